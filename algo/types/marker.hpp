@@ -1,0 +1,38 @@
+// Fiducial markers: what is seen in an image, and where they are in a scene.
+#pragma once
+
+#include <array>
+#include <map>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace plumb {
+
+/// Corners in detector order: top-left first, clockwise as seen on the print. In the marker's own frame
+/// (x right, y up on the print, z out of it) they are (-,+), (+,+), (+,-), (-,-) times length/2.
+using MarkerCorners = std::array<Eigen::Vector3d, 4>;  ///< metres
+using ImageCorners = std::array<Eigen::Vector2d, 4>;   ///< pixels, centres at integers, as seen (distorted)
+
+/// One marker in one image.
+struct MarkerObservation {
+  int id = 0;
+  ImageCorners corners;
+};
+
+/// Corners of a marker of the given side in its own frame, in detector order.
+[[nodiscard]] inline MarkerCorners CornersInMarkerFrame(double length_m) {
+  const double h = length_m / 2.0;
+  return {Eigen::Vector3d(-h, h, 0), Eigen::Vector3d(h, h, 0), Eigen::Vector3d(h, -h, 0), Eigen::Vector3d(-h, -h, 0)};
+}
+
+/// A marker's corners in a scene, with how well they are known.
+struct SceneMarker {
+  MarkerCorners corners;   ///< Scene frame.
+  int num_views = 0;       ///< Keyframes (or frames) that contributed.
+  double sigma_m = 0.001;  ///< Standard deviation of one corner coordinate, metres.
+};
+
+using MarkerMap = std::map<int, SceneMarker>;  ///< by id
+
+}  // namespace plumb

@@ -1,0 +1,56 @@
+// A reconstructed scene: what `plumb reconstruct` makes and `plumb compare` reads.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "algo/types/height_map.hpp"
+#include "algo/types/marker.hpp"
+#include "algo/types/point_cloud.hpp"
+#include "algo/types/pose.hpp"
+
+namespace plumb {
+
+enum class Preset { kBest, kPaper };
+[[nodiscard]] inline const char* Name(Preset preset) { return preset == Preset::kBest ? "best" : "paper"; }
+
+enum class SceneFrame { kReferenceMarker, kFirstKeyframe };
+[[nodiscard]] inline const char* Name(SceneFrame frame) {
+  return frame == SceneFrame::kReferenceMarker ? "reference_marker" : "first_keyframe";
+}
+
+/// A camera pose with the time it belongs to (the depth image's stamp).
+struct StampedPose {
+  double time_s = 0.0;
+  Pose T_world_camera = Pose::Identity();  ///< world = the scene's own frame
+};
+
+/// All of one scan. Lengths in metres, everything in the scene's own frame.
+struct Scene {
+  Preset preset = Preset::kBest;
+  SceneFrame frame = SceneFrame::kFirstKeyframe;
+  std::string marker_dictionary;
+  double marker_length_m = 0.0;
+  std::optional<int> reference_marker;
+  MarkerMap markers;
+
+  std::vector<StampedPose> keyframes;
+  std::vector<StampedPose> trajectory;  ///< Every tracked frame.
+  std::int64_t frames_total = 0;
+  std::int64_t frames_tracked = 0;
+  std::int64_t frames_dropped = 0;
+  double longest_lost_s = 0.0;  ///< Longest time without a pose between two tracked frames.
+
+  PointCloud cloud;                     ///< Merged surface: normals always, colours unless left out.
+  std::optional<HeightMap> height_map;  ///< Only in the reference marker's frame.
+  TriangleMesh mesh;                    ///< Of the height map, or empty.
+
+  std::map<std::string, double> calibration;  ///< What was estimated; keys carry their units.
+  std::map<std::string, double> timings_s;
+  std::vector<std::string> warnings;
+};
+
+}  // namespace plumb

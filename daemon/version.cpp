@@ -1,0 +1,7 @@
+#include "daemon/version.hpp"
+
+namespace plumb {
+
+std::string_view Version() { return PLUMB_VERSION; }
+
+}  // namespace plumb

@@ -1,0 +1,26 @@
+# Libraries of the system, each by its package's own config where it has one.
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(Ceres 2.1 REQUIRED)
+find_package(TBB REQUIRED)
+find_package(fmt REQUIRED)
+find_package(nlohmann_json 3.11 REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(PNG REQUIRED)
+find_package(TIFF REQUIRED)
+find_package(JPEG REQUIRED)
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(cairo REQUIRED IMPORTED_TARGET cairo)
+find_path(PLUMB_TOMLPP_INCLUDE toml++/toml.h REQUIRED)
+add_library(tomlplusplus::tomlplusplus INTERFACE IMPORTED)
+target_include_directories(tomlplusplus::tomlplusplus INTERFACE ${PLUMB_TOMLPP_INCLUDE})
+find_path(PLUMB_NANOFLANN_INCLUDE nanoflann.hpp REQUIRED)
+
+# Debian ships OpenCV's CMake package only with the whole of OpenCV (highgui, imgcodecs and their closure): here only the modules used.
+find_path(PLUMB_OPENCV_INCLUDE opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
+foreach(module core imgproc flann features2d calib3d video aruco)
+  find_library(PLUMB_OPENCV_${module} opencv_${module} REQUIRED)
+  add_library(opencv_${module} UNKNOWN IMPORTED)
+  set_target_properties(opencv_${module} PROPERTIES IMPORTED_LOCATION ${PLUMB_OPENCV_${module}}
+    INTERFACE_INCLUDE_DIRECTORIES ${PLUMB_OPENCV_INCLUDE})
+endforeach()
