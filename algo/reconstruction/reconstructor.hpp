@@ -1,0 +1,62 @@
+// From a stream of RGB-D frames to a scene: the whole chain of the method behind one class.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <string_view>
+
+#include "algo/types/frame.hpp"
+#include "algo/types/scene.hpp"
+
+namespace plumb {
+
+struct ReconstructorOptions {
+  Preset preset = Preset::kBest;
+  bool keep_color = true;  ///< false: clouds and meshes carry no colours (patients).
+  bool use_markers = true;  ///< false: track and reconstruct by keypoints and depth alone.
+  bool use_keypoints = true;  ///< false: track by markers (and depth) alone.
+  int num_icp_iterations = 20;  ///< Preset `paper`: iterations of Algorithm 1.
+  unsigned seed = 1;            ///< Of random subsampling.
+  /// Wall clock in seconds for `Scene::timings_s`; none: no timings. The method itself never looks at a clock.
+  std::function<double()> now_s;
+};
+
+/// What tracking made of one frame; for guidance while sweeping.
+struct TrackingReport {
+  bool tracked = false;
+  bool is_keyframe = false;
+  int num_keypoints = 0;      ///< Inlier landmarks.
+  int num_markers = 0;        ///< Markers that took part.
+  Pose T_world_camera = Pose::Identity();  ///< At the depth stamp; live estimate in the tracker's own world.
+  double median_depth_m = 0;  ///< 0: no valid depth.
+  double valid_depth = 0;     ///< Share of pixels with depth.
+};
+
+/// Streams frames into a scene: AddFrame() tracks and prepares, so that Finish() has only the joint solve, the surfaces
+/// and the height map left. One thread calls; inside, work is spread over TBB's threads. Deterministic: same frames,
+/// same options, same scene bit for bit, whatever the number of threads.
+class Reconstructor {
+ public:
+  /// @throws DataError if the stream's marker dictionary is unknown or its intrinsics make no sense.
+  Reconstructor(const StreamInfo& info, const ReconstructorOptions& options);
+  ~Reconstructor();
+
+  /// @throws DataError if the images do not have the size that the intrinsics state.
+  TrackingReport AddFrame(const Frame& frame);
+
+  /// A frame was dropped before it came here (live, too slow): counted only.
+  void CountDropped(int num_frames);
+
+  /// The scene. Call once, last.
+  /// @throws DataError if nothing can be reconstructed: fewer than two frames, no valid depth anywhere.
+  /// @throws Interrupted on a stop request.
+  [[nodiscard]] Scene Finish(const std::stop_token& stop = {},
+                             const std::function<void(double fraction, std::string_view what)>& progress = {});
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace plumb
