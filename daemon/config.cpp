@@ -1,0 +1,266 @@
+#include "daemon/config.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <concepts>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/types/errors.hpp"
+#include "algo/types/units.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr std::uintmax_t kMaxFileBytes = 1 << 20;
+
+std::string ReadText(const std::filesystem::path& file, std::string_view what) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  if (error) throw DataError(fmt::format("cannot read the {} '{}': {}", what, file.string(), error.message()));
+  if (size > kMaxFileBytes) {
+    throw DataError(fmt::format("the {} '{}' has {} bytes, expected at most {}", what, file.string(), size, kMaxFileBytes));
+  }
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw DataError(fmt::format("cannot open the {} '{}' for reading", what, file.string()));
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// One table of the file: values are taken key by key, and what nobody took is unknown.
+class Section {
+ public:
+  Section(const toml::table& root, std::string name, const std::string& file) : name_(std::move(name)), file_(file) {
+    const toml::node* node = root.get(name_);
+    if (node == nullptr) return;
+    table_ = node->as_table();
+    if (table_ == nullptr) Fail(*node, name_, "a table, [" + name_ + "]");
+  }
+
+  template <typename T, typename Check>
+  void Take(std::string_view key, T& value, std::string_view expected, Check is_valid) {
+    const toml::node* node = Find(key);
+    if (node == nullptr) return;
+    std::optional<T> found;
+    if constexpr (std::floating_point<T>) {
+      if (node->is_number()) found = node->value<double>();
+    } else if constexpr (std::integral<T> && !std::same_as<T, bool>) {
+      if (const std::optional<std::int64_t> number = node->value_exact<std::int64_t>(); number && std::in_range<T>(*number))
+        found = static_cast<T>(*number);
+    } else {
+      found = node->value_exact<T>();
+    }
+    if (!found || !is_valid(*found)) Fail(*node, key, expected);
+    value = *found;
+  }
+
+  /// A positive number in another unit than inside.
+  void TakeScaled(std::string_view key, double& value, double unit, std::string_view expected) {
+    double number = value / unit;
+    bool taken = false;
+    Take(key, number, expected, [&](double v) { return taken = std::isfinite(v) && v > 0; });
+    if (taken) value = number * unit;
+  }
+
+  template <typename T>
+  void TakeName(std::string_view key, T& value, const std::vector<std::pair<std::string, T>>& names) {
+    std::vector<std::string> known;
+    for (const auto& [name, unused] : names) known.push_back('"' + name + '"');
+    std::string found;
+    const auto match = [&](const std::string& text) {
+      return std::find_if(names.begin(), names.end(), [&](const auto& name) { return name.first == text; });
+    };
+    Take(key, found, fmt::format("one of {}", fmt::join(known, ", ")), [&](const std::string& text) { return match(text) != names.end(); });
+    if (!found.empty()) value = match(found)->second;
+  }
+
+  /// Rows of finite numbers; nothing if the key is absent. One row may be written without the outer brackets.
+  std::optional<std::vector<std::vector<double>>> TakeRows(std::string_view key, std::size_t num_rows, std::size_t num_columns,
+                                                           std::string_view expected) {
+    const toml::node* node = Find(key);
+    if (node == nullptr) return std::nullopt;
+    std::vector<std::vector<double>> rows;
+    const auto read_row = [&](const toml::node& row_node) {
+      const toml::array* row = row_node.as_array();
+      if (row == nullptr || row->size() != num_columns) Fail(row_node, key, expected);
+      rows.emplace_back();
+      for (const toml::node& element : *row) {
+        const std::optional<double> number = element.is_number() ? element.value<double>() : std::nullopt;
+        if (!number || !std::isfinite(*number)) Fail(element, key, expected);
+        rows.back().push_back(*number);
+      }
+    };
+    if (num_rows == 1) {
+      read_row(*node);
+    } else {
+      const toml::array* array = node->as_array();
+      if (array == nullptr || array->size() != num_rows) Fail(*node, key, expected);
+      for (const toml::node& row : *array) read_row(row);
+    }
+    return rows;
+  }
+
+  void RefuseTheRest() const {
+    if (table_ == nullptr) return;
+    for (const auto& [key, node] : *table_) {
+      if (std::find(taken_.begin(), taken_.end(), key.str()) != taken_.end()) continue;
+      throw DataError(fmt::format("{}:{}: unknown key '{}' in [{}]; known are {}", file_, node.source().begin.line, key.str(), name_,
+                                  fmt::join(taken_, ", ")));
+    }
+  }
+
+  [[noreturn]] void Fail(const toml::node& node, std::string_view key, std::string_view expected) const {
+    std::ostringstream found;
+    node.visit([&found](const auto& n) { found << n; });
+    throw DataError(fmt::format("{}:{}: {}.{}: expected {}, found {}", file_, node.source().begin.line, name_, key, expected, found.str()));
+  }
+
+ private:
+  const toml::node* Find(std::string_view key) {
+    taken_.emplace_back(key);
+    return table_ == nullptr ? nullptr : table_->get(key);
+  }
+
+  std::string name_;
+  const std::string& file_;
+  const toml::table* table_ = nullptr;
+  std::vector<std::string> taken_;
+};
+
+const auto kAny = [](const auto&) { return true; };
+const std::vector<std::pair<std::string, Preset>> kPresets = {{"best", Preset::kBest}, {"paper", Preset::kPaper}};
+
+void ReadMarkers(Section section, MarkerConfig& markers) {
+  std::string dictionary;
+  section.Take("dictionary", dictionary, "a dictionary's name, such as \"DICT_6X6_250\"", [](const std::string& s) { return !s.empty(); });
+  if (!dictionary.empty()) markers.dictionary = dictionary;
+  double length_m = 0;
+  section.Take("length_m", length_m, "a marker's side in metres, above 0 and at most 2", [](double v) { return v > 0 && v <= 2; });
+  if (length_m > 0) markers.length_m = length_m;
+  int reference = -1;
+  section.Take("reference", reference, "a marker's id, 0 or more", [](int id) { return id >= 0; });
+  if (reference >= 0) markers.reference = reference;
+  section.RefuseTheRest();
+}
+
+void ReadReconstruct(Section section, ReconstructorOptions& options) {
+  section.TakeName("preset", options.preset, kPresets);
+  section.Take("keep_color", options.keep_color, "true or false", kAny);
+  section.Take("use_markers", options.use_markers, "true or false", kAny);
+  section.Take("use_keypoints", options.use_keypoints, "true or false", kAny);
+  section.Take("num_icp_iterations", options.num_icp_iterations, "a whole number from 1 to 1000",
+               [](int n) { return n >= 1 && n <= 1000; });
+  section.Take("seed", options.seed, "a whole number, 0 or more", kAny);
+  section.RefuseTheRest();
+}
+
+void ReadCompare(Section section, Config& config) {
+  CompareOptions& options = config.compare;
+  section.TakeName("preset", options.preset, kPresets);
+  std::string region;
+  section.Take("region", region, "the path of a region file", [](const std::string& s) { return !s.empty(); });
+  if (!region.empty()) config.region_file = region;
+  if (const auto rows = section.TakeRows("isocentre_m", 1, 3, "[x, y, z] in metres")) {
+    options.isocentre_m = Eigen::Vector3d(rows->front().data());
+  }
+  section.TakeName("marker_kind", options.marker_kind, {{"room", MarkerKind::kRoom}, {"couch", MarkerKind::kCouch}});
+  section.TakeName("posture", options.posture,
+                   {{"HFS", PatientPosture::kHeadFirstSupine},
+                    {"HFP", PatientPosture::kHeadFirstProne},
+                    {"FFS", PatientPosture::kFeetFirstSupine},
+                    {"FFP", PatientPosture::kFeetFirstProne}});
+  section.TakeScaled("shift_tolerance_mm", options.shift_tolerance_m, kMillimetre, "millimetres above 0");
+  section.TakeScaled("rotation_tolerance_deg", options.rotation_tolerance_rad, kDegree, "degrees above 0");
+  section.Take("min_shared_markers", options.min_shared_markers, "a whole number from 1 to 1000",
+               [](int n) { return n >= 1 && n <= 1000; });
+  section.TakeScaled("moved_marker_mm", options.moved_marker_m, kMillimetre, "millimetres above 0");
+  section.TakeScaled("moved_marker_sigmas", options.moved_marker_sigmas, 1.0, "a number above 0");
+  section.Take("min_coverage", options.min_coverage, "a share from 0 to 1", [](double v) { return v >= 0 && v <= 1; });
+  section.TakeScaled("max_hole_mm", options.max_hole_m, kMillimetre, "millimetres above 0");
+  section.TakeScaled("max_residual_p95_mm", options.max_residual_p95_m, kMillimetre, "millimetres above 0");
+  section.TakeScaled("max_lost_s", options.max_lost_s, 1.0, "seconds above 0");
+  section.RefuseTheRest();
+}
+
+void ReadIec(Section section, const toml::table& root, Pose& T_iec_reference) {
+  const std::string_view expected = "a rigid transform: 4 rows of 4 numbers, a rotation and a translation in metres, last row 0 0 0 1";
+  if (const auto rows = section.TakeRows("T_iec_reference", 4, 4, expected)) {
+    Eigen::Matrix4d matrix;
+    for (Eigen::Index r = 0; r < 4; ++r) matrix.row(r) = Eigen::RowVector4d((*rows)[static_cast<std::size_t>(r)].data());
+    Pose T;
+    T.matrix() = matrix;
+    const bool is_rotation =
+        (T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-4 && T.linear().determinant() > 0;
+    const bool is_affine = (matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() == 0;
+    if (!is_rotation || !is_affine) section.Fail(*root["iec"]["T_iec_reference"].node(), "T_iec_reference", expected);
+    T_iec_reference = Orthonormalised(T);
+  }
+  section.RefuseTheRest();
+}
+
+}  // namespace
+
+Config ParseConfig(const std::string& text, const std::string& name) {
+  toml::table root;
+  try {
+    root = toml::parse(text, name);
+  } catch (const toml::parse_error& error) {
+    throw DataError(fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line, error.description()));
+  }
+  static constexpr std::array<std::string_view, 4> kSections = {"markers", "reconstruct", "compare", "iec"};
+  for (const auto& [key, node] : root) {
+    if (std::find(kSections.begin(), kSections.end(), key.str()) != kSections.end()) continue;
+    throw DataError(fmt::format("{}:{}: unknown table or key '{}'; known are [{}]", name, node.source().begin.line, key.str(),
+                                fmt::join(kSections, "], [")));
+  }
+  Config config;
+  ReadMarkers(Section(root, "markers", name), config.markers);
+  ReadReconstruct(Section(root, "reconstruct", name), config.reconstruct);
+  ReadCompare(Section(root, "compare", name), config);
+  ReadIec(Section(root, "iec", name), root, config.compare.T_iec_reference);
+  return config;
+}
+
+Config ReadConfig(const std::filesystem::path& file) {
+  Config config = ParseConfig(ReadText(file, "configuration"), file.string());
+  if (config.region_file && config.region_file->is_relative()) config.region_file = file.parent_path() / *config.region_file;
+  return config;
+}
+
+std::vector<Eigen::Vector2d> ReadRegion(const std::filesystem::path& file) {
+  const std::string text = ReadText(file, "region file");
+  const auto fail = [&](std::string_view what) { throw DataError(fmt::format("region file '{}': {}", file.string(), what)); };
+  nlohmann::json json;
+  try {
+    json = nlohmann::json::parse(text);
+  } catch (const nlohmann::json::exception& error) {
+    fail(fmt::format("not valid JSON ({})", error.what()));
+  }
+  if (!json.is_object()) fail("expected an object with \"format\", \"frame\" and \"polygon_m\"");
+  if (json.value("format", nlohmann::json()) != 1)
+    fail(fmt::format("expected \"format\": 1, found {}", json.value("format", nlohmann::json()).dump()));
+  if (json.value("frame", nlohmann::json()) != "reference_marker") {
+    fail(fmt::format("expected \"frame\": \"reference_marker\", found {}", json.value("frame", nlohmann::json()).dump()));
+  }
+  const nlohmann::json vertices = json.value("polygon_m", nlohmann::json());
+  if (!vertices.is_array() || vertices.size() < 3 || vertices.size() > 10000)
+    fail("expected \"polygon_m\" with 3 to 10000 vertices [x, y] in metres");
+  std::vector<Eigen::Vector2d> polygon;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const nlohmann::json& vertex = vertices[i];
+    const bool is_point = vertex.is_array() && vertex.size() == 2 && vertex[0].is_number() && vertex[1].is_number();
+    if (!is_point) fail(fmt::format("polygon_m[{}]: expected [x, y] in metres, found {}", i, vertex.dump().substr(0, 80)));
+    polygon.emplace_back(vertex[0].get<double>(), vertex[1].get<double>());
+    if (!(polygon.back().cwiseAbs().maxCoeff() <= 100)) fail(fmt::format("polygon_m[{}]: expected metres within 100 m", i));
+  }
+  return polygon;
+}
+
+}  // namespace plumb
