@@ -1,0 +1,275 @@
+#include "drivers/replay/camera_file.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/core/persistence.hpp>
+
+#include "algo/types/errors.hpp"
+#include "drivers/replay/image_file.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr std::size_t kMaxText = std::size_t{1} << 16;
+constexpr int kMaxNesting = 8;  // OpenCV's parser recurses; a calibration needs two levels
+constexpr double kMaxMarkerLength_m = 2.0;
+constexpr double kMaxDistortion = 100.0;
+constexpr double kMinDepthScale = 10.0;  // below, somebody wrote metres per unit
+constexpr double kMaxDepthScale = 1e6;
+constexpr double kMaxBaseline_m = 1.0;
+constexpr int kMaxMarkerId = 65535;
+
+constexpr std::array<std::string_view, 22> kDictionaries = {
+    "DICT_4X4_50",        "DICT_4X4_100",        "DICT_4X4_250",        "DICT_4X4_1000",       "DICT_5X5_50",         "DICT_5X5_100",
+    "DICT_5X5_250",       "DICT_5X5_1000",       "DICT_6X6_50",         "DICT_6X6_100",        "DICT_6X6_250",        "DICT_6X6_1000",
+    "DICT_7X7_50",        "DICT_7X7_100",        "DICT_7X7_250",        "DICT_7X7_1000",       "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_16h5",
+    "DICT_APRILTAG_25h9", "DICT_APRILTAG_36h10", "DICT_APRILTAG_36h11", "DICT_ARUCO_MIP_36h12"};
+
+/// Refuses texts whose nesting would take the parser's stack.
+void CheckText(std::string_view text, const std::string& name) {
+  if (text.size() > kMaxText) throw DataError(fmt::format("{} has {} bytes, at most {} are read", name, text.size(), kMaxText));
+  if (text.find('\0') != std::string_view::npos) throw DataError(fmt::format("{} holds zero bytes: it is no text", name));
+  int depth = 0;
+  int dashes = 0;
+  for (const char c : text) {
+    if (c == '[' || c == '{') ++depth;
+    if ((c == ']' || c == '}') && depth > 0) --depth;
+    if (c == '-') {
+      ++dashes;  // "- - - x" nests without brackets
+    } else if (c != ' ') {
+      dashes = 0;
+    }
+    if (depth > kMaxNesting || dashes > kMaxNesting) throw DataError(fmt::format("{} nests deeper than {} levels", name, kMaxNesting));
+  }
+}
+
+/// The keys of one file, typed and with messages.
+class Keys {
+ public:
+  Keys(std::string_view text, std::string name) : name_(std::move(name)) {
+    CheckText(text, name_);
+    std::string document(text);
+    // Files written by hand often lack the header that OpenCV asks for.
+    if (!document.starts_with("%YAML")) document.insert(0, "%YAML:1.0\n---\n");
+    try {
+      storage_.open(document, cv::FileStorage::READ | cv::FileStorage::MEMORY | cv::FileStorage::FORMAT_YAML);
+    } catch (const std::exception& error) {
+      throw DataError(fmt::format("{} cannot be parsed as OpenCV YAML: {}", name_, FirstLine(error.what())));
+    }
+    if (!storage_.isOpened() || !storage_.root().isMap()) {
+      throw DataError(fmt::format("{} holds no keys; expected OpenCV YAML as its FileStorage writes it", name_));
+    }
+  }
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] bool has(const char* key) const { return !storage_[key].empty(); }
+  [[nodiscard]] std::string Where(const char* key) const { return fmt::format("{}: {}", name_, key); }
+
+  [[nodiscard]] double Number(const char* key) const { return Number(Required(key), key); }
+
+  [[nodiscard]] int Integer(const char* key) const {
+    const double value = Number(key);
+    if (value != std::floor(value) || std::abs(value) > 1e9) {
+      throw DataError(fmt::format("{} is {}, expected a whole number", Where(key), value));
+    }
+    return static_cast<int>(value);
+  }
+
+  [[nodiscard]] std::string Text(const char* key) const {
+    const cv::FileNode node = Required(key);
+    if (!node.isString()) throw DataError(fmt::format("{} is no text", Where(key)));
+    return node.string();
+  }
+
+  /// The elements of a matrix, row by row: an !!opencv-matrix, or a plain list.
+  [[nodiscard]] std::vector<double> Matrix(const char* key) const {
+    const cv::FileNode node = Required(key);
+    const cv::FileNode data = node.isMap() ? node["data"] : node;
+    if (!data.isSeq() || data.size() > 64) throw DataError(fmt::format("{} is no matrix of numbers", Where(key)));
+    std::vector<double> values;
+    for (const cv::FileNode& element : data) values.push_back(Number(element, key));
+    return values;
+  }
+
+ private:
+  static std::string FirstLine(std::string text) { return text.substr(0, std::min<std::size_t>(text.find('\n'), 200)); }
+
+  [[nodiscard]] cv::FileNode Required(const char* key) const {
+    const cv::FileNode node = storage_[key];
+    if (node.empty()) throw DataError(fmt::format("{} is missing", Where(key)));
+    return node;
+  }
+
+  [[nodiscard]] double Number(const cv::FileNode& node, const char* key) const {
+    if (!node.isInt() && !node.isReal()) throw DataError(fmt::format("{} holds something that is no number", Where(key)));
+    const double value = node.real();
+    if (!std::isfinite(value)) throw DataError(fmt::format("{} holds {}, expected finite numbers", Where(key), value));
+    return value;
+  }
+
+  std::string name_;
+  cv::FileStorage storage_;
+};
+
+void ReadCameraMatrix(const Keys& keys, const char* key, Intrinsics& intrinsics) {
+  const std::vector<double> k = keys.Matrix(key);
+  if (k.size() != 9) throw DataError(fmt::format("{} has {} elements, expected 3x3", keys.Where(key), k.size()));
+  if (!(k[0] > 0 && k[4] > 0)) {
+    throw DataError(
+        fmt::format("{} has focal lengths {} and {}, expected both > 0 pixels; calibrate the camera", keys.Where(key), k[0], k[4]));
+  }
+  if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
+    throw DataError(fmt::format("{} is [{}], expected [fx 0 cx, 0 fy cy, 0 0 1]", keys.Where(key), fmt::join(k, " ")));
+  }
+  intrinsics.fx = k[0];
+  intrinsics.fy = k[4];
+  intrinsics.cx = k[2];
+  intrinsics.cy = k[5];
+  // A principal point off the image, or a view narrower than 5 deg or wider than 150 deg, belongs to another image size.
+  const auto fits = [](double f, double c, int size) { return c > 0 && c < size && f > size * 0.13 && f < size * 12.0; };
+  if (!fits(k[0], k[2], intrinsics.width) || !fits(k[4], k[5], intrinsics.height)) {
+    throw DataError(fmt::format("{} (fx {} fy {} cx {} cy {}) does not fit an image of {}x{}; was it calibrated at another size?",
+                                keys.Where(key), k[0], k[4], k[2], k[5], intrinsics.width, intrinsics.height));
+  }
+}
+
+void ReadDistortion(const Keys& keys, const char* key, Intrinsics& intrinsics) {
+  const std::vector<double> d = keys.Matrix(key);
+  const bool only_five = d.size() >= 4 && std::all_of(d.begin() + std::min<std::ptrdiff_t>(5, std::ssize(d)), d.end(),
+                                                      [](double value) { return value == 0; });
+  if (!only_five) {
+    throw DataError(
+        fmt::format("{} has {} elements, expected the five k1 k2 p1 p2 k3 of OpenCV's plain lens model", keys.Where(key), d.size()));
+  }
+  for (std::size_t i = 0; i < std::min<std::size_t>(5, d.size()); ++i) {
+    if (std::abs(d[i]) > kMaxDistortion) throw DataError(fmt::format("{} holds {}, which is no lens", keys.Where(key), d[i]));
+    intrinsics.distortion[i] = d[i];
+  }
+  // A lens model must be one to one over the whole image, or pixels cannot become rays.
+  for (const double x : {0.0, 0.25, 0.75, 1.0}) {
+    for (const double y : {0.0, 0.25, 0.75, 1.0}) {
+      const Eigen::Vector2d pixel(x * (intrinsics.width - 1), y * (intrinsics.height - 1));
+      const Eigen::Vector2d ray = Undistort(intrinsics, pixel);
+      const double error_px = (Project(intrinsics, ray.homogeneous()) - pixel).norm();
+      if (!(error_px < 0.5)) {
+        throw DataError(fmt::format("{} cannot be undone at pixel ({:.0f}, {:.0f}); is it for this camera and image size?", keys.Where(key),
+                                    pixel.x(), pixel.y()));
+      }
+    }
+  }
+}
+
+void CheckSize(const Keys& keys, const Intrinsics& intrinsics, const char* what) {
+  if (intrinsics.width >= 1 && intrinsics.height >= 1 && intrinsics.width <= kMaxImageSide && intrinsics.height <= kMaxImageSide) return;
+  throw DataError(fmt::format("{}: the {} image is {}x{} pixels, expected 1 to {} a side", keys.name(), what, intrinsics.width,
+                              intrinsics.height, kMaxImageSide));
+}
+
+Pose ReadRigid(const Keys& keys, const char* key) {
+  const std::vector<double> m = keys.Matrix(key);
+  if (m.size() != 16) throw DataError(fmt::format("{} has {} elements, expected 4x4", keys.Where(key), m.size()));
+  const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(m.data());
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+  constexpr double kTolerance = 1e-3;
+  const bool rigid = (rotation * rotation.transpose()).isApprox(Eigen::Matrix3d::Identity(), kTolerance) && rotation.determinant() > 0 &&
+                     matrix.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), kTolerance);
+  const Eigen::Vector3d translation_m = matrix.topRightCorner<3, 1>();
+  if (!rigid || translation_m.norm() > kMaxBaseline_m) {
+    throw DataError(
+        fmt::format("{} is no rigid transform of less than {} m; expected [R t; 0 0 0 1] in metres", keys.Where(key), kMaxBaseline_m));
+  }
+  Pose T = Pose::Identity();
+  T.linear() = rotation;
+  T.translation() = translation_m;
+  return Orthonormalised(T);
+}
+
+void ReadDepthCamera(const Keys& keys, CameraFile& camera) {
+  if (!keys.has("depth_registered")) return;
+  const int registered = keys.Integer("depth_registered");
+  if (registered != 0 && registered != 1) {
+    throw DataError(fmt::format("{} is {}, expected 0 or 1", keys.Where("depth_registered"), registered));
+  }
+  if (registered == 1) return;
+  if (!keys.has("depth_camera_matrix") || !keys.has("depth_distortion_coefficients") || !keys.has("T_color_depth")) {
+    camera.warnings.push_back(
+        fmt::format("{}: depth_registered is 0 but depth_camera_matrix, depth_distortion_coefficients and T_color_depth are not all given; "
+                    "depth is taken as registered to colour",
+                    keys.name()));
+    return;
+  }
+  DepthCamera depth;
+  depth.intrinsics.width = keys.has("depth_image_width") ? keys.Integer("depth_image_width") : camera.color.width;
+  depth.intrinsics.height = keys.has("depth_image_height") ? keys.Integer("depth_image_height") : camera.color.height;
+  CheckSize(keys, depth.intrinsics, "depth");
+  ReadCameraMatrix(keys, "depth_camera_matrix", depth.intrinsics);
+  ReadDistortion(keys, "depth_distortion_coefficients", depth.intrinsics);
+  depth.T_color_depth = ReadRigid(keys, "T_color_depth");
+  camera.depth_camera = depth;
+}
+
+void ReadMarkers(const Keys& keys, CameraFile& camera) {
+  if (keys.has("marker_dictionary")) {
+    camera.marker_dictionary = keys.Text("marker_dictionary");
+    CheckDictionary(*camera.marker_dictionary, keys.Where("marker_dictionary"));
+  }
+  if (keys.has("marker_length")) {
+    camera.marker_length_m = keys.Number("marker_length");
+    CheckMarkerLength(*camera.marker_length_m, keys.Where("marker_length"));
+  }
+  if (keys.has("reference_marker")) {
+    camera.reference_marker = keys.Integer("reference_marker");
+    if (*camera.reference_marker < 0 || *camera.reference_marker > kMaxMarkerId) {
+      throw DataError(fmt::format("{} is {}, expected a marker id from 0 to {}", keys.Where("reference_marker"), *camera.reference_marker,
+                                  kMaxMarkerId));
+    }
+  }
+}
+
+}  // namespace
+
+bool IsKnownDictionary(std::string_view name) { return std::find(kDictionaries.begin(), kDictionaries.end(), name) != kDictionaries.end(); }
+
+void CheckDictionary(const std::string& dictionary, const std::string& where) {
+  if (IsKnownDictionary(dictionary)) return;
+  throw DataError(fmt::format("{} is \"{}\", expected one of {}", where, dictionary.substr(0, 60), fmt::join(kDictionaries, ", ")));
+}
+
+void CheckMarkerLength(double length_m, const std::string& where) {
+  if (length_m > 0 && length_m < kMaxMarkerLength_m) return;
+  throw DataError(fmt::format("{} is {} m, expected more than 0 and less than {} m (the side of the black square)", where, length_m,
+                              kMaxMarkerLength_m));
+}
+
+CameraFile ParseCameraFile(std::string_view text, const std::string& name) try {
+  const Keys keys(text, name);
+  CameraFile camera;
+  camera.color.width = keys.Integer("image_width");
+  camera.color.height = keys.Integer("image_height");
+  CheckSize(keys, camera.color, "colour");
+  ReadCameraMatrix(keys, "camera_matrix", camera.color);
+  if (keys.has("distortion_coefficients")) {
+    ReadDistortion(keys, "distortion_coefficients", camera.color);
+  } else {
+    camera.warnings.push_back(fmt::format("{} has no distortion_coefficients: the lens is taken as free of distortion", name));
+  }
+  if (keys.has("depth_scale")) {
+    camera.depth_scale = keys.Number("depth_scale");
+    if (!(camera.depth_scale >= kMinDepthScale && camera.depth_scale <= kMaxDepthScale)) {
+      throw DataError(fmt::format("{} is {}, expected units per metre from {} to {} (1000 for millimetres)", keys.Where("depth_scale"),
+                                  camera.depth_scale, kMinDepthScale, kMaxDepthScale));
+    }
+  }
+  ReadDepthCamera(keys, camera);
+  ReadMarkers(keys, camera);
+  return camera;
+} catch (const cv::Exception& error) {
+  throw DataError(fmt::format("{} cannot be read as OpenCV YAML: {}", name, error.err.substr(0, 200)));
+}
+
+}  // namespace plumb

@@ -1,0 +1,36 @@
+// The index files of a TUM RGB-D recording (rgb.txt, depth.txt) and which colour image belongs to which depth image.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace plumb {
+
+/// One line of an index.
+struct IndexEntry {
+  double time_s = 0.0;
+  std::string file;  ///< Relative to the recording's folder, with '/'; stays inside it as far as the text shows.
+};
+
+/// The entries of an index: lines "timestamp filename", comments (#) and empty lines skipped; CR LF, tabs and commas are accepted.
+/// Stamps are seconds, not negative, and rise strictly from line to line.
+/// @param name  Of the file, for messages, which give the line too.
+/// @throws DataError on anything else, on paths that are absolute or hold "..", and on more than 1,000,000 entries.
+[[nodiscard]] std::vector<IndexEntry> ParseIndex(std::string_view text, const std::string& name);
+
+/// Positions of one colour and one depth image that belong together.
+struct IndexPair {
+  std::size_t color = 0;
+  std::size_t depth = 0;
+  bool operator==(const IndexPair&) const = default;
+};
+
+/// Pairs by the smallest difference of stamps first, each image at most once, differences up to `max_gap_s`.
+/// Both lists must rise strictly. The result rises in both members.
+[[nodiscard]] std::vector<IndexPair> AssociateByTime(std::span<const IndexEntry> color, std::span<const IndexEntry> depth,
+                                                     double max_gap_s);
+
+}  // namespace plumb

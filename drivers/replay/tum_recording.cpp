@@ -1,0 +1,272 @@
+#include "drivers/replay/tum_recording.hpp"
+
+#include <fmt/format.h>
+#include <time.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <stdexcept>
+#include <stop_token>
+#include <thread>
+#include <vector>
+
+#include "algo/types/errors.hpp"
+#include "drivers/replay/camera_file.hpp"
+#include "drivers/replay/file_io.hpp"
+#include "drivers/replay/image_file.hpp"
+#include "drivers/replay/registration.hpp"
+#include "drivers/replay/tum_index.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxIndexBytes = std::size_t{64} << 20;
+constexpr std::size_t kMaxCameraBytes = std::size_t{1} << 16;
+constexpr std::size_t kReadAhead = 3;
+constexpr std::size_t kMinFrames = 2;
+constexpr std::uint16_t kSaturated = 65535;
+
+double ThreadCpuSeconds() {
+  timespec now{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Names and stamps of one pair, everything that decoding needs.
+struct FramePlan {
+  fs::path color_file;
+  fs::path depth_file;
+  double color_time_s = 0.0;
+  double depth_time_s = 0.0;
+};
+
+/// A frame as the decoding thread hands it over, or why there is none.
+struct Decoded {
+  Frame frame;
+  bool has_depth = false;
+  double cpu_s = 0.0;
+  std::exception_ptr error;
+};
+
+std::vector<IndexEntry> ReadIndex(const fs::path& file) {
+  std::vector<IndexEntry> entries = ParseIndex(ReadTextFile(file, kMaxIndexBytes), file.string());
+  if (entries.empty()) throw DataError(fmt::format("{} lists no image", file.string()));
+  return entries;
+}
+
+/// The real place of an image, which must lie in the recording's folder even where links lead.
+fs::path Resolve(const fs::path& canonical_folder, const fs::path& index, const IndexEntry& entry) {
+  std::error_code error;
+  fs::path file = fs::canonical(canonical_folder / entry.file, error);
+  if (error) {
+    throw DataError(fmt::format("image {} of {} (stamp {:.6f}) cannot be found: {}; copy the recording again or remove the line",
+                                entry.file, index.string(), entry.time_s, error.message()));
+  }
+  if (std::mismatch(canonical_folder.begin(), canonical_folder.end(), file.begin(), file.end()).first != canonical_folder.end()) {
+    throw DataError(fmt::format("image {} of {} leads out of the recording's folder, to {}; copy it into the folder", entry.file,
+                                index.string(), file.string()));
+  }
+  return file;
+}
+
+/// TUM's published nominal camera, for recordings that bring none.
+CameraFile AssumedCamera(const fs::path& first_image) {
+  const cv::Mat image = ReadColorImage(first_image);
+  if (image.cols * 3 != image.rows * 4) {
+    throw DataError(
+        fmt::format("the recording has no camera.yaml and its images are {}x{}: nominal intrinsics are known only for 4:3 "
+                    "(640x480, 320x240); add camera.yaml",
+                    image.cols, image.rows));
+  }
+  CameraFile camera;
+  camera.color = Resized(Intrinsics{}, image.cols, image.rows);
+  camera.warnings.push_back(fmt::format("no camera.yaml: assumed fx {} fy {} cx {} cy {}, no distortion and {} depth units per metre",
+                                        camera.color.fx, camera.color.fy, camera.color.cx, camera.color.cy, camera.depth_scale));
+  return camera;
+}
+
+/// Metres from units; true if any pixel holds a measurement.
+bool ToMetres(const cv::Mat& depth_units, double units_per_metre, cv::Mat& depth_m) {
+  depth_m.create(depth_units.size(), CV_32FC1);
+  const auto metres_per_unit = static_cast<float>(1.0 / units_per_metre);
+  unsigned any = 0;
+  for (int row = 0; row < depth_units.rows; ++row) {
+    const auto* in = depth_units.ptr<std::uint16_t>(row);
+    auto* out = depth_m.ptr<float>(row);
+    for (int column = 0; column < depth_units.cols; ++column) {
+      const unsigned units = in[column] == kSaturated ? 0U : in[column];
+      any |= units;
+      out[column] = static_cast<float>(units) * metres_per_unit;
+    }
+  }
+  return any != 0;
+}
+
+void CheckImageSize(const fs::path& file, const cv::Mat& image, const Intrinsics& camera, const char* what) {
+  if (image.cols == camera.width && image.rows == camera.height) return;
+  throw DataError(fmt::format("{} image {} has {}x{} pixels, expected {}x{} as the camera states; use the calibration of this image size",
+                              what, file.string(), image.cols, image.rows, camera.width, camera.height));
+}
+
+}  // namespace
+
+struct TumRecording::Impl {
+  StreamInfo info;
+  RecordingStatistics statistics;
+  std::vector<FramePlan> plans;
+  double depth_scale = 5000.0;
+  Intrinsics depth_intrinsics;
+  std::optional<DepthRegistration> registration;
+
+  // Shared with the decoding thread.
+  std::mutex mutex;
+  std::condition_variable_any changed;
+  std::deque<Decoded> queue;
+  bool finished = false;  ///< The thread will add nothing more.
+  std::jthread thread;    ///< Last member: joined before the others go.
+
+  void FindFrames(const fs::path& folder, double max_gap_s);
+  void ReadCamera(const fs::path& folder, const RecordingDefaults& defaults);
+  [[nodiscard]] Decoded Decode(std::size_t i) const;
+  void DecodeAll(const std::stop_token& stop);
+};
+
+void TumRecording::Impl::FindFrames(const fs::path& folder, double max_gap_s) {
+  const fs::path color_index = folder / "rgb.txt";
+  const fs::path depth_index = folder / "depth.txt";
+  const std::vector<IndexEntry> color = ReadIndex(color_index);
+  const std::vector<IndexEntry> depth = ReadIndex(depth_index);
+  const std::vector<IndexPair> pairs = AssociateByTime(color, depth, max_gap_s);
+  if (pairs.size() < kMinFrames) {
+    throw DataError(
+        fmt::format("recording {} has {} frame{} ({} colour and {} depth images, stamps at most {:.0f} ms apart), expected at "
+                    "least {}; are both lists of the same sweep and clock?",
+                    folder.string(), pairs.size(), pairs.size() == 1 ? "" : "s", color.size(), depth.size(), max_gap_s * 1e3, kMinFrames));
+  }
+  const fs::path canonical_folder = fs::canonical(folder);
+  plans.reserve(pairs.size());
+  for (const IndexPair& pair : pairs) {
+    const IndexEntry& c = color[pair.color];
+    const IndexEntry& d = depth[pair.depth];
+    plans.push_back({Resolve(canonical_folder, color_index, c), Resolve(canonical_folder, depth_index, d), c.time_s, d.time_s});
+  }
+  statistics.num_unmatched_color = std::ssize(color) - std::ssize(pairs);
+  statistics.num_unmatched_depth = std::ssize(depth) - std::ssize(pairs);
+  if (statistics.num_unmatched_color > 0 || statistics.num_unmatched_depth > 0) {
+    info.warnings.push_back(fmt::format("{} of {} colour and {} of {} depth images have no partner within {:.0f} ms and are left out",
+                                        statistics.num_unmatched_color, color.size(), statistics.num_unmatched_depth, depth.size(),
+                                        max_gap_s * 1e3));
+  }
+  info.num_frames = std::ssize(plans);
+}
+
+void TumRecording::Impl::ReadCamera(const fs::path& folder, const RecordingDefaults& defaults) {
+  const fs::path file = folder / "camera.yaml";
+  const bool given = fs::exists(fs::symlink_status(file));
+  const CameraFile camera =
+      given ? ParseCameraFile(ReadTextFile(file, kMaxCameraBytes), file.string()) : AssumedCamera(plans.front().color_file);
+  info.intrinsics = camera.color;
+  info.intrinsics_assumed = !given;
+  info.marker_dictionary = camera.marker_dictionary.value_or(defaults.marker_dictionary);
+  info.marker_length_m = camera.marker_length_m.value_or(defaults.marker_length_m);
+  info.reference_marker = camera.reference_marker ? camera.reference_marker : defaults.reference_marker;
+  info.warnings.insert(info.warnings.end(), camera.warnings.begin(), camera.warnings.end());
+  if (!camera.marker_dictionary || !camera.marker_length_m) {
+    info.warnings.push_back(fmt::format("the recording does not state its markers: assumed {} with a side of {} m", info.marker_dictionary,
+                                        info.marker_length_m));
+  }
+  depth_scale = camera.depth_scale;
+  depth_intrinsics = camera.depth_camera ? camera.depth_camera->intrinsics : camera.color;
+  if (camera.depth_camera) registration.emplace(depth_intrinsics, camera.color, camera.depth_camera->T_color_depth);
+}
+
+Decoded TumRecording::Impl::Decode(std::size_t i) const {
+  const double begin_s = ThreadCpuSeconds();
+  const FramePlan& plan = plans[i];
+  Decoded decoded;
+  decoded.frame.index = static_cast<std::int64_t>(i);
+  decoded.frame.color_time_s = plan.color_time_s;
+  decoded.frame.depth_time_s = plan.depth_time_s;
+  decoded.frame.color_rgb = ReadColorImage(plan.color_file);
+  CheckImageSize(plan.color_file, decoded.frame.color_rgb, info.intrinsics, "colour");
+  const cv::Mat depth_units = ReadDepthImage(plan.depth_file);
+  CheckImageSize(plan.depth_file, depth_units, depth_intrinsics, "depth");
+  decoded.has_depth = ToMetres(depth_units, depth_scale, decoded.frame.depth_m);
+  if (registration) decoded.frame.depth_m = registration->Register(decoded.frame.depth_m);
+  decoded.cpu_s = ThreadCpuSeconds() - begin_s;
+  return decoded;
+}
+
+void TumRecording::Impl::DecodeAll(const std::stop_token& stop) {
+  for (std::size_t i = 0; i < plans.size(); ++i) {
+    Decoded decoded;
+    try {
+      decoded = Decode(i);
+    } catch (...) {
+      decoded.error = std::current_exception();
+    }
+    const bool failed = decoded.error != nullptr;
+    std::unique_lock lock(mutex);
+    if (!changed.wait(lock, stop, [this] { return queue.size() < kReadAhead; })) return;
+    queue.push_back(std::move(decoded));
+    finished = failed || i + 1 == plans.size();
+    lock.unlock();
+    changed.notify_all();
+    if (failed) return;
+  }
+}
+
+TumRecording::TumRecording(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+TumRecording::~TumRecording() = default;
+
+std::unique_ptr<TumRecording> TumRecording::Open(const fs::path& folder, const RecordingDefaults& defaults) {
+  if (!(defaults.max_stamp_gap_s >= 0 && defaults.marker_length_m > 0 && IsKnownDictionary(defaults.marker_dictionary))) {
+    throw std::invalid_argument("RecordingDefaults: gap, marker length or dictionary out of range");
+  }
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
+    throw DataError(fmt::format("recording {} is {}; expected a folder with rgb.txt and depth.txt", folder.string(),
+                                fs::exists(folder, error) ? "no folder" : "missing"));
+  }
+  auto impl = std::make_unique<Impl>();
+  try {
+    impl->FindFrames(folder, defaults.max_stamp_gap_s);
+    impl->ReadCamera(folder, defaults);
+  } catch (const fs::filesystem_error& failure) {
+    throw DataError(fmt::format("recording {} cannot be read: {}", folder.string(), failure.what()));
+  }
+  return std::unique_ptr<TumRecording>(new TumRecording(std::move(impl)));
+}
+
+const StreamInfo& TumRecording::info() const { return impl_->info; }
+const RecordingStatistics& TumRecording::statistics() const { return impl_->statistics; }
+
+std::optional<Frame> TumRecording::Next() {
+  Impl& impl = *impl_;
+  if (!impl.thread.joinable()) impl.thread = std::jthread([&impl](const std::stop_token& stop) { impl.DecodeAll(stop); });
+  std::unique_lock lock(impl.mutex);
+  impl.changed.wait(lock, [&impl] { return !impl.queue.empty() || impl.finished; });
+  if (impl.queue.empty()) return std::nullopt;
+  Decoded decoded = std::move(impl.queue.front());
+  impl.queue.pop_front();
+  lock.unlock();
+  impl.changed.notify_all();
+  if (decoded.error) std::rethrow_exception(decoded.error);
+  impl.statistics.num_frames += 1;
+  impl.statistics.num_frames_with_depth += decoded.has_depth ? 1 : 0;
+  impl.statistics.decode_cpu_s += decoded.cpu_s;
+  return std::move(decoded.frame);
+}
+
+bool IsTumRecording(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::exists(folder / "rgb.txt", ignored) || fs::exists(folder / "depth.txt", ignored);
+}
+
+}  // namespace plumb
