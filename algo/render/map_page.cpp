@@ -1,0 +1,207 @@
+#include "algo/render/map_page.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include "algo/types/notice.hpp"
+#include "algo/types/units.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr Color kInk = {33, 37, 41};
+constexpr Color kFaint = {92, 99, 106};
+constexpr Color kNoticeInk = {122, 28, 10};
+constexpr Color kNoticePaper = {253, 240, 222};
+
+constexpr int kMapWidth_px = 1240, kMapHeight_px = 940;  // the map fits into this
+constexpr int kMinMapHeight_px = 520;                    // room for the legend beside it
+constexpr int kLeft_px = 84, kTop_px = 92, kLegend_px = 236, kAxis_px = 62, kGap_px = 28;
+
+/// Rounded length of 1, 2 or 5 times a power of ten, the largest that is not above `length_m`.
+double RoundLength(double length_m) {
+  const double power = std::pow(10.0, std::floor(std::log10(length_m) + 1e-9));
+  for (const double step : {5.0, 2.0}) {
+    if (step * power <= length_m * (1 + 1e-9)) return step * power;
+  }
+  return power;
+}
+
+std::string LengthLabel(double length_m) {
+  return length_m < 0.995 ? fmt::format("{:.3g} cm", length_m / kCentimetre) : fmt::format("{:.3g} m", length_m);
+}
+
+/// Where the map lies on the page and how cells map to pixels.
+struct MapArea {
+  cv::Rect box;
+  GridShape grid;
+  [[nodiscard]] double px_per_m() const { return box.width / (grid.width * grid.step); }
+  [[nodiscard]] double PixelX(double x_m) const { return box.x + (x_m - grid.x_min) * px_per_m(); }
+  [[nodiscard]] double PixelY(double y_m) const { return box.y + box.height - (y_m - grid.y_min) * px_per_m(); }
+};
+
+cv::Mat ScaledMap(const MapPage& page, const cv::Size& size) {
+  cv::Mat upright, scaled;
+  cv::flip(page.cells_rgb, upright, 0);
+  cv::resize(upright, scaled, size, 0, 0, size.width < upright.cols ? cv::INTER_AREA : cv::INTER_LINEAR);
+  if (!page.outline.empty()) {
+    cv::Mat mask(page.grid.height, page.grid.width, CV_8UC1, const_cast<std::uint8_t*>(page.outline.data()));
+    cv::Mat edge;
+    cv::flip(mask, edge, 0);
+    cv::resize(edge, edge, size, 0, 0, cv::INTER_NEAREST);
+    cv::morphologyEx(edge, edge, cv::MORPH_GRADIENT, cv::getStructuringElement(cv::MORPH_ELLIPSE, {3, 3}));
+    scaled.setTo(cv::Scalar(kInk[0], kInk[1], kInk[2]), edge);
+  }
+  return scaled;
+}
+
+void DrawAxes(Figure& figure, const MapArea& area) {
+  const GridShape& grid = area.grid;
+  const double step_m = RoundLength(std::max(0.02, 190.0 / area.px_per_m()));
+  const TextStyle label{.size_px = 16, .color = kFaint, .align = HorizontalAlign::kCentre};
+  const double bottom = area.box.y + area.box.height;
+  const auto text = [](double value) { return fmt::format("{:.1f}", std::abs(value) < 1e-9 ? 0.0 : value); };
+  const auto fine = [](double value) { return fmt::format("{:.2f}", std::abs(value) < 1e-9 ? 0.0 : value); };
+  const auto format = [&](double value) { return step_m < 0.095 ? fine(value) : text(value); };
+  for (double i = std::ceil(grid.x_min / step_m); i * step_m <= grid.x_min + grid.width * grid.step; ++i) {
+    const double x = area.PixelX(i * step_m);
+    figure.Line(x, area.box.y, x, bottom, kInk, 1.0, 0.13);
+    figure.Line(x, bottom, x, bottom + 6, kFaint, 1.5);
+    figure.Text(x, bottom + 25, format(i * step_m), label);
+  }
+  TextStyle left = label;
+  left.align = HorizontalAlign::kRight;
+  for (double i = std::ceil(grid.y_min / step_m); i * step_m <= grid.y_min + grid.height * grid.step; ++i) {
+    const double y = area.PixelY(i * step_m);
+    figure.Line(area.box.x, y, area.box.x + area.box.width, y, kInk, 1.0, 0.13);
+    figure.Line(area.box.x - 6, y, area.box.x, y, kFaint, 1.5);
+    figure.Text(area.box.x - 11, y + 6, format(i * step_m), left);
+  }
+  figure.FrameRectangle(area.box.x - 0.5, area.box.y - 0.5, area.box.width + 1, area.box.height + 1, kFaint);
+  figure.Text(area.box.x + area.box.width / 2.0, bottom + 49, "x (m), reference marker's frame", label);
+  left.align = HorizontalAlign::kLeft;
+  figure.Text(14, area.box.y + area.box.height / 2.0 + 6, "y (m)", left);
+}
+
+void DrawScaleBar(Figure& figure, const MapArea& area) {
+  const double length_m = RoundLength(0.22 * area.box.width / area.px_per_m());
+  const double length_px = length_m * area.px_per_m();
+  const double x = area.box.x + 20, y = area.box.y + area.box.height - 62;
+  figure.FillRectangle(x - 6, y - 6, length_px + 36, 56, {255, 255, 255}, 0.86);
+  figure.Text(x + 12 + length_px / 2, y + 17, LengthLabel(length_m),
+              {.size_px = 17, .color = kInk, .bold = true, .align = HorizontalAlign::kCentre});
+  figure.FillRectangle(x + 12, y + 28, length_px, 7, kInk);
+  for (const double end : {x + 12, x + 12 + length_px}) figure.Line(end, y + 23, end, y + 40, kInk, 2.5);
+}
+
+void DrawTitle(Figure& figure, const MapPage& page) {
+  const double width = figure.width() - 2 * 24;
+  TextStyle title{.size_px = 28, .color = kInk, .bold = true};
+  while (title.size_px > 14 && figure.TextWidth(page.title, title) > width) title.size_px -= 1;
+  figure.Text(24, 42, page.title, title);
+  TextStyle subtitle{.size_px = 18, .color = kFaint};
+  while (subtitle.size_px > 11 && figure.TextWidth(page.subtitle, subtitle) > width) subtitle.size_px -= 0.5;
+  figure.Text(24, 72, page.subtitle, subtitle);
+}
+
+}  // namespace
+
+cv::Rect CellsWithData(const GridShape& grid, std::initializer_list<std::span<const float>> maps) {
+  int x0 = grid.width, x1 = -1, y0 = grid.height, y1 = -1;
+  for (const std::span<const float> map : maps) {
+    for (int row = 0; row < grid.height; ++row) {
+      const float* z = map.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width);
+      int first = 0, last = grid.width - 1;
+      while (first <= last && !std::isfinite(z[first])) ++first;
+      if (first > last) continue;
+      while (!std::isfinite(z[last])) --last;
+      x0 = std::min(x0, first), x1 = std::max(x1, last);
+      y0 = std::min(y0, row), y1 = std::max(y1, row);
+    }
+  }
+  const cv::Rect whole(0, 0, grid.width, grid.height);
+  if (x1 < 0) return whole;
+  const int margin = static_cast<int>(std::lround(0.03 / grid.step));
+  return cv::Rect(x0 - margin, y0 - margin, x1 - x0 + 1 + 2 * margin, y1 - y0 + 1 + 2 * margin) & whole;
+}
+
+GridShape Part(const GridShape& grid, const cv::Rect& cells) {
+  return {.x_min = grid.x_min + cells.x * grid.step,
+          .y_min = grid.y_min + cells.y * grid.step,
+          .step = grid.step,
+          .width = cells.width,
+          .height = cells.height};
+}
+
+cv::Mat Relief(const HeightMap& heights, const cv::Rect& cells) {
+  // Light from the upper left of the picture, 45 degrees high.
+  const Eigen::Vector3f light = Eigen::Vector3f(-1.0F, 1.0F, 1.4F).normalized();
+  constexpr float kAmbient = 0.40F;
+  cv::Mat relief(cells.height, cells.width, CV_32FC1, cv::Scalar(1.0));
+  const auto step = static_cast<float>(heights.grid.step);
+  for (int row = 0; row < cells.height; ++row) {
+    auto* out = relief.ptr<float>(row);
+    const int y = cells.y + row;
+    if (y == 0 || y + 1 >= heights.grid.height) continue;
+    for (int column = 0; column < cells.width; ++column) {
+      const int x = cells.x + column;
+      if (x == 0 || x + 1 >= heights.grid.width) continue;
+      const float dx = (heights.at(y, x + 1) - heights.at(y, x - 1)) / (2 * step);
+      const float dy = (heights.at(y + 1, x) - heights.at(y - 1, x)) / (2 * step);
+      if (!std::isfinite(dx + dy)) continue;
+      const float cosine = (-dx * light.x() - dy * light.y() + light.z()) / std::sqrt(dx * dx + dy * dy + 1.0F);
+      out[column] = kAmbient + (1.0F - kAmbient) * std::max(0.0F, cosine) / light.z();
+    }
+  }
+  return relief;
+}
+
+double DrawSwatch(Figure& figure, double x, double y, double width, const Color& color, std::string_view meaning) {
+  constexpr double kSize = 24;
+  const TextStyle style{.size_px = 16, .color = kInk};
+  figure.FillRectangle(x, y, kSize, kSize, color);
+  figure.FrameRectangle(x, y, kSize, kSize, kFaint);
+  double baseline = y + 18;
+  for (const std::string& line : figure.Wrap(meaning, style, width - kSize - 10)) {
+    figure.Text(x + kSize + 10, baseline, line, style);
+    baseline += 20;
+  }
+  return std::max(y + kSize, baseline - 14) + 12;
+}
+
+cv::Mat DrawPage(const MapPage& page) {
+  if (page.grid.width <= 0 || page.grid.height <= 0) throw std::invalid_argument("a picture needs a grid with at least one cell");
+  const double scale = std::min(static_cast<double>(kMapWidth_px) / page.grid.width, static_cast<double>(kMapHeight_px) / page.grid.height);
+  const cv::Size map_size(std::max(1, static_cast<int>(std::lround(scale * page.grid.width))),
+                          std::max(1, static_cast<int>(std::lround(scale * page.grid.height))));
+  const int content_width = std::max(map_size.width, 620);
+  const int body_height = std::max(map_size.height, kMinMapHeight_px);
+  const int width = kLeft_px + content_width + kGap_px + kLegend_px + 12;
+
+  const TextStyle notice_style{.size_px = 19, .color = kNoticeInk, .bold = true, .align = HorizontalAlign::kCentre};
+  const std::vector<std::string> notice = Figure(8, 8).Wrap(kResearchNotice, notice_style, width - 48);
+  const int notice_height = 20 + 27 * static_cast<int>(notice.size());
+  Figure figure(width, kTop_px + body_height + kAxis_px + notice_height);
+
+  const MapArea area{.box = cv::Rect(kLeft_px + (content_width - map_size.width) / 2, kTop_px + (body_height - map_size.height) / 2,
+                                     map_size.width, map_size.height),
+                     .grid = page.grid};
+  figure.Picture(area.box.x, area.box.y, ScaledMap(page, map_size));
+  DrawAxes(figure, area);
+  DrawScaleBar(figure, area);
+  DrawTitle(figure, page);
+  if (page.draw_legend) page.draw_legend(figure, cv::Rect(kLeft_px + content_width + kGap_px, kTop_px, kLegend_px, body_height));
+
+  const double top = figure.height() - notice_height;
+  figure.FillRectangle(0, top, width, notice_height, kNoticePaper);
+  figure.Line(0, top, width, top, kNoticeInk, 2.0);
+  for (std::size_t i = 0; i < notice.size(); ++i)
+    figure.Text(width / 2.0, top + 30 + 27.0 * static_cast<double>(i), notice[i], notice_style);
+  return figure.ToRgb();
+}
+
+}  // namespace plumb
