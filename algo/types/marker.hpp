@@ -18,6 +18,7 @@ using ImageCorners = std::array<Eigen::Vector2d, 4>;   ///< pixels, centres at i
 struct MarkerObservation {
   int id = 0;
   ImageCorners corners;
+  std::array<double, 4> sigma_px = {0.3, 0.3, 0.3, 0.3};  ///< Standard deviation of each corner, per coordinate, pixels.
 };
 
 /// Corners of a marker of the given side in its own frame, in detector order.
