@@ -63,7 +63,8 @@ struct WeakDirection {
 /// Rigid motion of the body: p_current = T * p_reference, both in the reference frame.
 struct BodyMotion {
   Pose T = Pose::Identity();
-  Matrix6d covariance = Matrix6d::Zero();                ///< Rotation vector (rad), translation (m); left perturbation about `centroid_m`.
+  /// Rotation vector (rad), translation (m); left perturbation about the centroid where the motion took it, T * centroid_m.
+  Matrix6d covariance = Matrix6d::Zero();
   Eigen::Vector3d centroid_m = Eigen::Vector3d::Zero();  ///< Of the reference region, reference frame.
   std::vector<WeakDirection> weak_directions;
   double residual_median_m = 0.0;  ///< Nearest-surface distance in the region after the fit.

@@ -49,8 +49,9 @@ struct Correction {
 /// The correction of a body motion with its uncertainty, propagated to first order.
 ///
 /// @param T_motion    p_current = T_motion * p_reference, reference-marker frame.
-/// @param covariance  Of T_motion: rotation vector, translation; left perturbation about `centroid`.
-/// @param centroid    In the reference-marker frame.
+/// @param covariance  Of T_motion: rotation vector, translation; left perturbation about the moved centroid, T_motion * centroid,
+///                    so that its translation part is the uncertainty of where the centroid went.
+/// @param centroid    Of the region in the reference scene, reference-marker frame.
 [[nodiscard]] Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance, const Eigen::Vector3d& centroid,
                                       const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference, MarkerKind kind,
                                       PatientPosture posture);

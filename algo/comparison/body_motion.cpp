@@ -1,0 +1,334 @@
+#include "algo/comparison/body_motion.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <vector>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "algo/comparison/motion_start.hpp"
+#include "algo/comparison/surface.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr std::size_t kMinSamples = 50;
+constexpr int kMinPairs = 30;
+constexpr std::size_t kChunk = 1024;  // pairs summed together: fixed, so sums do not depend on threads
+constexpr double kTukey = 4.685;      // 95 % efficiency on Gaussian residuals
+constexpr double kMadToSigma = 1.4826;
+constexpr double kMinScale_m = 0.2e-3;        // below what any sensor leaves; keeps perfect data from a zero scale
+constexpr double kCorrelationArea_m2 = 1e-4;  // residuals within about 1 cm are one measurement
+constexpr double kBlock_m = 0.08;             // of the empirical covariance
+constexpr double kMinInformation = 1e-6;      // of the best direction's; below it a direction counts as unseen
+constexpr double kStepTolerance_m = 2e-6;
+constexpr double kPrior = 1e-5;  // of the mean information: unseen directions stay where they start
+
+// One side of the registration.
+struct Side {
+  Surface surface;
+  NearestSample nearest;
+  explicit Side(Surface s, double radius_m) : surface(std::move(s)), nearest(surface.points, radius_m) {}
+};
+
+struct Stage {
+  double radius_m;        // of the search for mates
+  double max_sideways_m;  // mates further apart along the surface are none
+  double min_normal_cos;
+  double max_scale_m;  // of the residuals: bounds the weights' reach
+  int max_iterations;
+};
+
+constexpr Stage kCoarse = {0.08, 0.03, 0.6, 0.03, 15};
+constexpr Stage kMiddle = {0.03, 0.015, 0.7, 0.008, 15};
+constexpr Stage kFine = {0.015, 0.006, 0.8, 0.005, 25};
+constexpr double kCoarseSpacing_m = 0.02;
+constexpr double kMiddleSpacing_m = 0.01;
+constexpr double kFineSpacing_m = 0.005;
+
+struct Pair {
+  Eigen::Vector3d arm = Eigen::Vector3d::Zero();  // moved point from the pivot
+  Eigen::Vector3d normal_reference = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal_current = Eigen::Vector3d::Zero();
+  double residual_m = 0.0;  // along the mean normal, moved reference minus current
+  bool valid = false;
+};
+
+Vector6d Gradient(const Eigen::Vector3d& arm, const Eigen::Vector3d& normal) {
+  Vector6d gradient;
+  gradient << arm.cross(normal), normal;
+  return gradient;
+}
+
+Pair MakePair(const Surface& reference, std::size_t i, const Surface& current, std::size_t j, const Pose& T, const Eigen::Vector3d& pivot,
+              const Stage& stage) {
+  Pair pair;
+  const Eigen::Vector3d p = T * reference.points[i].cast<double>();
+  const Eigen::Vector3d q = current.points[j].cast<double>();
+  pair.normal_reference = T.linear() * reference.normals[i].cast<double>();
+  pair.normal_current = current.normals[j].cast<double>();
+  if (pair.normal_reference.dot(pair.normal_current) < stage.min_normal_cos) return pair;
+  const Eigen::Vector3d normal = (pair.normal_reference + pair.normal_current).normalized();
+  const Eigen::Vector3d difference = p - q;
+  pair.residual_m = normal.dot(difference);
+  pair.arm = p - pivot;
+  pair.valid = (difference - pair.residual_m * normal).norm() < stage.max_sideways_m;
+  return pair;
+}
+
+// Mates from both sides: the reference's samples first, then the current ones, one slot each.
+std::vector<Pair> FindPairs(const Side& reference, const Side& current, const Pose& T, const Eigen::Vector3d& pivot, const Stage& stage) {
+  const std::size_t n = reference.surface.size();
+  const std::size_t m = current.surface.size();
+  std::vector<Pair> pairs(n + m);
+  const Pose T_back = T.inverse();
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n + m, 512), [&](const tbb::blocked_range<std::size_t>& range) {
+    for (std::size_t k = range.begin(); k < range.end(); ++k) {
+      const bool forward = k < n;
+      const Side& from = forward ? reference : current;
+      const Side& to = forward ? current : reference;
+      const std::size_t i = forward ? k : k - n;
+      if (from.surface.inner[i] == 0) continue;
+      const Eigen::Vector3d p = from.surface.points[i].cast<double>();
+      const Eigen::Vector3d moved = forward ? T * p : T_back * p;
+      const std::uint32_t mate = to.nearest.Find(moved.cast<float>());
+      if (mate == NearestSample::kNone || to.surface.inner[mate] == 0) continue;
+      pairs[k] = forward ? MakePair(reference.surface, i, current.surface, mate, T, pivot, stage)
+                         : MakePair(reference.surface, mate, current.surface, i, T, pivot, stage);
+    }
+  });
+  return pairs;
+}
+
+// Robust standard deviation of the valid residuals, or nothing if there are too few.
+std::optional<double> ResidualScale(const std::vector<Pair>& pairs, double max_scale_m) {
+  std::vector<double> magnitudes;
+  for (const Pair& pair : pairs) {
+    if (pair.valid) magnitudes.push_back(std::abs(pair.residual_m));
+  }
+  if (magnitudes.size() < static_cast<std::size_t>(kMinPairs)) return std::nullopt;
+  const auto middle = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / 2);
+  std::nth_element(magnitudes.begin(), middle, magnitudes.end());
+  return std::clamp(kMadToSigma * *middle, kMinScale_m, max_scale_m);
+}
+
+double TukeyWeight(double residual_m, double scale_m) {
+  const double u = residual_m / (kTukey * scale_m);
+  return std::abs(u) < 1.0 ? (1 - u * u) * (1 - u * u) : 0.0;
+}
+
+struct NormalEquations {
+  Matrix6d A = Matrix6d::Zero();
+  Vector6d b = Vector6d::Zero();
+};
+
+NormalEquations SumPairs(const std::vector<Pair>& pairs, double scale_m) {
+  const std::size_t num_chunks = (pairs.size() + kChunk - 1) / kChunk;
+  std::vector<NormalEquations> sums(num_chunks);
+  tbb::parallel_for(std::size_t{0}, num_chunks, [&](std::size_t c) {
+    NormalEquations& sum = sums[c];
+    for (std::size_t k = c * kChunk; k < std::min(pairs.size(), (c + 1) * kChunk); ++k) {
+      const Pair& pair = pairs[k];
+      const double w = pair.valid ? TukeyWeight(pair.residual_m, scale_m) : 0.0;
+      if (w == 0.0) continue;
+      const Vector6d gradient = Gradient(pair.arm, (pair.normal_reference + pair.normal_current).normalized());
+      sum.A += w * gradient * gradient.transpose();
+      sum.b += w * pair.residual_m * gradient;
+    }
+  });
+  NormalEquations total;
+  for (const NormalEquations& sum : sums) {
+    total.A += sum.A;
+    total.b += sum.b;
+  }
+  return total;
+}
+
+struct StageResult {
+  Pose T = Pose::Identity();
+  double scale_m = 0.0;
+  int iterations = 0;
+  bool valid = false;
+};
+
+Eigen::Vector3d MeanPoint(const Surface& surface) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3f& p : surface.points) sum += p.cast<double>();
+  return sum / static_cast<double>(std::max<std::size_t>(surface.size(), 1));
+}
+
+// Root mean square distance from the centroid: turns radians into metres of the same importance.
+double LeverArm(const Surface& surface, const Eigen::Vector3d& centroid) {
+  double sum = 0.0;
+  for (const Eigen::Vector3f& p : surface.points) sum += (p.cast<double>() - centroid).squaredNorm();
+  return std::max(std::sqrt(sum / static_cast<double>(std::max<std::size_t>(surface.size(), 1))), 1e-3);
+}
+
+StageResult RunStage(const Side& reference, const Side& current, const Pose& T_start, const Stage& stage) {
+  StageResult result;
+  result.T = T_start;
+  const Eigen::Vector3d centroid = MeanPoint(reference.surface);
+  const double lever = LeverArm(reference.surface, centroid);
+  for (; result.iterations < stage.max_iterations; ++result.iterations) {
+    const Eigen::Vector3d pivot = result.T * centroid;
+    const std::vector<Pair> pairs = FindPairs(reference, current, result.T, pivot, stage);
+    const std::optional<double> scale = ResidualScale(pairs, stage.max_scale_m);
+    result.valid = scale.has_value();
+    if (!scale) return result;
+    result.scale_m = *scale;
+    NormalEquations equations = SumPairs(pairs, *scale);
+    // In units of the lever arm rotation and translation weigh alike.
+    Vector6d unit;
+    unit << Eigen::Vector3d::Constant(1.0 / lever), Eigen::Vector3d::Ones();
+    Matrix6d A = unit.asDiagonal() * equations.A * unit.asDiagonal();
+    A += kPrior * A.trace() / 6.0 * Matrix6d::Identity();
+    const Vector6d step = A.ldlt().solve(-(unit.asDiagonal() * equations.b));
+    if (!step.allFinite()) {
+      result.valid = false;
+      return result;
+    }
+    const Vector6d twist = unit.asDiagonal() * step;
+    result.T = Orthonormalised(Eigen::Translation3d(pivot) * PoseFromTwist(twist) * Eigen::Translation3d(-pivot) * result.T);
+    if (step.norm() < kStepTolerance_m) break;
+  }
+  return result;
+}
+
+// Two-sided mean of truncated distances, metres; samples without a mate count as `limit`.
+double Disagreement(const Side& reference, const Side& current, const Pose& T, const Stage& stage, double limit_m) {
+  const std::vector<Pair> pairs = FindPairs(reference, current, T, Eigen::Vector3d::Zero(), stage);
+  const auto mean = [&](const Surface& surface, std::size_t first) {
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < surface.size(); ++i) {
+      if (surface.inner[i] == 0) continue;
+      const Pair& pair = pairs[first + i];
+      sum += pair.valid ? std::min(std::abs(pair.residual_m), limit_m) : limit_m;
+      ++count;
+    }
+    return count > 0 ? sum / static_cast<double>(count) : limit_m;
+  };
+  return 0.5 * (mean(reference.surface, 0) + mean(current.surface, reference.surface.size()));
+}
+
+PointCloud BodyCloud(const PointCloud& cloud, const Body& body) {
+  PointCloud part;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (!body.Contains(cloud.points[i].cast<double>())) continue;
+    part.points.push_back(cloud.points[i]);
+    part.normals.push_back(cloud.normals[i]);
+  }
+  return part;
+}
+
+// Best of the starts after coarse, then middle refinement of the three most promising.
+std::optional<Pose> GlobalMotion(const BodyMotionInput& input, const PointCloud& reference, const PointCloud& current) {
+  const Side coarse_reference(MakeSurface(reference, kCoarseSpacing_m, 3 * kCoarseSpacing_m), kCoarse.radius_m);
+  const Side coarse_current(MakeSurface(current, kCoarseSpacing_m, 3 * kCoarseSpacing_m), kCoarse.radius_m);
+  struct Scored {
+    Pose T;
+    double score;
+  };
+  const auto by_score = [](const Scored& a, const Scored& b) { return a.score < b.score; };
+  std::vector<Scored> scored;
+  for (const Pose& start : MotionStarts(input.reference_body, input.current_body)) {
+    const StageResult refined = RunStage(coarse_reference, coarse_current, start, kCoarse);
+    if (refined.valid) scored.push_back({refined.T, Disagreement(coarse_reference, coarse_current, refined.T, kCoarse, 0.02)});
+  }
+  if (scored.empty()) return std::nullopt;
+  std::stable_sort(scored.begin(), scored.end(), by_score);
+  // Starts that ran into the same pose need one refinement only.
+  std::vector<Scored> distinct;
+  for (const Scored& s : scored) {
+    const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Scored& d) {
+      const Eigen::Vector3d c = input.region_centroid_m;
+      return RotationAngle(s.T.inverse() * d.T) < 0.03 && (s.T * c - d.T * c).norm() < 0.01;
+    });
+    if (!known && distinct.size() < 3) distinct.push_back(s);
+  }
+  const Side middle_reference(MakeSurface(reference, kMiddleSpacing_m, 2.5 * kMiddleSpacing_m), kMiddle.radius_m);
+  const Side middle_current(MakeSurface(current, kMiddleSpacing_m, 2.5 * kMiddleSpacing_m), kMiddle.radius_m);
+  for (Scored& s : distinct) {
+    const StageResult refined = RunStage(middle_reference, middle_current, s.T, kMiddle);
+    if (refined.valid) s.T = refined.T;
+    s.score = Disagreement(middle_reference, middle_current, s.T, kMiddle, 0.015);
+  }
+  return std::min_element(distinct.begin(), distinct.end(), by_score)->T;
+}
+
+// Covariance of the fit at its end: A^-1 B A^-1 with B from blocks, plus the share of independent small patches.
+Matrix6d FitCovariance(const std::vector<Pair>& pairs, double scale_m, double spacing_m, double lever) {
+  Matrix6d information = Matrix6d::Zero();
+  std::map<std::array<int, 3>, Vector6d> blocks;
+  Vector6d unit;
+  unit << Eigen::Vector3d::Constant(1.0 / lever), Eigen::Vector3d::Ones();
+  for (const Pair& pair : pairs) {
+    const double u = pair.residual_m / (kTukey * scale_m);
+    if (!pair.valid || std::abs(u) >= 1.0) continue;
+    const Vector6d a = unit.asDiagonal() * Gradient(pair.arm, pair.normal_reference);
+    const Vector6d b = unit.asDiagonal() * Gradient(pair.arm, pair.normal_current);
+    const double slope = std::max((1 - u * u) * (1 - 5 * u * u), -0.3);
+    information += 0.5 * slope * (a * b.transpose() + b * a.transpose());
+    const Eigen::Array3i block = (pair.arm.array() / kBlock_m).floor().cast<int>();
+    const auto slot = blocks.try_emplace({block[0], block[1], block[2]}, Vector6d::Zero()).first;
+    slot->second += TukeyWeight(pair.residual_m, scale_m) * pair.residual_m * 0.5 * (a + b);
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
+  const double largest = std::max(eigen.eigenvalues()[5], 1e-12);
+  const Matrix6d inverse = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(kMinInformation * largest).cwiseInverse().asDiagonal() *
+                           eigen.eigenvectors().transpose();
+  Matrix6d scatter = Matrix6d::Zero();
+  for (const auto& [block, sum] : blocks) scatter += sum * sum.transpose();
+  const double k = static_cast<double>(blocks.size());
+  scatter *= k / std::max(k - 6.0, 1.0);
+  // Two pairs a sample (one from each side), and one independent measurement for every kCorrelationArea_m2.
+  const double pairs_per_measurement = 2.0 * std::max(kCorrelationArea_m2 / (spacing_m * spacing_m), 1.0);
+  const Matrix6d small_patches = scale_m * scale_m * pairs_per_measurement * inverse;
+  const Matrix6d covariance = inverse * scatter * inverse + small_patches;
+  return unit.asDiagonal() * covariance * unit.asDiagonal();
+}
+
+}  // namespace
+
+std::optional<SurfaceMotion> EstimateBodyMotion(const BodyMotionInput& input) {
+  const PointCloud reference = BodyCloud(input.reference_cloud, input.reference_body);
+  const PointCloud current = BodyCloud(input.current_cloud, input.current_body);
+  if (reference.size() < kMinSamples || current.size() < kMinSamples) return std::nullopt;
+  const std::optional<Pose> T_start = GlobalMotion(input, reference, current);
+  if (!T_start) return std::nullopt;
+
+  Surface fine_reference = MakeSurface(reference, kFineSpacing_m, 3 * kFineSpacing_m);
+  if (input.in_region) {
+    fine_reference = Subset(fine_reference, [&](std::size_t i) { return input.in_region(fine_reference.points[i].cast<double>()); });
+  }
+  const Side side_reference(std::move(fine_reference), kFine.radius_m);
+  const Side side_current(MakeSurface(current, kFineSpacing_m, 3 * kFineSpacing_m), kFine.radius_m);
+  if (side_reference.surface.size() < kMinSamples) return std::nullopt;
+  const StageResult fitted = RunStage(side_reference, side_current, *T_start, kFine);
+  if (!fitted.valid) return std::nullopt;
+
+  SurfaceMotion motion;
+  motion.T = fitted.T;
+  motion.scale_m = fitted.scale_m;
+  motion.iterations = fitted.iterations;
+  const Eigen::Vector3d pivot = motion.T * input.region_centroid_m;
+  const std::vector<Pair> pairs = FindPairs(side_reference, side_current, motion.T, pivot, kFine);
+  motion.covariance = FitCovariance(pairs, fitted.scale_m, kFineSpacing_m, LeverArm(side_reference.surface, input.region_centroid_m));
+  std::size_t inner = 0;
+  std::size_t explained = 0;
+  for (std::size_t i = 0; i < side_reference.surface.size(); ++i) {
+    if (side_reference.surface.inner[i] == 0) continue;
+    ++inner;
+    explained += pairs[i].valid && TukeyWeight(pairs[i].residual_m, fitted.scale_m) > 0 ? 1 : 0;
+  }
+  motion.inlier_share = inner > 0 ? static_cast<double>(explained) / static_cast<double>(inner) : 0.0;
+  return motion;
+}
+
+}  // namespace plumb

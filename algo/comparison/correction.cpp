@@ -1,0 +1,114 @@
+#include "algo/comparison/correction.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "algo/types/units.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr double kNormal95 = 1.959964;  // half-width of a 95 % interval in standard deviations
+
+// Standard deviations of the couch vector, to first order by central differences: the covariance is a left
+// perturbation (w, t) about the moved centroid m, p -> m + R(w)(p - m) + t.
+Vector6d CouchSigmas(const Pose& T_motion, const Matrix6d& covariance, const Eigen::Vector3d& moved_centroid,
+                     const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference) {
+  constexpr double kStep = 1e-6;  // rad or m: rounding 1e-10, curvature 1e-12 of the value
+  Matrix6d jacobian;
+  for (int i = 0; i < 6; ++i) {
+    std::array<Vector6d, 2> side;
+    for (int s = 0; s < 2; ++s) {
+      Vector6d twist = Vector6d::Zero();
+      twist[i] = s == 0 ? -kStep : kStep;
+      const Pose T_perturbed =
+          Eigen::Translation3d(moved_centroid) * PoseFromTwist(twist) * Eigen::Translation3d(-moved_centroid) * T_motion;
+      side[static_cast<std::size_t>(s)] = CouchVector(T_perturbed, isocentre_reference, T_iec_reference);
+    }
+    jacobian.col(i) = (side[1] - side[0]) / (2 * kStep);
+  }
+  return (jacobian * covariance * jacobian.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
+}
+
+CouchNumbers NumbersOf(const Vector6d& couch, MarkerKind kind) {
+  CouchNumbers numbers;
+  if (kind == MarkerKind::kRoom) {
+    numbers.lateral_mm = couch[0] / kMillimetre;
+    numbers.longitudinal_mm = couch[1] / kMillimetre;
+    numbers.vertical_mm = couch[2] / kMillimetre;
+  }
+  numbers.pitch_deg = couch[3] / kDegree;
+  numbers.roll_deg = couch[4] / kDegree;
+  numbers.yaw_deg = couch[5] / kDegree;
+  return numbers;
+}
+
+// Words for the signs. The patient's left is +X (viewer's right) head first supine; each of prone and feet first turns it over.
+std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind, PatientPosture posture) {
+  const bool head_first = posture == PatientPosture::kHeadFirstSupine || posture == PatientPosture::kHeadFirstProne;
+  const bool supine = posture == PatientPosture::kHeadFirstSupine || posture == PatientPosture::kFeetFirstSupine;
+  const bool left_is_plus_x = head_first == supine;
+  const auto side = [&](bool plus_x) { return plus_x == left_is_plus_x ? "left" : "right"; };
+
+  std::array<std::string, 6> words;
+  if (kind == MarkerKind::kRoom) {
+    words[0] = couch[2] >= 0 ? "up" : "down";
+    words[1] = couch[1] >= 0 ? "toward gantry" : "away from gantry";
+    words[2] = std::string("to patient ") + side(couch[0] >= 0);
+  }
+  words[3] = (couch[3] >= 0) == head_first ? "head up" : "head down";
+  words[4] = std::string("patient ") + side(couch[4] >= 0) + " side down";
+  // Counter-clockwise from above carries the gantry end to -X, the other end to +X.
+  words[5] = std::string("head to patient ") + side((couch[5] >= 0) != head_first);
+  return words;
+}
+
+}  // namespace
+
+const char* Name(MarkerKind kind) { return kind == MarkerKind::kRoom ? "room" : "couch"; }
+
+const char* Name(PatientPosture posture) {
+  switch (posture) {
+    case PatientPosture::kHeadFirstSupine:
+      return "HFS";
+    case PatientPosture::kHeadFirstProne:
+      return "HFP";
+    case PatientPosture::kFeetFirstSupine:
+      return "FFS";
+    case PatientPosture::kFeetFirstProne:
+      return "FFP";
+  }
+  return "HFS";
+}
+
+Eigen::Matrix3d CouchRotation(double pitch_rad, double roll_rad, double yaw_rad) {
+  return (Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch_rad, Eigen::Vector3d::UnitX()) *
+          Eigen::AngleAxisd(roll_rad, Eigen::Vector3d::UnitY()))
+      .toRotationMatrix();
+}
+
+Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference) {
+  const Pose T_correction = T_iec_reference * T_motion.inverse() * T_iec_reference.inverse();
+  const Eigen::Vector3d isocentre_iec = T_iec_reference * isocentre_reference;
+  const Eigen::Matrix3d R = T_correction.linear();
+  Vector6d couch;
+  couch.head<3>() = T_correction * isocentre_iec - isocentre_iec;
+  couch[3] = std::asin(std::clamp(R(2, 1), -1.0, 1.0));
+  couch[4] = std::atan2(-R(2, 0), R(2, 2));
+  couch[5] = std::atan2(-R(0, 1), R(1, 1));
+  return couch;
+}
+
+Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance, const Eigen::Vector3d& centroid,
+                        const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference, MarkerKind kind, PatientPosture posture) {
+  const Vector6d couch = CouchVector(T_motion, isocentre_reference, T_iec_reference);
+  Correction correction;
+  correction.isocentre_m = isocentre_reference;
+  correction.value = NumbersOf(couch, kind);
+  correction.u95 =
+      NumbersOf(kNormal95 * CouchSigmas(T_motion, covariance, T_motion * centroid, isocentre_reference, T_iec_reference), kind);
+  correction.words = WordsOf(couch, kind, posture);
+  return correction;
+}
+
+}  // namespace plumb

@@ -1,0 +1,339 @@
+#include "algo/comparison/region.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Eigenvalues>
+
+namespace plumb {
+namespace {
+
+constexpr int kMaxPlanes = 6;
+constexpr double kHistogramBin_m = 0.01;
+constexpr double kCoarsePlaneBand_m = 0.04;  // first guess is level: 2 deg over 2 m is 35 mm at the ends
+constexpr double kFinePlaneBand_m = 0.010;   // surfaces wave by some millimetres over a room
+constexpr double kPlaneNormalCos = 0.985;    // 10 deg
+constexpr double kCarriedShare = 0.5;        // of the most that any plane carries
+
+struct FoundPlane {
+  SupportPlane plane;
+  std::vector<std::size_t> members;
+};
+
+// Weighted total least squares over the given samples with Tukey weights of the current residuals.
+bool RefitPlane(const Surface& scene, const std::vector<std::size_t>& candidates, double band_m, double min_cos, SupportPlane& plane) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  double total = 0.0;
+  int count = 0;
+  for (const std::size_t i : candidates) {
+    const Eigen::Vector3d p = scene.points[i].cast<double>();
+    const double u = plane.Height(p) / band_m;
+    if (std::abs(u) >= 1.0 || scene.normals[i].cast<double>().dot(plane.normal) < min_cos) continue;
+    const double w = (1 - u * u) * (1 - u * u);
+    mean += w * p;
+    second += w * p * p.transpose();
+    total += w;
+    ++count;
+  }
+  if (count < 10 || total <= 0) return false;
+  mean /= total;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(second / total - mean * mean.transpose());
+  Eigen::Vector3d normal = eigen.eigenvectors().col(0);
+  if (normal.dot(plane.normal) < 0) normal = -normal;
+  plane.normal = normal;
+  plane.offset_m = normal.dot(mean);
+  return true;
+}
+
+// Height (along z) at which most of the candidates lie.
+double ModeHeight(const Surface& scene, const std::vector<std::size_t>& candidates) {
+  float low = std::numeric_limits<float>::max();
+  float high = std::numeric_limits<float>::lowest();
+  for (const std::size_t i : candidates) {
+    low = std::min(low, scene.points[i].z());
+    high = std::max(high, scene.points[i].z());
+  }
+  std::vector<int> histogram(static_cast<std::size_t>((high - low) / kHistogramBin_m) + 3, 0);
+  for (const std::size_t i : candidates) ++histogram[static_cast<std::size_t>((scene.points[i].z() - low) / kHistogramBin_m) + 1];
+  std::size_t best = 1;
+  int best_count = -1;
+  for (std::size_t b = 1; b + 1 < histogram.size(); ++b) {
+    const int count = histogram[b - 1] + 2 * histogram[b] + histogram[b + 1];
+    if (count > best_count) {
+      best_count = count;
+      best = b;
+    }
+  }
+  return low + (static_cast<double>(best) - 0.5) * kHistogramBin_m;
+}
+
+std::vector<FoundPlane> HorizontalPlanes(const Surface& scene, const BodyOptions& options) {
+  const double cos_tilt = std::cos(options.max_tilt_rad);
+  std::vector<std::size_t> left;
+  for (std::size_t i = 0; i < scene.size(); ++i) {
+    if (scene.normals[i].z() > cos_tilt) left.push_back(i);
+  }
+  const double area_per_sample = scene.spacing_m * scene.spacing_m;
+  std::vector<FoundPlane> planes;
+  for (int round = 0; round < 2 * kMaxPlanes && planes.size() < kMaxPlanes; ++round) {
+    if (static_cast<double>(left.size()) * area_per_sample < options.min_support_area_m2) break;
+    FoundPlane found;
+    found.plane.offset_m = ModeHeight(scene, left);
+    bool fitted = true;
+    for (double band = kCoarsePlaneBand_m; fitted && band > kFinePlaneBand_m; band *= 0.7) {
+      fitted = RefitPlane(scene, left, band, band > 0.025 ? cos_tilt : kPlaneNormalCos, found.plane);
+    }
+    for (int i = 0; i < 3 && fitted; ++i) fitted = RefitPlane(scene, left, kFinePlaneBand_m, kPlaneNormalCos, found.plane);
+    // What lies in the band leaves the pool, member or not, so that every round makes progress.
+    std::vector<std::size_t> rest;
+    for (const std::size_t i : left) {
+      const double height = found.plane.Height(scene.points[i].cast<double>());
+      const bool parallel = scene.normals[i].cast<double>().dot(found.plane.normal) > kPlaneNormalCos;
+      if (fitted && std::abs(height) < kFinePlaneBand_m && parallel) found.members.push_back(i);
+      if (std::abs(height) >= kFinePlaneBand_m) rest.push_back(i);
+    }
+    if (rest.size() == left.size()) break;
+    left = std::move(rest);
+    const bool level = found.plane.normal.z() > cos_tilt;
+    if (level && static_cast<double>(found.members.size()) * area_per_sample >= options.min_support_area_m2)
+      planes.push_back(std::move(found));
+  }
+  return planes;
+}
+
+// The highest plane that carries nearly as much as any: the couch rather than the floor below it.
+std::optional<SupportPlane> ChooseSupport(const Surface& scene, const std::vector<FoundPlane>& planes, const BodyOptions& options) {
+  std::vector<std::uint8_t> flat(scene.size(), 0);
+  for (const FoundPlane& found : planes) {
+    for (const std::size_t i : found.members) flat[i] = 1;
+  }
+  std::vector<int> carried(planes.size(), 0);
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    for (std::size_t i = 0; i < scene.size(); ++i) {
+      const double height = planes[k].plane.Height(scene.points[i].cast<double>());
+      if (flat[i] == 0 && height > options.min_height_m && height < options.max_height_m) ++carried[k];
+    }
+  }
+  if (planes.empty()) return std::nullopt;
+  const int most = *std::max_element(carried.begin(), carried.end());
+  const SupportPlane* best = nullptr;
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    if (carried[k] < kCarriedShare * most) continue;
+    if (best == nullptr || planes[k].plane.offset_m > best->offset_m) best = &planes[k].plane;
+  }
+  return *best;
+}
+
+// Keeps the largest 8-connected set of kBody cells; the others become kMeasured.
+void KeepLargestComponent(Body& body) {
+  const int width = body.grid.width;
+  const int height = body.grid.height;
+  std::vector<int> label(body.cells.size(), -1);
+  std::vector<std::size_t> stack;
+  int best = -1;
+  std::size_t best_size = 0;
+  int next = 0;
+  for (std::size_t start = 0; start < body.cells.size(); ++start) {
+    if (body.cells[start] != Body::kBody || label[start] >= 0) continue;
+    std::size_t size = 0;
+    stack.assign(1, start);
+    label[start] = next;
+    while (!stack.empty()) {
+      const std::size_t cell = stack.back();
+      stack.pop_back();
+      ++size;
+      const int row = static_cast<int>(cell) / width;
+      const int column = static_cast<int>(cell) % width;
+      for (int r = std::max(row - 1, 0); r <= std::min(row + 1, height - 1); ++r) {
+        for (int c = std::max(column - 1, 0); c <= std::min(column + 1, width - 1); ++c) {
+          const std::size_t other = static_cast<std::size_t>(r) * static_cast<std::size_t>(width) + static_cast<std::size_t>(c);
+          if (body.cells[other] != Body::kBody || label[other] >= 0) continue;
+          label[other] = next;
+          stack.push_back(other);
+        }
+      }
+    }
+    if (size > best_size) {
+      best_size = size;
+      best = next;
+    }
+    ++next;
+  }
+  for (std::size_t i = 0; i < body.cells.size(); ++i) {
+    if (body.cells[i] == Body::kBody && label[i] != best) body.cells[i] = Body::kMeasured;
+  }
+}
+
+GridShape GridAround(const Surface& scene, double step) {
+  GridShape grid;
+  grid.step = step;
+  if (scene.size() == 0) return grid;
+  Eigen::Vector2f low = scene.points.front().head<2>();
+  Eigen::Vector2f high = low;
+  for (const Eigen::Vector3f& p : scene.points) {
+    low = low.cwiseMin(p.head<2>());
+    high = high.cwiseMax(p.head<2>());
+  }
+  grid.x_min = low.x() - step;
+  grid.y_min = low.y() - step;
+  grid.width = static_cast<int>((high.x() - low.x()) / step) + 3;
+  grid.height = static_cast<int>((high.y() - low.y()) / step) + 3;
+  return grid;
+}
+
+bool InsidePolygon(const std::vector<Eigen::Vector2d>& polygon, double x, double y) {
+  bool inside = false;
+  for (std::size_t i = 0, j = polygon.size() - 1; i < polygon.size(); j = i++) {
+    const Eigen::Vector2d& a = polygon[i];
+    const Eigen::Vector2d& b = polygon[j];
+    if ((a.y() > y) != (b.y() > y) && x < (b.x() - a.x()) * (y - a.y()) / (b.y() - a.y()) + a.x()) inside = !inside;
+  }
+  return inside;
+}
+
+// Calls visit(cell index, surface point) for every valid cell of the map.
+template <typename Visit>
+void ForEachCell(const HeightMap& map, Visit&& visit) {
+  for (int row = 0; row < map.grid.height; ++row) {
+    for (int column = 0; column < map.grid.width; ++column) {
+      const float z = map.at(row, column);
+      if (!std::isfinite(z)) continue;
+      visit(static_cast<std::size_t>(row) * static_cast<std::size_t>(map.grid.width) + static_cast<std::size_t>(column),
+            Eigen::Vector3d(map.grid.x_centre(column), map.grid.y_centre(row), z));
+    }
+  }
+}
+
+}  // namespace
+
+bool Body::HighEnough(const Eigen::Vector3d& p) const {
+  if (!support) return true;
+  const double height = support->Height(p);
+  return height > min_height_m && height < max_height_m;
+}
+
+bool Body::Contains(const Eigen::Vector3d& p) const {
+  const auto cell = grid.cell(p.x(), p.y());
+  return cell && cells[*cell] == kBody && HighEnough(p);
+}
+
+Body FindBody(const Surface& scene, const BodyOptions& options) {
+  Body body;
+  body.min_height_m = options.min_height_m;
+  body.max_height_m = options.max_height_m;
+  body.support = ChooseSupport(scene, HorizontalPlanes(scene, options), options);
+  body.grid = GridAround(scene, options.cell_m);
+  body.cells.assign(body.grid.num_cells(), Body::kUnknown);
+  body.height_m.assign(body.grid.num_cells(), std::numeric_limits<float>::quiet_NaN());
+  for (std::size_t i = 0; i < scene.size(); ++i) {
+    const Eigen::Vector3d p = scene.points[i].cast<double>();
+    const auto cell = body.grid.cell(p.x(), p.y());
+    if (!cell) continue;
+    const double height = body.support ? body.support->Height(p) : p.z();
+    body.cells[*cell] = std::max<std::uint8_t>(body.cells[*cell], body.HighEnough(p) ? Body::kBody : Body::kMeasured);
+    if (body.support && height >= options.max_height_m) continue;
+    if (!(body.height_m[*cell] >= height)) body.height_m[*cell] = static_cast<float>(height);
+  }
+  KeepLargestComponent(body);
+  return body;
+}
+
+std::vector<std::uint8_t> RegionMask(const HeightMap& map, const Body& body, const std::vector<Eigen::Vector2d>& polygon_m) {
+  std::vector<std::uint8_t> mask(map.grid.num_cells(), 0);
+  bool any = false;
+  ForEachCell(map, [&](std::size_t cell, const Eigen::Vector3d& p) {
+    const bool inside = polygon_m.empty() ? body.Contains(p) : InsidePolygon(polygon_m, p.x(), p.y()) && body.HighEnough(p);
+    mask[cell] = inside ? 1 : 0;
+    any = any || inside;
+  });
+  if (any || polygon_m.empty()) return mask;
+  // Nothing rises in the polygon: whoever drew it meant the flat surface itself.
+  ForEachCell(map, [&](std::size_t cell, const Eigen::Vector3d& p) { mask[cell] = InsidePolygon(polygon_m, p.x(), p.y()) ? 1 : 0; });
+  return mask;
+}
+
+std::optional<Eigen::Vector3d> RegionCentroid(const HeightMap& map, const std::vector<std::uint8_t>& mask) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  std::size_t count = 0;
+  ForEachCell(map, [&](std::size_t cell, const Eigen::Vector3d& p) {
+    if (mask[cell] == 0) return;
+    sum += p;
+    ++count;
+  });
+  if (count == 0) return std::nullopt;
+  return sum / static_cast<double>(count);
+}
+
+RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uint8_t>& mask, const PointCloud& current,
+                          double current_step_m, const Pose& T_motion) {
+  // Brought back by the inverse motion, so that cells compare in place.
+  const Pose T_back = T_motion.inverse();
+  const GridShape& fine = reference.grid;
+  GridShape grid = fine;
+  grid.step = std::max(2 * fine.step, 1.5 * current_step_m);
+  grid.width = static_cast<int>(std::ceil(fine.width * fine.step / grid.step));
+  grid.height = static_cast<int>(std::ceil(fine.height * fine.step / grid.step));
+  std::vector<std::uint8_t> measured(grid.num_cells(), 0);
+  for (const Eigen::Vector3f& p : current.points) {
+    const Eigen::Vector3d moved = T_back * p.cast<double>();
+    const auto cell = grid.cell(moved.x(), moved.y());
+    if (cell) measured[*cell] = 1;
+  }
+  const auto near = [&](int row, int column) {
+    for (int r = std::max(row - 1, 0); r <= std::min(row + 1, grid.height - 1); ++r) {
+      for (int c = std::max(column - 1, 0); c <= std::min(column + 1, grid.width - 1); ++c) {
+        if (measured[static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(c)] != 0) return true;
+      }
+    }
+    return false;
+  };
+
+  std::size_t region_cells = 0;
+  std::size_t covered_cells = 0;
+  std::vector<float> distance(grid.num_cells(), 0.0F);  // of uncovered region cells to anything else, cells
+  ForEachCell(reference, [&](std::size_t cell, const Eigen::Vector3d& p) {
+    if (mask[cell] == 0) return;
+    ++region_cells;
+    const auto coarse = grid.cell(p.x(), p.y());
+    if (!coarse) return;
+    const bool covered = near(static_cast<int>(*coarse) / grid.width, static_cast<int>(*coarse) % grid.width);
+    covered_cells += covered ? 1 : 0;
+    if (!covered) distance[*coarse] = std::numeric_limits<float>::max();
+  });
+  RegionCoverage result;
+  if (region_cells == 0) return result;
+  result.coverage = static_cast<double>(covered_cells) / static_cast<double>(region_cells);
+
+  // Chamfer distance (1, sqrt 2), two passes: within 8 % of the Euclidean one.
+  const auto relax = [&](int row, int column, int dr, int dc) {
+    const int r = row + dr;
+    const int c = column + dc;
+    float& here = distance[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(column)];
+    const bool inside = r >= 0 && r < grid.height && c >= 0 && c < grid.width;
+    const float there =
+        inside ? distance[static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(c)] : 0.0F;
+    here = std::min(here, there + (dr != 0 && dc != 0 ? 1.41421356F : 1.0F));
+  };
+  for (int row = 0; row < grid.height; ++row) {
+    for (int column = 0; column < grid.width; ++column) {
+      for (const auto& [dr, dc] : {std::pair(0, -1), std::pair(-1, -1), std::pair(-1, 0), std::pair(-1, 1)}) relax(row, column, dr, dc);
+    }
+  }
+  float largest = 0.0F;
+  for (int row = grid.height - 1; row >= 0; --row) {
+    for (int column = grid.width - 1; column >= 0; --column) {
+      for (const auto& [dr, dc] : {std::pair(0, 1), std::pair(1, 1), std::pair(1, 0), std::pair(1, -1)}) relax(row, column, dr, dc);
+      const float d = distance[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(column)];
+      if (d <= largest) continue;
+      largest = d;
+      result.hole_centre_m = {grid.x_centre(column), grid.y_centre(row)};
+    }
+  }
+  // A cell next to the hole's rim counts half; the dilation of the measured cells took one ring from the hole.
+  if (largest > 0) result.largest_hole_m = (2.0 * largest - 1.0 + 2.0) * grid.step;
+  return result;
+}
+
+}  // namespace plumb

@@ -1,0 +1,279 @@
+#include "algo/comparison/scene_alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "algo/geometry/rigid_fit.hpp"
+
+namespace plumb {
+namespace {
+
+// No map knows a corner better than this, whatever it claims: prints are not flat and cut to some tenths of a millimetre.
+constexpr double kMinCornerSigma_m = 0.2 * kMillimetre;
+// The four corners of a marker share the error of the views that placed it: together they say as much as two.
+constexpr double kIndependentShare = 0.5;
+constexpr std::size_t kMaxHypothesisMarkers = 60;  // pairs of them are tried: 1770 fits of 8 points
+
+// A marker that both scenes saw.
+struct SharedMarker {
+  int id = 0;
+  MarkerCorners reference;
+  MarkerCorners current;
+  double sigma_m = 0.0;  // of one coordinate of the difference
+};
+
+using Subset = std::vector<std::size_t>;  // ascending indices of shared markers
+
+bool AllFinite(const MarkerCorners& corners) {
+  return std::all_of(corners.begin(), corners.end(), [](const Eigen::Vector3d& p) { return p.allFinite(); });
+}
+
+double SquaredSigma(const SceneMarker& marker) {
+  const double sigma = std::isfinite(marker.sigma_m) ? std::max(marker.sigma_m, kMinCornerSigma_m) : 1.0;
+  return sigma * sigma;
+}
+
+std::vector<SharedMarker> SharedMarkers(const MarkerMap& reference, const MarkerMap& current) {
+  std::vector<SharedMarker> shared;
+  for (const auto& [id, marker] : reference) {
+    const auto other = current.find(id);
+    if (other == current.end() || !AllFinite(marker.corners) || !AllFinite(other->second.corners)) continue;
+    shared.push_back({id, marker.corners, other->second.corners, std::sqrt(SquaredSigma(marker) + SquaredSigma(other->second))});
+  }
+  return shared;
+}
+
+RigidFit FitSubset(std::span<const SharedMarker> shared, const Subset& subset, bool weighted) {
+  std::vector<Eigen::Vector3d> points_reference, points_current;
+  std::vector<double> weights;
+  for (const std::size_t i : subset) {
+    for (std::size_t corner = 0; corner < 4; ++corner) {
+      points_reference.push_back(shared[i].reference[corner]);
+      points_current.push_back(shared[i].current[corner]);
+      weights.push_back(weighted ? 1.0 / (shared[i].sigma_m * shared[i].sigma_m) : 1.0);
+    }
+  }
+  return FitRigid(points_reference, points_current, weights);
+}
+
+// Root mean square corner distance of one marker under an alignment.
+double MarkerResidual(const SharedMarker& marker, const Pose& T_reference_current) {
+  double sum = 0.0;
+  for (std::size_t corner = 0; corner < 4; ++corner) {
+    sum += (marker.reference[corner] - T_reference_current * marker.current[corner]).squaredNorm();
+  }
+  return std::sqrt(sum / 4.0);
+}
+
+Eigen::Vector3d Centre(const SharedMarker& marker) {
+  return 0.25 * (marker.reference[0] + marker.reference[1] + marker.reference[2] + marker.reference[3]);
+}
+
+Eigen::Vector3d CentreOf(std::span<const SharedMarker> shared, const Subset& subset) {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const std::size_t i : subset) centre += Centre(shared[i]);
+  return centre / static_cast<double>(subset.size());
+}
+
+// Covariance of the weighted fit: left perturbation (rotation vector, translation) about `centre`.
+Matrix6d FitCovariance(std::span<const SharedMarker> shared, const Subset& subset, const Eigen::Vector3d& centre) {
+  Matrix6d information = Matrix6d::Zero();
+  for (const std::size_t i : subset) {
+    for (const Eigen::Vector3d& corner : shared[i].reference) {
+      Eigen::Matrix<double, 3, 6> jacobian;
+      jacobian << -Skew(corner - centre), Eigen::Matrix3d::Identity();
+      information += kIndependentShare / (shared[i].sigma_m * shared[i].sigma_m) * jacobian.transpose() * jacobian;
+    }
+  }
+  return information.ldlt().solve(Matrix6d::Identity());
+}
+
+// Standard deviation of MarkerResidual() of a marker that did not move and took no part in the fit.
+double ExpectedResidual(const SharedMarker& marker, const Matrix6d& fit_covariance, const Eigen::Vector3d& centre) {
+  double variance = 0.0;
+  for (const Eigen::Vector3d& corner : marker.reference) {
+    Eigen::Matrix<double, 3, 6> jacobian;
+    jacobian << -Skew(corner - centre), Eigen::Matrix3d::Identity();
+    variance += (jacobian * fit_covariance * jacobian.transpose()).trace() / 4.0;
+  }
+  return std::sqrt(variance + 3.0 * marker.sigma_m * marker.sigma_m);
+}
+
+// The markers that agree with a hypothesis, judged by their own noise only.
+Subset Supporters(std::span<const SharedMarker> shared, const Pose& T, const CompareOptions& options) {
+  Subset subset;
+  for (std::size_t i = 0; i < shared.size(); ++i) {
+    const double limit = std::max(options.moved_marker_m, options.moved_marker_sigmas * std::sqrt(3.0) * shared[i].sigma_m);
+    if (MarkerResidual(shared[i], T) <= limit) subset.push_back(i);
+  }
+  return subset;
+}
+
+struct Consensus {
+  Subset subset;
+  double rms_m = 0.0;
+};
+
+bool Disjoint(const Subset& a, const Subset& b) {
+  return std::none_of(a.begin(), a.end(), [&](std::size_t i) { return std::binary_search(b.begin(), b.end(), i); });
+}
+
+// Largest set of markers that one rigid transform explains: tried from all markers and from every pair of them (one
+// marker alone extrapolates too badly). Sets are returned best first.
+std::vector<Consensus> ConsensusSets(std::span<const SharedMarker> shared, const CompareOptions& options) {
+  std::vector<Consensus> sets;
+  const auto consider = [&](const Subset& seed) {
+    RigidFit fit = FitSubset(shared, seed, true);
+    Subset subset = seed;
+    for (int round = 0; round < 5 && fit.valid; ++round) {
+      Subset next = Supporters(shared, fit.T_a_b, options);
+      if (next.empty() || next == subset) break;
+      subset = std::move(next);
+      fit = FitSubset(shared, subset, true);
+    }
+    if (!fit.valid || std::any_of(sets.begin(), sets.end(), [&](const Consensus& c) { return c.subset == subset; })) return;
+    sets.push_back({subset, fit.rms_m});
+  };
+  Subset all;
+  for (std::size_t i = 0; i < shared.size(); ++i) all.push_back(i);
+  consider(all);
+  const std::size_t n = std::min(shared.size(), kMaxHypothesisMarkers);
+  const bool everyone_agrees = !sets.empty() && sets.front().subset.size() == shared.size();
+  for (std::size_t i = 0; i < n && !everyone_agrees; ++i) {
+    for (std::size_t j = i + 1; j < n; ++j) consider({i, j});
+  }
+  std::stable_sort(sets.begin(), sets.end(), [](const Consensus& a, const Consensus& b) {
+    return a.subset.size() != b.subset.size() ? a.subset.size() > b.subset.size() : a.rms_m < b.rms_m;
+  });
+  return sets;
+}
+
+struct LeaveOneOut {
+  double residual_m = 0.0;
+  double excess = 0.0;  // residual over what would accuse the marker; > 1: it moved
+};
+
+// Judges a marker by the fit of the others in `good`.
+LeaveOneOut JudgeMarker(std::span<const SharedMarker> shared, const Subset& good, std::size_t index, const CompareOptions& options) {
+  Subset others;
+  std::copy_if(good.begin(), good.end(), std::back_inserter(others), [&](std::size_t i) { return i != index; });
+  LeaveOneOut judged;
+  if (others.empty()) return judged;
+  const RigidFit fit = FitSubset(shared, others, true);
+  if (!fit.valid) return judged;
+  const Eigen::Vector3d centre = CentreOf(shared, others);
+  const double sigma = ExpectedResidual(shared[index], FitCovariance(shared, others, centre), centre);
+  judged.residual_m = MarkerResidual(shared[index], fit.T_a_b);
+  judged.excess = judged.residual_m / std::max(options.moved_marker_m, options.moved_marker_sigmas * sigma);
+  return judged;
+}
+
+// Drops the most suspicious marker while one is accused, then takes back whoever the rest acquits.
+Subset GoodMarkers(std::span<const SharedMarker> shared, Subset good, const CompareOptions& options) {
+  while (good.size() > 2) {
+    std::size_t worst = 0;
+    double worst_excess = 0.0;
+    for (std::size_t k = 0; k < good.size(); ++k) {
+      const double excess = JudgeMarker(shared, good, good[k], options).excess;
+      if (excess > worst_excess) {
+        worst_excess = excess;
+        worst = k;
+      }
+    }
+    if (worst_excess <= 1.0) break;
+    good.erase(good.begin() + static_cast<std::ptrdiff_t>(worst));
+  }
+  if (good.size() < 3) return good;
+  Subset acquitted = good;
+  for (std::size_t i = 0; i < shared.size(); ++i) {
+    if (std::binary_search(good.begin(), good.end(), i)) continue;
+    if (JudgeMarker(shared, good, i, options).excess <= 1.0) acquitted.push_back(i);
+  }
+  std::sort(acquitted.begin(), acquitted.end());
+  return acquitted;
+}
+
+std::string IdsOf(std::span<const SharedMarker> shared) {
+  if (shared.empty()) return "";
+  std::vector<int> ids;
+  for (const SharedMarker& marker : shared) ids.push_back(marker.id);
+  return fmt::format(" (id{} {})", ids.size() == 1 ? "" : "s", fmt::join(ids, ", "));
+}
+
+Alignment MakeAlignment(std::span<const SharedMarker> shared, const Subset& subset, const RigidFit& fit) {
+  Alignment alignment;
+  alignment.T_reference_current = fit.T_a_b;
+  alignment.centre_m = CentreOf(shared, subset);
+  double sum = 0.0;
+  double expected = 0.0;
+  for (const std::size_t i : subset) {
+    const double residual = MarkerResidual(shared[i], fit.T_a_b);
+    sum += residual * residual;
+    expected += 3.0 * shared[i].sigma_m * shared[i].sigma_m;
+    alignment.markers_used.push_back(shared[i].id);
+  }
+  alignment.rms_m = std::sqrt(sum / static_cast<double>(subset.size()));
+  // The maps' sigmas may be too proud: the corners' disagreement is the better witness where it is larger.
+  const double pride = std::max(1.0, expected > 0 ? sum / expected : 1.0);
+  alignment.covariance = pride * FitCovariance(shared, subset, alignment.centre_m);
+  return alignment;
+}
+
+AlignmentOutcome AlignAll(std::span<const SharedMarker> shared) {
+  AlignmentOutcome outcome;
+  Subset all;
+  for (std::size_t i = 0; i < shared.size(); ++i) all.push_back(i);
+  const RigidFit fit = FitSubset(shared, all, false);
+  if (!fit.valid) {
+    outcome.failure = "the scans share no marker: the current scan cannot be placed in the reference";
+    return outcome;
+  }
+  outcome.alignment = MakeAlignment(shared, all, fit);
+  return outcome;
+}
+
+}  // namespace
+
+AlignmentOutcome AlignScenes(const MarkerMap& reference, const MarkerMap& current, const CompareOptions& options) {
+  const std::vector<SharedMarker> shared = SharedMarkers(reference, current);
+  if (options.preset == Preset::kPaper) return AlignAll(shared);
+
+  AlignmentOutcome outcome;
+  const std::size_t needed = static_cast<std::size_t>(std::max(options.min_shared_markers, 1));
+  if (shared.size() < needed) {
+    outcome.failure = fmt::format("scan needs at least {} markers shared with the reference, found {}{}; keep the markers in view", needed,
+                                  shared.size(), IdsOf(shared));
+    return outcome;
+  }
+  const std::vector<Consensus> sets = ConsensusSets(shared, options);
+  const Subset good = sets.empty() ? Subset{} : GoodMarkers(shared, sets.front().subset, options);
+  if (good.size() < needed) {
+    outcome.failure = fmt::format(
+        "scan needs at least {} markers that did not move since the reference, {} of {} shared ones agree; check where the markers lie",
+        needed, good.size(), shared.size());
+    return outcome;
+  }
+  for (std::size_t k = 1; k < sets.size(); ++k) {
+    if (sets[k].subset.size() < good.size() || !Disjoint(sets[k].subset, good)) continue;
+    outcome.failure =
+        fmt::format("the markers fall into two groups of {} that moved against each other; check where the markers lie", good.size());
+    return outcome;
+  }
+  const RigidFit fit = FitSubset(shared, good, true);
+  outcome.alignment = MakeAlignment(shared, good, fit);
+  for (std::size_t i = 0; i < shared.size(); ++i) {
+    if (std::binary_search(good.begin(), good.end(), i)) continue;
+    const double residual = MarkerResidual(shared[i], fit.T_a_b);
+    outcome.alignment->markers_rejected[shared[i].id] = residual;
+    outcome.warnings.push_back(fmt::format("marker {} moved {:.0f} mm since the reference; ignored", shared[i].id, residual / kMillimetre));
+  }
+  return outcome;
+}
+
+}  // namespace plumb
