@@ -6,7 +6,6 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <tuple>
 
 #include "algo/types/errors.hpp"
 
@@ -57,6 +56,41 @@ void CheckFileName(std::string_view file, const std::string& where) {
   }
 }
 
+/// A pair that may be chosen, and the best chain of pairs that ends with it.
+struct Candidate {
+  IndexPair pair;
+  double sum_s = 0.0;
+  std::ptrdiff_t previous = -1;  ///< Position of the candidate before it in the chain; -1 at its start.
+};
+
+/// The best chain among those that end before a depth image: a Fenwick tree of maxima.
+class BestChain {
+ public:
+  struct End {
+    double sum_s = 0.0;
+    std::ptrdiff_t candidate = -1;
+  };
+
+  explicit BestChain(std::size_t size) : tree_(size + 1) {}
+
+  [[nodiscard]] End Before(std::size_t depth) const {
+    End best;
+    for (std::size_t i = depth; i > 0; i &= i - 1) {
+      if (tree_[i].sum_s > best.sum_s) best = tree_[i];
+    }
+    return best;
+  }
+
+  void Add(std::size_t depth, const End& end) {
+    for (std::size_t i = depth + 1; i < tree_.size(); i += i & (~i + 1)) {
+      if (end.sum_s > tree_[i].sum_s) tree_[i] = end;
+    }
+  }
+
+ private:
+  std::vector<End> tree_;
+};
+
 }  // namespace
 
 std::vector<IndexEntry> ParseIndex(std::string_view text, const std::string& name) {
@@ -90,35 +124,31 @@ std::vector<IndexEntry> ParseIndex(std::string_view text, const std::string& nam
 }
 
 std::vector<IndexPair> AssociateByTime(std::span<const IndexEntry> color, std::span<const IndexEntry> depth, double max_gap_s) {
-  std::vector<std::tuple<double, std::size_t, std::size_t>> candidates;
+  std::vector<Candidate> candidates;
+  BestChain best(depth.size());
   for (std::size_t c = 0; c < color.size(); ++c) {
     const auto after = std::partition_point(depth.begin(), depth.end(), [&](const IndexEntry& d) { return d.time_s < color[c].time_s; });
     const auto first = after - std::min(kNeighbours, after - depth.begin());
     const auto last = after + std::min(kNeighbours, depth.end() - after);
+    const std::size_t first_of_color = candidates.size();
     for (auto d = first; d != last; ++d) {
       const double gap_s = std::abs(d->time_s - color[c].time_s);
-      if (gap_s <= max_gap_s) candidates.emplace_back(gap_s, c, static_cast<std::size_t>(d - depth.begin()));
+      if (gap_s > max_gap_s) continue;
+      const auto position = static_cast<std::size_t>(d - depth.begin());
+      const BestChain::End before = best.Before(position);
+      candidates.push_back({{c, position}, before.sum_s + 2 * max_gap_s - gap_s, before.candidate});
+    }
+    // Only now, so that no chain uses one colour image twice.
+    for (std::size_t i = first_of_color; i < candidates.size(); ++i) {
+      best.Add(candidates[i].pair.depth, {candidates[i].sum_s, static_cast<std::ptrdiff_t>(i)});
     }
   }
-  std::sort(candidates.begin(), candidates.end());
-
-  std::vector<bool> color_used(color.size());
-  std::vector<bool> depth_used(depth.size());
   std::vector<IndexPair> pairs;
-  for (const auto& [gap_s, c, d] : candidates) {
-    if (color_used[c] || depth_used[d]) continue;
-    color_used[c] = true;
-    depth_used[d] = true;
-    pairs.push_back({c, d});
+  for (std::ptrdiff_t i = best.Before(depth.size()).candidate; i >= 0; i = candidates[static_cast<std::size_t>(i)].previous) {
+    pairs.push_back(candidates[static_cast<std::size_t>(i)].pair);
   }
-  std::sort(pairs.begin(), pairs.end(), [](const IndexPair& a, const IndexPair& b) { return a.color < b.color; });
-
-  // Stamps denser than the gap can cross; time never runs backwards in what comes out.
-  std::vector<IndexPair> rising;
-  for (const IndexPair& pair : pairs) {
-    if (rising.empty() || pair.depth > rising.back().depth) rising.push_back(pair);
-  }
-  return rising;
+  std::reverse(pairs.begin(), pairs.end());
+  return pairs;
 }
 
 }  // namespace plumb

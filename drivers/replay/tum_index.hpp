@@ -28,8 +28,9 @@ struct IndexPair {
   bool operator==(const IndexPair&) const = default;
 };
 
-/// Pairs by the smallest difference of stamps first, each image at most once, differences up to `max_gap_s`.
-/// Both lists must rise strictly. The result rises in both members.
+/// Pairs images that are at most `max_gap_s` apart: each at most once, time rising in both lists, with the largest sum of
+/// (2 max_gap_s - gap). So nearest stamps pair, but where the two streams run half a frame apart an image takes its second
+/// nearest partner rather than leave another without any. Both lists must rise strictly; max_gap_s > 0.
 [[nodiscard]] std::vector<IndexPair> AssociateByTime(std::span<const IndexEntry> color, std::span<const IndexEntry> depth,
                                                      double max_gap_s);
 

@@ -1,0 +1,57 @@
+// Writes recordings in the TUM RGB-D layout that TumRecording reads.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "algo/types/frame.hpp"
+
+namespace plumb {
+
+struct TumWriterOptions {
+  double depth_scale = 5000.0;  ///< Units per metre of the depth images; farther than 65534 units is written as nothing.
+  int jpeg_quality = 92;        ///< Of the colour images; 0 writes PNG instead.
+};
+
+/// One image pair, ready for the disk.
+struct EncodedFrame {
+  double color_time_s = 0.0;
+  double depth_time_s = 0.0;
+  std::vector<std::uint8_t> color_file;
+  std::vector<std::uint8_t> depth_file;
+};
+
+/// Compresses one pair. Thread-safe: frames can be encoded in parallel and added in order.
+/// @throws std::invalid_argument unless the images are CV_8UC3 and CV_32FC1 (metres) of one size.
+[[nodiscard]] EncodedFrame EncodeFrame(const Frame& frame, const TumWriterOptions& options);
+
+/// The text of camera.yaml; ParseCameraFile() gives the same camera back, bit for bit.
+[[nodiscard]] std::string CameraFileText(const StreamInfo& info, double depth_scale);
+
+/// Writes one recording. Images go to the disk as they come; the indices and camera.yaml come last, with Finish().
+/// Without it the folder is no recording: whoever stops early removes it (see daemon/files/atomic_folder.hpp). Not thread-safe.
+class TumWriter {
+ public:
+  /// Creates the folder (its parent must exist) with rgb/ and depth/. @throws IoError
+  TumWriter(std::filesystem::path folder, const StreamInfo& info, const TumWriterOptions& options = {});
+
+  /// @throws IoError; std::invalid_argument if a stamp is not later than the one before by a microsecond, the resolution of the files.
+  void Add(const EncodedFrame& frame);
+  void Add(const Frame& frame) { Add(EncodeFrame(frame, options_)); }
+
+  /// @throws IoError
+  void Finish();
+
+ private:
+  std::filesystem::path folder_;
+  StreamInfo info_;
+  TumWriterOptions options_;
+  std::string color_index_;
+  std::string depth_index_;
+  double last_color_s_ = -1.0;
+  double last_depth_s_ = -1.0;
+};
+
+}  // namespace plumb

@@ -1,0 +1,302 @@
+#include "drivers/replay/tum_recording.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <functional>
+#include <opencv2/core.hpp>
+
+#include "algo/types/errors.hpp"
+#include "drivers/replay/file_io.hpp"
+#include "drivers/replay/image_file.hpp"
+#include "drivers/replay/tum_writer.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using testing::MessageOf;
+using testing::TempFolder;
+
+constexpr int kNumFrames = 12;
+
+StreamInfo SmallCamera() {
+  StreamInfo info;
+  info.intrinsics = {.width = 64, .height = 48, .fx = 52.5, .fy = 52.4, .cx = 31.7, .cy = 23.6, .distortion = {0.01, -0.02, 0.001, 0, 0}};
+  info.marker_dictionary = "DICT_5X5_100";
+  info.marker_length_m = 0.08;
+  info.reference_marker = 3;
+  return info;
+}
+
+/// Frame i: a grey of its own and a depth of its own, with one column of nothing.
+Frame NumberedFrame(int i, int width = 64, int height = 48) {
+  Frame frame;
+  frame.index = i;
+  frame.color_time_s = 1000.0 + i / 30.0;
+  frame.depth_time_s = frame.color_time_s + 0.006;
+  frame.color_rgb = cv::Mat(height, width, CV_8UC3, cv::Scalar(10 * i, 10 * i + 1, 10 * i + 2));
+  frame.depth_m = cv::Mat(height, width, CV_32FC1, cv::Scalar(0.5 + 0.1 * i));
+  frame.depth_m.col(5).setTo(cv::Scalar(0));
+  return frame;
+}
+
+/// A good recording that a test then damages.
+class TumRecordingTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    TumWriter writer(recording_, SmallCamera(), {.jpeg_quality = 0});
+    for (int i = 0; i < kNumFrames; ++i) writer.Add(NumberedFrame(i));
+    writer.Finish();
+  }
+
+  /// The message of the refusal, by Open() or while the frames are read.
+  [[nodiscard]] std::string Refusal() const {
+    return MessageOf<DataError>([&] {
+      const auto source = TumRecording::Open(recording_);
+      while (source->Next()) {
+      }
+    });
+  }
+
+  [[nodiscard]] fs::path ColorFile(int i) const { return recording_ / fmt::format("rgb/{:.6f}.png", NumberedFrame(i).color_time_s); }
+  [[nodiscard]] fs::path DepthFile(int i) const { return recording_ / fmt::format("depth/{:.6f}.png", NumberedFrame(i).depth_time_s); }
+
+  TempFolder folder_;
+  fs::path recording_ = folder_ / "recording";
+};
+
+TEST_F(TumRecordingTest, GivesBackWhatWasWritten) {
+  const auto source = TumRecording::Open(recording_);
+  EXPECT_EQ(source->info().intrinsics, SmallCamera().intrinsics);
+  EXPECT_FALSE(source->info().intrinsics_assumed);
+  EXPECT_EQ(source->info().marker_dictionary, "DICT_5X5_100");
+  EXPECT_EQ(source->info().marker_length_m, 0.08);
+  EXPECT_EQ(source->info().reference_marker, 3);
+  EXPECT_EQ(source->info().num_frames, kNumFrames);
+  EXPECT_THAT(source->info().warnings, ::testing::IsEmpty());
+  for (int i = 0; i < kNumFrames; ++i) {
+    const std::optional<Frame> frame = source->Next();
+    ASSERT_TRUE(frame);
+    const Frame expected = NumberedFrame(i);
+    EXPECT_EQ(frame->index, i);
+    EXPECT_NEAR(frame->color_time_s, expected.color_time_s, 5e-7);  // stamps have microseconds
+    EXPECT_NEAR(frame->depth_time_s, expected.depth_time_s, 5e-7);
+    EXPECT_EQ(cv::norm(frame->color_rgb, expected.color_rgb, cv::NORM_INF), 0);
+    EXPECT_LE(cv::norm(frame->depth_m, expected.depth_m, cv::NORM_INF), 1e-4 + 1e-6);  // half a unit of 1/5000 m
+    EXPECT_EQ(frame->depth_m.at<float>(7, 5), 0.0F);
+  }
+  EXPECT_FALSE(source->Next());
+  EXPECT_FALSE(source->Next());
+  EXPECT_EQ(source->statistics().num_frames, kNumFrames);
+  EXPECT_EQ(source->statistics().num_frames_with_depth, kNumFrames);
+  EXPECT_GT(source->statistics().decode_cpu_s, 0.0);
+}
+
+TEST_F(TumRecordingTest, StoppingEarlyEndsTheThread) {
+  for (int frames = 0; frames < 3; ++frames) {
+    const auto source = TumRecording::Open(recording_);
+    for (int i = 0; i < frames; ++i) EXPECT_TRUE(source->Next());
+  }
+}
+
+TEST_F(TumRecordingTest, ReadsJpegColour) {
+  const fs::path jpeg = folder_ / "jpeg";
+  TumWriter writer(jpeg, SmallCamera(), {.jpeg_quality = 95});
+  for (int i = 0; i < 2; ++i) writer.Add(NumberedFrame(i + 4));
+  writer.Finish();
+  const auto frame = TumRecording::Open(jpeg)->Next();
+  ASSERT_TRUE(frame);
+  // Flat grey 40 41 42: JPEG's colour transform rounds by at most 2.
+  EXPECT_LE(cv::norm(frame->color_rgb, NumberedFrame(4).color_rgb, cv::NORM_INF), 2);
+}
+
+TEST_F(TumRecordingTest, UnmatchedImagesAreLeftOutAndCounted) {
+  std::string index = ReadTextFile(recording_ / "depth.txt", 1 << 20);
+  const std::size_t line = index.find("1000.106");  // frame 3
+  index.erase(line, index.find('\n', line) + 1 - line);
+  WriteWholeFile(recording_ / "depth.txt", index);
+  const auto source = TumRecording::Open(recording_);
+  EXPECT_EQ(source->info().num_frames, kNumFrames - 1);
+  EXPECT_EQ(source->statistics().num_unmatched_color, 1);
+  EXPECT_EQ(source->statistics().num_unmatched_depth, 0);
+  EXPECT_THAT(source->info().warnings, Contains(HasSubstr("1 of 12 colour and 0 of 11 depth images")));
+  for (int i = 0; i < 3; ++i) (void)source->Next();
+  const auto after_gap = source->Next();
+  EXPECT_NEAR(after_gap->color_time_s, NumberedFrame(4).color_time_s, 1e-6);
+  EXPECT_EQ(after_gap->index, 3);
+}
+
+TEST_F(TumRecordingTest, WithoutCameraFileTumsCameraIsAssumedAtTheImagesSize) {
+  fs::remove(recording_ / "camera.yaml");
+  const auto source = TumRecording::Open(recording_, {.marker_dictionary = "DICT_4X4_50", .marker_length_m = 0.1, .reference_marker = 9});
+  EXPECT_TRUE(source->info().intrinsics_assumed);
+  EXPECT_EQ(source->info().intrinsics.width, 64);
+  EXPECT_DOUBLE_EQ(source->info().intrinsics.fx, 52.5);
+  EXPECT_DOUBLE_EQ(source->info().intrinsics.cx, 31.5);
+  EXPECT_EQ(source->info().marker_dictionary, "DICT_4X4_50");
+  EXPECT_EQ(source->info().reference_marker, 9);
+  EXPECT_THAT(source->info().warnings, Contains(HasSubstr("no camera.yaml: assumed fx 52.5")));
+  EXPECT_NEAR(source->Next()->depth_m.at<float>(0, 0), 0.5F, 1e-4);  // 5000 units a metre
+}
+
+TEST_F(TumRecordingTest, WithoutCameraFileOtherShapesNeedOne) {
+  const fs::path wide = folder_ / "wide";
+  TumWriter writer(wide, SmallCamera(), {.jpeg_quality = 0});
+  for (int i = 0; i < 2; ++i) writer.Add(NumberedFrame(i, 80, 48));
+  writer.Finish();
+  fs::remove(wide / "camera.yaml");
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(wide); }), AllOf(HasSubstr("80x48"), HasSubstr("add camera.yaml")));
+}
+
+TEST_F(TumRecordingTest, UnregisteredDepthIsRegistered) {
+  std::string text = ReadTextFile(recording_ / "camera.yaml", 1 << 16);
+  const std::string registered = "depth_registered: 1";
+  text.replace(text.find(registered), registered.size(),
+               "depth_registered: 0\ndepth_camera_matrix: [ 52.5, 0, 31.7, 0, 52.4, 23.6, 0, 0, 1 ]\n"
+               "depth_distortion_coefficients: [ 0.01, -0.02, 0.001, 0, 0 ]\n"
+               "T_color_depth: [ 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0.25, 0, 0, 0, 1 ]");
+  WriteWholeFile(recording_ / "camera.yaml", text);
+  const auto frame = TumRecording::Open(recording_)->Next();
+  ASSERT_TRUE(frame);
+  EXPECT_NEAR(frame->depth_m.at<float>(24, 32), 0.75F, 1e-4);  // 0.5 m before a depth camera that stands 0.25 m in front
+}
+
+TEST_F(TumRecordingTest, AllDepthZeroIsCountedWhileReading) {
+  for (int i = 0; i < kNumFrames; ++i) WritePng(DepthFile(i), cv::Mat::zeros(48, 64, CV_16UC1));
+  const auto source = TumRecording::Open(recording_);
+  while (source->Next()) {
+  }
+  EXPECT_EQ(source->statistics().num_frames, kNumFrames);
+  EXPECT_EQ(source->statistics().num_frames_with_depth, 0);
+}
+
+TEST_F(TumRecordingTest, SaturatedDepthIsNothing) {
+  WritePng(DepthFile(0), cv::Mat(48, 64, CV_16UC1, cv::Scalar(65535)));
+  const auto source = TumRecording::Open(recording_);
+  EXPECT_EQ(cv::countNonZero(source->Next()->depth_m), 0);
+  EXPECT_EQ(source->statistics().num_frames_with_depth, 0);
+}
+
+// ---- bad input: each is refused with the file, what was found and what is expected
+
+TEST_F(TumRecordingTest, MissingFolderAndAFileInItsPlaceAreNamed) {
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(folder_ / "none"); }), AllOf(HasSubstr("none"), HasSubstr("missing")));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(recording_ / "rgb.txt"); }), HasSubstr("no folder"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(folder_.path()); }), HasSubstr("rgb.txt is missing"));
+}
+
+TEST_F(TumRecordingTest, MissingIndexIsNamed) {
+  fs::remove(recording_ / "depth.txt");
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("depth.txt"), HasSubstr("missing")));
+}
+
+TEST_F(TumRecordingTest, EmptyIndexIsNamed) {
+  WriteWholeFile(recording_ / "rgb.txt", std::string_view("# nothing\n"));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("rgb.txt"), HasSubstr("lists no image")));
+}
+
+TEST_F(TumRecordingTest, MissingImageIsNamedBeforeAnyWork) {
+  fs::remove(ColorFile(7));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(recording_); }),
+              AllOf(HasSubstr(ColorFile(7).filename()), HasSubstr("rgb.txt"), HasSubstr("cannot be found")));
+}
+
+TEST_F(TumRecordingTest, TruncatedImageIsNamedAfterTheGoodFrames) {
+  fs::resize_file(DepthFile(7), fs::file_size(DepthFile(7)) / 2);
+  const auto source = TumRecording::Open(recording_);
+  for (int i = 0; i < 7; ++i) EXPECT_TRUE(source->Next());
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)source->Next(); }), AllOf(HasSubstr(DepthFile(7).filename()), HasSubstr("damaged")));
+  EXPECT_FALSE(source->Next());
+}
+
+TEST_F(TumRecordingTest, WrongSizeImagesAreNamed) {
+  WritePng(ColorFile(2), cv::Mat::zeros(24, 32, CV_8UC3));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr(ColorFile(2).filename()), HasSubstr("32x24"), HasSubstr("expected 64x48")));
+  WritePng(ColorFile(2), cv::Mat::zeros(48, 64, CV_8UC3));
+  WritePng(DepthFile(3), cv::Mat::zeros(24, 32, CV_16UC1));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("depth image"), HasSubstr("32x24"), HasSubstr("expected 64x48")));
+}
+
+TEST_F(TumRecordingTest, EightBitAndColourDepthAreNamed) {
+  WritePng(DepthFile(2), cv::Mat::zeros(48, 64, CV_8UC1));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr(DepthFile(2).filename()), HasSubstr("8 bits")));
+  WritePng(DepthFile(2), cv::Mat::zeros(48, 64, CV_8UC3));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr(DepthFile(2).filename()), HasSubstr("3 channels")));
+}
+
+TEST_F(TumRecordingTest, IntrinsicsForAnotherSizeAreNamed) {
+  StreamInfo other = SmallCamera();
+  other.intrinsics = Intrinsics{};
+  WriteWholeFile(recording_ / "camera.yaml", CameraFileText(other, 5000));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("64x48"), HasSubstr("expected 640x480")));
+}
+
+TEST_F(TumRecordingTest, BadCameraFileIsNamed) {
+  WriteWholeFile(recording_ / "camera.yaml", std::string_view("%YAML:1.0\n---\nimage_width: 64\n"));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("camera.yaml"), HasSubstr("image_height is missing")));
+}
+
+TEST_F(TumRecordingTest, LinksOutOfTheFolderAreNamed) {
+  fs::rename(ColorFile(5), folder_ / "outside.png");
+  fs::create_symlink(folder_ / "outside.png", ColorFile(5));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr(ColorFile(5).filename()), HasSubstr("out of the recording's folder")));
+  fs::remove(ColorFile(5));
+  fs::copy_file(ColorFile(4), recording_ / "kept.png");
+  fs::create_symlink("../kept.png", ColorFile(5));  // a link inside the folder is fine
+  EXPECT_EQ(TumRecording::Open(recording_)->info().num_frames, kNumFrames);
+}
+
+TEST_F(TumRecordingTest, AFolderWhoseNameBeginsTheSameIsOutside) {
+  fs::create_directory(folder_ / "recording2");
+  fs::rename(ColorFile(5), folder_ / "recording2/a.png");
+  fs::create_symlink("../../recording2/a.png", ColorFile(5));
+  EXPECT_THAT(Refusal(), HasSubstr("out of the recording's folder"));
+}
+
+TEST_F(TumRecordingTest, ASingleFrameIsNamed) {
+  WriteWholeFile(recording_ / "rgb.txt", fmt::format("1000.000000 rgb/{}\n", ColorFile(0).filename().string()));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("has 1 frame ("), HasSubstr("at least 2")));
+}
+
+TEST_F(TumRecordingTest, ListsOfDifferentClocksAreNamed) {
+  WriteWholeFile(recording_ / "rgb.txt",
+                 fmt::format("5.0 rgb/{}\n6.0 rgb/{}\n", ColorFile(0).filename().string(), ColorFile(1).filename().string()));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("has 0 frames"), HasSubstr("clock")));
+}
+
+TEST_F(TumRecordingTest, UnreadableIndexLinesAreNamed) {
+  WriteWholeFile(recording_ / "rgb.txt", std::string_view("1000.0 rgb/a.png\nnan rgb/b.png\n"));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("rgb.txt line 2"), HasSubstr("nan")));
+}
+
+// ---- the writer
+
+TEST_F(TumRecordingTest, TheWriterRefusesStampsThatDoNotRise) {
+  TumWriter writer(folder_ / "w", SmallCamera());
+  writer.Add(NumberedFrame(1));
+  EXPECT_THROW(writer.Add(NumberedFrame(1)), std::invalid_argument);
+  EXPECT_THROW(writer.Add(NumberedFrame(0)), std::invalid_argument);
+  EXPECT_THROW(TumWriter(folder_ / "missing/parent", SmallCamera()), IoError);
+}
+
+TEST_F(TumRecordingTest, DepthBeyondSixteenBitsIsWrittenAsNothing) {
+  Frame frame = NumberedFrame(0);
+  frame.depth_m.at<float>(0, 0) = 13.2F;  // 66000 units
+  frame.depth_m.at<float>(0, 1) = std::numeric_limits<float>::quiet_NaN();
+  const cv::Mat units = DecodeDepthImage(EncodeFrame(frame, {}).depth_file, "written");
+  EXPECT_EQ(units.at<std::uint16_t>(0, 0), 0);
+  EXPECT_EQ(units.at<std::uint16_t>(0, 1), 0);
+  EXPECT_EQ(units.at<std::uint16_t>(0, 2), 2500);
+}
+
+}  // namespace
+}  // namespace plumb
