@@ -1,0 +1,47 @@
+// Bundle adjustment over keyframes, landmarks, markers and the sensor's own calibration (Ceres).
+#pragma once
+
+#include <vector>
+
+#include "algo/tracking/calibration_model.hpp"
+#include "algo/tracking/map.hpp"
+
+namespace plumb {
+
+/// A quadratic in the twists of two keyframes (or of one keyframe and a marker) and the depth calibration:
+/// 1/2 x' H x + g' x, where x holds the twists from the poses at the time of linearisation (twist on the camera's or the
+/// marker's side) and the change of CalibrationModel::depth. Sums of millions of point-to-plane residuals come in this form.
+struct QuadraticTerm {
+  static constexpr int kSize = 18;
+  int keyframe_a = -1;
+  int keyframe_b = -1;  ///< Second keyframe, or -1 where `marker` is the second.
+  int marker = -1;      ///< Id.
+  Eigen::Matrix<double, kSize, kSize> H = Eigen::Matrix<double, kSize, kSize>::Zero();
+  Eigen::Matrix<double, kSize, 1> g = Eigen::Matrix<double, kSize, 1>::Zero();
+};
+
+struct BundleOptions {
+  std::vector<int> free_keyframes;  ///< To move; the others that share landmarks or markers stay.
+  bool calibrate = false;           ///< Move the calibration too.
+  bool fix_markers = false;         ///< Markers stay where they are.
+  int max_iterations = 8;
+  int num_threads = 1;
+  double keypoint_sigma_px = 0.6;  ///< At 640 columns.
+  double min_corner_sigma_px = 0.15;
+  double marker_length_m = 0.104;
+};
+
+struct BundleSummary {
+  bool usable = false;
+  int num_residuals = 0;
+  int num_iterations = 0;
+  double initial_cost = 0;
+  double final_cost = 0;
+};
+
+/// Moves what the options free, in place. Deterministic (fixed order, whatever the number of threads).
+/// @param terms  Linearised at the map's and the calibration's present values.
+BundleSummary BundleAdjust(const Intrinsics& stated, const BundleOptions& options, const std::vector<QuadraticTerm>& terms,
+                           TrackingMap& map, CalibrationModel& calibration);
+
+}  // namespace plumb

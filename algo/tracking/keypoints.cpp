@@ -1,0 +1,132 @@
+#include "algo/tracking/keypoints.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+
+namespace plumb {
+namespace {
+
+std::vector<cv::Point2f> ToCv(const std::vector<Eigen::Vector2f>& points) {
+  std::vector<cv::Point2f> result;
+  result.reserve(points.size());
+  for (const Eigen::Vector2f& p : points) result.emplace_back(p.x(), p.y());
+  return result;
+}
+
+// Offset of the peak of a parabola through three samples around it, in [-0.5, 0.5].
+float PeakOffset(float before, float at, float after) {
+  const float curvature = before - 2 * at + after;
+  return curvature < 0 ? std::clamp(0.5F * (before - after) / curvature, -0.5F, 0.5F) : 0.0F;
+}
+
+}  // namespace
+
+Pyramid MakePyramid(const cv::Mat& gray, const KeypointOptions& options) {
+  Pyramid pyramid;
+  cv::buildOpticalFlowPyramid(gray, pyramid, cv::Size(options.window_px, options.window_px), options.levels, true);
+  return pyramid;
+}
+
+std::vector<Eigen::Vector2f> DetectCorners(const cv::Mat& gray, const std::vector<Eigen::Vector2f>& occupied,
+                                           const KeypointOptions& options) {
+  cv::Mat score;
+  cv::cornerMinEigenVal(gray, score, 5, 3);
+  // cornerMinEigenVal sums, over its 5x5 block, squares of Sobel gradients (8 times the gradient) scaled by 1 / (255 * 4 * 5).
+
+  const float threshold = static_cast<float>(options.min_quality * 25.0 * 64.0 / (5100.0 * 5100.0));
+  const int cell = std::max(8, options.cell_px * gray.cols / 640);
+  const int columns = (gray.cols + cell - 1) / cell;
+  const int rows = (gray.rows + cell - 1) / cell;
+  std::vector<bool> taken(static_cast<std::size_t>(columns * rows), false);
+  for (const Eigen::Vector2f& p : occupied) {
+    const int c = static_cast<int>(p.x()) / cell;
+    const int r = static_cast<int>(p.y()) / cell;
+    if (c >= 0 && r >= 0 && c < columns && r < rows) taken[static_cast<std::size_t>(r * columns + c)] = true;
+  }
+  const int margin = 8;
+  std::vector<Eigen::Vector2f> corners;
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < columns; ++c) {
+      if (taken[static_cast<std::size_t>(r * columns + c)]) continue;
+      float best = threshold;
+      cv::Point at(-1, -1);
+      for (int y = std::max(margin, r * cell); y < std::min(gray.rows - margin, (r + 1) * cell); ++y) {
+        const float* line = score.ptr<float>(y);
+        for (int x = std::max(margin, c * cell); x < std::min(gray.cols - margin, (c + 1) * cell); ++x) {
+          if (line[x] > best) {
+            best = line[x];
+            at = {x, y};
+          }
+        }
+      }
+      if (at.x < 0) continue;
+      const float dx = PeakOffset(score.at<float>(at.y, at.x - 1), best, score.at<float>(at.y, at.x + 1));
+      const float dy = PeakOffset(score.at<float>(at.y - 1, at.x), best, score.at<float>(at.y + 1, at.x));
+      corners.emplace_back(static_cast<float>(at.x) + dx, static_cast<float>(at.y) + dy);
+    }
+  }
+  return corners;
+}
+
+KltResult TrackKlt(const Pyramid& from, const Pyramid& to, const std::vector<Eigen::Vector2f>& points,
+                   const std::vector<Eigen::Vector2f>& guesses, int max_level, const KeypointOptions& options) {
+  KltResult result;
+  result.points = guesses;
+  result.found.assign(points.size(), false);
+  if (points.empty()) return result;
+  const std::vector<cv::Point2f> start = ToCv(points);
+  std::vector<cv::Point2f> end = ToCv(guesses);
+  std::vector<unsigned char> status;
+  std::vector<float> error;
+  cv::calcOpticalFlowPyrLK(from, to, start, end, status, error, cv::Size(options.window_px, options.window_px), max_level,
+                           cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 20, 0.01), cv::OPTFLOW_USE_INITIAL_FLOW, 1e-3);
+  const float width = static_cast<float>(to[0].cols);
+  const float height = static_cast<float>(to[0].rows);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    result.points[i] = {end[i].x, end[i].y};
+    // The error is the mean absolute difference of the patches, grey levels.
+    result.found[i] = status[i] != 0 && error[i] < 20.0F && end[i].x > 3 && end[i].y > 3 && end[i].x < width - 4 && end[i].y < height - 4;
+  }
+  return result;
+}
+
+double DepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel) {
+  const int x = static_cast<int>(std::lround(pixel.x()));
+  const int y = static_cast<int>(std::lround(pixel.y()));
+  if (x < 1 || y < 1 || x + 1 >= depth_m.cols || y + 1 >= depth_m.rows) return 0.0;
+  std::array<float, 9> values{};
+  int n = 0;
+  for (int r = y - 1; r <= y + 1; ++r)
+    for (int c = x - 1; c <= x + 1; ++c)
+      if (const float z = depth_m.at<float>(r, c); z > 0) values[static_cast<std::size_t>(n++)] = z;
+  if (n < 6) return 0.0;
+  std::sort(values.begin(), values.begin() + n);
+  if (values[static_cast<std::size_t>(n - 1)] - values[0] > 0.03F * values[0] + 0.005F) return 0.0;
+  return values[static_cast<std::size_t>(n / 2)];
+}
+
+DescribedFeatures DescribeFeatures(const cv::Mat& gray, const cv::Mat& depth_m, const Intrinsics& intrinsics) {
+  // Few levels: relocalisation sees the same body from about the same distance.
+  const cv::Ptr<cv::ORB> orb = cv::ORB::create(500, 1.3F, 4, 15, 0, 2, cv::ORB::HARRIS_SCORE, 31, 10);
+  std::vector<cv::KeyPoint> keypoints;
+  cv::Mat descriptors;
+  orb->detectAndCompute(gray, cv::noArray(), keypoints, descriptors);
+  DescribedFeatures features;
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    const Eigen::Vector2d pixel(keypoints[i].pt.x, keypoints[i].pt.y);
+    const double z = DepthAt(depth_m, pixel);
+    if (z <= 0) continue;
+    const Eigen::Vector2d ideal = Undistort(intrinsics, pixel);
+    features.pixels.emplace_back(pixel.cast<float>());
+    features.in_camera.emplace_back(Eigen::Vector3d(z * ideal.x(), z * ideal.y(), z).cast<float>());
+    features.descriptors.push_back(descriptors.row(static_cast<int>(i)));
+  }
+  return features;
+}
+
+}  // namespace plumb

@@ -1,0 +1,62 @@
+// The tracker's map: keyframes, landmarks, markers. Its world is the first keyframe's colour camera.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include <opencv2/core/mat.hpp>
+
+#include "algo/tracking/dense_view.hpp"
+#include "algo/types/keyframe.hpp"
+
+namespace plumb {
+
+/// A natural keypoint in space.
+struct Landmark {
+  Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
+  int first_keyframe = 0;
+  int num_observations = 0;  ///< In keyframes.
+  int num_rejections = 0;    ///< Times that a pose found it off.
+  bool usable = true;
+};
+
+/// A landmark seen in a keyframe.
+struct KeypointObservation {
+  int landmark = 0;
+  Eigen::Vector2d pixel;  ///< As seen (distorted).
+  double z_m = 0.0;       ///< Depth there; 0: none, or an edge.
+};
+
+/// A keyframe of the map. `data.view.T_world_camera` (depth time) follows T_world_color: see DepthPose().
+struct MapKeyframe {
+  Keyframe data;
+  Pose T_world_color = Pose::Identity();       ///< At the colour stamp.
+  Vector6d velocity_per_s = Vector6d::Zero();  ///< Twist in the camera frame: T(t0 + dt) = T(t0) * PoseFromTwist(v dt).
+  std::vector<KeypointObservation> keypoints;
+  DenseView dense;
+  cv::Mat gray;                                  ///< CV_8UC1; released once the keyframe is out of reach of re-association.
+  std::vector<Eigen::Vector2f> features_px;      ///< For relocalisation: keypoints with a descriptor and depth.
+  std::vector<Eigen::Vector3f> features_camera;  ///< The same in the camera frame, metres.
+  cv::Mat descriptors;                           ///< One ORB descriptor a row, for each of the features.
+};
+
+/// Camera pose `dt_s` after the colour stamp under the keyframe's velocity.
+[[nodiscard]] inline Pose PoseAfter(const Pose& T_world_color, const Vector6d& velocity_per_s, double dt_s) {
+  return T_world_color * PoseFromTwist(velocity_per_s * dt_s);
+}
+
+/// A marker of the map, as a rigid square of known side.
+struct MapMarker {
+  Pose T_world_marker = Pose::Identity();
+  int num_views = 0;
+};
+
+struct TrackingMap {
+  std::vector<MapKeyframe> keyframes;
+  std::vector<Landmark> landmarks;
+  std::map<int, MapMarker> markers;
+};
+
+}  // namespace plumb

@@ -1,0 +1,140 @@
+#include "algo/tracking/pose_optimizer.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+namespace plumb {
+namespace {
+
+constexpr double kPointGate = 3.0;  // Residuals in sigmas: beyond, a point is an outlier.
+
+// Normal equations of a twist applied on the camera's side: T <- T * PoseFromTwist(x).
+struct NormalEquations {
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d g = Vector6d::Zero();
+
+  void Add(const Vector6d& J, double residual, double weight) {
+    H.noalias() += weight * J * J.transpose();
+    g.noalias() += weight * residual * J;
+  }
+};
+
+// Weight of a residual in sigmas under the Cauchy loss.
+double CauchyWeight(double residual, double scale) { return 1.0 / (1.0 + (residual / scale) * (residual / scale)); }
+
+// With p_camera = T^-1 p_world and T <- T exp(x): d p_camera / d x = [ [p]x , -I ].
+void AddPoint(const PosePoint& point, const Eigen::Vector3d& p, NormalEquations& equations) {
+  if (p.z() < 0.05) return;
+  const double iz = 1.0 / p.z();
+  const Eigen::Vector2d residual = (p.head<2>() * iz - point.ideal) / point.sigma;
+  const double weight = CauchyWeight(residual.norm(), 2.0);
+  Eigen::Matrix<double, 3, 6> J_point;
+  J_point << Skew(p), -Eigen::Matrix3d::Identity();
+  const Vector6d Jx = (J_point.row(0) - p.x() * iz * J_point.row(2)).transpose() * (iz / point.sigma);
+  const Vector6d Jy = (J_point.row(1) - p.y() * iz * J_point.row(2)).transpose() * (iz / point.sigma);
+  equations.Add(Jx, residual.x(), weight);
+  equations.Add(Jy, residual.y(), weight);
+  if (point.inverse_z > 0) {
+    const double depth_residual = (iz - point.inverse_z) / point.inverse_z_sigma;
+    const Vector6d Jz = -iz * iz / point.inverse_z_sigma * J_point.row(2).transpose();
+    equations.Add(Jz, depth_residual, weight * CauchyWeight(depth_residual, 2.0));
+  }
+}
+
+struct DenseSum {
+  NormalEquations equations;
+  double squares = 0;
+  int associated = 0;
+  int valid = 0;
+};
+
+DenseSum AddDense(const PoseProblem& problem, const Pose& T_world_camera, double gate_m) {
+  DenseSum sum;
+  const DenseView& frame = *problem.dense_frame;
+  const DenseView& target = *problem.dense_target;
+  const Pose T_target_depth = problem.T_world_target.inverse() * T_world_camera * problem.T_color_depth;
+  const Pose T_depth_color = problem.T_color_depth.inverse();
+  const Eigen::Matrix3f R = T_target_depth.linear().cast<float>();
+  const Eigen::Vector3f t = T_target_depth.translation().cast<float>();
+  const Eigen::Matrix3d R_target_color = (T_target_depth * T_depth_color).linear();
+  const double window = frame.window_px;
+  for (int r = 0; r < frame.height; r += 2) {
+    for (int c = 0; c < frame.width; c += 2) {
+      const auto i = static_cast<std::size_t>(r * frame.width + c);
+      if (frame.z_m[i] <= 0) continue;
+      ++sum.valid;
+      const Eigen::Vector3f q = R * frame.point(i) + t;
+      if (q.z() < 0.1F) continue;
+      const Eigen::Vector2d pixel = Project(problem.intrinsics, q.cast<double>());
+      const int column = static_cast<int>(std::floor((pixel.x() + 0.5) / window));
+      const int row = static_cast<int>(std::floor((pixel.y() + 0.5) / window));
+      if (column < 0 || row < 0 || column >= target.width || row >= target.height) continue;
+      const auto j = static_cast<std::size_t>(row * target.width + column);
+      if (target.normals[j].isZero()) continue;
+      const Eigen::Vector3f n = target.normals[j];
+      const double residual = n.dot(q - target.point(j));
+      if (std::abs(residual) > gate_m) continue;
+      const double cosine = std::abs(n.dot(target.point(j).normalized()));
+      const double sigma = std::sqrt(2.0) * DepthSigma(q.z(), cosine) + 0.002;
+      // The motion is on the colour camera's side: q = T_target_color * exp(x) * p_color.
+      const Eigen::Vector3d p_color = problem.T_color_depth * frame.point(i).cast<double>();
+      const Eigen::Vector3d n_color = R_target_color.transpose() * n.cast<double>();
+      Vector6d J;
+      J << p_color.cross(n_color), n_color;
+      sum.equations.Add(J / sigma, residual / sigma, CauchyWeight(residual / sigma, 2.0));
+      sum.squares += residual * residual;
+      ++sum.associated;
+    }
+  }
+  return sum;
+}
+
+}  // namespace
+
+PoseEstimate OptimizePose(const PoseProblem& problem, const Pose& T_world_camera_start) {
+  PoseEstimate estimate;
+  estimate.T_world_camera = T_world_camera_start;
+  const bool dense = problem.dense_frame != nullptr && problem.dense_target != nullptr;
+  double gate_m = 0.08;
+  for (int iteration = 0; iteration < problem.num_iterations; ++iteration) {
+    NormalEquations equations;
+    const Pose T_camera_world = estimate.T_world_camera.inverse();
+    for (const PosePoint& point : problem.points) AddPoint(point, T_camera_world * point.p_world, equations);
+    if (dense) {
+      const DenseSum sum = AddDense(problem, estimate.T_world_camera, gate_m);
+      equations.H += sum.equations.H;
+      equations.g += sum.equations.g;
+      estimate.num_dense = sum.associated;
+      estimate.dense_overlap = sum.valid > 0 ? static_cast<double>(sum.associated) / sum.valid : 0.0;
+      estimate.dense_rms_m = sum.associated > 0 ? std::sqrt(sum.squares / sum.associated) : 0.0;
+      gate_m = std::max(0.02, gate_m * 0.7);
+    }
+    estimate.information = equations.H;
+    // A whisper of damping keeps directions that nothing constrains where the prediction put them.
+    Matrix6d damped = equations.H;
+    damped.diagonal().array() += 1e-3 + 1e-6 * equations.H.diagonal().array();
+    const Vector6d step = -damped.ldlt().solve(equations.g);
+    if (!step.allFinite()) return estimate;
+    estimate.T_world_camera = estimate.T_world_camera * PoseFromTwist(step);
+    if (step.head<3>().norm() < 1e-5 && step.tail<3>().norm() < 1e-5) {
+      estimate.converged = true;
+      break;
+    }
+  }
+  estimate.T_world_camera = Orthonormalised(estimate.T_world_camera);
+  const Pose T_camera_world = estimate.T_world_camera.inverse();
+  estimate.inlier.resize(problem.points.size());
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    const PosePoint& point = problem.points[i];
+    const Eigen::Vector3d p = T_camera_world * point.p_world;
+    bool inlier = p.z() > 0.05 && (p.head<2>() / p.z() - point.ideal).norm() < kPointGate * point.sigma;
+    if (inlier && point.inverse_z > 0) inlier = std::abs(1.0 / p.z() - point.inverse_z) < 2 * kPointGate * point.inverse_z_sigma;
+    estimate.inlier[i] = inlier;
+    estimate.num_inliers += inlier ? 1 : 0;
+  }
+  return estimate;
+}
+
+}  // namespace plumb

@@ -1,0 +1,208 @@
+#include "algo/tracking/relocalizer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+
+#include <opencv2/calib3d.hpp>
+#include <opencv2/features2d.hpp>
+
+#include "algo/geometry/rigid_fit.hpp"
+
+namespace plumb {
+namespace {
+
+Pose FromCv(const cv::Mat& rotation_vector, const cv::Mat& translation) {
+  Vector6d twist;
+  for (int i = 0; i < 3; ++i) {
+    twist[i] = rotation_vector.at<double>(i);
+    twist[3 + i] = translation.at<double>(i);
+  }
+  return PoseFromTwist(twist);
+}
+
+double ReprojectionRms(const Pose& T_camera_points, const std::vector<cv::Point3d>& points, const std::vector<cv::Point2d>& ideal) {
+  double sum = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d p = T_camera_points * Eigen::Vector3d(points[i].x, points[i].y, points[i].z);
+    if (p.z() <= 0) return 1e9;
+    sum += (p.head<2>() / p.z() - Eigen::Vector2d(ideal[i].x, ideal[i].y)).squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(points.size()));
+}
+
+// Mean distance between a marker's plane and the depth measured inside it; nothing without enough depth.
+std::optional<double> DepthMisfit(const Intrinsics& intrinsics, const Pose& T_camera_marker, double length_m, const cv::Mat& depth_m) {
+  double sum = 0;
+  int n = 0;
+  for (int i = -4; i <= 4; ++i) {
+    for (int j = -4; j <= 4; ++j) {
+      const Eigen::Vector3d p = T_camera_marker * Eigen::Vector3d(i * length_m / 10, j * length_m / 10, 0);
+      if (p.z() <= 0) continue;
+      const double z = DepthAt(depth_m, Project(intrinsics, p));
+      if (z <= 0) continue;
+      sum += std::abs(z - p.z());
+      ++n;
+    }
+  }
+  if (n < 20) return std::nullopt;
+  return sum / n;
+}
+
+double Distance(const Pose& T_a, const Pose& T_b) {
+  const Pose T_a_b = T_a.inverse() * T_b;
+  return T_a_b.translation().norm() + 0.5 * RotationAngle(T_a_b);
+}
+
+}  // namespace
+
+std::optional<Pose> MarkerPoseInCamera(const Intrinsics& intrinsics, double marker_length_m, const MarkerObservation& marker,
+                                       const cv::Mat& depth_m) {
+  std::vector<cv::Point3d> corners;
+  std::vector<cv::Point2d> ideal;
+  for (const Eigen::Vector3d& c : CornersInMarkerFrame(marker_length_m)) corners.emplace_back(c.x(), c.y(), c.z());
+  for (const Eigen::Vector2d& pixel : marker.corners) {
+    const Eigen::Vector2d u = Undistort(intrinsics, pixel);
+    ideal.emplace_back(u.x(), u.y());
+  }
+  std::vector<cv::Mat> rotations;
+  std::vector<cv::Mat> translations;
+  cv::solvePnPGeneric(corners, ideal, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations, translations, false, cv::SOLVEPNP_IPPE_SQUARE);
+  std::array<double, 2> error{1e9, 1e9};
+  std::array<Pose, 2> candidates;
+  const std::size_t n = std::min<std::size_t>(2, rotations.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    candidates[i] = FromCv(rotations[i], translations[i]);
+    error[i] = ReprojectionRms(candidates[i], corners, ideal);
+  }
+  if (n == 0 || std::min(error[0], error[1]) > 0.01) return std::nullopt;
+  if (n == 1) return candidates[0];
+  const auto misfit0 = DepthMisfit(intrinsics, candidates[0], marker_length_m, depth_m);
+  const auto misfit1 = DepthMisfit(intrinsics, candidates[1], marker_length_m, depth_m);
+  const double floor = 0.2 / intrinsics.fx;
+  if ((error[1] + floor) > 3.0 * (error[0] + floor)) return candidates[0];
+  if ((error[0] + floor) > 3.0 * (error[1] + floor)) return candidates[1];
+  if (misfit0 && misfit1 && std::max(*misfit0, *misfit1) > 1.5 * std::min(*misfit0, *misfit1))
+    return *misfit0 < *misfit1 ? candidates[0] : candidates[1];
+  // Two poses that differ by little are no ambiguity.
+  if (RotationAngle(candidates[0].inverse() * candidates[1]) < 0.15) return error[0] <= error[1] ? candidates[0] : candidates[1];
+  return std::nullopt;
+}
+
+int NearestKeyframe(const TrackingMap& map, const Pose& T_world_color) {
+  int best = 0;
+  double best_distance = 1e300;
+  for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
+    const double d = Distance(map.keyframes[k].T_world_color, T_world_color);
+    if (d < best_distance) {
+      best_distance = d;
+      best = static_cast<int>(k);
+    }
+  }
+  return best;
+}
+
+std::optional<Relocalization> RelocalizeByMarkers(const TrackingMap& map, const Intrinsics& intrinsics, double marker_length_m,
+                                                  const std::vector<MarkerObservation>& markers, const cv::Mat& depth_m) {
+  std::vector<const MarkerObservation*> known;
+  for (const MarkerObservation& m : markers)
+    if (map.markers.contains(m.id)) known.push_back(&m);
+  if (known.empty()) return std::nullopt;
+  std::vector<cv::Point3d> corners;
+  std::vector<cv::Point2d> ideal;
+  for (const MarkerObservation* m : known) {
+    const MarkerCorners in_marker = CornersInMarkerFrame(marker_length_m);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Eigen::Vector3d p = map.markers.at(m->id).T_world_marker * in_marker[i];
+      const Eigen::Vector2d u = Undistort(intrinsics, m->corners[i]);
+      corners.emplace_back(p.x(), p.y(), p.z());
+      ideal.emplace_back(u.x(), u.y());
+    }
+  }
+  Relocalization result;
+  if (known.size() == 1) {
+    const auto T_camera_marker = MarkerPoseInCamera(intrinsics, marker_length_m, *known[0], depth_m);
+    if (!T_camera_marker) return std::nullopt;
+    result.T_world_color = map.markers.at(known[0]->id).T_world_marker * T_camera_marker->inverse();
+  } else {
+    cv::Mat rotation;
+    cv::Mat translation;
+    if (!cv::solvePnP(corners, ideal, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotation, translation, false, cv::SOLVEPNP_SQPNP))
+      return std::nullopt;
+    const Pose T_camera_world = FromCv(rotation, translation);
+    if (ReprojectionRms(T_camera_world, corners, ideal) > 8.0 / intrinsics.fx) return std::nullopt;
+    result.T_world_color = T_camera_world.inverse();
+  }
+  result.num_inliers = static_cast<int>(corners.size());
+  result.keyframe = NearestKeyframe(map, result.T_world_color);
+  return result;
+}
+
+namespace {
+
+// Consensus of three-point rigid fits between a keyframe's features and the frame's.
+std::optional<Relocalization> Consensus(const MapKeyframe& keyframe, const Intrinsics& intrinsics, const DescribedFeatures& features,
+                                        const std::vector<cv::DMatch>& matches) {
+  std::mt19937 random(1);
+  const auto draw = [&] { return static_cast<std::size_t>(random() % matches.size()); };
+  const auto agrees = [&](const Pose& T_frame_keyframe, const cv::DMatch& m) {
+    const Eigen::Vector3d p = T_frame_keyframe * keyframe.features_camera[static_cast<std::size_t>(m.trainIdx)].cast<double>();
+    if (p.z() < 0.05) return false;
+    const Eigen::Vector3d q = features.in_camera[static_cast<std::size_t>(m.queryIdx)].cast<double>();
+    const double pixels = (p.head<2>() / p.z() - q.head<2>() / q.z()).norm() * intrinsics.fx;
+    return pixels < 4.0 * intrinsics.width / 640.0 && std::abs(p.z() - q.z()) < 0.03 * q.z();
+  };
+  const auto fit = [&](const std::vector<cv::DMatch>& pairs) {
+    std::vector<Eigen::Vector3d> in_frame;
+    std::vector<Eigen::Vector3d> in_keyframe;
+    for (const cv::DMatch& m : pairs) {
+      in_frame.push_back(features.in_camera[static_cast<std::size_t>(m.queryIdx)].cast<double>());
+      in_keyframe.push_back(keyframe.features_camera[static_cast<std::size_t>(m.trainIdx)].cast<double>());
+    }
+    return FitRigid(in_frame, in_keyframe);
+  };
+  std::vector<cv::DMatch> best;
+  for (int round = 0; round < 150; ++round) {
+    const RigidFit candidate = fit({matches[draw()], matches[draw()], matches[draw()]});
+    if (!candidate.valid) continue;
+    std::vector<cv::DMatch> inliers;
+    for (const cv::DMatch& m : matches)
+      if (agrees(candidate.T_a_b, m)) inliers.push_back(m);
+    if (inliers.size() > best.size()) best = std::move(inliers);
+  }
+  if (best.size() < 15) return std::nullopt;
+  const RigidFit refined = fit(best);
+  if (!refined.valid) return std::nullopt;
+  Relocalization result;
+  result.T_world_color = keyframe.T_world_color * refined.T_a_b.inverse();
+  result.num_inliers = static_cast<int>(best.size());
+  return result;
+}
+
+}  // namespace
+
+std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const Intrinsics& intrinsics,
+                                                   const DescribedFeatures& features) {
+  std::optional<Relocalization> best;
+  if (features.descriptors.rows < 15) return best;
+  const cv::BFMatcher matcher(cv::NORM_HAMMING);
+  for (std::size_t k = map.keyframes.size(); k-- > 0;) {
+    const MapKeyframe& keyframe = map.keyframes[k];
+    if (keyframe.descriptors.rows < 15) continue;
+    std::vector<std::vector<cv::DMatch>> pairs;
+    matcher.knnMatch(features.descriptors, keyframe.descriptors, pairs, 2);
+    std::vector<cv::DMatch> matches;
+    for (const auto& pair : pairs)
+      if (pair.size() == 2 && pair[0].distance < 60 && pair[0].distance < 0.85F * pair[1].distance) matches.push_back(pair[0]);
+    if (matches.size() < 15) continue;
+    auto candidate = Consensus(keyframe, intrinsics, features, matches);
+    if (!candidate || (best && candidate->num_inliers <= best->num_inliers)) continue;
+    candidate->keyframe = static_cast<int>(k);
+    best = candidate;
+    if (best->num_inliers >= 60) break;  // Beyond doubt.
+  }
+  return best;
+}
+
+}  // namespace plumb

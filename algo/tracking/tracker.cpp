@@ -1,0 +1,468 @@
+#include "algo/tracking/tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include "algo/markers/marker_detector.hpp"
+#include "algo/tracking/bundle_adjustment.hpp"
+#include "algo/tracking/keypoints.hpp"
+#include "algo/tracking/pose_optimizer.hpp"
+#include "algo/tracking/relocalizer.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr double kMaxSpeed = 2.5;         // Metres a second that a hand moves a sensor at the very most.
+constexpr double kMaxTurn = 4.0;          // Radians a second.
+constexpr std::size_t kReassociated = 3;  // Older keyframes whose landmarks are looked for in a new keyframe.
+
+struct ActivePoint {
+  int landmark = 0;
+  Eigen::Vector2f pixel;
+};
+
+// What is made of one frame's images before its pose is known.
+struct Prepared {
+  cv::Mat gray;
+  Pyramid pyramid;
+  DenseView dense;
+  std::vector<MarkerObservation> markers;
+};
+
+}  // namespace
+
+struct Tracker::Impl {
+  StreamInfo info;
+  TrackerOptions options;
+  KeypointOptions keypoint_options;
+  DenseViewMaker dense_maker;
+  std::optional<MarkerDetector> detector;
+
+  TrackingMap map;
+  std::vector<TrackedFrame> frames;
+  CalibrationModel no_calibration;
+
+  Pyramid last_pyramid;
+  std::vector<ActivePoint> active;
+  int reference = -1;               // Keyframe that frames are tracked against.
+  std::size_t reference_count = 0;  // Active points when that keyframe was made.
+  Pose T_world_last = Pose::Identity();
+  double last_time_s = 0;
+  Vector6d velocity = Vector6d::Zero();
+  bool lost = true;
+  bool keyframe_wanted = false;  // After a relocalisation.
+
+  Impl(const StreamInfo& stream, const TrackerOptions& tracker_options)
+      : info(stream), options(tracker_options), dense_maker(stream.intrinsics) {
+    if (options.use_markers) detector.emplace(MarkerDictionary::ByName(info.marker_dictionary));
+  }
+
+  // ---- one frame -------------------------------------------------------------------------------------------------
+
+  Prepared Prepare(const Frame& frame) const {
+    const Intrinsics& k = info.intrinsics;
+    for (const cv::Mat* image : {&frame.color_rgb, &frame.depth_m})
+      if (image->cols != k.width || image->rows != k.height)
+        throw std::invalid_argument(fmt::format("frame {}: image is {}x{}, the intrinsics are for {}x{}", frame.index, image->cols,
+                                                image->rows, k.width, k.height));
+    Prepared prepared;
+    cv::cvtColor(frame.color_rgb, prepared.gray, cv::COLOR_RGB2GRAY);
+    prepared.pyramid = MakePyramid(prepared.gray, keypoint_options);
+    prepared.dense = dense_maker.Make(frame.depth_m);
+    if (detector) prepared.markers = detector->Detect(prepared.gray).markers;
+    return prepared;
+  }
+
+  TrackedFrame Track(const Frame& frame) {
+    Prepared prepared = Prepare(frame);
+    TrackedFrame result;
+    result.frame_index = frame.index;
+    result.color_time_s = frame.color_time_s;
+    result.depth_time_s = frame.depth_time_s;
+    if (map.keyframes.empty()) {
+      MakeKeyframe(frame, prepared, Pose::Identity(), result);
+      result.tracked = true;
+    } else {
+      std::optional<PoseEstimate> estimate;
+      if (!lost) estimate = FollowFrame(frame, prepared, result);
+      if (!estimate) estimate = Relocalize(frame, prepared, result);
+      if (estimate) {
+        Accept(frame, prepared, *estimate, result);
+      } else {
+        lost = true;
+        active.clear();
+      }
+    }
+    last_pyramid = std::move(prepared.pyramid);
+    frames.push_back(result);
+    return result;
+  }
+
+  // ---- pose ------------------------------------------------------------------------------------------------------
+
+  [[nodiscard]] double SigmaPx() const { return info.intrinsics.width / 640.0; }
+
+  void AddMarkerPoints(const std::vector<MarkerObservation>& markers, std::vector<PosePoint>& points) const {
+    const MarkerCorners in_marker = CornersInMarkerFrame(info.marker_length_m);
+    for (const MarkerObservation& m : markers) {
+      const auto known = map.markers.find(m.id);
+      if (known == map.markers.end()) continue;
+      for (std::size_t i = 0; i < 4; ++i) {
+        PosePoint point;
+        point.p_world = known->second.T_world_marker * in_marker[i];
+        point.ideal = Undistort(info.intrinsics, m.corners[i]);
+        // Half a pixel: the map's own error and the rolling shutter, beside the detector's.
+        point.sigma = std::hypot(m.sigma_px[i], 0.5 * SigmaPx()) / info.intrinsics.fx;
+        points.push_back(point);
+      }
+    }
+  }
+
+  void AddKeypoints(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_guess, std::vector<ActivePoint>& followed,
+                    std::vector<PosePoint>& points) const {
+    std::vector<Eigen::Vector2f> from;
+    std::vector<Eigen::Vector2f> guesses;
+    const Pose T_camera_world = T_world_guess.inverse();
+    for (const ActivePoint& a : active) {
+      from.push_back(a.pixel);
+      const Eigen::Vector3d p = T_camera_world * map.landmarks[static_cast<std::size_t>(a.landmark)].p_world;
+      guesses.push_back(p.z() > 0.05 ? Eigen::Vector2f(Project(info.intrinsics, p).cast<float>()) : a.pixel);
+    }
+    const KltResult klt = TrackKlt(last_pyramid, prepared.pyramid, from, guesses, keypoint_options.levels, keypoint_options);
+    for (std::size_t i = 0; i < active.size(); ++i) {
+      if (!klt.found[i]) continue;
+      PosePoint point;
+      point.p_world = map.landmarks[static_cast<std::size_t>(active[i].landmark)].p_world;
+      const Eigen::Vector2d pixel = klt.points[i].cast<double>();
+      point.ideal = Undistort(info.intrinsics, pixel);
+      point.sigma = 1.2 * SigmaPx() / info.intrinsics.fx;
+      if (const double z = DepthAt(depth_m, pixel); z > 0) {
+        point.inverse_z = 1.0 / z;
+        point.inverse_z_sigma = (2.0 * DepthSigma(z, 0.8) + 0.003) / (z * z);
+      }
+      points.push_back(point);
+      followed.push_back({active[i].landmark, klt.points[i]});
+    }
+  }
+
+  PoseProblem MakeProblem(const Prepared& prepared, double dt_depth_s) const {
+    PoseProblem problem;
+    problem.intrinsics = info.intrinsics;
+    problem.T_color_depth = PoseFromTwist(velocity * dt_depth_s);
+    if (options.use_dense) {
+      const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(reference)];
+      problem.dense_frame = &prepared.dense;
+      problem.dense_target = &keyframe.dense;
+      problem.T_world_target = DepthPose(keyframe);
+    }
+    return problem;
+  }
+
+  static Pose DepthPose(const MapKeyframe& keyframe) {
+    return PoseAfter(keyframe.T_world_color, keyframe.velocity_per_s, keyframe.data.depth_time_s - keyframe.data.color_time_s);
+  }
+
+  // True if the estimate is one to build on: enough agrees, all six directions are held, and no hand moves so fast.
+  [[nodiscard]] bool Plausible(const PoseEstimate& estimate, std::size_t num_points, double dt_s) const {
+    const double share = num_points > 0 ? static_cast<double>(estimate.num_inliers) / static_cast<double>(num_points) : 0.0;
+    const bool by_points = estimate.num_inliers >= 12 && share > 0.35;
+    const bool by_markers = num_points > 0 && estimate.num_inliers >= 4 && share > 0.6;
+    const bool by_depth = estimate.num_dense > 600 && estimate.dense_overlap > 0.4 && estimate.dense_rms_m < 0.012;
+    if (!by_points && !by_markers && !by_depth) return false;
+    // Depth that contradicts what few points say: a pose on a wrong start.
+    if (!by_points && estimate.num_dense > 0 && estimate.dense_overlap < 0.25) return false;
+    const Matrix6d covariance = estimate.information.ldlt().solve(Matrix6d::Identity());
+    const double rotation_rad = std::sqrt(std::max(0.0, covariance.topLeftCorner<3, 3>().trace()));
+    const double translation_m = std::sqrt(std::max(0.0, covariance.bottomRightCorner<3, 3>().trace()));
+    if (!(rotation_rad < 0.02) || !(translation_m < 0.02)) return false;
+    const Pose T_last_now = T_world_last.inverse() * estimate.T_world_camera;
+    const double dt = std::clamp(dt_s, 0.02, 1.0);
+    return lost || (T_last_now.translation().norm() < kMaxSpeed * dt + 0.02 && RotationAngle(T_last_now) < kMaxTurn * dt + 0.03);
+  }
+
+  std::optional<PoseEstimate> FollowFrame(const Frame& frame, const Prepared& prepared, TrackedFrame& result) {
+    const double dt = frame.color_time_s - last_time_s;
+    const double dt_depth = frame.depth_time_s - frame.color_time_s;
+    // The constant-velocity guess first; if that fails (a jerk), the last pose.
+    const std::array<Pose, 2> guesses = {PoseAfter(T_world_last, velocity, std::min(dt, 0.3)), T_world_last};
+    for (const Pose& T_guess : guesses) {
+      PoseProblem problem = MakeProblem(prepared, dt_depth);
+      AddMarkerPoints(prepared.markers, problem.points);
+      const std::size_t num_corners = problem.points.size();
+      std::vector<ActivePoint> followed;
+      if (options.use_keypoints) AddKeypoints(prepared, frame.depth_m, T_guess, followed, problem.points);
+      PoseEstimate estimate = OptimizePose(problem, T_guess);
+      if (!Plausible(estimate, problem.points.size(), dt)) continue;
+      active.clear();
+      for (std::size_t i = 0; i < followed.size(); ++i) {
+        Landmark& landmark = map.landmarks[static_cast<std::size_t>(followed[i].landmark)];
+        if (estimate.inlier[num_corners + i]) {
+          active.push_back(followed[i]);
+        } else if (++landmark.num_rejections > 3 && landmark.num_observations < 3) {
+          landmark.usable = false;
+        }
+      }
+      result.num_keypoints = static_cast<int>(active.size());
+      result.num_markers = CountMarkers(estimate, num_corners);
+      return estimate;
+    }
+    return std::nullopt;
+  }
+
+  static int CountMarkers(const PoseEstimate& estimate, std::size_t num_corners) {
+    int count = 0;
+    for (std::size_t i = 0; i + 3 < num_corners; i += 4)
+      count += estimate.inlier[i] && estimate.inlier[i + 1] && estimate.inlier[i + 2] && estimate.inlier[i + 3] ? 1 : 0;
+    return count;
+  }
+
+  std::optional<PoseEstimate> Relocalize(const Frame& frame, const Prepared& prepared, TrackedFrame& result) {
+    lost = true;
+    velocity.setZero();
+    std::optional<Relocalization> found = RelocalizeByMarkers(map, info.intrinsics, info.marker_length_m, prepared.markers, frame.depth_m);
+    std::optional<DescribedFeatures> features;
+    for (int attempt = 0; attempt < 2; ++attempt) {
+      if (!found && options.use_keypoints && !features) {
+        features = DescribeFeatures(prepared.gray, frame.depth_m, info.intrinsics);
+        found = RelocalizeByFeatures(map, info.intrinsics, *features);
+      }
+      if (!found) return std::nullopt;
+      reference = found->keyframe;
+      PoseProblem problem = MakeProblem(prepared, 0.0);
+      AddMarkerPoints(prepared.markers, problem.points);
+      const std::size_t num_corners = problem.points.size();
+      active.clear();
+      Reassociate(prepared, frame.depth_m, found->T_world_color, problem.points);
+      PoseEstimate estimate = OptimizePose(problem, found->T_world_color);
+      if (Plausible(estimate, problem.points.size(), 1.0)) {
+        result.num_markers = CountMarkers(estimate, num_corners);
+        result.num_keypoints = static_cast<int>(active.size());
+        keyframe_wanted = true;
+        return estimate;
+      }
+      found.reset();
+    }
+    active.clear();
+    return std::nullopt;
+  }
+
+  void Accept(const Frame& frame, const Prepared& prepared, const PoseEstimate& estimate, TrackedFrame& result) {
+    const double dt = frame.color_time_s - last_time_s;
+    if (!lost && dt > 0) velocity = TwistFromPose(T_world_last.inverse() * estimate.T_world_camera) / dt;
+    result.tracked = true;
+    result.velocity_per_s = velocity;
+    RefreshKeyframeVelocity(frame, estimate.T_world_camera);
+    lost = false;
+    T_world_last = estimate.T_world_camera;
+    last_time_s = frame.color_time_s;
+    if (keyframe_wanted || NeedsKeyframe(estimate.T_world_camera)) {
+      MakeKeyframe(frame, prepared, estimate.T_world_camera, result);
+    } else {
+      result.reference_keyframe = reference;
+      result.T_reference_color = map.keyframes[static_cast<std::size_t>(reference)].T_world_color.inverse() * estimate.T_world_camera;
+    }
+  }
+
+  // The frame after a keyframe gives that keyframe a central difference.
+  void RefreshKeyframeVelocity(const Frame& frame, const Pose& T_world_now) {
+    if (frames.empty() || frames.back().keyframe < 0 || lost) return;
+    MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(frames.back().keyframe)];
+    const double dt_after = frame.color_time_s - keyframe.data.color_time_s;
+    if (dt_after <= 0) return;
+    const Vector6d after = TwistFromPose(keyframe.T_world_color.inverse() * T_world_now) / dt_after;
+    keyframe.velocity_per_s = frames.size() == 1 ? after : Vector6d(0.5 * (keyframe.velocity_per_s + after));
+    frames.back().velocity_per_s = keyframe.velocity_per_s;
+  }
+
+  // ---- keyframes -------------------------------------------------------------------------------------------------
+
+  [[nodiscard]] bool NeedsKeyframe(const Pose& T_world_color) const {
+    const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(reference)];
+    const Pose T_keyframe_now = keyframe.T_world_color.inverse() * T_world_color;
+    if (T_keyframe_now.translation().norm() > options.keyframe_distance * std::clamp(MedianDepth(keyframe.dense), 0.4, 3.0)) return true;
+    if (RotationAngle(T_keyframe_now) > options.keyframe_angle_rad) return true;
+    return options.use_keypoints && static_cast<double>(active.size()) < options.min_tracked_share * static_cast<double>(reference_count) &&
+           (T_keyframe_now.translation().norm() > 0.01 || RotationAngle(T_keyframe_now) > 0.01 || active.size() < 30);
+  }
+
+  static double MedianDepth(const DenseView& view) {
+    std::vector<float> z;
+    for (const float value : view.z_m)
+      if (value > 0) z.push_back(value);
+    if (z.empty()) return 1.0;
+    std::nth_element(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2), z.end());
+    return z[z.size() / 2];
+  }
+
+  // Looks for landmarks of near older keyframes that are not being followed; adds those found to `active` and `points`.
+  void Reassociate(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_color, std::vector<PosePoint>& points) {
+    std::set<int> followed;
+    for (const ActivePoint& a : active) followed.insert(a.landmark);
+    const Pose T_camera_world = T_world_color.inverse();
+    for (const std::size_t k : KeyframesNear(T_world_color)) {
+      const MapKeyframe& keyframe = map.keyframes[k];
+      std::vector<int> landmarks;
+      std::vector<Eigen::Vector2f> from;
+      std::vector<Eigen::Vector2f> guesses;
+      for (const KeypointObservation& o : keyframe.keypoints) {
+        const Landmark& landmark = map.landmarks[static_cast<std::size_t>(o.landmark)];
+        if (!landmark.usable || followed.contains(o.landmark)) continue;
+        const Eigen::Vector3d p = T_camera_world * landmark.p_world;
+        if (p.z() < 0.1) continue;
+        const Eigen::Vector2d pixel = Project(info.intrinsics, p);
+        if (pixel.x() < 8 || pixel.y() < 8 || pixel.x() > info.intrinsics.width - 9 || pixel.y() > info.intrinsics.height - 9) continue;
+        const double z = DepthAt(depth_m, pixel);
+        if (z > 0 && std::abs(z - p.z()) > 0.03 * z + 0.01) continue;  // Hidden, or another surface.
+        landmarks.push_back(o.landmark);
+        from.push_back(o.pixel.cast<float>());
+        guesses.push_back(pixel.cast<float>());
+      }
+      if (landmarks.empty()) continue;
+      const Pyramid pyramid = MakePyramid(keyframe.gray, keypoint_options);
+      const KltResult klt = TrackKlt(pyramid, prepared.pyramid, from, guesses, 1, keypoint_options);
+      for (std::size_t i = 0; i < landmarks.size(); ++i) {
+        if (!klt.found[i] || (klt.points[i] - guesses[i]).norm() > 6.0F * static_cast<float>(SigmaPx())) continue;
+        followed.insert(landmarks[i]);
+        active.push_back({landmarks[i], klt.points[i]});
+        PosePoint point;
+        point.p_world = map.landmarks[static_cast<std::size_t>(landmarks[i])].p_world;
+        point.ideal = Undistort(info.intrinsics, klt.points[i].cast<double>());
+        point.sigma = 2.0 * SigmaPx() / info.intrinsics.fx;
+        points.push_back(point);
+      }
+    }
+  }
+
+  // Nearest keyframes by pose that see about the same, the reference itself left out while it is being followed.
+  [[nodiscard]] std::vector<std::size_t> KeyframesNear(const Pose& T_world_color) const {
+    std::vector<std::pair<double, std::size_t>> near;
+    for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
+      if (!lost && static_cast<int>(k) == reference) continue;
+      if (map.keyframes[k].gray.empty()) continue;
+      const Pose T = map.keyframes[k].T_world_color.inverse() * T_world_color;
+      const double depth = std::clamp(MedianDepth(map.keyframes[k].dense), 0.4, 3.0);
+      const double distance = T.translation().norm() / depth + RotationAngle(T);
+      if (distance < 0.7) near.emplace_back(distance, k);
+    }
+    std::sort(near.begin(), near.end());
+    std::vector<std::size_t> result;
+    for (std::size_t i = 0; i < std::min(kReassociated, near.size()); ++i) result.push_back(near[i].second);
+    return result;
+  }
+
+  void MakeKeyframe(const Frame& frame, const Prepared& prepared, const Pose& T_world_color, TrackedFrame& result) {
+    MapKeyframe keyframe;
+    keyframe.data.frame_index = frame.index;
+    keyframe.data.color_time_s = frame.color_time_s;
+    keyframe.data.depth_time_s = frame.depth_time_s;
+    keyframe.data.view.intrinsics = info.intrinsics;
+    keyframe.data.view.depth_m = frame.depth_m;
+    keyframe.data.view.color_rgb = frame.color_rgb;
+    keyframe.data.markers = prepared.markers;
+    keyframe.T_world_color = T_world_color;
+    keyframe.velocity_per_s = velocity;
+    keyframe.dense = prepared.dense;
+    keyframe.gray = prepared.gray;
+    const int index = static_cast<int>(map.keyframes.size());
+    if (options.use_keypoints) {
+      AssociateKeyframe(prepared, frame.depth_m, T_world_color, keyframe);
+      AddCorners(prepared, frame.depth_m, index, keyframe);
+      DescribedFeatures features = DescribeFeatures(prepared.gray, frame.depth_m, info.intrinsics);
+      keyframe.features_px = std::move(features.pixels);
+      keyframe.features_camera = std::move(features.in_camera);
+      keyframe.descriptors = features.descriptors;
+    }
+    AddNewMarkers(frame.depth_m, keyframe);
+    map.keyframes.push_back(std::move(keyframe));
+    reference = index;
+    reference_count = active.size();
+    keyframe_wanted = false;
+    lost = false;
+    AdjustLocally(index);
+    const Pose T_adjusted = map.keyframes.back().T_world_color;
+    T_world_last = T_adjusted;
+    last_time_s = frame.color_time_s;
+    result.keyframe = index;
+    result.reference_keyframe = index;
+    result.T_reference_color = Pose::Identity();
+  }
+
+  // Landmarks seen in a new keyframe: those followed, and those of older keyframes found again.
+  void AssociateKeyframe(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_color, MapKeyframe& keyframe) {
+    const std::size_t followed = active.size();
+    std::vector<PosePoint> found;
+    Reassociate(prepared, depth_m, T_world_color, found);
+    std::vector<ActivePoint> kept(active.begin(), active.begin() + static_cast<std::ptrdiff_t>(followed));
+    const Pose T_camera_world = T_world_color.inverse();
+    for (std::size_t i = followed; i < active.size(); ++i) {
+      const PosePoint& point = found[i - followed];
+      const Eigen::Vector3d p = T_camera_world * point.p_world;
+      if ((p.head<2>() / p.z() - point.ideal).norm() * info.intrinsics.fx < 4.0 * SigmaPx()) kept.push_back(active[i]);
+    }
+    active = std::move(kept);
+    for (const ActivePoint& a : active) {
+      const Eigen::Vector2d pixel = a.pixel.cast<double>();
+      keyframe.keypoints.push_back({a.landmark, pixel, DepthAt(depth_m, pixel)});
+      ++map.landmarks[static_cast<std::size_t>(a.landmark)].num_observations;
+    }
+  }
+
+  void AddCorners(const Prepared& prepared, const cv::Mat& depth_m, int index, MapKeyframe& keyframe) {
+    std::vector<Eigen::Vector2f> occupied;
+    for (const ActivePoint& a : active) occupied.push_back(a.pixel);
+    const Pose T_color_depth = PoseFromTwist(keyframe.velocity_per_s * (keyframe.data.depth_time_s - keyframe.data.color_time_s));
+    for (const Eigen::Vector2f& corner : DetectCorners(prepared.gray, occupied, keypoint_options)) {
+      const Eigen::Vector2d pixel = corner.cast<double>();
+      const double z = DepthAt(depth_m, pixel);
+      if (z <= 0) continue;
+      const Eigen::Vector3d p = z * Undistort(info.intrinsics, pixel).homogeneous();
+      Landmark landmark;
+      landmark.p_world = keyframe.T_world_color * Eigen::Vector3d(p.x(), p.y(), (T_color_depth * p).z());
+      landmark.first_keyframe = index;
+      landmark.num_observations = 1;
+      const int id = static_cast<int>(map.landmarks.size());
+      map.landmarks.push_back(landmark);
+      keyframe.keypoints.push_back({id, pixel, z});
+      active.push_back({id, corner});
+    }
+  }
+
+  void AddNewMarkers(const cv::Mat& depth_m, const MapKeyframe& keyframe) {
+    for (const MarkerObservation& m : keyframe.data.markers) {
+      auto known = map.markers.find(m.id);
+      if (known == map.markers.end()) {
+        const auto T_camera_marker = MarkerPoseInCamera(info.intrinsics, info.marker_length_m, m, depth_m);
+        if (!T_camera_marker) continue;
+        known = map.markers.emplace(m.id, MapMarker{keyframe.T_world_color * *T_camera_marker, 0}).first;
+      }
+      ++known->second.num_views;
+    }
+  }
+
+  void AdjustLocally(int index) {
+    if (index == 0) return;
+    BundleOptions bundle;
+    bundle.marker_length_m = info.marker_length_m;
+    bundle.min_corner_sigma_px = 0.3;
+    bundle.max_iterations = 4;
+    for (int k = std::max(1, index + 1 - options.local_keyframes); k <= index; ++k) bundle.free_keyframes.push_back(k);
+    BundleAdjust(info.intrinsics, bundle, {}, map, no_calibration);
+  }
+};
+
+Tracker::Tracker(const StreamInfo& info, const TrackerOptions& options) : impl_(std::make_unique<Impl>(info, options)) {}
+Tracker::~Tracker() = default;
+TrackedFrame Tracker::Track(const Frame& frame) { return impl_->Track(frame); }
+const TrackingMap& Tracker::map() const { return impl_->map; }
+TrackingMap Tracker::TakeMap() { return std::move(impl_->map); }
+const std::vector<TrackedFrame>& Tracker::frames() const { return impl_->frames; }
+Pose Tracker::T_world_color(const TrackedFrame& frame) const {
+  return impl_->map.keyframes.at(static_cast<std::size_t>(frame.reference_keyframe)).T_world_color * frame.T_reference_color;
+}
+
+}  // namespace plumb
