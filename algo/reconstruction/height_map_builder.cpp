@@ -1,0 +1,97 @@
+#include "algo/reconstruction/height_map_builder.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <tbb/parallel_for.h>
+
+namespace plumb {
+namespace {
+
+constexpr double kMaxCells = 64e6;
+constexpr int kMaxRowsPerBand = 64;  // rows of cells that one task works on
+
+/// Highest point and band of one cloud in one cell.
+struct CellTop {
+  float highest = 0.0F;
+  float sum = 0.0F;  // of z - highest at the time of summing
+  int count = 0;
+};
+
+/// A point of one cloud that falls into the grid.
+struct CellPoint {
+  std::uint32_t cell;
+  float z;
+};
+
+}  // namespace
+
+GridShape HeightMapOptions::Grid() const {
+  const double columns = std::round((x_max - x_min) / cell_size);
+  const double rows = std::round((y_max - y_min) / cell_size);
+  if (!(cell_size > 0.0 && columns >= 1.0 && rows >= 1.0 && columns * rows <= kMaxCells))
+    throw std::invalid_argument("height map: crop or cell size out of range");
+  GridShape grid;
+  grid.x_min = x_min;
+  grid.y_min = y_min;
+  grid.step = cell_size;
+  grid.width = static_cast<int>(columns);
+  grid.height = static_cast<int>(rows);
+  return grid;
+}
+
+HeightMap PaperHeightMap(std::span<const PointCloud> clouds_in_marker, const HeightMapOptions& options) {
+  const GridShape grid = options.Grid();
+  if (!(options.top_surface_band > 0.0)) throw std::invalid_argument("height map: the top surface band is not positive");
+  const float band = static_cast<float>(options.top_surface_band);
+
+  // Each cloud's points sorted by bands of rows, so that bands can be worked on apart and in cloud order.
+  const std::size_t num_bands = static_cast<std::size_t>((grid.height + kMaxRowsPerBand - 1) / kMaxRowsPerBand);
+  const std::size_t cells_per_band = static_cast<std::size_t>(kMaxRowsPerBand) * static_cast<std::size_t>(grid.width);
+  std::vector<std::vector<std::vector<CellPoint>>> points(clouds_in_marker.size());
+  tbb::parallel_for(std::size_t{0}, clouds_in_marker.size(), [&](std::size_t j) {
+    points[j].resize(num_bands);
+    for (auto& in_band : points[j]) in_band.reserve(clouds_in_marker[j].size() / num_bands * 2);
+    for (const Eigen::Vector3f& p : clouds_in_marker[j].points) {
+      if (!std::isfinite(p.z())) continue;
+      if (const auto cell = grid.cell(p.x(), p.y()))
+        points[j][*cell / cells_per_band].push_back({static_cast<std::uint32_t>(*cell % cells_per_band), p.z()});
+    }
+  });
+
+  HeightMap map(grid);
+  tbb::parallel_for(std::size_t{0}, num_bands, [&](std::size_t b) {
+    const std::size_t first_cell = b * cells_per_band;
+    const std::size_t num_cells = std::min(cells_per_band, grid.num_cells() - first_cell);
+    std::vector<CellTop> tops(num_cells);
+    std::vector<float> sum_of_means(num_cells, 0.0F);
+    std::vector<std::uint16_t> num_means(num_cells, 0);
+    for (const auto& cloud : points) {
+      const std::vector<CellPoint>& in_band = cloud[b];
+      for (const CellPoint& p : in_band) {
+        CellTop& top = tops[p.cell];
+        top.highest = top.count == 0 ? p.z : std::max(top.highest, p.z);
+        top.count = 1;
+      }
+      for (const CellPoint& p : in_band) {
+        CellTop& top = tops[p.cell];
+        if (!(top.highest - p.z < band)) continue;
+        top.sum += p.z - top.highest;
+        ++top.count;  // one more than the points: 1 meant "touched"
+      }
+      for (const CellPoint& p : in_band) {
+        CellTop& top = tops[p.cell];
+        if (top.count < 2) continue;
+        sum_of_means[p.cell] += top.highest + top.sum / static_cast<float>(top.count - 1);
+        ++num_means[p.cell];
+        top = {};
+      }
+    }
+    for (std::size_t c = 0; c < num_cells; ++c)
+      if (num_means[c] > 0) map.z[first_cell + c] = sum_of_means[c] / static_cast<float>(num_means[c]);
+  });
+  return map;
+}
+
+}  // namespace plumb

@@ -1,0 +1,157 @@
+#include "algo/reconstruction/view_fusion.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace plumb {
+namespace {
+
+constexpr float kBandSigmas = 4.0F;
+constexpr float kMinCosIncidence = 0.15F;  // a view steeper than 81 deg to the seed's normal says nothing about it
+constexpr int kMaxSamples = 64;            // views that take part in one mean; more add nothing
+
+/// One view's measurement of the seed.
+struct Sample {
+  float distance_m;
+  float weight;
+};
+
+/// Weighted mean with Tukey's weights about `centre`: smooth, and blind to what lies beyond the cut.
+float TukeyMean(std::span<const Sample> samples, float centre, float cut, float& weight_sum) {
+  float sum = 0.0F;
+  weight_sum = 0.0F;
+  for (const Sample& sample : samples) {
+    const float ratio = (sample.distance_m - centre) / cut;
+    const float inside = 1.0F - ratio * ratio;
+    if (inside <= 0.0F) continue;
+    const float weight = sample.weight * inside * inside;
+    sum += weight * sample.distance_m;
+    weight_sum += weight;
+  }
+  return weight_sum > 0.0F ? sum / weight_sum : centre;
+}
+
+}  // namespace
+
+ViewFusion::ViewFusion(std::span<const ViewSurface> views, const FusionOptions& options) : options_(options) {
+  cameras_.reserve(views.size());
+  for (const ViewSurface& view : views) {
+    Camera camera;
+    camera.view = &view;
+    const Pose T_camera_world = view.T_world_camera.inverse();
+    camera.R_camera_world = T_camera_world.linear().cast<float>();
+    camera.t_camera_world = T_camera_world.translation().cast<float>();
+    const Intrinsics& k = view.intrinsics;
+    camera.fx = static_cast<float>(k.fx);
+    camera.fy = static_cast<float>(k.fy);
+    camera.cx = static_cast<float>(k.cx);
+    camera.cy = static_cast<float>(k.cy);
+    camera.k1 = static_cast<float>(k.distortion[0]);
+    camera.k2 = static_cast<float>(k.distortion[1]);
+    camera.p1 = static_cast<float>(k.distortion[2]);
+    camera.p2 = static_cast<float>(k.distortion[3]);
+    camera.k3 = static_cast<float>(k.distortion[4]);
+    camera.has_lens = k.distortion != std::array<double, 5>{};
+    const Eigen::Vector2f* rays = view.rays->row(0);
+    camera.ray_min = camera.ray_max = rays[0];
+    float min_inverse = 0.0F;
+    for (std::size_t i = 0; i < view.size(); ++i) {
+      camera.ray_min = camera.ray_min.cwiseMin(rays[i]);
+      camera.ray_max = camera.ray_max.cwiseMax(rays[i]);
+      if (view.weights[i] > 0.0F && (min_inverse == 0.0F || view.inverse_depth[i] < min_inverse)) min_inverse = view.inverse_depth[i];
+    }
+    camera.max_depth_m = min_inverse > 0.0F ? 1.0F / min_inverse : 0.0F;
+    camera.inward_sides = {Eigen::Vector3f(1, 0, -camera.ray_min.x()).normalized(), Eigen::Vector3f(-1, 0, camera.ray_max.x()).normalized(),
+                           Eigen::Vector3f(0, 1, -camera.ray_min.y()).normalized(),
+                           Eigen::Vector3f(0, -1, camera.ray_max.y()).normalized()};
+    cameras_.push_back(camera);
+  }
+}
+
+void ViewFusion::ViewsNear(const Eigen::Vector3f& centre_world, float radius_m, std::vector<std::uint16_t>& found) const {
+  found.clear();
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    const Camera& camera = cameras_[i];
+    const Eigen::Vector3f p = camera.R_camera_world * centre_world + camera.t_camera_world;
+    if (p.z() < -radius_m || p.z() - radius_m > camera.max_depth_m) continue;
+    const bool outside = std::any_of(camera.inward_sides.begin(), camera.inward_sides.end(),
+                                     [&](const Eigen::Vector3f& side) { return side.dot(p) < -radius_m; });
+    if (!outside) found.push_back(static_cast<std::uint16_t>(i));
+  }
+}
+
+FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3f& n_world,
+                            std::span<const std::uint16_t> candidates) const {
+  FusedPoint fused;
+  std::array<Sample, kMaxSamples> samples;
+  std::size_t num_samples = 0;
+  float best_weight = 0.0F;
+  float widest_band = options_.min_band_m;
+  for (const std::uint16_t index : candidates) {
+    const Camera& camera = cameras_[index];
+    const ViewSurface& view = *camera.view;
+    const Eigen::Vector3f p = camera.R_camera_world * p_world + camera.t_camera_world;
+    if (p.z() < 0.1F) continue;
+    const float inverse_z = 1.0F / p.z();
+    float x = p.x() * inverse_z;
+    float y = p.y() * inverse_z;
+    if (x < camera.ray_min.x() || x > camera.ray_max.x() || y < camera.ray_min.y() || y > camera.ray_max.y()) continue;
+    if (camera.has_lens) {
+      const float r2 = x * x + y * y;
+      const float radial = 1.0F + r2 * (camera.k1 + r2 * (camera.k2 + r2 * camera.k3));
+      const float xd = x * radial + 2.0F * camera.p1 * x * y + camera.p2 * (r2 + 2.0F * x * x);
+      y = y * radial + camera.p1 * (r2 + 2.0F * y * y) + 2.0F * camera.p2 * x * y;
+      x = xd;
+    }
+    const float u = camera.fx * x + camera.cx;
+    const float v = camera.fy * y + camera.cy;
+    if (!(u >= 0.0F && v >= 0.0F)) continue;
+    const int column = static_cast<int>(u);
+    const int row = static_cast<int>(v);
+    if (column + 1 >= view.width() || row + 1 >= view.height()) continue;
+    const std::size_t width = static_cast<std::size_t>(view.width());
+    const std::size_t i = static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
+    const float* weight = view.weights.data() + i;
+    if (weight[0] <= 0.0F || weight[1] <= 0.0F || weight[width] <= 0.0F || weight[width + 1] <= 0.0F) continue;
+    const Eigen::Vector3f n = camera.R_camera_world * n_world;
+    const float along = -n.dot(p);  // |p| times the cosine of incidence
+    if (along * along < kMinCosIncidence * kMinCosIncidence * p.squaredNorm() || along < 0.0F) continue;
+    const float fu = u - static_cast<float>(column);
+    const float fv = v - static_cast<float>(row);
+    const float* inverse = view.inverse_depth.data() + i;
+    const float top = inverse[0] + fu * (inverse[1] - inverse[0]);
+    const float bottom = inverse[width] + fu * (inverse[width + 1] - inverse[width]);
+    const float measured = 1.0F / (top + fv * (bottom - top));
+    // The measured point lies on the seed's own ray, at this share of its length beyond it.
+    const float beyond = measured * inverse_z - 1.0F;
+    const float distance = -beyond * along;
+    const float band = std::max(options_.min_band_m, kBandSigmas * AxialSigma(p.z(), 1.0F));
+    if (std::abs(distance) > band) {
+      if (beyond * p.z() > options_.see_through_m) ++fused.num_through;
+      continue;
+    }
+    if (num_samples == kMaxSamples) continue;
+    const std::size_t nearest = i + (fu > 0.5F ? 1U : 0U) + (fv > 0.5F ? width : 0U);
+    const float w = view.weights[nearest];
+    samples[num_samples++] = {distance, w};
+    widest_band = std::max(widest_band, band);
+    fused.normal += w * (camera.R_camera_world.transpose() * view.normals[nearest]);
+    if (w > best_weight) {
+      best_weight = w;
+      fused.best_view = index;
+      fused.best_pixel = static_cast<std::uint32_t>(nearest);
+    }
+  }
+  fused.num_agreeing = static_cast<int>(num_samples);
+  if (num_samples == 0) return fused;
+  const std::span<const Sample> used(samples.data(), num_samples);
+  // From the seed with the whole band, then from there: a stray view near the band's end loses its say.
+  fused.offset_m = TukeyMean(used, 0.0F, 1.5F * widest_band, fused.weight);
+  fused.offset_m = TukeyMean(used, fused.offset_m, widest_band, fused.weight);
+  const float length = fused.normal.norm();
+  fused.normal = length > 0.0F ? Eigen::Vector3f(fused.normal / length) : n_world;
+  return fused;
+}
+
+}  // namespace plumb

@@ -1,0 +1,67 @@
+// One depth image made ready for surfaces: normals, noise weights, and what is not to be trusted left out.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include "algo/geometry/back_projection.hpp"
+#include "algo/types/keyframe.hpp"
+#include "algo/types/point_cloud.hpp"
+
+namespace plumb {
+
+/// Axial noise of a structured-light depth camera, one standard deviation in metres (Nguyen et al. 2012).
+/// @param depth_m along the optical axis; @param cos_incidence between surface normal and viewing ray, in (0, 1].
+[[nodiscard]] float AxialSigma(float depth_m, float cos_incidence);
+
+struct ViewSurfaceOptions {
+  float min_depth_m = 0.3F;
+  float max_depth_m = 4.0F;
+  float max_incidence_deg = 75.0F;  ///< Steeper views of a surface are left out; in (0, 89].
+};
+
+/// A depth image at working resolution (about 320 columns, whatever the sensor's): each working pixel is the mean
+/// INVERSE depth of a block of image pixels. Planes are linear in inverse depth, so the mean is exact on them, and the
+/// quantisation of structured light is uniform in it. All vectors have width * height values, row by row.
+struct ViewSurface {
+  Intrinsics intrinsics;  ///< Of the working image.
+  int block = 1;          ///< Image pixels per working pixel, each way.
+  cv::Mat color_rgb;      ///< As in the view: image resolution, or empty.
+  Pose T_world_camera = Pose::Identity();
+  std::shared_ptr<const RayTable> rays;  ///< Of the working pixels; shared by the views of one camera.
+  std::vector<float> inverse_depth;      ///< 1/m; 0 where nothing was measured.
+  std::vector<Eigen::Vector3f> normals;  ///< Camera frame, unit, towards the camera; where weight > 0.
+  std::vector<float> weights;            ///< 1 / variance (1/m^2) times the cosine of incidence; 0: not to be used
+                                         ///< (depth edge, rim, grazing view, out of range).
+
+  [[nodiscard]] int width() const { return intrinsics.width; }
+  [[nodiscard]] int height() const { return intrinsics.height; }
+  [[nodiscard]] std::size_t size() const { return inverse_depth.size(); }
+  /// Point of a measured working pixel in the camera frame, metres.
+  [[nodiscard]] Eigen::Vector3f PointInCamera(std::size_t i) const {
+    const float z = 1.0F / inverse_depth[i];
+    const Eigen::Vector2f& ray = rays->row(0)[i];
+    return {ray.x() * z, ray.y() * z, z};
+  }
+  /// Colour at a working pixel; black without a colour image.
+  [[nodiscard]] Color ColorAt(std::size_t i) const;
+};
+
+/// The camera of the working images that belong to images of this camera.
+[[nodiscard]] Intrinsics WorkingIntrinsics(const Intrinsics& image);
+
+/// Prepares one view.
+/// @param working_rays  RayTable of WorkingIntrinsics(view.intrinsics).
+/// @throws std::invalid_argument if images, intrinsics, rays or options do not fit together.
+[[nodiscard]] ViewSurface PrepareView(const DepthView& view, const std::shared_ptr<const RayTable>& working_rays,
+                                      const ViewSurfaceOptions& options = {});
+
+/// Prepares all views, in parallel. Deterministic. @throws std::invalid_argument naming the view that does not fit.
+[[nodiscard]] std::vector<ViewSurface> PrepareViews(std::span<const DepthView> views, const ViewSurfaceOptions& options = {});
+
+}  // namespace plumb
