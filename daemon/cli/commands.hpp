@@ -1,0 +1,45 @@
+// The commands of `plumb`: each adds its own options to the command line and says how it is run.
+#pragma once
+
+#include <functional>
+#include <stop_token>
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace plumb {
+
+/// Exit codes of the contract.
+enum ExitCode : int {
+  kDone = 0,
+  kInternalError = 1,
+  kUsageError = 2,
+  kBadInput = 3,
+  kNoAnswer = 4,
+  kDeviceFailed = 5,
+  kInterrupted = 130,
+};
+
+/// What every command is handed when it runs.
+struct CommandContext {
+  std::stop_token stop;  ///< Ctrl-C or SIGTERM.
+};
+
+/// Runs the command; its return value is the exit code, its exceptions become the others (see main.cpp).
+using Command = std::function<int(const CommandContext&)>;
+
+/// Adds the subcommand to `app` and returns how to run it once the line is parsed.
+[[nodiscard]] Command AddSimulate(CLI::App& app);
+[[nodiscard]] Command AddReconstruct(CLI::App& app);
+[[nodiscard]] Command AddCompare(CLI::App& app);
+[[nodiscard]] Command AddMesh(CLI::App& app);
+[[nodiscard]] Command AddInfo(CLI::App& app);
+[[nodiscard]] Command AddEvaluate(CLI::App& app);
+
+/// Writes to stdout.
+/// @throws IoError if stdout does not take it (closed pipe, full disk).
+void PrintOut(const std::string& text);
+
+}  // namespace plumb

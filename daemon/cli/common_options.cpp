@@ -1,0 +1,47 @@
+#include "daemon/cli/common_options.hpp"
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "algo/types/errors.hpp"
+#include "daemon/cli/progress.hpp"
+#include "daemon/scan_runner.hpp"
+
+namespace plumb {
+
+void MethodOptions::AddTo(CLI::App& app) {
+  app.add_option("--preset", preset, "best: whatever measures best (default); paper: the method as published")
+      ->check(CLI::IsMember({"best", "paper"}))
+      ->type_name("best|paper");
+  app.add_option("--config", config_file, "Options of the method, as TOML")->type_name("FILE");
+}
+
+Config MethodOptions::Read() const {
+  Config config = config_file ? ReadConfig(*config_file) : Config{};
+  if (preset) config.reconstruct.preset = config.compare.preset = *preset == "paper" ? Preset::kPaper : Preset::kBest;
+  return config;
+}
+
+std::unique_ptr<TumRecording> OpenRecording(const std::filesystem::path& path, const MarkerConfig& markers) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) {
+    throw DataError(
+        fmt::format("no recording at '{}': expected a folder in the TUM RGB-D layout (rgb.txt, depth.txt), found nothing", path.string()));
+  }
+  RecordingDefaults defaults;
+  if (markers.dictionary) defaults.marker_dictionary = *markers.dictionary;
+  if (markers.length_m) defaults.marker_length_m = *markers.length_m;
+  defaults.reference_marker = markers.reference;
+  return TumRecording::Open(path, defaults);
+}
+
+void Show(Progress& progress, const std::string& prefix, const ScanProgress& scan) {
+  std::string detail;
+  if (scan.tracking != nullptr) {
+    detail = fmt::format("frame {}, {} tracked", scan.frames, scan.frames_tracked);
+    if (scan.frames_dropped > 0) detail += fmt::format(", {} dropped", scan.frames_dropped);
+  }
+  progress.Update(prefix + std::string(scan.step), scan.fraction, detail);
+}
+
+}  // namespace plumb

@@ -1,0 +1,40 @@
+// Options and little jobs that several commands share.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "algo/types/scene.hpp"
+#include "daemon/config.hpp"
+#include "drivers/replay/tum_recording.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace plumb {
+
+class Progress;
+struct ScanProgress;
+
+/// --preset and --config, and what they say together: the option on the line wins over the file.
+struct MethodOptions {
+  std::optional<std::string> preset;
+  std::optional<std::filesystem::path> config_file;
+
+  void AddTo(CLI::App& app);
+  /// @throws DataError from the configuration file.
+  [[nodiscard]] Config Read() const;
+};
+
+/// Opens a recording of any kind that this build reads.
+/// @throws DataError if it is none.
+[[nodiscard]] std::unique_ptr<TumRecording> OpenRecording(const std::filesystem::path& path, const MarkerConfig& markers);
+
+/// Shows a scan's progress; `prefix` goes before the step's name.
+void Show(Progress& progress, const std::string& prefix, const ScanProgress& scan);
+
+}  // namespace plumb

@@ -1,0 +1,36 @@
+// How far a command is, on stderr.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace plumb {
+
+/// A bar that is redrawn in place on a terminal, one plain line a step elsewhere. Not thread-safe.
+class Progress {
+ public:
+  /// @param quiet  Prints nothing at all.
+  explicit Progress(bool quiet = false);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// @param step      What is being done, such as "tracking reference".
+  /// @param fraction  0..1 of the step.
+  /// @param detail    Shown behind the bar, such as "frame 12 of 100".
+  void Update(std::string_view step, double fraction, std::string_view detail = {});
+
+  /// Removes the bar, so that other text can follow.
+  void Clear();
+
+ private:
+  void Draw(double fraction, std::string_view detail);
+
+  const bool quiet_;
+  const bool is_terminal_;
+  bool is_drawn_ = false;
+  double last_draw_s_ = -1.0;
+  std::string step_;
+};
+
+}  // namespace plumb
