@@ -31,12 +31,11 @@ std::string CheckedName(const json& value, const fs::path& file) {
 
 void ReadSuiteFile(const fs::path& file, Suite& suite) {
   std::ifstream in(file);
-  json json;
   try {
-    json = json::parse(in);
-    suite.name = json.value("name", suite.name);
-    for (const auto& scene : json.at("scenes")) suite.scenes.push_back(CheckedName(scene, file));
-    for (const auto& pair : json.at("pairs")) suite.pairs.emplace_back(CheckedName(pair.at(0), file), CheckedName(pair.at(1), file));
+    const json content = json::parse(in);
+    suite.name = content.value("name", suite.name);
+    for (const auto& scene : content.at("scenes")) suite.scenes.push_back(CheckedName(scene, file));
+    for (const auto& pair : content.at("pairs")) suite.pairs.emplace_back(CheckedName(pair.at(0), file), CheckedName(pair.at(1), file));
   } catch (const json::exception& error) {
     throw DataError(
         fmt::format("suite file '{}': expected {{\"name\", \"scenes\": [..], \"pairs\": [[a, b], ..]}}; {}", file.string(), error.what()));
@@ -82,15 +81,16 @@ void MeasureMarkers(const Scene& scene, const SceneTruth& truth, SceneEvaluation
 }
 
 SceneEvaluation MeasureScene(const std::string& name, const Scene& scene, const SceneTruth& truth, double min_frames_seen) {
-  SceneEvaluation result{.name = name,
-                         .frames_total = scene.frames_total,
-                         .frames_tracked = scene.frames_tracked,
-                         .num_keyframes = scene.keyframes.size(),
-                         .num_markers = scene.markers.size(),
-                         .keyframes = ErrorOfTrajectory(scene.keyframes, truth),
-                         .trajectory = ErrorOfTrajectory(scene.trajectory, truth),
-                         .calibration = scene.calibration,
-                         .timings_s = scene.timings_s};
+  SceneEvaluation result;
+  result.name = name;
+  result.frames_total = scene.frames_total;
+  result.frames_tracked = scene.frames_tracked;
+  result.num_keyframes = scene.keyframes.size();
+  result.num_markers = scene.markers.size();
+  result.keyframes = ErrorOfTrajectory(scene.keyframes, truth);
+  result.trajectory = ErrorOfTrajectory(scene.trajectory, truth);
+  result.calibration = scene.calibration;
+  result.timings_s = scene.timings_s;
   MeasureMarkers(scene, truth, result);
   if (scene.height_map) {
     const HeightMap true_heights = TrueHeights(truth, scene.height_map->grid, truth.T_world_reference_marker, min_frames_seen);
@@ -110,11 +110,12 @@ struct KeptScene {
 
 PairEvaluation MeasurePair(const std::string& reference_name, const std::string& current_name, const KeptScene& reference,
                            const KeptScene& current, const Comparison& comparison, double min_frames_seen) {
-  PairEvaluation result{.reference = reference_name,
-                        .current = current_name,
-                        .verdict = comparison.verdict,
-                        .reasons = comparison.reasons,
-                        .timings_s = comparison.timings_s};
+  PairEvaluation result;
+  result.reference = reference_name;
+  result.current = current_name;
+  result.verdict = comparison.verdict;
+  result.reasons = comparison.reasons;
+  result.timings_s = comparison.timings_s;
   if (comparison.motion) result.motion = ErrorOfMotion(comparison.motion->T, reference.truth, current.truth);
   if (comparison.alignment && reference.has_world && current.has_world) {
     result.alignment = ErrorOfAlignment(comparison.alignment->T_reference_current, reference.truth, current.truth, reference.T_world_scene,
@@ -157,7 +158,8 @@ Suite OpenSuite(const fs::path& folder) {
     throw DataError(
         fmt::format("'{}' is no suite: expected folders 'truth' and 'recordings' in it, as `plumb simulate` writes", folder.string()));
   }
-  Suite suite{.name = folder.filename().empty() ? folder.parent_path().filename().string() : folder.filename().string()};
+  Suite suite;
+  suite.name = (folder.filename().empty() ? folder.parent_path() : folder).filename().string();
   if (fs::exists(folder / "suite.json")) {
     ReadSuiteFile(folder / "suite.json", suite);
   } else {
@@ -195,7 +197,9 @@ MotionStatistics Evaluation::OfReference(const std::string& reference) const {
 
 Evaluation EvaluateSuite(const Suite& suite, const EvaluateOptions& options, const std::stop_token& stop,
                          const std::function<void(const std::string& what, double fraction)>& progress) {
-  Evaluation evaluation{.suite = suite.name, .preset = options.compare.preset};
+  Evaluation evaluation;
+  evaluation.suite = suite.name;
+  evaluation.preset = options.compare.preset;
   std::map<std::string, KeptScene> kept;
   for (const std::string& name : suite.scenes) {
     KeptScene& entry = kept[name];
