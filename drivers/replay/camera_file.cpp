@@ -4,12 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/core/persistence.hpp>
 
 #include "algo/types/errors.hpp"
+#include "algo/types/marker_dictionary.hpp"
 #include "drivers/replay/image_file.hpp"
 
 namespace plumb {
@@ -23,12 +23,6 @@ constexpr double kMinDepthScale = 10.0;  // below, somebody wrote metres per uni
 constexpr double kMaxDepthScale = 1e6;
 constexpr double kMaxBaseline_m = 1.0;
 constexpr int kMaxMarkerId = 65535;
-
-constexpr std::array<std::string_view, 22> kDictionaries = {
-    "DICT_4X4_50",        "DICT_4X4_100",        "DICT_4X4_250",        "DICT_4X4_1000",       "DICT_5X5_50",         "DICT_5X5_100",
-    "DICT_5X5_250",       "DICT_5X5_1000",       "DICT_6X6_50",         "DICT_6X6_100",        "DICT_6X6_250",        "DICT_6X6_1000",
-    "DICT_7X7_50",        "DICT_7X7_100",        "DICT_7X7_250",        "DICT_7X7_1000",       "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_16h5",
-    "DICT_APRILTAG_25h9", "DICT_APRILTAG_36h10", "DICT_APRILTAG_36h11", "DICT_ARUCO_MIP_36h12"};
 
 /// Refuses texts whose nesting would take the parser's stack.
 void CheckText(std::string_view text, const std::string& name) {
@@ -215,12 +209,20 @@ void ReadDepthCamera(const Keys& keys, CameraFile& camera) {
 
 void ReadMarkers(const Keys& keys, CameraFile& camera) {
   if (keys.has("marker_dictionary")) {
-    camera.marker_dictionary = keys.Text("marker_dictionary");
-    CheckDictionary(*camera.marker_dictionary, keys.Where("marker_dictionary"));
+    const std::string name = keys.Text("marker_dictionary");
+    const std::optional<MarkerDictionary> dictionary = MarkerDictionary::Find(name);
+    if (!dictionary) {
+      throw DataError(fmt::format("{} is \"{}\", expected one of {}", keys.Where("marker_dictionary"), name.substr(0, 60),
+                                  fmt::join(MarkerDictionary::KnownNames(), ", ")));
+    }
+    camera.marker_dictionary = dictionary->name();
   }
   if (keys.has("marker_length")) {
     camera.marker_length_m = keys.Number("marker_length");
-    CheckMarkerLength(*camera.marker_length_m, keys.Where("marker_length"));
+    if (!(*camera.marker_length_m > 0 && *camera.marker_length_m < kMaxMarkerLength_m)) {
+      throw DataError(fmt::format("{} is {} m, expected more than 0 and less than {} m (the side of the black square)",
+                                  keys.Where("marker_length"), *camera.marker_length_m, kMaxMarkerLength_m));
+    }
   }
   if (keys.has("reference_marker")) {
     camera.reference_marker = keys.Integer("reference_marker");
@@ -232,19 +234,6 @@ void ReadMarkers(const Keys& keys, CameraFile& camera) {
 }
 
 }  // namespace
-
-bool IsKnownDictionary(std::string_view name) { return std::find(kDictionaries.begin(), kDictionaries.end(), name) != kDictionaries.end(); }
-
-void CheckDictionary(const std::string& dictionary, const std::string& where) {
-  if (IsKnownDictionary(dictionary)) return;
-  throw DataError(fmt::format("{} is \"{}\", expected one of {}", where, dictionary.substr(0, 60), fmt::join(kDictionaries, ", ")));
-}
-
-void CheckMarkerLength(double length_m, const std::string& where) {
-  if (length_m > 0 && length_m < kMaxMarkerLength_m) return;
-  throw DataError(fmt::format("{} is {} m, expected more than 0 and less than {} m (the side of the black square)", where, length_m,
-                              kMaxMarkerLength_m));
-}
 
 CameraFile ParseCameraFile(std::string_view text, const std::string& name) try {
   const Keys keys(text, name);

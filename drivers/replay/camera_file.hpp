@@ -36,13 +36,4 @@ struct CameraFile {
 /// @throws DataError naming file, key, what was found and what is expected.
 [[nodiscard]] CameraFile ParseCameraFile(std::string_view text, const std::string& name);
 
-/// OpenCV's predefined dictionaries and DICT_ARUCO_MIP_36h12.
-[[nodiscard]] bool IsKnownDictionary(std::string_view name);
-
-/// @throws DataError unless the length is in (0, 2) metres.
-void CheckMarkerLength(double length_m, const std::string& where);
-
-/// @throws DataError if the name is unknown; the message lists what is known.
-void CheckDictionary(const std::string& dictionary, const std::string& where);
-
 }  // namespace plumb

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "algo/types/errors.hpp"
+#include "algo/types/marker_dictionary.hpp"
 #include "drivers/replay/camera_file.hpp"
 #include "drivers/replay/file_io.hpp"
 #include "drivers/replay/image_file.hpp"
@@ -226,7 +227,7 @@ TumRecording::TumRecording(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) 
 TumRecording::~TumRecording() = default;
 
 std::unique_ptr<TumRecording> TumRecording::Open(const fs::path& folder, const RecordingDefaults& defaults) {
-  if (!(defaults.max_stamp_gap_s > 0 && defaults.marker_length_m > 0 && IsKnownDictionary(defaults.marker_dictionary))) {
+  if (!(defaults.max_stamp_gap_s > 0 && defaults.marker_length_m > 0 && MarkerDictionary::Find(defaults.marker_dictionary))) {
     throw std::invalid_argument("RecordingDefaults: gap, marker length or dictionary out of range");
   }
   std::error_code error;

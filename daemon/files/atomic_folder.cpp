@@ -1,0 +1,193 @@
+#include "daemon/files/atomic_folder.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <string>
+
+#include "algo/types/errors.hpp"
+#include "drivers/replay/file_io.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::chrono::minutes kStaleAge{1};  // covers the moment between a folder's making and its locking
+constexpr std::size_t kMaxFsyncs = 64;        // beyond, one sync of the file system is cheaper
+
+/// Absolute, without trailing slash, links to folders followed.
+fs::path Normalised(const fs::path& target) {
+  fs::path path = fs::absolute(target).lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();
+  std::error_code error;
+  if (fs::is_symlink(path, error)) {
+    const fs::path real = fs::canonical(path, error);
+    if (!error) return real;
+  }
+  return path;
+}
+
+std::string HiddenPrefix(const fs::path& target) { return fmt::format(".{}.plumb-", target.filename().string()); }
+
+/// Forces one file or folder to the disk.
+void Sync(const fs::path& path, bool whole_file_system = false) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) throw IoError(DescribeWriteError(path, errno));
+  const int result = whole_file_system ? ::syncfs(descriptor) : ::fsync(descriptor);
+  const int error = errno;
+  ::close(descriptor);
+  if (result != 0 && error != EINVAL) throw IoError(DescribeWriteError(path, error));  // EINVAL: a file system without fsync
+}
+
+void SyncTree(const fs::path& folder) {
+  std::vector<fs::path> paths;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) paths.push_back(entry.path());
+  if (paths.size() > kMaxFsyncs) {
+    Sync(folder, true);
+    return;
+  }
+  for (const fs::path& path : paths) Sync(path);
+  Sync(folder);
+}
+
+void CheckReplaceable(const fs::path& target, const OutputKind& kind) {
+  const fs::file_status status = fs::symlink_status(target);
+  if (!fs::exists(status)) return;
+  if (!fs::is_directory(status)) {
+    throw IoError(fmt::format("cannot write {} {}: there is a file of that name; choose another or remove it", kind.name, target.string()));
+  }
+  bool has_marker = false;
+  for (const fs::directory_entry& entry : fs::directory_iterator(target)) {
+    const std::string name = entry.path().filename().string();
+    if (std::find(kind.known_entries.begin(), kind.known_entries.end(), name) == kind.known_entries.end()) {
+      throw IoError(fmt::format("cannot write {} {}: the folder holds {}, which is no part of a {}; choose an empty or new folder",
+                                kind.name, target.string(), name, kind.name));
+    }
+    has_marker = has_marker || name == kind.marker_file;
+  }
+  if (!has_marker && !fs::is_empty(target)) {
+    throw IoError(fmt::format("cannot write {} {}: the folder is not empty and holds no {}; choose an empty or new folder", kind.name,
+                              target.string(), kind.marker_file));
+  }
+}
+
+/// Exchanges the two folders in one step where the file system can; else the old one goes first.
+void Replace(const fs::path& hidden, const fs::path& target) {
+  if (::rename(hidden.c_str(), target.c_str()) == 0) return;  // nothing there, or an empty folder
+  if (errno != ENOTEMPTY && errno != EEXIST) throw IoError(DescribeWriteError(target, errno));
+  if (::renameat2(AT_FDCWD, hidden.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) != 0) {
+    const fs::path aside = hidden.string() + "-old";
+    if (::rename(target.c_str(), aside.c_str()) != 0) throw IoError(DescribeWriteError(target, errno));
+    if (::rename(hidden.c_str(), target.c_str()) != 0) {
+      const int error = errno;
+      (void)::rename(aside.c_str(), target.c_str());
+      throw IoError(DescribeWriteError(target, error));
+    }
+    if (::rename(aside.c_str(), hidden.c_str()) != 0) throw IoError(DescribeWriteError(aside, errno));
+  }
+  std::error_code ignored;  // the new output is in place; a rest of the old one under the hidden name is cleaned up later
+  fs::remove_all(hidden, ignored);
+}
+
+std::string UniqueSuffix() {
+  static std::atomic<unsigned> counter{0};
+  return fmt::format("{}-{}", ::getpid(), counter.fetch_add(1));
+}
+
+}  // namespace
+
+AtomicFolder::AtomicFolder(const fs::path& target, OutputKind kind) : kind_(std::move(kind)), target_(Normalised(target)) {
+  try {
+    CheckReplaceable(target_, kind_);
+    for (fs::path parent = target_.parent_path(); !fs::exists(parent); parent = parent.parent_path()) {
+      made_parents_.insert(made_parents_.begin(), parent);
+    }
+    fs::create_directories(target_.parent_path());
+    RemoveStale();
+    MakeHidden();
+  } catch (const fs::filesystem_error& error) {
+    Discard();
+    throw IoError(DescribeWriteError(target_, error.code().value()));
+  } catch (...) {
+    Discard();
+    throw;
+  }
+}
+
+void AtomicFolder::MakeHidden() {
+  do {
+    hidden_ = target_.parent_path() / (HiddenPrefix(target_) + UniqueSuffix());
+  } while (::mkdir(hidden_.c_str(), 0777) != 0 && errno == EEXIST);
+  lock_ = ::open(hidden_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (lock_ < 0) throw IoError(DescribeWriteError(target_, errno));
+  (void)::flock(lock_, LOCK_EX | LOCK_NB);  // where locks do not work, stale folders stay: no harm
+}
+
+void AtomicFolder::RemoveStale() const {
+  const std::string prefix = HiddenPrefix(target_);
+  std::vector<fs::path> stale;
+  for (const fs::directory_entry& entry : fs::directory_iterator(target_.parent_path())) {
+    std::error_code error;
+    const bool ours = entry.path().filename().string().starts_with(prefix) && entry.is_directory(error) && !entry.is_symlink(error);
+    if (!ours || fs::file_time_type::clock::now() - entry.last_write_time(error) < kStaleAge || error) continue;
+    const int descriptor = ::open(entry.path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (descriptor < 0) continue;
+    if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) stale.push_back(entry.path());
+    ::close(descriptor);
+  }
+  std::error_code ignored;
+  for (const fs::path& path : stale) fs::remove_all(path, ignored);
+}
+
+AtomicFolder::~AtomicFolder() {
+  if (lock_ >= 0) ::close(lock_);
+  if (!committed_) Discard();
+}
+
+void AtomicFolder::Discard() {
+  std::error_code ignored;
+  if (!hidden_.empty()) fs::remove_all(hidden_, ignored);
+  for (auto parent = made_parents_.rbegin(); parent != made_parents_.rend(); ++parent) ::rmdir(parent->c_str());  // only empty ones go
+}
+
+void AtomicFolder::Commit() {
+  try {
+    SyncTree(hidden_);
+    CheckReplaceable(target_, kind_);  // again: time has passed
+    Replace(hidden_, target_);
+    committed_ = true;
+    Sync(target_.parent_path());
+  } catch (const fs::filesystem_error& error) {
+    throw IoError(DescribeWriteError(target_, error.code().value()));
+  }
+}
+
+void WriteFileAtomically(const fs::path& target, const std::function<void(const fs::path&)>& write) {
+  const fs::path path = Normalised(target);
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    throw IoError(fmt::format("cannot write {}: it is a folder; name a file", path.string()));
+  }
+  const fs::path hidden = path.parent_path() / (HiddenPrefix(path) + UniqueSuffix() + path.extension().string());
+  try {
+    write(hidden);
+    Sync(hidden);
+    if (::rename(hidden.c_str(), path.c_str()) != 0) throw IoError(DescribeWriteError(path, errno));
+    Sync(path.parent_path());
+  } catch (...) {
+    ::unlink(hidden.c_str());
+    throw;
+  }
+}
+
+}  // namespace plumb

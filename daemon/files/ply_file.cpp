@@ -1,0 +1,340 @@
+#include "daemon/files/ply_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
+
+#include "algo/types/errors.hpp"
+#include "drivers/replay/file_io.hpp"
+
+static_assert(std::endian::native == std::endian::little, "PLY is written and read as the bytes in memory");
+
+namespace plumb {
+namespace {
+
+constexpr std::size_t kMaxFileBytes = std::size_t{2} << 30;
+constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 14;
+constexpr std::size_t kMaxElements = 100'000'000;
+
+// ---- writing
+
+template <typename T>
+void Append(std::vector<std::uint8_t>& row, const T& value) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(&value);
+  row.insert(row.end(), bytes, bytes + sizeof value);
+}
+
+struct VertexColumns {
+  const std::vector<Eigen::Vector3f>& points;
+  const std::vector<Eigen::Vector3f>& normals;
+  const std::vector<Color>& colors;
+};
+
+void CheckColumns(const VertexColumns& columns) {
+  const std::size_t n = columns.points.size();
+  if ((!columns.normals.empty() && columns.normals.size() != n) || (!columns.colors.empty() && columns.colors.size() != n)) {
+    throw std::invalid_argument(
+        fmt::format("PLY: {} points with {} normals and {} colours", n, columns.normals.size(), columns.colors.size()));
+  }
+}
+
+std::string VertexHeader(const VertexColumns& columns) {
+  std::string header = fmt::format(
+      "ply\nformat binary_little_endian 1.0\ncomment metres\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n",
+      columns.points.size());
+  if (!columns.normals.empty()) header += "property float nx\nproperty float ny\nproperty float nz\n";
+  if (!columns.colors.empty()) header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  return header;
+}
+
+void WriteVertices(FileWriter& file, const VertexColumns& columns) {
+  std::vector<std::uint8_t> row;
+  for (std::size_t i = 0; i < columns.points.size(); ++i) {
+    row.clear();
+    for (int axis = 0; axis < 3; ++axis) Append(row, columns.points[i][axis]);
+    if (!columns.normals.empty()) {
+      for (int axis = 0; axis < 3; ++axis) Append(row, columns.normals[i][axis]);
+    }
+    if (!columns.colors.empty()) row.insert(row.end(), columns.colors[i].begin(), columns.colors[i].end());
+    file.Write(row);
+  }
+}
+
+// ---- reading
+
+enum class Scalar { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
+
+std::optional<Scalar> ScalarOf(const std::string& name) {
+  if (name == "char" || name == "int8") return Scalar::kInt8;
+  if (name == "uchar" || name == "uint8") return Scalar::kUint8;
+  if (name == "short" || name == "int16") return Scalar::kInt16;
+  if (name == "ushort" || name == "uint16") return Scalar::kUint16;
+  if (name == "int" || name == "int32") return Scalar::kInt32;
+  if (name == "uint" || name == "uint32") return Scalar::kUint32;
+  if (name == "float" || name == "float32") return Scalar::kFloat;
+  if (name == "double" || name == "float64") return Scalar::kDouble;
+  return std::nullopt;
+}
+
+std::size_t SizeOf(Scalar type) {
+  constexpr std::size_t kSizes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+  return kSizes[static_cast<std::size_t>(type)];
+}
+
+template <typename T>
+double Load(const std::uint8_t* at) {
+  T value;
+  std::memcpy(&value, at, sizeof value);
+  return static_cast<double>(value);
+}
+
+double Value(Scalar type, const std::uint8_t* at) {
+  switch (type) {
+    case Scalar::kInt8:
+      return Load<std::int8_t>(at);
+    case Scalar::kUint8:
+      return Load<std::uint8_t>(at);
+    case Scalar::kInt16:
+      return Load<std::int16_t>(at);
+    case Scalar::kUint16:
+      return Load<std::uint16_t>(at);
+    case Scalar::kInt32:
+      return Load<std::int32_t>(at);
+    case Scalar::kUint32:
+      return Load<std::uint32_t>(at);
+    case Scalar::kFloat:
+      return Load<float>(at);
+    case Scalar::kDouble:
+      return Load<double>(at);
+  }
+  return 0.0;
+}
+
+struct Property {
+  std::string name;
+  Scalar type = Scalar::kFloat;
+  std::size_t offset = 0;            ///< In its row.
+  std::optional<Scalar> list_count;  ///< Of a list: type of its length.
+};
+
+struct Element {
+  std::string name;
+  std::size_t count = 0;
+  std::size_t row_bytes = 0;  ///< Without lists.
+  std::vector<Property> properties;
+};
+
+/// A parsed header and the bytes after it.
+class PlyReader {
+ public:
+  PlyReader(std::span<const std::uint8_t> bytes, std::string name) : name_(std::move(name)) {
+    constexpr std::string_view kEnd = "end_header\n";
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), std::min(bytes.size(), kMaxHeaderBytes));
+    const std::size_t end = text.find(kEnd);
+    if (!text.starts_with("ply\n") || end == std::string_view::npos) Fail("it has no PLY header");
+    ParseHeader(std::string(text.substr(0, end)));
+    body_ = bytes.subspan(end + kEnd.size());
+    if (elements_.empty() || elements_[0].name != "vertex") Fail("its first element is not vertex");
+    Require(elements_[0].count * elements_[0].row_bytes);
+  }
+
+  [[nodiscard]] PointCloud Vertices() const {
+    const Element& vertex = elements_[0];
+    const auto position = Three(vertex, {"x", "y", "z"});
+    if (!position) Fail("its vertices have no x, y, z");
+    const auto normal = Three(vertex, {"nx", "ny", "nz"});
+    const auto color = Three(vertex, {"red", "green", "blue"});
+    PointCloud cloud;
+    cloud.points.reserve(vertex.count);
+    cloud.normals.reserve(normal ? vertex.count : 0);
+    cloud.colors.reserve(color ? vertex.count : 0);
+    const std::uint8_t* row = body_.data();
+    for (std::size_t i = 0; i < vertex.count; ++i, row += vertex.row_bytes) {
+      cloud.points.push_back(Vector(*position, row));
+      if (!cloud.points.back().allFinite()) Fail(fmt::format("vertex {} is not finite", i));
+      if (normal) {
+        cloud.normals.push_back(Vector(*normal, row));
+        if (!cloud.normals.back().allFinite()) Fail(fmt::format("the normal of vertex {} is not finite", i));
+      }
+      if (color) {
+        Color& out = cloud.colors.emplace_back();
+        for (std::size_t c = 0; c < 3; ++c) {
+          out[c] = static_cast<std::uint8_t>(std::clamp(Value((*color)[c].type, row + (*color)[c].offset), 0.0, 255.0));
+        }
+      }
+    }
+    return cloud;
+  }
+
+  [[nodiscard]] std::vector<std::array<std::uint32_t, 3>> Triangles() const {
+    const Element& vertex = elements_[0];
+    if (elements_.size() < 2 || elements_[1].name != "face") Fail("it has no faces after its vertices");
+    const Element& face = elements_[1];
+    if (face.properties.size() != 1 || !face.properties[0].list_count) Fail("its faces are no plain list of vertex indices");
+    const Scalar count_type = *face.properties[0].list_count;
+    const Scalar index_type = face.properties[0].type;
+    const std::size_t row_bytes = SizeOf(count_type) + 3 * SizeOf(index_type);
+    const std::size_t begin = vertex.count * vertex.row_bytes;
+    Require(begin + face.count * row_bytes);
+    std::vector<std::array<std::uint32_t, 3>> triangles(face.count);
+    const std::uint8_t* row = body_.data() + begin;
+    for (std::size_t i = 0; i < face.count; ++i, row += row_bytes) {
+      const double corners = Value(count_type, row);
+      if (corners != 3) Fail(fmt::format("face {} has {} corners, expected triangles", i, corners));
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double index = Value(index_type, row + SizeOf(count_type) + k * SizeOf(index_type));
+        if (!(index >= 0 && index < static_cast<double>(vertex.count))) {
+          Fail(fmt::format("face {} names vertex {}, there are {}", i, index, vertex.count));
+        }
+        triangles[i][k] = static_cast<std::uint32_t>(index);
+      }
+    }
+    return triangles;
+  }
+
+ private:
+  using Columns = std::array<Property, 3>;
+
+  [[noreturn]] void Fail(const std::string& what) const { throw DataError(fmt::format("PLY file {} cannot be used: {}", name_, what)); }
+
+  void Require(std::size_t bytes) const {
+    if (body_.size() < bytes) {
+      Fail(fmt::format("it is truncated: {} bytes after its header, expected {}; make it again", body_.size(), bytes));
+    }
+  }
+
+  void ParseHeader(const std::string& text) {
+    std::istringstream lines(text);
+    std::string line;
+    bool has_format = false;
+    std::getline(lines, line);  // "ply"
+    while (std::getline(lines, line)) {
+      std::istringstream words(line);
+      std::string key;
+      words >> key;
+      if (key.empty() || key == "comment" || key == "obj_info") continue;
+      if (key == "format") {
+        std::string format;
+        words >> format;
+        if (format != "binary_little_endian") Fail(fmt::format("its format is {}, expected binary_little_endian", format.substr(0, 40)));
+        has_format = true;
+      } else if (key == "element") {
+        AddElement(words);
+      } else if (key == "property" && !elements_.empty()) {
+        AddProperty(words, elements_.back());
+      } else {
+        Fail(fmt::format("header line \"{}\" is not understood", line.substr(0, 60)));
+      }
+    }
+    if (!has_format) Fail("its header states no format");
+  }
+
+  void AddElement(std::istringstream& words) {
+    Element element;
+    std::uint64_t count = 0;
+    if (!(words >> element.name >> count) || count > kMaxElements) {
+      Fail(fmt::format("an element of its header has no count from 0 to {}", kMaxElements));
+    }
+    element.count = static_cast<std::size_t>(count);
+    elements_.push_back(std::move(element));
+  }
+
+  void AddProperty(std::istringstream& words, Element& element) const {
+    Property property;
+    std::string type;
+    words >> type;
+    if (type == "list") {
+      std::string count_type;
+      words >> count_type >> type;
+      property.list_count = ScalarOf(count_type);
+      if (!property.list_count || element.name == "vertex") Fail("its header holds a list that is not understood");
+    }
+    const std::optional<Scalar> scalar = ScalarOf(type);
+    if (!scalar || !(words >> property.name)) Fail(fmt::format("a property of its header has the type \"{}\"", type.substr(0, 40)));
+    property.type = *scalar;
+    property.offset = element.row_bytes;
+    element.row_bytes += SizeOf(*scalar);
+    element.properties.push_back(std::move(property));
+  }
+
+  static std::optional<Columns> Three(const Element& element, const std::array<std::string_view, 3>& names) {
+    Columns columns;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto at =
+          std::find_if(element.properties.begin(), element.properties.end(), [&](const Property& p) { return p.name == names[i]; });
+      if (at == element.properties.end()) return std::nullopt;
+      columns[i] = *at;
+    }
+    return columns;
+  }
+
+  static Eigen::Vector3f Vector(const Columns& columns, const std::uint8_t* row) {
+    Eigen::Vector3f vector;
+    for (std::size_t i = 0; i < 3; ++i) {
+      vector[static_cast<Eigen::Index>(i)] = static_cast<float>(Value(columns[i].type, row + columns[i].offset));
+    }
+    return vector;
+  }
+
+  std::string name_;
+  std::vector<Element> elements_;
+  std::span<const std::uint8_t> body_;
+};
+
+}  // namespace
+
+void WriteCloudPly(const std::filesystem::path& path, const PointCloud& cloud) {
+  const VertexColumns columns{cloud.points, cloud.normals, cloud.colors};
+  CheckColumns(columns);
+  FileWriter file(path);
+  file.Write(VertexHeader(columns) + "end_header\n");
+  WriteVertices(file, columns);
+  file.Close();
+}
+
+void WriteMeshPly(const std::filesystem::path& path, const TriangleMesh& mesh) {
+  const VertexColumns columns{mesh.vertices, mesh.normals, mesh.colors};
+  CheckColumns(columns);
+  for (const auto& triangle : mesh.triangles) {
+    if (*std::max_element(triangle.begin(), triangle.end()) >= mesh.vertices.size()) {
+      throw std::invalid_argument(fmt::format("PLY: a triangle names a vertex that is not there ({} vertices)", mesh.vertices.size()));
+    }
+  }
+  FileWriter file(path);
+  file.Write(VertexHeader(columns) +
+             fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n", mesh.triangles.size()));
+  WriteVertices(file, columns);
+  std::vector<std::uint8_t> row;
+  for (const auto& triangle : mesh.triangles) {
+    row.assign(1, 3);
+    for (const std::uint32_t index : triangle) Append(row, index);
+    file.Write(row);
+  }
+  file.Close();
+}
+
+PointCloud ParseCloudPly(std::span<const std::uint8_t> bytes, const std::string& name) { return PlyReader(bytes, name).Vertices(); }
+
+PointCloud ReadCloudPly(const std::filesystem::path& path) { return ParseCloudPly(ReadWholeFile(path, kMaxFileBytes), path.string()); }
+
+TriangleMesh ParseMeshPly(std::span<const std::uint8_t> bytes, const std::string& name) {
+  const PlyReader reader(bytes, name);
+  PointCloud vertices = reader.Vertices();
+  TriangleMesh mesh;
+  mesh.vertices = std::move(vertices.points);
+  mesh.normals = std::move(vertices.normals);
+  mesh.colors = std::move(vertices.colors);
+  mesh.triangles = reader.Triangles();
+  return mesh;
+}
+
+TriangleMesh ReadMeshPly(const std::filesystem::path& path) { return ParseMeshPly(ReadWholeFile(path, kMaxFileBytes), path.string()); }
+
+}  // namespace plumb

@@ -1,0 +1,235 @@
+#include "daemon/files/scene_json.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "algo/types/errors.hpp"
+#include "algo/types/marker_dictionary.hpp"
+#include "drivers/replay/image_file.hpp"
+
+namespace plumb {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kFormat = 1;
+constexpr int kMaxMarkerId = 65535;
+constexpr double kMaxCoordinate_m = 1e4;
+constexpr double kMaxCount = 1e9;
+constexpr std::size_t kMaxMarkers = 4096;
+constexpr double kMinStep_m = 1e-5;
+constexpr double kMaxStep_m = 1.0;
+
+/// One value of the document with its place, for messages.
+class Value {
+ public:
+  Value(const Json& json, std::string where) : json_(json), where_(std::move(where)) {}
+
+  [[nodiscard]] bool has(const char* key) const { return json_.is_object() && json_.contains(key); }
+  [[nodiscard]] bool is_null() const { return json_.is_null(); }
+  [[nodiscard]] const Json& json() const { return json_; }
+
+  [[nodiscard]] Value operator[](const char* key) const {
+    if (!json_.is_object()) Fail("is no object");
+    if (!json_.contains(key)) throw DataError(fmt::format("{}.{} is missing; make the scene again", where_, key));
+    return {json_[key], fmt::format("{}.{}", where_, key)};
+  }
+
+  [[nodiscard]] Value At(std::size_t index) const { return {json_[index], fmt::format("{}[{}]", where_, index)}; }
+
+  [[nodiscard]] std::string Text() const {
+    if (!json_.is_string()) Fail("is no text");
+    return json_.get<std::string>();
+  }
+
+  [[nodiscard]] double Number(double min, double max) const {
+    if (!json_.is_number()) Fail("is no number");
+    const double value = json_.get<double>();
+    if (!(value >= min && value <= max)) Fail(fmt::format("is {}, expected {} to {}", value, min, max));
+    return value;
+  }
+
+  [[nodiscard]] std::int64_t Integer(double min, double max) const {
+    if (!json_.is_number_integer()) Fail("is no whole number");
+    return static_cast<std::int64_t>(Number(min, max));
+  }
+
+  void RequireArray(std::size_t size) const {
+    if (!json_.is_array() || json_.size() != size) Fail(fmt::format("is no list of {}", size));
+  }
+
+  /// Calls `visit(key, value)` for each entry of an object.
+  template <typename Visit>
+  void ForEach(const Visit& visit) const {
+    if (!json_.is_object()) Fail("is no object");
+    for (const auto& [key, value] : json_.items()) visit(key, Value(value, fmt::format("{}.{}", where_, key.substr(0, 40))));
+  }
+
+  [[noreturn]] void Fail(const std::string& what) const { throw DataError(fmt::format("{} {}; make the scene again", where_, what)); }
+
+ private:
+  const Json& json_;
+  std::string where_;
+};
+
+Json MapJson(const std::map<std::string, double>& values) {
+  Json json = Json::object();
+  for (const auto& [key, value] : values) json[key] = value;
+  return json;
+}
+
+/// A marker id that is the key of an object.
+int MarkerId(const std::string& key, const Value& value) {
+  int id = -1;
+  const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), id);
+  if (error != std::errc{} || end != key.data() + key.size() || id < 0 || id > kMaxMarkerId) {
+    value.Fail(fmt::format("is no marker id from 0 to {}", kMaxMarkerId));
+  }
+  return id;
+}
+
+void ReadMarkers(const Value& root, Scene& scene) {
+  root["markers"].ForEach([&](const std::string& key, const Value& corners) {
+    SceneMarker& marker = scene.markers[MarkerId(key, corners)];
+    if (scene.markers.size() > kMaxMarkers) corners.Fail(fmt::format("is one of more than {} markers", kMaxMarkers));
+    corners.RequireArray(4);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Value corner = corners.At(k);
+      corner.RequireArray(3);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        marker.corners[k][static_cast<Eigen::Index>(axis)] = corner.At(axis).Number(-kMaxCoordinate_m, kMaxCoordinate_m);
+      }
+    }
+  });
+  const auto find = [&](const std::string& key, const Value& value) -> SceneMarker& {
+    const auto marker = scene.markers.find(MarkerId(key, value));
+    if (marker == scene.markers.end()) value.Fail("belongs to no marker of the scene");
+    return marker->second;
+  };
+  if (root.has("marker_views")) {
+    root["marker_views"].ForEach(
+        [&](const std::string& key, const Value& views) { find(key, views).num_views = static_cast<int>(views.Integer(0, kMaxCount)); });
+  }
+  if (root.has("marker_sigma_m")) {
+    root["marker_sigma_m"].ForEach([&](const std::string& key, const Value& sigma) { find(key, sigma).sigma_m = sigma.Number(0, 1e3); });
+  }
+}
+
+/// Keys that Plumb writes and other programs may leave out.
+void ReadMarkerKind(const Value& root, Scene& scene) {
+  if (root.has("marker_dictionary")) {
+    const Value value = root["marker_dictionary"];
+    const std::string name = value.Text();
+    if (!name.empty() && !MarkerDictionary::Find(name))
+      value.Fail(fmt::format("is \"{}\", which is no known dictionary", name.substr(0, 60)));
+    scene.marker_dictionary = name;
+  }
+  if (root.has("marker_length_m")) scene.marker_length_m = root["marker_length_m"].Number(0, 10);
+  if (root.has("reference_marker") && !root["reference_marker"].is_null()) {
+    scene.reference_marker = static_cast<int>(root["reference_marker"].Integer(0, kMaxMarkerId));
+  }
+}
+
+std::optional<GridShape> ReadGrid(const Value& heightmap) {
+  if (heightmap.is_null()) return std::nullopt;
+  GridShape grid;
+  grid.x_min = heightmap["x_min"].Number(-kMaxCoordinate_m, kMaxCoordinate_m);
+  grid.y_min = heightmap["y_min"].Number(-kMaxCoordinate_m, kMaxCoordinate_m);
+  grid.step = heightmap["step"].Number(kMinStep_m, kMaxStep_m);
+  grid.width = static_cast<int>(heightmap["width"].Integer(1, kMaxGridSide));
+  grid.height = static_cast<int>(heightmap["height"].Integer(1, kMaxGridSide));
+  return grid;
+}
+
+Json ParseText(std::string_view text, const std::string& name) {
+  try {
+    return Json::parse(text.begin(), text.end());
+  } catch (const Json::exception& error) {
+    throw DataError(fmt::format("{} is no JSON: {}; make the scene again", name, std::string_view(error.what()).substr(0, 200)));
+  }
+}
+
+}  // namespace
+
+std::string SceneJson(const Scene& scene) {
+  Json json;
+  json["format"] = kFormat;
+  json["preset"] = Name(scene.preset);
+  json["frame"] = Name(scene.frame);
+  json["marker_dictionary"] = scene.marker_dictionary;
+  json["marker_length_m"] = scene.marker_length_m;
+  json["reference_marker"] = scene.reference_marker ? Json(*scene.reference_marker) : Json(nullptr);
+  json["markers"] = Json::object();
+  json["marker_views"] = Json::object();
+  json["marker_sigma_m"] = Json::object();
+  for (const auto& [id, marker] : scene.markers) {
+    const std::string key = std::to_string(id);
+    Json corners = Json::array();
+    for (const Eigen::Vector3d& corner : marker.corners) corners.push_back({corner.x(), corner.y(), corner.z()});
+    json["markers"][key] = corners;
+    json["marker_views"][key] = marker.num_views;
+    json["marker_sigma_m"][key] = marker.sigma_m;
+  }
+  json["heightmap"] = nullptr;
+  if (scene.height_map) {
+    const GridShape& grid = scene.height_map->grid;
+    json["heightmap"] = {{"x_min", grid.x_min}, {"y_min", grid.y_min}, {"step", grid.step}, {"width", grid.width}, {"height", grid.height}};
+  }
+  json["keyframes"] = scene.keyframes.size();
+  json["frames"] = {{"total", scene.frames_total}, {"tracked", scene.frames_tracked}, {"dropped", scene.frames_dropped}};
+  json["longest_lost_s"] = scene.longest_lost_s;
+  json["calibration"] = MapJson(scene.calibration);
+  json["timings_s"] = MapJson(scene.timings_s);
+  json["warnings"] = scene.warnings;
+  // Warnings can quote file names in any encoding; what is no UTF-8 is replaced.
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
+  const Json json = ParseText(text, name);
+  const Value root(json, name);
+  const Value format_value = root["format"];
+  const std::int64_t format = format_value.Integer(-kMaxCount, kMaxCount);
+  if (format > kFormat) {
+    throw DataError(fmt::format("{} has format {}, this version reads format {}; update Plumb or make the scene again with this version",
+                                name, format, kFormat));
+  }
+  if (format < kFormat) format_value.Fail(fmt::format("is {}, expected {}", format, kFormat));
+
+  SceneHeader header;
+  Scene& scene = header.scene;
+  const std::string preset = root["preset"].Text();
+  if (preset != Name(Preset::kBest) && preset != Name(Preset::kPaper)) root["preset"].Fail("is neither best nor paper");
+  scene.preset = preset == Name(Preset::kBest) ? Preset::kBest : Preset::kPaper;
+  const std::string frame = root["frame"].Text();
+  if (frame != Name(SceneFrame::kReferenceMarker) && frame != Name(SceneFrame::kFirstKeyframe)) {
+    root["frame"].Fail("is neither reference_marker nor first_keyframe");
+  }
+  scene.frame = frame == Name(SceneFrame::kReferenceMarker) ? SceneFrame::kReferenceMarker : SceneFrame::kFirstKeyframe;
+  ReadMarkerKind(root, scene);
+  ReadMarkers(root, scene);
+  header.grid = ReadGrid(root["heightmap"]);
+  header.num_keyframes = static_cast<std::size_t>(root["keyframes"].Integer(0, kMaxCount));
+  const Value frames = root["frames"];
+  scene.frames_total = frames["total"].Integer(0, kMaxCount);
+  scene.frames_tracked = frames["tracked"].Integer(0, kMaxCount);
+  scene.frames_dropped = frames["dropped"].Integer(0, kMaxCount);
+  if (root.has("longest_lost_s")) scene.longest_lost_s = root["longest_lost_s"].Number(0, 1e9);
+  if (root.has("calibration")) {
+    root["calibration"].ForEach([&](const std::string& key, const Value& value) { scene.calibration[key] = value.Number(-1e12, 1e12); });
+  }
+  if (root.has("timings_s")) {
+    root["timings_s"].ForEach([&](const std::string& key, const Value& value) { scene.timings_s[key] = value.Number(0, 1e9); });
+  }
+  if (root.has("warnings")) {
+    const Value warnings = root["warnings"];
+    if (!warnings.json().is_array()) warnings.Fail("is no list");
+    for (std::size_t i = 0; i < warnings.json().size(); ++i) scene.warnings.push_back(warnings.At(i).Text());
+  }
+  return header;
+}
+
+}  // namespace plumb

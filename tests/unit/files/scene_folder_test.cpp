@@ -1,0 +1,303 @@
+#include "daemon/files/scene_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <set>
+#include <string>
+
+#include "algo/types/errors.hpp"
+#include "algo/types/units.hpp"
+#include "daemon/files/scene_json.hpp"
+#include "daemon/files/trajectory_file.hpp"
+#include "drivers/replay/file_io.hpp"
+#include "drivers/replay/image_file.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::MessageOf;
+using testing::TempFolder;
+
+StampedPose PoseAt(double time_s) {
+  StampedPose pose{time_s, Pose::Identity()};
+  pose.T_world_camera.linear() = RotationFromVector(Eigen::Vector3d(2.9, 0.3 * time_s, -0.7));
+  pose.T_world_camera.translation() = Eigen::Vector3d(0.1 * time_s, -1.23456789, 0.777);
+  return pose;
+}
+
+Scene SmallScene() {
+  Scene scene;
+  scene.preset = Preset::kPaper;
+  scene.frame = SceneFrame::kReferenceMarker;
+  scene.marker_dictionary = "DICT_ARUCO_MIP_36h12";
+  scene.marker_length_m = 0.104;
+  scene.reference_marker = 11;
+  scene.markers[11] = {CornersInMarkerFrame(0.104), 9, 0.0004};
+  scene.markers[100] = {CornersInMarkerFrame(0.104), 2, 0.002};
+  scene.markers[100].corners[2] = Eigen::Vector3d(1.0 / 3.0, -0.1, 1e-9);
+  scene.keyframes = {PoseAt(1), PoseAt(3)};
+  scene.trajectory = {PoseAt(1), PoseAt(2), PoseAt(3)};
+  scene.frames_total = 5;
+  scene.frames_tracked = 3;
+  scene.frames_dropped = 1;
+  scene.longest_lost_s = 0.25;
+  scene.cloud.points = {{0, 0, 0.1F}, {0.5F, 0.25F, 0.125F}};
+  scene.cloud.normals = {{0, 0, 1}, {0, 1, 0}};
+  scene.cloud.colors = {Color{1, 2, 3}, Color{4, 5, 6}};
+  scene.height_map.emplace(GridShape{-0.1, -0.2, 0.0015, 7, 3});
+  scene.height_map->z[0] = 0.01F;
+  scene.height_map->z[9] = -0.02F;
+  scene.mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  scene.mesh.triangles = {{0, 1, 2}};
+  scene.calibration["depth_scale"] = 1.00123;
+  scene.timings_s["clouds"] = 0.5;
+  scene.warnings = {"depth is a little short"};
+  return scene;
+}
+
+/// A written scene that a test then damages.
+class SceneFolderTest : public ::testing::Test {
+ protected:
+  void SetUp() override { WriteScene(SmallScene(), scene_); }
+
+  [[nodiscard]] std::string Refusal(const SceneParts& parts = {.mesh = true}) const {
+    return MessageOf<DataError>([&] { (void)ReadScene(scene_, parts); });
+  }
+
+  /// Refusal after one change of scene.json.
+  template <typename Change>
+  [[nodiscard]] std::string RefusalWith(const Change& change) const {
+    auto json = nlohmann::json::parse(SceneJson(SmallScene()));
+    change(json);
+    WriteWholeFile(scene_ / "scene.json", json.dump());
+    return Refusal();
+  }
+
+  void Truncate(const char* name) const { fs::resize_file(scene_ / name, fs::file_size(scene_ / name) - 3); }
+
+  TempFolder folder_;
+  fs::path scene_ = folder_ / "scene";
+};
+
+TEST_F(SceneFolderTest, GivesBackWhatWasWritten) {
+  const Scene read = ReadScene(scene_, {.mesh = true});
+  const Scene scene = SmallScene();
+  EXPECT_EQ(read.preset, scene.preset);
+  EXPECT_EQ(read.frame, scene.frame);
+  EXPECT_EQ(read.marker_dictionary, scene.marker_dictionary);
+  EXPECT_EQ(read.marker_length_m, scene.marker_length_m);
+  EXPECT_EQ(read.reference_marker, scene.reference_marker);
+  ASSERT_EQ(read.markers.size(), 2U);
+  for (const auto& [id, marker] : scene.markers) {
+    EXPECT_EQ(read.markers.at(id).corners, marker.corners) << id;  // bit for bit
+    EXPECT_EQ(read.markers.at(id).num_views, marker.num_views);
+    EXPECT_EQ(read.markers.at(id).sigma_m, marker.sigma_m);
+  }
+  ASSERT_EQ(read.keyframes.size(), 2U);
+  ASSERT_EQ(read.trajectory.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(read.trajectory[i].time_s, scene.trajectory[i].time_s);
+    // Nine decimals: half a nanometre in the translation, a few nanoradians in the rotation.
+    EXPECT_LT((read.trajectory[i].T_world_camera.translation() - scene.trajectory[i].T_world_camera.translation()).norm(), 1e-9);
+    EXPECT_LT(RotationAngle(read.trajectory[i].T_world_camera.inverse() * scene.trajectory[i].T_world_camera), 1e-8);
+  }
+  EXPECT_EQ(read.frames_total, 5);
+  EXPECT_EQ(read.frames_tracked, 3);
+  EXPECT_EQ(read.frames_dropped, 1);
+  EXPECT_EQ(read.longest_lost_s, 0.25);
+  EXPECT_EQ(read.cloud.points, scene.cloud.points);
+  EXPECT_EQ(read.cloud.normals, scene.cloud.normals);
+  EXPECT_EQ(read.cloud.colors, scene.cloud.colors);
+  ASSERT_TRUE(read.height_map);
+  EXPECT_EQ(read.height_map->grid, scene.height_map->grid);
+  EXPECT_EQ(read.height_map->at(0, 0), 0.01F);
+  EXPECT_EQ(read.height_map->at(1, 2), -0.02F);
+  EXPECT_TRUE(std::isnan(read.height_map->at(2, 6)));
+  EXPECT_EQ(read.mesh.triangles, scene.mesh.triangles);
+  EXPECT_EQ(read.calibration, scene.calibration);
+  EXPECT_EQ(read.timings_s, scene.timings_s);
+  EXPECT_EQ(read.warnings, scene.warnings);
+}
+
+TEST_F(SceneFolderTest, HoldsTheKeysOfTheContract) {
+  const auto json = nlohmann::json::parse(ReadTextFile(scene_ / "scene.json", 1 << 20));
+  EXPECT_EQ(json.at("format"), 1);
+  EXPECT_EQ(json.at("preset"), "paper");
+  EXPECT_EQ(json.at("frame"), "reference_marker");
+  EXPECT_EQ(json.at("markers").at("100").size(), 4U);
+  EXPECT_EQ(json.at("markers").at("100").at(2).at(0), 1.0 / 3.0);
+  EXPECT_EQ(json.at("marker_views").at("11"), 9);
+  EXPECT_EQ(json.at("heightmap").at("x_min"), -0.1);
+  EXPECT_EQ(json.at("heightmap").at("y_min"), -0.2);
+  EXPECT_EQ(json.at("heightmap").at("step"), 0.0015);
+  EXPECT_EQ(json.at("heightmap").at("width"), 7);
+  EXPECT_EQ(json.at("heightmap").at("height"), 3);
+  EXPECT_EQ(json.at("keyframes"), 2);
+  EXPECT_EQ(json.at("frames").at("total"), 5);
+  EXPECT_EQ(json.at("calibration").at("depth_scale"), 1.00123);
+  EXPECT_EQ(json.at("timings_s").at("clouds"), 0.5);
+  EXPECT_EQ(json.at("warnings").at(0), "depth is a little short");
+}
+
+TEST_F(SceneFolderTest, SameSceneSameBytes) {
+  WriteScene(SmallScene(), folder_ / "again");
+  for (const fs::directory_entry& entry : fs::directory_iterator(scene_)) {
+    const std::string name = entry.path().filename().string();
+    EXPECT_EQ(ReadWholeFile(entry.path(), 1 << 20), ReadWholeFile(folder_ / "again" / name, 1 << 20)) << name;
+  }
+}
+
+TEST_F(SceneFolderTest, ASceneWithoutMarkersHasNoHeightMap) {
+  Scene scene = SmallScene();
+  scene.frame = SceneFrame::kFirstKeyframe;
+  scene.reference_marker.reset();
+  scene.markers.clear();
+  scene.height_map.reset();
+  scene.mesh = {};
+  WriteScene(scene, scene_);
+  EXPECT_FALSE(fs::exists(scene_ / "heightmap.tiff"));
+  EXPECT_TRUE(nlohmann::json::parse(ReadTextFile(scene_ / "scene.json", 1 << 20)).at("heightmap").is_null());
+  const Scene read = ReadScene(scene_, {.mesh = true});
+  EXPECT_EQ(read.frame, SceneFrame::kFirstKeyframe);
+  EXPECT_FALSE(read.height_map);
+  EXPECT_FALSE(read.reference_marker);
+  EXPECT_TRUE(read.mesh.triangles.empty());
+}
+
+TEST_F(SceneFolderTest, TrajectoryIsTumFormatWithSixDecimalsOfTime) {
+  Scene scene = SmallScene();
+  scene.trajectory = {{1700120000.0561461, Pose::Identity()}};
+  WriteScene(scene, scene_);
+  EXPECT_THAT(ReadTextFile(scene_ / "trajectory_all.txt", 1 << 20),
+              HasSubstr("\n1700120000.056146 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 1.000000000\n"));
+}
+
+TEST_F(SceneFolderTest, AnotherProgramsSceneWithOnlyTheContractsKeysIsRead) {
+  auto json = nlohmann::json::parse(SceneJson(SmallScene()));
+  for (const char* key : {"marker_dictionary", "marker_length_m", "reference_marker", "marker_sigma_m", "longest_lost_s"}) json.erase(key);
+  WriteWholeFile(scene_ / "scene.json", json.dump());
+  EXPECT_EQ(ReadScene(scene_).markers.size(), 2U);
+}
+
+TEST_F(SceneFolderTest, WarningsInAnyEncodingAreWritten) {
+  Scene scene = SmallScene();
+  scene.warnings = {"file \xff\xfe"};
+  WriteScene(scene, scene_);
+  EXPECT_EQ(ReadScene(scene_).warnings.size(), 1U);
+}
+
+TEST_F(SceneFolderTest, WhatIsNotFiniteIsNeverWritten) {
+  Scene scene = SmallScene();
+  scene.keyframes[1].T_world_camera.translation().x() = std::nan("");
+  EXPECT_THROW(WriteScene(scene, folder_ / "nan"), std::invalid_argument);
+  scene = SmallScene();
+  scene.markers[11].corners[0].x() = std::nan("");
+  EXPECT_THROW(WriteScene(scene, folder_ / "nan"), std::invalid_argument);
+  EXPECT_FALSE(fs::exists(folder_ / "nan"));
+}
+
+// ---- bad input
+
+TEST_F(SceneFolderTest, MissingFoldersAndFilesAreNamed) {
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadScene(folder_ / "none"); }), AllOf(HasSubstr("none"), HasSubstr("is missing")));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadScene(folder_.path()); }), HasSubstr("holds no scene.json"));
+  fs::remove(scene_ / "heightmap.tiff");
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("heightmap.tiff"), HasSubstr("missing")));
+  fs::remove(scene_ / "cloud.ply");
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("cloud.ply"), HasSubstr("missing")));
+  fs::remove(scene_ / "trajectory.txt");
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("trajectory.txt"), HasSubstr("missing")));
+}
+
+TEST_F(SceneFolderTest, ANewerFormatIsNamed) {
+  EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = 2; }),
+              AllOf(HasSubstr("scene.json"), HasSubstr("format 2"), HasSubstr("reads format 1"), HasSubstr("update")));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = 0; }), HasSubstr("format is 0"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = "1"; }), HasSubstr("no whole number"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json.erase("format"); }), HasSubstr("format is missing"));
+}
+
+TEST_F(SceneFolderTest, TruncatedFilesAreNamed) {
+  Truncate("mesh.ply");
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("mesh.ply"), HasSubstr("truncated")));
+  EXPECT_EQ(ReadScene(scene_).keyframes.size(), 2U);  // who does not ask for the mesh does not read it
+  fs::resize_file(scene_ / "heightmap.tiff", fs::file_size(scene_ / "heightmap.tiff") / 2);
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("heightmap.tiff"), HasSubstr("truncated")));
+  Truncate("cloud.ply");
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("cloud.ply"), HasSubstr("truncated")));
+  Truncate("scene.json");
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("scene.json"), HasSubstr("no JSON")));
+}
+
+TEST_F(SceneFolderTest, ATruncatedTrajectoryIsNamed) {
+  Truncate("trajectory.txt");  // a pose without its last digits still parses: the count of lines is right, the number is not
+  fs::resize_file(scene_ / "trajectory.txt", fs::file_size(scene_ / "trajectory.txt") - 20);
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("trajectory.txt line 3"), HasSubstr("8 finite numbers")));
+}
+
+TEST_F(SceneFolderTest, NanPosesAreNamed) {
+  WriteWholeFile(scene_ / "trajectory.txt", std::string_view("1.0 0 0 0 0 0 0 1\n2.0 nan 0 0 0 0 0 1\n"));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("trajectory.txt line 2"), HasSubstr("finite")));
+  WriteWholeFile(scene_ / "trajectory.txt", std::string_view("1.0 0 0 0 0 0 0 0\n2.0 0 0 0 0 0 0 1\n"));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("line 1"), HasSubstr("quaternion of length 0")));
+  WriteWholeFile(scene_ / "trajectory.txt", std::string_view("2.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 0 1\n"));
+  EXPECT_THAT(Refusal(), HasSubstr("not later"));
+  WriteWholeFile(scene_ / "trajectory.txt", std::string_view("2.0 0 0 0 0 0 0 1 5\n"));
+  EXPECT_THAT(Refusal(), HasSubstr("8 finite numbers"));
+}
+
+TEST_F(SceneFolderTest, CornersThatAreNoNumbersAreNamed) {
+  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"][1][2] = nullptr; }),
+              HasSubstr("scene.json.markers.11[1][2] is no number"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"][1][2] = 1e30; }), HasSubstr("1e+30"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"].erase(0); }), HasSubstr("no list of 4"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["-3"] = json["markers"]["11"]; }), HasSubstr("no marker id"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["marker_views"]["12"] = 3; }), HasSubstr("belongs to no marker"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"] = nlohmann::json::array(); }), HasSubstr("markers is no object"));
+}
+
+TEST_F(SceneFolderTest, SizesThatDisagreeAreNamed) {
+  EXPECT_THAT(RefusalWith([](auto& json) { json["heightmap"]["width"] = 8; }),
+              AllOf(HasSubstr("heightmap.tiff has 7x3"), HasSubstr("scene.json states 8x3")));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["keyframes"] = 3; }), AllOf(HasSubstr("2 poses"), HasSubstr("3 keyframes")));
+}
+
+TEST_F(SceneFolderTest, AbsurdNumbersAreNamed) {
+  EXPECT_THAT(RefusalWith([](auto& json) { json["heightmap"]["width"] = 1000000; }), AllOf(HasSubstr("width"), HasSubstr("1000000")));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["heightmap"]["step"] = 0; }), HasSubstr("step"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["heightmap"]["step"] = -0.0015; }), HasSubstr("step"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["frames"]["total"] = -1; }), HasSubstr("frames.total"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["frame"] = "moon"; }), HasSubstr("neither reference_marker nor first_keyframe"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["marker_dictionary"] = "DICT_9X9"; }), HasSubstr("DICT_9X9"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json = nlohmann::json::array(); }), HasSubstr("no object"));
+  WriteWholeFile(scene_ / "scene.json", std::string(200'000, '['));
+  EXPECT_THAT(Refusal(), HasSubstr("no JSON"));
+}
+
+TEST_F(SceneFolderTest, InfiniteHeightsAreNamed) {
+  cv::Mat values(3, 7, CV_32FC1, cv::Scalar(0.1));
+  values.at<float>(1, 4) = std::numeric_limits<float>::infinity();
+  WriteFloatTiff(scene_ / "heightmap.tiff", values);
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr("heightmap.tiff"), HasSubstr("row 1, column 4")));
+}
+
+TEST_F(SceneFolderTest, AFolderOfSomethingElseIsNotReplaced) {
+  fs::create_directory(folder_ / "photos");
+  WriteWholeFile(folder_ / "photos/a.jpg", std::string_view("x"));
+  EXPECT_THROW(WriteScene(SmallScene(), folder_ / "photos"), IoError);
+  EXPECT_TRUE(fs::exists(folder_ / "photos/a.jpg"));
+}
+
+}  // namespace
+}  // namespace plumb
