@@ -13,9 +13,9 @@ namespace plumb {
 
 struct ReconstructorOptions {
   Preset preset = Preset::kBest;
-  bool keep_color = true;  ///< false: clouds and meshes carry no colours (patients).
-  bool use_markers = true;  ///< false: track and reconstruct by keypoints and depth alone.
-  bool use_keypoints = true;  ///< false: track by markers (and depth) alone.
+  bool keep_color = true;       ///< false: clouds and meshes carry no colours (patients).
+  bool use_markers = true;      ///< false: track and reconstruct by keypoints and depth alone.
+  bool use_keypoints = true;    ///< false: track by markers (and depth) alone.
   int num_icp_iterations = 20;  ///< Preset `paper`: iterations of Algorithm 1.
   unsigned seed = 1;            ///< Of random subsampling.
   /// Wall clock in seconds for `Scene::timings_s`; none: no timings. The method itself never looks at a clock.
@@ -26,11 +26,11 @@ struct ReconstructorOptions {
 struct TrackingReport {
   bool tracked = false;
   bool is_keyframe = false;
-  int num_keypoints = 0;      ///< Inlier landmarks.
-  int num_markers = 0;        ///< Markers that took part.
+  int num_keypoints = 0;                   ///< Inlier landmarks.
+  int num_markers = 0;                     ///< Markers that took part.
   Pose T_world_camera = Pose::Identity();  ///< At the depth stamp; live estimate in the tracker's own world.
-  double median_depth_m = 0;  ///< 0: no valid depth.
-  double valid_depth = 0;     ///< Share of pixels with depth.
+  double median_depth_m = 0;               ///< 0: no valid depth.
+  double valid_depth = 0;                  ///< Share of pixels with depth.
 };
 
 /// Streams frames into a scene: AddFrame() tracks and prepares, so that Finish() has only the joint solve, the surfaces

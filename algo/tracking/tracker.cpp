@@ -378,6 +378,10 @@ struct Tracker::Impl {
       keyframe.descriptors = features.descriptors;
     }
     AddNewMarkers(frame.depth_m, keyframe);
+    if (reference >= 0) {
+      result.previous_keyframe = reference;
+      result.T_previous_color = map.keyframes[static_cast<std::size_t>(reference)].T_world_color.inverse() * T_world_color;
+    }
     map.keyframes.push_back(std::move(keyframe));
     reference = index;
     reference_count = active.size();

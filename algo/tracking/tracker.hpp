@@ -30,6 +30,8 @@ struct TrackedFrame {
   int keyframe = -1;                           ///< Index in the map if it became one, else -1.
   int reference_keyframe = -1;                 ///< The keyframe that it was tracked against.
   Pose T_reference_color = Pose::Identity();   ///< Colour camera at the colour stamp, in the reference keyframe's colour camera.
+  int previous_keyframe = -1;                  ///< Of a keyframe: the one that it was tracked against, or -1.
+  Pose T_previous_color = Pose::Identity();    ///< Of a keyframe: its camera in that one's, as tracked.
   Vector6d velocity_per_s = Vector6d::Zero();  ///< In the camera frame.
   int num_keypoints = 0;
   int num_markers = 0;

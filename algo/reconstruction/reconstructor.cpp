@@ -1,0 +1,242 @@
+#include "algo/reconstruction/reconstructor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "algo/reconstruction/height_map_builder.hpp"
+#include "algo/reconstruction/joint_registration.hpp"
+#include "algo/reconstruction/surface_cloud.hpp"
+#include "algo/reconstruction/trajectory.hpp"
+#include "algo/reconstruction/view_surface.hpp"
+#include "algo/tracking/tracker.hpp"
+#include "algo/types/errors.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr int kMinReferenceViews = 3;  // Of the reference marker, before the scene's frame is built on it.
+
+TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
+  TrackerOptions tracking;
+  tracking.use_markers = options.use_markers;
+  tracking.use_keypoints = options.use_keypoints;
+  return tracking;
+}
+
+// Depth as the calibration corrects it, in place of what was measured.
+cv::Mat CorrectedDepth(const cv::Mat& depth_m, const CalibrationModel& calibration) {
+  cv::Mat corrected(depth_m.size(), CV_32FC1);
+  const auto scale = static_cast<float>(1.0 + calibration.depth[0]);
+  for (int r = 0; r < depth_m.rows; ++r) {
+    const float* in = depth_m.ptr<float>(r);
+    float* out = corrected.ptr<float>(r);
+    for (int c = 0; c < depth_m.cols; ++c) {
+      const double bow = BowRadiusSquared(c, r, depth_m.cols, depth_m.rows);
+      const float z = in[c] * scale + static_cast<float>(calibration.depth[1] + calibration.depth[2] * bow);
+      out[c] = in[c] > 0 && z > 0 ? z : 0.0F;
+    }
+  }
+  return corrected;
+}
+
+}  // namespace
+
+struct Reconstructor::Impl {
+  StreamInfo info;
+  ReconstructorOptions options;
+  Tracker tracker;
+  std::int64_t dropped = 0;
+  bool depth_seen = false;
+  std::vector<double> tracking_times_s;
+  double finish_start_s = 0;
+
+  Impl(const StreamInfo& stream, const ReconstructorOptions& reconstructor_options)
+      : info(stream), options(reconstructor_options), tracker(stream, TrackingOptions(reconstructor_options)) {}
+
+  [[nodiscard]] double Now() const { return options.now_s ? options.now_s() : 0.0; }
+
+  TrackingReport AddFrame(const Frame& frame) {
+    if (frame.color_rgb.cols != info.intrinsics.width || frame.color_rgb.rows != info.intrinsics.height ||
+        frame.depth_m.size() != frame.color_rgb.size())
+      throw DataError(fmt::format("frame {}: images are {}x{} (colour) and {}x{} (depth), the calibration is for {}x{}", frame.index,
+                                  frame.color_rgb.cols, frame.color_rgb.rows, frame.depth_m.cols, frame.depth_m.rows, info.intrinsics.width,
+                                  info.intrinsics.height));
+    TrackingReport report;
+    DepthStatistics(frame.depth_m, report);
+    const double start = Now();
+    const TrackedFrame tracked = tracker.Track(frame);
+    tracking_times_s.push_back(Now() - start);
+    report.tracked = tracked.tracked;
+    report.is_keyframe = tracked.keyframe >= 0;
+    report.num_keypoints = tracked.num_keypoints;
+    report.num_markers = tracked.num_markers;
+    if (tracked.tracked) {
+      const double dt = tracked.depth_time_s - tracked.color_time_s;
+      report.T_world_camera = PoseAfter(tracker.T_world_color(tracked), tracked.velocity_per_s, dt);
+    }
+    return report;
+  }
+
+  // On every eighth pixel each way: enough for guidance.
+  void DepthStatistics(const cv::Mat& depth_m, TrackingReport& report) {
+    std::vector<float> z;
+    int total = 0;
+    for (int r = 4; r < depth_m.rows; r += 8) {
+      for (int c = 4; c < depth_m.cols; c += 8) {
+        ++total;
+        if (const float value = depth_m.at<float>(r, c); value > 0) z.push_back(value);
+      }
+    }
+    report.valid_depth = total > 0 ? static_cast<double>(z.size()) / total : 0.0;
+    if (z.empty()) return;
+    depth_seen = true;
+    std::nth_element(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2), z.end());
+    report.median_depth_m = z[z.size() / 2];
+  }
+
+  // ---- after the last frame --------------------------------------------------------------------------------------
+
+  void CheckInput(const std::vector<TrackedFrame>& frames) const {
+    if (frames.size() < 2)
+      throw DataError(fmt::format("the recording has {} usable frame(s), a scene needs at least 2: record a sweep", frames.size()));
+    if (!depth_seen)
+      throw DataError(
+          fmt::format("all {} depth images are empty (0 everywhere): check the sensor's depth stream and depth_scale", frames.size()));
+  }
+
+  Scene Finish(const std::stop_token& stop, const std::function<void(double, std::string_view)>& progress) {
+    const double start = Now();
+    const auto report = [&](double fraction, std::string_view what) {
+      if (stop.stop_requested()) throw Interrupted("stopped on request");
+      if (progress) progress(fraction, what);
+    };
+    std::vector<TrackedFrame> frames = tracker.frames();
+    CheckInput(frames);
+    TrackingMap map = tracker.TakeMap();
+    RefreshVelocities(frames, map);
+
+    report(0.0, "registration");
+    double stage = Now();
+    JointRegistrationOptions joint_options;
+    joint_options.marker_length_m = info.marker_length_m;
+    const JointRegistrationResult joint = RegisterJointly(info.intrinsics, joint_options, map, stop);
+    Scene scene = MakeScene(frames, map, joint);
+    scene.timings_s["global_registration"] = Now() - stage;
+
+    report(0.5, "surface");
+    stage = Now();
+    const Pose T_scene_world = SceneFromWorld(map);
+    const std::vector<ViewSurface> surfaces = PrepareViews(Views(map, joint.calibration, T_scene_world));
+    SurfaceCloudOptions cloud_options;
+    cloud_options.with_colors = options.keep_color;
+    scene.cloud = MergeSurface(surfaces, cloud_options);
+    scene.timings_s["clouds"] = Now() - stage;
+
+    report(0.8, "height map");
+    stage = Now();
+    if (scene.frame == SceneFrame::kReferenceMarker) {
+      RobustHeightMapOptions map_options;
+      map_options.with_colors = options.keep_color;
+      ColoredHeightMap heights = RobustHeightMap(surfaces, map_options);
+      scene.height_map = std::move(heights.map);
+    }
+    scene.timings_s["height_map"] = Now() - stage;
+    if (!tracking_times_s.empty()) {
+      std::vector<double> times = tracking_times_s;
+      std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
+      scene.timings_s["tracking_per_frame_median"] = times[times.size() / 2];
+    }
+    scene.timings_s["after_last_frame"] = Now() - start;
+    report(1.0, "done");
+    return scene;
+  }
+
+  [[nodiscard]] bool HasReferenceMarker(const TrackingMap& map) const {
+    if (!info.reference_marker) return false;
+    const auto found = map.markers.find(*info.reference_marker);
+    return found != map.markers.end() && found->second.num_views >= kMinReferenceViews;
+  }
+
+  [[nodiscard]] Pose SceneFromWorld(const TrackingMap& map) const {
+    if (HasReferenceMarker(map)) return map.markers.at(*info.reference_marker).T_world_marker.inverse();
+    return map.keyframes.front().T_world_color.inverse();
+  }
+
+  Scene MakeScene(const std::vector<TrackedFrame>& frames, const TrackingMap& map, const JointRegistrationResult& joint) const {
+    Scene scene;
+    scene.preset = options.preset;
+    scene.frame = HasReferenceMarker(map) ? SceneFrame::kReferenceMarker : SceneFrame::kFirstKeyframe;
+    scene.marker_dictionary = info.marker_dictionary;
+    scene.marker_length_m = info.marker_length_m;
+    scene.reference_marker = info.reference_marker;
+    scene.warnings = info.warnings;
+    const Pose T_scene_world = SceneFromWorld(map);
+    for (const MapKeyframe& keyframe : map.keyframes)
+      scene.keyframes.push_back({keyframe.data.depth_time_s, T_scene_world * DepthPose(keyframe, joint.calibration)});
+    scene.trajectory = DepthTrajectory(frames, map, joint.calibration, T_scene_world);
+    scene.frames_total = static_cast<std::int64_t>(frames.size()) + dropped;
+    scene.frames_tracked = static_cast<std::int64_t>(scene.trajectory.size());
+    scene.frames_dropped = dropped;
+    scene.longest_lost_s = LongestLost(frames);
+    for (const auto& [id, marker] : map.markers) scene.markers[id] = ToSceneMarker(marker, T_scene_world);
+    for (const auto& [name, value] : joint.calibration.Named()) scene.calibration[name] = value;
+    scene.calibration["consistency_before_m"] = joint.consistency_before_m;
+    scene.calibration["consistency_after_m"] = joint.consistency_after_m;
+    if (scene.markers.empty())
+      scene.warnings.push_back("no marker was seen: the scene lies in the first keyframe's frame and cannot be compared");
+    if (!scene.markers.empty() && scene.frame == SceneFrame::kFirstKeyframe)
+      scene.warnings.push_back(
+          info.reference_marker
+              ? fmt::format(
+                    "reference marker {} was not seen well enough: the scene lies in the first keyframe's frame, without a height map",
+                    *info.reference_marker)
+              : "no reference marker is configured: the scene lies in the first keyframe's frame, without a height map");
+    if (scene.frames_tracked < scene.frames_total - dropped)
+      scene.warnings.push_back(fmt::format("{} of {} frames were not tracked, {:.2f} s at longest",
+                                           scene.frames_total - dropped - scene.frames_tracked, scene.frames_total - dropped,
+                                           scene.longest_lost_s));
+    if (!joint.accepted && joint.num_pairs > 0)
+      scene.warnings.push_back("the dense registration did not make the views agree better and was left out");
+    return scene;
+  }
+
+  [[nodiscard]] SceneMarker ToSceneMarker(const MapMarker& marker, const Pose& T_scene_world) const {
+    SceneMarker result;
+    const MarkerCorners corners = CornersInMarkerFrame(info.marker_length_m);
+    for (std::size_t i = 0; i < 4; ++i) result.corners[i] = T_scene_world * (marker.T_world_marker * corners[i]);
+    result.num_views = marker.num_views;
+    // One view: a quarter of a pixel at arm's length, mostly in depth; more views average down to the map's own error.
+    result.sigma_m = std::hypot(0.001, 0.004 / std::sqrt(std::max(1, marker.num_views)));
+    return result;
+  }
+
+  std::vector<DepthView> Views(TrackingMap& map, const CalibrationModel& calibration, const Pose& T_scene_world) const {
+    std::vector<DepthView> views(map.keyframes.size());
+    Intrinsics corrected = calibration.Corrected(info.intrinsics);
+    const double scale = info.intrinsics.width / 640.0;
+    corrected.cx += calibration.depth[3] * scale;
+    corrected.cy += calibration.depth[4] * scale;
+    tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t k) {
+      MapKeyframe& keyframe = map.keyframes[k];
+      views[k].intrinsics = corrected;
+      views[k].depth_m = CorrectedDepth(keyframe.data.view.depth_m, calibration);
+      keyframe.data.view.depth_m.release();
+      if (options.keep_color) views[k].color_rgb = keyframe.data.view.color_rgb;
+      views[k].T_world_camera = T_scene_world * DepthPose(keyframe, calibration);
+    });
+    return views;
+  }
+};
+
+Reconstructor::Reconstructor(const StreamInfo& info, const ReconstructorOptions& options) : impl_(std::make_unique<Impl>(info, options)) {}
+Reconstructor::~Reconstructor() = default;
+TrackingReport Reconstructor::AddFrame(const Frame& frame) { return impl_->AddFrame(frame); }
+void Reconstructor::CountDropped(int num_frames) { impl_->dropped += num_frames; }
+Scene Reconstructor::Finish(const std::stop_token& stop, const std::function<void(double, std::string_view)>& progress) {
+  return impl_->Finish(stop, progress);
+}
+
+}  // namespace plumb
