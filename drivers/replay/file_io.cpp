@@ -85,13 +85,19 @@ std::string DescribeWriteError(const std::filesystem::path& path, int error_numb
 FileWriter::FileWriter(std::filesystem::path path) : path_(std::move(path)) {
   descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (descriptor_ < 0) throw IoError(DescribeWriteError(path_, errno));
+  struct stat status {};
+  regular_ = ::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode);
   buffer_.reserve(kBufferBytes);
 }
 
 FileWriter::~FileWriter() {
   if (descriptor_ < 0) return;
   ::close(descriptor_);
-  ::unlink(path_.c_str());
+  Discard();
+}
+
+void FileWriter::Discard() {
+  if (regular_) ::unlink(path_.c_str());
 }
 
 void FileWriter::Write(std::span<const std::uint8_t> bytes) {
@@ -124,7 +130,7 @@ void FileWriter::Close() {
   const int descriptor = std::exchange(descriptor_, -1);
   if (::close(descriptor) != 0) {
     const int error = errno;
-    ::unlink(path_.c_str());
+    Discard();
     throw IoError(DescribeWriteError(path_, error));
   }
 }

@@ -19,7 +19,7 @@ namespace plumb {
 [[nodiscard]] std::string ReadTextFile(const std::filesystem::path& path, std::size_t max_bytes);
 
 /// A new file, written through one buffer. The owner calls Close(); a writer that goes away without it
-/// (an exception passed by) removes its file. Not thread-safe.
+/// (an exception passed by) removes its file, unless what stands there is a device or a pipe. Not thread-safe.
 class FileWriter {
  public:
   /// Creates or truncates the file. @throws IoError
@@ -37,10 +37,12 @@ class FileWriter {
 
  private:
   void Flush();
+  void Discard();
   void WriteThrough(std::span<const std::uint8_t> bytes);
 
   std::filesystem::path path_;
   int descriptor_ = -1;
+  bool regular_ = false;
   std::vector<std::uint8_t> buffer_;
 };
 
