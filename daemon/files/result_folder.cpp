@@ -1,0 +1,168 @@
+#include "daemon/files/result_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+
+#include "algo/render/error_image.hpp"
+#include "algo/render/overlay_image.hpp"
+#include "algo/types/errors.hpp"
+#include "drivers/replay/file_io.hpp"
+#include "drivers/replay/image_file.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr int kFormat = 1;
+constexpr std::size_t kMaxJsonBytes = std::size_t{16} << 20;
+
+template <typename Derived>
+Json MatrixJson(const Eigen::MatrixBase<Derived>& matrix) {
+  Json rows = Json::array();
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
+    Json row = Json::array();
+    for (Eigen::Index c = 0; c < matrix.cols(); ++c) row.push_back(matrix(r, c));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+template <typename Derived>
+Json VectorJson(const Eigen::MatrixBase<Derived>& vector) {
+  Json values = Json::array();
+  for (Eigen::Index i = 0; i < vector.size(); ++i) values.push_back(vector(i));
+  return values;
+}
+
+Json OptionalJson(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+Json AlignmentJson(const Alignment& alignment) {
+  Json rejected = Json::object();
+  for (const auto& [id, residual_m] : alignment.markers_rejected) rejected[std::to_string(id)] = residual_m;
+  return {{"T_reference_current", MatrixJson(alignment.T_reference_current.matrix())},
+          {"rms_m", alignment.rms_m},
+          {"markers_used", alignment.markers_used},
+          {"markers_rejected", rejected},
+          {"covariance", MatrixJson(alignment.covariance)},
+          {"centre_m", VectorJson(alignment.centre_m)}};
+}
+
+Json MotionJson(const BodyMotion& motion) {
+  Json weak = Json::array();
+  for (const WeakDirection& direction : motion.weak_directions) {
+    weak.push_back(Json{{"name", direction.name}, {"u95", direction.u95}, {"unit", direction.unit}});
+  }
+  return {{"T", MatrixJson(motion.T.matrix())},
+          {"covariance", MatrixJson(motion.covariance)},
+          {"weak_directions", weak},
+          {"residual_m", {{"median", motion.residual_median_m}, {"p95", motion.residual_p95_m}}},
+          {"centroid_m", VectorJson(motion.centroid_m)},
+          {"inlier_share", motion.inlier_share}};
+}
+
+Json NumbersJson(const CouchNumbers& numbers) {
+  return {{"vertical_mm", OptionalJson(numbers.vertical_mm)},
+          {"longitudinal_mm", OptionalJson(numbers.longitudinal_mm)},
+          {"lateral_mm", OptionalJson(numbers.lateral_mm)},
+          {"pitch_deg", numbers.pitch_deg},
+          {"roll_deg", numbers.roll_deg},
+          {"yaw_deg", numbers.yaw_deg}};
+}
+
+Json CorrectionJson(const Correction& correction) {
+  Json json = {{"isocentre", VectorJson(correction.isocentre_m)}};
+  json.update(NumbersJson(correction.value));
+  json["uncertainty"] = NumbersJson(correction.u95);
+  json["words"] = {{"vertical", correction.words[0]}, {"longitudinal", correction.words[1]}, {"lateral", correction.words[2]},
+                   {"pitch", correction.words[3]},    {"roll", correction.words[4]},         {"yaw", correction.words[5]}};
+  return json;
+}
+
+Json RegionJson(const RegionCoverage& region) {
+  return {{"coverage", region.coverage}, {"largest_hole_m", region.largest_hole_m}, {"hole_centre_m", VectorJson(region.hole_centre_m)}};
+}
+
+void WriteMap(const fs::path& file, const std::optional<HeightMap>& map) {
+  if (!map || map->z.empty()) return;
+  // The image borrows the values; it is only read.
+  WriteFloatTiff(file, cv::Mat(map->grid.height, map->grid.width, CV_32FC1, const_cast<float*>(map->z.data())));
+}
+
+}  // namespace
+
+OutputKind ResultOutput() {
+  return {
+      "result", "result.json", {"result.json", "deviation.tiff", "distance.tiff", "deviation_after.tiff", "error_map.png", "overlay.png"}};
+}
+
+std::string ResultJson(const Comparison& comparison) {
+  Json json;
+  json["format"] = kFormat;
+  json["verdict"] = Name(comparison.verdict);
+  json["reasons"] = comparison.reasons;
+  json["alignment"] = comparison.alignment ? AlignmentJson(*comparison.alignment) : Json(nullptr);
+  json["motion"] = comparison.motion ? MotionJson(*comparison.motion) : Json(nullptr);
+  json["correction"] = comparison.correction ? CorrectionJson(*comparison.correction) : Json(nullptr);
+  json["region"] = comparison.region ? RegionJson(*comparison.region) : Json(nullptr);
+  json["warnings"] = comparison.warnings;
+  json["timings_s"] = Json::object();
+  for (const auto& [key, value] : comparison.timings_s) json["timings_s"][key] = value;
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+ResultPictures DrawResult(const Comparison& comparison, const HeightMap* reference_height, const PictureOptions& options) {
+  ResultPictures pictures;
+  if (comparison.deviation) {
+    ErrorImageOptions error;
+    error.tolerance_m = options.tolerance_m;
+    error.paper_colors = options.paper_colors;
+    error.subtitle = options.subtitle;
+    error.relief = reference_height;
+    error.region_mask = comparison.region_mask;
+    pictures.error_map = DrawErrorImage(*comparison.deviation, error);
+  }
+  if (reference_height != nullptr && comparison.current_height) {
+    OverlayImageOptions overlay;
+    overlay.tolerance_m = options.tolerance_m;
+    overlay.subtitle = options.subtitle;
+    pictures.overlay = DrawOverlayImage(*reference_height, *comparison.current_height, overlay);
+  }
+  return pictures;
+}
+
+void WriteResult(const Comparison& comparison, const ResultPictures& pictures, const fs::path& folder) {
+  AtomicFolder output(folder, ResultOutput());
+  WriteMap(output.path() / "deviation.tiff", comparison.deviation);
+  WriteMap(output.path() / "distance.tiff", comparison.distance);
+  WriteMap(output.path() / "deviation_after.tiff", comparison.deviation_after);
+  if (!pictures.error_map.empty()) WritePng(output.path() / "error_map.png", pictures.error_map);
+  if (!pictures.overlay.empty()) WritePng(output.path() / "overlay.png", pictures.overlay);
+  WriteWholeFile(output.path() / "result.json", ResultJson(comparison));
+  output.Commit();
+}
+
+std::string ReadResultJson(const fs::path& folder) {
+  const fs::path file = folder / "result.json";
+  std::string text = ReadTextFile(file, kMaxJsonBytes);
+  const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
+  if (!json.is_object() || !json.contains("format") || !json["format"].is_number_integer()) {
+    throw DataError(fmt::format("{} is no result of plumb compare: expected a JSON object with a format; compare again", file.string()));
+  }
+  const auto format = json["format"].get<std::int64_t>();
+  if (format != kFormat) {
+    throw DataError(fmt::format("{} has format {}, this version reads format {}; update Plumb or compare again with this version",
+                                file.string(), format, kFormat));
+  }
+  return text;
+}
+
+bool IsResultFolder(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::exists(folder / "result.json", ignored);
+}
+
+}  // namespace plumb

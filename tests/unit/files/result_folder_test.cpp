@@ -1,0 +1,157 @@
+#include "daemon/files/result_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <set>
+
+#include "algo/types/errors.hpp"
+#include "drivers/replay/file_io.hpp"
+#include "drivers/replay/image_file.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::MessageOf;
+using testing::TempFolder;
+
+std::set<std::string> Names(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename().string());
+  return names;
+}
+
+const GridShape kGrid{-0.1, -0.2, 0.0015, 120, 80};
+
+HeightMap Slope(double offset_m) {
+  HeightMap map(kGrid);
+  for (std::size_t i = 0; i < map.z.size(); ++i) map.z[i] = static_cast<float>(offset_m + 1e-4 * static_cast<double>(i % 120));
+  map.z[5] = std::numeric_limits<float>::quiet_NaN();
+  return map;
+}
+
+Comparison Answer() {
+  Comparison comparison;
+  comparison.verdict = Verdict::kMove;
+  comparison.reasons = {"vertical is 9.0 mm off"};
+  Alignment alignment;
+  alignment.T_reference_current.translation() = Eigen::Vector3d(0.25, 0.5, 0.75);
+  alignment.rms_m = 0.001;
+  alignment.markers_used = {3, 5, 8};
+  alignment.markers_rejected = {{7, 0.012}};
+  comparison.alignment = alignment;
+  BodyMotion motion;
+  motion.T.translation() = Eigen::Vector3d(1, 2, 3);
+  motion.covariance(0, 5) = 0.125;
+  motion.weak_directions = {{"roll", 2.5, "deg"}};
+  motion.residual_median_m = 0.0015;
+  motion.residual_p95_m = 0.004;
+  comparison.motion = motion;
+  Correction correction;
+  correction.isocentre_m = Eigen::Vector3d(0.1, 0.2, 0.3);
+  correction.value = {-9.0, 2.0, 3.0, 0.1, 0.2, 0.3};
+  correction.u95 = {0.5, 0.6, 0.7, 0.01, 0.02, 0.03};
+  correction.words[0] = "down 9.0 mm";
+  comparison.correction = correction;
+  comparison.region = RegionCoverage{0.97, 0.012, Eigen::Vector2d(0.4, 0.5)};
+  comparison.deviation = Slope(0.009);
+  comparison.distance = Slope(0.008);
+  comparison.current_height = Slope(0.109);
+  comparison.timings_s["alignment"] = 0.25;
+  return comparison;
+}
+
+TEST(ResultFolderTest, HoldsTheKeysOfTheContract) {
+  const auto json = nlohmann::json::parse(ResultJson(Answer()));
+  EXPECT_EQ(json.at("format"), 1);
+  EXPECT_EQ(json.at("verdict"), "move");
+  EXPECT_EQ(json.at("reasons").at(0), "vertical is 9.0 mm off");
+  const auto& alignment = json.at("alignment");
+  EXPECT_EQ(alignment.at("T_reference_current").at(1).at(3), 0.5);  // row-major: the translation is the last column
+  EXPECT_EQ(alignment.at("T_reference_current").at(3), (nlohmann::json{0.0, 0.0, 0.0, 1.0}));
+  EXPECT_EQ(alignment.at("rms_m"), 0.001);
+  EXPECT_EQ(alignment.at("markers_used"), (nlohmann::json{3, 5, 8}));
+  EXPECT_EQ(alignment.at("markers_rejected").at("7"), 0.012);
+  const auto& motion = json.at("motion");
+  EXPECT_EQ(motion.at("T").at(2).at(3), 3.0);
+  EXPECT_EQ(motion.at("covariance").size(), 6U);
+  EXPECT_EQ(motion.at("covariance").at(0).at(5), 0.125);
+  EXPECT_EQ(motion.at("weak_directions").at(0), (nlohmann::json{{"name", "roll"}, {"u95", 2.5}, {"unit", "deg"}}));
+  EXPECT_EQ(motion.at("residual_m"), (nlohmann::json{{"median", 0.0015}, {"p95", 0.004}}));
+  const auto& correction = json.at("correction");
+  EXPECT_EQ(correction.at("isocentre"), (nlohmann::json{0.1, 0.2, 0.3}));
+  EXPECT_EQ(correction.at("vertical_mm"), -9.0);
+  EXPECT_EQ(correction.at("longitudinal_mm"), 2.0);
+  EXPECT_EQ(correction.at("lateral_mm"), 3.0);
+  EXPECT_EQ(correction.at("pitch_deg"), 0.1);
+  EXPECT_EQ(correction.at("roll_deg"), 0.2);
+  EXPECT_EQ(correction.at("yaw_deg"), 0.3);
+  EXPECT_EQ(correction.at("uncertainty").at("lateral_mm"), 0.7);
+  EXPECT_EQ(json.at("region").at("coverage"), 0.97);
+  EXPECT_EQ(json.at("region").at("largest_hole_m"), 0.012);
+  EXPECT_EQ(json.at("timings_s").at("alignment"), 0.25);
+}
+
+TEST(ResultFolderTest, AbsentResultsAreNull) {
+  Comparison comparison;
+  comparison.reasons = {"scan needs at least 3 markers shared with the reference, found 1"};
+  auto json = nlohmann::json::parse(ResultJson(comparison));
+  EXPECT_EQ(json.at("verdict"), "no_answer");
+  for (const char* key : {"alignment", "motion", "correction", "region"}) EXPECT_TRUE(json.at(key).is_null()) << key;
+
+  comparison = Answer();
+  comparison.correction->value.vertical_mm.reset();  // refused for couch-fixed markers
+  EXPECT_TRUE(nlohmann::json::parse(ResultJson(comparison)).at("correction").at("vertical_mm").is_null());
+}
+
+TEST(ResultFolderTest, WritesMapsAndPictures) {
+  const TempFolder folder;
+  const HeightMap reference = Slope(0.1);
+  WriteResult(Answer(), DrawResult(Answer(), &reference), folder / "result");
+  EXPECT_THAT(Names(folder / "result"), ElementsAre("deviation.tiff", "distance.tiff", "error_map.png", "overlay.png", "result.json"));
+  const cv::Mat deviation = ReadFloatTiff(folder / "result/deviation.tiff");
+  ASSERT_EQ(deviation.size(), cv::Size(120, 80));
+  EXPECT_EQ(deviation.at<float>(0, 7), Slope(0.009).z[7]);  // row 0 is y_min
+  EXPECT_TRUE(std::isnan(deviation.at<float>(0, 5)));
+  EXPECT_FALSE(ReadColorImage(folder / "result/error_map.png").empty());
+  EXPECT_EQ(ReadResultJson(folder / "result"), ResultJson(Answer()));
+}
+
+TEST(ResultFolderTest, SameResultSameBytes) {
+  const TempFolder folder;
+  const HeightMap reference = Slope(0.1);
+  for (const char* name : {"a", "b"}) WriteResult(Answer(), DrawResult(Answer(), &reference), folder / name);
+  for (const std::string& name : Names(folder / "a")) {
+    EXPECT_EQ(ReadWholeFile(folder / "a" / name, 1 << 24), ReadWholeFile(folder / "b" / name, 1 << 24)) << name;
+  }
+}
+
+TEST(ResultFolderTest, NoAnswerIsWrittenWithoutMaps) {
+  const TempFolder folder;
+  const HeightMap reference = Slope(0.1);
+  WriteResult(Comparison{}, DrawResult(Comparison{}, &reference), folder / "result");
+  EXPECT_THAT(Names(folder / "result"), ElementsAre("result.json"));
+  WriteResult(Answer(), DrawResult(Answer(), nullptr), folder / "result");  // replaces it
+  EXPECT_FALSE(fs::exists(folder / "result/overlay.png"));
+}
+
+TEST(ResultFolderTest, AnotherFormatAndDamageAreNamed) {
+  const TempFolder folder;
+  WriteWholeFile(folder / "result.json", std::string_view("{\"format\": 2}"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadResultJson(folder.path()); }), AllOf(HasSubstr("format 2"), HasSubstr("update")));
+  WriteWholeFile(folder / "result.json", std::string_view("{\"format\": 1"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadResultJson(folder.path()); }), HasSubstr("no result of plumb compare"));
+}
+
+}  // namespace
+}  // namespace plumb
