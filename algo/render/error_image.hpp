@@ -19,7 +19,7 @@ struct ErrorImageOptions {
   std::string title = "Height error: current \u2212 reference";
   std::string subtitle;
   const HeightMap* relief = nullptr;          ///< Heights on the same grid, whose shape shades the colours a little.
-  std::span<const std::uint8_t> region_mask;  ///< Cells inside the region (1), as the grid; outlined, the rest paler; or empty.
+  std::span<const std::uint8_t> region_mask = {};  ///< Cells inside the region (1), as the grid; outlined, the rest paler; or empty.
 };
 
 /// Draws a map of differences (metres) with y up, holes grey, axes, scale bar, legend with units, and the research notice.

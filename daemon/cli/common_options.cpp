@@ -35,6 +35,12 @@ std::unique_ptr<TumRecording> OpenRecording(const std::filesystem::path& path, c
   return TumRecording::Open(path, defaults);
 }
 
+void EnsureFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw IoError(fmt::format("cannot make the folder '{}': {}", folder.string(), error.message()));
+}
+
 void Show(Progress& progress, const std::string& prefix, const ScanProgress& scan) {
   std::string detail;
   if (scan.tracking != nullptr) {

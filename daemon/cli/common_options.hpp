@@ -34,6 +34,10 @@ struct MethodOptions {
 /// @throws DataError if it is none.
 [[nodiscard]] std::unique_ptr<TumRecording> OpenRecording(const std::filesystem::path& path, const MarkerConfig& markers);
 
+/// Makes a folder and its parents where they are missing.
+/// @throws IoError
+void EnsureFolder(const std::filesystem::path& folder);
+
 /// Shows a scan's progress; `prefix` goes before the step's name.
 void Show(Progress& progress, const std::string& prefix, const ScanProgress& scan);
 

@@ -220,7 +220,7 @@ Evaluation EvaluateSuite(const Suite& suite, const EvaluateOptions& options, con
     if (stop.stop_requested()) throw Interrupted("the evaluation was interrupted");
     if (progress) progress("comparing", static_cast<double>(evaluation.pairs.size()) / static_cast<double>(suite.pairs.size()));
     const Comparison comparison = Compare(kept.at(reference).scene, kept.at(current).scene, options.compare);
-    if (options.store) options.store(reference, current, comparison);
+    if (options.store) options.store(reference, current, kept.at(reference).scene, comparison);
     evaluation.pairs.push_back(MeasurePair(reference, current, kept.at(reference), kept.at(current), comparison, options.min_frames_seen));
   }
   return evaluation;

@@ -74,9 +74,9 @@ struct EvaluateOptions {
   CompareOptions compare;
   double min_frames_seen = 3;  ///< A part of the body counts as visible if at least this many frames measured it.
   /// Makes (or finds) the scene of a name; required.
-  std::function<Scene(const std::string& name)> get_scene;
+  std::function<Scene(const std::string& name)> get_scene = {};
   /// If set, called with every comparison, for storing.
-  std::function<void(const std::string& reference, const std::string& current, const Comparison&)> store;
+  std::function<void(const std::string& reference, const std::string& current, const Scene& reference_scene, const Comparison&)> store = {};
 };
 
 /// Reconstructs every scene, compares every pair, and measures both against the truth.

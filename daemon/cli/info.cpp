@@ -1,0 +1,101 @@
+#include <memory>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "algo/types/errors.hpp"
+#include "daemon/cli/commands.hpp"
+#include "daemon/cli/common_options.hpp"
+#include "daemon/files/scene_folder.hpp"
+#include "daemon/files/scene_json.hpp"
+#include "drivers/replay/file_io.hpp"
+#include "drivers/replay/tum_index.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr std::size_t kMaxJsonBytes = std::size_t{64} << 20;
+
+struct Options {
+  fs::path path;
+  bool json = false;
+};
+
+ordered_json RecordingFacts(const fs::path& folder) {
+  const std::unique_ptr<TumRecording> recording = OpenRecording(folder, {});
+  const StreamInfo& info = recording->info();
+  const std::vector<IndexEntry> depth = ParseIndex(ReadTextFile(folder / "depth.txt", kMaxJsonBytes), (folder / "depth.txt").string());
+  const double duration_s = depth.size() > 1 ? depth.back().time_s - depth.front().time_s : 0.0;
+  const Intrinsics& camera = info.intrinsics;
+  ordered_json facts = {{"kind", "recording"},
+                        {"frames", info.num_frames.value_or(0)},
+                        {"duration_s", duration_s},
+                        {"rate_hz", duration_s > 0 ? static_cast<double>(depth.size() - 1) / duration_s : 0.0},
+                        {"image_width", camera.width},
+                        {"image_height", camera.height},
+                        {"focal_px", {camera.fx, camera.fy}},
+                        {"centre_px", {camera.cx, camera.cy}},
+                        {"distortion", camera.distortion},
+                        {"calibration", info.intrinsics_assumed ? "assumed" : "from camera.yaml"},
+                        {"marker_dictionary", info.marker_dictionary},
+                        {"marker_length_m", info.marker_length_m},
+                        {"reference_marker", nullptr},
+                        {"warnings", info.warnings}};
+  if (info.reference_marker) facts["reference_marker"] = *info.reference_marker;
+  return facts;
+}
+
+/// One line a fact; nested values as short JSON.
+std::string Lines(const ordered_json& facts) {
+  std::string text;
+  for (const auto& [key, value] : facts.items()) {
+    if (value.is_object()) {
+      text += fmt::format("{}\n", key);
+      for (const auto& [inner, v] : value.items())
+        text += fmt::format("  {:<32} {}\n", inner, v.is_string() ? v.get<std::string>() : v.dump());
+    } else if (value.is_array() && !value.empty() && value.front().is_string()) {
+      text += fmt::format("{}\n", key);
+      for (const auto& v : value) text += fmt::format("  {}\n", v.get<std::string>());
+    } else {
+      text += fmt::format("{:<34} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+    }
+  }
+  return text;
+}
+
+int Run(const Options& options) {
+  ordered_json facts;
+  if (IsSceneFolder(options.path)) {
+    facts = {{"kind", "scene"}};
+    facts.update(ordered_json::parse(SceneJson(ReadScene(options.path, {.cloud = false, .height_map = false, .mesh = false}))));
+  } else if (fs::is_regular_file(options.path / "result.json")) {
+    facts = {{"kind", "result"}};
+    try {
+      facts.update(ordered_json::parse(ReadTextFile(options.path / "result.json", kMaxJsonBytes)));
+    } catch (const nlohmann::json::exception& error) {
+      throw DataError(fmt::format("'{}' is not valid JSON: {}", (options.path / "result.json").string(), error.what()));
+    }
+  } else if (IsTumRecording(options.path)) {
+    facts = RecordingFacts(options.path);
+  } else {
+    throw DataError(fmt::format("'{}' is no recording (rgb.txt, depth.txt), no scene (scene.json) and no result (result.json){}",
+                                options.path.string(), fs::exists(options.path) ? "" : "; it does not exist"));
+  }
+  PrintOut(options.json ? facts.dump(2) + "\n" : Lines(facts));
+  return kDone;
+}
+
+}  // namespace
+
+Command AddInfo(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("path", options->path, "Folder of a recording, a scene or a result")->required()->type_name("RECORDING|SCENE|RESULT");
+  app.add_flag("--json", options->json, "Print JSON on the standard output");
+  return [options](const CommandContext&) { return Run(*options); };
+}
+
+}  // namespace plumb
