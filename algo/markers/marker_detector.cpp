@@ -1,26 +1,19 @@
 #include "algo/markers/marker_detector.hpp"
 
 #include <algorithm>
-#include <opencv2/aruco.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include <fmt/format.h>
 
+#include "algo/markers/corner_refinement.hpp"
+#include "algo/markers/marker_decoder.hpp"
+#include "algo/markers/quad_finder.hpp"
+
 namespace plumb {
 namespace {
 
-cv::Ptr<cv::aruco::Dictionary> ToOpenCv(const MarkerDictionary& dictionary) {
-  const int bits = dictionary.bits_per_side();
-  cv::Mat all_bytes;
-  for (int id = 0; id < dictionary.size(); ++id) {
-    cv::Mat pattern(bits, bits, CV_8UC1);
-    for (int row = 0; row < bits; ++row)
-      for (int column = 0; column < bits; ++column) pattern.at<std::uint8_t>(row, column) = dictionary.Bit(id, row, column) ? 1 : 0;
-    all_bytes.push_back(cv::aruco::Dictionary::getByteListFromBits(pattern));
-  }
-  return cv::makePtr<cv::aruco::Dictionary>(all_bytes, bits, dictionary.max_correction_bits());
-}
+constexpr double kUnrefinedSigma_px = 0.7;  // an outline's corner on a blurred image
 
 cv::Mat ToGray(const cv::Mat& image) {
   if (image.empty())
@@ -38,6 +31,21 @@ double MeanSide(const ImageCorners& corners) {
   double sum = 0;
   for (std::size_t i = 0; i < 4; ++i) sum += (corners[(i + 1) % 4] - corners[i]).norm();
   return sum / 4;
+}
+
+/// Adds a marker unless the same square is there already (an outline and its inner rim may both decode): the one with fewer
+/// wrong bits, then the larger one, stays.
+void AddDistinct(const DecodedMarker& marker, std::vector<DecodedMarker>& markers) {
+  for (DecodedMarker& other : markers) {
+    if (other.id != marker.id) continue;
+    const double side = MeanSide(other.corners);
+    double largest = 0;
+    for (std::size_t k = 0; k < 4; ++k) largest = std::max(largest, (other.corners[k] - marker.corners[k]).norm());
+    if (largest > 0.3 * side) continue;
+    if (std::pair(marker.wrong_bits, -MeanSide(marker.corners)) < std::pair(other.wrong_bits, -side)) other = marker;
+    return;
+  }
+  markers.push_back(marker);
 }
 
 /// Sorts by id and takes out ids that occur more than once.
@@ -61,17 +69,30 @@ MarkerDetection WithoutDuplicates(std::vector<MarkerObservation> found) {
 
 struct MarkerDetector::Impl {
   MarkerDetectorOptions options;
-  cv::Ptr<cv::aruco::Dictionary> dictionary;
-  cv::Ptr<cv::aruco::DetectorParameters> parameters;
+  MarkerDictionary dictionary;
+  MarkerDecoder decoder;
+
+  [[nodiscard]] MarkerObservation Refined(const cv::Mat& gray, const DecodedMarker& marker) const {
+    MarkerObservation observation;
+    observation.id = marker.id;
+    observation.corners = marker.corners;
+    observation.sigma_px.fill(kUnrefinedSigma_px);
+    if (!options.refine_corners) return observation;
+    const MarkerPattern pattern{dictionary.Code(marker.id), dictionary.bits_per_side()};
+    if (const auto refined = RefineCorners(gray, marker.corners, pattern, {options.linear_light, options.intrinsics})) {
+      observation.corners = refined->corners;
+      observation.sigma_px = refined->sigma_px;
+    }
+    return observation;
+  }
 };
 
-MarkerDetector::MarkerDetector(const MarkerDictionary& dictionary, const MarkerDetectorOptions& options) : impl_(std::make_unique<Impl>()) {
+MarkerDetector::MarkerDetector(const MarkerDictionary& dictionary, const MarkerDetectorOptions& options) {
   if (!(options.min_side_px >= 8)) throw std::invalid_argument(fmt::format("min_side_px must be at least 8, got {}", options.min_side_px));
   if (!(options.border_px >= 0)) throw std::invalid_argument(fmt::format("border_px must not be negative, got {}", options.border_px));
-  impl_->options = options;
-  impl_->dictionary = ToOpenCv(dictionary);
-  impl_->parameters = cv::aruco::DetectorParameters::create();
-  if (options.refine_corners) impl_->parameters->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+  // Not the whole of the dictionary's distance: fewer wrong bits, fewer false markers.
+  const int max_wrong_bits = static_cast<int>(0.6 * dictionary.max_correction_bits());
+  impl_.reset(new Impl{options, dictionary, MarkerDecoder(dictionary, max_wrong_bits)});
 }
 
 MarkerDetector::~MarkerDetector() = default;
@@ -80,17 +101,13 @@ MarkerDetector& MarkerDetector::operator=(MarkerDetector&&) noexcept = default;
 
 MarkerDetection MarkerDetector::Detect(const cv::Mat& gray_or_rgb) const {
   const cv::Mat gray = ToGray(gray_or_rgb);
-  std::vector<std::vector<cv::Point2f>> quads;
-  std::vector<int> ids;
-  cv::aruco::detectMarkers(gray, impl_->dictionary, quads, ids, impl_->parameters);
-
-  std::vector<MarkerObservation> found;
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    MarkerObservation marker;
-    marker.id = ids[i];
-    for (std::size_t k = 0; k < 4; ++k) marker.corners[k] = Eigen::Vector2d(quads[i][k].x, quads[i][k].y);
-    if (MeanSide(marker.corners) >= impl_->options.min_side_px) found.push_back(marker);
+  const MarkerDetectorOptions& options = impl_->options;
+  std::vector<DecodedMarker> decoded;
+  for (const ImageCorners& quad : FindDarkQuads(gray, {.min_side_px = options.min_side_px, .border_px = options.border_px})) {
+    if (const std::optional<DecodedMarker> marker = impl_->decoder.Decode(gray, quad)) AddDistinct(*marker, decoded);
   }
+  std::vector<MarkerObservation> found;
+  for (const DecodedMarker& marker : decoded) found.push_back(impl_->Refined(gray, marker));
   return WithoutDuplicates(std::move(found));
 }
 
