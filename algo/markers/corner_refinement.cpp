@@ -16,13 +16,14 @@
 namespace plumb {
 namespace {
 
-constexpr int kOuterRounds = 4;          // geometry (homography, pixel set) is renewed in each
-constexpr int kInnerRounds = 2;          // Gauss-Newton steps on one pixel set
-constexpr double kConverged_px = 0.004;  // largest corner movement of a round that ends the search
-constexpr double kMinContrast = 0.02;    // of full scale
-constexpr int kSideSamples = 360;        // pixels used per side, about
-constexpr double kMinBlur_px = 0.35;     // a pixel's own area is 0.29 px wide (sigma)
-constexpr int kTablePerCell = 8;         // resolution of the blurred cell rows
+constexpr int kOuterRounds = 4;         // geometry (homography, pixel set) is renewed in each
+constexpr int kInnerRounds = 2;         // Gauss-Newton steps on one pixel set
+constexpr double kConverged_px = 0.03;  // largest corner movement of a round that ends the search
+constexpr double kMinContrast = 0.02;   // of full scale
+constexpr int kFirstSideSamples = 90;   // pixels used per side, about: in the first round
+constexpr int kSideSamples = 180;       // and later
+constexpr double kMinBlur_px = 0.35;    // a pixel's own area is 0.29 px wide (sigma)
+constexpr int kTablePerCell = 4;        // resolution of the blurred cell rows
 
 /// The normal distribution function and density by table: error below 1e-5, exact zero / one outside +-4.
 class NormalTable {
@@ -128,9 +129,11 @@ void FillDarkness(const MarkerPattern& pattern, int side, int row, double blur_c
   for (int i = 0; i <= cells; ++i) {
     const float change = dark[static_cast<std::size_t>(i + 1)] - dark[static_cast<std::size_t>(i)];
     if (change == 0.0F) continue;
-    for (std::size_t k = 0; k < table.size(); ++k) {
+    const auto reach = static_cast<int>(std::ceil(4 * blur_cells * kTablePerCell));
+    const int size = static_cast<int>(table.size());
+    for (int k = std::max(0, i * kTablePerCell - reach); k < size; ++k) {
       const double position = static_cast<double>(k) / kTablePerCell;
-      table[k] += change * Normal().At(static_cast<float>((position - i) / blur_cells)).first;
+      table[static_cast<std::size_t>(k)] += change * Normal().At(static_cast<float>((position - i) / blur_cells)).first;
     }
   }
 }
@@ -178,7 +181,7 @@ std::optional<Side> MakeSide(const ImageCorners& corners, int index, const Marke
 }
 
 /// The pixels of the image in a band along the side, as many as are useful. No interpolation: each is itself a measurement.
-void CollectSamples(const cv::Mat& gray, const ToneTable& tone, const Side& side, std::vector<Sample>& samples) {
+void CollectSamples(const cv::Mat& gray, const ToneTable& tone, const Side& side, int wanted, std::vector<Sample>& samples) {
   samples.clear();
   const double outside_px = std::clamp(0.75 * side.cell_px, 2.0, 8.0);
   const double inside_px = std::clamp(1.25 * side.cell_px, 2.5, 8.0);
@@ -193,7 +196,7 @@ void CollectSamples(const cv::Mat& gray, const ToneTable& tone, const Side& side
   const double last = side.origin[major] + (side.length_px - margin_px) * side.direction[major];
   const int begin = static_cast<int>(std::ceil(std::min(first, last)));
   const int end = static_cast<int>(std::floor(std::max(first, last)));
-  const int stride = std::max(1, static_cast<int>((end - begin + 1) * per_line / kSideSamples));
+  const int stride = std::max(1, static_cast<int>((end - begin + 1) * per_line / wanted));
   const int major_limit = by_column ? gray.cols : gray.rows;
   const int minor_limit = by_column ? gray.rows : gray.cols;
   const double sign = side.normal[minor] > 0 ? 1 : -1;
@@ -268,8 +271,7 @@ using Matrix7 = Eigen::Matrix<double, 7, 7>;
 /// One robust Gauss-Newton step on a side's samples. False if the system is singular.
 bool Step(const Side& side, const std::vector<Sample>& samples, SideFit& fit) {
   // In single precision and by hand: this loop is most of the cost of a frame.
-  std::array<float, 28> upper{};
-  std::array<float, 7> gradient{};
+  std::array<std::array<float, 8>, 8> sums{};  // J^T W J, the residual as the eighth column of J
   double weighted_square = 0, weights = 0;
   const auto inverse_blur = static_cast<float>(1.0 / fit.blur_px);
   const auto limit = static_cast<float>(0.12 * fit.step);
@@ -283,23 +285,20 @@ bool Step(const Side& side, const std::vector<Sample>& samples, SideFit& fit) {
     const float residual = sample.value - (white - step * model.darkness);
     const float weight = std::abs(residual) <= limit ? 1.0F : limit / std::abs(residual);
     const float by_line = step * model.by_depth;  // value grows when the line moves inward
-    const std::array<float, 7> jacobian = {by_line * (1 - along), by_line * along, -step * model.by_log_blur,    1.0F,
-                                           from_middle,           -model.darkness, -model.darkness * from_middle};
-    std::size_t index = 0;
+    const std::array<float, 8> jacobian = {by_line * (1 - along), by_line * along, -step * model.by_log_blur,     1.0F,
+                                           from_middle,           -model.darkness, -model.darkness * from_middle, residual};
     for (std::size_t i = 0; i < 7; ++i) {
       const float weighted = weight * jacobian[i];
-      gradient[i] += weighted * residual;
-      for (std::size_t j = i; j < 7; ++j) upper[index++] += weighted * jacobian[j];
+      for (std::size_t j = 0; j < 8; ++j) sums[i][j] += weighted * jacobian[j];
     }
     weighted_square += static_cast<double>(weight) * residual * residual;
     weights += weight;
   }
   Matrix7 normal;
   Vector7 right;
-  std::size_t index = 0;
   for (int i = 0; i < 7; ++i) {
-    right[i] = gradient[static_cast<std::size_t>(i)];
-    for (int j = i; j < 7; ++j) normal(i, j) = normal(j, i) = upper[index++];
+    for (int j = 0; j < 7; ++j) normal(i, j) = sums[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+    right[i] = sums[static_cast<std::size_t>(i)][7];
   }
   // A weak prior on blur and slopes keeps the system regular on faint or tiny sides.
   const double scale = fit.step * fit.step;
@@ -328,10 +327,11 @@ bool Step(const Side& side, const std::vector<Sample>& samples, SideFit& fit) {
   return fit.step > kMinContrast;
 }
 
-SideFit FitSide(const cv::Mat& gray, const ToneTable& tone, const Side& side, double start_blur_px, std::vector<Sample>& samples) {
+SideFit FitSide(const cv::Mat& gray, const ToneTable& tone, const Side& side, double start_blur_px, int wanted,
+                std::vector<Sample>& samples) {
   SideFit fit;
   fit.blur_px = start_blur_px;
-  CollectSamples(gray, tone, side, samples);
+  CollectSamples(gray, tone, side, wanted, samples);
   if (samples.size() < 24 || !StartLevels(side, samples, fit)) return fit;
   for (int round = 0; round < kInnerRounds; ++round)
     if (!Step(side, samples, fit)) return fit;
@@ -393,7 +393,7 @@ std::optional<CornerRefinement> RefineCorners(const cv::Mat& gray, const ImageCo
       std::optional<Side> side = MakeSide(result.corners, k, pattern, along, options.intrinsics);
       if (!side) return std::nullopt;
       sides[i] = *std::move(side);
-      fits[i] = FitSide(gray, tone, sides[i], blur_px[i], samples);
+      fits[i] = FitSide(gray, tone, sides[i], blur_px[i], round == 0 ? kFirstSideSamples : kSideSamples, samples);
       if (!fits[i].valid) return std::nullopt;
     }
     double moved = 0;

@@ -13,6 +13,8 @@ namespace {
 
 using Outline = std::vector<cv::Point>;
 
+constexpr double kOutlineToEdge_px = 0.5;
+
 Eigen::Vector2d ToVector(const cv::Point& p) { return {p.x, p.y}; }
 
 /// Indices of the four vertices of an outline in its own order, or nothing if it has another number.
@@ -55,20 +57,29 @@ std::optional<Line> FitSide(const Outline& outline, std::size_t from, std::size_
   return Line{normal, normal.dot(base + mean)};
 }
 
-std::optional<ImageCorners> FitQuad(const Outline& outline, std::array<std::size_t, 4> vertices) {
-  // Outline order may be either way round; corners are wanted clockwise as seen.
-  double area = 0;
+/// True for the outer outline of a dark region, false for the rim of a hole in one: OpenCV traces them in opposite directions.
+bool IsOuter(const Outline& outline, const std::array<std::size_t, 4>& vertices) {
+  double area = 0;  // positive: clockwise as seen
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector2d a = ToVector(outline[vertices[k]]);
     const Eigen::Vector2d b = ToVector(outline[vertices[(k + 1) % 4]]);
     area += a.x() * b.y() - b.x() * a.y();
   }
+  return area < 0;
+}
+
+/// Corners from lines along the four runs of the outline, clockwise as seen.
+std::optional<ImageCorners> FitQuad(const Outline& outline, std::array<std::size_t, 4> vertices) {
   // approxPolyDP keeps the outline's direction, so vertex k and k+1 bound one run of points.
+  const Eigen::Vector2d centre = 0.25 * (ToVector(outline[vertices[0]]) + ToVector(outline[vertices[1]]) + ToVector(outline[vertices[2]]) +
+                                         ToVector(outline[vertices[3]]));
   std::array<Line, 4> lines;
   for (std::size_t k = 0; k < 4; ++k) {
     const std::optional<Line> line = FitSide(outline, vertices[k], vertices[(k + 1) % 4]);
     if (!line) return std::nullopt;
-    lines[k] = *line;
+    // Outline pixels are the last dark ones: the edge runs half a pixel outside them.
+    const double outside = line->normal.dot(centre) < line->offset ? kOutlineToEdge_px : -kOutlineToEdge_px;
+    lines[k] = {line->normal, line->offset + outside};
   }
   ImageCorners corners;
   for (std::size_t k = 0; k < 4; ++k) {
@@ -83,7 +94,7 @@ std::optional<ImageCorners> FitQuad(const Outline& outline, std::array<std::size
       if ((meet - vertex).norm() < 6) corners[k] = meet;
     }
   }
-  if (area < 0) std::swap(corners[1], corners[3]);
+  std::swap(corners[1], corners[3]);  // the outline ran counter-clockwise
   return corners;
 }
 
@@ -120,7 +131,7 @@ std::vector<ImageCorners> FindDarkQuads(const cv::Mat& gray, const QuadFinderOpt
     const cv::Rect box = cv::boundingRect(outline);
     if (std::max(box.width, box.height) < 0.7 * options.min_side_px || points > 4.5 * (box.width + box.height)) continue;
     const std::optional<std::array<std::size_t, 4>> vertices = FourVertices(outline, std::max(1.5, 0.03 * points));
-    if (!vertices) continue;
+    if (!vertices || !IsOuter(outline, *vertices)) continue;
     const std::optional<ImageCorners> corners = FitQuad(outline, *vertices);
     if (corners && Plausible(*corners, gray.size(), options)) quads.push_back(*corners);
   }
