@@ -12,7 +12,7 @@ namespace plumb {
 /// Parameters of FindDarkQuads(); pixels.
 struct QuadFinderOptions {
   double min_side_px = 12.0;  ///< Shorter mean sides are left out.
-  double border_px = 2.0;     ///< Quadrilaterals with a corner nearer to the image border are left out.
+  double border_px = 1.0;     ///< Quadrilaterals with a corner nearer to the image border are left out.
   int window_px = 23;         ///< Side of the local mean that a pixel is compared with; odd, >= 3.
   int min_darkness = 7;       ///< A pixel is dark if it is so much below the local mean (grey levels).
 };
