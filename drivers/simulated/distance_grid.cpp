@@ -1,0 +1,250 @@
+#include "drivers/simulated/distance_grid.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <tbb/parallel_for.h>
+
+namespace plumb::simulated {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// Solution of the eikonal equation at one node from its smallest neighbours along x, y and z (Zhao 2005).
+float SolveEikonal(float a, float b, float c, float h) {
+  if (a > b) std::swap(a, b);
+  if (b > c) std::swap(b, c);
+  if (a > b) std::swap(a, b);
+  float u = a + h;
+  if (u <= b) return u;
+  u = 0.5F * (a + b + std::sqrt(2.0F * h * h - (a - b) * (a - b)));
+  if (u <= c) return u;
+  const float sum = a + b + c;
+  return (sum + std::sqrt(std::max(0.0F, sum * sum - 3.0F * (a * a + b * b + c * c - h * h)))) / 3.0F;
+}
+
+}  // namespace
+
+DistanceGrid::DistanceGrid(const std::function<double(const Eigen::Vector3d&)>& implicit, const Eigen::AlignedBox3d& box, double spacing)
+    : spacing_(static_cast<float>(spacing)), inverse_spacing_(static_cast<float>(1.0 / spacing)) {
+  if (!(spacing > 0) || box.isEmpty()) throw std::invalid_argument("distance grid needs a box that is not empty and a spacing > 0");
+  size_ = ((box.sizes() / spacing).array().ceil().cast<int>() + 1).matrix();
+  const Eigen::Vector3f low = box.min().cast<float>();
+  box_ = Eigen::AlignedBox3f(low, low + (size_.cast<float>() - Eigen::Vector3f::Ones()) * spacing_);
+  values_.resize(Index(0, 0, size_.z()));
+  tbb::parallel_for(0, size_.z(), [&](int z) {
+    for (int y = 0; y < size_.y(); ++y) {
+      for (int x = 0; x < size_.x(); ++x) {
+        const Eigen::Vector3d p = box.min() + Eigen::Vector3d(x, y, z) * spacing;
+        values_[Index(x, y, z)] = static_cast<float>(implicit(p));
+      }
+    }
+  });
+  PropagateDistances(NormaliseNearSurface());
+  BuildShades();
+}
+
+std::vector<char> DistanceGrid::NormaliseNearSurface() {
+  std::vector<char> fixed(values_.size(), 0);
+  std::vector<float> distances = values_;
+  tbb::parallel_for(1, size_.z() - 1, [&](int z) {
+    for (int y = 1; y + 1 < size_.y(); ++y) {
+      for (int x = 1; x + 1 < size_.x(); ++x) {
+        const float centre = values_[Index(x, y, z)];
+        const std::array<float, 6> around = {values_[Index(x - 1, y, z)], values_[Index(x + 1, y, z)], values_[Index(x, y - 1, z)],
+                                             values_[Index(x, y + 1, z)], values_[Index(x, y, z - 1)], values_[Index(x, y, z + 1)]};
+        if (std::none_of(around.begin(), around.end(), [&](float v) { return (v < 0) != (centre < 0); })) continue;
+        const Eigen::Vector3f gradient(around[1] - around[0], around[3] - around[2], around[5] - around[4]);
+        const float slope = std::max(0.2F, gradient.norm() * 0.5F * inverse_spacing_);
+        distances[Index(x, y, z)] = centre / slope;
+        fixed[Index(x, y, z)] = 1;
+      }
+    }
+  });
+  values_.swap(distances);
+  return fixed;
+}
+
+void DistanceGrid::PropagateDistances(const std::vector<char>& fixed) {
+  std::vector<float> far(values_.size());
+  for (std::size_t i = 0; i < far.size(); ++i) far[i] = fixed[i] != 0 ? std::abs(values_[i]) : 1e3F;
+  const auto at = [&](int x, int y, int z) {
+    const bool inside = x >= 0 && y >= 0 && z >= 0 && x < size_.x() && y < size_.y() && z < size_.z();
+    return inside ? far[Index(x, y, z)] : 1e3F;
+  };
+  // Fast sweeping: eight passes, one per diagonal direction.
+  for (int pass = 0; pass < 8; ++pass) {
+    for (int k = 0; k < size_.z(); ++k) {
+      const int z = (pass & 4) != 0 ? size_.z() - 1 - k : k;
+      for (int j = 0; j < size_.y(); ++j) {
+        const int y = (pass & 2) != 0 ? size_.y() - 1 - j : j;
+        for (int i = 0; i < size_.x(); ++i) {
+          const int x = (pass & 1) != 0 ? size_.x() - 1 - i : i;
+          const std::size_t index = Index(x, y, z);
+          if (fixed[index] != 0) continue;
+          const float u = SolveEikonal(std::min(at(x - 1, y, z), at(x + 1, y, z)), std::min(at(x, y - 1, z), at(x, y + 1, z)),
+                                       std::min(at(x, y, z - 1), at(x, y, z + 1)), spacing_);
+          far[index] = std::min(far[index], u);
+        }
+      }
+    }
+  }
+  for (std::size_t i = 0; i < far.size(); ++i) {
+    if (fixed[i] == 0) values_[i] = values_[i] < 0 ? -far[i] : far[i];
+  }
+}
+
+DistanceGrid::Place DistanceGrid::Locate(const Eigen::Vector3f& p) const {
+  const Eigen::Vector3f g = (p - box_.min()) * inverse_spacing_;
+  const float gx = std::clamp(g.x(), 0.0F, static_cast<float>(size_.x()) - 1.001F);
+  const float gy = std::clamp(g.y(), 0.0F, static_cast<float>(size_.y()) - 1.001F);
+  const float gz = std::clamp(g.z(), 0.0F, static_cast<float>(size_.z()) - 1.001F);
+  const int x = static_cast<int>(gx);
+  const int y = static_cast<int>(gy);
+  const int z = static_cast<int>(gz);
+  return {Index(x, y, z), gx - static_cast<float>(x), gy - static_cast<float>(y), gz - static_cast<float>(z)};
+}
+
+float DistanceGrid::Interpolate(const Eigen::Vector3f& p) const {
+  const Place at = Locate(p);
+  const float* v = &values_[at.index];
+  const std::size_t row = static_cast<std::size_t>(size_.x());
+  const std::size_t slice = row * static_cast<std::size_t>(size_.y());
+  const float v00 = v[0] + at.x * (v[1] - v[0]);
+  const float v10 = v[row] + at.x * (v[row + 1] - v[row]);
+  const float v01 = v[slice] + at.x * (v[slice + 1] - v[slice]);
+  const float v11 = v[slice + row] + at.x * (v[slice + row + 1] - v[slice + row]);
+  const float v0 = v00 + at.y * (v10 - v00);
+  const float v1 = v01 + at.y * (v11 - v01);
+  return v0 + at.z * (v1 - v0);
+}
+
+Eigen::Vector3f DistanceGrid::GradientAtNode(int x, int y, int z) const {
+  const auto slope = [&](int at, int size, const auto& value) {
+    const int low = std::max(0, at - 1);
+    const int high = std::min(size - 1, at + 1);
+    return (value(high) - value(low)) * inverse_spacing_ / static_cast<float>(high - low);
+  };
+  return {slope(x, size_.x(), [&](int i) { return values_[Index(i, y, z)]; }),
+          slope(y, size_.y(), [&](int i) { return values_[Index(x, i, z)]; }),
+          slope(z, size_.z(), [&](int i) { return values_[Index(x, y, i)]; })};
+}
+
+void DistanceGrid::BuildShades() {
+  // Nodes of the cells that the surface crosses, and one cell further.
+  const float near = 3.0F * spacing_;
+  shade_of_node_.assign(values_.size(), 0);
+  std::vector<Eigen::Vector3i> nodes;
+  for (int z = 0; z < size_.z(); ++z) {
+    for (int y = 0; y < size_.y(); ++y) {
+      for (int x = 0; x < size_.x(); ++x) {
+        if (std::abs(values_[Index(x, y, z)]) > near) continue;
+        nodes.emplace_back(x, y, z);
+        shade_of_node_[Index(x, y, z)] = static_cast<std::uint32_t>(nodes.size());
+      }
+    }
+  }
+  shades_.assign(nodes.size() + 1, Eigen::Vector4f(0, 0, 1, 1));
+  tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t i) {
+    const Eigen::Vector3i& node = nodes[i];
+    const Eigen::Vector3f gradient = GradientAtNode(node.x(), node.y(), node.z());
+    const Eigen::Vector3f normal = gradient / std::max(1e-6F, gradient.norm());
+    const Eigen::Vector3f p = box_.min() + node.cast<float>() * spacing_;
+    const Eigen::Vector3f surface = p - values_[Index(node.x(), node.y(), node.z())] * normal;
+    const float open_near = std::clamp(Distance(surface + 0.03F * normal) / 0.03F, 0.0F, 1.0F);
+    const float open_far = std::clamp(Distance(surface + 0.10F * normal) / 0.10F, 0.0F, 1.0F);
+    shades_[i + 1] << normal, 0.35F + 0.25F * open_near + 0.4F * open_far;
+  });
+}
+
+float DistanceGrid::Distance(const Eigen::Vector3f& p) const {
+  const Eigen::Vector3f inside = p.cwiseMax(box_.min()).cwiseMin(box_.max());
+  return Interpolate(inside) + (p - inside).norm();
+}
+
+Eigen::Vector4f DistanceGrid::Shade(const Eigen::Vector3f& p) const {
+  const Place at = Locate(p);
+  const std::size_t row = static_cast<std::size_t>(size_.x());
+  const std::size_t slice = row * static_cast<std::size_t>(size_.y());
+  const auto edge = [&](std::size_t index) -> Eigen::Vector4f {
+    const Eigen::Vector4f& a = shades_[shade_of_node_[index]];
+    const Eigen::Vector4f& b = shades_[shade_of_node_[index + 1]];
+    return a + at.x * (b - a);
+  };
+  const Eigen::Vector4f v00 = edge(at.index);
+  const Eigen::Vector4f v01 = edge(at.index + slice);
+  const Eigen::Vector4f v0 = v00 + at.y * (edge(at.index + row) - v00);
+  const Eigen::Vector4f v1 = v01 + at.y * (edge(at.index + slice + row) - v01);
+  Eigen::Vector4f shade = v0 + at.z * (v1 - v0);
+  shade.head<3>() /= std::max(1e-6F, shade.head<3>().norm());
+  return shade;
+}
+
+bool DistanceGrid::ClipToBox(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float& t_begin, float& t_end) const {
+  for (int axis = 0; axis < 3; ++axis) {
+    const float inverse = 1.0F / direction[axis];  // An infinity here takes the right branch below.
+    float near = (box_.min()[axis] - origin[axis]) * inverse;
+    float far = (box_.max()[axis] - origin[axis]) * inverse;
+    if (near > far) std::swap(near, far);
+    t_begin = std::max(t_begin, near);
+    t_end = std::min(t_end, far);
+  }
+  return t_begin < t_end;
+}
+
+float DistanceGrid::Intersect(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float t_begin, float t_end) const {
+  if (!ClipToBox(origin, direction, t_begin, t_end)) return kInfinity;
+  constexpr float kTolerance = 2e-5F;
+  constexpr int kMaxSteps = 200;
+  float t = t_begin;
+  float d = Interpolate(origin + t * direction);
+  for (int step = 0; step < kMaxSteps; ++step) {
+    if (d <= kTolerance) return t;
+    float advance = std::max(0.9F * d, kTolerance);  // Below 1: the interpolated distance may be a little too large.
+    if (t + advance >= t_end) return kInfinity;
+    float d_next = Interpolate(origin + (t + advance) * direction);
+    if (d_next > kTolerance) {
+      // Near the surface the distance falls linearly along the ray: try to step across it.
+      const float slope = (d - d_next) / advance;
+      t += advance;
+      d = d_next;
+      if (d > spacing_ || slope < 0.05F) continue;
+      advance = 1.2F * d / slope + kTolerance;
+      if (advance > spacing_ || t + advance >= t_end) continue;
+      d_next = Interpolate(origin + (t + advance) * direction);
+      if (d_next > 0) continue;
+    }
+    // The surface lies between t (outside) and t + advance (inside): two rounds of false position.
+    for (int round = 0; round < 2; ++round) {
+      const float split = advance * d / (d - std::min(d_next, 0.0F));
+      const float d_split = Interpolate(origin + (t + split) * direction);
+      if (d_split > 0) {
+        t += split;
+        advance -= split;
+        d = d_split;
+      } else {
+        advance = split;
+        d_next = d_split;
+      }
+    }
+    return t + advance * d / (d - std::min(d_next, 0.0F));
+  }
+  return kInfinity;
+}
+
+float DistanceGrid::ConeStart(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float spread, float margin,
+                              float t_end) const {
+  float t = 0;
+  for (int step = 0; step < 100; ++step) {
+    const float room = 0.9F * Distance(origin + t * direction) - spread * t - margin;
+    if (room <= 0.002F) return t;
+    t += room / (1.0F + spread);
+    if (t >= t_end) return kInfinity;
+  }
+  return t;
+}
+
+}  // namespace plumb::simulated

@@ -1,0 +1,123 @@
+// The simulated room: a supporting plane, markers on it, a body, light; and rays through it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "algo/types/marker.hpp"
+#include "algo/types/pose.hpp"
+#include "drivers/simulated/distance_grid.hpp"
+#include "drivers/simulated/texture.hpp"
+
+namespace plumb::simulated {
+
+inline constexpr const char* kDictionary = "DICT_6X6_250";
+inline constexpr double kMarkerLength = 0.104;  ///< Side of the black square, metres.
+inline constexpr double kBoardSide = 0.132;     ///< Side of the white board that it is printed on, metres.
+
+/// A marker of DICT_6X6_250 printed on a stiff white board; the board's body reaches down into the support.
+struct Board {
+  int id = 0;
+  Pose T_world_marker = Pose::Identity();  ///< Marker's frame: x right, y up on the print, z out of it.
+};
+
+/// The part of a world that all scenes of a suite share.
+struct Room {
+  std::vector<Board> boards;
+  std::shared_ptr<const Texture> support_texture;
+  std::shared_ptr<const Texture> skin_texture;
+  /// Couch top in the plane z = 0: everything outside is a floor far below. Without it z = 0 is the floor.
+  std::optional<Eigen::AlignedBox2f> couch;
+  float floor_below_couch_m = 0.75F;
+};
+
+/// What a ray met, as one number: two rays of different `material` have an edge between them.
+using Material = std::uint16_t;
+inline constexpr Material kNothing = 0;
+inline constexpr Material kSupport = 1;
+inline constexpr Material kLowerFloor = 2;
+inline constexpr Material kCouchSide = 3;
+inline constexpr Material kBody = 4;
+inline constexpr Material kFirstBoard = 8;  ///< Then four a board: white, black, side.
+
+/// The object that a material belongs to: all materials of one board are one object.
+[[nodiscard]] constexpr Material ObjectOf(Material material) {
+  return material < kFirstBoard ? material : static_cast<Material>(material & ~3U);
+}
+[[nodiscard]] constexpr int BoardOf(Material material) { return material < kFirstBoard ? -1 : (material - kFirstBoard) / 4; }
+[[nodiscard]] constexpr bool IsBoardTop(Material material) { return material >= kFirstBoard && (material & 3U) < 2; }
+
+struct Ray {
+  Eigen::Vector3f origin;     ///< World, metres.
+  Eigen::Vector3f direction;  ///< World, unit length.
+};
+
+struct Hit {
+  float t = std::numeric_limits<float>::infinity();  ///< Metres along the ray.
+  Material material = kNothing;
+};
+
+struct Shading {
+  Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  ///< World.
+  Eigen::Vector3f light = Eigen::Vector3f::Zero();    ///< Linear red, green, blue; about 1 on an open horizontal surface.
+};
+
+/// What rays of one small bundle may meet; found once a bundle, so that single rays stay cheap.
+struct Candidates {
+  float body_start = std::numeric_limits<float>::infinity();  ///< No ray of the bundle meets the body before.
+  std::array<std::uint8_t, 12> boards{};
+  int num_boards = 0;
+};
+
+/// Immutable after construction: any number of threads may read.
+class World {
+ public:
+  /// @param body  Distances of the body in its own frame.
+  World(const Room& room, std::shared_ptr<const DistanceGrid> body, const Pose& T_world_body);
+
+  /// @param spread  Radius of the bundle per metre, around `centre`.  @param margin  Radius of its origins, metres.
+  [[nodiscard]] Candidates FindCandidates(const Ray& centre, float spread, float margin) const;
+  [[nodiscard]] Hit Trace(const Ray& ray, const Candidates& candidates) const;
+
+  [[nodiscard]] Eigen::Vector3f Normal(Material material, const Eigen::Vector3f& p_world) const;
+  /// Normal and light at a place: both vary slowly over a surface.
+  [[nodiscard]] Shading ShadingAt(Material material, const Eigen::Vector3f& p_world) const;
+  /// Share of the light that the surface sends back, linear red, green, blue.
+  [[nodiscard]] Eigen::Vector3f Albedo(Material material, const Eigen::Vector3f& p_world, const Eigen::Vector3f& normal) const;
+
+  /// The board's plane, for rays that are known to meet its top and nothing else.
+  [[nodiscard]] Material TraceBoardTop(int index, const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
+
+  [[nodiscard]] const Pose& T_world_body() const { return T_world_body_; }
+  [[nodiscard]] const Room& room() const { return room_; }
+
+ private:
+  struct BoardSolid {
+    Eigen::Matrix3f R_board_world;
+    Eigen::Vector3f p_world;
+    std::array<std::uint8_t, 64> black;  ///< 8 x 8 cells, row 0 at the top of the print.
+  };
+  [[nodiscard]] static Material TopMaterial(const BoardSolid& solid, int index, float x, float y);
+  [[nodiscard]] Eigen::Vector3f SupportLight(const Eigen::Vector3f& p_world) const;
+  void TraceBoard(int index, const Ray& ray, Hit& hit) const;
+  void TraceSupport(const Ray& ray, Hit& hit) const;
+  [[nodiscard]] Eigen::Vector3f ToBody(const Eigen::Vector3f& p_world) const { return R_body_world_ * p_world + t_body_world_; }
+  void BakeSupportLight();
+
+  Room room_;
+  std::shared_ptr<const DistanceGrid> body_;
+  Pose T_world_body_;
+  Eigen::Matrix3f R_body_world_;
+  Eigen::Vector3f t_body_world_;
+  std::vector<BoardSolid> solids_;
+  std::vector<float> support_light_;  ///< Share of the light that reaches the support, on a square grid.
+};
+
+}  // namespace plumb::simulated
