@@ -1,0 +1,290 @@
+#include "drivers/simulated/color_camera.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include <tbb/parallel_for.h>
+
+#include "drivers/simulated/random.hpp"
+
+namespace plumb::simulated {
+namespace {
+
+using Eigen::Vector3f;
+
+constexpr int kNumPatterns = 32;
+constexpr int kInkSide = 6;               // 36 samples in a pixel on an edge of a marker's print,
+constexpr int kOutlineSide = 4;           // 16 on the outline of a body or board,
+constexpr int kSmoothSide = 2;            // 4 elsewhere.
+constexpr std::uint8_t kInkEdge = 1;      // Within reach two materials of one object meet,
+constexpr std::uint8_t kOutlineEdge = 2;  // or two objects.
+constexpr float kGain = 0.80F;            // Linear exposure: white boards stay below saturation.
+constexpr int kGammaLevels = 4096;
+
+// Share of light within the distance x of the centre's left, of a unit pixel seen through a Gaussian blur: by integration, once.
+class PixelKernel {
+ public:
+  explicit PixelKernel(double blur_px) {
+    const double reach = 0.5 + 4.0 * blur_px;
+    for (int i = 0; i <= kSteps; ++i) {
+      const double x = -reach + 2.0 * reach * i / kSteps;
+      places_.push_back(x);
+      const double density =
+          blur_px > 0
+              ? 0.5 * (std::erf((x + 0.5) / (blur_px * std::numbers::sqrt2)) - std::erf((x - 0.5) / (blur_px * std::numbers::sqrt2)))
+              : 1.0;
+      shares_.push_back(i == 0 ? 0.0 : shares_.back() + density);
+    }
+    for (double& share : shares_) share /= shares_.back();
+  }
+  /// Place below which the given share of the light falls.
+  [[nodiscard]] double Inverse(double share) const {
+    const auto above = std::upper_bound(shares_.begin() + 1, shares_.end() - 1, share);
+    const auto i = static_cast<std::size_t>(above - shares_.begin());
+    const double step = shares_[i] - shares_[i - 1];
+    return places_[i - 1] + (places_[i] - places_[i - 1]) * (step > 0 ? (share - shares_[i - 1]) / step : 0.5);
+  }
+
+ private:
+  static constexpr int kSteps = 2000;
+  std::vector<double> places_;
+  std::vector<double> shares_;
+};
+
+std::vector<int> Permutation(RandomStream& random, int size) {
+  std::vector<int> order(static_cast<std::size_t>(size));
+  std::iota(order.begin(), order.end(), 0);
+  for (int i = size - 1; i > 0; --i)
+    std::swap(order[static_cast<std::size_t>(i)], order[static_cast<std::size_t>(random.Uniform() * (i + 1))]);
+  return order;
+}
+
+float SrgbEncode(float linear) { return linear <= 0.0031308F ? 12.92F * linear : 1.055F * std::pow(linear, 1.0F / 2.4F) - 0.055F; }
+
+// Four almost normal numbers of unit variance in one go: sums of four bytes of a hash.
+float NearlyNormal(std::uint64_t hash) {
+  const auto sum = static_cast<float>((hash & 0xff) + ((hash >> 8) & 0xff) + ((hash >> 16) & 0xff) + ((hash >> 24) & 0xff));
+  return (sum - 510.0F) * (1.0F / 147.8F);
+}
+
+}  // namespace
+
+struct ColorCamera::Shot {
+  const World& world;
+  std::vector<MovingPose> rows;        // Pose of each row at its mid-exposure.
+  std::vector<Candidates> candidates;  // By tile.
+  cv::Mat material;                    // CV_16UC1, at each pixel's centre.
+  cv::Mat t;                           // CV_32FC1, metres along the ray.
+  cv::Mat edge;                        // CV_8UC1
+  std::uint64_t noise_seed;
+  int tiles_across;
+};
+
+ColorCamera::ColorCamera(const SensorUnit& unit) : unit_(unit), rays_(unit.color_true) {
+  BuildSamples();
+  for (int i = 0; i < kGammaLevels; ++i) {
+    gamma_.push_back(static_cast<std::uint8_t>(std::lround(255.0F * SrgbEncode(static_cast<float>(i) / (kGammaLevels - 1)))));
+  }
+}
+
+void ColorCamera::BuildSamples() {
+  const PixelKernel kernel(unit_.lens_blur_px);
+  RandomStream random(Hash(unit_.seed, 91));
+  const auto pattern = [&](int side) {
+    // Multi-jittered (Chiu, Shirley, Wang 1994): one sample a cell of the side x side grid, and one in each of the side^2 columns and rows.
+    const int count = side * side;
+    std::vector<Sample> samples;
+    std::vector<std::vector<int>> columns;
+    std::vector<std::vector<int>> rows;
+    for (int i = 0; i < side; ++i) {
+      columns.push_back(Permutation(random, side));
+      rows.push_back(Permutation(random, side));
+    }
+    const std::vector<int> times = Permutation(random, count);
+    for (int j = 0; j < side; ++j) {
+      for (int i = 0; i < side; ++i) {
+        const auto a = static_cast<std::size_t>(i);
+        const auto b = static_cast<std::size_t>(j);
+        const double u = (i + (columns[a][b] + 0.5) / side) / side;
+        const double v = (j + (rows[b][a] + 0.5) / side) / side;
+        const double time = (times[static_cast<std::size_t>(j * side + i)] + 0.5) / count - 0.5;
+        samples.push_back(
+            {static_cast<float>(kernel.Inverse(u)), static_cast<float>(kernel.Inverse(v)), static_cast<float>(unit_.exposure_s * time)});
+      }
+    }
+    return samples;
+  };
+  for (int i = 0; i < kNumPatterns; ++i) {
+    ink_samples_.push_back(pattern(kInkSide));
+    outline_samples_.push_back(pattern(kOutlineSide));
+    smooth_samples_.push_back(pattern(kSmoothSide));
+  }
+}
+
+void ColorCamera::Cast(Shot& shot, int tile_row) const {
+  const int y_end = std::min(rays_.height(), (tile_row + 1) * kTileSize);
+  const int y_mid = std::min(rays_.height() - 1, tile_row * kTileSize + kTileSize / 2);
+  // A tile's half diagonal, the lens's blur, and some room for the motion within the exposure.
+  const float spread = (0.75F * kTileSize + 4.0F * static_cast<float>(unit_.lens_blur_px) + 2.0F) / rays_.focal_px() +
+                       0.6F * static_cast<float>(unit_.exposure_s);
+  const float margin = 0.002F + 0.6F * static_cast<float>(unit_.exposure_s + unit_.readout_s * kTileSize / rays_.height());
+  for (int tile = 0; tile < shot.tiles_across; ++tile) {
+    const int x_mid = std::min(rays_.width() - 1, tile * kTileSize + kTileSize / 2);
+    const Ray centre = shot.rows[static_cast<std::size_t>(y_mid)].RayOf(rays_.At(x_mid, y_mid, -0.5F, -0.5F), 0.0F);
+    const Candidates candidates = shot.world.FindCandidates(centre, spread, margin);
+    shot.candidates[static_cast<std::size_t>(tile_row * shot.tiles_across + tile)] = candidates;
+    for (int y = tile_row * kTileSize; y < y_end; ++y) {
+      for (int x = tile * kTileSize; x < std::min(rays_.width(), (tile + 1) * kTileSize); ++x) {
+        const Hit hit = shot.world.Trace(shot.rows[static_cast<std::size_t>(y)].RayOf(rays_.At(x, y, 0, 0), 0.0F), candidates);
+        shot.material.at<std::uint16_t>(y, x) = hit.material;
+        shot.t.at<float>(y, x) = hit.t;
+      }
+    }
+  }
+}
+
+cv::Mat ColorCamera::EdgeMask(const Shot& shot) const {
+  // How far an edge can smear: pixel and lens, and the motion during the exposure.
+  const MovingPose& middle = shot.rows[shot.rows.size() / 2];
+  const float motion_px =
+      static_cast<float>(unit_.exposure_s) * rays_.focal_px() * (middle.angular_velocity.norm() + middle.velocity.norm() / 0.75F);
+  const int reach = std::clamp(static_cast<int>(std::ceil(0.5F + 2.0F * static_cast<float>(unit_.lens_blur_px) + 0.5F * motion_px)), 1, 8);
+  const int width = rays_.width();
+  const int height = rays_.height();
+  cv::Mat along_row(height, width, CV_8UC1);
+  cv::Mat mask(height, width, CV_8UC1);
+  tbb::parallel_for(0, height, [&](int y) {
+    const auto* material = shot.material.ptr<std::uint16_t>(y);
+    auto* out = along_row.ptr<std::uint8_t>(y);
+    std::fill(out, out + width, std::uint8_t{0});
+    for (int x = 0; x < width; ++x) {
+      const Material right = x + 1 < width ? material[x + 1] : material[x];
+      const Material below = y + 1 < height ? shot.material.at<std::uint16_t>(y + 1, x) : material[x];
+      if (material[x] == right && material[x] == below) continue;
+      const Material object = ObjectOf(material[x]);
+      const std::uint8_t kind = object == ObjectOf(right) && object == ObjectOf(below) ? kInkEdge : kOutlineEdge;
+      for (int i = std::max(0, x - reach); i < std::min(width, x + reach + 2); ++i) out[i] |= kind;
+    }
+  });
+  tbb::parallel_for(0, height, [&](int y) {
+    auto* out = mask.ptr<std::uint8_t>(y);
+    std::fill(out, out + width, std::uint8_t{0});
+    for (int other = std::max(0, y - reach - 1); other <= std::min(height - 1, y + reach); ++other) {
+      const auto* in = along_row.ptr<std::uint8_t>(other);
+      for (int x = 0; x < width; ++x) out[x] |= in[x];
+    }
+  });
+  return mask;
+}
+
+Vector3f ColorCamera::GatherInk(const Shot& shot, int x, int y) const {
+  const auto material = shot.material.at<std::uint16_t>(y, x);
+  const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
+  int black = 0;
+  const auto& samples = PatternOf(ink_samples_, x, y);
+  for (const Sample& sample : samples) {
+    const Eigen::Vector3f direction = pose.DirectionOf(rays_.At(x, y, sample.du, sample.dv), sample.dt);
+    black += shot.world.TraceBoardTop(BoardOf(material), pose.p_world + sample.dt * pose.velocity, direction) & 1;
+  }
+  const Vector3f p = PointAt(shot, x, y);
+  const float share = static_cast<float>(black) / static_cast<float>(samples.size());
+  const Material white = ObjectOf(material);
+  const Vector3f paper = shot.world.Albedo(white, p, Vector3f::UnitZ());
+  const Vector3f ink = shot.world.Albedo(static_cast<Material>(white + 1), p, Vector3f::UnitZ());
+  return shot.world.ShadingAt(material, p).light.cwiseProduct(paper + share * (ink - paper));
+}
+
+Vector3f ColorCamera::GatherOutline(const Shot& shot, int x, int y, const Candidates& candidates) const {
+  const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
+  Vector3f sum = Vector3f::Zero();
+  const auto& samples = PatternOf(outline_samples_, x, y);
+  for (const Sample& sample : samples) {
+    const Ray ray = pose.RayOf(rays_.At(x, y, sample.du, sample.dv), sample.dt);
+    const Hit hit = shot.world.Trace(ray, candidates);
+    const Vector3f p = ray.origin + hit.t * ray.direction;
+    const Shading shading = shot.world.ShadingAt(hit.material, p);
+    sum += shot.world.Albedo(hit.material, p, shading.normal).cwiseProduct(shading.light);
+  }
+  return sum / static_cast<float>(samples.size());
+}
+
+Vector3f ColorCamera::GatherSmooth(const Shot& shot, int x, int y) const {
+  const auto material = shot.material.at<std::uint16_t>(y, x);
+  const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
+  const Vector3f p = PointAt(shot, x, y);
+  const Shading shading = shot.world.ShadingAt(material, p);
+  if (material >= kFirstBoard) return shading.light.cwiseProduct(shot.world.Albedo(material, p, shading.normal));
+  // The surface is its tangent plane over one pixel.
+  const auto& samples = PatternOf(smooth_samples_, x, y);
+  Vector3f albedo = Vector3f::Zero();
+  for (const Sample& sample : samples) {
+    const Vector3f origin = pose.p_world + sample.dt * pose.velocity;
+    const Vector3f direction = pose.DirectionOf(rays_.At(x, y, sample.du, sample.dv), sample.dt);
+    const float t = shading.normal.dot(p - origin) / std::min(-0.05F, shading.normal.dot(direction));
+    albedo += shot.world.Albedo(material, origin + t * direction, shading.normal);
+  }
+  return shading.light.cwiseProduct(albedo) / static_cast<float>(samples.size());
+}
+
+Vector3f ColorCamera::PointAt(const Shot& shot, int x, int y) const {
+  const Ray ray = shot.rows[static_cast<std::size_t>(y)].RayOf(rays_.At(x, y, 0, 0), 0.0F);
+  return ray.origin + shot.t.at<float>(y, x) * ray.direction;
+}
+
+void ColorCamera::Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const {
+  const int width = rays_.width();
+  const int height = rays_.height();
+  const Intrinsics& camera = unit_.color_true;
+  const double corner_squared = 0.25 * (static_cast<double>(width) * width + static_cast<double>(height) * height);
+  const auto shot_noise = static_cast<float>(unit_.shot_noise);
+  const auto read_variance = static_cast<float>(unit_.read_noise * unit_.read_noise);
+  const bool noisy = unit_.shot_noise > 0 || unit_.read_noise > 0;
+  for (int y = tile_row * kTileSize; y < std::min(height, (tile_row + 1) * kTileSize); ++y) {
+    for (int x = 0; x < width; ++x) {
+      const Candidates& candidates = shot.candidates[static_cast<std::size_t>(tile_row * shot.tiles_across + x / kTileSize)];
+      const std::uint8_t edge = shot.edge.at<std::uint8_t>(y, x);
+      const bool only_ink = edge == kInkEdge && IsBoardTop(shot.material.at<std::uint16_t>(y, x));
+      Vector3f light = only_ink ? GatherInk(shot, x, y) : edge != 0 ? GatherOutline(shot, x, y, candidates) : GatherSmooth(shot, x, y);
+      const double r_squared = ((x - camera.cx) * (x - camera.cx) + (y - camera.cy) * (y - camera.cy)) / corner_squared;
+      light *= kGain * static_cast<float>(1.0 - unit_.vignetting * r_squared);
+      auto& pixel = rgb.at<cv::Vec3b>(y, x);
+      const std::uint64_t hash =
+          noisy ? Hash(shot.noise_seed, static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) + static_cast<std::uint64_t>(x))
+                : 0;
+      for (int channel = 0; channel < 3; ++channel) {
+        float value = light[channel];
+        if (noisy)
+          value += std::sqrt(shot_noise * value + read_variance) * NearlyNormal(channel == 2 ? Hash(hash) : hash >> (32 * channel));
+        pixel[channel] = gamma_[static_cast<std::size_t>(std::clamp(value, 0.0F, 1.0F) * (kGammaLevels - 1) + 0.5F)];
+      }
+    }
+  }
+}
+
+cv::Mat ColorCamera::Render(const World& world, const Trajectory& trajectory, double time_s, std::uint64_t noise_seed) const {
+  const int width = rays_.width();
+  const int height = rays_.height();
+  const int tile_rows = (height + kTileSize - 1) / kTileSize;
+  const int tiles_across = (width + kTileSize - 1) / kTileSize;
+  Shot shot{world,
+            std::vector<MovingPose>(static_cast<std::size_t>(height)),
+            std::vector<Candidates>(static_cast<std::size_t>(tile_rows * tiles_across)),
+            cv::Mat(height, width, CV_16UC1),
+            cv::Mat(height, width, CV_32FC1),
+            cv::Mat(),
+            noise_seed,
+            tiles_across};
+  tbb::parallel_for(0, height, [&](int y) {
+    const double row_time = time_s + unit_.readout_s * ((y + 0.5) / height - 0.5);
+    shot.rows[static_cast<std::size_t>(y)] = PoseAt(trajectory, row_time, Pose::Identity());
+  });
+  tbb::parallel_for(0, tile_rows, [&](int row) { Cast(shot, row); });
+  shot.edge = EdgeMask(shot);
+  cv::Mat rgb(height, width, CV_8UC3);
+  tbb::parallel_for(0, tile_rows, [&](int row) { Develop(shot, row, rgb); });
+  return rgb;
+}
+
+}  // namespace plumb::simulated

@@ -1,0 +1,50 @@
+// What the simulated colour camera records.
+#pragma once
+
+#include <cstdint>
+
+#include <opencv2/core/mat.hpp>
+
+#include "drivers/simulated/random.hpp"
+#include "drivers/simulated/ray_caster.hpp"
+#include "drivers/simulated/sensor_unit.hpp"
+
+namespace plumb::simulated {
+
+/// Renders colour images: light is gathered linearly over each pixel's area, the lens's blur and the exposure; then vignetting, noise,
+/// gamma. Pixels on an edge of a marker's print take 36 samples, stratified so that a straight edge's coverage is true to about 1 %; others
+/// fewer. Immutable: any number of threads may render; parallel inside, the result does not depend on the number of threads.
+class ColorCamera {
+ public:
+  explicit ColorCamera(const SensorUnit& unit);
+  /// @param time_s  Mid-exposure of the middle row, trajectory time.  @param noise_seed  Of this image.
+  /// @return CV_8UC3, red, green, blue.
+  [[nodiscard]] cv::Mat Render(const World& world, const Trajectory& trajectory, double time_s, std::uint64_t noise_seed) const;
+
+ private:
+  struct Sample {
+    float du, dv, dt;  ///< Pixels from the centre; seconds from mid-exposure.
+  };
+  struct Shot;  ///< One image in the making.
+  void BuildSamples();
+  void Cast(Shot& shot, int tile_row) const;
+  [[nodiscard]] cv::Mat EdgeMask(const Shot& shot) const;
+  void Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const;
+  using Patterns = std::vector<std::vector<Sample>>;
+  [[nodiscard]] static const std::vector<Sample>& PatternOf(const Patterns& patterns, int x, int y) {
+    return patterns[Hash(static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y)) % patterns.size()];
+  }
+  [[nodiscard]] Eigen::Vector3f PointAt(const Shot& shot, int x, int y) const;
+  [[nodiscard]] Eigen::Vector3f GatherInk(const Shot& shot, int x, int y) const;
+  [[nodiscard]] Eigen::Vector3f GatherOutline(const Shot& shot, int x, int y, const Candidates& candidates) const;
+  [[nodiscard]] Eigen::Vector3f GatherSmooth(const Shot& shot, int x, int y) const;
+
+  SensorUnit unit_;
+  PixelRays rays_;
+  Patterns ink_samples_;  ///< Several patterns of each kind, chosen by pixel.
+  Patterns outline_samples_;
+  Patterns smooth_samples_;
+  std::vector<std::uint8_t> gamma_;  ///< 8-bit code of a linear value in 1/4095.
+};
+
+}  // namespace plumb::simulated

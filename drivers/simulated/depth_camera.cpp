@@ -1,0 +1,198 @@
+#include "drivers/simulated/depth_camera.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+#include "algo/types/units.hpp"
+#include "drivers/simulated/noise_field.hpp"
+#include "drivers/simulated/ps1080.hpp"
+#include "drivers/simulated/random.hpp"
+
+namespace plumb::simulated {
+namespace {
+
+using Eigen::Vector3f;
+
+constexpr double kJitterFilterPx = 1.5;                              // Of a 640-pixel image: the jitter of neighbours agrees a little.
+constexpr float kEdgeStep = 0.02F;                                   // Neighbours further apart in depth than this are an edge, metres.
+constexpr float kFlyingShare = 0.15F;                                // Edge pixels that get a depth in between.
+constexpr float kEdgeLossShare = 0.45F;                              // Edge pixels without depth.
+constexpr float kGrazingBegin = static_cast<float>(74.0 * kDegree);  // Losses begin here,
+constexpr float kGrazingEnd = static_cast<float>(82.0 * kDegree);    // and are complete here.
+
+}  // namespace
+
+struct DepthCamera::Layers {
+  std::vector<float> jitter_x, jitter_y, axial;  // Unit variance; empty when the effect is off.
+};
+
+DepthCamera::DepthCamera(const SensorUnit& unit) : unit_(unit), rays_(unit.depth_true) {
+  const Intrinsics& camera = unit_.depth_assumed;
+  const Eigen::Matrix3d R_color_depth = unit_.T_color_depth_assumed.linear();
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const Eigen::Vector2d ideal = Undistort(camera, {x, y});
+      assumed_rays_.push_back((R_color_depth * Eigen::Vector3d(ideal.x(), ideal.y(), 1.0)).cast<float>());
+    }
+  }
+}
+
+void DepthCamera::Cast(const World& world, const MovingPose& pose, int tile_row, const Layers& layers, cv::Mat& true_m,
+                       cv::Mat& incidence) const {
+  const int width = rays_.width();
+  const int y_end = std::min(rays_.height(), (tile_row + 1) * kTileSize);
+  const int y_mid = std::min(rays_.height() - 1, tile_row * kTileSize + kTileSize / 2);
+  const float spread = (0.75F * kTileSize + 6.0F * static_cast<float>(unit_.lateral_noise) + 1.0F) / rays_.focal_px();
+  const Vector3f forward = pose.R_world_camera.col(2);
+  for (int x_begin = 0; x_begin < width; x_begin += kTileSize) {
+    const Ray centre = pose.RayOf(rays_.At(std::min(width - 1, x_begin + kTileSize / 2), y_mid, -0.5F, -0.5F), 0.0F);
+    const Candidates candidates = world.FindCandidates(centre, spread, 0.002F);
+    float sigma_px = 0;
+    if (!layers.jitter_x.empty()) {
+      const Hit hit = world.Trace(centre, candidates);
+      const Vector3f normal = world.Normal(hit.material, centre.origin + hit.t * centre.direction);
+      const double angle = std::acos(std::clamp(-normal.dot(centre.direction), 0.0F, 1.0F));
+      sigma_px = static_cast<float>(unit_.lateral_noise * NguyenLateralSigma(angle));
+    }
+    for (int y = tile_row * kTileSize; y < y_end; ++y) {
+      for (int x = x_begin; x < std::min(width, x_begin + kTileSize); ++x) {
+        float du = 0;
+        float dv = 0;
+        if (sigma_px > 0) {
+          const std::size_t index = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+          du = std::clamp(sigma_px * layers.jitter_x[index], -4.0F, 4.0F);
+          dv = std::clamp(sigma_px * layers.jitter_y[index], -4.0F, 4.0F);
+        }
+        const Ray ray = pose.RayOf(rays_.At(x, y, du, dv), 0.0F);
+        const Hit hit = world.Trace(ray, candidates);
+        const bool met = hit.material != kNothing;
+        true_m.at<float>(y, x) = met ? hit.t * ray.direction.dot(forward) : 0.0F;
+        if (incidence.empty()) continue;
+        const Vector3f normal = world.Normal(hit.material, ray.origin + hit.t * ray.direction);
+        incidence.at<float>(y, x) = met ? std::acos(std::clamp(-normal.dot(ray.direction), 0.0F, 1.0F)) : 0.0F;
+      }
+    }
+  }
+}
+
+void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m, const cv::Mat& incidence, std::uint64_t noise_seed,
+                          cv::Mat& measured_m) const {
+  const int width = rays_.width();
+  const int height = rays_.height();
+  const double corner_squared = 0.25 * (static_cast<double>(width) * width + static_cast<double>(height) * height);
+  const auto* truth = true_m.ptr<float>(y);
+  const auto* above = true_m.ptr<float>(std::max(0, y - 1));
+  const auto* below = true_m.ptr<float>(std::min(height - 1, y + 1));
+  auto* out = measured_m.ptr<float>(y);
+  for (int x = 0; x < width; ++x) {
+    double z = truth[x];
+    out[x] = 0;
+    if (!(z > 0)) continue;
+    const std::size_t index = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+    if (unit_.dropout > 0) {
+      const std::uint64_t hash = Hash(noise_seed, index, 5);
+      const auto chance = static_cast<float>(UnitUniform(hash));
+      const float theta = incidence.at<float>(y, x);
+      const float grazing = std::clamp((theta - kGrazingBegin) / (kGrazingEnd - kGrazingBegin), 0.0F, 1.0F);
+      const auto lost = static_cast<float>(unit_.dropout) + grazing;
+      if (chance < lost) continue;
+      const float left = truth[std::max(0, x - 1)];
+      const float right = truth[std::min(width - 1, x + 1)];
+      const float lowest = std::min({left, right, above[x], below[x], truth[x]});
+      const float highest = std::max({left, right, above[x], below[x], truth[x]});
+      if (highest - lowest > kEdgeStep + 0.02F * lowest * std::tan(std::min(theta, 1.3F))) {
+        const auto edge_chance = static_cast<float>(UnitUniform(Hash(hash)));
+        if (edge_chance < kEdgeLossShare) continue;
+        if (edge_chance < kEdgeLossShare + kFlyingShare) z = lowest + UnitUniform(Hash(hash, 1)) * (highest - lowest);
+      }
+    }
+    const double u = x - (width - 1) / 2.0;
+    const double v = y - (height - 1) / 2.0;
+    const double true_z = z;
+    z = true_z * (1.0 + unit_.depth_scale_error) + unit_.depth_offset_m +
+        true_z * true_z *
+            (unit_.depth_bow_per_m * ((u * u + v * v) / corner_squared - 0.5) +
+             (unit_.depth_tilt_per_m[0] * u + unit_.depth_tilt_per_m[1] * v) / std::sqrt(corner_squared));
+    if (!layers.axial.empty()) {
+      const double step = unit_.quantised ? z * z * 2.894e-3 : 0.0;  // The PS1080's step: 9000 / z_mm in units of 0.1042 / 4.
+      const double sigma = unit_.axial_noise * NguyenAxialSigma(true_z, incidence.at<float>(y, x));
+      z += std::sqrt(std::max(0.0, sigma * sigma - step * step / 12.0)) * layers.axial[index];
+    }
+    if (!(z > unit_.min_range_m && z < unit_.max_range_m)) continue;
+    out[x] = static_cast<float>(unit_.quantised ? QuantisePs1080(z / kMillimetre) * kMillimetre : z);
+  }
+}
+
+void DepthCamera::CastShadow(int y, const cv::Mat& true_m, cv::Mat& measured_m) const {
+  // The projector looks from the right: a pixel is dark if something further right in the row is hit by a beam further left,
+  // so near edges throw shadows of b f (1/z_f - 1/z_b) pixels to their left.
+  const double baseline_px = unit_.projector_baseline_m * unit_.depth_true.fx;
+  const auto* truth = true_m.ptr<float>(y);
+  auto* out = measured_m.ptr<float>(y);
+  double leftmost_beam = std::numeric_limits<double>::infinity();
+  for (int x = rays_.width() - 1; x >= 0; --x) {
+    if (!(truth[x] > 0)) continue;
+    const double beam = x - baseline_px / truth[x];
+    if (beam > leftmost_beam + 0.75) out[x] = 0;
+    leftmost_beam = std::min(leftmost_beam, beam);
+  }
+}
+
+cv::Mat DepthCamera::Register(const cv::Mat& measured_m) const {
+  const Intrinsics& color = unit_.color_true;
+  const Vector3f offset = unit_.T_color_depth_assumed.translation().cast<float>();
+  const bool same_camera = unit_.level == NoiseLevel::kIdeal;
+  cv::Mat registered = cv::Mat::zeros(color.height, color.width, CV_16UC1);
+  for (int y = 0; y < measured_m.rows; ++y) {
+    const auto* in = measured_m.ptr<float>(y);
+    for (int x = 0; x < measured_m.cols; ++x) {
+      if (!(in[x] > 0)) continue;
+      const Vector3f p =
+          in[x] * assumed_rays_[static_cast<std::size_t>(y) * static_cast<std::size_t>(measured_m.cols) + static_cast<std::size_t>(x)] +
+          offset;
+      int u = x;
+      int v = y;
+      if (!same_camera) {
+        const Eigen::Vector2d pixel = Project(color, p.cast<double>());
+        u = static_cast<int>(std::floor(pixel.x() + 0.5));
+        v = static_cast<int>(std::floor(pixel.y() + 0.5));
+      }
+      if (u < 0 || v < 0 || u >= color.width || v >= color.height) continue;
+      const double units = std::round(p.z() * unit_.depth_units_per_metre);
+      if (units < 1 || units > 65535) continue;
+      auto& value = registered.at<std::uint16_t>(v, u);
+      if (value == 0 || units < value) value = static_cast<std::uint16_t>(units);
+    }
+  }
+  return registered;
+}
+
+DepthShot DepthCamera::Render(const World& world, const Trajectory& trajectory, double time_s, std::uint64_t noise_seed) const {
+  const int width = rays_.width();
+  const int height = rays_.height();
+  const MovingPose pose = PoseAt(trajectory, time_s, unit_.T_color_depth_true);
+  const double pixels = width / 640.0;
+  Layers layers;
+  if (unit_.lateral_noise > 0) {
+    layers.jitter_x = CorrelatedNoise(Hash(noise_seed, 1), width, height, kJitterFilterPx * pixels);
+    layers.jitter_y = CorrelatedNoise(Hash(noise_seed, 2), width, height, kJitterFilterPx * pixels);
+  }
+  if (unit_.axial_noise > 0) layers.axial = CorrelatedNoise(Hash(noise_seed, 3), width, height, FilterSigmaOfLag(unit_.correlation_px));
+
+  DepthShot shot;
+  shot.true_m = cv::Mat(height, width, CV_32FC1);
+  shot.measured_m = cv::Mat(height, width, CV_32FC1);
+  cv::Mat incidence;
+  if (unit_.axial_noise > 0 || unit_.dropout > 0) incidence = cv::Mat(height, width, CV_32FC1);
+  tbb::parallel_for(0, (height + kTileSize - 1) / kTileSize, [&](int row) { Cast(world, pose, row, layers, shot.true_m, incidence); });
+  tbb::parallel_for(0, height, [&](int y) {
+    Measure(y, layers, shot.true_m, incidence, noise_seed, shot.measured_m);
+    if (unit_.projector_baseline_m > 0) CastShadow(y, shot.true_m, shot.measured_m);
+  });
+  shot.registered = Register(shot.measured_m);
+  return shot;
+}
+
+}  // namespace plumb::simulated

@@ -1,0 +1,41 @@
+// What the simulated depth camera records, registered to the colour camera.
+#pragma once
+
+#include <cstdint>
+
+#include <opencv2/core/mat.hpp>
+
+#include "drivers/simulated/ray_caster.hpp"
+#include "drivers/simulated/sensor_unit.hpp"
+
+namespace plumb::simulated {
+
+/// A depth image with what was behind it.
+struct DepthShot {
+  cv::Mat registered;  ///< CV_16UC1 on the colour camera's grid, units of SensorUnit::depth_units_per_metre, 0: nothing.
+  cv::Mat measured_m;  ///< CV_32FC1 on the infrared camera's grid: what it measured, 0: nothing.
+  cv::Mat true_m;      ///< CV_32FC1 on the same grid: the true depth along each pixel's own centre or jittered ray.
+};
+
+/// Renders depth images by the chain true z -> scale, offset, bow -> lateral jitter -> correlated axial noise -> quantisation -> projector
+/// shadow -> drop-outs and flying pixels -> registration. Immutable; parallel inside, the result does not depend on the number of threads.
+class DepthCamera {
+ public:
+  explicit DepthCamera(const SensorUnit& unit);
+  /// @param time_s  Trajectory time of the (global) exposure.  @param noise_seed  Of this image.
+  [[nodiscard]] DepthShot Render(const World& world, const Trajectory& trajectory, double time_s, std::uint64_t noise_seed) const;
+
+ private:
+  struct Layers;
+  void Cast(const World& world, const MovingPose& pose, int tile_row, const Layers& layers, cv::Mat& true_m, cv::Mat& incidence) const;
+  void Measure(int y, const Layers& layers, const cv::Mat& true_m, const cv::Mat& incidence, std::uint64_t noise_seed,
+               cv::Mat& measured_m) const;
+  void CastShadow(int y, const cv::Mat& true_m, cv::Mat& measured_m) const;
+  [[nodiscard]] cv::Mat Register(const cv::Mat& measured_m) const;
+
+  SensorUnit unit_;
+  PixelRays rays_;
+  std::vector<Eigen::Vector3f> assumed_rays_;  ///< Of the registration: where each pixel looks in the colour camera's frame.
+};
+
+}  // namespace plumb::simulated

@@ -1,0 +1,71 @@
+#include "drivers/simulated/noise_field.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+#include "drivers/simulated/random.hpp"
+
+namespace plumb::simulated {
+namespace {
+
+// Sum of the four 16-bit parts of a hash: variance 1, mean 0, nearly normal, and normal after the filter.
+float White(std::uint64_t hash) {
+  constexpr float kMean = 2.0F * 65535.0F;
+  constexpr float kInverseSigma = 1.0F / 37837.2F;  // sqrt(4/12) 65536
+  const auto sum = static_cast<float>((hash & 0xffff) + ((hash >> 16) & 0xffff) + ((hash >> 32) & 0xffff) + (hash >> 48));
+  return (sum - kMean) * kInverseSigma;
+}
+
+// Taps of the filter, centre first, scaled so that white noise keeps its variance.
+std::vector<float> Taps(double sigma_px) {
+  const int reach = sigma_px > 0 ? std::max(1, static_cast<int>(std::ceil(3.0 * sigma_px))) : 0;
+  std::vector<double> taps;
+  double power = 0;
+  for (int i = 0; i <= reach; ++i) {
+    taps.push_back(reach > 0 ? std::exp(-0.5 * i * i / (sigma_px * sigma_px)) : 1.0);
+    power += (i > 0 ? 2.0 : 1.0) * taps.back() * taps.back();
+  }
+  std::vector<float> scaled;
+  for (const double tap : taps) scaled.push_back(static_cast<float>(tap / std::sqrt(power)));
+  return scaled;
+}
+
+}  // namespace
+
+double FilterSigmaOfLag(double lag_px) { return lag_px / (2.0 * std::sqrt(std::log(10.0))); }
+
+std::vector<float> CorrelatedNoise(std::uint64_t seed, int width, int height, double sigma_px) {
+  const std::vector<float> taps = Taps(sigma_px);
+  const int reach = static_cast<int>(taps.size()) - 1;
+  const auto w = static_cast<std::size_t>(width);
+  std::vector<float> rows(w * static_cast<std::size_t>(height));
+  tbb::parallel_for(0, height, [&](int y) {
+    // The row with its wrapped ends on both sides.
+    std::vector<float> padded(w + 2 * static_cast<std::size_t>(reach));
+    for (int i = 0; i < static_cast<int>(padded.size()); ++i) {
+      const int x = ((i - reach) % width + width) % width;
+      padded[static_cast<std::size_t>(i)] = White(Hash(seed, static_cast<std::uint64_t>(y) * w + static_cast<std::uint64_t>(x)));
+    }
+    float* out = &rows[static_cast<std::size_t>(y) * w];
+    const float* centre = padded.data() + reach;
+    for (std::size_t x = 0; x < w; ++x) out[x] = taps[0] * centre[x];
+    for (int k = 1; k <= reach; ++k) {
+      const float tap = taps[static_cast<std::size_t>(k)];
+      for (int x = 0; x < width; ++x) out[x] += tap * (centre[x - k] + centre[x + k]);
+    }
+  });
+  std::vector<float> field(rows.size());
+  tbb::parallel_for(0, height, [&](int y) {
+    float* out = &field[static_cast<std::size_t>(y) * w];
+    for (int k = -reach; k <= reach; ++k) {
+      const float tap = taps[static_cast<std::size_t>(std::abs(k))];
+      const float* in = &rows[static_cast<std::size_t>(((y + k) % height + height) % height) * w];
+      for (std::size_t x = 0; x < w; ++x) out[x] += tap * in[x];
+    }
+  });
+  return field;
+}
+
+}  // namespace plumb::simulated

@@ -1,0 +1,39 @@
+#include "drivers/simulated/ray_caster.hpp"
+
+#include <tbb/parallel_for.h>
+
+namespace plumb::simulated {
+
+PixelRays::PixelRays(const Intrinsics& camera) : width_(camera.width), height_(camera.height), focal_px_(static_cast<float>(camera.fx)) {
+  // One pixel more on every side, for the differences.
+  const auto across = static_cast<std::size_t>(width_ + 2);
+  std::vector<Eigen::Vector2d> ideal(across * static_cast<std::size_t>(height_ + 2));
+  tbb::parallel_for(-1, height_ + 1, [&](int y) {
+    for (int x = -1; x <= width_; ++x)
+      ideal[static_cast<std::size_t>(y + 1) * across + static_cast<std::size_t>(x + 1)] = Undistort(camera, {x, y});
+  });
+  entries_.reserve(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      const Eigen::Vector2d* centre = &ideal[static_cast<std::size_t>(y + 1) * across + static_cast<std::size_t>(x + 1)];
+      const Eigen::Vector2f du = (0.5 * (centre[1] - centre[-1])).cast<float>();
+      const Eigen::Vector2f dv = (0.5 * (*(centre + across) - *(centre - across))).cast<float>();
+      entries_.push_back({static_cast<float>(centre->x()), static_cast<float>(centre->y()), du.x(), dv.x(), du.y(), dv.y()});
+    }
+  }
+}
+
+MovingPose PoseAt(const Trajectory& trajectory, double time_s, const Pose& T_carrier_camera) {
+  constexpr double kStep = 5e-4;
+  const Pose before = trajectory.T_world_camera(time_s - kStep) * T_carrier_camera;
+  const Pose after = trajectory.T_world_camera(time_s + kStep) * T_carrier_camera;
+  const Pose now = trajectory.T_world_camera(time_s) * T_carrier_camera;
+  MovingPose moving;
+  moving.R_world_camera = now.linear().cast<float>();
+  moving.p_world = now.translation().cast<float>();
+  moving.velocity = ((after.translation() - before.translation()) / (2 * kStep)).cast<float>();
+  moving.angular_velocity = (VectorFromRotation(after.linear() * before.linear().transpose()) / (2 * kStep)).cast<float>();
+  return moving;
+}
+
+}  // namespace plumb::simulated

@@ -1,0 +1,61 @@
+// Rays of one moving camera: which way each pixel looks, and from where, at any time.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "algo/types/intrinsics.hpp"
+#include "drivers/simulated/trajectory.hpp"
+#include "drivers/simulated/world.hpp"
+
+namespace plumb::simulated {
+
+inline constexpr int kTileSize = 8;  ///< Pixels; the rays of one tile share their candidates.
+
+/// The direction that each pixel looks in, camera frame. Made once per camera.
+class PixelRays {
+ public:
+  explicit PixelRays(const Intrinsics& camera);
+  /// Ray through a place near the centre of pixel (x, y), du and dv pixels away; z = 1. Linear in du, dv over a few pixels.
+  [[nodiscard]] Eigen::Vector3f At(int x, int y, float du, float dv) const {
+    const Entry& e = entries_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
+    return {e.x + du * e.x_du + dv * e.x_dv, e.y + du * e.y_du + dv * e.y_dv, 1.0F};
+  }
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] float focal_px() const { return focal_px_; }
+
+ private:
+  struct Entry {
+    float x, y, x_du, x_dv, y_du, y_dv;
+  };
+  int width_;
+  int height_;
+  float focal_px_;
+  std::vector<Entry> entries_;
+};
+
+/// A camera's place with its motion, so that the poses of a few milliseconds around come cheaply.
+struct MovingPose {
+  Eigen::Matrix3f R_world_camera = Eigen::Matrix3f::Identity();
+  Eigen::Vector3f p_world = Eigen::Vector3f::Zero();
+  Eigen::Vector3f velocity = Eigen::Vector3f::Zero();          ///< World, m/s.
+  Eigen::Vector3f angular_velocity = Eigen::Vector3f::Zero();  ///< World, rad/s.
+
+  /// World direction of a camera-frame direction, not normalised.
+  [[nodiscard]] Eigen::Vector3f DirectionOf(const Eigen::Vector3f& direction_camera, float dt) const {
+    const Eigen::Vector3f direction = R_world_camera * direction_camera;
+    return direction + dt * angular_velocity.cross(direction);
+  }
+  /// Ray of a camera-frame direction, dt seconds after the pose's own time. Exact to second order in the turn (below 0.01 pixel).
+  [[nodiscard]] Ray RayOf(const Eigen::Vector3f& direction_camera, float dt) const {
+    return {p_world + dt * velocity, DirectionOf(direction_camera, dt).normalized()};
+  }
+};
+
+/// @param T_carrier_camera  Where this camera sits on what the trajectory moves (the colour camera).
+[[nodiscard]] MovingPose PoseAt(const Trajectory& trajectory, double time_s, const Pose& T_carrier_camera);
+
+}  // namespace plumb::simulated

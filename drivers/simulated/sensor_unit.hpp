@@ -1,0 +1,67 @@
+// One simulated sensor: its true optics and errors, and the calibration that its owner believes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algo/types/intrinsics.hpp"
+#include "algo/types/pose.hpp"
+
+namespace plumb::simulated {
+
+enum class NoiseLevel { kIdeal, kNominal, kHard };
+
+/// A unit of the Xtion class: projector, infrared camera and colour camera apart from each other. Lengths in metres, times in seconds.
+struct SensorUnit {
+  NoiseLevel level = NoiseLevel::kNominal;
+  std::uint64_t seed = 1;
+
+  Intrinsics color_true;
+  Intrinsics color_written;  ///< What camera.yaml says.
+  Intrinsics depth_true;
+  Intrinsics depth_assumed;  ///< What the registration to colour uses.
+  Pose T_color_depth_true = Pose::Identity();
+  Pose T_color_depth_assumed = Pose::Identity();
+  double depth_units_per_metre = 5000.0;  ///< Of the 16-bit file.
+
+  // Systematic depth errors: z (1 + scale) + offset + bow z^2 (r^2 - 1/2) + tilt z^2 (x, y), r = 1 at the image's corner.
+  double depth_scale_error = 0.0;
+  double depth_offset_m = 0.0;
+  double depth_bow_per_m = 0.0;
+  std::array<double, 2> depth_tilt_per_m{};
+
+  // Random depth errors. Factors multiply Nguyen's (2012) axial and lateral models; 0 switches an effect off.
+  double axial_noise = 0.0;
+  double lateral_noise = 0.0;
+  double correlation_px = 9.0;        ///< Lag at which the axial noise has lost 90 % of its correlation.
+  bool quantised = false;             ///< The PS1080's disparity steps.
+  double projector_baseline_m = 0.0;  ///< Projector to the right of the infrared camera; 0: no shadow.
+  double dropout = 0.0;               ///< Share of single pixels lost anywhere; also switches grazing losses and flying pixels on.
+  double min_range_m = 0.0;
+  double max_range_m = 5.0;
+
+  // Times. A frame's colour image is taken at its nominal time, depth `depth_delay_s` later; stamps err beside that.
+  double exposure_s = 0.0;
+  double readout_s = 0.0;  ///< Rolling shutter of the colour camera, first to last row.
+  double depth_delay_s = 0.0;
+  double color_stamp_bias_s = 0.0;
+  double stamp_jitter_s = 0.0;
+
+  // Colour.
+  double lens_blur_px = 0.0;  ///< Standard deviation of the lens's point spread, beside the pixel's own area.
+  double vignetting = 0.0;    ///< Light lost at the image's corner.
+  double shot_noise = 0.0;    ///< Variance per unit of linear signal.
+  double read_noise = 0.0;    ///< Standard deviation of the linear signal in the dark.
+  int jpeg_quality = 0;       ///< 0: lossless PNG.
+};
+
+/// The unit of a given level and seed, for images of the given size (multiples of the 640 x 480 optics).
+/// Ideal: one pinhole camera that gives colour and depth at the same instant, without noise.
+[[nodiscard]] SensorUnit MakeSensorUnit(NoiseLevel level, std::uint64_t seed, int width, int height);
+
+/// Standard deviation of one depth reading (Nguyen 2012), metres. z in metres, incidence in radians from the surface's normal.
+[[nodiscard]] double NguyenAxialSigma(double z, double incidence);
+/// Standard deviation of its place in the image, pixels of a 640 x 480 image.
+[[nodiscard]] double NguyenLateralSigma(double incidence);
+
+}  // namespace plumb::simulated

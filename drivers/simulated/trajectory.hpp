@@ -1,0 +1,44 @@
+// How the sensor is carried over the body: a head to feet sweep by hand.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "algo/types/pose.hpp"
+
+namespace plumb::simulated {
+
+/// A sweep in its own frame: x from head to feet, z up from the support, origin under the middle of the way.
+struct SweepOptions {
+  Pose T_world_sweep = Pose::Identity();
+  double half_way_m = 0.6;  ///< The sensor goes from x = -half_way_m to +half_way_m.
+  double height_m = 0.95;   ///< Above the support.
+  double swing_m = 0.22;    ///< Amplitude of the left-right swings.
+  double swing_period_s = 3.6;
+  double duration_s = 10.0;
+  double tremor = 1.0;  ///< Multiplies the hand's tremor; 0: none.
+  std::uint64_t seed = 1;
+};
+
+/// The true pose of the colour camera at any time; smooth, a pure function of its options.
+class Trajectory {
+ public:
+  explicit Trajectory(const SweepOptions& options);
+  /// @param time_s  From 0 to the sweep's duration; the sensor stands still (but for its tremor) before and after.
+  [[nodiscard]] Pose T_world_camera(double time_s) const;
+
+ private:
+  struct Wave {
+    double amplitude, frequency_hz, phase;
+    [[nodiscard]] double At(double time_s) const;
+  };
+  using Waves = std::array<Wave, 5>;
+  static double Sum(const Waves& waves, double time_s);
+
+  SweepOptions options_;
+  double swing_phase_;
+  std::array<Waves, 3> position_;  ///< Drift and tremor, metres.
+  std::array<Waves, 3> rotation_;  ///< Likewise, radians, camera frame.
+};
+
+}  // namespace plumb::simulated
