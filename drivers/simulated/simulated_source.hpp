@@ -1,0 +1,64 @@
+// A simulated sweep as a stream of frames, with its truth.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "algo/types/frame.hpp"
+#include "drivers/simulated/color_camera.hpp"
+#include "drivers/simulated/depth_camera.hpp"
+#include "drivers/simulated/sensor_unit.hpp"
+#include "drivers/simulated/trajectory.hpp"
+#include "drivers/simulated/world.hpp"
+
+namespace plumb {
+
+/// What one sweep is made of, beside the world and the unit.
+struct SimulatedSweep {
+  simulated::SweepOptions motion;
+  int num_frames = 150;
+  double rate_hz = 15.0;
+  double start_time_s = 0.0;  ///< Stamp of the trajectory's time 0.
+  int reference_marker = 0;
+  std::uint64_t seed = 1;  ///< Of the noise of its images and stamps.
+};
+
+/// What really happened while a frame was taken. Times on the scale of the stamps, but without their errors.
+struct FrameTruth {
+  double color_time_s = 0.0;  ///< Mid-exposure of the colour image's middle row.
+  double depth_time_s = 0.0;
+  Pose T_world_camera_at_color = Pose::Identity();  ///< Of the true colour camera.
+  Pose T_world_camera_at_depth = Pose::Identity();
+  simulated::DepthShot depth;  ///< With the depth before registration.
+};
+
+/// Renders one sweep frame by frame; the same bits for the same arguments. Not thread-safe, parallel inside.
+class SimulatedSource : public FrameSource {
+ public:
+  SimulatedSource(std::shared_ptr<const simulated::World> world, const simulated::SensorUnit& unit, const SimulatedSweep& sweep);
+
+  [[nodiscard]] const StreamInfo& info() const override { return info_; }
+  [[nodiscard]] std::optional<Frame> Next() override;
+
+  /// Truth of the frame that Next() gave last.
+  [[nodiscard]] const FrameTruth& truth() const { return truth_; }
+  /// True pose of the colour camera at a time on the scale of the stamps.
+  [[nodiscard]] Pose T_world_camera(double time_s) const { return trajectory_.T_world_camera(time_s - sweep_.start_time_s); }
+  [[nodiscard]] const simulated::SensorUnit& unit() const { return unit_; }
+  [[nodiscard]] const SimulatedSweep& sweep() const { return sweep_; }
+
+ private:
+  std::shared_ptr<const simulated::World> world_;
+  simulated::SensorUnit unit_;
+  SimulatedSweep sweep_;
+  simulated::Trajectory trajectory_;
+  simulated::ColorCamera color_camera_;
+  simulated::DepthCamera depth_camera_;
+  StreamInfo info_;
+  FrameTruth truth_;
+  int next_ = 0;
+};
+
+}  // namespace plumb

@@ -1,0 +1,108 @@
+#include "drivers/simulated/suite.hpp"
+
+#include <unistd.h>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/types/errors.hpp"
+#include "drivers/replay/file_io.hpp"
+#include "drivers/replay/tum_writer.hpp"
+#include "drivers/simulated/suite_plan.hpp"
+#include "drivers/simulated/truth_writer.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A folder beside the final one, gone again unless it was renamed.
+class FolderBeside {
+ public:
+  explicit FolderBeside(const fs::path& out) : out_(out) {
+    fs::path name = out.has_filename() ? out : out.parent_path();
+    out_ = name;
+    std::error_code error;
+    if (fs::exists(name, error) && !(fs::is_directory(name, error) && fs::is_empty(name, error))) {
+      throw DataError(fmt::format("cannot simulate into {}: expected a new or empty folder, found something there; choose another --out",
+                                  name.string()));
+    }
+    if (name.has_parent_path()) fs::create_directories(name.parent_path(), error);
+    if (error) throw IoError(DescribeWriteError(name.parent_path(), error.value()));
+    name += fmt::format(".partial-{}", ::getpid());
+    beside_ = name;
+    Make(beside_);
+  }
+  ~FolderBeside() {
+    std::error_code ignored;
+    if (!beside_.empty()) fs::remove_all(beside_, ignored);
+  }
+  FolderBeside(const FolderBeside&) = delete;
+  FolderBeside& operator=(const FolderBeside&) = delete;
+
+  static void Make(const fs::path& folder) {
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) throw IoError(DescribeWriteError(folder, error.value()));
+  }
+  [[nodiscard]] const fs::path& path() const { return beside_; }
+  void Commit() {
+    std::error_code error;
+    fs::rename(beside_, out_, error);  // Replaces an empty folder.
+    if (error) throw IoError(DescribeWriteError(out_, error.value()));
+    beside_.clear();
+  }
+
+ private:
+  fs::path out_;
+  fs::path beside_;
+};
+
+void WriteSuiteFile(const fs::path& folder, const simulated::SuitePlan& plan) {
+  nlohmann::json scenes = nlohmann::json::array();
+  for (const auto& scene : plan.scenes) scenes.push_back(scene.name);
+  nlohmann::json pairs = nlohmann::json::array();
+  for (const auto& [reference, current] : plan.pairs) pairs.push_back({reference, current});
+  WriteWholeFile(folder / "suite.json", nlohmann::json{{"name", plan.name}, {"scenes", scenes}, {"pairs", pairs}}.dump(1));
+}
+
+}  // namespace
+
+std::optional<simulated::NoiseLevel> ParseNoiseLevel(std::string_view name) {
+  if (name == "ideal") return simulated::NoiseLevel::kIdeal;
+  if (name == "nominal") return simulated::NoiseLevel::kNominal;
+  if (name == "hard") return simulated::NoiseLevel::kHard;
+  return std::nullopt;
+}
+
+void SimulateSuite(const SimulateOptions& options, const std::stop_token& stop,
+                   const std::function<void(double fraction, std::string_view what)>& progress) {
+  FolderBeside folder(options.out);
+  const simulated::SuitePlan plan = simulated::PlanSuite(options);
+  const double total = static_cast<double>(plan.scenes.size()) * options.frames;
+  double done = 0;
+  for (std::size_t i = 0; i < plan.scenes.size(); ++i) {
+    const std::string& name = plan.scenes[i].name;
+    FolderBeside::Make(folder.path() / "recordings");
+    FolderBeside::Make(folder.path() / "truth" / name);
+    const auto source = simulated::MakeSource(plan, i);
+    TumWriter writer(folder.path() / "recordings" / name, source->info(),
+                     {.depth_scale = plan.unit.depth_units_per_metre, .jpeg_quality = plan.unit.jpeg_quality});
+    simulated::VertexSightings sightings(plan, i);
+    while (const std::optional<Frame> frame = source->Next()) {
+      writer.Add(*frame);
+      sightings.Add(source->truth());
+      done += 1;
+      if (progress) progress(done / total, name);
+      if (stop.stop_requested())
+        throw Interrupted(
+            fmt::format("simulation stopped after {} of {} frames; nothing is left in {}", done, total, options.out.string()));
+    }
+    writer.Finish();
+    simulated::WriteTruth(folder.path() / "truth" / name, plan, i, *source, sightings.counts());
+  }
+  WriteSuiteFile(folder.path(), plan);
+  folder.Commit();
+}
+
+}  // namespace plumb

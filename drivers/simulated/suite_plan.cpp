@@ -1,0 +1,249 @@
+#include "drivers/simulated/suite_plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "algo/types/units.hpp"
+#include "drivers/simulated/random.hpp"
+
+namespace plumb::simulated {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kFirstStamp_s = 1.7e9;
+constexpr double kSceneInterval_s = 100.0;
+
+// How a body lies: its centroid's place over the support and its attitude.
+struct Placement {
+  double x = 0.0, y = 0.0;
+  double yaw_deg = 0.0, pitch_deg = 0.0, roll_deg = 0.0;
+};
+
+// The body rests on the support: its lowest point presses one millimetre into it.
+Pose Placed(const BodyModel& body, const Placement& placement) {
+  Pose T = Pose::Identity();
+  T.linear() = (Eigen::AngleAxisd(placement.yaw_deg * kDegree, Vector3d::UnitZ()) *
+                Eigen::AngleAxisd(placement.pitch_deg * kDegree, Vector3d::UnitY()) *
+                Eigen::AngleAxisd(placement.roll_deg * kDegree, Vector3d::UnitX()))
+                   .toRotationMatrix();
+  double lowest = 0;
+  for (const Eigen::Vector3f& vertex : body.surface.vertices) lowest = std::min(lowest, (T.linear() * vertex.cast<double>()).z());
+  const Vector3d turned = T.linear() * body.centroid;
+  T.translation() = Vector3d(placement.x - turned.x(), placement.y - turned.y(), -lowest - 1 * kMillimetre);
+  return T;
+}
+
+struct BoardRegion {
+  double half_length, half_width;  // Of the rectangle that holds the boards' centres.
+  std::size_t count;
+};
+
+Pose BoardPose(double x, double y, double yaw, double tilt, double tilt_direction) {
+  Pose T = Pose::Identity();
+  const Vector3d axis(std::cos(tilt_direction), std::sin(tilt_direction), 0.0);
+  T.linear() = (Eigen::AngleAxisd(tilt, axis) * Eigen::AngleAxisd(yaw, Vector3d::UnitZ())).toRotationMatrix();
+  double lowest = 0;
+  for (const Vector3d& corner : CornersInMarkerFrame(kBoardSide)) lowest = std::min(lowest, (T.linear() * corner).z());
+  T.translation() = Vector3d(x, y, 2 * kMillimetre - lowest);
+  return T;
+}
+
+bool FreeOfBodies(const Pose& T_world_board, const std::vector<ScenePlan>& scenes) {
+  constexpr double kClearance = 0.012;
+  for (const ScenePlan& scene : scenes) {
+    const Pose T_body_board = scene.T_world_body.inverse() * T_world_board;
+    for (int i = 0; i < 25; ++i) {
+      const Vector3d p((i % 5 - 2) * kBoardSide / 4, (i / 5 - 2) * kBoardSide / 4, 0.01);
+      if (scene.body->grid->Distance((T_body_board * p).cast<float>()) < kClearance) return false;
+    }
+  }
+  return true;
+}
+
+// Boards around the bodies of all scenes, none under any of them; the first one is the reference marker.
+std::vector<Board> LayBoards(const BoardRegion& region, const std::vector<ScenePlan>& scenes, std::uint64_t seed) {
+  RandomStream random(Hash(seed, 61));
+  std::vector<Board> boards;
+  std::set<int> used;
+  const auto lay = [&](const Pose& T_world_marker) {
+    int id = 0;
+    do id = static_cast<int>(random.Uniform() * 250.0);
+    while (!used.insert(id).second);
+    boards.push_back({id, T_world_marker});
+  };
+  lay(BoardPose(-region.half_length + 0.08, -region.half_width + 0.02, random.Within(1.5 * kDegree), 0.3 * kDegree * random.Uniform(),
+                random.Uniform(0.0, 2.0 * std::numbers::pi)));
+  double spacing = 0.30;  // Between centres; reduced when the region gets full.
+  for (int attempt = 0; attempt < 6000 && boards.size() < region.count; ++attempt) {
+    if (attempt % 1000 == 999) spacing = std::max(0.20, spacing - 0.02);
+    const double x = random.Within(region.half_length);
+    const double y = random.Within(region.half_width);
+    // Most lie almost flat, some are propped up.
+    const double tilt = (random.Uniform() < 0.75 ? random.Uniform(0.0, 2.0) : random.Uniform(3.0, 9.0)) * kDegree;
+    const Pose T = BoardPose(x, y, random.Uniform(0.0, 2.0 * std::numbers::pi), tilt, random.Uniform(0.0, 2.0 * std::numbers::pi));
+    const bool crowded = std::any_of(boards.begin(), boards.end(), [&](const Board& other) {
+      return (other.T_world_marker.translation() - T.translation()).head<2>().norm() < spacing;
+    });
+    if (!crowded && FreeOfBodies(T, scenes)) lay(T);
+  }
+  return boards;
+}
+
+std::vector<std::pair<std::string, std::string>> OrderedPairs(const std::vector<ScenePlan>& scenes) {
+  std::vector<std::pair<std::string, std::string>> pairs;
+  for (const ScenePlan& a : scenes) {
+    for (const ScenePlan& b : scenes) {
+      if (a.name != b.name) pairs.emplace_back(a.name, b.name);
+    }
+  }
+  return pairs;
+}
+
+void PlanDemo(SuitePlan& plan, const SimulateOptions& options) {
+  const auto body = MakeBody({.kind = BodyKind::kTorso});
+  RandomStream random(Hash(options.seed, 62));
+  const auto sign = [&] { return random.Uniform() < 0.5 ? -1.0 : 1.0; };
+  const Placement moved{sign() * random.Uniform(0.02, 0.05), sign() * random.Uniform(0.015, 0.04), sign() * random.Uniform(3.0, 8.0),
+                        random.Within(1.2), random.Within(1.2)};
+  plan.scenes.push_back({"reference", body, Placed(*body, {}), {}});
+  plan.scenes.push_back({"moved", body, Placed(*body, moved), {}});
+  plan.pairs = {{"reference", "moved"}};
+}
+
+void PlanNine(SuitePlan& plan, const SimulateOptions& options) {
+  const auto body = MakeBody({.kind = BodyKind::kTorso});
+  RandomStream random(Hash(options.seed, 63));
+  for (int i = 0; i < 9; ++i) {
+    // A 3 x 3 pattern of places, each with some freedom, so that the whole area is used for every seed.
+    Placement placement;
+    placement.x = 0.17 * (i % 3 - 1) + random.Within(0.08);
+    placement.y = 0.12 * (i / 3 - 1) + random.Within(0.05);
+    placement.yaw_deg = 12.0 * ((i * 4) % 9 - 4) * 0.6 + random.Within(6.0);
+    placement.pitch_deg = random.Within(1.5);
+    placement.roll_deg = random.Within(1.8);
+    plan.scenes.push_back({fmt::format("placement_{}", i + 1), body, Placed(*body, placement), {}});
+  }
+  plan.pairs = OrderedPairs(plan.scenes);
+}
+
+void PlanPatient(SuitePlan& plan, const SimulateOptions& options) {
+  RandomStream random(Hash(options.seed, 64));
+  const BodyShape relaxed{.kind = BodyKind::kFullBody, .right_arm_abduction_rad = 0.5 * kDegree};
+  const auto add = [&](const std::string& name, const BodyShape& shape, const Placement& placement) {
+    const auto body = MakeBody(shape);
+    // The trunk's place must not depend on the deformation: placed by the relaxed body's centroid.
+    BodyModel anchor = *body;
+    if (!plan.scenes.empty()) anchor.centroid = plan.scenes.front().body->centroid;
+    plan.scenes.push_back({name, body, Placed(anchor, placement), {}});
+  };
+  const auto small = [&] {
+    return Placement{random.Within(0.015), random.Within(0.012), random.Within(2.0), random.Within(0.6), random.Within(0.8)};
+  };
+  add("reference", relaxed, {});
+  BodyShape arm = relaxed;
+  arm.right_arm_abduction_rad = random.Uniform(6.0, 9.0) * kDegree;
+  add("arm_moved", arm, small());
+  BodyShape belly = relaxed;
+  belly.belly_rise_m = -random.Uniform(0.010, 0.018);
+  add("belly_lower", belly, small());
+  BodyShape chest = relaxed;
+  chest.chest_rise_m = random.Uniform(0.006, 0.012);
+  add("chest_higher", chest, small());
+  for (std::size_t i = 1; i < plan.scenes.size(); ++i) plan.pairs.emplace_back("reference", plan.scenes[i].name);
+}
+
+void PlanSweeps(SuitePlan& plan, const SimulateOptions& options, double half_way, double height) {
+  for (std::size_t i = 0; i < plan.scenes.size(); ++i) {
+    ScenePlan& scene = plan.scenes[i];
+    RandomStream random(Hash(options.seed, 65, i));
+    // Who sweeps follows the body, but not exactly.
+    const Vector3d centre = scene.T_world_body * scene.body->centroid;
+    const Vector3d forward = scene.T_world_body.linear().col(0);
+    Pose T_world_sweep = Pose::Identity();
+    T_world_sweep.translation() = Vector3d(0.5 * centre.x() + random.Within(0.02), 0.6 * centre.y() + random.Within(0.02), 0.0);
+    T_world_sweep.linear() =
+        Eigen::AngleAxisd(0.45 * std::atan2(forward.y(), forward.x()) + random.Within(2.0 * kDegree), Vector3d::UnitZ()).toRotationMatrix();
+    SweepOptions motion;
+    motion.T_world_sweep = T_world_sweep;
+    motion.half_way_m = half_way;
+    motion.height_m = height + random.Within(0.03);
+    motion.swing_m = random.Uniform(0.19, 0.25);
+    motion.swing_period_s = random.Uniform(3.2, 4.2);
+    motion.duration_s = options.frames / options.rate_hz;
+    motion.tremor = options.noise == NoiseLevel::kHard ? 1.8 : 1.0;
+    motion.seed = Hash(options.seed, 66, i);
+    scene.sweep = {.motion = motion,
+                   .num_frames = options.frames,
+                   .rate_hz = options.rate_hz,
+                   .start_time_s = kFirstStamp_s + kSceneInterval_s * static_cast<double>(i),
+                   .reference_marker = plan.reference_marker,
+                   .seed = Hash(options.seed, 67, i)};
+  }
+}
+
+Vector3d AreaCentroid(const TriangleMesh& mesh) {
+  Vector3d weighted = Vector3d::Zero();
+  double total = 0;
+  for (const auto& triangle : mesh.triangles) {
+    const Vector3d a = mesh.vertices[triangle[0]].cast<double>();
+    const Vector3d b = mesh.vertices[triangle[1]].cast<double>();
+    const Vector3d c = mesh.vertices[triangle[2]].cast<double>();
+    const double area = 0.5 * (b - a).cross(c - a).norm();
+    weighted += area * (a + b + c) / 3.0;
+    total += area;
+  }
+  return weighted / total;
+}
+
+}  // namespace
+
+std::shared_ptr<const BodyModel> MakeBody(const BodyShape& shape) {
+  constexpr double kSpacing = 5 * kMillimetre;
+  BodyModel body;
+  body.shape = shape;
+  body.grid = std::make_shared<DistanceGrid>([&](const Vector3d& p) { return BodyImplicit(shape, p); }, BodyBox(shape), kSpacing);
+  body.surface = body.grid->Surface();
+  body.centroid = AreaCentroid(body.surface);
+  return std::make_shared<const BodyModel>(std::move(body));
+}
+
+SuitePlan PlanSuite(const SimulateOptions& options) {
+  if (options.frames < 2 || options.frames > 20000)
+    throw std::invalid_argument(fmt::format("simulate: frames must be 2 to 20000, found {}", options.frames));
+  if (!(options.rate_hz > 0) || options.rate_hz > 60)
+    throw std::invalid_argument(fmt::format("simulate: rate must be over 0 and up to 60 Hz, found {}", options.rate_hz));
+  SuitePlan plan;
+  plan.name = options.suite;
+  plan.unit = MakeSensorUnit(options.noise, options.seed, options.width, options.height);
+  const bool patient = options.suite == "patient";
+  if (options.suite == "demo") {
+    PlanDemo(plan, options);
+  } else if (options.suite == "nine") {
+    PlanNine(plan, options);
+  } else if (patient) {
+    PlanPatient(plan, options);
+  } else {
+    throw std::invalid_argument(fmt::format("simulate: unknown suite \"{}\", expected demo, nine or patient", options.suite));
+  }
+  const BoardRegion region = patient ? BoardRegion{1.02, 0.50, 26} : BoardRegion{0.92, 0.62, 24};
+  plan.room.boards = LayBoards(region, plan.scenes, options.seed);
+  plan.room.support_texture = std::make_shared<const Texture>(patient ? PaintSheet(options.seed) : PaintFloor(options.seed));
+  plan.room.skin_texture = std::make_shared<const Texture>(PaintSkin(options.seed));
+  if (patient) plan.room.couch = Eigen::AlignedBox2f(Eigen::Vector2f(-1.12F, -0.58F), Eigen::Vector2f(1.12F, 0.58F));
+  plan.reference_marker = plan.room.boards.front().id;
+  PlanSweeps(plan, options, patient ? 0.95 : 0.58, patient ? 1.0 : 0.95);
+  return plan;
+}
+
+std::unique_ptr<SimulatedSource> MakeSource(const SuitePlan& plan, std::size_t scene) {
+  const ScenePlan& planned = plan.scenes.at(scene);
+  return std::make_unique<SimulatedSource>(std::make_shared<const World>(plan.room, planned.body->grid, planned.T_world_body), plan.unit,
+                                           planned.sweep);
+}
+
+}  // namespace plumb::simulated

@@ -1,0 +1,139 @@
+#include "drivers/simulated/truth_writer.hpp"
+
+#include <cmath>
+#include <cstring>
+#include <iterator>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/types/marker.hpp"
+#include "drivers/replay/file_io.hpp"
+
+namespace plumb::simulated {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kTruthRate_hz = 500.0;
+constexpr double kMargin_s = 0.15;  // Beyond the last frame, for its delays.
+
+json ToJson(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+json ToJson(const Pose& T) {
+  json rows = json::array();
+  for (int row = 0; row < 4; ++row) rows.push_back({T.matrix()(row, 0), T.matrix()(row, 1), T.matrix()(row, 2), T.matrix()(row, 3)});
+  return rows;
+}
+
+std::string TrajectoryText(const SimulatedSource& source) {
+  std::string text = "# timestamp tx ty tz qx qy qz qw\n";
+  const double duration = source.sweep().num_frames / source.sweep().rate_hz + kMargin_s;
+  for (int i = 0; i < static_cast<int>(std::lround(duration * kTruthRate_hz)); ++i) {
+    const double time = source.sweep().start_time_s + i / kTruthRate_hz;
+    const Pose T = source.T_world_camera(time);
+    const Eigen::Vector3d t = T.translation();
+    const Eigen::Quaterniond q(T.linear());
+    fmt::format_to(std::back_inserter(text), "{:.6f} {:.7f} {:.7f} {:.7f} {:.9f} {:.9f} {:.9f} {:.9f}\n", time, t.x(), t.y(), t.z(), q.x(),
+                   q.y(), q.z(), q.w());
+  }
+  return text;
+}
+
+json Markers(const SuitePlan& plan) {
+  json markers;
+  for (const Board& board : plan.room.boards) {
+    const MarkerCorners corners = CornersInMarkerFrame(kMarkerLength);
+    json in_paper_order = json::array();
+    for (const std::size_t detector_corner : {3, 2, 1, 0})
+      in_paper_order.push_back(ToJson(board.T_world_marker * corners[detector_corner]));
+    markers[std::to_string(board.id)] = {{"T_world_marker", ToJson(board.T_world_marker)}, {"corners", in_paper_order}};
+  }
+  return {
+      {"about",
+       "corners in world metres, paper order c1(-l/2,-l/2) c2(l/2,-l/2) c3(l/2,l/2) c4(-l/2,l/2) in the marker frame (x right, y up on the "
+       "printed sheet, z out of the paper); these are OpenCV detector corners 3,2,1,0"},
+      {"dictionary", kDictionary},
+      {"length", kMarkerLength},
+      {"markers", markers}};
+}
+
+json Motion(const SuitePlan& plan, const ScenePlan& scene) {
+  const Pose T_world_body0 = plan.scenes.front().T_world_body;
+  const Pose T_world_reference_marker = plan.room.boards.front().T_world_marker;
+  const Pose motion = scene.T_world_body * T_world_body0.inverse();
+  const Eigen::Vector3d centroid = plan.scenes.front().body->centroid;
+  return {
+      {"about",
+       "motion_*: rigid transform from the placement of the suite's first scene (body0) to this scene's; centroid = area centroid of the "
+       "undeformed body's surface"},
+      {"T_world_body", ToJson(scene.T_world_body)},
+      {"T_world_body0", ToJson(T_world_body0)},
+      {"T_world_reference_marker", ToJson(T_world_reference_marker)},
+      {"centroid_body", ToJson(centroid)},
+      {"centroid_world", ToJson(scene.T_world_body * centroid)},
+      {"motion_reference_marker", ToJson(T_world_reference_marker.inverse() * motion * T_world_reference_marker)},
+      {"motion_world", ToJson(motion)}};
+}
+
+void Append(std::vector<std::uint8_t>& bytes, const void* data, std::size_t size) {
+  const auto* begin = static_cast<const std::uint8_t*>(data);
+  bytes.insert(bytes.end(), begin, begin + size);
+}
+
+std::vector<std::uint8_t> BodyPly(const ScenePlan& scene, const std::vector<int>& sightings) {
+  const TriangleMesh& mesh = scene.body->surface;
+  const std::string header = fmt::format(
+      "ply\nformat binary_little_endian 1.0\ncomment true surface, world frame, metres; seen = frames that measured the vertex\n"
+      "element vertex {}\nproperty float x\nproperty float y\nproperty float z\nproperty float seen\nelement face {}\n"
+      "property list uchar int vertex_indices\nend_header\n",
+      mesh.vertices.size(), mesh.triangles.size());
+  std::vector<std::uint8_t> bytes(header.begin(), header.end());
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    const Eigen::Vector3f p = (scene.T_world_body * mesh.vertices[i].cast<double>()).cast<float>();
+    const auto seen = static_cast<float>(sightings[i]);
+    Append(bytes, p.data(), 3 * sizeof(float));
+    Append(bytes, &seen, sizeof(seen));
+  }
+  for (const auto& triangle : mesh.triangles) {
+    bytes.push_back(3);
+    Append(bytes, triangle.data(), 3 * sizeof(std::uint32_t));
+  }
+  return bytes;
+}
+
+}  // namespace
+
+VertexSightings::VertexSightings(const SuitePlan& plan, std::size_t scene) : plan_(plan), scene_(plan.scenes.at(scene)) {
+  const TriangleMesh& mesh = scene_.body->surface;
+  for (const Eigen::Vector3f& vertex : mesh.vertices) vertices_in_world_.push_back(scene_.T_world_body * vertex.cast<double>());
+  for (const Eigen::Vector3f& normal : mesh.normals) normals_in_world_.push_back(scene_.T_world_body.linear() * normal.cast<double>());
+  counts_.assign(mesh.vertices.size(), 0);
+}
+
+void VertexSightings::Add(const FrameTruth& truth) {
+  constexpr double kSame = 0.010;  // The true depth at the pixel is the vertex's own within this much, metres.
+  const Pose T_depth_world = (truth.T_world_camera_at_depth * plan_.unit.T_color_depth_true).inverse();
+  const Eigen::Vector3d centre = T_depth_world.inverse().translation();
+  for (std::size_t i = 0; i < counts_.size(); ++i) {
+    if (normals_in_world_[i].dot(centre - vertices_in_world_[i]) <= 0) continue;
+    const Eigen::Vector3d p = T_depth_world * vertices_in_world_[i];
+    if (p.z() <= 0) continue;
+    const Eigen::Vector2d pixel = Project(plan_.unit.depth_true, p);
+    const int x = static_cast<int>(std::floor(pixel.x() + 0.5));
+    const int y = static_cast<int>(std::floor(pixel.y() + 0.5));
+    if (x < 0 || y < 0 || x >= truth.depth.true_m.cols || y >= truth.depth.true_m.rows) continue;
+    if (truth.depth.measured_m.at<float>(y, x) > 0 && std::abs(truth.depth.true_m.at<float>(y, x) - p.z()) < kSame) ++counts_[i];
+  }
+}
+
+void WriteTruth(const std::filesystem::path& folder, const SuitePlan& plan, std::size_t scene, const SimulatedSource& source,
+                const std::vector<int>& vertex_sightings) {
+  const ScenePlan& planned = plan.scenes.at(scene);
+  WriteWholeFile(folder / "groundtruth.txt", TrajectoryText(source));
+  WriteWholeFile(folder / "markers.json", Markers(plan).dump(1));
+  WriteWholeFile(folder / "motion.json", Motion(plan, planned).dump(1));
+  WriteWholeFile(folder / "body.ply", BodyPly(planned, vertex_sightings));
+}
+
+}  // namespace plumb::simulated
