@@ -28,7 +28,7 @@ struct CornerRefinementOptions {
   /// paper eats into the black border and corners move inward by up to half a pixel.
   bool linear_light = true;
   /// If given, the bow that the lens puts on the sides is taken into account; coefficients of the image that is searched.
-  std::optional<Intrinsics> intrinsics;
+  std::optional<Intrinsics> intrinsics = std::nullopt;
 };
 
 /// What RefineCorners() found.

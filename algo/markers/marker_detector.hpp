@@ -15,11 +15,11 @@ namespace plumb {
 
 /// Parameters of MarkerDetector. Lengths in pixels of the image that is searched.
 struct MarkerDetectorOptions {
-  double min_side_px = 14.0;             ///< Markers with a shorter mean side are not reported; >= 8.
-  double border_px = 1.0;                ///< A marker with a corner nearer than this to the image border is not reported; >= 0.
-  bool refine_corners = true;            ///< False: the corners as detected, to about half a pixel.
-  bool linear_light = true;              ///< Undo the sRGB tone curve for the refinement; see CornerRefinementOptions.
-  std::optional<Intrinsics> intrinsics;  ///< If given, the refinement allows for the bow that the lens puts on the sides.
+  double min_side_px = 14.0;   ///< Markers with a shorter mean side are not reported; >= 8.
+  double border_px = 1.0;      ///< A marker with a corner nearer than this to the image border is not reported; >= 0.
+  bool refine_corners = true;  ///< False: the corners as detected, to about half a pixel.
+  bool linear_light = true;    ///< Undo the sRGB tone curve for the refinement; see CornerRefinementOptions.
+  std::optional<Intrinsics> intrinsics = std::nullopt;  ///< If given, the refinement allows for the bow that the lens puts on the sides.
 };
 
 /// What one image showed.
