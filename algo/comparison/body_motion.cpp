@@ -27,8 +27,8 @@ constexpr double kMinScale_m = 0.2e-3;        // below what any sensor leaves; k
 constexpr double kCorrelationArea_m2 = 1e-4;  // residuals within about 1 cm are one measurement
 constexpr double kBlock_m = 0.08;             // of the empirical covariance
 constexpr double kMinInformation = 1e-6;      // of the best direction's; below it a direction counts as unseen
-constexpr double kStepTolerance_m = 2e-6;
-constexpr double kPrior = 1e-5;  // of the mean information: unseen directions stay where they start
+constexpr double kStepTolerance_m = 5e-6;
+constexpr double kSeenInformation = 3e-4;  // of the best direction's; below it a direction stays where it starts
 
 // One side of the registration.
 struct Side {
@@ -47,10 +47,13 @@ struct Stage {
 
 constexpr Stage kCoarse = {0.08, 0.03, 0.6, 0.03, 15};
 constexpr Stage kMiddle = {0.03, 0.015, 0.7, 0.008, 15};
-constexpr Stage kFine = {0.015, 0.006, 0.8, 0.005, 25};
 constexpr double kCoarseSpacing_m = 0.02;
 constexpr double kMiddleSpacing_m = 0.01;
 constexpr double kFineSpacing_m = 0.005;
+constexpr double kMaxFineSamples = 20000.0;  // a side; more cost time and add nothing: their errors are not independent
+
+// Mates two spacings away at most: what is further off is not the rigid part, and the search stays short.
+Stage FineStage(double spacing_m) { return {2 * spacing_m, 1.2 * spacing_m, 0.8, spacing_m, 25}; }
 
 struct Pair {
   Eigen::Vector3d arm = Eigen::Vector3d::Zero();  // moved point from the pivot
@@ -125,6 +128,7 @@ double TukeyWeight(double residual_m, double scale_m) {
 
 struct NormalEquations {
   Matrix6d A = Matrix6d::Zero();
+  Matrix6d crossed = Matrix6d::Zero();  // A from one normal of each side: free of the bias that their noise puts into A
   Vector6d b = Vector6d::Zero();
 };
 
@@ -139,15 +143,29 @@ NormalEquations SumPairs(const std::vector<Pair>& pairs, double scale_m) {
       if (w == 0.0) continue;
       const Vector6d gradient = Gradient(pair.arm, (pair.normal_reference + pair.normal_current).normalized());
       sum.A += w * gradient * gradient.transpose();
+      sum.crossed += w * Gradient(pair.arm, pair.normal_reference) * Gradient(pair.arm, pair.normal_current).transpose();
       sum.b += w * pair.residual_m * gradient;
     }
   });
   NormalEquations total;
   for (const NormalEquations& sum : sums) {
     total.A += sum.A;
+    total.crossed += 0.5 * (sum.crossed + sum.crossed.transpose());
     total.b += sum.b;
   }
   return total;
+}
+
+// Gauss-Newton step within the directions that the surfaces show; along a direction that they do not (roll of a bar) the
+// noise of the normals would drive the pose away. `unit` scales the unknowns to one importance.
+Vector6d SeenStep(const NormalEquations& equations, const Vector6d& unit) {
+  const Matrix6d A = unit.asDiagonal() * equations.A * unit.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(unit.asDiagonal() * equations.crossed * unit.asDiagonal());
+  int unseen = 0;
+  while (unseen < 6 && eigen.eigenvalues()[unseen] < kSeenInformation * eigen.eigenvalues()[5]) ++unseen;
+  const Eigen::MatrixXd seen = eigen.eigenvectors().rightCols(6 - unseen);
+  const Eigen::VectorXd along = (seen.transpose() * A * seen).ldlt().solve(-(seen.transpose() * (unit.asDiagonal() * equations.b)));
+  return unit.asDiagonal() * (seen * along);
 }
 
 struct StageResult {
@@ -182,20 +200,16 @@ StageResult RunStage(const Side& reference, const Side& current, const Pose& T_s
     result.valid = scale.has_value();
     if (!scale) return result;
     result.scale_m = *scale;
-    NormalEquations equations = SumPairs(pairs, *scale);
     // In units of the lever arm rotation and translation weigh alike.
     Vector6d unit;
     unit << Eigen::Vector3d::Constant(1.0 / lever), Eigen::Vector3d::Ones();
-    Matrix6d A = unit.asDiagonal() * equations.A * unit.asDiagonal();
-    A += kPrior * A.trace() / 6.0 * Matrix6d::Identity();
-    const Vector6d step = A.ldlt().solve(-(unit.asDiagonal() * equations.b));
-    if (!step.allFinite()) {
+    const Vector6d twist = SeenStep(SumPairs(pairs, *scale), unit);
+    if (!twist.allFinite()) {
       result.valid = false;
       return result;
     }
-    const Vector6d twist = unit.asDiagonal() * step;
     result.T = Orthonormalised(Eigen::Translation3d(pivot) * PoseFromTwist(twist) * Eigen::Translation3d(-pivot) * result.T);
-    if (step.norm() < kStepTolerance_m) break;
+    if (twist.cwiseQuotient(unit).norm() < kStepTolerance_m) break;
   }
   return result;
 }
@@ -303,14 +317,20 @@ std::optional<SurfaceMotion> EstimateBodyMotion(const BodyMotionInput& input) {
   const std::optional<Pose> T_start = GlobalMotion(input, reference, current);
   if (!T_start) return std::nullopt;
 
-  Surface fine_reference = MakeSurface(reference, kFineSpacing_m, 3 * kFineSpacing_m);
+  double spacing_m = kFineSpacing_m;
+  Surface fine_reference = MakeSurface(reference, spacing_m, 3 * spacing_m);
+  if (static_cast<double>(fine_reference.size()) > kMaxFineSamples) {
+    spacing_m *= std::sqrt(static_cast<double>(fine_reference.size()) / kMaxFineSamples);
+    fine_reference = MakeSurface(reference, spacing_m, 3 * spacing_m);
+  }
   if (input.in_region) {
     fine_reference = Subset(fine_reference, [&](std::size_t i) { return input.in_region(fine_reference.points[i].cast<double>()); });
   }
-  const Side side_reference(std::move(fine_reference), kFine.radius_m);
-  const Side side_current(MakeSurface(current, kFineSpacing_m, 3 * kFineSpacing_m), kFine.radius_m);
-  if (side_reference.surface.size() < kMinSamples) return std::nullopt;
-  const StageResult fitted = RunStage(side_reference, side_current, *T_start, kFine);
+  if (fine_reference.size() < kMinSamples) return std::nullopt;
+  const Stage stage = FineStage(spacing_m);
+  const Side side_reference(std::move(fine_reference), stage.radius_m);
+  const Side side_current(MakeSurface(current, spacing_m, 3 * spacing_m), stage.radius_m);
+  const StageResult fitted = RunStage(side_reference, side_current, *T_start, stage);
   if (!fitted.valid) return std::nullopt;
 
   SurfaceMotion motion;
@@ -318,8 +338,8 @@ std::optional<SurfaceMotion> EstimateBodyMotion(const BodyMotionInput& input) {
   motion.scale_m = fitted.scale_m;
   motion.iterations = fitted.iterations;
   const Eigen::Vector3d pivot = motion.T * input.region_centroid_m;
-  const std::vector<Pair> pairs = FindPairs(side_reference, side_current, motion.T, pivot, kFine);
-  motion.covariance = FitCovariance(pairs, fitted.scale_m, kFineSpacing_m, LeverArm(side_reference.surface, input.region_centroid_m));
+  const std::vector<Pair> pairs = FindPairs(side_reference, side_current, motion.T, pivot, stage);
+  motion.covariance = FitCovariance(pairs, fitted.scale_m, spacing_m, LeverArm(side_reference.surface, input.region_centroid_m));
   std::size_t inner = 0;
   std::size_t explained = 0;
   for (std::size_t i = 0; i < side_reference.surface.size(); ++i) {

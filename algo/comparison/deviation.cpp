@@ -103,13 +103,16 @@ class NearestCells {
         step_(static_cast<float>(current.grid.step)),
         best_(current.z.size(), kNone),
         squared_(current.z.size(), std::numeric_limits<float>::max()),
-        wanted_(current.z.size(), 0) {
+        wanted_(current.z.size(), 0),
+        settled_(current.z.size(), 0) {
     for (std::size_t i = 0; i < best_.size(); ++i) {
       wanted_[i] = std::isfinite(reference.z[i]) && (mask.empty() || mask[i] != 0) ? 1 : 0;
       if (wanted_[i] != 0 && std::isfinite(current.z[i])) {
         const float dz = current.z[i] - reference.z[i];
         best_[i] = static_cast<std::uint32_t>(i);
         squared_[i] = dz * dz;
+        // Nearer than a cell: no other column can hold a point that matters, the tangent plane here is exact enough.
+        settled_[i] = std::abs(dz) < step_ ? 1 : 0;
       }
     }
     for (int pass = 0; pass < 2; ++pass) {
@@ -145,7 +148,7 @@ class NearestCells {
     for (int row = first_row; row >= 0 && row < height_; row += direction) {
       for (int column = first_column; column >= 0 && column < width_; column += direction) {
         const std::size_t cell = static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column);
-        if (wanted_[cell] == 0) continue;
+        if (wanted_[cell] == 0 || settled_[cell] != 0) continue;
         for (const auto& [dr, dc] : behind) {
           const int r = row + dr;
           const int c = column + dc;
@@ -163,7 +166,7 @@ class NearestCells {
   }
 
   void Descend(std::size_t cell) {
-    if (best_[cell] == kNone) return;
+    if (best_[cell] == kNone || settled_[cell] != 0) return;
     const int row = static_cast<int>(cell) / width_;
     const int column = static_cast<int>(cell) % width_;
     for (int step = 0; step < kMaxDescent; ++step) {
@@ -185,6 +188,7 @@ class NearestCells {
   std::vector<std::uint32_t> best_;
   std::vector<float> squared_;
   std::vector<std::uint8_t> wanted_;
+  std::vector<std::uint8_t> settled_;
 };
 
 }  // namespace

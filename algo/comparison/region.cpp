@@ -272,7 +272,7 @@ RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uin
   const Pose T_back = T_motion.inverse();
   const GridShape& fine = reference.grid;
   GridShape grid = fine;
-  grid.step = std::max(2 * fine.step, 1.5 * current_step_m);
+  grid.step = 2 * std::max(fine.step, current_step_m);  // so that no cell within a measured part stays empty
   grid.width = static_cast<int>(std::ceil(fine.width * fine.step / grid.step));
   grid.height = static_cast<int>(std::ceil(fine.height * fine.step / grid.step));
   std::vector<std::uint8_t> measured(grid.num_cells(), 0);
@@ -281,15 +281,6 @@ RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uin
     const auto cell = grid.cell(moved.x(), moved.y());
     if (cell) measured[*cell] = 1;
   }
-  const auto near = [&](int row, int column) {
-    for (int r = std::max(row - 1, 0); r <= std::min(row + 1, grid.height - 1); ++r) {
-      for (int c = std::max(column - 1, 0); c <= std::min(column + 1, grid.width - 1); ++c) {
-        if (measured[static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(c)] != 0) return true;
-      }
-    }
-    return false;
-  };
-
   std::size_t region_cells = 0;
   std::size_t covered_cells = 0;
   std::vector<float> distance(grid.num_cells(), 0.0F);  // of uncovered region cells to anything else, cells
@@ -298,7 +289,7 @@ RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uin
     ++region_cells;
     const auto coarse = grid.cell(p.x(), p.y());
     if (!coarse) return;
-    const bool covered = near(static_cast<int>(*coarse) / grid.width, static_cast<int>(*coarse) % grid.width);
+    const bool covered = measured[*coarse] != 0;
     covered_cells += covered ? 1 : 0;
     if (!covered) distance[*coarse] = std::numeric_limits<float>::max();
   });
@@ -331,8 +322,8 @@ RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uin
       result.hole_centre_m = {grid.x_centre(column), grid.y_centre(row)};
     }
   }
-  // A cell next to the hole's rim counts half; the dilation of the measured cells took one ring from the hole.
-  if (largest > 0) result.largest_hole_m = (2.0 * largest - 1.0 + 2.0) * grid.step;
+  // Half a cell to the centre of the next measured one on each side, and half a cell that is only partly measured.
+  if (largest > 0) result.largest_hole_m = 2.0 * largest * grid.step;
   return result;
 }
 

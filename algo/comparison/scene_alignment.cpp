@@ -131,13 +131,14 @@ std::vector<Consensus> ConsensusSets(std::span<const SharedMarker> shared, const
   const auto consider = [&](const Subset& seed) {
     RigidFit fit = FitSubset(shared, seed, true);
     Subset subset = seed;
-    for (int round = 0; round < 5 && fit.valid; ++round) {
+    bool settled = false;  // the set supports itself: else it is no consensus
+    for (int round = 0; round < 10 && fit.valid && !settled; ++round) {
       Subset next = Supporters(shared, fit.T_a_b, options);
-      if (next.empty() || next == subset) break;
+      settled = next == subset;
       subset = std::move(next);
       fit = FitSubset(shared, subset, true);
     }
-    if (!fit.valid || std::any_of(sets.begin(), sets.end(), [&](const Consensus& c) { return c.subset == subset; })) return;
+    if (!settled || !fit.valid || std::any_of(sets.begin(), sets.end(), [&](const Consensus& c) { return c.subset == subset; })) return;
     sets.push_back({subset, fit.rms_m});
   };
   Subset all;

@@ -1,0 +1,199 @@
+#include "algo/comparison/scene_alignment.hpp"
+
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "algo/types/units.hpp"
+
+namespace plumb {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+const Pose kTrue(Eigen::Translation3d(0.3, -0.2, 0.1) * Eigen::AngleAxisd(0.8, Eigen::Vector3d(0.1, 0.2, 1).normalized()));
+
+CompareOptions Using(Preset preset) {
+  CompareOptions options;
+  options.preset = preset;
+  return options;
+}
+
+// Markers around a body, each turned another way.
+MarkerMap Room(int count, double sigma_m = 0.001) {
+  MarkerMap map;
+  for (int id = 0; id < count; ++id) {
+    const double angle = 6.283 * id / count;
+    const Pose T(Eigen::Translation3d(0.7 * std::cos(angle), 0.5 * std::sin(angle), 0) *
+                 Eigen::AngleAxisd(1.1 * id, Eigen::Vector3d::UnitZ()));
+    SceneMarker marker;
+    marker.sigma_m = sigma_m;
+    marker.corners = CornersInMarkerFrame(0.104);
+    for (Eigen::Vector3d& p : marker.corners) p = T * p;
+    map[id] = marker;
+  }
+  return map;
+}
+
+MarkerMap Seen(const MarkerMap& room, double noise_m, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, noise_m);
+  MarkerMap map = room;
+  for (auto& [id, marker] : map) {
+    for (Eigen::Vector3d& p : marker.corners)
+      p = kTrue.inverse() * p + (noise_m > 0 ? Eigen::Vector3d(noise(random), noise(random), noise(random)) : Eigen::Vector3d::Zero());
+  }
+  return map;
+}
+
+void Move(MarkerMap& map, int id, const Eigen::Vector3d& by_m) {
+  for (Eigen::Vector3d& p : map.at(id).corners) p += by_m;
+}
+
+double WorstCorner_m(const Alignment& alignment, const MarkerMap& room) {
+  double worst = 0;
+  for (const auto& [id, marker] : room) {
+    for (const Eigen::Vector3d& p : marker.corners)
+      worst = std::max(worst, (alignment.T_reference_current * (kTrue.inverse() * p) - p).norm());
+  }
+  return worst;
+}
+
+TEST(SceneAlignmentTest, ExactMarkersGiveTheExactPose) {
+  for (const Preset preset : {Preset::kBest, Preset::kPaper}) {
+    const MarkerMap room = Room(6);
+    const AlignmentOutcome outcome = AlignScenes(room, Seen(room, 0, 1), Using(preset));
+    ASSERT_TRUE(outcome.alignment);
+    EXPECT_LT(WorstCorner_m(*outcome.alignment, room), 1e-12);
+    EXPECT_THAT(outcome.alignment->markers_used, ElementsAre(0, 1, 2, 3, 4, 5));
+    EXPECT_THAT(outcome.warnings, IsEmpty());
+  }
+}
+
+TEST(SceneAlignmentTest, NamesTheMarkerThatMovedAndLeavesItOut) {
+  const MarkerMap room = Room(6);
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    MarkerMap current = Seen(room, 0.001, seed);
+    Move(current, 4, {0.012, 0, 0});
+    const AlignmentOutcome outcome = AlignScenes(room, current, {});
+    ASSERT_TRUE(outcome.alignment);
+    EXPECT_THAT(outcome.alignment->markers_rejected, ElementsAre(testing::Pair(4, testing::DoubleNear(0.012, 0.002))));
+    EXPECT_THAT(outcome.warnings, ElementsAre(HasSubstr("marker 4 moved")));
+    // 20 corners of 1 mm; measured worst corner over these seeds 1.0 mm.
+    EXPECT_LT(WorstCorner_m(*outcome.alignment, room), 0.002);
+  }
+}
+
+TEST(SceneAlignmentTest, NoisyDepthAccusesNobody) {
+  const MarkerMap room = Room(6, 0.004);
+  for (unsigned seed = 1; seed <= 50; ++seed) {
+    const AlignmentOutcome outcome = AlignScenes(room, Seen(room, 0.0056, seed), {});  // both maps 4 mm
+    ASSERT_TRUE(outcome.alignment);
+    EXPECT_THAT(outcome.alignment->markers_rejected, IsEmpty()) << "seed " << seed;
+  }
+}
+
+TEST(SceneAlignmentTest, ThreeGoodMarkersWinAgainstFourThatMovedEachItsOwnWay) {
+  const MarkerMap room = Room(7);
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    MarkerMap current = Seen(room, 0.0005, seed);
+    Move(current, 0, {0.3, 0, 0});
+    Move(current, 2, {0, -0.2, 0});
+    Move(current, 3, {-0.1, 0.1, 0.05});
+    Move(current, 6, {0.05, 0.2, 0});
+    const AlignmentOutcome outcome = AlignScenes(room, current, {});
+    ASSERT_TRUE(outcome.alignment) << outcome.failure;
+    EXPECT_THAT(outcome.alignment->markers_used, ElementsAre(1, 4, 5));
+    EXPECT_THAT(outcome.alignment->markers_rejected, SizeIs(4));
+  }
+}
+
+TEST(SceneAlignmentTest, OneGoodMarkerAgainstManyMovedIsNoAnswer) {
+  const MarkerMap room = Room(5);
+  MarkerMap current = Seen(room, 0.0005, 3);
+  Move(current, 1, {0.3, 0, 0});
+  Move(current, 2, {0, -0.2, 0});
+  Move(current, 3, {-0.1, 0.1, 0.05});
+  Move(current, 4, {0.05, 0.2, 0});
+  const AlignmentOutcome outcome = AlignScenes(room, current, {});
+  EXPECT_FALSE(outcome.alignment);
+  EXPECT_THAT(outcome.failure, HasSubstr("did not move"));
+}
+
+TEST(SceneAlignmentTest, TwoGroupsOfEqualSizeAreNoAnswer) {
+  const MarkerMap room = Room(6);
+  MarkerMap current = Seen(room, 0.0005, 4);
+  for (const int id : {0, 1, 2}) Move(current, id, {0.1, 0.05, 0});
+  const AlignmentOutcome outcome = AlignScenes(room, current, {});
+  EXPECT_FALSE(outcome.alignment);
+  EXPECT_THAT(outcome.failure, HasSubstr("two groups of 3"));
+}
+
+TEST(SceneAlignmentTest, FewerThanThreeSharedMarkersAreNoAnswerInBestOnly) {
+  const MarkerMap room = Room(6);
+  MarkerMap current = Seen(room, 0.0005, 5);
+  for (const int id : {0, 1, 2, 3}) current.erase(id);
+  const AlignmentOutcome best = AlignScenes(room, current, {});
+  EXPECT_FALSE(best.alignment);
+  EXPECT_EQ(best.failure, "scan needs at least 3 markers shared with the reference, found 2 (ids 4, 5); keep the markers in view");
+  current.erase(4);
+  const AlignmentOutcome paper = AlignScenes(room, current, Using(Preset::kPaper));
+  ASSERT_TRUE(paper.alignment);  // four coplanar corners determine a pose
+  EXPECT_THAT(paper.alignment->markers_used, ElementsAre(5));
+  current.clear();
+  EXPECT_FALSE(AlignScenes(room, current, Using(Preset::kPaper)).alignment);
+}
+
+TEST(SceneAlignmentTest, PreciseMarkersOutweighVagueOnes) {
+  MarkerMap room = Room(6);
+  for (const int id : {0, 2, 4}) room.at(id).sigma_m = 0.02;
+  double weighted = 0, equal = 0;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    MarkerMap current = Seen(room, 0.0005, seed);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0, 0.02);
+    for (const int id : {0, 2, 4}) {
+      for (Eigen::Vector3d& p : current.at(id).corners) p += Eigen::Vector3d(noise(random), noise(random), noise(random));
+    }
+    const AlignmentOutcome best = AlignScenes(room, current, {});
+    ASSERT_TRUE(best.alignment);
+    EXPECT_THAT(best.alignment->markers_rejected, IsEmpty());
+    weighted += WorstCorner_m(*best.alignment, room);
+    equal += WorstCorner_m(*AlignScenes(room, current, Using(Preset::kPaper)).alignment, room);
+  }
+  EXPECT_LT(weighted, 0.2 * equal);  // measured 0.06
+}
+
+TEST(SceneAlignmentTest, CovarianceMatchesTheScatterOfRepeatedScans) {
+  const MarkerMap room = Room(6, 0.001);
+  Matrix6d scatter = Matrix6d::Zero();
+  Matrix6d claimed = Matrix6d::Zero();
+  constexpr int kTrials = 400;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const AlignmentOutcome outcome = AlignScenes(room, Seen(room, 0.001 * std::sqrt(2.0), static_cast<unsigned>(trial) + 1), {});
+    ASSERT_TRUE(outcome.alignment);
+    const Eigen::Vector3d c = outcome.alignment->centre_m;
+    const Pose error = Eigen::Translation3d(-c) * outcome.alignment->T_reference_current * kTrue.inverse() * Eigen::Translation3d(c);
+    const Vector6d twist = TwistFromPose(error);
+    scatter += twist * twist.transpose() / kTrials;
+    claimed += outcome.alignment->covariance / kTrials;
+  }
+  // Corners here are independent, the claim counts four as two: it is twice the scatter.
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(claimed(i, i) / scatter(i, i), 2.0, 0.5) << i;
+}
+
+TEST(SceneAlignmentTest, DamagedCornersAreNotShared) {
+  const MarkerMap room = Room(4);
+  MarkerMap current = Seen(room, 0, 1);
+  current.at(2).corners[1].x() = std::nan("");
+  const AlignmentOutcome outcome = AlignScenes(room, current, {});
+  ASSERT_TRUE(outcome.alignment);
+  EXPECT_THAT(outcome.alignment->markers_used, ElementsAre(0, 1, 3));
+}
+
+}  // namespace
+}  // namespace plumb
