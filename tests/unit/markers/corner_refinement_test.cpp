@@ -94,13 +94,13 @@ Errors Measure(const Trial& trial, unsigned seed) {
   return errors;
 }
 
-// Limits: about twice what was measured over six seeds (inward -0.004 to 0.001, sigma 0.017 to 0.020).
-TEST(CornerRefinementTest, LightBlurLeavesNoBias) { EXPECT_THAT(Measure({}, 1), AreWithin(0.01, 0.04)); }
+// Figures here and below: over six seeds; limits leave about as much again. Measured: inward -0.008 to -0.005, sigma 0.018 to 0.024.
+TEST(CornerRefinementTest, LightBlurLeavesNoBias) { EXPECT_THAT(Measure({}, 1), AreWithin(0.015, 0.05)); }
 
-// Measured: inward -0.018 to 0.011, sigma 0.040 to 0.047.
-TEST(CornerRefinementTest, MotionBlurLeavesNoBias) { EXPECT_THAT(Measure({.look = {.motion_px = 5}}, 2), AreWithin(0.035, 0.08)); }
+// Measured: inward -0.019 to -0.009, sigma 0.038 to 0.059.
+TEST(CornerRefinementTest, MotionBlurLeavesNoBias) { EXPECT_THAT(Measure({.look = {.motion_px = 5}}, 2), AreWithin(0.04, 0.1)); }
 
-// Measured: 0.34 px inward where the tone curve is left in, -0.003 where it is undone.
+// Measured: 0.30 to 0.34 px inward where the tone curve is left in; where it is undone -0.007 to 0.004, sigma 0.017 to 0.028.
 TEST(CornerRefinementTest, EncodedValuesWouldPullCornersInward) {
   const Trial encoded{.look = {.blur_px = 1.2}, .options = {.linear_light = false}, .count = 10};
   const Trial linear{.look = {.blur_px = 1.2}, .count = 10};
@@ -108,7 +108,8 @@ TEST(CornerRefinementTest, EncodedValuesWouldPullCornersInward) {
   EXPECT_THAT(Measure(linear, 3), AreWithin(0.02, 0.06));
 }
 
-// A lens that bends the sides by up to a pixel. Measured: sigma 0.31 where that is ignored, 0.019 where it is allowed for.
+// A lens that bends the sides by up to a pixel. Measured: sigma 0.30 to 0.34 where that is ignored; where it is
+// allowed for inward -0.003 to 0.004, sigma 0.015 to 0.022.
 TEST(CornerRefinementTest, LensBowIsAllowedFor) {
   const Trial ignored{.side_px = 150, .camera = CameraWithLens(), .count = 4};
   const Trial allowed{.side_px = 150, .options = {.intrinsics = CameraWithLens()}, .camera = CameraWithLens(), .count = 4};
@@ -116,22 +117,24 @@ TEST(CornerRefinementTest, LensBowIsAllowedFor) {
   EXPECT_THAT(Measure(allowed, 4), AreWithin(0.02, 0.04));
 }
 
-// Measured: 30 px side inward -0.006, sigma 0.022; 20 px (cells of 2.5 px) inward 0.016, sigma 0.055.
+// Measured: 30 px side inward -0.011 to -0.005, sigma 0.017 to 0.031; 20 px (cells of 2.5 px) inward -0.007 to 0.011, sigma 0.029 to 0.057,
+// one refused in 45.
 TEST(CornerRefinementTest, DegradesGracefullyOnSmallMarkers) {
-  EXPECT_THAT(Measure({.side_px = 30}, 5), AreWithin(0.02, 0.05));
+  EXPECT_THAT(Measure({.side_px = 30}, 5), AreWithin(0.025, 0.06));
   EXPECT_THAT(Measure({.side_px = 20, .start_error_px = 0.5}, 6), AreWithin(0.04, 0.12));
 }
 
-// Measured: 0.75 to 0.95 of the stated value.
+// Measured: 0.62 to 1.08 of the stated value.
 TEST(CornerRefinementTest, StatedSigmaMatchesTheErrors) {
   for (const double noise : {0.5, 5.0}) {
     const Errors errors = Measure({.look = {.noise = noise}, .count = 12}, 7);
-    EXPECT_GT(errors.over_stated, 0.5) << noise;
-    EXPECT_LT(errors.over_stated, 1.4) << noise;
+    EXPECT_GT(errors.over_stated, 0.4) << noise;
+    EXPECT_LT(errors.over_stated, 1.5) << noise;
   }
 }
 
-// Measured: dim and strongly shaded, inward -0.004, sigma 0.032; sheet cut half a cell (4 px) from the square, inward 0.096, sigma 0.086.
+// Measured: dim and strongly shaded, inward -0.010 to -0.002, sigma 0.025 to 0.034; sheet cut half a cell (4 px) from the square, inward
+// 0.087 to 0.095, sigma 0.076 to 0.091.
 TEST(CornerRefinementTest, DimAndNarrowSheetsStillWork) {
   const SceneLook dim{.white = 0.15, .black = 0.01, .ground = 0.05, .shading = 0.6};
   EXPECT_THAT(Measure({.look = dim, .count = 12}, 8), AreWithin(0.02, 0.07));

@@ -80,7 +80,7 @@ TEST(MarkerDetectorTest, FindsMarkersOfEveryDictionary) {
     const PlacedMarker marker = RandomMarker(id, 80, 40 * kDegree, kLength_m, Camera(), random);
     const MarkerDetection found = detector.Detect(Render(dictionary, {marker}, Camera(), {}, random));
     ASSERT_THAT(Ids(found), ElementsAre(id)) << name;
-    // Measured: at most 0.06 px.
+    // Measured over 4 seeds x 22 families: at most 0.08 px.
     EXPECT_LT(LargestError(found.markers[0].corners, TrueCorners(marker, kLength_m, Camera())), 0.15) << name;
   }
 }
@@ -173,15 +173,15 @@ TEST(MarkerDetectorTest, WorksOnHalfResolutionAndSmallMarkers) {
     const PlacedMarker near = RandomMarker(trial, 32, 35 * kDegree, kLength_m, half, random);
     const MarkerDetection seen = detector.Detect(Render(dictionary, {near}, half, {}, random));
     ASSERT_THAT(Ids(seen), ElementsAre(trial));
-    EXPECT_LT(LargestError(seen.markers[0].corners, TrueCorners(near, kLength_m, half)), 0.3);  // measured: at most 0.13
+    EXPECT_LT(LargestError(seen.markers[0].corners, TrueCorners(near, kLength_m, half)), 0.3);  // measured over 4 seeds: at most 0.15
     const PlacedMarker far = RandomMarker(trial, 20, 25 * kDegree, kLength_m, half, random);
     const MarkerDetection small = detector.Detect(Render(dictionary, {far}, half, {}, random));
     if (small.markers.empty()) continue;
     ++found_20px;
     EXPECT_THAT(Ids(small), ElementsAre(trial));
-    EXPECT_LT(LargestError(small.markers[0].corners, TrueCorners(far, kLength_m, half)), 0.6);
+    EXPECT_LT(LargestError(small.markers[0].corners, TrueCorners(far, kLength_m, half)), 0.5);  // measured: at most 0.15
   }
-  EXPECT_GE(found_20px, 25);
+  EXPECT_GE(found_20px, 26);  // measured: 28 to 30
 }
 
 // Anything may come from outside: sizes from one pixel up, noise, stripes, checkerboards, shuffled pieces of markers.
