@@ -1,0 +1,8 @@
+// Any bytes as a colour image (JPEG by the seeds).
+#include "drivers/replay/image_file.hpp"
+
+#include "tests/fuzz/fuzz_one.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  return plumb::fuzz::One([&] { (void)plumb::DecodeColorImage({data, size}, "fuzz"); });
+}

@@ -1,0 +1,84 @@
+// Writes small good inputs for each fuzz target: plumb_fuzz_seeds FOLDER makes FOLDER/png, FOLDER/jpeg and so on.
+#include <filesystem>
+#include <opencv2/core.hpp>
+
+#include "daemon/files/ply_file.hpp"
+#include "daemon/files/scene_json.hpp"
+#include "daemon/files/trajectory_file.hpp"
+#include "drivers/replay/file_io.hpp"
+#include "drivers/replay/image_file.hpp"
+#include "drivers/replay/tum_writer.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path Folder(const fs::path& folder) {
+  fs::create_directories(folder);
+  return folder;
+}
+
+void WriteImages(const fs::path& root) {
+  cv::Mat rgb(9, 11, CV_8UC3, cv::Scalar(10, 120, 250));
+  rgb.at<cv::Vec3b>(4, 5) = cv::Vec3b(255, 0, 7);
+  cv::Mat depth(9, 11, CV_16UC1, cv::Scalar(5000));
+  depth.at<std::uint16_t>(3, 3) = 0;
+  const fs::path png = Folder(root / "png");
+  WritePng(png / "rgb", rgb);
+  WritePng(png / "depth", depth);
+  WritePng(png / "grey", cv::Mat(3, 2, CV_8UC1, cv::Scalar(9)));
+  const fs::path jpeg = Folder(root / "jpeg");
+  WriteJpeg(jpeg / "fine", rgb, 95);
+  WriteJpeg(jpeg / "coarse", rgb, 5);
+  WriteFloatTiff(Folder(root / "tiff") / "map", cv::Mat(5, 4, CV_32FC1, cv::Scalar(0.5)));
+}
+
+void WriteTexts(const fs::path& root) {
+  StreamInfo info;
+  info.reference_marker = 3;
+  const std::string camera = CameraFileText(info, 5000);
+  WriteWholeFile(Folder(root / "camera") / "registered", camera);
+  std::string depth_camera = camera;
+  depth_camera.replace(depth_camera.find("depth_registered: 1"), 19,
+                       "depth_registered: 0\ndepth_camera_matrix: [ 570., 0., 320., 0., 570., 240., 0., 0., 1. ]\n"
+                       "depth_distortion_coefficients: [ 0.1, 0., 0., 0., 0. ]\n"
+                       "T_color_depth: [ 1., 0., 0., 0.02, 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1. ]");
+  WriteWholeFile(root / "camera/unregistered", depth_camera);
+  WriteWholeFile(Folder(root / "index") / "rgb", std::string_view("# c\n1.0 rgb/1.png\n1.033 rgb/2.png\r\n1305031102.175304 a b.png\n"));
+
+  Scene scene;
+  scene.frame = SceneFrame::kReferenceMarker;
+  scene.marker_dictionary = "DICT_6X6_250";
+  scene.marker_length_m = 0.104;
+  scene.reference_marker = 5;
+  scene.markers[5] = {CornersInMarkerFrame(0.104), 4, 0.001};
+  scene.height_map.emplace(GridShape{0, 0, 0.0015, 4, 3});
+  scene.keyframes = {{1.0, Pose::Identity()}, {2.0, Pose::Identity()}};
+  scene.timings_s["mesh"] = 0.1;
+  scene.warnings = {"w"};
+  WriteWholeFile(Folder(root / "scene") / "scene", SceneJson(scene));
+  WriteWholeFile(Folder(root / "trajectory") / "two", TrajectoryText(scene.keyframes));
+}
+
+void WriteSurfaces(const fs::path& root) {
+  PointCloud cloud;
+  cloud.points = {{0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
+  cloud.normals = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
+  cloud.colors = {Color{1, 2, 3}, Color{4, 5, 6}, Color{7, 8, 9}};
+  const fs::path ply = Folder(root / "ply");
+  WriteCloudPly(ply / "cloud", cloud);
+  WriteMeshPly(ply / "mesh", {cloud.points, {}, cloud.colors, {{0, 1, 2}}});
+}
+
+}  // namespace
+}  // namespace plumb
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 2;
+  const std::filesystem::path root = argv[1];
+  plumb::WriteImages(root);
+  plumb::WriteTexts(root);
+  plumb::WriteSurfaces(root);
+  return 0;
+}

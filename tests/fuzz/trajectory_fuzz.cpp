@@ -1,0 +1,8 @@
+// Any text as a trajectory.
+#include "daemon/files/trajectory_file.hpp"
+
+#include "tests/fuzz/fuzz_one.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  return plumb::fuzz::One([&] { (void)plumb::ParseTrajectory(plumb::fuzz::Text(data, size), "fuzz"); });
+}
