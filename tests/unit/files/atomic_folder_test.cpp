@@ -2,11 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <fstream>
@@ -15,6 +11,7 @@
 
 #include "algo/types/errors.hpp"
 #include "drivers/replay/file_io.hpp"
+#include "tests/support/full_disk.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -28,6 +25,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::MessageOf;
 using testing::TempFolder;
+using testing::WriteOnFullDisk;
+using testing::WriteOutcome;
 
 OutputKind Kind() { return {"thing", "thing.json", {"thing.json", "data"}}; }
 
@@ -158,29 +157,16 @@ TEST(AtomicFolderTest, TheDisksRefusalIsAnIoErrorThatSaysWhatToDo) {
   EXPECT_THAT(DescribeWriteError("a/b", ENOSPC), AllOf(HasSubstr("cannot write a/b"), HasSubstr("No space left"), HasSubstr("free space")));
 }
 
-// A file size limit stands for a full disk: the kernel cuts a write short in the middle, then refuses it.
 TEST(AtomicFolderTest, ADiskThatFillsUpLeavesNothing) {
   const TempFolder folder;
   WriteThing(folder / "out", "old");
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    ::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{1'000'000, 1'000'000};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-    int code = 0;
-    try {
-      AtomicFolder output(folder / "out", Kind());
-      WriteWholeFile(output.path() / "data", std::vector<std::uint8_t>(3'000'000, 7));
-      output.Commit();
-    } catch (const IoError& error) {
-      code = std::string(error.what()).find("File too large") != std::string::npos ? 42 : 41;
-    }
-    ::_exit(code);
-  }
-  int status = 0;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  EXPECT_EQ(WEXITSTATUS(status), 42);
+  EXPECT_EQ(WriteOnFullDisk(1'000'000,
+                            [&] {
+                              AtomicFolder output(folder / "out", Kind());
+                              WriteWholeFile(output.path() / "data", std::vector<std::uint8_t>(3'000'000, 7));
+                              output.Commit();
+                            }),
+            WriteOutcome::kIoError);
   EXPECT_THAT(Names(folder.path()), ElementsAre("out"));
   EXPECT_EQ(ReadTextFile(folder / "out/thing.json", 10), "old");
 }

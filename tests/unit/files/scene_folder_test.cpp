@@ -16,6 +16,7 @@
 #include "daemon/files/trajectory_file.hpp"
 #include "drivers/replay/file_io.hpp"
 #include "drivers/replay/image_file.hpp"
+#include "tests/support/full_disk.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -205,6 +206,19 @@ TEST_F(SceneFolderTest, WhatIsNotFiniteIsNeverWritten) {
   scene.markers[11].corners[0].x() = std::nan("");
   EXPECT_THROW(WriteScene(scene, folder_ / "nan"), std::invalid_argument);
   EXPECT_FALSE(fs::exists(folder_ / "nan"));
+}
+
+// The limit falls into another of the files each time.
+TEST_F(SceneFolderTest, AFullDiskKeepsTheOldSceneAndLeavesNothingElse) {
+  const std::string before = ReadTextFile(scene_ / "scene.json", 1 << 20);
+  for (const unsigned long max_bytes : {0UL, 150UL, 300UL, 350UL}) {
+    const auto outcome = testing::WriteOnFullDisk(max_bytes, [&] { WriteScene(SmallScene(), scene_); });
+    EXPECT_EQ(outcome, testing::WriteOutcome::kIoError) << max_bytes;
+    EXPECT_EQ(ReadTextFile(scene_ / "scene.json", 1 << 20), before);
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()), 1) << max_bytes;
+    EXPECT_EQ(ReadScene(scene_, {.mesh = true}).cloud.size(), 2U);
+  }
+  EXPECT_EQ(testing::WriteOnFullDisk(100'000, [&] { WriteScene(SmallScene(), scene_); }), testing::WriteOutcome::kDone);
 }
 
 // ---- bad input
