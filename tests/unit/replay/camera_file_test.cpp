@@ -119,7 +119,7 @@ TEST(CameraFileTest, WhatIsNoYamlIsRefused) {
   EXPECT_THAT(Refusal(""), HasSubstr("rec/camera.yaml"));
   EXPECT_THAT(Refusal("just words"), HasSubstr("rec/camera.yaml"));
   EXPECT_THAT(Refusal("%YAML:1.0\n---\na: [1, 2\nb: }"), HasSubstr("rec/camera.yaml"));
-  EXPECT_THAT(Refusal(std::string("%YAML:1.0\n---\na: \0", 20)), HasSubstr("zero bytes"));
+  EXPECT_THAT(Refusal(std::string("%YAML:1.0\n---\na: ") + '\0'), HasSubstr("zero bytes"));
   EXPECT_THAT(Refusal("%YAML:1.0\n---\na: " + std::string(30000, '[')), HasSubstr("nests deeper"));
   std::string dashes = "%YAML:1.0\n---\na:\n   ";
   for (int i = 0; i < 10000; ++i) dashes += "- ";
