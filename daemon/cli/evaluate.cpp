@@ -6,8 +6,10 @@
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/cli/progress.hpp"
+#include "daemon/cli/text_report.hpp"
 #include "daemon/evaluation/evaluation.hpp"
 #include "daemon/evaluation/report.hpp"
+#include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/scan_runner.hpp"
 #include "drivers/replay/file_io.hpp"
@@ -20,6 +22,7 @@ struct Options {
   std::optional<std::filesystem::path> out;
   MethodOptions method;
   bool reuse = false;
+  bool results = false;
   bool json = false;
 };
 
@@ -47,6 +50,16 @@ int Run(const Options& options, const CommandContext& context) {
     if (options.reuse && IsSceneFolder(folder)) return ReadScene(folder);
     return Reconstruct(suite, name, config, folder, context, progress);
   };
+  if (options.results) {
+    evaluate.store = [&](const std::string& reference, const std::string& current, const Scene& reference_scene,
+                         const Comparison& comparison) {
+      const HeightMap* heights = reference_scene.height_map ? &*reference_scene.height_map : nullptr;
+      WriteResult(
+          comparison,
+          DrawResult(comparison, heights, {.tolerance_m = config.compare.shift_tolerance_m, .subtitle = PictureSubtitle(comparison)}),
+          out / "results" / (reference + "_" + current));
+    };
+  }
   const Evaluation evaluation =
       EvaluateSuite(suite, evaluate, context.stop, [&](const std::string& step, double fraction) { progress.Update(step, fraction); });
   progress.Clear();
@@ -65,6 +78,7 @@ Command AddEvaluate(CLI::App& app) {
   app.add_option("--out", options->out, "Folder for scenes and figures; default SUITE_DIR/results-PRESET")->type_name("DIR");
   options->method.AddTo(app);
   app.add_flag("--reuse", options->reuse, "Keep the scenes that an earlier run left in the folder instead of reconstructing them again");
+  app.add_flag("--results", options->results, "Write the result folder of every pair too");
   app.add_flag("--json", options->json, "Print the figures as JSON on the standard output");
   return [options](const CommandContext& context) { return Run(*options, context); };
 }

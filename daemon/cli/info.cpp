@@ -7,6 +7,7 @@
 #include "algo/types/errors.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
+#include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/files/scene_json.hpp"
 #include "drivers/replay/file_io.hpp"
@@ -72,13 +73,9 @@ int Run(const Options& options) {
   if (IsSceneFolder(options.path)) {
     facts = {{"kind", "scene"}};
     facts.update(ordered_json::parse(SceneJson(ReadScene(options.path, {.cloud = false, .height_map = false, .mesh = false}))));
-  } else if (fs::is_regular_file(options.path / "result.json")) {
+  } else if (IsResultFolder(options.path)) {
     facts = {{"kind", "result"}};
-    try {
-      facts.update(ordered_json::parse(ReadTextFile(options.path / "result.json", kMaxJsonBytes)));
-    } catch (const nlohmann::json::exception& error) {
-      throw DataError(fmt::format("'{}' is not valid JSON: {}", (options.path / "result.json").string(), error.what()));
-    }
+    facts.update(ordered_json::parse(ReadResultJson(options.path)));
   } else if (IsTumRecording(options.path)) {
     facts = RecordingFacts(options.path);
   } else {

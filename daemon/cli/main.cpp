@@ -64,6 +64,7 @@ int Main(int argc, char** argv) {
     commands.emplace_back(command, add_options(*command));
   };
   add("reconstruct", "Turn a recording into a scene: trajectory, markers, surface, height map", AddReconstruct);
+  add("compare", "Compare a current scene with a reference: error map, motion of the body, six couch numbers, verdict", AddCompare);
   add("mesh", "Export the surface of a scene as PLY, STL or OBJ", AddMesh);
   add("info", "Describe a recording, a scene or a result", AddInfo);
   add("evaluate", "Measure the accuracy on a suite of recordings with truth, beside the paper's table", AddEvaluate);

@@ -29,7 +29,7 @@ std::string NumberRow(const char* name, const std::optional<double>& value, cons
   if (!value) return fmt::format("  {:<14}   refused: couch-fixed markers tell posture only\n", name);
   const bool is_in = u95 && std::abs(*value) + *u95 <= tolerance;
   const int digits = std::string_view(unit) == "mm" ? 1 : 2;
-  return fmt::format("  {:<14} {:>+9.{}f} {:<4}  +-{:>5.{}f}   {:>5.3g} {:<4} {}  {}\n", name, *value, digits, unit, u95.value_or(NAN),
+  return fmt::format("  {:<14} {:>+9.{}f} {:<4}  ±{:>5.{}f}   {:>5.3g} {:<4} {}  {}\n", name, *value, digits, unit, u95.value_or(NAN),
                      digits, tolerance, unit, is_in ? "ok  " : "MOVE", words);
 }
 
@@ -67,7 +67,7 @@ std::string TrustLines(const Comparison& comparison) {
     text += fmt::format("  surface residual {:.2f} mm median, {:.2f} mm 95th percentile\n", motion->residual_median_m / kMillimetre,
                         motion->residual_p95_m / kMillimetre);
     for (const WeakDirection& weak : motion->weak_directions) {
-      text += fmt::format("  not well seen    {}: +-{:.3g} {}\n", weak.name, weak.u95, weak.unit);
+      text += fmt::format("  not well seen    {}: ±{:.3g} {}\n", weak.name, weak.u95, weak.unit);
     }
   }
   for (const std::string& warning : comparison.warnings) text += fmt::format("  warning          {}\n", warning);

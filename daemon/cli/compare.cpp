@@ -1,0 +1,90 @@
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "algo/comparison/comparison.hpp"
+#include "algo/types/errors.hpp"
+#include "daemon/cli/commands.hpp"
+#include "daemon/cli/common_options.hpp"
+#include "daemon/cli/progress.hpp"
+#include "daemon/cli/text_report.hpp"
+#include "daemon/files/atomic_folder.hpp"
+#include "daemon/files/result_folder.hpp"
+#include "daemon/files/scene_folder.hpp"
+#include "daemon/scan_runner.hpp"
+
+namespace plumb {
+namespace {
+
+struct Options {
+  std::filesystem::path reference, current, out;
+  std::optional<std::filesystem::path> region;
+  std::vector<double> isocentre_m;
+  MethodOptions method;
+  bool paper_colors = false;
+  bool json = false;
+};
+
+CompareOptions MethodOf(const Options& options) {
+  Config config = options.method.Read();
+  CompareOptions compare = std::move(config.compare);
+  if (const auto& file = options.region ? options.region : config.region_file) compare.region_polygon_m = ReadRegion(*file);
+  if (!options.isocentre_m.empty()) compare.isocentre_m = Eigen::Vector3d(options.isocentre_m.data());
+  compare.now_s = SteadySeconds;
+  return compare;
+}
+
+int Run(const Options& options, const CommandContext& context) {
+  const CompareOptions method = MethodOf(options);
+  { const AtomicFolder check(options.out, ResultOutput()); }  // refuses a bad place before the work
+  Progress progress;
+  const auto stop_if_asked = [&] {
+    if (context.stop.stop_requested()) throw Interrupted("nothing was written");
+  };
+  progress.Update("reading scenes", 0.1);
+  const Scene reference = ReadScene(options.reference);
+  stop_if_asked();
+  const Scene current = ReadScene(options.current);
+  stop_if_asked();
+  progress.Update("comparing", 0.3);
+  Comparison comparison = Compare(reference, current, method);
+  stop_if_asked();
+  progress.Update("drawing", 0.8);
+  const double start_s = SteadySeconds();
+  const ResultPictures pictures =
+      DrawResult(comparison, reference.height_map ? &*reference.height_map : nullptr,
+                 {.tolerance_m = method.shift_tolerance_m, .paper_colors = options.paper_colors, .subtitle = PictureSubtitle(comparison)});
+  comparison.timings_s["pictures"] = SteadySeconds() - start_s;
+  stop_if_asked();
+  progress.Update("writing", 0.9);
+  WriteResult(comparison, pictures, options.out);
+  progress.Clear();
+  PrintOut(options.json ? ResultJson(comparison)
+                        : ComparisonText(comparison, method) + fmt::format("\nWritten to {}\n", options.out.string()));
+  return comparison.verdict == Verdict::kNoAnswer ? kNoAnswer : kDone;
+}
+
+}  // namespace
+
+Command AddCompare(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("reference", options->reference, "Scene folder of the reference")->required()->type_name("REFERENCE_SCENE");
+  app.add_option("current", options->current, "Scene folder of the current scan")->required()->type_name("CURRENT_SCENE");
+  app.add_option("--out", options->out, "Result folder to write")->required()->type_name("RESULT");
+  options->method.AddTo(app);
+  app.add_option("--region", options->region,
+                 "Region of interest, a JSON polygon in the reference marker's frame; default: the segmented body")
+      ->type_name("FILE");
+  app.add_option("--isocentre", options->isocentre_m, "Isocentre in the reference marker's frame, metres; default: the region's centroid")
+      ->expected(3)
+      ->type_name("X Y Z");
+  app.add_flag("--paper-colours", options->paper_colors, "Draw the error map on the paper's scale: |e|, blue at 0 to red at 10 cm");
+  app.add_flag("--json", options->json, "Print result.json on the standard output");
+  app.footer("\nExit code 4 with the verdict no_answer: the result is written and says why.");
+  return [options](const CommandContext& context) { return Run(*options, context); };
+}
+
+}  // namespace plumb
