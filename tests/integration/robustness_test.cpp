@@ -1,0 +1,181 @@
+// Interruptions, full disks, foreign folders, damaged scenes, and the same bytes every time.
+#include <csignal>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/integration/command_line.hpp"
+
+namespace plumb {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+const std::string& Reference() { return SmallNames()[0]; }
+
+class RobustnessTest : public CommandLineTest {
+ protected:
+  /// Everything of a scene but the timings, which no run repeats.
+  static std::map<std::string, std::string> Bytes(const fs::path& scene) {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::directory_iterator(scene)) files[entry.path().filename().string()] = ReadText(entry.path());
+    auto facts = nlohmann::json::parse(files.at("scene.json"));
+    facts.erase("timings_s");
+    files["scene.json"] = facts.dump();
+    return files;
+  }
+
+  void ExpectSame(const fs::path& a, const fs::path& b) {
+    const auto first = Bytes(a), second = Bytes(b);
+    ASSERT_EQ(first.size(), second.size());
+    for (const auto& [name, bytes] : first) EXPECT_TRUE(second.contains(name) && second.at(name) == bytes) << name << " differs";
+  }
+};
+
+TEST_F(RobustnessTest, TwoRunsGiveTheSameBytes) {
+  ASSERT_EQ(Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "again"}).exit_code, 0);
+  ExpectSame(SmallScene(Reference()), folder_ / "again");
+}
+
+TEST_F(RobustnessTest, OneProcessorGivesTheSameBytesAsTwo) {
+  ASSERT_EQ(Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "one"}, {.num_cpus = 1}).exit_code, 0);
+  ASSERT_EQ(Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "two"}, {.num_cpus = 2}).exit_code, 0);
+  ExpectSame(folder_ / "one", folder_ / "two");
+}
+
+TEST_F(RobustnessTest, ThePaperPresetRepeatsToo) {
+  for (const auto& [name, cpus] : {std::pair("one", 1), std::pair("two", 2)}) {
+    ASSERT_EQ(
+        Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / name, "--preset", "paper"}, {.num_cpus = cpus}).exit_code, 0);
+  }
+  ExpectSame(folder_ / "one", folder_ / "two");
+}
+
+TEST_F(RobustnessTest, TheSimulatorRepeats) {
+  for (const auto& [name, cpus] : {std::pair("one", 1), std::pair("two", 2)}) {
+    const RunResult made =
+        Plumb({"simulate", "--suite", "demo", "--frames", "3", "--size", "320x240", "--out", folder_ / name}, {.num_cpus = cpus});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+  }
+  for (const auto& entry : fs::recursive_directory_iterator(folder_ / "one")) {
+    if (!entry.is_regular_file()) continue;
+    const fs::path other = folder_ / "two" / fs::relative(entry.path(), folder_ / "one");
+    EXPECT_EQ(ReadText(entry.path()), ReadText(other)) << other;
+  }
+}
+
+TEST_F(RobustnessTest, CtrlCEndsWith130AndLeavesNothing) {
+  struct Case {
+    std::vector<std::string> arguments;
+    const char* started;  ///< Printed once the work is under way.
+    int signal;
+  };
+  const std::vector<Case> cases = {
+      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene"}, "tracking", SIGINT},
+      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene"}, "tracking", SIGTERM},
+      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene", "--preset", "paper"}, "tracking", SIGINT},
+      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene", "--realtime"}, "tracking", SIGINT},
+      {{"simulate", "--suite", "nine", "--out", folder_ / "suite"}, "simulating", SIGINT},
+  };
+  for (const Case& c : cases) {
+    Process process(PlumbCommand(c.arguments));
+    ASSERT_TRUE(process.WaitForStderr(c.started)) << process.err();
+    process.Signal(c.signal);
+    EXPECT_EQ(process.Wait(), 130) << process.err();
+    EXPECT_EQ(process.out(), "");
+    EXPECT_THAT(LeftBehind({}), IsEmpty()) << testing::PrintToString(c.arguments);
+  }
+}
+
+TEST_F(RobustnessTest, AnInterruptedEvaluationLeavesNoHalfScene) {
+  Process process(PlumbCommand({"evaluate", SmallSuite(), "--out", folder_ / "out"}));
+  ASSERT_TRUE(process.WaitForStderr("tracking")) << process.err();
+  process.Signal(SIGINT);
+  EXPECT_EQ(process.Wait(), 130) << process.err();
+  for (const auto& entry : fs::recursive_directory_iterator(folder_)) EXPECT_FALSE(entry.is_regular_file()) << entry.path();
+}
+
+TEST_F(RobustnessTest, AFullDiskIsExitOneAndLeavesNothing) {
+  // The largest file of a scene is some megabytes; RLIMIT_FSIZE fails the write as a full disk does.
+  const RunResult scene = Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene"}, {.max_file_bytes = 100'000});
+  EXPECT_EQ(scene.exit_code, 1) << scene.err;
+  EXPECT_THAT(scene.err, HasSubstr("cannot write"));
+  const RunResult result =
+      Plumb({"compare", SmallScene(Reference()), SmallScene(Reference()), "--out", folder_ / "result"}, {.max_file_bytes = 100'000});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  EXPECT_EQ(Plumb({"mesh", SmallScene(Reference()), "--out", folder_ / "mesh.ply"}, {.max_file_bytes = 100'000}).exit_code, 1);
+  EXPECT_EQ(
+      Plumb({"simulate", "--suite", "demo", "--frames", "3", "--size", "320x240", "--out", folder_ / "suite"}, {.max_file_bytes = 1000})
+          .exit_code,
+      1);
+  EXPECT_THAT(LeftBehind({}), IsEmpty());
+}
+
+TEST_F(RobustnessTest, AForeignFolderIsNeverReplaced) {
+  fs::create_directory(folder_ / "mine");
+  WriteText(folder_ / "mine" / "thesis.tex", "years of work");
+  EXPECT_NE(Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "mine"}).exit_code, 0);
+  EXPECT_NE(Plumb({"compare", SmallScene(Reference()), SmallScene(Reference()), "--out", folder_ / "mine"}).exit_code, 0);
+  EXPECT_NE(Plumb({"simulate", "--suite", "demo", "--frames", "3", "--out", folder_ / "mine"}).exit_code, 0);
+  EXPECT_EQ(ReadText(folder_ / "mine" / "thesis.tex"), "years of work");
+  EXPECT_THAT(LeftBehind({"mine"}), IsEmpty());
+}
+
+TEST_F(RobustnessTest, AnOlderOutputIsReplaced) {
+  const fs::path scene = Copy(SmallScene(Reference()), "scene");
+  WriteText(scene / "trajectory.txt", "old");
+  ASSERT_EQ(Plumb({"reconstruct", SmallRecording(Reference()), "--out", scene}).exit_code, 0);
+  EXPECT_NE(ReadText(scene / "trajectory.txt"), "old");
+  EXPECT_THAT(LeftBehind({"scene"}), IsEmpty());
+}
+
+TEST_F(RobustnessTest, DamagedScenesAreRefused) {
+  const auto refused = [this](const std::string& name, const std::function<void(const fs::path&)>& damage, const std::string& message) {
+    const fs::path scene = Copy(SmallScene(Reference()), name);
+    damage(scene);
+    const RunResult result = Plumb({"compare", SmallScene(Reference()), scene, "--out", folder_ / "result"});
+    EXPECT_EQ(result.exit_code, 3) << name << ": " << result.err;
+    EXPECT_THAT(result.err, HasSubstr(message)) << name;
+    EXPECT_FALSE(fs::exists(folder_ / "result")) << name;
+    fs::remove_all(scene);
+  };
+  const auto edit = [](const char* key, const nlohmann::json& value) {
+    return [=](const fs::path& scene) {
+      auto facts = nlohmann::json::parse(ReadText(scene / "scene.json"));
+      facts[key] = value;
+      WriteText(scene / "scene.json", facts.dump());
+    };
+  };
+  const auto halve = [](const char* file) {
+    return [=](const fs::path& scene) { fs::resize_file(scene / file, fs::file_size(scene / file) / 2); };
+  };
+  refused("newer", edit("format", 2), "format");
+  refused(
+      "no-json", [](const fs::path& scene) { WriteText(scene / "scene.json", "{"); }, "scene.json");
+  refused("other-dictionary", edit("marker_dictionary", "DICT_4X4_50"), "DICT_4X4_50");
+  refused("other-length", edit("marker_length", 0.2), "0.2");
+  refused("short-map", halve("heightmap.tiff"), "heightmap.tiff");
+  refused("short-cloud", halve("cloud.ply"), "cloud.ply");
+  refused(
+      "no-map", [](const fs::path& scene) { fs::remove(scene / "heightmap.tiff"); }, "heightmap.tiff");
+  refused(
+      "nan-pose",
+      [](const fs::path& scene) {
+        std::string text = ReadText(scene / "trajectory.txt");
+        const std::size_t at = text.find(' ', text.find('\n') + 1) + 1;
+        text.replace(at, text.find(' ', at) - at, "nan");
+        WriteText(scene / "trajectory.txt", text);
+      },
+      "trajectory.txt");
+  EXPECT_THAT(LeftBehind({}), IsEmpty());
+}
+
+TEST_F(RobustnessTest, ASuiteThatIsNoneIsBadInput) {
+  EXPECT_EQ(Plumb({"evaluate", folder_}).exit_code, 3);
+  EXPECT_EQ(Plumb({"evaluate", folder_ / "nowhere"}).exit_code, 3);
+  EXPECT_THAT(LeftBehind({}), IsEmpty());
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,217 @@
+// Reconstruct, compare, mesh, info and evaluate from end to end on small simulated recordings.
+#include <algorithm>
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/integration/command_line.hpp"
+
+namespace plumb {
+namespace {
+
+using nlohmann::json;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+const std::string& Reference() { return SmallNames()[0]; }
+const std::string& Current() { return SmallNames()[1]; }
+
+class ScenesTest : public CommandLineTest {};
+
+TEST_F(ScenesTest, ReconstructWritesEveryFileOfTheContract) {
+  const fs::path scene = SmallScene(Reference());
+  for (const char* file : {"scene.json", "trajectory.txt", "trajectory_all.txt", "cloud.ply", "heightmap.tiff", "mesh.ply"}) {
+    EXPECT_TRUE(fs::is_regular_file(scene / file)) << file;
+  }
+  const json facts = json::parse(ReadText(scene / "scene.json"));
+  EXPECT_EQ(facts.at("format"), 1);
+  EXPECT_EQ(facts.at("preset"), "best");
+  EXPECT_EQ(facts.at("frame"), "reference_marker");
+  EXPECT_EQ(facts.at("frames").at("total"), 30);
+  for (const char* key : {"markers", "marker_views", "heightmap", "keyframes", "calibration", "timings_s", "warnings"})
+    EXPECT_TRUE(facts.contains(key)) << key;
+  for (const char* key : {"x_min", "y_min", "step", "width", "height"}) EXPECT_TRUE(facts.at("heightmap").contains(key)) << key;
+  EXPECT_GE(facts.at("markers").size(), 3U);
+}
+
+TEST_F(ScenesTest, JsonOnTheStandardOutputIsTheFile) {
+  const RunResult result = Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(json::parse(result.out), json::parse(ReadText(folder_ / "scene" / "scene.json")));
+}
+
+TEST_F(ScenesTest, CompareTellsTheSixNumbersByName) {
+  const RunResult result = Plumb({"compare", SmallScene(Reference()), SmallScene(Current()), "--out", folder_ / "result"});
+  ASSERT_EQ(result.exit_code, 0) << result.err << result.out;
+  for (const char* name : {"vertical", "longitudinal", "lateral", "pitch", "roll", "yaw", "MOVE", "Research use only"}) {
+    EXPECT_THAT(result.out, HasSubstr(name));
+  }
+  for (const char* file : {"result.json", "deviation.tiff", "distance.tiff", "error_map.png", "overlay.png"}) {
+    EXPECT_TRUE(fs::is_regular_file(folder_ / "result" / file)) << file;
+  }
+  const json facts = json::parse(ReadText(folder_ / "result" / "result.json"));
+  EXPECT_EQ(facts.at("verdict"), "move");
+  EXPECT_EQ(facts.at("alignment").at("T_reference_current").size(), 4U);
+  EXPECT_EQ(facts.at("motion").at("covariance").size(), 6U);
+  for (const char* key : {"isocentre", "vertical_mm", "longitudinal_mm", "lateral_mm", "pitch_deg", "roll_deg", "yaw_deg", "uncertainty"}) {
+    EXPECT_TRUE(facts.at("correction").contains(key)) << key;
+  }
+}
+
+TEST_F(ScenesTest, ASceneAgainstItselfIsInTolerance) {
+  const RunResult result = Plumb({"compare", SmallScene(Reference()), SmallScene(Reference()), "--out", folder_ / "result", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json facts = json::parse(result.out);
+  EXPECT_EQ(facts.at("verdict"), "in_tolerance") << facts.at("reasons");
+  for (const char* key : {"vertical_mm", "longitudinal_mm", "lateral_mm", "pitch_deg", "roll_deg", "yaw_deg"}) {
+    EXPECT_NEAR(facts.at("correction").at(key).get<double>(), 0.0, 0.02) << key;  // both surfaces are the same numbers
+  }
+}
+
+TEST_F(ScenesTest, TheIsocentreIsTheCallers) {
+  const RunResult result = Plumb({"compare", SmallScene(Reference()), SmallScene(Current()), "--out", folder_ / "result", "--json",
+                                  "--isocentre", "0.3", "0.25", "-0.1"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(json::parse(result.out).at("correction").at("isocentre"), json({0.3, 0.25, -0.1}));
+}
+
+TEST_F(ScenesTest, ARegionThatNobodyMeasuredIsNoAnswerAndStillWritten) {
+  WriteText(folder_ / "region.json", R"({"format": 1, "frame": "reference_marker", "polygon_m": [[7, 7], [7.5, 7], [7.5, 7.5]]})");
+  const RunResult result = Plumb({"compare", SmallScene(Reference()), SmallScene(Current()), "--out", folder_ / "result", "--json",
+                                  "--region", folder_ / "region.json"});
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  const json facts = json::parse(ReadText(folder_ / "result" / "result.json"));
+  EXPECT_EQ(facts.at("verdict"), "no_answer");
+  EXPECT_FALSE(facts.at("reasons").empty());
+  WriteText(folder_ / "region.json", "[1, 2]");
+  EXPECT_EQ(
+      Plumb({"compare", SmallScene(Reference()), SmallScene(Current()), "--out", folder_ / "other", "--region", folder_ / "region.json"})
+          .exit_code,
+      3);
+  EXPECT_FALSE(fs::exists(folder_ / "other"));
+}
+
+TEST_F(ScenesTest, WithoutMarkersASceneIsMadeButNotCompared) {
+  const fs::path recording = Copy(SmallRecording(Current()), "recording");
+  std::string camera = ReadText(recording / "camera.yaml");
+  const std::size_t at = camera.find("marker_dictionary:");
+  camera.replace(at, camera.find('\n', at) - at, "marker_dictionary: DICT_7X7_50");
+  WriteText(recording / "camera.yaml", camera);
+  const RunResult made = Plumb({"reconstruct", recording, "--out", folder_ / "scene", "--json"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const json scene = json::parse(made.out);
+  EXPECT_EQ(scene.at("frame"), "first_keyframe");
+  EXPECT_TRUE(scene.at("heightmap").is_null());
+  EXPECT_FALSE(scene.at("warnings").empty());
+  // Another dictionary than the reference's cannot be compared at all; a reference without markers gives no answer.
+  EXPECT_EQ(Plumb({"compare", SmallScene(Reference()), folder_ / "scene", "--out", folder_ / "result"}).exit_code, 3);
+  EXPECT_FALSE(fs::exists(folder_ / "result"));
+  EXPECT_EQ(Plumb({"compare", folder_ / "scene", folder_ / "scene", "--out", folder_ / "result"}).exit_code, 4);
+  EXPECT_TRUE(fs::exists(folder_ / "result" / "result.json"));
+  EXPECT_EQ(Plumb({"mesh", folder_ / "scene", "--out", folder_ / "mesh.ply"}).exit_code, 3);
+}
+
+TEST_F(ScenesTest, WithoutTheReferenceMarkerTheFirstKeyframeIsTheFrame) {
+  const fs::path recording = Copy(SmallRecording(Current()), "recording");
+  std::string camera = ReadText(recording / "camera.yaml");
+  const std::size_t at = camera.find("reference_marker:");
+  camera.replace(at, camera.find('\n', at) - at, "reference_marker: 249");
+  WriteText(recording / "camera.yaml", camera);
+  const RunResult made = Plumb({"reconstruct", recording, "--out", folder_ / "scene", "--json"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_EQ(json::parse(made.out).at("frame"), "first_keyframe");
+  EXPECT_TRUE(json::parse(made.out).at("heightmap").is_null());
+  // The current scene needs no reference marker: the shared markers align it.
+  EXPECT_EQ(Plumb({"compare", SmallScene(Reference()), folder_ / "scene", "--out", folder_ / "result"}).exit_code, 0);
+}
+
+TEST_F(ScenesTest, TheConfigurationIsReadAndRefused) {
+  WriteText(folder_ / "good.toml", "[compare]\nshift_tolerance_mm = 900\nrotation_tolerance_deg = 170\n");
+  const RunResult wide = Plumb({"compare", SmallScene(Reference()), SmallScene(Current()), "--out", folder_ / "result", "--config",
+                                folder_ / "good.toml", "--json"});
+  ASSERT_EQ(wide.exit_code, 0) << wide.err;
+  EXPECT_EQ(json::parse(wide.out).at("verdict"), "in_tolerance");
+  WriteText(folder_ / "bad.toml", "[compare]\n\nshift_tolerance_mm = -1\n");
+  const RunResult bad =
+      Plumb({"compare", SmallScene(Reference()), SmallScene(Current()), "--out", folder_ / "other", "--config", folder_ / "bad.toml"});
+  EXPECT_EQ(bad.exit_code, 3);
+  EXPECT_THAT(bad.err, HasSubstr("bad.toml:3"));
+  EXPECT_FALSE(fs::exists(folder_ / "other"));
+}
+
+TEST_F(ScenesTest, ThePaperPresetRunsToAResult) {
+  for (const std::string& name : {Reference(), Current()}) {
+    const RunResult made = Plumb({"reconstruct", SmallRecording(name), "--out", folder_ / name, "--preset", "paper", "--json"});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    EXPECT_EQ(json::parse(made.out).at("preset"), "paper");
+  }
+  const RunResult result =
+      Plumb({"compare", folder_ / Reference(), folder_ / Current(), "--out", folder_ / "result", "--preset", "paper", "--paper-colours"});
+  EXPECT_THAT((std::vector<int>{0, 4}), Contains(result.exit_code)) << result.err;
+  EXPECT_TRUE(fs::exists(folder_ / "result" / "result.json"));
+}
+
+TEST_F(ScenesTest, MeshWritesEveryFormatAndRefusesOthers) {
+  for (const char* name : {"mesh.ply", "mesh.stl", "mesh.obj"}) {
+    const RunResult result = Plumb({"mesh", SmallScene(Reference()), "--out", folder_ / name});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_GT(fs::file_size(folder_ / name), 10000U);
+  }
+  EXPECT_EQ(Plumb({"mesh", SmallScene(Reference()), "--out", folder_ / "mesh.gltf"}).exit_code, 2);
+  EXPECT_EQ(Plumb({"mesh", folder_ / "nowhere", "--out", folder_ / "other.ply"}).exit_code, 3);
+  EXPECT_THAT(LeftBehind({"mesh.ply", "mesh.stl", "mesh.obj"}), IsEmpty());
+}
+
+TEST_F(ScenesTest, InfoKnowsEveryKindOfFolder) {
+  ASSERT_EQ(Plumb({"compare", SmallScene(Reference()), SmallScene(Reference()), "--out", folder_ / "result"}).exit_code, 0);
+  for (const auto& [path, kind] : {std::pair(SmallRecording(Reference()), "recording"), std::pair(SmallScene(Reference()), "scene"),
+                                   std::pair(folder_ / "result", "result")}) {
+    const RunResult text = Plumb({"info", path}), machine = Plumb({"info", path, "--json"});
+    EXPECT_EQ(text.exit_code, 0) << text.err;
+    EXPECT_THAT(text.out, HasSubstr(kind));
+    EXPECT_EQ(json::parse(machine.out).at("kind"), kind);
+  }
+}
+
+TEST_F(ScenesTest, EvaluateMeasuresAgainstTheTruth) {
+  const RunResult result = Plumb({"evaluate", SmallSuite(), "--out", folder_ / "out", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json figures = json::parse(result.out);
+  for (const char* key : {"by_reference", "total", "pairs"}) EXPECT_TRUE(figures.contains(key)) << key;
+  ASSERT_FALSE(figures.at("pairs").empty());
+  EXPECT_EQ(figures.at("total").at("without_motion"), 0);
+  const double error_mm = figures.at("total").at("translation_mm").at("max"), error_deg = figures.at("total").at("rotation_deg").at("max");
+  RecordProperty("translation_mm", std::to_string(error_mm));
+  RecordProperty("rotation_deg", std::to_string(error_deg));
+  // 320 x 240 and a tenth of a real sweep's frames: a wrong sign or frame would leave tens of millimetres.
+  EXPECT_LT(error_mm, 10.0);
+  EXPECT_LT(error_deg, 1.0);
+  const RunResult again = Plumb({"evaluate", SmallSuite(), "--out", folder_ / "out", "--reuse"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.err, Not(HasSubstr("tracking")));
+  EXPECT_THAT(again.out, HasSubstr("11.458"));  // the paper's total stands beside ours
+}
+
+TEST_F(ScenesTest, RealtimeDropsAndCountsButFinishes) {
+  const fs::path recording = Copy(SmallRecording(Reference()), "recording");
+  for (const char* index : {"rgb.txt", "depth.txt"}) {  // the first 3 s only: the pace is that of the stamps
+    std::istringstream in(ReadText(recording / index));
+    std::string text, line;
+    for (int kept = 0; kept < 10 && std::getline(in, line);) {
+      text += line + "\n";
+      kept += line[0] != '#' ? 1 : 0;
+    }
+    WriteText(recording / index, text);
+  }
+  const RunResult result = Plumb({"reconstruct", recording, "--out", folder_ / "scene", "--realtime", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json frames = json::parse(result.out).at("frames");
+  EXPECT_EQ(frames.at("total").get<int>(), 10);
+  EXPECT_LE(frames.at("tracked").get<int>() + frames.at("dropped").get<int>(), 10);
+}
+
+}  // namespace
+}  // namespace plumb
