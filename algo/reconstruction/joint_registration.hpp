@@ -17,7 +17,7 @@ struct JointRegistrationOptions {
   int max_pairs = 8;          ///< Overlapping keyframes that each keyframe is registered against.
   double min_overlap = 0.2;   ///< Share of a keyframe's cells that fall into the other.
   double dense_weight = 0.3;  ///< Of the dense terms against their noise model: what the model leaves out is shared by neighbours.
-  int num_threads = 2;        ///< Of the solver; the result does not depend on it.
+  int num_threads = 1;        ///< Of the solver. With more, its sums come in the order of the threads: no two runs agree in the last bits.
 };
 
 struct JointRegistrationResult {

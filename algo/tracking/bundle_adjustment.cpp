@@ -390,10 +390,12 @@ class Bundle {
     for (const int landmark : used_landmarks_)
       ordering.AddElementToGroup(map_.landmarks[static_cast<std::size_t>(landmark)].p_world.data(), 0);
     for (const int k : used_keyframes_) ordering.AddElementToGroup(PoseBlock(k), 1);
-    for (auto& [id, block] : markers_) ordering.AddElementToGroup(block.data(), 1);
+    // Within a group Ceres goes by addresses, and those of separate allocations differ from run to run: a group for each.
+    int group = 2;
+    for (auto& [id, block] : markers_) ordering.AddElementToGroup(block.data(), group++);
     for (double* block :
          {calibration_.lens.data(), calibration_.readout_s.data(), calibration_.edge_bias_px.data(), calibration_.depth.data()})
-      if (problem_.HasParameterBlock(block)) ordering.AddElementToGroup(block, 1);
+      if (problem_.HasParameterBlock(block)) ordering.AddElementToGroup(block, group++);
   }
 
   void WriteBack() {
