@@ -31,6 +31,7 @@ struct CommandContext {
 using Command = std::function<int(const CommandContext&)>;
 
 /// Adds the subcommand to `app` and returns how to run it once the line is parsed.
+[[nodiscard]] Command AddSimulate(CLI::App& app);
 [[nodiscard]] Command AddReconstruct(CLI::App& app);
 [[nodiscard]] Command AddCompare(CLI::App& app);
 [[nodiscard]] Command AddMesh(CLI::App& app);

@@ -63,6 +63,7 @@ int Main(int argc, char** argv) {
     command->set_help_flag("-h,--help", "Print this help and exit");
     commands.emplace_back(command, add_options(*command));
   };
+  add("simulate", "Render recordings with known truth: a mannequin, a room with markers, a hand-held sensor", AddSimulate);
   add("reconstruct", "Turn a recording into a scene: trajectory, markers, surface, height map", AddReconstruct);
   add("compare", "Compare a current scene with a reference: error map, motion of the body, six couch numbers, verdict", AddCompare);
   add("mesh", "Export the surface of a scene as PLY, STL or OBJ", AddMesh);

@@ -49,6 +49,8 @@ struct Damage {
   const char* message;  ///< Part of what must be said.
 };
 
+[[maybe_unused]] void PrintTo(const Damage& damage, std::ostream* out) { *out << damage.name; }
+
 std::vector<Damage> Damages() {
   const auto change_line = [](const char* index, std::size_t line, const std::function<void(std::string&)>& change) {
     return [=](const fs::path& recording) {
@@ -134,7 +136,7 @@ TEST_P(BadRecordingTest, IsRefusedWithAMessageAndNothingIsLeft) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, BadRecordingTest, testing::ValuesIn(Damages()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& test) { return std::string(test.param.name); });
 
 class RecordingTest : public CommandLineTest {};
 
@@ -154,7 +156,4 @@ TEST_F(RecordingTest, ThatIsAnEmptyFolderIsBadInput) {
 }
 
 }  // namespace
-
-void PrintTo(const Damage& damage, std::ostream* out) { *out << damage.name; }
-
 }  // namespace plumb

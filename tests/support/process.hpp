@@ -12,7 +12,7 @@ namespace plumb {
 struct ProcessOptions {
   int num_cpus = 0;         ///< > 0: only so many processors may be used.
   long max_file_bytes = 0;  ///< > 0: writes beyond fail with EFBIG, as a full disk does with ENOSPC.
-  std::string stdout_path;  ///< Not empty: stdout goes there instead of being captured.
+  std::string stdout_path = {};  ///< Not empty: stdout goes there instead of being captured.
 };
 
 /// A running program. The destructor kills it if it still runs.
