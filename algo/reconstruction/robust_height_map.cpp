@@ -20,7 +20,9 @@ constexpr float kMinTopShare = 0.2F;            // of a coarse cell's samples: w
 constexpr std::size_t kMinTopCount = 2;
 constexpr float kMinNormalZ = 0.17F;  // flanks steeper than 80 deg have no height
 constexpr double kMaxCells = 64e6;
-constexpr int kMinNeighbours = 5;  // of 8 measured coarse cells around an empty one: worth a try there
+constexpr int kMaxViews = 12;          // that are asked for one cell
+constexpr float kMaxMeanSlope = 2.0F;  // tan of 63 deg: over steeper squares means of corners are not trusted
+constexpr int kMinNeighbours = 5;      // of 8 measured coarse cells around an empty one: worth a try there
 
 /// A measured working pixel in a coarse cell.
 struct Sample {
@@ -90,7 +92,7 @@ std::optional<GridShape> GridAroundData(std::span<const ViewSurface> views, cons
     const Eigen::Matrix3f R = RotationOf(view);
     const Eigen::Vector3f t = TranslationOf(view);
     for (std::size_t i = 0; i < view.size(); i += 3) {
-      if (view.weights[i] <= 0.0F) continue;
+      if (view.pixels[i].weight <= 0.0F) continue;
       const Eigen::Vector3f p = R * view.PointInCamera(i) + t;
       if (p.z() < options.z_min || p.z() > options.z_max) continue;
       if (const auto cell = raster.cell(p.x(), p.y())) counts[v][*cell] += 3;
@@ -137,7 +139,7 @@ void SortIntoRows(const ViewSurface& view, std::uint32_t index, std::size_t stri
   const std::size_t cells_per_row = static_cast<std::size_t>(coarse.width) * kTile;
   // A stride that shares no factor with the image's width scatters the kept pixels over the columns.
   for (std::size_t i = index % stride; i < view.size(); i += stride) {
-    if (view.weights[i] <= 0.0F) continue;
+    if (view.pixels[i].inverse_depth <= 0.0F) continue;  // rims and grazing views too: they show where something is, if not where exactly
     const Eigen::Vector3f p = R * view.PointInCamera(i) + t;
     if (p.z() < options.z_min || p.z() > options.z_max) continue;
     if (const auto cell = coarse.cell(p.x(), p.y()))
@@ -164,18 +166,19 @@ TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, 
     for (std::size_t k = begin; k < end; ++k) {
       const ViewSurface& view = views[samples[k].view];
       const std::size_t i = samples[k].pixel;
-      const float weight = view.weights[i];
+      const float weight = view.pixels[i].weight;
+      if (weight <= 0.0F) continue;
+      ++top.count;
       const Eigen::Matrix3f R = RotationOf(view);
       top.point += weight * (R * view.PointInCamera(i) + TranslationOf(view));
       normal += weight * (R * view.normals[i]);
       weight_sum += weight;
     }
-    top.point /= weight_sum;
+    // The top is only seen by rims, or too steep: no height, and none of what lies below either.
     const float length = normal.norm();
-    if (length > 0.0F && normal.z() > kMinNormalZ * length) {
-      top.normal = normal / length;
-      top.count = static_cast<int>(end - begin);
-    }
+    if (!(weight_sum > 0.0F && normal.z() > kMinNormalZ * length)) return {};
+    top.point /= weight_sum;
+    top.normal = normal / length;
     break;
   }
   return top;
@@ -267,57 +270,125 @@ void DropSpeckles(CoarseMap& map, float max_step, std::size_t min_cells) {
   }
 }
 
-/// Measures the fine cells of one tile.
-class TileFiller {
+/// Measures the fine cells, tile by tile: every second one each way by fusion (3 mm, which is as fine as the sensor
+/// samples), the others by their neighbours' mean where those lie on one surface, else by fusion too.
+class MapFiller {
  public:
-  TileFiller(std::span<const ViewSurface> views, const CoarseMap& coarse, const RobustHeightMapOptions& options, int min_views)
-      : views_(views), coarse_(coarse), options_(options), min_views_(min_views), fusion_(views, {}) {}
+  MapFiller(std::span<const ViewSurface> views, const CoarseMap& coarse, const RobustHeightMapOptions& options, ColoredHeightMap& result)
+      : views_(views),
+        coarse_(coarse),
+        band_(static_cast<float>(options.top_surface_band)),
+        max_step_(kMaxMeanSlope * static_cast<float>(2.0 * options.cell_size)),
+        min_views_(std::min(options.min_views, static_cast<int>(views.size()))),
+        fusion_(views, {.with_normals = false, .max_views = kMaxViews}),
+        result_(result) {}
 
-  void Fill(int tile_row, int tile_column, ColoredHeightMap& result) const {
-    const int row_end = std::min((tile_row + 1) * kTile, coarse_.grid.height);
-    const int column_end = std::min((tile_column + 1) * kTile, coarse_.grid.width);
-    Eigen::AlignedBox3f box;
-    for (int row = tile_row * kTile; row < row_end; ++row)
-      for (int column = tile_column * kTile; column < column_end; ++column)
-        if (PlaneAt(row, column).count > 0) box.extend(PlaneAt(row, column).point);
-    if (box.isEmpty()) return;
-    std::vector<std::uint16_t> near;
-    fusion_.ViewsNear(box.center(), 0.5F * box.diagonal().norm() + static_cast<float>(coarse_.grid.step), near);
-    for (int row = tile_row * kTile; row < row_end; ++row)
-      for (int column = tile_column * kTile; column < column_end; ++column)
-        if (PlaneAt(row, column).count > 0) FillCoarseCell(row, column, near, result);
+  void Fill() {
+    const int tile_rows = (coarse_.grid.height + kTile - 1) / kTile;
+    const int tile_columns = (coarse_.grid.width + kTile - 1) / kTile;
+    tbb::parallel_for(0, tile_rows, [&](int row) {
+      for (int column = 0; column < tile_columns; ++column) FillTile(row, column, true);
+    });
+    // Into another array: what a cell becomes must not depend on which of its neighbours came first.
+    nodes_ = result_.map.z;
+    tbb::parallel_for(0, tile_rows, [&](int row) {
+      for (int column = 0; column < tile_columns; ++column) FillTile(row, column, false);
+    });
   }
 
  private:
+  [[nodiscard]] std::size_t Index(int row, int column) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(result_.map.grid.width) + static_cast<std::size_t>(column);
+  }
   [[nodiscard]] const TopPlane& PlaneAt(int row, int column) const {
     return coarse_.cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(coarse_.grid.width) + static_cast<std::size_t>(column)];
   }
 
-  void FillCoarseCell(int coarse_row, int coarse_column, std::span<const std::uint16_t> near, ColoredHeightMap& result) const {
-    const TopPlane& plane = PlaneAt(coarse_row, coarse_column);
-    const GridShape& grid = result.map.grid;
-    const float band = static_cast<float>(options_.top_surface_band);
+  void FillTile(int tile_row, int tile_column, bool is_node_pass) {
+    const int row_end = std::min((tile_row + 1) * kTile, coarse_.grid.height);
+    const int column_end = std::min((tile_column + 1) * kTile, coarse_.grid.width);
+    Eigen::AlignedBox3f box;
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+    for (int row = tile_row * kTile; row < row_end; ++row) {
+      for (int column = tile_column * kTile; column < column_end; ++column) {
+        if (PlaneAt(row, column).count == 0) continue;
+        box.extend(PlaneAt(row, column).point);
+        normal += PlaneAt(row, column).normal;
+      }
+    }
+    if (box.isEmpty()) return;
+    std::vector<std::uint16_t> near;
+    fusion_.ViewsNear(box.center(), 0.5F * box.diagonal().norm() + static_cast<float>(coarse_.grid.step), normal.normalized(), near);
+    for (int row = tile_row * kTile; row < row_end; ++row)
+      for (int column = tile_column * kTile; column < column_end; ++column)
+        if (PlaneAt(row, column).count > 0) FillCoarseCell(row, column, near, is_node_pass);
+  }
+
+  void FillCoarseCell(int coarse_row, int coarse_column, std::span<const std::uint16_t> near, bool is_node_pass) {
+    const GridShape& grid = result_.map.grid;
     for (int row = coarse_row * kCoarse; row < std::min((coarse_row + 1) * kCoarse, grid.height); ++row) {
       for (int column = coarse_column * kCoarse; column < std::min((coarse_column + 1) * kCoarse, grid.width); ++column) {
-        Eigen::Vector3f seed(static_cast<float>(grid.x_centre(column)), static_cast<float>(grid.y_centre(row)), plane.point.z());
-        const Eigen::Vector3f& n = plane.normal;
-        seed.z() -= (n.x() * (seed.x() - plane.point.x()) + n.y() * (seed.y() - plane.point.y())) / n.z();
-        const FusedPoint fused = fusion_.Fuse(seed, n, near);
-        if (fused.num_agreeing < min_views_ || fused.num_through > fused.num_agreeing || fused.weight <= 0.0F) continue;
-        const float rise = fused.offset_m / n.z();
-        if (std::abs(rise) > band) continue;
-        const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(column);
-        result.map.z[i] = seed.z() + rise;
-        if (!result.colors.empty()) result.colors[i] = views_[static_cast<std::size_t>(fused.best_view)].ColorAt(fused.best_pixel);
+        const bool is_node = row % 2 == 0 && column % 2 == 0;
+        if (is_node != is_node_pass) continue;
+        if (!is_node && MeanOfNodes(row, column)) continue;
+        Measure(row, column, PlaneAt(coarse_row, coarse_column), near);
       }
     }
   }
 
+  /// Sets a cell between nodes to their mean; false if one is missing or they lie on different surfaces.
+  bool MeanOfNodes(int row, int column) {
+    const int row_before = row - row % 2;
+    const int row_after = row + row % 2;
+    const int column_before = column - column % 2;
+    const int column_after = column + column % 2;
+    if (row_after >= result_.map.grid.height || column_after >= result_.map.grid.width) return false;
+    const std::array<std::size_t, 4> around = {Index(row_before, column_before), Index(row_before, column_after),
+                                               Index(row_after, column_before), Index(row_after, column_after)};
+    float lowest = nodes_[around[0]];
+    float highest = lowest;
+    float sum = 0.0F;
+    for (const std::size_t i : around) {
+      if (std::isnan(nodes_[i])) return false;
+      lowest = std::min(lowest, nodes_[i]);
+      highest = std::max(highest, nodes_[i]);
+      sum += nodes_[i];
+    }
+    if (highest - lowest > max_step_) return false;
+    const std::size_t i = Index(row, column);
+    result_.map.z[i] = 0.25F * sum;
+    if (!result_.colors.empty()) {
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        unsigned total = 2;
+        for (const std::size_t k : around) total += result_.colors[k][channel];
+        result_.colors[i][channel] = static_cast<std::uint8_t>(total / 4);
+      }
+    }
+    return true;
+  }
+
+  void Measure(int row, int column, const TopPlane& plane, std::span<const std::uint16_t> near) {
+    const GridShape& grid = result_.map.grid;
+    Eigen::Vector3f seed(static_cast<float>(grid.x_centre(column)), static_cast<float>(grid.y_centre(row)), plane.point.z());
+    const Eigen::Vector3f& n = plane.normal;
+    seed.z() -= (n.x() * (seed.x() - plane.point.x()) + n.y() * (seed.y() - plane.point.y())) / n.z();
+    const FusedPoint fused = fusion_.Fuse(seed, n, near);
+    if (fused.num_agreeing < min_views_ || fused.num_through > fused.num_agreeing || fused.weight <= 0.0F) return;
+    const float rise = fused.offset_m / n.z();
+    if (std::abs(rise) > band_) return;
+    result_.map.z[Index(row, column)] = seed.z() + rise;
+    if (!result_.colors.empty())
+      result_.colors[Index(row, column)] = views_[static_cast<std::size_t>(fused.best_view)].ColorAt(fused.best_pixel);
+  }
+
   std::span<const ViewSurface> views_;
   const CoarseMap& coarse_;
-  const RobustHeightMapOptions& options_;
+  float band_;
+  float max_step_;
   int min_views_;
   ViewFusion fusion_;
+  ColoredHeightMap& result_;
+  std::vector<float> nodes_;
 };
 
 }  // namespace
@@ -342,13 +413,7 @@ ColoredHeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker, c
   SeedGaps(coarse);
   DropSpeckles(coarse, static_cast<float>(options.top_surface_band),
                static_cast<std::size_t>(options.min_patch_area / (coarse.grid.step * coarse.grid.step)));
-  const int min_views = std::min(options.min_views, static_cast<int>(views_in_marker.size()));
-  const TileFiller filler(views_in_marker, coarse, options, min_views);
-  const int tile_rows = (coarse.grid.height + kTile - 1) / kTile;
-  const int tile_columns = (coarse.grid.width + kTile - 1) / kTile;
-  tbb::parallel_for(0, tile_rows, [&](int row) {
-    for (int column = 0; column < tile_columns; ++column) filler.Fill(row, column, result);
-  });
+  MapFiller(views_in_marker, coarse, options, result).Fill();
   return result;
 }
 

@@ -36,6 +36,18 @@ Key KeyOf(const Eigen::Vector3f& p, float inverse_size) {
   return (block << (3 * kBlockBits)) | within;
 }
 
+/// The voxel `step` further along an axis (0 x, 1 y, 2 z).
+Key Beside(Key key, int axis, int step) {
+  const int at_within = kBlockBits * (2 - axis);
+  const int at_block = 3 * kBlockBits + (kKeyBits - kBlockBits) * (2 - axis);
+  constexpr Key kWithin = (1U << kBlockBits) - 1U;
+  constexpr Key kBlock = (1U << (kKeyBits - kBlockBits)) - 1U;
+  const Key index =
+      ((((key >> at_block) & kBlock) << kBlockBits) | ((key >> at_within) & kWithin)) + static_cast<Key>(static_cast<std::int64_t>(step));
+  key &= ~((kWithin << at_within) | (kBlock << at_block));
+  return key | ((index & kWithin) << at_within) | (((index >> kBlockBits) & kBlock) << at_block);
+}
+
 Key BlockOf(Key key) { return key >> (3 * kBlockBits); }
 Key Mix(Key key) {
   key *= 0x9E3779B97F4A7C15ULL;
@@ -46,29 +58,37 @@ std::size_t ShardOf(Key key) { return (Mix(BlockOf(key)) >> 20) % kNumShards; }
 /// Open-addressing map from a voxel to its entry's index, in order of first insertion.
 class VoxelIndex {
  public:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+
+  [[nodiscard]] std::uint32_t Find(Key key) const {
+    if (slots_.empty()) return kNone;
+    std::size_t at = Mix(key) & (slots_.size() - 1);
+    while (slots_[at].index != kNone && slots_[at].key != key) at = (at + 1) & (slots_.size() - 1);
+    return slots_[at].index;
+  }
+
   /// Index of the key's entry; the caller appends an entry when it equals size() before the call.
   std::uint32_t FindOrAdd(Key key) {
     if (2 * (size_ + 1) > slots_.size()) Grow();
     std::size_t at = Mix(key) & (slots_.size() - 1);
-    while (slots_[at].index != kFree && slots_[at].key != key) at = (at + 1) & (slots_.size() - 1);
-    if (slots_[at].index == kFree) slots_[at] = {key, static_cast<std::uint32_t>(size_++)};
+    while (slots_[at].index != kNone && slots_[at].key != key) at = (at + 1) & (slots_.size() - 1);
+    if (slots_[at].index == kNone) slots_[at] = {key, static_cast<std::uint32_t>(size_++)};
     return slots_[at].index;
   }
 
  private:
-  static constexpr std::uint32_t kFree = 0xFFFFFFFFU;
   struct Slot {
     Key key = 0;
-    std::uint32_t index = kFree;
+    std::uint32_t index = kNone;
   };
 
   void Grow() {
     std::vector<Slot> old(std::max<std::size_t>(1024, 2 * slots_.size()));
     old.swap(slots_);
     for (const Slot& slot : old) {
-      if (slot.index == kFree) continue;
+      if (slot.index == kNone) continue;
       std::size_t at = Mix(slot.key) & (slots_.size() - 1);
-      while (slots_[at].index != kFree) at = (at + 1) & (slots_.size() - 1);
+      while (slots_[at].index != kNone) at = (at + 1) & (slots_.size() - 1);
       slots_[at] = slot;
     }
   }
@@ -90,6 +110,7 @@ struct Seed {
   float weight;
   std::uint32_t pixel;
   std::uint32_t view;
+  std::uint32_t count;  ///< measurements in the voxel
 };
 
 /// A seed moved onto the views' common surface.
@@ -113,16 +134,41 @@ void SortIntoShards(const ViewSurface& view, float inverse_size, Shards<Sample>&
   const Eigen::Matrix3f R = view.T_world_camera.linear().cast<float>();
   const Eigen::Vector3f t = view.T_world_camera.translation().cast<float>();
   for (std::size_t i = 0; i < view.size(); ++i) {
-    if (view.weights[i] <= 0.0F) continue;
+    if (view.pixels[i].weight <= 0.0F) continue;
     const Key key = KeyOf(R * view.PointInCamera(i) + t, inverse_size);
-    shards[ShardOf(key)].push_back({key, view.weights[i], static_cast<std::uint32_t>(i)});
+    shards[ShardOf(key)].push_back({key, view.pixels[i].weight, static_cast<std::uint32_t>(i)});
   }
 }
 
-/// One seed per touched voxel, by shard, in block order within each.
+using VoxelShards = std::array<VoxelIndex, kNumShards>;
+
+/// The seeds whose voxel holds at least as many measurements as the two next to it along the surface's normal. Noise spreads
+/// a surface over several layers of voxels; all their seeds would move to the same place.
+std::vector<Seed> FullestLayers(std::span<const ViewSurface> views, const Shards<Seed>& seeds, const VoxelShards& voxels,
+                                std::size_t shard) {
+  std::vector<Seed> kept;
+  for (const Seed& seed : seeds[shard]) {
+    const ViewSurface& view = views[seed.view];
+    const Eigen::Vector3f n = view.T_world_camera.linear().cast<float>() * view.normals[seed.pixel];
+    int axis = 0;
+    n.cwiseAbs().maxCoeff(&axis);
+    const auto count_beside = [&](int step) {
+      const Key key = Beside(seed.key, axis, step);
+      const std::size_t other = ShardOf(key);
+      const std::uint32_t index = voxels[other].Find(key);
+      return index == VoxelIndex::kNone ? 0U : seeds[other][index].count;
+    };
+    // Of two equally full layers the lower one stays.
+    if (seed.count >= count_beside(1) && seed.count > count_beside(-1)) kept.push_back(seed);
+  }
+  std::sort(kept.begin(), kept.end(), [](const Seed& a, const Seed& b) { return a.key < b.key; });
+  return kept;
+}
+
+/// One seed per touched voxel, thinned to one layer, by shard, in block order within each.
 Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size) {
   Shards<Seed> seeds;
-  std::array<VoxelIndex, kNumShards> voxels;
+  VoxelShards voxels;
   std::vector<Shards<Sample>> samples(std::min(kViewsAtOnce, views.size()));
   for (std::size_t first = 0; first < views.size(); first += kViewsAtOnce) {
     const std::size_t count = std::min(kViewsAtOnce, views.size() - first);
@@ -131,26 +177,29 @@ Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size) {
       for (std::size_t i = 0; i < count; ++i) {
         for (const Sample& sample : samples[i][s]) {
           const std::uint32_t index = voxels[s].FindOrAdd(sample.key);
-          const Seed seed = {sample.key, sample.weight, sample.pixel, static_cast<std::uint32_t>(first + i)};
-          if (index == seeds[s].size())
-            seeds[s].push_back(seed);
-          else if (sample.weight > seeds[s][index].weight)
-            seeds[s][index] = seed;
+          if (index == seeds[s].size()) {
+            seeds[s].push_back({sample.key, sample.weight, sample.pixel, static_cast<std::uint32_t>(first + i), 1});
+            continue;
+          }
+          Seed& seed = seeds[s][index];
+          ++seed.count;
+          if (sample.weight <= seed.weight) continue;
+          seed.weight = sample.weight;
+          seed.pixel = sample.pixel;
+          seed.view = static_cast<std::uint32_t>(first + i);
         }
       }
     });
   }
-  tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) {
-    std::sort(seeds[s].begin(), seeds[s].end(), [](const Seed& a, const Seed& b) { return a.key < b.key; });
-  });
-  return seeds;
+  Shards<Seed> layer;
+  tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) { layer[s] = FullestLayers(views, seeds, voxels, s); });
+  return layer;
 }
 
-/// Moves the seeds of one shard; those that too few views support are left out.
-std::vector<Merged> MoveSeeds(std::span<const ViewSurface> views, const ViewFusion& fusion, const std::vector<Seed>& seeds,
-                              const SurfaceCloudOptions& options, float voxel_size, int min_views) {
-  std::vector<Merged> moved;
-  moved.reserve(seeds.size());
+/// Moves the seeds of one shard; those that too few views support are left out. By the shard where they arrive.
+Shards<Merged> MoveSeeds(std::span<const ViewSurface> views, const ViewFusion& fusion, const std::vector<Seed>& seeds,
+                         const SurfaceCloudOptions& options, float voxel_size, int min_views) {
+  Shards<Merged> moved;
   std::vector<std::uint16_t> near;
   const float radius = 0.5F * std::sqrt(3.0F) * voxel_size * static_cast<float>(1 << kBlockBits);
   Key block = 0;
@@ -158,32 +207,31 @@ std::vector<Merged> MoveSeeds(std::span<const ViewSurface> views, const ViewFusi
     const Seed& seed = seeds[k];
     const ViewSurface& view = views[seed.view];
     const Eigen::Vector3f p = PointInWorld(view, seed.pixel);
+    const Eigen::Vector3f n = view.T_world_camera.linear().cast<float>() * view.normals[seed.pixel];
     if (k == 0 || BlockOf(seed.key) != block) {
       block = BlockOf(seed.key);
       // Twice the radius: the ball about any of the block's points covers the block.
-      fusion.ViewsNear(p, 2.0F * radius, near);
+      fusion.ViewsNear(p, 2.0F * radius, n, near);
     }
-    const Eigen::Vector3f n = view.T_world_camera.linear().cast<float>() * view.normals[seed.pixel];
     const FusedPoint fused = fusion.Fuse(p, n, near);
     if (fused.num_agreeing < min_views || fused.num_through > fused.num_agreeing || fused.weight <= 0.0F) continue;
     const Eigen::Vector3f point = p + fused.offset_m * n;
     Color color = {0, 0, 0};
     if (options.with_colors) color = views[static_cast<std::size_t>(fused.best_view)].ColorAt(fused.best_pixel);
-    moved.push_back({KeyOf(point, 1.0F / voxel_size), point, fused.normal, fused.weight, color});
+    const Key key = KeyOf(point, 1.0F / voxel_size);
+    moved[ShardOf(key)].push_back({key, point, fused.normal, fused.weight, color});
   }
   return moved;
 }
 
 /// Weighted mean of the moved seeds of each voxel.
-PointCloud MergeVoxels(const Shards<Merged>& moved, bool with_colors) {
+PointCloud MergeVoxels(const std::array<Shards<Merged>, kNumShards>& moved, bool with_colors) {
   Shards<Merged> voxels;
   tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) {
     VoxelIndex index_of;
     std::vector<Merged>& merged = voxels[s];
-    // A seed may have moved across a block's border into another shard: every shard looks at all.
-    for (const auto& source : moved) {
-      for (const Merged& point : source) {
-        if (ShardOf(point.key) != s) continue;
+    for (const Shards<Merged>& source : moved) {
+      for (const Merged& point : source[s]) {
         const std::uint32_t index = index_of.FindOrAdd(point.key);
         if (index == merged.size()) {
           merged.push_back(point);
@@ -237,7 +285,7 @@ PointCloud MergeSurface(std::span<const ViewSurface> views, const SurfaceCloudOp
     voxel_size *= 1.5F;
   }
   const ViewFusion fusion(views, {.min_band_m = options.band_m});
-  Shards<Merged> moved;
+  std::array<Shards<Merged>, kNumShards> moved;
   tbb::parallel_for(std::size_t{0}, kNumShards,
                     [&](std::size_t s) { moved[s] = MoveSeeds(views, fusion, seeds[s], options, voxel_size, min_views); });
   return MergeVoxels(moved, with_colors);

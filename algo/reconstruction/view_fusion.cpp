@@ -59,7 +59,8 @@ ViewFusion::ViewFusion(std::span<const ViewSurface> views, const FusionOptions& 
     for (std::size_t i = 0; i < view.size(); ++i) {
       camera.ray_min = camera.ray_min.cwiseMin(rays[i]);
       camera.ray_max = camera.ray_max.cwiseMax(rays[i]);
-      if (view.weights[i] > 0.0F && (min_inverse == 0.0F || view.inverse_depth[i] < min_inverse)) min_inverse = view.inverse_depth[i];
+      const ViewSurface::Pixel& pixel = view.pixels[i];
+      if (pixel.weight > 0.0F && (min_inverse == 0.0F || pixel.inverse_depth < min_inverse)) min_inverse = pixel.inverse_depth;
     }
     camera.max_depth_m = min_inverse > 0.0F ? 1.0F / min_inverse : 0.0F;
     camera.inward_sides = {Eigen::Vector3f(1, 0, -camera.ray_min.x()).normalized(), Eigen::Vector3f(-1, 0, camera.ray_max.x()).normalized(),
@@ -69,16 +70,30 @@ ViewFusion::ViewFusion(std::span<const ViewSurface> views, const FusionOptions& 
   }
 }
 
-void ViewFusion::ViewsNear(const Eigen::Vector3f& centre_world, float radius_m, std::vector<std::uint16_t>& found) const {
+void ViewFusion::ViewsNear(const Eigen::Vector3f& centre_world, float radius_m, const Eigen::Vector3f& n_world,
+                           std::vector<std::uint16_t>& found) const {
   found.clear();
+  std::vector<std::pair<float, std::uint16_t>> rated;
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     const Camera& camera = cameras_[i];
     const Eigen::Vector3f p = camera.R_camera_world * centre_world + camera.t_camera_world;
     if (p.z() < -radius_m || p.z() - radius_m > camera.max_depth_m) continue;
     const bool outside = std::any_of(camera.inward_sides.begin(), camera.inward_sides.end(),
                                      [&](const Eigen::Vector3f& side) { return side.dot(p) < -radius_m; });
-    if (!outside) found.push_back(static_cast<std::uint16_t>(i));
+    if (outside) continue;
+    // Views that hold the ball's centre come before those that only touch the ball.
+    const bool holds_centre = std::all_of(camera.inward_sides.begin(), camera.inward_sides.end(),
+                                          [&](const Eigen::Vector3f& side) { return side.dot(p) >= 0.0F; });
+    const float distance = std::max(0.1F, p.norm());
+    const float cos_incidence = std::max(0.0F, -n_world.dot(camera.R_camera_world.transpose() * p) / distance);
+    const float sigma = AxialSigma(distance, 1.0F);
+    rated.emplace_back((cos_incidence + (holds_centre ? 0.2F : 0.0F)) / (sigma * sigma), static_cast<std::uint16_t>(i));
   }
+  const std::size_t count = std::min(rated.size(), static_cast<std::size_t>(std::max(1, options_.max_views)));
+  std::partial_sort(rated.begin(), rated.begin() + static_cast<std::ptrdiff_t>(count), rated.end(),
+                    [](const auto& a, const auto& b) { return a.first != b.first ? a.first > b.first : a.second < b.second; });
+  for (std::size_t k = 0; k < count; ++k) found.push_back(rated[k].second);
+  std::sort(found.begin(), found.end());
 }
 
 FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3f& n_world,
@@ -112,17 +127,17 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
     if (column + 1 >= view.width() || row + 1 >= view.height()) continue;
     const std::size_t width = static_cast<std::size_t>(view.width());
     const std::size_t i = static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
-    const float* weight = view.weights.data() + i;
-    if (weight[0] <= 0.0F || weight[1] <= 0.0F || weight[width] <= 0.0F || weight[width + 1] <= 0.0F) continue;
+    const ViewSurface::Pixel* top = view.pixels.data() + i;
+    const ViewSurface::Pixel* bottom = top + width;
+    if (top[0].weight <= 0.0F || top[1].weight <= 0.0F || bottom[0].weight <= 0.0F || bottom[1].weight <= 0.0F) continue;
     const Eigen::Vector3f n = camera.R_camera_world * n_world;
     const float along = -n.dot(p);  // |p| times the cosine of incidence
     if (along * along < kMinCosIncidence * kMinCosIncidence * p.squaredNorm() || along < 0.0F) continue;
     const float fu = u - static_cast<float>(column);
     const float fv = v - static_cast<float>(row);
-    const float* inverse = view.inverse_depth.data() + i;
-    const float top = inverse[0] + fu * (inverse[1] - inverse[0]);
-    const float bottom = inverse[width] + fu * (inverse[width + 1] - inverse[width]);
-    const float measured = 1.0F / (top + fv * (bottom - top));
+    const float above = top[0].inverse_depth + fu * (top[1].inverse_depth - top[0].inverse_depth);
+    const float below = bottom[0].inverse_depth + fu * (bottom[1].inverse_depth - bottom[0].inverse_depth);
+    const float measured = 1.0F / (above + fv * (below - above));
     // The measured point lies on the seed's own ray, at this share of its length beyond it.
     const float beyond = measured * inverse_z - 1.0F;
     const float distance = -beyond * along;
@@ -133,10 +148,10 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
     }
     if (num_samples == kMaxSamples) continue;
     const std::size_t nearest = i + (fu > 0.5F ? 1U : 0U) + (fv > 0.5F ? width : 0U);
-    const float w = view.weights[nearest];
+    const float w = view.pixels[nearest].weight;
     samples[num_samples++] = {distance, w};
     widest_band = std::max(widest_band, band);
-    fused.normal += w * (camera.R_camera_world.transpose() * view.normals[nearest]);
+    if (options_.with_normals) fused.normal += w * (camera.R_camera_world.transpose() * view.normals[nearest]);
     if (w > best_weight) {
       best_weight = w;
       fused.best_view = index;

@@ -1,6 +1,7 @@
 // One surface point against all views: where do they agree that the surface lies?
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -14,6 +15,8 @@ namespace plumb {
 struct FusionOptions {
   float min_band_m = 0.010F;    ///< A view within this of the seed (or 4 sigma, if more) measured the same surface.
   float see_through_m = 0.03F;  ///< A view that looks this far past the seed says that nothing is there.
+  bool with_normals = true;     ///< false: FusedPoint::normal is the seed's.
+  int max_views = 16;           ///< ViewsNear() keeps the best so many; noise falls with the root only.
 };
 
 /// What the views say about one seed point.
@@ -38,8 +41,9 @@ class ViewFusion {
   [[nodiscard]] FusedPoint Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3f& n_world,
                                 std::span<const std::uint16_t> candidates) const;
 
-  /// Views whose frustum meets the ball; ascending.
-  void ViewsNear(const Eigen::Vector3f& centre_world, float radius_m, std::vector<std::uint16_t>& found) const;
+  /// Views whose frustum meets the ball and that look at the side where the normal points, the least noisy ones; ascending.
+  void ViewsNear(const Eigen::Vector3f& centre_world, float radius_m, const Eigen::Vector3f& n_world,
+                 std::vector<std::uint16_t>& found) const;
 
   [[nodiscard]] std::size_t num_views() const { return cameras_.size(); }
 

@@ -25,7 +25,7 @@ class BoxSums {
  public:
   BoxSums(int width, int height) : stride_(width + 1), count_(Size(width, height), 0), sum_(Size(width, height), 0.0) {}
 
-  void SetRow(int row, const float* values, const std::uint8_t* good, int width) {
+  void SetRow(int row, const ViewSurface::Pixel* pixels, const std::uint8_t* good, int width) {
     const std::size_t above = static_cast<std::size_t>(row) * static_cast<std::size_t>(stride_);
     const std::size_t here = above + static_cast<std::size_t>(stride_);
     double sum = 0.0;
@@ -33,7 +33,7 @@ class BoxSums {
     for (int column = 0; column < width; ++column) {
       const std::size_t c = static_cast<std::size_t>(column) + 1;
       if (good[column] != 0) {
-        sum += values[column];
+        sum += pixels[column].inverse_depth;
         ++count;
       }
       sum_[here + c] = sum_[above + c] + sum;
@@ -85,7 +85,7 @@ void Bin(const DepthView& view, const ViewSurfaceOptions& options, ViewSurface& 
         }
       }
       const bool usable = count >= min_count && farthest - nearest <= EdgeStep(nearest, pixel_angle);
-      surface.inverse_depth[i] = usable ? sum / static_cast<float>(count) : 0.0F;
+      surface.pixels[i].inverse_depth = usable ? sum / static_cast<float>(count) : 0.0F;
     }
   }
 }
@@ -94,14 +94,14 @@ void Bin(const DepthView& view, const ViewSurfaceOptions& options, ViewSurface& 
 std::vector<std::uint8_t> WithoutEdges(const ViewSurface& surface) {
   const float pixel_angle = static_cast<float>(1.0 / surface.intrinsics.fx);
   const std::size_t width = static_cast<std::size_t>(surface.width());
-  const std::vector<float>& inverse = surface.inverse_depth;
+  const auto inverse = [&](std::size_t i) { return surface.pixels[i].inverse_depth; };
   std::vector<std::uint8_t> good(surface.size());
-  for (std::size_t i = 0; i < good.size(); ++i) good[i] = inverse[i] > 0.0F ? 1 : 0;
+  for (std::size_t i = 0; i < good.size(); ++i) good[i] = inverse(i) > 0.0F ? 1 : 0;
   const auto cut = [&](std::size_t a, std::size_t b) {
-    if (inverse[a] <= 0.0F || inverse[b] <= 0.0F) return;
-    const float nearer = 1.0F / std::max(inverse[a], inverse[b]);
+    if (inverse(a) <= 0.0F || inverse(b) <= 0.0F) return;
+    const float nearer = 1.0F / std::max(inverse(a), inverse(b));
     // |1/a - 1/b| as a step in depth at the nearer of the two
-    if (std::abs(inverse[a] - inverse[b]) * nearer * nearer > EdgeStep(nearer, pixel_angle)) good[a] = good[b] = 0;
+    if (std::abs(inverse(a) - inverse(b)) * nearer * nearer > EdgeStep(nearer, pixel_angle)) good[a] = good[b] = 0;
   };
   for (std::size_t row = 0; row < static_cast<std::size_t>(surface.height()); ++row) {
     for (std::size_t column = 0; column < width; ++column) {
@@ -149,14 +149,14 @@ void ComputeNormals(const BoxSums& sums, const std::vector<std::uint8_t>& good, 
       const std::size_t step_down = step * static_cast<std::size_t>(width);
       const float a = static_cast<float>(across) / (rays[i + step].x() - rays[i - step].x());
       const float b = static_cast<float>(down) / (rays[i + step_down].y() - rays[i - step_down].y());
-      const float inverse = surface.inverse_depth[i];
+      const float inverse = surface.pixels[i].inverse_depth;
       const Eigen::Vector3f plane(a, b, inverse - a * ray.x() - b * ray.y());
       const float length = plane.norm();
       const float cos_incidence = inverse / (length * std::sqrt(ray.squaredNorm() + 1.0F));
       if (!(cos_incidence >= min_cos)) continue;
       const float sigma = AxialSigma(1.0F / inverse, cos_incidence);
       surface.normals[i] = plane * (-1.0F / length);
-      surface.weights[i] = cos_incidence / (sigma * sigma);
+      surface.pixels[i].weight = cos_incidence / (sigma * sigma);
     }
   }
 }
@@ -216,15 +216,14 @@ ViewSurface PrepareView(const DepthView& view, const std::shared_ptr<const RayTa
   const int width = surface.width();
   const int height = surface.height();
   const std::size_t size = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  surface.inverse_depth.resize(size);
+  surface.pixels.resize(size);
   surface.normals.assign(size, Eigen::Vector3f::Zero());
-  surface.weights.assign(size, 0.0F);
   Bin(view, options, surface);
   const std::vector<std::uint8_t> good = WithoutEdges(surface);
   BoxSums sums(width, height);
   for (int row = 0; row < height; ++row) {
     const std::size_t start = static_cast<std::size_t>(row) * static_cast<std::size_t>(width);
-    sums.SetRow(row, surface.inverse_depth.data() + start, good.data() + start, width);
+    sums.SetRow(row, surface.pixels.data() + start, good.data() + start, width);
   }
   ComputeNormals(sums, good, std::cos(options.max_incidence_deg * static_cast<float>(kDegree)), surface);
   return surface;

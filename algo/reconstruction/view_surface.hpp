@@ -29,22 +29,27 @@ struct ViewSurfaceOptions {
 /// INVERSE depth of a block of image pixels. Planes are linear in inverse depth, so the mean is exact on them, and the
 /// quantisation of structured light is uniform in it. All vectors have width * height values, row by row.
 struct ViewSurface {
+  /// Inverse depth and weight lie together because searches need both.
+  struct Pixel {
+    float inverse_depth = 0.0F;  ///< 1/m; 0 where nothing was measured.
+    float weight = 0.0F;         ///< 1 / variance (1/m^2) times the cosine of incidence; 0: not to be used
+                                 ///< (depth edge, rim, grazing view, out of range).
+  };
+
   Intrinsics intrinsics;  ///< Of the working image.
   int block = 1;          ///< Image pixels per working pixel, each way.
   cv::Mat color_rgb;      ///< As in the view: image resolution, or empty.
   Pose T_world_camera = Pose::Identity();
   std::shared_ptr<const RayTable> rays;  ///< Of the working pixels; shared by the views of one camera.
-  std::vector<float> inverse_depth;      ///< 1/m; 0 where nothing was measured.
+  std::vector<Pixel> pixels;
   std::vector<Eigen::Vector3f> normals;  ///< Camera frame, unit, towards the camera; where weight > 0.
-  std::vector<float> weights;            ///< 1 / variance (1/m^2) times the cosine of incidence; 0: not to be used
-                                         ///< (depth edge, rim, grazing view, out of range).
 
   [[nodiscard]] int width() const { return intrinsics.width; }
   [[nodiscard]] int height() const { return intrinsics.height; }
-  [[nodiscard]] std::size_t size() const { return inverse_depth.size(); }
+  [[nodiscard]] std::size_t size() const { return pixels.size(); }
   /// Point of a measured working pixel in the camera frame, metres.
   [[nodiscard]] Eigen::Vector3f PointInCamera(std::size_t i) const {
-    const float z = 1.0F / inverse_depth[i];
+    const float z = 1.0F / pixels[i].inverse_depth;
     const Eigen::Vector2f& ray = rays->row(0)[i];
     return {ray.x() * z, ray.y() * z, z};
   }
