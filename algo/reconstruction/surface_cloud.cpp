@@ -62,7 +62,7 @@ class VoxelIndex {
 
   [[nodiscard]] std::uint32_t Find(Key key) const {
     if (slots_.empty()) return kNone;
-    std::size_t at = Mix(key) & (slots_.size() - 1);
+    std::size_t at = Start(key);
     while (slots_[at].index != kNone && slots_[at].key != key) at = (at + 1) & (slots_.size() - 1);
     return slots_[at].index;
   }
@@ -70,7 +70,7 @@ class VoxelIndex {
   /// Index of the key's entry; the caller appends an entry when it equals size() before the call.
   std::uint32_t FindOrAdd(Key key) {
     if (2 * (size_ + 1) > slots_.size()) Grow();
-    std::size_t at = Mix(key) & (slots_.size() - 1);
+    std::size_t at = Start(key);
     while (slots_[at].index != kNone && slots_[at].key != key) at = (at + 1) & (slots_.size() - 1);
     if (slots_[at].index == kNone) slots_[at] = {key, static_cast<std::uint32_t>(size_++)};
     return slots_[at].index;
@@ -82,12 +82,18 @@ class VoxelIndex {
     std::uint32_t index = kNone;
   };
 
+  /// Voxels of a block lie close together, five slots apart so that filled planes make no long runs.
+  [[nodiscard]] std::size_t Start(Key key) const {
+    constexpr Key kWithin = (Key{1} << (3 * kBlockBits)) - 1;
+    return (Mix(BlockOf(key)) + 5 * (key & kWithin)) & (slots_.size() - 1);
+  }
+
   void Grow() {
     std::vector<Slot> old(std::max<std::size_t>(1024, 2 * slots_.size()));
     old.swap(slots_);
     for (const Slot& slot : old) {
       if (slot.index == kNone) continue;
-      std::size_t at = Mix(slot.key) & (slots_.size() - 1);
+      std::size_t at = Start(slot.key);
       while (slots_[at].index != kNone) at = (at + 1) & (slots_.size() - 1);
       slots_[at] = slot;
     }
