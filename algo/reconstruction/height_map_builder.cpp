@@ -42,6 +42,11 @@ GridShape HeightMapOptions::Grid() const {
 }
 
 HeightMap PaperHeightMap(std::span<const PointCloud> clouds_in_marker, const HeightMapOptions& options) {
+  return PaperHeightMap(clouds_in_marker, std::vector<Pose>(clouds_in_marker.size(), Pose::Identity()), options);
+}
+
+HeightMap PaperHeightMap(std::span<const PointCloud> clouds, std::span<const Pose> T_marker_cloud, const HeightMapOptions& options) {
+  if (clouds.size() != T_marker_cloud.size()) throw std::invalid_argument("height map: there is not one pose a cloud");
   const GridShape grid = options.Grid();
   if (!(options.top_surface_band > 0.0)) throw std::invalid_argument("height map: the top surface band is not positive");
   const float band = static_cast<float>(options.top_surface_band);
@@ -49,11 +54,14 @@ HeightMap PaperHeightMap(std::span<const PointCloud> clouds_in_marker, const Hei
   // Each cloud's points sorted by bands of rows, so that bands can be worked on apart and in cloud order.
   const std::size_t num_bands = static_cast<std::size_t>((grid.height + kMaxRowsPerBand - 1) / kMaxRowsPerBand);
   const std::size_t cells_per_band = static_cast<std::size_t>(kMaxRowsPerBand) * static_cast<std::size_t>(grid.width);
-  std::vector<std::vector<std::vector<CellPoint>>> points(clouds_in_marker.size());
-  tbb::parallel_for(std::size_t{0}, clouds_in_marker.size(), [&](std::size_t j) {
+  std::vector<std::vector<std::vector<CellPoint>>> points(clouds.size());
+  tbb::parallel_for(std::size_t{0}, clouds.size(), [&](std::size_t j) {
+    const Eigen::Matrix3f R = T_marker_cloud[j].linear().cast<float>();
+    const Eigen::Vector3f t = T_marker_cloud[j].translation().cast<float>();
     points[j].resize(num_bands);
-    for (auto& in_band : points[j]) in_band.reserve(clouds_in_marker[j].size() / num_bands * 2);
-    for (const Eigen::Vector3f& p : clouds_in_marker[j].points) {
+    for (auto& in_band : points[j]) in_band.reserve(clouds[j].size() / num_bands * 2);
+    for (const Eigen::Vector3f& p_cloud : clouds[j].points) {
+      const Eigen::Vector3f p = R * p_cloud + t;
       if (!std::isfinite(p.z())) continue;
       if (const auto cell = grid.cell(p.x(), p.y()))
         points[j][*cell / cells_per_band].push_back({static_cast<std::uint32_t>(*cell % cells_per_band), p.z()});

@@ -35,6 +35,11 @@ struct HeightMapOptions {
 /// Deterministic, whatever the number of threads.
 [[nodiscard]] HeightMap PaperHeightMap(std::span<const PointCloud> clouds_in_marker, const HeightMapOptions& options = {});
 
+/// The same for clouds that are moved on the way: p_marker = T_marker_cloud[j] * p. Saves a copy of the clouds.
+/// @throws std::invalid_argument also if there is not one pose a cloud.
+[[nodiscard]] HeightMap PaperHeightMap(std::span<const PointCloud> clouds, std::span<const Pose> T_marker_cloud,
+                                       const HeightMapOptions& options = {});
+
 /// Parameters of RobustHeightMap(). Lengths in metres, reference marker's frame.
 struct RobustHeightMapOptions {
   double cell_size = 1.5 * kMillimetre;

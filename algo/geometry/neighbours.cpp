@@ -1,0 +1,141 @@
+#include "algo/geometry/neighbours.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace plumb {
+namespace {
+
+// Distances are compared in single precision: reach a little further than the exact bound. Relative and absolute.
+constexpr float kReachFactor = 1.0F + 1e-5F;
+constexpr float kReachMargin = 1e-6F;
+
+}  // namespace
+
+CloudNeighbours::CloudNeighbours(Clouds clouds, double cell_size)
+    : inverse_size_(static_cast<float>(1.0 / cell_size)), cell_size_(static_cast<float>(cell_size)), slack_(0.25F * cell_size_) {
+  if (!(cell_size > 0.0 && std::isfinite(cell_size)))
+    throw std::invalid_argument(fmt::format("neighbours: cell size {} m is not a length", cell_size));
+  starts_.push_back(0);
+  for (const auto& cloud : clouds) starts_.push_back(starts_.back() + static_cast<std::uint32_t>(cloud.size()));
+  points_.resize(starts_.back());
+  entries_.resize(points_.size());
+  entry_of_.resize(points_.size());
+  const float reach = cell_size_ * static_cast<float>(LatticeCell::kLimit / 2);
+  for (std::size_t c = 0; c < clouds.size(); ++c) {
+    for (std::size_t i = 0; i < clouds[c].size(); ++i) {
+      if (!(clouds[c][i].cwiseAbs().maxCoeff() < reach) || !clouds[c][i].allFinite())
+        throw std::invalid_argument(fmt::format("neighbours: point {} of cloud {} is not finite or too far away", i, c));
+      points_[starts_[c] + i] = clouds[c][i];
+    }
+  }
+  Bin();
+}
+
+void CloudNeighbours::Move(Clouds clouds) {
+  if (clouds.size() + 1 != starts_.size()) throw std::invalid_argument("neighbours: the number of clouds has changed");
+  const float reach = cell_size_ * static_cast<float>(LatticeCell::kLimit / 2);
+  float largest = 0.0F;
+  for (std::size_t c = 0; c < clouds.size(); ++c) {
+    if (clouds[c].size() != starts_[c + 1] - starts_[c]) throw std::invalid_argument("neighbours: the number of points has changed");
+    for (std::size_t i = 0; i < clouds[c].size(); ++i) {
+      Eigen::Vector3f& point = points_[starts_[c] + i];
+      const Eigen::Vector3f& moved = clouds[c][i];
+      if (!(moved.cwiseAbs().maxCoeff() < reach) || !moved.allFinite())
+        throw std::invalid_argument(fmt::format("neighbours: point {} of cloud {} is not finite or too far away", i, c));
+      largest = std::max(largest, (moved - point).squaredNorm());
+      point = moved;
+    }
+  }
+  travel_ += std::sqrt(largest) * kReachFactor;
+  if (travel_ - travel_when_binned_ > slack_) {
+    Bin();
+    return;
+  }
+  for (std::size_t i = 0; i < points_.size(); ++i) entries_[entry_of_[i]].point = points_[i];
+}
+
+void CloudNeighbours::Bin() {
+  travel_when_binned_ = travel_;
+  cell_of_.Reset(points_.size());
+  cells_.clear();
+  std::vector<std::uint32_t> cell_of_point(points_.size());
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Eigen::Vector3f& p = points_[i];
+    const LatticeCell cell(LatticeCell::Index(p.x(), inverse_size_), LatticeCell::Index(p.y(), inverse_size_),
+                           LatticeCell::Index(p.z(), inverse_size_));
+    const std::uint32_t index = cell_of_.FindOrAdd(cell.key(), static_cast<std::uint32_t>(cells_.size()));
+    if (index == cells_.size()) cells_.emplace_back();
+    ++cells_[index].last;
+    cell_of_point[i] = index;
+  }
+  std::uint32_t start = 0;
+  for (Range& cell : cells_) {
+    cell.first = start;
+    start += cell.last;
+    cell.last = cell.first;
+  }
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const std::uint32_t at = cells_[cell_of_point[i]].last++;
+    entries_[at] = {points_[i], static_cast<std::uint32_t>(i)};
+    entry_of_[i] = at;
+  }
+}
+
+void CloudNeighbours::SearchBox(const Eigen::Vector3f& p, float reach, std::uint32_t own_first, std::uint32_t own_last, Best& best) const {
+  const float out = reach + (travel_ - travel_when_binned_);
+  const Eigen::Vector3i lo(LatticeCell::Index(p.x() - out, inverse_size_), LatticeCell::Index(p.y() - out, inverse_size_),
+                           LatticeCell::Index(p.z() - out, inverse_size_));
+  const Eigen::Vector3i hi(LatticeCell::Index(p.x() + out, inverse_size_), LatticeCell::Index(p.y() + out, inverse_size_),
+                           LatticeCell::Index(p.z() + out, inverse_size_));
+  for (int x = lo.x(); x <= hi.x(); ++x) {
+    for (int y = lo.y(); y <= hi.y(); ++y) {
+      for (int z = lo.z(); z <= hi.z(); ++z) {
+        const std::uint32_t cell = cell_of_.Find(LatticeCell(x, y, z).key());
+        if (cell == CellMap::kNone) continue;
+        for (std::uint32_t i = cells_[cell].first; i < cells_[cell].last; ++i) {
+          const Entry& entry = entries_[i];
+          if (entry.global_index >= own_first && entry.global_index < own_last) continue;
+          const float squared = (entry.point - p).squaredNorm();
+          if (squared < best.squared_distance || (squared == best.squared_distance && entry.global_index < best.global_index))
+            best = {squared, entry.global_index};
+        }
+      }
+    }
+  }
+}
+
+std::uint32_t CloudNeighbours::Nearest(std::size_t cloud, std::size_t index, float radius, Memory& memory) const {
+  const std::uint32_t own_first = starts_[cloud];
+  const std::uint32_t own_last = starts_[cloud + 1];
+  const Eigen::Vector3f& p = points_[own_first + index];
+  const float squared_radius = radius * radius;
+  const auto reach_of = [](float distance) { return distance * kReachFactor + kReachMargin; };
+
+  // Both ends can have come nearer by the travel since, and still nothing is within the radius.
+  if (memory.none_within - 2.0F * (travel_ - memory.travel_then) > reach_of(radius)) return kNone;
+
+  // The old partner bounds the search; without one, outwards in growing boxes. Past the radius by one cell, so that
+  // the next searches can know that nothing is near.
+  const float farthest = radius + cell_size_;
+  Best best = {farthest * farthest, kNone};
+  float reach = std::min(cell_size_, farthest);
+  if (memory.neighbour != kNone) {
+    const float squared = (points_[memory.neighbour] - p).squaredNorm();
+    if (squared < best.squared_distance) {
+      best = {squared, memory.neighbour};
+      reach = std::sqrt(squared);
+    }
+  }
+  for (;; reach = std::min(2.0F * reach, farthest)) {
+    SearchBox(p, reach_of(reach), own_first, own_last, best);
+    if (best.squared_distance <= reach * reach || reach >= farthest) break;
+  }
+  memory = {best.global_index, std::sqrt(best.squared_distance), travel_};
+  return best.squared_distance < squared_radius ? best.global_index : kNone;
+}
+
+}  // namespace plumb

@@ -1,0 +1,79 @@
+// Nearest points among several clouds that move: one shared spatial hash for all of them.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "algo/geometry/grid_hash.hpp"
+
+namespace plumb {
+
+/// Finds, for a point of one cloud, the nearest point of any OTHER cloud. Exact, whatever the hints.
+///
+/// Two things make repeated searches cheap while the clouds move little between them. Points stay in
+/// the cell where they were binned until one has moved by a quarter of a cell; searches reach out by that much
+/// more. And the partner of the last search bounds the next one, as does the knowledge that none was near.
+///
+/// Nearest() is const and thread-safe for different points; Move() is not. Deterministic: of equally near points the one
+/// with the smaller (cloud, index) is found.
+class CloudNeighbours {
+ public:
+  using Clouds = std::span<const std::vector<Eigen::Vector3f>>;
+
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+
+  /// What is remembered of a point's last search; starts empty.
+  struct Memory {
+    std::uint32_t neighbour = kNone;  ///< Global index of the nearest point found last, within the radius or not.
+    float none_within = 0.0F;         ///< Nothing was nearer than this ...
+    float travel_then = 0.0F;         ///< ... when the clouds had moved so far.
+  };
+
+  /// @param cell_size  Metres, > 0: about the distance between neighbours within a cloud.
+  /// @throws std::invalid_argument on a bad cell size, or points that are not finite or a million cells away.
+  CloudNeighbours(Clouds clouds, double cell_size);
+
+  /// The same points at new places. @throws std::invalid_argument if their numbers differ, and as the constructor.
+  void Move(Clouds clouds);
+
+  /// Nearest point of another cloud with distance < radius.
+  /// @return its global index or kNone; `memory` is used and brought up to date.
+  [[nodiscard]] std::uint32_t Nearest(std::size_t cloud, std::size_t index, float radius, Memory& memory) const;
+
+  /// Place of a point by its global index (clouds one after the other).
+  [[nodiscard]] const Eigen::Vector3f& point(std::uint32_t global_index) const { return points_[global_index]; }
+
+ private:
+  struct Entry {
+    Eigen::Vector3f point;
+    std::uint32_t global_index;
+  };
+  struct Range {
+    std::uint32_t first = 0;
+    std::uint32_t last = 0;
+  };
+  struct Best {
+    float squared_distance;
+    std::uint32_t global_index;
+  };
+
+  void Bin();
+  void SearchBox(const Eigen::Vector3f& p, float reach, std::uint32_t own_first, std::uint32_t own_last, Best& best) const;
+
+  float inverse_size_;
+  float cell_size_;
+  float slack_;          ///< Bound on how far any point is from where it was binned.
+  float travel_ = 0.0F;  ///< Sum over moves of the largest displacement.
+  float travel_when_binned_ = 0.0F;
+  std::vector<std::uint32_t> starts_;    ///< First global index of each cloud, and the total.
+  std::vector<Eigen::Vector3f> points_;  ///< By global index.
+  std::vector<std::uint32_t> entry_of_;  ///< By global index.
+  std::vector<Entry> entries_;           ///< By cell.
+  std::vector<Range> cells_;
+  CellMap cell_of_;
+};
+
+}  // namespace plumb
