@@ -43,10 +43,10 @@ struct HeightMapOptions {
 /// Parameters of RobustHeightMap(). Lengths in metres, reference marker's frame.
 struct RobustHeightMapOptions {
   double cell_size = 1.5 * kMillimetre;
-  std::optional<GridShape> grid;  ///< Fixed grid; none: around the data, cell borders at multiples of cell_size.
-  double max_extent = 4.0;        ///< Of a grid found from the data, each way.
-  double z_min = -0.3;            ///< Height crop: floor under a couch, ...
-  double z_max = 0.8;             ///< ... hands, cables, lamps above the body.
+  std::optional<GridShape> grid = std::nullopt;  ///< Fixed grid; none: around the data, cell borders at multiples of cell_size.
+  double max_extent = 4.0;                       ///< Of a grid found from the data, each way.
+  double z_min = -0.3;                           ///< Height crop: floor under a couch, ...
+  double z_max = 0.8;                            ///< ... hands, cables, lamps above the body.
   double top_surface_band = 3 * kCentimetre;
   int min_views = 2;             ///< Views that must agree on a cell (no more than there are).
   double min_patch_area = 4e-4;  ///< Square metres; smaller separate patches are speckles.

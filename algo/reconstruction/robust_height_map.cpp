@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <stdexcept>
 
@@ -148,8 +149,15 @@ void SortIntoRows(const ViewSurface& view, std::uint32_t index, std::size_t stri
   }
 }
 
+/// Different views among the samples; views 64 apart count as one, which only asks for more support.
+int NumViews(std::span<const Sample> samples) {
+  std::uint64_t seen = 0;
+  for (const Sample& sample : samples) seen |= std::uint64_t{1} << (sample.view % 64);
+  return std::popcount(seen);
+}
+
 /// The highest band of samples that has support, as a plane. `samples` are those of one cell; they get reordered.
-TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, float band) {
+TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, float band, int min_views) {
   TopPlane top;
   // Highest first; equal heights in input order, so that the order never depends on the sorting algorithm.
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
@@ -160,7 +168,7 @@ TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, 
   for (std::size_t begin = 0; begin + needed <= samples.size(); ++begin) {
     end = std::max(end, begin);
     while (end < samples.size() && samples[begin].z - samples[end].z < band) ++end;
-    if (end - begin < needed) continue;
+    if (end - begin < needed || NumViews(samples.subspan(begin, end - begin)) < min_views) continue;
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     float weight_sum = 0.0F;
     for (std::size_t k = begin; k < end; ++k) {
@@ -198,6 +206,7 @@ CoarseMap FindTops(std::span<const ViewSurface> views, const GridShape& fine, co
     SortIntoRows(views[v], static_cast<std::uint32_t>(v), std::max<std::size_t>(1, stride), map.grid, options, samples[v]);
   });
   const float band = static_cast<float>(options.top_surface_band);
+  const int min_views = std::min(options.min_views, static_cast<int>(views.size()));
   const std::size_t cells_per_row = static_cast<std::size_t>(map.grid.width) * kTile;
   tbb::parallel_for(std::size_t{0}, num_rows, [&](std::size_t row) {
     const std::size_t first = row * cells_per_row;
@@ -211,7 +220,7 @@ CoarseMap FindTops(std::span<const ViewSurface> views, const GridShape& fine, co
     for (const auto& of_view : samples)
       for (const Sample& sample : of_view[row]) sorted[next[sample.cell]++] = sample;
     for (std::size_t c = 0; c < num_cells; ++c)
-      map.cells[first + c] = FindTop(std::span(sorted).subspan(starts[c], starts[c + 1] - starts[c]), views, band);
+      map.cells[first + c] = FindTop(std::span(sorted).subspan(starts[c], starts[c + 1] - starts[c]), views, band, min_views);
   });
   return map;
 }
@@ -277,6 +286,7 @@ class MapFiller {
   MapFiller(std::span<const ViewSurface> views, const CoarseMap& coarse, const RobustHeightMapOptions& options, ColoredHeightMap& result)
       : views_(views),
         coarse_(coarse),
+        options_(options),
         band_(static_cast<float>(options.top_surface_band)),
         max_step_(kMaxMeanSlope * static_cast<float>(2.0 * options.cell_size)),
         min_views_(std::min(options.min_views, static_cast<int>(views.size()))),
@@ -375,7 +385,7 @@ class MapFiller {
     const FusedPoint fused = fusion_.Fuse(seed, n, near);
     if (fused.num_agreeing < min_views_ || fused.num_through > fused.num_agreeing || fused.weight <= 0.0F) return;
     const float rise = fused.offset_m / n.z();
-    if (std::abs(rise) > band_) return;
+    if (!(std::abs(rise) <= band_ && seed.z() + rise >= options_.z_min && seed.z() + rise <= options_.z_max)) return;
     result_.map.z[Index(row, column)] = seed.z() + rise;
     if (!result_.colors.empty())
       result_.colors[Index(row, column)] = views_[static_cast<std::size_t>(fused.best_view)].ColorAt(fused.best_pixel);
@@ -383,6 +393,7 @@ class MapFiller {
 
   std::span<const ViewSurface> views_;
   const CoarseMap& coarse_;
+  const RobustHeightMapOptions& options_;
   float band_;
   float max_step_;
   int min_views_;

@@ -7,6 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include <Eigen/Geometry>
+
 #include "algo/types/units.hpp"
 
 namespace plumb {
