@@ -23,7 +23,7 @@ constexpr double kMinContrast = 0.02;    // of full scale
 constexpr int kFirstSideSamples = 90;    // pixels used per side, about: in the first round
 constexpr int kSideSamples = 180;        // and later
 constexpr double kMinBlur_px = 0.35;     // a pixel's own area is 0.29 px wide (sigma)
-constexpr double kModelError_px = 0.01;  // what is left on noiseless images
+constexpr double kModelError_px = 0.03;  // sharpening cameras and real paper; rendered images leave 0.01
 constexpr int kTablePerCell = 4;         // resolution of the blurred cell rows
 
 /// The normal distribution function and density by table: error below 1e-5, exact zero / one outside +-4.
