@@ -7,6 +7,7 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "algo/geometry/back_projection.hpp"
 #include "algo/types/intrinsics.hpp"
 #include "algo/types/keyframe.hpp"
 #include "algo/types/pose.hpp"
@@ -63,8 +64,8 @@ inline Pose LookAt(const Eigen::Vector3d& position, const Eigen::Vector3d& targe
 }
 
 /// Exact depth, plus independent noise of `noise_m` if asked for. The colour of a pixel codes its world place.
-inline DepthView RenderDome(const DomeScene& scene, const Intrinsics& intrinsics, const Pose& T_world_camera, double noise_m,
-                            unsigned seed) {
+inline DepthView RenderDome(const DomeScene& scene, const RayTable& rays, const Pose& T_world_camera, double noise_m, unsigned seed) {
+  const Intrinsics& intrinsics = rays.intrinsics();
   DepthView view;
   view.intrinsics = intrinsics;
   view.T_world_camera = T_world_camera;
@@ -74,7 +75,7 @@ inline DepthView RenderDome(const DomeScene& scene, const Intrinsics& intrinsics
   std::normal_distribution<double> normal;
   for (int row = 0; row < intrinsics.height; ++row) {
     for (int column = 0; column < intrinsics.width; ++column) {
-      const Eigen::Vector3d ray = Undistort(intrinsics, Eigen::Vector2d(column, row)).homogeneous();
+      const Eigen::Vector3d ray = rays.ideal(row, column).cast<double>().homogeneous();
       const double z = scene.Cast(T_world_camera.translation(), T_world_camera.linear() * ray);
       if (!(z > 0.0 && z < 4.0)) continue;
       view.depth_m.at<float>(row, column) = static_cast<float>(z + noise_m * normal(random));
@@ -95,12 +96,13 @@ inline void ShiftDepth(DepthView& view, const cv::Rect& pixels, float shift_m) {
 inline std::vector<DepthView> SweepOverDome(const DomeScene& scene, int count, int width, double noise_m) {
   Intrinsics intrinsics = Resized({}, width, width * 3 / 4);
   intrinsics.distortion = {0.05, -0.12, 0.001, -0.0008, 0.02};
+  const RayTable rays(intrinsics);
   std::vector<DepthView> views;
   for (int i = 0; i < count; ++i) {
     const double along = (i + 0.5) / count;
     const Eigen::Vector3d target(scene.x - 0.3 + 0.6 * along, scene.y, 0.05);
     const Eigen::Vector3d position(target.x() - 0.1 + 0.2 * along, scene.y + 0.35 * std::sin(9.0 * along), 0.95);
-    views.push_back(RenderDome(scene, intrinsics, LookAt(position, target), noise_m, static_cast<unsigned>(i + 1)));
+    views.push_back(RenderDome(scene, rays, LookAt(position, target), noise_m, static_cast<unsigned>(i + 1)));
   }
   return views;
 }
