@@ -63,6 +63,14 @@ std::string MotionTable(const Evaluation& evaluation) {
   text += rule + MotionRow("total", total, kPaperTotal);
   text += fmt::format("\n  {} pairs; {} without a motion, {} with the verdict no_answer.\n", total.num_pairs, total.num_without_motion,
                       total.num_no_answer);
+  constexpr std::size_t kMaxListed = 10;
+  std::size_t num_listed = 0;
+  for (const PairEvaluation& pair : evaluation.pairs) {
+    if (pair.verdict != Verdict::kNoAnswer || num_listed++ >= kMaxListed) continue;
+    text +=
+        fmt::format("    {} -> {}: {}\n", pair.reference, pair.current, pair.reasons.empty() ? "no reason given" : pair.reasons.front());
+  }
+  if (num_listed > kMaxListed) text += fmt::format("    and {} more\n", num_listed - kMaxListed);
   text += "  The paper's figures are its own nine scenes on a real sensor; its rows stand beside ours by number, not by pose.\n";
   return text;
 }
@@ -119,6 +127,10 @@ std::string AlignmentTable(const Evaluation& evaluation) {
   std::string text = "\nAlignment and deviation over the pairs (mm)                      mean  median    95th     max\n\n";
   const auto row = [&text](const char* name, std::vector<double> values) {
     const ErrorSummary s = Summarise(std::move(values));
+    if (s.count == 0) {
+      text += fmt::format("  {:<60} {:>7}\n", name, "none");
+      return;
+    }
     text += fmt::format("  {:<60} {:7.2f} {:7.2f} {:7.2f} {:7.2f}\n", name, s.mean, s.median, s.p95, s.max);
   };
   row("alignment at marker corners, in the true marker frames", corners);

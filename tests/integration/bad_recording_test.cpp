@@ -96,7 +96,7 @@ std::vector<Damage> Damages() {
        ".."},
       {"AbsolutePath", change_line("rgb.txt", 5, [](std::string& line) { line = line.substr(0, line.find(' ')) + " /etc/passwd"; }),
        "/etc/passwd"},
-      {"OtherSizeInCalibration", [](const fs::path& r) { Replace(r / "camera.yaml", "image_width:", "640"); }, "640"},
+      {"OtherSizeInCalibration", [](const fs::path& r) { Replace(r / "camera.yaml", "image_width:", "640"); }, "image size"},
       {"ZeroFocalLength",
        [](const fs::path& r) {
          std::string text = ReadText(r / "camera.yaml");

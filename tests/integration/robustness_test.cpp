@@ -154,7 +154,7 @@ TEST_F(RobustnessTest, DamagedScenesAreRefused) {
   refused(
       "no-json", [](const fs::path& scene) { WriteText(scene / "scene.json", "{"); }, "scene.json");
   refused("other-dictionary", edit("marker_dictionary", "DICT_4X4_50"), "DICT_4X4_50");
-  refused("other-length", edit("marker_length", 0.2), "0.2");
+  refused("other-length", edit("marker_length_m", 0.2), "0.2");
   refused("short-map", halve("heightmap.tiff"), "heightmap.tiff");
   refused("short-cloud", halve("cloud.ply"), "cloud.ply");
   refused(
