@@ -12,6 +12,7 @@ namespace {
 // Distances are compared in single precision: reach a little further than the exact bound. Relative and absolute.
 constexpr float kReachFactor = 1.0F + 1e-5F;
 constexpr float kReachMargin = 1e-6F;
+constexpr float kStepsAhead = 8.0F;  // moves of the last size that an answer should outlast
 
 }  // namespace
 
@@ -50,7 +51,8 @@ void CloudNeighbours::Move(Clouds clouds) {
       point = moved;
     }
   }
-  travel_ += std::sqrt(largest) * kReachFactor;
+  last_step_ = std::sqrt(largest) * kReachFactor;
+  travel_ += last_step_;
   if (travel_ - travel_when_binned_ > slack_) {
     Bin();
     return;
@@ -86,22 +88,37 @@ void CloudNeighbours::Bin() {
 }
 
 void CloudNeighbours::SearchBox(const Eigen::Vector3f& p, float reach, std::uint32_t own_first, std::uint32_t own_last, Best& best) const {
-  const float out = reach + (travel_ - travel_when_binned_);
+  const float slack = travel_ - travel_when_binned_ + kReachMargin;
+  const float out = reach + slack;
   const Eigen::Vector3i lo(LatticeCell::Index(p.x() - out, inverse_size_), LatticeCell::Index(p.y() - out, inverse_size_),
                            LatticeCell::Index(p.z() - out, inverse_size_));
   const Eigen::Vector3i hi(LatticeCell::Index(p.x() + out, inverse_size_), LatticeCell::Index(p.y() + out, inverse_size_),
                            LatticeCell::Index(p.z() + out, inverse_size_));
+  // Squared distance along one axis to what a slab of cells can hold, points' drift since binning included. Rounding of the
+  // slab's borders is below a millionth of the coordinate.
+  const auto squared_gap = [&](float coordinate, int index) {
+    const float low = static_cast<float>(index) * cell_size_;
+    const float gap = std::max(low - coordinate, coordinate - low - cell_size_) - slack - 1e-6F * std::abs(coordinate);
+    return gap > 0.0F ? gap * gap : 0.0F;
+  };
   for (int x = lo.x(); x <= hi.x(); ++x) {
+    const float gap_x = squared_gap(p.x(), x);
     for (int y = lo.y(); y <= hi.y(); ++y) {
+      const float gap_xy = gap_x + squared_gap(p.y(), y);
+      if (gap_xy > best.second_squared * kReachFactor) continue;
       for (int z = lo.z(); z <= hi.z(); ++z) {
+        if (gap_xy + squared_gap(p.z(), z) > best.second_squared * kReachFactor) continue;
         const std::uint32_t cell = cell_of_.Find(LatticeCell(x, y, z).key());
         if (cell == CellMap::kNone) continue;
         for (std::uint32_t i = cells_[cell].first; i < cells_[cell].last; ++i) {
           const Entry& entry = entries_[i];
           if (entry.global_index >= own_first && entry.global_index < own_last) continue;
+          if (entry.global_index == best.global_index) continue;
           const float squared = (entry.point - p).squaredNorm();
           if (squared < best.squared_distance || (squared == best.squared_distance && entry.global_index < best.global_index))
-            best = {squared, entry.global_index};
+            best = {squared, entry.global_index, std::min(best.squared_distance, best.second_squared)};
+          else if (squared < best.second_squared)
+            best.second_squared = squared;
         }
       }
     }
@@ -115,26 +132,31 @@ std::uint32_t CloudNeighbours::Nearest(std::size_t cloud, std::size_t index, flo
   const float squared_radius = radius * radius;
   const auto reach_of = [](float distance) { return distance * kReachFactor + kReachMargin; };
 
-  // Both ends can have come nearer by the travel since, and still nothing is within the radius.
-  if (memory.none_within - 2.0F * (travel_ - memory.travel_then) > reach_of(radius)) return kNone;
+  // Since the last search any two points can have come nearer by the travel of both.
+  const float nearer_by = 2.0F * (travel_ - memory.travel_then);
+  if (memory.none_within - nearer_by > reach_of(radius)) return kNone;
 
-  // The old partner bounds the search; without one, outwards in growing boxes. Past the radius by one cell, so that
-  // the next searches can know that nothing is near.
+  // Past the radius by one cell, so that the next searches can know that nothing is near.
   const float farthest = radius + cell_size_;
-  Best best = {farthest * farthest, kNone};
+  Best best = {farthest * farthest, kNone, farthest * farthest};
   float reach = std::min(cell_size_, farthest);
   if (memory.neighbour != kNone) {
     const float squared = (points_[memory.neighbour] - p).squaredNorm();
+    const float distance = std::sqrt(squared);
+    if (reach_of(distance) < memory.no_other_within - nearer_by) return squared < squared_radius ? memory.neighbour : kNone;
+    // The old partner bounds the search; a little further, the next candidate decides how long the answer will hold.
     if (squared < best.squared_distance) {
-      best = {squared, memory.neighbour};
-      reach = std::sqrt(squared);
+      reach = std::min(distance + std::clamp(kStepsAhead * last_step_, 0.02F * cell_size_, 0.2F * cell_size_), farthest);
+      best = {squared, memory.neighbour, reach * reach};
     }
   }
   for (;; reach = std::min(2.0F * reach, farthest)) {
+    best.second_squared = std::min(best.second_squared, reach * reach);
     SearchBox(p, reach_of(reach), own_first, own_last, best);
     if (best.squared_distance <= reach * reach || reach >= farthest) break;
+    best.second_squared = farthest * farthest;
   }
-  memory = {best.global_index, std::sqrt(best.squared_distance), travel_};
+  memory = {best.global_index, std::sqrt(best.squared_distance), std::sqrt(best.second_squared), travel_};
   return best.squared_distance < squared_radius ? best.global_index : kNone;
 }
 

@@ -15,7 +15,8 @@ namespace plumb {
 ///
 /// Two things make repeated searches cheap while the clouds move little between them. Points stay in
 /// the cell where they were binned until one has moved by a quarter of a cell; searches reach out by that much
-/// more. And the partner of the last search bounds the next one, as does the knowledge that none was near.
+/// more. And what the last search knew holds for a while: its partner is still the nearest, or none is near, until the clouds
+/// have moved by the distance to the next candidate; after that the old partner bounds the search.
 ///
 /// Nearest() is const and thread-safe for different points; Move() is not. Deterministic: of equally near points the one
 /// with the smaller (cloud, index) is found.
@@ -29,6 +30,7 @@ class CloudNeighbours {
   struct Memory {
     std::uint32_t neighbour = kNone;  ///< Global index of the nearest point found last, within the radius or not.
     float none_within = 0.0F;         ///< Nothing was nearer than this ...
+    float no_other_within = 0.0F;     ///< ... and nothing but `neighbour` nearer than this ...
     float travel_then = 0.0F;         ///< ... when the clouds had moved so far.
   };
 
@@ -58,6 +60,7 @@ class CloudNeighbours {
   struct Best {
     float squared_distance;
     std::uint32_t global_index;
+    float second_squared;  ///< No other point was found nearer than this.
   };
 
   void Bin();
@@ -68,6 +71,7 @@ class CloudNeighbours {
   float slack_;          ///< Bound on how far any point is from where it was binned.
   float travel_ = 0.0F;  ///< Sum over moves of the largest displacement.
   float travel_when_binned_ = 0.0F;
+  float last_step_ = 0.0F;               ///< Largest displacement of the last move.
   std::vector<std::uint32_t> starts_;    ///< First global index of each cloud, and the total.
   std::vector<Eigen::Vector3f> points_;  ///< By global index.
   std::vector<std::uint32_t> entry_of_;  ///< By global index.
