@@ -13,7 +13,7 @@
 namespace plumb {
 namespace {
 
-using Vector18d = Eigen::Matrix<double, QuadraticTerm::kSize, 1>;
+using TermVector = Eigen::Matrix<double, QuadraticTerm::kSize, 1>;
 
 struct KeyframePair {
   int a = 0;  // Whose cells are projected.
@@ -27,7 +27,7 @@ struct CalibratedView {
   Pose T_world_depth;
   Pose T_color_depth;
   std::vector<Eigen::Vector3f> points;  // Corrected, depth camera frame; z 0 where nothing.
-  std::vector<float> bow;               // r^2 of each cell.
+  std::vector<Eigen::Vector2f> centred;  // Coordinates of each cell in the depth model.
   int width = 0;
   int height = 0;
 };
@@ -55,17 +55,20 @@ std::vector<CalibratedView> MakeViews(const Sensor& sensor, const CalibrationMod
   if (map.keyframes.empty()) return views;
   const DenseView& first = map.keyframes[0].dense;
   std::vector<Eigen::Vector2f> rays(first.size());
-  std::vector<float> bow(first.size());
+  std::vector<Eigen::Vector2f> centred(first.size());
   for (int r = 0; r < first.height; ++r) {
     for (int c = 0; c < first.width; ++c) {
       const auto i = static_cast<std::size_t>(r * first.width + c);
       const double x = (c + 0.5) * first.window_px - 0.5;
       const double y = (r + 0.5) * first.window_px - 0.5;
       rays[i] = Undistort(sensor.depth, {x, y}).cast<float>();
-      bow[i] = static_cast<float>(BowRadiusSquared(x, y, sensor.stated.width, sensor.stated.height));
+      centred[i] = CentredCoordinates(x, y, sensor.stated.width, sensor.stated.height).cast<float>();
     }
   }
-  const auto& d = calibration.depth;
+  // Rows are read one after the other: each cell is moved to where the camera at the stamp would have it.
+  const auto readout_s = static_cast<float>(calibration.depth[8]);
+  std::vector<float> row_share;
+  for (int r = 0; r < first.height; ++r) row_share.push_back((static_cast<float>(r) + 0.5F) / static_cast<float>(first.height) - 0.5F);
   tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t k) {
     const MapKeyframe& keyframe = map.keyframes[k];
     CalibratedView& view = views[k];
@@ -74,13 +77,17 @@ std::vector<CalibratedView> MakeViews(const Sensor& sensor, const CalibrationMod
     view.T_color_depth = keyframe.T_world_color.inverse() * view.T_world_depth;
     view.width = keyframe.dense.width;
     view.height = keyframe.dense.height;
-    view.bow = bow;
+    view.centred = centred;
     view.points.assign(keyframe.dense.size(), Eigen::Vector3f::Zero());
+    const Eigen::Vector3f w = keyframe.velocity_per_s.head<3>().cast<float>();
+    const Eigen::Vector3f v = keyframe.velocity_per_s.tail<3>().cast<float>();
     for (std::size_t i = 0; i < view.points.size(); ++i) {
       const float z = keyframe.dense.z_m[i];
       if (z <= 0) continue;
-      const float corrected = z * static_cast<float>(1.0 + d[0]) + static_cast<float>(d[1]) + static_cast<float>(d[2]) * bow[i];
-      view.points[i] = {rays[i].x() * corrected, rays[i].y() * corrected, corrected};
+      const auto corrected = static_cast<float>(calibration.CorrectedDepth(z, centred[i].cast<double>()));
+      const Eigen::Vector3f p(rays[i].x() * corrected, rays[i].y() * corrected, corrected);
+      const float late_s = row_share[i / static_cast<std::size_t>(view.width)] * readout_s;
+      view.points[i] = p + late_s * (w.cross(p) + v);
     }
   });
   return views;
@@ -175,30 +182,37 @@ std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistratio
 
 // Derivative of a corrected point's position with the depth calibration, dotted with a direction m of its own camera.
 void AddDepthJacobian(const Sensor& sensor, const CalibratedView& view, std::size_t i, const Eigen::Vector3d& m, double sign,
-                      Vector18d& J) {
+                      TermVector& J) {
   const Eigen::Vector3d p = view.points[i].cast<double>();
   const Eigen::Vector3d ray = p / p.z();
   const double z_raw = view.keyframe->dense.z_m[i];
   const double along = sign * m.dot(ray);
   J[12] += along * z_raw;
   J[13] += along;
-  J[14] += along * view.bow[i];
+  J[14] += along * view.centred[i].squaredNorm();
+  J[18] += along * z_raw * view.centred[i].x();
+  J[19] += along * z_raw * view.centred[i].y();
   J[15] -= sign * m.x() * p.z() * sensor.scale / sensor.depth.fx;
   J[16] -= sign * m.y() * p.z() * sensor.scale / sensor.depth.fy;
   const Vector6d& v = view.keyframe->velocity_per_s;
-  J[17] += sign * m.dot(v.head<3>().cross(p) + v.tail<3>());
+  const double along_motion = sign * m.dot(v.head<3>().cross(p) + v.tail<3>());
+  J[17] += along_motion;
+  const auto row = static_cast<double>(i / static_cast<std::size_t>(view.width));
+  J[20] += along_motion * ((row + 0.5) / view.height - 0.5);
 }
 
 // A residual in metres of the scene shrinks with the scene, so the solver would shrink it: the residual is taken back to the
 // units of the measurement, r z_raw / z_corrected, and J follows. Returns that factor times the residual.
-double InRawUnits(const CalibratedView& view, std::size_t i, double residual, Vector18d& J) {
+double InRawUnits(const CalibratedView& view, std::size_t i, double residual, TermVector& J) {
   const double z_raw = view.keyframe->dense.z_m[i];
   const double z = view.points[i].z();
   const double factor = z_raw / z;
   J *= factor;
   J[12] -= residual * factor * factor;
   J[13] -= residual * factor / z;
-  J[14] -= residual * factor / z * view.bow[i];
+  J[14] -= residual * factor / z * view.centred[i].squaredNorm();
+  J[18] -= residual * factor * factor * view.centred[i].x();
+  J[19] -= residual * factor * factor * view.centred[i].y();
   return residual * factor;
 }
 
@@ -219,7 +233,7 @@ QuadraticTerm DenseTerm(const Sensor& sensor, const CalibratedView& a, const Cal
     const Eigen::Vector3d n_color_a = a.T_color_depth.linear() * n_a;
     const Eigen::Vector3d q_color = b.T_color_depth * q_b.cast<double>();
     const Eigen::Vector3d n_color_b = b.T_color_depth.linear() * n_b;
-    Vector18d J = Vector18d::Zero();
+    TermVector J = TermVector::Zero();
     J.segment<3>(0) = p_color.cross(n_color_a);
     J.segment<3>(3) = n_color_a;
     J.segment<3>(6) = -q_color.cross(n_color_b);
@@ -262,7 +276,7 @@ std::optional<QuadraticTerm> MarkerFaceTerm(const Sensor& sensor, const Calibrat
       if (std::abs(in_marker.z()) > gate_m) continue;
       const Eigen::Vector3d p_color = view.T_color_depth * p;
       const Eigen::Vector3d n_color = view.T_color_depth.linear() * n_depth;
-      Vector18d J = Vector18d::Zero();
+      TermVector J = TermVector::Zero();
       J.segment<3>(0) = p_color.cross(n_color);
       J.segment<3>(3) = n_color;
       J.segment<3>(6) = -in_marker.cross(Eigen::Vector3d::UnitZ());
@@ -346,6 +360,8 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointReg
   BundleOptions bundle;
   bundle.marker_length_m = options.marker_length_m;
   bundle.calibrate = options.calibrate;
+  bundle.keypoint_sigma_px = options.keypoint_sigma_px;
+  bundle.keypoint_depth_sigmas = options.keypoint_depth_sigmas;
   bundle.num_threads = options.num_threads;
   bundle.max_iterations = 10;
   bundle.free_keyframes.resize(map.keyframes.size() - 1);
@@ -358,6 +374,8 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointReg
   double gate_m = options.max_gate_m;
   std::vector<KeyframePair> pairs;
   bundle.max_iterations = 4;
+  // The dense terms know nothing of the lens: left free here it would follow what they do to the poses.
+  bundle.fix_lens = true;
   for (int round = 0; round < options.num_rounds; ++round) {
     CheckStop(stop);
     const Sensor sensor = MakeSensor(stated, result.calibration);

@@ -118,29 +118,33 @@ struct KeypointCost final : ceres::SizedCostFunction<2, 6, 3, 6, 1> {
 };
 
 // Blocks: pose, landmark, depth.
-struct KeypointDepthCost final : ceres::SizedCostFunction<1, 6, 3, 6> {
+struct KeypointDepthCost final : ceres::SizedCostFunction<1, 6, 3, CalibrationModel::kDepthSize> {
   Pose T_camera0_world;
   Vector6d velocity;
-  double bow;
+  Eigen::Vector2d centred;
+  double row_share;  // RowShare() of the pixel.
   double z_m;
   double dt_s;  // Depth stamp after colour stamp.
   double sigma_m;
 
-  KeypointDepthCost(const Pose& T, const Vector6d& v, double bow_r2, double z, double dt, double sigma)
-      : T_camera0_world(T), velocity(v), bow(bow_r2), z_m(z), dt_s(dt), sigma_m(sigma) {}
+  KeypointDepthCost(const Pose& T, const Vector6d& v, const Eigen::Vector2d& centred_coordinates, double share, double z, double dt, double sigma)
+      : T_camera0_world(T), velocity(v), centred(centred_coordinates), row_share(share), z_m(z), dt_s(dt), sigma_m(sigma) {}
 
   bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
     const double* d = blocks[2];
-    const SeenPoint point = See(T_camera0_world, velocity, blocks[0], Eigen::Map<const Eigen::Vector3d>(blocks[1]), dt_s + d[5]);
+    const SeenPoint point = See(T_camera0_world, velocity, blocks[0], Eigen::Map<const Eigen::Vector3d>(blocks[1]), dt_s + d[5] + row_share * d[8]);
     // In the units of the measurement: in metres of the scene, a smaller scene would look better.
-    const double predicted = (point.p.z() - d[1] - d[2] * bow) / (1.0 + d[0]);
+    const double bow = centred.squaredNorm();
+    const double scale = 1.0 + d[0] + d[6] * centred.x() + d[7] * centred.y();
+    const double predicted = (point.p.z() - d[1] - d[2] * bow) / scale;
     residual[0] = (z_m - predicted) / sigma_m;
     if (jacobians == nullptr) return true;
-    const double factor = -1.0 / ((1.0 + d[0]) * sigma_m);
+    const double factor = -1.0 / (scale * sigma_m);
     if (jacobians[0] != nullptr) Eigen::Map<Eigen::Matrix<double, 1, 6>>{jacobians[0]} = factor * point.J_pose.row(2);
     if (jacobians[1] != nullptr) Eigen::Map<Eigen::Matrix<double, 1, 3>>{jacobians[1]} = factor * point.J_world.row(2);
     if (jacobians[2] != nullptr)
-      Eigen::Map<Eigen::Matrix<double, 1, 6>>{jacobians[2]} << -predicted * factor, -factor, -bow * factor, 0, 0, factor * point.J_time.z();
+      Eigen::Map<Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>>{jacobians[2]} << -predicted * factor, -factor, -bow * factor, 0, 0,
+          factor * point.J_time.z(), -predicted * factor * centred.x(), -predicted * factor * centred.y(), factor * point.J_time.z() * row_share;
     return true;
   }
 };
@@ -205,7 +209,7 @@ struct PriorCost {
 // 1/2 |A (x - x0) + b|^2 equal to the quadratic up to a constant: A = sqrt(L) V', b = A H^+ g.
 class QuadraticCost : public ceres::CostFunction {
  public:
-  QuadraticCost(const QuadraticTerm& term, const std::array<double, 6>& depth0) : depth0_(depth0) {
+  QuadraticCost(const QuadraticTerm& term, const std::array<double, CalibrationModel::kDepthSize>& depth0) : depth0_(depth0) {
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, QuadraticTerm::kSize, QuadraticTerm::kSize>> solver(term.H);
     const double cutoff = 1e-10 * std::max(1e-300, solver.eigenvalues().maxCoeff());
     int rank = 0;
@@ -220,7 +224,7 @@ class QuadraticCost : public ceres::CostFunction {
       b_[row++] = solver.eigenvectors().col(i).dot(term.g) / std::sqrt(value);
     }
     set_num_residuals(rank);
-    *mutable_parameter_block_sizes() = {6, 6, 6};
+    *mutable_parameter_block_sizes() = {6, 6, CalibrationModel::kDepthSize};
   }
 
   [[nodiscard]] bool empty() const { return num_residuals() == 0; }
@@ -230,20 +234,25 @@ class QuadraticCost : public ceres::CostFunction {
     for (int i = 0; i < 6; ++i) {
       x[i] = parameters[0][i];
       x[6 + i] = parameters[1][i];
-      x[12 + i] = parameters[2][i] - depth0_[static_cast<std::size_t>(i)];
     }
+    for (int i = 0; i < CalibrationModel::kDepthSize; ++i) x[12 + i] = parameters[2][i] - depth0_[static_cast<std::size_t>(i)];
     Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = A_ * x + b_;
     if (jacobians == nullptr) return true;
-    for (int block = 0; block < 3; ++block) {
-      if (jacobians[block] == nullptr) continue;
-      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>;
-      Eigen::Map<RowMajor>(jacobians[block], num_residuals(), 6) = A_.middleCols<6>(6 * block);
-    }
+    CopyColumns<6>(0, jacobians[0]);
+    CopyColumns<6>(6, jacobians[1]);
+    CopyColumns<CalibrationModel::kDepthSize>(12, jacobians[2]);
     return true;
   }
 
  private:
-  std::array<double, 6> depth0_;
+  template <int kColumns>
+  void CopyColumns(int first, double* jacobian) const {
+    if (jacobian == nullptr) return;
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, kColumns, Eigen::RowMajor>>(jacobian, num_residuals(), kColumns) =
+        A_.middleCols<kColumns>(first);
+  }
+
+  std::array<double, CalibrationModel::kDepthSize> depth0_;
   Eigen::Matrix<double, Eigen::Dynamic, QuadraticTerm::kSize> A_;
   Eigen::VectorXd b_;
 };
@@ -324,9 +333,9 @@ class Bundle {
                               PoseBlock(k), landmark.p_world.data(), calibration_.lens.data(), calibration_.readout_s.data());
     if (o.z_m > 0) {
       const double dt = keyframe.data.depth_time_s - keyframe.data.color_time_s;
-      const double bow = BowRadiusSquared(o.pixel.x(), o.pixel.y(), stated_.width, stated_.height);
+      const Eigen::Vector2d centred = CentredCoordinates(o.pixel.x(), o.pixel.y(), stated_.width, stated_.height);
       problem_.AddResidualBlock(
-          new KeypointDepthCost(T_camera0_world, keyframe.velocity_per_s, bow, o.z_m, dt, 1.5 * DepthSigma(o.z_m, 0.8)), &keypoint_loss_,
+          new KeypointDepthCost(T_camera0_world, keyframe.velocity_per_s, centred, RowShare(o.pixel.y(), stated_.height), o.z_m, dt, options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8)), &keypoint_loss_,
           PoseBlock(k), landmark.p_world.data(), calibration_.depth.data());
       depth_used_ = true;
     }
@@ -369,15 +378,14 @@ class Bundle {
       problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost<1>, 1, 1>(new PriorCost<1>{{C::kEdgeBiasSigma}}), nullptr,
                                 calibration_.edge_bias_px.data());
     if (depth_used_)
-      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost<6>, 6, 6>(new PriorCost<6>{C::kDepthSigma}), nullptr,
+      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost<C::kDepthSize>, C::kDepthSize, C::kDepthSize>(new PriorCost<C::kDepthSize>{C::kDepthSigma}), nullptr,
                                 calibration_.depth.data());
   }
 
   void FixBlocks() {
     for (const int k : used_keyframes_)
       if (!free_.contains(k)) problem_.SetParameterBlockConstant(PoseBlock(k));
-    if (options_.fix_markers)
-      for (auto& [id, block] : markers_) problem_.SetParameterBlockConstant(block.data());
+    if (options_.fix_lens && problem_.HasParameterBlock(calibration_.lens.data())) problem_.SetParameterBlockConstant(calibration_.lens.data());
     if (!options_.calibrate) {
       for (double* block :
            {calibration_.lens.data(), calibration_.readout_s.data(), calibration_.edge_bias_px.data(), calibration_.depth.data()})
@@ -404,7 +412,6 @@ class Bundle {
       const Vector6d twist = Eigen::Map<const Vector6d>(poses_[static_cast<std::size_t>(k)].data());
       keyframe.T_world_color = Orthonormalised(keyframe.T_world_color * PoseFromTwist(twist));
     }
-    if (options_.fix_markers) return;
     for (auto& [id, block] : markers_) {
       MapMarker& marker = map_.markers.at(id);
       marker.T_world_marker = Orthonormalised(marker.T_world_marker * PoseFromTwist(Eigen::Map<const Vector6d>(block.data())));

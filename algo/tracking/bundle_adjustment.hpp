@@ -12,7 +12,7 @@ namespace plumb {
 /// 1/2 x' H x + g' x, where x holds the twists from the poses at the time of linearisation (twist on the camera's or the
 /// marker's side) and the change of CalibrationModel::depth. Sums of millions of point-to-plane residuals come in this form.
 struct QuadraticTerm {
-  static constexpr int kSize = 18;
+  static constexpr int kSize = 12 + CalibrationModel::kDepthSize;
   int keyframe_a = -1;
   int keyframe_b = -1;  ///< Second keyframe, or -1 where `marker` is the second.
   int marker = -1;      ///< Id.
@@ -23,7 +23,7 @@ struct QuadraticTerm {
 struct BundleOptions {
   std::vector<int> free_keyframes;  ///< To move; the others that share landmarks or markers stay.
   bool calibrate = false;           ///< Move the calibration too.
-  bool fix_markers = false;         ///< Markers stay where they are.
+  bool fix_lens = false;            ///< Keep CalibrationModel::lens even so.
   int max_iterations = 8;
   int num_threads = 1;
   double keypoint_sigma_px = 0.6;  ///< At 640 columns.

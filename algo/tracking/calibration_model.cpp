@@ -2,11 +2,9 @@
 
 namespace plumb {
 
-double BowRadiusSquared(double x_px, double y_px, int width, int height) {
+Eigen::Vector2d CentredCoordinates(double x_px, double y_px, int width, int height) {
   const double half = width / 2.0;
-  const double x = (x_px - (width - 1) / 2.0) / half;
-  const double y = (y_px - (height - 1) / 2.0) / half;
-  return x * x + y * y;
+  return {(x_px - (width - 1) / 2.0) / half, (y_px - (height - 1) / 2.0) / half};
 }
 
 Intrinsics CalibrationModel::Corrected(const Intrinsics& stated) const {
@@ -21,10 +19,6 @@ Intrinsics CalibrationModel::Corrected(const Intrinsics& stated) const {
   return corrected;
 }
 
-double CalibrationModel::CorrectedDepth(double z_m, double x_px, double y_px, const Intrinsics& stated) const {
-  return z_m * (1.0 + depth[0]) + depth[1] + depth[2] * BowRadiusSquared(x_px, y_px, stated.width, stated.height);
-}
-
 std::map<std::string, double> CalibrationModel::Named() const {
   return {{"focal_x_scale", 1.0 + lens[0]},  {"focal_y_scale", 1.0 + lens[1]},
           {"centre_x_px", lens[2]},          {"centre_y_px", lens[3]},
@@ -32,7 +26,7 @@ std::map<std::string, double> CalibrationModel::Named() const {
           {"color_readout_s", readout_s[0]}, {"marker_edge_bias_px", edge_bias_px[0]},
           {"depth_scale", 1.0 + depth[0]},   {"depth_offset_m", depth[1]},
           {"depth_bow_m", depth[2]},         {"depth_shift_x_px", depth[3]},
-          {"depth_shift_y_px", depth[4]},    {"depth_delay_s", depth[5]}};
+          {"depth_shift_y_px", depth[4]},    {"depth_delay_s", depth[5]}, {"depth_slope_x", depth[6]}, {"depth_slope_y", depth[7]}, {"depth_readout_s", depth[8]}};
 }
 
 }  // namespace plumb
