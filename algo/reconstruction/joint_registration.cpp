@@ -26,7 +26,7 @@ struct CalibratedView {
   const MapKeyframe* keyframe = nullptr;
   Pose T_world_depth;
   Pose T_color_depth;
-  std::vector<Eigen::Vector3f> points;  // Corrected, depth camera frame; z 0 where nothing.
+  std::vector<Eigen::Vector3f> points;   // Corrected, depth camera frame; z 0 where nothing.
   std::vector<Eigen::Vector2f> centred;  // Coordinates of each cell in the depth model.
   int width = 0;
   int height = 0;

@@ -14,10 +14,13 @@ struct JointRegistrationOptions {
   int num_rounds = 5;        ///< Of association and solution.
   double max_gate_m = 0.06;  ///< Farthest point-to-plane residual of the first round; shrinks by 0.6 a round.
   double min_gate_m = 0.012;
-  int max_pairs = 8;          ///< Overlapping keyframes that each keyframe is registered against.
-  double min_overlap = 0.2;   ///< Share of a keyframe's cells that fall into the other.
-  double dense_weight = 0.3;  ///< Of the dense terms against their noise model: what the model leaves out is shared by neighbours.
-  int num_threads = 1;        ///< Of the solver. With more, its sums come in the order of the threads: no two runs agree in the last bits.
+  int max_pairs = 8;         ///< Overlapping keyframes that each keyframe is registered against.
+  double min_overlap = 0.2;  ///< Share of a keyframe's cells that fall into the other.
+  /// Of the dense terms against their noise model: what the model leaves out is shared by neighbouring cells and views.
+  double dense_weight = 0.05;
+  /// Pixels at 640 columns. Far above the noise of one sighting: a track's error is common to its views.
+  double keypoint_sigma_px = 3.0;
+  double keypoint_depth_sigmas = 4.0;  ///< In standard deviations of the noise model.
 };
 
 struct JointRegistrationResult {

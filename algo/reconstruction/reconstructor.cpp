@@ -9,7 +9,9 @@
 #include "algo/geometry/back_projection.hpp"
 #include "algo/reconstruction/height_map_builder.hpp"
 #include "algo/reconstruction/joint_registration.hpp"
+#include "algo/reconstruction/paper_reconstruction.hpp"
 #include "algo/reconstruction/surface_cloud.hpp"
+#include "algo/reconstruction/surface_mesh.hpp"
 #include "algo/reconstruction/trajectory.hpp"
 #include "algo/reconstruction/view_surface.hpp"
 #include "algo/tracking/tracker.hpp"
@@ -18,7 +20,8 @@
 namespace plumb {
 namespace {
 
-constexpr int kMinReferenceViews = 3;  // Of the reference marker, before the scene's frame is built on it.
+constexpr std::size_t kMaxPaperKeyframes = 20;  // The paper had about 15 a sweep.
+constexpr int kMinReferenceViews = 3;           // Of the reference marker, before the scene's frame is built on it.
 
 TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
   TrackerOptions tracking;
@@ -134,32 +137,17 @@ struct Reconstructor::Impl {
     TrackingMap map = tracker.TakeMap();
     RefreshVelocities(frames, map);
 
-    report(0.0, "registration");
-    double stage = Now();
-    JointRegistrationOptions joint_options;
-    joint_options.marker_length_m = info.marker_length_m;
-    const JointRegistrationResult joint = RegisterJointly(info.intrinsics, joint_options, map, stop);
-    Scene scene = MakeScene(frames, map, joint);
-    scene.timings_s["global_registration"] = Now() - stage;
-
-    report(0.5, "surface");
-    stage = Now();
-    const Pose T_scene_world = SceneFromWorld(map);
-    const std::vector<ViewSurface> surfaces = PrepareViews(Views(map, joint.calibration, T_scene_world));
-    SurfaceCloudOptions cloud_options;
-    cloud_options.with_colors = options.keep_color;
-    scene.cloud = MergeSurface(surfaces, cloud_options);
-    scene.timings_s["clouds"] = Now() - stage;
-
-    report(0.8, "height map");
-    stage = Now();
-    if (scene.frame == SceneFrame::kReferenceMarker) {
-      RobustHeightMapOptions map_options;
-      map_options.with_colors = options.keep_color;
-      ColoredHeightMap heights = RobustHeightMap(surfaces, map_options);
-      scene.height_map = std::move(heights.map);
+    Scene scene;
+    if (options.preset == Preset::kPaper) {
+      ReconstructPaper(frames, map, scene, stop, report);
+    } else {
+      ReconstructBest(frames, map, scene, stop, report);
     }
-    scene.timings_s["height_map"] = Now() - stage;
+    report(0.9, "mesh");
+    double stage = Now();
+    if (scene.height_map)
+      scene.mesh = MeshOfHeightMap(*scene.height_map, ColorsFromCloud(*scene.height_map, scene.cloud), {.decimation = 2});
+    scene.timings_s["mesh"] = Now() - stage;
     if (!tracking_times_s.empty()) {
       std::vector<double> times = tracking_times_s;
       std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
@@ -168,6 +156,95 @@ struct Reconstructor::Impl {
     scene.timings_s["after_last_frame"] = Now() - start;
     report(1.0, "done");
     return scene;
+  }
+
+  using Report = std::function<void(double, std::string_view)>;
+
+  void ReconstructBest(const std::vector<TrackedFrame>& frames, TrackingMap& map, Scene& scene, const std::stop_token& stop,
+                       const Report& report) const {
+    report(0.0, "registration");
+    double stage = Now();
+    JointRegistrationOptions joint_options;
+    joint_options.marker_length_m = info.marker_length_m;
+    const JointRegistrationResult joint = RegisterJointly(info.intrinsics, joint_options, map, stop);
+    scene = MakeScene(frames, map, joint.calibration, SceneFromWorld(map));
+    for (const auto& [name, value] : joint.calibration.Named()) scene.calibration[name] = value;
+    scene.calibration["consistency_before_m"] = joint.consistency_before_m;
+    scene.calibration["consistency_after_m"] = joint.consistency_after_m;
+    if (!joint.accepted && joint.num_pairs > 0)
+      scene.warnings.push_back("the dense registration did not make the views agree better and was left out");
+    scene.timings_s["global_registration"] = Now() - stage;
+
+    report(0.5, "surface");
+    stage = Now();
+    const std::vector<ViewSurface> surfaces = PrepareViews(Views(map, joint.calibration, SceneFromWorld(map)));
+    SurfaceCloudOptions cloud_options;
+    cloud_options.with_colors = options.keep_color;
+    scene.cloud = MergeSurface(surfaces, cloud_options);
+    scene.timings_s["clouds"] = Now() - stage;
+
+    report(0.8, "height map");
+    stage = Now();
+    RobustHeightMapOptions map_options;
+    map_options.with_colors = false;  // The mesh takes its colours from the cloud.
+    if (scene.frame == SceneFrame::kReferenceMarker) scene.height_map = RobustHeightMap(surfaces, map_options).map;
+    scene.timings_s["height_map"] = Now() - stage;
+  }
+
+  // The published chain: tracking with its own bundle adjustment, then Algorithm 1 on a few keyframes, single-pixel
+  // corners, means of means. The sensor is taken at its word.
+  void ReconstructPaper(const std::vector<TrackedFrame>& frames, TrackingMap& map, Scene& scene, const std::stop_token& stop,
+                        const Report& report) const {
+    report(0.0, "registration");
+    const double start = Now();
+    JointRegistrationOptions joint_options;
+    joint_options.marker_length_m = info.marker_length_m;
+    joint_options.calibrate = false;
+    joint_options.use_dense = false;
+    const CalibrationModel stated = RegisterJointly(info.intrinsics, joint_options, map, stop).calibration;
+    scene.timings_s["bundle_adjustment"] = Now() - start;
+    std::vector<Keyframe> keyframes;
+    const std::size_t step = (map.keyframes.size() + kMaxPaperKeyframes - 1) / kMaxPaperKeyframes;
+    for (std::size_t k = 0; k < map.keyframes.size(); k += step) {
+      if (cv::countNonZero(map.keyframes[k].data.view.depth_m) == 0) continue;
+      keyframes.push_back(map.keyframes[k].data);
+      keyframes.back().view.T_world_camera = DepthPose(map.keyframes[k], stated);
+    }
+    PaperOptions paper_options;
+    paper_options.icp.num_iterations = options.num_icp_iterations;
+    paper_options.icp.seed = options.seed;
+    paper_options.marker_length_m = info.marker_length_m;
+    paper_options.reference_marker = info.reference_marker;
+    std::string running;
+    double stage = Now();
+    std::map<std::string, double> timings;
+    const PaperReconstruction paper = ReconstructAsPublished(
+        keyframes, paper_options, stop,
+        [&](std::string_view next) {
+          if (!running.empty()) timings[running] = Now() - stage;
+          running = next;
+          stage = Now();
+        },
+        [&](double fraction) { report(0.1 + 0.6 * fraction, "global ICP"); });
+    const Pose T_scene_world = paper.T_marker_world.value_or(map.keyframes.front().T_world_color.inverse());
+    timings.merge(scene.timings_s);
+    scene = MakeScene(frames, map, stated, T_scene_world);
+    scene.timings_s = timings;
+    scene.frame = paper.T_marker_world ? SceneFrame::kReferenceMarker : SceneFrame::kFirstKeyframe;
+    scene.markers = paper.markers_in_world;
+    for (auto& [id, marker] : scene.markers)
+      for (Eigen::Vector3d& corner : marker.corners) corner = T_scene_world * corner;
+    scene.keyframes.clear();
+    std::vector<DepthView> views;
+    for (std::size_t j = 0; j < keyframes.size(); ++j) {
+      DepthView view = keyframes[j].view;
+      view.T_world_camera = T_scene_world * paper.T_refined_world[j] * view.T_world_camera;
+      if (!options.keep_color) view.color_rgb.release();
+      scene.keyframes.push_back({keyframes[j].depth_time_s, view.T_world_camera});
+      views.push_back(std::move(view));
+    }
+    scene.cloud = MergeSurface(views, {.with_colors = options.keep_color});
+    scene.height_map = paper.height_map;
   }
 
   [[nodiscard]] bool HasReferenceMarker(const TrackingMap& map) const {
@@ -181,7 +258,8 @@ struct Reconstructor::Impl {
     return map.keyframes.front().T_world_color.inverse();
   }
 
-  Scene MakeScene(const std::vector<TrackedFrame>& frames, const TrackingMap& map, const JointRegistrationResult& joint) const {
+  Scene MakeScene(const std::vector<TrackedFrame>& frames, const TrackingMap& map, const CalibrationModel& calibration,
+                  const Pose& T_scene_world) const {
     Scene scene;
     scene.preset = options.preset;
     scene.frame = HasReferenceMarker(map) ? SceneFrame::kReferenceMarker : SceneFrame::kFirstKeyframe;
@@ -189,18 +267,14 @@ struct Reconstructor::Impl {
     scene.marker_length_m = info.marker_length_m;
     scene.reference_marker = info.reference_marker;
     scene.warnings = info.warnings;
-    const Pose T_scene_world = SceneFromWorld(map);
     for (const MapKeyframe& keyframe : map.keyframes)
-      scene.keyframes.push_back({keyframe.data.depth_time_s, T_scene_world * DepthPose(keyframe, joint.calibration)});
-    scene.trajectory = DepthTrajectory(frames, map, joint.calibration, T_scene_world);
+      scene.keyframes.push_back({keyframe.data.depth_time_s, T_scene_world * DepthPose(keyframe, calibration)});
+    scene.trajectory = DepthTrajectory(frames, map, calibration, T_scene_world);
     scene.frames_total = static_cast<std::int64_t>(frames.size()) + dropped;
     scene.frames_tracked = static_cast<std::int64_t>(scene.trajectory.size());
     scene.frames_dropped = dropped;
     scene.longest_lost_s = LongestLost(frames);
     for (const auto& [id, marker] : map.markers) scene.markers[id] = ToSceneMarker(marker, T_scene_world);
-    for (const auto& [name, value] : joint.calibration.Named()) scene.calibration[name] = value;
-    scene.calibration["consistency_before_m"] = joint.consistency_before_m;
-    scene.calibration["consistency_after_m"] = joint.consistency_after_m;
     if (scene.markers.empty())
       scene.warnings.push_back("no marker was seen: the scene lies in the first keyframe's frame and cannot be compared");
     if (!scene.markers.empty() && scene.frame == SceneFrame::kFirstKeyframe)
@@ -214,8 +288,6 @@ struct Reconstructor::Impl {
       scene.warnings.push_back(fmt::format("{} of {} frames were not tracked, {:.2f} s at longest",
                                            scene.frames_total - dropped - scene.frames_tracked, scene.frames_total - dropped,
                                            scene.longest_lost_s));
-    if (!joint.accepted && joint.num_pairs > 0)
-      scene.warnings.push_back("the dense registration did not make the views agree better and was left out");
     return scene;
   }
 
