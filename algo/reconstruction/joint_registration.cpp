@@ -362,7 +362,6 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointReg
   bundle.calibrate = options.calibrate;
   bundle.keypoint_sigma_px = options.keypoint_sigma_px;
   bundle.keypoint_depth_sigmas = options.keypoint_depth_sigmas;
-  bundle.num_threads = options.num_threads;
   bundle.max_iterations = 10;
   bundle.free_keyframes.resize(map.keyframes.size() - 1);
   std::iota(bundle.free_keyframes.begin(), bundle.free_keyframes.end(), 1);

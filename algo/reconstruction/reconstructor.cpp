@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <opencv2/core.hpp>
 #include <tbb/parallel_for.h>
 
 #include "algo/geometry/back_projection.hpp"

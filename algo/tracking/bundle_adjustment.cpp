@@ -281,7 +281,7 @@ class Bundle {
     ceres::Solver::Options solver_options;
     solver_options.linear_solver_type = ceres::SPARSE_SCHUR;
     solver_options.max_num_iterations = options_.max_iterations;
-    solver_options.num_threads = options_.num_threads;
+    solver_options.num_threads = 1;
     solver_options.function_tolerance = 1e-5;
     solver_options.logging_type = ceres::SILENT;
     solver_options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();

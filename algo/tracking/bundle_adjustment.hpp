@@ -25,7 +25,6 @@ struct BundleOptions {
   bool calibrate = false;           ///< Move the calibration too.
   bool fix_lens = false;            ///< Keep CalibrationModel::lens even so.
   int max_iterations = 8;
-  int num_threads = 1;
   double keypoint_sigma_px = 0.6;      ///< At 640 columns.
   double keypoint_depth_sigmas = 1.5;  ///< Standard deviation of a keypoint's depth, in those of the noise model.
   double min_corner_sigma_px = 0.15;
