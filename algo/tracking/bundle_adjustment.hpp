@@ -27,7 +27,7 @@ struct BundleOptions {
   int max_iterations = 8;
   double keypoint_sigma_px = 0.6;      ///< At 640 columns.
   double keypoint_depth_sigmas = 1.5;  ///< Standard deviation of a keypoint's depth, in those of the noise model.
-  double min_corner_sigma_px = 0.15;
+  double min_corner_sigma_px = 0.05;
   double marker_length_m = 0.104;
 };
 
