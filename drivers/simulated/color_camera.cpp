@@ -14,7 +14,6 @@ namespace {
 
 using Eigen::Vector3f;
 
-constexpr int kNumPatterns = 32;
 constexpr int kInkSide = 6;               // 36 samples in a pixel on an edge of a marker's print,
 constexpr int kOutlineSide = 4;           // 16 on the outline of a body or board,
 constexpr int kSmoothSide = 2;            // 4 elsewhere.
@@ -116,9 +115,15 @@ void ColorCamera::BuildSamples() {
     }
     return samples;
   };
-  for (int i = 0; i < kNumPatterns; ++i) {
+  for (std::size_t i = 0; i < kNumPatterns; ++i) {
     ink_samples_.push_back(pattern(kInkSide));
     outline_samples_.push_back(pattern(kOutlineSide));
+    // The corners of the grid first: see GatherOutline().
+    auto& outline = outline_samples_.back();
+    constexpr std::size_t kSide = kOutlineSide;
+    std::swap(outline[1], outline[kSide - 1]);
+    std::swap(outline[2], outline[kSide * (kSide - 1)]);
+    std::swap(outline[3], outline[kSide * kSide - 1]);
     smooth_samples_.push_back(pattern(kSmoothSide));
   }
 }
@@ -198,14 +203,20 @@ Vector3f ColorCamera::GatherInk(const Shot& shot, int x, int y) const {
 
 Vector3f ColorCamera::GatherOutline(const Shot& shot, int x, int y, const Candidates& candidates) const {
   const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
+  const auto centre = shot.material.at<std::uint16_t>(y, x);
   Vector3f sum = Vector3f::Zero();
+  bool mixed = false;
   const auto& samples = PatternOf(outline_samples_, x, y);
-  for (const Sample& sample : samples) {
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    // The first four lie at the corners of the pattern: where they see nothing else, nothing else is in sight.
+    if (i == 4 && !mixed) return centre < kFirstBoard ? Vector3f(sum / 4.0F) : GatherSmooth(shot, x, y);
+    const Sample& sample = samples[i];
     const Ray ray = pose.RayOf(rays_.At(x, y, sample.du, sample.dv), sample.dt);
     const Hit hit = shot.world.Trace(ray, candidates);
     const Vector3f p = ray.origin + hit.t * ray.direction;
     const Shading shading = shot.world.ShadingAt(hit.material, p);
     sum += shot.world.Albedo(hit.material, p, shading.normal).cwiseProduct(shading.light);
+    mixed = mixed || hit.material != centre;
   }
   return sum / static_cast<float>(samples.size());
 }

@@ -30,9 +30,10 @@ class ColorCamera {
   void Cast(Shot& shot, int tile_row) const;
   [[nodiscard]] cv::Mat EdgeMask(const Shot& shot) const;
   void Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const;
+  static constexpr std::size_t kNumPatterns = 32;
   using Patterns = std::vector<std::vector<Sample>>;
   [[nodiscard]] static const std::vector<Sample>& PatternOf(const Patterns& patterns, int x, int y) {
-    return patterns[Hash(static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y)) % patterns.size()];
+    return patterns[Hash(static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y)) % kNumPatterns];
   }
   [[nodiscard]] Eigen::Vector3f PointAt(const Shot& shot, int x, int y) const;
   [[nodiscard]] Eigen::Vector3f GatherInk(const Shot& shot, int x, int y) const;

@@ -34,6 +34,9 @@ DistanceGrid::DistanceGrid(const std::function<double(const Eigen::Vector3d&)>& 
   size_ = ((box.sizes() / spacing).array().ceil().cast<int>() + 1).matrix();
   const Eigen::Vector3f low = box.min().cast<float>();
   box_ = Eigen::AlignedBox3f(low, low + (size_.cast<float>() - Eigen::Vector3f::Ones()) * spacing_);
+  last_ = size_.cast<float>() - Eigen::Vector3f::Constant(1.001F);
+  row_ = Index(0, 1, 0);
+  slice_ = Index(0, 0, 1);
   values_.resize(Index(0, 0, size_.z()));
   tbb::parallel_for(0, size_.z(), [&](int z) {
     for (int y = 0; y < size_.y(); ++y) {
@@ -97,29 +100,31 @@ void DistanceGrid::PropagateDistances(const std::vector<char>& fixed) {
   }
 }
 
-DistanceGrid::Place DistanceGrid::Locate(const Eigen::Vector3f& p) const {
-  const Eigen::Vector3f g = (p - box_.min()) * inverse_spacing_;
-  const float gx = std::clamp(g.x(), 0.0F, static_cast<float>(size_.x()) - 1.001F);
-  const float gy = std::clamp(g.y(), 0.0F, static_cast<float>(size_.y()) - 1.001F);
-  const float gz = std::clamp(g.z(), 0.0F, static_cast<float>(size_.z()) - 1.001F);
+inline DistanceGrid::Place DistanceGrid::Locate(float gx, float gy, float gz) const {
+  gx = std::clamp(gx, 0.0F, last_.x());
+  gy = std::clamp(gy, 0.0F, last_.y());
+  gz = std::clamp(gz, 0.0F, last_.z());
   const int x = static_cast<int>(gx);
   const int y = static_cast<int>(gy);
   const int z = static_cast<int>(gz);
   return {Index(x, y, z), gx - static_cast<float>(x), gy - static_cast<float>(y), gz - static_cast<float>(z)};
 }
 
-float DistanceGrid::Interpolate(const Eigen::Vector3f& p) const {
-  const Place at = Locate(p);
+inline float DistanceGrid::ValueAt(const Place& at) const {
   const float* v = &values_[at.index];
-  const std::size_t row = static_cast<std::size_t>(size_.x());
-  const std::size_t slice = row * static_cast<std::size_t>(size_.y());
+  const float* w = v + slice_;
   const float v00 = v[0] + at.x * (v[1] - v[0]);
-  const float v10 = v[row] + at.x * (v[row + 1] - v[row]);
-  const float v01 = v[slice] + at.x * (v[slice + 1] - v[slice]);
-  const float v11 = v[slice + row] + at.x * (v[slice + row + 1] - v[slice + row]);
+  const float v10 = v[row_] + at.x * (v[row_ + 1] - v[row_]);
+  const float v01 = w[0] + at.x * (w[1] - w[0]);
+  const float v11 = w[row_] + at.x * (w[row_ + 1] - w[row_]);
   const float v0 = v00 + at.y * (v10 - v00);
   const float v1 = v01 + at.y * (v11 - v01);
   return v0 + at.z * (v1 - v0);
+}
+
+float DistanceGrid::Interpolate(const Eigen::Vector3f& p) const {
+  const Eigen::Vector3f g = (p - box_.min()) * inverse_spacing_;
+  return ValueAt(Locate(g.x(), g.y(), g.z()));
 }
 
 Eigen::Vector3f DistanceGrid::GradientAtNode(int x, int y, int z) const {
@@ -156,7 +161,7 @@ void DistanceGrid::BuildShades() {
     const Eigen::Vector3f surface = p - values_[Index(node.x(), node.y(), node.z())] * normal;
     const float open_near = std::clamp(Distance(surface + 0.03F * normal) / 0.03F, 0.0F, 1.0F);
     const float open_far = std::clamp(Distance(surface + 0.10F * normal) / 0.10F, 0.0F, 1.0F);
-    shades_[i + 1] << normal, 0.35F + 0.25F * open_near + 0.4F * open_far;
+    shades_[i + 1] = Eigen::Vector4f(normal.x(), normal.y(), normal.z(), 0.35F + 0.25F * open_near + 0.4F * open_far);
   });
 }
 
@@ -166,18 +171,17 @@ float DistanceGrid::Distance(const Eigen::Vector3f& p) const {
 }
 
 Eigen::Vector4f DistanceGrid::Shade(const Eigen::Vector3f& p) const {
-  const Place at = Locate(p);
-  const std::size_t row = static_cast<std::size_t>(size_.x());
-  const std::size_t slice = row * static_cast<std::size_t>(size_.y());
+  const Eigen::Vector3f g = (p - box_.min()) * inverse_spacing_;
+  const Place at = Locate(g.x(), g.y(), g.z());
   const auto edge = [&](std::size_t index) -> Eigen::Vector4f {
     const Eigen::Vector4f& a = shades_[shade_of_node_[index]];
     const Eigen::Vector4f& b = shades_[shade_of_node_[index + 1]];
     return a + at.x * (b - a);
   };
   const Eigen::Vector4f v00 = edge(at.index);
-  const Eigen::Vector4f v01 = edge(at.index + slice);
-  const Eigen::Vector4f v0 = v00 + at.y * (edge(at.index + row) - v00);
-  const Eigen::Vector4f v1 = v01 + at.y * (edge(at.index + slice + row) - v01);
+  const Eigen::Vector4f v01 = edge(at.index + slice_);
+  const Eigen::Vector4f v0 = v00 + at.y * (edge(at.index + row_) - v00);
+  const Eigen::Vector4f v1 = v01 + at.y * (edge(at.index + slice_ + row_) - v01);
   Eigen::Vector4f shade = v0 + at.z * (v1 - v0);
   shade.head<3>() /= std::max(1e-6F, shade.head<3>().norm());
   return shade;
@@ -199,13 +203,17 @@ float DistanceGrid::Intersect(const Eigen::Vector3f& origin, const Eigen::Vector
   if (!ClipToBox(origin, direction, t_begin, t_end)) return kInfinity;
   constexpr float kTolerance = 2e-5F;
   constexpr int kMaxSteps = 200;
+  // The ray in units of cells.
+  const Eigen::Vector3f o = (origin - box_.min()) * inverse_spacing_;
+  const Eigen::Vector3f way = direction * inverse_spacing_;
+  const auto distance = [&](float at) { return ValueAt(Locate(o.x() + at * way.x(), o.y() + at * way.y(), o.z() + at * way.z())); };
   float t = t_begin;
-  float d = Interpolate(origin + t * direction);
+  float d = distance(t);
   for (int step = 0; step < kMaxSteps; ++step) {
     if (d <= kTolerance) return t;
     float advance = std::max(0.9F * d, kTolerance);  // Below 1: the interpolated distance may be a little too large.
     if (t + advance >= t_end) return kInfinity;
-    float d_next = Interpolate(origin + (t + advance) * direction);
+    float d_next = distance(t + advance);
     if (d_next > kTolerance) {
       // Near the surface the distance falls linearly along the ray: try to step across it.
       const float slope = (d - d_next) / advance;
@@ -214,13 +222,13 @@ float DistanceGrid::Intersect(const Eigen::Vector3f& origin, const Eigen::Vector
       if (d > spacing_ || slope < 0.05F) continue;
       advance = 1.2F * d / slope + kTolerance;
       if (advance > spacing_ || t + advance >= t_end) continue;
-      d_next = Interpolate(origin + (t + advance) * direction);
+      d_next = distance(t + advance);
       if (d_next > 0) continue;
     }
     // The surface lies between t (outside) and t + advance (inside): two rounds of false position.
     for (int round = 0; round < 2; ++round) {
       const float split = advance * d / (d - std::min(d_next, 0.0F));
-      const float d_split = Interpolate(origin + (t + split) * direction);
+      const float d_split = distance(t + split);
       if (d_split > 0) {
         t += split;
         advance -= split;

@@ -55,7 +55,8 @@ class DistanceGrid {
     std::size_t index;
     float x, y, z;  ///< In [0, 1].
   };
-  [[nodiscard]] Place Locate(const Eigen::Vector3f& p) const;
+  [[nodiscard]] Place Locate(float gx, float gy, float gz) const;  ///< From coordinates in cells.
+  [[nodiscard]] float ValueAt(const Place& at) const;
   [[nodiscard]] float Interpolate(const Eigen::Vector3f& p) const;
   [[nodiscard]] Eigen::Vector3f GradientAtNode(int x, int y, int z) const;
   void BuildShades();
@@ -66,6 +67,9 @@ class DistanceGrid {
 
   Eigen::AlignedBox3f box_;
   Eigen::Vector3i size_;
+  Eigen::Vector3f last_;  ///< Largest coordinates in cells that still have a neighbour.
+  std::size_t row_ = 0;   ///< Nodes from one row, and from one slice, to the next.
+  std::size_t slice_ = 0;
   float spacing_;
   float inverse_spacing_;
   std::vector<float> values_;

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <stdexcept>
 
 #include <fmt/format.h>
 
 #include "algo/types/units.hpp"
+#include "drivers/simulated/board_layout.hpp"
 #include "drivers/simulated/random.hpp"
 
 namespace plumb::simulated {
@@ -36,62 +36,6 @@ Pose Placed(const BodyModel& body, const Placement& placement) {
   const Vector3d turned = T.linear() * body.centroid;
   T.translation() = Vector3d(placement.x - turned.x(), placement.y - turned.y(), -lowest - 1 * kMillimetre);
   return T;
-}
-
-struct BoardRegion {
-  double half_length, half_width;  // Of the rectangle that holds the boards' centres.
-  std::size_t count;
-};
-
-Pose BoardPose(double x, double y, double yaw, double tilt, double tilt_direction) {
-  Pose T = Pose::Identity();
-  const Vector3d axis(std::cos(tilt_direction), std::sin(tilt_direction), 0.0);
-  T.linear() = (Eigen::AngleAxisd(tilt, axis) * Eigen::AngleAxisd(yaw, Vector3d::UnitZ())).toRotationMatrix();
-  double lowest = 0;
-  for (const Vector3d& corner : CornersInMarkerFrame(kBoardSide)) lowest = std::min(lowest, (T.linear() * corner).z());
-  T.translation() = Vector3d(x, y, 2 * kMillimetre - lowest);
-  return T;
-}
-
-bool FreeOfBodies(const Pose& T_world_board, const std::vector<ScenePlan>& scenes) {
-  constexpr double kClearance = 0.012;
-  for (const ScenePlan& scene : scenes) {
-    const Pose T_body_board = scene.T_world_body.inverse() * T_world_board;
-    for (int i = 0; i < 25; ++i) {
-      const Vector3d p((i % 5 - 2) * kBoardSide / 4, (i / 5 - 2) * kBoardSide / 4, 0.01);
-      if (scene.body->grid->Distance((T_body_board * p).cast<float>()) < kClearance) return false;
-    }
-  }
-  return true;
-}
-
-// Boards around the bodies of all scenes, none under any of them; the first one is the reference marker.
-std::vector<Board> LayBoards(const BoardRegion& region, const std::vector<ScenePlan>& scenes, std::uint64_t seed) {
-  RandomStream random(Hash(seed, 61));
-  std::vector<Board> boards;
-  std::set<int> used;
-  const auto lay = [&](const Pose& T_world_marker) {
-    int id = 0;
-    do id = static_cast<int>(random.Uniform() * 250.0);
-    while (!used.insert(id).second);
-    boards.push_back({id, T_world_marker});
-  };
-  lay(BoardPose(-region.half_length + 0.08, -region.half_width + 0.02, random.Within(1.5 * kDegree), 0.3 * kDegree * random.Uniform(),
-                random.Uniform(0.0, 2.0 * std::numbers::pi)));
-  double spacing = 0.30;  // Between centres; reduced when the region gets full.
-  for (int attempt = 0; attempt < 6000 && boards.size() < region.count; ++attempt) {
-    if (attempt % 1000 == 999) spacing = std::max(0.20, spacing - 0.02);
-    const double x = random.Within(region.half_length);
-    const double y = random.Within(region.half_width);
-    // Most lie almost flat, some are propped up.
-    const double tilt = (random.Uniform() < 0.75 ? random.Uniform(0.0, 2.0) : random.Uniform(3.0, 9.0)) * kDegree;
-    const Pose T = BoardPose(x, y, random.Uniform(0.0, 2.0 * std::numbers::pi), tilt, random.Uniform(0.0, 2.0 * std::numbers::pi));
-    const bool crowded = std::any_of(boards.begin(), boards.end(), [&](const Board& other) {
-      return (other.T_world_marker.translation() - T.translation()).head<2>().norm() < spacing;
-    });
-    if (!crowded && FreeOfBodies(T, scenes)) lay(T);
-  }
-  return boards;
 }
 
 std::vector<std::pair<std::string, std::string>> OrderedPairs(const std::vector<ScenePlan>& scenes) {
@@ -181,7 +125,6 @@ void PlanSweeps(SuitePlan& plan, const SimulateOptions& options, double half_way
                    .num_frames = options.frames,
                    .rate_hz = options.rate_hz,
                    .start_time_s = kFirstStamp_s + kSceneInterval_s * static_cast<double>(i),
-                   .reference_marker = plan.reference_marker,
                    .seed = Hash(options.seed, 67, i)};
   }
 }
@@ -230,13 +173,17 @@ SuitePlan PlanSuite(const SimulateOptions& options) {
   } else {
     throw std::invalid_argument(fmt::format("simulate: unknown suite \"{}\", expected demo, nine or patient", options.suite));
   }
-  const BoardRegion region = patient ? BoardRegion{1.02, 0.50, 26} : BoardRegion{0.92, 0.62, 24};
-  plan.room.boards = LayBoards(region, plan.scenes, options.seed);
+  PlanSweeps(plan, options, patient ? 0.95 : 0.58, patient ? 1.0 : 0.95);
+
+  std::vector<LayoutScene> layout;
+  for (const ScenePlan& scene : plan.scenes) layout.push_back({scene.body->grid, scene.T_world_body, scene.sweep.motion});
+  const LayoutRegion region = patient ? LayoutRegion{1.02, 0.50, 26} : LayoutRegion{0.95, 0.66, 24};
+  plan.room.boards = LayBoards(region, layout, plan.unit.color_true, options.seed);
+  plan.reference_marker = plan.room.boards.front().id;
+  for (ScenePlan& scene : plan.scenes) scene.sweep.reference_marker = plan.reference_marker;
   plan.room.support_texture = std::make_shared<const Texture>(patient ? PaintSheet(options.seed) : PaintFloor(options.seed));
   plan.room.skin_texture = std::make_shared<const Texture>(PaintSkin(options.seed));
   if (patient) plan.room.couch = Eigen::AlignedBox2f(Eigen::Vector2f(-1.12F, -0.58F), Eigen::Vector2f(1.12F, 0.58F));
-  plan.reference_marker = plan.room.boards.front().id;
-  PlanSweeps(plan, options, patient ? 0.95 : 0.58, patient ? 1.0 : 0.95);
   return plan;
 }
 

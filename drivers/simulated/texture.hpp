@@ -32,9 +32,7 @@ class Texture {
   }
 
  private:
-  struct Texel {
-    std::uint8_t r, g, b, unused;  ///< Square root of the albedo times 255.
-  };
+  using Texel = std::uint32_t;  ///< Square roots of red, green and blue albedo times 255, a byte each from the lowest.
   [[nodiscard]] std::size_t Index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
   }
