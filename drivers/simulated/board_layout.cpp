@@ -44,10 +44,12 @@ bool FreeOfBodies(const Pose& T_world_board, const std::vector<LayoutScene>& sce
 // Moments spread over all sweeps, and which boards each of them sees.
 class Views {
  public:
-  Views(const std::vector<LayoutScene>& scenes, const Intrinsics& camera) : scenes_(scenes), camera_(camera), seen_(scenes.size() * kViewsPerSweep, 0) {
+  Views(const std::vector<LayoutScene>& scenes, const Intrinsics& camera)
+      : scenes_(scenes), camera_(camera), seen_(scenes.size() * kViewsPerSweep, 0) {
     for (const LayoutScene& scene : scenes) {
       const Trajectory trajectory(scene.sweep);
-      for (int i = 0; i < kViewsPerSweep; ++i) T_world_camera_.push_back(trajectory.T_world_camera(scene.sweep.duration_s * (i + 0.5) / kViewsPerSweep));
+      for (int i = 0; i < kViewsPerSweep; ++i)
+        T_world_camera_.push_back(trajectory.T_world_camera(scene.sweep.duration_s * (i + 0.5) / kViewsPerSweep));
     }
   }
 
@@ -58,7 +60,8 @@ class Views {
       const Vector3d p = T_camera_board * corner;
       if (p.z() < 0.2) return false;
       const Eigen::Vector2d pixel = Project(camera_, p);
-      if (pixel.x() < kBorder || pixel.y() < kBorder || pixel.x() > camera_.width - kBorder || pixel.y() > camera_.height - kBorder) return false;
+      if (pixel.x() < kBorder || pixel.y() < kBorder || pixel.x() > camera_.width - kBorder || pixel.y() > camera_.height - kBorder)
+        return false;
     }
     const LayoutScene& scene = scenes_[view / kViewsPerSweep];
     const Pose T_body_world = scene.T_world_body.inverse();
@@ -125,7 +128,8 @@ Pose ReferencePose(const LayoutRegion& region, const std::vector<LayoutScene>& s
 
 }  // namespace
 
-std::vector<Board> LayBoards(const LayoutRegion& region, const std::vector<LayoutScene>& scenes, const Intrinsics& camera, std::uint64_t seed) {
+std::vector<Board> LayBoards(const LayoutRegion& region, const std::vector<LayoutScene>& scenes, const Intrinsics& camera,
+                             std::uint64_t seed) {
   RandomStream random(Hash(seed, 61));
   Views views(scenes, camera);
   std::vector<Board> boards;

@@ -27,8 +27,9 @@ struct LayoutRegion {
   std::size_t num_boards = 24;
 };
 
-/// Lays boards around the bodies of all scenes, none under any of them, where a person would put them: so that every part of every sweep sees
-/// several. The first board is the reference marker: at the head, right of the body (-x, -y), its x axis along the sweep, seen in every scene.
+/// Lays boards around the bodies of all scenes, none under any of them, where a person would put them: so that every part of every sweep
+/// sees several. The first board is the reference marker: at the head, right of the body (-x, -y), its x axis along the sweep, seen in
+/// every scene.
 /// @throws std::invalid_argument if no place for the reference marker is seen in all scenes.
 [[nodiscard]] std::vector<Board> LayBoards(const LayoutRegion& region, const std::vector<LayoutScene>& scenes, const Intrinsics& camera,
                                            std::uint64_t seed);

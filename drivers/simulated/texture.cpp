@@ -21,7 +21,8 @@ std::uint32_t Encode(const Vector3f& albedo) {
 }
 
 Vector3f Decode(std::uint32_t texel) {
-  const Vector3f root = Vector3f(static_cast<float>(texel & 0xffU), static_cast<float>((texel >> 8) & 0xffU), static_cast<float>(texel >> 16)) / 255.0F;
+  const Vector3f root =
+      Vector3f(static_cast<float>(texel & 0xffU), static_cast<float>((texel >> 8) & 0xffU), static_cast<float>(texel >> 16)) / 255.0F;
   return root.cwiseProduct(root);
 }
 

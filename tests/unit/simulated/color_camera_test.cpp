@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -18,8 +21,9 @@ constexpr int kId = 17;
 
 Board TiltedBoard() {
   Board board{kId, Pose::Identity()};
-  board.T_world_marker.linear() = (Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ())).toRotationMatrix();
-  board.T_world_marker.translation() = Eigen::Vector3d(0.06, -0.09, 0.02);
+  board.T_world_marker.linear() =
+      (Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ())).toRotationMatrix();
+  board.T_world_marker.translation() = Eigen::Vector3d(0.20, -0.09, 0.02);
   return board;
 }
 
@@ -38,7 +42,8 @@ double LightAt(const cv::Mat& rgb, const Eigen::Vector2d& pixel) {
   return (1 - v) * ((1 - u) * light(0, 0) + u * light(0, 1)) + v * ((1 - u) * light(1, 0) + u * light(1, 1));
 }
 
-// Where the edge of the black square crosses a line from 4 pixels inside to 4 pixels outside, as an offset outwards: from the light's balance.
+// Where the edge of the black square crosses a line from 4 pixels inside to 4 pixels outside, as an offset outwards: from the light's
+// balance.
 double EdgeOffset(const cv::Mat& rgb, const Eigen::Vector2d& on_edge, const Eigen::Vector2d& outwards) {
   constexpr int kSteps = 160;
   std::vector<double> profile;
@@ -85,11 +90,12 @@ TEST(ColorCameraTest, RollingShutterAndBlurKeepAMovingEdgeAtItsRowsTime) {
   unit.readout_s = 0.025;
   unit.lens_blur_px = 0.5;
   SweepOptions sweep = Standing(0.75);
-  sweep.swing_m = 0.05;  // 0.1 m/s at the fastest, a pixel in 14 ms
+  sweep.swing_m = 0.15;  // 0.26 m/s at the fastest, a pixel in 5 ms.
   sweep.tremor = 1.0;
   const Trajectory trajectory(sweep);
   const cv::Mat rgb = ColorCamera(unit).Render(world, trajectory, 3.0, 1);
-  // The marker's own rows are taken at another time than the middle row: with that pose its edges are true, with the middle row's they are not.
+  // The marker's own rows are taken at another time than the middle row: with that pose its edges are true, with the middle row's they are
+  // not.
   const Pose T_camera_marker = trajectory.T_world_camera(3.0).inverse() * TiltedBoard().T_world_marker;
   const double row = Project(unit.color_true, T_camera_marker.translation()).y();
   const double time = 3.0 + unit.readout_s * ((row + 0.5) / 480 - 0.5);
@@ -113,7 +119,8 @@ TEST(ColorCameraTest, ShowsTheBitsOfTheDictionaryUprightOnThePrint) {
     for (int column = 0; column < 6; ++column) {
       const double cell = kMarkerLength / 8;
       const Eigen::Vector3d centre((column + 1.5) * cell - kMarkerLength / 2, kMarkerLength / 2 - (row + 1.5) * cell, 0.0);
-      EXPECT_EQ(LightAt(rgb, Project(unit.color_true, T_camera_marker * centre)) > 0.2, dictionary.Bit(kId, row, column)) << row << ", " << column;
+      EXPECT_EQ(LightAt(rgb, Project(unit.color_true, T_camera_marker * centre)) > 0.2, dictionary.Bit(kId, row, column))
+          << row << ", " << column;
     }
   }
 }

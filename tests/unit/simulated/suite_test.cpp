@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -33,7 +35,14 @@ class SuiteTest : public testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   SimulateOptions Small(const std::string& name) const {
-    return {.suite = "demo", .out = folder_ / name, .seed = 5, .noise = simulated::NoiseLevel::kNominal, .frames = 3, .rate_hz = 0.3, .width = 160, .height = 120};
+    return {.suite = "demo",
+            .out = folder_ / name,
+            .seed = 5,
+            .noise = simulated::NoiseLevel::kNominal,
+            .frames = 3,
+            .rate_hz = 0.3,
+            .width = 160,
+            .height = 120};
   }
 
   fs::path folder_;
@@ -47,7 +56,8 @@ std::string Text(const fs::path& path) {
 Pose ToPose(const json& rows) {
   Pose T = Pose::Identity();
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) T.matrix()(row, column) = rows.at(static_cast<std::size_t>(row)).at(static_cast<std::size_t>(column)).get<double>();
+    for (int column = 0; column < 4; ++column)
+      T.matrix()(row, column) = rows.at(static_cast<std::size_t>(row)).at(static_cast<std::size_t>(column)).get<double>();
   }
   return T;
 }
@@ -74,7 +84,8 @@ TEST_F(SuiteTest, WritesRecordingsAndATruthThatAgreesWithItself) {
   const json suite = json::parse(Text(out / "suite.json"));
   EXPECT_EQ(suite, json({{"name", "demo"}, {"scenes", {"reference", "moved"}}, {"pairs", json::array({{"reference", "moved"}})}}));
   for (const char* name : {"reference", "moved"}) {
-    for (const char* file : {"rgb.txt", "depth.txt", "camera.yaml"}) EXPECT_TRUE(fs::exists(out / "recordings" / name / file)) << name << file;
+    for (const char* file : {"rgb.txt", "depth.txt", "camera.yaml"})
+      EXPECT_TRUE(fs::exists(out / "recordings" / name / file)) << name << file;
     EXPECT_EQ(std::distance(fs::directory_iterator(out / "recordings" / name / "rgb"), {}), 3);
     EXPECT_EQ(std::distance(fs::directory_iterator(out / "recordings" / name / "depth"), {}), 3);
   }
@@ -103,7 +114,8 @@ TEST_F(SuiteTest, WritesRecordingsAndATruthThatAgreesWithItself) {
   const json markers = json::parse(Text(out / "truth/moved/markers.json"));
   EXPECT_GE(markers.at("markers").size(), 10U);
   const double h = 0.052;
-  const std::array<Eigen::Vector3d, 4> paper = {Eigen::Vector3d(-h, -h, 0), Eigen::Vector3d(h, -h, 0), Eigen::Vector3d(h, h, 0), Eigen::Vector3d(-h, h, 0)};
+  const std::array<Eigen::Vector3d, 4> paper = {Eigen::Vector3d(-h, -h, 0), Eigen::Vector3d(h, -h, 0), Eigen::Vector3d(h, h, 0),
+                                                Eigen::Vector3d(-h, h, 0)};
   bool found = false;
   for (const auto& [id, marker] : markers.at("markers").items()) {
     const Pose T = ToPose(marker.at("T_world_marker"));
@@ -123,7 +135,9 @@ TEST_F(SuiteTest, WritesRecordingsAndATruthThatAgreesWithItself) {
   int poses = 0;
   double last = 0;
   for (double t = 0, x, y, z, qx, qy, qz, qw; trajectory >> t >> x >> y >> z >> qx >> qy >> qz >> qw; ++poses) {
-    if (poses > 0) EXPECT_NEAR(t - last, 0.002, 1e-6);
+    if (poses > 0) {
+      EXPECT_NEAR(t - last, 0.002, 1e-6);
+    }
     last = t;
     EXPECT_GT(z, 0.7);
     EXPECT_LT((Eigen::Quaterniond(qw, qx, qy, qz) * Eigen::Vector3d::UnitZ()).z(), -0.8);
@@ -135,7 +149,8 @@ TEST_F(SuiteTest, TheSameSeedGivesTheSameBytes) {
   SimulateSuite(Small("a"));
   SimulateSuite(Small("b"));
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder_ / "a")) {
-    if (entry.is_regular_file()) EXPECT_EQ(Text(entry.path()), Text(folder_ / "b" / fs::relative(entry.path(), folder_ / "a"))) << entry.path();
+    if (!entry.is_regular_file()) continue;
+    EXPECT_EQ(Text(entry.path()), Text(folder_ / "b" / fs::relative(entry.path(), folder_ / "a"))) << entry.path();
   }
 }
 
@@ -167,7 +182,7 @@ TEST_F(SuiteTest, RefusesWhatItDoesNotKnow) {
 }
 
 TEST(SuitePlanTest, NineHasSeventyTwoPairsAndMarkersThatEverySweepSees) {
-  const simulated::SuitePlan plan = simulated::PlanSuite({.suite = "nine", .seed = 2});
+  const simulated::SuitePlan plan = simulated::PlanSuite({.suite = "nine", .out = {}, .seed = 2});
   EXPECT_EQ(plan.scenes.size(), 9U);
   EXPECT_EQ(plan.pairs.size(), 72U);
   ASSERT_GE(plan.room.boards.size(), 10U);
@@ -192,7 +207,8 @@ TEST(SuitePlanTest, NineHasSeventyTwoPairsAndMarkersThatEverySweepSees) {
     EXPECT_GE(reference_seen, 4) << scene.name;
     // The body lies on the support: it neither floats nor sinks.
     double lowest = 1.0;
-    for (const Eigen::Vector3f& vertex : scene.body->surface.vertices) lowest = std::min(lowest, (scene.T_world_body * vertex.cast<double>()).z());
+    for (const Eigen::Vector3f& vertex : scene.body->surface.vertices)
+      lowest = std::min(lowest, (scene.T_world_body * vertex.cast<double>()).z());
     EXPECT_NEAR(lowest, -0.001, 1e-5);
   }
 }
