@@ -127,12 +127,14 @@ struct KeypointDepthCost final : ceres::SizedCostFunction<1, 6, 3, CalibrationMo
   double dt_s;  // Depth stamp after colour stamp.
   double sigma_m;
 
-  KeypointDepthCost(const Pose& T, const Vector6d& v, const Eigen::Vector2d& centred_coordinates, double share, double z, double dt, double sigma)
+  KeypointDepthCost(const Pose& T, const Vector6d& v, const Eigen::Vector2d& centred_coordinates, double share, double z, double dt,
+                    double sigma)
       : T_camera0_world(T), velocity(v), centred(centred_coordinates), row_share(share), z_m(z), dt_s(dt), sigma_m(sigma) {}
 
   bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
     const double* d = blocks[2];
-    const SeenPoint point = See(T_camera0_world, velocity, blocks[0], Eigen::Map<const Eigen::Vector3d>(blocks[1]), dt_s + d[5] + row_share * d[8]);
+    const SeenPoint point =
+        See(T_camera0_world, velocity, blocks[0], Eigen::Map<const Eigen::Vector3d>(blocks[1]), dt_s + d[5] + row_share * d[8]);
     // In the units of the measurement: in metres of the scene, a smaller scene would look better.
     const double bow = centred.squaredNorm();
     const double scale = 1.0 + d[0] + d[6] * centred.x() + d[7] * centred.y();
@@ -144,7 +146,8 @@ struct KeypointDepthCost final : ceres::SizedCostFunction<1, 6, 3, CalibrationMo
     if (jacobians[1] != nullptr) Eigen::Map<Eigen::Matrix<double, 1, 3>>{jacobians[1]} = factor * point.J_world.row(2);
     if (jacobians[2] != nullptr)
       Eigen::Map<Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>>{jacobians[2]} << -predicted * factor, -factor, -bow * factor, 0, 0,
-          factor * point.J_time.z(), -predicted * factor * centred.x(), -predicted * factor * centred.y(), factor * point.J_time.z() * row_share;
+          factor * point.J_time.z(), -predicted * factor * centred.x(), -predicted * factor * centred.y(),
+          factor * point.J_time.z() * row_share;
     return true;
   }
 };
@@ -300,12 +303,14 @@ class Bundle {
 
  private:
   void AddObservations() {
-    // Landmarks that a free keyframe sees, then every observation of those.
+    // Landmarks that a free keyframe sees, then every observation of those. One seen only once constrains nothing.
     std::vector<bool> wanted(map_.landmarks.size(), false);
     std::set<int> wanted_markers;
     for (const int k : free_) {
-      for (const KeypointObservation& o : map_.keyframes[static_cast<std::size_t>(k)].keypoints)
-        wanted[static_cast<std::size_t>(o.landmark)] = map_.landmarks[static_cast<std::size_t>(o.landmark)].usable;
+      for (const KeypointObservation& o : map_.keyframes[static_cast<std::size_t>(k)].keypoints) {
+        const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
+        wanted[static_cast<std::size_t>(o.landmark)] = landmark.usable && landmark.num_observations > 1;
+      }
       for (const MarkerObservation& m : map_.keyframes[static_cast<std::size_t>(k)].data.markers) wanted_markers.insert(m.id);
     }
     for (std::size_t k = 0; k < map_.keyframes.size(); ++k) {
@@ -335,8 +340,9 @@ class Bundle {
       const double dt = keyframe.data.depth_time_s - keyframe.data.color_time_s;
       const Eigen::Vector2d centred = CentredCoordinates(o.pixel.x(), o.pixel.y(), stated_.width, stated_.height);
       problem_.AddResidualBlock(
-          new KeypointDepthCost(T_camera0_world, keyframe.velocity_per_s, centred, RowShare(o.pixel.y(), stated_.height), o.z_m, dt, options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8)), &keypoint_loss_,
-          PoseBlock(k), landmark.p_world.data(), calibration_.depth.data());
+          new KeypointDepthCost(T_camera0_world, keyframe.velocity_per_s, centred, RowShare(o.pixel.y(), stated_.height), o.z_m, dt,
+                                options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8)),
+          &keypoint_loss_, PoseBlock(k), landmark.p_world.data(), calibration_.depth.data());
       depth_used_ = true;
     }
     lens_used_ = true;
@@ -378,14 +384,16 @@ class Bundle {
       problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost<1>, 1, 1>(new PriorCost<1>{{C::kEdgeBiasSigma}}), nullptr,
                                 calibration_.edge_bias_px.data());
     if (depth_used_)
-      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost<C::kDepthSize>, C::kDepthSize, C::kDepthSize>(new PriorCost<C::kDepthSize>{C::kDepthSigma}), nullptr,
-                                calibration_.depth.data());
+      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost<C::kDepthSize>, C::kDepthSize, C::kDepthSize>(
+                                    new PriorCost<C::kDepthSize>{C::kDepthSigma}),
+                                nullptr, calibration_.depth.data());
   }
 
   void FixBlocks() {
     for (const int k : used_keyframes_)
       if (!free_.contains(k)) problem_.SetParameterBlockConstant(PoseBlock(k));
-    if (options_.fix_lens && problem_.HasParameterBlock(calibration_.lens.data())) problem_.SetParameterBlockConstant(calibration_.lens.data());
+    if (options_.fix_lens && problem_.HasParameterBlock(calibration_.lens.data()))
+      problem_.SetParameterBlockConstant(calibration_.lens.data());
     if (!options_.calibrate) {
       for (double* block :
            {calibration_.lens.data(), calibration_.readout_s.data(), calibration_.edge_bias_px.data(), calibration_.depth.data()})

@@ -36,6 +36,7 @@ struct MapKeyframe {
   Vector6d velocity_per_s = Vector6d::Zero();  ///< Twist in the camera frame: T(t0 + dt) = T(t0) * PoseFromTwist(v dt).
   std::vector<KeypointObservation> keypoints;
   DenseView dense;
+  double median_depth_m = 1.0;  ///< Of the dense view.
   cv::Mat gray;                                  ///< CV_8UC1; released once the keyframe is out of reach of re-association.
   std::vector<Eigen::Vector2f> features_px;      ///< For relocalisation: keypoints with a descriptor and depth.
   std::vector<Eigen::Vector3f> features_camera;  ///< The same in the camera frame, metres.

@@ -34,6 +34,16 @@ struct Prepared {
   std::vector<MarkerObservation> markers;
 };
 
+// Of a view's usable cells, metres; 1 where there is none.
+double MedianDepth(const DenseView& view) {
+  std::vector<float> z;
+  for (const float value : view.z_m)
+    if (value > 0) z.push_back(value);
+  if (z.empty()) return 1.0;
+  std::nth_element(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2), z.end());
+  return z[z.size() / 2];
+}
+
 }  // namespace
 
 struct Tracker::Impl {
@@ -284,19 +294,10 @@ struct Tracker::Impl {
   [[nodiscard]] bool NeedsKeyframe(const Pose& T_world_color) const {
     const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(reference)];
     const Pose T_keyframe_now = keyframe.T_world_color.inverse() * T_world_color;
-    if (T_keyframe_now.translation().norm() > options.keyframe_distance * std::clamp(MedianDepth(keyframe.dense), 0.4, 3.0)) return true;
+    if (T_keyframe_now.translation().norm() > options.keyframe_distance * std::clamp(keyframe.median_depth_m, 0.4, 3.0)) return true;
     if (RotationAngle(T_keyframe_now) > options.keyframe_angle_rad) return true;
     return options.use_keypoints && static_cast<double>(active.size()) < options.min_tracked_share * static_cast<double>(reference_count) &&
            (T_keyframe_now.translation().norm() > 0.01 || RotationAngle(T_keyframe_now) > 0.01 || active.size() < 30);
-  }
-
-  static double MedianDepth(const DenseView& view) {
-    std::vector<float> z;
-    for (const float value : view.z_m)
-      if (value > 0) z.push_back(value);
-    if (z.empty()) return 1.0;
-    std::nth_element(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2), z.end());
-    return z[z.size() / 2];
   }
 
   // Looks for landmarks of near older keyframes that are not being followed; adds those found to `active` and `points`.
@@ -345,7 +346,7 @@ struct Tracker::Impl {
       if (!lost && static_cast<int>(k) == reference) continue;
       if (map.keyframes[k].gray.empty()) continue;
       const Pose T = map.keyframes[k].T_world_color.inverse() * T_world_color;
-      const double depth = std::clamp(MedianDepth(map.keyframes[k].dense), 0.4, 3.0);
+      const double depth = std::clamp(map.keyframes[k].median_depth_m, 0.4, 3.0);
       const double distance = T.translation().norm() / depth + RotationAngle(T);
       if (distance < 0.7) near.emplace_back(distance, k);
     }
@@ -367,6 +368,7 @@ struct Tracker::Impl {
     keyframe.T_world_color = T_world_color;
     keyframe.velocity_per_s = velocity;
     keyframe.dense = prepared.dense;
+    keyframe.median_depth_m = MedianDepth(prepared.dense);
     keyframe.gray = prepared.gray;
     const int index = static_cast<int>(map.keyframes.size());
     if (options.use_keypoints) {
