@@ -80,7 +80,7 @@ void CheckScenesMatch(const Scene& reference, const Scene& current) {
 }
 
 // The scene's surface as a cloud with normals, in the reference frame.
-PointCloud SceneCloud(const Scene& scene, const Pose& T_reference_scene) {
+PointCloud SceneCloud(const Scene& scene, const Eigen::Affine3d& T_reference_scene) {
   const bool has_cloud = !scene.cloud.empty() && scene.cloud.normals.size() == scene.cloud.size();
   if (has_cloud) return TransformedCloud(T_reference_scene, scene.cloud);
   if (scene.height_map) return TransformedCloud(T_reference_scene, CloudOfHeightMap(*scene.height_map));
@@ -136,10 +136,17 @@ class Comparer {
     return true;
   }
 
+  // From the current scene to the reference frame, its length and width corrected.
+  [[nodiscard]] Eigen::Affine3d StretchedAlignment() const {
+    const Alignment& alignment = *result_.alignment;
+    return Eigen::Translation3d(alignment.centre_m) * Eigen::Affine3d(alignment.stretch) * Eigen::Translation3d(-alignment.centre_m) *
+           alignment.T_reference_current;
+  }
+
   void Segment() {
     const double since_s = Now();
-    reference_cloud_ = SceneCloud(reference_, Pose::Identity());
-    current_cloud_ = SceneCloud(current_, result_.alignment->T_reference_current);
+    reference_cloud_ = SceneCloud(reference_, Eigen::Affine3d::Identity());
+    current_cloud_ = SceneCloud(current_, StretchedAlignment());
     reference_body_ = FindBody(MakeSurface(reference_cloud_, kSegmentationSpacing_m, kSegmentationSmoothing_m));
     current_body_ = FindBody(MakeSurface(current_cloud_, kSegmentationSpacing_m, kSegmentationSmoothing_m));
     if (!reference_body_.support) result_.warnings.push_back("no flat support was found in the reference scan: all of it counts as body");
@@ -159,7 +166,7 @@ class Comparer {
   // The current surface on the reference grid, moved by T after the alignment.
   [[nodiscard]] HeightMap CurrentHeight(const Pose& T) const {
     const GridShape& grid = reference_.height_map->grid;
-    if (current_.height_map) return ResampledHeightMap(*current_.height_map, T * result_.alignment->T_reference_current, grid);
+    if (current_.height_map) return ResampledHeightMap(*current_.height_map, T * StretchedAlignment(), grid);
     return HeightMapOfCloud(TransformedCloud(T, current_cloud_), kCloudReach_m, grid);
   }
 

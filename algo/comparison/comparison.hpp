@@ -46,11 +46,15 @@ struct CompareOptions {
 /// Current scene onto reference scene, from the shared markers.
 struct Alignment {
   Pose T_reference_current = Pose::Identity();
-  double rms_m = 0.0;                                  ///< Over the corners used.
+  /// Preset `best`: how the current marker map must be stretched within its plane to become as long and as wide as the reference's
+  /// (a hand-held scan is some tenths of a percent too long or short, rooms are not); symmetric, 1 across the plane, where
+  /// depth itself gives the scale. Applied about `centre_m` after T_reference_current, which is the rigid fit.
+  Eigen::Matrix3d stretch = Eigen::Matrix3d::Identity();
+  double rms_m = 0.0;                                  ///< Over the corners used, rigid.
   std::vector<int> markers_used;                       ///< Ids, ascending.
   std::map<int, double> markers_rejected;              ///< Id to its residual against the others, metres.
   Matrix6d covariance = Matrix6d::Zero();              ///< Rotation vector, translation; left perturbation about `centre_m`.
-  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< Centroid of the corners used, reference frame.
+  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< Weighted centroid of the corners used, reference frame.
 };
 
 /// A direction in which the surfaces say little, e.g. roll of a cylinder.

@@ -9,9 +9,10 @@
 namespace plumb {
 namespace {
 
-constexpr float kMaxJump_m = 0.01F;  // between neighbouring cells: more is another surface, not a slope
-constexpr float kSheet_m = 0.01F;    // of a cloud's top surface
-constexpr int kMaxDescent = 200;     // steps of the local search; each is one cell
+constexpr float kMaxJump_m = 0.01F;   // between neighbouring cells: more is another surface, not a slope
+constexpr float kSheet_m = 0.01F;     // of a cloud's top surface
+constexpr float kMaxRimShare = 0.5F;  // sideways over along: a pinhole's rim with a noisy normal is still the surface
+constexpr int kMaxDescent = 200;      // steps of the local search; each is one cell
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 void CheckGrids(const HeightMap& current, const HeightMap& reference) {
@@ -193,7 +194,7 @@ class NearestCells {
 
 }  // namespace
 
-HeightMap ResampledHeightMap(const HeightMap& source, const Pose& T_target_source, const GridShape& target) {
+HeightMap ResampledHeightMap(const HeightMap& source, const Eigen::Affine3d& T_target_source, const GridShape& target) {
   TriangleCanvas canvas(target);
   const int width = source.grid.width;
   std::vector<Eigen::Vector3d> above(static_cast<std::size_t>(std::max(width, 0)));
@@ -298,7 +299,7 @@ HeightMap SignedDistance(const HeightMap& current, const HeightMap& reference, c
     // Within a cell's own patch of surface the tangent plane is the surface; beyond it the nearest point is a crease or an end.
     if (sideways < 1.5F * step / std::max(normal.z(), 0.1F)) {
       distance.z[cell] = -along;
-    } else if (!surface.OnRim(row, column)) {
+    } else if (sideways < kMaxRimShare * std::abs(along) || !surface.OnRim(row, column)) {
       distance.z[cell] = along < 0 ? offset.norm() : -offset.norm();
     }
   }

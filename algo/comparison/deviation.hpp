@@ -4,15 +4,17 @@
 #include <cstdint>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "algo/types/height_map.hpp"
 #include "algo/types/point_cloud.hpp"
-#include "algo/types/pose.hpp"
 
 namespace plumb {
 
 /// A height map seen in another frame: its surface (triangles between neighbouring cells, none across jumps) moved by
-/// T_target_source and drawn onto the target grid from above, the highest sheet winning. NaN where it does not reach.
-[[nodiscard]] HeightMap ResampledHeightMap(const HeightMap& source, const Pose& T_target_source, const GridShape& target);
+/// T_target_source (rigid but for a small stretch) and drawn onto the target grid from above, the highest sheet winning. NaN where it does
+/// not reach.
+[[nodiscard]] HeightMap ResampledHeightMap(const HeightMap& source, const Eigen::Affine3d& T_target_source, const GridShape& target);
 
 /// Height map of a cloud with normals: each point paints its tangent disc of `reach_m`; cells take the weighted mean of
 /// what lies within 1 cm of the highest. For scans that have no height map of their own.

@@ -56,14 +56,14 @@ void Smooth(const Surface& raw, const NearestSample& neighbours, float radius, s
 
 }  // namespace
 
-PointCloud TransformedCloud(const Pose& T_a_b, const PointCloud& cloud_in_b) {
+PointCloud TransformedCloud(const Eigen::Affine3d& T_a_b, const PointCloud& cloud_in_b) {
   PointCloud cloud_in_a;
-  const Eigen::Isometry3f T = T_a_b.cast<float>();
+  const Eigen::Matrix3f R = T_a_b.rotation().cast<float>();
   cloud_in_a.points.reserve(cloud_in_b.size());
   cloud_in_a.normals.reserve(cloud_in_b.normals.size());
   // Through double: a scene frame far from the reference must not cost the points their last digits.
   for (const Eigen::Vector3f& p : cloud_in_b.points) cloud_in_a.points.emplace_back((T_a_b * p.cast<double>()).cast<float>());
-  for (const Eigen::Vector3f& n : cloud_in_b.normals) cloud_in_a.normals.emplace_back(T.linear() * n);
+  for (const Eigen::Vector3f& n : cloud_in_b.normals) cloud_in_a.normals.emplace_back(R * n);
   return cloud_in_a;
 }
 

@@ -6,11 +6,10 @@
 #include <limits>
 #include <vector>
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "algo/types/height_map.hpp"
 #include "algo/types/point_cloud.hpp"
-#include "algo/types/pose.hpp"
 
 namespace plumb {
 
@@ -24,8 +23,8 @@ struct Surface {
   [[nodiscard]] std::size_t size() const { return points.size(); }
 };
 
-/// The cloud in another frame: p_a = T_a_b * p_b, normals turned, colours dropped.
-[[nodiscard]] PointCloud TransformedCloud(const Pose& T_a_b, const PointCloud& cloud_in_b);
+/// The cloud in another frame: p_a = T_a_b * p_b, normals turned, colours dropped. T_a_b is rigid but for a small stretch.
+[[nodiscard]] PointCloud TransformedCloud(const Eigen::Affine3d& T_a_b, const PointCloud& cloud_in_b);
 
 /// One point a cell, with normals by central differences; for scenes that carry no cloud.
 [[nodiscard]] PointCloud CloudOfHeightMap(const HeightMap& map);

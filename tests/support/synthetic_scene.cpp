@@ -212,23 +212,71 @@ class Scanner {
   VoxelCloud cloud_;
 };
 
-void SeeBody(const SyntheticOptions& options, Scanner& scanner, std::vector<std::uint8_t>& shadow) {
-  const bool full = options.shape == BodyShape::kFullBody;
-  const int nu = full ? 1500 : 500;
-  const int nv = full ? 700 : 450;
-  for (int i = 0; i < nu; ++i) {
-    for (int j = 0; j < nv; ++j) {
-      const double u = std::clamp((i + 0.5 + 0.8 * scanner.Jitter()) / nu, 1e-3, 1 - 1e-3);
-      const double v = std::clamp((j + 0.5 + 0.8 * scanner.Jitter()) / nv, 1e-3, 1 - 1e-3);
-      BodySample sample = SampleBody(options.shape, u, v);
-      if (full && sample.p.z() < 0.005) continue;
-      if (options.deform) sample.p += options.deform(sample.p);
-      const Eigen::Vector3d p = options.T_reference_body * sample.p;
-      if (p.z() < 0) continue;
-      const auto cell = scanner.map().grid.cell(p.x(), p.y());
-      if (cell) shadow[*cell] = 1;
-      scanner.See(p, options.T_reference_body.linear() * sample.normal);
+// A body sampled on a fine grid of its parameters, normals from the neighbours; made once a shape.
+class SampleTable {
+ public:
+  explicit SampleTable(BodyShape shape) {
+    std::vector<Eigen::Vector3d> points(static_cast<std::size_t>(kRows) * kColumns);
+    for (int i = 0; i < kRows; ++i) {
+      for (int j = 0; j < kColumns; ++j) points[At(i, j)] = BodyPoint(shape, (i + 0.5) / kRows, (j + 0.5) / kColumns);
     }
+    samples_.resize(points.size());
+    for (int i = 1; i + 1 < kRows; ++i) {
+      for (int j = 1; j + 1 < kColumns; ++j) {
+        const Eigen::Vector3d n =
+            (points[At(i + 1, j)] - points[At(i - 1, j)]).cross(points[At(i, j + 1)] - points[At(i, j - 1)]).normalized();
+        samples_[At(i, j)] = {points[At(i, j)], n.z() < 0 ? Eigen::Vector3d(-n) : n};
+      }
+    }
+  }
+  static constexpr int kRows = 1000;
+  static constexpr int kColumns = 900;
+  [[nodiscard]] const BodySample& at(int i, int j) const { return samples_[At(i, j)]; }
+
+  static const SampleTable& Of(BodyShape shape) {
+    static const SampleTable torso(BodyShape::kTorso);
+    static const SampleTable wide(BodyShape::kTorsoWide);
+    static const SampleTable cylinder(BodyShape::kCylinder);
+    return shape == BodyShape::kTorso ? torso : shape == BodyShape::kTorsoWide ? wide : cylinder;
+  }
+
+ private:
+  static std::size_t At(int i, int j) { return static_cast<std::size_t>(i) * kColumns + static_cast<std::size_t>(j); }
+  std::vector<BodySample> samples_;
+};
+
+// Random samples, about one a square millimetre and a half, different in every scan.
+std::vector<BodySample> BodySamples(BodyShape shape, Scanner& scanner) {
+  std::vector<BodySample> samples;
+  if (shape != BodyShape::kFullBody) {
+    const SampleTable& table = SampleTable::Of(shape);
+    for (int i = 2; i + 2 < SampleTable::kRows; i += 2) {
+      for (int j = 2; j + 2 < SampleTable::kColumns; j += 2) {
+        samples.push_back(table.at(i + (scanner.Jitter() > 0 ? 1 : 0), j + (scanner.Jitter() > 0 ? 1 : 0)));
+      }
+    }
+    return samples;
+  }
+  constexpr int kRows = 1500;
+  constexpr int kColumns = 700;
+  for (int i = 0; i < kRows; ++i) {
+    for (int j = 0; j < kColumns; ++j) {
+      const double u = (i + 0.5 + 0.8 * scanner.Jitter()) / kRows;
+      const double v = (j + 0.5 + 0.8 * scanner.Jitter()) / kColumns;
+      if (BodyPoint(shape, u, v).z() > 0.005) samples.push_back(SampleBody(shape, u, v));
+    }
+  }
+  return samples;
+}
+
+void SeeBody(const SyntheticOptions& options, Scanner& scanner, std::vector<std::uint8_t>& shadow) {
+  for (const BodySample& sample : BodySamples(options.shape, scanner)) {
+    const Eigen::Vector3d p_body = options.deform ? Eigen::Vector3d(sample.p + options.deform(sample.p)) : sample.p;
+    const Eigen::Vector3d p = options.T_reference_body * p_body;
+    if (p.z() < 0) continue;
+    const auto cell = scanner.map().grid.cell(p.x(), p.y());
+    if (cell) shadow[*cell] = 1;
+    scanner.See(p, options.T_reference_body.linear() * sample.normal);
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "algo/types/pose.hpp"
 #include "algo/types/units.hpp"
 
 namespace plumb {
