@@ -184,11 +184,9 @@ TEST_F(ScenesTest, EvaluateMeasuresAgainstTheTruth) {
   ASSERT_FALSE(figures.at("pairs").empty());
   EXPECT_EQ(figures.at("total").at("without_motion"), 0);
   const double error_mm = figures.at("total").at("translation_mm").at("max"), error_deg = figures.at("total").at("rotation_deg").at("max");
-  RecordProperty("translation_mm", std::to_string(error_mm));
-  RecordProperty("rotation_deg", std::to_string(error_deg));
-  // 320 x 240 and a tenth of a real sweep's frames: a wrong sign or frame would leave tens of millimetres.
-  EXPECT_LT(error_mm, 10.0);
-  EXPECT_LT(error_deg, 1.0);
+  // 320 x 240 and a fifth of a real sweep's frames, nominal noise. Measured over two seeds: 1.0 and 1.8 mm, 0.03 and 0.01 deg.
+  EXPECT_LT(error_mm, 5.0);
+  EXPECT_LT(error_deg, 0.5);
   const RunResult again = Plumb({"evaluate", SmallSuite(), "--out", folder_ / "out", "--reuse"});
   EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_THAT(again.err, Not(HasSubstr("tracking")));
