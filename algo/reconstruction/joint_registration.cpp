@@ -381,6 +381,11 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointReg
     const std::vector<CalibratedView> views = MakeViews(sensor, result.calibration, map);
     if (round == 0) pairs = FindPairs(sensor, options, views);
     BundleAdjust(stated, bundle, MakeTerms(sensor, options, map, views, pairs, gate_m), map, result.calibration);
+    double farthest_m = 0.0;
+    for (const CalibratedView& view : views)
+      farthest_m =
+          std::max(farthest_m, (DepthPose(*view.keyframe, result.calibration).translation() - view.T_world_depth.translation()).norm());
+    if (farthest_m < options.settled_m) break;
     gate_m = std::max(options.min_gate_m, 0.6 * gate_m);
   }
   result.num_pairs = static_cast<int>(pairs.size());

@@ -14,6 +14,7 @@ struct JointRegistrationOptions {
   int num_rounds = 5;        ///< Of association and solution.
   double max_gate_m = 0.06;  ///< Farthest point-to-plane residual of the first round; shrinks by 0.6 a round.
   double min_gate_m = 0.012;
+  double settled_m = 0.001;  ///< A round that moves no camera farther is the last one.
   int max_pairs = 8;         ///< Overlapping keyframes that each keyframe is registered against.
   double min_overlap = 0.2;  ///< Share of a keyframe's cells that fall into the other.
   /// Of the dense terms against their noise model: what the model leaves out is shared by neighbouring cells and views.
