@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <opencv2/core.hpp>
 #include <tbb/parallel_for.h>
+#include <opencv2/core.hpp>
 
 #include "algo/geometry/back_projection.hpp"
 #include "algo/reconstruction/height_map_builder.hpp"
@@ -136,6 +136,9 @@ struct Reconstructor::Impl {
     std::vector<TrackedFrame> frames = tracker.frames();
     CheckInput(frames);
     TrackingMap map = tracker.TakeMap();
+    if (map.keyframes.empty())
+      throw DataError(fmt::format(
+          "none of {} frames shows a marker or a surface: check that the sensor looks at the scene from 0.5 to 1.5 m", frames.size()));
     RefreshVelocities(frames, map);
 
     Scene scene;

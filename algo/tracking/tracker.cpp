@@ -95,8 +95,11 @@ struct Tracker::Impl {
     result.color_time_s = frame.color_time_s;
     result.depth_time_s = frame.depth_time_s;
     if (map.keyframes.empty()) {
-      MakeKeyframe(frame, prepared, Pose::Identity(), result);
-      result.tracked = true;
+      // A world that began with an empty image would never be found again.
+      if (ShowsSomething(prepared)) {
+        MakeKeyframe(frame, prepared, Pose::Identity(), result);
+        result.tracked = true;
+      }
     } else {
       std::optional<PoseEstimate> estimate;
       if (!lost) estimate = FollowFrame(frame, prepared, result);
@@ -111,6 +114,10 @@ struct Tracker::Impl {
     last_pyramid = std::move(prepared.pyramid);
     frames.push_back(result);
     return result;
+  }
+
+  static bool ShowsSomething(const Prepared& prepared) {
+    return !prepared.markers.empty() || std::any_of(prepared.dense.z_m.begin(), prepared.dense.z_m.end(), [](float z) { return z > 0; });
   }
 
   // ---- pose ------------------------------------------------------------------------------------------------------
@@ -285,7 +292,7 @@ struct Tracker::Impl {
     const double dt_after = frame.color_time_s - keyframe.data.color_time_s;
     if (dt_after <= 0) return;
     const Vector6d after = TwistFromPose(keyframe.T_world_color.inverse() * T_world_now) / dt_after;
-    keyframe.velocity_per_s = frames.size() == 1 ? after : Vector6d(0.5 * (keyframe.velocity_per_s + after));
+    keyframe.velocity_per_s = frames.back().keyframe == 0 ? after : Vector6d(0.5 * (keyframe.velocity_per_s + after));
     frames.back().velocity_per_s = keyframe.velocity_per_s;
   }
 
