@@ -1,0 +1,186 @@
+#include "algo/reconstruction/reconstructor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "algo/types/errors.hpp"
+#include "tests/unit/tracking/ball_sweep.hpp"
+
+namespace plumb {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr int kNumFrames = 16;
+
+class ReconstructorTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { sweep_ = new BallSweep(MakeBallSweep(kNumFrames)); }
+  static void TearDownTestSuite() { delete sweep_; }
+  static const BallSweep& sweep() { return *sweep_; }
+
+  static Scene Reconstruct(const ReconstructorOptions& options) {
+    Reconstructor reconstructor(sweep().info, options);
+    for (const Frame& frame : sweep().frames) reconstructor.AddFrame(frame);
+    return reconstructor.Finish();
+  }
+
+  // Message of the DataError that finishing these frames gives; empty if none.
+  static std::string Refusal(const std::vector<Frame>& frames) {
+    Reconstructor reconstructor(sweep().info, {});
+    try {
+      for (const Frame& frame : frames) reconstructor.AddFrame(frame);
+      static_cast<void>(reconstructor.Finish());
+    } catch (const DataError& error) {
+      return error.what();
+    }
+    return {};
+  }
+
+  static BallSweep* sweep_;
+};
+BallSweep* ReconstructorTest::sweep_ = nullptr;
+
+// Distance of the cloud's points that belong to the ball's upper part from the true ball.
+double BallRms(const BallSweep& sweep, const PointCloud& cloud, int& count) {
+  const Eigen::Vector3d centre = sweep.T_world_reference.inverse() * sweep.ball_centre;
+  double sum = 0;
+  count = 0;
+  for (const Eigen::Vector3f& point : cloud.points) {
+    const Eigen::Vector3d p = point.cast<double>();
+    if ((p - centre).norm() > kSweptBallRadius + 0.02 || p.z() < centre.z() + 0.03) continue;
+    const double error = (p - centre).norm() - kSweptBallRadius;
+    sum += error * error;
+    ++count;
+  }
+  return count > 0 ? std::sqrt(sum / count) : 1.0;
+}
+
+TEST_F(ReconstructorTest, SceneOfTheBallIsTrue) {
+  const Scene scene = Reconstruct({});
+  EXPECT_EQ(scene.frame, SceneFrame::kReferenceMarker);
+  EXPECT_EQ(scene.frames_total, kNumFrames);
+  EXPECT_EQ(scene.frames_tracked, kNumFrames);
+  EXPECT_EQ(scene.trajectory.size(), static_cast<std::size_t>(kNumFrames));
+  EXPECT_EQ(scene.longest_lost_s, 0.0);
+  EXPECT_EQ(scene.cloud.colors.size(), scene.cloud.size());
+  int count = 0;
+  const double rms = BallRms(sweep(), scene.cloud, count);
+  double worst_path = 0;
+  for (std::size_t i = 0; i < scene.trajectory.size(); ++i) {
+    const Pose T_true = sweep().T_world_reference.inverse() * sweep().T_world_color[i];
+    worst_path = std::max(worst_path, (T_true.inverse() * scene.trajectory[i].T_world_camera).translation().norm());
+  }
+  ASSERT_TRUE(scene.height_map.has_value());
+  const Eigen::Vector3d centre = sweep().T_world_reference.inverse() * sweep().ball_centre;
+  const auto cell = scene.height_map->grid.cell(centre.x(), centre.y());
+  ASSERT_TRUE(cell.has_value());
+  const double top = scene.height_map->z[*cell];
+  fmt::print("ball {:.2e} m rms of {} points, path {:.2e} m, top {:.4f} of {:.4f} m\n", rms, count, worst_path, top,
+             centre.z() + kSweptBallRadius);
+  EXPECT_GT(count, 1000);
+  EXPECT_LT(rms, 0.0003);                                  // Measured: 0.08 mm.
+  EXPECT_LT(worst_path, 0.003);                            // Measured: 1.1 mm.
+  EXPECT_NEAR(top, centre.z() + kSweptBallRadius, 0.001);  // Measured: 0.1 mm.
+  EXPECT_FALSE(scene.mesh.triangles.empty());
+}
+
+TEST_F(ReconstructorTest, WithoutMarkersTheFirstKeyframeIsTheFrame) {
+  ReconstructorOptions options;
+  options.keep_color = false;
+  options.use_markers = false;
+  const Scene scene = Reconstruct(options);
+  EXPECT_EQ(scene.frame, SceneFrame::kFirstKeyframe);
+  EXPECT_FALSE(scene.height_map.has_value());
+  EXPECT_TRUE(scene.mesh.triangles.empty());
+  EXPECT_TRUE(scene.markers.empty());
+  EXPECT_TRUE(scene.cloud.colors.empty()) << "colours were to be left out";
+  EXPECT_GT(scene.cloud.size(), 1000U);
+  EXPECT_LT(scene.trajectory.front().T_world_camera.translation().norm(), 0.002);
+  ASSERT_FALSE(scene.warnings.empty());
+  EXPECT_THAT(scene.warnings.back(), HasSubstr("no marker was seen"));
+}
+
+TEST_F(ReconstructorTest, PaperPresetMakesItsScene) {
+  ReconstructorOptions options;
+  options.preset = Preset::kPaper;
+  options.num_icp_iterations = 2;
+  const Scene scene = Reconstruct(options);
+  EXPECT_EQ(scene.preset, Preset::kPaper);
+  EXPECT_EQ(scene.frame, SceneFrame::kReferenceMarker);
+  EXPECT_TRUE(scene.height_map.has_value());
+  EXPECT_TRUE(scene.calibration.empty()) << "the sensor is taken at its word";
+  int count = 0;
+  const double rms = BallRms(sweep(), scene.cloud, count);
+  fmt::print("paper: ball {:.2e} m rms of {} points\n", rms, count);
+  EXPECT_GT(count, 1000);
+  EXPECT_LT(rms, 0.0015);  // Measured: 0.36 mm.
+}
+
+TEST_F(ReconstructorTest, SameBitsOnAnyNumberOfThreads) {
+  std::vector<Scene> scenes;
+  for (std::size_t run = 0; run < 2; ++run) {
+    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, run + 1);
+    scenes.push_back(Reconstruct({}));
+  }
+  EXPECT_EQ(scenes[0].cloud.points, scenes[1].cloud.points);
+  EXPECT_EQ(scenes[0].cloud.colors, scenes[1].cloud.colors);
+  EXPECT_EQ(scenes[0].calibration, scenes[1].calibration);
+  ASSERT_EQ(scenes[0].height_map->z.size(), scenes[1].height_map->z.size());
+  for (std::size_t i = 0; i < scenes[0].height_map->z.size(); ++i) {
+    const float a = scenes[0].height_map->z[i];
+    const float b = scenes[1].height_map->z[i];
+    ASSERT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << i;
+  }
+}
+
+TEST_F(ReconstructorTest, SaysWhatIsMissing) {
+  EXPECT_THAT(Refusal({}), HasSubstr("0 usable frame"));
+  EXPECT_THAT(Refusal({sweep().frames[0]}), HasSubstr("1 usable frame"));
+  std::vector<Frame> no_depth(sweep().frames.begin(), sweep().frames.begin() + 3);
+  for (Frame& frame : no_depth) frame.depth_m = Blank(frame).depth_m;
+  EXPECT_THAT(Refusal(no_depth), HasSubstr("depth images are empty"));
+  // Depth in single pixels only: no surface, and no marker either.
+  std::vector<Frame> specks;
+  for (int i = 0; i < 3; ++i) {
+    specks.push_back(Blank(sweep().frames[static_cast<std::size_t>(i)]));
+    for (int r = 4; r < 240; r += 8)
+      for (int c = 4; c < 320; c += 8) specks.back().depth_m.at<float>(r, c) = 0.8F;
+  }
+  EXPECT_THAT(Refusal(specks), HasSubstr("none of 3 frames"));
+  Frame small = sweep().frames[0];
+  small.depth_m = small.depth_m(cv::Rect(0, 0, 160, 120)).clone();
+  EXPECT_THAT(Refusal({small}), HasSubstr("160x120"));
+}
+
+TEST_F(ReconstructorTest, CountsLostAndDroppedFrames) {
+  Reconstructor reconstructor(sweep().info, {});
+  for (std::size_t i = 0; i < 10; ++i) {
+    const bool blank = i < 2 || i == 6;
+    const TrackingReport report = reconstructor.AddFrame(blank ? Blank(sweep().frames[i]) : sweep().frames[i]);
+    EXPECT_EQ(report.tracked, !blank) << i;
+    EXPECT_EQ(report.median_depth_m > 0, !blank);
+  }
+  reconstructor.CountDropped(5);
+  const Scene scene = reconstructor.Finish();
+  EXPECT_EQ(scene.frames_total, 15);
+  EXPECT_EQ(scene.frames_dropped, 5);
+  EXPECT_EQ(scene.frames_tracked, 7);
+  EXPECT_NEAR(scene.longest_lost_s, 2 / 15.0, 0.01);
+}
+
+TEST_F(ReconstructorTest, StopsOnRequest) {
+  Reconstructor reconstructor(sweep().info, {});
+  for (std::size_t i = 0; i < 3; ++i) reconstructor.AddFrame(sweep().frames[i]);
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THROW(static_cast<void>(reconstructor.Finish(stop.get_token())), Interrupted);
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,144 @@
+#include "algo/tracking/keypoints.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "algo/tracking/dense_view.hpp"
+
+namespace plumb {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector2f;
+
+// A smooth pattern known at every real place, so that images moved by fractions of a pixel are exact.
+cv::Mat Pattern(double dx, double dy, int width = 320, int height = 240) {
+  cv::Mat image(height, width, CV_8UC1);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double u = x - dx;
+      const double v = y - dy;
+      const double value = 128 + 40 * std::sin(0.31 * u + 0.05 * v) * std::cos(0.27 * v - 0.04 * u) + 30 * std::sin(0.11 * u - 0.13 * v) +
+                           25 * std::cos(0.19 * v + 0.07 * u + 0.001 * u * v);
+      image.at<unsigned char>(y, x) = cv::saturate_cast<unsigned char>(value);
+    }
+  }
+  return image;
+}
+
+TEST(Keypoints, FollowsAShiftToAFractionOfAPixel) {
+  const KeypointOptions options;
+  const cv::Mat from = Pattern(0, 0);
+  const double dx = 3.37;
+  const double dy = -2.61;
+  const auto corners = DetectCorners(from, {}, options);
+  ASSERT_GT(corners.size(), 100U);
+  const KltResult result =
+      TrackKlt(MakePyramid(from, options), MakePyramid(Pattern(dx, dy), options), corners, corners, options.levels, options);
+  std::vector<float> errors;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (!result.found[i]) continue;
+    errors.push_back((result.points[i] - corners[i] - Vector2f(static_cast<float>(dx), static_cast<float>(dy))).norm());
+  }
+  ASSERT_GT(errors.size(), corners.size() * 8 / 10);
+  std::sort(errors.begin(), errors.end());
+  fmt::print("KLT: median {:.3f} px, 80 % below {:.3f} px\n", errors[errors.size() / 2], errors[errors.size() * 8 / 10]);
+  EXPECT_LT(errors[errors.size() / 2], 0.05F);
+  EXPECT_LT(errors[errors.size() * 8 / 10], 0.1F);
+}
+
+TEST(Keypoints, LosesWhatIsNoLongerThere) {
+  const KeypointOptions options;
+  const cv::Mat from = Pattern(0, 0);
+  const auto corners = DetectCorners(from, {}, options);
+  const cv::Mat black = cv::Mat::zeros(from.size(), CV_8UC1);
+  const KltResult result = TrackKlt(MakePyramid(from, options), MakePyramid(black, options), corners, corners, options.levels, options);
+  for (std::size_t i = 0; i < corners.size(); ++i) EXPECT_FALSE(result.found[i]);
+}
+
+TEST(Keypoints, OneCornerACellAndNoneWhereOneIs) {
+  const KeypointOptions options;
+  const cv::Mat image = Pattern(0, 0);
+  const auto corners = DetectCorners(image, {}, options);
+  const int cell = 16;  // 32 at 640 columns.
+  std::vector<int> count(20 * 15, 0);
+  for (const Vector2f& p : corners)
+    ++count[static_cast<std::size_t>(static_cast<int>(std::lround(p.y())) / cell * 20 + static_cast<int>(std::lround(p.x())) / cell)];
+  for (const int n : count) EXPECT_LE(n, 2);  // Two where a peak lies on the cells' border.
+  const auto again = DetectCorners(image, corners, options);
+  EXPECT_LT(again.size(), corners.size() / 5);
+}
+
+TEST(Keypoints, FindsACornerWhereItIs) {
+  cv::Mat image(240, 320, CV_8UC1, cv::Scalar(60));
+  image(cv::Rect(100, 80, 220, 160)).setTo(180);  // Its corner is at pixel border (99.5, 79.5).
+  const auto corners = DetectCorners(image, {}, {});
+  double nearest = 1e9;
+  for (const Vector2f& p : corners) nearest = std::min<double>(nearest, (p - Vector2f(99.5F, 79.5F)).norm());
+  // The score's window pulls the peak inwards a little.
+  EXPECT_LT(nearest, 1.5);
+}
+
+TEST(Keypoints, FlatImagesHaveNoCorners) { EXPECT_TRUE(DetectCorners(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)), {}, {}).empty()); }
+
+TEST(Keypoints, DepthIsTheMedianAndNothingAtEdgesAndHoles) {
+  cv::Mat depth(20, 20, CV_32FC1, cv::Scalar(0.8));
+  depth.at<float>(10, 10) = 0.81F;
+  EXPECT_FLOAT_EQ(static_cast<float>(DepthAt(depth, {10, 10})), 0.8F);
+  depth(cv::Rect(12, 0, 8, 20)).setTo(1.2);
+  EXPECT_EQ(DepthAt(depth, {11.6, 10}), 0.0) << "an edge";
+  cv::Mat holes = cv::Mat::zeros(20, 20, CV_32FC1);
+  holes.at<float>(5, 5) = 0.9F;
+  EXPECT_EQ(DepthAt(holes, {5, 5}), 0.0) << "too little around";
+  for (const Vector2d& outside : {Vector2d(-3, 5), Vector2d(0, 0), Vector2d(25, 5), Vector2d(5, 19), Vector2d(1e9, -1e9)})
+    EXPECT_EQ(DepthAt(depth, outside), 0.0);
+}
+
+TEST(DenseView, PlaneHasItsNormalAndDepth) {
+  Intrinsics k;
+  // n . p = 0.6 with the plane tilted about both axes.
+  const Eigen::Vector3d n = Eigen::Vector3d(0.2, -0.15, 1).normalized();
+  cv::Mat depth(480, 640, CV_32FC1);
+  for (int r = 0; r < 480; ++r)
+    for (int c = 0; c < 640; ++c)
+      depth.at<float>(r, c) = static_cast<float>(0.6 / n.dot(Eigen::Vector3d((c - k.cx) / k.fx, (r - k.cy) / k.fy, 1)));
+  depth(cv::Rect(200, 200, 40, 40)).setTo(0);
+  const DenseView view = DenseViewMaker(k).Make(depth);
+  ASSERT_EQ(view.width, 160);
+  ASSERT_EQ(view.height, 120);
+  int with_normal = 0;
+  for (std::size_t i = 0; i < view.size(); ++i) {
+    if (view.normals[i].isZero()) continue;
+    ++with_normal;
+    EXPECT_LT((view.normals[i].cast<double>() + n).norm(), 1e-3);  // Towards the camera.
+    EXPECT_NEAR(n.dot(view.point(i).cast<double>()), 0.6, 1e-5);
+  }
+  EXPECT_GT(with_normal, 160 * 120 - 12 * 12 - 2 * (160 + 120) - 1);
+  EXPECT_EQ(view.z_m[55 * 160 + 55], 0.0F) << "the hole";
+}
+
+TEST(DenseView, EdgesAreLeftOut) {
+  Intrinsics k;
+  cv::Mat depth(480, 640, CV_32FC1, cv::Scalar(0.7));
+  depth(cv::Rect(322, 0, 318, 480)).setTo(1.0);  // In the middle of a 4-pixel window.
+  const DenseView view = DenseViewMaker(k).Make(depth);
+  EXPECT_EQ(view.z_m[60 * 160 + 80], 0.0F);
+  EXPECT_NEAR(view.z_m[60 * 160 + 79], 0.7F, 1e-6);
+  EXPECT_TRUE(view.normals[60 * 160 + 79].isZero()) << "no normal across an edge";
+}
+
+TEST(DepthSigma, FollowsNguyen) {
+  EXPECT_NEAR(DepthSigma(0.4, 1.0), 0.0012, 1e-9);
+  EXPECT_NEAR(DepthSigma(1.4, 1.0), 0.0031, 1e-9);
+  // theta = 60 degrees: 0.0001 / sqrt(1) * (60 / 30)^2 more.
+  EXPECT_NEAR(DepthSigma(1.0, 0.5), 0.0012 + 0.0019 * 0.36 + 0.0004, 1e-9);
+  EXPECT_TRUE(std::isfinite(DepthSigma(1.0, 0.0)));
+  EXPECT_TRUE(std::isfinite(DepthSigma(0.0, 1.0)));
+}
+
+}  // namespace
+}  // namespace plumb
