@@ -19,6 +19,7 @@ void MethodOptions::AddTo(CLI::App& app) {
 Config MethodOptions::Read() const {
   Config config = config_file ? ReadConfig(*config_file) : Config{};
   if (preset) config.reconstruct.preset = config.compare.preset = *preset == "paper" ? Preset::kPaper : Preset::kBest;
+  if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
   return config;
 }
 

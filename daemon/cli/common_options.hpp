@@ -26,7 +26,8 @@ struct MethodOptions {
   std::optional<std::filesystem::path> config_file;
 
   void AddTo(CLI::App& app);
-  /// @throws DataError from the configuration file.
+  /// The region file that the configuration names is read too.
+  /// @throws DataError from either file.
   [[nodiscard]] Config Read() const;
 };
 

@@ -1,5 +1,4 @@
 #include <memory>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -29,9 +28,8 @@ struct Options {
 };
 
 CompareOptions MethodOf(const Options& options) {
-  Config config = options.method.Read();
-  CompareOptions compare = std::move(config.compare);
-  if (const auto& file = options.region ? options.region : config.region_file) compare.region_polygon_m = ReadRegion(*file);
+  CompareOptions compare = options.method.Read().compare;
+  if (options.region) compare.region_polygon_m = ReadRegion(*options.region);
   if (!options.isocentre_m.empty()) compare.isocentre_m = Eigen::Vector3d(options.isocentre_m.data());
   compare.now_s = SteadySeconds;
   return compare;
