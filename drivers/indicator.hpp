@@ -1,0 +1,28 @@
+// The light (and beeper) that tells the technician what the appliance does.
+#pragma once
+
+namespace plumb {
+
+enum class IndicatorPattern {
+  kOff,
+  kNoSensor,
+  kReady,
+  kScanning,
+  kTooFast,
+  kTooNear,
+  kTooFar,
+  kWorking,
+  kResultInTolerance,
+  kResultMove,
+  kNoAnswer,
+  kFault,
+};
+
+/// A light. One thread (the event loop's) calls; no call blocks or throws: a broken light must not stop a scan.
+class Indicator {
+ public:
+  virtual ~Indicator() = default;
+  virtual void Show(IndicatorPattern pattern) noexcept = 0;
+};
+
+}  // namespace plumb
