@@ -1,0 +1,69 @@
+// The event loop of the main thread (sd-event): descriptors, timers, signals, and calls posted by other threads.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+namespace plumb {
+
+/// Everything but Post() and Quit() belongs to the thread that made the loop, and all callbacks run on it. A callback that throws ends
+/// Run(), which throws it on. Construct it before any other thread starts: it blocks the signals that it watches, and
+/// threads inherit that.
+class EventLoop {
+ public:
+  using Clock = std::chrono::steady_clock;
+  struct Impl;
+  class Source;
+
+  EventLoop();
+  ~EventLoop();
+  EventLoop(const EventLoop&) = delete;
+  EventLoop& operator=(const EventLoop&) = delete;
+
+  /// Runs until Quit(); returns its code.
+  int Run();
+
+  /// Ends Run() after the callback that runs now. Thread-safe.
+  void Quit(int exit_code);
+
+  /// Has the loop call `work`, in the order of posting. Thread-safe, never waits. What is posted after Run() ended is dropped.
+  void Post(std::function<void()> work);
+
+  /// Calls `ready` with the epoll events that came, for as long as the source lives. The descriptor stays the caller's.
+  [[nodiscard]] Source WatchDescriptor(int fd, std::uint32_t epoll_events, std::function<void(std::uint32_t)> ready);
+
+  /// Calls `caught` for a signal. One of SIGTERM, SIGINT, SIGHUP.
+  [[nodiscard]] Source WatchSignal(int signal, std::function<void()> caught);
+
+  /// A timer on the monotonic clock, not armed yet.
+  [[nodiscard]] Source MakeTimer(std::function<void()> expired);
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+/// What the loop watches; destroyed, it is not watched any more, also from within its own callback.
+class EventLoop::Source {
+ public:
+  struct Impl;
+  Source();
+  explicit Source(std::unique_ptr<Impl> impl);
+  ~Source();
+  Source(Source&&) noexcept;
+  Source& operator=(Source&&) noexcept;
+
+  /// Of a descriptor: which epoll events to wait for.
+  void SetEvents(std::uint32_t epoll_events);
+  /// Of a timer: expire once, at this time or after this long; an older arming is replaced.
+  void ArmAt(Clock::time_point time);
+  void ArmAfter(std::chrono::microseconds delay);
+  void Disarm();
+  [[nodiscard]] bool is_armed() const;
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace plumb
