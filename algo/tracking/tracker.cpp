@@ -9,8 +9,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "algo/markers/marker_detector.hpp"
-#include "algo/tracking/bundle_adjustment.hpp"
 #include "algo/tracking/keypoints.hpp"
+#include "algo/tracking/local_bundle.hpp"
 #include "algo/tracking/pose_optimizer.hpp"
 #include "algo/tracking/relocalizer.hpp"
 
@@ -55,7 +55,6 @@ struct Tracker::Impl {
 
   TrackingMap map;
   std::vector<TrackedFrame> frames;
-  CalibrationModel no_calibration;
 
   Pyramid last_pyramid;
   std::vector<ActivePoint> active;
@@ -459,12 +458,10 @@ struct Tracker::Impl {
 
   void AdjustLocally(int index) {
     if (index == 0) return;
-    BundleOptions bundle;
+    LocalBundleOptions bundle;
     bundle.marker_length_m = info.marker_length_m;
-    bundle.min_corner_sigma_px = 0.3;
-    bundle.max_iterations = 4;
     for (int k = std::max(1, index + 1 - options.local_keyframes); k <= index; ++k) bundle.free_keyframes.push_back(k);
-    BundleAdjust(info.intrinsics, bundle, {}, map, no_calibration);
+    AdjustLocalMap(info.intrinsics, bundle, map);
   }
 };
 
