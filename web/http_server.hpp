@@ -1,0 +1,64 @@
+// The appliance's HTTP server, driven by the daemon's event loop.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "web/scan_service.hpp"
+
+namespace plumb::web {
+
+struct HttpServerOptions {
+  std::string address = "127.0.0.1";      ///< IPv4 or IPv6 address to listen on.
+  std::uint16_t port = 0;                 ///< 0: any free one, see port().
+  std::optional<int> listen_fd;           ///< A listening socket from outside (socket activation); address and port are then unused.
+  std::filesystem::path tls_certificate;  ///< PEM; with tls_key: HTTPS instead of HTTP.
+  std::filesystem::path tls_key;
+  std::vector<std::string> host_names;  ///< Accepted in the Host header beside localhost and addresses written as numbers.
+  unsigned max_connections = 256;
+  unsigned max_connections_per_ip = 64;
+  std::size_t max_body_bytes = 256 << 10;
+  std::size_t connection_memory_bytes = 32 << 10;  ///< Request line, headers and their parsing.
+  std::chrono::seconds request_timeout{15};        ///< A connection on which nothing moves is closed.
+  std::chrono::seconds request_limit{60};          ///< A request must be in whole by then, however it drips.
+  std::size_t event_buffer_bytes = 64 << 10;       ///< Per viewer of the event stream; one that falls behind is dropped.
+  unsigned max_event_streams = 32;
+  std::uint64_t password_memory_bytes = 64 << 20;  ///< Of argon2id; one hash runs at a time.
+  std::uint64_t password_operations = 3;
+  std::chrono::seconds session_limit{12 * 3600};  ///< A session ends then, however busy.
+};
+
+/// Serves the page, the API under /api/v1 (web/openapi.yaml), the event stream and GET /health.
+///
+/// Belongs to the loop thread: everything is called there and calls the service there. Passwords are hashed on a thread of its own.
+/// Signals must be blocked before it is made. Destroying it closes every connection; completions that come later find nobody.
+class HttpServer {
+ public:
+  /// Listens at once; nothing is answered before the first Run(). @throws IoError with address and reason, DataError for the TLS files.
+  HttpServer(ScanService& service, HttpServerOptions options);
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+
+  /// An epoll descriptor: wait for EPOLLIN on it, then call Run().
+  [[nodiscard]] int fd() const;
+  /// Does what is due; never waits.
+  void Run();
+  /// Call Run() after that time even if fd() stays silent; nothing: no need. Ask again after each Run().
+  [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const;
+
+  [[nodiscard]] std::uint16_t port() const;
+  /// "XXXX-XXXX" while there is no account: whoever types it makes the first one, an engineer. Print it where only the owner looks.
+  [[nodiscard]] std::optional<std::string> setup_code() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace plumb::web

@@ -1,0 +1,108 @@
+// What the web asks of the appliance. The daemon implements it; the web only calls.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "web/service_types.hpp"
+
+namespace plumb::web {
+
+enum class ChangeResult {
+  kDone,
+  kInvalid,   ///< The request makes no sense; the message says what was expected and found.
+  kNotFound,  ///< No such patient, reference, scan or user.
+  kConflict,  ///< Not in this state: "in state X, trying f(), requires Y".
+  kRefused,   ///< This user may not, here: the one who made a reference does not approve it.
+  kNoSpace,   ///< Disk full or read-only.
+  kFailed,
+};
+
+/// The answer to a change.
+struct Change {
+  ChangeResult result = ChangeResult::kDone;
+  std::string message;         ///< For people; empty when done.
+  std::string id;              ///< Of what was made, where something was.
+  std::filesystem::path file;  ///< Of what was written, where something was.
+};
+/// Called exactly once, on the loop thread: within the call that asked, or later.
+using Done = std::function<void(const Change&)>;
+
+enum class EventKind {
+  kStatus,    ///< State, sensor, light, storage: ask Status().
+  kProgress,  ///< Of a scan: ask Status().
+  kResult,    ///< A scan ended: ask Status().
+  kData,      ///< Patients, references, scans, users or settings changed.
+  kUpdate,    ///< Ask Update().
+};
+
+/// The appliance as the page sees it.
+///
+/// Every function is called on the loop thread and returns within a few milliseconds: reads answer from memory or from an index, changes
+/// may finish later. Each change and its audit entry are one transaction of the store. Nothing throws but std::bad_alloc: what goes wrong
+/// is a Change. Strings that come in are valid UTF-8, short, and without control characters, but their meaning is not checked.
+class ScanService {
+ public:
+  virtual ~ScanService() = default;
+
+  // --- what the appliance does
+  [[nodiscard]] virtual Status GetStatus() = 0;
+  [[nodiscard]] virtual Health GetHealth() = 0;
+  /// The newest camera picture as a small JPEG (at most 320 pixels wide, at most 5 a second); null when the sensor shows none.
+  [[nodiscard]] virtual std::shared_ptr<const std::string> Preview() = 0;
+  /// As a short press of the button: starts a scan, ends the sweep, leaves a result. kConflict where it is ignored.
+  virtual void Press(const Actor& actor, Done done) = 0;
+  /// As a long press: the scan is thrown away.
+  virtual void Cancel(const Actor& actor, Done done) = 0;
+  /// Called on the loop thread. One listener; an empty function ends it.
+  virtual void SetListener(std::function<void(EventKind)> listener) = 0;
+
+  // --- patients
+  [[nodiscard]] virtual std::vector<Patient> Patients() = 0;  ///< By code; at most 1000.
+  [[nodiscard]] virtual std::optional<Patient> FindPatient(const std::string& id) = 0;
+  virtual void AddPatient(const Actor& actor, const std::string& code, const std::string& site, Done done) = 0;  ///< Gives the id.
+  /// Removes the patient with scans, references and files ("wipe patient"); the audit log keeps that it was done.
+  virtual void WipePatient(const Actor& actor, const std::string& id, Done done) = 0;
+  /// The next scan, from any button, is of this patient and for this. @param reason  Why a new reference is taken; may be empty.
+  virtual void OpenPatient(const Actor& actor, const std::string& id, ScanPurpose purpose, const std::string& reason, Done done) = 0;
+
+  // --- references
+  [[nodiscard]] virtual std::vector<Reference> References(const std::string& patient_id) = 0;  ///< Newest version first.
+  [[nodiscard]] virtual std::optional<Reference> FindReference(const std::string& id) = 0;
+  /// A draft made of a scan with a scene. Gives the id.
+  virtual void AddReference(const Actor& actor, const std::string& scan_id, const std::string& reason, Done done) = 0;
+  /// Of a draft: changed in place. Of an approved one: a new draft with the next version; gives its id.
+  virtual void PlanReference(const Actor& actor, const std::string& id, const ReferencePlan& plan, Done done) = 0;
+  /// kRefused for the user who made or last planned it. From then on it is immutable and the one that fractions are compared with.
+  virtual void ApproveReference(const Actor& actor, const std::string& id, Done done) = 0;
+
+  // --- scans
+  [[nodiscard]] virtual std::vector<Scan> Scans(const std::string& patient_id, int limit) = 0;  ///< Newest first; all patients: "".
+  [[nodiscard]] virtual std::optional<Scan> FindScan(const std::string& id) = 0;
+  virtual void AcceptScan(const Actor& actor, const std::string& id, Done done) = 0;
+
+  // --- accounts, log, settings
+  [[nodiscard]] virtual std::vector<User> Users() = 0;  ///< By name.
+  [[nodiscard]] virtual std::optional<User> FindUser(const std::string& name) = 0;
+  virtual void AddUser(const Actor& actor, const User& user, Done done) = 0;  ///< kConflict if the name is taken.
+  /// Replaces role, password_hash and disabled. kConflict if no enabled engineer would be left.
+  virtual void ChangeUser(const Actor& actor, const User& user, Done done) = 0;
+  /// Logins and what else is no change of the store. May be written later, in order.
+  virtual void Log(const Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) = 0;
+  /// Newest first, older than number `before` (0: all).
+  [[nodiscard]] virtual std::vector<AuditEntry> Audit(std::int64_t before, int limit) = 0;
+  [[nodiscard]] virtual Settings GetSettings() = 0;
+  virtual void ChangeSettings(const Actor& actor, const Settings& settings, Done done) = 0;  ///< kInvalid names the field.
+
+  // --- care
+  [[nodiscard]] virtual UpdateStatus GetUpdate() = 0;
+  virtual void InstallUpdate(const Actor& actor, const std::string& bundle, Done done) = 0;  ///< kConflict during a scan.
+  /// Gives a file (no patient data in it) that is downloaded once and then removed.
+  virtual void WriteDiagnostics(const Actor& actor, Done done) = 0;
+};
+
+}  // namespace plumb::web
