@@ -21,10 +21,10 @@ constexpr double kCornerLossScale = 3.0;
 
 // A keypoint's observation, in what the residuals need. Grouped by landmark.
 struct PointView {
-  int keyframe = 0;        // Index in the map.
-  Eigen::Vector2d ideal;   // Undistorted.
-  double z_m = 0;          // 0: none.
-  double weight_z = 0;     // 1 / standard deviation.
+  int keyframe = 0;       // Index in the map.
+  Eigen::Vector2d ideal;  // Undistorted.
+  double z_m = 0;         // 0: none.
+  double weight_z = 0;    // 1 / standard deviation.
 };
 
 struct CornerView {
@@ -162,7 +162,8 @@ class LocalBundle {
     for (const int k : options_.free_keyframes)
       map_.keyframes[static_cast<std::size_t>(k)].T_world_color =
           Orthonormalised(state.T_camera_world[static_cast<std::size_t>(k)].inverse());
-    for (std::size_t s = 0; s < markers_.size(); ++s) map_.markers.at(markers_[s]).T_world_marker = Orthonormalised(state.T_world_marker[s]);
+    for (std::size_t s = 0; s < markers_.size(); ++s)
+      map_.markers.at(markers_[s]).T_world_marker = Orthonormalised(state.T_world_marker[s]);
     for (std::size_t s = 0; s < landmarks_.size(); ++s)
       map_.landmarks[static_cast<std::size_t>(landmarks_[s])].p_world = state.landmarks[s];
   }
@@ -224,8 +225,8 @@ class LocalBundle {
         const double weight_z = std::sqrt(CauchyWeight(rz * rz, kKeypointLossScale));
         const double dt_s = keyframe.data.depth_time_s - keyframe.data.color_time_s;
         r.z() = weight_z * rz;
-        J_camera.row(2) = weight_z * view.weight_z *
-                          Eigen::RowVector3d(dt_s * keyframe.velocity_per_s[1], -dt_s * keyframe.velocity_per_s[0], 1.0);
+        J_camera.row(2) =
+            weight_z * view.weight_z * Eigen::RowVector3d(dt_s * keyframe.velocity_per_s[1], -dt_s * keyframe.velocity_per_s[0], 1.0);
       }
       const Eigen::Matrix3d J_point = J_camera * T_camera_world.linear();
       point.V.noalias() += J_point.transpose() * J_point;

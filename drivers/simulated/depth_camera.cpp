@@ -39,16 +39,17 @@ DepthCamera::DepthCamera(const SensorUnit& unit) : unit_(unit), rays_(unit.depth
   }
 }
 
-void DepthCamera::Cast(const World& world, const MovingPose& pose, int tile_row, const Layers& layers, cv::Mat& true_m,
+void DepthCamera::Cast(const World& world, std::span<const MovingPose> rows, int tile_row, const Layers& layers, cv::Mat& true_m,
                        cv::Mat& incidence) const {
   const int width = rays_.width();
   const int y_end = std::min(rays_.height(), (tile_row + 1) * kTileSize);
   const int y_mid = std::min(rays_.height() - 1, tile_row * kTileSize + kTileSize / 2);
   const float spread = (0.75F * kTileSize + 6.0F * static_cast<float>(unit_.lateral_noise) + 1.0F) / rays_.focal_px();
-  const Vector3f forward = pose.R_world_camera.col(2);
+  const float margin = 0.002F + 0.6F * static_cast<float>(unit_.depth_readout_s * kTileSize / rays_.height());  // A hand's 0.6 m/s.
   for (int x_begin = 0; x_begin < width; x_begin += kTileSize) {
-    const Ray centre = pose.RayOf(rays_.At(std::min(width - 1, x_begin + kTileSize / 2), y_mid, -0.5F, -0.5F), 0.0F);
-    const Candidates candidates = world.FindCandidates(centre, spread, 0.002F);
+    const Ray centre =
+        rows[static_cast<std::size_t>(y_mid)].RayOf(rays_.At(std::min(width - 1, x_begin + kTileSize / 2), y_mid, -0.5F, -0.5F), 0.0F);
+    const Candidates candidates = world.FindCandidates(centre, spread, margin);
     float sigma_px = 0;
     if (!layers.jitter_x.empty()) {
       const Hit hit = world.Trace(centre, candidates);
@@ -57,6 +58,8 @@ void DepthCamera::Cast(const World& world, const MovingPose& pose, int tile_row,
       sigma_px = static_cast<float>(unit_.lateral_noise * NguyenLateralSigma(angle));
     }
     for (int y = tile_row * kTileSize; y < y_end; ++y) {
+      const MovingPose& pose = rows[static_cast<std::size_t>(y)];
+      const Vector3f forward = pose.R_world_camera.col(2);
       for (int x = x_begin; x < std::min(width, x_begin + kTileSize); ++x) {
         float du = 0;
         float dv = 0;
@@ -172,7 +175,9 @@ cv::Mat DepthCamera::Register(const cv::Mat& measured_m) const {
 DepthShot DepthCamera::Render(const World& world, const Trajectory& trajectory, double time_s, std::uint64_t noise_seed) const {
   const int width = rays_.width();
   const int height = rays_.height();
-  const MovingPose pose = PoseAt(trajectory, time_s, unit_.T_color_depth_true);
+  std::vector<MovingPose> rows;
+  for (int y = 0; y < height; ++y)
+    rows.push_back(PoseAt(trajectory, time_s + unit_.depth_readout_s * ((y + 0.5) / height - 0.5), unit_.T_color_depth_true));
   const double pixels = width / 640.0;
   Layers layers;
   if (unit_.lateral_noise > 0) {
@@ -186,7 +191,7 @@ DepthShot DepthCamera::Render(const World& world, const Trajectory& trajectory, 
   shot.measured_m = cv::Mat(height, width, CV_32FC1);
   cv::Mat incidence;
   if (unit_.axial_noise > 0 || unit_.dropout > 0) incidence = cv::Mat(height, width, CV_32FC1);
-  tbb::parallel_for(0, (height + kTileSize - 1) / kTileSize, [&](int row) { Cast(world, pose, row, layers, shot.true_m, incidence); });
+  tbb::parallel_for(0, (height + kTileSize - 1) / kTileSize, [&](int row) { Cast(world, rows, row, layers, shot.true_m, incidence); });
   tbb::parallel_for(0, height, [&](int y) {
     Measure(y, layers, shot.true_m, incidence, noise_seed, shot.measured_m);
     if (unit_.projector_baseline_m > 0) CastShadow(y, shot.true_m, shot.measured_m);

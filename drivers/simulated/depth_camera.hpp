@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include <opencv2/core/mat.hpp>
 
@@ -14,7 +15,7 @@ namespace plumb::simulated {
 struct DepthShot {
   cv::Mat registered;  ///< CV_16UC1 on the colour camera's grid, units of SensorUnit::depth_units_per_metre, 0: nothing.
   cv::Mat measured_m;  ///< CV_32FC1 on the infrared camera's grid: what it measured, 0: nothing.
-  cv::Mat true_m;      ///< CV_32FC1 on the same grid: the true depth along each pixel's own centre or jittered ray.
+  cv::Mat true_m;      ///< CV_32FC1 on the same grid: the true depth along each pixel's own centre or jittered ray, when its row was read.
 };
 
 /// Renders depth images by the chain true z -> scale, offset, bow -> lateral jitter -> correlated axial noise -> quantisation -> projector
@@ -22,12 +23,14 @@ struct DepthShot {
 class DepthCamera {
  public:
   explicit DepthCamera(const SensorUnit& unit);
-  /// @param time_s  Trajectory time of the (global) exposure.  @param noise_seed  Of this image.
+  /// @param time_s  Trajectory time at which the middle row is taken; the others follow SensorUnit::depth_readout_s.  @param noise_seed  Of
+  /// this image.
   [[nodiscard]] DepthShot Render(const World& world, const Trajectory& trajectory, double time_s, std::uint64_t noise_seed) const;
 
  private:
   struct Layers;
-  void Cast(const World& world, const MovingPose& pose, int tile_row, const Layers& layers, cv::Mat& true_m, cv::Mat& incidence) const;
+  void Cast(const World& world, std::span<const MovingPose> rows, int tile_row, const Layers& layers, cv::Mat& true_m,
+            cv::Mat& incidence) const;
   void Measure(int y, const Layers& layers, const cv::Mat& true_m, const cv::Mat& incidence, std::uint64_t noise_seed,
                cv::Mat& measured_m) const;
   void CastShadow(int y, const cv::Mat& true_m, cv::Mat& measured_m) const;

@@ -95,6 +95,7 @@ SensorUnit MakeSensorUnit(NoiseLevel level, std::uint64_t seed, int width, int h
     unit.vignetting = 0.25;
     unit.shot_noise = 1.2e-4 * size * size;
     unit.read_noise = 0.0015 * size;
+    unit.depth_readout_s = random.Uniform(0.012, 0.028) * (level == NoiseLevel::kHard ? 1.2 : 1.0);
     unit.jpeg_quality = level == NoiseLevel::kHard ? 90 : 95;
   }
   const double pixels = width / 640.0;

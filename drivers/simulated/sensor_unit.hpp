@@ -42,7 +42,8 @@ struct SensorUnit {
 
   // Times. A frame's colour image is taken at its nominal time, depth `depth_delay_s` later; stamps err beside that.
   double exposure_s = 0.0;
-  double readout_s = 0.0;  ///< Rolling shutter of the colour camera, first to last row.
+  double readout_s = 0.0;        ///< Rolling shutter of the colour camera, first to last row.
+  double depth_readout_s = 0.0;  ///< Rolling shutter of the infrared camera; the depth image's time is that of its middle row.
   double depth_delay_s = 0.0;
   double color_stamp_bias_s = 0.0;
   double stamp_jitter_s = 0.0;

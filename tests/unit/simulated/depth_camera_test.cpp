@@ -53,6 +53,29 @@ TEST(DepthCameraTest, IdealDepthIsThatOfThePlaneAndTheBall) {
   EXPECT_GT(on_ball, 5000);
 }
 
+TEST(DepthCameraTest, RollingShutterReadsEachRowAtItsOwnTime) {
+  const World world = BallWorld({0.0, 0.0, -0.5});
+  SensorUnit unit = MakeSensorUnit(NoiseLevel::kIdeal, 1, 320, 240);
+  unit.depth_readout_s = 0.030;
+  SweepOptions sweep = Standing(kHeight);
+  sweep.swing_m = 0.15;
+  sweep.tremor = 3.0;  // Turns and heaves, so that rows differ in depth on a plane.
+  const Trajectory trajectory(sweep);
+  const DepthShot shot = DepthCamera(unit).Render(world, trajectory, 3.0, 1);
+  double worst = 0, worst_at_middle_time = 0;
+  for (int y = 0; y < 240; ++y) {
+    const Pose T_row = trajectory.T_world_camera(3.0 + unit.depth_readout_s * ((y + 0.5) / 240 - 0.5));
+    for (int x = 0; x < 320; x += 7) {
+      const double z = shot.true_m.at<float>(y, x);
+      worst = std::max(worst, std::abs(z - FloorDepth(unit.depth_true, T_row, x, y)));
+      worst_at_middle_time =
+          std::max(worst_at_middle_time, std::abs(z - FloorDepth(unit.depth_true, trajectory.T_world_camera(3.0), x, y)));
+    }
+  }
+  EXPECT_LT(worst, 2e-5);
+  EXPECT_GT(worst_at_middle_time, 20 * worst);
+}
+
 TEST(DepthCameraTest, AxialNoiseFollowsTheModelInSizeAndCorrelation) {
   SensorUnit unit = MakeSensorUnit(NoiseLevel::kIdeal, 1, 640, 480);
   unit.axial_noise = 1.0;

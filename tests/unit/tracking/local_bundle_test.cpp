@@ -38,7 +38,8 @@ TEST(LocalBundle, FindsDisturbedPosesLandmarksAndMarkers) {
   EXPECT_LT(error.translation_m, 5e-5);
   EXPECT_LT(error.rotation_rad, 5e-5);
   for (const auto& [id, marker] : map.markers)
-    EXPECT_LT((marker.T_world_marker.translation() - truth.map.markers.at(id).T_world_marker.translation()).norm(), 5e-5) << "marker " << id;
+    EXPECT_LT((marker.T_world_marker.translation() - truth.map.markers.at(id).T_world_marker.translation()).norm(), 5e-5)
+        << "marker " << id;
 }
 
 // Wrong derivatives still creep downhill; true ones converge quadratically once the damping is gone.
