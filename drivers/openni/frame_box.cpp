@@ -1,0 +1,113 @@
+#include "drivers/openni/frame_box.hpp"
+
+#include <fmt/format.h>
+
+#include "algo/types/errors.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr std::chrono::seconds kRateWindow{1};
+
+}  // namespace
+
+FrameBox::FrameBox(std::string name, std::chrono::microseconds max_gap, std::chrono::milliseconds stall_time)
+    : name_(std::move(name)), stall_time_(stall_time), pairing_(max_gap.count()) {}
+
+void FrameBox::Add(StreamKind kind, std::int64_t stamp_us, cv::Mat image) {
+  {
+    const std::lock_guard lock(mutex_);
+    auto pair = pairing_.Add(kind, stamp_us, std::move(image));
+    if (!pair) return;
+    if (skip_ > 0) {
+      --skip_;
+      return;
+    }
+    last_arrival_ = Clock::now();
+    arrivals_.push_back(last_arrival_);
+    while (arrivals_.front() + kRateWindow < last_arrival_) arrivals_.pop_front();
+    pairs_.push_back({std::move(*pair), next_index_++});
+    if (pairs_.size() > kCapacity) pairs_.pop_front();
+  }
+  changed_.notify_all();
+}
+
+void FrameBox::CountDiscarded() {
+  const std::lock_guard lock(mutex_);
+  ++num_discarded_;
+}
+
+void FrameBox::Lose() noexcept {
+  {
+    const std::lock_guard lock(mutex_);
+    lost_ = true;
+  }
+  changed_.notify_all();
+}
+
+void FrameBox::SetFailed(bool failed) noexcept {
+  {
+    const std::lock_guard lock(mutex_);
+    failed_ = failed;
+  }
+  changed_.notify_all();
+}
+
+void FrameBox::Interrupt() noexcept {
+  {
+    const std::lock_guard lock(mutex_);
+    interrupted_ = true;
+  }
+  changed_.notify_all();
+}
+
+void FrameBox::Flush() noexcept {
+  const std::lock_guard lock(mutex_);
+  pairs_.clear();
+  pairing_.Clear();
+  next_index_ = 0;
+}
+
+void FrameBox::SkipPairs(int count) {
+  const std::lock_guard lock(mutex_);
+  skip_ = count;
+}
+
+std::optional<FrameBox::Pair> FrameBox::Take() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    if (interrupted_) return std::nullopt;
+    if (lost_) throw DeviceLost(fmt::format("sensor {} was unplugged; plug it in again", name_));
+    if (failed_) throw DeviceError(fmt::format("the driver of sensor {} reports an error; unplug it and plug it in again", name_));
+    if (!pairs_.empty()) break;
+    const Clock::time_point limit = last_arrival_ + stall_time_;
+    if (Clock::now() >= limit) {
+      throw DeviceError(
+          fmt::format("sensor {} has given no pair of images for {} ms ({} unpaired, {} discarded so far); unplug it and plug it in again",
+                      name_, stall_time_.count(), pairing_.num_unpaired(), pairing_.num_discarded() + num_discarded_));
+    }
+    changed_.wait_until(lock, limit);
+  }
+  Pair pair = std::move(pairs_.front());
+  pairs_.pop_front();
+  ++num_taken_;
+  return pair;
+}
+
+SensorStatistics FrameBox::statistics() const {
+  const std::lock_guard lock(mutex_);
+  SensorStatistics statistics;
+  statistics.num_pairs = num_taken_;
+  statistics.num_unpaired = pairing_.num_unpaired();
+  statistics.num_discarded = pairing_.num_discarded() + num_discarded_;
+  const Clock::time_point begin = Clock::now() - kRateWindow;
+  for (const Clock::time_point& arrival : arrivals_) statistics.frames_per_second += arrival > begin ? 1.0 : 0.0;
+  return statistics;
+}
+
+bool FrameBox::lost() const {
+  const std::lock_guard lock(mutex_);
+  return lost_;
+}
+
+}  // namespace plumb

@@ -1,0 +1,65 @@
+// Where the thread that reads a sensor leaves image pairs for the thread that uses them.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include <opencv2/core/mat.hpp>
+
+#include "drivers/openni/frame_pairing.hpp"
+#include "drivers/sensor.hpp"
+
+namespace plumb {
+
+/// Pairs images and holds the newest few. All functions may be called from any thread; only Take() waits.
+class FrameBox {
+ public:
+  using Clock = std::chrono::steady_clock;
+  struct Pair {
+    FramePairing<cv::Mat>::Pair images;
+    std::int64_t index = 0;  ///< Since the last Flush(); a gap shows that pairs were thrown away.
+  };
+
+  /// @param name  Of the sensor, for messages.
+  FrameBox(std::string name, std::chrono::microseconds max_gap, std::chrono::milliseconds stall_time);
+
+  void Add(StreamKind kind, std::int64_t stamp_us, cv::Mat image);
+  void CountDiscarded();
+  void Lose() noexcept;                  ///< The unit is gone for good.
+  void SetFailed(bool failed) noexcept;  ///< The driver reports an error, or that it is over.
+  void Interrupt() noexcept;             ///< For good.
+  void Flush() noexcept;
+  void SkipPairs(int count);  ///< The next so many pairs are thrown away.
+
+  /// The oldest pair that waits; nothing once interrupted.
+  /// @throws DeviceLost, DeviceError as LiveSensor::Next().
+  [[nodiscard]] std::optional<Pair> Take();
+  [[nodiscard]] SensorStatistics statistics() const;
+  [[nodiscard]] bool lost() const;
+
+ private:
+  static constexpr std::size_t kCapacity = 4;  ///< Pairs of 1.5 MB; the user's own queue is the one that counts what it drops.
+
+  const std::string name_;
+  const std::chrono::milliseconds stall_time_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  FramePairing<cv::Mat> pairing_;
+  std::deque<Pair> pairs_;
+  std::deque<Clock::time_point> arrivals_;  ///< Of pairs, within the last second.
+  Clock::time_point last_arrival_ = Clock::now();
+  std::int64_t next_index_ = 0;
+  std::int64_t num_taken_ = 0;
+  std::int64_t num_discarded_ = 0;
+  int skip_ = 0;
+  bool lost_ = false;
+  bool failed_ = false;
+  bool interrupted_ = false;
+};
+
+}  // namespace plumb

@@ -1,0 +1,150 @@
+#include "drivers/openni/openni_provider.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <mutex>
+#include <span>
+
+#include "algo/types/errors.hpp"
+#include "drivers/openni/openni_library.hpp"
+#include "drivers/openni/openni_sensor.hpp"
+
+namespace plumb {
+
+// No lock of ours is held while OpenNI2 is called: it calls back from the driver's thread under locks of its own.
+struct OpenNiProvider::Impl {
+  explicit Impl(const OpenNiOptions& wanted) : options(wanted), library(OpenNiLibrary::Load(wanted.library)) {
+    callbacks.deviceConnected = [](const OniDeviceInfo*, void* self) { static_cast<Impl*>(self)->Notify(); };
+    callbacks.deviceDisconnected = [](const OniDeviceInfo* info, void* self) { static_cast<Impl*>(self)->OnGone(*info); };
+    callbacks.deviceStateChanged = [](const OniDeviceInfo* info, OniDeviceState state, void* self) {
+      static_cast<Impl*>(self)->OnState(*info, state);
+    };
+    library->Check("OpenNI2 refuses to report what is plugged in", library->RegisterDeviceCallbacks(&callbacks, this, &handle));
+  }
+  ~Impl() {
+    if (handle != nullptr) library->UnregisterDeviceCallbacks(handle);
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  void Notify() {
+    const std::lock_guard lock(listener_mutex);
+    if (listener) listener();
+  }
+
+  template <typename Change>
+  void ForBoxes(const std::string& uri, Change&& change) {
+    const std::lock_guard lock(mutex);
+    for (const auto& [box_uri, weak] : boxes) {
+      if (const auto box = weak.lock(); box && box_uri == uri) change(*box);
+    }
+  }
+
+  void OnGone(const OniDeviceInfo& info) {
+    ForBoxes(info.uri, [](FrameBox& box) { box.Lose(); });
+    {
+      const std::lock_guard lock(mutex);
+      serials.erase(info.uri);
+      std::erase_if(boxes, [](const auto& entry) { return entry.second.expired(); });
+    }
+    Notify();
+  }
+
+  void OnState(const OniDeviceInfo& info, OniDeviceState state) {
+    // "Not ready" comes with unplugging too, which has a callback of its own.
+    if (state == ONI_DEVICE_STATE_ERROR || state == ONI_DEVICE_STATE_OK)
+      ForBoxes(info.uri, [&](FrameBox& box) { box.SetFailed(state == ONI_DEVICE_STATE_ERROR); });
+    Notify();
+  }
+
+  /// Asks the unit; empty if it cannot be opened or tells none.
+  std::string AskSerial(const OniDeviceInfo& info) const {
+    OniDeviceHandle device = nullptr;
+    if (library->DeviceOpen(info.uri, &device) != ONI_STATUS_OK) return {};
+    std::array<char, ONI_MAX_STR> serial{};
+    int size = static_cast<int>(serial.size());
+    const OniStatus status = library->DeviceGetProperty(device, ONI_DEVICE_PROPERTY_SERIAL_NUMBER, serial.data(), &size);
+    library->DeviceClose(device);
+    serial.back() = '\0';
+    return status == ONI_STATUS_OK ? std::string(serial.data()) : std::string();
+  }
+
+  SensorDescription Describe(const OniDeviceInfo& info) {
+    std::string serial;
+    {
+      const std::lock_guard lock(mutex);
+      if (const auto known = serials.find(info.uri); known != serials.end()) serial = known->second;
+    }
+    if (serial.empty()) {
+      serial = AskSerial(info);
+      const std::lock_guard lock(mutex);
+      if (!serial.empty()) serials[info.uri] = serial;
+    }
+    return {info.uri, serial.empty() ? info.uri : serial, fmt::format("{} {}", info.vendor, info.name), info.usbVendorId,
+            info.usbProductId};
+  }
+
+  std::vector<SensorDescription> List() {
+    OniDeviceInfo* infos = nullptr;
+    int count = 0;
+    library->Check("OpenNI2 does not list the sensors", library->GetDeviceList(&infos, &count));
+    const std::vector<OniDeviceInfo> found(infos, infos + std::max(count, 0));
+    library->ReleaseDeviceList(infos);
+    std::vector<SensorDescription> sensors;
+    for (const OniDeviceInfo& info : found) {
+      const bool known = std::any_of(sensors.begin(), sensors.end(), [&](const auto& sensor) { return sensor.uri == info.uri; });
+      if (!known) sensors.push_back(Describe(info));
+    }
+    std::sort(sensors.begin(), sensors.end(),
+              [](const auto& a, const auto& b) { return std::tie(a.serial, a.uri) < std::tie(b.serial, b.uri); });
+    return sensors;
+  }
+
+  const OpenNiOptions options;
+  const std::shared_ptr<const OpenNiLibrary> library;
+  OniDeviceCallbacks callbacks{};
+  OniCallbackHandle handle = nullptr;
+
+  std::mutex listener_mutex;
+  std::function<void()> listener;
+
+  std::mutex mutex;
+  std::map<std::string, std::string> serials;                          ///< By URI, of the units that are attached.
+  std::vector<std::pair<std::string, std::weak_ptr<FrameBox>>> boxes;  ///< Of open sensors, by URI.
+};
+
+OpenNiProvider::OpenNiProvider(const OpenNiOptions& options) : impl_(std::make_shared<Impl>(options)) {}
+
+OpenNiProvider::~OpenNiProvider() { SetListener(nullptr); }
+
+std::vector<SensorDescription> OpenNiProvider::List() { return impl_->List(); }
+
+void OpenNiProvider::SetListener(std::function<void()> changed) {
+  const std::lock_guard lock(impl_->listener_mutex);
+  impl_->listener = std::move(changed);
+}
+
+std::unique_ptr<LiveSensor> OpenNiProvider::Open(const std::string& serial) {
+  const std::vector<SensorDescription> sensors = List();
+  const auto found =
+      std::find_if(sensors.begin(), sensors.end(), [&](const auto& sensor) { return serial.empty() || sensor.serial == serial; });
+  if (found == sensors.end()) {
+    throw DeviceError(serial.empty() ? "no sensor is attached; plug one in, `plumb doctor` tells what is seen"
+                                     : fmt::format("sensor {} is not attached, found {}; plug it in", serial,
+                                                   sensors.empty() ? "none" : sensors.front().serial));
+  }
+  auto box = std::make_shared<FrameBox>(found->serial, impl_->options.max_gap, impl_->options.stall_time);
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->boxes.emplace_back(found->uri, box);
+  }
+  auto streams = std::make_unique<OpenNiStreams>(impl_->library, *found);
+  // The box knows of an unplug from here on, so none is missed between the listing and the first image.
+  if (box->lost()) throw DeviceLost(fmt::format("sensor {} was unplugged while it was opened", found->serial));
+  return std::make_unique<OpenNiSensor>(std::move(streams), std::move(box), impl_, *found, impl_->options);
+}
+
+}  // namespace plumb

@@ -1,0 +1,168 @@
+#include "drivers/openni/openni_sensor.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <mutex>
+
+#include "algo/types/errors.hpp"
+#include "drivers/openni/sensor_calibration.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr int kWait_ms = 100;                         // of one look for images; the longest that closing waits
+constexpr std::chrono::milliseconds kAfterError{20};  // OpenNI2 may answer at once, and always the same, after an unplug
+constexpr int kFps = 30;
+// Registration and exposure need a moment after the start; until then depth may still lie on its own grid.
+constexpr int kPairsToSettle = 2;
+
+/// @return False where the stream has no such setting.
+template <typename Value>
+bool Set(const OpenNiLibrary& library, OniStreamHandle stream, int property, const Value& value) {
+  return library.StreamIsPropertySupported(stream, property) != FALSE &&
+         library.StreamSetProperty(stream, property, &value, sizeof value) == ONI_STATUS_OK;
+}
+
+}  // namespace
+
+OpenNiStreams::OpenNiStreams(std::shared_ptr<const OpenNiLibrary> loaded, const SensorDescription& description)
+    : library(std::move(loaded)), name_(description.serial) {
+  const OniStatus status = library->DeviceOpen(description.uri.c_str(), &device);
+  if (status != ONI_STATUS_OK) {
+    throw DeviceError(
+        library->Describe(fmt::format("cannot open sensor {} ({}); `plumb doctor` tells whether it is attached and permitted, "
+                                      "or unplug it and plug it in again",
+                                      name_, description.name),
+                          status));
+  }
+  try {
+    Create();
+    SetModes();
+  } catch (...) {
+    Close();
+    throw;
+  }
+}
+
+OpenNiStreams::~OpenNiStreams() { Close(); }
+
+void OpenNiStreams::Create() {
+  library->Check(fmt::format("sensor {} gives no depth", name_), library->DeviceCreateStream(device, ONI_SENSOR_DEPTH, &depth));
+  library->Check(fmt::format("sensor {} gives no colour", name_), library->DeviceCreateStream(device, ONI_SENSOR_COLOR, &color));
+}
+
+OniStatus OpenNiStreams::SetMode(OniStreamHandle stream, OniPixelFormat format, int mode_width, int mode_height) const {
+  const OniVideoMode mode{format, mode_width, mode_height, kFps};
+  return library->StreamSetProperty(stream, ONI_STREAM_PROPERTY_VIDEO_MODE, &mode, sizeof mode);
+}
+
+void OpenNiStreams::SetModes() {
+  OniStatus status = ONI_STATUS_ERROR;
+  for (const auto& [w, h] : {std::pair{640, 480}, std::pair{320, 240}}) {
+    status = SetMode(depth, ONI_PIXEL_FORMAT_DEPTH_1_MM, w, h);
+    if (status == ONI_STATUS_OK) status = SetMode(color, ONI_PIXEL_FORMAT_RGB888, w, h);
+    if (status != ONI_STATUS_OK) continue;
+    width = w;
+    height = h;
+    break;
+  }
+  library->Check(fmt::format("sensor {} takes neither 640x480 nor 320x240 at {} Hz with depth in mm and colour as RGB", name_, kFps),
+                 status);
+  for (OniStreamHandle stream : {depth, color}) {
+    const OniBool off = FALSE;
+    library->Check(fmt::format("sensor {} keeps its images mirrored", name_),
+                   library->StreamSetProperty(stream, ONI_STREAM_PROPERTY_MIRRORING, &off, sizeof off));
+  }
+  (void)library->DeviceEnableDepthColorSync(device);  // a unit without it is paired by stamps all the same
+}
+
+void OpenNiStreams::Start() {
+  started_ = true;
+  library->Check(fmt::format("sensor {} does not start its depth", name_), library->StreamStart(depth));
+  library->Check(fmt::format("sensor {} does not start its colour", name_), library->StreamStart(color));
+  const int mode = ONI_IMAGE_REGISTRATION_DEPTH_TO_COLOR;  // set before the start, units forget it
+  library->Check(fmt::format("sensor {} does not register depth to colour", name_),
+                 library->DeviceSetProperty(device, ONI_DEVICE_PROPERTY_IMAGE_REGISTRATION, &mode, sizeof mode));
+}
+
+void OpenNiStreams::Close() noexcept {
+  for (OniStreamHandle stream : {depth, color}) {
+    if (stream == nullptr) continue;
+    if (started_) library->StreamStop(stream);
+    library->StreamDestroy(stream);
+  }
+  if (device != nullptr) library->DeviceClose(device);
+}
+
+OpenNiSensor::OpenNiSensor(std::unique_ptr<OpenNiStreams> streams, std::shared_ptr<FrameBox> box, std::shared_ptr<const void> provider,
+                           const SensorDescription& description, const OpenNiOptions& options)
+    : description_(description), provider_(std::move(provider)), streams_(std::move(streams)), box_(std::move(box)) {
+  float fov_rad = 0;
+  int size = sizeof fov_rad;
+  if (streams_->library->StreamGetProperty(streams_->color, ONI_STREAM_PROPERTY_HORIZONTAL_FOV, &fov_rad, &size) != ONI_STATUS_OK)
+    fov_rad = 0;
+  info_ = LiveStreamInfo(options, description_.serial, streams_->width, streams_->height, fov_rad);
+  streams_->Start();
+  box_->SkipPairs(kPairsToSettle);
+  reader_ = std::jthread([this](const std::stop_token& stop) { Read(stop); });
+}
+
+OpenNiSensor::~OpenNiSensor() = default;
+
+void OpenNiSensor::Read(const std::stop_token& stop) {
+  const OpenNiLibrary& library = *streams_->library;
+  std::array<OniStreamHandle, 2> streams{streams_->depth, streams_->color};
+  std::mutex mutex;
+  std::condition_variable_any wake;
+  while (!stop.stop_requested()) {
+    int index = -1;
+    const OniStatus status = library.WaitForAnyStream(streams.data(), static_cast<int>(streams.size()), &index, kWait_ms);
+    if (status == ONI_STATUS_TIME_OUT) continue;
+    OniFrame* frame = nullptr;
+    // Only a stream that has an image is read: reading one that was unplugged never returns.
+    const bool read = status == ONI_STATUS_OK && (index == 0 || index == 1) &&
+                      library.StreamReadFrame(streams[static_cast<std::size_t>(index)], &frame) == ONI_STATUS_OK && frame != nullptr;
+    if (!read) {
+      std::unique_lock lock(mutex);
+      wake.wait_for(lock, stop, kAfterError, [] { return false; });
+      continue;
+    }
+    Accept(index == 0 ? StreamKind::kDepth : StreamKind::kColor, *frame);
+    library.FrameRelease(frame);
+  }
+}
+
+void OpenNiSensor::Accept(StreamKind kind, const OniFrame& frame) {
+  const bool is_color = kind == StreamKind::kColor;
+  const int row_bytes = streams_->width * (is_color ? 3 : 2);
+  const bool fits = frame.width == streams_->width && frame.height == streams_->height && frame.stride >= row_bytes &&
+                    frame.data != nullptr && frame.dataSize / frame.stride >= frame.height &&
+                    frame.videoMode.pixelFormat == (is_color ? ONI_PIXEL_FORMAT_RGB888 : ONI_PIXEL_FORMAT_DEPTH_1_MM);
+  if (!fits) {
+    box_->CountDiscarded();
+    return;
+  }
+  const cv::Mat view(frame.height, frame.width, is_color ? CV_8UC3 : CV_16UC1, frame.data, static_cast<std::size_t>(frame.stride));
+  box_->Add(kind, static_cast<std::int64_t>(frame.timestamp), view.clone());
+}
+
+std::optional<Frame> OpenNiSensor::Next() {
+  std::optional<FrameBox::Pair> pair = box_->Take();
+  if (!pair) return std::nullopt;
+  Frame frame;
+  frame.index = pair->index;
+  frame.color_time_s = 1e-6 * static_cast<double>(pair->images.color_us);
+  frame.depth_time_s = 1e-6 * static_cast<double>(pair->images.depth_us);
+  frame.color_rgb = std::move(pair->images.color);
+  pair->images.depth.convertTo(frame.depth_m, CV_32F, 1e-3);
+  return frame;
+}
+
+void OpenNiSensor::LockExposure(bool locked) {
+  const OniBool automatic = locked ? FALSE : TRUE;
+  (void)Set(*streams_->library, streams_->color, ONI_STREAM_PROPERTY_AUTO_EXPOSURE, automatic);
+  (void)Set(*streams_->library, streams_->color, ONI_STREAM_PROPERTY_AUTO_WHITE_BALANCE, automatic);
+}
+
+}  // namespace plumb

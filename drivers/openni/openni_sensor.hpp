@@ -1,0 +1,77 @@
+// One open sensor of OpenNI2. OpenNiProvider makes it.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <thread>
+
+#include "drivers/openni/frame_box.hpp"
+#include "drivers/openni/openni_library.hpp"
+#include "drivers/openni/openni_provider.hpp"
+
+namespace plumb {
+
+/// Frees the handles of one device with its depth and colour stream, in the order that OpenNI2 needs.
+class OpenNiStreams {
+ public:
+  /// Opens and creates, sets both to 640x480 at 30 Hz (320x240 where that is refused), not mirrored, in step. Starts nothing.
+  /// @throws DeviceError
+  OpenNiStreams(std::shared_ptr<const OpenNiLibrary> library, const SensorDescription& description);
+  ~OpenNiStreams();
+  OpenNiStreams(const OpenNiStreams&) = delete;
+  OpenNiStreams& operator=(const OpenNiStreams&) = delete;
+
+  /// @throws DeviceError
+  void Start();
+
+  std::shared_ptr<const OpenNiLibrary> library;
+  OniDeviceHandle device = nullptr;
+  OniStreamHandle depth = nullptr;
+  OniStreamHandle color = nullptr;
+  int width = 0;
+  int height = 0;
+
+ private:
+  void Create();
+  void SetModes();
+  [[nodiscard]] OniStatus SetMode(OniStreamHandle stream, OniPixelFormat format, int mode_width, int mode_height) const;
+  void Close() noexcept;
+  std::string name_;
+  bool started_ = false;
+};
+
+/// A thread of its own reads both streams all the time, so the newest images are at hand when a scan starts and the rate is known.
+class OpenNiSensor : public LiveSensor {
+ public:
+  /// @param box       The provider reports an unplug or a failure there.
+  /// @param provider  Kept alive as long as this sensor.
+  OpenNiSensor(std::unique_ptr<OpenNiStreams> streams, std::shared_ptr<FrameBox> box, std::shared_ptr<const void> provider,
+               const SensorDescription& description, const OpenNiOptions& options);
+  ~OpenNiSensor() override;
+
+  [[nodiscard]] const SensorDescription& description() const override { return description_; }
+  [[nodiscard]] SensorStatistics statistics() const override { return box_->statistics(); }
+  [[nodiscard]] const StreamInfo& info() const override { return info_; }
+  [[nodiscard]] std::optional<Frame> Next() override;
+  void Interrupt() noexcept override { box_->Interrupt(); }
+  void Flush() noexcept override { box_->Flush(); }
+  void LockExposure(bool locked) override;
+
+  /// For the recorder, which attaches to the streams.
+  [[nodiscard]] const OpenNiStreams& streams() const { return *streams_; }
+
+ private:
+  void Read(const std::stop_token& stop);
+  void Accept(StreamKind kind, const OniFrame& frame);
+
+  SensorDescription description_;
+  std::shared_ptr<const void> provider_;
+  std::unique_ptr<OpenNiStreams> streams_;
+  std::shared_ptr<FrameBox> box_;
+  StreamInfo info_;
+  std::jthread reader_;  ///< Last: joined before the streams go.
+};
+
+}  // namespace plumb

@@ -1,0 +1,13 @@
+// Where the files lie that came with the running program.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+namespace plumb {
+
+/// Looks for `relative` in the folders above the running program, nearest first: an installed /usr/bin/plumb finds /usr/lib/plumb/...,
+/// and programs of a build tree find what lies in the build folder.
+[[nodiscard]] std::optional<std::filesystem::path> FindBesideProgram(const std::filesystem::path& relative);
+
+}  // namespace plumb
