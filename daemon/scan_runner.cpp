@@ -17,24 +17,25 @@ namespace plumb {
 namespace {
 
 /// Reads the source on its own thread and hands its frames to the queue until the end, an error or a stop.
-class FrameReader {
+class FrameReader : public FrameFeed {
  public:
   FrameReader(FrameSource& source, bool realtime, std::size_t capacity)
       : source_(source), realtime_(realtime), queue_(capacity), thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
-  std::optional<Frame> Next(const std::stop_token& stop) { return queue_.Pop(stop); }
-  int TakeDropped() { return dropped_.exchange(0); }
+  std::optional<Frame> Next(const std::stop_token& stop) override { return queue_.Pop(stop); }
+  int TakeDropped() override { return dropped_.exchange(0); }
 
-  /// Ends the thread; throws what ended the reading, if an error did.
-  void Finish() {
+  /// Ends the thread.
+  void Finish() override {
     thread_.request_stop();
     queue_.Close();
     thread_.join();
     if (error_) std::rethrow_exception(error_);
   }
 
-  /// Steady time at which the last frame was handed over.
-  [[nodiscard]] double last_frame_s() const { return last_frame_s_; }
+  [[nodiscard]] std::optional<double> last_frame_s() const override {
+    return realtime_ ? std::optional<double>(last_frame_s_) : std::nullopt;
+  }
 
  private:
   void Run(const std::stop_token& stop) {
@@ -85,17 +86,16 @@ class FrameReader {
 
 double SteadySeconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-Scene RunScan(FrameSource& source, const ScanRunnerOptions& options, const std::stop_token& stop,
+Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOptions& options, const std::stop_token& stop,
               const std::function<void(const ScanProgress&)>& progress) {
-  ReconstructorOptions reconstructor_options = options.reconstructor;
+  ReconstructorOptions reconstructor_options = options;
   if (!reconstructor_options.now_s) reconstructor_options.now_s = SteadySeconds;
-  Reconstructor reconstructor(source.info(), reconstructor_options);
-  FrameReader reader(source, options.realtime, options.queue_capacity);
+  Reconstructor reconstructor(info, reconstructor_options);
 
   ScanProgress state{.step = "tracking"};
-  const double expected_frames = static_cast<double>(source.info().num_frames.value_or(0));
-  while (std::optional<Frame> frame = reader.Next(stop)) {
-    if (const int dropped = reader.TakeDropped(); dropped > 0) {
+  const double expected_frames = static_cast<double>(info.num_frames.value_or(0));
+  while (std::optional<Frame> frame = feed.Next(stop)) {
+    if (const int dropped = feed.TakeDropped(); dropped > 0) {
       reconstructor.CountDropped(dropped);
       state.frames_dropped += dropped;
     }
@@ -105,12 +105,14 @@ Scene RunScan(FrameSource& source, const ScanRunnerOptions& options, const std::
     const double seen = static_cast<double>(state.frames + state.frames_dropped);
     state.fraction = expected_frames > 0 ? std::min(1.0, seen / expected_frames) : 0.0;
     state.tracking = &report;
+    state.frame = &*frame;
     if (progress) progress(state);
     state.tracking = nullptr;
+    state.frame = nullptr;
   }
-  const double last_frame_s = reader.last_frame_s();
-  reader.Finish();
-  if (const int dropped = reader.TakeDropped(); dropped > 0) reconstructor.CountDropped(dropped);
+  const std::optional<double> last_frame_s = feed.last_frame_s();
+  feed.Finish();
+  if (const int dropped = feed.TakeDropped(); dropped > 0) reconstructor.CountDropped(dropped);
   if (stop.stop_requested()) throw Interrupted("the scan was interrupted while tracking");
 
   Scene scene = reconstructor.Finish(stop, [&](double fraction, std::string_view step) {
@@ -119,13 +121,19 @@ Scene RunScan(FrameSource& source, const ScanRunnerOptions& options, const std::
     if (progress) progress(state);
   });
   // Live, frames may still have been waiting when the last one came: that wait belongs to the time to the result.
-  if (options.realtime) scene.timings_s["after_last_frame"] = SteadySeconds() - last_frame_s;
-  std::vector<std::string> warnings = source.info().warnings;
+  if (last_frame_s) scene.timings_s["after_last_frame"] = SteadySeconds() - *last_frame_s;
+  std::vector<std::string> warnings = info.warnings;
   for (const std::string& warning : scene.warnings) {
     if (std::find(warnings.begin(), warnings.end(), warning) == warnings.end()) warnings.push_back(warning);
   }
   scene.warnings = std::move(warnings);
   return scene;
+}
+
+Scene RunScan(FrameSource& source, const ScanRunnerOptions& options, const std::stop_token& stop,
+              const std::function<void(const ScanProgress&)>& progress) {
+  FrameReader reader(source, options.realtime, options.queue_capacity);
+  return RunScan(reader, source.info(), options.reconstructor, stop, progress);
 }
 
 }  // namespace plumb

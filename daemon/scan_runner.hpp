@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <stop_token>
 #include <string_view>
 
@@ -21,6 +22,21 @@ struct ScanProgress {
   std::int64_t frames_tracked = 0;
   std::int64_t frames_dropped = 0;
   const TrackingReport* tracking = nullptr;  ///< Of the newest frame while tracking; valid during the call.
+  const Frame* frame = nullptr;              ///< The newest frame while tracking; valid during the call.
+};
+
+/// Frames that somebody else reads, as the tracking thread takes them.
+class FrameFeed {
+ public:
+  virtual ~FrameFeed() = default;
+  /// Waits for the next frame; nothing at the end or on a stop request.
+  virtual std::optional<Frame> Next(const std::stop_token& stop) = 0;
+  /// Frames that were dropped since the last call, because tracking was late.
+  virtual int TakeDropped() = 0;
+  /// Called once, after Next() returned nothing: throws what ended the reading, if an error did.
+  virtual void Finish() = 0;
+  /// Steady time at which the last frame arrived; none where time has no meaning.
+  [[nodiscard]] virtual std::optional<double> last_frame_s() const = 0;
 };
 
 struct ScanRunnerOptions {
@@ -36,6 +52,10 @@ struct ScanRunnerOptions {
 /// @param progress  If set, called on the calling thread.
 /// @throws DataError, DeviceError from the source or the reconstructor; Interrupted on a stop request.
 [[nodiscard]] Scene RunScan(FrameSource& source, const ScanRunnerOptions& options, const std::stop_token& stop = {},
+                            const std::function<void(const ScanProgress&)>& progress = {});
+
+/// The same with frames that another thread reads. `options.realtime` and `queue_capacity` are the feed's matter.
+[[nodiscard]] Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOptions& options, const std::stop_token& stop = {},
                             const std::function<void(const ScanProgress&)>& progress = {});
 
 /// Seconds of the steady clock.

@@ -1,0 +1,122 @@
+#include "daemon/scan_session.hpp"
+
+#include <future>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "algo/types/errors.hpp"
+#include "daemon/cli/text_report.hpp"
+#include "daemon/files/result_folder.hpp"
+#include "daemon/files/scene_folder.hpp"
+#include "daemon/recording_feed.hpp"
+#include "daemon/scan_runner.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr double kUpdateEvery_s = 0.1;
+
+void ThrowIfStopped(const std::stop_token& stop) {
+  if (stop.stop_requested()) throw Interrupted("the scan was discarded");
+}
+
+}  // namespace
+
+ScanSession::ScanSession(ScanJob job, ScanCallbacks callbacks)
+    : job_(std::move(job)),
+      callbacks_(std::move(callbacks)),
+      feed_(std::make_shared<LiveFeed>(job_.queue_capacity)),
+      guide_(job_.info.intrinsics, job_.guidance),
+      heartbeat_s_(SteadySeconds()),
+      thread_([this](const std::stop_token& stop) { Run(stop); }) {}
+
+ScanSession::~ScanSession() { Cancel(); }
+
+void ScanSession::Cancel() {
+  thread_.request_stop();
+  feed_->Close();
+}
+
+void ScanSession::Run(const std::stop_token& stop) {
+  try {
+    const Scene scene = Track(stop);
+    Evaluate(scene, stop);
+    outcome_.kind = ScanOutcome::Kind::kDone;
+    if (const std::optional<double> last_s = feed_->last_frame_s()) outcome_.after_last_frame_s = SteadySeconds() - *last_s;
+    if (callbacks_.save) callbacks_.save(outcome_);
+  } catch (const Interrupted&) {
+    outcome_.kind = ScanOutcome::Kind::kCancelled;
+  } catch (const DataError& error) {
+    outcome_.kind = ScanOutcome::Kind::kNoScene;
+    outcome_.reason = error.what();
+  } catch (const std::bad_alloc&) {
+    outcome_.kind = ScanOutcome::Kind::kFailed;
+    outcome_.reason = "out of memory: sweep a shorter way, or close what else runs";
+  } catch (const std::exception& error) {
+    outcome_.kind = ScanOutcome::Kind::kFailed;
+    outcome_.reason = error.what();
+  }
+  if (outcome_.kind != ScanOutcome::Kind::kDone && stop.stop_requested()) outcome_.kind = ScanOutcome::Kind::kCancelled;
+  callbacks_.ended(outcome_);
+}
+
+Scene ScanSession::Track(const std::stop_token& stop) {
+  std::error_code ignored;
+  std::filesystem::create_directories(job_.folder, ignored);  // what cannot be made is told by the first write into it
+  std::optional<RecordingFeed> recording;
+  if (job_.keep_recording) recording.emplace(*feed_, job_.info, job_.folder / "recording");
+  FrameFeed& feed = recording ? static_cast<FrameFeed&>(*recording) : *feed_;
+  return RunScan(feed, job_.info, job_.reconstructor, stop, [this](const ScanProgress& progress) { OnProgress(progress); });
+}
+
+void ScanSession::OnProgress(const ScanProgress& progress) {
+  heartbeat_s_ = SteadySeconds();
+  update_.frames = outcome_.frames = progress.frames;
+  update_.frames_tracked = outcome_.frames_tracked = progress.frames_tracked;
+  update_.frames_dropped = outcome_.frames_dropped = progress.frames_dropped;
+  if (progress.tracking != nullptr && progress.frame != nullptr) {
+    update_.guidance = guide_.Add(*progress.frame, *progress.tracking);
+    outcome_.swept_area_m2 = update_.guidance.area_m2;
+    if (update_.guidance.without_new_area_s >= job_.stop_after_s && !std::exchange(told_complete_, true)) callbacks_.sweep_complete();
+  }
+  Tell(std::string(progress.step), progress.fraction);
+}
+
+/// Tells at most ten times a second, but each new step and the first frame at once.
+void ScanSession::Tell(std::string step, double fraction) {
+  const double now_s = SteadySeconds();
+  heartbeat_s_ = now_s;
+  if (step == update_.step && now_s - told_s_ < kUpdateEvery_s) return;
+  told_s_ = now_s;
+  update_.step = std::move(step);
+  update_.fraction = fraction;
+  if (callbacks_.update) callbacks_.update(update_);
+}
+
+void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
+  ThrowIfStopped(stop);
+  Tell("saving", 0.0);
+  // The scene goes to the disk while it is compared.
+  std::future<void> writing = std::async(std::launch::async, [&] { WriteScene(scene, job_.folder / "scene"); });
+  std::optional<Comparison> comparison;
+  ResultPictures pictures;
+  if (!job_.reference_scene.empty()) {
+    Tell("comparing", 0.0);
+    const Scene reference = ReadScene(job_.reference_scene);
+    ThrowIfStopped(stop);
+    comparison = Compare(reference, scene, job_.compare);
+    ThrowIfStopped(stop);
+    pictures = DrawResult(*comparison, reference.height_map ? &*reference.height_map : nullptr,
+                          {.tolerance_m = job_.compare.shift_tolerance_m, .subtitle = PictureSubtitle(*comparison)});
+    Tell("saving", 0.5);
+  }
+  writing.get();
+  if (!comparison) return;
+  ThrowIfStopped(stop);
+  WriteResult(*comparison, pictures, job_.folder / "result");
+  outcome_.result_json = ResultJson(*comparison);
+  outcome_.verdict = comparison->verdict;
+}
+
+}  // namespace plumb

@@ -1,0 +1,99 @@
+// One scan, from its first live frame to what is stored: the tracking thread and what it tells.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
+
+#include "algo/comparison/comparison.hpp"
+#include "algo/reconstruction/reconstructor.hpp"
+#include "daemon/live_feed.hpp"
+#include "daemon/sweep_guidance.hpp"
+
+namespace plumb {
+
+/// What a scan is made for.
+struct ScanJob {
+  StreamInfo info;  ///< Of the sensor.
+  ReconstructorOptions reconstructor;
+  CompareOptions compare;
+  GuidanceOptions guidance;
+  std::filesystem::path reference_scene;  ///< SCENE to compare with; empty: none.
+  std::filesystem::path folder;           ///< Where `scene`, `result` and `recording` are written; its parent exists.
+  bool keep_recording = false;
+  std::size_t queue_capacity = 15;  ///< Frames that may wait for tracking: half a second.
+  double stop_after_s = 10.0;       ///< Without new coverage: the sweep is complete.
+};
+
+/// How far it is; for the light, the page and `watch`.
+struct ScanUpdate {
+  std::string step;       ///< "tracking", then what the reconstruction names, "comparing", "saving".
+  double fraction = 0.0;  ///< Of this step.
+  std::int64_t frames = 0;
+  std::int64_t frames_tracked = 0;
+  std::int64_t frames_dropped = 0;
+  SweepGuidance guidance;
+};
+
+/// How it ended.
+struct ScanOutcome {
+  enum class Kind { kDone, kNoScene, kCancelled, kFailed };
+  Kind kind = Kind::kFailed;
+  std::string reason;       ///< kNoScene: why the frames make no scene. kFailed: what broke.
+  std::string result_json;  ///< kDone with a reference: as result.json.
+  std::optional<Verdict> verdict;
+  std::int64_t frames = 0, frames_tracked = 0, frames_dropped = 0;
+  double swept_area_m2 = 0.0;
+  double after_last_frame_s = 0.0;  ///< Until everything was written.
+};
+
+/// Called on the tracking thread; they post to the loop.
+struct ScanCallbacks {
+  std::function<void(const ScanUpdate&)> update;
+  std::function<void()> sweep_complete;  ///< No new coverage for long enough; once.
+  /// Stores what kDone left in the folder, still on the tracking thread. May throw IoError: the scan has then failed.
+  std::function<void(ScanOutcome&)> save;
+  std::function<void(const ScanOutcome&)> ended;  ///< Last; exactly once.
+};
+
+/// Starts with its construction. The sensor thread pushes into feed(); closing the feed ends the sweep. The owner's functions
+/// are called from one thread (the loop's); the destructor cancels and waits.
+class ScanSession {
+ public:
+  ScanSession(ScanJob job, ScanCallbacks callbacks);
+  ~ScanSession();
+  ScanSession(const ScanSession&) = delete;
+  ScanSession& operator=(const ScanSession&) = delete;
+
+  [[nodiscard]] const std::shared_ptr<LiveFeed>& feed() const { return feed_; }
+  /// Discards the scan; `ended` follows with kCancelled, mostly within 100 ms. Does not wait.
+  void Cancel();
+  /// Steady seconds at which the tracking thread last got on. While it waits for a frame that is the last one's arrival.
+  [[nodiscard]] double heartbeat_s() const { return heartbeat_s_; }
+
+ private:
+  void Run(const std::stop_token& stop);
+  [[nodiscard]] Scene Track(const std::stop_token& stop);
+  void Evaluate(const Scene& scene, const std::stop_token& stop);
+  void OnProgress(const struct ScanProgress& progress);
+  void Tell(std::string step, double fraction);
+
+  ScanJob job_;
+  ScanCallbacks callbacks_;
+  std::shared_ptr<LiveFeed> feed_;
+  SweepGuide guide_;
+  ScanUpdate update_;
+  ScanOutcome outcome_;
+  bool told_complete_ = false;
+  double told_s_ = 0.0;
+  std::atomic<double> heartbeat_s_;
+  std::jthread thread_;  // last: starts when everything above is there
+};
+
+}  // namespace plumb

@@ -1,0 +1,229 @@
+#include "daemon/sensor_thread.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <stop_token>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "algo/types/errors.hpp"
+
+namespace plumb {
+
+using Clock = std::chrono::steady_clock;
+
+/// Everything in it belongs to the sensor thread, but what the mutex guards and the atomics.
+struct SensorThread::Impl {
+  Impl(std::function<std::unique_ptr<SensorProvider>()> make, SensorThreadOptions its_options, std::function<void(const SensorEvent&)> tell)
+      : make_provider(std::move(make)), options(std::move(its_options)), notify(std::move(tell)), retry(options.first_retry) {
+    thread = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+  }
+  ~Impl() {
+    thread.request_stop();
+    {
+      const std::lock_guard lock(mutex);
+      if (sensor) sensor->Interrupt();
+    }
+    thread.join();
+  }
+
+  const std::function<std::unique_ptr<SensorProvider>()> make_provider;
+  const SensorThreadOptions options;
+  const std::function<void(const SensorEvent&)> notify;
+
+  mutable std::mutex mutex;
+  std::condition_variable_any changed;
+  bool bus_changed = true;             // guarded: the provider's listener spoke
+  std::shared_ptr<LiveFeed> wanted;    // guarded: where the frames shall go
+  std::shared_ptr<LiveSensor> sensor;  // guarded for others: written by the sensor thread only
+  SensorSnapshot current;              // guarded
+  std::optional<Frame> newest;         // guarded
+  std::atomic<double> heartbeat = SteadySeconds();
+
+  std::unique_ptr<SensorProvider> provider;
+  std::shared_ptr<LiveFeed> feed;  // where the frames go
+  bool ready = false;              // kReady was told for this sensor
+  std::optional<SensorEvent::Kind> told;
+  std::string told_reason;
+  std::chrono::milliseconds retry;
+  std::optional<Clock::time_point> retry_at;
+  std::jthread thread;  // last: starts when everything above is there
+
+  void Run(const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      heartbeat = SteadySeconds();
+      try {
+        if (!provider) MakeProvider();
+        if (!sensor) Find();
+        if (sensor) {
+          Read(stop);
+        } else {
+          Wait(stop);
+        }
+      } catch (const DeviceLost&) {
+        Drop();
+        {
+          const std::lock_guard lock(mutex);
+          bus_changed = true;  // another one may be there already
+        }
+        Tell(SensorEvent::Kind::kLost, {});
+      } catch (const std::exception& error) {
+        Drop();
+        Tell(SensorEvent::Kind::kFailed, error.what());
+        retry_at = Clock::now() + retry;
+        retry = std::min(2 * retry, options.last_retry);
+      }
+    }
+    Drop();
+    provider.reset();
+  }
+
+  void MakeProvider() {
+    if (retry_at && Clock::now() < *retry_at) return;
+    provider = make_provider();
+    provider->SetListener([this] {
+      const std::lock_guard lock(mutex);
+      bus_changed = true;
+      changed.notify_all();
+    });
+  }
+
+  /// Opens a sensor if one is there and the time has come; tells that there is none.
+  void Find() {
+    if (!provider) return;
+    {
+      const std::lock_guard lock(mutex);
+      const bool retry_is_due = retry_at && Clock::now() >= *retry_at;
+      if (!bus_changed && !retry_is_due) return;
+      bus_changed = false;
+    }
+    const std::vector<SensorDescription> attached = provider->List();
+    const auto match = std::find_if(attached.begin(), attached.end(), [&](const SensorDescription& sensor_there) {
+      return options.serial.empty() || sensor_there.serial == options.serial;
+    });
+    if (match == attached.end()) {
+      retry_at.reset();
+      retry = options.first_retry;
+      if (attached.empty() || options.serial.empty()) {
+        Tell(SensorEvent::Kind::kLost, {});
+      } else {
+        Tell(SensorEvent::Kind::kFailed, fmt::format("the sensor {} is not attached, but {} is: attach the configured one or change "
+                                                     "appliance.sensor_serial",
+                                                     options.serial, attached.front().serial));
+      }
+      return;
+    }
+    retry_at.reset();
+    std::shared_ptr<LiveSensor> opened = provider->Open(match->serial);
+    const std::lock_guard lock(mutex);
+    sensor = std::move(opened);
+    ready = false;
+    current = {.present = false, .sensor = sensor->description(), .statistics = {}, .info = sensor->info()};
+  }
+
+  void Wait(const std::stop_token& stop) {
+    std::unique_lock lock(mutex);
+    const Clock::time_point heartbeat_due = Clock::now() + std::chrono::milliseconds(500);
+    const Clock::time_point until = retry_at ? std::min(*retry_at, heartbeat_due) : heartbeat_due;
+    changed.wait_until(lock, stop, until, [this] { return bus_changed; });
+  }
+
+  void Read(const std::stop_token& stop) {
+    SwitchFeed();
+    std::optional<Frame> frame = sensor->Next();
+    if (!frame) {
+      if (!stop.stop_requested()) throw DeviceError("the sensor's stream ended");
+      return;
+    }
+    heartbeat = SteadySeconds();
+    bool is_new = false;
+    {
+      const std::lock_guard lock(mutex);
+      current.present = true;
+      current.statistics = sensor->statistics();
+      newest = *frame;
+      if (wanted != feed) return;  // a scan began or ended while this frame was on its way
+      is_new = !std::exchange(ready, true);
+    }
+    if (feed) feed->Push(std::move(*frame));
+    if (is_new) {
+      retry = options.first_retry;
+      Tell(SensorEvent::Kind::kReady, {});
+    }
+  }
+
+  void SwitchFeed() {
+    std::shared_ptr<LiveFeed> next;
+    {
+      const std::lock_guard lock(mutex);
+      next = wanted;
+    }
+    if (next == feed) return;
+    feed = next;
+    sensor->LockExposure(feed != nullptr);
+    if (!feed) return;
+    if (options.before_scan) options.before_scan();
+    sensor->Flush();
+  }
+
+  void Drop() {
+    feed.reset();
+    std::shared_ptr<LiveSensor> gone;
+    const std::lock_guard lock(mutex);
+    gone = std::move(sensor);
+    sensor.reset();
+    current.present = false;
+    newest.reset();
+  }
+
+  void Tell(SensorEvent::Kind kind, const std::string& reason) {
+    if (told == kind && told_reason == reason && kind != SensorEvent::Kind::kReady) return;
+    told = kind;
+    told_reason = reason;
+    SensorEvent event{.kind = kind, .sensor = {}, .reason = reason};
+    {
+      const std::lock_guard lock(mutex);
+      if (kind == SensorEvent::Kind::kLost) current = {};
+      event.sensor = current.sensor;
+    }
+    notify(event);
+  }
+};
+
+SensorThread::SensorThread(std::function<std::unique_ptr<SensorProvider>()> make_provider, SensorThreadOptions options,
+                           std::function<void(const SensorEvent&)> notify)
+    : impl_(std::make_unique<Impl>(std::move(make_provider), std::move(options), std::move(notify))) {}
+
+SensorThread::~SensorThread() = default;
+
+void SensorThread::BeginScan(std::shared_ptr<LiveFeed> feed) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->wanted = std::move(feed);
+}
+
+void SensorThread::EndScan() {
+  std::shared_ptr<LiveFeed> feed;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    feed = std::exchange(impl_->wanted, nullptr);
+  }
+  if (feed) feed->Close();
+}
+
+SensorSnapshot SensorThread::snapshot() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->current;
+}
+
+std::optional<Frame> SensorThread::latest() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->newest;
+}
+
+double SensorThread::heartbeat_s() const { return impl_->heartbeat; }
+
+}  // namespace plumb

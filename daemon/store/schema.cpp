@@ -1,0 +1,101 @@
+#include "daemon/store/schema.hpp"
+
+#include <array>
+
+#include <fmt/format.h>
+
+namespace plumb {
+namespace {
+
+// Times are microseconds since 1970, UTC. Order comes from ids, which only count up: clocks step.
+constexpr const char* kVersion1 = R"sql(
+CREATE TABLE patients (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  code TEXT NOT NULL UNIQUE,
+  site TEXT NOT NULL,
+  created_at INTEGER NOT NULL,
+  wiping INTEGER NOT NULL DEFAULT 0
+) STRICT;
+CREATE TABLE scans (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  patient_id INTEGER NOT NULL REFERENCES patients(id) ON DELETE CASCADE,
+  reference_id INTEGER REFERENCES refs(id) ON DELETE SET NULL,
+  purpose TEXT NOT NULL CHECK (purpose IN ('fraction', 'reference', 'daily_check')),
+  outcome TEXT NOT NULL CHECK (outcome IN ('running', 'done', 'cancelled', 'failed')),
+  failure TEXT NOT NULL DEFAULT '',
+  started_at INTEGER NOT NULL,
+  finished_at INTEGER,
+  sensor_serial TEXT NOT NULL,
+  swept_area_m2 REAL NOT NULL DEFAULT 0,
+  reason TEXT NOT NULL DEFAULT '',
+  accepted_by TEXT NOT NULL DEFAULT '',
+  has_folder INTEGER NOT NULL DEFAULT 0
+) STRICT;
+CREATE INDEX scans_of_patient ON scans(patient_id, id);
+CREATE TABLE results (
+  scan_id INTEGER PRIMARY KEY REFERENCES scans(id) ON DELETE CASCADE,
+  json TEXT NOT NULL
+) STRICT;
+CREATE TABLE refs (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  patient_id INTEGER NOT NULL REFERENCES patients(id) ON DELETE CASCADE,
+  version INTEGER NOT NULL,
+  scan_id INTEGER NOT NULL REFERENCES scans(id),
+  created_at INTEGER NOT NULL,
+  created_by TEXT NOT NULL,
+  planned_by TEXT NOT NULL,
+  reason TEXT NOT NULL,
+  plan TEXT NOT NULL,
+  approved_by TEXT NOT NULL DEFAULT '',
+  approved_at INTEGER,
+  UNIQUE (patient_id, version)
+) STRICT;
+CREATE TRIGGER refs_immutable BEFORE UPDATE ON refs WHEN OLD.approved_by <> ''
+  BEGIN SELECT RAISE(ABORT, 'an approved reference is never changed'); END;
+CREATE TRIGGER refs_stay BEFORE DELETE ON refs
+  WHEN OLD.approved_by <> '' AND EXISTS (SELECT 1 FROM patients WHERE id = OLD.patient_id AND wiping = 0)
+  BEGIN SELECT RAISE(ABORT, 'an approved reference goes only with its patient'); END;
+CREATE TABLE users (
+  name TEXT PRIMARY KEY,
+  role TEXT NOT NULL CHECK (role IN ('technician', 'physicist', 'engineer')),
+  password_hash TEXT NOT NULL,
+  disabled INTEGER NOT NULL DEFAULT 0,
+  created_at INTEGER NOT NULL
+) STRICT;
+CREATE TABLE audit (
+  number INTEGER PRIMARY KEY AUTOINCREMENT,
+  time INTEGER NOT NULL,
+  user TEXT NOT NULL,
+  address TEXT NOT NULL,
+  action TEXT NOT NULL,
+  subject TEXT NOT NULL,
+  detail TEXT NOT NULL
+) STRICT;
+CREATE TRIGGER audit_no_update BEFORE UPDATE ON audit BEGIN SELECT RAISE(ABORT, 'the audit log is append-only'); END;
+CREATE TRIGGER audit_no_delete BEFORE DELETE ON audit BEGIN SELECT RAISE(ABORT, 'the audit log is append-only'); END;
+CREATE TABLE settings (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
+)sql";
+
+constexpr std::array<const char*, kSchemaVersion> kSteps = {kVersion1};
+
+}  // namespace
+
+void Migrate(Database& database) {
+  int version = 0;
+  {
+    Statement query = database.Prepare("PRAGMA user_version");
+    if (query.Step()) version = static_cast<int>(query.Integer(0));
+  }
+  if (version < 0 || version > kSchemaVersion) {
+    throw DatabaseCorrupt(
+        fmt::format("the database has version {}, this Plumb knows up to {}: install the newer Plumb again", version, kSchemaVersion));
+  }
+  for (; version < kSchemaVersion; ++version) {
+    Transaction transaction(database);
+    database.Execute(kSteps[static_cast<std::size_t>(version)]);
+    database.Execute(fmt::format("PRAGMA user_version = {}", version + 1));
+    transaction.Commit();
+  }
+}
+
+}  // namespace plumb

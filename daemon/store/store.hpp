@@ -1,0 +1,128 @@
+// What the appliance keeps: patients, references, scans, results, accounts, the audit log. SQLite beside folders of files.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "daemon/store/database.hpp"
+#include "web/scan_service.hpp"
+
+namespace plumb {
+
+/// A change that the store does not make, and why; for the person who asked.
+class StoreRefusal : public std::runtime_error {
+ public:
+  StoreRefusal(web::ChangeResult result, const std::string& message) : std::runtime_error(message), result_(result) {}
+  [[nodiscard]] web::ChangeResult result() const { return result_; }
+
+ private:
+  web::ChangeResult result_;
+};
+
+/// What a start found after a crash, and put right.
+struct RecoveryReport {
+  int interrupted_scans = 0;  ///< Had begun and not ended: failed now.
+  int orphaned_folders = 0;   ///< Of no finished scan: removed.
+  int lost_scans = 0;         ///< Finished, but their files are gone: marked.
+  int broken_references = 0;  ///< Approved, but their scene is gone: to be told loudly.
+};
+
+/// What a scan begins with.
+struct NewScan {
+  std::string patient_id;
+  std::string reference_id;  ///< Empty: none.
+  web::ScanPurpose purpose = web::ScanPurpose::kFraction;
+  std::string sensor_serial;
+  std::string reason;  ///< Why a new reference is taken.
+};
+
+/// How it ended.
+struct FinishedScan {
+  web::ScanOutcome outcome = web::ScanOutcome::kFailed;
+  std::string failure;
+  std::string result_json;  ///< Empty: nothing was compared.
+  double swept_area_m2 = 0.0;
+};
+
+/// DIR/plumb.db and DIR/scans/<id>/. A scan's files are made in a hidden staging folder and appear under their id in one step; its row says
+/// `done` only after that, so a crash at any point leaves either a whole scan or none. Changes and their audit entries
+/// are one transaction.
+///
+/// Thread-safe: changes take turns; reads use a connection of their own and never wait for the disk writes of a change.
+/// Changes throw StoreRefusal, and IoError with its kinds when the disk or the database fails.
+class Store {
+ public:
+  /// Opens or makes the store, checks and migrates the database, recovers from a crash.
+  /// @throws IoError and its kinds: DatabaseCorrupt, DiskRefused.
+  explicit Store(const std::filesystem::path& folder);
+
+  [[nodiscard]] const RecoveryReport& recovery() const { return recovery_; }
+  [[nodiscard]] std::filesystem::path ScanFolder(const std::string& scan_id) const;
+
+  // --- patients
+  [[nodiscard]] std::vector<web::Patient> Patients();
+  [[nodiscard]] std::optional<web::Patient> FindPatient(const std::string& id);
+  [[nodiscard]] std::optional<web::Patient> FindPatientByCode(const std::string& code);
+  std::string AddPatient(const web::Actor& actor, const std::string& code, const std::string& site);
+  void WipePatient(const web::Actor& actor, const std::string& id);
+
+  // --- references
+  [[nodiscard]] std::vector<web::Reference> References(const std::string& patient_id);
+  [[nodiscard]] std::optional<web::Reference> FindReference(const std::string& id);
+  [[nodiscard]] std::optional<web::Reference> ApprovedReference(const std::string& patient_id);
+  std::string AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason, const web::ReferencePlan& plan);
+  std::string PlanReference(const web::Actor& actor, const std::string& id, const web::ReferencePlan& plan);
+  /// @param two_users  The approver must be another than who made or planned it; false only for the demo's "auto".
+  void ApproveReference(const web::Actor& actor, const std::string& id, bool two_users = true);
+
+  // --- scans
+  [[nodiscard]] std::vector<web::Scan> Scans(const std::string& patient_id, int limit);
+  [[nodiscard]] std::optional<web::Scan> FindScan(const std::string& id);
+  [[nodiscard]] int ScansSince(const std::string& patient_id, web::WallClock::time_point since);
+  /// Surface seen by a scan's sweep; 0 unknown.
+  [[nodiscard]] double SweptArea(const std::string& scan_id);
+  /// A row that says `running`, and an empty staging folder. Gives the id.
+  std::string BeginScan(const NewScan& scan);
+  [[nodiscard]] std::filesystem::path StagingFolder(const std::string& scan_id) const;
+  /// kDone: the staging folder becomes the scan's. Else it is removed.
+  void FinishScan(const std::string& scan_id, const FinishedScan& finished);
+  void AcceptScan(const web::Actor& actor, const std::string& id);
+  /// Removes scans older than so many days (0: none) but those that references are made of. Gives how many.
+  int RemoveOldScans(int retention_days);
+  /// Removes the oldest recordings, then the oldest scans as above, until the scans take at most so many bytes. Gives how many scans lost
+  /// something.
+  int KeepWithinQuota(std::uint64_t max_bytes);
+
+  // --- accounts, log, settings
+  [[nodiscard]] std::vector<web::User> Users();
+  [[nodiscard]] std::optional<web::User> FindUser(const std::string& name);
+  void AddUser(const web::Actor& actor, const web::User& user);
+  void ChangeUser(const web::Actor& actor, const web::User& user);
+  void Log(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail);
+  [[nodiscard]] std::vector<web::AuditEntry> Audit(std::int64_t before, int limit);
+  [[nodiscard]] web::Settings GetSettings();
+  void ChangeSettings(const web::Actor& actor, const web::Settings& settings);
+
+ private:
+  void Recover();
+  void CollectOrphans();
+  void Write(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail);
+  void RemoveScanFiles(const std::string& scan_id);
+  [[nodiscard]] std::vector<std::string> RemovableScans(const char* sql, std::int64_t parameter);
+  void ForgetScan(const std::string& scan_id);
+
+  std::filesystem::path folder_;
+  std::mutex write_mutex_;
+  std::unique_ptr<Database> write_;
+  std::mutex read_mutex_;
+  std::unique_ptr<Database> read_;
+  RecoveryReport recovery_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,136 @@
+// Accounts, the audit log, settings.
+#include <fmt/format.h>
+
+#include "daemon/store/store.hpp"
+#include "daemon/store/store_internal.hpp"
+#include "daemon/store/store_json.hpp"
+
+namespace plumb {
+
+using store::FromStored;
+using store::ToStored;
+using web::ChangeResult;
+
+namespace {
+
+web::User ReadUser(const Statement& row) {
+  return {.name = row.Text(0),
+          .role = store::ParseRole(row.Text(1)),
+          .password_hash = row.Text(2),
+          .disabled = row.Integer(3) != 0,
+          .created_at = FromStored(row.Integer(4))};
+}
+
+}  // namespace
+
+std::vector<web::User> Store::Users() {
+  const std::lock_guard lock(read_mutex_);
+  Statement query = read_->Prepare("SELECT name, role, password_hash, disabled, created_at FROM users ORDER BY name LIMIT 1000");
+  std::vector<web::User> users;
+  while (query.Step()) users.push_back(ReadUser(query));
+  return users;
+}
+
+std::optional<web::User> Store::FindUser(const std::string& name) {
+  const std::lock_guard lock(read_mutex_);
+  Statement query = read_->Prepare("SELECT name, role, password_hash, disabled, created_at FROM users WHERE name = ?");
+  return query.Bind(name).Step() ? std::optional(ReadUser(query)) : std::nullopt;
+}
+
+void Store::AddUser(const web::Actor& actor, const web::User& user) {
+  const std::lock_guard lock(write_mutex_);
+  Transaction transaction(*write_);
+  try {
+    write_->Prepare("INSERT INTO users (name, role, password_hash, disabled, created_at) VALUES (?, ?, ?, ?, ?)")
+        .Bind(user.name)
+        .Bind(store::Name(user.role))
+        .Bind(user.password_hash)
+        .Bind(std::int64_t{user.disabled})
+        .Bind(ToStored(web::WallClock::now()))
+        .Run();
+  } catch (const ConstraintBroken&) {
+    throw StoreRefusal(ChangeResult::kConflict, "there is an account of this name already: choose another name");
+  }
+  Write(actor, "user.add", user.name, store::Name(user.role));
+  transaction.Commit();
+}
+
+void Store::ChangeUser(const web::Actor& actor, const web::User& user) {
+  const std::lock_guard lock(write_mutex_);
+  Transaction transaction(*write_);
+  std::string changes;
+  {
+    Statement query = write_->Prepare("SELECT role, password_hash, disabled FROM users WHERE name = ?");
+    if (!query.Bind(user.name).Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such account");
+    if (query.Text(0) != store::Name(user.role)) changes += fmt::format("role {} ", store::Name(user.role));
+    if (query.Text(1) != user.password_hash) changes += "password ";
+    if ((query.Integer(2) != 0) != user.disabled) changes += user.disabled ? "disabled " : "enabled ";
+  }
+  write_->Prepare("UPDATE users SET role = ?, password_hash = ?, disabled = ? WHERE name = ?")
+      .Bind(store::Name(user.role))
+      .Bind(user.password_hash)
+      .Bind(std::int64_t{user.disabled})
+      .Bind(user.name)
+      .Run();
+  {
+    Statement query = write_->Prepare("SELECT 1 FROM users WHERE role = 'engineer' AND disabled = 0 LIMIT 1");
+    if (!query.Step()) throw StoreRefusal(ChangeResult::kConflict, "no enabled engineer would be left: make another one first");
+  }
+  if (!changes.empty()) changes.pop_back();
+  Write(actor, "user.change", user.name, changes);
+  transaction.Commit();
+}
+
+void Store::Log(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) {
+  const std::lock_guard lock(write_mutex_);
+  Write(actor, action, subject, detail);
+}
+
+/// Within a transaction, or as one of its own.
+void Store::Write(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) {
+  write_->Prepare("INSERT INTO audit (time, user, address, action, subject, detail) VALUES (?, ?, ?, ?, ?, ?)")
+      .Bind(ToStored(web::WallClock::now()))
+      .Bind(actor.user)
+      .Bind(actor.address)
+      .Bind(action)
+      .Bind(subject)
+      .Bind(detail)
+      .Run();
+}
+
+std::vector<web::AuditEntry> Store::Audit(std::int64_t before, int limit) {
+  const std::lock_guard lock(read_mutex_);
+  Statement query = read_->Prepare(
+      "SELECT number, time, user, address, action, subject, detail FROM audit WHERE ?1 <= 0 OR number < ?1 ORDER BY number DESC LIMIT ?2");
+  query.Bind(before).Bind(std::int64_t{limit});
+  std::vector<web::AuditEntry> entries;
+  while (query.Step()) {
+    entries.push_back({.number = query.Integer(0),
+                       .time = FromStored(query.Integer(1)),
+                       .user = query.Text(2),
+                       .address = query.Text(3),
+                       .action = query.Text(4),
+                       .subject = query.Text(5),
+                       .detail = query.Text(6)});
+  }
+  return entries;
+}
+
+web::Settings Store::GetSettings() {
+  const std::lock_guard lock(read_mutex_);
+  Statement query = read_->Prepare("SELECT value FROM settings WHERE name = 'settings'");
+  return query.Step() ? ParseSettings(query.Text(0)) : web::Settings{};
+}
+
+void Store::ChangeSettings(const web::Actor& actor, const web::Settings& settings) {
+  const std::lock_guard lock(write_mutex_);
+  Transaction transaction(*write_);
+  const std::string text = SettingsJson(settings);
+  write_->Prepare("INSERT INTO settings (name, value) VALUES ('settings', ?1) ON CONFLICT (name) DO UPDATE SET value = ?1")
+      .Bind(text)
+      .Run();
+  Write(actor, "settings.change", "", text);
+  transaction.Commit();
+}
+
+}  // namespace plumb

@@ -1,0 +1,79 @@
+// Opening the store, and what a crash left behind.
+#include <set>
+
+#include <fmt/format.h>
+
+#include "daemon/files/scene_folder.hpp"
+#include "daemon/store/schema.hpp"
+#include "daemon/store/store.hpp"
+#include "daemon/store/store_internal.hpp"
+#include "drivers/replay/file_io.hpp"
+
+namespace plumb {
+
+namespace fs = std::filesystem;
+using store::ScanId;
+
+Store::Store(const fs::path& folder) : folder_(fs::absolute(folder)) {
+  std::error_code error;
+  fs::create_directories(folder_ / "scans", error);
+  if (error) throw DiskRefused(DescribeWriteError(folder_ / "scans", error.value()));
+  write_ = std::make_unique<Database>(folder_ / "plumb.db", Database::Access::kReadWrite);
+  write_->CheckIntegrity();
+  Migrate(*write_);
+  read_ = std::make_unique<Database>(folder_ / "plumb.db", Database::Access::kReadOnly);
+  Recover();
+}
+
+void Store::Recover() {
+  const std::lock_guard lock(write_mutex_);
+  {
+    Transaction transaction(*write_);
+    write_
+        ->Prepare(
+            "UPDATE scans SET outcome = 'failed', failure = 'interrupted: the appliance was switched off', has_folder = 0"
+            " WHERE outcome = 'running'")
+        .Run();
+    recovery_.interrupted_scans = write_->num_changed();
+    transaction.Commit();
+  }
+  std::vector<std::int64_t> lost;
+  {
+    Statement query = write_->Prepare("SELECT id FROM scans WHERE has_folder = 1 ORDER BY id");
+    while (query.Step()) {
+      if (!IsSceneFolder(ScanFolder(ScanId(query.Integer(0))) / "scene")) lost.push_back(query.Integer(0));
+    }
+  }
+  for (const std::int64_t id : lost) {
+    Statement query = write_->Prepare("SELECT 1 FROM refs WHERE scan_id = ? AND approved_by <> '' LIMIT 1");
+    if (query.Bind(id).Step()) {
+      ++recovery_.broken_references;  // its row stays as it is: a backup of the files makes it whole again
+      continue;
+    }
+    write_->Prepare("UPDATE scans SET has_folder = 0, failure = 'its files are gone' WHERE id = ?").Bind(id).Run();
+    ++recovery_.lost_scans;
+  }
+  CollectOrphans();
+}
+
+void Store::CollectOrphans() {
+  std::set<std::string> known;
+  {
+    Statement query = write_->Prepare("SELECT id FROM scans WHERE has_folder = 1");
+    while (query.Step()) known.insert(ScanId(query.Integer(0)));
+  }
+  std::vector<fs::path> orphans;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder_ / "scans", error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    const bool is_ours = store::ParseId(name).has_value() || name.starts_with(".staging-");
+    if (is_ours && !known.contains(name)) orphans.push_back(entry->path());
+  }
+  for (const fs::path& orphan : orphans) {
+    std::error_code ignored;
+    fs::remove_all(orphan, ignored);
+    ++recovery_.orphaned_folders;
+  }
+}
+
+}  // namespace plumb

@@ -1,0 +1,236 @@
+// Scans and their folders: how they begin, end, are accepted and removed.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+
+#include <fmt/format.h>
+
+#include "daemon/store/store.hpp"
+#include "daemon/store/store_internal.hpp"
+#include "daemon/store/store_json.hpp"
+#include "drivers/replay/file_io.hpp"
+
+namespace plumb {
+
+namespace fs = std::filesystem;
+using store::FromStored;
+using store::ParseId;
+using store::ScanId;
+using store::ToStored;
+using web::ChangeResult;
+
+namespace {
+
+constexpr const char* kScanColumns =
+    "SELECT scans.id, patient_id, reference_id, purpose, outcome, failure, started_at, finished_at, accepted_by, has_folder, results.json"
+    " FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
+
+web::Scan ReadScan(const Statement& row, const Store& store) {
+  web::Scan scan{.id = ScanId(row.Integer(0)),
+                 .patient_id = row.Text(1),
+                 .reference_id = row.Text(2),
+                 .purpose = store::ParsePurpose(row.Text(3)),
+                 .outcome = store::ParseOutcome(row.Text(4)),
+                 .failure = row.Text(5),
+                 .started_at = FromStored(row.Integer(6)),
+                 .finished_at = {},
+                 .result = {},
+                 .accepted_by = row.Text(8),
+                 .folder = {}};
+  if (!row.IsNull(7)) scan.finished_at = FromStored(row.Integer(7));
+  if (row.Integer(9) != 0) scan.folder = store.ScanFolder(scan.id);
+  if (!row.IsNull(10)) scan.result = SummaryOf(row.Text(10));
+  return scan;
+}
+
+void SyncFolder(const fs::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) throw DiskRefused(DescribeWriteError(folder, errno));
+  const int result = ::fsync(descriptor);
+  const int error = errno;
+  ::close(descriptor);
+  if (result != 0 && error != EINVAL) throw DiskRefused(DescribeWriteError(folder, error));
+}
+
+std::uint64_t BytesOf(const fs::path& folder) {
+  std::uint64_t bytes = 0;
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    std::error_code ignored;
+    if (entry->is_regular_file(ignored)) bytes += entry->file_size(ignored);
+  }
+  return bytes;
+}
+
+}  // namespace
+
+fs::path Store::ScanFolder(const std::string& scan_id) const { return folder_ / "scans" / scan_id; }
+fs::path Store::StagingFolder(const std::string& scan_id) const { return folder_ / "scans" / (".staging-" + scan_id); }
+
+std::vector<web::Scan> Store::Scans(const std::string& patient_id, int limit) {
+  std::vector<web::Scan> scans;
+  const std::optional<std::int64_t> number = ParseId(patient_id);
+  if (!number && !patient_id.empty()) return scans;
+  const std::lock_guard lock(read_mutex_);
+  static const std::string kAll = std::string(kScanColumns) + "ORDER BY scans.id DESC LIMIT ?";
+  static const std::string kOfPatient = std::string(kScanColumns) + "WHERE patient_id = ? ORDER BY scans.id DESC LIMIT ?";
+  Statement query = read_->Prepare(number ? kOfPatient.c_str() : kAll.c_str());
+  if (number) query.Bind(*number);
+  query.Bind(std::int64_t{limit});
+  while (query.Step()) scans.push_back(ReadScan(query, *this));
+  return scans;
+}
+
+std::optional<web::Scan> Store::FindScan(const std::string& id) {
+  const std::optional<std::int64_t> number = ParseId(id);
+  if (!number) return std::nullopt;
+  const std::lock_guard lock(read_mutex_);
+  static const std::string kSql = std::string(kScanColumns) + "WHERE scans.id = ?";
+  Statement query = read_->Prepare(kSql.c_str());
+  return query.Bind(*number).Step() ? std::optional(ReadScan(query, *this)) : std::nullopt;
+}
+
+int Store::ScansSince(const std::string& patient_id, web::WallClock::time_point since) {
+  const std::optional<std::int64_t> number = ParseId(patient_id);
+  if (!number) return 0;
+  const std::lock_guard lock(read_mutex_);
+  Statement query = read_->Prepare("SELECT count(*) FROM scans WHERE patient_id = ? AND outcome = 'done' AND started_at >= ?");
+  return query.Bind(*number).Bind(ToStored(since)).Step() ? static_cast<int>(query.Integer(0)) : 0;
+}
+
+double Store::SweptArea(const std::string& scan_id) {
+  const std::optional<std::int64_t> number = ParseId(scan_id);
+  if (!number) return 0.0;
+  const std::lock_guard lock(read_mutex_);
+  Statement query = read_->Prepare("SELECT swept_area_m2 FROM scans WHERE id = ?");
+  return query.Bind(*number).Step() ? query.Real(0) : 0.0;
+}
+
+std::string Store::BeginScan(const NewScan& scan) {
+  const std::lock_guard lock(write_mutex_);
+  Transaction transaction(*write_);
+  write_
+      ->Prepare(
+          "INSERT INTO scans (patient_id, reference_id, purpose, outcome, started_at, sensor_serial, reason)"
+          " VALUES (?, ?, ?, 'running', ?, ?, ?)")
+      .Bind(ParseId(scan.patient_id))
+      .Bind(ParseId(scan.reference_id))
+      .Bind(store::Name(scan.purpose))
+      .Bind(ToStored(web::WallClock::now()))
+      .Bind(scan.sensor_serial)
+      .Bind(scan.reason)
+      .Run();
+  const std::string id = ScanId(write_->last_id());
+  std::error_code error;
+  fs::remove_all(StagingFolder(id), error);
+  fs::create_directory(StagingFolder(id), error);
+  if (error) throw DiskRefused(DescribeWriteError(StagingFolder(id), error.value()));
+  transaction.Commit();
+  return id;
+}
+
+void Store::FinishScan(const std::string& scan_id, const FinishedScan& finished) {
+  const std::int64_t number = ParseId(scan_id).value_or(0);
+  const bool is_done = finished.outcome == web::ScanOutcome::kDone;
+  const std::lock_guard lock(write_mutex_);
+  if (is_done) {
+    if (::rename(StagingFolder(scan_id).c_str(), ScanFolder(scan_id).c_str()) != 0) {
+      throw DiskRefused(DescribeWriteError(ScanFolder(scan_id), errno));
+    }
+    SyncFolder(folder_ / "scans");
+  } else {
+    std::error_code ignored;
+    fs::remove_all(StagingFolder(scan_id), ignored);
+  }
+  Transaction transaction(*write_);
+  write_->Prepare("UPDATE scans SET outcome = ?, failure = ?, finished_at = ?, swept_area_m2 = ?, has_folder = ? WHERE id = ?")
+      .Bind(store::Name(finished.outcome))
+      .Bind(finished.failure)
+      .Bind(ToStored(web::WallClock::now()))
+      .Bind(finished.swept_area_m2)
+      .Bind(std::int64_t{is_done})
+      .Bind(number)
+      .Run();
+  if (!finished.result_json.empty()) {
+    write_->Prepare("INSERT INTO results (scan_id, json) VALUES (?, ?)").Bind(number).Bind(finished.result_json).Run();
+  }
+  transaction.Commit();
+}
+
+void Store::AcceptScan(const web::Actor& actor, const std::string& id) {
+  const std::optional<std::int64_t> number = ParseId(id);
+  const std::lock_guard lock(write_mutex_);
+  Transaction transaction(*write_);
+  {
+    Statement query =
+        write_->Prepare("SELECT outcome, accepted_by, (SELECT 1 FROM results WHERE scan_id = scans.id) FROM scans WHERE id = ?");
+    if (!number || !query.Bind(*number).Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
+    if (query.Text(0) != "done" || query.IsNull(2)) {
+      throw StoreRefusal(ChangeResult::kConflict, "this scan has no result: only a compared scan is accepted");
+    }
+    if (!query.Text(1).empty()) throw StoreRefusal(ChangeResult::kConflict, "this scan is accepted already");
+  }
+  write_->Prepare("UPDATE scans SET accepted_by = ? WHERE id = ?").Bind(actor.user).Bind(*number).Run();
+  Write(actor, "scan.accept", id, "");
+  transaction.Commit();
+}
+
+void Store::RemoveScanFiles(const std::string& scan_id) {
+  std::error_code ignored;  // what stays is an orphan at the next start
+  fs::remove_all(ScanFolder(scan_id), ignored);
+  fs::remove_all(StagingFolder(scan_id), ignored);
+}
+
+std::vector<std::string> Store::RemovableScans(const char* sql, std::int64_t parameter) {
+  std::vector<std::string> scans;
+  Statement query = write_->Prepare(sql);
+  query.Bind(parameter);
+  while (query.Step()) scans.push_back(ScanId(query.Integer(0)));
+  return scans;
+}
+
+void Store::ForgetScan(const std::string& scan_id) {
+  Transaction transaction(*write_);
+  write_->Prepare("DELETE FROM scans WHERE id = ?").Bind(ParseId(scan_id)).Run();
+  Write({.user = "plumbd", .address = ""}, "scan.remove", scan_id, "retention");
+  transaction.Commit();
+  RemoveScanFiles(scan_id);
+}
+
+int Store::RemoveOldScans(int retention_days) {
+  if (retention_days <= 0) return 0;
+  const std::lock_guard lock(write_mutex_);
+  const std::int64_t before = ToStored(web::WallClock::now() - std::chrono::hours(24) * retention_days);
+  const std::vector<std::string> old = RemovableScans(
+      "SELECT id FROM scans WHERE outcome <> 'running' AND started_at < ? AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id", before);
+  for (const std::string& scan : old) ForgetScan(scan);
+  return static_cast<int>(old.size());
+}
+
+int Store::KeepWithinQuota(std::uint64_t max_bytes) {
+  const std::lock_guard lock(write_mutex_);
+  std::uint64_t bytes = BytesOf(folder_ / "scans");
+  if (bytes <= max_bytes) return 0;
+  int num_touched = 0;
+  const std::vector<std::string> all = RemovableScans("SELECT id FROM scans WHERE outcome = 'done' AND has_folder >= ? ORDER BY id", 1);
+  for (const std::string& scan : all) {  // raw recordings are large, and nothing hangs on them
+    const fs::path recording = ScanFolder(scan) / "recording";
+    std::error_code ignored;
+    if (bytes <= max_bytes || !fs::exists(recording, ignored)) continue;
+    bytes -= std::min(bytes, BytesOf(recording));
+    fs::remove_all(recording, ignored);
+    ++num_touched;
+  }
+  const std::vector<std::string> removable = RemovableScans(
+      "SELECT id FROM scans WHERE outcome = 'done' AND has_folder >= ? AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id", 1);
+  for (const std::string& scan : removable) {
+    if (bytes <= max_bytes) break;
+    bytes -= std::min(bytes, BytesOf(ScanFolder(scan)));
+    ForgetScan(scan);
+    ++num_touched;
+  }
+  return num_touched;
+}
+
+}  // namespace plumb

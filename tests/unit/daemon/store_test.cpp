@@ -1,0 +1,327 @@
+// The store: its rules, and what it makes of a crash at each point.
+#include "daemon/store/store.hpp"
+
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/store/schema.hpp"
+#include "drivers/replay/file_io.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using testing::MessageOf;
+using ::testing::SizeIs;
+using web::ChangeResult;
+
+const web::Actor kAnna{.user = "anna", .address = "::1"};
+const web::Actor kBert{.user = "bert", .address = "::1"};
+const char* const kResult = R"({"verdict":"move","reasons":["vertical is off"],"correction":{"vertical_mm":6.5,"longitudinal_mm":null,)"
+                            R"("lateral_mm":-1,"pitch_deg":0.5,"roll_deg":0,"yaw_deg":2,"uncertainty":{"vertical_mm":1.2}}})";
+
+class StoreTest : public ::testing::Test {
+ protected:
+  std::unique_ptr<Store> Open() const { return std::make_unique<Store>(folder_ / "state"); }
+
+  static void FillStaging(const Store& store, const std::string& id) {
+    fs::create_directories(store.StagingFolder(id) / "scene");
+    WriteWholeFile(store.StagingFolder(id) / "scene" / "scene.json", std::string_view("{}"));
+  }
+  static std::string Scan(Store& store, const std::string& patient, const std::string& reference = "", const std::string& result = "") {
+    const std::string id =
+        store.BeginScan({.patient_id = patient, .reference_id = reference, .purpose = {}, .sensor_serial = "S1", .reason = {}});
+    FillStaging(store, id);
+    store.FinishScan(id, {.outcome = web::ScanOutcome::kDone, .failure = {}, .result_json = result, .swept_area_m2 = 2.5});
+    return id;
+  }
+  static std::string ApprovedReference(Store& store, const std::string& patient) {
+    const std::string id = store.AddReference(kAnna, Scan(store, patient), "first", {});
+    store.ApproveReference(kBert, id);
+    return id;
+  }
+  template <typename Call>
+  static ChangeResult RefusalOf(const Call& call) {
+    try {
+      call();
+    } catch (const StoreRefusal& refusal) {
+      EXPECT_STRNE(refusal.what(), "");
+      return refusal.result();
+    }
+    return ChangeResult::kDone;
+  }
+  [[nodiscard]] fs::path database() const { return folder_ / "state" / "plumb.db"; }
+
+  testing::TempFolder folder_;
+};
+
+TEST_F(StoreTest, KeepsEverythingOverARestart) {
+  std::string patient, scan;
+  {
+    const auto store = Open();
+    patient = store->AddPatient(kAnna, "P-17", "thorax");
+    const std::string reference = ApprovedReference(*store, patient);
+    scan = Scan(*store, patient, reference, kResult);
+    store->AcceptScan(kAnna, scan);
+    store->ChangeSettings(kAnna, {.tolerance = {}, .posture = "FFS", .retention_days = 30});
+  }
+  const auto store = Open();
+  EXPECT_EQ(store->recovery().interrupted_scans + store->recovery().orphaned_folders + store->recovery().lost_scans, 0);
+  const auto found = store->FindScan(scan);
+  ASSERT_TRUE(found && found->result && found->result->correction);
+  EXPECT_EQ(found->patient_id, patient);
+  EXPECT_EQ(found->accepted_by, "anna");
+  EXPECT_EQ(found->result->verdict, "move");
+  EXPECT_EQ(found->result->correction->vertical_mm, 6.5);
+  EXPECT_EQ(found->result->correction->longitudinal_mm, std::nullopt);
+  EXPECT_EQ(found->result->u95->vertical_mm, 1.2);
+  EXPECT_EQ(found->folder, store->ScanFolder(scan));
+  EXPECT_EQ(store->FindPatientByCode("P-17")->approved_reference_id, found->reference_id);
+  EXPECT_EQ(store->GetSettings().posture, "FFS");
+  EXPECT_EQ(store->GetSettings().retention_days, 30);
+  EXPECT_EQ(store->SweptArea(scan), 2.5);
+}
+
+TEST_F(StoreTest, AScanThatWasRunningAtACrashHasFailedAndLeavesNothing) {
+  std::string patient, id;
+  {
+    const auto store = Open();
+    patient = store->AddPatient(kAnna, "A", "");
+    id = store->BeginScan({.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}, .reason = {}});
+    FillStaging(*store, id);
+  }
+  const auto store = Open();
+  EXPECT_EQ(store->recovery().interrupted_scans, 1);
+  EXPECT_EQ(store->FindScan(id)->outcome, web::ScanOutcome::kFailed);
+  EXPECT_THAT(store->FindScan(id)->failure, HasSubstr("interrupted"));
+  EXPECT_TRUE(fs::is_empty(folder_ / "state" / "scans"));
+}
+
+TEST_F(StoreTest, AFolderThatAppearedJustBeforeACrashIsAnOrphan) {
+  std::string id;
+  {
+    const auto store = Open();
+    const std::string patient = store->AddPatient(kAnna, "A", "");
+    id = store->BeginScan({.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}, .reason = {}});
+    FillStaging(*store, id);
+    fs::rename(store->StagingFolder(id), store->ScanFolder(id));  // and here the power goes
+  }
+  const auto store = Open();
+  EXPECT_EQ(store->recovery().orphaned_folders, 1);
+  EXPECT_FALSE(fs::exists(store->ScanFolder(id)));
+  EXPECT_EQ(store->FindScan(id)->outcome, web::ScanOutcome::kFailed);
+}
+
+TEST_F(StoreTest, FilesThatAreNotOursAreLeftAlone) {
+  (void)Open();
+  fs::create_directories(folder_ / "state" / "scans" / "lost+found");
+  (void)Open();
+  EXPECT_TRUE(fs::exists(folder_ / "state" / "scans" / "lost+found"));
+}
+
+TEST_F(StoreTest, AScanWhoseFilesAreGoneIsMarkedAndABrokenReferenceIsTold) {
+  std::string patient, scan, reference;
+  {
+    const auto store = Open();
+    patient = store->AddPatient(kAnna, "A", "");
+    reference = ApprovedReference(*store, patient);
+    scan = Scan(*store, patient, reference, kResult);
+    fs::remove_all(store->ScanFolder(scan));
+    fs::remove_all(store->ScanFolder(store->FindReference(reference)->scan_id));
+  }
+  const auto store = Open();
+  EXPECT_EQ(store->recovery().lost_scans, 1);
+  EXPECT_EQ(store->recovery().broken_references, 1);
+  EXPECT_TRUE(store->FindScan(scan)->folder.empty());
+  EXPECT_TRUE(store->FindScan(scan)->result) << "the numbers are in the database";
+  EXPECT_EQ(store->ApprovedReference(patient)->id, reference);
+}
+
+TEST_F(StoreTest, AnApprovedReferenceIsNeverChangedButPlannedAnew) {
+  const auto store = Open();
+  const std::string patient = store->AddPatient(kAnna, "A", "");
+  const std::string first = ApprovedReference(*store, patient);
+  web::ReferencePlan plan;
+  plan.region_m = {{0, 0}, {1, 0}, {1, 1}};
+  plan.isocentre_m = {0.1, 0.2, 0.3};
+  const std::string second = store->PlanReference(kAnna, first, plan);
+  EXPECT_NE(second, first);
+  EXPECT_TRUE(store->FindReference(first)->plan.region_m.empty());
+  EXPECT_EQ(store->FindReference(second)->version, 2);
+  EXPECT_EQ(store->FindReference(second)->plan.region_m, plan.region_m);
+  EXPECT_EQ(store->FindReference(second)->plan.isocentre_m, plan.isocentre_m);
+  EXPECT_EQ(store->ApprovedReference(patient)->id, first) << "a draft is compared with by nobody";
+  EXPECT_EQ(store->PlanReference(kAnna, second, {}), second);
+  store->ApproveReference(kBert, second);
+  EXPECT_EQ(store->ApprovedReference(patient)->id, second);
+  EXPECT_EQ(store->FindPatient(patient)->approved_reference_id, second);
+
+  Database direct(database(), Database::Access::kReadWrite);  // not even somebody with the file in hand, by mistake
+  EXPECT_THROW(direct.Execute("UPDATE refs SET plan = '{}' WHERE id = " + second), ConstraintBroken);
+  EXPECT_THROW(direct.Execute("DELETE FROM refs"), ConstraintBroken);
+}
+
+TEST_F(StoreTest, NobodyApprovesTheirOwnReference) {
+  const auto store = Open();
+  const std::string patient = store->AddPatient(kAnna, "A", "");
+  const std::string draft = store->AddReference(kAnna, Scan(*store, patient), "", {});
+  EXPECT_EQ(RefusalOf([&] { store->ApproveReference(kAnna, draft); }), ChangeResult::kRefused);
+  (void)store->PlanReference(kBert, draft, {});
+  EXPECT_EQ(RefusalOf([&] { store->ApproveReference(kBert, draft); }), ChangeResult::kRefused);
+  store->ApproveReference({.user = "carl", .address = {}}, draft);
+  EXPECT_EQ(RefusalOf([&] { store->ApproveReference(kBert, draft); }), ChangeResult::kConflict);
+}
+
+TEST_F(StoreTest, RefusesWhatMakesNoSense) {
+  const auto store = Open();
+  const std::string patient = store->AddPatient(kAnna, "A", "");
+  EXPECT_EQ(RefusalOf([&] { (void)store->AddPatient(kAnna, "A", ""); }), ChangeResult::kConflict);
+  const std::string running =
+      store->BeginScan({.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}, .reason = {}});
+  EXPECT_EQ(RefusalOf([&] { (void)store->AddReference(kAnna, running, "", {}); }), ChangeResult::kConflict);
+  EXPECT_EQ(RefusalOf([&] { store->WipePatient(kAnna, patient); }), ChangeResult::kConflict);
+  EXPECT_EQ(RefusalOf([&] { store->AcceptScan(kAnna, running); }), ChangeResult::kConflict);
+  for (const char* id : {"", "0", "-1", "7x", "99", "999999999999999999999", "../1", "1; DROP TABLE scans"}) {
+    EXPECT_EQ(RefusalOf([&] { store->WipePatient(kAnna, id); }), ChangeResult::kNotFound) << id;
+    EXPECT_EQ(RefusalOf([&] { store->ApproveReference(kAnna, id); }), ChangeResult::kNotFound) << id;
+    EXPECT_EQ(RefusalOf([&] { store->AcceptScan(kAnna, id); }), ChangeResult::kNotFound) << id;
+    EXPECT_EQ(store->FindScan(id), std::nullopt) << id;
+    EXPECT_THAT(store->Scans(*id == 0 ? "x" : id, 10), SizeIs(0)) << id;
+  }
+}
+
+TEST_F(StoreTest, WipingAPatientLeavesNothingButTheAuditEntry) {
+  const auto store = Open();
+  const std::string keep = store->AddPatient(kAnna, "keep", "");
+  const std::string kept = ApprovedReference(*store, keep);
+  const std::string patient = store->AddPatient(kAnna, "SECRET-CODE-4711", "thorax");
+  const std::string scan = Scan(*store, patient, ApprovedReference(*store, patient), kResult);
+  store->WipePatient(kBert, patient);
+  EXPECT_EQ(store->FindPatient(patient), std::nullopt);
+  EXPECT_EQ(store->FindScan(scan), std::nullopt);
+  EXPECT_EQ(store->ApprovedReference(patient), std::nullopt);
+  EXPECT_FALSE(fs::exists(store->ScanFolder(scan)));
+  EXPECT_EQ(store->ApprovedReference(keep)->id, kept);
+  EXPECT_EQ(store->Audit(0, 1).at(0).action, "patient.wipe");
+  EXPECT_EQ(store->Audit(0, 1).at(0).user, "bert");
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_ / "state")) {
+    if (!entry.is_regular_file()) continue;
+    const auto bytes = ReadWholeFile(entry.path(), 1 << 26);
+    EXPECT_EQ(std::string(bytes.begin(), bytes.end()).find("SECRET-CODE-4711"), std::string::npos) << entry.path();
+  }
+}
+
+TEST_F(StoreTest, TheAuditLogOnlyGrows) {
+  const auto store = Open();
+  (void)store->AddPatient(kAnna, "A", "");
+  store->Log(kBert, "login", "bert", "");
+  EXPECT_THAT(store->Audit(0, 10), SizeIs(2));
+  EXPECT_EQ(store->Audit(0, 10).front().action, "login");
+  EXPECT_EQ(store->Audit(2, 10).front().action, "patient.add");
+  Database direct(database(), Database::Access::kReadWrite);
+  EXPECT_THROW(direct.Execute("DELETE FROM audit"), ConstraintBroken);
+  EXPECT_THROW(direct.Execute("UPDATE audit SET user = 'nobody'"), ConstraintBroken);
+}
+
+TEST_F(StoreTest, TheLastEnabledEngineerStays) {
+  const auto store = Open();
+  store->AddUser(kAnna, {.name = "anna", .role = web::Role::kEngineer, .password_hash = "x", .created_at = {}});
+  EXPECT_EQ(RefusalOf([&] { store->AddUser(kAnna, {.name = "anna", .password_hash = "y", .created_at = {}}); }), ChangeResult::kConflict);
+  EXPECT_EQ(RefusalOf([&] {
+              store->ChangeUser(kAnna, {.name = "anna", .role = web::Role::kTechnician, .password_hash = "x", .created_at = {}});
+            }),
+            ChangeResult::kConflict);
+  EXPECT_EQ(store->FindUser("anna")->role, web::Role::kEngineer) << "a refused change is rolled back";
+  store->AddUser(kAnna, {.name = "bert", .role = web::Role::kEngineer, .password_hash = "x", .created_at = {}});
+  store->ChangeUser(kBert, {.name = "anna", .role = web::Role::kEngineer, .password_hash = "x", .disabled = true, .created_at = {}});
+  EXPECT_TRUE(store->FindUser("anna")->disabled);
+}
+
+TEST_F(StoreTest, OldScansGoAndReferencesStay) {
+  const auto store = Open();
+  const std::string patient = store->AddPatient(kAnna, "A", "");
+  const std::string reference = ApprovedReference(*store, patient);
+  const std::string old = Scan(*store, patient, reference, kResult);
+  {
+    Database direct(database(), Database::Access::kReadWrite);
+    direct.Execute("UPDATE scans SET started_at = 0");
+  }
+  const std::string fresh = Scan(*store, patient, reference, kResult);
+  EXPECT_EQ(store->RemoveOldScans(0), 0) << "0: never";
+  EXPECT_EQ(store->RemoveOldScans(30), 1);
+  EXPECT_EQ(store->FindScan(old), std::nullopt);
+  EXPECT_FALSE(fs::exists(store->ScanFolder(old)));
+  EXPECT_TRUE(store->FindScan(fresh));
+  EXPECT_TRUE(fs::exists(store->ScanFolder(store->FindReference(reference)->scan_id)));
+}
+
+TEST_F(StoreTest, TheQuotaTakesRecordingsFirstThenOldScansAndNeverReferences) {
+  const auto store = Open();
+  const std::string patient = store->AddPatient(kAnna, "A", "");
+  const std::string reference = ApprovedReference(*store, patient);
+  const std::string reference_scan = store->FindReference(reference)->scan_id;
+  const std::string old = Scan(*store, patient, reference, kResult), fresh = Scan(*store, patient, reference, kResult);
+  for (const std::string& scan : {reference_scan, old, fresh}) {
+    fs::create_directory(store->ScanFolder(scan) / "recording");
+    WriteWholeFile(store->ScanFolder(scan) / "recording" / "rgb.txt", std::string(1000, 'r'));
+    WriteWholeFile(store->ScanFolder(scan) / "scene" / "cloud.ply", std::string(1000, 'c'));
+  }
+  EXPECT_EQ(store->KeepWithinQuota(7000), 0);
+  EXPECT_GT(store->KeepWithinQuota(5100), 0);
+  EXPECT_FALSE(fs::exists(store->ScanFolder(reference_scan) / "recording"));
+  EXPECT_TRUE(store->FindScan(old));
+  (void)store->KeepWithinQuota(2100);
+  EXPECT_EQ(store->FindScan(old), std::nullopt);
+  EXPECT_TRUE(store->FindScan(fresh));
+  (void)store->KeepWithinQuota(0);
+  EXPECT_TRUE(fs::exists(store->ScanFolder(reference_scan) / "scene"));
+}
+
+TEST_F(StoreTest, ADamagedDatabaseIsToldWithWhatToDo) {
+  (void)Open();
+  WriteWholeFile(database(), std::string(20000, 'x'));
+  EXPECT_THAT(MessageOf<DatabaseCorrupt>([&] { (void)Open(); }), ::testing::AllOf(HasSubstr("plumb.db"), HasSubstr("backup")));
+}
+
+TEST_F(StoreTest, ADamagedPageIsFoundAtTheStart) {
+  {
+    const auto store = Open();
+    for (int i = 0; i < 500; ++i) store->Log(kAnna, "note", std::to_string(i), std::string(100, 'n'));
+  }
+  const auto size = fs::file_size(database());
+  ASSERT_GT(size, 40000U);
+  std::fstream file(database(), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(static_cast<std::streamoff>(size / 2));
+  file << std::string(8192, '\x55');
+  file.close();
+  EXPECT_THROW((void)Open(), DatabaseCorrupt);
+}
+
+TEST_F(StoreTest, ADatabaseOfANewerVersionIsRefused) {
+  (void)Open();
+  {
+    Database direct(database(), Database::Access::kReadWrite);
+    direct.Execute("PRAGMA user_version = 99");
+  }
+  EXPECT_THAT(MessageOf<DatabaseCorrupt>([&] { (void)Open(); }), HasSubstr("newer"));
+}
+
+TEST_F(StoreTest, ScanNumbersAreNeverUsedTwice) {
+  std::string patient, last;
+  {
+    const auto store = Open();
+    patient = store->AddPatient(kAnna, "A", "");
+    last = Scan(*store, patient);
+    store->WipePatient(kAnna, patient);
+  }
+  const auto store = Open();
+  EXPECT_GT(Scan(*store, store->AddPatient(kAnna, "B", "")), last);
+}
+
+}  // namespace
+}  // namespace plumb
