@@ -207,13 +207,7 @@ struct Reconstructor::Impl {
     joint_options.use_dense = false;
     const CalibrationModel stated = RegisterJointly(info.intrinsics, joint_options, map, stop).calibration;
     scene.timings_s["bundle_adjustment"] = Now() - start;
-    std::vector<Keyframe> keyframes;
-    const std::size_t step = (map.keyframes.size() + kMaxPaperKeyframes - 1) / kMaxPaperKeyframes;
-    for (std::size_t k = 0; k < map.keyframes.size(); k += step) {
-      if (cv::countNonZero(map.keyframes[k].data.view.depth_m) == 0) continue;
-      keyframes.push_back(map.keyframes[k].data);
-      keyframes.back().view.T_world_camera = DepthPose(map.keyframes[k], stated);
-    }
+    const std::vector<Keyframe> keyframes = PaperKeyframes(map, stated);
     PaperOptions paper_options;
     paper_options.icp.num_iterations = options.num_icp_iterations;
     paper_options.icp.seed = options.seed;
@@ -249,6 +243,25 @@ struct Reconstructor::Impl {
     }
     scene.cloud = MergeSurface(views, {.with_colors = options.keep_color});
     scene.height_map = paper.height_map;
+  }
+
+  // Evenly spread over the sweep; of each stretch the keyframe that sees the most markers, because a marker is known from these
+  // few keyframes alone.
+  static std::vector<Keyframe> PaperKeyframes(const TrackingMap& map, const CalibrationModel& stated) {
+    std::vector<Keyframe> keyframes;
+    const std::size_t step = (map.keyframes.size() + kMaxPaperKeyframes - 1) / kMaxPaperKeyframes;
+    for (std::size_t first = 0; first < map.keyframes.size(); first += step) {
+      const MapKeyframe* best = nullptr;
+      for (std::size_t k = first; k < std::min(first + step, map.keyframes.size()); ++k) {
+        const MapKeyframe& keyframe = map.keyframes[k];
+        if (best != nullptr && keyframe.data.markers.size() <= best->data.markers.size()) continue;
+        if (cv::countNonZero(keyframe.data.view.depth_m) > 0) best = &keyframe;
+      }
+      if (best == nullptr) continue;
+      keyframes.push_back(best->data);
+      keyframes.back().view.T_world_camera = DepthPose(*best, stated);
+    }
+    return keyframes;
   }
 
   [[nodiscard]] bool HasReferenceMarker(const TrackingMap& map) const {

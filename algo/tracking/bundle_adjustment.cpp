@@ -2,262 +2,71 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
-#include <memory>
-#include <set>
 
-#include <ceres/ceres.h>
-#include <Eigen/Eigenvalues>
+#include <tbb/parallel_for.h>
+#include <Eigen/Cholesky>
+#include <Eigen/SparseCholesky>
+
+#include "algo/tracking/bundle_model.hpp"
 
 namespace plumb {
 namespace {
 
-// Cost functions carry their derivatives by hand: automatic ones cost six times as much, and this runs while sweeping.
+using namespace bundle;  // NOLINT: the model is this file's own vocabulary
+using Matrix2x6d = Eigen::Matrix<double, 2, 6>;
+using Matrix6x3d = Eigen::Matrix<double, 6, 3>;
+using Matrix17d = Eigen::Matrix<double, kCalibrationSize, kCalibrationSize>;
+using Matrix17x6d = Eigen::Matrix<double, kCalibrationSize, 6>;
+using Matrix17x3d = Eigen::Matrix<double, kCalibrationSize, 3>;
 
-using Matrix2x3d = Eigen::Matrix<double, 2, 3>;
-using Matrix3x6d = Eigen::Matrix<double, 3, 6>;
-template <int kRows, int kColumns>
-using JacobianMap = Eigen::Map<Eigen::Matrix<double, kRows, kColumns, (kColumns == 1 ? Eigen::ColMajor : Eigen::RowMajor)>>;
+constexpr Eigen::Index kLargestDenseSystem = 1200;  // Unknowns; beyond, a sparse factorisation is faster.
+constexpr double kFunctionTolerance = 1e-5;         // Relative decrease that is not worth another iteration.
+constexpr double kLargestDamping = 1e8;             // Steps so short that improve nothing: at the minimum.
 
-// Right Jacobian of the rotation vector, to second order: the twists stay small because each call linearises anew.
-Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& w) {
-  const Eigen::Matrix3d W = Skew(w);
-  return Eigen::Matrix3d::Identity() - 0.5 * W + W * W / 6.0;
-}
-
-// A point in the camera T0 * PoseFromTwist(x), `dt_s` after the stamp under the keyframe's velocity.
-struct SeenPoint {
-  Eigen::Vector3d p;
-  Matrix3x6d J_pose;
-  Eigen::Matrix3d J_world;  // dp / dp_world
-  Eigen::Vector3d J_time;   // dp / ddt
-};
-
-SeenPoint See(const Pose& T_camera0_world, const Vector6d& velocity, const double* pose, const Eigen::Vector3d& p_world, double dt_s) {
-  const Eigen::Vector3d w(pose[0], pose[1], pose[2]);
-  const Eigen::Vector3d v(pose[3], pose[4], pose[5]);
-  const Eigen::Matrix3d R_inverse = RotationFromVector(-w);
-  const Eigen::Vector3d p = R_inverse * (T_camera0_world * p_world - v);
-  // Later camera, to first order: p - dt (w x p + v).
-  const Eigen::Matrix3d later = Eigen::Matrix3d::Identity() - dt_s * Skew(velocity.head<3>());
-  SeenPoint seen;
-  seen.J_time = -(velocity.head<3>().cross(p) + velocity.tail<3>());
-  seen.p = p + dt_s * seen.J_time;
-  seen.J_pose.leftCols<3>() = later * Skew(p) * RightJacobian(w);
-  seen.J_pose.rightCols<3>() = -later * R_inverse;
-  seen.J_world = later * R_inverse * T_camera0_world.linear();
-  return seen;
-}
-
-// Pixel through the corrected lens, with derivatives to the point and to CalibrationModel::lens.
-struct SeenPixel {
+// A keypoint's observation and what the last linearisation made of it: rows pixel x, pixel y, depth, weighted.
+struct PointView {
+  int keyframe = 0;
+  int landmark = 0;  // Slot.
   Eigen::Vector2d pixel;
-  Matrix2x3d J_point;
-  Eigen::Matrix<double, 2, 6> J_lens;
-};
-
-SeenPixel ProjectCorrected(const Intrinsics& k, const double* lens, const Eigen::Vector3d& p) {
-  const double iz = 1.0 / p.z();
-  const double x = p.x() * iz;
-  const double y = p.y() * iz;
-  const double r2 = x * x + y * y;
-  const double k1 = k.distortion[0] + lens[4];
-  const double k2 = k.distortion[1] + lens[5];
-  const double p1 = k.distortion[2];
-  const double p2 = k.distortion[3];
-  const double k3 = k.distortion[4];
-  const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-  const double slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * r2 * k3));  // d radial / dx = slope x
-  const double xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
-  const double yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
-  const double fx = k.fx * (1.0 + lens[0]);
-  const double fy = k.fy * (1.0 + lens[1]);
-  const double scale = k.width / 640.0;
-  SeenPixel seen;
-  seen.pixel = {fx * xd + k.cx + lens[2] * scale, fy * yd + k.cy + lens[3] * scale};
-  const double dxx = radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x;
-  const double dxy = x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
-  const double dyy = radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
-  seen.J_point << fx * dxx * iz, fx * dxy * iz, -fx * (dxx * x + dxy * y) * iz,  //
-      fy * dxy * iz, fy * dyy * iz, -fy * (dxy * x + dyy * y) * iz;
-  seen.J_lens << k.fx * xd, 0, scale, 0, fx * x * r2, fx * x * r2 * r2,  //
-      0, k.fy * yd, 0, scale, fy * y * r2, fy * y * r2 * r2;
-  return seen;
-}
-
-// Share of the readout before or after the stamp at an image row: -0.5 at the top, 0.5 at the bottom.
-double RowShare(double y_px, int height) { return (y_px + 0.5) / height - 0.5; }
-
-constexpr double kNearestPoint_m = 0.02;  // In front of the camera; nearer, projections mean nothing.
-
-// Blocks: pose, landmark, lens, readout.
-struct KeypointCost final : ceres::SizedCostFunction<2, 6, 3, 6, 1> {
-  const Intrinsics* intrinsics;
-  Pose T_camera0_world;
-  Vector6d velocity;
-  Eigen::Vector2d measured_px;
-  double sigma_px;
-
-  KeypointCost(const Intrinsics* k, const Pose& T, const Vector6d& v, const Eigen::Vector2d& px, double sigma)
-      : intrinsics(k), T_camera0_world(T), velocity(v), measured_px(px), sigma_px(sigma) {}
-
-  bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
-    const double share = RowShare(measured_px.y(), intrinsics->height);
-    const SeenPoint point = See(T_camera0_world, velocity, blocks[0], Eigen::Map<const Eigen::Vector3d>(blocks[1]), blocks[3][0] * share);
-    if (point.p.z() < kNearestPoint_m) return false;
-    const SeenPixel seen = ProjectCorrected(*intrinsics, blocks[2], point.p);
-    Eigen::Map<Eigen::Vector2d>{residual} = (seen.pixel - measured_px) / sigma_px;
-    if (jacobians == nullptr) return true;
-    const Matrix2x3d J = seen.J_point / sigma_px;
-    if (jacobians[0] != nullptr) JacobianMap<2, 6>{jacobians[0]} = J * point.J_pose;
-    if (jacobians[1] != nullptr) JacobianMap<2, 3>{jacobians[1]} = J * point.J_world;
-    if (jacobians[2] != nullptr) JacobianMap<2, 6>{jacobians[2]} = seen.J_lens / sigma_px;
-    if (jacobians[3] != nullptr) JacobianMap<2, 1>{jacobians[3]} = J * point.J_time * share;
-    return true;
-  }
-};
-
-// Blocks: pose, landmark, depth.
-struct KeypointDepthCost final : ceres::SizedCostFunction<1, 6, 3, CalibrationModel::kDepthSize> {
-  Pose T_camera0_world;
-  Vector6d velocity;
   Eigen::Vector2d centred;
-  double row_share;  // RowShare() of the pixel.
-  double z_m;
-  double dt_s;  // Depth stamp after colour stamp.
-  double sigma_m;
+  double row_share = 0;
+  double z_m = 0;  // 0: none.
+  double weight_z = 0;
 
-  KeypointDepthCost(const Pose& T, const Vector6d& v, const Eigen::Vector2d& centred_coordinates, double share, double z, double dt,
-                    double sigma)
-      : T_camera0_world(T), velocity(v), centred(centred_coordinates), row_share(share), z_m(z), dt_s(dt), sigma_m(sigma) {}
+  Eigen::Vector3d r = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d J_point = Eigen::Matrix3d::Zero();
+  Matrix3x6d J_pose = Matrix3x6d::Zero();
+  Eigen::Matrix<double, 2, 7> J_lens = Eigen::Matrix<double, 2, 7>::Zero();  // Lens and readout.
+  Eigen::Matrix<double, 1, CalibrationModel::kDepthSize> J_depth = Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>::Zero();
 
-  bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
-    const double* d = blocks[2];
-    const SeenPoint point =
-        See(T_camera0_world, velocity, blocks[0], Eigen::Map<const Eigen::Vector3d>(blocks[1]), dt_s + d[5] + row_share * d[8]);
-    // In the units of the measurement: in metres of the scene, a smaller scene would look better.
-    const double bow = centred.squaredNorm();
-    const double scale = 1.0 + d[0] + d[6] * centred.x() + d[7] * centred.y();
-    const double predicted = (point.p.z() - d[1] - d[2] * bow) / scale;
-    residual[0] = (z_m - predicted) / sigma_m;
-    if (jacobians == nullptr) return true;
-    const double factor = -1.0 / (scale * sigma_m);
-    if (jacobians[0] != nullptr) Eigen::Map<Eigen::Matrix<double, 1, 6>>{jacobians[0]} = factor * point.J_pose.row(2);
-    if (jacobians[1] != nullptr) Eigen::Map<Eigen::Matrix<double, 1, 3>>{jacobians[1]} = factor * point.J_world.row(2);
-    if (jacobians[2] != nullptr)
-      Eigen::Map<Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>>{jacobians[2]} << -predicted * factor, -factor, -bow * factor, 0, 0,
-          factor * point.J_time.z(), -predicted * factor * centred.x(), -predicted * factor * centred.y(),
-          factor * point.J_time.z() * row_share;
-    return true;
-  }
-};
-
-// Blocks: pose, marker, lens, readout, edge bias.
-struct CornerCost final : ceres::SizedCostFunction<2, 6, 6, 6, 1, 1> {
-  const Intrinsics* intrinsics;
-  Pose T_camera0_world;
-  Pose T_world_marker0;
-  Vector6d velocity;
-  Eigen::Vector3d corner_in_marker;
-  Eigen::Vector2d measured_px;
-  Eigen::Vector2d inward;  // Sum of the unit directions along the two sides that meet here, times the pixel scale.
-  double sigma_px;
-
-  CornerCost(const Intrinsics* k, const Pose& T_camera_world, const Pose& T_world_marker, const Vector6d& v, const Eigen::Vector3d& corner,
-             const Eigen::Vector2d& px, const Eigen::Vector2d& inward_px, double sigma)
-      : intrinsics(k),
-        T_camera0_world(T_camera_world),
-        T_world_marker0(T_world_marker),
-        velocity(v),
-        corner_in_marker(corner),
-        measured_px(px),
-        inward(inward_px),
-        sigma_px(sigma) {}
-
-  bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
-    const Eigen::Vector3d w(blocks[1][0], blocks[1][1], blocks[1][2]);
-    const Eigen::Vector3d v(blocks[1][3], blocks[1][4], blocks[1][5]);
-    const Eigen::Matrix3d R_marker = RotationFromVector(w);
-    const Eigen::Vector3d p_world = T_world_marker0 * (R_marker * corner_in_marker + v);
-    const double share = RowShare(measured_px.y(), intrinsics->height);
-    const SeenPoint point = See(T_camera0_world, velocity, blocks[0], p_world, blocks[3][0] * share);
-    if (point.p.z() < kNearestPoint_m) return false;
-    const SeenPixel seen = ProjectCorrected(*intrinsics, blocks[2], point.p);
-    Eigen::Map<Eigen::Vector2d>{residual} = (seen.pixel + blocks[4][0] * inward - measured_px) / sigma_px;
-    if (jacobians == nullptr) return true;
-    const Matrix2x3d J = seen.J_point / sigma_px;
-    if (jacobians[0] != nullptr) JacobianMap<2, 6>{jacobians[0]} = J * point.J_pose;
-    if (jacobians[1] != nullptr) {
-      Matrix3x6d J_marker;
-      J_marker << -R_marker * Skew(corner_in_marker) * RightJacobian(w), Eigen::Matrix3d::Identity();
-      JacobianMap<2, 6>{jacobians[1]} = J * point.J_world * T_world_marker0.linear() * J_marker;
-    }
-    if (jacobians[2] != nullptr) JacobianMap<2, 6>{jacobians[2]} = seen.J_lens / sigma_px;
-    if (jacobians[3] != nullptr) JacobianMap<2, 1>{jacobians[3]} = J * point.J_time * share;
-    if (jacobians[4] != nullptr) JacobianMap<2, 1>{jacobians[4]} = inward / sigma_px;
-    return true;
-  }
-};
-
-template <int kN>
-struct PriorCost {
-  std::array<double, kN> sigma;
-  template <typename T>
-  bool operator()(const T* value, T* residual) const {
-    for (int i = 0; i < kN; ++i) residual[i] = value[i] / sigma[static_cast<std::size_t>(i)];
-    return true;
-  }
-};
-
-// 1/2 |A (x - x0) + b|^2 equal to the quadratic up to a constant: A = sqrt(L) V', b = A H^+ g.
-class QuadraticCost : public ceres::CostFunction {
- public:
-  QuadraticCost(const QuadraticTerm& term, const std::array<double, CalibrationModel::kDepthSize>& depth0) : depth0_(depth0) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, QuadraticTerm::kSize, QuadraticTerm::kSize>> solver(term.H);
-    const double cutoff = 1e-10 * std::max(1e-300, solver.eigenvalues().maxCoeff());
-    int rank = 0;
-    for (int i = 0; i < QuadraticTerm::kSize; ++i) rank += solver.eigenvalues()[i] > cutoff ? 1 : 0;
-    A_.resize(rank, QuadraticTerm::kSize);
-    b_.resize(rank);
-    int row = 0;
-    for (int i = 0; i < QuadraticTerm::kSize; ++i) {
-      const double value = solver.eigenvalues()[i];
-      if (!(value > cutoff)) continue;
-      A_.row(row) = std::sqrt(value) * solver.eigenvectors().col(i).transpose();
-      b_[row++] = solver.eigenvectors().col(i).dot(term.g) / std::sqrt(value);
-    }
-    set_num_residuals(rank);
-    *mutable_parameter_block_sizes() = {6, 6, CalibrationModel::kDepthSize};
-  }
-
-  [[nodiscard]] bool empty() const { return num_residuals() == 0; }
-
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    Eigen::Matrix<double, QuadraticTerm::kSize, 1> x;
-    for (int i = 0; i < 6; ++i) {
-      x[i] = parameters[0][i];
-      x[6 + i] = parameters[1][i];
-    }
-    for (int i = 0; i < CalibrationModel::kDepthSize; ++i) x[12 + i] = parameters[2][i] - depth0_[static_cast<std::size_t>(i)];
-    Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = A_ * x + b_;
-    if (jacobians == nullptr) return true;
-    CopyColumns<6>(0, jacobians[0]);
-    CopyColumns<6>(6, jacobians[1]);
-    CopyColumns<CalibrationModel::kDepthSize>(12, jacobians[2]);
-    return true;
-  }
-
- private:
+  // J' M for this observation's derivatives J to the whole calibration.
   template <int kColumns>
-  void CopyColumns(int first, double* jacobian) const {
-    if (jacobian == nullptr) return;
-    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, kColumns, Eigen::RowMajor>>(jacobian, num_residuals(), kColumns) =
-        A_.middleCols<kColumns>(first);
+  [[nodiscard]] Eigen::Matrix<double, kCalibrationSize, kColumns> CalibrationTimes(const Eigen::Matrix<double, 3, kColumns>& M) const {
+    Eigen::Matrix<double, kCalibrationSize, kColumns> product;
+    product.template topRows<7>().noalias() = J_lens.transpose() * M.template topRows<2>();
+    product.row(kEdgeBias).setZero();
+    product.template bottomRows<CalibrationModel::kDepthSize>().noalias() = J_depth.transpose() * M.row(2);
+    return product;
   }
+};
 
-  std::array<double, CalibrationModel::kDepthSize> depth0_;
-  Eigen::Matrix<double, Eigen::Dynamic, QuadraticTerm::kSize> A_;
-  Eigen::VectorXd b_;
+struct CornerView {
+  int keyframe = 0;
+  int marker = 0;  // Slot.
+  Eigen::Vector3d in_marker;
+  Eigen::Vector2d pixel;
+  Eigen::Vector2d inward;  // Sum of the unit directions along the two sides that meet here, times the pixel scale.
+  double weight = 0;
+};
+
+// A landmark's own 3x3 system, inverted, and its coupling to the free keyframes and the calibration.
+struct PointSystem {
+  Eigen::Matrix3d V_inverse;
+  Eigen::Vector3d g;
+  std::vector<std::pair<int, Matrix6x3d>> W;  // Pose slot, ascending.
+  Matrix17x3d W_calibration;
 };
 
 // Sum of the unit directions from corner i to its two neighbours.
@@ -267,192 +76,534 @@ Eigen::Vector2d Inward(const ImageCorners& corners, std::size_t i) {
   return next + previous;
 }
 
-// Builds and solves one problem; lives for one call of BundleAdjust().
+// Everything that moves.
+struct State {
+  std::vector<CameraState> cameras;  // One a keyframe of the map; those that stay never change.
+  std::vector<Vector6d> markers;     // Twists on the markers' side.
+  std::vector<Eigen::Vector3d> landmarks;
+  CalibrationModel calibration;
+};
+
+// One problem; lives for one call of BundleAdjust(). Unknowns: free poses, markers, calibration; landmarks are eliminated.
 class Bundle {
  public:
-  Bundle(const Intrinsics& stated, const BundleOptions& options, TrackingMap& map, CalibrationModel& calibration)
-      : stated_(stated), options_(options), map_(map), calibration_(calibration) {
-    poses_.resize(map.keyframes.size(), {});
-    for (const int k : options.free_keyframes) free_.insert(k);
+  Bundle(const Intrinsics& stated, const BundleOptions& options, const std::vector<QuadraticTerm>& terms, TrackingMap& map,
+         CalibrationModel& calibration)
+      : stated_(stated), options_(options), terms_(terms), map_(map), calibration_(calibration), pose_slot_(map.keyframes.size(), -1) {
+    for (const int k : options.free_keyframes) {
+      int& slot = pose_slot_[static_cast<std::size_t>(k)];
+      if (slot >= 0) continue;
+      slot = static_cast<int>(free_.size());
+      free_.push_back(k);
+    }
+    CollectMarkers();
+    CollectPoints();
+    calibration_at_ = 6 * static_cast<Eigen::Index>(free_.size() + markers_.size());
+    size_ = calibration_at_ + (options.calibrate ? kCalibrationSize : 0);
   }
 
-  BundleSummary Run(const std::vector<QuadraticTerm>& terms) {
-    AddObservations();
-    for (const QuadraticTerm& term : terms) AddTerm(term);
-    AddPriors();
-    FixBlocks();
-    ceres::Solver::Options solver_options;
-    solver_options.linear_solver_type = ceres::SPARSE_SCHUR;
-    solver_options.max_num_iterations = options_.max_iterations;
-    solver_options.num_threads = 1;
-    solver_options.function_tolerance = 1e-5;
-    solver_options.logging_type = ceres::SILENT;
-    solver_options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-    Order(*solver_options.linear_solver_ordering);
-    ceres::Solver::Summary summary;
-    ceres::Solve(solver_options, &problem_, &summary);
-    BundleSummary result;
-    result.usable = summary.IsSolutionUsable();
-    result.num_residuals = summary.num_residuals;
-    result.num_iterations = static_cast<int>(summary.iterations.size());
-    result.initial_cost = summary.initial_cost;
-    result.final_cost = summary.final_cost;
-    if (result.usable) WriteBack();
-    return result;
+  BundleSummary Run() {
+    BundleSummary summary;
+    summary.num_residuals = static_cast<int>(2 * (views_.size() + corners_.size()));
+    for (const PointView& view : views_) summary.num_residuals += view.z_m > 0 ? 1 : 0;
+    State state = Start();
+    DropViewsBehindCameras(state);
+    double cost = Cost(state);
+    summary.initial_cost = summary.final_cost = cost;
+    if (!std::isfinite(cost) || size_ == 0) return summary;
+    summary.usable = true;
+    double damping = 1e-4;
+    bool linearised = false;
+    while (summary.num_iterations < options_.max_iterations && damping < kLargestDamping) {
+      ++summary.num_iterations;
+      if (!linearised) Linearise(state);
+      linearised = true;
+      State next;
+      const double next_cost = Step(state, damping, next) ? Cost(next) : std::numeric_limits<double>::infinity();
+      if (!(next_cost < cost)) {
+        damping *= 10.0;
+        continue;
+      }
+      const bool settled = cost - next_cost < kFunctionTolerance * std::abs(cost);
+      state = std::move(next);
+      cost = next_cost;
+      damping = std::max(1e-9, 0.2 * damping);
+      linearised = false;
+      if (settled) break;
+    }
+    summary.final_cost = cost;
+    Write(state);
+    return summary;
   }
 
  private:
-  void AddObservations() {
+  // ---- what is observed --------------------------------------------------------------------------------------------
+
+  void CollectMarkers() {
+    for (const int k : free_)
+      for (const MarkerObservation& m : map_.keyframes[static_cast<std::size_t>(k)].data.markers)
+        if (map_.markers.contains(m.id)) markers_.try_emplace(m.id, 0);
+    for (const QuadraticTerm& term : terms_)
+      if (term.keyframe_b < 0) markers_.try_emplace(term.marker, 0);
+    int slot = 0;
+    for (auto& [id, index] : markers_) {
+      index = slot++;
+      T_world_marker0_.push_back(map_.markers.at(id).T_world_marker);
+    }
+    const MarkerCorners in_marker = CornersInMarkerFrame(options_.marker_length_m);
+    const double scale = stated_.width / 640.0;
+    for (std::size_t k = 0; k < map_.keyframes.size(); ++k) {
+      for (const MarkerObservation& m : map_.keyframes[k].data.markers) {
+        const auto found = markers_.find(m.id);
+        if (found == markers_.end()) continue;
+        for (std::size_t i = 0; i < 4; ++i)
+          corners_.push_back({static_cast<int>(k), found->second, in_marker[i], m.corners[i], scale * Inward(m.corners, i),
+                              1.0 / std::max(options_.min_corner_sigma_px * scale, m.sigma_px[i])});
+      }
+    }
+  }
+
+  void CollectPoints() {
     // Landmarks that a free keyframe sees, then every observation of those. One seen only once constrains nothing.
-    std::vector<bool> wanted(map_.landmarks.size(), false);
-    std::set<int> wanted_markers;
+    std::vector<int> slot(map_.landmarks.size(), -1);
     for (const int k : free_) {
       for (const KeypointObservation& o : map_.keyframes[static_cast<std::size_t>(k)].keypoints) {
         const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
-        wanted[static_cast<std::size_t>(o.landmark)] = landmark.usable && landmark.num_observations > 1;
+        int& s = slot[static_cast<std::size_t>(o.landmark)];
+        if (s >= 0 || !landmark.usable || landmark.num_observations < 2) continue;
+        s = static_cast<int>(landmarks_.size());
+        landmarks_.push_back(o.landmark);
       }
-      for (const MarkerObservation& m : map_.keyframes[static_cast<std::size_t>(k)].data.markers) wanted_markers.insert(m.id);
     }
     for (std::size_t k = 0; k < map_.keyframes.size(); ++k) {
-      const MapKeyframe& keyframe = map_.keyframes[k];
-      for (const KeypointObservation& o : keyframe.keypoints)
-        if (wanted[static_cast<std::size_t>(o.landmark)]) AddKeypoint(static_cast<int>(k), keyframe, o);
-      for (const MarkerObservation& m : keyframe.data.markers)
-        if (wanted_markers.contains(m.id) && map_.markers.contains(m.id)) AddMarker(static_cast<int>(k), keyframe, m);
+      for (const KeypointObservation& o : map_.keyframes[k].keypoints) {
+        const int s = slot[static_cast<std::size_t>(o.landmark)];
+        if (s < 0) continue;
+        PointView view;
+        view.keyframe = static_cast<int>(k);
+        view.landmark = s;
+        view.pixel = o.pixel;
+        view.centred = CentredCoordinates(o.pixel.x(), o.pixel.y(), stated_.width, stated_.height);
+        view.row_share = RowShare(o.pixel.y(), stated_.height);
+        view.z_m = o.z_m;
+        if (o.z_m > 0) view.weight_z = 1.0 / (options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8));
+        views_.push_back(view);
+      }
     }
   }
 
-  double* PoseBlock(int keyframe) {
-    used_keyframes_.insert(keyframe);
-    return poses_[static_cast<std::size_t>(keyframe)].data();
-  }
-
-  double* MarkerBlock(int id) { return markers_.try_emplace(id).first->second.data(); }
-
-  void AddKeypoint(int k, const MapKeyframe& keyframe, const KeypointObservation& o) {
-    Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
-    used_landmarks_.insert(o.landmark);
-    const Pose T_camera0_world = keyframe.T_world_color.inverse();
-    const double sigma_px = options_.keypoint_sigma_px * stated_.width / 640.0;
-    problem_.AddResidualBlock(new KeypointCost(&stated_, T_camera0_world, keyframe.velocity_per_s, o.pixel, sigma_px), &keypoint_loss_,
-                              PoseBlock(k), landmark.p_world.data(), calibration_.lens.data(), calibration_.readout_s.data());
-    if (o.z_m > 0) {
-      const double dt = keyframe.data.depth_time_s - keyframe.data.color_time_s;
-      const Eigen::Vector2d centred = CentredCoordinates(o.pixel.x(), o.pixel.y(), stated_.width, stated_.height);
-      problem_.AddResidualBlock(
-          new KeypointDepthCost(T_camera0_world, keyframe.velocity_per_s, centred, RowShare(o.pixel.y(), stated_.height), o.z_m, dt,
-                                options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8)),
-          &keypoint_loss_, PoseBlock(k), landmark.p_world.data(), calibration_.depth.data());
-      depth_used_ = true;
+  [[nodiscard]] State Start() const {
+    State state;
+    for (const MapKeyframe& keyframe : map_.keyframes) {
+      CameraState camera;
+      camera.T_camera0_world = keyframe.T_world_color.inverse();
+      camera.velocity_per_s = keyframe.velocity_per_s;
+      camera.Prepare();
+      state.cameras.push_back(camera);
     }
-    lens_used_ = true;
+    state.markers.assign(markers_.size(), Vector6d::Zero());
+    for (const int id : landmarks_) state.landmarks.push_back(map_.landmarks[static_cast<std::size_t>(id)].p_world);
+    state.calibration = calibration_;
+    return state;
   }
 
-  void AddMarker(int k, const MapKeyframe& keyframe, const MarkerObservation& observation) {
-    const MapMarker& marker = map_.markers.at(observation.id);
-    const MarkerCorners corners = CornersInMarkerFrame(options_.marker_length_m);
-    const double scale = stated_.width / 640.0;
-    for (std::size_t i = 0; i < 4; ++i) {
-      const double sigma_px = std::max(options_.min_corner_sigma_px * scale, observation.sigma_px[i]);
-      problem_.AddResidualBlock(new CornerCost(&stated_, keyframe.T_world_color.inverse(), marker.T_world_marker, keyframe.velocity_per_s,
-                                               corners[i], observation.corners[i], scale * Inward(observation.corners, i), sigma_px),
-                                &corner_loss_, PoseBlock(k), MarkerBlock(observation.id), calibration_.lens.data(),
-                                calibration_.readout_s.data(), calibration_.edge_bias_px.data());
+  // A landmark that starts behind a camera has no projection there; later it cannot get there, see Cost().
+  void DropViewsBehindCameras(const State& state) {
+    std::erase_if(views_, [&](const PointView& view) { return PointInCamera(state, view).z() < kNearestPoint_m; });
+    std::erase_if(corners_, [&](const CornerView& view) {
+      return (state.cameras[static_cast<std::size_t>(view.keyframe)].T_camera_world * CornerInWorld(state, view)).z() < kNearestPoint_m;
+    });
+    views_of_landmark_.assign(landmarks_.size(), {});
+    views_of_keyframe_.assign(map_.keyframes.size(), {});
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      views_of_landmark_[static_cast<std::size_t>(views_[i].landmark)].push_back(static_cast<std::uint32_t>(i));
+      views_of_keyframe_[static_cast<std::size_t>(views_[i].keyframe)].push_back(static_cast<std::uint32_t>(i));
     }
-    lens_used_ = true;
-    bias_used_ = true;
   }
 
-  void AddTerm(const QuadraticTerm& term) {
-    auto cost = std::make_unique<QuadraticCost>(term, calibration_.depth);
-    if (cost->empty()) return;
-    double* second = term.keyframe_b >= 0 ? PoseBlock(term.keyframe_b) : MarkerBlock(term.marker);
-    problem_.AddResidualBlock(cost.release(), nullptr, PoseBlock(term.keyframe_a), second, calibration_.depth.data());
-    depth_used_ = true;
+  static Eigen::Vector3d PointInCamera(const State& state, const PointView& view) {
+    return state.cameras[static_cast<std::size_t>(view.keyframe)].T_camera_world * state.landmarks[static_cast<std::size_t>(view.landmark)];
   }
 
-  void AddPriors() {
+  [[nodiscard]] Eigen::Vector3d CornerInWorld(const State& state, const CornerView& view) const {
+    return MarkerPose(view.marker) * (PoseFromTwist(state.markers[static_cast<std::size_t>(view.marker)]) * view.in_marker);
+  }
+
+  // As it was at the beginning.
+  [[nodiscard]] const Pose& MarkerPose(int slot) const { return T_world_marker0_[static_cast<std::size_t>(slot)]; }
+
+  [[nodiscard]] double PixelWeight() const { return 1.0 / (options_.keypoint_sigma_px * stated_.width / 640.0); }
+  [[nodiscard]] double DepthDelay(const State& state, int keyframe, double row_share) const {
+    const Keyframe& data = map_.keyframes[static_cast<std::size_t>(keyframe)].data;
+    return data.depth_time_s - data.color_time_s + state.calibration.depth[5] + row_share * state.calibration.depth[8];
+  }
+
+  // ---- cost --------------------------------------------------------------------------------------------------------
+
+  // 1/2 sum of losses, and the quadratic terms (up to their constant).
+  [[nodiscard]] double Cost(const State& state) const {
+    std::vector<double> parts(map_.keyframes.size(), 0.0);
+    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t k) {
+      for (const std::uint32_t i : views_of_keyframe_[k]) parts[k] += PointCost(state, views_[i]);
+    });
+    double cost = 0;
+    for (const double part : parts) cost += part;
+    for (const CornerView& view : corners_) {
+      const double share = RowShare(view.pixel.y(), stated_.height);
+      const SeenPoint point =
+          See(state.cameras[static_cast<std::size_t>(view.keyframe)], CornerInWorld(state, view), state.calibration.readout_s[0] * share);
+      if (point.p.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
+      cost += 0.5 * CauchyLoss(CornerResidual(state, view, point.p).squaredNorm(), kCornerLossScale);
+    }
+    for (const QuadraticTerm& term : terms_) {
+      const TermVector x = TermState(state, term);
+      cost += x.dot(0.5 * (term.H * x) + term.g);
+    }
+    if (options_.calibrate) cost += 0.5 * (CalibrationVector(state.calibration).cwiseProduct(PriorWeights())).squaredNorm();
+    return cost;
+  }
+
+  [[nodiscard]] double PointCost(const State& state, const PointView& view) const {
+    const CameraState& camera = state.cameras[static_cast<std::size_t>(view.keyframe)];
+    const Eigen::Vector3d p = PointInCamera(state, view);
+    const Eigen::Vector3d motion = -(camera.velocity_per_s.head<3>().cross(p) + camera.velocity_per_s.tail<3>());
+    const Eigen::Vector3d at_row = p + state.calibration.readout_s[0] * view.row_share * motion;
+    if (at_row.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
+    const Eigen::Vector2d r = (ProjectCorrected(stated_, state.calibration.lens, at_row).pixel - view.pixel) * PixelWeight();
+    double cost = 0.5 * CauchyLoss(r.squaredNorm(), kKeypointLossScale);
+    if (view.z_m > 0) {
+      SeenPoint late;
+      late.p = p + DepthDelay(state, view.keyframe, view.row_share) * motion;
+      late.J_time = motion;
+      const double rz = (PredictDepth(state.calibration, late, view.centred, view.row_share).z_m - view.z_m) * view.weight_z;
+      cost += 0.5 * CauchyLoss(rz * rz, kKeypointLossScale);
+    }
+    return cost;
+  }
+
+  [[nodiscard]] Eigen::Vector2d CornerResidual(const State& state, const CornerView& view, const Eigen::Vector3d& p) const {
+    const Eigen::Vector2d pixel = ProjectCorrected(stated_, state.calibration.lens, p).pixel;
+    return (pixel + state.calibration.edge_bias_px[0] * view.inward - view.pixel) * view.weight;
+  }
+
+  using TermVector = Eigen::Matrix<double, QuadraticTerm::kSize, 1>;
+  [[nodiscard]] TermVector TermState(const State& state, const QuadraticTerm& term) const {
+    TermVector x;
+    x.head<6>() = state.cameras[static_cast<std::size_t>(term.keyframe_a)].twist;
+    x.segment<6>(6) = term.keyframe_b >= 0 ? state.cameras[static_cast<std::size_t>(term.keyframe_b)].twist
+                                           : state.markers[static_cast<std::size_t>(markers_.at(term.marker))];
+    for (int i = 0; i < CalibrationModel::kDepthSize; ++i)
+      x[12 + i] = state.calibration.depth[static_cast<std::size_t>(i)] - calibration_.depth[static_cast<std::size_t>(i)];
+    return x;
+  }
+
+  static Vector17d CalibrationVector(const CalibrationModel& c) {
+    Vector17d x;
+    for (int i = 0; i < 6; ++i) x[kLens + i] = c.lens[static_cast<std::size_t>(i)];
+    x[kReadout] = c.readout_s[0];
+    x[kEdgeBias] = c.edge_bias_px[0];
+    for (int i = 0; i < CalibrationModel::kDepthSize; ++i) x[kDepth + i] = c.depth[static_cast<std::size_t>(i)];
+    return x;
+  }
+
+  // 1 / standard deviation of each prior.
+  static Vector17d PriorWeights() {
     using C = CalibrationModel;
+    Vector17d w;
+    for (int i = 0; i < 6; ++i) w[kLens + i] = 1.0 / C::kLensSigma[static_cast<std::size_t>(i)];
+    w[kReadout] = 1.0 / C::kReadoutSigma;
+    w[kEdgeBias] = 1.0 / C::kEdgeBiasSigma;
+    for (int i = 0; i < C::kDepthSize; ++i) w[kDepth + i] = 1.0 / C::kDepthSigma[static_cast<std::size_t>(i)];
+    return w;
+  }
+
+  // ---- linearisation -----------------------------------------------------------------------------------------------
+
+  // Fills views_, points_, and the undamped H_ (lower half) and g_ of poses, markers and calibration, landmarks not yet eliminated.
+  // Parallel loops write to their own slots, and every sum has one order: the same bits on any number of threads.
+  void Linearise(const State& state) {
+    H_ = Eigen::MatrixXd::Zero(size_, size_);
+    g_ = Eigen::VectorXd::Zero(size_);
+    std::vector<Matrix17d> H_calibration(map_.keyframes.size(), Matrix17d::Zero());
+    std::vector<Vector17d> g_calibration(map_.keyframes.size(), Vector17d::Zero());
+    tbb::parallel_for(std::size_t{0}, map_.keyframes.size(),
+                      [&](std::size_t k) { LineariseKeyframe(state, k, H_calibration[k], g_calibration[k]); });
+    if (options_.calibrate) {
+      for (std::size_t k = 0; k < map_.keyframes.size(); ++k) {
+        H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += H_calibration[k];
+        g_.tail<kCalibrationSize>() += g_calibration[k];
+      }
+      const Vector17d w = PriorWeights();
+      H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>().diagonal() += w.cwiseAbs2();
+      g_.tail<kCalibrationSize>() += w.cwiseAbs2().cwiseProduct(CalibrationVector(state.calibration));
+    }
+    for (const CornerView& view : corners_) AddCorner(state, view);
+    for (const QuadraticTerm& term : terms_) AddTerm(state, term);
+    points_.resize(landmarks_.size());
+  }
+
+  void LineariseKeyframe(const State& state, std::size_t k, Matrix17d& H_calibration, Vector17d& g_calibration) {
+    const int slot = pose_slot_[k];
+    Matrix6d H = Matrix6d::Zero();
+    Vector6d g = Vector6d::Zero();
+    Matrix17x6d H_coupled = Matrix17x6d::Zero();
+    for (const std::uint32_t i : views_of_keyframe_[k]) {
+      PointView& view = views_[i];
+      LineariseView(state, view);
+      if (slot >= 0) {
+        H.noalias() += view.J_pose.transpose() * view.J_pose;
+        g.noalias() += view.J_pose.transpose() * view.r;
+      }
+      if (!options_.calibrate) continue;
+      if (slot >= 0) H_coupled += view.CalibrationTimes<6>(view.J_pose);
+      H_calibration.topLeftCorner<7, 7>().noalias() += view.J_lens.transpose() * view.J_lens;
+      H_calibration.bottomRightCorner<CalibrationModel::kDepthSize, CalibrationModel::kDepthSize>().noalias() +=
+          view.J_depth.transpose() * view.J_depth;
+      g_calibration += view.CalibrationTimes<1>(view.r);
+    }
+    if (slot < 0) return;
+    H_.block<6, 6>(6 * slot, 6 * slot) += H;
+    g_.segment<6>(6 * slot) += g;
+    if (options_.calibrate) H_.block<kCalibrationSize, 6>(calibration_at_, 6 * slot) += H_coupled;
+  }
+
+  void LineariseView(const State& state, PointView& view) const {
+    const CameraState& camera = state.cameras[static_cast<std::size_t>(view.keyframe)];
+    const Eigen::Vector3d& p_world = state.landmarks[static_cast<std::size_t>(view.landmark)];
+    const SeenPoint point = See(camera, p_world, state.calibration.readout_s[0] * view.row_share);
+    const SeenPixel seen = ProjectCorrected(stated_, state.calibration.lens, point.p);
+    const Eigen::Vector2d r = (seen.pixel - view.pixel) * PixelWeight();
+    const double w = PixelWeight() * std::sqrt(CauchyWeight(r.squaredNorm(), kKeypointLossScale));
+    const Eigen::Matrix<double, 2, 3> J = w * seen.J_point;
+    view.r.head<2>() = w * (seen.pixel - view.pixel);
+    view.J_point.topRows<2>().noalias() = J * point.J_world;
+    view.J_pose.topRows<2>().noalias() = J * point.J_pose;
+    view.J_lens.leftCols<6>() = w * seen.J_lens;
+    view.J_lens.col(6) = view.row_share * (J * point.J_time);
+    view.r[2] = 0;
+    view.J_point.row(2).setZero();
+    view.J_pose.row(2).setZero();
+    view.J_depth.setZero();
+    if (!(view.z_m > 0)) return;
+    const SeenPoint late = See(camera, p_world, DepthDelay(state, view.keyframe, view.row_share));
+    const PredictedDepth predicted = PredictDepth(state.calibration, late, view.centred, view.row_share);
+    const double rz = (predicted.z_m - view.z_m) * view.weight_z;
+    const double wz = view.weight_z * std::sqrt(CauchyWeight(rz * rz, kKeypointLossScale));
+    view.r[2] = wz * (predicted.z_m - view.z_m);
+    view.J_point.row(2) = wz * predicted.J_z * late.J_world.row(2);
+    view.J_pose.row(2) = wz * predicted.J_z * late.J_pose.row(2);
+    view.J_depth = wz * predicted.J_depth;
+  }
+
+  void AddCorner(const State& state, const CornerView& view) {
+    const Vector6d& twist = state.markers[static_cast<std::size_t>(view.marker)];
+    CameraState marker_side;  // Only for the right Jacobian of the twist.
+    marker_side.twist = twist;
+    marker_side.Prepare();
+    const Pose T_world_marker = MarkerPose(view.marker) * PoseFromTwist(twist);
+    const double share = RowShare(view.pixel.y(), stated_.height);
+    const Eigen::Vector3d p_world = MarkerPose(view.marker) * (PoseFromTwist(twist) * view.in_marker);
+    const SeenPoint point = See(state.cameras[static_cast<std::size_t>(view.keyframe)], p_world, state.calibration.readout_s[0] * share);
+    const SeenPixel seen = ProjectCorrected(stated_, state.calibration.lens, point.p);
+    Eigen::Vector2d r = CornerResidual(state, view, point.p);
+    const double robust = std::sqrt(CauchyWeight(r.squaredNorm(), kCornerLossScale));
+    const double w = robust * view.weight;
+    r *= robust;
+    const Eigen::Matrix<double, 2, 3> J = w * seen.J_point;
+    Matrix3x6d J_in_world;
+    J_in_world.leftCols<3>() = -T_world_marker.linear() * Skew(view.in_marker) * marker_side.J_right;
+    J_in_world.rightCols<3>() = MarkerPose(view.marker).linear();
+    const Matrix2x6d J_marker = J * point.J_world * J_in_world;
+    const Matrix2x6d J_pose = J * point.J_pose;
+    const Eigen::Index m = 6 * (static_cast<Eigen::Index>(free_.size()) + view.marker);
+    const Eigen::Index a = 6 * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(view.keyframe)]);
+    H_.block<6, 6>(m, m).noalias() += J_marker.transpose() * J_marker;
+    g_.segment<6>(m).noalias() += J_marker.transpose() * r;
+    if (a >= 0) {
+      H_.block<6, 6>(a, a).noalias() += J_pose.transpose() * J_pose;
+      H_.block<6, 6>(m, a).noalias() += J_marker.transpose() * J_pose;
+      g_.segment<6>(a).noalias() += J_pose.transpose() * r;
+    }
     if (!options_.calibrate) return;
-    if (lens_used_) {
-      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost<6>, 6, 6>(new PriorCost<6>{C::kLensSigma}), nullptr,
-                                calibration_.lens.data());
-      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost<1>, 1, 1>(new PriorCost<1>{{C::kReadoutSigma}}), nullptr,
-                                calibration_.readout_s.data());
+    Eigen::Matrix<double, 2, 8> J_calibration;  // Lens, readout, edge bias.
+    J_calibration << w * seen.J_lens, share * (J * point.J_time), w * view.inward;
+    H_.block<8, 8>(calibration_at_, calibration_at_).noalias() += J_calibration.transpose() * J_calibration;
+    H_.block<8, 6>(calibration_at_, m).noalias() += J_calibration.transpose() * J_marker;
+    if (a >= 0) H_.block<8, 6>(calibration_at_, a).noalias() += J_calibration.transpose() * J_pose;
+    g_.segment<8>(calibration_at_).noalias() += J_calibration.transpose() * r;
+  }
+
+  void AddTerm(const State& state, const QuadraticTerm& term) {
+    const TermVector slope = term.H * TermState(state, term) + term.g;
+    constexpr int kDepthSize = CalibrationModel::kDepthSize;
+    const Eigen::Index a = 6 * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(term.keyframe_a)]);
+    const Eigen::Index b = term.keyframe_b >= 0 ? 6 * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(term.keyframe_b)])
+                                                : 6 * (static_cast<Eigen::Index>(free_.size()) + markers_.at(term.marker));
+    const Eigen::Index d = calibration_at_ + kDepth;
+    if (a >= 0) {
+      H_.block<6, 6>(a, a) += term.H.topLeftCorner<6, 6>();
+      g_.segment<6>(a) += slope.head<6>();
+      if (options_.calibrate) H_.block<kDepthSize, 6>(d, a) += term.H.block<kDepthSize, 6>(12, 0);
     }
-    if (bias_used_)
-      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost<1>, 1, 1>(new PriorCost<1>{{C::kEdgeBiasSigma}}), nullptr,
-                                calibration_.edge_bias_px.data());
-    if (depth_used_)
-      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorCost<C::kDepthSize>, C::kDepthSize, C::kDepthSize>(
-                                    new PriorCost<C::kDepthSize>{C::kDepthSigma}),
-                                nullptr, calibration_.depth.data());
-  }
-
-  void FixBlocks() {
-    for (const int k : used_keyframes_)
-      if (!free_.contains(k)) problem_.SetParameterBlockConstant(PoseBlock(k));
-    if (options_.fix_lens && problem_.HasParameterBlock(calibration_.lens.data()))
-      problem_.SetParameterBlockConstant(calibration_.lens.data());
-    if (!options_.calibrate) {
-      for (double* block :
-           {calibration_.lens.data(), calibration_.readout_s.data(), calibration_.edge_bias_px.data(), calibration_.depth.data()})
-        if (problem_.HasParameterBlock(block)) problem_.SetParameterBlockConstant(block);
+    if (b >= 0) {
+      H_.block<6, 6>(b, b) += term.H.block<6, 6>(6, 6);
+      g_.segment<6>(b) += slope.segment<6>(6);
+      if (options_.calibrate) H_.block<kDepthSize, 6>(d, b) += term.H.block<kDepthSize, 6>(12, 6);
     }
+    if (a >= 0 && b >= 0) {
+      if (b > a) {
+        H_.block<6, 6>(b, a) += term.H.block<6, 6>(6, 0);
+      } else {
+        H_.block<6, 6>(a, b) += term.H.block<6, 6>(0, 6);
+      }
+    }
+    if (!options_.calibrate) return;
+    H_.block<kDepthSize, kDepthSize>(d, d) += term.H.bottomRightCorner<kDepthSize, kDepthSize>();
+    g_.segment<kDepthSize>(d) += slope.tail<kDepthSize>();
   }
 
-  // Landmarks first (Schur complement), the rest after, always in the same order.
-  void Order(ceres::ParameterBlockOrdering& ordering) {
-    for (const int landmark : used_landmarks_)
-      ordering.AddElementToGroup(map_.landmarks[static_cast<std::size_t>(landmark)].p_world.data(), 0);
-    for (const int k : used_keyframes_) ordering.AddElementToGroup(PoseBlock(k), 1);
-    // Within a group Ceres goes by addresses, and those of separate allocations differ from run to run: a group for each.
-    int group = 2;
-    for (auto& [id, block] : markers_) ordering.AddElementToGroup(block.data(), group++);
-    for (double* block :
-         {calibration_.lens.data(), calibration_.readout_s.data(), calibration_.edge_bias_px.data(), calibration_.depth.data()})
-      if (problem_.HasParameterBlock(block)) ordering.AddElementToGroup(block, group++);
+  // ---- solution ----------------------------------------------------------------------------------------------------
+
+  void MakePoint(std::size_t s, double damping) {
+    PointSystem& point = points_[s];
+    Eigen::Matrix3d V = Eigen::Matrix3d::Zero();
+    point.g.setZero();
+    point.W.clear();
+    point.W_calibration.setZero();
+    for (const std::uint32_t i : views_of_landmark_[s]) {
+      const PointView& view = views_[i];
+      V.noalias() += view.J_point.transpose() * view.J_point;
+      point.g.noalias() += view.J_point.transpose() * view.r;
+      const int slot = pose_slot_[static_cast<std::size_t>(view.keyframe)];
+      if (slot >= 0) point.W.emplace_back(slot, view.J_pose.transpose() * view.J_point);
+      if (options_.calibrate) point.W_calibration += view.CalibrationTimes<3>(view.J_point);
+    }
+    V.diagonal() *= 1.0 + damping;
+    V.diagonal().array() += 1e-9 * V.trace() + 1e-12;
+    point.V_inverse = V.inverse();
   }
 
-  void WriteBack() {
+  // One damped Gauss-Newton step; false if the system cannot be solved.
+  bool Step(const State& state, double damping, State& next) {
+    tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t s) { MakePoint(s, damping); });
+    Eigen::MatrixXd S = H_;
+    S.diagonal() *= 1.0 + damping;
+    S.diagonal().array() += 1e-9;
+    Eigen::VectorXd right = g_;
+    Eliminate(S, right);
+    if (options_.calibrate && options_.fix_lens) Pin(calibration_at_ + kLens, 6, S, right);
+    Eigen::VectorXd x;
+    if (!Solve(S, right, x)) return false;
+    next = state;
+    for (std::size_t slot = 0; slot < free_.size(); ++slot) {
+      CameraState& camera = next.cameras[static_cast<std::size_t>(free_[slot])];
+      camera.twist -= x.segment<6>(6 * static_cast<Eigen::Index>(slot));
+      camera.Prepare();
+    }
+    for (std::size_t m = 0; m < markers_.size(); ++m) next.markers[m] -= x.segment<6>(6 * static_cast<Eigen::Index>(free_.size() + m));
+    if (options_.calibrate) MoveCalibration(x.tail<kCalibrationSize>(), next.calibration);
+    tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t s) {
+      const PointSystem& point = points_[s];
+      Eigen::Vector3d rest = point.g;
+      for (const auto& [a, W] : point.W) rest.noalias() -= W.transpose() * x.segment<6>(6 * static_cast<Eigen::Index>(a));
+      if (options_.calibrate) rest.noalias() -= point.W_calibration.transpose() * x.tail<kCalibrationSize>();
+      next.landmarks[s] -= point.V_inverse * rest;
+    });
+    return true;
+  }
+
+  // S -= W V^-1 W', right -= W V^-1 g over all landmarks. Each free keyframe's rows are one task, so every block has one writer.
+  void Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const {
+    tbb::parallel_for(std::size_t{0}, free_.size(), [&](std::size_t slot) {
+      const auto a = 6 * static_cast<Eigen::Index>(slot);
+      for (const std::uint32_t i : views_of_keyframe_[static_cast<std::size_t>(free_[slot])]) {
+        const PointSystem& point = points_[static_cast<std::size_t>(views_[i].landmark)];
+        const Matrix6x3d WV = views_[i].J_pose.transpose() * (views_[i].J_point * point.V_inverse);
+        right.segment<6>(a).noalias() -= WV * point.g;
+        for (const auto& [b, W] : point.W)
+          if (b <= static_cast<int>(slot)) S.block<6, 6>(a, 6 * static_cast<Eigen::Index>(b)).noalias() -= WV * W.transpose();
+        if (options_.calibrate) S.block<kCalibrationSize, 6>(calibration_at_, a).noalias() -= point.W_calibration * WV.transpose();
+      }
+    });
+    if (!options_.calibrate) return;
+    Matrix17d H = Matrix17d::Zero();
+    for (const PointSystem& point : points_) {
+      const Matrix17x3d WV = point.W_calibration * point.V_inverse;
+      H.noalias() += WV * point.W_calibration.transpose();
+      right.tail<kCalibrationSize>().noalias() -= WV * point.g;
+    }
+    S.bottomRightCorner<kCalibrationSize, kCalibrationSize>() -= H;
+  }
+
+  // Makes `count` unknowns stay where they are.
+  static void Pin(Eigen::Index first, Eigen::Index count, Eigen::MatrixXd& S, Eigen::VectorXd& right) {
+    S.middleRows(first, count).setZero();
+    S.middleCols(first, count).setZero();
+    S.diagonal().segment(first, count).setOnes();
+    right.segment(first, count).setZero();
+  }
+
+  static bool Solve(const Eigen::MatrixXd& S, const Eigen::VectorXd& right, Eigen::VectorXd& x) {
+    if (S.rows() <= kLargestDenseSystem) {
+      const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> solver(S);
+      if (solver.info() != Eigen::Success) return false;
+      x = solver.solve(right);
+    } else {
+      const Eigen::SparseMatrix<double> sparse = S.triangularView<Eigen::Lower>().toDenseMatrix().sparseView();
+      const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower> solver(sparse);
+      if (solver.info() != Eigen::Success) return false;
+      x = solver.solve(right);
+    }
+    return x.allFinite();
+  }
+
+  static void MoveCalibration(const Vector17d& x, CalibrationModel& c) {
+    for (int i = 0; i < 6; ++i) c.lens[static_cast<std::size_t>(i)] -= x[kLens + i];
+    c.readout_s[0] -= x[kReadout];
+    c.edge_bias_px[0] -= x[kEdgeBias];
+    for (int i = 0; i < CalibrationModel::kDepthSize; ++i) c.depth[static_cast<std::size_t>(i)] -= x[kDepth + i];
+  }
+
+  void Write(const State& state) {
     for (const int k : free_) {
       MapKeyframe& keyframe = map_.keyframes[static_cast<std::size_t>(k)];
-      const Vector6d twist = Eigen::Map<const Vector6d>(poses_[static_cast<std::size_t>(k)].data());
-      keyframe.T_world_color = Orthonormalised(keyframe.T_world_color * PoseFromTwist(twist));
+      keyframe.T_world_color = Orthonormalised(keyframe.T_world_color * PoseFromTwist(state.cameras[static_cast<std::size_t>(k)].twist));
     }
-    for (auto& [id, block] : markers_) {
+    for (const auto& [id, slot] : markers_) {
       MapMarker& marker = map_.markers.at(id);
-      marker.T_world_marker = Orthonormalised(marker.T_world_marker * PoseFromTwist(Eigen::Map<const Vector6d>(block.data())));
+      marker.T_world_marker = Orthonormalised(marker.T_world_marker * PoseFromTwist(state.markers[static_cast<std::size_t>(slot)]));
     }
+    for (std::size_t s = 0; s < landmarks_.size(); ++s)
+      map_.landmarks[static_cast<std::size_t>(landmarks_[s])].p_world = state.landmarks[s];
+    calibration_ = state.calibration;
   }
 
   const Intrinsics& stated_;
   const BundleOptions& options_;
+  const std::vector<QuadraticTerm>& terms_;
   TrackingMap& map_;
   CalibrationModel& calibration_;
-  // Shared by all residuals of a kind, so the problem must not own them.
-  ceres::CauchyLoss keypoint_loss_{2.0};
-  ceres::CauchyLoss corner_loss_{3.0};
-  ceres::Problem problem_{[] {
-    ceres::Problem::Options problem_options;
-    problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    return problem_options;
-  }()};
-  std::set<int> free_;
-  std::set<int> used_keyframes_;
-  std::set<int> used_landmarks_;
-  std::vector<std::array<double, 6>> poses_;
-  std::map<int, std::array<double, 6>> markers_;
-  bool lens_used_ = false;
-  bool depth_used_ = false;
-  bool bias_used_ = false;
+  std::vector<int> free_;       // Keyframes, by pose slot.
+  std::vector<int> pose_slot_;  // Of each keyframe; -1: stays.
+  std::map<int, int> markers_;  // Id to slot.
+  std::vector<Pose> T_world_marker0_;
+  std::vector<int> landmarks_;  // Ids, by slot.
+  std::vector<PointView> views_;
+  std::vector<CornerView> corners_;
+  std::vector<std::vector<std::uint32_t>> views_of_landmark_;
+  std::vector<std::vector<std::uint32_t>> views_of_keyframe_;
+  Eigen::Index calibration_at_ = 0;
+  Eigen::Index size_ = 0;
+  Eigen::MatrixXd H_;
+  Eigen::VectorXd g_;
+  std::vector<PointSystem> points_;
 };
 
 }  // namespace
 
 BundleSummary BundleAdjust(const Intrinsics& stated, const BundleOptions& options, const std::vector<QuadraticTerm>& terms,
                            TrackingMap& map, CalibrationModel& calibration) {
-  return Bundle(stated, options, map, calibration).Run(terms);
+  return Bundle(stated, options, terms, map, calibration).Run();
 }
 
 }  // namespace plumb

@@ -1,4 +1,4 @@
-// Bundle adjustment over keyframes, landmarks, markers and the sensor's own calibration (Ceres).
+// Bundle adjustment over keyframes, landmarks, markers and the sensor's own calibration.
 #pragma once
 
 #include <vector>
@@ -39,7 +39,9 @@ struct BundleSummary {
   double final_cost = 0;
 };
 
-/// Moves what the options free, in place. Deterministic (fixed order, whatever the number of threads).
+/// Moves what the options free, in place, by Levenberg-Marquardt with Cauchy weights; landmarks are eliminated (Schur complement).
+/// Spread over TBB's threads; deterministic, whatever their number. A general solver came to the same minima, but repeats
+/// its bits on one thread only.
 /// @param terms  Linearised at the map's and the calibration's present values.
 BundleSummary BundleAdjust(const Intrinsics& stated, const BundleOptions& options, const std::vector<QuadraticTerm>& terms,
                            TrackingMap& map, CalibrationModel& calibration);

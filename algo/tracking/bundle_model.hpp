@@ -1,0 +1,78 @@
+// The residuals of bundle adjustment with their derivatives: what a camera under a calibration sees of a point.
+#pragma once
+
+#include <array>
+
+#include <Eigen/Core>
+
+#include "algo/tracking/calibration_model.hpp"
+#include "algo/types/intrinsics.hpp"
+#include "algo/types/pose.hpp"
+
+namespace plumb::bundle {
+
+using Vector17d = Eigen::Matrix<double, 17, 1>;
+using Matrix3x6d = Eigen::Matrix<double, 3, 6>;
+
+/// Places of CalibrationModel's blocks in one vector of all that can be calibrated.
+inline constexpr int kLens = 0;
+inline constexpr int kReadout = 6;
+inline constexpr int kEdgeBias = 7;
+inline constexpr int kDepth = 8;
+inline constexpr int kCalibrationSize = kDepth + CalibrationModel::kDepthSize;
+static_assert(kCalibrationSize == 17);
+
+/// In front of the camera; nearer, projections mean nothing.
+inline constexpr double kNearestPoint_m = 0.02;
+
+/// Where a keyframe's camera is: T_world_camera = T_world_camera0 * PoseFromTwist(twist), moving with `velocity_per_s`.
+struct CameraState {
+  Pose T_camera0_world = Pose::Identity();
+  Vector6d velocity_per_s = Vector6d::Zero();
+  Vector6d twist = Vector6d::Zero();
+
+  /// Of `twist`; made once, because every residual of the camera wants it.
+  void Prepare();
+  Pose T_camera_world = Pose::Identity();
+  Eigen::Matrix3d R_inverse = Eigen::Matrix3d::Identity();  ///< Of the twist's rotation.
+  Eigen::Matrix3d J_right = Eigen::Matrix3d::Identity();    ///< Its right Jacobian.
+};
+
+/// A point in the camera frame some time after the stamp, with derivatives.
+struct SeenPoint {
+  Eigen::Vector3d p;
+  Matrix3x6d J_pose;
+  Eigen::Matrix3d J_world;  ///< dp / dp_world
+  Eigen::Vector3d J_time;   ///< dp / ddt
+};
+[[nodiscard]] SeenPoint See(const CameraState& camera, const Eigen::Vector3d& p_world, double dt_s);
+
+/// Its pixel through the corrected lens, with derivatives to the point and to CalibrationModel::lens.
+struct SeenPixel {
+  Eigen::Vector2d pixel;
+  Eigen::Matrix<double, 2, 3> J_point;
+  Eigen::Matrix<double, 2, 6> J_lens;
+};
+[[nodiscard]] SeenPixel ProjectCorrected(const Intrinsics& stated, const std::array<double, 6>& lens, const Eigen::Vector3d& p);
+
+/// Share of the readout before or after the stamp at an image row: -0.5 at the top, 0.5 at the bottom.
+[[nodiscard]] inline double RowShare(double y_px, int height) { return (y_px + 0.5) / height - 0.5; }
+
+/// A depth reading's prediction, in the units of the measurement (in metres of the scene, a smaller scene would look better).
+struct PredictedDepth {
+  double z_m = 0;
+  double J_z = 0;                                                  ///< To the true depth.
+  Eigen::Matrix<double, 1, CalibrationModel::kDepthSize> J_depth;  ///< To CalibrationModel::depth, times included.
+};
+/// @param seen  The point at the time of the reading. @param centred  CentredCoordinates() of its pixel.
+[[nodiscard]] PredictedDepth PredictDepth(const CalibrationModel& calibration, const SeenPoint& seen, const Eigen::Vector2d& centred,
+                                          double row_share);
+
+/// Cauchy's loss of a squared residual, and the weight of its reweighted square.
+[[nodiscard]] double CauchyLoss(double squared, double scale);
+[[nodiscard]] inline double CauchyWeight(double squared, double scale) { return 1.0 / (1.0 + squared / (scale * scale)); }
+
+inline constexpr double kKeypointLossScale = 2.0;  ///< In standard deviations.
+inline constexpr double kCornerLossScale = 3.0;
+
+}  // namespace plumb::bundle
