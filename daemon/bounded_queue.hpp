@@ -39,6 +39,15 @@ class BoundedQueue {
     return num_dropped;
   }
 
+  /// False (and the element is gone) if there is no room or the queue is closed. Never waits.
+  bool TryPush(T element) {
+    const std::lock_guard lock(mutex_);
+    if (closed_ || elements_.size() >= capacity_) return false;
+    elements_.push_back(std::move(element));
+    changed_.notify_all();
+    return true;
+  }
+
   /// Waits for an element. Nothing once the queue is closed and empty, or a stop is requested.
   std::optional<T> Pop(const std::stop_token& stop = {}) {
     std::unique_lock lock(mutex_);

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
-#include <concepts>
 #include <fstream>
 #include <iterator>
 #include <string_view>
@@ -16,6 +16,7 @@
 
 #include "algo/types/errors.hpp"
 #include "algo/types/units.hpp"
+#include "daemon/config_section.hpp"
 
 namespace plumb {
 namespace {
@@ -33,106 +34,6 @@ std::string ReadText(const std::filesystem::path& file, std::string_view what) {
   if (!in) throw DataError(fmt::format("cannot open the {} '{}' for reading", what, file.string()));
   return {std::istreambuf_iterator<char>(in), {}};
 }
-
-/// One table of the file: values are taken key by key, and what nobody took is unknown.
-class Section {
- public:
-  Section(const toml::table& root, std::string name, const std::string& file) : name_(std::move(name)), file_(file) {
-    const toml::node* node = root.get(name_);
-    if (node == nullptr) return;
-    table_ = node->as_table();
-    if (table_ == nullptr) Fail(*node, name_, "a table, [" + name_ + "]");
-  }
-
-  template <typename T, typename Check>
-  void Take(std::string_view key, T& value, std::string_view expected, Check is_valid) {
-    const toml::node* node = Find(key);
-    if (node == nullptr) return;
-    std::optional<T> found;
-    if constexpr (std::floating_point<T>) {
-      if (node->is_number()) found = node->value<double>();
-    } else if constexpr (std::integral<T> && !std::same_as<T, bool>) {
-      if (const std::optional<std::int64_t> number = node->value_exact<std::int64_t>(); number && std::in_range<T>(*number))
-        found = static_cast<T>(*number);
-    } else {
-      found = node->value_exact<T>();
-    }
-    if (!found || !is_valid(*found)) Fail(*node, key, expected);
-    value = *found;
-  }
-
-  /// A positive number in another unit than inside.
-  void TakeScaled(std::string_view key, double& value, double unit, std::string_view expected) {
-    double number = value / unit;
-    bool taken = false;
-    Take(key, number, expected, [&](double v) { return taken = std::isfinite(v) && v > 0; });
-    if (taken) value = number * unit;
-  }
-
-  template <typename T>
-  void TakeName(std::string_view key, T& value, const std::vector<std::pair<std::string, T>>& names) {
-    std::vector<std::string> known;
-    for (const auto& [name, unused] : names) known.push_back('"' + name + '"');
-    std::string found;
-    const auto match = [&](const std::string& text) {
-      return std::find_if(names.begin(), names.end(), [&](const auto& name) { return name.first == text; });
-    };
-    Take(key, found, fmt::format("one of {}", fmt::join(known, ", ")), [&](const std::string& text) { return match(text) != names.end(); });
-    if (!found.empty()) value = match(found)->second;
-  }
-
-  /// Rows of finite numbers; nothing if the key is absent. One row may be written without the outer brackets.
-  std::optional<std::vector<std::vector<double>>> TakeRows(std::string_view key, std::size_t num_rows, std::size_t num_columns,
-                                                           std::string_view expected) {
-    const toml::node* node = Find(key);
-    if (node == nullptr) return std::nullopt;
-    std::vector<std::vector<double>> rows;
-    const auto read_row = [&](const toml::node& row_node) {
-      const toml::array* row = row_node.as_array();
-      if (row == nullptr || row->size() != num_columns) Fail(row_node, key, expected);
-      rows.emplace_back();
-      for (const toml::node& element : *row) {
-        const std::optional<double> number = element.is_number() ? element.value<double>() : std::nullopt;
-        if (!number || !std::isfinite(*number)) Fail(element, key, expected);
-        rows.back().push_back(*number);
-      }
-    };
-    if (num_rows == 1) {
-      read_row(*node);
-    } else {
-      const toml::array* array = node->as_array();
-      if (array == nullptr || array->size() != num_rows) Fail(*node, key, expected);
-      for (const toml::node& row : *array) read_row(row);
-    }
-    return rows;
-  }
-
-  void RefuseTheRest() const {
-    if (table_ == nullptr) return;
-    for (const auto& [key, node] : *table_) {
-      if (std::find(taken_.begin(), taken_.end(), key.str()) != taken_.end()) continue;
-      throw DataError(fmt::format("{}:{}: unknown key '{}' in [{}]; known are {}", file_, node.source().begin.line, key.str(), name_,
-                                  fmt::join(taken_, ", ")));
-    }
-  }
-
-  [[noreturn]] void Fail(const toml::node& node, std::string_view key, std::string_view expected) const {
-    std::ostringstream found;
-    node.visit([&found](const auto& n) { found << n; });
-    throw DataError(fmt::format("{}:{}: {}.{}: expected {}, found {}", file_, node.source().begin.line, name_, key, expected, found.str()));
-  }
-
- private:
-  const toml::node* Find(std::string_view key) {
-    taken_.emplace_back(key);
-    return table_ == nullptr ? nullptr : table_->get(key);
-  }
-
-  std::string name_;
-  const std::string& file_;
-  const toml::table* table_ = nullptr;
-  std::vector<std::string> taken_;
-};
 
 const auto kAny = [](const auto&) { return true; };
 const std::vector<std::pair<std::string, Preset>> kPresets = {{"best", Preset::kBest}, {"paper", Preset::kPaper}};
@@ -205,7 +106,61 @@ void ReadIec(Section section, const toml::table& root, Pose& T_iec_reference) {
   section.RefuseTheRest();
 }
 
+void ReadAppliance(Section section, ApplianceConfig& appliance) {
+  const auto take_path = [&](std::string_view key, std::filesystem::path& path) {
+    std::string text;
+    section.Take(key, text, "an absolute path", [](const std::string& s) { return s.starts_with('/') && s.size() < 4096; });
+    if (!text.empty()) path = text;
+  };
+  const auto take_seconds = [&](std::string_view key, std::optional<double>& value, double least, double most) {
+    double seconds = -1;
+    section.Take(key, seconds, fmt::format("seconds from {} to {}", least, most), [&](double v) { return v >= least && v <= most; });
+    if (seconds >= 0) value = seconds;
+  };
+  take_path("state", appliance.state);
+  take_path("control", appliance.control);
+  take_path("calibration", appliance.calibration);
+  section.Take("sensor_serial", appliance.sensor_serial, "the serial of a sensor", [](const std::string& s) { return s.size() <= 64; });
+  section.Take("keep_recordings", appliance.keep_recordings, "true or false", kAny);
+  section.Take("quota_gb", appliance.quota_gb, "gigabytes from 1 to 100000", [](double v) { return v >= 1 && v <= 100000; });
+  take_seconds("auto_stop_s", appliance.auto_stop_s, 1, 120);
+  take_seconds("scan_limit_s", appliance.scan_limit_s, 1, 600);
+  std::optional<double> result_s;
+  take_seconds("result_s", result_s, 1, 3600);
+  appliance.result_s = result_s.value_or(appliance.result_s);
+  section.RefuseTheRest();
+}
+
+void ReadWeb(Section section, WebConfig& web) {
+  section.Take("listen", web.listen, "an address and a port, such as \"0.0.0.0:8080\" or \"[::]:8080\"",
+               [](const std::string& s) { return ParseListenAddress(s).has_value(); });
+  const auto take_path = [&](std::string_view key, std::filesystem::path& path) {
+    std::string text;
+    section.Take(key, text, "an absolute path", [](const std::string& s) { return s.starts_with('/') && s.size() < 4096; });
+    if (!text.empty()) path = text;
+  };
+  take_path("tls_certificate", web.tls_certificate);
+  take_path("tls_key", web.tls_key);
+  section.TakeNames("host_names", web.host_names, "a list of at most 16 host names", 16);
+  section.RefuseTheRest();
+}
+
 }  // namespace
+
+std::optional<ListenAddress> ParseListenAddress(std::string_view text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string_view::npos || colon == 0) return std::nullopt;
+  std::string_view address = text.substr(0, colon);
+  const std::string_view digits = text.substr(colon + 1);
+  if (address.starts_with('[') != address.ends_with(']')) return std::nullopt;
+  const bool is_v6 = address.starts_with('[');
+  if (is_v6) address = address.substr(1, address.size() - 2);
+  if (address.empty() || (address.find(':') != std::string_view::npos) != is_v6) return std::nullopt;
+  unsigned port = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
+  if (error != std::errc() || end != digits.data() + digits.size() || port > 65535) return std::nullopt;
+  return ListenAddress{.address = std::string(address), .port = static_cast<std::uint16_t>(port)};
+}
 
 Config ParseConfig(const std::string& text, const std::string& name) {
   toml::table root;
@@ -214,7 +169,7 @@ Config ParseConfig(const std::string& text, const std::string& name) {
   } catch (const toml::parse_error& error) {
     throw DataError(fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line, error.description()));
   }
-  static constexpr std::array<std::string_view, 4> kSections = {"markers", "reconstruct", "compare", "iec"};
+  static constexpr std::array<std::string_view, 6> kSections = {"markers", "reconstruct", "compare", "iec", "appliance", "web"};
   for (const auto& [key, node] : root) {
     if (std::find(kSections.begin(), kSections.end(), key.str()) != kSections.end()) continue;
     throw DataError(fmt::format("{}:{}: unknown table or key '{}'; known are [{}]", name, node.source().begin.line, key.str(),
@@ -225,6 +180,8 @@ Config ParseConfig(const std::string& text, const std::string& name) {
   ReadReconstruct(Section(root, "reconstruct", name), config.reconstruct);
   ReadCompare(Section(root, "compare", name), config);
   ReadIec(Section(root, "iec", name), root, config.compare.T_iec_reference);
+  ReadAppliance(Section(root, "appliance", name), config.appliance);
+  ReadWeb(Section(root, "web", name), config.web);
   return config;
 }
 

@@ -1,9 +1,12 @@
 // The configuration file (TOML): options of reconstruct and compare, checked, with line numbers in every complaint.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "algo/comparison/comparison.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
@@ -17,11 +20,40 @@ struct MarkerConfig {
   std::optional<int> reference;  ///< Id whose frame is the scene's frame.
 };
 
+/// Of the appliance, plumbd; the command line does not look at it.
+struct ApplianceConfig {
+  std::filesystem::path state = "/var/lib/plumb";
+  std::filesystem::path control = "/run/plumb/control.sock";
+  std::filesystem::path calibration = "/var/lib/plumb/calibration";  ///< SERIAL.yaml for each calibrated sensor.
+  std::string sensor_serial;                                         ///< Only this sensor; empty: the first one.
+  bool keep_recordings = false;                                      ///< Of every scan, whatever the page's settings say.
+  double quota_gb = 100.0;                                           ///< Of all scans; beyond, the oldest go.
+  std::optional<double> auto_stop_s;   ///< Sweep ends after so long without new coverage; none: the page's setting.
+  std::optional<double> scan_limit_s;  ///< Longest sweep; none: the page's setting.
+  double result_s = 120.0;             ///< A result is shown for so long.
+};
+
+/// Of the page that plumbd serves.
+struct WebConfig {
+  std::string listen = "0.0.0.0:8080";
+  std::filesystem::path tls_certificate, tls_key;  ///< PEM; both or none.
+  std::vector<std::string> host_names;             ///< By which browsers reach it, beside addresses.
+};
+
+struct ListenAddress {
+  std::string address;
+  std::uint16_t port = 0;
+};
+/// "127.0.0.1:8080", "[::1]:8080"; nothing if it is neither. Port 0: any free one.
+[[nodiscard]] std::optional<ListenAddress> ParseListenAddress(std::string_view text);
+
 /// What a configuration file holds; what it leaves out keeps the defaults here.
 struct Config {
   MarkerConfig markers;
   ReconstructorOptions reconstruct;
   CompareOptions compare;
+  ApplianceConfig appliance;
+  WebConfig web;
   std::optional<std::filesystem::path> region_file;  ///< Absolute, or relative to the configuration file's folder.
 };
 
@@ -33,6 +65,8 @@ struct Config {
 ///                    shift_tolerance_mm, rotation_tolerance_deg, min_shared_markers, moved_marker_mm, moved_marker_sigmas,
 ///                    min_coverage, max_hole_mm, max_residual_p95_mm, max_lost_s
 ///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to the IEC fixed frame
+///     [appliance]    state, control, calibration, sensor_serial, keep_recordings, quota_gb, auto_stop_s, scan_limit_s, result_s
+///     [web]          listen, tls_certificate, tls_key, host_names
 ///
 /// @throws DataError naming file, line, key, what was expected and found. A key that is not listed is an error.
 [[nodiscard]] Config ReadConfig(const std::filesystem::path& file);

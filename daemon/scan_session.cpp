@@ -40,11 +40,8 @@ void ScanSession::Cancel() {
 
 void ScanSession::Run(const std::stop_token& stop) {
   try {
-    const Scene scene = Track(stop);
-    Evaluate(scene, stop);
+    Scan(stop);
     outcome_.kind = ScanOutcome::Kind::kDone;
-    if (const std::optional<double> last_s = feed_->last_frame_s()) outcome_.after_last_frame_s = SteadySeconds() - *last_s;
-    if (callbacks_.save) callbacks_.save(outcome_);
   } catch (const Interrupted&) {
     outcome_.kind = ScanOutcome::Kind::kCancelled;
   } catch (const DataError& error) {
@@ -58,14 +55,34 @@ void ScanSession::Run(const std::stop_token& stop) {
     outcome_.reason = error.what();
   }
   if (outcome_.kind != ScanOutcome::Kind::kDone && stop.stop_requested()) outcome_.kind = ScanOutcome::Kind::kCancelled;
+  Save();
   callbacks_.ended(outcome_);
 }
 
+void ScanSession::Scan(const std::stop_token& stop) {
+  folder_ = callbacks_.begin();
+  const Scene scene = Track(stop);
+  Evaluate(scene, stop);
+  if (const std::optional<double> last_s = feed_->last_frame_s()) outcome_.after_last_frame_s = SteadySeconds() - *last_s;
+}
+
+void ScanSession::Save() {
+  try {
+    callbacks_.save(outcome_);
+    return;
+  } catch (const std::exception& error) {
+    if (outcome_.kind == ScanOutcome::Kind::kDone || outcome_.reason.empty()) outcome_.reason = error.what();
+    outcome_.kind = ScanOutcome::Kind::kFailed;
+  }
+  try {
+    callbacks_.save(outcome_);
+  } catch (const std::exception&) {  // said already; the next start puts the store right
+  }
+}
+
 Scene ScanSession::Track(const std::stop_token& stop) {
-  std::error_code ignored;
-  std::filesystem::create_directories(job_.folder, ignored);  // what cannot be made is told by the first write into it
   std::optional<RecordingFeed> recording;
-  if (job_.keep_recording) recording.emplace(*feed_, job_.info, job_.folder / "recording");
+  if (job_.keep_recording) recording.emplace(*feed_, job_.info, folder_ / "recording");
   FrameFeed& feed = recording ? static_cast<FrameFeed&>(*recording) : *feed_;
   return RunScan(feed, job_.info, job_.reconstructor, stop, [this](const ScanProgress& progress) { OnProgress(progress); });
 }
@@ -76,6 +93,7 @@ void ScanSession::OnProgress(const ScanProgress& progress) {
   update_.frames_tracked = outcome_.frames_tracked = progress.frames_tracked;
   update_.frames_dropped = outcome_.frames_dropped = progress.frames_dropped;
   if (progress.tracking != nullptr && progress.frame != nullptr) {
+    update_.keyframes += progress.tracking->is_keyframe ? 1 : 0;
     update_.guidance = guide_.Add(*progress.frame, *progress.tracking);
     outcome_.swept_area_m2 = update_.guidance.area_m2;
     if (update_.guidance.without_new_area_s >= job_.stop_after_s && !std::exchange(told_complete_, true)) callbacks_.sweep_complete();
@@ -96,9 +114,12 @@ void ScanSession::Tell(std::string step, double fraction) {
 
 void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
   ThrowIfStopped(stop);
+  if (job_.is_reference && (scene.frame != SceneFrame::kReferenceMarker || !scene.height_map)) {
+    throw DataError("this scan cannot become a reference: the reference marker was not seen; keep it in view during a part of the sweep");
+  }
   Tell("saving", 0.0);
   // The scene goes to the disk while it is compared.
-  std::future<void> writing = std::async(std::launch::async, [&] { WriteScene(scene, job_.folder / "scene"); });
+  std::future<void> writing = std::async(std::launch::async, [&] { WriteScene(scene, folder_ / "scene"); });
   std::optional<Comparison> comparison;
   ResultPictures pictures;
   if (!job_.reference_scene.empty()) {
@@ -114,7 +135,7 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
   writing.get();
   if (!comparison) return;
   ThrowIfStopped(stop);
-  WriteResult(*comparison, pictures, job_.folder / "result");
+  WriteResult(*comparison, pictures, folder_ / "result");
   outcome_.result_json = ResultJson(*comparison);
   outcome_.verdict = comparison->verdict;
 }

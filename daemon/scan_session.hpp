@@ -25,7 +25,7 @@ struct ScanJob {
   CompareOptions compare;
   GuidanceOptions guidance;
   std::filesystem::path reference_scene;  ///< SCENE to compare with; empty: none.
-  std::filesystem::path folder;           ///< Where `scene`, `result` and `recording` are written; its parent exists.
+  bool is_reference = false;              ///< The scene must be one that others can be compared with, else there is no answer.
   bool keep_recording = false;
   std::size_t queue_capacity = 15;  ///< Frames that may wait for tracking: half a second.
   double stop_after_s = 10.0;       ///< Without new coverage: the sweep is complete.
@@ -38,6 +38,7 @@ struct ScanUpdate {
   std::int64_t frames = 0;
   std::int64_t frames_tracked = 0;
   std::int64_t frames_dropped = 0;
+  std::int64_t keyframes = 0;
   SweepGuidance guidance;
 };
 
@@ -53,12 +54,16 @@ struct ScanOutcome {
   double after_last_frame_s = 0.0;  ///< Until everything was written.
 };
 
-/// Called on the tracking thread; they post to the loop.
+/// Called on the tracking thread; they post to the loop, but for the first two, which use the store. These may throw: the scan has then
+/// failed.
 struct ScanCallbacks {
+  /// First: gives the folder in which `scene`, `result` and `recording` are written.
+  std::function<std::filesystem::path()> begin;
+  /// Stores the outcome, whatever it is, and what the folder holds. If that of a scan that is done fails, it is called again for the failed
+  /// one.
+  std::function<void(const ScanOutcome&)> save;
   std::function<void(const ScanUpdate&)> update;
-  std::function<void()> sweep_complete;  ///< No new coverage for long enough; once.
-  /// Stores what kDone left in the folder, still on the tracking thread. May throw IoError: the scan has then failed.
-  std::function<void(ScanOutcome&)> save;
+  std::function<void()> sweep_complete;           ///< No new coverage for long enough; once.
   std::function<void(const ScanOutcome&)> ended;  ///< Last; exactly once.
 };
 
@@ -79,6 +84,8 @@ class ScanSession {
 
  private:
   void Run(const std::stop_token& stop);
+  void Scan(const std::stop_token& stop);
+  void Save();
   [[nodiscard]] Scene Track(const std::stop_token& stop);
   void Evaluate(const Scene& scene, const std::stop_token& stop);
   void OnProgress(const struct ScanProgress& progress);
@@ -86,6 +93,7 @@ class ScanSession {
 
   ScanJob job_;
   ScanCallbacks callbacks_;
+  std::filesystem::path folder_;
   std::shared_ptr<LiveFeed> feed_;
   SweepGuide guide_;
   ScanUpdate update_;

@@ -1,6 +1,7 @@
 // The commands of `plumb`: each adds its own options to the command line and says how it is run.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <stop_token>
 #include <string>
@@ -24,7 +25,8 @@ enum ExitCode : int {
 
 /// What every command is handed when it runs.
 struct CommandContext {
-  std::stop_token stop;  ///< Ctrl-C or SIGTERM.
+  std::stop_token stop;           ///< Ctrl-C or SIGTERM.
+  std::filesystem::path control;  ///< Control socket of plumbd.
 };
 
 /// Runs the command; its return value is the exit code, its exceptions become the others (see main.cpp).
@@ -37,6 +39,10 @@ using Command = std::function<int(const CommandContext&)>;
 [[nodiscard]] Command AddMesh(CLI::App& app);
 [[nodiscard]] Command AddInfo(CLI::App& app);
 [[nodiscard]] Command AddEvaluate(CLI::App& app);
+[[nodiscard]] Command AddStatus(CLI::App& app);
+[[nodiscard]] Command AddPress(CLI::App& app);
+[[nodiscard]] Command AddWatch(CLI::App& app);
+[[nodiscard]] Command AddSim(CLI::App& app);
 
 /// Writes to stdout.
 /// @throws IoError if stdout does not take it (closed pipe, full disk).

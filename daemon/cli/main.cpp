@@ -51,6 +51,10 @@ int Main(int argc, char** argv) {
   app.set_version_flag("--version", fmt::format("plumb {}", Version()), "Print the version and exit");
   app.set_help_flag("-h,--help", "Print this help, or with a command its own, and exit");
   app.require_subcommand(1);
+  std::filesystem::path control = "/run/plumb/control.sock";
+  app.add_option("--control", control, "Control socket of plumbd, for status, press, watch and sim")
+      ->type_name("SOCK")
+      ->capture_default_str();
   app.get_formatter()->column_width(34);
   app.footer(
       fmt::format("\nplumb COMMAND --help tells more.\n"
@@ -70,13 +74,18 @@ int Main(int argc, char** argv) {
   add("info", "Describe a recording, a scene or a result", AddInfo);
   add("evaluate", "Measure the accuracy on a suite of recordings with truth, beside the paper's table", AddEvaluate);
 
+  add("status", "What a running plumbd does: state, sensor, scan, last result", AddStatus);
+  add("press", "Press the button of a running plumbd", AddPress);
+  add("watch", "Print the events of a running plumbd, one JSON object a line", AddWatch);
+  add("sim", "Plug, unplug, stall or move on the virtual sensor of a running plumbd", AddSim);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kDone : kUsageError;
   }
   for (const auto& [subcommand, command] : commands) {
-    if (subcommand->parsed()) return RunAndReport(subcommand->get_name(), command, {.stop = signals.token()});
+    if (subcommand->parsed()) return RunAndReport(subcommand->get_name(), command, {.stop = signals.token(), .control = control});
   }
   return kUsageError;
 }

@@ -1,0 +1,408 @@
+#include "daemon/appliance.hpp"
+
+#include <sys/epoll.h>
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/types/errors.hpp"
+#include "daemon/files/scene_json.hpp"
+#include "daemon/log.hpp"
+
+namespace plumb {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Json = nlohmann::json;
+using std::chrono::seconds;
+
+constexpr seconds kTick{1};
+constexpr double kWorkerSilence_s = 30.0;  // the longest single step, a comparison of two large scenes, takes a few seconds
+constexpr double kSensorSilence_s = 30.0;  // opening a sensor on a slow bus takes some seconds
+const web::Actor kSelf{.user = "plumbd", .address = ""};
+const web::Actor kAuto{.user = "auto", .address = ""};
+
+PatientPosture PostureOf(const std::string& name, PatientPosture otherwise) {
+  for (const PatientPosture posture : {PatientPosture::kHeadFirstSupine, PatientPosture::kHeadFirstProne, PatientPosture::kFeetFirstSupine,
+                                       PatientPosture::kFeetFirstProne}) {
+    if (name == Name(posture)) return posture;
+  }
+  return otherwise;
+}
+
+double Milliseconds(Clock::duration duration) { return std::chrono::duration<double, std::milli>(duration).count(); }
+
+}  // namespace
+
+Appliance::Appliance(EventLoop& loop, ApplianceParts parts) : loop_(loop), parts_(std::move(parts)) {
+  OpenStore();
+  result_timer_ = loop_.MakeTimer([this] { (void)Handle(ScanEvent::kResultExpired); });
+  limit_timer_ = loop_.MakeTimer([this] {
+    Log(LogLevel::kNotice, "the longest sweep is over", {{"SCAN", scan_.id}});
+    (void)Handle(ScanEvent::kSweepComplete);
+  });
+  tick_timer_ = loop_.MakeTimer([this] { OnTick(); });
+  tick_timer_.ArmAfter(kTick);
+  if (!storage_fault_.empty()) (void)Handle(ScanEvent::kStorageFailed);
+  WatchButton();
+  Show();
+  sensors_ = std::make_unique<SensorThread>(
+      parts_.make_provider, SensorThreadOptions{.serial = parts_.config.appliance.sensor_serial, .before_scan = parts_.before_scan},
+      [this](const SensorEvent& event) { loop_.Post([this, event] { OnSensor(event); }); });
+}
+
+Appliance::~Appliance() {
+  session_.reset();
+  sensors_.reset();
+}
+
+void Appliance::OpenStore() {
+  try {
+    store_ = std::make_unique<Store>(parts_.config.appliance.state);
+    const RecoveryReport& found = store_->recovery();
+    if (found.interrupted_scans + found.orphaned_folders + found.lost_scans > 0) {
+      Log(LogLevel::kWarning,
+          fmt::format("put right after an interruption: {} scans had not ended, {} folders of none, {} scans without files",
+                      found.interrupted_scans, found.orphaned_folders, found.lost_scans));
+    }
+    if (found.broken_references > 0) {
+      Log(LogLevel::kError, fmt::format("the files of {} approved references are gone: put a backup of the state folder in its place",
+                                        found.broken_references));
+    }
+    if (!parts_.demo_patient.empty()) {
+      const auto patient = store_->FindPatientByCode(parts_.demo_patient);
+      open_patient_ = patient ? patient->id : store_->AddPatient(kSelf, parts_.demo_patient, "");
+    }
+  } catch (const IoError& error) {
+    store_.reset();
+    storage_fault_ = error.what();
+    Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", storage_fault_));
+  }
+}
+
+void Appliance::WatchButton() {
+  if (parts_.button == nullptr) return;
+  parts_.button->SetListener([this](ButtonPress press) { (void)Press(press); });
+  const auto dispatch = [this] {
+    try {
+      parts_.button->Dispatch(Button::Clock::now());
+      ArmButtonTimer();
+    } catch (const DeviceError& error) {
+      Log(LogLevel::kError, fmt::format("the button is gone: {}", error.what()));
+      button_source_ = {};
+    }
+  };
+  button_timer_ = loop_.MakeTimer(dispatch);
+  button_source_ = loop_.WatchDescriptor(parts_.button->fd(), EPOLLIN, [dispatch](std::uint32_t) { dispatch(); });
+  ArmButtonTimer();
+}
+
+void Appliance::ArmButtonTimer() {
+  if (const auto deadline = parts_.button->deadline()) {
+    button_timer_.ArmAt(*deadline);
+  } else {
+    button_timer_.Disarm();
+  }
+}
+
+Appliance::Answer Appliance::Press(ButtonPress press) {
+  return Handle(press == ButtonPress::kShort ? ScanEvent::kShortPress : ScanEvent::kLongPress);
+}
+
+Appliance::Answer Appliance::Cancel() { return Handle(ScanEvent::kCancel); }
+
+/// What only the appliance knows; the state has said yes already.
+Appliance::Answer Appliance::WhyNotScan() const {
+  if (stopped_) return "the appliance is being switched off";
+  if (store_ == nullptr) return "nothing can be stored";
+  if (open_patient_.empty()) return "no patient is open: open one on the page first";
+  constexpr std::uintmax_t kLeast = 48U << 20;
+  std::error_code error;
+  const std::filesystem::space_info space = std::filesystem::space(parts_.config.appliance.state, error);
+  if (!error && space.available < kLeast)
+    return fmt::format("the disk is full: {} MB are free, a scan needs about 50; free space first", space.available >> 20);
+  return {};
+}
+
+Appliance::Answer Appliance::Handle(ScanEvent event) {
+  const ScanState before = state_;
+  ScanTransition transition = Next(state_, event);
+  const bool starts = std::find(transition.actions.begin(), transition.actions.end(), ScanAction::kStartScan) != transition.actions.end();
+  Answer answer(transition.refusal);
+  if (starts) {
+    answer = WhyNotScan();
+    if (!answer.empty()) transition = {.state = before, .actions = {ScanAction::kRefuse}, .refusal = {}};
+  }
+  if (!answer.empty()) {
+    Log(LogLevel::kNotice, fmt::format("{} ignored in state {}: {}", Name(event), Name(before.phase), answer));
+    TellEvent("ignored", Json{{"what", Name(event)}, {"state", Name(before.phase)}, {"reason", answer}}.dump());
+  }
+  state_ = transition.state;
+  if (state_.phase != ScanPhase::kResult) result_timer_.Disarm();
+  for (const ScanAction action : transition.actions) Act(action);
+  if (state_ != before) TellState();
+  return answer;
+}
+
+void Appliance::Act(ScanAction action) {
+  switch (action) {
+    case ScanAction::kStartScan:
+      return StartScan();
+    case ScanAction::kEndSweep:
+      limit_timer_.Disarm();
+      return sensors_->EndScan();
+    case ScanAction::kCancelScan:
+      limit_timer_.Disarm();
+      scan_.cancelled_at = Clock::now();
+      if (session_) session_->Cancel();
+      return sensors_->EndScan();
+    case ScanAction::kArmResultTimer:
+      return result_timer_.ArmAfter(std::chrono::microseconds(static_cast<std::int64_t>(parts_.config.appliance.result_s * 1e6)));
+    case ScanAction::kRefuse:
+      return;
+  }
+}
+
+void Appliance::StartScan() {
+  try {
+    BeginSession();
+  } catch (const std::exception& error) {
+    scan_fault_ = fmt::format("the scan could not begin: {}", error.what());
+    Log(LogLevel::kError, scan_fault_);
+    loop_.Post([this] { (void)Handle(ScanEvent::kScanFailed); });
+  }
+}
+
+void Appliance::BeginSession() {
+  const web::Settings settings = store_->GetSettings();
+  session_.reset();  // the last one has ended
+  scan_ = {};
+  scan_.patient_id = open_patient_;
+  scan_.purpose = purpose_;
+  scan_.started = Clock::now();
+  ScanJob job = MakeJob(settings);
+  const NewScan record{.patient_id = scan_.patient_id,
+                       .reference_id = scan_.reference_id,
+                       .purpose = scan_.purpose,
+                       .sensor_serial = sensors_->snapshot().sensor.serial,
+                       .reason = reference_reason_};
+  session_ = std::make_unique<ScanSession>(std::move(job), MakeCallbacks(record));
+  sensors_->BeginScan(session_->feed());
+  limit_timer_.ArmAfter(
+      std::chrono::microseconds(static_cast<std::int64_t>(parts_.config.appliance.scan_limit_s.value_or(settings.scan_limit_s) * 1e6)));
+}
+
+ScanJob Appliance::MakeJob(const web::Settings& settings) {
+  ScanJob job;
+  job.info = sensors_->snapshot().info;
+  job.reconstructor = parts_.config.reconstruct;
+  job.reconstructor.keep_color = false;  // of a patient only the shape is kept
+  job.keep_recording = parts_.config.appliance.keep_recordings || settings.keep_recordings;
+  job.stop_after_s = parts_.config.appliance.auto_stop_s.value_or(settings.auto_stop_s);
+  const std::optional<web::Reference> reference = store_->ApprovedReference(scan_.patient_id);
+  if (reference) scan_.reference_area_m2 = store_->SweptArea(reference->scan_id);
+  if (!reference && scan_.purpose == web::ScanPurpose::kFraction) scan_.purpose = web::ScanPurpose::kReference;
+  job.is_reference = scan_.purpose == web::ScanPurpose::kReference;
+  if (reference && scan_.purpose == web::ScanPurpose::kFraction) {
+    scan_.reference_id = reference->id;
+    job.reference_scene = store_->ScanFolder(reference->scan_id) / "scene";
+    job.compare = CompareOptionsFor(reference->plan);
+  }
+  return job;
+}
+
+CompareOptions Appliance::CompareOptionsFor(const web::ReferencePlan& plan) const {
+  CompareOptions options = parts_.config.compare;
+  options.now_s = SteadySeconds;
+  if (!plan.region_m.empty()) {
+    options.region_polygon_m.clear();
+    for (const auto& [x, y] : plan.region_m) options.region_polygon_m.emplace_back(x, y);
+  }
+  if (plan.isocentre_m) options.isocentre_m = Eigen::Vector3d(plan.isocentre_m->data());
+  options.marker_kind = plan.couch_markers ? MarkerKind::kCouch : MarkerKind::kRoom;
+  options.posture = PostureOf(plan.posture, options.posture);
+  options.shift_tolerance_m = plan.tolerance.shift_mm * kMillimetre;
+  options.rotation_tolerance_rad = plan.tolerance.rotation_deg * kDegree;
+  return options;
+}
+
+web::ReferencePlan Appliance::DefaultPlan() {
+  const web::Settings settings = store_ ? store_->GetSettings() : web::Settings{};
+  return {.region_m = {},
+          .isocentre_m = {},
+          .tolerance = settings.tolerance,
+          .posture = settings.posture,
+          .couch_markers = settings.couch_markers};
+}
+
+/// They run on the scan's thread: they use the store, which is thread-safe, and copies; everything else is posted.
+ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
+  ScanCallbacks callbacks;
+  auto id = std::make_shared<std::string>();
+  callbacks.begin = [this, record, id] {
+    *id = store_->BeginScan(record);
+    loop_.Post([this, id] { scan_.id = *id; });
+    return store_->StagingFolder(*id);
+  };
+  const bool is_demo = !parts_.demo_patient.empty() && record.purpose == web::ScanPurpose::kReference;
+  const web::ReferencePlan plan = DefaultPlan();
+  callbacks.save = [this, id, plan, is_demo, patient = record.patient_id](const ScanOutcome& outcome) {
+    if (id->empty()) return;  // it never began
+    using Kind = ScanOutcome::Kind;
+    FinishedScan finished{.failure = outcome.reason, .result_json = outcome.result_json, .swept_area_m2 = outcome.swept_area_m2};
+    if (outcome.kind == Kind::kDone) finished.outcome = web::ScanOutcome::kDone;
+    if (outcome.kind == Kind::kCancelled) finished.outcome = web::ScanOutcome::kCancelled;
+    store_->FinishScan(*id, finished);
+    const auto demo = store_->FindPatientByCode(parts_.demo_patient);
+    if (!is_demo || !demo || demo->id != patient || outcome.kind != Kind::kDone) return;
+    store_->ApproveReference(kAuto, store_->AddReference(kAuto, *id, "first scan of the demo", plan), /*two_users=*/false);
+  };
+  callbacks.update = [this](const ScanUpdate& update) { loop_.Post([this, update] { OnUpdate(update); }); };
+  callbacks.sweep_complete = [this] { loop_.Post([this] { (void)Handle(ScanEvent::kSweepComplete); }); };
+  callbacks.ended = [this](const ScanOutcome& outcome) { loop_.Post([this, outcome] { OnEnded(outcome); }); };
+  return callbacks;
+}
+
+void Appliance::OnSensor(const SensorEvent& event) {
+  sensor_fault_ = event.reason;
+  switch (event.kind) {
+    case SensorEvent::Kind::kReady:
+      sensor_since_ = Clock::now();
+      Log(LogLevel::kInfo, "the sensor is ready", {{"SERIAL", event.sensor.serial}});
+      break;
+    case SensorEvent::Kind::kLost:
+      Log(LogLevel::kNotice, "no sensor is attached");
+      break;
+    case SensorEvent::Kind::kFailed:
+      Log(LogLevel::kError, fmt::format("the sensor does not work: {}", event.reason), {{"SERIAL", event.sensor.serial}});
+      break;
+  }
+  const char* kNames[] = {"ready", "lost", "failed"};
+  TellEvent("sensor",
+            Json{{"what", kNames[static_cast<int>(event.kind)]}, {"serial", event.sensor.serial}, {"reason", event.reason}}.dump());
+  (void)Handle(event.kind == SensorEvent::Kind::kReady  ? ScanEvent::kSensorReady
+               : event.kind == SensorEvent::Kind::kLost ? ScanEvent::kSensorLost
+                                                        : ScanEvent::kSensorFailed);
+  TellWeb(web::EventKind::kStatus);
+}
+
+void Appliance::OnUpdate(const ScanUpdate& update) {
+  if (scan_.has_ended) return;
+  if (update.frames > 0 && scan_.update.frames == 0) scan_.first_frame_ms = Milliseconds(Clock::now() - scan_.started);
+  scan_.update = update;
+  Show();
+  const Json coverage = Coverage() ? Json(*Coverage()) : Json(nullptr);
+  TellEvent("progress", Json{{"scan", scan_.id},
+                             {"step", update.step},
+                             {"fraction", update.fraction},
+                             {"frames", update.frames},
+                             {"frames_tracked", update.frames_tracked},
+                             {"frames_dropped", update.frames_dropped},
+                             {"advice", Name(update.guidance.advice)},
+                             {"speed_m_s", update.guidance.speed_m_s},
+                             {"median_depth_m", update.guidance.median_depth_m},
+                             {"area_m2", update.guidance.area_m2},
+                             {"coverage", coverage}}
+                            .dump());
+  TellWeb(web::EventKind::kProgress);
+}
+
+void Appliance::OnEnded(const ScanOutcome& outcome) {
+  using Kind = ScanOutcome::Kind;
+  limit_timer_.Disarm();
+  sensors_->EndScan();
+  session_.reset();  // joins a thread that has nothing left to do
+  scan_.has_ended = true;
+  scan_.outcome = outcome;
+  if (outcome.kind == Kind::kCancelled) {
+    scan_.cancel_ms = Milliseconds(Clock::now() - scan_.cancelled_at);
+    Log(LogLevel::kNotice, fmt::format("the scan was discarded within {:.0f} ms", scan_.cancel_ms), {{"SCAN", scan_.id}});
+    (void)Handle(ScanEvent::kScanCancelled);
+  } else if (outcome.kind == Kind::kFailed) {
+    scan_fault_ = fmt::format("the scan failed: {}", outcome.reason);
+    Log(LogLevel::kError, scan_fault_, {{"SCAN", scan_.id}});
+    (void)Handle(ScanEvent::kScanFailed);
+  } else {
+    last_result_ = scan_;
+    const std::string answer = outcome.verdict ? Name(*outcome.verdict) : outcome.kind == Kind::kNoScene ? outcome.reason : "no comparison";
+    Log(LogLevel::kInfo,
+        fmt::format("the scan is done {:.2f} s after its last frame, {} frames, {} dropped: {}", outcome.after_last_frame_s, outcome.frames,
+                    outcome.frames_dropped, answer),
+        {{"SCAN", scan_.id}});
+    (void)Handle(ScanEvent::kScanDone);
+    TellEvent("result", Json{{"scan", scan_.id}, {"answer", answer}}.dump());
+  }
+  if (reference_reason_.empty() && outcome.kind == Kind::kDone) purpose_ = web::ScanPurpose::kFraction;
+  TellWeb(web::EventKind::kResult);
+  TellWeb(web::EventKind::kData);
+  Care();
+  if (stopped_) std::exchange(stopped_, nullptr)();
+}
+
+/// Retention and quota, off the loop.
+void Appliance::Care() {
+  if (store_ == nullptr) return;
+  const auto quota = static_cast<std::uint64_t>(parts_.config.appliance.quota_gb * 1e9);
+  const bool posted = store_thread_.Post([this, quota] {
+    try {
+      const int old = store_->RemoveOldScans(store_->GetSettings().retention_days);
+      const int over = store_->KeepWithinQuota(quota);
+      if (old + over > 0) Log(LogLevel::kNotice, fmt::format("removed {} scans for their age, {} for the quota", old, over));
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError, fmt::format("cannot remove old scans: {}", error.what()));
+    }
+  });
+  if (!posted) Log(LogLevel::kWarning, "the store is too busy to remove old scans now");
+}
+
+void Appliance::OpenPatient(const std::string& patient_id, web::ScanPurpose purpose, const std::string& reason) {
+  open_patient_ = patient_id;
+  purpose_ = purpose;
+  reference_reason_ = reason;
+  TellWeb(web::EventKind::kStatus);
+}
+
+void Appliance::Reload(const Config& config) {
+  const ApplianceConfig& now = parts_.config.appliance;
+  const ApplianceConfig& next = config.appliance;
+  if (now.state != next.state || now.control != next.control || now.sensor_serial != next.sensor_serial ||
+      now.calibration != next.calibration || parts_.config.web.listen != config.web.listen) {
+    Log(LogLevel::kWarning, "state, control, calibration, sensor_serial and listen change only with a restart");
+  }
+  const ApplianceConfig kept = now;
+  parts_.config = config;
+  parts_.config.appliance.state = kept.state;
+  parts_.config.appliance.control = kept.control;
+  parts_.config.appliance.sensor_serial = kept.sensor_serial;
+  parts_.config.appliance.calibration = kept.calibration;
+  Log(LogLevel::kInfo, "the configuration was read again");
+}
+
+void Appliance::Stop(std::function<void()> stopped) {
+  const bool is_running = state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking;
+  if (!is_running) {
+    stopped();
+    stopped_ = [] {};
+    return;
+  }
+  stopped_ = std::move(stopped);
+  if (!state_.cancelling) (void)Handle(ScanEvent::kCancel);
+}
+
+void Appliance::OnTick() {
+  tick_timer_.ArmAfter(kTick);
+  if (parts_.button != nullptr && button_source_.is_armed()) ArmButtonTimer();
+}
+
+bool Appliance::WorkersAreAlive() const {
+  const double now_s = SteadySeconds();
+  if (now_s - sensors_->heartbeat_s() > kSensorSilence_s) return false;
+  // While sweeping the scan's thread waits for frames; that frames come is the sensor thread's matter.
+  const bool is_working = state_.phase == ScanPhase::kWorking && session_ != nullptr;
+  return !is_working || now_s - session_->heartbeat_s() < kWorkerSilence_s;
+}
+
+}  // namespace plumb

@@ -1,0 +1,146 @@
+// The appliance: sensor, button, light, scans and store behind one state, on the event loop.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/config.hpp"
+#include "daemon/event_loop.hpp"
+#include "daemon/scan_session.hpp"
+#include "daemon/scan_state.hpp"
+#include "daemon/sensor_thread.hpp"
+#include "daemon/store/store.hpp"
+#include "daemon/work_thread.hpp"
+#include "drivers/button.hpp"
+#include "drivers/indicator.hpp"
+
+namespace plumb {
+
+/// What an appliance is made of. Borrowed objects live longer than it.
+struct ApplianceParts {
+  Config config;
+  std::function<std::unique_ptr<SensorProvider>()> make_provider;  ///< Called on the sensor thread.
+  std::function<void()> before_scan;                               ///< See SensorThreadOptions.
+  Button* button = nullptr;                                        ///< None: only others press.
+  Indicator* indicator = nullptr;
+  /// The patient whom scans belong to while nobody opened another; its first scan becomes its reference, approved by "auto".
+  /// Empty: a patient must be opened first.
+  std::string demo_patient;
+};
+
+/// Everything belongs to the loop's thread but what its own threads do; see ARCHITECTURE in the README. Functions return at once.
+class Appliance {
+ public:
+  Appliance(EventLoop& loop, ApplianceParts parts);
+  ~Appliance();
+  Appliance(const Appliance&) = delete;
+  Appliance& operator=(const Appliance&) = delete;
+
+  /// Empty when the appliance does it, else one sentence why not.
+  using Answer = std::string;
+  Answer Press(ButtonPress press);
+  /// Discards the running scan.
+  Answer Cancel();
+  /// The next scan's patient and purpose. Empty id: none.
+  void OpenPatient(const std::string& patient_id, web::ScanPurpose purpose, const std::string& reason);
+  /// Takes over what may change while running; what may not is logged. For SIGHUP.
+  void Reload(const Config& config);
+  /// Calls `stopped` once no scan runs any more; a running one is discarded.
+  void Stop(std::function<void()> stopped);
+
+  /// Each event as one JSON object ({"event", "time", ...}); to the control socket's watchers.
+  void SetEventListener(std::function<void(const std::string& line)> listener) { tell_watchers_ = std::move(listener); }
+  void SetWebListener(std::function<void(web::EventKind)> listener) { tell_web_ = std::move(listener); }
+
+  [[nodiscard]] std::string StatusJson();
+  [[nodiscard]] web::Status WebStatus();
+  [[nodiscard]] web::Health Health();
+  /// One line for systemd.
+  [[nodiscard]] std::string StatusLine() const;
+  /// False while a busy worker shows no progress: systemd's watchdog must then not be fed.
+  [[nodiscard]] bool WorkersAreAlive() const;
+
+  /// Null in safe mode.
+  [[nodiscard]] Store* store() { return store_.get(); }
+  [[nodiscard]] const std::string& storage_fault() const { return storage_fault_; }
+  [[nodiscard]] std::optional<Frame> LatestFrame() const { return sensors_->latest(); }
+  [[nodiscard]] const ScanState& state() const { return state_; }
+  /// Changes of the store, one after the other, off the loop.
+  [[nodiscard]] WorkThread& store_thread() { return store_thread_; }
+  [[nodiscard]] EventLoop& loop() { return loop_; }
+  /// Of a new reference, from settings and configuration.
+  [[nodiscard]] web::ReferencePlan DefaultPlan();
+  void TellData() { TellWeb(web::EventKind::kData); }
+
+ private:
+  /// The scan that runs, or the last one.
+  struct CurrentScan {
+    std::string id;  ///< Empty until the store gave one.
+    std::string patient_id;
+    std::string reference_id;
+    web::ScanPurpose purpose = web::ScanPurpose::kFraction;
+    double reference_area_m2 = 0.0;
+    std::chrono::steady_clock::time_point started;
+    double first_frame_ms = 0.0;  ///< From the press to the first frame used.
+    double cancel_ms = 0.0;       ///< From the cancellation to its end.
+    std::chrono::steady_clock::time_point cancelled_at;
+    ScanUpdate update;
+    ScanOutcome outcome;
+    bool has_ended = false;
+  };
+
+  void OpenStore();
+  Answer Handle(ScanEvent event);
+  void Act(ScanAction action);
+  Answer WhyNotScan() const;
+  void StartScan();
+  void BeginSession();
+  [[nodiscard]] ScanJob MakeJob(const web::Settings& settings);
+  [[nodiscard]] ScanCallbacks MakeCallbacks(const NewScan& scan);
+  [[nodiscard]] CompareOptions CompareOptionsFor(const web::ReferencePlan& plan) const;
+  void OnSensor(const SensorEvent& event);
+  void OnUpdate(const ScanUpdate& update);
+  void OnEnded(const ScanOutcome& outcome);
+  void OnTick();
+  void WatchButton();
+  void ArmButtonTimer();
+  void Care();
+  void Show();
+  [[nodiscard]] IndicatorPattern Pattern() const;
+  void TellEvent(const char* event, const std::string& fields_json);
+  void TellState();
+  void TellWeb(web::EventKind kind);
+  [[nodiscard]] std::optional<double> Coverage() const;
+  [[nodiscard]] std::string FaultReason() const;
+
+  EventLoop& loop_;
+  ApplianceParts parts_;
+  std::unique_ptr<Store> store_;
+  std::string storage_fault_;
+  ScanState state_;
+  std::string sensor_fault_, scan_fault_;
+  std::string open_patient_, reference_reason_;
+  web::ScanPurpose purpose_ = web::ScanPurpose::kFraction;
+  CurrentScan scan_;
+  std::optional<CurrentScan> last_result_;
+  std::chrono::steady_clock::time_point sensor_since_;
+  IndicatorPattern shown_ = IndicatorPattern::kOff;
+  std::function<void(const std::string&)> tell_watchers_;
+  std::function<void(web::EventKind)> tell_web_;
+  std::function<void()> stopped_;
+  EventLoop::Source result_timer_, limit_timer_, tick_timer_, button_source_, button_timer_;
+  WorkThread store_thread_{256};
+  std::unique_ptr<SensorThread> sensors_;
+  std::unique_ptr<ScanSession> session_;  // last: its thread uses what is above
+};
+
+/// "off", "no_sensor", "ready", ...
+[[nodiscard]] const char* Name(IndicatorPattern pattern);
+
+}  // namespace plumb

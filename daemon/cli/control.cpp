@@ -1,0 +1,162 @@
+// `plumb status|press|watch|sim`: talks to a running plumbd through its control socket.
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <optional>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "algo/types/errors.hpp"
+#include "daemon/cli/commands.hpp"
+#include "daemon/control/control_protocol.hpp"
+#include "daemon/control/unix_socket.hpp"
+
+namespace plumb {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::size_t kMaxAnswer = 4 << 20;
+
+/// A conversation with plumbd, line by line.
+class ControlConnection {
+ public:
+  ControlConnection(const std::filesystem::path& socket, const ControlRequest& request) : fd_(ConnectUnix(socket)) {
+    const std::string line = ControlRequestText(request) + "\n";
+    if (::send(fd_, line.data(), line.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(line.size())) {
+      ::close(fd_);
+      throw DeviceError("plumbd hung up before it was asked");
+    }
+  }
+  ~ControlConnection() { ::close(fd_); }
+  ControlConnection(const ControlConnection&) = delete;
+  ControlConnection& operator=(const ControlConnection&) = delete;
+
+  /// Nothing once plumbd hangs up. @throws Interrupted on a stop request, DeviceError if no answer comes in time.
+  std::optional<std::string> ReadLine(const std::stop_token& stop, std::optional<int> timeout_ms) {
+    for (int waited_ms = 0;;) {
+      if (const std::size_t end = received_.find('\n'); end != std::string::npos) {
+        std::string line = received_.substr(0, end);
+        received_.erase(0, end + 1);
+        return line;
+      }
+      if (received_.size() > kMaxAnswer) throw DeviceError("plumbd answers without end");
+      constexpr int kStep_ms = 100;
+      pollfd ready{.fd = fd_, .events = POLLIN, .revents = 0};
+      if (::poll(&ready, 1, kStep_ms) == 0) waited_ms += kStep_ms;
+      if (stop.stop_requested()) throw Interrupted("stopped waiting for plumbd");
+      if (timeout_ms && waited_ms >= *timeout_ms) throw DeviceError(fmt::format("plumbd did not answer within {} s", *timeout_ms / 1000));
+      if (ready.revents == 0) continue;
+      char buffer[4096];
+      const ssize_t count = ::recv(fd_, buffer, sizeof(buffer), 0);
+      if (count < 0 && errno == EINTR) continue;
+      if (count <= 0) return std::nullopt;
+      received_.append(buffer, static_cast<std::size_t>(count));
+    }
+  }
+
+ private:
+  int fd_;
+  std::string received_;
+};
+
+Json Ask(const std::filesystem::path& socket, const ControlRequest& request, const CommandContext& context) {
+  constexpr int kTimeout_ms = 10'000;
+  ControlConnection connection(socket, request);
+  const std::optional<std::string> line = connection.ReadLine(context.stop, kTimeout_ms);
+  if (!line) throw DeviceError("plumbd hung up without an answer");
+  const Json answer = Json::parse(*line, nullptr, /*allow_exceptions=*/false);
+  if (!answer.is_object()) throw DeviceError("plumbd's answer is no JSON object; are both of one version?");
+  return answer;
+}
+
+std::string NumberText(const Json& result, const char* name) {
+  const Json value = result.value(name, Json());
+  return value.is_number() ? fmt::format("{:+.2f}", value.get<double>()) : std::string("refused");
+}
+
+std::string StatusText(const Json& status) {
+  const Json sensor = status.value("sensor", Json::object());
+  const Json scan = status.value("scan", Json::object());
+  std::string text = fmt::format("state    {}{}\n", status.value("state", "?"),
+                                 status.value("reason", "").empty() ? "" : ": " + status.value("reason", ""));
+  text += sensor.value("present", false) ? fmt::format("sensor   {} ({}), {:.1f} pairs/s\n", sensor.value("serial", ""),
+                                                       sensor.value("name", ""), sensor.value("fps", 0.0))
+                                         : std::string("sensor   none\n");
+  if (scan.value("active", false)) {
+    text +=
+        fmt::format("scan     {} {}: {} frames, {} tracked, {} dropped; {}\n", scan.value("id", ""), scan.value("step", ""),
+                    scan.value("frames", 0), scan.value("frames_tracked", 0), scan.value("frames_dropped", 0), scan.value("advice", ""));
+  }
+  if (const Json last = status.value("last_result", Json()); last.is_object()) {
+    const Json verdict = last.value("verdict", Json());
+    text +=
+        fmt::format("result   scan {}: {}\n", last.value("scan", ""), verdict.is_string() ? verdict.get<std::string>() : "reference taken");
+    if (last.value("correction", Json()).is_object()) {
+      for (const auto& [name, unit] : {std::pair("vertical", "mm"), std::pair("longitudinal", "mm"), std::pair("lateral", "mm"),
+                                       std::pair("pitch", "deg"), std::pair("roll", "deg"), std::pair("yaw", "deg")}) {
+        text += fmt::format("         {:<13}{:>9} {}\n", name, NumberText(last, fmt::format("{}_{}", name, unit).c_str()), unit);
+      }
+    }
+    for (const Json& reason : last.value("reasons", Json::array()))
+      text += fmt::format("         {}\n", reason.is_string() ? reason.get<std::string>() : "");
+  }
+  return text + fmt::format("version  {}\n", status.value("version", ""));
+}
+
+/// Presses are ignored in some states: that is no failure, but it is said.
+int Press(bool is_long, const CommandContext& context) {
+  const Json answer = Ask(context.control, {.kind = ControlRequest::Kind::kPress, .is_long = is_long, .action = {}}, context);
+  PrintOut(answer.value("ok", false) ? std::string("pressed\n") : fmt::format("ignored: {}\n", answer.value("error", "no reason given")));
+  return kDone;
+}
+
+int Simulate(const std::string& action, const CommandContext& context) {
+  const Json answer = Ask(context.control, {.kind = ControlRequest::Kind::kSim, .is_long = false, .action = action}, context);
+  if (!answer.value("ok", false)) throw DeviceError(answer.value("error", "refused without a reason"));
+  return kDone;
+}
+
+int Status(bool json, const CommandContext& context) {
+  const Json status = Ask(context.control, {}, context);
+  PrintOut(json ? status.dump(2, ' ', false, Json::error_handler_t::replace) + "\n" : StatusText(status));
+  return kDone;
+}
+
+int Watch(const CommandContext& context) {
+  ControlConnection connection(context.control, {.kind = ControlRequest::Kind::kWatch, .is_long = false, .action = {}});
+  while (const std::optional<std::string> line = connection.ReadLine(context.stop, std::nullopt)) PrintOut(*line + "\n");
+  throw DeviceError("plumbd hung up");
+}
+
+}  // namespace
+
+Command AddStatus(CLI::App& app) {
+  auto json = std::make_shared<bool>(false);
+  app.add_flag("--json", *json, "Print the status as JSON");
+  return [json](const CommandContext& context) { return Status(*json, context); };
+}
+
+Command AddPress(CLI::App& app) {
+  auto is_long = std::make_shared<bool>(false);
+  app.add_flag("--long", *is_long, "A long press: discards the running scan, puts a result away");
+  return [is_long](const CommandContext& context) { return Press(*is_long, context); };
+}
+
+Command AddWatch(CLI::App&) { return Watch; }
+
+Command AddSim(CLI::App& app) {
+  auto action = std::make_shared<std::string>();
+  app.add_option("action", *action, "What happens to the virtual sensor")
+      ->required()
+      ->check(CLI::IsMember({"plug", "unplug", "stall", "resume", "error", "next-scene"}));
+  return [action](const CommandContext& context) { return Simulate(*action, context); };
+}
+
+}  // namespace plumb

@@ -1,0 +1,142 @@
+#include "daemon/control/control_server.hpp"
+
+#include <sys/epoll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <utility>
+#include <vector>
+
+#include "algo/types/errors.hpp"
+
+namespace plumb {
+
+struct ControlServer::Client {
+  int fd = -1;
+  std::string in, out;
+  bool watches = false;
+  bool at_end = false;  ///< It sends no more; it goes once it has read what waits for it.
+  int unanswered = 0;
+  EventLoop::Source source;
+  ~Client() {
+    source = {};
+    if (fd >= 0) ::close(fd);
+  }
+};
+
+ControlServer::ControlServer(EventLoop& loop, int listening, Handler handler, const ControlServerOptions& options)
+    : loop_(loop), listening_(listening), handler_(std::move(handler)), options_(options) {
+  source_ = loop_.WatchDescriptor(listening_, EPOLLIN, [this](std::uint32_t) { Accept(); });
+}
+
+ControlServer::~ControlServer() {
+  *alive_ = false;
+  source_ = {};
+  clients_.clear();
+  ::close(listening_);
+}
+
+void ControlServer::Accept() {
+  const int fd = ::accept4(listening_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  if (fd < 0) return;
+  if (clients_.size() >= options_.max_clients) {
+    ::close(fd);
+    return;
+  }
+  const std::uint64_t id = next_id_++;
+  auto client = std::make_unique<Client>();
+  client->fd = fd;
+  client->source = loop_.WatchDescriptor(fd, EPOLLIN, [this, id](std::uint32_t events) {
+    if ((events & EPOLLOUT) != 0) Flush(id);
+    if ((events & EPOLLIN) != 0) {
+      Read(id);
+    } else if ((events & (EPOLLHUP | EPOLLERR)) != 0) {
+      Drop(id);  // gone altogether: nobody is left to answer
+    }
+  });
+  clients_.emplace(id, std::move(client));
+}
+
+void ControlServer::Read(std::uint64_t id) {
+  const auto found = clients_.find(id);
+  if (found == clients_.end()) return;
+  Client& client = *found->second;
+  std::array<char, 4096> buffer;
+  const ssize_t count = ::recv(client.fd, buffer.data(), buffer.size(), 0);
+  if (count < 0 && (errno == EAGAIN || errno == EINTR)) return;
+  if (count < 0) return Drop(id);
+  if (count == 0) {
+    client.at_end = true;
+    // Who shut down only its writing side still gets its answer; a watcher has nothing to wait for but its own end.
+    if (client.out.empty() && client.unanswered == 0) return Drop(id);
+    client.source.SetEvents(EPOLLOUT);
+    return;
+  }
+  client.in.append(buffer.data(), static_cast<std::size_t>(count));
+  for (std::size_t end = 0; (end = client.in.find('\n')) != std::string::npos;) {
+    const std::string line = client.in.substr(0, end);
+    client.in.erase(0, end + 1);
+    HandleLine(id, line);
+    if (!clients_.contains(id)) return;
+  }
+  if (client.in.size() > kMaxControlLine) {
+    Send(id, ControlRefusal("the request is too long"));
+    Drop(id);
+  }
+}
+
+void ControlServer::HandleLine(std::uint64_t id, const std::string& line) {
+  try {
+    const ControlRequest request = ParseControlRequest(line);
+    Client& client = *clients_.at(id);
+    if (request.kind == ControlRequest::Kind::kWatch) client.watches = true;
+    ++client.unanswered;
+    handler_(request, [this, id, alive = alive_](const std::string& reply) {
+      if (!*alive) return;
+      if (const auto found = clients_.find(id); found != clients_.end()) --found->second->unanswered;
+      Send(id, reply);
+    });
+  } catch (const DataError& error) {
+    Send(id, ControlRefusal(error.what()));
+  }
+}
+
+void ControlServer::Send(std::uint64_t id, const std::string& line) {
+  const auto found = clients_.find(id);
+  if (found == clients_.end()) return;
+  Client& client = *found->second;
+  if (client.out.size() + line.size() + 1 > options_.max_waiting) return Drop(id);
+  client.out += line;
+  client.out += '\n';
+  Flush(id);
+}
+
+void ControlServer::Flush(std::uint64_t id) {
+  const auto found = clients_.find(id);
+  if (found == clients_.end()) return;
+  Client& client = *found->second;
+  while (!client.out.empty()) {
+    const ssize_t count = ::send(client.fd, client.out.data(), client.out.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0 && errno != EAGAIN) return Drop(id);
+    if (count < 0) break;
+    client.out.erase(0, static_cast<std::size_t>(count));
+  }
+  if (client.at_end && client.out.empty() && client.unanswered == 0) return Drop(id);
+  const std::uint32_t reading = client.at_end ? 0U : static_cast<std::uint32_t>(EPOLLIN);
+  client.source.SetEvents(client.out.empty() ? reading : reading | EPOLLOUT);
+}
+
+void ControlServer::Drop(std::uint64_t id) { clients_.erase(id); }
+
+void ControlServer::Broadcast(const std::string& line) {
+  std::vector<std::uint64_t> watchers;
+  for (const auto& [id, client] : clients_) {
+    if (client->watches) watchers.push_back(id);
+  }
+  for (const std::uint64_t id : watchers) Send(id, line);
+}
+
+}  // namespace plumb

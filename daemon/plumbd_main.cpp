@@ -1,0 +1,3 @@
+#include "daemon/plumbd.hpp"
+
+int main(int argc, char** argv) { return plumb::RunPlumbd(argc, argv); }

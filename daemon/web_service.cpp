@@ -1,0 +1,241 @@
+#include "daemon/web_service.hpp"
+
+#include <unistd.h>
+
+#include <cstring>
+#include <fstream>
+#include <utility>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include "daemon/log.hpp"
+#include "daemon/version.hpp"
+#include "drivers/replay/file_io.hpp"
+#include "drivers/replay/image_file.hpp"
+
+namespace plumb {
+
+using web::ChangeResult;
+
+namespace {
+
+constexpr auto kPreviewEvery = std::chrono::milliseconds(200);
+constexpr int kPreviewWidth = 320;
+constexpr int kPreviewQuality = 70;
+
+web::Change AnswerOf(const std::string& refusal) {
+  return {.result = refusal.empty() ? ChangeResult::kDone : ChangeResult::kConflict, .message = refusal, .id = {}, .file = {}};
+}
+
+std::string CheckSettings(const web::Settings& s) {
+  const auto out_of = [](double v, double least, double most) { return !(v >= least && v <= most); };
+  if (out_of(s.tolerance.shift_mm, 0.1, 100)) return "tolerance.shift_mm: expected 0.1 to 100";
+  if (out_of(s.tolerance.rotation_deg, 0.1, 45)) return "tolerance.rotation_deg: expected 0.1 to 45";
+  if (s.posture != "HFS" && s.posture != "HFP" && s.posture != "FFS" && s.posture != "FFP") return "posture: expected HFS, HFP, FFS or FFP";
+  if (out_of(s.auto_stop_s, 1, 120)) return "auto_stop_s: expected 1 to 120";
+  if (out_of(s.scan_limit_s, 5, 600)) return "scan_limit_s: expected 5 to 600";
+  if (out_of(s.retention_days, 0, 36500)) return "retention_days: expected 0 to 36500";
+  if (out_of(s.idle_logout_min, 1, 240)) return "idle_logout_min: expected 1 to 240";
+  return {};
+}
+
+}  // namespace
+
+void WebService::Change(web::Done done, std::function<std::string(Store&)> change) {
+  Store* store = appliance_.store();
+  if (store == nullptr) {
+    done({.result = ChangeResult::kFailed, .message = appliance_.storage_fault(), .id = {}, .file = {}});
+    return;
+  }
+  const bool posted = appliance_.store_thread().Post([this, store, done, change = std::move(change), alive = alive_] {
+    web::Change answer;
+    try {
+      answer.id = change(*store);
+    } catch (const StoreRefusal& refusal) {
+      answer = {.result = refusal.result(), .message = refusal.what(), .id = {}, .file = {}};
+    } catch (const DiskRefused& error) {
+      answer = {.result = ChangeResult::kNoSpace, .message = error.what(), .id = {}, .file = {}};
+    } catch (const std::exception& error) {
+      answer = {.result = ChangeResult::kFailed, .message = error.what(), .id = {}, .file = {}};
+    }
+    appliance_.loop().Post([this, done, answer, alive] {
+      if (!*alive) return;
+      done(answer);
+      if (answer.result == ChangeResult::kDone) appliance_.TellData();
+    });
+  });
+  if (!posted) done({.result = ChangeResult::kFailed, .message = "the store is busy: try again", .id = {}, .file = {}});
+}
+
+template <typename Result>
+Result WebService::Read(const std::function<Result(Store&)>& read, Result otherwise) const {
+  if (appliance_.store() == nullptr) return otherwise;
+  try {
+    return read(*appliance_.store());
+  } catch (const std::exception& error) {
+    plumb::Log(LogLevel::kError, fmt::format("cannot read the store: {}", error.what()));
+    return otherwise;
+  }
+}
+
+std::shared_ptr<const std::string> WebService::Preview() {
+  const auto now = std::chrono::steady_clock::now();
+  const std::optional<Frame> frame = appliance_.LatestFrame();
+  if (!frame) {
+    preview_.reset();
+    return nullptr;
+  }
+  if (preview_ && (now - preview_at_ < kPreviewEvery || frame->index == preview_index_)) return preview_;
+  cv::Mat small;
+  const int width = std::min(kPreviewWidth, frame->color_rgb.cols);
+  cv::resize(frame->color_rgb, small, {width, frame->color_rgb.rows * width / frame->color_rgb.cols}, 0, 0, cv::INTER_AREA);
+  const std::vector<std::uint8_t> jpeg = EncodeJpeg(small, kPreviewQuality);
+  preview_ = std::make_shared<const std::string>(jpeg.begin(), jpeg.end());
+  preview_at_ = now;
+  preview_index_ = frame->index;
+  return preview_;
+}
+
+void WebService::Press(const web::Actor& actor, web::Done done) {
+  const std::string refusal = appliance_.Press(ButtonPress::kShort);
+  if (refusal.empty()) Log(actor, "press", "", Name(appliance_.state().phase));
+  done(AnswerOf(refusal));
+}
+
+void WebService::Cancel(const web::Actor& actor, web::Done done) {
+  const std::string refusal = appliance_.Cancel();
+  if (refusal.empty()) Log(actor, "scan.cancel", "", "");
+  done(AnswerOf(refusal));
+}
+
+std::vector<web::Patient> WebService::Patients() {
+  return Read<std::vector<web::Patient>>([](Store& store) { return store.Patients(); }, {});
+}
+std::optional<web::Patient> WebService::FindPatient(const std::string& id) {
+  return Read<std::optional<web::Patient>>([&](Store& store) { return store.FindPatient(id); }, {});
+}
+
+void WebService::AddPatient(const web::Actor& actor, const std::string& code, const std::string& site, web::Done done) {
+  Change(std::move(done), [=](Store& store) { return store.AddPatient(actor, code, site); });
+}
+
+void WebService::WipePatient(const web::Actor& actor, const std::string& id, web::Done done) {
+  const web::Status status = appliance_.WebStatus();
+  if (status.scan && status.scan->patient_id == id) {
+    return done(AnswerOf("a scan of this patient is running: end or cancel it first"));
+  }
+  if (status.patient_id == id) appliance_.OpenPatient("", web::ScanPurpose::kFraction, "");
+  Change(std::move(done), [=](Store& store) { return store.WipePatient(actor, id), id; });
+}
+
+void WebService::OpenPatient(const web::Actor& actor, const std::string& id, web::ScanPurpose purpose, const std::string& reason,
+                             web::Done done) {
+  const std::optional<web::Patient> patient = FindPatient(id);
+  if (!patient) return done({.result = ChangeResult::kNotFound, .message = "there is no such patient", .id = {}, .file = {}});
+  const ScanPhase phase = appliance_.state().phase;
+  if (phase == ScanPhase::kScanning || phase == ScanPhase::kWorking) {
+    return done(
+        AnswerOf(fmt::format("in state {}, trying to open a patient, requires that no scan runs: wait for its result", Name(phase))));
+  }
+  if (purpose == web::ScanPurpose::kFraction && patient->approved_reference_id.empty()) {
+    return done(AnswerOf("this patient has no approved reference: take and approve one first"));
+  }
+  appliance_.OpenPatient(id, purpose, reason);
+  Change(std::move(done), [=](Store& store) { return store.Log(actor, "patient.open", id, ""), id; });
+}
+
+std::vector<web::Reference> WebService::References(const std::string& patient_id) {
+  return Read<std::vector<web::Reference>>([&](Store& store) { return store.References(patient_id); }, {});
+}
+std::optional<web::Reference> WebService::FindReference(const std::string& id) {
+  return Read<std::optional<web::Reference>>([&](Store& store) { return store.FindReference(id); }, {});
+}
+
+void WebService::AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason, web::Done done) {
+  Change(std::move(done), [=, plan = appliance_.DefaultPlan()](Store& store) { return store.AddReference(actor, scan_id, reason, plan); });
+}
+void WebService::PlanReference(const web::Actor& actor, const std::string& id, const web::ReferencePlan& plan, web::Done done) {
+  Change(std::move(done), [=](Store& store) { return store.PlanReference(actor, id, plan); });
+}
+void WebService::ApproveReference(const web::Actor& actor, const std::string& id, web::Done done) {
+  Change(std::move(done), [=](Store& store) { return store.ApproveReference(actor, id), id; });
+}
+
+std::vector<web::Scan> WebService::Scans(const std::string& patient_id, int limit) {
+  return Read<std::vector<web::Scan>>([&](Store& store) { return store.Scans(patient_id, limit); }, {});
+}
+std::optional<web::Scan> WebService::FindScan(const std::string& id) {
+  return Read<std::optional<web::Scan>>([&](Store& store) { return store.FindScan(id); }, {});
+}
+void WebService::AcceptScan(const web::Actor& actor, const std::string& id, web::Done done) {
+  Change(std::move(done), [=](Store& store) { return store.AcceptScan(actor, id), id; });
+}
+
+std::vector<web::User> WebService::Users() {
+  return Read<std::vector<web::User>>([](Store& store) { return store.Users(); }, {});
+}
+std::optional<web::User> WebService::FindUser(const std::string& name) {
+  return Read<std::optional<web::User>>([&](Store& store) { return store.FindUser(name); }, {});
+}
+void WebService::AddUser(const web::Actor& actor, const web::User& user, web::Done done) {
+  Change(std::move(done), [=](Store& store) { return store.AddUser(actor, user), user.name; });
+}
+void WebService::ChangeUser(const web::Actor& actor, const web::User& user, web::Done done) {
+  Change(std::move(done), [=](Store& store) { return store.ChangeUser(actor, user), user.name; });
+}
+
+void WebService::Log(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) {
+  const auto report = [action](const web::Change& answer) {
+    if (answer.result == ChangeResult::kDone) return;
+    plumb::Log(LogLevel::kError, fmt::format("the audit log does not take '{}': {}", action, answer.message));
+  };
+  Change(report, [=](Store& store) { return store.Log(actor, action, subject, detail), std::string(); });
+}
+
+std::vector<web::AuditEntry> WebService::Audit(std::int64_t before, int limit) {
+  return Read<std::vector<web::AuditEntry>>([&](Store& store) { return store.Audit(before, limit); }, {});
+}
+web::Settings WebService::GetSettings() {
+  return Read<web::Settings>([](Store& store) { return store.GetSettings(); }, {});
+}
+
+void WebService::ChangeSettings(const web::Actor& actor, const web::Settings& settings, web::Done done) {
+  if (const std::string wrong = CheckSettings(settings); !wrong.empty()) {
+    return done({.result = ChangeResult::kInvalid, .message = wrong, .id = {}, .file = {}});
+  }
+  Change(std::move(done), [=](Store& store) { return store.ChangeSettings(actor, settings), std::string(); });
+}
+
+web::UpdateStatus WebService::GetUpdate() {
+  web::UpdateStatus status;
+  status.message = "this is no appliance image: update its packages instead";
+  return status;
+}
+
+void WebService::InstallUpdate(const web::Actor&, const std::string&, web::Done done) { done(AnswerOf(GetUpdate().message)); }
+
+/// Versions, status, health and the audit log's actions: nothing of a patient, no names of scans' owners.
+void WebService::WriteDiagnostics(const web::Actor& actor, web::Done done) {
+  const std::string status = appliance_.StatusJson();
+  const web::Health health = appliance_.Health();
+  const auto report = [done, alive = alive_](const web::Change& change) {
+    web::Change answer = change;
+    answer.file = std::exchange(answer.id, {});
+    done(answer);
+  };
+  Change(report, [=](Store& store) {
+    std::string text =
+        fmt::format("plumbd {}\nhealth: {}\nstatus: {}\n\nlast actions:\n", Version(), health.ok ? "ok" : health.reason, status);
+    for (const web::AuditEntry& entry : store.Audit(0, 500)) text += fmt::format("{} {} {}\n", entry.number, entry.action, entry.subject);
+    std::string name = (std::filesystem::temp_directory_path() / "plumb-diagnostics-XXXXXX").string();
+    const int fd = ::mkstemp(name.data());
+    if (fd < 0) throw DiskRefused(DescribeWriteError(name, errno));
+    ::close(fd);
+    WriteWholeFile(name, text);
+    store.Log(actor, "diagnostics.write", "", "");
+    return name;
+  });
+}
+
+}  // namespace plumb
