@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,7 +31,8 @@ struct HttpServerOptions {
   unsigned max_event_streams = 32;
   std::uint64_t password_memory_bytes = 64 << 20;  ///< Of argon2id; one hash runs at a time.
   std::uint64_t password_operations = 3;
-  std::chrono::seconds session_limit{12 * 3600};  ///< A session ends then, however busy.
+  std::chrono::seconds session_limit{12 * 3600};               ///< A session ends then, however busy.
+  std::function<std::chrono::steady_clock::time_point()> now;  ///< For tests; empty: the steady clock.
 };
 
 /// Serves the page, the API under /api/v1 (web/openapi.yaml), the event stream and GET /health.
@@ -53,6 +55,8 @@ class HttpServer {
   [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const;
 
   [[nodiscard]] std::uint16_t port() const;
+  /// "GET /api/v1/status view" for each route: method, path and permission; for the documentation and its test.
+  [[nodiscard]] std::vector<std::string> RouteNames() const;
   /// "XXXX-XXXX" while there is no account: whoever types it makes the first one, an engineer. Print it where only the owner looks.
   [[nodiscard]] std::optional<std::string> setup_code() const;
 

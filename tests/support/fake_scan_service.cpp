@@ -1,0 +1,336 @@
+#include "tests/support/fake_scan_service.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace plumb::test {
+
+using namespace web;  // NOLINT: a test's own names are none of these
+
+namespace {
+
+Change Refusal(ChangeResult result, std::string message) { return {result, std::move(message), "", ""}; }
+
+template <typename T>
+std::optional<T> FindById(const std::vector<T>& items, const std::string& id) {
+  const auto found = std::find_if(items.begin(), items.end(), [&](const T& item) { return item.id == id; });
+  return found == items.end() ? std::nullopt : std::optional(*found);
+}
+
+}  // namespace
+
+FakeScanService::FakeScanService() {
+  status.state = ApplianceState::kReady;
+  status.sensor = {true, "1503150045", "Virtual Xtion", 30.0, 1800.0};
+  status.storage = {std::int64_t{182} << 30, std::int64_t{238} << 30, true};
+  status.light = "ready";
+  status.version = "0.1.0-test";
+  update.message = "updates need the appliance image";
+}
+
+void FakeScanService::Tell(EventKind kind) const {
+  if (listener_) listener_(kind);
+}
+
+void FakeScanService::Finish(const Done& done, Change change) {
+  if (hold_completions) {
+    held.push_back([done, change] { done(change); });
+  } else {
+    done(change);
+  }
+}
+
+void FakeScanService::Did(const Actor& actor, const std::string& action, const std::string& subject, const Done& done,
+                          const std::string& id) {
+  Log(actor, action, subject, "");
+  Tell(EventKind::kData);
+  Finish(done, {ChangeResult::kDone, "", id, ""});
+}
+
+Patient* FakeScanService::PatientOf(const std::string& id) {
+  const auto found = std::find_if(patients.begin(), patients.end(), [&](const Patient& patient) { return patient.id == id; });
+  return found == patients.end() ? nullptr : &*found;
+}
+
+void FakeScanService::Press(const Actor& actor, Done done) {
+  if (status.state == ApplianceState::kScanning) {
+    phase_begun_.reset();
+    status.state = ApplianceState::kWorking;
+    status.light = "working";
+    status.scan->step = "surfaces";
+    Tell(EventKind::kStatus);
+    return Did(actor, "press", status.scan->id, done);
+  }
+  if (status.state != ApplianceState::kReady && status.state != ApplianceState::kResult) {
+    return Finish(done, Refusal(ChangeResult::kConflict, "in this state a press is ignored; it requires ready, scanning or result"));
+  }
+  Scan scan;
+  scan.id = fmt::format("s{:04}", next_id_++);
+  scan.patient_id = status.patient_id;
+  scan.purpose = status.next_purpose;
+  if (const Patient* patient = PatientOf(status.patient_id); patient != nullptr && scan.purpose == ScanPurpose::kFraction) {
+    scan.reference_id = patient->approved_reference_id;
+  }
+  scan.started_at = WallClock::now();
+  scans.push_back(scan);
+  status.scan = LiveScan{.id = scan.id, .patient_id = scan.patient_id, .purpose = scan.purpose, .coverage = 0.0, .step = "tracking"};
+  status.state = ApplianceState::kScanning;
+  status.light = "scanning";
+  phase_begun_.reset();
+  Tell(EventKind::kStatus);
+  Did(actor, "press", scan.id, done);
+}
+
+void FakeScanService::Cancel(const Actor& actor, Done done) {
+  if (!status.scan)
+    return Finish(done, Refusal(ChangeResult::kConflict, "in this state there is nothing to cancel; it requires scanning or working"));
+  scans.back().outcome = ScanOutcome::kCancelled;
+  scans.back().failure = "cancelled";
+  const std::string id = status.scan->id;
+  status.scan.reset();
+  status.state = ApplianceState::kReady;
+  status.light = "ready";
+  Tell(EventKind::kStatus);
+  Did(actor, "cancel", id, done);
+}
+
+void FakeScanService::Tick(std::chrono::steady_clock::time_point now) {
+  if (!status.scan) return;
+  if (!phase_begun_) phase_begun_ = now;
+  const auto elapsed = std::chrono::duration_cast<std::chrono::milliseconds>(now - *phase_begun_);
+  LiveScan& scan = *status.scan;
+  if (status.state == ApplianceState::kScanning) {
+    const double fraction = std::min(1.0, static_cast<double>(elapsed.count()) / static_cast<double>(sweep.count()));
+    scan.elapsed_s = static_cast<double>(elapsed.count()) / 1000.0;
+    scan.coverage = fraction;
+    scan.guidance = fraction > 0.3 && fraction < 0.6 ? Guidance::kSlower : Guidance::kNone;
+    status.light = scan.guidance == Guidance::kSlower ? "too_fast" : "scanning";
+    scan.frames = static_cast<std::int64_t>(scan.elapsed_s * 30);
+    scan.frames_tracked = scan.frames;
+    scan.keyframes = scan.frames / 4;
+    if (fraction >= 1.0) {
+      phase_begun_ = now;
+      status.state = ApplianceState::kWorking;
+      status.light = "working";
+      scan.step = "surfaces";
+      scan.guidance = Guidance::kNone;
+    }
+    Tell(EventKind::kProgress);
+  } else {
+    scan.step_fraction = std::min(1.0, static_cast<double>(elapsed.count()) / static_cast<double>(work.count()));
+    Tell(EventKind::kProgress);
+    if (elapsed >= work) EndScan();
+  }
+}
+
+void FakeScanService::EndScan() {
+  Scan& scan = scans.back();
+  scan.outcome = ScanOutcome::kDone;
+  scan.finished_at = WallClock::now();
+  if (!recorded.empty()) {
+    const Recorded& data = recorded[std::min(num_finished_, recorded.size() - 1)];
+    scan.folder = data.folder;
+    if (!scan.reference_id.empty()) scan.result = data.result;
+  }
+  ++num_finished_;
+  status.scan.reset();
+  status.state = ApplianceState::kResult;
+  status.light = scan.result ? scan.result->verdict == "move" ? "result_move" : "result_in_tolerance" : "ready";
+  status.last_result = scan;
+  ++status.scans_today;
+  if (Patient* patient = PatientOf(scan.patient_id)) {
+    ++patient->num_scans;
+    if (scan.purpose == ScanPurpose::kReference) MakeReference(scan, "technician", "");
+  }
+  Tell(EventKind::kResult);
+}
+
+Reference& FakeScanService::MakeReference(const Scan& scan, const std::string& by, const std::string& reason) {
+  Reference reference;
+  reference.id = fmt::format("r{:04}", next_id_++);
+  reference.patient_id = scan.patient_id;
+  reference.version = static_cast<int>(References(scan.patient_id).size()) + 1;
+  reference.scan_id = scan.id;
+  reference.created_at = WallClock::now();
+  reference.created_by = by;
+  reference.reason = reason;
+  reference.plan.tolerance = settings.tolerance;
+  references.push_back(reference);
+  return references.back();
+}
+
+void FakeScanService::Unplug() {
+  status.sensor.present = false;
+  status.state = ApplianceState::kNoSensor;
+  status.light = "no_sensor";
+  if (status.scan) {
+    scans.back().outcome = ScanOutcome::kFailed;
+    scans.back().failure = "the sensor was unplugged; the scan is discarded";
+    status.last_result.reset();
+    status.scan.reset();
+  }
+  Tell(EventKind::kStatus);
+}
+
+void FakeScanService::Plug() {
+  status.sensor.present = true;
+  status.state = ApplianceState::kReady;
+  status.light = "ready";
+  Tell(EventKind::kStatus);
+}
+
+std::optional<Patient> FakeScanService::FindPatient(const std::string& id) { return FindById(patients, id); }
+
+void FakeScanService::AddPatient(const Actor& actor, const std::string& code, const std::string& site, Done done) {
+  if (std::any_of(patients.begin(), patients.end(), [&](const Patient& patient) { return patient.code == code; })) {
+    return Finish(done, Refusal(ChangeResult::kConflict, "there is a patient of this code"));
+  }
+  patients.push_back({fmt::format("p{:04}", next_id_++), code, site, WallClock::now(), "", 0});
+  Did(actor, "patient.add", patients.back().id, done, patients.back().id);
+}
+
+void FakeScanService::WipePatient(const Actor& actor, const std::string& id, Done done) {
+  if (std::erase_if(patients, [&](const Patient& patient) { return patient.id == id; }) == 0) {
+    return Finish(done, Refusal(ChangeResult::kNotFound, "no such patient"));
+  }
+  std::erase_if(references, [&](const Reference& reference) { return reference.patient_id == id; });
+  std::erase_if(scans, [&](const Scan& scan) { return scan.patient_id == id; });
+  if (status.patient_id == id) status.patient_id.clear();
+  if (status.last_result && status.last_result->patient_id == id) status.last_result.reset();
+  Tell(EventKind::kStatus);
+  Did(actor, "patient.wipe", id, done);
+}
+
+void FakeScanService::OpenPatient(const Actor& actor, const std::string& id, ScanPurpose purpose, const std::string&, Done done) {
+  const Patient* patient = PatientOf(id);
+  if (patient == nullptr) return Finish(done, Refusal(ChangeResult::kNotFound, "no such patient"));
+  if (purpose == ScanPurpose::kFraction && patient->approved_reference_id.empty()) {
+    return Finish(done, Refusal(ChangeResult::kConflict, "this patient has no approved reference; take one first"));
+  }
+  if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running"));
+  status.patient_id = id;
+  status.next_purpose = purpose;
+  status.scans_today = 0;
+  Tell(EventKind::kStatus);
+  Did(actor, "patient.open", id, done);
+}
+
+std::vector<Reference> FakeScanService::References(const std::string& patient_id) {
+  std::vector<Reference> found;
+  std::copy_if(references.rbegin(), references.rend(), std::back_inserter(found),
+               [&](const Reference& reference) { return reference.patient_id == patient_id; });
+  return found;
+}
+
+std::optional<Reference> FakeScanService::FindReference(const std::string& id) { return FindById(references, id); }
+
+void FakeScanService::AddReference(const Actor& actor, const std::string& scan_id, const std::string& reason, Done done) {
+  const auto scan = FindScan(scan_id);
+  if (!scan || scan->outcome != ScanOutcome::kDone) return Finish(done, Refusal(ChangeResult::kNotFound, "no finished scan of this id"));
+  const std::string id = MakeReference(*scan, actor.user, reason).id;
+  Did(actor, "reference.add", id, done, id);
+}
+
+void FakeScanService::PlanReference(const Actor& actor, const std::string& id, const ReferencePlan& plan, Done done) {
+  const auto found = std::find_if(references.begin(), references.end(), [&](const Reference& reference) { return reference.id == id; });
+  if (found == references.end()) return Finish(done, Refusal(ChangeResult::kNotFound, "no such reference"));
+  if (found->approved_by.empty()) {
+    found->plan = plan;
+    found->created_by = actor.user;
+    return Did(actor, "reference.plan", id, done);
+  }
+  Reference next = *found;
+  next.id = fmt::format("r{:04}", next_id_++);
+  next.version = static_cast<int>(References(next.patient_id).size()) + 1;
+  next.plan = plan;
+  next.created_by = actor.user;
+  next.approved_by.clear();
+  next.approved_at.reset();
+  references.push_back(next);
+  Did(actor, "reference.plan", next.id, done, next.id);
+}
+
+void FakeScanService::ApproveReference(const Actor& actor, const std::string& id, Done done) {
+  const auto found = std::find_if(references.begin(), references.end(), [&](const Reference& reference) { return reference.id == id; });
+  if (found == references.end()) return Finish(done, Refusal(ChangeResult::kNotFound, "no such reference"));
+  if (!found->approved_by.empty()) return Finish(done, Refusal(ChangeResult::kConflict, "this reference is approved already"));
+  if (found->created_by == actor.user) {
+    return Finish(done, Refusal(ChangeResult::kRefused, "a second person must approve: you made or planned this reference"));
+  }
+  found->approved_by = actor.user;
+  found->approved_at = WallClock::now();
+  if (Patient* patient = PatientOf(found->patient_id)) patient->approved_reference_id = id;
+  Did(actor, "reference.approve", id, done);
+}
+
+std::vector<Scan> FakeScanService::Scans(const std::string& patient_id, int limit) {
+  std::vector<Scan> found;
+  for (auto scan = scans.rbegin(); scan != scans.rend() && found.size() < static_cast<std::size_t>(limit); ++scan) {
+    if (patient_id.empty() || scan->patient_id == patient_id) found.push_back(*scan);
+  }
+  return found;
+}
+
+std::optional<Scan> FakeScanService::FindScan(const std::string& id) { return FindById(scans, id); }
+
+void FakeScanService::AcceptScan(const Actor& actor, const std::string& id, Done done) {
+  const auto found = std::find_if(scans.begin(), scans.end(), [&](const Scan& scan) { return scan.id == id; });
+  if (found == scans.end()) return Finish(done, Refusal(ChangeResult::kNotFound, "no such scan"));
+  found->accepted_by = actor.user;
+  if (status.last_result && status.last_result->id == id) status.last_result = *found;
+  Did(actor, "scan.accept", id, done);
+}
+
+std::optional<User> FakeScanService::FindUser(const std::string& name) {
+  const auto found = std::find_if(users.begin(), users.end(), [&](const User& user) { return user.name == name; });
+  return found == users.end() ? std::nullopt : std::optional(*found);
+}
+
+void FakeScanService::AddUser(const Actor& actor, const User& user, Done done) {
+  if (FindUser(user.name)) return Finish(done, Refusal(ChangeResult::kConflict, "this name is taken"));
+  users.push_back(user);
+  Did(actor, "user.add", user.name, done);
+}
+
+void FakeScanService::ChangeUser(const Actor& actor, const User& user, Done done) {
+  const auto found = std::find_if(users.begin(), users.end(), [&](const User& other) { return other.name == user.name; });
+  if (found == users.end()) return Finish(done, Refusal(ChangeResult::kNotFound, "no such user"));
+  const bool engineer_left = std::any_of(users.begin(), users.end(), [&](const User& other) {
+    const User& after = other.name == user.name ? user : other;
+    return after.role == Role::kEngineer && !after.disabled;
+  });
+  if (!engineer_left) return Finish(done, Refusal(ChangeResult::kConflict, "one engineer must remain"));
+  *found = user;
+  Did(actor, "user.change", user.name, done);
+}
+
+void FakeScanService::Log(const Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) {
+  audit.push_back({static_cast<std::int64_t>(audit.size()) + 1, WallClock::now(), actor.user, actor.address, action, subject, detail});
+}
+
+std::vector<AuditEntry> FakeScanService::Audit(std::int64_t before, int limit) {
+  std::vector<AuditEntry> found;
+  for (auto entry = audit.rbegin(); entry != audit.rend() && found.size() < static_cast<std::size_t>(limit); ++entry) {
+    if (before == 0 || entry->number < before) found.push_back(*entry);
+  }
+  return found;
+}
+
+void FakeScanService::ChangeSettings(const Actor& actor, const Settings& changed, Done done) {
+  settings = changed;
+  Did(actor, "settings.change", "", done);
+}
+
+void FakeScanService::InstallUpdate(const Actor& actor, const std::string& bundle, Done done) {
+  if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running; update after it"));
+  if (!update.supported) return Finish(done, Refusal(ChangeResult::kConflict, update.message));
+  Did(actor, "update.install", bundle, done);
+}
+
+void FakeScanService::WriteDiagnostics(const Actor& actor, Done done) {
+  Log(actor, "diagnostics", "", "");
+  Finish(done, {ChangeResult::kDone, "", "", diagnostics_file});
+}
+
+}  // namespace plumb::test

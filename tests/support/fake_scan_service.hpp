@@ -1,0 +1,99 @@
+// The appliance without a sensor, for tests of the web: everything in memory, a scan goes as its Tick() goes.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "web/scan_service.hpp"
+
+namespace plumb::test {
+
+/// Follows the rules that scan_service.hpp states. One thread.
+class FakeScanService : public web::ScanService {
+ public:
+  FakeScanService();
+
+  // --- what tests turn
+  web::Status status;
+  web::Health health;
+  web::Settings settings;
+  web::UpdateStatus update;
+  std::vector<web::Patient> patients;
+  std::vector<web::Reference> references;
+  std::vector<web::Scan> scans;  ///< Oldest first.
+  std::vector<web::User> users;
+  std::vector<web::AuditEntry> audit;  ///< Oldest first.
+  std::shared_ptr<const std::string> preview;
+  std::filesystem::path diagnostics_file;
+  /// Folder of the n-th finished scan (0, 1, ...) with its result; a scan beyond the list uses the last.
+  struct Recorded {
+    std::filesystem::path folder;
+    std::optional<web::ResultSummary> result;
+  };
+  std::vector<Recorded> recorded;
+  std::chrono::milliseconds sweep{3000};
+  std::chrono::milliseconds work{600};
+  /// Set: completions wait here until the test calls them.
+  bool hold_completions = false;
+  std::vector<std::function<void()>> held;
+
+  /// Moves a running scan on. @param now  Any clock that grows.
+  void Tick(std::chrono::steady_clock::time_point now);
+  void Tell(web::EventKind kind) const;
+  void Unplug();
+  void Plug();
+
+  // --- ScanService
+  web::Status GetStatus() override { return status; }
+  web::Health GetHealth() override { return health; }
+  std::shared_ptr<const std::string> Preview() override { return preview; }
+  void Press(const web::Actor& actor, web::Done done) override;
+  void Cancel(const web::Actor& actor, web::Done done) override;
+  void SetListener(std::function<void(web::EventKind)> listener) override { listener_ = std::move(listener); }
+  std::vector<web::Patient> Patients() override { return patients; }
+  std::optional<web::Patient> FindPatient(const std::string& id) override;
+  void AddPatient(const web::Actor& actor, const std::string& code, const std::string& site, web::Done done) override;
+  void WipePatient(const web::Actor& actor, const std::string& id, web::Done done) override;
+  void OpenPatient(const web::Actor& actor, const std::string& id, web::ScanPurpose purpose, const std::string& reason,
+                   web::Done done) override;
+  std::vector<web::Reference> References(const std::string& patient_id) override;
+  std::optional<web::Reference> FindReference(const std::string& id) override;
+  void AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason, web::Done done) override;
+  void PlanReference(const web::Actor& actor, const std::string& id, const web::ReferencePlan& plan, web::Done done) override;
+  void ApproveReference(const web::Actor& actor, const std::string& id, web::Done done) override;
+  std::vector<web::Scan> Scans(const std::string& patient_id, int limit) override;
+  std::optional<web::Scan> FindScan(const std::string& id) override;
+  void AcceptScan(const web::Actor& actor, const std::string& id, web::Done done) override;
+  std::vector<web::User> Users() override { return users; }
+  std::optional<web::User> FindUser(const std::string& name) override;
+  void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;
+  void ChangeUser(const web::Actor& actor, const web::User& user, web::Done done) override;
+  void Log(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) override;
+  std::vector<web::AuditEntry> Audit(std::int64_t before, int limit) override;
+  web::Settings GetSettings() override { return settings; }
+  void ChangeSettings(const web::Actor& actor, const web::Settings& changed, web::Done done) override;
+  web::UpdateStatus GetUpdate() override { return update; }
+  void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
+  void WriteDiagnostics(const web::Actor& actor, web::Done done) override;
+
+  /// A reference made of a scan, as AddReference() does it, without the log.
+  web::Reference& MakeReference(const web::Scan& scan, const std::string& by, const std::string& reason);
+
+ private:
+  void Finish(const web::Done& done, web::Change change);
+  void Did(const web::Actor& actor, const std::string& action, const std::string& subject, const web::Done& done,
+           const std::string& id = "");
+  void EndScan();
+  [[nodiscard]] web::Patient* PatientOf(const std::string& id);
+
+  std::function<void(web::EventKind)> listener_;
+  std::optional<std::chrono::steady_clock::time_point> phase_begun_;
+  std::size_t num_finished_ = 0;
+  int next_id_ = 1;
+};
+
+}  // namespace plumb::test

@@ -1,0 +1,239 @@
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/web/web_fixture.hpp"
+
+namespace plumb::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+class ApiTest : public WebTest {
+ protected:
+  void SetUp() override {
+    Start();
+    SetUpAccounts();
+  }
+
+  std::string AddPatient(HttpClient& client, const std::string& code) {
+    return client.Post("/api/v1/patients", {{"code", code}, {"site", "thorax"}}).json().value("id", "");
+  }
+
+  static nlohmann::json Plan() {
+    return {{"region_m", {{0.0, 0.0}, {0.5, 0.0}, {0.5, 0.4}}},
+            {"isocentre_m", {0.2, 0.1, 0.05}},
+            {"shift_tolerance_mm", 3},
+            {"rotation_tolerance_deg", 1},
+            {"posture", "HFS"},
+            {"couch_markers", false}};
+  }
+};
+
+TEST_F(ApiTest, NothingUnderTheApiAnswersWithoutLogin) {
+  HttpClient stranger(port_);
+  for (const std::string& route : server_->RouteNames()) {
+    const std::string method = route.substr(0, route.find(' '));
+    std::string path = route.substr(method.size() + 1);
+    const std::string permission = path.substr(path.rfind(' ') + 1);
+    path = path.substr(0, path.rfind(' '));
+    if (permission == "none") continue;
+    for (std::size_t at; (at = path.find('{')) != std::string::npos;) path.replace(at, path.find('}') - at + 1, "x1");
+    EXPECT_EQ(stranger.Ask(method, path, method == "GET" ? "" : "{}").status, 401) << route;
+  }
+  EXPECT_EQ(stranger.Get("/api/v1/nothing").status, 401);
+  EXPECT_EQ(stranger.Get("/health").status, 200);
+}
+
+TEST_F(ApiTest, HealthSaysWhyItIsNotWell) {
+  loop_->Do([&] { service_.health = {false, "the disk is full"}; });
+  const HttpAnswer answer = HttpClient(port_).Get("/health");
+  EXPECT_EQ(answer.status, 503);
+  EXPECT_THAT(answer.body, HasSubstr("the disk is full"));
+}
+
+TEST_F(ApiTest, ChangesNeedTheSessionsToken) {
+  HttpClient client = LoggedIn("technician");
+  const std::string token = client.csrf_token;
+  client.csrf_token.clear();
+  EXPECT_EQ(client.Post("/api/v1/press").status, 403);
+  client.csrf_token = LoggedIn("physicist").csrf_token;
+  EXPECT_EQ(client.Post("/api/v1/press").status, 403);
+  EXPECT_TRUE(service_.scans.empty());
+  client.csrf_token = token;
+  EXPECT_EQ(client.Post("/api/v1/press").status, 200);
+  EXPECT_EQ(service_.scans.size(), 1U);
+}
+
+TEST_F(ApiTest, ChangesFromOtherSitesAreRefusedEvenWithTheToken) {
+  HttpClient client = LoggedIn("technician");
+  client.extra_headers = {{"Origin", "http://evil.example"}};
+  EXPECT_EQ(client.Post("/api/v1/press").status, 403);
+  client.extra_headers = {{"Origin", "null"}};
+  EXPECT_EQ(client.Post("/api/v1/press").status, 403);
+  client.extra_headers = {{"Sec-Fetch-Site", "cross-site"}};
+  EXPECT_EQ(client.Post("/api/v1/press").status, 403);
+  client.extra_headers = {{"Origin", "http://127.0.0.1:" + std::to_string(port_)}, {"Sec-Fetch-Site", "same-origin"}};
+  EXPECT_EQ(client.Post("/api/v1/press").status, 200);
+}
+
+TEST_F(ApiTest, ScanGoesFromPressToResultAndIsAudited) {
+  HttpClient client = LoggedIn("technician");
+  EXPECT_EQ(client.Get("/api/v1/status").json()["state"], "ready");
+  EXPECT_EQ(client.Post("/api/v1/press").status, 200);
+  EXPECT_EQ(client.Get("/api/v1/status").json()["state"], "scanning");
+  EXPECT_EQ(client.Post("/api/v1/cancel").status, 200);
+  EXPECT_EQ(client.Post("/api/v1/cancel").status, 409);
+  const nlohmann::json entries = LoggedIn("physicist").Get("/api/v1/audit").json()["entries"];
+  std::vector<std::string> actions;
+  for (const auto& entry : entries) actions.push_back(entry["user"].get<std::string>() + " " + entry["action"].get<std::string>());
+  EXPECT_THAT(actions, ::testing::IsSupersetOf({"technician login", "technician press", "technician cancel", "physicist login"}));
+}
+
+TEST_F(ApiTest, AReferenceIsApprovedByASecondPerson) {
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist"), second = LoggedIn("second");
+  const std::string patient = AddPatient(technician, "PX-17");
+  EXPECT_EQ(technician.Post("/api/v1/patients/" + patient + "/open", {{"purpose", "fraction"}, {"reason", ""}}).status, 409);
+  EXPECT_EQ(technician.Post("/api/v1/patients/" + patient + "/open", {{"purpose", "reference"}, {"reason", "first"}}).status, 200);
+  loop_->Do([&] {
+    web::Scan scan;
+    scan.id = "s1";
+    scan.patient_id = patient;
+    scan.outcome = web::ScanOutcome::kDone;
+    service_.scans.push_back(scan);
+  });
+  const std::string id = physicist.Post("/api/v1/references", {{"scan_id", "s1"}, {"reason", "planning"}}).json()["id"];
+  EXPECT_EQ(physicist.Put("/api/v1/references/" + id + "/plan", Plan()).status, 200);
+  EXPECT_EQ(technician.Put("/api/v1/references/" + id + "/plan", Plan()).status, 403);
+  EXPECT_EQ(physicist.Post("/api/v1/references/" + id + "/approve").status, 403);
+  EXPECT_EQ(second.Post("/api/v1/references/" + id + "/approve").status, 200);
+  EXPECT_EQ(second.Post("/api/v1/references/" + id + "/approve").status, 409);
+  const nlohmann::json reference = technician.Get("/api/v1/references/" + id).json();
+  EXPECT_EQ(reference["approved_by"], "second");
+  EXPECT_EQ(reference["plan"]["isocentre_m"], nlohmann::json({0.2, 0.1, 0.05}));
+  EXPECT_EQ(technician.Get("/api/v1/patients/" + patient).json()["approved_reference_id"], id);
+}
+
+TEST_F(ApiTest, PlansOutOfRangeAreRefusedWithTheField) {
+  HttpClient physicist = LoggedIn("physicist");
+  const auto refused = [&](const std::string& field, const nlohmann::json& value) {
+    nlohmann::json plan = Plan();
+    plan[field] = value;
+    const HttpAnswer answer = physicist.Put("/api/v1/references/r1/plan", plan);
+    EXPECT_EQ(answer.status, 400) << field << " = " << value;
+    EXPECT_THAT(answer.body, HasSubstr(field));
+  };
+  refused("shift_tolerance_mm", 0);
+  refused("shift_tolerance_mm", "3");
+  refused("rotation_tolerance_deg", 1e300);
+  refused("posture", "UPSIDE");
+  refused("couch_markers", 1);
+  refused("region_m", {{0, 0}, {1, 1}});
+  refused("region_m", {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}});
+  refused("region_m", std::vector<std::array<double, 2>>(501, {0.0, 0.0}));
+  refused("isocentre_m", {1, 2});
+}
+
+TEST_F(ApiTest, BodiesMustBeSmallShallowWholeJsonInUtf8) {
+  HttpClient client = LoggedIn("technician");
+  const auto status = [&](const std::string& body) { return client.Ask("POST", "/api/v1/patients", body).status; };
+  EXPECT_EQ(status("{\"code\": \"A\""), 400);
+  EXPECT_EQ(status("[]"), 400);
+  EXPECT_EQ(status("null"), 400);
+  EXPECT_EQ(status(R"({"code":"A","site":"x","more":1})"), 400);
+  EXPECT_EQ(status("{\"code\":\"A\",\"site\":\"\xC3\x28\"}"), 400);
+  EXPECT_EQ(status(R"({"code":"A","site":"\u0000"})"), 400);
+  EXPECT_EQ(status(R"({"code":"../../etc","site":"x"})"), 400);
+  EXPECT_EQ(status(std::string(100000, '[')), 400);
+  EXPECT_EQ(status(std::string(300000, ' ')), 413);
+  client.extra_headers["Content-Type"] = "text/plain";
+  EXPECT_EQ(status(R"({"code":"A","site":"x"})"), 415);
+  EXPECT_TRUE(service_.patients.empty());
+}
+
+TEST_F(ApiTest, WrongMethodsNameTheRightOnes) {
+  HttpClient client = LoggedIn("technician");
+  const HttpAnswer answer = client.Ask("PUT", "/api/v1/patients", "{}");
+  EXPECT_EQ(answer.status, 405);
+  EXPECT_EQ(answer.Header("allow"), "GET, POST");
+  EXPECT_EQ(client.Ask("TRACE", "/api/v1/status", "").status, 405);
+  EXPECT_EQ(client.Ask("HEAD", "/api/v1/status", "").status, 200);
+}
+
+class FilesTest : public ApiTest {
+ protected:
+  void SetUp() override {
+    ApiTest::SetUp();
+    std::filesystem::create_directories(folder_ / "scan/result");
+    std::ofstream(folder_ / "scan/result/result.json") << R"({"format": 1})";
+    std::ofstream(folder_ / "secret") << "secret";
+    std::filesystem::create_symlink(folder_ / "secret", folder_ / "scan/result/overlay.png");
+    std::filesystem::create_directories(folder_ / "scan/result/error_map.png");
+    loop_->Do([&] {
+      web::Scan scan;
+      scan.id = "s1";
+      scan.outcome = web::ScanOutcome::kDone;
+      scan.folder = folder_ / "scan";
+      service_.scans.push_back(scan);
+    });
+  }
+  plumb::testing::TempFolder folder_;
+};
+
+TEST_F(FilesTest, ResultsAreDownloadedUnderASafeName) {
+  HttpClient client = LoggedIn("technician");
+  EXPECT_EQ(client.Get("/api/v1/results/s1").body, R"({"format": 1})");
+  const HttpAnswer file = client.Get("/api/v1/scans/s1/files/result.json?download");
+  EXPECT_EQ(file.body, R"({"format": 1})");
+  EXPECT_EQ(file.Header("content-disposition"), "attachment; filename=\"s1_result.json\"");
+  EXPECT_EQ(file.Header("cache-control"), "no-store");
+}
+
+TEST_F(FilesTest, NoPathLeadsOutOfAScan) {
+  HttpClient client = LoggedIn("technician");
+  for (const char* path :
+       {"/api/v1/scans/s1/files/../../secret", "/api/v1/scans/s1/files/..%2f..%2fsecret", "/api/v1/scans/s1/files/..",
+        "/api/v1/scans/s1/files/secret", "/api/v1/scans/../scans/s1/files/result.json", "/api/v1/scans/s1/files//etc/passwd",
+        "/assets/../../etc/passwd", "/assets/..%2f..%2fetc%2fpasswd", "/%2e%2e/etc/passwd", "/api/v1/scans/s1/files/result.json%00.png"}) {
+    EXPECT_EQ(client.Get(path).status, 404) << path;
+  }
+  EXPECT_EQ(client.Get("/api/v1/scans/s1/files/overlay.png").status, 404) << "a link";
+  EXPECT_EQ(client.Get("/api/v1/scans/s1/files/error_map.png").status, 404) << "a folder";
+}
+
+TEST_F(FilesTest, DiagnosticsAreSentOnceAndRemoved) {
+  std::ofstream(folder_ / "bundle.tar") << "bundle";
+  loop_->Do([&] { service_.diagnostics_file = folder_ / "bundle.tar"; });
+  HttpClient engineer = LoggedIn("engineer");
+  const HttpAnswer answer = engineer.Post("/api/v1/diagnostics");
+  EXPECT_EQ(answer.body, "bundle");
+  EXPECT_THAT(answer.Header("content-disposition"), HasSubstr("plumb-diagnostics.tar"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "bundle.tar"));
+}
+
+TEST_F(ApiTest, SlowCompletionsAreWaitedForAndLateOnesFindNobody) {
+  HttpClient client = LoggedIn("technician");
+  loop_->Do([&] { service_.hold_completions = true; });
+  std::jthread asking([&] { EXPECT_EQ(client.Post("/api/v1/press").status, 200); });
+  bool held = false;
+  while (!held) loop_->Do([&] { held = !service_.held.empty(); });
+  loop_->Do([&] {
+    service_.held.front()();
+    service_.held.clear();
+  });
+  asking.join();
+  {
+    HttpConnection gone(port_);
+    gone.Send("POST /api/v1/cancel HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie + "\r\nX-CSRF-Token: " + client.csrf_token +
+              "\r\nContent-Length: 0\r\n\r\n");
+    held = false;
+    while (!held) loop_->Do([&] { held = !service_.held.empty(); });
+  }
+  loop_.reset();
+  server_.reset();  // with a request that waits
+  service_.held.front()();
+}
+
+}  // namespace
+}  // namespace plumb::test

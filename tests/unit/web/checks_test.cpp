@@ -1,0 +1,64 @@
+#include "web/http/checks.hpp"
+
+#include <gtest/gtest.h>
+
+namespace plumb::web {
+namespace {
+
+TEST(ChecksTest, PlainTextIsWellFormedUtf8WithoutControls) {
+  EXPECT_TRUE(IsPlainText("links \xC3\xB6stlich \xE2\x82\xAC \xF0\x9F\xA6\xB4"));
+  EXPECT_FALSE(IsPlainText("line\nbreak"));
+  EXPECT_TRUE(IsPlainText("line\nbreak", true));
+  EXPECT_FALSE(IsPlainText(std::string("a\0b", 3)));
+  EXPECT_FALSE(IsPlainText("\xC0\xAF")) << "overlong";
+  EXPECT_FALSE(IsPlainText("\xED\xA0\x80")) << "surrogate";
+  EXPECT_FALSE(IsPlainText("\xF4\x90\x80\x80")) << "beyond Unicode";
+  EXPECT_FALSE(IsPlainText("\xE2\x82")) << "cut";
+  EXPECT_FALSE(IsPlainText("\xC2\x85")) << "control in two bytes";
+}
+
+TEST(ChecksTest, CookiesAreFoundByTheirWholeName) {
+  EXPECT_EQ(CookieValue("a=1; plumb_session=abc; b=2", "plumb_session"), "abc");
+  EXPECT_EQ(CookieValue("xplumb_session=abc", "plumb_session"), std::nullopt);
+  EXPECT_EQ(CookieValue("plumb_session=a; plumb_session=b", "plumb_session"), std::nullopt);
+  EXPECT_EQ(CookieValue("plumb_session", "plumb_session"), std::nullopt);
+}
+
+TEST(ChecksTest, FormsAreUnescapedOnceAndCompletely) {
+  const auto form = ParseForm("name=a%2Bb+c&password=%C3%A4%26");
+  ASSERT_TRUE(form.has_value());
+  EXPECT_EQ(form->at("name"), "a+b c");
+  EXPECT_EQ(form->at("password"), "\xC3\xA4&");
+  EXPECT_FALSE(ParseForm("name=%2").has_value());
+  EXPECT_FALSE(ParseForm("name=%zz").has_value());
+  EXPECT_FALSE(ParseForm("name=a&name=b").has_value());
+  EXPECT_FALSE(ParseForm("name").has_value());
+}
+
+TEST(ChecksTest, OriginMustBeTheRequestsOwnHost) {
+  EXPECT_TRUE(IsSameOrigin("http://localhost:80", "LOCALHOST:80", false));
+  EXPECT_FALSE(IsSameOrigin("http://localhost:80", "localhost:81", false));
+  EXPECT_FALSE(IsSameOrigin("https://localhost:80", "localhost:80", false));
+  EXPECT_FALSE(IsSameOrigin("http://localhost", "localhost", true));
+  EXPECT_FALSE(IsSameOrigin("null", "null", false));
+}
+
+TEST(ChecksTest, GzipIsTakenOnlyWhereAccepted) {
+  EXPECT_TRUE(AcceptsGzip(std::nullopt));
+  EXPECT_TRUE(AcceptsGzip("deflate, GZIP;q=0.5"));
+  EXPECT_TRUE(AcceptsGzip("*"));
+  EXPECT_FALSE(AcceptsGzip("identity"));
+  EXPECT_FALSE(AcceptsGzip("gzip;q=0"));
+  EXPECT_FALSE(AcceptsGzip("*, gzip;q=0.000"));
+}
+
+TEST(ChecksTest, NamesLeadNowhere) {
+  EXPECT_TRUE(IsName("app.1A2b.js"));
+  for (const char* bad : {"", ".", "..", ".hidden", "a/b", "a\\b", "a%2f", "a b", "\xC3\xA4"}) EXPECT_FALSE(IsName(bad)) << bad;
+  EXPECT_FALSE(IsName(std::string(65, 'a')));
+}
+
+TEST(ChecksTest, HtmlIsEscaped) { EXPECT_EQ(EscapeHtml("<a href=\"x\">&'"), "&lt;a href=&quot;x&quot;&gt;&amp;&#39;"); }
+
+}  // namespace
+}  // namespace plumb::web

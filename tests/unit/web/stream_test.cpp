@@ -1,0 +1,126 @@
+#include <gmock/gmock.h>
+
+#include "tests/unit/web/web_fixture.hpp"
+#include "web/http/event_hub.hpp"
+
+namespace plumb::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+class StreamTest : public WebTest {
+ protected:
+  HttpConnection OpenStream(const HttpClient& client, int receive_buffer = 0) {
+    HttpConnection connection(port_);
+    if (receive_buffer > 0) connection.SetReceiveBuffer(receive_buffer);
+    connection.Send("GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie + "\r\n\r\n");
+    return connection;
+  }
+};
+
+TEST_F(StreamTest, BeginsWithTheStateAndFollowsIt) {
+  Start();
+  SetUpAccounts();
+  const HttpClient client = LoggedIn("technician");
+  HttpConnection stream = OpenStream(client);
+  EXPECT_THAT(stream.ReadUntil("\n\n"), HasSubstr("text/event-stream"));
+  loop_->Do([&] { service_.Press({"technician", ""}, [](const web::Change&) {}); });
+  EXPECT_FALSE(stream.ReadUntil("\"state\":\"scanning\"").empty());
+  loop_->Do([&] { service_.Unplug(); });
+  EXPECT_FALSE(stream.ReadUntil("\"state\":\"no_sensor\"").empty());
+}
+
+TEST_F(StreamTest, ManyChangesInAShortTimeAreSentTogether) {
+  Start();
+  SetUpAccounts();
+  const HttpClient client = LoggedIn("technician");
+  HttpConnection stream = OpenStream(client);
+  stream.ReadUntil("\n\n");
+  loop_->Do([&] {
+    for (int i = 0; i < 1000; ++i) service_.Tell(web::EventKind::kProgress);
+    service_.Tell(web::EventKind::kData);
+  });
+  const std::string until_data = stream.ReadUntil("event: data");
+  loop_->Do([&] {
+    service_.status.fault = "end of test";
+    service_.Tell(web::EventKind::kStatus);
+  });
+  const std::string text = until_data + stream.ReadUntil("end of test");
+  std::size_t count = 0;
+  for (std::size_t at = 0; (at = text.find("event: status", at)) != std::string::npos; ++at) ++count;
+  EXPECT_LE(count, 4U);
+}
+
+TEST_F(StreamTest, EndsWhenTheSessionEnds) {
+  Start();
+  SetUpAccounts();
+  HttpClient client = LoggedIn("technician");
+  HttpConnection stream = OpenStream(client);
+  stream.ReadUntil("\n\n");
+  EXPECT_EQ(client.Post("/api/v1/logout").status, 200);
+  EXPECT_FALSE(stream.ReadUntil("logged_off").empty());
+}
+
+TEST_F(StreamTest, AViewerThatNeverReadsIsDroppedAndCostsNobodyAnything) {
+  Start([](web::HttpServerOptions& options) { options.event_buffer_bytes = 16 << 10; });
+  SetUpAccounts();
+  const HttpClient client = LoggedIn("technician");
+  HttpConnection deaf = OpenStream(client, 4096);
+  HttpConnection reader = OpenStream(client);
+  reader.ReadUntil("\n\n");
+  // Far more than the sockets' buffers hold; the kernel's send buffer may grow to megabytes.
+  for (int i = 0; i < 400; ++i) {
+    loop_->Do([&] {
+      service_.status.fault = std::string(8000, 'x') + std::to_string(i);
+      for (int j = 0; j < 50; ++j) service_.Tell(web::EventKind::kData);
+    });
+    reader.ReadUntil("event: data");
+  }
+  const auto is_dropped = [&] {
+    int count = 0;
+    loop_->Do([&] {
+      for (int j = 0; j < 2000; ++j) service_.Tell(web::EventKind::kResult);
+      ++count;
+    });
+    return count;
+  };
+  for (int i = 0; i < 50; ++i) is_dropped();
+  EXPECT_TRUE(deaf.IsClosedBySoon());
+  EXPECT_EQ(HttpClient(port_).Get("/health").status, 200);
+}
+
+TEST_F(StreamTest, StreamsAreFew) {
+  Start([](web::HttpServerOptions& options) { options.max_event_streams = 2; });
+  SetUpAccounts();
+  const HttpClient client = LoggedIn("technician");
+  HttpConnection first = OpenStream(client), second = OpenStream(client);
+  first.ReadUntil("event: status");
+  second.ReadUntil("event: status");
+  EXPECT_EQ(OpenStream(client).Read().status, 503);
+}
+
+TEST(EventHubTest, AFullBufferClosesTheStreamAndFreesIt) {
+  web::EventHub hub(4, 100);
+  const auto stream = hub.Open(std::make_shared<web::Session>());
+  bool cut = false;
+  stream->cut = [&] { cut = true; };
+  hub.Broadcast("status", std::string(50, 'x'));
+  EXPECT_FALSE(cut);
+  hub.Broadcast("status", std::string(50, 'x'));
+  EXPECT_TRUE(cut);
+  EXPECT_TRUE(stream->closed());
+  EXPECT_EQ(stream->waiting(), 0U);
+}
+
+TEST(EventHubTest, WhatIsTakenMakesRoom) {
+  web::EventHub hub(4, 100);
+  const auto stream = hub.Open(std::make_shared<web::Session>());
+  for (int i = 0; i < 1000; ++i) {
+    hub.Broadcast("status", std::string(40, 'x'));
+    stream->Take(stream->Peek(1000).size());
+  }
+  EXPECT_FALSE(stream->closed());
+}
+
+}  // namespace
+}  // namespace plumb::test

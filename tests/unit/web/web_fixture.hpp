@@ -1,0 +1,61 @@
+// The real server over a fake appliance, on a thread of its own.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+
+#include "tests/support/fake_scan_service.hpp"
+#include "tests/support/http_client.hpp"
+#include "web/http_server.hpp"
+
+namespace plumb::test {
+
+inline constexpr const char* kPassword = "correct horse battery";
+
+class WebTest : public ::testing::Test {
+ protected:
+  /// Cheap passwords: what they cost is libsodium's affair. @param change  Adjusts the options before the server starts.
+  void Start(const std::function<void(web::HttpServerOptions&)>& change = {}) {
+    web::HttpServerOptions options;
+    options.password_memory_bytes = 1 << 20;
+    options.password_operations = 1;
+    options.now = [this] { return std::chrono::steady_clock::now() + std::chrono::seconds(skipped_s_.load()); };
+    if (change) change(options);
+    server_ = std::make_unique<web::HttpServer>(service_, options);
+    port_ = server_->port();
+    setup_code_ = server_->setup_code().value_or("");
+    loop_ = std::make_unique<ServingLoop>(*server_);
+  }
+
+  void TearDown() override {
+    loop_.reset();
+    server_.reset();
+  }
+
+  /// Sets up the first account ("engineer") and adds one of each other role; each has kPassword.
+  void SetUpAccounts() {
+    HttpClient engineer(port_);
+    ASSERT_EQ(engineer.Post("/api/v1/setup", {{"code", setup_code_}, {"name", "engineer"}, {"password", kPassword}}).status, 200);
+    engineer.FetchToken();
+    for (const auto& [name, role] : {std::pair{"technician", "technician"}, {"physicist", "physicist"}, {"second", "physicist"}}) {
+      ASSERT_EQ(engineer.Post("/api/v1/users", {{"name", name}, {"role", role}, {"password", kPassword}}).status, 201) << name;
+    }
+  }
+
+  [[nodiscard]] HttpClient LoggedIn(const std::string& name) {
+    HttpClient client(port_);
+    EXPECT_EQ(client.LogIn(name, kPassword), 200) << name;
+    return client;
+  }
+
+  FakeScanService service_;
+  std::atomic<int> skipped_s_ = 0;  ///< Seconds that the server's clock is ahead.
+  std::unique_ptr<web::HttpServer> server_;
+  std::unique_ptr<ServingLoop> loop_;
+  std::uint16_t port_ = 0;
+  std::string setup_code_;
+};
+
+}  // namespace plumb::test

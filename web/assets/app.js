@@ -1,0 +1,1 @@
+document.title='Plumb'; import('three').then(t=>t);

@@ -1,0 +1,67 @@
+#include "web/http/event_hub.hpp"
+
+#include <fmt/format.h>
+
+namespace plumb::web {
+
+std::string_view EventStream::Peek(std::size_t max) const { return std::string_view(buffer_).substr(taken_, max); }
+
+void EventStream::Take(std::size_t count) {
+  taken_ += count;
+  if (taken_ == buffer_.size()) {
+    buffer_.clear();
+    taken_ = 0;
+  }
+}
+
+void EventStream::Send(std::string_view text) {
+  if (closed_) return;
+  if (waiting() + text.size() > capacity_) {
+    // Somebody who does not read gets no more of our memory; a browser reconnects by itself.
+    buffer_ = std::string();
+    taken_ = 0;
+    closed_ = true;
+    if (cut) cut();
+    return;
+  }
+  buffer_.erase(0, taken_);
+  taken_ = 0;
+  buffer_ += text;
+  if (wake) wake();
+}
+
+void EventStream::Close() {
+  if (closed_) return;
+  closed_ = true;
+  if (wake) wake();
+}
+
+std::shared_ptr<EventStream> EventHub::Open(std::shared_ptr<Session> session) {
+  if (streams_.size() >= max_streams_) return nullptr;
+  streams_.push_back(std::make_shared<EventStream>(std::move(session), buffer_bytes_));
+  return streams_.back();
+}
+
+void EventHub::Broadcast(std::string_view event, std::string_view data) {
+  const std::string text = FormatEvent(event, data);
+  for (const auto& stream : std::list(streams_)) stream->Send(text);
+}
+
+void EventHub::Beat() {
+  for (const auto& stream : std::list(streams_)) {
+    if (stream->session().ended) {
+      stream->Send(FormatEvent("logged_off", "{}"));
+      stream->Close();
+    } else {
+      stream->Send(": here\n\n");
+    }
+  }
+}
+
+void EventHub::CloseAll() {
+  for (const auto& stream : std::list(streams_)) stream->Close();
+}
+
+std::string FormatEvent(std::string_view event, std::string_view data) { return fmt::format("event: {}\ndata: {}\n\n", event, data); }
+
+}  // namespace plumb::web

@@ -1,0 +1,72 @@
+// The event stream (text/event-stream) to every open page.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <list>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "web/security/sessions.hpp"
+
+namespace plumb::web {
+
+/// One open stream: bytes wait in a bounded buffer until the connection takes them.
+class EventStream {
+ public:
+  EventStream(std::shared_ptr<Session> session, std::size_t capacity) : session_(std::move(session)), capacity_(capacity) {}
+
+  /// What the connection needs: called when there is something to take, or when the stream is over.
+  std::function<void()> wake;
+  /// Called when the viewer is too slow: its connection is to be cut.
+  std::function<void()> cut;
+
+  /// At most `max` bytes, taken out of the buffer.
+  [[nodiscard]] std::string_view Peek(std::size_t max) const;
+  void Take(std::size_t count);
+  [[nodiscard]] bool empty() const { return taken_ == buffer_.size(); }
+  [[nodiscard]] bool closed() const { return closed_; }
+  [[nodiscard]] const Session& session() const { return *session_; }
+  [[nodiscard]] std::size_t waiting() const { return buffer_.size() - taken_; }
+
+  void Send(std::string_view text);
+  /// After what waits, the stream ends.
+  void Close();
+
+ private:
+  std::shared_ptr<Session> session_;
+  std::size_t capacity_;
+  std::string buffer_;
+  std::size_t taken_ = 0;
+  bool closed_ = false;
+};
+
+/// All streams. Belongs to the loop thread.
+class EventHub {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  EventHub(std::size_t max_streams, std::size_t buffer_bytes) : max_streams_(max_streams), buffer_bytes_(buffer_bytes) {}
+
+  /// Null where there are too many.
+  [[nodiscard]] std::shared_ptr<EventStream> Open(std::shared_ptr<Session> session);
+  void Remove(const std::shared_ptr<EventStream>& stream) { streams_.remove(stream); }
+  /// To every stream. @param data  One line.
+  void Broadcast(std::string_view event, std::string_view data);
+  /// Ends the streams of sessions that are over; a comment to the rest, so that dead connections are noticed.
+  void Beat();
+  void CloseAll();
+  [[nodiscard]] std::size_t size() const { return streams_.size(); }
+
+ private:
+  std::size_t max_streams_;
+  std::size_t buffer_bytes_;
+  std::list<std::shared_ptr<EventStream>> streams_;
+};
+
+/// One event on the wire.
+[[nodiscard]] std::string FormatEvent(std::string_view event, std::string_view data);
+
+}  // namespace plumb::web

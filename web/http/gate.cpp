@@ -1,0 +1,98 @@
+#include "web/http/gate.hpp"
+
+#include <sodium.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "algo/types/errors.hpp"
+#include "web/http/checks.hpp"
+#include "web/json.hpp"
+
+namespace plumb::web {
+namespace {
+
+bool IsType(std::string_view header, std::string_view type) {
+  const std::string_view value = header.substr(0, header.find(';'));
+  return std::equal(value.begin(), value.end(), type.begin(), type.end(), [](char a, char b) { return std::tolower(a) == b; });
+}
+
+bool SameToken(std::string_view a, std::string_view b) { return a.size() == b.size() && sodium_memcmp(a.data(), b.data(), a.size()) == 0; }
+
+}  // namespace
+
+bool Gate::IsOwnPage(const Request& request) const {
+  const std::string_view site = request.Header("sec-fetch-site");
+  if (!site.empty() && site != "same-origin" && site != "none") return false;
+  const std::string_view origin = request.Header("origin");
+  return origin.empty() || IsSameOrigin(origin, request.Header("host"), tls_);
+}
+
+Response Gate::NotLoggedIn() const {
+  Response response;
+  response.status = 401;
+  response.body = Dump({{"error", "log in first"}, {"setup_required", accounts_.needs_setup()}});
+  return response;
+}
+
+std::variant<const Route*, Response> Gate::Admit(Request& request) const {
+  if (!IsKnownHost(request.Header("host"), host_names_)) {
+    return ErrorResponse(421, "unknown host name; use the appliance's address, or add the name to its configuration");
+  }
+  Router::Match match = router_.Find(request.method, request.path);
+  const bool api = request.path.starts_with("/api/");
+  // What the page asks by itself, without anybody at the screen, does not keep a session alive.
+  const bool touch = request.Header("x-plumb-background").empty() && request.path != "/api/v1/events";
+  request.session = accounts_.SessionOf(request, touch);
+  if (match.route == nullptr) {
+    if (api && !request.session) return NotLoggedIn();
+    if (match.allowed.empty()) return ErrorResponse(404, "there is nothing at this address");
+    Response response = ErrorResponse(405, "this address takes " + match.allowed);
+    response.headers.emplace_back("Allow", match.allowed);
+    return response;
+  }
+  const Route& route = *match.route;
+  request.arguments = std::move(match.arguments);
+  if (route.permission != Permission::kNone) {
+    if (!request.session) return NotLoggedIn();
+    if (!May(request.session->role, route.permission)) return ErrorResponse(403, "your role may not do this");
+  }
+  if (request.method != "GET") {
+    if (!IsOwnPage(request)) return ErrorResponse(403, "this change was asked for by a page from elsewhere");
+    if (route.permission != Permission::kNone && !SameToken(request.Header("x-csrf-token"), request.session->csrf_token)) {
+      return ErrorResponse(403, "the token of this session is missing or wrong; load the page again");
+    }
+  }
+  const std::string_view type = request.Header("content-type");
+  if (route.body == BodyKind::kJson && !IsType(type, "application/json")) return ErrorResponse(415, "expected application/json");
+  if (route.body == BodyKind::kForm && !IsType(type, "application/x-www-form-urlencoded")) return ErrorResponse(415, "expected a form");
+  return &route;
+}
+
+void Gate::Handle(const Route& route, const Request& request, const Respond& respond) {
+  if (route.body == BodyKind::kNone && !request.body.empty()) return respond(ErrorResponse(400, "expected no body"));
+  try {
+    route.handler(request, respond);
+  } catch (const DataError& error) {
+    respond(ErrorResponse(400, error.what()));
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "web: %s %s: %s\n", route.method.c_str(), route.pattern.c_str(), error.what());
+    respond(ErrorResponse(500, "internal error; the journal says more"));
+  }
+}
+
+void AddSecurityHeaders(Response& response) {
+  const auto add = [&](const char* name, const char* value) { response.headers.emplace_back(name, value); };
+  add("Content-Security-Policy",
+      "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; base-uri 'none'; "
+      "form-action 'self'; frame-ancestors 'none'");
+  add("X-Content-Type-Options", "nosniff");
+  add("X-Frame-Options", "DENY");
+  add("Referrer-Policy", "no-referrer");
+  add("Cross-Origin-Opener-Policy", "same-origin");
+  add("Cross-Origin-Resource-Policy", "same-origin");
+  add("Permissions-Policy", "camera=(), microphone=(), geolocation=(), usb=()");
+  add("Cache-Control", response.cache_for_ever ? "public, max-age=31536000, immutable" : "no-store");
+}
+
+}  // namespace plumb::web

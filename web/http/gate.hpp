@@ -1,0 +1,36 @@
+// What every request passes before its handler: host, route, login, role, origin, token, type.
+#pragma once
+
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "web/accounts.hpp"
+#include "web/http/router.hpp"
+
+namespace plumb::web {
+
+class Gate {
+ public:
+  Gate(const Router& router, Accounts& accounts, std::vector<std::string> host_names, bool tls)
+      : router_(router), accounts_(accounts), host_names_(std::move(host_names)), tls_(tls) {}
+
+  /// Judges a request by its head; fills in its session and arguments. The route, or the refusal.
+  [[nodiscard]] std::variant<const Route*, Response> Admit(Request& request) const;
+  /// Called with the whole body. Runs the handler; what it throws becomes an answer.
+  static void Handle(const Route& route, const Request& request, const Respond& respond);
+
+ private:
+  [[nodiscard]] bool IsOwnPage(const Request& request) const;
+  [[nodiscard]] Response NotLoggedIn() const;
+
+  const Router& router_;
+  Accounts& accounts_;
+  std::vector<std::string> host_names_;
+  bool tls_;
+};
+
+/// The headers of every answer, from one place.
+void AddSecurityHeaders(Response& response);
+
+}  // namespace plumb::web

@@ -1,0 +1,46 @@
+#include "web/http/message.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "algo/types/errors.hpp"
+
+namespace plumb::web {
+
+std::string_view Request::Header(const std::string& name) const {
+  const auto found = headers.find(name);
+  return found == headers.end() ? std::string_view() : std::string_view(found->second);
+}
+
+OpenFile::OpenFile(const std::filesystem::path& file) : fd_(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)) {
+  if (fd_ < 0) throw IoError(fmt::format("cannot open {}: {}", file.filename().string(), std::strerror(errno)));
+  struct stat info {};
+  if (fstat(fd_, &info) != 0 || !S_ISREG(info.st_mode)) {
+    close(fd_);
+    throw IoError(fmt::format("{} is no plain file", file.filename().string()));
+  }
+  size_ = static_cast<std::uint64_t>(info.st_size);
+  // Sending happens on the loop in small pieces; ask for the file now so that they come from memory.
+  posix_fadvise(fd_, 0, 0, POSIX_FADV_WILLNEED);
+}
+
+OpenFile::~OpenFile() {
+  if (fd_ >= 0) close(fd_);
+}
+
+int OpenFile::Release() { return std::exchange(fd_, -1); }
+
+Response ErrorResponse(int status, const std::string& message) {
+  Response response;
+  response.status = status;
+  response.body = nlohmann::json{{"error", message}}.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return response;
+}
+
+}  // namespace plumb::web

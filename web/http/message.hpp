@@ -1,0 +1,68 @@
+// One request and one answer, free of the library that carries them.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "web/security/sessions.hpp"
+
+namespace plumb::web {
+
+struct Request {
+  std::string method;  ///< HEAD arrives as GET.
+  std::string path;    ///< As sent, never unescaped.
+  std::map<std::string, std::string> query;
+  std::map<std::string, std::string> headers;  ///< Names in small letters.
+  std::string body;
+  std::string address;                 ///< Of the browser.
+  std::vector<std::string> arguments;  ///< What the route's placeholders matched: [A-Za-z0-9._-]{1,64}, not beginning with a dot.
+  std::shared_ptr<Session> session;    ///< Set where the route wants a login.
+
+  /// Empty if absent.
+  [[nodiscard]] std::string_view Header(const std::string& name) const;
+  [[nodiscard]] Actor actor() const { return {session ? session->user : std::string(), address}; }
+};
+
+/// An open file that is sent as the body.
+class OpenFile {
+ public:
+  /// @throws IoError where it cannot be opened or is no plain file.
+  explicit OpenFile(const std::filesystem::path& file);
+  ~OpenFile();
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  /// The caller closes it.
+  [[nodiscard]] int Release();
+
+ private:
+  int fd_ = -1;
+  std::uint64_t size_ = 0;
+};
+
+struct Response {
+  int status = 200;
+  std::string type = "application/json";
+  std::string body;
+  std::string_view constant_body;  ///< Sent instead of body where not empty; lives as long as the program.
+  std::shared_ptr<OpenFile> file;  ///< Sent instead of both.
+  std::vector<std::pair<std::string, std::string>> headers;
+  bool cache_for_ever = false;  ///< Else nothing is cached.
+  bool event_stream = false;    ///< Stays open; the event hub writes it.
+};
+
+/// {"error": message}
+[[nodiscard]] Response ErrorResponse(int status, const std::string& message);
+
+/// Gives the answer, once; later than the connection: to nobody.
+using Respond = std::function<void(Response)>;
+using Handler = std::function<void(const Request&, Respond)>;
+
+}  // namespace plumb::web

@@ -1,0 +1,40 @@
+// Which handler answers what, and who may ask.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "web/http/message.hpp"
+#include "web/security/permissions.hpp"
+
+namespace plumb::web {
+
+enum class BodyKind { kNone, kJson, kForm };
+
+struct Route {
+  std::string method;
+  std::string pattern;  ///< "/api/v1/scans/{id}"; a placeholder is a whole segment.
+  Permission permission = Permission::kView;
+  BodyKind body = BodyKind::kNone;
+  Handler handler;
+};
+
+/// The table; filled once, then only read.
+class Router {
+ public:
+  void Add(Route route) { routes_.push_back(std::move(route)); }
+
+  struct Match {
+    const Route* route = nullptr;  ///< Null: nothing there, or not with this method.
+    std::vector<std::string> arguments;
+    std::string allowed;  ///< Methods of that path, "GET, POST"; empty: no such path.
+  };
+  [[nodiscard]] Match Find(std::string_view method, std::string_view path) const;
+  [[nodiscard]] const std::vector<Route>& routes() const { return routes_; }
+
+ private:
+  std::vector<Route> routes_;
+};
+
+}  // namespace plumb::web

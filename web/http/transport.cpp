@@ -1,0 +1,371 @@
+#include "web/http/transport.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <microhttpd.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include "algo/types/errors.hpp"
+#include "web/http/checks.hpp"
+#include "web/http/listen_socket.hpp"
+
+namespace plumb::web {
+namespace {
+
+constexpr std::size_t kMaxPath = 256;
+constexpr std::size_t kMaxQueryFields = 8;
+constexpr std::size_t kMaxHeaders = 64;
+constexpr std::size_t kStreamBlock = 4096;
+
+std::string ReadPem(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (!in || text.str().find("-----BEGIN") == std::string::npos) {
+    throw DataError(fmt::format("cannot read {}: expected a PEM file; check the path and its permissions", file.string()));
+  }
+  return text.str();
+}
+
+std::string AddressOf(MHD_Connection* connection) {
+  const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  if (info == nullptr || info->client_addr == nullptr) return {};
+  if (info->client_addr->sa_family == AF_INET) {
+    inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(info->client_addr)->sin_addr, text.data(), text.size());
+  } else if (info->client_addr->sa_family == AF_INET6) {
+    inet_ntop(AF_INET6, &reinterpret_cast<const sockaddr_in6*>(info->client_addr)->sin6_addr, text.data(), text.size());
+  }
+  return text.data();
+}
+
+void CutSocket(MHD_Connection* connection) {
+  const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+  if (info != nullptr) shutdown(info->connect_fd, SHUT_RDWR);
+}
+
+}  // namespace
+
+struct Transport::Connection {
+  int fd = -1;
+  std::chrono::steady_clock::time_point since;  ///< When its present request could have begun.
+  bool receiving = true;
+};
+
+/// One request and its answer.
+struct Transport::Exchange : std::enable_shared_from_this<Transport::Exchange> {
+  Transport* owner = nullptr;
+  MHD_Connection* connection = nullptr;
+  Request request;
+  const Route* route = nullptr;
+  bool head_only = false;
+  bool malformed = false;
+  int num_hosts = 0;
+  bool started = false;
+  bool suspended = false;
+  std::optional<Response> response;
+  std::shared_ptr<EventStream> stream;
+
+  void Suspend() {
+    suspended = true;
+    MHD_suspend_connection(connection);
+  }
+  void Resume() {
+    if (!suspended) return;
+    suspended = false;
+    MHD_resume_connection(connection);
+    owner->Wake();
+  }
+  void Answer(Response given) {
+    if (response) return;
+    response = std::move(given);
+    Resume();
+  }
+};
+
+struct Transport::Callbacks {
+  static std::size_t KeepEscapes(void*, MHD_Connection*, char* text) { return std::strlen(text); }
+
+  static void OnConnection(void* self, MHD_Connection* connection, void** context, MHD_ConnectionNotificationCode code) {
+    auto* transport = static_cast<Transport*>(self);
+    if (code == MHD_CONNECTION_NOTIFY_STARTED) {
+      const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+      auto made = std::make_unique<Connection>(Connection{info->connect_fd, transport->options_.now()});
+      transport->connections_.push_back(made.get());
+      *context = made.release();
+    } else {
+      transport->connections_.remove(static_cast<Connection*>(*context));
+      delete static_cast<Connection*>(*context);
+      *context = nullptr;
+    }
+  }
+
+  static Connection* ConnectionOf(MHD_Connection* connection) {
+    const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+    return info != nullptr ? static_cast<Connection*>(info->socket_context) : nullptr;
+  }
+
+  static void OnCompleted(void* self, MHD_Connection* connection, void** context, MHD_RequestTerminationCode) {
+    auto* transport = static_cast<Transport*>(self);
+    if (Connection* known = ConnectionOf(connection)) {
+      known->since = transport->options_.now();
+      known->receiving = true;
+    }
+    auto* held = static_cast<std::shared_ptr<Exchange>*>(*context);
+    if (held == nullptr) return;
+    transport->exchanges_.remove(held->get());
+    if ((*held)->stream) {
+      (*held)->stream->wake = nullptr;
+      (*held)->stream->cut = nullptr;
+      transport->hub_.Remove((*held)->stream);
+    }
+    (*held)->response.emplace();  // whoever answers now answers nobody
+    delete held;
+    *context = nullptr;
+  }
+
+  static MHD_Result OnHeader(void* cls, MHD_ValueKind, const char* key, const char* value) {
+    auto* exchange = static_cast<Exchange*>(cls);
+    std::string name(key);
+    std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    const std::string_view text = value != nullptr ? value : "";
+    exchange->num_hosts += name == "host" ? 1 : 0;
+    auto& headers = exchange->request.headers;
+    if (!IsPlainText(text) || headers.size() >= kMaxHeaders) exchange->malformed = true;
+    const auto [where, fresh] = headers.emplace(std::move(name), text);
+    if (!fresh && where->first == "cookie") where->second.append("; ").append(text);
+    if (!fresh && (where->first == "content-length" || where->first == "x-csrf-token" || where->first == "origin"))
+      exchange->malformed = true;
+    return MHD_YES;
+  }
+
+  static MHD_Result OnQuery(void* cls, MHD_ValueKind, const char* key, const char* value) {
+    auto* exchange = static_cast<Exchange*>(cls);
+    const std::string_view text = value != nullptr ? value : "";
+    auto& query = exchange->request.query;
+    const bool valid = IsName(key) && (text.empty() || IsName(text)) && query.size() < kMaxQueryFields;
+    if (!valid || !query.emplace(key, text).second) exchange->malformed = true;
+    return MHD_YES;
+  }
+
+  static std::optional<Response> RefuseByHead(Exchange& exchange, std::size_t max_body) {
+    const Request& request = exchange.request;
+    if (exchange.malformed || exchange.num_hosts != 1 || request.path.size() > kMaxPath) return ErrorResponse(400, "malformed request");
+    const std::string_view length = request.Header("content-length");
+    if (!length.empty() && !request.Header("transfer-encoding").empty()) return ErrorResponse(400, "two lengths for one body");
+    std::uint64_t bytes = 0;
+    if (!length.empty() && std::from_chars(length.data(), length.data() + length.size(), bytes).ec != std::errc()) {
+      return ErrorResponse(413, "the body is too long");
+    }
+    if (bytes > max_body) return ErrorResponse(413, fmt::format("the body is too long: at most {} bytes", max_body));
+    auto admitted = exchange.owner->gate_.Admit(exchange.request);
+    if (auto* refusal = std::get_if<Response>(&admitted)) return std::move(*refusal);
+    exchange.route = std::get<const Route*>(admitted);
+    return std::nullopt;
+  }
+
+  static MHD_Result Begin(Transport& transport, MHD_Connection* connection, const char* url, const char* method, void** context) {
+    auto exchange = std::make_shared<Exchange>();
+    exchange->owner = &transport;
+    exchange->connection = connection;
+    exchange->head_only = std::strcmp(method, "HEAD") == 0;
+    exchange->request.method = exchange->head_only ? "GET" : method;
+    exchange->request.path = url;
+    exchange->request.address = AddressOf(connection);
+    MHD_get_connection_values(connection, MHD_HEADER_KIND, OnHeader, exchange.get());
+    MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, OnQuery, exchange.get());
+    transport.exchanges_.push_back(exchange.get());
+    *context = new std::shared_ptr<Exchange>(exchange);
+    if (auto refusal = RefuseByHead(*exchange, transport.options_.max_body_bytes)) {
+      exchange->response = std::move(*refusal);
+      exchange->started = true;
+      // An answer before the whole request ends the connection: only where a body would have to be read for nothing.
+      const bool has_body = !exchange->request.Header("transfer-encoding").empty() || exchange->malformed ||
+                            (!exchange->request.Header("content-length").empty() && exchange->request.Header("content-length") != "0");
+      if (has_body) return Queue(*exchange);
+    }
+    return MHD_YES;
+  }
+
+  static MHD_Result OnRequest(void* self, MHD_Connection* connection, const char* url, const char* method, const char*, const char* upload,
+                              std::size_t* upload_size, void** context) {
+    auto& transport = *static_cast<Transport*>(self);
+    try {
+      if (*context == nullptr) return Begin(transport, connection, url, method, context);
+      const std::shared_ptr<Exchange> exchange = *static_cast<std::shared_ptr<Exchange>*>(*context);
+      if (*upload_size > 0) {
+        // Too long without having said so: there is no way to answer in the middle of an upload.
+        if (exchange->request.body.size() + *upload_size > transport.options_.max_body_bytes) return MHD_NO;
+        exchange->request.body.append(upload, *upload_size);
+        *upload_size = 0;
+        return MHD_YES;
+      }
+      if (Connection* known = ConnectionOf(connection)) known->receiving = false;
+      if (!exchange->started) {
+        exchange->started = true;
+        Gate::Handle(*exchange->route, exchange->request, [weak = std::weak_ptr(exchange)](Response response) {
+          if (const auto alive = weak.lock()) alive->Answer(std::move(response));
+        });
+      }
+      if (exchange->response) return Queue(*exchange);
+      exchange->Suspend();
+      return MHD_YES;
+    } catch (const std::exception&) {
+      return MHD_NO;
+    }
+  }
+
+  static ssize_t ReadStream(void* cls, std::uint64_t, char* buffer, std::size_t max) {
+    Exchange& exchange = **static_cast<std::shared_ptr<Exchange>*>(cls);
+    EventStream& stream = *exchange.stream;
+    if (stream.empty()) {
+      if (stream.closed()) return MHD_CONTENT_READER_END_OF_STREAM;
+      exchange.Suspend();
+      return 0;
+    }
+    const std::string_view bytes = stream.Peek(max);
+    std::memcpy(buffer, bytes.data(), bytes.size());
+    const std::size_t count = bytes.size();
+    stream.Take(count);
+    return static_cast<ssize_t>(count);
+  }
+
+  static void FreeStream(void* cls) { delete static_cast<std::shared_ptr<Exchange>*>(cls); }
+
+  static MHD_Response* MakeStream(Exchange& exchange) {
+    exchange.stream = exchange.owner->hub_.Open(exchange.request.session);
+    if (!exchange.stream) {
+      exchange.response = ErrorResponse(503, "too many pages are open");
+      return nullptr;
+    }
+    exchange.stream->wake = [&exchange] { exchange.Resume(); };
+    exchange.stream->cut = [&exchange] {
+      CutSocket(exchange.connection);
+      exchange.Resume();
+    };
+    exchange.owner->greet_(*exchange.stream);
+    auto held = std::make_unique<std::shared_ptr<Exchange>>(exchange.shared_from_this());
+    return MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, kStreamBlock, ReadStream, held.release(), FreeStream);
+  }
+
+  static MHD_Response* MakeBody(Exchange& exchange) {
+    Response& response = *exchange.response;
+    if (response.event_stream && !exchange.head_only) {
+      if (MHD_Response* stream = MakeStream(exchange)) return stream;
+    }
+    if (response.file) {
+      const std::uint64_t size = response.file->size();
+      return MHD_create_response_from_fd64(size, response.file->Release());
+    }
+    if (!response.constant_body.empty()) {
+      return MHD_create_response_from_buffer(response.constant_body.size(), const_cast<char*>(response.constant_body.data()),
+                                             MHD_RESPMEM_PERSISTENT);
+    }
+    return MHD_create_response_from_buffer(response.body.size(), response.body.data(), MHD_RESPMEM_MUST_COPY);
+  }
+
+  static MHD_Result Queue(Exchange& exchange) {
+    MHD_Response* made = MakeBody(exchange);
+    if (made == nullptr) return MHD_NO;
+    Response& response = *exchange.response;
+    AddSecurityHeaders(response);
+    MHD_add_response_header(made, MHD_HTTP_HEADER_CONTENT_TYPE, response.type.c_str());
+    for (const auto& [name, value] : response.headers) MHD_add_response_header(made, name.c_str(), value.c_str());
+    const MHD_Result queued = MHD_queue_response(exchange.connection, static_cast<unsigned>(response.status), made);
+    MHD_destroy_response(made);
+    return queued;
+  }
+};
+
+Transport::Transport(const HttpServerOptions& options, const Router& router, Accounts& accounts, EventHub& hub,
+                     std::function<void(EventStream&)> greet)
+    : options_(options),
+      gate_(router, accounts, options.host_names, !options.tls_certificate.empty()),
+      hub_(hub),
+      greet_(std::move(greet)),
+      wake_fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+  if (wake_fd_ < 0) throw IoError(fmt::format("cannot make an eventfd: {}", std::strerror(errno)));
+  try {
+    Start(options.listen_fd ? *options.listen_fd : OpenListenSocket(options.address, options.port));
+  } catch (...) {
+    close(wake_fd_);
+    throw;
+  }
+}
+
+void Transport::Start(int listen_fd) {
+  port_ = PortOf(listen_fd);
+  unsigned flags = MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC;
+  if (IsIpv6(listen_fd)) flags |= MHD_USE_IPv6;
+  std::string certificate, key;
+  std::vector<MHD_OptionItem> extra;
+  if (!options_.tls_certificate.empty()) {
+    flags |= MHD_USE_TLS;
+    certificate = ReadPem(options_.tls_certificate);
+    key = ReadPem(options_.tls_key);
+    extra.push_back({MHD_OPTION_HTTPS_MEM_CERT, 0, certificate.data()});
+    extra.push_back({MHD_OPTION_HTTPS_MEM_KEY, 0, key.data()});
+  }
+  extra.push_back({MHD_OPTION_END, 0, nullptr});
+  daemon_ = MHD_start_daemon(flags, 0, nullptr, nullptr, &Callbacks::OnRequest, this, MHD_OPTION_LISTEN_SOCKET, listen_fd,
+                             MHD_OPTION_CONNECTION_LIMIT, options_.max_connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT,
+                             options_.max_connections_per_ip, MHD_OPTION_CONNECTION_MEMORY_LIMIT, options_.connection_memory_bytes,
+                             MHD_OPTION_CONNECTION_TIMEOUT, static_cast<unsigned>(options_.request_timeout.count()),
+                             MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_UNESCAPE_CALLBACK, &Callbacks::KeepEscapes, nullptr,
+                             MHD_OPTION_NOTIFY_COMPLETED, &Callbacks::OnCompleted, this, MHD_OPTION_NOTIFY_CONNECTION,
+                             &Callbacks::OnConnection, this, MHD_OPTION_ARRAY, extra.data(), MHD_OPTION_END);
+  if (daemon_ == nullptr) {
+    if (!options_.listen_fd) close(listen_fd);
+    throw IoError(fmt::format("cannot start the HTTP server on port {}{}", port_,
+                              certificate.empty() ? "" : "; do the TLS certificate and key belong together?"));
+  }
+  epoll_fd_ = MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_EPOLL_FD)->epoll_fd;
+}
+
+Transport::~Transport() {
+  // The library cannot stop while connections are suspended.
+  for (Exchange* exchange : std::list(exchanges_)) {
+    if (!exchange->response) exchange->response = ErrorResponse(503, "the appliance is stopping");
+    exchange->Resume();
+  }
+  MHD_run(daemon_);
+  for (Exchange* exchange : std::list(exchanges_)) exchange->Resume();
+  MHD_stop_daemon(daemon_);
+  close(wake_fd_);
+}
+
+void Transport::Run() {
+  std::uint64_t count = 0;
+  [[maybe_unused]] const auto drained = read(wake_fd_, &count, sizeof count);
+  MHD_run(daemon_);
+}
+
+void Transport::Wake() const {
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const auto written = write(wake_fd_, &one, sizeof one);  // cannot fail below 2^64 - 1
+}
+
+std::optional<std::chrono::milliseconds> Transport::timeout() const {
+  MHD_UNSIGNED_LONG_LONG wait_ms = 0;
+  if (MHD_get_timeout(daemon_, &wait_ms) != MHD_YES) return std::nullopt;
+  return std::chrono::milliseconds(wait_ms);
+}
+
+void Transport::CutLate() {
+  const auto now = options_.now();
+  for (const Connection* connection : connections_) {
+    if (connection->receiving && now - connection->since > options_.request_limit) shutdown(connection->fd, SHUT_RDWR);
+  }
+}
+
+}  // namespace plumb::web

@@ -1,0 +1,59 @@
+// libmicrohttpd as the loop sees it: connections, limits, bodies, files, streams.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <memory>
+#include <optional>
+
+#include "web/http/event_hub.hpp"
+#include "web/http/gate.hpp"
+#include "web/http_server.hpp"
+
+struct MHD_Daemon;
+
+namespace plumb::web {
+
+/// Carries requests to the gate and answers back. Belongs to the loop thread.
+class Transport {
+ public:
+  /// @param greet  Writes the first events into a new stream.
+  Transport(const HttpServerOptions& options, const Router& router, Accounts& accounts, EventHub& hub,
+            std::function<void(EventStream&)> greet);
+  ~Transport();
+  Transport(const Transport&) = delete;
+  Transport& operator=(const Transport&) = delete;
+
+  [[nodiscard]] int fd() const { return epoll_fd_; }
+  /// Readable after Wake(): something is ready to be sent.
+  [[nodiscard]] int wake_fd() const { return wake_fd_; }
+  void Run();
+  void Wake() const;
+  [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const;
+  /// Closes connections whose request is not whole in time.
+  void CutLate();
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+
+  struct Connection;
+  struct Exchange;
+  /// libmicrohttpd's callbacks; only the .cpp knows its types.
+  struct Callbacks;
+
+ private:
+  void Start(int listen_fd);
+
+  HttpServerOptions options_;
+  Gate gate_;
+  EventHub& hub_;
+  std::function<void(EventStream&)> greet_;
+  std::list<Connection*> connections_;
+  std::list<Exchange*> exchanges_;
+  std::uint16_t port_ = 0;
+  int wake_fd_ = -1;
+  int epoll_fd_ = -1;
+  MHD_Daemon* daemon_ = nullptr;
+};
+
+}  // namespace plumb::web

@@ -1,0 +1,119 @@
+// The last result as plain HTML: for browsers without script, and for printing.
+#include <fmt/format.h>
+
+#include <array>
+
+#include "web/api.hpp"
+#include "web/assets.hpp"
+#include "web/http/checks.hpp"
+#include "web/json.hpp"
+
+namespace plumb::web {
+namespace {
+
+constexpr std::string_view kNotice =
+    "Research use only. Not a medical device. Do not use to position patients for treatment or to replace image guidance.";
+constexpr std::chrono::minutes kOldAfter{2};
+
+struct NumberRow {
+  const char* name;
+  const char* positive;  ///< For a patient on the back with the head to the gantry; result.json has the words for other postures.
+  const char* unit;
+  std::optional<double> value, u95;
+};
+
+std::array<NumberRow, 6> Rows(const SixNumbers& value, const SixNumbers& u95) {
+  return {NumberRow{"vertical", "+ is up", "mm", value.vertical_mm, u95.vertical_mm},
+          NumberRow{"longitudinal", "+ is toward gantry", "mm", value.longitudinal_mm, u95.longitudinal_mm},
+          NumberRow{"lateral", "+ is to the right, seen facing the gantry", "mm", value.lateral_mm, u95.lateral_mm},
+          NumberRow{"pitch", "about the lateral axis", "\xC2\xB0", value.pitch_deg, u95.pitch_deg},
+          NumberRow{"roll", "about the longitudinal axis", "\xC2\xB0", value.roll_deg, u95.roll_deg},
+          NumberRow{"yaw", "about the vertical axis", "\xC2\xB0", value.yaw_deg, u95.yaw_deg}};
+}
+
+std::string Document(const std::string& body) {
+  std::string style;
+  for (const Asset& asset : Assets()) {
+    if (asset.type.starts_with("text/css")) style += fmt::format("<link rel=\"stylesheet\" href=\"{}\">", asset.path);
+  }
+  return fmt::format(
+      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">"
+      "<title>Plumb result</title>{}</head><body class=\"plain\"><p class=\"notice\" role=\"note\">{}</p><main>{}</main></body></html>",
+      style, kNotice, body);
+}
+
+std::string LoginForm(bool failed) {
+  return fmt::format(
+      "<h1>Log in</h1>{}<form method=\"post\" action=\"/login\" class=\"card form\">"
+      "<label>Name <input name=\"name\" autocomplete=\"username\" required maxlength=\"32\"></label>"
+      "<label>Password <input name=\"password\" type=\"password\" autocomplete=\"current-password\" required maxlength=\"128\"></label>"
+      "<button class=\"primary\">Log in</button></form>",
+      failed ? "<p role=\"alert\">Name or password is wrong.</p>" : "");
+}
+
+std::string NumbersTable(const ResultSummary& result) {
+  if (!result.correction) return "";
+  std::string rows;
+  for (const NumberRow& row : Rows(*result.correction, result.u95.value_or(SixNumbers{}))) {
+    const std::string value = row.value ? fmt::format("{:+.1f} {}", *row.value, row.unit) : "not known";
+    const std::string u95 = row.value && row.u95 ? fmt::format("\xC2\xB1 {:.1f}", *row.u95) : "";
+    rows += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td></tr>", row.name, value, u95, row.positive);
+  }
+  return fmt::format(
+      "<table><caption>Correction to apply at the isocentre</caption><thead><tr><th scope=\"col\">axis</th><th scope=\"col\">value</th>"
+      "<th scope=\"col\">95 %</th><th scope=\"col\">sign</th></tr></thead><tbody>{}</tbody></table>",
+      rows);
+}
+
+std::string Pictures(const std::string& scan_id) {
+  return fmt::format(
+      "<figure><img src=\"/api/v1/scans/{0}/files/error_map.png\" alt=\"Map of height errors, current minus reference\"></figure>"
+      "<figure><img src=\"/api/v1/scans/{0}/files/overlay.png\" alt=\"Reference blue, current red\"></figure>",
+      scan_id);
+}
+
+std::string ResultBody(ScanService& service, const Scan& scan) {
+  const auto patient = service.FindPatient(scan.patient_id);
+  const auto reference = service.FindReference(scan.reference_id);
+  const auto age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
+  const bool old = age > kOldAfter;
+  std::string body = fmt::format("<h1>Patient {}</h1><p>Scan of {}, {} min ago.{}</p>", patient ? EscapeHtml(patient->code) : "none",
+                                 TimeText(scan.started_at), std::chrono::floor<std::chrono::minutes>(age).count(),
+                                 old ? " <strong>OLD: do not act on it.</strong>" : "");
+  if (reference) body += fmt::format("<p>Reference version {} of {}.</p>", reference->version, TimeText(reference->created_at));
+  if (!scan.result) return body + "<p>This scan was compared with nothing.</p>";
+  const bool in_tolerance = scan.result->verdict == "in_tolerance", move = scan.result->verdict == "move";
+  body += fmt::format("<section class=\"{}\"><p class=\"verdict {}\">{}</p>", old ? "old" : "fresh", EscapeHtml(scan.result->verdict),
+                      in_tolerance ? "IN TOLERANCE"
+                      : move       ? "MOVE"
+                                   : "NO ANSWER");
+  for (const std::string& reason : scan.result->reasons) body += fmt::format("<p>{}</p>", EscapeHtml(reason));
+  return body + NumbersTable(*scan.result) + Pictures(scan.id) + "</section>";
+}
+
+}  // namespace
+
+void AddResultPage(Router& router, ScanService& service) {
+  router.Add({"GET", "/result", Permission::kNone, BodyKind::kNone, [&service](const Request& request, const Respond& respond) {
+                Response response;
+                response.type = "text/html; charset=utf-8";
+                if (!request.session) {
+                  response.body = Document(LoginForm(request.query.contains("failed")));
+                  return respond(std::move(response));
+                }
+                std::optional<Scan> scan;
+                if (const auto wanted = request.query.find("scan"); wanted != request.query.end()) {
+                  scan = service.FindScan(wanted->second);
+                } else {
+                  for (Scan& candidate : service.Scans("", 20)) {
+                    if (candidate.outcome != ScanOutcome::kDone) continue;
+                    scan = std::move(candidate);
+                    break;
+                  }
+                }
+                response.body = Document(scan ? ResultBody(service, *scan) : "<h1>No result yet</h1>");
+                respond(std::move(response));
+              }});
+}
+
+}  // namespace plumb::web

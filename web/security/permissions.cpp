@@ -1,0 +1,67 @@
+#include "web/security/permissions.hpp"
+
+#include <array>
+
+namespace plumb::web {
+namespace {
+
+struct Row {
+  Permission permission;
+  std::string_view name;
+  bool technician, physicist, engineer;
+};
+
+constexpr std::array kTable = {
+    Row{Permission::kNone, "none", true, true, true},          Row{Permission::kLogin, "login", true, true, true},
+    Row{Permission::kView, "view", true, true, true},          Row{Permission::kScan, "scan", true, true, true},
+    Row{Permission::kPatients, "patients", true, true, false}, Row{Permission::kPlan, "plan", false, true, false},
+    Row{Permission::kApprove, "approve", false, true, false},  Row{Permission::kAccept, "accept", true, true, false},
+    Row{Permission::kWipe, "wipe", false, true, false},        Row{Permission::kUsers, "users", false, false, true},
+    Row{Permission::kAudit, "audit", false, true, true},       Row{Permission::kSettings, "settings", false, false, true},
+    Row{Permission::kUpdate, "update", false, false, true},    Row{Permission::kDiagnostics, "diagnostics", false, false, true},
+};
+
+constexpr std::array<std::string_view, 3> kRoles = {"technician", "physicist", "engineer"};
+
+}  // namespace
+
+bool May(Role role, Permission permission) {
+  for (const Row& row : kTable) {
+    if (row.permission != permission) continue;
+    switch (role) {
+      case Role::kTechnician:
+        return row.technician;
+      case Role::kPhysicist:
+        return row.physicist;
+      case Role::kEngineer:
+        return row.engineer;
+    }
+  }
+  return false;
+}
+
+std::vector<Permission> PermissionsOf(Role role) {
+  std::vector<Permission> permissions;
+  for (const Row& row : kTable) {
+    if (May(role, row.permission)) permissions.push_back(row.permission);
+  }
+  return permissions;
+}
+
+std::string_view Name(Permission permission) {
+  for (const Row& row : kTable) {
+    if (row.permission == permission) return row.name;
+  }
+  return {};
+}
+
+std::string_view Name(Role role) { return kRoles[static_cast<std::size_t>(role)]; }
+
+std::optional<Role> ParseRole(std::string_view name) {
+  for (std::size_t i = 0; i < kRoles.size(); ++i) {
+    if (kRoles[i] == name) return static_cast<Role>(i);
+  }
+  return std::nullopt;
+}
+
+}  // namespace plumb::web

@@ -1,0 +1,35 @@
+// Who may do what.
+#pragma once
+
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "web/service_types.hpp"
+
+namespace plumb::web {
+
+enum class Permission {
+  kNone,  ///< Nobody needs to be logged in.
+  kLogin,
+  kView,
+  kScan,
+  kPatients,
+  kPlan,
+  kApprove,
+  kAccept,
+  kWipe,
+  kUsers,
+  kAudit,
+  kSettings,
+  kUpdate,
+  kDiagnostics,
+};
+
+[[nodiscard]] bool May(Role role, Permission permission);
+[[nodiscard]] std::vector<Permission> PermissionsOf(Role role);
+[[nodiscard]] std::string_view Name(Permission permission);
+[[nodiscard]] std::string_view Name(Role role);
+[[nodiscard]] std::optional<Role> ParseRole(std::string_view name);
+
+}  // namespace plumb::web
