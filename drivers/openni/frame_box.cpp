@@ -8,6 +8,9 @@ namespace plumb {
 namespace {
 
 constexpr std::chrono::seconds kRateWindow{1};
+constexpr std::size_t kMaxStamps = 100'000;
+
+std::size_t Side(StreamKind kind) { return kind == StreamKind::kColor ? 0 : 1; }
 
 }  // namespace
 
@@ -17,6 +20,7 @@ FrameBox::FrameBox(std::string name, std::chrono::microseconds max_gap, std::chr
 void FrameBox::Add(StreamKind kind, std::int64_t stamp_us, cv::Mat image) {
   {
     const std::lock_guard lock(mutex_);
+    if (std::vector<std::int64_t>& stamps = stamps_us_[Side(kind)]; keep_stamps_ && stamps.size() < kMaxStamps) stamps.push_back(stamp_us);
     auto pair = pairing_.Add(kind, stamp_us, std::move(image));
     if (!pair) return;
     if (skip_ > 0) {
@@ -66,6 +70,17 @@ void FrameBox::Flush() noexcept {
   pairs_.clear();
   pairing_.Clear();
   next_index_ = 0;
+}
+
+void FrameBox::KeepStamps(bool keep) {
+  const std::lock_guard lock(mutex_);
+  keep_stamps_ = keep;
+  for (auto& stamps : stamps_us_) stamps.clear();
+}
+
+std::vector<std::int64_t> FrameBox::StampsOf(StreamKind kind) const {
+  const std::lock_guard lock(mutex_);
+  return stamps_us_[Side(kind)];
 }
 
 void FrameBox::SkipPairs(int count) {

@@ -1,6 +1,7 @@
 // Where the thread that reads a sensor leaves image pairs for the thread that uses them.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <opencv2/core/mat.hpp>
 
@@ -34,6 +36,8 @@ class FrameBox {
   void SetFailed(bool failed) noexcept;  ///< The driver reports an error, or that it is over.
   void Interrupt() noexcept;             ///< For good.
   void Flush() noexcept;
+  void KeepStamps(bool keep);  ///< From now on, for StampsOf().
+  [[nodiscard]] std::vector<std::int64_t> StampsOf(StreamKind kind) const;
   void SkipPairs(int count);  ///< The next so many pairs are thrown away.
 
   /// The oldest pair that waits; nothing once interrupted.
@@ -56,6 +60,8 @@ class FrameBox {
   std::int64_t next_index_ = 0;
   std::int64_t num_taken_ = 0;
   std::int64_t num_discarded_ = 0;
+  std::array<std::vector<std::int64_t>, 2> stamps_us_;  ///< Of all images that came, colour and depth.
+  bool keep_stamps_ = false;
   int skip_ = 0;
   bool lost_ = false;
   bool failed_ = false;

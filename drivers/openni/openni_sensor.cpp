@@ -2,17 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <mutex>
-
 #include "algo/types/errors.hpp"
 #include "drivers/openni/sensor_calibration.hpp"
+#include "drivers/openni/stream_waiter.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr int kWait_ms = 100;                         // of one look for images; the longest that closing waits
-constexpr std::chrono::milliseconds kAfterError{20};  // OpenNI2 may answer at once, and always the same, after an unplug
 constexpr int kFps = 30;
 // Registration and exposure need a moment after the start; until then depth may still lie on its own grid.
 constexpr int kPairsToSettle = 2;
@@ -105,33 +101,12 @@ OpenNiSensor::OpenNiSensor(std::unique_ptr<OpenNiStreams> streams, std::shared_p
   info_ = LiveStreamInfo(options, description_.serial, streams_->width, streams_->height, fov_rad);
   streams_->Start();
   box_->SkipPairs(kPairsToSettle);
-  reader_ = std::jthread([this](const std::stop_token& stop) { Read(stop); });
+  waiting_ = StreamWaiter::Of(*streams_->library)
+                 .Add(*streams_->library, {streams_->depth, streams_->color},
+                      [this](int stream, const OniFrame& frame) { Accept(stream == 0 ? StreamKind::kDepth : StreamKind::kColor, frame); });
 }
 
-OpenNiSensor::~OpenNiSensor() = default;
-
-void OpenNiSensor::Read(const std::stop_token& stop) {
-  const OpenNiLibrary& library = *streams_->library;
-  std::array<OniStreamHandle, 2> streams{streams_->depth, streams_->color};
-  std::mutex mutex;
-  std::condition_variable_any wake;
-  while (!stop.stop_requested()) {
-    int index = -1;
-    const OniStatus status = library.WaitForAnyStream(streams.data(), static_cast<int>(streams.size()), &index, kWait_ms);
-    if (status == ONI_STATUS_TIME_OUT) continue;
-    OniFrame* frame = nullptr;
-    // Only a stream that has an image is read: reading one that was unplugged never returns.
-    const bool read = status == ONI_STATUS_OK && (index == 0 || index == 1) &&
-                      library.StreamReadFrame(streams[static_cast<std::size_t>(index)], &frame) == ONI_STATUS_OK && frame != nullptr;
-    if (!read) {
-      std::unique_lock lock(mutex);
-      wake.wait_for(lock, stop, kAfterError, [] { return false; });
-      continue;
-    }
-    Accept(index == 0 ? StreamKind::kDepth : StreamKind::kColor, *frame);
-    library.FrameRelease(frame);
-  }
-}
+OpenNiSensor::~OpenNiSensor() { StreamWaiter::Of(*streams_->library).Remove(waiting_); }
 
 void OpenNiSensor::Accept(StreamKind kind, const OniFrame& frame) {
   const bool is_color = kind == StreamKind::kColor;

@@ -1,11 +1,9 @@
 // One open sensor of OpenNI2. OpenNiProvider makes it.
 #pragma once
 
-#include <atomic>
+#include <cstdint>
 #include <memory>
-#include <stop_token>
 #include <string>
-#include <thread>
 
 #include "drivers/openni/frame_box.hpp"
 #include "drivers/openni/openni_library.hpp"
@@ -42,7 +40,7 @@ class OpenNiStreams {
   bool started_ = false;
 };
 
-/// A thread of its own reads both streams all the time, so the newest images are at hand when a scan starts and the rate is known.
+/// The StreamWaiter reads both streams all the time, so the newest images are at hand when a scan starts and the rate is known.
 class OpenNiSensor : public LiveSensor {
  public:
   /// @param box       The provider reports an unplug or a failure there.
@@ -59,11 +57,11 @@ class OpenNiSensor : public LiveSensor {
   void Flush() noexcept override { box_->Flush(); }
   void LockExposure(bool locked) override;
 
-  /// For the recorder, which attaches to the streams.
+  /// For the recorder, which attaches to the streams and wants the stamps.
   [[nodiscard]] const OpenNiStreams& streams() const { return *streams_; }
+  [[nodiscard]] FrameBox& box() { return *box_; }
 
  private:
-  void Read(const std::stop_token& stop);
   void Accept(StreamKind kind, const OniFrame& frame);
 
   SensorDescription description_;
@@ -71,7 +69,7 @@ class OpenNiSensor : public LiveSensor {
   std::unique_ptr<OpenNiStreams> streams_;
   std::shared_ptr<FrameBox> box_;
   StreamInfo info_;
-  std::jthread reader_;  ///< Last: joined before the streams go.
+  std::int64_t waiting_ = 0;  ///< At the StreamWaiter.
 };
 
 }  // namespace plumb

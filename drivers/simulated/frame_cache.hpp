@@ -20,6 +20,7 @@ struct FrameCacheShape {
   std::uint32_t height = 0;
   std::uint32_t num_frames = 0;
   std::uint32_t period_us = 0;  ///< Nominal, between frames.
+  std::uint32_t version = 0;    ///< Of the simulator that rendered them.
   bool operator==(const FrameCacheShape&) const = default;
   [[nodiscard]] std::size_t color_bytes() const { return std::size_t{3} * width * height; }
   [[nodiscard]] std::size_t depth_bytes() const { return std::size_t{2} * width * height; }

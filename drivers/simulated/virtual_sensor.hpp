@@ -4,12 +4,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "drivers/simulated/sensor_unit.hpp"
+#include "drivers/simulated/virtual_session.hpp"
 
 namespace plumb {
 
@@ -60,15 +62,15 @@ class VirtualSensor {
 
   [[nodiscard]] const std::filesystem::path& runtime_library() const { return runtime_library_; }
   /// Holds `SERIAL.yaml` of the virtual unit; other serials have none.
-  [[nodiscard]] const std::filesystem::path& calibration_folder() const { return calibration_folder_; }
+  [[nodiscard]] const std::filesystem::path& calibration_folder() const { return session_->calibration_folder(); }
   /// Names of the scenes in the order in which NextScene() shows them.
   [[nodiscard]] const std::vector<std::string>& scenes() const { return scenes_; }
   [[nodiscard]] int frames() const { return frames_; }
   /// Where the plug-in listens; datagrams with one command each, the answer goes to the sender.
-  [[nodiscard]] const std::filesystem::path& socket() const { return socket_; }
+  [[nodiscard]] const std::filesystem::path& socket() const { return session_->socket(); }
 
   /// Sends one line as listed in drivers/simulated/README.md and returns the answer without its leading "ok".
-  std::string Command(std::string_view command) const;
+  std::string Command(std::string_view command) const { return session_->Command(command); }
 
   void Plug() const { (void)Command("plug"); }
   void Unplug() const { (void)Command("unplug"); }
@@ -79,14 +81,10 @@ class VirtualSensor {
   void Rewind() const { (void)Command("rewind"); }
 
  private:
-  void WriteSession(const VirtualSensorOptions& options, const std::vector<std::filesystem::path>& caches) const;
-
-  std::filesystem::path session_folder_;
   std::filesystem::path runtime_library_;
-  std::filesystem::path calibration_folder_;
-  std::filesystem::path socket_;
   std::vector<std::string> scenes_;
   int frames_ = 0;
+  std::unique_ptr<const VirtualSession> session_;
 };
 
 }  // namespace plumb

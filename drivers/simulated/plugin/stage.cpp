@@ -20,11 +20,12 @@ Stage::View Stage::Now() const {
   return view_;
 }
 
-void Stage::Show(std::size_t scene, Motion motion) {
+void Stage::Show(std::size_t scene, Motion motion, std::int64_t origin_us) {
   const std::lock_guard lock(mutex_);
   view_.index = scene % scenes_.size();
   view_.scene = scenes_[view_.index];
   view_.motion = motion;
+  view_.origin_us = origin_us;
   view_.epoch += 1;
 }
 

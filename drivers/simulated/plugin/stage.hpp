@@ -24,8 +24,9 @@ class Stage {
     std::shared_ptr<const FrameCacheReader> scene;
     std::size_t index = 0;
     Motion motion = Motion::kStill;
-    std::uint64_t epoch = 0;  ///< Another number each time when something changed: start anew.
-    double speed = 1.0;       ///< 0: as fast as it goes.
+    std::uint64_t epoch = 0;      ///< Another number each time when something changed: start anew.
+    double speed = 1.0;           ///< 0: as fast as it goes.
+    std::int64_t origin_us = -1;  ///< Stamp of the sweep's time 0; negative: whenever it starts.
   };
 
   /// @throws std::runtime_error unless there are scenes, all of one shape.
@@ -34,7 +35,7 @@ class Stage {
   [[nodiscard]] const FrameCacheShape& shape() const { return scenes_.front()->shape(); }
   [[nodiscard]] std::size_t size() const { return scenes_.size(); }
   [[nodiscard]] View Now() const;
-  void Show(std::size_t scene, Motion motion);
+  void Show(std::size_t scene, Motion motion, std::int64_t origin_us = -1);
   void SetSpeed(double speed);
 
  private:

@@ -137,7 +137,7 @@ void VirtualDevice::Tick(const std::stop_token& stop) {
   Load(std::min(next_, last));
   Shown shown;
   if (in_sweep) {
-    if (next_ == 0) sweep_begin_us_ = device_us_ - loaded_stamps_.color_us;
+    if (next_ == 0) sweep_begin_us_ = view_.origin_us >= 0 ? view_.origin_us : device_us_ - loaded_stamps_.color_us;
     shown.stamps = {sweep_begin_us_ + loaded_stamps_.color_us, sweep_begin_us_ + loaded_stamps_.depth_us};
     ++next_;
   } else {

@@ -153,7 +153,11 @@ class VirtualDriver : public oni::driver::DriverBase {
     if (verb == "plug") return Plug(argument.empty() ? default_serial_ : argument);
     if (verb == "next-scene") return Show(stage_->Now().index + 1, Stage::Motion::kStill);
     if (verb == "scene") return Show(std::stoul(argument), Stage::Motion::kStill);
-    if (verb == "rewind") return Show(stage_->Now().index, argument == "once" ? Stage::Motion::kSweepOnce : Stage::Motion::kSweep);
+    if (verb == "rewind") {
+      std::int64_t origin_us = -1;
+      words >> origin_us;
+      return Show(stage_->Now().index, argument == "once" ? Stage::Motion::kSweepOnce : Stage::Motion::kSweep, words ? origin_us : -1);
+    }
     if (verb == "hold") return Show(stage_->Now().index, Stage::Motion::kStill);
     if (verb == "state") return State();
     if (verb == "speed") {
@@ -179,8 +183,8 @@ class VirtualDriver : public oni::driver::DriverBase {
     return "refused: cannot understand the argument of " + line;
   }
 
-  std::string Show(std::size_t scene, Stage::Motion motion) {
-    stage_->Show(scene, motion);
+  std::string Show(std::size_t scene, Stage::Motion motion, std::int64_t origin_us = -1) {
+    stage_->Show(scene, motion, origin_us);
     return "ok";
   }
 
