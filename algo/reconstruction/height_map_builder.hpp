@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "algo/reconstruction/view_surface.hpp"
@@ -51,6 +52,7 @@ struct RobustHeightMapOptions {
   int min_views = 2;             ///< Views that must agree on a cell (no more than there are).
   double min_patch_area = 4e-4;  ///< Square metres; smaller separate patches are speckles.
   bool with_colors = true;
+  std::stop_token stop = {};  ///< Polled; see CheckStop().
 };
 
 /// A height map with a colour for each cell (black where the map is empty), or no colours.

@@ -8,7 +8,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/types/check_stop.hpp"
 
 namespace plumb {
 namespace {
@@ -342,10 +342,6 @@ std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrati
   return terms;
 }
 
-void CheckStop(const std::stop_token& stop) {
-  if (stop.stop_requested()) throw Interrupted("stopped during the joint registration");
-}
-
 }  // namespace
 
 Pose DepthPose(const MapKeyframe& keyframe, const CalibrationModel& calibration) {
@@ -362,6 +358,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointReg
   bundle.calibrate = options.calibrate;
   bundle.keypoint_sigma_px = options.keypoint_sigma_px;
   bundle.keypoint_depth_sigmas = options.keypoint_depth_sigmas;
+  bundle.stop = stop;
   bundle.max_iterations = 10;
   bundle.free_keyframes.resize(map.keyframes.size() - 1);
   std::iota(bundle.free_keyframes.begin(), bundle.free_keyframes.end(), 1);
@@ -379,8 +376,10 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointReg
     CheckStop(stop);
     const Sensor sensor = MakeSensor(stated, result.calibration);
     const std::vector<CalibratedView> views = MakeViews(sensor, result.calibration, map);
+    CheckStop(stop);
     if (round == 0) pairs = FindPairs(sensor, options, views);
     BundleAdjust(stated, bundle, MakeTerms(sensor, options, map, views, pairs, gate_m), map, result.calibration);
+    CheckStop(stop);
     double farthest_m = 0.0;
     for (const CalibratedView& view : views)
       farthest_m =

@@ -11,6 +11,7 @@
 #include "algo/geometry/back_projection.hpp"
 #include "algo/geometry/rigid_fit.hpp"
 #include "algo/markers/corner_depth.hpp"
+#include "algo/types/check_stop.hpp"
 #include "algo/types/errors.hpp"
 
 namespace plumb {
@@ -112,7 +113,7 @@ PaperReconstruction ReconstructAsPublished(std::span<const Keyframe> keyframes, 
                                            const std::function<void(std::string_view stage)>& on_stage,
                                            const std::function<void(double fraction)>& progress) {
   const auto enter = [&](std::string_view stage) {
-    if (stop.stop_requested()) throw Interrupted("reconstruction stopped on request");
+    CheckStop(stop);
     if (on_stage) on_stage(stage);
   };
   PaperReconstruction result;

@@ -16,6 +16,7 @@
 #include "algo/reconstruction/trajectory.hpp"
 #include "algo/reconstruction/view_surface.hpp"
 #include "algo/tracking/tracker.hpp"
+#include "algo/types/check_stop.hpp"
 #include "algo/types/errors.hpp"
 
 namespace plumb {
@@ -130,7 +131,7 @@ struct Reconstructor::Impl {
   Scene Finish(const std::stop_token& stop, const std::function<void(double, std::string_view)>& progress) {
     const double start = Now();
     const auto report = [&](double fraction, std::string_view what) {
-      if (stop.stop_requested()) throw Interrupted("stopped on request");
+      CheckStop(stop);
       if (progress) progress(fraction, what);
     };
     std::vector<TrackedFrame> frames = tracker.frames();
@@ -184,12 +185,14 @@ struct Reconstructor::Impl {
     const std::vector<ViewSurface> surfaces = PrepareViews(Views(map, joint.calibration, SceneFromWorld(map)));
     SurfaceCloudOptions cloud_options;
     cloud_options.with_colors = options.keep_color;
+    cloud_options.stop = stop;
     scene.cloud = MergeSurface(surfaces, cloud_options);
     scene.timings_s["clouds"] = Now() - stage;
 
     report(0.8, "height map");
     stage = Now();
     RobustHeightMapOptions map_options;
+    map_options.stop = stop;
     map_options.with_colors = false;  // The mesh takes its colours from the cloud.
     if (scene.frame == SceneFrame::kReferenceMarker) scene.height_map = RobustHeightMap(surfaces, map_options).map;
     scene.timings_s["height_map"] = Now() - stage;
@@ -241,7 +244,7 @@ struct Reconstructor::Impl {
       scene.keyframes.push_back({keyframes[j].depth_time_s, view.T_world_camera});
       views.push_back(std::move(view));
     }
-    scene.cloud = MergeSurface(views, {.with_colors = options.keep_color});
+    scene.cloud = MergeSurface(views, {.with_colors = options.keep_color, .stop = stop});
     scene.height_map = paper.height_map;
   }
 

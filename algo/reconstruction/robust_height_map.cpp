@@ -8,6 +8,7 @@
 
 #include "algo/reconstruction/height_map_builder.hpp"
 #include "algo/reconstruction/view_fusion.hpp"
+#include "algo/types/check_stop.hpp"
 
 namespace plumb {
 namespace {
@@ -297,6 +298,7 @@ class MapFiller {
     const int tile_rows = (coarse_.grid.height + kTile - 1) / kTile;
     const int tile_columns = (coarse_.grid.width + kTile - 1) / kTile;
     tbb::parallel_for(0, tile_rows, [&](int row) {
+      CheckStop(options_.stop);
       for (int column = 0; column < tile_columns; ++column) FillTile(row, column, true);
     });
     // Into another array: what a cell becomes must not depend on which of its neighbours came first.
@@ -421,6 +423,7 @@ ColoredHeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker, c
   if (views_in_marker.empty()) return result;
 
   CoarseMap coarse = FindTops(views_in_marker, *grid, options);
+  CheckStop(options.stop);
   SeedGaps(coarse);
   DropSpeckles(coarse, static_cast<float>(options.top_surface_band),
                static_cast<std::size_t>(options.min_patch_area / (coarse.grid.step * coarse.grid.step)));

@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "algo/reconstruction/view_fusion.hpp"
+#include "algo/types/check_stop.hpp"
 
 namespace plumb {
 namespace {
@@ -172,11 +173,12 @@ std::vector<Seed> FullestLayers(std::span<const ViewSurface> views, const Shards
 }
 
 /// One seed per touched voxel, thinned to one layer, by shard, in block order within each.
-Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size) {
+Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size, const std::stop_token& stop) {
   Shards<Seed> seeds;
   VoxelShards voxels;
   std::vector<Shards<Sample>> samples(std::min(kViewsAtOnce, views.size()));
   for (std::size_t first = 0; first < views.size(); first += kViewsAtOnce) {
+    CheckStop(stop);
     const std::size_t count = std::min(kViewsAtOnce, views.size() - first);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) { SortIntoShards(views[first + i], inverse_size, samples[i]); });
     tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) {
@@ -215,6 +217,7 @@ Shards<Merged> MoveSeeds(std::span<const ViewSurface> views, const ViewFusion& f
     const Eigen::Vector3f p = PointInWorld(view, seed.pixel);
     const Eigen::Vector3f n = view.T_world_camera.linear().cast<float>() * view.normals[seed.pixel];
     if (k == 0 || BlockOf(seed.key) != block) {
+      CheckStop(options.stop);
       block = BlockOf(seed.key);
       // Twice the radius: the ball about any of the block's points covers the block.
       fusion.ViewsNear(p, 2.0F * radius, n, near);
@@ -284,7 +287,7 @@ PointCloud MergeSurface(std::span<const ViewSurface> views, const SurfaceCloudOp
   float voxel_size = options.voxel_size_m;
   Shards<Seed> seeds;
   for (;;) {
-    seeds = FindSeeds(views, 1.0F / voxel_size);
+    seeds = FindSeeds(views, 1.0F / voxel_size, options.stop);
     std::size_t count = 0;
     for (const auto& shard : seeds) count += shard.size();
     if (count <= kMaxSeeds) break;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <stop_token>
 
 #include "algo/reconstruction/view_surface.hpp"
 #include "algo/types/keyframe.hpp"
@@ -15,6 +16,7 @@ struct SurfaceCloudOptions {
   int min_views = 2;            ///< Views that must agree on a point (no more than there are).
   float band_m = 0.010F;        ///< Views within this along the normal (or 4 sigma of the sensor) see the same surface.
   bool with_colors = true;      ///< Colours where the views have them.
+  std::stop_token stop = {};    ///< Polled; see CheckStop().
 };
 
 /// The merged surface in the world frame, with normals and colours.
@@ -26,7 +28,7 @@ struct SurfaceCloudOptions {
 ///
 /// @param views  Corrected poses and depth; borrowed.
 /// @return points ordered by voxel: the same for any number of threads. Empty if no view has a usable pixel.
-/// @throws std::invalid_argument if an option is out of range or a view's images do not fit its intrinsics.
+/// @throws std::invalid_argument if an option is out of range or a view's images do not fit its intrinsics; Interrupted on a stop request.
 [[nodiscard]] PointCloud MergeSurface(std::span<const DepthView> views, const SurfaceCloudOptions& options = {});
 
 /// The same from prepared views, for callers that make a height map of them as well.

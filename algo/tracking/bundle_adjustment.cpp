@@ -10,6 +10,7 @@
 #include <Eigen/SparseCholesky>
 
 #include "algo/tracking/bundle_model.hpp"
+#include "algo/types/check_stop.hpp"
 
 namespace plumb {
 namespace {
@@ -115,6 +116,7 @@ class Bundle {
     double damping = 1e-4;
     bool linearised = false;
     while (summary.num_iterations < options_.max_iterations && damping < kLargestDamping) {
+      CheckStop(options_.stop);
       ++summary.num_iterations;
       if (!linearised) Linearise(state);
       linearised = true;

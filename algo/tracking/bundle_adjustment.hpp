@@ -1,6 +1,7 @@
 // Bundle adjustment over keyframes, landmarks, markers and the sensor's own calibration.
 #pragma once
 
+#include <stop_token>
 #include <vector>
 
 #include "algo/tracking/calibration_model.hpp"
@@ -29,6 +30,7 @@ struct BundleOptions {
   double keypoint_depth_sigmas = 1.5;  ///< Standard deviation of a keypoint's depth, in those of the noise model.
   double min_corner_sigma_px = 0.05;
   double marker_length_m = 0.104;
+  std::stop_token stop = {};  ///< Polled in each iteration.
 };
 
 struct BundleSummary {
@@ -43,6 +45,7 @@ struct BundleSummary {
 /// Spread over TBB's threads; deterministic, whatever their number. A general solver came to the same minima, but repeats
 /// its bits on one thread only.
 /// @param terms  Linearised at the map's and the calibration's present values.
+/// @throws Interrupted on a stop request; nothing has moved then.
 BundleSummary BundleAdjust(const Intrinsics& stated, const BundleOptions& options, const std::vector<QuadraticTerm>& terms,
                            TrackingMap& map, CalibrationModel& calibration);
 
