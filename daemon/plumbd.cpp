@@ -1,6 +1,7 @@
 #include "daemon/plumbd.hpp"
 
 #include <signal.h>
+#include <sys/epoll.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
@@ -24,11 +25,13 @@
 #include "daemon/control/unix_socket.hpp"
 #include "daemon/log.hpp"
 #include "daemon/version.hpp"
+#include "daemon/web_service.hpp"
 #include "daemon/work_thread.hpp"
 #ifdef PLUMB_WITH_OPENNI
 #include "drivers/openni/openni_provider.hpp"
 #include "drivers/simulated/virtual_sensor.hpp"
 #endif
+#include "web/http_server.hpp"
 
 namespace plumb {
 namespace {
@@ -199,18 +202,30 @@ class Plumbd {
                            .make_provider = [this] { return sensors_.MakeProvider(); },
                            .before_scan = sensors_.BeforeScan(),
                            .demo_patient = options.simulated.empty() ? "" : "demo"}),
+        service_(appliance_),
+        http_(service_, HttpOptions(config)),
         control_(loop_, ControlSocket(config),
                  [this](const ControlRequest& request, const ControlServer::Reply& reply) { Answer(request, reply); }) {
     appliance_.SetEventListener([this](const std::string& line) { control_.Broadcast(line); });
+    http_timer_ = loop_.MakeTimer([this] { RunHttp(); });
+    http_source_ = loop_.WatchDescriptor(http_.fd(), EPOLLIN, [this](std::uint32_t) { RunHttp(); });
     for (const int signal : {SIGTERM, SIGINT}) signals_.push_back(loop_.WatchSignal(signal, [this] { Stop(); }));
     signals_.push_back(loop_.WatchSignal(SIGHUP, [this] { Reload(); }));
     std::uint64_t watchdog_us = 0;
-    if (sd_watchdog_enabled(0, &watchdog_us) > 0) watchdog_period_ = std::chrono::microseconds(watchdog_us / 3);
+    has_watchdog_ = sd_watchdog_enabled(0, &watchdog_us) > 0;
+    if (has_watchdog_) watchdog_period_ = std::chrono::microseconds(watchdog_us / 3);
     tick_ = loop_.MakeTimer([this] { Tick(); });
   }
 
   int Run() {
     Tick();
+    RunHttp();
+    const std::string page = fmt::format("{}://{}:{}/", is_https_ ? "https" : "http", page_host_, http_.port());
+    Log(LogLevel::kNotice, "the page is served at " + page);
+    if (const std::optional<std::string> code = http_.setup_code(); code && appliance_.store() != nullptr) {
+      fmt::print("setup code: {}\n", *code);  // under systemd the standard output is the journal
+      std::fflush(stdout);
+    }
     sd_notify(0, "READY=1");
     Log(LogLevel::kNotice, fmt::format("plumbd {} is ready; research use only, not a medical device", Version()));
     const int code = loop_.Run();
@@ -222,6 +237,29 @@ class Plumbd {
   static int ControlSocket(const Config& config) {
     if (const std::optional<int> inherited = InheritedSocket("control")) return *inherited;
     return ListenUnix(config.appliance.control);
+  }
+
+  web::HttpServerOptions HttpOptions(const Config& config) {
+    const ListenAddress listen = ParseListenAddress(config.web.listen).value_or(ListenAddress{});
+    is_https_ = !config.web.tls_certificate.empty();
+    page_host_ = listen.address.find(':') == std::string::npos ? listen.address : "[" + listen.address + "]";
+    web::HttpServerOptions options;
+    options.address = listen.address;
+    options.port = listen.port;
+    options.listen_fd = InheritedSocket("http");
+    options.tls_certificate = config.web.tls_certificate;
+    options.tls_key = config.web.tls_key;
+    options.host_names = config.web.host_names;
+    return options;
+  }
+
+  void RunHttp() {
+    http_.Run();
+    if (const auto timeout = http_.timeout()) {
+      http_timer_.ArmAfter(*timeout);
+    } else {
+      http_timer_.Disarm();
+    }
   }
 
   void Answer(const ControlRequest& request, const ControlServer::Reply& reply) {
@@ -259,6 +297,7 @@ class Plumbd {
       status_line_ = line;
       sd_notifyf(0, "STATUS=%s", line.c_str());
     }
+    if (!has_watchdog_) return;
     if (appliance_.WorkersAreAlive()) {
       sd_notify(0, "WATCHDOG=1");
     } else {
@@ -289,9 +328,15 @@ class Plumbd {
   Sensors sensors_;
   WorkThread device_thread_{16};
   Appliance appliance_;
+  bool is_https_ = false;
+  std::string page_host_;
+  WebService service_;
+  web::HttpServer http_;
   ControlServer control_;
+  EventLoop::Source http_source_, http_timer_;
   std::vector<EventLoop::Source> signals_;
   EventLoop::Source tick_;
+  bool has_watchdog_ = false;
   std::chrono::microseconds watchdog_period_{1'000'000};
   std::string status_line_;
 };

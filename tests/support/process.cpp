@@ -92,6 +92,13 @@ bool Process::WaitForStderr(std::string_view text) {
   return true;
 }
 
+bool Process::WaitForStdout(std::string_view text) {
+  while (out_.find(text) == std::string::npos) {
+    if (!ReadSome()) return false;
+  }
+  return true;
+}
+
 void Process::Signal(int signal) const { kill(pid_, signal); }
 
 int Process::Wait() {

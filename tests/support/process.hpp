@@ -25,6 +25,7 @@ class Process {
 
   /// Reads stderr until it holds the text; false if the program ended before.
   bool WaitForStderr(std::string_view text);
+  bool WaitForStdout(std::string_view text);
   void Signal(int signal) const;
 
   /// Reads all output until the end. Exit code, or -signal if one killed it.

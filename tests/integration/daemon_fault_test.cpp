@@ -1,0 +1,324 @@
+// What goes wrong around a real plumbd: sensors that go and stall, signals, power cuts, full and broken disks.
+#include <csignal>
+#include <fstream>
+#include <random>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "daemon/control/unix_socket.hpp"
+#include "daemon/store/store.hpp"
+#include "tests/support/plumbd.hpp"
+#include "tests/support/process.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using ::testing::AnyOf;
+using ::testing::HasSubstr;
+using testing::Plumbd;
+
+class DaemonFaultTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { testing::RenderOnce(); }
+
+  static void ScanOnce(Plumbd& plumbd) {
+    ASSERT_EQ(plumbd.Press()["ok"], true);
+    plumbd.WaitFor("the end of the sweep", [](const json& status) {
+      return status["state"] == "scanning" && status["scan"]["frames"].get<int>() + status["scan"]["frames_dropped"].get<int>() >= 120;
+    });
+    ASSERT_EQ(plumbd.Press()["ok"], true);
+    plumbd.WaitForState("result");
+  }
+
+  /// Folders of scans, hidden ones too.
+  [[nodiscard]] static std::vector<std::string> ScanFolders(const fs::path& state) {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(state / "scans")) names.push_back(entry.path().filename());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
+  testing::TempFolder folder_;
+};
+
+TEST_F(DaemonFaultTest, StartsWithoutASensorAndIsReadyOnceItIsPlugged) {
+  Plumbd plumbd(folder_.path(), {.arguments = {"--sim-unplugged"}});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  const json status = plumbd.WaitForState("no_sensor");
+  EXPECT_EQ(status["sensor"]["present"], false);
+  const json refused = plumbd.Press();
+  EXPECT_EQ(refused["ok"], false);
+  EXPECT_THAT(refused["error"].get<std::string>(), HasSubstr("no sensor"));
+  const auto plugged = std::chrono::steady_clock::now();
+  plumbd.Sim("plug");
+  EXPECT_EQ(plumbd.WaitForState("ready")["sensor"]["serial"], "VIRTUAL-0001");
+  std::printf("plug to ready: %.0f ms\n", std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - plugged).count());
+}
+
+TEST_F(DaemonFaultTest, UnpluggedWhileIdleAndBackAgain) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  for (int round = 0; round < 3; ++round) {
+    plumbd.WaitForState("ready");
+    plumbd.Sim("unplug");
+    plumbd.WaitForState("no_sensor");
+    plumbd.Sim("plug");
+  }
+  plumbd.WaitForState("ready");
+}
+
+TEST_F(DaemonFaultTest, UnpluggedWhileScanningThePartialScanIsDiscarded) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  plumbd.Press();
+  plumbd.WaitForFrames(10);
+  plumbd.Sim("unplug");
+  plumbd.WaitForState("no_sensor");
+  EXPECT_TRUE(ScanFolders(plumbd.state()).empty());
+  plumbd.Sim("plug");
+  plumbd.WaitForState("ready");
+  ScanOnce(plumbd);
+  EXPECT_EQ(ScanFolders(plumbd.state()), std::vector<std::string>{"000002"}) << "the number of the lost scan is not used again";
+}
+
+TEST_F(DaemonFaultTest, FramesThatStopAreAFaultWithAReasonUntilTheyComeAgain) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  plumbd.Sim("stall");
+  const json status = plumbd.WaitForState("fault");
+  EXPECT_NE(status["reason"], "");
+  EXPECT_EQ(plumbd.Press()["ok"], false);
+  plumbd.Sim("resume");
+  plumbd.WaitForState("ready");
+}
+
+TEST_F(DaemonFaultTest, AStallWhileScanningEndsTheScanAndNotThePlumbd) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  plumbd.Press();
+  plumbd.WaitForFrames(5);
+  plumbd.Sim("stall");
+  plumbd.WaitForState("fault");
+  EXPECT_TRUE(ScanFolders(plumbd.state()).empty());
+  plumbd.Sim("resume");
+  plumbd.WaitForState("ready");
+}
+
+TEST_F(DaemonFaultTest, AnErrorOfTheDriverIsToldAndOverOnceItWorksAgain) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  plumbd.Sim("error");
+  EXPECT_NE(plumbd.WaitForState("fault")["reason"], "");
+  plumbd.Sim("resume");
+  plumbd.WaitForState("ready");
+}
+
+TEST_F(DaemonFaultTest, APressDuringWorkingIsIgnoredAndSaidSo) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  plumbd.Press();
+  plumbd.WaitForFrames(90);
+  ASSERT_EQ(plumbd.Press()["ok"], true);
+  const RunResult press = plumb::Run({PLUMB_BINARY, "--control", plumbd.socket(), "press"});
+  EXPECT_EQ(press.exit_code, 0);
+  EXPECT_THAT(press.out, HasSubstr("ignored"));
+  plumbd.WaitForState("result");
+}
+
+TEST_F(DaemonFaultTest, ACancelledScanIsGoneSoonAndLeavesNothing) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  double slowest_ms = 0;
+  for (const int frames : {1, 20, 60, 100}) {
+    ASSERT_EQ(plumbd.Press()["ok"], true);
+    plumbd.WaitForFrames(frames);
+    ASSERT_EQ(plumbd.Press(/*is_long=*/true)["ok"], true);
+    slowest_ms = std::max(slowest_ms, plumbd.WaitForState("ready")["scan"]["cancel_ms"].get<double>());
+  }
+  std::printf("slowest cancellation: %.0f ms\n", slowest_ms);
+  EXPECT_LT(slowest_ms, 2000) << "200 ms on a machine that does nothing else";
+  EXPECT_TRUE(ScanFolders(plumbd.state()).empty());
+}
+
+TEST_F(DaemonFaultTest, SigtermWhileScanningAndWhileWorkingEndsCleanly) {
+  for (const bool is_working : {false, true}) {
+    {
+      Plumbd plumbd(folder_.path());
+      ASSERT_TRUE(plumbd.WaitUntilUp());
+      plumbd.WaitForState("ready");
+      plumbd.Press();
+      plumbd.WaitForFrames(60);
+      if (is_working) plumbd.Press();
+      EXPECT_EQ(plumbd.Stop(), 0);
+    }
+    EXPECT_TRUE(ScanFolders(folder_ / "state").empty());
+    Store store(folder_ / "state");
+    EXPECT_EQ(store.recovery().interrupted_scans + store.recovery().orphaned_folders, 0) << "there was nothing left to put right";
+    EXPECT_EQ(store.Scans("", 1).at(0).outcome, web::ScanOutcome::kCancelled);
+  }
+}
+
+/// What must hold of a state folder whenever plumbd was killed and its store opened again.
+void ExpectConsistent(const fs::path& state) {
+  Store store(state);
+  EXPECT_EQ(store.recovery().lost_scans, 0);
+  EXPECT_EQ(store.recovery().broken_references, 0) << "the approved reference must survive";
+  std::vector<std::string> with_folder;
+  for (const web::Scan& scan : store.Scans("", 10000)) {
+    EXPECT_NE(scan.outcome, web::ScanOutcome::kRunning);
+    EXPECT_EQ(scan.outcome == web::ScanOutcome::kDone, !scan.folder.empty()) << scan.id;
+    if (!scan.folder.empty()) with_folder.push_back(scan.id);
+    if (!scan.reference_id.empty() && scan.outcome == web::ScanOutcome::kDone) {
+      EXPECT_TRUE(fs::exists(scan.folder / "result" / "result.json")) << scan.id;
+    }
+  }
+  std::sort(with_folder.begin(), with_folder.end());
+  std::vector<std::string> folders;
+  for (const auto& entry : fs::directory_iterator(state / "scans")) folders.push_back(entry.path().filename());
+  std::sort(folders.begin(), folders.end());
+  EXPECT_EQ(folders, with_folder);
+}
+
+TEST_F(DaemonFaultTest, KilledAtAnyMomentNothingIsHalf) {
+  const char* rounds_text = std::getenv("PLUMB_KILL_ROUNDS");
+  const int rounds = rounds_text != nullptr ? std::atoi(rounds_text) : 6;
+  std::mt19937 random(7);
+  {
+    Plumbd plumbd(folder_.path());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    plumbd.WaitForState("ready");
+    ScanOnce(plumbd);  // the reference
+    plumbd.Signal(SIGKILL);
+    EXPECT_EQ(plumbd.Wait(), -SIGKILL);
+  }
+  ExpectConsistent(folder_ / "state");
+  for (int round = 0; round < rounds; ++round) {
+    {
+      Plumbd plumbd(folder_.path());
+      ASSERT_TRUE(plumbd.WaitUntilUp());
+      plumbd.WaitForState("ready");
+      plumbd.Press();
+      plumbd.WaitForFrames(static_cast<int>(random() % 60) + 40);
+      // Half of the rounds die while frames come, half while their result is made and saved.
+      if (random() % 4 != 0) plumbd.Press();
+      const auto delay = std::chrono::milliseconds(random() % 2500);
+      const auto end = std::chrono::steady_clock::now() + delay;
+      while (std::chrono::steady_clock::now() < end && plumbd.Status()["state"] != "result") std::this_thread::yield();
+      plumbd.Signal(SIGKILL);
+      EXPECT_EQ(plumbd.Wait(), -SIGKILL);
+    }
+    ExpectConsistent(folder_ / "state");
+  }
+  Store store(folder_ / "state");
+  const std::vector<web::Scan> scans = store.Scans("", 10000);
+  const auto num_done = std::count_if(scans.begin(), scans.end(), [](const web::Scan& s) { return s.outcome == web::ScanOutcome::kDone; });
+  std::printf("%d rounds: %d scans done, %zu begun\n", rounds, static_cast<int>(num_done), scans.size());
+}
+
+TEST_F(DaemonFaultTest, AFullDiskFailsTheScanWithAReasonAndKeepsTheReference) {
+  {
+    Plumbd plumbd(folder_.path());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    plumbd.WaitForState("ready");
+    ScanOnce(plumbd);
+    EXPECT_EQ(plumbd.Stop(), 0);
+  }
+  {
+    Plumbd plumbd(folder_.path(), {.max_file_bytes = 300'000});  // the database still fits, a scene does not
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    plumbd.WaitForState("ready");
+    plumbd.Press();
+    plumbd.WaitForFrames(90);
+    plumbd.Press();
+    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(), HasSubstr("cannot write"));
+    EXPECT_EQ(plumbd.Press()["ok"], true) << "a press acknowledges";
+    plumbd.WaitForState("ready");
+    EXPECT_EQ(plumbd.Stop(), 0);
+  }
+  ExpectConsistent(folder_ / "state");
+}
+
+TEST_F(DaemonFaultTest, AStateFolderThatCannotBeWrittenIsSafeModeWithAReason) {
+  const bool is_root = ::geteuid() == 0;  // for whom modes mean nothing: take a place where nobody can make anything
+  const fs::path state = is_root ? fs::path("/proc/plumb-state") : folder_ / "locked" / "state";
+  if (!is_root) {
+    fs::create_directories(state.parent_path());
+    fs::permissions(state.parent_path(), fs::perms::owner_read | fs::perms::owner_exec);
+  }
+  Plumbd plumbd(folder_.path(), {.state = state});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(), HasSubstr(state.string()));
+  EXPECT_EQ(plumbd.Press()["ok"], false);
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+TEST_F(DaemonFaultTest, ACorruptDatabaseIsSafeModeAndTouchesNothing) {
+  fs::create_directories(folder_ / "state" / "scans" / "000001" / "scene");
+  std::ofstream(folder_ / "state" / "plumb.db") << std::string(50000, 'x');
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  const json status =
+      plumbd.WaitFor("fault and a sensor", [](const json& s) { return s["state"] == "fault" && s["sensor"]["present"] == true; });
+  EXPECT_THAT(status["reason"].get<std::string>(), HasSubstr("damaged"));
+  EXPECT_THAT(plumbd.Press()["error"].get<std::string>(), HasSubstr("storage"));
+  EXPECT_EQ(plumbd.Stop(), 0);
+  EXPECT_TRUE(fs::exists(folder_ / "state" / "scans" / "000001" / "scene"));
+}
+
+TEST_F(DaemonFaultTest, ManyShortScansLeaveNoThreadsDescriptorsOrMemoryBehind) {
+  const char* rounds_text = std::getenv("PLUMB_SHORT_SCANS");
+  const int rounds = rounds_text != nullptr ? std::atoi(rounds_text) : 30;
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  int descriptors = 0, threads = 0;
+  long memory_kb = 0;
+  for (int round = 0; round < rounds; ++round) {
+    ASSERT_EQ(plumbd.Press()["ok"], true);
+    plumbd.WaitForFrames(3);
+    ASSERT_EQ(plumbd.Press(/*is_long=*/true)["ok"], true);
+    plumbd.WaitForState("ready");
+    if (round != rounds / 3) continue;  // pools and caches have filled by then
+    descriptors = plumbd.num_descriptors();
+    threads = plumbd.num_threads();
+    memory_kb = plumbd.resident_kb();
+  }
+  std::printf("%d scans: descriptors %d -> %d, threads %d -> %d, memory %ld -> %ld kB\n", rounds, descriptors, plumbd.num_descriptors(),
+              threads, plumbd.num_threads(), memory_kb, plumbd.resident_kb());
+  EXPECT_LE(plumbd.num_descriptors(), descriptors);
+  EXPECT_LE(plumbd.num_threads(), threads);
+  EXPECT_LT(plumbd.resident_kb(), memory_kb + 30'000) << "the allocator's pools move by some megabytes";
+}
+
+TEST_F(DaemonFaultTest, NonsenseAtTheControlSocketCostsOnlyItsOwnConnection) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  for (const std::string& text : {std::string("\n"), std::string("{}\n"), std::string("[[[[[[[[\n"), std::string(100'000, 'a'),
+                                  std::string("{\"command\":\"sim\",\"action\":\"explode\"}\n"), std::string("\0\xFF\xFE\n", 4)}) {
+    const int fd = ConnectUnix(plumbd.socket());
+    (void)::send(fd, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    char buffer[512] = {};
+    EXPECT_GT(::recv(fd, buffer, sizeof(buffer) - 1, 0), 0) << text.substr(0, 20);
+    EXPECT_THAT(buffer, HasSubstr("\"ok\":false"));
+    ::close(fd);
+  }
+  std::vector<int> silent;
+  for (int i = 0; i < 100; ++i) silent.push_back(ConnectUnix(plumbd.socket()));  // more than it keeps
+  for (const int fd : silent) ::close(fd);
+  plumbd.WaitFor("its answer", [](const json& status) { return status.contains("state"); });
+}
+
+}  // namespace
+}  // namespace plumb

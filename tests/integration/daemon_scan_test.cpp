@@ -1,0 +1,183 @@
+// Scans of a real plumbd: from the press to the six numbers, against the truth and against their own recordings.
+#include <csignal>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include "algo/types/pose.hpp"
+#include "algo/types/units.hpp"
+#include "drivers/replay/file_io.hpp"
+#include "drivers/simulated/suite_plan.hpp"
+#include "tests/support/plumbd.hpp"
+#include "tests/support/process.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::Plumbd;
+
+const std::vector<const char*> kSixNumbers = {"vertical_mm", "longitudinal_mm", "lateral_mm", "pitch_deg", "roll_deg", "yaw_deg"};
+
+class DaemonScanTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { testing::RenderOnce(); }
+
+  /// Presses, lets the sweep play, presses again, waits for the result.
+  static json ScanOnce(Plumbd& plumbd) {
+    EXPECT_EQ(plumbd.Press()["ok"], true);
+    plumbd.WaitFor("the end of the sweep", [](const json& status) {
+      return status["state"] == "scanning" && status["scan"]["frames"].get<int>() + status["scan"]["frames_dropped"].get<int>() >= 120;
+    });
+    EXPECT_EQ(plumbd.Press()["ok"], true);
+    return plumbd.WaitForState("result");
+  }
+
+  static json ReadJson(const fs::path& file) { return json::parse(ReadTextFile(file, 1 << 24)); }
+
+  testing::TempFolder folder_;
+};
+
+/// True motion of the body between the demo's two scenes, in the reference marker's frame; from the simulator's plan, not from images.
+Pose TrueMotion() {
+  SimulateOptions options;
+  options.frames = 120;
+  options.rate_hz = 30;
+  options.width = 320;
+  options.height = 240;
+  const simulated::SuitePlan plan = simulated::PlanSuite(options);
+  Pose T_world_marker = Pose::Identity();
+  for (const simulated::Board& board : plan.room.boards) {
+    if (board.id == plan.reference_marker) T_world_marker = board.T_world_marker;
+  }
+  return T_world_marker.inverse() * plan.scenes[1].T_world_body * plan.scenes[0].T_world_body.inverse() * T_world_marker;
+}
+
+TEST_F(DaemonScanTest, TwoPressesAndTwoMoreGiveTheSixNumbersOfTheBodysTrueMotion) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  EXPECT_THAT(plumbd.notifications(), HasSubstr("READY=1"));
+  const json first = ScanOnce(plumbd);
+  EXPECT_EQ(first["last_result"]["is_reference"], true);
+  EXPECT_EQ(plumbd.Sim("next-scene")["ok"], true);
+  const json second = ScanOnce(plumbd);
+  const json last = second["last_result"];
+  EXPECT_EQ(last["verdict"], "move");
+  for (const char* name : kSixNumbers) EXPECT_TRUE(last[name].is_number()) << name;
+
+  const fs::path scan = plumbd.state() / "scans" / last["scan"].get<std::string>();
+  EXPECT_TRUE(fs::exists(scan / "scene" / "scene.json"));
+  const json result = ReadJson(scan / "result" / "result.json");
+  for (const char* name : kSixNumbers) EXPECT_EQ(last[name], result["correction"][name]) << name;
+  Pose M;
+  for (int r = 0; r < 4; ++r) {
+    for (int c = 0; c < 4; ++c) M.matrix()(r, c) = result["motion"]["T"][r][c];
+  }
+  const Pose M_true = TrueMotion();
+  const auto& c = result["motion"]["centroid_m"];
+  const Eigen::Vector3d centroid(c[0], c[1], c[2]);
+  // At a quarter of the pixels and twice the usual speed, measured 3 to 5 mm and 0.1 to 0.4 deg; the motion itself is 50 mm and 3.4 deg.
+  EXPECT_LT((M * centroid - M_true * centroid).norm(), 12 * kMillimetre);
+  EXPECT_LT(RotationAngle(M * M_true.inverse()), 1.0 * kDegree);
+  ::testing::Test::RecordProperty("after_last_frame_s", last["after_last_frame_s"].dump());
+  std::printf("result %.2f s after the last frame, first frame used %.0f ms after the press, %d frames dropped\n",
+              last["after_last_frame_s"].get<double>(), second["scan"]["first_frame_ms"].get<double>(), last["frames_dropped"].get<int>());
+  EXPECT_EQ(plumbd.Stop(), 0);
+  EXPECT_THAT(plumbd.notifications(), HasSubstr("STOPPING=1"));
+  EXPECT_FALSE(fs::exists(plumbd.state() / "scans" / ".staging-000003"));
+}
+
+TEST_F(DaemonScanTest, TheResultIsTheSameWhenTheRecordingIsComputedAgain) {
+  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nkeep_recordings = true\n[reconstruct]\nkeep_color = false\n";
+  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  ScanOnce(plumbd);
+  ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
+  const json live = ScanOnce(plumbd)["last_result"];
+  ASSERT_EQ(plumbd.Stop(), 0);
+  for (const char* id : {"000001", "000002"}) {
+    const fs::path recording = plumbd.state() / "scans" / id / "recording";
+    const RunResult again = plumb::Run({PLUMB_BINARY, "reconstruct", recording, "--out", folder_ / id, "--config", folder_ / "plumb.toml"});
+    ASSERT_EQ(again.exit_code, 0) << again.err;
+    const auto live_poses = ReadTextFile(plumbd.state() / "scans" / id / "scene" / "trajectory.txt", 1 << 20);
+    EXPECT_EQ(ReadTextFile(folder_ / id / "trajectory.txt", 1 << 20), live_poses)
+        << id << ": the same frames, the same poses to the last digit";
+  }
+  const RunResult compared =
+      plumb::Run({PLUMB_BINARY, "compare", folder_ / "000001", folder_ / "000002", "--out", folder_ / "result", "--json"});
+  ASSERT_EQ(compared.exit_code, 0) << compared.err;
+  const json replayed = json::parse(compared.out)["correction"];
+  for (const char* name : kSixNumbers) {
+    EXPECT_NEAR(replayed[name].get<double>(), live[name].get<double>(), std::string(name).ends_with("deg") ? 0.05 : 0.5) << name;
+  }
+}
+
+TEST_F(DaemonScanTest, ASweepEndsByItselfWhenNothingNewIsSeen) {
+  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nauto_stop_s = 1.5\n";
+  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  EXPECT_EQ(plumbd.Press()["ok"], true);
+  const json status = plumbd.WaitForState("result");
+  EXPECT_GE(status["last_result"]["frames"].get<int>() + status["last_result"]["frames_dropped"].get<int>(), 120)
+      << "the whole sweep was used, and then some time in which nothing new came";
+}
+
+TEST_F(DaemonScanTest, ASweepEndsAtItsLimit) {
+  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nscan_limit_s = 1\n";
+  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  EXPECT_EQ(plumbd.Press()["ok"], true);
+  plumbd.WaitForState("result");
+  EXPECT_THAT(plumbd.log(), HasSubstr("longest sweep"));
+}
+
+TEST_F(DaemonScanTest, AResultIsPutAwayAfterItsTimeAndThePressStartsTheNextScanBefore) {
+  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nscan_limit_s = 1\nresult_s = 1\n";
+  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  plumbd.Press();
+  plumbd.WaitForState("result");
+  const json later = plumbd.WaitForState("ready");
+  EXPECT_TRUE(later["last_result"].is_object()) << "the last result is still told";
+}
+
+TEST_F(DaemonScanTest, WatchersSeeStatesAndProgressAndTheSocketIsTheOwnersOnly) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  Process watch({PLUMB_BINARY, "--control", plumbd.socket(), "watch"}, {.num_cpus = 0, .max_file_bytes = 0, .stdout_path = {}});
+  struct stat status {};
+  ASSERT_EQ(::stat(plumbd.socket().c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0117, 0U) << "nobody but owner and group";
+  ASSERT_TRUE(watch.WaitForStdout("\"status\""));
+  EXPECT_EQ(plumbd.Press()["ok"], true);
+  plumbd.WaitForFrames(30);
+  EXPECT_EQ(plumbd.Press(/*is_long=*/true)["ok"], true);
+  plumbd.WaitForState("ready");
+  EXPECT_EQ(plumbd.Stop(), 0);
+  EXPECT_EQ(watch.Wait(), 5);
+  std::vector<std::string> events, states;
+  std::istringstream lines(watch.out());
+  for (std::string line; std::getline(lines, line);) {
+    const json event = json::parse(line);
+    EXPECT_TRUE(event["time"].is_number()) << line;
+    events.push_back(event["event"]);
+    if (event["event"] == "state") states.push_back(event["state"]);
+  }
+  EXPECT_EQ(events.front(), "status");
+  EXPECT_THAT(events, ::testing::Contains("progress"));
+  EXPECT_THAT(states, ::testing::ElementsAre("scanning", "scanning", "ready"));
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,203 @@
+#include "tests/support/plumbd.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/file.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <stdexcept>
+#include <thread>
+
+#include "daemon/control/unix_socket.hpp"
+
+namespace plumb::testing {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+constexpr std::chrono::seconds kPatience{120};  // the machine may be busy with much else
+constexpr std::chrono::milliseconds kBetweenLooks{20};
+
+std::string ReadAll(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// A datagram socket as systemd's for notifications.
+int MakeNotifySocket(const fs::path& path) {
+  ::unlink(path.c_str());
+  const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const int bound = WithUnixAddress(path, [&](const sockaddr* address, socklen_t size) { return ::bind(fd, address, size); });
+  if (fd < 0 || bound != 0) throw std::runtime_error("cannot make a notification socket at " + path.string());
+  return fd;
+}
+
+}  // namespace
+
+Plumbd::Plumbd(const fs::path& folder, PlumbdOptions options)
+    : folder_(folder), state_(options.state.empty() ? folder / "state" : options.state) {
+  notify_fd_ = MakeNotifySocket(folder_ / "notify.sock");
+  std::vector<std::string> arguments = {PLUMBD_BINARY, "--simulated",   "demo",      "--sim-size",      "320x240",  "--sim-frames", "120",
+                                        "--state",     state_.string(), "--control", socket().string(), "--listen", "127.0.0.1:0"};
+  arguments.insert(arguments.end(), options.arguments.begin(), options.arguments.end());
+  options.environment["XDG_CACHE_HOME"] = PLUMB_TEST_CACHE;
+  options.environment["NOTIFY_SOCKET"] = (folder_ / "notify.sock").string();
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  const std::string log_path = (folder_ / "log").string();
+  pid_ = ::fork();
+  if (pid_ != 0) return;
+  const int log = ::open(log_path.c_str(), O_CREAT | O_WRONLY | O_APPEND, 0644);
+  ::dup2(log, STDOUT_FILENO);
+  ::dup2(log, STDERR_FILENO);
+  for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
+  if (options.max_file_bytes > 0) {
+    ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{static_cast<rlim_t>(options.max_file_bytes), static_cast<rlim_t>(options.max_file_bytes)};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ::execv(argv[0], argv.data());
+  ::_exit(127);
+}
+
+Plumbd::~Plumbd() {
+  if (pid_ > 0) {
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  ::close(notify_fd_);
+  if (::testing::Test::HasFailure()) std::fprintf(stderr, "--- log of plumbd ---\n%s---\n", log().c_str());
+}
+
+json Plumbd::Ask(const json& request) const {
+  int fd = -1;
+  try {
+    fd = ConnectUnix(socket());
+  } catch (const std::exception&) {
+    return json::object();
+  }
+  const std::string line = request.dump() + "\n";
+  std::string answer;
+  if (::send(fd, line.data(), line.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(line.size())) {
+    char buffer[4096];
+    while (answer.find('\n') == std::string::npos) {
+      pollfd ready{.fd = fd, .events = POLLIN, .revents = 0};
+      if (::poll(&ready, 1, std::chrono::duration_cast<std::chrono::milliseconds>(kPatience).count()) <= 0) break;
+      const ssize_t count = ::recv(fd, buffer, sizeof(buffer), 0);
+      if (count <= 0) break;
+      answer.append(buffer, static_cast<std::size_t>(count));
+    }
+  }
+  ::close(fd);
+  const json parsed = json::parse(answer, nullptr, false);
+  return parsed.is_object() ? parsed : json::object();
+}
+
+bool Plumbd::HasEnded() const {
+  siginfo_t ended{};
+  return ::waitid(P_PID, static_cast<id_t>(pid_), &ended, WEXITED | WNOHANG | WNOWAIT) != 0 || ended.si_pid != 0;
+}
+
+bool Plumbd::WaitUntilUp() {
+  for (const auto end = std::chrono::steady_clock::now() + kPatience; std::chrono::steady_clock::now() < end;) {
+    if (!Status().empty()) return true;
+    if (HasEnded()) return false;
+    std::this_thread::sleep_for(kBetweenLooks);
+  }
+  return false;
+}
+
+json Plumbd::WaitFor(const std::string& what, const std::function<bool(const json&)>& condition) {
+  json status;
+  for (const auto end = std::chrono::steady_clock::now() + kPatience; std::chrono::steady_clock::now() < end;) {
+    (void)notifications();  // a socket that nobody reads makes its sender wait
+    status = Status();
+    if (!status.empty() && condition(status)) return status;
+    if (HasEnded()) break;
+    std::this_thread::sleep_for(kBetweenLooks);
+  }
+  ADD_FAILURE() << "plumbd did not get to: " << what << "; its status: " << status.dump();
+  throw std::runtime_error("waited in vain");
+}
+
+json Plumbd::WaitForState(const std::string& state) {
+  return WaitFor("state " + state, [&](const json& status) { return status["state"] == state; });
+}
+
+json Plumbd::WaitForFrames(int frames) {
+  return WaitFor("frames", [&](const json& status) { return status["scan"]["active"] == true && status["scan"]["frames"] >= frames; });
+}
+
+void Plumbd::Signal(int signal) const { ::kill(pid_, signal); }
+
+int Plumbd::Wait() {
+  int status = 0;
+  ::waitpid(pid_, &status, 0);
+  pid_ = -1;
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+int Plumbd::Stop() {
+  Signal(SIGTERM);
+  return Wait();
+}
+
+std::string Plumbd::log() const { return ReadAll(folder_ / "log"); }
+
+std::string Plumbd::notifications() {
+  char buffer[4096];
+  for (ssize_t count = 0; (count = ::recv(notify_fd_, buffer, sizeof(buffer), MSG_DONTWAIT)) > 0;) {
+    notified_.append(buffer, static_cast<std::size_t>(count));
+    notified_ += '\n';
+  }
+  return notified_;
+}
+
+int Plumbd::num_descriptors() const {
+  const fs::directory_iterator entries("/proc/" + std::to_string(pid_) + "/fd");
+  return static_cast<int>(std::distance(fs::begin(entries), fs::end(entries)));
+}
+
+int Plumbd::num_threads() const {
+  const fs::directory_iterator entries("/proc/" + std::to_string(pid_) + "/task");
+  return static_cast<int>(std::distance(fs::begin(entries), fs::end(entries)));
+}
+
+long Plumbd::resident_kb() const {
+  std::ifstream status("/proc/" + std::to_string(pid_) + "/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmRSS:")) return std::atol(line.c_str() + 6);
+  }
+  return 0;
+}
+
+void RenderOnce() {
+  fs::create_directories(PLUMB_TEST_CACHE);
+  const int lock = ::open((fs::path(PLUMB_TEST_CACHE) / "lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
+  ::flock(lock, LOCK_EX);
+  {
+    const TempFolder folder;
+    Plumbd plumbd(folder.path());
+    for (int i = 0; i < 10 && !plumbd.WaitUntilUp(); ++i) {
+    }
+    plumbd.Stop();
+  }
+  ::close(lock);
+}
+
+}  // namespace plumb::testing

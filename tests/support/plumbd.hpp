@@ -1,0 +1,77 @@
+// A real plumbd with the virtual sensor, as its own process, and what a person at the control socket does with it.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <sys/types.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb::testing {
+
+struct PlumbdOptions {
+  std::vector<std::string> arguments = {};  ///< Beside those that every test needs.
+  std::map<std::string, std::string> environment = {};
+  long max_file_bytes = 0;           ///< > 0: larger files fail as on a full disk.
+  std::filesystem::path state = {};  ///< Empty: a folder in the test's own.
+};
+
+/// Starts plumbd and speaks to it. Every wait is for a condition, with a generous end. Killed by its destructor if it still runs.
+class Plumbd {
+ public:
+  /// @param folder  Of the test; outlives it. Holds state/, control.sock, log and config.
+  explicit Plumbd(const std::filesystem::path& folder, PlumbdOptions options = {});
+  ~Plumbd();
+  Plumbd(const Plumbd&) = delete;
+  Plumbd& operator=(const Plumbd&) = delete;
+
+  /// Until the control socket answers; false if the process ended before.
+  bool WaitUntilUp();
+  [[nodiscard]] bool HasEnded() const;
+  /// Until the status fulfils the condition; a failure of the test if it does not in time. Gives the last status.
+  nlohmann::json WaitFor(const std::string& what, const std::function<bool(const nlohmann::json& status)>& condition);
+  nlohmann::json WaitForState(const std::string& state);
+  /// Until the scan has taken at least so many frames.
+  nlohmann::json WaitForFrames(int frames);
+
+  [[nodiscard]] nlohmann::json Status() const { return Ask({{"command", "status"}}); }
+  nlohmann::json Press(bool is_long = false) const { return Ask({{"command", "press"}, {"long", is_long}}); }
+  nlohmann::json Sim(const std::string& action) const { return Ask({{"command", "sim"}, {"action", action}}); }
+  /// One request, one answer; an empty object if nobody answers.
+  [[nodiscard]] nlohmann::json Ask(const nlohmann::json& request) const;
+
+  void Signal(int signal) const;
+  /// Until it ends. Exit code, or -signal.
+  int Wait();
+  /// SIGTERM and Wait().
+  int Stop();
+
+  [[nodiscard]] pid_t pid() const { return pid_; }
+  [[nodiscard]] std::string log() const;
+  [[nodiscard]] const std::filesystem::path& state() const { return state_; }
+  [[nodiscard]] std::filesystem::path socket() const { return folder_ / "control.sock"; }
+  /// What systemd was told, one message a line.
+  [[nodiscard]] std::string notifications();
+
+  [[nodiscard]] int num_descriptors() const;
+  [[nodiscard]] int num_threads() const;
+  [[nodiscard]] long resident_kb() const;
+
+ private:
+  std::filesystem::path folder_, state_;
+  int notify_fd_ = -1;
+  std::string notified_;
+  pid_t pid_ = -1;
+};
+
+/// Makes sure that the frames of the virtual sensor that all tests use are rendered. Slow once, quick later.
+void RenderOnce();
+
+}  // namespace plumb::testing
