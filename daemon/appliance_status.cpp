@@ -245,7 +245,7 @@ web::Health Appliance::Health() {
   if (!StorageOf(parts_.config.appliance.state, true).writable)
     return {.ok = false, .reason = "storage: the state folder is on a read-only disk"};
   if (!WorkersAreAlive()) return {.ok = false, .reason = "a worker thread shows no progress"};
-  if (state_.phase == ScanPhase::kFault) return {.ok = false, .reason = FaultReason()};
+  if (state_.phase == ScanPhase::kFault && state_.fault == FaultKind::kSensor) return {.ok = false, .reason = "sensor: " + sensor_fault_};
   return {};
 }
 

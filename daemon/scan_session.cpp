@@ -61,8 +61,13 @@ void ScanSession::Run(const std::stop_token& stop) {
 
 void ScanSession::Scan(const std::stop_token& stop) {
   folder_ = callbacks_.begin();
+  // Read while the sweep goes on: it is wanted as soon as the new scene is there.
+  std::future<Scene> reference;
+  if (!job_.reference_scene.empty()) {
+    reference = std::async(std::launch::async, [folder = job_.reference_scene] { return ReadScene(folder); });
+  }
   const Scene scene = Track(stop);
-  Evaluate(scene, stop);
+  Evaluate(scene, reference, stop);
   if (const std::optional<double> last_s = feed_->last_frame_s()) outcome_.after_last_frame_s = SteadySeconds() - *last_s;
 }
 
@@ -112,7 +117,7 @@ void ScanSession::Tell(std::string step, double fraction) {
   if (callbacks_.update) callbacks_.update(update_);
 }
 
-void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
+void ScanSession::Evaluate(const Scene& scene, std::future<Scene>& reference_scene, const std::stop_token& stop) {
   ThrowIfStopped(stop);
   if (job_.is_reference && (scene.frame != SceneFrame::kReferenceMarker || !scene.height_map)) {
     throw DataError("this scan cannot become a reference: the reference marker was not seen; keep it in view during a part of the sweep");
@@ -122,9 +127,9 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
   std::future<void> writing = std::async(std::launch::async, [&] { WriteScene(scene, folder_ / "scene"); });
   std::optional<Comparison> comparison;
   ResultPictures pictures;
-  if (!job_.reference_scene.empty()) {
+  if (reference_scene.valid()) {
     Tell("comparing", 0.0);
-    const Scene reference = ReadScene(job_.reference_scene);
+    const Scene reference = reference_scene.get();
     ThrowIfStopped(stop);
     comparison = Compare(reference, scene, job_.compare);
     ThrowIfStopped(stop);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -87,7 +88,7 @@ class ScanSession {
   void Scan(const std::stop_token& stop);
   void Save();
   [[nodiscard]] Scene Track(const std::stop_token& stop);
-  void Evaluate(const Scene& scene, const std::stop_token& stop);
+  void Evaluate(const Scene& scene, std::future<Scene>& reference_scene, const std::stop_token& stop);
   void OnProgress(const struct ScanProgress& progress);
   void Tell(std::string step, double fraction);
 

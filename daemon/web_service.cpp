@@ -105,7 +105,7 @@ void WebService::Press(const web::Actor& actor, web::Done done) {
 
 void WebService::Cancel(const web::Actor& actor, web::Done done) {
   const std::string refusal = appliance_.Cancel();
-  if (refusal.empty()) Log(actor, "scan.cancel", "", "");
+  if (refusal.empty()) Log(actor, "cancel", "", "");
   done(AnswerOf(refusal));
 }
 
@@ -126,7 +126,7 @@ void WebService::WipePatient(const web::Actor& actor, const std::string& id, web
     return done(AnswerOf("a scan of this patient is running: end or cancel it first"));
   }
   if (status.patient_id == id) appliance_.OpenPatient("", web::ScanPurpose::kFraction, "");
-  Change(std::move(done), [=](Store& store) { return store.WipePatient(actor, id), id; });
+  Change(std::move(done), [=](Store& store) { return store.WipePatient(actor, id), std::string(); });
 }
 
 void WebService::OpenPatient(const web::Actor& actor, const std::string& id, web::ScanPurpose purpose, const std::string& reason,
@@ -142,7 +142,7 @@ void WebService::OpenPatient(const web::Actor& actor, const std::string& id, web
     return done(AnswerOf("this patient has no approved reference: take and approve one first"));
   }
   appliance_.OpenPatient(id, purpose, reason);
-  Change(std::move(done), [=](Store& store) { return store.Log(actor, "patient.open", id, ""), id; });
+  Change(std::move(done), [=](Store& store) { return store.Log(actor, "patient.open", id, ""), std::string(); });
 }
 
 std::vector<web::Reference> WebService::References(const std::string& patient_id) {
@@ -156,10 +156,13 @@ void WebService::AddReference(const web::Actor& actor, const std::string& scan_i
   Change(std::move(done), [=, plan = appliance_.DefaultPlan()](Store& store) { return store.AddReference(actor, scan_id, reason, plan); });
 }
 void WebService::PlanReference(const web::Actor& actor, const std::string& id, const web::ReferencePlan& plan, web::Done done) {
-  Change(std::move(done), [=](Store& store) { return store.PlanReference(actor, id, plan); });
+  Change(std::move(done), [=](Store& store) {
+    const std::string planned = store.PlanReference(actor, id, plan);
+    return planned == id ? std::string() : planned;  // only a new version was made
+  });
 }
 void WebService::ApproveReference(const web::Actor& actor, const std::string& id, web::Done done) {
-  Change(std::move(done), [=](Store& store) { return store.ApproveReference(actor, id), id; });
+  Change(std::move(done), [=](Store& store) { return store.ApproveReference(actor, id), std::string(); });
 }
 
 std::vector<web::Scan> WebService::Scans(const std::string& patient_id, int limit) {
@@ -169,7 +172,7 @@ std::optional<web::Scan> WebService::FindScan(const std::string& id) {
   return Read<std::optional<web::Scan>>([&](Store& store) { return store.FindScan(id); }, {});
 }
 void WebService::AcceptScan(const web::Actor& actor, const std::string& id, web::Done done) {
-  Change(std::move(done), [=](Store& store) { return store.AcceptScan(actor, id), id; });
+  Change(std::move(done), [=](Store& store) { return store.AcceptScan(actor, id), std::string(); });
 }
 
 std::vector<web::User> WebService::Users() {
@@ -179,10 +182,10 @@ std::optional<web::User> WebService::FindUser(const std::string& name) {
   return Read<std::optional<web::User>>([&](Store& store) { return store.FindUser(name); }, {});
 }
 void WebService::AddUser(const web::Actor& actor, const web::User& user, web::Done done) {
-  Change(std::move(done), [=](Store& store) { return store.AddUser(actor, user), user.name; });
+  Change(std::move(done), [=](Store& store) { return store.AddUser(actor, user), std::string(); });
 }
 void WebService::ChangeUser(const web::Actor& actor, const web::User& user, web::Done done) {
-  Change(std::move(done), [=](Store& store) { return store.ChangeUser(actor, user), user.name; });
+  Change(std::move(done), [=](Store& store) { return store.ChangeUser(actor, user), std::string(); });
 }
 
 void WebService::Log(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) {

@@ -57,7 +57,7 @@ class WebService : public web::ScanService {
   void WriteDiagnostics(const web::Actor& actor, web::Done done) override;
 
  private:
-  /// Runs `change` on the store's thread; what it returns is the id of the answer, what it throws becomes the answer.
+  /// Runs `change` on the store's thread; what it returns is the id of what was made, what it throws becomes the answer.
   void Change(web::Done done, std::function<std::string(Store&)> change);
   /// A read that fails (a damaged database) is logged and gives what `otherwise` is.
   template <typename Result>

@@ -3,6 +3,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <memory>
@@ -123,9 +124,30 @@ int Simulate(const std::string& action, const CommandContext& context) {
   return kDone;
 }
 
-int Status(bool json, const CommandContext& context) {
+/// "last_result.yaw_deg": what stands there, as text without quotes; empty where nothing does.
+std::string ValueAt(const Json& status, const std::string& keys) {
+  Json value = status;
+  for (std::size_t begin = 0; begin <= keys.size();) {
+    const std::size_t end = std::min(keys.find('.', begin), keys.size());
+    value = value.is_object() ? value.value(keys.substr(begin, end - begin), Json()) : Json();
+    begin = end + 1;
+  }
+  if (value.is_null()) return {};
+  return value.is_string() ? value.get<std::string>() : value.dump();
+}
+
+struct StatusOptions {
+  bool json = false;
+  std::string get;
+};
+
+int Status(const StatusOptions& options, const CommandContext& context) {
   const Json status = Ask(context.control, {}, context);
-  PrintOut(json ? status.dump(2, ' ', false, Json::error_handler_t::replace) + "\n" : StatusText(status));
+  if (!options.get.empty()) {
+    PrintOut(ValueAt(status, options.get) + "\n");
+  } else {
+    PrintOut(options.json ? status.dump(2, ' ', false, Json::error_handler_t::replace) + "\n" : StatusText(status));
+  }
   return kDone;
 }
 
@@ -138,9 +160,10 @@ int Watch(const CommandContext& context) {
 }  // namespace
 
 Command AddStatus(CLI::App& app) {
-  auto json = std::make_shared<bool>(false);
-  app.add_flag("--json", *json, "Print the status as JSON");
-  return [json](const CommandContext& context) { return Status(*json, context); };
+  auto options = std::make_shared<StatusOptions>();
+  app.add_flag("--json", options->json, "Print the status as JSON");
+  app.add_option("--get", options->get, "Print one value of it, such as state or last_result.yaw_deg")->type_name("KEY");
+  return [options](const CommandContext& context) { return Status(*options, context); };
 }
 
 Command AddPress(CLI::App& app) {

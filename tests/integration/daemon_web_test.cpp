@@ -1,0 +1,129 @@
+// The appliance through its page's interface: a real plumbd, real HTTP, the whole workflow of a patient.
+#include <regex>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/http_client.hpp"
+#include "tests/support/plumbd.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using test::HttpAnswer;
+using test::HttpClient;
+using ::testing::HasSubstr;
+using ::testing::IsSupersetOf;
+using testing::Plumbd;
+
+const char* const kPassword = "correct horse battery";
+
+class DaemonWebTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { testing::RenderOnce(); }
+
+  static std::string InLog(const Plumbd& plumbd, const std::string& pattern) {
+    std::smatch found;
+    const std::string log = plumbd.log();
+    return std::regex_search(log, found, std::regex(pattern)) ? found[1].str() : std::string();
+  }
+  static std::uint16_t PortOf(const Plumbd& plumbd) {
+    return static_cast<std::uint16_t>(std::atoi(InLog(plumbd, "page is served at http://127.0.0.1:([0-9]+)/").c_str()));
+  }
+
+  testing::TempFolder folder_;
+};
+
+TEST_F(DaemonWebTest, HealthIsGoodWithAndWithoutASensorAndTellsADamagedDatabase) {
+  {
+    Plumbd plumbd(folder_.path());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    plumbd.WaitForState("ready");
+    HttpClient stranger(PortOf(plumbd));
+    HttpAnswer answer = stranger.Get("/health");
+    EXPECT_EQ(answer.status, 200);
+    EXPECT_EQ(answer.json(), (json{{"status", "ok"}}));
+    plumbd.Sim("unplug");
+    plumbd.WaitForState("no_sensor");
+    EXPECT_EQ(stranger.Get("/health").status, 200);
+    EXPECT_EQ(stranger.Get("/api/v1/status").status, 401);
+    EXPECT_EQ(plumbd.Stop(), 0);
+  }
+  fs::resize_file(folder_ / "state" / "plumb.db", 5000);
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("fault");
+  std::smatch last;
+  const std::string log = plumbd.log();
+  const std::string second_start = log.substr(log.rfind("page is served at"));
+  ASSERT_TRUE(std::regex_search(second_start, last, std::regex("127.0.0.1:([0-9]+)/")));
+  const HttpAnswer answer = HttpClient(static_cast<std::uint16_t>(std::stoi(last[1].str()))).Get("/health");
+  EXPECT_EQ(answer.status, 503);
+  EXPECT_THAT(answer.body, HasSubstr("damaged"));
+}
+
+TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  const std::uint16_t port = PortOf(plumbd);
+  const std::string code = InLog(plumbd, "setup code: ([0-9A-Z]{4}-[0-9A-Z]{4})\n");
+  ASSERT_NE(code, "") << "the first start prints it";
+  HttpClient engineer(port), physicist(port), second(port), technician(port);
+  ASSERT_EQ(engineer.Post("/api/v1/setup", {{"code", code}, {"name", "engineer"}, {"password", kPassword}}).status, 200);
+  ASSERT_EQ(engineer.LogIn("engineer", kPassword), 200);
+  for (const auto& [name, role] :
+       {std::pair("physicist", "physicist"), std::pair("second", "physicist"), std::pair("technician", "technician")}) {
+    ASSERT_EQ(engineer.Post("/api/v1/users", {{"name", name}, {"role", role}, {"password", kPassword}}).status, 201) << name;
+  }
+  ASSERT_EQ(physicist.LogIn("physicist", kPassword), 200);
+  ASSERT_EQ(second.LogIn("second", kPassword), 200);
+  ASSERT_EQ(technician.LogIn("technician", kPassword), 200);
+
+  const std::string patient = technician.Post("/api/v1/patients", {{"code", "PX-17"}, {"site", "thorax"}}).json().value("id", "");
+  ASSERT_NE(patient, "");
+  EXPECT_EQ(technician.Post("/api/v1/patients/" + patient + "/open", {{"purpose", "fraction"}, {"reason", ""}}).status, 409)
+      << "no reference yet";
+  ASSERT_EQ(technician.Post("/api/v1/patients/" + patient + "/open", {{"purpose", "reference"}, {"reason", "planning"}}).status, 200);
+  const auto scan = [&](HttpClient& client) {
+    EXPECT_EQ(client.Post("/api/v1/press").status, 200);
+    plumbd.WaitFor("the end of the sweep", [](const json& s) {
+      return s["state"] == "scanning" && s["scan"]["frames"].get<int>() + s["scan"]["frames_dropped"].get<int>() >= 120;
+    });
+    EXPECT_EQ(client.Get("/api/v1/status").json()["state"], "scanning");
+    EXPECT_EQ(client.Get("/api/v1/preview").status, 200);
+    EXPECT_EQ(client.Post("/api/v1/press").status, 200);
+    return plumbd.WaitForState("result")["last_result"]["scan"].get<std::string>();
+  };
+  const std::string first = scan(technician);
+  const std::string reference = physicist.Post("/api/v1/references", {{"scan_id", first}, {"reason", "planning"}}).json().value("id", "");
+  ASSERT_NE(reference, "");
+  EXPECT_EQ(physicist.Post("/api/v1/references/" + reference + "/approve").status, 403) << "not by who made it";
+  ASSERT_EQ(second.Post("/api/v1/references/" + reference + "/approve").status, 200);
+
+  ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
+  ASSERT_EQ(technician.Post("/api/v1/patients/" + patient + "/open", {{"purpose", "fraction"}, {"reason", ""}}).status, 200);
+  const std::string fraction = scan(technician);
+  const json result = technician.Get("/api/v1/results/" + fraction).json();
+  EXPECT_EQ(result["verdict"], "move");
+  EXPECT_EQ(technician.Get("/api/v1/scans/" + fraction + "/files/error_map.png").status, 200);
+  EXPECT_EQ(technician.Post("/api/v1/scans/" + fraction + "/accept").status, 200);
+  EXPECT_EQ(technician.Post("/api/v1/scans/" + fraction + "/accept").status, 409);
+
+  std::vector<std::string> actions;
+  const json audit = physicist.Get("/api/v1/audit").json();
+  for (const json& entry : audit["entries"]) {
+    actions.push_back(entry["user"].get<std::string>() + " " + entry["action"].get<std::string>());
+  }
+  EXPECT_THAT(actions, IsSupersetOf({"engineer user.add", "technician patient.add", "technician press", "physicist reference.add",
+                                     "second reference.approve", "technician scan.accept"}));
+  EXPECT_EQ(plumbd.log().find("PX-17"), std::string::npos) << "no patient's code in the log";
+  EXPECT_EQ(physicist.Ask("DELETE", "/api/v1/patients/" + patient, "").status, 200);
+  EXPECT_FALSE(fs::exists(plumbd.state() / "scans" / fraction));
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,69 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "algo/types/errors.hpp"
+#include "daemon/config.hpp"
+#include "tests/support/message_of.hpp"
+
+namespace plumb {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::MessageOf;
+
+TEST(ApplianceConfigTest, EveryKeyIsRead) {
+  const Config config = ParseConfig(R"(
+[appliance]
+state = "/data/plumb"
+control = "/run/p.sock"
+calibration = "/data/cal"
+sensor_serial = "1804060024"
+keep_recordings = true
+quota_gb = 12.5
+auto_stop_s = 4
+scan_limit_s = 30
+result_s = 300
+[web]
+listen = "[::]:8443"
+tls_certificate = "/etc/plumb/cert.pem"
+tls_key = "/etc/plumb/key.pem"
+host_names = ["plumb.local", "couch"]
+)",
+                                    "test.toml");
+  EXPECT_EQ(config.appliance.state, "/data/plumb");
+  EXPECT_EQ(config.appliance.control, "/run/p.sock");
+  EXPECT_EQ(config.appliance.calibration, "/data/cal");
+  EXPECT_EQ(config.appliance.sensor_serial, "1804060024");
+  EXPECT_TRUE(config.appliance.keep_recordings);
+  EXPECT_EQ(config.appliance.quota_gb, 12.5);
+  EXPECT_EQ(config.appliance.auto_stop_s, 4.0);
+  EXPECT_EQ(config.appliance.scan_limit_s, 30.0);
+  EXPECT_EQ(config.appliance.result_s, 300.0);
+  EXPECT_EQ(config.web.listen, "[::]:8443");
+  EXPECT_EQ(config.web.tls_key, "/etc/plumb/key.pem");
+  EXPECT_THAT(config.web.host_names, ElementsAre("plumb.local", "couch"));
+}
+
+TEST(ApplianceConfigTest, WhatIsWrongIsToldWithItsLine) {
+  const auto complaint = [](const std::string& text) { return MessageOf<DataError>([&] { (void)ParseConfig(text, "plumb.toml"); }); };
+  EXPECT_THAT(complaint("[appliance]\n\nstate = \"relative\"\n"),
+              AllOf(HasSubstr("plumb.toml:3"), HasSubstr("absolute"), HasSubstr("relative")));
+  EXPECT_THAT(complaint("[appliance]\nauto_stop_s = 1000\n"), AllOf(HasSubstr(":2"), HasSubstr("120")));
+  EXPECT_THAT(complaint("[appliance]\nquota = 3\n"), AllOf(HasSubstr(":2"), HasSubstr("unknown key 'quota'"), HasSubstr("quota_gb")));
+  EXPECT_THAT(complaint("[web]\nlisten = \"8080\"\n"), AllOf(HasSubstr(":2"), HasSubstr("0.0.0.0:8080")));
+  EXPECT_THAT(complaint("[web]\nhost_names = [1]\n"), HasSubstr(":2"));
+  EXPECT_THAT(complaint("[gpio]\n"), HasSubstr("[appliance]"));
+}
+
+TEST(ApplianceConfigTest, ListenAddresses) {
+  EXPECT_EQ(ParseListenAddress("127.0.0.1:8080")->port, 8080);
+  EXPECT_EQ(ParseListenAddress("[::1]:0")->address, "::1");
+  for (const char* bad : {"", ":80", "80", "host:", "1.2.3.4:65536", "1.2.3.4:x", "::1:80", "[::1:80", "[1.2.3.4]:80", "a:-1"}) {
+    EXPECT_FALSE(ParseListenAddress(bad)) << bad;
+  }
+}
+
+}  // namespace
+}  // namespace plumb
