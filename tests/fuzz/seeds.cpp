@@ -59,6 +59,11 @@ void WriteTexts(const fs::path& root) {
   scene.warnings = {"w"};
   WriteWholeFile(Folder(root / "scene") / "scene", SceneJson(scene));
   WriteWholeFile(Folder(root / "trajectory") / "two", TrajectoryText(scene.keyframes));
+
+  const fs::path control = Folder(root / "control");
+  WriteWholeFile(control / "status", std::string_view(R"({"command":"status"})"));
+  WriteWholeFile(control / "press", std::string_view(R"({"command":"press","long":true})"));
+  WriteWholeFile(control / "sim", std::string_view(R"({"command":"sim","action":"next-scene"})"));
 }
 
 void WriteSurfaces(const fs::path& root) {
