@@ -38,7 +38,8 @@ std::string Document(const std::string& body) {
   }
   return fmt::format(
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">"
-      "<title>Plumb result</title>{}</head><body class=\"plain\"><p class=\"notice\" role=\"note\">{}</p><main>{}</main></body></html>",
+      "<title>Plumb result</title>{}</head><body class=\"plain\"><aside class=\"notice\" "
+      "aria-label=\"Notice\"><p>{}</p></aside><main>{}</main></body></html>",
       style, kNotice, body);
 }
 

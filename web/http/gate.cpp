@@ -88,7 +88,7 @@ void AddSecurityHeaders(Response& response) {
       "form-action 'self'; frame-ancestors 'none'");
   add("X-Content-Type-Options", "nosniff");
   add("X-Frame-Options", "DENY");
-  add("Referrer-Policy", "no-referrer");
+  add("Referrer-Policy", "same-origin");  // "no-referrer" would make the Origin of a form "null"
   add("Cross-Origin-Opener-Policy", "same-origin");
   add("Cross-Origin-Resource-Policy", "same-origin");
   add("Permissions-Policy", "camera=(), microphone=(), geolocation=(), usb=()");

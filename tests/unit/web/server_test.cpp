@@ -34,7 +34,7 @@ TEST_F(ServerTest, EveryAnswerCarriesTheSecurityHeaders) {
     EXPECT_THAT(policy, ::testing::Not(HasSubstr("unsafe"))) << path;
     EXPECT_EQ(answer.Header("x-content-type-options"), "nosniff") << path;
     EXPECT_EQ(answer.Header("x-frame-options"), "DENY") << path;
-    EXPECT_EQ(answer.Header("referrer-policy"), "no-referrer") << path;
+    EXPECT_EQ(answer.Header("referrer-policy"), "same-origin") << path;
     EXPECT_EQ(answer.Header("cache-control"), "no-store") << path;
   }
 }

@@ -1,0 +1,85 @@
+// Server, browser, screenshots, accessibility, and the list of what went wrong.
+import { spawn } from 'node:child_process';
+import { existsSync, mkdirSync, readFileSync, rmSync } from 'node:fs';
+import { createRequire } from 'node:module';
+import { join } from 'node:path';
+import { createInterface } from 'node:readline';
+
+const kSkip = 77;
+const kSize = { width: 1920, height: 1080 };
+
+export class Harness {
+  static async start([modules, server, folder, chromium]) {
+    if (!chromium || !existsSync(chromium)) {
+      console.log('skipped: no chromium (Debian package chromium)');
+      process.exit(kSkip);
+    }
+    const h = new Harness();
+    const load = createRequire(join(modules, 'index.js'));
+    h.axe = readFileSync(load.resolve('axe-core/axe.min.js'), 'utf8');
+    rmSync(folder, { recursive: true, force: true });
+    mkdirSync(join(folder, 'data'), { recursive: true });
+    h.folder = folder;
+    h.failures = [];
+    h.contexts = [];
+    h.check = (holds, what) => { if (!holds) throw new Error(`expected: ${what}`); };
+    h.equal = (found, expected, what) => h.check(found === expected, `${what}: ${JSON.stringify(expected)}, found ${JSON.stringify(found)}`);
+    h.server = spawn(server, [join(folder, 'data')], { stdio: ['pipe', 'pipe', 'inherit'] });
+    h.server.on('exit', (code, signal) => { if (!h.finished) { console.error(`the server ended: ${code ?? signal}`); process.exit(1); } });
+    for await (const line of createInterface({ input: h.server.stdout })) {
+      if (line.startsWith('port ')) h.url = `http://127.0.0.1:${line.slice(5)}/`;
+      if (line.startsWith('setup code: ')) { h.setupCode = line.slice(12); break; }
+    }
+    h.browser = await load('playwright-core').chromium.launch({ executablePath: chromium, args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-dev-shm-usage'] });
+    return h;
+  }
+
+  file(name) { return join(this.folder, name); }
+  tell(command) { this.server.stdin.write(`${command}\n`); }
+
+  /// A browser of one's own; complaints of its console are failures.
+  async person(name, viewport = kSize, options = {}) {
+    const context = await this.browser.newContext({ viewport, reducedMotion: 'reduce', ...options });
+    const page = await context.newPage();
+    page.setDefaultTimeout(15000);
+    page.on('pageerror', (error) => this.failures.push(`${name}: script error: ${error.message}`));
+    page.on('console', (message) => {
+      // The browser itself reports answers such as 401 and 404, which the page expects.
+      if (message.type() === 'error' && !message.text().startsWith('Failed to load resource')) this.failures.push(`${name}: console: ${message.text()}`);
+    });
+    return page;
+  }
+
+  async step(name, work) {
+    const begun = Date.now();
+    try {
+      await work();
+      console.log(`ok      ${name} (${Date.now() - begun} ms)`);
+    } catch (error) {
+      console.log(`FAILED  ${name}: ${error.message}`);
+      this.failures.push(`${name}: ${error.message}`);
+      let i = 0;
+      for (const context of this.browser.contexts()) for (const page of context.pages()) await page.screenshot({ path: this.file(`failed-${name.replace(/\W+/g, '-')}-${i++}.png`) }).catch(() => {});
+      await this.finish();  // the steps after it build on this one
+    }
+  }
+
+  /// Keeps a picture of the screen and lets axe look at it.
+  async look(page, name, { axe = true, fullPage = true } = {}) {
+    await page.screenshot({ path: this.file(`${name}.png`), fullPage });
+    if (!axe) return;
+    // Through the debugger, not as a script element: the page's policy stays in force.
+    await page.evaluate(this.axe);
+    const { violations } = await page.evaluate(() => window.axe.run({ runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'best-practice'] }));
+    for (const violation of violations) this.failures.push(`axe, ${name}: ${violation.id}: ${violation.help}: ${violation.nodes.slice(0, 3).map((node) => `${node.target.join(' ')} (${node.failureSummary?.split('\n')[1]?.trim()})`).join('; ')}`);
+  }
+
+  async finish() {
+    this.finished = true;
+    await this.browser.close();
+    this.server.stdin.end('quit\n');
+    for (const failure of this.failures) console.log(`  - ${failure}`);
+    console.log(this.failures.length ? `${this.failures.length} failures` : 'all well');
+    process.exit(this.failures.length ? 1 : 0);
+  }
+}

@@ -1,0 +1,322 @@
+// A run through the page in a real browser: page_test.mjs NODE_MODULES SERVER OUT_FOLDER CHROMIUM
+import { fileURLToPath } from 'node:url';
+import { Harness } from './harness.mjs';
+
+const h = await Harness.start(process.argv.slice(2), fileURLToPath(import.meta.url));
+const { check, equal } = h;
+const kPassword = 'correct horse battery';
+
+async function logIn(page, name) {
+  await page.goto(h.url);
+  await page.getByLabel('Name').fill(name);
+  await page.getByLabel('Password').fill(kPassword);
+  await page.getByRole('button', { name: 'Log in' }).click();
+  await page.getByRole('navigation').waitFor();
+}
+
+async function addAccount(page, name, role) {
+  const card = page.locator('section', { has: page.getByRole('heading', { name: 'Add an account' }) });
+  await card.getByLabel('Name').fill(name);
+  await card.getByLabel('Role').selectOption(role);
+  await card.getByLabel('Password').fill(kPassword);
+  await card.getByRole('button', { name: 'Add' }).click();
+  await page.getByRole('cell', { name, exact: true }).waitFor();
+}
+
+async function scan(page, button = 'Start sweep') {
+  await page.goto(`${h.url}#/scan`);
+  await page.getByRole('button', { name: button }).click();
+  await page.locator('.verdict').waitFor({ timeout: 60000 });
+}
+
+const engineer = await h.person('engineer');
+await h.step('set-up makes the first account and refuses a wrong code', async () => {
+  await engineer.goto(h.url);
+  await engineer.getByRole('heading', { name: 'First start' }).waitFor();
+  await h.look(engineer, 'setup');
+  const fill = async (code) => {
+    await engineer.getByLabel('Setup code').fill(code);
+    await engineer.getByLabel('Name').fill('engineer');
+    await engineer.getByLabel('Password', { exact: true }).fill(kPassword);
+    await engineer.getByLabel('Password again').fill(kPassword);
+    await engineer.getByRole('button', { name: 'Make the account' }).click();
+  };
+  await fill('AAAA-AAAA');
+  await engineer.getByRole('alert').getByText('setup code is wrong').waitFor();
+  await fill(h.setupCode);
+  await engineer.getByRole('navigation').waitFor();
+});
+
+await h.step('the engineer adds accounts', async () => {
+  await engineer.goto(`${h.url}#/users`);
+  for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'], ['clara', 'physicist']]) await addAccount(engineer, name, role);
+  await h.look(engineer, 'users');
+});
+
+const anna = await h.person('anna');
+const bob = await h.person('bob');
+const clara = await h.person('clara');
+await h.step('a wrong password is refused in words', async () => {
+  await anna.goto(h.url);
+  await anna.getByLabel('Name').fill('anna');
+  await anna.getByLabel('Password').fill('not this one');
+  await anna.getByRole('button', { name: 'Log in' }).click();
+  await anna.getByRole('alert').getByText('name or password is wrong').waitFor();
+  await h.look(anna, 'login');
+  await logIn(anna, 'anna');
+  await anna.getByText('Last scans').waitFor();
+  await h.look(anna, 'status');
+});
+
+await h.step('roles see only their own screens', async () => {
+  equal(await anna.getByRole('link', { name: 'Log', exact: true }).count(), 0, 'the technician sees no log');
+  await anna.goto(`${h.url}#/audit`);
+  await anna.getByText('Your role does not open this page.').waitFor();
+});
+
+await h.step('a new patient is scanned for a reference', async () => {
+  await anna.goto(`${h.url}#/patients`);
+  await anna.getByLabel('Code', { exact: true }).fill('PX-0417');
+  await anna.getByLabel('Site').fill('thorax');
+  await anna.getByRole('button', { name: 'Add a patient' }).click();
+  await anna.getByRole('heading', { name: 'PX-0417' }).waitFor();
+  equal(await anna.getByRole('button', { name: 'Open for a fraction' }).isDisabled(), true, 'no fraction without a reference');
+  await anna.getByRole('button', { name: 'Take a new reference' }).click();
+  await anna.getByText('Press the button to start a sweep.').waitFor();
+  await h.look(anna, 'scan-ready');
+  await scan(anna);
+  await h.look(anna, 'result-reference');
+});
+
+await h.step('a physicist plans, a second one approves', async () => {
+  await logIn(bob, 'bob');
+  await bob.goto(`${h.url}#/patients`);
+  await bob.getByRole('link', { name: 'PX-0417' }).click();
+  await bob.getByRole('link', { name: 'Plan, Version 1' }).click();
+  const map = bob.getByRole('application');
+  await map.scrollIntoViewIfNeeded();
+  const box = await map.boundingBox();
+  for (const [x, y] of [[0.3, 0.3], [0.7, 0.3], [0.72, 0.7], [0.28, 0.7]]) await bob.mouse.click(box.x + x * box.width, box.y + y * box.height);
+  await bob.getByText('4 corners').waitFor();
+  await map.press('n');
+  await map.press('ArrowUp');
+  await bob.getByRole('button', { name: 'Pick on the map' }).click();
+  const scrolled = await map.boundingBox();
+  await bob.mouse.click(scrolled.x + 0.5 * scrolled.width, scrolled.y + 0.5 * scrolled.height);
+  check(Number(await bob.getByLabel('Isocentre z').inputValue()) > 0.02, 'the isocentre lies on the body');
+  await h.look(bob, 'plan');
+  await bob.getByRole('button', { name: 'Save plan' }).click();
+  await bob.getByRole('status').getByText('Plan saved.').waitFor({ state: 'attached' });
+  await bob.getByRole('button', { name: 'Approve' }).click();
+  await bob.getByRole('alert').getByText('a second person must approve').waitFor();
+  await logIn(clara, 'clara');
+  await clara.goto(`${h.url}${new URL(bob.url()).hash}`);
+  await clara.getByText('4 corners').waitFor();
+  await clara.getByRole('button', { name: 'Approve' }).click();
+  await clara.getByText('approved by clara').waitFor();
+  await h.look(clara, 'plan-approved');
+});
+
+await h.step('a fraction shows MOVE with the signs in words', async () => {
+  await anna.goto(`${h.url}#/patients`);
+  await anna.getByRole('link', { name: 'PX-0417' }).click();
+  await h.look(anna, 'patient');
+  await anna.getByRole('button', { name: 'Open for a fraction' }).click();
+  await scan(anna, /Start sweep|Scan again/);
+  await anna.locator('.verdict.move').waitFor();
+  // The body was carried by +6.2 mm along x, -12.4 mm along y and raised by 4.1 mm (within the turn's share): the correction goes back.
+  const card = (name) => anna.locator('.number', { has: anna.getByRole('heading', { name }) });
+  check((await card('Vertical').locator('.value').innerText()).startsWith('−'), 'vertical is negative');
+  equal(await card('Vertical').locator('.word').innerText(), 'down', 'vertical in words');
+  check((await card('Longitudinal').locator('.value').innerText()).startsWith('+'), 'longitudinal is positive');
+  equal(await card('Longitudinal').locator('.word').innerText(), 'toward gantry', 'longitudinal in words');
+  check((await card('Yaw').locator('.value').innerText()).startsWith('+'), 'yaw is positive');
+  check(await anna.locator('.number.outside').count() >= 3, 'values outside tolerance are marked');
+  await anna.locator('.reading strong').waitFor();
+  await h.look(anna, 'result-move');
+});
+
+await h.step('the map reads millimetres by mouse and keyboard', async () => {
+  const map = anna.locator('canvas.map');
+  await map.scrollIntoViewIfNeeded();
+  await map.hover({ position: { x: 10, y: 10 } });
+  const corner = await anna.locator('.reading').innerText();
+  await map.focus();
+  for (let i = 0; i < 10; ++i) await map.press('Shift+ArrowRight');
+  for (let i = 0; i < 10; ++i) await map.press('Shift+ArrowDown');
+  const inside = await anna.locator('.reading').innerText();
+  check(corner !== inside, 'the reading follows');
+  check(/mm|not measured/.test(inside), `the reading is in millimetres: ${inside}`);
+  await anna.getByLabel('After the correction').check();
+});
+
+await h.step('the surface opens in 3-D', async () => {
+  await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
+  await anna.locator('canvas.mesh[data-ready=yes]').waitFor({ timeout: 60000 });
+  await anna.getByLabel('Reference as a ghost').check();
+  await anna.locator('canvas.mesh').press('ArrowLeft');
+  await anna.waitForTimeout(1500);
+  await anna.locator('canvas.mesh').screenshot({ path: h.file('mesh.png') });
+});
+
+await h.step('a second page follows the same scan', async () => {
+  await clara.goto(`${h.url}#/scan`);
+  await anna.goto(`${h.url}#/scan`);
+  h.tell('slow');
+  await anna.getByRole('button', { name: 'Scan again' }).click();
+  await clara.getByRole('button', { name: 'End sweep' }).waitFor();
+  await anna.waitForTimeout(1200);
+  await h.look(anna, 'scan-sweep');
+  await clara.reload();
+  await clara.getByRole('button', { name: 'End sweep' }).waitFor();
+  h.tell('fast');
+  await clara.locator('.verdict').waitFor({ timeout: 60000 });
+  await anna.locator('.verdict.in_tolerance').waitFor();
+  await h.look(anna, 'result-in-tolerance');
+  await anna.getByRole('button', { name: 'Accept' }).click();
+  await anna.getByText('Accepted by anna').waitFor();
+});
+
+await h.step('an old result greys out and says so', async () => {
+  h.tell('old');
+  await anna.goto(`${h.url}#/result`);
+  await anna.getByText('Do not act on it').waitFor();
+  check(await anna.locator('.is-old').count() === 1, 'the result is grey');
+  await h.look(anna, 'result-old', { axe: false });
+});
+
+await h.step('NO ANSWER says why', async () => {
+  await scan(anna, 'Scan again');
+  await anna.locator('.verdict.no_answer').waitFor();
+  check(/marker/i.test(await anna.locator('.verdict .why').innerText()), 'the reason names the markers');
+  await h.look(anna, 'result-no-answer');
+});
+
+await h.step('the trend shows the fractions', async () => {
+  await anna.locator('.trend').first().waitFor();
+  equal(await anna.locator('.trend').count(), 6, 'six trends');
+});
+
+await h.step('unplugging during a sweep discards the scan and says so', async () => {
+  h.tell('slow');
+  await anna.goto(`${h.url}#/scan`);
+  await anna.getByRole('button', { name: 'Scan again' }).click();
+  await anna.getByRole('button', { name: 'End sweep' }).waitFor();
+  h.tell('unplug');
+  await anna.locator('.headline', { hasText: 'Sensor missing' }).waitFor();
+  equal(await anna.getByRole('button', { name: 'Start sweep' }).isDisabled(), true, 'no start without a sensor');
+  await h.look(anna, 'scan-unplugged');
+  h.tell('plug');
+  h.tell('fast');
+  await anna.locator('.headline', { hasText: 'Ready' }).waitFor();
+});
+
+await h.step('another open patient is pointed out on the result', async () => {
+  await anna.goto(`${h.url}#/patients`);
+  await anna.getByLabel('Code', { exact: true }).fill('PX-0999');
+  await anna.getByRole('button', { name: 'Add a patient' }).click();
+  await anna.getByRole('button', { name: 'Take a new reference' }).click();
+  const history = await anna.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
+  const last = history.scans.find((one) => one.result);
+  await anna.goto(`${h.url}#/result/${last.id}`);
+  await anna.getByText('Another patient (PX-0999) is open').waitFor();
+});
+
+await h.step('patients, log, settings and update look finished', async () => {
+  await bob.goto(`${h.url}#/patients`);
+  await bob.getByRole('link', { name: 'PX-0417' }).waitFor();
+  await h.look(bob, 'patients');
+  await bob.goto(`${h.url}#/audit`);
+  await bob.getByRole('cell', { name: 'reference.approve' }).waitFor();
+  await h.look(bob, 'audit');
+  await engineer.goto(`${h.url}#/settings`);
+  await engineer.getByLabel('Log off after idle minutes').fill('20');
+  await engineer.getByRole('button', { name: 'Save' }).click();
+  await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
+  await h.look(engineer, 'settings');
+  await engineer.goto(`${h.url}#/update`);
+  await engineer.getByText('plumb-0.2.0.raucb').waitFor();
+  await h.look(engineer, 'update');
+});
+
+await h.step('a keyboard alone reaches login, navigation and the start button', async () => {
+  const keys = await h.person('keys');
+  await keys.goto(h.url);
+  await keys.getByRole('heading', { name: 'Log in' }).waitFor();
+  await keys.keyboard.type('anna');
+  await keys.keyboard.press('Tab');
+  await keys.keyboard.type(kPassword);
+  await keys.keyboard.press('Enter');
+  await keys.getByRole('navigation').waitFor();
+  const focused = () => keys.evaluate(() => document.activeElement.textContent);
+  for (let i = 0; i < 40 && (await focused()) !== 'Scan'; ++i) await keys.keyboard.press('Tab');
+  await h.look(keys, 'focus', { axe: false });
+  await keys.keyboard.press('Enter');
+  await keys.getByRole('button', { name: 'Start sweep' }).waitFor();
+  for (let i = 0; i < 8 && (await focused()) !== 'Start sweep'; ++i) await keys.keyboard.press('Tab');
+  equal(await focused(), 'Start sweep', 'the start button is reached from the main part');
+  await keys.close();
+});
+
+await h.step('phone and 4K', async () => {
+  for (const [name, width, height] of [['phone', 360, 740], ['4k', 3840, 2160]]) {
+    const page = await h.person(name, { width, height });
+    await logIn(page, 'anna');
+    const scans = await page.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
+    const moved = scans.scans.find((one) => one.result?.verdict === 'move');
+    for (const [screen, hash] of [['result', `result/${moved.id}`], ['scan', 'scan'], ['status', 'status'], ['patients', 'patients']]) {
+      await page.goto(`${h.url}#/${hash}`);
+      await page.waitForLoadState('networkidle').catch(() => {});
+      await page.waitForTimeout(400);
+      const overflow = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+      check(overflow <= 0, `${name} ${screen} does not scroll sideways (${overflow} px too wide)`);
+      await h.look(page, `${name}-${screen}`, { fullPage: false });
+    }
+    await page.context().close();
+  }
+});
+
+await h.step('without script the last result is shown, without WebGL the pictures', async () => {
+  const plain = await h.person('plain', { width: 1280, height: 900 }, { javaScriptEnabled: false });
+  await plain.goto(`${h.url}result`);
+  await plain.getByLabel('Name').fill('anna');
+  await plain.getByLabel('Password').fill(kPassword);
+  await plain.getByRole('button', { name: 'Log in' }).click();
+  await plain.getByText('NO ANSWER').waitFor();
+  check((await plain.getByRole('complementary').innerText()).includes('Not a medical device'), 'the notice is there');
+  await plain.screenshot({ path: h.file('plain-result.png'), fullPage: true });
+  const flat = await h.person('flat');
+  await flat.addInitScript(() => { HTMLCanvasElement.prototype.getContext = new Proxy(HTMLCanvasElement.prototype.getContext, { apply: (target, self, args) => (args[0].startsWith('webgl') ? null : Reflect.apply(target, self, args)) }); });
+  await logIn(flat, 'anna');
+  await flat.goto(`${h.url}#/result`);
+  await flat.getByRole('button', { name: 'Open the 3-D view' }).click();
+  await flat.getByText('WebGL is missing').waitFor();
+});
+
+await h.step('the first page is small and asks nobody else', async () => {
+  const page = await h.person('weight');
+  const sizes = [];
+  const hosts = new Set();
+  page.on('response', async (response) => {
+    hosts.add(new URL(response.url()).host);
+    const size = Number((await response.allHeaders())['content-length'] ?? 0);
+    sizes.push(size);
+  });
+  const begun = Date.now();
+  await page.goto(h.url);
+  await page.getByRole('button', { name: 'Log in' }).waitFor();
+  const paint = await page.evaluate(() => performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? -1);
+  const total = sizes.reduce((sum, size) => sum + size, 0);
+  console.log(`    first page ${total} bytes, first paint ${Math.round(paint)} ms, login shown after ${Date.now() - begun} ms`);
+  check(total < 150000, `first page is ${total} bytes`);
+  equal(hosts.size, 1, 'one host');
+});
+
+await h.step('the session ends with log out', async () => {
+  await anna.goto(`${h.url}#/status`);
+  await anna.getByRole('button', { name: 'Log out' }).click();
+  await anna.getByRole('heading', { name: 'Log in' }).waitFor();
+  equal(await anna.evaluate(() => fetch('/api/v1/status').then((response) => response.status)), 401, 'nothing without login');
+});
+
+await h.finish();

@@ -1,0 +1,206 @@
+import { fileUrl, get, getBytes, live, may, post } from '../api.js';
+import { action, checkbox, clear, field, form, h, localTime, say, warn } from '../dom.js';
+import { errorMap } from '../error_map.js';
+import { paintHeights, readTiff } from '../maps.js';
+import { sixNumbers } from '../numbers.js';
+import { S } from '../strings.js';
+import { trend } from '../trend.js';
+import { ageText, verdictIcon } from './common.js';
+
+const kOldAfter_s = 120;
+const mm = (metres, digits = 1) => (1000 * metres).toFixed(digits);
+const optional = (path) => get(path, true).catch(() => null);
+
+/// Everything that the screen shows of one scan.
+async function collect(id) {
+  let scan = id ? await get(`scans/${id}`).catch((error) => { throw error.status === 404 ? new Error(S.result.gone) : error; }) : (await get('status', true)).last_result;
+  if (!id && !scan) {
+    const { scans } = await get('scans?limit=20', true);
+    scan = scans.find((candidate) => candidate.outcome === 'done') ?? null;
+  }
+  if (!scan) return null;
+  const received = performance.now();
+  const [patient, reference, details, scene, history] = await Promise.all([
+    scan.patient_id ? optional(`patients/${scan.patient_id}`) : null, scan.reference_id ? optional(`references/${scan.reference_id}`) : null, scan.result ? optional(`results/${scan.id}`) : null,
+    optional(`scans/${scan.id}/files/scene.json`), scan.patient_id ? optional(`patients/${scan.patient_id}/scans`) : null]);
+  return { scan: { ...scan, details }, received, patient, reference, details, scene, history: history?.scans ?? [] };
+}
+
+function head({ scan, patient, reference, received }) {
+  const text = S.result;
+  const age = h('strong', {});
+  const item = (label, ...value) => h('div', {}, h('dt', {}, label), h('dd', {}, ...value));
+  const element = h('dl', { class: 'identity' },
+    item(text.patient, h('strong', { class: 'code' }, patient ? h('a', { href: `#/patient/${patient.id}` }, patient.code) : S.none)),
+    item(text.reference, reference ? `${text.version(reference.version)}, ${localTime(reference.created_at)}` : S.none),
+    item(text.scanned, localTime(scan.started_at)),
+    item(text.age, age));
+  const tick = () => {
+    const seconds = (scan.age_s ?? 0) + (performance.now() - received) / 1000;
+    age.textContent = ageText(seconds);
+    return seconds > kOldAfter_s;
+  };
+  return { element, tick };
+}
+
+function verdictStrip({ scan }) {
+  const text = S.result;
+  const { result } = scan;
+  if (!result) {
+    const words = { failed: text.failed, cancelled: text.cancelled }[scan.outcome] ?? text.noReference;
+    return h('section', { class: 'verdict none' }, h('p', { class: 'word' }, S.purposes[scan.purpose]), h('p', { class: 'why' }, scan.failure ? `${words}: ${scan.failure}` : words));
+  }
+  const why = result.verdict === 'no_answer' ? result.reasons.join('; ') : text.why[result.verdict];
+  return h('section', { class: `verdict ${result.verdict}` },
+    h('p', { class: 'word' }, h('span', { class: 'icon', 'aria-hidden': 'true' }, verdictIcon(result.verdict)), text.verdicts[result.verdict]), h('p', { class: 'why' }, why));
+}
+
+function trust({ details, scene }) {
+  const text = S.result;
+  const rows = [];
+  const add = (label, value, tone = '') => { if (value !== null && value !== undefined) rows.push(h('div', { class: tone }, h('dt', {}, label), h('dd', {}, value))); };
+  const { alignment, motion, region } = details ?? {};
+  add(text.markers, alignment && `${alignment.markers_used.length}`);
+  add(text.markerRms, alignment && `${mm(alignment.rms_m, 2)} mm`);
+  add(text.coverage, region && `${(100 * region.coverage).toFixed(1)} %`, region && region.coverage < 0.9 ? 'caution' : '');
+  add(text.hole, region && `${mm(region.largest_hole_m, 0)} mm`, region && region.largest_hole_m > 0.05 ? 'caution' : '');
+  add(text.residual, motion && text.medianAnd95(mm(motion.residual_m.median), mm(motion.residual_m.p95)));
+  add(text.views, scene && `${scene.keyframes}`);
+  add(text.frames, scene && `${scene.frames.tracked} / ${scene.frames.total}`);
+  add(text.lost, scene?.longest_lost_s > 0 ? `${scene.longest_lost_s.toFixed(1)} s` : null, 'caution');
+  add(text.depthScale, scene?.calibration?.depth_scale && `${(100 * (scene.calibration.depth_scale - 1)).toFixed(2)} %`);
+  add(text.sensorOn, live.status?.sensor.present ? S.result.minutes(Math.floor(live.status.sensor.powered_s / 60)) : null);
+  const rejected = Object.entries(alignment?.markers_rejected ?? {}).map(([id, residual]) => text.rejectedItem(id, mm(residual, 0)));
+  add(text.rejected, rejected.length ? rejected.join(', ') : null, 'caution');
+  const weak = (motion?.weak_directions ?? []).map((direction) => S.result.axes[direction.name] ?? direction.name);
+  add(text.weak, weak.length ? weak.join(', ') : null, 'caution');
+  const warnings = [...(details?.warnings ?? []), ...(scene?.warnings ?? [])];
+  add(text.warnings, warnings.length ? warnings.join('; ') : null, 'caution');
+  return h('dl', { class: 'trust' }, rows);
+}
+
+/// What the sweep saw, where there is nothing to compare it with.
+function seen({ scan, scene }) {
+  const canvas = h('canvas', { class: 'map', role: 'img', 'aria-label': S.result.heights });
+  const box = h('div', { class: 'map-box' }, canvas);
+  box.style.setProperty('max-width', `${65 * scene.heightmap.width / scene.heightmap.height}vh`);
+  getBytes(`scans/${scan.id}/files/heightmap.tiff`).then(readTiff).then((map) => paintHeights(canvas, map, scene.heightmap.step), () => clear(box));
+  return box;
+}
+
+function meshView({ scan, reference, details }, map, tolerance_mm) {
+  const text = S.result;
+  const place = h('div', {});
+  let view = null;
+  const open = action(text.meshOpen, async () => {
+    clear(place, h('p', { class: 'hint' }, text.meshLoading));
+    const canvas = h('canvas', { class: 'mesh', tabindex: '0', role: 'application', 'aria-label': text.meshLabel });
+    const ghost = checkbox(text.ghost, false, {});
+    try {
+      if (!document.createElement('canvas').getContext('webgl2')) throw new Error(text.meshFailed);
+      const { openMesh } = await import('../mesh.js');
+      clear(place, canvas, reference && ghost.element);
+      view = await openMesh(canvas, { url: fileUrl(scan.id, 'mesh.ply'), grid: map?.grid, deviation: map?.deviation, T: details?.alignment?.T_reference_current, tolerance_m: tolerance_mm / 1000 });
+      canvas.dataset.ready = 'yes';
+      ghost.box.addEventListener('change', () => view.setGhost(ghost.box.checked ? fileUrl(reference.scan_id, 'mesh.ply') : null).catch((error) => warn(error.message)));
+    } catch {
+      clear(place, h('p', { class: 'hint' }, text.meshFailed));
+    }
+  }, {});
+  clear(place, open);
+  return { element: place, stop: () => view?.stop() };
+}
+
+function closing({ scan, patient }, reload) {
+  const text = S.result;
+  const reason = h('input', { maxlength: 200, autocomplete: 'off' });
+  const rescan = may('scan') && patient && action(text.rescan, async () => {
+    if (live.status?.patient_id !== patient.id) await post(`patients/${patient.id}/open`, { purpose: 'fraction', reason: '' });
+    location.hash = '#/scan';
+  }, { class: 'primary' });
+  const accept = scan.accepted_by ? h('p', { class: 'badge in_tolerance' }, `✓ ${text.acceptedBy(scan.accepted_by)}`) : may('accept') && scan.result && scan.result.verdict !== 'no_answer' && action(text.accept, async () => {
+    await post(`scans/${scan.id}/accept`);
+    say(text.accept);
+    await reload();
+  }, {});
+  const files = h('ul', { class: 'files' }, Object.entries(text.files).filter(([name]) => scan.result || !/result|map\.png|overlay|deviation|distance/.test(name)).map(([name, label]) => h('li', {}, h('a', { href: fileUrl(scan.id, name, true), download: '' }, label))));
+  return h('div', {},
+    h('div', { class: 'row' }, rescan, accept, scan.result && h('a', { class: 'button', href: `/result?scan=${scan.id}` }, text.print)),
+    may('plan') && scan.outcome === 'done' && form({ class: 'form inline' }, async () => {
+      const { id } = await post('references', { scan_id: scan.id, reason: reason.value.trim() });
+      location.hash = `#/plan/${id}`;
+    }, field(text.newReferenceReason, reason), h('button', {}, text.newReference)),
+    h('details', {}, h('summary', {}, text.export), files));
+}
+
+export async function showResult(place, id) {
+  const text = S.result;
+  let stopMesh = () => {};
+  let tick = () => {};
+  const load = async () => {
+    const data = await collect(id);
+    if (!data) {
+      clear(place, h('section', { class: 'card' }, h('h1', {}, text.none), h('p', {}, text.noneHint)));
+      return;
+    }
+    const { scan, reference, patient, history } = data;
+    const mapped = Boolean(data.details?.alignment);
+    const tolerance = reference?.plan.tolerance ?? { shift_mm: 3, rotation_deg: 1 };
+    const identity = head(data);
+    const old = h('p', { class: 'old-note', role: 'status' });
+    const other = h('p', { class: 'caution' });
+    const card = (title, ...content) => h('section', { class: 'card' }, h('h2', {}, title), ...content);
+    const mapPlace = h('div', {}, h('p', { class: 'hint' }, S.loading));
+    const slicePlace = h('div', {});
+    const meshPlace = h('div', {});
+    clear(place, h('h1', { class: 'visually-hidden' }, text.title), identity.element, old, other, h('div', { class: 'fresh' }, verdictStrip(data), scan.result?.correction && h('section', { class: 'correction' }, h('h2', {}, text.numbers, ' ', h('small', {}, text.atIsocentre)), sixNumbers(scan.result, reference, data.details))),
+      data.details && card(text.trust, trust(data)),
+      mapped && card(text.where, mapPlace),
+      !mapped && data.scene?.heightmap && card(text.heights, seen(data)),
+      mapped && h('div', { class: 'halves' }, card(text.overlay, h('img', { class: 'picture', src: fileUrl(scan.id, 'overlay.png'), alt: text.overlayAlt, loading: 'lazy' })), card(text.slice, slicePlace)),
+      scan.outcome === 'done' && card(text.mesh, meshPlace),
+      scan.result && card(text.trend, trend(history, tolerance)),
+      h('section', { class: 'card' }, closing(data, load)));
+    tick = () => {
+      const aged = identity.tick();
+      const isOld = Boolean(scan.result) && aged;
+      place.classList.toggle('is-old', Boolean(isOld));
+      if (old.dataset.shown !== String(isOld)) {
+        old.dataset.shown = String(isOld);
+        clear(old, isOld ? [h('strong', {}, text.old), ' ', text.oldText] : '');
+      }
+      const open = live.status?.patient_id;
+      const differs = open && patient && open !== patient.id;
+      if (!differs) clear(other);
+      else if (other.dataset.open !== open) get(`patients/${open}`, true).then((found) => clear(other, text.differentPatient(found.code)), () => {});
+      other.dataset.open = differs ? open : '';
+    };
+    tick();
+    stopMesh();
+    let map = null;
+    if (mapped && reference) {
+      map = await errorMap(scan, reference, tolerance.shift_mm);
+      clear(mapPlace, map.element);
+      clear(slicePlace, map.sliceElement ?? h('p', { class: 'hint' }, text.mapFailed));
+    } else {
+      clear(mapPlace);
+    }
+    const mesh = meshView(data, map, tolerance.shift_mm);
+    clear(meshPlace, mesh.element);
+    stopMesh = mesh.stop;
+  };
+  const timer = setInterval(() => tick(), 1000);
+  const stop = live.listen((kind) => { if (kind === 'result' && !id) load().catch((error) => warn(error.message)); });
+  try {
+    await load();
+  } catch (error) {
+    clearInterval(timer);
+    stop();
+    throw error;
+  }
+  return () => {
+    clearInterval(timer);
+    stop();
+    stopMesh();
+  };
+}

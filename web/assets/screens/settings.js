@@ -1,0 +1,31 @@
+import { get, may, put } from '../api.js';
+import { checkbox, clear, field, form, h, say, select } from '../dom.js';
+import { S } from '../strings.js';
+
+const kNumbers = {
+  shift_tolerance_mm: [0.1, 50, 0.1], rotation_tolerance_deg: [0.1, 20, 0.1], auto_stop_s: [1, 120, 1], scan_limit_s: [5, 600, 1], retention_days: [0, 36500, 1], idle_logout_min: [1, 240, 1],
+};
+const kFlags = ['couch_markers', 'keep_recordings'];
+
+export async function showSettings(place) {
+  const text = S.settings;
+  const settings = await get('settings');
+  const editable = may('settings');
+  const inputs = {};
+  const numbers = Object.entries(kNumbers).map(([name, [min, max, step]]) => {
+    inputs[name] = h('input', { type: 'number', min, max, step, value: settings[name], required: true, disabled: !editable });
+    return field(text[name], inputs[name]);
+  });
+  const flags = kFlags.map((name) => {
+    inputs[name] = checkbox(text[name], settings[name], { disabled: !editable });
+    return inputs[name].element;
+  });
+  const posture = select(S.plan.postures, settings.posture, { disabled: !editable });
+  clear(place, h('h1', {}, text.title), !editable && h('p', { class: 'lead' }, text.readOnly), h('section', { class: 'card' }, form({ class: 'form columns' }, async () => {
+    const changed = { posture: posture.value };
+    for (const name of Object.keys(kNumbers)) changed[name] = Number(inputs[name].value);
+    for (const name of kFlags) changed[name] = inputs[name].box.checked;
+    await put('settings', changed);
+    say(S.saved);
+  }, numbers, field(text.posture, posture), flags, editable && h('div', { class: 'row' }, h('button', { class: 'primary' }, S.save)))));
+}

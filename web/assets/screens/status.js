@@ -1,0 +1,58 @@
+import { get, live, may } from '../api.js';
+import { clear, h, localTime, table } from '../dom.js';
+import { S } from '../strings.js';
+import { outcomeBadge, patientCodes } from './common.js';
+
+const kWarmUp_s = 15 * 60;
+const gigabytes = (bytes) => Math.round(bytes / 2 ** 30);
+
+function tiles(status, codes) {
+  const text = S.status;
+  const { sensor, storage } = status;
+  const used = storage.total_bytes > 0 ? 1 - storage.free_bytes / storage.total_bytes : 0;
+  const tile = (title, value, tone, ...more) => h('section', { class: `card tile ${tone}` }, h('h2', {}, title), h('p', { class: 'big' }, value), ...more);
+  return [
+    tile(text.sensor, sensor.present ? text.present : text.missing, sensor.present ? 'good' : 'bad',
+      sensor.present && h('p', {}, `${sensor.name}, ${text.serial} ${sensor.serial}`),
+      sensor.present && h('p', {}, `${text.rate(sensor.fps)}, ${text.powered(Math.floor(sensor.powered_s / 60))}`),
+      sensor.present && sensor.powered_s < kWarmUp_s && h('p', { class: 'caution' }, text.warming)),
+    tile(text.patient, codes.get(status.patient_id) ?? S.none, '', h('p', {}, S.purposes[status.next_purpose])),
+    tile(text.storage, storage.writable ? text.free(gigabytes(storage.free_bytes), gigabytes(storage.total_bytes)) : text.readOnly, storage.writable && used < 0.95 ? 'good' : 'bad',
+      h('meter', { min: 0, max: 1, high: 0.9, value: used, 'aria-label': text.storage })),
+    tile(text.light, S.lights[status.light] ?? status.light, ''),
+    tile(text.version, status.version, ''),
+  ];
+}
+
+export async function showStatus(place) {
+  const text = S.status;
+  const headline = h('p', { class: 'headline' });
+  const hint = h('p', { class: 'lead' });
+  const grid = h('div', { class: 'tiles' });
+  const list = h('div', {});
+  let codes = await patientCodes();
+  clear(place,
+    h('h1', { class: 'visually-hidden' }, text.title),
+    h('section', { class: 'card hero' }, h('div', {}, headline, hint), may('scan') && h('a', { class: 'button primary', href: '#/scan' }, text.goScan)),
+    grid,
+    h('section', { class: 'card' }, h('h2', {}, text.lastScans), list));
+
+  const draw = () => {
+    const { status } = live;
+    if (!status) return;
+    headline.textContent = S.states[status.state];
+    headline.dataset.state = status.state;
+    hint.textContent = status.fault ?? S.stateHints[status.state];
+    clear(grid, tiles(status, codes));
+  };
+  const load = async () => {
+    codes = await patientCodes();
+    const { scans } = await get('scans?limit=8', true);
+    const rows = scans.map((scan) => h('tr', {},
+      h('td', {}, h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at))), h('td', {}, codes.get(scan.patient_id) ?? S.none), h('td', {}, S.purposes[scan.purpose]), h('td', {}, outcomeBadge(scan))));
+    clear(list, rows.length ? table([S.patients.when, S.result.patient, S.patients.purpose, S.patients.outcome], rows, text.lastScans) : h('p', { class: 'hint' }, text.noScans));
+    draw();
+  };
+  await load();
+  return live.listen((kind) => (kind === 'status' ? draw() : load().catch(() => {})));
+}
