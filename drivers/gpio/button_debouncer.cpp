@@ -1,0 +1,40 @@
+#include "drivers/gpio/button_debouncer.hpp"
+
+#include <algorithm>
+
+namespace plumb {
+
+ButtonDebouncer::ButtonDebouncer(const Options& options, bool pressed, Clock::time_point now)
+    : options_(options), level_(pressed), stable_(pressed), ignored_(pressed), changed_(now), begin_(now) {}
+
+void ButtonDebouncer::OnLevel(bool pressed, Clock::time_point now) {
+  if (pressed == level_) return;
+  if (pressed && !stable_ && now - changed_ >= options_.debounce) begin_ = now;  // first contact after a rest
+  level_ = pressed;
+  changed_ = now;
+}
+
+std::optional<ButtonPress> ButtonDebouncer::OnTime(Clock::time_point now) {
+  if (level_ != stable_ && now - changed_ >= options_.debounce) {
+    stable_ = level_;
+    if (stable_) {
+      ignored_ = false;
+    } else if (!ignored_) {
+      ignored_ = true;
+      return ButtonPress::kShort;
+    }
+  }
+  if (stable_ && level_ && !ignored_ && now - begin_ >= options_.long_press) {
+    ignored_ = true;
+    return ButtonPress::kLong;
+  }
+  return std::nullopt;
+}
+
+std::optional<ButtonDebouncer::Clock::time_point> ButtonDebouncer::deadline() const {
+  if (level_ != stable_) return changed_ + options_.debounce;
+  if (stable_ && !ignored_) return begin_ + options_.long_press;
+  return std::nullopt;
+}
+
+}  // namespace plumb

@@ -1,0 +1,178 @@
+// The only file that knows libgpiod (its version 1; version 2 has another interface).
+#include "drivers/gpio/gpio.hpp"
+
+#include <gpiod.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "algo/types/errors.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr char kConsumer[] = "plumb";
+constexpr int kMaxEvents = 64;  // of one dispatch; a line that chatters for ever must not hold the loop
+
+struct ChipCloser {
+  void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }  // releases its lines too
+};
+using Chip = std::unique_ptr<gpiod_chip, ChipCloser>;
+
+std::string Reason(int error) {
+  if (error == EACCES || error == EPERM) return "no permission; put the user into the group of /dev/gpiochip* (usually gpio)";
+  if (error == EBUSY) return "another program uses it";
+  if (error == ENOENT || error == ENODEV) return "there is none; `plumb doctor` lists chips and lines";
+  return std::strerror(error);
+}
+
+Chip OpenChip(const std::string& name) {
+  Chip chip(gpiod_chip_open_lookup(name.c_str()));
+  if (!chip) throw DeviceError(fmt::format("GPIO chip {}: {}", name, Reason(errno)));
+  return chip;
+}
+
+gpiod_line* FindLine(const Chip& chip, const GpioLineName& where) {
+  gpiod_line* line = nullptr;
+  unsigned number = 0;
+  if (where.line.starts_with('#')) {
+    const char* end = where.line.data() + where.line.size();
+    if (std::from_chars(where.line.data() + 1, end, number).ptr == end) line = gpiod_chip_get_line(chip.get(), number);
+  } else {
+    line = gpiod_chip_find_line(chip.get(), where.line.c_str());
+  }
+  if (line == nullptr)
+    throw DeviceError(fmt::format("GPIO line {} of chip {}: there is none; `plumb doctor` lists chips and lines", where.line, where.chip));
+  return line;
+}
+
+}  // namespace
+
+struct GpioButton::Impl {
+  Chip chip;
+  gpiod_line* line = nullptr;
+  std::string name;
+  std::optional<ButtonDebouncer> debouncer;
+  std::function<void(ButtonPress)> pressed;
+
+  void Advance(Clock::time_point now) {
+    if (const std::optional<ButtonPress> press = debouncer->OnTime(now); press && pressed) pressed(*press);
+  }
+};
+
+GpioButton::GpioButton(const GpioButtonOptions& options) : impl_(std::make_unique<Impl>()) {
+  impl_->name = fmt::format("button on GPIO line {} of chip {}", options.where.line, options.where.chip);
+  impl_->chip = OpenChip(options.where.chip);
+  impl_->line = FindLine(impl_->chip, options.where);
+  gpiod_line_request_config config{};
+  config.consumer = kConsumer;
+  config.request_type = GPIOD_LINE_REQUEST_EVENT_BOTH_EDGES;
+  config.flags = options.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW | GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP
+                                    : GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_DOWN;
+  if (gpiod_line_request(impl_->line, &config, 0) != 0) {
+    config.flags = options.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;  // a chip without pull resistors inside
+    if (gpiod_line_request(impl_->line, &config, 0) != 0) throw DeviceError(fmt::format("{}: {}", impl_->name, Reason(errno)));
+  }
+  const int value = gpiod_line_get_value(impl_->line);
+  impl_->debouncer.emplace(options.timing, value == 1, Clock::now());
+}
+
+GpioButton::~GpioButton() = default;
+
+int GpioButton::fd() const { return gpiod_line_event_get_fd(impl_->line); }
+
+std::optional<GpioButton::Clock::time_point> GpioButton::deadline() const { return impl_->debouncer->deadline(); }
+
+void GpioButton::SetListener(std::function<void(ButtonPress)> pressed) { impl_->pressed = std::move(pressed); }
+
+void GpioButton::Dispatch(Clock::time_point now) {
+  for (int i = 0; i < kMaxEvents; ++i) {
+    pollfd wait{fd(), POLLIN, 0};
+    if (::poll(&wait, 1, 0) <= 0) break;
+    gpiod_line_event event{};
+    if ((wait.revents & POLLIN) == 0 || gpiod_line_event_read(impl_->line, &event) != 0)
+      throw DeviceError(fmt::format("{} is gone", impl_->name));
+    impl_->debouncer->OnLevel(event.event_type == GPIOD_LINE_EVENT_RISING_EDGE, now);
+  }
+  impl_->Advance(now);
+}
+
+struct GpioIndicator::Impl {
+  Chip chip;
+  std::array<gpiod_line*, 4> lines{};  ///< By bit of IndicatorOutput.
+  int num_lights = 0;
+  IndicatorPlayer player;
+  int written = -1;
+
+  void Write() noexcept {
+    const int outputs = player.outputs();
+    if (outputs == written) return;
+    written = outputs;
+    constexpr int kColours = kRed | kGreen | kBlue;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      if (lines[i] == nullptr) continue;
+      const bool is_light = (1 << i) != kBeeper;
+      const bool on = is_light && num_lights == 1 ? (outputs & kColours) != 0 : (outputs >> i & 1) != 0;
+      (void)gpiod_line_set_value(lines[i], on ? 1 : 0);
+    }
+  }
+};
+
+GpioIndicator::GpioIndicator(const GpioIndicatorOptions& options) : impl_(std::make_unique<Impl>()) {
+  impl_->chip = OpenChip(options.chip);
+  const std::array<std::string, 4> names{options.lights[0], options.lights[1], options.lights[2], options.beeper};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (names[i].empty()) continue;
+    gpiod_line* line = FindLine(impl_->chip, {options.chip, names[i]});
+    const int flags = options.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
+    if (gpiod_line_request_output_flags(line, kConsumer, flags, 0) != 0)
+      throw DeviceError(fmt::format("light on GPIO line {} of chip {}: {}", names[i], options.chip, Reason(errno)));
+    impl_->lines[i] = line;
+    impl_->num_lights += i < options.lights.size() ? 1 : 0;
+  }
+}
+
+GpioIndicator::~GpioIndicator() { Show(IndicatorPattern::kOff); }
+
+void GpioIndicator::Show(IndicatorPattern pattern) noexcept {
+  impl_->player.Show(pattern, Clock::now());
+  impl_->Write();
+}
+
+std::optional<GpioIndicator::Clock::time_point> GpioIndicator::deadline() const { return impl_->player.deadline(); }
+
+void GpioIndicator::Dispatch(Clock::time_point now) noexcept {
+  impl_->player.OnTime(now);
+  impl_->Write();
+}
+
+std::vector<GpioChipDescription> ListGpioChips() {
+  std::vector<GpioChipDescription> chips;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator("/dev", error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with("gpiochip")) continue;
+    GpioChipDescription& description = chips.emplace_back();
+    description.name = name;
+    const Chip chip(gpiod_chip_open(entry.path().c_str()));
+    if (!chip) {
+      description.problem = Reason(errno);
+      continue;
+    }
+    description.label = gpiod_chip_label(chip.get());
+    for (unsigned i = 0; i < gpiod_chip_num_lines(chip.get()); ++i) {
+      gpiod_line* line = gpiod_chip_get_line(chip.get(), i);
+      if (line != nullptr && gpiod_line_name(line) != nullptr) description.lines.emplace_back(gpiod_line_name(line));
+    }
+  }
+  std::sort(chips.begin(), chips.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+  return chips;
+}
+
+}  // namespace plumb

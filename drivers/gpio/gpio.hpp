@@ -1,0 +1,79 @@
+// Button and light on GPIO lines, by the names of chip and line. One thread, the event loop's, uses everything here.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/button.hpp"
+#include "drivers/gpio/button_debouncer.hpp"
+#include "drivers/gpio/indicator_patterns.hpp"
+#include "drivers/indicator.hpp"
+
+namespace plumb {
+
+/// A line of a chip.
+struct GpioLineName {
+  std::string chip = "gpiochip0";  ///< Name, label, number or path of the chip.
+  std::string line;                ///< Name of the line, as the device tree has it, or its number as `#17`.
+};
+
+struct GpioButtonOptions {
+  GpioLineName where;
+  bool active_low = true;  ///< Pressed pulls the line to ground; the pull-up inside the chip is switched on.
+  ButtonDebouncer::Options timing = {};
+};
+
+class GpioButton : public Button {
+ public:
+  /// @throws DeviceError naming chip and line, with a remedy.
+  explicit GpioButton(const GpioButtonOptions& options);
+  ~GpioButton() override;
+
+  [[nodiscard]] int fd() const override;
+  [[nodiscard]] std::optional<Clock::time_point> deadline() const override;
+  void Dispatch(Clock::time_point now) override;
+  void SetListener(std::function<void(ButtonPress)> pressed) override;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+struct GpioIndicatorOptions {
+  std::string chip = "gpiochip0";
+  /// Red, green, blue; empty: no such light. With one light alone, it shows all colours.
+  std::array<std::string, 3> lights;
+  std::string beeper;  ///< Empty: none.
+  bool active_low = false;
+};
+
+/// A line that fails later is given up silently: a broken light must not stop a scan.
+class GpioIndicator : public Indicator {
+ public:
+  using Clock = IndicatorPlayer::Clock;
+  /// @throws DeviceError naming chip and line, with a remedy.
+  explicit GpioIndicator(const GpioIndicatorOptions& options);
+  ~GpioIndicator() override;  ///< Switches everything off.
+
+  void Show(IndicatorPattern pattern) noexcept override;
+  /// When Dispatch() wants to be called next; nothing while the light stands still.
+  [[nodiscard]] std::optional<Clock::time_point> deadline() const;
+  void Dispatch(Clock::time_point now) noexcept;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// What is there, for diagnosis.
+struct GpioChipDescription {
+  std::string name, label;
+  std::vector<std::string> lines;  ///< Names, of those that have one.
+  std::string problem;             ///< Why it cannot be opened; empty if it can.
+};
+[[nodiscard]] std::vector<GpioChipDescription> ListGpioChips();
+
+}  // namespace plumb

@@ -1,0 +1,48 @@
+// What the light and the beeper do for each state: data, and the player of it.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "drivers/indicator.hpp"
+
+namespace plumb {
+
+/// Outputs as bits. A device with fewer lights shows any colour with those that it has.
+enum IndicatorOutput : std::uint8_t { kRed = 1, kGreen = 2, kBlue = 4, kBeeper = 8 };
+
+struct IndicatorStep {
+  std::uint8_t outputs = 0;             ///< Bits of IndicatorOutput.
+  std::chrono::milliseconds length{0};  ///< 0: for good.
+};
+
+/// Steps are played in turn; from `repeat_from` on again and again.
+struct IndicatorProgram {
+  std::span<const IndicatorStep> steps;
+  std::size_t repeat_from = 0;
+};
+
+/// Patterns differ in rhythm too, so that one lamp of one colour tells them apart.
+[[nodiscard]] IndicatorProgram ProgramOf(IndicatorPattern pattern);
+
+/// Plays the program of one pattern. Pure: the caller brings the time.
+class IndicatorPlayer {
+ public:
+  using Clock = std::chrono::steady_clock;
+  /// Begins a pattern; the same one again goes on as it was.
+  void Show(IndicatorPattern pattern, Clock::time_point now);
+  /// Steps forward to `now`.
+  void OnTime(Clock::time_point now);
+  [[nodiscard]] std::uint8_t outputs() const { return program_.steps[step_].outputs; }
+  [[nodiscard]] std::optional<Clock::time_point> deadline() const;
+
+ private:
+  IndicatorPattern pattern_ = IndicatorPattern::kOff;
+  IndicatorProgram program_ = ProgramOf(IndicatorPattern::kOff);
+  std::size_t step_ = 0;
+  Clock::time_point step_begin_{};
+};
+
+}  // namespace plumb
