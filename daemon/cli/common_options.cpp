@@ -6,6 +6,10 @@
 #include "algo/types/errors.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/scan_runner.hpp"
+#ifdef PLUMB_WITH_OPENNI
+#include "drivers/openni/oni_recording.hpp"
+#endif
+#include "drivers/replay/tum_recording.hpp"
 
 namespace plumb {
 
@@ -23,17 +27,22 @@ Config MethodOptions::Read() const {
   return config;
 }
 
-std::unique_ptr<TumRecording> OpenRecording(const std::filesystem::path& path, const MarkerConfig& markers) {
+std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path, const MarkerConfig& markers) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) {
     throw DataError(
-        fmt::format("no recording at '{}': expected a folder in the TUM RGB-D layout (rgb.txt, depth.txt), found nothing", path.string()));
+        fmt::format("no recording at '{}': expected a folder in the TUM RGB-D layout (rgb.txt, depth.txt) or an .oni file, found nothing", path.string()));
   }
   RecordingDefaults defaults;
   if (markers.dictionary) defaults.marker_dictionary = *markers.dictionary;
   if (markers.length_m) defaults.marker_length_m = *markers.length_m;
   defaults.reference_marker = markers.reference;
-  return TumRecording::Open(path, defaults);
+  if (std::filesystem::is_directory(path, error)) return TumRecording::Open(path, defaults);
+#ifdef PLUMB_WITH_OPENNI
+  return OniRecording::Open(path, defaults);
+#else
+  throw DataError(fmt::format("recording {} is no folder; this build has no OpenNI2 and reads no .oni files", path.string()));
+#endif
 }
 
 void EnsureFolder(const std::filesystem::path& folder) {

@@ -28,7 +28,7 @@ struct Options {
 
 Scene Reconstruct(const Suite& suite, const std::string& name, const Config& config, const std::filesystem::path& folder,
                   const CommandContext& context, Progress& progress) {
-  const std::unique_ptr<TumRecording> recording = OpenRecording(suite.recordings.at(name), config.markers);
+  const std::unique_ptr<FrameSource> recording = OpenRecording(suite.recordings.at(name), config.markers);
   Scene scene = RunScan(*recording, {.reconstructor = config.reconstruct}, context.stop,
                         [&](const ScanProgress& scan) { Show(progress, name + ": ", scan); });
   WriteScene(scene, folder);

@@ -12,6 +12,10 @@
 #include "daemon/files/scene_json.hpp"
 #include "drivers/replay/file_io.hpp"
 #include "drivers/replay/tum_index.hpp"
+#include "drivers/replay/tum_recording.hpp"
+#ifdef PLUMB_WITH_OPENNI
+#include "drivers/openni/oni_file.hpp"
+#endif
 
 namespace plumb {
 namespace {
@@ -26,22 +30,45 @@ struct Options {
   bool json = false;
 };
 
-ordered_json RecordingFacts(const fs::path& folder) {
-  const std::unique_ptr<TumRecording> recording = OpenRecording(folder, {});
+/// Stamps of the depth images, seconds; found without decoding any.
+std::vector<double> DepthStamps(const fs::path& recording) {
+  std::vector<double> stamps_s;
+#ifdef PLUMB_WITH_OPENNI
+  if (!fs::is_directory(recording)) {
+    const std::optional<OniFileSummary> summary = SummariseOniFile(recording);
+    if (!summary) throw DataError(fmt::format("recording {} is not whole: it has no END record", recording.string()));
+    for (const std::int64_t stamp_us : summary->depth_us) stamps_s.push_back(1e-6 * static_cast<double>(stamp_us));
+    return stamps_s;
+  }
+#endif
+  const fs::path index = recording / "depth.txt";
+  for (const IndexEntry& entry : ParseIndex(ReadTextFile(index, kMaxJsonBytes), index.string())) stamps_s.push_back(entry.time_s);
+  return stamps_s;
+}
+
+bool IsRecording(const fs::path& path) {
+#ifdef PLUMB_WITH_OPENNI
+  if (IsOniFile(path)) return true;
+#endif
+  return IsTumRecording(path);
+}
+
+ordered_json RecordingFacts(const fs::path& path) {
+  const std::unique_ptr<FrameSource> recording = OpenRecording(path, {});
   const StreamInfo& info = recording->info();
-  const std::vector<IndexEntry> depth = ParseIndex(ReadTextFile(folder / "depth.txt", kMaxJsonBytes), (folder / "depth.txt").string());
-  const double duration_s = depth.size() > 1 ? depth.back().time_s - depth.front().time_s : 0.0;
+  const std::vector<double> depth_s = DepthStamps(path);
+  const double duration_s = depth_s.size() > 1 ? depth_s.back() - depth_s.front() : 0.0;
   const Intrinsics& camera = info.intrinsics;
   ordered_json facts = {{"kind", "recording"},
                         {"frames", info.num_frames.value_or(0)},
                         {"duration_s", duration_s},
-                        {"rate_hz", duration_s > 0 ? static_cast<double>(depth.size() - 1) / duration_s : 0.0},
+                        {"rate_hz", duration_s > 0 ? static_cast<double>(depth_s.size() - 1) / duration_s : 0.0},
                         {"image_width", camera.width},
                         {"image_height", camera.height},
                         {"focal_px", {camera.fx, camera.fy}},
                         {"centre_px", {camera.cx, camera.cy}},
                         {"distortion", camera.distortion},
-                        {"calibration", info.intrinsics_assumed ? "assumed" : "from camera.yaml"},
+                        {"calibration", info.intrinsics_assumed ? "assumed" : fs::is_directory(path) ? "from camera.yaml" : "from the file beside it"},
                         {"marker_dictionary", info.marker_dictionary},
                         {"marker_length_m", info.marker_length_m},
                         {"reference_marker", nullptr},
@@ -76,10 +103,10 @@ int Run(const Options& options) {
   } else if (IsResultFolder(options.path)) {
     facts = {{"kind", "result"}};
     facts.update(ordered_json::parse(ReadResultJson(options.path)));
-  } else if (IsTumRecording(options.path)) {
+  } else if (IsRecording(options.path)) {
     facts = RecordingFacts(options.path);
   } else {
-    throw DataError(fmt::format("'{}' is no recording (rgb.txt, depth.txt), no scene (scene.json) and no result (result.json){}",
+    throw DataError(fmt::format("'{}' is no recording (rgb.txt, depth.txt, or an .oni file), no scene (scene.json) and no result (result.json){}",
                                 options.path.string(), fs::exists(options.path) ? "" : "; it does not exist"));
   }
   PrintOut(options.json ? facts.dump(2) + "\n" : Lines(facts));
@@ -90,7 +117,7 @@ int Run(const Options& options) {
 
 Command AddInfo(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("path", options->path, "Folder of a recording, a scene or a result")->required()->type_name("RECORDING|SCENE|RESULT");
+  app.add_option("path", options->path, "A recording (folder or .oni file), or the folder of a scene or a result")->required()->type_name("RECORDING|SCENE|RESULT");
   app.add_flag("--json", options->json, "Print JSON on the standard output");
   return [options](const CommandContext&) { return Run(*options); };
 }

@@ -73,7 +73,9 @@ int Main(int argc, char** argv) {
   add("mesh", "Export the surface of a scene as PLY, STL or OBJ", AddMesh);
   add("info", "Describe a recording, a scene or a result", AddInfo);
   add("evaluate", "Measure the accuracy on a suite of recordings with truth, beside the paper's table", AddEvaluate);
-
+  add("record", "Record from the attached sensor, or from a virtual one", AddRecord);
+  add("markers", "Draw printable sheets of markers at true size", AddMarkers);
+  add("doctor", "Tell what is attached, permitted and configured, and what to do about what is not", AddDoctor);
   add("status", "What a running plumbd does: state, sensor, scan, last result", AddStatus);
   add("press", "Press the button of a running plumbd", AddPress);
   add("watch", "Print the events of a running plumbd, one JSON object a line", AddWatch);

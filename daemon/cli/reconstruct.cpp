@@ -46,7 +46,7 @@ std::string Summary(const Scene& scene, const std::filesystem::path& out) {
 int Run(const Options& options, const CommandContext& context) {
   const Config config = options.method.Read();
   { const AtomicFolder check(options.out, SceneOutput()); }  // refuses a bad place before the long work
-  const std::unique_ptr<TumRecording> recording = OpenRecording(options.recording, config.markers);
+  const std::unique_ptr<FrameSource> recording = OpenRecording(options.recording, config.markers);
   Progress progress;
   const Scene scene = RunScan(*recording, {.reconstructor = config.reconstruct, .realtime = options.realtime}, context.stop,
                               [&](const ScanProgress& scan) { Show(progress, "", scan); });
@@ -61,7 +61,7 @@ int Run(const Options& options, const CommandContext& context) {
 
 Command AddReconstruct(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("recording", options->recording, "Recording: a folder in the TUM RGB-D layout")->required()->type_name("RECORDING");
+  app.add_option("recording", options->recording, "Recording: a folder in the TUM RGB-D layout, or an .oni file")->required()->type_name("RECORDING");
   app.add_option("--out", options->out, "Scene folder to write")->required()->type_name("SCENE");
   options->method.AddTo(app);
   app.add_flag("--realtime", options->realtime, "Play the recording at its own pace, dropping frames as a live sensor would");

@@ -18,6 +18,7 @@ struct Options {
 int Run(const Options& options, const CommandContext& context) {
   SimulateOptions simulate = options.simulate;
   simulate.noise = ParseNoiseLevel(options.noise).value_or(simulate.noise);
+  simulate.format = options.format == "oni" ? RecordingFormat::kOni : RecordingFormat::kTum;
   if (options.size == "320x240") simulate.width = 320, simulate.height = 240;
   Progress progress;
   SimulateSuite(simulate, context.stop, [&](double fraction, std::string_view what) { progress.Update("simulating", fraction, what); });
@@ -38,10 +39,10 @@ Command AddSimulate(CLI::App& app) {
       ->type_name("demo|nine|patient");
   app.add_option("--out", simulate.out, "Suite folder to write: recordings/, truth/, suite.json")->required()->type_name("DIR");
   app.add_option("--seed", simulate.seed, "Of everything random")->capture_default_str()->type_name("N");
-  app.add_option("--format", options->format, "Of the recordings: the TUM RGB-D layout")
-      ->check(CLI::IsMember({"tum"}))
+  app.add_option("--format", options->format, "Of the recordings: folders in the TUM RGB-D layout, or lossless .oni files of OpenNI2")
+      ->check(CLI::IsMember({"tum", "oni"}))
       ->capture_default_str()
-      ->type_name("tum");
+      ->type_name("tum|oni");
   app.add_option("--noise", options->noise, "Of sensor, calibration and hand")
       ->check(CLI::IsMember({"ideal", "nominal", "hard"}))
       ->capture_default_str()

@@ -177,10 +177,11 @@ Suite OpenSuite(const fs::path& folder) {
   }
   for (const std::string& name : suite.scenes) {
     const fs::path nested = folder / "recordings" / name;
-    suite.recordings[name] = fs::is_directory(nested) ? nested : folder / name;
+    const fs::path file = folder / "recordings" / (name + ".oni");
+    suite.recordings[name] = fs::is_directory(nested) ? nested : fs::is_regular_file(file) ? file : folder / name;
     suite.truths[name] = folder / "truth" / name;
     for (const fs::path& path : {suite.recordings[name], suite.truths[name]}) {
-      if (!fs::is_directory(path))
+      if (!fs::is_directory(path) && path != file)
         throw DataError(fmt::format("suite '{}': scene '{}' has no folder '{}'", folder.string(), name, path.string()));
     }
   }

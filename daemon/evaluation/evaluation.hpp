@@ -26,7 +26,7 @@ struct Suite {
 };
 
 /// Reads `suite.json`; where it is missing, every folder of `truth/` is a scene ("reference" first) and all ordered pairs count.
-/// Recordings lie in `recordings/NAME` or `NAME`.
+/// Recordings lie in `recordings/NAME`, `recordings/NAME.oni` or `NAME`.
 /// @throws DataError if the folder is no suite or a recording or truth is missing.
 [[nodiscard]] Suite OpenSuite(const std::filesystem::path& folder);
 

@@ -23,6 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr std::chrono::milliseconds kRecorderStart{100};  // it begins on a thread of its own and misses what comes before
 constexpr std::chrono::milliseconds kPoll{10};
+constexpr std::uint32_t kPeriod_us = 33333;  // of the unit that plays; the stamps are those of the frames
 constexpr std::chrono::seconds kNoProgress{20};
 
 /// Removes a file at the end.
@@ -41,12 +42,12 @@ struct Spooled {
 };
 
 /// Writes the source's frames as a frame cache.
-Spooled Spool(const fs::path& file, FrameSource& source, double period_s, const std::stop_token& stop, const std::function<void()>& each) {
+Spooled Spool(const fs::path& file, FrameSource& source, const std::stop_token& stop, const std::function<void()>& each) {
   const Intrinsics& camera = source.info().intrinsics;
   simulated::FrameCacheShape shape;
   shape.width = static_cast<std::uint32_t>(camera.width);
   shape.height = static_cast<std::uint32_t>(camera.height);
-  shape.period_us = static_cast<std::uint32_t>(std::lround(period_s * 1e6));
+  shape.period_us = kPeriod_us;
   FileWriter writer(file);
   writer.Write(simulated::FrameCacheHeader(shape));  // again below, with the number of frames
   double begin_s = 0;
@@ -85,9 +86,9 @@ void WaitForLast(const VirtualSession& session, std::uint32_t num_frames, const 
 
 }  // namespace
 
-void WriteOni(const fs::path& file, FrameSource& source, double period_s, const std::stop_token& stop, const std::function<void()>& each) {
+void WriteOni(const fs::path& file, FrameSource& source, const std::stop_token& stop, const std::function<void()>& each) {
   const Remover spool{fs::path(file.string() + ".frames")};
-  const Spooled spooled = Spool(spool.path, source, period_s, stop, each);
+  const Spooled spooled = Spool(spool.path, source, stop, each);
   VirtualSession::Contents contents;
   contents.serial = "SIMULATED";
   contents.scenes = {spool.path};

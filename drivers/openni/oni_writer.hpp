@@ -13,10 +13,9 @@ namespace plumb {
 /// microseconds. Needs room for the raw frames beside the file while it works. Nothing else may use the virtual sensor in this process
 /// meanwhile, and the process should have no other threads that read the environment.
 /// @param file      A new file, in a folder that exists; half-written ones are removed.
-/// @param period_s  Between frames; 1/30 for sensors of this class.
 /// @param each      If set, called after each frame taken from the source.
 /// @throws IoError, DeviceError, Interrupted; what the source throws.
-void WriteOni(const std::filesystem::path& file, FrameSource& source, double period_s, const std::stop_token& stop = {},
+void WriteOni(const std::filesystem::path& file, FrameSource& source, const std::stop_token& stop = {},
               const std::function<void()>& each = {});
 
 }  // namespace plumb

@@ -6,6 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/types/errors.hpp"
+#ifdef PLUMB_WITH_OPENNI
+#include "drivers/openni/oni_writer.hpp"
+#endif
 #include "drivers/replay/file_io.hpp"
 #include "drivers/replay/tum_writer.hpp"
 #include "drivers/simulated/suite_plan.hpp"
@@ -66,6 +69,25 @@ void WriteSuiteFile(const fs::path& folder, const simulated::SuitePlan& plan) {
   WriteWholeFile(folder / "suite.json", nlohmann::json{{"name", plan.name}, {"scenes", scenes}, {"pairs", pairs}}.dump(1));
 }
 
+void WriteTumRecording(const fs::path& folder, const simulated::SensorUnit& unit, SimulatedSource& source,
+                       const std::function<void()>& each) {
+  TumWriter writer(folder, source.info(), {.depth_scale = unit.depth_units_per_metre, .jpeg_quality = unit.jpeg_quality});
+  while (const std::optional<Frame> frame = source.Next()) {
+    writer.Add(*frame);
+    each();
+  }
+  writer.Finish();
+}
+
+void WriteOniRecording(const fs::path& file, SimulatedSource& source, const std::stop_token& stop, const std::function<void()>& each) {
+#ifdef PLUMB_WITH_OPENNI
+  WriteOni(file, source, stop, each);
+#else
+  (void)source, (void)stop, (void)each;
+  throw std::invalid_argument(fmt::format("cannot write {}: this build has no OpenNI2; use the format tum", file.string()));
+#endif
+}
+
 }  // namespace
 
 std::optional<simulated::NoiseLevel> ParseNoiseLevel(std::string_view name) {
@@ -86,19 +108,19 @@ void SimulateSuite(const SimulateOptions& options, const std::stop_token& stop,
     FolderBeside::Make(folder.path() / "recordings");
     FolderBeside::Make(folder.path() / "truth" / name);
     const auto source = simulated::MakeSource(plan, i);
-    TumWriter writer(folder.path() / "recordings" / name, source->info(),
-                     {.depth_scale = plan.unit.depth_units_per_metre, .jpeg_quality = plan.unit.jpeg_quality});
     simulated::VertexSightings sightings(plan, i);
-    while (const std::optional<Frame> frame = source->Next()) {
-      writer.Add(*frame);
+    const auto each = [&] {
       sightings.Add(source->truth());
       done += 1;
       if (progress) progress(done / total, name);
       if (stop.stop_requested())
         throw Interrupted(
             fmt::format("simulation stopped after {} of {} frames; nothing is left in {}", done, total, options.out.string()));
-    }
-    writer.Finish();
+    };
+    if (options.format == RecordingFormat::kOni)
+      WriteOniRecording(folder.path() / "recordings" / (name + ".oni"), *source, stop, each);
+    else
+      WriteTumRecording(folder.path() / "recordings" / name, plan.unit, *source, each);
     simulated::WriteTruth(folder.path() / "truth" / name, plan, i, *source, sightings.counts());
   }
   WriteSuiteFile(folder.path(), plan);

@@ -43,7 +43,7 @@ std::unique_ptr<SimulatedSource> Source() {
 const fs::path& Recording() {
   static const TempFolder folder;
   static const fs::path file = [] {
-    WriteOni(folder / "sweep.oni", *Source(), 1 / 30.0);
+    WriteOni(folder / "sweep.oni", *Source());
     return folder / "sweep.oni";
   }();
   return file;

@@ -1,0 +1,242 @@
+// `plumb doctor`: what is attached, permitted and configured, and what to do about what is not. It changes nothing.
+#include <unistd.h>
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "algo/types/errors.hpp"
+#include "daemon/cli/commands.hpp"
+#include "daemon/config.hpp"
+#include "daemon/control/unix_socket.hpp"
+#include "drivers/program_folders.hpp"
+#ifdef PLUMB_WITH_OPENNI
+#include "drivers/openni/openni_provider.hpp"
+#include "drivers/openni/sensor_calibration.hpp"
+#endif
+#ifdef PLUMB_WITH_USB
+#include "drivers/usb/usb_watcher.hpp"
+#endif
+#ifdef PLUMB_WITH_GPIO
+#include "drivers/gpio/gpio.hpp"
+#endif
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr char kDefaultConfig[] = "/etc/plumb/plumb.toml";
+
+enum class State { kGood, kNote, kBad };
+
+/// One finding. A note keeps nothing from working.
+struct Finding {
+  State state = State::kGood;
+  std::string what;
+  std::string found;
+  std::string remedy;
+};
+
+class Report {
+ public:
+  void Good(std::string what, std::string found) { findings_.push_back({State::kGood, std::move(what), std::move(found), {}}); }
+  void Note(std::string what, std::string found, std::string remedy) {
+    findings_.push_back({State::kNote, std::move(what), std::move(found), std::move(remedy)});
+  }
+  void Bad(std::string what, std::string found, std::string remedy) {
+    findings_.push_back({State::kBad, std::move(what), std::move(found), std::move(remedy)});
+  }
+
+  [[nodiscard]] bool ready() const {
+    for (const Finding& finding : findings_) {
+      if (finding.state == State::kBad) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] std::string Text() const {
+    std::string text;
+    for (const Finding& finding : findings_) {
+      const char* mark = finding.state == State::kGood ? "ok  " : finding.state == State::kNote ? "note" : "BAD ";
+      text += fmt::format("{}  {:<14} {}\n", mark, finding.what, finding.found);
+      if (!finding.remedy.empty()) text += fmt::format("{:21}-> {}\n", "", finding.remedy);
+    }
+    return text + (ready() ? "Ready to scan.\n" : "Not ready to scan: see BAD above.\n");
+  }
+
+  [[nodiscard]] ordered_json Json() const {
+    ordered_json list = ordered_json::array();
+    for (const Finding& finding : findings_) {
+      const char* state = finding.state == State::kGood ? "ok" : finding.state == State::kNote ? "note" : "bad";
+      list.push_back({{"state", state}, {"what", finding.what}, {"found", finding.found}, {"remedy", finding.remedy}});
+    }
+    return {{"ready", ready()}, {"findings", list}};
+  }
+
+ private:
+  std::vector<Finding> findings_;
+};
+
+Config CheckConfig(Report& report, const std::optional<fs::path>& wanted) {
+  const fs::path file = wanted.value_or(kDefaultConfig);
+  std::error_code error;
+  if (!wanted && !fs::exists(file, error)) {
+    report.Note("configuration", fmt::format("no {}: defaults hold", file.string()), "write one where the defaults do not fit");
+    return {};
+  }
+  try {
+    Config config = ReadConfig(file);
+    report.Good("configuration", file.string());
+    return config;
+  } catch (const DataError& problem) {
+    report.Bad("configuration", problem.what(), "correct it; `plumbd --check-config` tells when it is right");
+    return {};
+  }
+}
+
+void CheckUsb(Report& report) {
+#ifdef PLUMB_WITH_USB
+  try {
+    const UsbWatcher watcher;
+    if (watcher.sensors().empty()) {
+      report.Note("USB", "no sensor of the Xtion or Carmine kind (1d27:*)", "plug one in; its own lamp must light up");
+    }
+    for (const UsbSensor& sensor : watcher.sensors()) {
+      const std::string found = fmt::format("{} {:04x}:{:04x} at bus {} address {}{}{}", sensor.model, sensor.vendor, sensor.product,
+                                            sensor.bus, sensor.address, sensor.speed.empty() ? "" : ", ", sensor.speed);
+      if (sensor.problems.empty()) report.Good("USB", found);
+      for (const std::string& problem : sensor.problems) {
+        if (sensor.permitted)
+          report.Note("USB", found, problem);
+        else
+          report.Bad("USB", found, problem);
+      }
+    }
+  } catch (const DeviceError& error) {
+    report.Note("USB", error.what(), "sensors are found through OpenNI2 all the same");
+  }
+#else
+  report.Note("USB", "this build does not watch the bus", "build with PLUMB_WITH_USB for permissions and speeds");
+#endif
+}
+
+void CheckSensor(Report& report, const Config& config) {
+#ifdef PLUMB_WITH_OPENNI
+  try {
+    OpenNiOptions options;
+    options.calibration_folder = config.appliance.calibration;
+    OpenNiProvider provider(options);
+    const std::vector<SensorDescription> sensors = provider.List();
+    report.Good("OpenNI2", fmt::format("loaded, {} sensor{}", sensors.size(), sensors.size() == 1 ? "" : "s"));
+    if (sensors.empty()) report.Bad("sensor", "none is attached", "plug one in; look at USB above if it is");
+    const std::string& wanted = config.appliance.sensor_serial;
+    bool found_wanted = wanted.empty();
+    for (const SensorDescription& sensor : sensors) {
+      found_wanted = found_wanted || sensor.serial == wanted;
+      report.Good("sensor", fmt::format("{}, serial {}", sensor.name, sensor.serial));
+      const fs::path file = CalibrationFile(options.calibration_folder, sensor.serial);
+      std::error_code error;
+      if (!fs::exists(file, error)) {
+        report.Note("calibration", fmt::format("none for {}: nominal intrinsics are used", sensor.serial),
+                    fmt::format("calibrate the unit and put its camera.yaml at {}", file.string()));
+        continue;
+      }
+      try {
+        const StreamInfo info = LiveStreamInfo(options, sensor.serial, 640, 480, 0.0);
+        report.Good("calibration", fmt::format("{}, focal length {:.1f} pixels", file.string(), info.intrinsics.fx));
+      } catch (const DeviceError& problem) {
+        report.Bad("calibration", problem.what(), "");
+      }
+    }
+    if (!found_wanted && !sensors.empty())
+      report.Bad("sensor", fmt::format("the configuration wants serial {}", wanted), "plug that one in, or change sensor_serial");
+  } catch (const DeviceError& error) {
+    report.Bad("OpenNI2", error.what(), "");
+  }
+  if (const auto reader = FindBesideProgram("lib/plumb/plumb-oni-reader"))
+    report.Good(".oni files", reader->string());
+  else
+    report.Note(".oni files", "plumb-oni-reader is missing: recordings of OpenNI2 cannot be read", "install Plumb again");
+#else
+  (void)config;
+  report.Bad("OpenNI2", "this build has none: no sensor can be used", "build with PLUMB_WITH_OPENNI");
+#endif
+}
+
+void CheckGpio(Report& report) {
+#ifdef PLUMB_WITH_GPIO
+  const std::vector<GpioChipDescription> chips = ListGpioChips();
+  if (chips.empty())
+    report.Note("GPIO", "no chip: no hardware button and light", "use the page's button, `plumb press` or a board with GPIO");
+  for (const GpioChipDescription& chip : chips) {
+    if (chip.problem.empty())
+      report.Good("GPIO", fmt::format("{} \"{}\", named lines: {}", chip.name, chip.label, fmt::join(chip.lines, " ")));
+    else
+      report.Note("GPIO", fmt::format("{} cannot be opened", chip.name), chip.problem);
+  }
+#else
+  report.Note("GPIO", "this build has no hardware button and light", "build with PLUMB_WITH_GPIO");
+#endif
+}
+
+void CheckFolder(Report& report, const char* what, const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
+    report.Note(what, fmt::format("{} does not exist", folder.string()), "the installation makes it (systemd-tmpfiles --create)");
+    return;
+  }
+  const bool writable = ::access(folder.c_str(), W_OK) == 0;
+  const auto free_gb = static_cast<double>(fs::space(folder, error).available) / 1e9;
+  if (!writable) {
+    report.Note(what, fmt::format("{} is not writable for this user", folder.string()),
+                "the service's own user writes there; for tests give another");
+  } else if (free_gb < 2.0) {
+    report.Bad(what, fmt::format("{}: {:.1f} GB free", folder.string(), free_gb), "free space: a scan needs up to 1 GB while it runs");
+  } else {
+    report.Good(what, fmt::format("{}: {:.0f} GB free", folder.string(), free_gb));
+  }
+}
+
+void CheckDaemon(Report& report, const fs::path& control) {
+  try {
+    ::close(ConnectUnix(control));
+    report.Good("plumbd", fmt::format("answers at {}; while it runs it alone has the sensor", control.string()));
+  } catch (const std::exception& error) {
+    report.Note("plumbd", error.what(), "start it with systemctl start plumbd, or name its socket with --control");
+  }
+}
+
+}  // namespace
+
+Command AddDoctor(CLI::App& app) {
+  struct Options {
+    std::optional<fs::path> config;
+    bool json = false;
+  };
+  auto options = std::make_shared<Options>();
+  app.add_option("--config", options->config, fmt::format("Of the appliance; default {}", kDefaultConfig))->type_name("FILE");
+  app.add_flag("--json", options->json, "Print JSON on the standard output");
+  return [options](const CommandContext& context) {
+    Report report;
+    const Config config = CheckConfig(report, options->config);
+    CheckUsb(report);
+    CheckSensor(report, config);
+    CheckGpio(report);
+    CheckFolder(report, "state", config.appliance.state);
+    CheckDaemon(report, context.control);
+    PrintOut(options->json ? report.Json().dump(2) + "\n" : report.Text());
+    return kDone;
+  };
+}
+
+}  // namespace plumb

@@ -1,0 +1,116 @@
+// The commands around sensors and prints, through the real binary: record, .oni files, markers, doctor.
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/integration/command_line.hpp"
+
+namespace plumb {
+namespace {
+
+using nlohmann::json;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class DevicesTest : public CommandLineTest {
+ protected:
+  void SetUp() override {
+    CommandLineTest::SetUp();
+    ::setenv("XDG_CACHE_HOME", PLUMB_INTEGRATION_DATA "/cache", 1);  // of what the virtual sensor shows
+  }
+};
+
+TEST_F(DevicesTest, MarkersAreDrawnAsPdfAndSvg) {
+  const RunResult pdf = Plumb({"markers", "--ids", "0-3", "--out", (folder_ / "m.pdf").string()});
+  EXPECT_EQ(pdf.exit_code, 0) << pdf.err;
+  EXPECT_THAT(pdf.out, HasSubstr("2 pages"));
+  const RunResult svg = Plumb({"markers", "--ids", "0-3", "--paper", "A3", "--out", (folder_ / "m.svg").string()});
+  EXPECT_EQ(svg.exit_code, 0) << svg.err;
+  EXPECT_THAT(ReadText(folder_ / "m.svg"), HasSubstr("width=\"297mm\""));
+  EXPECT_THAT(LeftBehind({"m.pdf", "m.svg"}), IsEmpty());
+}
+
+TEST_F(DevicesTest, MarkersThatDoNotFitAreUsageErrors) {
+  EXPECT_EQ(Plumb({"markers", "--length", "1", "--out", (folder_ / "m.pdf").string()}).exit_code, 2);
+  EXPECT_EQ(Plumb({"markers", "--ids", "900", "--out", (folder_ / "m.pdf").string()}).exit_code, 2);
+  EXPECT_EQ(Plumb({"markers", "--out", (folder_ / "m.docx").string()}).exit_code, 2);
+  EXPECT_EQ(Plumb({"markers", "--out", (folder_ / "missing" / "m.pdf").string()}).exit_code, 1);
+  EXPECT_THAT(LeftBehind({}), IsEmpty());
+}
+
+TEST_F(DevicesTest, DoctorSaysWhatIsMissingAndWhatToDo) {
+  const RunResult doctor = Plumb({"doctor", "--json"});
+  EXPECT_EQ(doctor.exit_code, 0) << doctor.err;
+  const json report = json::parse(doctor.out);
+  EXPECT_TRUE(report.at("ready").is_boolean());
+  bool sensor_told = false;
+  for (const json& finding : report.at("findings")) {
+    if (finding.at("state") == "bad" || finding.at("state") == "note") {
+      EXPECT_FALSE(finding.at("found").get<std::string>().empty());
+    }
+    sensor_told = sensor_told || finding.at("what") == "sensor" || finding.at("what") == "OpenNI2";
+  }
+  EXPECT_TRUE(sensor_told);
+}
+
+TEST_F(DevicesTest, DoctorNamesADamagedConfiguration) {
+  WriteText(folder_ / "plumb.toml", "[compare]\nposture = 7\n");
+  const RunResult doctor = Plumb({"doctor", "--config", (folder_ / "plumb.toml").string()});
+  EXPECT_THAT(doctor.out, HasSubstr("plumb.toml"));
+  EXPECT_THAT(doctor.out, HasSubstr("BAD"));
+}
+
+#ifdef PLUMB_WITH_OPENNI
+
+TEST_F(DevicesTest, WithoutASensorRecordIsADeviceError) {
+  const RunResult record = Plumb({"record", "--serial", "NOBODY", "--out", (folder_ / "r").string()});
+  EXPECT_EQ(record.exit_code, 5);
+  EXPECT_THAT(record.err, HasSubstr("attached"));
+  EXPECT_THAT(LeftBehind({}), IsEmpty());
+}
+
+TEST_F(DevicesTest, ASimulatedSuiteOfOniFilesIsReconstructedAndDescribed) {
+  const fs::path suite = folder_ / "suite";
+  const RunResult simulate = Plumb({"simulate", "--suite", "demo", "--out", suite.string(), "--frames", "12", "--rate", "10", "--size",
+                                    "320x240", "--noise", "ideal", "--format", "oni"});
+  ASSERT_EQ(simulate.exit_code, 0) << simulate.err;
+  const std::string file = (suite / "recordings" / "reference.oni").string();
+  const json facts = json::parse(Plumb({"info", file, "--json"}).out);
+  EXPECT_EQ(facts.at("frames"), 12);
+  EXPECT_NEAR(facts.at("rate_hz").get<double>(), 10.0, 0.1);
+  EXPECT_EQ(facts.at("warnings"), json::array());
+  const RunResult reconstruct = Plumb({"reconstruct", file, "--out", (folder_ / "scene").string(), "--json"});
+  ASSERT_EQ(reconstruct.exit_code, 0) << reconstruct.err;
+  const json frames = json::parse(reconstruct.out).at("frames");
+  EXPECT_EQ(frames.at("total"), 12);
+  EXPECT_GE(frames.at("tracked"), 8);
+  // Stamps are those of the simulator, so that truth and trajectory meet.
+  EXPECT_THAT(ReadText(folder_ / "scene" / "trajectory_all.txt"), HasSubstr("\n17000000"));
+}
+
+TEST_F(DevicesTest, ADamagedOniFileIsBadInput) {
+  WriteText(folder_ / "bad.oni", "NI10 and nothing that follows makes sense, for a good number of bytes at least");
+  const RunResult reconstruct = Plumb({"reconstruct", (folder_ / "bad.oni").string(), "--out", (folder_ / "scene").string()});
+  EXPECT_EQ(reconstruct.exit_code, 3);
+  EXPECT_THAT(reconstruct.err, HasSubstr("bad.oni"));
+  EXPECT_THAT(LeftBehind({"bad.oni"}), IsEmpty());
+}
+
+TEST_F(DevicesTest, RecordsAVirtualSensorToAFolderAndToAnOniFile) {
+  for (const char* name : {"r", "r.oni"}) {
+    const RunResult record = Plumb({"record", "--simulated", "demo", "--seconds", "0.5", "--out", (folder_ / name).string()});
+    ASSERT_EQ(record.exit_code, 0) << record.err;
+    EXPECT_THAT(record.out, HasSubstr("VIRTUAL-0001"));
+    const json facts = json::parse(Plumb({"info", (folder_ / name).string(), "--json"}).out);
+    EXPECT_GE(facts.at("frames"), 8);  // 15 on a machine that keeps up
+    EXPECT_LE(facts.at("frames"), 25);
+    EXPECT_NE(facts.at("calibration"), "assumed");
+  }
+  EXPECT_THAT(LeftBehind({"r", "r.oni", "r.oni.yaml"}), IsEmpty());
+}
+
+#endif
+
+}  // namespace
+}  // namespace plumb
