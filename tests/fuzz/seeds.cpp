@@ -34,6 +34,21 @@ void WriteImages(const fs::path& root) {
   WriteFloatTiff(Folder(root / "tiff") / "map", cv::Mat(5, 4, CV_32FC1, cv::Scalar(0.5)));
 }
 
+void WriteOni(const fs::path& root) {
+  std::string file = "NI10" + std::string(20, '\0');
+  const auto add = [&](std::uint32_t kind, std::uint32_t node, const std::vector<std::uint32_t>& fields) {
+    const auto size = static_cast<std::uint32_t>(28 + 4 * fields.size());
+    for (const std::uint32_t number : {0x0052494eU, kind, node, size, 0U, 0U, 0U}) file.append(reinterpret_cast<const char*>(&number), 4);
+    for (const std::uint32_t number : fields) file.append(reinterpret_cast<const char*>(&number), 4);
+  };
+  add(13, 1, {4, 0x67616d49, 3});
+  add(13, 2, {4, 0x74706544, 2});
+  for (const std::uint32_t node : {1U, 2U}) add(10, node, {33333, 0, 1});
+  add(11, 0, {});
+  WriteWholeFile(Folder(root / "oni") / "small", file);
+  WriteWholeFile(root / "oni/beside", std::string_view("a: 1\ncolor_begin_us: 17\ndepth_begin_us: 18\n"));
+}
+
 void WriteTexts(const fs::path& root) {
   StreamInfo info;
   info.reference_marker = 3;
@@ -83,6 +98,7 @@ int main(int argc, char** argv) {
   if (argc != 2) return 2;
   const std::filesystem::path root = argv[1];
   plumb::WriteImages(root);
+  plumb::WriteOni(root);
   plumb::WriteTexts(root);
   plumb::WriteSurfaces(root);
   return 0;
