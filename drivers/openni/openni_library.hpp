@@ -29,18 +29,14 @@ class OpenNiLibrary {
   /// @throws DeviceError with Describe() unless the status is ok.
   void Check(const std::string& what, OniStatus status) const;
 
-#define PLUMB_ONI_FUNCTIONS(X)                                                                                                        \
-  X(Initialize)                                                                                                                       \
-  X(Shutdown)                                                                                                                         \
-  X(GetExtendedError)                                                                                                                 \
-  X(GetDeviceList)                                                                                                                    \
-  X(ReleaseDeviceList)                                                                                                                \
-  X(RegisterDeviceCallbacks)                                                                                                          \
-  X(UnregisterDeviceCallbacks)                                                                                                        \
-  X(WaitForAnyStream) X(DeviceOpen) X(DeviceClose) X(DeviceGetInfo) X(DeviceGetSensorInfo) X(DeviceCreateStream)                      \
-      X(DeviceEnableDepthColorSync) X(DeviceSetProperty) X(DeviceGetProperty) X(StreamDestroy) X(StreamStart) X(StreamStop)           \
-          X(StreamReadFrame) X(StreamSetProperty) X(StreamGetProperty) X(StreamIsPropertySupported) X(FrameRelease) X(CreateRecorder) \
-              X(RecorderAttachStream) X(RecorderStart) X(RecorderStop) X(RecorderDestroy) X(SetLogConsoleOutput)
+// clang-format off
+#define PLUMB_ONI_FUNCTIONS(X)                                                                                          \
+  X(Initialize) X(Shutdown) X(GetExtendedError) X(GetDeviceList) X(ReleaseDeviceList) X(RegisterDeviceCallbacks)        \
+  X(UnregisterDeviceCallbacks) X(WaitForAnyStream) X(DeviceOpen) X(DeviceClose) X(DeviceCreateStream)                   \
+  X(DeviceEnableDepthColorSync) X(DeviceSetProperty) X(DeviceGetProperty) X(StreamDestroy) X(StreamStart) X(StreamStop) \
+  X(StreamReadFrame) X(StreamSetProperty) X(StreamGetProperty) X(StreamIsPropertySupported) X(FrameRelease)             \
+  X(CreateRecorder) X(RecorderAttachStream) X(RecorderStart) X(RecorderStop) X(RecorderDestroy)
+// clang-format on
 #define PLUMB_ONI_DECLARE(name) decltype(&::oni##name) name = nullptr;
   PLUMB_ONI_FUNCTIONS(PLUMB_ONI_DECLARE)
 #undef PLUMB_ONI_DECLARE
