@@ -1,0 +1,186 @@
+// Scans of a still wall: how they end, and what they tell on the way.
+#include "daemon/scan_session.hpp"
+
+#include <condition_variable>
+#include <filesystem>
+#include <mutex>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "algo/types/errors.hpp"
+#include "tests/support/fake_sensor.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+using ::testing::ElementsAre;
+using testing::FakeBus;
+using ::testing::HasSubstr;
+using Kind = ScanOutcome::Kind;
+
+class ScanSessionTest : public ::testing::Test {
+ protected:
+  ScanSessionTest() {
+    job_.info = FakeBus::Info();
+    job_.stop_after_s = 1000;
+    callbacks_.begin = [this] { return folder_.path(); };
+    callbacks_.save = [this](const ScanOutcome& outcome) { saved_.push_back(outcome.kind); };
+    callbacks_.update = [](const ScanUpdate&) {};
+    callbacks_.sweep_complete = [this] { ++num_complete_; };
+    callbacks_.ended = [this](const ScanOutcome& outcome) {
+      const std::lock_guard lock(mutex_);
+      outcome_ = outcome;
+      changed_.notify_all();
+    };
+  }
+
+  void Start() { session_ = std::make_unique<ScanSession>(job_, callbacks_); }
+  void Push(int num_frames) {
+    for (int i = 0; i < num_frames; ++i) session_->feed()->Push(FakeBus::Wall(next_++));
+  }
+  ScanOutcome WaitForEnd() {
+    std::unique_lock lock(mutex_);
+    EXPECT_TRUE(changed_.wait_for(lock, std::chrono::seconds(60), [&] { return outcome_.has_value(); })) << "the scan did not end";
+    return outcome_.value_or(ScanOutcome{});
+  }
+
+  testing::TempFolder folder_;
+  ScanJob job_;
+  ScanCallbacks callbacks_;
+  std::vector<Kind> saved_;
+  int num_complete_ = 0;
+  int next_ = 0;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::optional<ScanOutcome> outcome_;
+  std::unique_ptr<ScanSession> session_;
+};
+
+TEST_F(ScanSessionTest, ClosingTheFeedEndsTheSweepWithEveryFrameThatWaited) {
+  Start();
+  Push(12);
+  session_->feed()->Close();
+  const ScanOutcome outcome = WaitForEnd();
+  EXPECT_EQ(outcome.kind, Kind::kDone) << outcome.reason;
+  EXPECT_EQ(outcome.frames, 12);
+  EXPECT_EQ(outcome.frames_dropped, 0);
+  EXPECT_THAT(saved_, ElementsAre(Kind::kDone));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "scene" / "scene.json"));
+}
+
+TEST_F(ScanSessionTest, FramesThatTrackingIsTooLateForAreDroppedAndCounted) {
+  job_.queue_capacity = 2;
+  std::mutex gate;
+  gate.lock();
+  callbacks_.begin = [&] {
+    const std::lock_guard wait(gate);  // tracking does not begin before all frames are there
+    return folder_.path();
+  };
+  Start();
+  Push(10);
+  gate.unlock();
+  session_->feed()->Close();
+  const ScanOutcome outcome = WaitForEnd();
+  EXPECT_EQ(outcome.frames, 2);
+  EXPECT_EQ(outcome.frames_dropped, 8);
+}
+
+TEST_F(ScanSessionTest, CancelledItLeavesNothingButItsEnd) {
+  Start();
+  Push(3);
+  session_->Cancel();
+  EXPECT_EQ(WaitForEnd().kind, Kind::kCancelled);
+  EXPECT_THAT(saved_, ElementsAre(Kind::kCancelled));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "scene"));
+}
+
+TEST_F(ScanSessionTest, DestroyedItCancelsAndWaits) {
+  Start();
+  Push(3);
+  session_.reset();
+  EXPECT_EQ(outcome_->kind, Kind::kCancelled);
+}
+
+TEST_F(ScanSessionTest, NoFramesAreNoSceneWithAReason) {
+  Start();
+  session_->feed()->Close();
+  const ScanOutcome outcome = WaitForEnd();
+  EXPECT_EQ(outcome.kind, Kind::kNoScene);
+  EXPECT_NE(outcome.reason, "");
+}
+
+TEST_F(ScanSessionTest, AReferenceWithoutItsMarkerIsNoneAndSaysWhatToDo) {
+  job_.is_reference = true;
+  Start();
+  Push(12);
+  session_->feed()->Close();
+  const ScanOutcome outcome = WaitForEnd();
+  EXPECT_EQ(outcome.kind, Kind::kNoScene);
+  EXPECT_THAT(outcome.reason, HasSubstr("reference marker"));
+}
+
+TEST_F(ScanSessionTest, AFrameOfTheWrongSizeEndsTheScanAndNotTheProcess) {
+  Start();
+  Frame wrong = FakeBus::Wall(0);
+  wrong.depth_m = cv::Mat(60, 80, CV_32FC1, cv::Scalar(1.0));
+  session_->feed()->Push(wrong);
+  EXPECT_EQ(WaitForEnd().kind, Kind::kNoScene);
+}
+
+TEST_F(ScanSessionTest, AStoreThatRefusesFailsTheScanAndIsToldOfTheFailure) {
+  callbacks_.save = [this](const ScanOutcome& outcome) {
+    saved_.push_back(outcome.kind);
+    if (outcome.kind == Kind::kDone) throw IoError("the disk is full");
+  };
+  Start();
+  Push(12);
+  session_->feed()->Close();
+  const ScanOutcome outcome = WaitForEnd();
+  EXPECT_EQ(outcome.kind, Kind::kFailed);
+  EXPECT_EQ(outcome.reason, "the disk is full");
+  EXPECT_THAT(saved_, ElementsAre(Kind::kDone, Kind::kFailed));
+}
+
+TEST_F(ScanSessionTest, AStoreThatDoesNotEvenBeginFailsTheScan) {
+  callbacks_.begin = []() -> std::filesystem::path { throw IoError("read-only disk"); };
+  Start();
+  EXPECT_EQ(WaitForEnd().kind, Kind::kFailed);
+  EXPECT_EQ(outcome_->reason, "read-only disk");
+}
+
+TEST_F(ScanSessionTest, AReferenceThatCannotBeReadIsSaid) {
+  job_.reference_scene = folder_ / "nowhere";
+  Start();
+  Push(12);
+  session_->feed()->Close();
+  const ScanOutcome outcome = WaitForEnd();
+  EXPECT_NE(outcome.kind, Kind::kDone);
+  EXPECT_THAT(outcome.reason, HasSubstr("nowhere"));
+}
+
+TEST_F(ScanSessionTest, TheSweepIsCompleteOnceWhenNothingNewIsSeenForLongEnough) {
+  job_.stop_after_s = 1.0;
+  job_.queue_capacity = 100;
+  Start();
+  Push(75);  // two and a half seconds of the same wall
+  session_->feed()->Close();
+  (void)WaitForEnd();
+  EXPECT_EQ(num_complete_, 1);
+}
+
+TEST_F(ScanSessionTest, ARecordingHoldsWhatTrackingTook) {
+  job_.keep_recording = true;
+  Start();
+  Push(9);
+  session_->feed()->Close();
+  EXPECT_EQ(WaitForEnd().kind, Kind::kDone) << outcome_->reason;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "recording" / "camera.yaml"));
+  int num_images = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder_ / "recording" / "depth")) ++num_images;
+  EXPECT_EQ(num_images, 9);
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,157 @@
+#include "daemon/sensor_thread.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/fake_sensor.hpp"
+
+namespace plumb {
+namespace {
+
+using testing::FakeBus;
+using testing::FakeProvider;
+using Kind = SensorEvent::Kind;
+using std::chrono::milliseconds;
+
+/// Collects what the sensor thread tells.
+class Told {
+ public:
+  void operator()(const SensorEvent& event) {
+    const std::lock_guard lock(mutex_);
+    events_.push_back(event);
+    changed_.notify_all();
+  }
+  /// Waits for the event with that number, from 0.
+  SensorEvent At(std::size_t index) {
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait_for(lock, std::chrono::seconds(20), [&] { return events_.size() > index; })) {
+      ADD_FAILURE() << "no event " << index;
+      return {};
+    }
+    return events_[index];
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<SensorEvent> events_;
+};
+
+class SensorThreadTest : public ::testing::Test {
+ protected:
+  void Start(SensorThreadOptions options = {}) {
+    options.first_retry = milliseconds(5);
+    options.last_retry = milliseconds(20);
+    thread_ = std::make_unique<SensorThread>([this] { return std::make_unique<FakeProvider>(bus_); }, options,
+                                             [this](const SensorEvent& event) { told_(event); });
+    EXPECT_EQ(told_.At(0).kind, Kind::kLost) << "nothing is attached yet";
+  }
+
+  FakeBus bus_;
+  Told told_;
+  std::unique_ptr<SensorThread> thread_;
+};
+
+TEST_F(SensorThreadTest, IsReadyWithTheFirstFrameAndNotBefore) {
+  Start();
+  bus_.Plug("A");
+  while (bus_.opened() == 0) std::this_thread::yield();
+  EXPECT_FALSE(thread_->snapshot().present) << "open, but it has shown nothing yet";
+  bus_.GiveFrame();
+  EXPECT_EQ(told_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(told_.At(1).sensor.serial, "A");
+  EXPECT_TRUE(thread_->snapshot().present);
+  EXPECT_EQ(thread_->latest()->index, 0);
+}
+
+TEST_F(SensorThreadTest, FramesGoToTheScanOnceItBeganAndNotAnyMoreOnceItEnded) {
+  std::atomic<int> prepared = 0;
+  Start({.serial = {}, .before_scan = [&] { ++prepared; }});
+  bus_.Plug("A");
+  bus_.GiveFrame();
+  EXPECT_EQ(told_.At(1).kind, Kind::kReady);
+  const auto feed = std::make_shared<LiveFeed>(10);
+  thread_->BeginScan(feed);
+  bus_.GiveFrame();  // may be on its way already: then it belongs to the time before the press
+  while (bus_.flushed() == 0) std::this_thread::yield();
+  EXPECT_EQ(prepared, 1);
+  EXPECT_TRUE(bus_.exposure_locked());
+  bus_.GiveFrame();
+  bus_.GiveFrame();
+  const std::int64_t first = feed->Next({})->index;
+  EXPECT_GE(first, 1);
+  EXPECT_EQ(feed->Next({})->index, first + 1);
+  while (bus_.taken() < 4) std::this_thread::yield();
+  thread_->EndScan();
+  while (feed->Next({})) {
+  }
+  const std::int64_t pushed = feed->num_pushed();
+  while (bus_.exposure_locked()) {
+    bus_.GiveFrame();
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(feed->num_pushed(), pushed) << "the feed is closed";
+  EXPECT_EQ(feed->TakeDropped(), 0);
+}
+
+TEST_F(SensorThreadTest, AnUnpluggedSensorIsLostAndAnotherOneTakesItsPlace) {
+  Start();
+  bus_.Plug("A");
+  bus_.GiveFrame();
+  EXPECT_EQ(told_.At(1).kind, Kind::kReady);
+  bus_.Unplug();
+  EXPECT_EQ(told_.At(2).kind, Kind::kLost);
+  EXPECT_FALSE(thread_->snapshot().present);
+  EXPECT_EQ(thread_->latest(), std::nullopt);
+  bus_.Plug("B");
+  bus_.GiveFrame();
+  EXPECT_EQ(told_.At(3).kind, Kind::kReady);
+  EXPECT_EQ(told_.At(3).sensor.serial, "B");
+}
+
+TEST_F(SensorThreadTest, AFailureIsToldOnceAndTriedAgain) {
+  Start();
+  bus_.RefuseToOpen("no permission; see plumb doctor");
+  bus_.Plug("A");
+  EXPECT_EQ(told_.At(1).kind, Kind::kFailed);
+  EXPECT_EQ(told_.At(1).reason, "no permission; see plumb doctor");
+  bus_.GiveFrame();
+  EXPECT_EQ(told_.At(2).kind, Kind::kReady) << "by itself, nobody plugged anything";
+  bus_.FailOnce("no pair for 2 s");
+  EXPECT_EQ(told_.At(3).reason, "no pair for 2 s");
+  bus_.GiveFrame();
+  EXPECT_EQ(told_.At(4).kind, Kind::kReady);
+}
+
+TEST_F(SensorThreadTest, OnlyTheConfiguredSensorIsUsed) {
+  Start({.serial = "B", .before_scan = {}});
+  bus_.Plug("A");
+  EXPECT_EQ(told_.At(1).kind, Kind::kFailed);
+  EXPECT_THAT(told_.At(1).reason, ::testing::AllOf(::testing::HasSubstr("B"), ::testing::HasSubstr("A")));
+  bus_.Plug("B");
+  bus_.GiveFrame();
+  EXPECT_EQ(told_.At(2).sensor.serial, "B");
+}
+
+TEST_F(SensorThreadTest, ALibraryThatDoesNotStartIsAFailureThatIsTriedAgain) {
+  int attempts = 0;
+  thread_ = std::make_unique<SensorThread>(
+      [&]() -> std::unique_ptr<SensorProvider> {
+        if (++attempts < 3) throw DeviceError("the library is missing");
+        return std::make_unique<FakeProvider>(bus_);
+      },
+      SensorThreadOptions{.serial = {}, .before_scan = {}, .first_retry = milliseconds(1), .last_retry = milliseconds(2)},
+      [this](const SensorEvent& event) { told_(event); });
+  EXPECT_EQ(told_.At(0).reason, "the library is missing");
+  EXPECT_EQ(told_.At(1).kind, Kind::kLost) << "and then it works, and sees no sensor";
+}
+
+TEST_F(SensorThreadTest, EndsAtOnceWhileItWaitsForAFrame) {
+  Start();
+  bus_.Plug("A");
+  while (bus_.opened() == 0) std::this_thread::yield();
+  thread_.reset();  // would hang if nobody interrupted the sensor
+}
+
+}  // namespace
+}  // namespace plumb
