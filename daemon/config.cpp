@@ -131,6 +131,23 @@ void ReadAppliance(Section section, ApplianceConfig& appliance) {
   section.RefuseTheRest();
 }
 
+void ReadPanel(Section button, Section light, PanelConfig& panel) {
+  const auto take = [](Section& section, std::string_view key, std::string& name) {
+    section.Take(key, name, "a name of at most 64 characters", [](const std::string& s) { return !s.empty() && s.size() <= 64; });
+  };
+  take(button, "chip", panel.button_chip);
+  take(button, "line", panel.button_line);
+  button.Take("active_low", panel.button_active_low, "true or false", kAny);
+  button.RefuseTheRest();
+  take(light, "chip", panel.light_chip);
+  take(light, "red", panel.red_line);
+  take(light, "green", panel.green_line);
+  take(light, "blue", panel.blue_line);
+  take(light, "beeper", panel.beeper_line);
+  light.Take("active_low", panel.light_active_low, "true or false", kAny);
+  light.RefuseTheRest();
+}
+
 void ReadWeb(Section section, WebConfig& web) {
   section.Take("listen", web.listen, "an address and a port, such as \"0.0.0.0:8080\" or \"[::]:8080\"",
                [](const std::string& s) { return ParseListenAddress(s).has_value(); });
@@ -169,7 +186,8 @@ Config ParseConfig(const std::string& text, const std::string& name) {
   } catch (const toml::parse_error& error) {
     throw DataError(fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line, error.description()));
   }
-  static constexpr std::array<std::string_view, 6> kSections = {"markers", "reconstruct", "compare", "iec", "appliance", "web"};
+  static constexpr std::array<std::string_view, 8> kSections = {"markers",   "reconstruct", "compare", "iec",
+                                                                "appliance", "button",      "light",   "web"};
   for (const auto& [key, node] : root) {
     if (std::find(kSections.begin(), kSections.end(), key.str()) != kSections.end()) continue;
     throw DataError(fmt::format("{}:{}: unknown table or key '{}'; known are [{}]", name, node.source().begin.line, key.str(),
@@ -181,6 +199,7 @@ Config ParseConfig(const std::string& text, const std::string& name) {
   ReadCompare(Section(root, "compare", name), config);
   ReadIec(Section(root, "iec", name), root, config.compare.T_iec_reference);
   ReadAppliance(Section(root, "appliance", name), config.appliance);
+  ReadPanel(Section(root, "button", name), Section(root, "light", name), config.panel);
   ReadWeb(Section(root, "web", name), config.web);
   return config;
 }

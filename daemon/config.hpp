@@ -33,6 +33,14 @@ struct ApplianceConfig {
   double result_s = 120.0;             ///< A result is shown for so long.
 };
 
+/// Start button and light on GPIO lines. A line is its name as the device tree has it, or its number as "#17"; empty: none.
+struct PanelConfig {
+  std::string button_chip = "gpiochip0", button_line;
+  bool button_active_low = true;
+  std::string light_chip = "gpiochip0", red_line, green_line, blue_line, beeper_line;
+  bool light_active_low = false;
+};
+
 /// Of the page that plumbd serves.
 struct WebConfig {
   std::string listen = "0.0.0.0:8080";
@@ -53,6 +61,7 @@ struct Config {
   ReconstructorOptions reconstruct;
   CompareOptions compare;
   ApplianceConfig appliance;
+  PanelConfig panel;
   WebConfig web;
   std::optional<std::filesystem::path> region_file;  ///< Absolute, or relative to the configuration file's folder.
 };
@@ -66,6 +75,8 @@ struct Config {
 ///                    min_coverage, max_hole_mm, max_residual_p95_mm, max_lost_s
 ///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to the IEC fixed frame
 ///     [appliance]    state, control, calibration, sensor_serial, keep_recordings, quota_gb, auto_stop_s, scan_limit_s, result_s
+///     [button]       chip, line, active_low
+///     [light]        chip, red, green, blue, beeper, active_low
 ///     [web]          listen, tls_certificate, tls_key, host_names
 ///
 /// @throws DataError naming file, line, key, what was expected and found. A key that is not listed is an error.

@@ -24,6 +24,7 @@
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/unix_socket.hpp"
 #include "daemon/log.hpp"
+#include "daemon/panel.hpp"
 #include "daemon/version.hpp"
 #include "daemon/web_service.hpp"
 #include "daemon/work_thread.hpp"
@@ -198,9 +199,12 @@ class Plumbd {
   Plumbd(const Options& options, const Config& config)
       : options_(options),
         sensors_(options, config),
+        panel_(loop_, config.panel),
         appliance_(loop_, {.config = config,
                            .make_provider = [this] { return sensors_.MakeProvider(); },
                            .before_scan = sensors_.BeforeScan(),
+                           .button = panel_.button(),
+                           .indicator = panel_.light(),
                            .demo_patient = options.simulated.empty() ? "" : "demo"}),
         service_(appliance_),
         http_(service_, HttpOptions(config)),
@@ -327,6 +331,7 @@ class Plumbd {
   EventLoop loop_;  // first: blocks signals before any thread starts
   Sensors sensors_;
   WorkThread device_thread_{16};
+  Panel panel_;
   Appliance appliance_;
   bool is_https_ = false;
   std::string page_host_;

@@ -25,6 +25,13 @@ quota_gb = 12.5
 auto_stop_s = 4
 scan_limit_s = 30
 result_s = 300
+[button]
+chip = "gpiochip1"
+line = "start"
+active_low = false
+[light]
+green = "#17"
+beeper = "beep"
 [web]
 listen = "[::]:8443"
 tls_certificate = "/etc/plumb/cert.pem"
@@ -41,6 +48,12 @@ host_names = ["plumb.local", "couch"]
   EXPECT_EQ(config.appliance.auto_stop_s, 4.0);
   EXPECT_EQ(config.appliance.scan_limit_s, 30.0);
   EXPECT_EQ(config.appliance.result_s, 300.0);
+  EXPECT_EQ(config.panel.button_chip, "gpiochip1");
+  EXPECT_EQ(config.panel.button_line, "start");
+  EXPECT_FALSE(config.panel.button_active_low);
+  EXPECT_EQ(config.panel.green_line, "#17");
+  EXPECT_EQ(config.panel.beeper_line, "beep");
+  EXPECT_EQ(config.panel.red_line, "");
   EXPECT_EQ(config.web.listen, "[::]:8443");
   EXPECT_EQ(config.web.tls_key, "/etc/plumb/key.pem");
   EXPECT_THAT(config.web.host_names, ElementsAre("plumb.local", "couch"));
