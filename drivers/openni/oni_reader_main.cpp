@@ -3,8 +3,8 @@
 //
 // A process of its own because the library crashes on damaged files. It has no rights that its parent has not, little memory, and ends with
 // its parent.
+#include <poll.h>
 #include <signal.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -18,6 +18,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
@@ -183,6 +184,17 @@ void WriteError(const char* what, bool header_written) {
   WriteAll(what, length);
 }
 
+/// The parent holds the other end of the pipe; once that is closed nobody waits for us, wherever the library hangs.
+void EndWithParent() {
+  ::signal(SIGPIPE, SIG_IGN);
+  std::thread([] {
+    pollfd pipe{STDOUT_FILENO, 0, 0};
+    while (::poll(&pipe, 1, -1) < 0 && errno == EINTR) {
+    }
+    ::_exit(1);
+  }).detach();
+}
+
 int Main(const std::string& file, const std::array<std::int64_t, 2>& begin_us) {
   bool header_written = false;
   try {
@@ -204,8 +216,7 @@ int Main(const std::string& file, const std::array<std::int64_t, 2>& begin_us) {
 
 int main(int argc, char** argv) {
   if (argc != 4) return 2;
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() == 1) return 1;
+  plumb::EndWithParent();
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   const rlimit memory{plumb::kMaxMemory, plumb::kMaxMemory};
   ::setrlimit(RLIMIT_AS, &memory);

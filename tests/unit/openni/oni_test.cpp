@@ -2,8 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
 #include <fstream>
 #include <random>
+#include <thread>
 
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
@@ -140,6 +143,27 @@ TEST(OniTest, DamagedFilesAreDataErrorsOrShorter) {
     read(bytes);
   }
   EXPECT_GE(refused, 3);
+}
+
+/// How many readers of this process run now.
+int CountReaders() {
+  int count = 0;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator("/proc", error)) {
+    std::ifstream status(entry.path() / "stat");
+    std::string id, name, state, parent;
+    if (status >> id >> name >> state >> parent) count += name == "(plumb-oni-reade)" && parent == std::to_string(::getpid()) ? 1 : 0;
+  }
+  return count;
+}
+
+TEST(OniTest, MayBeReadOnAnotherThreadThanItWasOpenedOnAndLeavesNoProcess) {
+  std::unique_ptr<OniRecording> recording;
+  std::thread([&] { recording = OniRecording::Open(Recording()); }).join();
+  EXPECT_TRUE(recording->Next());
+  EXPECT_EQ(CountReaders(), 1);
+  recording.reset();  // in the middle
+  EXPECT_EQ(CountReaders(), 0);
 }
 
 // The recorder forgets where each stream's stamps began; the side-car brings the delay between colour and depth back.
