@@ -49,6 +49,7 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts) : loop_(loop), parts
   if (!storage_fault_.empty()) (void)Handle(ScanEvent::kStorageFailed);
   WatchButton();
   Show();
+  Care();
   sensors_ = std::make_unique<SensorThread>(
       parts_.make_provider, SensorThreadOptions{.serial = parts_.config.appliance.sensor_serial, .before_scan = parts_.before_scan},
       [this](const SensorEvent& event) { loop_.Post([this, event] { OnSensor(event); }); });
@@ -335,7 +336,6 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
     (void)Handle(ScanEvent::kScanDone);
     TellEvent("result", Json{{"scan", scan_.id}, {"answer", answer}}.dump());
   }
-  if (reference_reason_.empty() && outcome.kind == Kind::kDone) purpose_ = web::ScanPurpose::kFraction;
   TellWeb(web::EventKind::kResult);
   TellWeb(web::EventKind::kData);
   Care();

@@ -193,7 +193,7 @@ void ExpectConsistent(const fs::path& state) {
 
 TEST_F(DaemonFaultTest, KilledAtAnyMomentNothingIsHalf) {
   const char* rounds_text = std::getenv("PLUMB_KILL_ROUNDS");
-  const int rounds = rounds_text != nullptr ? std::atoi(rounds_text) : 6;
+  const int rounds = rounds_text != nullptr ? std::atoi(rounds_text) : 3;
   std::mt19937 random(7);
   {
     Plumbd plumbd(folder_.path());
@@ -279,7 +279,7 @@ TEST_F(DaemonFaultTest, ACorruptDatabaseIsSafeModeAndTouchesNothing) {
 
 TEST_F(DaemonFaultTest, ManyShortScansLeaveNoThreadsDescriptorsOrMemoryBehind) {
   const char* rounds_text = std::getenv("PLUMB_SHORT_SCANS");
-  const int rounds = rounds_text != nullptr ? std::atoi(rounds_text) : 30;
+  const int rounds = rounds_text != nullptr ? std::atoi(rounds_text) : 15;
   Plumbd plumbd(folder_.path());
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
@@ -300,6 +300,68 @@ TEST_F(DaemonFaultTest, ManyShortScansLeaveNoThreadsDescriptorsOrMemoryBehind) {
   EXPECT_LE(plumbd.num_descriptors(), descriptors);
   EXPECT_LE(plumbd.num_threads(), threads);
   EXPECT_LT(plumbd.resident_kb(), memory_kb + 30'000) << "the allocator's pools move by some megabytes";
+}
+
+TEST_F(DaemonFaultTest, SighupTakesAGoodConfigurationAndKeepsTheOldOneForABadOne) {
+  const fs::path config = folder_ / "plumb.toml";
+  std::ofstream(config) << "[appliance]\nscan_limit_s = 600\n";
+  Plumbd plumbd(folder_.path(), {.arguments = {"--config", config}});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  const auto wait_for_log = [&](const std::string& text) {
+    plumbd.WaitFor(text, [&](const json&) { return plumbd.log().find(text) != std::string::npos; });
+  };
+  std::ofstream(config) << "[appliance]\nscan_limit_s = -1\n";
+  plumbd.Signal(SIGHUP);
+  wait_for_log("plumb.toml:2");
+  std::ofstream(config) << "[appliance]\nscan_limit_s = 1\n";
+  plumbd.Signal(SIGHUP);
+  wait_for_log("read again");
+  plumbd.Press();
+  plumbd.WaitForState("result");
+  EXPECT_THAT(plumbd.log(), HasSubstr("longest sweep")) << "the new limit holds";
+  EXPECT_THAT(plumbd.notifications(), HasSubstr("RELOADING=1"));
+}
+
+TEST_F(DaemonFaultTest, TheWatchdogIsFedWhileItScansAndAfter) {
+  Plumbd plumbd(folder_.path(), {.environment = {{"WATCHDOG_USEC", "300000"}}});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  const auto fed = [&] {
+    const std::string told = plumbd.notifications();
+    int count = 0;
+    for (std::size_t at = told.find("WATCHDOG=1"); at != std::string::npos; at = told.find("WATCHDOG=1", at + 1)) ++count;
+    return count;
+  };
+  plumbd.Press();
+  plumbd.WaitForFrames(20);
+  const int before = fed();
+  plumbd.WaitFor("more food", [&](const json&) { return fed() >= before + 5; });
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+TEST_F(DaemonFaultTest, AClockThatStepsDisturbsNoTimer) {
+  // Wall-clock time comes from a library loaded before the others, which adds what a file says.
+  std::ofstream(folder_ / "offset") << 0;
+  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nauto_stop_s = 1.5\n";
+  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"},
+                                 .environment = {{"LD_PRELOAD", PLUMB_CLOCK_STEP}, {"PLUMB_CLOCK_OFFSET", folder_ / "offset"}}});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  plumbd.Press();
+  plumbd.WaitForFrames(30);
+  std::ofstream(folder_ / "offset") << -86400;
+  plumbd.WaitForFrames(60);
+  std::ofstream(folder_ / "offset") << 86400 * 30;
+  EXPECT_EQ(plumbd.WaitForState("result")["last_result"]["is_reference"], true) << "neither cut short nor without end";
+  std::ofstream(folder_ / "offset") << -86400;
+  ScanOnce(plumbd);
+  EXPECT_EQ(plumbd.Stop(), 0);
+  Store store(folder_ / "state");
+  const std::vector<web::Scan> scans = store.Scans("", 10);
+  ASSERT_EQ(scans.size(), 2U);
+  EXPECT_LT(scans[0].started_at, scans[1].finished_at) << "the clock did step";
+  EXPECT_EQ(scans[0].id, "000002") << "and the order is that of the scans all the same";
 }
 
 TEST_F(DaemonFaultTest, NonsenseAtTheControlSocketCostsOnlyItsOwnConnection) {
