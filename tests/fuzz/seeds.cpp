@@ -91,6 +91,25 @@ void WriteSurfaces(const fs::path& root) {
   WriteMeshPly(ply / "mesh", {cloud.points, {}, cloud.colors, {{0, 1, 2}}});
 }
 
+/// What browsers send; the first byte chooses the reader, as in web_fuzz.cpp.
+void WriteWeb(const fs::path& root) {
+  const fs::path web = Folder(root / "web");
+  const std::string plan =
+      R"({"region_m":[[0,0],[1,0],[1,1.5]],"isocentre_m":[0.1,0.2,0.3],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false})";
+  const std::string settings =
+      R"({"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"FFP","couch_markers":true,"auto_stop_s":10,"scan_limit_s":60,"keep_recordings":false,"retention_days":0,"idle_logout_min":15})";
+  const std::vector<std::string> texts = {"name=a%2Bb&password=c+d",
+                                          "p\xC3\xA4tient\n",
+                                          "plumb_session=abc; b=2",
+                                          "/api/v1/scans/s1/files/result.json",
+                                          R"({"name":"anna","disabled":false})",
+                                          plan,
+                                          settings};
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    WriteWholeFile(web / std::to_string(i), static_cast<char>(i) + texts[i]);
+  }
+}
+
 }  // namespace
 }  // namespace plumb
 
@@ -100,6 +119,7 @@ int main(int argc, char** argv) {
   plumb::WriteImages(root);
   plumb::WriteOni(root);
   plumb::WriteTexts(root);
+  plumb::WriteWeb(root);
   plumb::WriteSurfaces(root);
   return 0;
 }

@@ -167,8 +167,8 @@ void FakeScanService::Unplug() {
   if (status.scan) {
     scans.back().outcome = ScanOutcome::kFailed;
     scans.back().failure = "the sensor was unplugged; the scan is discarded";
-    status.last_result.reset();
     status.scan.reset();
+    Tell(EventKind::kResult);
   }
   Tell(EventKind::kStatus);
 }

@@ -9,7 +9,8 @@ const kSkip = 77;
 const kSize = { width: 1920, height: 1080 };
 
 export class Harness {
-  static async start([modules, server, folder, chromium]) {
+  /// @param command  Of the server, with its arguments; it names its address and the setup code on stdout or stderr. FOLDER is replaced.
+  static async start({ modules, command, folder, chromium }) {
     if (!chromium || !existsSync(chromium)) {
       console.log('skipped: no chromium (Debian package chromium)');
       process.exit(kSkip);
@@ -21,15 +22,23 @@ export class Harness {
     mkdirSync(join(folder, 'data'), { recursive: true });
     h.folder = folder;
     h.failures = [];
+    h.log = [];
     h.contexts = [];
     h.check = (holds, what) => { if (!holds) throw new Error(`expected: ${what}`); };
     h.equal = (found, expected, what) => h.check(found === expected, `${what}: ${JSON.stringify(expected)}, found ${JSON.stringify(found)}`);
-    h.server = spawn(server, [join(folder, 'data')], { stdio: ['pipe', 'pipe', 'inherit'] });
-    h.server.on('exit', (code, signal) => { if (!h.finished) { console.error(`the server ended: ${code ?? signal}`); process.exit(1); } });
-    for await (const line of createInterface({ input: h.server.stdout })) {
-      if (line.startsWith('port ')) h.url = `http://127.0.0.1:${line.slice(5)}/`;
-      if (line.startsWith('setup code: ')) { h.setupCode = line.slice(12); break; }
-    }
+    const [program, ...rest] = command.map((part) => part.replace('FOLDER', join(folder, 'data')));
+    h.server = spawn(program, rest, { stdio: ['pipe', 'pipe', 'pipe'] });
+    h.server.on('exit', (code, signal) => { if (!h.finished) { console.error(`the server ended: ${code ?? signal}\n${h.log.join('\n')}`); process.exit(1); } });
+    await new Promise((ready) => {
+      for (const input of [h.server.stdout, h.server.stderr]) {
+        createInterface({ input }).on('line', (line) => {
+          h.log.push(line);
+          h.url ??= /http:\/\/127\.0\.0\.1:\d+\//.exec(line)?.[0];
+          h.setupCode ??= /setup code: (\S+)/.exec(line)?.[1];
+          if (h.url && h.setupCode) ready();
+        });
+      }
+    });
     h.browser = await load('playwright-core').chromium.launch({ executablePath: chromium, args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-dev-shm-usage'] });
     return h;
   }
@@ -78,6 +87,7 @@ export class Harness {
     this.finished = true;
     await this.browser.close();
     this.server.stdin.end('quit\n');
+    this.server.kill('SIGTERM');
     for (const failure of this.failures) console.log(`  - ${failure}`);
     console.log(this.failures.length ? `${this.failures.length} failures` : 'all well');
     process.exit(this.failures.length ? 1 : 0);

@@ -1,8 +1,8 @@
 // A run through the page in a real browser: page_test.mjs NODE_MODULES SERVER OUT_FOLDER CHROMIUM
-import { fileURLToPath } from 'node:url';
 import { Harness } from './harness.mjs';
 
-const h = await Harness.start(process.argv.slice(2), fileURLToPath(import.meta.url));
+const [modules, server, folder, chromium] = process.argv.slice(2);
+const h = await Harness.start({ modules, command: [server, 'FOLDER'], folder, chromium });
 const { check, equal } = h;
 const kPassword = 'correct horse battery';
 
@@ -205,6 +205,8 @@ await h.step('unplugging during a sweep discards the scan and says so', async ()
   h.tell('unplug');
   await anna.locator('.headline', { hasText: 'Sensor missing' }).waitFor();
   equal(await anna.getByRole('button', { name: 'Start sweep' }).isDisabled(), true, 'no start without a sensor');
+  await anna.getByRole('alert').getByText('the sensor was unplugged').waitFor();
+  equal(await anna.locator('.verdict').count(), 0, 'no older result is shown for it');
   await h.look(anna, 'scan-unplugged');
   h.tell('plug');
   h.tell('fast');

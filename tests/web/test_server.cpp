@@ -1,5 +1,5 @@
 // The real HTTP server over a fake appliance whose scans show real results: for tests of the page in a browser.
-// plumb_web_test_server FOLDER: makes scenes and results in FOLDER, prints "port N" and "setup code: XXXX-XXXX", obeys lines on stdin:
+// plumb_web_test_server FOLDER: makes scenes and results in FOLDER, prints its address and "setup code: XXXX-XXXX", obeys lines on stdin:
 // unplug, plug, slow (long sweeps), fast, old (the last result becomes 10 minutes old), quit.
 #include <fmt/format.h>
 #include <poll.h>
@@ -105,7 +105,7 @@ int Serve(const fs::path& root) {
   options.password_memory_bytes = 1 << 20;
   options.password_operations = 1;
   web::HttpServer server(service, options);
-  fmt::print("port {}\nsetup code: {}\n", server.port(), server.setup_code().value_or(""));
+  fmt::print("http://127.0.0.1:{}/\nsetup code: {}\n", server.port(), server.setup_code().value_or(""));
   std::fflush(stdout);
   std::string rest;
   while (true) {

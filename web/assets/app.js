@@ -1,5 +1,5 @@
 // The page: who is logged in, which screen is shown, and the bar above it.
-import { currentSession, live, loadSession, logOut, may, setLoggedOffHandler } from './api.js';
+import { currentSession, get, live, loadSession, logOut, may, setLoggedOffHandler } from './api.js';
 import { clear, h, say, warn } from './dom.js';
 import { showAudit } from './screens/audit.js';
 import { showLogin } from './screens/login.js';
@@ -124,11 +124,21 @@ async function begin(message) {
   main.focus({ preventScroll: true });
 }
 
+/// A result that comes while the sweep is watched is shown at once; a scan that failed is said, and no older result is shown for it.
+async function followScan() {
+  const { state } = await get('status', true);
+  if (state === 'result') {
+    location.hash = '#/result';
+    return;
+  }
+  const { scans } = await get('scans?limit=1', true);
+  if (scans[0]?.outcome === 'failed') warn(`${S.result.failed}: ${scans[0].failure}`);
+}
+
 live.listen((kind) => {
   if (kind === 'connection') warn(live.connected ? '' : S.offline);
   if (kind === 'status' || kind === 'connection') drawChip();
-  // A result that comes while the sweep is watched is shown at once.
-  if (kind === 'result' && route().name === 'scan') location.hash = '#/result';
+  if (kind === 'result' && route().name === 'scan') followScan().catch(() => {});
 });
 setLoggedOffHandler(() => { live.close(); begin(S.loggedOff); });
 window.addEventListener('hashchange', () => {

@@ -106,10 +106,10 @@ export async function errorMap(scan, reference, tolerance_mm) {
   draw();
   read();
   const box = h('div', { class: 'map-box' }, canvas, cross);
+  const profileBox = h('div', {}, h('h3', {}, text.slice), h('fieldset', { class: 'row plainset' }, h('legend', { class: 'visually-hidden' }, text.slice), choose('along', 0, text.sliceAlong[0], read), choose('along', 1, text.sliceAlong[1], read)), slice,
+    h('p', { class: 'keys' }, h('span', { class: 'key reference' }, text.reference_), h('span', { class: 'key current' }, text.current_)));
   const element = h('div', {},
     h('fieldset', { class: 'row plainset' }, h('legend', { class: 'visually-hidden' }, text.where), choose('map', 'before', text.before, () => { draw(); read(); }), maps.after && choose('map', 'after', text.after, () => { draw(); read(); })),
-    row(grid, box, h('div', { class: 'map-side' }, reading, legend(tolerance_mm))));
-  const sliceElement = h('div', {}, h('fieldset', { class: 'row plainset' }, h('legend', { class: 'visually-hidden' }, text.slice), choose('along', 0, text.sliceAlong[0], read), choose('along', 1, text.sliceAlong[1], read)), slice,
-    h('p', { class: 'keys' }, h('span', { class: 'key reference' }, text.reference_), h('span', { class: 'key current' }, text.current_)));
-  return { element, sliceElement, grid, deviation: maps.before };
+    row(grid, box, h('div', { class: 'map-side' }, reading, legend(tolerance_mm), profileBox)));
+  return { element, grid, deviation: maps.before };
 }

@@ -39,7 +39,7 @@ export async function openMesh(canvas, { url, grid, deviation, T, tolerance_m })
   scene.add(body);
   geometry.computeBoundingSphere();
   const { center, radius } = geometry.boundingSphere;
-  camera.position.set(center.x, center.y - 1.5 * radius, center.z + 1.5 * radius);
+  camera.position.set(center.x, center.y - 1.05 * radius, center.z + 1.15 * radius);
   const controls = new OrbitControls(camera, canvas);
   controls.target.copy(center);
   controls.enableDamping = false;

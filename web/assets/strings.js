@@ -50,7 +50,7 @@ export const S = {
     add: 'Add a patient', codeHint: 'A pseudonym: letters, digits, . _ - (no name)', siteHint: 'For example thorax', submit: 'Add',
     empty: 'No patient yet.', search: 'Find a code', isOpen: 'open for the next scan',
     openFraction: 'Open for a fraction', openReference: 'Take a new reference', openCheck: 'Daily check',
-    reason: 'Reason for the new reference', references: 'References', version: 'Version', made: 'Made', state: 'State', draft: 'draft', plan: 'Plan', planView: 'View plan',
+    reason: 'Reason for the new reference', reasonShort: 'Reason', references: 'References', version: 'Version', made: 'Made', state: 'State', draft: 'draft', plan: 'Plan', planView: 'View plan',
     approvedBy: (who, when) => `approved by ${who}, ${when}`, wipe: 'Wipe patient', wipeText: 'This removes the patient with every scan, reference and file, for good. Type the code to confirm.',
     wipeSubmit: 'Wipe for good', history: 'Scans', when: 'When', purpose: 'For', outcome: 'Outcome', accepted: 'Accepted', needsReference: 'A fraction needs an approved reference.',
     opened: (code) => `Patient ${code} is open for the next scan.`, noReferences: 'No reference yet: open the patient for a new reference and scan.', confirmWho: (code) => `Is ${code} the patient on the couch?`,
@@ -61,7 +61,7 @@ export const S = {
     guidance: {
       none: 'Good pace', slower: 'SLOWER', closer: 'CLOSER', farther: 'FARTHER', tracking_lost: 'LOST: go back to where you were', no_markers: 'NO MARKERS IN VIEW',
     },
-    unknownCoverage: 'not known yet', ignored: 'The button is ignored while the appliance works.', discarded: 'The scan was discarded.', step: { tracking: 'Finishing tracking', surfaces: 'Joining surfaces' }, seconds: (s) => `${s.toFixed(1)} s`,
+    unknownCoverage: 'so far: not known yet', ignored: 'The button is ignored while the appliance works.', discarded: 'The scan was discarded.', step: { tracking: 'Finishing tracking', surfaces: 'Joining surfaces' }, seconds: (s) => `${s.toFixed(1)} s`,
   },
   result: {
     title: 'Result', none: 'No result yet.', noneHint: 'Open a patient, then scan.', patient: 'Patient', reference: 'Reference', version: (v) => `version ${v}`, scanned: 'Scanned', age: 'Age',

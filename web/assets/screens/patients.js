@@ -43,7 +43,7 @@ function openButtons(patient) {
   };
   const fraction = action(text.openFraction, open('fraction'), { class: 'primary' });
   fraction.disabled = !patient.approved_reference_id;
-  return h('div', {},
+  return h('div', { class: 'form' },
     h('p', { class: 'lead' }, text.confirmWho(patient.code)),
     h('div', { class: 'row' }, fraction, action(text.openReference, open('reference'), {}), action(text.openCheck, open('daily_check'), {})),
     !patient.approved_reference_id && h('p', { class: 'hint' }, text.needsReference),
@@ -57,7 +57,7 @@ function referenceTable(references) {
     h('td', {}, reference.version), h('td', {}, `${localTime(reference.created_at)}, ${reference.created_by}`), h('td', {}, reference.reason || S.none),
     h('td', {}, reference.approved_by ? `✓ ${text.approvedBy(reference.approved_by, localTime(reference.approved_at))}` : h('span', { class: 'badge move' }, text.draft)),
     h('td', {}, h('a', { class: 'button', href: `#/plan/${reference.id}`, 'aria-label': `${may('plan') ? text.plan : text.planView}, ${text.version} ${reference.version}` }, may('plan') ? text.plan : text.planView))));
-  return table([text.version, text.made, text.reason, text.state, S.action], rows, text.references);
+  return table([text.version, text.made, text.reasonShort, text.state, S.action], rows, text.references);
 }
 
 function scanTable(scans) {

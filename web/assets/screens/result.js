@@ -151,14 +151,12 @@ export async function showResult(place, id) {
     const other = h('p', { class: 'caution' });
     const card = (title, ...content) => h('section', { class: 'card' }, h('h2', {}, title), ...content);
     const mapPlace = h('div', {}, h('p', { class: 'hint' }, S.loading));
-    const slicePlace = h('div', {});
     const meshPlace = h('div', {});
     clear(place, h('h1', { class: 'visually-hidden' }, text.title), identity.element, old, other, h('div', { class: 'fresh' }, verdictStrip(data), scan.result?.correction && h('section', { class: 'correction' }, h('h2', {}, text.numbers, ' ', h('small', {}, text.atIsocentre)), sixNumbers(scan.result, reference, data.details))),
       data.details && card(text.trust, trust(data)),
       mapped && card(text.where, mapPlace),
       !mapped && data.scene?.heightmap && card(text.heights, seen(data)),
-      mapped && h('div', { class: 'halves' }, card(text.overlay, h('img', { class: 'picture', src: fileUrl(scan.id, 'overlay.png'), alt: text.overlayAlt, loading: 'lazy' })), card(text.slice, slicePlace)),
-      scan.outcome === 'done' && card(text.mesh, meshPlace),
+      h('div', { class: mapped ? 'halves' : '' }, mapped && card(text.overlay, h('img', { class: 'picture', src: fileUrl(scan.id, 'overlay.png'), alt: text.overlayAlt, loading: 'lazy' })), scan.outcome === 'done' && card(text.mesh, meshPlace)),
       scan.result && card(text.trend, trend(history, tolerance)),
       h('section', { class: 'card' }, closing(data, load)));
     tick = () => {
@@ -181,7 +179,6 @@ export async function showResult(place, id) {
     if (mapped && reference) {
       map = await errorMap(scan, reference, tolerance.shift_mm);
       clear(mapPlace, map.element);
-      clear(slicePlace, map.sliceElement ?? h('p', { class: 'hint' }, text.mapFailed));
     } else {
       clear(mapPlace);
     }

@@ -1,0 +1,165 @@
+// The page on the real appliance with its virtual sensor: appliance_test.mjs NODE_MODULES PLUMBD PLUMB OUT_FOLDER CHROMIUM
+import { execFile } from 'node:child_process';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { promisify } from 'node:util';
+import { Harness } from './harness.mjs';
+
+const [modules, plumbd, plumb, folder, chromium] = process.argv.slice(2);
+const socket = join(folder, 'data', 'control.sock');
+const h = await Harness.start({ modules, folder, chromium, command: [plumbd, '--simulated', 'demo', '--state', 'FOLDER', '--listen', '127.0.0.1:0', '--control', socket] });
+const { check, equal } = h;
+const kPassword = 'correct horse battery';
+const kSlow = { timeout: 180000 };
+const sim = (command) => promisify(execFile)(plumb, ['--control', socket, 'sim', command]);
+const memory_kB = () => Number(/VmRSS:\s+(\d+)/.exec(readFileSync(`/proc/${h.server.pid}/status`, 'utf8'))[1]);
+
+const page = await h.person('engineer');
+async function logIn(other, name) {
+  await other.goto(h.url);
+  await other.getByLabel('Name').fill(name);
+  await other.getByLabel('Password').fill(kPassword);
+  await other.getByRole('button', { name: 'Log in' }).click();
+  await other.getByRole('navigation').waitFor();
+}
+
+async function scan() {
+  await page.goto(`${h.url}#/scan`);
+  await page.getByRole('button', { name: /Start sweep|Scan again/ }).click(kSlow);
+  await page.getByRole('button', { name: 'End sweep' }).waitFor();
+  await page.locator('.verdict').waitFor(kSlow);
+}
+
+await h.step('first start', async () => {
+  await page.goto(h.url);
+  await page.getByLabel('Setup code').fill(h.setupCode);
+  await page.getByLabel('Name').fill('engineer');
+  await page.getByLabel('Password', { exact: true }).fill(kPassword);
+  await page.getByLabel('Password again').fill(kPassword);
+  await page.getByRole('button', { name: 'Make the account' }).click();
+  await page.getByRole('navigation').waitFor();
+  await page.locator('.headline', { hasText: 'Ready' }).waitFor(kSlow);
+  await h.look(page, 'status');
+});
+
+await h.step('accounts for two physicists', async () => {
+  await page.goto(`${h.url}#/users`);
+  const card = page.locator('section', { has: page.getByRole('heading', { name: 'Add an account' }) });
+  for (const name of ['bob', 'clara']) {
+    await card.getByLabel('Name').fill(name);
+    await card.getByLabel('Role').selectOption('physicist');
+    await card.getByLabel('Password').fill(kPassword);
+    await card.getByRole('button', { name: 'Add' }).click();
+    await page.getByRole('cell', { name, exact: true }).waitFor();
+  }
+});
+
+await h.step('the first sweep, closed and opened again midway, becomes the reference', async () => {
+  await page.goto(`${h.url}#/scan`);
+  await page.getByRole('button', { name: 'Start sweep' }).click();
+  await page.getByRole('button', { name: 'End sweep' }).waitFor();
+  await page.waitForFunction(() => document.querySelector('.facts')?.textContent.match(/Tracked\s*[1-9]/));
+  await page.locator('.preview img').waitFor();
+  await h.look(page, 'scan-sweep');
+  const id = await page.evaluate(() => fetch('/api/v1/status').then((response) => response.json()).then((status) => status.scan.id));
+  await page.goto('about:blank');
+  await page.goto(`${h.url}#/scan`);
+  await page.locator('.verdict').waitFor(kSlow);
+  const scans = await page.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
+  equal(scans.scans.length, 1, 'one scan');
+  equal(scans.scans[0].id, id, 'the same scan');
+  await page.locator('canvas.map').waitFor();
+  await page.waitForFunction(() => document.querySelector('canvas.map').width > 300);
+  await h.look(page, 'result-reference');
+});
+
+await h.step('the moved body gives MOVE and six numbers', async () => {
+  await sim('next-scene');
+  await scan();
+  await page.locator('.verdict.move').waitFor();
+  equal(await page.locator('.number .value').count(), 6, 'six numbers');
+  check(await page.locator('.number.outside').count() > 0, 'something is outside tolerance');
+  await page.locator('.reading strong').waitFor();
+  await h.look(page, 'result-move');
+  await page.getByRole('button', { name: 'Open the 3-D view' }).click();
+  await page.locator('canvas.mesh[data-ready=yes]').waitFor(kSlow);
+  await page.waitForTimeout(2500);
+  await page.locator('canvas.mesh').scrollIntoViewIfNeeded();
+  await page.screenshot({ path: h.file('mesh.png') });
+});
+
+await h.step('five viewers and a download cost little memory, and the sweep drops nothing for them', async () => {
+  await page.goto(`${h.url}#/scan`);
+  const before = memory_kB();
+  const viewers = [];
+  for (let i = 0; i < 4; ++i) {
+    const viewer = await h.person(`viewer${i}`, { width: 640, height: 480 });
+    await logIn(viewer, 'bob');
+    await viewer.goto(`${h.url}#/status`);
+    viewers.push(viewer);
+  }
+  const after = memory_kB();
+  console.log(`    plumbd: ${before} kB before, ${after} kB with five viewers`);
+  check(after - before < 10240, `five viewers take ${after - before} kB more`);
+  for (const viewer of viewers) await viewer.context().close();
+});
+
+await h.step('a third sweep makes a trend', async () => {
+  await scan();
+  await page.locator('.trend').first().waitFor();
+  equal(await page.locator('.trend').count(), 6, 'six trends');
+});
+
+await h.step('a physicist plans a new version, a second one approves', async () => {
+  const bob = await h.person('bob');
+  await logIn(bob, 'bob');
+  await bob.goto(`${h.url}#/patients`);
+  await bob.getByRole('link', { name: 'demo' }).click();
+  await bob.getByRole('link', { name: /^Plan, Version/ }).first().click();
+  const map = bob.getByRole('application');
+  await map.scrollIntoViewIfNeeded();
+  const box = await map.boundingBox();
+  for (const [x, y] of [[0.3, 0.3], [0.65, 0.3], [0.65, 0.65], [0.3, 0.65]]) await bob.mouse.click(box.x + x * box.width, box.y + y * box.height);
+  await h.look(bob, 'plan');
+  await bob.getByRole('button', { name: 'Save plan' }).click();
+  await bob.getByText('draft').waitFor();
+  await bob.getByRole('button', { name: 'Approve' }).click();
+  await bob.getByRole('alert').getByText(/second|planned|made/).waitFor();
+  const clara = await h.person('clara');
+  await logIn(clara, 'clara');
+  await clara.goto(bob.url());
+  await clara.getByRole('button', { name: 'Approve' }).click();
+  await clara.getByText('approved by clara').waitFor();
+  await clara.goto(`${h.url}#/patients`);
+  await clara.getByRole('link', { name: 'demo' }).click();
+  await clara.getByRole('heading', { name: 'References' }).waitFor();
+  await h.look(clara, 'patient');
+  await clara.goto(`${h.url}#/audit`);
+  await clara.getByRole('cell', { name: /approve/ }).first().waitFor();
+  await h.look(clara, 'audit');
+});
+
+await h.step('unplugging during a sweep is said, and the scan is discarded', async () => {
+  await page.goto(`${h.url}#/scan`);
+  await page.getByRole('button', { name: /Start sweep|Scan again/ }).click(kSlow);
+  await page.getByRole('button', { name: 'End sweep' }).waitFor();
+  await sim('unplug');
+  await page.locator('.headline', { hasText: 'Sensor missing' }).waitFor(kSlow);
+  await page.getByRole('alert').getByText('This scan failed').waitFor();
+  await sim('plug');
+  await page.locator('.headline', { hasText: 'Ready' }).waitFor(kSlow);
+  const { scans } = await page.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
+  equal(scans[0].outcome, 'failed', 'the scan failed');
+  check(/sensor/.test(scans[0].failure), `the reason names the sensor: ${scans[0].failure}`);
+});
+
+await h.step('settings, update, a region that was not swept', async () => {
+  await page.goto(`${h.url}#/update`);
+  await page.getByText('Installed version').waitFor();
+  await h.look(page, 'update');
+  await page.goto(`${h.url}#/settings`);
+  await page.getByRole('button', { name: 'Save' }).waitFor();
+  await h.look(page, 'settings');
+});
+
+await h.finish();
