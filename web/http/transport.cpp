@@ -51,7 +51,11 @@ std::string AddressOf(MHD_Connection* connection) {
 
 void CutSocket(MHD_Connection* connection) {
   const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-  if (info != nullptr) shutdown(info->connect_fd, SHUT_RDWR);
+  if (info == nullptr) return;
+  // What waits in the kernel for a reader that does not read is dropped with the connection.
+  const linger drop{1, 0};
+  setsockopt(info->connect_fd, SOL_SOCKET, SO_LINGER, &drop, sizeof drop);
+  shutdown(info->connect_fd, SHUT_RDWR);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
+#include <cstdlib>
 #include <fstream>
 
 #include "algo/types/errors.hpp"
@@ -178,6 +179,37 @@ TEST_F(ServerTest, MissingOrWrongCertificatesAreSaid) {
   EXPECT_THROW(web::HttpServer(service_, options), DataError);
   for (const char* name : {"cert.pem", "key.pem"}) std::ofstream(folder / name) << "-----BEGIN NONSENSE-----\n";
   EXPECT_THROW(web::HttpServer(service_, options), IoError);
+}
+
+/// A certificate for this test alone, and what a TLS client makes of the server.
+TEST_F(ServerTest, ServesTlsWithASecureCookie) {
+  if (std::system("openssl version > /dev/null 2>&1") != 0) GTEST_SKIP() << "no openssl (Debian package openssl)";
+  const plumb::testing::TempFolder folder;
+  const std::string certificate = (folder / "cert.pem").string(), key = (folder / "key.pem").string();
+  ASSERT_EQ(std::system(("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=localhost -keyout " +
+                         key + " -out " + certificate + " 2> /dev/null")
+                            .c_str()),
+            0);
+  Start([&](web::HttpServerOptions& options) {
+    options.tls_certificate = certificate;
+    options.tls_key = key;
+  });
+  const std::string body = nlohmann::json{{"code", setup_code_}, {"name", "eve"}, {"password", kPassword}}.dump();
+  std::ofstream(folder / "request")
+      << "POST /api/v1/setup HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Type: application/json\r\n"
+      << "Origin: https://localhost\r\nContent-Length: " << body.size() << "\r\n\r\n"
+      << body;
+  const std::string answer_file = (folder / "answer").string();
+  ASSERT_EQ(std::system(("timeout 60 openssl s_client -quiet -verify_return_error -CAfile " + certificate + " -connect 127.0.0.1:" +
+                         std::to_string(port_) + " < " + (folder / "request").string() + " > " + answer_file + " 2> /dev/null")
+                            .c_str()),
+            0);
+  std::ifstream in(answer_file);
+  const std::string answer((std::istreambuf_iterator<char>(in)), {});
+  EXPECT_THAT(answer, HasSubstr("HTTP/1.1 200"));
+  EXPECT_THAT(answer, HasSubstr("__Host-plumb_session="));
+  EXPECT_THAT(answer, HasSubstr("; Secure"));
+  EXPECT_EQ(StatusOf("GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n"), 0) << "no answer without TLS";
 }
 
 }  // namespace
