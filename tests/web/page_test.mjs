@@ -205,7 +205,7 @@ await h.step('unplugging during a sweep discards the scan and says so', async ()
   h.tell('unplug');
   await anna.locator('.headline', { hasText: 'Sensor missing' }).waitFor();
   equal(await anna.getByRole('button', { name: 'Start sweep' }).isDisabled(), true, 'no start without a sensor');
-  await anna.getByRole('alert').getByText('the sensor was unplugged').waitFor();
+  await anna.getByRole('alert').getByText('The sensor is gone').waitFor();
   equal(await anna.locator('.verdict').count(), 0, 'no older result is shown for it');
   await h.look(anna, 'scan-unplugged');
   h.tell('plug');

@@ -126,9 +126,13 @@ async function begin(message) {
 
 /// A result that comes while the sweep is watched is shown at once; a scan that failed is said, and no older result is shown for it.
 async function followScan() {
-  const { state } = await get('status', true);
+  const { state, sensor } = await get('status', true);
   if (state === 'result') {
     location.hash = '#/result';
+    return;
+  }
+  if (!sensor.present) {
+    warn(S.scan.lost);
     return;
   }
   const { scans } = await get('scans?limit=1', true);

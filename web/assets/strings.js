@@ -61,7 +61,7 @@ export const S = {
     guidance: {
       none: 'Good pace', slower: 'SLOWER', closer: 'CLOSER', farther: 'FARTHER', tracking_lost: 'LOST: go back to where you were', no_markers: 'NO MARKERS IN VIEW',
     },
-    unknownCoverage: 'so far: not known yet', ignored: 'The button is ignored while the appliance works.', discarded: 'The scan was discarded.', step: { tracking: 'Finishing tracking', surfaces: 'Joining surfaces' }, seconds: (s) => `${s.toFixed(1)} s`,
+    unknownCoverage: 'so far: not known yet', ignored: 'The button is ignored while the appliance works.', discarded: 'The scan was discarded.', lost: 'The sensor is gone: the scan was discarded.', step: { tracking: 'Finishing tracking', surfaces: 'Joining surfaces' }, seconds: (s) => `${s.toFixed(1)} s`,
   },
   result: {
     title: 'Result', none: 'No result yet.', noneHint: 'Open a patient, then scan.', patient: 'Patient', reference: 'Reference', version: (v) => `version ${v}`, scanned: 'Scanned', age: 'Age',
