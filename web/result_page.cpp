@@ -66,11 +66,13 @@ std::string NumbersTable(const ResultSummary& result) {
       rows);
 }
 
-std::string Pictures(const std::string& scan_id) {
+std::string Pictures(const Scan& scan) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(scan.folder / "result/error_map.png", ignored)) return "";
   return fmt::format(
       "<figure><img src=\"/api/v1/scans/{0}/files/error_map.png\" alt=\"Map of height errors, current minus reference\"></figure>"
       "<figure><img src=\"/api/v1/scans/{0}/files/overlay.png\" alt=\"Reference blue, current red\"></figure>",
-      scan_id);
+      scan.id);
 }
 
 std::string ResultBody(ScanService& service, const Scan& scan) {
@@ -89,7 +91,7 @@ std::string ResultBody(ScanService& service, const Scan& scan) {
                       : move       ? "MOVE"
                                    : "NO ANSWER");
   for (const std::string& reason : scan.result->reasons) body += fmt::format("<p>{}</p>", EscapeHtml(reason));
-  return body + NumbersTable(*scan.result) + Pictures(scan.id) + "</section>";
+  return body + NumbersTable(*scan.result) + Pictures(scan) + "</section>";
 }
 
 }  // namespace

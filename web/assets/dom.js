@@ -41,7 +41,18 @@ export const select = (choices, value, properties) => {
   return element;
 };
 
-export const say = (text) => { document.getElementById('status').textContent = text; };
+const kToast_ms = 4000;
+let toastTimer = 0;
+/// Tells screen readers; `seen` shows it for a while too.
+export function say(text, seen = false) {
+  const place = document.getElementById('status');
+  clearTimeout(toastTimer);
+  place.textContent = text;
+  place.className = seen ? 'toast' : 'visually-hidden';
+  if (seen) toastTimer = setTimeout(() => say(''), kToast_ms);
+}
+/// What a person just did has worked.
+export const done = (text) => say(text, true);
 
 export function warn(text) {
   const place = document.getElementById('alert');

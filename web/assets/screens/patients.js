@@ -1,5 +1,5 @@
 import { get, live, may, post, remove } from '../api.js';
-import { action, clear, field, form, h, localTime, say, table, warn } from '../dom.js';
+import { action, clear, done, field, form, h, localTime, table, warn } from '../dom.js';
 import { S } from '../strings.js';
 import { outcomeBadge } from './common.js';
 
@@ -38,7 +38,7 @@ function openButtons(patient) {
   const reason = h('input', { maxlength: 200, autocomplete: 'off' });
   const open = (purpose) => async () => {
     await post(`patients/${patient.id}/open`, { purpose, reason: purpose === 'reference' ? reason.value.trim() : '' });
-    say(text.opened(patient.code));
+    done(text.opened(patient.code));
     location.hash = '#/scan';
   };
   const fraction = action(text.openFraction, open('fraction'), { class: 'primary' });

@@ -1,5 +1,5 @@
 import { get, getBytes, may, post, put } from '../api.js';
-import { action, checkbox, clear, field, h, localTime, say, select, svg, warn } from '../dom.js';
+import { action, checkbox, clear, done, field, h, localTime, say, select, svg, warn } from '../dom.js';
 import { cellAt, paintHeights, readTiff } from '../maps.js';
 import { S } from '../strings.js';
 
@@ -150,13 +150,13 @@ export async function showPlan(place, id) {
   }));
   const save = action(text.save, async () => {
     const answer = await put(`references/${id}/plan`, inputs.body());
-    say(text.saved);
+    done(text.saved);
     if (answer.id && answer.id !== id) location.hash = `#/plan/${answer.id}`;
     else await showPlan(place, id);
   }, { class: 'primary' });
   const approve = action(text.approve, async () => {
     await post(`references/${id}/approve`);
-    say(text.approved);
+    done(text.approved);
     await showPlan(place, id);
   }, {});
   clear(place,

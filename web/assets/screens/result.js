@@ -1,5 +1,5 @@
 import { fileUrl, get, getBytes, live, may, post } from '../api.js';
-import { action, checkbox, clear, field, form, h, localTime, say, warn } from '../dom.js';
+import { action, checkbox, clear, done, field, form, h, localTime, warn } from '../dom.js';
 import { errorMap } from '../error_map.js';
 import { paintHeights, readTiff } from '../maps.js';
 import { sixNumbers } from '../numbers.js';
@@ -120,7 +120,7 @@ function closing({ scan, patient }, reload) {
   }, { class: 'primary' });
   const accept = scan.accepted_by ? h('p', { class: 'badge in_tolerance' }, `✓ ${text.acceptedBy(scan.accepted_by)}`) : may('accept') && scan.result && scan.result.verdict !== 'no_answer' && action(text.accept, async () => {
     await post(`scans/${scan.id}/accept`);
-    say(text.accept);
+    done(S.saved);
     await reload();
   }, {});
   const files = h('ul', { class: 'files' }, Object.entries(text.files).filter(([name]) => scan.result || !/result|map\.png|overlay|deviation|distance/.test(name)).map(([name, label]) => h('li', {}, h('a', { href: fileUrl(scan.id, name, true), download: '' }, label))));

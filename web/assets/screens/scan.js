@@ -1,5 +1,5 @@
 import { get, live, may, post } from '../api.js';
-import { action, clear, h, say } from '../dom.js';
+import { action, clear, done, h, say } from '../dom.js';
 import { S } from '../strings.js';
 
 const kPreviewEvery_ms = 250;
@@ -39,7 +39,7 @@ function buttons() {
   const press = action('', () => post('press'), { class: 'primary giant' });
   const discard = action(text.discard, async () => {
     await post('cancel');
-    say(text.discarded);
+    done(text.discarded);
   }, { class: 'danger' });
   return { press, discard, element: may('scan') ? h('div', { class: 'controls' }, press, discard) : h('div', {}) };
 }

@@ -1,5 +1,5 @@
 import { get, may, put } from '../api.js';
-import { checkbox, clear, field, form, h, say, select } from '../dom.js';
+import { checkbox, clear, done, field, form, h, select } from '../dom.js';
 import { S } from '../strings.js';
 
 const kNumbers = {
@@ -26,6 +26,6 @@ export async function showSettings(place) {
     for (const name of Object.keys(kNumbers)) changed[name] = Number(inputs[name].value);
     for (const name of kFlags) changed[name] = inputs[name].box.checked;
     await put('settings', changed);
-    say(S.saved);
+    done(S.saved);
   }, numbers, field(text.posture, posture), flags, editable && h('div', { class: 'row' }, h('button', { class: 'primary' }, S.save)))));
 }

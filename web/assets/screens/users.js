@@ -1,5 +1,5 @@
 import { currentSession, get, may, post, put } from '../api.js';
-import { checkbox, clear, field, form, h, localTime, say, select, table, warn } from '../dom.js';
+import { checkbox, clear, done, field, form, h, localTime, select, table, warn } from '../dom.js';
 import { S } from '../strings.js';
 
 const password = (properties) => h('input', { type: 'password', autocomplete: 'new-password', maxlength: 128, ...properties });
@@ -11,7 +11,7 @@ function ownPassword() {
   return h('section', { class: 'card' }, h('h2', {}, text.own), form({ class: 'form inline' }, async () => {
     await post('session/password', { old_password: old.value, password: fresh.value });
     old.value = fresh.value = '';
-    say(S.saved);
+    done(S.saved);
   }, field(text.oldPassword, old), field(text.password, fresh, S.login.passwordHint), h('button', {}, text.changeOwn)));
 }
 
@@ -23,7 +23,7 @@ function userRow(user, reload) {
   return h('tr', {}, h('td', {}, user.name), h('td', {}, S.roles[user.role]), h('td', {}, user.disabled ? text.disabled : `✓ ${text.active}`), h('td', {}, localTime(user.created_at)),
     h('td', {}, h('details', {}, h('summary', { 'aria-label': `${text.change} ${user.name}` }, text.change), form({ class: 'form' }, async () => {
       await put(`users/${user.name}`, { role: role.value, disabled: disabled.box.checked, password: fresh.value });
-      say(S.saved);
+      done(S.saved);
       if (user.name !== currentSession()?.user) await reload();
     }, field(text.role, role), disabled.element, field(text.newPassword, fresh), h('button', { class: 'primary' }, S.save)))));
 }
@@ -43,7 +43,7 @@ export async function showUsers(place) {
     may('users') && h('section', { class: 'card' }, h('h2', {}, text.add), form({ class: 'form inline' }, async () => {
       await post('users', { name: name.value.trim(), role: role.value, password: fresh.value });
       name.value = fresh.value = '';
-      say(S.saved);
+      done(S.saved);
       await load();
     }, field(text.name, name, text.nameHint), field(text.role, role), field(text.password, fresh, S.login.passwordHint), h('button', { class: 'primary' }, text.submit))),
     ownPassword());
