@@ -1,9 +1,11 @@
 #include "drivers/simulated/virtual_sensor.hpp"
 
+#include <signal.h>
 #include <stdlib.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
@@ -41,6 +43,19 @@ bool IsCurrent(const fs::path& file, const FrameCacheShape& shape, const RawFram
   return false;
 }
 
+/// Removes what killed processes have left half-written; it may be half a gigabyte each.
+void RemoveStale(const fs::path& folder) {
+  constexpr std::string_view kMark = ".partial-";
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    const std::size_t mark = name.find(kMark);
+    if (mark == std::string::npos) continue;
+    const int pid = std::atoi(name.c_str() + mark + kMark.size());
+    if (pid > 0 && ::kill(pid, 0) != 0 && errno == ESRCH) fs::remove(entry.path(), error);
+  }
+}
+
 /// Renders scenes into the cache, those that are missing.
 class Renderer {
  public:
@@ -54,6 +69,7 @@ class Renderer {
     std::error_code error;
     fs::create_directories(folder_, error);
     if (error) throw IoError(DescribeWriteError(folder_, error.value()));
+    RemoveStale(folder_);
   }
 
   [[nodiscard]] const simulated::SuitePlan& plan() const { return plan_; }

@@ -279,8 +279,11 @@ TEST(VirtualSensorTest, RendersAgainWhatTheCacheHoldsNoMore) {
   };
   prepare();
   EXPECT_GT(rendered, 0);
+  const std::filesystem::path stale = folder / "x.frames.partial-99999999";  // no process has this number
+  WriteWholeFile(stale, std::string_view("half"));
   prepare();
   EXPECT_EQ(rendered, 0);
+  EXPECT_FALSE(std::filesystem::exists(stale));
   const auto file = std::filesystem::directory_iterator(folder.path())->path();
   std::filesystem::resize_file(file, std::filesystem::file_size(file) - 1);
   prepare();
