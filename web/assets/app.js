@@ -101,6 +101,13 @@ async function show() {
   }
 }
 
+/// The focus goes to the new screen at once: later, when its data has come, somebody may have moved it.
+function showFocused() {
+  const shown = show();
+  main.focus({ preventScroll: true });
+  return shown;
+}
+
 async function leave() {
   live.close();
   await logOut().catch(() => {});
@@ -120,8 +127,7 @@ async function begin(message) {
     return;
   }
   live.open();
-  await show();
-  main.focus({ preventScroll: true });
+  await showFocused();
 }
 
 /// A result that comes while the sweep is watched is shown at once; a scan that failed is said, and no older result is shown for it.
@@ -147,6 +153,6 @@ live.listen((kind) => {
 setLoggedOffHandler(() => { live.close(); begin(S.loggedOff); });
 window.addEventListener('hashchange', () => {
   if (!currentSession()) return;
-  show().then(() => main.focus({ preventScroll: true }));
+  showFocused();
 });
 begin().catch((error) => clear(main, h('p', { class: 'card' }, error.message)));
