@@ -100,6 +100,7 @@ Config ReadConfiguration(const Options& options) {
   return config;
 }
 
+#ifdef PLUMB_WITH_OPENNI
 /// True if a signal waits for the loop, which does not run yet.
 bool IsToldToEnd() {
   sigset_t pending;
@@ -107,6 +108,7 @@ bool IsToldToEnd() {
   sigpending(&pending);
   return sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1;
 }
+#endif
 
 /// Sensor of this run: the virtual one and its provider, or the real ones.
 class Sensors {

@@ -131,7 +131,9 @@ void ScanSession::Evaluate(const Scene& scene, std::future<Scene>& reference_sce
     Tell("comparing", 0.0);
     const Scene reference = reference_scene.get();
     ThrowIfStopped(stop);
-    comparison = Compare(reference, scene, job_.compare);
+    CompareOptions compare = job_.compare;
+    compare.stop = stop;
+    comparison = Compare(reference, scene, compare);
     ThrowIfStopped(stop);
     pictures = DrawResult(*comparison, reference.height_map ? &*reference.height_map : nullptr,
                           {.tolerance_m = job_.compare.shift_tolerance_m, .subtitle = PictureSubtitle(*comparison)});

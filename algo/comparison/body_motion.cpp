@@ -9,11 +9,13 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
 #include "algo/comparison/motion_start.hpp"
 #include "algo/comparison/surface.hpp"
+#include "algo/types/check_stop.hpp"
 
 namespace plumb {
 namespace {
@@ -188,12 +190,13 @@ double LeverArm(const Surface& surface, const Eigen::Vector3d& centroid) {
   return std::max(std::sqrt(sum / static_cast<double>(std::max<std::size_t>(surface.size(), 1))), 1e-3);
 }
 
-StageResult RunStage(const Side& reference, const Side& current, const Pose& T_start, const Stage& stage) {
+StageResult RunStage(const Side& reference, const Side& current, const Pose& T_start, const Stage& stage, const std::stop_token& stop) {
   StageResult result;
   result.T = T_start;
   const Eigen::Vector3d centroid = MeanPoint(reference.surface);
   const double lever = LeverArm(reference.surface, centroid);
   for (; result.iterations < stage.max_iterations; ++result.iterations) {
+    CheckStop(stop);
     const Eigen::Vector3d pivot = result.T * centroid;
     const std::vector<Pair> pairs = FindPairs(reference, current, result.T, pivot, stage);
     const std::optional<double> scale = ResidualScale(pairs, stage.max_scale_m);
@@ -252,7 +255,7 @@ std::optional<Pose> GlobalMotion(const BodyMotionInput& input, const PointCloud&
   const auto by_score = [](const Scored& a, const Scored& b) { return a.score < b.score; };
   std::vector<Scored> scored;
   for (const Pose& start : MotionStarts(input.reference_body, input.current_body)) {
-    const StageResult refined = RunStage(coarse_reference, coarse_current, start, kCoarse);
+    const StageResult refined = RunStage(coarse_reference, coarse_current, start, kCoarse, input.stop);
     if (refined.valid) scored.push_back({refined.T, Disagreement(coarse_reference, coarse_current, refined.T, kCoarse, 0.02)});
   }
   if (scored.empty()) return std::nullopt;
@@ -269,7 +272,7 @@ std::optional<Pose> GlobalMotion(const BodyMotionInput& input, const PointCloud&
   const Side middle_reference(MakeSurface(reference, kMiddleSpacing_m, 2.5 * kMiddleSpacing_m), kMiddle.radius_m);
   const Side middle_current(MakeSurface(current, kMiddleSpacing_m, 2.5 * kMiddleSpacing_m), kMiddle.radius_m);
   for (Scored& s : distinct) {
-    const StageResult refined = RunStage(middle_reference, middle_current, s.T, kMiddle);
+    const StageResult refined = RunStage(middle_reference, middle_current, s.T, kMiddle, input.stop);
     if (refined.valid) s.T = refined.T;
     s.score = Disagreement(middle_reference, middle_current, s.T, kMiddle, 0.015);
   }
@@ -330,7 +333,7 @@ std::optional<SurfaceMotion> EstimateBodyMotion(const BodyMotionInput& input) {
   const Stage stage = FineStage(spacing_m);
   const Side side_reference(std::move(fine_reference), stage.radius_m);
   const Side side_current(MakeSurface(current, spacing_m, 3 * spacing_m), stage.radius_m);
-  const StageResult fitted = RunStage(side_reference, side_current, *T_start, stage);
+  const StageResult fitted = RunStage(side_reference, side_current, *T_start, stage, input.stop);
   if (!fitted.valid) return std::nullopt;
 
   SurfaceMotion motion;

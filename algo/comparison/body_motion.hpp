@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <optional>
+#include <stop_token>
 
 #include "algo/comparison/comparison.hpp"
 #include "algo/comparison/region.hpp"
@@ -20,6 +21,7 @@ struct BodyMotionInput {
   /// Accepts the points of the reference body that lie in the region of interest; none: all of the body.
   std::function<bool(const Eigen::Vector3d&)> in_region;
   Eigen::Vector3d region_centroid_m = Eigen::Vector3d::Zero();
+  std::stop_token stop = {};  ///< Polled in each iteration; Interrupted follows.
 };
 
 /// What the surfaces alone say of the motion; the alignment's uncertainty is not in it.

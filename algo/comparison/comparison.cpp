@@ -13,6 +13,7 @@
 #include "algo/comparison/region.hpp"
 #include "algo/comparison/scene_alignment.hpp"
 #include "algo/comparison/surface.hpp"
+#include "algo/types/check_stop.hpp"
 #include "algo/types/errors.hpp"
 
 namespace plumb {
@@ -102,7 +103,9 @@ class Comparer {
   Comparison Run() {
     if (Align()) {
       Segment();
+      CheckStop(options_.stop);
       Heights();
+      CheckStop(options_.stop);
       if (Move()) Judge();
     }
     if (result_.reasons.empty()) Decide();
@@ -147,7 +150,9 @@ class Comparer {
     const double since_s = Now();
     reference_cloud_ = SceneCloud(reference_, Eigen::Affine3d::Identity());
     current_cloud_ = SceneCloud(current_, StretchedAlignment());
+    CheckStop(options_.stop);
     reference_body_ = FindBody(MakeSurface(reference_cloud_, kSegmentationSpacing_m, kSegmentationSmoothing_m));
+    CheckStop(options_.stop);
     current_body_ = FindBody(MakeSurface(current_cloud_, kSegmentationSpacing_m, kSegmentationSmoothing_m));
     if (!reference_body_.support) result_.warnings.push_back("no flat support was found in the reference scan: all of it counts as body");
     if (!current_body_.support) result_.warnings.push_back("no flat support was found in the current scan: all of it counts as body");
@@ -179,7 +184,7 @@ class Comparer {
                         : "the reference scan measured nothing inside the region; draw the region on the body");
     }
     const GridShape& grid = reference_.height_map->grid;
-    BodyMotionInput input{reference_cloud_, reference_body_, current_cloud_, current_body_, nullptr, *centroid};
+    BodyMotionInput input{reference_cloud_, reference_body_, current_cloud_, current_body_, nullptr, *centroid, options_.stop};
     if (!options_.region_polygon_m.empty()) {
       input.in_region = [&](const Eigen::Vector3d& p) {
         const auto cell = grid.cell(p.x(), p.y());

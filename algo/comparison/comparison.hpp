@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,7 @@ struct CompareOptions {
   double max_lost_s = 1.0;                       ///< Longest time without tracking in either scan.
 
   std::function<double()> now_s;  ///< Wall clock for `Comparison::timings_s`; none: no timings.
+  std::stop_token stop = {};      ///< Polled every few hundredths of a second.
 };
 
 /// Current scene onto reference scene, from the shared markers.
@@ -110,7 +112,7 @@ struct Comparison {
 ///
 /// @throws DataError if the scenes used another marker dictionary or marker length.
 /// @throws std::invalid_argument if an option is out of range (tolerances <= 0, a polygon of fewer than 3 points,
-///         values that are not finite).
+///         values that are not finite). Interrupted on a stop request.
 ///
 /// Thread-safe and deterministic: same input, same result, whatever the number of threads.
 [[nodiscard]] Comparison Compare(const Scene& reference, const Scene& current, const CompareOptions& options = {});

@@ -281,6 +281,14 @@ TEST(ComparisonTest, OtherMarkersAreBadInputAndBadOptionsAreTheCallersMistake) {
   EXPECT_THROW((void)Compare(PerfectReference(), PerfectReference(), options), std::invalid_argument);
 }
 
+TEST(ComparisonTest, StopsOnRequest) {
+  std::stop_source stop;
+  stop.request_stop();
+  CompareOptions options;
+  options.stop = stop.get_token();
+  EXPECT_THROW((void)Compare(PerfectReference(), PerfectReference(), options), Interrupted);
+}
+
 TEST(ComparisonTest, OneThreadAndTwoGiveTheSameBits) {
   const Pose T_motion = BodyMotionAbout({0.6, 0.45, 0.1}, {0.03, -0.02, 0}, 6);
   const Scene current = MakeSyntheticScene(MovedBy(T_motion, ReferenceOptions(BodyShape::kTorso, 0.001)));
