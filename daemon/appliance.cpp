@@ -295,19 +295,7 @@ void Appliance::OnUpdate(const ScanUpdate& update) {
   if (update.frames > 0 && scan_.update.frames == 0) scan_.first_frame_ms = Milliseconds(Clock::now() - scan_.started);
   scan_.update = update;
   Show();
-  const Json coverage = Coverage() ? Json(*Coverage()) : Json(nullptr);
-  TellEvent("progress", Json{{"scan", scan_.id},
-                             {"step", update.step},
-                             {"fraction", update.fraction},
-                             {"frames", update.frames},
-                             {"frames_tracked", update.frames_tracked},
-                             {"frames_dropped", update.frames_dropped},
-                             {"advice", Name(update.guidance.advice)},
-                             {"speed_m_s", update.guidance.speed_m_s},
-                             {"median_depth_m", update.guidance.median_depth_m},
-                             {"area_m2", update.guidance.area_m2},
-                             {"coverage", coverage}}
-                            .dump());
+  TellProgress();
   TellWeb(web::EventKind::kProgress);
 }
 

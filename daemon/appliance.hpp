@@ -115,6 +115,7 @@ class Appliance {
   [[nodiscard]] IndicatorPattern Pattern() const;
   void TellEvent(const char* event, const std::string& fields_json);
   void TellState();
+  void TellProgress();
   void TellWeb(web::EventKind kind);
   [[nodiscard]] std::optional<double> Coverage() const;
   [[nodiscard]] std::string FaultReason() const;

@@ -17,6 +17,20 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::json;
 
+/// What both the status and an event tell of a scan.
+Json ProgressFields(const ScanUpdate& update, std::optional<double> coverage) {
+  return {{"step", update.step},
+          {"fraction", update.fraction},
+          {"frames", update.frames},
+          {"frames_tracked", update.frames_tracked},
+          {"frames_dropped", update.frames_dropped},
+          {"advice", Name(update.guidance.advice)},
+          {"speed_m_s", update.guidance.speed_m_s},
+          {"median_depth_m", update.guidance.median_depth_m},
+          {"area_m2", update.guidance.area_m2},
+          {"coverage", coverage ? Json(*coverage) : Json(nullptr)}};
+}
+
 double WallSeconds() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
 double SecondsSince(Clock::time_point time) { return std::chrono::duration<double>(Clock::now() - time).count(); }
 
@@ -148,26 +162,23 @@ std::string Appliance::StatusLine() const {
   return line;
 }
 
+void Appliance::TellProgress() {
+  Json progress = ProgressFields(scan_.update, Coverage());
+  progress["scan"] = scan_.id;
+  TellEvent("progress", progress.dump());
+}
+
 std::string Appliance::StatusJson() {
   const SensorSnapshot sensor = sensors_->snapshot();
   const ScanUpdate& update = scan_.update;
   const bool is_running = state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking;
-  Json scan = {{"active", is_running},
-               {"id", scan_.id},
-               {"step", update.step},
-               {"fraction", update.fraction},
-               {"frames", update.frames},
-               {"frames_tracked", update.frames_tracked},
-               {"frames_dropped", update.frames_dropped},
-               {"advice", Name(update.guidance.advice)},
-               {"speed_m_s", update.guidance.speed_m_s},
-               {"median_depth_m", update.guidance.median_depth_m},
-               {"valid_depth", update.guidance.valid_depth},
-               {"area_m2", update.guidance.area_m2},
-               {"without_new_area_s", update.guidance.without_new_area_s},
-               {"coverage", Coverage() ? Json(*Coverage()) : Json(nullptr)},
-               {"first_frame_ms", scan_.first_frame_ms},
-               {"cancel_ms", scan_.cancel_ms}};
+  Json scan = ProgressFields(update, Coverage());
+  scan["active"] = is_running;
+  scan["id"] = scan_.id;
+  scan["valid_depth"] = update.guidance.valid_depth;
+  scan["without_new_area_s"] = update.guidance.without_new_area_s;
+  scan["first_frame_ms"] = scan_.first_frame_ms;
+  scan["cancel_ms"] = scan_.cancel_ms;
   Json last = nullptr;
   if (last_result_) {
     const ScanOutcome& outcome = last_result_->outcome;

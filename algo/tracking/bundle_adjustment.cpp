@@ -299,26 +299,6 @@ class Bundle {
     return x;
   }
 
-  static Vector17d CalibrationVector(const CalibrationModel& c) {
-    Vector17d x;
-    for (int i = 0; i < 6; ++i) x[kLens + i] = c.lens[static_cast<std::size_t>(i)];
-    x[kReadout] = c.readout_s[0];
-    x[kEdgeBias] = c.edge_bias_px[0];
-    for (int i = 0; i < CalibrationModel::kDepthSize; ++i) x[kDepth + i] = c.depth[static_cast<std::size_t>(i)];
-    return x;
-  }
-
-  // 1 / standard deviation of each prior.
-  static Vector17d PriorWeights() {
-    using C = CalibrationModel;
-    Vector17d w;
-    for (int i = 0; i < 6; ++i) w[kLens + i] = 1.0 / C::kLensSigma[static_cast<std::size_t>(i)];
-    w[kReadout] = 1.0 / C::kReadoutSigma;
-    w[kEdgeBias] = 1.0 / C::kEdgeBiasSigma;
-    for (int i = 0; i < C::kDepthSize; ++i) w[kDepth + i] = 1.0 / C::kDepthSigma[static_cast<std::size_t>(i)];
-    return w;
-  }
-
   // ---- linearisation -----------------------------------------------------------------------------------------------
 
   // Fills views_, points_, and the undamped H_ (lower half) and g_ of poses, markers and calibration, landmarks not yet eliminated.
@@ -503,7 +483,7 @@ class Bundle {
       camera.Prepare();
     }
     for (std::size_t m = 0; m < markers_.size(); ++m) next.markers[m] -= x.segment<6>(6 * static_cast<Eigen::Index>(free_.size() + m));
-    if (options_.calibrate) MoveCalibration(x.tail<kCalibrationSize>(), next.calibration);
+    if (options_.calibrate) MoveCalibration(-x.tail<kCalibrationSize>(), next.calibration);
     tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t s) {
       const PointSystem& point = points_[s];
       Eigen::Vector3d rest = point.g;
@@ -557,13 +537,6 @@ class Bundle {
       x = solver.solve(right);
     }
     return x.allFinite();
-  }
-
-  static void MoveCalibration(const Vector17d& x, CalibrationModel& c) {
-    for (int i = 0; i < 6; ++i) c.lens[static_cast<std::size_t>(i)] -= x[kLens + i];
-    c.readout_s[0] -= x[kReadout];
-    c.edge_bias_px[0] -= x[kEdgeBias];
-    for (int i = 0; i < CalibrationModel::kDepthSize; ++i) c.depth[static_cast<std::size_t>(i)] -= x[kDepth + i];
   }
 
   void Write(const State& state) {

@@ -13,6 +13,32 @@ Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& w) {
 
 }  // namespace
 
+Vector17d CalibrationVector(const CalibrationModel& c) {
+  Vector17d x;
+  for (int i = 0; i < 6; ++i) x[kLens + i] = c.lens[static_cast<std::size_t>(i)];
+  x[kReadout] = c.readout_s[0];
+  x[kEdgeBias] = c.edge_bias_px[0];
+  for (int i = 0; i < CalibrationModel::kDepthSize; ++i) x[kDepth + i] = c.depth[static_cast<std::size_t>(i)];
+  return x;
+}
+
+Vector17d PriorWeights() {
+  using C = CalibrationModel;
+  Vector17d w;
+  for (int i = 0; i < 6; ++i) w[kLens + i] = 1.0 / C::kLensSigma[static_cast<std::size_t>(i)];
+  w[kReadout] = 1.0 / C::kReadoutSigma;
+  w[kEdgeBias] = 1.0 / C::kEdgeBiasSigma;
+  for (int i = 0; i < C::kDepthSize; ++i) w[kDepth + i] = 1.0 / C::kDepthSigma[static_cast<std::size_t>(i)];
+  return w;
+}
+
+void MoveCalibration(const Vector17d& by, CalibrationModel& c) {
+  for (int i = 0; i < 6; ++i) c.lens[static_cast<std::size_t>(i)] += by[kLens + i];
+  c.readout_s[0] += by[kReadout];
+  c.edge_bias_px[0] += by[kEdgeBias];
+  for (int i = 0; i < CalibrationModel::kDepthSize; ++i) c.depth[static_cast<std::size_t>(i)] += by[kDepth + i];
+}
+
 void CameraState::Prepare() {
   T_camera_world = PoseFromTwist(twist).inverse() * T_camera0_world;
   R_inverse = RotationFromVector(-twist.head<3>());

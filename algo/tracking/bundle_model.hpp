@@ -22,6 +22,12 @@ inline constexpr int kDepth = 8;
 inline constexpr int kCalibrationSize = kDepth + CalibrationModel::kDepthSize;
 static_assert(kCalibrationSize == 17);
 
+/// Of a calibration, in these places.
+[[nodiscard]] Vector17d CalibrationVector(const CalibrationModel& calibration);
+/// 1 / standard deviation of each one's prior.
+[[nodiscard]] Vector17d PriorWeights();
+void MoveCalibration(const Vector17d& by, CalibrationModel& calibration);
+
 /// In front of the camera; nearer, projections mean nothing.
 inline constexpr double kNearestPoint_m = 0.02;
 

@@ -107,7 +107,9 @@ class Renderer {
   fs::path folder_;
 };
 
-SimulateOptions Simulate(const VirtualSensorOptions& options) {
+}  // namespace
+
+SimulateOptions ScenesOf(const VirtualSensorOptions& options) {
   const bool known_size = (options.width == 640 && options.height == 480) || (options.width == 320 && options.height == 240);
   if (!known_size) throw std::invalid_argument("the virtual sensor is 640x480 or 320x240");
   SimulateOptions simulate;
@@ -120,8 +122,6 @@ SimulateOptions Simulate(const VirtualSensorOptions& options) {
   simulate.height = options.height;
   return simulate;
 }
-
-}  // namespace
 
 fs::path DefaultVirtualSensorCache() {
   if (const char* cache = ::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache == '/') return fs::path(cache) / "plumb/virtual-sensor";
@@ -142,7 +142,7 @@ fs::path FindVirtualSensorRuntime() {
 VirtualSensor::VirtualSensor(const VirtualSensorOptions& options, const std::stop_token& stop,
                              const std::function<void(double, std::string_view)>& progress)
     : runtime_library_(options.runtime.empty() ? FindVirtualSensorRuntime() : options.runtime), frames_(options.frames) {
-  const Renderer renderer(options, Simulate(options));
+  const Renderer renderer(options, ScenesOf(options));
   const std::size_t total = renderer.plan().scenes.size();
   const std::size_t count = options.max_scenes == 0 ? total : std::min(total, options.max_scenes);
   std::vector<fs::path> caches;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "drivers/simulated/sensor_unit.hpp"
+#include "drivers/simulated/suite.hpp"
 #include "drivers/simulated/virtual_session.hpp"
 
 namespace plumb {
@@ -30,6 +31,9 @@ struct VirtualSensorOptions {
   std::filesystem::path runtime =
       {};  ///< Library of the private driver tree; empty: the one beside the program, see FindVirtualSensorRuntime().
 };
+
+/// The suite that the virtual sensor plays, as `plumb simulate` renders it. @throws std::invalid_argument for another image size.
+[[nodiscard]] SimulateOptions ScenesOf(const VirtualSensorOptions& options);
 
 /// $XDG_CACHE_HOME/plumb/virtual-sensor, else ~/.cache/plumb/virtual-sensor, else a folder of the system's temporary one.
 [[nodiscard]] std::filesystem::path DefaultVirtualSensorCache();

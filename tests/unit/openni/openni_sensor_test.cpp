@@ -26,18 +26,6 @@ using testing::MessageOf;
 using testing::SmallVirtualSensor;
 using testing::VirtualRig;
 
-SimulateOptions SameScenes(const VirtualSensorOptions& options) {
-  SimulateOptions simulate;
-  simulate.suite = options.suite;
-  simulate.seed = options.seed;
-  simulate.noise = options.noise;
-  simulate.frames = options.frames;
-  simulate.rate_hz = options.rate_hz;
-  simulate.width = options.width;
-  simulate.height = options.height;
-  return simulate;
-}
-
 std::vector<Frame> Take(LiveSensor& sensor, int count) {
   std::vector<Frame> frames;
   while (std::ssize(frames) < count) frames.push_back(sensor.Next().value());
@@ -50,7 +38,7 @@ TEST(OpenNiSensorTest, GivesTheSimulatorsSweepToTheBit) {
   const auto sensor = rig.provider.Open("");
   // The truth is rendered here again, without any of the code under test.
   const VirtualSensorOptions options = SmallVirtualSensor();
-  const auto source = simulated::MakeSource(simulated::PlanSuite(SameScenes(options)), 0);
+  const auto source = simulated::MakeSource(simulated::PlanSuite(ScenesOf(options)), 0);
   std::vector<Frame> truth;
   while (auto frame = source->Next()) truth.push_back(std::move(*frame));
   EXPECT_EQ(sensor->info().intrinsics, source->info().intrinsics);
