@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "algo/types/errors.hpp"
@@ -154,6 +155,7 @@ void Appliance::Act(ScanAction action) {
       return StartScan();
     case ScanAction::kEndSweep:
       limit_timer_.Disarm();
+      scan_.sensor_after = sensors_->snapshot().statistics;
       return sensors_->EndScan();
     case ScanAction::kCancelScan:
       limit_timer_.Disarm();
@@ -190,6 +192,7 @@ void Appliance::BeginSession() {
                        .purpose = scan_.purpose,
                        .sensor_serial = sensors_->snapshot().sensor.serial,
                        .reason = reference_reason_};
+  scan_.sensor_before = scan_.sensor_after = sensors_->snapshot().statistics;
   session_ = std::make_unique<ScanSession>(std::move(job), MakeCallbacks(record));
   sensors_->BeginScan(session_->feed());
   limit_timer_.ArmAfter(
@@ -268,26 +271,39 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
 }
 
 void Appliance::OnSensor(const SensorEvent& event) {
+  LogSensor(event);
+  const char* kNames[] = {"ready", "lost", "failed", "others"};
+  TellEvent("sensor", Json{{"what", kNames[static_cast<int>(event.kind)]},
+                           {"serial", event.sensor.serial},
+                           {"reason", event.reason},
+                           {"others", event.others}}
+                          .dump());
+  TellWeb(web::EventKind::kStatus);
+  if (event.kind == SensorEvent::Kind::kOthers) return;
   sensor_fault_ = event.reason;
-  switch (event.kind) {
-    case SensorEvent::Kind::kReady:
-      sensor_since_ = Clock::now();
-      Log(LogLevel::kInfo, "the sensor is ready", {{"SERIAL", event.sensor.serial}});
-      break;
-    case SensorEvent::Kind::kLost:
-      Log(LogLevel::kNotice, "no sensor is attached");
-      break;
-    case SensorEvent::Kind::kFailed:
-      Log(LogLevel::kError, fmt::format("the sensor does not work: {}", event.reason), {{"SERIAL", event.sensor.serial}});
-      break;
-  }
-  const char* kNames[] = {"ready", "lost", "failed"};
-  TellEvent("sensor",
-            Json{{"what", kNames[static_cast<int>(event.kind)]}, {"serial", event.sensor.serial}, {"reason", event.reason}}.dump());
   (void)Handle(event.kind == SensorEvent::Kind::kReady  ? ScanEvent::kSensorReady
                : event.kind == SensorEvent::Kind::kLost ? ScanEvent::kSensorLost
                                                         : ScanEvent::kSensorFailed);
-  TellWeb(web::EventKind::kStatus);
+}
+
+void Appliance::LogSensor(const SensorEvent& event) {
+  const std::string& serial = event.sensor.serial;
+  if (event.kind == SensorEvent::Kind::kLost) Log(LogLevel::kNotice, "no sensor is attached");
+  if (event.kind == SensorEvent::Kind::kFailed)
+    Log(LogLevel::kError, fmt::format("the sensor does not work: {}", event.reason), {{"SERIAL", serial}});
+  if (event.kind == SensorEvent::Kind::kReady) {
+    sensor_since_ = Clock::now();
+    Log(LogLevel::kInfo, "the sensor is ready", {{"SERIAL", serial}});
+    if (!last_serial_.empty() && last_serial_ != serial)
+      Log(LogLevel::kNotice, fmt::format("another sensor than before: {} instead of {}, with its own calibration", serial, last_serial_));
+    last_serial_ = serial;
+    for (const std::string& warning : sensors_->snapshot().info.warnings) Log(LogLevel::kWarning, warning, {{"SERIAL", serial}});
+  }
+  const bool has_others = event.kind == SensorEvent::Kind::kReady && !event.others.empty();
+  if (!has_others && event.kind != SensorEvent::Kind::kOthers) return;
+  Log(LogLevel::kNotice, event.others.empty() ? fmt::format("only the sensor {} is attached now", serial)
+                                              : fmt::format("{} sensors are attached: {} is used, {} not; appliance.sensor_serial chooses",
+                                                            event.others.size() + 1, serial, fmt::join(event.others, ", ")));
 }
 
 void Appliance::OnUpdate(const ScanUpdate& update) {
@@ -321,6 +337,13 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
         fmt::format("the scan is done {:.2f} s after its last frame, {} frames, {} dropped: {}", outcome.after_last_frame_s, outcome.frames,
                     outcome.frames_dropped, answer),
         {{"SCAN", scan_.id}});
+    const SensorStatistics images = scan_.images();
+    if (images.num_lost + images.num_unpaired + images.num_discarded > 0) {
+      Log(LogLevel::kWarning,
+          fmt::format("of the sensor's images {} were lost, {} without a partner, {} of a wrong size, twice or out of order",
+                      images.num_lost, images.num_unpaired, images.num_discarded),
+          {{"SCAN", scan_.id}});
+    }
     (void)Handle(ScanEvent::kScanDone);
     TellEvent("result", Json{{"scan", scan_.id}, {"answer", answer}}.dump());
   }

@@ -90,9 +90,17 @@ class Appliance {
     double first_frame_ms = 0.0;  ///< From the press to the first frame used.
     double cancel_ms = 0.0;       ///< From the cancellation to its end.
     std::chrono::steady_clock::time_point cancelled_at;
+    SensorStatistics sensor_before, sensor_after;  ///< Its counters when the scan began and ended.
     ScanUpdate update;
     ScanOutcome outcome;
     bool has_ended = false;
+    /// What the sensor counted during the sweep.
+    [[nodiscard]] SensorStatistics images() const {
+      return {.num_pairs = sensor_after.num_pairs - sensor_before.num_pairs,
+              .num_unpaired = sensor_after.num_unpaired - sensor_before.num_unpaired,
+              .num_discarded = sensor_after.num_discarded - sensor_before.num_discarded,
+              .num_lost = sensor_after.num_lost - sensor_before.num_lost};
+    }
   };
 
   void OpenStore();
@@ -105,6 +113,7 @@ class Appliance {
   [[nodiscard]] ScanCallbacks MakeCallbacks(const NewScan& scan);
   [[nodiscard]] CompareOptions CompareOptionsFor(const web::ReferencePlan& plan) const;
   void OnSensor(const SensorEvent& event);
+  void LogSensor(const SensorEvent& event);
   void OnUpdate(const ScanUpdate& update);
   void OnEnded(const ScanOutcome& outcome);
   void OnTick();
@@ -131,6 +140,7 @@ class Appliance {
   CurrentScan scan_;
   std::optional<CurrentScan> last_result_;
   std::chrono::steady_clock::time_point sensor_since_;
+  std::string last_serial_;  ///< Of the sensor that was used last.
   IndicatorPattern shown_ = IndicatorPattern::kOff;
   std::function<void(const std::string&)> tell_watchers_;
   std::function<void(web::EventKind)> tell_web_;

@@ -189,6 +189,9 @@ std::string Appliance::StatusJson() {
             {"correction", nullptr},
             {"frames", outcome.frames},
             {"frames_dropped", outcome.frames_dropped},
+            {"images_lost", last_result_->images().num_lost},
+            {"images_unpaired", last_result_->images().num_unpaired},
+            {"images_discarded", last_result_->images().num_discarded},
             {"after_last_frame_s", outcome.after_last_frame_s}};
     if (!outcome.result_json.empty()) {
       const Json result = Json::parse(outcome.result_json);
@@ -209,7 +212,11 @@ std::string Appliance::StatusJson() {
                          {"fps", sensor.present ? sensor.statistics.frames_per_second : 0.0},
                          {"pairs", sensor.statistics.num_pairs},
                          {"unpaired", sensor.statistics.num_unpaired},
-                         {"discarded", sensor.statistics.num_discarded}}},
+                         {"discarded", sensor.statistics.num_discarded},
+                         {"lost", sensor.statistics.num_lost},
+                         {"calibrated", sensor.present && !sensor.info.intrinsics_assumed},
+                         {"warnings", sensor.info.warnings},
+                         {"others", sensor.others}}},
                        {"scan", scan},
                        {"last_result", last},
                        {"light", Name(shown_)},

@@ -143,14 +143,14 @@ class Sensors {
   }
 
   /// Does what `sim ACTION` asks. @throws DeviceError
-  void Simulate(const std::string& action) const {
+  void Simulate(const std::string& command) const {
 #ifdef PLUMB_WITH_OPENNI
     if (virtual_) {
-      (void)virtual_->Command(action);
+      (void)virtual_->Command(command);
       return;
     }
 #endif
-    throw DeviceError(fmt::format("sim {}: there is no virtual sensor; start plumbd with --simulated", action));
+    throw DeviceError(fmt::format("sim {}: there is no virtual sensor; start plumbd with --simulated", command));
   }
 
  private:
@@ -283,10 +283,10 @@ class Plumbd {
       case Kind::kSim:
         break;
     }
-    const bool posted = device_thread_.Post([this, reply, action = request.action] {
+    const bool posted = device_thread_.Post([this, reply, command = fmt::format("{} {}", request.action, request.argument)] {
       std::string answer = ControlDone();
       try {
-        sensors_.Simulate(action);
+        sensors_.Simulate(command);
       } catch (const DeviceError& error) {
         answer = ControlRefusal(error.what());
       }

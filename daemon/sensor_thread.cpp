@@ -45,8 +45,9 @@ struct SensorThread::Impl {
   std::atomic<double> heartbeat = SteadySeconds();
 
   std::unique_ptr<SensorProvider> provider;
-  std::shared_ptr<LiveFeed> feed;  // where the frames go
-  bool ready = false;              // kReady was told for this sensor
+  std::shared_ptr<LiveFeed> feed;   // where the frames go
+  std::weak_ptr<LiveFeed> spoiled;  // its sensor went: what comes from the next one does not belong to it
+  bool ready = false;               // kReady was told for this sensor
   std::optional<SensorEvent::Kind> told;
   std::string told_reason;
   std::chrono::milliseconds retry;
@@ -122,7 +123,36 @@ struct SensorThread::Impl {
     const std::lock_guard lock(mutex);
     sensor = std::move(opened);
     ready = false;
-    current = {.present = false, .sensor = sensor->description(), .statistics = {}, .info = sensor->info()};
+    current = {.present = false,
+               .sensor = sensor->description(),
+               .statistics = {},
+               .info = sensor->info(),
+               .others = Others(attached, sensor->description())};
+  }
+
+  static std::vector<std::string> Others(const std::vector<SensorDescription>& attached, const SensorDescription& used) {
+    std::vector<std::string> others;
+    for (const SensorDescription& one : attached) {
+      if (one.uri != used.uri) others.push_back(one.serial);
+    }
+    return others;
+  }
+
+  /// Who else is there now? Asking a new unit for its serial takes its time, so not while a scan runs.
+  void LookForOthers() {
+    {
+      const std::lock_guard lock(mutex);
+      if (feed || !ready || !std::exchange(bus_changed, false)) return;
+    }
+    const std::vector<SensorDescription> attached = provider->List();
+    std::vector<std::string> others = Others(attached, sensor->description());
+    if (others.size() == attached.size()) return;  // the one in use is gone: Next() will say so
+    {
+      const std::lock_guard lock(mutex);
+      if (others == current.others) return;
+      current.others = std::move(others);
+    }
+    Notify(SensorEvent::Kind::kOthers, {});
   }
 
   void Wait(const std::stop_token& stop) {
@@ -134,6 +164,7 @@ struct SensorThread::Impl {
 
   void Read(const std::stop_token& stop) {
     SwitchFeed();
+    LookForOthers();
     std::optional<Frame> frame = sensor->Next();
     if (!frame) {
       if (!stop.stop_requested()) throw DeviceError("the sensor's stream ended");
@@ -146,7 +177,7 @@ struct SensorThread::Impl {
       current.present = true;
       current.statistics = sensor->statistics();
       newest = *frame;
-      if (wanted != feed) return;  // a scan began or ended while this frame was on its way
+      if (WantedFeed() != feed) return;  // a scan began or ended while this frame was on its way
       is_new = !std::exchange(ready, true);
     }
     if (feed) feed->Push(std::move(*frame));
@@ -156,11 +187,14 @@ struct SensorThread::Impl {
     }
   }
 
+  /// Needs the lock.
+  [[nodiscard]] std::shared_ptr<LiveFeed> WantedFeed() const { return wanted && wanted == spoiled.lock() ? nullptr : wanted; }
+
   void SwitchFeed() {
     std::shared_ptr<LiveFeed> next;
     {
       const std::lock_guard lock(mutex);
-      next = wanted;
+      next = WantedFeed();
     }
     if (next == feed) return;
     feed = next;
@@ -171,7 +205,7 @@ struct SensorThread::Impl {
   }
 
   void Drop() {
-    feed.reset();
+    if (feed) spoiled = std::exchange(feed, nullptr);
     std::shared_ptr<LiveSensor> gone;
     const std::lock_guard lock(mutex);
     gone = std::move(sensor);
@@ -184,11 +218,19 @@ struct SensorThread::Impl {
     if (told == kind && told_reason == reason && kind != SensorEvent::Kind::kReady) return;
     told = kind;
     told_reason = reason;
-    SensorEvent event{.kind = kind, .sensor = {}, .reason = reason};
+    if (kind == SensorEvent::Kind::kLost) {
+      const std::lock_guard lock(mutex);
+      current = {};
+    }
+    Notify(kind, reason);
+  }
+
+  void Notify(SensorEvent::Kind kind, const std::string& reason) {
+    SensorEvent event{.kind = kind, .sensor = {}, .reason = reason, .others = {}};
     {
       const std::lock_guard lock(mutex);
-      if (kind == SensorEvent::Kind::kLost) current = {};
       event.sensor = current.sensor;
+      event.others = current.others;
     }
     notify(event);
   }

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/live_feed.hpp"
 #include "drivers/sensor.hpp"
@@ -22,10 +23,11 @@ struct SensorThreadOptions {
 
 /// What happened to the sensor.
 struct SensorEvent {
-  enum class Kind { kReady, kLost, kFailed };
+  enum class Kind { kReady, kLost, kFailed, kOthers };
   Kind kind = Kind::kLost;
-  SensorDescription sensor;  ///< kReady, and kFailed where known.
-  std::string reason;        ///< kFailed: a sentence with a remedy.
+  SensorDescription sensor;         ///< kReady, kOthers, and kFailed where known.
+  std::string reason;               ///< kFailed: a sentence with a remedy.
+  std::vector<std::string> others;  ///< kReady, kOthers: serials of the units that are attached and not used.
 };
 
 /// What is known of the sensor now.
@@ -34,6 +36,7 @@ struct SensorSnapshot {
   SensorDescription sensor;
   SensorStatistics statistics;
   StreamInfo info;
+  std::vector<std::string> others;  ///< Serials of the units that are attached and not used; not looked for while a scan runs.
 };
 
 /// Reads all the time, so that an unplugged or stalled sensor is noticed while nobody scans, too. While a scan runs the frames go to its
@@ -41,7 +44,8 @@ struct SensorSnapshot {
 class SensorThread {
  public:
   /// @param make_provider  Called on the sensor thread, again after it threw DeviceError.
-  /// @param notify  Called on the sensor thread for each event; it posts to the loop. kReady comes with the first frame.
+  /// @param notify  Called on the sensor thread for each event; it posts to the loop. kReady comes with the first frame, kOthers when the
+  ///                units that are not used became others.
   SensorThread(std::function<std::unique_ptr<SensorProvider>()> make_provider, SensorThreadOptions options,
                std::function<void(const SensorEvent&)> notify);
   ~SensorThread();
@@ -49,6 +53,7 @@ class SensorThread {
   SensorThread& operator=(const SensorThread&) = delete;
 
   /// From now on frames go to the feed; those that arrived before do not. Exposure stands still until EndScan().
+  /// Of a sensor that comes back meanwhile, or of another one, the feed gets nothing.
   void BeginScan(std::shared_ptr<LiveFeed> feed);
   /// Closes the feed.
   void EndScan();

@@ -26,6 +26,7 @@ struct SensorStatistics {
   std::int64_t num_pairs = 0;      ///< Handed out by Next().
   std::int64_t num_unpaired = 0;   ///< Images of either stream without a partner close in time.
   std::int64_t num_discarded = 0;  ///< Images of the wrong size, doubled or out of order.
+  std::int64_t num_lost = 0;       ///< Images that were taken and never came: the library keeps only the newest of each stream.
   double frames_per_second = 0.0;  ///< Over the last second.
 };
 
@@ -44,7 +45,8 @@ class LiveSensor : public FrameSource {
   /// Exposure and white balance stand still (true, while scanning) or adapt (false), where the sensor can.
   virtual void LockExposure(bool locked) = 0;
 
-  // Next() throws DeviceLost once the sensor is unplugged, DeviceError if no pair arrives for the stall time or the driver reports an error.
+  // Next() throws DeviceLost once the sensor is unplugged, DeviceError if no pair arrives for the stall time or the driver reports an
+  // error.
 };
 
 /// The sensors of one library. All functions belong to one thread, but the listener is called on the driver's own.

@@ -8,8 +8,10 @@
 #include <cstring>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -90,6 +92,14 @@ std::string StatusText(const Json& status) {
   text += sensor.value("present", false) ? fmt::format("sensor   {} ({}), {:.1f} pairs/s\n", sensor.value("serial", ""),
                                                        sensor.value("name", ""), sensor.value("fps", 0.0))
                                          : std::string("sensor   none\n");
+  for (const Json& other : sensor.value("others", Json::array()))
+    text += fmt::format("         {} is attached too, and not used\n", other.is_string() ? other.get<std::string>() : "");
+  for (const Json& warning : sensor.value("warnings", Json::array()))
+    text += fmt::format("         {}\n", warning.is_string() ? warning.get<std::string>() : "");
+  if (const auto lost = sensor.value("lost", 0) + sensor.value("unpaired", 0) + sensor.value("discarded", 0); lost > 0) {
+    text += fmt::format("         images: {} lost, {} unpaired, {} discarded\n", sensor.value("lost", 0), sensor.value("unpaired", 0),
+                        sensor.value("discarded", 0));
+  }
   if (scan.value("active", false)) {
     text +=
         fmt::format("scan     {} {}: {} frames, {} tracked, {} dropped; {}\n", scan.value("id", ""), scan.value("step", ""),
@@ -113,13 +123,14 @@ std::string StatusText(const Json& status) {
 
 /// Presses are ignored in some states: that is no failure, but it is said.
 int Press(bool is_long, const CommandContext& context) {
-  const Json answer = Ask(context.control, {.kind = ControlRequest::Kind::kPress, .is_long = is_long, .action = {}}, context);
+  const Json answer =
+      Ask(context.control, {.kind = ControlRequest::Kind::kPress, .is_long = is_long, .action = {}, .argument = {}}, context);
   PrintOut(answer.value("ok", false) ? std::string("pressed\n") : fmt::format("ignored: {}\n", answer.value("error", "no reason given")));
   return kDone;
 }
 
-int Simulate(const std::string& action, const CommandContext& context) {
-  const Json answer = Ask(context.control, {.kind = ControlRequest::Kind::kSim, .is_long = false, .action = action}, context);
+int Simulate(const ControlRequest& request, const CommandContext& context) {
+  const Json answer = Ask(context.control, request, context);
   if (!answer.value("ok", false)) throw DeviceError(answer.value("error", "refused without a reason"));
   return kDone;
 }
@@ -152,7 +163,7 @@ int Status(const StatusOptions& options, const CommandContext& context) {
 }
 
 int Watch(const CommandContext& context) {
-  ControlConnection connection(context.control, {.kind = ControlRequest::Kind::kWatch, .is_long = false, .action = {}});
+  ControlConnection connection(context.control, {.kind = ControlRequest::Kind::kWatch, .is_long = false, .action = {}, .argument = {}});
   while (const std::optional<std::string> line = connection.ReadLine(context.stop, std::nullopt)) PrintOut(*line + "\n");
   throw DeviceError("plumbd hung up");
 }
@@ -175,11 +186,24 @@ Command AddPress(CLI::App& app) {
 Command AddWatch(CLI::App&) { return Watch; }
 
 Command AddSim(CLI::App& app) {
-  auto action = std::make_shared<std::string>();
-  app.add_option("action", *action, "What happens to the virtual sensor")
+  struct Options {
+    std::string action;
+    std::vector<std::string> words;
+  };
+  auto options = std::make_shared<Options>();
+  app.add_option("action", options->action, "What happens to the virtual sensor")
       ->required()
-      ->check(CLI::IsMember({"plug", "unplug", "stall", "resume", "error", "next-scene"}));
-  return [action](const CommandContext& context) { return Simulate(*action, context); };
+      ->check(CLI::IsMember({"plug", "unplug", "stall", "resume", "error", "next-scene", "glitch"}));
+  app.add_option("argument", options->words,
+                 "A unit's serial; with glitch: late, double, old, size or lone, and for how many pairs of images")
+      ->expected(0, 2);
+  return [options](const CommandContext& context) {
+    return Simulate({.kind = ControlRequest::Kind::kSim,
+                     .is_long = false,
+                     .action = options->action,
+                     .argument = fmt::format("{}", fmt::join(options->words, " "))},
+                    context);
+  };
 }
 
 }  // namespace plumb

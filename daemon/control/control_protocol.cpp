@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <initializer_list>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -15,7 +17,14 @@ namespace {
 using Json = nlohmann::json;
 using Kind = ControlRequest::Kind;
 
-constexpr std::array<std::string_view, 6> kActions = {"plug", "unplug", "stall", "resume", "error", "next-scene"};
+constexpr std::array<std::string_view, 7> kActions = {"plug", "unplug", "stall", "resume", "error", "next-scene", "glitch"};
+constexpr std::size_t kMaxArgument = 80;
+
+/// The argument goes on to the virtual sensor in one line with the action.
+bool IsWords(const std::string& text) {
+  return text.size() <= kMaxArgument &&
+         std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_' || c == ' '; });
+}
 
 bool IsFlat(const Json& json) {
   return std::all_of(json.begin(), json.end(), [](const Json& value) { return !value.is_structured(); });
@@ -36,29 +45,34 @@ ControlRequest ParseControlRequest(std::string_view line) {
     const auto value = json.find(key);
     return value != json.end() && value->is_string() ? value->get<std::string>() : std::string();
   };
-  const auto allow_only = [&](const char* key) {
+  const auto allow_only = [&](std::initializer_list<std::string_view> keys) {
     for (const auto& [name, value] : json.items()) {
-      if (name != "command" && name != key) throw DataError(fmt::format("unknown key '{}' in the request", name.substr(0, 32)));
+      if (std::find(keys.begin(), keys.end(), name) == keys.end())
+        throw DataError(fmt::format("unknown key '{}' in the request", name.substr(0, 32)));
     }
   };
   ControlRequest request;
   const std::string command = text("command");
   if (command == "status" || command == "watch") {
     request.kind = command == "status" ? Kind::kStatus : Kind::kWatch;
-    allow_only("command");
+    allow_only({"command"});
   } else if (command == "press") {
     request.kind = Kind::kPress;
-    allow_only("long");
+    allow_only({"command", "long"});
     if (const auto is_long = json.find("long"); is_long != json.end()) {
       if (!is_long->is_boolean()) throw DataError("press: \"long\" is true or false");
       request.is_long = is_long->get<bool>();
     }
   } else if (command == "sim") {
     request.kind = Kind::kSim;
-    allow_only("action");
+    allow_only({"command", "action", "argument"});
     request.action = text("action");
     if (std::find(kActions.begin(), kActions.end(), request.action) == kActions.end()) {
       throw DataError(fmt::format("sim: expected an action of {}", fmt::join(kActions, ", ")));
+    }
+    request.argument = text("argument");
+    if ((json.contains("argument") && !json["argument"].is_string()) || !IsWords(request.argument)) {
+      throw DataError(fmt::format("sim: \"argument\" is at most {} letters, digits, spaces, - and _", kMaxArgument));
     }
   } else {
     throw DataError("expected a command of status, press, watch, sim");
@@ -77,7 +91,9 @@ std::string ControlRequestText(const ControlRequest& request) {
     case Kind::kSim:
       break;
   }
-  return Json{{"command", "sim"}, {"action", request.action}}.dump();
+  Json sim = {{"command", "sim"}, {"action", request.action}};
+  if (!request.argument.empty()) sim["argument"] = request.argument;
+  return sim.dump();
 }
 
 std::string ControlDone() { return R"({"ok":true})"; }

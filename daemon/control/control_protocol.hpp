@@ -9,12 +9,13 @@ namespace plumb {
 
 inline constexpr std::size_t kMaxControlLine = 4096;  ///< Bytes of a request.
 
-/// {"command": "status" | "press" | "watch" | "sim", "long": bool with press, "action": text with sim}
+/// {"command": "status" | "press" | "watch" | "sim", "long": bool with press, "action" and, optional, "argument": texts with sim}
 struct ControlRequest {
   enum class Kind { kStatus, kPress, kWatch, kSim };
   Kind kind = Kind::kStatus;
   bool is_long = false;  ///< kPress
-  std::string action;    ///< kSim: one of plug, unplug, stall, resume, error, next-scene.
+  std::string action;    ///< kSim: one of plug, unplug, stall, resume, error, next-scene, glitch.
+  std::string argument;  ///< kSim: a serial, or what kind of glitch and how often; words of letters, digits, - and _.
   bool operator==(const ControlRequest&) const = default;
 };
 

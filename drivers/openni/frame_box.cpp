@@ -31,7 +31,10 @@ void FrameBox::Add(StreamKind kind, std::int64_t stamp_us, cv::Mat image) {
     arrivals_.push_back(last_arrival_);
     while (arrivals_.front() + kRateWindow < last_arrival_) arrivals_.pop_front();
     pairs_.push_back({std::move(*pair), next_index_++});
-    if (pairs_.size() > kCapacity) pairs_.pop_front();
+    if (pairs_.size() > kCapacity) {
+      pairs_.pop_front();
+      num_lost_ += 2;
+    }
   }
   changed_.notify_all();
 }
@@ -39,6 +42,14 @@ void FrameBox::Add(StreamKind kind, std::int64_t stamp_us, cv::Mat image) {
 void FrameBox::CountDiscarded() {
   const std::lock_guard lock(mutex_);
   ++num_discarded_;
+}
+
+void FrameBox::CountGaps(StreamKind kind, std::int64_t number) {
+  const std::lock_guard lock(mutex_);
+  std::optional<std::int64_t>& last = last_number_[Side(kind)];
+  if (last && number <= *last) return;  // doubled or out of order: counted as such
+  if (last) num_lost_ += number - *last - 1;
+  last = number;
 }
 
 void FrameBox::Lose() noexcept {
@@ -115,6 +126,7 @@ SensorStatistics FrameBox::statistics() const {
   statistics.num_pairs = num_taken_;
   statistics.num_unpaired = pairing_.num_unpaired();
   statistics.num_discarded = pairing_.num_discarded() + num_discarded_;
+  statistics.num_lost = num_lost_;
   const Clock::time_point begin = Clock::now() - kRateWindow;
   for (const Clock::time_point& arrival : arrivals_) statistics.frames_per_second += arrival > begin ? 1.0 : 0.0;
   return statistics;

@@ -32,6 +32,8 @@ class FrameBox {
 
   void Add(StreamKind kind, std::int64_t stamp_us, cv::Mat image);
   void CountDiscarded();
+  /// Numbers of the images of a stream as the driver counts them, of wrong ones too: a gap shows what never came.
+  void CountGaps(StreamKind kind, std::int64_t number);
   void Lose() noexcept;                  ///< The unit is gone for good.
   void SetFailed(bool failed) noexcept;  ///< The driver reports an error, or that it is over.
   void Interrupt() noexcept;             ///< For good.
@@ -60,6 +62,8 @@ class FrameBox {
   std::int64_t next_index_ = 0;
   std::int64_t num_taken_ = 0;
   std::int64_t num_discarded_ = 0;
+  std::int64_t num_lost_ = 0;
+  std::array<std::optional<std::int64_t>, 2> last_number_;
   std::array<std::vector<std::int64_t>, 2> stamps_us_;  ///< Of all images that came, colour and depth.
   bool keep_stamps_ = false;
   int skip_ = 0;

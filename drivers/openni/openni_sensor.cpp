@@ -110,6 +110,7 @@ OpenNiSensor::~OpenNiSensor() { StreamWaiter::Of(*streams_->library).Remove(wait
 
 void OpenNiSensor::Accept(StreamKind kind, const OniFrame& frame) {
   const bool is_color = kind == StreamKind::kColor;
+  box_->CountGaps(kind, frame.frameIndex);
   const int row_bytes = streams_->width * (is_color ? 3 : 2);
   const bool fits = frame.width == streams_->width && frame.height == streams_->height && frame.stride >= row_bytes &&
                     frame.data != nullptr && frame.dataSize / frame.stride >= frame.height &&

@@ -27,15 +27,6 @@ class DaemonFaultTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() { testing::RenderOnce(); }
 
-  static void ScanOnce(Plumbd& plumbd) {
-    ASSERT_EQ(plumbd.Press()["ok"], true);
-    plumbd.WaitFor("the end of the sweep", [](const json& status) {
-      return status["state"] == "scanning" && status["scan"]["frames"].get<int>() + status["scan"]["frames_dropped"].get<int>() >= 120;
-    });
-    ASSERT_EQ(plumbd.Press()["ok"], true);
-    plumbd.WaitForState("result");
-  }
-
   /// Folders of scans, hidden ones too.
   [[nodiscard]] static std::vector<std::string> ScanFolders(const fs::path& state) {
     std::vector<std::string> names;
@@ -84,7 +75,7 @@ TEST_F(DaemonFaultTest, UnpluggedWhileScanningThePartialScanIsDiscarded) {
   EXPECT_TRUE(ScanFolders(plumbd.state()).empty());
   plumbd.Sim("plug");
   plumbd.WaitForState("ready");
-  ScanOnce(plumbd);
+  plumbd.ScanOnce();
   EXPECT_EQ(ScanFolders(plumbd.state()), std::vector<std::string>{"000002"}) << "the number of the lost scan is not used again";
 }
 
@@ -199,7 +190,7 @@ TEST_F(DaemonFaultTest, KilledAtAnyMomentNothingIsHalf) {
     Plumbd plumbd(folder_.path());
     ASSERT_TRUE(plumbd.WaitUntilUp());
     plumbd.WaitForState("ready");
-    ScanOnce(plumbd);  // the reference
+    plumbd.ScanOnce();  // the reference
     plumbd.Signal(SIGKILL);
     EXPECT_EQ(plumbd.Wait(), -SIGKILL);
   }
@@ -232,7 +223,7 @@ TEST_F(DaemonFaultTest, AFullDiskFailsTheScanWithAReasonAndKeepsTheReference) {
     Plumbd plumbd(folder_.path());
     ASSERT_TRUE(plumbd.WaitUntilUp());
     plumbd.WaitForState("ready");
-    ScanOnce(plumbd);
+    plumbd.ScanOnce();
     EXPECT_EQ(plumbd.Stop(), 0);
   }
   {
@@ -308,15 +299,12 @@ TEST_F(DaemonFaultTest, SighupTakesAGoodConfigurationAndKeepsTheOldOneForABadOne
   Plumbd plumbd(folder_.path(), {.arguments = {"--config", config}});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
-  const auto wait_for_log = [&](const std::string& text) {
-    plumbd.WaitFor(text, [&](const json&) { return plumbd.log().find(text) != std::string::npos; });
-  };
   std::ofstream(config) << "[appliance]\nscan_limit_s = -1\n";
   plumbd.Signal(SIGHUP);
-  wait_for_log("plumb.toml:2");
+  plumbd.WaitForLog("plumb.toml:2");
   std::ofstream(config) << "[appliance]\nscan_limit_s = 1\n";
   plumbd.Signal(SIGHUP);
-  wait_for_log("read again");
+  plumbd.WaitForLog("read again");
   plumbd.Press();
   plumbd.WaitForState("result");
   EXPECT_THAT(plumbd.log(), HasSubstr("longest sweep")) << "the new limit holds";
@@ -355,7 +343,7 @@ TEST_F(DaemonFaultTest, AClockThatStepsDisturbsNoTimer) {
   std::ofstream(folder_ / "offset") << 86400 * 30;
   EXPECT_EQ(plumbd.WaitForState("result")["last_result"]["is_reference"], true) << "neither cut short nor without end";
   std::ofstream(folder_ / "offset") << -86400;
-  ScanOnce(plumbd);
+  plumbd.ScanOnce();
   EXPECT_EQ(plumbd.Stop(), 0);
   Store store(folder_ / "state");
   const std::vector<web::Scan> scans = store.Scans("", 10);

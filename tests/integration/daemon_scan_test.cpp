@@ -6,10 +6,9 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "algo/types/pose.hpp"
 #include "algo/types/units.hpp"
 #include "drivers/replay/file_io.hpp"
-#include "drivers/simulated/suite_plan.hpp"
+#include "tests/support/demo_truth.hpp"
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
 
@@ -28,45 +27,20 @@ class DaemonScanTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() { testing::RenderOnce(); }
 
-  /// Presses, lets the sweep play, presses again, waits for the result.
-  static json ScanOnce(Plumbd& plumbd) {
-    EXPECT_EQ(plumbd.Press()["ok"], true);
-    plumbd.WaitFor("the end of the sweep", [](const json& status) {
-      return status["state"] == "scanning" && status["scan"]["frames"].get<int>() + status["scan"]["frames_dropped"].get<int>() >= 120;
-    });
-    EXPECT_EQ(plumbd.Press()["ok"], true);
-    return plumbd.WaitForState("result");
-  }
-
   static json ReadJson(const fs::path& file) { return json::parse(ReadTextFile(file, 1 << 24)); }
 
   testing::TempFolder folder_;
 };
-
-/// True motion of the body between the demo's two scenes, in the reference marker's frame; from the simulator's plan, not from images.
-Pose TrueMotion() {
-  SimulateOptions options;
-  options.frames = 120;
-  options.rate_hz = 30;
-  options.width = 320;
-  options.height = 240;
-  const simulated::SuitePlan plan = simulated::PlanSuite(options);
-  Pose T_world_marker = Pose::Identity();
-  for (const simulated::Board& board : plan.room.boards) {
-    if (board.id == plan.reference_marker) T_world_marker = board.T_world_marker;
-  }
-  return T_world_marker.inverse() * plan.scenes[1].T_world_body * plan.scenes[0].T_world_body.inverse() * T_world_marker;
-}
 
 TEST_F(DaemonScanTest, TwoPressesAndTwoMoreGiveTheSixNumbersOfTheBodysTrueMotion) {
   Plumbd plumbd(folder_.path());
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   EXPECT_THAT(plumbd.notifications(), HasSubstr("READY=1"));
-  const json first = ScanOnce(plumbd);
+  const json first = plumbd.ScanOnce();
   EXPECT_EQ(first["last_result"]["is_reference"], true);
   EXPECT_EQ(plumbd.Sim("next-scene")["ok"], true);
-  const json second = ScanOnce(plumbd);
+  const json second = plumbd.ScanOnce();
   const json last = second["last_result"];
   EXPECT_EQ(last["verdict"], "move");
   for (const char* name : kSixNumbers) EXPECT_TRUE(last[name].is_number()) << name;
@@ -75,16 +49,10 @@ TEST_F(DaemonScanTest, TwoPressesAndTwoMoreGiveTheSixNumbersOfTheBodysTrueMotion
   EXPECT_TRUE(fs::exists(scan / "scene" / "scene.json"));
   const json result = ReadJson(scan / "result" / "result.json");
   for (const char* name : kSixNumbers) EXPECT_EQ(last[name], result["correction"][name]) << name;
-  Pose M;
-  for (int r = 0; r < 4; ++r) {
-    for (int c = 0; c < 4; ++c) M.matrix()(r, c) = result["motion"]["T"][r][c];
-  }
-  const Pose M_true = TrueMotion();
-  const auto& c = result["motion"]["centroid_m"];
-  const Eigen::Vector3d centroid(c[0], c[1], c[2]);
   // A quarter of the pixels at twice the usual speed; the motion itself is 50 mm and 3.4 deg. A wrong sign or frame misses by that much.
-  EXPECT_LT((M * centroid - M_true * centroid).norm(), 12 * kMillimetre);
-  EXPECT_LT(RotationAngle(M * M_true.inverse()), 1.0 * kDegree);
+  const testing::MotionError error = testing::ErrorOfMotion(result);
+  EXPECT_LT(error.translation_m, 12 * kMillimetre);
+  EXPECT_LT(error.rotation_rad, 1.0 * kDegree);
   ::testing::Test::RecordProperty("after_last_frame_s", last["after_last_frame_s"].dump());
   std::printf("result %.2f s after the last frame, first frame used %.0f ms after the press, %d frames dropped\n",
               last["after_last_frame_s"].get<double>(), second["scan"]["first_frame_ms"].get<double>(), last["frames_dropped"].get<int>());
@@ -98,9 +66,9 @@ TEST_F(DaemonScanTest, TheResultIsTheSameWhenTheRecordingIsComputedAgain) {
   Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
-  ScanOnce(plumbd);
+  plumbd.ScanOnce();
   ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
-  const json live = ScanOnce(plumbd)["last_result"];
+  const json live = plumbd.ScanOnce()["last_result"];
   ASSERT_EQ(plumbd.Stop(), 0);
   for (const char* id : {"000001", "000002"}) {
     const fs::path recording = plumbd.state() / "scans" / id / "recording";

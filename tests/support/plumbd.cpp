@@ -143,6 +143,19 @@ json Plumbd::WaitForFrames(int frames) {
   return WaitFor("frames", [&](const json& status) { return status["scan"]["active"] == true && status["scan"]["frames"] >= frames; });
 }
 
+void Plumbd::WaitForLog(const std::string& text) {
+  WaitFor("log: " + text, [&](const json&) { return log().find(text) != std::string::npos; });
+}
+
+json Plumbd::ScanOnce() {
+  EXPECT_EQ(Press()["ok"], true);
+  WaitFor("the end of the sweep", [](const json& status) {
+    return status["state"] == "scanning" && status["scan"]["frames"].get<int>() + status["scan"]["frames_dropped"].get<int>() >= 120;
+  });
+  EXPECT_EQ(Press()["ok"], true);
+  return WaitForState("result");
+}
+
 void Plumbd::Signal(int signal) const { ::kill(pid_, signal); }
 
 int Plumbd::Wait() {

@@ -40,10 +40,16 @@ class Plumbd {
   nlohmann::json WaitForState(const std::string& state);
   /// Until the scan has taken at least so many frames.
   nlohmann::json WaitForFrames(int frames);
+  /// Until plumbd has logged the text.
+  void WaitForLog(const std::string& text);
+  /// Presses, lets the sweep play, presses again, waits for the result.
+  nlohmann::json ScanOnce();
 
   [[nodiscard]] nlohmann::json Status() const { return Ask({{"command", "status"}}); }
   nlohmann::json Press(bool is_long = false) const { return Ask({{"command", "press"}, {"long", is_long}}); }
-  nlohmann::json Sim(const std::string& action) const { return Ask({{"command", "sim"}, {"action", action}}); }
+  nlohmann::json Sim(const std::string& action, const std::string& argument = {}) const {
+    return Ask({{"command", "sim"}, {"action", action}, {"argument", argument}});
+  }
   /// One request, one answer; an empty object if nobody answers.
   [[nodiscard]] nlohmann::json Ask(const nlohmann::json& request) const;
 

@@ -143,8 +143,8 @@ void VirtualDevice::Tick(const std::stop_token& stop) {
   } else {
     shown.stamps = {device_us_, device_us_ + loaded_stamps_.depth_us - loaded_stamps_.color_us};
   }
-  shown.frame_index = ++frame_index_;
   if (unit_->silent()) return;
+  shown.frame_index = ++frame_index_;
   if (unit_->glitch == Glitch::kLate && unit_->glitches_left > 0)
     SleepUntil(Clock::now() + std::chrono::microseconds(3 * view_.scene->shape().period_us), stop);
   Give(shown, stop);

@@ -54,13 +54,14 @@ OniDeviceInfo InfoOf(const Unit& unit) {
   return info;
 }
 
+/// @throws std::invalid_argument for an unknown name.
 Glitch ParseGlitch(const std::string& name) {
   if (name == "late") return Glitch::kLate;
   if (name == "double") return Glitch::kDouble;
   if (name == "old") return Glitch::kOld;
   if (name == "size") return Glitch::kSize;
   if (name == "lone") return Glitch::kLone;
-  return Glitch::kNone;
+  throw std::invalid_argument("unknown glitch " + name);
 }
 
 class VirtualDriver : public oni::driver::DriverBase {
@@ -168,10 +169,10 @@ class VirtualDriver : public oni::driver::DriverBase {
     }
     if (verb == "glitch") {
       int count = 1;
-      words >> count;
-      return OnUnit("", [&](Unit& unit) {
-        unit.glitch = ParseGlitch(argument);
-        unit.glitches_left = unit.glitch == Glitch::kNone ? 0 : std::clamp(count, 0, 10000);
+      if (!(words >> count)) count = 1;
+      return OnUnit("", [&, glitch = ParseGlitch(argument)](Unit& unit) {
+        unit.glitch = glitch;
+        unit.glitches_left = std::clamp(count, 0, 10000);
       });
     }
     if (verb == "unplug") return Unplug(argument);

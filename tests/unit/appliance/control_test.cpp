@@ -23,10 +23,12 @@ using testing::MessageOf;
 using Kind = ControlRequest::Kind;
 
 TEST(ControlProtocolTest, EveryRequestReadsBack) {
-  for (const ControlRequest& request :
-       {ControlRequest{.kind = Kind::kStatus, .action = {}}, ControlRequest{.kind = Kind::kWatch, .action = {}},
-        ControlRequest{.kind = Kind::kPress, .is_long = false, .action = {}},
-        ControlRequest{.kind = Kind::kPress, .is_long = true, .action = {}}, ControlRequest{.kind = Kind::kSim, .action = "next-scene"}}) {
+  for (const ControlRequest& request : {ControlRequest{.kind = Kind::kStatus, .action = {}, .argument = {}},
+                                        ControlRequest{.kind = Kind::kWatch, .action = {}, .argument = {}},
+                                        ControlRequest{.kind = Kind::kPress, .is_long = false, .action = {}, .argument = {}},
+                                        ControlRequest{.kind = Kind::kPress, .is_long = true, .action = {}, .argument = {}},
+                                        ControlRequest{.kind = Kind::kSim, .action = "next-scene", .argument = {}},
+                                        ControlRequest{.kind = Kind::kSim, .action = "glitch", .argument = "late 30"}}) {
     EXPECT_EQ(ParseControlRequest(ControlRequestText(request)), request);
   }
 }
@@ -34,7 +36,8 @@ TEST(ControlProtocolTest, EveryRequestReadsBack) {
 TEST(ControlProtocolTest, RefusesEverythingElse) {
   for (const char* line :
        {"", "status", "[]", "{}", "null", "{\"command\":1}", "{\"command\":\"reboot\"}", "{\"command\":\"status\",\"x\":1}",
-        "{\"command\":\"press\",\"long\":\"yes\"}", "{\"command\":\"sim\"}", "{\"command\":\"sim\",\"action\":\"glitch\"}",
+        "{\"command\":\"press\",\"long\":\"yes\"}", "{\"command\":\"sim\"}", "{\"command\":\"sim\",\"action\":\"explode\"}",
+        "{\"command\":\"sim\",\"action\":\"plug\",\"argument\":7}", "{\"command\":\"sim\",\"action\":\"plug\",\"argument\":\"a\\nb\"}",
         "{\"command\":{\"a\":{\"b\":{}}}}", "{\"command\":\"status\"} {}", "{\"command\":\"status\"", "\xff\xfe"}) {
     EXPECT_THROW((void)ParseControlRequest(line), DataError) << line;
   }

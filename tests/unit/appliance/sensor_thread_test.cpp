@@ -109,6 +109,54 @@ TEST_F(SensorThreadTest, AnUnpluggedSensorIsLostAndAnotherOneTakesItsPlace) {
   EXPECT_EQ(told_.At(3).sensor.serial, "B");
 }
 
+TEST_F(SensorThreadTest, AScanGetsNoFrameOfTheSensorThatComesAfterItsOwnWasUnplugged) {
+  Start();
+  bus_.Plug("A");
+  bus_.GiveFrame();
+  EXPECT_EQ(told_.At(1).kind, Kind::kReady);
+  const auto feed = std::make_shared<LiveFeed>(10);
+  thread_->BeginScan(feed);
+  bus_.GiveFrame();
+  while (bus_.flushed() == 0) std::this_thread::yield();
+  bus_.GiveFrame();
+  while (feed->num_pushed() == 0) std::this_thread::yield();
+  bus_.Unplug();
+  EXPECT_EQ(told_.At(2).kind, Kind::kLost);
+  const std::int64_t pushed = feed->num_pushed();
+  bus_.Plug("B");
+  bus_.GiveFrame();
+  EXPECT_EQ(told_.At(3).sensor.serial, "B");
+  const int taken = bus_.taken();
+  for (int i = 0; i < 3; ++i) bus_.GiveFrame();
+  while (bus_.taken() < taken + 3) std::this_thread::yield();
+  EXPECT_EQ(feed->num_pushed(), pushed) << "nobody has ended the scan yet";
+  const auto next = std::make_shared<LiveFeed>(10);
+  thread_->BeginScan(next);
+  while (next->num_pushed() == 0) bus_.GiveFrame();
+}
+
+TEST_F(SensorThreadTest, SensorsThatAreNotUsedAreToldWhenTheyComeAndNotWhileAScanRuns) {
+  Start();
+  bus_.Plug("A");
+  bus_.GiveFrame();
+  EXPECT_TRUE(told_.At(1).others.empty());
+  bus_.Plug("B");
+  bus_.GiveFrame();
+  EXPECT_EQ(told_.At(2).kind, Kind::kOthers);
+  EXPECT_EQ(told_.At(2).sensor.serial, "A");
+  EXPECT_EQ(told_.At(2).others, std::vector<std::string>{"B"});
+  thread_->BeginScan(std::make_shared<LiveFeed>(10));
+  while (!bus_.exposure_locked()) bus_.GiveFrame();
+  bus_.Plug("C");
+  const int taken = bus_.taken();
+  for (int i = 0; i < 3; ++i) bus_.GiveFrame();
+  while (bus_.taken() < taken + 3) std::this_thread::yield();
+  EXPECT_EQ(thread_->snapshot().others.size(), 1U);
+  thread_->EndScan();
+  while (thread_->snapshot().others.size() < 2) bus_.GiveFrame();
+  EXPECT_EQ(told_.At(3).others, (std::vector<std::string>{"B", "C"}));
+}
+
 TEST_F(SensorThreadTest, AFailureIsToldOnceAndTriedAgain) {
   Start();
   bus_.RefuseToOpen("no permission; see plumb doctor");

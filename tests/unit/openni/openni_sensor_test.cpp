@@ -184,6 +184,7 @@ TEST(OpenNiSensorTest, DiscardsAndCountsBadImages) {
   const std::int64_t before = sensor->statistics().num_unpaired;
   (void)rig.sensor.Command("glitch lone 6");
   EXPECT_TRUE(Eventually([&] { return sensor->statistics().num_unpaired >= before + 3; }));
+  EXPECT_GE(sensor->statistics().num_lost, 3) << "the colour images that never came";
   double last_s = 0;
   sensor->Flush();
   for (const Frame& frame : Take(*sensor, 5)) {

@@ -1,0 +1,188 @@
+// Sensors that are not as they were: another unit, several at once, images that come late, twice, out of order or of a wrong size.
+#include <fstream>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "algo/types/units.hpp"
+#include "drivers/replay/camera_file.hpp"
+#include "drivers/replay/file_io.hpp"
+#include "tests/support/demo_truth.hpp"
+#include "tests/support/plumbd.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::Plumbd;
+
+const char* const kFirst = "VIRTUAL-0001";
+const char* const kSecond = "VIRTUAL-0002";
+
+class DaemonSensorTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { testing::RenderOnce(); }
+
+  /// plumbd keeps its recordings, which tell what calibration a scan was made with, and the virtual sensor's files are in our reach.
+  [[nodiscard]] testing::PlumbdOptions Options(const std::string& more = {}) const {
+    std::ofstream(folder_ / "plumb.toml") << "[appliance]\nkeep_recordings = true\n" << more;
+    fs::create_directories(folder_ / "tmp");
+    return {.arguments = {"--config", folder_ / "plumb.toml"}, .environment = {{"TMPDIR", folder_ / "tmp"}}};
+  }
+
+  /// Gives a unit the first one's calibration with another focal length, and returns that.
+  double Calibrate(const std::string& serial) const {
+    fs::path calibration;
+    for (const auto& entry : fs::directory_iterator(folder_ / "tmp")) {
+      if (fs::exists(entry.path() / "calibration")) calibration = entry.path() / "calibration";
+    }
+    std::string text = ReadTextFile(calibration / fmt::format("{}.yaml", kFirst), 1 << 16);
+    const double focal = ParseCameraFile(text, "").color.fx;
+    const std::string data = "data: [";
+    const std::size_t begin = text.find(data, text.find("camera_matrix")) + data.size();
+    const double other = std::round(1000 * focal) / 1000 + 1.5;
+    text.replace(begin, text.find(',', begin) - begin, fmt::format(" {}", other));
+    WriteWholeFile(calibration / fmt::format("{}.yaml", serial), text);
+    return other;
+  }
+
+  /// Focal length that a stored scan was made with.
+  [[nodiscard]] static double FocalLengthOf(const Plumbd& plumbd, const json& result) {
+    const fs::path scan = plumbd.state() / "scans" / result["last_result"]["scan"].get<std::string>();
+    return ParseCameraFile(ReadTextFile(scan / "recording" / "camera.yaml", 1 << 16), "").color.fx;
+  }
+
+  static json WaitForSensor(Plumbd& plumbd, const std::string& serial) {
+    return plumbd.WaitFor("ready with " + serial, [&](const json& s) { return s["state"] == "ready" && s["sensor"]["serial"] == serial; });
+  }
+
+  testing::TempFolder folder_;
+};
+
+TEST_F(DaemonSensorTest, ReplacedWhileIdleTheOtherUnitIsToldAndUsedWithItsOwnCalibration) {
+  Plumbd plumbd(folder_.path(), Options());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  EXPECT_EQ(WaitForSensor(plumbd, kFirst)["sensor"]["calibrated"], true);
+  const double focal = Calibrate(kSecond);
+  plumbd.Sim("unplug");
+  plumbd.WaitForState("no_sensor");
+  plumbd.Sim("plug", kSecond);
+  EXPECT_EQ(WaitForSensor(plumbd, kSecond)["sensor"]["calibrated"], true);
+  plumbd.WaitForLog("VIRTUAL-0002 instead of VIRTUAL-0001");
+  EXPECT_NEAR(FocalLengthOf(plumbd, plumbd.ScanOnce()), focal, 1e-6);
+  plumbd.Sim("unplug");
+  plumbd.WaitForState("no_sensor");
+  plumbd.Sim("plug", "UNKNOWN-7");
+  const json status = WaitForSensor(plumbd, "UNKNOWN-7");
+  EXPECT_EQ(status["sensor"]["calibrated"], false);
+  EXPECT_THAT(status["sensor"]["warnings"].dump(), HasSubstr("not calibrated"));
+  EXPECT_THAT(plumbd.log(), HasSubstr("UNKNOWN-7 is not calibrated"));
+}
+
+TEST_F(DaemonSensorTest, ReplacedWhileScanningTheScanIsDiscardedAndTheNextOneUsesTheOtherUnitsCalibration) {
+  Plumbd plumbd(folder_.path(), Options());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  WaitForSensor(plumbd, kFirst);
+  const double focal = Calibrate(kSecond);
+  ASSERT_EQ(plumbd.Press()["ok"], true);
+  plumbd.WaitForFrames(20);
+  plumbd.Sim("unplug");
+  plumbd.Sim("plug", kSecond);  // at once: nobody can be quicker
+  const json status = WaitForSensor(plumbd, kSecond);
+  EXPECT_TRUE(status["last_result"].is_null()) << "no scan of two units";
+  EXPECT_TRUE(fs::is_empty(plumbd.state() / "scans"));
+  plumbd.WaitForLog("the scan was discarded");
+  const json result = plumbd.ScanOnce();
+  EXPECT_EQ(result["last_result"]["is_reference"], true);
+  EXPECT_NEAR(FocalLengthOf(plumbd, result), focal, 1e-6);
+}
+
+TEST_F(DaemonSensorTest, OfTwoSensorsTheOneInUseStaysAndTheOtherIsToldAndTakesOverWhenItGoes) {
+  Plumbd plumbd(folder_.path(), Options());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  WaitForSensor(plumbd, kFirst);
+  plumbd.Sim("plug", "VIRTUAL-0000");  // would come first in the order of serials
+  const auto has_other = [](const json& status) { return status["sensor"]["others"] == json{"VIRTUAL-0000"}; };
+  EXPECT_EQ(plumbd.WaitFor("the other one", has_other)["sensor"]["serial"], kFirst);
+  plumbd.WaitForLog("2 sensors are attached: VIRTUAL-0001 is used, VIRTUAL-0000 not");
+  ASSERT_EQ(plumbd.Press()["ok"], true);
+  plumbd.WaitForFrames(20);
+  plumbd.Sim("plug", kSecond);
+  plumbd.WaitForFrames(60);
+  ASSERT_EQ(plumbd.Press()["ok"], true);
+  EXPECT_EQ(plumbd.WaitForState("result")["sensor"]["serial"], kFirst) << "a third one disturbs no scan";
+  plumbd.WaitForLog("3 sensors are attached");
+  plumbd.Sim("unplug", "VIRTUAL-0000");
+  plumbd.WaitFor("one other", [](const json& status) { return status["sensor"]["others"] == json{kSecond}; });
+  plumbd.Sim("unplug", kFirst);
+  EXPECT_EQ(WaitForSensor(plumbd, kSecond)["sensor"]["others"], json::array());
+}
+
+TEST_F(DaemonSensorTest, OfTwoSensorsTheConfiguredOneIsUsedAndNoOther) {
+  Plumbd plumbd(folder_.path(), Options(fmt::format("sensor_serial = \"{}\"\n", kSecond)));
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(), AllOf(HasSubstr(kFirst), HasSubstr(kSecond)));
+  plumbd.Sim("plug", kSecond);
+  EXPECT_EQ(WaitForSensor(plumbd, kSecond)["sensor"]["others"], json{kFirst});
+  plumbd.Sim("unplug", kSecond);
+  plumbd.WaitForState("fault");
+}
+
+/// Pairs of images that go wrong in the middle of both sweeps.
+class DaemonGlitchTest : public DaemonSensorTest, public ::testing::WithParamInterface<const char*> {
+ protected:
+  static constexpr int kGlitches = 15;
+
+  static json ScanWith(Plumbd& plumbd, const std::string& glitch) {
+    EXPECT_EQ(plumbd.Press()["ok"], true);
+    plumbd.WaitForFrames(30);
+    EXPECT_EQ(plumbd.Sim("glitch", fmt::format("{} {}", glitch, kGlitches))["ok"], true);
+    if (glitch == "late") plumbd.WaitFor("fewer frames a second", [](const json& s) { return s["sensor"]["fps"] < 25.0; });
+    // What was wrong does not come again: the sweep goes on with the next pairs, and ends when it shows nothing new.
+    return plumbd.WaitFor("an end", [](const json& s) { return s["state"] == "result" || s["state"] == "fault"; });
+  }
+};
+
+TEST_P(DaemonGlitchTest, AreCountedAndTheResultIsRightOrSaidToBeNone) {
+  const std::string glitch = GetParam();
+  Plumbd plumbd(folder_.path(), Options("auto_stop_s = 1.5\n"));
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  WaitForSensor(plumbd, kFirst);
+  const json first = ScanWith(plumbd, glitch);
+  ASSERT_EQ(first["state"], "result") << first["reason"];
+  ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
+  const json second = ScanWith(plumbd, glitch);
+  ASSERT_EQ(second["state"], "result") << second["reason"];
+  const json last = second["last_result"];
+  std::printf("%s: %s; images lost %d, unpaired %d, discarded %d\n", glitch.c_str(), last["verdict"].dump().c_str(),
+              last["images_lost"].get<int>(), last["images_unpaired"].get<int>(), last["images_discarded"].get<int>());
+  // OpenNI2 keeps only the newest image of a stream, so on a busy machine some of the wrong ones go by unseen.
+  if (glitch == "double" || glitch == "old" || glitch == "size") {
+    EXPECT_GE(last["images_discarded"].get<int>(), kGlitches / 2);
+  }
+  if (glitch == "lone") {
+    EXPECT_GE(last["images_unpaired"].get<int>(), kGlitches / 2);
+    EXPECT_GE(last["images_lost"].get<int>(), kGlitches / 2) << "the colour images that never came";
+  }
+  if (glitch != "late") plumbd.WaitForLog("of the sensor's images");
+  EXPECT_EQ(first["last_result"]["is_reference"], true);
+  if (last["verdict"] == "no_answer") {
+    EXPECT_FALSE(last["reasons"].empty());
+    return;
+  }
+  const fs::path file = plumbd.state() / "scans" / last["scan"].get<std::string>() / "result" / "result.json";
+  const testing::MotionError error = testing::ErrorOfMotion(json::parse(ReadTextFile(file, 1 << 24)));
+  EXPECT_LT(error.translation_m, 12 * kMillimetre) << "as without glitches";
+  EXPECT_LT(error.rotation_rad, 1.0 * kDegree);
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Images, DaemonGlitchTest, ::testing::Values("late", "double", "old", "size", "lone"),
+                         [](const ::testing::TestParamInfo<const char*>& glitch) { return std::string(glitch.param); });
+
+}  // namespace
+}  // namespace plumb
