@@ -141,10 +141,15 @@ void ColorCamera::Cast(Shot& shot, int tile_row) const {
     const Candidates candidates = shot.world.FindCandidates(centre, spread, margin);
     shot.candidates[static_cast<std::size_t>(tile_row * shot.tiles_across + tile)] = candidates;
     for (int y = tile_row * kTileSize; y < y_end; ++y) {
-      for (int x = tile * kTileSize; x < std::min(rays_.width(), (tile + 1) * kTileSize); ++x) {
-        const Hit hit = shot.world.Trace(shot.rows[static_cast<std::size_t>(y)].RayOf(rays_.At(x, y, 0, 0), 0.0F), candidates);
-        shot.material.at<std::uint16_t>(y, x) = hit.material;
-        shot.t.at<float>(y, x) = hit.t;
+      for (int x = tile * kTileSize; x < std::min(rays_.width(), (tile + 1) * kTileSize); x += 4) {
+        std::array<Ray, 4> rays;
+        for (int i = 0; i < 4; ++i)
+          rays[static_cast<std::size_t>(i)] = shot.rows[static_cast<std::size_t>(y)].RayOf(rays_.At(x + i, y, 0, 0), 0.0F);
+        const std::array<Hit, 4> hits = shot.world.Trace(rays, candidates);
+        for (int i = 0; i < 4; ++i) {
+          shot.material.at<std::uint16_t>(y, x + i) = hits[static_cast<std::size_t>(i)].material;
+          shot.t.at<float>(y, x + i) = hits[static_cast<std::size_t>(i)].t;
+        }
       }
     }
   }
@@ -187,17 +192,28 @@ cv::Mat ColorCamera::EdgeMask(const Shot& shot) const {
 Vector3f ColorCamera::GatherInk(const Shot& shot, int x, int y) const {
   const auto material = shot.material.at<std::uint16_t>(y, x);
   const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
+  // Everything in the board's frame, where a sample's place is linear in du, dv and dt before the division.
+  const World::BoardPlane plane = shot.world.PlaneOf(BoardOf(material));
+  const Vector3f origin = plane.R_board_world * (pose.p_world - plane.p_world);
+  const Vector3f velocity = plane.R_board_world * pose.velocity;
+  const Eigen::Matrix3f R_board_camera = plane.R_board_world * pose.R_world_camera;
+  const Vector3f direction = R_board_camera * rays_.At(x, y, 0, 0);
+  const Vector3f along_u = R_board_camera * rays_.At(x, y, 1, 0) - direction;
+  const Vector3f along_v = R_board_camera * rays_.At(x, y, 0, 1) - direction;
+  const Vector3f turn = plane.R_board_world * pose.angular_velocity.cross(pose.R_world_camera * rays_.At(x, y, 0, 0));
   int black = 0;
   const auto& samples = PatternOf(ink_samples_, x, y);
   for (const Sample& sample : samples) {
-    const Eigen::Vector3f direction = pose.DirectionOf(rays_.At(x, y, sample.du, sample.dv), sample.dt);
-    black += shot.world.TraceBoardTop(BoardOf(material), pose.p_world + sample.dt * pose.velocity, direction) & 1;
+    const Vector3f o = origin + sample.dt * velocity;
+    const Vector3f d = direction + sample.du * along_u + sample.dv * along_v + sample.dt * turn;
+    const float t = -o.z() / d.z();
+    black += plane.IsBlack(o.x() + t * d.x(), o.y() + t * d.y()) ? 1 : 0;
   }
   const Vector3f p = PointAt(shot, x, y);
   const float share = static_cast<float>(black) / static_cast<float>(samples.size());
   const Material white = ObjectOf(material);
-  const Vector3f paper = shot.world.Albedo(white, p, Vector3f::UnitZ());
-  const Vector3f ink = shot.world.Albedo(static_cast<Material>(white + 1), p, Vector3f::UnitZ());
+  const Vector3f paper = shot.world.Albedo({white}, p);
+  const Vector3f ink = shot.world.Albedo({static_cast<Material>(white + 1)}, p);
   return shot.world.ShadingAt(material, p).light.cwiseProduct(paper + share * (ink - paper));
 }
 
@@ -207,16 +223,21 @@ Vector3f ColorCamera::GatherOutline(const Shot& shot, int x, int y, const Candid
   Vector3f sum = Vector3f::Zero();
   bool mixed = false;
   const auto& samples = PatternOf(outline_samples_, x, y);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
+  for (std::size_t first = 0; first < samples.size(); first += 4) {
     // The first four lie at the corners of the pattern: where they see nothing else, nothing else is in sight.
-    if (i == 4 && !mixed) return centre < kFirstBoard ? Vector3f(sum / 4.0F) : GatherSmooth(shot, x, y);
-    const Sample& sample = samples[i];
-    const Ray ray = pose.RayOf(rays_.At(x, y, sample.du, sample.dv), sample.dt);
-    const Hit hit = shot.world.Trace(ray, candidates);
-    const Vector3f p = ray.origin + hit.t * ray.direction;
-    const Shading shading = shot.world.ShadingAt(hit.material, p);
-    sum += shot.world.Albedo(hit.material, p, shading.normal).cwiseProduct(shading.light);
-    mixed = mixed || hit.material != centre;
+    if (first == 4 && !mixed) return centre < kFirstBoard ? Vector3f(sum / 4.0F) : GatherSmooth(shot, x, y);
+    std::array<Ray, 4> rays;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Sample& sample = samples[first + i];
+      rays[i] = pose.RayOf(rays_.At(x, y, sample.du, sample.dv), sample.dt);
+    }
+    const std::array<Hit, 4> hits = shot.world.Trace(rays, candidates);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Vector3f p = rays[i].origin + hits[i].t * rays[i].direction;
+      const Shading shading = shot.world.ShadingAt(hits[i].material, p);
+      sum += shot.world.Albedo(shot.world.PaintOf(hits[i].material, shading.normal), p).cwiseProduct(shading.light);
+      mixed = mixed || hits[i].material != centre;
+    }
   }
   return sum / static_cast<float>(samples.size());
 }
@@ -226,15 +247,16 @@ Vector3f ColorCamera::GatherSmooth(const Shot& shot, int x, int y) const {
   const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
   const Vector3f p = PointAt(shot, x, y);
   const Shading shading = shot.world.ShadingAt(material, p);
-  if (material >= kFirstBoard) return shading.light.cwiseProduct(shot.world.Albedo(material, p, shading.normal));
+  if (material >= kFirstBoard) return shading.light.cwiseProduct(shot.world.Albedo(shot.world.PaintOf(material, shading.normal), p));
   // The surface is its tangent plane over one pixel.
   const auto& samples = PatternOf(smooth_samples_, x, y);
+  const World::Paint paint = shot.world.PaintOf(material, shading.normal);
   Vector3f albedo = Vector3f::Zero();
   for (const Sample& sample : samples) {
     const Vector3f origin = pose.p_world + sample.dt * pose.velocity;
     const Vector3f direction = pose.DirectionOf(rays_.At(x, y, sample.du, sample.dv), sample.dt);
     const float t = shading.normal.dot(p - origin) / std::min(-0.05F, shading.normal.dot(direction));
-    albedo += shot.world.Albedo(material, origin + t * direction, shading.normal);
+    albedo += shot.world.Albedo(paint, origin + t * direction);
   }
   return shading.light.cwiseProduct(albedo) / static_cast<float>(samples.size());
 }
@@ -252,23 +274,27 @@ void ColorCamera::Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const {
   const auto shot_noise = static_cast<float>(unit_.shot_noise);
   const auto read_variance = static_cast<float>(unit_.read_noise * unit_.read_noise);
   const bool noisy = unit_.shot_noise > 0 || unit_.read_noise > 0;
-  for (int y = tile_row * kTileSize; y < std::min(height, (tile_row + 1) * kTileSize); ++y) {
-    for (int x = 0; x < width; ++x) {
-      const Candidates& candidates = shot.candidates[static_cast<std::size_t>(tile_row * shot.tiles_across + x / kTileSize)];
-      const std::uint8_t edge = shot.edge.at<std::uint8_t>(y, x);
-      const bool only_ink = edge == kInkEdge && IsBoardTop(shot.material.at<std::uint16_t>(y, x));
-      Vector3f light = only_ink ? GatherInk(shot, x, y) : edge != 0 ? GatherOutline(shot, x, y, candidates) : GatherSmooth(shot, x, y);
-      const double r_squared = ((x - camera.cx) * (x - camera.cx) + (y - camera.cy) * (y - camera.cy)) / corner_squared;
-      light *= kGain * static_cast<float>(1.0 - unit_.vignetting * r_squared);
-      auto& pixel = rgb.at<cv::Vec3b>(y, x);
-      const std::uint64_t hash =
-          noisy ? Hash(shot.noise_seed, static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) + static_cast<std::uint64_t>(x))
-                : 0;
-      for (int channel = 0; channel < 3; ++channel) {
-        float value = light[channel];
-        if (noisy)
-          value += std::sqrt(shot_noise * value + read_variance) * NearlyNormal(channel == 2 ? Hash(hash) : hash >> (32 * channel));
-        pixel[channel] = gamma_[static_cast<std::size_t>(std::clamp(value, 0.0F, 1.0F) * (kGammaLevels - 1) + 0.5F)];
+  const int y_end = std::min(height, (tile_row + 1) * kTileSize);
+  // Tile by tile, so that neighbours find each other's texels in the cache.
+  for (int tile = 0; tile < shot.tiles_across; ++tile) {
+    const Candidates& candidates = shot.candidates[static_cast<std::size_t>(tile_row * shot.tiles_across + tile)];
+    for (int y = tile_row * kTileSize; y < y_end; ++y) {
+      for (int x = tile * kTileSize; x < std::min(width, (tile + 1) * kTileSize); ++x) {
+        const std::uint8_t edge = shot.edge.at<std::uint8_t>(y, x);
+        const bool only_ink = edge == kInkEdge && IsBoardTop(shot.material.at<std::uint16_t>(y, x));
+        Vector3f light = only_ink ? GatherInk(shot, x, y) : edge != 0 ? GatherOutline(shot, x, y, candidates) : GatherSmooth(shot, x, y);
+        const double r_squared = ((x - camera.cx) * (x - camera.cx) + (y - camera.cy) * (y - camera.cy)) / corner_squared;
+        light *= kGain * static_cast<float>(1.0 - unit_.vignetting * r_squared);
+        auto& pixel = rgb.at<cv::Vec3b>(y, x);
+        const std::uint64_t hash =
+            noisy ? Hash(shot.noise_seed, static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) + static_cast<std::uint64_t>(x))
+                  : 0;
+        for (int channel = 0; channel < 3; ++channel) {
+          float value = light[channel];
+          if (noisy)
+            value += std::sqrt(shot_noise * value + read_variance) * NearlyNormal(channel == 2 ? Hash(hash) : hash >> (32 * channel));
+          pixel[channel] = gamma_[static_cast<std::size_t>(std::clamp(value, 0.0F, 1.0F) * (kGammaLevels - 1) + 0.5F)];
+        }
       }
     }
   }

@@ -1,6 +1,7 @@
 #include "drivers/simulated/depth_camera.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <tbb/parallel_for.h>
@@ -60,21 +61,28 @@ void DepthCamera::Cast(const World& world, std::span<const MovingPose> rows, int
     for (int y = tile_row * kTileSize; y < y_end; ++y) {
       const MovingPose& pose = rows[static_cast<std::size_t>(y)];
       const Vector3f forward = pose.R_world_camera.col(2);
-      for (int x = x_begin; x < std::min(width, x_begin + kTileSize); ++x) {
-        float du = 0;
-        float dv = 0;
-        if (sigma_px > 0) {
-          const std::size_t index = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
-          du = std::clamp(sigma_px * layers.jitter_x[index], -4.0F, 4.0F);
-          dv = std::clamp(sigma_px * layers.jitter_y[index], -4.0F, 4.0F);
+      for (int x = x_begin; x < std::min(width, x_begin + kTileSize); x += 4) {
+        std::array<Ray, 4> rays;
+        for (int i = 0; i < 4; ++i) {
+          float du = 0;
+          float dv = 0;
+          if (sigma_px > 0) {
+            const std::size_t index = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x + i);
+            du = std::clamp(sigma_px * layers.jitter_x[index], -4.0F, 4.0F);
+            dv = std::clamp(sigma_px * layers.jitter_y[index], -4.0F, 4.0F);
+          }
+          rays[static_cast<std::size_t>(i)] = pose.RayOf(rays_.At(x + i, y, du, dv), 0.0F);
         }
-        const Ray ray = pose.RayOf(rays_.At(x, y, du, dv), 0.0F);
-        const Hit hit = world.Trace(ray, candidates);
-        const bool met = hit.material != kNothing;
-        true_m.at<float>(y, x) = met ? hit.t * ray.direction.dot(forward) : 0.0F;
-        if (incidence.empty()) continue;
-        const Vector3f normal = world.Normal(hit.material, ray.origin + hit.t * ray.direction);
-        incidence.at<float>(y, x) = met ? std::acos(std::clamp(-normal.dot(ray.direction), 0.0F, 1.0F)) : 0.0F;
+        const std::array<Hit, 4> hits = world.Trace(rays, candidates);
+        for (int i = 0; i < 4; ++i) {
+          const Ray& ray = rays[static_cast<std::size_t>(i)];
+          const Hit& hit = hits[static_cast<std::size_t>(i)];
+          const bool met = hit.material != kNothing;
+          true_m.at<float>(y, x + i) = met ? hit.t * ray.direction.dot(forward) : 0.0F;
+          if (incidence.empty()) continue;
+          const Vector3f normal = world.Normal(hit.material, ray.origin + hit.t * ray.direction);
+          incidence.at<float>(y, x + i) = met ? std::acos(std::clamp(-normal.dot(ray.direction), 0.0F, 1.0F)) : 0.0F;
+        }
       }
     }
   }

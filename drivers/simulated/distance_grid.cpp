@@ -187,62 +187,6 @@ Eigen::Vector4f DistanceGrid::Shade(const Eigen::Vector3f& p) const {
   return shade;
 }
 
-bool DistanceGrid::ClipToBox(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float& t_begin, float& t_end) const {
-  for (int axis = 0; axis < 3; ++axis) {
-    const float inverse = 1.0F / direction[axis];  // An infinity here takes the right branch below.
-    float near = (box_.min()[axis] - origin[axis]) * inverse;
-    float far = (box_.max()[axis] - origin[axis]) * inverse;
-    if (near > far) std::swap(near, far);
-    t_begin = std::max(t_begin, near);
-    t_end = std::min(t_end, far);
-  }
-  return t_begin < t_end;
-}
-
-float DistanceGrid::Intersect(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float t_begin, float t_end) const {
-  if (!ClipToBox(origin, direction, t_begin, t_end)) return kInfinity;
-  constexpr float kTolerance = 2e-5F;
-  constexpr int kMaxSteps = 200;
-  // The ray in units of cells.
-  const Eigen::Vector3f o = (origin - box_.min()) * inverse_spacing_;
-  const Eigen::Vector3f way = direction * inverse_spacing_;
-  const auto distance = [&](float at) { return ValueAt(Locate(o.x() + at * way.x(), o.y() + at * way.y(), o.z() + at * way.z())); };
-  float t = t_begin;
-  float d = distance(t);
-  for (int step = 0; step < kMaxSteps; ++step) {
-    if (d <= kTolerance) return t;
-    float advance = std::max(0.9F * d, kTolerance);  // Below 1: the interpolated distance may be a little too large.
-    if (t + advance >= t_end) return kInfinity;
-    float d_next = distance(t + advance);
-    if (d_next > kTolerance) {
-      // Near the surface the distance falls linearly along the ray: try to step across it.
-      const float slope = (d - d_next) / advance;
-      t += advance;
-      d = d_next;
-      if (d > spacing_ || slope < 0.05F) continue;
-      advance = 1.2F * d / slope + kTolerance;
-      if (advance > spacing_ || t + advance >= t_end) continue;
-      d_next = distance(t + advance);
-      if (d_next > 0) continue;
-    }
-    // The surface lies between t (outside) and t + advance (inside): two rounds of false position.
-    for (int round = 0; round < 2; ++round) {
-      const float split = advance * d / (d - std::min(d_next, 0.0F));
-      const float d_split = distance(t + split);
-      if (d_split > 0) {
-        t += split;
-        advance -= split;
-        d = d_split;
-      } else {
-        advance = split;
-        d_next = d_split;
-      }
-    }
-    return t + advance * d / (d - std::min(d_next, 0.0F));
-  }
-  return kInfinity;
-}
-
 float DistanceGrid::ConeStart(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float spread, float margin,
                               float t_end) const {
   float t = 0;

@@ -1,5 +1,6 @@
 #include "drivers/simulated/ps1080.hpp"
 
+#include <array>
 #include <cmath>
 
 namespace plumb {
@@ -10,8 +11,14 @@ int Ps1080DepthOfCode(int code) {
 }
 
 int QuantisePs1080(double depth_mm) {
+  static const std::array<int, 1024> kDepths = [] {
+    std::array<int, 1024> depths{};
+    for (std::size_t code = 0; code < depths.size(); ++code) depths[code] = Ps1080DepthOfCode(static_cast<int>(code));
+    return depths;
+  }();
   const double code = 800.0 + 4.0 * ((7.5 - 9000.0 / depth_mm) / 0.1042 + 0.375);
-  return Ps1080DepthOfCode(static_cast<int>(std::lround(code)));
+  const auto whole = static_cast<int>(std::floor(code + 0.5));
+  return whole >= 0 && whole < static_cast<int>(kDepths.size()) ? kDepths[static_cast<std::size_t>(whole)] : Ps1080DepthOfCode(whole);
 }
 
 }  // namespace plumb

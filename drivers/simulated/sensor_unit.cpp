@@ -64,8 +64,8 @@ double NguyenLateralSigma(double incidence) {
 }
 
 SensorUnit MakeSensorUnit(NoiseLevel level, std::uint64_t seed, int width, int height) {
-  if (width < 80 || height < 60 || width > 2560 || height > 1920)
-    throw std::invalid_argument("simulated images must be 80x60 to 2560x1920");
+  if (width < 80 || height < 60 || width > 2560 || height > 1920 || width % 4 != 0)
+    throw std::invalid_argument("simulated images must be 80x60 to 2560x1920, the width a multiple of 4");
   SensorUnit unit;
   unit.level = level;
   unit.seed = seed;

@@ -30,8 +30,8 @@ struct SimulateOptions {
 /// "ideal", "nominal" or "hard".
 [[nodiscard]] std::optional<simulated::NoiseLevel> ParseNoiseLevel(std::string_view name);
 
-/// Renders a suite into options.out: suite.json, recordings/NAME/ (TUM RGB-D layout) or recordings/NAME.oni, truth/NAME/. Written beside and renamed at the end:
-/// a failure or a stop leaves nothing behind. The same options give the same bytes, whatever the number of threads.
+/// Renders a suite into options.out: suite.json, recordings/NAME/ (TUM RGB-D layout) or recordings/NAME.oni, truth/NAME/. Written beside
+/// and renamed at the end: a failure or a stop leaves nothing behind. The same options give the same bytes, whatever the number of threads.
 /// @param progress  If set, called on the calling thread with the fraction done and the scene's name.
 /// @throws std::invalid_argument for an unknown suite or numbers out of range, DataError if the folder is not empty, IoError if it cannot
 /// be

@@ -56,7 +56,7 @@ World::World(const Room& room, std::shared_ptr<const DistanceGrid> body, const P
   t_body_world_ = T_body_world.translation().cast<float>();
   const MarkerDictionary dictionary = MarkerDictionary::ByName(kDictionary);
   for (const Board& board : room_.boards) {
-    solids_.push_back({board.T_world_marker.linear().transpose().cast<float>(), board.T_world_marker.translation().cast<float>(),
+    boards_.push_back({board.T_world_marker.linear().transpose().cast<float>(), board.T_world_marker.translation().cast<float>(),
                        BlackCells(dictionary, board.id)});
   }
   BakeSupportLight();
@@ -97,9 +97,9 @@ void World::BakeSupportLight() {
 
 Candidates World::FindCandidates(const Ray& centre, float spread, float margin) const {
   Candidates found;
-  for (std::size_t i = 0; i < solids_.size(); ++i) {
+  for (std::size_t i = 0; i < boards_.size(); ++i) {
     // Sphere around the board's top and the part of its side above the support.
-    const Vector3f to_board = solids_[i].p_world - centre.origin;
+    const Vector3f to_board = boards_[i].p_world - centre.origin;
     const float along = to_board.dot(centre.direction);
     const float beside = (to_board - along * centre.direction).norm();
     if (along > 0 && beside < kBoardHalf * 1.6F + margin + spread * (along + 0.1F) &&
@@ -136,9 +136,9 @@ void World::TraceSupport(const Ray& ray, Hit& hit) const {
 }
 
 void World::TraceBoard(int index, const Ray& ray, Hit& hit) const {
-  const BoardSolid& solid = solids_[static_cast<std::size_t>(index)];
-  const Vector3f o = solid.R_board_world * (ray.origin - solid.p_world);
-  const Vector3f d = solid.R_board_world * ray.direction;
+  const BoardPlane& board = boards_[static_cast<std::size_t>(index)];
+  const Vector3f o = board.R_board_world * (ray.origin - board.p_world);
+  const Vector3f d = board.R_board_world * ray.direction;
   float t_near = 0;
   float t_far = hit.t;
   bool through_top = false;
@@ -155,30 +155,27 @@ void World::TraceBoard(int index, const Ray& ray, Hit& hit) const {
   }
   if (t_near >= t_far || t_near <= 0) return;
   hit.t = t_near;
-  hit.material = through_top ? TopMaterial(solid, index, o.x() + t_near * d.x(), o.y() + t_near * d.y())
-                             : static_cast<Material>(kFirstBoard + 4 * index + 2);
+  const int part = !through_top ? 2 : board.IsBlack(o.x() + t_near * d.x(), o.y() + t_near * d.y()) ? 1 : 0;
+  hit.material = static_cast<Material>(kFirstBoard + 4 * index + part);
 }
 
-Material World::TopMaterial(const BoardSolid& solid, int index, float x, float y) {
-  const float column = (x + kMarkerHalf) * (8.0F / (2.0F * kMarkerHalf));
-  const float row = (kMarkerHalf - y) * (8.0F / (2.0F * kMarkerHalf));
+bool World::BoardPlane::IsBlack(float x, float y) const {
+  constexpr float kCellsPerMetre = 8.0F / (2.0F * kMarkerHalf);
+  const float column = (x + kMarkerHalf) * kCellsPerMetre;
+  const float row = (kMarkerHalf - y) * kCellsPerMetre;
   const bool printed = column >= 0 && row >= 0 && column < 8 && row < 8;
-  const bool black = printed && solid.black[static_cast<std::size_t>(8 * static_cast<int>(row) + static_cast<int>(column))] != 0;
-  return static_cast<Material>(kFirstBoard + 4 * index + (black ? 1 : 0));
+  return printed && black[static_cast<std::size_t>(8 * static_cast<int>(row) + static_cast<int>(column))] != 0;
 }
 
-Material World::TraceBoardTop(int index, const Vector3f& origin, const Vector3f& direction) const {
-  const BoardSolid& solid = solids_[static_cast<std::size_t>(index)];
-  const Vector3f o = solid.R_board_world * (origin - solid.p_world);
-  const Vector3f d = solid.R_board_world * direction;
-  const float t = -o.z() / d.z();
-  return TopMaterial(solid, index, o.x() + t * d.x(), o.y() + t * d.y());
-}
-
-Hit World::Trace(const Ray& ray, const Candidates& candidates) const {
+Hit World::TraceFlat(const Ray& ray, const Candidates& candidates) const {
   Hit hit;
   TraceSupport(ray, hit);
   for (int i = 0; i < candidates.num_boards; ++i) TraceBoard(candidates.boards[static_cast<std::size_t>(i)], ray, hit);
+  return hit;
+}
+
+Hit World::Trace(const Ray& ray, const Candidates& candidates) const {
+  Hit hit = TraceFlat(ray, candidates);
   if (candidates.body_start < hit.t) {
     const float t = body_->Intersect(ToBody(ray.origin), R_body_world_ * ray.direction, candidates.body_start, hit.t);
     if (t < hit.t) hit = {t, kBody};
@@ -186,31 +183,52 @@ Hit World::Trace(const Ray& ray, const Candidates& candidates) const {
   return hit;
 }
 
+std::array<Hit, 4> World::Trace(const std::array<Ray, 4>& rays, const Candidates& candidates) const {
+  std::array<Hit, 4> hits;
+  Vector3x4 origin;
+  Vector3x4 direction;
+  Float4 end;
+  for (std::size_t i = 0; i < 4; ++i) {
+    hits[i] = TraceFlat(rays[i], candidates);
+    const int lane = static_cast<int>(i);
+    origin.Set(lane, rays[i].origin);
+    direction.Set(lane, rays[i].direction);
+    end[lane] = hits[i].t;
+  }
+  const Float4 begin = Splat(candidates.body_start);
+  if (!Any(begin < end)) return hits;
+  const Float4 t = body_->Intersect(R_body_world_ * origin + t_body_world_, R_body_world_ * direction, begin, end);
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (t[static_cast<int>(i)] < hits[i].t) hits[i] = {t[static_cast<int>(i)], kBody};
+  }
+  return hits;
+}
+
 Vector3f World::Normal(Material material, const Vector3f& p_world) const {
   if (material == kBody) return R_body_world_.transpose() * body_->Normal(ToBody(p_world));
-  if (IsBoardTop(material)) return solids_[static_cast<std::size_t>(BoardOf(material))].R_board_world.row(2);
+  if (IsBoardTop(material)) return boards_[static_cast<std::size_t>(BoardOf(material))].R_board_world.row(2);
   return Vector3f::UnitZ();
 }
 
-Vector3f World::Albedo(Material material, const Vector3f& p_world, const Vector3f& normal) const {
+World::Paint World::PaintOf(Material material, const Vector3f& normal) const {
+  if (material != kBody) return {material};
+  // The paint is projected along the three axes and blended by how squarely each one meets the skin.
+  const Vector3f n = (R_body_world_ * normal).cwiseAbs2();
+  Vector3f weight = n.cwiseProduct(n);
+  weight = (weight.array() > 0.03F * weight.sum()).select(weight, 0.0F);
+  return {material, weight / weight.sum()};
+}
+
+Vector3f World::Albedo(const Paint& paint, const Vector3f& p_world) const {
+  const Material material = paint.material;
   if (material == kSupport) return room_.support_texture->At(p_world.x(), p_world.y());
   if (material == kBody) {
     const Vector3f p = ToBody(p_world);
-    const Vector3f n = (R_body_world_ * normal).cwiseAbs2();
-    // The paint is projected along the three axes and blended by how squarely each one meets the skin.
-    const Vector3f weight = n.cwiseProduct(n);
-    const float least = 0.03F * weight.sum();
     Vector3f albedo = Vector3f::Zero();
-    float used = 0;
-    const auto add = [&](float share, float u, float v) {
-      if (share <= least) return;
-      albedo += share * room_.skin_texture->At(u, v);
-      used += share;
-    };
-    add(weight.z(), p.x(), p.y());
-    add(weight.y(), p.x() + 0.37F, p.z() + 0.21F);
-    add(weight.x(), p.y() + 0.11F, p.z() - 0.33F);
-    return albedo / used;
+    if (paint.weight.z() > 0) albedo += paint.weight.z() * room_.skin_texture->At(p.x(), p.y());
+    if (paint.weight.y() > 0) albedo += paint.weight.y() * room_.skin_texture->At(p.x() + 0.37F, p.z() + 0.21F);
+    if (paint.weight.x() > 0) albedo += paint.weight.x() * room_.skin_texture->At(p.y() + 0.11F, p.z() - 0.33F);
+    return albedo;
   }
   if (material == kLowerFloor) return 0.6F * room_.support_texture->At(p_world.y() * 0.8F, p_world.x() * 0.8F);
   if (material == kCouchSide) return Vector3f(0.25F, 0.26F, 0.28F);

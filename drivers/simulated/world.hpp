@@ -85,29 +85,40 @@ class World {
   /// @param spread  Radius of the bundle per metre, around `centre`.  @param margin  Radius of its origins, metres.
   [[nodiscard]] Candidates FindCandidates(const Ray& centre, float spread, float margin) const;
   [[nodiscard]] Hit Trace(const Ray& ray, const Candidates& candidates) const;
+  /// Four rays at once, which costs little more than one.
+  [[nodiscard]] std::array<Hit, 4> Trace(const std::array<Ray, 4>& rays, const Candidates& candidates) const;
 
   [[nodiscard]] Eigen::Vector3f Normal(Material material, const Eigen::Vector3f& p_world) const;
   /// Normal and light at a place: both vary slowly over a surface.
   [[nodiscard]] Shading ShadingAt(Material material, const Eigen::Vector3f& p_world) const;
+  /// What covers a surface whose normal is the same over a few pixels.
+  struct Paint {
+    Material material = kNothing;
+    Eigen::Vector3f weight = Eigen::Vector3f::Zero();  ///< Of the skin's paint as projected along x, y and z of the body; sum 1.
+  };
+  [[nodiscard]] Paint PaintOf(Material material, const Eigen::Vector3f& normal) const;
   /// Share of the light that the surface sends back, linear red, green, blue.
-  [[nodiscard]] Eigen::Vector3f Albedo(Material material, const Eigen::Vector3f& p_world, const Eigen::Vector3f& normal) const;
+  [[nodiscard]] Eigen::Vector3f Albedo(const Paint& paint, const Eigen::Vector3f& p_world) const;
 
-  /// The board's plane, for rays that are known to meet its top and nothing else.
-  [[nodiscard]] Material TraceBoardTop(int index, const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const;
+  /// A board and its print.
+  struct BoardPlane {
+    Eigen::Matrix3f R_board_world;
+    Eigen::Vector3f p_world;
+    std::array<std::uint8_t, 64> black;  ///< 8 x 8 cells, row 0 at the top of the print.
+
+    /// @param x, y  On the board, metres from its centre.
+    [[nodiscard]] bool IsBlack(float x, float y) const;
+  };
+  [[nodiscard]] const BoardPlane& PlaneOf(int board) const { return boards_[static_cast<std::size_t>(board)]; }
 
   [[nodiscard]] const Pose& T_world_body() const { return T_world_body_; }
   [[nodiscard]] const Room& room() const { return room_; }
 
  private:
-  struct BoardSolid {
-    Eigen::Matrix3f R_board_world;
-    Eigen::Vector3f p_world;
-    std::array<std::uint8_t, 64> black;  ///< 8 x 8 cells, row 0 at the top of the print.
-  };
-  [[nodiscard]] static Material TopMaterial(const BoardSolid& solid, int index, float x, float y);
   [[nodiscard]] Eigen::Vector3f SupportLight(const Eigen::Vector3f& p_world) const;
   void TraceBoard(int index, const Ray& ray, Hit& hit) const;
   void TraceSupport(const Ray& ray, Hit& hit) const;
+  [[nodiscard]] Hit TraceFlat(const Ray& ray, const Candidates& candidates) const;  ///< Everything but the body.
   [[nodiscard]] Eigen::Vector3f ToBody(const Eigen::Vector3f& p_world) const { return R_body_world_ * p_world + t_body_world_; }
   void BakeSupportLight();
 
@@ -116,7 +127,7 @@ class World {
   Pose T_world_body_;
   Eigen::Matrix3f R_body_world_;
   Eigen::Vector3f t_body_world_;
-  std::vector<BoardSolid> solids_;
+  std::vector<BoardPlane> boards_;
   std::vector<float> support_light_;  ///< Share of the light that reaches the support, on a square grid.
 };
 
