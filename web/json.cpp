@@ -118,7 +118,8 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
     json["result"] = {{"verdict", scan.result->verdict},
                       {"reasons", scan.result->reasons},
                       {"correction", NumbersJson(scan.result->correction)},
-                      {"u95", NumbersJson(scan.result->u95)}};
+                      {"u95", NumbersJson(scan.result->u95)},
+                      {"body", {{"now", scan.result->body_now}, {"after", scan.result->body_after}}}};
   }
   return json;
 }

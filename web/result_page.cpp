@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 
 #include "web/api.hpp"
 #include "web/assets.hpp"
@@ -17,7 +18,7 @@ constexpr std::chrono::minutes kOldAfter{2};
 
 struct NumberRow {
   const char* name;
-  const char* positive;  ///< For a patient on the back with the head to the gantry; result.json has the words for other postures.
+  const char* positive;  ///< In the room's words, where the result has none.
   const char* unit;
   std::optional<double> value, u95;
 };
@@ -52,18 +53,38 @@ std::string LoginForm(bool failed) {
       failed ? "<p role=\"alert\">Name or password is wrong.</p>" : "");
 }
 
+/// A correction that is no answer is no advice: it is left out.
 std::string NumbersTable(const ResultSummary& result) {
-  if (!result.correction) return "";
+  if (!result.correction || result.verdict == "no_answer") return "";
   std::string rows;
+  std::size_t i = 0;
   for (const NumberRow& row : Rows(*result.correction, result.u95.value_or(SixNumbers{}))) {
-    const std::string value = row.value ? fmt::format("{:+.1f} {}", *row.value, row.unit) : "not known";
+    const bool is_still = row.value && std::abs(*row.value) < 0.05;  // prints as zero: no sign, no direction
+    const std::string value = !row.value ? "not known"
+                              : is_still ? fmt::format("0.0 {}", row.unit)
+                                         : fmt::format("{:+.1f} {}", *row.value, row.unit);
     const std::string u95 = row.value && row.u95 ? fmt::format("\xC2\xB1 {:.1f}", *row.u95) : "";
-    rows += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td></tr>", row.name, value, u95, row.positive);
+    const std::string& words = result.words[i++];
+    rows += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td></tr>", row.name, value, u95,
+                        is_still        ? "stays"
+                        : words.empty() ? row.positive
+                                        : EscapeHtml(words));
   }
   return fmt::format(
       "<table><caption>Correction to apply at the isocentre</caption><thead><tr><th scope=\"col\">axis</th><th scope=\"col\">value</th>"
-      "<th scope=\"col\">95 %</th><th scope=\"col\">sign</th></tr></thead><tbody>{}</tbody></table>",
+      "<th scope=\"col\">95 %</th><th scope=\"col\">direction</th></tr></thead><tbody>{}</tbody></table>",
       rows);
+}
+
+std::string BodyList(const ResultSummary& result) {
+  if (!result.correction || result.verdict == "no_answer") return "";
+  const auto list = [](const char* title, const std::vector<std::string>& words) {
+    std::string items;
+    for (const std::string& text : words) items += fmt::format("<li>{}</li>", EscapeHtml(text));
+    return fmt::format("<h3>{}</h3><ul class=\"findings\">{}</ul>", title,
+                       items.empty() ? "<li>as in the reference, within 3 mm</li>" : items);
+  };
+  return "<h2>Where on the body</h2>" + list("Now", result.body_now) + list("Left after the correction: the posture", result.body_after);
 }
 
 std::string Pictures(const Scan& scan) {
@@ -91,7 +112,7 @@ std::string ResultBody(ScanService& service, const Scan& scan) {
                       : move       ? "MOVE"
                                    : "NO ANSWER");
   for (const std::string& reason : scan.result->reasons) body += fmt::format("<p>{}</p>", EscapeHtml(reason));
-  return body + NumbersTable(*scan.result) + Pictures(scan) + "</section>";
+  return body + NumbersTable(*scan.result) + BodyList(*scan.result) + Pictures(scan) + "</section>";
 }
 
 }  // namespace

@@ -73,8 +73,11 @@ struct Tolerance {
 struct ResultSummary {
   std::string verdict;  ///< "in_tolerance", "move" or "no_answer".
   std::vector<std::string> reasons;
-  std::optional<SixNumbers> correction;  ///< What to APPLY.
+  std::optional<SixNumbers> correction;  ///< What to APPLY. With "no_answer" it is there for who studies it, never to be shown as advice.
   std::optional<SixNumbers> u95;
+  std::array<std::string, 6> words;     ///< Of the correction: vertical, longitudinal, lateral, pitch, roll, yaw; empty where not known.
+  std::vector<std::string> body_now;    ///< "left shoulder 9 mm high", before any correction.
+  std::vector<std::string> body_after;  ///< The same once the correction is applied: the posture.
 };
 
 struct Scan {

@@ -220,6 +220,14 @@ class Comparer {
     const HeightMap corrected = CurrentHeight(motion.T.inverse());
     result_.deviation_after = HeightDifference(corrected, *reference_.height_map);
     Residuals(corrected);
+    result_.body_parts = DescribeBody({.reference = *reference_.height_map,
+                                       .deviation_after = *result_.deviation_after,
+                                       .region_mask = result_.region_mask,
+                                       .body_mask = RegionMask(*reference_.height_map, reference_body_, {}),
+                                       .T_motion = motion.T,
+                                       .T_iec_reference = options_.T_iec_reference,
+                                       .marker_kind = options_.marker_kind,
+                                       .posture = options_.posture});
     Lap("trust", since_s);
   }
 

@@ -11,6 +11,7 @@
 
 #include <Eigen/Core>
 
+#include "algo/comparison/body_parts.hpp"
 #include "algo/comparison/correction.hpp"
 #include "algo/types/height_map.hpp"
 #include "algo/types/pose.hpp"
@@ -93,6 +94,7 @@ struct Comparison {
   std::optional<BodyMotion> motion;
   std::optional<Correction> correction;
   std::optional<RegionCoverage> region;
+  std::optional<BodyParts> body_parts;  ///< Where on the body, in words.
 
   /// On the reference scene's grid; absent where the reference scene has no height map or nothing could be aligned.
   std::optional<HeightMap> deviation;        ///< Current - reference height after alignment, metres.

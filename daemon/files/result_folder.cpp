@@ -8,6 +8,7 @@
 #include "algo/render/error_image.hpp"
 #include "algo/render/overlay_image.hpp"
 #include "algo/types/errors.hpp"
+#include "algo/types/units.hpp"
 #include "drivers/replay/file_io.hpp"
 #include "drivers/replay/image_file.hpp"
 
@@ -18,6 +19,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr int kFormat = 1;
+constexpr double kSpokenHeight_m = 3 * kMillimetre;  // smaller differences of a part are not put into words
 constexpr std::size_t kMaxJsonBytes = std::size_t{16} << 20;
 
 template <typename Derived>
@@ -86,6 +88,23 @@ Json RegionJson(const RegionCoverage& region) {
   return {{"coverage", region.coverage}, {"largest_hole_m", region.largest_hole_m}, {"hole_centre_m", VectorJson(region.hole_centre_m)}};
 }
 
+Json BodyPartsJson(const BodyParts& body) {
+  Json parts = Json::array();
+  const auto words = [](const BodyPart& part, const std::optional<double>& height_m) {
+    const std::string text = height_m ? HeightWords(part, *height_m, kSpokenHeight_m) : "";
+    return text.empty() ? Json(nullptr) : Json(text);
+  };
+  for (const BodyPart& part : body.parts) {
+    parts.push_back(Json{{"name", part.name},
+                         {"centre_m", VectorJson(part.centre_m)},
+                         {"now_mm", part.now_m ? Json(*part.now_m / kMillimetre) : Json(nullptr)},
+                         {"after_mm", part.after_m / kMillimetre},
+                         {"words_now", words(part, part.now_m)},
+                         {"words_after", words(part, part.after_m)}});
+  }
+  return {{"named_by", body.by_posture ? "posture" : "room"}, {"parts", parts}};
+}
+
 void WriteMap(const fs::path& file, const std::optional<HeightMap>& map) {
   if (!map || map->z.empty()) return;
   // The image borrows the values; it is only read.
@@ -108,6 +127,7 @@ std::string ResultJson(const Comparison& comparison) {
   json["motion"] = comparison.motion ? MotionJson(*comparison.motion) : Json(nullptr);
   json["correction"] = comparison.correction ? CorrectionJson(*comparison.correction) : Json(nullptr);
   json["region"] = comparison.region ? RegionJson(*comparison.region) : Json(nullptr);
+  json["body"] = comparison.body_parts ? BodyPartsJson(*comparison.body_parts) : Json(nullptr);
   json["warnings"] = comparison.warnings;
   json["timings_s"] = Json::object();
   for (const auto& [key, value] : comparison.timings_s) json["timings_s"][key] = value;

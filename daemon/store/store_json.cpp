@@ -24,6 +24,23 @@ web::SixNumbers NumbersOf(const Json& json) {
           .yaw_deg = Number(json, "yaw_deg").value_or(0.0)};
 }
 
+void ReadWords(const Json& result, web::ResultSummary& summary) {
+  const auto text = [](const Json& json, const char* key) {
+    const auto found = json.find(key);
+    return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
+  };
+  if (const auto words = result.value(Json::json_pointer("/correction/words"), Json()); words.is_object()) {
+    summary.words = {text(words, "vertical"), text(words, "longitudinal"), text(words, "lateral"),
+                     text(words, "pitch"),    text(words, "roll"),         text(words, "yaw")};
+  }
+  const auto parts = result.value(Json::json_pointer("/body/parts"), Json());
+  for (const Json& part : parts.is_array() ? parts : Json::array()) {
+    if (!part.is_object()) continue;
+    if (std::string words = text(part, "words_now"); !words.empty()) summary.body_now.push_back(std::move(words));
+    if (std::string words = text(part, "words_after"); !words.empty()) summary.body_after.push_back(std::move(words));
+  }
+}
+
 }  // namespace
 
 std::string PlanJson(const web::ReferencePlan& plan) {
@@ -83,7 +100,14 @@ web::ResultSummary SummaryOf(const std::string& result_json) {
   if (!json.is_object() || !json.contains("verdict") || !json["verdict"].is_string()) {
     throw DataError("a stored result has no verdict: the database was changed from outside");
   }
-  web::ResultSummary summary{.verdict = json["verdict"].get<std::string>(), .reasons = {}, .correction = {}, .u95 = {}};
+  web::ResultSummary summary{.verdict = json["verdict"].get<std::string>(),
+                             .reasons = {},
+                             .correction = {},
+                             .u95 = {},
+                             .words = {},
+                             .body_now = {},
+                             .body_after = {}};
+  ReadWords(json, summary);
   if (const auto reasons = json.find("reasons"); reasons != json.end() && reasons->is_array()) {
     for (const Json& reason : *reasons) summary.reasons.push_back(reason.is_string() ? reason.get<std::string>() : reason.dump());
   }

@@ -129,14 +129,18 @@ void FakeScanService::EndScan() {
   scan.outcome = ScanOutcome::kDone;
   scan.finished_at = WallClock::now();
   if (!recorded.empty()) {
-    const Recorded& data = recorded[std::min(num_finished_, recorded.size() - 1)];
+    const Recorded data = next_recorded ? *next_recorded : recorded[std::min(num_finished_, recorded.size() - 1)];
+    if (!next_recorded) ++num_finished_;
+    next_recorded.reset();
     scan.folder = data.folder;
     if (!scan.reference_id.empty()) scan.result = data.result;
   }
-  ++num_finished_;
   status.scan.reset();
   status.state = ApplianceState::kResult;
-  status.light = scan.result ? scan.result->verdict == "move" ? "result_move" : "result_in_tolerance" : "ready";
+  status.light = !scan.result                             ? "ready"
+                 : scan.result->verdict == "move"         ? "result_move"
+                 : scan.result->verdict == "in_tolerance" ? "result_in_tolerance"
+                                                          : "no_answer";
   status.last_result = scan;
   ++status.scans_today;
   if (Patient* patient = PatientOf(scan.patient_id)) {

@@ -35,6 +35,7 @@ class FakeScanService : public web::ScanService {
     std::optional<web::ResultSummary> result;
   };
   std::vector<Recorded> recorded;
+  std::optional<Recorded> next_recorded;  ///< Set: what the next finished scan shows, out of turn.
   std::chrono::milliseconds sweep{3000};
   std::chrono::milliseconds work{600};
   /// Set: completions wait here until the test calls them.

@@ -6,6 +6,7 @@ import { join } from 'node:path';
 import { createInterface } from 'node:readline';
 
 const kSkip = 77;
+const kPassword = 'correct horse battery';
 const kSize = { width: 1920, height: 1080 };
 
 export class Harness {
@@ -57,6 +58,45 @@ export class Harness {
       if (message.type() === 'error' && !message.text().startsWith('Failed to load resource')) this.failures.push(`${name}: console: ${message.text()}`);
     });
     return page;
+  }
+
+  /// The first account, an engineer of that name.
+  async firstStart(page, name = 'engineer') {
+    await page.goto(this.url);
+    await page.getByLabel('Setup code').fill(this.setupCode);
+    await page.getByLabel('Name').fill(name);
+    await page.getByLabel('Password', { exact: true }).fill(kPassword);
+    await page.getByLabel('Password again').fill(kPassword);
+    await page.getByRole('button', { name: 'Make the account' }).click();
+    await page.getByRole('navigation').waitFor();
+  }
+
+  async logIn(page, name) {
+    await page.goto(this.url);
+    await page.getByLabel('Name').fill(name);
+    await page.getByLabel('Password').fill(kPassword);
+    await page.getByRole('button', { name: 'Log in' }).click();
+    await page.getByRole('navigation').waitFor();
+  }
+
+  /// On the screen of accounts.
+  async addAccount(page, name, role) {
+    const card = page.locator('section', { has: page.getByRole('heading', { name: 'Add an account' }) });
+    await card.getByLabel('Name').fill(name);
+    await card.getByLabel('Role').selectOption(role);
+    await card.getByLabel('Password').fill(kPassword);
+    await card.getByRole('button', { name: 'Add' }).click();
+    await page.getByRole('cell', { name, exact: true }).waitFor();
+  }
+
+  /// A request with the session of that page's person: { status, body }.
+  async api(page, path, method = 'GET', body = undefined) {
+    return page.evaluate(async ([where, how, what]) => {
+      const { csrf_token } = await (await fetch('/api/v1/session')).json();
+      const headers = { 'X-CSRF-Token': csrf_token, ...(what === undefined ? {} : { 'Content-Type': 'application/json' }) };
+      const response = await fetch(`/api/v1/${where}`, { method: how, headers, body: what === undefined ? undefined : JSON.stringify(what) });
+      return { status: response.status, body: await response.json().catch(() => null) };
+    }, [path, method, body]);
   }
 
   async step(name, work) {

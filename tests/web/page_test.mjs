@@ -124,12 +124,13 @@ await h.step('a fraction shows MOVE with the signs in words', async () => {
   await anna.getByRole('button', { name: 'Open for a fraction' }).click();
   await scan(anna, /Start sweep|Scan again/);
   await anna.locator('.verdict.move').waitFor();
-  // The body was carried by +6.2 mm along x, -12.4 mm along y and raised by 4.1 mm (within the turn's share): the correction goes back.
+  // The body was carried by 6.2 mm to the gantry, 12.4 mm to its left and raised by 4.1 mm (within the turn's share): the correction goes back.
   const card = (name) => anna.locator('.number', { has: anna.getByRole('heading', { name }) });
   check((await card('Vertical').locator('.value').innerText()).startsWith('−'), 'vertical is negative');
   equal(await card('Vertical').locator('.word').innerText(), 'down', 'vertical in words');
-  check((await card('Longitudinal').locator('.value').innerText()).startsWith('+'), 'longitudinal is positive');
-  equal(await card('Longitudinal').locator('.word').innerText(), 'toward gantry', 'longitudinal in words');
+  check((await card('Longitudinal').locator('.value').innerText()).startsWith('−'), 'longitudinal is negative');
+  equal(await card('Longitudinal').locator('.word').innerText(), 'away from gantry', 'longitudinal in words');
+  equal(await card('Lateral').locator('.word').innerText(), 'to patient right', 'lateral in words');
   check((await card('Yaw').locator('.value').innerText()).startsWith('+'), 'yaw is positive');
   check(await anna.locator('.number.outside').count() >= 3, 'values outside tolerance are marked');
   await anna.locator('.reading strong').waitFor();

@@ -1,21 +1,26 @@
 // The real HTTP server over a fake appliance whose scans show real results: for tests of the page in a browser.
 // plumb_web_test_server FOLDER: makes scenes and results in FOLDER, prints its address and "setup code: XXXX-XXXX", obeys lines on stdin:
-// unplug, plug, slow (long sweeps), fast, old (the last result becomes 10 minutes old), quit.
+// unplug, plug, slow (long sweeps), fast, old (the last result becomes 10 minutes old), quit; of what the next scan shows: stranger
+// (another body), shoulder (lifted), "moved AXIS AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by pitch, roll, yaw by
+// degrees).
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 
 #include "algo/comparison/comparison.hpp"
 #include "algo/reconstruction/surface_mesh.hpp"
+#include "algo/types/units.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
+#include "daemon/store/store_json.hpp"
 #include "tests/support/fake_scan_service.hpp"
 #include "tests/support/synthetic_scene.hpp"
 #include "web/http_server.hpp"
@@ -25,60 +30,133 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What the sweep shows: a body that was carried, one that lies right, one with its markers covered.
+/// The couch lies along the marker's x axis, its head end at the gantry.
+const Pose kT_iec_reference(Eigen::AngleAxisd(90 * kDegree, Eigen::Vector3d::UnitZ()));
+const Eigen::Vector3d kCentre(0.6, 0.45, 0.0);
+
+CompareOptions Options() {
+  CompareOptions options;
+  options.T_iec_reference = kT_iec_reference;
+  return options;
+}
+
+SyntheticOptions At(const Pose& T_motion, unsigned seed, double noise_m) {
+  SyntheticOptions options;
+  options.T_reference_body = T_motion * Pose(Eigen::Translation3d(kCentre));
+  options.seed = seed;
+  options.noise_m = noise_m;
+  return options;
+}
+
+/// What the sweeps show in turn: a body, carried, lying right, with its markers covered.
 std::vector<SyntheticOptions> Sweeps() {
-  const Eigen::Vector3d centre(0.6, 0.45, 0.0);
-  SyntheticOptions reference;
-  reference.T_reference_body = Pose(Eigen::Translation3d(centre));
-  SyntheticOptions moved;
-  moved.T_reference_body = BodyMotionAbout(centre, {0.0062, -0.0124, 0.0041}, -2.4, 0.6, -0.5) * reference.T_reference_body;
-  moved.seed = 2;
-  moved.noise_m = 0.0008;
-  SyntheticOptions right = moved;
-  right.T_reference_body = BodyMotionAbout(centre, {0.0006, -0.0004, 0.0003}, 0.05) * reference.T_reference_body;
-  right.seed = 3;
+  const SyntheticOptions reference = At(Pose::Identity(), 1, 0.0);
+  const SyntheticOptions moved = At(BodyMotionAbout(kCentre, {0.0062, -0.0124, 0.0041}, -2.4, 0.6, -0.5), 2, 0.0008);
+  const SyntheticOptions right = At(BodyMotionAbout(kCentre, {0.0006, -0.0004, 0.0003}, 0.05), 3, 0.0008);
   SyntheticOptions covered = right;
   for (const auto& [id, marker] : MakeSyntheticScene(reference).markers) covered.hidden_markers.insert(id);
   covered.hidden_markers.erase(covered.hidden_markers.begin());
   return {reference, moved, right, covered};
 }
 
-web::SixNumbers Numbers(const CouchNumbers& numbers) {
-  return {numbers.vertical_mm, numbers.longitudinal_mm, numbers.lateral_mm, numbers.pitch_deg, numbers.roll_deg, numbers.yaw_deg};
+/// Another person in the place of the one of the reference.
+SyntheticOptions Stranger() {
+  SyntheticOptions stranger = At(Pose::Identity(), 4, 0.0008);
+  stranger.shape = BodyShape::kTorsoWide;
+  return stranger;
 }
 
-std::vector<FakeScanService::Recorded> Record(const fs::path& root) {
-  std::vector<FakeScanService::Recorded> recorded;
-  std::optional<Scene> reference;
-  for (const SyntheticOptions& options : Sweeps()) {
+/// The body lies right, but its left side is lifted at the head end (x to the head, y to the right of who lies on the back).
+SyntheticOptions LiftedShoulder() {
+  SyntheticOptions lifted = At(Pose::Identity(), 5, 0.0008);
+  lifted.deform = [](const Eigen::Vector3d& p) {
+    const double share = std::clamp((p.x() - 0.08) / 0.05, 0.0, 1.0) * std::clamp((-p.y() - 0.01) / 0.04, 0.0, 1.0);
+    return Eigen::Vector3d(0, 0, 0.016 * share);
+  };
+  return lifted;
+}
+
+class Recorder {
+ public:
+  explicit Recorder(fs::path root) : root_(std::move(root)) {}
+
+  /// The first one is the reference of all others.
+  FakeScanService::Recorded Record(const SyntheticOptions& options) {
     Scene scene = MakeSyntheticScene(options);
     if (scene.height_map) scene.mesh = MeshOfHeightMap(*scene.height_map, {}, {.decimation = 3});
-    const fs::path folder = root / fmt::format("sweep_{}", recorded.size());
-    fs::create_directories(folder);
+    const fs::path folder = NewFolder();
     WriteScene(scene, folder / "scene");
-    FakeScanService::Recorded entry{folder, std::nullopt};
-    if (!reference) {
-      reference = scene;
-    } else {
-      const Comparison comparison = Compare(*reference, scene);
-      WriteResult(comparison, DrawResult(comparison, &*reference->height_map), folder / "result");
-      entry.result = web::ResultSummary{Name(comparison.verdict), comparison.reasons, std::nullopt, std::nullopt};
-      if (comparison.correction) {
-        entry.result->correction = Numbers(comparison.correction->value);
-        entry.result->u95 = Numbers(comparison.correction->u95);
-      }
+    if (!reference_) {
+      reference_ = std::move(scene);
+      return {folder, std::nullopt};
     }
-    recorded.push_back(entry);
+    return Write(folder, Compare(*reference_, scene, Options()));
   }
-  return recorded;
+
+  /// A result of which the body's motion in the room is known: `along` the axis (mm), or about it (degrees).
+  FakeScanService::Recorded RecordMotion(const Eigen::Vector3d& axis, bool is_turn, double amount, PatientPosture posture) {
+    if (!still_) still_ = Compare(*reference_, MakeSyntheticScene(At(Pose::Identity(), 6, 0.0)), Options());
+    const Eigen::Vector3d isocentre = kT_iec_reference * still_->motion->centroid_m;
+    const Pose T_room =
+        is_turn ? Eigen::Translation3d(isocentre) * Pose(Eigen::AngleAxisd(amount * kDegree, axis)) * Eigen::Translation3d(-isocentre)
+                : Pose(Eigen::Translation3d(amount * kMillimetre * axis));
+    Comparison comparison = *still_;
+    comparison.motion->T = kT_iec_reference.inverse() * T_room * kT_iec_reference;
+    comparison.correction = CorrectionOf(comparison.motion->T, comparison.motion->covariance, comparison.motion->centroid_m,
+                                         comparison.motion->centroid_m, kT_iec_reference, MarkerKind::kRoom, posture);
+    comparison.verdict = Verdict::kMove;
+    comparison.reasons = {"known motion"};
+    const fs::path folder = NewFolder();
+    fs::create_directory_symlink(root_ / "sweep_0" / "scene", folder / "scene");
+    return Write(folder, comparison);
+  }
+
+ private:
+  fs::path NewFolder() {
+    const fs::path folder = root_ / fmt::format("sweep_{}", num_folders_++);
+    fs::create_directories(folder);
+    return folder;
+  }
+
+  FakeScanService::Recorded Write(const fs::path& folder, const Comparison& comparison) {
+    WriteResult(comparison, DrawResult(comparison, &*reference_->height_map), folder / "result");
+    return {folder, SummaryOf(ResultJson(comparison))};
+  }
+
+  fs::path root_;
+  int num_folders_ = 0;
+  std::optional<Scene> reference_;
+  std::optional<Comparison> still_;
+};
+
+/// "x" is to the right of who faces the gantry, "y" to the gantry, "z" up; "pitch", "roll", "yaw" are turns about them.
+FakeScanService::Recorded Moved(Recorder& recorder, const std::string& axis, double amount, const std::string& posture) {
+  const std::string names[] = {"x", "y", "z", "pitch", "roll", "yaw"};
+  const auto which = std::find(std::begin(names), std::end(names), axis) - std::begin(names);
+  PatientPosture lies = PatientPosture::kHeadFirstSupine;
+  for (const PatientPosture known : {PatientPosture::kHeadFirstProne, PatientPosture::kFeetFirstSupine, PatientPosture::kFeetFirstProne}) {
+    if (posture == Name(known)) lies = known;
+  }
+  return recorder.RecordMotion(Eigen::Vector3d::Unit(which % 3), which >= 3, amount, lies);
 }
 
-void Obey(FakeScanService& service, const std::string& command) {
-  if (command == "unplug") service.Unplug();
-  if (command == "plug") service.Plug();
-  if (command == "slow") service.sweep = std::chrono::milliseconds(60000);
-  if (command == "fast") service.sweep = std::chrono::milliseconds(1500);
-  if (command == "old" && !service.scans.empty()) {
+void Obey(FakeScanService& service, Recorder& recorder, const std::string& command) {
+  std::istringstream words(command);
+  std::string name;
+  words >> name;
+  if (name == "unplug") service.Unplug();
+  if (name == "plug") service.Plug();
+  if (name == "slow") service.sweep = std::chrono::milliseconds(60000);
+  if (name == "fast") service.sweep = std::chrono::milliseconds(1500);
+  if (name == "stranger") service.next_recorded = recorder.Record(Stranger());
+  if (name == "shoulder") service.next_recorded = recorder.Record(LiftedShoulder());
+  if (name == "moved") {
+    std::string axis, posture;
+    double amount = 0;
+    words >> axis >> amount >> posture;
+    service.next_recorded = Moved(recorder, axis, amount, posture);
+  }
+  if (name == "old" && !service.scans.empty()) {
     service.scans.back().finished_at = web::WallClock::now() - std::chrono::minutes(10);
     service.status.last_result = service.scans.back();
     service.Tell(web::EventKind::kResult);
@@ -98,7 +176,8 @@ std::vector<std::string> ReadCommands(std::string& rest) {
 
 int Serve(const fs::path& root) {
   FakeScanService service;
-  service.recorded = Record(root);
+  Recorder recorder(root);
+  for (const SyntheticOptions& options : Sweeps()) service.recorded.push_back(recorder.Record(options));
   service.sweep = std::chrono::milliseconds(1500);
   service.update = {true, "", "A", false, 0.0, {"plumb-0.2.0.raucb"}};
   web::HttpServerOptions options;
@@ -115,7 +194,7 @@ int Serve(const fs::path& root) {
     if (waiting[1].revents != 0) {
       for (const std::string& command : ReadCommands(rest)) {
         if (command == "quit") return 0;
-        Obey(service, command);
+        Obey(service, recorder, command);
       }
     }
     service.Tick(std::chrono::steady_clock::now());

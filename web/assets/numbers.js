@@ -7,7 +7,8 @@ export const kAxes = [
   { name: 'pitch', key: 'pitch_deg', unit: '°' }, { name: 'roll', key: 'roll_deg', unit: '°' }, { name: 'yaw', key: 'yaw_deg', unit: '°' },
 ];
 
-export const signed = (value, digits = 1) => `${value < 0 ? '−' : '+'}${Math.abs(value).toFixed(digits)}`;
+const printsAsZero = (value, digits) => Number(Math.abs(value).toFixed(digits)) === 0;
+export const signed = (value, digits = 1) => `${printsAsZero(value, digits) ? '' : value < 0 ? '−' : '+'}${Math.abs(value).toFixed(digits)}`;
 
 // What the couch does, drawn for a positive value; a negative one is turned or mirrored. The gantry is the ring.
 const kDrawings = {
@@ -45,9 +46,10 @@ function card(axis, correction, u95, tolerance, words, weak) {
   const half = u95?.[axis.key] ?? 0;
   const within = Math.abs(value) + half <= limit;
   const digits = axis.shift ? 1 : Math.abs(value) < 10 ? 2 : 1;
-  const word = words?.[axis.name] || text.words[axis.name][value < 0 ? 1 : 0];
+  const still = printsAsZero(value, digits);  // no direction either
+  const word = still ? text.still : words?.[axis.name] || text.words[axis.name][value < 0 ? 1 : 0];
   return h('li', { class: `number ${within ? 'within' : 'outside'}` },
-    h('h3', {}, name), drawing(axis.name, value),
+    h('h3', {}, name), !still && drawing(axis.name, value),
     h('p', { class: 'value' }, signed(value, digits), h('span', { class: 'unit' }, axis.unit === '°' ? '°' : ` ${axis.unit}`)),
     h('p', { class: 'word' }, word),
     bar(value, half, limit),

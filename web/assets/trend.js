@@ -24,7 +24,7 @@ function chart(axis, points, limit) {
 
 /// @param scans  Newest first.
 export function trend(scans, tolerance) {
-  const shown = scans.filter((scan) => scan.result?.correction).slice(0, 30).reverse();
+  const shown = scans.filter((scan) => scan.result?.correction && scan.result.verdict !== 'no_answer').slice(0, 30).reverse();
   if (shown.length < 2) return h('p', { class: 'hint' }, S.result.trendEmpty);
   const charts = kAxes.map((axis) => {
     const points = shown.filter((scan) => scan.result.correction[axis.key] !== null).map((scan) => ({ value: scan.result.correction[axis.key], u95: scan.result.u95?.[axis.key] ?? 0 }));

@@ -9,6 +9,9 @@ import { ageText, verdictIcon } from './common.js';
 
 const kOldAfter_s = 120;
 const mm = (metres, digits = 1) => (1000 * metres).toFixed(digits);
+/// NO ANSWER is a result, but none to act on: then no number, word or trend is shown that somebody could apply.
+const isAdvice = (scan) => Boolean(scan.result?.correction) && scan.result.verdict !== 'no_answer';
+const sentence = (reason = '') => `${reason.charAt(0).toUpperCase()}${reason.slice(1).replaceAll('+-', '±')}${/[.!]$/.test(reason) ? '' : '.'}`;
 const optional = (path) => get(path, true).catch(() => null);
 
 /// Everything that the screen shows of one scan.
@@ -50,9 +53,11 @@ function verdictStrip({ scan }) {
     const words = { failed: text.failed, cancelled: text.cancelled }[scan.outcome] ?? text.noReference;
     return h('section', { class: 'verdict none' }, h('p', { class: 'word' }, S.purposes[scan.purpose]), h('p', { class: 'why' }, scan.failure ? `${words}: ${scan.failure}` : words));
   }
-  const why = result.verdict === 'no_answer' ? result.reasons.join('; ') : text.why[result.verdict];
+  // The first reason decides; a wall of text is read by nobody.
+  const [first, ...others] = result.verdict === 'no_answer' ? result.reasons : [text.why[result.verdict]];
   return h('section', { class: `verdict ${result.verdict}` },
-    h('p', { class: 'word' }, h('span', { class: 'icon', 'aria-hidden': 'true' }, verdictIcon(result.verdict)), text.verdicts[result.verdict]), h('p', { class: 'why' }, why));
+    h('p', { class: 'word' }, h('span', { class: 'icon', 'aria-hidden': 'true' }, verdictIcon(result.verdict)), text.verdicts[result.verdict]), h('p', { class: 'why' }, sentence(first)),
+    others.length > 0 && h('details', { class: 'other-reasons' }, h('summary', {}, text.otherReasons(others.length)), h('ul', {}, others.map((reason) => h('li', {}, sentence(reason))))));
 }
 
 function trust({ details, scene }) {
@@ -79,6 +84,17 @@ function trust({ details, scene }) {
   return h('dl', { class: 'trust' }, rows);
 }
 
+/// Where on the body, in words: what lies high or low now, and what the correction will leave.
+function bodyWords({ scan, details }) {
+  const text = S.result;
+  if (!scan.result?.body || !details?.body || !isAdvice(scan)) return null;
+  const list = (title, hint, words) => h('div', {}, h('h3', {}, title), h('p', { class: 'hint' }, hint), h('ul', { class: 'findings' }, words.length ? words.map((word) => h('li', {}, word)) : h('li', { class: 'fine-part' }, `✓ ${text.asReference}`)));
+  return h('div', { class: 'body-words' },
+    list(text.bodyAfter, text.bodyAfterHint, scan.result.body.after),
+    details.correction?.vertical_mm !== null && list(text.bodyNow, text.bodyNowHint, scan.result.body.now),
+    details.body.named_by === 'room' && h('p', { class: 'caution' }, text.bodyByRoom));
+}
+
 /// What the sweep saw, where there is nothing to compare it with.
 function seen({ scan, scene }) {
   const canvas = h('canvas', { class: 'map', role: 'img', 'aria-label': S.result.heights });
@@ -90,9 +106,10 @@ function seen({ scan, scene }) {
 
 function meshView({ scan, reference, details }, map, tolerance_mm) {
   const text = S.result;
-  const place = h('div', {});
+  const place = h('div', { class: 'mesh-place' });
   let view = null;
   const open = action(text.meshOpen, async () => {
+    place.classList.remove('waiting');
     clear(place, h('p', { class: 'hint' }, text.meshLoading));
     const canvas = h('canvas', { class: 'mesh', tabindex: '0', role: 'application', 'aria-label': text.meshLabel });
     const ghost = checkbox(text.ghost, false, {});
@@ -107,7 +124,8 @@ function meshView({ scan, reference, details }, map, tolerance_mm) {
       clear(place, h('p', { class: 'hint' }, text.meshFailed));
     }
   }, {});
-  clear(place, open);
+  place.classList.add('waiting');
+  clear(place, open, h('p', { class: 'hint' }, text.meshHint));
   return { element: place, stop: () => view?.stop() };
 }
 
@@ -152,12 +170,12 @@ export async function showResult(place, id) {
     const card = (title, ...content) => h('section', { class: 'card' }, h('h2', {}, title), ...content);
     const mapPlace = h('div', {}, h('p', { class: 'hint' }, S.loading));
     const meshPlace = h('div', {});
-    clear(place, h('h1', { class: 'visually-hidden' }, text.title), identity.element, old, other, h('div', { class: 'fresh' }, verdictStrip(data), scan.result?.correction && h('section', { class: 'correction' }, h('h2', {}, text.numbers, ' ', h('small', {}, text.atIsocentre)), sixNumbers(scan.result, reference, data.details))),
+    clear(place, h('h1', { class: 'visually-hidden' }, text.title), identity.element, old, other, h('div', { class: 'fresh' }, verdictStrip(data), isAdvice(scan) && h('section', { class: 'correction' }, h('h2', {}, text.numbers, ' ', h('small', {}, text.atIsocentre)), sixNumbers(scan.result, reference, data.details))),
       data.details && card(text.trust, trust(data)),
-      mapped && card(text.where, mapPlace),
+      mapped && card(text.where, bodyWords(data), mapPlace),
       !mapped && data.scene?.heightmap && card(text.heights, seen(data)),
       h('div', { class: mapped ? 'halves' : '' }, mapped && card(text.overlay, h('img', { class: 'picture', src: fileUrl(scan.id, 'overlay.png'), alt: text.overlayAlt, loading: 'lazy' })), scan.outcome === 'done' && card(text.mesh, meshPlace)),
-      scan.result && card(text.trend, trend(history, tolerance)),
+      scan.result && card(text.trend, !isAdvice(scan) && h('p', { class: 'caution' }, text.trendWithout), trend(history, tolerance)),
       h('section', { class: 'card' }, closing(data, load)));
     tick = () => {
       const aged = identity.tick();
