@@ -249,16 +249,17 @@ Vector3f ColorCamera::GatherSmooth(const Shot& shot, int x, int y) const {
   const Shading shading = shot.world.ShadingAt(material, p);
   if (material >= kFirstBoard) return shading.light.cwiseProduct(shot.world.Albedo(shot.world.PaintOf(material, shading.normal), p));
   // The surface is its tangent plane over one pixel.
+  static_assert(kSmoothSide * kSmoothSide == 4);
   const auto& samples = PatternOf(smooth_samples_, x, y);
-  const World::Paint paint = shot.world.PaintOf(material, shading.normal);
-  Vector3f albedo = Vector3f::Zero();
-  for (const Sample& sample : samples) {
+  Vector3x4 places;
+  for (int i = 0; i < 4; ++i) {
+    const Sample& sample = samples[static_cast<std::size_t>(i)];
     const Vector3f origin = pose.p_world + sample.dt * pose.velocity;
     const Vector3f direction = pose.DirectionOf(rays_.At(x, y, sample.du, sample.dv), sample.dt);
     const float t = shading.normal.dot(p - origin) / std::min(-0.05F, shading.normal.dot(direction));
-    albedo += shot.world.Albedo(paint, origin + t * direction);
+    places.Set(i, origin + t * direction);
   }
-  return shading.light.cwiseProduct(albedo) / static_cast<float>(samples.size());
+  return shading.light.cwiseProduct(shot.world.MeanAlbedo(shot.world.PaintOf(material, shading.normal), places));
 }
 
 Vector3f ColorCamera::PointAt(const Shot& shot, int x, int y) const {

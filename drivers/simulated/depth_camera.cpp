@@ -167,10 +167,10 @@ cv::Mat DepthCamera::Register(const cv::Mat& measured_m) const {
       int v = y;
       if (!same_camera) {
         const Eigen::Vector2d pixel = Project(color, p.cast<double>());
-        u = static_cast<int>(std::floor(pixel.x() + 0.5));
-        v = static_cast<int>(std::floor(pixel.y() + 0.5));
+        if (!(pixel.x() >= -0.5 && pixel.y() >= -0.5 && pixel.x() < color.width - 0.5 && pixel.y() < color.height - 0.5)) continue;
+        u = static_cast<int>(pixel.x() + 0.5);
+        v = static_cast<int>(pixel.y() + 0.5);
       }
-      if (u < 0 || v < 0 || u >= color.width || v >= color.height) continue;
       const double units = std::round(p.z() * unit_.depth_units_per_metre);
       if (units < 1 || units > 65535) continue;
       auto& value = registered.at<std::uint16_t>(v, u);

@@ -10,9 +10,9 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kTolerance = 2e-5F;
-constexpr float kCloseEnough = 1e-5F;
-constexpr float kFree = 0.9F;  // Below 1: the interpolated distance may be a little too large.
-constexpr int kMaxRounds = 4;  // Of false position.
+constexpr float kFree = 0.9F;        // Below 1: the interpolated distance may be a little too large.
+constexpr float kLeastStep = 0.25F;  // Of a cell: what a ray grazes less deep than one micrometre (on a radius of 0.1 m) it may miss.
+constexpr int kMaxRounds = 4;        // Of false position.
 constexpr int kMaxSteps = 200;
 
 // Clips [begin, end] to where the rays are between low and high along one axis.
@@ -82,15 +82,15 @@ Float4 DistanceGrid::Intersect(const Vector3x4& origin, const Vector3x4& directi
   found = at_once ? t : found;
   active &= ~at_once;
   Float4 slope = Splat(0.5F);  // Fall of the distance per way in the last step.
-  Int4 careful{0, 0, 0, 0};    // The last step was too bold.
+  const float least_step = kLeastStep * spacing_;
+  Int4 careful{0, 0, 0, 0};  // The last step was too bold.
   Float4 width = Splat(0.0F);
   Float4 d_far = Splat(0.0F);
   Int4 bracketed{0, 0, 0, 0};
   Int4 rounds{0, 0, 0, 0};
   for (int step = 0; step < kMaxSteps && Any(active); ++step) {
-    // Over-relaxed (Keinert et al. 2014): as far as the free balls around both ends still overlap, if the distance goes on falling like
-    // this.
-    const Float4 safe = Larger(kFree * d, Splat(kTolerance));
+    // Over-relaxed (Keinert et al. 2014): as far as the free balls around both ends still overlap, if the distance goes on falling so.
+    const Float4 safe = Larger(kFree * d, Splat(least_step));
     Float4 advance = careful ? safe : Larger(1.9F * kFree * d / Larger(1.0F + slope, Splat(0.5F)), safe);
     // Near the surface the distance falls linearly along the ray: try to step across it.
     const Float4 across = 1.2F * d / Larger(slope, Splat(0.05F)) + kTolerance;
@@ -112,8 +112,8 @@ Float4 DistanceGrid::Intersect(const Vector3x4& origin, const Vector3x4& directi
     t = outside ? t + advance : t;
     d = outside ? d_next : d;
 
-    const Int4 done = active & bracketed & ((rounds == kMaxRounds) | ((d_next <= kCloseEnough) & (d_next >= -kCloseEnough)));
     bracketed |= inside;
+    const Int4 done = active & bracketed & ((rounds == kMaxRounds) | ((d_next <= kTolerance) & (d_next >= -kTolerance)));
     found = done ? t + width * d / (d - Smaller(d_far, Splat(0.0F))) : found;
     active &= ~done;
   }

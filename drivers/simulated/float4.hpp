@@ -16,9 +16,10 @@ inline Float4 Smaller(Float4 a, Float4 b) { return a < b ? a : b; }
 inline Float4 Larger(Float4 a, Float4 b) { return a > b ? a : b; }
 inline bool Any(Int4 mask) { return (mask[0] | mask[1] | mask[2] | mask[3]) != 0; }
 
-/// Four points or directions.
-struct Vector3x4 {
-  Float4 x, y, z;
+/// A point or direction, or four of them.
+template <typename T>
+struct Vector3 {
+  T x, y, z;
 
   void Set(int i, const Eigen::Vector3f& v) {
     x[i] = v.x();
@@ -26,12 +27,17 @@ struct Vector3x4 {
     z[i] = v.z();
   }
 };
+using Vector3x4 = Vector3<Float4>;
 
 inline Vector3x4 Splat(const Eigen::Vector3f& v) { return {Splat(v.x()), Splat(v.y()), Splat(v.z())}; }
-inline Vector3x4 operator*(const Eigen::Matrix3f& m, const Vector3x4& v) {
+template <typename T>
+Vector3<T> operator*(const Eigen::Matrix3f& m, const Vector3<T>& v) {
   return {m(0, 0) * v.x + m(0, 1) * v.y + m(0, 2) * v.z, m(1, 0) * v.x + m(1, 1) * v.y + m(1, 2) * v.z,
           m(2, 0) * v.x + m(2, 1) * v.y + m(2, 2) * v.z};
 }
-inline Vector3x4 operator+(const Vector3x4& a, const Eigen::Vector3f& b) { return {a.x + b.x(), a.y + b.y(), a.z + b.z()}; }
+template <typename T>
+Vector3<T> operator+(const Vector3<T>& a, const Eigen::Vector3f& b) {
+  return {a.x + b.x(), a.y + b.y(), a.z + b.z()};
+}
 
 }  // namespace plumb::simulated

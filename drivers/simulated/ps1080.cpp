@@ -17,8 +17,8 @@ int QuantisePs1080(double depth_mm) {
     return depths;
   }();
   const double code = 800.0 + 4.0 * ((7.5 - 9000.0 / depth_mm) / 0.1042 + 0.375);
-  const auto whole = static_cast<int>(std::floor(code + 0.5));
-  return whole >= 0 && whole < static_cast<int>(kDepths.size()) ? kDepths[static_cast<std::size_t>(whole)] : Ps1080DepthOfCode(whole);
+  if (!(code >= 0 && code < static_cast<double>(kDepths.size() - 1))) return Ps1080DepthOfCode(static_cast<int>(std::lround(code)));
+  return kDepths[static_cast<std::size_t>(code + 0.5)];
 }
 
 }  // namespace plumb

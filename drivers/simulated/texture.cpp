@@ -16,6 +16,11 @@ namespace {
 using Byte8 = std::uint8_t __attribute__((vector_size(8)));
 using Short4 = std::uint16_t __attribute__((vector_size(8)));
 using Short8 = std::uint16_t __attribute__((vector_size(16)));
+// Far away from zero, so that the conversion to an integer rounds down for all places of a room.
+constexpr int kOffset = 1 << 14;
+constexpr int kFractions = 16;  // Of a texel: fine enough, and the sums of 8-bit values stay in 16 bits.
+constexpr float kScale = 1.0F / (255.0F * kFractions * kFractions);
+
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
@@ -68,15 +73,7 @@ Texture::Texture(const Vector2f& low, float step, int width, int height, const V
   texels_.assign(Index(0, height), Encode(albedo));
 }
 
-Vector3f Texture::At(float x, float y) const {
-  // Far away from zero, so that the conversion to an integer rounds down for all places of a room.
-  constexpr int kOffset = 1 << 14;
-  const float gx = (x - low_.x()) * inverse_step_;
-  const float gy = (y - low_.y()) * inverse_step_;
-  int x0 = static_cast<int>(gx + kOffset) - kOffset;
-  int y0 = static_cast<int>(gy + kOffset) - kOffset;
-  const float u = gx - static_cast<float>(x0);
-  const float v = gy - static_cast<float>(y0);
+inline Int4 Texture::Between(int x0, int y0, int wu, int wv) const {
   int x1 = x0 + 1;
   int y1 = y0 + 1;
   if (x0 < 0 || y0 < 0 || x1 >= width_ || y1 >= height_) {
@@ -85,22 +82,45 @@ Vector3f Texture::At(float x, float y) const {
     y0 = Mirror(y0, height_);
     y1 = Mirror(y1, height_);
   }
-  // Interpolated before the square is taken, in whole numbers: a sixteenth of a texel is fine enough. All channels of two texels at a time.
-  const auto wu = static_cast<std::uint16_t>(16.0F * u + 0.5F);
-  const auto wv = static_cast<std::uint16_t>(16.0F * v + 0.5F);
-  const auto near = static_cast<std::uint16_t>(16 - wu);
-  const Short8 across{near, near, near, near, wu, wu, wu, wu};
+  // Interpolated before the square is taken, in whole numbers; all channels of two texels at a time.
+  const auto right = static_cast<std::uint16_t>(wu);
+  const auto left = static_cast<std::uint16_t>(kFractions - wu);
+  const Short8 across{left, left, left, left, right, right, right, right};
   const auto pair = [&](int row) {
     const std::array<Texel, 2> texels = {texels_[Index(x0, row)], texels_[Index(x1, row)]};
     Byte8 bytes;
     std::memcpy(&bytes, texels.data(), sizeof(bytes));
     return __builtin_convertvector(bytes, Short8) * across;
   };
-  const Short8 both = pair(y0) * static_cast<std::uint16_t>(16 - wv) + pair(y1) * wv;
+  const Short8 both = pair(y0) * static_cast<std::uint16_t>(kFractions - wv) + pair(y1) * static_cast<std::uint16_t>(wv);
   const Short4 sum = __builtin_shufflevector(both, both, 0, 1, 2, 3) + __builtin_shufflevector(both, both, 4, 5, 6, 7);
-  const Float4 root = (1.0F / (255.0F * 256.0F)) * __builtin_convertvector(__builtin_convertvector(sum, Int4), Float4);
-  const Float4 albedo = root * root;
-  return {albedo[0], albedo[1], albedo[2]};
+  return __builtin_convertvector(sum, Int4);
+}
+
+Vector3f Texture::At(Float4 x, Float4 y) const {
+  const Float4 gx = (x - low_.x()) * inverse_step_;
+  const Float4 gy = (y - low_.y()) * inverse_step_;
+  const Int4 x0 = __builtin_convertvector(gx + static_cast<float>(kOffset), Int4) - kOffset;
+  const Int4 y0 = __builtin_convertvector(gy + static_cast<float>(kOffset), Int4) - kOffset;
+  const Int4 wu = __builtin_convertvector(kFractions * (gx - __builtin_convertvector(x0, Float4)) + 0.5F, Int4);
+  const Int4 wv = __builtin_convertvector(kFractions * (gy - __builtin_convertvector(y0, Float4)) + 0.5F, Int4);
+  Float4 sum = Splat(0.0F);
+  for (int i = 0; i < 4; ++i) {
+    const Float4 root = __builtin_convertvector(Between(x0[i], y0[i], wu[i], wv[i]), Float4);
+    sum += root * root;
+  }
+  return 0.25F * kScale * kScale * Vector3f(sum[0], sum[1], sum[2]);
+}
+
+Vector3f Texture::At(float x, float y) const {
+  const float gx = (x - low_.x()) * inverse_step_;
+  const float gy = (y - low_.y()) * inverse_step_;
+  const int x0 = static_cast<int>(gx + kOffset) - kOffset;
+  const int y0 = static_cast<int>(gy + kOffset) - kOffset;
+  const auto wu = static_cast<int>(kFractions * (gx - static_cast<float>(x0)) + 0.5F);
+  const auto wv = static_cast<int>(kFractions * (gy - static_cast<float>(y0)) + 0.5F);
+  const Float4 root = kScale * __builtin_convertvector(Between(x0, y0, wu, wv), Float4);
+  return {root[0] * root[0], root[1] * root[1], root[2] * root[2]};
 }
 
 void Texture::Blend(int x, int y, const Vector3f& color, float opacity) {

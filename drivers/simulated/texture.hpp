@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "drivers/simulated/float4.hpp"
+
 namespace plumb::simulated {
 
 /// Linear-light albedo over a rectangle of a plane; mirrored outside of it. Immutable once painted.
@@ -16,6 +18,9 @@ class Texture {
 
   /// Albedo (red, green, blue) at a place, bilinear between texels.
   [[nodiscard]] Eigen::Vector3f At(float x, float y) const;
+
+  /// Mean albedo over four places.
+  [[nodiscard]] Eigen::Vector3f At(Float4 x, Float4 y) const;
 
   // Painting. Colours are linear-light albedo in [0, 1]; lengths in metres.
 
@@ -36,6 +41,8 @@ class Texture {
   [[nodiscard]] std::size_t Index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
   }
+  /// Roots of red, green and blue times 255 * 256, between four texels; wu, wv in sixteenths of the way.
+  [[nodiscard]] Int4 Between(int x0, int y0, int wu, int wv) const;
   void Blend(int x, int y, const Eigen::Vector3f& color, float opacity);
 
   Eigen::Vector2f low_;

@@ -219,24 +219,31 @@ World::Paint World::PaintOf(Material material, const Vector3f& normal) const {
   return {material, weight / weight.sum()};
 }
 
-Vector3f World::Albedo(const Paint& paint, const Vector3f& p_world) const {
+template <typename Place>
+Vector3f World::AlbedoOf(const Paint& paint, const Place& p_world) const {
   const Material material = paint.material;
-  if (material == kSupport) return room_.support_texture->At(p_world.x(), p_world.y());
+  if (material == kSupport) return room_.support_texture->At(p_world.x, p_world.y);
   if (material == kBody) {
-    const Vector3f p = ToBody(p_world);
+    const Place p = R_body_world_ * p_world + t_body_world_;
+    const Texture& skin = *room_.skin_texture;
     Vector3f albedo = Vector3f::Zero();
-    if (paint.weight.z() > 0) albedo += paint.weight.z() * room_.skin_texture->At(p.x(), p.y());
-    if (paint.weight.y() > 0) albedo += paint.weight.y() * room_.skin_texture->At(p.x() + 0.37F, p.z() + 0.21F);
-    if (paint.weight.x() > 0) albedo += paint.weight.x() * room_.skin_texture->At(p.y() + 0.11F, p.z() - 0.33F);
+    if (paint.weight.z() > 0) albedo += paint.weight.z() * skin.At(p.x, p.y);
+    if (paint.weight.y() > 0) albedo += paint.weight.y() * skin.At(p.x + 0.37F, p.z + 0.21F);
+    if (paint.weight.x() > 0) albedo += paint.weight.x() * skin.At(p.y + 0.11F, p.z - 0.33F);
     return albedo;
   }
-  if (material == kLowerFloor) return 0.6F * room_.support_texture->At(p_world.y() * 0.8F, p_world.x() * 0.8F);
+  if (material == kLowerFloor) return 0.6F * room_.support_texture->At(p_world.y * 0.8F, p_world.x * 0.8F);
   if (material == kCouchSide) return Vector3f(0.25F, 0.26F, 0.28F);
   if (material < kFirstBoard) return Vector3f::Constant(0.02F);
   const int part = (material - kFirstBoard) % 4;
   if (part == 0) return Vector3f(0.78F, 0.78F, 0.76F);
   return part == 1 ? Vector3f::Constant(0.045F) : Vector3f(0.45F, 0.43F, 0.40F);
 }
+
+Vector3f World::Albedo(const Paint& paint, const Vector3f& p_world) const {
+  return AlbedoOf(paint, Vector3<float>{p_world.x(), p_world.y(), p_world.z()});
+}
+Vector3f World::MeanAlbedo(const Paint& paint, const Vector3x4& p_world) const { return AlbedoOf(paint, p_world); }
 
 Vector3f World::SupportLight(const Vector3f& p_world) const {
   const float gx = std::clamp((p_world.x() - kLightGridLow) / kLightGridStep, 0.0F, kLightGridSize - 1.001F);

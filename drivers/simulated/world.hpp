@@ -99,6 +99,7 @@ class World {
   [[nodiscard]] Paint PaintOf(Material material, const Eigen::Vector3f& normal) const;
   /// Share of the light that the surface sends back, linear red, green, blue.
   [[nodiscard]] Eigen::Vector3f Albedo(const Paint& paint, const Eigen::Vector3f& p_world) const;
+  [[nodiscard]] Eigen::Vector3f MeanAlbedo(const Paint& paint, const Vector3x4& p_world) const;  ///< Over four places.
 
   /// A board and its print.
   struct BoardPlane {
@@ -120,6 +121,8 @@ class World {
   void TraceSupport(const Ray& ray, Hit& hit) const;
   [[nodiscard]] Hit TraceFlat(const Ray& ray, const Candidates& candidates) const;  ///< Everything but the body.
   [[nodiscard]] Eigen::Vector3f ToBody(const Eigen::Vector3f& p_world) const { return R_body_world_ * p_world + t_body_world_; }
+  template <typename Place>
+  [[nodiscard]] Eigen::Vector3f AlbedoOf(const Paint& paint, const Place& p_world) const;
   void BakeSupportLight();
 
   Room room_;

@@ -42,6 +42,38 @@ TEST(DistanceGridTest, RaysMeetABallWhereGeometrySays) {
   EXPECT_GT(hits, 1000);
 }
 
+TEST(DistanceGridTest, FourRaysAtOnceFindWhatEachFindsAlone) {
+  const auto ball = Ball();
+  RandomStream random(5);
+  const auto within = [&](double limit) { return static_cast<float>(random.Within(limit)); };
+  int hits = 0;
+  int misses = 0;
+  for (int packet = 0; packet < 2000; ++packet) {
+    Vector3x4 origins{};
+    Vector3x4 directions{};
+    Float4 begin{};
+    Float4 end{};
+    Float4 alone{};
+    for (int i = 0; i < 4; ++i) {
+      // Beside, grazing and through the ball; some from inside of the box, some that end before it.
+      const Vector3f origin(within(0.3), within(0.3), random.Uniform() < 0.2 ? 0.11F : 0.8F);
+      const Vector3f direction = (Vector3f(within(0.14), within(0.14), within(0.05)) - origin).normalized();
+      origins.Set(i, origin);
+      directions.Set(i, direction);
+      begin[i] = static_cast<float>(random.Uniform(0.0, 0.1));
+      end[i] = random.Uniform() < 0.2 ? 0.3F : 2.0F;
+      alone[i] = ball->Intersect(origin, direction, begin[i], end[i]);
+    }
+    const Float4 together = ball->Intersect(origins, directions, begin, end);
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_EQ(together[i], alone[i]);
+      ++(std::isfinite(together[i]) ? hits : misses);
+    }
+  }
+  EXPECT_GT(hits, 1000);
+  EXPECT_GT(misses, 1000);
+}
+
 TEST(DistanceGridTest, NormalsPointAwayFromABallsCentre) {
   const auto ball = Ball();
   for (int i = 0; i < 200; ++i) {
