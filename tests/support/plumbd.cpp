@@ -51,8 +51,9 @@ int MakeNotifySocket(const fs::path& path) {
 Plumbd::Plumbd(const fs::path& folder, PlumbdOptions options)
     : folder_(folder), state_(options.state.empty() ? folder / "state" : options.state) {
   notify_fd_ = MakeNotifySocket(folder_ / "notify.sock");
-  std::vector<std::string> arguments = {PLUMBD_BINARY, "--simulated",   "demo",      "--sim-size",      "320x240",  "--sim-frames", "120",
-                                        "--state",     state_.string(), "--control", socket().string(), "--listen", "127.0.0.1:0"};
+  std::vector<std::string> arguments = {
+      PLUMBD_BINARY, "--simulated",   "demo",      "--sim-size",      "320x240",  "--sim-frames", std::to_string(options.sweep_frames),
+      "--state",     state_.string(), "--control", socket().string(), "--listen", "127.0.0.1:0"};
   arguments.insert(arguments.end(), options.arguments.begin(), options.arguments.end());
   options.environment["XDG_CACHE_HOME"] = PLUMB_TEST_CACHE;
   options.environment["NOTIFY_SOCKET"] = (folder_ / "notify.sock").string();

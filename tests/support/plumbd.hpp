@@ -19,6 +19,7 @@ namespace plumb::testing {
 struct PlumbdOptions {
   std::vector<std::string> arguments = {};  ///< Beside those that every test needs.
   std::map<std::string, std::string> environment = {};
+  int sweep_frames = 120;
   long max_file_bytes = 0;           ///< > 0: larger files fail as on a full disk.
   std::filesystem::path state = {};  ///< Empty: a folder in the test's own.
 };
