@@ -82,6 +82,14 @@ void Appliance::OpenStore() {
     store_.reset();
     storage_fault_ = error.what();
     Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", storage_fault_));
+    if (dynamic_cast<const DiskRefused*>(&error) == nullptr) return;
+  }
+  if (store_) return;
+  try {
+    store_ = Store::OpenReadable(parts_.config.appliance.state);
+    Log(LogLevel::kNotice, "what is stored can be read");
+  } catch (const IoError& error) {
+    Log(LogLevel::kError, fmt::format("nor can anything be read: {}", error.what()));
   }
 }
 
@@ -119,7 +127,7 @@ Appliance::Answer Appliance::Cancel() { return Handle(ScanEvent::kCancel); }
 /// What only the appliance knows; the state has said yes already.
 Appliance::Answer Appliance::WhyNotScan() const {
   if (stopped_) return "the appliance is being switched off";
-  if (store_ == nullptr) return "nothing can be stored";
+  if (store_ == nullptr || !storage_fault_.empty()) return "nothing can be stored";
   if (open_patient_.empty()) return "no patient is open: open one on the page first";
   constexpr std::uintmax_t kLeast = 48U << 20;
   std::error_code error;
@@ -330,6 +338,7 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
     scan_fault_ = fmt::format("the scan failed: {}", outcome.reason);
     Log(LogLevel::kError, scan_fault_, {{"SCAN", scan_.id}});
     (void)Handle(ScanEvent::kScanFailed);
+    CheckDisk();
   } else {
     last_result_ = scan_;
     const std::string answer = outcome.verdict ? Name(*outcome.verdict) : outcome.kind == Kind::kNoScene ? outcome.reason : "no comparison";
@@ -353,9 +362,28 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
   if (stopped_) std::exchange(stopped_, nullptr)();
 }
 
+/// A disk that has become read-only must be known before a patient is scanned in vain. Off the loop.
+void Appliance::CheckDisk() {
+  ticks_to_disk_check_ = kDiskCheckTicks;
+  if (store_ == nullptr || !storage_fault_.empty()) return;
+  (void)store_thread_.Post([this] {
+    try {
+      store_->CheckWritable();
+    } catch (const DiskRefused& error) {
+      loop_.Post([this, what = std::string(error.what())] {
+        if (!storage_fault_.empty()) return;
+        storage_fault_ = what;
+        Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", what));
+        (void)Handle(ScanEvent::kStorageFailed);
+        TellState();
+      });
+    }
+  });
+}
+
 /// Retention and quota, off the loop.
 void Appliance::Care() {
-  if (store_ == nullptr) return;
+  if (store_ == nullptr || !storage_fault_.empty()) return;
   const auto quota = static_cast<std::uint64_t>(parts_.config.appliance.quota_gb * 1e9);
   const bool posted = store_thread_.Post([this, quota] {
     try {
@@ -405,6 +433,8 @@ void Appliance::Stop(std::function<void()> stopped) {
 
 void Appliance::OnTick() {
   tick_timer_.ArmAfter(kTick);
+  const bool is_running = state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking;
+  if (!is_running && --ticks_to_disk_check_ <= 0) CheckDisk();
   if (parts_.button != nullptr && button_source_.is_armed()) ArmButtonTimer();
 }
 

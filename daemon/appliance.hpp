@@ -66,7 +66,7 @@ class Appliance {
   /// False while a busy worker shows no progress: systemd's watchdog must then not be fed.
   [[nodiscard]] bool WorkersAreAlive() const;
 
-  /// Null in safe mode.
+  /// In safe mode one that can only be read, or null.
   [[nodiscard]] Store* store() { return store_.get(); }
   [[nodiscard]] const std::string& storage_fault() const { return storage_fault_; }
   [[nodiscard]] std::optional<Frame> LatestFrame() const { return sensors_->latest(); }
@@ -103,6 +103,8 @@ class Appliance {
     }
   };
 
+  static constexpr int kDiskCheckTicks = 10;  ///< Seconds, while no scan runs.
+
   void OpenStore();
   Answer Handle(ScanEvent event);
   void Act(ScanAction action);
@@ -120,6 +122,7 @@ class Appliance {
   void WatchButton();
   void ArmButtonTimer();
   void Care();
+  void CheckDisk();
   void Show();
   [[nodiscard]] IndicatorPattern Pattern() const;
   void TellEvent(const char* event, const std::string& fields_json);
@@ -133,6 +136,7 @@ class Appliance {
   ApplianceParts parts_;
   std::unique_ptr<Store> store_;
   std::string storage_fault_;
+  int ticks_to_disk_check_ = kDiskCheckTicks;
   ScanState state_;
   std::string sensor_fault_, scan_fault_;
   std::string open_patient_, reference_reason_;

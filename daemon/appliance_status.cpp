@@ -234,7 +234,7 @@ web::Status Appliance::WebStatus() {
                    .name = sensor.sensor.name,
                    .frames_per_second = sensor.present ? sensor.statistics.frames_per_second : 0.0,
                    .powered_s = sensor.present ? SecondsSince(sensor_since_) : 0.0};
-  status.storage = StorageOf(parts_.config.appliance.state, store_ != nullptr);
+  status.storage = StorageOf(parts_.config.appliance.state, storage_fault_.empty());
   status.light = Name(shown_);
   status.patient_id = open_patient_;
   status.next_purpose = purpose_;

@@ -228,7 +228,7 @@ class Plumbd {
     RunHttp();
     const std::string page = fmt::format("{}://{}:{}/", is_https_ ? "https" : "http", page_host_, http_.port());
     Log(LogLevel::kNotice, "the page is served at " + page);
-    if (const std::optional<std::string> code = http_.setup_code(); code && appliance_.store() != nullptr) {
+    if (const std::optional<std::string> code = http_.setup_code(); code && appliance_.storage_fault().empty()) {
       fmt::print("setup code: {}\n", *code);  // under systemd the standard output is the journal
       std::fflush(stdout);
     }

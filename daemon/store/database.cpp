@@ -11,6 +11,22 @@ namespace {
 
 constexpr int kBusyTimeout_ms = 5000;
 
+/// The name as an address, with what SQLite must know of the disk.
+std::string UriOf(const std::filesystem::path& file, Database::Access access) {
+  std::string uri = "file:";
+  for (const char c : file.string()) {
+    if (c == '%' || c == '?' || c == '#') {
+      uri += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+    } else {
+      uri += c;
+    }
+  }
+  // A database that was closed well has no log, and none can be made.
+  std::error_code error;
+  if (access == Database::Access::kFrozen && !std::filesystem::exists(file.string() + "-wal", error)) uri += "?immutable=1";
+  return uri;
+}
+
 }  // namespace
 
 Statement::~Statement() {
@@ -72,12 +88,16 @@ std::string Statement::Text(int column) const {
 }
 
 Database::Database(const std::filesystem::path& file, Access access) : file_(file) {
-  const int flags = access == Access::kReadOnly ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  const int flags = access == Access::kReadWrite ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY;
+  const char* const system = access == Access::kFrozen ? "unix-none" : "unix-excl";  // no locks; of this process only
   try {
-    if (const int code = sqlite3_open_v2(file.c_str(), &handle_, flags | SQLITE_OPEN_NOMUTEX, nullptr); code != SQLITE_OK)
+    if (const int code = sqlite3_open_v2(UriOf(file, access).c_str(), &handle_, flags | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_URI, system);
+        code != SQLITE_OK) {
       Fail(code, "open");
+    }
     sqlite3_extended_result_codes(handle_, 1);
     sqlite3_busy_timeout(handle_, kBusyTimeout_ms);
+    if (access == Access::kFrozen) Execute("PRAGMA locking_mode = EXCLUSIVE");  // the log's index is kept in memory
     // A file from elsewhere shall not be able to run anything.
     sqlite3_db_config(handle_, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
     sqlite3_db_config(handle_, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
@@ -143,6 +163,8 @@ void Database::Fail(int code, const char* doing) const {
       throw DiskRefused(message + "; make the folder writable for this user");
     case SQLITE_IOERR:
       throw DiskRefused(message + "; the disk may be full or failing");
+    case SQLITE_BUSY:
+      throw IoError(message + "; does another plumbd use this folder?");
     case SQLITE_CONSTRAINT:
       throw ConstraintBroken(message);
     default:

@@ -71,10 +71,15 @@ class Statement {
   int next_ = 1;
 };
 
-/// One connection; belongs to one thread at a time. Write-ahead log, foreign keys on, commits are on the disk when they return.
+/// One connection; belongs to one thread at a time. Write-ahead log, foreign keys on, commits are on the disk when they return. The file
+/// belongs to one process at a time: what connections share is in its memory and not in a mapped file, whose disk may become read-only.
 class Database {
  public:
-  enum class Access { kReadWrite, kReadOnly };
+  enum class Access {
+    kReadWrite,
+    kReadOnly,  ///< Beside one that writes.
+    kFrozen,    ///< On a disk that cannot be written by anybody.
+  };
   /// @throws IoError and its kinds.
   Database(const std::filesystem::path& file, Access access);
   ~Database();

@@ -61,6 +61,12 @@ class Store {
   /// Opens or makes the store, checks and migrates the database, recovers from a crash.
   /// @throws IoError and its kinds: DatabaseCorrupt, DiskRefused.
   explicit Store(const std::filesystem::path& folder);
+  /// What can be read of a store on a disk that cannot be written: nothing is checked, put right or changed; every change throws
+  /// DiskRefused.
+  /// @throws IoError and its kinds.
+  [[nodiscard]] static std::unique_ptr<Store> OpenReadable(const std::filesystem::path& folder);
+  /// Tries to write beside the database. @throws DiskRefused saying why that fails, unless the disk is only full.
+  void CheckWritable() const;
 
   [[nodiscard]] const RecoveryReport& recovery() const { return recovery_; }
   [[nodiscard]] std::filesystem::path ScanFolder(const std::string& scan_id) const;
@@ -110,6 +116,7 @@ class Store {
   void ChangeSettings(const web::Actor& actor, const web::Settings& settings);
 
  private:
+  Store() = default;
   void Recover();
   void CollectOrphans();
   void Write(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail);

@@ -1,4 +1,9 @@
 // Opening the store, and what a crash left behind.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
 #include <set>
 
 #include <fmt/format.h>
@@ -18,11 +23,35 @@ Store::Store(const fs::path& folder) : folder_(fs::absolute(folder)) {
   std::error_code error;
   fs::create_directories(folder_ / "scans", error);
   if (error) throw DiskRefused(DescribeWriteError(folder_ / "scans", error.value()));
+  CheckWritable();
   write_ = std::make_unique<Database>(folder_ / "plumb.db", Database::Access::kReadWrite);
   write_->CheckIntegrity();
   Migrate(*write_);
   read_ = std::make_unique<Database>(folder_ / "plumb.db", Database::Access::kReadOnly);
   Recover();
+}
+
+std::unique_ptr<Store> Store::OpenReadable(const fs::path& folder) {
+  std::unique_ptr<Store> store(new Store);
+  store->folder_ = fs::absolute(folder);
+  for (std::unique_ptr<Database>* database : {&store->write_, &store->read_}) {
+    *database = std::make_unique<Database>(store->folder_ / "plumb.db", Database::Access::kFrozen);
+  }
+  (void)store->Patients();  // the tables are there
+  return store;
+}
+
+void Store::CheckWritable() const {
+  const fs::path probe = folder_ / ".writable";
+  const int fd = ::open(probe.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600);
+  const int reason = fd < 0 ? errno : 0;
+  if (fd >= 0) {
+    ::close(fd);
+    ::unlink(probe.c_str());
+  }
+  if (reason == 0 || reason == ENOSPC || reason == EDQUOT || reason == EMFILE || reason == ENFILE) return;
+  throw DiskRefused(fmt::format("cannot write to {}: {}; check the disk, make it writable and start plumbd again", folder_.string(),
+                                std::strerror(reason)));
 }
 
 void Store::Recover() {

@@ -268,6 +268,22 @@ TEST_F(DaemonFaultTest, ACorruptDatabaseIsSafeModeAndTouchesNothing) {
   EXPECT_TRUE(fs::exists(folder_ / "state" / "scans" / "000001" / "scene"));
 }
 
+TEST_F(DaemonFaultTest, ASecondPlumbdOnTheSameFolderIsSafeModeAndTheFirstGoesOn) {
+  Plumbd first(folder_.path());
+  ASSERT_TRUE(first.WaitUntilUp());
+  first.WaitForState("ready");
+  ASSERT_EQ(first.Press()["ok"], true);
+  first.WaitForFrames(20);
+  const testing::TempFolder other;
+  Plumbd second(other.path(), {.state = first.state()});
+  ASSERT_TRUE(second.WaitUntilUp());
+  EXPECT_THAT(second.WaitForState("fault")["reason"].get<std::string>(), HasSubstr("another plumbd"));
+  EXPECT_EQ(second.Stop(), 0);
+  EXPECT_EQ(first.Status()["state"], "scanning");
+  EXPECT_EQ(first.Press()["ok"], true);
+  EXPECT_EQ(first.WaitForState("result")["last_result"]["is_reference"], true) << "its staging folder is still there";
+}
+
 TEST_F(DaemonFaultTest, ManyShortScansLeaveNoThreadsDescriptorsOrMemoryBehind) {
   const char* rounds_text = std::getenv("PLUMB_SHORT_SCANS");
   const int rounds = rounds_text != nullptr ? std::atoi(rounds_text) : 15;

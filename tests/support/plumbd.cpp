@@ -173,6 +173,18 @@ int Plumbd::Stop() {
 
 std::string Plumbd::log() const { return ReadAll(folder_ / "log"); }
 
+std::uint16_t Plumbd::port() const {
+  const std::string text = log(), marker = "page is served at http://127.0.0.1:";
+  const std::size_t at = text.rfind(marker);  // of the last start
+  return at == std::string::npos ? 0 : static_cast<std::uint16_t>(std::atoi(text.c_str() + at + marker.size()));
+}
+
+std::string Plumbd::setup_code() const {
+  const std::string text = log(), marker = "setup code: ";
+  const std::size_t at = text.rfind(marker);
+  return at == std::string::npos ? std::string() : text.substr(at + marker.size(), 9);
+}
+
 std::string Plumbd::notifications() {
   char buffer[4096];
   for (ssize_t count = 0; (count = ::recv(notify_fd_, buffer, sizeof(buffer), MSG_DONTWAIT)) > 0;) {

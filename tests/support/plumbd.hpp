@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -62,6 +63,10 @@ class Plumbd {
 
   [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] std::string log() const;
+  /// Where the page is served; after WaitUntilUp().
+  [[nodiscard]] std::uint16_t port() const;
+  /// Of the first account, as the first start prints it.
+  [[nodiscard]] std::string setup_code() const;
   [[nodiscard]] const std::filesystem::path& state() const { return state_; }
   [[nodiscard]] std::filesystem::path socket() const { return folder_ / "control.sock"; }
   /// What systemd was told, one message a line.

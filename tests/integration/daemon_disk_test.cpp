@@ -1,0 +1,205 @@
+// Disks that become or are read-only under a real plumbd. Mounts of its own need root; without, these tests are skipped.
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
+#include <unistd.h>
+
+#include "daemon/store/store.hpp"
+#include "tests/support/http_client.hpp"
+#include "tests/support/plumbd.hpp"
+#include "tests/support/process.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using test::HttpAnswer;
+using test::HttpClient;
+using ::testing::HasSubstr;
+using testing::Plumbd;
+
+const char* const kPassword = "correct horse battery";
+
+class DaemonDiskTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { testing::RenderOnce(); }
+
+  void SetUp() override {
+    if (::geteuid() != 0 || ::unshare(CLONE_NEWNS) != 0 || ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
+      GTEST_SKIP() << "mounts of its own are not permitted here (root and CAP_SYS_ADMIN)";
+    fs::create_directories(state());
+  }
+  void TearDown() override {
+    if (mounted_) {
+      EXPECT_EQ(::umount2(state().c_str(), MNT_DETACH), 0);
+    }
+  }
+
+  [[nodiscard]] fs::path state() const { return folder_ / "state"; }
+
+  void MountMemory() {
+    ASSERT_EQ(::mount("none", state().c_str(), "tmpfs", 0, "size=200m"), 0);
+    mounted_ = true;
+  }
+  void SetReadOnly(bool read_only) const {
+    ASSERT_EQ(::mount("none", state().c_str(), nullptr, MS_REMOUNT | (read_only ? MS_RDONLY : 0), "size=200m"), 0) << std::strerror(errno);
+  }
+
+  /// A file system that refuses every write once it has met an error, as ext4 does on a dying disk.
+  [[nodiscard]] bool MountImage() {
+    const fs::path image = folder_ / "disk.img";
+    if (!fs::exists(image)) {
+      std::ofstream(image) << "";
+      fs::resize_file(image, 200 << 20);
+      if (plumb::Run({"/sbin/mke2fs", "-q", "-F", "-t", "ext4", image}).exit_code != 0) return false;
+    }
+    mounted_ = plumb::Run({"/bin/mount", "-o", "loop,errors=remount-ro", image, state()}).exit_code == 0;
+    if (!mounted_) return false;
+    const std::string device = plumb::Run({"/bin/findmnt", "-n", "-o", "SOURCE", state()}).out;
+    trigger_ = fs::path("/sys/fs/ext4") / fs::path(device.substr(0, device.find('\n'))).filename() / "trigger_fs_error";
+    return fs::exists(trigger_);
+  }
+  void Unmount() {
+    ASSERT_EQ(::umount2(state().c_str(), 0), 0) << std::strerror(errno);
+    mounted_ = false;
+  }
+  void BreakDisk() const { std::ofstream(trigger_) << 1; }
+
+  /// The first account, and a reference of the demo's patient.
+  static void Fill(Plumbd& plumbd) {
+    plumbd.WaitForState("ready");
+    HttpClient client(plumbd.port());
+    ASSERT_EQ(client.Post("/api/v1/setup", {{"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}}).status, 200);
+    plumbd.ScanOnce();
+  }
+
+  /// Nothing can be scanned and everybody is told why, but what is stored can be looked at.
+  static void ExpectReadable(Plumbd& plumbd) {
+    HttpClient client(plumbd.port());
+    const HttpAnswer health = client.Get("/health");
+    EXPECT_EQ(health.status, 503);
+    EXPECT_THAT(health.body, HasSubstr("Read-only file system"));
+    const json refused = plumbd.Press();
+    EXPECT_EQ(refused["ok"], false);
+    EXPECT_THAT(refused["error"].get<std::string>(), HasSubstr("storage has failed"));
+    ASSERT_EQ(client.LogIn("engineer", kPassword), 200);
+    const json patients = client.Get("/api/v1/patients").json()["patients"];
+    ASSERT_EQ(patients.size(), 1U) << patients.dump();
+    const std::string id = patients[0]["id"].get<std::string>();
+    const json references = client.Get("/api/v1/patients/" + id + "/references").json()["references"];
+    ASSERT_EQ(references.size(), 1U) << references.dump();
+    EXPECT_EQ(references[0]["approved_by"], "auto");
+    EXPECT_EQ(client.Get("/api/v1/scans/000001").status, 200);
+    EXPECT_EQ(client.Get("/api/v1/scans/000001/files/mesh.ply").status, 200);
+    const HttpAnswer refused_patient = client.Post("/api/v1/patients/" + id + "/open", {{"purpose", "fraction"}, {"reason", ""}});
+    EXPECT_NE(refused_patient.status, 500);
+  }
+
+  testing::TempFolder folder_;
+
+ private:
+  bool mounted_ = false;
+  fs::path trigger_;
+};
+
+TEST_F(DaemonDiskTest, StartedOnAReadOnlyDiskItSaysSoAndReferencesCanBeRead) {
+  MountMemory();
+  {
+    Plumbd plumbd(folder_.path());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    Fill(plumbd);
+    plumbd.Stop();
+  }
+  SetReadOnly(true);
+  {
+    Plumbd plumbd(folder_.path());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(), HasSubstr(state().string() + ": Read-only file system"));
+    ExpectReadable(plumbd);
+    EXPECT_EQ(plumbd.Stop(), 0);
+  }
+  SetReadOnly(false);
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  EXPECT_TRUE(plumbd.ScanOnce()["last_result"]["verdict"].is_string()) << "compared with the reference";
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+TEST_F(DaemonDiskTest, StartedOnAReadOnlyDiskAfterAPowerCutItReadsTheLogToo) {
+  MountMemory();
+  {
+    Plumbd plumbd(folder_.path());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    Fill(plumbd);
+    plumbd.Signal(SIGKILL);
+    plumbd.Wait();
+  }
+  ASSERT_GT(fs::file_size(state() / "plumb.db-wal"), 0U) << "the reference is in the log only";
+  SetReadOnly(true);
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("fault");
+  ExpectReadable(plumbd);
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyWhileNobodyScansIsToldBeforeTheNextScan) {
+  if (!MountImage()) GTEST_SKIP() << "no loop device with ext4 here";
+  {
+    Plumbd plumbd(folder_.path());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    Fill(plumbd);
+    plumbd.Press(/*is_long=*/true);
+    plumbd.WaitForState("ready");
+    BreakDisk();
+    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(), HasSubstr("Read-only file system"));
+    EXPECT_THAT(plumbd.log(), HasSubstr("safe mode"));
+    ExpectReadable(plumbd);
+    EXPECT_EQ(plumbd.Stop(), 0);
+  }
+  Unmount();
+  ASSERT_TRUE(MountImage());
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  EXPECT_TRUE(plumbd.ScanOnce()["last_result"]["verdict"].is_string());
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyDuringAScanFailsItWithTheReasonAndKeepsTheReference) {
+  if (!MountImage()) GTEST_SKIP() << "no loop device with ext4 here";
+  {
+    Plumbd plumbd(folder_.path());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    Fill(plumbd);
+    ASSERT_EQ(plumbd.Press()["ok"], true);
+    plumbd.WaitForFrames(60);
+    BreakDisk();
+    plumbd.WaitForFrames(90);
+    ASSERT_EQ(plumbd.Press()["ok"], true);
+    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(), HasSubstr("ead-only file system"));
+    plumbd.WaitForLog("safe mode");
+    ExpectReadable(plumbd);
+    EXPECT_EQ(plumbd.Stop(), 0);
+  }
+  Unmount();
+  ASSERT_TRUE(MountImage());
+  Store store(state());
+  EXPECT_EQ(store.recovery().broken_references, 0);
+  EXPECT_EQ(store.recovery().lost_scans, 0);
+  const std::vector<web::Scan> scans = store.Scans("", 10);
+  ASSERT_EQ(scans.size(), 2U);
+  EXPECT_EQ(scans[0].outcome, web::ScanOutcome::kFailed);
+  EXPECT_TRUE(store.ApprovedReference(scans[0].patient_id).has_value());
+}
+
+}  // namespace
+}  // namespace plumb
