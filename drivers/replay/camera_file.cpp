@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <opencv2/core.hpp>
-#include <opencv2/core/persistence.hpp>
 
 #include "algo/types/errors.hpp"
 #include "algo/types/marker_dictionary.hpp"
@@ -16,7 +16,7 @@ namespace plumb {
 namespace {
 
 constexpr std::size_t kMaxText = std::size_t{1} << 16;
-constexpr int kMaxNesting = 8;  // OpenCV's parser recurses; a calibration needs two levels
+constexpr int kMaxNesting = 8;  // a calibration needs two levels
 constexpr double kMaxMarkerLength_m = 2.0;
 constexpr double kMaxDistortion = 100.0;
 constexpr double kMinDepthScale = 10.0;  // below, somebody wrote metres per unit
@@ -42,26 +42,27 @@ void CheckText(std::string_view text, const std::string& name) {
   }
 }
 
-/// The keys of one file, typed and with messages.
+/// The text as plain YAML: OpenCV's header `%YAML:1.0` is none of YAML's directives.
+std::string WithoutHeader(std::string_view text) {
+  while (text.starts_with('%')) text.remove_prefix(std::min(text.size(), text.find('\n') == text.npos ? text.size() : text.find('\n') + 1));
+  return std::string(text);
+}
+
+/// The keys of one file, typed and with messages. Read by yaml-cpp: OpenCV's own reader never returns from some broken texts.
 class Keys {
  public:
   Keys(std::string_view text, std::string name) : name_(std::move(name)) {
     CheckText(text, name_);
-    std::string document(text);
-    // Files written by hand often lack the header that OpenCV asks for.
-    if (!document.starts_with("%YAML")) document.insert(0, "%YAML:1.0\n---\n");
     try {
-      storage_.open(document, cv::FileStorage::READ | cv::FileStorage::MEMORY | cv::FileStorage::FORMAT_YAML);
-    } catch (const std::exception& error) {
-      throw DataError(fmt::format("{} cannot be parsed as OpenCV YAML: {}", name_, FirstLine(error.what())));
+      root_ = YAML::Load(WithoutHeader(text));
+    } catch (const YAML::Exception& error) {
+      throw DataError(fmt::format("{} cannot be parsed as YAML: {}", name_, FirstLine(error.what())));
     }
-    if (!storage_.isOpened() || !storage_.root().isMap()) {
-      throw DataError(fmt::format("{} holds no keys; expected OpenCV YAML as its FileStorage writes it", name_));
-    }
+    if (!root_.IsMap()) throw DataError(fmt::format("{} holds no keys; expected OpenCV YAML as its FileStorage writes it", name_));
   }
 
   [[nodiscard]] const std::string& name() const { return name_; }
-  [[nodiscard]] bool has(const char* key) const { return !storage_[key].empty(); }
+  [[nodiscard]] bool has(const char* key) const { return root_[key].IsDefined() && !root_[key].IsNull(); }
   [[nodiscard]] std::string Where(const char* key) const { return fmt::format("{}: {}", name_, key); }
 
   [[nodiscard]] double Number(const char* key) const { return Number(Required(key), key); }
@@ -75,39 +76,44 @@ class Keys {
   }
 
   [[nodiscard]] std::string Text(const char* key) const {
-    const cv::FileNode node = Required(key);
-    if (!node.isString()) throw DataError(fmt::format("{} is no text", Where(key)));
-    return node.string();
+    const YAML::Node node = Required(key);
+    if (!node.IsScalar()) throw DataError(fmt::format("{} is no text", Where(key)));
+    return node.Scalar();
   }
 
   /// The elements of a matrix, row by row: an !!opencv-matrix, or a plain list.
   [[nodiscard]] std::vector<double> Matrix(const char* key) const {
-    const cv::FileNode node = Required(key);
-    const cv::FileNode data = node.isMap() ? node["data"] : node;
-    if (!data.isSeq() || data.size() > 64) throw DataError(fmt::format("{} is no matrix of numbers", Where(key)));
+    const YAML::Node node = Required(key);
+    const YAML::Node data = node.IsMap() ? node["data"] : node;
+    if (!data.IsDefined() || !data.IsSequence() || data.size() > 64) throw DataError(fmt::format("{} is no matrix of numbers", Where(key)));
     std::vector<double> values;
-    for (const cv::FileNode& element : data) values.push_back(Number(element, key));
+    for (const YAML::Node& element : data) values.push_back(Number(element, key));
     return values;
   }
 
  private:
   static std::string FirstLine(std::string text) { return text.substr(0, std::min<std::size_t>(text.find('\n'), 200)); }
 
-  [[nodiscard]] cv::FileNode Required(const char* key) const {
-    const cv::FileNode node = storage_[key];
-    if (node.empty()) throw DataError(fmt::format("{} is missing", Where(key)));
-    return node;
+  [[nodiscard]] YAML::Node Required(const char* key) const {
+    if (!has(key)) throw DataError(fmt::format("{} is missing", Where(key)));
+    return root_[key];
   }
 
-  [[nodiscard]] double Number(const cv::FileNode& node, const char* key) const {
-    if (!node.isInt() && !node.isReal()) throw DataError(fmt::format("{} holds something that is no number", Where(key)));
-    const double value = node.real();
-    if (!std::isfinite(value)) throw DataError(fmt::format("{} holds {}, expected finite numbers", Where(key), value));
+  [[nodiscard]] double Number(const YAML::Node& node, const char* key) const {
+    const std::string text = node.IsScalar() ? node.Scalar() : std::string();
+    const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
+    const char* end = text.data() + text.size();
+    double value = 0;
+    const auto [stop, error] = std::from_chars(begin, end, value);
+    if (begin == end || stop != end || error != std::errc() || !std::isfinite(value)) {
+      throw DataError(fmt::format("{} holds {}, expected finite numbers", Where(key),
+                                  text.empty() ? "something else" : '"' + text.substr(0, 60) + '"'));
+    }
     return value;
   }
 
   std::string name_;
-  cv::FileStorage storage_;
+  YAML::Node root_;  // Only read: operator[] of a const node adds nothing.
 };
 
 void ReadCameraMatrix(const Keys& keys, const char* key, Intrinsics& intrinsics) {
@@ -257,8 +263,8 @@ CameraFile ParseCameraFile(std::string_view text, const std::string& name) try {
   ReadDepthCamera(keys, camera);
   ReadMarkers(keys, camera);
   return camera;
-} catch (const cv::Exception& error) {
-  throw DataError(fmt::format("{} cannot be read as OpenCV YAML: {}", name, error.err.substr(0, 200)));
+} catch (const YAML::Exception& error) {
+  throw DataError(fmt::format("{} cannot be read as YAML: {}", name, std::string(error.what()).substr(0, 200)));
 }
 
 }  // namespace plumb
