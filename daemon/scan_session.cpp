@@ -124,7 +124,7 @@ void ScanSession::Evaluate(const Scene& scene, std::future<Scene>& reference_sce
   }
   Tell("saving", 0.0);
   // The scene goes to the disk while it is compared.
-  std::future<void> writing = std::async(std::launch::async, [&] { WriteScene(scene, folder_ / "scene"); });
+  std::future<void> writing = std::async(std::launch::async, [&] { WriteScene(scene, folder_ / "scene", stop); });
   std::optional<Comparison> comparison;
   ResultPictures pictures;
   if (reference_scene.valid()) {

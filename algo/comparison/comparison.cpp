@@ -106,7 +106,10 @@ class Comparer {
       CheckStop(options_.stop);
       Heights();
       CheckStop(options_.stop);
-      if (Move()) Judge();
+      if (Move()) {
+        CheckStop(options_.stop);
+        Judge();
+      }
     }
     if (result_.reasons.empty()) Decide();
     Lap("total", start_s_);
@@ -163,7 +166,9 @@ class Comparer {
   void Heights() {
     const double since_s = Now();
     result_.current_height = CurrentHeight(Pose::Identity());
+    CheckStop(options_.stop);
     result_.deviation = HeightDifference(*result_.current_height, *reference_.height_map);
+    CheckStop(options_.stop);
     result_.distance = SignedDistance(*result_.current_height, *reference_.height_map);
     Lap("deviation", since_s);
   }
@@ -217,6 +222,7 @@ class Comparer {
       if (u95[i] && *u95[i] > kWeakShare * Tolerance(options_, i)) motion.weak_directions.push_back({kNames[i], *u95[i], Unit(i)});
     }
     result_.region = CoverageOf(*reference_.height_map, result_.region_mask, current_cloud_, kCloudSpacing_m, motion.T);
+    CheckStop(options_.stop);
     const HeightMap corrected = CurrentHeight(motion.T.inverse());
     result_.deviation_after = HeightDifference(corrected, *reference_.height_map);
     Residuals(corrected);

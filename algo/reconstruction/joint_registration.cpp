@@ -143,11 +143,12 @@ std::optional<Correspondence> Correspond(const CalibratedView& a, const Calibrat
   return match;
 }
 
-std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistrationOptions& options,
-                                    const std::vector<CalibratedView>& views) {
+std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistrationOptions& options, const std::vector<CalibratedView>& views,
+                                    const std::stop_token& stop) {
   const std::size_t n = views.size();
   std::vector<std::vector<KeyframePair>> candidates(n);
   tbb::parallel_for(std::size_t{0}, n, [&](std::size_t a) {
+    CheckStop(stop);
     for (std::size_t b = 0; b < n; ++b) {
       if (a == b) continue;
       const Eigen::Vector3d axis_a = views[a].T_world_depth.linear().col(2);
@@ -315,7 +316,8 @@ double Consistency(const Sensor& sensor, const std::vector<CalibratedView>& view
 }
 
 std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options, const TrackingMap& map,
-                                     const std::vector<CalibratedView>& views, const std::vector<KeyframePair>& pairs, double gate_m) {
+                                     const std::vector<CalibratedView>& views, const std::vector<KeyframePair>& pairs, double gate_m,
+                                     const std::stop_token& stop) {
   std::vector<int> uses(views.size(), 0);
   for (const KeyframePair& pair : pairs) {
     ++uses[static_cast<std::size_t>(pair.a)];
@@ -323,6 +325,7 @@ std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrati
   }
   std::vector<QuadraticTerm> terms(pairs.size());
   tbb::parallel_for(std::size_t{0}, pairs.size(), [&](std::size_t p) {
+    CheckStop(stop);
     const auto a = static_cast<std::size_t>(pairs[p].a);
     const auto b = static_cast<std::size_t>(pairs[p].b);
     // A keyframe's noise enters all its pairs: together they weigh as much as its cells once.
@@ -377,8 +380,8 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointReg
     const Sensor sensor = MakeSensor(stated, result.calibration);
     const std::vector<CalibratedView> views = MakeViews(sensor, result.calibration, map);
     CheckStop(stop);
-    if (round == 0) pairs = FindPairs(sensor, options, views);
-    BundleAdjust(stated, bundle, MakeTerms(sensor, options, map, views, pairs, gate_m), map, result.calibration);
+    if (round == 0) pairs = FindPairs(sensor, options, views, stop);
+    BundleAdjust(stated, bundle, MakeTerms(sensor, options, map, views, pairs, gate_m, stop), map, result.calibration);
     CheckStop(stop);
     double farthest_m = 0.0;
     for (const CalibratedView& view : views)
@@ -389,6 +392,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointReg
   }
   result.num_pairs = static_cast<int>(pairs.size());
   const auto consistency = [&](const TrackingMap& of, const CalibrationModel& calibration) {
+    CheckStop(stop);
     const Sensor sensor = MakeSensor(stated, calibration);
     return Consistency(sensor, MakeViews(sensor, calibration, of), pairs, options.max_gate_m);
   };

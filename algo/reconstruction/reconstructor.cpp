@@ -182,7 +182,9 @@ struct Reconstructor::Impl {
 
     report(0.5, "surface");
     stage = Now();
-    const std::vector<ViewSurface> surfaces = PrepareViews(Views(map, joint.calibration, SceneFromWorld(map)));
+    ViewSurfaceOptions view_options;
+    view_options.stop = stop;
+    const std::vector<ViewSurface> surfaces = PrepareViews(Views(map, joint.calibration, SceneFromWorld(map)), view_options);
     SurfaceCloudOptions cloud_options;
     cloud_options.with_colors = options.keep_color;
     cloud_options.stop = stop;

@@ -204,12 +204,14 @@ CoarseMap FindTops(std::span<const ViewSurface> views, const GridShape& fine, co
   const std::size_t num_rows = static_cast<std::size_t>((map.grid.height + kTile - 1) / kTile);
   std::vector<std::vector<std::vector<Sample>>> samples(views.size(), std::vector<std::vector<Sample>>(num_rows));
   tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t v) {
+    CheckStop(options.stop);
     SortIntoRows(views[v], static_cast<std::uint32_t>(v), std::max<std::size_t>(1, stride), map.grid, options, samples[v]);
   });
   const float band = static_cast<float>(options.top_surface_band);
   const int min_views = std::min(options.min_views, static_cast<int>(views.size()));
   const std::size_t cells_per_row = static_cast<std::size_t>(map.grid.width) * kTile;
   tbb::parallel_for(std::size_t{0}, num_rows, [&](std::size_t row) {
+    CheckStop(options.stop);
     const std::size_t first = row * cells_per_row;
     const std::size_t num_cells = std::min(cells_per_row, map.cells.size() - first);
     std::vector<std::uint32_t> starts(num_cells + 1, 0);
@@ -304,6 +306,7 @@ class MapFiller {
     // Into another array: what a cell becomes must not depend on which of its neighbours came first.
     nodes_ = result_.map.z;
     tbb::parallel_for(0, tile_rows, [&](int row) {
+      CheckStop(options_.stop);
       for (int column = 0; column < tile_columns; ++column) FillTile(row, column, false);
     });
   }
@@ -427,6 +430,7 @@ ColoredHeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker, c
   SeedGaps(coarse);
   DropSpeckles(coarse, static_cast<float>(options.top_surface_band),
                static_cast<std::size_t>(options.min_patch_area / (coarse.grid.step * coarse.grid.step)));
+  CheckStop(options.stop);
   MapFiller(views_in_marker, coarse, options, result).Fill();
   return result;
 }

@@ -180,7 +180,10 @@ Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size, c
   for (std::size_t first = 0; first < views.size(); first += kViewsAtOnce) {
     CheckStop(stop);
     const std::size_t count = std::min(kViewsAtOnce, views.size() - first);
-    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) { SortIntoShards(views[first + i], inverse_size, samples[i]); });
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+      CheckStop(stop);
+      SortIntoShards(views[first + i], inverse_size, samples[i]);
+    });
     tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) {
       for (std::size_t i = 0; i < count; ++i) {
         for (const Sample& sample : samples[i][s]) {
@@ -200,7 +203,10 @@ Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size, c
     });
   }
   Shards<Seed> layer;
-  tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) { layer[s] = FullestLayers(views, seeds, voxels, s); });
+  tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) {
+    CheckStop(stop);
+    layer[s] = FullestLayers(views, seeds, voxels, s);
+  });
   return layer;
 }
 
@@ -297,6 +303,7 @@ PointCloud MergeSurface(std::span<const ViewSurface> views, const SurfaceCloudOp
   std::array<Shards<Merged>, kNumShards> moved;
   tbb::parallel_for(std::size_t{0}, kNumShards,
                     [&](std::size_t s) { moved[s] = MoveSeeds(views, fusion, seeds[s], options, voxel_size, min_views); });
+  CheckStop(options.stop);
   return MergeVoxels(moved, with_colors);
 }
 

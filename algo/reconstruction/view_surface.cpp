@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "algo/types/check_stop.hpp"
 #include "algo/types/units.hpp"
 
 namespace plumb {
@@ -235,7 +236,10 @@ std::vector<ViewSurface> PrepareViews(std::span<const DepthView> views, const Vi
   rays.reserve(views.size());
   for (const DepthView& view : views) rays.push_back(tables.For(WorkingIntrinsics(view.intrinsics)));
   std::vector<ViewSurface> surfaces(views.size());
-  tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t i) { surfaces[i] = PrepareView(views[i], rays[i], options); });
+  tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t i) {
+    CheckStop(options.stop);
+    surfaces[i] = PrepareView(views[i], rays[i], options);
+  });
   return surfaces;
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include <Eigen/Core>
@@ -23,6 +24,7 @@ struct ViewSurfaceOptions {
   float min_depth_m = 0.3F;
   float max_depth_m = 4.0F;
   float max_incidence_deg = 75.0F;  ///< Steeper views of a surface are left out; in (0, 89].
+  std::stop_token stop = {};        ///< Of PrepareViews(); polled, see CheckStop().
 };
 
 /// A depth image at working resolution (about 320 columns, whatever the sensor's): each working pixel is the mean

@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <stdexcept>
 
+#include "algo/types/check_stop.hpp"
 #include "algo/types/errors.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "daemon/files/scene_json.hpp"
@@ -66,20 +67,24 @@ OutputKind SceneOutput() {
   return {"scene", "scene.json", {"scene.json", "trajectory.txt", "trajectory_all.txt", "cloud.ply", "heightmap.tiff", "mesh.ply"}};
 }
 
-void WriteScene(const Scene& scene, const fs::path& folder) {
+void WriteScene(const Scene& scene, const fs::path& folder, const std::stop_token& stop) {
   CheckFinite(scene);
   AtomicFolder output(folder, SceneOutput());
   WriteWholeFile(output.path() / "trajectory.txt", TrajectoryText(scene.keyframes));
   WriteWholeFile(output.path() / "trajectory_all.txt", TrajectoryText(scene.trajectory));
+  CheckStop(stop);
   WriteCloudPly(output.path() / "cloud.ply", scene.cloud);
+  CheckStop(stop);
   if (scene.height_map) {
     const HeightMap& map = *scene.height_map;
     // The image borrows the values; it is only read.
     const cv::Mat values(map.grid.height, map.grid.width, CV_32FC1, const_cast<float*>(map.z.data()));
     WriteFloatTiff(output.path() / "heightmap.tiff", values);
   }
+  CheckStop(stop);
   if (!scene.mesh.vertices.empty()) WriteMeshPly(output.path() / "mesh.ply", scene.mesh);
   WriteWholeFile(output.path() / "scene.json", SceneJson(scene));
+  CheckStop(stop);
   output.Commit();
 }
 

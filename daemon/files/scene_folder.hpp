@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <stop_token>
 
 #include "algo/types/scene.hpp"
 #include "daemon/files/atomic_folder.hpp"
@@ -13,8 +14,10 @@ namespace plumb {
 
 /// Writes a scene, whole or not at all; replaces an older scene at that place. The height map's and the mesh's files are there only
 /// where the scene has them. Same scene, same bytes.
-/// @throws IoError; std::invalid_argument if the scene contradicts itself (attribute counts) or holds poses or corners that are not finite.
-void WriteScene(const Scene& scene, const std::filesystem::path& folder);
+/// @param stop  Polled between the files.
+/// @throws IoError; Interrupted; std::invalid_argument if the scene contradicts itself (attribute counts) or holds poses or corners that
+/// are not finite.
+void WriteScene(const Scene& scene, const std::filesystem::path& folder, const std::stop_token& stop = {});
 
 /// Which of the large parts to read; scene.json and the trajectories always are.
 struct SceneParts {

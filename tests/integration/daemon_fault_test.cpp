@@ -143,6 +143,46 @@ TEST_F(DaemonFaultTest, ACancelledScanIsGoneSoonAndLeavesNothing) {
   EXPECT_TRUE(ScanFolders(plumbd.state()).empty());
 }
 
+TEST_F(DaemonFaultTest, AScanCancelledAtAnyMomentOfWorkingIsGoneSoonAndLeavesNothing) {
+  const char* rounds_text = std::getenv("PLUMB_CANCELS");
+  const int rounds = rounds_text != nullptr ? std::atoi(rounds_text) : 4;
+  std::mt19937 random(11);
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  plumbd.ScanOnce();  // the reference: those that follow are compared, too
+  ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
+  const auto working = [&] { return plumbd.Status()["state"] == "working"; };
+  double work_s = 0;
+  std::size_t num_done = 1;
+  std::vector<double> cancels_ms, first_frames_ms;
+  for (int round = 0; round <= rounds; ++round) {
+    ASSERT_EQ(plumbd.Press()["ok"], true);
+    first_frames_ms.push_back(plumbd.WaitForFrames(100)["scan"]["first_frame_ms"].get<double>());
+    ASSERT_EQ(plumbd.Press()["ok"], true);
+    const auto begin = std::chrono::steady_clock::now();
+    const auto worked_s = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(); };
+    // The first one is let through, to know how long it takes.
+    const double until_s = round == 0 ? 1e9 : work_s * std::uniform_real_distribution<>(0, 0.9)(random);
+    while (working() && worked_s() < until_s) std::this_thread::yield();
+    if (round == 0) work_s = worked_s();
+    ASSERT_EQ(plumbd.Press(/*is_long=*/true)["ok"], true);  // a result that came before is put away
+    const json status = plumbd.WaitForState("ready");
+    if (status["scan"]["id"] == status["last_result"]["scan"]) {
+      ++num_done;
+      continue;
+    }
+    cancels_ms.push_back(status["scan"]["cancel_ms"].get<double>());
+    EXPECT_EQ(ScanFolders(plumbd.state()).size(), num_done);
+  }
+  ASSERT_FALSE(cancels_ms.empty());
+  std::sort(cancels_ms.begin(), cancels_ms.end());
+  std::printf("%zu of %d cancelled while working: median %.0f ms, slowest %.0f ms; first frame used %.0f ms after the press at most\n",
+              cancels_ms.size(), rounds, cancels_ms[cancels_ms.size() / 2], cancels_ms.back(),
+              *std::max_element(first_frames_ms.begin(), first_frames_ms.end()));
+  EXPECT_LT(cancels_ms.back(), 2000) << "200 ms on a machine that does nothing else";
+}
+
 TEST_F(DaemonFaultTest, SigtermWhileScanningAndWhileWorkingEndsCleanly) {
   for (const bool is_working : {false, true}) {
     {
