@@ -25,6 +25,7 @@ constexpr std::uint64_t kFileHeader = 24;
 // (8).
 constexpr std::array<std::uint8_t, 4> kRecordMagic{'N', 'I', 'R', 0};
 constexpr std::uint64_t kRecordHeader = 28;
+constexpr std::uint32_t kDataBegin = 8;
 constexpr std::uint32_t kNewData = 10;  // its fields begin with the stamp
 constexpr std::uint32_t kEnd = 11;
 constexpr std::uint32_t kNodeAdded = 13;  // fields: length of the name, the name, kind of the node
@@ -100,6 +101,19 @@ std::optional<OniFileSummary> SummariseOniFile(const ReadBytes& read) {
     if (kind == kEnd) return found;
   }
   return std::nullopt;
+}
+
+bool HasOniDataBegun(const std::filesystem::path& file, int num_streams) {
+  const Descriptor descriptor(file, O_RDONLY);
+  std::array<std::uint8_t, kRecordHeader> bytes{};
+  int num_begun = 0;
+  for (std::uint64_t at = kFileHeader; num_begun < num_streams; at += Number(bytes, 12) + std::uint64_t{Number(bytes, 16)}) {
+    if (!descriptor.is_regular() || !ReadAt(descriptor.get(), at, bytes)) return false;
+    const bool is_record = std::equal(kRecordMagic.begin(), kRecordMagic.end(), bytes.begin()) && Number(bytes, 12) >= kRecordHeader;
+    if (!is_record) return false;
+    num_begun += Number(bytes, 4) == kDataBegin ? 1 : 0;
+  }
+  return true;
 }
 
 std::optional<OniFileSummary> SummariseOniFile(const std::filesystem::path& file) {

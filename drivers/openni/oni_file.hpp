@@ -28,6 +28,10 @@ using ReadBytes = std::function<bool(std::uint64_t offset, std::span<std::uint8_
 [[nodiscard]] std::optional<OniFileSummary> SummariseOniFile(const ReadBytes& read);
 [[nodiscard]] std::optional<OniFileSummary> SummariseOniFile(const std::filesystem::path& file);
 
+/// True once the file says that the data of so many streams begin. The recorder writes that on a thread of its own and misses what
+/// comes before. False for a file that is being written elsewhere.
+[[nodiscard]] bool HasOniDataBegun(const std::filesystem::path& file, int num_streams);
+
 /// True if it is a regular file that begins as .oni files do.
 [[nodiscard]] bool IsOniFile(const std::filesystem::path& file);
 

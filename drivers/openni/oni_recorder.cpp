@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <cerrno>
+#include <chrono>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 
 #include "algo/types/errors.hpp"
@@ -14,6 +16,12 @@
 #include "drivers/replay/tum_writer.hpp"
 
 namespace plumb {
+namespace {
+
+constexpr std::chrono::seconds kStartTime{20};  // it starts on a thread of its own, mostly within 1 ms
+constexpr std::chrono::milliseconds kPoll{1};
+
+}  // namespace
 
 struct OniRecorder::Impl {
   OpenNiSensor* sensor = nullptr;
@@ -53,6 +61,12 @@ OniRecorder::OniRecorder(LiveSensor& sensor, std::filesystem::path file, const O
   library.Check(what, library.RecorderAttachStream(impl_->recorder, openni->streams().depth, FALSE));
   library.Check(what, library.RecorderAttachStream(impl_->recorder, openni->streams().color, options.jpeg ? TRUE : FALSE));
   library.Check(what, library.RecorderStart(impl_->recorder));
+  const auto limit = std::chrono::steady_clock::now() + kStartTime;
+  while (!HasOniDataBegun(impl_->file, 2)) {
+    if (std::chrono::steady_clock::now() > limit)
+      throw DeviceError(fmt::format("{}: OpenNI2 has not begun within {} s; is the disk too busy?", what, kStartTime.count()));
+    std::this_thread::sleep_for(kPoll);
+  }
 }
 
 OniRecorder::~OniRecorder() = default;

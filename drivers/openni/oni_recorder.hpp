@@ -10,8 +10,9 @@
 
 namespace plumb {
 
-/// Records from its making until Finish(). Images go from the driver to the file through a thread of OpenNI2 that holds back what the disk
-/// does not take at once, so none is lost. The sensor must outlive it and may be read at the same time. One thread calls.
+/// Records from its making until Finish(): once it is made, no image is missed. Images go from the driver to the file through a thread of
+/// OpenNI2 that holds back what the disk does not take at once, so none is lost. The sensor must outlive it and may be read at the same
+/// time. One thread calls.
 class OniRecorder {
  public:
   struct Options {

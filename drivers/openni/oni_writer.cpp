@@ -21,7 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::milliseconds kRecorderStart{100};  // it begins on a thread of its own and misses what comes before
 constexpr std::chrono::milliseconds kPoll{10};
 constexpr std::uint32_t kPeriod_us = 33333;  // of the unit that plays; the stamps are those of the frames
 constexpr std::chrono::seconds kNoProgress{20};
@@ -104,7 +103,6 @@ void WriteOni(const fs::path& file, FrameSource& source, const std::stop_token& 
     const std::unique_ptr<LiveSensor> sensor = provider.Open("");
     (void)session.Command("stall");
     OniRecorder recorder(*sensor, file, {});
-    std::this_thread::sleep_for(kRecorderStart);
     (void)session.Command("speed 4");  // the disk keeps up with that; what it does not take is held in memory
     (void)session.Command(fmt::format("rewind once {}", spooled.begin_us));
     (void)session.Command("resume");

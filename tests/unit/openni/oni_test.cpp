@@ -88,6 +88,21 @@ TEST(OniTest, EndsAtItsEndRecord) {
   EXPECT_EQ(found->depth_us.size(), static_cast<std::size_t>(kFrames));
 }
 
+TEST(OniFileTest, TellsWhenTheDataOfBothStreamsBegin) {
+  EXPECT_TRUE(HasOniDataBegun(Recording(), 2));
+  EXPECT_FALSE(HasOniDataBegun(Recording(), 3));
+  const TempFolder folder;
+  const std::vector<std::uint8_t> bytes = Bytes();
+  const fs::path cut = folder / "cut.oni";
+  std::size_t length = 0;
+  for (; length < bytes.size() && !HasOniDataBegun(cut, 2); length += 28) {
+    WriteWholeFile(cut, std::string_view(reinterpret_cast<const char*>(bytes.data()), length));
+  }
+  EXPECT_GT(length, 1000U) << "behind what is said of the streams";
+  EXPECT_LT(length, 4000U) << "and before the first image";
+  EXPECT_FALSE(HasOniDataBegun(folder / "missing.oni", 2));
+}
+
 TEST(OniTest, LeavesNothingBesideTheFileAndItsSideCar) {
   int files = 0;
   for (const auto& entry : fs::directory_iterator(Recording().parent_path())) {
