@@ -1,4 +1,5 @@
-// `plumb doctor`: what is attached, permitted and configured, and what to do about what is not. It changes nothing.
+// `plumb doctor`: what is attached, permitted and configured, and what to do about what is not. It changes nothing. Its exit code tells
+// whether something necessary is missing.
 #include <unistd.h>
 
 #include <filesystem>
@@ -45,24 +46,27 @@ struct Finding {
   std::string what;
   std::string found;
   std::string remedy;
+  int exit_code = kDone;  ///< kBad: what a command that needs it would end with.
 };
 
 class Report {
  public:
-  void Good(std::string what, std::string found) { findings_.push_back({State::kGood, std::move(what), std::move(found), {}}); }
+  void Good(std::string what, std::string found) { findings_.push_back({State::kGood, std::move(what), std::move(found), {}, kDone}); }
   void Note(std::string what, std::string found, std::string remedy) {
-    findings_.push_back({State::kNote, std::move(what), std::move(found), std::move(remedy)});
+    findings_.push_back({State::kNote, std::move(what), std::move(found), std::move(remedy), kDone});
   }
-  void Bad(std::string what, std::string found, std::string remedy) {
-    findings_.push_back({State::kBad, std::move(what), std::move(found), std::move(remedy)});
+  void Bad(std::string what, std::string found, std::string remedy, int exit_code = kDeviceFailed) {
+    findings_.push_back({State::kBad, std::move(what), std::move(found), std::move(remedy), exit_code});
   }
 
-  [[nodiscard]] bool ready() const {
+  /// kDone if nothing necessary is missing, else that of the first thing that is.
+  [[nodiscard]] int exit_code() const {
     for (const Finding& finding : findings_) {
-      if (finding.state == State::kBad) return false;
+      if (finding.state == State::kBad) return finding.exit_code;
     }
-    return true;
+    return kDone;
   }
+  [[nodiscard]] bool ready() const { return exit_code() == kDone; }
 
   [[nodiscard]] std::string Text() const {
     std::string text;
@@ -99,7 +103,7 @@ Config CheckConfig(Report& report, const std::optional<fs::path>& wanted) {
     report.Good("configuration", file.string());
     return config;
   } catch (const DataError& problem) {
-    report.Bad("configuration", problem.what(), "correct it; `plumbd --check-config` tells when it is right");
+    report.Bad("configuration", problem.what(), "correct it; `plumbd --check-config` tells when it is right", kBadInput);
     return {};
   }
 }
@@ -201,7 +205,8 @@ void CheckFolder(Report& report, const char* what, const fs::path& folder) {
     report.Note(what, fmt::format("{} is not writable for this user", folder.string()),
                 "the service's own user writes there; for tests give another");
   } else if (free_gb < 2.0) {
-    report.Bad(what, fmt::format("{}: {:.1f} GB free", folder.string(), free_gb), "free space: a scan needs up to 1 GB while it runs");
+    report.Bad(what, fmt::format("{}: {:.1f} GB free", folder.string(), free_gb), "free space: a scan needs up to 1 GB while it runs",
+               kInternalError);
   } else {
     report.Good(what, fmt::format("{}: {:.0f} GB free", folder.string(), free_gb));
   }
@@ -235,7 +240,7 @@ Command AddDoctor(CLI::App& app) {
     CheckFolder(report, "state", config.appliance.state);
     CheckDaemon(report, context.control);
     PrintOut(options->json ? report.Json().dump(2) + "\n" : report.Text());
-    return kDone;
+    return report.exit_code();
   };
 }
 
