@@ -193,9 +193,10 @@ Command AddSim(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("action", options->action, "What happens to the virtual sensor")
       ->required()
-      ->check(CLI::IsMember({"plug", "unplug", "stall", "resume", "error", "next-scene", "glitch"}));
-  app.add_option("argument", options->words,
-                 "A unit's serial; with glitch: late, double, old, size or lone, and for how many pairs of images")
+      ->check(CLI::IsMember({"plug", "unplug", "stall", "resume", "error", "next-scene", "glitch", "speed"}));
+  app.add_option(
+         "argument", options->words,
+         "A unit's serial; with glitch: late, double, old, size or lone, and for how many pairs of images; with speed: times real time")
       ->expected(0, 2);
   return [options](const CommandContext& context) {
     return Simulate({.kind = ControlRequest::Kind::kSim,

@@ -17,13 +17,14 @@ namespace {
 using Json = nlohmann::json;
 using Kind = ControlRequest::Kind;
 
-constexpr std::array<std::string_view, 7> kActions = {"plug", "unplug", "stall", "resume", "error", "next-scene", "glitch"};
+constexpr std::array<std::string_view, 8> kActions = {"plug", "unplug", "stall", "resume", "error", "next-scene", "glitch", "speed"};
 constexpr std::size_t kMaxArgument = 80;
 
 /// The argument goes on to the virtual sensor in one line with the action.
 bool IsWords(const std::string& text) {
-  return text.size() <= kMaxArgument &&
-         std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_' || c == ' '; });
+  return text.size() <= kMaxArgument && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+           return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.' || c == ' ';
+         });
 }
 
 bool IsFlat(const Json& json) {
@@ -72,7 +73,7 @@ ControlRequest ParseControlRequest(std::string_view line) {
     }
     request.argument = text("argument");
     if ((json.contains("argument") && !json["argument"].is_string()) || !IsWords(request.argument)) {
-      throw DataError(fmt::format("sim: \"argument\" is at most {} letters, digits, spaces, - and _", kMaxArgument));
+      throw DataError(fmt::format("sim: \"argument\" is at most {} letters, digits, spaces, -, _ and dots", kMaxArgument));
     }
   } else {
     throw DataError("expected a command of status, press, watch, sim");

@@ -14,8 +14,8 @@ struct ControlRequest {
   enum class Kind { kStatus, kPress, kWatch, kSim };
   Kind kind = Kind::kStatus;
   bool is_long = false;  ///< kPress
-  std::string action;    ///< kSim: one of plug, unplug, stall, resume, error, next-scene, glitch.
-  std::string argument;  ///< kSim: a serial, or what kind of glitch and how often; words of letters, digits, - and _.
+  std::string action;    ///< kSim: one of plug, unplug, stall, resume, error, next-scene, glitch, speed.
+  std::string argument;  ///< kSim: a serial, what kind of glitch and how often, or how fast; words of letters, digits, -, _ and dots.
   bool operator==(const ControlRequest&) const = default;
 };
 

@@ -1,11 +1,17 @@
 // Sensors that are not as they were: another unit, several at once, images that come late, twice, out of order or of a wrong size.
+#include <csignal>
 #include <fstream>
+#include <random>
+#include <thread>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "algo/types/units.hpp"
+#include "daemon/control/unix_socket.hpp"
 #include "drivers/replay/camera_file.hpp"
 #include "drivers/replay/file_io.hpp"
 #include "tests/support/demo_truth.hpp"
@@ -130,6 +136,75 @@ TEST_F(DaemonSensorTest, OfTwoSensorsTheConfiguredOneIsUsedAndNoOther) {
   EXPECT_EQ(WaitForSensor(plumbd, kSecond)["sensor"]["others"], json{kFirst});
   plumbd.Sim("unplug", kSecond);
   plumbd.WaitForState("fault");
+}
+
+TEST_F(DaemonSensorTest, FramesThatComeFasterThanTrackingAreDroppedCountedAndShownAndTheResultIsRightOrNone) {
+  Plumbd plumbd(folder_.path(), Options());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  WaitForSensor(plumbd, kFirst);
+  plumbd.ScanOnce();
+  ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
+  ASSERT_EQ(plumbd.Sim("speed", "20")["ok"], true);  // stamps stay those of 30 Hz
+  ASSERT_EQ(plumbd.Press()["ok"], true);
+  const json during = plumbd.WaitFor("dropped frames while sweeping", [](const json& status) {
+    return status["scan"]["active"] == true && status["scan"]["frames_dropped"].get<int>() > 20 && status["scan"]["frames"].get<int>() > 20;
+  });
+  EXPECT_EQ(during["state"], "scanning");
+  ASSERT_EQ(plumbd.Press()["ok"], true);
+  const json last = plumbd.WaitForState("result")["last_result"];
+  std::printf("%d frames, %d dropped, %d images lost: %s\n", last["frames"].get<int>(), last["frames_dropped"].get<int>(),
+              last["images_lost"].get<int>(), last["verdict"].dump().c_str());
+  EXPECT_GT(last["frames_dropped"].get<int>(), 20);
+  const fs::path scan = plumbd.state() / "scans" / last["scan"].get<std::string>();
+  if (last["verdict"] == "no_answer") {
+    EXPECT_FALSE(last["reasons"].empty());
+    return;
+  }
+  const json scene = json::parse(ReadTextFile(scan / "scene" / "scene.json", 1 << 24));
+  EXPECT_EQ(scene["frames"]["dropped"], last["frames_dropped"]);
+  const testing::MotionError error = testing::ErrorOfMotion(json::parse(ReadTextFile(scan / "result" / "result.json", 1 << 24)));
+  EXPECT_LT(error.translation_m, 12 * kMillimetre) << "as with all frames";
+  EXPECT_LT(error.rotation_rad, 1.0 * kDegree);
+}
+
+TEST_F(DaemonSensorTest, UnpluggedWhileItIsClosedPlumbdEndsOrGoesOn) {
+  fs::create_directories(folder_ / "tmp");
+  const auto send = [&](const std::string& command) {  // to the driver itself: plumbd does not listen any more
+    for (const auto& entry : fs::directory_iterator(folder_ / "tmp")) {
+      const fs::path path = entry.path() / "sensor.sock";
+      const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+      (void)WithUnixAddress(path, [&](const sockaddr* address, socklen_t size) {
+        return static_cast<int>(::sendto(fd, command.data(), command.size(), MSG_DONTWAIT, address, size));
+      });
+      ::close(fd);
+    }
+  };
+  std::mt19937 random(5);
+  for (int round = 0; round < 8; ++round) {
+    Plumbd plumbd(folder_.path(), Options());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    WaitForSensor(plumbd, kFirst);
+    if (round % 2 == 1) {
+      ASSERT_EQ(plumbd.Press()["ok"], true);
+      plumbd.WaitForFrames(5);
+    }
+    plumbd.Signal(SIGTERM);
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % 60'000));  // any moment of the way down
+    send("unplug");
+    EXPECT_EQ(plumbd.Wait(), 0);
+  }
+  // A sensor that failed is closed, too, while plumbd goes on.
+  Plumbd plumbd(folder_.path(), Options());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  WaitForSensor(plumbd, kFirst);
+  for (int round = 0; round < 8; ++round) {
+    send("error");
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % 20'000));
+    send("unplug");
+    plumbd.WaitForState("no_sensor");
+    plumbd.Sim("plug");
+    WaitForSensor(plumbd, kFirst);
+  }
 }
 
 /// Pairs of images that go wrong in the middle of both sweeps.
