@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/types/errors.hpp"
+#include "daemon/check_json.hpp"
 #include "daemon/files/scene_json.hpp"
 #include "daemon/log.hpp"
 
@@ -128,7 +129,7 @@ Appliance::Answer Appliance::Cancel() { return Handle(ScanEvent::kCancel); }
 Appliance::Answer Appliance::WhyNotScan() const {
   if (stopped_) return "the appliance is being switched off";
   if (store_ == nullptr || !storage_fault_.empty()) return "nothing can be stored";
-  if (open_patient_.empty()) return "no patient is open: open one on the page first";
+  if (open_patient_.empty() && !check_) return "no patient is open: open one on the page first";
   constexpr std::uintmax_t kLeast = 48U << 20;
   std::error_code error;
   const std::filesystem::space_info space = std::filesystem::space(parts_.config.appliance.state, error);
@@ -191,8 +192,8 @@ void Appliance::BeginSession() {
   const web::Settings settings = store_->GetSettings();
   session_.reset();  // the last one has ended
   scan_ = {};
-  scan_.patient_id = open_patient_;
-  scan_.purpose = purpose_;
+  scan_.patient_id = check_ ? std::string() : open_patient_;
+  scan_.purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
   scan_.started = Clock::now();
   ScanJob job = MakeJob(settings);
   const NewScan record{.patient_id = scan_.patient_id,
@@ -201,7 +202,7 @@ void Appliance::BeginSession() {
                        .sensor_serial = sensors_->snapshot().sensor.serial,
                        .reason = reference_reason_};
   scan_.sensor_before = scan_.sensor_after = sensors_->snapshot().statistics;
-  session_ = std::make_unique<ScanSession>(std::move(job), MakeCallbacks(record));
+  session_ = std::make_unique<ScanSession>(std::move(job), check_ ? MakeCheckCallbacks(record) : MakeCallbacks(record));
   sensors_->BeginScan(session_->feed());
   limit_timer_.ArmAfter(
       std::chrono::microseconds(static_cast<std::int64_t>(parts_.config.appliance.scan_limit_s.value_or(settings.scan_limit_s) * 1e6)));
@@ -214,6 +215,11 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
   job.reconstructor.keep_color = false;  // of a patient only the shape is kept
   job.keep_recording = parts_.config.appliance.keep_recordings || settings.keep_recordings;
   job.stop_after_s = parts_.config.appliance.auto_stop_s.value_or(settings.auto_stop_s);
+  if (check_) {
+    job.keep_recording = false;
+    job.check = CheckJob{BaselineIn(store_->CheckBaselineJson()), parts_.config.check};
+    return job;
+  }
   const std::optional<web::Reference> reference = store_->ApprovedReference(scan_.patient_id);
   if (reference) scan_.reference_area_m2 = store_->SweptArea(reference->scan_id);
   if (!reference && scan_.purpose == web::ScanPurpose::kFraction) scan_.purpose = web::ScanPurpose::kReference;
@@ -272,10 +278,34 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
     if (!is_demo || !demo || demo->id != patient || outcome.kind != Kind::kDone) return;
     store_->ApproveReference(kAuto, store_->AddReference(kAuto, *id, "first scan of the demo", plan), /*two_users=*/false);
   };
+  AddListeners(callbacks);
+  return callbacks;
+}
+
+void Appliance::AddListeners(ScanCallbacks& callbacks) {
   callbacks.update = [this](const ScanUpdate& update) { loop_.Post([this, update] { OnUpdate(update); }); };
   callbacks.sweep_complete = [this] { loop_.Post([this] { (void)Handle(ScanEvent::kSweepComplete); }); };
   callbacks.ended = [this](const ScanOutcome& outcome) { loop_.Post([this, outcome] { OnEnded(outcome); }); };
+}
+
+/// Nothing of a check is kept but its numbers.
+ScanCallbacks Appliance::MakeCheckCallbacks(const NewScan& record) {
+  ScanCallbacks callbacks;
+  callbacks.begin = [] { return std::filesystem::path(); };
+  callbacks.save = [this, actor = *check_, serial = record.sensor_serial](const ScanOutcome& outcome) {
+    if (!outcome.check_json.empty()) (void)store_->AddCheck(actor, serial, outcome.check_json);
+  };
+  AddListeners(callbacks);
   return callbacks;
+}
+
+Appliance::Answer Appliance::OpenCheck(const web::Actor& actor) {
+  if (state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking) {
+    return fmt::format("in state {}, trying to begin a check, requires that no scan runs: wait for its result", Name(state_.phase));
+  }
+  check_ = actor;
+  TellWeb(web::EventKind::kStatus);
+  return {};
 }
 
 void Appliance::OnSensor(const SensorEvent& event) {
@@ -340,8 +370,12 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
     (void)Handle(ScanEvent::kScanFailed);
     CheckDisk();
   } else {
-    last_result_ = scan_;
-    const std::string answer = outcome.verdict ? Name(*outcome.verdict) : outcome.kind == Kind::kNoScene ? outcome.reason : "no comparison";
+    const bool is_check = scan_.purpose == web::ScanPurpose::kDailyCheck;
+    if (!is_check) last_result_ = scan_;
+    const std::string answer = is_check                         ? "daily check " + CheckIn(outcome.check_json).status
+                               : outcome.verdict                ? Name(*outcome.verdict)
+                               : outcome.kind == Kind::kNoScene ? outcome.reason
+                                                                : "no comparison";
     Log(LogLevel::kInfo,
         fmt::format("the scan is done {:.2f} s after its last frame, {} frames, {} dropped: {}", outcome.after_last_frame_s, outcome.frames,
                     outcome.frames_dropped, answer),
@@ -356,6 +390,7 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
     (void)Handle(ScanEvent::kScanDone);
     TellEvent("result", Json{{"scan", scan_.id}, {"answer", answer}}.dump());
   }
+  check_.reset();
   TellWeb(web::EventKind::kResult);
   TellWeb(web::EventKind::kData);
   Care();
@@ -399,6 +434,7 @@ void Appliance::Care() {
 
 void Appliance::OpenPatient(const std::string& patient_id, web::ScanPurpose purpose, const std::string& reason) {
   open_patient_ = patient_id;
+  check_.reset();
   purpose_ = purpose;
   reference_reason_ = reason;
   TellWeb(web::EventKind::kStatus);

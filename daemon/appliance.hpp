@@ -49,6 +49,9 @@ class Appliance {
   Answer Cancel();
   /// The next scan's patient and purpose. Empty id: none.
   void OpenPatient(const std::string& patient_id, web::ScanPurpose purpose, const std::string& reason);
+  /// The next scan is the daily check of the room's markers; after it, scans are of the open patient again.
+  Answer OpenCheck(const web::Actor& actor);
+  [[nodiscard]] web::CheckStatus Checks();
   /// Takes over what may change while running; what may not is logged. For SIGHUP.
   void Reload(const Config& config);
   /// Calls `stopped` once no scan runs any more; a running one is discarded.
@@ -112,6 +115,8 @@ class Appliance {
   void StartScan();
   void BeginSession();
   [[nodiscard]] ScanJob MakeJob(const web::Settings& settings);
+  [[nodiscard]] ScanCallbacks MakeCheckCallbacks(const NewScan& scan);
+  void AddListeners(ScanCallbacks& callbacks);
   [[nodiscard]] ScanCallbacks MakeCallbacks(const NewScan& scan);
   [[nodiscard]] CompareOptions CompareOptionsFor(const web::ReferencePlan& plan) const;
   void OnSensor(const SensorEvent& event);
@@ -141,6 +146,7 @@ class Appliance {
   std::string sensor_fault_, scan_fault_;
   std::string open_patient_, reference_reason_;
   web::ScanPurpose purpose_ = web::ScanPurpose::kFraction;
+  std::optional<web::Actor> check_;  ///< Set: the next or running scan is the daily check that this person asked for.
   CurrentScan scan_;
   std::optional<CurrentScan> last_result_;
   std::chrono::steady_clock::time_point sensor_since_;

@@ -236,8 +236,13 @@ web::Status Appliance::WebStatus() {
                    .powered_s = sensor.present ? SecondsSince(sensor_since_) : 0.0};
   status.storage = StorageOf(parts_.config.appliance.state, storage_fault_.empty());
   status.light = Name(shown_);
-  status.patient_id = open_patient_;
-  status.next_purpose = purpose_;
+  status.patient_id = check_ ? std::string() : open_patient_;
+  status.next_purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
+  status.check_overdue = store_ != nullptr && !store_->HasPassedCheckSince(StartOfDay());
+  if (store_ != nullptr) {
+    const std::vector<web::CheckRecord> newest = store_->Checks(1);
+    if (!newest.empty()) status.last_check = newest.front();
+  }
   if (store_ != nullptr && !open_patient_.empty()) status.scans_today = store_->ScansSince(open_patient_, StartOfDay());
   if (state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking) {
     status.scan = web::LiveScan{.id = scan_.id,
@@ -256,6 +261,11 @@ web::Status Appliance::WebStatus() {
   if (last_result_ && store_ != nullptr) status.last_result = store_->FindScan(last_result_->id);
   status.version = Version();
   return status;
+}
+
+web::CheckStatus Appliance::Checks() {
+  constexpr int kShown = 60;
+  return {.checks = store_->Checks(kShown), .baseline = store_->CheckBaseline(), .overdue = !store_->HasPassedCheckSince(StartOfDay())};
 }
 
 web::Health Appliance::Health() {

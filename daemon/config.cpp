@@ -90,6 +90,17 @@ void ReadCompare(Section section, Config& config) {
   section.RefuseTheRest();
 }
 
+void ReadCheck(Section section, MarkerCheckLimits& limits) {
+  constexpr double kPercent = 0.01;
+  section.TakeScaled("misfit_mm", limits.max_misfit_m, kMillimetre, "millimetres above 0");
+  section.TakeScaled("moved_mm", limits.max_moved_m, kMillimetre, "millimetres above 0");
+  section.TakeScaled("side_percent", limits.max_side_share, kPercent, "percent above 0");
+  section.TakeScaled("scale_percent", limits.max_scale_share, kPercent, "percent above 0");
+  section.TakeScaled("depth_percent", limits.max_depth_share, kPercent, "percent above 0");
+  section.Take("min_views", limits.min_views, "a whole number from 1 to 1000", [](int n) { return n >= 1 && n <= 1000; });
+  section.RefuseTheRest();
+}
+
 void ReadIec(Section section, const toml::table& root, Pose& T_iec_reference) {
   const std::string_view expected = "a rigid transform: 4 rows of 4 numbers, a rotation and a translation in metres, last row 0 0 0 1";
   if (const auto rows = section.TakeRows("T_iec_reference", 4, 4, expected)) {
@@ -148,6 +159,14 @@ void ReadPanel(Section button, Section light, PanelConfig& panel) {
   light.RefuseTheRest();
 }
 
+void ReadUpdate(Section section, UpdateConfig& update) {
+  std::string folder;
+  section.Take("folder", folder, "an absolute path", [](const std::string& text) { return text.starts_with('/') && text.size() < 4096; });
+  if (!folder.empty()) update.folder = folder;
+  section.Take("max_bundle_mb", update.max_bundle_mb, "a whole number from 1 to 65536", [](int n) { return n >= 1 && n <= 65536; });
+  section.RefuseTheRest();
+}
+
 void ReadWeb(Section section, WebConfig& web) {
   section.Take("listen", web.listen, "an address and a port, such as \"0.0.0.0:8080\" or \"[::]:8080\"",
                [](const std::string& s) { return ParseListenAddress(s).has_value(); });
@@ -186,8 +205,8 @@ Config ParseConfig(const std::string& text, const std::string& name) {
   } catch (const toml::parse_error& error) {
     throw DataError(fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line, error.description()));
   }
-  static constexpr std::array<std::string_view, 8> kSections = {"markers",   "reconstruct", "compare", "iec",
-                                                                "appliance", "button",      "light",   "web"};
+  static constexpr std::array<std::string_view, 10> kSections = {"markers",   "reconstruct", "compare", "check", "iec",
+                                                                 "appliance", "button",      "light",   "web",   "update"};
   for (const auto& [key, node] : root) {
     if (std::find(kSections.begin(), kSections.end(), key.str()) != kSections.end()) continue;
     throw DataError(fmt::format("{}:{}: unknown table or key '{}'; known are [{}]", name, node.source().begin.line, key.str(),
@@ -197,10 +216,12 @@ Config ParseConfig(const std::string& text, const std::string& name) {
   ReadMarkers(Section(root, "markers", name), config.markers);
   ReadReconstruct(Section(root, "reconstruct", name), config.reconstruct);
   ReadCompare(Section(root, "compare", name), config);
+  ReadCheck(Section(root, "check", name), config.check);
   ReadIec(Section(root, "iec", name), root, config.compare.T_iec_reference);
   ReadAppliance(Section(root, "appliance", name), config.appliance);
   ReadPanel(Section(root, "button", name), Section(root, "light", name), config.panel);
   ReadWeb(Section(root, "web", name), config.web);
+  ReadUpdate(Section(root, "update", name), config.update);
   return config;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "algo/comparison/comparison.hpp"
+#include "algo/comparison/marker_check.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
 
 namespace plumb {
@@ -48,6 +49,12 @@ struct WebConfig {
   std::vector<std::string> host_names;             ///< By which browsers reach it, beside addresses.
 };
 
+/// System updates, where the machine has an installer.
+struct UpdateConfig {
+  std::filesystem::path folder = "/var/lib/plumb/updates";  ///< Bundles: NAME.raucb.
+  int max_bundle_mb = 2048;
+};
+
 struct ListenAddress {
   std::string address;
   std::uint16_t port = 0;
@@ -60,9 +67,11 @@ struct Config {
   MarkerConfig markers;
   ReconstructorOptions reconstruct;
   CompareOptions compare;
+  MarkerCheckLimits check;  ///< Of the daily check.
   ApplianceConfig appliance;
   PanelConfig panel;
   WebConfig web;
+  UpdateConfig update;
   std::optional<std::filesystem::path> region_file;  ///< Absolute, or relative to the configuration file's folder.
 };
 
@@ -73,11 +82,13 @@ struct Config {
 ///     [compare]      preset, region, isocentre_m = [x, y, z], marker_kind = "room"|"couch", posture = "HFS"|"HFP"|"FFS"|"FFP",
 ///                    shift_tolerance_mm, rotation_tolerance_deg, min_shared_markers, moved_marker_mm, moved_marker_sigmas,
 ///                    min_coverage, max_hole_mm, max_residual_p95_mm, max_lost_s
+///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views: limits of the daily check
 ///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to the IEC fixed frame
 ///     [appliance]    state, control, calibration, sensor_serial, keep_recordings, quota_gb, auto_stop_s, scan_limit_s, result_s
 ///     [button]       chip, line, active_low
 ///     [light]        chip, red, green, blue, beeper, active_low
 ///     [web]          listen, tls_certificate, tls_key, host_names
+///     [update]       folder, max_bundle_mb
 ///
 /// @throws DataError naming file, line, key, what was expected and found. A key that is not listed is an error.
 [[nodiscard]] Config ReadConfig(const std::filesystem::path& file);

@@ -88,7 +88,10 @@ Config ReadConfiguration(const Options& options) {
   if (config.web.tls_certificate.empty() != config.web.tls_key.empty()) {
     throw DataError("web.tls_certificate and web.tls_key: expected both or none, found one");
   }
-  if (options.state) config.appliance.state = fs::absolute(*options.state);
+  if (options.state) {
+    config.appliance.state = fs::absolute(*options.state);
+    config.update.folder = config.appliance.state / "updates";
+  }
   if (options.control) config.appliance.control = fs::absolute(*options.control);
   if (options.listen) {
     if (!ParseListenAddress(*options.listen)) {
@@ -208,7 +211,7 @@ class Plumbd {
                            .button = panel_.button(),
                            .indicator = panel_.light(),
                            .demo_patient = options.simulated.empty() ? "" : "demo"}),
-        service_(appliance_),
+        service_(appliance_, config.update),
         http_(service_, HttpOptions(config)),
         control_(loop_, ControlSocket(config),
                  [this](const ControlRequest& request, const ControlServer::Reply& reply) { Answer(request, reply); }) {

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "algo/types/errors.hpp"
+#include "daemon/check_json.hpp"
 #include "daemon/cli/text_report.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
@@ -47,6 +48,7 @@ void ScanSession::Run(const std::stop_token& stop) {
   } catch (const DataError& error) {
     outcome_.kind = ScanOutcome::Kind::kNoScene;
     outcome_.reason = error.what();
+    if (job_.check) outcome_.check_json = CheckJson({.status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {error.what()}}, {});
   } catch (const std::bad_alloc&) {
     outcome_.kind = ScanOutcome::Kind::kFailed;
     outcome_.reason = "out of memory: sweep a shorter way, or close what else runs";
@@ -67,7 +69,11 @@ void ScanSession::Scan(const std::stop_token& stop) {
     reference = std::async(std::launch::async, [folder = job_.reference_scene] { return ReadScene(folder); });
   }
   const Scene scene = Track(stop);
-  Evaluate(scene, reference, stop);
+  if (job_.check) {
+    Check(scene);
+  } else {
+    Evaluate(scene, reference, stop);
+  }
   if (const std::optional<double> last_s = feed_->last_frame_s()) outcome_.after_last_frame_s = SteadySeconds() - *last_s;
 }
 
@@ -115,6 +121,13 @@ void ScanSession::Tell(std::string step, double fraction) {
   update_.step = std::move(step);
   update_.fraction = fraction;
   if (callbacks_.update) callbacks_.update(update_);
+}
+
+void ScanSession::Check(const Scene& scene) {
+  Tell("checking", 0.0);
+  const MarkerCheck check = CheckMarkers(scene, job_.check->baseline, job_.check->limits);
+  outcome_.check_json = CheckJson(check, BaselineOf(scene, job_.check->limits));
+  outcome_.verdict = check.status == MarkerCheckStatus::kPassed ? Verdict::kInTolerance : Verdict::kNoAnswer;
 }
 
 void ScanSession::Evaluate(const Scene& scene, std::future<Scene>& reference_scene, const std::stop_token& stop) {

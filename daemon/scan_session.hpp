@@ -13,11 +13,18 @@
 #include <thread>
 
 #include "algo/comparison/comparison.hpp"
+#include "algo/comparison/marker_check.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
 #include "daemon/live_feed.hpp"
 #include "daemon/sweep_guidance.hpp"
 
 namespace plumb {
+
+/// A scan of the room's markers, not of a patient.
+struct CheckJob {
+  std::optional<MarkerBaseline> baseline;
+  MarkerCheckLimits limits;
+};
 
 /// What a scan is made for.
 struct ScanJob {
@@ -27,6 +34,7 @@ struct ScanJob {
   GuidanceOptions guidance;
   std::filesystem::path reference_scene;  ///< SCENE to compare with; empty: none.
   bool is_reference = false;              ///< The scene must be one that others can be compared with, else there is no answer.
+  std::optional<CheckJob> check;          ///< Set: the daily check; nothing but its numbers is kept.
   bool keep_recording = false;
   std::size_t queue_capacity = 15;  ///< Frames that may wait for tracking: half a second.
   double stop_after_s = 10.0;       ///< Without new coverage: the sweep is complete.
@@ -47,9 +55,10 @@ struct ScanUpdate {
 struct ScanOutcome {
   enum class Kind { kDone, kNoScene, kCancelled, kFailed };
   Kind kind = Kind::kFailed;
-  std::string reason;       ///< kNoScene: why the frames make no scene. kFailed: what broke.
-  std::string result_json;  ///< kDone with a reference: as result.json.
-  std::optional<Verdict> verdict;
+  std::string reason;              ///< kNoScene: why the frames make no scene. kFailed: what broke.
+  std::string result_json;         ///< kDone with a reference: as result.json.
+  std::string check_json;          ///< kDone or kNoScene of a check: as CheckJson().
+  std::optional<Verdict> verdict;  ///< Of a check: in tolerance where it passed, else no answer.
   std::int64_t frames = 0, frames_tracked = 0, frames_dropped = 0;
   double swept_area_m2 = 0.0;
   double after_last_frame_s = 0.0;  ///< Until everything was written.
@@ -88,6 +97,7 @@ class ScanSession {
   void Scan(const std::stop_token& stop);
   void Save();
   [[nodiscard]] Scene Track(const std::stop_token& stop);
+  void Check(const Scene& scene);
   void Evaluate(const Scene& scene, std::future<Scene>& reference_scene, const std::stop_token& stop);
   void OnProgress(const struct ScanProgress& progress);
   void Tell(std::string step, double fraction);

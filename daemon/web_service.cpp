@@ -42,6 +42,27 @@ std::string CheckSettings(const web::Settings& s) {
 
 }  // namespace
 
+WebService::WebService(Appliance& appliance, const UpdateConfig& update)
+    : appliance_(appliance),
+      updater_(appliance.loop(), UpdaterOptions{.folder = update.folder,
+                                                .max_bytes = static_cast<std::uint64_t>(update.max_bundle_mb) << 20,
+                                                .bus_address = {},
+                                                .version = std::string(Version()),
+                                                .changed =
+                                                    [this] {
+                                                      if (listener_) listener_(web::EventKind::kUpdate);
+                                                    },
+                                                .ended =
+                                                    [this](const std::string& bundle, const std::string& failure) {
+                                                      Log({.user = "installer", .address = {}},
+                                                          failure.empty() ? "update.done" : "update.fail", bundle, failure);
+                                                    }}) {}
+
+void WebService::SetListener(std::function<void(web::EventKind)> listener) {
+  listener_ = listener;
+  appliance_.SetWebListener(std::move(listener));
+}
+
 void WebService::Change(web::Done done, std::function<std::string(Store&)> change) {
   Store* store = appliance_.store();
   if (store == nullptr) {
@@ -138,6 +159,9 @@ void WebService::OpenPatient(const web::Actor& actor, const std::string& id, web
     return done(
         AnswerOf(fmt::format("in state {}, trying to open a patient, requires that no scan runs: wait for its result", Name(phase))));
   }
+  if (purpose == web::ScanPurpose::kDailyCheck) {
+    return done({.result = ChangeResult::kInvalid, .message = "a daily check is of no patient: open it as a check", .id = {}, .file = {}});
+  }
   if (purpose == web::ScanPurpose::kFraction && patient->approved_reference_id.empty()) {
     return done(AnswerOf("this patient has no approved reference: take and approve one first"));
   }
@@ -175,6 +199,19 @@ void WebService::AcceptScan(const web::Actor& actor, const std::string& id, web:
   Change(std::move(done), [=](Store& store) { return store.AcceptScan(actor, id), std::string(); });
 }
 
+web::CheckStatus WebService::GetChecks() {
+  return Read<web::CheckStatus>([this](Store&) { return appliance_.Checks(); }, {});
+}
+
+void WebService::OpenCheck(const web::Actor& actor, web::Done done) {
+  if (const std::string refusal = appliance_.OpenCheck(actor); !refusal.empty()) return done(AnswerOf(refusal));
+  Change(std::move(done), [=](Store& store) { return store.Log(actor, "check.open", "", ""), std::string(); });
+}
+
+void WebService::SetCheckBaseline(const web::Actor& actor, const std::string& check_id, web::Done done) {
+  Change(std::move(done), [=](Store& store) { return store.SetCheckBaseline(actor, check_id), std::string(); });
+}
+
 std::vector<web::User> WebService::Users() {
   return Read<std::vector<web::User>>([](Store& store) { return store.Users(); }, {});
 }
@@ -210,13 +247,18 @@ void WebService::ChangeSettings(const web::Actor& actor, const web::Settings& se
   Change(std::move(done), [=](Store& store) { return store.ChangeSettings(actor, settings), std::string(); });
 }
 
-web::UpdateStatus WebService::GetUpdate() {
-  web::UpdateStatus status;
-  status.message = "this is no appliance image: update its packages instead";
-  return status;
-}
+web::UpdateStatus WebService::GetUpdate() { return updater_.status(); }
 
-void WebService::InstallUpdate(const web::Actor&, const std::string&, web::Done done) { done(AnswerOf(GetUpdate().message)); }
+void WebService::InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) {
+  const ScanPhase phase = appliance_.state().phase;
+  if (phase == ScanPhase::kScanning || phase == ScanPhase::kWorking) {
+    return done(AnswerOf(fmt::format("in state {}, trying to update, requires that no scan runs: wait for its result", Name(phase))));
+  }
+  updater_.Install(bundle, [this, actor, bundle, done = std::move(done)](const web::Change& change) {
+    Log(actor, change.result == ChangeResult::kDone ? "update.install" : "update.refuse", bundle, change.message);
+    done(change);
+  });
+}
 
 /// Versions, status, health and the audit log's actions: nothing of a patient, no names of scans' owners.
 void WebService::WriteDiagnostics(const web::Actor& actor, web::Done done) {

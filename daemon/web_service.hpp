@@ -7,6 +7,7 @@
 #include <string>
 
 #include "daemon/appliance.hpp"
+#include "daemon/updater.hpp"
 #include "web/scan_service.hpp"
 
 namespace plumb {
@@ -16,7 +17,7 @@ namespace plumb {
 class WebService : public web::ScanService {
  public:
   /// Borrowed; lives longer.
-  explicit WebService(Appliance& appliance) : appliance_(appliance) {}
+  WebService(Appliance& appliance, const UpdateConfig& update);
   ~WebService() override { *alive_ = false; }
 
   [[nodiscard]] web::Status GetStatus() override { return appliance_.WebStatus(); }
@@ -24,7 +25,7 @@ class WebService : public web::ScanService {
   [[nodiscard]] std::shared_ptr<const std::string> Preview() override;
   void Press(const web::Actor& actor, web::Done done) override;
   void Cancel(const web::Actor& actor, web::Done done) override;
-  void SetListener(std::function<void(web::EventKind)> listener) override { appliance_.SetWebListener(std::move(listener)); }
+  void SetListener(std::function<void(web::EventKind)> listener) override;
 
   [[nodiscard]] std::vector<web::Patient> Patients() override;
   [[nodiscard]] std::optional<web::Patient> FindPatient(const std::string& id) override;
@@ -42,6 +43,10 @@ class WebService : public web::ScanService {
   [[nodiscard]] std::vector<web::Scan> Scans(const std::string& patient_id, int limit) override;
   [[nodiscard]] std::optional<web::Scan> FindScan(const std::string& id) override;
   void AcceptScan(const web::Actor& actor, const std::string& id, web::Done done) override;
+
+  [[nodiscard]] web::CheckStatus GetChecks() override;
+  void OpenCheck(const web::Actor& actor, web::Done done) override;
+  void SetCheckBaseline(const web::Actor& actor, const std::string& check_id, web::Done done) override;
 
   [[nodiscard]] std::vector<web::User> Users() override;
   [[nodiscard]] std::optional<web::User> FindUser(const std::string& name) override;
@@ -64,10 +69,12 @@ class WebService : public web::ScanService {
   Result Read(const std::function<Result(Store&)>& read, Result otherwise) const;
 
   Appliance& appliance_;
+  std::function<void(web::EventKind)> listener_;
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
   std::shared_ptr<const std::string> preview_;
   std::int64_t preview_index_ = -1;
   std::chrono::steady_clock::time_point preview_at_;
+  Updater updater_;  // last: what it tells uses the rest
 };
 
 }  // namespace plumb

@@ -226,6 +226,18 @@ void AddScanRoutes(Table& table) {
   });
 }
 
+void AddCheckRoutes(Table& table) {
+  table.Read("/api/v1/checks", Permission::kView,
+             [](ScanService& service, const Request&) { return JsonResponse(ToJson(service.GetChecks(), WallClock::now())); });
+  table.Write(
+      "POST", "/api/v1/checks/open", Permission::kScan, BodyKind::kNone,
+      [](ScanService& service, const Request& request, const Respond& respond) { service.OpenCheck(request.actor(), Answer(respond)); });
+  table.Write("POST", "/api/v1/checks/{id}/baseline", Permission::kPlan, BodyKind::kNone,
+              [](ScanService& service, const Request& request, const Respond& respond) {
+                service.SetCheckBaseline(request.actor(), request.arguments[0], Answer(respond));
+              });
+}
+
 void AddCareRoutes(Table& table) {
   table.Read("/api/v1/audit", Permission::kAudit, [](ScanService& service, const Request& request) {
     const auto before = QueryNumber(request, "before", 0, std::int64_t{1} << 53);
@@ -269,6 +281,7 @@ void AddApiRoutes(Router& router, ScanService& service) {
   AddPatientRoutes(table);
   AddReferenceRoutes(table);
   AddScanRoutes(table);
+  AddCheckRoutes(table);
   AddCareRoutes(table);
 }
 

@@ -21,6 +21,7 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kBeat{5000};
+constexpr std::chrono::milliseconds kExpireEvery{500};  // while somebody watches: a session's end is seen within a second
 constexpr std::chrono::milliseconds kMinEventGap{100};
 
 AccountOptions AccountsOptions(const HttpServerOptions& options) {
@@ -86,6 +87,10 @@ class HttpServer::Impl {
     accounts_.Dispatch();
     const auto now = SteadyClock::now();
     if (status_due_ && now >= *status_due_) SendStatus(now);
+    if (hub_.size() > 0 && now >= next_expiry_) {
+      next_expiry_ = now + kExpireEvery;
+      accounts_.Expire();
+    }
     if (now >= next_beat_) {
       next_beat_ = now + kBeat;
       accounts_.Expire();
@@ -93,11 +98,13 @@ class HttpServer::Impl {
       transport_.CutLate();
     }
     transport_.Run();
+    if (hub_.EndOver()) transport_.Run();  // a log-out that has just come ends its own streams at once
   }
 
   [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const {
     const auto now = SteadyClock::now();
     auto due = next_beat_;
+    if (hub_.size() > 0) due = std::min(due, next_expiry_);
     if (status_due_) due = std::min(due, *status_due_);
     auto wait = std::max(std::chrono::milliseconds(0), std::chrono::ceil<std::chrono::milliseconds>(due - now));
     if (const auto own = transport_.timeout()) wait = std::min(wait, *own);
@@ -163,6 +170,7 @@ class HttpServer::Impl {
   Transport transport_;
   int epoll_fd_ = -1;
   SteadyClock::time_point next_beat_;
+  SteadyClock::time_point next_expiry_;
   SteadyClock::time_point last_status_;
   std::optional<SteadyClock::time_point> status_due_;
 };

@@ -124,6 +124,43 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
   return json;
 }
 
+namespace {
+
+Json CheckJson(const CheckRecord& check, WallClock::time_point now) {
+  Json items = Json::array();
+  for (const CheckItem& item : check.items) {
+    items.push_back(Json{{"name", item.name},
+                         {"value", item.value ? Json(*item.value) : Json(nullptr)},
+                         {"limit", item.limit},
+                         {"unit", item.unit},
+                         {"passed", item.passed},
+                         {"note", TextOrNull(item.note)}});
+  }
+  return {{"id", check.id},
+          {"time", TimeText(check.time)},
+          {"age_s", std::max<std::int64_t>(0, std::chrono::duration_cast<std::chrono::seconds>(now - check.time).count())},
+          {"user", check.user},
+          {"sensor_serial", check.sensor_serial},
+          {"status", check.status},
+          {"reasons", check.reasons},
+          {"items", items},
+          {"num_markers", check.num_markers}};
+}
+
+}  // namespace
+
+Json ToJson(const CheckStatus& checks, WallClock::time_point now) {
+  Json json = {{"checks", Json::array()}, {"baseline", nullptr}, {"overdue", checks.overdue}};
+  for (const CheckRecord& check : checks.checks) json["checks"].push_back(CheckJson(check, now));
+  if (checks.baseline) {
+    json["baseline"] = {{"check_id", checks.baseline->check_id},
+                        {"set_at", TimeText(checks.baseline->set_at)},
+                        {"set_by", checks.baseline->set_by},
+                        {"num_markers", checks.baseline->num_markers}};
+  }
+  return json;
+}
+
 Json ToJson(const Status& status, WallClock::time_point now) {
   return {{"state", NameIn(kStates, status.state)},
           {"fault", TextOrNull(status.fault)},
@@ -140,6 +177,8 @@ Json ToJson(const Status& status, WallClock::time_point now) {
           {"next_purpose", NameIn(kPurposes, status.next_purpose)},
           {"scans_today", status.scans_today},
           {"scan", status.scan ? LiveScanJson(*status.scan) : Json(nullptr)},
+          {"check_overdue", status.check_overdue},
+          {"last_check", status.last_check ? CheckJson(*status.last_check, now) : Json(nullptr)},
           {"last_result", status.last_result ? ToJson(*status.last_result, now) : Json(nullptr)},
           {"time", TimeText(now)},
           {"version", status.version}};

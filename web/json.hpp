@@ -17,6 +17,7 @@ using Json = nlohmann::ordered_json;
 [[nodiscard]] Json ToJson(const Scan& scan, WallClock::time_point now);
 [[nodiscard]] Json ToJson(const Patient& patient);
 [[nodiscard]] Json ToJson(const Reference& reference);
+[[nodiscard]] Json ToJson(const CheckStatus& checks, WallClock::time_point now);
 [[nodiscard]] Json ToJson(const User& user);  ///< Without the hash.
 [[nodiscard]] Json ToJson(const AuditEntry& entry);
 [[nodiscard]] Json ToJson(const Settings& settings);

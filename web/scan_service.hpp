@@ -85,6 +85,13 @@ class ScanService {
   [[nodiscard]] virtual std::optional<Scan> FindScan(const std::string& id) = 0;
   virtual void AcceptScan(const Actor& actor, const std::string& id, Done done) = 0;
 
+  // --- daily check
+  [[nodiscard]] virtual CheckStatus GetChecks() = 0;
+  /// The next scan, from any button, is of the room's markers. kConflict during a scan.
+  virtual void OpenCheck(const Actor& actor, Done done) = 0;
+  /// From now on checks are compared with this one.
+  virtual void SetCheckBaseline(const Actor& actor, const std::string& check_id, Done done) = 0;
+
   // --- accounts, log, settings
   [[nodiscard]] virtual std::vector<User> Users() = 0;  ///< By name.
   [[nodiscard]] virtual std::optional<User> FindUser(const std::string& name) = 0;

@@ -126,6 +126,42 @@ struct Reference {
   ReferencePlan plan;
 };
 
+/// One number of a daily check.
+struct CheckItem {
+  std::string name;             ///< markers_seen, misfit, moved, side, scale, depth_scale
+  std::optional<double> value;  ///< Nothing: could not be computed.
+  double limit = 0.0;
+  std::string unit;
+  bool passed = false;
+  std::string note;
+};
+
+/// A scan of the room's markers against where they lay.
+struct CheckRecord {
+  std::string id;
+  WallClock::time_point time;
+  std::string user;  ///< Who asked for it.
+  std::string sensor_serial;
+  std::string status = "failed";  ///< "passed", "failed" or "no_baseline".
+  std::vector<std::string> reasons;
+  std::vector<CheckItem> items;
+  std::size_t num_markers = 0;  ///< Seen well.
+};
+
+/// The check whose markers count as lying right.
+struct CheckBaseline {
+  std::string check_id;
+  WallClock::time_point set_at;
+  std::string set_by;
+  std::size_t num_markers = 0;
+};
+
+struct CheckStatus {
+  std::vector<CheckRecord> checks;  ///< Newest first.
+  std::optional<CheckBaseline> baseline;
+  bool overdue = true;  ///< None passed today.
+};
+
 struct Status {
   ApplianceState state = ApplianceState::kNoSensor;
   std::string fault;  ///< In words, in state kFault.
@@ -134,8 +170,10 @@ struct Status {
   std::string light;       ///< Name of the pattern shown: "ready", "too_fast".
   std::string patient_id;  ///< Open for the next scan; empty: none.
   ScanPurpose next_purpose = ScanPurpose::kFraction;
-  int scans_today = 0;              ///< Of the open patient: the rescan counter.
-  std::optional<LiveScan> scan;     ///< In states scanning and working.
+  int scans_today = 0;           ///< Of the open patient: the rescan counter.
+  std::optional<LiveScan> scan;  ///< In states scanning and working.
+  std::optional<CheckRecord> last_check;
+  bool check_overdue = true;        ///< No daily check passed today.
   std::optional<Scan> last_result;  ///< The newest finished scan of this run.
   std::string version;
 };

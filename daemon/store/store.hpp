@@ -105,6 +105,15 @@ class Store {
   /// something.
   int KeepWithinQuota(std::uint64_t max_bytes);
 
+  // --- daily check
+  /// @param check_json  Of CheckJson(). Gives the id.
+  std::string AddCheck(const web::Actor& actor, const std::string& sensor_serial, const std::string& check_json);
+  [[nodiscard]] std::vector<web::CheckRecord> Checks(int limit);  ///< Newest first.
+  [[nodiscard]] bool HasPassedCheckSince(web::WallClock::time_point since);
+  [[nodiscard]] std::optional<web::CheckBaseline> CheckBaseline();
+  [[nodiscard]] std::string CheckBaselineJson();  ///< Of the check that is the baseline; empty: none.
+  void SetCheckBaseline(const web::Actor& actor, const std::string& check_id);
+
   // --- accounts, log, settings
   [[nodiscard]] std::vector<web::User> Users();
   [[nodiscard]] std::optional<web::User> FindUser(const std::string& name);

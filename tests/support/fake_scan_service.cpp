@@ -73,7 +73,7 @@ void FakeScanService::Press(const Actor& actor, Done done) {
     scan.reference_id = patient->approved_reference_id;
   }
   scan.started_at = WallClock::now();
-  scans.push_back(scan);
+  if (!is_check_) scans.push_back(scan);
   status.scan = LiveScan{.id = scan.id, .patient_id = scan.patient_id, .purpose = scan.purpose, .coverage = 0.0, .step = "tracking"};
   status.state = ApplianceState::kScanning;
   status.light = "scanning";
@@ -85,8 +85,9 @@ void FakeScanService::Press(const Actor& actor, Done done) {
 void FakeScanService::Cancel(const Actor& actor, Done done) {
   if (!status.scan)
     return Finish(done, Refusal(ChangeResult::kConflict, "in this state there is nothing to cancel; it requires scanning or working"));
-  scans.back().outcome = ScanOutcome::kCancelled;
-  scans.back().failure = "cancelled";
+  if (!is_check_) scans.back().outcome = ScanOutcome::kCancelled;
+  if (!is_check_) scans.back().failure = "cancelled";
+  CloseCheck();
   const std::string id = status.scan->id;
   status.scan.reset();
   status.state = ApplianceState::kReady;
@@ -124,7 +125,64 @@ void FakeScanService::Tick(std::chrono::steady_clock::time_point now) {
   }
 }
 
+void FakeScanService::CloseCheck() {
+  if (!is_check_) return;
+  is_check_ = false;
+  status.next_purpose = ScanPurpose::kFraction;
+  status.patient_id = patient_before_check_;
+}
+
+void FakeScanService::EndCheck() {
+  CheckRecord check;
+  check.id = fmt::format("{}", next_id_++);
+  check.status = checks.baseline ? "passed" : "no_baseline";
+  check.num_markers = 12;
+  check.items = {{"markers_seen", 12, 12, "", true, ""},    {"misfit", 0.84, 3, "mm", true, ""},
+                 {"moved", 1.6, 5, "mm", true, "marker 4"}, {"scale", 0.08, 0.5, "%", true, ""},
+                 {"side", -0.4, 3, "%", true, "marker 9"},  {"depth_scale", 0.62, 3, "%", true, ""}};
+  if (!checks.baseline)
+    check.reasons = {"there is no baseline yet: somebody who knows that the markers lie right takes this check as the baseline"};
+  if (next_check) {
+    const std::string id = check.id;
+    check = *next_check;
+    check.id = id;
+    next_check.reset();
+  }
+  check.time = WallClock::now();
+  check.user = checker_;
+  check.sensor_serial = status.sensor.serial;
+  checks.checks.insert(checks.checks.begin(), check);
+  if (check.status == "passed") checks.overdue = false;
+  status.last_check = check;
+  status.check_overdue = checks.overdue;
+  status.scan.reset();
+  status.state = ApplianceState::kResult;
+  status.light = check.status == "passed" ? "result_in_tolerance" : "no_answer";
+  CloseCheck();
+  Tell(EventKind::kResult);
+}
+
+void FakeScanService::OpenCheck(const Actor& actor, Done done) {
+  if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running"));
+  if (!is_check_) patient_before_check_ = status.patient_id;
+  is_check_ = true;
+  checker_ = actor.user;
+  status.patient_id.clear();
+  status.next_purpose = ScanPurpose::kDailyCheck;
+  Tell(EventKind::kStatus);
+  Did(actor, "check.open", "", done);
+}
+
+void FakeScanService::SetCheckBaseline(const Actor& actor, const std::string& check_id, Done done) {
+  const auto found =
+      std::find_if(checks.checks.begin(), checks.checks.end(), [&](const CheckRecord& check) { return check.id == check_id; });
+  if (found == checks.checks.end()) return Finish(done, Refusal(ChangeResult::kNotFound, "there is no such check"));
+  checks.baseline = CheckBaseline{check_id, WallClock::now(), actor.user, found->num_markers};
+  Did(actor, "check.baseline", check_id, done);
+}
+
 void FakeScanService::EndScan() {
+  if (is_check_) return EndCheck();
   Scan& scan = scans.back();
   scan.outcome = ScanOutcome::kDone;
   scan.finished_at = WallClock::now();
@@ -169,8 +227,11 @@ void FakeScanService::Unplug() {
   status.state = ApplianceState::kNoSensor;
   status.light = "no_sensor";
   if (status.scan) {
-    scans.back().outcome = ScanOutcome::kFailed;
-    scans.back().failure = "the sensor was unplugged; the scan is discarded";
+    if (!is_check_) {
+      scans.back().outcome = ScanOutcome::kFailed;
+      scans.back().failure = "the sensor was unplugged; the scan is discarded";
+    }
+    CloseCheck();
     status.scan.reset();
     Tell(EventKind::kResult);
   }
@@ -213,6 +274,7 @@ void FakeScanService::OpenPatient(const Actor& actor, const std::string& id, Sca
     return Finish(done, Refusal(ChangeResult::kConflict, "this patient has no approved reference; take one first"));
   }
   if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running"));
+  CloseCheck();
   status.patient_id = id;
   status.next_purpose = purpose;
   status.scans_today = 0;

@@ -25,6 +25,8 @@ class FakeScanService : public web::ScanService {
   std::vector<web::Patient> patients;
   std::vector<web::Reference> references;
   std::vector<web::Scan> scans;  ///< Oldest first.
+  web::CheckStatus checks;
+  std::optional<web::CheckRecord> next_check;  ///< What the next check scan finds; nothing: it passes.
   std::vector<web::User> users;
   std::vector<web::AuditEntry> audit;  ///< Oldest first.
   std::shared_ptr<const std::string> preview;
@@ -69,6 +71,9 @@ class FakeScanService : public web::ScanService {
   std::vector<web::Scan> Scans(const std::string& patient_id, int limit) override;
   std::optional<web::Scan> FindScan(const std::string& id) override;
   void AcceptScan(const web::Actor& actor, const std::string& id, web::Done done) override;
+  web::CheckStatus GetChecks() override { return checks; }
+  void OpenCheck(const web::Actor& actor, web::Done done) override;
+  void SetCheckBaseline(const web::Actor& actor, const std::string& check_id, web::Done done) override;
   std::vector<web::User> Users() override { return users; }
   std::optional<web::User> FindUser(const std::string& name) override;
   void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;
@@ -89,11 +94,15 @@ class FakeScanService : public web::ScanService {
   void Did(const web::Actor& actor, const std::string& action, const std::string& subject, const web::Done& done,
            const std::string& id = "");
   void EndScan();
+  void EndCheck();
+  void CloseCheck();
   [[nodiscard]] web::Patient* PatientOf(const std::string& id);
 
   std::function<void(web::EventKind)> listener_;
   std::optional<std::chrono::steady_clock::time_point> phase_begun_;
   std::size_t num_finished_ = 0;
+  bool is_check_ = false;  ///< The next or running scan is a check.
+  std::string checker_, patient_before_check_;
   int next_id_ = 1;
 };
 

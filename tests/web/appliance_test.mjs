@@ -149,6 +149,27 @@ await h.step('a physicist plans a new version, a second one approves', async () 
   await h.look(clara, 'audit');
 });
 
+await h.step('the daily check of the real markers: no baseline, then passed', async () => {
+  const bob = await h.person('checker');
+  await logIn(bob, 'bob');
+  const check = async (verdict) => {
+    await bob.goto(`${h.url}#/check`);
+    await bob.getByRole('button', { name: 'Start a check' }).click();
+    await bob.getByRole('button', { name: /Start sweep|Scan again/ }).click(kSlow);
+    await bob.waitForURL(/#\/check/, kSlow);
+    await bob.locator('.verdict', { hasText: verdict }).waitFor(kSlow);
+    console.log(`    ${(await bob.locator('tbody tr').allInnerTexts()).slice(0, 6).join(' | ').replace(/\s+/g, ' ')}`);
+  };
+  await check('NO BASELINE');
+  await bob.getByRole('button', { name: 'Take this check as the baseline' }).click();
+  await bob.getByText('taken by bob').waitFor();
+  await check('PASSED');
+  await h.look(bob, 'check');
+  await bob.goto(`${h.url}#/status`);
+  await bob.locator('.tile.good', { hasText: 'Daily check' }).waitFor();
+  await bob.context().close();
+});
+
 await h.step('unplugging during a sweep is said, and the scan is discarded', async () => {
   await page.goto(`${h.url}#/scan`);
   await page.getByRole('button', { name: /Start sweep|Scan again/ }).click(kSlow);

@@ -225,6 +225,38 @@ await h.step('another open patient is pointed out on the result', async () => {
   await anna.getByText('Another patient (PX-0999) is open').waitFor();
 });
 
+await h.step('the daily check: overdue, without a baseline, passed, failed', async () => {
+  await anna.goto(`${h.url}#/status`);
+  await anna.getByText('No check has passed today.').waitFor();
+  await anna.goto(`${h.url}#/check`);
+  await anna.getByText('NOT DONE').waitFor();
+  await h.look(anna, 'check-never');
+  const check = async () => {
+    await anna.goto(`${h.url}#/check`);
+    await anna.getByRole('button', { name: 'Start a check' }).click();
+    await anna.getByText('sweep over all markers of the room').waitFor();
+    await anna.getByRole('button', { name: /Start sweep|Scan again/ }).click();
+    await anna.waitForURL(/#\/check/, { timeout: 60000 });
+  };
+  await check();
+  await anna.locator('.verdict', { hasText: 'NO BASELINE' }).waitFor();
+  equal(await anna.getByRole('button', { name: 'Take this check' }).count(), 0, 'a technician sets no baseline');
+  await bob.goto(`${h.url}#/check`);
+  await bob.getByRole('button', { name: 'Take this check as the baseline' }).click();
+  await bob.getByText('12 markers, taken by bob').waitFor();
+  await check();
+  await anna.locator('.verdict', { hasText: 'PASSED' }).waitFor();
+  await h.look(anna, 'check-passed');
+  h.tell('markermoved');
+  await check();
+  await anna.locator('.verdict', { hasText: 'FAILED' }).waitFor();
+  await anna.getByText('marker 7 moved 12 mm').first().waitFor();
+  await h.look(anna, 'check-failed');
+  await anna.goto(`${h.url}#/status`);
+  await anna.locator('.tile', { hasText: 'Daily check' }).getByText('failed').waitFor();
+  await h.look(anna, 'status-check-failed');
+});
+
 await h.step('patients, log, settings and update look finished', async () => {
   await bob.goto(`${h.url}#/patients`);
   await bob.getByRole('link', { name: 'PX-0417' }).waitFor();
@@ -255,9 +287,9 @@ await h.step('a keyboard alone reaches login, navigation and the start button', 
   for (let i = 0; i < 40 && (await focused()) !== 'Scan'; ++i) await keys.keyboard.press('Tab');
   await h.look(keys, 'focus', { axe: false });
   await keys.keyboard.press('Enter');
-  await keys.getByRole('button', { name: 'Start sweep' }).waitFor();
-  for (let i = 0; i < 8 && (await focused()) !== 'Start sweep'; ++i) await keys.keyboard.press('Tab');
-  equal(await focused(), 'Start sweep', 'the start button is reached from the main part');
+  await keys.getByRole('button', { name: 'Scan again' }).waitFor();
+  for (let i = 0; i < 8 && (await focused()) !== 'Scan again'; ++i) await keys.keyboard.press('Tab');
+  equal(await focused(), 'Scan again', 'the start button is reached from the main part');
   await keys.close();
 });
 

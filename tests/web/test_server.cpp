@@ -1,8 +1,8 @@
 // The real HTTP server over a fake appliance whose scans show real results: for tests of the page in a browser.
 // plumb_web_test_server FOLDER: makes scenes and results in FOLDER, prints its address and "setup code: XXXX-XXXX", obeys lines on stdin:
-// unplug, plug, slow (long sweeps), fast, old (the last result becomes 10 minutes old), quit; of what the next scan shows: stranger
-// (another body), shoulder (lifted), "moved AXIS AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by pitch, roll, yaw by
-// degrees).
+// unplug, plug, slow (long sweeps), fast, old (the last result becomes 10 minutes old), quit; of what the next scan shows: markermoved (a
+// check), stranger (another body), shoulder (lifted), "moved AXIS AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by pitch,
+// roll, yaw by degrees).
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
@@ -148,6 +148,15 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
   if (name == "plug") service.Plug();
   if (name == "slow") service.sweep = std::chrono::milliseconds(60000);
   if (name == "fast") service.sweep = std::chrono::milliseconds(1500);
+  if (name == "markermoved") {
+    web::CheckRecord check;
+    check.reasons = {"marker 7 moved 12 mm", "the markers lie 3.4 mm (RMS) off where they lay, at most 3 mm are allowed"};
+    check.items = {{"markers_seen", 12, 12, "", true, ""},      {"misfit", 3.4, 3, "mm", false, ""},
+                   {"moved", 12.2, 5, "mm", false, "marker 7"}, {"scale", 0.08, 0.5, "%", true, ""},
+                   {"side", -0.4, 3, "%", true, "marker 9"},    {"depth_scale", 0.62, 3, "%", true, ""}};
+    check.num_markers = 12;
+    service.next_check = check;
+  }
   if (name == "stranger") service.next_recorded = recorder.Record(Stranger());
   if (name == "shoulder") service.next_recorded = recorder.Record(LiftedShoulder());
   if (name == "moved") {

@@ -2,6 +2,7 @@
 import { currentSession, get, live, loadSession, logOut, may, setLoggedOffHandler } from './api.js';
 import { clear, h, say, warn } from './dom.js';
 import { showAudit } from './screens/audit.js';
+import { showCheck } from './screens/check.js';
 import { showLogin } from './screens/login.js';
 import { showPatient, showPatients } from './screens/patients.js';
 import { showPlan } from './screens/plan.js';
@@ -20,6 +21,7 @@ const kScreens = {
   plan: { show: showPlan, permission: 'view', parent: 'patients' },
   scan: { show: showScan, permission: 'view', nav: true },
   result: { show: showResult, permission: 'view', nav: true },
+  check: { show: showCheck, permission: 'view', nav: true },
   users: { show: showUsers, permission: 'login', nav: true },
   audit: { show: showAudit, permission: 'audit', nav: true },
   settings: { show: showSettings, permission: 'view', nav: true },
@@ -134,7 +136,7 @@ async function begin(message) {
 async function followScan() {
   const { state, sensor } = await get('status', true);
   if (state === 'result') {
-    location.hash = '#/result';
+    location.hash = lastPurpose === 'daily_check' ? '#/check' : '#/result';
     return;
   }
   if (!sensor.present) {
@@ -145,7 +147,9 @@ async function followScan() {
   if (scans[0]?.outcome === 'failed') warn(`${S.result.failed}: ${scans[0].failure}`);
 }
 
+let lastPurpose = null;
 live.listen((kind) => {
+  lastPurpose = live.status?.scan?.purpose ?? lastPurpose;
   if (kind === 'connection') warn(live.connected ? '' : S.offline);
   if (kind === 'status' || kind === 'connection') drawChip();
   if (kind === 'result' && route().name === 'scan') followScan().catch(() => {});

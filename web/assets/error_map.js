@@ -1,7 +1,7 @@
 // The error map with a cursor that reads millimetres, and the profile through it.
 import { fileUrl, get, getBytes } from './api.js';
 import { clear, h, svg } from './dom.js';
-import { cellAt, paintErrors, readTiff } from './maps.js';
+import { cellAt, paintErrors, paintOverlay, readTiff } from './maps.js';
 import { S } from './strings.js';
 
 function legend(tolerance_mm) {
@@ -97,7 +97,7 @@ export async function errorMap(scan, reference, tolerance_mm) {
     event.preventDefault();
     move(cursor.x + by * direction[0], cursor.y + by * direction[1]);
   });
-  const draw = () => paintErrors(canvas, maps[shown.map], tolerance_mm / 1000);
+  const draw = () => paintErrors(canvas, maps[shown.map], tolerance_mm / 1000, shown.map === 'before' ? maps.after : null);
   const choose = (name, value, label, apply) => {
     const input = h('input', { type: 'radio', name, value, checked: value === shown[name === 'map' ? 'map' : 'along'] });
     input.addEventListener('change', () => { shown[name === 'map' ? 'map' : 'along'] = value; apply(); });
@@ -111,5 +111,6 @@ export async function errorMap(scan, reference, tolerance_mm) {
   const element = h('div', {},
     h('fieldset', { class: 'row plainset' }, h('legend', { class: 'visually-hidden' }, text.where), choose('map', 'before', text.before, () => { draw(); read(); }), maps.after && choose('map', 'after', text.after, () => { draw(); read(); })),
     row(grid, box, h('div', { class: 'map-side' }, reading, legend(tolerance_mm), profileBox)));
-  return { element, grid, deviation: maps.before };
+  const overlay = (target) => paintOverlay(target, heights, maps.before, tolerance_mm / 1000, grid.step);
+  return { element, grid, deviation: maps.before, overlay };
 }

@@ -35,6 +35,7 @@ export async function readTiff(buffer) {
   return { width, height, values };
 }
 
+const kOutside = 0.28;  // light of what lies outside the region
 // Stops of the signed scale, in units of the tolerance: blue where the current surface is lower, orange where it is higher.
 const kStops = [[-20, 8, 29, 88], [-10, 33, 85, 152], [-5, 66, 130, 190], [-2, 120, 180, 220], [-1, 190, 214, 228], [-0.999, 226, 232, 236], [0, 250, 250, 248], [0.999, 245, 236, 226], [1, 250, 208, 160], [2, 244, 166, 90], [5, 217, 103, 30], [10, 160, 60, 10], [20, 92, 28, 6]];
 
@@ -68,13 +69,34 @@ export function paint(canvas, { width, height }, colour) {
   context.putImageData(image, 0, 0);
 }
 
-export function paintErrors(canvas, map, tolerance_m) {
+/// @param region  A map that is NaN outside the region of interest: what lies there is dimmed. The colours within are those of the scale.
+export function paintErrors(canvas, map, tolerance_m, region = null) {
   const colours = errorTable();
   paint(canvas, map, (i, out) => {
     const value = map.values[i];
     if (Number.isNaN(value)) { out[0] = 70; out[1] = 76; out[2] = 82; out[3] = 255; return; }
     const at = 3 * errorIndex(value / tolerance_m);
-    out[0] = colours[at]; out[1] = colours[at + 1]; out[2] = colours[at + 2]; out[3] = 255;
+    const light = region && Number.isNaN(region.values[i]) ? kOutside : 1;
+    out[0] = colours[at] * light; out[1] = colours[at + 1] * light; out[2] = colours[at + 2] * light; out[3] = 255;
+  });
+}
+
+const kBoth = [148, 132, 168];
+const kReferenceOnTop = [62, 118, 232];
+const kCurrentOnTop = [226, 74, 62];
+/// Both surfaces from above: whichever lies higher by more than the tolerance shows its colour. The background is dark.
+export function paintOverlay(canvas, base, deviation, tolerance_m, step) {
+  const { width, values } = base;
+  paint(canvas, base, (i, out) => {
+    const d = deviation.values[i];
+    const z = values[i];
+    if (Number.isNaN(d)) { out[0] = 30; out[1] = 37; out[2] = 44; out[3] = 255; return; }
+    const colour = d > tolerance_m ? kCurrentOnTop : d < -tolerance_m ? kReferenceOnTop : kBoth;
+    const slope = (((values[i + kReach * width] - values[i - kReach * width]) || 0) - ((values[i + kReach] - values[i - kReach]) || 0)) / (2 * kReach * step);
+    // The floor is flat and large: darker, so that the body stands out and nothing glares.
+    const light = (z < 0.02 ? 0.45 : 0.8) + 0.25 * Math.max(-1.2, Math.min(1.2, slope));
+    for (let k = 0; k < 3; ++k) out[k] = colour[k] * Math.max(0.2, light);
+    out[3] = 255;
   });
 }
 

@@ -48,14 +48,18 @@ void EventHub::Broadcast(std::string_view event, std::string_view data) {
 }
 
 void EventHub::Beat() {
+  for (const auto& stream : std::list(streams_)) stream->Send(": here\n\n");
+}
+
+bool EventHub::EndOver() {
+  bool any = false;
   for (const auto& stream : std::list(streams_)) {
-    if (stream->session().ended) {
-      stream->Send(FormatEvent("logged_off", "{}"));
-      stream->Close();
-    } else {
-      stream->Send(": here\n\n");
-    }
+    if (!stream->session().ended || stream->closed()) continue;
+    stream->Send(FormatEvent("logged_off", "{}"));
+    stream->Close();
+    any = true;
   }
+  return any;
 }
 
 void EventHub::CloseAll() {

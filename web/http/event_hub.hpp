@@ -55,8 +55,10 @@ class EventHub {
   void Remove(const std::shared_ptr<EventStream>& stream) { streams_.remove(stream); }
   /// To every stream. @param data  One line.
   void Broadcast(std::string_view event, std::string_view data);
-  /// Ends the streams of sessions that are over; a comment to the rest, so that dead connections are noticed.
+  /// A comment to every stream, so that dead connections are noticed.
   void Beat();
+  /// Ends the streams of sessions that are over, after telling them so. True if there was one.
+  bool EndOver();
   void CloseAll();
   [[nodiscard]] std::size_t size() const { return streams_.size(); }
 

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/check_json.hpp"
 #include "daemon/store/schema.hpp"
 #include "drivers/replay/file_io.hpp"
 #include "tests/support/message_of.hpp"
@@ -309,6 +310,84 @@ TEST_F(StoreTest, ADatabaseOfANewerVersionIsRefused) {
     direct.Execute("PRAGMA user_version = 99");
   }
   EXPECT_THAT(MessageOf<DatabaseCorrupt>([&] { (void)Open(); }), HasSubstr("newer"));
+}
+
+// Markers 1 to n in a row, as a check that ended in `status` keeps them.
+std::string CheckWith(int n, MarkerCheckStatus status) {
+  MarkerBaseline seen{{}, "DICT_6X6_250", 0.104};
+  for (int id = 1; id <= n; ++id) {
+    SceneMarker marker{.corners = CornersInMarkerFrame(0.104), .num_views = 9, .sigma_m = 0.0005};
+    for (Eigen::Vector3d& corner : marker.corners) corner.x() += 0.3 * id;
+    seen.markers[id] = marker;
+  }
+  return CheckJson({.status = status, .items = {{"moved", 1.25, 5.0, "mm", true, "marker 2"}}, .reasons = {"because"}}, seen);
+}
+
+TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
+  const auto before = web::WallClock::now() - std::chrono::seconds(1);
+  {
+    const auto store = Open();
+    EXPECT_FALSE(store->CheckBaseline());
+    EXPECT_FALSE(BaselineIn(store->CheckBaselineJson()));
+    const std::string first = store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
+    EXPECT_FALSE(store->HasPassedCheckSince(before)) << "without a baseline nothing has passed";
+    store->SetCheckBaseline(kBert, first);
+    store->AddCheck(kAnna, "S1", CheckWith(5, MarkerCheckStatus::kPassed));
+  }
+  const auto store = Open();
+  const std::vector<web::CheckRecord> checks = store->Checks(10);
+  ASSERT_THAT(checks, SizeIs(2));
+  EXPECT_EQ(checks[0].status, "passed");
+  EXPECT_EQ(checks[0].user, "anna");
+  EXPECT_EQ(checks[0].sensor_serial, "S1");
+  EXPECT_EQ(checks[0].num_markers, 5U);
+  ASSERT_THAT(checks[0].items, SizeIs(1));
+  EXPECT_EQ(checks[0].items[0].value, 1.25);
+  EXPECT_EQ(checks[0].items[0].note, "marker 2");
+  EXPECT_EQ(checks[1].reasons, std::vector<std::string>{"because"});
+  EXPECT_TRUE(store->HasPassedCheckSince(before));
+  EXPECT_FALSE(store->HasPassedCheckSince(web::WallClock::now() + std::chrono::hours(1)));
+  const auto baseline = store->CheckBaseline();
+  ASSERT_TRUE(baseline);
+  EXPECT_EQ(baseline->check_id, checks[1].id);
+  EXPECT_EQ(baseline->set_by, "bert");
+  EXPECT_EQ(baseline->num_markers, 4U);
+  const auto markers = BaselineIn(store->CheckBaselineJson());
+  ASSERT_TRUE(markers);
+  EXPECT_EQ(markers->dictionary, "DICT_6X6_250");
+  EXPECT_NEAR(markers->markers.at(3).corners[0].x(), 0.9 - 0.052, 1e-12);
+  EXPECT_EQ(markers->markers.at(3).num_views, 9);
+  std::vector<std::string> actions;
+  for (const web::AuditEntry& entry : store->Audit(0, 10)) actions.push_back(entry.user + " " + entry.action + " " + entry.detail);
+  EXPECT_THAT(actions, ::testing::IsSupersetOf({"anna check.done passed", "anna check.done no_baseline", "bert check.baseline "}));
+}
+
+TEST_F(StoreTest, ABaselineNeedsACheckThatSawMarkers) {
+  const auto store = Open();
+  EXPECT_EQ(RefusalOf([&] { store->SetCheckBaseline(kAnna, "77"); }), ChangeResult::kNotFound);
+  EXPECT_EQ(RefusalOf([&] { store->SetCheckBaseline(kAnna, "x"); }), ChangeResult::kNotFound);
+  const std::string blind = store->AddCheck(kAnna, "S1", CheckWith(2, MarkerCheckStatus::kFailed));
+  EXPECT_EQ(RefusalOf([&] { store->SetCheckBaseline(kAnna, blind); }), ChangeResult::kConflict);
+  EXPECT_FALSE(store->CheckBaseline());
+}
+
+TEST_F(StoreTest, ChecksAreNeverChanged) {
+  (void)Open()->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kFailed));
+  Database direct(database(), Database::Access::kReadWrite);
+  EXPECT_THROW(direct.Execute("UPDATE checks SET status = 'passed'"), ConstraintBroken);
+  EXPECT_THROW(direct.Execute("DELETE FROM checks"), ConstraintBroken);
+}
+
+TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
+  (void)Open()->AddPatient(kAnna, "P-1", "");
+  {
+    Database direct(database(), Database::Access::kReadWrite);
+    direct.Execute("DROP TABLE check_baselines; DROP TABLE checks; PRAGMA user_version = 1");
+  }
+  const auto store = Open();
+  EXPECT_THAT(store->Patients(), SizeIs(1));
+  EXPECT_THAT(store->Checks(10), SizeIs(0));
+  EXPECT_EQ(store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kFailed)), "1");
 }
 
 TEST_F(StoreTest, ScanNumbersAreNeverUsedTwice) {

@@ -91,6 +91,39 @@ TEST_F(ApiTest, ScanGoesFromPressToResultAndIsAudited) {
   EXPECT_THAT(actions, ::testing::IsSupersetOf({"technician login", "technician press", "technician cancel", "physicist login"}));
 }
 
+TEST_F(ApiTest, TheDailyCheckIsOpenedScannedAndBecomesABaseline) {
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
+  EXPECT_TRUE(technician.Get("/api/v1/status").json()["check_overdue"]);
+  EXPECT_EQ(technician.Post("/api/v1/checks/open").status, 200);
+  EXPECT_EQ(technician.Get("/api/v1/status").json()["next_purpose"], "daily_check");
+  const auto scan = [&] {
+    EXPECT_EQ(technician.Post("/api/v1/press").status, 200);
+    EXPECT_EQ(technician.Post("/api/v1/checks/open").status, 409) << "not during a scan";
+    loop_->Do([&] {
+      for (int i = 0; i < 20; ++i) service_.Tick(std::chrono::steady_clock::now() + std::chrono::seconds(10 * i));
+    });
+  };
+  scan();
+  EXPECT_TRUE(service_.scans.empty()) << "a check is no scan of a patient";
+  const nlohmann::json first = technician.Get("/api/v1/checks").json();
+  ASSERT_EQ(first["checks"].size(), 1U);
+  EXPECT_EQ(first["checks"][0]["status"], "no_baseline");
+  EXPECT_EQ(first["checks"][0]["user"], "technician");
+  EXPECT_EQ(first["checks"][0]["items"][1]["name"], "misfit");
+  EXPECT_EQ(first["baseline"], nullptr);
+  const std::string baseline = "/api/v1/checks/" + first["checks"][0]["id"].get<std::string>() + "/baseline";
+  EXPECT_EQ(technician.Post(baseline).status, 403);
+  EXPECT_EQ(physicist.Post(baseline).status, 200);
+  EXPECT_EQ(physicist.Post("/api/v1/checks/none/baseline").status, 404);
+  EXPECT_EQ(technician.Post("/api/v1/checks/open").status, 200);
+  scan();
+  const nlohmann::json status = technician.Get("/api/v1/status").json();
+  EXPECT_EQ(status["last_check"]["status"], "passed");
+  EXPECT_FALSE(status["check_overdue"]);
+  EXPECT_EQ(technician.Get("/api/v1/checks").json()["baseline"]["set_by"], "physicist");
+  EXPECT_EQ(HttpClient(port_).Get("/api/v1/checks").status, 401);
+}
+
 TEST_F(ApiTest, AReferenceIsApprovedByASecondPerson) {
   HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist"), second = LoggedIn("second");
   const std::string patient = AddPatient(technician, "PX-17");

@@ -93,6 +93,29 @@ TEST_F(ServerTest, MalformedRequestsNeitherCrashNorHang) {
   ExpectAlive();
 }
 
+// The library answers what it cannot read by itself, before any code of ours, and has no place for headers of ours. Such an answer is a
+// fixed text: nothing of the request is in it, and the connection ends.
+TEST_F(ServerTest, WhatTheLibraryRefusesByItselfGivesNothingBack) {
+  Start();
+  const std::string probe = "<script>alert(1)</script>";
+  for (const std::string& request :
+       {"GET /" + probe + " HTTP/1.1 " + probe + "\r\nHost: localhost\r\n\r\n", "GET / HTTP/9.9\r\nHost: " + probe + "\r\n\r\n",
+        "GET / HTTP/1.1\r\n" + probe + "\r\nHost: localhost\r\n\r\n",
+        "GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + probe + "\r\n\r\n",
+        "GET / HTTP/1.1\r\nHost: localhost\r\nX: " + probe + std::string(64 << 10, 'x') + "\r\n\r\n"}) {
+    HttpConnection connection(port_);
+    connection.Send(request);
+    const HttpAnswer answer = connection.Read();
+    EXPECT_THAT(answer.body, ::testing::Not(HasSubstr("script"))) << request.substr(0, 60);
+    for (const auto& [name, value] : answer.headers) EXPECT_THAT(value, ::testing::Not(HasSubstr("script"))) << name;
+    EXPECT_THAT(answer.status, AnyOf(0, 400, 404, 413, 414, 421, 431, 505)) << request.substr(0, 60);
+    if (answer.Header("content-security-policy").empty()) {
+      EXPECT_TRUE(connection.IsClosedBySoon()) << request.substr(0, 60);
+    }
+  }
+  ExpectAlive();
+}
+
 TEST_F(ServerTest, OversizedPartsAreRefused) {
   Start();
   EXPECT_THAT(StatusOf("GET /" + std::string(100000, 'a') + " HTTP/1.1\r\nHost: localhost\r\n\r\n"), AnyOf(0, 400, 414));

@@ -61,6 +61,31 @@ TEST_F(StreamTest, EndsWhenTheSessionEnds) {
   EXPECT_FALSE(stream.ReadUntil("logged_off").empty());
 }
 
+TEST_F(StreamTest, EndsWithinASecondHoweverTheSessionEnds) {
+  Start();
+  SetUpAccounts();
+  HttpClient engineer = LoggedIn("engineer");
+  const auto ends_within_a_second = [&](const std::string& name, const std::function<void(HttpClient&)>& end) {
+    HttpClient client = LoggedIn(name);
+    HttpConnection stream = OpenStream(client);
+    stream.ReadUntil("event: status");
+    end(client);
+    const auto since = std::chrono::steady_clock::now();
+    EXPECT_FALSE(stream.ReadUntil("logged_off").empty());
+    EXPECT_FALSE(stream.ReadUntil("0\r\n\r\n").empty()) << "nothing comes after it";
+    const double passed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count();
+    return passed_s;
+  };
+  // Asked for: 1 s. The last one waits for the timer of half a second.
+  EXPECT_LT(ends_within_a_second("technician", [](HttpClient& client) { client.Post("/api/v1/logout"); }), 1.0);
+  EXPECT_LT(ends_within_a_second("technician",
+                                 [&](HttpClient&) {
+                                   engineer.Put("/api/v1/users/technician", {{"role", "technician"}, {"disabled", true}, {"password", ""}});
+                                 }),
+            1.0);
+  EXPECT_LT(ends_within_a_second("physicist", [&](HttpClient&) { skipped_s_ += 3600; }), 1.0);
+}
+
 TEST_F(StreamTest, AViewerThatNeverReadsIsDroppedAndCostsNobodyAnything) {
   Start([](web::HttpServerOptions& options) { options.event_buffer_bytes = 16 << 10; });
   SetUpAccounts();

@@ -45,7 +45,7 @@ function openButtons(patient) {
   fraction.disabled = !patient.approved_reference_id;
   return h('div', { class: 'form' },
     h('p', { class: 'lead' }, text.confirmWho(patient.code)),
-    h('div', { class: 'row' }, fraction, action(text.openReference, open('reference'), {}), action(text.openCheck, open('daily_check'), {})),
+    h('div', { class: 'row' }, fraction, action(text.openReference, open('reference'), {})),
     !patient.approved_reference_id && h('p', { class: 'hint' }, text.needsReference),
     field(text.reason, reason));
 }

@@ -84,6 +84,15 @@ function trust({ details, scene }) {
   return h('dl', { class: 'trust' }, rows);
 }
 
+/// Reference and current surface from above; where the maps cannot be read, the picture that was drawn for print.
+function overlay(map, scan) {
+  const text = S.result;
+  if (!map?.overlay) return h('div', { class: 'framed' }, h('img', { class: 'picture', src: fileUrl(scan.id, 'overlay.png'), alt: text.overlayAlt, loading: 'lazy' }));
+  const canvas = h('canvas', { class: 'map still', role: 'img', 'aria-label': text.overlayAlt });
+  map.overlay(canvas);
+  return h('div', {}, h('div', { class: 'map-box' }, canvas), h('p', { class: 'keys below-map' }, h('span', { class: 'key on-top-reference' }, text.referenceHigher), h('span', { class: 'key on-top-current' }, text.currentHigher), h('span', { class: 'key both' }, text.bothSame)));
+}
+
 /// Where on the body, in words: what lies high or low now, and what the correction will leave.
 function bodyWords({ scan, details }) {
   const text = S.result;
@@ -170,11 +179,12 @@ export async function showResult(place, id) {
     const card = (title, ...content) => h('section', { class: 'card' }, h('h2', {}, title), ...content);
     const mapPlace = h('div', {}, h('p', { class: 'hint' }, S.loading));
     const meshPlace = h('div', {});
+    const overlayPlace = h('div', {}, h('p', { class: 'hint' }, S.loading));
     clear(place, h('h1', { class: 'visually-hidden' }, text.title), identity.element, old, other, h('div', { class: 'fresh' }, verdictStrip(data), isAdvice(scan) && h('section', { class: 'correction' }, h('h2', {}, text.numbers, ' ', h('small', {}, text.atIsocentre)), sixNumbers(scan.result, reference, data.details))),
       data.details && card(text.trust, trust(data)),
       mapped && card(text.where, bodyWords(data), mapPlace),
       !mapped && data.scene?.heightmap && card(text.heights, seen(data)),
-      h('div', { class: mapped ? 'halves' : '' }, mapped && card(text.overlay, h('img', { class: 'picture', src: fileUrl(scan.id, 'overlay.png'), alt: text.overlayAlt, loading: 'lazy' })), scan.outcome === 'done' && card(text.mesh, meshPlace)),
+      h('div', { class: mapped ? 'halves' : '' }, mapped && card(text.overlay, overlayPlace), scan.outcome === 'done' && card(text.mesh, meshPlace)),
       scan.result && card(text.trend, !isAdvice(scan) && h('p', { class: 'caution' }, text.trendWithout), trend(history, tolerance)),
       h('section', { class: 'card' }, closing(data, load)));
     tick = () => {
@@ -197,8 +207,10 @@ export async function showResult(place, id) {
     if (mapped && reference) {
       map = await errorMap(scan, reference, tolerance.shift_mm);
       clear(mapPlace, map.element);
+      clear(overlayPlace, overlay(map, scan));
     } else {
       clear(mapPlace);
+      clear(overlayPlace, overlay(null, scan));
     }
     const mesh = meshView(data, map, tolerance.shift_mm);
     clear(meshPlace, mesh.element);

@@ -63,7 +63,8 @@ export async function showScan(place) {
       h('section', { class: 'card' }, h('h2', {}, S.status.preview), camera.element, facts)));
 
   const drawWho = (status) => {
-    clear(who, status.patient_id
+    const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
+    clear(who, isCheck ? [h('strong', {}, S.purposes.daily_check), ` · ${S.check.sweep}`] : status.patient_id
       ? [`${text.patient} `, h('strong', {}, patient?.code ?? '…'), ` · ${S.purposes[status.next_purpose]} · ${text.counter}: ${status.scans_today}`]
       : [text.noPatient, ' ', h('a', { href: '#/patients' }, text.choose)]);
   };

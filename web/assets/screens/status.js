@@ -6,6 +6,14 @@ import { outcomeBadge, patientCodes } from './common.js';
 const kWarmUp_s = 15 * 60;
 const gigabytes = (bytes) => Math.round(bytes / 2 ** 30);
 
+/// Whether the room was checked today, and how that went.
+function checkTile({ last_check: last, check_overdue: overdue }, tile) {
+  const text = S.check;
+  const good = last?.status === 'passed' && !overdue;
+  const word = good ? text.verdicts.passed : last && last.status !== 'passed' ? text.verdicts[last.status] : text.overdue;
+  return tile(text.tile, word.toLowerCase(), good ? 'good' : 'bad', last && h('p', {}, text.last(localTime(last.time), last.user)), overdue && h('p', { class: 'caution' }, text.overdueText), h('p', {}, h('a', { href: '#/check' }, S.nav.check)));
+}
+
 function tiles(status, codes) {
   const text = S.status;
   const { sensor, storage } = status;
@@ -17,6 +25,7 @@ function tiles(status, codes) {
       sensor.present && h('p', {}, `${text.rate(sensor.fps)}, ${text.powered(Math.floor(sensor.powered_s / 60))}`),
       sensor.present && sensor.powered_s < kWarmUp_s && h('p', { class: 'caution' }, text.warming)),
     tile(text.patient, codes.get(status.patient_id) ?? S.none, '', h('p', {}, S.purposes[status.next_purpose])),
+    checkTile(status, tile),
     tile(text.storage, storage.writable ? text.free(gigabytes(storage.free_bytes), gigabytes(storage.total_bytes)) : text.readOnly, storage.writable && used < 0.95 ? 'good' : 'bad',
       h('meter', { min: 0, max: 1, high: 0.9, value: used, 'aria-label': text.storage })),
     tile(text.light, S.lights[status.light] ?? status.light, ''),

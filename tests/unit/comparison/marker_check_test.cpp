@@ -1,0 +1,148 @@
+#include "algo/comparison/marker_check.hpp"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace plumb {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr double kLength_m = 0.104;
+
+// Twelve markers in a row of three, 0.4 m apart.
+Scene Room() {
+  Scene scene;
+  scene.marker_dictionary = "DICT_6X6_250";
+  scene.marker_length_m = kLength_m;
+  for (int id = 0; id < 12; ++id) {
+    SceneMarker marker;
+    const Eigen::Vector3d place(0.4 * (id % 4), 0.4 * (id / 4), 0.0);
+    marker.corners = CornersInMarkerFrame(kLength_m);
+    for (Eigen::Vector3d& corner : marker.corners) corner += place;
+    marker.num_views = 10;
+    scene.markers[id] = marker;
+  }
+  scene.calibration["depth_scale"] = 1.004;
+  return scene;
+}
+
+void Move(Scene& scene, int id, const Eigen::Vector3d& by) {
+  for (Eigen::Vector3d& corner : scene.markers[id].corners) corner += by;
+}
+
+const MarkerCheckItem& Item(const MarkerCheck& check, const std::string& name) {
+  static const MarkerCheckItem kNone;
+  for (const MarkerCheckItem& item : check.items) {
+    if (item.name == name) return item;
+  }
+  ADD_FAILURE() << "no item " << name;
+  return kNone;
+}
+
+MarkerCheck Against(const Scene& scene) { return CheckMarkers(scene, BaselineOf(Room())); }
+
+TEST(MarkerCheckTest, TheSameMarkersFromElsewherePass) {
+  Scene scene = Room();
+  const Pose T(Eigen::Translation3d(0.3, -1, 2) * Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 2, 3).normalized()));
+  for (auto& [id, marker] : scene.markers) {
+    for (Eigen::Vector3d& corner : marker.corners) corner = T * corner;
+  }
+  const MarkerCheck check = Against(scene);
+  EXPECT_EQ(check.status, MarkerCheckStatus::kPassed);
+  EXPECT_THAT(check.reasons, IsEmpty());
+  EXPECT_NEAR(Item(check, "misfit").value, 0.0, 1e-6);
+  EXPECT_EQ(Item(check, "markers_seen").value, 12);
+  EXPECT_NEAR(Item(check, "depth_scale").value, 0.4, 1e-9);
+}
+
+TEST(MarkerCheckTest, AMovedMarkerIsNamedWithHowFar) {
+  Scene scene = Room();
+  Move(scene, 7, {0.012, 0, 0});
+  const MarkerCheck check = Against(scene);
+  EXPECT_EQ(check.status, MarkerCheckStatus::kFailed);
+  EXPECT_THAT(check.reasons, Contains("marker 7 moved 12 mm"));
+  EXPECT_NEAR(Item(check, "moved").value, 12.0, 0.5);
+  EXPECT_EQ(Item(check, "moved").note, "marker 7");
+  EXPECT_TRUE(Item(check, "misfit").passed) << "the moved one is not counted among the others";
+}
+
+TEST(MarkerCheckTest, AMoveWithinTheLimitPasses) {
+  Scene scene = Room();
+  Move(scene, 7, {0.003, 0, 0});
+  EXPECT_EQ(Against(scene).status, MarkerCheckStatus::kPassed);
+}
+
+TEST(MarkerCheckTest, CoveredMarkersAreNamed) {
+  Scene scene = Room();
+  scene.markers.erase(3);
+  scene.markers[9].num_views = 2;
+  const MarkerCheck check = Against(scene);
+  EXPECT_EQ(check.status, MarkerCheckStatus::kFailed);
+  EXPECT_EQ(Item(check, "markers_seen").value, 10);
+  EXPECT_EQ(Item(check, "markers_seen").note, "missing: 3, 9");
+  EXPECT_THAT(check.reasons, Contains(HasSubstr("markers 3, 9 were not seen well")));
+}
+
+TEST(MarkerCheckTest, AWholeThatGrewIsACalibrationThatChanged) {
+  Scene scene = Room();
+  for (auto& [id, marker] : scene.markers) {
+    for (Eigen::Vector3d& corner : marker.corners) corner *= 1.008;
+  }
+  const MarkerCheck check = Against(scene);
+  EXPECT_NEAR(Item(check, "scale").value, 0.8, 1e-3);
+  EXPECT_FALSE(Item(check, "scale").passed);
+  EXPECT_EQ(check.status, MarkerCheckStatus::kFailed);
+}
+
+TEST(MarkerCheckTest, APrintOfTheWrongSizeFails) {
+  Scene scene = Room();
+  const Eigen::Vector3d centre = (scene.markers[5].corners[0] + scene.markers[5].corners[2]) / 2;
+  for (Eigen::Vector3d& corner : scene.markers[5].corners) corner = centre + 0.96 * (corner - centre);
+  const MarkerCheck check = Against(scene);
+  EXPECT_NEAR(Item(check, "side").value, -4.0, 1e-6);
+  EXPECT_EQ(Item(check, "side").note, "marker 5");
+  EXPECT_EQ(check.status, MarkerCheckStatus::kFailed);
+}
+
+TEST(MarkerCheckTest, SidesThatWereTakenForGrantedAreNotJudged) {
+  for (const MarkerCheckItem& item : Against(Room()).items) EXPECT_NE(item.name, "side");
+}
+
+TEST(MarkerCheckTest, DepthThatIsOffFails) {
+  Scene scene = Room();
+  scene.calibration["depth_scale"] = 0.96;
+  const MarkerCheck check = Against(scene);
+  EXPECT_FALSE(Item(check, "depth_scale").passed);
+  EXPECT_THAT(check.reasons, Contains(HasSubstr("-4.0 %")));
+}
+
+TEST(MarkerCheckTest, WithoutABaselineItSaysSoAndDoesNotPass) {
+  const MarkerCheck check = CheckMarkers(Room(), std::nullopt);
+  EXPECT_EQ(check.status, MarkerCheckStatus::kNoBaseline);
+  EXPECT_THAT(check.reasons, Contains(HasSubstr("no baseline yet")));
+}
+
+TEST(MarkerCheckTest, OtherMarkersThanTheBaselinesFail) {
+  Scene scene = Room();
+  scene.marker_dictionary = "DICT_4X4_50";
+  EXPECT_THAT(Against(scene).reasons, Contains(HasSubstr("take a new baseline")));
+}
+
+TEST(MarkerCheckTest, NothingSeenIsAFailureAndNoCrash) {
+  Scene empty = Room();
+  empty.markers.clear();
+  EXPECT_EQ(Against(empty).status, MarkerCheckStatus::kFailed);
+  EXPECT_EQ(CheckMarkers(empty, std::nullopt).status, MarkerCheckStatus::kFailed);
+  Scene broken = Room();
+  broken.markers[0].corners[0].x() = std::nan("");
+  EXPECT_EQ(Against(broken).status, MarkerCheckStatus::kFailed);
+  EXPECT_EQ(Item(Against(broken), "markers_seen").note, "missing: 0");
+}
+
+}  // namespace
+}  // namespace plumb
