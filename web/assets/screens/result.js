@@ -88,7 +88,7 @@ function trust({ details, scene }) {
 function overlay(map, scan) {
   const text = S.result;
   if (!map?.overlay) return h('div', { class: 'framed' }, h('img', { class: 'picture', src: fileUrl(scan.id, 'overlay.png'), alt: text.overlayAlt, loading: 'lazy' }));
-  const canvas = h('canvas', { class: 'map still', role: 'img', 'aria-label': text.overlayAlt });
+  const canvas = h('canvas', { class: 'still-map', role: 'img', 'aria-label': text.overlayAlt });
   map.overlay(canvas);
   return h('div', {}, h('div', { class: 'map-box' }, canvas), h('p', { class: 'keys below-map' }, h('span', { class: 'key on-top-reference' }, text.referenceHigher), h('span', { class: 'key on-top-current' }, text.currentHigher), h('span', { class: 'key both' }, text.bothSame)));
 }
