@@ -164,7 +164,7 @@ void Appliance::Act(ScanAction action) {
       return StartScan();
     case ScanAction::kEndSweep:
       limit_timer_.Disarm();
-      scan_.sensor_after = sensors_->snapshot().statistics;
+      scan_.images = sensors_->snapshot().statistics.Since(scan_.sensor_before);
       return sensors_->EndScan();
     case ScanAction::kCancelScan:
       limit_timer_.Disarm();
@@ -201,7 +201,7 @@ void Appliance::BeginSession() {
                        .purpose = scan_.purpose,
                        .sensor_serial = sensors_->snapshot().sensor.serial,
                        .reason = reference_reason_};
-  scan_.sensor_before = scan_.sensor_after = sensors_->snapshot().statistics;
+  scan_.sensor_before = sensors_->snapshot().statistics;
   session_ = std::make_unique<ScanSession>(std::move(job), check_ ? MakeCheckCallbacks(record) : MakeCallbacks(record));
   sensors_->BeginScan(session_->feed());
   limit_timer_.ArmAfter(
@@ -332,10 +332,13 @@ void Appliance::LogSensor(const SensorEvent& event) {
   if (event.kind == SensorEvent::Kind::kReady) {
     sensor_since_ = Clock::now();
     Log(LogLevel::kInfo, "the sensor is ready", {{"SERIAL", serial}});
-    if (!last_serial_.empty() && last_serial_ != serial)
-      Log(LogLevel::kNotice, fmt::format("another sensor than before: {} instead of {}, with its own calibration", serial, last_serial_));
+    const StreamInfo info = sensors_->snapshot().info;
+    if (!last_serial_.empty() && last_serial_ != serial) {
+      Log(LogLevel::kNotice, fmt::format("another sensor than before: {} instead of {}, {}", serial, last_serial_,
+                                         info.intrinsics_assumed ? "not calibrated" : "with its own calibration"));
+    }
     last_serial_ = serial;
-    for (const std::string& warning : sensors_->snapshot().info.warnings) Log(LogLevel::kWarning, warning, {{"SERIAL", serial}});
+    for (const std::string& warning : info.warnings) Log(LogLevel::kWarning, warning, {{"SERIAL", serial}});
   }
   const bool has_others = event.kind == SensorEvent::Kind::kReady && !event.others.empty();
   if (!has_others && event.kind != SensorEvent::Kind::kOthers) return;
@@ -380,7 +383,7 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
         fmt::format("the scan is done {:.2f} s after its last frame, {} frames, {} dropped: {}", outcome.after_last_frame_s, outcome.frames,
                     outcome.frames_dropped, answer),
         {{"SCAN", scan_.id}});
-    const SensorStatistics images = scan_.images();
+    const SensorStatistics& images = scan_.images;
     if (images.num_lost + images.num_unpaired + images.num_discarded > 0) {
       Log(LogLevel::kWarning,
           fmt::format("of the sensor's images {} were lost, {} without a partner, {} of a wrong size, twice or out of order",

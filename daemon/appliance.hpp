@@ -93,17 +93,11 @@ class Appliance {
     double first_frame_ms = 0.0;  ///< From the press to the first frame used.
     double cancel_ms = 0.0;       ///< From the cancellation to its end.
     std::chrono::steady_clock::time_point cancelled_at;
-    SensorStatistics sensor_before, sensor_after;  ///< Its counters when the scan began and ended.
+    SensorStatistics sensor_before;  ///< Its counters when the scan began.
+    SensorStatistics images;         ///< What it counted during the sweep.
     ScanUpdate update;
     ScanOutcome outcome;
     bool has_ended = false;
-    /// What the sensor counted during the sweep.
-    [[nodiscard]] SensorStatistics images() const {
-      return {.num_pairs = sensor_after.num_pairs - sensor_before.num_pairs,
-              .num_unpaired = sensor_after.num_unpaired - sensor_before.num_unpaired,
-              .num_discarded = sensor_after.num_discarded - sensor_before.num_discarded,
-              .num_lost = sensor_after.num_lost - sensor_before.num_lost};
-    }
   };
 
   static constexpr int kDiskCheckTicks = 10;  ///< Seconds, while no scan runs.

@@ -189,9 +189,9 @@ std::string Appliance::StatusJson() {
             {"correction", nullptr},
             {"frames", outcome.frames},
             {"frames_dropped", outcome.frames_dropped},
-            {"images_lost", last_result_->images().num_lost},
-            {"images_unpaired", last_result_->images().num_unpaired},
-            {"images_discarded", last_result_->images().num_discarded},
+            {"images_lost", last_result_->images.num_lost},
+            {"images_unpaired", last_result_->images.num_unpaired},
+            {"images_discarded", last_result_->images.num_discarded},
             {"after_last_frame_s", outcome.after_last_frame_s}};
     if (!outcome.result_json.empty()) {
       const Json result = Json::parse(outcome.result_json);

@@ -28,6 +28,15 @@ struct SensorStatistics {
   std::int64_t num_discarded = 0;  ///< Images of the wrong size, doubled or out of order.
   std::int64_t num_lost = 0;       ///< Images that were taken and never came: the library keeps only the newest of each stream.
   double frames_per_second = 0.0;  ///< Over the last second.
+
+  /// What was counted since an earlier look at the same streams.
+  [[nodiscard]] SensorStatistics Since(const SensorStatistics& earlier) const {
+    return {.num_pairs = num_pairs - earlier.num_pairs,
+            .num_unpaired = num_unpaired - earlier.num_unpaired,
+            .num_discarded = num_discarded - earlier.num_discarded,
+            .num_lost = num_lost - earlier.num_lost,
+            .frames_per_second = frames_per_second};
+  }
 };
 
 /// An open sensor, streaming. Next() belongs to one thread; Interrupt(), Flush() and statistics() may be called from any.
