@@ -259,6 +259,8 @@ class Plumbd {
     options.tls_certificate = config.web.tls_certificate;
     options.tls_key = config.web.tls_key;
     options.host_names = config.web.host_names;
+    options.upload_folder = config.update.folder;
+    options.max_upload_bytes = static_cast<std::uint64_t>(config.update.max_bundle_mb) << 20;
     return options;
   }
 

@@ -33,6 +33,7 @@ constexpr const char* kProperties = "org.freedesktop.DBus.Properties";
 constexpr auto kLookAgain = std::chrono::seconds(5);
 constexpr std::uint64_t kCallTimeout_us = 60'000'000;  // RAUC reads the whole bundle before it answers
 constexpr std::size_t kMaxListed = 32;
+constexpr std::size_t kMaxKept = 4;
 constexpr std::string_view kEnding = ".raucb";
 constexpr std::size_t kMaxText = 500;
 
@@ -59,6 +60,7 @@ std::string Shown(const char* text) {
 struct Updater::Impl {
   Impl(EventLoop& on, UpdaterOptions given) : loop(on), options(std::move(given)) {
     timer = loop.MakeTimer([this] { Process(); });
+    RemoveBroken();
     Connect();
   }
   ~Impl() { Disconnect(); }
@@ -76,6 +78,16 @@ struct Updater::Impl {
   double fraction = 0.0;
   std::string bundle;
   web::Done done;
+
+  /// What was being sent when the power went.
+  void RemoveBroken() const {
+    std::error_code error;
+    std::vector<std::filesystem::path> broken;
+    for (std::filesystem::directory_iterator entry(options.folder, error), end; !error && entry != end; entry.increment(error)) {
+      if (entry->path().filename().string().starts_with(".upload-")) broken.push_back(entry->path());
+    }
+    for (const std::filesystem::path& file : broken) std::filesystem::remove(file, error);
+  }
 
   void Disconnect() {
     source = {};
@@ -313,6 +325,33 @@ web::UpdateStatus Updater::status() {
   status.fraction = impl_->fraction;
   status.bundles = impl_->Bundles();
   return status;
+}
+
+web::Change Updater::Add(const std::filesystem::path& file, const std::string& name) {
+  if (!impl_->is_there) return Refused(ChangeResult::kConflict, "there is no installer (RAUC) on this machine");
+  if (impl_->is_installing) return Refused(ChangeResult::kConflict, "a bundle is being installed: wait until it is done");
+  if (const std::string why = WhyNoBundle(file, impl_->options.max_bytes); !why.empty()) {
+    return Refused(ChangeResult::kInvalid, name + why.substr(std::min(why.size(), file.filename().string().size())));
+  }
+  const std::vector<std::string> known = impl_->Bundles();
+  const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
+  if (!is_known && known.size() >= kMaxKept) return Refused(ChangeResult::kConflict, "there are too many bundles: remove one first");
+  if (::rename(file.c_str(), (impl_->options.folder / name).c_str()) != 0) {
+    return Refused(ChangeResult::kNoSpace, fmt::format("{} cannot be kept: {}", name, std::strerror(errno)));
+  }
+  impl_->Tell();
+  return {};
+}
+
+web::Change Updater::Remove(const std::string& name) {
+  if (impl_->is_installing) return Refused(ChangeResult::kConflict, "a bundle is being installed: wait until it is done");
+  const std::vector<std::string> known = impl_->Bundles();
+  if (std::find(known.begin(), known.end(), name) == known.end()) return Refused(ChangeResult::kNotFound, "there is no such bundle");
+  std::error_code error;
+  std::filesystem::remove(impl_->options.folder / name, error);
+  if (error) return Refused(ChangeResult::kFailed, fmt::format("{} cannot be removed: {}", name, error.message()));
+  impl_->Tell();
+  return {};
 }
 
 void Updater::Install(const std::string& name, web::Done done) { impl_->Install(name, std::move(done)); }

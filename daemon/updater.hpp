@@ -35,6 +35,9 @@ class Updater {
 
   /// Also looks again for RAUC where there was none, at most every few seconds.
   [[nodiscard]] web::UpdateStatus status();
+  /// Takes a file among the bundles, by moving it: kInvalid where it can be none, kConflict where there are too many.
+  web::Change Add(const std::filesystem::path& file, const std::string& name);
+  web::Change Remove(const std::string& name);
   /// Has RAUC check and install NAME of the folder. `done` comes once it has begun, or with the reason why not.
   void Install(const std::string& name, web::Done done);
 

@@ -249,6 +249,18 @@ void WebService::ChangeSettings(const web::Actor& actor, const web::Settings& se
 
 web::UpdateStatus WebService::GetUpdate() { return updater_.status(); }
 
+void WebService::AddBundle(const web::Actor& actor, const std::filesystem::path& file, const std::string& name, web::Done done) {
+  const web::Change change = updater_.Add(file, name);
+  Log(actor, change.result == ChangeResult::kDone ? "update.upload" : "update.refuse", name, change.message);
+  done(change);
+}
+
+void WebService::RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) {
+  const web::Change change = updater_.Remove(name);
+  if (change.result == ChangeResult::kDone) Log(actor, "update.remove", name, "");
+  done(change);
+}
+
 void WebService::InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) {
   const ScanPhase phase = appliance_.state().phase;
   if (phase == ScanPhase::kScanning || phase == ScanPhase::kWorking) {

@@ -58,6 +58,8 @@ class WebService : public web::ScanService {
   void ChangeSettings(const web::Actor& actor, const web::Settings& settings, web::Done done) override;
 
   [[nodiscard]] web::UpdateStatus GetUpdate() override;
+  void AddBundle(const web::Actor& actor, const std::filesystem::path& file, const std::string& name, web::Done done) override;
+  void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override;
   void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
   void WriteDiagnostics(const web::Actor& actor, web::Done done) override;
 

@@ -260,6 +260,17 @@ void AddCareRoutes(Table& table) {
                 if (!IsName(bundle)) throw DataError("bundle must be one of the names listed");
                 service.InstallUpdate(request.actor(), bundle, Answer(respond));
               });
+  table.Write("POST", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kFile,
+              [](ScanService& service, const Request& request, const Respond& respond) {
+                const std::string& name = request.arguments[0];
+                if (!name.ends_with(".raucb")) throw DataError("a bundle's name must end with .raucb");
+                service.AddBundle(request.actor(), request.upload->path(), name,
+                                  [respond, kept = request.upload](const plumb::web::Change& change) { respond(ChangeResponse(change)); });
+              });
+  table.Write("DELETE", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kNone,
+              [](ScanService& service, const Request& request, const Respond& respond) {
+                service.RemoveBundle(request.actor(), request.arguments[0], Answer(respond));
+              });
   table.Write("POST", "/api/v1/diagnostics", Permission::kDiagnostics, BodyKind::kNone,
               [](ScanService& service, const Request& request, const Respond& respond) {
                 service.WriteDiagnostics(request.actor(), [respond](const Change& change) {

@@ -24,6 +24,9 @@ struct HttpServerOptions {
   unsigned max_connections = 256;
   unsigned max_connections_per_ip = 64;
   std::size_t max_body_bytes = 256 << 10;
+  std::filesystem::path upload_folder;  ///< Where bundles are written while they come; empty: none are taken.
+  std::uint64_t max_upload_bytes = std::uint64_t{2} << 30;
+  std::chrono::seconds upload_limit{15 * 60};      ///< In place of request_limit.
   std::size_t connection_memory_bytes = 32 << 10;  ///< Request line, headers and their parsing.
   std::chrono::seconds request_timeout{15};        ///< A connection on which nothing moves is closed.
   std::chrono::seconds request_limit{60};          ///< A request must be in whole by then, however it drips.

@@ -107,6 +107,9 @@ class ScanService {
 
   // --- care
   [[nodiscard]] virtual UpdateStatus GetUpdate() = 0;
+  /// Checks a file's form and takes it among the bundles under that name (NAME.raucb). Moves the file. kInvalid: no bundle.
+  virtual void AddBundle(const Actor& actor, const std::filesystem::path& file, const std::string& name, Done done) = 0;
+  virtual void RemoveBundle(const Actor& actor, const std::string& name, Done done) = 0;
   virtual void InstallUpdate(const Actor& actor, const std::string& bundle, Done done) = 0;  ///< kConflict during a scan.
   /// Gives a file (no patient data in it) that is downloaded once and then removed.
   virtual void WriteDiagnostics(const Actor& actor, Done done) = 0;

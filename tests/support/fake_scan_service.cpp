@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
 
 namespace plumb::test {
 
@@ -388,9 +389,30 @@ void FakeScanService::ChangeSettings(const Actor& actor, const Settings& changed
   Did(actor, "settings.change", "", done);
 }
 
+void FakeScanService::AddBundle(const Actor& actor, const std::filesystem::path& file, const std::string& name, Done done) {
+  std::ifstream in(file, std::ios::binary);
+  std::string magic(4, ' ');
+  in.read(magic.data(), 4);
+  if (magic != "hsqs") return Finish(done, Refusal(ChangeResult::kInvalid, name + " is no bundle: expected a squashfs image"));
+  uploaded_bytes = std::filesystem::file_size(file);
+  update.bundles.push_back(name);
+  Tell(EventKind::kUpdate);
+  Did(actor, "update.upload", name, done);
+}
+
+void FakeScanService::RemoveBundle(const Actor& actor, const std::string& name, Done done) {
+  if (std::erase(update.bundles, name) == 0) return Finish(done, Refusal(ChangeResult::kNotFound, "there is no such bundle"));
+  Tell(EventKind::kUpdate);
+  Did(actor, "update.remove", name, done);
+}
+
 void FakeScanService::InstallUpdate(const Actor& actor, const std::string& bundle, Done done) {
   if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running; update after it"));
   if (!update.supported) return Finish(done, Refusal(ChangeResult::kConflict, update.message));
+  update.installing = true;
+  update.fraction = 0.4;
+  update.message = "Copying image to rootfs.1";
+  Tell(EventKind::kUpdate);
   Did(actor, "update.install", bundle, done);
 }
 

@@ -31,6 +31,7 @@ class FakeScanService : public web::ScanService {
   std::vector<web::AuditEntry> audit;  ///< Oldest first.
   std::shared_ptr<const std::string> preview;
   std::filesystem::path diagnostics_file;
+  std::uint64_t uploaded_bytes = 0;
   /// Folder of the n-th finished scan (0, 1, ...) with its result; a scan beyond the list uses the last.
   struct Recorded {
     std::filesystem::path folder;
@@ -83,6 +84,8 @@ class FakeScanService : public web::ScanService {
   web::Settings GetSettings() override { return settings; }
   void ChangeSettings(const web::Actor& actor, const web::Settings& changed, web::Done done) override;
   web::UpdateStatus GetUpdate() override { return update; }
+  void AddBundle(const web::Actor& actor, const std::filesystem::path& file, const std::string& name, web::Done done) override;
+  void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override;
   void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
   void WriteDiagnostics(const web::Actor& actor, web::Done done) override;
 

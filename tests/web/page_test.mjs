@@ -272,6 +272,23 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.goto(`${h.url}#/update`);
   await engineer.getByText('plumb-0.2.0.raucb').waitFor();
   await h.look(engineer, 'update');
+  const send = async (name, text) => {
+    await engineer.getByLabel('Bundle', { exact: true }).setInputFiles({ name, mimeType: 'application/octet-stream', buffer: Buffer.from(text.padEnd(100000, 'x')) });
+    await engineer.getByRole('button', { name: 'Send' }).click();
+  };
+  await send('photo.raucb', 'GIF89a');
+  await engineer.getByRole('alert').getByText('photo.raucb is no bundle').waitFor();
+  await send('plumb-0.3.0.raucb', 'hsqs');
+  await engineer.getByRole('button', { name: 'Install plumb-0.3.0.raucb' }).click();
+  await engineer.getByText('Copying image to rootfs.1').waitFor();
+  equal(await engineer.locator('progress[value="0.4"]').count(), 1, 'the progress');
+  equal(await engineer.getByRole('button', { name: 'Install plumb-0.2.0.raucb' }).isDisabled(), true, 'one installation at a time');
+  await h.look(engineer, 'update-installing');
+  h.tell('installed');
+  await engineer.getByText('restart the appliance to use it').waitFor();
+  await bob.goto(`${h.url}#/update`);
+  await bob.getByText('plumb-0.3.0.raucb').first().waitFor();
+  equal(await bob.getByRole('button', { name: /Install|Send|Remove/ }).count(), 0, 'a physicist updates nothing');
 });
 
 await h.step('a keyboard alone reaches login, navigation and the start button', async () => {

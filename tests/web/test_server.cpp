@@ -148,6 +148,11 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
   if (name == "plug") service.Plug();
   if (name == "slow") service.sweep = std::chrono::milliseconds(60000);
   if (name == "fast") service.sweep = std::chrono::milliseconds(1500);
+  if (name == "installed") {
+    service.update.installing = false;
+    service.update.message = "plumb-0.3.0.raucb is installed: restart the appliance to use it";
+    service.Tell(web::EventKind::kUpdate);
+  }
   if (name == "markermoved") {
     web::CheckRecord check;
     check.reasons = {"marker 7 moved 12 mm", "the markers lie 3.4 mm (RMS) off where they lay, at most 3 mm are allowed"};
@@ -192,6 +197,8 @@ int Serve(const fs::path& root) {
   web::HttpServerOptions options;
   options.password_memory_bytes = 1 << 20;
   options.password_operations = 1;
+  options.upload_folder = root / "updates";
+  options.max_upload_bytes = 4 << 20;
   web::HttpServer server(service, options);
   fmt::print("http://127.0.0.1:{}/\nsetup code: {}\n", server.port(), server.setup_code().value_or(""));
   std::fflush(stdout);

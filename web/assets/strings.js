@@ -95,11 +95,11 @@ export const S = {
   check: {
     title: 'Daily check', verdicts: { passed: 'PASSED', failed: 'FAILED', no_baseline: 'NO BASELINE' }, none: 'NOT DONE', never: 'No check was done yet.',
     overdue: 'overdue', overdueText: 'No check has passed today. Do it before the first patient.', today: 'Today’s check has passed.', start: 'Start a check', sweep: 'sweep over all markers of the room, without a patient',
-    how: 'Take everything off the couch, then sweep over all markers as over a patient. The markers must lie where they lay when the baseline was taken, and measure their true size.',
+    how: 'Take everything off the couch, then sweep over all markers as over a patient. The markers must lie where they lay when the baseline was taken, and the sensor’s depth must agree with their size.',
     baseline: 'Baseline', baselineOf: (who, when, markers) => `${markers} markers, taken by ${who}, ${when}`, noBaseline: 'none yet', takeBaseline: 'Take this check as the baseline', takeHint: 'Only when you know that every marker lies where it should. All further checks are compared with it.', baselineTaken: 'This check is the baseline now.',
     number: 'Number', value: 'Value', limit: 'Limit', judged: 'Judged', within: 'within the limit', outside: 'outside the limit', notKnown: 'not known', history: 'Earlier checks', by: 'By', sensor: 'Sensor', markers: 'Markers', last: (when, who) => `${when}, by ${who}`,
     items: { markers_seen: 'Markers seen', misfit: 'Marker misfit (RMS)', moved: 'Largest move of a marker', scale: 'Size of the marker map', side: 'Side of a marker', depth_scale: 'Depth scale' },
-    atLeast: (value) => `at least ${value}`, atMost: (value, unit) => `at most ±${value} ${unit}`, tile: 'Daily check',
+    atLeast: (value) => `at least ${value}`, atMost: (sign, value, unit) => `at most ${sign}${value} ${unit}`, tile: 'Daily check',
   },
   plan: {
     title: 'Plan', reference: 'Reference', region: 'Region of interest', regionHint: 'Click the map to add corners; drag a corner to move it; Delete removes the chosen one. Without corners the body found in the scan is the region.',
@@ -116,6 +116,6 @@ export const S = {
     auto_stop_s: 'End a sweep after seconds without new coverage', scan_limit_s: 'Longest sweep (seconds)', keep_recordings: 'Keep raw recordings (with colour)', retention_days: 'Remove scans after days (0: never)', idle_logout_min: 'Log off after idle minutes', readOnly: 'Only an engineer changes the settings.',
   },
   update: {
-    title: 'Update', installed: 'Installed version', slot: 'System', unsupported: 'Updates are not available here', bundles: 'Found on attached media', noBundles: 'No bundle found. Attach a medium with one.', install: 'Install', installing: 'Installing…', diagnostics: 'Diagnostics', diagnosticsText: 'A file for the maker: versions, logs, settings. No patient data.', download: 'Download diagnostics',
+    title: 'Update', installed: 'Installed version', slot: 'System', unsupported: 'Updates are not available here', bundles: 'Bundles on this machine', noBundles: 'No bundle yet: send one below.', remove: 'Remove', upload: 'Send a bundle', uploadHint: 'A signed system image (NAME.raucb). Its size and form are checked at once, its signature and version when it is installed.', bundle: 'Bundle', send: 'Send', uploading: 'Sending…', uploaded: 'The bundle is here.', uploadFailed: 'The bundle did not arrive: too large, or the connection broke.', install: 'Install', installing: 'Installing…', diagnostics: 'Diagnostics', diagnosticsText: 'A file for the maker: versions, logs, settings. No patient data.', download: 'Download diagnostics',
   },
 };

@@ -66,6 +66,8 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
   const std::string_view type = request.Header("content-type");
   if (route.body == BodyKind::kJson && !IsType(type, "application/json")) return ErrorResponse(415, "expected application/json");
   if (route.body == BodyKind::kForm && !IsType(type, "application/x-www-form-urlencoded")) return ErrorResponse(415, "expected a form");
+  if (route.body == BodyKind::kFile && !IsType(type, "application/octet-stream"))
+    return ErrorResponse(415, "expected application/octet-stream");
   return &route;
 }
 

@@ -6,12 +6,38 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "algo/types/errors.hpp"
 
 namespace plumb::web {
+
+UploadFile::UploadFile(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  std::filesystem::create_directories(folder, ignored);
+  std::string name = (folder / ".upload-XXXXXX").string();
+  fd_ = ::mkostemp(name.data(), O_CLOEXEC);
+  if (fd_ < 0) throw IoError(fmt::format("cannot write to {}: {}", folder.string(), std::strerror(errno)));
+  path_ = name;
+}
+
+UploadFile::~UploadFile() {
+  ::close(fd_);
+  std::error_code ignored;
+  std::filesystem::remove(path_, ignored);
+}
+
+void UploadFile::Append(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(fd_, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) throw IoError(fmt::format("the disk takes no more of the upload: {}", std::strerror(errno)));
+    bytes.remove_prefix(static_cast<std::size_t>(count));
+    size_ += static_cast<std::uint64_t>(count);
+  }
+}
 
 std::string_view Request::Header(const std::string& name) const {
   const auto found = headers.find(name);

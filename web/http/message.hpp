@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -15,12 +16,32 @@
 
 namespace plumb::web {
 
+/// A body on its way to the disk. Gone with its last owner, unless somebody gave it another name.
+class UploadFile {
+ public:
+  /// @throws IoError where nothing can be written.
+  explicit UploadFile(const std::filesystem::path& folder);
+  ~UploadFile();
+  UploadFile(const UploadFile&) = delete;
+  UploadFile& operator=(const UploadFile&) = delete;
+  /// @throws IoError when the disk takes no more.
+  void Append(std::string_view bytes);
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  int fd_ = -1;
+  std::uint64_t size_ = 0;
+};
+
 struct Request {
   std::string method;  ///< HEAD arrives as GET.
   std::string path;    ///< As sent, never unescaped.
   std::map<std::string, std::string> query;
   std::map<std::string, std::string> headers;  ///< Names in small letters.
   std::string body;
+  std::shared_ptr<UploadFile> upload;  ///< Instead of body, of a route that takes a file.
   std::string address;                 ///< Of the browser.
   std::vector<std::string> arguments;  ///< What the route's placeholders matched: [A-Za-z0-9._-]{1,64}, not beginning with a dot.
   std::shared_ptr<Session> session;    ///< Set where the route wants a login.

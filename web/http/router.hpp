@@ -10,7 +10,12 @@
 
 namespace plumb::web {
 
-enum class BodyKind { kNone, kJson, kForm };
+enum class BodyKind {
+  kNone,
+  kJson,
+  kForm,
+  kFile,  ///< Straight to the disk: Request::upload.
+};
 
 struct Route {
   std::string method;

@@ -64,6 +64,7 @@ struct Transport::Connection {
   int fd = -1;
   std::chrono::steady_clock::time_point since;  ///< When its present request could have begun.
   bool receiving = true;
+  bool uploading = false;
 };
 
 /// One request and its answer.
@@ -124,6 +125,7 @@ struct Transport::Callbacks {
     if (Connection* known = ConnectionOf(connection)) {
       known->since = transport->options_.now();
       known->receiving = true;
+      known->uploading = false;
     }
     auto* held = static_cast<std::shared_ptr<Exchange>*>(*context);
     if (held == nullptr) return;
@@ -171,11 +173,57 @@ struct Transport::Callbacks {
     if (!length.empty() && std::from_chars(length.data(), length.data() + length.size(), bytes).ec != std::errc()) {
       return ErrorResponse(413, "the body is too long");
     }
-    if (bytes > max_body) return ErrorResponse(413, fmt::format("the body is too long: at most {} bytes", max_body));
     auto admitted = exchange.owner->gate_.Admit(exchange.request);
     if (auto* refusal = std::get_if<Response>(&admitted)) return std::move(*refusal);
     exchange.route = std::get<const Route*>(admitted);
+    if (exchange.route->body == BodyKind::kFile) return BeginUpload(exchange, bytes);
+    if (bytes > max_body) return ErrorResponse(413, fmt::format("the body is too long: at most {} bytes", max_body));
     return std::nullopt;
+  }
+
+  static std::optional<Response> BeginUpload(Exchange& exchange, std::uint64_t bytes) {
+    Transport& transport = *exchange.owner;
+    const HttpServerOptions& options = transport.options_;
+    if (options.upload_folder.empty()) return ErrorResponse(409, "no files are taken on this machine");
+    if (!transport.upload_.expired()) return ErrorResponse(409, "another file is being sent: wait until it is here");
+    if (bytes == 0) return ErrorResponse(411, "a file must say its length, and have one");
+    if (bytes > options.max_upload_bytes)
+      return ErrorResponse(413, fmt::format("the file is too large: at most {} MB", options.max_upload_bytes >> 20));
+    constexpr std::uintmax_t kSpare = 64U << 20;
+    try {
+      exchange.request.upload = std::make_shared<UploadFile>(options.upload_folder);
+    } catch (const IoError& error) {
+      return ErrorResponse(507, error.what());
+    }
+    std::error_code error;
+    const auto space = std::filesystem::space(options.upload_folder, error);
+    if (!error && space.available < bytes + kSpare) {
+      exchange.request.upload.reset();
+      return ErrorResponse(507, fmt::format("the disk is too full: {} MB are free", space.available >> 20));
+    }
+    transport.upload_ = exchange.request.upload;
+    if (Connection* known = ConnectionOf(exchange.connection)) known->uploading = true;
+    return std::nullopt;
+  }
+
+  /// A part of a body. @return  False: too long, the connection ends.
+  static bool TakeBody(Exchange& exchange, std::string_view bytes) {
+    const HttpServerOptions& options = exchange.owner->options_;
+    if (exchange.response) return true;  // refused in the middle of a file: the rest is read, and dropped
+    if (!exchange.request.upload) {
+      if (exchange.request.body.size() + bytes.size() > options.max_body_bytes) return false;
+      exchange.request.body.append(bytes);
+      return true;
+    }
+    if (exchange.request.upload->size() + bytes.size() > options.max_upload_bytes) return false;
+    try {
+      exchange.request.upload->Append(bytes);
+    } catch (const IoError& error) {
+      exchange.request.upload.reset();
+      exchange.started = true;
+      exchange.response = ErrorResponse(507, error.what());
+    }
+    return true;
   }
 
   static MHD_Result Begin(Transport& transport, MHD_Connection* connection, const char* url, const char* method, void** context) {
@@ -209,8 +257,7 @@ struct Transport::Callbacks {
       const std::shared_ptr<Exchange> exchange = *static_cast<std::shared_ptr<Exchange>*>(*context);
       if (*upload_size > 0) {
         // Too long without having said so: there is no way to answer in the middle of an upload.
-        if (exchange->request.body.size() + *upload_size > transport.options_.max_body_bytes) return MHD_NO;
-        exchange->request.body.append(upload, *upload_size);
+        if (!TakeBody(*exchange, {upload, *upload_size})) return MHD_NO;
         *upload_size = 0;
         return MHD_YES;
       }
@@ -368,7 +415,8 @@ std::optional<std::chrono::milliseconds> Transport::timeout() const {
 void Transport::CutLate() {
   const auto now = options_.now();
   for (const Connection* connection : connections_) {
-    if (connection->receiving && now - connection->since > options_.request_limit) shutdown(connection->fd, SHUT_RDWR);
+    const auto limit = connection->uploading ? options_.upload_limit : options_.request_limit;
+    if (connection->receiving && now - connection->since > limit) shutdown(connection->fd, SHUT_RDWR);
   }
 }
 

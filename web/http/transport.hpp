@@ -50,6 +50,7 @@ class Transport {
   std::function<void(EventStream&)> greet_;
   std::list<Connection*> connections_;
   std::list<Exchange*> exchanges_;
+  std::weak_ptr<UploadFile> upload_;  ///< One at a time.
   std::uint16_t port_ = 0;
   int wake_fd_ = -1;
   int epoll_fd_ = -1;

@@ -351,6 +351,37 @@ TEST_F(UpdaterTest, OnlyBundlesOfTheFolderAreKnown) {
   });
 }
 
+TEST_F(UpdaterTest, SentFilesBecomeBundlesOrAreRefused) {
+  WriteBundle(".upload-left");
+  Play([&] {
+    FakeRauc rauc(bus_.address());
+    Start();
+    WaitForRauc();
+    EXPECT_FALSE(fs::exists(folder_ / "updates" / ".upload-left")) << "of a run before";
+    const auto add = [&](const std::string& from, const std::string& name) {
+      web::Change change;
+      On([&] { change = updater_->Add(folder_ / "updates" / from, name); });
+      return change;
+    };
+    WriteBundle(".upload-1");
+    EXPECT_EQ(add(".upload-1", "b.raucb").result, ChangeResult::kDone);
+    EXPECT_THAT(StatusNow().bundles, ::testing::ElementsAre("b.raucb", "plumb-9.0.raucb"));
+    WriteBundle(".upload-2", "GIF8");
+    const web::Change picture = add(".upload-2", "picture.raucb");
+    EXPECT_EQ(picture.result, ChangeResult::kInvalid);
+    EXPECT_EQ(picture.message, "picture.raucb is no bundle: expected a squashfs image");
+    for (const char* name : {"c.raucb", "d.raucb", "e.raucb"}) {
+      WriteBundle(".upload-3");
+      EXPECT_EQ(add(".upload-3", name).result, std::string(name) == "e.raucb" ? ChangeResult::kConflict : ChangeResult::kDone) << name;
+    }
+    On([&] {
+      EXPECT_EQ(updater_->Remove("c.raucb").result, ChangeResult::kDone);
+      EXPECT_EQ(updater_->Remove("c.raucb").result, ChangeResult::kNotFound);
+    });
+    EXPECT_EQ(StatusNow().bundles.size(), 3U);
+  });
+}
+
 TEST_F(UpdaterTest, WhatIsNoBundleIsRefusedBeforeRaucIsAsked) {
   const auto why = [&](const std::string& name) { return WhyNoBundle(folder_ / "updates" / name, 1 << 20); };
   EXPECT_EQ(why("plumb-9.0.raucb"), "");

@@ -245,6 +245,94 @@ TEST_F(FilesTest, DiagnosticsAreSentOnceAndRemoved) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "bundle.tar"));
 }
 
+class UploadTest : public WebTest {
+ protected:
+  UploadTest() {
+    Start([this](web::HttpServerOptions& options) {
+      options.upload_folder = folder_ / "updates";
+      options.max_upload_bytes = 1 << 20;
+    });
+    SetUpAccounts();
+  }
+  std::string Head(const HttpClient& client, const std::string& name, std::size_t bytes) {
+    return "POST /api/v1/update/bundles/" + name + " HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie +
+           "\r\nX-CSRF-Token: " + client.csrf_token +
+           "\r\nContent-Type: application/octet-stream\r\nContent-Length: " + std::to_string(bytes) + "\r\n\r\n";
+  }
+  HttpAnswer Send(const HttpClient& client, const std::string& name, const std::string& body) {
+    HttpConnection connection(port_);
+    connection.Send(Head(client, name, body.size()));
+    connection.Send(body);
+    return connection.Read();
+  }
+  [[nodiscard]] std::size_t FilesLeft() const {
+    std::size_t count = 0;
+    std::error_code error;
+    for (std::filesystem::directory_iterator entry(folder_ / "updates", error), end; !error && entry != end; ++entry) ++count;
+    return count;
+  }
+
+  testing::TempFolder folder_;
+};
+
+TEST_F(UploadTest, ABundleGoesToTheDiskAndNothingIsLeftOfIt) {
+  const HttpClient engineer = LoggedIn("engineer");
+  const std::string bundle = "hsqs" + std::string(900000, 'x');
+  EXPECT_EQ(Send(engineer, "plumb-2.raucb", bundle).status, 200);
+  loop_->Do([&] {
+    EXPECT_EQ(service_.uploaded_bytes, bundle.size());
+    EXPECT_THAT(service_.update.bundles, ::testing::Contains("plumb-2.raucb"));
+  });
+  EXPECT_EQ(FilesLeft(), 0U) << "the fake keeps none";
+  HttpClient again = LoggedIn("engineer");
+  EXPECT_EQ(again.Ask("DELETE", "/api/v1/update/bundles/plumb-2.raucb", "").status, 200);
+  EXPECT_EQ(again.Ask("DELETE", "/api/v1/update/bundles/plumb-2.raucb", "").status, 404);
+}
+
+TEST_F(UploadTest, WhatIsNoBundleOrTooLargeIsRefused) {
+  const HttpClient engineer = LoggedIn("engineer");
+  EXPECT_EQ(Send(engineer, "zip.raucb", "PK" + std::string(5000, 'x')).status, 400);
+  EXPECT_EQ(Send(engineer, "name.zip", "hsqs" + std::string(5000, 'x')).status, 400);
+  EXPECT_EQ(Send(engineer, "a.raucb", "").status, 411);
+  HttpConnection large(port_);
+  large.Send(Head(engineer, "large.raucb", std::size_t{2} << 20));
+  EXPECT_EQ(large.Read().status, 413);
+  EXPECT_EQ(FilesLeft(), 0U);
+}
+
+TEST_F(UploadTest, ABrokenUploadLeavesNothing) {
+  const HttpClient engineer = LoggedIn("engineer");
+  {
+    HttpConnection broken(port_);
+    broken.Send(Head(engineer, "broken.raucb", 500000));
+    broken.Send("hsqs" + std::string(100000, 'x'));
+    bool begun = false;
+    for (int i = 0; i < 2000 && !begun; ++i) begun = FilesLeft() == 1, ::usleep(1000);
+    EXPECT_TRUE(begun);
+    EXPECT_EQ(Send(engineer, "second.raucb", "hsqs" + std::string(5000, 'x')).status, 409) << "one at a time";
+  }
+  bool gone = false;
+  for (int i = 0; i < 10000 && !gone; ++i) gone = FilesLeft() == 0, ::usleep(1000);
+  EXPECT_TRUE(gone);
+  EXPECT_EQ(Send(engineer, "third.raucb", "hsqs" + std::string(5000, 'x')).status, 200);
+}
+
+TEST_F(UploadTest, OnlyAnEngineerSendsBundles) {
+  for (const char* name : {"technician", "physicist"})
+    EXPECT_EQ(Send(LoggedIn(name), "a.raucb", "hsqs" + std::string(5000, 'x')).status, 403);
+  HttpClient nobody(port_);
+  EXPECT_EQ(Send(nobody, "a.raucb", "hsqs" + std::string(5000, 'x')).status, 401);
+  EXPECT_EQ(FilesLeft(), 0U);
+}
+
+TEST_F(ApiTest, WithoutAFolderNoFilesAreTaken) {
+  const HttpClient engineer = LoggedIn("engineer");
+  HttpConnection connection(port_);
+  connection.Send("POST /api/v1/update/bundles/a.raucb HTTP/1.1\r\nHost: localhost\r\nCookie: " + engineer.cookie + "\r\nX-CSRF-Token: " +
+                  engineer.csrf_token + "\r\nContent-Type: application/octet-stream\r\nContent-Length: 5\r\n\r\nhsqs!");
+  EXPECT_EQ(connection.Read().status, 409);
+}
+
 TEST_F(ApiTest, SlowCompletionsAreWaitedForAndLateOnesFindNobody) {
   HttpClient client = LoggedIn("technician");
   loop_->Do([&] { service_.hold_completions = true; });

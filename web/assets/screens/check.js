@@ -6,12 +6,15 @@ import { S } from '../strings.js';
 const kIcons = { passed: '✓', failed: '▲', no_baseline: '?' };
 const kTones = { passed: 'in_tolerance', failed: 'move', no_baseline: 'no_answer' };
 
+/// A length: it has no sign.
+const isSize = (item) => item.name === 'misfit' || item.name === 'moved';
+
 function itemRow(item) {
   const text = S.check;
   const isCount = item.name === 'markers_seen';
-  const value = item.value === null ? text.notKnown : isCount ? `${item.value}` : `${item.name === 'misfit' || item.name === 'moved' ? item.value.toFixed(1) : signed(item.value, 2)} ${item.unit}`;
+  const value = item.value === null ? text.notKnown : isCount ? `${item.value}` : `${isSize(item) ? item.value.toFixed(1) : signed(item.value, 2)} ${item.unit}`;
   return h('tr', {}, h('th', { scope: 'row' }, text.items[item.name] ?? item.name), h('td', { class: 'figure' }, value, item.note && h('small', {}, ` ${item.note}`)),
-    h('td', {}, isCount ? text.atLeast(item.limit) : text.atMost(item.limit, item.unit)), h('td', { class: item.passed ? 'judged-in' : 'judged-out' }, item.passed ? `✓ ${text.within}` : `▲ ${text.outside}`));
+    h('td', {}, isCount ? text.atLeast(item.limit) : text.atMost(isSize(item) ? '' : '±', item.limit, item.unit)), h('td', { class: item.passed ? 'judged-in' : 'judged-out' }, item.passed ? `✓ ${text.within}` : `▲ ${text.outside}`));
 }
 
 function verdict(check, overdue) {
