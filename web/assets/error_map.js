@@ -45,6 +45,16 @@ function row(grid, ...children) {
   return element;
 }
 
+const kAround = 2;  // cells to each side: what is read is the surface, not one cell's noise
+function around({ width, values }, cell) {
+  const known = [];
+  for (let dy = -kAround; dy <= kAround; ++dy) for (let dx = -kAround; dx <= kAround; ++dx) {
+    const value = values[cell + dy * width + dx];
+    if (Number.isFinite(value)) known.push(value);
+  }
+  return known.length * 4 < (2 * kAround + 1) ** 2 ? NaN : known.sort((a, b) => a - b)[known.length >> 1];
+}
+
 /// Figure with map, reading and profile for a scan with a result; falls back to the picture.
 export async function errorMap(scan, reference, tolerance_mm) {
   const text = S.result;
@@ -75,7 +85,7 @@ export async function errorMap(scan, reference, tolerance_mm) {
 
   const read = () => {
     const cell = cellAt(grid, cursor.x, cursor.y);
-    const value = cell < 0 ? NaN : maps[shown.map].values[cell];
+    const value = cell < 0 ? NaN : around(maps[shown.map], cell);
     clear(reading, h('strong', {}, cell < 0 ? text.outsideMap : Number.isNaN(value) ? text.unknown : text.reads(1000 * value)), ` ${text.at(cursor.x, cursor.y)}`);
     cross.style.setProperty('left', `${100 * (cursor.x - grid.x_min) / (grid.width * grid.step)}%`);
     cross.style.setProperty('top', `${100 * (1 - (cursor.y - grid.y_min) / (grid.height * grid.step))}%`);

@@ -108,7 +108,6 @@ function bodyWords({ scan, details }) {
 function seen({ scan, scene }) {
   const canvas = h('canvas', { class: 'map', role: 'img', 'aria-label': S.result.heights });
   const box = h('div', { class: 'map-box' }, canvas);
-  box.style.setProperty('max-width', `${65 * scene.heightmap.width / scene.heightmap.height}vh`);
   getBytes(`scans/${scan.id}/files/heightmap.tiff`).then(readTiff).then((map) => paintHeights(canvas, map, scene.heightmap.step), () => clear(box));
   return box;
 }
@@ -183,8 +182,7 @@ export async function showResult(place, id) {
     clear(place, h('h1', { class: 'visually-hidden' }, text.title), identity.element, old, other, h('div', { class: 'fresh' }, verdictStrip(data), isAdvice(scan) && h('section', { class: 'correction' }, h('h2', {}, text.numbers, ' ', h('small', {}, text.atIsocentre)), sixNumbers(scan.result, reference, data.details))),
       data.details && card(text.trust, trust(data)),
       mapped && card(text.where, bodyWords(data), mapPlace),
-      !mapped && data.scene?.heightmap && card(text.heights, seen(data)),
-      h('div', { class: mapped ? 'halves' : '' }, mapped && card(text.overlay, overlayPlace), scan.outcome === 'done' && card(text.mesh, meshPlace)),
+      h('div', { class: mapped || data.scene?.heightmap ? 'halves' : '' }, mapped && card(text.overlay, overlayPlace), !mapped && data.scene?.heightmap && card(text.heights, seen(data)), scan.outcome === 'done' && card(text.mesh, meshPlace)),
       scan.result && card(text.trend, !isAdvice(scan) && h('p', { class: 'caution' }, text.trendWithout), trend(history, tolerance)),
       h('section', { class: 'card' }, closing(data, load)));
     tick = () => {

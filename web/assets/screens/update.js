@@ -39,9 +39,9 @@ export async function showUpdate(place) {
       action(text.install, () => post('update', { bundle: name }), { class: 'primary', 'aria-label': `${text.install} ${name}`, disabled: update.installing }),
       action(text.remove, () => remove(`update/bundles/${name}`), { 'aria-label': `${text.remove} ${name}`, disabled: update.installing })]));
     clear(body, h('dl', { class: 'facts' }, h('dt', {}, text.installed), h('dd', {}, live.status?.version ?? S.none), update.slot && [h('dt', {}, text.slot), h('dd', {}, update.slot)]),
-      update.installing && [h('p', { class: 'lead' }, text.installing), h('progress', { max: 1, value: update.fraction, 'aria-label': text.installing })],
+      update.installing && [h('p', { class: 'lead' }, text.installing, ' ', update.message), h('progress', { max: 1, value: update.fraction, 'aria-label': text.installing })],
       update.supported ? [h('h2', {}, text.bundles), choices.length ? h('ul', { class: 'files' }, choices) : h('p', { class: 'hint' }, text.noBundles)] : h('p', { class: 'caution' }, `${text.unsupported}: ${update.message}`),
-      update.supported && update.message && h('p', { class: 'lead' }, update.message));
+      update.supported && !update.installing && update.message && h('p', { class: 'lead' }, update.message));
     sender.hidden = !update.supported || !may('update');
   };
   clear(place, h('h1', {}, text.title), h('section', { class: 'card' }, body), sender,
