@@ -19,12 +19,14 @@ const row = (what, figure, asked = '') => { rows.push([what, figure, asked]); co
 
 // --- the first page, by a real browser
 const page = await h.person('engineer', { width: 1280, height: 800 });
-let bytes = 0;
-page.on('response', async (response) => { bytes += Number((await response.allHeaders())['content-length'] ?? 0); });
-await page.goto(h.url);
+const answers = [];
+page.on('response', (response) => answers.push(response));
+await page.goto(h.url, { waitUntil: 'networkidle' });
 await page.getByLabel('Setup code').waitFor();
+const headers = await Promise.all(answers.map((response) => response.allHeaders()));
+const bytes = headers.reduce((sum, each) => sum + Number(each['content-length'] ?? 0), 0);
 const paint = await page.evaluate(() => performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? -1);
-row('first page, gzip', `${(bytes / 1000).toFixed(1)} kB`, '<= 150 kB');
+row('first page, gzip', `${(bytes / 1000).toFixed(1)} kB in ${answers.length} answers`, '<= 150 kB');
 row('first paint', `${Math.round(paint)} ms`, '<= 1 s');
 await h.firstStart(page);
 const cookie = (await page.context().cookies()).map(({ name, value }) => `${name}=${value}`).join('; ');

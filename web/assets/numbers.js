@@ -60,7 +60,8 @@ function card(axis, correction, u95, tolerance, words, weak) {
 
 export function sixNumbers(result, reference, details) {
   const tolerance = reference?.plan.tolerance ?? { shift_mm: 3, rotation_deg: 1 };
-  const words = details?.correction?.words;
+  // Where the body does not lie as its posture says, only the room's words are safe.
+  const words = details?.body?.named_by === 'room' ? null : details?.correction?.words;
   const weak = new Set((details?.motion?.weak_directions ?? []).map((direction) => direction.name));
   return h('ol', { class: 'numbers' }, kAxes.map((axis) => card(axis, result.correction, result.u95, tolerance, words, weak.has(axis.name))));
 }

@@ -98,9 +98,10 @@ function bodyWords({ scan, details }) {
   const text = S.result;
   if (!scan.result?.body || !details?.body || !isAdvice(scan)) return null;
   const list = (title, hint, words) => h('div', {}, h('h3', {}, title), h('p', { class: 'hint' }, hint), h('ul', { class: 'findings' }, words.length ? words.map((word) => h('li', {}, word)) : h('li', { class: 'fine-part' }, `✓ ${text.asReference}`)));
-  return h('div', { class: 'body-words' },
-    list(text.bodyAfter, text.bodyAfterHint, scan.result.body.after),
-    details.correction?.vertical_mm !== null && list(text.bodyNow, text.bodyNowHint, scan.result.body.now),
+  return h('div', { class: 'body-part-words' },
+    h('div', { class: 'body-words' },
+      list(text.bodyAfter, text.bodyAfterHint, scan.result.body.after),
+      details.correction?.vertical_mm !== null && list(text.bodyNow, text.bodyNowHint, scan.result.body.now)),
     details.body.named_by === 'room' && h('p', { class: 'caution' }, text.bodyByRoom));
 }
 
