@@ -2,6 +2,7 @@
 import { fileUrl, get, getBytes } from './api.js';
 import { clear, h, svg } from './dom.js';
 import { cellAt, paintErrors, paintOverlay, readTiff } from './maps.js';
+import { signed } from './numbers.js';
 import { S } from './strings.js';
 
 function legend(tolerance_mm) {
@@ -86,7 +87,7 @@ export async function errorMap(scan, reference, tolerance_mm) {
   const read = () => {
     const cell = cellAt(grid, cursor.x, cursor.y);
     const value = cell < 0 ? NaN : around(maps[shown.map], cell);
-    clear(reading, h('strong', {}, cell < 0 ? text.outsideMap : Number.isNaN(value) ? text.unknown : text.reads(1000 * value)), ` ${text.at(cursor.x, cursor.y)}`);
+    clear(reading, h('strong', {}, cell < 0 ? text.outsideMap : Number.isNaN(value) ? text.unknown : text.reads(signed(1000 * value))), ` ${text.at(cursor.x, cursor.y)}`);
     cross.style.setProperty('left', `${100 * (cursor.x - grid.x_min) / (grid.width * grid.step)}%`);
     cross.style.setProperty('top', `${100 * (1 - (cursor.y - grid.y_min) / (grid.height * grid.step))}%`);
     clear(slice, profile(grid, heights, maps[shown.map], cursor, shown.along));
@@ -122,5 +123,5 @@ export async function errorMap(scan, reference, tolerance_mm) {
     h('fieldset', { class: 'row plainset' }, h('legend', { class: 'visually-hidden' }, text.where), choose('map', 'before', text.before, () => { draw(); read(); }), maps.after && choose('map', 'after', text.after, () => { draw(); read(); })),
     row(grid, box, h('div', { class: 'map-side' }, reading, legend(tolerance_mm), profileBox)));
   const overlay = (target) => paintOverlay(target, heights, maps.before, tolerance_mm / 1000, grid.step);
-  return { element, grid, deviation: maps.before, overlay };
+  return { element, grid, deviation: maps.before, region: maps.after, overlay };
 }

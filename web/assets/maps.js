@@ -35,7 +35,7 @@ export async function readTiff(buffer) {
   return { width, height, values };
 }
 
-const kOutside = 0.28;  // light of what lies outside the region
+export const kOutside = 0.28;  // light of what lies outside the region
 // Stops of the signed scale, in units of the tolerance: blue where the current surface is lower, orange where it is higher.
 const kStops = [[-20, 8, 29, 88], [-10, 33, 85, 152], [-5, 66, 130, 190], [-2, 120, 180, 220], [-1, 190, 214, 228], [-0.999, 226, 232, 236], [0, 250, 250, 248], [0.999, 245, 236, 226], [1, 250, 208, 160], [2, 244, 166, 90], [5, 217, 103, 30], [10, 160, 60, 10], [20, 92, 28, 6]];
 

@@ -2,10 +2,11 @@
 import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { PLYLoader } from 'three/examples/jsm/loaders/PLYLoader.js';
-import { cellAt, errorIndex, errorTable } from './maps.js';
+import { cellAt, errorIndex, errorTable, kOutside } from './maps.js';
 
 /// Colours each vertex by the error map; T maps the mesh's frame to the map's.
-function colourByError(geometry, grid, deviation, T, tolerance_m) {
+/// @param region  NaN outside the region of interest: dimmed there, as the map is.
+function colourByError(geometry, grid, deviation, region, T, tolerance_m) {
   const position = geometry.getAttribute('position');
   const colours = new Uint8Array(3 * position.count);
   const scale = errorTable();
@@ -16,13 +17,14 @@ function colourByError(geometry, grid, deviation, T, tolerance_m) {
     const cell = grid ? cellAt(grid, u, v) : -1;
     const value = cell < 0 ? NaN : deviation.values[cell];
     const at = 3 * errorIndex(value / tolerance_m);
-    for (let k = 0; k < 3; ++k) colours[3 * i + k] = Number.isNaN(value) ? 110 : scale[at + k];
+    const light = cell >= 0 && region && Number.isNaN(region.values[cell]) ? kOutside : 1;
+    for (let k = 0; k < 3; ++k) colours[3 * i + k] = Number.isNaN(value) ? 80 : scale[at + k] * light;
   }
   geometry.setAttribute('color', new THREE.BufferAttribute(colours, 3, true));
 }
 
 /// Draws into `canvas`; returns {setGhost(url), stop()}. Throws where there is no WebGL.
-export async function openMesh(canvas, { url, grid, deviation, T, tolerance_m }) {
+export async function openMesh(canvas, { url, grid, deviation, region, T, tolerance_m }) {
   const renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
   const scene = new THREE.Scene();
   scene.background = new THREE.Color(0x0d1216);
@@ -34,7 +36,7 @@ export async function openMesh(canvas, { url, grid, deviation, T, tolerance_m })
   scene.add(sun);
   const loader = new PLYLoader();
   const geometry = await loader.loadAsync(url);
-  colourByError(geometry, grid, deviation, T, tolerance_m);
+  colourByError(geometry, grid, deviation, region, T, tolerance_m);
   const body = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.9, side: THREE.DoubleSide }));
   scene.add(body);
   geometry.computeBoundingSphere();

@@ -83,7 +83,7 @@ export const S = {
     where: 'Where on the body', before: 'Before', after: 'After the correction', mapLabel: 'Map of height errors, current minus reference. Move with the arrow keys to read values.', mapPicture: 'Error map',
     bodyAfter: 'Posture: left after the correction', bodyAfterHint: 'Put this right first: no couch can.', bodyNow: 'Now', bodyNowHint: 'Against the reference, before the correction.', asReference: 'every part as in the reference, within 3 mm',
     bodyByRoom: 'Parts are named by the axes of the room (IEC 61217): the posture is not known, or the body does not lie as it says.',
-    higher: 'current is higher', lower: 'current is lower', unknown: 'not measured', reads: (mm) => `${mm > 0 ? '+' : ''}${mm.toFixed(1)} mm`, at: (x, y) => `at x ${x.toFixed(3)}, y ${y.toFixed(3)} m`,
+    higher: 'current is higher', lower: 'current is lower', unknown: 'not measured', reads: (value) => `${value} mm`, at: (x, y) => `at x ${x.toFixed(3)}, y ${y.toFixed(3)} m`,
     outsideMap: 'outside the map', mapFailed: 'The map cannot be read; the picture shows the same.', zone: 'Largest in tenths of the body',
     heights: 'Heights seen by this sweep', overlay: 'Overlay', referenceHigher: 'reference on top', currentHigher: 'current on top', bothSame: 'both, within tolerance', overlayAlt: 'Overlay: reference blue, current red', slice: 'Profile', sliceLabel: 'Heights along the line through the cursor of the map: reference and current', sliceAlong: ['Along x', 'Along y'],
     reference_: 'reference', current_: 'current', mesh: '3-D surface', meshOpen: 'Open the 3-D view', meshLoading: 'Loading the surface…', meshLabel: '3-D surface, coloured by the error. Arrow keys turn it, plus and minus zoom.',

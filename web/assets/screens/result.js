@@ -126,7 +126,7 @@ function meshView({ scan, reference, details }, map, tolerance_mm) {
       if (!document.createElement('canvas').getContext('webgl2')) throw new Error(text.meshFailed);
       const { openMesh } = await import('../mesh.js');
       clear(place, canvas, reference && ghost.element);
-      view = await openMesh(canvas, { url: fileUrl(scan.id, 'mesh.ply'), grid: map?.grid, deviation: map?.deviation, T: details?.alignment?.T_reference_current, tolerance_m: tolerance_mm / 1000 });
+      view = await openMesh(canvas, { url: fileUrl(scan.id, 'mesh.ply'), grid: map?.grid, deviation: map?.deviation, region: map?.region, T: details?.alignment?.T_reference_current, tolerance_m: tolerance_mm / 1000 });
       canvas.dataset.ready = 'yes';
       ghost.box.addEventListener('change', () => view.setGhost(ghost.box.checked ? fileUrl(reference.scan_id, 'mesh.ply') : null).catch((error) => warn(error.message)));
     } catch {
@@ -185,7 +185,7 @@ export async function showResult(place, id) {
       mapped && card(text.where, bodyWords(data), mapPlace),
       h('div', { class: mapped || data.scene?.heightmap ? 'halves' : '' }, mapped && card(text.overlay, overlayPlace), !mapped && data.scene?.heightmap && card(text.heights, seen(data)), scan.outcome === 'done' && card(text.mesh, meshPlace)),
       scan.result && card(text.trend, !isAdvice(scan) && h('p', { class: 'caution' }, text.trendWithout), trend(history, tolerance)),
-      h('section', { class: 'card' }, closing(data, load)));
+      h('section', { class: 'card actions' }, closing(data, load)));
     tick = () => {
       const aged = identity.tick();
       const isOld = Boolean(scan.result) && aged;
