@@ -373,6 +373,8 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
     (void)Handle(ScanEvent::kScanFailed);
     CheckDisk();
   } else {
+    if (state_.cancelling)
+      Log(LogLevel::kNotice, "the scan was stored before it could be discarded: its result stands", {{"SCAN", scan_.id}});
     const bool is_check = scan_.purpose == web::ScanPurpose::kDailyCheck;
     if (!is_check) last_result_ = scan_;
     const std::string answer = is_check                         ? "daily check " + CheckIn(outcome.check_json).status

@@ -73,6 +73,7 @@ void ScanSession::Scan(const std::stop_token& stop) {
     Check(scene);
   } else {
     Evaluate(scene, reference, stop);
+    ThrowIfStopped(stop);  // from here on it is stored
   }
   if (const std::optional<double> last_s = feed_->last_frame_s()) outcome_.after_last_frame_s = SteadySeconds() - *last_s;
 }

@@ -14,15 +14,16 @@ for program in systemd-nspawn mmdebstrap; do
 done
 
 # The packages that the programs were linked with, from wherever this machine gets its own.
-if [ ! -e "$root/etc/debian_version" ]; then
-  libraries=$(ldd "$build/daemon/plumbd" "$build/daemon/plumb" | awk '$3 ~ /^\// { print $3 }' | sort -u)
-  packages=$(for library in $libraries; do dpkg -S "$(realpath "$library")" "$library" 2>/dev/null || true; done |
-    sed 's/:.*//' | sort -u | paste -sd,)
-  rm -rf "$root"
+libraries=$(ldd "$build/daemon/plumbd" "$build/daemon/plumb" | awk '$3 ~ /^\// { print $3 }' | sort -u)
+packages=$(for library in $libraries; do dpkg -S "$(realpath "$library")" "$library" 2>/dev/null || true; done |
+  sed 's/:.*//' | sort -u | paste -sd,),systemd,systemd-sysv,udev,dbus,curl,procps,libopenni2-0
+if [ "$(cat "$work/packages" 2>/dev/null)" != "$packages" ]; then
+  rm -rf "$root" "$work/packages"
   (cat /etc/apt/sources.list /etc/apt/sources.list.d/debian.sources 2>/dev/null || true) |
-    mmdebstrap --variant=minbase --include="$packages,systemd,systemd-sysv,udev,dbus,curl,procps,libopenni2-0" \
-      --aptopt='APT::Install-Recommends "false"' --dpkgopt='path-exclude=/usr/share/doc/*' --dpkgopt='path-exclude=/usr/share/man/*' \
+    mmdebstrap --variant=minbase --include="$packages" --aptopt='APT::Install-Recommends "false"' \
+      --dpkgopt='path-exclude=/usr/share/doc/*' --dpkgopt='path-exclude=/usr/share/man/*' \
       "$(. /etc/os-release && echo "$VERSION_CODENAME")" "$root" - || skip "no Debian could be made: see above"
+  echo "$packages" >"$work/packages"
 fi
 
 DESTDIR=$root cmake --install "$build" >/dev/null
