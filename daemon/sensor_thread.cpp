@@ -16,6 +16,10 @@ namespace plumb {
 
 using Clock = std::chrono::steady_clock;
 
+namespace {
+constexpr std::chrono::seconds kListAgain{2};
+}
+
 /// Everything in it belongs to the sensor thread, but what the mutex guards and the atomics.
 struct SensorThread::Impl {
   Impl(std::function<std::unique_ptr<SensorProvider>()> make, SensorThreadOptions its_options, std::function<void(const SensorEvent&)> tell)
@@ -52,6 +56,7 @@ struct SensorThread::Impl {
   std::string told_reason;
   std::chrono::milliseconds retry;
   std::optional<Clock::time_point> retry_at;
+  Clock::time_point listed_at;
   std::jthread thread;  // last: starts when everything above is there
 
   void Run(const std::stop_token& stop) {
@@ -98,9 +103,11 @@ struct SensorThread::Impl {
     if (!provider) return;
     {
       const std::lock_guard lock(mutex);
-      const bool retry_is_due = retry_at && Clock::now() >= *retry_at;
-      if (!bus_changed && !retry_is_due) return;
+      // Looked for even if nothing was said: a plug that the driver did not report must not wait for a restart.
+      const bool due = Clock::now() >= (retry_at ? *retry_at : listed_at + kListAgain);
+      if (!bus_changed && !due) return;
       bus_changed = false;
+      listed_at = Clock::now();
     }
     const std::vector<SensorDescription> attached = provider->List();
     const auto match = std::find_if(attached.begin(), attached.end(), [&](const SensorDescription& sensor_there) {

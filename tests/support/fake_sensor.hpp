@@ -21,6 +21,11 @@ class FakeBus {
   void Plug(const std::string& serial) {
     Change([&] { attached_.push_back(serial); });
   }
+  /// Without a word to the listener.
+  void PlugUnreported(const std::string& serial) {
+    const std::lock_guard lock(mutex_);
+    attached_.push_back(serial);
+  }
   void Unplug() {
     Change([&] { attached_.clear(); });
   }

@@ -94,6 +94,15 @@ TEST_F(SensorThreadTest, FramesGoToTheScanOnceItBeganAndNotAnyMoreOnceItEnded) {
   EXPECT_EQ(feed->TakeDropped(), 0);
 }
 
+TEST_F(SensorThreadTest, ASensorThatTheDriverDidNotReportIsFoundToo) {
+  Start();
+  EXPECT_EQ(told_.At(0).kind, Kind::kLost);
+  bus_.PlugUnreported("A");
+  while (bus_.opened() == 0) std::this_thread::yield();  // GiveFrame() would wake the listener
+  bus_.GiveFrame();
+  EXPECT_EQ(told_.At(1).kind, Kind::kReady);
+}
+
 TEST_F(SensorThreadTest, AnUnpluggedSensorIsLostAndAnotherOneTakesItsPlace) {
   Start();
   bus_.Plug("A");
