@@ -29,6 +29,7 @@ export class Harness {
     h.equal = (found, expected, what) => h.check(found === expected, `${what}: ${JSON.stringify(expected)}, found ${JSON.stringify(found)}`);
     const [program, ...rest] = command.map((part) => part.replace('FOLDER', join(folder, 'data')));
     h.server = spawn(program, rest, { stdio: ['pipe', 'pipe', 'pipe'] });
+    process.on('exit', () => h.server.kill('SIGKILL'));  // whatever goes wrong here, nothing stays behind
     h.server.on('exit', (code, signal) => { if (!h.finished) { console.error(`the server ended: ${code ?? signal}\n${h.log.join('\n')}`); process.exit(1); } });
     await new Promise((ready) => {
       for (const input of [h.server.stdout, h.server.stderr]) {
