@@ -98,6 +98,17 @@ std::string TimeText(WallClock::time_point time) {
 std::string_view Name(ApplianceState state) { return NameIn(kStates, state); }
 std::string_view Name(ScanPurpose purpose) { return NameIn(kPurposes, purpose); }
 
+namespace {
+
+Json WordsJson(const std::array<std::string, 6>& words) {
+  static constexpr std::array<const char*, 6> kNames = {"vertical", "longitudinal", "lateral", "pitch", "roll", "yaw"};
+  Json json = Json::object();
+  for (std::size_t i = 0; i < words.size(); ++i) json[kNames[i]] = TextOrNull(words[i]);
+  return json;
+}
+
+}  // namespace
+
 Json ToJson(const Scan& scan, WallClock::time_point now) {
   Json json = {{"id", scan.id},
                {"patient_id", TextOrNull(scan.patient_id)},
@@ -119,6 +130,7 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
                       {"reasons", scan.result->reasons},
                       {"correction", NumbersJson(scan.result->correction)},
                       {"u95", NumbersJson(scan.result->u95)},
+                      {"words", WordsJson(scan.result->words)},
                       {"body", {{"now", scan.result->body_now}, {"after", scan.result->body_after}}}};
   }
   return json;

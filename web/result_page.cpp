@@ -18,18 +18,17 @@ constexpr std::chrono::minutes kOldAfter{2};
 
 struct NumberRow {
   const char* name;
-  const char* positive;  ///< In the room's words, where the result has none.
   const char* unit;
   std::optional<double> value, u95;
 };
 
 std::array<NumberRow, 6> Rows(const SixNumbers& value, const SixNumbers& u95) {
-  return {NumberRow{"vertical", "+ is up", "mm", value.vertical_mm, u95.vertical_mm},
-          NumberRow{"longitudinal", "+ is toward gantry", "mm", value.longitudinal_mm, u95.longitudinal_mm},
-          NumberRow{"lateral", "+ is to the right, seen facing the gantry", "mm", value.lateral_mm, u95.lateral_mm},
-          NumberRow{"pitch", "about the lateral axis", "\xC2\xB0", value.pitch_deg, u95.pitch_deg},
-          NumberRow{"roll", "about the longitudinal axis", "\xC2\xB0", value.roll_deg, u95.roll_deg},
-          NumberRow{"yaw", "about the vertical axis", "\xC2\xB0", value.yaw_deg, u95.yaw_deg}};
+  return {NumberRow{"vertical", "mm", value.vertical_mm, u95.vertical_mm},
+          NumberRow{"longitudinal", "mm", value.longitudinal_mm, u95.longitudinal_mm},
+          NumberRow{"lateral", "mm", value.lateral_mm, u95.lateral_mm},
+          NumberRow{"pitch", "\xC2\xB0", value.pitch_deg, u95.pitch_deg},
+          NumberRow{"roll", "\xC2\xB0", value.roll_deg, u95.roll_deg},
+          NumberRow{"yaw", "\xC2\xB0", value.yaw_deg, u95.yaw_deg}};
 }
 
 std::string Document(const std::string& body) {
@@ -64,11 +63,9 @@ std::string NumbersTable(const ResultSummary& result) {
                               : is_still ? fmt::format("0.0 {}", row.unit)
                                          : fmt::format("{:+.1f} {}", *row.value, row.unit);
     const std::string u95 = row.value && row.u95 ? fmt::format("\xC2\xB1 {:.1f}", *row.u95) : "";
-    const std::string& words = result.words[i++];
     rows += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td></tr>", row.name, value, u95,
-                        is_still        ? "stays"
-                        : words.empty() ? row.positive
-                                        : EscapeHtml(words));
+                        is_still ? "stays" : EscapeHtml(result.words[i]));
+    ++i;
   }
   return fmt::format(
       "<table><caption>Correction to apply at the isocentre</caption><thead><tr><th scope=\"col\">axis</th><th scope=\"col\">value</th>"

@@ -215,12 +215,6 @@ class Comparer {
   void Judge() {
     const double since_s = Now();
     BodyMotion& motion = *result_.motion;
-    result_.correction = CorrectionOf(motion.T, motion.covariance, motion.centroid_m, options_.isocentre_m.value_or(motion.centroid_m),
-                                      options_.T_iec_reference, options_.marker_kind, options_.posture);
-    const auto u95 = Values(result_.correction->u95);
-    for (std::size_t i = 0; i < 6; ++i) {
-      if (u95[i] && *u95[i] > kWeakShare * Tolerance(options_, i)) motion.weak_directions.push_back({kNames[i], *u95[i], Unit(i)});
-    }
     result_.region = CoverageOf(*reference_.height_map, result_.region_mask, current_cloud_, kCloudSpacing_m, motion.T);
     CheckStop(options_.stop);
     const HeightMap corrected = CurrentHeight(motion.T.inverse());
@@ -234,6 +228,13 @@ class Comparer {
                                        .T_iec_reference = options_.T_iec_reference,
                                        .marker_kind = options_.marker_kind,
                                        .posture = options_.posture});
+    const std::optional<PatientPosture> posture = result_.body_parts->by_posture ? std::optional(options_.posture) : std::nullopt;
+    result_.correction = CorrectionOf(motion.T, motion.covariance, motion.centroid_m, options_.isocentre_m.value_or(motion.centroid_m),
+                                      options_.T_iec_reference, options_.marker_kind, posture);
+    const auto u95 = Values(result_.correction->u95);
+    for (std::size_t i = 0; i < 6; ++i) {
+      if (u95[i] && *u95[i] > kWeakShare * Tolerance(options_, i)) motion.weak_directions.push_back({kNames[i], *u95[i], Unit(i)});
+    }
     Lap("trust", since_s);
   }
 

@@ -44,18 +44,23 @@ CouchNumbers NumbersOf(const Vector6d& couch, MarkerKind kind) {
 }
 
 // Words for the signs. The patient's left is +X (viewer's right) head first supine; each of prone and feet first turns it over.
-std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind, PatientPosture posture) {
-  const bool head_first = posture == PatientPosture::kHeadFirstSupine || posture == PatientPosture::kHeadFirstProne;
-  const bool supine = posture == PatientPosture::kHeadFirstSupine || posture == PatientPosture::kFeetFirstSupine;
-  const bool left_is_plus_x = head_first == supine;
-  const auto side = [&](bool plus_x) { return plus_x == left_is_plus_x ? "left" : "right"; };
-
+std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind, std::optional<PatientPosture> posture) {
   std::array<std::string, 6> words;
   if (kind == MarkerKind::kRoom) {
     words[0] = couch[2] >= 0 ? "up" : "down";
     words[1] = couch[1] >= 0 ? "toward gantry" : "away from gantry";
-    words[2] = std::string("to patient ") + side(couch[0] >= 0);
+    words[2] = couch[0] >= 0 ? "to the right, facing the gantry" : "to the left, facing the gantry";
   }
+  words[3] = couch[3] >= 0 ? "gantry end up" : "gantry end down";
+  words[4] = couch[4] >= 0 ? "right side down, facing the gantry" : "left side down, facing the gantry";
+  words[5] = couch[5] >= 0 ? "counter-clockwise from above" : "clockwise from above";
+  if (!posture) return words;
+
+  const bool head_first = *posture == PatientPosture::kHeadFirstSupine || *posture == PatientPosture::kHeadFirstProne;
+  const bool supine = *posture == PatientPosture::kHeadFirstSupine || *posture == PatientPosture::kFeetFirstSupine;
+  const bool left_is_plus_x = head_first == supine;
+  const auto side = [&](bool plus_x) { return plus_x == left_is_plus_x ? "left" : "right"; };
+  if (kind == MarkerKind::kRoom) words[2] = std::string("to patient ") + side(couch[0] >= 0);
   words[3] = (couch[3] >= 0) == head_first ? "head up" : "head down";
   words[4] = std::string("patient ") + side(couch[4] >= 0) + " side down";
   // Counter-clockwise from above carries the gantry end to -X, the other end to +X.
@@ -100,7 +105,8 @@ Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_refe
 }
 
 Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance, const Eigen::Vector3d& centroid,
-                        const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference, MarkerKind kind, PatientPosture posture) {
+                        const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference, MarkerKind kind,
+                        std::optional<PatientPosture> posture) {
   const Vector6d couch = CouchVector(T_motion, isocentre_reference, T_iec_reference);
   Correction correction;
   correction.isocentre_m = isocentre_reference;

@@ -34,7 +34,7 @@ struct Correction {
   Eigen::Vector3d isocentre_m = Eigen::Vector3d::Zero();  ///< Reference-marker frame.
   CouchNumbers value;
   CouchNumbers u95;                  ///< 95 % half-widths.
-  std::array<std::string, 6> words;  ///< vertical, longitudinal, lateral, pitch, roll, yaw; "" where refused.
+  std::array<std::string, 6> words;  ///< Which way: vertical, longitudinal, lateral, pitch, roll, yaw; "" where refused.
 };
 
 /// The six numbers as a vector, in the order lateral, longitudinal, vertical (metres), pitch, roll, yaw (radians).
@@ -52,8 +52,9 @@ struct Correction {
 /// @param covariance  Of T_motion: rotation vector, translation; left perturbation about the moved centroid, T_motion * centroid,
 ///                    so that its translation part is the uncertainty of where the centroid went.
 /// @param centroid    Of the region in the reference scene, reference-marker frame.
+/// @param posture     Turns the words into the patient's left, right and head; none: it is not to be believed, the words are the room's.
 [[nodiscard]] Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance, const Eigen::Vector3d& centroid,
                                       const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference, MarkerKind kind,
-                                      PatientPosture posture);
+                                      std::optional<PatientPosture> posture);
 
 }  // namespace plumb

@@ -29,9 +29,7 @@ void ReadWords(const Json& result, web::ResultSummary& summary) {
     const auto found = json.find(key);
     return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
   };
-  // Where the body does not lie as its posture says, the words of the posture are not believed either.
-  const bool by_room = result.value(Json::json_pointer("/body/named_by"), std::string()) == "room";
-  if (const auto words = result.value(Json::json_pointer("/correction/words"), Json()); words.is_object() && !by_room) {
+  if (const auto words = result.value(Json::json_pointer("/correction/words"), Json()); words.is_object()) {
     summary.words = {text(words, "vertical"), text(words, "longitudinal"), text(words, "lateral"),
                      text(words, "pitch"),    text(words, "roll"),         text(words, "yaw")};
   }

@@ -22,10 +22,9 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using test::HttpAnswer;
 using test::HttpClient;
+using test::kPassword;
 using ::testing::HasSubstr;
 using testing::Plumbd;
-
-const char* const kPassword = "correct horse battery";
 
 class DaemonDiskTest : public ::testing::Test {
  protected:

@@ -12,11 +12,10 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using test::HttpAnswer;
 using test::HttpClient;
+using test::kPassword;
 using ::testing::HasSubstr;
 using ::testing::IsSupersetOf;
 using testing::Plumbd;
-
-const char* const kPassword = "correct horse battery";
 
 class DaemonWebTest : public ::testing::Test {
  protected:

@@ -12,6 +12,8 @@
 
 namespace plumb::test {
 
+inline constexpr const char* kPassword = "correct horse battery";  ///< Of every account that a test makes.
+
 /// What came back.
 struct HttpAnswer {
   int status = 0;                                   ///< 0: the connection was closed without an answer.

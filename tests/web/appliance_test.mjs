@@ -9,20 +9,11 @@ const [modules, plumbd, plumb, folder, chromium] = process.argv.slice(2);
 const socket = join(folder, 'data', 'control.sock');
 const h = await Harness.start({ modules, folder, chromium, command: [plumbd, '--simulated', 'demo', '--state', 'FOLDER', '--listen', '127.0.0.1:0', '--control', socket] });
 const { check, equal } = h;
-const kPassword = 'correct horse battery';
 const kSlow = { timeout: 180000 };
 const sim = (command) => promisify(execFile)(plumb, ['--control', socket, 'sim', command]);
 const memory_kB = () => Number(/VmRSS:\s+(\d+)/.exec(readFileSync(`/proc/${h.server.pid}/status`, 'utf8'))[1]);
 
 const page = await h.person('engineer');
-async function logIn(other, name) {
-  await other.goto(h.url);
-  await other.getByLabel('Name').fill(name);
-  await other.getByLabel('Password').fill(kPassword);
-  await other.getByRole('button', { name: 'Log in' }).click();
-  await other.getByRole('navigation').waitFor();
-}
-
 async function scan() {
   await page.goto(`${h.url}#/scan`);
   await page.getByRole('button', { name: /Start sweep|Scan again/ }).click(kSlow);
@@ -31,27 +22,14 @@ async function scan() {
 }
 
 await h.step('first start', async () => {
-  await page.goto(h.url);
-  await page.getByLabel('Setup code').fill(h.setupCode);
-  await page.getByLabel('Name').fill('engineer');
-  await page.getByLabel('Password', { exact: true }).fill(kPassword);
-  await page.getByLabel('Password again').fill(kPassword);
-  await page.getByRole('button', { name: 'Make the account' }).click();
-  await page.getByRole('navigation').waitFor();
+  await h.firstStart(page);
   await page.locator('.headline', { hasText: 'Ready' }).waitFor(kSlow);
   await h.look(page, 'status');
 });
 
 await h.step('accounts for two physicists', async () => {
   await page.goto(`${h.url}#/users`);
-  const card = page.locator('section', { has: page.getByRole('heading', { name: 'Add an account' }) });
-  for (const name of ['bob', 'clara']) {
-    await card.getByLabel('Name').fill(name);
-    await card.getByLabel('Role').selectOption('physicist');
-    await card.getByLabel('Password').fill(kPassword);
-    await card.getByRole('button', { name: 'Add' }).click();
-    await page.getByRole('cell', { name, exact: true }).waitFor();
-  }
+  for (const name of ['bob', 'clara']) await h.addAccount(page, name, 'physicist');
 });
 
 await h.step('the first sweep, closed and opened again midway, becomes the reference', async () => {
@@ -94,7 +72,7 @@ await h.step('five viewers cost little memory', async () => {
   const before = memory_kB();
   for (let i = 0; i < 4; ++i) {
     const viewer = await h.person(`viewer${i}`, { width: 640, height: 480 });
-    await logIn(viewer, 'bob');
+    await h.logIn(viewer, 'bob');
     await viewer.goto(`${h.url}#/status`);
     viewers.push(viewer);
   }
@@ -122,7 +100,7 @@ await h.step('a third sweep, watched by five and with a download, makes a trend'
 
 await h.step('a physicist plans a new version, a second one approves', async () => {
   const bob = await h.person('bob');
-  await logIn(bob, 'bob');
+  await h.logIn(bob, 'bob');
   await bob.goto(`${h.url}#/patients`);
   await bob.getByRole('link', { name: 'demo' }).click();
   await bob.getByRole('link', { name: /^Plan, Version/ }).first().click();
@@ -136,7 +114,7 @@ await h.step('a physicist plans a new version, a second one approves', async () 
   await bob.getByRole('button', { name: 'Approve' }).click();
   await bob.getByRole('alert').getByText(/second|planned|made/).waitFor();
   const clara = await h.person('clara');
-  await logIn(clara, 'clara');
+  await h.logIn(clara, 'clara');
   await clara.goto(bob.url());
   await clara.getByRole('button', { name: 'Approve' }).click();
   await clara.getByText('approved by clara').waitFor();
@@ -151,7 +129,7 @@ await h.step('a physicist plans a new version, a second one approves', async () 
 
 await h.step('the daily check of the real markers: no baseline, then passed', async () => {
   const bob = await h.person('checker');
-  await logIn(bob, 'bob');
+  await h.logIn(bob, 'bob');
   const check = async (verdict) => {
     await bob.goto(`${h.url}#/check`);
     await bob.getByRole('button', { name: 'Start a check' }).click();

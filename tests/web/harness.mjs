@@ -23,6 +23,7 @@ export class Harness {
     mkdirSync(join(folder, 'data'), { recursive: true });
     h.folder = folder;
     h.failures = [];
+    h.password = kPassword;  // of every account
     h.log = [];
     h.contexts = [];
     h.check = (holds, what) => { if (!holds) throw new Error(`expected: ${what}`); };

@@ -4,24 +4,6 @@ import { Harness } from './harness.mjs';
 const [modules, server, folder, chromium] = process.argv.slice(2);
 const h = await Harness.start({ modules, command: [server, 'FOLDER'], folder, chromium });
 const { check, equal } = h;
-const kPassword = 'correct horse battery';
-
-async function logIn(page, name) {
-  await page.goto(h.url);
-  await page.getByLabel('Name').fill(name);
-  await page.getByLabel('Password').fill(kPassword);
-  await page.getByRole('button', { name: 'Log in' }).click();
-  await page.getByRole('navigation').waitFor();
-}
-
-async function addAccount(page, name, role) {
-  const card = page.locator('section', { has: page.getByRole('heading', { name: 'Add an account' }) });
-  await card.getByLabel('Name').fill(name);
-  await card.getByLabel('Role').selectOption(role);
-  await card.getByLabel('Password').fill(kPassword);
-  await card.getByRole('button', { name: 'Add' }).click();
-  await page.getByRole('cell', { name, exact: true }).waitFor();
-}
 
 async function scan(page, button = 'Start sweep') {
   await page.goto(`${h.url}#/scan`);
@@ -37,8 +19,8 @@ await h.step('set-up makes the first account and refuses a wrong code', async ()
   const fill = async (code) => {
     await engineer.getByLabel('Setup code').fill(code);
     await engineer.getByLabel('Name').fill('engineer');
-    await engineer.getByLabel('Password', { exact: true }).fill(kPassword);
-    await engineer.getByLabel('Password again').fill(kPassword);
+    await engineer.getByLabel('Password', { exact: true }).fill(h.password);
+    await engineer.getByLabel('Password again').fill(h.password);
     await engineer.getByRole('button', { name: 'Make the account' }).click();
   };
   await fill('AAAA-AAAA');
@@ -49,7 +31,7 @@ await h.step('set-up makes the first account and refuses a wrong code', async ()
 
 await h.step('the engineer adds accounts', async () => {
   await engineer.goto(`${h.url}#/users`);
-  for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'], ['clara', 'physicist']]) await addAccount(engineer, name, role);
+  for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'], ['clara', 'physicist']]) await h.addAccount(engineer, name, role);
   await h.look(engineer, 'users');
 });
 
@@ -63,7 +45,7 @@ await h.step('a wrong password is refused in words', async () => {
   await anna.getByRole('button', { name: 'Log in' }).click();
   await anna.getByRole('alert').getByText('name or password is wrong').waitFor();
   await h.look(anna, 'login');
-  await logIn(anna, 'anna');
+  await h.logIn(anna, 'anna');
   await anna.getByText('Last scans').waitFor();
   await h.look(anna, 'status');
 });
@@ -89,7 +71,7 @@ await h.step('a new patient is scanned for a reference', async () => {
 });
 
 await h.step('a physicist plans, a second one approves', async () => {
-  await logIn(bob, 'bob');
+  await h.logIn(bob, 'bob');
   await bob.goto(`${h.url}#/patients`);
   await bob.getByRole('link', { name: 'PX-0417' }).click();
   await bob.getByRole('link', { name: 'Plan, Version 1' }).click();
@@ -109,7 +91,7 @@ await h.step('a physicist plans, a second one approves', async () => {
   await bob.getByRole('status').getByText('Plan saved.').waitFor({ state: 'attached' });
   await bob.getByRole('button', { name: 'Approve' }).click();
   await bob.getByRole('alert').getByText('a second person must approve').waitFor();
-  await logIn(clara, 'clara');
+  await h.logIn(clara, 'clara');
   await clara.goto(`${h.url}${new URL(bob.url()).hash}`);
   await clara.getByText('4 corners').waitFor();
   await clara.getByRole('button', { name: 'Approve' }).click();
@@ -297,7 +279,7 @@ await h.step('a keyboard alone reaches login, navigation and the start button', 
   await keys.getByRole('heading', { name: 'Log in' }).waitFor();
   await keys.keyboard.type('anna');
   await keys.keyboard.press('Tab');
-  await keys.keyboard.type(kPassword);
+  await keys.keyboard.type(h.password);
   await keys.keyboard.press('Enter');
   await keys.getByRole('navigation').waitFor();
   const focused = () => keys.evaluate(() => document.activeElement.textContent);
@@ -313,7 +295,7 @@ await h.step('a keyboard alone reaches login, navigation and the start button', 
 await h.step('phone and 4K', async () => {
   for (const [name, width, height] of [['phone', 360, 740], ['4k', 3840, 2160]]) {
     const page = await h.person(name, { width, height });
-    await logIn(page, 'anna');
+    await h.logIn(page, 'anna');
     const scans = await page.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
     const moved = scans.scans.find((one) => one.result?.verdict === 'move');
     for (const [screen, hash] of [['result', `result/${moved.id}`], ['scan', 'scan'], ['status', 'status'], ['patients', 'patients']]) {
@@ -332,14 +314,14 @@ await h.step('without script the last result is shown, without WebGL the picture
   const plain = await h.person('plain', { width: 1280, height: 900 }, { javaScriptEnabled: false });
   await plain.goto(`${h.url}result`);
   await plain.getByLabel('Name').fill('anna');
-  await plain.getByLabel('Password').fill(kPassword);
+  await plain.getByLabel('Password').fill(h.password);
   await plain.getByRole('button', { name: 'Log in' }).click();
   await plain.getByText('NO ANSWER').waitFor();
   check((await plain.getByRole('complementary').innerText()).includes('Not a medical device'), 'the notice is there');
   await plain.screenshot({ path: h.file('plain-result.png'), fullPage: true });
   const flat = await h.person('flat');
   await flat.addInitScript(() => { HTMLCanvasElement.prototype.getContext = new Proxy(HTMLCanvasElement.prototype.getContext, { apply: (target, self, args) => (args[0].startsWith('webgl') ? null : Reflect.apply(target, self, args)) }); });
-  await logIn(flat, 'anna');
+  await h.logIn(flat, 'anna');
   await flat.goto(`${h.url}#/result`);
   await flat.getByRole('button', { name: 'Open the 3-D view' }).click();
   await flat.getByText('WebGL is missing').waitFor();

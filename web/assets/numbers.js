@@ -47,7 +47,7 @@ function card(axis, correction, u95, tolerance, words, weak) {
   const within = Math.abs(value) + half <= limit;
   const digits = axis.shift ? 1 : Math.abs(value) < 10 ? 2 : 1;
   const still = printsAsZero(value, digits);  // no direction either
-  const word = still ? text.still : words?.[axis.name] || text.words[axis.name][value < 0 ? 1 : 0];
+  const word = still ? text.still : words?.[axis.name] ?? S.none;
   return h('li', { class: `number ${within ? 'within' : 'outside'}` },
     h('h3', {}, name), !still && drawing(axis.name, value),
     h('p', { class: 'value' }, signed(value, digits), h('span', { class: 'unit' }, axis.unit === '°' ? '°' : ` ${axis.unit}`)),
@@ -60,8 +60,6 @@ function card(axis, correction, u95, tolerance, words, weak) {
 
 export function sixNumbers(result, reference, details) {
   const tolerance = reference?.plan.tolerance ?? { shift_mm: 3, rotation_deg: 1 };
-  // Where the body does not lie as its posture says, only the room's words are safe.
-  const words = details?.body?.named_by === 'room' ? null : details?.correction?.words;
   const weak = new Set((details?.motion?.weak_directions ?? []).map((direction) => direction.name));
-  return h('ol', { class: 'numbers' }, kAxes.map((axis) => card(axis, result.correction, result.u95, tolerance, words, weak.has(axis.name))));
+  return h('ol', { class: 'numbers' }, kAxes.map((axis) => card(axis, result.correction, result.u95, tolerance, result.words, weak.has(axis.name))));
 }

@@ -73,10 +73,6 @@ export const S = {
     numbers: 'Correction to apply', atIsocentre: 'at the isocentre', within: 'within tolerance', outside: 'outside tolerance', tolerance: (value, unit) => `tolerance ±${value} ${unit}`,
     refused: 'not known with couch markers', still: 'stays', notSeen: 'not well seen', uncertainty: (value, unit) => `±${value} ${unit}`, uncertaintyLong: '95 % uncertainty',
     axes: { vertical: 'Vertical', longitudinal: 'Longitudinal', lateral: 'Lateral', pitch: 'Pitch', roll: 'Roll', yaw: 'Yaw' },
-    words: {
-      vertical: ['up', 'down'], longitudinal: ['toward gantry', 'away from gantry'], lateral: ['to the right, facing the gantry', 'to the left, facing the gantry'],
-      pitch: ['gantry end up', 'gantry end down'], roll: ['right side down', 'right side up'], yaw: ['counter-clockwise from above', 'clockwise from above'],
-    },
     trust: 'Why trust it', markers: 'Markers matched', markerRms: 'Marker misfit', coverage: 'Region covered', hole: 'Largest hole', residual: 'Surface misfit', views: 'Views kept', frames: 'Frames tracked',
     depthScale: 'Depth scale corrected by', sensorOn: 'Sensor on for', rejected: 'Markers ignored', rejectedItem: (id, mm) => `marker ${id} moved ${mm} mm`, weak: 'Not well seen', warnings: 'Warnings', lost: 'Longest time lost',
     medianAnd95: (median, p95) => `${median} mm median, ${p95} mm 95th percentile`,

@@ -103,6 +103,22 @@ TEST(CorrectionTest, WordsFollowThePosture) {
   EXPECT_EQ(Correct(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitZ())).words[5], "head to patient right");
 }
 
+TEST(CorrectionTest, WithoutAPostureTheWordsAreTheRooms) {
+  const auto words = [](const Pose& T_motion) {
+    return CorrectionOf(T_motion, Matrix6d::Identity() * 1e-6, kIsocentre, kIsocentre, Pose::Identity(), MarkerKind::kRoom, std::nullopt)
+        .words;
+  };
+  EXPECT_EQ(words(Shift(-0.01, 0, 0))[2], "to the right, facing the gantry");
+  EXPECT_EQ(words(Shift(0.01, 0, 0))[2], "to the left, facing the gantry");
+  EXPECT_EQ(words(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitX()))[3], "gantry end up");
+  EXPECT_EQ(words(TurnAboutIsocentre(5, Eigen::Vector3d::UnitX()))[3], "gantry end down");
+  // Roll > 0 turns +Z toward +X: the side at +X, right of who faces the gantry, goes down.
+  EXPECT_EQ(words(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitY()))[4], "right side down, facing the gantry");
+  EXPECT_EQ(words(TurnAboutIsocentre(5, Eigen::Vector3d::UnitY()))[4], "left side down, facing the gantry");
+  EXPECT_EQ(words(TurnAboutIsocentre(-5, Eigen::Vector3d::UnitZ()))[5], "counter-clockwise from above");
+  EXPECT_EQ(words(TurnAboutIsocentre(5, Eigen::Vector3d::UnitZ()))[5], "clockwise from above");
+}
+
 TEST(CorrectionTest, CouchMarkersGivePostureOnly) {
   const Correction correction = Correct(Shift(0.01, 0.02, 0.03) * TurnAboutIsocentre(3, Eigen::Vector3d::UnitZ()), MarkerKind::kCouch);
   EXPECT_FALSE(correction.value.vertical_mm || correction.value.longitudinal_mm || correction.value.lateral_mm);

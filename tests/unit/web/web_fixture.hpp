@@ -12,8 +12,6 @@
 
 namespace plumb::test {
 
-inline constexpr const char* kPassword = "correct horse battery";
-
 class WebTest : public ::testing::Test {
  protected:
   /// Cheap passwords: what they cost is libsodium's affair. @param change  Adjusts the options before the server starts.
