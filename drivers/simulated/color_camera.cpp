@@ -75,7 +75,7 @@ struct ColorCamera::Shot {
   std::vector<MovingPose> rows;        // Pose of each row at its mid-exposure.
   std::vector<Candidates> candidates;  // By tile.
   cv::Mat material;                    // CV_16UC1, at each pixel's centre.
-  cv::Mat t;                           // CV_32FC1, metres along the ray.
+  cv::Mat depth;                       // CV_32FC1, metres along the optical axis.
   cv::Mat edge;                        // CV_8UC1
   std::uint64_t noise_seed;
   int tiles_across;
@@ -94,7 +94,7 @@ void ColorCamera::BuildSamples() {
   const auto pattern = [&](int side) {
     // Multi-jittered (Chiu, Shirley, Wang 1994): one sample a cell of the side x side grid, and one in each of the side^2 columns and rows.
     const int count = side * side;
-    std::vector<Sample> samples;
+    std::vector<Eigen::Vector3f> samples;  // du, dv, dt
     std::vector<std::vector<int>> columns;
     std::vector<std::vector<int>> rows;
     for (int i = 0; i < side; ++i) {
@@ -109,21 +109,26 @@ void ColorCamera::BuildSamples() {
         const double u = (i + (columns[a][b] + 0.5) / side) / side;
         const double v = (j + (rows[b][a] + 0.5) / side) / side;
         const double time = (times[static_cast<std::size_t>(j * side + i)] + 0.5) / count - 0.5;
-        samples.push_back(
-            {static_cast<float>(kernel.Inverse(u)), static_cast<float>(kernel.Inverse(v)), static_cast<float>(unit_.exposure_s * time)});
+        samples.emplace_back(static_cast<float>(kernel.Inverse(u)), static_cast<float>(kernel.Inverse(v)),
+                             static_cast<float>(unit_.exposure_s * time));
       }
     }
-    return samples;
+    // The corners of the grid first: see GatherOutline().
+    const auto n = static_cast<std::size_t>(side);
+    std::swap(samples[1], samples[n - 1]);
+    std::swap(samples[2], samples[n * (n - 1)]);
+    std::swap(samples[3], samples[n * n - 1]);
+    std::vector<Samples> fours(samples.size() / 4);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      fours[i / 4].du[i % 4] = samples[i].x();
+      fours[i / 4].dv[i % 4] = samples[i].y();
+      fours[i / 4].dt[i % 4] = samples[i].z();
+    }
+    return fours;
   };
   for (std::size_t i = 0; i < kNumPatterns; ++i) {
     ink_samples_.push_back(pattern(kInkSide));
     outline_samples_.push_back(pattern(kOutlineSide));
-    // The corners of the grid first: see GatherOutline().
-    auto& outline = outline_samples_.back();
-    constexpr std::size_t kSide = kOutlineSide;
-    std::swap(outline[1], outline[kSide - 1]);
-    std::swap(outline[2], outline[kSide * (kSide - 1)]);
-    std::swap(outline[3], outline[kSide * kSide - 1]);
     smooth_samples_.push_back(pattern(kSmoothSide));
   }
 }
@@ -142,13 +147,12 @@ void ColorCamera::Cast(Shot& shot, int tile_row) const {
     shot.candidates[static_cast<std::size_t>(tile_row * shot.tiles_across + tile)] = candidates;
     for (int y = tile_row * kTileSize; y < y_end; ++y) {
       for (int x = tile * kTileSize; x < std::min(rays_.width(), (tile + 1) * kTileSize); x += 4) {
-        std::array<Ray, 4> rays;
-        for (int i = 0; i < 4; ++i)
-          rays[static_cast<std::size_t>(i)] = shot.rows[static_cast<std::size_t>(y)].RayOf(rays_.At(x + i, y, 0, 0), 0.0F);
-        const std::array<Hit, 4> hits = shot.world.Trace(rays, candidates);
+        const Ray4 rays = shot.rows[static_cast<std::size_t>(y)].RayOf(rays_.FourFrom(x, y));
+        const Hit4 hits = shot.world.Trace(rays, candidates);
+        const Float4 depth = hits.t * rays.inverse_norm;
         for (int i = 0; i < 4; ++i) {
-          shot.material.at<std::uint16_t>(y, x + i) = hits[static_cast<std::size_t>(i)].material;
-          shot.t.at<float>(y, x + i) = hits[static_cast<std::size_t>(i)].t;
+          shot.material.at<std::uint16_t>(y, x + i) = static_cast<Material>(hits.material[i]);
+          shot.depth.at<float>(y, x + i) = depth[i];
         }
       }
     }
@@ -193,7 +197,7 @@ Vector3f ColorCamera::GatherInk(const Shot& shot, int x, int y) const {
   const auto material = shot.material.at<std::uint16_t>(y, x);
   const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
   // Everything in the board's frame, where a sample's place is linear in du, dv and dt before the division.
-  const World::BoardPlane plane = shot.world.PlaneOf(BoardOf(material));
+  const World::BoardPlane& plane = shot.world.PlaneOf(BoardOf(material));
   const Vector3f origin = plane.R_board_world * (pose.p_world - plane.p_world);
   const Vector3f velocity = plane.R_board_world * pose.velocity;
   const Eigen::Matrix3f R_board_camera = plane.R_board_world * pose.R_world_camera;
@@ -201,16 +205,16 @@ Vector3f ColorCamera::GatherInk(const Shot& shot, int x, int y) const {
   const Vector3f along_u = R_board_camera * rays_.At(x, y, 1, 0) - direction;
   const Vector3f along_v = R_board_camera * rays_.At(x, y, 0, 1) - direction;
   const Vector3f turn = plane.R_board_world * pose.angular_velocity.cross(pose.R_world_camera * rays_.At(x, y, 0, 0));
-  int black = 0;
+  Int4 black = Splat(0);
   const auto& samples = PatternOf(ink_samples_, x, y);
-  for (const Sample& sample : samples) {
-    const Vector3f o = origin + sample.dt * velocity;
-    const Vector3f d = direction + sample.du * along_u + sample.dv * along_v + sample.dt * turn;
-    const float t = -o.z() / d.z();
-    black += plane.IsBlack(o.x() + t * d.x(), o.y() + t * d.y()) ? 1 : 0;
+  for (const Samples& four : samples) {
+    const Vector3x4 o = four.dt * velocity + origin;
+    const Vector3x4 d = four.du * along_u + four.dv * along_v + four.dt * turn + direction;
+    const Float4 t = -o.z / d.z;
+    black -= plane.IsBlack(o.x + t * d.x, o.y + t * d.y);
   }
   const Vector3f p = PointAt(shot, x, y);
-  const float share = static_cast<float>(black) / static_cast<float>(samples.size());
+  const float share = static_cast<float>(black[0] + black[1] + black[2] + black[3]) / static_cast<float>(4 * samples.size());
   const Material white = ObjectOf(material);
   const Vector3f paper = shot.world.Albedo({white}, p);
   const Vector3f ink = shot.world.Albedo({static_cast<Material>(white + 1)}, p);
@@ -223,23 +227,21 @@ Vector3f ColorCamera::GatherOutline(const Shot& shot, int x, int y, const Candid
   Vector3f sum = Vector3f::Zero();
   bool mixed = false;
   const auto& samples = PatternOf(outline_samples_, x, y);
-  for (std::size_t first = 0; first < samples.size(); first += 4) {
+  for (const Samples& four : samples) {
     // The first four lie at the corners of the pattern: where they see nothing else, nothing else is in sight.
-    if (first == 4 && !mixed) return centre < kFirstBoard ? Vector3f(sum / 4.0F) : GatherSmooth(shot, x, y);
-    std::array<Ray, 4> rays;
-    for (std::size_t i = 0; i < 4; ++i) {
-      const Sample& sample = samples[first + i];
-      rays[i] = pose.RayOf(rays_.At(x, y, sample.du, sample.dv), sample.dt);
-    }
-    const std::array<Hit, 4> hits = shot.world.Trace(rays, candidates);
-    for (std::size_t i = 0; i < 4; ++i) {
-      const Vector3f p = rays[i].origin + hits[i].t * rays[i].direction;
-      const Shading shading = shot.world.ShadingAt(hits[i].material, p);
-      sum += shot.world.Albedo(shot.world.PaintOf(hits[i].material, shading.normal), p).cwiseProduct(shading.light);
-      mixed = mixed || hits[i].material != centre;
+    if (&four == &samples[1] && !mixed) return centre < kFirstBoard ? Vector3f(sum / 4.0F) : GatherSmooth(shot, x, y);
+    const Ray4 rays = pose.RayOf(rays_.At(x, y, four.du, four.dv), four.dt);
+    const Hit4 hits = shot.world.Trace(rays, candidates);
+    const Vector3x4 places = hits.t * rays.direction + rays.origin;
+    for (int i = 0; i < 4; ++i) {
+      const auto material = static_cast<Material>(hits.material[i]);
+      const Vector3f p = Lane(places, i);
+      const Shading shading = shot.world.ShadingAt(material, p);
+      sum += shot.world.Albedo(shot.world.PaintOf(material, shading.normal), p).cwiseProduct(shading.light);
+      mixed = mixed || material != centre;
     }
   }
-  return sum / static_cast<float>(samples.size());
+  return sum / static_cast<float>(4 * samples.size());
 }
 
 Vector3f ColorCamera::GatherSmooth(const Shot& shot, int x, int y) const {
@@ -250,28 +252,26 @@ Vector3f ColorCamera::GatherSmooth(const Shot& shot, int x, int y) const {
   if (material >= kFirstBoard) return shading.light.cwiseProduct(shot.world.Albedo(shot.world.PaintOf(material, shading.normal), p));
   // The surface is its tangent plane over one pixel.
   static_assert(kSmoothSide * kSmoothSide == 4);
-  const auto& samples = PatternOf(smooth_samples_, x, y);
-  Vector3x4 places;
-  for (int i = 0; i < 4; ++i) {
-    const Sample& sample = samples[static_cast<std::size_t>(i)];
-    const Vector3f origin = pose.p_world + sample.dt * pose.velocity;
-    const Vector3f direction = pose.DirectionOf(rays_.At(x, y, sample.du, sample.dv), sample.dt);
-    const float t = shading.normal.dot(p - origin) / std::min(-0.05F, shading.normal.dot(direction));
-    places.Set(i, origin + t * direction);
-  }
-  return shading.light.cwiseProduct(shot.world.MeanAlbedo(shot.world.PaintOf(material, shading.normal), places));
+  const Samples& four = PatternOf(smooth_samples_, x, y).front();
+  const Vector3x4 origin = four.dt * pose.velocity + pose.p_world;
+  const Vector3x4 direction = pose.DirectionOf(rays_.At(x, y, four.du, four.dv), four.dt);
+  const Float4 t = (shading.normal.dot(p) - Dot(shading.normal, origin)) / Smaller(Dot(shading.normal, direction), Splat(-0.05F));
+  return shading.light.cwiseProduct(shot.world.MeanAlbedo(shot.world.PaintOf(material, shading.normal), t * direction + origin));
 }
 
 Vector3f ColorCamera::PointAt(const Shot& shot, int x, int y) const {
-  const Ray ray = shot.rows[static_cast<std::size_t>(y)].RayOf(rays_.At(x, y, 0, 0), 0.0F);
-  return ray.origin + shot.t.at<float>(y, x) * ray.direction;
+  const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
+  return pose.p_world + shot.depth.at<float>(y, x) * (pose.R_world_camera * rays_.At(x, y, 0, 0));
 }
 
 void ColorCamera::Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const {
   const int width = rays_.width();
   const int height = rays_.height();
   const Intrinsics& camera = unit_.color_true;
-  const double corner_squared = 0.25 * (static_cast<double>(width) * width + static_cast<double>(height) * height);
+  const auto cx = static_cast<float>(camera.cx);
+  const auto cy = static_cast<float>(camera.cy);
+  const auto vignetting =
+      static_cast<float>(4.0 * unit_.vignetting / (static_cast<double>(width) * width + static_cast<double>(height) * height));
   const auto shot_noise = static_cast<float>(unit_.shot_noise);
   const auto read_variance = static_cast<float>(unit_.read_noise * unit_.read_noise);
   const bool noisy = unit_.shot_noise > 0 || unit_.read_noise > 0;
@@ -284,8 +284,9 @@ void ColorCamera::Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const {
         const std::uint8_t edge = shot.edge.at<std::uint8_t>(y, x);
         const bool only_ink = edge == kInkEdge && IsBoardTop(shot.material.at<std::uint16_t>(y, x));
         Vector3f light = only_ink ? GatherInk(shot, x, y) : edge != 0 ? GatherOutline(shot, x, y, candidates) : GatherSmooth(shot, x, y);
-        const double r_squared = ((x - camera.cx) * (x - camera.cx) + (y - camera.cy) * (y - camera.cy)) / corner_squared;
-        light *= kGain * static_cast<float>(1.0 - unit_.vignetting * r_squared);
+        const float dx = static_cast<float>(x) - cx;
+        const float dy = static_cast<float>(y) - cy;
+        light *= kGain * (1.0F - vignetting * (dx * dx + dy * dy));
         auto& pixel = rgb.at<cv::Vec3b>(y, x);
         const std::uint64_t hash =
             noisy ? Hash(shot.noise_seed, static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) + static_cast<std::uint64_t>(x))

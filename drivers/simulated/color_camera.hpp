@@ -22,8 +22,8 @@ class ColorCamera {
   [[nodiscard]] cv::Mat Render(const World& world, const Trajectory& trajectory, double time_s, std::uint64_t noise_seed) const;
 
  private:
-  struct Sample {
-    float du, dv, dt;  ///< Pixels from the centre; seconds from mid-exposure.
+  struct Samples {
+    Float4 du, dv, dt;  ///< Four: pixels from the centre; seconds from mid-exposure.
   };
   struct Shot;  ///< One image in the making.
   void BuildSamples();
@@ -31,8 +31,8 @@ class ColorCamera {
   [[nodiscard]] cv::Mat EdgeMask(const Shot& shot) const;
   void Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const;
   static constexpr std::size_t kNumPatterns = 32;
-  using Patterns = std::vector<std::vector<Sample>>;
-  [[nodiscard]] static const std::vector<Sample>& PatternOf(const Patterns& patterns, int x, int y) {
+  using Patterns = std::vector<std::vector<Samples>>;
+  [[nodiscard]] static const std::vector<Samples>& PatternOf(const Patterns& patterns, int x, int y) {
     return patterns[Hash(static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y)) % kNumPatterns];
   }
   [[nodiscard]] Eigen::Vector3f PointAt(const Shot& shot, int x, int y) const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 #include <tbb/parallel_for.h>
 
@@ -22,6 +23,34 @@ constexpr float kFlyingShare = 0.15F;                                // Edge pix
 constexpr float kEdgeLossShare = 0.45F;                              // Edge pixels without depth.
 constexpr float kGrazingBegin = static_cast<float>(74.0 * kDegree);  // Losses begin here,
 constexpr float kGrazingEnd = static_cast<float>(82.0 * kDegree);    // and are complete here.
+constexpr float kSteepest = 1.3F;                                    // Radians; steeper surfaces still count as edges.
+constexpr int kSlantSteps = 2048;
+
+// Share of the beams that a surface of this incidence loses, by its cosine.
+float GrazingLoss(float cosine) {
+  static const float kBegin = std::cos(kGrazingBegin);
+  if (cosine >= kBegin) return 0.0F;
+  return std::min((std::acos(cosine) - kGrazingBegin) / (kGrazingEnd - kGrazingBegin), 1.0F);
+}
+
+float TangentOf(float cosine) {
+  static const float kLeast = std::cos(kSteepest);
+  const float c = std::max(cosine, kLeast);
+  return std::sqrt(1.0F - c * c) / c;
+}
+
+// Cosines of the angles between rays and the normals of what they met.
+Float4 IncidenceCosine(const World& world, const Ray4& rays, const Hit4& hits) {
+  Float4 cosine = -rays.direction.z;  // The support's.
+  if (Any(hits.material > kSupport)) {
+    const Vector3x4 places = hits.t * rays.direction + rays.origin;
+    for (int i = 0; i < 4; ++i) {
+      if (hits.material[i] > kSupport)
+        cosine[i] = -world.Normal(static_cast<Material>(hits.material[i]), Lane(places, i)).dot(Lane(rays.direction, i));
+    }
+  }
+  return Smaller(Larger(cosine, Splat(0.0F)), Splat(1.0F));
+}
 
 }  // namespace
 
@@ -30,6 +59,8 @@ struct DepthCamera::Layers {
 };
 
 DepthCamera::DepthCamera(const SensorUnit& unit) : unit_(unit), rays_(unit.depth_true) {
+  for (int i = 0; i <= kSlantSteps + 1; ++i)
+    slants_.push_back(static_cast<float>(NguyenSlant(std::acos(std::min(1.0, static_cast<double>(i) / kSlantSteps)))));
   const Intrinsics& camera = unit_.depth_assumed;
   const Eigen::Matrix3d R_color_depth = unit_.T_color_depth_assumed.linear();
   for (int y = 0; y < camera.height; ++y) {
@@ -41,7 +72,7 @@ DepthCamera::DepthCamera(const SensorUnit& unit) : unit_(unit), rays_(unit.depth
 }
 
 void DepthCamera::Cast(const World& world, std::span<const MovingPose> rows, int tile_row, const Layers& layers, cv::Mat& true_m,
-                       cv::Mat& incidence) const {
+                       cv::Mat& incidence_cosine) const {
   const int width = rays_.width();
   const int y_end = std::min(rays_.height(), (tile_row + 1) * kTileSize);
   const int y_mid = std::min(rays_.height() - 1, tile_row * kTileSize + kTileSize / 2);
@@ -59,43 +90,44 @@ void DepthCamera::Cast(const World& world, std::span<const MovingPose> rows, int
       sigma_px = static_cast<float>(unit_.lateral_noise * NguyenLateralSigma(angle));
     }
     for (int y = tile_row * kTileSize; y < y_end; ++y) {
-      const MovingPose& pose = rows[static_cast<std::size_t>(y)];
-      const Vector3f forward = pose.R_world_camera.col(2);
       for (int x = x_begin; x < std::min(width, x_begin + kTileSize); x += 4) {
-        std::array<Ray, 4> rays;
-        for (int i = 0; i < 4; ++i) {
-          float du = 0;
-          float dv = 0;
-          if (sigma_px > 0) {
-            const std::size_t index = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x + i);
-            du = std::clamp(sigma_px * layers.jitter_x[index], -4.0F, 4.0F);
-            dv = std::clamp(sigma_px * layers.jitter_y[index], -4.0F, 4.0F);
-          }
-          rays[static_cast<std::size_t>(i)] = pose.RayOf(rays_.At(x + i, y, du, dv), 0.0F);
+        Float4 du = Splat(0.0F);
+        Float4 dv = Splat(0.0F);
+        if (sigma_px > 0) {
+          const std::size_t index = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+          du = Smaller(Larger(sigma_px * Load(&layers.jitter_x[index]), Splat(-4.0F)), Splat(4.0F));
+          dv = Smaller(Larger(sigma_px * Load(&layers.jitter_y[index]), Splat(-4.0F)), Splat(4.0F));
         }
-        const std::array<Hit, 4> hits = world.Trace(rays, candidates);
-        for (int i = 0; i < 4; ++i) {
-          const Ray& ray = rays[static_cast<std::size_t>(i)];
-          const Hit& hit = hits[static_cast<std::size_t>(i)];
-          const bool met = hit.material != kNothing;
-          true_m.at<float>(y, x + i) = met ? hit.t * ray.direction.dot(forward) : 0.0F;
-          if (incidence.empty()) continue;
-          const Vector3f normal = world.Normal(hit.material, ray.origin + hit.t * ray.direction);
-          incidence.at<float>(y, x + i) = met ? std::acos(std::clamp(-normal.dot(ray.direction), 0.0F, 1.0F)) : 0.0F;
+        const Ray4 rays = rows[static_cast<std::size_t>(y)].RayOf(rays_.FourFrom(x, y, du, dv));
+        const Hit4 hits = world.Trace(rays, candidates);
+        const Int4 met = hits.material != kNothing;
+        const Float4 depth = met ? hits.t * rays.inverse_norm : Splat(0.0F);
+        std::memcpy(true_m.ptr<float>(y) + x, &depth, sizeof(depth));
+        if (!incidence_cosine.empty()) {
+          const Float4 cosine = met ? IncidenceCosine(world, rays, hits) : Splat(1.0F);
+          std::memcpy(incidence_cosine.ptr<float>(y) + x, &cosine, sizeof(cosine));
         }
       }
     }
   }
 }
 
-void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m, const cv::Mat& incidence, std::uint64_t noise_seed,
+inline float DepthCamera::SlantAt(float cosine) const {
+  const float place = cosine * kSlantSteps;
+  const auto i = static_cast<std::size_t>(place);
+  return slants_[i] + (place - static_cast<float>(i)) * (slants_[i + 1] - slants_[i]);
+}
+
+void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m, const cv::Mat& incidence_cosine, std::uint64_t noise_seed,
                           cv::Mat& measured_m) const {
   const int width = rays_.width();
   const int height = rays_.height();
-  const double corner_squared = 0.25 * (static_cast<double>(width) * width + static_cast<double>(height) * height);
+  const double inverse_corner_squared = 4.0 / (static_cast<double>(width) * width + static_cast<double>(height) * height);
+  const double inverse_corner = std::sqrt(inverse_corner_squared);
   const auto* truth = true_m.ptr<float>(y);
   const auto* above = true_m.ptr<float>(std::max(0, y - 1));
   const auto* below = true_m.ptr<float>(std::min(height - 1, y + 1));
+  const float* cosine = incidence_cosine.empty() ? nullptr : incidence_cosine.ptr<float>(y);
   auto* out = measured_m.ptr<float>(y);
   for (int x = 0; x < width; ++x) {
     double z = truth[x];
@@ -105,15 +137,13 @@ void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m, co
     if (unit_.dropout > 0) {
       const std::uint64_t hash = Hash(noise_seed, index, 5);
       const auto chance = static_cast<float>(UnitUniform(hash));
-      const float theta = incidence.at<float>(y, x);
-      const float grazing = std::clamp((theta - kGrazingBegin) / (kGrazingEnd - kGrazingBegin), 0.0F, 1.0F);
-      const auto lost = static_cast<float>(unit_.dropout) + grazing;
+      const auto lost = static_cast<float>(unit_.dropout) + GrazingLoss(cosine[x]);
       if (chance < lost) continue;
       const float left = truth[std::max(0, x - 1)];
       const float right = truth[std::min(width - 1, x + 1)];
       const float lowest = std::min({left, right, above[x], below[x], truth[x]});
       const float highest = std::max({left, right, above[x], below[x], truth[x]});
-      if (highest - lowest > kEdgeStep + 0.02F * lowest * std::tan(std::min(theta, 1.3F))) {
+      if (highest - lowest > kEdgeStep && highest - lowest > kEdgeStep + 0.02F * lowest * TangentOf(cosine[x])) {
         const auto edge_chance = static_cast<float>(UnitUniform(Hash(hash)));
         if (edge_chance < kEdgeLossShare) continue;
         if (edge_chance < kEdgeLossShare + kFlyingShare) z = lowest + UnitUniform(Hash(hash, 1)) * (highest - lowest);
@@ -124,11 +154,11 @@ void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m, co
     const double true_z = z;
     z = true_z * (1.0 + unit_.depth_scale_error) + unit_.depth_offset_m +
         true_z * true_z *
-            (unit_.depth_bow_per_m * ((u * u + v * v) / corner_squared - 0.5) +
-             (unit_.depth_tilt_per_m[0] * u + unit_.depth_tilt_per_m[1] * v) / std::sqrt(corner_squared));
+            (unit_.depth_bow_per_m * ((u * u + v * v) * inverse_corner_squared - 0.5) +
+             (unit_.depth_tilt_per_m[0] * u + unit_.depth_tilt_per_m[1] * v) * inverse_corner);
     if (!layers.axial.empty()) {
       const double step = unit_.quantised ? z * z * 2.894e-3 : 0.0;  // The PS1080's step: 9000 / z_mm in units of 0.1042 / 4.
-      const double sigma = unit_.axial_noise * NguyenAxialSigma(true_z, incidence.at<float>(y, x));
+      const double sigma = unit_.axial_noise * NguyenAxialSigma(true_z, SlantAt(cosine[x]));
       z += std::sqrt(std::max(0.0, sigma * sigma - step * step / 12.0)) * layers.axial[index];
     }
     if (!(z > unit_.min_range_m && z < unit_.max_range_m)) continue;
@@ -197,11 +227,12 @@ DepthShot DepthCamera::Render(const World& world, const Trajectory& trajectory, 
   DepthShot shot;
   shot.true_m = cv::Mat(height, width, CV_32FC1);
   shot.measured_m = cv::Mat(height, width, CV_32FC1);
-  cv::Mat incidence;
-  if (unit_.axial_noise > 0 || unit_.dropout > 0) incidence = cv::Mat(height, width, CV_32FC1);
-  tbb::parallel_for(0, (height + kTileSize - 1) / kTileSize, [&](int row) { Cast(world, rows, row, layers, shot.true_m, incidence); });
+  cv::Mat incidence_cosine;
+  if (unit_.axial_noise > 0 || unit_.dropout > 0) incidence_cosine = cv::Mat(height, width, CV_32FC1);
+  tbb::parallel_for(0, (height + kTileSize - 1) / kTileSize,
+                    [&](int row) { Cast(world, rows, row, layers, shot.true_m, incidence_cosine); });
   tbb::parallel_for(0, height, [&](int y) {
-    Measure(y, layers, shot.true_m, incidence, noise_seed, shot.measured_m);
+    Measure(y, layers, shot.true_m, incidence_cosine, noise_seed, shot.measured_m);
     if (unit_.projector_baseline_m > 0) CastShadow(y, shot.true_m, shot.measured_m);
   });
   shot.registered = Register(shot.measured_m);

@@ -30,14 +30,16 @@ class DepthCamera {
  private:
   struct Layers;
   void Cast(const World& world, std::span<const MovingPose> rows, int tile_row, const Layers& layers, cv::Mat& true_m,
-            cv::Mat& incidence) const;
-  void Measure(int y, const Layers& layers, const cv::Mat& true_m, const cv::Mat& incidence, std::uint64_t noise_seed,
+            cv::Mat& incidence_cosine) const;
+  void Measure(int y, const Layers& layers, const cv::Mat& true_m, const cv::Mat& incidence_cosine, std::uint64_t noise_seed,
                cv::Mat& measured_m) const;
   void CastShadow(int y, const cv::Mat& true_m, cv::Mat& measured_m) const;
+  [[nodiscard]] float SlantAt(float cosine) const;  ///< NguyenSlant() by the cosine of the incidence.
   [[nodiscard]] cv::Mat Register(const cv::Mat& measured_m) const;
 
   SensorUnit unit_;
   PixelRays rays_;
+  std::vector<float> slants_;                  ///< By the cosine, in equal steps.
   std::vector<Eigen::Vector3f> assumed_rays_;  ///< Of the registration: where each pixel looks in the colour camera's frame.
 };
 

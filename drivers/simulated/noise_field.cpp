@@ -44,9 +44,11 @@ std::vector<float> CorrelatedNoise(std::uint64_t seed, int width, int height, do
   tbb::parallel_for(0, height, [&](int y) {
     // The row with its wrapped ends on both sides.
     std::vector<float> padded(w + 2 * static_cast<std::size_t>(reach));
-    for (int i = 0; i < static_cast<int>(padded.size()); ++i) {
-      const int x = ((i - reach) % width + width) % width;
-      padded[static_cast<std::size_t>(i)] = White(Hash(seed, static_cast<std::uint64_t>(y) * w + static_cast<std::uint64_t>(x)));
+    const auto r = static_cast<std::size_t>(reach);
+    for (std::size_t x = 0; x < w; ++x) padded[r + x] = White(Hash(seed, static_cast<std::uint64_t>(y) * w + x));
+    for (std::size_t i = 0; i < r; ++i) {
+      padded[r - 1 - i] = padded[r + (w - 1 - i % w)];
+      padded[r + w + i] = padded[r + i % w];
     }
     float* out = &rows[static_cast<std::size_t>(y) * w];
     const float* centre = padded.data() + reach;

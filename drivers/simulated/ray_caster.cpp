@@ -12,13 +12,18 @@ PixelRays::PixelRays(const Intrinsics& camera) : width_(camera.width), height_(c
     for (int x = -1; x <= width_; ++x)
       ideal[static_cast<std::size_t>(y + 1) * across + static_cast<std::size_t>(x + 1)] = Undistort(camera, {x, y});
   });
-  entries_.reserve(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  for (std::vector<float>* values : {&x_, &y_, &x_du_, &x_dv_, &y_du_, &y_dv_}) values->reserve(Index(0, height_));
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
       const Eigen::Vector2d* centre = &ideal[static_cast<std::size_t>(y + 1) * across + static_cast<std::size_t>(x + 1)];
       const Eigen::Vector2f du = (0.5 * (centre[1] - centre[-1])).cast<float>();
       const Eigen::Vector2f dv = (0.5 * (*(centre + across) - *(centre - across))).cast<float>();
-      entries_.push_back({static_cast<float>(centre->x()), static_cast<float>(centre->y()), du.x(), dv.x(), du.y(), dv.y()});
+      x_.push_back(static_cast<float>(centre->x()));
+      y_.push_back(static_cast<float>(centre->y()));
+      x_du_.push_back(du.x());
+      x_dv_.push_back(dv.x());
+      y_du_.push_back(du.y());
+      y_dv_.push_back(dv.y());
     }
   }
 }

@@ -20,21 +20,37 @@ class PixelRays {
   explicit PixelRays(const Intrinsics& camera);
   /// Ray through a place near the centre of pixel (x, y), du and dv pixels away; z = 1. Linear in du, dv over a few pixels.
   [[nodiscard]] Eigen::Vector3f At(int x, int y, float du, float dv) const {
-    const Entry& e = entries_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
-    return {e.x + du * e.x_du + dv * e.x_dv, e.y + du * e.y_du + dv * e.y_dv, 1.0F};
+    const std::size_t i = Index(x, y);
+    return {x_[i] + du * x_du_[i] + dv * x_dv_[i], y_[i] + du * y_du_[i] + dv * y_dv_[i], 1.0F};
+  }
+  /// Through four places near the centre of one pixel.
+  [[nodiscard]] Vector3x4 At(int x, int y, Float4 du, Float4 dv) const {
+    const std::size_t i = Index(x, y);
+    return {x_[i] + du * x_du_[i] + dv * x_dv_[i], y_[i] + du * y_du_[i] + dv * y_dv_[i], Splat(1.0F)};
+  }
+  /// Through the centres of the pixels x to x + 3 of a row.
+  [[nodiscard]] Vector3x4 FourFrom(int x, int y) const {
+    const std::size_t i = Index(x, y);
+    return {Load(&x_[i]), Load(&y_[i]), Splat(1.0F)};
+  }
+  /// Through a place near each of them.
+  [[nodiscard]] Vector3x4 FourFrom(int x, int y, Float4 du, Float4 dv) const {
+    const std::size_t i = Index(x, y);
+    return {Load(&x_[i]) + du * Load(&x_du_[i]) + dv * Load(&x_dv_[i]), Load(&y_[i]) + du * Load(&y_du_[i]) + dv * Load(&y_dv_[i]),
+            Splat(1.0F)};
   }
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] float focal_px() const { return focal_px_; }
 
  private:
-  struct Entry {
-    float x, y, x_du, x_dv, y_du, y_dv;
-  };
+  [[nodiscard]] std::size_t Index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
+  }
   int width_;
   int height_;
   float focal_px_;
-  std::vector<Entry> entries_;
+  std::vector<float> x_, y_, x_du_, x_dv_, y_du_, y_dv_;  ///< By pixel.
 };
 
 /// A camera's place with its motion, so that the poses of a few milliseconds around come cheaply.
@@ -53,6 +69,15 @@ struct MovingPose {
   [[nodiscard]] Ray RayOf(const Eigen::Vector3f& direction_camera, float dt) const {
     return {p_world + dt * velocity, DirectionOf(direction_camera, dt).normalized()};
   }
+  [[nodiscard]] Vector3x4 DirectionOf(const Vector3x4& direction_camera, Float4 dt) const {
+    const Vector3x4 direction = R_world_camera * direction_camera;
+    return direction + dt * Cross(angular_velocity, direction);
+  }
+  [[nodiscard]] Ray4 RayOf(const Vector3x4& direction_camera, Float4 dt) const {
+    return Ray4(dt * velocity + p_world, DirectionOf(direction_camera, dt));
+  }
+  /// At the pose's own time.
+  [[nodiscard]] Ray4 RayOf(const Vector3x4& direction_camera) const { return Ray4(Splat(p_world), R_world_camera * direction_camera); }
 };
 
 /// @param T_carrier_camera  Where this camera sits on what the trajectory moves (the colour camera).

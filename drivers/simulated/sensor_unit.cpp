@@ -52,10 +52,10 @@ void DrawOptics(SensorUnit& unit, RandomStream& random, double size) {
 
 }  // namespace
 
-double NguyenAxialSigma(double z, double incidence) {
+double NguyenSlant(double incidence) {
   const double theta = std::min(incidence, kMaxIncidence);
   const double rest = std::numbers::pi / 2.0 - theta;
-  return 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4) + 0.0001 / std::sqrt(z) * theta * theta / (rest * rest);
+  return theta * theta / (rest * rest);
 }
 
 double NguyenLateralSigma(double incidence) {

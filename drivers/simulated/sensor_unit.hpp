@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "algo/types/intrinsics.hpp"
@@ -60,8 +61,12 @@ struct SensorUnit {
 /// Ideal: one pinhole camera that gives colour and depth at the same instant, without noise.
 [[nodiscard]] SensorUnit MakeSensorUnit(NoiseLevel level, std::uint64_t seed, int width, int height);
 
-/// Standard deviation of one depth reading (Nguyen 2012), metres. z in metres, incidence in radians from the surface's normal.
-[[nodiscard]] double NguyenAxialSigma(double z, double incidence);
+/// Standard deviation of one depth reading (Nguyen 2012), metres. z in metres.
+/// @param slant  NguyenSlant() of the incidence: theta^2 / (pi/2 - theta)^2, theta in radians from the surface's normal.
+[[nodiscard]] inline double NguyenAxialSigma(double z, double slant) {
+  return 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4) + 0.0001 / std::sqrt(z) * slant;
+}
+[[nodiscard]] double NguyenSlant(double incidence);
 /// Standard deviation of its place in the image, pixels of a 640 x 480 image.
 [[nodiscard]] double NguyenLateralSigma(double incidence);
 

@@ -112,96 +112,89 @@ Candidates World::FindCandidates(const Ray& centre, float spread, float margin) 
   return found;
 }
 
-void World::TraceSupport(const Ray& ray, Hit& hit) const {
-  if (ray.direction.z() > -1e-4F) return;
-  const float t = -ray.origin.z() / ray.direction.z();
-  const Vector3f p = ray.origin + t * ray.direction;
-  if (!room_.couch || room_.couch->contains(Eigen::Vector2f(p.head<2>()))) {
-    hit = {t, kSupport};
-    return;
-  }
-  hit = {t - room_.floor_below_couch_m / ray.direction.z(), kLowerFloor};
-  // The couch's vertical sides, seen from outside.
-  for (int axis = 0; axis < 2; ++axis) {
-    if (std::abs(ray.direction[axis]) < 1e-6F) continue;
-    const float plane = ray.direction[axis] > 0 ? room_.couch->min()[axis] : room_.couch->max()[axis];
-    const float t_side = (plane - ray.origin[axis]) / ray.direction[axis];
-    const Vector3f q = ray.origin + t_side * ray.direction;
-    const int other = 1 - axis;
-    if (t_side > 0 && q.z() < 0 && q.z() > -kCouchThickness && q[other] >= room_.couch->min()[other] &&
-        q[other] <= room_.couch->max()[other]) {
-      hit = {t_side, kCouchSide};
-    }
-  }
+void World::TraceSupport(const Ray4& rays, Hit4& hits) const {
+  const Int4 down = rays.direction.z < -1e-4F;
+  const Float4 t = -rays.origin.z / rays.direction.z;
+  hits.t = down ? t : hits.t;
+  hits.material = down ? Splat(std::int32_t{kSupport}) : hits.material;
+  if (!room_.couch) return;
+  const Float4 x = rays.origin.x + t * rays.direction.x;
+  const Float4 y = rays.origin.y + t * rays.direction.y;
+  const Eigen::Vector2f &low = room_.couch->min(), &high = room_.couch->max();
+  const Int4 beside = down & ~((x >= low.x()) & (x <= high.x()) & (y >= low.y()) & (y <= high.y()));
+  if (Any(beside)) TraceCouchSides(rays, beside, hits);
 }
 
-void World::TraceBoard(int index, const Ray& ray, Hit& hit) const {
+// Of the rays that pass beside the couch's top: the floor, or a vertical side of the couch seen from outside.
+void World::TraceCouchSides(const Ray4& rays, Int4 beside, Hit4& hits) const {
+  hits.t = beside ? hits.t - room_.floor_below_couch_m / rays.direction.z : hits.t;
+  hits.material = beside ? Splat(std::int32_t{kLowerFloor}) : hits.material;
+  const Eigen::Vector2f &low = room_.couch->min(), &high = room_.couch->max();
+  const auto side = [&](Float4 origin, Float4 direction, float near, float far, Float4 other_origin, Float4 other_direction, float left,
+                        float right) {
+    const Float4 t = ((direction > 0.0F ? Splat(near) : Splat(far)) - origin) / direction;
+    const Float4 z = rays.origin.z + t * rays.direction.z;
+    const Float4 other = other_origin + t * other_direction;
+    const Int4 met =
+        beside & (Magnitude(direction) >= 1e-6F) & (t > 0.0F) & (z < 0.0F) & (z > -kCouchThickness) & (other >= left) & (other <= right);
+    hits.t = met ? t : hits.t;
+    hits.material = met ? Splat(std::int32_t{kCouchSide}) : hits.material;
+  };
+  side(rays.origin.x, rays.direction.x, low.x(), high.x(), rays.origin.y, rays.direction.y, low.y(), high.y());
+  side(rays.origin.y, rays.direction.y, low.y(), high.y(), rays.origin.x, rays.direction.x, low.x(), high.x());
+}
+
+void World::TraceBoard(int index, const Ray4& rays, Hit4& hits) const {
   const BoardPlane& board = boards_[static_cast<std::size_t>(index)];
-  const Vector3f o = board.R_board_world * (ray.origin - board.p_world);
-  const Vector3f d = board.R_board_world * ray.direction;
-  float t_near = 0;
-  float t_far = hit.t;
-  bool through_top = false;
-  for (int axis = 0; axis < 3; ++axis) {
-    const float inverse = 1.0F / d[axis];
-    float near = ((axis < 2 ? -kBoardHalf : -kBoardDepth) - o[axis]) * inverse;
-    float far = ((axis < 2 ? kBoardHalf : 0.0F) - o[axis]) * inverse;
-    if (near > far) std::swap(near, far);
-    if (near > t_near) {
-      t_near = near;
-      through_top = axis == 2;
-    }
-    t_far = std::min(t_far, far);
-  }
-  if (t_near >= t_far || t_near <= 0) return;
-  hit.t = t_near;
-  const int part = !through_top ? 2 : board.IsBlack(o.x() + t_near * d.x(), o.y() + t_near * d.y()) ? 1 : 0;
-  hit.material = static_cast<Material>(kFirstBoard + 4 * index + part);
+  const Vector3x4 o = board.R_board_world * (rays.origin - board.p_world);
+  const Vector3x4 d = board.R_board_world * rays.direction;
+  Float4 t_near = Splat(0.0F);
+  Float4 t_far = hits.t;
+  const auto clip = [&](Float4 origin, Float4 direction, float low, float high) {
+    const Float4 inverse = 1.0F / direction;
+    const Float4 a = (low - origin) * inverse;
+    const Float4 b = (high - origin) * inverse;
+    t_far = Smaller(Larger(a, b), t_far);
+    return Smaller(a, b);
+  };
+  t_near = Larger(t_near, clip(o.x, d.x, -kBoardHalf, kBoardHalf));
+  t_near = Larger(t_near, clip(o.y, d.y, -kBoardHalf, kBoardHalf));
+  const Float4 top = clip(o.z, d.z, -kBoardDepth, 0.0F);
+  const Int4 through_top = top > t_near;
+  t_near = Larger(t_near, top);
+  const Int4 met = (t_near < t_far) & (t_near > 0.0F);
+  if (!Any(met)) return;
+  hits.t = met ? t_near : hits.t;
+  const Int4 part = through_top ? board.IsBlack(o.x + t_near * d.x, o.y + t_near * d.y) & 1 : Splat(2);
+  hits.material = met ? kFirstBoard + 4 * index + part : hits.material;
 }
 
-bool World::BoardPlane::IsBlack(float x, float y) const {
+Int4 World::BoardPlane::IsBlack(Float4 x, Float4 y) const {
   constexpr float kCellsPerMetre = 8.0F / (2.0F * kMarkerHalf);
-  const float column = (x + kMarkerHalf) * kCellsPerMetre;
-  const float row = (kMarkerHalf - y) * kCellsPerMetre;
-  const bool printed = column >= 0 && row >= 0 && column < 8 && row < 8;
-  return printed && black[static_cast<std::size_t>(8 * static_cast<int>(row) + static_cast<int>(column))] != 0;
+  const Float4 column = (x + kMarkerHalf) * kCellsPerMetre;
+  const Float4 row = (kMarkerHalf - y) * kCellsPerMetre;
+  const Int4 printed = (column >= 0.0F) & (row >= 0.0F) & (column < 8.0F) & (row < 8.0F);
+  const Int4 cell = printed ? 8 * __builtin_convertvector(row, Int4) + __builtin_convertvector(column, Int4) : Splat(0);
+  const auto at = [&](int i) { return static_cast<std::int32_t>(black[static_cast<std::size_t>(cell[i])]); };
+  return printed & (Int4{at(0), at(1), at(2), at(3)} != 0);
 }
 
-Hit World::TraceFlat(const Ray& ray, const Candidates& candidates) const {
-  Hit hit;
-  TraceSupport(ray, hit);
-  for (int i = 0; i < candidates.num_boards; ++i) TraceBoard(candidates.boards[static_cast<std::size_t>(i)], ray, hit);
-  return hit;
+Hit4 World::Trace(const Ray4& rays, const Candidates& candidates) const {
+  Hit4 hits;
+  TraceSupport(rays, hits);
+  for (int i = 0; i < candidates.num_boards; ++i) TraceBoard(candidates.boards[static_cast<std::size_t>(i)], rays, hits);
+  const Float4 begin = Splat(candidates.body_start);
+  if (!Any(begin < hits.t)) return hits;
+  const Float4 t = body_->Intersect(R_body_world_ * rays.origin + t_body_world_, R_body_world_ * rays.direction, begin, hits.t);
+  const Int4 met = t < hits.t;
+  hits.t = met ? t : hits.t;
+  hits.material = met ? Splat(std::int32_t{kBody}) : hits.material;
+  return hits;
 }
 
 Hit World::Trace(const Ray& ray, const Candidates& candidates) const {
-  Hit hit = TraceFlat(ray, candidates);
-  if (candidates.body_start < hit.t) {
-    const float t = body_->Intersect(ToBody(ray.origin), R_body_world_ * ray.direction, candidates.body_start, hit.t);
-    if (t < hit.t) hit = {t, kBody};
-  }
-  return hit;
-}
-
-std::array<Hit, 4> World::Trace(const std::array<Ray, 4>& rays, const Candidates& candidates) const {
-  std::array<Hit, 4> hits;
-  Vector3x4 origin;
-  Vector3x4 direction;
-  Float4 end;
-  for (std::size_t i = 0; i < 4; ++i) {
-    hits[i] = TraceFlat(rays[i], candidates);
-    const int lane = static_cast<int>(i);
-    origin.Set(lane, rays[i].origin);
-    direction.Set(lane, rays[i].direction);
-    end[lane] = hits[i].t;
-  }
-  const Float4 begin = Splat(candidates.body_start);
-  if (!Any(begin < end)) return hits;
-  const Float4 t = body_->Intersect(R_body_world_ * origin + t_body_world_, R_body_world_ * direction, begin, end);
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (t[static_cast<int>(i)] < hits[i].t) hits[i] = {t[static_cast<int>(i)], kBody};
-  }
-  return hits;
+  const Hit4 hits = Trace(Ray4(Splat(ray.origin), Splat(ray.direction)), candidates);
+  return {hits.t[0], static_cast<Material>(hits.material[0])};
 }
 
 Vector3f World::Normal(Material material, const Vector3f& p_world) const {

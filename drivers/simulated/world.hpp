@@ -59,6 +59,22 @@ struct Ray {
   Eigen::Vector3f direction;  ///< World, unit length.
 };
 
+/// Four rays.
+struct Ray4 {
+  Vector3x4 origin;     ///< World, metres.
+  Vector3x4 direction;  ///< World, unit length.
+  Float4 inverse_norm;  ///< Of the directions as they were given: 1 / |way|.
+
+  Ray4(const Vector3x4& start, const Vector3x4& way) : origin(start), inverse_norm(1.0F / Root(SquaredNorm(way))) {
+    direction = inverse_norm * way;
+  }
+};
+
+struct Hit4 {
+  Float4 t = Splat(std::numeric_limits<float>::infinity());  ///< Metres along the rays.
+  Int4 material{kNothing, kNothing, kNothing, kNothing};
+};
+
 struct Hit {
   float t = std::numeric_limits<float>::infinity();  ///< Metres along the ray.
   Material material = kNothing;
@@ -86,7 +102,7 @@ class World {
   [[nodiscard]] Candidates FindCandidates(const Ray& centre, float spread, float margin) const;
   [[nodiscard]] Hit Trace(const Ray& ray, const Candidates& candidates) const;
   /// Four rays at once, which costs little more than one.
-  [[nodiscard]] std::array<Hit, 4> Trace(const std::array<Ray, 4>& rays, const Candidates& candidates) const;
+  [[nodiscard]] Hit4 Trace(const Ray4& rays, const Candidates& candidates) const;
 
   [[nodiscard]] Eigen::Vector3f Normal(Material material, const Eigen::Vector3f& p_world) const;
   /// Normal and light at a place: both vary slowly over a surface.
@@ -107,8 +123,8 @@ class World {
     Eigen::Vector3f p_world;
     std::array<std::uint8_t, 64> black;  ///< 8 x 8 cells, row 0 at the top of the print.
 
-    /// @param x, y  On the board, metres from its centre.
-    [[nodiscard]] bool IsBlack(float x, float y) const;
+    /// @param x, y  On the board, metres from its centre.  @return Mask.
+    [[nodiscard]] Int4 IsBlack(Float4 x, Float4 y) const;
   };
   [[nodiscard]] const BoardPlane& PlaneOf(int board) const { return boards_[static_cast<std::size_t>(board)]; }
 
@@ -117,9 +133,9 @@ class World {
 
  private:
   [[nodiscard]] Eigen::Vector3f SupportLight(const Eigen::Vector3f& p_world) const;
-  void TraceBoard(int index, const Ray& ray, Hit& hit) const;
-  void TraceSupport(const Ray& ray, Hit& hit) const;
-  [[nodiscard]] Hit TraceFlat(const Ray& ray, const Candidates& candidates) const;  ///< Everything but the body.
+  void TraceBoard(int index, const Ray4& rays, Hit4& hits) const;
+  void TraceSupport(const Ray4& rays, Hit4& hits) const;
+  void TraceCouchSides(const Ray4& rays, Int4 beside, Hit4& hits) const;
   [[nodiscard]] Eigen::Vector3f ToBody(const Eigen::Vector3f& p_world) const { return R_body_world_ * p_world + t_body_world_; }
   template <typename Place>
   [[nodiscard]] Eigen::Vector3f AlbedoOf(const Paint& paint, const Place& p_world) const;

@@ -46,6 +46,11 @@ TEST(DistanceGridTest, FourRaysAtOnceFindWhatEachFindsAlone) {
   const auto ball = Ball();
   RandomStream random(5);
   const auto within = [&](double limit) { return static_cast<float>(random.Within(limit)); };
+  const auto set = [](Vector3x4& lanes, int i, const Vector3f& v) {
+    lanes.x[i] = v.x();
+    lanes.y[i] = v.y();
+    lanes.z[i] = v.z();
+  };
   int hits = 0;
   int misses = 0;
   for (int packet = 0; packet < 2000; ++packet) {
@@ -58,8 +63,8 @@ TEST(DistanceGridTest, FourRaysAtOnceFindWhatEachFindsAlone) {
       // Beside, grazing and through the ball; some from inside of the box, some that end before it.
       const Vector3f origin(within(0.3), within(0.3), random.Uniform() < 0.2 ? 0.11F : 0.8F);
       const Vector3f direction = (Vector3f(within(0.14), within(0.14), within(0.05)) - origin).normalized();
-      origins.Set(i, origin);
-      directions.Set(i, direction);
+      set(origins, i, origin);
+      set(directions, i, direction);
       begin[i] = static_cast<float>(random.Uniform(0.0, 0.1));
       end[i] = random.Uniform() < 0.2 ? 0.3F : 2.0F;
       alone[i] = ball->Intersect(origin, direction, begin[i], end[i]);
