@@ -41,12 +41,12 @@ double Milliseconds(Clock::duration duration) { return std::chrono::duration<dou
 
 Appliance::Appliance(EventLoop& loop, ApplianceParts parts) : loop_(loop), parts_(std::move(parts)) {
   OpenStore();
-  result_timer_ = loop_.MakeTimer([this] { (void)Handle(ScanEvent::kResultExpired); });
-  limit_timer_ = loop_.MakeTimer([this] {
+  result_timer_ = loop_.MakeTimer("result expired", [this] { (void)Handle(ScanEvent::kResultExpired); });
+  limit_timer_ = loop_.MakeTimer("longest sweep", [this] {
     Log(LogLevel::kNotice, "the longest sweep is over", {{"SCAN", scan_.id}});
     (void)Handle(ScanEvent::kSweepComplete);
   });
-  tick_timer_ = loop_.MakeTimer([this] { OnTick(); });
+  tick_timer_ = loop_.MakeTimer("tick", [this] { OnTick(); });
   tick_timer_.ArmAfter(kTick);
   if (!storage_fault_.empty()) (void)Handle(ScanEvent::kStorageFailed);
   WatchButton();
@@ -54,7 +54,7 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts) : loop_(loop), parts
   Care();
   sensors_ = std::make_unique<SensorThread>(
       parts_.make_provider, SensorThreadOptions{.serial = parts_.config.appliance.sensor_serial, .before_scan = parts_.before_scan},
-      [this](const SensorEvent& event) { loop_.Post([this, event] { OnSensor(event); }); });
+      [this](const SensorEvent& event) { loop_.Post("sensor", [this, event] { OnSensor(event); }); });
 }
 
 Appliance::~Appliance() {
@@ -106,8 +106,8 @@ void Appliance::WatchButton() {
       button_source_ = {};
     }
   };
-  button_timer_ = loop_.MakeTimer(dispatch);
-  button_source_ = loop_.WatchDescriptor(parts_.button->fd(), EPOLLIN, [dispatch](std::uint32_t) { dispatch(); });
+  button_timer_ = loop_.MakeTimer("button", dispatch);
+  button_source_ = loop_.WatchDescriptor("button", parts_.button->fd(), EPOLLIN, [dispatch](std::uint32_t) { dispatch(); });
   ArmButtonTimer();
 }
 
@@ -184,7 +184,7 @@ void Appliance::StartScan() {
   } catch (const std::exception& error) {
     scan_fault_ = fmt::format("the scan could not begin: {}", error.what());
     Log(LogLevel::kError, scan_fault_);
-    loop_.Post([this] { (void)Handle(ScanEvent::kScanFailed); });
+    loop_.Post("scan failed", [this] { (void)Handle(ScanEvent::kScanFailed); });
   }
 }
 
@@ -262,7 +262,7 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
   auto id = std::make_shared<std::string>();
   callbacks.begin = [this, record, id] {
     *id = store_->BeginScan(record);
-    loop_.Post([this, id] { scan_.id = *id; });
+    loop_.Post("scan begun", [this, id] { scan_.id = *id; });
     return store_->StagingFolder(*id);
   };
   const bool is_demo = !parts_.demo_patient.empty() && record.purpose == web::ScanPurpose::kReference;
@@ -283,9 +283,9 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
 }
 
 void Appliance::AddListeners(ScanCallbacks& callbacks) {
-  callbacks.update = [this](const ScanUpdate& update) { loop_.Post([this, update] { OnUpdate(update); }); };
-  callbacks.sweep_complete = [this] { loop_.Post([this] { (void)Handle(ScanEvent::kSweepComplete); }); };
-  callbacks.ended = [this](const ScanOutcome& outcome) { loop_.Post([this, outcome] { OnEnded(outcome); }); };
+  callbacks.update = [this](const ScanUpdate& update) { loop_.Post("scan progress", [this, update] { OnUpdate(update); }); };
+  callbacks.sweep_complete = [this] { loop_.Post("sweep complete", [this] { (void)Handle(ScanEvent::kSweepComplete); }); };
+  callbacks.ended = [this](const ScanOutcome& outcome) { loop_.Post("scan ended", [this, outcome] { OnEnded(outcome); }); };
 }
 
 /// Nothing of a check is kept but its numbers.
@@ -410,7 +410,7 @@ void Appliance::CheckDisk() {
     try {
       store_->CheckWritable();
     } catch (const DiskRefused& error) {
-      loop_.Post([this, what = std::string(error.what())] {
+      loop_.Post("disk check", [this, what = std::string(error.what())] {
         if (!storage_fault_.empty()) return;
         storage_fault_ = what;
         Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", what));

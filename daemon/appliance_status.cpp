@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/appliance.hpp"
+#include "daemon/loop_report.hpp"
 #include "daemon/store/store_json.hpp"
 #include "daemon/version.hpp"
 
@@ -220,6 +221,7 @@ std::string Appliance::StatusJson() {
                        {"scan", scan},
                        {"last_result", last},
                        {"light", Name(shown_)},
+                       {"loop", LoopJson(loop_.meter())},
                        {"version", Version()}};
   return status.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -41,30 +41,37 @@ struct EventLoop::Impl {
   int wake_fd = -1;
   sd_event_source* wake_source = nullptr;
   std::mutex mutex;
-  std::deque<std::function<void()>> posted;
+  struct Posted {
+    const char* name;
+    std::function<void()> call;
+  };
+  std::deque<Posted> posted;
   std::exception_ptr error;
+  LoopMeter meter;
 
   /// Runs a callback inside sd-event's C code: what it throws must not pass through there.
-  void Guard(const std::function<void()>& call) noexcept {
+  void Guard(const char* name, const std::function<void()>& call) noexcept {
+    meter.Begin(name);
     try {
       call();
     } catch (...) {
       if (!error) error = std::current_exception();
       sd_event_exit(event, 1);
     }
+    meter.End();
   }
 
   void RunPosted() {
     std::uint64_t count = 0;
     (void)!::read(wake_fd, &count, sizeof(count));
-    std::deque<std::function<void()>> work;
+    std::deque<Posted> work;
     {
       const std::lock_guard lock(mutex);
       work.swap(posted);
     }
-    for (const std::function<void()>& call : work) {
-      Guard(call);
-      if (error) return;
+    while (!work.empty() && !error) {
+      Guard(work.front().name, work.front().call);
+      work.pop_front();
     }
   }
 
@@ -76,6 +83,7 @@ struct EventLoop::Impl {
 
 struct EventLoop::Source::Impl {
   EventLoop::Impl* loop = nullptr;
+  const char* name = "";
   sd_event_source* source = nullptr;
   std::shared_ptr<std::function<void(std::uint32_t)>> callback;  // shared: the source may be destroyed by its own callback
 
@@ -85,7 +93,7 @@ struct EventLoop::Source::Impl {
   void Call(std::uint32_t events) {
     const std::shared_ptr<std::function<void(std::uint32_t)>> kept = callback;
     EventLoop::Impl* const its_loop = loop;
-    its_loop->Guard([&] { (*kept)(events); });
+    its_loop->Guard(name, [&] { (*kept)(events); });
   }
   static int OnIo(sd_event_source*, int, std::uint32_t events, void* self) {
     static_cast<Impl*>(self)->Call(events);
@@ -122,21 +130,25 @@ int EventLoop::Run() {
 }
 
 void EventLoop::Quit(int exit_code) {
-  Post([this, exit_code] { sd_event_exit(impl_->event, exit_code); });
+  Post("quit", [this, exit_code] { sd_event_exit(impl_->event, exit_code); });
 }
 
-void EventLoop::Post(std::function<void()> work) {
+LoopMeter& EventLoop::meter() { return impl_->meter; }
+
+void EventLoop::Post(const char* name, std::function<void()> work) {
   {
     const std::lock_guard lock(impl_->mutex);
-    impl_->posted.push_back(std::move(work));
+    impl_->posted.push_back({name, std::move(work)});
   }
   const std::uint64_t one = 1;
   (void)!::write(impl_->wake_fd, &one, sizeof(one));  // fails only when it is readable anyway
 }
 
-EventLoop::Source EventLoop::WatchDescriptor(int fd, std::uint32_t epoll_events, std::function<void(std::uint32_t)> ready) {
+EventLoop::Source EventLoop::WatchDescriptor(const char* name, int fd, std::uint32_t epoll_events,
+                                             std::function<void(std::uint32_t)> ready) {
   auto source = std::make_unique<Source::Impl>();
   source->loop = impl_.get();
+  source->name = name;
   source->callback = std::make_shared<std::function<void(std::uint32_t)>>(std::move(ready));
   Checked(sd_event_add_io(impl_->event, &source->source, fd, epoll_events, Source::Impl::OnIo, source.get()), "watch a descriptor");
   return Source(std::move(source));
@@ -145,14 +157,16 @@ EventLoop::Source EventLoop::WatchDescriptor(int fd, std::uint32_t epoll_events,
 EventLoop::Source EventLoop::WatchSignal(int signal, std::function<void()> caught) {
   auto source = std::make_unique<Source::Impl>();
   source->loop = impl_.get();
+  source->name = "signal";
   source->callback = std::make_shared<std::function<void(std::uint32_t)>>([call = std::move(caught)](std::uint32_t) { call(); });
   Checked(sd_event_add_signal(impl_->event, &source->source, signal, Source::Impl::OnSignal, source.get()), "watch a signal");
   return Source(std::move(source));
 }
 
-EventLoop::Source EventLoop::MakeTimer(std::function<void()> expired) {
+EventLoop::Source EventLoop::MakeTimer(const char* name, std::function<void()> expired) {
   auto source = std::make_unique<Source::Impl>();
   source->loop = impl_.get();
+  source->name = name;
   source->callback = std::make_shared<std::function<void(std::uint32_t)>>([call = std::move(expired)](std::uint32_t) { call(); });
   constexpr std::uint64_t kAccuracyUs = 1000;
   Checked(sd_event_add_time(impl_->event, &source->source, CLOCK_MONOTONIC, 0, kAccuracyUs, Source::Impl::OnTimer, source.get()),

@@ -6,11 +6,13 @@
 #include <functional>
 #include <memory>
 
+#include "daemon/loop_meter.hpp"
+
 namespace plumb {
 
 /// Everything but Post() and Quit() belongs to the thread that made the loop, and all callbacks run on it. A callback that throws ends
 /// Run(), which throws it on. Construct it before any other thread starts: it blocks the signals that it watches, and
-/// threads inherit that.
+/// threads inherit that. What watches or is posted has a name, for the meter: a text of the program.
 class EventLoop {
  public:
   using Clock = std::chrono::steady_clock;
@@ -29,16 +31,19 @@ class EventLoop {
   void Quit(int exit_code);
 
   /// Has the loop call `work`, in the order of posting. Thread-safe, never waits. What is posted after Run() ended is dropped.
-  void Post(std::function<void()> work);
+  void Post(const char* name, std::function<void()> work);
 
   /// Calls `ready` with the epoll events that came, for as long as the source lives. The descriptor stays the caller's.
-  [[nodiscard]] Source WatchDescriptor(int fd, std::uint32_t epoll_events, std::function<void(std::uint32_t)> ready);
+  [[nodiscard]] Source WatchDescriptor(const char* name, int fd, std::uint32_t epoll_events, std::function<void(std::uint32_t)> ready);
 
   /// Calls `caught` for a signal. One of SIGTERM, SIGINT, SIGHUP.
   [[nodiscard]] Source WatchSignal(int signal, std::function<void()> caught);
 
   /// A timer on the monotonic clock, not armed yet.
-  [[nodiscard]] Source MakeTimer(std::function<void()> expired);
+  [[nodiscard]] Source MakeTimer(const char* name, std::function<void()> expired);
+
+  /// What the callbacks cost so far: each of them, and each posted call, is a turn.
+  [[nodiscard]] LoopMeter& meter();
 
  private:
   std::unique_ptr<Impl> impl_;

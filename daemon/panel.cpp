@@ -17,7 +17,7 @@ namespace {
 class BlinkingLight : public Indicator {
  public:
   BlinkingLight(EventLoop& loop, const GpioIndicatorOptions& options) : light_(options) {
-    timer_ = loop.MakeTimer([this] {
+    timer_ = loop.MakeTimer("light", [this] {
       light_.Dispatch(GpioIndicator::Clock::now());
       Arm();
     });

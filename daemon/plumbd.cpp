@@ -24,6 +24,7 @@
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/unix_socket.hpp"
 #include "daemon/log.hpp"
+#include "daemon/loop_report.hpp"
 #include "daemon/panel.hpp"
 #include "daemon/version.hpp"
 #include "daemon/web_service.hpp"
@@ -216,14 +217,15 @@ class Plumbd {
         control_(loop_, ControlSocket(config),
                  [this](const ControlRequest& request, const ControlServer::Reply& reply) { Answer(request, reply); }) {
     appliance_.SetEventListener([this](const std::string& line) { control_.Broadcast(line); });
-    http_timer_ = loop_.MakeTimer([this] { RunHttp(); });
-    http_source_ = loop_.WatchDescriptor(http_.fd(), EPOLLIN, [this](std::uint32_t) { RunHttp(); });
+    http_timer_ = loop_.MakeTimer("http", [this] { RunHttp(); });
+    http_source_ = loop_.WatchDescriptor("http", http_.fd(), EPOLLIN, [this](std::uint32_t) { RunHttp(); });
     for (const int signal : {SIGTERM, SIGINT}) signals_.push_back(loop_.WatchSignal(signal, [this] { Stop(); }));
     signals_.push_back(loop_.WatchSignal(SIGHUP, [this] { Reload(); }));
     std::uint64_t watchdog_us = 0;
     has_watchdog_ = sd_watchdog_enabled(0, &watchdog_us) > 0;
     if (has_watchdog_) watchdog_period_ = std::chrono::microseconds(watchdog_us / 3);
-    tick_ = loop_.MakeTimer([this] { Tick(); });
+    loop_.meter().SetSlowListener([](const LoopTurn& turn, std::int64_t unsaid) { Log(LogLevel::kWarning, SlowTurnText(turn, unsaid)); });
+    tick_ = loop_.MakeTimer("watchdog", [this] { Tick(); });
   }
 
   int Run() {
@@ -260,6 +262,7 @@ class Plumbd {
     options.tls_key = config.web.tls_key;
     options.host_names = config.web.host_names;
     options.upload_folder = config.update.folder;
+    options.doing = [this](std::string_view what) { loop_.meter().Part(what); };
     options.max_upload_bytes = static_cast<std::uint64_t>(config.update.max_bundle_mb) << 20;
     return options;
   }
@@ -295,7 +298,7 @@ class Plumbd {
       } catch (const DeviceError& error) {
         answer = ControlRefusal(error.what());
       }
-      loop_.Post([reply, answer] { reply(answer); });
+      loop_.Post("sim", [reply, answer] { reply(answer); });
     });
     if (!posted) reply(ControlRefusal("the virtual sensor is busy: try again"));
   }

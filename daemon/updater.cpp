@@ -59,7 +59,7 @@ std::string Shown(const char* text) {
 
 struct Updater::Impl {
   Impl(EventLoop& on, UpdaterOptions given) : loop(on), options(std::move(given)) {
-    timer = loop.MakeTimer([this] { Process(); });
+    timer = loop.MakeTimer("bus", [this] { Process(); });
     RemoveBroken();
     Connect();
   }
@@ -111,7 +111,7 @@ struct Updater::Impl {
     sd_bus_set_method_call_timeout(bus, kCallTimeout_us);
     sd_bus_match_signal_async(bus, nullptr, kService, kPath, kProperties, "PropertiesChanged", &Impl::OnChanged, nullptr, this);
     sd_bus_match_signal_async(bus, nullptr, kService, kPath, kInstaller, "Completed", &Impl::OnCompleted, nullptr, this);
-    source = loop.WatchDescriptor(sd_bus_get_fd(bus), EPOLLIN, [this](std::uint32_t) { Process(); });
+    source = loop.WatchDescriptor("bus", sd_bus_get_fd(bus), EPOLLIN, [this](std::uint32_t) { Process(); });
     Look();
     Process();
   }

@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "daemon/log.hpp"
+#include "daemon/loop_report.hpp"
 #include "daemon/version.hpp"
 #include "drivers/replay/file_io.hpp"
 #include "drivers/replay/image_file.hpp"
@@ -80,7 +81,7 @@ void WebService::Change(web::Done done, std::function<std::string(Store&)> chang
     } catch (const std::exception& error) {
       answer = {.result = ChangeResult::kFailed, .message = error.what(), .id = {}, .file = {}};
     }
-    appliance_.loop().Post([this, done, answer, alive] {
+    appliance_.loop().Post("store changed", [this, done, answer, alive] {
       if (!*alive) return;
       done(answer);
       if (answer.result == ChangeResult::kDone) appliance_.TellData();
@@ -275,6 +276,7 @@ void WebService::InstallUpdate(const web::Actor& actor, const std::string& bundl
 /// Versions, status, health and the audit log's actions: nothing of a patient, no names of scans' owners.
 void WebService::WriteDiagnostics(const web::Actor& actor, web::Done done) {
   const std::string status = appliance_.StatusJson();
+  const std::string loop = LoopTable(appliance_.loop().meter());
   const web::Health health = appliance_.Health();
   const auto report = [done, alive = alive_](const web::Change& change) {
     web::Change answer = change;
@@ -282,8 +284,8 @@ void WebService::WriteDiagnostics(const web::Actor& actor, web::Done done) {
     done(answer);
   };
   Change(report, [=](Store& store) {
-    std::string text =
-        fmt::format("plumbd {}\nhealth: {}\nstatus: {}\n\nlast actions:\n", Version(), health.ok ? "ok" : health.reason, status);
+    std::string text = fmt::format("plumbd {}\nhealth: {}\nstatus: {}\n\nthe event loop:\n{}\nlast actions:\n", Version(),
+                                   health.ok ? "ok" : health.reason, status, loop);
     for (const web::AuditEntry& entry : store.Audit(0, 500)) text += fmt::format("{} {} {}\n", entry.number, entry.action, entry.subject);
     std::string name = (std::filesystem::temp_directory_path() / "plumb-diagnostics-XXXXXX").string();
     const int fd = ::mkstemp(name.data());

@@ -84,7 +84,10 @@ class HttpServer::Impl {
   [[nodiscard]] const Router& router() const { return router_; }
 
   void Run() {
-    accounts_.Dispatch();
+    {
+      const Doing doing(options_, "passwords");
+      accounts_.Dispatch();
+    }
     const auto now = SteadyClock::now();
     if (status_due_ && now >= *status_due_) SendStatus(now);
     if (hub_.size() > 0 && now >= next_expiry_) {
@@ -151,6 +154,7 @@ class HttpServer::Impl {
   void SendStatus(SteadyClock::time_point now) {
     status_due_.reset();
     last_status_ = now;
+    const Doing doing(options_, "status to viewers");
     if (hub_.size() > 0) hub_.Broadcast("status", Dump(ToJson(service_.GetStatus(), WallClock::now())));
   }
 

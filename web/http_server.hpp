@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "web/scan_service.hpp"
@@ -36,6 +37,8 @@ struct HttpServerOptions {
   std::uint64_t password_operations = 3;
   std::chrono::seconds session_limit{12 * 3600};               ///< A session ends then, however busy.
   std::function<std::chrono::steady_clock::time_point()> now;  ///< For tests; empty: the steady clock.
+  /// Told what Run() is about to do: "GET /api/v1/scans/{id}", of the routes' table, and an empty text after it. May be empty.
+  std::function<void(std::string_view what)> doing;
 };
 
 /// Serves the page, the API under /api/v1 (web/openapi.yaml), the event stream and GET /health.

@@ -28,7 +28,7 @@ struct ControlServer::Client {
 
 ControlServer::ControlServer(EventLoop& loop, int listening, Handler handler, const ControlServerOptions& options)
     : loop_(loop), listening_(listening), handler_(std::move(handler)), options_(options) {
-  source_ = loop_.WatchDescriptor(listening_, EPOLLIN, [this](std::uint32_t) { Accept(); });
+  source_ = loop_.WatchDescriptor("control", listening_, EPOLLIN, [this](std::uint32_t) { Accept(); });
 }
 
 ControlServer::~ControlServer() {
@@ -48,7 +48,7 @@ void ControlServer::Accept() {
   const std::uint64_t id = next_id_++;
   auto client = std::make_unique<Client>();
   client->fd = fd;
-  client->source = loop_.WatchDescriptor(fd, EPOLLIN, [this, id](std::uint32_t events) {
+  client->source = loop_.WatchDescriptor("control", fd, EPOLLIN, [this, id](std::uint32_t events) {
     if ((events & EPOLLOUT) != 0) Flush(id);
     if ((events & EPOLLIN) != 0) {
       Read(id);

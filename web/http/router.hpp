@@ -23,6 +23,8 @@ struct Route {
   Permission permission = Permission::kView;
   BodyKind body = BodyKind::kNone;
   Handler handler;
+
+  [[nodiscard]] std::string Name() const { return method + " " + pattern; }
 };
 
 /// The table; filled once, then only read.

@@ -122,6 +122,7 @@ struct Transport::Callbacks {
 
   static void OnCompleted(void* self, MHD_Connection* connection, void** context, MHD_RequestTerminationCode) {
     auto* transport = static_cast<Transport*>(self);
+    const Doing doing(transport->options_, "the end of a request");
     if (Connection* known = ConnectionOf(connection)) {
       known->since = transport->options_.now();
       known->receiving = true;
@@ -216,6 +217,7 @@ struct Transport::Callbacks {
       return true;
     }
     if (exchange.request.upload->size() + bytes.size() > options.max_upload_bytes) return false;
+    const Doing doing(options, "writing an upload");
     try {
       exchange.request.upload->Append(bytes);
     } catch (const IoError& error) {
@@ -253,7 +255,10 @@ struct Transport::Callbacks {
                               std::size_t* upload_size, void** context) {
     auto& transport = *static_cast<Transport*>(self);
     try {
-      if (*context == nullptr) return Begin(transport, connection, url, method, context);
+      if (*context == nullptr) {
+        const Doing doing(transport.options_, "the head of a request");
+        return Begin(transport, connection, url, method, context);
+      }
       const std::shared_ptr<Exchange> exchange = *static_cast<std::shared_ptr<Exchange>*>(*context);
       if (*upload_size > 0) {
         // Too long without having said so: there is no way to answer in the middle of an upload.
@@ -264,6 +269,7 @@ struct Transport::Callbacks {
       if (Connection* known = ConnectionOf(connection)) known->receiving = false;
       if (!exchange->started) {
         exchange->started = true;
+        const Doing doing(transport.options_, transport.options_.doing ? exchange->route->Name() : std::string());
         Gate::Handle(*exchange->route, exchange->request, [weak = std::weak_ptr(exchange)](Response response) {
           if (const auto alive = weak.lock()) alive->Answer(std::move(response));
         });

@@ -16,6 +16,22 @@ struct MHD_Daemon;
 
 namespace plumb::web {
 
+/// Tells HttpServerOptions::doing what runs while it lives.
+class Doing {
+ public:
+  Doing(const HttpServerOptions& options, std::string_view what) : tell_(options.doing) {
+    if (tell_) tell_(what);
+  }
+  ~Doing() {
+    if (tell_) tell_({});
+  }
+  Doing(const Doing&) = delete;
+  Doing& operator=(const Doing&) = delete;
+
+ private:
+  const std::function<void(std::string_view)>& tell_;
+};
+
 /// Carries requests to the gate and answers back. Belongs to the loop thread.
 class Transport {
  public:

@@ -78,7 +78,7 @@ class ControlServerTest : public ::testing::Test {
 
   void Handle(const ControlRequest& request, const ControlServer::Reply& reply) {
     if (request.kind == Kind::kSim) {  // answered later
-      later_ = loop_.MakeTimer([reply] { reply(ControlDone()); });
+      later_ = loop_.MakeTimer("later", [reply] { reply(ControlDone()); });
       later_.ArmAfter(std::chrono::milliseconds(20));
     } else {
       reply(ControlDone());
@@ -141,7 +141,7 @@ TEST_F(ControlServerTest, AWatcherThatNeverReadsIsDroppedAndOthersAreNot) {
   RunWith([&] {
     EXPECT_EQ(ReadLine(good), ControlDone());
     for (; received < kLines; ++received) {
-      loop_.Post([&] { server_.Broadcast("{\"event\":\"" + std::string(1000, 'x') + "\"}"); });
+      loop_.Post("broadcast", [&] { server_.Broadcast("{\"event\":\"" + std::string(1000, 'x') + "\"}"); });
       if (ReadLine(good).size() < 1000) break;
     }
   });

@@ -25,7 +25,7 @@ TEST(EventLoopTest, RunsWhatOtherThreadsPostInOrderOnItsOwnThread) {
   const std::thread::id own = std::this_thread::get_id();
   std::jthread poster([&] {
     for (int i = 0; i < 1000; ++i) {
-      loop.Post([&, i] {
+      loop.Post("test", [&, i] {
         seen.push_back(i);
         on_own_thread = on_own_thread && std::this_thread::get_id() == own;
       });
@@ -45,10 +45,10 @@ TEST(EventLoopTest, WorkMayPostFurtherWork) {
     if (++depth == 5) {
       loop.Quit(0);
     } else {
-      loop.Post(again);
+      loop.Post("test", again);
     }
   };
-  loop.Post(again);
+  loop.Post("test", again);
   EXPECT_EQ(loop.Run(), 0);
   EXPECT_EQ(depth, 5);
 }
@@ -57,9 +57,9 @@ TEST(EventLoopTest, TimersExpireOnceInTheOrderOfTheirTimesAndNotBefore) {
   EventLoop loop;
   std::vector<int> seen;
   const auto start = EventLoop::Clock::now();
-  EventLoop::Source late = loop.MakeTimer([&] { seen.push_back(2), loop.Quit(0); });
-  EventLoop::Source early = loop.MakeTimer([&] { seen.push_back(1); });
-  EventLoop::Source never = loop.MakeTimer([&] { seen.push_back(3); });
+  EventLoop::Source late = loop.MakeTimer("test", [&] { seen.push_back(2), loop.Quit(0); });
+  EventLoop::Source early = loop.MakeTimer("test", [&] { seen.push_back(1); });
+  EventLoop::Source never = loop.MakeTimer("test", [&] { seen.push_back(3); });
   late.ArmAfter(milliseconds(30));
   early.ArmAfter(milliseconds(10));
   never.ArmAfter(milliseconds(5));
@@ -78,11 +78,11 @@ TEST(EventLoopTest, ADescriptorIsWatchedUntilItsSourceGoesEvenInItsOwnCallback) 
   ASSERT_EQ(::pipe(ends.data()), 0);
   int calls = 0;
   EventLoop::Source source;
-  source = loop.WatchDescriptor(ends[0], EPOLLIN, [&](std::uint32_t events) {
+  source = loop.WatchDescriptor("test", ends[0], EPOLLIN, [&](std::uint32_t events) {
     EXPECT_NE(events & EPOLLIN, 0U);
     ++calls;
     source = {};  // what is readable stays so: a source that lived on would be called again
-    loop.Post([&] { loop.Quit(0); });
+    loop.Post("test", [&] { loop.Quit(0); });
   });
   ASSERT_EQ(::write(ends[1], "x", 1), 1);
   EXPECT_EQ(loop.Run(), 0);
@@ -104,8 +104,8 @@ TEST(EventLoopTest, SignalsArriveAsCalls) {
 TEST(EventLoopTest, WhatACallbackThrowsComesOutOfRun) {
   EventLoop loop;
   int later = 0;
-  loop.Post([] { throw std::runtime_error("broken"); });
-  loop.Post([&] { ++later; });
+  loop.Post("test", [] { throw std::runtime_error("broken"); });
+  loop.Post("test", [&] { ++later; });
   EXPECT_THROW(loop.Run(), std::runtime_error);
   EXPECT_EQ(later, 0);
 }

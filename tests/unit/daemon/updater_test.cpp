@@ -183,7 +183,7 @@ class UpdaterTest : public ::testing::Test {
   /// On the loop's thread; waits for it.
   void On(const std::function<void()>& work) {
     std::promise<void> done;
-    loop_.Post([&] {
+    loop_.Post("test", [&] {
       work();
       done.set_value();
     });
