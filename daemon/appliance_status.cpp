@@ -241,10 +241,7 @@ web::Status Appliance::WebStatus() {
   status.patient_id = check_ ? std::string() : open_patient_;
   status.next_purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
   status.check_overdue = store_ != nullptr && !store_->HasPassedCheckSince(StartOfDay());
-  if (store_ != nullptr) {
-    const std::vector<web::CheckRecord> newest = store_->Checks(1);
-    if (!newest.empty()) status.last_check = newest.front();
-  }
+  if (store_ != nullptr) status.last_check = store_->LastCheck();
   if (store_ != nullptr && !open_patient_.empty()) status.scans_today = store_->ScansSince(open_patient_, StartOfDay());
   if (state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking) {
     status.scan = web::LiveScan{.id = scan_.id,

@@ -46,6 +46,27 @@ web::Change Refused(ChangeResult result, std::string message) {
   return {.result = result, .message = std::move(message), .id = {}, .file = {}};
 }
 
+/// Keeps a file's contents until its destruction, so that taking its name away is quick.
+class Keep {
+ public:
+  Keep(const std::filesystem::path& file, const std::function<void(int)>& close_aside)
+      : close_aside_(close_aside), fd_(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK)) {}
+  ~Keep() {
+    if (fd_ < 0) return;
+    if (close_aside_) {
+      close_aside_(fd_);
+    } else {
+      ::close(fd_);
+    }
+  }
+  Keep(const Keep&) = delete;
+  Keep& operator=(const Keep&) = delete;
+
+ private:
+  const std::function<void(int)>& close_aside_;
+  int fd_;
+};
+
 /// What a service says is shown to people: bounded, and without what is no text.
 std::string Shown(const char* text) {
   std::string shown(text != nullptr ? text : "");
@@ -336,6 +357,7 @@ web::Change Updater::Add(const std::filesystem::path& file, const std::string& n
   const std::vector<std::string> known = impl_->Bundles();
   const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
   if (!is_known && known.size() >= kMaxKept) return Refused(ChangeResult::kConflict, "there are too many bundles: remove one first");
+  const Keep replaced(impl_->options.folder / name, impl_->options.close_aside);
   if (::rename(file.c_str(), (impl_->options.folder / name).c_str()) != 0) {
     return Refused(ChangeResult::kNoSpace, fmt::format("{} cannot be kept: {}", name, std::strerror(errno)));
   }
@@ -348,6 +370,7 @@ web::Change Updater::Remove(const std::string& name) {
   const std::vector<std::string> known = impl_->Bundles();
   if (std::find(known.begin(), known.end(), name) == known.end()) return Refused(ChangeResult::kNotFound, "there is no such bundle");
   std::error_code error;
+  const Keep removed(impl_->options.folder / name, impl_->options.close_aside);
   std::filesystem::remove(impl_->options.folder / name, error);
   if (error) return Refused(ChangeResult::kFailed, fmt::format("{} cannot be removed: {}", name, error.message()));
   impl_->Tell();

@@ -19,6 +19,8 @@ struct UpdaterOptions {
   std::string bus_address;                                  ///< Empty: the system bus.
   std::string version;                                      ///< Of what runs: an older bundle is refused.
   std::function<void()> changed;                            ///< Called on the loop when status() has changed.
+  /// Closes a descriptor on another thread: that of a large file whose name is gone takes its time. Empty: closed at once.
+  std::function<void(int fd)> close_aside;
   /// Called on the loop when an installation that had begun has ended; empty text: it worked.
   std::function<void(const std::string& bundle, const std::string& failure)> ended;
 };

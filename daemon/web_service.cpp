@@ -53,6 +53,10 @@ WebService::WebService(Appliance& appliance, const UpdateConfig& update)
                                                     [this] {
                                                       if (listener_) listener_(web::EventKind::kUpdate);
                                                     },
+                                                .close_aside =
+                                                    [this](int fd) {
+                                                      if (!files_.Post([fd] { ::close(fd); })) ::close(fd);
+                                                    },
                                                 .ended =
                                                     [this](const std::string& bundle, const std::string& failure) {
                                                       Log({.user = "installer", .address = {}},
@@ -88,6 +92,16 @@ void WebService::Change(web::Done done, std::function<std::string(Store&)> chang
     });
   });
   if (!posted) done({.result = ChangeResult::kFailed, .message = "the store is busy: try again", .id = {}, .file = {}});
+}
+
+bool WebService::Later(web::Aside where, std::function<void()> work, std::function<void()> done) {
+  WorkThread& thread = where == web::Aside::kReads ? reads_ : files_;
+  return thread.Post([this, work = std::move(work), done = std::move(done), alive = alive_] {
+    work();
+    appliance_.loop().Post("done aside", [done, alive] {
+      if (*alive) done();
+    });
+  });
 }
 
 template <typename Result>

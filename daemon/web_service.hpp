@@ -12,14 +12,15 @@
 
 namespace plumb {
 
-/// Reads answer at once; changes run on the store's thread and call `done` on the loop. Belongs to the loop's thread. In safe mode lists
-/// are empty and changes fail with the reason.
+/// Reads answer at once, or within Later() on a thread of theirs; changes run on the store's thread and call `done` on the loop. Belongs to
+/// the loop's thread. In safe mode lists are empty and changes fail with the reason.
 class WebService : public web::ScanService {
  public:
   /// Borrowed; lives longer.
   WebService(Appliance& appliance, const UpdateConfig& update);
   ~WebService() override { *alive_ = false; }
 
+  [[nodiscard]] bool Later(web::Aside where, std::function<void()> work, std::function<void()> done) override;
   [[nodiscard]] web::Status GetStatus() override { return appliance_.WebStatus(); }
   [[nodiscard]] web::Health GetHealth() override { return appliance_.Health(); }
   [[nodiscard]] std::shared_ptr<const std::string> Preview() override;
@@ -76,7 +77,8 @@ class WebService : public web::ScanService {
   std::shared_ptr<const std::string> preview_;
   std::int64_t preview_index_ = -1;
   std::chrono::steady_clock::time_point preview_at_;
-  Updater updater_;  // last: what it tells uses the rest
+  Updater updater_;                   // what it tells uses the rest
+  WorkThread reads_{64}, files_{64};  // last: what they do uses the rest
 };
 
 }  // namespace plumb

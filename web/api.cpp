@@ -9,6 +9,7 @@
 #include "algo/types/errors.hpp"
 #include "web/accounts.hpp"
 #include "web/http/checks.hpp"
+#include "web/http/gate.hpp"
 #include "web/json.hpp"
 
 namespace plumb::web {
@@ -109,6 +110,15 @@ class Table {
         {"GET", pattern, permission, BodyKind::kNone,
          [this_service = &service_, get](const Request& request, const Respond& respond) { respond(get(*this_service, request)); }});
   }
+  /// Of lists and files: not on the loop.
+  void ReadAside(const char* pattern, Permission permission, Get get) {
+    const std::string name = std::string("GET ") + pattern;
+    router_.Add({"GET", pattern, permission, BodyKind::kNone,
+                 [this_service = &service_, name, get](const Request& request, const Respond& respond) {
+                   RespondAside(
+                       *this_service, name, [this_service, get, request] { return get(*this_service, request); }, respond);
+                 }});
+  }
   void Write(const char* method, const char* pattern, Permission permission, BodyKind body, Change change) {
     router_.Add({method, pattern, permission, body, [this_service = &service_, change](const Request& request, const Respond& respond) {
                    change(*this_service, request, respond);
@@ -146,7 +156,7 @@ void AddApplianceRoutes(Table& table) {
 }
 
 void AddPatientRoutes(Table& table) {
-  table.Read("/api/v1/patients", Permission::kView, [](ScanService& service, const Request&) {
+  table.ReadAside("/api/v1/patients", Permission::kView, [](ScanService& service, const Request&) {
     return JsonResponse({{"patients", ListJson(service.Patients())}});
   });
   table.Write("POST", "/api/v1/patients", Permission::kPatients, BodyKind::kJson,
@@ -173,11 +183,11 @@ void AddPatientRoutes(Table& table) {
                 fields.Finish();
                 service.OpenPatient(request.actor(), request.arguments[0], purpose, reason, Answer(respond));
               });
-  table.Read("/api/v1/patients/{id}/references", Permission::kView, [](ScanService& service, const Request& request) {
+  table.ReadAside("/api/v1/patients/{id}/references", Permission::kView, [](ScanService& service, const Request& request) {
     if (!service.FindPatient(request.arguments[0])) return ErrorResponse(404, "no such patient");
     return JsonResponse({{"references", ListJson(service.References(request.arguments[0]))}});
   });
-  table.Read("/api/v1/patients/{id}/scans", Permission::kView, [](ScanService& service, const Request& request) {
+  table.ReadAside("/api/v1/patients/{id}/scans", Permission::kView, [](ScanService& service, const Request& request) {
     if (!service.FindPatient(request.arguments[0])) return ErrorResponse(404, "no such patient");
     return JsonResponse({{"scans", ListJson(service.Scans(request.arguments[0], kMaxListed))}});
   });
@@ -206,7 +216,7 @@ void AddReferenceRoutes(Table& table) {
 }
 
 void AddScanRoutes(Table& table) {
-  table.Read("/api/v1/scans", Permission::kView, [](ScanService& service, const Request& request) {
+  table.ReadAside("/api/v1/scans", Permission::kView, [](ScanService& service, const Request& request) {
     const auto limit = static_cast<int>(QueryNumber(request, "limit", kMaxListed, kMaxListed));
     return JsonResponse({{"scans", ListJson(service.Scans("", limit))}});
   });
@@ -218,17 +228,17 @@ void AddScanRoutes(Table& table) {
               [](ScanService& service, const Request& request, const Respond& respond) {
                 service.AcceptScan(request.actor(), request.arguments[0], Answer(respond));
               });
-  table.Read("/api/v1/scans/{id}/files/{name}", Permission::kView, [](ScanService& service, const Request& request) {
+  table.ReadAside("/api/v1/scans/{id}/files/{name}", Permission::kView, [](ScanService& service, const Request& request) {
     return ScanFileResponse(service, request.arguments[0], request.arguments[1], request.query.contains("download"));
   });
-  table.Read("/api/v1/results/{id}", Permission::kView, [](ScanService& service, const Request& request) {
+  table.ReadAside("/api/v1/results/{id}", Permission::kView, [](ScanService& service, const Request& request) {
     return ScanFileResponse(service, request.arguments[0], "result.json", /*download=*/false);
   });
 }
 
 void AddCheckRoutes(Table& table) {
-  table.Read("/api/v1/checks", Permission::kView,
-             [](ScanService& service, const Request&) { return JsonResponse(ToJson(service.GetChecks(), WallClock::now())); });
+  table.ReadAside("/api/v1/checks", Permission::kView,
+                  [](ScanService& service, const Request&) { return JsonResponse(ToJson(service.GetChecks(), WallClock::now())); });
   table.Write(
       "POST", "/api/v1/checks/open", Permission::kScan, BodyKind::kNone,
       [](ScanService& service, const Request& request, const Respond& respond) { service.OpenCheck(request.actor(), Answer(respond)); });
@@ -239,7 +249,7 @@ void AddCheckRoutes(Table& table) {
 }
 
 void AddCareRoutes(Table& table) {
-  table.Read("/api/v1/audit", Permission::kAudit, [](ScanService& service, const Request& request) {
+  table.ReadAside("/api/v1/audit", Permission::kAudit, [](ScanService& service, const Request& request) {
     const auto before = QueryNumber(request, "before", 0, std::int64_t{1} << 53);
     const auto limit = static_cast<int>(QueryNumber(request, "limit", 100, kMaxListed));
     return JsonResponse({{"entries", ListJson(service.Audit(before, limit))}});

@@ -55,7 +55,7 @@ class HttpServer::Impl {
         options_(Completed(std::move(options))),
         accounts_(service, AccountsOptions(options_)),
         hub_(options_.max_event_streams, options_.event_buffer_bytes),
-        transport_(options_, router_, accounts_, hub_, [this](EventStream& stream) { stream.Send(StatusEvent()); }) {
+        transport_(options_, service_, router_, accounts_, hub_, [this](EventStream& stream) { stream.Send(StatusEvent()); }) {
     accounts_.AddRoutes(router_);
     AddApiRoutes(router_, service_);
     AddResultPage(router_, service_);

@@ -7,6 +7,7 @@
 #include "web/api.hpp"
 #include "web/assets.hpp"
 #include "web/http/checks.hpp"
+#include "web/http/gate.hpp"
 #include "web/json.hpp"
 
 namespace plumb::web {
@@ -112,28 +113,38 @@ std::string ResultBody(ScanService& service, const Scan& scan) {
   return body + NumbersTable(*scan.result) + BodyList(*scan.result) + Pictures(scan) + "</section>";
 }
 
+/// Of the newest finished scan, where none is named.
+Response ResultPage(ScanService& service, const std::optional<std::string>& wanted) {
+  std::optional<Scan> scan;
+  if (wanted) {
+    scan = service.FindScan(*wanted);
+  } else {
+    for (Scan& candidate : service.Scans("", 20)) {
+      if (candidate.outcome != ScanOutcome::kDone) continue;
+      scan = std::move(candidate);
+      break;
+    }
+  }
+  Response response;
+  response.type = "text/html; charset=utf-8";
+  response.body = Document(scan ? ResultBody(service, *scan) : "<h1>No result yet</h1>");
+  return response;
+}
+
 }  // namespace
 
 void AddResultPage(Router& router, ScanService& service) {
   router.Add({"GET", "/result", Permission::kNone, BodyKind::kNone, [&service](const Request& request, const Respond& respond) {
-                Response response;
-                response.type = "text/html; charset=utf-8";
                 if (!request.session) {
+                  Response response;
+                  response.type = "text/html; charset=utf-8";
                   response.body = Document(LoginForm(request.query.contains("failed")));
                   return respond(std::move(response));
                 }
-                std::optional<Scan> scan;
-                if (const auto wanted = request.query.find("scan"); wanted != request.query.end()) {
-                  scan = service.FindScan(wanted->second);
-                } else {
-                  for (Scan& candidate : service.Scans("", 20)) {
-                    if (candidate.outcome != ScanOutcome::kDone) continue;
-                    scan = std::move(candidate);
-                    break;
-                  }
-                }
-                response.body = Document(scan ? ResultBody(service, *scan) : "<h1>No result yet</h1>");
-                respond(std::move(response));
+                const auto named = request.query.find("scan");
+                const auto wanted = named == request.query.end() ? std::nullopt : std::optional(named->second);
+                RespondAside(
+                    service, "GET /result", [&service, wanted] { return ResultPage(service, wanted); }, respond);
               }});
 }
 

@@ -40,14 +40,26 @@ enum class EventKind {
   kUpdate,    ///< Ask Update().
 };
 
+/// Threads beside the loop, for what may take its time.
+enum class Aside {
+  kReads,  ///< Lists, and files that are opened.
+  kFiles,  ///< Writing and removing large files.
+};
+
 /// The appliance as the page sees it.
 ///
 /// Every function is called on the loop thread and returns within a few milliseconds: reads answer from memory or from an index, changes
-/// may finish later. Each change and its audit entry are one transaction of the store. Nothing throws but std::bad_alloc: what goes wrong
-/// is a Change. Strings that come in are valid UTF-8, short, and without control characters, but their meaning is not checked.
+/// may finish later. Those marked (aside) read lists: they are called within Later(), as the others beside them may be. Each change and its
+/// audit entry are one transaction of the store. Nothing throws but std::bad_alloc: what goes wrong is a Change. Strings that come in are
+/// valid UTF-8, short, and without control characters, but their meaning is not checked.
 class ScanService {
  public:
   virtual ~ScanService() = default;
+
+  /// Has `work` done beside the loop, one after the other of its kind, then calls `done` on the loop. Neither may throw. Within `work` the
+  /// functions marked (aside), FindPatient(), FindReference() and FindScan() may be called.
+  /// @return False where too much waits already: neither is called then.
+  [[nodiscard]] virtual bool Later(Aside where, std::function<void()> work, std::function<void()> done) = 0;
 
   // --- what the appliance does
   [[nodiscard]] virtual Status GetStatus() = 0;
@@ -62,7 +74,7 @@ class ScanService {
   virtual void SetListener(std::function<void(EventKind)> listener) = 0;
 
   // --- patients
-  [[nodiscard]] virtual std::vector<Patient> Patients() = 0;  ///< By code; at most 1000.
+  [[nodiscard]] virtual std::vector<Patient> Patients() = 0;  ///< By code; at most 1000 (aside).
   [[nodiscard]] virtual std::optional<Patient> FindPatient(const std::string& id) = 0;
   virtual void AddPatient(const Actor& actor, const std::string& code, const std::string& site, Done done) = 0;  ///< Gives the id.
   /// Removes the patient with scans, references and files ("wipe patient"); the audit log keeps that it was done.
@@ -71,7 +83,7 @@ class ScanService {
   virtual void OpenPatient(const Actor& actor, const std::string& id, ScanPurpose purpose, const std::string& reason, Done done) = 0;
 
   // --- references
-  [[nodiscard]] virtual std::vector<Reference> References(const std::string& patient_id) = 0;  ///< Newest version first.
+  [[nodiscard]] virtual std::vector<Reference> References(const std::string& patient_id) = 0;  ///< Newest version first (aside).
   [[nodiscard]] virtual std::optional<Reference> FindReference(const std::string& id) = 0;
   /// A draft made of a scan with a scene. Gives the id.
   virtual void AddReference(const Actor& actor, const std::string& scan_id, const std::string& reason, Done done) = 0;
@@ -81,12 +93,13 @@ class ScanService {
   virtual void ApproveReference(const Actor& actor, const std::string& id, Done done) = 0;
 
   // --- scans
-  [[nodiscard]] virtual std::vector<Scan> Scans(const std::string& patient_id, int limit) = 0;  ///< Newest first; all patients: "".
+  /// Newest first; all patients: "" (aside).
+  [[nodiscard]] virtual std::vector<Scan> Scans(const std::string& patient_id, int limit) = 0;
   [[nodiscard]] virtual std::optional<Scan> FindScan(const std::string& id) = 0;
   virtual void AcceptScan(const Actor& actor, const std::string& id, Done done) = 0;
 
   // --- daily check
-  [[nodiscard]] virtual CheckStatus GetChecks() = 0;
+  [[nodiscard]] virtual CheckStatus GetChecks() = 0;  ///< (aside)
   /// The next scan, from any button, is of the room's markers. kConflict during a scan.
   virtual void OpenCheck(const Actor& actor, Done done) = 0;
   /// From now on checks are compared with this one.
@@ -100,7 +113,7 @@ class ScanService {
   virtual void ChangeUser(const Actor& actor, const User& user, Done done) = 0;
   /// Logins and what else is no change of the store. May be written later, in order.
   virtual void Log(const Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) = 0;
-  /// Newest first, older than number `before` (0: all).
+  /// Newest first, older than number `before` (0: all) (aside).
   [[nodiscard]] virtual std::vector<AuditEntry> Audit(std::int64_t before, int limit) = 0;
   [[nodiscard]] virtual Settings GetSettings() = 0;
   virtual void ChangeSettings(const Actor& actor, const Settings& settings, Done done) = 0;  ///< kInvalid names the field.

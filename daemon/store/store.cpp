@@ -90,9 +90,9 @@ web::Reference ReadReference(const Statement& row) {
 }  // namespace
 
 std::vector<web::Patient> Store::Patients() {
-  const std::lock_guard lock(read_mutex_);
+  const std::lock_guard lock(list_mutex_);
   static const std::string kSql = std::string(kPatientColumns) + "ORDER BY code LIMIT 1000";
-  Statement query = read_->Prepare(kSql.c_str());
+  Statement query = list_->Prepare(kSql.c_str());
   std::vector<web::Patient> patients;
   while (query.Step()) patients.push_back(ReadPatient(query));
   return patients;
@@ -166,9 +166,9 @@ std::vector<web::Reference> Store::References(const std::string& patient_id) {
   std::vector<web::Reference> references;
   const std::optional<std::int64_t> number = ParseId(patient_id);
   if (!number) return references;
-  const std::lock_guard lock(read_mutex_);
+  const std::lock_guard lock(list_mutex_);
   static const std::string kSql = std::string(kReferenceColumns) + "WHERE patient_id = ? ORDER BY version DESC LIMIT 1000";
-  Statement query = read_->Prepare(kSql.c_str());
+  Statement query = list_->Prepare(kSql.c_str());
   query.Bind(*number);
   while (query.Step()) references.push_back(ReadReference(query));
   return references;

@@ -54,7 +54,8 @@ struct FinishedScan {
 /// `done` only after that, so a crash at any point leaves either a whole scan or none. Changes and their audit entries
 /// are one transaction.
 ///
-/// Thread-safe: changes take turns; reads use a connection of their own and never wait for the disk writes of a change.
+/// Thread-safe: changes take turns; reads of single rows and lists have a connection each: they never wait for the disk writes of a change,
+/// nor a row for a list.
 /// Changes throw StoreRefusal, and IoError with its kinds when the disk or the database fails.
 class Store {
  public:
@@ -109,6 +110,7 @@ class Store {
   /// @param check_json  Of CheckJson(). Gives the id.
   std::string AddCheck(const web::Actor& actor, const std::string& sensor_serial, const std::string& check_json);
   [[nodiscard]] std::vector<web::CheckRecord> Checks(int limit);  ///< Newest first.
+  [[nodiscard]] std::optional<web::CheckRecord> LastCheck();
   [[nodiscard]] bool HasPassedCheckSince(web::WallClock::time_point since);
   [[nodiscard]] std::optional<web::CheckBaseline> CheckBaseline();
   [[nodiscard]] std::string CheckBaselineJson();  ///< Of the check that is the baseline; empty: none.
@@ -137,7 +139,9 @@ class Store {
   std::mutex write_mutex_;
   std::unique_ptr<Database> write_;
   std::mutex read_mutex_;
-  std::unique_ptr<Database> read_;
+  std::unique_ptr<Database> read_;  ///< Single rows, for the loop too.
+  std::mutex list_mutex_;
+  std::unique_ptr<Database> list_;  ///< Lists, which may take their time.
   RecoveryReport recovery_;
 };
 

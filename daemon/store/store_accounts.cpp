@@ -99,8 +99,8 @@ void Store::Write(const web::Actor& actor, const std::string& action, const std:
 }
 
 std::vector<web::AuditEntry> Store::Audit(std::int64_t before, int limit) {
-  const std::lock_guard lock(read_mutex_);
-  Statement query = read_->Prepare(
+  const std::lock_guard lock(list_mutex_);
+  Statement query = list_->Prepare(
       "SELECT number, time, user, address, action, subject, detail FROM audit WHERE ?1 <= 0 OR number < ?1 ORDER BY number DESC LIMIT ?2");
   query.Bind(before).Bind(std::int64_t{limit});
   std::vector<web::AuditEntry> entries;

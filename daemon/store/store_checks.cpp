@@ -10,6 +10,21 @@ using store::ParseId;
 using store::ToStored;
 using web::ChangeResult;
 
+namespace {
+
+constexpr const char* kNewestChecks = "SELECT id, time, user, sensor_serial, json FROM checks ORDER BY id DESC LIMIT ?";
+
+web::CheckRecord ReadCheck(const Statement& row) {
+  web::CheckRecord record = CheckIn(row.Text(4));
+  record.id = row.Text(0);
+  record.time = FromStored(row.Integer(1));
+  record.user = row.Text(2);
+  record.sensor_serial = row.Text(3);
+  return record;
+}
+
+}  // namespace
+
 std::string Store::AddCheck(const web::Actor& actor, const std::string& sensor_serial, const std::string& check_json) {
   const std::string status = CheckIn(check_json).status;
   const std::lock_guard lock(write_mutex_);
@@ -28,19 +43,18 @@ std::string Store::AddCheck(const web::Actor& actor, const std::string& sensor_s
 }
 
 std::vector<web::CheckRecord> Store::Checks(int limit) {
-  const std::lock_guard lock(read_mutex_);
-  Statement query = read_->Prepare("SELECT id, time, user, sensor_serial, json FROM checks ORDER BY id DESC LIMIT ?");
+  const std::lock_guard lock(list_mutex_);
+  Statement query = list_->Prepare(kNewestChecks);
   query.Bind(std::int64_t{limit});
   std::vector<web::CheckRecord> checks;
-  while (query.Step()) {
-    web::CheckRecord record = CheckIn(query.Text(4));
-    record.id = query.Text(0);
-    record.time = FromStored(query.Integer(1));
-    record.user = query.Text(2);
-    record.sensor_serial = query.Text(3);
-    checks.push_back(std::move(record));
-  }
+  while (query.Step()) checks.push_back(ReadCheck(query));
   return checks;
+}
+
+std::optional<web::CheckRecord> Store::LastCheck() {
+  const std::lock_guard lock(read_mutex_);
+  Statement query = read_->Prepare(kNewestChecks);
+  return query.Bind(std::int64_t{1}).Step() ? std::optional(ReadCheck(query)) : std::nullopt;
 }
 
 bool Store::HasPassedCheckSince(web::WallClock::time_point since) {

@@ -28,13 +28,14 @@ Store::Store(const fs::path& folder) : folder_(fs::absolute(folder)) {
   write_->CheckIntegrity();
   Migrate(*write_);
   read_ = std::make_unique<Database>(folder_ / "plumb.db", Database::Access::kReadOnly);
+  list_ = std::make_unique<Database>(folder_ / "plumb.db", Database::Access::kReadOnly);
   Recover();
 }
 
 std::unique_ptr<Store> Store::OpenReadable(const fs::path& folder) {
   std::unique_ptr<Store> store(new Store);
   store->folder_ = fs::absolute(folder);
-  for (std::unique_ptr<Database>* database : {&store->write_, &store->read_}) {
+  for (std::unique_ptr<Database>* database : {&store->write_, &store->read_, &store->list_}) {
     *database = std::make_unique<Database>(store->folder_ / "plumb.db", Database::Access::kFrozen);
   }
   (void)store->Patients();  // the tables are there

@@ -72,10 +72,10 @@ std::vector<web::Scan> Store::Scans(const std::string& patient_id, int limit) {
   std::vector<web::Scan> scans;
   const std::optional<std::int64_t> number = ParseId(patient_id);
   if (!number && !patient_id.empty()) return scans;
-  const std::lock_guard lock(read_mutex_);
+  const std::lock_guard lock(list_mutex_);
   static const std::string kAll = std::string(kScanColumns) + "ORDER BY scans.id DESC LIMIT ?";
   static const std::string kOfPatient = std::string(kScanColumns) + "WHERE patient_id = ? ORDER BY scans.id DESC LIMIT ?";
-  Statement query = read_->Prepare(number ? kOfPatient.c_str() : kAll.c_str());
+  Statement query = list_->Prepare(number ? kOfPatient.c_str() : kAll.c_str());
   if (number) query.Bind(*number);
   query.Bind(std::int64_t{limit});
   while (query.Step()) scans.push_back(ReadScan(query, *this));

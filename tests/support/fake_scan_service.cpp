@@ -389,6 +389,20 @@ void FakeScanService::ChangeSettings(const Actor& actor, const Settings& changed
   Did(actor, "settings.change", "", done);
 }
 
+bool FakeScanService::Later(web::Aside, std::function<void()> aside, std::function<void()> done) {
+  if (refuse_aside) return false;
+  const auto both = [aside = std::move(aside), done = std::move(done)] {
+    aside();
+    done();
+  };
+  if (hold_aside) {
+    held_aside.push_back(both);
+  } else {
+    both();
+  }
+  return true;
+}
+
 void FakeScanService::AddBundle(const Actor& actor, const std::filesystem::path& file, const std::string& name, Done done) {
   std::ifstream in(file, std::ios::binary);
   std::string magic(4, ' ');

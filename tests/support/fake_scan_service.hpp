@@ -45,6 +45,11 @@ class FakeScanService : public web::ScanService {
   bool hold_completions = false;
   std::vector<std::function<void()>> held;
 
+  /// Set: what is to be done aside waits here until the test does it: the work, then what follows on the loop.
+  bool hold_aside = false;
+  std::vector<std::function<void()>> held_aside;
+  bool refuse_aside = false;  ///< Too much waits already.
+
   /// Moves a running scan on. @param now  Any clock that grows.
   void Tick(std::chrono::steady_clock::time_point now);
   void Tell(web::EventKind kind) const;
@@ -52,6 +57,7 @@ class FakeScanService : public web::ScanService {
   void Plug();
 
   // --- ScanService
+  bool Later(web::Aside where, std::function<void()> work, std::function<void()> done) override;
   web::Status GetStatus() override { return status; }
   web::Health GetHealth() override { return health; }
   std::shared_ptr<const std::string> Preview() override { return preview; }

@@ -17,6 +17,11 @@ bool IsType(std::string_view header, std::string_view type) {
   return std::equal(value.begin(), value.end(), type.begin(), type.end(), [](char a, char b) { return std::tolower(a) == b; });
 }
 
+Response InternalError(std::string_view name, const std::exception& error) {
+  std::fprintf(stderr, "web: %.*s: %s\n", static_cast<int>(name.size()), name.data(), error.what());
+  return ErrorResponse(500, "internal error; the journal says more");
+}
+
 bool SameToken(std::string_view a, std::string_view b) { return a.size() == b.size() && sodium_memcmp(a.data(), b.data(), a.size()) == 0; }
 
 }  // namespace
@@ -78,9 +83,25 @@ void Gate::Handle(const Route& route, const Request& request, const Respond& res
   } catch (const DataError& error) {
     respond(ErrorResponse(400, error.what()));
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "web: %s %s: %s\n", route.method.c_str(), route.pattern.c_str(), error.what());
-    respond(ErrorResponse(500, "internal error; the journal says more"));
+    respond(InternalError(route.Name(), error));
   }
+}
+
+void RespondAside(ScanService& service, const std::string& name, std::function<Response()> make, const Respond& respond) {
+  auto made = std::make_shared<Response>();
+  const auto work = [made, name, make = std::move(make)] {
+    try {
+      *made = make();
+    } catch (const DataError& error) {
+      *made = ErrorResponse(400, error.what());
+    } catch (const std::exception& error) {
+      *made = InternalError(name, error);
+    }
+  };
+  if (service.Later(Aside::kReads, work, [made, respond] { respond(std::move(*made)); })) return;
+  Response busy = ErrorResponse(503, "too much is asked at once; try again in a few seconds");
+  busy.headers.emplace_back("Retry-After", "2");
+  respond(std::move(busy));
 }
 
 void AddSecurityHeaders(Response& response) {

@@ -30,6 +30,10 @@ class Gate {
   bool tls_;
 };
 
+/// An answer that takes its time: made by `make` on the service's thread for reads; what it throws becomes an answer as in Gate::Handle().
+/// @param name  Of the route.
+void RespondAside(ScanService& service, const std::string& name, std::function<Response()> make, const Respond& respond);
+
 /// The headers of every answer, from one place.
 void AddSecurityHeaders(Response& response);
 

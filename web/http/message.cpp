@@ -35,7 +35,6 @@ void UploadFile::Append(std::string_view bytes) {
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0) throw IoError(fmt::format("the disk takes no more of the upload: {}", std::strerror(errno)));
     bytes.remove_prefix(static_cast<std::size_t>(count));
-    size_ += static_cast<std::uint64_t>(count);
   }
 }
 

@@ -16,7 +16,8 @@
 
 namespace plumb::web {
 
-/// A body on its way to the disk. Gone with its last owner, unless somebody gave it another name.
+/// A body on its way to the disk. Gone with its last owner, unless somebody gave it another name. One thread at a time; writing takes as
+/// long as the disk takes, and so does removing.
 class UploadFile {
  public:
   /// @throws IoError where nothing can be written.
@@ -26,13 +27,11 @@ class UploadFile {
   UploadFile& operator=(const UploadFile&) = delete;
   /// @throws IoError when the disk takes no more.
   void Append(std::string_view bytes);
-  [[nodiscard]] std::uint64_t size() const { return size_; }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
   std::filesystem::path path_;
   int fd_ = -1;
-  std::uint64_t size_ = 0;
 };
 
 struct Request {

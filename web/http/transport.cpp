@@ -26,6 +26,7 @@ constexpr std::size_t kMaxPath = 256;
 constexpr std::size_t kMaxQueryFields = 8;
 constexpr std::size_t kMaxHeaders = 64;
 constexpr std::size_t kStreamBlock = 4096;
+constexpr std::size_t kUploadBlock = 1 << 20;  // a file that is sent is written in such pieces; one is written while the next comes
 
 std::string ReadPem(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -80,6 +81,9 @@ struct Transport::Exchange : std::enable_shared_from_this<Transport::Exchange> {
   bool suspended = false;
   std::optional<Response> response;
   std::shared_ptr<EventStream> stream;
+  std::uint64_t uploaded = 0;  ///< Bytes of a file that came.
+  std::string unwritten;       ///< Of them, what is still to be given to the disk.
+  bool writing = false;        ///< A piece is on its way there.
 
   void Suspend() {
     suspended = true;
@@ -192,7 +196,13 @@ struct Transport::Callbacks {
       return ErrorResponse(413, fmt::format("the file is too large: at most {} MB", options.max_upload_bytes >> 20));
     constexpr std::uintmax_t kSpare = 64U << 20;
     try {
-      exchange.request.upload = std::make_shared<UploadFile>(options.upload_folder);
+      // Its removal takes as long as it is large.
+      exchange.request.upload =
+          std::shared_ptr<UploadFile>(new UploadFile(options.upload_folder), [&service = transport.service_](UploadFile* file) {
+            if (!service.Later(
+                    Aside::kFiles, [file] { delete file; }, [] {}))
+              delete file;
+          });
     } catch (const IoError& error) {
       return ErrorResponse(507, error.what());
     }
@@ -216,16 +226,49 @@ struct Transport::Callbacks {
       exchange.request.body.append(bytes);
       return true;
     }
-    if (exchange.request.upload->size() + bytes.size() > options.max_upload_bytes) return false;
-    const Doing doing(options, "writing an upload");
-    try {
-      exchange.request.upload->Append(bytes);
-    } catch (const IoError& error) {
-      exchange.request.upload.reset();
-      exchange.started = true;
-      exchange.response = ErrorResponse(507, error.what());
-    }
+    exchange.uploaded += bytes.size();
+    if (exchange.uploaded > options.max_upload_bytes) return false;
+    exchange.unwritten.append(bytes);
+    if (exchange.unwritten.size() >= kUploadBlock) WriteUpload(exchange);
     return true;
+  }
+
+  /// Gives what is unwritten to the disk, or makes the connection wait for the piece before.
+  static void WriteUpload(Exchange& exchange) {
+    if (exchange.writing) return exchange.Suspend();
+    const auto failure = std::make_shared<std::string>();
+    const auto work = [file = exchange.request.upload, bytes = std::exchange(exchange.unwritten, {}), failure] {
+      try {
+        file->Append(bytes);
+      } catch (const IoError& error) {
+        *failure = error.what();
+      }
+    };
+    exchange.writing = true;
+    const bool accepted = exchange.owner->service_.Later(Aside::kFiles, work, [weak = exchange.weak_from_this(), failure] {
+      if (const auto alive = weak.lock()) HaveWritten(*alive, *failure);
+    });
+    if (!accepted) HaveWritten(exchange, "the disk is too busy; send the file again later");
+  }
+
+  static void HaveWritten(Exchange& exchange, const std::string& failure) {
+    exchange.writing = false;
+    if (!failure.empty() && !exchange.response) {
+      exchange.request.upload.reset();
+      exchange.unwritten = {};
+      exchange.started = true;
+      exchange.response = ErrorResponse(507, failure);
+    }
+    exchange.Resume();
+  }
+
+  /// True once the whole file is with the disk; else the connection waits for that.
+  static bool HasWholeUpload(Exchange& exchange) {
+    if (!exchange.request.upload) return true;
+    if (!exchange.writing && !exchange.unwritten.empty()) WriteUpload(exchange);
+    if (!exchange.writing) return true;
+    exchange.Suspend();
+    return false;
   }
 
   static MHD_Result Begin(Transport& transport, MHD_Connection* connection, const char* url, const char* method, void** context) {
@@ -267,6 +310,7 @@ struct Transport::Callbacks {
         return MHD_YES;
       }
       if (Connection* known = ConnectionOf(connection)) known->receiving = false;
+      if (!exchange->started && !HasWholeUpload(*exchange)) return MHD_YES;
       if (!exchange->started) {
         exchange->started = true;
         const Doing doing(transport.options_, transport.options_.doing ? exchange->route->Name() : std::string());
@@ -344,9 +388,10 @@ struct Transport::Callbacks {
   }
 };
 
-Transport::Transport(const HttpServerOptions& options, const Router& router, Accounts& accounts, EventHub& hub,
+Transport::Transport(const HttpServerOptions& options, ScanService& service, const Router& router, Accounts& accounts, EventHub& hub,
                      std::function<void(EventStream&)> greet)
     : options_(options),
+      service_(service),
       gate_(router, accounts, options.host_names, !options.tls_certificate.empty()),
       hub_(hub),
       greet_(std::move(greet)),

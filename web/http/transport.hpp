@@ -35,8 +35,9 @@ class Doing {
 /// Carries requests to the gate and answers back. Belongs to the loop thread.
 class Transport {
  public:
+  /// @param service  Writes files aside.
   /// @param greet  Writes the first events into a new stream.
-  Transport(const HttpServerOptions& options, const Router& router, Accounts& accounts, EventHub& hub,
+  Transport(const HttpServerOptions& options, ScanService& service, const Router& router, Accounts& accounts, EventHub& hub,
             std::function<void(EventStream&)> greet);
   ~Transport();
   Transport(const Transport&) = delete;
@@ -61,6 +62,7 @@ class Transport {
   void Start(int listen_fd);
 
   HttpServerOptions options_;
+  ScanService& service_;
   Gate gate_;
   EventHub& hub_;
   std::function<void(EventStream&)> greet_;

@@ -199,6 +199,7 @@ class UpdaterTest : public ::testing::Test {
                          .bus_address = bus_.address(),
                          .version = "0.1.0",
                          .changed = [this] { ++num_changes_; },
+                         .close_aside = {},
                          .ended = [this](const std::string& bundle, const std::string& failure) { ended_ = bundle + ": " + failure; }});
     });
   }
