@@ -8,6 +8,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "algo/tracking/loop_closer.hpp"
 #include "algo/types/check_stop.hpp"
 
 namespace plumb {
@@ -345,6 +346,26 @@ std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrati
   return terms;
 }
 
+// Tracking's word for the keyframes that too little else holds, appended to the terms.
+void AddTrackedLinks(const TrackingMap& map, std::vector<QuadraticTerm>& terms) {
+  constexpr double kSigma_rad = 0.004;
+  constexpr double kSigma_m = 0.006;
+  for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
+    const MapKeyframe& keyframe = map.keyframes[k];
+    if (keyframe.previous < 0) continue;
+    const MapKeyframe& previous = map.keyframes[static_cast<std::size_t>(keyframe.previous)];
+    if (IsHeld(map, keyframe) && IsHeld(map, previous)) continue;
+    const LinkEquations link = Linearise({keyframe.previous, static_cast<int>(k), keyframe.T_previous_color}, previous.T_world_color,
+                                         keyframe.T_world_color, kSigma_rad, kSigma_m);
+    QuadraticTerm term;
+    term.keyframe_a = keyframe.previous;
+    term.keyframe_b = static_cast<int>(k);
+    term.H.topLeftCorner<12, 12>() = link.H;
+    term.g.head<12>() = link.g;
+    terms.push_back(term);
+  }
+}
+
 }  // namespace
 
 Pose DepthPose(const MapKeyframe& keyframe, const CalibrationModel& calibration) {
@@ -365,7 +386,9 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointReg
   bundle.max_iterations = 10;
   bundle.free_keyframes.resize(map.keyframes.size() - 1);
   std::iota(bundle.free_keyframes.begin(), bundle.free_keyframes.end(), 1);
-  BundleAdjust(stated, bundle, {}, map, result.calibration);
+  std::vector<QuadraticTerm> links;
+  AddTrackedLinks(map, links);
+  BundleAdjust(stated, bundle, links, map, result.calibration);
   if (!options.use_dense) return result;
 
   const TrackingMap before = map;
@@ -381,7 +404,9 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointReg
     const std::vector<CalibratedView> views = MakeViews(sensor, result.calibration, map);
     CheckStop(stop);
     if (round == 0) pairs = FindPairs(sensor, options, views, stop);
-    BundleAdjust(stated, bundle, MakeTerms(sensor, options, map, views, pairs, gate_m, stop), map, result.calibration);
+    std::vector<QuadraticTerm> terms = MakeTerms(sensor, options, map, views, pairs, gate_m, stop);
+    AddTrackedLinks(map, terms);
+    BundleAdjust(stated, bundle, terms, map, result.calibration);
     CheckStop(stop);
     double farthest_m = 0.0;
     for (const CalibratedView& view : views)

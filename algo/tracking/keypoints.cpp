@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include <Eigen/Geometry>
 #include <opencv2/features2d.hpp>
@@ -71,6 +72,33 @@ std::vector<Eigen::Vector2f> DetectCorners(const cv::Mat& gray, const std::vecto
     }
   }
   return corners;
+}
+
+double BrightnessRatio(const cv::Mat& from, const cv::Mat& to, const std::vector<Eigen::Vector2f>& points,
+                       const std::vector<Eigen::Vector2f>& guesses) {
+  constexpr int kReach = 3;
+  constexpr std::size_t kFewest = 8;
+  const auto sum = [](const cv::Mat& image, const Eigen::Vector2f& p) {
+    const int x = static_cast<int>(std::lround(p.x()));
+    const int y = static_cast<int>(std::lround(p.y()));
+    if (x < kReach || y < kReach || x + kReach >= image.cols || y + kReach >= image.rows) return 0;
+    int total = 0;
+    for (int r = y - kReach; r <= y + kReach; ++r) {
+      const auto* line = image.ptr<std::uint8_t>(r);
+      for (int c = x - kReach; c <= x + kReach; ++c) total += line[c];
+    }
+    return total;
+  };
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const int before = sum(from, points[i]);
+    const int after = sum(to, guesses[i]);
+    if (before > 0 && after > 0) ratios.push_back(static_cast<double>(after) / before);
+  }
+  if (ratios.size() < kFewest) return 1.0;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return *middle;
 }
 
 KltResult TrackKlt(const Pyramid& from, const Pyramid& to, const std::vector<Eigen::Vector2f>& points,

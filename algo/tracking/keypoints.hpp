@@ -27,6 +27,11 @@ struct KeypointOptions {
 [[nodiscard]] std::vector<Eigen::Vector2f> DetectCorners(const cv::Mat& gray, const std::vector<Eigen::Vector2f>& occupied,
                                                          const KeypointOptions& options);
 
+/// How much brighter an image shows the same places than another: the median over the points of the ratio of the mean grey levels around
+/// them; 1 with too few points to tell. Automatic exposure changes it.
+[[nodiscard]] double BrightnessRatio(const cv::Mat& from, const cv::Mat& to, const std::vector<Eigen::Vector2f>& points,
+                                     const std::vector<Eigen::Vector2f>& guesses);
+
 /// Follows points from one image to another; `found[i]` false where the patch was lost or looks different.
 struct KltResult {
   std::vector<Eigen::Vector2f> points;

@@ -34,9 +34,11 @@ struct MapKeyframe {
   Keyframe data;
   Pose T_world_color = Pose::Identity();       ///< At the colour stamp.
   Vector6d velocity_per_s = Vector6d::Zero();  ///< Twist in the camera frame: T(t0 + dt) = T(t0) * PoseFromTwist(v dt).
+  int previous = -1;                           ///< The keyframe that it was tracked against, or -1.
+  Pose T_previous_color = Pose::Identity();    ///< Its camera in that one's, as tracked.
   std::vector<KeypointObservation> keypoints;
   DenseView dense;
-  double median_depth_m = 1.0;  ///< Of the dense view.
+  double median_depth_m = 1.0;                   ///< Of the dense view.
   cv::Mat gray;                                  ///< CV_8UC1; released once the keyframe is out of reach of re-association.
   std::vector<Eigen::Vector2f> features_px;      ///< For relocalisation: keypoints with a descriptor and depth.
   std::vector<Eigen::Vector3f> features_camera;  ///< The same in the camera frame, metres.
@@ -59,5 +61,20 @@ struct TrackingMap {
   std::vector<Landmark> landmarks;
   std::map<int, MapMarker> markers;
 };
+
+/// Whether enough landmarks that others see too, or a marker, hold the keyframe: if not (a blank wall), bundle adjustment would let it
+/// slide, and tracking's word counts.
+[[nodiscard]] inline bool IsHeld(const TrackingMap& map, const MapKeyframe& keyframe) {
+  constexpr int kEnough = 30;
+  int shared = 0;
+  for (const KeypointObservation& o : keyframe.keypoints) {
+    const Landmark& landmark = map.landmarks[static_cast<std::size_t>(o.landmark)];
+    shared += landmark.usable && landmark.num_observations > 1 ? 1 : 0;
+  }
+  if (shared >= kEnough) return true;
+  for (const MarkerObservation& marker : keyframe.data.markers)
+    if (map.markers.contains(marker.id)) return true;
+  return false;
+}
 
 }  // namespace plumb

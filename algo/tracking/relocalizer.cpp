@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include <opencv2/calib3d.hpp>
@@ -182,13 +183,13 @@ std::optional<Relocalization> Consensus(const MapKeyframe& keyframe, const Intri
 
 }  // namespace
 
-std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const Intrinsics& intrinsics,
-                                                   const DescribedFeatures& features) {
+std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const Intrinsics& intrinsics, const DescribedFeatures& features,
+                                                   const std::vector<int>& keyframes) {
   std::optional<Relocalization> best;
   if (features.descriptors.rows < 15) return best;
   const cv::BFMatcher matcher(cv::NORM_HAMMING);
-  for (std::size_t k = map.keyframes.size(); k-- > 0;) {
-    const MapKeyframe& keyframe = map.keyframes[k];
+  for (const int k : keyframes) {
+    const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(k)];
     if (keyframe.descriptors.rows < 15) continue;
     std::vector<std::vector<cv::DMatch>> pairs;
     matcher.knnMatch(features.descriptors, keyframe.descriptors, pairs, 2);
@@ -198,11 +199,18 @@ std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const
     if (matches.size() < 15) continue;
     auto candidate = Consensus(keyframe, intrinsics, features, matches);
     if (!candidate || (best && candidate->num_inliers <= best->num_inliers)) continue;
-    candidate->keyframe = static_cast<int>(k);
+    candidate->keyframe = k;
     best = candidate;
     if (best->num_inliers >= 60) break;  // Beyond doubt.
   }
   return best;
+}
+
+std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const Intrinsics& intrinsics,
+                                                   const DescribedFeatures& features) {
+  std::vector<int> newest_first(map.keyframes.size());
+  std::iota(newest_first.rbegin(), newest_first.rend(), 0);
+  return RelocalizeByFeatures(map, intrinsics, features, newest_first);
 }
 
 }  // namespace plumb

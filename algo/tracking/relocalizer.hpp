@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "algo/tracking/keypoints.hpp"
 #include "algo/tracking/map.hpp"
@@ -20,6 +21,10 @@ struct Relocalization {
                                                                 const cv::Mat& depth_m);
 
 /// By ORB features with depth: nearest in Hamming distance in each keyframe, three-point rigid fits, best consensus.
+/// @param keyframes  Those to compare with, in this order; one that leaves no doubt ends the search.
+[[nodiscard]] std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const Intrinsics& intrinsics,
+                                                                 const DescribedFeatures& features, const std::vector<int>& keyframes);
+/// The same with all keyframes of the map, the newest first.
 [[nodiscard]] std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const Intrinsics& intrinsics,
                                                                  const DescribedFeatures& features);
 

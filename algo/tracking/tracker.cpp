@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -11,15 +12,20 @@
 #include "algo/markers/marker_detector.hpp"
 #include "algo/tracking/keypoints.hpp"
 #include "algo/tracking/local_bundle.hpp"
+#include "algo/tracking/loop_closer.hpp"
 #include "algo/tracking/pose_optimizer.hpp"
 #include "algo/tracking/relocalizer.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr double kMaxSpeed = 2.5;         // Metres a second that a hand moves a sensor at the very most.
-constexpr double kMaxTurn = 4.0;          // Radians a second.
-constexpr std::size_t kReassociated = 3;  // Older keyframes whose landmarks are looked for in a new keyframe.
+constexpr double kMaxSpeed = 2.5;           // Metres a second that a hand moves a sensor at the very most.
+constexpr double kMaxTurn = 4.0;            // Radians a second.
+constexpr std::size_t kReassociated = 3;    // Older keyframes whose landmarks are looked for in a new keyframe.
+constexpr double kSameBrightness = 0.08;    // Of the exposure: what KLT follows without help.
+constexpr double kDriftFollowed_m = 0.003;  // A drift that bundle adjustment takes out by itself, once the old landmarks are seen again.
+constexpr double kDriftFollowed_rad = 0.001;
+constexpr int kLoopInliers = 30;  // Features, and keypoints after them, that must agree on a place seen before.
 
 struct ActivePoint {
   int landmark = 0;
@@ -65,6 +71,7 @@ struct Tracker::Impl {
   Vector6d velocity = Vector6d::Zero();
   bool lost = true;
   bool keyframe_wanted = false;  // After a relocalisation.
+  std::vector<KeyframeLink> loops;
 
   Impl(const StreamInfo& stream, const TrackerOptions& tracker_options)
       : info(stream), options(tracker_options), dense_maker(stream.intrinsics) {
@@ -149,7 +156,10 @@ struct Tracker::Impl {
       const Eigen::Vector3d p = T_camera_world * map.landmarks[static_cast<std::size_t>(a.landmark)].p_world;
       guesses.push_back(p.z() > 0.05 ? Eigen::Vector2f(Project(info.intrinsics, p).cast<float>()) : a.pixel);
     }
-    const KltResult klt = TrackKlt(last_pyramid, prepared.pyramid, from, guesses, keypoint_options.levels, keypoint_options);
+    const double ratio = BrightnessRatio(last_pyramid[0], prepared.gray, from, guesses);
+    const bool same = std::abs(ratio - 1.0) < kSameBrightness;
+    const KltResult klt = TrackKlt(same ? last_pyramid : MakePyramid(last_pyramid[0] * ratio, keypoint_options), prepared.pyramid, from,
+                                   guesses, keypoint_options.levels, keypoint_options);
     for (std::size_t i = 0; i < active.size(); ++i) {
       if (!klt.found[i]) continue;
       PosePoint point;
@@ -253,7 +263,7 @@ struct Tracker::Impl {
       AddMarkerPoints(prepared.markers, problem.points);
       const std::size_t num_corners = problem.points.size();
       active.clear();
-      Reassociate(prepared, frame.depth_m, found->T_world_color, problem.points);
+      Reassociate(prepared, frame.depth_m, found->T_world_color, KeyframesNear(found->T_world_color, map.keyframes.size()), problem.points);
       PoseEstimate estimate = OptimizePose(problem, found->T_world_color);
       if (Plausible(estimate, problem.points.size(), 1.0)) {
         result.num_markers = CountMarkers(estimate, num_corners);
@@ -307,11 +317,12 @@ struct Tracker::Impl {
   }
 
   // Looks for landmarks of near older keyframes that are not being followed; adds those found to `active` and `points`.
-  void Reassociate(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_color, std::vector<PosePoint>& points) {
+  void Reassociate(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_color, const std::vector<std::size_t>& keyframes,
+                   std::vector<PosePoint>& points) {
     std::set<int> followed;
     for (const ActivePoint& a : active) followed.insert(a.landmark);
     const Pose T_camera_world = T_world_color.inverse();
-    for (const std::size_t k : KeyframesNear(T_world_color)) {
+    for (const std::size_t k : keyframes) {
       const MapKeyframe& keyframe = map.keyframes[k];
       std::vector<int> landmarks;
       std::vector<Eigen::Vector2f> from;
@@ -330,7 +341,9 @@ struct Tracker::Impl {
         guesses.push_back(pixel.cast<float>());
       }
       if (landmarks.empty()) continue;
-      const Pyramid pyramid = MakePyramid(keyframe.gray, keypoint_options);
+      const double ratio = BrightnessRatio(keyframe.gray, prepared.gray, from, guesses);
+      const bool same = std::abs(ratio - 1.0) < kSameBrightness;
+      const Pyramid pyramid = MakePyramid(same ? keyframe.gray : cv::Mat(keyframe.gray * ratio), keypoint_options);
       const KltResult klt = TrackKlt(pyramid, prepared.pyramid, from, guesses, 1, keypoint_options);
       for (std::size_t i = 0; i < landmarks.size(); ++i) {
         if (!klt.found[i] || (klt.points[i] - guesses[i]).norm() > 6.0F * static_cast<float>(SigmaPx())) continue;
@@ -345,10 +358,10 @@ struct Tracker::Impl {
     }
   }
 
-  // Nearest keyframes by pose that see about the same, the reference itself left out while it is being followed.
-  [[nodiscard]] std::vector<std::size_t> KeyframesNear(const Pose& T_world_color) const {
+  // Nearest by pose of the first `count` keyframes that see about the same, the reference itself left out while it is being followed.
+  [[nodiscard]] std::vector<std::size_t> KeyframesNear(const Pose& T_world_color, std::size_t count) const {
     std::vector<std::pair<double, std::size_t>> near;
-    for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
+    for (std::size_t k = 0; k < count; ++k) {
       if (!lost && static_cast<int>(k) == reference) continue;
       if (map.keyframes[k].gray.empty()) continue;
       const Pose T = map.keyframes[k].T_world_color.inverse() * T_world_color;
@@ -390,12 +403,15 @@ struct Tracker::Impl {
       result.previous_keyframe = reference;
       result.T_previous_color = map.keyframes[static_cast<std::size_t>(reference)].T_world_color.inverse() * T_world_color;
     }
+    keyframe.previous = reference;
+    keyframe.T_previous_color = result.T_previous_color;
     map.keyframes.push_back(std::move(keyframe));
     reference = index;
-    reference_count = active.size();
     keyframe_wanted = false;
     lost = false;
     AdjustLocally(index);
+    if (options.use_keypoints) CloseLoop(prepared, index);
+    reference_count = active.size();
     const Pose T_adjusted = map.keyframes.back().T_world_color;
     T_world_last = T_adjusted;
     last_time_s = frame.color_time_s;
@@ -404,24 +420,80 @@ struct Tracker::Impl {
     result.T_reference_color = Pose::Identity();
   }
 
+  // A place seen long ago: where the map has drifted since, it is bent until both visits agree, and the old landmarks are followed again.
+  void CloseLoop(const Prepared& prepared, int index) {
+    const std::vector<int> candidates = LoopCandidates(map);
+    if (candidates.empty()) return;
+    const MapKeyframe& newest = map.keyframes.back();
+    const auto found =
+        RelocalizeByFeatures(map, info.intrinsics, {newest.features_px, newest.features_camera, newest.descriptors}, candidates);
+    if (!found || found->num_inliers < kLoopInliers) return;
+    const std::optional<Pose> T_world_seen = SeenFrom(found->keyframe, found->T_world_color, prepared, newest);
+    if (!T_world_seen) return;
+    const Pose T_drift = newest.T_world_color.inverse() * *T_world_seen;
+    const DriftBound bound = LargestDrift(map, found->keyframe, index);
+    if (T_drift.translation().norm() > bound.translation_m || RotationAngle(T_drift) > bound.rotation_rad) return;
+    if (T_drift.translation().norm() > kDriftFollowed_m || RotationAngle(T_drift) > kDriftFollowed_rad) {
+      const Pose& T_world_old = map.keyframes[static_cast<std::size_t>(found->keyframe)].T_world_color;
+      loops.push_back({found->keyframe, index, T_world_old.inverse() * *T_world_seen});
+      BendMap(loops, map);
+    }
+
+    MapKeyframe keyframe = std::move(map.keyframes.back());
+    map.keyframes.pop_back();
+    const std::size_t known = active.size();
+    std::vector<PosePoint> points;
+    Reassociate(prepared, keyframe.data.view.depth_m, keyframe.T_world_color, KeyframesNear(keyframe.T_world_color, map.keyframes.size()),
+                points);
+    Observe(points, known, keyframe);
+    map.keyframes.push_back(std::move(keyframe));
+    AdjustLocally(index);
+  }
+
+  // Pose of the newest keyframe from an older one's surroundings alone: landmarks of then and depth. Nothing if they do not agree well.
+  std::optional<Pose> SeenFrom(int older, const Pose& T_world_guess, const Prepared& prepared, const MapKeyframe& newest) {
+    const std::vector<ActivePoint> followed = std::exchange(active, {});
+    const int followed_reference = std::exchange(reference, older);
+    PoseProblem problem = MakeProblem(prepared, newest.data.depth_time_s - newest.data.color_time_s);
+    reference = -1;  // None is left out.
+    Reassociate(prepared, newest.data.view.depth_m, T_world_guess, KeyframesNear(T_world_guess, static_cast<std::size_t>(older) + 4),
+                problem.points);
+    const PoseEstimate estimate = OptimizePose(problem, T_world_guess);
+    active = followed;
+    reference = followed_reference;
+    const bool by_depth = !options.use_dense || (estimate.num_dense > 300 && estimate.dense_rms_m < 0.015);
+    if (estimate.num_inliers < kLoopInliers || 2 * estimate.num_inliers < static_cast<int>(problem.points.size()) || !by_depth)
+      return std::nullopt;
+    return estimate.T_world_camera;
+  }
+
   // Landmarks seen in a new keyframe: those followed, and those of older keyframes found again.
   void AssociateKeyframe(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_color, MapKeyframe& keyframe) {
     const std::size_t followed = active.size();
     std::vector<PosePoint> found;
-    Reassociate(prepared, depth_m, T_world_color, found);
-    std::vector<ActivePoint> kept(active.begin(), active.begin() + static_cast<std::ptrdiff_t>(followed));
-    const Pose T_camera_world = T_world_color.inverse();
-    for (std::size_t i = followed; i < active.size(); ++i) {
-      const PosePoint& point = found[i - followed];
+    Reassociate(prepared, depth_m, T_world_color, KeyframesNear(T_world_color, map.keyframes.size()), found);
+    for (std::size_t i = 0; i < followed; ++i) AddObservation(active[i], keyframe);
+    Observe(found, followed, keyframe);
+  }
+
+  void AddObservation(const ActivePoint& a, MapKeyframe& keyframe) {
+    const Eigen::Vector2d pixel = a.pixel.cast<double>();
+    keyframe.keypoints.push_back({a.landmark, pixel, DepthAt(keyframe.data.view.depth_m, pixel)});
+    ++map.landmarks[static_cast<std::size_t>(a.landmark)].num_observations;
+  }
+
+  // Of the active points, those from `first` on were found again, at `found`: the ones that fit the pose are seen in the keyframe.
+  void Observe(const std::vector<PosePoint>& found, std::size_t first, MapKeyframe& keyframe) {
+    std::vector<ActivePoint> kept(active.begin(), active.begin() + static_cast<std::ptrdiff_t>(first));
+    const Pose T_camera_world = keyframe.T_world_color.inverse();
+    for (std::size_t i = first; i < active.size(); ++i) {
+      const PosePoint& point = found[i - first];
       const Eigen::Vector3d p = T_camera_world * point.p_world;
-      if ((p.head<2>() / p.z() - point.ideal).norm() * info.intrinsics.fx < 4.0 * SigmaPx()) kept.push_back(active[i]);
+      if ((p.head<2>() / p.z() - point.ideal).norm() * info.intrinsics.fx >= 4.0 * SigmaPx()) continue;
+      kept.push_back(active[i]);
+      AddObservation(active[i], keyframe);
     }
     active = std::move(kept);
-    for (const ActivePoint& a : active) {
-      const Eigen::Vector2d pixel = a.pixel.cast<double>();
-      keyframe.keypoints.push_back({a.landmark, pixel, DepthAt(depth_m, pixel)});
-      ++map.landmarks[static_cast<std::size_t>(a.landmark)].num_observations;
-    }
   }
 
   void AddCorners(const Prepared& prepared, const cv::Mat& depth_m, int index, MapKeyframe& keyframe) {
@@ -460,7 +532,8 @@ struct Tracker::Impl {
     if (index == 0) return;
     LocalBundleOptions bundle;
     bundle.marker_length_m = info.marker_length_m;
-    for (int k = std::max(1, index + 1 - options.local_keyframes); k <= index; ++k) bundle.free_keyframes.push_back(k);
+    for (int k = std::max(1, index + 1 - options.local_keyframes); k <= index; ++k)
+      if (IsHeld(map, map.keyframes[static_cast<std::size_t>(k)])) bundle.free_keyframes.push_back(k);
     AdjustLocalMap(info.intrinsics, bundle, map);
   }
 };

@@ -36,6 +36,28 @@ TEST(RegisterJointly, FindsDisturbedPosesByDenseDepth) {
   EXPECT_LT(error.rotation_rad, 0.003);    // Measured: 1.4 mrad.
 }
 
+TEST(RegisterJointly, KeepsAKeyframeThatSawNextToNothingWhereTrackingPutIt) {
+  // A blank wall: no depth, four keypoints, and those are taken for others.
+  const auto error_m = [](bool tracked) {
+    TrueMap truth = MakeTrueMap({.num_keyframes = 8, .num_landmarks = 120, .markers = false, .pixel_noise = 0.1});
+    constexpr std::size_t kBlank = 4;
+    MapKeyframe& blank = truth.map.keyframes[kBlank];
+    blank.keypoints.resize(4);
+    for (KeypointObservation& o : blank.keypoints) o = {o.landmark, o.pixel + Eigen::Vector2d(15, -10), 0.0};
+    if (tracked) {
+      blank.previous = kBlank - 1;
+      blank.T_previous_color = truth.map.keyframes[kBlank - 1].T_world_color.inverse() * blank.T_world_color;
+    }
+    TrackingMap map = truth.map;
+    (void)RegisterJointly(truth.stated, {.use_dense = false}, map);
+    return (map.keyframes[kBlank].T_world_color.translation() - blank.T_world_color.translation()).norm();
+  };
+  const double tracked_m = error_m(true), alone_m = error_m(false);
+  fmt::print("with tracking's word {:.2e} m, without {:.2e} m\n", tracked_m, alone_m);
+  EXPECT_LT(tracked_m, 0.015);  // Measured: 11 and 59 mm.
+  EXPECT_GT(alone_m, 2 * tracked_m) << "nothing pulls: nothing is tested";
+}
+
 TEST(RegisterJointly, FindsWhatTheDepthCameraGetsWrong) {
   synthetic::MapOptions options = kLandscape;
   options.sensor.depth[0] = 0.008;

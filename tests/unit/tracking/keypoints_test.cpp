@@ -51,6 +51,22 @@ TEST(Keypoints, FollowsAShiftToAFractionOfAPixel) {
   EXPECT_LT(errors[errors.size() * 8 / 10], 0.1F);
 }
 
+TEST(Keypoints, FollowsThroughAChangeOfTheExposureOnceItsRatioIsKnown) {
+  const KeypointOptions options;
+  const cv::Mat from = Pattern(0, 0);
+  const cv::Mat darker = Pattern(1.3, -0.6) * 0.6;
+  const auto corners = DetectCorners(from, {}, options);
+  const double ratio = BrightnessRatio(from, darker, corners, corners);
+  EXPECT_NEAR(ratio, 0.6, 0.03);  // The pattern moved a little too.
+  const auto found = [&](const cv::Mat& start) {
+    const KltResult result = TrackKlt(MakePyramid(start, options), MakePyramid(darker, options), corners, corners, options.levels, options);
+    return static_cast<std::size_t>(std::count(result.found.begin(), result.found.end(), true));
+  };
+  EXPECT_LT(found(from), corners.size() / 2) << "the change does no harm: nothing is tested";
+  EXPECT_GT(found(from * ratio), corners.size() * 8 / 10);
+  EXPECT_EQ(BrightnessRatio(from, darker, {corners[0]}, {corners[0]}), 1.0) << "one point tells nothing";
+}
+
 TEST(Keypoints, LosesWhatIsNoLongerThere) {
   const KeypointOptions options;
   const cv::Mat from = Pattern(0, 0);

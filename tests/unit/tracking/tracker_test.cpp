@@ -65,6 +65,18 @@ TEST_F(TrackerTest, FollowsASweepWithAnyOfItsMeans) {
   }
 }
 
+TEST_F(TrackerTest, FollowsThroughAStepOfTheExposure) {
+  Tracker tracker(sweep().info, {.use_markers = false, .use_dense = false});
+  for (std::size_t i = 0; i < sweep().frames.size(); ++i) {
+    Frame frame = sweep().frames[i];
+    if (i >= 6) frame.color_rgb = frame.color_rgb * (i < 13 ? 0.5 : 0.8);
+    EXPECT_TRUE(tracker.Track(frame).tracked) << "frame " << i;
+  }
+  const double worst = WorstError(tracker);
+  fmt::print("exposure halved, and back: worst {:.2e} m\n", worst);
+  EXPECT_LT(worst, 0.002);
+}
+
 TEST_F(TrackerTest, SaysLostOnBlankFramesAndComesBack) {
   for (const bool use_markers : {true, false}) {
     Tracker tracker(sweep().info, {.use_markers = use_markers});

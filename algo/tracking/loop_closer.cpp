@@ -1,0 +1,176 @@
+#include "algo/tracking/loop_closer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include <Eigen/SparseCholesky>
+
+namespace plumb {
+namespace {
+
+constexpr int kMaxCandidates = 4;
+constexpr int kSharedEnough = 10;   // Landmarks in common: the keyframes know of each other.
+constexpr int kCovisible = 15;      // Landmarks in common: a constraint.
+constexpr double kViewReach = 0.7;  // As far apart as two views may be: shares of the depth plus radians.
+constexpr double kDriftPerMetre = 0.05;
+constexpr double kTurnPerMetre = 0.03;  // Radians.
+constexpr int kMaxRounds = 15;
+constexpr double kLinkSigma_m = 0.002;
+constexpr double kLinkSigma_rad = 0.001;
+
+// Length of the way of the camera from each keyframe to the newest.
+std::vector<double> WayToNewest(const TrackingMap& map) {
+  std::vector<double> way(map.keyframes.size(), 0.0);
+  for (std::size_t k = map.keyframes.size() - 1; k-- > 0;)
+    way[k] = way[k + 1] + (map.keyframes[k + 1].T_world_color.translation() - map.keyframes[k].T_world_color.translation()).norm();
+  return way;
+}
+
+DriftBound BoundOf(double way_m) { return {0.30 + kDriftPerMetre * way_m, 0.30 + kTurnPerMetre * way_m}; }
+
+// Landmarks that the newest keyframe shares with each.
+std::vector<int> SharedWithNewest(const TrackingMap& map) {
+  std::vector<bool> seen(map.landmarks.size(), false);
+  for (const KeypointObservation& o : map.keyframes.back().keypoints) seen[static_cast<std::size_t>(o.landmark)] = true;
+  std::vector<int> shared;
+  for (const MapKeyframe& keyframe : map.keyframes) {
+    shared.push_back(static_cast<int>(std::count_if(keyframe.keypoints.begin(), keyframe.keypoints.end(),
+                                                    [&](const auto& o) { return seen[static_cast<std::size_t>(o.landmark)]; })));
+  }
+  return shared;
+}
+
+// What holds the map together now: each keyframe's link to the one it followed and to those with landmarks in common.
+std::vector<KeyframeLink> LinksOf(const TrackingMap& map) {
+  std::vector<std::vector<int>> seen_by(map.landmarks.size());
+  for (std::size_t k = 0; k < map.keyframes.size(); ++k)
+    for (const KeypointObservation& o : map.keyframes[k].keypoints)
+      seen_by[static_cast<std::size_t>(o.landmark)].push_back(static_cast<int>(k));
+  std::map<std::pair<int, int>, int> shared;
+  for (const std::vector<int>& keyframes : seen_by)
+    for (std::size_t i = 0; i < keyframes.size(); ++i)
+      for (std::size_t j = i + 1; j < keyframes.size(); ++j) ++shared[{keyframes[i], keyframes[j]}];
+  for (std::size_t k = 0; k < map.keyframes.size(); ++k)
+    if (map.keyframes[k].previous >= 0) shared[{map.keyframes[k].previous, static_cast<int>(k)}] += kCovisible;
+  std::vector<KeyframeLink> links;
+  for (const auto& [pair, count] : shared) {
+    if (count < kCovisible || pair.first == pair.second) continue;
+    const auto& a = map.keyframes[static_cast<std::size_t>(pair.first)];
+    const auto& b = map.keyframes[static_cast<std::size_t>(pair.second)];
+    links.push_back({pair.first, pair.second, a.T_world_color.inverse() * b.T_world_color});
+  }
+  return links;
+}
+
+// Gauss-Newton; the first pose stays. False if the system cannot be solved; the poses are as they were then.
+bool MeetLinks(const std::vector<KeyframeLink>& links, std::vector<Pose>& T_world) {
+  const auto size = static_cast<Eigen::Index>(6 * T_world.size());
+  std::vector<Pose> T = T_world;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    std::vector<Eigen::Triplet<double>> entries;
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(size);
+    const auto add = [&](int row, int column, const Matrix6d& block) {
+      for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) entries.emplace_back(6 * row + i, 6 * column + j, block(i, j));
+    };
+    for (const KeyframeLink& link : links) {
+      const LinkEquations equations =
+          Linearise(link, T[static_cast<std::size_t>(link.a)], T[static_cast<std::size_t>(link.b)], kLinkSigma_rad, kLinkSigma_m);
+      add(link.a, link.a, equations.H.topLeftCorner<6, 6>());
+      add(link.a, link.b, equations.H.topRightCorner<6, 6>());
+      add(link.b, link.a, equations.H.bottomLeftCorner<6, 6>());
+      add(link.b, link.b, equations.H.bottomRightCorner<6, 6>());
+      gradient.segment<6>(6 * link.a) += equations.g.head<6>();
+      gradient.segment<6>(6 * link.b) += equations.g.tail<6>();
+    }
+    // Holds the first pose, and those that nothing links.
+    for (int i = 0; i < size; ++i) entries.emplace_back(i, i, i < 6 ? 1e12 : 1.0);
+    Eigen::SparseMatrix<double> H(size, size);
+    H.setFromTriplets(entries.begin(), entries.end());
+    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(H);
+    if (solver.info() != Eigen::Success) return false;
+    const Eigen::VectorXd step = solver.solve(-gradient);
+    if (!step.allFinite()) return false;
+    for (std::size_t k = 1; k < T.size(); ++k) T[k] = T[k] * PoseFromTwist(step.segment<6>(static_cast<Eigen::Index>(6 * k)));
+    if (step.lpNorm<Eigen::Infinity>() < 1e-6) break;
+  }
+  for (Pose& pose : T) pose = Orthonormalised(pose);
+  T_world = std::move(T);
+  return true;
+}
+
+}  // namespace
+
+std::vector<int> LoopCandidates(const TrackingMap& map) {
+  const int newest = static_cast<int>(map.keyframes.size()) - 1;
+  if (newest < kLoopMinGap) return {};
+  const std::vector<double> way = WayToNewest(map);
+  const std::vector<int> shared = SharedWithNewest(map);
+  std::vector<std::pair<double, int>> near;
+  for (int k = 0; k + kLoopMinGap <= newest; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    if (shared[i] >= kSharedEnough || map.keyframes[i].descriptors.empty()) continue;
+    const Pose T = map.keyframes[i].T_world_color.inverse() * map.keyframes.back().T_world_color;
+    const DriftBound drift = BoundOf(way[i]);
+    const double depth = std::clamp(map.keyframes[i].median_depth_m, 0.4, 3.0);
+    const double apart =
+        std::max(0.0, T.translation().norm() - drift.translation_m) / depth + std::max(0.0, RotationAngle(T) - drift.rotation_rad);
+    // Among those within reach, the ones that would see most alike without any drift.
+    if (apart < kViewReach) near.emplace_back(T.translation().norm() / depth + RotationAngle(T), k);
+  }
+  std::sort(near.begin(), near.end());
+  std::vector<int> candidates;
+  for (const auto& [distance, k] : near) {
+    const bool beside = std::any_of(candidates.begin(), candidates.end(), [k = k](int other) { return std::abs(other - k) < 2; });
+    if (!beside) candidates.push_back(k);
+    if (static_cast<int>(candidates.size()) == kMaxCandidates) break;
+  }
+  return candidates;
+}
+
+DriftBound LargestDrift(const TrackingMap& map, int from_keyframe, int to_keyframe) {
+  double way = 0;
+  for (auto k = static_cast<std::size_t>(from_keyframe); k < static_cast<std::size_t>(to_keyframe); ++k)
+    way += (map.keyframes[k + 1].T_world_color.translation() - map.keyframes[k].T_world_color.translation()).norm();
+  return BoundOf(way);
+}
+
+LinkEquations Linearise(const KeyframeLink& link, const Pose& T_world_a, const Pose& T_world_b, double sigma_rad, double sigma_m) {
+  const Pose T_a_b = T_world_a.inverse() * T_world_b;
+  Vector6d r;
+  r << VectorFromRotation(link.T_a_b.linear().transpose() * T_a_b.linear()), T_a_b.translation() - link.T_a_b.translation();
+  Eigen::Matrix<double, 6, 12> J = Eigen::Matrix<double, 6, 12>::Zero();
+  J.block<3, 3>(0, 0) = -T_a_b.linear().transpose();
+  J.block<3, 3>(0, 6).setIdentity();
+  J.block<3, 3>(3, 0) = Skew(T_a_b.translation());
+  J.block<3, 3>(3, 3) = -Eigen::Matrix3d::Identity();
+  J.block<3, 3>(3, 9) = T_a_b.linear();
+  Vector6d weight;
+  weight << Eigen::Vector3d::Constant(1.0 / (sigma_rad * sigma_rad)), Eigen::Vector3d::Constant(1.0 / (sigma_m * sigma_m));
+  return {J.transpose() * weight.asDiagonal() * J, J.transpose() * (weight.asDiagonal() * r)};
+}
+
+void BendMap(const std::vector<KeyframeLink>& links, TrackingMap& map) {
+  std::vector<KeyframeLink> all = LinksOf(map);
+  all.insert(all.end(), links.begin(), links.end());
+  std::vector<Pose> T_world;
+  for (const MapKeyframe& keyframe : map.keyframes) T_world.push_back(keyframe.T_world_color);
+  if (!MeetLinks(all, T_world)) return;
+
+  std::vector<Pose> T_new_old;  // World.
+  for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
+    T_new_old.push_back(T_world[k] * map.keyframes[k].T_world_color.inverse());
+    map.keyframes[k].T_world_color = T_world[k];
+  }
+  for (Landmark& landmark : map.landmarks)
+    landmark.p_world = T_new_old[static_cast<std::size_t>(landmark.first_keyframe)] * landmark.p_world;
+  std::map<int, std::size_t> first_view;
+  for (std::size_t k = 0; k < map.keyframes.size(); ++k)
+    for (const MarkerObservation& marker : map.keyframes[k].data.markers) first_view.emplace(marker.id, k);
+  for (auto& [id, marker] : map.markers)
+    if (const auto k = first_view.find(id); k != first_view.end()) marker.T_world_marker = T_new_old[k->second] * marker.T_world_marker;
+}
+
+}  // namespace plumb
