@@ -156,10 +156,7 @@ struct Tracker::Impl {
       const Eigen::Vector3d p = T_camera_world * map.landmarks[static_cast<std::size_t>(a.landmark)].p_world;
       guesses.push_back(p.z() > 0.05 ? Eigen::Vector2f(Project(info.intrinsics, p).cast<float>()) : a.pixel);
     }
-    const double ratio = BrightnessRatio(last_pyramid[0], prepared.gray, from, guesses);
-    const bool same = std::abs(ratio - 1.0) < kSameBrightness;
-    const KltResult klt = TrackKlt(same ? last_pyramid : MakePyramid(last_pyramid[0] * ratio, keypoint_options), prepared.pyramid, from,
-                                   guesses, keypoint_options.levels, keypoint_options);
+    const KltResult klt = Follow(last_pyramid, prepared, from, guesses, keypoint_options.levels);
     for (std::size_t i = 0; i < active.size(); ++i) {
       if (!klt.found[i]) continue;
       PosePoint point;
@@ -174,6 +171,19 @@ struct Tracker::Impl {
       points.push_back(point);
       followed.push_back({active[i].landmark, klt.points[i]});
     }
+  }
+
+  // KLT; where it loses most points, once more at the new image's brightness: the exposure may have changed.
+  [[nodiscard]] KltResult Follow(const Pyramid& before, const Prepared& prepared, const std::vector<Eigen::Vector2f>& from,
+                                 const std::vector<Eigen::Vector2f>& guesses, int max_level) const {
+    const auto num_found = [](const KltResult& klt) { return std::count(klt.found.begin(), klt.found.end(), true); };
+    KltResult klt = TrackKlt(before, prepared.pyramid, from, guesses, max_level, keypoint_options);
+    if (2 * num_found(klt) >= static_cast<std::ptrdiff_t>(from.size())) return klt;
+    const double ratio = BrightnessRatio(before[0], prepared.gray, from, guesses);
+    if (std::abs(ratio - 1.0) < kSameBrightness) return klt;
+    KltResult again =
+        TrackKlt(MakePyramid(before[0] * ratio, keypoint_options), prepared.pyramid, from, guesses, max_level, keypoint_options);
+    return num_found(again) > num_found(klt) ? again : klt;
   }
 
   PoseProblem MakeProblem(const Prepared& prepared, double dt_depth_s) const {
@@ -341,10 +351,7 @@ struct Tracker::Impl {
         guesses.push_back(pixel.cast<float>());
       }
       if (landmarks.empty()) continue;
-      const double ratio = BrightnessRatio(keyframe.gray, prepared.gray, from, guesses);
-      const bool same = std::abs(ratio - 1.0) < kSameBrightness;
-      const Pyramid pyramid = MakePyramid(same ? keyframe.gray : cv::Mat(keyframe.gray * ratio), keypoint_options);
-      const KltResult klt = TrackKlt(pyramid, prepared.pyramid, from, guesses, 1, keypoint_options);
+      const KltResult klt = Follow(MakePyramid(keyframe.gray, keypoint_options), prepared, from, guesses, 1);
       for (std::size_t i = 0; i < landmarks.size(); ++i) {
         if (!klt.found[i] || (klt.points[i] - guesses[i]).norm() > 6.0F * static_cast<float>(SigmaPx())) continue;
         followed.insert(landmarks[i]);
@@ -439,14 +446,12 @@ struct Tracker::Impl {
       BendMap(loops, map);
     }
 
-    MapKeyframe keyframe = std::move(map.keyframes.back());
-    map.keyframes.pop_back();
+    MapKeyframe& keyframe = map.keyframes.back();
     const std::size_t known = active.size();
     std::vector<PosePoint> points;
     Reassociate(prepared, keyframe.data.view.depth_m, keyframe.T_world_color, KeyframesNear(keyframe.T_world_color, map.keyframes.size()),
                 points);
     Observe(points, known, keyframe);
-    map.keyframes.push_back(std::move(keyframe));
     AdjustLocally(index);
   }
 
