@@ -360,7 +360,8 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
   using Kind = ScanOutcome::Kind;
   limit_timer_.Disarm();
   sensors_->EndScan();
-  session_.reset();  // joins a thread that has nothing left to do
+  // Its thread has nothing left to do, but its end may wait for a processor.
+  (void)store_thread_.Post([ended = std::shared_ptr<ScanSession>(std::move(session_))]() mutable { ended.reset(); });
   scan_.has_ended = true;
   scan_.outcome = outcome;
   if (outcome.kind == Kind::kCancelled) {
