@@ -282,6 +282,8 @@ await h.step('a keyboard alone reaches login, navigation and the start button', 
   await keys.keyboard.type(h.password);
   await keys.keyboard.press('Enter');
   await keys.getByRole('navigation').waitFor();
+  await keys.locator('.tile').first().waitFor();
+  await keys.locator('tbody tr').first().waitFor();
   const focused = () => keys.evaluate(() => document.activeElement.textContent);
   for (let i = 0; i < 40 && (await focused()) !== 'Scan'; ++i) await keys.keyboard.press('Tab');
   await h.look(keys, 'focus', { axe: false });

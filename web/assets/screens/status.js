@@ -62,6 +62,7 @@ export async function showStatus(place) {
     clear(list, rows.length ? table([S.patients.when, S.result.patient, S.patients.purpose, S.patients.outcome], rows, text.lastScans) : h('p', { class: 'hint' }, text.noScans));
     draw();
   };
+  draw();  // what is known already; the list may take a moment
   await load();
   return live.listen((kind) => (kind === 'status' ? draw() : load().catch(() => {})));
 }
