@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// Keyframes made at least `kMinGap` before the newest that may show the same as it although they share (almost) no landmarks with it,
+/// Keyframes made at least `kLoopMinGap` before the newest that may show the same as it although they share (almost) no landmarks with it,
 /// likeliest first, at most four. How far the map may have drifted is taken from the length of the way between.
 inline constexpr int kLoopMinGap = 12;
 [[nodiscard]] std::vector<int> LoopCandidates(const TrackingMap& map);
