@@ -125,9 +125,12 @@ AtomicFolder::AtomicFolder(const fs::path& target, OutputKind kind) : kind_(std:
 }
 
 void AtomicFolder::MakeHidden() {
+  int result = 0;
   do {
     hidden_ = target_.parent_path() / (HiddenPrefix(target_) + UniqueSuffix());
-  } while (::mkdir(hidden_.c_str(), 0777) != 0 && errno == EEXIST);
+    result = ::mkdir(hidden_.c_str(), 0777);
+  } while (result != 0 && errno == EEXIST);
+  if (result != 0) throw IoError(DescribeWriteError(target_, errno));
   lock_ = ::open(hidden_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (lock_ < 0) throw IoError(DescribeWriteError(target_, errno));
   (void)::flock(lock_, LOCK_EX | LOCK_NB);  // where locks do not work, stale folders stay: no harm

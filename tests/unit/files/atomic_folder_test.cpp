@@ -42,6 +42,12 @@ void WriteThing(const fs::path& target, const std::string& content) {
   output.Commit();
 }
 
+TEST(AtomicFolderTest, WhereNoFolderCanBeMadeTheReasonIsTold) {
+  // Nobody makes folders there, root neither.
+  EXPECT_THAT(MessageOf<IoError>([] { WriteThing("/sys/plumb-out", "1"); }),
+              AllOf(HasSubstr("/sys/plumb-out"), HasSubstr("choose a folder that you may write to")));
+}
+
 TEST(AtomicFolderTest, AppearsOnlyWithCommit) {
   const TempFolder folder;
   {
