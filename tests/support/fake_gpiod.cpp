@@ -9,14 +9,16 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <string>
+#include <vector>
 
-struct gpiod_chip {
-  int unused = 0;
-};
 struct gpiod_line {
   std::string name;
   int button = -1;
+};
+struct gpiod_chip {
+  std::vector<std::unique_ptr<gpiod_line>> lines;  // the chip's, as in libgpiod: gone with it
 };
 
 namespace {
@@ -50,9 +52,9 @@ PLUMB_FAKE gpiod_chip* gpiod_chip_open_lookup(const char* name) {
 
 PLUMB_FAKE void gpiod_chip_close(gpiod_chip* chip) { delete chip; }
 
-PLUMB_FAKE gpiod_line* gpiod_chip_find_line(gpiod_chip*, const char* name) {
-  return new gpiod_line{name};
-}  // a few; never freed, as in 1.6
+PLUMB_FAKE gpiod_line* gpiod_chip_find_line(gpiod_chip* chip, const char* name) {
+  return chip->lines.emplace_back(new gpiod_line{name}).get();
+}
 
 PLUMB_FAKE int gpiod_line_request(gpiod_line* line, const gpiod_line_request_config*, int) {
   line->button = ::open(InFolder("button").c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
