@@ -85,6 +85,18 @@ Plumbd::~Plumbd() {
   if (::testing::Test::HasFailure()) std::fprintf(stderr, "--- log of plumbd ---\n%s---\n", log().c_str());
 }
 
+json Plumbd::Sim(const std::string& action, const std::string& argument) const {
+  json answer;
+  for (const auto end = std::chrono::steady_clock::now() + kPatience; std::chrono::steady_clock::now() < end;) {
+    answer = Ask({{"command", "sim"}, {"action", action}, {"argument", argument}});
+    // The control socket answers before the driver is loaded; on a busy machine by seconds.
+    if (answer.value("error", "").find("does not listen") == std::string::npos) break;
+    std::this_thread::sleep_for(kBetweenLooks);
+  }
+  EXPECT_EQ(answer.value("ok", false), true) << action << ' ' << argument << ": " << answer.dump();
+  return answer;
+}
+
 json Plumbd::Ask(const json& request) const {
   int fd = -1;
   try {

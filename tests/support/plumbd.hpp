@@ -49,9 +49,8 @@ class Plumbd {
 
   [[nodiscard]] nlohmann::json Status() const { return Ask({{"command", "status"}}); }
   nlohmann::json Press(bool is_long = false) const { return Ask({{"command", "press"}, {"long", is_long}}); }
-  nlohmann::json Sim(const std::string& action, const std::string& argument = {}) const {
-    return Ask({{"command", "sim"}, {"action", action}, {"argument", argument}});
-  }
+  /// Waits until the driver listens, which plumbd loads after it has begun to answer; a failure of the test if it then refuses.
+  nlohmann::json Sim(const std::string& action, const std::string& argument = {}) const;
   /// One request, one answer; an empty object if nobody answers.
   [[nodiscard]] nlohmann::json Ask(const nlohmann::json& request) const;
 
