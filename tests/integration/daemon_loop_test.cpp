@@ -9,6 +9,7 @@
 
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
+#include "tests/support/sanitized.hpp"
 
 namespace plumb {
 namespace {
@@ -18,11 +19,7 @@ using test::HttpClient;
 using test::kPassword;
 using testing::Plumbd;
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kJudges = false;  // several times slower: only reported
-#else
-constexpr bool kJudges = true;
-#endif
+constexpr bool kJudges = !testing::kIsSanitized;  // several times slower: only reported
 /// Seen by hand on a busy machine (load 8 to 10): 5 of 470 000 turns, all of them moving bytes only, with 10 to 14 ms of own time;
 /// supposedly interrupts, which the kernel charges to whoever runs. Work that is too long is too long each time.
 constexpr int kAttempts = 2;
@@ -81,7 +78,7 @@ void SendBundle(std::uint16_t port, const HttpClient& engineer) {
 /// The meter's figures after all of it.
 json WorkflowFigures() {
   const testing::TempFolder folder;
-  Plumbd plumbd(folder.path());
+  Plumbd plumbd(folder.path(), {.scenes = 2});
   EXPECT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   HttpClient engineer(plumbd.port()), physicist(plumbd.port());

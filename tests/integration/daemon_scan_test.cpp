@@ -33,7 +33,7 @@ class DaemonScanTest : public ::testing::Test {
 };
 
 TEST_F(DaemonScanTest, TwoPressesAndTwoMoreGiveTheSixNumbersOfTheBodysTrueMotion) {
-  Plumbd plumbd(folder_.path());
+  Plumbd plumbd(folder_.path(), {.scenes = 2});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   EXPECT_THAT(plumbd.notifications(), HasSubstr("READY=1"));
@@ -63,7 +63,7 @@ TEST_F(DaemonScanTest, TwoPressesAndTwoMoreGiveTheSixNumbersOfTheBodysTrueMotion
 
 TEST_F(DaemonScanTest, TheResultIsTheSameWhenTheRecordingIsComputedAgain) {
   std::ofstream(folder_ / "plumb.toml") << "[appliance]\nkeep_recordings = true\n[reconstruct]\nkeep_color = false\n";
-  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
+  Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}, .scenes = 2});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   plumbd.ScanOnce();

@@ -34,10 +34,10 @@ class DaemonSensorTest : public ::testing::Test {
   static void SetUpTestSuite() { testing::RenderOnce(); }
 
   /// plumbd keeps its recordings, which tell what calibration a scan was made with, and the virtual sensor's files are in our reach.
-  [[nodiscard]] testing::PlumbdOptions Options(const std::string& more = {}) const {
+  [[nodiscard]] testing::PlumbdOptions Options(const std::string& more = {}, int scenes = 1) const {
     std::ofstream(folder_ / "plumb.toml") << "[appliance]\nkeep_recordings = true\n" << more;
     fs::create_directories(folder_ / "tmp");
-    return {.arguments = {"--config", folder_ / "plumb.toml"}, .environment = {{"TMPDIR", folder_ / "tmp"}}};
+    return {.arguments = {"--config", folder_ / "plumb.toml"}, .environment = {{"TMPDIR", folder_ / "tmp"}}, .scenes = scenes};
   }
 
   /// Gives a unit the first one's calibration with another focal length, and returns that.
@@ -139,7 +139,7 @@ TEST_F(DaemonSensorTest, OfTwoSensorsTheConfiguredOneIsUsedAndNoOther) {
 }
 
 TEST_F(DaemonSensorTest, FramesThatComeFasterThanTrackingAreDroppedCountedAndShownAndTheResultIsRightOrNone) {
-  Plumbd plumbd(folder_.path(), Options());
+  Plumbd plumbd(folder_.path(), Options({}, 2));
   ASSERT_TRUE(plumbd.WaitUntilUp());
   WaitForSensor(plumbd, kFirst);
   plumbd.ScanOnce();
@@ -224,7 +224,7 @@ class DaemonGlitchTest : public DaemonSensorTest, public ::testing::WithParamInt
 
 TEST_P(DaemonGlitchTest, AreCountedAndTheResultIsRightOrSaidToBeNone) {
   const std::string glitch = GetParam();
-  Plumbd plumbd(folder_.path(), Options("auto_stop_s = 1.5\n"));
+  Plumbd plumbd(folder_.path(), Options("auto_stop_s = 1.5\n", 2));
   ASSERT_TRUE(plumbd.WaitUntilUp());
   WaitForSensor(plumbd, kFirst);
   const json first = ScanWith(plumbd, glitch);

@@ -12,6 +12,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using test::HttpAnswer;
 using test::HttpClient;
+using test::HttpConnection;
 using test::kPassword;
 using ::testing::HasSubstr;
 using ::testing::IsSupersetOf;
@@ -49,7 +50,7 @@ TEST_F(DaemonWebTest, HealthIsGoodWithAndWithoutASensorAndTellsADamagedDatabase)
 }
 
 TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
-  Plumbd plumbd(folder_.path());
+  Plumbd plumbd(folder_.path(), {.scenes = 2});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   const std::uint16_t port = plumbd.port();
@@ -107,6 +108,28 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
   EXPECT_EQ(physicist.Ask("DELETE", "/api/v1/patients/" + patient, "").status, 200);
   EXPECT_FALSE(fs::exists(plumbd.state() / "scans" / fraction));
   EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+TEST_F(DaemonWebTest, AnEventStreamTellsAScanFromThePressToTheResultAnUnplugAndTheEnd) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  HttpClient client(plumbd.port());
+  ASSERT_EQ(client.Post("/api/v1/setup", {{"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}}).status, 200);
+  ASSERT_EQ(client.LogIn("engineer", kPassword), 200);
+  HttpConnection stream(plumbd.port());
+  ASSERT_TRUE(stream.Send("GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie + "\r\n\r\n"));
+  EXPECT_THAT(stream.ReadUntil("\"state\":\"ready\""), HasSubstr("text/event-stream"));
+  plumbd.ScanOnce();
+  for (const char* news : {"\"state\":\"scanning\"", "\"state\":\"working\"", "event: result"}) {
+    EXPECT_FALSE(stream.ReadUntil(news).empty()) << news;
+  }
+  plumbd.Press(/*is_long=*/true);
+  plumbd.WaitForState("ready");
+  plumbd.Sim("unplug");
+  EXPECT_FALSE(stream.ReadUntil("\"state\":\"no_sensor\"").empty());
+  EXPECT_EQ(plumbd.Stop(), 0) << "an open stream keeps nothing from ending";
+  EXPECT_TRUE(stream.ReadUntil("more").empty());
 }
 
 }  // namespace

@@ -16,10 +16,12 @@
 #include <stdexcept>
 #include <vector>
 
+#include "tests/support/sanitized.hpp"
+
 namespace plumb::test {
 namespace {
 
-constexpr int kLimit_ms = 30000;
+constexpr int kLimit_ms = 30000 * testing::kSlowness;
 
 sockaddr_in Address(const std::string& text, std::uint16_t port) {
   sockaddr_in address{};
