@@ -315,7 +315,8 @@ TEST_F(DaemonFaultTest, ACorruptDatabaseIsSafeModeAndTouchesNothing) {
 }
 
 TEST_F(DaemonFaultTest, ASecondPlumbdOnTheSameFolderIsSafeModeAndTheFirstGoesOn) {
-  Plumbd first(folder_.path());
+  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nauto_stop_s = 100\n";  // the second one may take long to start
+  Plumbd first(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
   ASSERT_TRUE(first.WaitUntilUp());
   first.WaitForState("ready");
   ASSERT_EQ(first.Press()["ok"], true);

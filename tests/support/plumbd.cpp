@@ -134,6 +134,7 @@ json Plumbd::Sim(const std::string& action, const std::string& argument) const {
 }
 
 json Plumbd::Ask(const json& request) const {
+  (void)notifications();  // a socket that nobody reads makes its sender wait
   int fd = -1;
   try {
     fd = ConnectUnix(socket());
@@ -174,7 +175,6 @@ bool Plumbd::WaitUntilUp() {
 json Plumbd::WaitFor(const std::string& what, const std::function<bool(const json&)>& condition) {
   json status;
   for (const auto end = std::chrono::steady_clock::now() + kPatience; std::chrono::steady_clock::now() < end;) {
-    (void)notifications();  // a socket that nobody reads makes its sender wait
     status = Status();
     if (!status.empty() && condition(status)) return status;
     if (HasEnded()) break;
@@ -214,7 +214,10 @@ void Plumbd::Signal(int signal) const { ::kill(pid_, signal); }
 
 int Plumbd::Wait() {
   int status = 0;
-  ::waitpid(pid_, &status, 0);
+  while (::waitpid(pid_, &status, WNOHANG) == 0) {
+    (void)notifications();
+    std::this_thread::sleep_for(kBetweenLooks);
+  }
   pid_ = -1;
   return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
 }
@@ -238,7 +241,7 @@ std::string Plumbd::setup_code() const {
   return at == std::string::npos ? std::string() : text.substr(at + marker.size(), 9);
 }
 
-std::string Plumbd::notifications() {
+std::string Plumbd::notifications() const {
   char buffer[4096];
   for (ssize_t count = 0; (count = ::recv(notify_fd_, buffer, sizeof(buffer), MSG_DONTWAIT)) > 0;) {
     notified_.append(buffer, static_cast<std::size_t>(count));

@@ -71,7 +71,7 @@ class Plumbd {
   [[nodiscard]] const std::filesystem::path& state() const { return state_; }
   [[nodiscard]] std::filesystem::path socket() const { return folder_ / "control.sock"; }
   /// What systemd was told, one message a line.
-  [[nodiscard]] std::string notifications();
+  [[nodiscard]] std::string notifications() const;
 
   [[nodiscard]] int num_descriptors() const;
   [[nodiscard]] int num_threads() const;
@@ -80,7 +80,7 @@ class Plumbd {
  private:
   std::filesystem::path folder_, state_;
   int notify_fd_ = -1;
-  std::string notified_;
+  mutable std::string notified_;
   pid_t pid_ = -1;
 };
 
