@@ -180,6 +180,7 @@ class Sensors {
                                                });
     provider_.library = virtual_->runtime_library();
     provider_.calibration_folder = virtual_->calibration_folder();
+    provider_.before_stop = [sensor = virtual_.get()] { sensor->Quit(); };
   }
 
   std::unique_ptr<VirtualSensor> virtual_;

@@ -62,6 +62,7 @@ struct Attached {
           simulated, stop, [&](double fraction, std::string_view scene) { progress.Update("rendering", fraction, scene); });
       openni.library = virtual_sensor->runtime_library();
       openni.calibration_folder = virtual_sensor->calibration_folder();
+      openni.before_stop = [virtual_sensor = virtual_sensor.get()] { virtual_sensor->Quit(); };
     }
     provider = std::make_unique<OpenNiProvider>(openni);
     sensor = provider->Open(options.serial);

@@ -118,7 +118,10 @@ struct OpenNiProvider::Impl {
 
 OpenNiProvider::OpenNiProvider(const OpenNiOptions& options) : impl_(std::make_shared<Impl>(options)) {}
 
-OpenNiProvider::~OpenNiProvider() { SetListener(nullptr); }
+OpenNiProvider::~OpenNiProvider() {
+  SetListener(nullptr);
+  if (impl_->options.before_stop) impl_->options.before_stop();
+}
 
 std::vector<SensorDescription> OpenNiProvider::List() { return impl_->List(); }
 

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,6 +23,9 @@ struct OpenNiOptions {
   std::optional<int> reference_marker = {};
   std::chrono::milliseconds stall_time{2000};  ///< Next() fails after so long without a pair.
   std::chrono::microseconds max_gap{16000};    ///< Between the stamps of a pair; under half of the frame period.
+  /// Called before the library is stopped, which waits for its drivers' threads under a lock that their callbacks want: whoever makes a
+  /// driver call back must cease. Must not throw.
+  std::function<void()> before_stop = {};
 };
 
 /// Wakes nobody's loop and takes its time: List() opens each unit that it has not seen before to ask its serial (about a second on real

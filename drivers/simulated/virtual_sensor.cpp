@@ -159,4 +159,12 @@ VirtualSensor::VirtualSensor(const VirtualSensorOptions& options, const std::sto
 
 VirtualSensor::~VirtualSensor() = default;
 
+void VirtualSensor::Quit() const noexcept {
+  try {
+    (void)Command("quit");
+  } catch (const std::exception&) {
+    // It does not listen as it is.
+  }
+}
+
 }  // namespace plumb

@@ -83,6 +83,8 @@ class VirtualSensor {
   void Error() const { (void)Command("error"); }    ///< The driver reports a failure and frames stop.
   void NextScene() const { (void)Command("next-scene"); }
   void Rewind() const { (void)Command("rewind"); }
+  /// The driver finishes what it was told and listens no more: for OpenNiOptions::before_stop.
+  void Quit() const noexcept;
 
  private:
   std::filesystem::path runtime_library_;

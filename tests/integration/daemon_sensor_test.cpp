@@ -139,7 +139,7 @@ TEST_F(DaemonSensorTest, OfTwoSensorsTheConfiguredOneIsUsedAndNoOther) {
 }
 
 TEST_F(DaemonSensorTest, FramesThatComeFasterThanTrackingAreDroppedCountedAndShownAndTheResultIsRightOrNone) {
-  Plumbd plumbd(folder_.path(), Options({}, 2));
+  Plumbd plumbd(folder_.path(), Options("auto_stop_s = 100\n", 2));  // the press is to end the second sweep, however slow tracking is
   ASSERT_TRUE(plumbd.WaitUntilUp());
   WaitForSensor(plumbd, kFirst);
   plumbd.ScanOnce();

@@ -141,9 +141,12 @@ class VirtualDriver : public oni::driver::DriverBase {
       socklen_t length = sizeof sender;
       const ssize_t size = ::recvfrom(socket_, buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&sender), &length);
       if (size <= 0) continue;
-      const std::string answer = Obey(std::string(buffer.data(), static_cast<std::size_t>(size)));
+      const std::string command(buffer.data(), static_cast<std::size_t>(size));
+      const bool quits = command == "quit";
+      const std::string answer = quits ? "ok" : Obey(command);
       if (length > sizeof(sa_family_t))
         ::sendto(socket_, answer.data(), answer.size(), MSG_DONTWAIT, reinterpret_cast<const sockaddr*>(&sender), length);
+      if (quits) return;
     }
   }
 

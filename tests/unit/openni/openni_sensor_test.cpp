@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <future>
+#include <thread>
 
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
@@ -247,6 +248,30 @@ TEST(OpenNiSensorTest, TheSensorMayOutliveItsProvider) {
   (void)Take(*sensor, 2);
   virtual_sensor.Unplug();
   EXPECT_THROW(Take(*sensor, 1000), DeviceLost);
+}
+
+TEST(OpenNiSensorTest, TheLibraryStopsWhileUnitsComeAndGo) {
+  const VirtualSensor virtual_sensor(SmallVirtualSensor());
+  for (int round = 0; round < 10; ++round) {
+    std::atomic<bool> closing = false;
+    std::atomic<int> toggles = 0;
+    OpenNiOptions options;
+    options.library = virtual_sensor.runtime_library();
+    options.before_stop = [&] {
+      closing = true;
+      virtual_sensor.Quit();
+    };
+    auto provider = std::make_unique<OpenNiProvider>(options);
+    std::jthread toggler([&] {
+      try {
+        for (; !closing; ++toggles) toggles % 2 == 0 ? virtual_sensor.Unplug() : virtual_sensor.Plug();
+      } catch (const DeviceError&) {
+        // Sent after the driver had quit.
+      }
+    });
+    while (toggles < 3) std::this_thread::yield();
+    provider.reset();  // Hung when a callback was under way.
+  }
 }
 
 TEST(OpenNiSensorTest, AMissingLibraryIsNamed) {
