@@ -8,7 +8,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "algo/tracking/loop_closer.hpp"
+#include "algo/tracking/keyframe_link.hpp"
 #include "algo/types/check_stop.hpp"
 
 namespace plumb {
@@ -348,6 +348,7 @@ std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrati
 
 // Tracking's word for the keyframes that too little else holds, appended to the terms.
 void AddTrackedLinks(const TrackingMap& map, std::vector<QuadraticTerm>& terms) {
+  // What a hand's next few centimetres are followed to by depth alone; against the hundreds of observations elsewhere it weighs nothing.
   constexpr double kSigma_rad = 0.004;
   constexpr double kSigma_m = 0.006;
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {

@@ -14,10 +14,12 @@ constexpr int kMaxCandidates = 4;
 constexpr int kSharedEnough = 10;   // Landmarks in common: the keyframes know of each other.
 constexpr int kCovisible = 15;      // Landmarks in common: a constraint.
 constexpr double kViewReach = 0.7;  // As far apart as two views may be: shares of the depth plus radians.
+constexpr double kDrift_m = 0.30;   // Believed on any way, and on each metre of it.
 constexpr double kDriftPerMetre = 0.05;
+constexpr double kTurn_rad = 0.30;
 constexpr double kTurnPerMetre = 0.03;  // Radians.
 constexpr int kMaxRounds = 15;
-constexpr double kLinkSigma_m = 0.002;
+constexpr double kLinkSigma_m = 0.002;  // All links alike: only the ratio of these two counts.
 constexpr double kLinkSigma_rad = 0.001;
 
 // Length of the way of the camera from each keyframe to the newest.
@@ -28,7 +30,7 @@ std::vector<double> WayToNewest(const TrackingMap& map) {
   return way;
 }
 
-DriftBound BoundOf(double way_m) { return {0.30 + kDriftPerMetre * way_m, 0.30 + kTurnPerMetre * way_m}; }
+DriftBound BoundOf(double way_m) { return {kDrift_m + kDriftPerMetre * way_m, kTurn_rad + kTurnPerMetre * way_m}; }
 
 // Landmarks that the newest keyframe shares with each.
 std::vector<int> SharedWithNewest(const TrackingMap& map) {
@@ -130,26 +132,8 @@ std::vector<int> LoopCandidates(const TrackingMap& map) {
   return candidates;
 }
 
-DriftBound LargestDrift(const TrackingMap& map, int from_keyframe, int to_keyframe) {
-  double way = 0;
-  for (auto k = static_cast<std::size_t>(from_keyframe); k < static_cast<std::size_t>(to_keyframe); ++k)
-    way += (map.keyframes[k + 1].T_world_color.translation() - map.keyframes[k].T_world_color.translation()).norm();
-  return BoundOf(way);
-}
-
-LinkEquations Linearise(const KeyframeLink& link, const Pose& T_world_a, const Pose& T_world_b, double sigma_rad, double sigma_m) {
-  const Pose T_a_b = T_world_a.inverse() * T_world_b;
-  Vector6d r;
-  r << VectorFromRotation(link.T_a_b.linear().transpose() * T_a_b.linear()), T_a_b.translation() - link.T_a_b.translation();
-  Eigen::Matrix<double, 6, 12> J = Eigen::Matrix<double, 6, 12>::Zero();
-  J.block<3, 3>(0, 0) = -T_a_b.linear().transpose();
-  J.block<3, 3>(0, 6).setIdentity();
-  J.block<3, 3>(3, 0) = Skew(T_a_b.translation());
-  J.block<3, 3>(3, 3) = -Eigen::Matrix3d::Identity();
-  J.block<3, 3>(3, 9) = T_a_b.linear();
-  Vector6d weight;
-  weight << Eigen::Vector3d::Constant(1.0 / (sigma_rad * sigma_rad)), Eigen::Vector3d::Constant(1.0 / (sigma_m * sigma_m));
-  return {J.transpose() * weight.asDiagonal() * J, J.transpose() * (weight.asDiagonal() * r)};
+DriftBound LargestDrift(const TrackingMap& map, int older_keyframe) {
+  return BoundOf(WayToNewest(map).at(static_cast<std::size_t>(older_keyframe)));
 }
 
 void BendMap(const std::vector<KeyframeLink>& links, TrackingMap& map) {

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "algo/tracking/keyframe_link.hpp"
 #include "algo/tracking/map.hpp"
 
 namespace plumb {
@@ -12,28 +13,13 @@ namespace plumb {
 inline constexpr int kLoopMinGap = 12;
 [[nodiscard]] std::vector<int> LoopCandidates(const TrackingMap& map);
 
-/// A drift is believed up to here: metres and radians between where a keyframe is in the map and where an older one sees it.
+/// A drift is believed up to here: between where the newest keyframe is in the map and where an older one sees it. Generous: it keeps out
+/// places that only look alike, it is no model of drift.
 struct DriftBound {
   double translation_m = 0.0;
   double rotation_rad = 0.0;
 };
-[[nodiscard]] DriftBound LargestDrift(const TrackingMap& map, int from_keyframe, int to_keyframe);
-
-/// How two keyframes stand to each other: T_a_b is keyframe b's colour camera in keyframe a's.
-struct KeyframeLink {
-  int a = 0;
-  int b = 0;
-  Pose T_a_b = Pose::Identity();
-};
-
-/// A link's least squares as normal equations in the twists of both cameras, on the cameras' side, for residuals
-/// r = (log(R_ba' R_a^T R_b) / sigma_rad, (R_a^T (t_b - t_a) - t_ab') / sigma_m): 1/2 x' H x + g' x.
-struct LinkEquations {
-  Eigen::Matrix<double, 12, 12> H;
-  Eigen::Matrix<double, 12, 1> g;
-};
-[[nodiscard]] LinkEquations Linearise(const KeyframeLink& link, const Pose& T_world_a, const Pose& T_world_b, double sigma_rad,
-                                      double sigma_m);
+[[nodiscard]] DriftBound LargestDrift(const TrackingMap& map, int older_keyframe);
 
 /// Spreads the contradiction between the links and the map over the map: keyframes keep how they stand to those that they share landmarks
 /// with or follow, and meet the links (pose graph, least squares; keyframe 0 stays). Landmarks and markers move with the keyframe that saw

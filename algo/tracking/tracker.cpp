@@ -438,7 +438,7 @@ struct Tracker::Impl {
     const std::optional<Pose> T_world_seen = SeenFrom(found->keyframe, found->T_world_color, prepared, newest);
     if (!T_world_seen) return;
     const Pose T_drift = newest.T_world_color.inverse() * *T_world_seen;
-    const DriftBound bound = LargestDrift(map, found->keyframe, index);
+    const DriftBound bound = LargestDrift(map, found->keyframe);
     if (T_drift.translation().norm() > bound.translation_m || RotationAngle(T_drift) > bound.rotation_rad) return;
     if (T_drift.translation().norm() > kDriftFollowed_m || RotationAngle(T_drift) > kDriftFollowed_rad) {
       const Pose& T_world_old = map.keyframes[static_cast<std::size_t>(found->keyframe)].T_world_color;

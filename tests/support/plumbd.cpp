@@ -7,11 +7,14 @@
 #include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
 #include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -111,7 +114,9 @@ Plumbd::Plumbd(const fs::path& folder, PlumbdOptions options)
 }
 
 Plumbd::~Plumbd() {
-  if (pid_ > 0 && kIsSanitized && !::testing::Test::HasFailure()) EXPECT_EQ(Stop(), 0) << "leaks are counted at the end";
+  if (pid_ > 0 && kIsSanitized && !::testing::Test::HasFailure()) {
+    EXPECT_EQ(Stop(), 0) << "leaks are counted at the end";
+  }
   if (pid_ > 0) {
     ::kill(pid_, SIGKILL);
     ::waitpid(pid_, nullptr, 0);
@@ -213,11 +218,12 @@ json Plumbd::ScanOnce() {
 void Plumbd::Signal(int signal) const { ::kill(pid_, signal); }
 
 int Plumbd::Wait() {
+  // Its notifications are read meanwhile: it waits for whoever does not.
+  std::array<pollfd, 2> waits{{{static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0)), POLLIN, 0}, {notify_fd_, POLLIN, 0}}};
+  while (waits[0].revents == 0 && (::poll(waits.data(), waits.size(), -1) > 0 || errno == EINTR)) (void)notifications();
+  ::close(waits[0].fd);
   int status = 0;
-  while (::waitpid(pid_, &status, WNOHANG) == 0) {
-    (void)notifications();
-    std::this_thread::sleep_for(kBetweenLooks);
-  }
+  ::waitpid(pid_, &status, 0);
   pid_ = -1;
   return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
 }
