@@ -6,7 +6,9 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <memory>
 #include <optional>
@@ -23,6 +25,7 @@
 #include "daemon/appliance.hpp"
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/unix_socket.hpp"
+#include "daemon/end_guard.hpp"
 #include "daemon/log.hpp"
 #include "daemon/loop_report.hpp"
 #include "daemon/panel.hpp"
@@ -39,6 +42,9 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr int kDeviceFailed = 5;                 // exit code, as the command line's
+constexpr std::chrono::seconds kLongestEnd{10};  // less than the unit's TimeoutStopSec
 
 struct Options {
   std::optional<fs::path> config_file;
@@ -367,7 +373,17 @@ int RunChecked(const Options& options) {
     throw std::invalid_argument("--simulated needs --state DIR, a folder of its own");
   std::error_code ignored;
   fs::create_directories(config.appliance.state, ignored);  // what cannot be made is told when the store opens
-  return Plumbd(options, config).Run();
+  std::optional<EndGuard> guard;                            // outlives the threads that it waits for
+  Plumbd plumbd(options, config);
+  const int code = plumbd.Run();
+  guard.emplace(kLongestEnd, [] {
+    Log(LogLevel::kError,
+        fmt::format("{} s after the end began a thread still runs, supposedly in the sensor's driver: plumbd ends without it. "
+                    "What was scanned is stored; unplug the sensor if this comes again",
+                    kLongestEnd.count()));
+    std::_Exit(kDeviceFailed);
+  });
+  return code;
 }
 
 }  // namespace
@@ -392,7 +408,7 @@ int RunPlumbd(int argc, char** argv) {
   } catch (const DataError& error) {
     return fail(error.what(), 3);
   } catch (const DeviceError& error) {
-    return fail(error.what(), 5);
+    return fail(error.what(), kDeviceFailed);
   } catch (const std::invalid_argument& error) {
     return fail(error.what(), 2);
   } catch (const std::exception& error) {

@@ -66,6 +66,18 @@ class DaemonSensorTest : public ::testing::Test {
     return plumbd.WaitFor("ready with " + serial, [&](const json& s) { return s["state"] == "ready" && s["sensor"]["serial"] == serial; });
   }
 
+  /// Tells the driver itself, which plumbd passes nothing on to while it ends.
+  void TellDriver(const std::string& command) const {
+    for (const auto& entry : fs::directory_iterator(folder_ / "tmp")) {
+      const fs::path path = entry.path() / "sensor.sock";
+      const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+      (void)WithUnixAddress(path, [&](const sockaddr* address, socklen_t size) {
+        return static_cast<int>(::sendto(fd, command.data(), command.size(), MSG_DONTWAIT, address, size));
+      });
+      ::close(fd);
+    }
+  }
+
   testing::TempFolder folder_;
 };
 
@@ -169,16 +181,6 @@ TEST_F(DaemonSensorTest, FramesThatComeFasterThanTrackingAreDroppedCountedAndSho
 
 TEST_F(DaemonSensorTest, UnpluggedWhileItIsClosedPlumbdEndsOrGoesOn) {
   fs::create_directories(folder_ / "tmp");
-  const auto send = [&](const std::string& command) {  // to the driver itself: plumbd does not listen any more
-    for (const auto& entry : fs::directory_iterator(folder_ / "tmp")) {
-      const fs::path path = entry.path() / "sensor.sock";
-      const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-      (void)WithUnixAddress(path, [&](const sockaddr* address, socklen_t size) {
-        return static_cast<int>(::sendto(fd, command.data(), command.size(), MSG_DONTWAIT, address, size));
-      });
-      ::close(fd);
-    }
-  };
   std::mt19937 random(5);
   for (int round = 0; round < 8; ++round) {
     Plumbd plumbd(folder_.path(), Options());
@@ -190,7 +192,7 @@ TEST_F(DaemonSensorTest, UnpluggedWhileItIsClosedPlumbdEndsOrGoesOn) {
     }
     plumbd.Signal(SIGTERM);
     std::this_thread::sleep_for(std::chrono::microseconds(random() % 60'000));  // any moment of the way down
-    send("unplug");
+    TellDriver("unplug");
     EXPECT_EQ(plumbd.Wait(), 0);
   }
   // A sensor that failed is closed, too, while plumbd goes on.
@@ -198,13 +200,29 @@ TEST_F(DaemonSensorTest, UnpluggedWhileItIsClosedPlumbdEndsOrGoesOn) {
   ASSERT_TRUE(plumbd.WaitUntilUp());
   WaitForSensor(plumbd, kFirst);
   for (int round = 0; round < 8; ++round) {
-    send("error");
+    TellDriver("error");
     std::this_thread::sleep_for(std::chrono::microseconds(random() % 20'000));
-    send("unplug");
+    TellDriver("unplug");
     plumbd.WaitForState("no_sensor");
     plumbd.Sim("plug");
     WaitForSensor(plumbd, kFirst);
   }
+}
+
+TEST_F(DaemonSensorTest, ADriverThatDoesNotComeBackKeepsPlumbdFromEndingForSecondsOnlyAndNothingIsLost) {
+  {
+    Plumbd plumbd(folder_.path(), Options());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    WaitForSensor(plumbd, kFirst);
+    plumbd.ScanOnce();
+    TellDriver("hang");
+    EXPECT_EQ(plumbd.Stop(), 5);
+    EXPECT_THAT(plumbd.log(), HasSubstr("a thread still runs"));
+  }
+  Plumbd plumbd(folder_.path(), Options());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  WaitForSensor(plumbd, kFirst);
+  EXPECT_TRUE(plumbd.ScanOnce()["last_result"]["verdict"].is_string()) << "the first scan is the reference";
 }
 
 /// Pairs of images that go wrong in the middle of both sweeps.

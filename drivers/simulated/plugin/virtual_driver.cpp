@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstdlib>
 #include <fstream>
 #include <list>
@@ -87,6 +88,7 @@ class VirtualDriver : public oni::driver::DriverBase {
   }
 
   void shutdown() override {
+    while (hangs_) ::pause();
     if (thread_.joinable()) {
       ::eventfd_write(stop_, 1);
       thread_.join();
@@ -178,6 +180,10 @@ class VirtualDriver : public oni::driver::DriverBase {
         unit.glitches_left = std::clamp(count, 0, 10000);
       });
     }
+    if (verb == "hang") {
+      hangs_ = true;
+      return "ok";
+    }
     if (verb == "unplug") return Unplug(argument);
     if (verb == "stall") return OnUnit(argument, [](Unit& unit) { unit.stalled = true; });
     if (verb == "error") return Report(argument, true);
@@ -268,6 +274,7 @@ class VirtualDriver : public oni::driver::DriverBase {
   int socket_ = -1;
   int stop_ = -1;
   std::thread thread_;
+  std::atomic<bool> hangs_ = false;
 };
 
 }  // namespace
