@@ -58,6 +58,7 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts) : loop_(loop), parts
 }
 
 Appliance::~Appliance() {
+  care_.request_stop();
   session_.reset();
   sensors_.reset();
 }
@@ -70,6 +71,11 @@ void Appliance::OpenStore() {
       Log(LogLevel::kWarning,
           fmt::format("put right after an interruption: {} scans had not ended, {} folders of none, {} scans without files",
                       found.interrupted_scans, found.orphaned_folders, found.lost_scans));
+    }
+    if (found.foreign_folders > 0) {
+      Log(LogLevel::kError,
+          fmt::format("{} scans are unknown to the database and were moved to {}: is it an older backup? They can be read with plumb info",
+                      found.foreign_folders, (parts_.config.appliance.state / "set-aside").string()));
     }
     if (found.broken_references > 0) {
       Log(LogLevel::kError, fmt::format("the files of {} approved references are gone: put a backup of the state folder in its place",
@@ -411,25 +417,30 @@ void Appliance::CheckDisk() {
     try {
       store_->CheckWritable();
     } catch (const DiskRefused& error) {
-      loop_.Post("disk check", [this, what = std::string(error.what())] {
-        if (!storage_fault_.empty()) return;
-        storage_fault_ = what;
-        Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", what));
-        (void)Handle(ScanEvent::kStorageFailed);
-        TellState();
-      });
+      loop_.Post("disk check", [this, what = std::string(error.what())] { FailStorage(what); });
     }
   });
 }
 
+void Appliance::FailStorage(const std::string& what) {
+  if (!storage_fault_.empty()) return;
+  storage_fault_ = what;
+  Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", what));
+  (void)Handle(ScanEvent::kStorageFailed);
+  TellState();
+}
+
 /// Retention and quota, off the loop.
 void Appliance::Care() {
-  if (store_ == nullptr || !storage_fault_.empty()) return;
+  ticks_to_care_ = kCareTicks;
+  if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
+  constexpr std::chrono::hours kTrusted{1};  // until then a time server may set it right
+  const bool has_clock = clock_.held() >= kTrusted;
   const auto quota = static_cast<std::uint64_t>(parts_.config.appliance.quota_gb * 1e9);
-  const bool posted = store_thread_.Post([this, quota] {
+  const bool posted = store_thread_.Post([this, quota, has_clock, stop = care_.get_token()] {
     try {
-      const int old = store_->RemoveOldScans(store_->GetSettings().retention_days);
-      const int over = store_->KeepWithinQuota(quota);
+      const int old = has_clock ? store_->RemoveOldScans(store_->GetSettings().retention_days, stop) : 0;
+      const int over = store_->KeepWithinQuota(quota, stop);
       if (old + over > 0) Log(LogLevel::kNotice, fmt::format("removed {} scans for their age, {} for the quota", old, over));
     } catch (const std::exception& error) {
       Log(LogLevel::kError, fmt::format("cannot remove old scans: {}", error.what()));
@@ -463,6 +474,7 @@ void Appliance::Reload(const Config& config) {
 }
 
 void Appliance::Stop(std::function<void()> stopped) {
+  care_.request_stop();
   const bool is_running = state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking;
   if (!is_running) {
     stopped();
@@ -476,7 +488,9 @@ void Appliance::Stop(std::function<void()> stopped) {
 void Appliance::OnTick() {
   tick_timer_.ArmAfter(kTick);
   const bool is_running = state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking;
+  clock_.Look(std::chrono::system_clock::now(), Clock::now());
   if (!is_running && --ticks_to_disk_check_ <= 0) CheckDisk();
+  if (!is_running && --ticks_to_care_ <= 0) Care();
   if (parts_.button != nullptr && button_source_.is_armed()) ArmButtonTimer();
 }
 

@@ -7,9 +7,11 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
+#include "daemon/clock_watch.hpp"
 #include "daemon/config.hpp"
 #include "daemon/event_loop.hpp"
 #include "daemon/scan_session.hpp"
@@ -101,6 +103,7 @@ class Appliance {
   };
 
   static constexpr int kDiskCheckTicks = 10;  ///< Seconds, while no scan runs.
+  static constexpr int kCareTicks = 3600;     ///< Likewise.
 
   void OpenStore();
   Answer Handle(ScanEvent event);
@@ -122,6 +125,8 @@ class Appliance {
   void ArmButtonTimer();
   void Care();
   void CheckDisk();
+  void FailStorage(const std::string& what);
+  void ReadStored(web::Status& status);
   void Show();
   [[nodiscard]] IndicatorPattern Pattern() const;
   void TellEvent(const char* event, const std::string& fields_json);
@@ -136,6 +141,9 @@ class Appliance {
   std::unique_ptr<Store> store_;
   std::string storage_fault_;
   int ticks_to_disk_check_ = kDiskCheckTicks;
+  int ticks_to_care_ = kCareTicks;
+  ClockWatch clock_{std::chrono::system_clock::now(), std::chrono::steady_clock::now()};
+  std::stop_source care_;  ///< Stopped when the appliance ends.
   ScanState state_;
   std::string sensor_fault_, scan_fault_;
   std::string open_patient_, reference_reason_;

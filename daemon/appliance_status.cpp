@@ -2,6 +2,7 @@
 #include <sys/statvfs.h>
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 #include <fmt/format.h>
@@ -240,9 +241,6 @@ web::Status Appliance::WebStatus() {
   status.light = Name(shown_);
   status.patient_id = check_ ? std::string() : open_patient_;
   status.next_purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
-  status.check_overdue = store_ != nullptr && !store_->HasPassedCheckSince(StartOfDay());
-  if (store_ != nullptr) status.last_check = store_->LastCheck();
-  if (store_ != nullptr && !open_patient_.empty()) status.scans_today = store_->ScansSince(open_patient_, StartOfDay());
   if (state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking) {
     status.scan = web::LiveScan{.id = scan_.id,
                                 .patient_id = scan_.patient_id,
@@ -257,9 +255,22 @@ web::Status Appliance::WebStatus() {
                                 .step = scan_.update.step,
                                 .step_fraction = scan_.update.fraction};
   }
-  if (last_result_ && store_ != nullptr) status.last_result = store_->FindScan(last_result_->id);
   status.version = Version();
+  ReadStored(status);
   return status;
+}
+
+void Appliance::ReadStored(web::Status& status) {
+  if (store_ == nullptr) return;
+  try {
+    status.check_overdue = !store_->HasPassedCheckSince(StartOfDay());
+    status.last_check = store_->LastCheck();
+    if (!open_patient_.empty()) status.scans_today = store_->ScansSince(open_patient_, StartOfDay());
+    if (last_result_) status.last_result = store_->FindScan(last_result_->id);
+  } catch (const std::exception& error) {
+    // Whoever asks for the status must not end the appliance. Posted: this may be a part of telling it.
+    loop_.Post("store failed", [this, what = std::string(error.what())] { FailStorage(what); });
+  }
 }
 
 web::CheckStatus Appliance::Checks() {

@@ -10,22 +10,25 @@ constexpr std::size_t kWaiting = 60;  // two seconds of a sensor, 130 MB
 }  // namespace
 
 RecordingFeed::RecordingFeed(FrameFeed& feed, const StreamInfo& info, const std::filesystem::path& folder)
-    : feed_(feed), options_{.depth_scale = 1000.0, .jpeg_quality = 0}, writer_(folder, info, options_), queue_(kWaiting), thread_([this] {
-        Write();
-      }) {}
+    : feed_(feed),
+      options_{.depth_scale = 1000.0, .jpeg_quality = 0},
+      writer_(folder, info, options_),
+      queue_(kWaiting),
+      thread_([this](const std::stop_token& stop) { Write(stop); }) {}
 
-RecordingFeed::~RecordingFeed() { queue_.Close(); }
+// Not finished, nobody wants it: what waits is not written.
+RecordingFeed::~RecordingFeed() = default;
 
 std::optional<Frame> RecordingFeed::Next(const std::stop_token& stop) {
   std::optional<Frame> frame = feed_.Next(stop);
-  if (frame) (void)queue_.Push(*frame, stop);
+  if (frame && !queue_.Push(*frame, stop) && !stop.stop_requested()) Complete(stop);  // closed by an error: no use in going on
   return frame;
 }
 
-void RecordingFeed::Write() {
+void RecordingFeed::Write(const std::stop_token& stop) {
   try {
-    while (const std::optional<Frame> frame = queue_.Pop()) writer_.Add(EncodeFrame(*frame, options_));
-    writer_.Finish();
+    while (const std::optional<Frame> frame = queue_.Pop(stop)) writer_.Add(EncodeFrame(*frame, options_));
+    if (!stop.stop_requested()) writer_.Finish();
   } catch (...) {
     error_ = std::current_exception();
     queue_.Close();
@@ -34,8 +37,14 @@ void RecordingFeed::Write() {
 
 void RecordingFeed::Finish() {
   queue_.Close();
-  if (thread_.joinable()) thread_.join();
   feed_.Finish();
+}
+
+void RecordingFeed::Complete(const std::stop_token& stop) {
+  {
+    const std::stop_callback discard(stop, [this] { thread_.request_stop(); });
+    thread_.join();
+  }
   if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
 }
 

@@ -21,14 +21,18 @@ class RecordingFeed : public FrameFeed {
   RecordingFeed(FrameFeed& feed, const StreamInfo& info, const std::filesystem::path& folder);
   ~RecordingFeed() override;
 
+  /// @throws IoError if the recording cannot be written.
   std::optional<Frame> Next(const std::stop_token& stop) override;
   int TakeDropped() override { return feed_.TakeDropped(); }
-  /// @throws IoError if the recording could not be written.
+  /// No more frames come; those that wait are written on while the scan is computed.
   void Finish() override;
+  /// Waits for the last of them, once, after Finish(). A stop leaves an incomplete recording, as the destructor does.
+  /// @throws IoError if the recording could not be written.
+  void Complete(const std::stop_token& stop);
   [[nodiscard]] std::optional<double> last_frame_s() const override { return feed_.last_frame_s(); }
 
  private:
-  void Write();
+  void Write(const std::stop_token& stop);
 
   FrameFeed& feed_;
   TumWriterOptions options_;

@@ -111,9 +111,9 @@ Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOption
     state.frame = nullptr;
   }
   const std::optional<double> last_frame_s = feed.last_frame_s();
+  if (stop.stop_requested()) throw Interrupted("the scan was interrupted while tracking");
   feed.Finish();
   if (const int dropped = feed.TakeDropped(); dropped > 0) reconstructor.CountDropped(dropped);
-  if (stop.stop_requested()) throw Interrupted("the scan was interrupted while tracking");
 
   Scene scene = reconstructor.Finish(stop, [&](double fraction, std::string_view step) {
     state.step = step;

@@ -33,7 +33,7 @@ class FrameFeed {
   virtual std::optional<Frame> Next(const std::stop_token& stop) = 0;
   /// Frames that were dropped since the last call, because tracking was late.
   virtual int TakeDropped() = 0;
-  /// Called once, after Next() returned nothing: throws what ended the reading, if an error did.
+  /// Called once, after Next() returned nothing without a stop: throws what ended the reading, if an error did.
   virtual void Finish() = 0;
   /// Steady time at which the last frame arrived; none where time has no meaning.
   [[nodiscard]] virtual std::optional<double> last_frame_s() const = 0;

@@ -18,6 +18,17 @@ namespace {
 
 constexpr double kUpdateEvery_s = 0.1;
 
+Scene ReadReference(const std::filesystem::path& folder) {
+  try {
+    return ReadScene(folder);
+  } catch (const std::exception& error) {
+    throw std::runtime_error(
+        fmt::format("the patient's reference cannot be read: {}; put a backup of the scan's files in their place, or "
+                    "take a new reference",
+                    error.what()));
+  }
+}
+
 void ThrowIfStopped(const std::stop_token& stop) {
   if (stop.stop_requested()) throw Interrupted("the scan was discarded");
 }
@@ -64,15 +75,14 @@ void ScanSession::Run(const std::stop_token& stop) {
 void ScanSession::Scan(const std::stop_token& stop) {
   folder_ = callbacks_.begin();
   // Read while the sweep goes on: it is wanted as soon as the new scene is there.
-  std::future<Scene> reference;
   if (!job_.reference_scene.empty()) {
-    reference = std::async(std::launch::async, [folder = job_.reference_scene] { return ReadScene(folder); });
+    reference_ = std::async(std::launch::async, [folder = job_.reference_scene] { return ReadReference(folder); }).share();
   }
   const Scene scene = Track(stop);
   if (job_.check) {
     Check(scene);
   } else {
-    Evaluate(scene, reference, stop);
+    Evaluate(scene, stop);
     ThrowIfStopped(stop);  // from here on it is stored
   }
   if (const std::optional<double> last_s = feed_->last_frame_s()) outcome_.after_last_frame_s = SteadySeconds() - *last_s;
@@ -96,10 +106,14 @@ Scene ScanSession::Track(const std::stop_token& stop) {
   std::optional<RecordingFeed> recording;
   if (job_.keep_recording) recording.emplace(*feed_, job_.info, folder_ / "recording");
   FrameFeed& feed = recording ? static_cast<FrameFeed&>(*recording) : *feed_;
-  return RunScan(feed, job_.info, job_.reconstructor, stop, [this](const ScanProgress& progress) { OnProgress(progress); });
+  Scene scene = RunScan(feed, job_.info, job_.reconstructor, stop, [this](const ScanProgress& progress) { OnProgress(progress); });
+  if (recording) recording->Complete(stop);
+  return scene;
 }
 
 void ScanSession::OnProgress(const ScanProgress& progress) {
+  // Nobody shall sweep in vain.
+  if (reference_.valid() && reference_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) (void)reference_.get();
   heartbeat_s_ = SteadySeconds();
   update_.frames = outcome_.frames = progress.frames;
   update_.frames_tracked = outcome_.frames_tracked = progress.frames_tracked;
@@ -131,7 +145,7 @@ void ScanSession::Check(const Scene& scene) {
   outcome_.verdict = check.status == MarkerCheckStatus::kPassed ? Verdict::kInTolerance : Verdict::kNoAnswer;
 }
 
-void ScanSession::Evaluate(const Scene& scene, std::future<Scene>& reference_scene, const std::stop_token& stop) {
+void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
   ThrowIfStopped(stop);
   if (job_.is_reference && (scene.frame != SceneFrame::kReferenceMarker || !scene.height_map)) {
     throw DataError("this scan cannot become a reference: the reference marker was not seen; keep it in view during a part of the sweep");
@@ -141,13 +155,17 @@ void ScanSession::Evaluate(const Scene& scene, std::future<Scene>& reference_sce
   std::future<void> writing = std::async(std::launch::async, [&] { WriteScene(scene, folder_ / "scene", stop); });
   std::optional<Comparison> comparison;
   ResultPictures pictures;
-  if (reference_scene.valid()) {
+  if (reference_.valid()) {
     Tell("comparing", 0.0);
-    const Scene reference = reference_scene.get();
+    const Scene& reference = reference_.get();
     ThrowIfStopped(stop);
     CompareOptions compare = job_.compare;
     compare.stop = stop;
-    comparison = Compare(reference, scene, compare);
+    try {
+      comparison = Compare(reference, scene, compare);
+    } catch (const DataError& error) {  // not the sweep's fault: another one would end the same
+      throw std::runtime_error(fmt::format("the scan does not fit its reference: {}", error.what()));
+    }
     ThrowIfStopped(stop);
     pictures = DrawResult(*comparison, reference.height_map ? &*reference.height_map : nullptr,
                           {.tolerance_m = job_.compare.shift_tolerance_m, .subtitle = PictureSubtitle(*comparison)});

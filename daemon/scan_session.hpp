@@ -98,7 +98,7 @@ class ScanSession {
   void Save();
   [[nodiscard]] Scene Track(const std::stop_token& stop);
   void Check(const Scene& scene);
-  void Evaluate(const Scene& scene, std::future<Scene>& reference_scene, const std::stop_token& stop);
+  void Evaluate(const Scene& scene, const std::stop_token& stop);
   void OnProgress(const struct ScanProgress& progress);
   void Tell(std::string step, double fraction);
 
@@ -106,6 +106,7 @@ class ScanSession {
   ScanCallbacks callbacks_;
   std::filesystem::path folder_;
   std::shared_ptr<LiveFeed> feed_;
+  std::shared_future<Scene> reference_;  ///< Belongs to the thread; valid if there is one to compare with.
   SweepGuide guide_;
   ScanUpdate update_;
   ScanOutcome outcome_;

@@ -139,8 +139,8 @@ void Database::CheckIntegrity() {
   while (check.Step()) found += (found.empty() ? "" : "; ") + check.Text(0);
   if (found != "ok") {
     throw DatabaseCorrupt(
-        fmt::format("the database {} is damaged ({}): put a backup in its place, or move it away to begin anew; the scans "
-                    "beside it are untouched",
+        fmt::format("the database {} is damaged ({}): put a backup in its place, or move it and the folder scans away to "
+                    "begin anew",
                     file_.string(), found));
   }
 }
@@ -152,8 +152,7 @@ void Database::Fail(int code, const char* doing) const {
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
       throw DatabaseCorrupt(
-          fmt::format("the database {} is damaged ({}): put a backup in its place, or move it away to begin anew; the scans beside it are "
-                      "untouched",
+          fmt::format("the database {} is damaged ({}): put a backup in its place, or move it and the folder scans away to begin anew",
                       file_.string(), what));
     case SQLITE_FULL:
       throw DiskRefused(message + "; free space on that disk");

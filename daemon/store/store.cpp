@@ -130,18 +130,18 @@ std::string Store::AddPatient(const web::Actor& actor, const std::string& code, 
 
 void Store::WipePatient(const web::Actor& actor, const std::string& id) {
   const std::int64_t number = RequireId(id, "patient");
-  const std::lock_guard lock(write_mutex_);
   std::vector<std::string> scans;
   {
+    const std::lock_guard lock(write_mutex_);
     Transaction transaction(*write_);
     {
       Statement query = write_->Prepare("SELECT id FROM scans WHERE patient_id = ?");
       query.Bind(number);
-      while (query.Step()) scans.push_back(ScanId(query.Integer(0)));
+      scans = ScansOf(std::move(query));
     }
-    {
-      Statement running = write_->Prepare("SELECT 1 FROM scans WHERE patient_id = ? AND outcome = 'running'");
-      if (running.Bind(number).Step())
+    if (running_) {
+      Statement running = write_->Prepare("SELECT 1 FROM scans WHERE patient_id = ? AND id = ?");
+      if (running.Bind(number).Bind(*running_).Step())
         throw StoreRefusal(ChangeResult::kConflict, "a scan of this patient is running: end or cancel it first");
     }
     write_->Prepare("UPDATE patients SET wiping = 1 WHERE id = ?").Bind(number).Run();
@@ -152,7 +152,8 @@ void Store::WipePatient(const web::Actor& actor, const std::string& id) {
     transaction.Commit();
   }
   for (const std::string& scan : scans) RemoveScanFiles(scan);  // what a crash leaves here is an orphan at the next start
-  write_->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Run();     // nor does the log keep what was wiped
+  const std::lock_guard lock(write_mutex_);
+  write_->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Run();  // nor does the log keep what was wiped
 }
 
 namespace {

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 #include <stdexcept>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,7 @@ class StoreRefusal : public std::runtime_error {
 struct RecoveryReport {
   int interrupted_scans = 0;  ///< Had begun and not ended: failed now.
   int orphaned_folders = 0;   ///< Of no finished scan: removed.
+  int foreign_folders = 0;    ///< Of scans that this database has never numbered: moved to DIR/set-aside.
   int lost_scans = 0;         ///< Finished, but their files are gone: marked.
   int broken_references = 0;  ///< Approved, but their scene is gone: to be told loudly.
 };
@@ -101,10 +103,11 @@ class Store {
   void FinishScan(const std::string& scan_id, const FinishedScan& finished);
   void AcceptScan(const web::Actor& actor, const std::string& id);
   /// Removes scans older than so many days (0: none) but those that references are made of. Gives how many.
-  int RemoveOldScans(int retention_days);
+  /// Their age is by the wall clock: call it while that can be trusted.
+  int RemoveOldScans(int retention_days, const std::stop_token& stop = {});
   /// Removes the oldest recordings, then the oldest scans as above, until the scans take at most so many bytes. Gives how many scans lost
   /// something.
-  int KeepWithinQuota(std::uint64_t max_bytes);
+  int KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop = {});
 
   // --- daily check
   /// @param check_json  Of CheckJson(). Gives the id.
@@ -129,15 +132,21 @@ class Store {
  private:
   Store() = default;
   void Recover();
+  void FailInterrupted();
+  void RefuseScansOfAnother();
   void CollectOrphans();
+  void SetAside(const std::filesystem::path& folder);
+  [[nodiscard]] std::vector<std::filesystem::path> ScanFolders() const;  ///< Of all numbers.
+  void NoteEnd(const std::string& scan_id, const FinishedScan& finished);
   void Write(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail);
   void RemoveScanFiles(const std::string& scan_id);
-  [[nodiscard]] std::vector<std::string> RemovableScans(const char* sql, std::int64_t parameter);
-  void ForgetScan(const std::string& scan_id);
+  [[nodiscard]] static std::vector<std::string> ScansOf(Statement query);
+  bool ForgetScan(const std::string& scan_id);  ///< False if it has become a reference.
 
   std::filesystem::path folder_;
   std::mutex write_mutex_;
   std::unique_ptr<Database> write_;
+  std::optional<std::int64_t> running_;  ///< Scan that has begun and not ended.
   std::mutex read_mutex_;
   std::unique_ptr<Database> read_;  ///< Single rows, for the loop too.
   std::mutex list_mutex_;

@@ -26,6 +26,7 @@ Store::Store(const fs::path& folder) : folder_(fs::absolute(folder)) {
   CheckWritable();
   write_ = std::make_unique<Database>(folder_ / "plumb.db", Database::Access::kReadWrite);
   write_->CheckIntegrity();
+  RefuseScansOfAnother();
   Migrate(*write_);
   read_ = std::make_unique<Database>(folder_ / "plumb.db", Database::Access::kReadOnly);
   list_ = std::make_unique<Database>(folder_ / "plumb.db", Database::Access::kReadOnly);
@@ -59,11 +60,7 @@ void Store::Recover() {
   const std::lock_guard lock(write_mutex_);
   {
     Transaction transaction(*write_);
-    write_
-        ->Prepare(
-            "UPDATE scans SET outcome = 'failed', failure = 'interrupted: the appliance was switched off', has_folder = 0"
-            " WHERE outcome = 'running'")
-        .Run();
+    FailInterrupted();
     recovery_.interrupted_scans = write_->num_changed();
     transaction.Commit();
   }
@@ -86,24 +83,75 @@ void Store::Recover() {
   CollectOrphans();
 }
 
+/// A database that was lost must not pass for a new one: every scan would be an orphan.
+void Store::RefuseScansOfAnother() {
+  {
+    Statement version = write_->Prepare("PRAGMA user_version");
+    if (version.Step() && version.Integer(0) != 0) return;
+  }
+  const std::vector<fs::path> folders = ScanFolders();
+  if (folders.empty()) return;
+  throw DatabaseCorrupt(fmt::format(
+      "the database {} is empty or missing, but there are scans of another one ({} and {} more): put a backup of the database in "
+      "its place, or move the folder {} away too to begin anew",
+      (folder_ / "plumb.db").string(), folders.front().string(), folders.size() - 1, (folder_ / "scans").string()));
+}
+
+std::vector<fs::path> Store::ScanFolders() const {
+  std::vector<fs::path> folders;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder_ / "scans", error), end; !error && entry != end; entry.increment(error)) {
+    if (store::ParseId(entry->path().filename().string())) folders.push_back(entry->path());
+  }
+  return folders;
+}
+
+/// Removes what a crash or a removal left. Folders that this database has never given a number to are not ours to remove: it may be an
+/// older backup.
 void Store::CollectOrphans() {
   std::set<std::string> known;
   {
     Statement query = write_->Prepare("SELECT id FROM scans WHERE has_folder = 1");
     while (query.Step()) known.insert(ScanId(query.Integer(0)));
   }
-  std::vector<fs::path> orphans;
+  std::int64_t last = 0;
+  {
+    Statement query = write_->Prepare("SELECT seq FROM sqlite_sequence WHERE name = 'scans'");
+    if (query.Step()) last = query.Integer(0);
+  }
+  for (const fs::path& folder : ScanFolders()) {
+    const std::string name = folder.filename().string();
+    if (known.contains(name)) continue;
+    if (*store::ParseId(name) <= last) {
+      std::error_code ignored;
+      fs::remove_all(folder, ignored);
+      ++recovery_.orphaned_folders;
+    } else {
+      SetAside(folder);
+      ++recovery_.foreign_folders;
+    }
+  }
+  std::vector<fs::path> staging;
   std::error_code error;
   for (fs::directory_iterator entry(folder_ / "scans", error), end; !error && entry != end; entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    const bool is_ours = store::ParseId(name).has_value() || name.starts_with(".staging-");
-    if (is_ours && !known.contains(name)) orphans.push_back(entry->path());
+    if (entry->path().filename().string().starts_with(".staging-")) staging.push_back(entry->path());
   }
-  for (const fs::path& orphan : orphans) {
+  for (const fs::path& folder : staging) {
     std::error_code ignored;
-    fs::remove_all(orphan, ignored);
+    fs::remove_all(folder, ignored);
     ++recovery_.orphaned_folders;
   }
+}
+
+/// Its number will be given to another scan.
+void Store::SetAside(const fs::path& folder) {
+  const fs::path aside = folder_ / "set-aside";
+  std::error_code error;
+  fs::create_directories(aside, error);
+  fs::path target = aside / folder.filename();
+  for (int i = 2; fs::exists(target, error); ++i) target = aside / fmt::format("{}-{}", folder.filename().string(), i);
+  fs::rename(folder, target, error);
+  if (error) throw DiskRefused(DescribeWriteError(target, error.value()));
 }
 
 }  // namespace plumb

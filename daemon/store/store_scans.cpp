@@ -22,6 +22,7 @@ using web::ChangeResult;
 
 namespace {
 
+constexpr const char* kRecording = "recording";  // folder of a scan whose images were kept
 constexpr const char* kScanColumns =
     "SELECT scans.id, patient_id, reference_id, purpose, outcome, failure, started_at, finished_at, accepted_by, has_folder, results.json"
     " FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
@@ -44,19 +45,21 @@ web::Scan ReadScan(const Statement& row, const Store& store) {
   return scan;
 }
 
-void SyncFolder(const fs::path& folder) {
+/// Of a folder, or with ::syncfs of everything on its disk.
+void Sync(const fs::path& folder, int (*sync)(int) = ::fsync) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) throw DiskRefused(DescribeWriteError(folder, errno));
-  const int result = ::fsync(descriptor);
+  const int result = sync(descriptor);
   const int error = errno;
   ::close(descriptor);
   if (result != 0 && error != EINVAL) throw DiskRefused(DescribeWriteError(folder, error));
 }
 
-std::uint64_t BytesOf(const fs::path& folder) {
+std::uint64_t BytesOf(const fs::path& folder, const std::stop_token& stop) {
   std::uint64_t bytes = 0;
   std::error_code error;
-  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end && !stop.stop_requested();
+       entry.increment(error)) {
     std::error_code ignored;
     if (entry->is_regular_file(ignored)) bytes += entry->file_size(ignored);
   }
@@ -110,6 +113,7 @@ double Store::SweptArea(const std::string& scan_id) {
 std::string Store::BeginScan(const NewScan& scan) {
   const std::lock_guard lock(write_mutex_);
   Transaction transaction(*write_);
+  FailInterrupted();  // one whose end the disk refused to note
   write_
       ->Prepare(
           "INSERT INTO scans (patient_id, reference_id, purpose, outcome, started_at, sensor_serial, reason)"
@@ -121,35 +125,58 @@ std::string Store::BeginScan(const NewScan& scan) {
       .Bind(scan.sensor_serial)
       .Bind(scan.reason)
       .Run();
-  const std::string id = ScanId(write_->last_id());
+  const std::int64_t number = write_->last_id();
+  const std::string id = ScanId(number);
   std::error_code error;
   fs::remove_all(StagingFolder(id), error);
   fs::create_directory(StagingFolder(id), error);
   if (error) throw DiskRefused(DescribeWriteError(StagingFolder(id), error.value()));
   transaction.Commit();
+  running_ = number;
   return id;
 }
 
+void Store::FailInterrupted() {
+  write_
+      ->Prepare(
+          "UPDATE scans SET outcome = 'failed', failure = 'interrupted: the appliance was switched off or its disk refused the scan',"
+          " has_folder = 0 WHERE outcome = 'running'")
+      .Run();
+}
+
 void Store::FinishScan(const std::string& scan_id, const FinishedScan& finished) {
-  const std::int64_t number = ParseId(scan_id).value_or(0);
   const bool is_done = finished.outcome == web::ScanOutcome::kDone;
   const std::lock_guard lock(write_mutex_);
-  if (is_done) {
-    if (::rename(StagingFolder(scan_id).c_str(), ScanFolder(scan_id).c_str()) != 0) {
-      throw DiskRefused(DescribeWriteError(ScanFolder(scan_id), errno));
-    }
-    SyncFolder(folder_ / "scans");
-  } else {
+  running_.reset();
+  if (!is_done) {
     std::error_code ignored;
     fs::remove_all(StagingFolder(scan_id), ignored);
+    return NoteEnd(scan_id, finished);
   }
+  // Scene and result are on the disk; the images of a recording are too many to be synced one by one.
+  std::error_code ignored;
+  if (fs::exists(StagingFolder(scan_id) / kRecording, ignored)) Sync(folder_ / "scans", ::syncfs);
+  if (::rename(StagingFolder(scan_id).c_str(), ScanFolder(scan_id).c_str()) != 0) {
+    throw DiskRefused(DescribeWriteError(ScanFolder(scan_id), errno));
+  }
+  try {
+    Sync(folder_ / "scans");
+    NoteEnd(scan_id, finished);
+  } catch (...) {  // without its row it is none
+    ::rename(ScanFolder(scan_id).c_str(), StagingFolder(scan_id).c_str());
+    throw;
+  }
+}
+
+void Store::NoteEnd(const std::string& scan_id, const FinishedScan& finished) {
+  const std::int64_t number = ParseId(scan_id).value_or(0);
   Transaction transaction(*write_);
   write_->Prepare("UPDATE scans SET outcome = ?, failure = ?, finished_at = ?, swept_area_m2 = ?, has_folder = ? WHERE id = ?")
       .Bind(store::Name(finished.outcome))
       .Bind(finished.failure)
       .Bind(ToStored(web::WallClock::now()))
       .Bind(finished.swept_area_m2)
-      .Bind(std::int64_t{is_done})
+      .Bind(std::int64_t{finished.outcome == web::ScanOutcome::kDone})
       .Bind(number)
       .Run();
   if (!finished.result_json.empty()) {
@@ -182,52 +209,73 @@ void Store::RemoveScanFiles(const std::string& scan_id) {
   fs::remove_all(StagingFolder(scan_id), ignored);
 }
 
-std::vector<std::string> Store::RemovableScans(const char* sql, std::int64_t parameter) {
+std::vector<std::string> Store::ScansOf(Statement query) {
   std::vector<std::string> scans;
-  Statement query = write_->Prepare(sql);
-  query.Bind(parameter);
   while (query.Step()) scans.push_back(ScanId(query.Integer(0)));
   return scans;
 }
 
-void Store::ForgetScan(const std::string& scan_id) {
-  Transaction transaction(*write_);
-  write_->Prepare("DELETE FROM scans WHERE id = ?").Bind(ParseId(scan_id)).Run();
-  Write({.user = "plumbd", .address = ""}, "scan.remove", scan_id, "retention");
-  transaction.Commit();
+/// Its files go after the lock is free: a scan that begins meanwhile must not wait for a slow disk.
+bool Store::ForgetScan(const std::string& scan_id) {
+  {
+    const std::lock_guard lock(write_mutex_);
+    Transaction transaction(*write_);
+    write_->Prepare("DELETE FROM scans WHERE id = ? AND outcome <> 'running' AND id NOT IN (SELECT scan_id FROM refs)")
+        .Bind(ParseId(scan_id))
+        .Run();
+    if (write_->num_changed() == 0) return false;
+    Write({.user = "plumbd", .address = ""}, "scan.remove", scan_id, "retention");
+    transaction.Commit();
+  }
   RemoveScanFiles(scan_id);
+  return true;
 }
 
-int Store::RemoveOldScans(int retention_days) {
+int Store::RemoveOldScans(int retention_days, const std::stop_token& stop) {
   if (retention_days <= 0) return 0;
-  const std::lock_guard lock(write_mutex_);
-  const std::int64_t before = ToStored(web::WallClock::now() - std::chrono::hours(24) * retention_days);
-  const std::vector<std::string> old = RemovableScans(
-      "SELECT id FROM scans WHERE outcome <> 'running' AND started_at < ? AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id", before);
-  for (const std::string& scan : old) ForgetScan(scan);
-  return static_cast<int>(old.size());
+  const web::WallClock::time_point now = web::WallClock::now();
+  std::vector<std::string> old;
+  {
+    const std::lock_guard lock(write_mutex_);
+    // Numbers only count up while clocks step: no scan is older than one before it, and stamps of the future are wrong.
+    Statement query = write_->Prepare(
+        "SELECT id FROM (SELECT id, outcome, max(CASE WHEN started_at <= ? THEN started_at ELSE 0 END) OVER (ORDER BY id) AS since"
+        " FROM scans) WHERE outcome <> 'running' AND since < ? AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id");
+    query.Bind(ToStored(now)).Bind(ToStored(now - std::chrono::hours(24) * retention_days));
+    old = ScansOf(std::move(query));
+  }
+  int num_removed = 0;
+  for (const std::string& scan : old) {
+    if (stop.stop_requested()) break;
+    num_removed += ForgetScan(scan) ? 1 : 0;
+  }
+  return num_removed;
 }
 
-int Store::KeepWithinQuota(std::uint64_t max_bytes) {
-  const std::lock_guard lock(write_mutex_);
-  std::uint64_t bytes = BytesOf(folder_ / "scans");
+int Store::KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop) {
+  std::uint64_t bytes = BytesOf(folder_ / "scans", stop);
   if (bytes <= max_bytes) return 0;
   int num_touched = 0;
-  const std::vector<std::string> all = RemovableScans("SELECT id FROM scans WHERE outcome = 'done' AND has_folder >= ? ORDER BY id", 1);
+  std::vector<std::string> all, removable;
+  {
+    const std::lock_guard lock(write_mutex_);
+    all = ScansOf(write_->Prepare("SELECT id FROM scans WHERE outcome = 'done' AND has_folder = 1 ORDER BY id"));
+    removable = ScansOf(write_->Prepare(
+        "SELECT id FROM scans WHERE outcome = 'done' AND has_folder = 1 AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id"));
+  }
   for (const std::string& scan : all) {  // raw recordings are large, and nothing hangs on them
-    const fs::path recording = ScanFolder(scan) / "recording";
+    const fs::path recording = ScanFolder(scan) / kRecording;
     std::error_code ignored;
-    if (bytes <= max_bytes || !fs::exists(recording, ignored)) continue;
-    bytes -= std::min(bytes, BytesOf(recording));
+    if (bytes <= max_bytes || stop.stop_requested() || !fs::exists(recording, ignored)) continue;
+    bytes -= std::min(bytes, BytesOf(recording, stop));
     fs::remove_all(recording, ignored);
     ++num_touched;
   }
-  const std::vector<std::string> removable = RemovableScans(
-      "SELECT id FROM scans WHERE outcome = 'done' AND has_folder >= ? AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id", 1);
   for (const std::string& scan : removable) {
-    if (bytes <= max_bytes) break;
-    bytes -= std::min(bytes, BytesOf(ScanFolder(scan)));
-    ForgetScan(scan);
+    if (bytes <= max_bytes || stop.stop_requested()) break;
+    const std::uint64_t its_bytes = BytesOf(ScanFolder(scan), stop);
+    if (!ForgetScan(scan)) continue;  // a reference by now
+    bytes -= std::min(bytes, its_bytes);
     ++num_touched;
   }
   return num_touched;

@@ -3,7 +3,9 @@
 
 #include <condition_variable>
 #include <filesystem>
+#include <future>
 #include <mutex>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -39,6 +41,17 @@ class ScanSessionTest : public ::testing::Test {
   void Start() { session_ = std::make_unique<ScanSession>(job_, callbacks_); }
   void Push(int num_frames) {
     for (int i = 0; i < num_frames; ++i) session_->feed()->Push(FakeBus::Wall(next_++));
+  }
+  /// The sweep goes on until it is told: nobody closes the feed.
+  void PushUntilTheEnd() {
+    const auto has_ended = [&] {
+      const std::lock_guard lock(mutex_);
+      return outcome_.has_value();
+    };
+    for (const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+         !has_ended() && std::chrono::steady_clock::now() < end;) {
+      Push(1);
+    }
   }
   ScanOutcome WaitForEnd() {
     std::unique_lock lock(mutex_);
@@ -150,14 +163,14 @@ TEST_F(ScanSessionTest, AStoreThatDoesNotEvenBeginFailsTheScan) {
   EXPECT_EQ(outcome_->reason, "read-only disk");
 }
 
-TEST_F(ScanSessionTest, AReferenceThatCannotBeReadIsSaid) {
+TEST_F(ScanSessionTest, AReferenceThatCannotBeReadEndsTheSweepAsAFault) {
   job_.reference_scene = folder_ / "nowhere";
   Start();
-  Push(12);
-  session_->feed()->Close();
+  PushUntilTheEnd();
   const ScanOutcome outcome = WaitForEnd();
-  EXPECT_NE(outcome.kind, Kind::kDone);
-  EXPECT_THAT(outcome.reason, HasSubstr("nowhere"));
+  EXPECT_EQ(outcome.kind, Kind::kFailed) << "another sweep would not help";
+  EXPECT_THAT(outcome.reason, ::testing::AllOf(HasSubstr("nowhere"), HasSubstr("backup")));
+  EXPECT_THAT(saved_, ElementsAre(Kind::kFailed));
 }
 
 TEST_F(ScanSessionTest, TheSweepIsCompleteOnceWhenNothingNewIsSeenForLongEnough) {
@@ -168,6 +181,34 @@ TEST_F(ScanSessionTest, TheSweepIsCompleteOnceWhenNothingNewIsSeenForLongEnough)
   session_->feed()->Close();
   (void)WaitForEnd();
   EXPECT_EQ(num_complete_, 1);
+}
+
+TEST_F(ScanSessionTest, ADiscardedRecordingIsNotWrittenToItsEnd) {
+  job_.keep_recording = true;
+  job_.queue_capacity = 100;
+  Start();
+  Push(60);
+  session_->Cancel();
+  EXPECT_EQ(WaitForEnd().kind, Kind::kCancelled);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "recording" / "camera.yaml")) << "written last";
+}
+
+TEST_F(ScanSessionTest, ARecordingThatCannotBeWrittenEndsTheSweepWithItsReason) {
+  job_.keep_recording = true;
+  callbacks_.begin = [this] {
+    std::filesystem::create_directories(folder_ / "recording" / "rgb" / "0.000000.png");  // where the first image is to be written
+    return folder_.path();
+  };
+  std::promise<void> first_frame;  // none is dropped before it
+  callbacks_.update = [&, is_told = false](const ScanUpdate&) mutable {
+    if (!std::exchange(is_told, true)) first_frame.set_value();
+  };
+  Start();
+  Push(1);
+  first_frame.get_future().wait();
+  PushUntilTheEnd();
+  EXPECT_EQ(WaitForEnd().kind, Kind::kFailed);
+  EXPECT_THAT(outcome_->reason, HasSubstr("0.000000.png"));
 }
 
 TEST_F(ScanSessionTest, ARecordingHoldsWhatTrackingTook) {

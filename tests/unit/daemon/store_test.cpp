@@ -9,6 +9,7 @@
 #include "daemon/check_json.hpp"
 #include "daemon/store/schema.hpp"
 #include "drivers/replay/file_io.hpp"
+#include "tests/support/full_disk.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -116,6 +117,47 @@ TEST_F(StoreTest, AFolderThatAppearedJustBeforeACrashIsAnOrphan) {
   EXPECT_EQ(store->recovery().orphaned_folders, 1);
   EXPECT_FALSE(fs::exists(store->ScanFolder(id)));
   EXPECT_EQ(store->FindScan(id)->outcome, web::ScanOutcome::kFailed);
+}
+
+TEST_F(StoreTest, ScansOfALostDatabaseAreNeverTakenForOrphans) {
+  std::string scan;
+  {
+    const auto store = Open();
+    scan = Scan(*store, store->AddPatient(kAnna, "A", ""));
+  }
+  const fs::path folder = folder_ / "state" / "scans" / scan;
+  const std::vector<std::uint8_t> kept = ReadWholeFile(database(), 1 << 26);
+  for (const bool is_empty : {false, true}) {
+    fs::remove(database());
+    if (is_empty) WriteWholeFile(database(), std::string_view());
+    for (int start = 0; start < 2; ++start) {
+      EXPECT_THAT(MessageOf<DatabaseCorrupt>([&] { (void)Open(); }), ::testing::AllOf(HasSubstr("backup"), HasSubstr(folder.string())));
+    }
+    EXPECT_TRUE(fs::exists(folder / "scene" / "scene.json"));
+  }
+  WriteWholeFile(database(), std::string_view(reinterpret_cast<const char*>(kept.data()), kept.size()));
+  EXPECT_EQ(Open()->FindScan(scan)->folder, folder) << "as the message said";
+}
+
+TEST_F(StoreTest, ScansThatAnOlderBackupDoesNotKnowAreSetAsideAndTheirNumbersUsedAgain) {
+  std::string patient, old_scan, new_scan;
+  std::vector<std::uint8_t> backup;
+  {
+    const auto store = Open();
+    patient = store->AddPatient(kAnna, "A", "");
+    old_scan = Scan(*store, patient);
+  }
+  backup = ReadWholeFile(database(), 1 << 26);
+  new_scan = Scan(*Open(), patient);
+  for (const char* aside : {"", "-2"}) {
+    WriteWholeFile(database(), std::string_view(reinterpret_cast<const char*>(backup.data()), backup.size()));
+    const auto store = Open();
+    EXPECT_EQ(store->recovery().foreign_folders, 1);
+    EXPECT_EQ(store->recovery().orphaned_folders, 0);
+    EXPECT_TRUE(fs::exists(folder_ / "state" / "set-aside" / (new_scan + aside) / "scene" / "scene.json"));
+    EXPECT_FALSE(store->FindScan(old_scan)->folder.empty());
+    EXPECT_EQ(Scan(*store, patient), new_scan);
+  }
 }
 
 TEST_F(StoreTest, FilesThatAreNotOursAreLeftAlone) {
@@ -259,6 +301,69 @@ TEST_F(StoreTest, OldScansGoAndReferencesStay) {
   EXPECT_FALSE(fs::exists(store->ScanFolder(old)));
   EXPECT_TRUE(store->FindScan(fresh));
   EXPECT_TRUE(fs::exists(store->ScanFolder(store->FindReference(reference)->scan_id)));
+}
+
+TEST_F(StoreTest, AWrongClockMakesNoScanOld) {
+  const auto store = Open();
+  const std::string patient = store->AddPatient(kAnna, "A", "");
+  const std::string first = Scan(*store, patient), with_early_clock = Scan(*store, patient), with_late_clock = Scan(*store, patient);
+  const std::string last = Scan(*store, patient);
+  const auto stamp = [&](const std::string& scan, const std::string& time) {
+    Database(database(), Database::Access::kReadWrite).Execute("UPDATE scans SET started_at = " + time + " WHERE id = " + scan);
+  };
+  stamp(with_early_clock, "0");
+  stamp(with_late_clock, "9000000000000000");
+  EXPECT_EQ(store->RemoveOldScans(30), 0);
+  for (const std::string& scan : {first, last}) stamp(scan, "1000000");
+  EXPECT_EQ(store->RemoveOldScans(30), 4) << "a stamp of the future keeps nothing for ever";
+}
+
+TEST_F(StoreTest, CareEndsSoonWhenItIsTold) {
+  const auto store = Open();
+  (void)Scan(*store, store->AddPatient(kAnna, "A", ""));
+  Database(database(), Database::Access::kReadWrite).Execute("UPDATE scans SET started_at = 0");
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_EQ(store->RemoveOldScans(30, stop.get_token()), 0);
+  EXPECT_EQ(store->KeepWithinQuota(0, stop.get_token()), 0);
+  EXPECT_EQ(store->KeepWithinQuota(0), 1);
+}
+
+TEST_F(StoreTest, AScanWhoseRowTheDiskRefusesIsNoneAndLeavesNothing) {
+  std::string patient, id;
+  {
+    const auto store = Open();
+    patient = store->AddPatient(kAnna, "A", "");
+  }
+  EXPECT_EQ(testing::WriteOnFullDisk(
+                60'000,
+                [&] {
+                  const auto store = Open();
+                  const std::string scan =
+                      store->BeginScan({.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}, .reason = {}});
+                  FillStaging(*store, scan);
+                  const std::string large(100'000, ' ');  // does not fit
+                  EXPECT_THROW(
+                      store->FinishScan(
+                          scan, {.outcome = web::ScanOutcome::kDone, .failure = {}, .result_json = "{}" + large, .swept_area_m2 = 0}),
+                      IoError);
+                  EXPECT_FALSE(fs::exists(store->ScanFolder(scan)));
+                  EXPECT_TRUE(fs::exists(store->StagingFolder(scan)));
+                  if (::testing::Test::HasFailure()) throw std::logic_error("see above");
+                  store->WipePatient(kAnna, patient);  // it does not run any more
+                }),
+            testing::WriteOutcome::kDone);
+  EXPECT_EQ(Open()->Patients().size(), 0U);
+  EXPECT_TRUE(fs::is_empty(folder_ / "state" / "scans"));
+}
+
+TEST_F(StoreTest, AScanThatCouldNotBeEndedHasFailedWhenTheNextBegins) {
+  const auto store = Open();
+  const std::string patient = store->AddPatient(kAnna, "A", "");
+  const NewScan scan{.patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}, .reason = {}};
+  const std::string lost = store->BeginScan(scan);
+  (void)store->BeginScan(scan);
+  EXPECT_EQ(store->FindScan(lost)->outcome, web::ScanOutcome::kFailed);
 }
 
 TEST_F(StoreTest, TheQuotaTakesRecordingsFirstThenOldScansAndNeverReferences) {
