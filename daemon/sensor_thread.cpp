@@ -166,7 +166,8 @@ struct SensorThread::Impl {
     std::unique_lock lock(mutex);
     const Clock::time_point heartbeat_due = Clock::now() + std::chrono::milliseconds(500);
     const Clock::time_point until = retry_at ? std::min(*retry_at, heartbeat_due) : heartbeat_due;
-    changed.wait_until(lock, stop, until, [this] { return bus_changed; });
+    // Without a provider nobody looks at the bus, so what it said would not be done with: only the next attempt is waited for.
+    changed.wait_until(lock, stop, until, [this] { return provider != nullptr && bus_changed; });
   }
 
   void Read(const std::stop_token& stop) {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <time.h>
+
 #include "tests/support/fake_sensor.hpp"
 
 namespace plumb {
@@ -201,6 +203,29 @@ TEST_F(SensorThreadTest, ALibraryThatDoesNotStartIsAFailureThatIsTriedAgain) {
       [this](const SensorEvent& event) { told_(event); });
   EXPECT_EQ(told_.At(0).reason, "the library is missing");
   EXPECT_EQ(told_.At(1).kind, Kind::kLost) << "and then it works, and sees no sensor";
+}
+
+TEST_F(SensorThreadTest, WaitingForALibraryThatDoesNotStartTakesNoProcessor) {
+  const auto processor_s = [] {
+    timespec used{};
+    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+    return static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+  };
+  int attempts = 0;
+  double before_s = 0, waiting_s = 0;
+  thread_ = std::make_unique<SensorThread>(
+      [&]() -> std::unique_ptr<SensorProvider> {
+        if (++attempts == 1) {
+          before_s = processor_s();
+          throw DeviceError("the library is missing");
+        }
+        waiting_s = processor_s() - before_s;
+        return std::make_unique<FakeProvider>(bus_);
+      },
+      SensorThreadOptions{.serial = {}, .before_scan = {}, .first_retry = milliseconds(300), .last_retry = milliseconds(300)},
+      [this](const SensorEvent& event) { told_(event); });
+  EXPECT_EQ(told_.At(1).kind, Kind::kLost) << "the second attempt works, and sees no sensor";
+  EXPECT_LT(waiting_s, 0.01) << "of 0.3 s";
 }
 
 TEST_F(SensorThreadTest, EndsAtOnceWhileItWaitsForAFrame) {
