@@ -94,9 +94,10 @@ std::vector<std::int64_t> FrameBox::StampsOf(StreamKind kind) const {
   return stamps_us_[Side(kind)];
 }
 
-void FrameBox::SkipPairs(int count) {
+void FrameBox::Begin(int pairs_to_skip) {
   const std::lock_guard lock(mutex_);
-  skip_ = count;
+  skip_ = pairs_to_skip;
+  last_arrival_ = Clock::now();
 }
 
 std::optional<FrameBox::Pair> FrameBox::Take() {

@@ -40,7 +40,8 @@ class FrameBox {
   void Flush() noexcept;
   void KeepStamps(bool keep);  ///< From now on, for StampsOf().
   [[nodiscard]] std::vector<std::int64_t> StampsOf(StreamKind kind) const;
-  void SkipPairs(int count);  ///< The next so many pairs are thrown away.
+  /// The streams have started: from now on pairs must come (opening takes seconds on a slow bus), and the first so many are thrown away.
+  void Begin(int pairs_to_skip);
 
   /// The oldest pair that waits; nothing once interrupted.
   /// @throws DeviceLost, DeviceError as LiveSensor::Next().

@@ -100,7 +100,7 @@ OpenNiSensor::OpenNiSensor(std::unique_ptr<OpenNiStreams> streams, std::shared_p
     fov_rad = 0;
   info_ = LiveStreamInfo(options, description_.serial, streams_->width, streams_->height, fov_rad);
   streams_->Start();
-  box_->SkipPairs(kPairsToSettle);
+  box_->Begin(kPairsToSettle);
   waiting_ = StreamWaiter::Of(*streams_->library)
                  .Add(*streams_->library, {streams_->depth, streams_->color},
                       [this](int stream, const OniFrame& frame) { Accept(stream == 0 ? StreamKind::kDepth : StreamKind::kColor, frame); });
