@@ -9,6 +9,14 @@ ScanTransition Refuse(const ScanState& state, std::string_view why) {
   return {.state = state, .actions = {ScanAction::kRefuse}, .refusal = why};
 }
 
+/// What is wrong while no scan has failed and storage works.
+FaultKind SensorFault(const ScanState& state) { return state.sensor_fails ? FaultKind::kSensor : FaultKind::kNone; }
+
+std::string_view WhyNoSensor(const ScanState& state) {
+  return state.sensor_fails ? "the sensor does not work: see the reason in the status; plug it out and in again"
+                            : "no sensor is attached: plug it in and wait for the ready light";
+}
+
 /// Where the appliance rests when no scan runs and no result is shown.
 ScanTransition Settle(ScanState state) {
   state.cancelling = false;
@@ -39,12 +47,11 @@ ScanTransition Fail(ScanState state, FaultKind fault) {
 
 /// What the sensor and the store report is noted in any phase; what follows from it depends on the phase.
 void Note(ScanState& state, ScanEvent event) {
-  if (event == ScanEvent::kSensorReady) state.has_sensor = true;
-  if (event == ScanEvent::kSensorLost || event == ScanEvent::kSensorFailed) state.has_sensor = false;
-  if ((event == ScanEvent::kSensorReady || event == ScanEvent::kSensorLost) && state.fault == FaultKind::kSensor) {
-    state.fault = FaultKind::kNone;
+  if (event == ScanEvent::kSensorReady || event == ScanEvent::kSensorLost || event == ScanEvent::kSensorFailed) {
+    state.has_sensor = event == ScanEvent::kSensorReady;
+    state.sensor_fails = event == ScanEvent::kSensorFailed;
+    if (state.fault == FaultKind::kNone || state.fault == FaultKind::kSensor) state.fault = SensorFault(state);
   }
-  if (event == ScanEvent::kSensorFailed && state.fault == FaultKind::kNone) state.fault = FaultKind::kSensor;
   if (event == ScanEvent::kStorageFailed) state.fault = FaultKind::kStorage;
 }
 
@@ -53,7 +60,7 @@ ScanTransition InNoSensor(const ScanState& state, ScanEvent event) {
     case ScanEvent::kShortPress:
     case ScanEvent::kLongPress:
     case ScanEvent::kStart:
-      return Refuse(state, "no sensor is attached: plug it in and wait for the ready light");
+      return Refuse(state, WhyNoSensor(state));
     case ScanEvent::kEndSweep:
     case ScanEvent::kCancel:
       return Refuse(state, "no scan is running");
@@ -132,9 +139,7 @@ ScanTransition InResult(const ScanState& state, ScanEvent event) {
     case ScanEvent::kShortPress:
     case ScanEvent::kStart:
       if (state.has_sensor && state.fault == FaultKind::kNone) return Start(state);
-      return {.state = Settle(state).state,
-              .actions = {ScanAction::kRefuse},
-              .refusal = "no sensor is attached: plug it in and wait for the ready light"};
+      return Refuse(Settle(state).state, WhyNoSensor(state));
     case ScanEvent::kEndSweep:
     case ScanEvent::kCancel:
       return Refuse(state, "no scan is running");
@@ -154,13 +159,13 @@ ScanTransition InFault(ScanState state, ScanEvent event) {
   const bool is_command = is_press || event == ScanEvent::kStart || event == ScanEvent::kEndSweep || event == ScanEvent::kCancel;
   if (!is_command) return Settle(state);
   if (state.fault == FaultKind::kScan && is_press) {
-    state.fault = FaultKind::kNone;
+    state.fault = SensorFault(state);  // it may have failed meanwhile, and says so only once
     return Settle(state);
   }
   if (state.fault == FaultKind::kStorage)
     return Refuse(state, "the storage has failed: see the reason in the status; nothing can be scanned");
   if (state.fault == FaultKind::kScan) return Refuse(state, "the last scan failed: press the button to acknowledge it");
-  return Refuse(state, "the sensor does not work: see the reason in the status; plug it out and in again");
+  return Refuse(state, WhyNoSensor(state));
 }
 
 }  // namespace

@@ -20,6 +20,7 @@ enum class FaultKind {
 struct ScanState {
   ScanPhase phase = ScanPhase::kNoSensor;
   bool has_sensor = false;             ///< Attached, open and streaming.
+  bool sensor_fails = false;           ///< Attached and does not work, whatever else is wrong; never with has_sensor.
   FaultKind fault = FaultKind::kNone;  ///< Not kNone in phase kFault only, or in a scan that is being cancelled because of it.
   bool cancelling = false;             ///< The running scan was told to stop and has not yet; kScanning and kWorking only.
   bool operator==(const ScanState&) const = default;

@@ -24,6 +24,8 @@ bool IsRunning(const ScanState& s) { return s.phase == kScanning || s.phase == k
 /// What the header promises of a state.
 bool IsConsistent(const ScanState& s) {
   if (s.cancelling && !IsRunning(s)) return false;
+  if (s.sensor_fails && (s.has_sensor || s.fault == FaultKind::kNone)) return false;
+  if (s.fault == FaultKind::kSensor && !s.sensor_fails) return false;
   if (s.phase == kFault) return s.fault != FaultKind::kNone;
   if (s.phase == kReady) return s.has_sensor && s.fault == FaultKind::kNone;
   if (s.phase == kNoSensor) return !s.has_sensor && s.fault == FaultKind::kNone;
@@ -43,8 +45,8 @@ std::vector<ScanState> ReachableStates() {
 }
 
 std::string Text(const ScanState& s, E e) {
-  return std::string(Name(s.phase)) + (s.has_sensor ? " sensor" : "") + (s.cancelling ? " cancelling" : "") + " fault " +
-         std::to_string(static_cast<int>(s.fault)) + " on " + Name(e);
+  return std::string(Name(s.phase)) + (s.has_sensor ? " sensor" : "") + (s.sensor_fails ? " failing" : "") +
+         (s.cancelling ? " cancelling" : "") + " fault " + std::to_string(static_cast<int>(s.fault)) + " on " + Name(e);
 }
 
 template <typename Check>
@@ -118,7 +120,42 @@ TEST(ScanStateTest, TheSensorIsKnownInEveryState) {
   ForEveryStateAndEvent([](const ScanState& before, E event, const ScanTransition& t) {
     const bool expected = event == E::kSensorReady || (before.has_sensor && event != E::kSensorLost && event != E::kSensorFailed);
     EXPECT_EQ(t.state.has_sensor, expected);
+    const bool fails = event == E::kSensorFailed || (before.sensor_fails && event != E::kSensorReady && event != E::kSensorLost);
+    EXPECT_EQ(t.state.sensor_fails, fails);
   });
+}
+
+ScanTransition After(const std::vector<E>& events) {
+  ScanTransition t;
+  for (const E event : events) t = Next(t.state, event);
+  return t;
+}
+
+// It is told once only, so nothing else may make the appliance ask for a sensor that is attached.
+TEST(ScanStateTest, ASensorThatFailsDuringAnotherFaultFailsStillWhenThatIsOver) {
+  ScanTransition t = After({E::kSensorReady, E::kStart, E::kScanFailed, E::kSensorFailed});
+  EXPECT_EQ(t.state.fault, FaultKind::kScan);
+  t = Next(t.state, E::kShortPress);
+  EXPECT_EQ(t.state.phase, kFault);
+  EXPECT_EQ(t.state.fault, FaultKind::kSensor);
+  EXPECT_EQ(Next(t.state, E::kSensorReady).state.phase, kReady);
+
+  t = After({E::kSensorReady, E::kStart, E::kSensorFailed, E::kScanFailed, E::kShortPress});
+  EXPECT_EQ(t.state.fault, FaultKind::kSensor);
+  t = After({E::kSensorReady, E::kStart, E::kSensorFailed, E::kScanFailed, E::kSensorLost, E::kShortPress});
+  EXPECT_EQ(t.state.phase, kNoSensor);
+}
+
+TEST(ScanStateTest, ARefusalTellsASensorThatFailsFromNone) {
+  const std::vector<E> result = {E::kSensorReady, E::kStart, E::kEndSweep};
+  for (const E press : {E::kShortPress, E::kStart}) {
+    std::vector<E> events = result;
+    events.insert(events.end(), {E::kSensorFailed, E::kScanDone, press});
+    EXPECT_THAT(After(events).refusal, testing::HasSubstr("does not work"));
+    events = result;
+    events.insert(events.end(), {E::kSensorLost, E::kScanDone, press});
+    EXPECT_THAT(After(events).refusal, testing::HasSubstr("no sensor is attached"));
+  }
 }
 
 TEST(ScanStateTest, ThePlainWay) {
@@ -149,12 +186,12 @@ constexpr ScanState kInReady{.phase = kReady, .has_sensor = true};
 constexpr ScanState kInScanning{.phase = kScanning, .has_sensor = true};
 constexpr ScanState kInWorking{.phase = kWorking, .has_sensor = true};
 constexpr ScanState kInResult{.phase = kResult, .has_sensor = true};
-constexpr ScanState kSensorFault{.phase = kFault, .fault = FaultKind::kSensor};
+constexpr ScanState kSensorFault{.phase = kFault, .sensor_fails = true, .fault = FaultKind::kSensor};
 constexpr ScanState kScanFault{.phase = kFault, .has_sensor = true, .fault = FaultKind::kScan};
 constexpr ScanState kStorageFault{.phase = kFault, .has_sensor = true, .fault = FaultKind::kStorage};
 constexpr ScanState kCancelling{.phase = kScanning, .has_sensor = true, .cancelling = true};
 constexpr ScanState kUnplugged{.phase = kScanning, .has_sensor = false, .cancelling = true};
-constexpr ScanState kStalled{.phase = kScanning, .has_sensor = false, .fault = FaultKind::kSensor, .cancelling = true};
+constexpr ScanState kStalled{.phase = kScanning, .sensor_fails = true, .fault = FaultKind::kSensor, .cancelling = true};
 
 TEST(ScanStateTest, TheTable) {
   const std::vector<Row> rows = {
