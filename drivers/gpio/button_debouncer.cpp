@@ -7,11 +7,24 @@ namespace plumb {
 ButtonDebouncer::ButtonDebouncer(const Options& options, bool pressed, Clock::time_point now)
     : options_(options), level_(pressed), stable_(pressed), ignored_(pressed), changed_(now), begin_(now) {}
 
-void ButtonDebouncer::OnLevel(bool pressed, Clock::time_point now) {
+std::optional<ButtonPress> ButtonDebouncer::OnEdge(bool pressed, Clock::time_point then) {
+  const std::optional<ButtonPress> press = OnTime(then);
+  Set(pressed, then);
+  return press;
+}
+
+std::optional<ButtonPress> ButtonDebouncer::OnLevel(bool pressed, Clock::time_point now) {
+  if (pressed == level_) return OnTime(now);
+  const std::optional<ButtonPress> press = OnTime(std::min(now, changed_ + options_.debounce));
+  Set(pressed, now);
+  return press;
+}
+
+void ButtonDebouncer::Set(bool pressed, Clock::time_point then) {
   if (pressed == level_) return;
-  if (pressed && !stable_ && now - changed_ >= options_.debounce) begin_ = now;  // first contact after a rest
+  if (pressed && !stable_ && then - changed_ >= options_.debounce) begin_ = then;  // first contact after a rest
   level_ = pressed;
-  changed_ = now;
+  changed_ = then;
 }
 
 std::optional<ButtonPress> ButtonDebouncer::OnTime(Clock::time_point now) {

@@ -60,9 +60,17 @@ struct GpioButton::Impl {
   std::string name;
   std::optional<ButtonDebouncer> debouncer;
   std::function<void(ButtonPress)> pressed;
+  Clock::time_point last;  ///< The debouncer's time.
 
-  void Advance(Clock::time_point now) {
-    if (const std::optional<ButtonPress> press = debouncer->OnTime(now); press && pressed) pressed(*press);
+  void Tell(std::optional<ButtonPress> press) const {
+    if (press && pressed) pressed(*press);
+  }
+
+  /// When it happened by its stamp, so that a loop that comes late still sees how long the button was held. Stamps are of the monotonic
+  /// clock since Linux 5.7; one of another clock does not fit between the last time and now.
+  [[nodiscard]] Clock::time_point TimeOf(const gpiod_line_event& event, Clock::time_point now) const {
+    const Clock::time_point stamp{std::chrono::seconds(event.ts.tv_sec) + std::chrono::nanoseconds(event.ts.tv_nsec)};
+    return stamp >= last && stamp <= now ? stamp : now;
   }
 };
 
@@ -80,7 +88,8 @@ GpioButton::GpioButton(const GpioButtonOptions& options) : impl_(std::make_uniqu
     if (gpiod_line_request(impl_->line, &config, 0) != 0) throw DeviceError(fmt::format("{}: {}", impl_->name, Reason(errno)));
   }
   const int value = gpiod_line_get_value(impl_->line);
-  impl_->debouncer.emplace(options.timing, value == 1, Clock::now());
+  impl_->last = Clock::now();
+  impl_->debouncer.emplace(options.timing, value == 1, impl_->last);
 }
 
 GpioButton::~GpioButton() = default;
@@ -98,9 +107,13 @@ void GpioButton::Dispatch(Clock::time_point now) {
     gpiod_line_event event{};
     if ((wait.revents & POLLIN) == 0 || gpiod_line_event_read(impl_->line, &event) != 0)
       throw DeviceError(fmt::format("{} is gone", impl_->name));
-    impl_->debouncer->OnLevel(event.event_type == GPIOD_LINE_EVENT_RISING_EDGE, now);
+    impl_->last = impl_->TimeOf(event, now);
+    impl_->Tell(impl_->debouncer->OnEdge(event.event_type == GPIOD_LINE_EVENT_RISING_EDGE, impl_->last));
   }
-  impl_->Advance(now);
+  impl_->last = now;
+  // The kernel keeps 16 edges and drops those that come after: where the line is in the end only it can tell.
+  const int value = gpiod_line_get_value(impl_->line);
+  impl_->Tell(value < 0 ? impl_->debouncer->OnTime(now) : impl_->debouncer->OnLevel(value == 1, now));
 }
 
 struct GpioIndicator::Impl {

@@ -16,6 +16,7 @@
 struct gpiod_line {
   std::string name;
   int button = -1;
+  bool is_pressed = false;  // as the edges told that were read
 };
 struct gpiod_chip {
   std::vector<std::unique_ptr<gpiod_line>> lines;  // the chip's, as in libgpiod: gone with it
@@ -58,6 +59,7 @@ PLUMB_FAKE gpiod_line* gpiod_chip_find_line(gpiod_chip* chip, const char* name) 
 
 PLUMB_FAKE int gpiod_line_request(gpiod_line* line, const gpiod_line_request_config*, int) {
   line->button = ::open(InFolder("button").c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
+  line->is_pressed = ::access(InFolder("held").c_str(), F_OK) == 0;
   return line->button < 0 ? -1 : 0;
 }
 
@@ -66,7 +68,7 @@ PLUMB_FAKE int gpiod_line_request_output_flags(gpiod_line* line, const char*, in
   return 0;
 }
 
-PLUMB_FAKE int gpiod_line_get_value(gpiod_line*) { return ::access(InFolder("held").c_str(), F_OK) == 0 ? 1 : 0; }
+PLUMB_FAKE int gpiod_line_get_value(gpiod_line* line) { return line->is_pressed ? 1 : 0; }
 
 PLUMB_FAKE int gpiod_line_set_value(gpiod_line* line, int value) {
   Tell(*line, value);
@@ -79,6 +81,7 @@ PLUMB_FAKE int gpiod_line_event_read(gpiod_line* line, gpiod_line_event* event) 
   char edge = 0;
   if (::read(line->button, &edge, 1) != 1 || edge == 'x') return -1;
   ::clock_gettime(CLOCK_MONOTONIC, &event->ts);
-  event->event_type = edge == '1' ? GPIOD_LINE_EVENT_RISING_EDGE : GPIOD_LINE_EVENT_FALLING_EDGE;
+  line->is_pressed = edge == '1';
+  event->event_type = line->is_pressed ? GPIOD_LINE_EVENT_RISING_EDGE : GPIOD_LINE_EVENT_FALLING_EDGE;
   return 0;
 }

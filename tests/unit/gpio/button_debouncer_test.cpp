@@ -14,7 +14,13 @@ using std::chrono::milliseconds;
 class Bench {
  public:
   explicit Bench(bool held = false) : debouncer_({}, held, now_) {}
-  void Level(bool pressed) { debouncer_.OnLevel(pressed, now_); }
+  void Level(bool pressed) { Note(debouncer_.OnEdge(pressed, now_)); }
+  /// An edge that is read only now.
+  void Late(bool pressed, milliseconds ago) { Note(debouncer_.OnEdge(pressed, now_ - ago)); }
+  /// What the line itself says.
+  void Reread(bool pressed) { Note(debouncer_.OnLevel(pressed, now_)); }
+  /// The loop does not come round.
+  void Hang(milliseconds time) { now_ += time; }
   void Pass(milliseconds time) {
     const auto end = now_ + time;
     while (debouncer_.deadline() && *debouncer_.deadline() <= end) {
@@ -28,9 +34,10 @@ class Bench {
   [[nodiscard]] bool idle() const { return !debouncer_.deadline(); }
 
  private:
-  void Step() {
-    if (const auto press = debouncer_.OnTime(now_)) presses.push_back(*press);
+  void Note(std::optional<ButtonPress> press) {
+    if (press) presses.push_back(*press);
   }
+  void Step() { Note(debouncer_.OnTime(now_)); }
   ButtonDebouncer::Clock::time_point now_{std::chrono::hours(1)};
   ButtonDebouncer debouncer_;
 };
@@ -95,6 +102,47 @@ TEST(ButtonDebouncerTest, ALossOfContactShorterThanTheDebounceDoesNotEndAPress) 
   bench.Level(false);
   bench.Pass(milliseconds(100));
   EXPECT_EQ(bench.presses.size(), 1U);
+}
+
+TEST(ButtonDebouncerTest, EdgesThatAreReadLateCountByWhenTheyHappened) {
+  Bench bench;
+  bench.Hang(milliseconds(400));
+  bench.Late(true, milliseconds(300));
+  bench.Late(false, milliseconds(100));
+  bench.Pass(milliseconds(0));
+  EXPECT_EQ(bench.presses, std::vector{ButtonPress::kShort});
+  bench.Hang(std::chrono::seconds(3));
+  bench.Late(true, milliseconds(2500));
+  bench.Late(false, milliseconds(500));
+  bench.Pass(milliseconds(100));
+  EXPECT_EQ(bench.presses, (std::vector{ButtonPress::kShort, ButtonPress::kLong}));
+  bench.Hang(std::chrono::seconds(3));
+  bench.Late(true, milliseconds(500));
+  bench.Late(false, milliseconds(490));
+  bench.Pass(milliseconds(100));
+  EXPECT_EQ(bench.presses.size(), 2U) << "a spike stays one";
+}
+
+TEST(ButtonDebouncerTest, AReleaseWhoseEdgeWasLostIsNoLongPress) {
+  Bench bench;
+  bench.Level(true);
+  bench.Hang(std::chrono::seconds(3));
+  bench.Reread(false);
+  bench.Pass(milliseconds(100));
+  EXPECT_EQ(bench.presses, std::vector{ButtonPress::kShort});
+  EXPECT_TRUE(bench.idle());
+}
+
+TEST(ButtonDebouncerTest, APressWhoseEdgeWasLostBeginsWhenItIsSeen) {
+  Bench bench;
+  bench.Level(false);
+  bench.Hang(std::chrono::seconds(3));
+  bench.Reread(true);
+  bench.Pass(milliseconds(200));
+  EXPECT_TRUE(bench.presses.empty());
+  bench.Level(false);
+  bench.Pass(milliseconds(100));
+  EXPECT_EQ(bench.presses, std::vector{ButtonPress::kShort});
 }
 
 // Contacts that chatter for up to 15 ms at each change: exactly one press each time, long or short as it was held.

@@ -7,12 +7,14 @@
 #include <fcntl.h>
 #include <linux/gpio.h>
 #include <poll.h>
+#include <sys/stat.h>
 #include <umockdev.h>
 #include <unistd.h>
 
 #include <array>
 #include <atomic>
 #include <cstring>
+#include <string>
 #include <vector>
 
 #include "algo/types/errors.hpp"
@@ -31,30 +33,42 @@ using Clock = Button::Clock;
 class FakeChip {
  public:
   FakeChip() : testbed_(umockdev_testbed_new()), handler_(umockdev_ioctl_base_new()) {
-    EXPECT_EQ(::pipe2(events_.data(), O_CLOEXEC), 0);
     GError* error = nullptr;
     const char* devices =
         "P: /devices/platform/plumb/gpiochip0\nN: gpiochip0\nE: DEVNAME=/dev/gpiochip0\nE: SUBSYSTEM=gpio\nE: MAJOR=254\nE: MINOR=0\n"
         "A: dev=254:0\\n\n\n"
         "P: /devices/virtual/misc/plumbout\nN: plumbout\nE: DEVNAME=/dev/plumbout\nE: SUBSYSTEM=misc\nE: MAJOR=10\nE: MINOR=99\n"
-        "A: dev=10:99\\n\n";
+        "A: dev=10:99\\n\n\n"
+        "P: /devices/virtual/misc/plumbin\nN: plumbin\nE: DEVNAME=/dev/plumbin\nE: SUBSYSTEM=misc\nE: MAJOR=10\nE: MINOR=98\n"
+        "A: dev=10:98\\n\n";
     EXPECT_TRUE(umockdev_testbed_add_from_string(testbed_, devices, &error)) << (error ? error->message : "");
     g_signal_connect(handler_, "handle-ioctl", G_CALLBACK(&FakeChip::OnIoctl), this);
-    for (const char* device : {"/dev/gpiochip0", "/dev/plumbout"})
+    for (const char* device : {"/dev/gpiochip0", "/dev/plumbout", kEvents})
       EXPECT_TRUE(umockdev_testbed_attach_ioctl(testbed_, device, handler_, &error)) << (error ? error->message : "");
+    // Edges come through a pipe that is a device too, so that the line can be asked for its level.
+    gchar* root = umockdev_testbed_get_root_dir(testbed_);
+    const std::string node = root + std::string(kEvents);
+    g_free(root);
+    ::unlink(node.c_str());
+    EXPECT_EQ(::mkfifo(node.c_str(), 0600), 0);
+    events_ = ::open(kEvents, O_RDWR | O_CLOEXEC);
+    EXPECT_GE(events_, 0);
   }
   ~FakeChip() {
     g_object_unref(testbed_);
     g_object_unref(handler_);
-    for (const int end : events_) ::close(end);
+    ::close(events_);
   }
   FakeChip(const FakeChip&) = delete;
   FakeChip& operator=(const FakeChip&) = delete;
 
-  void Edge(bool pressed) const {
+  /// By default with a stamp of a clock that is not ours, as kernels before 5.7 give it.
+  void Edge(bool pressed, Clock::time_point at = Clock::time_point(std::chrono::hours(24 * 365 * 50))) {
+    held = pressed;
     gpioevent_data event{};
+    event.timestamp = static_cast<std::uint64_t>(std::chrono::nanoseconds(at.time_since_epoch()).count());
     event.id = pressed ? GPIOEVENT_EVENT_RISING_EDGE : GPIOEVENT_EVENT_FALLING_EDGE;
-    EXPECT_EQ(::write(events_[1], &event, sizeof event), static_cast<ssize_t>(sizeof event));
+    EXPECT_EQ(::write(events_, &event, sizeof event), static_cast<ssize_t>(sizeof event));
   }
   std::atomic<bool> held{false};
   std::atomic<unsigned> event_flags{0};
@@ -108,7 +122,7 @@ class FakeChip {
       case GPIO_GET_LINEEVENT_IOCTL: {
         auto& wanted = *static_cast<gpioevent_request*>(memory);
         event_flags = wanted.handleflags;
-        wanted.fd = ::dup(events_[0]);
+        wanted.fd = ::open(kEvents, O_RDWR | O_CLOEXEC);
         return true;
       }
       case GPIO_GET_LINEHANDLE_IOCTL: {
@@ -129,9 +143,11 @@ class FakeChip {
     }
   }
 
+  static constexpr const char* kEvents = "/dev/plumbin";
+
   UMockdevTestbed* testbed_;
   UMockdevIoctlBase* handler_;
-  std::array<int, 2> events_{};
+  int events_ = -1;
   unsigned last_line_ = 0;
 };
 
@@ -167,6 +183,41 @@ TEST_F(GpioTest, APressOnTheLineIsAPress) {
   button.Dispatch(now + milliseconds(300));
   EXPECT_EQ(presses, std::vector{ButtonPress::kShort});
   EXPECT_FALSE(button.deadline());
+}
+
+TEST_F(GpioTest, APressAndItsReleaseThatAreReadTogetherAreAPress) {
+  GpioButton button({.where = {"gpiochip0", "start-button"}});
+  std::vector<ButtonPress> presses;
+  button.SetListener([&](ButtonPress press) { presses.push_back(press); });
+  const Clock::time_point now = Clock::now();
+  chip_->Edge(true, now + milliseconds(100));
+  chip_->Edge(false, now + milliseconds(300));
+  ASSERT_TRUE(IsReadable(button.fd()));
+  button.Dispatch(now + milliseconds(400));
+  EXPECT_EQ(presses, std::vector{ButtonPress::kShort});
+}
+
+TEST_F(GpioTest, AReleaseWhoseEdgeTheKernelHadNoRoomForIsSeenOnTheLine) {
+  GpioButton button({.where = {"gpiochip0", "start-button"}});
+  std::vector<ButtonPress> presses;
+  button.SetListener([&](ButtonPress press) { presses.push_back(press); });
+  const Clock::time_point now = Clock::now();
+  chip_->Edge(true, now + milliseconds(100));
+  chip_->held = false;
+  ASSERT_TRUE(IsReadable(button.fd()));
+  button.Dispatch(now + milliseconds(300));
+  ASSERT_TRUE(button.deadline());
+  button.Dispatch(*button.deadline());
+  button.Dispatch(now + std::chrono::seconds(10));
+  EXPECT_EQ(presses, std::vector{ButtonPress::kShort});
+}
+
+TEST_F(GpioTest, AButtonHeldAtTheStartIsNoPress) {
+  chip_->held = true;
+  GpioButton button({.where = {"gpiochip0", "start-button"}});
+  EXPECT_FALSE(button.deadline());
+  button.SetListener([](ButtonPress) { ADD_FAILURE() << "no press"; });
+  button.Dispatch(Clock::now() + std::chrono::seconds(10));
 }
 
 TEST_F(GpioTest, ChipsAndLinesThatAreNotThereAreNamed) {
