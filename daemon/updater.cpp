@@ -132,6 +132,11 @@ struct Updater::Impl {
     sd_bus_set_method_call_timeout(bus, kCallTimeout_us);
     sd_bus_match_signal_async(bus, nullptr, kService, kPath, kProperties, "PropertiesChanged", &Impl::OnChanged, nullptr, this);
     sd_bus_match_signal_async(bus, nullptr, kService, kPath, kInstaller, "Completed", &Impl::OnCompleted, nullptr, this);
+    const std::string owner = fmt::format(
+        "type='signal',sender='{0}',path='/org/freedesktop/DBus',interface='{0}',"
+        "member='NameOwnerChanged',arg0='{1}'",
+        "org.freedesktop.DBus", kService);
+    sd_bus_add_match_async(bus, nullptr, owner.c_str(), &Impl::OnOwner, nullptr, this);
     source = loop.WatchDescriptor("bus", sd_bus_get_fd(bus), EPOLLIN, [this](std::uint32_t) { Process(); });
     Look();
     Process();
@@ -237,6 +242,20 @@ struct Updater::Impl {
     return 0;
   }
 
+  /// RAUC has gone: it will never say that the installation ended. A call that it has not answered is answered by the bus.
+  static int OnOwner(sd_bus_message* message, void* self, sd_bus_error*) {
+    auto* impl = static_cast<Impl*>(self);
+    const char *name = nullptr, *before = nullptr, *now = nullptr;
+    if (sd_bus_message_read(message, "sss", &name, &before, &now) < 0 || *now != '\0') return 0;
+    impl->is_there = false;
+    if (impl->is_installing && !impl->done) {
+      impl->End("the installer ended before it was done: look at its log, then try again");
+    } else {
+      impl->Tell();
+    }
+    return 0;
+  }
+
   static std::string ErrorOf(sd_bus_message* message) {
     const sd_bus_error* error = sd_bus_message_get_error(message);
     const std::string text = error != nullptr ? Shown(error->message) : "";
@@ -337,7 +356,7 @@ web::UpdateStatus Updater::status() {
   web::UpdateStatus status;
   status.supported = impl_->is_there;
   if (!status.supported) {
-    status.message = "there is no installer (RAUC) on this machine; update its packages instead";
+    status.message = impl_->outcome.empty() ? "there is no installer (RAUC) on this machine; update its packages instead" : impl_->outcome;
     return status;
   }
   status.message = impl_->is_installing ? impl_->step : impl_->outcome;

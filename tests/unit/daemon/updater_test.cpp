@@ -339,6 +339,23 @@ TEST_F(UpdaterTest, ABusThatGoesAwayEndsTheInstallation) {
   });
 }
 
+TEST_F(UpdaterTest, AnInstallerThatDiesInTheMiddleEndsTheInstallation) {
+  Play([&] {
+    auto rauc = std::make_unique<FakeRauc>(bus_.address());
+    Start();
+    WaitForRauc();
+    EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone);
+    rauc.reset();
+    ASSERT_TRUE(Becomes([&] { return !Ended().empty(); }));
+    EXPECT_THAT(Ended(), HasSubstr("the installer ended before it was done"));
+    EXPECT_FALSE(StatusNow().installing);
+    EXPECT_THAT(StatusNow().message, HasSubstr("plumb-9.0.raucb was not installed"));
+    rauc = std::make_unique<FakeRauc>(bus_.address());
+    WaitForRauc();
+    EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone) << "again, once it is back";
+  });
+}
+
 TEST_F(UpdaterTest, OnlyBundlesOfTheFolderAreKnown) {
   Play([&] {
     FakeRauc rauc(bus_.address());
