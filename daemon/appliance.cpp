@@ -458,19 +458,11 @@ void Appliance::OpenPatient(const std::string& patient_id, web::ScanPurpose purp
 }
 
 void Appliance::Reload(const Config& config) {
-  const ApplianceConfig& now = parts_.config.appliance;
-  const ApplianceConfig& next = config.appliance;
-  if (now.state != next.state || now.control != next.control || now.sensor_serial != next.sensor_serial ||
-      now.calibration != next.calibration || parts_.config.web.listen != config.web.listen) {
-    Log(LogLevel::kWarning, "state, control, calibration, sensor_serial and listen change only with a restart");
-  }
-  const ApplianceConfig kept = now;
-  parts_.config = config;
-  parts_.config.appliance.state = kept.state;
-  parts_.config.appliance.control = kept.control;
-  parts_.config.appliance.sensor_serial = kept.sensor_serial;
-  parts_.config.appliance.calibration = kept.calibration;
+  Config next = config;
+  const std::vector<std::string> kept = KeepUntilRestart(parts_.config, next);
+  parts_.config = std::move(next);
   Log(LogLevel::kInfo, "the configuration was read again");
+  if (!kept.empty()) Log(LogLevel::kWarning, fmt::format("changed, but in use only after a restart: {}", fmt::join(kept, ", ")));
 }
 
 void Appliance::Stop(std::function<void()> stopped) {

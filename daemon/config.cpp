@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/types/errors.hpp"
+#include "algo/types/marker_dictionary.hpp"
 #include "algo/types/units.hpp"
 #include "daemon/config_section.hpp"
 
@@ -40,7 +41,8 @@ const std::vector<std::pair<std::string, Preset>> kPresets = {{"best", Preset::k
 
 void ReadMarkers(Section section, MarkerConfig& markers) {
   std::string dictionary;
-  section.Take("dictionary", dictionary, "a dictionary's name, such as \"DICT_6X6_250\"", [](const std::string& s) { return !s.empty(); });
+  section.Take("dictionary", dictionary, fmt::format("one of {}", fmt::join(MarkerDictionary::KnownNames(), ", ")),
+               [](const std::string& s) { return MarkerDictionary::Find(s).has_value(); });
   if (!dictionary.empty()) markers.dictionary = dictionary;
   double length_m = 0;
   section.Take("length_m", length_m, "a marker's side in metres, above 0 and at most 2", [](double v) { return v > 0 && v <= 2; });
@@ -229,6 +231,38 @@ Config ReadConfig(const std::filesystem::path& file) {
   Config config = ParseConfig(ReadText(file, "configuration"), file.string());
   if (config.region_file && config.region_file->is_relative()) config.region_file = file.parent_path() / *config.region_file;
   return config;
+}
+
+std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
+  std::vector<std::string> kept;
+  const auto keep = [&kept](const char* key, const auto& used, auto& wanted) {
+    if (wanted == used) return;
+    kept.emplace_back(key);
+    wanted = used;
+  };
+  keep("markers.dictionary", in_use.markers.dictionary, next.markers.dictionary);
+  keep("markers.length_m", in_use.markers.length_m, next.markers.length_m);
+  keep("markers.reference", in_use.markers.reference, next.markers.reference);
+  keep("appliance.state", in_use.appliance.state, next.appliance.state);
+  keep("appliance.control", in_use.appliance.control, next.appliance.control);
+  keep("appliance.calibration", in_use.appliance.calibration, next.appliance.calibration);
+  keep("appliance.sensor_serial", in_use.appliance.sensor_serial, next.appliance.sensor_serial);
+  keep("button.chip", in_use.panel.button_chip, next.panel.button_chip);
+  keep("button.line", in_use.panel.button_line, next.panel.button_line);
+  keep("button.active_low", in_use.panel.button_active_low, next.panel.button_active_low);
+  keep("light.chip", in_use.panel.light_chip, next.panel.light_chip);
+  keep("light.red", in_use.panel.red_line, next.panel.red_line);
+  keep("light.green", in_use.panel.green_line, next.panel.green_line);
+  keep("light.blue", in_use.panel.blue_line, next.panel.blue_line);
+  keep("light.beeper", in_use.panel.beeper_line, next.panel.beeper_line);
+  keep("light.active_low", in_use.panel.light_active_low, next.panel.light_active_low);
+  keep("web.listen", in_use.web.listen, next.web.listen);
+  keep("web.tls_certificate", in_use.web.tls_certificate, next.web.tls_certificate);
+  keep("web.tls_key", in_use.web.tls_key, next.web.tls_key);
+  keep("web.host_names", in_use.web.host_names, next.web.host_names);
+  keep("update.folder", in_use.update.folder, next.update.folder);
+  keep("update.max_bundle_mb", in_use.update.max_bundle_mb, next.update.max_bundle_mb);
+  return kept;
 }
 
 std::vector<Eigen::Vector2d> ReadRegion(const std::filesystem::path& file) {

@@ -96,6 +96,9 @@ struct Config {
 /// As ReadConfig(), of a text; `name` stands for the file in messages.
 [[nodiscard]] Config ParseConfig(const std::string& text, const std::string& name);
 
+/// What takes effect only at the start stays in `next` as it is in use. Gives the keys that would have changed, such as "web.listen".
+[[nodiscard]] std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next);
+
 /// Vertices of a region file: {"format": 1, "frame": "reference_marker", "polygon_m": [[x, y], ...]}; metres.
 /// @throws DataError naming the file and what is wrong with it.
 [[nodiscard]] std::vector<Eigen::Vector2d> ReadRegion(const std::filesystem::path& file);

@@ -369,9 +369,9 @@ TEST_F(DaemonFaultTest, SighupTakesAGoodConfigurationAndKeepsTheOldOneForABadOne
   std::ofstream(config) << "[appliance]\nscan_limit_s = -1\n";
   plumbd.Signal(SIGHUP);
   plumbd.WaitForLog("plumb.toml:2");
-  std::ofstream(config) << "[appliance]\nscan_limit_s = 1\n";
+  std::ofstream(config) << "[appliance]\nscan_limit_s = 1\n[markers]\nlength_m = 0.05\n[web]\nhost_names = [\"scan.example\"]\n";
   plumbd.Signal(SIGHUP);
-  plumbd.WaitForLog("read again");
+  plumbd.WaitForLog("only after a restart: markers.length_m, web.host_names");
   plumbd.Press();
   plumbd.WaitForState("result");
   EXPECT_THAT(plumbd.log(), HasSubstr("longest sweep")) << "the new limit holds";

@@ -98,6 +98,8 @@ TEST(ConfigTest, NamesTheLineOfAnUnknownKey) {
 TEST(ConfigTest, NamesLineKeyExpectedAndFound) {
   EXPECT_THAT(ErrorOf("\n[markers]\nlength_m = -0.1\n"),
               AllOf(HasSubstr("test.toml:3:"), HasSubstr("markers.length_m"), HasSubstr("-0.1")));
+  EXPECT_THAT(ErrorOf("[markers]\ndictionary = \"DICT_6X6_25O\"\n"),
+              AllOf(HasSubstr("test.toml:2: markers.dictionary"), HasSubstr("DICT_6X6_25O"), HasSubstr("DICT_6X6_250, ")));
   EXPECT_THAT(ErrorOf("[reconstruct]\nseed = \"one\"\n"), AllOf(HasSubstr("test.toml:2:"), HasSubstr("seed"), HasSubstr("one")));
   EXPECT_THAT(ErrorOf("[reconstruct]\nseed = -1\n"), HasSubstr("reconstruct.seed"));
   EXPECT_THAT(ErrorOf("[reconstruct]\nnum_icp_iterations = 99999999999999\n"), HasSubstr("1 to 1000"));
@@ -107,6 +109,51 @@ TEST(ConfigTest, NamesLineKeyExpectedAndFound) {
   EXPECT_THAT(ErrorOf("[iec]\nT_iec_reference = [[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n"), HasSubstr("rigid transform"));
   EXPECT_THAT(ErrorOf("compare = 3\n"), HasSubstr("a table"));
   EXPECT_THAT(ErrorOf("[compare\n"), AllOf(HasSubstr("test.toml:1:"), HasSubstr("not valid TOML")));
+}
+
+TEST(ConfigTest, WhatTakesEffectAtTheStartIsKeptAndNamed) {
+  const std::string at_start = R"(
+[markers]
+dictionary = "DICT_4X4_50"
+length_m = 0.08
+reference = 12
+[button]
+chip = "a"
+line = "b"
+active_low = false
+[light]
+chip = "c"
+red = "d"
+green = "e"
+blue = "f"
+beeper = "g"
+active_low = true
+[update]
+folder = "/updates"
+max_bundle_mb = 7
+[web]
+listen = "127.0.0.1:1"
+tls_certificate = "/c"
+tls_key = "/k"
+host_names = ["h"]
+[appliance]
+state = "/s"
+control = "/c"
+calibration = "/d"
+sensor_serial = "7"
+)";
+  const Config in_use = ParseConfig("", "test.toml");
+  Config next = ParseConfig(at_start + "result_s = 5\n[check]\nmin_views = 3\n", "test.toml");
+  EXPECT_THAT(KeepUntilRestart(in_use, next),
+              testing::UnorderedElementsAre("markers.dictionary", "markers.length_m", "markers.reference", "button.chip", "button.line",
+                                            "button.active_low", "light.chip", "light.red", "light.green", "light.blue", "light.beeper",
+                                            "light.active_low", "update.folder", "update.max_bundle_mb", "web.listen",
+                                            "web.tls_certificate", "web.tls_key", "web.host_names", "appliance.state", "appliance.control",
+                                            "appliance.calibration", "appliance.sensor_serial"));
+  EXPECT_EQ(next.web.listen, in_use.web.listen);
+  EXPECT_EQ(next.appliance.result_s, 5);
+  EXPECT_EQ(next.check.min_views, 3);
+  EXPECT_THAT(KeepUntilRestart(in_use, next), testing::IsEmpty());
 }
 
 TEST(ConfigTest, AMissingFileIsBadInput) { EXPECT_THROW((void)ReadConfig("/nonexistent/plumb.toml"), DataError); }
