@@ -457,6 +457,14 @@ void Appliance::OpenPatient(const std::string& patient_id, web::ScanPurpose purp
   TellWeb(web::EventKind::kStatus);
 }
 
+void Appliance::ClosePatient(const std::string& patient_id) {
+  if (open_patient_ != patient_id) return;
+  open_patient_.clear();
+  purpose_ = web::ScanPurpose::kFraction;
+  reference_reason_.clear();
+  TellWeb(web::EventKind::kStatus);
+}
+
 void Appliance::Reload(const Config& config) {
   Config next = config;
   const std::vector<std::string> kept = KeepUntilRestart(parts_.config, next);

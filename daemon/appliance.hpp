@@ -51,6 +51,8 @@ class Appliance {
   Answer Cancel();
   /// The next scan's patient and purpose. Empty id: none.
   void OpenPatient(const std::string& patient_id, web::ScanPurpose purpose, const std::string& reason);
+  /// If this one is open, none is any more. A daily check that is open stays so.
+  void ClosePatient(const std::string& patient_id);
   /// The next scan is the daily check of the room's markers; after it, scans are of the open patient again.
   Answer OpenCheck(const web::Actor& actor);
   [[nodiscard]] web::CheckStatus Checks();

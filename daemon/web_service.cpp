@@ -161,7 +161,7 @@ void WebService::WipePatient(const web::Actor& actor, const std::string& id, web
   if (status.scan && status.scan->patient_id == id) {
     return done(AnswerOf("a scan of this patient is running: end or cancel it first"));
   }
-  if (status.patient_id == id) appliance_.OpenPatient("", web::ScanPurpose::kFraction, "");
+  appliance_.ClosePatient(id);
   Change(std::move(done), [=](Store& store) { return store.WipePatient(actor, id), std::string(); });
 }
 

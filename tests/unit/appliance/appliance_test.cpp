@@ -1,0 +1,130 @@
+// The appliance on its loop, with a sensor that does what a test says.
+#include "daemon/appliance.hpp"
+
+#include <future>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/web_service.hpp"
+#include "tests/support/fake_sensor.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+using testing::FakeBus;
+using testing::FakeProvider;
+
+/// Its driver takes as long to open a sensor as the test wants.
+class SlowProvider : public FakeProvider {
+ public:
+  SlowProvider(FakeBus& bus, std::shared_future<void> may_open) : FakeProvider(bus), may_open_(std::move(may_open)) {}
+  [[nodiscard]] std::unique_ptr<LiveSensor> Open(const std::string& serial) override {
+    may_open_.wait();
+    return FakeProvider::Open(serial);
+  }
+
+ private:
+  std::shared_future<void> may_open_;
+};
+
+class ApplianceTest : public ::testing::Test {
+ protected:
+  ApplianceTest() {
+    parts_.config.appliance.state = folder_ / "state";
+    parts_.config.update.folder = folder_ / "updates";
+    parts_.demo_patient = "demo";
+    parts_.make_provider = [this] { return std::make_unique<SlowProvider>(bus_, may_open_); };
+  }
+
+  /// Runs the test beside the loop, which has the main thread; a loop that has ended does not begin again.
+  void Play(const std::function<void()>& test) {
+    appliance_ = std::make_unique<Appliance>(loop_, parts_);
+    service_ = std::make_unique<WebService>(*appliance_, parts_.config.update);
+    std::jthread player([&] {
+      test();
+      if (!opens_) LetOpen();
+      loop_.Quit(0);
+    });
+    loop_.Run();
+    service_.reset();
+    appliance_.reset();
+  }
+
+  /// On the loop's thread; waits for it.
+  void On(const std::function<void()>& work) {
+    const auto done = std::make_shared<std::promise<void>>();  // shared: it wakes us while it is still at it
+    loop_.Post("test", [&work, done] {
+      work();
+      done->set_value();
+    });
+    done->get_future().wait();
+  }
+  /// False if it does not come to that within half a minute. Asked on the loop's thread.
+  [[nodiscard]] bool Becomes(const std::function<bool()>& holds) {
+    const auto until = EventLoop::Clock::now() + std::chrono::seconds(30);
+    while (EventLoop::Clock::now() < until) {
+      bool does = false;
+      On([&] { does = holds(); });
+      if (does) return true;
+      std::this_thread::yield();
+    }
+    return false;
+  }
+  void LetOpen() {
+    opens_ = true;
+    opener_.set_value();
+  }
+  void MakeReady() {
+    LetOpen();
+    bus_.Plug("A");
+    bus_.GiveFrame();
+    ASSERT_TRUE(Becomes([&] { return appliance_->state().phase == ScanPhase::kReady; }));
+  }
+  [[nodiscard]] bool IsRunning() const {
+    const ScanPhase phase = appliance_->state().phase;
+    return phase == ScanPhase::kScanning || phase == ScanPhase::kWorking;
+  }
+
+  EventLoop loop_;  // first: blocks signals before any thread starts
+  testing::TempFolder folder_;
+  FakeBus bus_;
+  ApplianceParts parts_;
+  std::unique_ptr<Appliance> appliance_;
+  std::unique_ptr<WebService> service_;
+  std::promise<void> opener_;
+  std::shared_future<void> may_open_ = opener_.get_future().share();
+  bool opens_ = false;
+};
+
+TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) {
+  const web::Actor actor{.user = "tester", .address = {}};
+  parts_.demo_patient.clear();
+  Play([&] {
+    MakeReady();
+    std::promise<web::Change> added, wiped;
+    On([&] { service_->AddPatient(actor, "P1", "", [&](const web::Change& change) { added.set_value(change); }); });
+    const std::string id = added.get_future().get().id;
+    On([&] {
+      service_->OpenPatient(actor, id, web::ScanPurpose::kReference, "", [](const web::Change&) {});
+      EXPECT_EQ(appliance_->WebStatus().patient_id, id);
+      EXPECT_EQ(appliance_->OpenCheck(actor), "");
+      service_->WipePatient(actor, id, [&](const web::Change& change) { wiped.set_value(change); });
+      EXPECT_EQ(appliance_->WebStatus().next_purpose, web::ScanPurpose::kDailyCheck) << "the check stays open";
+    });
+    EXPECT_EQ(wiped.get_future().get().result, web::ChangeResult::kDone);
+    On([&] {
+      for (int i = 0; i < 2; ++i) EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
+    });
+    EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
+    On([&] {
+      EXPECT_NE(appliance_->WebStatus().next_purpose, web::ScanPurpose::kDailyCheck);
+      EXPECT_EQ(appliance_->WebStatus().patient_id, "");
+    });
+  });
+}
+
+}  // namespace
+}  // namespace plumb
