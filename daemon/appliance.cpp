@@ -22,8 +22,6 @@ using Json = nlohmann::json;
 using std::chrono::seconds;
 
 constexpr seconds kTick{1};
-constexpr double kWorkerSilence_s = 30.0;  // the longest single step, a comparison of two large scenes, takes a few seconds
-constexpr double kSensorSilence_s = 30.0;  // opening a sensor on a slow bus takes some seconds
 const web::Actor kSelf{.user = "plumbd", .address = ""};
 const web::Actor kAuto{.user = "auto", .address = ""};
 
@@ -496,10 +494,10 @@ void Appliance::OnTick() {
 
 bool Appliance::WorkersAreAlive() const {
   const double now_s = SteadySeconds();
-  if (now_s - sensors_->heartbeat_s() > kSensorSilence_s) return false;
+  if (now_s - sensors_->heartbeat_s() > parts_.sensor_silence_s) return false;
   // While sweeping the scan's thread waits for frames; that frames come is the sensor thread's matter.
   const bool is_working = state_.phase == ScanPhase::kWorking && session_ != nullptr;
-  return !is_working || now_s - session_->heartbeat_s() < kWorkerSilence_s;
+  return !is_working || now_s - session_->heartbeat_s() < parts_.worker_silence_s;
 }
 
 }  // namespace plumb

@@ -34,6 +34,10 @@ struct ApplianceParts {
   /// The patient whom scans belong to while nobody opened another; its first scan becomes its reference, approved by "auto".
   /// Empty: a patient must be opened first.
   std::string demo_patient;
+  /// Of a thread that works: after so long without progress it counts as dead. Opening a sensor on a slow bus takes some seconds, the
+  /// longest single step, a comparison of two large scenes, a few.
+  double sensor_silence_s = 30.0;
+  double worker_silence_s = 30.0;
 };
 
 /// Everything belongs to the loop's thread but what its own threads do; see ARCHITECTURE in the README. Functions return at once.

@@ -99,6 +99,37 @@ class ApplianceTest : public ::testing::Test {
   bool opens_ = false;
 };
 
+TEST_F(ApplianceTest, AWorkerIsNotAliveWhileADriverDoesNotComeBackFromOpening) {
+  parts_.sensor_silence_s = 0.7;
+  Play([&] {
+    bus_.Plug("A");
+    EXPECT_TRUE(Becomes([&] { return !appliance_->WorkersAreAlive(); }));
+    On([&] { EXPECT_FALSE(appliance_->Health().ok); });
+    LetOpen();
+    EXPECT_TRUE(Becomes([&] {
+      bus_.GiveFrame();
+      return appliance_->WorkersAreAlive();
+    }));
+  });
+}
+
+TEST_F(ApplianceTest, AWorkerIsNotAliveWhileAResultIsComputedWithoutProgress) {
+  parts_.worker_silence_s = -1;  // any time without progress is too long
+  Play([&] {
+    MakeReady();
+    On([&] {
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
+      EXPECT_EQ(appliance_->state().phase, ScanPhase::kScanning);
+      EXPECT_TRUE(appliance_->WorkersAreAlive()) << "it waits for frames";
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
+      EXPECT_EQ(appliance_->state().phase, ScanPhase::kWorking);
+      EXPECT_FALSE(appliance_->WorkersAreAlive());
+    });
+    EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
+    On([&] { EXPECT_TRUE(appliance_->WorkersAreAlive()); });
+  });
+}
+
 TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) {
   const web::Actor actor{.user = "tester", .address = {}};
   parts_.demo_patient.clear();
