@@ -109,14 +109,19 @@ TEST_F(DaemonScanTest, ASweepEndsAtItsLimit) {
 }
 
 TEST_F(DaemonScanTest, AResultIsPutAwayAfterItsTimeAndThePressStartsTheNextScanBefore) {
-  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nscan_limit_s = 1\nresult_s = 1\n";
+  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nscan_limit_s = 1\nresult_s = 600\n";
   Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   plumbd.Press();
-  plumbd.WaitForState("result");
+  const json first = plumbd.WaitForState("result");
+  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nscan_limit_s = 1\nresult_s = 1\n";
+  plumbd.Signal(SIGHUP);
+  plumbd.WaitForLog("read again");
+  EXPECT_EQ(plumbd.Press()["ok"], true) << "its 600 s are not over";
   const json later = plumbd.WaitForState("ready");
   EXPECT_TRUE(later["last_result"].is_object()) << "the last result is still told";
+  EXPECT_NE(later["last_result"]["scan"], first["last_result"]["scan"]) << "there was a second scan";
 }
 
 TEST_F(DaemonScanTest, WatchersSeeStatesAndProgressAndTheSocketIsTheOwnersOnly) {
