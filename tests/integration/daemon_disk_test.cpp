@@ -1,4 +1,5 @@
 // Disks that become or are read-only under a real plumbd. Mounts of its own need root; without, these tests are skipped.
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
@@ -8,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <sys/mount.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "daemon/store/store.hpp"
@@ -198,6 +200,55 @@ TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyDuringAScanFailsItWithTheReasonAn
   ASSERT_EQ(scans.size(), 2U);
   EXPECT_EQ(scans[0].outcome, web::ScanOutcome::kFailed);
   EXPECT_TRUE(store.ApprovedReference(scans[0].patient_id).has_value());
+}
+
+/// A kill keeps what the kernel has not written yet; a power cut does not. So the order is checked in which things reach the disk.
+TEST(DaemonPowerCutTest, AScanIsCalledDoneOnlyAfterAllOfItIsOnTheDisk) {
+  testing::RenderOnce();
+  const testing::TempFolder folder;
+  std::ofstream(folder / "plumb.toml") << "[appliance]\nkeep_recordings = true\n";
+  Plumbd plumbd(folder.path(), {.arguments = {"--config", folder / "plumb.toml"},
+                                .environment = {{"LD_PRELOAD", PLUMB_SYNC_LOG}, {"PLUMB_SYNC_LOG", folder / "synced"}},
+                                .scenes = 2});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  plumbd.ScanOnce();
+  ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
+  plumbd.ScanOnce();
+  EXPECT_EQ(plumbd.Stop(), 0);
+
+  std::vector<std::string> log;
+  std::ifstream lines(folder / "synced");
+  for (std::string line; std::getline(lines, line);) log.push_back(line);
+  const auto find = [&](const std::string& line, std::ptrdiff_t from) {
+    return std::find(log.begin() + from, log.end(), line) - log.begin();
+  };
+  const auto line_of = [](const fs::path& path) {
+    struct stat status {};
+    EXPECT_EQ(::stat(path.c_str(), &status), 0) << path;
+    return fmt::format("fsync {} {}", status.st_ino, status.st_size);
+  };
+  const auto end = static_cast<std::ptrdiff_t>(log.size());
+  const fs::path scans = plumbd.state() / "scans";
+  std::ptrdiff_t from = 0;
+  for (const std::string id : {"000001", "000002"}) {
+    const std::ptrdiff_t renamed = find(fmt::format("rename {} {}", (scans / (".staging-" + id)).string(), (scans / id).string()), 0);
+    ASSERT_LT(renamed, end) << id;
+    int num_files = 0;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(scans / id)) {
+      if (entry.path().string().find("/recording") != std::string::npos) continue;
+      EXPECT_LT(find(line_of(entry.path()), 0), renamed) << entry.path() << " was not on the disk as it is, or later";
+      num_files += entry.is_regular_file() ? 1 : 0;
+    }
+    EXPECT_GT(num_files, 3);
+    EXPECT_LT(find(line_of(scans / id), 0), renamed) << "the names in it";
+    EXPECT_LT(find("syncfs", from), renamed) << "the recording";
+    const auto is_of_scans = [&](const std::string& line) { return line.starts_with(line_of(scans).substr(0, line_of(scans).rfind(' '))); };
+    const auto folder_synced = std::find_if(log.begin() + renamed, log.end(), is_of_scans) - log.begin();
+    const std::ptrdiff_t row = find("fdatasync " + (plumbd.state() / "plumb.db-wal").string(), folder_synced);
+    EXPECT_LT(row, end) << "done, in the database, after that";
+    from = renamed;
+  }
 }
 
 }  // namespace
