@@ -127,11 +127,14 @@ Appliance::Answer Appliance::Press(ButtonPress press) {
   return Handle(press == ButtonPress::kShort ? ScanEvent::kShortPress : ScanEvent::kLongPress);
 }
 
+Appliance::Answer Appliance::StartSweep() { return Handle(ScanEvent::kStart); }
+Appliance::Answer Appliance::EndSweep() { return Handle(ScanEvent::kEndSweep); }
 Appliance::Answer Appliance::Cancel() { return Handle(ScanEvent::kCancel); }
 
 /// What only the appliance knows; the state has said yes already.
 Appliance::Answer Appliance::WhyNotScan() const {
   if (stopped_) return "the appliance is being switched off";
+  if (std::string hindrance = hindrance_ ? hindrance_() : std::string(); !hindrance.empty()) return hindrance;
   if (store_ == nullptr || !storage_fault_.empty()) return "nothing can be stored";
   if (open_patient_.empty() && !check_) return "no patient is open: open one on the page first";
   constexpr std::uintmax_t kLeast = 48U << 20;
@@ -280,7 +283,7 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
     store_->FinishScan(*id, finished);
     const auto demo = store_->FindPatientByCode(parts_.demo_patient);
     if (!is_demo || !demo || demo->id != patient || outcome.kind != Kind::kDone) return;
-    store_->ApproveReference(kAuto, store_->AddReference(kAuto, *id, "first scan of the demo", plan), /*two_users=*/false);
+    store_->ApproveReference(kAuto, store_->AddReference(kAuto, *id, "first scan of the demo", plan), /*revision=*/1, /*two_users=*/false);
   };
   AddListeners(callbacks);
   return callbacks;
@@ -367,6 +370,7 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
   // Its thread has nothing left to do, but its end may wait for a processor.
   (void)store_thread_.Post([ended = std::shared_ptr<ScanSession>(std::move(session_))]() mutable { ended.reset(); });
   scan_.has_ended = true;
+  scan_.ended = Clock::now();
   scan_.outcome = outcome;
   if (outcome.kind == Kind::kCancelled) {
     scan_.cancel_ms = Milliseconds(Clock::now() - scan_.cancelled_at);
@@ -382,6 +386,11 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
       Log(LogLevel::kNotice, "the scan was stored before it could be discarded: its result stands", {{"SCAN", scan_.id}});
     const bool is_check = scan_.purpose == web::ScanPurpose::kDailyCheck;
     if (!is_check) last_result_ = scan_;
+    if (scan_.purpose == web::ScanPurpose::kReference &&
+        outcome.kind == Kind::kDone) {  // the next one is compared with it, once it is approved
+      purpose_ = web::ScanPurpose::kFraction;
+      reference_reason_.clear();
+    }
     const std::string answer = is_check                         ? "daily check " + CheckIn(outcome.check_json).status
                                : outcome.verdict                ? Name(*outcome.verdict)
                                : outcome.kind == Kind::kNoScene ? outcome.reason

@@ -9,6 +9,7 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/clock_watch.hpp"
@@ -51,8 +52,13 @@ class Appliance {
   /// Empty when the appliance does it, else one sentence why not.
   using Answer = std::string;
   Answer Press(ButtonPress press);
+  /// As a press, for one purpose each.
+  Answer StartSweep();
+  Answer EndSweep();
   /// Discards the running scan.
   Answer Cancel();
+  /// Asked before each scan: a reason why none may begin now, or nothing.
+  void SetHindrance(std::function<std::string()> hindrance) { hindrance_ = std::move(hindrance); }
   /// The next scan's patient and purpose. Empty id: none.
   void OpenPatient(const std::string& patient_id, web::ScanPurpose purpose, const std::string& reason);
   /// If this one is open, none is any more. A daily check that is open stays so.
@@ -60,6 +66,8 @@ class Appliance {
   /// The next scan is the daily check of the room's markers; after it, scans are of the open patient again.
   Answer OpenCheck(const web::Actor& actor);
   [[nodiscard]] web::CheckStatus Checks();
+  /// Of the last result of this run, by a clock that does not step; nothing for another scan.
+  [[nodiscard]] std::optional<double> AgeOf(const std::string& scan_id) const;
   /// Takes over what may change while running; what may not is logged. For SIGHUP.
   void Reload(const Config& config);
   /// Calls `stopped` once no scan runs any more; a running one is discarded.
@@ -97,7 +105,7 @@ class Appliance {
     std::string reference_id;
     web::ScanPurpose purpose = web::ScanPurpose::kFraction;
     double reference_area_m2 = 0.0;
-    std::chrono::steady_clock::time_point started;
+    std::chrono::steady_clock::time_point started, ended;
     double first_frame_ms = 0.0;  ///< From the press to the first frame used.
     double cancel_ms = 0.0;       ///< From the cancellation to its end.
     std::chrono::steady_clock::time_point cancelled_at;
@@ -146,6 +154,7 @@ class Appliance {
   ApplianceParts parts_;
   std::unique_ptr<Store> store_;
   std::string storage_fault_;
+  std::function<std::string()> hindrance_;
   int ticks_to_disk_check_ = kDiskCheckTicks;
   int ticks_to_care_ = kCareTicks;
   ClockWatch clock_{std::chrono::system_clock::now(), std::chrono::steady_clock::now()};

@@ -55,6 +55,20 @@ web::Guidance WebGuidance(SweepAdvice advice) {
   return web::Guidance::kTrackingLost;
 }
 
+web::FaultKind WebFault(FaultKind fault) {
+  switch (fault) {
+    case FaultKind::kNone:
+      break;
+    case FaultKind::kSensor:
+      return web::FaultKind::kSensor;
+    case FaultKind::kScan:
+      return web::FaultKind::kScan;
+    case FaultKind::kStorage:
+      return web::FaultKind::kStorage;
+  }
+  return web::FaultKind::kNone;
+}
+
 web::StorageStatus StorageOf(const std::filesystem::path& folder, bool is_open) {
   struct statvfs status {};
   if (::statvfs(folder.c_str(), &status) != 0) return {.writable = false};
@@ -75,8 +89,9 @@ web::WallClock::time_point StartOfDay() {
 }  // namespace
 
 const char* Name(IndicatorPattern pattern) {
-  static constexpr const char* kNames[] = {"off",     "no_sensor",           "ready",       "scanning",  "too_fast", "too_near", "too_far",
-                                           "working", "result_in_tolerance", "result_move", "no_answer", "fault"};
+  static constexpr const char* kNames[] = {"off",         "no_sensor", "ready",   "scanning", "too_fast",
+                                           "too_near",    "too_far",   "working", "done",     "result_in_tolerance",
+                                           "result_move", "no_answer", "fault"};
   return kNames[static_cast<int>(pattern)];
 }
 
@@ -95,6 +110,7 @@ IndicatorPattern Appliance::Pattern() const {
     case ScanPhase::kResult:
       if (scan_.outcome.kind == ScanOutcome::Kind::kNoScene || scan_.outcome.verdict == Verdict::kNoAnswer)
         return IndicatorPattern::kNoAnswer;
+      if (!scan_.outcome.verdict) return IndicatorPattern::kDone;  // compared with nothing: nothing is known of tolerance
       return scan_.outcome.verdict == Verdict::kMove ? IndicatorPattern::kResultMove : IndicatorPattern::kResultInTolerance;
   }
   switch (scan_.update.guidance.advice) {
@@ -232,6 +248,7 @@ web::Status Appliance::WebStatus() {
   web::Status status;
   status.state = WebState(state_.phase);
   status.fault = FaultReason();
+  if (state_.phase == ScanPhase::kFault) status.fault_kind = WebFault(state_.fault);
   status.sensor = {.present = sensor.present,
                    .serial = sensor.sensor.serial,
                    .name = sensor.sensor.name,
@@ -260,13 +277,18 @@ web::Status Appliance::WebStatus() {
   return status;
 }
 
+std::optional<double> Appliance::AgeOf(const std::string& scan_id) const {
+  return last_result_ && last_result_->id == scan_id ? std::optional(SecondsSince(last_result_->ended)) : std::nullopt;
+}
+
 void Appliance::ReadStored(web::Status& status) {
   if (store_ == nullptr) return;
   try {
-    status.check_overdue = !store_->HasPassedCheckSince(StartOfDay());
+    status.check_overdue = !store_->HasPassedCheckSince(StartOfDay(), sensors_->snapshot().sensor.serial);
     status.last_check = store_->LastCheck();
     if (!open_patient_.empty()) status.scans_today = store_->ScansSince(open_patient_, StartOfDay());
     if (last_result_) status.last_result = store_->FindScan(last_result_->id);
+    if (status.last_result) status.last_result->age_s = AgeOf(status.last_result->id);
   } catch (const std::exception& error) {
     // Whoever asks for the status must not end the appliance. Posted: this may be a part of telling it.
     loop_.Post("store failed", [this, what = std::string(error.what())] { FailStorage(what); });
@@ -275,7 +297,9 @@ void Appliance::ReadStored(web::Status& status) {
 
 web::CheckStatus Appliance::Checks() {
   constexpr int kShown = 60;
-  return {.checks = store_->Checks(kShown), .baseline = store_->CheckBaseline(), .overdue = !store_->HasPassedCheckSince(StartOfDay())};
+  return {.checks = store_->Checks(kShown),
+          .baseline = store_->CheckBaseline(),
+          .overdue = !store_->HasPassedCheckSince(StartOfDay(), sensors_->snapshot().sensor.serial)};
 }
 
 web::Health Appliance::Health() {

@@ -279,6 +279,11 @@ struct Updater::Impl {
                    fmt::format("this bundle holds version {}, older than {} which runs", Shown(version), impl->options.version));
       return 0;
     }
+    // To look at a large bundle takes its time.
+    if (const std::string why = impl->options.hindrance ? impl->options.hindrance() : std::string(); !why.empty()) {
+      impl->Refuse(ChangeResult::kConflict, why);
+      return 0;
+    }
     impl->Call();
     return 0;
   }
@@ -343,6 +348,8 @@ struct Updater::Impl {
 
 Updater::Updater(EventLoop& loop, UpdaterOptions options) : impl_(std::make_unique<Impl>(loop, std::move(options))) {}
 Updater::~Updater() = default;
+
+bool Updater::is_installing() const { return impl_->is_installing; }
 
 web::UpdateStatus Updater::status() {
   if (!impl_->is_there && std::chrono::steady_clock::now() - impl_->looked_at >= kLookAgain) {

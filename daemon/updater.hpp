@@ -18,6 +18,7 @@ struct UpdaterOptions {
   std::uint64_t max_bytes = std::uint64_t{2} << 30;         ///< Of one bundle.
   std::string bus_address;                                  ///< Empty: the system bus.
   std::string version;                                      ///< Of what runs: an older bundle is refused.
+  std::function<std::string()> hindrance;                   ///< Asked before RAUC is told to begin: why it may not now, or nothing.
   std::function<void()> changed;                            ///< Called on the loop when status() has changed.
   /// Closes a descriptor on another thread: that of a large file whose name is gone takes its time. Empty: closed at once.
   std::function<void(int fd)> close_aside;
@@ -35,6 +36,7 @@ class Updater {
   Updater(const Updater&) = delete;
   Updater& operator=(const Updater&) = delete;
 
+  [[nodiscard]] bool is_installing() const;
   /// Also looks again for RAUC where there was none, at most every few seconds.
   [[nodiscard]] web::UpdateStatus status();
   /// Takes a file among the bundles, by moving it: kInvalid where it can be none, kConflict where there are too many.

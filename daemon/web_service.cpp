@@ -49,6 +49,7 @@ WebService::WebService(Appliance& appliance, const UpdateConfig& update)
                                                 .max_bytes = static_cast<std::uint64_t>(update.max_bundle_mb) << 20,
                                                 .bus_address = {},
                                                 .version = std::string(Version()),
+                                                .hindrance = [this] { return WhyNoUpdate(); },
                                                 .changed =
                                                     [this] {
                                                       if (listener_) listener_(web::EventKind::kUpdate);
@@ -61,7 +62,22 @@ WebService::WebService(Appliance& appliance, const UpdateConfig& update)
                                                     [this](const std::string& bundle, const std::string& failure) {
                                                       Log({.user = "installer", .address = {}},
                                                           failure.empty() ? "update.done" : "update.fail", bundle, failure);
-                                                    }}) {}
+                                                    }}) {
+  appliance_.SetHindrance([this] {
+    return updater_.is_installing() ? std::string("a system update is being installed: wait until it is done") : std::string();
+  });
+}
+
+WebService::~WebService() {
+  *alive_ = false;
+  appliance_.SetHindrance({});
+}
+
+std::string WebService::WhyNoUpdate() const {
+  const ScanPhase phase = appliance_.state().phase;
+  if (phase != ScanPhase::kScanning && phase != ScanPhase::kWorking) return {};
+  return fmt::format("in state {}, trying to update, requires that no scan runs: wait for its result", Name(phase));
+}
 
 void WebService::SetListener(std::function<void(web::EventKind)> listener) {
   listener_ = listener;
@@ -139,6 +155,18 @@ void WebService::Press(const web::Actor& actor, web::Done done) {
   done(AnswerOf(refusal));
 }
 
+void WebService::StartSweep(const web::Actor& actor, web::Done done) {
+  const std::string refusal = appliance_.StartSweep();
+  if (refusal.empty()) Log(actor, "scan.start", "", "");
+  done(AnswerOf(refusal));
+}
+
+void WebService::EndSweep(const web::Actor& actor, web::Done done) {
+  const std::string refusal = appliance_.EndSweep();
+  if (refusal.empty()) Log(actor, "scan.end", "", "");
+  done(AnswerOf(refusal));
+}
+
 void WebService::Cancel(const web::Actor& actor, web::Done done) {
   const std::string refusal = appliance_.Cancel();
   if (refusal.empty()) Log(actor, "cancel", "", "");
@@ -194,14 +222,15 @@ std::optional<web::Reference> WebService::FindReference(const std::string& id) {
 void WebService::AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason, web::Done done) {
   Change(std::move(done), [=, plan = appliance_.DefaultPlan()](Store& store) { return store.AddReference(actor, scan_id, reason, plan); });
 }
-void WebService::PlanReference(const web::Actor& actor, const std::string& id, const web::ReferencePlan& plan, web::Done done) {
+void WebService::PlanReference(const web::Actor& actor, const std::string& id, int revision, const web::ReferencePlan& plan,
+                               web::Done done) {
   Change(std::move(done), [=](Store& store) {
-    const std::string planned = store.PlanReference(actor, id, plan);
+    const std::string planned = store.PlanReference(actor, id, revision, plan);
     return planned == id ? std::string() : planned;  // only a new version was made
   });
 }
-void WebService::ApproveReference(const web::Actor& actor, const std::string& id, web::Done done) {
-  Change(std::move(done), [=](Store& store) { return store.ApproveReference(actor, id), std::string(); });
+void WebService::ApproveReference(const web::Actor& actor, const std::string& id, int revision, web::Done done) {
+  Change(std::move(done), [=](Store& store) { return store.ApproveReference(actor, id, revision), std::string(); });
 }
 
 std::vector<web::Scan> WebService::Scans(const std::string& patient_id, int limit) {
@@ -236,8 +265,8 @@ std::optional<web::User> WebService::FindUser(const std::string& name) {
 void WebService::AddUser(const web::Actor& actor, const web::User& user, web::Done done) {
   Change(std::move(done), [=](Store& store) { return store.AddUser(actor, user), std::string(); });
 }
-void WebService::ChangeUser(const web::Actor& actor, const web::User& user, web::Done done) {
-  Change(std::move(done), [=](Store& store) { return store.ChangeUser(actor, user), std::string(); });
+void WebService::ChangeUser(const web::Actor& actor, const web::UserChange& change, web::Done done) {
+  Change(std::move(done), [=](Store& store) { return store.ChangeUser(actor, change), std::string(); });
 }
 
 void WebService::Log(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) {
@@ -277,10 +306,7 @@ void WebService::RemoveBundle(const web::Actor& actor, const std::string& name, 
 }
 
 void WebService::InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) {
-  const ScanPhase phase = appliance_.state().phase;
-  if (phase == ScanPhase::kScanning || phase == ScanPhase::kWorking) {
-    return done(AnswerOf(fmt::format("in state {}, trying to update, requires that no scan runs: wait for its result", Name(phase))));
-  }
+  if (const std::string why = WhyNoUpdate(); !why.empty()) return done(AnswerOf(why));
   updater_.Install(bundle, [this, actor, bundle, done = std::move(done)](const web::Change& change) {
     Log(actor, change.result == ChangeResult::kDone ? "update.install" : "update.refuse", bundle, change.message);
     done(change);

@@ -18,13 +18,15 @@ class WebService : public web::ScanService {
  public:
   /// Borrowed; lives longer.
   WebService(Appliance& appliance, const UpdateConfig& update);
-  ~WebService() override { *alive_ = false; }
+  ~WebService() override;
 
   [[nodiscard]] bool Later(web::Aside where, std::function<void()> work, std::function<void()> done) override;
   [[nodiscard]] web::Status GetStatus() override { return appliance_.WebStatus(); }
   [[nodiscard]] web::Health GetHealth() override { return appliance_.Health(); }
   [[nodiscard]] std::shared_ptr<const std::string> Preview() override;
   void Press(const web::Actor& actor, web::Done done) override;
+  void StartSweep(const web::Actor& actor, web::Done done) override;
+  void EndSweep(const web::Actor& actor, web::Done done) override;
   void Cancel(const web::Actor& actor, web::Done done) override;
   void SetListener(std::function<void(web::EventKind)> listener) override;
 
@@ -38,8 +40,8 @@ class WebService : public web::ScanService {
   [[nodiscard]] std::vector<web::Reference> References(const std::string& patient_id) override;
   [[nodiscard]] std::optional<web::Reference> FindReference(const std::string& id) override;
   void AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason, web::Done done) override;
-  void PlanReference(const web::Actor& actor, const std::string& id, const web::ReferencePlan& plan, web::Done done) override;
-  void ApproveReference(const web::Actor& actor, const std::string& id, web::Done done) override;
+  void PlanReference(const web::Actor& actor, const std::string& id, int revision, const web::ReferencePlan& plan, web::Done done) override;
+  void ApproveReference(const web::Actor& actor, const std::string& id, int revision, web::Done done) override;
 
   [[nodiscard]] std::vector<web::Scan> Scans(const std::string& patient_id, int limit) override;
   [[nodiscard]] std::optional<web::Scan> FindScan(const std::string& id) override;
@@ -52,7 +54,7 @@ class WebService : public web::ScanService {
   [[nodiscard]] std::vector<web::User> Users() override;
   [[nodiscard]] std::optional<web::User> FindUser(const std::string& name) override;
   void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;
-  void ChangeUser(const web::Actor& actor, const web::User& user, web::Done done) override;
+  void ChangeUser(const web::Actor& actor, const web::UserChange& change, web::Done done) override;
   void Log(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) override;
   [[nodiscard]] std::vector<web::AuditEntry> Audit(std::int64_t before, int limit) override;
   [[nodiscard]] web::Settings GetSettings() override;
@@ -65,6 +67,8 @@ class WebService : public web::ScanService {
   void WriteDiagnostics(const web::Actor& actor, web::Done done) override;
 
  private:
+  /// Why no update may begin now; empty: it may.
+  [[nodiscard]] std::string WhyNoUpdate() const;
   /// Runs `change` on the store's thread; what it returns is the id of what was made, what it throws becomes the answer.
   void Change(web::Done done, std::function<std::string(Store&)> change);
   /// A read that fails (a damaged database) is logged and gives what `otherwise` is.

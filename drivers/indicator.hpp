@@ -12,6 +12,7 @@ enum class IndicatorPattern {
   kTooNear,
   kTooFar,
   kWorking,
+  kDone,  ///< A scan that was compared with nothing.
   kResultInTolerance,
   kResultMove,
   kNoAnswer,

@@ -267,9 +267,9 @@ void Accounts::ChangeOwnPassword(const Request& request, const Respond& respond)
                        if (!matches) return respond(ErrorResponse(403, "the old password is wrong"));
                        limiter_.Succeeded(key);
                        HashThen(password, respond, [this, user, actor, session, respond](const std::string& hash) {
-                         User changed = user;
-                         changed.password_hash = hash;
-                         service_.ChangeUser(actor, changed, WhileAlive([this, name = user.name, session, respond](const Change& change) {
+                         const UserChange wanted{
+                             .name = user.name, .role = {}, .disabled = {}, .password_hash = hash, .expected_hash = user.password_hash};
+                         service_.ChangeUser(actor, wanted, WhileAlive([this, name = user.name, session, respond](const Change& change) {
                                                if (change.result == ChangeResult::kDone) sessions_.EndAllOf(name, session);
                                                respond(ChangeResponse(change));
                                              }));
@@ -299,25 +299,25 @@ void Accounts::AddUser(const Request& request, const Respond& respond) {
 
 void Accounts::ChangeUser(const Request& request, const Respond& respond) {
   Fields fields(request.body);
-  auto user = service_.FindUser(request.arguments.at(0));
-  if (!user) return respond(ErrorResponse(404, "no account of that name"));
-  user->role = ReadRole(fields);
-  user->disabled = fields.Flag("disabled");
-  std::string password = fields.Text("password", 0, kMaxPassword);  // empty: stays as it is
+  if (!service_.FindUser(request.arguments.at(0))) return respond(ErrorResponse(404, "no account of that name"));
+  UserChange change{.name = request.arguments.at(0), .role = {}, .disabled = {}, .password_hash = {}, .expected_hash = {}};
+  if (fields.Has("role")) change.role = ReadRole(fields);
+  if (fields.Has("disabled")) change.disabled = fields.Flag("disabled");
+  std::string password = fields.Has("password") ? fields.Text("password", 0, kMaxPassword) : std::string();  // empty: stays as it is
   fields.Finish();
-  const auto save = [this, actor = request.actor(), respond](const User& changed) {
-    service_.ChangeUser(actor, changed, WhileAlive([this, name = changed.name, respond](const Change& change) {
+  const auto save = [this, actor = request.actor(), respond](const UserChange& what) {
+    service_.ChangeUser(actor, what, WhileAlive([this, name = what.name, respond](const Change& done) {
                           // What an account may do is fixed at login: its sessions end, its own too.
-                          if (change.result == ChangeResult::kDone) sessions_.EndAllOf(name, nullptr);
-                          respond(ChangeResponse(change));
+                          if (done.result == ChangeResult::kDone) sessions_.EndAllOf(name, nullptr);
+                          respond(ChangeResponse(done));
                         }));
   };
-  if (password.empty()) return save(*user);
+  if (password.empty()) return save(change);
   if (password.size() < kMinPassword) throw DataError(fmt::format("password must have at least {} bytes", kMinPassword));
-  HashThen(std::move(password), respond, [save, user = *user](const std::string& hash) {
-    User changed = user;
-    changed.password_hash = hash;
-    save(changed);
+  HashThen(std::move(password), respond, [save, change](const std::string& hash) {
+    UserChange with_password = change;
+    with_password.password_hash = hash;
+    save(with_password);
   });
 }
 

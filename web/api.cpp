@@ -92,6 +92,7 @@ Response ScanFileResponse(ScanService& service, const std::string& scan_id, std:
   if (!scan) return ErrorResponse(404, "no such scan");
   for (const ScanFile& file : kScanFiles) {
     if (file.name != name) continue;
+    if (scan->folder.empty()) return ErrorResponse(404, "the files of this scan are gone");
     return FileResponse(scan->folder / file.path, file.type, download ? fmt::format("{}_{}", scan_id, name) : "");
   }
   return ErrorResponse(404, "this scan has no such file");
@@ -151,6 +152,12 @@ void AddApplianceRoutes(Table& table) {
       "POST", "/api/v1/press", Permission::kScan, BodyKind::kNone,
       [](ScanService& service, const Request& request, const Respond& respond) { service.Press(request.actor(), Answer(respond)); });
   table.Write(
+      "POST", "/api/v1/scan/start", Permission::kScan, BodyKind::kNone,
+      [](ScanService& service, const Request& request, const Respond& respond) { service.StartSweep(request.actor(), Answer(respond)); });
+  table.Write(
+      "POST", "/api/v1/scan/end", Permission::kScan, BodyKind::kNone,
+      [](ScanService& service, const Request& request, const Respond& respond) { service.EndSweep(request.actor(), Answer(respond)); });
+  table.Write(
       "POST", "/api/v1/cancel", Permission::kScan, BodyKind::kNone,
       [](ScanService& service, const Request& request, const Respond& respond) { service.Cancel(request.actor(), Answer(respond)); });
 }
@@ -207,11 +214,15 @@ void AddReferenceRoutes(Table& table) {
   });
   table.Write("PUT", "/api/v1/references/{id}/plan", Permission::kPlan, BodyKind::kJson,
               [](ScanService& service, const Request& request, const Respond& respond) {
-                service.PlanReference(request.actor(), request.arguments[0], ParsePlan(request.body), Answer(respond));
+                const auto [plan, revision] = ParsePlan(request.body);
+                service.PlanReference(request.actor(), request.arguments[0], revision, plan, Answer(respond));
               });
-  table.Write("POST", "/api/v1/references/{id}/approve", Permission::kApprove, BodyKind::kNone,
+  table.Write("POST", "/api/v1/references/{id}/approve", Permission::kApprove, BodyKind::kJson,
               [](ScanService& service, const Request& request, const Respond& respond) {
-                service.ApproveReference(request.actor(), request.arguments[0], Answer(respond));
+                Fields fields(request.body);
+                const int revision = fields.Integer("revision", 1, kMaxRevision);
+                fields.Finish();
+                service.ApproveReference(request.actor(), request.arguments[0], revision, Answer(respond));
               });
 }
 

@@ -19,6 +19,7 @@ constexpr double kMaxCoordinate_m = 100.0;
 constexpr std::size_t kMaxRegionCorners = 500;
 constexpr std::array<std::string_view, 6> kStates = {"no_sensor", "ready", "scanning", "working", "result", "fault"};
 constexpr std::array<std::string_view, 6> kGuidance = {"none", "slower", "closer", "farther", "tracking_lost", "no_markers"};
+constexpr std::array<std::string_view, 4> kFaultKinds = {"none", "sensor", "scan", "storage"};
 constexpr std::array<std::string_view, 3> kPurposes = {"fraction", "reference", "daily_check"};
 constexpr std::array<std::string_view, 4> kOutcomes = {"running", "done", "cancelled", "failed"};
 constexpr std::array<std::string_view, 4> kPostures = {"HFS", "HFP", "FFS", "FFP"};
@@ -123,7 +124,11 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
                {"result", nullptr}};
   if (scan.finished_at) {
     json["finished_at"] = TimeText(*scan.finished_at);
-    json["age_s"] = std::max<std::int64_t>(0, std::chrono::duration_cast<std::chrono::seconds>(now - *scan.finished_at).count());
+    // An end in the future: the clock has stepped, and nobody knows the age.
+    if (scan.age_s)
+      json["age_s"] = static_cast<std::int64_t>(*scan.age_s);
+    else if (now >= *scan.finished_at)
+      json["age_s"] = std::chrono::duration_cast<std::chrono::seconds>(now - *scan.finished_at).count();
   }
   if (scan.result) {
     json["result"] = {{"verdict", scan.result->verdict},
@@ -176,6 +181,7 @@ Json ToJson(const CheckStatus& checks, WallClock::time_point now) {
 Json ToJson(const Status& status, WallClock::time_point now) {
   return {{"state", NameIn(kStates, status.state)},
           {"fault", TextOrNull(status.fault)},
+          {"fault_kind", NameIn(kFaultKinds, status.fault_kind)},
           {"sensor",
            {{"present", status.sensor.present},
             {"serial", status.sensor.serial},
@@ -215,6 +221,7 @@ Json ToJson(const Reference& reference) {
           {"created_at", TimeText(reference.created_at)},
           {"created_by", reference.created_by},
           {"reason", reference.reason},
+          {"revision", reference.revision},
           {"approved_by", TextOrNull(reference.approved_by)},
           {"approved_at", reference.approved_at ? Json(TimeText(*reference.approved_at)) : Json(nullptr)},
           {"plan",
@@ -260,6 +267,11 @@ const nlohmann::json& Fields::Get(const char* name) {
   const auto found = json_.find(name);
   if (found == json_.end()) throw DataError(fmt::format("{} is missing", name));
   return *found;
+}
+
+bool Fields::Has(const char* name) {
+  known_.insert(name);
+  return json_.contains(name);
 }
 
 std::string Fields::Text(const char* name, std::size_t min, std::size_t max) {
@@ -332,9 +344,10 @@ std::string ParsePosture(Fields& fields) {
 
 }  // namespace
 
-ReferencePlan ParsePlan(const std::string& body) {
+std::pair<ReferencePlan, int> ParsePlan(const std::string& body) {
   Fields fields(body);
   ReferencePlan plan;
+  const int revision = fields.Integer("revision", 1, kMaxRevision);
   for (const auto& point : fields.Points("region_m", 2, kMaxRegionCorners)) plan.region_m.push_back({point[0], point[1]});
   if (!plan.region_m.empty() && plan.region_m.size() < 3) throw DataError("region_m must have no corner or at least 3");
   if (const auto point = fields.Point("isocentre_m", 3)) plan.isocentre_m = {(*point)[0], (*point)[1], (*point)[2]};
@@ -343,7 +356,7 @@ ReferencePlan ParsePlan(const std::string& body) {
   plan.posture = ParsePosture(fields);
   plan.couch_markers = fields.Flag("couch_markers");
   fields.Finish();
-  return plan;
+  return {plan, revision};
 }
 
 Settings ParseSettings(const std::string& body) {

@@ -43,6 +43,7 @@ class Fields {
   [[nodiscard]] std::vector<std::vector<double>> Points(const char* name, std::size_t width, std::size_t max);
   /// A list of `width` such numbers; nothing where null.
   [[nodiscard]] std::optional<std::vector<double>> Point(const char* name, std::size_t width);
+  [[nodiscard]] bool Has(const char* name);
   /// Throws if a field was sent that nobody asked for.
   void Finish() const;
 
@@ -53,7 +54,9 @@ class Fields {
   std::set<std::string> known_;
 };
 
-[[nodiscard]] ReferencePlan ParsePlan(const std::string& body);
+inline constexpr int kMaxRevision = 1'000'000'000;
+/// And the revision that it was made from.
+[[nodiscard]] std::pair<ReferencePlan, int> ParsePlan(const std::string& body);
 [[nodiscard]] Settings ParseSettings(const std::string& body);
 [[nodiscard]] ScanPurpose ParsePurpose(const std::string& name);
 

@@ -16,6 +16,7 @@ namespace {
 constexpr std::string_view kNotice =
     "Research use only. Not a medical device. Do not use to position patients for treatment or to replace image guidance.";
 constexpr std::chrono::minutes kOldAfter{2};
+constexpr std::chrono::seconds kRefreshEvery{10};
 
 struct NumberRow {
   const char* name;
@@ -32,16 +33,18 @@ std::array<NumberRow, 6> Rows(const SixNumbers& value, const SixNumbers& u95) {
           NumberRow{"yaw", "\xC2\xB0", value.yaw_deg, u95.yaw_deg}};
 }
 
-std::string Document(const std::string& body) {
+/// @param refresh  Asks for itself again, without counting as use: nobody shall act on what was true when the page was opened.
+std::string Document(const std::string& body, const std::string& refresh = "") {
   std::string style;
   for (const Asset& asset : Assets()) {
     if (asset.type.starts_with("text/css")) style += fmt::format("<link rel=\"stylesheet\" href=\"{}\">", asset.path);
   }
   return fmt::format(
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">"
-      "<title>Plumb result</title>{}</head><body class=\"plain\"><aside class=\"notice\" "
+      "<title>Plumb result</title>{}{}</head><body class=\"plain\"><aside class=\"notice\" "
       "aria-label=\"Notice\"><p>{}</p></aside><main>{}</main></body></html>",
-      style, kNotice, body);
+      refresh.empty() ? "" : fmt::format("<meta http-equiv=\"refresh\" content=\"{};url={}\">", kRefreshEvery.count(), refresh), style,
+      kNotice, body);
 }
 
 std::string LoginForm(bool failed) {
@@ -94,14 +97,25 @@ std::string Pictures(const Scan& scan) {
       scan.id);
 }
 
-std::string ResultBody(ScanService& service, const Scan& scan) {
+/// @param newer  A later scan that gave no result; null: none.
+std::string ResultBody(ScanService& service, const Scan& scan, const Scan* newer) {
   const auto patient = service.FindPatient(scan.patient_id);
   const auto reference = service.FindReference(scan.reference_id);
   const auto age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
-  const bool old = age > kOldAfter;
-  std::string body = fmt::format("<h1>Patient {}</h1><p>Scan of {}, {} min ago.{}</p>", patient ? EscapeHtml(patient->code) : "none",
-                                 TimeText(scan.started_at), std::chrono::floor<std::chrono::minutes>(age).count(),
-                                 old ? " <strong>OLD: do not act on it.</strong>" : "");
+  const bool is_known = age >= age.zero();  // else the clock has stepped
+  const bool old = !is_known || age > kOldAfter || newer != nullptr;
+  const std::string when = is_known ? fmt::format("{} min ago", std::chrono::floor<std::chrono::minutes>(age).count())
+                                    : "nobody knows how long ago: the clock has stepped";
+  std::string body;
+  if (newer != nullptr) {
+    body += fmt::format("<p role=\"alert\"><strong>NO ANSWER</strong> from the last scan, of {}: {} What follows is from before it.</p>",
+                        TimeText(newer->started_at), EscapeHtml(newer->failure));
+  }
+  body += fmt::format("<h1>Patient {}</h1><p>Scan of {}, {}.{}</p>", patient ? EscapeHtml(patient->code) : "none",
+                      TimeText(scan.started_at), when, old ? " <strong>OLD: do not act on it.</strong>" : "");
+  if (scan.outcome != ScanOutcome::kDone)
+    return body +
+           fmt::format("<section class=\"old\"><p class=\"verdict no_answer\">NO ANSWER</p><p>{}</p></section>", EscapeHtml(scan.failure));
   if (reference) body += fmt::format("<p>Reference version {} of {}.</p>", reference->version, TimeText(reference->created_at));
   if (!scan.result) return body + "<p>This scan was compared with nothing.</p>";
   const bool in_tolerance = scan.result->verdict == "in_tolerance", move = scan.result->verdict == "move";
@@ -113,21 +127,25 @@ std::string ResultBody(ScanService& service, const Scan& scan) {
   return body + NumbersTable(*scan.result) + BodyList(*scan.result) + Pictures(scan) + "</section>";
 }
 
-/// Of the newest finished scan, where none is named.
+/// Of the newest scan that was done, where none is named; one after it that failed is told.
 Response ResultPage(ScanService& service, const std::optional<std::string>& wanted) {
-  std::optional<Scan> scan;
+  std::optional<Scan> scan, failed;
   if (wanted) {
     scan = service.FindScan(*wanted);
   } else {
     for (Scan& candidate : service.Scans("", 20)) {
+      if (candidate.outcome == ScanOutcome::kFailed && !failed) failed = candidate;
       if (candidate.outcome != ScanOutcome::kDone) continue;
       scan = std::move(candidate);
       break;
     }
+    if (!scan) std::swap(scan, failed);
   }
   Response response;
   response.type = "text/html; charset=utf-8";
-  response.body = Document(scan ? ResultBody(service, *scan) : "<h1>No result yet</h1>");
+  // What is asked for by name stays what it is, but for its age.
+  response.body = Document(scan ? ResultBody(service, *scan, failed ? &*failed : nullptr) : "<h1>No result yet</h1>",
+                           wanted ? fmt::format("/result?again&amp;scan={}", EscapeHtml(*wanted)) : "/result?again");
   return response;
 }
 

@@ -68,6 +68,9 @@ class ScanService {
   [[nodiscard]] virtual std::shared_ptr<const std::string> Preview() = 0;
   /// As a short press of the button: starts a scan, ends the sweep, leaves a result. kConflict where it is ignored.
   virtual void Press(const Actor& actor, Done done) = 0;
+  /// The same for one purpose each, so that asked twice it does not do the other: kConflict in other states.
+  virtual void StartSweep(const Actor& actor, Done done) = 0;
+  virtual void EndSweep(const Actor& actor, Done done) = 0;
   /// As a long press: the scan is thrown away.
   virtual void Cancel(const Actor& actor, Done done) = 0;
   /// Called on the loop thread. One listener; an empty function ends it.
@@ -88,14 +91,17 @@ class ScanService {
   /// A draft made of a scan with a scene. Gives the id.
   virtual void AddReference(const Actor& actor, const std::string& scan_id, const std::string& reason, Done done) = 0;
   /// Of a draft: changed in place. Of an approved one: a new draft with the next version; gives its id.
-  virtual void PlanReference(const Actor& actor, const std::string& id, const ReferencePlan& plan, Done done) = 0;
+  /// @param revision  That was read: kConflict if another has been saved since.
+  virtual void PlanReference(const Actor& actor, const std::string& id, int revision, const ReferencePlan& plan, Done done) = 0;
   /// kRefused for the user who made or last planned it. From then on it is immutable and the one that fractions are compared with.
-  virtual void ApproveReference(const Actor& actor, const std::string& id, Done done) = 0;
+  /// @param revision  That was read, as above.
+  virtual void ApproveReference(const Actor& actor, const std::string& id, int revision, Done done) = 0;
 
   // --- scans
   /// Newest first; all patients: "" (aside).
   [[nodiscard]] virtual std::vector<Scan> Scans(const std::string& patient_id, int limit) = 0;
   [[nodiscard]] virtual std::optional<Scan> FindScan(const std::string& id) = 0;
+  /// kConflict for one without an answer.
   virtual void AcceptScan(const Actor& actor, const std::string& id, Done done) = 0;
 
   // --- daily check
@@ -109,8 +115,8 @@ class ScanService {
   [[nodiscard]] virtual std::vector<User> Users() = 0;  ///< By name.
   [[nodiscard]] virtual std::optional<User> FindUser(const std::string& name) = 0;
   virtual void AddUser(const Actor& actor, const User& user, Done done) = 0;  ///< kConflict if the name is taken.
-  /// Replaces role, password_hash and disabled. kConflict if no enabled engineer would be left.
-  virtual void ChangeUser(const Actor& actor, const User& user, Done done) = 0;
+  /// kConflict if no enabled engineer would be left, or the account is not as expected.
+  virtual void ChangeUser(const Actor& actor, const UserChange& change, Done done) = 0;
   /// Logins and what else is no change of the store. May be written later, in order.
   virtual void Log(const Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) = 0;
   /// Newest first, older than number `before` (0: all) (aside).

@@ -14,6 +14,7 @@ namespace plumb::web {
 using WallClock = std::chrono::system_clock;
 
 enum class ApplianceState { kNoSensor, kReady, kScanning, kWorking, kResult, kFault };
+enum class FaultKind { kNone, kSensor, kScan, kStorage };
 enum class Guidance { kNone, kSlower, kCloser, kFarther, kTrackingLost, kNoMarkers };
 enum class ScanPurpose { kFraction, kReference, kDailyCheck };
 enum class ScanOutcome { kRunning, kDone, kCancelled, kFailed };
@@ -90,8 +91,9 @@ struct Scan {
   WallClock::time_point started_at;
   std::optional<WallClock::time_point> finished_at;
   std::optional<ResultSummary> result;
-  std::string accepted_by;       ///< Empty: not accepted.
-  std::filesystem::path folder;  ///< DIR/scans/<id>; holds scene/, result/ and recording/, each where it exists.
+  std::string accepted_by;           ///< Empty: not accepted.
+  std::optional<double> age_s = {};  ///< Since its end, by a clock that does not step; nothing: only the wall clock can tell.
+  std::filesystem::path folder;      ///< DIR/scans/<id>; holds scene/, result/ and recording/, each where it exists.
 };
 
 struct Patient {
@@ -121,6 +123,7 @@ struct Reference {
   WallClock::time_point created_at;
   std::string created_by;
   std::string reason;
+  int revision = 1;         ///< Counts the plans that were saved into this version: who saves or approves says which one was read.
   std::string approved_by;  ///< Empty: a draft. "auto": the demo's.
   std::optional<WallClock::time_point> approved_at;
   ReferencePlan plan;
@@ -165,6 +168,7 @@ struct CheckStatus {
 struct Status {
   ApplianceState state = ApplianceState::kNoSensor;
   std::string fault;  ///< In words, in state kFault.
+  FaultKind fault_kind = FaultKind::kNone;
   SensorStatus sensor;
   StorageStatus storage;
   std::string light;       ///< Name of the pattern shown: "ready", "too_fast".
@@ -184,6 +188,16 @@ struct User {
   std::string password_hash;  ///< libsodium's argon2id string; never leaves the service but to the login.
   bool disabled = false;
   WallClock::time_point created_at;
+};
+
+/// What of an account is to be changed; the rest stays.
+struct UserChange {
+  std::string name;
+  std::optional<Role> role;
+  std::optional<bool> disabled;
+  std::optional<std::string> password_hash;
+  /// Set: only if the account is enabled and still has this hash. For people who change their own.
+  std::optional<std::string> expected_hash;
 };
 
 struct AuditEntry {

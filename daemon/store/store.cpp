@@ -80,6 +80,7 @@ web::Reference ReadReference(const Statement& row) {
                            .created_at = FromStored(row.Integer(4)),
                            .created_by = row.Text(5),
                            .reason = row.Text(6),
+                           .revision = static_cast<int>(row.Integer(10)),
                            .approved_by = row.Text(7),
                            .approved_at = {},
                            .plan = ParsePlan(row.Text(9))};
@@ -159,7 +160,7 @@ void Store::WipePatient(const web::Actor& actor, const std::string& id) {
 namespace {
 
 constexpr const char* kReferenceColumns =
-    "SELECT id, patient_id, version, scan_id, created_at, created_by, reason, approved_by, approved_at, plan FROM refs ";
+    "SELECT id, patient_id, version, scan_id, created_at, created_by, reason, approved_by, approved_at, plan, revision FROM refs ";
 
 }  // namespace
 
@@ -227,15 +228,25 @@ std::string Store::AddReference(const web::Actor& actor, const std::string& scan
   return id;
 }
 
-std::string Store::PlanReference(const web::Actor& actor, const std::string& id, const web::ReferencePlan& plan) {
+namespace {
+
+void RequireRevision(std::int64_t stored, int read) {
+  if (stored != read)
+    throw StoreRefusal(ChangeResult::kConflict, "this plan has been changed by somebody else meanwhile: look at it again");
+}
+
+}  // namespace
+
+std::string Store::PlanReference(const web::Actor& actor, const std::string& id, int revision, const web::ReferencePlan& plan) {
   const std::int64_t number = RequireId(id, "reference");
   const std::lock_guard lock(write_mutex_);
   Transaction transaction(*write_);
   bool is_approved = false;
   {
-    Statement query = write_->Prepare("SELECT approved_by FROM refs WHERE id = ?");
+    Statement query = write_->Prepare("SELECT approved_by, revision FROM refs WHERE id = ?");
     if (!query.Bind(number).Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
     is_approved = !query.Text(0).empty();
+    RequireRevision(query.Integer(1), revision);
   }
   std::string changed = id;
   if (is_approved) {
@@ -252,21 +263,26 @@ std::string Store::PlanReference(const web::Actor& actor, const std::string& id,
         .Run();
     changed = std::to_string(write_->last_id());
   } else {
-    write_->Prepare("UPDATE refs SET plan = ?, planned_by = ? WHERE id = ?").Bind(PlanJson(plan)).Bind(actor.user).Bind(number).Run();
+    write_->Prepare("UPDATE refs SET plan = ?, planned_by = ?, revision = revision + 1 WHERE id = ?")
+        .Bind(PlanJson(plan))
+        .Bind(actor.user)
+        .Bind(number)
+        .Run();
   }
   Write(actor, "reference.plan", changed, "");
   transaction.Commit();
   return changed;
 }
 
-void Store::ApproveReference(const web::Actor& actor, const std::string& id, bool two_users) {
+void Store::ApproveReference(const web::Actor& actor, const std::string& id, int revision, bool two_users) {
   const std::int64_t number = RequireId(id, "reference");
   const std::lock_guard lock(write_mutex_);
   Transaction transaction(*write_);
   {
-    Statement query = write_->Prepare("SELECT approved_by, created_by, planned_by FROM refs WHERE id = ?");
+    Statement query = write_->Prepare("SELECT approved_by, created_by, planned_by, revision FROM refs WHERE id = ?");
     if (!query.Bind(number).Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
     if (!query.Text(0).empty()) throw StoreRefusal(ChangeResult::kConflict, "this reference is approved already");
+    RequireRevision(query.Integer(3), revision);
     if (two_users && (query.Text(1) == actor.user || query.Text(2) == actor.user)) {
       throw StoreRefusal(ChangeResult::kRefused, "who made or planned a reference does not approve it: ask a second person");
     }

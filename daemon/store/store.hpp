@@ -86,9 +86,10 @@ class Store {
   [[nodiscard]] std::optional<web::Reference> FindReference(const std::string& id);
   [[nodiscard]] std::optional<web::Reference> ApprovedReference(const std::string& patient_id);
   std::string AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason, const web::ReferencePlan& plan);
-  std::string PlanReference(const web::Actor& actor, const std::string& id, const web::ReferencePlan& plan);
+  /// @param revision  That was read; another one has been saved since: kConflict.
+  std::string PlanReference(const web::Actor& actor, const std::string& id, int revision, const web::ReferencePlan& plan);
   /// @param two_users  The approver must be another than who made or planned it; false only for the demo's "auto".
-  void ApproveReference(const web::Actor& actor, const std::string& id, bool two_users = true);
+  void ApproveReference(const web::Actor& actor, const std::string& id, int revision, bool two_users = true);
 
   // --- scans
   [[nodiscard]] std::vector<web::Scan> Scans(const std::string& patient_id, int limit);
@@ -114,7 +115,8 @@ class Store {
   std::string AddCheck(const web::Actor& actor, const std::string& sensor_serial, const std::string& check_json);
   [[nodiscard]] std::vector<web::CheckRecord> Checks(int limit);  ///< Newest first.
   [[nodiscard]] std::optional<web::CheckRecord> LastCheck();
-  [[nodiscard]] bool HasPassedCheckSince(web::WallClock::time_point since);
+  /// Not in the future. @param sensor_serial  Of the unit that is to be checked; empty: any.
+  [[nodiscard]] bool HasPassedCheckSince(web::WallClock::time_point since, const std::string& sensor_serial = {});
   [[nodiscard]] std::optional<web::CheckBaseline> CheckBaseline();
   [[nodiscard]] std::string CheckBaselineJson();  ///< Of the check that is the baseline; empty: none.
   void SetCheckBaseline(const web::Actor& actor, const std::string& check_id);
@@ -123,7 +125,7 @@ class Store {
   [[nodiscard]] std::vector<web::User> Users();
   [[nodiscard]] std::optional<web::User> FindUser(const std::string& name);
   void AddUser(const web::Actor& actor, const web::User& user);
-  void ChangeUser(const web::Actor& actor, const web::User& user);
+  void ChangeUser(const web::Actor& actor, const web::UserChange& change);
   void Log(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail);
   [[nodiscard]] std::vector<web::AuditEntry> Audit(std::int64_t before, int limit);
   [[nodiscard]] web::Settings GetSettings();

@@ -55,29 +55,33 @@ void Store::AddUser(const web::Actor& actor, const web::User& user) {
   transaction.Commit();
 }
 
-void Store::ChangeUser(const web::Actor& actor, const web::User& user) {
+void Store::ChangeUser(const web::Actor& actor, const web::UserChange& change) {
   const std::lock_guard lock(write_mutex_);
   Transaction transaction(*write_);
-  std::string changes;
+  web::User user;
   {
-    Statement query = write_->Prepare("SELECT role, password_hash, disabled FROM users WHERE name = ?");
-    if (!query.Bind(user.name).Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such account");
-    if (query.Text(0) != store::Name(user.role)) changes += fmt::format("role {} ", store::Name(user.role));
-    if (query.Text(1) != user.password_hash) changes += "password ";
-    if ((query.Integer(2) != 0) != user.disabled) changes += user.disabled ? "disabled " : "enabled ";
+    Statement query = write_->Prepare("SELECT name, role, password_hash, disabled, created_at FROM users WHERE name = ?");
+    if (!query.Bind(change.name).Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such account");
+    user = ReadUser(query);
   }
+  if (change.expected_hash && (user.disabled || user.password_hash != *change.expected_hash))
+    throw StoreRefusal(ChangeResult::kConflict, "the account has been changed by somebody else meanwhile: log in again");
+  std::string changes;
+  if (change.role && *change.role != user.role) changes += fmt::format("role {} ", store::Name(*change.role));
+  if (change.password_hash && *change.password_hash != user.password_hash) changes += "password ";
+  if (change.disabled && *change.disabled != user.disabled) changes += *change.disabled ? "disabled " : "enabled ";
   write_->Prepare("UPDATE users SET role = ?, password_hash = ?, disabled = ? WHERE name = ?")
-      .Bind(store::Name(user.role))
-      .Bind(user.password_hash)
-      .Bind(std::int64_t{user.disabled})
-      .Bind(user.name)
+      .Bind(store::Name(change.role.value_or(user.role)))
+      .Bind(change.password_hash.value_or(user.password_hash))
+      .Bind(std::int64_t{change.disabled.value_or(user.disabled)})
+      .Bind(change.name)
       .Run();
   {
     Statement query = write_->Prepare("SELECT 1 FROM users WHERE role = 'engineer' AND disabled = 0 LIMIT 1");
     if (!query.Step()) throw StoreRefusal(ChangeResult::kConflict, "no enabled engineer would be left: make another one first");
   }
   if (!changes.empty()) changes.pop_back();
-  Write(actor, "user.change", user.name, changes);
+  Write(actor, "user.change", change.name, changes);
   transaction.Commit();
 }
 

@@ -57,10 +57,11 @@ std::optional<web::CheckRecord> Store::LastCheck() {
   return query.Bind(std::int64_t{1}).Step() ? std::optional(ReadCheck(query)) : std::nullopt;
 }
 
-bool Store::HasPassedCheckSince(web::WallClock::time_point since) {
+bool Store::HasPassedCheckSince(web::WallClock::time_point since, const std::string& sensor_serial) {
   const std::lock_guard lock(read_mutex_);
-  Statement query = read_->Prepare("SELECT 1 FROM checks WHERE status = 'passed' AND time >= ? LIMIT 1");
-  return query.Bind(ToStored(since)).Step();
+  Statement query =
+      read_->Prepare("SELECT 1 FROM checks WHERE status = 'passed' AND time >= ? AND time <= ? AND (? = '' OR sensor_serial = ?) LIMIT 1");
+  return query.Bind(ToStored(since)).Bind(ToStored(web::WallClock::now())).Bind(sensor_serial).Bind(sensor_serial).Step();
 }
 
 std::optional<web::CheckBaseline> Store::CheckBaseline() {

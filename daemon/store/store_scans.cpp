@@ -191,11 +191,13 @@ void Store::AcceptScan(const web::Actor& actor, const std::string& id) {
   Transaction transaction(*write_);
   {
     Statement query =
-        write_->Prepare("SELECT outcome, accepted_by, (SELECT 1 FROM results WHERE scan_id = scans.id) FROM scans WHERE id = ?");
+        write_->Prepare("SELECT outcome, accepted_by, (SELECT json FROM results WHERE scan_id = scans.id) FROM scans WHERE id = ?");
     if (!number || !query.Bind(*number).Step()) throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
     if (query.Text(0) != "done" || query.IsNull(2)) {
       throw StoreRefusal(ChangeResult::kConflict, "this scan has no result: only a compared scan is accepted");
     }
+    if (SummaryOf(query.Text(2)).verdict == "no_answer")
+      throw StoreRefusal(ChangeResult::kConflict, "this scan gave no answer: there is nothing to accept");
     if (!query.Text(1).empty()) throw StoreRefusal(ChangeResult::kConflict, "this scan is accepted already");
   }
   write_->Prepare("UPDATE scans SET accepted_by = ? WHERE id = ?").Bind(actor.user).Bind(*number).Run();

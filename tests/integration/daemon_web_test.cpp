@@ -73,20 +73,24 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
       << "no reference yet";
   ASSERT_EQ(technician.Post("/api/v1/patients/" + patient + "/open", {{"purpose", "reference"}, {"reason", "planning"}}).status, 200);
   const auto scan = [&](HttpClient& client) {
-    EXPECT_EQ(client.Post("/api/v1/press").status, 200);
+    EXPECT_EQ(client.Post("/api/v1/scan/start").status, 200);
+    EXPECT_EQ(client.Post("/api/v1/scan/start").status, 409) << "a second tap ends nothing";
     plumbd.WaitFor("the end of the sweep", [](const json& s) {
       return s["state"] == "scanning" && s["scan"]["frames"].get<int>() + s["scan"]["frames_dropped"].get<int>() >= 120;
     });
     EXPECT_EQ(client.Get("/api/v1/status").json()["state"], "scanning");
     EXPECT_EQ(client.Get("/api/v1/preview").status, 200);
-    EXPECT_EQ(client.Post("/api/v1/press").status, 200);
+    EXPECT_EQ(client.Post("/api/v1/scan/end").status, 200);
+    EXPECT_EQ(client.Post("/api/v1/scan/end").status, 409);
     return plumbd.WaitForState("result")["last_result"]["scan"].get<std::string>();
   };
   const std::string first = scan(technician);
+  EXPECT_EQ(technician.Get("/api/v1/status").json()["light"], "done") << "compared with nothing: no word of tolerance";
+  EXPECT_EQ(technician.Get("/api/v1/status").json()["next_purpose"], "fraction") << "one reference, not all that follow";
   const std::string reference = physicist.Post("/api/v1/references", {{"scan_id", first}, {"reason", "planning"}}).json().value("id", "");
   ASSERT_NE(reference, "");
-  EXPECT_EQ(physicist.Post("/api/v1/references/" + reference + "/approve").status, 403) << "not by who made it";
-  ASSERT_EQ(second.Post("/api/v1/references/" + reference + "/approve").status, 200);
+  EXPECT_EQ(physicist.Post("/api/v1/references/" + reference + "/approve", {{"revision", 1}}).status, 403) << "not by who made it";
+  ASSERT_EQ(second.Post("/api/v1/references/" + reference + "/approve", {{"revision", 1}}).status, 200);
 
   ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
   ASSERT_EQ(technician.Post("/api/v1/patients/" + patient + "/open", {{"purpose", "fraction"}, {"reason", ""}}).status, 200);
@@ -102,8 +106,8 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
   for (const json& entry : audit["entries"]) {
     actions.push_back(entry["user"].get<std::string>() + " " + entry["action"].get<std::string>());
   }
-  EXPECT_THAT(actions, IsSupersetOf({"engineer user.add", "technician patient.add", "technician press", "physicist reference.add",
-                                     "second reference.approve", "technician scan.accept"}));
+  EXPECT_THAT(actions, IsSupersetOf({"engineer user.add", "technician patient.add", "technician scan.start", "technician scan.end",
+                                     "physicist reference.add", "second reference.approve", "technician scan.accept"}));
   EXPECT_EQ(plumbd.log().find("PX-17"), std::string::npos) << "no patient's code in the log";
   EXPECT_EQ(physicist.Ask("DELETE", "/api/v1/patients/" + patient, "").status, 200);
   EXPECT_FALSE(fs::exists(plumbd.state() / "scans" / fraction));

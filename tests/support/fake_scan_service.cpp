@@ -54,7 +54,38 @@ Patient* FakeScanService::PatientOf(const std::string& id) {
   return found == patients.end() ? nullptr : &*found;
 }
 
+void FakeScanService::StartSweep(const Actor& actor, Done done) {
+  if (status.state == ApplianceState::kReady || status.state == ApplianceState::kResult) return Press(actor, std::move(done));
+  Finish(done, Refusal(ChangeResult::kConflict, "a scan is running already: end or cancel it first"));
+}
+
+void FakeScanService::EndSweep(const Actor& actor, Done done) {
+  if (status.state == ApplianceState::kScanning) return Press(actor, std::move(done));
+  Finish(done, Refusal(ChangeResult::kConflict, "no scan is running"));
+}
+
+void FakeScanService::Fail(const std::string& reason) {
+  if (status.scan && !is_check_) {
+    scans.back().outcome = ScanOutcome::kFailed;
+    scans.back().failure = reason;
+  }
+  status.scan.reset();
+  status.state = ApplianceState::kFault;
+  status.fault = reason;
+  status.fault_kind = FaultKind::kScan;
+  status.light = "fault";
+  Tell(EventKind::kResult);
+}
+
 void FakeScanService::Press(const Actor& actor, Done done) {
+  if (status.fault_kind == FaultKind::kScan) {
+    status.fault.clear();
+    status.fault_kind = FaultKind::kNone;
+    status.state = ApplianceState::kReady;
+    status.light = "ready";
+    Tell(EventKind::kStatus);
+    return Did(actor, "press", "", done);
+  }
   if (status.state == ApplianceState::kScanning) {
     phase_begun_.reset();
     status.state = ApplianceState::kWorking;
@@ -196,7 +227,7 @@ void FakeScanService::EndScan() {
   }
   status.scan.reset();
   status.state = ApplianceState::kResult;
-  status.light = !scan.result                             ? "ready"
+  status.light = !scan.result                             ? "done"
                  : scan.result->verdict == "move"         ? "result_move"
                  : scan.result->verdict == "in_tolerance" ? "result_in_tolerance"
                                                           : "no_answer";
@@ -299,11 +330,13 @@ void FakeScanService::AddReference(const Actor& actor, const std::string& scan_i
   Did(actor, "reference.add", id, done, id);
 }
 
-void FakeScanService::PlanReference(const Actor& actor, const std::string& id, const ReferencePlan& plan, Done done) {
+void FakeScanService::PlanReference(const Actor& actor, const std::string& id, int revision, const ReferencePlan& plan, Done done) {
   const auto found = std::find_if(references.begin(), references.end(), [&](const Reference& reference) { return reference.id == id; });
   if (found == references.end()) return Finish(done, Refusal(ChangeResult::kNotFound, "no such reference"));
+  if (found->revision != revision) return Finish(done, Refusal(ChangeResult::kConflict, "this plan has been changed by somebody else"));
   if (found->approved_by.empty()) {
     found->plan = plan;
+    ++found->revision;
     found->created_by = actor.user;
     return Did(actor, "reference.plan", id, done);
   }
@@ -311,6 +344,7 @@ void FakeScanService::PlanReference(const Actor& actor, const std::string& id, c
   next.id = fmt::format("r{:04}", next_id_++);
   next.version = static_cast<int>(References(next.patient_id).size()) + 1;
   next.plan = plan;
+  next.revision = 1;
   next.created_by = actor.user;
   next.approved_by.clear();
   next.approved_at.reset();
@@ -318,10 +352,11 @@ void FakeScanService::PlanReference(const Actor& actor, const std::string& id, c
   Did(actor, "reference.plan", next.id, done, next.id);
 }
 
-void FakeScanService::ApproveReference(const Actor& actor, const std::string& id, Done done) {
+void FakeScanService::ApproveReference(const Actor& actor, const std::string& id, int revision, Done done) {
   const auto found = std::find_if(references.begin(), references.end(), [&](const Reference& reference) { return reference.id == id; });
   if (found == references.end()) return Finish(done, Refusal(ChangeResult::kNotFound, "no such reference"));
   if (!found->approved_by.empty()) return Finish(done, Refusal(ChangeResult::kConflict, "this reference is approved already"));
+  if (found->revision != revision) return Finish(done, Refusal(ChangeResult::kConflict, "this plan has been changed by somebody else"));
   if (found->created_by == actor.user) {
     return Finish(done, Refusal(ChangeResult::kRefused, "a second person must approve: you made or planned this reference"));
   }
@@ -360,9 +395,15 @@ void FakeScanService::AddUser(const Actor& actor, const User& user, Done done) {
   Did(actor, "user.add", user.name, done);
 }
 
-void FakeScanService::ChangeUser(const Actor& actor, const User& user, Done done) {
-  const auto found = std::find_if(users.begin(), users.end(), [&](const User& other) { return other.name == user.name; });
+void FakeScanService::ChangeUser(const Actor& actor, const UserChange& change, Done done) {
+  const auto found = std::find_if(users.begin(), users.end(), [&](const User& other) { return other.name == change.name; });
   if (found == users.end()) return Finish(done, Refusal(ChangeResult::kNotFound, "no such user"));
+  if (change.expected_hash && (found->disabled || found->password_hash != *change.expected_hash))
+    return Finish(done, Refusal(ChangeResult::kConflict, "the account has been changed by somebody else meanwhile"));
+  User user = *found;
+  user.role = change.role.value_or(user.role);
+  user.disabled = change.disabled.value_or(user.disabled);
+  user.password_hash = change.password_hash.value_or(user.password_hash);
   const bool engineer_left = std::any_of(users.begin(), users.end(), [&](const User& other) {
     const User& after = other.name == user.name ? user : other;
     return after.role == Role::kEngineer && !after.disabled;

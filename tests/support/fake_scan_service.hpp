@@ -53,6 +53,8 @@ class FakeScanService : public web::ScanService {
   /// Moves a running scan on. @param now  Any clock that grows.
   void Tick(std::chrono::steady_clock::time_point now);
   void Tell(web::EventKind kind) const;
+  /// The running scan, or none, fails as one of plumbd does: a press acknowledges.
+  void Fail(const std::string& reason);
   void Unplug();
   void Plug();
 
@@ -62,6 +64,8 @@ class FakeScanService : public web::ScanService {
   web::Health GetHealth() override { return health; }
   std::shared_ptr<const std::string> Preview() override { return preview; }
   void Press(const web::Actor& actor, web::Done done) override;
+  void StartSweep(const web::Actor& actor, web::Done done) override;
+  void EndSweep(const web::Actor& actor, web::Done done) override;
   void Cancel(const web::Actor& actor, web::Done done) override;
   void SetListener(std::function<void(web::EventKind)> listener) override { listener_ = std::move(listener); }
   std::vector<web::Patient> Patients() override { return patients; }
@@ -73,8 +77,8 @@ class FakeScanService : public web::ScanService {
   std::vector<web::Reference> References(const std::string& patient_id) override;
   std::optional<web::Reference> FindReference(const std::string& id) override;
   void AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason, web::Done done) override;
-  void PlanReference(const web::Actor& actor, const std::string& id, const web::ReferencePlan& plan, web::Done done) override;
-  void ApproveReference(const web::Actor& actor, const std::string& id, web::Done done) override;
+  void PlanReference(const web::Actor& actor, const std::string& id, int revision, const web::ReferencePlan& plan, web::Done done) override;
+  void ApproveReference(const web::Actor& actor, const std::string& id, int revision, web::Done done) override;
   std::vector<web::Scan> Scans(const std::string& patient_id, int limit) override;
   std::optional<web::Scan> FindScan(const std::string& id) override;
   void AcceptScan(const web::Actor& actor, const std::string& id, web::Done done) override;
@@ -84,7 +88,7 @@ class FakeScanService : public web::ScanService {
   std::vector<web::User> Users() override { return users; }
   std::optional<web::User> FindUser(const std::string& name) override;
   void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;
-  void ChangeUser(const web::Actor& actor, const web::User& user, web::Done done) override;
+  void ChangeUser(const web::Actor& actor, const web::UserChange& change, web::Done done) override;
   void Log(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) override;
   std::vector<web::AuditEntry> Audit(std::int64_t before, int limit) override;
   web::Settings GetSettings() override { return settings; }

@@ -48,7 +48,7 @@ void EventHub::Broadcast(std::string_view event, std::string_view data) {
 }
 
 void EventHub::Beat() {
-  for (const auto& stream : std::list(streams_)) stream->Send(": here\n\n");
+  for (const auto& stream : std::list(streams_)) stream->Send(FormatEvent("beat", "{}"));
 }
 
 bool EventHub::EndOver() {

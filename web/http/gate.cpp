@@ -47,7 +47,8 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
   Router::Match match = router_.Find(request.method, request.path);
   const bool api = request.path.starts_with("/api/");
   // What the page asks by itself, without anybody at the screen, does not keep a session alive.
-  const bool touch = request.Header("x-plumb-background").empty() && request.path != "/api/v1/events";
+  const bool touch = request.Header("x-plumb-background").empty() && request.path != "/api/v1/events" &&
+                     !(request.path == "/result" && request.query.contains("again"));
   request.session = accounts_.SessionOf(request, touch);
   if (match.route == nullptr) {
     if (api && !request.session) return NotLoggedIn();
@@ -78,6 +79,9 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
 
 void Gate::Handle(const Route& route, const Request& request, const Respond& respond) {
   if (route.body == BodyKind::kNone && !request.body.empty()) return respond(ErrorResponse(400, "expected no body"));
+  // The body may have taken its time, and the account may have been disabled meanwhile.
+  if (route.permission != Permission::kNone && request.session->ended)
+    return respond(ErrorResponse(401, "the session has ended: log in again"));
   try {
     route.handler(request, respond);
   } catch (const DataError& error) {

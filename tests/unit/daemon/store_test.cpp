@@ -44,7 +44,7 @@ class StoreTest : public ::testing::Test {
   }
   static std::string ApprovedReference(Store& store, const std::string& patient) {
     const std::string id = store.AddReference(kAnna, Scan(store, patient), "first", {});
-    store.ApproveReference(kBert, id);
+    store.ApproveReference(kBert, id, 1);
     return id;
   }
   template <typename Call>
@@ -192,15 +192,15 @@ TEST_F(StoreTest, AnApprovedReferenceIsNeverChangedButPlannedAnew) {
   web::ReferencePlan plan;
   plan.region_m = {{0, 0}, {1, 0}, {1, 1}};
   plan.isocentre_m = {0.1, 0.2, 0.3};
-  const std::string second = store->PlanReference(kAnna, first, plan);
+  const std::string second = store->PlanReference(kAnna, first, 1, plan);
   EXPECT_NE(second, first);
   EXPECT_TRUE(store->FindReference(first)->plan.region_m.empty());
   EXPECT_EQ(store->FindReference(second)->version, 2);
   EXPECT_EQ(store->FindReference(second)->plan.region_m, plan.region_m);
   EXPECT_EQ(store->FindReference(second)->plan.isocentre_m, plan.isocentre_m);
   EXPECT_EQ(store->ApprovedReference(patient)->id, first) << "a draft is compared with by nobody";
-  EXPECT_EQ(store->PlanReference(kAnna, second, {}), second);
-  store->ApproveReference(kBert, second);
+  EXPECT_EQ(store->PlanReference(kAnna, second, 1, {}), second);
+  store->ApproveReference(kBert, second, 2);
   EXPECT_EQ(store->ApprovedReference(patient)->id, second);
   EXPECT_EQ(store->FindPatient(patient)->approved_reference_id, second);
 
@@ -213,11 +213,13 @@ TEST_F(StoreTest, NobodyApprovesTheirOwnReference) {
   const auto store = Open();
   const std::string patient = store->AddPatient(kAnna, "A", "");
   const std::string draft = store->AddReference(kAnna, Scan(*store, patient), "", {});
-  EXPECT_EQ(RefusalOf([&] { store->ApproveReference(kAnna, draft); }), ChangeResult::kRefused);
-  (void)store->PlanReference(kBert, draft, {});
-  EXPECT_EQ(RefusalOf([&] { store->ApproveReference(kBert, draft); }), ChangeResult::kRefused);
-  store->ApproveReference({.user = "carl", .address = {}}, draft);
-  EXPECT_EQ(RefusalOf([&] { store->ApproveReference(kBert, draft); }), ChangeResult::kConflict);
+  EXPECT_EQ(RefusalOf([&] { store->ApproveReference(kAnna, draft, 1); }), ChangeResult::kRefused);
+  (void)store->PlanReference(kBert, draft, 1, {});
+  EXPECT_EQ(RefusalOf([&] { store->PlanReference(kAnna, draft, 1, {}); }), ChangeResult::kConflict) << "not what was read";
+  EXPECT_EQ(RefusalOf([&] { store->ApproveReference({.user = "carl", .address = {}}, draft, 1); }), ChangeResult::kConflict);
+  EXPECT_EQ(RefusalOf([&] { store->ApproveReference(kBert, draft, 2); }), ChangeResult::kRefused);
+  store->ApproveReference({.user = "carl", .address = {}}, draft, 2);
+  EXPECT_EQ(RefusalOf([&] { store->ApproveReference(kBert, draft, 2); }), ChangeResult::kConflict);
 }
 
 TEST_F(StoreTest, RefusesWhatMakesNoSense) {
@@ -231,7 +233,7 @@ TEST_F(StoreTest, RefusesWhatMakesNoSense) {
   EXPECT_EQ(RefusalOf([&] { store->AcceptScan(kAnna, running); }), ChangeResult::kConflict);
   for (const char* id : {"", "0", "-1", "7x", "99", "999999999999999999999", "../1", "1; DROP TABLE scans"}) {
     EXPECT_EQ(RefusalOf([&] { store->WipePatient(kAnna, id); }), ChangeResult::kNotFound) << id;
-    EXPECT_EQ(RefusalOf([&] { store->ApproveReference(kAnna, id); }), ChangeResult::kNotFound) << id;
+    EXPECT_EQ(RefusalOf([&] { store->ApproveReference(kAnna, id, 1); }), ChangeResult::kNotFound) << id;
     EXPECT_EQ(RefusalOf([&] { store->AcceptScan(kAnna, id); }), ChangeResult::kNotFound) << id;
     EXPECT_EQ(store->FindScan(id), std::nullopt) << id;
     EXPECT_THAT(store->Scans(*id == 0 ? "x" : id, 10), SizeIs(0)) << id;
@@ -276,13 +278,41 @@ TEST_F(StoreTest, TheLastEnabledEngineerStays) {
   store->AddUser(kAnna, {.name = "anna", .role = web::Role::kEngineer, .password_hash = "x", .created_at = {}});
   EXPECT_EQ(RefusalOf([&] { store->AddUser(kAnna, {.name = "anna", .password_hash = "y", .created_at = {}}); }), ChangeResult::kConflict);
   EXPECT_EQ(RefusalOf([&] {
-              store->ChangeUser(kAnna, {.name = "anna", .role = web::Role::kTechnician, .password_hash = "x", .created_at = {}});
+              store->ChangeUser(kAnna,
+                                {.name = "anna", .role = web::Role::kTechnician, .disabled = {}, .password_hash = {}, .expected_hash = {}});
             }),
             ChangeResult::kConflict);
   EXPECT_EQ(store->FindUser("anna")->role, web::Role::kEngineer) << "a refused change is rolled back";
   store->AddUser(kAnna, {.name = "bert", .role = web::Role::kEngineer, .password_hash = "x", .created_at = {}});
-  store->ChangeUser(kBert, {.name = "anna", .role = web::Role::kEngineer, .password_hash = "x", .disabled = true, .created_at = {}});
+  store->ChangeUser(kBert, {.name = "anna", .role = {}, .disabled = true, .password_hash = {}, .expected_hash = {}});
   EXPECT_TRUE(store->FindUser("anna")->disabled);
+  EXPECT_EQ(store->FindUser("anna")->role, web::Role::kEngineer);
+}
+
+TEST_F(StoreTest, APasswordChangedMeanwhileDoesNotUndoWhatWasDoneToTheAccount) {
+  const auto store = Open();
+  for (const char* name : {"anna", "bert"})
+    store->AddUser(kAnna, {.name = name, .role = web::Role::kEngineer, .password_hash = "x", .created_at = {}});
+  const web::UserChange password{.name = "bert", .role = {}, .disabled = {}, .password_hash = "y", .expected_hash = "x"};
+  store->ChangeUser(kAnna, {.name = "bert", .role = web::Role::kTechnician, .disabled = {}, .password_hash = {}, .expected_hash = {}});
+  store->ChangeUser(kBert, password);
+  EXPECT_EQ(store->FindUser("bert")->role, web::Role::kTechnician);
+  EXPECT_EQ(RefusalOf([&] { store->ChangeUser(kBert, password); }), ChangeResult::kConflict) << "not the password that was asked for";
+  store->ChangeUser(kAnna, {.name = "bert", .role = {}, .disabled = true, .password_hash = {}, .expected_hash = {}});
+  EXPECT_EQ(RefusalOf([&] {
+              store->ChangeUser(kBert, {.name = "bert", .role = {}, .disabled = {}, .password_hash = "z", .expected_hash = "y"});
+            }),
+            ChangeResult::kConflict);
+  EXPECT_TRUE(store->FindUser("bert")->disabled);
+}
+
+TEST_F(StoreTest, OnlyAScanWithAnAnswerIsAccepted) {
+  const auto store = Open();
+  const std::string patient = store->AddPatient(kAnna, "A", "");
+  const std::string reference = ApprovedReference(*store, patient);
+  const std::string none = Scan(*store, patient, reference, R"({"verdict":"no_answer","reasons":["too few markers"]})");
+  EXPECT_EQ(RefusalOf([&] { store->AcceptScan(kAnna, none); }), ChangeResult::kConflict);
+  store->AcceptScan(kAnna, Scan(*store, patient, reference, kResult));
 }
 
 TEST_F(StoreTest, OldScansGoAndReferencesStay) {
@@ -428,6 +458,13 @@ std::string CheckWith(int n, MarkerCheckStatus status) {
   return CheckJson({.status = status, .items = {{"moved", 1.25, 5.0, "mm", true, "marker 2"}}, .reasons = {"because"}}, seen);
 }
 
+TEST_F(StoreTest, ACheckWithAStampOfTheFutureCountsForNoDay) {
+  const auto store = Open();
+  Database(database(), Database::Access::kReadWrite)
+      .Execute("INSERT INTO checks (time, user, sensor_serial, status, json) VALUES (9000000000000000, 'anna', 'S1', 'passed', '{}')");
+  EXPECT_FALSE(store->HasPassedCheckSince(web::WallClock::now()));
+}
+
 TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   const auto before = web::WallClock::now() - std::chrono::seconds(1);
   {
@@ -452,6 +489,8 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   EXPECT_EQ(checks[1].reasons, std::vector<std::string>{"because"});
   EXPECT_TRUE(store->HasPassedCheckSince(before));
   EXPECT_FALSE(store->HasPassedCheckSince(web::WallClock::now() + std::chrono::hours(1)));
+  EXPECT_TRUE(store->HasPassedCheckSince(before, "S1"));
+  EXPECT_FALSE(store->HasPassedCheckSince(before, "S2")) << "another unit was not checked";
   const auto baseline = store->CheckBaseline();
   ASSERT_TRUE(baseline);
   EXPECT_EQ(baseline->check_id, checks[1].id);
@@ -487,7 +526,7 @@ TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
   (void)Open()->AddPatient(kAnna, "P-1", "");
   {
     Database direct(database(), Database::Access::kReadWrite);
-    direct.Execute("DROP TABLE check_baselines; DROP TABLE checks; PRAGMA user_version = 1");
+    direct.Execute("DROP TABLE check_baselines; DROP TABLE checks; ALTER TABLE refs DROP COLUMN revision; PRAGMA user_version = 1");
   }
   const auto store = Open();
   EXPECT_THAT(store->Patients(), SizeIs(1));

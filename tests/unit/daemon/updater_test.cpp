@@ -198,6 +198,7 @@ class UpdaterTest : public ::testing::Test {
                          .max_bytes = 1 << 20,
                          .bus_address = bus_.address(),
                          .version = "0.1.0",
+                         .hindrance = [this] { return hindrance_; },
                          .changed = [this] { ++num_changes_; },
                          .close_aside = {},
                          .ended = [this](const std::string& bundle, const std::string& failure) { ended_ = bundle + ": " + failure; }});
@@ -244,6 +245,7 @@ class UpdaterTest : public ::testing::Test {
   PrivateBus bus_{folder_.path()};
   std::unique_ptr<Updater> updater_;
   int num_changes_ = 0;
+  std::string hindrance_;
   std::string ended_;
 };
 
@@ -309,6 +311,20 @@ TEST_F(UpdaterTest, AnOlderVersionIsRefused) {
     WaitForRauc();
     EXPECT_THAT(Install("plumb-9.0.raucb").message, HasSubstr("older than 0.1.0"));
     EXPECT_EQ(rauc.installed(), "");
+  });
+}
+
+TEST_F(UpdaterTest, AScanThatBeganWhileTheBundleWasLookedAtGoesFirst) {
+  hindrance_ = "a scan is running";
+  Play([&] {
+    FakeRauc rauc(bus_.address());
+    Start();
+    WaitForRauc();
+    const web::Change answer = Install("plumb-9.0.raucb");
+    EXPECT_EQ(answer.result, ChangeResult::kConflict);
+    EXPECT_EQ(answer.message, hindrance_);
+    EXPECT_EQ(rauc.installed(), "");
+    EXPECT_FALSE(StatusNow().installing);
   });
 }
 

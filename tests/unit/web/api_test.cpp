@@ -21,8 +21,9 @@ class ApiTest : public WebTest {
     return client.Post("/api/v1/patients", {{"code", code}, {"site", "thorax"}}).json().value("id", "");
   }
 
-  static nlohmann::json Plan() {
-    return {{"region_m", {{0.0, 0.0}, {0.5, 0.0}, {0.5, 0.4}}},
+  static nlohmann::json Plan(int revision = 1) {
+    return {{"revision", revision},
+            {"region_m", {{0.0, 0.0}, {0.5, 0.0}, {0.5, 0.4}}},
             {"isocentre_m", {0.2, 0.1, 0.05}},
             {"shift_tolerance_mm", 3},
             {"rotation_tolerance_deg", 1},
@@ -139,9 +140,12 @@ TEST_F(ApiTest, AReferenceIsApprovedByASecondPerson) {
   const std::string id = physicist.Post("/api/v1/references", {{"scan_id", "s1"}, {"reason", "planning"}}).json()["id"];
   EXPECT_EQ(physicist.Put("/api/v1/references/" + id + "/plan", Plan()).status, 200);
   EXPECT_EQ(technician.Put("/api/v1/references/" + id + "/plan", Plan()).status, 403);
-  EXPECT_EQ(physicist.Post("/api/v1/references/" + id + "/approve").status, 403);
-  EXPECT_EQ(second.Post("/api/v1/references/" + id + "/approve").status, 200);
-  EXPECT_EQ(second.Post("/api/v1/references/" + id + "/approve").status, 409);
+  EXPECT_EQ(physicist.Put("/api/v1/references/" + id + "/plan", Plan()).status, 409) << "another one was saved since";
+  EXPECT_EQ(second.Post("/api/v1/references/" + id + "/approve", {{"revision", 1}}).status, 409);
+  EXPECT_EQ(second.Get("/api/v1/references/" + id).json()["revision"], 2);
+  EXPECT_EQ(physicist.Post("/api/v1/references/" + id + "/approve", {{"revision", 2}}).status, 403);
+  EXPECT_EQ(second.Post("/api/v1/references/" + id + "/approve", {{"revision", 2}}).status, 200);
+  EXPECT_EQ(second.Post("/api/v1/references/" + id + "/approve", {{"revision", 2}}).status, 409);
   const nlohmann::json reference = technician.Get("/api/v1/references/" + id).json();
   EXPECT_EQ(reference["approved_by"], "second");
   EXPECT_EQ(reference["plan"]["isocentre_m"], nlohmann::json({0.2, 0.1, 0.05}));
