@@ -59,39 +59,69 @@ export function warn(text) {
   clear(place, text ? h('p', { class: 'alert' }, h('span', {}, text), h('button', { class: 'quiet', onclick: () => warn(''), 'aria-label': 'Close' }, '✕')) : '');
 }
 
-/// A form that calls `submit` with its button disabled meanwhile; errors go to the alert region.
+/// A form that calls `submit` with its button off meanwhile.
 export function form(properties, submit, ...children) {
   const element = h('form', { ...properties, novalidate: false }, ...children);
-  element.addEventListener('submit', async (event) => {
+  const button = element.querySelector('button:not([type=button])');
+  element.addEventListener('submit', (event) => {
     event.preventDefault();
-    const button = element.querySelector('button:not([type=button])');
-    if (button) button.disabled = true;
-    try {
-      warn('');
-      await submit();
-    } catch (error) {
-      warn(error.message);
-    } finally {
-      if (button) button.disabled = false;
-    }
+    if (button) work(button, submit);
   });
   return element;
 }
 
-export function action(label, work, properties) {
+/// A button that is off says so, but can be focused: one that is `disabled` loses the focus, and who works by keys starts anew.
+export function enable(button, enabled) {
+  button.dataset.off = enabled ? '' : 'yes';
+  mark(button);
+}
+const isOff = (button) => button.dataset.off === 'yes' || button.dataset.busy === 'yes';
+function mark(button) {
+  if (isOff(button)) button.setAttribute('aria-disabled', 'true');
+  else button.removeAttribute('aria-disabled');
+}
+
+/// One thing at a time for each button; errors go to the alert region.
+async function work(button, task) {
+  if (isOff(button)) return;
+  button.dataset.busy = 'yes';
+  mark(button);
+  try {
+    warn('');
+    await task();
+  } catch (error) {
+    warn(error.message);
+  } finally {
+    button.dataset.busy = '';
+    mark(button);
+  }
+}
+
+export function action(label, task, properties) {
   const button = h('button', { type: 'button', ...properties }, label);
-  button.addEventListener('click', async () => {
-    button.disabled = true;
-    try {
-      warn('');
-      await work();
-    } catch (error) {
-      warn(error.message);
-    } finally {
-      button.disabled = false;
-    }
-  });
+  button.addEventListener('click', () => work(button, task));
   return button;
+}
+
+/// What tells a control from the others after it was built anew.
+const nameOf = (control) => [control.tagName, control.getAttribute('href'), control.getAttribute('aria-label') ?? control.textContent].join(' ');
+
+/// Changes what is in `element`; the focus stays on the same control, where there still is one.
+export function keepFocus(element, change) {
+  const focused = element.contains(document.activeElement) ? nameOf(document.activeElement) : null;
+  change();
+  if (focused === null || element.contains(document.activeElement)) return;
+  [...element.querySelectorAll('a, button, input, select, summary, [tabindex]')].find((control) => nameOf(control) === focused)?.focus({ preventScroll: true });
+}
+
+const drawn = new WeakMap();
+/// As clear(), but what is there stays when nothing differs: neither the focus nor what a reader reads is taken away.
+export function redraw(element, ...children) {
+  const fresh = clear(element.cloneNode(false), ...children);
+  const html = fresh.innerHTML;
+  if (drawn.get(element) === html && element.hasChildNodes()) return;
+  drawn.set(element, html);
+  keepFocus(element, () => clear(element, ...fresh.childNodes));
 }
 
 export function table(headings, rows, caption) {

@@ -8,6 +8,8 @@ export const S = {
   loading: 'Loading…',
   none: '–',
   offline: 'No connection to the appliance. Trying again…',
+  noAnswer: 'The appliance does not answer.',
+  leavingOffline: 'No connection to the appliance. You are logged out as soon as it answers. Trying again…',
   online: 'Connected again.',
   loggedOff: 'You were logged off. Log in again.',
   notAllowed: 'Your role does not open this page.',
@@ -27,6 +29,7 @@ export const S = {
     result: 'The result is ready. Press to scan again.',
     fault: 'The appliance needs help.',
   },
+  faultHints: { scan: 'Acknowledge it on the scan screen or with the button, then scan again.', storage: 'Nothing can be scanned until it is put right.', sensor: 'Plug the sensor in anew.' },
   purposes: { fraction: 'Fraction', reference: 'New reference', daily_check: 'Daily check' },
   outcomes: { running: 'running', done: 'done', cancelled: 'cancelled', failed: 'failed' },
   login: {
@@ -42,8 +45,8 @@ export const S = {
     goScan: 'Go to scan', preview: 'Camera', previewAlt: 'Picture of the camera', noPreview: 'The camera shows nothing now.',
   },
   lights: {
-    off: 'off', no_sensor: 'red, slow', ready: 'white', scanning: 'blue', too_fast: 'amber, fast', too_near: 'amber', too_far: 'amber', working: 'blue, pulsing',
-    result_in_tolerance: 'green', result_move: 'amber', no_answer: 'violet', fault: 'red, fast',
+    off: 'off', no_sensor: 'red, a short blink', ready: 'green', scanning: 'blue', too_fast: 'yellow, fast', too_near: 'yellow, two short', too_far: 'yellow, two long', working: 'blue, slow', done: 'blue and green in turn',
+    result_in_tolerance: 'green, short gaps', result_move: 'yellow, slow', no_answer: 'red, blinking', fault: 'red, flickering',
   },
   patients: {
     title: 'Patients', code: 'Code', site: 'Site', added: 'Added', scans: 'Scans', reference: 'Reference', approved: 'approved', noReference: 'none', open: 'Open',
@@ -56,7 +59,7 @@ export const S = {
     opened: (code) => `Patient ${code} is open for the next scan.`, noReferences: 'No reference yet: open the patient for a new reference and scan.', confirmWho: (code) => `Is ${code} the patient on the couch?`,
   },
   scan: {
-    title: 'Scan', start: 'Start sweep', stop: 'End sweep', discard: 'Discard scan', again: 'Scan again', coverage: 'Covered', keyframes: 'Views kept', tracked: 'Tracked', dropped: 'Dropped', time: 'Time',
+    title: 'Scan', start: 'Start sweep', stop: 'End sweep', acknowledge: 'Acknowledge', discard: 'Discard scan', again: 'Scan again', coverage: 'Covered', keyframes: 'Views kept', tracked: 'Tracked', dropped: 'Dropped', time: 'Time',
     noPatient: 'No patient is open: the scan will be compared with nothing.', choose: 'Choose a patient', patient: 'Patient', counter: 'Scans of this session', show: 'Show result',
     guidance: {
       none: 'Good pace', slower: 'SLOWER', closer: 'CLOSER', farther: 'FARTHER', tracking_lost: 'LOST: go back to where you were', no_markers: 'NO MARKERS IN VIEW',
@@ -100,11 +103,11 @@ export const S = {
   plan: {
     title: 'Plan', reference: 'Reference', region: 'Region of interest', regionHint: 'Click the map to add corners; drag a corner to move it; Delete removes the chosen one. Without corners the body found in the scan is the region.',
     mapLabel: 'Height map of the reference with the region. Enter adds a corner in the middle, N chooses the next one, arrow keys move it, Delete removes it.', isocentre: 'Isocentre', isocentreHint: 'Metres in the reference marker’s frame. Empty: the middle of the region.', pick: 'Pick on the map', picking: 'Click the map where the isocentre lies.',
-    tolerance: 'Tolerance', shift: 'Shifts (mm)', rotation: 'Rotations (degrees)', posture: 'Posture', postures: { HFS: 'Head first, supine', HFP: 'Head first, prone', FFS: 'Feet first, supine', FFP: 'Feet first, prone' }, couch: 'Markers move with the couch (shifts are then refused)',
+    tolerance: 'Tolerance', shift: 'Shifts (mm)', rotation: 'Rotations (degrees)', posture: 'Posture', postures: { HFS: 'Head first, supine', HFP: 'Head first, prone', FFS: 'Feet first, supine', FFP: 'Feet first, prone' }, couch: 'Markers move with the couch (shifts are then refused)', isocentreBad: 'Three numbers in metres, or all three empty.', changedMeanwhile: 'The plan was changed by somebody else meanwhile. This is what is stored now: look at it, then try again.', changedWhileEditing: 'Somebody else has changed this plan while you edit it: saving will be refused. Load the page again to see it.', reloaded: 'The plan was changed by somebody else; this is what is stored now.',
     save: 'Save plan', approve: 'Approve', approveHint: 'A second physicist approves. From then on this version cannot be changed.', approvedHint: 'This version is approved and cannot be changed. Saving makes a new version.', clear: 'Clear the region', corners: (n) => (n === 0 ? 'No corners: the whole body' : `${n} corners`), saved: 'Plan saved.', approved: 'Reference approved.', newVersion: 'A new version was made.', corner: (n, x, y) => `Corner ${n}: x ${x.toFixed(3)}, y ${y.toFixed(3)} m`, height: 'height', noMap: 'This scan has no height map.',
   },
   users: {
-    title: 'Accounts', name: 'Name', role: 'Role', state: 'State', active: 'active', disabled: 'disabled', add: 'Add an account', submit: 'Add', change: 'Change', password: 'Password', newPassword: 'New password (empty: stays)', disable: 'Disabled', own: 'My password', oldPassword: 'Old password', changeOwn: 'Change password', nameHint: 'Small letters, digits, . _ -',
+    title: 'Accounts', name: 'Name', role: 'Role', state: 'State', active: 'active', disabled: 'disabled', add: 'Add an account', submit: 'Add', change: 'Change', password: 'Password', newPassword: 'New password (empty: stays)', disable: 'Disabled', own: 'My password', oldPassword: 'Old password', changeOwn: 'Change password', nameHint: 'Small letters, digits, . _ -', unchanged: 'Nothing was changed.',
   },
   audit: { title: 'Log', time: 'Time', user: 'Who', address: 'From', action: 'What', subject: 'On', detail: 'Detail', more: 'Older entries', empty: 'Nothing yet.' },
   settings: {

@@ -1,5 +1,5 @@
 import { get, live, may, post } from '../api.js';
-import { action, clear, done, h, localTime, table } from '../dom.js';
+import { action, done, h, localTime, redraw, table } from '../dom.js';
 import { signed } from '../numbers.js';
 import { S } from '../strings.js';
 
@@ -34,7 +34,7 @@ function newest(check, load) {
       await post(`checks/${check.id}/baseline`);
       done(text.baselineTaken);
       await load();
-    }, {}), h('p', { class: 'hint' }, text.takeHint)));
+    }, { 'data-check': check.id }), h('p', { class: 'hint' }, text.takeHint)));
 }
 
 function earlier(checks) {
@@ -47,7 +47,7 @@ export async function showCheck(place) {
   const text = S.check;
   const load = async () => {
     const { checks, baseline, overdue } = await get('checks', true);
-    clear(place, h('h1', { class: 'visually-hidden' }, text.title), verdict(checks[0], overdue),
+    redraw(place, h('h1', { class: 'visually-hidden' }, text.title), verdict(checks[0], overdue),
       h('section', { class: 'card split' }, h('div', {}, h('p', {}, text.how), h('p', { class: 'hint' }, `${text.baseline}: ${baseline ? text.baselineOf(baseline.set_by, localTime(baseline.set_at), baseline.num_markers) : text.noBaseline}`)),
         may('scan') && action(text.start, async () => {
           await post('checks/open');

@@ -3,6 +3,9 @@ import { get } from '../api.js';
 import { h } from '../dom.js';
 import { S } from '../strings.js';
 
+/// What is wrong and what to do about it; nothing where nothing is.
+export const faultWords = ({ fault, fault_kind: kind }) => (fault ? `${fault.charAt(0).toUpperCase()}${fault.slice(1).replace(/[.!]$/, '')}. ${S.faultHints[kind] ?? ''}`.trim() : null);
+
 export const verdictIcon = (verdict) => ({ in_tolerance: '✓', move: '↔', no_answer: '?' })[verdict] ?? '–';
 
 export const verdictBadge = (verdict) => h('span', { class: `badge ${verdict}` }, `${verdictIcon(verdict)} ${S.result.verdicts[verdict]}`);

@@ -1,5 +1,5 @@
 import { get, live, may, post, remove } from '../api.js';
-import { action, clear, done, field, form, h, localTime, table, warn } from '../dom.js';
+import { action, clear, done, enable, field, form, h, localTime, redraw, table, warn } from '../dom.js';
 import { S } from '../strings.js';
 import { outcomeBadge } from './common.js';
 
@@ -16,7 +16,7 @@ export async function showPatients(place) {
     const rows = patients.filter((patient) => patient.code.toLowerCase().includes(wanted)).map((patient) => h('tr', { class: patient.id === live.status?.patient_id ? 'chosen' : '' },
       h('td', {}, h('a', { href: `#/patient/${patient.id}` }, patient.code), patient.id === live.status?.patient_id && h('span', { class: 'badge here' }, text.isOpen)),
       h('td', {}, patient.site || S.none), h('td', {}, patient.num_scans), h('td', {}, patient.approved_reference_id ? `✓ ${text.approved}` : text.noReference), h('td', {}, localTime(patient.created_at))));
-    clear(list, rows.length ? table([text.code, text.site, text.scans, text.reference, text.added], rows, text.title) : h('p', { class: 'hint' }, text.empty));
+    redraw(list, rows.length ? table([text.code, text.site, text.scans, text.reference, text.added], rows, text.title) : h('p', { class: 'hint' }, text.empty));
   };
   const load = async () => {
     ({ patients } = await get('patients', true));
@@ -42,7 +42,7 @@ function openButtons(patient) {
     location.hash = '#/scan';
   };
   const fraction = action(text.openFraction, open('fraction'), { class: 'primary' });
-  fraction.disabled = !patient.approved_reference_id;
+  enable(fraction, Boolean(patient.approved_reference_id));
   return h('div', { class: 'form' },
     h('p', { class: 'lead' }, text.confirmWho(patient.code)),
     h('div', { class: 'row' }, fraction, action(text.openReference, open('reference'), {})),
@@ -84,8 +84,8 @@ export async function showPatient(place, id) {
   const scans = h('div', {});
   const load = async () => {
     const [found, history] = await Promise.all([get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
-    clear(references, referenceTable(found.references));
-    clear(scans, scanTable(history.scans));
+    redraw(references, referenceTable(found.references));
+    redraw(scans, scanTable(history.scans));
   };
   clear(place, h('h1', {}, patient.code, ' ', h('small', {}, patient.site)),
     may('scan') && h('section', { class: 'card' }, h('h2', {}, text.open), openButtons(patient)),

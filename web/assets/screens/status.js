@@ -1,7 +1,7 @@
 import { get, live, may } from '../api.js';
-import { clear, h, localTime, table } from '../dom.js';
+import { clear, h, localTime, redraw, table } from '../dom.js';
 import { S } from '../strings.js';
-import { outcomeBadge, patientCodes } from './common.js';
+import { faultWords, outcomeBadge, patientCodes } from './common.js';
 
 const kWarmUp_s = 15 * 60;
 const gigabytes = (bytes) => Math.round(bytes / 2 ** 30);
@@ -51,18 +51,21 @@ export async function showStatus(place) {
     if (!status) return;
     headline.textContent = S.states[status.state];
     headline.dataset.state = status.state;
-    hint.textContent = status.fault ?? S.stateHints[status.state];
-    clear(grid, tiles(status, codes));
+    hint.textContent = faultWords(status) ?? S.stateHints[status.state];
+    redraw(grid, tiles(status, codes));
   };
   const load = async () => {
     codes = await patientCodes();
     const { scans } = await get('scans?limit=8', true);
     const rows = scans.map((scan) => h('tr', {},
       h('td', {}, h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at))), h('td', {}, codes.get(scan.patient_id) ?? S.none), h('td', {}, S.purposes[scan.purpose]), h('td', {}, outcomeBadge(scan))));
-    clear(list, rows.length ? table([S.patients.when, S.result.patient, S.patients.purpose, S.patients.outcome], rows, text.lastScans) : h('p', { class: 'hint' }, text.noScans));
+    redraw(list, rows.length ? table([S.patients.when, S.result.patient, S.patients.purpose, S.patients.outcome], rows, text.lastScans) : h('p', { class: 'hint' }, text.noScans));
     draw();
   };
   draw();  // what is known already; the list may take a moment
   await load();
-  return live.listen((kind) => (kind === 'status' ? draw() : load().catch(() => {})));
+  return live.listen((kind) => {
+    if (kind === 'status') draw();
+    if (kind === 'data' || kind === 'result') load().catch(() => {});
+  });
 }
