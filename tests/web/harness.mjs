@@ -101,6 +101,22 @@ export class Harness {
     }, [path, method, body]);
   }
 
+  /// The machine of that page's browser sleeps: no network, and while the time goes on its steady clock stands still.
+  async sleep(page, seconds) {
+    await page.context().setOffline(true);
+    await this.setClockOn(page, seconds);
+  }
+  wake(page) { return page.context().setOffline(false); }
+  setClockOn(page, seconds) {
+    return page.evaluate((s) => {
+      const now = Date.now.bind(Date);
+      Date.now = () => now() + 1000 * s;
+    }, seconds);
+  }
+
+  /// What has the focus, by its text.
+  focused(page) { return page.evaluate(() => document.activeElement.textContent); }
+
   async step(name, work) {
     const begun = Date.now();
     try {

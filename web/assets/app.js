@@ -28,10 +28,13 @@ const kScreens = {
   update: { show: showUpdate, permission: 'view', nav: true },
 };
 
+const kAskAgain_ms = 3000;
 const main = document.getElementById('main');
 const top = document.getElementById('top');
 let cleanUp = null;
 let turn = 0;
+let waiting = false;  // for the appliance, to come in or to leave
+let failed = false;   // the screen could not be shown
 
 const route = () => {
   const [name, argument] = location.hash.replace(/^#\/?/, '').split('/');
@@ -65,7 +68,7 @@ function buildTop(session) {
     h('nav', { 'aria-label': S.nav.label }, links),
     h('p', { class: 'chip', id: 'chip' }),
     h('p', { class: 'who' }, S.loggedInAs(session.user, S.roles[session.role])),
-    h('button', { class: 'quiet', onclick: () => leave() }, S.logOut));
+    h('button', { class: 'quiet', onclick: () => leave().catch(report) }, S.logOut));
 }
 
 let lastState = null;
@@ -86,7 +89,8 @@ async function show() {
   const mine = ++turn;
   cleanUp?.();
   cleanUp = null;
-  warn('');
+  failed = false;
+  warn(live.connected ? '' : S.offline);
   const { name, argument } = route();
   drawTop();
   const screen = kScreens[name];
@@ -99,7 +103,9 @@ async function show() {
     if (mine === turn) cleanUp = done ?? null;
     else done?.();
   } catch (error) {
-    if (mine === turn && currentSession()) clear(place, h('p', { class: 'card' }, error.message));
+    if (mine !== turn || !currentSession()) return;
+    failed = true;
+    clear(place, h('p', { class: 'card' }, error.message));
   }
 }
 
@@ -110,17 +116,39 @@ function showFocused() {
   return shown;
 }
 
+/// What `question` answers. As long as the appliance does not answer, nothing else is shown than that, and it is asked again.
+async function ask(question, text = S.offline) {
+  const mine = ++turn;
+  waiting = true;
+  cleanUp?.();
+  cleanUp = null;
+  try {
+    while (mine === turn) {
+      try {
+        return await question();
+      } catch (error) {
+        if (error.status > 0 && error.status < 500) throw error;
+        top.hidden = true;
+        clear(main, h('p', { class: 'card' }, error.status ? error.message : text));
+        await new Promise((ready) => { setTimeout(ready, kAskAgain_ms); });
+      }
+    }
+    return null;  // somebody else asks
+  } finally {
+    if (mine === turn) waiting = false;
+  }
+}
+
 async function leave() {
   live.close();
-  await logOut().catch(() => {});
+  await ask(logOut, S.leavingOffline).catch(() => {});
   await begin();
 }
 
 async function begin(message) {
-  ++turn;
-  cleanUp?.();
-  cleanUp = null;
-  const { session, setupRequired } = await loadSession();
+  const found = await ask(loadSession);
+  if (!found) return;
+  const { session, setupRequired } = found;
   drawTop();
   if (!session) {
     document.title = `${S.login.title} · ${S.product}`;
@@ -139,6 +167,7 @@ async function followScan() {
     location.hash = lastPurpose === 'daily_check' ? '#/check' : '#/result';
     return;
   }
+  if (state === 'fault') return;  // the screen says it
   if (!sensor.present) {
     warn(S.scan.lost);
     return;
@@ -147,16 +176,18 @@ async function followScan() {
   if (scans[0]?.outcome === 'failed') warn(`${S.result.failed}: ${scans[0].failure}`);
 }
 
+const report = (error) => clear(main, h('p', { class: 'card' }, error.message));
 let lastPurpose = null;
 live.listen((kind) => {
   lastPurpose = live.status?.scan?.purpose ?? lastPurpose;
   if (kind === 'connection') warn(live.connected ? '' : S.offline);
+  if (kind === 'connection' && live.connected && failed) show();
   if (kind === 'status' || kind === 'connection') drawChip();
   if (kind === 'result' && route().name === 'scan') followScan().catch(() => {});
 });
-setLoggedOffHandler(() => { live.close(); begin(S.loggedOff); });
+setLoggedOffHandler(() => { live.close(); begin(S.loggedOff).catch(report); });
 window.addEventListener('hashchange', () => {
-  if (!currentSession()) return;
+  if (!currentSession() || waiting) return;
   showFocused();
 });
-begin().catch((error) => clear(main, h('p', { class: 'card' }, error.message)));
+begin().catch(report);

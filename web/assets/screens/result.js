@@ -1,5 +1,5 @@
-import { fileUrl, get, getBytes, live, may, post } from '../api.js';
-import { action, checkbox, clear, done, field, form, h, localTime, warn } from '../dom.js';
+import { fileUrl, get, getBytes, live, may, now, post, since_s } from '../api.js';
+import { action, checkbox, clear, done, field, form, h, keepFocus, localTime, warn } from '../dom.js';
 import { errorMap } from '../error_map.js';
 import { paintHeights, readTiff } from '../maps.js';
 import { sixNumbers } from '../numbers.js';
@@ -14,15 +14,12 @@ const isAdvice = (scan) => Boolean(scan.result?.correction) && scan.result.verdi
 const sentence = (reason = '') => `${reason.charAt(0).toUpperCase()}${reason.slice(1).replaceAll('+-', '±')}${/[.!]$/.test(reason) ? '' : '.'}`;
 const optional = (path) => get(path, true).catch(() => null);
 
-/// Everything that the screen shows of one scan.
-async function collect(id) {
-  let scan = id ? await get(`scans/${id}`).catch((error) => { throw error.status === 404 ? new Error(S.result.gone) : error; }) : (await get('status', true)).last_result;
-  if (!id && !scan) {
-    const { scans } = await get('scans?limit=20', true);
-    scan = scans.find((candidate) => candidate.outcome === 'done') ?? null;
-  }
-  if (!scan) return null;
-  const received = performance.now();
+/// The newest finished scan: of this run of the appliance, else the newest that is stored.
+const newest = async (last) => last ?? (await get('scans?limit=20', true)).scans.find((candidate) => candidate.outcome === 'done') ?? null;
+const find = (id) => get(`scans/${id}`).catch((error) => { throw error.status === 404 ? new Error(S.result.gone) : error; });
+
+/// Everything that the screen shows of one scan, which came at `received`.
+async function collect(scan, received) {
   const [patient, reference, details, scene, history] = await Promise.all([
     scan.patient_id ? optional(`patients/${scan.patient_id}`) : null, scan.reference_id ? optional(`references/${scan.reference_id}`) : null, scan.result ? optional(`results/${scan.id}`) : null,
     optional(`scans/${scan.id}/files/scene.json`), scan.patient_id ? optional(`patients/${scan.patient_id}/scans`) : null]);
@@ -39,8 +36,10 @@ function head({ scan, patient, reference, received }) {
     item(text.scanned, localTime(scan.started_at)),
     item(text.age, age));
   const tick = () => {
-    const seconds = (scan.age_s ?? 0) + (performance.now() - received) / 1000;
-    age.textContent = ageText(seconds);
+    const last = live.status?.last_result;
+    const told = last?.id === scan.id ? { age_s: last.age_s, at: live.received } : { age_s: scan.age_s, at: received };
+    const seconds = (told.age_s ?? Infinity) + since_s(told.at);  // what nobody knows the age of is old
+    age.textContent = Number.isFinite(seconds) ? ageText(seconds) : S.none;
     return seconds > kOldAfter_s;
   };
   return { element, tick };
@@ -142,7 +141,8 @@ function closing({ scan, patient }, reload) {
   const text = S.result;
   const reason = h('input', { maxlength: 200, autocomplete: 'off' });
   const rescan = may('scan') && patient && action(text.rescan, async () => {
-    if (live.status?.patient_id !== patient.id) await post(`patients/${patient.id}/open`, { purpose: 'fraction', reason: '' });
+    const purpose = scan.purpose === 'reference' ? 'reference' : 'fraction';
+    if (live.status?.patient_id !== patient.id || live.status.next_purpose !== purpose) await post(`patients/${patient.id}/open`, { purpose, reason: '' });
     location.hash = '#/scan';
   }, { class: 'primary' });
   const accept = scan.accepted_by ? h('p', { class: 'badge in_tolerance' }, `✓ ${text.acceptedBy(scan.accepted_by)}`) : may('accept') && scan.result && scan.result.verdict !== 'no_answer' && action(text.accept, async () => {
@@ -164,9 +164,21 @@ export async function showResult(place, id) {
   const text = S.result;
   let stopMesh = () => {};
   let tick = () => {};
+  let turn = 0;
+  let latest;  // id of the last result that was looked for; nothing: none was yet
   const load = async () => {
-    const data = await collect(id);
+    const mine = ++turn;
+    const received = now();
+    let last = null;
+    if (!id) {
+      ({ last_result: last } = await get('status', true));
+      latest = last?.id ?? null;
+    }
+    const found = id ? await find(id) : await newest(last);
+    const data = found && await collect(found, received);
+    if (mine !== turn) return;
     if (!data) {
+      tick = () => {};
       clear(place, h('section', { class: 'card' }, h('h1', {}, text.none), h('p', {}, text.noneHint)));
       return;
     }
@@ -180,12 +192,12 @@ export async function showResult(place, id) {
     const mapPlace = h('div', {}, h('p', { class: 'hint' }, S.loading));
     const meshPlace = h('div', {});
     const overlayPlace = h('div', {}, h('p', { class: 'hint' }, S.loading));
-    clear(place, h('h1', { class: 'visually-hidden' }, text.title), identity.element, old, other, h('div', { class: 'fresh' }, verdictStrip(data), isAdvice(scan) && h('section', { class: 'correction' }, h('h2', {}, text.numbers, ' ', h('small', {}, text.atIsocentre)), sixNumbers(scan.result, reference, data.details))),
+    keepFocus(place, () => clear(place, h('h1', { class: 'visually-hidden' }, text.title), identity.element, old, other, h('div', { class: 'fresh' }, verdictStrip(data), isAdvice(scan) && h('section', { class: 'correction' }, h('h2', {}, text.numbers, ' ', h('small', {}, text.atIsocentre)), sixNumbers(scan.result, reference, data.details))),
       data.details && card(text.trust, trust(data)),
       mapped && card(text.where, bodyWords(data), mapPlace),
       h('div', { class: mapped || data.scene?.heightmap ? 'halves' : '' }, mapped && card(text.overlay, overlayPlace), !mapped && data.scene?.heightmap && card(text.heights, seen(data)), scan.outcome === 'done' && card(text.mesh, meshPlace)),
       scan.result && card(text.trend, !isAdvice(scan) && h('p', { class: 'caution' }, text.trendWithout), trend(history, tolerance)),
-      h('section', { class: 'card actions' }, closing(data, load)));
+      h('section', { class: 'card actions' }, closing(data, load))));
     tick = () => {
       const aged = identity.tick();
       const isOld = Boolean(scan.result) && aged;
@@ -205,6 +217,7 @@ export async function showResult(place, id) {
     let map = null;
     if (mapped && reference) {
       map = await errorMap(scan, reference, tolerance.shift_mm);
+      if (mine !== turn) return;
       clear(mapPlace, map.element);
       clear(overlayPlace, overlay(map, scan));
     } else {
@@ -216,7 +229,15 @@ export async function showResult(place, id) {
     stopMesh = mesh.stop;
   };
   const timer = setInterval(() => tick(), 1000);
-  const stop = live.listen((kind) => { if (kind === 'result' && !id) load().catch((error) => warn(error.message)); });
+  const follow = () => load().catch((error) => {
+    latest = '';  // the next status tries again
+    warn(error.message);
+  });
+  const stop = live.listen((kind) => {
+    const missed = kind === 'status' && latest !== undefined && (live.status.last_result?.id ?? null) !== latest;
+    if (!id && (kind === 'result' || missed)) follow();
+    else if (kind === 'status') tick();
+  });
   try {
     await load();
   } catch (error) {
