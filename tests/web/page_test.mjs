@@ -47,6 +47,7 @@ await h.step('a wrong password is refused in words', async () => {
   await h.look(anna, 'login');
   await h.logIn(anna, 'anna');
   await anna.getByText('Last scans').waitFor();
+  equal(await anna.locator('.tile', { hasText: 'Light' }).locator('.big').innerText(), 'green', 'the light, as it is when ready');
   await h.look(anna, 'status');
 });
 
@@ -68,6 +69,8 @@ await h.step('a new patient is scanned for a reference', async () => {
   await h.look(anna, 'scan-ready');
   await scan(anna);
   await h.look(anna, 'result-reference');
+  await anna.goto(`${h.url}#/status`);
+  await anna.locator('.tile', { hasText: 'Light' }).getByText('blue and green in turn').waitFor();  // done, compared with nothing
 });
 
 await h.step('a physicist plans, a second one approves', async () => {
@@ -122,15 +125,30 @@ await h.step('a fraction shows MOVE with the signs in words', async () => {
 await h.step('the map reads millimetres by mouse and keyboard', async () => {
   const map = anna.locator('canvas.map');
   await map.scrollIntoViewIfNeeded();
-  await map.hover({ position: { x: 10, y: 10 } });
-  const corner = await anna.locator('.reading').innerText();
+  const read = async () => {
+    const words = await anna.locator('.reading').innerText();
+    const [, value, x, y] = /^(.+)\s+at x (\S+), y (\S+) m$/.exec(words) ?? [];
+    return { value, mm: Number(/^([+−]?[\d.]+) mm$/.exec(value)?.[1].replace('−', '-') ?? NaN), x: Number(x), y: Number(y) };
+  };
+  const near = (found, expected, what) => check(Math.abs(found - expected) < 0.0015, `${what}: ${expected.toFixed(3)}, found ${found}`);
   await map.focus();
-  for (let i = 0; i < 10; ++i) await map.press('Shift+ArrowRight');
-  for (let i = 0; i < 10; ++i) await map.press('Shift+ArrowDown');
-  const inside = await anna.locator('.reading').innerText();
-  check(corner !== inside, 'the reading follows');
-  check(/mm|not measured/.test(inside), `the reading is in millimetres: ${inside}`);
+  for (let i = 0; i < 60 && !(Math.abs((await read()).mm) > 4); ++i) await map.press('ArrowUp');  // to where the moved body lies off
+  const start = await read();
+  check(Math.abs(start.mm) > 4, `the body lies off: ${start.value}`);
   await anna.getByLabel('After the correction').check();
+  const after = await read();
+  near(after.x, start.x, 'the same place');
+  check(Math.abs(after.mm) < 0.5 * Math.abs(start.mm), `the correction puts it right: ${start.value}, then ${after.value}`);
+  await anna.getByLabel('Before', { exact: true }).check();
+  equal((await read()).value, start.value, 'and back');
+  await map.press('ArrowRight');
+  await map.press('Shift+ArrowDown');
+  const beside = await read();
+  near(beside.x, start.x + 0.005, 'a step to the right');
+  near(beside.y, start.y - 0.05, 'a long step down');
+  await map.hover({ position: { x: 10, y: 10 } });
+  const corner = await read();
+  check(corner.x < start.x - 0.05 && corner.y > start.y + 0.05, `the pointer reads at the upper left: ${corner.x}, ${corner.y}`);
 });
 
 await h.step('the surface opens in 3-D', async () => {
@@ -160,11 +178,17 @@ await h.step('a second page follows the same scan', async () => {
   await anna.getByText('Accepted by anna').waitFor();
 });
 
-await h.step('an old result greys out and says so', async () => {
-  h.tell('old');
-  await anna.goto(`${h.url}#/result`);
+await h.step('a result grows old over a sleep, and takes its age from the appliance again', async () => {
+  equal(await anna.locator('.is-old').count(), 0, 'fresh at first');
+  await h.sleep(anna, 130);
   await anna.getByText('Do not act on it').waitFor();
-  check(await anna.locator('.is-old').count() === 1, 'the result is grey');
+  await anna.getByRole('alert').getByText('No connection to the appliance').waitFor();
+  equal(await anna.locator('.is-old').count(), 1, 'the result is grey');
+  await h.wake(anna);
+  await anna.locator('.is-old').waitFor({ state: 'detached' });  // for the appliance no 2 minutes have passed
+  await anna.getByRole('alert').getByText('No connection').waitFor({ state: 'detached' });
+  h.tell('old');
+  await anna.getByText('Do not act on it').waitFor();
   await h.look(anna, 'result-old', { axe: false });
 });
 
@@ -194,6 +218,23 @@ await h.step('unplugging during a sweep discards the scan and says so', async ()
   h.tell('plug');
   h.tell('fast');
   await anna.locator('.headline', { hasText: 'Ready' }).waitFor();
+});
+
+await h.step('a failed scan is acknowledged on the page', async () => {
+  h.tell('slow');
+  await anna.getByRole('button', { name: 'Start sweep' }).click();
+  await anna.getByRole('button', { name: 'End sweep' }).waitFor();
+  h.tell('fail');
+  await anna.getByRole('button', { name: 'Acknowledge' }).waitFor();
+  await anna.locator('.headline', { hasText: 'Fault' }).waitFor();
+  equal(await anna.locator('.guidance').innerText(), 'The recording cannot be written. Acknowledge it on the scan screen or with the button, then scan again.', 'what is wrong and what to do');
+  equal(await anna.getByRole('button', { name: 'Start sweep' }).count(), 0, 'no start before');
+  await h.look(anna, 'scan-fault');
+  await anna.waitForTimeout(1000);  // or it would be the second tap of two
+  await anna.getByRole('button', { name: 'Acknowledge' }).click();
+  await anna.locator('.headline', { hasText: 'Ready' }).waitFor();
+  equal(await anna.getByRole('button', { name: 'Start sweep' }).isDisabled(), false, 'the next scan can start');
+  h.tell('fast');
 });
 
 await h.step('another open patient is pointed out on the result', async () => {
@@ -273,7 +314,7 @@ await h.step('patients, log, settings and update look finished', async () => {
   equal(await bob.getByRole('button', { name: /Install|Send|Remove/ }).count(), 0, 'a physicist updates nothing');
 });
 
-await h.step('a keyboard alone reaches login, navigation and the start button', async () => {
+await h.step('a keyboard alone logs in, starts a sweep and ends it', async () => {
   const keys = await h.person('keys');
   await keys.goto(h.url);
   await keys.getByRole('heading', { name: 'Log in' }).waitFor();
@@ -284,14 +325,48 @@ await h.step('a keyboard alone reaches login, navigation and the start button', 
   await keys.getByRole('navigation').waitFor();
   await keys.locator('.tile').first().waitFor();
   await keys.locator('tbody tr').first().waitFor();
-  const focused = () => keys.evaluate(() => document.activeElement.textContent);
+  const focused = () => h.focused(keys);
+  const tile = keys.locator('.tile').getByRole('link', { name: 'Daily check' });
+  await tile.focus();
+  h.tell('unplug');
+  await keys.locator('.tile.bad', { hasText: 'missing' }).waitFor();
+  equal(await focused(), 'Daily check', 'a tile that is drawn anew keeps the focus');
+  h.tell('plug');
+  await keys.locator('.tile.good', { hasText: 'attached' }).waitFor();
+  const { body: { patients } } = await h.api(anna, 'patients');
+  equal((await h.api(anna, `patients/${patients.find((one) => one.code === 'PX-0417').id}/open`, 'POST', { purpose: 'fraction', reason: '' })).status, 200, 'a patient to compare');
+  await keys.locator('.brand').focus();
   for (let i = 0; i < 40 && (await focused()) !== 'Scan'; ++i) await keys.keyboard.press('Tab');
   await h.look(keys, 'focus', { axe: false });
   await keys.keyboard.press('Enter');
-  await keys.getByRole('button', { name: 'Scan again' }).waitFor();
-  for (let i = 0; i < 8 && (await focused()) !== 'Scan again'; ++i) await keys.keyboard.press('Tab');
-  equal(await focused(), 'Scan again', 'the start button is reached from the main part');
+  await keys.getByRole('button', { name: 'Start sweep' }).waitFor();
+  for (let i = 0; i < 8 && (await focused()) !== 'Start sweep'; ++i) await keys.keyboard.press('Tab');
+  equal(await focused(), 'Start sweep', 'the start button is reached from the main part');
+  h.tell('slow');
+  await keys.keyboard.press('Enter');
+  await keys.getByRole('button', { name: 'End sweep' }).waitFor();
+  equal(await focused(), 'End sweep', 'the focus stays on the button');
+  await keys.waitForTimeout(1000);
+  await keys.keyboard.press('Enter');
+  await keys.waitForURL(/#\/result/);
   await keys.close();
+});
+
+await h.step('two taps start a sweep and do not end it', async () => {
+  await anna.goto(`${h.url}#/scan`);
+  await anna.getByRole('button', { name: 'Scan again' }).waitFor();
+  await anna.evaluate(async () => {
+    const button = document.querySelector('.giant');
+    button.click();
+    while (button.textContent !== 'End sweep') await new Promise((ready) => { setTimeout(ready, 10); });
+    button.click();
+  });
+  await anna.waitForTimeout(1200);
+  equal((await h.api(anna, 'status')).body.state, 'scanning', 'the sweep goes on');
+  await anna.getByRole('button', { name: 'Discard scan' }).click();
+  await anna.locator('.headline', { hasText: 'Ready' }).waitFor();
+  equal(await h.focused(anna), 'Start sweep', 'the focus goes on where the button is gone');
+  h.tell('fast');
 });
 
 await h.step('phone and 4K', async () => {
@@ -302,8 +377,8 @@ await h.step('phone and 4K', async () => {
     const moved = scans.scans.find((one) => one.result?.verdict === 'move');
     for (const [screen, hash] of [['result', `result/${moved.id}`], ['scan', 'scan'], ['status', 'status'], ['patients', 'patients']]) {
       await page.goto(`${h.url}#/${hash}`);
-      await page.waitForLoadState('networkidle').catch(() => {});
-      await page.waitForTimeout(400);
+      await page.getByText('Loading…').first().waitFor({ state: 'detached' });
+      await page.waitForTimeout(1000);
       const overflow = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
       check(overflow <= 0, `${name} ${screen} does not scroll sideways (${overflow} px too wide)`);
       await h.look(page, `${name}-${screen}`, { fullPage: false });

@@ -1,6 +1,6 @@
 // The real HTTP server over a fake appliance whose scans show real results: for tests of the page in a browser.
 // plumb_web_test_server FOLDER: makes scenes and results in FOLDER, prints its address and "setup code: XXXX-XXXX", obeys lines on stdin:
-// unplug, plug, slow (long sweeps), fast, old (the last result becomes 10 minutes old), quit; of what the next scan shows: markermoved (a
+// unplug, plug, fail (of the running scan), slow (long sweeps), fast, old (the last result becomes 10 minutes old), quit; of what the next scan shows: markermoved (a
 // check), stranger (another body), shoulder (lifted), "moved AXIS AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by pitch,
 // roll, yaw by degrees).
 #include <fmt/format.h>
@@ -146,6 +146,7 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
   words >> name;
   if (name == "unplug") service.Unplug();
   if (name == "plug") service.Plug();
+  if (name == "fail") service.Fail("the recording cannot be written");
   if (name == "slow") service.sweep = std::chrono::milliseconds(60000);
   if (name == "fast") service.sweep = std::chrono::milliseconds(1500);
   if (name == "installed") {

@@ -1,8 +1,11 @@
-import { get, live, may, post } from '../api.js';
-import { action, clear, done, h, say } from '../dom.js';
+import { get, live, may, now, post, since_s } from '../api.js';
+import { action, clear, done, enable, h, redraw, say } from '../dom.js';
 import { S } from '../strings.js';
+import { faultWords } from './common.js';
 
 const kPreviewEvery_ms = 250;
+const kPreviewAnswer_ms = 5000;
+const kSecondTap_s = 0.8;
 
 /// The camera's picture, as long as there is one.
 function preview() {
@@ -14,7 +17,7 @@ function preview() {
   const next = async () => {
     if (stopped) return;
     try {
-      const response = await fetch('/api/v1/preview', { headers: { 'X-Plumb-Background': '1' }, cache: 'no-store' });
+      const response = await fetch('/api/v1/preview', { headers: { 'X-Plumb-Background': '1' }, cache: 'no-store', signal: AbortSignal.timeout(kPreviewAnswer_ms) });
       if (!response.ok) throw new Error();
       const fresh = URL.createObjectURL(await response.blob());
       picture.src = fresh;
@@ -34,14 +37,39 @@ function preview() {
   return { element: h('figure', { class: 'preview' }, picture, none), stop: () => { stopped = true; } };
 }
 
+/// What the large button does now: its words and its request; nothing where it is off.
+function offer({ state, fault_kind: fault }) {
+  const text = S.scan;
+  if (state === 'scanning') return { label: text.stop, request: 'scan/end' };
+  if (state === 'fault' && fault === 'scan') return { label: text.acknowledge, request: 'press' };
+  if (state === 'result') return { label: text.again, request: 'scan/start' };
+  return { label: text.start, request: state === 'ready' ? 'scan/start' : '' };
+}
+
 function buttons() {
   const text = S.scan;
-  const press = action('', () => post('press'), { class: 'primary giant' });
+  let request = '';
+  let tapped = null;
+  const press = action('', async () => {
+    if (tapped && since_s(tapped) < kSecondTap_s) return;  // the second of two was meant for what the button said before
+    tapped = now();
+    await post(request);
+  }, { class: 'primary giant' });
   const discard = action(text.discard, async () => {
     await post('cancel');
     done(text.discarded);
   }, { class: 'danger' });
-  return { press, discard, element: may('scan') ? h('div', { class: 'controls' }, press, discard) : h('div', {}) };
+  const draw = (status) => {
+    const next = offer(status);
+    request = next.request;
+    if (press.textContent !== next.label) press.textContent = next.label;
+    press.classList.toggle('stop', status.state === 'scanning');
+    enable(press, Boolean(request));
+    const isOver = !['scanning', 'working'].includes(status.state);
+    if (isOver && document.activeElement === discard) press.focus();
+    discard.hidden = isOver;
+  };
+  return { draw, element: may('scan') ? h('div', { class: 'controls' }, press, discard) : h('div', {}) };
 }
 
 export async function showScan(place) {
@@ -64,7 +92,7 @@ export async function showScan(place) {
 
   const drawWho = (status) => {
     const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
-    clear(who, isCheck ? [h('strong', {}, S.purposes.daily_check), ` · ${S.check.sweep}`] : status.patient_id
+    redraw(who, isCheck ? [h('strong', {}, S.purposes.daily_check), ` · ${S.check.sweep}`] : status.patient_id
       ? [`${text.patient} `, h('strong', {}, patient?.code ?? '…'), ` · ${S.purposes[status.next_purpose]} · ${text.counter}: ${status.scans_today}`]
       : [text.noPatient, ' ', h('a', { href: '#/patients' }, text.choose)]);
   };
@@ -89,12 +117,9 @@ export async function showScan(place) {
     if (!status) return;
     headline.textContent = S.states[status.state];
     headline.dataset.state = status.state;
-    control.press.textContent = status.state === 'scanning' ? text.stop : status.state === 'result' ? text.again : text.start;
-    control.press.classList.toggle('stop', status.state === 'scanning');
-    control.press.disabled = !['ready', 'scanning', 'result'].includes(status.state);
-    control.discard.hidden = !['scanning', 'working'].includes(status.state);
+    control.draw(status);
     drawProgress(status);
-    if (status.fault) guidance.textContent = status.fault;
+    if (status.fault) guidance.textContent = faultWords(status);
     drawWho(status);
     if (status.patient_id !== shown.patient) {
       shown.patient = status.patient_id;
