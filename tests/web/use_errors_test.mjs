@@ -151,14 +151,137 @@ await h.step('a wrong reference is NO ANSWER with its reason, and nothing to app
 await h.step('a result that grows old on the screen turns grey and says so', async () => {
   h.tell('moved z 8 HFS');
   await scan();
-  equal(await anna.locator('.is-old').count(), 0, 'fresh at first');
   const colour = () => anna.locator('.fresh').evaluate((element) => getComputedStyle(element).filter);
+  await h.sleep(anna, 100);
+  await anna.locator('.identity', { hasText: /1\d\d s/ }).waitFor();
+  equal(await anna.locator('.is-old').count(), 0, 'fresh for 2 minutes');
   equal(await colour(), 'none', 'in colour');
-  h.tell('old');
+  await h.setClockOn(anna, 30);
   await anna.getByText('Do not act on it').waitFor();
   equal(await anna.locator('.is-old').count(), 1, 'marked as old');
   equal(await colour(), 'grayscale(1)', 'grey');
   await h.look(anna, 'result-grown-old', { axe: false });
+  await h.setClockOn(anna, -3600);
+  await anna.waitForTimeout(1500);
+  check(!/-\d+ (s|min)/.test(await anna.locator('.identity').innerText()), 'a clock that is set back makes no age negative');
+});
+
+await h.step('a result that was missed without a connection is shown as soon as there is one', async () => {
+  const vertical = anna.locator('.number', { has: anna.getByRole('heading', { name: 'Vertical', exact: true }) }).locator('.value');
+  check((await vertical.innerText()).startsWith('−8.0'), 'the older result, while there is no connection');
+  h.tell('moved z -8 HFS');
+  const { body: { last_result: before } } = await h.api(bob, 'status');
+  equal((await h.api(bob, 'scan/start', 'POST')).status, 200, 'another screen starts');
+  await bob.waitForFunction((id) => fetch('/api/v1/status').then((response) => response.json()).then((status) => status.last_result.id !== id), before.id, { timeout: 30000, polling: 500 });
+  check((await vertical.innerText()).startsWith('−8.0'), 'nothing has come');
+  await h.wake(anna);
+  await vertical.getByText('+8.0').waitFor();
+  equal(await anna.locator('.is-old').count(), 0, 'and it is fresh');
+});
+
+await h.step('a stream that says nothing any more is no connection', async () => {
+  h.server.kill('SIGSTOP');
+  try {
+    await h.setClockOn(anna, 20);
+    await anna.waitForTimeout(1500);
+    equal(await anna.getByText('No connection to the appliance').count(), 0, 'beats may be late');
+    await h.setClockOn(anna, 20);
+    await anna.getByRole('alert').getByText('No connection to the appliance').waitFor();
+    equal(await anna.locator('.chip').innerText(), 'No connection to the appliance. Trying again…', 'and above');
+  } finally {
+    h.server.kill('SIGCONT');
+  }
+  await anna.getByText('No connection to the appliance').first().waitFor({ state: 'detached' });
+  await anna.locator('.chip', { hasText: 'Result' }).waitFor();
+});
+
+await h.step('who logs out without a connection sees no patient any more, and is logged out once there is one', async () => {
+  await h.sleep(anna, 0);
+  await anna.getByRole('button', { name: 'Log out' }).click();
+  await anna.getByText('You are logged out as soon as it answers.').waitFor();
+  equal(await anna.locator('.identity').count(), 0, 'no result');
+  equal(await anna.getByRole('navigation').count(), 0, 'no way to one');
+  await h.wake(anna);
+  await anna.getByRole('heading', { name: 'Log in' }).waitFor();
+  equal(await anna.evaluate(() => fetch('/api/v1/status').then((response) => response.status)), 401, 'nothing without login');
+  await h.logIn(anna, 'anna');
+});
+
+await h.step('scan again at a fraction takes a fraction, whatever the patient was opened for since', async () => {
+  await anna.goto(`${h.url}#/patients`);
+  await anna.getByRole('link', { name: 'PX-0001' }).click();
+  await anna.getByRole('button', { name: 'Take a new reference' }).click();
+  await anna.locator('.who-line', { hasText: 'New reference' }).waitFor();
+  await anna.goto(`${h.url}#/result`);
+  await anna.getByRole('button', { name: 'Scan again' }).click();
+  await anna.locator('.who-line', { hasText: 'PX-0001 · Fraction' }).waitFor();
+});
+
+await h.step('two at one plan: nobody saves over or approves what was not seen', async () => {
+  const shift = (page) => page.getByLabel('Shifts (mm)');
+  const save = (page) => page.getByRole('button', { name: 'Save plan' }).click();
+  await bob.goto(`${h.url}#/plan/${(await h.api(anna, 'scans?limit=1')).body.scans[0].reference_id}`);
+  await shift(bob).fill('4');
+  await save(bob);  // of an approved one: a new version
+  await bob.getByRole('heading', { name: 'Reference 2' }).waitFor();
+  await clara.goto(bob.url());
+  await clara.getByRole('heading', { name: 'Reference 2' }).waitFor();
+  await shift(bob).fill('5');
+  await save(bob);
+  await clara.getByRole('status').getByText('this is what is stored now').waitFor();
+  equal(await shift(clara).inputValue(), '5', 'what nobody edited is loaded again');
+  await clara.getByLabel('Rotations (degrees)').fill('2');
+  await shift(bob).fill('6');
+  await save(bob);
+  await clara.getByRole('alert').getByText('while you edit it').waitFor();
+  equal(await shift(clara).inputValue(), '5', 'what is edited stays');
+  await save(clara);
+  await clara.getByRole('alert').getByText('changed by somebody else meanwhile').waitFor();
+  equal(await shift(clara).inputValue(), '6', 'what is stored');
+  equal(await clara.getByLabel('Rotations (degrees)').inputValue(), '1', 'nothing of what was refused');
+  // As an approval that was on its way while bob saved.
+  const { reference, plan } = await clara.evaluate(() => fetch(`/api/v1/references/${location.hash.split('/')[2]}`).then((response) => response.json())).then(({ plan: stored, ...rest }) => ({ reference: rest, plan: stored }));
+  await clara.route('**/approve', async (route) => {
+    const { region_m, isocentre_m, posture, couch_markers } = plan;
+    equal((await h.api(bob, `references/${reference.id}/plan`, 'PUT', { region_m, isocentre_m, posture, couch_markers, shift_tolerance_mm: 7, rotation_tolerance_deg: 1, revision: reference.revision })).status, 200, 'bob saves');
+    await route.continue();
+  });
+  await clara.getByRole('button', { name: 'Approve' }).click();
+  await clara.getByRole('alert').getByText('changed by somebody else meanwhile').waitFor();
+  equal(await shift(clara).inputValue(), '7', 'what would have been approved unseen');
+  await clara.getByText('draft').waitFor();
+  await h.look(clara, 'plan-changed');
+});
+
+await h.step('half an isocentre is refused at its field', async () => {
+  for (const axis of ['x', 'y', 'z']) await clara.getByLabel(`Isocentre ${axis}`).fill('');
+  await clara.getByLabel('Isocentre x').fill('0.5');
+  await clara.getByRole('button', { name: 'Save plan' }).click();
+  await clara.getByText('Three numbers in metres, or all three empty.').waitFor();
+  equal(await clara.getByLabel('Isocentre y').getAttribute('aria-invalid'), 'true', 'the field');
+  equal(await clara.getByLabel('Isocentre x').inputValue(), '0.5', 'what was typed stays');
+  await h.look(clara, 'plan-half-isocentre');
+  await clara.getByLabel('Isocentre y').fill('0.4');
+  await clara.getByLabel('Isocentre z').pressSequentially('1e');
+  await clara.getByRole('button', { name: 'Save plan' }).click();
+  await clara.getByText('Three numbers in metres, or all three empty.').waitFor();
+  equal(await clara.getByLabel('Isocentre z').getAttribute('aria-invalid'), 'true', 'what is no number');
+  for (const axis of ['x', 'y', 'z']) await clara.getByLabel(`Isocentre ${axis}`).fill('');
+  await clara.getByRole('button', { name: 'Save plan' }).click();
+  await clara.getByRole('status').getByText('Plan saved.').waitFor();
+});
+
+await h.step('an account: only what was changed is sent', async () => {
+  await engineer.goto(`${h.url}#/users`);
+  await h.addAccount(engineer, 'dora', 'technician');
+  const row = engineer.getByRole('row', { name: 'dora' });
+  await row.getByText('Change', { exact: true }).click();
+  await row.getByRole('button', { name: 'Save' }).click();
+  await engineer.getByRole('alert').getByText('Nothing was changed.').waitFor();
+  await row.getByLabel('Disabled').check();
+  const [request] = await Promise.all([engineer.waitForRequest((one) => one.method() === 'PUT'), row.getByRole('button', { name: 'Save' }).click()]);
+  equal(request.postData(), '{"disabled":true}', 'what is sent');
+  await row.getByText('disabled', { exact: true }).waitFor();
 });
 
 await h.step('the wrong patient: both codes are on the screen', async () => {

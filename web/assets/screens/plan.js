@@ -1,5 +1,5 @@
-import { get, getBytes, may, post, put } from '../api.js';
-import { action, checkbox, clear, done, field, h, localTime, say, select, svg, warn } from '../dom.js';
+import { get, getBytes, live, may, post, put } from '../api.js';
+import { action, checkbox, clear, done, field, h, keepFocus, localTime, say, select, svg, warn } from '../dom.js';
 import { cellAt, paintHeights, readTiff } from '../maps.js';
 import { S } from '../strings.js';
 
@@ -111,21 +111,35 @@ async function loadMap(reference) {
 function controls(reference, model, editable) {
   const text = S.plan;
   const number = (value, step, properties) => h('input', { type: 'number', step, value: value ?? '', disabled: !editable, inputmode: 'decimal', ...properties });
-  const axes = ['x', 'y', 'z'].map((axis, i) => number(model.isocentre?.[i], '0.001', { 'aria-label': `${text.isocentre} ${axis}`, placeholder: axis }));
+  const bad = h('p', { class: 'caution', id: 'isocentre-bad', role: 'alert' });
+  const axes = ['x', 'y', 'z'].map((axis, i) => number(model.isocentre?.[i], '0.001', { 'aria-label': `${text.isocentre} ${axis}`, placeholder: axis, 'aria-describedby': bad.id }));
   const shift = number(reference.plan.tolerance.shift_mm, '0.1', { min: 0.1, max: 50 });
   const rotation = number(reference.plan.tolerance.rotation_deg, '0.1', { min: 0.1, max: 20 });
   const posture = select(text.postures, reference.plan.posture, { disabled: !editable });
   const couch = checkbox(text.couch, reference.plan.couch_markers, { disabled: !editable });
+  /// The field that makes the isocentre neither three numbers nor none.
+  const wrongAxis = () => axes.find((axis) => axis.validity.badInput) ?? (axes.some((axis) => axis.value !== '') ? axes.find((axis) => axis.value === '') : undefined);
+  /// Says at the fields what is wrong; false then.
+  const judge = () => {
+    const wrong = wrongAxis();
+    bad.textContent = wrong ? text.isocentreBad : '';
+    for (const axis of axes) axis.setAttribute('aria-invalid', String(axis === wrong));
+    wrong?.focus();
+    return !wrong;
+  };
+  const isocentre = () => (wrongAxis() || axes[0].value === '' ? null : axes.map((axis) => Number(axis.value)));
   const body = () => ({
-    region_m: model.region, isocentre_m: axes.every((axis) => axis.value !== '') ? axes.map((axis) => Number(axis.value)) : null,
+    region_m: model.region, isocentre_m: isocentre(), revision: reference.revision,
     shift_tolerance_mm: Number(shift.value), rotation_tolerance_deg: Number(rotation.value), posture: posture.value, couch_markers: couch.box.checked,
   });
-  return { axes, shift, rotation, posture, couch, body };
+  /// All that a person can change, to tell whether they did.
+  const written = () => JSON.stringify([body(), axes.map((axis) => [axis.value, axis.validity.badInput])]);
+  return { axes, bad, shift, rotation, posture, couch, judge, isocentre, body, written };
 }
 
-export async function showPlan(place, id) {
+/// One stored plan and what is edited of it. `store(request)` sends a change.
+async function draft(place, reference, store) {
   const text = S.plan;
-  const reference = await get(`references/${id}`);
   const patient = await get(`patients/${reference.patient_id}`);
   const editable = may('plan');
   const model = { region: reference.plan.region_m.map((point) => [...point]), isocentre: reference.plan.isocentre_m };
@@ -134,7 +148,8 @@ export async function showPlan(place, id) {
   const mapPlace = h('div', {});
   const changed = () => {
     corners.textContent = text.corners(model.region.length);
-    inputs.axes.forEach((input, i) => { input.value = model.isocentre?.[i] ?? ''; });
+    // Without a picked point the fields keep what was typed: it may be half of one.
+    if (model.isocentre) inputs.axes.forEach((input, i) => { input.value = model.isocentre[i]; });
   };
   let drawing = null;
   try {
@@ -145,30 +160,67 @@ export async function showPlan(place, id) {
     clear(mapPlace, h('p', { class: 'hint' }, error.message));
   }
   inputs.axes.forEach((input) => input.addEventListener('input', () => {
-    model.isocentre = inputs.axes.every((axis) => axis.value !== '') ? inputs.axes.map((axis) => Number(axis.value)) : null;
+    model.isocentre = inputs.isocentre();
+    inputs.bad.textContent = '';
     drawing?.draw();
   }));
   const save = action(text.save, async () => {
-    const answer = await put(`references/${id}/plan`, inputs.body());
-    done(text.saved);
-    if (answer.id && answer.id !== id) location.hash = `#/plan/${answer.id}`;
-    else await showPlan(place, id);
+    if (inputs.judge()) await store(() => put(`references/${reference.id}/plan`, inputs.body()), text.saved);
   }, { class: 'primary' });
-  const approve = action(text.approve, async () => {
-    await post(`references/${id}/approve`);
-    done(text.approved);
-    await showPlan(place, id);
-  }, {});
-  clear(place,
+  const approve = action(text.approve, () => store(() => post(`references/${reference.id}/approve`, { revision: reference.revision }), text.approved), {});
+  keepFocus(place, () => clear(place,
     h('h1', {}, `${text.reference} ${reference.version} · `, h('a', { href: `#/patient/${patient.id}` }, patient.code)),
     h('p', { class: 'lead' }, reference.approved_by ? S.patients.approvedBy(reference.approved_by, localTime(reference.approved_at)) : [h('span', { class: 'badge move' }, S.patients.draft), ` ${localTime(reference.created_at)}, ${reference.created_by}`]),
     h('div', { class: 'plan-grid' },
       h('section', { class: 'card' }, h('h2', {}, text.region), editable && h('p', { class: 'hint' }, text.regionHint), mapPlace, corners, editable && drawing && h('div', { class: 'row' }, action(text.clear, async () => drawing.clear(), {}), action(text.pick, async () => drawing.pick(), {}))),
       h('section', { class: 'card form' },
-        h('fieldset', {}, h('legend', {}, text.isocentre), h('p', { class: 'hint' }, text.isocentreHint), h('div', { class: 'triple' }, inputs.axes)),
+        h('fieldset', {}, h('legend', {}, text.isocentre), h('p', { class: 'hint' }, text.isocentreHint), h('div', { class: 'triple' }, inputs.axes), inputs.bad),
         h('fieldset', {}, h('legend', {}, text.tolerance), field(text.shift, inputs.shift), field(text.rotation, inputs.rotation)),
         field(text.posture, inputs.posture), inputs.couch.element,
         editable && h('p', { class: 'hint' }, reference.approved_by ? text.approvedHint : text.approveHint),
-        h('div', { class: 'row' }, editable && save, may('approve') && !reference.approved_by && approve))));
+        h('div', { class: 'row' }, editable && save, may('approve') && !reference.approved_by && approve)))));
   changed();
+  const begun = inputs.written();
+  return { isEdited: () => inputs.written() !== begun };
+}
+
+export async function showPlan(place, id) {
+  const text = S.plan;
+  let reference;
+  let shown;
+  let busy = false;  // with a change of our own, which is told to us too
+  const load = async () => {
+    reference = await get(`references/${id}`);
+    shown = await draft(place, reference, store);
+  };
+  const differs = async () => {
+    const stored = await get(`references/${id}`, true);
+    return stored.revision !== reference.revision || stored.approved_by !== reference.approved_by;
+  };
+  const store = async (request, words) => {
+    busy = true;
+    try {
+      const answer = await request();
+      done(words);
+      if (answer.id && answer.id !== id) location.hash = `#/plan/${answer.id}`;
+      else await load();
+    } catch (error) {
+      if (error.status !== 409 || !await differs()) throw error;
+      await load();
+      throw new Error(text.changedMeanwhile);
+    } finally {
+      busy = false;
+    }
+  };
+  const follow = async () => {
+    if (busy || !await differs() || busy) return;
+    if (shown.isEdited()) {
+      warn(text.changedWhileEditing);
+      return;
+    }
+    await load();
+    say(text.reloaded, true);
+  };
+  await load();
+  return live.listen((kind) => { if (kind === 'data') follow().catch(() => {}); });
 }

@@ -22,7 +22,13 @@ function userRow(user, reload) {
   const fresh = password({ minlength: 10 });
   return h('tr', {}, h('td', {}, user.name), h('td', {}, S.roles[user.role]), h('td', {}, user.disabled ? text.disabled : `✓ ${text.active}`), h('td', {}, localTime(user.created_at)),
     h('td', {}, h('details', {}, h('summary', { 'aria-label': `${text.change} ${user.name}` }, text.change), form({ class: 'form' }, async () => {
-      await put(`users/${user.name}`, { role: role.value, disabled: disabled.box.checked, password: fresh.value });
+      // Only what this person changed: the rest may have been changed by somebody else since it was read.
+      const changes = {};
+      if (role.value !== user.role) changes.role = role.value;
+      if (disabled.box.checked !== user.disabled) changes.disabled = disabled.box.checked;
+      if (fresh.value) changes.password = fresh.value;
+      if (!Object.keys(changes).length) throw new Error(text.unchanged);
+      await put(`users/${user.name}`, changes);
       done(S.saved);
       if (user.name !== currentSession()?.user) await reload();
     }, field(text.role, role), disabled.element, field(text.newPassword, fresh), h('button', { class: 'primary' }, S.save)))));
