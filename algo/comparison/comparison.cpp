@@ -128,10 +128,15 @@ class Comparer {
   }
 
   bool Align() {
-    if (reference_.frame != SceneFrame::kReferenceMarker || !reference_.height_map) {
+    if (reference_.frame != SceneFrame::kReferenceMarker) {
       return Refuse(
-          "the reference scan did not see its reference marker, so it has no height map; scan the reference again with that marker in "
-          "view");
+          "the reference scan did not see its reference marker well enough, so it has no height map; scan the reference again with that "
+          "marker in view");
+    }
+    if (!reference_.height_map) {
+      return Refuse(
+          "the reference scan measured no surface around its reference marker, so it has no height map; lay the marker flat beside the "
+          "body and scan the reference again");
     }
     const double since_s = Now();
     AlignmentOutcome outcome = AlignScenes(reference_.markers, current_.markers, options_);

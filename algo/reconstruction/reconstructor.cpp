@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <utility>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -63,6 +65,29 @@ cv::Mat CorrectedDepth(const cv::Mat& depth_m, const CalibrationModel& calibrati
   return corrected;
 }
 
+double Median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Why no point of the scene is left. The depth is the median over the frames' own.
+std::string WhyNoSurface(std::span<const ViewSurface> surfaces, double median_depth_m) {
+  const ViewSurfaceOptions range;
+  const bool measured = std::any_of(surfaces.begin(), surfaces.end(), [](const ViewSurface& surface) {
+    return std::any_of(surface.pixels.begin(), surface.pixels.end(), [](const ViewSurface::Pixel& pixel) { return pixel.weight > 0; });
+  });
+  if (measured)
+    return fmt::format(
+        "no surface was seen alike by two of {} keyframes (depth {:.2f} m in the median): sweep slowly over a scene that stands still",
+        surfaces.size(), median_depth_m);
+  return fmt::format(
+      "no usable surface in {} keyframes: depth is {:.2f} m in the median, expected from {:.1f} to {:.1f} m; check depth_scale in "
+      "camera.yaml and "
+      "the distance to the scene",
+      surfaces.size(), median_depth_m, range.min_depth_m, range.max_depth_m);
+}
+
 }  // namespace
 
 struct Reconstructor::Impl {
@@ -70,7 +95,7 @@ struct Reconstructor::Impl {
   ReconstructorOptions options;
   Tracker tracker;
   std::int64_t dropped = 0;
-  bool depth_seen = false;
+  std::vector<double> median_depths_m;  // Of the frames that have any.
   std::vector<double> tracking_times_s;
   double finish_start_s = 0;
 
@@ -113,9 +138,9 @@ struct Reconstructor::Impl {
     }
     report.valid_depth = total > 0 ? static_cast<double>(z.size()) / total : 0.0;
     if (z.empty()) return;
-    depth_seen = true;
     std::nth_element(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2), z.end());
     report.median_depth_m = z[z.size() / 2];
+    median_depths_m.push_back(report.median_depth_m);
   }
 
   // ---- after the last frame --------------------------------------------------------------------------------------
@@ -123,7 +148,7 @@ struct Reconstructor::Impl {
   void CheckInput(const std::vector<TrackedFrame>& frames) const {
     if (frames.size() < 2)
       throw DataError(fmt::format("the recording has {} usable frame(s), a scene needs at least 2: record a sweep", frames.size()));
-    if (!depth_seen)
+    if (median_depths_m.empty())
       throw DataError(
           fmt::format("all {} depth images are empty (0 everywhere): check the sensor's depth stream and depth_scale", frames.size()));
   }
@@ -153,11 +178,7 @@ struct Reconstructor::Impl {
     if (scene.height_map)
       scene.mesh = MeshOfHeightMap(*scene.height_map, ColorsFromCloud(*scene.height_map, scene.cloud), {.decimation = 2});
     scene.timings_s["mesh"] = Now() - stage;
-    if (!tracking_times_s.empty()) {
-      std::vector<double> times = tracking_times_s;
-      std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
-      scene.timings_s["tracking_per_frame_median"] = times[times.size() / 2];
-    }
+    if (!tracking_times_s.empty()) scene.timings_s["tracking_per_frame_median"] = Median(tracking_times_s);
     scene.timings_s["after_last_frame"] = Now() - start;
     report(1.0, "done");
     return scene;
@@ -189,6 +210,7 @@ struct Reconstructor::Impl {
     cloud_options.with_colors = options.keep_color;
     cloud_options.stop = stop;
     scene.cloud = MergeSurface(surfaces, cloud_options);
+    if (scene.cloud.empty()) throw DataError(WhyNoSurface(surfaces, Median(median_depths_m)));
     scene.timings_s["clouds"] = Now() - stage;
 
     report(0.8, "height map");
@@ -196,7 +218,7 @@ struct Reconstructor::Impl {
     RobustHeightMapOptions map_options;
     map_options.stop = stop;
     map_options.with_colors = false;  // The mesh takes its colours from the cloud.
-    if (scene.frame == SceneFrame::kReferenceMarker) scene.height_map = RobustHeightMap(surfaces, map_options).map;
+    if (scene.frame == SceneFrame::kReferenceMarker) KeepHeightMap(RobustHeightMap(surfaces, map_options).map, scene);
     scene.timings_s["height_map"] = Now() - stage;
   }
 
@@ -247,7 +269,20 @@ struct Reconstructor::Impl {
       views.push_back(std::move(view));
     }
     scene.cloud = MergeSurface(views, {.with_colors = options.keep_color, .stop = stop});
-    scene.height_map = paper.height_map;
+    if (scene.cloud.empty()) throw DataError(WhyNoSurface(PrepareViews(views), Median(median_depths_m)));
+    if (paper.height_map) KeepHeightMap(*paper.height_map, scene);
+  }
+
+  // Only a map that shows something: one without cells cannot even be stored, and an empty one compares with nothing.
+  static void KeepHeightMap(HeightMap map, Scene& scene) {
+    if (std::any_of(map.z.begin(), map.z.end(), [](float z) { return std::isfinite(z); })) {
+      scene.height_map = std::move(map);
+      return;
+    }
+    scene.warnings.push_back(
+        fmt::format("no surface was measured around reference marker {}, up to some decimetres below and above it: the scene has no height "
+                    "map and cannot be a reference; lay the marker flat beside the body and sweep over both",
+                    scene.reference_marker.value_or(-1)));
   }
 
   // Evenly spread over the sweep; of each stretch the keyframe that sees the most markers, because a marker is known from these

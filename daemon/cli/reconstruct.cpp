@@ -33,7 +33,8 @@ std::string Summary(const Scene& scene, const std::filesystem::path& out) {
     const GridShape& grid = scene.height_map->grid;
     text += fmt::format("  height map {} x {} cells of {:.3g} mm\n", grid.width, grid.height, grid.step * 1000);
   } else {
-    text += "  height map none: the reference marker was not seen\n";
+    text += scene.frame == SceneFrame::kReferenceMarker ? "  height map none: no surface around the reference marker\n"
+                                                        : "  height map none: not in the reference marker's frame\n";
   }
   text += fmt::format("  surface    {} points, {} triangles\n", scene.cloud.size(), scene.mesh.triangles.size());
   if (const auto after = scene.timings_s.find("after_last_frame"); after != scene.timings_s.end()) {
@@ -61,7 +62,9 @@ int Run(const Options& options, const CommandContext& context) {
 
 Command AddReconstruct(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("recording", options->recording, "Recording: a folder in the TUM RGB-D layout, or an .oni file")->required()->type_name("RECORDING");
+  app.add_option("recording", options->recording, "Recording: a folder in the TUM RGB-D layout, or an .oni file")
+      ->required()
+      ->type_name("RECORDING");
   app.add_option("--out", options->out, "Scene folder to write")->required()->type_name("SCENE");
   options->method.AddTo(app);
   app.add_flag("--realtime", options->realtime, "Play the recording at its own pace, dropping frames as a live sensor would");

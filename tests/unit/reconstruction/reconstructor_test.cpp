@@ -174,6 +174,31 @@ TEST_F(ReconstructorTest, CountsLostAndDroppedFrames) {
   EXPECT_NEAR(scene.longest_lost_s, 2 / 15.0, 0.01);
 }
 
+// The sweep with its depth read in a wrong unit.
+std::vector<Frame> Scaled(const std::vector<Frame>& frames, double scale) {
+  std::vector<Frame> scaled = frames;
+  for (Frame& frame : scaled) frame.depth_m = cv::Mat(frame.depth_m * scale);
+  return scaled;
+}
+
+TEST_F(ReconstructorTest, NoSurfaceAroundTheReferenceMarkerIsNoHeightMap) {
+  Reconstructor reconstructor(sweep().info, {});
+  // Three times as far: in range of the sensor, and a metre and a half below the marker.
+  for (const Frame& frame : Scaled(sweep().frames, 3.0)) reconstructor.AddFrame(frame);
+  const Scene scene = reconstructor.Finish();
+  EXPECT_EQ(scene.frame, SceneFrame::kReferenceMarker);
+  EXPECT_FALSE(scene.cloud.empty());
+  EXPECT_FALSE(scene.height_map.has_value()) << scene.height_map->grid.width << " columns";
+  ASSERT_FALSE(scene.warnings.empty());
+  EXPECT_THAT(scene.warnings.back(), HasSubstr("no surface was measured around reference marker"));
+}
+
+TEST_F(ReconstructorTest, DepthOutOfRangeIsRefusedWithItsDistance) {
+  const std::string message = Refusal(Scaled(sweep().frames, 8.0));
+  fmt::print("{}\n", message);
+  EXPECT_THAT(message, HasSubstr("expected from 0.3 to 4.0 m; check depth_scale"));
+}
+
 TEST_F(ReconstructorTest, StopsOnRequest) {
   Reconstructor reconstructor(sweep().info, {});
   for (std::size_t i = 0; i < 3; ++i) reconstructor.AddFrame(sweep().frames[i]);
