@@ -7,6 +7,17 @@ namespace {
 
 constexpr double kMaxGap_s = 0.3;  // Neighbours farther apart tell nothing of a velocity.
 
+constexpr double kUsualSpacings = 3.0;  // A live stream on a busy machine skips one or two images at a time.
+
+// Median, so that gaps do not count as usual, and a recording of any rate has its own.
+double UsualSpacing(const std::vector<TrackedFrame>& frames) {
+  std::vector<double> spacings_s;
+  for (std::size_t i = 1; i < frames.size(); ++i) spacings_s.push_back(frames[i].color_time_s - frames[i - 1].color_time_s);
+  const auto middle = spacings_s.begin() + static_cast<std::ptrdiff_t>(spacings_s.size() / 2);
+  std::nth_element(spacings_s.begin(), middle, spacings_s.end());
+  return *middle;
+}
+
 const Pose& KeyframePose(const TrackingMap& map, int keyframe) {
   return map.keyframes.at(static_cast<std::size_t>(keyframe)).T_world_color;
 }
@@ -72,6 +83,7 @@ std::vector<StampedPose> DepthTrajectory(const std::vector<TrackedFrame>& frames
 
 double LongestLost(const std::vector<TrackedFrame>& frames) {
   if (frames.size() < 2) return 0.0;
+  const double longest_usual_s = kUsualSpacings * UsualSpacing(frames);
   double longest = 0.0;
   double last_tracked_s = frames.front().color_time_s;
   bool lost = false;
@@ -81,7 +93,7 @@ double LongestLost(const std::vector<TrackedFrame>& frames) {
       longest = std::max(longest, frame.color_time_s - last_tracked_s);
       continue;
     }
-    if (lost) longest = std::max(longest, frame.color_time_s - last_tracked_s);
+    if (lost || frame.color_time_s - last_tracked_s > longest_usual_s) longest = std::max(longest, frame.color_time_s - last_tracked_s);
     lost = false;
     last_tracked_s = frame.color_time_s;
   }

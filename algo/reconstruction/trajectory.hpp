@@ -20,7 +20,8 @@ void RefreshVelocities(std::vector<TrackedFrame>& frames, TrackingMap& map);
 [[nodiscard]] std::vector<StampedPose> DepthTrajectory(const std::vector<TrackedFrame>& frames, const TrackingMap& map,
                                                        const CalibrationModel& calibration, const Pose& T_scene_world);
 
-/// Longest time without a pose: between tracked frames beyond their usual spacing, and lost at either end; seconds.
+/// Longest time without a pose, seconds: between tracked frames with lost ones between them or three times farther apart
+/// than usual (the median spacing of the recording: images that never came), and lost at either end.
 [[nodiscard]] double LongestLost(const std::vector<TrackedFrame>& frames);
 
 }  // namespace plumb

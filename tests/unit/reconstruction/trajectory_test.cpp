@@ -101,5 +101,22 @@ TEST(LongestLost, CountsTheTimeWithoutAPose) {
   EXPECT_NEAR(LongestLost(path.frames), 0.4, 1e-12) << "lost to the end";
 }
 
+TEST(LongestLost, CountsImagesThatNeverCame) {
+  Path path = Tracked();
+  for (std::size_t i = 3; i < 6; ++i) path.frames[i].color_time_s += 1.5;
+  EXPECT_NEAR(LongestLost(path.frames), 1.6, 1e-12) << "between two tracked frames";
+  path.frames[3].tracked = false;
+  EXPECT_NEAR(LongestLost(path.frames), 1.7, 1e-12) << "and to the next frame that was tracked";
+}
+
+TEST(LongestLost, LowAndUnevenRatesAreNoGaps) {
+  Path path = Tracked();
+  for (TrackedFrame& frame : path.frames) frame.color_time_s = 1.2 * static_cast<double>(frame.frame_index);
+  EXPECT_EQ(LongestLost(path.frames), 0.0) << "a slow recording";
+  const std::vector<double> uneven = {0.0, 0.04, 0.11, 0.24, 0.30, 0.36};  // Two images skipped now and then.
+  for (std::size_t i = 0; i < uneven.size(); ++i) path.frames[i].color_time_s = uneven[i];
+  EXPECT_EQ(LongestLost(path.frames), 0.0);
+}
+
 }  // namespace
 }  // namespace plumb
