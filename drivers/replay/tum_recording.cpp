@@ -27,6 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kMaxGapPeriods = 0.55;
 constexpr std::size_t kMaxIndexBytes = std::size_t{64} << 20;
 constexpr std::size_t kMaxCameraBytes = std::size_t{1} << 16;
 constexpr std::size_t kReadAhead = 3;
@@ -59,6 +60,16 @@ std::vector<IndexEntry> ReadIndex(const fs::path& file) {
   std::vector<IndexEntry> entries = ParseIndex(ReadTextFile(file, kMaxIndexBytes), file.string());
   if (entries.empty()) throw DataError(fmt::format("{} lists no image", file.string()));
   return entries;
+}
+
+/// Typical time from one image to the next; 0 if there is only one.
+double MedianPeriod(const std::vector<IndexEntry>& entries) {
+  std::vector<double> periods_s;
+  for (std::size_t i = 1; i < entries.size(); ++i) periods_s.push_back(entries[i].time_s - entries[i - 1].time_s);
+  if (periods_s.empty()) return 0.0;
+  const auto middle = periods_s.begin() + static_cast<std::ptrdiff_t>(periods_s.size() / 2);
+  std::nth_element(periods_s.begin(), middle, periods_s.end());
+  return *middle;
 }
 
 /// The real place of an image, which must lie in the recording's folder even where links lead.
@@ -132,17 +143,19 @@ struct TumRecording::Impl {
   bool finished = false;  ///< The thread will add nothing more.
   std::jthread thread;    ///< Last member: joined before the others go.
 
-  void FindFrames(const fs::path& folder, double max_gap_s);
+  void FindFrames(const fs::path& folder, double least_max_gap_s);
   void ReadCamera(const fs::path& folder, const RecordingDefaults& defaults);
   [[nodiscard]] Decoded Decode(std::size_t i) const;
   void DecodeAll(const std::stop_token& stop);
 };
 
-void TumRecording::Impl::FindFrames(const fs::path& folder, double max_gap_s) {
+void TumRecording::Impl::FindFrames(const fs::path& folder, double least_max_gap_s) {
   const fs::path color_index = folder / "rgb.txt";
   const fs::path depth_index = folder / "depth.txt";
   const std::vector<IndexEntry> color = ReadIndex(color_index);
   const std::vector<IndexEntry> depth = ReadIndex(depth_index);
+  // The nearest partner is never more than half a period off; a tenth of that for jitter.
+  const double max_gap_s = std::max(least_max_gap_s, kMaxGapPeriods * std::max(MedianPeriod(color), MedianPeriod(depth)));
   const std::vector<IndexPair> pairs = AssociateByTime(color, depth, max_gap_s);
   if (pairs.size() < kMinFrames) {
     throw DataError(

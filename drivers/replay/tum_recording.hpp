@@ -16,7 +16,9 @@ struct RecordingDefaults {
   std::string marker_dictionary = "DICT_6X6_250";
   double marker_length_m = 0.104;
   std::optional<int> reference_marker;
-  double max_stamp_gap_s = 0.020;  ///< Largest difference between the stamps of a colour image and its depth image.
+  /// Largest difference between the stamps of a colour image and its depth image; 0.55 periods of the slower stream, if that is more:
+  /// streams of a low rate that run half a period apart still pair.
+  double max_stamp_gap_s = 0.020;
 };
 
 /// What reading has found so far; complete once Next() has returned nothing.

@@ -135,6 +135,43 @@ TEST_F(TumRecordingTest, UnmatchedImagesAreLeftOutAndCounted) {
   EXPECT_EQ(after_gap->index, 3);
 }
 
+// A recording of its own rate whose depth stamps lie that much later.
+std::unique_ptr<TumRecording> OpenWithOffset(const fs::path& folder, double rate_hz, double offset_s) {
+  TumWriter writer(folder, SmallCamera(), {.jpeg_quality = 0});
+  for (int i = 0; i < kNumFrames; ++i) {
+    Frame frame = NumberedFrame(i);
+    frame.color_time_s = 1000.0 + i / rate_hz;
+    frame.depth_time_s = frame.color_time_s + offset_s;
+    writer.Add(frame);
+  }
+  writer.Finish();
+  return TumRecording::Open(folder);
+}
+
+TEST_F(TumRecordingTest, SlowStreamsPairWithTheirNearestWhateverTheirOffset) {
+  for (const int offset_ms : {0, 19, 25, 30, 33}) {
+    const auto source = OpenWithOffset(folder_ / fmt::format("offset{}", offset_ms), 15.0, offset_ms * 1e-3);
+    EXPECT_EQ(source->info().num_frames, kNumFrames) << offset_ms;
+    EXPECT_EQ(source->statistics().num_unmatched_color, 0) << offset_ms;
+    const std::optional<Frame> frame = source->Next();
+    ASSERT_TRUE(frame);
+    EXPECT_NEAR(frame->depth_time_s - frame->color_time_s, offset_ms * 1e-3, 2e-6);
+  }
+}
+
+TEST_F(TumRecordingTest, SlowStreamsDoNotPairAcrossALostImage) {
+  const fs::path slow = folder_ / "slow";
+  static_cast<void>(OpenWithOffset(slow, 15.0, 0.005));
+  std::string index = ReadTextFile(slow / "depth.txt", 1 << 20);
+  const std::size_t line = index.find("1000.205");  // frame 3
+  ASSERT_NE(line, std::string::npos);
+  index.erase(line, index.find('\n', line) + 1 - line);
+  WriteWholeFile(slow / "depth.txt", index);
+  const auto source = TumRecording::Open(slow);
+  EXPECT_EQ(source->info().num_frames, kNumFrames - 1);
+  while (const auto frame = source->Next()) EXPECT_NEAR(frame->depth_time_s - frame->color_time_s, 0.005, 2e-6);
+}
+
 TEST_F(TumRecordingTest, WithoutCameraFileTumsCameraIsAssumedAtTheImagesSize) {
   fs::remove(recording_ / "camera.yaml");
   const auto source = TumRecording::Open(recording_, {.marker_dictionary = "DICT_4X4_50", .marker_length_m = 0.1, .reference_marker = 9});
