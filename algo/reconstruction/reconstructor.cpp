@@ -25,7 +25,9 @@ namespace plumb {
 namespace {
 
 constexpr std::size_t kMaxPaperKeyframes = 20;  // The paper had about 15 a sweep.
-constexpr int kMinReferenceViews = 3;           // Of the reference marker, before the scene's frame is built on it.
+// Of the reference marker, before the scene's frame is built on it. A sensor that hardly moves has one keyframe, so frames count too.
+constexpr int kMinReferenceViews = 3;
+constexpr int kMinReferenceFrames = 5;
 
 TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
   TrackerOptions tracking;
@@ -193,13 +195,16 @@ struct Reconstructor::Impl {
     JointRegistrationOptions joint_options;
     joint_options.marker_length_m = info.marker_length_m;
     const JointRegistrationResult joint = RegisterJointly(info.intrinsics, joint_options, map, stop);
+    const double solved = Now();
     scene = MakeScene(frames, map, joint.calibration, SceneFromWorld(map));
+    WarnOfFrame(map, scene);
     for (const auto& [name, value] : joint.calibration.Named()) scene.calibration[name] = value;
     scene.calibration["consistency_before_m"] = joint.consistency_before_m;
     scene.calibration["consistency_after_m"] = joint.consistency_after_m;
     if (!joint.accepted && joint.num_pairs > 0)
       scene.warnings.push_back("the dense registration did not make the views agree better and was left out");
-    scene.timings_s["global_registration"] = Now() - stage;
+    scene.timings_s["global_registration"] = solved - stage;
+    scene.timings_s["markers"] = Now() - solved;  // The joint solve has done their work: this puts them into the scene's frame.
 
     report(0.5, "surface");
     stage = Now();
@@ -259,6 +264,7 @@ struct Reconstructor::Impl {
     scene.markers = paper.markers_in_world;
     for (auto& [id, marker] : scene.markers)
       for (Eigen::Vector3d& corner : marker.corners) corner = T_scene_world * corner;
+    WarnOfFrame(map, scene);
     scene.keyframes.clear();
     std::vector<DepthView> views;
     for (std::size_t j = 0; j < keyframes.size(); ++j) {
@@ -307,7 +313,7 @@ struct Reconstructor::Impl {
   [[nodiscard]] bool HasReferenceMarker(const TrackingMap& map) const {
     if (!info.reference_marker) return false;
     const auto found = map.markers.find(*info.reference_marker);
-    return found != map.markers.end() && found->second.num_views >= kMinReferenceViews;
+    return found != map.markers.end() && (found->second.num_views >= kMinReferenceViews || found->second.num_frames >= kMinReferenceFrames);
   }
 
   [[nodiscard]] Pose SceneFromWorld(const TrackingMap& map) const {
@@ -332,20 +338,36 @@ struct Reconstructor::Impl {
     scene.frames_dropped = dropped;
     scene.longest_lost_s = LongestLost(frames);
     for (const auto& [id, marker] : map.markers) scene.markers[id] = ToSceneMarker(marker, T_scene_world);
-    if (scene.markers.empty())
-      scene.warnings.push_back("no marker was seen: the scene lies in the first keyframe's frame and cannot be compared");
-    if (!scene.markers.empty() && scene.frame == SceneFrame::kFirstKeyframe)
-      scene.warnings.push_back(
-          info.reference_marker
-              ? fmt::format(
-                    "reference marker {} was not seen well enough: the scene lies in the first keyframe's frame, without a height map",
-                    *info.reference_marker)
-              : "no reference marker is configured: the scene lies in the first keyframe's frame, without a height map");
     if (scene.frames_tracked < scene.frames_total - dropped)
       scene.warnings.push_back(fmt::format("{} of {} frames were not tracked, {:.2f} s at longest",
                                            scene.frames_total - dropped - scene.frames_tracked, scene.frames_total - dropped,
                                            scene.longest_lost_s));
     return scene;
+  }
+
+  // On the frame that was decided in the end, which the presets do differently.
+  void WarnOfFrame(const TrackingMap& map, Scene& scene) const {
+    if (scene.markers.empty()) {
+      scene.warnings.push_back("no marker was seen: the scene lies in the first keyframe's frame and cannot be compared");
+    } else if (!info.reference_marker) {
+      scene.warnings.push_back("no reference marker is configured: the scene lies in the first keyframe's frame, without a height map");
+    } else if (scene.frame == SceneFrame::kFirstKeyframe && options.preset == Preset::kPaper) {
+      scene.warnings.push_back(
+          fmt::format("no keyframe measured reference marker {} in depth at all its corners: the scene lies in the first keyframe's frame, "
+                      "without a height map; keep the marker in view",
+                      *info.reference_marker));
+    } else if (scene.frame == SceneFrame::kFirstKeyframe) {
+      const auto found = map.markers.find(*info.reference_marker);
+      const MapMarker seen = found == map.markers.end() ? MapMarker{} : found->second;
+      scene.warnings.push_back(fmt::format(
+          "reference marker {} was seen in {} keyframes and {} tracked frames, {} or {} are needed: the scene lies in the first "
+          "keyframe's frame, without a height map; keep the marker in view",
+          *info.reference_marker, seen.num_views, seen.num_frames, kMinReferenceViews, kMinReferenceFrames));
+    } else if (const int views = scene.markers.at(*info.reference_marker).num_views; views < kMinReferenceViews) {
+      scene.warnings.push_back(
+          fmt::format("reference marker {} was seen from {} place{} only: the scene's frame is less certain than that of a sweep",
+                      *info.reference_marker, views, views == 1 ? "" : "s"));
+    }
   }
 
   [[nodiscard]] SceneMarker ToSceneMarker(const MapMarker& marker, const Pose& T_scene_world) const {

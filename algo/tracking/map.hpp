@@ -53,7 +53,8 @@ struct MapKeyframe {
 /// A marker of the map, as a rigid square of known side.
 struct MapMarker {
   Pose T_world_marker = Pose::Identity();
-  int num_views = 0;
+  int num_views = 0;   ///< Keyframes that show it.
+  int num_frames = 0;  ///< Tracked frames, keyframes or not, that agree on all its corners; the one that began the map counts.
 };
 
 struct TrackingMap {

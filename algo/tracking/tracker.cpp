@@ -244,16 +244,25 @@ struct Tracker::Impl {
         }
       }
       result.num_keypoints = static_cast<int>(active.size());
-      result.num_markers = CountMarkers(estimate, num_corners);
+      result.num_markers = CountMarkers(prepared.markers, estimate);
       return estimate;
     }
     return std::nullopt;
   }
 
-  static int CountMarkers(const PoseEstimate& estimate, std::size_t num_corners) {
+  // Those whose corners all agree with the pose; their points are the estimate's first, as AddMarkerPoints() adds them.
+  int CountMarkers(const std::vector<MarkerObservation>& markers, const PoseEstimate& estimate) {
     int count = 0;
-    for (std::size_t i = 0; i + 3 < num_corners; i += 4)
-      count += estimate.inlier[i] && estimate.inlier[i + 1] && estimate.inlier[i + 2] && estimate.inlier[i + 3] ? 1 : 0;
+    std::size_t i = 0;
+    for (const MarkerObservation& m : markers) {
+      const auto known = map.markers.find(m.id);
+      if (known == map.markers.end()) continue;
+      if (estimate.inlier[i] && estimate.inlier[i + 1] && estimate.inlier[i + 2] && estimate.inlier[i + 3]) {
+        ++known->second.num_frames;
+        ++count;
+      }
+      i += 4;
+    }
     return count;
   }
 
@@ -276,7 +285,7 @@ struct Tracker::Impl {
       Reassociate(prepared, frame.depth_m, found->T_world_color, KeyframesNear(found->T_world_color, map.keyframes.size()), problem.points);
       PoseEstimate estimate = OptimizePose(problem, found->T_world_color);
       if (Plausible(estimate, problem.points.size(), 1.0)) {
-        result.num_markers = CountMarkers(estimate, num_corners);
+        result.num_markers = CountMarkers(prepared.markers, estimate);
         result.num_keypoints = static_cast<int>(active.size());
         keyframe_wanted = true;
         return estimate;
@@ -527,7 +536,7 @@ struct Tracker::Impl {
       if (known == map.markers.end()) {
         const auto T_camera_marker = MarkerPoseInCamera(info.intrinsics, info.marker_length_m, m, depth_m);
         if (!T_camera_marker) continue;
-        known = map.markers.emplace(m.id, MapMarker{keyframe.T_world_color * *T_camera_marker, 0}).first;
+        known = map.markers.emplace(m.id, MapMarker{keyframe.T_world_color * *T_camera_marker, 0, 1}).first;
       }
       ++known->second.num_views;
     }

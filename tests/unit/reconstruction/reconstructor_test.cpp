@@ -9,6 +9,7 @@
 #include <tbb/global_control.h>
 
 #include "algo/types/errors.hpp"
+#include "algo/types/units.hpp"
 #include "tests/unit/tracking/ball_sweep.hpp"
 
 namespace plumb {
@@ -191,6 +192,68 @@ TEST_F(ReconstructorTest, NoSurfaceAroundTheReferenceMarkerIsNoHeightMap) {
   EXPECT_FALSE(scene.height_map.has_value()) << scene.height_map->grid.width << " columns";
   ASSERT_FALSE(scene.warnings.empty());
   EXPECT_THAT(scene.warnings.back(), HasSubstr("no surface was measured around reference marker"));
+}
+
+// The first view of the sweep again and again, as from a tripod.
+std::vector<Frame> Static(const std::vector<Frame>& frames, int count) {
+  std::vector<Frame> still(static_cast<std::size_t>(count), frames.front());
+  for (int i = 0; i < count; ++i) {
+    Frame& frame = still[static_cast<std::size_t>(i)];
+    frame.index = i;
+    frame.color_time_s += i / 15.0;
+    frame.depth_time_s += i / 15.0;
+  }
+  return still;
+}
+
+TEST_F(ReconstructorTest, SensorOnATripodGetsTheReferenceMarkersFrame) {
+  Reconstructor reconstructor(sweep().info, {});
+  for (const Frame& frame : Static(sweep().frames, 30)) reconstructor.AddFrame(frame);
+  const Scene scene = reconstructor.Finish();
+  EXPECT_EQ(scene.keyframes.size(), 1U) << "else this tests nothing";
+  ASSERT_EQ(scene.frame, SceneFrame::kReferenceMarker);
+  ASSERT_TRUE(scene.height_map.has_value());
+  EXPECT_THAT(scene.warnings, testing::Contains(HasSubstr("from 1 place only")));
+  EXPECT_GT(scene.markers.at(kReferenceBoard).sigma_m, 0.004);
+  const Pose T_true = sweep().T_world_reference.inverse() * sweep().T_world_color.front();
+  const Pose T_error = T_true.inverse() * scene.trajectory.front().T_world_camera;
+  const double turn_deg = Eigen::AngleAxisd(T_error.linear()).angle() / kDegree;
+  fmt::print("tripod: {:.2e} m, {:.3f} deg\n", T_error.translation().norm(), turn_deg);
+  EXPECT_LT(T_error.translation().norm(), 0.01);
+  EXPECT_LT(turn_deg, 1.0);
+}
+
+TEST_F(ReconstructorTest, AMarkerOfFewFramesIsNoFrameAndTheWarningSaysHowMany) {
+  Reconstructor reconstructor(sweep().info, {});
+  for (const Frame& frame : Static(sweep().frames, 4)) reconstructor.AddFrame(frame);
+  const Scene scene = reconstructor.Finish();
+  EXPECT_EQ(scene.frame, SceneFrame::kFirstKeyframe);
+  EXPECT_THAT(scene.warnings, testing::Contains(HasSubstr("in 1 keyframes and 4 tracked frames, 3 or 5 are needed")));
+}
+
+TEST_F(ReconstructorTest, PaperPresetWarnsOfItsOwnFrameOnly) {
+  ReconstructorOptions options;
+  options.preset = Preset::kPaper;
+  options.num_icp_iterations = 1;
+  Reconstructor reconstructor(sweep().info, options);
+  for (const Frame& frame : Static(sweep().frames, 4)) reconstructor.AddFrame(frame);
+  const Scene scene = reconstructor.Finish();
+  EXPECT_EQ(scene.frame, SceneFrame::kReferenceMarker) << "one keyframe is enough for the published means";
+  EXPECT_THAT(scene.warnings, testing::Not(testing::Contains(HasSubstr("first keyframe's frame"))));
+}
+
+TEST_F(ReconstructorTest, TimesEveryStage) {
+  for (const Preset preset : {Preset::kBest, Preset::kPaper}) {
+    ReconstructorOptions options;
+    options.preset = preset;
+    options.num_icp_iterations = 1;
+    double now_s = 0;
+    options.now_s = [&] { return now_s += 1.0; };
+    const Scene scene = Reconstruct(options);
+    for (const char* stage :
+         {"tracking_per_frame_median", "clouds", "global_registration", "markers", "height_map", "mesh", "after_last_frame"})
+      EXPECT_GT(scene.timings_s.count(stage), 0U) << Name(preset) << ": " << stage;
+  }
 }
 
 TEST_F(ReconstructorTest, DepthOutOfRangeIsRefusedWithItsDistance) {
