@@ -36,9 +36,9 @@ struct SceneEvaluation {
   std::int64_t frames_total = 0, frames_tracked = 0;
   std::size_t num_keyframes = 0, num_markers = 0;
   std::optional<TrajectoryError> keyframes, trajectory;
-  double marker_rms_mm = 0;            ///< Marker corners after their own best rigid fit to the true ones.
-  double marker_scale_permille = 0;    ///< By how much the marker map is too large.
-  std::optional<HeightError> heights;  ///< Against the true surface in the true reference marker's frame.
+  std::optional<double> marker_rms_mm;          ///< Marker corners after their own best rigid fit to the true ones; none matched: nothing.
+  std::optional<double> marker_scale_permille;  ///< By how much the marker map is too large.
+  std::optional<HeightError> heights;           ///< Against the true surface in the true reference marker's frame.
   std::optional<ShapeError> shape;
   std::map<std::string, double> calibration, timings_s;
 };

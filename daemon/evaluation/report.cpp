@@ -90,9 +90,11 @@ std::string SceneTable(const Evaluation& evaluation) {
       "|e|50   95th | after sweep (s)\n";
   for (const SceneEvaluation& s : evaluation.scenes) {
     text += fmt::format("  {:<10} {:>4}/{:<4} {:>8}   |", s.name, s.frames_tracked, s.frames_total, s.num_keyframes);
-    const TrajectoryError keys = s.keyframes.value_or(TrajectoryError{}), all = s.trajectory.value_or(TrajectoryError{});
-    text += fmt::format(" {:6.2f} {:6.2f} {:6.3f} {:5.1f} |", keys.rmse_mm, all.rmse_mm, keys.rotation_rmse_deg, keys.drift_mm);
-    text += fmt::format(" {:6.2f} {:+5.1f} |", s.marker_rms_mm, s.marker_scale_permille);
+    text += fmt::format(" {} {}", s.keyframes ? fmt::format("{:6.2f}", s.keyframes->rmse_mm) : "  none",
+                        s.trajectory ? fmt::format("{:6.2f}", s.trajectory->rmse_mm) : "  none");
+    text += s.keyframes ? fmt::format(" {:6.3f} {:5.1f} |", s.keyframes->rotation_rmse_deg, s.keyframes->drift_mm) : "   none  none |";
+    text += s.marker_rms_mm && s.marker_scale_permille ? fmt::format(" {:6.2f} {:+5.1f} |", *s.marker_rms_mm, *s.marker_scale_permille)
+                                                       : "   none  none |";
     if (s.heights) {
       text += fmt::format(" {:+5.2f} {:5.2f} {:5.2f} {:5.2f} {:4.1f}% |", s.heights->bias_mm, s.heights->median_abs_mm, s.heights->rmse_mm,
                           s.heights->p95_mm, 100 * s.heights->completeness);
@@ -181,14 +183,16 @@ ordered_json ToJson(const std::optional<ShapeError>& e) {
 
 ordered_json ToJson(const AlignmentError::Figures& f) { return {{"corners_mm", f.corners_mm}, {"body_mm", f.body_mm}}; }
 
+ordered_json OrNull(const std::optional<double>& value) { return value ? ordered_json(*value) : ordered_json(); }
+
 ordered_json ToJson(const SceneEvaluation& s) {
   return {{"frames", {{"total", s.frames_total}, {"tracked", s.frames_tracked}}},
           {"keyframes", s.num_keyframes},
           {"markers", s.num_markers},
           {"trajectory_keyframes", ToJson(s.keyframes)},
           {"trajectory_all", ToJson(s.trajectory)},
-          {"marker_rms_mm", s.marker_rms_mm},
-          {"marker_scale_permille", s.marker_scale_permille},
+          {"marker_rms_mm", OrNull(s.marker_rms_mm)},
+          {"marker_scale_permille", OrNull(s.marker_scale_permille)},
           {"heights", ToJson(s.heights)},
           {"shape", ToJson(s.shape)},
           {"calibration", s.calibration},

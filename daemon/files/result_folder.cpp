@@ -46,6 +46,7 @@ Json AlignmentJson(const Alignment& alignment) {
   Json rejected = Json::object();
   for (const auto& [id, residual_m] : alignment.markers_rejected) rejected[std::to_string(id)] = residual_m;
   return {{"T_reference_current", MatrixJson(alignment.T_reference_current.matrix())},
+          {"stretch", MatrixJson(alignment.stretch)},
           {"rms_m", alignment.rms_m},
           {"markers_used", alignment.markers_used},
           {"markers_rejected", rejected},

@@ -3,9 +3,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "algo/types/errors.hpp"
 #include "daemon/evaluation/evaluation.hpp"
+#include "daemon/evaluation/report.hpp"
 
 namespace plumb {
 namespace {
@@ -73,6 +75,24 @@ TEST(EvaluationStatisticsTest, APairWithoutAMotionIsCountedButIsNoZero) {
   EXPECT_EQ(evaluation.Total().num_no_answer, 1U);
   EXPECT_DOUBLE_EQ(evaluation.Total().translation_mm.mean, 6);
   EXPECT_DOUBLE_EQ(evaluation.OfReference("a").translation_mm.mean, 4);
+}
+
+TEST(EvaluationReportTest, WhatWasNotMeasuredIsNoZero) {
+  Evaluation evaluation;
+  evaluation.scenes.resize(1);
+  evaluation.scenes[0].name = "blind";
+  const std::string table = EvaluationTable(evaluation);
+  const std::string row = table.substr(table.find("  blind"), 100);
+  EXPECT_THAT(row, testing::Not(testing::HasSubstr("0.0"))) << row;
+  EXPECT_THAT(row, testing::HasSubstr("none"));
+  const auto scene = nlohmann::json::parse(EvaluationJson(evaluation)).at("scenes").at("blind");
+  for (const char* key : {"trajectory_keyframes", "trajectory_all", "marker_rms_mm", "marker_scale_permille"})
+    EXPECT_TRUE(scene.at(key).is_null()) << key;
+
+  evaluation.scenes[0].trajectory = TrajectoryError{.rmse_mm = 1.25};
+  evaluation.scenes[0].marker_rms_mm = 0.75;
+  evaluation.scenes[0].marker_scale_permille = 2.0;
+  EXPECT_THAT(EvaluationTable(evaluation), testing::AllOf(testing::HasSubstr("none   1.25"), testing::HasSubstr("|   0.75  +2.0 |")));
 }
 
 }  // namespace

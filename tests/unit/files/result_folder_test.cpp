@@ -46,6 +46,7 @@ Comparison Answer() {
   comparison.reasons = {"vertical is 9.0 mm off"};
   Alignment alignment;
   alignment.T_reference_current.translation() = Eigen::Vector3d(0.25, 0.5, 0.75);
+  alignment.stretch(0, 1) = 0.125;
   alignment.rms_m = 0.001;
   alignment.markers_used = {3, 5, 8};
   alignment.markers_rejected = {{7, 0.012}};
@@ -79,6 +80,7 @@ TEST(ResultFolderTest, HoldsTheKeysOfTheContract) {
   const auto& alignment = json.at("alignment");
   EXPECT_EQ(alignment.at("T_reference_current").at(1).at(3), 0.5);  // row-major: the translation is the last column
   EXPECT_EQ(alignment.at("T_reference_current").at(3), (nlohmann::json{0.0, 0.0, 0.0, 1.0}));
+  EXPECT_EQ(alignment.at("stretch").at(0), (nlohmann::json{1.0, 0.125, 0.0}));
   EXPECT_EQ(alignment.at("rms_m"), 0.001);
   EXPECT_EQ(alignment.at("markers_used"), (nlohmann::json{3, 5, 8}));
   EXPECT_EQ(alignment.at("markers_rejected").at("7"), 0.012);
