@@ -286,6 +286,12 @@ class Comparer {
 
   void CollectDoubts() {
     std::vector<std::string>& reasons = result_.reasons;
+    // The region would be all that was measured, and a couch that stands still would hide that the body moved.
+    if (!reference_body_.support && options_.region_polygon_m.empty()) {
+      reasons.push_back(
+          "no flat support was found in the reference scan, so nothing tells the body from what it lies on; draw a region on the body, or "
+          "scan the reference again with more of the couch in view");
+    }
     if (result_.region->coverage < options_.min_coverage) {
       reasons.push_back(fmt::format("the current scan covers {:.0f} % of the region, at least {:.0f} % are needed; sweep all of it",
                                     100 * result_.region->coverage, 100 * options_.min_coverage));

@@ -256,6 +256,27 @@ TEST(ComparisonTest, EachDoubtIsNoAnswerWithItsReason) {
   EXPECT_EQ(Compare(empty, PerfectReference()).verdict, Verdict::kNoAnswer);
 }
 
+TEST(ComparisonTest, WithoutASupportOnlyADrawnRegionGetsAVerdict) {
+  SyntheticOptions reference = ReferenceOptions();
+  reference.hidden = [](const Eigen::Vector3d& p) { return p.z() < 0.02; };  // The floor was not scanned.
+  const Scene floorless = MakeSyntheticScene(reference);
+  const Comparison all = Compare(floorless, MakeSyntheticScene(MovedBy(Pose::Identity(), reference)));
+  EXPECT_EQ(all.verdict, Verdict::kNoAnswer);
+  EXPECT_THAT(all.reasons.at(0), HasSubstr("no flat support was found in the reference scan"));
+  EXPECT_TRUE(all.motion) << "what was computed is told";
+
+  CompareOptions drawn;
+  drawn.region_polygon_m = {{0.35, 0.25}, {0.85, 0.25}, {0.85, 0.65}, {0.35, 0.65}};
+  const Comparison region = Compare(floorless, MakeSyntheticScene(MovedBy(Pose::Identity(), reference)), drawn);
+  EXPECT_EQ(region.verdict, Verdict::kInTolerance) << region.reasons.at(0);
+  CompareOptions paper;
+  paper.preset = Preset::kPaper;
+  EXPECT_NE(Compare(floorless, MakeSyntheticScene(MovedBy(Pose::Identity(), reference)), paper).verdict, Verdict::kNoAnswer);
+
+  // The region is the reference's: a current scan of the body alone is enough.
+  EXPECT_EQ(Compare(PerfectReference(), MakeSyntheticScene(MovedBy(Pose::Identity(), reference))).verdict, Verdict::kInTolerance);
+}
+
 TEST(ComparisonTest, CouchMarkersRefuseShiftsAndJudgePostureOnly) {
   CompareOptions options;
   options.marker_kind = MarkerKind::kCouch;
