@@ -310,7 +310,8 @@ class Comparer {
     }
     for (const auto& [scene, name] : {std::pair(&reference_, "reference"), std::pair(&current_, "current")}) {
       if (!(scene->longest_lost_s > options_.max_lost_s)) continue;
-      reasons.push_back(fmt::format("tracking was lost for {:.1f} s in the {} scan; sweep more slowly", scene->longest_lost_s, name));
+      reasons.push_back(fmt::format("tracking was lost for {:.1f} s in the {} scan, or no image came; sweep again, more slowly",
+                                    scene->longest_lost_s, name));
     }
     const auto u95 = Values(result_.correction->u95);
     for (std::size_t i = 0; i < 6; ++i) {

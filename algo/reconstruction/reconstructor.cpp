@@ -28,6 +28,7 @@ constexpr std::size_t kMaxPaperKeyframes = 20;  // The paper had about 15 a swee
 // Of the reference marker, before the scene's frame is built on it. A sensor that hardly moves has one keyframe, so frames count too.
 constexpr int kMinReferenceViews = 3;
 constexpr int kMinReferenceFrames = 5;
+constexpr double kGapWorthTelling_s = 0.5;  // A comparison refuses above 1 s.
 
 TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
   TrackerOptions tracking;
@@ -338,10 +339,14 @@ struct Reconstructor::Impl {
     scene.frames_dropped = dropped;
     scene.longest_lost_s = LongestLost(frames);
     for (const auto& [id, marker] : map.markers) scene.markers[id] = ToSceneMarker(marker, T_scene_world);
-    if (scene.frames_tracked < scene.frames_total - dropped)
+    if (scene.frames_tracked < scene.frames_total - dropped) {
       scene.warnings.push_back(fmt::format("{} of {} frames were not tracked, {:.2f} s at longest",
                                            scene.frames_total - dropped - scene.frames_tracked, scene.frames_total - dropped,
                                            scene.longest_lost_s));
+    } else if (scene.longest_lost_s > kGapWorthTelling_s) {
+      scene.warnings.push_back(
+          fmt::format("no image came for {:.2f} s in the sweep; what the sensor passed meanwhile is missing", scene.longest_lost_s));
+    }
     return scene;
   }
 

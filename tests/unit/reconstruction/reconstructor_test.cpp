@@ -262,6 +262,17 @@ TEST_F(ReconstructorTest, DepthOutOfRangeIsRefusedWithItsDistance) {
   EXPECT_THAT(message, HasSubstr("expected from 0.3 to 4.0 m; check depth_scale"));
 }
 
+TEST_F(ReconstructorTest, ImagesThatNeverCameAreTold) {
+  std::vector<Frame> frames = Static(sweep().frames, 12);
+  for (std::size_t i = 6; i < frames.size(); ++i) frames[i].color_time_s += 1.5, frames[i].depth_time_s += 1.5;
+  Reconstructor reconstructor(sweep().info, {});
+  for (const Frame& frame : frames) reconstructor.AddFrame(frame);
+  const Scene scene = reconstructor.Finish();
+  EXPECT_EQ(scene.frames_tracked, 12);
+  EXPECT_NEAR(scene.longest_lost_s, 1.5 + 1 / 15.0, 1e-6);
+  EXPECT_THAT(scene.warnings, testing::Contains(HasSubstr("no image came for 1.57 s")));
+}
+
 TEST_F(ReconstructorTest, StopsOnRequest) {
   Reconstructor reconstructor(sweep().info, {});
   for (std::size_t i = 0; i < 3; ++i) reconstructor.AddFrame(sweep().frames[i]);
