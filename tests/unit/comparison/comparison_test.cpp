@@ -248,6 +248,8 @@ TEST(ComparisonTest, EachDoubtIsNoAnswerWithItsReason) {
   frameless.frame = SceneFrame::kFirstKeyframe;
   frameless.height_map.reset();
   EXPECT_THAT(Compare(frameless, PerfectReference()).reasons.at(0), HasSubstr("did not see its reference marker"));
+  frameless.frame = SceneFrame::kReferenceMarker;
+  EXPECT_THAT(Compare(frameless, PerfectReference()).reasons.at(0), HasSubstr("measured no surface around its reference marker"));
 
   Scene empty = PerfectReference();
   empty.cloud = {};
