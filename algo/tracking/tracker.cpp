@@ -280,7 +280,6 @@ struct Tracker::Impl {
       reference = found->keyframe;
       PoseProblem problem = MakeProblem(prepared, 0.0);
       AddMarkerPoints(prepared.markers, problem.points);
-      const std::size_t num_corners = problem.points.size();
       active.clear();
       Reassociate(prepared, frame.depth_m, found->T_world_color, KeyframesNear(found->T_world_color, map.keyframes.size()), problem.points);
       PoseEstimate estimate = OptimizePose(problem, found->T_world_color);

@@ -18,8 +18,8 @@ constexpr std::array kTooNearSteps{IndicatorStep{kYellow, milliseconds(100)}, In
 constexpr std::array kTooFarSteps{IndicatorStep{kYellow, milliseconds(400)}, IndicatorStep{0, milliseconds(150)},
                                   IndicatorStep{kYellow, milliseconds(400)}, IndicatorStep{0, milliseconds(650)}};
 constexpr std::array kWorkingSteps{IndicatorStep{kBlue, milliseconds(500)}, IndicatorStep{0, milliseconds(500)}};
-constexpr std::array kDoneSteps{IndicatorStep{kBlue | kBeeper, milliseconds(200)}, IndicatorStep{kBlue, milliseconds(800)},
-                                IndicatorStep{kGreen, milliseconds(1000)}, IndicatorStep{kBlue, milliseconds(1000)}};
+constexpr std::array kDoneSteps{IndicatorStep{kGreen | kBeeper, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(800)},
+                                IndicatorStep{kBlue, milliseconds(1000)}, IndicatorStep{kGreen, milliseconds(1000)}};
 constexpr std::array kInToleranceSteps{IndicatorStep{kGreen | kBeeper, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(1800)},
                                        IndicatorStep{0, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(1800)}};
 constexpr std::array kMoveSteps{IndicatorStep{kYellow | kBeeper, milliseconds(200)}, IndicatorStep{kYellow, milliseconds(800)},

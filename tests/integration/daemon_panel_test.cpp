@@ -166,7 +166,7 @@ TEST_F(DaemonPanelTest, PressedDuringWorkingItIsIgnoredAndHeldDownItDiscardsTheS
   Press();
   plumbd.WaitForFrames(90);
   EdgeWithChatter('1');
-  WaitForPairs(plumbd, 4);  // longer than contacts chatter, however many frames tracking has dropped by now
+  WaitForPairs(plumbd, 4);                // longer than contacts chatter, however many frames tracking has dropped by now
   ASSERT_EQ(plumbd.Press()["ok"], true);  // the page ends the sweep while the button is down
   plumbd.WaitFor("working", [](const json& s) { return s["state"] != "scanning"; });
   EdgeWithChatter('0');
@@ -224,11 +224,17 @@ TEST_F(DaemonPanelTest, TheLightShowsScanningWorkingAndResults) {
   plumbd.WaitForState("ready");
   ForgetLamps();
   plumbd.ScanOnce();
-  EXPECT_EQ(NumPhases({"blue", "beeper"}), 1U) << "a beep at the start";
+  EXPECT_EQ(plumbd.Status()["light"], "done") << "there was nothing to compare with";
+  // Under a sanitizer most frames are dropped, and the sweep may rightly seem too fast.
+  if (!testing::kIsSanitized) {
+    EXPECT_EQ(NumPhases({"blue", "beeper"}), 1U) << "a beep at the start";
+  }
   EXPECT_GE(NumPhases({"blue"}), 1U) << "steady; how often it comes back while the result is made depends on the machine";
   WaitForPhases(plumbd, {"green"}, 3);
   EXPECT_EQ(NumPhases({"green", "beeper"}), 1U);
-  EXPECT_EQ(Seen(), (Lamps{"blue", "beeper", "green"}));
+  if (!testing::kIsSanitized) {
+    EXPECT_EQ(Seen(), (Lamps{"blue", "beeper", "green"}));
+  }
   plumbd.Sim("next-scene");
   plumbd.ScanOnce();
   ForgetLamps();
