@@ -166,7 +166,9 @@ class PlyReader {
       if (color) {
         Color& out = cloud.colors.emplace_back();
         for (std::size_t c = 0; c < 3; ++c) {
-          out[c] = static_cast<std::uint8_t>(std::clamp(Value((*color)[c].type, row + (*color)[c].offset), 0.0, 255.0));
+          const double value = Value((*color)[c].type, row + (*color)[c].offset);
+          if (!std::isfinite(value)) Fail(fmt::format("the colour of vertex {} is not finite", i));
+          out[c] = static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0));
         }
       }
     }

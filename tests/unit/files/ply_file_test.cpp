@@ -105,6 +105,15 @@ TEST(PlyFileTest, ReadsOtherLayouts) {
   EXPECT_THAT(cloud.colors, ElementsAre(Color{10, 20, 30}));
 }
 
+TEST(PlyFileTest, ColoursThatAreNoNumbersAreRefused) {
+  Bytes bytes = Ascii(
+      "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+      "property float red\nproperty float green\nproperty float blue\nend_header\n");
+  for (int i = 0; i < 5; ++i) Append(bytes, 1.0F);
+  Append(bytes, std::numeric_limits<float>::quiet_NaN());
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ParseCloudPly(bytes, "c.ply"); }), HasSubstr("colour of vertex 0"));
+}
+
 TEST(PlyFileTest, EveryTruncationIsAnError) {
   const TempFolder folder;
   WriteMeshPly(folder / "m.ply", Tetrahedron());
