@@ -38,6 +38,9 @@ double SecondsSince(Clock::time_point time) { return std::chrono::duration<doubl
 
 web::ApplianceState WebState(ScanPhase phase) { return static_cast<web::ApplianceState>(static_cast<int>(phase)); }
 static_assert(static_cast<int>(web::ApplianceState::kFault) == static_cast<int>(ScanPhase::kFault));
+static_assert(static_cast<int>(web::FaultKind::kSensor) == static_cast<int>(FaultKind::kSensor));
+static_assert(static_cast<int>(web::FaultKind::kScan) == static_cast<int>(FaultKind::kScan));
+static_assert(static_cast<int>(web::FaultKind::kStorage) == static_cast<int>(FaultKind::kStorage));
 
 web::Guidance WebGuidance(SweepAdvice advice) {
   switch (advice) {
@@ -53,20 +56,6 @@ web::Guidance WebGuidance(SweepAdvice advice) {
       break;
   }
   return web::Guidance::kTrackingLost;
-}
-
-web::FaultKind WebFault(FaultKind fault) {
-  switch (fault) {
-    case FaultKind::kNone:
-      break;
-    case FaultKind::kSensor:
-      return web::FaultKind::kSensor;
-    case FaultKind::kScan:
-      return web::FaultKind::kScan;
-    case FaultKind::kStorage:
-      return web::FaultKind::kStorage;
-  }
-  return web::FaultKind::kNone;
 }
 
 web::StorageStatus StorageOf(const std::filesystem::path& folder, bool is_open) {
@@ -248,7 +237,7 @@ web::Status Appliance::WebStatus() {
   web::Status status;
   status.state = WebState(state_.phase);
   status.fault = FaultReason();
-  if (state_.phase == ScanPhase::kFault) status.fault_kind = WebFault(state_.fault);
+  if (state_.phase == ScanPhase::kFault) status.fault_kind = static_cast<web::FaultKind>(state_.fault);
   status.sensor = {.present = sensor.present,
                    .serial = sensor.sensor.serial,
                    .name = sensor.sensor.name,

@@ -138,7 +138,7 @@ class Store {
   void RefuseScansOfAnother();
   void CollectOrphans();
   void SetAside(const std::filesystem::path& folder);
-  [[nodiscard]] std::vector<std::filesystem::path> ScanFolders() const;  ///< Of all numbers.
+  [[nodiscard]] std::vector<std::filesystem::path> ScanFolders() const;  ///< Those of numbers, and staging.
   void NoteEnd(const std::string& scan_id, const FinishedScan& finished);
   void Write(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail);
   void RemoveScanFiles(const std::string& scan_id);

@@ -19,6 +19,12 @@ namespace plumb {
 namespace fs = std::filesystem;
 using store::ScanId;
 
+namespace {
+
+bool IsStaging(const fs::path& folder) { return folder.filename().string().starts_with(".staging-"); }
+
+}  // namespace
+
 Store::Store(const fs::path& folder) : folder_(fs::absolute(folder)) {
   std::error_code error;
   fs::create_directories(folder_ / "scans", error);
@@ -89,7 +95,8 @@ void Store::RefuseScansOfAnother() {
     Statement version = write_->Prepare("PRAGMA user_version");
     if (version.Step() && version.Integer(0) != 0) return;
   }
-  const std::vector<fs::path> folders = ScanFolders();
+  std::vector<fs::path> folders = ScanFolders();
+  std::erase_if(folders, [](const fs::path& folder) { return IsStaging(folder); });  // what had not become a scan is nobody's loss
   if (folders.empty()) return;
   throw DatabaseCorrupt(fmt::format(
       "the database {} is empty or missing, but there are scans of another one ({} and {} more): put a backup of the database in "
@@ -101,7 +108,7 @@ std::vector<fs::path> Store::ScanFolders() const {
   std::vector<fs::path> folders;
   std::error_code error;
   for (fs::directory_iterator entry(folder_ / "scans", error), end; !error && entry != end; entry.increment(error)) {
-    if (store::ParseId(entry->path().filename().string())) folders.push_back(entry->path());
+    if (IsStaging(entry->path()) || store::ParseId(entry->path().filename().string())) folders.push_back(entry->path());
   }
   return folders;
 }
@@ -122,24 +129,14 @@ void Store::CollectOrphans() {
   for (const fs::path& folder : ScanFolders()) {
     const std::string name = folder.filename().string();
     if (known.contains(name)) continue;
-    if (*store::ParseId(name) <= last) {
+    if (store::ParseId(name).value_or(0) > last) {
+      SetAside(folder);
+      ++recovery_.foreign_folders;
+    } else {
       std::error_code ignored;
       fs::remove_all(folder, ignored);
       ++recovery_.orphaned_folders;
-    } else {
-      SetAside(folder);
-      ++recovery_.foreign_folders;
     }
-  }
-  std::vector<fs::path> staging;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder_ / "scans", error), end; !error && entry != end; entry.increment(error)) {
-    if (entry->path().filename().string().starts_with(".staging-")) staging.push_back(entry->path());
-  }
-  for (const fs::path& folder : staging) {
-    std::error_code ignored;
-    fs::remove_all(folder, ignored);
-    ++recovery_.orphaned_folders;
   }
 }
 
