@@ -1,3 +1,3 @@
-#include "daemon/plumbd.hpp"
+#include "daemon/appliance/plumbd.hpp"
 
 int main(int argc, char** argv) { return plumb::RunPlumbd(argc, argv); }

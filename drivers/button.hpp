@@ -17,11 +17,13 @@ class Button {
 
   /// Readable when something happened; the loop then calls Dispatch().
   [[nodiscard]] virtual int fd() const = 0;
-  /// When Dispatch() wants to be called even if nothing was readable: the end of a debounce, the moment a press becomes long.
+  /// When Dispatch() wants to be called even if nothing was readable: the end of a debounce, the
+  /// moment a press becomes long.
   [[nodiscard]] virtual std::optional<Clock::time_point> deadline() const = 0;
   /// Never blocks. @throws DeviceError if the line is gone.
   virtual void Dispatch(Clock::time_point now) = 0;
-  /// A short press is reported on release, a long one as soon as it is long. A button held at start is no press until released.
+  /// A short press is reported on release, a long one as soon as it is long. A button held at start
+  /// is no press until released.
   virtual void SetListener(std::function<void(ButtonPress)> pressed) = 0;
 };
 

@@ -1,4 +1,4 @@
-// The light (and beeper) that tells the technician what the appliance does.
+// The light (and beeper) that shows the technician what the appliance is doing.
 #pragma once
 
 namespace plumb {
@@ -14,12 +14,14 @@ enum class IndicatorPattern {
   kWorking,
   kDone,  ///< A scan that was compared with nothing.
   kResultInTolerance,
+  kResultUnsure,  ///< Every value within its tolerance, but not with its uncertainty.
   kResultMove,
   kNoAnswer,
   kFault,
 };
 
-/// A light. One thread (the event loop's) calls; no call blocks or throws: a broken light must not stop a scan.
+/// A light. One thread (the event loop's) calls; no call blocks or throws: a broken light must not
+/// stop a scan.
 class Indicator {
  public:
   virtual ~Indicator() = default;

@@ -6,8 +6,10 @@
 
 namespace plumb {
 
-/// Looks for `relative` in the folders above the running program, nearest first: an installed /usr/bin/plumb finds /usr/lib/plumb/...,
-/// and programs of a build tree find what lies in the build folder.
-[[nodiscard]] std::optional<std::filesystem::path> FindBesideProgram(const std::filesystem::path& relative);
+/// Looks for `relative` in the folders above the running program, nearest first: an installed
+/// /usr/bin/plumb finds /usr/lib/plumb/..., and programs of a build tree find what lies in the
+/// build folder.
+[[nodiscard]] std::optional<std::filesystem::path> FindBesideProgram(
+    const std::filesystem::path& relative);
 
 }  // namespace plumb

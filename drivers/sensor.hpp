@@ -1,4 +1,4 @@
-// What the appliance expects of a live RGB-D sensor, whoever makes it.
+// The interface of a live RGB-D sensor of any make.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace plumb {
 /// A sensor that is attached now.
 struct SensorDescription {
   std::string uri;     ///< Of the driver; another one after each re-plug.
-  std::string serial;  ///< Identifies the unit; the URI where the unit tells no serial.
+  std::string serial;  ///< Identifies the unit; the URI where the unit has no serial.
   std::string name;
   std::uint16_t usb_vendor = 0;  ///< 0: unknown.
   std::uint16_t usb_product = 0;
@@ -26,10 +26,11 @@ struct SensorStatistics {
   std::int64_t num_pairs = 0;      ///< Handed out by Next().
   std::int64_t num_unpaired = 0;   ///< Images of either stream without a partner close in time.
   std::int64_t num_discarded = 0;  ///< Images of the wrong size, doubled or out of order.
-  std::int64_t num_lost = 0;       ///< Images that were taken and never came: the library keeps only the newest of each stream.
+  std::int64_t num_lost = 0;  ///< Images that were taken and never came: the library keeps only the
+                              ///< newest of each stream.
   double frames_per_second = 0.0;  ///< Over the last second.
 
-  /// What was counted since an earlier look at the same streams.
+  /// The counts since an earlier reading of the same streams.
   [[nodiscard]] SensorStatistics Since(const SensorStatistics& earlier) const {
     return {.num_pairs = num_pairs - earlier.num_pairs,
             .num_unpaired = num_unpaired - earlier.num_unpaired,
@@ -39,7 +40,8 @@ struct SensorStatistics {
   }
 };
 
-/// An open sensor, streaming. Next() belongs to one thread; Interrupt(), Flush() and statistics() may be called from any.
+/// An open sensor, streaming. Next() belongs to one thread; Interrupt(), Flush() and statistics()
+/// may be called from any.
 class LiveSensor : public FrameSource {
  public:
   [[nodiscard]] virtual const SensorDescription& description() const = 0;
@@ -48,17 +50,20 @@ class LiveSensor : public FrameSource {
   /// Makes a waiting Next(), and each one after it, return nothing; at once, without blocking.
   virtual void Interrupt() noexcept = 0;
 
-  /// Pairs that arrived before this call are not handed out any more: a scan begins with what is seen after the button was pressed.
+  /// Pairs that arrived before this call are not handed out any more: a scan begins with what is
+  /// seen after the button was pressed.
   virtual void Flush() noexcept = 0;
 
-  /// Exposure and white balance stand still (true, while scanning) or adapt (false), where the sensor can.
+  /// Exposure and white balance stand still (true, while scanning) or adapt (false), where the
+  /// sensor can.
   virtual void LockExposure(bool locked) = 0;
 
-  // Next() throws DeviceLost once the sensor is unplugged, DeviceError if no pair arrives for the stall time or the driver reports an
-  // error.
+  // Next() throws DeviceLost once the sensor is unplugged, DeviceError if no pair arrives for the
+  // stall time or the driver reports an error.
 };
 
-/// The sensors of one library. All functions belong to one thread, but the listener is called on the driver's own.
+/// The sensors of one library. All functions belong to one thread, but the listener is called on
+/// the driver's own.
 class SensorProvider {
  public:
   virtual ~SensorProvider() = default;
@@ -66,11 +71,13 @@ class SensorProvider {
   /// Attached sensors, each once, in the order of their serials.
   [[nodiscard]] virtual std::vector<SensorDescription> List() = 0;
 
-  /// Called, from a thread of the driver, after a sensor came, went or changed its state. It must not call back; it posts to the loop.
+  /// Called, from a thread of the driver, after a sensor came, went or changed its state. It must
+  /// not call back; it posts to the loop.
   virtual void SetListener(std::function<void()> changed) = 0;
 
   /// Opens a sensor and starts its streams. @param serial  Empty: the first one.
-  /// @throws DeviceError naming the serial and what the driver says, with a remedy where one is known.
+  /// @throws DeviceError naming the serial and what the driver says, with a remedy where one is
+  /// known.
   [[nodiscard]] virtual std::unique_ptr<LiveSensor> Open(const std::string& serial) = 0;
 };
 

@@ -4,3 +4,9 @@ string(REGEX MATCHALL "[^\n]*(Unknown|Failed to parse|Invalid|ignoring)[^\n]*" c
 if(complaints)
   message(FATAL_ERROR "${complaints}")
 endif()
+# Nobody with a shell may be near: neither the service nor its socket may ever give up.
+file(STRINGS ${UNIT} unlimited REGEX "^StartLimitIntervalSec=0$")
+file(STRINGS ${SOCKET} socket_unlimited REGEX "^TriggerLimitIntervalSec=0$")
+if(NOT unlimited OR NOT socket_unlimited)
+  message(FATAL_ERROR "the units give up after some failures: expected StartLimitIntervalSec=0 and TriggerLimitIntervalSec=0")
+endif()

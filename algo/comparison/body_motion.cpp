@@ -13,30 +13,35 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "algo/base/check_stop.hpp"
 #include "algo/comparison/motion_start.hpp"
 #include "algo/comparison/surface.hpp"
-#include "algo/types/check_stop.hpp"
 
 namespace plumb {
 namespace {
 
 constexpr std::size_t kMinSamples = 50;
 constexpr int kMinPairs = 30;
-constexpr std::size_t kChunk = 1024;  // pairs summed together: fixed, so sums do not depend on threads
-constexpr double kTukey = 4.685;      // 95 % efficiency on Gaussian residuals
+constexpr std::size_t kChunk =
+    1024;                         // pairs summed together: fixed, so sums do not depend on threads
+constexpr double kTukey = 4.685;  // 95 % efficiency on Gaussian residuals
 constexpr double kMadToSigma = 1.4826;
-constexpr double kMinScale_m = 0.2e-3;        // below what any sensor leaves; keeps perfect data from a zero scale
+constexpr double kMinScale_m =
+    0.2e-3;  // below what any sensor leaves; keeps perfect data from a zero scale
 constexpr double kCorrelationArea_m2 = 1e-4;  // residuals within about 1 cm are one measurement
 constexpr double kBlock_m = 0.08;             // of the empirical covariance
-constexpr double kMinInformation = 1e-6;      // of the best direction's; below it a direction counts as unseen
+constexpr double kMinInformation =
+    1e-6;  // of the best direction's; below it a direction counts as unseen
 constexpr double kStepTolerance_m = 5e-6;
-constexpr double kSeenInformation = 3e-4;  // of the best direction's; below it a direction stays where it starts
+constexpr double kSeenInformation =
+    3e-4;  // of the best direction's; below it a direction stays where it starts
 
 // One side of the registration.
 struct Side {
   Surface surface;
   NearestSample nearest;
-  explicit Side(Surface s, double radius_m) : surface(std::move(s)), nearest(surface.points, radius_m) {}
+  explicit Side(Surface s, double radius_m)
+      : surface(std::move(s)), nearest(surface.points, radius_m) {}
 };
 
 struct Stage {
@@ -52,9 +57,11 @@ constexpr Stage kMiddle = {0.03, 0.015, 0.7, 0.008, 15};
 constexpr double kCoarseSpacing_m = 0.02;
 constexpr double kMiddleSpacing_m = 0.01;
 constexpr double kFineSpacing_m = 0.005;
-constexpr double kMaxFineSamples = 20000.0;  // a side; more cost time and add nothing: their errors are not independent
+constexpr double kMaxFineSamples =
+    20000.0;  // a side; more cost time and add nothing: their errors are not independent
 
-// Mates two spacings away at most: what is further off is not the rigid part, and the search stays short.
+// Mates two spacings away at most: what is further off is not the rigid part, and the search stays
+// short.
 Stage FineStage(double spacing_m) { return {2 * spacing_m, 1.2 * spacing_m, 0.8, spacing_m, 25}; }
 
 struct Pair {
@@ -71,8 +78,8 @@ Vector6d Gradient(const Eigen::Vector3d& arm, const Eigen::Vector3d& normal) {
   return gradient;
 }
 
-Pair MakePair(const Surface& reference, std::size_t i, const Surface& current, std::size_t j, const Pose& T, const Eigen::Vector3d& pivot,
-              const Stage& stage) {
+Pair MakePair(const Surface& reference, std::size_t i, const Surface& current, std::size_t j,
+              const Pose& T, const Eigen::Vector3d& pivot, const Stage& stage) {
   Pair pair;
   const Eigen::Vector3d p = T * reference.points[i].cast<double>();
   const Eigen::Vector3d q = current.points[j].cast<double>();
@@ -88,26 +95,30 @@ Pair MakePair(const Surface& reference, std::size_t i, const Surface& current, s
 }
 
 // Mates from both sides: the reference's samples first, then the current ones, one slot each.
-std::vector<Pair> FindPairs(const Side& reference, const Side& current, const Pose& T, const Eigen::Vector3d& pivot, const Stage& stage) {
+std::vector<Pair> FindPairs(const Side& reference, const Side& current, const Pose& T,
+                            const Eigen::Vector3d& pivot, const Stage& stage) {
   const std::size_t n = reference.surface.size();
   const std::size_t m = current.surface.size();
   std::vector<Pair> pairs(n + m);
   const Pose T_back = T.inverse();
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n + m, 512), [&](const tbb::blocked_range<std::size_t>& range) {
-    for (std::size_t k = range.begin(); k < range.end(); ++k) {
-      const bool forward = k < n;
-      const Side& from = forward ? reference : current;
-      const Side& to = forward ? current : reference;
-      const std::size_t i = forward ? k : k - n;
-      if (from.surface.inner[i] == 0) continue;
-      const Eigen::Vector3d p = from.surface.points[i].cast<double>();
-      const Eigen::Vector3d moved = forward ? T * p : T_back * p;
-      const std::uint32_t mate = to.nearest.Find(moved.cast<float>());
-      if (mate == NearestSample::kNone || to.surface.inner[mate] == 0) continue;
-      pairs[k] = forward ? MakePair(reference.surface, i, current.surface, mate, T, pivot, stage)
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, n + m, 512),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t k = range.begin(); k < range.end(); ++k) {
+          const bool forward = k < n;
+          const Side& from = forward ? reference : current;
+          const Side& to = forward ? current : reference;
+          const std::size_t i = forward ? k : k - n;
+          if (from.surface.inner[i] == 0) continue;
+          const Eigen::Vector3d p = from.surface.points[i].cast<double>();
+          const Eigen::Vector3d moved = forward ? T * p : T_back * p;
+          const std::uint32_t mate = to.nearest.Find(moved.cast<float>());
+          if (mate == NearestSample::kNone || to.surface.inner[mate] == 0) continue;
+          pairs[k] = forward
+                         ? MakePair(reference.surface, i, current.surface, mate, T, pivot, stage)
                          : MakePair(reference.surface, mate, current.surface, i, T, pivot, stage);
-    }
-  });
+        }
+      });
   return pairs;
 }
 
@@ -130,7 +141,8 @@ double TukeyWeight(double residual_m, double scale_m) {
 
 struct NormalEquations {
   Matrix6d A = Matrix6d::Zero();
-  Matrix6d crossed = Matrix6d::Zero();  // A from one normal of each side: free of the bias that their noise puts into A
+  Matrix6d crossed = Matrix6d::Zero();  // A from one normal of each side: free of the bias that
+                                        // their noise puts into A
   Vector6d b = Vector6d::Zero();
 };
 
@@ -143,9 +155,11 @@ NormalEquations SumPairs(const std::vector<Pair>& pairs, double scale_m) {
       const Pair& pair = pairs[k];
       const double w = pair.valid ? TukeyWeight(pair.residual_m, scale_m) : 0.0;
       if (w == 0.0) continue;
-      const Vector6d gradient = Gradient(pair.arm, (pair.normal_reference + pair.normal_current).normalized());
+      const Vector6d gradient =
+          Gradient(pair.arm, (pair.normal_reference + pair.normal_current).normalized());
       sum.A += w * gradient * gradient.transpose();
-      sum.crossed += w * Gradient(pair.arm, pair.normal_reference) * Gradient(pair.arm, pair.normal_current).transpose();
+      sum.crossed += w * Gradient(pair.arm, pair.normal_reference) *
+                     Gradient(pair.arm, pair.normal_current).transpose();
       sum.b += w * pair.residual_m * gradient;
     }
   });
@@ -158,15 +172,20 @@ NormalEquations SumPairs(const std::vector<Pair>& pairs, double scale_m) {
   return total;
 }
 
-// Gauss-Newton step within the directions that the surfaces show; along a direction that they do not (roll of a bar) the
-// noise of the normals would drive the pose away. `unit` scales the unknowns to one importance.
+// Gauss-Newton step within the directions that the surfaces show; along a direction that they do
+// not (roll of a bar) the noise of the normals would drive the pose away. `unit` scales the
+// unknowns to one importance.
 Vector6d SeenStep(const NormalEquations& equations, const Vector6d& unit) {
   const Matrix6d A = unit.asDiagonal() * equations.A * unit.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(unit.asDiagonal() * equations.crossed * unit.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(unit.asDiagonal() * equations.crossed *
+                                                      unit.asDiagonal());
   int unseen = 0;
-  while (unseen < 6 && eigen.eigenvalues()[unseen] < kSeenInformation * eigen.eigenvalues()[5]) ++unseen;
+  while (unseen < 6 && eigen.eigenvalues()[unseen] < kSeenInformation * eigen.eigenvalues()[5])
+    ++unseen;
   const Eigen::MatrixXd seen = eigen.eigenvectors().rightCols(6 - unseen);
-  const Eigen::VectorXd along = (seen.transpose() * A * seen).ldlt().solve(-(seen.transpose() * (unit.asDiagonal() * equations.b)));
+  const Eigen::VectorXd along = (seen.transpose() * A * seen)
+                                    .ldlt()
+                                    .solve(-(seen.transpose() * (unit.asDiagonal() * equations.b)));
   return unit.asDiagonal() * (seen * along);
 }
 
@@ -186,11 +205,14 @@ Eigen::Vector3d MeanPoint(const Surface& surface) {
 // Root mean square distance from the centroid: turns radians into metres of the same importance.
 double LeverArm(const Surface& surface, const Eigen::Vector3d& centroid) {
   double sum = 0.0;
-  for (const Eigen::Vector3f& p : surface.points) sum += (p.cast<double>() - centroid).squaredNorm();
-  return std::max(std::sqrt(sum / static_cast<double>(std::max<std::size_t>(surface.size(), 1))), 1e-3);
+  for (const Eigen::Vector3f& p : surface.points)
+    sum += (p.cast<double>() - centroid).squaredNorm();
+  return std::max(std::sqrt(sum / static_cast<double>(std::max<std::size_t>(surface.size(), 1))),
+                  1e-3);
 }
 
-StageResult RunStage(const Side& reference, const Side& current, const Pose& T_start, const Stage& stage, const std::stop_token& stop) {
+StageResult RunStage(const Side& reference, const Side& current, const Pose& T_start,
+                     const Stage& stage, const std::stop_token& stop) {
   StageResult result;
   result.T = T_start;
   const Eigen::Vector3d centroid = MeanPoint(reference.surface);
@@ -211,14 +233,16 @@ StageResult RunStage(const Side& reference, const Side& current, const Pose& T_s
       result.valid = false;
       return result;
     }
-    result.T = Orthonormalised(Eigen::Translation3d(pivot) * PoseFromTwist(twist) * Eigen::Translation3d(-pivot) * result.T);
+    result.T = Orthonormalised(Eigen::Translation3d(pivot) * PoseFromTwist(twist) *
+                               Eigen::Translation3d(-pivot) * result.T);
     if (twist.cwiseQuotient(unit).norm() < kStepTolerance_m) break;
   }
   return result;
 }
 
 // Two-sided mean of truncated distances, metres; samples without a mate count as `limit`.
-double Disagreement(const Side& reference, const Side& current, const Pose& T, const Stage& stage, double limit_m) {
+double Disagreement(const Side& reference, const Side& current, const Pose& T, const Stage& stage,
+                    double limit_m) {
   const std::vector<Pair> pairs = FindPairs(reference, current, T, Eigen::Vector3d::Zero(), stage);
   const auto mean = [&](const Surface& surface, std::size_t first) {
     double sum = 0.0;
@@ -245,9 +269,12 @@ PointCloud BodyCloud(const PointCloud& cloud, const Body& body) {
 }
 
 // Best of the starts after coarse, then middle refinement of the three most promising.
-std::optional<Pose> GlobalMotion(const BodyMotionInput& input, const PointCloud& reference, const PointCloud& current) {
-  const Side coarse_reference(MakeSurface(reference, kCoarseSpacing_m, 3 * kCoarseSpacing_m), kCoarse.radius_m);
-  const Side coarse_current(MakeSurface(current, kCoarseSpacing_m, 3 * kCoarseSpacing_m), kCoarse.radius_m);
+std::optional<Pose> GlobalMotion(const BodyMotionInput& input, const PointCloud& reference,
+                                 const PointCloud& current) {
+  const Side coarse_reference(MakeSurface(reference, kCoarseSpacing_m, 3 * kCoarseSpacing_m),
+                              kCoarse.radius_m);
+  const Side coarse_current(MakeSurface(current, kCoarseSpacing_m, 3 * kCoarseSpacing_m),
+                            kCoarse.radius_m);
   struct Scored {
     Pose T;
     double score;
@@ -255,8 +282,11 @@ std::optional<Pose> GlobalMotion(const BodyMotionInput& input, const PointCloud&
   const auto by_score = [](const Scored& a, const Scored& b) { return a.score < b.score; };
   std::vector<Scored> scored;
   for (const Pose& start : MotionStarts(input.reference_body, input.current_body)) {
-    const StageResult refined = RunStage(coarse_reference, coarse_current, start, kCoarse, input.stop);
-    if (refined.valid) scored.push_back({refined.T, Disagreement(coarse_reference, coarse_current, refined.T, kCoarse, 0.02)});
+    const StageResult refined =
+        RunStage(coarse_reference, coarse_current, start, kCoarse, input.stop);
+    if (refined.valid)
+      scored.push_back(
+          {refined.T, Disagreement(coarse_reference, coarse_current, refined.T, kCoarse, 0.02)});
   }
   if (scored.empty()) return std::nullopt;
   std::stable_sort(scored.begin(), scored.end(), by_score);
@@ -269,18 +299,23 @@ std::optional<Pose> GlobalMotion(const BodyMotionInput& input, const PointCloud&
     });
     if (!known && distinct.size() < 3) distinct.push_back(s);
   }
-  const Side middle_reference(MakeSurface(reference, kMiddleSpacing_m, 2.5 * kMiddleSpacing_m), kMiddle.radius_m);
-  const Side middle_current(MakeSurface(current, kMiddleSpacing_m, 2.5 * kMiddleSpacing_m), kMiddle.radius_m);
+  const Side middle_reference(MakeSurface(reference, kMiddleSpacing_m, 2.5 * kMiddleSpacing_m),
+                              kMiddle.radius_m);
+  const Side middle_current(MakeSurface(current, kMiddleSpacing_m, 2.5 * kMiddleSpacing_m),
+                            kMiddle.radius_m);
   for (Scored& s : distinct) {
-    const StageResult refined = RunStage(middle_reference, middle_current, s.T, kMiddle, input.stop);
+    const StageResult refined =
+        RunStage(middle_reference, middle_current, s.T, kMiddle, input.stop);
     if (refined.valid) s.T = refined.T;
     s.score = Disagreement(middle_reference, middle_current, s.T, kMiddle, 0.015);
   }
   return std::min_element(distinct.begin(), distinct.end(), by_score)->T;
 }
 
-// Covariance of the fit at its end: A^-1 B A^-1 with B from blocks, plus the share of independent small patches.
-Matrix6d FitCovariance(const std::vector<Pair>& pairs, double scale_m, double spacing_m, double lever) {
+// Covariance of the fit at its end: A^-1 B A^-1 with B from blocks, plus the share of independent
+// small patches.
+Matrix6d FitCovariance(const std::vector<Pair>& pairs, double scale_m, double spacing_m,
+                       double lever) {
   Matrix6d information = Matrix6d::Zero();
   std::map<std::array<int, 3>, Vector6d> blocks;
   Vector6d unit;
@@ -298,14 +333,18 @@ Matrix6d FitCovariance(const std::vector<Pair>& pairs, double scale_m, double sp
   }
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
   const double largest = std::max(eigen.eigenvalues()[5], 1e-12);
-  const Matrix6d inverse = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(kMinInformation * largest).cwiseInverse().asDiagonal() *
-                           eigen.eigenvectors().transpose();
+  const Matrix6d inverse =
+      eigen.eigenvectors() *
+      eigen.eigenvalues().cwiseMax(kMinInformation * largest).cwiseInverse().asDiagonal() *
+      eigen.eigenvectors().transpose();
   Matrix6d scatter = Matrix6d::Zero();
   for (const auto& [block, sum] : blocks) scatter += sum * sum.transpose();
   const double k = static_cast<double>(blocks.size());
   scatter *= k / std::max(k - 6.0, 1.0);
-  // Two pairs a sample (one from each side), and one independent measurement for every kCorrelationArea_m2.
-  const double pairs_per_measurement = 2.0 * std::max(kCorrelationArea_m2 / (spacing_m * spacing_m), 1.0);
+  // Two pairs a sample (one from each side), and one independent measurement for every
+  // kCorrelationArea_m2.
+  const double pairs_per_measurement =
+      2.0 * std::max(kCorrelationArea_m2 / (spacing_m * spacing_m), 1.0);
   const Matrix6d small_patches = scale_m * scale_m * pairs_per_measurement * inverse;
   const Matrix6d covariance = inverse * scatter * inverse + small_patches;
   return unit.asDiagonal() * covariance * unit.asDiagonal();
@@ -327,7 +366,9 @@ std::optional<SurfaceMotion> EstimateBodyMotion(const BodyMotionInput& input) {
     fine_reference = MakeSurface(reference, spacing_m, 3 * spacing_m);
   }
   if (input.in_region) {
-    fine_reference = Subset(fine_reference, [&](std::size_t i) { return input.in_region(fine_reference.points[i].cast<double>()); });
+    fine_reference = Subset(fine_reference, [&](std::size_t i) {
+      return input.in_region(fine_reference.points[i].cast<double>());
+    });
   }
   if (fine_reference.size() < kMinSamples) return std::nullopt;
   const Stage stage = FineStage(spacing_m);
@@ -342,7 +383,8 @@ std::optional<SurfaceMotion> EstimateBodyMotion(const BodyMotionInput& input) {
   motion.iterations = fitted.iterations;
   const Eigen::Vector3d pivot = motion.T * input.region_centroid_m;
   const std::vector<Pair> pairs = FindPairs(side_reference, side_current, motion.T, pivot, stage);
-  motion.covariance = FitCovariance(pairs, fitted.scale_m, spacing_m, LeverArm(side_reference.surface, input.region_centroid_m));
+  motion.covariance = FitCovariance(pairs, fitted.scale_m, spacing_m,
+                                    LeverArm(side_reference.surface, input.region_centroid_m));
   std::size_t inner = 0;
   std::size_t explained = 0;
   for (std::size_t i = 0; i < side_reference.surface.size(); ++i) {
@@ -350,7 +392,8 @@ std::optional<SurfaceMotion> EstimateBodyMotion(const BodyMotionInput& input) {
     ++inner;
     explained += pairs[i].valid && TukeyWeight(pairs[i].residual_m, fitted.scale_m) > 0 ? 1 : 0;
   }
-  motion.inlier_share = inner > 0 ? static_cast<double>(explained) / static_cast<double>(inner) : 0.0;
+  motion.inlier_share =
+      inner > 0 ? static_cast<double>(explained) / static_cast<double>(inner) : 0.0;
   return motion;
 }
 

@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 
 namespace plumb {
 namespace {
@@ -26,15 +26,21 @@ constexpr double kMinNeck_m = 0.04;       // shorter is the rounded end of a tru
 constexpr double kMaxHead_m = 0.45;       // head and neck
 constexpr double kTrunk_m = 0.6;          // behind the first end, the widest part is looked for
 
-// Ends of the bands below the shoulder line, in widths of the shoulders (about 0.45 m with arms); then the lower legs.
+// Ends of the bands below the shoulder line, in widths of the shoulders (about 0.45 m with arms);
+// then the lower legs.
 struct Band {
   const char* name;
   double end;
 };
-constexpr std::array<Band, 6> kBands = {
-    {{"shoulder", 0.3}, {"chest", 0.75}, {"side of the abdomen", 1.2}, {"side of the pelvis", 1.7}, {"thigh", 2.6}, {"lower leg", 9.0}}};
+constexpr std::array<Band, 6> kBands = {{{"shoulder", 0.3},
+                                         {"chest", 0.75},
+                                         {"side of the abdomen", 1.2},
+                                         {"side of the pelvis", 1.7},
+                                         {"thigh", 2.6},
+                                         {"lower leg", 9.0}}};
 
-// Directions in the reference frame's plane: along runs from the gantry (head) end away, side to +X (the left).
+// Directions in the reference frame's plane: along runs from the gantry (head) end away, side to +X
+// (the left).
 struct Axes {
   Eigen::Vector2d along, side;
   bool by_posture = false;
@@ -63,23 +69,30 @@ Outline OutlineOf(const GridShape& grid, const std::vector<std::uint8_t>& mask) 
   }
   if (count == 0) return {sum, {0, 1}, 1.0};
   const Eigen::Vector2d mean = sum / count;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(squares / count - mean * mean.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(squares / count -
+                                                              mean * mean.transpose());
   const Eigen::Vector2d spread = solver.eigenvalues().cwiseMax(1e-9).cwiseSqrt();
   return {mean, solver.eigenvectors().col(1), spread[1] / spread[0]};
 }
 
 Axes AxesOf(const BodyView& view, const Outline& outline) {
   const Eigen::Matrix3d R_reference_iec = view.T_iec_reference.linear().transpose();
-  const auto in_plane = [&](const Eigen::Vector3d& iec) -> Eigen::Vector2d { return (R_reference_iec * iec).head<2>().normalized(); };
-  const Axes room = {-in_plane(Eigen::Vector3d::UnitY()), in_plane(Eigen::Vector3d::UnitX()), false};
+  const auto in_plane = [&](const Eigen::Vector3d& iec) -> Eigen::Vector2d {
+    return (R_reference_iec * iec).head<2>().normalized();
+  };
+  const Axes room = {-in_plane(Eigen::Vector3d::UnitY()), in_plane(Eigen::Vector3d::UnitX()),
+                     false};
   if (!view.posture) return room;
-  const bool head_first = *view.posture == PatientPosture::kHeadFirstSupine || *view.posture == PatientPosture::kHeadFirstProne;
-  const bool supine = *view.posture == PatientPosture::kHeadFirstSupine || *view.posture == PatientPosture::kFeetFirstSupine;
-  Axes axes = {head_first ? room.along : Eigen::Vector2d(-room.along), head_first == supine ? room.side : Eigen::Vector2d(-room.side),
-               true};
+  const bool head_first = *view.posture == PatientPosture::kHeadFirstSupine ||
+                          *view.posture == PatientPosture::kHeadFirstProne;
+  const bool supine = *view.posture == PatientPosture::kHeadFirstSupine ||
+                      *view.posture == PatientPosture::kFeetFirstSupine;
+  Axes axes = {head_first ? room.along : Eigen::Vector2d(-room.along),
+               head_first == supine ? room.side : Eigen::Vector2d(-room.side), true};
   if (outline.elongation < kElongated) return axes;
   const double cosine = outline.principal.dot(axes.along);
-  if (std::abs(cosine) < std::sqrt(0.5)) return room;  // it lies across: posture or T_iec_reference is not this patient's
+  if (std::abs(cosine) < std::sqrt(0.5))
+    return room;  // it lies across: posture or T_iec_reference is not this patient's
   axes.along = cosine > 0 ? outline.principal : Eigen::Vector2d(-outline.principal);
   const Eigen::Vector2d across(axes.along.y(), -axes.along.x());
   axes.side = across.dot(axes.side) > 0 ? across : Eigen::Vector2d(-across);
@@ -97,7 +110,8 @@ struct Profile {
       if (mask[i] == 0) continue;
       const Eigen::Vector2d p = CellCentre(grid, i);
       const double side = p.dot(axes.side);
-      const auto [where, fresh] = bins.emplace(std::lround(std::floor(p.dot(axes.along) / kBin_m)), std::pair(side, side));
+      const auto [where, fresh] =
+          bins.emplace(std::lround(std::floor(p.dot(axes.along) / kBin_m)), std::pair(side, side));
       where->second = {std::min(where->second.first, side), std::max(where->second.second, side)};
     }
     if (bins.empty()) return;
@@ -120,9 +134,12 @@ struct Shoulders {
 };
 
 std::optional<Shoulders> FindShoulders(const Profile& profile) {
-  const auto bins = [](double metres) { return static_cast<std::size_t>(std::lround(metres / kBin_m)); };
+  const auto bins = [](double metres) {
+    return static_cast<std::size_t>(std::lround(metres / kBin_m));
+  };
   double widest = 0.0;
-  for (std::size_t i = 0; i < std::min(profile.size(), bins(kTrunk_m)); ++i) widest = std::max(widest, profile.width(i));
+  for (std::size_t i = 0; i < std::min(profile.size(), bins(kTrunk_m)); ++i)
+    widest = std::max(widest, profile.width(i));
   if (widest <= 0.25) return std::nullopt;  // narrower than any shoulders
   std::size_t narrow = 0;
   for (std::size_t i = 0; i < std::min(profile.size(), bins(kMaxHead_m)); ++i) {
@@ -134,7 +151,8 @@ std::optional<Shoulders> FindShoulders(const Profile& profile) {
   return std::nullopt;
 }
 
-// The middle of the outline along the body, as a line: limbs and slant must not move it from bin to bin.
+// The middle of the outline along the body, as a line: limbs and slant must not move it from bin to
+// bin.
 struct Midline {
   double offset = 0.0, slope = 0.0;
 
@@ -142,7 +160,8 @@ struct Midline {
     const auto n = static_cast<double>(profile.size());
     double sx = 0, sy = 0, sxx = 0, sxy = 0;
     for (std::size_t i = 0; i < profile.size(); ++i) {
-      const double x = profile.begin_m + (static_cast<double>(i) + 0.5) * kBin_m, y = (profile.low[i] + profile.high[i]) / 2;
+      const double x = profile.begin_m + (static_cast<double>(i) + 0.5) * kBin_m,
+                   y = (profile.low[i] + profile.high[i]) / 2;
       sx += x, sy += y, sxx += x * x, sxy += x * y;
     }
     const double determinant = n * sxx - sx * sx;
@@ -156,17 +175,22 @@ struct Midline {
 class Naming {
  public:
   Naming(const Profile& profile, bool by_posture)
-      : begin_m_(profile.begin_m), length_m_(profile.length_m()), midline_(profile), by_posture_(by_posture) {
+      : begin_m_(profile.begin_m),
+        length_m_(profile.length_m()),
+        midline_(profile),
+        by_posture_(by_posture) {
     if (by_posture) shoulders_ = FindShoulders(profile);
   }
 
   /// Number of the part that holds a place; parts are listed in this order.
   [[nodiscard]] int RankOf(double along, double side) const {
     const int of_side = side > midline_.at(along) ? 0 : 1;
-    if (!shoulders_) return 2 * std::clamp(static_cast<int>(3 * (along - begin_m_) / length_m_), 0, 2) + of_side;
+    if (!shoulders_)
+      return 2 * std::clamp(static_cast<int>(3 * (along - begin_m_) / length_m_), 0, 2) + of_side;
     if (along < shoulders_->line_m) return -1;
     const double down = (along - shoulders_->line_m) / shoulders_->width_m;
-    const auto band = std::find_if(kBands.begin(), kBands.end() - 1, [&](const Band& b) { return down < b.end; });
+    const auto band =
+        std::find_if(kBands.begin(), kBands.end() - 1, [&](const Band& b) { return down < b.end; });
     return 2 * static_cast<int>(band - kBands.begin()) + of_side;
   }
 
@@ -175,9 +199,12 @@ class Naming {
     const auto place = static_cast<std::size_t>(rank / 2);
     const bool is_plus = rank % 2 == 0;
     if (shoulders_) return fmt::format("{} {}", is_plus ? "left" : "right", kBands[place].name);
-    static constexpr std::array<const char*, 3> kByPosture = {"at the head end", "in the middle", "at the feet end"};
-    static constexpr std::array<const char*, 3> kByRoom = {"at the gantry end", "in the middle", "at the end away from the gantry"};
-    if (by_posture_) return fmt::format("{} side {}", is_plus ? "left" : "right", kByPosture[place]);
+    static constexpr std::array<const char*, 3> kByPosture = {"at the head end", "in the middle",
+                                                              "at the feet end"};
+    static constexpr std::array<const char*, 3> kByRoom = {"at the gantry end", "in the middle",
+                                                           "at the end away from the gantry"};
+    if (by_posture_)
+      return fmt::format("{} side {}", is_plus ? "left" : "right", kByPosture[place]);
     return fmt::format("{} side {}", is_plus ? "+X" : "-X", kByRoom[place]);
   }
 
@@ -196,7 +223,8 @@ struct Collected {
 
 void CheckSizes(const BodyView& view) {
   const std::size_t cells = view.reference.grid.num_cells();
-  if (!(view.deviation_after.grid == view.reference.grid) || view.region_mask.size() != cells || view.body_mask.size() != cells) {
+  if (!(view.deviation_after.grid == view.reference.grid) || view.region_mask.size() != cells ||
+      view.body_mask.size() != cells) {
     throw std::invalid_argument("body parts: maps and masks must share the reference scene's grid");
   }
 }
@@ -223,11 +251,17 @@ BodyParts DescribeBody(const BodyView& view) {
   }
   for (auto& [rank, part] : collected) {
     const auto cells = static_cast<double>(part.cells);
-    if (cells * grid.step * grid.step < kMinPart_m2 || static_cast<double>(part.after.size()) < kMinMeasured * cells) continue;
+    if (cells * grid.step * grid.step < kMinPart_m2 ||
+        static_cast<double>(part.after.size()) < kMinMeasured * cells)
+      continue;
     const auto middle = part.after.begin() + static_cast<std::ptrdiff_t>(part.after.size() / 2);
     std::nth_element(part.after.begin(), middle, part.after.end());
-    BodyPart made{.name = naming.NameOf(rank), .centre_m = part.sum / cells, .now_m = std::nullopt, .after_m = *middle};
-    if (view.marker_kind == MarkerKind::kRoom) made.now_m = (view.T_motion * made.centre_m - made.centre_m).z() + made.after_m;
+    BodyPart made{.name = naming.NameOf(rank),
+                  .centre_m = part.sum / cells,
+                  .now_m = std::nullopt,
+                  .after_m = *middle};
+    if (view.marker_kind == MarkerKind::kRoom)
+      made.now_m = (view.T_motion * made.centre_m - made.centre_m).z() + made.after_m;
     result.parts.push_back(std::move(made));
   }
   return result;
@@ -235,7 +269,8 @@ BodyParts DescribeBody(const BodyView& view) {
 
 std::string HeightWords(const BodyPart& part, double height_m, double limit_m) {
   if (!(std::abs(height_m) > limit_m)) return {};
-  return fmt::format("{} {:.0f} mm {}", part.name, std::abs(height_m) / kMillimetre, height_m > 0 ? "high" : "low");
+  return fmt::format("{} {:.0f} mm {}", part.name, std::abs(height_m) / kMillimetre,
+                     height_m > 0 ? "high" : "low");
 }
 
 }  // namespace plumb

@@ -8,22 +8,27 @@
 
 #include <Eigen/Core>
 
+#include "algo/base/pose.hpp"
 #include "algo/comparison/correction.hpp"
 #include "algo/types/height_map.hpp"
-#include "algo/types/pose.hpp"
 
 namespace plumb {
 
-/// A part of the region of interest and how far its surface lies from the reference's, up being positive.
+/// A part of the region of interest and how far its surface lies from the reference's, up being
+/// positive.
 struct BodyPart {
-  std::string name;  ///< "left shoulder", "left side at the head end"; by the room: "+X side at the gantry end".
-  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< Mean of its reference surface, reference frame.
-  std::optional<double> now_m;                         ///< How far it lies too high before any correction; absent with couch-fixed markers.
-  double after_m = 0.0;                                ///< What the rigid correction leaves: its posture.
+  std::string name;  ///< "left shoulder", "left side at the head end"; by the room: "+X side at the
+                     ///< gantry end".
+  Eigen::Vector3d centre_m =
+      Eigen::Vector3d::Zero();  ///< Mean of its reference surface, reference frame.
+  std::optional<double>
+      now_m;  ///< How far it lies too high before any correction; absent with couch-fixed markers.
+  double after_m = 0.0;  ///< What the rigid correction leaves: its posture.
 };
 
 struct BodyParts {
-  /// Names follow the patient's posture. False: posture unknown, or the body does not lie as it says; then no name holds a left or right.
+  /// Names follow the patient's posture. False: posture unknown, or the body does not lie as it
+  /// says; then no name holds a left or right.
   bool by_posture = false;
   std::vector<BodyPart> parts;  ///< From head to feet (by the room: from the gantry away).
 };
@@ -31,10 +36,11 @@ struct BodyParts {
 /// What DescribeBody() looks at. All maps and masks share one grid, the reference scene's.
 struct BodyView {
   const HeightMap& reference;
-  const HeightMap& deviation_after;              ///< Current - reference height once the correction is applied; NaN unknown.
+  const HeightMap&
+      deviation_after;  ///< Current - reference height once the correction is applied; NaN unknown.
   const std::vector<std::uint8_t>& region_mask;  ///< 1: of the region of interest.
-  const std::vector<std::uint8_t>& body_mask;    ///< 1: of the whole body; it tells where shoulders are.
-  Pose T_motion = Pose::Identity();              ///< p_current = T_motion * p_reference, reference frame.
+  const std::vector<std::uint8_t>& body_mask;  ///< 1: of the whole body; it locates the shoulders.
+  Pose T_motion = Pose::Identity();  ///< p_current = T_motion * p_reference, reference frame.
   Pose T_iec_reference = Pose::Identity();
   MarkerKind marker_kind = MarkerKind::kRoom;
   std::optional<PatientPosture> posture;  ///< None: unknown.
@@ -42,10 +48,12 @@ struct BodyView {
 
 /// Splits the region into parts and measures each.
 ///
-/// A body whose neck is seen is named by shoulder, chest, abdomen, pelvis, thigh and lower leg; one without by its ends. Which end is the
-/// head and which side is left follow from posture and T_iec_reference; where the body's outline clearly lies across the axis that they
-/// tell, neither is believed. `now_m` is the rise of the part under the rigid motion plus what the motion leaves: a
-/// shift sideways lifts nothing. Parts of less than 20 cm2, or of which less than a third was measured, are left out.
+/// A body whose neck is seen is named by shoulder, chest, abdomen, pelvis, thigh and lower leg; one
+/// without by its ends. Which end is the head and which side is left follow from posture and
+/// T_iec_reference; where the body's outline clearly lies across the axis that they state, neither
+/// is believed. `now_m` is the rise of the part under the rigid motion plus what the motion leaves:
+/// a shift sideways lifts nothing. Parts of less than 20 cm2, or of which less than a third was
+/// measured, are left out.
 /// @throws std::invalid_argument if grids or masks differ in size.
 [[nodiscard]] BodyParts DescribeBody(const BodyView& view);
 

@@ -3,16 +3,17 @@
 #include <algorithm>
 #include <cmath>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 
 namespace plumb {
 namespace {
 
 constexpr double kNormal95 = 1.959964;  // half-width of a 95 % interval in standard deviations
 
-// Standard deviations of the couch vector, to first order by central differences: the covariance is a left
-// perturbation (w, t) about the moved centroid m, p -> m + R(w)(p - m) + t.
-Vector6d CouchSigmas(const Pose& T_motion, const Matrix6d& covariance, const Eigen::Vector3d& moved_centroid,
+// Standard deviations of the couch vector, to first order by central differences: the covariance is
+// a left perturbation (w, t) about the moved centroid m, p -> m + R(w)(p - m) + t.
+Vector6d CouchSigmas(const Pose& T_motion, const Matrix6d& covariance,
+                     const Eigen::Vector3d& moved_centroid,
                      const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference) {
   constexpr double kStep = 1e-6;  // rad or m: rounding 1e-10, curvature 1e-12 of the value
   Matrix6d jacobian;
@@ -21,9 +22,10 @@ Vector6d CouchSigmas(const Pose& T_motion, const Matrix6d& covariance, const Eig
     for (int s = 0; s < 2; ++s) {
       Vector6d twist = Vector6d::Zero();
       twist[i] = s == 0 ? -kStep : kStep;
-      const Pose T_perturbed =
-          Eigen::Translation3d(moved_centroid) * PoseFromTwist(twist) * Eigen::Translation3d(-moved_centroid) * T_motion;
-      side[static_cast<std::size_t>(s)] = CouchVector(T_perturbed, isocentre_reference, T_iec_reference);
+      const Pose T_perturbed = Eigen::Translation3d(moved_centroid) * PoseFromTwist(twist) *
+                               Eigen::Translation3d(-moved_centroid) * T_motion;
+      side[static_cast<std::size_t>(s)] =
+          CouchVector(T_perturbed, isocentre_reference, T_iec_reference);
     }
     jacobian.col(i) = (side[1] - side[0]) / (2 * kStep);
   }
@@ -43,8 +45,10 @@ CouchNumbers NumbersOf(const Vector6d& couch, MarkerKind kind) {
   return numbers;
 }
 
-// Words for the signs. The patient's left is +X (viewer's right) head first supine; each of prone and feet first turns it over.
-std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind, std::optional<PatientPosture> posture) {
+// Words for the signs. The patient's left is +X (viewer's right) head first supine; each of prone
+// and feet first turns it over.
+std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind,
+                                   std::optional<PatientPosture> posture) {
   std::array<std::string, 6> words;
   if (kind == MarkerKind::kRoom) {
     words[0] = couch[2] >= 0 ? "up" : "down";
@@ -52,12 +56,15 @@ std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind, std::
     words[2] = couch[0] >= 0 ? "to the right, facing the gantry" : "to the left, facing the gantry";
   }
   words[3] = couch[3] >= 0 ? "gantry end up" : "gantry end down";
-  words[4] = couch[4] >= 0 ? "right side down, facing the gantry" : "left side down, facing the gantry";
+  words[4] =
+      couch[4] >= 0 ? "right side down, facing the gantry" : "left side down, facing the gantry";
   words[5] = couch[5] >= 0 ? "counter-clockwise from above" : "clockwise from above";
   if (!posture) return words;
 
-  const bool head_first = *posture == PatientPosture::kHeadFirstSupine || *posture == PatientPosture::kHeadFirstProne;
-  const bool supine = *posture == PatientPosture::kHeadFirstSupine || *posture == PatientPosture::kFeetFirstSupine;
+  const bool head_first =
+      *posture == PatientPosture::kHeadFirstSupine || *posture == PatientPosture::kHeadFirstProne;
+  const bool supine =
+      *posture == PatientPosture::kHeadFirstSupine || *posture == PatientPosture::kFeetFirstSupine;
   const bool left_is_plus_x = head_first == supine;
   const auto side = [&](bool plus_x) { return plus_x == left_is_plus_x ? "left" : "right"; };
   if (kind == MarkerKind::kRoom) words[2] = std::string("to patient ") + side(couch[0] >= 0);
@@ -87,12 +94,14 @@ const char* Name(PatientPosture posture) {
 }
 
 Eigen::Matrix3d CouchRotation(double pitch_rad, double roll_rad, double yaw_rad) {
-  return (Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch_rad, Eigen::Vector3d::UnitX()) *
+  return (Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(pitch_rad, Eigen::Vector3d::UnitX()) *
           Eigen::AngleAxisd(roll_rad, Eigen::Vector3d::UnitY()))
       .toRotationMatrix();
 }
 
-Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference) {
+Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_reference,
+                     const Pose& T_iec_reference) {
   const Pose T_correction = T_iec_reference * T_motion.inverse() * T_iec_reference.inverse();
   const Eigen::Vector3d isocentre_iec = T_iec_reference * isocentre_reference;
   const Eigen::Matrix3d R = T_correction.linear();
@@ -104,15 +113,17 @@ Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_refe
   return couch;
 }
 
-Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance, const Eigen::Vector3d& centroid,
-                        const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference, MarkerKind kind,
+Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance,
+                        const Eigen::Vector3d& centroid, const Eigen::Vector3d& isocentre_reference,
+                        const Pose& T_iec_reference, MarkerKind kind,
                         std::optional<PatientPosture> posture) {
   const Vector6d couch = CouchVector(T_motion, isocentre_reference, T_iec_reference);
   Correction correction;
   correction.isocentre_m = isocentre_reference;
   correction.value = NumbersOf(couch, kind);
-  correction.u95 =
-      NumbersOf(kNormal95 * CouchSigmas(T_motion, covariance, T_motion * centroid, isocentre_reference, T_iec_reference), kind);
+  correction.u95 = NumbersOf(kNormal95 * CouchSigmas(T_motion, covariance, T_motion * centroid,
+                                                     isocentre_reference, T_iec_reference),
+                             kind);
   correction.words = WordsOf(couch, kind, posture);
   return correction;
 }

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "algo/types/pose.hpp"
+#include "algo/base/pose.hpp"
 
 namespace plumb {
 
@@ -19,7 +19,8 @@ enum class MarkerKind { kRoom, kCouch };
 enum class PatientPosture { kHeadFirstSupine, kHeadFirstProne, kFeetFirstSupine, kFeetFirstProne };
 [[nodiscard]] const char* Name(PatientPosture posture);  ///< "HFS", "HFP", "FFS", "FFP"
 
-/// Six values or their uncertainties. Shifts are absent where they are refused (couch-fixed markers).
+/// Six values or their uncertainties. Shifts are absent where they are refused (couch-fixed
+/// markers).
 struct CouchNumbers {
   std::optional<double> vertical_mm;      ///< +Z, up.
   std::optional<double> longitudinal_mm;  ///< +Y, toward the gantry.
@@ -33,15 +34,18 @@ struct CouchNumbers {
 struct Correction {
   Eigen::Vector3d isocentre_m = Eigen::Vector3d::Zero();  ///< Reference-marker frame.
   CouchNumbers value;
-  CouchNumbers u95;                  ///< 95 % half-widths.
-  std::array<std::string, 6> words;  ///< Which way: vertical, longitudinal, lateral, pitch, roll, yaw; "" where refused.
+  CouchNumbers u95;  ///< 95 % half-widths.
+  std::array<std::string, 6>
+      words;  ///< Which way: vertical, longitudinal, lateral, pitch, roll, yaw; "" where refused.
 };
 
-/// The six numbers as a vector, in the order lateral, longitudinal, vertical (metres), pitch, roll, yaw (radians).
+/// The six numbers as a vector, in the order lateral, longitudinal, vertical (metres), pitch, roll,
+/// yaw (radians).
 ///
-/// C = T_iec_reference M^-1 T_iec_reference^-1 = (R, t); shift = R c + t - c at the isocentre c in the IEC frame;
-/// R = Rz(yaw) Rx(pitch) Ry(roll).
-[[nodiscard]] Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference);
+/// C = T_iec_reference M^-1 T_iec_reference^-1 = (R, t); shift = R c + t - c at the isocentre c in
+/// the IEC frame; R = Rz(yaw) Rx(pitch) Ry(roll).
+[[nodiscard]] Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_reference,
+                                   const Pose& T_iec_reference);
 
 /// Rotation of the angles: Rz(yaw) Rx(pitch) Ry(roll), radians.
 [[nodiscard]] Eigen::Matrix3d CouchRotation(double pitch_rad, double roll_rad, double yaw_rad);
@@ -49,12 +53,16 @@ struct Correction {
 /// The correction of a body motion with its uncertainty, propagated to first order.
 ///
 /// @param T_motion    p_current = T_motion * p_reference, reference-marker frame.
-/// @param covariance  Of T_motion: rotation vector, translation; left perturbation about the moved centroid, T_motion * centroid,
+/// @param covariance  Of T_motion: rotation vector, translation; left perturbation about the moved
+/// centroid, T_motion * centroid,
 ///                    so that its translation part is the uncertainty of where the centroid went.
 /// @param centroid    Of the region in the reference scene, reference-marker frame.
-/// @param posture     Turns the words into the patient's left, right and head; none: it is not to be believed, the words are the room's.
-[[nodiscard]] Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance, const Eigen::Vector3d& centroid,
-                                      const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference, MarkerKind kind,
+/// @param posture     Turns the words into the patient's left, right and head; none: it is not to
+/// be believed, the words are the room's.
+[[nodiscard]] Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance,
+                                      const Eigen::Vector3d& centroid,
+                                      const Eigen::Vector3d& isocentre_reference,
+                                      const Pose& T_iec_reference, MarkerKind kind,
                                       std::optional<PatientPosture> posture);
 
 }  // namespace plumb

@@ -9,14 +9,18 @@
 namespace plumb {
 namespace {
 
-constexpr float kMaxJump_m = 0.01F;   // between neighbouring cells: more is another surface, not a slope
-constexpr float kSheet_m = 0.01F;     // of a cloud's top surface
-constexpr float kMaxRimShare = 0.5F;  // sideways over along: a pinhole's rim with a noisy normal is still the surface
-constexpr int kMaxDescent = 200;      // steps of the local search; each is one cell
+constexpr float kMaxJump_m =
+    0.01F;  // between neighbouring cells: more is another surface, not a slope
+constexpr float kSheet_m = 0.01F;  // of a cloud's top surface
+constexpr float kMaxRimShare =
+    0.5F;  // sideways over along: a pinhole's rim with a noisy normal is still the surface
+constexpr int kMaxDescent = 200;  // steps of the local search; each is one cell
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 void CheckGrids(const HeightMap& current, const HeightMap& reference) {
-  if (current.grid == reference.grid && current.z.size() == reference.z.size() && current.z.size() == current.grid.num_cells()) return;
+  if (current.grid == reference.grid && current.z.size() == reference.z.size() &&
+      current.z.size() == current.grid.num_cells())
+    return;
   throw std::invalid_argument("height maps must share one grid");
 }
 
@@ -35,12 +39,16 @@ class TriangleCanvas {
     const double y_high = std::min(std::max({a.y(), b.y(), c.y()}), map_.grid.height - 1.0);
     for (int row = static_cast<int>(std::ceil(y_low)); row <= y_high; ++row) {
       for (int column = static_cast<int>(std::ceil(x_low)); column <= x_high; ++column) {
-        const double v = ((column - a.x()) * (c.y() - a.y()) - (c.x() - a.x()) * (row - a.y())) / area;
-        const double w = ((b.x() - a.x()) * (row - a.y()) - (column - a.x()) * (b.y() - a.y())) / area;
+        const double v =
+            ((column - a.x()) * (c.y() - a.y()) - (c.x() - a.x()) * (row - a.y())) / area;
+        const double w =
+            ((b.x() - a.x()) * (row - a.y()) - (column - a.x()) * (b.y() - a.y())) / area;
         constexpr double kEdge = -1e-9;  // cells on a shared edge belong to both: no pinholes
         if (v < kEdge || w < kEdge || v + w > 1.0 - kEdge) continue;
         const float z = static_cast<float>(a.z() + v * (b.z() - a.z()) + w * (c.z() - a.z()));
-        float& cell = map_.z[static_cast<std::size_t>(row) * static_cast<std::size_t>(map_.grid.width) + static_cast<std::size_t>(column)];
+        float& cell =
+            map_.z[static_cast<std::size_t>(row) * static_cast<std::size_t>(map_.grid.width) +
+                   static_cast<std::size_t>(column)];
         if (!(cell >= z)) cell = z;
       }
     }
@@ -52,12 +60,15 @@ class TriangleCanvas {
   HeightMap map_;
 };
 
-bool Connected(float a, float b, float c) { return std::max({a, b, c}) - std::min({a, b, c}) < kMaxJump_m; }
+bool Connected(float a, float b, float c) {
+  return std::max({a, b, c}) - std::min({a, b, c}) < kMaxJump_m;
+}
 
 // The current surface as the distance search needs it: position and normal of a cell.
 class GridSurface {
  public:
-  explicit GridSurface(const HeightMap& map) : map_(map), step_(static_cast<float>(map.grid.step)) {}
+  explicit GridSurface(const HeightMap& map)
+      : map_(map), step_(static_cast<float>(map.grid.step)) {}
 
   [[nodiscard]] Eigen::Vector3f Normal(int row, int column) const {
     return Eigen::Vector3f(-Slope(row, column, 0, 1), -Slope(row, column, 1, 0), 1.0F).normalized();
@@ -66,7 +77,9 @@ class GridSurface {
   [[nodiscard]] bool OnRim(int row, int column) const {
     for (int r = row - 1; r <= row + 1; ++r) {
       for (int c = column - 1; c <= column + 1; ++c) {
-        if (r < 0 || r >= map_.grid.height || c < 0 || c >= map_.grid.width || !std::isfinite(map_.at(r, c))) return true;
+        if (r < 0 || r >= map_.grid.height || c < 0 || c >= map_.grid.width ||
+            !std::isfinite(map_.at(r, c)))
+          return true;
       }
     }
     return false;
@@ -74,7 +87,8 @@ class GridSurface {
 
  private:
   [[nodiscard]] float Value(int row, int column) const {
-    if (row < 0 || row >= map_.grid.height || column < 0 || column >= map_.grid.width) return std::numeric_limits<float>::quiet_NaN();
+    if (row < 0 || row >= map_.grid.height || column < 0 || column >= map_.grid.width)
+      return std::numeric_limits<float>::quiet_NaN();
     return map_.at(row, column);
   }
   // Rise over run in one direction: central, or one-sided at an end or beside a jump.
@@ -93,10 +107,12 @@ class GridSurface {
   float step_;
 };
 
-// Nearest cell of the current surface for every reference cell, by passing candidates on between neighbours.
+// Nearest cell of the current surface for every reference cell, by passing candidates on between
+// neighbours.
 class NearestCells {
  public:
-  NearestCells(const HeightMap& current, const HeightMap& reference, const std::vector<std::uint8_t>& mask)
+  NearestCells(const HeightMap& current, const HeightMap& reference,
+               const std::vector<std::uint8_t>& mask)
       : current_(current),
         reference_(reference),
         width_(current.grid.width),
@@ -112,7 +128,8 @@ class NearestCells {
         const float dz = current.z[i] - reference.z[i];
         best_[i] = static_cast<std::uint32_t>(i);
         squared_[i] = dz * dz;
-        // Nearer than a cell: no other column can hold a point that matters, the tangent plane here is exact enough.
+        // Nearer than a cell: no other column can hold a point that matters, the tangent plane here
+        // is exact enough.
         settled_[i] = std::abs(dz) < step_ ? 1 : 0;
       }
     }
@@ -129,7 +146,8 @@ class NearestCells {
   void Try(std::size_t cell, int row, int column, int other_row, int other_column) {
     if (other_row < 0 || other_row >= height_ || other_column < 0 || other_column >= width_) return;
     const std::size_t other =
-        static_cast<std::size_t>(other_row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(other_column);
+        static_cast<std::size_t>(other_row) * static_cast<std::size_t>(width_) +
+        static_cast<std::size_t>(other_column);
     const float z = current_.z[other];
     if (!std::isfinite(z)) return;
     const float dx = static_cast<float>(other_column - column) * step_;
@@ -148,14 +166,16 @@ class NearestCells {
         {{0, -direction}, {-direction, -direction}, {-direction, 0}, {-direction, direction}}};
     for (int row = first_row; row >= 0 && row < height_; row += direction) {
       for (int column = first_column; column >= 0 && column < width_; column += direction) {
-        const std::size_t cell = static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column);
+        const std::size_t cell = static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
+                                 static_cast<std::size_t>(column);
         if (wanted_[cell] == 0 || settled_[cell] != 0) continue;
         for (const auto& [dr, dc] : behind) {
           const int r = row + dr;
           const int c = column + dc;
           if (r < 0 || r >= height_ || c < 0 || c >= width_) continue;
           const std::uint32_t candidate =
-              best_[static_cast<std::size_t>(r) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(c)];
+              best_[static_cast<std::size_t>(r) * static_cast<std::size_t>(width_) +
+                    static_cast<std::size_t>(c)];
           if (candidate == kNone) continue;
           const int candidate_row = static_cast<int>(candidate) / width_;
           const int candidate_column = static_cast<int>(candidate) % width_;
@@ -194,7 +214,8 @@ class NearestCells {
 
 }  // namespace
 
-HeightMap ResampledHeightMap(const HeightMap& source, const Eigen::Affine3d& T_target_source, const GridShape& target) {
+HeightMap ResampledHeightMap(const HeightMap& source, const Eigen::Affine3d& T_target_source,
+                             const GridShape& target) {
   TriangleCanvas canvas(target);
   const int width = source.grid.width;
   std::vector<Eigen::Vector3d> above(static_cast<std::size_t>(std::max(width, 0)));
@@ -206,7 +227,8 @@ HeightMap ResampledHeightMap(const HeightMap& source, const Eigen::Affine3d& T_t
     for (int column = 0; column < width; ++column) {
       const float z = source.at(row, column);
       if (!std::isfinite(z)) continue;
-      const Eigen::Vector3d p = T_target_source * Eigen::Vector3d(source.grid.x_centre(column), source.grid.y_centre(row), z);
+      const Eigen::Vector3d p = T_target_source * Eigen::Vector3d(source.grid.x_centre(column),
+                                                                  source.grid.y_centre(row), z);
       below[static_cast<std::size_t>(column)] = (p - origin).cwiseProduct(to_cells);
     }
     for (int column = 0; row > 0 && column + 1 < width; ++column) {
@@ -215,20 +237,24 @@ HeightMap ResampledHeightMap(const HeightMap& source, const Eigen::Affine3d& T_t
       const float z01 = source.at(row - 1, column + 1);
       const float z10 = source.at(row, column);
       const float z11 = source.at(row, column + 1);
-      // Two triangles over the diagonal 00-11; where a corner is missing, the one triangle over the other three. NaN connects nothing.
+      // Two triangles over the diagonal 00-11; where a corner is missing, the one triangle over the
+      // other three. NaN connects nothing.
       const bool upper = Connected(z00, z01, z11) && std::isfinite(z00 + z01 + z11);
       const bool lower = Connected(z00, z11, z10) && std::isfinite(z00 + z11 + z10);
       if (upper) canvas.Draw(above[c], above[c + 1], below[c + 1]);
       if (lower) canvas.Draw(above[c], below[c + 1], below[c]);
       if (upper || lower) continue;
-      if (std::isfinite(z00 + z01 + z10) && Connected(z00, z01, z10)) canvas.Draw(above[c], above[c + 1], below[c]);
-      if (std::isfinite(z01 + z11 + z10) && Connected(z01, z11, z10)) canvas.Draw(above[c + 1], below[c + 1], below[c]);
+      if (std::isfinite(z00 + z01 + z10) && Connected(z00, z01, z10))
+        canvas.Draw(above[c], above[c + 1], below[c]);
+      if (std::isfinite(z01 + z11 + z10) && Connected(z01, z11, z10))
+        canvas.Draw(above[c + 1], below[c + 1], below[c]);
     }
   }
   return canvas.Take();
 }
 
-HeightMap HeightMapOfCloud(const PointCloud& cloud_in_target, double reach_m, const GridShape& target) {
+HeightMap HeightMapOfCloud(const PointCloud& cloud_in_target, double reach_m,
+                           const GridShape& target) {
   constexpr float kMinUp = 0.2F;  // steeper discs are no part of a view from above
   HeightMap top(target);
   std::vector<float> sum(target.num_cells(), 0.0F);
@@ -240,15 +266,19 @@ HeightMap HeightMapOfCloud(const PointCloud& cloud_in_target, double reach_m, co
     const double column_at = (p.x() - target.x_min) / target.step - 0.5;
     const double row_at = (p.y() - target.y_min) / target.step - 0.5;
     const double reach = reach_m / target.step;
-    if (!(column_at > -reach && column_at < target.width + reach && row_at > -reach && row_at < target.height + reach)) return;
-    for (int row = std::max(static_cast<int>(std::ceil(row_at - reach)), 0); row <= std::min(row_at + reach, target.height - 1.0); ++row) {
+    if (!(column_at > -reach && column_at < target.width + reach && row_at > -reach &&
+          row_at < target.height + reach))
+      return;
+    for (int row = std::max(static_cast<int>(std::ceil(row_at - reach)), 0);
+         row <= std::min(row_at + reach, target.height - 1.0); ++row) {
       for (int column = std::max(static_cast<int>(std::ceil(column_at - reach)), 0);
            column <= std::min(column_at + reach, target.width - 1.0); ++column) {
         const float dx = static_cast<float>((column - column_at) * target.step);
         const float dy = static_cast<float>((row - row_at) * target.step);
         const float far = (dx * dx + dy * dy) / static_cast<float>(reach_m * reach_m);
         if (far >= 1.0F) continue;
-        visit(static_cast<std::size_t>(row) * static_cast<std::size_t>(target.width) + static_cast<std::size_t>(column),
+        visit(static_cast<std::size_t>(row) * static_cast<std::size_t>(target.width) +
+                  static_cast<std::size_t>(column),
               p.z() - (n.x() * dx + n.y() * dy) / n.z(), (1 - far) * (1 - far) + 1e-3F);
       }
     }
@@ -274,13 +304,16 @@ HeightMap HeightMapOfCloud(const PointCloud& cloud_in_target, double reach_m, co
 HeightMap HeightDifference(const HeightMap& current, const HeightMap& reference) {
   CheckGrids(current, reference);
   HeightMap difference(reference.grid);
-  for (std::size_t i = 0; i < difference.z.size(); ++i) difference.z[i] = current.z[i] - reference.z[i];
+  for (std::size_t i = 0; i < difference.z.size(); ++i)
+    difference.z[i] = current.z[i] - reference.z[i];
   return difference;
 }
 
-HeightMap SignedDistance(const HeightMap& current, const HeightMap& reference, const std::vector<std::uint8_t>& mask) {
+HeightMap SignedDistance(const HeightMap& current, const HeightMap& reference,
+                         const std::vector<std::uint8_t>& mask) {
   CheckGrids(current, reference);
-  if (!mask.empty() && mask.size() != reference.z.size()) throw std::invalid_argument("the mask must have one entry a cell");
+  if (!mask.empty() && mask.size() != reference.z.size())
+    throw std::invalid_argument("the mask must have one entry a cell");
   HeightMap distance(reference.grid);
   const NearestCells nearest(current, reference, mask);
   const GridSurface surface(current);
@@ -292,11 +325,13 @@ HeightMap SignedDistance(const HeightMap& current, const HeightMap& reference, c
     const int row = static_cast<int>(best) / width;
     const int column = static_cast<int>(best) % width;
     const Eigen::Vector3f offset(static_cast<float>(static_cast<int>(cell) % width - column) * step,
-                                 static_cast<float>(static_cast<int>(cell) / width - row) * step, reference.z[cell] - current.z[best]);
+                                 static_cast<float>(static_cast<int>(cell) / width - row) * step,
+                                 reference.z[cell] - current.z[best]);
     const Eigen::Vector3f normal = surface.Normal(row, column);
     const float along = normal.dot(offset);
     const float sideways = (offset - along * normal).norm();
-    // Within a cell's own patch of surface the tangent plane is the surface; beyond it the nearest point is a crease or an end.
+    // Within a cell's own patch of surface the tangent plane is the surface; beyond it the nearest
+    // point is a crease or an end.
     if (sideways < 1.5F * step / std::max(normal.z(), 0.1F)) {
       distance.z[cell] = -along;
     } else if (sideways < kMaxRimShare * std::abs(along) || !surface.OnRim(row, column)) {

@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include "algo/comparison/scene_alignment.hpp"
+#include "algo/geometry/rigid_fit.hpp"
 
 namespace plumb {
 namespace {
@@ -21,7 +22,8 @@ Eigen::Vector3d CentreOf(const SceneMarker& marker) {
 
 double SideOf(const SceneMarker& marker) {
   double sum = 0.0;
-  for (std::size_t i = 0; i < 4; ++i) sum += (marker.corners[(i + 1) % 4] - marker.corners[i]).norm();
+  for (std::size_t i = 0; i < 4; ++i)
+    sum += (marker.corners[(i + 1) % 4] - marker.corners[i]).norm();
   return sum / 4.0;
 }
 
@@ -41,8 +43,12 @@ double ScaleOf(const std::vector<std::pair<const SceneMarker*, const SceneMarker
 
 class Checker {
  public:
-  Checker(const Scene& scene, const std::optional<MarkerBaseline>& baseline, const MarkerCheckLimits& limits)
-      : scene_(scene), baseline_(baseline), limits_(limits), seen_(BaselineOf(scene, limits).markers) {}
+  Checker(const Scene& scene, const std::optional<MarkerBaseline>& baseline,
+          const MarkerCheckLimits& limits)
+      : scene_(scene),
+        baseline_(baseline),
+        limits_(limits),
+        seen_(BaselineOf(scene, limits).markers) {}
 
   MarkerCheck Run() {
     Seen();
@@ -50,10 +56,15 @@ class Checker {
     Sides();
     Depth();
     const bool passed = check_.reasons.empty() &&
-                        std::all_of(check_.items.begin(), check_.items.end(), [](const MarkerCheckItem& item) { return item.passed; });
-    check_.status = !passed ? MarkerCheckStatus::kFailed : baseline_ ? MarkerCheckStatus::kPassed : MarkerCheckStatus::kNoBaseline;
+                        std::all_of(check_.items.begin(), check_.items.end(),
+                                    [](const MarkerCheckItem& item) { return item.passed; });
+    check_.status = !passed     ? MarkerCheckStatus::kFailed
+                    : baseline_ ? MarkerCheckStatus::kPassed
+                                : MarkerCheckStatus::kNoBaseline;
     if (check_.status == MarkerCheckStatus::kNoBaseline) {
-      check_.reasons.push_back("there is no baseline yet: somebody who knows that the markers lie right takes this check as the baseline");
+      check_.reasons.push_back(
+          "there is no baseline yet: somebody who knows that the markers lie right takes this "
+          "check as the baseline");
     }
     return std::move(check_);
   }
@@ -61,7 +72,8 @@ class Checker {
  private:
   void Fail(std::string reason) { check_.reasons.push_back(std::move(reason)); }
 
-  void AtMost(const char* name, double value, double limit, const char* unit, std::string note, const std::string& reason) {
+  void AtMost(const char* name, double value, double limit, const char* unit, std::string note,
+              const std::string& reason) {
     const bool passed = std::abs(value) <= limit;
     check_.items.push_back({name, value, limit, unit, passed, std::move(note)});
     if (!passed) Fail(reason);
@@ -74,49 +86,84 @@ class Checker {
         if (!seen_.contains(id)) missing.push_back(id);
       }
     }
-    const auto wanted = baseline_ ? baseline_->markers.size() : static_cast<std::size_t>(limits_.min_markers);
+    const auto wanted =
+        baseline_ ? baseline_->markers.size() : static_cast<std::size_t>(limits_.min_markers);
     const auto found = baseline_ ? wanted - missing.size() : seen_.size();
-    const std::string names = missing.empty() ? "" : fmt::format("missing: {}", fmt::join(missing, ", "));
-    check_.items.push_back({"markers_seen", static_cast<double>(found), static_cast<double>(wanted), "", found >= wanted, names});
+    const std::string names =
+        missing.empty() ? "" : fmt::format("missing: {}", fmt::join(missing, ", "));
+    check_.items.push_back({"markers_seen", static_cast<double>(found), static_cast<double>(wanted),
+                            "", found >= wanted, names});
     if (found >= wanted) return;
     Fail(missing.empty()
-             ? fmt::format("{} markers were seen, at least {} are needed; sweep over all of them", found, wanted)
-             : fmt::format("markers {} were not seen well: look whether they are there, clean and uncovered, and sweep over all",
+             ? fmt::format("{} markers were seen, at least {} are needed; sweep over all of them",
+                           found, wanted)
+             : fmt::format("markers {} were not seen well: look whether they are there, clean and "
+                           "uncovered, and sweep over all",
                            fmt::join(missing, ", ")));
   }
 
   bool SameMarkers() {
-    if (baseline_->dictionary == scene_.marker_dictionary && std::abs(baseline_->marker_length_m - scene_.marker_length_m) < 1e-6)
+    if (baseline_->dictionary == scene_.marker_dictionary &&
+        std::abs(baseline_->marker_length_m - scene_.marker_length_m) < 1e-6)
       return true;
-    Fail(fmt::format("the baseline was taken with markers {} of {} m, this check with {} of {} m; take a new baseline",
-                     baseline_->dictionary, baseline_->marker_length_m, scene_.marker_dictionary, scene_.marker_length_m));
+    Fail(
+        fmt::format("the baseline was taken with markers {} of {} m, this check with {} of {} m; "
+                    "take a new baseline",
+                    baseline_->dictionary, baseline_->marker_length_m, scene_.marker_dictionary,
+                    scene_.marker_length_m));
     return false;
   }
 
+  // Baseline from sweep by the agreeing markers other than `id`: a marker must not pull the fit
+  // that it is judged by. Nothing if those determine no pose.
+  [[nodiscard]] std::optional<Pose> FitWithout(int id, const std::vector<int>& agreeing) const {
+    std::vector<Eigen::Vector3d> before, now;
+    for (const int other : agreeing) {
+      if (other == id) continue;
+      const MarkerCorners& known = baseline_->markers.at(other).corners;
+      const MarkerCorners& seen = seen_.at(other).corners;
+      before.insert(before.end(), known.begin(), known.end());
+      now.insert(now.end(), seen.begin(), seen.end());
+    }
+    const RigidFit fit = FitRigid(before, now);
+    return fit.valid ? std::optional(fit.T_a_b) : std::nullopt;
+  }
+
   void Geometry() {
-    CompareOptions options;
-    options.min_shared_markers = limits_.min_markers;
-    const AlignmentOutcome outcome = AlignScenes(baseline_->markers, seen_, options);
-    if (!outcome.alignment) return Fail(outcome.failure);
+    const AlignmentOutcome outcome =
+        AlignScenes(baseline_->markers, seen_, Preset::kBest, {}, limits_.min_markers);
+    if (!outcome.alignment) {
+      for (std::string& reason : RefusalsOfMarkers(outcome.markers, limits_.min_markers)) {
+        Fail(std::move(reason));
+      }
+      return;
+    }
+    const std::vector<int>& agreeing = outcome.alignment->markers_used;
+    std::vector<std::pair<const SceneMarker*, const SceneMarker*>> good;
+    for (const int id : agreeing) good.emplace_back(&baseline_->markers.at(id), &seen_.at(id));
     double moved_m = 0.0;
     int worst = -1;
-    std::vector<std::pair<const SceneMarker*, const SceneMarker*>> good;
     for (const auto& [id, marker] : seen_) {
       const auto known = baseline_->markers.find(id);
       if (known == baseline_->markers.end()) continue;
-      const double off_m = (outcome.alignment->T_reference_current * CentreOf(marker) - CentreOf(known->second)).norm();
+      const Pose T = FitWithout(id, agreeing).value_or(outcome.alignment->T_reference_current);
+      const double off_m = (T * CentreOf(marker) - CentreOf(known->second)).norm();
       if (worst < 0 || off_m > moved_m) moved_m = off_m, worst = id;
-      if (!outcome.alignment->markers_rejected.contains(id)) good.emplace_back(&known->second, &marker);
     }
-    const double misfit_mm = outcome.alignment->rms_m / kMillimetre, moved_mm = moved_m / kMillimetre;
+    const double misfit_mm = outcome.alignment->rms_m / kMillimetre,
+                 moved_mm = moved_m / kMillimetre;
     AtMost("misfit", misfit_mm, limits_.max_misfit_m / kMillimetre, "mm", "",
-           fmt::format("the markers lie {:.1f} mm (RMS) off where they lay, at most {:g} mm are allowed", misfit_mm,
-                       limits_.max_misfit_m / kMillimetre));
-    AtMost("moved", moved_mm, limits_.max_moved_m / kMillimetre, "mm", fmt::format("marker {}", worst),
+           fmt::format(
+               "the markers lie {:.1f} mm (RMS) off where they lay, at most {:g} mm are allowed",
+               misfit_mm, limits_.max_misfit_m / kMillimetre));
+    AtMost("moved", moved_mm, limits_.max_moved_m / kMillimetre, "mm",
+           fmt::format("marker {}", worst),
            fmt::format("marker {} moved {:.0f} mm", worst, moved_mm));
     const double scale = 100 * (ScaleOf(good) - 1);
     AtMost("scale", scale, 100 * limits_.max_scale_share, "%", "",
-           fmt::format("the markers lie {:.2f} % farther apart than they did: the sensor's calibration may have changed", scale));
+           fmt::format("the markers lie {:.2f} % farther apart than they did: the sensor's "
+                       "calibration may have changed",
+                       scale));
   }
 
   void Sides() {
@@ -126,12 +173,16 @@ class Checker {
       const double off = 100 * (SideOf(marker) / scene_.marker_length_m - 1);
       if (id_of_worst < 0 || std::abs(off) > std::abs(worst)) worst = off, id_of_worst = id;
     }
-    // Preset `best` takes every marker for as large as it should be: then its sides were not measured, and say nothing.
+    // Preset `best` takes every marker for as large as it should be: then its sides were not
+    // measured, and say nothing.
     if (std::abs(worst) < kAssumed_percent) return;
-    AtMost("side", worst, 100 * limits_.max_side_share, "%", id_of_worst < 0 ? "" : fmt::format("marker {}", id_of_worst),
+    AtMost("side", worst, 100 * limits_.max_side_share, "%",
+           id_of_worst < 0 ? "" : fmt::format("marker {}", id_of_worst),
            id_of_worst < 0
                ? std::string("no marker was seen, so none could be measured")
-               : fmt::format("marker {} measures {:+.1f} % of its length: is its print of the right size?", id_of_worst, worst));
+               : fmt::format(
+                     "marker {} measures {:+.1f} % of its length: is its print of the right size?",
+                     id_of_worst, worst));
   }
 
   void Depth() {
@@ -139,7 +190,9 @@ class Checker {
     if (found == scene_.calibration.end()) return;
     const double off = 100 * (found->second - 1);
     AtMost("depth_scale", off, 100 * limits_.max_depth_share, "%", "",
-           fmt::format("the sensor's depth is off by {:+.1f} %: let it warm up, check again, then have it calibrated", off));
+           fmt::format("the sensor's depth is off by {:+.1f} %: let it warm up, check again, then "
+                       "have it calibrated",
+                       off));
   }
 
   const Scene& scene_;
@@ -166,13 +219,15 @@ const char* Name(MarkerCheckStatus status) {
 MarkerBaseline BaselineOf(const Scene& scene, const MarkerCheckLimits& limits) {
   MarkerBaseline baseline{{}, scene.marker_dictionary, scene.marker_length_m};
   for (const auto& [id, marker] : scene.markers) {
-    const bool finite = std::all_of(marker.corners.begin(), marker.corners.end(), [](const Eigen::Vector3d& p) { return p.allFinite(); });
+    const bool finite = std::all_of(marker.corners.begin(), marker.corners.end(),
+                                    [](const Eigen::Vector3d& p) { return p.allFinite(); });
     if (finite && marker.num_views >= limits.min_views) baseline.markers.emplace(id, marker);
   }
   return baseline;
 }
 
-MarkerCheck CheckMarkers(const Scene& scene, const std::optional<MarkerBaseline>& baseline, const MarkerCheckLimits& limits) {
+MarkerCheck CheckMarkers(const Scene& scene, const std::optional<MarkerBaseline>& baseline,
+                         const MarkerCheckLimits& limits) {
   return Checker(scene, baseline, limits).Run();
 }
 

@@ -9,7 +9,8 @@
 namespace plumb {
 namespace {
 
-constexpr float kUnknownShare = 0.7F;      // what an unmeasured place costs, of the limit: missing data is weak evidence
+constexpr float kUnknownShare =
+    0.7F;  // what an unmeasured place costs, of the limit: missing data is weak evidence
 constexpr double kDistinctYaw_rad = 0.21;  // 12 deg
 constexpr double kDistinctShift_m = 0.05;
 
@@ -35,7 +36,8 @@ Eigen::Vector2d Centroid(const std::vector<BodyCell>& cells) {
   return sum / static_cast<double>(cells.size());
 }
 
-// Heights of the body, 0 where something else was measured, NaN where nothing was; single gaps filled.
+// Heights of the body, 0 where something else was measured, NaN where nothing was; single gaps
+// filled.
 std::vector<float> SearchMap(const Body& body) {
   std::vector<float> map(body.cells.size(), std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < map.size(); ++i) {
@@ -46,13 +48,15 @@ std::vector<float> SearchMap(const Body& body) {
   const int width = body.grid.width;
   for (int row = 1; row + 1 < body.grid.height; ++row) {
     for (int column = 1; column + 1 < width; ++column) {
-      const std::size_t here = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column);
+      const std::size_t here = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                               static_cast<std::size_t>(column);
       if (std::isfinite(map[here])) continue;
       float sum = 0.0F;
       int count = 0;
       for (int r = -1; r <= 1; ++r) {
         for (int c = -1; c <= 1; ++c) {
-          const float z = map[static_cast<std::size_t>(row + r) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column + c)];
+          const float z = map[static_cast<std::size_t>(row + r) * static_cast<std::size_t>(width) +
+                              static_cast<std::size_t>(column + c)];
           if (!std::isfinite(z)) continue;
           sum += z;
           ++count;
@@ -78,22 +82,26 @@ double SupportHeightAt(const Body& body, const Eigen::Vector2d& xy) {
 
 }  // namespace
 
-std::vector<Pose> MotionStarts(const Body& reference, const Body& current, const MotionStartOptions& options) {
+std::vector<Pose> MotionStarts(const Body& reference, const Body& current,
+                               const MotionStartOptions& options) {
   const std::vector<BodyCell> all_reference = BodyCells(reference);
   const std::vector<BodyCell> all_current = BodyCells(current);
   if (all_reference.empty() || all_current.empty()) return {};
   const Eigen::Vector2d centre_reference = Centroid(all_reference);
   const Eigen::Vector2d centre_current = Centroid(all_current);
-  const double area_ratio = static_cast<double>(all_reference.size()) / static_cast<double>(all_current.size()) *
-                            (reference.grid.step * reference.grid.step) / (current.grid.step * current.grid.step);
+  const double area_ratio =
+      static_cast<double>(all_reference.size()) / static_cast<double>(all_current.size()) *
+      (reference.grid.step * reference.grid.step) / (current.grid.step * current.grid.step);
 
   std::vector<BodyCell> samples;
   const std::size_t stride = all_reference.size() / options.max_samples + 1;
-  for (std::size_t i = 0; i < all_reference.size(); i += stride) samples.push_back(all_reference[i]);
+  for (std::size_t i = 0; i < all_reference.size(); i += stride)
+    samples.push_back(all_reference[i]);
   const std::vector<float> map = SearchMap(current);
   const float limit = static_cast<float>(options.height_limit_m);
 
-  const auto cost_of = [&](const std::vector<Eigen::Vector2d>& turned, const Eigen::Vector2d& shift) {
+  const auto cost_of = [&](const std::vector<Eigen::Vector2d>& turned,
+                           const Eigen::Vector2d& shift) {
     float sum = 0.0F;
     int hits = 0;
     for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -113,13 +121,15 @@ std::vector<Pose> MotionStarts(const Body& reference, const Body& current, const
 
   const int yaw_steps = static_cast<int>(options.max_yaw_rad / options.yaw_step_rad);
   const int shift_steps = static_cast<int>(options.max_offset_m / options.offset_step_m);
-  const std::size_t per_yaw = static_cast<std::size_t>((2 * shift_steps + 1) * (2 * shift_steps + 1));
+  const std::size_t per_yaw =
+      static_cast<std::size_t>((2 * shift_steps + 1) * (2 * shift_steps + 1));
   std::vector<Candidate> candidates(static_cast<std::size_t>(2 * yaw_steps + 1) * per_yaw);
   tbb::parallel_for(-yaw_steps, yaw_steps + 1, [&](int k) {
     const double yaw = k * options.yaw_step_rad;
     const Eigen::Rotation2Dd R(yaw);
     std::vector<Eigen::Vector2d> turned;
-    for (const BodyCell& cell : samples) turned.push_back(R * (cell.xy - centre_reference) + centre_current);
+    for (const BodyCell& cell : samples)
+      turned.push_back(R * (cell.xy - centre_reference) + centre_current);
     std::size_t slot = static_cast<std::size_t>(k + yaw_steps) * per_yaw;
     for (int iy = -shift_steps; iy <= shift_steps; ++iy) {
       for (int ix = -shift_steps; ix <= shift_steps; ++ix) {
@@ -128,22 +138,26 @@ std::vector<Pose> MotionStarts(const Body& reference, const Body& current, const
       }
     }
   });
-  std::stable_sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
 
   std::vector<Candidate> kept;
   for (const Candidate& candidate : candidates) {
     if (kept.size() >= options.num_starts) break;
     const bool known = std::any_of(kept.begin(), kept.end(), [&](const Candidate& other) {
-      return std::abs(other.yaw_rad - candidate.yaw_rad) < kDistinctYaw_rad && (other.offset - candidate.offset).norm() < kDistinctShift_m;
+      return std::abs(other.yaw_rad - candidate.yaw_rad) < kDistinctYaw_rad &&
+             (other.offset - candidate.offset).norm() < kDistinctShift_m;
     });
     if (!known) kept.push_back(candidate);
   }
   std::vector<Pose> starts;
   for (const Candidate& candidate : kept) {
     const Eigen::Vector2d target = centre_current + candidate.offset;
-    const Eigen::Vector3d from(centre_reference.x(), centre_reference.y(), SupportHeightAt(reference, centre_reference));
+    const Eigen::Vector3d from(centre_reference.x(), centre_reference.y(),
+                               SupportHeightAt(reference, centre_reference));
     const Eigen::Vector3d to(target.x(), target.y(), SupportHeightAt(current, target));
-    starts.push_back(Eigen::Translation3d(to) * Pose(Eigen::AngleAxisd(candidate.yaw_rad, Eigen::Vector3d::UnitZ())) *
+    starts.push_back(Eigen::Translation3d(to) *
+                     Pose(Eigen::AngleAxisd(candidate.yaw_rad, Eigen::Vector3d::UnitZ())) *
                      Eigen::Translation3d(-from));
   }
   return starts;

@@ -11,10 +11,11 @@ namespace {
 
 constexpr int kMaxPlanes = 6;
 constexpr double kHistogramBin_m = 0.01;
-constexpr double kCoarsePlaneBand_m = 0.04;  // first guess is level: 2 deg over 2 m is 35 mm at the ends
-constexpr double kFinePlaneBand_m = 0.010;   // surfaces wave by some millimetres over a room
-constexpr double kPlaneNormalCos = 0.985;    // 10 deg
-constexpr double kCarriedShare = 0.5;        // of the most that any plane carries
+constexpr double kCoarsePlaneBand_m =
+    0.04;  // first guess is level: 2 deg over 2 m is 35 mm at the ends
+constexpr double kFinePlaneBand_m = 0.010;  // surfaces wave by some millimetres over a room
+constexpr double kPlaneNormalCos = 0.985;   // 10 deg
+constexpr double kCarriedShare = 0.5;       // of the most that any plane carries
 
 struct FoundPlane {
   SupportPlane plane;
@@ -22,7 +23,8 @@ struct FoundPlane {
 };
 
 // Weighted total least squares over the given samples with Tukey weights of the current residuals.
-bool RefitPlane(const Surface& scene, const std::vector<std::size_t>& candidates, double band_m, double min_cos, SupportPlane& plane) {
+bool RefitPlane(const Surface& scene, const std::vector<std::size_t>& candidates, double band_m,
+                double min_cos, SupportPlane& plane) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
   double total = 0.0;
@@ -39,7 +41,8 @@ bool RefitPlane(const Surface& scene, const std::vector<std::size_t>& candidates
   }
   if (count < 10 || total <= 0) return false;
   mean /= total;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(second / total - mean * mean.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(second / total -
+                                                             mean * mean.transpose());
   Eigen::Vector3d normal = eigen.eigenvectors().col(0);
   if (normal.dot(plane.normal) < 0) normal = -normal;
   plane.normal = normal;
@@ -56,7 +59,8 @@ double ModeHeight(const Surface& scene, const std::vector<std::size_t>& candidat
     high = std::max(high, scene.points[i].z());
   }
   std::vector<int> histogram(static_cast<std::size_t>((high - low) / kHistogramBin_m) + 3, 0);
-  for (const std::size_t i : candidates) ++histogram[static_cast<std::size_t>((scene.points[i].z() - low) / kHistogramBin_m) + 1];
+  for (const std::size_t i : candidates)
+    ++histogram[static_cast<std::size_t>((scene.points[i].z() - low) / kHistogramBin_m) + 1];
   std::size_t best = 1;
   int best_count = -1;
   for (std::size_t b = 1; b + 1 < histogram.size(); ++b) {
@@ -83,28 +87,34 @@ std::vector<FoundPlane> HorizontalPlanes(const Surface& scene, const BodyOptions
     found.plane.offset_m = ModeHeight(scene, left);
     bool fitted = true;
     for (double band = kCoarsePlaneBand_m; fitted && band > kFinePlaneBand_m; band *= 0.7) {
-      fitted = RefitPlane(scene, left, band, band > 0.025 ? cos_tilt : kPlaneNormalCos, found.plane);
+      fitted =
+          RefitPlane(scene, left, band, band > 0.025 ? cos_tilt : kPlaneNormalCos, found.plane);
     }
-    for (int i = 0; i < 3 && fitted; ++i) fitted = RefitPlane(scene, left, kFinePlaneBand_m, kPlaneNormalCos, found.plane);
+    for (int i = 0; i < 3 && fitted; ++i)
+      fitted = RefitPlane(scene, left, kFinePlaneBand_m, kPlaneNormalCos, found.plane);
     // What lies in the band leaves the pool, member or not, so that every round makes progress.
     std::vector<std::size_t> rest;
     for (const std::size_t i : left) {
       const double height = found.plane.Height(scene.points[i].cast<double>());
-      const bool parallel = scene.normals[i].cast<double>().dot(found.plane.normal) > kPlaneNormalCos;
+      const bool parallel =
+          scene.normals[i].cast<double>().dot(found.plane.normal) > kPlaneNormalCos;
       if (fitted && std::abs(height) < kFinePlaneBand_m && parallel) found.members.push_back(i);
       if (std::abs(height) >= kFinePlaneBand_m) rest.push_back(i);
     }
     if (rest.size() == left.size()) break;
     left = std::move(rest);
     const bool level = found.plane.normal.z() > cos_tilt;
-    if (level && static_cast<double>(found.members.size()) * area_per_sample >= options.min_support_area_m2)
+    if (level &&
+        static_cast<double>(found.members.size()) * area_per_sample >= options.min_support_area_m2)
       planes.push_back(std::move(found));
   }
   return planes;
 }
 
 // The highest plane that carries nearly as much as any: the couch rather than the floor below it.
-std::optional<SupportPlane> ChooseSupport(const Surface& scene, const std::vector<FoundPlane>& planes, const BodyOptions& options) {
+std::optional<SupportPlane> ChooseSupport(const Surface& scene,
+                                          const std::vector<FoundPlane>& planes,
+                                          const BodyOptions& options) {
   std::vector<std::uint8_t> flat(scene.size(), 0);
   for (const FoundPlane& found : planes) {
     for (const std::size_t i : found.members) flat[i] = 1;
@@ -113,7 +123,8 @@ std::optional<SupportPlane> ChooseSupport(const Surface& scene, const std::vecto
   for (std::size_t k = 0; k < planes.size(); ++k) {
     for (std::size_t i = 0; i < scene.size(); ++i) {
       const double height = planes[k].plane.Height(scene.points[i].cast<double>());
-      if (flat[i] == 0 && height > options.min_height_m && height < options.max_height_m) ++carried[k];
+      if (flat[i] == 0 && height > options.min_height_m && height < options.max_height_m)
+        ++carried[k];
     }
   }
   if (planes.empty()) return std::nullopt;
@@ -148,7 +159,8 @@ void KeepLargestComponent(Body& body) {
       const int column = static_cast<int>(cell) % width;
       for (int r = std::max(row - 1, 0); r <= std::min(row + 1, height - 1); ++r) {
         for (int c = std::max(column - 1, 0); c <= std::min(column + 1, width - 1); ++c) {
-          const std::size_t other = static_cast<std::size_t>(r) * static_cast<std::size_t>(width) + static_cast<std::size_t>(c);
+          const std::size_t other = static_cast<std::size_t>(r) * static_cast<std::size_t>(width) +
+                                    static_cast<std::size_t>(c);
           if (body.cells[other] != Body::kBody || label[other] >= 0) continue;
           label[other] = next;
           stack.push_back(other);
@@ -188,7 +200,8 @@ bool InsidePolygon(const std::vector<Eigen::Vector2d>& polygon, double x, double
   for (std::size_t i = 0, j = polygon.size() - 1; i < polygon.size(); j = i++) {
     const Eigen::Vector2d& a = polygon[i];
     const Eigen::Vector2d& b = polygon[j];
-    if ((a.y() > y) != (b.y() > y) && x < (b.x() - a.x()) * (y - a.y()) / (b.y() - a.y()) + a.x()) inside = !inside;
+    if ((a.y() > y) != (b.y() > y) && x < (b.x() - a.x()) * (y - a.y()) / (b.y() - a.y()) + a.x())
+      inside = !inside;
   }
   return inside;
 }
@@ -200,7 +213,8 @@ void ForEachCell(const HeightMap& map, Visit&& visit) {
     for (int column = 0; column < map.grid.width; ++column) {
       const float z = map.at(row, column);
       if (!std::isfinite(z)) continue;
-      visit(static_cast<std::size_t>(row) * static_cast<std::size_t>(map.grid.width) + static_cast<std::size_t>(column),
+      visit(static_cast<std::size_t>(row) * static_cast<std::size_t>(map.grid.width) +
+                static_cast<std::size_t>(column),
             Eigen::Vector3d(map.grid.x_centre(column), map.grid.y_centre(row), z));
     }
   }
@@ -232,7 +246,8 @@ Body FindBody(const Surface& scene, const BodyOptions& options) {
     const auto cell = body.grid.cell(p.x(), p.y());
     if (!cell) continue;
     const double height = body.support ? body.support->Height(p) : p.z();
-    body.cells[*cell] = std::max<std::uint8_t>(body.cells[*cell], body.HighEnough(p) ? Body::kBody : Body::kMeasured);
+    body.cells[*cell] = std::max<std::uint8_t>(body.cells[*cell],
+                                               body.HighEnough(p) ? Body::kBody : Body::kMeasured);
     if (body.support && height >= options.max_height_m) continue;
     if (!(body.height_m[*cell] >= height)) body.height_m[*cell] = static_cast<float>(height);
   }
@@ -240,21 +255,27 @@ Body FindBody(const Surface& scene, const BodyOptions& options) {
   return body;
 }
 
-std::vector<std::uint8_t> RegionMask(const HeightMap& map, const Body& body, const std::vector<Eigen::Vector2d>& polygon_m) {
+std::vector<std::uint8_t> RegionMask(const HeightMap& map, const Body& body,
+                                     const std::vector<Eigen::Vector2d>& polygon_m) {
   std::vector<std::uint8_t> mask(map.grid.num_cells(), 0);
   bool any = false;
   ForEachCell(map, [&](std::size_t cell, const Eigen::Vector3d& p) {
-    const bool inside = polygon_m.empty() ? body.Contains(p) : InsidePolygon(polygon_m, p.x(), p.y()) && body.HighEnough(p);
+    const bool inside = polygon_m.empty()
+                            ? body.Contains(p)
+                            : InsidePolygon(polygon_m, p.x(), p.y()) && body.HighEnough(p);
     mask[cell] = inside ? 1 : 0;
     any = any || inside;
   });
   if (any || polygon_m.empty()) return mask;
   // Nothing rises in the polygon: whoever drew it meant the flat surface itself.
-  ForEachCell(map, [&](std::size_t cell, const Eigen::Vector3d& p) { mask[cell] = InsidePolygon(polygon_m, p.x(), p.y()) ? 1 : 0; });
+  ForEachCell(map, [&](std::size_t cell, const Eigen::Vector3d& p) {
+    mask[cell] = InsidePolygon(polygon_m, p.x(), p.y()) ? 1 : 0;
+  });
   return mask;
 }
 
-std::optional<Eigen::Vector3d> RegionCentroid(const HeightMap& map, const std::vector<std::uint8_t>& mask) {
+std::optional<Eigen::Vector3d> RegionCentroid(const HeightMap& map,
+                                              const std::vector<std::uint8_t>& mask) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   std::size_t count = 0;
   ForEachCell(map, [&](std::size_t cell, const Eigen::Vector3d& p) {
@@ -266,13 +287,14 @@ std::optional<Eigen::Vector3d> RegionCentroid(const HeightMap& map, const std::v
   return sum / static_cast<double>(count);
 }
 
-RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uint8_t>& mask, const PointCloud& current,
-                          double current_step_m, const Pose& T_motion) {
+RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uint8_t>& mask,
+                          const PointCloud& current, double current_step_m, const Pose& T_motion) {
   // Brought back by the inverse motion, so that cells compare in place.
   const Pose T_back = T_motion.inverse();
   const GridShape& fine = reference.grid;
   GridShape grid = fine;
-  grid.step = 2 * std::max(fine.step, current_step_m);  // so that no cell within a measured part stays empty
+  grid.step = 2 * std::max(fine.step,
+                           current_step_m);  // so that no cell within a measured part stays empty
   grid.width = static_cast<int>(std::ceil(fine.width * fine.step / grid.step));
   grid.height = static_cast<int>(std::ceil(fine.height * fine.step / grid.step));
   std::vector<std::uint8_t> measured(grid.num_cells(), 0);
@@ -283,7 +305,8 @@ RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uin
   }
   std::size_t region_cells = 0;
   std::size_t covered_cells = 0;
-  std::vector<float> distance(grid.num_cells(), 0.0F);  // of uncovered region cells to anything else, cells
+  std::vector<float> distance(grid.num_cells(),
+                              0.0F);  // of uncovered region cells to anything else, cells
   ForEachCell(reference, [&](std::size_t cell, const Eigen::Vector3d& p) {
     if (mask[cell] == 0) return;
     ++region_cells;
@@ -301,28 +324,38 @@ RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uin
   const auto relax = [&](int row, int column, int dr, int dc) {
     const int r = row + dr;
     const int c = column + dc;
-    float& here = distance[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(column)];
+    float& here = distance[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) +
+                           static_cast<std::size_t>(column)];
     const bool inside = r >= 0 && r < grid.height && c >= 0 && c < grid.width;
     const float there =
-        inside ? distance[static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(c)] : 0.0F;
+        inside ? distance[static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.width) +
+                          static_cast<std::size_t>(c)]
+               : 0.0F;
     here = std::min(here, there + (dr != 0 && dc != 0 ? 1.41421356F : 1.0F));
   };
   for (int row = 0; row < grid.height; ++row) {
     for (int column = 0; column < grid.width; ++column) {
-      for (const auto& [dr, dc] : {std::pair(0, -1), std::pair(-1, -1), std::pair(-1, 0), std::pair(-1, 1)}) relax(row, column, dr, dc);
+      for (const auto& [dr, dc] :
+           {std::pair(0, -1), std::pair(-1, -1), std::pair(-1, 0), std::pair(-1, 1)})
+        relax(row, column, dr, dc);
     }
   }
   float largest = 0.0F;
   for (int row = grid.height - 1; row >= 0; --row) {
     for (int column = grid.width - 1; column >= 0; --column) {
-      for (const auto& [dr, dc] : {std::pair(0, 1), std::pair(1, 1), std::pair(1, 0), std::pair(1, -1)}) relax(row, column, dr, dc);
-      const float d = distance[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(column)];
+      for (const auto& [dr, dc] :
+           {std::pair(0, 1), std::pair(1, 1), std::pair(1, 0), std::pair(1, -1)})
+        relax(row, column, dr, dc);
+      const float d =
+          distance[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) +
+                   static_cast<std::size_t>(column)];
       if (d <= largest) continue;
       largest = d;
       result.hole_centre_m = {grid.x_centre(column), grid.y_centre(row)};
     }
   }
-  // Half a cell to the centre of the next measured one on each side, and half a cell that is only partly measured.
+  // Half a cell to the centre of the next measured one on each side, and half a cell that is only
+  // partly measured.
   if (largest > 0) result.largest_hole_m = 2.0 * largest * grid.step;
   return result;
 }

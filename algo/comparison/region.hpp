@@ -7,9 +7,10 @@
 
 #include <Eigen/Core>
 
-#include "algo/comparison/comparison.hpp"
+#include "algo/base/pose.hpp"
 #include "algo/comparison/surface.hpp"
 #include "algo/types/height_map.hpp"
+#include "algo/types/point_cloud.hpp"
 
 namespace plumb {
 
@@ -21,17 +22,20 @@ struct SupportPlane {
 };
 
 struct BodyOptions {
-  double min_height_m = 0.025;        ///< Body is what rises more than this over the support: above noise, below a wrist.
-  double max_height_m = 0.6;          ///< Higher: stands, hands, gantry.
-  double cell_m = 0.015;              ///< Of the map of the body's outline.
-  double max_tilt_rad = 0.35;         ///< Of a support against the frame's z axis: a marker may lie on a wedge.
+  double min_height_m =
+      0.025;  ///< Body is what rises more than this over the support: above noise, below a wrist.
+  double max_height_m = 0.6;  ///< Higher: stands, hands, gantry.
+  double cell_m = 0.015;      ///< Of the map of the body's outline.
+  double max_tilt_rad =
+      0.35;  ///< Of a support against the frame's z axis: a marker may lie on a wedge.
   double min_support_area_m2 = 0.08;  ///< No part of a body is as large and as flat.
 };
 
 /// A body on its support, in the frame of the surface it was found in.
 struct Body {
   enum Cell : std::uint8_t { kUnknown = 0, kMeasured = 1, kBody = 2 };
-  std::optional<SupportPlane> support;  ///< None: nothing flat was found, all that was measured counts as body.
+  std::optional<SupportPlane>
+      support;  ///< None: nothing flat was found, all that was measured counts as body.
   double min_height_m = 0.0;
   double max_height_m = 0.0;
   GridShape grid;                   ///< Coarse; x and y of the frame.
@@ -43,21 +47,34 @@ struct Body {
   [[nodiscard]] bool HighEnough(const Eigen::Vector3d& p) const;
 };
 
-/// Finds the large near-horizontal planes, takes the highest that carries (nearly) as much as any, and the largest
-/// connected part over it. z of the frame points up to `options.max_tilt_rad`.
+/// Finds the large near-horizontal planes, takes the highest that carries (nearly) as much as any,
+/// and the largest connected part over it. z of the frame points up to `options.max_tilt_rad`.
 /// @param scene  The whole scene, about 1 cm spacing.
 [[nodiscard]] Body FindBody(const Surface& scene, const BodyOptions& options = {});
 
-/// Cells of the map that belong to the region: valid, and part of the body, or inside the polygon and above the support.
-[[nodiscard]] std::vector<std::uint8_t> RegionMask(const HeightMap& map, const Body& body, const std::vector<Eigen::Vector2d>& polygon_m);
+/// Cells of the map that belong to the region: valid, and part of the body, or inside the polygon
+/// and above the support.
+[[nodiscard]] std::vector<std::uint8_t> RegionMask(const HeightMap& map, const Body& body,
+                                                   const std::vector<Eigen::Vector2d>& polygon_m);
 
 /// Mean of the region's surface points; nothing where the mask is empty.
-[[nodiscard]] std::optional<Eigen::Vector3d> RegionCentroid(const HeightMap& map, const std::vector<std::uint8_t>& mask);
+[[nodiscard]] std::optional<Eigen::Vector3d> RegionCentroid(const HeightMap& map,
+                                                            const std::vector<std::uint8_t>& mask);
 
-/// Share of the region that the current scan measured, and its largest hole. A cell is measured if the current scan has
-/// data over the place where the motion took it.
+/// What of the region the current scan measured, after the motion is taken into account.
+struct RegionCoverage {
+  double coverage = 0.0;  ///< Share 0..1 of the region's valid reference cells.
+  double largest_hole_m =
+      0.0;  ///< Diameter of the largest disc inside the region without current data.
+  Eigen::Vector2d hole_centre_m = Eigen::Vector2d::Zero();  ///< Reference frame.
+};
+
+/// Share of the region that the current scan measured, and its largest hole. A cell is measured if
+/// the current scan has data over the place where the motion took it.
 /// @param current  All of the current scene, in the reference frame; `current_step_m` its spacing.
-[[nodiscard]] RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uint8_t>& mask, const PointCloud& current,
-                                        double current_step_m, const Pose& T_motion);
+[[nodiscard]] RegionCoverage CoverageOf(const HeightMap& reference,
+                                        const std::vector<std::uint8_t>& mask,
+                                        const PointCloud& current, double current_step_m,
+                                        const Pose& T_motion);
 
 }  // namespace plumb

@@ -5,7 +5,6 @@
 #include <span>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -15,11 +14,14 @@
 namespace plumb {
 namespace {
 
-// No map knows a corner better than this, whatever it claims: prints are not flat and cut to some tenths of a millimetre.
+// No map knows a corner better than this, whatever it claims: prints are not flat and cut to some
+// tenths of a millimetre.
 constexpr double kMinCornerSigma_m = 0.2 * kMillimetre;
-// The four corners of a marker share the error of the views that placed it: together they say as much as two.
+// The four corners of a marker share the error of the views that placed it: together they say as
+// much as two.
 constexpr double kIndependentShare = 0.5;
-// How much two scans of one room differ in length or width: measured 0.03 to 0.25 % on simulated sweeps.
+// How much two scans of one room differ in length or width: measured 0.03 to 0.25 % on simulated
+// sweeps.
 constexpr double kStretchSigma = 0.002;
 constexpr double kMaxStretch = 0.02;               // more is no error of scale but another room
 constexpr std::size_t kMaxHypothesisMarkers = 60;  // pairs of them are tried: 1770 fits of 8 points
@@ -35,11 +37,13 @@ struct SharedMarker {
 using Subset = std::vector<std::size_t>;  // ascending indices of shared markers
 
 bool AllFinite(const MarkerCorners& corners) {
-  return std::all_of(corners.begin(), corners.end(), [](const Eigen::Vector3d& p) { return p.allFinite(); });
+  return std::all_of(corners.begin(), corners.end(),
+                     [](const Eigen::Vector3d& p) { return p.allFinite(); });
 }
 
 double SquaredSigma(const SceneMarker& marker) {
-  const double sigma = std::isfinite(marker.sigma_m) ? std::max(marker.sigma_m, kMinCornerSigma_m) : 1.0;
+  const double sigma =
+      std::isfinite(marker.sigma_m) ? std::max(marker.sigma_m, kMinCornerSigma_m) : 1.0;
   return sigma * sigma;
 }
 
@@ -47,8 +51,10 @@ std::vector<SharedMarker> SharedMarkers(const MarkerMap& reference, const Marker
   std::vector<SharedMarker> shared;
   for (const auto& [id, marker] : reference) {
     const auto other = current.find(id);
-    if (other == current.end() || !AllFinite(marker.corners) || !AllFinite(other->second.corners)) continue;
-    shared.push_back({id, marker.corners, other->second.corners, std::sqrt(SquaredSigma(marker) + SquaredSigma(other->second))});
+    if (other == current.end() || !AllFinite(marker.corners) || !AllFinite(other->second.corners))
+      continue;
+    shared.push_back({id, marker.corners, other->second.corners,
+                      std::sqrt(SquaredSigma(marker) + SquaredSigma(other->second))});
   }
   return shared;
 }
@@ -76,7 +82,8 @@ double MarkerResidual(const SharedMarker& marker, const Pose& T_reference_curren
 }
 
 Eigen::Vector3d Centre(const SharedMarker& marker) {
-  return 0.25 * (marker.reference[0] + marker.reference[1] + marker.reference[2] + marker.reference[3]);
+  return 0.25 *
+         (marker.reference[0] + marker.reference[1] + marker.reference[2] + marker.reference[3]);
 }
 
 // Weighted as the fit is: the point about which its rotation and translation do not correlate.
@@ -92,20 +99,23 @@ Eigen::Vector3d CentreOf(std::span<const SharedMarker> shared, const Subset& sub
 }
 
 // Covariance of the weighted fit: left perturbation (rotation vector, translation) about `centre`.
-Matrix6d FitCovariance(std::span<const SharedMarker> shared, const Subset& subset, const Eigen::Vector3d& centre) {
+Matrix6d FitCovariance(std::span<const SharedMarker> shared, const Subset& subset,
+                       const Eigen::Vector3d& centre) {
   Matrix6d information = Matrix6d::Zero();
   for (const std::size_t i : subset) {
     for (const Eigen::Vector3d& corner : shared[i].reference) {
       Eigen::Matrix<double, 3, 6> jacobian;
       jacobian << -Skew(corner - centre), Eigen::Matrix3d::Identity();
-      information += kIndependentShare / (shared[i].sigma_m * shared[i].sigma_m) * jacobian.transpose() * jacobian;
+      information += kIndependentShare / (shared[i].sigma_m * shared[i].sigma_m) *
+                     jacobian.transpose() * jacobian;
     }
   }
   return information.ldlt().solve(Matrix6d::Identity());
 }
 
 // Standard deviation of MarkerResidual() of a marker that did not move and took no part in the fit.
-double ExpectedResidual(const SharedMarker& marker, const Matrix6d& fit_covariance, const Eigen::Vector3d& centre) {
+double ExpectedResidual(const SharedMarker& marker, const Matrix6d& fit_covariance,
+                        const Eigen::Vector3d& centre) {
   double variance = 0.0;
   for (const Eigen::Vector3d& corner : marker.reference) {
     Eigen::Matrix<double, 3, 6> jacobian;
@@ -116,10 +126,12 @@ double ExpectedResidual(const SharedMarker& marker, const Matrix6d& fit_covarian
 }
 
 // The markers that agree with a hypothesis, judged by their own noise only.
-Subset Supporters(std::span<const SharedMarker> shared, const Pose& T, const CompareOptions& options) {
+Subset Supporters(std::span<const SharedMarker> shared, const Pose& T,
+                  const MarkerConsensusOptions& options) {
   Subset subset;
   for (std::size_t i = 0; i < shared.size(); ++i) {
-    const double limit = std::max(options.moved_marker_m, options.moved_marker_sigmas * std::sqrt(3.0) * shared[i].sigma_m);
+    const double limit =
+        std::max(options.moved_m, options.moved_sigmas * std::sqrt(3.0) * shared[i].sigma_m);
     if (MarkerResidual(shared[i], T) <= limit) subset.push_back(i);
   }
   return subset;
@@ -131,12 +143,14 @@ struct Consensus {
 };
 
 bool Disjoint(const Subset& a, const Subset& b) {
-  return std::none_of(a.begin(), a.end(), [&](std::size_t i) { return std::binary_search(b.begin(), b.end(), i); });
+  return std::none_of(a.begin(), a.end(),
+                      [&](std::size_t i) { return std::binary_search(b.begin(), b.end(), i); });
 }
 
-// Largest set of markers that one rigid transform explains: tried from all markers and from every pair of them (one
-// marker alone extrapolates too badly). Sets are returned best first.
-std::vector<Consensus> ConsensusSets(std::span<const SharedMarker> shared, const CompareOptions& options) {
+// Largest set of markers that one rigid transform explains: tried from all markers and from every
+// pair of them (one marker alone extrapolates too badly). Sets are returned best first.
+std::vector<Consensus> ConsensusSets(std::span<const SharedMarker> shared,
+                                     const MarkerConsensusOptions& options) {
   std::vector<Consensus> sets;
   const auto consider = [&](const Subset& seed) {
     RigidFit fit = FitSubset(shared, seed, true);
@@ -148,7 +162,10 @@ std::vector<Consensus> ConsensusSets(std::span<const SharedMarker> shared, const
       subset = std::move(next);
       fit = FitSubset(shared, subset, true);
     }
-    if (!settled || !fit.valid || std::any_of(sets.begin(), sets.end(), [&](const Consensus& c) { return c.subset == subset; })) return;
+    if (!settled || !fit.valid || std::any_of(sets.begin(), sets.end(), [&](const Consensus& c) {
+          return c.subset == subset;
+        }))
+      return;
     sets.push_back({subset, fit.rms_m});
   };
   Subset all;
@@ -160,7 +177,8 @@ std::vector<Consensus> ConsensusSets(std::span<const SharedMarker> shared, const
     for (std::size_t j = i + 1; j < n; ++j) consider({i, j});
   }
   std::stable_sort(sets.begin(), sets.end(), [](const Consensus& a, const Consensus& b) {
-    return a.subset.size() != b.subset.size() ? a.subset.size() > b.subset.size() : a.rms_m < b.rms_m;
+    return a.subset.size() != b.subset.size() ? a.subset.size() > b.subset.size()
+                                              : a.rms_m < b.rms_m;
   });
   return sets;
 }
@@ -171,22 +189,26 @@ struct LeaveOneOut {
 };
 
 // Judges a marker by the fit of the others in `good`.
-LeaveOneOut JudgeMarker(std::span<const SharedMarker> shared, const Subset& good, std::size_t index, const CompareOptions& options) {
+LeaveOneOut JudgeMarker(std::span<const SharedMarker> shared, const Subset& good, std::size_t index,
+                        const MarkerConsensusOptions& options) {
   Subset others;
-  std::copy_if(good.begin(), good.end(), std::back_inserter(others), [&](std::size_t i) { return i != index; });
+  std::copy_if(good.begin(), good.end(), std::back_inserter(others),
+               [&](std::size_t i) { return i != index; });
   LeaveOneOut judged;
   if (others.empty()) return judged;
   const RigidFit fit = FitSubset(shared, others, true);
   if (!fit.valid) return judged;
   const Eigen::Vector3d centre = CentreOf(shared, others);
-  const double sigma = ExpectedResidual(shared[index], FitCovariance(shared, others, centre), centre);
+  const double sigma =
+      ExpectedResidual(shared[index], FitCovariance(shared, others, centre), centre);
   judged.residual_m = MarkerResidual(shared[index], fit.T_a_b);
-  judged.excess = judged.residual_m / std::max(options.moved_marker_m, options.moved_marker_sigmas * sigma);
+  judged.excess = judged.residual_m / std::max(options.moved_m, options.moved_sigmas * sigma);
   return judged;
 }
 
 // Drops the most suspicious marker while one is accused, then takes back whoever the rest acquits.
-Subset GoodMarkers(std::span<const SharedMarker> shared, Subset good, const CompareOptions& options) {
+Subset GoodMarkers(std::span<const SharedMarker> shared, Subset good,
+                   const MarkerConsensusOptions& options) {
   while (good.size() > 2) {
     std::size_t worst = 0;
     double worst_excess = 0.0;
@@ -210,33 +232,39 @@ Subset GoodMarkers(std::span<const SharedMarker> shared, Subset good, const Comp
   return acquitted;
 }
 
-std::string IdsOf(std::span<const SharedMarker> shared) {
-  if (shared.empty()) return "";
-  std::vector<int> ids;
-  for (const SharedMarker& marker : shared) ids.push_back(marker.id);
-  return fmt::format(" (id{} {})", ids.size() == 1 ? "" : "s", fmt::join(ids, ", "));
-}
-
-Alignment MakeAlignment(std::span<const SharedMarker> shared, const Subset& subset, const RigidFit& fit) {
+Alignment MakeAlignment(std::span<const SharedMarker> shared, const Subset& subset,
+                        const RigidFit& fit) {
   Alignment alignment;
   alignment.T_reference_current = fit.T_a_b;
   alignment.centre_m = CentreOf(shared, subset);
+  const auto count = static_cast<double>(subset.size());
   double sum = 0.0;
-  double expected = 0.0;
+  double chi2 = 0.0;
+  double spread = 0.0;
   for (const std::size_t i : subset) {
     const double residual = MarkerResidual(shared[i], fit.T_a_b);
     sum += residual * residual;
-    expected += 3.0 * shared[i].sigma_m * shared[i].sigma_m;
+    chi2 += 4.0 * residual * residual / (shared[i].sigma_m * shared[i].sigma_m);
+    spread += (Centre(shared[i]) - alignment.centre_m).squaredNorm();
+    Eigen::Vector3d current = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& p : shared[i].current) current += 0.25 * p;
+    const Eigen::Vector3d off = Centre(shared[i]) - fit.T_a_b * current;
+    alignment.distortion += off * off.transpose();
     alignment.markers_used.push_back(shared[i].id);
   }
-  alignment.rms_m = std::sqrt(sum / static_cast<double>(subset.size()));
-  // The maps' sigmas may be too proud: the corners' disagreement is the better witness where it is larger.
-  const double pride = std::max(1.0, expected > 0 ? sum / expected : 1.0);
-  alignment.covariance = pride * FitCovariance(shared, subset, alignment.centre_m);
+  alignment.rms_m = std::sqrt(sum / count);
+  alignment.spread_m = std::sqrt(spread / count);
+  // Six values of the pose were fitted to three of each marker.
+  alignment.distortion *= 3.0 / std::max(3.0 * count - 6.0, 3.0);
+  // The maps' sigmas may be too small: the corners' disagreement counts where it is larger.
+  const double degrees_of_freedom = 12.0 * count - 6.0;
+  const double variance_factor = std::max(1.0, chi2 / degrees_of_freedom);
+  alignment.covariance = variance_factor * FitCovariance(shared, subset, alignment.centre_m);
   return alignment;
 }
 
-// The pairs of corners of a set of markers, from its centre, in the axes of the plane in which they lie.
+// The pairs of corners of a set of markers, from its centre, in the axes of the plane in which they
+// lie.
 struct PlanarCorners {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  // columns; the last one across the plane
   std::vector<Eigen::Vector3d> reference;
@@ -244,15 +272,18 @@ struct PlanarCorners {
   std::vector<double> weights;
 };
 
-PlanarCorners InTheirPlane(std::span<const SharedMarker> shared, const Subset& subset, const Alignment& alignment) {
+PlanarCorners InTheirPlane(std::span<const SharedMarker> shared, const Subset& subset,
+                           const Alignment& alignment) {
   PlanarCorners corners;
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const std::size_t i : subset) {
     for (std::size_t k = 0; k < 4; ++k) {
       corners.reference.push_back(shared[i].reference[k] - alignment.centre_m);
-      corners.current.push_back(alignment.T_reference_current * shared[i].current[k] - alignment.centre_m);
+      corners.current.push_back(alignment.T_reference_current * shared[i].current[k] -
+                                alignment.centre_m);
       corners.weights.push_back(1.0 / (shared[i].sigma_m * shared[i].sigma_m));
-      scatter += corners.weights.back() * corners.reference.back() * corners.reference.back().transpose();
+      scatter +=
+          corners.weights.back() * corners.reference.back() * corners.reference.back().transpose();
     }
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
@@ -262,9 +293,9 @@ PlanarCorners InTheirPlane(std::span<const SharedMarker> shared, const Subset& s
   return corners;
 }
 
-// Alignment::stretch: least squares over three values (long, wide, shear), each drawn towards none as far as the markers
-// leave it uncertain.
-Eigen::Matrix3d RelativeStretch(std::span<const SharedMarker> shared, const Subset& subset, const Alignment& alignment) {
+// Alignment::stretch and its sigma: least squares over three values (long, wide, shear), each drawn
+// towards none as far as the markers leave it uncertain.
+void FitStretch(std::span<const SharedMarker> shared, const Subset& subset, Alignment& alignment) {
   const PlanarCorners corners = InTheirPlane(shared, subset, alignment);
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -279,67 +310,91 @@ Eigen::Matrix3d RelativeStretch(std::span<const SharedMarker> shared, const Subs
     chi2 += corners.weights[k] * difference.squaredNorm();
   }
   const Eigen::Vector3d best = information.ldlt().solve(right);
-  const double degrees_of_freedom = std::max(2.0 * static_cast<double>(corners.weights.size()) - 6.0, 1.0);
-  const double pride = std::max(1.0, (chi2 - right.dot(best)) / degrees_of_freedom);
-  const Eigen::Matrix3d seen = kIndependentShare / pride * information;
+  const double degrees_of_freedom =
+      std::max(2.0 * static_cast<double>(corners.weights.size()) - 6.0, 1.0);
+  const double variance_factor = std::max(1.0, (chi2 - right.dot(best)) / degrees_of_freedom);
+  const Eigen::Matrix3d seen = kIndependentShare / variance_factor * information;
   const Eigen::Matrix3d prior = Eigen::Matrix3d::Identity() / (kStretchSigma * kStretchSigma);
-  const Eigen::Vector3d shrunk = (seen + prior).ldlt().solve(seen * best);
-  if (!shrunk.allFinite() || shrunk.cwiseAbs().maxCoeff() > kMaxStretch) return Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d covariance = (seen + prior).inverse();
+  alignment.stretch_sigma = std::sqrt(covariance.diagonal().maxCoeff());
+  const Eigen::Vector3d shrunk = covariance * (seen * best);
+  if (!shrunk.allFinite() || shrunk.cwiseAbs().maxCoeff() > kMaxStretch) return;
   Eigen::Matrix3d planar = Eigen::Matrix3d::Identity();
   planar.topLeftCorner<2, 2>() << 1 + shrunk[0], shrunk[2], shrunk[2], 1 + shrunk[1];
-  return corners.axes * planar * corners.axes.transpose();
+  alignment.stretch = corners.axes * planar * corners.axes.transpose();
 }
 
-AlignmentOutcome AlignAll(std::span<const SharedMarker> shared) {
-  AlignmentOutcome outcome;
+// The markers that agree and how the others contradict them.
+struct MarkerConsensus {
+  Subset good;
+  MarkerEvidence evidence;
+};
+
+MarkerConsensus FindConsensus(std::span<const SharedMarker> shared,
+                              const MarkerConsensusOptions& options) {
+  MarkerConsensus consensus;
+  for (const SharedMarker& marker : shared) consensus.evidence.shared_ids.push_back(marker.id);
+  const std::vector<Consensus> sets = ConsensusSets(shared, options);
+  if (sets.empty()) return consensus;
+  consensus.good = GoodMarkers(shared, sets.front().subset, options);
+  consensus.evidence.good = static_cast<int>(consensus.good.size());
+  consensus.evidence.two_groups =
+      std::any_of(sets.begin() + 1, sets.end(), [&](const Consensus& other) {
+        return other.subset.size() >= consensus.good.size() &&
+               Disjoint(other.subset, consensus.good);
+      });
+  return consensus;
+}
+
+Subset AllOf(std::span<const SharedMarker> shared) {
   Subset all;
   for (std::size_t i = 0; i < shared.size(); ++i) all.push_back(i);
-  const RigidFit fit = FitSubset(shared, all, false);
-  if (!fit.valid) {
-    outcome.failure = "the scans share no marker: the current scan cannot be placed in the reference";
-    return outcome;
+  return all;
+}
+
+AlignmentOutcome AlignAll(std::span<const SharedMarker> shared, MarkerConsensus consensus) {
+  AlignmentOutcome outcome;
+  outcome.markers = std::move(consensus.evidence);
+  const Subset all = AllOf(shared);
+  for (const std::size_t i : all) {
+    if (!std::binary_search(consensus.good.begin(), consensus.good.end(), i)) {
+      outcome.markers.moved_used.push_back(shared[i].id);
+    }
   }
+  const RigidFit fit = FitSubset(shared, all, false);
+  if (!fit.valid) return outcome;
   outcome.alignment = MakeAlignment(shared, all, fit);
+  outcome.alignment->stretch_sigma = kStretchSigma;
+  return outcome;
+}
+
+AlignmentOutcome AlignGood(std::span<const SharedMarker> shared, MarkerConsensus consensus,
+                           int min_markers) {
+  AlignmentOutcome outcome;
+  outcome.markers = std::move(consensus.evidence);
+  if (!RefusalsOfMarkers(outcome.markers, std::max(min_markers, 1)).empty()) return outcome;
+  const RigidFit fit = FitSubset(shared, consensus.good, true);
+  if (!fit.valid) return outcome;
+  outcome.alignment = MakeAlignment(shared, consensus.good, fit);
+  FitStretch(shared, consensus.good, *outcome.alignment);
+  for (std::size_t i = 0; i < shared.size(); ++i) {
+    if (std::binary_search(consensus.good.begin(), consensus.good.end(), i)) continue;
+    const double residual = MarkerResidual(shared[i], fit.T_a_b);
+    outcome.alignment->markers_rejected[shared[i].id] = residual;
+    outcome.warnings.push_back(fmt::format("marker {} moved {:.0f} mm since the reference; ignored",
+                                           shared[i].id, residual / kMillimetre));
+  }
   return outcome;
 }
 
 }  // namespace
 
-AlignmentOutcome AlignScenes(const MarkerMap& reference, const MarkerMap& current, const CompareOptions& options) {
+AlignmentOutcome AlignScenes(const MarkerMap& reference, const MarkerMap& current, Preset preset,
+                             const MarkerConsensusOptions& options, int min_markers) {
   const std::vector<SharedMarker> shared = SharedMarkers(reference, current);
-  if (options.preset == Preset::kPaper) return AlignAll(shared);
-
-  AlignmentOutcome outcome;
-  const std::size_t needed = static_cast<std::size_t>(std::max(options.min_shared_markers, 1));
-  if (shared.size() < needed) {
-    outcome.failure = fmt::format("scan needs at least {} markers shared with the reference, found {}{}; keep the markers in view", needed,
-                                  shared.size(), IdsOf(shared));
-    return outcome;
-  }
-  const std::vector<Consensus> sets = ConsensusSets(shared, options);
-  const Subset good = sets.empty() ? Subset{} : GoodMarkers(shared, sets.front().subset, options);
-  if (good.size() < needed) {
-    outcome.failure = fmt::format(
-        "scan needs at least {} markers that did not move since the reference, {} of {} shared ones agree; check where the markers lie",
-        needed, good.size(), shared.size());
-    return outcome;
-  }
-  for (std::size_t k = 1; k < sets.size(); ++k) {
-    if (sets[k].subset.size() < good.size() || !Disjoint(sets[k].subset, good)) continue;
-    outcome.failure =
-        fmt::format("the markers fall into two groups of {} that moved against each other; check where the markers lie", good.size());
-    return outcome;
-  }
-  const RigidFit fit = FitSubset(shared, good, true);
-  outcome.alignment = MakeAlignment(shared, good, fit);
-  outcome.alignment->stretch = RelativeStretch(shared, good, *outcome.alignment);
-  for (std::size_t i = 0; i < shared.size(); ++i) {
-    if (std::binary_search(good.begin(), good.end(), i)) continue;
-    const double residual = MarkerResidual(shared[i], fit.T_a_b);
-    outcome.alignment->markers_rejected[shared[i].id] = residual;
-    outcome.warnings.push_back(fmt::format("marker {} moved {:.0f} mm since the reference; ignored", shared[i].id, residual / kMillimetre));
-  }
-  return outcome;
+  MarkerConsensus consensus = FindConsensus(shared, options);
+  return preset == Preset::kPaper ? AlignAll(shared, std::move(consensus))
+                                  : AlignGood(shared, std::move(consensus), min_markers);
 }
 
 }  // namespace plumb

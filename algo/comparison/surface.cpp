@@ -9,15 +9,18 @@
 namespace plumb {
 namespace {
 
-constexpr float kMaxExtent_m = 20.0F;          // a scan is a room at most; what lies beyond is damage
+constexpr float kMaxExtent_m = 20.0F;  // a scan is a room at most; what lies beyond is damage
 constexpr std::size_t kMaxCubes = 16'000'000;  // bounds the memory of one search structure: 64 MB
-constexpr float kRimOffset = 0.25F;            // centroid of the neighbours off the sample, in radii: half a disc gives 0.42
-constexpr int kMinNeighbours = 6;              // a full neighbourhood has pi (3 spacings)^2 = 28
+constexpr float kRimOffset =
+    0.25F;  // centroid of the neighbours off the sample, in radii: half a disc gives 0.42
+constexpr int kMinNeighbours = 6;  // a full neighbourhood has pi (3 spacings)^2 = 28
 
 struct VoxelEntry {
   std::uint64_t voxel;
   std::uint32_t index;
-  bool operator<(const VoxelEntry& other) const { return voxel != other.voxel ? voxel < other.voxel : index < other.index; }
+  bool operator<(const VoxelEntry& other) const {
+    return voxel != other.voxel ? voxel < other.voxel : index < other.index;
+  }
 };
 
 std::vector<VoxelEntry> SortedByVoxel(const PointCloud& cloud, double spacing_m) {
@@ -29,14 +32,16 @@ std::vector<VoxelEntry> SortedByVoxel(const PointCloud& cloud, double spacing_m)
     if (!(p.cwiseAbs().maxCoeff() < kMaxExtent_m) || !cloud.normals[i].allFinite()) continue;
     const Eigen::Array3f v = ((p.array() + kMaxExtent_m) * inverse).floor();
     const auto key = [](float x) { return static_cast<std::uint64_t>(x) & 0x1FFFFF; };
-    entries.push_back({(key(v[2]) << 42) | (key(v[1]) << 21) | key(v[0]), static_cast<std::uint32_t>(i)});
+    entries.push_back(
+        {(key(v[2]) << 42) | (key(v[1]) << 21) | key(v[0]), static_cast<std::uint32_t>(i)});
   }
   std::sort(entries.begin(), entries.end());
   return entries;
 }
 
 // Smooths the normal of one sample and decides whether it lies inside its surface.
-void Smooth(const Surface& raw, const NearestSample& neighbours, float radius, std::size_t i, Surface& out) {
+void Smooth(const Surface& raw, const NearestSample& neighbours, float radius, std::size_t i,
+            Surface& out) {
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   Eigen::Vector3f offset = Eigen::Vector3f::Zero();
   int count = 0;
@@ -61,8 +66,10 @@ PointCloud TransformedCloud(const Eigen::Affine3d& T_a_b, const PointCloud& clou
   const Eigen::Matrix3f R = T_a_b.rotation().cast<float>();
   cloud_in_a.points.reserve(cloud_in_b.size());
   cloud_in_a.normals.reserve(cloud_in_b.normals.size());
-  // Through double: a scene frame far from the reference must not cost the points their last digits.
-  for (const Eigen::Vector3f& p : cloud_in_b.points) cloud_in_a.points.emplace_back((T_a_b * p.cast<double>()).cast<float>());
+  // Through double: a scene frame far from the reference must not cost the points their last
+  // digits.
+  for (const Eigen::Vector3f& p : cloud_in_b.points)
+    cloud_in_a.points.emplace_back((T_a_b * p.cast<double>()).cast<float>());
   for (const Eigen::Vector3f& n : cloud_in_b.normals) cloud_in_a.normals.emplace_back(R * n);
   return cloud_in_a;
 }
@@ -76,8 +83,10 @@ PointCloud CloudOfHeightMap(const HeightMap& map) {
       const float dx = map.at(row, column + 1) - map.at(row, column - 1);
       const float dy = map.at(row + 1, column) - map.at(row - 1, column);
       if (!std::isfinite(z) || !std::isfinite(dx) || !std::isfinite(dy)) continue;
-      cloud.points.emplace_back(static_cast<float>(grid.x_centre(column)), static_cast<float>(grid.y_centre(row)), z);
-      cloud.normals.push_back(Eigen::Vector3f(-dx, -dy, static_cast<float>(2 * grid.step)).normalized());
+      cloud.points.emplace_back(static_cast<float>(grid.x_centre(column)),
+                                static_cast<float>(grid.y_centre(row)), z);
+      cloud.normals.push_back(
+          Eigen::Vector3f(-dx, -dy, static_cast<float>(2 * grid.step)).normalized());
     }
   }
   return cloud;
@@ -104,9 +113,11 @@ Surface MakeSurface(const PointCloud& cloud, double spacing_m, double smoothing_
   raw.inner.assign(raw.size(), 1);
   Surface smoothed = raw;
   const NearestSample neighbours(raw.points, smoothing_m);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, raw.size(), 512), [&](const tbb::blocked_range<std::size_t>& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) Smooth(raw, neighbours, static_cast<float>(smoothing_m), i, smoothed);
-  });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, raw.size(), 512),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      for (std::size_t i = range.begin(); i < range.end(); ++i)
+                        Smooth(raw, neighbours, static_cast<float>(smoothing_m), i, smoothed);
+                    });
   return smoothed;
 }
 
@@ -132,15 +143,19 @@ NearestSample::NearestSample(const std::vector<Eigen::Vector3f>& points, double 
     high = high.cwiseMax(p);
   }
   double size = radius_m;
-  const auto cubes_at = [&](double edge) { return Eigen::Array3d(((high - low).cast<double>().array() / edge).floor() + 1.0); };
+  const auto cubes_at = [&](double edge) {
+    return Eigen::Array3d(((high - low).cast<double>().array() / edge).floor() + 1.0);
+  };
   while (cubes_at(size).prod() > static_cast<double>(kMaxCubes)) size *= 1.5;
   origin_ = low;
   inverse_size_ = static_cast<float>(1.0 / size);
-  cubes_ = cubes_at(size).cast<int>() + 1;  // one more: float and double may disagree on the last cube
+  cubes_ =
+      cubes_at(size).cast<int>() + 1;  // one more: float and double may disagree on the last cube
 
   const auto slot = [&](const Eigen::Vector3f& p) {
     const Eigen::Array3i c = CubeOf(p).max(0).min(cubes_ - 1);
-    return (static_cast<std::size_t>(c[2]) * static_cast<std::size_t>(cubes_[1]) + static_cast<std::size_t>(c[1])) *
+    return (static_cast<std::size_t>(c[2]) * static_cast<std::size_t>(cubes_[1]) +
+            static_cast<std::size_t>(c[1])) *
                static_cast<std::size_t>(cubes_[0]) +
            static_cast<std::size_t>(c[0]);
   };
@@ -166,7 +181,9 @@ std::uint32_t NearestSample::Find(const Eigen::Vector3f& p) const {
   float best_squared = squared_radius_;
   Scan(p, [&](std::uint32_t k) {
     const float squared = (sorted_[k] - p).squaredNorm();
-    if (squared > best_squared || (squared == best_squared && best != kNone && index_[k] > index_[best])) return;
+    if (squared > best_squared ||
+        (squared == best_squared && best != kNone && index_[k] > index_[best]))
+      return;
     best = k;
     best_squared = squared;
   });

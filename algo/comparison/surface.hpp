@@ -13,29 +13,35 @@
 
 namespace plumb {
 
-/// Samples of a surface, one a voxel, with normals smoothed over a neighbourhood. Metres; the frame is the owner's.
+/// Samples of a surface, one a voxel, with normals smoothed over a neighbourhood. Metres; the frame
+/// is the owner's.
 struct Surface {
   std::vector<Eigen::Vector3f> points;
   std::vector<Eigen::Vector3f> normals;  ///< Unit length, outward.
-  std::vector<std::uint8_t> inner;       ///< 0 on rims (of the scanned part, of holes) and on stray samples.
-  double spacing_m = 0.0;                ///< Edge of the voxels.
+  std::vector<std::uint8_t>
+      inner;               ///< 0 on rims (of the scanned part, of holes) and on stray samples.
+  double spacing_m = 0.0;  ///< Edge of the voxels.
 
   [[nodiscard]] std::size_t size() const { return points.size(); }
 };
 
-/// The cloud in another frame: p_a = T_a_b * p_b, normals turned, colours dropped. T_a_b is rigid but for a small stretch.
-[[nodiscard]] PointCloud TransformedCloud(const Eigen::Affine3d& T_a_b, const PointCloud& cloud_in_b);
+/// The cloud in another frame: p_a = T_a_b * p_b, normals turned, colours dropped. T_a_b is rigid
+/// but for a small stretch.
+[[nodiscard]] PointCloud TransformedCloud(const Eigen::Affine3d& T_a_b,
+                                          const PointCloud& cloud_in_b);
 
 /// One point a cell, with normals by central differences; for scenes that carry no cloud.
 [[nodiscard]] PointCloud CloudOfHeightMap(const HeightMap& map);
 
-/// Thins to the mean of each voxel, smooths normals over `smoothing_m` and marks rims. Order: by voxel.
+/// Thins to the mean of each voxel, smooths normals over `smoothing_m` and marks rims. Order: by
+/// voxel.
 [[nodiscard]] Surface MakeSurface(const PointCloud& cloud, double spacing_m, double smoothing_m);
 
 /// The samples of a surface that `keep` accepts (by index), attributes included.
 [[nodiscard]] Surface Subset(const Surface& surface, const std::function<bool(std::size_t)>& keep);
 
-/// Finds nearest samples within a fixed radius: samples sorted into cubes of that size. Copies the points.
+/// Finds nearest samples within a fixed radius: samples sorted into cubes of that size. Copies the
+/// points.
 class NearestSample {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -45,7 +51,8 @@ class NearestSample {
   /// Index of the nearest point within the radius, or kNone. Thread-safe.
   [[nodiscard]] std::uint32_t Find(const Eigen::Vector3f& p) const;
 
-  /// Calls visit(index, squared distance) for every point within the radius, in a fixed order. Thread-safe.
+  /// Calls visit(index, squared distance) for every point within the radius, in a fixed order.
+  /// Thread-safe.
   template <typename Visit>
   void ForEach(const Eigen::Vector3f& p, Visit&& visit) const;
 
@@ -58,9 +65,11 @@ class NearestSample {
     return ((p - origin_).array() * inverse_size_).floor().cast<int>();
   }
   [[nodiscard]] Range Row(int x_first, int x_last, int y, int z) const {
-    const std::size_t row = (static_cast<std::size_t>(z) * static_cast<std::size_t>(cubes_[1]) + static_cast<std::size_t>(y)) *
+    const std::size_t row = (static_cast<std::size_t>(z) * static_cast<std::size_t>(cubes_[1]) +
+                             static_cast<std::size_t>(y)) *
                             static_cast<std::size_t>(cubes_[0]);
-    return {first_[row + static_cast<std::size_t>(x_first)], first_[row + static_cast<std::size_t>(x_last) + 1]};
+    return {first_[row + static_cast<std::size_t>(x_first)],
+            first_[row + static_cast<std::size_t>(x_last) + 1]};
   }
   /// Calls visit(position in sorted_) over the 27 cubes around p.
   template <typename Visit>

@@ -1,4 +1,5 @@
-// Integer cells of space and an open-addressing map from them; shared by the searches in this folder.
+// Integer cells of space and an open-addressing map from them; shared by the searches in this
+// folder.
 #pragma once
 
 #include <array>
@@ -17,15 +18,20 @@ class LatticeCell {
  public:
   static constexpr int kLimit = 1 << 20;
   LatticeCell(int x, int y, int z) : x_(x), y_(y), z_(z) {}
-  [[nodiscard]] static int Index(float coordinate, float inverse_size) { return static_cast<int>(std::floor(coordinate * inverse_size)); }
+  [[nodiscard]] static int Index(float coordinate, float inverse_size) {
+    return static_cast<int>(std::floor(coordinate * inverse_size));
+  }
   [[nodiscard]] std::uint64_t key() const { return (Part(x_) << 42) | (Part(y_) << 21) | Part(z_); }
 
  private:
-  static std::uint64_t Part(int index) { return static_cast<std::uint64_t>(index + kLimit) & 0x1FFFFFU; }
+  static std::uint64_t Part(int index) {
+    return static_cast<std::uint64_t>(index + kLimit) & 0x1FFFFFU;
+  }
   int x_, y_, z_;
 };
 
-/// Map from packed cells to small integers. Grows; never shrinks; iteration is not offered, so order cannot leak.
+/// Map from packed cells to small integers. Grows; never shrinks; iteration is not offered, so
+/// order cannot leak.
 class CellMap {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
@@ -64,7 +70,9 @@ class CellMap {
     std::uint32_t value = kNone;
   };
 
-  [[nodiscard]] std::size_t Start(std::uint64_t key) const { return ((key * 0x9E3779B97F4A7C15ULL) >> 32) & (slots_.size() - 1); }
+  [[nodiscard]] std::size_t Start(std::uint64_t key) const {
+    return ((key * 0x9E3779B97F4A7C15ULL) >> 32) & (slots_.size() - 1);
+  }
 
   void Grow() {
     std::vector<Slot> old(2 * slots_.size());

@@ -9,7 +9,8 @@
 namespace plumb {
 namespace {
 
-// Distances are compared in single precision: reach a little further than the exact bound. Relative and absolute.
+// Distances are compared in single precision: reach a little further than the exact bound. Relative
+// and absolute.
 constexpr float kReachFactor = 1.0F + 1e-5F;
 constexpr float kReachMargin = 1e-6F;
 constexpr float kStepsAhead = 8.0F;  // moves of the last size that an answer should outlast
@@ -17,11 +18,15 @@ constexpr float kStepsAhead = 8.0F;  // moves of the last size that an answer sh
 }  // namespace
 
 CloudNeighbours::CloudNeighbours(Clouds clouds, double cell_size)
-    : inverse_size_(static_cast<float>(1.0 / cell_size)), cell_size_(static_cast<float>(cell_size)), slack_(0.25F * cell_size_) {
+    : inverse_size_(static_cast<float>(1.0 / cell_size)),
+      cell_size_(static_cast<float>(cell_size)),
+      slack_(0.25F * cell_size_) {
   if (!(cell_size > 0.0 && std::isfinite(cell_size)))
-    throw std::invalid_argument(fmt::format("neighbours: cell size {} m is not a length", cell_size));
+    throw std::invalid_argument(
+        fmt::format("neighbours: cell size {} m is not a length", cell_size));
   starts_.push_back(0);
-  for (const auto& cloud : clouds) starts_.push_back(starts_.back() + static_cast<std::uint32_t>(cloud.size()));
+  for (const auto& cloud : clouds)
+    starts_.push_back(starts_.back() + static_cast<std::uint32_t>(cloud.size()));
   points_.resize(starts_.back());
   entries_.resize(points_.size());
   entry_of_.resize(points_.size());
@@ -29,7 +34,8 @@ CloudNeighbours::CloudNeighbours(Clouds clouds, double cell_size)
   for (std::size_t c = 0; c < clouds.size(); ++c) {
     for (std::size_t i = 0; i < clouds[c].size(); ++i) {
       if (!(clouds[c][i].cwiseAbs().maxCoeff() < reach) || !clouds[c][i].allFinite())
-        throw std::invalid_argument(fmt::format("neighbours: point {} of cloud {} is not finite or too far away", i, c));
+        throw std::invalid_argument(
+            fmt::format("neighbours: point {} of cloud {} is not finite or too far away", i, c));
       points_[starts_[c] + i] = clouds[c][i];
     }
   }
@@ -37,16 +43,19 @@ CloudNeighbours::CloudNeighbours(Clouds clouds, double cell_size)
 }
 
 void CloudNeighbours::Move(Clouds clouds) {
-  if (clouds.size() + 1 != starts_.size()) throw std::invalid_argument("neighbours: the number of clouds has changed");
+  if (clouds.size() + 1 != starts_.size())
+    throw std::invalid_argument("neighbours: the number of clouds has changed");
   const float reach = cell_size_ * static_cast<float>(LatticeCell::kLimit / 2);
   float largest = 0.0F;
   for (std::size_t c = 0; c < clouds.size(); ++c) {
-    if (clouds[c].size() != starts_[c + 1] - starts_[c]) throw std::invalid_argument("neighbours: the number of points has changed");
+    if (clouds[c].size() != starts_[c + 1] - starts_[c])
+      throw std::invalid_argument("neighbours: the number of points has changed");
     for (std::size_t i = 0; i < clouds[c].size(); ++i) {
       Eigen::Vector3f& point = points_[starts_[c] + i];
       const Eigen::Vector3f& moved = clouds[c][i];
       if (!(moved.cwiseAbs().maxCoeff() < reach) || !moved.allFinite())
-        throw std::invalid_argument(fmt::format("neighbours: point {} of cloud {} is not finite or too far away", i, c));
+        throw std::invalid_argument(
+            fmt::format("neighbours: point {} of cloud {} is not finite or too far away", i, c));
       largest = std::max(largest, (moved - point).squaredNorm());
       point = moved;
     }
@@ -67,9 +76,11 @@ void CloudNeighbours::Bin() {
   std::vector<std::uint32_t> cell_of_point(points_.size());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Eigen::Vector3f& p = points_[i];
-    const LatticeCell cell(LatticeCell::Index(p.x(), inverse_size_), LatticeCell::Index(p.y(), inverse_size_),
+    const LatticeCell cell(LatticeCell::Index(p.x(), inverse_size_),
+                           LatticeCell::Index(p.y(), inverse_size_),
                            LatticeCell::Index(p.z(), inverse_size_));
-    const std::uint32_t index = cell_of_.FindOrAdd(cell.key(), static_cast<std::uint32_t>(cells_.size()));
+    const std::uint32_t index =
+        cell_of_.FindOrAdd(cell.key(), static_cast<std::uint32_t>(cells_.size()));
     if (index == cells_.size()) cells_.emplace_back();
     ++cells_[index].last;
     cell_of_point[i] = index;
@@ -87,18 +98,22 @@ void CloudNeighbours::Bin() {
   }
 }
 
-void CloudNeighbours::SearchBox(const Eigen::Vector3f& p, float reach, std::uint32_t own_first, std::uint32_t own_last, Best& best) const {
+void CloudNeighbours::SearchBox(const Eigen::Vector3f& p, float reach, std::uint32_t own_first,
+                                std::uint32_t own_last, Best& best) const {
   const float slack = travel_ - travel_when_binned_ + kReachMargin;
   const float out = reach + slack;
-  const Eigen::Vector3i lo(LatticeCell::Index(p.x() - out, inverse_size_), LatticeCell::Index(p.y() - out, inverse_size_),
+  const Eigen::Vector3i lo(LatticeCell::Index(p.x() - out, inverse_size_),
+                           LatticeCell::Index(p.y() - out, inverse_size_),
                            LatticeCell::Index(p.z() - out, inverse_size_));
-  const Eigen::Vector3i hi(LatticeCell::Index(p.x() + out, inverse_size_), LatticeCell::Index(p.y() + out, inverse_size_),
+  const Eigen::Vector3i hi(LatticeCell::Index(p.x() + out, inverse_size_),
+                           LatticeCell::Index(p.y() + out, inverse_size_),
                            LatticeCell::Index(p.z() + out, inverse_size_));
-  // Squared distance along one axis to what a slab of cells can hold, points' drift since binning included. Rounding of the
-  // slab's borders is below a millionth of the coordinate.
+  // Squared distance along one axis to what a slab of cells can hold, points' drift since binning
+  // included. Rounding of the slab's borders is below a millionth of the coordinate.
   const auto squared_gap = [&](float coordinate, int index) {
     const float low = static_cast<float>(index) * cell_size_;
-    const float gap = std::max(low - coordinate, coordinate - low - cell_size_) - slack - 1e-6F * std::abs(coordinate);
+    const float gap = std::max(low - coordinate, coordinate - low - cell_size_) - slack -
+                      1e-6F * std::abs(coordinate);
     return gap > 0.0F ? gap * gap : 0.0F;
   };
   for (int x = lo.x(); x <= hi.x(); ++x) {
@@ -115,8 +130,10 @@ void CloudNeighbours::SearchBox(const Eigen::Vector3f& p, float reach, std::uint
           if (entry.global_index >= own_first && entry.global_index < own_last) continue;
           if (entry.global_index == best.global_index) continue;
           const float squared = (entry.point - p).squaredNorm();
-          if (squared < best.squared_distance || (squared == best.squared_distance && entry.global_index < best.global_index))
-            best = {squared, entry.global_index, std::min(best.squared_distance, best.second_squared)};
+          if (squared < best.squared_distance ||
+              (squared == best.squared_distance && entry.global_index < best.global_index))
+            best = {squared, entry.global_index,
+                    std::min(best.squared_distance, best.second_squared)};
           else if (squared < best.second_squared)
             best.second_squared = squared;
         }
@@ -125,7 +142,8 @@ void CloudNeighbours::SearchBox(const Eigen::Vector3f& p, float reach, std::uint
   }
 }
 
-std::uint32_t CloudNeighbours::Nearest(std::size_t cloud, std::size_t index, float radius, Memory& memory) const {
+std::uint32_t CloudNeighbours::Nearest(std::size_t cloud, std::size_t index, float radius,
+                                       Memory& memory) const {
   const std::uint32_t own_first = starts_[cloud];
   const std::uint32_t own_last = starts_[cloud + 1];
   const Eigen::Vector3f& p = points_[own_first + index];
@@ -143,10 +161,14 @@ std::uint32_t CloudNeighbours::Nearest(std::size_t cloud, std::size_t index, flo
   if (memory.neighbour != kNone) {
     const float squared = (points_[memory.neighbour] - p).squaredNorm();
     const float distance = std::sqrt(squared);
-    if (reach_of(distance) < memory.no_other_within - nearer_by) return squared < squared_radius ? memory.neighbour : kNone;
-    // The old partner bounds the search; a little further, the next candidate decides how long the answer will hold.
+    if (reach_of(distance) < memory.no_other_within - nearer_by)
+      return squared < squared_radius ? memory.neighbour : kNone;
+    // The old partner bounds the search; a little further, the next candidate decides how long the
+    // answer will hold.
     if (squared < best.squared_distance) {
-      reach = std::min(distance + std::clamp(kStepsAhead * last_step_, 0.02F * cell_size_, 0.2F * cell_size_), farthest);
+      reach = std::min(
+          distance + std::clamp(kStepsAhead * last_step_, 0.02F * cell_size_, 0.2F * cell_size_),
+          farthest);
       best = {squared, memory.neighbour, reach * reach};
     }
   }
@@ -156,7 +178,8 @@ std::uint32_t CloudNeighbours::Nearest(std::size_t cloud, std::size_t index, flo
     if (best.squared_distance <= reach * reach || reach >= farthest) break;
     best.second_squared = farthest * farthest;
   }
-  memory = {best.global_index, std::sqrt(best.squared_distance), std::sqrt(best.second_squared), travel_};
+  memory = {best.global_index, std::sqrt(best.squared_distance), std::sqrt(best.second_squared),
+            travel_};
   return best.squared_distance < squared_radius ? best.global_index : kNone;
 }
 

@@ -11,42 +11,50 @@
 
 namespace plumb {
 
-/// Finds, for a point of one cloud, the nearest point of any OTHER cloud. Exact, whatever the hints.
+/// Finds, for a point of one cloud, the nearest point of any OTHER cloud. Exact, whatever the
+/// hints.
 ///
-/// Two things make repeated searches cheap while the clouds move little between them. Points stay in
-/// the cell where they were binned until one has moved by a quarter of a cell; searches reach out by that much
-/// more. And what the last search knew holds for a while: its partner is still the nearest, or none is near, until the clouds
-/// have moved by the distance to the next candidate; after that the old partner bounds the search.
+/// Two things make repeated searches cheap while the clouds move little between them. Points stay
+/// in the cell where they were binned until one has moved by a quarter of a cell; searches reach
+/// out by that much more. And what the last search knew holds for a while: its partner is still the
+/// nearest, or none is near, until the clouds have moved by the distance to the next candidate;
+/// after that the old partner bounds the search.
 ///
-/// Nearest() is const and thread-safe for different points; Move() is not. Deterministic: of equally near points the one
-/// with the smaller (cloud, index) is found.
+/// Nearest() is const and thread-safe for different points; Move() is not. Deterministic: of
+/// equally near points the one with the smaller (cloud, index) is found.
 class CloudNeighbours {
  public:
   using Clouds = std::span<const std::vector<Eigen::Vector3f>>;
 
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
-  /// What is remembered of a point's last search; starts empty.
+  /// Remembers a point's last search; starts empty.
   struct Memory {
-    std::uint32_t neighbour = kNone;  ///< Global index of the nearest point found last, within the radius or not.
-    float none_within = 0.0F;         ///< Nothing was nearer than this ...
-    float no_other_within = 0.0F;     ///< ... and nothing but `neighbour` nearer than this ...
-    float travel_then = 0.0F;         ///< ... when the clouds had moved so far.
+    std::uint32_t neighbour =
+        kNone;  ///< Global index of the nearest point found last, within the radius or not.
+    float none_within = 0.0F;      ///< Nothing was nearer than this ...
+    float no_other_within = 0.0F;  ///< ... and nothing but `neighbour` nearer than this ...
+    float travel_then = 0.0F;      ///< ... when the clouds had moved so far.
   };
 
   /// @param cell_size  Metres, > 0: about the distance between neighbours within a cloud.
-  /// @throws std::invalid_argument on a bad cell size, or points that are not finite or a million cells away.
+  /// @throws std::invalid_argument on a bad cell size, or points that are not finite or a million
+  /// cells away.
   CloudNeighbours(Clouds clouds, double cell_size);
 
-  /// The same points at new places. @throws std::invalid_argument if their numbers differ, and as the constructor.
+  /// The same points at new places. @throws std::invalid_argument if their numbers differ, and as
+  /// the constructor.
   void Move(Clouds clouds);
 
   /// Nearest point of another cloud with distance < radius.
   /// @return its global index or kNone; `memory` is used and brought up to date.
-  [[nodiscard]] std::uint32_t Nearest(std::size_t cloud, std::size_t index, float radius, Memory& memory) const;
+  [[nodiscard]] std::uint32_t Nearest(std::size_t cloud, std::size_t index, float radius,
+                                      Memory& memory) const;
 
   /// Place of a point by its global index (clouds one after the other).
-  [[nodiscard]] const Eigen::Vector3f& point(std::uint32_t global_index) const { return points_[global_index]; }
+  [[nodiscard]] const Eigen::Vector3f& point(std::uint32_t global_index) const {
+    return points_[global_index];
+  }
 
  private:
   struct Entry {
@@ -64,7 +72,8 @@ class CloudNeighbours {
   };
 
   void Bin();
-  void SearchBox(const Eigen::Vector3f& p, float reach, std::uint32_t own_first, std::uint32_t own_last, Best& best) const;
+  void SearchBox(const Eigen::Vector3f& p, float reach, std::uint32_t own_first,
+                 std::uint32_t own_last, Best& best) const;
 
   float inverse_size_;
   float cell_size_;

@@ -10,8 +10,9 @@
 namespace plumb {
 namespace {
 
-// Spread below this share of the largest spread counts as none. Singular values of a scatter are squared lengths, so
-// 1e-9 asks for a set about 30 000 times longer than wide: far below what any measured line of points reaches.
+// Spread below this share of the largest spread counts as none. Singular values of a scatter are
+// squared lengths, so 1e-9 asks for a set about 30 000 times longer than wide: far below what any
+// measured line of points reaches.
 constexpr double kRelativeRankTolerance = 1e-9;
 
 struct WeightedMean {
@@ -30,7 +31,8 @@ WeightedMean MeanOf(std::span<const Eigen::Vector3d> points, std::span<const dou
   return result;
 }
 
-// Rank of a centred scatter; `scale` is the squared distance from the origin, which bounds the rounding error.
+// Rank of a centred scatter; `scale` is the squared distance from the origin, which bounds the
+// rounding error.
 int ScatterRank(const Eigen::Matrix3d& scatter, double scale) {
   const Eigen::Vector3d spread = scatter.jacobiSvd().singularValues();
   const double floor = std::max(spread[0] * kRelativeRankTolerance, scale * 1e-14);
@@ -39,21 +41,26 @@ int ScatterRank(const Eigen::Matrix3d& scatter, double scale) {
   return rank;
 }
 
-void CheckArguments(std::span<const Eigen::Vector3d> points_a, std::span<const Eigen::Vector3d> points_b, std::span<const double> weights) {
+void CheckArguments(std::span<const Eigen::Vector3d> points_a,
+                    std::span<const Eigen::Vector3d> points_b, std::span<const double> weights) {
   if (points_a.size() != points_b.size()) {
-    throw std::invalid_argument(fmt::format("FitRigid needs paired points, got {} in a and {} in b", points_a.size(), points_b.size()));
+    throw std::invalid_argument(fmt::format("FitRigid needs paired points, got {} in a and {} in b",
+                                            points_a.size(), points_b.size()));
   }
   if (!weights.empty() && weights.size() != points_a.size()) {
-    throw std::invalid_argument(fmt::format("FitRigid needs one weight for each of {} pairs, got {}", points_a.size(), weights.size()));
+    throw std::invalid_argument(fmt::format(
+        "FitRigid needs one weight for each of {} pairs, got {}", points_a.size(), weights.size()));
   }
   for (const double w : weights) {
-    if (!(w >= 0) || !std::isfinite(w)) throw std::invalid_argument("FitRigid: weights must be finite and >= 0");
+    if (!(w >= 0) || !std::isfinite(w))
+      throw std::invalid_argument("FitRigid: weights must be finite and >= 0");
   }
 }
 
 }  // namespace
 
-RigidFit FitRigid(std::span<const Eigen::Vector3d> points_a, std::span<const Eigen::Vector3d> points_b, std::span<const double> weights) {
+RigidFit FitRigid(std::span<const Eigen::Vector3d> points_a,
+                  std::span<const Eigen::Vector3d> points_b, std::span<const double> weights) {
   CheckArguments(points_a, points_b, weights);
   RigidFit fit;
   const WeightedMean a = MeanOf(points_a, weights);
@@ -74,16 +81,19 @@ RigidFit FitRigid(std::span<const Eigen::Vector3d> points_a, std::span<const Eig
     num_weighted += w > 0 ? 1 : 0;
   }
   if (!cross.allFinite() || !scatter_a.allFinite() || !scatter_b.allFinite()) return fit;
-  fit.rank = std::min(ScatterRank(scatter_a, a.total * a.mean.squaredNorm()), ScatterRank(scatter_b, b.total * b.mean.squaredNorm()));
+  fit.rank = std::min(ScatterRank(scatter_a, a.total * a.mean.squaredNorm()),
+                      ScatterRank(scatter_b, b.total * b.mean.squaredNorm()));
 
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  // Two sets of rank 2 can still pair up into a cross scatter of rank 1 (mates exchanged), which leaves a rotation free.
+  // Two sets of rank 2 can still pair up into a cross scatter of rank 1 (points paired wrongly),
+  // which leaves a rotation free.
   const Eigen::Vector3d shared = svd.singularValues();
   const bool determined = shared[1] > std::max(shared[0] * kRelativeRankTolerance, 0.0);
   if (num_weighted < 3 || fit.rank < 2 || !determined) return fit;
 
   const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1.0 : 1.0;
-  fit.T_a_b.linear() = svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+  fit.T_a_b.linear() =
+      svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
   fit.T_a_b.translation() = a.mean - fit.T_a_b.linear() * b.mean;
   double sum = 0.0;
   for (std::size_t i = 0; i < points_a.size(); ++i) {

@@ -21,13 +21,16 @@ constexpr double kMinSigma = 5e-4;    // 1/m: half a millimetre at 1 m, below an
 constexpr double kMadToSigma = 1.4826;
 
 void CheckSize(const DepthView& view, const RayTable& rays) {
-  if (view.depth_m.type() != CV_32FC1 || view.depth_m.cols != rays.width() || view.depth_m.rows != rays.height())
-    throw std::invalid_argument(fmt::format("corner depth: depth image {}x{} (type {}) does not fit a camera of {}x{}", view.depth_m.cols,
-                                            view.depth_m.rows, view.depth_m.type(), rays.width(), rays.height()));
+  if (view.depth_m.type() != CV_32FC1 || view.depth_m.cols != rays.width() ||
+      view.depth_m.rows != rays.height())
+    throw std::invalid_argument(fmt::format(
+        "corner depth: depth image {}x{} (type {}) does not fit a camera of {}x{}",
+        view.depth_m.cols, view.depth_m.rows, view.depth_m.type(), rays.width(), rays.height()));
 }
 
 bool IsInside(const Eigen::Vector2d& pixel, const RayTable& rays) {
-  return pixel.x() >= -0.5 && pixel.y() >= -0.5 && pixel.x() < rays.width() - 0.5 && pixel.y() < rays.height() - 0.5;  // false for NaN
+  return pixel.x() >= -0.5 && pixel.y() >= -0.5 && pixel.x() < rays.width() - 0.5 &&
+         pixel.y() < rays.height() - 0.5;  // false for NaN
 }
 
 /// A depth pixel of the face.
@@ -36,8 +39,10 @@ struct FacePixel {
   double inverse;  ///< 1/z
 };
 
-/// Depth pixels inside a clockwise convex outline, thinned; `num_inside` counts all pixels on the same raster, valid or not.
-std::vector<FacePixel> PixelsInside(const ImageCorners& outline, const DepthView& view, const RayTable& rays, int& num_inside) {
+/// Depth pixels inside a clockwise convex outline, thinned; `num_inside` counts all pixels on the
+/// same raster, valid or not.
+std::vector<FacePixel> PixelsInside(const ImageCorners& outline, const DepthView& view,
+                                    const RayTable& rays, int& num_inside) {
   double x0 = outline[0].x(), x1 = x0, y0 = outline[0].y(), y1 = y0;
   for (const Eigen::Vector2d& corner : outline) {
     x0 = std::min(x0, corner.x());
@@ -51,7 +56,8 @@ std::vector<FacePixel> PixelsInside(const ImageCorners& outline, const DepthView
   std::vector<FacePixel> pixels;
   num_inside = 0;
   for (int row = std::max(0, static_cast<int>(std::ceil(y0))); row <= row_end; row += step) {
-    for (int column = std::max(0, static_cast<int>(std::ceil(x0))); column <= column_end; column += step) {
+    for (int column = std::max(0, static_cast<int>(std::ceil(x0))); column <= column_end;
+         column += step) {
       bool inside = true;
       for (std::size_t k = 0; k < 4 && inside; ++k) {
         const Eigen::Vector2d& from = outline[k];
@@ -69,7 +75,8 @@ std::vector<FacePixel> PixelsInside(const ImageCorners& outline, const DepthView
   return pixels;
 }
 
-/// Corners go clockwise on the print, so clockwise in an image with y down: every turn is to the same side.
+/// Corners go clockwise on the print, so clockwise in an image with y down: every turn is to the
+/// same side.
 bool IsConvexClockwise(const ImageCorners& outline) {
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector2d a = outline[(k + 1) % 4] - outline[k];
@@ -85,8 +92,10 @@ double Median(std::vector<double>& values) {
   return *middle;
 }
 
-/// Weighted least squares of 1/z = a x + b y + c about the pixels' mean; false if the rays do not span a plane.
-bool SolvePlane(const std::vector<FacePixel>& pixels, const std::vector<double>& weights, Eigen::Vector3d& plane) {
+/// Weighted least squares of 1/z = a x + b y + c about the pixels' mean; false if the rays do not
+/// span a plane.
+bool SolvePlane(const std::vector<FacePixel>& pixels, const std::vector<double>& weights,
+                Eigen::Vector3d& plane) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double sum = 0.0;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
@@ -116,13 +125,17 @@ double Residual(const FacePixel& pixel, const Eigen::Vector3d& plane) {
 
 int DepthWindow(int window_px_at_640, int image_width) {
   if (window_px_at_640 < 1 || image_width < 1)
-    throw std::invalid_argument(fmt::format("corner depth: window of {} px in an image {} wide", window_px_at_640, image_width));
-  const int half = static_cast<int>(static_cast<double>(window_px_at_640) * image_width / 640.0 / 2.0);
+    throw std::invalid_argument(fmt::format("corner depth: window of {} px in an image {} wide",
+                                            window_px_at_640, image_width));
+  const int half =
+      static_cast<int>(static_cast<double>(window_px_at_640) * image_width / 640.0 / 2.0);
   return 2 * std::max(1, half) + 1;
 }
 
-std::array<std::optional<Eigen::Vector3d>, 4> PaperCornerPositions(const MarkerObservation& marker, const DepthView& view,
-                                                                   const RayTable& rays, int window_px_at_640) {
+std::array<std::optional<Eigen::Vector3d>, 4> PaperCornerPositions(const MarkerObservation& marker,
+                                                                   const DepthView& view,
+                                                                   const RayTable& rays,
+                                                                   int window_px_at_640) {
   CheckSize(view, rays);
   const int half = DepthWindow(window_px_at_640, rays.width()) / 2;
   std::array<std::optional<Eigen::Vector3d>, 4> positions;
@@ -133,13 +146,15 @@ std::array<std::optional<Eigen::Vector3d>, 4> PaperCornerPositions(const MarkerO
     const int row = static_cast<int>(std::lround(corner.y()));
     const float at_corner = view.depth_m.at<float>(row, column);
     if (at_corner > 0.0F) {
-      positions[k] = static_cast<double>(at_corner) * Undistort(rays.intrinsics(), corner).homogeneous();
+      positions[k] =
+          static_cast<double>(at_corner) * Undistort(rays.intrinsics(), corner).homogeneous();
       continue;
     }
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     int count = 0;
     for (int r = std::max(0, row - half); r <= std::min(rays.height() - 1, row + half); ++r) {
-      for (int c = std::max(0, column - half); c <= std::min(rays.width() - 1, column + half); ++c) {
+      for (int c = std::max(0, column - half); c <= std::min(rays.width() - 1, column + half);
+           ++c) {
         const float z = view.depth_m.at<float>(r, c);
         if (!(z > 0.0F)) continue;
         sum += static_cast<double>(z) * rays.ideal(r, c).cast<double>().homogeneous();
@@ -151,7 +166,8 @@ std::array<std::optional<Eigen::Vector3d>, 4> PaperCornerPositions(const MarkerO
   return positions;
 }
 
-std::optional<MarkerFace> FitMarkerFace(const MarkerObservation& marker, const DepthView& view, const RayTable& rays) {
+std::optional<MarkerFace> FitMarkerFace(const MarkerObservation& marker, const DepthView& view,
+                                        const RayTable& rays) {
   CheckSize(view, rays);
   if (!IsConvexClockwise(marker.corners)) return std::nullopt;
   for (const Eigen::Vector2d& corner : marker.corners)
@@ -161,7 +177,8 @@ std::optional<MarkerFace> FitMarkerFace(const MarkerObservation& marker, const D
   const int num_pixels = static_cast<int>(pixels.size());
   if (num_pixels < kMinPixels || num_pixels < kMinValidShare * num_inside) return std::nullopt;
 
-  // Start: only pixels near the median depth, so that a hand or a gap beside the marker does not tilt the first plane.
+  // Start: only pixels near the median depth, so that a hand or a gap beside the marker does not
+  // tilt the first plane.
   std::vector<double> values;
   values.reserve(pixels.size());
   for (const FacePixel& pixel : pixels) values.push_back(pixel.inverse);
@@ -170,13 +187,15 @@ std::optional<MarkerFace> FitMarkerFace(const MarkerObservation& marker, const D
   const double spread = Median(values);
   std::vector<double> weights(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i)
-    weights[i] = std::abs(pixels[i].inverse - median) <= std::max(3.0 * spread, kMinSigma) ? 1.0 : 0.0;
+    weights[i] =
+        std::abs(pixels[i].inverse - median) <= std::max(3.0 * spread, kMinSigma) ? 1.0 : 0.0;
 
   MarkerFace face;
   double sigma = kMinSigma;
   for (int round = 0; round < kNumRounds; ++round) {
     if (!SolvePlane(pixels, weights, face.plane)) return std::nullopt;
-    for (std::size_t i = 0; i < pixels.size(); ++i) values[i] = std::abs(Residual(pixels[i], face.plane));
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      values[i] = std::abs(Residual(pixels[i], face.plane));
     sigma = std::max(kMinSigma, kMadToSigma * Median(values));
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const double ratio = Residual(pixels[i], face.plane) / (kTukeyScales * sigma);

@@ -16,24 +16,28 @@
 namespace plumb {
 namespace {
 
-constexpr int kOuterRounds = 4;          // geometry (homography, pixel set) is renewed in each
-constexpr int kFirstSteps = 2;           // Gauss-Newton steps in the first round; one in the others
-constexpr double kConverged_px = 0.03;   // largest corner movement of a round that ends the search
-constexpr double kMinContrast = 0.02;    // of full scale
-constexpr int kFirstSideSamples = 90;    // pixels used per side, about: in the first round
-constexpr int kSideSamples = 180;        // and later
-constexpr double kMinBlur_px = 0.35;     // a pixel's own area is 0.29 px wide (sigma)
-constexpr double kModelError_px = 0.03;  // sharpening cameras and real paper; rendered images leave 0.01
-constexpr int kTablePerCell = 4;         // resolution of the blurred cell rows
+constexpr int kOuterRounds = 4;         // geometry (homography, pixel set) is renewed in each
+constexpr int kFirstSteps = 2;          // Gauss-Newton steps in the first round; one in the others
+constexpr double kConverged_px = 0.03;  // largest corner movement of a round that ends the search
+constexpr double kMinContrast = 0.02;   // of full scale
+constexpr int kFirstSideSamples = 90;   // pixels used per side, about: in the first round
+constexpr int kSideSamples = 180;       // and later
+constexpr double kMinBlur_px = 0.35;    // a pixel's own area is 0.29 px wide (sigma)
+constexpr double kModelError_px =
+    0.03;                         // sharpening cameras and real paper; rendered images leave 0.01
+constexpr int kTablePerCell = 4;  // resolution of the blurred cell rows
 
-/// The normal distribution function and density by table: error below 1e-5, exact zero / one outside +-4.
+/// The normal distribution function and density by table: error below 1e-5, exact zero / one
+/// outside +-4.
 class NormalTable {
  public:
   NormalTable() {
     for (int i = 0; i <= kSize; ++i) {
       const double z = -kLimit + i / kScale;
-      cdf_[static_cast<std::size_t>(i)] = static_cast<float>(0.5 * std::erfc(-z / std::numbers::sqrt2));
-      pdf_[static_cast<std::size_t>(i)] = static_cast<float>(std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi));
+      cdf_[static_cast<std::size_t>(i)] =
+          static_cast<float>(0.5 * std::erfc(-z / std::numbers::sqrt2));
+      pdf_[static_cast<std::size_t>(i)] =
+          static_cast<float>(std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi));
     }
   }
   /// {distribution, density} at z.
@@ -69,23 +73,28 @@ const ToneTable& Tone(bool linear_light) {
     for (std::size_t i = 0; i < 256; ++i) {
       const double v = static_cast<double>(i) / 255.0;
       both[0][i] = static_cast<float>(v);
-      both[1][i] = static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+      both[1][i] =
+          static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
     }
     return both;
   }();
   return tables[linear_light ? 1 : 0];
 }
 
-/// A side of the square in its own coordinates: `along` from its first corner, `depth` towards the marker's inside, pixels.
+/// A side of the square in its own coordinates: `along` from its first corner, `depth` towards the
+/// marker's inside, pixels.
 struct Side {
   Eigen::Vector2d origin, direction, normal;
   double length_px = 0;
-  Eigen::Matrix3d pixel_to_cells;                  ///< (column, row) with this side on top: 0..N along, 0..N in depth.
-  std::array<double, 2> depth_one{}, depth_two{};  ///< Depth of the lines one and two cells inside, at both ends.
-  double cell_px = 0;                              ///< Mean depth of one cell.
-  double outside_px = 0, inside_px = 0;            ///< Extent of the band of pixels used.
-  double bow_px = 0;                               ///< Depth of the curved side at its middle.
-  /// Darkness (0 paper, 1 ink) of the border and the first two code rows along the side, blurred along it.
+  Eigen::Matrix3d
+      pixel_to_cells;  ///< (column, row) with this side on top: 0..N along, 0..N in depth.
+  std::array<double, 2> depth_one{},
+      depth_two{};     ///< Depth of the lines one and two cells inside, at both ends.
+  double cell_px = 0;  ///< Mean depth of one cell.
+  double outside_px = 0, inside_px = 0;  ///< Extent of the band of pixels used.
+  double bow_px = 0;                     ///< Depth of the curved side at its middle.
+  /// Darkness (0 paper, 1 ink) of the border and the first two code rows along the side, blurred
+  /// along it.
   std::array<std::vector<float>, 3> darkness;
 };
 
@@ -93,7 +102,8 @@ struct Side {
 struct SideFit {
   Eigen::Vector2d ends = Eigen::Vector2d::Zero();  ///< Depth of the line at both ends, pixels.
   double blur_px = 1.0;
-  double white = 0, white_slope = 0, step = 0, step_slope = 0;  ///< At the middle, and from end to end.
+  double white = 0, white_slope = 0, step = 0,
+         step_slope = 0;  ///< At the middle, and from end to end.
   Eigen::Matrix2d ends_covariance = Eigen::Matrix2d::Identity();
   double residual_rms = 0;
   bool valid = false;
@@ -120,12 +130,14 @@ bool WhiteFromSide(const MarkerPattern& pattern, int side, int row, int column) 
 }
 
 /// Darkness along the side of depth row `row` (0 border), blurred by a Gaussian of `blur_cells`.
-void FillDarkness(const MarkerPattern& pattern, int side, int row, double blur_cells, std::vector<float>& table) {
+void FillDarkness(const MarkerPattern& pattern, int side, int row, double blur_cells,
+                  std::vector<float>& table) {
   const int cells = pattern.bits_per_side + 2;
   std::array<float, 12> dark{};  // with paper at both ends
   for (int i = 0; i < cells; ++i) {
     const bool border = row == 0 || i == 0 || i == cells - 1;
-    dark[static_cast<std::size_t>(i + 1)] = border || !WhiteFromSide(pattern, side, row - 1, i - 1) ? 1.0F : 0.0F;
+    dark[static_cast<std::size_t>(i + 1)] =
+        border || !WhiteFromSide(pattern, side, row - 1, i - 1) ? 1.0F : 0.0F;
   }
   table.assign(static_cast<std::size_t>(cells * kTablePerCell + 1), 0.0F);
   for (int i = 0; i <= cells; ++i) {
@@ -135,27 +147,32 @@ void FillDarkness(const MarkerPattern& pattern, int side, int row, double blur_c
     const int size = static_cast<int>(table.size());
     for (int k = std::max(0, i * kTablePerCell - reach); k < size; ++k) {
       const double position = static_cast<double>(k) / kTablePerCell;
-      table[static_cast<std::size_t>(k)] += change * Normal().At(static_cast<float>((position - i) / blur_cells)).first;
+      table[static_cast<std::size_t>(k)] +=
+          change * Normal().At(static_cast<float>((position - i) / blur_cells)).first;
     }
   }
 }
 
 float Lookup(const std::vector<float>& table, float cells) {
-  const float position = std::clamp(cells * kTablePerCell, 0.0F, static_cast<float>(table.size() - 1) - 1e-3F);
+  const float position =
+      std::clamp(cells * kTablePerCell, 0.0F, static_cast<float>(table.size() - 1) - 1e-3F);
   const auto index = static_cast<std::size_t>(position);
   const float part = position - static_cast<float>(index);
   return table[index] + part * (table[index + 1] - table[index]);
 }
 
 /// How far the lens bends the straight segment a..b at its middle, along `normal`.
-double Bow(const Intrinsics& intrinsics, const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& normal) {
+double Bow(const Intrinsics& intrinsics, const Eigen::Vector2d& a, const Eigen::Vector2d& b,
+           const Eigen::Vector2d& normal) {
   const Eigen::Vector2d middle = 0.5 * (Undistort(intrinsics, a) + Undistort(intrinsics, b));
   return normal.dot(Project(intrinsics, middle.homogeneous()) - 0.5 * (a + b));
 }
 
-std::optional<Side> MakeSide(const ImageCorners& corners, int index, const MarkerPattern& pattern, double blur_along_px,
-                             const std::optional<Intrinsics>& intrinsics) {
-  const auto at = [&](int k) -> const Eigen::Vector2d& { return corners[static_cast<std::size_t>((index + k) % 4)]; };
+std::optional<Side> MakeSide(const ImageCorners& corners, int index, const MarkerPattern& pattern,
+                             double blur_along_px, const std::optional<Intrinsics>& intrinsics) {
+  const auto at = [&](int k) -> const Eigen::Vector2d& {
+    return corners[static_cast<std::size_t>((index + k) % 4)];
+  };
   const int cells = pattern.bits_per_side + 2;
   Side side;
   side.origin = at(0);
@@ -165,11 +182,13 @@ std::optional<Side> MakeSide(const ImageCorners& corners, int index, const Marke
   side.direction /= side.length_px;
   side.normal = Eigen::Vector2d(-side.direction.y(), side.direction.x());
 
-  const std::optional<Eigen::Matrix3d> cells_to_pixel = SquareToQuad(cells, {at(0), at(1), at(2), at(3)});
+  const std::optional<Eigen::Matrix3d> cells_to_pixel =
+      SquareToQuad(cells, {at(0), at(1), at(2), at(3)});
   if (!cells_to_pixel) return std::nullopt;
   side.pixel_to_cells = cells_to_pixel->inverse();
   const auto depth_of = [&](double column, double row) {
-    return side.normal.dot((*cells_to_pixel * Eigen::Vector3d(column, row, 1)).hnormalized() - side.origin);
+    return side.normal.dot((*cells_to_pixel * Eigen::Vector3d(column, row, 1)).hnormalized() -
+                           side.origin);
   };
   side.depth_one = {depth_of(0, 1), depth_of(cells, 1)};
   side.depth_two = {depth_of(0, 2), depth_of(cells, 2)};
@@ -181,12 +200,15 @@ std::optional<Side> MakeSide(const ImageCorners& corners, int index, const Marke
   if (intrinsics) side.bow_px = Bow(*intrinsics, at(0), at(1), side.normal);
 
   const double blur_cells = std::max(blur_along_px, kMinBlur_px) * cells / side.length_px;
-  for (int row = 0; row < 3; ++row) FillDarkness(pattern, index, row, blur_cells, side.darkness[static_cast<std::size_t>(row)]);
+  for (int row = 0; row < 3; ++row)
+    FillDarkness(pattern, index, row, blur_cells, side.darkness[static_cast<std::size_t>(row)]);
   return side;
 }
 
-/// The pixels of the image in a band along the side, as many as are useful. No interpolation: each is itself a measurement.
-void CollectSamples(const cv::Mat& gray, const ToneTable& tone, const Side& side, int wanted, std::vector<Sample>& samples) {
+/// The pixels of the image in a band along the side, as many as are useful. No interpolation: each
+/// is itself a measurement.
+void CollectSamples(const cv::Mat& gray, const ToneTable& tone, const Side& side, int wanted,
+                    std::vector<Sample>& samples) {
   samples.clear();
   const double margin_px = std::max(1.0, 0.06 * side.length_px);
   const bool by_column = std::abs(side.direction.x()) >= std::abs(side.direction.y());
@@ -217,24 +239,30 @@ void CollectSamples(const cv::Mat& gray, const ToneTable& tone, const Side& side
       const Eigen::Vector3d cell = side.pixel_to_cells * Eigen::Vector3d(x, y, 1);
       if (!(cell.z() > 0)) continue;  // behind the plane's horizon: not a square seen by a camera
       const auto column = static_cast<float>(cell.x() / cell.z());
-      samples.push_back({static_cast<float>(side.normal.dot(offset) - 4 * side.bow_px * along * (1 - along)),
-                         static_cast<float>(along),
-                         tone[gray.ptr<std::uint8_t>(y)[x]],
-                         {Lookup(side.darkness[0], column), Lookup(side.darkness[1], column), Lookup(side.darkness[2], column)}});
+      samples.push_back(
+          {static_cast<float>(side.normal.dot(offset) - 4 * side.bow_px * along * (1 - along)),
+           static_cast<float>(along),
+           tone[gray.ptr<std::uint8_t>(y)[x]],
+           {Lookup(side.darkness[0], column), Lookup(side.darkness[1], column),
+            Lookup(side.darkness[2], column)}});
     }
   }
 }
 
-/// Darkness of the model at a sample, and its derivatives by depth and by the logarithm of the blur.
+/// Darkness of the model at a sample, and its derivatives by depth and by the logarithm of the
+/// blur.
 struct Modelled {
   float darkness = 0, by_depth = 0, by_log_blur = 0;
 };
 
 Modelled Model(const Side& side, const Sample& sample, float line_depth, float inverse_blur) {
   const float along = sample.along;
-  const std::array<float, 3> edges = {line_depth,
-                                      line_depth + static_cast<float>(side.depth_one[0] + along * (side.depth_one[1] - side.depth_one[0])),
-                                      line_depth + static_cast<float>(side.depth_two[0] + along * (side.depth_two[1] - side.depth_two[0]))};
+  const std::array<float, 3> edges = {
+      line_depth,
+      line_depth +
+          static_cast<float>(side.depth_one[0] + along * (side.depth_one[1] - side.depth_one[0])),
+      line_depth +
+          static_cast<float>(side.depth_two[0] + along * (side.depth_two[1] - side.depth_two[0]))};
   const std::array<float, 3> change = {sample.darkness[0], sample.darkness[1] - sample.darkness[0],
                                        sample.darkness[2] - sample.darkness[1]};
   Modelled result;
@@ -283,15 +311,19 @@ bool Step(const Side& side, const std::vector<Sample>& samples, SideFit& fit) {
   for (const Sample& sample : samples) {
     const float along = sample.along;
     const float from_middle = along - 0.5F;
-    const float line_depth = static_cast<float>(fit.ends[0]) * (1 - along) + static_cast<float>(fit.ends[1]) * along;
+    const float line_depth =
+        static_cast<float>(fit.ends[0]) * (1 - along) + static_cast<float>(fit.ends[1]) * along;
     const Modelled model = Model(side, sample, line_depth, inverse_blur);
-    const float step = static_cast<float>(fit.step) + static_cast<float>(fit.step_slope) * from_middle;
-    const float white = static_cast<float>(fit.white) + static_cast<float>(fit.white_slope) * from_middle;
+    const float step =
+        static_cast<float>(fit.step) + static_cast<float>(fit.step_slope) * from_middle;
+    const float white =
+        static_cast<float>(fit.white) + static_cast<float>(fit.white_slope) * from_middle;
     const float residual = sample.value - (white - step * model.darkness);
     const float weight = std::abs(residual) <= limit ? 1.0F : limit / std::abs(residual);
     const float by_line = step * model.by_depth;  // value grows when the line moves inward
-    const std::array<float, 8> jacobian = {by_line * (1 - along), by_line * along, -step * model.by_log_blur,     1.0F,
-                                           from_middle,           -model.darkness, -model.darkness * from_middle, residual};
+    const std::array<float, 8> jacobian = {
+        by_line * (1 - along), by_line * along, -step * model.by_log_blur,     1.0F,
+        from_middle,           -model.darkness, -model.darkness * from_middle, residual};
     for (std::size_t i = 0; i < 7; ++i) {
       const float weighted = weight * jacobian[i];
       for (std::size_t j = 0; j < 8; ++j) sums[i][j] += weighted * jacobian[j];
@@ -302,7 +334,8 @@ bool Step(const Side& side, const std::vector<Sample>& samples, SideFit& fit) {
   Matrix7 normal;
   Vector7 right;
   for (int i = 0; i < 7; ++i) {
-    for (int j = 0; j < 7; ++j) normal(i, j) = sums[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+    for (int j = 0; j < 7; ++j)
+      normal(i, j) = sums[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
     right[i] = sums[static_cast<std::size_t>(i)][7];
   }
   // A weak prior on blur and slopes keeps the system regular on faint or tiny sides.
@@ -321,7 +354,8 @@ bool Step(const Side& side, const std::vector<Sample>& samples, SideFit& fit) {
 
   const double largest = std::max(1.0, 0.3 * side.cell_px);
   fit.ends += change.head<2>().cwiseMax(-largest).cwiseMin(largest);
-  fit.blur_px = std::clamp(fit.blur_px * std::exp(std::clamp(change[2], -0.5, 0.5)), kMinBlur_px, std::max(2.5, 0.8 * side.cell_px));
+  fit.blur_px = std::clamp(fit.blur_px * std::exp(std::clamp(change[2], -0.5, 0.5)), kMinBlur_px,
+                           std::max(2.5, 0.8 * side.cell_px));
   fit.white += change[3];
   fit.white_slope += change[4];
   fit.step += change[5];
@@ -333,7 +367,8 @@ bool Step(const Side& side, const std::vector<Sample>& samples, SideFit& fit) {
 }
 
 /// Fits a side from scratch (`fit` invalid, only its blur is used) or from the round before.
-void FitSide(const cv::Mat& gray, const ToneTable& tone, const Side& side, std::vector<Sample>& samples, SideFit& fit) {
+void FitSide(const cv::Mat& gray, const ToneTable& tone, const Side& side,
+             std::vector<Sample>& samples, SideFit& fit) {
   const bool first = !fit.valid;
   CollectSamples(gray, tone, side, first ? kFirstSideSamples : kSideSamples, samples);
   fit.ends.setZero();  // the side was moved to the line found before
@@ -352,7 +387,8 @@ struct Line {
 
 Line LineOf(const Side& side, const SideFit& fit) {
   const Eigen::Vector2d a = side.origin + fit.ends[0] * side.normal;
-  const Eigen::Vector2d b = side.origin + side.length_px * side.direction + fit.ends[1] * side.normal;
+  const Eigen::Vector2d b =
+      side.origin + side.length_px * side.direction + fit.ends[1] * side.normal;
   const Eigen::Vector2d direction = (b - a).normalized();
   const Eigen::Vector2d normal(-direction.y(), direction.x());
   return {normal, normal.dot(a)};
@@ -361,30 +397,37 @@ Line LineOf(const Side& side, const SideFit& fit) {
 std::optional<Eigen::Vector2d> Intersection(const Line& a, const Line& b) {
   Eigen::Matrix2d m;
   m << a.normal.transpose(), b.normal.transpose();
-  if (std::abs(m.determinant()) < 0.1) return std::nullopt;  // the sides meet at less than 6 degrees
+  if (std::abs(m.determinant()) < 0.1)
+    return std::nullopt;  // the sides meet at less than 6 degrees
   return m.inverse() * Eigen::Vector2d(a.offset, b.offset);
 }
 
-/// Root mean square of the corner's two coordinates' standard deviations, from the lines that meet there.
-double CornerSigma(const std::array<Side, 4>& sides, const std::array<SideFit, 4>& fits, std::size_t corner) {
+/// Root mean square of the corner's two coordinates' standard deviations, from the lines that meet
+/// there.
+double CornerSigma(const std::array<Side, 4>& sides, const std::array<SideFit, 4>& fits,
+                   std::size_t corner) {
   const std::size_t before = (corner + 3) % 4;
   Eigen::Matrix2d m;
   m << sides[before].normal.transpose(), sides[corner].normal.transpose();
   const Eigen::Matrix2d inverse = m.inverse();
-  const Eigen::Vector2d variance(fits[before].ends_covariance(1, 1), fits[corner].ends_covariance(0, 0));
+  const Eigen::Vector2d variance(fits[before].ends_covariance(1, 1),
+                                 fits[corner].ends_covariance(0, 0));
   const double random = (inverse * variance.asDiagonal() * inverse.transpose()).trace() / 2;
-  // Neighbouring pixels err together (compression, interpolation in the camera), and the model is not the whole truth: on rendered images
-  // the errors are 1.0 to 1.3 times what independent noise would leave.
+  // Neighbouring pixels err together (compression, interpolation in the camera), and the model is
+  // not the whole truth: on rendered images the errors are 1.0 to 1.3 times what independent noise
+  // would leave.
   return std::hypot(1.25 * std::sqrt(random), kModelError_px);
 }
 
 }  // namespace
 
-std::optional<CornerRefinement> RefineCorners(const cv::Mat& gray, const ImageCorners& initial, const MarkerPattern& pattern,
+std::optional<CornerRefinement> RefineCorners(const cv::Mat& gray, const ImageCorners& initial,
+                                              const MarkerPattern& pattern,
                                               const CornerRefinementOptions& options) {
   if (gray.empty() || gray.type() != CV_8UC1) {
     throw std::invalid_argument(
-        fmt::format("corner refinement needs an 8-bit grey image, got {} x {} of type {}", gray.cols, gray.rows, gray.type()));
+        fmt::format("corner refinement needs an 8-bit grey image, got {} x {} of type {}",
+                    gray.cols, gray.rows, gray.type()));
   }
   for (const Eigen::Vector2d& p : initial) {
     if (!(p.x() > -1 && p.y() > -1 && p.x() < gray.cols && p.y() < gray.rows)) return std::nullopt;
@@ -398,7 +441,9 @@ std::optional<CornerRefinement> RefineCorners(const cv::Mat& gray, const ImageCo
   for (int round = 0; round < kOuterRounds; ++round) {
     for (int k = 0; k < 4; ++k) {
       const auto i = static_cast<std::size_t>(k);
-      const double along = 0.5 * (fits[(i + 1) % 4].blur_px + fits[(i + 3) % 4].blur_px);  // the neighbours' blur runs along this side
+      const double along =
+          0.5 * (fits[(i + 1) % 4].blur_px +
+                 fits[(i + 3) % 4].blur_px);  // the neighbours' blur runs along this side
       std::optional<Side> side = MakeSide(result.corners, k, pattern, along, options.intrinsics);
       if (!side) return std::nullopt;
       sides[i] = *std::move(side);
@@ -409,14 +454,16 @@ std::optional<CornerRefinement> RefineCorners(const cv::Mat& gray, const ImageCo
     ImageCorners next;
     for (std::size_t i = 0; i < 4; ++i) {
       const std::size_t before = (i + 3) % 4;
-      const std::optional<Eigen::Vector2d> corner = Intersection(LineOf(sides[before], fits[before]), LineOf(sides[i], fits[i]));
+      const std::optional<Eigen::Vector2d> corner =
+          Intersection(LineOf(sides[before], fits[before]), LineOf(sides[i], fits[i]));
       if (!corner) return std::nullopt;
       next[i] = *corner;
       moved = std::max(moved, (next[i] - result.corners[i]).norm());
     }
     result.corners = next;
     for (const Eigen::Vector2d& p : next) {
-      if (!(p.x() > -2 && p.y() > -2 && p.x() < gray.cols + 1 && p.y() < gray.rows + 1)) return std::nullopt;
+      if (!(p.x() > -2 && p.y() > -2 && p.x() < gray.cols + 1 && p.y() < gray.rows + 1))
+        return std::nullopt;
     }
     if (round > 0 && moved < kConverged_px) break;
   }

@@ -33,17 +33,21 @@ double ValueAt(const cv::Mat& gray, double x, double y) {
   const double fy = y - y0;
   const std::uint8_t* upper = gray.ptr<std::uint8_t>(y0) + x0;
   const std::uint8_t* lower = gray.ptr<std::uint8_t>(y0 + 1) + x0;
-  return (1 - fy) * ((1 - fx) * upper[0] + fx * upper[1]) + fy * ((1 - fx) * lower[0] + fx * lower[1]);
+  return (1 - fy) * ((1 - fx) * upper[0] + fx * upper[1]) +
+         fy * ((1 - fx) * lower[0] + fx * lower[1]);
 }
 
 /// Mean grey of every cell's middle, row-major. False if the square leaves the image.
-bool SampleCells(const cv::Mat& gray, const Eigen::Matrix3d& cells_to_pixel, int cells, std::array<float, kMaxCells * kMaxCells>& values) {
-  constexpr std::array<double, 2> kPlaces[] = {{0.35, 0.35}, {0.65, 0.35}, {0.35, 0.65}, {0.65, 0.65}};
+bool SampleCells(const cv::Mat& gray, const Eigen::Matrix3d& cells_to_pixel, int cells,
+                 std::array<float, kMaxCells * kMaxCells>& values) {
+  constexpr std::array<double, 2> kPlaces[] = {
+      {0.35, 0.35}, {0.65, 0.35}, {0.35, 0.65}, {0.65, 0.65}};
   for (int row = 0; row < cells; ++row) {
     for (int column = 0; column < cells; ++column) {
       double sum = 0;
       for (const auto& place : kPlaces) {
-        const Eigen::Vector3d p = cells_to_pixel * Eigen::Vector3d(column + place[0], row + place[1], 1);
+        const Eigen::Vector3d p =
+            cells_to_pixel * Eigen::Vector3d(column + place[0], row + place[1], 1);
         const double x = p.x() / p.z();
         const double y = p.y() / p.z();
         if (!(x >= 0 && y >= 0 && x < gray.cols - 1 && y < gray.rows - 1)) return false;
@@ -73,7 +77,8 @@ std::optional<float> Threshold(const float* values, int count) {
     if (between > best) {
       best = between;
       best_gap = gap;
-      threshold = 0.5F * (sorted[static_cast<std::size_t>(i - 1)] + sorted[static_cast<std::size_t>(i)]);
+      threshold =
+          0.5F * (sorted[static_cast<std::size_t>(i - 1)] + sorted[static_cast<std::size_t>(i)]);
     }
   }
   if (best_gap < kMinContrast) return std::nullopt;
@@ -93,7 +98,8 @@ MarkerDecoder::MarkerDecoder(const MarkerDictionary& dictionary, int max_wrong_b
   }
 }
 
-std::optional<DecodedMarker> MarkerDecoder::Decode(const cv::Mat& gray, const ImageCorners& corners) const {
+std::optional<DecodedMarker> MarkerDecoder::Decode(const cv::Mat& gray,
+                                                   const ImageCorners& corners) const {
   const int cells = bits_per_side_ + 2;
   const std::optional<Eigen::Matrix3d> cells_to_pixel = SquareToQuad(cells, corners);
   if (!cells_to_pixel) return std::nullopt;
@@ -130,7 +136,8 @@ std::optional<DecodedMarker> MarkerDecoder::Decode(const cv::Mat& gray, const Im
   marker.id = best->id;
   marker.wrong_bits = best_distance;
   // A print turned clockwise k times has its top-left corner k places further on, clockwise.
-  for (std::size_t k = 0; k < 4; ++k) marker.corners[k] = corners[(k + static_cast<std::size_t>(best->turns)) % 4];
+  for (std::size_t k = 0; k < 4; ++k)
+    marker.corners[k] = corners[(k + static_cast<std::size_t>(best->turns)) % 4];
   return marker;
 }
 

@@ -23,13 +23,16 @@ struct DecodedMarker {
 /// Matches squares against one dictionary. Immutable; safe to share between threads.
 class MarkerDecoder {
  public:
-  /// @param max_wrong_bits  Code cells that may differ; above half the dictionary's distance codes are confused.
+  /// @param max_wrong_bits  Code cells that may differ; above half the dictionary's distance codes
+  /// are confused.
   MarkerDecoder(const MarkerDictionary& dictionary, int max_wrong_bits);
 
   /// @param gray     CV_8UC1.
   /// @param corners  Of the black square, clockwise as seen, any of them first.
-  /// @return nothing if the square has no black border, too little contrast or no code of the dictionary.
-  [[nodiscard]] std::optional<DecodedMarker> Decode(const cv::Mat& gray, const ImageCorners& corners) const;
+  /// @return nothing if the square has no black border, too little contrast or no code of the
+  /// dictionary.
+  [[nodiscard]] std::optional<DecodedMarker> Decode(const cv::Mat& gray,
+                                                    const ImageCorners& corners) const;
 
  private:
   struct Rotated {

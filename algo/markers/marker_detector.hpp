@@ -7,7 +7,7 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include "algo/types/intrinsics.hpp"
+#include "algo/base/intrinsics.hpp"
 #include "algo/types/marker.hpp"
 #include "algo/types/marker_dictionary.hpp"
 
@@ -15,31 +15,37 @@ namespace plumb {
 
 /// Parameters of MarkerDetector. Lengths in pixels of the image that is searched.
 struct MarkerDetectorOptions {
-  double min_side_px = 14.0;   ///< Markers with a shorter mean side are not reported; >= 8.
-  double border_px = 1.0;      ///< A marker with a corner nearer than this to the image border is not reported; >= 0.
+  double min_side_px = 14.0;  ///< Markers with a shorter mean side are not reported; >= 8.
+  double border_px =
+      1.0;  ///< A marker with a corner nearer than this to the image border is not reported; >= 0.
   bool refine_corners = true;  ///< False: the corners as detected, to about half a pixel.
-  bool linear_light = true;    ///< Undo the sRGB tone curve for the refinement; see CornerRefinementOptions.
-  std::optional<Intrinsics> intrinsics = std::nullopt;  ///< If given, the refinement allows for the bow that the lens puts on the sides.
+  bool linear_light =
+      true;  ///< Undo the sRGB tone curve for the refinement; see CornerRefinementOptions.
+  std::optional<Intrinsics> intrinsics = std::nullopt;  ///< If given, the refinement allows for the
+                                                        ///< bow that the lens puts on the sides.
 };
 
 /// What one image showed.
 struct MarkerDetection {
   std::vector<MarkerObservation> markers;  ///< Ascending by id, each id once.
-  std::vector<int> duplicate_ids;          ///< Ids seen more than once in this image, ascending: none of them is reported.
+  std::vector<int> duplicate_ids;  ///< Ids seen more than once in this image, ascending: none of
+                                   ///< them is reported.
 };
 
-/// Detects the markers of one dictionary. Stateless between images: Detect() may run on several threads at once and gives
-/// the same bits for the same image.
+/// Detects the markers of one dictionary. Stateless between images: Detect() may run on several
+/// threads at once and gives the same bits for the same image.
 class MarkerDetector {
  public:
   /// @throws std::invalid_argument if an option is out of range.
-  explicit MarkerDetector(const MarkerDictionary& dictionary, const MarkerDetectorOptions& options = {});
+  explicit MarkerDetector(const MarkerDictionary& dictionary,
+                          const MarkerDetectorOptions& options = {});
   ~MarkerDetector();
   MarkerDetector(MarkerDetector&&) noexcept;
   MarkerDetector& operator=(MarkerDetector&&) noexcept;
 
-  /// Markers in an image, CV_8UC1 or CV_8UC3 (red, green, blue). Corners are in pixels, centres at integers, in detector
-  /// order, as seen (distorted); markers that are partly covered or cut by the border are not reported.
+  /// Markers in an image, CV_8UC1 or CV_8UC3 (red, green, blue). Corners are in pixels, centres at
+  /// integers, in detector order, as seen (distorted); markers that are partly covered or cut by
+  /// the border are not reported.
   /// @throws std::invalid_argument for an empty image or another type.
   [[nodiscard]] MarkerDetection Detect(const cv::Mat& gray_or_rgb) const;
 

@@ -17,8 +17,10 @@ constexpr double kOutlineToEdge_px = 0.5;
 
 Eigen::Vector2d ToVector(const cv::Point& p) { return {p.x, p.y}; }
 
-/// Indices of the four vertices of an outline in its own order, or nothing if it has another number.
-std::optional<std::array<std::size_t, 4>> FourVertices(const Outline& outline, double tolerance_px) {
+/// Indices of the four vertices of an outline in its own order, or nothing if it has another
+/// number.
+std::optional<std::array<std::size_t, 4>> FourVertices(const Outline& outline,
+                                                       double tolerance_px) {
   std::vector<cv::Point> vertices;
   cv::approxPolyDP(outline, vertices, tolerance_px, true);
   if (vertices.size() != 4 || !cv::isContourConvex(vertices)) return std::nullopt;
@@ -31,7 +33,8 @@ std::optional<std::array<std::size_t, 4>> FourVertices(const Outline& outline, d
   return indices;
 }
 
-/// Total least squares line n . p = c through the middle part of the outline from one vertex to the next.
+/// Total least squares line n . p = c through the middle part of the outline from one vertex to the
+/// next.
 struct Line {
   Eigen::Vector2d normal;
   double offset = 0;
@@ -57,7 +60,8 @@ std::optional<Line> FitSide(const Outline& outline, std::size_t from, std::size_
   return Line{normal, normal.dot(base + mean)};
 }
 
-/// True for the outer outline of a dark region, false for the rim of a hole in one: OpenCV traces them in opposite directions.
+/// True for the outer outline of a dark region, false for the rim of a hole in one: OpenCV traces
+/// them in opposite directions.
 bool IsOuter(const Outline& outline, const std::array<std::size_t, 4>& vertices) {
   double area = 0;  // positive: clockwise as seen
   for (std::size_t k = 0; k < 4; ++k) {
@@ -71,26 +75,30 @@ bool IsOuter(const Outline& outline, const std::array<std::size_t, 4>& vertices)
 /// Corners from lines along the four runs of the outline, clockwise as seen.
 std::optional<ImageCorners> FitQuad(const Outline& outline, std::array<std::size_t, 4> vertices) {
   // approxPolyDP keeps the outline's direction, so vertex k and k+1 bound one run of points.
-  const Eigen::Vector2d centre = 0.25 * (ToVector(outline[vertices[0]]) + ToVector(outline[vertices[1]]) + ToVector(outline[vertices[2]]) +
-                                         ToVector(outline[vertices[3]]));
+  const Eigen::Vector2d centre =
+      0.25 * (ToVector(outline[vertices[0]]) + ToVector(outline[vertices[1]]) +
+              ToVector(outline[vertices[2]]) + ToVector(outline[vertices[3]]));
   std::array<Line, 4> lines;
   for (std::size_t k = 0; k < 4; ++k) {
     const std::optional<Line> line = FitSide(outline, vertices[k], vertices[(k + 1) % 4]);
     if (!line) return std::nullopt;
     // Outline pixels are the last dark ones: the edge runs half a pixel outside them.
-    const double outside = line->normal.dot(centre) < line->offset ? kOutlineToEdge_px : -kOutlineToEdge_px;
+    const double outside =
+        line->normal.dot(centre) < line->offset ? kOutlineToEdge_px : -kOutlineToEdge_px;
     lines[k] = {line->normal, line->offset + outside};
   }
   ImageCorners corners;
   for (std::size_t k = 0; k < 4; ++k) {
     const Line& before = lines[(k + 3) % 4];
     const Line& after = lines[k];
-    const double determinant = before.normal.x() * after.normal.y() - before.normal.y() * after.normal.x();
+    const double determinant =
+        before.normal.x() * after.normal.y() - before.normal.y() * after.normal.x();
     const Eigen::Vector2d vertex = ToVector(outline[vertices[k]]);
     corners[k] = vertex;
     if (std::abs(determinant) > 0.1) {
-      const Eigen::Vector2d meet((before.offset * after.normal.y() - after.offset * before.normal.y()) / determinant,
-                                 (before.normal.x() * after.offset - after.normal.x() * before.offset) / determinant);
+      const Eigen::Vector2d meet(
+          (before.offset * after.normal.y() - after.offset * before.normal.y()) / determinant,
+          (before.normal.x() * after.offset - after.normal.x() * before.offset) / determinant);
       if ((meet - vertex).norm() < 6) corners[k] = meet;
     }
   }
@@ -98,12 +106,14 @@ std::optional<ImageCorners> FitQuad(const Outline& outline, std::array<std::size
   return corners;
 }
 
-bool Plausible(const ImageCorners& corners, const cv::Size& size, const QuadFinderOptions& options) {
+bool Plausible(const ImageCorners& corners, const cv::Size& size,
+               const QuadFinderOptions& options) {
   double sum = 0;
   double shortest = 1e9;
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector2d& p = corners[k];
-    if (!(p.x() >= options.border_px && p.y() >= options.border_px && p.x() <= size.width - 1 - options.border_px &&
+    if (!(p.x() >= options.border_px && p.y() >= options.border_px &&
+          p.x() <= size.width - 1 - options.border_px &&
           p.y() <= size.height - 1 - options.border_px)) {
       return false;
     }
@@ -118,7 +128,8 @@ bool Plausible(const ImageCorners& corners, const cv::Size& size, const QuadFind
 
 std::vector<ImageCorners> FindDarkQuads(const cv::Mat& gray, const QuadFinderOptions& options) {
   cv::Mat dark;
-  cv::adaptiveThreshold(gray, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, options.window_px, options.min_darkness);
+  cv::adaptiveThreshold(gray, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV,
+                        options.window_px, options.min_darkness);
   std::vector<Outline> outlines;
   cv::findContours(dark, outlines, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
 
@@ -129,8 +140,11 @@ std::vector<ImageCorners> FindDarkQuads(const cv::Mat& gray, const QuadFinderOpt
     if (outline.size() < min_points) continue;
     const auto points = static_cast<double>(outline.size());
     const cv::Rect box = cv::boundingRect(outline);
-    if (std::max(box.width, box.height) < 0.7 * options.min_side_px || points > 4.5 * (box.width + box.height)) continue;
-    const std::optional<std::array<std::size_t, 4>> vertices = FourVertices(outline, std::max(1.5, 0.03 * points));
+    if (std::max(box.width, box.height) < 0.7 * options.min_side_px ||
+        points > 4.5 * (box.width + box.height))
+      continue;
+    const std::optional<std::array<std::size_t, 4>> vertices =
+        FourVertices(outline, std::max(1.5, 0.03 * points));
     if (!vertices || !IsOuter(outline, *vertices)) continue;
     const std::optional<ImageCorners> corners = FitQuad(outline, *vertices);
     if (corners && Plausible(*corners, gray.size(), options)) quads.push_back(*corners);

@@ -14,20 +14,26 @@
 namespace plumb {
 namespace {
 
-constexpr double kCellsPerSpacing = 1.5;  // cell side over spacing: measured fastest of 0.5, 1 and 1.5
+constexpr double kCellsPerSpacing =
+    1.5;  // cell side over spacing: measured fastest of 0.5, 1 and 1.5
 
 using Points = std::vector<Eigen::Vector3f>;
 
 void Check(std::span<const PointCloud> clouds, const GlobalIcpOptions& options) {
   if (options.num_iterations < 1)
-    throw std::invalid_argument(fmt::format("global ICP: number of iterations is {}, must be at least 1", options.num_iterations));
-  if (!(options.min_radius > 0.0 && options.min_radius <= options.max_radius && std::isfinite(options.max_radius)))
+    throw std::invalid_argument(fmt::format(
+        "global ICP: number of iterations is {}, must be at least 1", options.num_iterations));
+  if (!(options.min_radius > 0.0 && options.min_radius <= options.max_radius &&
+        std::isfinite(options.max_radius)))
     throw std::invalid_argument(
-        fmt::format("global ICP: radii must satisfy 0 < min ({} m) <= max ({} m)", options.min_radius, options.max_radius));
+        fmt::format("global ICP: radii must satisfy 0 < min ({} m) <= max ({} m)",
+                    options.min_radius, options.max_radius));
   if (!(options.subsample_spacing >= 0.0 && std::isfinite(options.subsample_spacing)))
-    throw std::invalid_argument(fmt::format("global ICP: subsample spacing {} m is not a distance", options.subsample_spacing));
+    throw std::invalid_argument(fmt::format("global ICP: subsample spacing {} m is not a distance",
+                                            options.subsample_spacing));
   for (std::size_t j = 0; j < clouds.size(); ++j) {
-    if (clouds[j].empty()) throw std::invalid_argument(fmt::format("global ICP: cloud {} is empty", j));
+    if (clouds[j].empty())
+      throw std::invalid_argument(fmt::format("global ICP: cloud {} is empty", j));
   }
 }
 
@@ -35,7 +41,8 @@ std::vector<Points> Subsample(std::span<const PointCloud> clouds, const GlobalIc
   std::vector<Points> subsampled(clouds.size());
   tbb::parallel_for(std::size_t{0}, clouds.size(), [&](std::size_t j) {
     try {
-      const auto kept = PoissonDiskSubset(clouds[j].points, options.subsample_spacing, options.seed + static_cast<unsigned>(j));
+      const auto kept = PoissonDiskSubset(clouds[j].points, options.subsample_spacing,
+                                          options.seed + static_cast<unsigned>(j));
       subsampled[j].reserve(kept.size());
       for (const std::uint32_t i : kept) subsampled[j].push_back(clouds[j].points[i]);
     } catch (const std::invalid_argument& error) {
@@ -45,12 +52,14 @@ std::vector<Points> Subsample(std::span<const PointCloud> clouds, const GlobalIc
   return subsampled;
 }
 
-/// Cells for the neighbour search: several clouds overlap, so other clouds' points are nearer than a cloud's own.
+/// Cells for the neighbour search: several clouds overlap, so other clouds' points are nearer than
+/// a cloud's own.
 double CellSize(const GlobalIcpOptions& options) {
-  return options.subsample_spacing > 0.0 ? kCellsPerSpacing * options.subsample_spacing : options.min_radius;
+  return options.subsample_spacing > 0.0 ? kCellsPerSpacing * options.subsample_spacing
+                                         : options.min_radius;
 }
 
-/// What one cloud found in one iteration.
+/// The correspondences of one cloud in one iteration.
 struct CloudStep {
   Pose T_new_old = Pose::Identity();
   double sum_squared = 0.0;
@@ -62,7 +71,8 @@ class CloudMatcher {
  public:
   explicit CloudMatcher(std::size_t num_points) : memory_(num_points) {}
 
-  CloudStep Step(std::size_t cloud, const CloudNeighbours& neighbours, const Points& points, float radius) {
+  CloudStep Step(std::size_t cloud, const CloudNeighbours& neighbours, const Points& points,
+                 float radius) {
     from_.clear();
     to_.clear();
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -73,7 +83,8 @@ class CloudMatcher {
     }
     CloudStep step;
     step.num_pairs = static_cast<int>(from_.size());
-    for (std::size_t k = 0; k < from_.size(); ++k) step.sum_squared += (from_[k] - to_[k]).squaredNorm();
+    for (std::size_t k = 0; k < from_.size(); ++k)
+      step.sum_squared += (from_[k] - to_[k]).squaredNorm();
     step.T_new_old = FitRigid(to_, from_).T_a_b;  // identity where the pairs determine none
     return step;
   }
@@ -87,10 +98,12 @@ class CloudMatcher {
 void MoveTo(const Pose& T_refined_world, const Points& original, Points& moved) {
   const Eigen::Matrix3d R = T_refined_world.linear();
   const Eigen::Vector3d t = T_refined_world.translation();
-  for (std::size_t i = 0; i < original.size(); ++i) moved[i] = (R * original[i].cast<double>() + t).cast<float>();
+  for (std::size_t i = 0; i < original.size(); ++i)
+    moved[i] = (R * original[i].cast<double>() + t).cast<float>();
 }
 
-/// Mean of rotations (chordal) about the mean of the clouds' centroids, and mean displacement of the centroids.
+/// Mean of rotations (chordal) about the mean of the clouds' centroids, and mean displacement of
+/// the centroids.
 Pose MeanMotion(const std::vector<Pose>& T_refined_world, const std::vector<Points>& clouds) {
   Eigen::Matrix3d sum_of_rotations = Eigen::Matrix3d::Zero();
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -113,7 +126,8 @@ Pose MeanMotion(const std::vector<Pose>& T_refined_world, const std::vector<Poin
 
 }  // namespace
 
-GlobalIcpResult RefinePoses(std::span<const PointCloud> clouds_in_world, const GlobalIcpOptions& options, const std::stop_token& stop,
+GlobalIcpResult RefinePoses(std::span<const PointCloud> clouds_in_world,
+                            const GlobalIcpOptions& options, const std::stop_token& stop,
                             const std::function<void(double fraction)>& progress) {
   Check(clouds_in_world, options);
   const std::size_t num_clouds = clouds_in_world.size();
@@ -133,7 +147,8 @@ GlobalIcpResult RefinePoses(std::span<const PointCloud> clouds_in_world, const G
   std::vector<CloudStep> steps(num_clouds);
   for (int iteration = 0; iteration < options.num_iterations; ++iteration) {
     tbb::parallel_for(std::size_t{0}, num_clouds, [&](std::size_t j) {
-      if (!stop.stop_requested()) steps[j] = matchers[j].Step(j, neighbours, current[j], static_cast<float>(radius));
+      if (!stop.stop_requested())
+        steps[j] = matchers[j].Step(j, neighbours, current[j], static_cast<float>(radius));
     });
     if (stop.stop_requested()) {
       result.cancelled = true;

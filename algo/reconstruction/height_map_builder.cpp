@@ -41,19 +41,27 @@ GridShape HeightMapOptions::Grid() const {
   return grid;
 }
 
-HeightMap PaperHeightMap(std::span<const PointCloud> clouds_in_marker, const HeightMapOptions& options) {
-  return PaperHeightMap(clouds_in_marker, std::vector<Pose>(clouds_in_marker.size(), Pose::Identity()), options);
+HeightMap PaperHeightMap(std::span<const PointCloud> clouds_in_marker,
+                         const HeightMapOptions& options) {
+  return PaperHeightMap(clouds_in_marker,
+                        std::vector<Pose>(clouds_in_marker.size(), Pose::Identity()), options);
 }
 
-HeightMap PaperHeightMap(std::span<const PointCloud> clouds, std::span<const Pose> T_marker_cloud, const HeightMapOptions& options) {
-  if (clouds.size() != T_marker_cloud.size()) throw std::invalid_argument("height map: there is not one pose a cloud");
+HeightMap PaperHeightMap(std::span<const PointCloud> clouds, std::span<const Pose> T_marker_cloud,
+                         const HeightMapOptions& options) {
+  if (clouds.size() != T_marker_cloud.size())
+    throw std::invalid_argument("height map: there is not one pose a cloud");
   const GridShape grid = options.Grid();
-  if (!(options.top_surface_band > 0.0)) throw std::invalid_argument("height map: the top surface band is not positive");
+  if (!(options.top_surface_band > 0.0))
+    throw std::invalid_argument("height map: the top surface band is not positive");
   const float band = static_cast<float>(options.top_surface_band);
 
-  // Each cloud's points sorted by bands of rows, so that bands can be worked on apart and in cloud order.
-  const std::size_t num_bands = static_cast<std::size_t>((grid.height + kMaxRowsPerBand - 1) / kMaxRowsPerBand);
-  const std::size_t cells_per_band = static_cast<std::size_t>(kMaxRowsPerBand) * static_cast<std::size_t>(grid.width);
+  // Each cloud's points sorted by bands of rows, so that bands can be worked on apart and in cloud
+  // order.
+  const std::size_t num_bands =
+      static_cast<std::size_t>((grid.height + kMaxRowsPerBand - 1) / kMaxRowsPerBand);
+  const std::size_t cells_per_band =
+      static_cast<std::size_t>(kMaxRowsPerBand) * static_cast<std::size_t>(grid.width);
   std::vector<std::vector<std::vector<CellPoint>>> points(clouds.size());
   tbb::parallel_for(std::size_t{0}, clouds.size(), [&](std::size_t j) {
     const Eigen::Matrix3f R = T_marker_cloud[j].linear().cast<float>();
@@ -64,7 +72,8 @@ HeightMap PaperHeightMap(std::span<const PointCloud> clouds, std::span<const Pos
       const Eigen::Vector3f p = R * p_cloud + t;
       if (!std::isfinite(p.z())) continue;
       if (const auto cell = grid.cell(p.x(), p.y()))
-        points[j][*cell / cells_per_band].push_back({static_cast<std::uint32_t>(*cell % cells_per_band), p.z()});
+        points[j][*cell / cells_per_band].push_back(
+            {static_cast<std::uint32_t>(*cell % cells_per_band), p.z()});
     }
   });
 
@@ -97,7 +106,8 @@ HeightMap PaperHeightMap(std::span<const PointCloud> clouds, std::span<const Pos
       }
     }
     for (std::size_t c = 0; c < num_cells; ++c)
-      if (num_means[c] > 0) map.z[first_cell + c] = sum_of_means[c] / static_cast<float>(num_means[c]);
+      if (num_means[c] > 0)
+        map.z[first_cell + c] = sum_of_means[c] / static_cast<float>(num_means[c]);
   });
   return map;
 }

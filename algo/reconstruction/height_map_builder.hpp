@@ -6,15 +6,16 @@
 #include <stop_token>
 #include <vector>
 
+#include "algo/base/units.hpp"
 #include "algo/reconstruction/view_surface.hpp"
 #include "algo/types/height_map.hpp"
 #include "algo/types/keyframe.hpp"
 #include "algo/types/point_cloud.hpp"
-#include "algo/types/units.hpp"
 
 namespace plumb {
 
-/// Parameters of PaperHeightMap(); the defaults are the paper's. Lengths in metres, reference marker's frame.
+/// Parameters of PaperHeightMap(); the defaults are the paper's. Lengths in metres, reference
+/// marker's frame.
 struct HeightMapOptions {
   double x_min = -0.1;
   double x_max = 2.0;
@@ -24,30 +25,36 @@ struct HeightMapOptions {
   double top_surface_band = 3 * kCentimetre;  ///< t
 
   /// Half-open cells: 1400 x 800 with the defaults.
-  /// @throws std::invalid_argument if the crop is empty, a value is not finite or the grid exceeds 64 million cells.
+  /// @throws std::invalid_argument if the crop is empty, a value is not finite or the grid exceeds
+  /// 64 million cells.
   [[nodiscard]] GridShape Grid() const;
 };
 
-/// The height map as published (paper, Eqs. height_map and heightmap_h): per cloud and cell the mean z of the points
-/// within the band below the cloud's highest point there; then the mean over the clouds that hold the cell.
-/// Points outside the crop and points that are not finite are ignored.
+/// The height map as published (paper, Eqs. height_map and heightmap_h): per cloud and cell the
+/// mean z of the points within the band below the cloud's highest point there; then the mean over
+/// the clouds that hold the cell. Points outside the crop and points that are not finite are
+/// ignored.
 /// @param clouds_in_marker  One a keyframe, in the reference marker's frame (z out of the print).
 /// @throws std::invalid_argument as HeightMapOptions::Grid(), or if the band is not positive.
 /// Deterministic, whatever the number of threads.
-[[nodiscard]] HeightMap PaperHeightMap(std::span<const PointCloud> clouds_in_marker, const HeightMapOptions& options = {});
+[[nodiscard]] HeightMap PaperHeightMap(std::span<const PointCloud> clouds_in_marker,
+                                       const HeightMapOptions& options = {});
 
-/// The same for clouds that are moved on the way: p_marker = T_marker_cloud[j] * p. Saves a copy of the clouds.
+/// The same for clouds that are moved on the way: p_marker = T_marker_cloud[j] * p. Saves a copy of
+/// the clouds.
 /// @throws std::invalid_argument also if there is not one pose a cloud.
-[[nodiscard]] HeightMap PaperHeightMap(std::span<const PointCloud> clouds, std::span<const Pose> T_marker_cloud,
+[[nodiscard]] HeightMap PaperHeightMap(std::span<const PointCloud> clouds,
+                                       std::span<const Pose> T_marker_cloud,
                                        const HeightMapOptions& options = {});
 
 /// Parameters of RobustHeightMap(). Lengths in metres, reference marker's frame.
 struct RobustHeightMapOptions {
   double cell_size = 1.5 * kMillimetre;
-  std::optional<GridShape> grid = std::nullopt;  ///< Fixed grid; none: around the data, cell borders at multiples of cell_size.
-  double max_extent = 4.0;                       ///< Of a grid found from the data, each way.
-  double z_min = -0.3;                           ///< Height crop: floor under a couch, ...
-  double z_max = 0.8;                            ///< ... hands, cables, lamps above the body.
+  std::optional<GridShape> grid =
+      std::nullopt;  ///< Fixed grid; none: around the data, cell borders at multiples of cell_size.
+  double max_extent = 4.0;  ///< Of a grid found from the data, each way.
+  double z_min = -0.3;      ///< Height crop: floor under a couch, ...
+  double z_max = 0.8;       ///< ... hands, cables, lamps above the body.
   double top_surface_band = 3 * kCentimetre;
   int min_views = 2;             ///< Views that must agree on a cell (no more than there are).
   double min_patch_area = 4e-4;  ///< Square metres; smaller separate patches are speckles.
@@ -63,16 +70,18 @@ struct ColoredHeightMap {
 
 /// The top surface over all views together.
 ///
-/// Coarse cells (4 x 4 fine ones) find the top: the highest band that several measurements support, not the highest
-/// point. Small separate patches are dropped. Then every fine cell is a seed on the coarse cell's plane that
-/// is moved to the robust, noise-weighted mean of what the views measured there (ViewFusion), so that a cell's height
-/// is sampled at its centre and a keyframe that saw something lower has no say. Nothing is filled: cells outside
-/// measured coarse cells stay NaN.
+/// Coarse cells (4 x 4 fine ones) find the top: the highest band that several measurements support,
+/// not the highest point. Small separate patches are dropped. Then every fine cell is a seed on the
+/// coarse cell's plane that is moved to the robust, noise-weighted mean of what the views measured
+/// there (ViewFusion), so that a cell's height is sampled at its centre and a keyframe that saw
+/// something lower has no say. Nothing is filled: cells outside measured coarse cells stay NaN.
 ///
 /// @param views_in_marker  Prepared views whose "world" is the reference marker's frame.
 /// @throws std::invalid_argument if an option is out of range.
 /// Deterministic, whatever the number of threads.
-[[nodiscard]] ColoredHeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker, const RobustHeightMapOptions& options = {});
-[[nodiscard]] ColoredHeightMap RobustHeightMap(std::span<const DepthView> views_in_marker, const RobustHeightMapOptions& options = {});
+[[nodiscard]] ColoredHeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker,
+                                               const RobustHeightMapOptions& options = {});
+[[nodiscard]] ColoredHeightMap RobustHeightMap(std::span<const DepthView> views_in_marker,
+                                               const RobustHeightMapOptions& options = {});
 
 }  // namespace plumb

@@ -8,8 +8,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "algo/base/check_stop.hpp"
 #include "algo/tracking/keyframe_link.hpp"
-#include "algo/types/check_stop.hpp"
 
 namespace plumb {
 namespace {
@@ -51,7 +51,8 @@ Sensor MakeSensor(const Intrinsics& stated, const CalibrationModel& calibration)
   return sensor;
 }
 
-std::vector<CalibratedView> MakeViews(const Sensor& sensor, const CalibrationModel& calibration, const TrackingMap& map) {
+std::vector<CalibratedView> MakeViews(const Sensor& sensor, const CalibrationModel& calibration,
+                                      const TrackingMap& map) {
   std::vector<CalibratedView> views(map.keyframes.size());
   if (map.keyframes.empty()) return views;
   const DenseView& first = map.keyframes[0].dense;
@@ -63,13 +64,16 @@ std::vector<CalibratedView> MakeViews(const Sensor& sensor, const CalibrationMod
       const double x = (c + 0.5) * first.window_px - 0.5;
       const double y = (r + 0.5) * first.window_px - 0.5;
       rays[i] = Undistort(sensor.depth, {x, y}).cast<float>();
-      centred[i] = CentredCoordinates(x, y, sensor.stated.width, sensor.stated.height).cast<float>();
+      centred[i] =
+          CentredCoordinates(x, y, sensor.stated.width, sensor.stated.height).cast<float>();
     }
   }
-  // Rows are read one after the other: each cell is moved to where the camera at the stamp would have it.
+  // Rows are read one after the other: each cell is moved to where the camera at the stamp would
+  // have it.
   const auto readout_s = static_cast<float>(calibration.depth[8]);
   std::vector<float> row_share;
-  for (int r = 0; r < first.height; ++r) row_share.push_back((static_cast<float>(r) + 0.5F) / static_cast<float>(first.height) - 0.5F);
+  for (int r = 0; r < first.height; ++r)
+    row_share.push_back((static_cast<float>(r) + 0.5F) / static_cast<float>(first.height) - 0.5F);
   tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t k) {
     const MapKeyframe& keyframe = map.keyframes[k];
     CalibratedView& view = views[k];
@@ -85,7 +89,8 @@ std::vector<CalibratedView> MakeViews(const Sensor& sensor, const CalibrationMod
     for (std::size_t i = 0; i < view.points.size(); ++i) {
       const float z = keyframe.dense.z_m[i];
       if (z <= 0) continue;
-      const auto corrected = static_cast<float>(calibration.CorrectedDepth(z, centred[i].cast<double>()));
+      const auto corrected =
+          static_cast<float>(calibration.CorrectedDepth(z, centred[i].cast<double>()));
       const Eigen::Vector3f p(rays[i].x() * corrected, rays[i].y() * corrected, corrected);
       const float late_s = row_share[i / static_cast<std::size_t>(view.width)] * readout_s;
       view.points[i] = p + late_s * (w.cross(p) + v);
@@ -94,9 +99,11 @@ std::vector<CalibratedView> MakeViews(const Sensor& sensor, const CalibrationMod
   return views;
 }
 
-// Projects cells of one view into another. Calls visit(cell in a, cell in b, q: the point in b's depth camera).
+// Projects cells of one view into another. Calls visit(cell in a, cell in b, q: the point in b's
+// depth camera).
 template <typename Visit>
-void ForEachProjected(const Sensor& sensor, const CalibratedView& a, const CalibratedView& b, int phase, int stride, const Visit& visit) {
+void ForEachProjected(const Sensor& sensor, const CalibratedView& a, const CalibratedView& b,
+                      int phase, int stride, const Visit& visit) {
   const Pose T_b_a = b.T_world_depth.inverse() * a.T_world_depth;
   const Eigen::Matrix3f R = T_b_a.linear().cast<float>();
   const Eigen::Vector3f t = T_b_a.translation().cast<float>();
@@ -125,10 +132,12 @@ struct Correspondence {
   Eigen::Vector3f normal;  // b's depth camera.
 };
 
-std::optional<Correspondence> Correspond(const CalibratedView& a, const CalibratedView& b, std::size_t i, std::size_t j,
-                                         const Eigen::Vector3f& q, const Eigen::Matrix3f& R_b_a, double gate_m) {
+std::optional<Correspondence> Correspond(const CalibratedView& a, const CalibratedView& b,
+                                         std::size_t i, std::size_t j, const Eigen::Vector3f& q,
+                                         const Eigen::Matrix3f& R_b_a, double gate_m) {
   const Eigen::Vector3f& n = b.keyframe->dense.normals[j];
-  if (n.isZero() || n.dot(R_b_a * a.keyframe->dense.normals[i]) < kMinNormalAgreement) return std::nullopt;
+  if (n.isZero() || n.dot(R_b_a * a.keyframe->dense.normals[i]) < kMinNormalAgreement)
+    return std::nullopt;
   const Eigen::Vector3f& p_b = b.points[j];
   Correspondence match;
   match.residual = n.dot(q - p_b);
@@ -144,7 +153,8 @@ std::optional<Correspondence> Correspond(const CalibratedView& a, const Calibrat
   return match;
 }
 
-std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistrationOptions& options, const std::vector<CalibratedView>& views,
+std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistrationOptions& options,
+                                    const std::vector<CalibratedView>& views,
                                     const std::stop_token& stop) {
   const std::size_t n = views.size();
   std::vector<std::vector<KeyframePair>> candidates(n);
@@ -160,20 +170,25 @@ std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistratio
       const int stride = 16;
       for (int r = stride / 2; r < views[a].height; r += stride)
         for (int c = stride / 2; c < views[a].width; c += stride)
-          tried += views[a].points[static_cast<std::size_t>(r * views[a].width + c)].z() > 0 ? 1 : 0;
-      ForEachProjected(sensor, views[a], views[b], 0, stride,
-                       [&](std::size_t i, std::size_t j, const Eigen::Vector3f& q, const Eigen::Matrix3f& R) {
-                         hits += Correspond(views[a], views[b], i, j, q, R, options.max_gate_m) ? 1 : 0;
-                       });
+          tried +=
+              views[a].points[static_cast<std::size_t>(r * views[a].width + c)].z() > 0 ? 1 : 0;
+      ForEachProjected(
+          sensor, views[a], views[b], 0, stride,
+          [&](std::size_t i, std::size_t j, const Eigen::Vector3f& q, const Eigen::Matrix3f& R) {
+            hits += Correspond(views[a], views[b], i, j, q, R, options.max_gate_m) ? 1 : 0;
+          });
       const double overlap = tried > 0 ? static_cast<double>(hits) / tried : 0.0;
-      if (overlap >= options.min_overlap) candidates[a].push_back({static_cast<int>(a), static_cast<int>(b), overlap});
+      if (overlap >= options.min_overlap)
+        candidates[a].push_back({static_cast<int>(a), static_cast<int>(b), overlap});
     }
     // Spread over the overlap range instead of the nearest only: far pairs are what stops drift.
-    std::stable_sort(candidates[a].begin(), candidates[a].end(), [](const auto& x, const auto& y) { return x.overlap > y.overlap; });
+    std::stable_sort(candidates[a].begin(), candidates[a].end(),
+                     [](const auto& x, const auto& y) { return x.overlap > y.overlap; });
     const auto wanted = static_cast<std::size_t>(options.max_pairs);
     if (candidates[a].size() > wanted) {
       std::vector<KeyframePair> spread;
-      for (std::size_t i = 0; i < wanted; ++i) spread.push_back(candidates[a][i * candidates[a].size() / wanted]);
+      for (std::size_t i = 0; i < wanted; ++i)
+        spread.push_back(candidates[a][i * candidates[a].size() / wanted]);
       candidates[a] = std::move(spread);
     }
   });
@@ -182,9 +197,10 @@ std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistratio
   return pairs;
 }
 
-// Derivative of a corrected point's position with the depth calibration, dotted with a direction m of its own camera.
-void AddDepthJacobian(const Sensor& sensor, const CalibratedView& view, std::size_t i, const Eigen::Vector3d& m, double sign,
-                      TermVector& J) {
+// Derivative of a corrected point's position with the depth calibration, dotted with a direction m
+// of its own camera.
+void AddDepthJacobian(const Sensor& sensor, const CalibratedView& view, std::size_t i,
+                      const Eigen::Vector3d& m, double sign, TermVector& J) {
   const Eigen::Vector3d p = view.points[i].cast<double>();
   const Eigen::Vector3d ray = p / p.z();
   const double z_raw = view.keyframe->dense.z_m[i];
@@ -203,8 +219,9 @@ void AddDepthJacobian(const Sensor& sensor, const CalibratedView& view, std::siz
   J[20] += along_motion * ((row + 0.5) / view.height - 0.5);
 }
 
-// A residual in metres of the scene shrinks with the scene, so the solver would shrink it: the residual is taken back to the
-// units of the measurement, r z_raw / z_corrected, and J follows. Returns that factor times the residual.
+// A residual in metres of the scene shrinks with the scene, so the solver would shrink it: the
+// residual is taken back to the units of the measurement, r z_raw / z_corrected, and J follows.
+// Returns that factor times the residual.
 double InRawUnits(const CalibratedView& view, std::size_t i, double residual, TermVector& J) {
   const double z_raw = view.keyframe->dense.z_m[i];
   const double z = view.points[i].z();
@@ -218,42 +235,49 @@ double InRawUnits(const CalibratedView& view, std::size_t i, double residual, Te
   return residual * factor;
 }
 
-double CauchyWeight(double residual_in_sigmas) { return 1.0 / (1.0 + residual_in_sigmas * residual_in_sigmas / 4.0); }
+double CauchyWeight(double residual_in_sigmas) {
+  return 1.0 / (1.0 + residual_in_sigmas * residual_in_sigmas / 4.0);
+}
 
-QuadraticTerm DenseTerm(const Sensor& sensor, const CalibratedView& a, const CalibratedView& b, const KeyframePair& pair, int phase,
-                        double gate_m, double weight) {
+QuadraticTerm DenseTerm(const Sensor& sensor, const CalibratedView& a, const CalibratedView& b,
+                        const KeyframePair& pair, int phase, double gate_m, double weight) {
   QuadraticTerm term;
   term.keyframe_a = pair.a;
   term.keyframe_b = pair.b;
   const Eigen::Matrix3d R_b_a = (b.T_world_depth.inverse() * a.T_world_depth).linear();
-  ForEachProjected(sensor, a, b, phase, 2, [&](std::size_t i, std::size_t j, const Eigen::Vector3f& q_b, const Eigen::Matrix3f& R) {
-    const auto match = Correspond(a, b, i, j, q_b, R, gate_m);
-    if (!match) return;
-    const Eigen::Vector3d n_b = match->normal.cast<double>();
-    const Eigen::Vector3d n_a = R_b_a.transpose() * n_b;
-    const Eigen::Vector3d p_color = a.T_color_depth * a.points[i].cast<double>();
-    const Eigen::Vector3d n_color_a = a.T_color_depth.linear() * n_a;
-    const Eigen::Vector3d q_color = b.T_color_depth * q_b.cast<double>();
-    const Eigen::Vector3d n_color_b = b.T_color_depth.linear() * n_b;
-    TermVector J = TermVector::Zero();
-    J.segment<3>(0) = p_color.cross(n_color_a);
-    J.segment<3>(3) = n_color_a;
-    J.segment<3>(6) = -q_color.cross(n_color_b);
-    J.segment<3>(9) = -n_color_b;
-    AddDepthJacobian(sensor, a, i, n_a, 1.0, J);
-    AddDepthJacobian(sensor, b, j, n_b, -1.0, J);
-    const double residual = InRawUnits(a, i, match->residual, J);
-    const double w = weight * CauchyWeight(residual / match->sigma) / (match->sigma * match->sigma);
-    term.H.selfadjointView<Eigen::Lower>().rankUpdate(J, w);
-    term.g.noalias() += w * residual * J;
-  });
+  ForEachProjected(
+      sensor, a, b, phase, 2,
+      [&](std::size_t i, std::size_t j, const Eigen::Vector3f& q_b, const Eigen::Matrix3f& R) {
+        const auto match = Correspond(a, b, i, j, q_b, R, gate_m);
+        if (!match) return;
+        const Eigen::Vector3d n_b = match->normal.cast<double>();
+        const Eigen::Vector3d n_a = R_b_a.transpose() * n_b;
+        const Eigen::Vector3d p_color = a.T_color_depth * a.points[i].cast<double>();
+        const Eigen::Vector3d n_color_a = a.T_color_depth.linear() * n_a;
+        const Eigen::Vector3d q_color = b.T_color_depth * q_b.cast<double>();
+        const Eigen::Vector3d n_color_b = b.T_color_depth.linear() * n_b;
+        TermVector J = TermVector::Zero();
+        J.segment<3>(0) = p_color.cross(n_color_a);
+        J.segment<3>(3) = n_color_a;
+        J.segment<3>(6) = -q_color.cross(n_color_b);
+        J.segment<3>(9) = -n_color_b;
+        AddDepthJacobian(sensor, a, i, n_a, 1.0, J);
+        AddDepthJacobian(sensor, b, j, n_b, -1.0, J);
+        const double residual = InRawUnits(a, i, match->residual, J);
+        const double w =
+            weight * CauchyWeight(residual / match->sigma) / (match->sigma * match->sigma);
+        term.H.selfadjointView<Eigen::Lower>().rankUpdate(J, w);
+        term.g.noalias() += w * residual * J;
+      });
   term.H.triangularView<Eigen::StrictlyUpper>() = term.H.transpose();
   return term;
 }
 
-// Depth measured on a marker's face lies on the marker's plane: what ties depth's scale to the markers' side.
-std::optional<QuadraticTerm> MarkerFaceTerm(const Sensor& sensor, const CalibratedView& view, int keyframe,
-                                            const MarkerObservation& observation, const MapMarker& marker, double half_side_m,
+// Depth measured on a marker's face lies on the marker's plane: what ties depth's scale to the
+// markers' side.
+std::optional<QuadraticTerm> MarkerFaceTerm(const Sensor& sensor, const CalibratedView& view,
+                                            int keyframe, const MarkerObservation& observation,
+                                            const MapMarker& marker, double half_side_m,
                                             double gate_m) {
   QuadraticTerm term;
   term.keyframe_a = keyframe;
@@ -268,13 +292,17 @@ std::optional<QuadraticTerm> MarkerFaceTerm(const Sensor& sensor, const Calibrat
   }
   const int window = view.keyframe->dense.window_px;
   int count = 0;
-  for (int r = std::max(1, static_cast<int>(low.y()) / window); r <= std::min(view.height - 2, static_cast<int>(high.y()) / window); ++r) {
-    for (int c = std::max(1, static_cast<int>(low.x()) / window); c <= std::min(view.width - 2, static_cast<int>(high.x()) / window); ++c) {
+  for (int r = std::max(1, static_cast<int>(low.y()) / window);
+       r <= std::min(view.height - 2, static_cast<int>(high.y()) / window); ++r) {
+    for (int c = std::max(1, static_cast<int>(low.x()) / window);
+         c <= std::min(view.width - 2, static_cast<int>(high.x()) / window); ++c) {
       const auto i = static_cast<std::size_t>(r * view.width + c);
       if (view.keyframe->dense.normals[i].isZero()) continue;
       const Eigen::Vector3d p = view.points[i].cast<double>();
       const Eigen::Vector3d in_marker = T_marker_depth * p;
-      if (std::abs(in_marker.x()) > 0.9 * half_side_m || std::abs(in_marker.y()) > 0.9 * half_side_m) continue;
+      if (std::abs(in_marker.x()) > 0.9 * half_side_m ||
+          std::abs(in_marker.y()) > 0.9 * half_side_m)
+        continue;
       if (std::abs(in_marker.z()) > gate_m) continue;
       const Eigen::Vector3d p_color = view.T_color_depth * p;
       const Eigen::Vector3d n_color = view.T_color_depth.linear() * n_depth;
@@ -300,24 +328,31 @@ std::optional<QuadraticTerm> MarkerFaceTerm(const Sensor& sensor, const Calibrat
 }
 
 // Median |point-to-plane| of cells that no solution used (the other checkerboard colour).
-double Consistency(const Sensor& sensor, const std::vector<CalibratedView>& views, const std::vector<KeyframePair>& pairs, double gate_m) {
+double Consistency(const Sensor& sensor, const std::vector<CalibratedView>& views,
+                   const std::vector<KeyframePair>& pairs, double gate_m) {
   std::vector<std::vector<float>> parts(pairs.size());
   tbb::parallel_for(std::size_t{0}, pairs.size(), [&](std::size_t p) {
     const CalibratedView& a = views[static_cast<std::size_t>(pairs[p].a)];
     const CalibratedView& b = views[static_cast<std::size_t>(pairs[p].b)];
-    ForEachProjected(sensor, a, b, 5, 4, [&](std::size_t i, std::size_t j, const Eigen::Vector3f& q, const Eigen::Matrix3f& R) {
-      if (const auto match = Correspond(a, b, i, j, q, R, gate_m)) parts[p].push_back(static_cast<float>(std::abs(match->residual)));
-    });
+    ForEachProjected(
+        sensor, a, b, 5, 4,
+        [&](std::size_t i, std::size_t j, const Eigen::Vector3f& q, const Eigen::Matrix3f& R) {
+          if (const auto match = Correspond(a, b, i, j, q, R, gate_m))
+            parts[p].push_back(static_cast<float>(std::abs(match->residual)));
+        });
   });
   std::vector<float> all;
   for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
   if (all.empty()) return 0.0;
-  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
+  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2),
+                   all.end());
   return all[all.size() / 2];
 }
 
-std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options, const TrackingMap& map,
-                                     const std::vector<CalibratedView>& views, const std::vector<KeyframePair>& pairs, double gate_m,
+std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
+                                     const TrackingMap& map,
+                                     const std::vector<CalibratedView>& views,
+                                     const std::vector<KeyframePair>& pairs, double gate_m,
                                      const std::stop_token& stop) {
   std::vector<int> uses(views.size(), 0);
   for (const KeyframePair& pair : pairs) {
@@ -330,16 +365,18 @@ std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrati
     const auto a = static_cast<std::size_t>(pairs[p].a);
     const auto b = static_cast<std::size_t>(pairs[p].b);
     // A keyframe's noise enters all its pairs: together they weigh as much as its cells once.
-    const double weight = options.dense_weight * 2.0 / std::sqrt(static_cast<double>(uses[a]) * uses[b]);
+    const double weight =
+        options.dense_weight * 2.0 / std::sqrt(static_cast<double>(uses[a]) * uses[b]);
     // Phases 0..3 of the 2x2 lattice except 3, which Consistency() holds out.
-    terms[p] = DenseTerm(sensor, views[a], views[b], pairs[p], static_cast<int>(p % 3), gate_m, weight);
+    terms[p] =
+        DenseTerm(sensor, views[a], views[b], pairs[p], static_cast<int>(p % 3), gate_m, weight);
   });
   for (std::size_t k = 0; k < views.size(); ++k) {
     for (const MarkerObservation& observation : map.keyframes[k].data.markers) {
       const auto marker = map.markers.find(observation.id);
       if (marker == map.markers.end()) continue;
-      auto term =
-          MarkerFaceTerm(sensor, views[k], static_cast<int>(k), observation, marker->second, options.marker_length_m / 2, gate_m + 0.03);
+      auto term = MarkerFaceTerm(sensor, views[k], static_cast<int>(k), observation, marker->second,
+                                 options.marker_length_m / 2, gate_m + 0.03);
       if (term) terms.push_back(std::move(*term));
     }
   }
@@ -348,7 +385,8 @@ std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrati
 
 // Tracking's word for the keyframes that too little else holds, appended to the terms.
 void AddTrackedLinks(const TrackingMap& map, std::vector<QuadraticTerm>& terms) {
-  // What a hand's next few centimetres are followed to by depth alone; against the hundreds of observations elsewhere it weighs nothing.
+  // What a hand's next few centimetres are followed to by depth alone; against the hundreds of
+  // observations elsewhere it weighs nothing.
   constexpr double kSigma_rad = 0.004;
   constexpr double kSigma_m = 0.006;
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
@@ -356,8 +394,9 @@ void AddTrackedLinks(const TrackingMap& map, std::vector<QuadraticTerm>& terms) 
     if (keyframe.previous < 0) continue;
     const MapKeyframe& previous = map.keyframes[static_cast<std::size_t>(keyframe.previous)];
     if (IsHeld(map, keyframe) && IsHeld(map, previous)) continue;
-    const LinkEquations link = Linearise({keyframe.previous, static_cast<int>(k), keyframe.T_previous_color}, previous.T_world_color,
-                                         keyframe.T_world_color, kSigma_rad, kSigma_m);
+    const LinkEquations link =
+        Linearise({keyframe.previous, static_cast<int>(k), keyframe.T_previous_color},
+                  previous.T_world_color, keyframe.T_world_color, kSigma_rad, kSigma_m);
     QuadraticTerm term;
     term.keyframe_a = keyframe.previous;
     term.keyframe_b = static_cast<int>(k);
@@ -374,7 +413,8 @@ Pose DepthPose(const MapKeyframe& keyframe, const CalibrationModel& calibration)
                    keyframe.data.depth_time_s - keyframe.data.color_time_s + calibration.depth[5]);
 }
 
-JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointRegistrationOptions& options, TrackingMap& map,
+JointRegistrationResult RegisterJointly(const Intrinsics& stated,
+                                        const JointRegistrationOptions& options, TrackingMap& map,
                                         const std::stop_token& stop) {
   JointRegistrationResult result;
   if (map.keyframes.size() < 2) return result;
@@ -397,7 +437,8 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointReg
   double gate_m = options.max_gate_m;
   std::vector<KeyframePair> pairs;
   bundle.max_iterations = 4;
-  // The dense terms know nothing of the lens: left free here it would follow what they do to the poses.
+  // The dense terms know nothing of the lens: left free here it would follow what they do to the
+  // poses.
   bundle.fix_lens = true;
   for (int round = 0; round < options.num_rounds; ++round) {
     CheckStop(stop);
@@ -412,7 +453,9 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointReg
     double farthest_m = 0.0;
     for (const CalibratedView& view : views)
       farthest_m =
-          std::max(farthest_m, (DepthPose(*view.keyframe, result.calibration).translation() - view.T_world_depth.translation()).norm());
+          std::max(farthest_m, (DepthPose(*view.keyframe, result.calibration).translation() -
+                                view.T_world_depth.translation())
+                                   .norm());
     if (farthest_m < options.settled_m) break;
     gate_m = std::max(options.min_gate_m, 0.6 * gate_m);
   }

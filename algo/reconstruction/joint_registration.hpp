@@ -1,4 +1,5 @@
-// All keyframes, landmarks, markers and the sensor's calibration in one least-squares problem with dense depth.
+// All keyframes, landmarks, markers and the sensor's calibration in one least-squares problem with
+// dense depth.
 #pragma once
 
 #include <stop_token>
@@ -9,33 +10,41 @@ namespace plumb {
 
 struct JointRegistrationOptions {
   double marker_length_m = 0.104;
-  bool calibrate = true;     ///< Estimate the sensor's calibration with the poses.
-  bool use_dense = true;     ///< false: keypoints and markers only.
-  int num_rounds = 5;        ///< Of association and solution.
-  double max_gate_m = 0.06;  ///< Farthest point-to-plane residual of the first round; shrinks by 0.6 a round.
+  bool calibrate = true;  ///< Estimate the sensor's calibration with the poses.
+  bool use_dense = true;  ///< false: keypoints and markers only.
+  int num_rounds = 5;     ///< Of association and solution.
+  double max_gate_m =
+      0.06;  ///< Farthest point-to-plane residual of the first round; shrinks by 0.6 a round.
   double min_gate_m = 0.012;
   double settled_m = 0.001;  ///< A round that moves no camera farther is the last one.
   int max_pairs = 8;         ///< Overlapping keyframes that each keyframe is registered against.
   double min_overlap = 0.2;  ///< Share of a keyframe's cells that fall into the other.
-  /// Of the dense terms against their noise model: what the model leaves out is shared by neighbouring cells and views.
+  /// Of the dense terms against their noise model: what the model leaves out is shared by
+  /// neighbouring cells and views.
   double dense_weight = 0.05;
-  /// Pixels at 640 columns. Far above the noise of one sighting: a track's error is common to its views.
+  /// Pixels at 640 columns. Far above the noise of one sighting: a track's error is common to its
+  /// views.
   double keypoint_sigma_px = 3.0;
   double keypoint_depth_sigmas = 4.0;  ///< In standard deviations of the noise model.
 };
 
 struct JointRegistrationResult {
   CalibrationModel calibration;
-  bool accepted = false;              ///< False: held-out points agreed better before; the map is as bundle adjustment left it.
-  double consistency_before_m = 0.0;  ///< Median point-to-plane residual of held-out cells between overlapping keyframes.
+  bool accepted = false;  ///< False: held-out points agreed better before; the map is as bundle
+                          ///< adjustment left it.
+  double consistency_before_m =
+      0.0;  ///< Median point-to-plane residual of held-out cells between overlapping keyframes.
   double consistency_after_m = 0.0;
   int num_pairs = 0;
 };
 
-/// Refines the map in place: bundle adjustment with the calibration free, then rounds of projective association (dense
-/// point-to-plane between overlapping keyframes, and depth on the markers' own faces) and joint solution. Keyframe 0 is the gauge.
-/// Deterministic whatever the number of threads. @throws Interrupted on a stop request.
-[[nodiscard]] JointRegistrationResult RegisterJointly(const Intrinsics& stated, const JointRegistrationOptions& options, TrackingMap& map,
+/// Refines the map in place: bundle adjustment with the calibration free, then rounds of projective
+/// association (dense point-to-plane between overlapping keyframes, and depth on the markers' own
+/// faces) and joint solution. Keyframe 0 is the gauge. Deterministic whatever the number of
+/// threads. @throws Interrupted on a stop request.
+[[nodiscard]] JointRegistrationResult RegisterJointly(const Intrinsics& stated,
+                                                      const JointRegistrationOptions& options,
+                                                      TrackingMap& map,
                                                       const std::stop_token& stop = {});
 
 /// Camera pose of a keyframe at its depth stamp.

@@ -8,11 +8,11 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "algo/base/check_stop.hpp"
+#include "algo/base/errors.hpp"
 #include "algo/geometry/back_projection.hpp"
 #include "algo/geometry/rigid_fit.hpp"
 #include "algo/markers/corner_depth.hpp"
-#include "algo/types/check_stop.hpp"
-#include "algo/types/errors.hpp"
 
 namespace plumb {
 namespace {
@@ -43,9 +43,13 @@ SceneMarker MeanMarker(const std::array<CornerSums, 4>& sums) {
     const double count = sums[k].count;
     marker.corners[k] = sums[k].sum / count;
     marker.num_views = std::min(marker.num_views, sums[k].count);
-    if (sums[k].count > 1) scatter += (sums[k].sum_squared - count * marker.corners[k].squaredNorm()) / (3.0 * (count - 1.0)) / 4.0;
+    if (sums[k].count > 1)
+      scatter += (sums[k].sum_squared - count * marker.corners[k].squaredNorm()) /
+                 (3.0 * (count - 1.0)) / 4.0;
   }
-  marker.sigma_m = marker.num_views > 1 ? std::max(kMinSigma, std::sqrt(std::max(0.0, scatter) / marker.num_views)) : kSingleViewSigma;
+  marker.sigma_m = marker.num_views > 1
+                       ? std::max(kMinSigma, std::sqrt(std::max(0.0, scatter) / marker.num_views))
+                       : kSingleViewSigma;
   return marker;
 }
 
@@ -58,7 +62,9 @@ std::vector<PointCloud> KeyframeClouds(std::span<const Keyframe> keyframes) {
     DepthView view = keyframes[j].view;
     view.color_rgb = cv::Mat();
     clouds[j] = BackProject(view, *rays[j]);
-    if (clouds[j].empty()) throw std::invalid_argument(fmt::format("keyframe clouds: keyframe {} has no valid depth", j));
+    if (clouds[j].empty())
+      throw std::invalid_argument(
+          fmt::format("keyframe clouds: keyframe {} has no valid depth", j));
     const Eigen::Matrix3f R = view.T_world_camera.linear().cast<float>();
     const Eigen::Vector3f t = view.T_world_camera.translation().cast<float>();
     for (Eigen::Vector3f& p : clouds[j].points) p = (R * p + t).eval();
@@ -66,15 +72,18 @@ std::vector<PointCloud> KeyframeClouds(std::span<const Keyframe> keyframes) {
   return clouds;
 }
 
-MarkerMap AverageMarkers(std::span<const Keyframe> keyframes, std::span<const Pose> T_refined_world, int depth_window_px) {
+MarkerMap AverageMarkers(std::span<const Keyframe> keyframes, std::span<const Pose> T_refined_world,
+                         int depth_window_px) {
   if (keyframes.size() != T_refined_world.size())
-    throw std::invalid_argument(fmt::format("marker map: {} poses for {} keyframes", T_refined_world.size(), keyframes.size()));
+    throw std::invalid_argument(fmt::format("marker map: {} poses for {} keyframes",
+                                            T_refined_world.size(), keyframes.size()));
   const auto rays = RaysOf(keyframes);
   std::map<int, std::array<CornerSums, 4>> sums;
   for (std::size_t j = 0; j < keyframes.size(); ++j) {
     const Pose T_refined_camera = T_refined_world[j] * keyframes[j].view.T_world_camera;
     for (const MarkerObservation& seen : keyframes[j].markers) {
-      const auto positions = PaperCornerPositions(seen, keyframes[j].view, *rays[j], depth_window_px);
+      const auto positions =
+          PaperCornerPositions(seen, keyframes[j].view, *rays[j], depth_window_px);
       for (std::size_t k = 0; k < 4; ++k) {
         if (!positions[k]) continue;
         const Eigen::Vector3d p = T_refined_camera * *positions[k];
@@ -87,13 +96,15 @@ MarkerMap AverageMarkers(std::span<const Keyframe> keyframes, std::span<const Po
   }
   MarkerMap markers;
   for (const auto& [id, corners] : sums) {
-    const bool complete = corners[0].count > 0 && corners[1].count > 0 && corners[2].count > 0 && corners[3].count > 0;
+    const bool complete = corners[0].count > 0 && corners[1].count > 0 && corners[2].count > 0 &&
+                          corners[3].count > 0;
     if (complete) markers.emplace(id, MeanMarker(corners));
   }
   return markers;
 }
 
-std::optional<Pose> ReferenceFrame(const MarkerMap& markers_in_world, int id, double marker_length_m) {
+std::optional<Pose> ReferenceFrame(const MarkerMap& markers_in_world, int id,
+                                   double marker_length_m) {
   const auto found = markers_in_world.find(id);
   if (found == markers_in_world.end()) return std::nullopt;
   const RigidFit fit = FitRigid(CornersInMarkerFrame(marker_length_m), found->second.corners);
@@ -101,17 +112,19 @@ std::optional<Pose> ReferenceFrame(const MarkerMap& markers_in_world, int id, do
   return fit.T_a_b;
 }
 
-HeightMap HeightMapOfKeyframes(std::span<const PointCloud> clouds_in_world, std::span<const Pose> T_refined_world,
-                               const Pose& T_marker_world, const HeightMapOptions& options) {
+HeightMap HeightMapOfKeyframes(std::span<const PointCloud> clouds_in_world,
+                               std::span<const Pose> T_refined_world, const Pose& T_marker_world,
+                               const HeightMapOptions& options) {
   std::vector<Pose> T_marker_cloud;
   T_marker_cloud.reserve(T_refined_world.size());
   for (const Pose& T : T_refined_world) T_marker_cloud.push_back(T_marker_world * T);
   return PaperHeightMap(clouds_in_world, T_marker_cloud, options);
 }
 
-PaperReconstruction ReconstructAsPublished(std::span<const Keyframe> keyframes, const PaperOptions& options, const std::stop_token& stop,
-                                           const std::function<void(std::string_view stage)>& on_stage,
-                                           const std::function<void(double fraction)>& progress) {
+PaperReconstruction ReconstructAsPublished(
+    std::span<const Keyframe> keyframes, const PaperOptions& options, const std::stop_token& stop,
+    const std::function<void(std::string_view stage)>& on_stage,
+    const std::function<void(double fraction)>& progress) {
   const auto enter = [&](std::string_view stage) {
     CheckStop(stop);
     if (on_stage) on_stage(stage);
@@ -124,12 +137,15 @@ PaperReconstruction ReconstructAsPublished(std::span<const Keyframe> keyframes, 
   result.T_refined_world = std::move(icp.T_refined_world);
   result.icp_rms_m = std::move(icp.rms_per_iteration);
   enter("markers");
-  result.markers_in_world = AverageMarkers(keyframes, result.T_refined_world, options.depth_window_px);
+  result.markers_in_world =
+      AverageMarkers(keyframes, result.T_refined_world, options.depth_window_px);
   if (options.reference_marker)
-    result.T_marker_world = ReferenceFrame(result.markers_in_world, *options.reference_marker, options.marker_length_m);
+    result.T_marker_world =
+        ReferenceFrame(result.markers_in_world, *options.reference_marker, options.marker_length_m);
   if (result.T_marker_world) {
     enter("height_map");
-    result.height_map = HeightMapOfKeyframes(clouds_in_world, result.T_refined_world, *result.T_marker_world, options.height_map);
+    result.height_map = HeightMapOfKeyframes(clouds_in_world, result.T_refined_world,
+                                             *result.T_marker_world, options.height_map);
   }
   enter("");
   return result;

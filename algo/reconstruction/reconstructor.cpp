@@ -9,6 +9,8 @@
 #include <tbb/parallel_for.h>
 #include <opencv2/core.hpp>
 
+#include "algo/base/check_stop.hpp"
+#include "algo/base/errors.hpp"
 #include "algo/geometry/back_projection.hpp"
 #include "algo/reconstruction/height_map_builder.hpp"
 #include "algo/reconstruction/joint_registration.hpp"
@@ -18,14 +20,13 @@
 #include "algo/reconstruction/trajectory.hpp"
 #include "algo/reconstruction/view_surface.hpp"
 #include "algo/tracking/tracker.hpp"
-#include "algo/types/check_stop.hpp"
-#include "algo/types/errors.hpp"
 
 namespace plumb {
 namespace {
 
 constexpr std::size_t kMaxPaperKeyframes = 20;  // The paper had about 15 a sweep.
-// Of the reference marker, before the scene's frame is built on it. A sensor that hardly moves has one keyframe, so frames count too.
+// Of the reference marker, before the scene's frame is built on it. A sensor that hardly moves has
+// one keyframe, so frames count too.
 constexpr int kMinReferenceViews = 3;
 constexpr int kMinReferenceFrames = 5;
 constexpr double kGapWorthTelling_s = 0.5;  // A comparison refuses above 1 s.
@@ -37,9 +38,10 @@ TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
   return tracking;
 }
 
-// Depth as the calibration corrects it, as a camera at the stamp would have measured it in one instant: each pixel takes its
-// value from where the moving camera's row saw that point.
-cv::Mat CorrectedDepth(const cv::Mat& depth_m, const CalibrationModel& calibration, const Intrinsics& intrinsics, const RayTable& rays,
+// Depth as the calibration corrects it, as a camera at the stamp would have measured it in one
+// instant: each pixel takes its value from where the moving camera's row saw that point.
+cv::Mat CorrectedDepth(const cv::Mat& depth_m, const CalibrationModel& calibration,
+                       const Intrinsics& intrinsics, const RayTable& rays,
                        const Vector6d& velocity_per_s) {
   cv::Mat corrected = cv::Mat::zeros(depth_m.size(), CV_32FC1);
   const Eigen::Vector3f w = velocity_per_s.head<3>().cast<float>();
@@ -50,18 +52,23 @@ cv::Mat CorrectedDepth(const cv::Mat& depth_m, const CalibrationModel& calibrati
     const float* here = depth_m.ptr<float>(r);
     float* out = corrected.ptr<float>(r);
     const Eigen::Vector2f* ray = rays.row(r);
-    const float late_s = static_cast<float>(calibration.depth[8] * ((r + 0.5) / depth_m.rows - 0.5));
+    const float late_s =
+        static_cast<float>(calibration.depth[8] * ((r + 0.5) / depth_m.rows - 0.5));
     for (int c = 0; c < depth_m.cols; ++c) {
       if (here[c] <= 0) continue;
       const Eigen::Vector3f p(ray[c].x() * here[c], ray[c].y() * here[c], here[c]);
       const Eigen::Vector3f moved = late_s * (w.cross(p) + v);
       // Where this row saw the point that the instant camera sees in this pixel.
-      const int x = c - static_cast<int>(std::lround(fx * (moved.x() - ray[c].x() * moved.z()) / here[c]));
-      const int y = r - static_cast<int>(std::lround(fy * (moved.y() - ray[c].y() * moved.z()) / here[c]));
+      const int x =
+          c - static_cast<int>(std::lround(fx * (moved.x() - ray[c].x() * moved.z()) / here[c]));
+      const int y =
+          r - static_cast<int>(std::lround(fy * (moved.y() - ray[c].y() * moved.z()) / here[c]));
       if (x < 0 || y < 0 || x >= depth_m.cols || y >= depth_m.rows) continue;
       const float z = depth_m.at<float>(y, x);
       if (z <= 0) continue;
-      const double metric = calibration.CorrectedDepth(z, CentredCoordinates(x, y, depth_m.cols, depth_m.rows)) + moved.z();
+      const double metric =
+          calibration.CorrectedDepth(z, CentredCoordinates(x, y, depth_m.cols, depth_m.rows)) +
+          moved.z();
       if (metric > 0) out[c] = static_cast<float>(metric);
     }
   }
@@ -77,15 +84,19 @@ double Median(std::vector<double> values) {
 // Why no point of the scene is left. The depth is the median over the frames' own.
 std::string WhyNoSurface(std::span<const ViewSurface> surfaces, double median_depth_m) {
   const ViewSurfaceOptions range;
-  const bool measured = std::any_of(surfaces.begin(), surfaces.end(), [](const ViewSurface& surface) {
-    return std::any_of(surface.pixels.begin(), surface.pixels.end(), [](const ViewSurface::Pixel& pixel) { return pixel.weight > 0; });
-  });
+  const bool measured =
+      std::any_of(surfaces.begin(), surfaces.end(), [](const ViewSurface& surface) {
+        return std::any_of(surface.pixels.begin(), surface.pixels.end(),
+                           [](const ViewSurface::Pixel& pixel) { return pixel.weight > 0; });
+      });
   if (measured)
     return fmt::format(
-        "no surface was seen alike by two of {} keyframes (depth {:.2f} m in the median): sweep slowly over a scene that stands still",
+        "no surface was seen alike by two of {} keyframes (depth {:.2f} m in the median): sweep "
+        "slowly over a scene that stands still",
         surfaces.size(), median_depth_m);
   return fmt::format(
-      "no usable surface in {} keyframes: depth is {:.2f} m in the median, expected from {:.1f} to {:.1f} m; check depth_scale in "
+      "no usable surface in {} keyframes: depth is {:.2f} m in the median, expected from {:.1f} to "
+      "{:.1f} m; check depth_scale in "
       "camera.yaml and "
       "the distance to the scene",
       surfaces.size(), median_depth_m, range.min_depth_m, range.max_depth_m);
@@ -103,16 +114,20 @@ struct Reconstructor::Impl {
   double finish_start_s = 0;
 
   Impl(const StreamInfo& stream, const ReconstructorOptions& reconstructor_options)
-      : info(stream), options(reconstructor_options), tracker(stream, TrackingOptions(reconstructor_options)) {}
+      : info(stream),
+        options(reconstructor_options),
+        tracker(stream, TrackingOptions(reconstructor_options)) {}
 
   [[nodiscard]] double Now() const { return options.now_s ? options.now_s() : 0.0; }
 
   TrackingReport AddFrame(const Frame& frame) {
-    if (frame.color_rgb.cols != info.intrinsics.width || frame.color_rgb.rows != info.intrinsics.height ||
+    if (frame.color_rgb.cols != info.intrinsics.width ||
+        frame.color_rgb.rows != info.intrinsics.height ||
         frame.depth_m.size() != frame.color_rgb.size())
-      throw DataError(fmt::format("frame {}: images are {}x{} (colour) and {}x{} (depth), the calibration is for {}x{}", frame.index,
-                                  frame.color_rgb.cols, frame.color_rgb.rows, frame.depth_m.cols, frame.depth_m.rows, info.intrinsics.width,
-                                  info.intrinsics.height));
+      throw DataError(fmt::format(
+          "frame {}: images are {}x{} (colour) and {}x{} (depth), the calibration is for {}x{}",
+          frame.index, frame.color_rgb.cols, frame.color_rgb.rows, frame.depth_m.cols,
+          frame.depth_m.rows, info.intrinsics.width, info.intrinsics.height));
     TrackingReport report;
     DepthStatistics(frame.depth_m, report);
     const double start = Now();
@@ -146,17 +161,23 @@ struct Reconstructor::Impl {
     median_depths_m.push_back(report.median_depth_m);
   }
 
-  // ---- after the last frame --------------------------------------------------------------------------------------
+  // ---- after the last frame
+  // --------------------------------------------------------------------------------------
 
   void CheckInput(const std::vector<TrackedFrame>& frames) const {
     if (frames.size() < 2)
-      throw DataError(fmt::format("the recording has {} usable frame(s), a scene needs at least 2: record a sweep", frames.size()));
+      throw DataError(fmt::format(
+          "the recording has {} usable frame(s), a scene needs at least 2: record a sweep",
+          frames.size()));
     if (median_depths_m.empty())
       throw DataError(
-          fmt::format("all {} depth images are empty (0 everywhere): check the sensor's depth stream and depth_scale", frames.size()));
+          fmt::format("all {} depth images are empty (0 everywhere): check the sensor's depth "
+                      "stream and depth_scale",
+                      frames.size()));
   }
 
-  Scene Finish(const std::stop_token& stop, const std::function<void(double, std::string_view)>& progress) {
+  Scene Finish(const std::stop_token& stop,
+               const std::function<void(double, std::string_view)>& progress) {
     const double start = Now();
     const auto report = [&](double fraction, std::string_view what) {
       CheckStop(stop);
@@ -166,8 +187,10 @@ struct Reconstructor::Impl {
     CheckInput(frames);
     TrackingMap map = tracker.TakeMap();
     if (map.keyframes.empty())
-      throw DataError(fmt::format(
-          "none of {} frames shows a marker or a surface: check that the sensor looks at the scene from 0.5 to 1.5 m", frames.size()));
+      throw DataError(
+          fmt::format("none of {} frames shows a marker or a surface: check that the sensor looks "
+                      "at the scene from 0.5 to 1.5 m",
+                      frames.size()));
     RefreshVelocities(frames, map);
 
     Scene scene;
@@ -179,9 +202,11 @@ struct Reconstructor::Impl {
     report(0.9, "mesh");
     double stage = Now();
     if (scene.height_map)
-      scene.mesh = MeshOfHeightMap(*scene.height_map, ColorsFromCloud(*scene.height_map, scene.cloud), {.decimation = 2});
+      scene.mesh = MeshOfHeightMap(
+          *scene.height_map, ColorsFromCloud(*scene.height_map, scene.cloud), {.decimation = 2});
     scene.timings_s["mesh"] = Now() - stage;
-    if (!tracking_times_s.empty()) scene.timings_s["tracking_per_frame_median"] = Median(tracking_times_s);
+    if (!tracking_times_s.empty())
+      scene.timings_s["tracking_per_frame_median"] = Median(tracking_times_s);
     scene.timings_s["after_last_frame"] = Now() - start;
     report(1.0, "done");
     return scene;
@@ -189,13 +214,14 @@ struct Reconstructor::Impl {
 
   using Report = std::function<void(double, std::string_view)>;
 
-  void ReconstructBest(const std::vector<TrackedFrame>& frames, TrackingMap& map, Scene& scene, const std::stop_token& stop,
-                       const Report& report) const {
+  void ReconstructBest(const std::vector<TrackedFrame>& frames, TrackingMap& map, Scene& scene,
+                       const std::stop_token& stop, const Report& report) const {
     report(0.0, "registration");
     double stage = Now();
     JointRegistrationOptions joint_options;
     joint_options.marker_length_m = info.marker_length_m;
-    const JointRegistrationResult joint = RegisterJointly(info.intrinsics, joint_options, map, stop);
+    const JointRegistrationResult joint =
+        RegisterJointly(info.intrinsics, joint_options, map, stop);
     const double solved = Now();
     scene = MakeScene(frames, map, joint.calibration, SceneFromWorld(map));
     WarnOfFrame(map, scene);
@@ -203,15 +229,19 @@ struct Reconstructor::Impl {
     scene.calibration["consistency_before_m"] = joint.consistency_before_m;
     scene.calibration["consistency_after_m"] = joint.consistency_after_m;
     if (!joint.accepted && joint.num_pairs > 0)
-      scene.warnings.push_back("the dense registration did not make the views agree better and was left out");
+      scene.warnings.push_back(
+          "the dense registration did not make the views agree better and was left out");
     scene.timings_s["global_registration"] = solved - stage;
-    scene.timings_s["markers"] = Now() - solved;  // The joint solve has done their work: this puts them into the scene's frame.
+    scene.timings_s["markers"] =
+        Now() -
+        solved;  // The joint solve has done their work: this puts them into the scene's frame.
 
     report(0.5, "surface");
     stage = Now();
     ViewSurfaceOptions view_options;
     view_options.stop = stop;
-    const std::vector<ViewSurface> surfaces = PrepareViews(Views(map, joint.calibration, SceneFromWorld(map)), view_options);
+    const std::vector<ViewSurface> surfaces =
+        PrepareViews(Views(map, joint.calibration, SceneFromWorld(map)), view_options);
     SurfaceCloudOptions cloud_options;
     cloud_options.with_colors = options.keep_color;
     cloud_options.stop = stop;
@@ -224,21 +254,23 @@ struct Reconstructor::Impl {
     RobustHeightMapOptions map_options;
     map_options.stop = stop;
     map_options.with_colors = false;  // The mesh takes its colours from the cloud.
-    if (scene.frame == SceneFrame::kReferenceMarker) KeepHeightMap(RobustHeightMap(surfaces, map_options).map, scene);
+    if (scene.frame == SceneFrame::kReferenceMarker)
+      KeepHeightMap(RobustHeightMap(surfaces, map_options).map, scene);
     scene.timings_s["height_map"] = Now() - stage;
   }
 
-  // The published chain: tracking with its own bundle adjustment, then Algorithm 1 on a few keyframes, single-pixel
-  // corners, means of means. The sensor is taken at its word.
-  void ReconstructPaper(const std::vector<TrackedFrame>& frames, TrackingMap& map, Scene& scene, const std::stop_token& stop,
-                        const Report& report) const {
+  // The published chain: tracking with its own bundle adjustment, then Algorithm 1 on a few
+  // keyframes, single-pixel corners, means of means. The sensor is taken at its word.
+  void ReconstructPaper(const std::vector<TrackedFrame>& frames, TrackingMap& map, Scene& scene,
+                        const std::stop_token& stop, const Report& report) const {
     report(0.0, "registration");
     const double start = Now();
     JointRegistrationOptions joint_options;
     joint_options.marker_length_m = info.marker_length_m;
     joint_options.calibrate = false;
     joint_options.use_dense = false;
-    const CalibrationModel stated = RegisterJointly(info.intrinsics, joint_options, map, stop).calibration;
+    const CalibrationModel stated =
+        RegisterJointly(info.intrinsics, joint_options, map, stop).calibration;
     scene.timings_s["bundle_adjustment"] = Now() - start;
     const std::vector<Keyframe> keyframes = PaperKeyframes(map, stated);
     PaperOptions paper_options;
@@ -257,7 +289,8 @@ struct Reconstructor::Impl {
           stage = Now();
         },
         [&](double fraction) { report(0.1 + 0.6 * fraction, "global ICP"); });
-    const Pose T_scene_world = paper.T_marker_world.value_or(map.keyframes.front().T_world_color.inverse());
+    const Pose T_scene_world =
+        paper.T_marker_world.value_or(map.keyframes.front().T_world_color.inverse());
     timings.merge(scene.timings_s);
     scene = MakeScene(frames, map, stated, T_scene_world);
     scene.timings_s = timings;
@@ -276,25 +309,29 @@ struct Reconstructor::Impl {
       views.push_back(std::move(view));
     }
     scene.cloud = MergeSurface(views, {.with_colors = options.keep_color, .stop = stop});
-    if (scene.cloud.empty()) throw DataError(WhyNoSurface(PrepareViews(views), Median(median_depths_m)));
+    if (scene.cloud.empty())
+      throw DataError(WhyNoSurface(PrepareViews(views), Median(median_depths_m)));
     if (paper.height_map) KeepHeightMap(*paper.height_map, scene);
   }
 
-  // Only a map that shows something: one without cells cannot even be stored, and an empty one compares with nothing.
+  // Only a map that shows something: one without cells cannot even be stored, and an empty one
+  // compares with nothing.
   static void KeepHeightMap(HeightMap map, Scene& scene) {
     if (std::any_of(map.z.begin(), map.z.end(), [](float z) { return std::isfinite(z); })) {
       scene.height_map = std::move(map);
       return;
     }
-    scene.warnings.push_back(
-        fmt::format("no surface was measured around reference marker {}, up to some decimetres below and above it: the scene has no height "
-                    "map and cannot be a reference; lay the marker flat beside the body and sweep over both",
-                    scene.reference_marker.value_or(-1)));
+    scene.warnings.push_back(fmt::format(
+        "no surface was measured around reference marker {}, up to some decimetres below and above "
+        "it: the scene has no height "
+        "map and cannot be a reference; lay the marker flat beside the body and sweep over both",
+        scene.reference_marker.value_or(-1)));
   }
 
-  // Evenly spread over the sweep; of each stretch the keyframe that sees the most markers, because a marker is known from these
-  // few keyframes alone.
-  static std::vector<Keyframe> PaperKeyframes(const TrackingMap& map, const CalibrationModel& stated) {
+  // Evenly spread over the sweep; of each stretch the keyframe that sees the most markers, because
+  // a marker is known from these few keyframes alone.
+  static std::vector<Keyframe> PaperKeyframes(const TrackingMap& map,
+                                              const CalibrationModel& stated) {
     std::vector<Keyframe> keyframes;
     const std::size_t step = (map.keyframes.size() + kMaxPaperKeyframes - 1) / kMaxPaperKeyframes;
     for (std::size_t first = 0; first < map.keyframes.size(); first += step) {
@@ -314,38 +351,44 @@ struct Reconstructor::Impl {
   [[nodiscard]] bool HasReferenceMarker(const TrackingMap& map) const {
     if (!info.reference_marker) return false;
     const auto found = map.markers.find(*info.reference_marker);
-    return found != map.markers.end() && (found->second.num_views >= kMinReferenceViews || found->second.num_frames >= kMinReferenceFrames);
+    return found != map.markers.end() && (found->second.num_views >= kMinReferenceViews ||
+                                          found->second.num_frames >= kMinReferenceFrames);
   }
 
   [[nodiscard]] Pose SceneFromWorld(const TrackingMap& map) const {
-    if (HasReferenceMarker(map)) return map.markers.at(*info.reference_marker).T_world_marker.inverse();
+    if (HasReferenceMarker(map))
+      return map.markers.at(*info.reference_marker).T_world_marker.inverse();
     return map.keyframes.front().T_world_color.inverse();
   }
 
-  Scene MakeScene(const std::vector<TrackedFrame>& frames, const TrackingMap& map, const CalibrationModel& calibration,
-                  const Pose& T_scene_world) const {
+  Scene MakeScene(const std::vector<TrackedFrame>& frames, const TrackingMap& map,
+                  const CalibrationModel& calibration, const Pose& T_scene_world) const {
     Scene scene;
     scene.preset = options.preset;
-    scene.frame = HasReferenceMarker(map) ? SceneFrame::kReferenceMarker : SceneFrame::kFirstKeyframe;
+    scene.frame =
+        HasReferenceMarker(map) ? SceneFrame::kReferenceMarker : SceneFrame::kFirstKeyframe;
     scene.marker_dictionary = info.marker_dictionary;
     scene.marker_length_m = info.marker_length_m;
     scene.reference_marker = info.reference_marker;
     scene.warnings = info.warnings;
     for (const MapKeyframe& keyframe : map.keyframes)
-      scene.keyframes.push_back({keyframe.data.depth_time_s, T_scene_world * DepthPose(keyframe, calibration)});
+      scene.keyframes.push_back(
+          {keyframe.data.depth_time_s, T_scene_world * DepthPose(keyframe, calibration)});
     scene.trajectory = DepthTrajectory(frames, map, calibration, T_scene_world);
     scene.frames_total = static_cast<std::int64_t>(frames.size()) + dropped;
     scene.frames_tracked = static_cast<std::int64_t>(scene.trajectory.size());
     scene.frames_dropped = dropped;
     scene.longest_lost_s = LongestLost(frames);
-    for (const auto& [id, marker] : map.markers) scene.markers[id] = ToSceneMarker(marker, T_scene_world);
+    for (const auto& [id, marker] : map.markers)
+      scene.markers[id] = ToSceneMarker(marker, T_scene_world);
     if (scene.frames_tracked < scene.frames_total - dropped) {
       scene.warnings.push_back(fmt::format("{} of {} frames were not tracked, {:.2f} s at longest",
-                                           scene.frames_total - dropped - scene.frames_tracked, scene.frames_total - dropped,
-                                           scene.longest_lost_s));
+                                           scene.frames_total - dropped - scene.frames_tracked,
+                                           scene.frames_total - dropped, scene.longest_lost_s));
     } else if (scene.longest_lost_s > kGapWorthTelling_s) {
-      scene.warnings.push_back(
-          fmt::format("no image came for {:.2f} s in the sweep; what the sensor passed meanwhile is missing", scene.longest_lost_s));
+      scene.warnings.push_back(fmt::format(
+          "no image came for {:.2f} s in the sweep; what the sensor passed meanwhile is missing",
+          scene.longest_lost_s));
     }
     return scene;
   }
@@ -353,39 +396,52 @@ struct Reconstructor::Impl {
   // On the frame that was decided in the end, which the presets do differently.
   void WarnOfFrame(const TrackingMap& map, Scene& scene) const {
     if (scene.markers.empty()) {
-      scene.warnings.push_back("no marker was seen: the scene lies in the first keyframe's frame and cannot be compared");
+      scene.warnings.push_back(
+          "no marker was seen: the scene lies in the first keyframe's frame and cannot be "
+          "compared");
     } else if (!info.reference_marker) {
-      scene.warnings.push_back("no reference marker is configured: the scene lies in the first keyframe's frame, without a height map");
+      scene.warnings.push_back(
+          "no reference marker is configured: the scene lies in the first keyframe's frame, "
+          "without a height map");
     } else if (scene.frame == SceneFrame::kFirstKeyframe && options.preset == Preset::kPaper) {
       scene.warnings.push_back(
-          fmt::format("no keyframe measured reference marker {} in depth at all its corners: the scene lies in the first keyframe's frame, "
+          fmt::format("no keyframe measured reference marker {} in depth at all its corners: the "
+                      "scene lies in the first keyframe's frame, "
                       "without a height map; keep the marker in view",
                       *info.reference_marker));
     } else if (scene.frame == SceneFrame::kFirstKeyframe) {
       const auto found = map.markers.find(*info.reference_marker);
       const MapMarker seen = found == map.markers.end() ? MapMarker{} : found->second;
-      scene.warnings.push_back(fmt::format(
-          "reference marker {} was seen in {} keyframes and {} tracked frames, {} or {} are needed: the scene lies in the first "
-          "keyframe's frame, without a height map; keep the marker in view",
-          *info.reference_marker, seen.num_views, seen.num_frames, kMinReferenceViews, kMinReferenceFrames));
-    } else if (const int views = scene.markers.at(*info.reference_marker).num_views; views < kMinReferenceViews) {
       scene.warnings.push_back(
-          fmt::format("reference marker {} was seen from {} place{} only: the scene's frame is less certain than that of a sweep",
+          fmt::format("reference marker {} was seen in {} keyframes and {} tracked frames, {} or "
+                      "{} are needed: the scene lies in the first "
+                      "keyframe's frame, without a height map; keep the marker in view",
+                      *info.reference_marker, seen.num_views, seen.num_frames, kMinReferenceViews,
+                      kMinReferenceFrames));
+    } else if (const int views = scene.markers.at(*info.reference_marker).num_views;
+               views < kMinReferenceViews) {
+      scene.warnings.push_back(
+          fmt::format("reference marker {} was seen from {} place{} only: the scene's frame is "
+                      "less certain than that of a sweep",
                       *info.reference_marker, views, views == 1 ? "" : "s"));
     }
   }
 
-  [[nodiscard]] SceneMarker ToSceneMarker(const MapMarker& marker, const Pose& T_scene_world) const {
+  [[nodiscard]] SceneMarker ToSceneMarker(const MapMarker& marker,
+                                          const Pose& T_scene_world) const {
     SceneMarker result;
     const MarkerCorners corners = CornersInMarkerFrame(info.marker_length_m);
-    for (std::size_t i = 0; i < 4; ++i) result.corners[i] = T_scene_world * (marker.T_world_marker * corners[i]);
+    for (std::size_t i = 0; i < 4; ++i)
+      result.corners[i] = T_scene_world * (marker.T_world_marker * corners[i]);
     result.num_views = marker.num_views;
-    // One view: a quarter of a pixel at arm's length, mostly in depth; more views average down to the map's own error.
+    // One view: a quarter of a pixel at arm's length, mostly in depth; more views average down to
+    // the map's own error.
     result.sigma_m = std::hypot(0.001, 0.004 / std::sqrt(std::max(1, marker.num_views)));
     return result;
   }
 
-  std::vector<DepthView> Views(TrackingMap& map, const CalibrationModel& calibration, const Pose& T_scene_world) const {
+  std::vector<DepthView> Views(TrackingMap& map, const CalibrationModel& calibration,
+                               const Pose& T_scene_world) const {
     std::vector<DepthView> views(map.keyframes.size());
     Intrinsics corrected = calibration.Corrected(info.intrinsics);
     const double scale = info.intrinsics.width / 640.0;
@@ -395,7 +451,8 @@ struct Reconstructor::Impl {
     tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t k) {
       MapKeyframe& keyframe = map.keyframes[k];
       views[k].intrinsics = corrected;
-      views[k].depth_m = CorrectedDepth(keyframe.data.view.depth_m, calibration, corrected, rays, keyframe.velocity_per_s);
+      views[k].depth_m = CorrectedDepth(keyframe.data.view.depth_m, calibration, corrected, rays,
+                                        keyframe.velocity_per_s);
       keyframe.data.view.depth_m.release();
       if (options.keep_color) views[k].color_rgb = keyframe.data.view.color_rgb;
       views[k].T_world_camera = T_scene_world * DepthPose(keyframe, calibration);
@@ -404,11 +461,13 @@ struct Reconstructor::Impl {
   }
 };
 
-Reconstructor::Reconstructor(const StreamInfo& info, const ReconstructorOptions& options) : impl_(std::make_unique<Impl>(info, options)) {}
+Reconstructor::Reconstructor(const StreamInfo& info, const ReconstructorOptions& options)
+    : impl_(std::make_unique<Impl>(info, options)) {}
 Reconstructor::~Reconstructor() = default;
 TrackingReport Reconstructor::AddFrame(const Frame& frame) { return impl_->AddFrame(frame); }
 void Reconstructor::CountDropped(int num_frames) { impl_->dropped += num_frames; }
-Scene Reconstructor::Finish(const std::stop_token& stop, const std::function<void(double, std::string_view)>& progress) {
+Scene Reconstructor::Finish(const std::stop_token& stop,
+                            const std::function<void(double, std::string_view)>& progress) {
   return impl_->Finish(stop, progress);
 }
 

@@ -18,27 +18,31 @@ struct ReconstructorOptions {
   bool use_keypoints = true;    ///< false: track by markers (and depth) alone.
   int num_icp_iterations = 20;  ///< Preset `paper`: iterations of Algorithm 1.
   unsigned seed = 1;            ///< Of random subsampling.
-  /// Wall clock in seconds for `Scene::timings_s`; none: no timings. The method itself never looks at a clock.
+  /// Wall clock in seconds for `Scene::timings_s`; none: no timings. The method itself never looks
+  /// at a clock.
   std::function<double()> now_s;
 };
 
-/// What tracking made of one frame; for guidance while sweeping.
+/// The outcome of tracking one frame; for guidance while sweeping.
 struct TrackingReport {
   bool tracked = false;
   bool is_keyframe = false;
-  int num_keypoints = 0;                   ///< Inlier landmarks.
-  int num_markers = 0;                     ///< Markers that took part.
-  Pose T_world_camera = Pose::Identity();  ///< At the depth stamp; live estimate in the tracker's own world.
-  double median_depth_m = 0;               ///< 0: no valid depth.
-  double valid_depth = 0;                  ///< Share of pixels with depth.
+  int num_keypoints = 0;  ///< Inlier landmarks.
+  int num_markers = 0;    ///< Markers that took part.
+  Pose T_world_camera =
+      Pose::Identity();       ///< At the depth stamp; live estimate in the tracker's own world.
+  double median_depth_m = 0;  ///< 0: no valid depth.
+  double valid_depth = 0;     ///< Share of pixels with depth.
 };
 
-/// Streams frames into a scene: AddFrame() tracks and prepares, so that Finish() has only the joint solve, the surfaces
-/// and the height map left. One thread calls; inside, work is spread over TBB's threads. Deterministic: same frames,
-/// same options, same scene bit for bit, whatever the number of threads.
+/// Streams frames into a scene: AddFrame() tracks and prepares, so that Finish() has only the joint
+/// solve, the surfaces and the height map left. One thread calls; inside, work is spread over TBB's
+/// threads. Deterministic: same frames, same options, same scene bit for bit, whatever the number
+/// of threads.
 class Reconstructor {
  public:
-  /// @throws DataError if the stream's marker dictionary is unknown or its intrinsics make no sense.
+  /// @throws DataError if the stream's marker dictionary is unknown or its intrinsics make no
+  /// sense.
   Reconstructor(const StreamInfo& info, const ReconstructorOptions& options);
   ~Reconstructor();
 
@@ -49,10 +53,12 @@ class Reconstructor {
   void CountDropped(int num_frames);
 
   /// The scene. Call once, last.
-  /// @throws DataError if nothing can be reconstructed: fewer than two frames, no valid depth anywhere.
+  /// @throws DataError if nothing can be reconstructed: fewer than two frames, no valid depth
+  /// anywhere.
   /// @throws Interrupted on a stop request.
-  [[nodiscard]] Scene Finish(const std::stop_token& stop = {},
-                             const std::function<void(double fraction, std::string_view what)>& progress = {});
+  [[nodiscard]] Scene Finish(
+      const std::stop_token& stop = {},
+      const std::function<void(double fraction, std::string_view what)>& progress = {});
 
  private:
   struct Impl;

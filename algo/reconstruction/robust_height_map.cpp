@@ -6,25 +6,31 @@
 
 #include <tbb/parallel_for.h>
 
+#include "algo/base/check_stop.hpp"
 #include "algo/reconstruction/height_map_builder.hpp"
 #include "algo/reconstruction/view_fusion.hpp"
-#include "algo/types/check_stop.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr int kCoarse = 4;                      // fine cells per coarse cell, each way: 6 mm, about 1.7 working pixels at 1 m
-constexpr int kTile = 8;                        // coarse cells per tile, each way: a tile's cells share one list of views
-constexpr double kExtentCell = 0.05;            // metres: raster on which the extent of the data is found
-constexpr int kMinExtentCount = 30;             // samples that make a raster cell count (a surface at 1 m gives 200 a view)
-constexpr std::size_t kMaxSamples = 1'500'000;  // for the coarse tops; views are thinned evenly to this
-constexpr float kMinTopShare = 0.2F;            // of a coarse cell's samples: what fewer support is not the top
+constexpr int kCoarse =
+    4;  // fine cells per coarse cell, each way: 6 mm, about 1.7 working pixels at 1 m
+constexpr int kTile = 8;  // coarse cells per tile, each way: a tile's cells share one list of views
+constexpr double kExtentCell = 0.05;  // metres: raster on which the extent of the data is found
+constexpr int kMinExtentCount =
+    30;  // samples that make a raster cell count (a surface at 1 m gives 200 a view)
+constexpr std::size_t kMaxSamples =
+    1'500'000;  // for the coarse tops; views are thinned evenly to this
+constexpr float kMinTopShare =
+    0.2F;  // of a coarse cell's samples: what fewer support is not the top
 constexpr std::size_t kMinTopCount = 2;
 constexpr float kMinNormalZ = 0.17F;  // flanks steeper than 80 deg have no height
 constexpr double kMaxCells = 64e6;
-constexpr int kMaxViews = 12;          // that are asked for one cell
-constexpr float kMaxMeanSlope = 2.0F;  // tan of 63 deg: over steeper squares means of corners are not trusted
-constexpr int kMinNeighbours = 5;      // of 8 measured coarse cells around an empty one: worth a try there
+constexpr int kMaxViews = 12;  // that are asked for one cell
+constexpr float kMaxMeanSlope =
+    2.0F;  // tan of 63 deg: over steeper squares means of corners are not trusted
+constexpr int kMinNeighbours =
+    5;  // of 8 measured coarse cells around an empty one: worth a try there
 
 /// A measured working pixel in a coarse cell.
 struct Sample {
@@ -51,20 +57,24 @@ struct Window {
   double last;
 };
 
-/// The stretch of the histogram that holds data, no longer than `max_extent` and around the origin where it must be cut.
-std::optional<Window> DataWindow(const std::vector<std::int64_t>& counts, double start, double max_extent) {
+/// The stretch of the histogram that holds data, no longer than `max_extent` and around the origin
+/// where it must be cut.
+std::optional<Window> DataWindow(const std::vector<std::int64_t>& counts, double start,
+                                 double max_extent) {
   const auto filled = [](std::int64_t count) { return count > 0; };
   const auto first = std::find_if(counts.begin(), counts.end(), filled);
   if (first == counts.end()) return std::nullopt;
   std::ptrdiff_t a = first - counts.begin();
   std::ptrdiff_t b = counts.rend() - std::find_if(counts.rbegin(), counts.rend(), filled);
-  const std::ptrdiff_t longest = std::max<std::ptrdiff_t>(1, static_cast<std::ptrdiff_t>(max_extent / kExtentCell));
+  const std::ptrdiff_t longest =
+      std::max<std::ptrdiff_t>(1, static_cast<std::ptrdiff_t>(max_extent / kExtentCell));
   if (b - a > longest) {
     // The window with most data among those that hold the marker.
     const std::ptrdiff_t origin = static_cast<std::ptrdiff_t>(-start / kExtentCell);
     std::int64_t best = -1;
     std::ptrdiff_t best_start = a;
-    for (std::ptrdiff_t s = std::max(a, origin - longest + 1); s <= std::min(b - longest, origin); ++s) {
+    for (std::ptrdiff_t s = std::max(a, origin - longest + 1); s <= std::min(b - longest, origin);
+         ++s) {
       std::int64_t sum = 0;
       for (std::ptrdiff_t i = s; i < s + longest; ++i) sum += counts[static_cast<std::size_t>(i)];
       if (sum > best) {
@@ -75,14 +85,20 @@ std::optional<Window> DataWindow(const std::vector<std::int64_t>& counts, double
     a = best_start;
     b = a + longest;
   }
-  return Window{start + static_cast<double>(a) * kExtentCell, start + static_cast<double>(b) * kExtentCell};
+  return Window{start + static_cast<double>(a) * kExtentCell,
+                start + static_cast<double>(b) * kExtentCell};
 }
 
-Eigen::Matrix3f RotationOf(const ViewSurface& view) { return view.T_world_camera.linear().cast<float>(); }
-Eigen::Vector3f TranslationOf(const ViewSurface& view) { return view.T_world_camera.translation().cast<float>(); }
+Eigen::Matrix3f RotationOf(const ViewSurface& view) {
+  return view.T_world_camera.linear().cast<float>();
+}
+Eigen::Vector3f TranslationOf(const ViewSurface& view) {
+  return view.T_world_camera.translation().cast<float>();
+}
 
 /// Grid around the samples' bounding box; nothing if there are none.
-std::optional<GridShape> GridAroundData(std::span<const ViewSurface> views, const RobustHeightMapOptions& options) {
+std::optional<GridShape> GridAroundData(std::span<const ViewSurface> views,
+                                        const RobustHeightMapOptions& options) {
   GridShape raster;
   raster.step = kExtentCell;
   raster.width = raster.height = 2 * static_cast<int>(std::ceil(options.max_extent / kExtentCell));
@@ -134,37 +150,45 @@ GridShape CoarseGrid(const GridShape& fine) {
 }
 
 /// Samples of one view, by rows of tiles.
-void SortIntoRows(const ViewSurface& view, std::uint32_t index, std::size_t stride, const GridShape& coarse,
-                  const RobustHeightMapOptions& options, std::vector<std::vector<Sample>>& rows) {
+void SortIntoRows(const ViewSurface& view, std::uint32_t index, std::size_t stride,
+                  const GridShape& coarse, const RobustHeightMapOptions& options,
+                  std::vector<std::vector<Sample>>& rows) {
   const Eigen::Matrix3f R = RotationOf(view);
   const Eigen::Vector3f t = TranslationOf(view);
   const std::size_t cells_per_row = static_cast<std::size_t>(coarse.width) * kTile;
-  // A stride that shares no factor with the image's width scatters the kept pixels over the columns.
+  // A stride that shares no factor with the image's width scatters the kept pixels over the
+  // columns.
   for (std::size_t i = index % stride; i < view.size(); i += stride) {
-    if (view.pixels[i].inverse_depth <= 0.0F) continue;  // rims and grazing views too: they show where something is, if not where exactly
+    if (view.pixels[i].inverse_depth <= 0.0F)
+      continue;  // rims and grazing views too: they show where something is, if not where exactly
     const Eigen::Vector3f p = R * view.PointInCamera(i) + t;
     if (p.z() < options.z_min || p.z() > options.z_max) continue;
     if (const auto cell = coarse.cell(p.x(), p.y()))
-      rows[*cell / cells_per_row].push_back(
-          {static_cast<std::uint32_t>(*cell % cells_per_row), p.z(), index, static_cast<std::uint32_t>(i)});
+      rows[*cell / cells_per_row].push_back({static_cast<std::uint32_t>(*cell % cells_per_row),
+                                             p.z(), index, static_cast<std::uint32_t>(i)});
   }
 }
 
-/// Different views among the samples; views 64 apart count as one, which only asks for more support.
+/// Different views among the samples; views 64 apart count as one, which only asks for more
+/// support.
 int NumViews(std::span<const Sample> samples) {
   std::uint64_t seen = 0;
   for (const Sample& sample : samples) seen |= std::uint64_t{1} << (sample.view % 64);
   return std::popcount(seen);
 }
 
-/// The highest band of samples that has support, as a plane. `samples` are those of one cell; they get reordered.
-TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, float band, int min_views) {
+/// The highest band of samples that has support, as a plane. `samples` are those of one cell; they
+/// get reordered.
+TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, float band,
+                 int min_views) {
   TopPlane top;
-  // Highest first; equal heights in input order, so that the order never depends on the sorting algorithm.
+  // Highest first; equal heights in input order, so that the order never depends on the sorting
+  // algorithm.
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
     return a.z != b.z ? a.z > b.z : (a.view != b.view ? a.view < b.view : a.pixel < b.pixel);
   });
-  const std::size_t needed = std::max(kMinTopCount, static_cast<std::size_t>(kMinTopShare * static_cast<float>(samples.size())));
+  const std::size_t needed = std::max(
+      kMinTopCount, static_cast<std::size_t>(kMinTopShare * static_cast<float>(samples.size())));
   std::size_t end = 0;
   for (std::size_t begin = 0; begin + needed <= samples.size(); ++begin) {
     end = std::max(end, begin);
@@ -193,7 +217,8 @@ TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, 
   return top;
 }
 
-CoarseMap FindTops(std::span<const ViewSurface> views, const GridShape& fine, const RobustHeightMapOptions& options) {
+CoarseMap FindTops(std::span<const ViewSurface> views, const GridShape& fine,
+                   const RobustHeightMapOptions& options) {
   CoarseMap map;
   map.grid = CoarseGrid(fine);
   map.cells.resize(map.grid.num_cells());
@@ -202,10 +227,12 @@ CoarseMap FindTops(std::span<const ViewSurface> views, const GridShape& fine, co
   std::size_t stride = (total + kMaxSamples - 1) / kMaxSamples;
   if (stride > 1) stride |= 1U;  // odd: no factor in common with the usual widths
   const std::size_t num_rows = static_cast<std::size_t>((map.grid.height + kTile - 1) / kTile);
-  std::vector<std::vector<std::vector<Sample>>> samples(views.size(), std::vector<std::vector<Sample>>(num_rows));
+  std::vector<std::vector<std::vector<Sample>>> samples(views.size(),
+                                                        std::vector<std::vector<Sample>>(num_rows));
   tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t v) {
     CheckStop(options.stop);
-    SortIntoRows(views[v], static_cast<std::uint32_t>(v), std::max<std::size_t>(1, stride), map.grid, options, samples[v]);
+    SortIntoRows(views[v], static_cast<std::uint32_t>(v), std::max<std::size_t>(1, stride),
+                 map.grid, options, samples[v]);
   });
   const float band = static_cast<float>(options.top_surface_band);
   const int min_views = std::min(options.min_views, static_cast<int>(views.size()));
@@ -223,19 +250,21 @@ CoarseMap FindTops(std::span<const ViewSurface> views, const GridShape& fine, co
     for (const auto& of_view : samples)
       for (const Sample& sample : of_view[row]) sorted[next[sample.cell]++] = sample;
     for (std::size_t c = 0; c < num_cells; ++c)
-      map.cells[first + c] = FindTop(std::span(sorted).subspan(starts[c], starts[c + 1] - starts[c]), views, band, min_views);
+      map.cells[first + c] = FindTop(
+          std::span(sorted).subspan(starts[c], starts[c + 1] - starts[c]), views, band, min_views);
   });
   return map;
 }
 
-/// Empty cells that are nearly surrounded get the plane of their neighbours, as a seed only: a height is
-/// still measured there or not.
+/// Empty cells that are nearly surrounded get the plane of their neighbours, as a seed only: a
+/// height is still measured there or not.
 void SeedGaps(CoarseMap& map) {
   const int width = map.grid.width;
   const std::vector<TopPlane> before = map.cells;
   for (int row = 1; row + 1 < map.grid.height; ++row) {
     for (int column = 1; column + 1 < width; ++column) {
-      const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column);
+      const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                            static_cast<std::size_t>(column);
       if (before[i].count > 0) continue;
       TopPlane sum;
       sum.normal.setZero();
@@ -268,10 +297,14 @@ void DropSpeckles(CoarseMap& map, float max_step, std::size_t min_cells) {
     for (std::size_t k = 0; k < patch.size(); ++k) {
       const int row = static_cast<int>(patch[k] / static_cast<std::size_t>(width));
       const int column = static_cast<int>(patch[k] % static_cast<std::size_t>(width));
-      for (const auto& [dy, dx] : {std::pair(-1, 0), std::pair(0, -1), std::pair(0, 1), std::pair(1, 0)}) {
-        if (row + dy < 0 || row + dy >= map.grid.height || column + dx < 0 || column + dx >= width) continue;
-        const std::size_t j = static_cast<std::size_t>(row + dy) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column + dx);
-        if (seen[j] != 0 || map.cells[j].count == 0 || std::abs(map.cells[j].point.z() - map.cells[patch[k]].point.z()) > max_step)
+      for (const auto& [dy, dx] :
+           {std::pair(-1, 0), std::pair(0, -1), std::pair(0, 1), std::pair(1, 0)}) {
+        if (row + dy < 0 || row + dy >= map.grid.height || column + dx < 0 || column + dx >= width)
+          continue;
+        const std::size_t j = static_cast<std::size_t>(row + dy) * static_cast<std::size_t>(width) +
+                              static_cast<std::size_t>(column + dx);
+        if (seen[j] != 0 || map.cells[j].count == 0 ||
+            std::abs(map.cells[j].point.z() - map.cells[patch[k]].point.z()) > max_step)
           continue;
         seen[j] = 1;
         patch.push_back(j);
@@ -282,11 +315,13 @@ void DropSpeckles(CoarseMap& map, float max_step, std::size_t min_cells) {
   }
 }
 
-/// Measures the fine cells, tile by tile: every second one each way by fusion (3 mm, which is as fine as the sensor
-/// samples), the others by their neighbours' mean where those lie on one surface, else by fusion too.
+/// Measures the fine cells, tile by tile: every second one each way by fusion (3 mm, which is as
+/// fine as the sensor samples), the others by their neighbours' mean where those lie on one
+/// surface, else by fusion too.
 class MapFiller {
  public:
-  MapFiller(std::span<const ViewSurface> views, const CoarseMap& coarse, const RobustHeightMapOptions& options, ColoredHeightMap& result)
+  MapFiller(std::span<const ViewSurface> views, const CoarseMap& coarse,
+            const RobustHeightMapOptions& options, ColoredHeightMap& result)
       : views_(views),
         coarse_(coarse),
         options_(options),
@@ -303,7 +338,8 @@ class MapFiller {
       CheckStop(options_.stop);
       for (int column = 0; column < tile_columns; ++column) FillTile(row, column, true);
     });
-    // Into another array: what a cell becomes must not depend on which of its neighbours came first.
+    // Into another array: what a cell becomes must not depend on which of its neighbours came
+    // first.
     nodes_ = result_.map.z;
     tbb::parallel_for(0, tile_rows, [&](int row) {
       CheckStop(options_.stop);
@@ -313,10 +349,13 @@ class MapFiller {
 
  private:
   [[nodiscard]] std::size_t Index(int row, int column) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(result_.map.grid.width) + static_cast<std::size_t>(column);
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(result_.map.grid.width) +
+           static_cast<std::size_t>(column);
   }
   [[nodiscard]] const TopPlane& PlaneAt(int row, int column) const {
-    return coarse_.cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(coarse_.grid.width) + static_cast<std::size_t>(column)];
+    return coarse_
+        .cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(coarse_.grid.width) +
+               static_cast<std::size_t>(column)];
   }
 
   void FillTile(int tile_row, int tile_column, bool is_node_pass) {
@@ -333,16 +372,21 @@ class MapFiller {
     }
     if (box.isEmpty()) return;
     std::vector<std::uint16_t> near;
-    fusion_.ViewsNear(box.center(), 0.5F * box.diagonal().norm() + static_cast<float>(coarse_.grid.step), normal.normalized(), near);
+    fusion_.ViewsNear(box.center(),
+                      0.5F * box.diagonal().norm() + static_cast<float>(coarse_.grid.step),
+                      normal.normalized(), near);
     for (int row = tile_row * kTile; row < row_end; ++row)
       for (int column = tile_column * kTile; column < column_end; ++column)
         if (PlaneAt(row, column).count > 0) FillCoarseCell(row, column, near, is_node_pass);
   }
 
-  void FillCoarseCell(int coarse_row, int coarse_column, std::span<const std::uint16_t> near, bool is_node_pass) {
+  void FillCoarseCell(int coarse_row, int coarse_column, std::span<const std::uint16_t> near,
+                      bool is_node_pass) {
     const GridShape& grid = result_.map.grid;
-    for (int row = coarse_row * kCoarse; row < std::min((coarse_row + 1) * kCoarse, grid.height); ++row) {
-      for (int column = coarse_column * kCoarse; column < std::min((coarse_column + 1) * kCoarse, grid.width); ++column) {
+    for (int row = coarse_row * kCoarse; row < std::min((coarse_row + 1) * kCoarse, grid.height);
+         ++row) {
+      for (int column = coarse_column * kCoarse;
+           column < std::min((coarse_column + 1) * kCoarse, grid.width); ++column) {
         const bool is_node = row % 2 == 0 && column % 2 == 0;
         if (is_node != is_node_pass) continue;
         if (!is_node && MeanOfNodes(row, column)) continue;
@@ -351,15 +395,18 @@ class MapFiller {
     }
   }
 
-  /// Sets a cell between nodes to their mean; false if one is missing or they lie on different surfaces.
+  /// Sets a cell between nodes to their mean; false if one is missing or they lie on different
+  /// surfaces.
   bool MeanOfNodes(int row, int column) {
     const int row_before = row - row % 2;
     const int row_after = row + row % 2;
     const int column_before = column - column % 2;
     const int column_after = column + column % 2;
-    if (row_after >= result_.map.grid.height || column_after >= result_.map.grid.width) return false;
-    const std::array<std::size_t, 4> around = {Index(row_before, column_before), Index(row_before, column_after),
-                                               Index(row_after, column_before), Index(row_after, column_after)};
+    if (row_after >= result_.map.grid.height || column_after >= result_.map.grid.width)
+      return false;
+    const std::array<std::size_t, 4> around = {
+        Index(row_before, column_before), Index(row_before, column_after),
+        Index(row_after, column_before), Index(row_after, column_after)};
     float lowest = nodes_[around[0]];
     float highest = lowest;
     float sum = 0.0F;
@@ -384,16 +431,23 @@ class MapFiller {
 
   void Measure(int row, int column, const TopPlane& plane, std::span<const std::uint16_t> near) {
     const GridShape& grid = result_.map.grid;
-    Eigen::Vector3f seed(static_cast<float>(grid.x_centre(column)), static_cast<float>(grid.y_centre(row)), plane.point.z());
+    Eigen::Vector3f seed(static_cast<float>(grid.x_centre(column)),
+                         static_cast<float>(grid.y_centre(row)), plane.point.z());
     const Eigen::Vector3f& n = plane.normal;
-    seed.z() -= (n.x() * (seed.x() - plane.point.x()) + n.y() * (seed.y() - plane.point.y())) / n.z();
+    seed.z() -=
+        (n.x() * (seed.x() - plane.point.x()) + n.y() * (seed.y() - plane.point.y())) / n.z();
     const FusedPoint fused = fusion_.Fuse(seed, n, near);
-    if (fused.num_agreeing < min_views_ || fused.num_through > fused.num_agreeing || fused.weight <= 0.0F) return;
+    if (fused.num_agreeing < min_views_ || fused.num_through > fused.num_agreeing ||
+        fused.weight <= 0.0F)
+      return;
     const float rise = fused.offset_m / n.z();
-    if (!(std::abs(rise) <= band_ && seed.z() + rise >= options_.z_min && seed.z() + rise <= options_.z_max)) return;
+    if (!(std::abs(rise) <= band_ && seed.z() + rise >= options_.z_min &&
+          seed.z() + rise <= options_.z_max))
+      return;
     result_.map.z[Index(row, column)] = seed.z() + rise;
     if (!result_.colors.empty())
-      result_.colors[Index(row, column)] = views_[static_cast<std::size_t>(fused.best_view)].ColorAt(fused.best_pixel);
+      result_.colors[Index(row, column)] =
+          views_[static_cast<std::size_t>(fused.best_view)].ColorAt(fused.best_pixel);
   }
 
   std::span<const ViewSurface> views_;
@@ -409,33 +463,39 @@ class MapFiller {
 
 }  // namespace
 
-ColoredHeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker, const RobustHeightMapOptions& options) {
-  if (!(options.cell_size > 0.0 && options.max_extent > 0.0 && options.max_extent <= 20.0 && options.z_min < options.z_max &&
-        options.top_surface_band > 0.0 && options.min_views >= 1 && options.min_patch_area >= 0.0))
+ColoredHeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker,
+                                 const RobustHeightMapOptions& options) {
+  if (!(options.cell_size > 0.0 && options.max_extent > 0.0 && options.max_extent <= 20.0 &&
+        options.z_min < options.z_max && options.top_surface_band > 0.0 && options.min_views >= 1 &&
+        options.min_patch_area >= 0.0))
     throw std::invalid_argument("robust height map: an option is out of range");
   std::optional<GridShape> grid = options.grid;
   if (!grid) grid = GridAroundData(views_in_marker, options);
   ColoredHeightMap result;
   if (!grid) return result;
-  if (!(grid->width > 0 && grid->height > 0 && grid->step > 0.0 && static_cast<double>(grid->width) * grid->height <= kMaxCells))
+  if (!(grid->width > 0 && grid->height > 0 && grid->step > 0.0 &&
+        static_cast<double>(grid->width) * grid->height <= kMaxCells))
     throw std::invalid_argument("robust height map: grid out of range");
   result.map = HeightMap(*grid);
   bool with_colors = options.with_colors;
-  for (const ViewSurface& view : views_in_marker) with_colors = with_colors && !view.color_rgb.empty();
+  for (const ViewSurface& view : views_in_marker)
+    with_colors = with_colors && !view.color_rgb.empty();
   if (with_colors) result.colors.assign(grid->num_cells(), Color{0, 0, 0});
   if (views_in_marker.empty()) return result;
 
   CoarseMap coarse = FindTops(views_in_marker, *grid, options);
   CheckStop(options.stop);
   SeedGaps(coarse);
-  DropSpeckles(coarse, static_cast<float>(options.top_surface_band),
-               static_cast<std::size_t>(options.min_patch_area / (coarse.grid.step * coarse.grid.step)));
+  DropSpeckles(
+      coarse, static_cast<float>(options.top_surface_band),
+      static_cast<std::size_t>(options.min_patch_area / (coarse.grid.step * coarse.grid.step)));
   CheckStop(options.stop);
   MapFiller(views_in_marker, coarse, options, result).Fill();
   return result;
 }
 
-ColoredHeightMap RobustHeightMap(std::span<const DepthView> views_in_marker, const RobustHeightMapOptions& options) {
+ColoredHeightMap RobustHeightMap(std::span<const DepthView> views_in_marker,
+                                 const RobustHeightMapOptions& options) {
   return RobustHeightMap(PrepareViews(views_in_marker), options);
 }
 

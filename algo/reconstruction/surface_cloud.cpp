@@ -9,16 +9,18 @@
 
 #include <tbb/parallel_for.h>
 
+#include "algo/base/check_stop.hpp"
 #include "algo/reconstruction/view_fusion.hpp"
-#include "algo/types/check_stop.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr std::size_t kNumShards = 32;    // parts of space that threads work on apart; fixed, so that results do not depend on threads
+constexpr std::size_t kNumShards = 32;  // parts of space that threads work on apart; fixed, so that
+                                        // results do not depend on threads
 constexpr std::size_t kViewsAtOnce = 16;  // bounds the memory of samples that wait for their shard
-constexpr int kBlockBits = 4;             // voxels per block and axis, as a power of two: a block shares its list of views
-constexpr int kKeyBits = 21;              // per axis: +-3 km at 3 mm
+constexpr int kBlockBits =
+    4;  // voxels per block and axis, as a power of two: a block shares its list of views
+constexpr int kKeyBits = 21;  // per axis: +-3 km at 3 mm
 constexpr int kKeyOffset = 1 << (kKeyBits - 1);
 constexpr double kMaxDistance = 1000.0;
 constexpr std::size_t kMaxSeeds = 3'000'000;  // a scene that would need more gets larger voxels
@@ -30,7 +32,8 @@ Key KeyOf(const Eigen::Vector3f& p, float inverse_size) {
   Key block = 0;
   Key within = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    const Key index = static_cast<Key>(static_cast<int>(std::floor(p[axis] * inverse_size)) + kKeyOffset);
+    const Key index =
+        static_cast<Key>(static_cast<int>(std::floor(p[axis] * inverse_size)) + kKeyOffset);
     block = (block << (kKeyBits - kBlockBits)) | (index >> kBlockBits);
     within = (within << kBlockBits) | (index & ((1U << kBlockBits) - 1U));
   }
@@ -44,7 +47,8 @@ Key Beside(Key key, int axis, int step) {
   constexpr Key kWithin = (1U << kBlockBits) - 1U;
   constexpr Key kBlock = (1U << (kKeyBits - kBlockBits)) - 1U;
   const Key index =
-      ((((key >> at_block) & kBlock) << kBlockBits) | ((key >> at_within) & kWithin)) + static_cast<Key>(static_cast<std::int64_t>(step));
+      ((((key >> at_block) & kBlock) << kBlockBits) | ((key >> at_within) & kWithin)) +
+      static_cast<Key>(static_cast<std::int64_t>(step));
   key &= ~((kWithin << at_within) | (kBlock << at_block));
   return key | ((index & kWithin) << at_within) | (((index >> kBlockBits) & kBlock) << at_block);
 }
@@ -83,7 +87,8 @@ class VoxelIndex {
     std::uint32_t index = kNone;
   };
 
-  /// Voxels of a block lie close together, five slots apart so that filled planes make no long runs.
+  /// Voxels of a block lie close together, five slots apart so that filled planes make no long
+  /// runs.
   [[nodiscard]] std::size_t Start(Key key) const {
     constexpr Key kWithin = (Key{1} << (3 * kBlockBits)) - 1;
     return (Mix(BlockOf(key)) + 5 * (key & kWithin)) & (slots_.size() - 1);
@@ -133,7 +138,8 @@ template <typename T>
 using Shards = std::array<std::vector<T>, kNumShards>;
 
 Eigen::Vector3f PointInWorld(const ViewSurface& view, std::size_t pixel) {
-  return view.T_world_camera.linear().cast<float>() * view.PointInCamera(pixel) + view.T_world_camera.translation().cast<float>();
+  return view.T_world_camera.linear().cast<float>() * view.PointInCamera(pixel) +
+         view.T_world_camera.translation().cast<float>();
 }
 
 void SortIntoShards(const ViewSurface& view, float inverse_size, Shards<Sample>& shards) {
@@ -149,10 +155,11 @@ void SortIntoShards(const ViewSurface& view, float inverse_size, Shards<Sample>&
 
 using VoxelShards = std::array<VoxelIndex, kNumShards>;
 
-/// The seeds whose voxel holds at least as many measurements as the two next to it along the surface's normal. Noise spreads
-/// a surface over several layers of voxels; all their seeds would move to the same place.
-std::vector<Seed> FullestLayers(std::span<const ViewSurface> views, const Shards<Seed>& seeds, const VoxelShards& voxels,
-                                std::size_t shard) {
+/// The seeds whose voxel holds at least as many measurements as the two next to it along the
+/// surface's normal. Noise spreads a surface over several layers of voxels; all their seeds would
+/// move to the same place.
+std::vector<Seed> FullestLayers(std::span<const ViewSurface> views, const Shards<Seed>& seeds,
+                                const VoxelShards& voxels, std::size_t shard) {
   std::vector<Seed> kept;
   for (const Seed& seed : seeds[shard]) {
     const ViewSurface& view = views[seed.view];
@@ -173,7 +180,8 @@ std::vector<Seed> FullestLayers(std::span<const ViewSurface> views, const Shards
 }
 
 /// One seed per touched voxel, thinned to one layer, by shard, in block order within each.
-Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size, const std::stop_token& stop) {
+Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size,
+                       const std::stop_token& stop) {
   Shards<Seed> seeds;
   VoxelShards voxels;
   std::vector<Shards<Sample>> samples(std::min(kViewsAtOnce, views.size()));
@@ -189,7 +197,8 @@ Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size, c
         for (const Sample& sample : samples[i][s]) {
           const std::uint32_t index = voxels[s].FindOrAdd(sample.key);
           if (index == seeds[s].size()) {
-            seeds[s].push_back({sample.key, sample.weight, sample.pixel, static_cast<std::uint32_t>(first + i), 1});
+            seeds[s].push_back({sample.key, sample.weight, sample.pixel,
+                                static_cast<std::uint32_t>(first + i), 1});
             continue;
           }
           Seed& seed = seeds[s][index];
@@ -210,9 +219,11 @@ Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size, c
   return layer;
 }
 
-/// Moves the seeds of one shard; those that too few views support are left out. By the shard where they arrive.
-Shards<Merged> MoveSeeds(std::span<const ViewSurface> views, const ViewFusion& fusion, const std::vector<Seed>& seeds,
-                         const SurfaceCloudOptions& options, float voxel_size, int min_views) {
+/// Moves the seeds of one shard; those that too few views support are left out. By the shard where
+/// they arrive.
+Shards<Merged> MoveSeeds(std::span<const ViewSurface> views, const ViewFusion& fusion,
+                         const std::vector<Seed>& seeds, const SurfaceCloudOptions& options,
+                         float voxel_size, int min_views) {
   Shards<Merged> moved;
   std::vector<std::uint16_t> near;
   const float radius = 0.5F * std::sqrt(3.0F) * voxel_size * static_cast<float>(1 << kBlockBits);
@@ -229,10 +240,13 @@ Shards<Merged> MoveSeeds(std::span<const ViewSurface> views, const ViewFusion& f
       fusion.ViewsNear(p, 2.0F * radius, n, near);
     }
     const FusedPoint fused = fusion.Fuse(p, n, near);
-    if (fused.num_agreeing < min_views || fused.num_through > fused.num_agreeing || fused.weight <= 0.0F) continue;
+    if (fused.num_agreeing < min_views || fused.num_through > fused.num_agreeing ||
+        fused.weight <= 0.0F)
+      continue;
     const Eigen::Vector3f point = p + fused.offset_m * n;
     Color color = {0, 0, 0};
-    if (options.with_colors) color = views[static_cast<std::size_t>(fused.best_view)].ColorAt(fused.best_pixel);
+    if (options.with_colors)
+      color = views[static_cast<std::size_t>(fused.best_view)].ColorAt(fused.best_pixel);
     const Key key = KeyOf(point, 1.0F / voxel_size);
     moved[ShardOf(key)].push_back({key, point, fused.normal, fused.weight, color});
   }
@@ -281,12 +295,14 @@ PointCloud MergeVoxels(const std::array<Shards<Merged>, kNumShards>& moved, bool
 }  // namespace
 
 PointCloud MergeSurface(std::span<const ViewSurface> views, const SurfaceCloudOptions& options) {
-  if (!(options.voxel_size_m > 0.0F && options.voxel_size_m < 1.0F && options.min_views >= 1 && options.band_m > 0.0F))
+  if (!(options.voxel_size_m > 0.0F && options.voxel_size_m < 1.0F && options.min_views >= 1 &&
+        options.band_m > 0.0F))
     throw std::invalid_argument("merged surface: voxel size, band or number of views out of range");
   if (views.empty()) return {};
   for (const ViewSurface& view : views)
     if (!IsFinite(view.T_world_camera) || view.T_world_camera.translation().norm() > kMaxDistance)
-      throw std::invalid_argument("merged surface: a view's pose is not finite or lies out of this world");
+      throw std::invalid_argument(
+          "merged surface: a view's pose is not finite or lies out of this world");
   const int min_views = std::min(options.min_views, static_cast<int>(views.size()));
   bool with_colors = options.with_colors;
   for (const ViewSurface& view : views) with_colors = with_colors && !view.color_rgb.empty();
@@ -301,8 +317,9 @@ PointCloud MergeSurface(std::span<const ViewSurface> views, const SurfaceCloudOp
   }
   const ViewFusion fusion(views, {.min_band_m = options.band_m});
   std::array<Shards<Merged>, kNumShards> moved;
-  tbb::parallel_for(std::size_t{0}, kNumShards,
-                    [&](std::size_t s) { moved[s] = MoveSeeds(views, fusion, seeds[s], options, voxel_size, min_views); });
+  tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) {
+    moved[s] = MoveSeeds(views, fusion, seeds[s], options, voxel_size, min_views);
+  });
   CheckStop(options.stop);
   return MergeVoxels(moved, with_colors);
 }

@@ -9,7 +9,7 @@
 
 #include <Eigen/Geometry>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 
 namespace plumb {
 namespace {
@@ -27,7 +27,8 @@ class GridMesher {
     max_diagonal_step_ = static_cast<float>(std::sqrt(2.0) * run * slope + options.step_margin_m);
     columns_ = (map.grid.width + decimation_ - 1) / decimation_;
     rows_ = (map.grid.height + decimation_ - 1) / decimation_;
-    vertex_of_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), kNoVertex);
+    vertex_of_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_),
+                      kNoVertex);
   }
 
   TriangleMesh Build() {
@@ -45,7 +46,9 @@ class GridMesher {
     int row, column;
   };
 
-  [[nodiscard]] float Z(const Node& node) const { return map_.at(node.row * decimation_, node.column * decimation_); }
+  [[nodiscard]] float Z(const Node& node) const {
+    return map_.at(node.row * decimation_, node.column * decimation_);
+  }
 
   /// NaN fails every comparison, so missing corners need no test of their own.
   [[nodiscard]] bool IsSurface(const Node& a, const Node& b, const Node& c) const {
@@ -57,8 +60,10 @@ class GridMesher {
   }
 
   void AddSquare(int row, int column) {
-    const Node p00{row, column}, p01{row, column + 1}, p10{row + 1, column}, p11{row + 1, column + 1};
-    // The diagonal with the smaller step follows ridges better; where it misses a corner, the other one is taken.
+    const Node p00{row, column}, p01{row, column + 1}, p10{row + 1, column},
+        p11{row + 1, column + 1};
+    // The diagonal with the smaller step follows ridges better; where it misses a corner, the other
+    // one is taken.
     const float falling = std::abs(Z(p00) - Z(p11));
     const float rising = std::abs(Z(p01) - Z(p10));
     if (falling <= rising || std::isnan(rising)) {
@@ -72,23 +77,27 @@ class GridMesher {
 
   std::uint32_t Vertex(const Node& node) {
     std::uint32_t& index =
-        vertex_of_[static_cast<std::size_t>(node.row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(node.column)];
+        vertex_of_[static_cast<std::size_t>(node.row) * static_cast<std::size_t>(columns_) +
+                   static_cast<std::size_t>(node.column)];
     if (index != kNoVertex) return index;
     index = static_cast<std::uint32_t>(mesh_.vertices.size());
     const int row = node.row * decimation_;
     const int column = node.column * decimation_;
-    mesh_.vertices.emplace_back(static_cast<float>(map_.grid.x_centre(column)), static_cast<float>(map_.grid.y_centre(row)), Z(node));
+    mesh_.vertices.emplace_back(static_cast<float>(map_.grid.x_centre(column)),
+                                static_cast<float>(map_.grid.y_centre(row)), Z(node));
     mesh_.normals.emplace_back(Eigen::Vector3f::Zero());
     if (!colors_.empty())
       mesh_.colors.push_back(
-          colors_[static_cast<std::size_t>(row) * static_cast<std::size_t>(map_.grid.width) + static_cast<std::size_t>(column)]);
+          colors_[static_cast<std::size_t>(row) * static_cast<std::size_t>(map_.grid.width) +
+                  static_cast<std::size_t>(column)]);
     return index;
   }
 
   void AddTriangle(const Node& a, const Node& b, const Node& c) {
     const std::array<std::uint32_t, 3> triangle = {Vertex(a), Vertex(b), Vertex(c)};
     const Eigen::Vector3f& origin = mesh_.vertices[triangle[0]];
-    const Eigen::Vector3f area = (mesh_.vertices[triangle[1]] - origin).cross(mesh_.vertices[triangle[2]] - origin);
+    const Eigen::Vector3f area =
+        (mesh_.vertices[triangle[1]] - origin).cross(mesh_.vertices[triangle[2]] - origin);
     for (const std::uint32_t vertex : triangle) mesh_.normals[vertex] += area;
     mesh_.triangles.push_back(triangle);
   }
@@ -106,10 +115,13 @@ class GridMesher {
 
 }  // namespace
 
-TriangleMesh MeshOfHeightMap(const HeightMap& map, std::span<const Color> colors, const SurfaceMeshOptions& options) {
-  if (options.decimation < 1 || !(options.max_slope_deg > 0.0 && options.max_slope_deg < 90.0) || !(options.step_margin_m >= 0.0))
+TriangleMesh MeshOfHeightMap(const HeightMap& map, std::span<const Color> colors,
+                             const SurfaceMeshOptions& options) {
+  if (options.decimation < 1 || !(options.max_slope_deg > 0.0 && options.max_slope_deg < 90.0) ||
+      !(options.step_margin_m >= 0.0))
     throw std::invalid_argument("surface mesh: decimation, slope or step margin out of range");
-  if (!colors.empty() && colors.size() != map.grid.num_cells()) throw std::invalid_argument("surface mesh: there is not one colour a cell");
+  if (!colors.empty() && colors.size() != map.grid.num_cells())
+    throw std::invalid_argument("surface mesh: there is not one colour a cell");
   return GridMesher(map, colors, options).Build();
 }
 
@@ -126,11 +138,15 @@ std::vector<Color> ColorsFromCloud(const HeightMap& map, const PointCloud& cloud
     const int row = static_cast<int>(*cell / static_cast<std::size_t>(grid.width));
     const int column = static_cast<int>(*cell % static_cast<std::size_t>(grid.width));
     for (int r = std::max(0, row - kReach); r <= std::min(grid.height - 1, row + kReach); ++r) {
-      for (int c = std::max(0, column - kReach); c <= std::min(grid.width - 1, column + kReach); ++c) {
-        const std::size_t k = static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(c);
+      for (int c = std::max(0, column - kReach); c <= std::min(grid.width - 1, column + kReach);
+           ++c) {
+        const std::size_t k = static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.width) +
+                              static_cast<std::size_t>(c);
         if (std::isnan(map.z[k])) continue;
-        // A cell's own points win by the whole cells between; among those of one cell the nearest in height.
-        const float cells_away = static_cast<float>(std::max(std::abs(r - row), std::abs(c - column)));
+        // A cell's own points win by the whole cells between; among those of one cell the nearest
+        // in height.
+        const float cells_away =
+            static_cast<float>(std::max(std::abs(r - row), std::abs(c - column)));
         const float d = cells_away + std::min(std::abs(map.z[k] - p.z()), 0.999F);
         if (d < distance[k]) {
           distance[k] = d;

@@ -5,14 +5,16 @@
 namespace plumb {
 namespace {
 
-constexpr double kMaxGap_s = 0.3;  // Neighbours farther apart tell nothing of a velocity.
+constexpr double kMaxGap_s = 0.3;  // Neighbours farther apart say nothing about a velocity.
 
-constexpr double kUsualSpacings = 3.0;  // A live stream on a busy machine skips one or two images at a time.
+constexpr double kUsualSpacings =
+    3.0;  // A live stream on a busy machine skips one or two images at a time.
 
 // Median, so that gaps do not count as usual, and a recording of any rate has its own.
 double UsualSpacing(const std::vector<TrackedFrame>& frames) {
   std::vector<double> spacings_s;
-  for (std::size_t i = 1; i < frames.size(); ++i) spacings_s.push_back(frames[i].color_time_s - frames[i - 1].color_time_s);
+  for (std::size_t i = 1; i < frames.size(); ++i)
+    spacings_s.push_back(frames[i].color_time_s - frames[i - 1].color_time_s);
   const auto middle = spacings_s.begin() + static_cast<std::ptrdiff_t>(spacings_s.size() / 2);
   std::nth_element(spacings_s.begin(), middle, spacings_s.end());
   return *middle;
@@ -30,7 +32,8 @@ std::vector<Pose> ColorPoses(const std::vector<TrackedFrame>& frames, const Trac
   const auto spread = [&](std::size_t end, const Pose& T_color_correction, double t0, double t1) {
     for (std::size_t i = begin; i < end; ++i) {
       if (!frames[i].tracked) continue;
-      const double fraction = t1 > t0 ? std::clamp((frames[i].color_time_s - t0) / (t1 - t0), 0.0, 1.0) : 0.0;
+      const double fraction =
+          t1 > t0 ? std::clamp((frames[i].color_time_s - t0) / (t1 - t0), 0.0, 1.0) : 0.0;
       poses[i] = KeyframePose(map, frames[i].reference_keyframe) * frames[i].T_reference_color *
                  Interpolate(Pose::Identity(), T_color_correction, fraction);
     }
@@ -40,9 +43,12 @@ std::vector<Pose> ColorPoses(const std::vector<TrackedFrame>& frames, const Trac
     if (frame.keyframe < 0) continue;
     Pose T_correction = Pose::Identity();
     double t0 = frame.color_time_s;
-    const bool continues = begin > 0 && frames[begin - 1].keyframe == frame.previous_keyframe && frame.previous_keyframe >= 0;
+    const bool continues = begin > 0 && frames[begin - 1].keyframe == frame.previous_keyframe &&
+                           frame.previous_keyframe >= 0;
     if (continues) {
-      T_correction = (KeyframePose(map, frame.previous_keyframe) * frame.T_previous_color).inverse() * KeyframePose(map, frame.keyframe);
+      T_correction =
+          (KeyframePose(map, frame.previous_keyframe) * frame.T_previous_color).inverse() *
+          KeyframePose(map, frame.keyframe);
       t0 = frames[begin - 1].color_time_s;
     }
     spread(i, T_correction, t0, frame.color_time_s);
@@ -58,25 +64,31 @@ void RefreshVelocities(std::vector<TrackedFrame>& frames, TrackingMap& map) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (!frames[i].tracked) continue;
     const auto usable = [&](std::size_t j) {
-      return j < frames.size() && frames[j].tracked && std::abs(frames[j].color_time_s - frames[i].color_time_s) < kMaxGap_s;
+      return j < frames.size() && frames[j].tracked &&
+             std::abs(frames[j].color_time_s - frames[i].color_time_s) < kMaxGap_s;
     };
     const std::size_t a = i > 0 && usable(i - 1) ? i - 1 : i;
     const std::size_t b = usable(i + 1) ? i + 1 : i;
     const double dt = frames[b].color_time_s - frames[a].color_time_s;
     if (!(dt > 0)) continue;
     frames[i].velocity_per_s = TwistFromPose(poses[a].inverse() * poses[b]) / dt;
-    if (frames[i].keyframe >= 0) map.keyframes[static_cast<std::size_t>(frames[i].keyframe)].velocity_per_s = frames[i].velocity_per_s;
+    if (frames[i].keyframe >= 0)
+      map.keyframes[static_cast<std::size_t>(frames[i].keyframe)].velocity_per_s =
+          frames[i].velocity_per_s;
   }
 }
 
-std::vector<StampedPose> DepthTrajectory(const std::vector<TrackedFrame>& frames, const TrackingMap& map,
-                                         const CalibrationModel& calibration, const Pose& T_scene_world) {
+std::vector<StampedPose> DepthTrajectory(const std::vector<TrackedFrame>& frames,
+                                         const TrackingMap& map,
+                                         const CalibrationModel& calibration,
+                                         const Pose& T_scene_world) {
   const std::vector<Pose> poses = ColorPoses(frames, map);
   std::vector<StampedPose> trajectory;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (!frames[i].tracked) continue;
     const double dt = frames[i].depth_time_s - frames[i].color_time_s + calibration.depth[5];
-    trajectory.push_back({frames[i].depth_time_s, T_scene_world * PoseAfter(poses[i], frames[i].velocity_per_s, dt)});
+    trajectory.push_back({frames[i].depth_time_s,
+                          T_scene_world * PoseAfter(poses[i], frames[i].velocity_per_s, dt)});
   }
   return trajectory;
 }
@@ -93,7 +105,8 @@ double LongestLost(const std::vector<TrackedFrame>& frames) {
       longest = std::max(longest, frame.color_time_s - last_tracked_s);
       continue;
     }
-    if (lost || frame.color_time_s - last_tracked_s > longest_usual_s) longest = std::max(longest, frame.color_time_s - last_tracked_s);
+    if (lost || frame.color_time_s - last_tracked_s > longest_usual_s)
+      longest = std::max(longest, frame.color_time_s - last_tracked_s);
     lost = false;
     last_tracked_s = frame.color_time_s;
   }

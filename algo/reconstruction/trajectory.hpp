@@ -3,25 +3,31 @@
 
 #include <vector>
 
-#include "algo/tracking/calibration_model.hpp"
+#include "algo/sensor_model/calibration_model.hpp"
 #include "algo/tracking/tracker.hpp"
 #include "algo/types/scene.hpp"
 
 namespace plumb {
 
-/// World poses of the colour camera for each frame (identity where not tracked). A frame between two keyframes takes its
-/// tracked motion from the first, and its share of what refinement moved the second by.
-[[nodiscard]] std::vector<Pose> ColorPoses(const std::vector<TrackedFrame>& frames, const TrackingMap& map);
+/// World poses of the colour camera for each frame (identity where not tracked). A frame between
+/// two keyframes takes its tracked motion from the first, and its share of what refinement moved
+/// the second by.
+[[nodiscard]] std::vector<Pose> ColorPoses(const std::vector<TrackedFrame>& frames,
+                                           const TrackingMap& map);
 
-/// Velocities by central differences over the neighbouring tracked frames; writes them to the frames and to the map's keyframes.
+/// Velocities by central differences over the neighbouring tracked frames; writes them to the
+/// frames and to the map's keyframes.
 void RefreshVelocities(std::vector<TrackedFrame>& frames, TrackingMap& map);
 
 /// All tracked frames at their depth stamps, in the scene's frame.
-[[nodiscard]] std::vector<StampedPose> DepthTrajectory(const std::vector<TrackedFrame>& frames, const TrackingMap& map,
-                                                       const CalibrationModel& calibration, const Pose& T_scene_world);
+[[nodiscard]] std::vector<StampedPose> DepthTrajectory(const std::vector<TrackedFrame>& frames,
+                                                       const TrackingMap& map,
+                                                       const CalibrationModel& calibration,
+                                                       const Pose& T_scene_world);
 
-/// Longest time without a pose, seconds: between tracked frames with lost ones between them or three times farther apart
-/// than usual (the median spacing of the recording: images that never came), and lost at either end.
+/// Longest time without a pose, seconds: between tracked frames with lost ones between them or
+/// three times farther apart than usual (the median spacing of the recording: images that never
+/// came), and lost at either end.
 [[nodiscard]] double LongestLost(const std::vector<TrackedFrame>& frames);
 
 }  // namespace plumb

@@ -8,8 +8,9 @@ namespace plumb {
 namespace {
 
 constexpr float kBandSigmas = 4.0F;
-constexpr float kMinCosIncidence = 0.15F;  // a view steeper than 81 deg to the seed's normal says nothing about it
-constexpr int kMaxSamples = 64;            // views that take part in one mean; more add nothing
+constexpr float kMinCosIncidence =
+    0.15F;  // a view steeper than 81 deg to the seed's normal says nothing about it
+constexpr int kMaxSamples = 64;  // views that take part in one mean; more add nothing
 
 /// One view's measurement of the seed.
 struct Sample {
@@ -17,7 +18,8 @@ struct Sample {
   float weight;
 };
 
-/// Weighted mean with Tukey's weights about `centre`: smooth, and blind to what lies beyond the cut.
+/// Weighted mean with Tukey's weights about `centre`: smooth, and blind to what lies beyond the
+/// cut.
 float TukeyMean(std::span<const Sample> samples, float centre, float cut, float& weight_sum) {
   float sum = 0.0F;
   weight_sum = 0.0F;
@@ -34,7 +36,8 @@ float TukeyMean(std::span<const Sample> samples, float centre, float cut, float&
 
 }  // namespace
 
-ViewFusion::ViewFusion(std::span<const ViewSurface> views, const FusionOptions& options) : options_(options) {
+ViewFusion::ViewFusion(std::span<const ViewSurface> views, const FusionOptions& options)
+    : options_(options) {
   cameras_.reserve(views.size());
   for (const ViewSurface& view : views) {
     Camera camera;
@@ -60,17 +63,20 @@ ViewFusion::ViewFusion(std::span<const ViewSurface> views, const FusionOptions& 
       camera.ray_min = camera.ray_min.cwiseMin(rays[i]);
       camera.ray_max = camera.ray_max.cwiseMax(rays[i]);
       const ViewSurface::Pixel& pixel = view.pixels[i];
-      if (pixel.weight > 0.0F && (min_inverse == 0.0F || pixel.inverse_depth < min_inverse)) min_inverse = pixel.inverse_depth;
+      if (pixel.weight > 0.0F && (min_inverse == 0.0F || pixel.inverse_depth < min_inverse))
+        min_inverse = pixel.inverse_depth;
     }
     camera.max_depth_m = min_inverse > 0.0F ? 1.0F / min_inverse : 0.0F;
-    camera.inward_sides = {Eigen::Vector3f(1, 0, -camera.ray_min.x()).normalized(), Eigen::Vector3f(-1, 0, camera.ray_max.x()).normalized(),
+    camera.inward_sides = {Eigen::Vector3f(1, 0, -camera.ray_min.x()).normalized(),
+                           Eigen::Vector3f(-1, 0, camera.ray_max.x()).normalized(),
                            Eigen::Vector3f(0, 1, -camera.ray_min.y()).normalized(),
                            Eigen::Vector3f(0, -1, camera.ray_max.y()).normalized()};
     cameras_.push_back(camera);
   }
 }
 
-void ViewFusion::ViewsNear(const Eigen::Vector3f& centre_world, float radius_m, const Eigen::Vector3f& n_world,
+void ViewFusion::ViewsNear(const Eigen::Vector3f& centre_world, float radius_m,
+                           const Eigen::Vector3f& n_world,
                            std::vector<std::uint16_t>& found) const {
   found.clear();
   std::vector<std::pair<float, std::uint16_t>> rated;
@@ -78,20 +84,27 @@ void ViewFusion::ViewsNear(const Eigen::Vector3f& centre_world, float radius_m, 
     const Camera& camera = cameras_[i];
     const Eigen::Vector3f p = camera.R_camera_world * centre_world + camera.t_camera_world;
     if (p.z() < -radius_m || p.z() - radius_m > camera.max_depth_m) continue;
-    const bool outside = std::any_of(camera.inward_sides.begin(), camera.inward_sides.end(),
-                                     [&](const Eigen::Vector3f& side) { return side.dot(p) < -radius_m; });
+    const bool outside =
+        std::any_of(camera.inward_sides.begin(), camera.inward_sides.end(),
+                    [&](const Eigen::Vector3f& side) { return side.dot(p) < -radius_m; });
     if (outside) continue;
     // Views that hold the ball's centre come before those that only touch the ball.
-    const bool holds_centre = std::all_of(camera.inward_sides.begin(), camera.inward_sides.end(),
-                                          [&](const Eigen::Vector3f& side) { return side.dot(p) >= 0.0F; });
+    const bool holds_centre =
+        std::all_of(camera.inward_sides.begin(), camera.inward_sides.end(),
+                    [&](const Eigen::Vector3f& side) { return side.dot(p) >= 0.0F; });
     const float distance = std::max(0.1F, p.norm());
-    const float cos_incidence = std::max(0.0F, -n_world.dot(camera.R_camera_world.transpose() * p) / distance);
+    const float cos_incidence =
+        std::max(0.0F, -n_world.dot(camera.R_camera_world.transpose() * p) / distance);
     const float sigma = AxialSigma(distance, 1.0F);
-    rated.emplace_back((cos_incidence + (holds_centre ? 0.2F : 0.0F)) / (sigma * sigma), static_cast<std::uint16_t>(i));
+    rated.emplace_back((cos_incidence + (holds_centre ? 0.2F : 0.0F)) / (sigma * sigma),
+                       static_cast<std::uint16_t>(i));
   }
-  const std::size_t count = std::min(rated.size(), static_cast<std::size_t>(std::max(1, options_.max_views)));
+  const std::size_t count =
+      std::min(rated.size(), static_cast<std::size_t>(std::max(1, options_.max_views)));
   std::partial_sort(rated.begin(), rated.begin() + static_cast<std::ptrdiff_t>(count), rated.end(),
-                    [](const auto& a, const auto& b) { return a.first != b.first ? a.first > b.first : a.second < b.second; });
+                    [](const auto& a, const auto& b) {
+                      return a.first != b.first ? a.first > b.first : a.second < b.second;
+                    });
   for (std::size_t k = 0; k < count; ++k) found.push_back(rated[k].second);
   std::sort(found.begin(), found.end());
 }
@@ -111,7 +124,9 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
     const float inverse_z = 1.0F / p.z();
     float x = p.x() * inverse_z;
     float y = p.y() * inverse_z;
-    if (x < camera.ray_min.x() || x > camera.ray_max.x() || y < camera.ray_min.y() || y > camera.ray_max.y()) continue;
+    if (x < camera.ray_min.x() || x > camera.ray_max.x() || y < camera.ray_min.y() ||
+        y > camera.ray_max.y())
+      continue;
     if (camera.has_lens) {
       const float r2 = x * x + y * y;
       const float radial = 1.0F + r2 * (camera.k1 + r2 * (camera.k2 + r2 * camera.k3));
@@ -129,14 +144,18 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
     const std::size_t i = static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
     const ViewSurface::Pixel* top = view.pixels.data() + i;
     const ViewSurface::Pixel* bottom = top + width;
-    if (top[0].weight <= 0.0F || top[1].weight <= 0.0F || bottom[0].weight <= 0.0F || bottom[1].weight <= 0.0F) continue;
+    if (top[0].weight <= 0.0F || top[1].weight <= 0.0F || bottom[0].weight <= 0.0F ||
+        bottom[1].weight <= 0.0F)
+      continue;
     const Eigen::Vector3f n = camera.R_camera_world * n_world;
     const float along = -n.dot(p);  // |p| times the cosine of incidence
-    if (along * along < kMinCosIncidence * kMinCosIncidence * p.squaredNorm() || along < 0.0F) continue;
+    if (along * along < kMinCosIncidence * kMinCosIncidence * p.squaredNorm() || along < 0.0F)
+      continue;
     const float fu = u - static_cast<float>(column);
     const float fv = v - static_cast<float>(row);
     const float above = top[0].inverse_depth + fu * (top[1].inverse_depth - top[0].inverse_depth);
-    const float below = bottom[0].inverse_depth + fu * (bottom[1].inverse_depth - bottom[0].inverse_depth);
+    const float below =
+        bottom[0].inverse_depth + fu * (bottom[1].inverse_depth - bottom[0].inverse_depth);
     const float measured = 1.0F / (above + fv * (below - above));
     // The measured point lies on the seed's own ray, at this share of its length beyond it.
     const float beyond = measured * inverse_z - 1.0F;
@@ -151,7 +170,8 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
     const float w = view.pixels[nearest].weight;
     samples[num_samples++] = {distance, w};
     widest_band = std::max(widest_band, band);
-    if (options_.with_normals) fused.normal += w * (camera.R_camera_world.transpose() * view.normals[nearest]);
+    if (options_.with_normals)
+      fused.normal += w * (camera.R_camera_world.transpose() * view.normals[nearest]);
     if (w > best_weight) {
       best_weight = w;
       fused.best_view = index;
@@ -161,7 +181,8 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
   fused.num_agreeing = static_cast<int>(num_samples);
   if (num_samples == 0) return fused;
   const std::span<const Sample> used(samples.data(), num_samples);
-  // From the seed with the whole band, then from there: a stray view near the band's end loses its say.
+  // From the seed with the whole band, then from there: a stray view near the band's end loses its
+  // say.
   fused.offset_m = TukeyMean(used, 0.0F, 1.5F * widest_band, fused.weight);
   fused.offset_m = TukeyMean(used, fused.offset_m, widest_band, fused.weight);
   const float length = fused.normal.norm();

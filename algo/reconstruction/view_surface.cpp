@@ -8,23 +8,27 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "algo/types/check_stop.hpp"
-#include "algo/types/units.hpp"
+#include "algo/base/check_stop.hpp"
+#include "algo/base/units.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr int kWorkingWidth = 320;   // columns that the block size aims at
-constexpr int kNormalRadius = 3;     // working pixels: half a window of about 25 mm at 1 m, past the noise's correlation
-constexpr int kRimRadius = 2;        // working pixels kept away from depth edges and holes
-constexpr int kMinRimCount = 20;     // of the 25 of a rim window: single drop-outs do not cost a whole window
-constexpr float kEdgeSlope = 6.0F;   // tan of 80 deg: steeper steps between neighbours are edges, not surfaces
+constexpr int kWorkingWidth = 320;  // columns that the block size aims at
+constexpr int kNormalRadius =
+    3;  // working pixels: half a window of about 25 mm at 1 m, past the noise's correlation
+constexpr int kRimRadius = 2;  // working pixels kept away from depth edges and holes
+constexpr int kMinRimCount =
+    20;  // of the 25 of a rim window: single drop-outs do not cost a whole window
+constexpr float kEdgeSlope =
+    6.0F;  // tan of 80 deg: steeper steps between neighbours are edges, not surfaces
 constexpr float kEdgeSigmas = 4.0F;  // noise allowed on top
 
 /// Sums over any rectangle of the image in four look-ups.
 class BoxSums {
  public:
-  BoxSums(int width, int height) : stride_(width + 1), count_(Size(width, height), 0), sum_(Size(width, height), 0.0) {}
+  BoxSums(int width, int height)
+      : stride_(width + 1), count_(Size(width, height), 0), sum_(Size(width, height), 0.0) {}
 
   void SetRow(int row, const ViewSurface::Pixel* pixels, const std::uint8_t* good, int width) {
     const std::size_t above = static_cast<std::size_t>(row) * static_cast<std::size_t>(stride_);
@@ -43,15 +47,22 @@ class BoxSums {
   }
 
   /// Rows [r0, r1), columns [c0, c1), within the image.
-  [[nodiscard]] int Count(int r0, int r1, int c0, int c1) const { return Box(count_, r0, r1, c0, c1); }
-  [[nodiscard]] double Sum(int r0, int r1, int c0, int c1) const { return Box(sum_, r0, r1, c0, c1); }
+  [[nodiscard]] int Count(int r0, int r1, int c0, int c1) const {
+    return Box(count_, r0, r1, c0, c1);
+  }
+  [[nodiscard]] double Sum(int r0, int r1, int c0, int c1) const {
+    return Box(sum_, r0, r1, c0, c1);
+  }
 
  private:
-  static std::size_t Size(int width, int height) { return static_cast<std::size_t>(width + 1) * static_cast<std::size_t>(height + 1); }
+  static std::size_t Size(int width, int height) {
+    return static_cast<std::size_t>(width + 1) * static_cast<std::size_t>(height + 1);
+  }
   template <typename T>
   [[nodiscard]] T Box(const std::vector<T>& table, int r0, int r1, int c0, int c1) const {
     const T* top = table.data() + static_cast<std::size_t>(r0) * static_cast<std::size_t>(stride_);
-    const T* bottom = table.data() + static_cast<std::size_t>(r1) * static_cast<std::size_t>(stride_);
+    const T* bottom =
+        table.data() + static_cast<std::size_t>(r1) * static_cast<std::size_t>(stride_);
     return bottom[c1] - bottom[c0] - top[c1] + top[c0];
   }
 
@@ -61,7 +72,9 @@ class BoxSums {
 };
 
 /// Step in depth between neighbouring working pixels that no plausible surface makes.
-float EdgeStep(float depth_m, float pixel_angle) { return kEdgeSlope * depth_m * pixel_angle + kEdgeSigmas * AxialSigma(depth_m, 1.0F); }
+float EdgeStep(float depth_m, float pixel_angle) {
+  return kEdgeSlope * depth_m * pixel_angle + kEdgeSigmas * AxialSigma(depth_m, 1.0F);
+}
 
 /// Fills the inverse depth of the working image.
 void Bin(const DepthView& view, const ViewSurfaceOptions& options, ViewSurface& surface) {
@@ -70,7 +83,9 @@ void Bin(const DepthView& view, const ViewSurfaceOptions& options, ViewSurface& 
   const float pixel_angle = static_cast<float>(1.0 / surface.intrinsics.fx);
   for (int row = 0; row < surface.height(); ++row) {
     for (int column = 0; column < surface.width(); ++column) {
-      const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(surface.width()) + static_cast<std::size_t>(column);
+      const std::size_t i =
+          static_cast<std::size_t>(row) * static_cast<std::size_t>(surface.width()) +
+          static_cast<std::size_t>(column);
       float sum = 0.0F;
       float nearest = options.max_depth_m;
       float farthest = 0.0F;
@@ -85,7 +100,8 @@ void Bin(const DepthView& view, const ViewSurfaceOptions& options, ViewSurface& 
           ++count;
         }
       }
-      const bool usable = count >= min_count && farthest - nearest <= EdgeStep(nearest, pixel_angle);
+      const bool usable =
+          count >= min_count && farthest - nearest <= EdgeStep(nearest, pixel_angle);
       surface.pixels[i].inverse_depth = usable ? sum / static_cast<float>(count) : 0.0F;
     }
   }
@@ -102,7 +118,8 @@ std::vector<std::uint8_t> WithoutEdges(const ViewSurface& surface) {
     if (inverse(a) <= 0.0F || inverse(b) <= 0.0F) return;
     const float nearer = 1.0F / std::max(inverse(a), inverse(b));
     // |1/a - 1/b| as a step in depth at the nearer of the two
-    if (std::abs(inverse(a) - inverse(b)) * nearer * nearer > EdgeStep(nearer, pixel_angle)) good[a] = good[b] = 0;
+    if (std::abs(inverse(a) - inverse(b)) * nearer * nearer > EdgeStep(nearer, pixel_angle))
+      good[a] = good[b] = 0;
   };
   for (std::size_t row = 0; row < static_cast<std::size_t>(surface.height()); ++row) {
     for (std::size_t column = 0; column < width; ++column) {
@@ -114,20 +131,24 @@ std::vector<std::uint8_t> WithoutEdges(const ViewSurface& surface) {
   return good;
 }
 
-/// Difference of the mean inverse depth between two rectangles that lie side by side, or false if one is too empty.
+/// Difference of the mean inverse depth between two rectangles that lie side by side, or false if
+/// one is too empty.
 struct Rectangle {
   int r0, r1, c0, c1;
 };
-bool MeanDifference(const BoxSums& sums, const Rectangle& minus, const Rectangle& plus, double& difference) {
+bool MeanDifference(const BoxSums& sums, const Rectangle& minus, const Rectangle& plus,
+                    double& difference) {
   const int min_count = (kNormalRadius * (2 * kNormalRadius + 1) * 6) / 10;
   const int count_minus = sums.Count(minus.r0, minus.r1, minus.c0, minus.c1);
   const int count_plus = sums.Count(plus.r0, plus.r1, plus.c0, plus.c1);
   if (count_minus < min_count || count_plus < min_count) return false;
-  difference = sums.Sum(plus.r0, plus.r1, plus.c0, plus.c1) / count_plus - sums.Sum(minus.r0, minus.r1, minus.c0, minus.c1) / count_minus;
+  difference = sums.Sum(plus.r0, plus.r1, plus.c0, plus.c1) / count_plus -
+               sums.Sum(minus.r0, minus.r1, minus.c0, minus.c1) / count_minus;
   return true;
 }
 
-void ComputeNormals(const BoxSums& sums, const std::vector<std::uint8_t>& good, float min_cos, ViewSurface& surface) {
+void ComputeNormals(const BoxSums& sums, const std::vector<std::uint8_t>& good, float min_cos,
+                    ViewSurface& surface) {
   constexpr int r = kNormalRadius;
   // The means of the two halves of a window lie r + 1 pixels apart, half of that to each side.
   constexpr int kHalfApart = (r + 1) / 2;
@@ -136,20 +157,26 @@ void ComputeNormals(const BoxSums& sums, const std::vector<std::uint8_t>& good, 
   const Eigen::Vector2f* rays = surface.rays->row(0);
   for (int row = r; row < surface.height() - r; ++row) {
     for (int column = r; column < width - r; ++column) {
-      const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column);
+      const std::size_t i = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                            static_cast<std::size_t>(column);
       if (good[i] == 0) continue;
-      if (sums.Count(row - kRimRadius, row + kRimRadius + 1, column - kRimRadius, column + kRimRadius + 1) < kMinRimCount) continue;
+      if (sums.Count(row - kRimRadius, row + kRimRadius + 1, column - kRimRadius,
+                     column + kRimRadius + 1) < kMinRimCount)
+        continue;
       double across = 0.0;
       double down = 0.0;
-      if (!MeanDifference(sums, {row - r, row + r + 1, column - r, column}, {row - r, row + r + 1, column + 1, column + r + 1}, across) ||
-          !MeanDifference(sums, {row - r, row, column - r, column + r + 1}, {row + 1, row + r + 1, column - r, column + r + 1}, down))
+      if (!MeanDifference(sums, {row - r, row + r + 1, column - r, column},
+                          {row - r, row + r + 1, column + 1, column + r + 1}, across) ||
+          !MeanDifference(sums, {row - r, row, column - r, column + r + 1},
+                          {row + 1, row + r + 1, column - r, column + r + 1}, down))
         continue;
       // A plane a X + b Y + c Z = 1 has inverse depth a x + b y + c along the ray (x, y, 1).
       const Eigen::Vector2f& ray = rays[i];
       const std::size_t step = static_cast<std::size_t>(kHalfApart);
       const std::size_t step_down = step * static_cast<std::size_t>(width);
       const float a = static_cast<float>(across) / (rays[i + step].x() - rays[i - step].x());
-      const float b = static_cast<float>(down) / (rays[i + step_down].y() - rays[i - step_down].y());
+      const float b =
+          static_cast<float>(down) / (rays[i + step_down].y() - rays[i - step_down].y());
       const float inverse = surface.pixels[i].inverse_depth;
       const Eigen::Vector3f plane(a, b, inverse - a * ray.x() - b * ray.y());
       const float length = plane.norm();
@@ -188,7 +215,9 @@ Intrinsics WorkingIntrinsics(const Intrinsics& image) {
   const int block = std::max(1, (image.width + kWorkingWidth / 2) / kWorkingWidth);
   const int width = image.width / block;
   const int height = image.height / block;
-  if (width < 1 || height < 1) throw std::invalid_argument(fmt::format("view surface: image size {}x{}", image.width, image.height));
+  if (width < 1 || height < 1)
+    throw std::invalid_argument(
+        fmt::format("view surface: image size {}x{}", image.width, image.height));
   // Resized() is exact for the part of the image that whole blocks cover.
   Intrinsics covered = image;
   covered.width = width * block;
@@ -196,16 +225,21 @@ Intrinsics WorkingIntrinsics(const Intrinsics& image) {
   return Resized(covered, width, height);
 }
 
-ViewSurface PrepareView(const DepthView& view, const std::shared_ptr<const RayTable>& working_rays, const ViewSurfaceOptions& options) {
-  if (!(options.min_depth_m > 0.0F && options.min_depth_m < options.max_depth_m && options.max_incidence_deg > 0.0F &&
-        options.max_incidence_deg <= 89.0F))
+ViewSurface PrepareView(const DepthView& view, const std::shared_ptr<const RayTable>& working_rays,
+                        const ViewSurfaceOptions& options) {
+  if (!(options.min_depth_m > 0.0F && options.min_depth_m < options.max_depth_m &&
+        options.max_incidence_deg > 0.0F && options.max_incidence_deg <= 89.0F))
     throw std::invalid_argument("view surface: depth range or incidence limit out of range");
   const cv::Mat& depth = view.depth_m;
-  if (depth.type() != CV_32FC1 || depth.cols != view.intrinsics.width || depth.rows != view.intrinsics.height)
-    throw std::invalid_argument(fmt::format("view surface: depth image {}x{} (type {}) does not fit a camera of {}x{}", depth.cols,
-                                            depth.rows, depth.type(), view.intrinsics.width, view.intrinsics.height));
-  if (!view.color_rgb.empty() && (view.color_rgb.type() != CV_8UC3 || view.color_rgb.size() != depth.size()))
-    throw std::invalid_argument("view surface: the colour image is not 8-bit RGB of the depth image's size");
+  if (depth.type() != CV_32FC1 || depth.cols != view.intrinsics.width ||
+      depth.rows != view.intrinsics.height)
+    throw std::invalid_argument(fmt::format(
+        "view surface: depth image {}x{} (type {}) does not fit a camera of {}x{}", depth.cols,
+        depth.rows, depth.type(), view.intrinsics.width, view.intrinsics.height));
+  if (!view.color_rgb.empty() &&
+      (view.color_rgb.type() != CV_8UC3 || view.color_rgb.size() != depth.size()))
+    throw std::invalid_argument(
+        "view surface: the colour image is not 8-bit RGB of the depth image's size");
   if (!working_rays || working_rays->intrinsics() != WorkingIntrinsics(view.intrinsics))
     throw std::invalid_argument("view surface: the rays are not those of the view's working image");
   ViewSurface surface;
@@ -226,15 +260,18 @@ ViewSurface PrepareView(const DepthView& view, const std::shared_ptr<const RayTa
     const std::size_t start = static_cast<std::size_t>(row) * static_cast<std::size_t>(width);
     sums.SetRow(row, surface.pixels.data() + start, good.data() + start, width);
   }
-  ComputeNormals(sums, good, std::cos(options.max_incidence_deg * static_cast<float>(kDegree)), surface);
+  ComputeNormals(sums, good, std::cos(options.max_incidence_deg * static_cast<float>(kDegree)),
+                 surface);
   return surface;
 }
 
-std::vector<ViewSurface> PrepareViews(std::span<const DepthView> views, const ViewSurfaceOptions& options) {
+std::vector<ViewSurface> PrepareViews(std::span<const DepthView> views,
+                                      const ViewSurfaceOptions& options) {
   RayTables tables;
   std::vector<std::shared_ptr<const RayTable>> rays;
   rays.reserve(views.size());
-  for (const DepthView& view : views) rays.push_back(tables.For(WorkingIntrinsics(view.intrinsics)));
+  for (const DepthView& view : views)
+    rays.push_back(tables.For(WorkingIntrinsics(view.intrinsics)));
   std::vector<ViewSurface> surfaces(views.size());
   tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t i) {
     CheckStop(options.stop);

@@ -1,4 +1,5 @@
-// One depth image made ready for surfaces: normals, noise weights, and what is not to be trusted left out.
+// One depth image made ready for surfaces: normals, noise weights, and what is not to be trusted
+// left out.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +17,10 @@
 
 namespace plumb {
 
-/// Axial noise of a structured-light depth camera, one standard deviation in metres (Nguyen et al. 2012).
-/// @param depth_m along the optical axis; @param cos_incidence between surface normal and viewing ray, in (0, 1].
+/// Axial noise of a structured-light depth camera, one standard deviation in metres (Nguyen et al.
+/// 2012).
+/// @param depth_m along the optical axis; @param cos_incidence between surface normal and viewing
+/// ray, in (0, 1].
 [[nodiscard]] float AxialSigma(float depth_m, float cos_incidence);
 
 struct ViewSurfaceOptions {
@@ -27,24 +30,27 @@ struct ViewSurfaceOptions {
   std::stop_token stop = {};        ///< Of PrepareViews(); polled, see CheckStop().
 };
 
-/// A depth image at working resolution (about 320 columns, whatever the sensor's): each working pixel is the mean
-/// INVERSE depth of a block of image pixels. Planes are linear in inverse depth, so the mean is exact on them, and the
-/// quantisation of structured light is uniform in it. All vectors have width * height values, row by row.
+/// A depth image at working resolution (about 320 columns, whatever the sensor's): each working
+/// pixel is the mean INVERSE depth of a block of image pixels. Planes are linear in inverse depth,
+/// so the mean is exact on them, and the quantisation of structured light is uniform in it. All
+/// vectors have width * height values, row by row.
 struct ViewSurface {
   /// Inverse depth and weight lie together because searches need both.
   struct Pixel {
     float inverse_depth = 0.0F;  ///< 1/m; 0 where nothing was measured.
-    float weight = 0.0F;         ///< 1 / variance (1/m^2) times the cosine of incidence; 0: not to be used
-                                 ///< (depth edge, rim, grazing view, out of range).
+    float weight = 0.0F;  ///< 1 / variance (1/m^2) times the cosine of incidence; 0: not to be used
+                          ///< (depth edge, rim, grazing view, out of range).
   };
 
   Intrinsics intrinsics;  ///< Of the working image.
   int block = 1;          ///< Image pixels per working pixel, each way.
   cv::Mat color_rgb;      ///< As in the view: image resolution, or empty.
   Pose T_world_camera = Pose::Identity();
-  std::shared_ptr<const RayTable> rays;  ///< Of the working pixels; shared by the views of one camera.
+  std::shared_ptr<const RayTable>
+      rays;  ///< Of the working pixels; shared by the views of one camera.
   std::vector<Pixel> pixels;
-  std::vector<Eigen::Vector3f> normals;  ///< Camera frame, unit, towards the camera; where weight > 0.
+  std::vector<Eigen::Vector3f>
+      normals;  ///< Camera frame, unit, towards the camera; where weight > 0.
 
   [[nodiscard]] int width() const { return intrinsics.width; }
   [[nodiscard]] int height() const { return intrinsics.height; }
@@ -65,10 +71,13 @@ struct ViewSurface {
 /// Prepares one view.
 /// @param working_rays  RayTable of WorkingIntrinsics(view.intrinsics).
 /// @throws std::invalid_argument if images, intrinsics, rays or options do not fit together.
-[[nodiscard]] ViewSurface PrepareView(const DepthView& view, const std::shared_ptr<const RayTable>& working_rays,
+[[nodiscard]] ViewSurface PrepareView(const DepthView& view,
+                                      const std::shared_ptr<const RayTable>& working_rays,
                                       const ViewSurfaceOptions& options = {});
 
-/// Prepares all views, in parallel. Deterministic. @throws std::invalid_argument naming the view that does not fit.
-[[nodiscard]] std::vector<ViewSurface> PrepareViews(std::span<const DepthView> views, const ViewSurfaceOptions& options = {});
+/// Prepares all views, in parallel. Deterministic. @throws std::invalid_argument naming the view
+/// that does not fit.
+[[nodiscard]] std::vector<ViewSurface> PrepareViews(std::span<const DepthView> views,
+                                                    const ViewSurfaceOptions& options = {});
 
 }  // namespace plumb

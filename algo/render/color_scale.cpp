@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 
 namespace plumb {
 namespace {
@@ -46,7 +46,8 @@ Color Between(std::span<const Stop> stops, double at) {
   const double fraction = std::clamp((at - low.at) / (high.at - low.at), 0.0, 1.0);
   Color color;
   for (std::size_t i = 0; i < 3; ++i) {
-    color[i] = static_cast<std::uint8_t>(std::lround(low.color[i] + fraction * (high.color[i] - low.color[i])));
+    color[i] = static_cast<std::uint8_t>(
+        std::lround(low.color[i] + fraction * (high.color[i] - low.color[i])));
   }
   return color;
 }
@@ -55,7 +56,8 @@ Color Between(std::span<const Stop> stops, double at) {
 
 ColorScale ColorScale::Signed(double tolerance_m) {
   if (!(tolerance_m > 0) || !std::isfinite(tolerance_m)) {
-    throw std::invalid_argument(fmt::format("a colour scale needs a tolerance above 0 m, found {}", tolerance_m));
+    throw std::invalid_argument(
+        fmt::format("a colour scale needs a tolerance above 0 m, found {}", tolerance_m));
   }
   return {true, tolerance_m};
 }
@@ -64,14 +66,16 @@ ColorScale ColorScale::Paper() { return {false, 0.0}; }
 
 double ColorScale::Position(double difference_m) const {
   if (!is_signed_) return std::clamp(std::abs(difference_m) / kPaperRange_m, 0.0, 1.0);
-  const double size = std::min(1.0, std::log1p(std::abs(difference_m) / tolerance_m_) / std::log1p(kRangeInTolerances));
+  const double size = std::min(
+      1.0, std::log1p(std::abs(difference_m) / tolerance_m_) / std::log1p(kRangeInTolerances));
   return 0.5 + std::copysign(0.5 * size, difference_m);
 }
 
 double ColorScale::Difference(double position) const {
   if (!is_signed_) return position * kPaperRange_m;
   const double size = std::abs(2.0 * position - 1.0);
-  return std::copysign(tolerance_m_ * std::expm1(size * std::log1p(kRangeInTolerances)), position - 0.5);
+  return std::copysign(tolerance_m_ * std::expm1(size * std::log1p(kRangeInTolerances)),
+                       position - 0.5);
 }
 
 Color ColorScale::operator()(double difference_m) const {
@@ -81,7 +85,8 @@ Color ColorScale::operator()(double difference_m) const {
     const auto red = static_cast<std::uint8_t>(std::lround(255.0 * position));
     return {red, 0, static_cast<std::uint8_t>(255 - red)};
   }
-  return Between(difference_m < 0 ? std::span<const Stop>(kBelow) : std::span<const Stop>(kAbove), std::abs(2.0 * position - 1.0));
+  return Between(difference_m < 0 ? std::span<const Stop>(kBelow) : std::span<const Stop>(kAbove),
+                 std::abs(2.0 * position - 1.0));
 }
 
 std::vector<ColorScale::Tick> ColorScale::Ticks() const {

@@ -13,9 +13,10 @@ inline constexpr Color kHoleColor = {150, 152, 156};
 
 /// Maps a difference in metres to a colour.
 ///
-/// Signed (the default of Plumb): blue below, orange above, nearly white within the tolerance, with a step at the tolerance;
-/// safe for colour-blind eyes (blue and orange, lightness falls with size). The axis is logarithmic in |e| / tolerance so that
-/// 1, 2, 5, 10 and 20 tolerances stay apart. Paper: blue at 0 to red at 10 cm of |e|, linear.
+/// Signed (the default of Plumb): blue below, orange above, nearly white within the tolerance, with
+/// a step at the tolerance; safe for colour-blind eyes (blue and orange, lightness falls with
+/// size). The axis is logarithmic in |e| / tolerance so that 1, 2, 5, 10 and 20 tolerances stay
+/// apart. Paper: blue at 0 to red at 10 cm of |e|, linear.
 class ColorScale {
  public:
   /// @throws std::invalid_argument unless tolerance_m > 0.
@@ -41,7 +42,8 @@ class ColorScale {
   [[nodiscard]] double tolerance_m() const { return tolerance_m_; }
 
  private:
-  ColorScale(bool is_signed, double tolerance_m) : is_signed_(is_signed), tolerance_m_(tolerance_m) {}
+  ColorScale(bool is_signed, double tolerance_m)
+      : is_signed_(is_signed), tolerance_m_(tolerance_m) {}
   bool is_signed_;
   double tolerance_m_;  // signed scale only
 };

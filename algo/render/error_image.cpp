@@ -18,11 +18,14 @@ constexpr Color kFaint = {92, 99, 106};
 constexpr double kReliefStrength = 0.30;
 constexpr double kPaleOutside = 0.45;  // share of white outside the region
 
-cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& options, const ColorScale& scale, const cv::Rect& cells) {
+cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& options,
+                     const ColorScale& scale, const cv::Rect& cells) {
   // A table over the legend: one logarithm a cell is cheap, a search among colours is not needed.
   constexpr int kTableSize = 4096;
   std::vector<Color> table(kTableSize + 1);
-  for (int i = 0; i <= kTableSize; ++i) table[static_cast<std::size_t>(i)] = scale(scale.Difference(static_cast<double>(i) / kTableSize));
+  for (int i = 0; i <= kTableSize; ++i)
+    table[static_cast<std::size_t>(i)] =
+        scale(scale.Difference(static_cast<double>(i) / kTableSize));
   const cv::Mat relief = options.relief != nullptr ? Relief(*options.relief, cells) : cv::Mat();
   cv::Mat picture(cells.height, cells.width, CV_8UC3);
   for (int row = 0; row < cells.height; ++row) {
@@ -33,17 +36,23 @@ cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& optio
         out[column] = cv::Vec3b(kHoleColor[0], kHoleColor[1], kHoleColor[2]);
         continue;
       }
-      const Color& color = table[static_cast<std::size_t>(std::lround(scale.Position(e) * kTableSize))];
-      double shade = relief.empty() ? 1.0 : 1.0 - kReliefStrength * (1.0 - std::min(1.0F, relief.at<float>(row, column)));
+      const Color& color =
+          table[static_cast<std::size_t>(std::lround(scale.Position(e) * kTableSize))];
+      double shade =
+          relief.empty()
+              ? 1.0
+              : 1.0 - kReliefStrength * (1.0 - std::min(1.0F, relief.at<float>(row, column)));
       double pale = 0.0;
       if (!options.region_mask.empty()) {
         const auto width = static_cast<std::size_t>(difference.grid.width);
-        const std::size_t cell = static_cast<std::size_t>(cells.y + row) * width + static_cast<std::size_t>(cells.x + column);
+        const std::size_t cell = static_cast<std::size_t>(cells.y + row) * width +
+                                 static_cast<std::size_t>(cells.x + column);
         pale = options.region_mask[cell] != 0 ? 0.0 : kPaleOutside;
       }
       for (int channel = 0; channel < 3; ++channel) {
         const double value = color[static_cast<std::size_t>(channel)] * shade;
-        out[column][channel] = static_cast<std::uint8_t>(std::lround(value + pale * (255.0 - value)));
+        out[column][channel] =
+            static_cast<std::uint8_t>(std::lround(value + pale * (255.0 - value)));
       }
     }
   }
@@ -55,14 +64,16 @@ void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, b
   double y = area.y;
   const TextStyle head{.size_px = 18, .color = kInk, .bold = true};
   figure.Text(x, y + 14, scale.is_signed() ? "height error" : "|height error|", head);
-  figure.Text(x, y + 38, "in " + std::string(scale.is_signed() ? "millimetres" : "centimetres"), {.size_px = 16, .color = kFaint});
+  figure.Text(x, y + 38, "in " + std::string(scale.is_signed() ? "millimetres" : "centimetres"),
+              {.size_px = 16, .color = kFaint});
   y += scale.is_signed() ? 84 : 60;
   const TextStyle small{.size_px = 15, .color = kFaint};
   if (scale.is_signed()) figure.Text(x, y - 15, "current is higher", small);
   const double below = (scale.is_signed() ? 24 : 0) + 150 + (has_region ? 46 : 0);
   const double height = std::max(180.0, area.y + area.height - y - below);
   for (int i = 0; i < static_cast<int>(height); ++i) {
-    figure.FillRectangle(x, y + i, bar_width, 1.02, scale(scale.Difference(1.0 - (i + 0.5) / height)));
+    figure.FillRectangle(x, y + i, bar_width, 1.02,
+                         scale(scale.Difference(1.0 - (i + 0.5) / height)));
   }
   figure.FrameRectangle(x, y, bar_width, height, kFaint);
   double last_y = -1e9;
@@ -70,7 +81,8 @@ void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, b
     const double at = y + (1.0 - scale.Position(tick.difference_m)) * height;
     if (std::abs(at - last_y) < 15) continue;
     last_y = at;
-    const bool is_tolerance = scale.is_signed() && std::abs(std::abs(tick.difference_m) - scale.tolerance_m()) < 1e-12;
+    const bool is_tolerance =
+        scale.is_signed() && std::abs(std::abs(tick.difference_m) - scale.tolerance_m()) < 1e-12;
     figure.Line(x + bar_width, at, x + bar_width + 8, at, kInk, is_tolerance ? 2.5 : 1.2);
     figure.Text(x + bar_width + 14, at + 6, tick.label + (is_tolerance ? "  tolerance" : ""),
                 {.size_px = 17, .color = kInk, .bold = is_tolerance});
@@ -78,22 +90,27 @@ void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, b
   y += height;
   if (scale.is_signed()) figure.Text(x, y + 22, "current is lower", small), y += 24;
   y = DrawSwatch(figure, x, y + 18, area.width, kHoleColor, "not measured in both scans");
-  if (has_region) DrawSwatch(figure, x, y, area.width, {255, 255, 255}, "outlined: the region; paler outside");
+  if (has_region)
+    DrawSwatch(figure, x, y, area.width, {255, 255, 255}, "outlined: the region; paler outside");
 }
 
 }  // namespace
 
 cv::Mat DrawErrorImage(const HeightMap& difference, const ErrorImageOptions& options) {
   const bool bad_relief = options.relief != nullptr && !(options.relief->grid == difference.grid);
-  const bool bad_region = !options.region_mask.empty() && options.region_mask.size() != difference.grid.num_cells();
+  const bool bad_region =
+      !options.region_mask.empty() && options.region_mask.size() != difference.grid.num_cells();
   if (bad_relief || bad_region)
-    throw std::invalid_argument(fmt::format("the {} of an error image lies on another grid", bad_relief ? "relief" : "region"));
-  const ColorScale scale = options.paper_colors ? ColorScale::Paper() : ColorScale::Signed(options.tolerance_m);
+    throw std::invalid_argument(fmt::format("the {} of an error image lies on another grid",
+                                            bad_relief ? "relief" : "region"));
+  const ColorScale scale =
+      options.paper_colors ? ColorScale::Paper() : ColorScale::Signed(options.tolerance_m);
   const cv::Rect cells = CellsWithData(difference.grid, {difference.z});
   std::vector<std::uint8_t> outline;
   if (!options.region_mask.empty()) {
     for (int row = cells.y; row < cells.y + cells.height; ++row) {
-      const auto first = options.region_mask.begin() + static_cast<std::ptrdiff_t>(row) * difference.grid.width + cells.x;
+      const auto first = options.region_mask.begin() +
+                         static_cast<std::ptrdiff_t>(row) * difference.grid.width + cells.x;
       outline.insert(outline.end(), first, first + cells.width);
     }
   }
@@ -102,7 +119,9 @@ cv::Mat DrawErrorImage(const HeightMap& difference, const ErrorImageOptions& opt
                    .grid = Part(difference.grid, cells),
                    .cells_rgb = ColoredCells(difference, options, scale, cells),
                    .outline = outline,
-                   .draw_legend = [&](Figure& figure, const cv::Rect& area) { DrawLegend(figure, area, scale, !outline.empty()); }});
+                   .draw_legend = [&](Figure& figure, const cv::Rect& area) {
+                     DrawLegend(figure, area, scale, !outline.empty());
+                   }});
 }
 
 }  // namespace plumb

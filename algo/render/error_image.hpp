@@ -7,24 +7,28 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "algo/base/units.hpp"
 #include "algo/render/color_scale.hpp"
 #include "algo/types/height_map.hpp"
-#include "algo/types/units.hpp"
 
 namespace plumb {
 
 struct ErrorImageOptions {
   double tolerance_m = 3 * kMillimetre;  ///< The signed scale is tied to it; > 0.
-  bool paper_colors = false;             ///< The paper's scale instead: |e|, blue at 0, red at 10 cm.
+  bool paper_colors = false;  ///< The paper's scale instead: |e|, blue at 0, red at 10 cm.
   std::string title = "Height error: current \u2212 reference";
   std::string subtitle;
-  const HeightMap* relief = nullptr;          ///< Heights on the same grid, whose shape shades the colours a little.
-  std::span<const std::uint8_t> region_mask = {};  ///< Cells inside the region (1), as the grid; outlined, the rest paler; or empty.
+  const HeightMap* relief =
+      nullptr;  ///< Heights on the same grid, whose shape shades the colours a little.
+  std::span<const std::uint8_t> region_mask =
+      {};  ///< Cells inside the region (1), as the grid; outlined, the rest paler; or empty.
 };
 
-/// Draws a map of differences (metres) with y up, holes grey, axes, scale bar, legend with units, and the research notice.
-/// The picture shows the part of the grid that holds data. CV_8UC3, channels red, green, blue.
+/// Draws a map of differences (metres) with y up, holes grey, axes, scale bar, legend with units,
+/// and the research notice. The picture shows the part of the grid that holds data. CV_8UC3,
+/// channels red, green, blue.
 /// @throws std::invalid_argument if the grid is empty, or relief or region have another grid.
-[[nodiscard]] cv::Mat DrawErrorImage(const HeightMap& difference, const ErrorImageOptions& options = {});
+[[nodiscard]] cv::Mat DrawErrorImage(const HeightMap& difference,
+                                     const ErrorImageOptions& options = {});
 
 }  // namespace plumb

@@ -34,11 +34,15 @@ class Figure {
   void Text(double x, double y, std::string_view text, const TextStyle& style);
   [[nodiscard]] double TextWidth(std::string_view text, const TextStyle& style);
   /// Splits a text into lines that fit.
-  [[nodiscard]] std::vector<std::string> Wrap(std::string_view text, const TextStyle& style, double width);
+  [[nodiscard]] std::vector<std::string> Wrap(std::string_view text, const TextStyle& style,
+                                              double width);
 
-  void FillRectangle(double x, double y, double width, double height, const Color& color, double opacity = 1.0);
-  void FrameRectangle(double x, double y, double width, double height, const Color& color, double line_width = 1.0);
-  void Line(double x0, double y0, double x1, double y1, const Color& color, double line_width = 1.0, double opacity = 1.0);
+  void FillRectangle(double x, double y, double width, double height, const Color& color,
+                     double opacity = 1.0);
+  void FrameRectangle(double x, double y, double width, double height, const Color& color,
+                      double line_width = 1.0);
+  void Line(double x0, double y0, double x1, double y1, const Color& color, double line_width = 1.0,
+            double opacity = 1.0);
   void FillTriangle(const std::array<Eigen::Vector2d, 3>& corners, const Color& color);
 
   /// Puts an RGB picture with its top left corner at (x, y), pixel for pixel.

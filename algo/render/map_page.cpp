@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
-#include "algo/types/notice.hpp"
-#include "algo/types/units.hpp"
+#include "algo/base/notice.hpp"
+#include "algo/base/units.hpp"
 
 namespace plumb {
 namespace {
@@ -32,7 +32,8 @@ double RoundLength(double length_m) {
 }
 
 std::string LengthLabel(double length_m) {
-  return length_m < 0.995 ? fmt::format("{:.3g} cm", length_m / kCentimetre) : fmt::format("{:.3g} m", length_m);
+  return length_m < 0.995 ? fmt::format("{:.3g} cm", length_m / kCentimetre)
+                          : fmt::format("{:.3g} m", length_m);
 }
 
 /// Where the map lies on the page and how cells map to pixels.
@@ -41,19 +42,24 @@ struct MapArea {
   GridShape grid;
   [[nodiscard]] double px_per_m() const { return box.width / (grid.width * grid.step); }
   [[nodiscard]] double PixelX(double x_m) const { return box.x + (x_m - grid.x_min) * px_per_m(); }
-  [[nodiscard]] double PixelY(double y_m) const { return box.y + box.height - (y_m - grid.y_min) * px_per_m(); }
+  [[nodiscard]] double PixelY(double y_m) const {
+    return box.y + box.height - (y_m - grid.y_min) * px_per_m();
+  }
 };
 
 cv::Mat ScaledMap(const MapPage& page, const cv::Size& size) {
   cv::Mat upright, scaled;
   cv::flip(page.cells_rgb, upright, 0);
-  cv::resize(upright, scaled, size, 0, 0, size.width < upright.cols ? cv::INTER_AREA : cv::INTER_LINEAR);
+  cv::resize(upright, scaled, size, 0, 0,
+             size.width < upright.cols ? cv::INTER_AREA : cv::INTER_LINEAR);
   if (!page.outline.empty()) {
-    cv::Mat mask(page.grid.height, page.grid.width, CV_8UC1, const_cast<std::uint8_t*>(page.outline.data()));
+    cv::Mat mask(page.grid.height, page.grid.width, CV_8UC1,
+                 const_cast<std::uint8_t*>(page.outline.data()));
     cv::Mat edge;
     cv::flip(mask, edge, 0);
     cv::resize(edge, edge, size, 0, 0, cv::INTER_NEAREST);
-    cv::morphologyEx(edge, edge, cv::MORPH_GRADIENT, cv::getStructuringElement(cv::MORPH_ELLIPSE, {3, 3}));
+    cv::morphologyEx(edge, edge, cv::MORPH_GRADIENT,
+                     cv::getStructuringElement(cv::MORPH_ELLIPSE, {3, 3}));
     scaled.setTo(cv::Scalar(kInk[0], kInk[1], kInk[2]), edge);
   }
   return scaled;
@@ -64,10 +70,15 @@ void DrawAxes(Figure& figure, const MapArea& area) {
   const double step_m = RoundLength(std::max(0.02, 190.0 / area.px_per_m()));
   const TextStyle label{.size_px = 16, .color = kFaint, .align = HorizontalAlign::kCentre};
   const double bottom = area.box.y + area.box.height;
-  const auto text = [](double value) { return fmt::format("{:.1f}", std::abs(value) < 1e-9 ? 0.0 : value); };
-  const auto fine = [](double value) { return fmt::format("{:.2f}", std::abs(value) < 1e-9 ? 0.0 : value); };
+  const auto text = [](double value) {
+    return fmt::format("{:.1f}", std::abs(value) < 1e-9 ? 0.0 : value);
+  };
+  const auto fine = [](double value) {
+    return fmt::format("{:.2f}", std::abs(value) < 1e-9 ? 0.0 : value);
+  };
   const auto format = [&](double value) { return step_m < 0.095 ? fine(value) : text(value); };
-  for (double i = std::ceil(grid.x_min / step_m); i * step_m <= grid.x_min + grid.width * grid.step; ++i) {
+  for (double i = std::ceil(grid.x_min / step_m); i * step_m <= grid.x_min + grid.width * grid.step;
+       ++i) {
     const double x = area.PixelX(i * step_m);
     figure.Line(x, area.box.y, x, bottom, kInk, 1.0, 0.13);
     figure.Line(x, bottom, x, bottom + 6, kFaint, 1.5);
@@ -75,14 +86,17 @@ void DrawAxes(Figure& figure, const MapArea& area) {
   }
   TextStyle left = label;
   left.align = HorizontalAlign::kRight;
-  for (double i = std::ceil(grid.y_min / step_m); i * step_m <= grid.y_min + grid.height * grid.step; ++i) {
+  for (double i = std::ceil(grid.y_min / step_m);
+       i * step_m <= grid.y_min + grid.height * grid.step; ++i) {
     const double y = area.PixelY(i * step_m);
     figure.Line(area.box.x, y, area.box.x + area.box.width, y, kInk, 1.0, 0.13);
     figure.Line(area.box.x - 6, y, area.box.x, y, kFaint, 1.5);
     figure.Text(area.box.x - 11, y + 6, format(i * step_m), left);
   }
-  figure.FrameRectangle(area.box.x - 0.5, area.box.y - 0.5, area.box.width + 1, area.box.height + 1, kFaint);
-  figure.Text(area.box.x + area.box.width / 2.0, bottom + 49, "x (m), reference marker's frame", label);
+  figure.FrameRectangle(area.box.x - 0.5, area.box.y - 0.5, area.box.width + 1, area.box.height + 1,
+                        kFaint);
+  figure.Text(area.box.x + area.box.width / 2.0, bottom + 49, "x (m), reference marker's frame",
+              label);
   left.align = HorizontalAlign::kLeft;
   figure.Text(14, area.box.y + area.box.height / 2.0 + 6, "y (m)", left);
 }
@@ -95,7 +109,8 @@ void DrawScaleBar(Figure& figure, const MapArea& area) {
   figure.Text(x + 12 + length_px / 2, y + 17, LengthLabel(length_m),
               {.size_px = 17, .color = kInk, .bold = true, .align = HorizontalAlign::kCentre});
   figure.FillRectangle(x + 12, y + 28, length_px, 7, kInk);
-  for (const double end : {x + 12, x + 12 + length_px}) figure.Line(end, y + 23, end, y + 40, kInk, 2.5);
+  for (const double end : {x + 12, x + 12 + length_px})
+    figure.Line(end, y + 23, end, y + 40, kInk, 2.5);
 }
 
 void DrawTitle(Figure& figure, const MapPage& page) {
@@ -104,7 +119,8 @@ void DrawTitle(Figure& figure, const MapPage& page) {
   while (title.size_px > 14 && figure.TextWidth(page.title, title) > width) title.size_px -= 1;
   figure.Text(24, 42, page.title, title);
   TextStyle subtitle{.size_px = 18, .color = kFaint};
-  while (subtitle.size_px > 11 && figure.TextWidth(page.subtitle, subtitle) > width) subtitle.size_px -= 0.5;
+  while (subtitle.size_px > 11 && figure.TextWidth(page.subtitle, subtitle) > width)
+    subtitle.size_px -= 0.5;
   figure.Text(24, 72, page.subtitle, subtitle);
 }
 
@@ -114,7 +130,8 @@ cv::Rect CellsWithData(const GridShape& grid, std::initializer_list<std::span<co
   int x0 = grid.width, x1 = -1, y0 = grid.height, y1 = -1;
   for (const std::span<const float> map : maps) {
     for (int row = 0; row < grid.height; ++row) {
-      const float* z = map.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width);
+      const float* z =
+          map.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width);
       int first = 0, last = grid.width - 1;
       while (first <= last && !std::isfinite(z[first])) ++first;
       if (first > last) continue;
@@ -126,7 +143,8 @@ cv::Rect CellsWithData(const GridShape& grid, std::initializer_list<std::span<co
   const cv::Rect whole(0, 0, grid.width, grid.height);
   if (x1 < 0) return whole;
   const int margin = static_cast<int>(std::lround(0.03 / grid.step));
-  return cv::Rect(x0 - margin, y0 - margin, x1 - x0 + 1 + 2 * margin, y1 - y0 + 1 + 2 * margin) & whole;
+  return cv::Rect(x0 - margin, y0 - margin, x1 - x0 + 1 + 2 * margin, y1 - y0 + 1 + 2 * margin) &
+         whole;
 }
 
 GridShape Part(const GridShape& grid, const cv::Rect& cells) {
@@ -153,14 +171,16 @@ cv::Mat Relief(const HeightMap& heights, const cv::Rect& cells) {
       const float dx = (heights.at(y, x + 1) - heights.at(y, x - 1)) / (2 * step);
       const float dy = (heights.at(y + 1, x) - heights.at(y - 1, x)) / (2 * step);
       if (!std::isfinite(dx + dy)) continue;
-      const float cosine = (-dx * light.x() - dy * light.y() + light.z()) / std::sqrt(dx * dx + dy * dy + 1.0F);
+      const float cosine =
+          (-dx * light.x() - dy * light.y() + light.z()) / std::sqrt(dx * dx + dy * dy + 1.0F);
       out[column] = kAmbient + (1.0F - kAmbient) * std::max(0.0F, cosine) / light.z();
     }
   }
   return relief;
 }
 
-double DrawSwatch(Figure& figure, double x, double y, double width, const Color& color, std::string_view meaning) {
+double DrawSwatch(Figure& figure, double x, double y, double width, const Color& color,
+                  std::string_view meaning) {
   constexpr double kSize = 24;
   const TextStyle style{.size_px = 16, .color = kInk};
   figure.FillRectangle(x, y, kSize, kSize, color);
@@ -174,27 +194,34 @@ double DrawSwatch(Figure& figure, double x, double y, double width, const Color&
 }
 
 cv::Mat DrawPage(const MapPage& page) {
-  if (page.grid.width <= 0 || page.grid.height <= 0) throw std::invalid_argument("a picture needs a grid with at least one cell");
-  const double scale = std::min(static_cast<double>(kMapWidth_px) / page.grid.width, static_cast<double>(kMapHeight_px) / page.grid.height);
+  if (page.grid.width <= 0 || page.grid.height <= 0)
+    throw std::invalid_argument("a picture needs a grid with at least one cell");
+  const double scale = std::min(static_cast<double>(kMapWidth_px) / page.grid.width,
+                                static_cast<double>(kMapHeight_px) / page.grid.height);
   const cv::Size map_size(std::max(1, static_cast<int>(std::lround(scale * page.grid.width))),
                           std::max(1, static_cast<int>(std::lround(scale * page.grid.height))));
   const int content_width = std::max(map_size.width, 620);
   const int body_height = std::max(map_size.height, kMinMapHeight_px);
   const int width = kLeft_px + content_width + kGap_px + kLegend_px + 12;
 
-  const TextStyle notice_style{.size_px = 19, .color = kNoticeInk, .bold = true, .align = HorizontalAlign::kCentre};
-  const std::vector<std::string> notice = Figure(8, 8).Wrap(kResearchNotice, notice_style, width - 48);
+  const TextStyle notice_style{
+      .size_px = 19, .color = kNoticeInk, .bold = true, .align = HorizontalAlign::kCentre};
+  const std::vector<std::string> notice =
+      Figure(8, 8).Wrap(kResearchNotice, notice_style, width - 48);
   const int notice_height = 20 + 27 * static_cast<int>(notice.size());
   Figure figure(width, kTop_px + body_height + kAxis_px + notice_height);
 
-  const MapArea area{.box = cv::Rect(kLeft_px + (content_width - map_size.width) / 2, kTop_px + (body_height - map_size.height) / 2,
-                                     map_size.width, map_size.height),
+  const MapArea area{.box = cv::Rect(kLeft_px + (content_width - map_size.width) / 2,
+                                     kTop_px + (body_height - map_size.height) / 2, map_size.width,
+                                     map_size.height),
                      .grid = page.grid};
   figure.Picture(area.box.x, area.box.y, ScaledMap(page, map_size));
   DrawAxes(figure, area);
   DrawScaleBar(figure, area);
   DrawTitle(figure, page);
-  if (page.draw_legend) page.draw_legend(figure, cv::Rect(kLeft_px + content_width + kGap_px, kTop_px, kLegend_px, body_height));
+  if (page.draw_legend)
+    page.draw_legend(
+        figure, cv::Rect(kLeft_px + content_width + kGap_px, kTop_px, kLegend_px, body_height));
 
   const double top = figure.height() - notice_height;
   figure.FillRectangle(0, top, width, notice_height, kNoticePaper);

@@ -1,4 +1,5 @@
-// The page around a map: title, axes, scale bar, legend column and the research notice. Shared by all pictures.
+// The page around a map: title, axes, scale bar, legend column and the research notice. Shared by
+// all pictures.
 #pragma once
 
 #include <cstdint>
@@ -17,17 +18,19 @@ namespace plumb {
 
 struct MapPage {
   std::string title;
-  std::string subtitle;                   ///< One line under the title, shrunk to fit; may be empty.
-  GridShape grid;                         ///< Of `cells_rgb`.
-  cv::Mat cells_rgb;                      ///< CV_8UC3, one cell a pixel, row 0 at y_min (the page turns y up).
-  std::span<const std::uint8_t> outline;  ///< Cells inside an outlined region (1) or not (0), as the grid; may be empty.
+  std::string subtitle;  ///< One line under the title, shrunk to fit; may be empty.
+  GridShape grid;        ///< Of `cells_rgb`.
+  cv::Mat cells_rgb;     ///< CV_8UC3, one cell a pixel, row 0 at y_min (the page turns y up).
+  std::span<const std::uint8_t>
+      outline;  ///< Cells inside an outlined region (1) or not (0), as the grid; may be empty.
   /// Draws the legend into the column at the right of the map.
   std::function<void(Figure&, const cv::Rect&)> draw_legend;
 };
 
-/// Cells to show: all that hold a value in one of the maps, and a margin; the whole grid if none does.
-/// Columns and rows, row 0 at y_min.
-[[nodiscard]] cv::Rect CellsWithData(const GridShape& grid, std::initializer_list<std::span<const float>> maps);
+/// Cells to show: all that hold a value in one of the maps, and a margin; the whole grid if none
+/// does. Columns and rows, row 0 at y_min.
+[[nodiscard]] cv::Rect CellsWithData(const GridShape& grid,
+                                     std::initializer_list<std::span<const float>> maps);
 
 /// That part of a grid.
 [[nodiscard]] GridShape Part(const GridShape& grid, const cv::Rect& cells);
@@ -36,10 +39,11 @@ struct MapPage {
 [[nodiscard]] cv::Mat DrawPage(const MapPage& page);
 
 /// A legend line: a swatch and its meaning (wrapped); returns the y below it.
-double DrawSwatch(Figure& figure, double x, double y, double width, const Color& color, std::string_view meaning);
+double DrawSwatch(Figure& figure, double x, double y, double width, const Color& color,
+                  std::string_view meaning);
 
-/// How light a surface looks at a cell, about 0.55..1, lit from the upper left; 1 where a neighbour is missing.
-/// Row 0 at y_min; CV_32FC1.
+/// How light a surface looks at a cell, about 0.55..1, lit from the upper left; 1 where a neighbour
+/// is missing. Row 0 at y_min; CV_32FC1.
 [[nodiscard]] cv::Mat Relief(const HeightMap& heights, const cv::Rect& cells);
 
 }  // namespace plumb

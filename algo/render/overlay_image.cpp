@@ -11,7 +11,8 @@
 namespace plumb {
 namespace {
 
-// Lightness differs as well as hue, and violet lies between: readable with every kind of colour vision.
+// Lightness differs as well as hue, and violet lies between: readable with every kind of colour
+// vision.
 constexpr Color kReference = {40, 104, 214};
 constexpr Color kCurrent = {226, 62, 46};
 constexpr Color kAgree = {176, 160, 190};
@@ -19,14 +20,17 @@ constexpr Color kInk = {33, 37, 41};
 
 Color Mix(const Color& a, const Color& b, double share_of_b) {
   Color mixed;
-  for (std::size_t i = 0; i < 3; ++i) mixed[i] = static_cast<std::uint8_t>(std::lround(a[i] + share_of_b * (b[i] - a[i])));
+  for (std::size_t i = 0; i < 3; ++i)
+    mixed[i] = static_cast<std::uint8_t>(std::lround(a[i] + share_of_b * (b[i] - a[i])));
   return mixed;
 }
 
 /// Colour where both surfaces are: from "agree" to the one on top within four tolerances.
 Color BothColor(double current_minus_reference_m, double tolerance_m) {
-  const double excess = std::clamp((std::abs(current_minus_reference_m) - tolerance_m) / (3 * tolerance_m), 0.0, 1.0);
-  return Mix(kAgree, current_minus_reference_m > 0 ? kCurrent : kReference, excess * (2.0 - excess));
+  const double excess =
+      std::clamp((std::abs(current_minus_reference_m) - tolerance_m) / (3 * tolerance_m), 0.0, 1.0);
+  return Mix(kAgree, current_minus_reference_m > 0 ? kCurrent : kReference,
+             excess * (2.0 - excess));
 }
 
 void DrawLegend(Figure& figure, const cv::Rect& area, double tolerance_m) {
@@ -35,32 +39,40 @@ void DrawLegend(Figure& figure, const cv::Rect& area, double tolerance_m) {
   double y = area.y + 34;
   y = DrawSwatch(figure, x, y, area.width, kReference, "reference");
   y = DrawSwatch(figure, x, y, area.width, kCurrent, "current");
-  y = DrawSwatch(figure, x, y, area.width, kAgree, fmt::format("both, within {:.3g} mm", tolerance_m / kMillimetre));
+  y = DrawSwatch(figure, x, y, area.width, kAgree,
+                 fmt::format("both, within {:.3g} mm", tolerance_m / kMillimetre));
   DrawSwatch(figure, x, y, area.width, kHoleColor, "not measured in either scan");
 }
 
 }  // namespace
 
-cv::Mat DrawOverlayImage(const HeightMap& reference, const HeightMap& current, const OverlayImageOptions& options) {
-  if (!(reference.grid == current.grid)) throw std::invalid_argument("an overlay needs both height maps on one grid");
+cv::Mat DrawOverlayImage(const HeightMap& reference, const HeightMap& current,
+                         const OverlayImageOptions& options) {
+  if (!(reference.grid == current.grid))
+    throw std::invalid_argument("an overlay needs both height maps on one grid");
   if (!(options.tolerance_m > 0))
-    throw std::invalid_argument(fmt::format("an overlay needs a tolerance above 0 m, found {}", options.tolerance_m));
+    throw std::invalid_argument(
+        fmt::format("an overlay needs a tolerance above 0 m, found {}", options.tolerance_m));
   const cv::Rect cells = CellsWithData(reference.grid, {reference.z, current.z});
-  const cv::Mat reference_relief = Relief(reference, cells), current_relief = Relief(current, cells);
+  const cv::Mat reference_relief = Relief(reference, cells),
+                current_relief = Relief(current, cells);
   cv::Mat picture(cells.height, cells.width, CV_8UC3);
   for (int row = 0; row < cells.height; ++row) {
     auto* out = picture.ptr<cv::Vec3b>(row);
     for (int column = 0; column < cells.width; ++column) {
-      const float a = reference.at(cells.y + row, cells.x + column), b = current.at(cells.y + row, cells.x + column);
+      const float a = reference.at(cells.y + row, cells.x + column),
+                  b = current.at(cells.y + row, cells.x + column);
       const bool has_a = std::isfinite(a), has_b = std::isfinite(b);
       Color color = kHoleColor;
       double light = 1.0;
       if (has_a && has_b) color = BothColor(static_cast<double>(b) - a, options.tolerance_m);
       if (has_a != has_b) color = has_a ? kReference : kCurrent;
       if (has_a || has_b)
-        light = has_b && (!has_a || b > a) ? current_relief.at<float>(row, column) : reference_relief.at<float>(row, column);
+        light = has_b && (!has_a || b > a) ? current_relief.at<float>(row, column)
+                                           : reference_relief.at<float>(row, column);
       for (int channel = 0; channel < 3; ++channel) {
-        out[column][channel] = static_cast<std::uint8_t>(std::min(255L, std::lround(color[static_cast<std::size_t>(channel)] * light)));
+        out[column][channel] = static_cast<std::uint8_t>(
+            std::min(255L, std::lround(color[static_cast<std::size_t>(channel)] * light)));
       }
     }
   }
@@ -69,7 +81,9 @@ cv::Mat DrawOverlayImage(const HeightMap& reference, const HeightMap& current, c
                    .grid = Part(reference.grid, cells),
                    .cells_rgb = picture,
                    .outline = {},
-                   .draw_legend = [&](Figure& figure, const cv::Rect& area) { DrawLegend(figure, area, options.tolerance_m); }});
+                   .draw_legend = [&](Figure& figure, const cv::Rect& area) {
+                     DrawLegend(figure, area, options.tolerance_m);
+                   }});
 }
 
 }  // namespace plumb

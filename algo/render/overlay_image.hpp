@@ -5,8 +5,8 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "algo/base/units.hpp"
 #include "algo/types/height_map.hpp"
-#include "algo/types/units.hpp"
 
 namespace plumb {
 
@@ -16,10 +16,12 @@ struct OverlayImageOptions {
   std::string subtitle;
 };
 
-/// Draws two height maps of one grid as shaded surfaces: reference blue, current red, where both are: the colour of the one on
-/// top, blending to violet where they agree within the tolerance; holes grey; y up, axes, scale bar, legend and the
-/// research notice. CV_8UC3, channels red, green, blue.
+/// Draws two height maps of one grid as shaded surfaces: reference blue, current red, where both
+/// are: the colour of the one on top, blending to violet where they agree within the tolerance;
+/// holes grey; y up, axes, scale bar, legend and the research notice. CV_8UC3, channels red, green,
+/// blue.
 /// @throws std::invalid_argument if the grids differ or are empty, or the tolerance is not above 0.
-[[nodiscard]] cv::Mat DrawOverlayImage(const HeightMap& reference, const HeightMap& current, const OverlayImageOptions& options = {});
+[[nodiscard]] cv::Mat DrawOverlayImage(const HeightMap& reference, const HeightMap& current,
+                                       const OverlayImageOptions& options = {});
 
 }  // namespace plumb

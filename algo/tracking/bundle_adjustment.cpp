@@ -9,8 +9,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
 
+#include "algo/base/check_stop.hpp"
 #include "algo/tracking/bundle_model.hpp"
-#include "algo/types/check_stop.hpp"
 
 namespace plumb {
 namespace {
@@ -22,11 +22,14 @@ using Matrix17d = Eigen::Matrix<double, kCalibrationSize, kCalibrationSize>;
 using Matrix17x6d = Eigen::Matrix<double, kCalibrationSize, 6>;
 using Matrix17x3d = Eigen::Matrix<double, kCalibrationSize, 3>;
 
-constexpr Eigen::Index kLargestDenseSystem = 1200;  // Unknowns; beyond, a sparse factorisation is faster.
-constexpr double kFunctionTolerance = 1e-5;         // Relative decrease that is not worth another iteration.
-constexpr double kLargestDamping = 1e8;             // Steps so short that improve nothing: at the minimum.
+constexpr Eigen::Index kLargestDenseSystem =
+    1200;  // Unknowns; beyond, a sparse factorisation is faster.
+constexpr double kFunctionTolerance =
+    1e-5;                                // Relative decrease that is not worth another iteration.
+constexpr double kLargestDamping = 1e8;  // Steps so short that improve nothing: at the minimum.
 
-// A keypoint's observation and what the last linearisation made of it: rows pixel x, pixel y, depth, weighted.
+// A keypoint's observation and what the last linearisation made of it: rows pixel x, pixel y,
+// depth, weighted.
 struct PointView {
   int keyframe = 0;
   int landmark = 0;  // Slot.
@@ -40,15 +43,18 @@ struct PointView {
   Eigen::Matrix3d J_point = Eigen::Matrix3d::Zero();
   Matrix3x6d J_pose = Matrix3x6d::Zero();
   Eigen::Matrix<double, 2, 7> J_lens = Eigen::Matrix<double, 2, 7>::Zero();  // Lens and readout.
-  Eigen::Matrix<double, 1, CalibrationModel::kDepthSize> J_depth = Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>::Zero();
+  Eigen::Matrix<double, 1, CalibrationModel::kDepthSize> J_depth =
+      Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>::Zero();
 
   // J' M for this observation's derivatives J to the whole calibration.
   template <int kColumns>
-  [[nodiscard]] Eigen::Matrix<double, kCalibrationSize, kColumns> CalibrationTimes(const Eigen::Matrix<double, 3, kColumns>& M) const {
+  [[nodiscard]] Eigen::Matrix<double, kCalibrationSize, kColumns> CalibrationTimes(
+      const Eigen::Matrix<double, 3, kColumns>& M) const {
     Eigen::Matrix<double, kCalibrationSize, kColumns> product;
     product.template topRows<7>().noalias() = J_lens.transpose() * M.template topRows<2>();
     product.row(kEdgeBias).setZero();
-    product.template bottomRows<CalibrationModel::kDepthSize>().noalias() = J_depth.transpose() * M.row(2);
+    product.template bottomRows<CalibrationModel::kDepthSize>().noalias() =
+        J_depth.transpose() * M.row(2);
     return product;
   }
 };
@@ -58,11 +64,13 @@ struct CornerView {
   int marker = 0;  // Slot.
   Eigen::Vector3d in_marker;
   Eigen::Vector2d pixel;
-  Eigen::Vector2d inward;  // Sum of the unit directions along the two sides that meet here, times the pixel scale.
+  Eigen::Vector2d inward;  // Sum of the unit directions along the two sides that meet here, times
+                           // the pixel scale.
   double weight = 0;
 };
 
-// A landmark's own 3x3 system, inverted, and its coupling to the free keyframes and the calibration.
+// A landmark's own 3x3 system, inverted, and its coupling to the free keyframes and the
+// calibration.
 struct PointSystem {
   Eigen::Matrix3d V_inverse;
   Eigen::Vector3d g;
@@ -85,12 +93,18 @@ struct State {
   CalibrationModel calibration;
 };
 
-// One problem; lives for one call of BundleAdjust(). Unknowns: free poses, markers, calibration; landmarks are eliminated.
+// One problem; lives for one call of BundleAdjust(). Unknowns: free poses, markers, calibration;
+// landmarks are eliminated.
 class Bundle {
  public:
-  Bundle(const Intrinsics& stated, const BundleOptions& options, const std::vector<QuadraticTerm>& terms, TrackingMap& map,
-         CalibrationModel& calibration)
-      : stated_(stated), options_(options), terms_(terms), map_(map), calibration_(calibration), pose_slot_(map.keyframes.size(), -1) {
+  Bundle(const Intrinsics& stated, const BundleOptions& options,
+         const std::vector<QuadraticTerm>& terms, TrackingMap& map, CalibrationModel& calibration)
+      : stated_(stated),
+        options_(options),
+        terms_(terms),
+        map_(map),
+        calibration_(calibration),
+        pose_slot_(map.keyframes.size(), -1) {
     for (const int k : options.free_keyframes) {
       int& slot = pose_slot_[static_cast<std::size_t>(k)];
       if (slot >= 0) continue;
@@ -121,7 +135,8 @@ class Bundle {
       if (!linearised) Linearise(state);
       linearised = true;
       State next;
-      const double next_cost = Step(state, damping, next) ? Cost(next) : std::numeric_limits<double>::infinity();
+      const double next_cost =
+          Step(state, damping, next) ? Cost(next) : std::numeric_limits<double>::infinity();
       if (!(next_cost < cost)) {
         damping *= 10.0;
         continue;
@@ -139,7 +154,8 @@ class Bundle {
   }
 
  private:
-  // ---- what is observed --------------------------------------------------------------------------------------------
+  // ---- what is observed
+  // --------------------------------------------------------------------------------------------
 
   void CollectMarkers() {
     for (const int k : free_)
@@ -159,14 +175,16 @@ class Bundle {
         const auto found = markers_.find(m.id);
         if (found == markers_.end()) continue;
         for (std::size_t i = 0; i < 4; ++i)
-          corners_.push_back({static_cast<int>(k), found->second, in_marker[i], m.corners[i], scale * Inward(m.corners, i),
+          corners_.push_back({static_cast<int>(k), found->second, in_marker[i], m.corners[i],
+                              scale * Inward(m.corners, i),
                               1.0 / std::max(options_.min_corner_sigma_px * scale, m.sigma_px[i])});
       }
     }
   }
 
   void CollectPoints() {
-    // Landmarks that a free keyframe sees, then every observation of those. One seen only once constrains nothing.
+    // Landmarks that a free keyframe sees, then every observation of those. One seen only once
+    // constrains nothing.
     std::vector<int> slot(map_.landmarks.size(), -1);
     for (const int k : free_) {
       for (const KeypointObservation& o : map_.keyframes[static_cast<std::size_t>(k)].keypoints) {
@@ -188,7 +206,8 @@ class Bundle {
         view.centred = CentredCoordinates(o.pixel.x(), o.pixel.y(), stated_.width, stated_.height);
         view.row_share = RowShare(o.pixel.y(), stated_.height);
         view.z_m = o.z_m;
-        if (o.z_m > 0) view.weight_z = 1.0 / (options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8));
+        if (o.z_m > 0)
+          view.weight_z = 1.0 / (options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8));
         views_.push_back(view);
       }
     }
@@ -204,43 +223,59 @@ class Bundle {
       state.cameras.push_back(camera);
     }
     state.markers.assign(markers_.size(), Vector6d::Zero());
-    for (const int id : landmarks_) state.landmarks.push_back(map_.landmarks[static_cast<std::size_t>(id)].p_world);
+    for (const int id : landmarks_)
+      state.landmarks.push_back(map_.landmarks[static_cast<std::size_t>(id)].p_world);
     state.calibration = calibration_;
     return state;
   }
 
-  // A landmark that starts behind a camera has no projection there; later it cannot get there, see Cost().
+  // A landmark that starts behind a camera has no projection there; later it cannot get there, see
+  // Cost().
   void DropViewsBehindCameras(const State& state) {
-    std::erase_if(views_, [&](const PointView& view) { return PointInCamera(state, view).z() < kNearestPoint_m; });
+    std::erase_if(views_, [&](const PointView& view) {
+      return PointInCamera(state, view).z() < kNearestPoint_m;
+    });
     std::erase_if(corners_, [&](const CornerView& view) {
-      return (state.cameras[static_cast<std::size_t>(view.keyframe)].T_camera_world * CornerInWorld(state, view)).z() < kNearestPoint_m;
+      return (state.cameras[static_cast<std::size_t>(view.keyframe)].T_camera_world *
+              CornerInWorld(state, view))
+                 .z() < kNearestPoint_m;
     });
     views_of_landmark_.assign(landmarks_.size(), {});
     views_of_keyframe_.assign(map_.keyframes.size(), {});
     for (std::size_t i = 0; i < views_.size(); ++i) {
-      views_of_landmark_[static_cast<std::size_t>(views_[i].landmark)].push_back(static_cast<std::uint32_t>(i));
-      views_of_keyframe_[static_cast<std::size_t>(views_[i].keyframe)].push_back(static_cast<std::uint32_t>(i));
+      views_of_landmark_[static_cast<std::size_t>(views_[i].landmark)].push_back(
+          static_cast<std::uint32_t>(i));
+      views_of_keyframe_[static_cast<std::size_t>(views_[i].keyframe)].push_back(
+          static_cast<std::uint32_t>(i));
     }
   }
 
   static Eigen::Vector3d PointInCamera(const State& state, const PointView& view) {
-    return state.cameras[static_cast<std::size_t>(view.keyframe)].T_camera_world * state.landmarks[static_cast<std::size_t>(view.landmark)];
+    return state.cameras[static_cast<std::size_t>(view.keyframe)].T_camera_world *
+           state.landmarks[static_cast<std::size_t>(view.landmark)];
   }
 
   [[nodiscard]] Eigen::Vector3d CornerInWorld(const State& state, const CornerView& view) const {
-    return MarkerPose(view.marker) * (PoseFromTwist(state.markers[static_cast<std::size_t>(view.marker)]) * view.in_marker);
+    return MarkerPose(view.marker) *
+           (PoseFromTwist(state.markers[static_cast<std::size_t>(view.marker)]) * view.in_marker);
   }
 
   // As it was at the beginning.
-  [[nodiscard]] const Pose& MarkerPose(int slot) const { return T_world_marker0_[static_cast<std::size_t>(slot)]; }
-
-  [[nodiscard]] double PixelWeight() const { return 1.0 / (options_.keypoint_sigma_px * stated_.width / 640.0); }
-  [[nodiscard]] double DepthDelay(const State& state, int keyframe, double row_share) const {
-    const Keyframe& data = map_.keyframes[static_cast<std::size_t>(keyframe)].data;
-    return data.depth_time_s - data.color_time_s + state.calibration.depth[5] + row_share * state.calibration.depth[8];
+  [[nodiscard]] const Pose& MarkerPose(int slot) const {
+    return T_world_marker0_[static_cast<std::size_t>(slot)];
   }
 
-  // ---- cost --------------------------------------------------------------------------------------------------------
+  [[nodiscard]] double PixelWeight() const {
+    return 1.0 / (options_.keypoint_sigma_px * stated_.width / 640.0);
+  }
+  [[nodiscard]] double DepthDelay(const State& state, int keyframe, double row_share) const {
+    const Keyframe& data = map_.keyframes[static_cast<std::size_t>(keyframe)].data;
+    return data.depth_time_s - data.color_time_s + state.calibration.depth[5] +
+           row_share * state.calibration.depth[8];
+  }
+
+  // ---- cost
+  // --------------------------------------------------------------------------------------------------------
 
   // 1/2 sum of losses, and the quadratic terms (up to their constant).
   [[nodiscard]] double Cost(const State& state) const {
@@ -253,37 +288,47 @@ class Bundle {
     for (const CornerView& view : corners_) {
       const double share = RowShare(view.pixel.y(), stated_.height);
       const SeenPoint point =
-          See(state.cameras[static_cast<std::size_t>(view.keyframe)], CornerInWorld(state, view), state.calibration.readout_s[0] * share);
+          See(state.cameras[static_cast<std::size_t>(view.keyframe)], CornerInWorld(state, view),
+              state.calibration.readout_s[0] * share);
       if (point.p.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
-      cost += 0.5 * CauchyLoss(CornerResidual(state, view, point.p).squaredNorm(), kCornerLossScale);
+      cost +=
+          0.5 * CauchyLoss(CornerResidual(state, view, point.p).squaredNorm(), kCornerLossScale);
     }
     for (const QuadraticTerm& term : terms_) {
       const TermVector x = TermState(state, term);
       cost += x.dot(0.5 * (term.H * x) + term.g);
     }
-    if (options_.calibrate) cost += 0.5 * (CalibrationVector(state.calibration).cwiseProduct(PriorWeights())).squaredNorm();
+    if (options_.calibrate)
+      cost +=
+          0.5 * (CalibrationVector(state.calibration).cwiseProduct(PriorWeights())).squaredNorm();
     return cost;
   }
 
   [[nodiscard]] double PointCost(const State& state, const PointView& view) const {
     const CameraState& camera = state.cameras[static_cast<std::size_t>(view.keyframe)];
     const Eigen::Vector3d p = PointInCamera(state, view);
-    const Eigen::Vector3d motion = -(camera.velocity_per_s.head<3>().cross(p) + camera.velocity_per_s.tail<3>());
+    const Eigen::Vector3d motion =
+        -(camera.velocity_per_s.head<3>().cross(p) + camera.velocity_per_s.tail<3>());
     const Eigen::Vector3d at_row = p + state.calibration.readout_s[0] * view.row_share * motion;
     if (at_row.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
-    const Eigen::Vector2d r = (ProjectCorrected(stated_, state.calibration.lens, at_row).pixel - view.pixel) * PixelWeight();
+    const Eigen::Vector2d r =
+        (ProjectCorrected(stated_, state.calibration.lens, at_row).pixel - view.pixel) *
+        PixelWeight();
     double cost = 0.5 * CauchyLoss(r.squaredNorm(), kKeypointLossScale);
     if (view.z_m > 0) {
       SeenPoint late;
       late.p = p + DepthDelay(state, view.keyframe, view.row_share) * motion;
       late.J_time = motion;
-      const double rz = (PredictDepth(state.calibration, late, view.centred, view.row_share).z_m - view.z_m) * view.weight_z;
+      const double rz =
+          (PredictDepth(state.calibration, late, view.centred, view.row_share).z_m - view.z_m) *
+          view.weight_z;
       cost += 0.5 * CauchyLoss(rz * rz, kKeypointLossScale);
     }
     return cost;
   }
 
-  [[nodiscard]] Eigen::Vector2d CornerResidual(const State& state, const CornerView& view, const Eigen::Vector3d& p) const {
+  [[nodiscard]] Eigen::Vector2d CornerResidual(const State& state, const CornerView& view,
+                                               const Eigen::Vector3d& p) const {
     const Eigen::Vector2d pixel = ProjectCorrected(stated_, state.calibration.lens, p).pixel;
     return (pixel + state.calibration.edge_bias_px[0] * view.inward - view.pixel) * view.weight;
   }
@@ -292,24 +337,29 @@ class Bundle {
   [[nodiscard]] TermVector TermState(const State& state, const QuadraticTerm& term) const {
     TermVector x;
     x.head<6>() = state.cameras[static_cast<std::size_t>(term.keyframe_a)].twist;
-    x.segment<6>(6) = term.keyframe_b >= 0 ? state.cameras[static_cast<std::size_t>(term.keyframe_b)].twist
-                                           : state.markers[static_cast<std::size_t>(markers_.at(term.marker))];
+    x.segment<6>(6) = term.keyframe_b >= 0
+                          ? state.cameras[static_cast<std::size_t>(term.keyframe_b)].twist
+                          : state.markers[static_cast<std::size_t>(markers_.at(term.marker))];
     for (int i = 0; i < CalibrationModel::kDepthSize; ++i)
-      x[12 + i] = state.calibration.depth[static_cast<std::size_t>(i)] - calibration_.depth[static_cast<std::size_t>(i)];
+      x[12 + i] = state.calibration.depth[static_cast<std::size_t>(i)] -
+                  calibration_.depth[static_cast<std::size_t>(i)];
     return x;
   }
 
-  // ---- linearisation -----------------------------------------------------------------------------------------------
+  // ---- linearisation
+  // -----------------------------------------------------------------------------------------------
 
-  // Fills views_, points_, and the undamped H_ (lower half) and g_ of poses, markers and calibration, landmarks not yet eliminated.
-  // Parallel loops write to their own slots, and every sum has one order: the same bits on any number of threads.
+  // Fills views_, points_, and the undamped H_ (lower half) and g_ of poses, markers and
+  // calibration, landmarks not yet eliminated. Parallel loops write to their own slots, and every
+  // sum has one order: the same bits on any number of threads.
   void Linearise(const State& state) {
     H_ = Eigen::MatrixXd::Zero(size_, size_);
     g_ = Eigen::VectorXd::Zero(size_);
     std::vector<Matrix17d> H_calibration(map_.keyframes.size(), Matrix17d::Zero());
     std::vector<Vector17d> g_calibration(map_.keyframes.size(), Vector17d::Zero());
-    tbb::parallel_for(std::size_t{0}, map_.keyframes.size(),
-                      [&](std::size_t k) { LineariseKeyframe(state, k, H_calibration[k], g_calibration[k]); });
+    tbb::parallel_for(std::size_t{0}, map_.keyframes.size(), [&](std::size_t k) {
+      LineariseKeyframe(state, k, H_calibration[k], g_calibration[k]);
+    });
     if (options_.calibrate) {
       for (std::size_t k = 0; k < map_.keyframes.size(); ++k) {
         H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += H_calibration[k];
@@ -317,14 +367,16 @@ class Bundle {
       }
       const Vector17d w = PriorWeights();
       H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>().diagonal() += w.cwiseAbs2();
-      g_.tail<kCalibrationSize>() += w.cwiseAbs2().cwiseProduct(CalibrationVector(state.calibration));
+      g_.tail<kCalibrationSize>() +=
+          w.cwiseAbs2().cwiseProduct(CalibrationVector(state.calibration));
     }
     for (const CornerView& view : corners_) AddCorner(state, view);
     for (const QuadraticTerm& term : terms_) AddTerm(state, term);
     points_.resize(landmarks_.size());
   }
 
-  void LineariseKeyframe(const State& state, std::size_t k, Matrix17d& H_calibration, Vector17d& g_calibration) {
+  void LineariseKeyframe(const State& state, std::size_t k, Matrix17d& H_calibration,
+                         Vector17d& g_calibration) {
     const int slot = pose_slot_[k];
     Matrix6d H = Matrix6d::Zero();
     Vector6d g = Vector6d::Zero();
@@ -339,8 +391,8 @@ class Bundle {
       if (!options_.calibrate) continue;
       if (slot >= 0) H_coupled += view.CalibrationTimes<6>(view.J_pose);
       H_calibration.topLeftCorner<7, 7>().noalias() += view.J_lens.transpose() * view.J_lens;
-      H_calibration.bottomRightCorner<CalibrationModel::kDepthSize, CalibrationModel::kDepthSize>().noalias() +=
-          view.J_depth.transpose() * view.J_depth;
+      H_calibration.bottomRightCorner<CalibrationModel::kDepthSize, CalibrationModel::kDepthSize>()
+          .noalias() += view.J_depth.transpose() * view.J_depth;
       g_calibration += view.CalibrationTimes<1>(view.r);
     }
     if (slot < 0) return;
@@ -368,7 +420,8 @@ class Bundle {
     view.J_depth.setZero();
     if (!(view.z_m > 0)) return;
     const SeenPoint late = See(camera, p_world, DepthDelay(state, view.keyframe, view.row_share));
-    const PredictedDepth predicted = PredictDepth(state.calibration, late, view.centred, view.row_share);
+    const PredictedDepth predicted =
+        PredictDepth(state.calibration, late, view.centred, view.row_share);
     const double rz = (predicted.z_m - view.z_m) * view.weight_z;
     const double wz = view.weight_z * std::sqrt(CauchyWeight(rz * rz, kKeypointLossScale));
     view.r[2] = wz * (predicted.z_m - view.z_m);
@@ -384,8 +437,10 @@ class Bundle {
     marker_side.Prepare();
     const Pose T_world_marker = MarkerPose(view.marker) * PoseFromTwist(twist);
     const double share = RowShare(view.pixel.y(), stated_.height);
-    const Eigen::Vector3d p_world = MarkerPose(view.marker) * (PoseFromTwist(twist) * view.in_marker);
-    const SeenPoint point = See(state.cameras[static_cast<std::size_t>(view.keyframe)], p_world, state.calibration.readout_s[0] * share);
+    const Eigen::Vector3d p_world =
+        MarkerPose(view.marker) * (PoseFromTwist(twist) * view.in_marker);
+    const SeenPoint point = See(state.cameras[static_cast<std::size_t>(view.keyframe)], p_world,
+                                state.calibration.readout_s[0] * share);
     const SeenPixel seen = ProjectCorrected(stated_, state.calibration.lens, point.p);
     Eigen::Vector2d r = CornerResidual(state, view, point.p);
     const double robust = std::sqrt(CauchyWeight(r.squaredNorm(), kCornerLossScale));
@@ -393,12 +448,14 @@ class Bundle {
     r *= robust;
     const Eigen::Matrix<double, 2, 3> J = w * seen.J_point;
     Matrix3x6d J_in_world;
-    J_in_world.leftCols<3>() = -T_world_marker.linear() * Skew(view.in_marker) * marker_side.J_right;
+    J_in_world.leftCols<3>() =
+        -T_world_marker.linear() * Skew(view.in_marker) * marker_side.J_right;
     J_in_world.rightCols<3>() = MarkerPose(view.marker).linear();
     const Matrix2x6d J_marker = J * point.J_world * J_in_world;
     const Matrix2x6d J_pose = J * point.J_pose;
     const Eigen::Index m = 6 * (static_cast<Eigen::Index>(free_.size()) + view.marker);
-    const Eigen::Index a = 6 * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(view.keyframe)]);
+    const Eigen::Index a =
+        6 * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(view.keyframe)]);
     H_.block<6, 6>(m, m).noalias() += J_marker.transpose() * J_marker;
     g_.segment<6>(m).noalias() += J_marker.transpose() * r;
     if (a >= 0) {
@@ -409,7 +466,8 @@ class Bundle {
     if (!options_.calibrate) return;
     Eigen::Matrix<double, 2, 8> J_calibration;  // Lens, readout, edge bias.
     J_calibration << w * seen.J_lens, share * (J * point.J_time), w * view.inward;
-    H_.block<8, 8>(calibration_at_, calibration_at_).noalias() += J_calibration.transpose() * J_calibration;
+    H_.block<8, 8>(calibration_at_, calibration_at_).noalias() +=
+        J_calibration.transpose() * J_calibration;
     H_.block<8, 6>(calibration_at_, m).noalias() += J_calibration.transpose() * J_marker;
     if (a >= 0) H_.block<8, 6>(calibration_at_, a).noalias() += J_calibration.transpose() * J_pose;
     g_.segment<8>(calibration_at_).noalias() += J_calibration.transpose() * r;
@@ -418,9 +476,12 @@ class Bundle {
   void AddTerm(const State& state, const QuadraticTerm& term) {
     const TermVector slope = term.H * TermState(state, term) + term.g;
     constexpr int kDepthSize = CalibrationModel::kDepthSize;
-    const Eigen::Index a = 6 * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(term.keyframe_a)]);
-    const Eigen::Index b = term.keyframe_b >= 0 ? 6 * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(term.keyframe_b)])
-                                                : 6 * (static_cast<Eigen::Index>(free_.size()) + markers_.at(term.marker));
+    const Eigen::Index a =
+        6 * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(term.keyframe_a)]);
+    const Eigen::Index b =
+        term.keyframe_b >= 0
+            ? 6 * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(term.keyframe_b)])
+            : 6 * (static_cast<Eigen::Index>(free_.size()) + markers_.at(term.marker));
     const Eigen::Index d = calibration_at_ + kDepth;
     if (a >= 0) {
       H_.block<6, 6>(a, a) += term.H.topLeftCorner<6, 6>();
@@ -444,7 +505,8 @@ class Bundle {
     g_.segment<kDepthSize>(d) += slope.tail<kDepthSize>();
   }
 
-  // ---- solution ----------------------------------------------------------------------------------------------------
+  // ---- solution
+  // ----------------------------------------------------------------------------------------------------
 
   void MakePoint(std::size_t s, double damping) {
     PointSystem& point = points_[s];
@@ -467,7 +529,8 @@ class Bundle {
 
   // One damped Gauss-Newton step; false if the system cannot be solved.
   bool Step(const State& state, double damping, State& next) {
-    tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t s) { MakePoint(s, damping); });
+    tbb::parallel_for(std::size_t{0}, points_.size(),
+                      [&](std::size_t s) { MakePoint(s, damping); });
     Eigen::MatrixXd S = H_;
     S.diagonal() *= 1.0 + damping;
     S.diagonal().array() += 1e-9;
@@ -482,19 +545,23 @@ class Bundle {
       camera.twist -= x.segment<6>(6 * static_cast<Eigen::Index>(slot));
       camera.Prepare();
     }
-    for (std::size_t m = 0; m < markers_.size(); ++m) next.markers[m] -= x.segment<6>(6 * static_cast<Eigen::Index>(free_.size() + m));
+    for (std::size_t m = 0; m < markers_.size(); ++m)
+      next.markers[m] -= x.segment<6>(6 * static_cast<Eigen::Index>(free_.size() + m));
     if (options_.calibrate) MoveCalibration(-x.tail<kCalibrationSize>(), next.calibration);
     tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t s) {
       const PointSystem& point = points_[s];
       Eigen::Vector3d rest = point.g;
-      for (const auto& [a, W] : point.W) rest.noalias() -= W.transpose() * x.segment<6>(6 * static_cast<Eigen::Index>(a));
-      if (options_.calibrate) rest.noalias() -= point.W_calibration.transpose() * x.tail<kCalibrationSize>();
+      for (const auto& [a, W] : point.W)
+        rest.noalias() -= W.transpose() * x.segment<6>(6 * static_cast<Eigen::Index>(a));
+      if (options_.calibrate)
+        rest.noalias() -= point.W_calibration.transpose() * x.tail<kCalibrationSize>();
       next.landmarks[s] -= point.V_inverse * rest;
     });
     return true;
   }
 
-  // S -= W V^-1 W', right -= W V^-1 g over all landmarks. Each free keyframe's rows are one task, so every block has one writer.
+  // S -= W V^-1 W', right -= W V^-1 g over all landmarks. Each free keyframe's rows are one task,
+  // so every block has one writer.
   void Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const {
     tbb::parallel_for(std::size_t{0}, free_.size(), [&](std::size_t slot) {
       const auto a = 6 * static_cast<Eigen::Index>(slot);
@@ -503,8 +570,11 @@ class Bundle {
         const Matrix6x3d WV = views_[i].J_pose.transpose() * (views_[i].J_point * point.V_inverse);
         right.segment<6>(a).noalias() -= WV * point.g;
         for (const auto& [b, W] : point.W)
-          if (b <= static_cast<int>(slot)) S.block<6, 6>(a, 6 * static_cast<Eigen::Index>(b)).noalias() -= WV * W.transpose();
-        if (options_.calibrate) S.block<kCalibrationSize, 6>(calibration_at_, a).noalias() -= point.W_calibration * WV.transpose();
+          if (b <= static_cast<int>(slot))
+            S.block<6, 6>(a, 6 * static_cast<Eigen::Index>(b)).noalias() -= WV * W.transpose();
+        if (options_.calibrate)
+          S.block<kCalibrationSize, 6>(calibration_at_, a).noalias() -=
+              point.W_calibration * WV.transpose();
       }
     });
     if (!options_.calibrate) return;
@@ -518,7 +588,8 @@ class Bundle {
   }
 
   // Makes `count` unknowns stay where they are.
-  static void Pin(Eigen::Index first, Eigen::Index count, Eigen::MatrixXd& S, Eigen::VectorXd& right) {
+  static void Pin(Eigen::Index first, Eigen::Index count, Eigen::MatrixXd& S,
+                  Eigen::VectorXd& right) {
     S.middleRows(first, count).setZero();
     S.middleCols(first, count).setZero();
     S.diagonal().segment(first, count).setOnes();
@@ -531,7 +602,8 @@ class Bundle {
       if (solver.info() != Eigen::Success) return false;
       x = solver.solve(right);
     } else {
-      const Eigen::SparseMatrix<double> sparse = S.triangularView<Eigen::Lower>().toDenseMatrix().sparseView();
+      const Eigen::SparseMatrix<double> sparse =
+          S.triangularView<Eigen::Lower>().toDenseMatrix().sparseView();
       const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower> solver(sparse);
       if (solver.info() != Eigen::Success) return false;
       x = solver.solve(right);
@@ -542,11 +614,13 @@ class Bundle {
   void Write(const State& state) {
     for (const int k : free_) {
       MapKeyframe& keyframe = map_.keyframes[static_cast<std::size_t>(k)];
-      keyframe.T_world_color = Orthonormalised(keyframe.T_world_color * PoseFromTwist(state.cameras[static_cast<std::size_t>(k)].twist));
+      keyframe.T_world_color = Orthonormalised(
+          keyframe.T_world_color * PoseFromTwist(state.cameras[static_cast<std::size_t>(k)].twist));
     }
     for (const auto& [id, slot] : markers_) {
       MapMarker& marker = map_.markers.at(id);
-      marker.T_world_marker = Orthonormalised(marker.T_world_marker * PoseFromTwist(state.markers[static_cast<std::size_t>(slot)]));
+      marker.T_world_marker = Orthonormalised(
+          marker.T_world_marker * PoseFromTwist(state.markers[static_cast<std::size_t>(slot)]));
     }
     for (std::size_t s = 0; s < landmarks_.size(); ++s)
       map_.landmarks[static_cast<std::size_t>(landmarks_[s])].p_world = state.landmarks[s];
@@ -576,8 +650,9 @@ class Bundle {
 
 }  // namespace
 
-BundleSummary BundleAdjust(const Intrinsics& stated, const BundleOptions& options, const std::vector<QuadraticTerm>& terms,
-                           TrackingMap& map, CalibrationModel& calibration) {
+BundleSummary BundleAdjust(const Intrinsics& stated, const BundleOptions& options,
+                           const std::vector<QuadraticTerm>& terms, TrackingMap& map,
+                           CalibrationModel& calibration) {
   return Bundle(stated, options, terms, map, calibration).Run();
 }
 

@@ -4,14 +4,15 @@
 #include <stop_token>
 #include <vector>
 
-#include "algo/tracking/calibration_model.hpp"
+#include "algo/sensor_model/calibration_model.hpp"
 #include "algo/tracking/map.hpp"
 
 namespace plumb {
 
-/// A quadratic in the twists of two keyframes (or of one keyframe and a marker) and the depth calibration:
-/// 1/2 x' H x + g' x, where x holds the twists from the poses at the time of linearisation (twist on the camera's or the
-/// marker's side) and the change of CalibrationModel::depth. Sums of millions of point-to-plane residuals come in this form.
+/// A quadratic in the twists of two keyframes (or of one keyframe and a marker) and the depth
+/// calibration: 1/2 x' H x + g' x, where x holds the twists from the poses at the time of
+/// linearisation (twist on the camera's or the marker's side) and the change of
+/// CalibrationModel::depth. Sums of millions of point-to-plane residuals come in this form.
 struct QuadraticTerm {
   static constexpr int kSize = 12 + CalibrationModel::kDepthSize;
   int keyframe_a = -1;
@@ -26,8 +27,9 @@ struct BundleOptions {
   bool calibrate = false;           ///< Move the calibration too.
   bool fix_lens = false;            ///< Keep CalibrationModel::lens even so.
   int max_iterations = 8;
-  double keypoint_sigma_px = 0.6;      ///< At 640 columns.
-  double keypoint_depth_sigmas = 1.5;  ///< Standard deviation of a keypoint's depth, in those of the noise model.
+  double keypoint_sigma_px = 0.6;  ///< At 640 columns.
+  double keypoint_depth_sigmas =
+      1.5;  ///< Standard deviation of a keypoint's depth, in those of the noise model.
   double min_corner_sigma_px = 0.05;
   double marker_length_m = 0.104;
   std::stop_token stop = {};  ///< Polled in each iteration.
@@ -41,12 +43,13 @@ struct BundleSummary {
   double final_cost = 0;
 };
 
-/// Moves what the options free, in place, by Levenberg-Marquardt with Cauchy weights; landmarks are eliminated (Schur complement).
-/// Spread over TBB's threads; deterministic, whatever their number. A general solver came to the same minima, but repeats
-/// its bits on one thread only.
+/// Moves what the options free, in place, by Levenberg-Marquardt with Cauchy weights; landmarks are
+/// eliminated (Schur complement). Spread over TBB's threads; deterministic, whatever their number.
+/// A general solver came to the same minima, but repeats its bits on one thread only.
 /// @param terms  Linearised at the map's and the calibration's present values.
 /// @throws Interrupted on a stop request; nothing has moved then.
-BundleSummary BundleAdjust(const Intrinsics& stated, const BundleOptions& options, const std::vector<QuadraticTerm>& terms,
-                           TrackingMap& map, CalibrationModel& calibration);
+BundleSummary BundleAdjust(const Intrinsics& stated, const BundleOptions& options,
+                           const std::vector<QuadraticTerm>& terms, TrackingMap& map,
+                           CalibrationModel& calibration);
 
 }  // namespace plumb

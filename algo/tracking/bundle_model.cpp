@@ -5,7 +5,7 @@
 namespace plumb::bundle {
 namespace {
 
-// To second order: the twists stay small because each call linearises anew.
+// To second order: the twists stay small because each call linearises again.
 Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& w) {
   const Eigen::Matrix3d W = Skew(w);
   return Eigen::Matrix3d::Identity() - 0.5 * W + W * W / 6.0;
@@ -18,7 +18,8 @@ Vector17d CalibrationVector(const CalibrationModel& c) {
   for (int i = 0; i < 6; ++i) x[kLens + i] = c.lens[static_cast<std::size_t>(i)];
   x[kReadout] = c.readout_s[0];
   x[kEdgeBias] = c.edge_bias_px[0];
-  for (int i = 0; i < CalibrationModel::kDepthSize; ++i) x[kDepth + i] = c.depth[static_cast<std::size_t>(i)];
+  for (int i = 0; i < CalibrationModel::kDepthSize; ++i)
+    x[kDepth + i] = c.depth[static_cast<std::size_t>(i)];
   return x;
 }
 
@@ -28,7 +29,8 @@ Vector17d PriorWeights() {
   for (int i = 0; i < 6; ++i) w[kLens + i] = 1.0 / C::kLensSigma[static_cast<std::size_t>(i)];
   w[kReadout] = 1.0 / C::kReadoutSigma;
   w[kEdgeBias] = 1.0 / C::kEdgeBiasSigma;
-  for (int i = 0; i < C::kDepthSize; ++i) w[kDepth + i] = 1.0 / C::kDepthSigma[static_cast<std::size_t>(i)];
+  for (int i = 0; i < C::kDepthSize; ++i)
+    w[kDepth + i] = 1.0 / C::kDepthSigma[static_cast<std::size_t>(i)];
   return w;
 }
 
@@ -36,7 +38,8 @@ void MoveCalibration(const Vector17d& by, CalibrationModel& c) {
   for (int i = 0; i < 6; ++i) c.lens[static_cast<std::size_t>(i)] += by[kLens + i];
   c.readout_s[0] += by[kReadout];
   c.edge_bias_px[0] += by[kEdgeBias];
-  for (int i = 0; i < CalibrationModel::kDepthSize; ++i) c.depth[static_cast<std::size_t>(i)] += by[kDepth + i];
+  for (int i = 0; i < CalibrationModel::kDepthSize; ++i)
+    c.depth[static_cast<std::size_t>(i)] += by[kDepth + i];
 }
 
 void CameraState::Prepare() {
@@ -59,7 +62,8 @@ SeenPoint See(const CameraState& camera, const Eigen::Vector3d& p_world, double 
   return seen;
 }
 
-SeenPixel ProjectCorrected(const Intrinsics& k, const std::array<double, 6>& lens, const Eigen::Vector3d& p) {
+SeenPixel ProjectCorrected(const Intrinsics& k, const std::array<double, 6>& lens,
+                           const Eigen::Vector3d& p) {
   const double iz = 1.0 / p.z();
   const double x = p.x() * iz;
   const double y = p.y() * iz;
@@ -88,7 +92,8 @@ SeenPixel ProjectCorrected(const Intrinsics& k, const std::array<double, 6>& len
   return seen;
 }
 
-PredictedDepth PredictDepth(const CalibrationModel& calibration, const SeenPoint& seen, const Eigen::Vector2d& centred, double row_share) {
+PredictedDepth PredictDepth(const CalibrationModel& calibration, const SeenPoint& seen,
+                            const Eigen::Vector2d& centred, double row_share) {
   const auto& d = calibration.depth;
   const double bow = centred.squaredNorm();
   const double scale = 1.0 + d[0] + d[6] * centred.x() + d[7] * centred.y();
@@ -97,10 +102,13 @@ PredictedDepth PredictDepth(const CalibrationModel& calibration, const SeenPoint
   predicted.J_z = 1.0 / scale;
   const double late = seen.J_time.z() / scale;
   const double z = predicted.z_m / scale;
-  predicted.J_depth << -z, -1.0 / scale, -bow / scale, 0, 0, late, -z * centred.x(), -z * centred.y(), late * row_share;
+  predicted.J_depth << -z, -1.0 / scale, -bow / scale, 0, 0, late, -z * centred.x(),
+      -z * centred.y(), late * row_share;
   return predicted;
 }
 
-double CauchyLoss(double squared, double scale) { return scale * scale * std::log1p(squared / (scale * scale)); }
+double CauchyLoss(double squared, double scale) {
+  return scale * scale * std::log1p(squared / (scale * scale));
+}
 
 }  // namespace plumb::bundle

@@ -1,13 +1,14 @@
-// The residuals of bundle adjustment with their derivatives: what a camera under a calibration sees of a point.
+// The residuals of bundle adjustment with their derivatives: what a camera under a calibration sees
+// of a point.
 #pragma once
 
 #include <array>
 
 #include <Eigen/Core>
 
-#include "algo/tracking/calibration_model.hpp"
-#include "algo/types/intrinsics.hpp"
-#include "algo/types/pose.hpp"
+#include "algo/base/intrinsics.hpp"
+#include "algo/base/pose.hpp"
+#include "algo/sensor_model/calibration_model.hpp"
 
 namespace plumb::bundle {
 
@@ -31,7 +32,8 @@ void MoveCalibration(const Vector17d& by, CalibrationModel& calibration);
 /// In front of the camera; nearer, projections mean nothing.
 inline constexpr double kNearestPoint_m = 0.02;
 
-/// Where a keyframe's camera is: T_world_camera = T_world_camera0 * PoseFromTwist(twist), moving with `velocity_per_s`.
+/// Where a keyframe's camera is: T_world_camera = T_world_camera0 * PoseFromTwist(twist), moving
+/// with `velocity_per_s`.
 struct CameraState {
   Pose T_camera0_world = Pose::Identity();
   Vector6d velocity_per_s = Vector6d::Zero();
@@ -53,30 +55,42 @@ struct SeenPoint {
 };
 [[nodiscard]] SeenPoint See(const CameraState& camera, const Eigen::Vector3d& p_world, double dt_s);
 
-/// Its pixel through the corrected lens, with derivatives to the point and to CalibrationModel::lens.
+/// Its pixel through the corrected lens, with derivatives to the point and to
+/// CalibrationModel::lens.
 struct SeenPixel {
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, 3> J_point;
   Eigen::Matrix<double, 2, 6> J_lens;
 };
-[[nodiscard]] SeenPixel ProjectCorrected(const Intrinsics& stated, const std::array<double, 6>& lens, const Eigen::Vector3d& p);
+[[nodiscard]] SeenPixel ProjectCorrected(const Intrinsics& stated,
+                                         const std::array<double, 6>& lens,
+                                         const Eigen::Vector3d& p);
 
-/// Share of the readout before or after the stamp at an image row: -0.5 at the top, 0.5 at the bottom.
-[[nodiscard]] inline double RowShare(double y_px, int height) { return (y_px + 0.5) / height - 0.5; }
+/// Share of the readout before or after the stamp at an image row: -0.5 at the top, 0.5 at the
+/// bottom.
+[[nodiscard]] inline double RowShare(double y_px, int height) {
+  return (y_px + 0.5) / height - 0.5;
+}
 
-/// A depth reading's prediction, in the units of the measurement (in metres of the scene, a smaller scene would look better).
+/// A depth reading's prediction, in the units of the measurement (in metres of the scene, a smaller
+/// scene would look better).
 struct PredictedDepth {
   double z_m = 0;
-  double J_z = 0;                                                  ///< To the true depth.
-  Eigen::Matrix<double, 1, CalibrationModel::kDepthSize> J_depth;  ///< To CalibrationModel::depth, times included.
+  double J_z = 0;  ///< To the true depth.
+  Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>
+      J_depth;  ///< To CalibrationModel::depth, times included.
 };
-/// @param seen  The point at the time of the reading. @param centred  CentredCoordinates() of its pixel.
-[[nodiscard]] PredictedDepth PredictDepth(const CalibrationModel& calibration, const SeenPoint& seen, const Eigen::Vector2d& centred,
+/// @param seen  The point at the time of the reading. @param centred  CentredCoordinates() of its
+/// pixel.
+[[nodiscard]] PredictedDepth PredictDepth(const CalibrationModel& calibration,
+                                          const SeenPoint& seen, const Eigen::Vector2d& centred,
                                           double row_share);
 
 /// Cauchy's loss of a squared residual, and the weight of its reweighted square.
 [[nodiscard]] double CauchyLoss(double squared, double scale);
-[[nodiscard]] inline double CauchyWeight(double squared, double scale) { return 1.0 / (1.0 + squared / (scale * scale)); }
+[[nodiscard]] inline double CauchyWeight(double squared, double scale) {
+  return 1.0 / (1.0 + squared / (scale * scale));
+}
 
 inline constexpr double kKeypointLossScale = 2.0;  ///< In standard deviations.
 inline constexpr double kCornerLossScale = 3.0;

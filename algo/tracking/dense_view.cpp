@@ -10,7 +10,8 @@ namespace plumb {
 namespace {
 
 constexpr int kColumns = 160;
-constexpr float kMaxRelativeSpread = 0.03F;  // Of depth within a window: more is an edge, not a slope.
+constexpr float kMaxRelativeSpread =
+    0.03F;  // Of depth within a window: more is an edge, not a slope.
 constexpr float kMinFill = 0.6F;
 
 // Mean inverse depth of one window; 0 if it is too empty or holds an edge.
@@ -40,16 +41,21 @@ float WindowDepth(const cv::Mat& depth_m, int row0, int column0, int side) {
 double DepthSigma(double z_m, double cos_incidence) {
   const double theta = std::acos(std::clamp(cos_incidence, 0.17, 1.0));
   const double grazing = theta / (std::numbers::pi / 2 - theta);
-  return 0.0012 + 0.0019 * (z_m - 0.4) * (z_m - 0.4) + 0.0001 / std::sqrt(std::max(z_m, 0.1)) * grazing * grazing;
+  return 0.0012 + 0.0019 * (z_m - 0.4) * (z_m - 0.4) +
+         0.0001 / std::sqrt(std::max(z_m, 0.1)) * grazing * grazing;
 }
 
 DenseViewMaker::DenseViewMaker(const Intrinsics& intrinsics)
-    : window_px_(std::max(1, intrinsics.width / kColumns)), width_(intrinsics.width / window_px_), height_(intrinsics.height / window_px_) {
+    : window_px_(std::max(1, intrinsics.width / kColumns)),
+      width_(intrinsics.width / window_px_),
+      height_(intrinsics.height / window_px_) {
   auto rays = std::make_shared<std::vector<Eigen::Vector2f>>();
   rays->reserve(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   const double half = (window_px_ - 1) / 2.0;
   for (int r = 0; r < height_; ++r)
-    for (int c = 0; c < width_; ++c) rays->push_back(Undistort(intrinsics, {c * window_px_ + half, r * window_px_ + half}).cast<float>());
+    for (int c = 0; c < width_; ++c)
+      rays->push_back(
+          Undistort(intrinsics, {c * window_px_ + half, r * window_px_ + half}).cast<float>());
   rays_ = std::move(rays);
 }
 
@@ -63,7 +69,8 @@ DenseView DenseViewMaker::Make(const cv::Mat& depth_m) const {
   view.normals.assign(rays_->size(), Eigen::Vector3f::Zero());
   for (int r = 0; r < height_; ++r)
     for (int c = 0; c < width_; ++c)
-      view.z_m[static_cast<std::size_t>(r * width_ + c)] = WindowDepth(depth_m, r * window_px_, c * window_px_, window_px_);
+      view.z_m[static_cast<std::size_t>(r * width_ + c)] =
+          WindowDepth(depth_m, r * window_px_, c * window_px_, window_px_);
   for (int r = 1; r + 1 < view.height; ++r) {
     for (int c = 1; c + 1 < view.width; ++c) {
       const auto i = static_cast<std::size_t>(r * view.width + c);
@@ -71,9 +78,12 @@ DenseView DenseViewMaker::Make(const cv::Mat& depth_m) const {
       const float z = view.z_m[i];
       const float limit = kMaxRelativeSpread * 2 * z + 0.01F;
       bool whole = z > 0;
-      for (const std::size_t j : {i - 1, i + 1, i - w, i + w}) whole = whole && view.z_m[j] > 0 && std::abs(view.z_m[j] - z) < limit;
+      for (const std::size_t j : {i - 1, i + 1, i - w, i + w})
+        whole = whole && view.z_m[j] > 0 && std::abs(view.z_m[j] - z) < limit;
       if (!whole) continue;
-      const Eigen::Vector3f normal = (view.point(i + w) - view.point(i - w)).cross(view.point(i + 1) - view.point(i - 1)).normalized();
+      const Eigen::Vector3f normal = (view.point(i + w) - view.point(i - w))
+                                         .cross(view.point(i + 1) - view.point(i - 1))
+                                         .normalized();
       // (down x right) points to the camera for a surface that faces it.
       if (normal.dot(view.point(i)) < 0) view.normals[i] = normal;
     }

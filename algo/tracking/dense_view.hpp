@@ -7,26 +7,32 @@
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
-#include "algo/types/intrinsics.hpp"
+#include "algo/base/intrinsics.hpp"
 
 namespace plumb {
 
-/// A depth image at a fraction of its resolution: every cell is the mean inverse depth of its window, kept only where
-/// the window is filled and smooth, with the surface normal there. Row-major, camera frame.
+/// A depth image at a fraction of its resolution: every cell is the mean inverse depth of its
+/// window, kept only where the window is filled and smooth, with the surface normal there.
+/// Row-major, camera frame.
 struct DenseView {
   int width = 0;
   int height = 0;
-  int window_px = 4;                                         ///< Side of the full-resolution window behind a cell.
-  std::vector<float> z_m;                                    ///< 0 where nothing usable.
-  std::vector<Eigen::Vector3f> normals;                      ///< Unit, towards the camera; zero where none could be had.
-  std::shared_ptr<const std::vector<Eigen::Vector2f>> rays;  ///< Ideal normalised coordinates of the cell centres; shared.
+  int window_px = 4;       ///< Side of the full-resolution window behind a cell.
+  std::vector<float> z_m;  ///< 0 where nothing usable.
+  std::vector<Eigen::Vector3f>
+      normals;  ///< Unit, towards the camera; zero where none could be had.
+  std::shared_ptr<const std::vector<Eigen::Vector2f>>
+      rays;  ///< Ideal normalised coordinates of the cell centres; shared.
 
   [[nodiscard]] std::size_t size() const { return z_m.size(); }
-  [[nodiscard]] Eigen::Vector3f point(std::size_t i) const { return {(*rays)[i].x() * z_m[i], (*rays)[i].y() * z_m[i], z_m[i]}; }
+  [[nodiscard]] Eigen::Vector3f point(std::size_t i) const {
+    return {(*rays)[i].x() * z_m[i], (*rays)[i].y() * z_m[i], z_m[i]};
+  }
 };
 
-/// Makes dense views of one camera's depth images; keeps the rays, which cost more than the view itself.
-/// Cells per image side follow the resolution, so that 640x480 and 320x240 give the same 160x120 cells.
+/// Makes dense views of one camera's depth images; keeps the rays, which cost more than the view
+/// itself. Cells per image side follow the resolution, so that 640x480 and 320x240 give the same
+/// 160x120 cells.
 class DenseViewMaker {
  public:
   explicit DenseViewMaker(const Intrinsics& intrinsics);
@@ -40,7 +46,8 @@ class DenseViewMaker {
   std::shared_ptr<const std::vector<Eigen::Vector2f>> rays_;
 };
 
-/// Standard deviation of one depth measurement (Nguyen et al. 2012, axial), metres; cos_incidence in (0, 1].
+/// Standard deviation of one depth measurement (Nguyen et al. 2012, axial), metres; cos_incidence
+/// in (0, 1].
 [[nodiscard]] double DepthSigma(double z_m, double cos_incidence);
 
 }  // namespace plumb

@@ -1,7 +1,7 @@
-// What is known of how two keyframes stand to each other.
+// A measured relative pose of two keyframes.
 #pragma once
 
-#include "algo/types/pose.hpp"
+#include "algo/base/pose.hpp"
 
 namespace plumb {
 
@@ -12,13 +12,14 @@ struct KeyframeLink {
   Pose T_a_b = Pose::Identity();
 };
 
-/// A link's least squares as normal equations in the twists of both cameras, on the cameras' side, for residuals
-/// r = (log(R_ba' R_a^T R_b) / sigma_rad, (R_a^T (t_b - t_a) - t_ab') / sigma_m): 1/2 x' H x + g' x.
+/// A link's least squares as normal equations in the twists of both cameras, on the cameras' side,
+/// for residuals r = (log(R_ba' R_a^T R_b) / sigma_rad, (R_a^T (t_b - t_a) - t_ab') / sigma_m): 1/2
+/// x' H x + g' x.
 struct LinkEquations {
   Eigen::Matrix<double, 12, 12> H;
   Eigen::Matrix<double, 12, 1> g;
 };
-[[nodiscard]] LinkEquations Linearise(const KeyframeLink& link, const Pose& T_world_a, const Pose& T_world_b, double sigma_rad,
-                                      double sigma_m);
+[[nodiscard]] LinkEquations Linearise(const KeyframeLink& link, const Pose& T_world_a,
+                                      const Pose& T_world_b, double sigma_rad, double sigma_m);
 
 }  // namespace plumb

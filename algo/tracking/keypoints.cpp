@@ -29,15 +29,18 @@ float PeakOffset(float before, float at, float after) {
 
 Pyramid MakePyramid(const cv::Mat& gray, const KeypointOptions& options) {
   Pyramid pyramid;
-  cv::buildOpticalFlowPyramid(gray, pyramid, cv::Size(options.window_px, options.window_px), options.levels, true);
+  cv::buildOpticalFlowPyramid(gray, pyramid, cv::Size(options.window_px, options.window_px),
+                              options.levels, true);
   return pyramid;
 }
 
-std::vector<Eigen::Vector2f> DetectCorners(const cv::Mat& gray, const std::vector<Eigen::Vector2f>& occupied,
+std::vector<Eigen::Vector2f> DetectCorners(const cv::Mat& gray,
+                                           const std::vector<Eigen::Vector2f>& occupied,
                                            const KeypointOptions& options) {
   cv::Mat score;
   cv::cornerMinEigenVal(gray, score, 5, 3);
-  // cornerMinEigenVal sums, over its 5x5 block, squares of Sobel gradients (8 times the gradient) scaled by 1 / (255 * 4 * 5).
+  // cornerMinEigenVal sums, over its 5x5 block, squares of Sobel gradients (8 times the gradient)
+  // scaled by 1 / (255 * 4 * 5).
 
   const float threshold = static_cast<float>(options.min_quality * 25.0 * 64.0 / (5100.0 * 5100.0));
   const int cell = std::max(8, options.cell_px * gray.cols / 640);
@@ -47,7 +50,8 @@ std::vector<Eigen::Vector2f> DetectCorners(const cv::Mat& gray, const std::vecto
   for (const Eigen::Vector2f& p : occupied) {
     const int c = static_cast<int>(p.x()) / cell;
     const int r = static_cast<int>(p.y()) / cell;
-    if (c >= 0 && r >= 0 && c < columns && r < rows) taken[static_cast<std::size_t>(r * columns + c)] = true;
+    if (c >= 0 && r >= 0 && c < columns && r < rows)
+      taken[static_cast<std::size_t>(r * columns + c)] = true;
   }
   const int margin = 8;
   std::vector<Eigen::Vector2f> corners;
@@ -56,9 +60,11 @@ std::vector<Eigen::Vector2f> DetectCorners(const cv::Mat& gray, const std::vecto
       if (taken[static_cast<std::size_t>(r * columns + c)]) continue;
       float best = threshold;
       cv::Point at(-1, -1);
-      for (int y = std::max(margin, r * cell); y < std::min(gray.rows - margin, (r + 1) * cell); ++y) {
+      for (int y = std::max(margin, r * cell); y < std::min(gray.rows - margin, (r + 1) * cell);
+           ++y) {
         const float* line = score.ptr<float>(y);
-        for (int x = std::max(margin, c * cell); x < std::min(gray.cols - margin, (c + 1) * cell); ++x) {
+        for (int x = std::max(margin, c * cell); x < std::min(gray.cols - margin, (c + 1) * cell);
+             ++x) {
           if (line[x] > best) {
             best = line[x];
             at = {x, y};
@@ -66,15 +72,18 @@ std::vector<Eigen::Vector2f> DetectCorners(const cv::Mat& gray, const std::vecto
         }
       }
       if (at.x < 0) continue;
-      const float dx = PeakOffset(score.at<float>(at.y, at.x - 1), best, score.at<float>(at.y, at.x + 1));
-      const float dy = PeakOffset(score.at<float>(at.y - 1, at.x), best, score.at<float>(at.y + 1, at.x));
+      const float dx =
+          PeakOffset(score.at<float>(at.y, at.x - 1), best, score.at<float>(at.y, at.x + 1));
+      const float dy =
+          PeakOffset(score.at<float>(at.y - 1, at.x), best, score.at<float>(at.y + 1, at.x));
       corners.emplace_back(static_cast<float>(at.x) + dx, static_cast<float>(at.y) + dy);
     }
   }
   return corners;
 }
 
-double BrightnessRatio(const cv::Mat& from, const cv::Mat& to, const std::vector<Eigen::Vector2f>& points,
+double BrightnessRatio(const cv::Mat& from, const cv::Mat& to,
+                       const std::vector<Eigen::Vector2f>& points,
                        const std::vector<Eigen::Vector2f>& guesses) {
   constexpr int kReach = 3;
   constexpr std::size_t kFewest = 8;
@@ -101,8 +110,10 @@ double BrightnessRatio(const cv::Mat& from, const cv::Mat& to, const std::vector
   return *middle;
 }
 
-KltResult TrackKlt(const Pyramid& from, const Pyramid& to, const std::vector<Eigen::Vector2f>& points,
-                   const std::vector<Eigen::Vector2f>& guesses, int max_level, const KeypointOptions& options) {
+KltResult TrackKlt(const Pyramid& from, const Pyramid& to,
+                   const std::vector<Eigen::Vector2f>& points,
+                   const std::vector<Eigen::Vector2f>& guesses, int max_level,
+                   const KeypointOptions& options) {
   KltResult result;
   result.points = guesses;
   result.found.assign(points.size(), false);
@@ -111,14 +122,17 @@ KltResult TrackKlt(const Pyramid& from, const Pyramid& to, const std::vector<Eig
   std::vector<cv::Point2f> end = ToCv(guesses);
   std::vector<unsigned char> status;
   std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(from, to, start, end, status, error, cv::Size(options.window_px, options.window_px), max_level,
-                           cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 20, 0.01), cv::OPTFLOW_USE_INITIAL_FLOW, 1e-3);
+  cv::calcOpticalFlowPyrLK(
+      from, to, start, end, status, error, cv::Size(options.window_px, options.window_px),
+      max_level, cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 20, 0.01),
+      cv::OPTFLOW_USE_INITIAL_FLOW, 1e-3);
   const float width = static_cast<float>(to[0].cols);
   const float height = static_cast<float>(to[0].rows);
   for (std::size_t i = 0; i < points.size(); ++i) {
     result.points[i] = {end[i].x, end[i].y};
     // The error is the mean absolute difference of the patches, grey levels.
-    result.found[i] = status[i] != 0 && error[i] < 20.0F && end[i].x > 3 && end[i].y > 3 && end[i].x < width - 4 && end[i].y < height - 4;
+    result.found[i] = status[i] != 0 && error[i] < 20.0F && end[i].x > 3 && end[i].y > 3 &&
+                      end[i].x < width - 4 && end[i].y < height - 4;
   }
   return result;
 }
@@ -138,9 +152,11 @@ double DepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel) {
   return values[static_cast<std::size_t>(n / 2)];
 }
 
-DescribedFeatures DescribeFeatures(const cv::Mat& gray, const cv::Mat& depth_m, const Intrinsics& intrinsics) {
+DescribedFeatures DescribeFeatures(const cv::Mat& gray, const cv::Mat& depth_m,
+                                   const Intrinsics& intrinsics) {
   // Few levels: relocalisation sees the same body from about the same distance.
-  const cv::Ptr<cv::ORB> orb = cv::ORB::create(500, 1.3F, 4, 15, 0, 2, cv::ORB::HARRIS_SCORE, 31, 10);
+  const cv::Ptr<cv::ORB> orb =
+      cv::ORB::create(500, 1.3F, 4, 15, 0, 2, cv::ORB::HARRIS_SCORE, 31, 10);
   std::vector<cv::KeyPoint> keypoints;
   cv::Mat descriptors;
   orb->detectAndCompute(gray, cv::noArray(), keypoints, descriptors);

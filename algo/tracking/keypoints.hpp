@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
-#include "algo/types/intrinsics.hpp"
+#include "algo/base/intrinsics.hpp"
 
 namespace plumb {
 
@@ -15,30 +15,39 @@ namespace plumb {
 using Pyramid = std::vector<cv::Mat>;
 
 struct KeypointOptions {
-  int cell_px = 32;          ///< At 640 pixels image width: one corner a cell at most, so that they spread over the image.
-  int window_px = 15;        ///< KLT window.
-  int levels = 3;            ///< KLT pyramid levels above the base.
-  double min_quality = 4.0;  ///< Smaller eigenvalue of the structure tensor, (grey levels a pixel)^2.
+  int cell_px = 32;  ///< At 640 pixels image width: one corner a cell at most, so that they spread
+                     ///< over the image.
+  int window_px = 15;  ///< KLT window.
+  int levels = 3;      ///< KLT pyramid levels above the base.
+  double min_quality =
+      4.0;  ///< Smaller eigenvalue of the structure tensor, (grey levels a pixel)^2.
 };
 
 [[nodiscard]] Pyramid MakePyramid(const cv::Mat& gray, const KeypointOptions& options);
 
-/// New corners (Shi-Tomasi, sub-pixel by the peak of the score) in cells that hold none of `occupied`, best first in each cell.
-[[nodiscard]] std::vector<Eigen::Vector2f> DetectCorners(const cv::Mat& gray, const std::vector<Eigen::Vector2f>& occupied,
-                                                         const KeypointOptions& options);
+/// New corners (Shi-Tomasi, sub-pixel by the peak of the score) in cells that hold none of
+/// `occupied`, best first in each cell.
+[[nodiscard]] std::vector<Eigen::Vector2f> DetectCorners(
+    const cv::Mat& gray, const std::vector<Eigen::Vector2f>& occupied,
+    const KeypointOptions& options);
 
-/// How much brighter an image shows the same places than another: the median over the points of the ratio of the mean grey levels around
-/// them; 1 with too few points to tell. Automatic exposure changes it.
-[[nodiscard]] double BrightnessRatio(const cv::Mat& from, const cv::Mat& to, const std::vector<Eigen::Vector2f>& points,
+/// How much brighter an image shows the same places than another: the median over the points of the
+/// ratio of the mean grey levels around them; 1 with too few points to decide. Automatic exposure
+/// changes it.
+[[nodiscard]] double BrightnessRatio(const cv::Mat& from, const cv::Mat& to,
+                                     const std::vector<Eigen::Vector2f>& points,
                                      const std::vector<Eigen::Vector2f>& guesses);
 
-/// Follows points from one image to another; `found[i]` false where the patch was lost or looks different.
+/// Follows points from one image to another; `found[i]` false where the patch was lost or looks
+/// different.
 struct KltResult {
   std::vector<Eigen::Vector2f> points;
   std::vector<bool> found;
 };
-[[nodiscard]] KltResult TrackKlt(const Pyramid& from, const Pyramid& to, const std::vector<Eigen::Vector2f>& points,
-                                 const std::vector<Eigen::Vector2f>& guesses, int max_level, const KeypointOptions& options);
+[[nodiscard]] KltResult TrackKlt(const Pyramid& from, const Pyramid& to,
+                                 const std::vector<Eigen::Vector2f>& points,
+                                 const std::vector<Eigen::Vector2f>& guesses, int max_level,
+                                 const KeypointOptions& options);
 
 /// Depth at a pixel: the median of its 3x3 neighbours, 0 at edges and holes.
 [[nodiscard]] double DepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel);
@@ -49,6 +58,7 @@ struct DescribedFeatures {
   std::vector<Eigen::Vector3f> in_camera;  ///< Metres.
   cv::Mat descriptors;                     ///< CV_8UC1, 32 columns, a row a feature.
 };
-[[nodiscard]] DescribedFeatures DescribeFeatures(const cv::Mat& gray, const cv::Mat& depth_m, const Intrinsics& intrinsics);
+[[nodiscard]] DescribedFeatures DescribeFeatures(const cv::Mat& gray, const cv::Mat& depth_m,
+                                                 const Intrinsics& intrinsics);
 
 }  // namespace plumb

@@ -7,7 +7,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "algo/types/pose.hpp"
+#include "algo/base/pose.hpp"
 
 namespace plumb {
 namespace {
@@ -15,7 +15,8 @@ namespace {
 using Matrix3x6d = Eigen::Matrix<double, 3, 6>;
 using Matrix6x3d = Eigen::Matrix<double, 6, 3>;
 
-constexpr double kNearestPoint_m = 0.02;    // In front of the camera; nearer, projections mean nothing.
+constexpr double kNearestPoint_m =
+    0.02;  // In front of the camera; nearer, projections mean nothing.
 constexpr double kKeypointLossScale = 2.0;  // Cauchy, in standard deviations.
 constexpr double kCornerLossScale = 3.0;
 
@@ -35,8 +36,12 @@ struct CornerView {
   double weight = 0;
 };
 
-double Cauchy(double squared, double scale) { return scale * scale * std::log1p(squared / (scale * scale)); }
-double CauchyWeight(double squared, double scale) { return 1.0 / (1.0 + squared / (scale * scale)); }
+double Cauchy(double squared, double scale) {
+  return scale * scale * std::log1p(squared / (scale * scale));
+}
+double CauchyWeight(double squared, double scale) {
+  return 1.0 / (1.0 + squared / (scale * scale));
+}
 
 // d(R(x)^-1 (p - v)) / dx at 0 for the twist x on the camera's side.
 Matrix3x6d PoseDerivative(const Eigen::Vector3d& p) {
@@ -57,8 +62,12 @@ Eigen::Matrix<double, 2, 3> ViewDerivative(const Eigen::Vector3d& p) {
 class LocalBundle {
  public:
   LocalBundle(const Intrinsics& intrinsics, const LocalBundleOptions& options, TrackingMap& map)
-      : intrinsics_(intrinsics), options_(options), map_(map), slot_of_keyframe_(map.keyframes.size(), -1) {
-    for (const int k : options.free_keyframes) slot_of_keyframe_[static_cast<std::size_t>(k)] = num_poses_++;
+      : intrinsics_(intrinsics),
+        options_(options),
+        map_(map),
+        slot_of_keyframe_(map.keyframes.size(), -1) {
+    for (const int k : options.free_keyframes)
+      slot_of_keyframe_[static_cast<std::size_t>(k)] = num_poses_++;
     const double scale = intrinsics.width / 640.0;
     weight_px_ = intrinsics.fx / (options.keypoint_sigma_px * scale);
     CollectPoints();
@@ -116,7 +125,8 @@ class LocalBundle {
     const auto for_each = [&](const auto& visit) {
       for (std::size_t k = 0; k < map_.keyframes.size(); ++k)
         for (const KeypointObservation& o : map_.keyframes[k].keypoints)
-          if (const int s = slot[static_cast<std::size_t>(o.landmark)]; s >= 0) visit(static_cast<int>(k), static_cast<std::size_t>(s), o);
+          if (const int s = slot[static_cast<std::size_t>(o.landmark)]; s >= 0)
+            visit(static_cast<int>(k), static_cast<std::size_t>(s), o);
     };
     for_each([&](int, std::size_t s, const KeypointObservation&) { ++first_view_[s + 1]; });
     for (std::size_t s = 0; s < landmarks_.size(); ++s) first_view_[s + 1] += first_view_[s];
@@ -125,7 +135,8 @@ class LocalBundle {
     for_each([&](int k, std::size_t s, const KeypointObservation& o) {
       PointView& view = views_[next[s]++];
       view = {k, Undistort(intrinsics_, o.pixel), o.z_m, 0.0};
-      if (o.z_m > 0) view.weight_z = 1.0 / (options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8));
+      if (o.z_m > 0)
+        view.weight_z = 1.0 / (options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8));
     });
   }
 
@@ -144,17 +155,22 @@ class LocalBundle {
         const auto found = slots.find(m.id);
         if (found == slots.end()) continue;
         for (std::size_t i = 0; i < 4; ++i)
-          corners_.push_back({static_cast<int>(k), found->second, in_marker[i], Undistort(intrinsics_, m.corners[i]),
-                              intrinsics_.fx / std::max(options_.min_corner_sigma_px * scale, m.sigma_px[i])});
+          corners_.push_back(
+              {static_cast<int>(k), found->second, in_marker[i],
+               Undistort(intrinsics_, m.corners[i]),
+               intrinsics_.fx / std::max(options_.min_corner_sigma_px * scale, m.sigma_px[i])});
       }
     }
   }
 
   [[nodiscard]] State Read() const {
     State state;
-    for (const MapKeyframe& keyframe : map_.keyframes) state.T_camera_world.push_back(keyframe.T_world_color.inverse());
-    for (const int id : markers_) state.T_world_marker.push_back(map_.markers.at(id).T_world_marker);
-    for (const int id : landmarks_) state.landmarks.push_back(map_.landmarks[static_cast<std::size_t>(id)].p_world);
+    for (const MapKeyframe& keyframe : map_.keyframes)
+      state.T_camera_world.push_back(keyframe.T_world_color.inverse());
+    for (const int id : markers_)
+      state.T_world_marker.push_back(map_.markers.at(id).T_world_marker);
+    for (const int id : landmarks_)
+      state.landmarks.push_back(map_.landmarks[static_cast<std::size_t>(id)].p_world);
     return state;
   }
 
@@ -168,10 +184,12 @@ class LocalBundle {
       map_.landmarks[static_cast<std::size_t>(landmarks_[s])].p_world = state.landmarks[s];
   }
 
-  // Depth of a point of the camera at its depth stamp, `dt` after the colour stamp: row 2 of p - dt (w x p + v).
+  // Depth of a point of the camera at its depth stamp, `dt` after the colour stamp: row 2 of p - dt
+  // (w x p + v).
   [[nodiscard]] double DepthAtStamp(const MapKeyframe& keyframe, const Eigen::Vector3d& p) const {
     const double dt_s = keyframe.data.depth_time_s - keyframe.data.color_time_s;
-    return p.z() - dt_s * (keyframe.velocity_per_s[0] * p.y() - keyframe.velocity_per_s[1] * p.x() + keyframe.velocity_per_s[5]);
+    return p.z() - dt_s * (keyframe.velocity_per_s[0] * p.y() - keyframe.velocity_per_s[1] * p.x() +
+                           keyframe.velocity_per_s[5]);
   }
 
   [[nodiscard]] double Cost(const State& state) const {
@@ -179,18 +197,22 @@ class LocalBundle {
     for (std::size_t s = 0; s < landmarks_.size(); ++s) {
       for (std::size_t i = first_view_[s]; i < first_view_[s + 1]; ++i) {
         const PointView& view = views_[i];
-        const Eigen::Vector3d p = state.T_camera_world[static_cast<std::size_t>(view.keyframe)] * state.landmarks[s];
+        const Eigen::Vector3d p =
+            state.T_camera_world[static_cast<std::size_t>(view.keyframe)] * state.landmarks[s];
         if (p.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
         const Eigen::Vector2d r = (p.head<2>() / p.z() - view.ideal) * weight_px_;
         cost += Cauchy(r.squaredNorm(), kKeypointLossScale);
         if (view.weight_z == 0) continue;
-        const double rz = (DepthAtStamp(map_.keyframes[static_cast<std::size_t>(view.keyframe)], p) - view.z_m) * view.weight_z;
+        const double rz =
+            (DepthAtStamp(map_.keyframes[static_cast<std::size_t>(view.keyframe)], p) - view.z_m) *
+            view.weight_z;
         cost += Cauchy(rz * rz, kKeypointLossScale);
       }
     }
     for (const CornerView& view : corners_) {
-      const Eigen::Vector3d p = state.T_camera_world[static_cast<std::size_t>(view.keyframe)] *
-                                (state.T_world_marker[static_cast<std::size_t>(view.marker)] * view.in_marker);
+      const Eigen::Vector3d p =
+          state.T_camera_world[static_cast<std::size_t>(view.keyframe)] *
+          (state.T_world_marker[static_cast<std::size_t>(view.marker)] * view.in_marker);
       if (p.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
       const Eigen::Vector2d r = (p.head<2>() / p.z() - view.ideal) * view.weight;
       cost += Cauchy(r.squaredNorm(), kCornerLossScale);
@@ -198,7 +220,8 @@ class LocalBundle {
     return cost;
   }
 
-  // What one landmark adds: its own 3x3 system, and its coupling to each free keyframe that sees it.
+  // What one landmark adds: its own 3x3 system, and its coupling to each free keyframe that sees
+  // it.
   struct PointSystem {
     Eigen::Matrix3d V = Eigen::Matrix3d::Zero();
     Eigen::Vector3d g = Eigen::Vector3d::Zero();
@@ -206,7 +229,8 @@ class LocalBundle {
   };
 
   // Normal equations of the poses and markers (H, g) and of one landmark.
-  void AddLandmark(const State& state, std::size_t s, Eigen::MatrixXd& H, Eigen::VectorXd& g, PointSystem& point) const {
+  void AddLandmark(const State& state, std::size_t s, Eigen::MatrixXd& H, Eigen::VectorXd& g,
+                   PointSystem& point) const {
     for (std::size_t i = first_view_[s]; i < first_view_[s + 1]; ++i) {
       const PointView& view = views_[i];
       const Pose& T_camera_world = state.T_camera_world[static_cast<std::size_t>(view.keyframe)];
@@ -225,8 +249,9 @@ class LocalBundle {
         const double weight_z = std::sqrt(CauchyWeight(rz * rz, kKeypointLossScale));
         const double dt_s = keyframe.data.depth_time_s - keyframe.data.color_time_s;
         r.z() = weight_z * rz;
-        J_camera.row(2) =
-            weight_z * view.weight_z * Eigen::RowVector3d(dt_s * keyframe.velocity_per_s[1], -dt_s * keyframe.velocity_per_s[0], 1.0);
+        J_camera.row(2) = weight_z * view.weight_z *
+                          Eigen::RowVector3d(dt_s * keyframe.velocity_per_s[1],
+                                             -dt_s * keyframe.velocity_per_s[0], 1.0);
       }
       const Eigen::Matrix3d J_point = J_camera * T_camera_world.linear();
       point.V.noalias() += J_point.transpose() * J_point;
@@ -240,7 +265,8 @@ class LocalBundle {
     }
   }
 
-  void AddCorner(const State& state, const CornerView& view, Eigen::MatrixXd& H, Eigen::VectorXd& g) const {
+  void AddCorner(const State& state, const CornerView& view, Eigen::MatrixXd& H,
+                 Eigen::VectorXd& g) const {
     const Pose& T_camera_world = state.T_camera_world[static_cast<std::size_t>(view.keyframe)];
     const Pose& T_world_marker = state.T_world_marker[static_cast<std::size_t>(view.marker)];
     const Eigen::Vector3d p = T_camera_world * (T_world_marker * view.in_marker);
@@ -251,7 +277,8 @@ class LocalBundle {
     // The twist on the marker's side: p_world = T_world_marker (p + w x p + v).
     Matrix3x6d J_in_marker;
     J_in_marker << -Skew(view.in_marker), Eigen::Matrix3d::Identity();
-    const Eigen::Matrix<double, 2, 6> J_marker = J * (T_camera_world.linear() * T_world_marker.linear()) * J_in_marker;
+    const Eigen::Matrix<double, 2, 6> J_marker =
+        J * (T_camera_world.linear() * T_world_marker.linear()) * J_in_marker;
     const int m = 6 * (num_poses_ + view.marker);
     H.block<6, 6>(m, m).noalias() += J_marker.transpose() * J_marker;
     g.segment<6>(m).noalias() += J_marker.transpose() * r;
@@ -263,7 +290,8 @@ class LocalBundle {
     g.segment<6>(6 * slot).noalias() += J_pose.transpose() * r;
   }
 
-  // One damped Gauss-Newton step from `state` to `next`; only the lower half of H is kept. False if it cannot be solved.
+  // One damped Gauss-Newton step from `state` to `next`; only the lower half of H is kept. False if
+  // it cannot be solved.
   bool Step(const State& state, double damping, State& next) const {
     const int size = 6 * (num_poses_ + static_cast<int>(markers_.size()));
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(size, size);
@@ -291,13 +319,17 @@ class LocalBundle {
     next = state;
     for (const int k : options_.free_keyframes) {
       const auto index = static_cast<std::size_t>(k);
-      next.T_camera_world[index] = PoseFromTwist(x.segment<6>(6 * slot_of_keyframe_[index])).inverse() * state.T_camera_world[index];
+      next.T_camera_world[index] =
+          PoseFromTwist(x.segment<6>(6 * slot_of_keyframe_[index])).inverse() *
+          state.T_camera_world[index];
     }
     for (std::size_t s = 0; s < markers_.size(); ++s)
-      next.T_world_marker[s] = state.T_world_marker[s] * PoseFromTwist(x.segment<6>(6 * (num_poses_ + static_cast<int>(s))));
+      next.T_world_marker[s] = state.T_world_marker[s] *
+                               PoseFromTwist(x.segment<6>(6 * (num_poses_ + static_cast<int>(s))));
     for (std::size_t s = 0; s < landmarks_.size(); ++s) {
       Eigen::Vector3d right = points[s].g;
-      for (const auto& [a, W_a] : points[s].W) right.noalias() += W_a.transpose() * x.segment<6>(6 * a);
+      for (const auto& [a, W_a] : points[s].W)
+        right.noalias() += W_a.transpose() * x.segment<6>(6 * a);
       next.landmarks[s] -= points[s].V * right;
     }
     return true;
@@ -318,7 +350,8 @@ class LocalBundle {
 
 }  // namespace
 
-LocalBundleSummary AdjustLocalMap(const Intrinsics& intrinsics, const LocalBundleOptions& options, TrackingMap& map) {
+LocalBundleSummary AdjustLocalMap(const Intrinsics& intrinsics, const LocalBundleOptions& options,
+                                  TrackingMap& map) {
   return LocalBundle(intrinsics, options, map).Run();
 }
 

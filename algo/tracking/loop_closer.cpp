@@ -11,10 +11,11 @@ namespace plumb {
 namespace {
 
 constexpr int kMaxCandidates = 4;
-constexpr int kSharedEnough = 10;   // Landmarks in common: the keyframes know of each other.
-constexpr int kCovisible = 15;      // Landmarks in common: a constraint.
-constexpr double kViewReach = 0.7;  // As far apart as two views may be: shares of the depth plus radians.
-constexpr double kDrift_m = 0.30;   // Believed on any way, and on each metre of it.
+constexpr int kSharedEnough = 10;  // Landmarks in common: the keyframes know of each other.
+constexpr int kCovisible = 15;     // Landmarks in common: a constraint.
+constexpr double kViewReach =
+    0.7;  // As far apart as two views may be: shares of the depth plus radians.
+constexpr double kDrift_m = 0.30;  // Believed on any way, and on each metre of it.
 constexpr double kDriftPerMetre = 0.05;
 constexpr double kTurn_rad = 0.30;
 constexpr double kTurnPerMetre = 0.03;  // Radians.
@@ -26,25 +27,32 @@ constexpr double kLinkSigma_rad = 0.001;
 std::vector<double> WayToNewest(const TrackingMap& map) {
   std::vector<double> way(map.keyframes.size(), 0.0);
   for (std::size_t k = map.keyframes.size() - 1; k-- > 0;)
-    way[k] = way[k + 1] + (map.keyframes[k + 1].T_world_color.translation() - map.keyframes[k].T_world_color.translation()).norm();
+    way[k] = way[k + 1] + (map.keyframes[k + 1].T_world_color.translation() -
+                           map.keyframes[k].T_world_color.translation())
+                              .norm();
   return way;
 }
 
-DriftBound BoundOf(double way_m) { return {kDrift_m + kDriftPerMetre * way_m, kTurn_rad + kTurnPerMetre * way_m}; }
+DriftBound BoundOf(double way_m) {
+  return {kDrift_m + kDriftPerMetre * way_m, kTurn_rad + kTurnPerMetre * way_m};
+}
 
 // Landmarks that the newest keyframe shares with each.
 std::vector<int> SharedWithNewest(const TrackingMap& map) {
   std::vector<bool> seen(map.landmarks.size(), false);
-  for (const KeypointObservation& o : map.keyframes.back().keypoints) seen[static_cast<std::size_t>(o.landmark)] = true;
+  for (const KeypointObservation& o : map.keyframes.back().keypoints)
+    seen[static_cast<std::size_t>(o.landmark)] = true;
   std::vector<int> shared;
   for (const MapKeyframe& keyframe : map.keyframes) {
-    shared.push_back(static_cast<int>(std::count_if(keyframe.keypoints.begin(), keyframe.keypoints.end(),
-                                                    [&](const auto& o) { return seen[static_cast<std::size_t>(o.landmark)]; })));
+    shared.push_back(static_cast<int>(
+        std::count_if(keyframe.keypoints.begin(), keyframe.keypoints.end(),
+                      [&](const auto& o) { return seen[static_cast<std::size_t>(o.landmark)]; })));
   }
   return shared;
 }
 
-// What holds the map together now: each keyframe's link to the one it followed and to those with landmarks in common.
+// What holds the map together now: each keyframe's link to the one it followed and to those with
+// landmarks in common.
 std::vector<KeyframeLink> LinksOf(const TrackingMap& map) {
   std::vector<std::vector<int>> seen_by(map.landmarks.size());
   for (std::size_t k = 0; k < map.keyframes.size(); ++k)
@@ -55,7 +63,8 @@ std::vector<KeyframeLink> LinksOf(const TrackingMap& map) {
     for (std::size_t i = 0; i < keyframes.size(); ++i)
       for (std::size_t j = i + 1; j < keyframes.size(); ++j) ++shared[{keyframes[i], keyframes[j]}];
   for (std::size_t k = 0; k < map.keyframes.size(); ++k)
-    if (map.keyframes[k].previous >= 0) shared[{map.keyframes[k].previous, static_cast<int>(k)}] += kCovisible;
+    if (map.keyframes[k].previous >= 0)
+      shared[{map.keyframes[k].previous, static_cast<int>(k)}] += kCovisible;
   std::vector<KeyframeLink> links;
   for (const auto& [pair, count] : shared) {
     if (count < kCovisible || pair.first == pair.second) continue;
@@ -66,7 +75,8 @@ std::vector<KeyframeLink> LinksOf(const TrackingMap& map) {
   return links;
 }
 
-// Gauss-Newton; the first pose stays. False if the system cannot be solved; the poses are as they were then.
+// Gauss-Newton; the first pose stays. False if the system cannot be solved; the poses are as they
+// were then.
 bool MeetLinks(const std::vector<KeyframeLink>& links, std::vector<Pose>& T_world) {
   const auto size = static_cast<Eigen::Index>(6 * T_world.size());
   std::vector<Pose> T = T_world;
@@ -79,7 +89,8 @@ bool MeetLinks(const std::vector<KeyframeLink>& links, std::vector<Pose>& T_worl
     };
     for (const KeyframeLink& link : links) {
       const LinkEquations equations =
-          Linearise(link, T[static_cast<std::size_t>(link.a)], T[static_cast<std::size_t>(link.b)], kLinkSigma_rad, kLinkSigma_m);
+          Linearise(link, T[static_cast<std::size_t>(link.a)], T[static_cast<std::size_t>(link.b)],
+                    kLinkSigma_rad, kLinkSigma_m);
       add(link.a, link.a, equations.H.topLeftCorner<6, 6>());
       add(link.a, link.b, equations.H.topRightCorner<6, 6>());
       add(link.b, link.a, equations.H.bottomLeftCorner<6, 6>());
@@ -95,7 +106,8 @@ bool MeetLinks(const std::vector<KeyframeLink>& links, std::vector<Pose>& T_worl
     if (solver.info() != Eigen::Success) return false;
     const Eigen::VectorXd step = solver.solve(-gradient);
     if (!step.allFinite()) return false;
-    for (std::size_t k = 1; k < T.size(); ++k) T[k] = T[k] * PoseFromTwist(step.segment<6>(static_cast<Eigen::Index>(6 * k)));
+    for (std::size_t k = 1; k < T.size(); ++k)
+      T[k] = T[k] * PoseFromTwist(step.segment<6>(static_cast<Eigen::Index>(6 * k)));
     if (step.lpNorm<Eigen::Infinity>() < 1e-6) break;
   }
   for (Pose& pose : T) pose = Orthonormalised(pose);
@@ -117,15 +129,16 @@ std::vector<int> LoopCandidates(const TrackingMap& map) {
     const Pose T = map.keyframes[i].T_world_color.inverse() * map.keyframes.back().T_world_color;
     const DriftBound drift = BoundOf(way[i]);
     const double depth = std::clamp(map.keyframes[i].median_depth_m, 0.4, 3.0);
-    const double apart =
-        std::max(0.0, T.translation().norm() - drift.translation_m) / depth + std::max(0.0, RotationAngle(T) - drift.rotation_rad);
+    const double apart = std::max(0.0, T.translation().norm() - drift.translation_m) / depth +
+                         std::max(0.0, RotationAngle(T) - drift.rotation_rad);
     // Among those within reach, the ones that would see most alike without any drift.
     if (apart < kViewReach) near.emplace_back(T.translation().norm() / depth + RotationAngle(T), k);
   }
   std::sort(near.begin(), near.end());
   std::vector<int> candidates;
   for (const auto& [distance, k] : near) {
-    const bool beside = std::any_of(candidates.begin(), candidates.end(), [k = k](int other) { return std::abs(other - k) < 2; });
+    const bool beside = std::any_of(candidates.begin(), candidates.end(),
+                                    [k = k](int other) { return std::abs(other - k) < 2; });
     if (!beside) candidates.push_back(k);
     if (static_cast<int>(candidates.size()) == kMaxCandidates) break;
   }
@@ -149,12 +162,15 @@ void BendMap(const std::vector<KeyframeLink>& links, TrackingMap& map) {
     map.keyframes[k].T_world_color = T_world[k];
   }
   for (Landmark& landmark : map.landmarks)
-    landmark.p_world = T_new_old[static_cast<std::size_t>(landmark.first_keyframe)] * landmark.p_world;
+    landmark.p_world =
+        T_new_old[static_cast<std::size_t>(landmark.first_keyframe)] * landmark.p_world;
   std::map<int, std::size_t> first_view;
   for (std::size_t k = 0; k < map.keyframes.size(); ++k)
-    for (const MarkerObservation& marker : map.keyframes[k].data.markers) first_view.emplace(marker.id, k);
+    for (const MarkerObservation& marker : map.keyframes[k].data.markers)
+      first_view.emplace(marker.id, k);
   for (auto& [id, marker] : map.markers)
-    if (const auto k = first_view.find(id); k != first_view.end()) marker.T_world_marker = T_new_old[k->second] * marker.T_world_marker;
+    if (const auto k = first_view.find(id); k != first_view.end())
+      marker.T_world_marker = T_new_old[k->second] * marker.T_world_marker;
 }
 
 }  // namespace plumb

@@ -1,4 +1,5 @@
-// The tracker's map: keyframes, landmarks, markers. Its world is the first keyframe's colour camera.
+// The tracker's map: keyframes, landmarks, markers. Its world is the first keyframe's colour
+// camera.
 #pragma once
 
 #include <array>
@@ -29,24 +30,28 @@ struct KeypointObservation {
   double z_m = 0.0;       ///< Depth there; 0: none, or an edge.
 };
 
-/// A keyframe of the map. `data.view.T_world_camera` (depth time) follows T_world_color: see DepthPose().
+/// A keyframe of the map. `data.view.T_world_camera` (depth time) follows T_world_color: see
+/// DepthPose().
 struct MapKeyframe {
   Keyframe data;
-  Pose T_world_color = Pose::Identity();       ///< At the colour stamp.
-  Vector6d velocity_per_s = Vector6d::Zero();  ///< Twist in the camera frame: T(t0 + dt) = T(t0) * PoseFromTwist(v dt).
-  int previous = -1;                           ///< The keyframe that it was tracked against, or -1.
-  Pose T_previous_color = Pose::Identity();    ///< Its camera in that one's, as tracked.
+  Pose T_world_color = Pose::Identity();  ///< At the colour stamp.
+  Vector6d velocity_per_s =
+      Vector6d::Zero();  ///< Twist in the camera frame: T(t0 + dt) = T(t0) * PoseFromTwist(v dt).
+  int previous = -1;     ///< The keyframe that it was tracked against, or -1.
+  Pose T_previous_color = Pose::Identity();  ///< Its camera in that one's, as tracked.
   std::vector<KeypointObservation> keypoints;
   DenseView dense;
-  double median_depth_m = 1.0;                   ///< Of the dense view.
-  cv::Mat gray;                                  ///< CV_8UC1; released once the keyframe is out of reach of re-association.
-  std::vector<Eigen::Vector2f> features_px;      ///< For relocalisation: keypoints with a descriptor and depth.
+  double median_depth_m = 1.0;  ///< Of the dense view.
+  cv::Mat gray;  ///< CV_8UC1; released once the keyframe is out of reach of re-association.
+  std::vector<Eigen::Vector2f>
+      features_px;  ///< For relocalisation: keypoints with a descriptor and depth.
   std::vector<Eigen::Vector3f> features_camera;  ///< The same in the camera frame, metres.
-  cv::Mat descriptors;                           ///< One ORB descriptor a row, for each of the features.
+  cv::Mat descriptors;  ///< One ORB descriptor a row, for each of the features.
 };
 
 /// Camera pose `dt_s` after the colour stamp under the keyframe's velocity.
-[[nodiscard]] inline Pose PoseAfter(const Pose& T_world_color, const Vector6d& velocity_per_s, double dt_s) {
+[[nodiscard]] inline Pose PoseAfter(const Pose& T_world_color, const Vector6d& velocity_per_s,
+                                    double dt_s) {
   return T_world_color * PoseFromTwist(velocity_per_s * dt_s);
 }
 
@@ -54,7 +59,8 @@ struct MapKeyframe {
 struct MapMarker {
   Pose T_world_marker = Pose::Identity();
   int num_views = 0;   ///< Keyframes that show it.
-  int num_frames = 0;  ///< Tracked frames, keyframes or not, that agree on all its corners; the one that began the map counts.
+  int num_frames = 0;  ///< Tracked frames, keyframes or not, that agree on all its corners; the one
+                       ///< that began the map counts.
 };
 
 struct TrackingMap {
@@ -63,8 +69,8 @@ struct TrackingMap {
   std::map<int, MapMarker> markers;
 };
 
-/// Whether enough landmarks that others see too, or a marker, hold the keyframe: if not (a blank wall), bundle adjustment would let it
-/// slide, and tracking's word counts.
+/// Whether enough landmarks that others see too, or a marker, hold the keyframe: if not (a blank
+/// wall), bundle adjustment would let it slide, and tracking's word counts.
 [[nodiscard]] inline bool IsHeld(const TrackingMap& map, const MapKeyframe& keyframe) {
   constexpr int kEnough = 30;
   int shared = 0;

@@ -22,7 +22,9 @@ struct NormalEquations {
 };
 
 // Weight of a residual in sigmas under the Cauchy loss.
-double CauchyWeight(double residual, double scale) { return 1.0 / (1.0 + (residual / scale) * (residual / scale)); }
+double CauchyWeight(double residual, double scale) {
+  return 1.0 / (1.0 + (residual / scale) * (residual / scale));
+}
 
 // With p_camera = T^-1 p_world and T <- T exp(x): d p_camera / d x = [ [p]x , -I ].
 void AddPoint(const PosePoint& point, const Eigen::Vector3d& p, NormalEquations& equations) {
@@ -32,8 +34,10 @@ void AddPoint(const PosePoint& point, const Eigen::Vector3d& p, NormalEquations&
   const double weight = CauchyWeight(residual.norm(), 2.0);
   Eigen::Matrix<double, 3, 6> J_point;
   J_point << Skew(p), -Eigen::Matrix3d::Identity();
-  const Vector6d Jx = (J_point.row(0) - p.x() * iz * J_point.row(2)).transpose() * (iz / point.sigma);
-  const Vector6d Jy = (J_point.row(1) - p.y() * iz * J_point.row(2)).transpose() * (iz / point.sigma);
+  const Vector6d Jx =
+      (J_point.row(0) - p.x() * iz * J_point.row(2)).transpose() * (iz / point.sigma);
+  const Vector6d Jy =
+      (J_point.row(1) - p.y() * iz * J_point.row(2)).transpose() * (iz / point.sigma);
   equations.Add(Jx, residual.x(), weight);
   equations.Add(Jy, residual.y(), weight);
   if (point.inverse_z > 0) {
@@ -54,7 +58,8 @@ DenseSum AddDense(const PoseProblem& problem, const Pose& T_world_camera, double
   DenseSum sum;
   const DenseView& frame = *problem.dense_frame;
   const DenseView& target = *problem.dense_target;
-  const Pose T_target_depth = problem.T_world_target.inverse() * T_world_camera * problem.T_color_depth;
+  const Pose T_target_depth =
+      problem.T_world_target.inverse() * T_world_camera * problem.T_color_depth;
   const Pose T_depth_color = problem.T_color_depth.inverse();
   const Eigen::Matrix3f R = T_target_depth.linear().cast<float>();
   const Eigen::Vector3f t = T_target_depth.translation().cast<float>();
@@ -101,13 +106,15 @@ PoseEstimate OptimizePose(const PoseProblem& problem, const Pose& T_world_camera
   for (int iteration = 0; iteration < problem.num_iterations; ++iteration) {
     NormalEquations equations;
     const Pose T_camera_world = estimate.T_world_camera.inverse();
-    for (const PosePoint& point : problem.points) AddPoint(point, T_camera_world * point.p_world, equations);
+    for (const PosePoint& point : problem.points)
+      AddPoint(point, T_camera_world * point.p_world, equations);
     if (dense) {
       const DenseSum sum = AddDense(problem, estimate.T_world_camera, gate_m);
       equations.H += sum.equations.H;
       equations.g += sum.equations.g;
       estimate.num_dense = sum.associated;
-      estimate.dense_overlap = sum.valid > 0 ? static_cast<double>(sum.associated) / sum.valid : 0.0;
+      estimate.dense_overlap =
+          sum.valid > 0 ? static_cast<double>(sum.associated) / sum.valid : 0.0;
       estimate.dense_rms_m = sum.associated > 0 ? std::sqrt(sum.squares / sum.associated) : 0.0;
       gate_m = std::max(0.02, gate_m * 0.7);
     }
@@ -129,8 +136,10 @@ PoseEstimate OptimizePose(const PoseProblem& problem, const Pose& T_world_camera
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     const PosePoint& point = problem.points[i];
     const Eigen::Vector3d p = T_camera_world * point.p_world;
-    bool inlier = p.z() > 0.05 && (p.head<2>() / p.z() - point.ideal).norm() < kPointGate * point.sigma;
-    if (inlier && point.inverse_z > 0) inlier = std::abs(1.0 / p.z() - point.inverse_z) < 2 * kPointGate * point.inverse_z_sigma;
+    bool inlier =
+        p.z() > 0.05 && (p.head<2>() / p.z() - point.ideal).norm() < kPointGate * point.sigma;
+    if (inlier && point.inverse_z > 0)
+      inlier = std::abs(1.0 / p.z() - point.inverse_z) < 2 * kPointGate * point.inverse_z_sigma;
     estimate.inlier[i] = inlier;
     estimate.num_inliers += inlier ? 1 : 0;
   }

@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "algo/base/pose.hpp"
 #include "algo/tracking/dense_view.hpp"
-#include "algo/types/pose.hpp"
 
 namespace plumb {
 
@@ -17,15 +17,16 @@ struct PosePoint {
   double inverse_z_sigma = 0.01;
 };
 
-/// Everything one pose is estimated from. The dense part is optional: point-to-plane between the frame's depth and a
-/// keyframe's, by projective association.
+/// Everything one pose is estimated from. The dense part is optional: point-to-plane between the
+/// frame's depth and a keyframe's, by projective association.
 struct PoseProblem {
   std::vector<PosePoint> points;
   const DenseView* dense_frame = nullptr;
   const DenseView* dense_target = nullptr;
   Pose T_world_target = Pose::Identity();  ///< Of the target's depth camera.
-  Pose T_color_depth = Pose::Identity();   ///< Motion from the frame's colour stamp to its depth stamp.
-  Intrinsics intrinsics;                   ///< Of the camera; the dense views' cells are scaled from it.
+  Pose T_color_depth =
+      Pose::Identity();   ///< Motion from the frame's colour stamp to its depth stamp.
+  Intrinsics intrinsics;  ///< Of the camera; the dense views' cells are scaled from it.
   int num_iterations = 10;
 };
 
@@ -33,15 +34,18 @@ struct PoseEstimate {
   Pose T_world_camera = Pose::Identity();  ///< At the colour stamp.
   std::vector<bool> inlier;                ///< One a point.
   int num_inliers = 0;
-  int num_dense = 0;           ///< Dense cells that were associated in the last iteration.
-  double dense_overlap = 0.0;  ///< Of the frame's valid cells, the share associated within the gate.
+  int num_dense = 0;  ///< Dense cells that were associated in the last iteration.
+  double dense_overlap =
+      0.0;  ///< Of the frame's valid cells, the share associated within the gate.
   double dense_rms_m = 0.0;
-  Matrix6d information = Matrix6d::Zero();  ///< Of the twist (rotation, translation) in the camera frame.
+  Matrix6d information =
+      Matrix6d::Zero();  ///< Of the twist (rotation, translation) in the camera frame.
   bool converged = false;
 };
 
 /// Gauss-Newton with Geman-McClure-like reweighting from `T_world_camera_start`.
 /// Deterministic. Thread-safe.
-[[nodiscard]] PoseEstimate OptimizePose(const PoseProblem& problem, const Pose& T_world_camera_start);
+[[nodiscard]] PoseEstimate OptimizePose(const PoseProblem& problem,
+                                        const Pose& T_world_camera_start);
 
 }  // namespace plumb

@@ -23,23 +23,28 @@ Pose FromCv(const cv::Mat& rotation_vector, const cv::Mat& translation) {
   return PoseFromTwist(twist);
 }
 
-double ReprojectionRms(const Pose& T_camera_points, const std::vector<cv::Point3d>& points, const std::vector<cv::Point2d>& ideal) {
+double ReprojectionRms(const Pose& T_camera_points, const std::vector<cv::Point3d>& points,
+                       const std::vector<cv::Point2d>& ideal) {
   double sum = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3d p = T_camera_points * Eigen::Vector3d(points[i].x, points[i].y, points[i].z);
+    const Eigen::Vector3d p =
+        T_camera_points * Eigen::Vector3d(points[i].x, points[i].y, points[i].z);
     if (p.z() <= 0) return 1e9;
     sum += (p.head<2>() / p.z() - Eigen::Vector2d(ideal[i].x, ideal[i].y)).squaredNorm();
   }
   return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-// Mean distance between a marker's plane and the depth measured inside it; nothing without enough depth.
-std::optional<double> DepthMisfit(const Intrinsics& intrinsics, const Pose& T_camera_marker, double length_m, const cv::Mat& depth_m) {
+// Mean distance between a marker's plane and the depth measured inside it; nothing without enough
+// depth.
+std::optional<double> DepthMisfit(const Intrinsics& intrinsics, const Pose& T_camera_marker,
+                                  double length_m, const cv::Mat& depth_m) {
   double sum = 0;
   int n = 0;
   for (int i = -4; i <= 4; ++i) {
     for (int j = -4; j <= 4; ++j) {
-      const Eigen::Vector3d p = T_camera_marker * Eigen::Vector3d(i * length_m / 10, j * length_m / 10, 0);
+      const Eigen::Vector3d p =
+          T_camera_marker * Eigen::Vector3d(i * length_m / 10, j * length_m / 10, 0);
       if (p.z() <= 0) continue;
       const double z = DepthAt(depth_m, Project(intrinsics, p));
       if (z <= 0) continue;
@@ -58,18 +63,20 @@ double Distance(const Pose& T_a, const Pose& T_b) {
 
 }  // namespace
 
-std::optional<Pose> MarkerPoseInCamera(const Intrinsics& intrinsics, double marker_length_m, const MarkerObservation& marker,
-                                       const cv::Mat& depth_m) {
+std::optional<Pose> MarkerPoseInCamera(const Intrinsics& intrinsics, double marker_length_m,
+                                       const MarkerObservation& marker, const cv::Mat& depth_m) {
   std::vector<cv::Point3d> corners;
   std::vector<cv::Point2d> ideal;
-  for (const Eigen::Vector3d& c : CornersInMarkerFrame(marker_length_m)) corners.emplace_back(c.x(), c.y(), c.z());
+  for (const Eigen::Vector3d& c : CornersInMarkerFrame(marker_length_m))
+    corners.emplace_back(c.x(), c.y(), c.z());
   for (const Eigen::Vector2d& pixel : marker.corners) {
     const Eigen::Vector2d u = Undistort(intrinsics, pixel);
     ideal.emplace_back(u.x(), u.y());
   }
   std::vector<cv::Mat> rotations;
   std::vector<cv::Mat> translations;
-  cv::solvePnPGeneric(corners, ideal, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations, translations, false, cv::SOLVEPNP_IPPE_SQUARE);
+  cv::solvePnPGeneric(corners, ideal, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations,
+                      translations, false, cv::SOLVEPNP_IPPE_SQUARE);
   std::array<double, 2> error{1e9, 1e9};
   std::array<Pose, 2> candidates;
   const std::size_t n = std::min<std::size_t>(2, rotations.size());
@@ -87,7 +94,8 @@ std::optional<Pose> MarkerPoseInCamera(const Intrinsics& intrinsics, double mark
   if (misfit0 && misfit1 && std::max(*misfit0, *misfit1) > 1.5 * std::min(*misfit0, *misfit1))
     return *misfit0 < *misfit1 ? candidates[0] : candidates[1];
   // Two poses that differ by little are no ambiguity.
-  if (RotationAngle(candidates[0].inverse() * candidates[1]) < 0.15) return error[0] <= error[1] ? candidates[0] : candidates[1];
+  if (RotationAngle(candidates[0].inverse() * candidates[1]) < 0.15)
+    return error[0] <= error[1] ? candidates[0] : candidates[1];
   return std::nullopt;
 }
 
@@ -104,8 +112,11 @@ int NearestKeyframe(const TrackingMap& map, const Pose& T_world_color) {
   return best;
 }
 
-std::optional<Relocalization> RelocalizeByMarkers(const TrackingMap& map, const Intrinsics& intrinsics, double marker_length_m,
-                                                  const std::vector<MarkerObservation>& markers, const cv::Mat& depth_m) {
+std::optional<Relocalization> RelocalizeByMarkers(const TrackingMap& map,
+                                                  const Intrinsics& intrinsics,
+                                                  double marker_length_m,
+                                                  const std::vector<MarkerObservation>& markers,
+                                                  const cv::Mat& depth_m) {
   std::vector<const MarkerObservation*> known;
   for (const MarkerObservation& m : markers)
     if (map.markers.contains(m.id)) known.push_back(&m);
@@ -123,13 +134,15 @@ std::optional<Relocalization> RelocalizeByMarkers(const TrackingMap& map, const 
   }
   Relocalization result;
   if (known.size() == 1) {
-    const auto T_camera_marker = MarkerPoseInCamera(intrinsics, marker_length_m, *known[0], depth_m);
+    const auto T_camera_marker =
+        MarkerPoseInCamera(intrinsics, marker_length_m, *known[0], depth_m);
     if (!T_camera_marker) return std::nullopt;
     result.T_world_color = map.markers.at(known[0]->id).T_world_marker * T_camera_marker->inverse();
   } else {
     cv::Mat rotation;
     cv::Mat translation;
-    if (!cv::solvePnP(corners, ideal, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotation, translation, false, cv::SOLVEPNP_SQPNP))
+    if (!cv::solvePnP(corners, ideal, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotation,
+                      translation, false, cv::SOLVEPNP_SQPNP))
       return std::nullopt;
     const Pose T_camera_world = FromCv(rotation, translation);
     if (ReprojectionRms(T_camera_world, corners, ideal) > 8.0 / intrinsics.fx) return std::nullopt;
@@ -143,14 +156,18 @@ std::optional<Relocalization> RelocalizeByMarkers(const TrackingMap& map, const 
 namespace {
 
 // Consensus of three-point rigid fits between a keyframe's features and the frame's.
-std::optional<Relocalization> Consensus(const MapKeyframe& keyframe, const Intrinsics& intrinsics, const DescribedFeatures& features,
+std::optional<Relocalization> Consensus(const MapKeyframe& keyframe, const Intrinsics& intrinsics,
+                                        const DescribedFeatures& features,
                                         const std::vector<cv::DMatch>& matches) {
   std::mt19937 random(1);
   const auto draw = [&] { return static_cast<std::size_t>(random() % matches.size()); };
   const auto agrees = [&](const Pose& T_frame_keyframe, const cv::DMatch& m) {
-    const Eigen::Vector3d p = T_frame_keyframe * keyframe.features_camera[static_cast<std::size_t>(m.trainIdx)].cast<double>();
+    const Eigen::Vector3d p =
+        T_frame_keyframe *
+        keyframe.features_camera[static_cast<std::size_t>(m.trainIdx)].cast<double>();
     if (p.z() < 0.05) return false;
-    const Eigen::Vector3d q = features.in_camera[static_cast<std::size_t>(m.queryIdx)].cast<double>();
+    const Eigen::Vector3d q =
+        features.in_camera[static_cast<std::size_t>(m.queryIdx)].cast<double>();
     const double pixels = (p.head<2>() / p.z() - q.head<2>() / q.z()).norm() * intrinsics.fx;
     return pixels < 4.0 * intrinsics.width / 640.0 && std::abs(p.z() - q.z()) < 0.03 * q.z();
   };
@@ -159,7 +176,8 @@ std::optional<Relocalization> Consensus(const MapKeyframe& keyframe, const Intri
     std::vector<Eigen::Vector3d> in_keyframe;
     for (const cv::DMatch& m : pairs) {
       in_frame.push_back(features.in_camera[static_cast<std::size_t>(m.queryIdx)].cast<double>());
-      in_keyframe.push_back(keyframe.features_camera[static_cast<std::size_t>(m.trainIdx)].cast<double>());
+      in_keyframe.push_back(
+          keyframe.features_camera[static_cast<std::size_t>(m.trainIdx)].cast<double>());
     }
     return FitRigid(in_frame, in_keyframe);
   };
@@ -183,7 +201,9 @@ std::optional<Relocalization> Consensus(const MapKeyframe& keyframe, const Intri
 
 }  // namespace
 
-std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const Intrinsics& intrinsics, const DescribedFeatures& features,
+std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map,
+                                                   const Intrinsics& intrinsics,
+                                                   const DescribedFeatures& features,
                                                    const std::vector<int>& keyframes) {
   std::optional<Relocalization> best;
   if (features.descriptors.rows < 15) return best;
@@ -195,7 +215,8 @@ std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const
     matcher.knnMatch(features.descriptors, keyframe.descriptors, pairs, 2);
     std::vector<cv::DMatch> matches;
     for (const auto& pair : pairs)
-      if (pair.size() == 2 && pair[0].distance < 60 && pair[0].distance < 0.85F * pair[1].distance) matches.push_back(pair[0]);
+      if (pair.size() == 2 && pair[0].distance < 60 && pair[0].distance < 0.85F * pair[1].distance)
+        matches.push_back(pair[0]);
     if (matches.size() < 15) continue;
     auto candidate = Consensus(keyframe, intrinsics, features, matches);
     if (!candidate || (best && candidate->num_inliers <= best->num_inliers)) continue;
@@ -206,7 +227,8 @@ std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const
   return best;
 }
 
-std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const Intrinsics& intrinsics,
+std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map,
+                                                   const Intrinsics& intrinsics,
                                                    const DescribedFeatures& features) {
   std::vector<int> newest_first(map.keyframes.size());
   std::iota(newest_first.rbegin(), newest_first.rend(), 0);

@@ -15,22 +15,31 @@ struct Relocalization {
   int num_inliers = 0;  ///< Corners or features that agree.
 };
 
-/// By the markers that the map knows: all their corners together; a lone marker only when depth settles its two poses.
-[[nodiscard]] std::optional<Relocalization> RelocalizeByMarkers(const TrackingMap& map, const Intrinsics& intrinsics,
-                                                                double marker_length_m, const std::vector<MarkerObservation>& markers,
-                                                                const cv::Mat& depth_m);
+/// By the markers that the map knows: all their corners together; a lone marker only when depth
+/// settles its two poses.
+[[nodiscard]] std::optional<Relocalization> RelocalizeByMarkers(
+    const TrackingMap& map, const Intrinsics& intrinsics, double marker_length_m,
+    const std::vector<MarkerObservation>& markers, const cv::Mat& depth_m);
 
-/// By ORB features with depth: nearest in Hamming distance in each keyframe, three-point rigid fits, best consensus.
-/// @param keyframes  Those to compare with, in this order; one that leaves no doubt ends the search.
-[[nodiscard]] std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const Intrinsics& intrinsics,
-                                                                 const DescribedFeatures& features, const std::vector<int>& keyframes);
+/// By ORB features with depth: nearest in Hamming distance in each keyframe, three-point rigid
+/// fits, best consensus.
+/// @param keyframes  Those to compare with, in this order; one that leaves no doubt ends the
+/// search.
+[[nodiscard]] std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map,
+                                                                 const Intrinsics& intrinsics,
+                                                                 const DescribedFeatures& features,
+                                                                 const std::vector<int>& keyframes);
 /// The same with all keyframes of the map, the newest first.
-[[nodiscard]] std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map, const Intrinsics& intrinsics,
+[[nodiscard]] std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map,
+                                                                 const Intrinsics& intrinsics,
                                                                  const DescribedFeatures& features);
 
-/// Pose of one marker in the camera frame from its four corners: the square's two candidate poses, told apart by depth
-/// inside it, or by reprojection where it is clear. Nothing where neither decides.
-[[nodiscard]] std::optional<Pose> MarkerPoseInCamera(const Intrinsics& intrinsics, double marker_length_m, const MarkerObservation& marker,
+/// Pose of one marker in the camera frame from its four corners: the square's two candidate poses,
+/// told apart by depth inside it, or by reprojection where it is clear. Nothing where neither
+/// decides.
+[[nodiscard]] std::optional<Pose> MarkerPoseInCamera(const Intrinsics& intrinsics,
+                                                     double marker_length_m,
+                                                     const MarkerObservation& marker,
                                                      const cv::Mat& depth_m);
 
 /// Index of the keyframe whose camera is nearest to a pose (metres plus 0.5 m a radian).

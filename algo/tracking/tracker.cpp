@@ -19,13 +19,16 @@
 namespace plumb {
 namespace {
 
-constexpr double kMaxSpeed = 2.5;           // Metres a second that a hand moves a sensor at the very most.
-constexpr double kMaxTurn = 4.0;            // Radians a second.
-constexpr std::size_t kReassociated = 3;    // Older keyframes whose landmarks are looked for in a new keyframe.
+constexpr double kMaxSpeed = 2.5;  // Metres a second that a hand moves a sensor at the very most.
+constexpr double kMaxTurn = 4.0;   // Radians a second.
+constexpr std::size_t kReassociated =
+    3;  // Older keyframes whose landmarks are looked for in a new keyframe.
 constexpr double kSameBrightness = 0.08;    // Of the exposure: what KLT follows without help.
-constexpr double kDriftFollowed_m = 0.003;  // A drift that bundle adjustment takes out by itself, once the old landmarks are seen again.
+constexpr double kDriftFollowed_m = 0.003;  // A drift that bundle adjustment takes out by itself,
+                                            // once the old landmarks are seen again.
 constexpr double kDriftFollowed_rad = 0.001;
-constexpr int kLoopInliers = 30;  // Features, and keypoints after them, that must agree on a place seen before.
+constexpr int kLoopInliers =
+    30;  // Features, and keypoints after them, that must agree on a place seen before.
 
 struct ActivePoint {
   int landmark = 0;
@@ -78,14 +81,16 @@ struct Tracker::Impl {
     if (options.use_markers) detector.emplace(MarkerDictionary::ByName(info.marker_dictionary));
   }
 
-  // ---- one frame -------------------------------------------------------------------------------------------------
+  // ---- one frame
+  // -------------------------------------------------------------------------------------------------
 
   Prepared Prepare(const Frame& frame) const {
     const Intrinsics& k = info.intrinsics;
     for (const cv::Mat* image : {&frame.color_rgb, &frame.depth_m})
       if (image->cols != k.width || image->rows != k.height)
-        throw std::invalid_argument(fmt::format("frame {}: image is {}x{}, the intrinsics are for {}x{}", frame.index, image->cols,
-                                                image->rows, k.width, k.height));
+        throw std::invalid_argument(
+            fmt::format("frame {}: image is {}x{}, the intrinsics are for {}x{}", frame.index,
+                        image->cols, image->rows, k.width, k.height));
     Prepared prepared;
     cv::cvtColor(frame.color_rgb, prepared.gray, cv::COLOR_RGB2GRAY);
     prepared.pyramid = MakePyramid(prepared.gray, keypoint_options);
@@ -123,14 +128,18 @@ struct Tracker::Impl {
   }
 
   static bool ShowsSomething(const Prepared& prepared) {
-    return !prepared.markers.empty() || std::any_of(prepared.dense.z_m.begin(), prepared.dense.z_m.end(), [](float z) { return z > 0; });
+    return !prepared.markers.empty() ||
+           std::any_of(prepared.dense.z_m.begin(), prepared.dense.z_m.end(),
+                       [](float z) { return z > 0; });
   }
 
-  // ---- pose ------------------------------------------------------------------------------------------------------
+  // ---- pose
+  // ------------------------------------------------------------------------------------------------------
 
   [[nodiscard]] double SigmaPx() const { return info.intrinsics.width / 640.0; }
 
-  void AddMarkerPoints(const std::vector<MarkerObservation>& markers, std::vector<PosePoint>& points) const {
+  void AddMarkerPoints(const std::vector<MarkerObservation>& markers,
+                       std::vector<PosePoint>& points) const {
     const MarkerCorners in_marker = CornersInMarkerFrame(info.marker_length_m);
     for (const MarkerObservation& m : markers) {
       const auto known = map.markers.find(m.id);
@@ -146,15 +155,17 @@ struct Tracker::Impl {
     }
   }
 
-  void AddKeypoints(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_guess, std::vector<ActivePoint>& followed,
-                    std::vector<PosePoint>& points) const {
+  void AddKeypoints(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_guess,
+                    std::vector<ActivePoint>& followed, std::vector<PosePoint>& points) const {
     std::vector<Eigen::Vector2f> from;
     std::vector<Eigen::Vector2f> guesses;
     const Pose T_camera_world = T_world_guess.inverse();
     for (const ActivePoint& a : active) {
       from.push_back(a.pixel);
-      const Eigen::Vector3d p = T_camera_world * map.landmarks[static_cast<std::size_t>(a.landmark)].p_world;
-      guesses.push_back(p.z() > 0.05 ? Eigen::Vector2f(Project(info.intrinsics, p).cast<float>()) : a.pixel);
+      const Eigen::Vector3d p =
+          T_camera_world * map.landmarks[static_cast<std::size_t>(a.landmark)].p_world;
+      guesses.push_back(p.z() > 0.05 ? Eigen::Vector2f(Project(info.intrinsics, p).cast<float>())
+                                     : a.pixel);
     }
     const KltResult klt = Follow(last_pyramid, prepared, from, guesses, keypoint_options.levels);
     for (std::size_t i = 0; i < active.size(); ++i) {
@@ -173,16 +184,20 @@ struct Tracker::Impl {
     }
   }
 
-  // KLT; where it loses most points, once more at the new image's brightness: the exposure may have changed.
-  [[nodiscard]] KltResult Follow(const Pyramid& before, const Prepared& prepared, const std::vector<Eigen::Vector2f>& from,
+  // KLT; where it loses most points, once more at the new image's brightness: the exposure may have
+  // changed.
+  [[nodiscard]] KltResult Follow(const Pyramid& before, const Prepared& prepared,
+                                 const std::vector<Eigen::Vector2f>& from,
                                  const std::vector<Eigen::Vector2f>& guesses, int max_level) const {
-    const auto num_found = [](const KltResult& klt) { return std::count(klt.found.begin(), klt.found.end(), true); };
+    const auto num_found = [](const KltResult& klt) {
+      return std::count(klt.found.begin(), klt.found.end(), true);
+    };
     KltResult klt = TrackKlt(before, prepared.pyramid, from, guesses, max_level, keypoint_options);
     if (2 * num_found(klt) >= static_cast<std::ptrdiff_t>(from.size())) return klt;
     const double ratio = BrightnessRatio(before[0], prepared.gray, from, guesses);
     if (std::abs(ratio - 1.0) < kSameBrightness) return klt;
-    KltResult again =
-        TrackKlt(MakePyramid(before[0] * ratio, keypoint_options), prepared.pyramid, from, guesses, max_level, keypoint_options);
+    KltResult again = TrackKlt(MakePyramid(before[0] * ratio, keypoint_options), prepared.pyramid,
+                               from, guesses, max_level, keypoint_options);
     return num_found(again) > num_found(klt) ? again : klt;
   }
 
@@ -200,38 +215,49 @@ struct Tracker::Impl {
   }
 
   static Pose DepthPose(const MapKeyframe& keyframe) {
-    return PoseAfter(keyframe.T_world_color, keyframe.velocity_per_s, keyframe.data.depth_time_s - keyframe.data.color_time_s);
+    return PoseAfter(keyframe.T_world_color, keyframe.velocity_per_s,
+                     keyframe.data.depth_time_s - keyframe.data.color_time_s);
   }
 
-  // True if the estimate is one to build on: enough agrees, all six directions are held, and no hand moves so fast.
-  [[nodiscard]] bool Plausible(const PoseEstimate& estimate, std::size_t num_points, double dt_s) const {
-    const double share = num_points > 0 ? static_cast<double>(estimate.num_inliers) / static_cast<double>(num_points) : 0.0;
+  // True if the estimate is one to build on: enough agrees, all six directions are held, and no
+  // hand moves so fast.
+  [[nodiscard]] bool Plausible(const PoseEstimate& estimate, std::size_t num_points,
+                               double dt_s) const {
+    const double share =
+        num_points > 0 ? static_cast<double>(estimate.num_inliers) / static_cast<double>(num_points)
+                       : 0.0;
     const bool by_points = estimate.num_inliers >= 12 && share > 0.35;
     const bool by_markers = num_points > 0 && estimate.num_inliers >= 4 && share > 0.6;
-    const bool by_depth = estimate.num_dense > 600 && estimate.dense_overlap > 0.4 && estimate.dense_rms_m < 0.012;
+    const bool by_depth =
+        estimate.num_dense > 600 && estimate.dense_overlap > 0.4 && estimate.dense_rms_m < 0.012;
     if (!by_points && !by_markers && !by_depth) return false;
     // Depth that contradicts what few points say: a pose on a wrong start.
     if (!by_points && estimate.num_dense > 0 && estimate.dense_overlap < 0.25) return false;
     const Matrix6d covariance = estimate.information.ldlt().solve(Matrix6d::Identity());
     const double rotation_rad = std::sqrt(std::max(0.0, covariance.topLeftCorner<3, 3>().trace()));
-    const double translation_m = std::sqrt(std::max(0.0, covariance.bottomRightCorner<3, 3>().trace()));
+    const double translation_m =
+        std::sqrt(std::max(0.0, covariance.bottomRightCorner<3, 3>().trace()));
     if (!(rotation_rad < 0.02) || !(translation_m < 0.02)) return false;
     const Pose T_last_now = T_world_last.inverse() * estimate.T_world_camera;
     const double dt = std::clamp(dt_s, 0.02, 1.0);
-    return lost || (T_last_now.translation().norm() < kMaxSpeed * dt + 0.02 && RotationAngle(T_last_now) < kMaxTurn * dt + 0.03);
+    return lost || (T_last_now.translation().norm() < kMaxSpeed * dt + 0.02 &&
+                    RotationAngle(T_last_now) < kMaxTurn * dt + 0.03);
   }
 
-  std::optional<PoseEstimate> FollowFrame(const Frame& frame, const Prepared& prepared, TrackedFrame& result) {
+  std::optional<PoseEstimate> FollowFrame(const Frame& frame, const Prepared& prepared,
+                                          TrackedFrame& result) {
     const double dt = frame.color_time_s - last_time_s;
     const double dt_depth = frame.depth_time_s - frame.color_time_s;
     // The constant-velocity guess first; if that fails (a jerk), the last pose.
-    const std::array<Pose, 2> guesses = {PoseAfter(T_world_last, velocity, std::min(dt, 0.3)), T_world_last};
+    const std::array<Pose, 2> guesses = {PoseAfter(T_world_last, velocity, std::min(dt, 0.3)),
+                                         T_world_last};
     for (const Pose& T_guess : guesses) {
       PoseProblem problem = MakeProblem(prepared, dt_depth);
       AddMarkerPoints(prepared.markers, problem.points);
       const std::size_t num_corners = problem.points.size();
       std::vector<ActivePoint> followed;
-      if (options.use_keypoints) AddKeypoints(prepared, frame.depth_m, T_guess, followed, problem.points);
+      if (options.use_keypoints)
+        AddKeypoints(prepared, frame.depth_m, T_guess, followed, problem.points);
       PoseEstimate estimate = OptimizePose(problem, T_guess);
       if (!Plausible(estimate, problem.points.size(), dt)) continue;
       active.clear();
@@ -250,14 +276,16 @@ struct Tracker::Impl {
     return std::nullopt;
   }
 
-  // Those whose corners all agree with the pose; their points are the estimate's first, as AddMarkerPoints() adds them.
+  // Those whose corners all agree with the pose; their points are the estimate's first, as
+  // AddMarkerPoints() adds them.
   int CountMarkers(const std::vector<MarkerObservation>& markers, const PoseEstimate& estimate) {
     int count = 0;
     std::size_t i = 0;
     for (const MarkerObservation& m : markers) {
       const auto known = map.markers.find(m.id);
       if (known == map.markers.end()) continue;
-      if (estimate.inlier[i] && estimate.inlier[i + 1] && estimate.inlier[i + 2] && estimate.inlier[i + 3]) {
+      if (estimate.inlier[i] && estimate.inlier[i + 1] && estimate.inlier[i + 2] &&
+          estimate.inlier[i + 3]) {
         ++known->second.num_frames;
         ++count;
       }
@@ -266,10 +294,12 @@ struct Tracker::Impl {
     return count;
   }
 
-  std::optional<PoseEstimate> Relocalize(const Frame& frame, const Prepared& prepared, TrackedFrame& result) {
+  std::optional<PoseEstimate> Relocalize(const Frame& frame, const Prepared& prepared,
+                                         TrackedFrame& result) {
     lost = true;
     velocity.setZero();
-    std::optional<Relocalization> found = RelocalizeByMarkers(map, info.intrinsics, info.marker_length_m, prepared.markers, frame.depth_m);
+    std::optional<Relocalization> found = RelocalizeByMarkers(
+        map, info.intrinsics, info.marker_length_m, prepared.markers, frame.depth_m);
     std::optional<DescribedFeatures> features;
     for (int attempt = 0; attempt < 2; ++attempt) {
       if (!found && options.use_keypoints && !features) {
@@ -281,7 +311,8 @@ struct Tracker::Impl {
       PoseProblem problem = MakeProblem(prepared, 0.0);
       AddMarkerPoints(prepared.markers, problem.points);
       active.clear();
-      Reassociate(prepared, frame.depth_m, found->T_world_color, KeyframesNear(found->T_world_color, map.keyframes.size()), problem.points);
+      Reassociate(prepared, frame.depth_m, found->T_world_color,
+                  KeyframesNear(found->T_world_color, map.keyframes.size()), problem.points);
       PoseEstimate estimate = OptimizePose(problem, found->T_world_color);
       if (Plausible(estimate, problem.points.size(), 1.0)) {
         result.num_markers = CountMarkers(prepared.markers, estimate);
@@ -295,9 +326,11 @@ struct Tracker::Impl {
     return std::nullopt;
   }
 
-  void Accept(const Frame& frame, const Prepared& prepared, const PoseEstimate& estimate, TrackedFrame& result) {
+  void Accept(const Frame& frame, const Prepared& prepared, const PoseEstimate& estimate,
+              TrackedFrame& result) {
     const double dt = frame.color_time_s - last_time_s;
-    if (!lost && dt > 0) velocity = TwistFromPose(T_world_last.inverse() * estimate.T_world_camera) / dt;
+    if (!lost && dt > 0)
+      velocity = TwistFromPose(T_world_last.inverse() * estimate.T_world_camera) / dt;
     result.tracked = true;
     result.velocity_per_s = velocity;
     RefreshKeyframeVelocity(frame, estimate.T_world_camera);
@@ -308,7 +341,9 @@ struct Tracker::Impl {
       MakeKeyframe(frame, prepared, estimate.T_world_camera, result);
     } else {
       result.reference_keyframe = reference;
-      result.T_reference_color = map.keyframes[static_cast<std::size_t>(reference)].T_world_color.inverse() * estimate.T_world_camera;
+      result.T_reference_color =
+          map.keyframes[static_cast<std::size_t>(reference)].T_world_color.inverse() *
+          estimate.T_world_camera;
     }
   }
 
@@ -319,24 +354,32 @@ struct Tracker::Impl {
     const double dt_after = frame.color_time_s - keyframe.data.color_time_s;
     if (dt_after <= 0) return;
     const Vector6d after = TwistFromPose(keyframe.T_world_color.inverse() * T_world_now) / dt_after;
-    keyframe.velocity_per_s = frames.back().keyframe == 0 ? after : Vector6d(0.5 * (keyframe.velocity_per_s + after));
+    keyframe.velocity_per_s =
+        frames.back().keyframe == 0 ? after : Vector6d(0.5 * (keyframe.velocity_per_s + after));
     frames.back().velocity_per_s = keyframe.velocity_per_s;
   }
 
-  // ---- keyframes -------------------------------------------------------------------------------------------------
+  // ---- keyframes
+  // -------------------------------------------------------------------------------------------------
 
   [[nodiscard]] bool NeedsKeyframe(const Pose& T_world_color) const {
     const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(reference)];
     const Pose T_keyframe_now = keyframe.T_world_color.inverse() * T_world_color;
-    if (T_keyframe_now.translation().norm() > options.keyframe_distance * std::clamp(keyframe.median_depth_m, 0.4, 3.0)) return true;
+    if (T_keyframe_now.translation().norm() >
+        options.keyframe_distance * std::clamp(keyframe.median_depth_m, 0.4, 3.0))
+      return true;
     if (RotationAngle(T_keyframe_now) > options.keyframe_angle_rad) return true;
-    return options.use_keypoints && static_cast<double>(active.size()) < options.min_tracked_share * static_cast<double>(reference_count) &&
-           (T_keyframe_now.translation().norm() > 0.01 || RotationAngle(T_keyframe_now) > 0.01 || active.size() < 30);
+    return options.use_keypoints &&
+           static_cast<double>(active.size()) <
+               options.min_tracked_share * static_cast<double>(reference_count) &&
+           (T_keyframe_now.translation().norm() > 0.01 || RotationAngle(T_keyframe_now) > 0.01 ||
+            active.size() < 30);
   }
 
-  // Looks for landmarks of near older keyframes that are not being followed; adds those found to `active` and `points`.
-  void Reassociate(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_color, const std::vector<std::size_t>& keyframes,
-                   std::vector<PosePoint>& points) {
+  // Looks for landmarks of near older keyframes that are not being followed; adds those found to
+  // `active` and `points`.
+  void Reassociate(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_color,
+                   const std::vector<std::size_t>& keyframes, std::vector<PosePoint>& points) {
     std::set<int> followed;
     for (const ActivePoint& a : active) followed.insert(a.landmark);
     const Pose T_camera_world = T_world_color.inverse();
@@ -351,17 +394,23 @@ struct Tracker::Impl {
         const Eigen::Vector3d p = T_camera_world * landmark.p_world;
         if (p.z() < 0.1) continue;
         const Eigen::Vector2d pixel = Project(info.intrinsics, p);
-        if (pixel.x() < 8 || pixel.y() < 8 || pixel.x() > info.intrinsics.width - 9 || pixel.y() > info.intrinsics.height - 9) continue;
+        if (pixel.x() < 8 || pixel.y() < 8 || pixel.x() > info.intrinsics.width - 9 ||
+            pixel.y() > info.intrinsics.height - 9)
+          continue;
         const double z = DepthAt(depth_m, pixel);
-        if (z > 0 && std::abs(z - p.z()) > 0.03 * z + 0.01) continue;  // Hidden, or another surface.
+        if (z > 0 && std::abs(z - p.z()) > 0.03 * z + 0.01)
+          continue;  // Hidden, or another surface.
         landmarks.push_back(o.landmark);
         from.push_back(o.pixel.cast<float>());
         guesses.push_back(pixel.cast<float>());
       }
       if (landmarks.empty()) continue;
-      const KltResult klt = Follow(MakePyramid(keyframe.gray, keypoint_options), prepared, from, guesses, 1);
+      const KltResult klt =
+          Follow(MakePyramid(keyframe.gray, keypoint_options), prepared, from, guesses, 1);
       for (std::size_t i = 0; i < landmarks.size(); ++i) {
-        if (!klt.found[i] || (klt.points[i] - guesses[i]).norm() > 6.0F * static_cast<float>(SigmaPx())) continue;
+        if (!klt.found[i] ||
+            (klt.points[i] - guesses[i]).norm() > 6.0F * static_cast<float>(SigmaPx()))
+          continue;
         followed.insert(landmarks[i]);
         active.push_back({landmarks[i], klt.points[i]});
         PosePoint point;
@@ -373,8 +422,10 @@ struct Tracker::Impl {
     }
   }
 
-  // Nearest by pose of the first `count` keyframes that see about the same, the reference itself left out while it is being followed.
-  [[nodiscard]] std::vector<std::size_t> KeyframesNear(const Pose& T_world_color, std::size_t count) const {
+  // Nearest by pose of the first `count` keyframes that see about the same, the reference itself
+  // left out while it is being followed.
+  [[nodiscard]] std::vector<std::size_t> KeyframesNear(const Pose& T_world_color,
+                                                       std::size_t count) const {
     std::vector<std::pair<double, std::size_t>> near;
     for (std::size_t k = 0; k < count; ++k) {
       if (!lost && static_cast<int>(k) == reference) continue;
@@ -386,11 +437,13 @@ struct Tracker::Impl {
     }
     std::sort(near.begin(), near.end());
     std::vector<std::size_t> result;
-    for (std::size_t i = 0; i < std::min(kReassociated, near.size()); ++i) result.push_back(near[i].second);
+    for (std::size_t i = 0; i < std::min(kReassociated, near.size()); ++i)
+      result.push_back(near[i].second);
     return result;
   }
 
-  void MakeKeyframe(const Frame& frame, const Prepared& prepared, const Pose& T_world_color, TrackedFrame& result) {
+  void MakeKeyframe(const Frame& frame, const Prepared& prepared, const Pose& T_world_color,
+                    TrackedFrame& result) {
     MapKeyframe keyframe;
     keyframe.data.frame_index = frame.index;
     keyframe.data.color_time_s = frame.color_time_s;
@@ -416,7 +469,9 @@ struct Tracker::Impl {
     AddNewMarkers(frame.depth_m, keyframe);
     if (reference >= 0) {
       result.previous_keyframe = reference;
-      result.T_previous_color = map.keyframes[static_cast<std::size_t>(reference)].T_world_color.inverse() * T_world_color;
+      result.T_previous_color =
+          map.keyframes[static_cast<std::size_t>(reference)].T_world_color.inverse() *
+          T_world_color;
     }
     keyframe.previous = reference;
     keyframe.T_previous_color = result.T_previous_color;
@@ -435,21 +490,28 @@ struct Tracker::Impl {
     result.T_reference_color = Pose::Identity();
   }
 
-  // A place seen long ago: where the map has drifted since, it is bent until both visits agree, and the old landmarks are followed again.
+  // A place seen long ago: where the map has drifted since, it is bent until both visits agree, and
+  // the old landmarks are followed again.
   void CloseLoop(const Prepared& prepared, int index) {
     const std::vector<int> candidates = LoopCandidates(map);
     if (candidates.empty()) return;
     const MapKeyframe& newest = map.keyframes.back();
-    const auto found =
-        RelocalizeByFeatures(map, info.intrinsics, {newest.features_px, newest.features_camera, newest.descriptors}, candidates);
+    const auto found = RelocalizeByFeatures(
+        map, info.intrinsics, {newest.features_px, newest.features_camera, newest.descriptors},
+        candidates);
     if (!found || found->num_inliers < kLoopInliers) return;
-    const std::optional<Pose> T_world_seen = SeenFrom(found->keyframe, found->T_world_color, prepared, newest);
+    const std::optional<Pose> T_world_seen =
+        SeenFrom(found->keyframe, found->T_world_color, prepared, newest);
     if (!T_world_seen) return;
     const Pose T_drift = newest.T_world_color.inverse() * *T_world_seen;
     const DriftBound bound = LargestDrift(map, found->keyframe);
-    if (T_drift.translation().norm() > bound.translation_m || RotationAngle(T_drift) > bound.rotation_rad) return;
-    if (T_drift.translation().norm() > kDriftFollowed_m || RotationAngle(T_drift) > kDriftFollowed_rad) {
-      const Pose& T_world_old = map.keyframes[static_cast<std::size_t>(found->keyframe)].T_world_color;
+    if (T_drift.translation().norm() > bound.translation_m ||
+        RotationAngle(T_drift) > bound.rotation_rad)
+      return;
+    if (T_drift.translation().norm() > kDriftFollowed_m ||
+        RotationAngle(T_drift) > kDriftFollowed_rad) {
+      const Pose& T_world_old =
+          map.keyframes[static_cast<std::size_t>(found->keyframe)].T_world_color;
       loops.push_back({found->keyframe, index, T_world_old.inverse() * *T_world_seen});
       BendMap(loops, map);
     }
@@ -457,34 +519,41 @@ struct Tracker::Impl {
     MapKeyframe& keyframe = map.keyframes.back();
     const std::size_t known = active.size();
     std::vector<PosePoint> points;
-    Reassociate(prepared, keyframe.data.view.depth_m, keyframe.T_world_color, KeyframesNear(keyframe.T_world_color, map.keyframes.size()),
-                points);
+    Reassociate(prepared, keyframe.data.view.depth_m, keyframe.T_world_color,
+                KeyframesNear(keyframe.T_world_color, map.keyframes.size()), points);
     Observe(points, known, keyframe);
     AdjustLocally(index);
   }
 
-  // Pose of the newest keyframe from an older one's surroundings alone: landmarks of then and depth. Nothing if they do not agree well.
-  std::optional<Pose> SeenFrom(int older, const Pose& T_world_guess, const Prepared& prepared, const MapKeyframe& newest) {
+  // Pose of the newest keyframe from an older one's surroundings alone: landmarks of then and
+  // depth. Nothing if they do not agree well.
+  std::optional<Pose> SeenFrom(int older, const Pose& T_world_guess, const Prepared& prepared,
+                               const MapKeyframe& newest) {
     const std::vector<ActivePoint> followed = std::exchange(active, {});
     const int followed_reference = std::exchange(reference, older);
-    PoseProblem problem = MakeProblem(prepared, newest.data.depth_time_s - newest.data.color_time_s);
+    PoseProblem problem =
+        MakeProblem(prepared, newest.data.depth_time_s - newest.data.color_time_s);
     reference = -1;  // None is left out.
-    Reassociate(prepared, newest.data.view.depth_m, T_world_guess, KeyframesNear(T_world_guess, static_cast<std::size_t>(older) + 4),
-                problem.points);
+    Reassociate(prepared, newest.data.view.depth_m, T_world_guess,
+                KeyframesNear(T_world_guess, static_cast<std::size_t>(older) + 4), problem.points);
     const PoseEstimate estimate = OptimizePose(problem, T_world_guess);
     active = followed;
     reference = followed_reference;
-    const bool by_depth = !options.use_dense || (estimate.num_dense > 300 && estimate.dense_rms_m < 0.015);
-    if (estimate.num_inliers < kLoopInliers || 2 * estimate.num_inliers < static_cast<int>(problem.points.size()) || !by_depth)
+    const bool by_depth =
+        !options.use_dense || (estimate.num_dense > 300 && estimate.dense_rms_m < 0.015);
+    if (estimate.num_inliers < kLoopInliers ||
+        2 * estimate.num_inliers < static_cast<int>(problem.points.size()) || !by_depth)
       return std::nullopt;
     return estimate.T_world_camera;
   }
 
   // Landmarks seen in a new keyframe: those followed, and those of older keyframes found again.
-  void AssociateKeyframe(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_color, MapKeyframe& keyframe) {
+  void AssociateKeyframe(const Prepared& prepared, const cv::Mat& depth_m,
+                         const Pose& T_world_color, MapKeyframe& keyframe) {
     const std::size_t followed = active.size();
     std::vector<PosePoint> found;
-    Reassociate(prepared, depth_m, T_world_color, KeyframesNear(T_world_color, map.keyframes.size()), found);
+    Reassociate(prepared, depth_m, T_world_color,
+                KeyframesNear(T_world_color, map.keyframes.size()), found);
     for (std::size_t i = 0; i < followed; ++i) AddObservation(active[i], keyframe);
     Observe(found, followed, keyframe);
   }
@@ -495,31 +564,37 @@ struct Tracker::Impl {
     ++map.landmarks[static_cast<std::size_t>(a.landmark)].num_observations;
   }
 
-  // Of the active points, those from `first` on were found again, at `found`: the ones that fit the pose are seen in the keyframe.
+  // Of the active points, those from `first` on were found again, at `found`: the ones that fit the
+  // pose are seen in the keyframe.
   void Observe(const std::vector<PosePoint>& found, std::size_t first, MapKeyframe& keyframe) {
-    std::vector<ActivePoint> kept(active.begin(), active.begin() + static_cast<std::ptrdiff_t>(first));
+    std::vector<ActivePoint> kept(active.begin(),
+                                  active.begin() + static_cast<std::ptrdiff_t>(first));
     const Pose T_camera_world = keyframe.T_world_color.inverse();
     for (std::size_t i = first; i < active.size(); ++i) {
       const PosePoint& point = found[i - first];
       const Eigen::Vector3d p = T_camera_world * point.p_world;
-      if ((p.head<2>() / p.z() - point.ideal).norm() * info.intrinsics.fx >= 4.0 * SigmaPx()) continue;
+      if ((p.head<2>() / p.z() - point.ideal).norm() * info.intrinsics.fx >= 4.0 * SigmaPx())
+        continue;
       kept.push_back(active[i]);
       AddObservation(active[i], keyframe);
     }
     active = std::move(kept);
   }
 
-  void AddCorners(const Prepared& prepared, const cv::Mat& depth_m, int index, MapKeyframe& keyframe) {
+  void AddCorners(const Prepared& prepared, const cv::Mat& depth_m, int index,
+                  MapKeyframe& keyframe) {
     std::vector<Eigen::Vector2f> occupied;
     for (const ActivePoint& a : active) occupied.push_back(a.pixel);
-    const Pose T_color_depth = PoseFromTwist(keyframe.velocity_per_s * (keyframe.data.depth_time_s - keyframe.data.color_time_s));
+    const Pose T_color_depth = PoseFromTwist(
+        keyframe.velocity_per_s * (keyframe.data.depth_time_s - keyframe.data.color_time_s));
     for (const Eigen::Vector2f& corner : DetectCorners(prepared.gray, occupied, keypoint_options)) {
       const Eigen::Vector2d pixel = corner.cast<double>();
       const double z = DepthAt(depth_m, pixel);
       if (z <= 0) continue;
       const Eigen::Vector3d p = z * Undistort(info.intrinsics, pixel).homogeneous();
       Landmark landmark;
-      landmark.p_world = keyframe.T_world_color * Eigen::Vector3d(p.x(), p.y(), (T_color_depth * p).z());
+      landmark.p_world =
+          keyframe.T_world_color * Eigen::Vector3d(p.x(), p.y(), (T_color_depth * p).z());
       landmark.first_keyframe = index;
       landmark.num_observations = 1;
       const int id = static_cast<int>(map.landmarks.size());
@@ -533,9 +608,12 @@ struct Tracker::Impl {
     for (const MarkerObservation& m : keyframe.data.markers) {
       auto known = map.markers.find(m.id);
       if (known == map.markers.end()) {
-        const auto T_camera_marker = MarkerPoseInCamera(info.intrinsics, info.marker_length_m, m, depth_m);
+        const auto T_camera_marker =
+            MarkerPoseInCamera(info.intrinsics, info.marker_length_m, m, depth_m);
         if (!T_camera_marker) continue;
-        known = map.markers.emplace(m.id, MapMarker{keyframe.T_world_color * *T_camera_marker, 0, 1}).first;
+        known =
+            map.markers.emplace(m.id, MapMarker{keyframe.T_world_color * *T_camera_marker, 0, 1})
+                .first;
       }
       ++known->second.num_views;
     }
@@ -546,19 +624,22 @@ struct Tracker::Impl {
     LocalBundleOptions bundle;
     bundle.marker_length_m = info.marker_length_m;
     for (int k = std::max(1, index + 1 - options.local_keyframes); k <= index; ++k)
-      if (IsHeld(map, map.keyframes[static_cast<std::size_t>(k)])) bundle.free_keyframes.push_back(k);
+      if (IsHeld(map, map.keyframes[static_cast<std::size_t>(k)]))
+        bundle.free_keyframes.push_back(k);
     AdjustLocalMap(info.intrinsics, bundle, map);
   }
 };
 
-Tracker::Tracker(const StreamInfo& info, const TrackerOptions& options) : impl_(std::make_unique<Impl>(info, options)) {}
+Tracker::Tracker(const StreamInfo& info, const TrackerOptions& options)
+    : impl_(std::make_unique<Impl>(info, options)) {}
 Tracker::~Tracker() = default;
 TrackedFrame Tracker::Track(const Frame& frame) { return impl_->Track(frame); }
 const TrackingMap& Tracker::map() const { return impl_->map; }
 TrackingMap Tracker::TakeMap() { return std::move(impl_->map); }
 const std::vector<TrackedFrame>& Tracker::frames() const { return impl_->frames; }
 Pose Tracker::T_world_color(const TrackedFrame& frame) const {
-  return impl_->map.keyframes.at(static_cast<std::size_t>(frame.reference_keyframe)).T_world_color * frame.T_reference_color;
+  return impl_->map.keyframes.at(static_cast<std::size_t>(frame.reference_keyframe)).T_world_color *
+         frame.T_reference_color;
 }
 
 }  // namespace plumb

@@ -1,4 +1,5 @@
-// Follows the camera: keypoints, marker corners and depth in one robust pose a frame, keyframes, and recovery after loss.
+// Follows the camera: keypoints, marker corners and depth in one robust pose a frame, keyframes,
+// and recovery after loss.
 #pragma once
 
 #include <functional>
@@ -14,8 +15,10 @@ namespace plumb {
 struct TrackerOptions {
   bool use_markers = true;
   bool use_keypoints = true;
-  bool use_dense = true;            ///< Depth against the last keyframe, so that few keypoints do not lose the pose.
-  double keyframe_distance = 0.06;  ///< Of the median depth: translation since the last keyframe that makes a new one.
+  bool use_dense =
+      true;  ///< Depth against the last keyframe, so that few keypoints do not lose the pose.
+  double keyframe_distance =
+      0.06;  ///< Of the median depth: translation since the last keyframe that makes a new one.
   double keyframe_angle_rad = 0.09;
   double min_tracked_share = 0.6;  ///< Of the keyframe's keypoints; fewer make a new keyframe.
   int local_keyframes = 6;         ///< Keyframes that local bundle adjustment moves.
@@ -27,11 +30,13 @@ struct TrackedFrame {
   double color_time_s = 0.0;
   double depth_time_s = 0.0;
   bool tracked = false;
-  int keyframe = -1;                           ///< Index in the map if it became one, else -1.
-  int reference_keyframe = -1;                 ///< The keyframe that it was tracked against.
-  Pose T_reference_color = Pose::Identity();   ///< Colour camera at the colour stamp, in the reference keyframe's colour camera.
-  int previous_keyframe = -1;                  ///< Of a keyframe: the one that it was tracked against, or -1.
-  Pose T_previous_color = Pose::Identity();    ///< Of a keyframe: its camera in that one's, as tracked.
+  int keyframe = -1;                          ///< Index in the map if it became one, else -1.
+  int reference_keyframe = -1;                ///< The keyframe that it was tracked against.
+  Pose T_reference_color = Pose::Identity();  ///< Colour camera at the colour stamp, in the
+                                              ///< reference keyframe's colour camera.
+  int previous_keyframe = -1;  ///< Of a keyframe: the one that it was tracked against, or -1.
+  Pose T_previous_color =
+      Pose::Identity();  ///< Of a keyframe: its camera in that one's, as tracked.
   Vector6d velocity_per_s = Vector6d::Zero();  ///< In the camera frame.
   int num_keypoints = 0;
   int num_markers = 0;

@@ -1,20 +1,26 @@
-// Code words of the marker family ARUCO_MIP_36h12: 250 codes of 36 bits, Hamming distance 12 or more over all rotations.
+// Code words of the marker family ARUCO_MIP_36h12: 250 codes of 36 bits, Hamming distance 12 or
+// more over all rotations.
 //
-// Origin: the ArUco library (R. Munoz-Salinas and S. Garrido-Jurado, https://sourceforge.net/projects/aruco, releases 3.1.x),
-// where the table is published under the 2-clause BSD licence, "Copyright 2017 Rafael Munoz Salinas. All rights reserved.";
-// generation: S. Garrido-Jurado et al., "Generation of fiducial marker dictionaries using Mixed Integer Linear Programming",
-// Pattern Recognition 51 (2016). The words are facts that every print of the family shares; they were compared between the copy in
-// js-aruco2 2.0.0 and a second, independent one, and the distances are computed again by a test.
+// Origin: the ArUco library (R. Munoz-Salinas and S. Garrido-Jurado,
+// https://sourceforge.net/projects/aruco, releases 3.1.x), where the table is published under the
+// 2-clause BSD licence, "Copyright 2017 Rafael Munoz Salinas. All rights reserved."; generation: S.
+// Garrido-Jurado et al., "Generation of fiducial marker dictionaries using Mixed Integer Linear
+// Programming", Pattern Recognition 51 (2016). The words are facts that every print of the family
+// shares; they were compared between the copy in js-aruco2 2.0.0 and a second, independent one, and
+// the distances are computed again by a test.
 //
-// Redistribution and use in source and binary forms, with or without modification, are permitted provided that redistributions
-// of source code retain the above copyright notice, this list of conditions and the following disclaimer, and redistributions
-// in binary form reproduce them in the documentation and/or other materials provided with the distribution.
-// THIS SOFTWARE IS PROVIDED BY RAFAEL MUNOZ SALINAS "AS IS" AND ANY EXPRESS OR IMPLIED WARRANTIES, INCLUDING, BUT NOT LIMITED
-// TO, THE IMPLIED WARRANTIES OF MERCHANTABILITY AND FITNESS FOR A PARTICULAR PURPOSE ARE DISCLAIMED. IN NO EVENT SHALL RAFAEL
-// MUNOZ SALINAS OR CONTRIBUTORS BE LIABLE FOR ANY DIRECT, INDIRECT, INCIDENTAL, SPECIAL, EXEMPLARY, OR CONSEQUENTIAL DAMAGES
-// (INCLUDING, BUT NOT LIMITED TO, PROCUREMENT OF SUBSTITUTE GOODS OR SERVICES; LOSS OF USE, DATA, OR PROFITS; OR BUSINESS
-// INTERRUPTION) HOWEVER CAUSED AND ON ANY THEORY OF LIABILITY, WHETHER IN CONTRACT, STRICT LIABILITY, OR TORT (INCLUDING
-// NEGLIGENCE OR OTHERWISE) ARISING IN ANY WAY OUT OF THE USE OF THIS SOFTWARE, EVEN IF ADVISED OF THE POSSIBILITY OF SUCH DAMAGE.
+// Redistribution and use in source and binary forms, with or without modification, are permitted
+// provided that redistributions of source code retain the above copyright notice, this list of
+// conditions and the following disclaimer, and redistributions in binary form reproduce them in the
+// documentation and/or other materials provided with the distribution. THIS SOFTWARE IS PROVIDED BY
+// RAFAEL MUNOZ SALINAS "AS IS" AND ANY EXPRESS OR IMPLIED WARRANTIES, INCLUDING, BUT NOT LIMITED
+// TO, THE IMPLIED WARRANTIES OF MERCHANTABILITY AND FITNESS FOR A PARTICULAR PURPOSE ARE
+// DISCLAIMED. IN NO EVENT SHALL RAFAEL MUNOZ SALINAS OR CONTRIBUTORS BE LIABLE FOR ANY DIRECT,
+// INDIRECT, INCIDENTAL, SPECIAL, EXEMPLARY, OR CONSEQUENTIAL DAMAGES (INCLUDING, BUT NOT LIMITED
+// TO, PROCUREMENT OF SUBSTITUTE GOODS OR SERVICES; LOSS OF USE, DATA, OR PROFITS; OR BUSINESS
+// INTERRUPTION) HOWEVER CAUSED AND ON ANY THEORY OF LIABILITY, WHETHER IN CONTRACT, STRICT
+// LIABILITY, OR TORT (INCLUDING NEGLIGENCE OR OTHERWISE) ARISING IN ANY WAY OUT OF THE USE OF THIS
+// SOFTWARE, EVEN IF ADVISED OF THE POSSIBILITY OF SUCH DAMAGE.
 #pragma once
 
 #include <array>

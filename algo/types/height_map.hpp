@@ -9,7 +9,8 @@
 
 namespace plumb {
 
-/// Half-open cells: column c, row r covers x in [x_min + c step, x_min + (c+1) step), y likewise; row 0 is y_min.
+/// Half-open cells: column c, row r covers x in [x_min + c step, x_min + (c+1) step), y likewise;
+/// row 0 is y_min.
 struct GridShape {
   double x_min = 0.0;  ///< Metres.
   double y_min = 0.0;
@@ -18,16 +19,20 @@ struct GridShape {
   int height = 0;  ///< Rows (y).
 
   bool operator==(const GridShape&) const = default;
-  [[nodiscard]] std::size_t num_cells() const { return static_cast<std::size_t>(width) * static_cast<std::size_t>(height); }
+  [[nodiscard]] std::size_t num_cells() const {
+    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  }
   [[nodiscard]] double x_centre(int column) const { return x_min + (column + 0.5) * step; }
   [[nodiscard]] double y_centre(int row) const { return y_min + (row + 0.5) * step; }
 
-  /// Index of the cell that holds (x, y), row-major; nothing outside the grid. The one cell function of Plumb.
+  /// Index of the cell that holds (x, y), row-major; nothing outside the grid. The one cell
+  /// function of Plumb.
   [[nodiscard]] std::optional<std::size_t> cell(double x, double y) const {
     const double column = std::floor((x - x_min) / step);
     const double row = std::floor((y - y_min) / step);
     if (!(column >= 0 && column < width && row >= 0 && row < height)) return std::nullopt;
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column);
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(column);
   }
 };
 
@@ -36,9 +41,11 @@ struct HeightMap {
   GridShape grid;
   std::vector<float> z;  ///< Metres; grid.num_cells() values.
 
-  explicit HeightMap(const GridShape& shape = {}) : grid(shape), z(shape.num_cells(), std::numeric_limits<float>::quiet_NaN()) {}
+  explicit HeightMap(const GridShape& shape = {})
+      : grid(shape), z(shape.num_cells(), std::numeric_limits<float>::quiet_NaN()) {}
   [[nodiscard]] float at(int row, int column) const {
-    return z[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(column)];
+    return z[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) +
+             static_cast<std::size_t>(column)];
   }
 };
 

@@ -6,18 +6,18 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include "algo/types/intrinsics.hpp"
+#include "algo/base/intrinsics.hpp"
+#include "algo/base/pose.hpp"
 #include "algo/types/marker.hpp"
-#include "algo/types/pose.hpp"
 
 namespace plumb {
 
 /// A depth image with its pose: the input of surfaces. The images are borrowed by reference count.
 struct DepthView {
-  Intrinsics intrinsics;                      ///< Of the depth image (colour camera's grid when registered).
-  cv::Mat depth_m;                            ///< CV_32FC1, metres, 0 = nothing measured.
-  cv::Mat color_rgb;                          ///< CV_8UC3 of the same size, or empty.
-  Pose T_world_camera = Pose::Identity();     ///< At the depth image's time.
+  Intrinsics intrinsics;  ///< Of the depth image (colour camera's grid when registered).
+  cv::Mat depth_m;        ///< CV_32FC1, metres, 0 = nothing measured.
+  cv::Mat color_rgb;      ///< CV_8UC3 of the same size, or empty.
+  Pose T_world_camera = Pose::Identity();  ///< At the depth image's time.
 };
 
 /// A frame kept for reconstruction: its view, its stamps and the markers seen in its colour image.

@@ -9,22 +9,26 @@
 
 namespace plumb {
 
-/// Corners in detector order: top-left first, clockwise as seen on the print. In the marker's own frame
-/// (x right, y up on the print, z out of it) they are (-,+), (+,+), (+,-), (-,-) times length/2.
+/// Corners in detector order: top-left first, clockwise as seen on the print. In the marker's own
+/// frame (x right, y up on the print, z out of it) they are (-,+), (+,+), (+,-), (-,-) times
+/// length/2.
 using MarkerCorners = std::array<Eigen::Vector3d, 4>;  ///< metres
-using ImageCorners = std::array<Eigen::Vector2d, 4>;   ///< pixels, centres at integers, as seen (distorted)
+using ImageCorners =
+    std::array<Eigen::Vector2d, 4>;  ///< pixels, centres at integers, as seen (distorted)
 
 /// One marker in one image.
 struct MarkerObservation {
   int id = 0;
   ImageCorners corners;
-  std::array<double, 4> sigma_px = {0.3, 0.3, 0.3, 0.3};  ///< Standard deviation of each corner, per coordinate, pixels.
+  std::array<double, 4> sigma_px = {
+      0.3, 0.3, 0.3, 0.3};  ///< Standard deviation of each corner, per coordinate, pixels.
 };
 
 /// Corners of a marker of the given side in its own frame, in detector order.
 [[nodiscard]] inline MarkerCorners CornersInMarkerFrame(double length_m) {
   const double h = length_m / 2.0;
-  return {Eigen::Vector3d(-h, h, 0), Eigen::Vector3d(h, h, 0), Eigen::Vector3d(h, -h, 0), Eigen::Vector3d(-h, -h, 0)};
+  return {Eigen::Vector3d(-h, h, 0), Eigen::Vector3d(h, h, 0), Eigen::Vector3d(h, -h, 0),
+          Eigen::Vector3d(-h, -h, 0)};
 }
 
 /// A marker's corners in a scene, with how well they are known.

@@ -1,88 +1,96 @@
 #include "algo/types/marker_dictionary.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
-#include <opencv2/aruco/dictionary.hpp>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "algo/base/errors.hpp"
+#include "algo/types/apriltag_codes.hpp"
+#include "algo/types/aruco_codes.hpp"
 #include "algo/types/aruco_mip_36h12.hpp"
-#include "algo/types/errors.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr std::string_view kMip36h12 = "DICT_ARUCO_MIP_36h12";
-
-struct PredefinedName {
+/// A family of markers. The smaller sets of one size are the first codes of the largest.
+struct Family {
   std::string_view name;
-  cv::aruco::PREDEFINED_DICTIONARY_NAME id;
+  int bits_per_side;
+  int max_correction_bits;  ///< OpenCV's; MIP: distance 12 leaves one code nearest.
+  std::span<const std::uint64_t> codes;
 };
 
-constexpr PredefinedName kPredefined[] = {
-    {"DICT_4X4_50", cv::aruco::DICT_4X4_50},
-    {"DICT_4X4_100", cv::aruco::DICT_4X4_100},
-    {"DICT_4X4_250", cv::aruco::DICT_4X4_250},
-    {"DICT_4X4_1000", cv::aruco::DICT_4X4_1000},
-    {"DICT_5X5_50", cv::aruco::DICT_5X5_50},
-    {"DICT_5X5_100", cv::aruco::DICT_5X5_100},
-    {"DICT_5X5_250", cv::aruco::DICT_5X5_250},
-    {"DICT_5X5_1000", cv::aruco::DICT_5X5_1000},
-    {"DICT_6X6_50", cv::aruco::DICT_6X6_50},
-    {"DICT_6X6_100", cv::aruco::DICT_6X6_100},
-    {"DICT_6X6_250", cv::aruco::DICT_6X6_250},
-    {"DICT_6X6_1000", cv::aruco::DICT_6X6_1000},
-    {"DICT_7X7_50", cv::aruco::DICT_7X7_50},
-    {"DICT_7X7_100", cv::aruco::DICT_7X7_100},
-    {"DICT_7X7_250", cv::aruco::DICT_7X7_250},
-    {"DICT_7X7_1000", cv::aruco::DICT_7X7_1000},
-    {"DICT_ARUCO_ORIGINAL", cv::aruco::DICT_ARUCO_ORIGINAL},
-    {"DICT_APRILTAG_16h5", cv::aruco::DICT_APRILTAG_16h5},
-    {"DICT_APRILTAG_25h9", cv::aruco::DICT_APRILTAG_25h9},
-    {"DICT_APRILTAG_36h10", cv::aruco::DICT_APRILTAG_36h10},
-    {"DICT_APRILTAG_36h11", cv::aruco::DICT_APRILTAG_36h11},
+/// The original ArUco family has no table: each row of five cells is one of four words, chosen by
+/// two bits of the id, the highest first.
+constexpr std::array<std::uint64_t, 1024> OriginalCodes() {
+  constexpr std::array<std::uint64_t, 4> kRows = {0b10000, 0b10111, 0b01001, 0b01110};
+  std::array<std::uint64_t, 1024> codes{};
+  for (std::size_t id = 0; id < codes.size(); ++id)
+    for (int shift = 8; shift >= 0; shift -= 2)
+      codes[id] = (codes[id] << 5) | kRows[(id >> shift) & 3U];
+  return codes;
+}
+
+constexpr std::array<std::uint64_t, 1024> kArucoOriginalCodes = OriginalCodes();
+
+constexpr std::span<const std::uint64_t> k4x4(kAruco4x4Codes);
+constexpr std::span<const std::uint64_t> k5x5(kAruco5x5Codes);
+constexpr std::span<const std::uint64_t> k6x6(kAruco6x6Codes);
+constexpr std::span<const std::uint64_t> k7x7(kAruco7x7Codes);
+
+constexpr Family kFamilies[] = {
+    {"DICT_4X4_50", 4, 1, k4x4.first(50)},
+    {"DICT_4X4_100", 4, 1, k4x4.first(100)},
+    {"DICT_4X4_250", 4, 1, k4x4.first(250)},
+    {"DICT_4X4_1000", 4, 0, k4x4},
+    {"DICT_5X5_50", 5, 3, k5x5.first(50)},
+    {"DICT_5X5_100", 5, 3, k5x5.first(100)},
+    {"DICT_5X5_250", 5, 2, k5x5.first(250)},
+    {"DICT_5X5_1000", 5, 2, k5x5},
+    {"DICT_6X6_50", 6, 6, k6x6.first(50)},
+    {"DICT_6X6_100", 6, 5, k6x6.first(100)},
+    {"DICT_6X6_250", 6, 5, k6x6.first(250)},
+    {"DICT_6X6_1000", 6, 4, k6x6},
+    {"DICT_7X7_50", 7, 9, k7x7.first(50)},
+    {"DICT_7X7_100", 7, 8, k7x7.first(100)},
+    {"DICT_7X7_250", 7, 8, k7x7.first(250)},
+    {"DICT_7X7_1000", 7, 6, k7x7},
+    {"DICT_ARUCO_ORIGINAL", 5, 0, kArucoOriginalCodes},
+    {"DICT_APRILTAG_16h5", 4, 0, kAprilTag16h5Codes},
+    {"DICT_APRILTAG_25h9", 5, 0, kAprilTag25h9Codes},
+    {"DICT_APRILTAG_36h10", 6, 0, kAprilTag36h10Codes},
+    {"DICT_APRILTAG_36h11", 6, 0, kAprilTag36h11Codes},
+    {"DICT_ARUCO_MIP_36h12", 6, 5, kArucoMip36h12Codes},
 };
 
 bool EqualIgnoringCase(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) {
-    return std::tolower(static_cast<unsigned char>(x)) == std::tolower(static_cast<unsigned char>(y));
+    return std::tolower(static_cast<unsigned char>(x)) ==
+           std::tolower(static_cast<unsigned char>(y));
   });
-}
-
-std::uint64_t PackBits(const cv::Mat& bits) {
-  std::uint64_t code = 0;
-  for (int row = 0; row < bits.rows; ++row)
-    for (int column = 0; column < bits.cols; ++column) code = (code << 1) | (bits.at<std::uint8_t>(row, column) != 0 ? 1U : 0U);
-  return code;
-}
-
-std::vector<std::uint64_t> CodesOf(const cv::aruco::Dictionary& dictionary) {
-  std::vector<std::uint64_t> codes;
-  codes.reserve(static_cast<std::size_t>(dictionary.bytesList.rows));
-  for (int id = 0; id < dictionary.bytesList.rows; ++id) {
-    codes.push_back(PackBits(cv::aruco::Dictionary::getBitsFromByteList(dictionary.bytesList.rowRange(id, id + 1), dictionary.markerSize)));
-  }
-  return codes;
 }
 
 }  // namespace
 
-MarkerDictionary::MarkerDictionary(std::string name, int bits_per_side, int max_correction_bits, std::vector<std::uint64_t> codes)
-    : name_(std::move(name)), bits_per_side_(bits_per_side), max_correction_bits_(max_correction_bits), codes_(std::move(codes)) {}
+MarkerDictionary::MarkerDictionary(std::string name, int bits_per_side, int max_correction_bits,
+                                   std::vector<std::uint64_t> codes)
+    : name_(std::move(name)),
+      bits_per_side_(bits_per_side),
+      max_correction_bits_(max_correction_bits),
+      codes_(std::move(codes)) {}
 
 std::optional<MarkerDictionary> MarkerDictionary::Find(std::string_view name) {
-  if (EqualIgnoringCase(name, kMip36h12)) {
-    // Distance 12: five wrong bits still have one nearest code.
-    return MarkerDictionary(std::string(kMip36h12), 6, 5, {kArucoMip36h12Codes.begin(), kArucoMip36h12Codes.end()});
-  }
-  for (const PredefinedName& predefined : kPredefined) {
-    if (!EqualIgnoringCase(name, predefined.name)) continue;
-    const cv::Ptr<cv::aruco::Dictionary> dictionary = cv::aruco::getPredefinedDictionary(predefined.id);
-    return MarkerDictionary(std::string(predefined.name), dictionary->markerSize, dictionary->maxCorrectionBits, CodesOf(*dictionary));
-  }
+  for (const Family& family : kFamilies)
+    if (EqualIgnoringCase(name, family.name))
+      return MarkerDictionary(std::string(family.name), family.bits_per_side,
+                              family.max_correction_bits,
+                              {family.codes.begin(), family.codes.end()});
   return std::nullopt;
 }
 
@@ -90,7 +98,8 @@ MarkerDictionary MarkerDictionary::ByName(std::string_view name) {
   std::optional<MarkerDictionary> dictionary = Find(name);
   if (!dictionary) {
     throw DataError(
-        fmt::format("unknown marker dictionary '{}': expected one of {}; correct marker_dictionary in camera.yaml or the configuration",
+        fmt::format("unknown marker dictionary '{}': expected one of {}; correct marker_dictionary "
+                    "in camera.yaml or the configuration",
                     name.substr(0, 80), fmt::join(KnownNames(), ", ")));
   }
   return *std::move(dictionary);
@@ -99,8 +108,7 @@ MarkerDictionary MarkerDictionary::ByName(std::string_view name) {
 const std::vector<std::string>& MarkerDictionary::KnownNames() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> all;
-    for (const PredefinedName& predefined : kPredefined) all.emplace_back(predefined.name);
-    all.emplace_back(kMip36h12);
+    for (const Family& family : kFamilies) all.emplace_back(family.name);
     return all;
   }();
   return names;
@@ -108,15 +116,17 @@ const std::vector<std::string>& MarkerDictionary::KnownNames() {
 
 bool MarkerDictionary::Bit(int id, int row, int column) const {
   if (row < 0 || row >= bits_per_side_ || column < 0 || column >= bits_per_side_) {
-    throw std::invalid_argument(
-        fmt::format("cell ({}, {}) lies outside a pattern of {} x {} of {}", row, column, bits_per_side_, bits_per_side_, name_));
+    throw std::invalid_argument(fmt::format("cell ({}, {}) lies outside a pattern of {} x {} of {}",
+                                            row, column, bits_per_side_, bits_per_side_, name_));
   }
   const int shift = bits_per_side_ * bits_per_side_ - 1 - (row * bits_per_side_ + column);
   return ((Code(id) >> shift) & 1U) != 0;
 }
 
 std::uint64_t MarkerDictionary::Code(int id) const {
-  if (id < 0 || id >= size()) throw std::invalid_argument(fmt::format("marker id {} is not in {} (0 to {})", id, name_, size() - 1));
+  if (id < 0 || id >= size())
+    throw std::invalid_argument(
+        fmt::format("marker id {} is not in {} (0 to {})", id, name_, size() - 1));
   return codes_[static_cast<std::size_t>(id)];
 }
 

@@ -7,15 +7,17 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/pose.hpp"
 #include "algo/types/height_map.hpp"
 #include "algo/types/marker.hpp"
 #include "algo/types/point_cloud.hpp"
-#include "algo/types/pose.hpp"
 
 namespace plumb {
 
 enum class Preset { kBest, kPaper };
-[[nodiscard]] inline const char* Name(Preset preset) { return preset == Preset::kBest ? "best" : "paper"; }
+[[nodiscard]] inline const char* Name(Preset preset) {
+  return preset == Preset::kBest ? "best" : "paper";
+}
 
 enum class SceneFrame { kReferenceMarker, kFirstKeyframe };
 [[nodiscard]] inline const char* Name(SceneFrame frame) {
@@ -44,7 +46,7 @@ struct Scene {
   std::int64_t frames_dropped = 0;
   double longest_lost_s = 0.0;  ///< Longest time without a pose between two tracked frames.
 
-  PointCloud cloud;                     ///< Merged surface: normals always, colours unless left out.
+  PointCloud cloud;  ///< Merged surface: normals always, colours unless left out.
   std::optional<HeightMap> height_map;  ///< Only in the reference marker's frame.
   TriangleMesh mesh;                    ///< Of the height map, or empty.
 

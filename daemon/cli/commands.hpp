@@ -23,13 +23,14 @@ enum ExitCode : int {
   kInterrupted = 130,
 };
 
-/// What every command is handed when it runs.
+/// Passed to every command when it runs.
 struct CommandContext {
   std::stop_token stop;           ///< Ctrl-C or SIGTERM.
   std::filesystem::path control;  ///< Control socket of plumbd.
 };
 
-/// Runs the command; its return value is the exit code, its exceptions become the others (see main.cpp).
+/// Runs the command; its return value is the exit code, its exceptions become the others (see
+/// main.cpp).
 using Command = std::function<int(const CommandContext&)>;
 
 /// Adds the subcommand to `app` and returns how to run it once the line is parsed.

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "daemon/cli/progress.hpp"
-#include "daemon/scan_runner.hpp"
+#include "daemon/pipeline/scan_runner.hpp"
 #ifdef PLUMB_WITH_OPENNI
 #include "drivers/openni/oni_recording.hpp"
 #endif
@@ -14,7 +14,8 @@
 namespace plumb {
 
 void MethodOptions::AddTo(CLI::App& app) {
-  app.add_option("--preset", preset, "best: whatever measures best (default); paper: the method as published")
+  app.add_option("--preset", preset,
+                 "best: whatever measures best (default); paper: the method as published")
       ->check(CLI::IsMember({"best", "paper"}))
       ->type_name("best|paper");
   app.add_option("--config", config_file, "Options of the method, as TOML")->type_name("FILE");
@@ -22,16 +23,21 @@ void MethodOptions::AddTo(CLI::App& app) {
 
 Config MethodOptions::Read() const {
   Config config = config_file ? ReadConfig(*config_file) : Config{};
-  if (preset) config.reconstruct.preset = config.compare.preset = *preset == "paper" ? Preset::kPaper : Preset::kBest;
+  if (preset)
+    config.reconstruct.preset = config.compare.preset =
+        *preset == "paper" ? Preset::kPaper : Preset::kBest;
   if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
   return config;
 }
 
-std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path, const MarkerConfig& markers) {
+std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path,
+                                           const MarkerConfig& markers) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) {
     throw DataError(
-        fmt::format("no recording at '{}': expected a folder in the TUM RGB-D layout (rgb.txt, depth.txt) or an .oni file, found nothing", path.string()));
+        fmt::format("no recording at '{}': expected a folder in the TUM RGB-D layout (rgb.txt, "
+                    "depth.txt) or an .oni file, found nothing",
+                    path.string()));
   }
   RecordingDefaults defaults;
   if (markers.dictionary) defaults.marker_dictionary = *markers.dictionary;
@@ -41,14 +47,17 @@ std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path, co
 #ifdef PLUMB_WITH_OPENNI
   return OniRecording::Open(path, defaults);
 #else
-  throw DataError(fmt::format("recording {} is no folder; this build has no OpenNI2 and reads no .oni files", path.string()));
+  throw DataError(
+      fmt::format("recording {} is no folder; this build has no OpenNI2 and reads no .oni files",
+                  path.string()));
 #endif
 }
 
 void EnsureFolder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error) throw IoError(fmt::format("cannot make the folder '{}': {}", folder.string(), error.message()));
+  if (error)
+    throw IoError(fmt::format("cannot make the folder '{}': {}", folder.string(), error.message()));
 }
 
 void Show(Progress& progress, const std::string& prefix, const ScanProgress& scan) {

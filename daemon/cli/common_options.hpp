@@ -9,7 +9,7 @@
 
 #include "algo/types/frame.hpp"
 #include "algo/types/scene.hpp"
-#include "daemon/config.hpp"
+#include "daemon/config/config.hpp"
 
 namespace CLI {
 class App;
@@ -33,7 +33,8 @@ struct MethodOptions {
 
 /// Opens a recording of any kind that this build reads.
 /// @throws DataError if it is none.
-[[nodiscard]] std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path, const MarkerConfig& markers);
+[[nodiscard]] std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path,
+                                                         const MarkerConfig& markers);
 
 /// Makes a folder and its parents where they are missing.
 /// @throws IoError

@@ -4,16 +4,16 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "algo/base/errors.hpp"
 #include "algo/comparison/comparison.hpp"
-#include "algo/types/errors.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/cli/progress.hpp"
-#include "daemon/cli/text_report.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
-#include "daemon/scan_runner.hpp"
+#include "daemon/files/text_report.hpp"
+#include "daemon/pipeline/scan_runner.hpp"
 
 namespace plumb {
 namespace {
@@ -30,7 +30,8 @@ struct Options {
 CompareOptions MethodOf(const Options& options) {
   CompareOptions compare = options.method.Read().compare;
   if (options.region) compare.region_polygon_m = ReadRegion(*options.region);
-  if (!options.isocentre_m.empty()) compare.isocentre_m = Eigen::Vector3d(options.isocentre_m.data());
+  if (!options.isocentre_m.empty())
+    compare.isocentre_m = Eigen::Vector3d(options.isocentre_m.data());
   compare.now_s = SteadySeconds;
   return compare;
 }
@@ -54,14 +55,17 @@ int Run(const Options& options, const CommandContext& context) {
   const double start_s = SteadySeconds();
   const ResultPictures pictures =
       DrawResult(comparison, reference.height_map ? &*reference.height_map : nullptr,
-                 {.tolerance_m = method.shift_tolerance_m, .paper_colors = options.paper_colors, .subtitle = PictureSubtitle(comparison)});
+                 {.tolerance_m = method.limits.shift_tolerance_m,
+                  .paper_colors = options.paper_colors,
+                  .subtitle = PictureSubtitle(comparison)});
   comparison.timings_s["pictures"] = SteadySeconds() - start_s;
   stop_if_asked();
   progress.Update("writing", 0.9);
   WriteResult(comparison, pictures, options.out);
   progress.Clear();
   PrintOut(options.json ? ResultJson(comparison)
-                        : ComparisonText(comparison, method) + fmt::format("\nWritten to {}\n", options.out.string()));
+                        : ComparisonText(comparison, method) +
+                              fmt::format("\nWritten to {}\n", options.out.string()));
   return comparison.verdict == Verdict::kNoAnswer ? kNoAnswer : kDone;
 }
 
@@ -69,17 +73,25 @@ int Run(const Options& options, const CommandContext& context) {
 
 Command AddCompare(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("reference", options->reference, "Scene folder of the reference")->required()->type_name("REFERENCE_SCENE");
-  app.add_option("current", options->current, "Scene folder of the current scan")->required()->type_name("CURRENT_SCENE");
+  app.add_option("reference", options->reference, "Scene folder of the reference")
+      ->required()
+      ->type_name("REFERENCE_SCENE");
+  app.add_option("current", options->current, "Scene folder of the current scan")
+      ->required()
+      ->type_name("CURRENT_SCENE");
   app.add_option("--out", options->out, "Result folder to write")->required()->type_name("RESULT");
   options->method.AddTo(app);
   app.add_option("--region", options->region,
-                 "Region of interest, a JSON polygon in the reference marker's frame; default: the segmented body")
+                 "Region of interest, a JSON polygon in the reference marker's frame; default: the "
+                 "segmented body")
       ->type_name("FILE");
-  app.add_option("--isocentre", options->isocentre_m, "Isocentre in the reference marker's frame, metres; default: the region's centroid")
+  app.add_option(
+         "--isocentre", options->isocentre_m,
+         "Isocentre in the reference marker's frame, metres; default: the region's centroid")
       ->expected(3)
       ->type_name("X Y Z");
-  app.add_flag("--paper-colours", options->paper_colors, "Draw the error map on the paper's scale: |e|, blue at 0 to red at 10 cm");
+  app.add_flag("--paper-colours", options->paper_colors,
+               "Draw the error map on the paper's scale: |e|, blue at 0 to red at 10 cm");
   app.add_flag("--json", options->json, "Print result.json on the standard output");
   app.footer("\nExit code 4 with the verdict no_answer: the result is written and says why.");
   return [options](const CommandContext& context) { return Run(*options, context); };

@@ -15,7 +15,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/control/control_protocol.hpp"
 #include "daemon/control/unix_socket.hpp"
@@ -30,7 +30,8 @@ constexpr std::size_t kMaxAnswer = 4 << 20;
 /// A conversation with plumbd, line by line.
 class ControlConnection {
  public:
-  ControlConnection(const std::filesystem::path& socket, const ControlRequest& request) : fd_(ConnectUnix(socket)) {
+  ControlConnection(const std::filesystem::path& socket, const ControlRequest& request)
+      : fd_(ConnectUnix(socket)) {
     const std::string line = ControlRequestText(request) + "\n";
     if (::send(fd_, line.data(), line.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(line.size())) {
       ::close(fd_);
@@ -41,7 +42,8 @@ class ControlConnection {
   ControlConnection(const ControlConnection&) = delete;
   ControlConnection& operator=(const ControlConnection&) = delete;
 
-  /// Nothing once plumbd hangs up. @throws Interrupted on a stop request, DeviceError if no answer comes in time.
+  /// Nothing once plumbd hangs up. @throws Interrupted on a stop request, DeviceError if no answer
+  /// comes in time.
   std::optional<std::string> ReadLine(const std::stop_token& stop, std::optional<int> timeout_ms) {
     for (int waited_ms = 0;;) {
       if (const std::size_t end = received_.find('\n'); end != std::string::npos) {
@@ -54,7 +56,8 @@ class ControlConnection {
       pollfd ready{.fd = fd_, .events = POLLIN, .revents = 0};
       if (::poll(&ready, 1, kStep_ms) == 0) waited_ms += kStep_ms;
       if (stop.stop_requested()) throw Interrupted("stopped waiting for plumbd");
-      if (timeout_ms && waited_ms >= *timeout_ms) throw DeviceError(fmt::format("plumbd did not answer within {} s", *timeout_ms / 1000));
+      if (timeout_ms && waited_ms >= *timeout_ms)
+        throw DeviceError(fmt::format("plumbd did not answer within {} s", *timeout_ms / 1000));
       if (ready.revents == 0) continue;
       char buffer[4096];
       const ssize_t count = ::recv(fd_, buffer, sizeof(buffer), 0);
@@ -69,13 +72,15 @@ class ControlConnection {
   std::string received_;
 };
 
-Json Ask(const std::filesystem::path& socket, const ControlRequest& request, const CommandContext& context) {
+Json Ask(const std::filesystem::path& socket, const ControlRequest& request,
+         const CommandContext& context) {
   constexpr int kTimeout_ms = 10'000;
   ControlConnection connection(socket, request);
   const std::optional<std::string> line = connection.ReadLine(context.stop, kTimeout_ms);
   if (!line) throw DeviceError("plumbd hung up without an answer");
   const Json answer = Json::parse(*line, nullptr, /*allow_exceptions=*/false);
-  if (!answer.is_object()) throw DeviceError("plumbd's answer is no JSON object; are both of one version?");
+  if (!answer.is_object())
+    throw DeviceError("plumbd's answer is no JSON object; are both of one version?");
   return answer;
 }
 
@@ -87,32 +92,41 @@ std::string NumberText(const Json& result, const char* name) {
 std::string StatusText(const Json& status) {
   const Json sensor = status.value("sensor", Json::object());
   const Json scan = status.value("scan", Json::object());
-  std::string text = fmt::format("state    {}{}\n", status.value("state", "?"),
-                                 status.value("reason", "").empty() ? "" : ": " + status.value("reason", ""));
-  text += sensor.value("present", false) ? fmt::format("sensor   {} ({}), {:.1f} pairs/s\n", sensor.value("serial", ""),
-                                                       sensor.value("name", ""), sensor.value("fps", 0.0))
-                                         : std::string("sensor   none\n");
+  std::string text =
+      fmt::format("state    {}{}\n", status.value("state", "?"),
+                  status.value("reason", "").empty() ? "" : ": " + status.value("reason", ""));
+  text += sensor.value("present", false)
+              ? fmt::format("sensor   {} ({}), {:.1f} pairs/s\n", sensor.value("serial", ""),
+                            sensor.value("name", ""), sensor.value("fps", 0.0))
+              : std::string("sensor   none\n");
   for (const Json& other : sensor.value("others", Json::array()))
-    text += fmt::format("         {} is attached too, and not used\n", other.is_string() ? other.get<std::string>() : "");
+    text += fmt::format("         {} is attached too, and not used\n",
+                        other.is_string() ? other.get<std::string>() : "");
   for (const Json& warning : sensor.value("warnings", Json::array()))
     text += fmt::format("         {}\n", warning.is_string() ? warning.get<std::string>() : "");
-  if (const auto lost = sensor.value("lost", 0) + sensor.value("unpaired", 0) + sensor.value("discarded", 0); lost > 0) {
-    text += fmt::format("         images: {} lost, {} unpaired, {} discarded\n", sensor.value("lost", 0), sensor.value("unpaired", 0),
+  if (const auto lost =
+          sensor.value("lost", 0) + sensor.value("unpaired", 0) + sensor.value("discarded", 0);
+      lost > 0) {
+    text += fmt::format("         images: {} lost, {} unpaired, {} discarded\n",
+                        sensor.value("lost", 0), sensor.value("unpaired", 0),
                         sensor.value("discarded", 0));
   }
   if (scan.value("active", false)) {
-    text +=
-        fmt::format("scan     {} {}: {} frames, {} tracked, {} dropped; {}\n", scan.value("id", ""), scan.value("step", ""),
-                    scan.value("frames", 0), scan.value("frames_tracked", 0), scan.value("frames_dropped", 0), scan.value("advice", ""));
+    text += fmt::format("scan     {} {}: {} frames, {} tracked, {} dropped; {}\n",
+                        scan.value("id", ""), scan.value("step", ""), scan.value("frames", 0),
+                        scan.value("frames_tracked", 0), scan.value("frames_dropped", 0),
+                        scan.value("advice", ""));
   }
   if (const Json last = status.value("last_result", Json()); last.is_object()) {
     const Json verdict = last.value("verdict", Json());
-    text +=
-        fmt::format("result   scan {}: {}\n", last.value("scan", ""), verdict.is_string() ? verdict.get<std::string>() : "reference taken");
+    text += fmt::format("result   scan {}: {}\n", last.value("scan", ""),
+                        verdict.is_string() ? verdict.get<std::string>() : "reference taken");
     if (last.value("correction", Json()).is_object()) {
-      for (const auto& [name, unit] : {std::pair("vertical", "mm"), std::pair("longitudinal", "mm"), std::pair("lateral", "mm"),
-                                       std::pair("pitch", "deg"), std::pair("roll", "deg"), std::pair("yaw", "deg")}) {
-        text += fmt::format("         {:<13}{:>9} {}\n", name, NumberText(last, fmt::format("{}_{}", name, unit).c_str()), unit);
+      for (const auto& [name, unit] : {std::pair("vertical", "mm"), std::pair("longitudinal", "mm"),
+                                       std::pair("lateral", "mm"), std::pair("pitch", "deg"),
+                                       std::pair("roll", "deg"), std::pair("yaw", "deg")}) {
+        text += fmt::format("         {:<13}{:>9} {}\n", name,
+                            NumberText(last, fmt::format("{}_{}", name, unit).c_str()), unit);
       }
     }
     for (const Json& reason : last.value("reasons", Json::array()))
@@ -124,14 +138,19 @@ std::string StatusText(const Json& status) {
 /// Presses are ignored in some states: that is no failure, but it is said.
 int Press(bool is_long, const CommandContext& context) {
   const Json answer =
-      Ask(context.control, {.kind = ControlRequest::Kind::kPress, .is_long = is_long, .action = {}, .argument = {}}, context);
-  PrintOut(answer.value("ok", false) ? std::string("pressed\n") : fmt::format("ignored: {}\n", answer.value("error", "no reason given")));
+      Ask(context.control,
+          {.kind = ControlRequest::Kind::kPress, .is_long = is_long, .action = {}, .argument = {}},
+          context);
+  PrintOut(answer.value("ok", false)
+               ? std::string("pressed\n")
+               : fmt::format("ignored: {}\n", answer.value("error", "no reason given")));
   return kDone;
 }
 
 int Simulate(const ControlRequest& request, const CommandContext& context) {
   const Json answer = Ask(context.control, request, context);
-  if (!answer.value("ok", false)) throw DeviceError(answer.value("error", "refused without a reason"));
+  if (!answer.value("ok", false))
+    throw DeviceError(answer.value("error", "refused without a reason"));
   return kDone;
 }
 
@@ -157,14 +176,18 @@ int Status(const StatusOptions& options, const CommandContext& context) {
   if (!options.get.empty()) {
     PrintOut(ValueAt(status, options.get) + "\n");
   } else {
-    PrintOut(options.json ? status.dump(2, ' ', false, Json::error_handler_t::replace) + "\n" : StatusText(status));
+    PrintOut(options.json ? status.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
+                          : StatusText(status));
   }
   return kDone;
 }
 
 int Watch(const CommandContext& context) {
-  ControlConnection connection(context.control, {.kind = ControlRequest::Kind::kWatch, .is_long = false, .action = {}, .argument = {}});
-  while (const std::optional<std::string> line = connection.ReadLine(context.stop, std::nullopt)) PrintOut(*line + "\n");
+  ControlConnection connection(
+      context.control,
+      {.kind = ControlRequest::Kind::kWatch, .is_long = false, .action = {}, .argument = {}});
+  while (const std::optional<std::string> line = connection.ReadLine(context.stop, std::nullopt))
+    PrintOut(*line + "\n");
   throw DeviceError("plumbd hung up");
 }
 
@@ -173,7 +196,9 @@ int Watch(const CommandContext& context) {
 Command AddStatus(CLI::App& app) {
   auto options = std::make_shared<StatusOptions>();
   app.add_flag("--json", options->json, "Print the status as JSON");
-  app.add_option("--get", options->get, "Print one value of it, such as state or last_result.yaw_deg")->type_name("KEY");
+  app.add_option("--get", options->get,
+                 "Print one value of it, such as state or last_result.yaw_deg")
+      ->type_name("KEY");
   return [options](const CommandContext& context) { return Status(*options, context); };
 }
 
@@ -193,10 +218,11 @@ Command AddSim(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("action", options->action, "What happens to the virtual sensor")
       ->required()
-      ->check(CLI::IsMember({"plug", "unplug", "stall", "resume", "error", "next-scene", "glitch", "speed"}));
-  app.add_option(
-         "argument", options->words,
-         "A unit's serial; with glitch: late, double, old, size or lone, and for how many pairs of images; with speed: times real time")
+      ->check(CLI::IsMember(
+          {"plug", "unplug", "stall", "resume", "error", "next-scene", "glitch", "speed"}));
+  app.add_option("argument", options->words,
+                 "A unit's serial; with glitch: late, double, old, size or lone, and for how many "
+                 "pairs of images; with speed: times real time")
       ->expected(0, 2);
   return [options](const CommandContext& context) {
     return Simulate({.kind = ControlRequest::Kind::kSim,

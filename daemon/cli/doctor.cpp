@@ -1,5 +1,5 @@
-// `plumb doctor`: what is attached, permitted and configured, and what to do about what is not. It changes nothing. Its exit code tells
-// whether something necessary is missing.
+// `plumb doctor`: what is attached, permitted and configured, and what to do about what is not. It
+// changes nothing. Its exit code says whether something necessary is missing.
 #include <unistd.h>
 
 #include <filesystem>
@@ -14,9 +14,9 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "daemon/cli/commands.hpp"
-#include "daemon/config.hpp"
+#include "daemon/config/config.hpp"
 #include "daemon/control/unix_socket.hpp"
 #include "drivers/program_folders.hpp"
 #ifdef PLUMB_WITH_OPENNI
@@ -51,12 +51,16 @@ struct Finding {
 
 class Report {
  public:
-  void Good(std::string what, std::string found) { findings_.push_back({State::kGood, std::move(what), std::move(found), {}, kDone}); }
+  void Good(std::string what, std::string found) {
+    findings_.push_back({State::kGood, std::move(what), std::move(found), {}, kDone});
+  }
   void Note(std::string what, std::string found, std::string remedy) {
-    findings_.push_back({State::kNote, std::move(what), std::move(found), std::move(remedy), kDone});
+    findings_.push_back(
+        {State::kNote, std::move(what), std::move(found), std::move(remedy), kDone});
   }
   void Bad(std::string what, std::string found, std::string remedy, int exit_code = kDeviceFailed) {
-    findings_.push_back({State::kBad, std::move(what), std::move(found), std::move(remedy), exit_code});
+    findings_.push_back(
+        {State::kBad, std::move(what), std::move(found), std::move(remedy), exit_code});
   }
 
   /// kDone if nothing necessary is missing, else that of the first thing that is.
@@ -71,7 +75,9 @@ class Report {
   [[nodiscard]] std::string Text() const {
     std::string text;
     for (const Finding& finding : findings_) {
-      const char* mark = finding.state == State::kGood ? "ok  " : finding.state == State::kNote ? "note" : "BAD ";
+      const char* mark = finding.state == State::kGood   ? "ok  "
+                         : finding.state == State::kNote ? "note"
+                                                         : "BAD ";
       text += fmt::format("{}  {:<14} {}\n", mark, finding.what, finding.found);
       if (!finding.remedy.empty()) text += fmt::format("{:21}-> {}\n", "", finding.remedy);
     }
@@ -81,8 +87,13 @@ class Report {
   [[nodiscard]] ordered_json Json() const {
     ordered_json list = ordered_json::array();
     for (const Finding& finding : findings_) {
-      const char* state = finding.state == State::kGood ? "ok" : finding.state == State::kNote ? "note" : "bad";
-      list.push_back({{"state", state}, {"what", finding.what}, {"found", finding.found}, {"remedy", finding.remedy}});
+      const char* state = finding.state == State::kGood   ? "ok"
+                          : finding.state == State::kNote ? "note"
+                                                          : "bad";
+      list.push_back({{"state", state},
+                      {"what", finding.what},
+                      {"found", finding.found},
+                      {"remedy", finding.remedy}});
     }
     return {{"ready", ready()}, {"findings", list}};
   }
@@ -95,15 +106,17 @@ Config CheckConfig(Report& report, const std::optional<fs::path>& wanted) {
   const fs::path file = wanted.value_or(kDefaultConfig);
   std::error_code error;
   if (!wanted && !fs::exists(file, error)) {
-    report.Note("configuration", fmt::format("no {}: defaults hold", file.string()), "write one where the defaults do not fit");
+    report.Note("configuration", fmt::format("no {}: defaults hold", file.string()),
+                "write one where the defaults do not fit");
     return {};
   }
   try {
-    Config config = ReadConfig(file);
+    Config config = ReadConfig(file, ConfigUse::kAppliance);
     report.Good("configuration", file.string());
     return config;
   } catch (const DataError& problem) {
-    report.Bad("configuration", problem.what(), "correct it; `plumbd --check-config` tells when it is right", kBadInput);
+    report.Bad("configuration", problem.what(),
+               "correct it; `plumbd --check-config` confirms when it is right", kBadInput);
     return {};
   }
 }
@@ -113,11 +126,13 @@ void CheckUsb(Report& report) {
   try {
     const UsbWatcher watcher;
     if (watcher.sensors().empty()) {
-      report.Note("USB", "no sensor of the Xtion or Carmine kind (1d27:*)", "plug one in; its own lamp must light up");
+      report.Note("USB", "no sensor of the Xtion or Carmine kind (1d27:*)",
+                  "plug one in; its own lamp must light up");
     }
     for (const UsbSensor& sensor : watcher.sensors()) {
-      const std::string found = fmt::format("{} {:04x}:{:04x} at bus {} address {}{}{}", sensor.model, sensor.vendor, sensor.product,
-                                            sensor.bus, sensor.address, sensor.speed.empty() ? "" : ", ", sensor.speed);
+      const std::string found = fmt::format(
+          "{} {:04x}:{:04x} at bus {} address {}{}{}", sensor.model, sensor.vendor, sensor.product,
+          sensor.bus, sensor.address, sensor.speed.empty() ? "" : ", ", sensor.speed);
       if (sensor.problems.empty()) report.Good("USB", found);
       for (const std::string& problem : sensor.problems) {
         if (sensor.permitted)
@@ -130,7 +145,8 @@ void CheckUsb(Report& report) {
     report.Note("USB", error.what(), "sensors are found through OpenNI2 all the same");
   }
 #else
-  report.Note("USB", "this build does not watch the bus", "build with PLUMB_WITH_USB for permissions and speeds");
+  report.Note("USB", "this build does not watch the bus",
+              "build with PLUMB_WITH_USB for permissions and speeds");
 #endif
 }
 
@@ -141,8 +157,10 @@ void CheckSensor(Report& report, const Config& config) {
     options.calibration_folder = config.appliance.calibration;
     OpenNiProvider provider(options);
     const std::vector<SensorDescription> sensors = provider.List();
-    report.Good("OpenNI2", fmt::format("loaded, {} sensor{}", sensors.size(), sensors.size() == 1 ? "" : "s"));
-    if (sensors.empty()) report.Bad("sensor", "none is attached", "plug one in; look at USB above if it is");
+    report.Good("OpenNI2",
+                fmt::format("loaded, {} sensor{}", sensors.size(), sensors.size() == 1 ? "" : "s"));
+    if (sensors.empty())
+      report.Bad("sensor", "none is attached", "plug one in; look at USB above if it is");
     const std::string& wanted = config.appliance.sensor_serial;
     bool found_wanted = wanted.empty();
     for (const SensorDescription& sensor : sensors) {
@@ -151,29 +169,34 @@ void CheckSensor(Report& report, const Config& config) {
       const fs::path file = CalibrationFile(options.calibration_folder, sensor.serial);
       std::error_code error;
       if (!fs::exists(file, error)) {
-        report.Note("calibration", fmt::format("none for {}: nominal intrinsics are used", sensor.serial),
+        report.Note("calibration",
+                    fmt::format("none for {}: nominal intrinsics are used", sensor.serial),
                     fmt::format("calibrate the unit and put its camera.yaml at {}", file.string()));
         continue;
       }
       try {
         const StreamInfo info = LiveStreamInfo(options, sensor.serial, 640, 480, 0.0);
-        report.Good("calibration", fmt::format("{}, focal length {:.1f} pixels", file.string(), info.intrinsics.fx));
+        report.Good("calibration", fmt::format("{}, focal length {:.1f} pixels", file.string(),
+                                               info.intrinsics.fx));
       } catch (const DeviceError& problem) {
         report.Bad("calibration", problem.what(), "");
       }
     }
     if (!found_wanted && !sensors.empty())
-      report.Bad("sensor", fmt::format("the configuration wants serial {}", wanted), "plug that one in, or change sensor_serial");
+      report.Bad("sensor", fmt::format("the configuration wants serial {}", wanted),
+                 "plug that one in, or change sensor_serial");
   } catch (const DeviceError& error) {
     report.Bad("OpenNI2", error.what(), "");
   }
   if (const auto reader = FindBesideProgram("lib/plumb/plumb-oni-reader"))
     report.Good(".oni files", reader->string());
   else
-    report.Note(".oni files", "plumb-oni-reader is missing: recordings of OpenNI2 cannot be read", "install Plumb again");
+    report.Note(".oni files", "plumb-oni-reader is missing: recordings of OpenNI2 cannot be read",
+                "install Plumb again");
 #else
   (void)config;
-  report.Bad("OpenNI2", "this build has none: no sensor can be used", "build with PLUMB_WITH_OPENNI");
+  report.Bad("OpenNI2", "this build has none: no sensor can be used",
+             "build with PLUMB_WITH_OPENNI");
 #endif
 }
 
@@ -181,10 +204,12 @@ void CheckGpio(Report& report) {
 #ifdef PLUMB_WITH_GPIO
   const std::vector<GpioChipDescription> chips = ListGpioChips();
   if (chips.empty())
-    report.Note("GPIO", "no chip: no hardware button and light", "use the page's button, `plumb press` or a board with GPIO");
+    report.Note("GPIO", "no chip: no hardware button and light",
+                "use the page's button, `plumb press` or a board with GPIO");
   for (const GpioChipDescription& chip : chips) {
     if (chip.problem.empty())
-      report.Good("GPIO", fmt::format("{} \"{}\", named lines: {}", chip.name, chip.label, fmt::join(chip.lines, " ")));
+      report.Good("GPIO", fmt::format("{} \"{}\", named lines: {}", chip.name, chip.label,
+                                      fmt::join(chip.lines, " ")));
     else
       report.Note("GPIO", fmt::format("{} cannot be opened", chip.name), chip.problem);
   }
@@ -196,7 +221,8 @@ void CheckGpio(Report& report) {
 void CheckFolder(Report& report, const char* what, const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    report.Note(what, fmt::format("{} does not exist", folder.string()), "the installation makes it (systemd-tmpfiles --create)");
+    report.Note(what, fmt::format("{} does not exist", folder.string()),
+                "the installation makes it (systemd-tmpfiles --create)");
     return;
   }
   const bool writable = ::access(folder.c_str(), W_OK) == 0;
@@ -205,8 +231,8 @@ void CheckFolder(Report& report, const char* what, const fs::path& folder) {
     report.Note(what, fmt::format("{} is not writable for this user", folder.string()),
                 "the service's own user writes there; for tests give another");
   } else if (free_gb < 2.0) {
-    report.Bad(what, fmt::format("{}: {:.1f} GB free", folder.string(), free_gb), "free space: a scan needs up to 1 GB while it runs",
-               kInternalError);
+    report.Bad(what, fmt::format("{}: {:.1f} GB free", folder.string(), free_gb),
+               "free space: a scan needs up to 1 GB while it runs", kInternalError);
   } else {
     report.Good(what, fmt::format("{}: {:.0f} GB free", folder.string(), free_gb));
   }
@@ -215,9 +241,11 @@ void CheckFolder(Report& report, const char* what, const fs::path& folder) {
 void CheckDaemon(Report& report, const fs::path& control) {
   try {
     ::close(ConnectUnix(control));
-    report.Good("plumbd", fmt::format("answers at {}; while it runs it alone has the sensor", control.string()));
+    report.Good("plumbd", fmt::format("answers at {}; while it runs it alone has the sensor",
+                                      control.string()));
   } catch (const std::exception& error) {
-    report.Note("plumbd", error.what(), "start it with systemctl start plumbd, or name its socket with --control");
+    report.Note("plumbd", error.what(),
+                "start it with systemctl start plumbd, or name its socket with --control");
   }
 }
 
@@ -229,7 +257,9 @@ Command AddDoctor(CLI::App& app) {
     bool json = false;
   };
   auto options = std::make_shared<Options>();
-  app.add_option("--config", options->config, fmt::format("Of the appliance; default {}", kDefaultConfig))->type_name("FILE");
+  app.add_option("--config", options->config,
+                 fmt::format("Of the appliance; default {}", kDefaultConfig))
+      ->type_name("FILE");
   app.add_flag("--json", options->json, "Print JSON on the standard output");
   return [options](const CommandContext& context) {
     Report report;

@@ -4,13 +4,13 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/files/scene_json.hpp"
-#include "drivers/replay/file_io.hpp"
+#include "drivers/files/file_io.hpp"
 #include "drivers/replay/tum_index.hpp"
 #include "drivers/replay/tum_recording.hpp"
 #ifdef PLUMB_WITH_OPENNI
@@ -36,13 +36,17 @@ std::vector<double> DepthStamps(const fs::path& recording) {
 #ifdef PLUMB_WITH_OPENNI
   if (!fs::is_directory(recording)) {
     const std::optional<OniFileSummary> summary = SummariseOniFile(recording);
-    if (!summary) throw DataError(fmt::format("recording {} is not whole: it has no END record", recording.string()));
-    for (const std::int64_t stamp_us : summary->depth_us) stamps_s.push_back(1e-6 * static_cast<double>(stamp_us));
+    if (!summary)
+      throw DataError(
+          fmt::format("recording {} is not whole: it has no END record", recording.string()));
+    for (const std::int64_t stamp_us : summary->depth_us)
+      stamps_s.push_back(1e-6 * static_cast<double>(stamp_us));
     return stamps_s;
   }
 #endif
   const fs::path index = recording / "depth.txt";
-  for (const IndexEntry& entry : ParseIndex(ReadTextFile(index, kMaxJsonBytes), index.string())) stamps_s.push_back(entry.time_s);
+  for (const IndexEntry& entry : ParseIndex(ReadTextFile(index, kMaxJsonBytes), index.string()))
+    stamps_s.push_back(entry.time_s);
   return stamps_s;
 }
 
@@ -59,20 +63,23 @@ ordered_json RecordingFacts(const fs::path& path) {
   const std::vector<double> depth_s = DepthStamps(path);
   const double duration_s = depth_s.size() > 1 ? depth_s.back() - depth_s.front() : 0.0;
   const Intrinsics& camera = info.intrinsics;
-  ordered_json facts = {{"kind", "recording"},
-                        {"frames", info.num_frames.value_or(0)},
-                        {"duration_s", duration_s},
-                        {"rate_hz", duration_s > 0 ? static_cast<double>(depth_s.size() - 1) / duration_s : 0.0},
-                        {"image_width", camera.width},
-                        {"image_height", camera.height},
-                        {"focal_px", {camera.fx, camera.fy}},
-                        {"centre_px", {camera.cx, camera.cy}},
-                        {"distortion", camera.distortion},
-                        {"calibration", info.intrinsics_assumed ? "assumed" : fs::is_directory(path) ? "from camera.yaml" : "from the file beside it"},
-                        {"marker_dictionary", info.marker_dictionary},
-                        {"marker_length_m", info.marker_length_m},
-                        {"reference_marker", nullptr},
-                        {"warnings", info.warnings}};
+  ordered_json facts = {
+      {"kind", "recording"},
+      {"frames", info.num_frames.value_or(0)},
+      {"duration_s", duration_s},
+      {"rate_hz", duration_s > 0 ? static_cast<double>(depth_s.size() - 1) / duration_s : 0.0},
+      {"image_width", camera.width},
+      {"image_height", camera.height},
+      {"focal_px", {camera.fx, camera.fy}},
+      {"centre_px", {camera.cx, camera.cy}},
+      {"distortion", camera.distortion},
+      {"calibration", info.intrinsics_assumed  ? "assumed"
+                      : fs::is_directory(path) ? "from camera.yaml"
+                                               : "from the file beside it"},
+      {"marker_dictionary", info.marker_dictionary},
+      {"marker_length_m", info.marker_length_m},
+      {"reference_marker", nullptr},
+      {"warnings", info.warnings}};
   if (info.reference_marker) facts["reference_marker"] = *info.reference_marker;
   return facts;
 }
@@ -84,12 +91,14 @@ std::string Lines(const ordered_json& facts) {
     if (value.is_object()) {
       text += fmt::format("{}\n", key);
       for (const auto& [inner, v] : value.items())
-        text += fmt::format("  {:<32} {}\n", inner, v.is_string() ? v.get<std::string>() : v.dump());
+        text +=
+            fmt::format("  {:<32} {}\n", inner, v.is_string() ? v.get<std::string>() : v.dump());
     } else if (value.is_array() && !value.empty() && value.front().is_string()) {
       text += fmt::format("{}\n", key);
       for (const auto& v : value) text += fmt::format("  {}\n", v.get<std::string>());
     } else {
-      text += fmt::format("{:<34} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+      text += fmt::format("{:<34} {}\n", key,
+                          value.is_string() ? value.get<std::string>() : value.dump());
     }
   }
   return text;
@@ -99,15 +108,18 @@ int Run(const Options& options) {
   ordered_json facts;
   if (IsSceneFolder(options.path)) {
     facts = {{"kind", "scene"}};
-    facts.update(ordered_json::parse(SceneJson(ReadScene(options.path, {.cloud = false, .height_map = false, .mesh = false}))));
+    facts.update(ordered_json::parse(
+        SceneJson(ReadScene(options.path, {.cloud = false, .height_map = false, .mesh = false}))));
   } else if (IsResultFolder(options.path)) {
     facts = {{"kind", "result"}};
     facts.update(ordered_json::parse(ReadResultJson(options.path)));
   } else if (IsRecording(options.path)) {
     facts = RecordingFacts(options.path);
   } else {
-    throw DataError(fmt::format("'{}' is no recording (rgb.txt, depth.txt, or an .oni file), no scene (scene.json) and no result (result.json){}",
-                                options.path.string(), fs::exists(options.path) ? "" : "; it does not exist"));
+    throw DataError(
+        fmt::format("'{}' is no recording (rgb.txt, depth.txt, or an .oni file), no scene "
+                    "(scene.json) and no result (result.json){}",
+                    options.path.string(), fs::exists(options.path) ? "" : "; it does not exist"));
   }
   PrintOut(options.json ? facts.dump(2) + "\n" : Lines(facts));
   return kDone;
@@ -117,7 +129,10 @@ int Run(const Options& options) {
 
 Command AddInfo(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("path", options->path, "A recording (folder or .oni file), or the folder of a scene or a result")->required()->type_name("RECORDING|SCENE|RESULT");
+  app.add_option("path", options->path,
+                 "A recording (folder or .oni file), or the folder of a scene or a result")
+      ->required()
+      ->type_name("RECORDING|SCENE|RESULT");
   app.add_flag("--json", options->json, "Print JSON on the standard output");
   return [options](const CommandContext&) { return Run(*options); };
 }

@@ -6,7 +6,7 @@
 
 #include "daemon/cli/commands.hpp"
 #include "daemon/files/atomic_folder.hpp"
-#include "daemon/marker_sheet.hpp"
+#include "daemon/files/marker_sheet.hpp"
 
 namespace plumb {
 namespace {
@@ -22,7 +22,8 @@ struct Options {
 /// Where page `page` goes: FILE.svg, or FILE-01.svg and so on where there are several.
 fs::path PageFile(const fs::path& out, int page, int num_pages) {
   if (num_pages == 1) return out;
-  return out.parent_path() / fmt::format("{}-{:02}{}", out.stem().string(), page + 1, out.extension().string());
+  return out.parent_path() /
+         fmt::format("{}-{:02}{}", out.stem().string(), page + 1, out.extension().string());
 }
 
 int Run(const Options& options) {
@@ -32,7 +33,8 @@ int Run(const Options& options) {
   std::string text;
   if (options.out.extension() == ".pdf") {
     WriteFileAtomically(options.out, [&](const fs::path& hidden) { sheet.WritePdf(hidden); });
-    text = fmt::format("{}: {} page{}\n", options.out.string(), sheet.num_pages(), sheet.num_pages() == 1 ? "" : "s");
+    text = fmt::format("{}: {} page{}\n", options.out.string(), sheet.num_pages(),
+                       sheet.num_pages() == 1 ? "" : "s");
   } else {
     for (int page = 0; page < sheet.num_pages(); ++page) {
       const fs::path file = PageFile(options.out, page, sheet.num_pages());
@@ -40,7 +42,9 @@ int Run(const Options& options) {
       text += file.string() + "\n";
     }
   }
-  PrintOut(text + "Print at 100 %, without fitting to the page, and check the ruler: it must measure 100 mm.\n");
+  PrintOut(text +
+           "Print at 100 %, without fitting to the page, and check the ruler: it must measure 100 "
+           "mm.\n");
   return kDone;
 }
 
@@ -48,11 +52,16 @@ int Run(const Options& options) {
 
 Command AddMarkers(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("--ids", options->ids, "Ids and ranges")->capture_default_str()->type_name("0-15,20");
-  app.add_option("--dictionary", options->sheet.dictionary, "OpenCV's name, or DICT_ARUCO_MIP_36h12")
+  app.add_option("--ids", options->ids, "Ids and ranges")
+      ->capture_default_str()
+      ->type_name("0-15,20");
+  app.add_option("--dictionary", options->sheet.dictionary,
+                 "OpenCV's name, or DICT_ARUCO_MIP_36h12")
       ->capture_default_str()
       ->type_name("NAME");
-  app.add_option("--length", options->sheet.length_m, "Side of the black square, metres")->capture_default_str()->type_name("M");
+  app.add_option("--length", options->sheet.length_m, "Side of the black square, metres")
+      ->capture_default_str()
+      ->type_name("M");
   app.add_option("--paper", options->sheet.paper, "Of the sheets, upright")
       ->check(CLI::IsMember({"A4", "A3"}))
       ->capture_default_str()
@@ -61,7 +70,9 @@ Command AddMarkers(CLI::App& app) {
       ->required()
       ->check([](const std::string& name) {
         const std::string extension = fs::path(name).extension().string();
-        return extension == ".pdf" || extension == ".svg" ? "" : "expected a file that ends in .pdf or .svg";
+        return extension == ".pdf" || extension == ".svg"
+                   ? ""
+                   : "expected a file that ends in .pdf or .svg";
       })
       ->type_name("FILE.pdf|FILE.svg");
   return [options](const CommandContext&) { return Run(*options); };

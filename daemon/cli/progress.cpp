@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "daemon/scan_runner.hpp"
+#include "daemon/pipeline/scan_runner.hpp"
 
 namespace plumb {
 namespace {
@@ -43,8 +43,9 @@ void Progress::Update(std::string_view step, double fraction, std::string_view d
 void Progress::Draw(double fraction, std::string_view detail) {
   constexpr int kBar = 24;
   const int filled = static_cast<int>(fraction * kBar + 0.5);
-  std::string line = fmt::format("{:<24} [{}{}] {:3.0f} %  {}", step_, std::string(static_cast<std::size_t>(filled), '#'),
-                                 std::string(static_cast<std::size_t>(kBar - filled), '.'), 100 * fraction, detail);
+  std::string line = fmt::format(
+      "{:<24} [{}{}] {:3.0f} %  {}", step_, std::string(static_cast<std::size_t>(filled), '#'),
+      std::string(static_cast<std::size_t>(kBar - filled), '.'), 100 * fraction, detail);
   line.resize(std::min(line.size(), static_cast<std::size_t>(TerminalWidth() - 1)));
   fmt::print(stderr, "\r\x1b[K{}", line);
   std::fflush(stderr);

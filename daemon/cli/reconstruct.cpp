@@ -9,7 +9,7 @@
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/files/scene_json.hpp"
-#include "daemon/scan_runner.hpp"
+#include "daemon/pipeline/scan_runner.hpp"
 
 namespace plumb {
 namespace {
@@ -23,34 +23,42 @@ struct Options {
 
 std::string Summary(const Scene& scene, const std::filesystem::path& out) {
   std::string text = fmt::format("{}\n", out.string());
-  text += fmt::format("  frames     {} of {} tracked, {} dropped; {} keyframes\n", scene.frames_tracked, scene.frames_total,
-                      scene.frames_dropped, scene.keyframes.size());
+  text +=
+      fmt::format("  frames     {} of {} tracked, {} dropped; {} keyframes\n", scene.frames_tracked,
+                  scene.frames_total, scene.frames_dropped, scene.keyframes.size());
   text += fmt::format("  markers    {}", scene.markers.size());
   if (scene.frame == SceneFrame::kReferenceMarker)
     text += fmt::format("; the frame is that of marker {}", scene.reference_marker.value_or(-1));
   text += "\n";
   if (scene.height_map) {
     const GridShape& grid = scene.height_map->grid;
-    text += fmt::format("  height map {} x {} cells of {:.3g} mm\n", grid.width, grid.height, grid.step * 1000);
+    text += fmt::format("  height map {} x {} cells of {:.3g} mm\n", grid.width, grid.height,
+                        grid.step * 1000);
   } else {
-    text += scene.frame == SceneFrame::kReferenceMarker ? "  height map none: no surface around the reference marker\n"
-                                                        : "  height map none: not in the reference marker's frame\n";
+    text += scene.frame == SceneFrame::kReferenceMarker
+                ? "  height map none: no surface around the reference marker\n"
+                : "  height map none: not in the reference marker's frame\n";
   }
-  text += fmt::format("  surface    {} points, {} triangles\n", scene.cloud.size(), scene.mesh.triangles.size());
+  text += fmt::format("  surface    {} points, {} triangles\n", scene.cloud.size(),
+                      scene.mesh.triangles.size());
   if (const auto after = scene.timings_s.find("after_last_frame"); after != scene.timings_s.end()) {
     text += fmt::format("  time       {:.2f} s after the last frame\n", after->second);
   }
-  for (const std::string& warning : scene.warnings) text += fmt::format("  warning    {}\n", warning);
+  for (const std::string& warning : scene.warnings)
+    text += fmt::format("  warning    {}\n", warning);
   return text;
 }
 
 int Run(const Options& options, const CommandContext& context) {
   const Config config = options.method.Read();
-  { const AtomicFolder check(options.out, SceneOutput()); }  // refuses a bad place before the long work
+  {
+    const AtomicFolder check(options.out, SceneOutput());
+  }  // refuses a bad place before the long work
   const std::unique_ptr<FrameSource> recording = OpenRecording(options.recording, config.markers);
   Progress progress;
-  const Scene scene = RunScan(*recording, {.reconstructor = config.reconstruct, .realtime = options.realtime}, context.stop,
-                              [&](const ScanProgress& scan) { Show(progress, "", scan); });
+  const Scene scene =
+      RunScan(*recording, {.reconstructor = config.reconstruct, .realtime = options.realtime},
+              context.stop, [&](const ScanProgress& scan) { Show(progress, "", scan); });
   progress.Update("writing", 0.0);
   WriteScene(scene, options.out);
   progress.Clear();
@@ -62,12 +70,14 @@ int Run(const Options& options, const CommandContext& context) {
 
 Command AddReconstruct(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("recording", options->recording, "Recording: a folder in the TUM RGB-D layout, or an .oni file")
+  app.add_option("recording", options->recording,
+                 "Recording: a folder in the TUM RGB-D layout, or an .oni file")
       ->required()
       ->type_name("RECORDING");
   app.add_option("--out", options->out, "Scene folder to write")->required()->type_name("SCENE");
   options->method.AddTo(app);
-  app.add_flag("--realtime", options->realtime, "Play the recording at its own pace, dropping frames as a live sensor would");
+  app.add_flag("--realtime", options->realtime,
+               "Play the recording at its own pace, dropping frames as a live sensor would");
   app.add_flag("--json", options->json, "Print scene.json on the standard output");
   return [options](const CommandContext& context) { return Run(*options, context); };
 }

@@ -8,17 +8,17 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "algo/types/errors.hpp"
-#include "daemon/bounded_queue.hpp"
+#include "algo/base/errors.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/files/atomic_folder.hpp"
+#include "daemon/loop/bounded_queue.hpp"
 #include "drivers/replay/tum_writer.hpp"
 #ifdef PLUMB_WITH_OPENNI
 #include "drivers/openni/oni_recorder.hpp"
 #include "drivers/openni/openni_provider.hpp"
-#include "drivers/simulated/virtual_sensor.hpp"
+#include "drivers/virtual/virtual_sensor.hpp"
 #endif
 
 namespace plumb {
@@ -47,7 +47,8 @@ struct Attached {
   std::unique_ptr<OpenNiProvider> provider;
   std::unique_ptr<LiveSensor> sensor;
 
-  Attached(const Options& options, const Config& config, const std::stop_token& stop, Progress& progress) {
+  Attached(const Options& options, const Config& config, const std::stop_token& stop,
+           Progress& progress) {
     OpenNiOptions openni;
     openni.calibration_folder = options.calibration;
     openni.marker_dictionary = config.markers.dictionary.value_or(openni.marker_dictionary);
@@ -59,7 +60,9 @@ struct Attached {
       simulated.max_scenes = 1;
       simulated.frames = std::max(2, static_cast<int>(options.seconds * simulated.rate_hz));
       virtual_sensor = std::make_unique<VirtualSensor>(
-          simulated, stop, [&](double fraction, std::string_view scene) { progress.Update("rendering", fraction, scene); });
+          simulated, stop, [&](double fraction, std::string_view scene) {
+            progress.Update("rendering", fraction, scene);
+          });
       openni.library = virtual_sensor->runtime_library();
       openni.calibration_folder = virtual_sensor->calibration_folder();
       openni.before_stop = [virtual_sensor = virtual_sensor.get()] { virtual_sensor->Quit(); };
@@ -69,7 +72,7 @@ struct Attached {
     sensor->LockExposure(true);
   }
 
-  /// What is recorded begins now.
+  /// Recording begins now.
   void Begin() const {
     if (virtual_sensor) virtual_sensor->Rewind();
     sensor->Flush();
@@ -78,10 +81,12 @@ struct Attached {
 
 /// Hands on each frame until the time is over. @throws Interrupted on a stop.
 template <typename Take>
-std::int64_t ReadFor(LiveSensor& sensor, double seconds, const std::stop_token& stop, Progress& progress, Take&& take) {
+std::int64_t ReadFor(LiveSensor& sensor, double seconds, const std::stop_token& stop,
+                     Progress& progress, Take&& take) {
   std::optional<double> begin_s;
   for (std::int64_t count = 0;; ++count) {
-    if (stop.stop_requested()) throw Interrupted("the recording was stopped; nothing of it is kept");
+    if (stop.stop_requested())
+      throw Interrupted("the recording was stopped; nothing of it is kept");
     std::optional<Frame> frame = sensor.Next();
     if (!frame) return count;
     if (!begin_s) begin_s = frame->depth_time_s;
@@ -92,7 +97,8 @@ std::int64_t ReadFor(LiveSensor& sensor, double seconds, const std::stop_token& 
   }
 }
 
-std::string RecordOni(const Options& options, const Attached& attached, const std::stop_token& stop, Progress& progress) {
+std::string RecordOni(const Options& options, const Attached& attached, const std::stop_token& stop,
+                      Progress& progress) {
   OniFileSummary summary;
   WriteFileAtomically(options.out, [&](const fs::path& hidden) {
     OniRecorder recorder(*attached.sensor, hidden, {.jpeg = options.jpeg});
@@ -101,15 +107,21 @@ std::string RecordOni(const Options& options, const Attached& attached, const st
     summary = recorder.Finish();
     std::error_code error;
     fs::rename(OniSideCar(hidden), OniSideCar(options.out), error);
-    if (error) throw IoError(fmt::format("cannot write {}: {}", OniSideCar(options.out).string(), error.message()));
+    if (error)
+      throw IoError(
+          fmt::format("cannot write {}: {}", OniSideCar(options.out).string(), error.message()));
   });
-  return fmt::format("{} colour and {} depth images", summary.color_us.size(), summary.depth_us.size());
+  return fmt::format("{} colour and {} depth images", summary.color_us.size(),
+                     summary.depth_us.size());
 }
 
-std::string RecordFolder(const Options& options, const Attached& attached, const std::stop_token& stop, Progress& progress) {
-  static const OutputKind kKind{"recording", "depth.txt", {"rgb", "depth", "rgb.txt", "depth.txt", "camera.yaml"}};
+std::string RecordFolder(const Options& options, const Attached& attached,
+                         const std::stop_token& stop, Progress& progress) {
+  static const OutputKind kKind{
+      "recording", "depth.txt", {"rgb", "depth", "rgb.txt", "depth.txt", "camera.yaml"}};
   AtomicFolder folder(options.out, kKind);
-  const TumWriterOptions writing{.depth_scale = kDepthUnitsPerMetre, .jpeg_quality = options.jpeg ? 92 : 0};
+  const TumWriterOptions writing{.depth_scale = kDepthUnitsPerMetre,
+                                 .jpeg_quality = options.jpeg ? 92 : 0};
   TumWriter writer(folder.path(), attached.sensor->info(), writing);
   BoundedQueue<Frame> queue(kQueue);
   int num_dropped = 0;
@@ -126,8 +138,9 @@ std::string RecordFolder(const Options& options, const Attached& attached, const
     });
     try {
       attached.Begin();
-      num_frames = ReadFor(*attached.sensor, options.seconds, stop, progress,
-                           [&](Frame&& frame) { num_dropped += queue.PushDroppingOldest(std::move(frame)); });
+      num_frames = ReadFor(*attached.sensor, options.seconds, stop, progress, [&](Frame&& frame) {
+        num_dropped += queue.PushDroppingOldest(std::move(frame));
+      });
     } catch (...) {
       queue.Close();
       throw;
@@ -138,7 +151,10 @@ std::string RecordFolder(const Options& options, const Attached& attached, const
   if (error) std::rethrow_exception(error);
   writer.Finish();
   folder.Commit();
-  const std::string dropped = num_dropped == 0 ? "" : fmt::format(", {} of them lost: the disk is too slow, try --jpeg", num_dropped);
+  const std::string dropped =
+      num_dropped == 0
+          ? ""
+          : fmt::format(", {} of them lost: the disk is too slow, try --jpeg", num_dropped);
   return fmt::format("{} frames{}", num_frames, dropped);
 }
 
@@ -147,18 +163,22 @@ int Run(const Options& options, const CommandContext& context) {
   Progress progress;
   const Attached attached(options, config, context.stop, progress);
   const bool oni = options.out.extension() == ".oni";
-  const std::string what =
-      oni ? RecordOni(options, attached, context.stop, progress) : RecordFolder(options, attached, context.stop, progress);
+  const std::string what = oni ? RecordOni(options, attached, context.stop, progress)
+                               : RecordFolder(options, attached, context.stop, progress);
   progress.Clear();
-  std::string text = fmt::format("{}: {} of sensor {}\n", options.out.string(), what, attached.sensor->description().serial);
-  for (const std::string& warning : attached.sensor->info().warnings) text += fmt::format("  warning    {}\n", warning);
+  std::string text = fmt::format("{}: {} of sensor {}\n", options.out.string(), what,
+                                 attached.sensor->description().serial);
+  for (const std::string& warning : attached.sensor->info().warnings)
+    text += fmt::format("  warning    {}\n", warning);
   PrintOut(text);
   return kDone;
 }
 
 #else
 
-int Run(const Options&, const CommandContext&) { throw DeviceError("this build has no OpenNI2: it reads no sensor"); }
+int Run(const Options&, const CommandContext&) {
+  throw DeviceError("this build has no OpenNI2: it reads no sensor");
+}
 
 #endif
 
@@ -166,19 +186,28 @@ int Run(const Options&, const CommandContext&) { throw DeviceError("this build h
 
 Command AddRecord(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("--out", options->out, "Recording to write: a folder in the TUM RGB-D layout, or a file that ends in .oni")
+  app.add_option(
+         "--out", options->out,
+         "Recording to write: a folder in the TUM RGB-D layout, or a file that ends in .oni")
       ->required()
       ->type_name("DIR|FILE.oni");
-  app.add_option("--seconds", options->seconds, "Length")->check(CLI::Range(0.1, 3600.0))->capture_default_str()->type_name("S");
-  app.add_option("--serial", options->serial, "Of the sensor, where several are attached")->type_name("SERIAL");
-  app.add_option("--calibration", options->calibration, "Folder of the sensors' calibrations, SERIAL.yaml")
+  app.add_option("--seconds", options->seconds, "Length")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str()
+      ->type_name("S");
+  app.add_option("--serial", options->serial, "Of the sensor, where several are attached")
+      ->type_name("SERIAL");
+  app.add_option("--calibration", options->calibration,
+                 "Folder of the sensors' calibrations, SERIAL.yaml")
       ->capture_default_str()
       ->type_name("DIR");
-  app.add_option("--simulated", options->simulated, "Record from a virtual sensor that sweeps the first scene of this suite")
+  app.add_option("--simulated", options->simulated,
+                 "Record from a virtual sensor that sweeps the first scene of this suite")
       ->check(CLI::IsMember({"demo", "nine", "patient"}))
       ->type_name("demo|nine|patient");
   app.add_flag("--jpeg", options->jpeg, "Colour as JPEG: much smaller, but not lossless");
-  app.add_option("--config", options->method.config_file, "Markers of the room, as TOML")->type_name("FILE");
+  app.add_option("--config", options->method.config_file, "Markers of the room, as TOML")
+      ->type_name("FILE");
   return [options](const CommandContext& context) { return Run(*options, context); };
 }
 

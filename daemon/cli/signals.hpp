@@ -6,9 +6,10 @@
 
 namespace plumb {
 
-/// While it lives, SIGINT, SIGTERM and SIGHUP ask for a stop instead of ending the process: a thread of its own waits for them.
-/// Create it first in main(), before any other thread: the signals are blocked in every thread that starts later.
-/// SIGPIPE is ignored; writes then report the error.
+/// While it lives, SIGINT, SIGTERM and SIGHUP ask for a stop instead of ending the process: a
+/// thread of its own waits for them. Create it first in main(), before any other thread: the
+/// signals are blocked in every thread that starts later. SIGPIPE is ignored; writes then report
+/// the error.
 class SignalStop {
  public:
   SignalStop();

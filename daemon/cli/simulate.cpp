@@ -1,4 +1,7 @@
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -6,24 +9,78 @@
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/progress.hpp"
 #include "drivers/simulated/suite.hpp"
+#ifdef PLUMB_WITH_OPENNI
+#include "drivers/virtual/oni_writer.hpp"
+#endif
 
 namespace plumb {
 namespace {
 
+struct Switch {
+  simulated::Fault fault;
+  bool on;
+};
+
 struct Options {
   SimulateOptions simulate;
   std::string format = "tum", noise = "nominal", size = "640x480";
+  std::vector<Switch> switches;
 };
+
+/// @throws CLI::CallForHelp for "list", CLI::ValidationError for anything but NAME=on and NAME=off.
+Switch ParseSwitch(const std::string& text) {
+  if (text == "list") throw CLI::CallForHelp();
+  const std::size_t equals = text.find('=');
+  const std::string state = equals == std::string::npos ? "" : text.substr(equals + 1);
+  if (state != "on" && state != "off")
+    throw CLI::ValidationError(
+        "--fault", fmt::format("expected NAME=on, NAME=off or list, found \"{}\"", text));
+  const std::string name = text.substr(0, equals);
+  const std::optional<simulated::Fault> fault = simulated::ParseFault(name);
+  if (!fault)
+    throw CLI::ValidationError(
+        "--fault", fmt::format("there is no fault \"{}\"; `plumb simulate --fault list` prints all "
+                               "names",
+                               name));
+  return {*fault, state == "on"};
+}
+
+// All names, where each is on, and one line about it.
+std::string FaultList() {
+  using simulated::NoiseLevel;
+  const simulated::FaultSet mild = simulated::MildFaults(NoiseLevel::kNominal);
+  const simulated::FaultSet nominal = simulated::FaultsOf(NoiseLevel::kNominal);
+  const simulated::FaultSet hard = simulated::FaultsOf(NoiseLevel::kHard);
+  std::string list = fmt::format("Faults:\n  {:<20} {:<20} {}\n", "NAME", "on for", "what it does");
+  for (const simulated::FaultEntry& entry : simulated::AllFaults()) {
+    const char* levels = mild.Has(entry.fault)      ? "demo, nominal, hard"
+                         : nominal.Has(entry.fault) ? "nominal, hard"
+                         : hard.Has(entry.fault)    ? "hard"
+                                                    : "nothing";
+    list += fmt::format("  {:<20} {:<20} {}\n", entry.name, levels, entry.about);
+  }
+  return list;
+}
 
 int Run(const Options& options, const CommandContext& context) {
   SimulateOptions simulate = options.simulate;
   simulate.noise = ParseNoiseLevel(options.noise).value_or(simulate.noise);
   simulate.format = options.format == "oni" ? RecordingFormat::kOni : RecordingFormat::kTum;
   if (options.size == "320x240") simulate.width = 320, simulate.height = 240;
+  simulated::FaultSet faults = FaultsOf(simulate);
+  for (const auto& [fault, on] : options.switches) faults.Set(fault, on);
+  simulate.faults = faults;
+#ifdef PLUMB_WITH_OPENNI
+  simulate.write_oni = WriteOni;
+#endif
   Progress progress;
-  SimulateSuite(simulate, context.stop, [&](double fraction, std::string_view what) { progress.Update("simulating", fraction, what); });
+  SimulateSuite(simulate, context.stop, [&](double fraction, std::string_view what) {
+    progress.Update("simulating", fraction, what);
+  });
   progress.Clear();
-  PrintOut(fmt::format("{}: suite '{}', noise {}, seed {}\n", simulate.out.string(), simulate.suite, options.noise, simulate.seed));
+  PrintOut(fmt::format("{}: suite '{}', noise {}, seed {}, unit {}\n", simulate.out.string(),
+                       simulate.suite, options.noise, simulate.seed,
+                       simulate.unit.value_or(simulate.seed)));
   return kDone;
 }
 
@@ -33,13 +90,36 @@ Command AddSimulate(CLI::App& app) {
   auto options = std::make_shared<Options>();
   SimulateOptions& simulate = options->simulate;
   app.add_option("--suite", simulate.suite,
-                 "demo: a reference and a moved body; nine: nine placements, 72 pairs; patient: arm moved, belly and chest deformed")
+                 "demo: a reference and a moved body; nine: nine placements, 72 pairs; small: ten "
+                 "placements within 10 mm and 2 deg, 90 pairs; patient: arm moved, belly and chest "
+                 "deformed")
       ->required()
-      ->check(CLI::IsMember({"demo", "nine", "patient"}))
-      ->type_name("demo|nine|patient");
-  app.add_option("--out", simulate.out, "Suite folder to write: recordings/, truth/, suite.json")->required()->type_name("DIR");
-  app.add_option("--seed", simulate.seed, "Of everything random")->capture_default_str()->type_name("N");
-  app.add_option("--format", options->format, "Of the recordings: folders in the TUM RGB-D layout, or lossless .oni files of OpenNI2")
+      ->check(CLI::IsMember({"demo", "nine", "small", "patient"}))
+      ->type_name("demo|nine|small|patient");
+  app.add_option("--out", simulate.out, "Suite folder to write: recordings/, truth/, suite.json")
+      ->required()
+      ->type_name("DIR");
+  app.add_option("--seed", simulate.seed, "Of room, body, placements and hand")
+      ->capture_default_str()
+      ->type_name("N");
+  app.add_option(
+         "--unit", simulate.unit,
+         "The sensor unit. Default: that of the seed; the demo's default unit has only mild "
+         "faults, as the virtual sensor has")
+      ->type_name("N");
+  app.add_option_function<std::vector<std::string>>(
+         "--fault",
+         [options](const std::vector<std::string>& texts) {
+           for (const std::string& text : texts) options->switches.push_back(ParseSwitch(text));
+         },
+         "Switch one fault of sensor, hand or room; may be repeated; list: print all names")
+      ->type_name("NAME=on|off")
+      ->expected(1)
+      ->take_all();
+  app.footer(FaultList());
+  app.add_option(
+         "--format", options->format,
+         "Of the recordings: folders in the TUM RGB-D layout, or lossless .oni files of OpenNI2")
       ->check(CLI::IsMember({"tum", "oni"}))
       ->capture_default_str()
       ->type_name("tum|oni");
@@ -47,8 +127,14 @@ Command AddSimulate(CLI::App& app) {
       ->check(CLI::IsMember({"ideal", "nominal", "hard"}))
       ->capture_default_str()
       ->type_name("ideal|nominal|hard");
-  app.add_option("--frames", simulate.frames, "Frames a scene")->check(CLI::Range(2, 10000))->capture_default_str()->type_name("N");
-  app.add_option("--rate", simulate.rate_hz, "Frames a second")->check(CLI::Range(1.0, 120.0))->capture_default_str()->type_name("HZ");
+  app.add_option("--frames", simulate.frames, "Frames a scene")
+      ->check(CLI::Range(2, 10000))
+      ->capture_default_str()
+      ->type_name("N");
+  app.add_option("--rate", simulate.rate_hz, "Frames a second")
+      ->check(CLI::Range(1.0, 120.0))
+      ->capture_default_str()
+      ->type_name("HZ");
   app.add_option("--size", options->size, "Of the images")
       ->check(CLI::IsMember({"640x480", "320x240"}))
       ->capture_default_str()

@@ -9,7 +9,7 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb {
 namespace {
@@ -17,7 +17,8 @@ namespace {
 using Json = nlohmann::json;
 using Kind = ControlRequest::Kind;
 
-constexpr std::array<std::string_view, 8> kActions = {"plug", "unplug", "stall", "resume", "error", "next-scene", "glitch", "speed"};
+constexpr std::array<std::string_view, 8> kActions = {"plug",  "unplug",     "stall",  "resume",
+                                                      "error", "next-scene", "glitch", "speed"};
 constexpr std::size_t kMaxArgument = 80;
 
 /// The argument goes on to the virtual sensor in one line with the action.
@@ -28,20 +29,24 @@ bool IsWords(const std::string& text) {
 }
 
 bool IsFlat(const Json& json) {
-  return std::all_of(json.begin(), json.end(), [](const Json& value) { return !value.is_structured(); });
+  return std::all_of(json.begin(), json.end(),
+                     [](const Json& value) { return !value.is_structured(); });
 }
 
 }  // namespace
 
 ControlRequest ParseControlRequest(std::string_view line) {
-  if (line.size() > kMaxControlLine) throw DataError(fmt::format("a request has at most {} bytes, found {}", kMaxControlLine, line.size()));
+  if (line.size() > kMaxControlLine)
+    throw DataError(
+        fmt::format("a request has at most {} bytes, found {}", kMaxControlLine, line.size()));
   const auto refuse_nesting = [](int depth, Json::parse_event_t, Json&) {
     if (depth > 2) throw DataError("a request is a flat JSON object, found a nested one");
     return true;
   };
   const Json json = Json::parse(line, refuse_nesting, /*allow_exceptions=*/false);
   if (!json.is_object() || !IsFlat(json))
-    throw DataError("expected a request such as {\"command\": \"status\"}, found no flat JSON object");
+    throw DataError(
+        "expected a request such as {\"command\": \"status\"}, found no flat JSON object");
   const auto text = [&](const char* key) {
     const auto value = json.find(key);
     return value != json.end() && value->is_string() ? value->get<std::string>() : std::string();
@@ -72,8 +77,10 @@ ControlRequest ParseControlRequest(std::string_view line) {
       throw DataError(fmt::format("sim: expected an action of {}", fmt::join(kActions, ", ")));
     }
     request.argument = text("argument");
-    if ((json.contains("argument") && !json["argument"].is_string()) || !IsWords(request.argument)) {
-      throw DataError(fmt::format("sim: \"argument\" is at most {} letters, digits, spaces, -, _ and dots", kMaxArgument));
+    if ((json.contains("argument") && !json["argument"].is_string()) ||
+        !IsWords(request.argument)) {
+      throw DataError(fmt::format(
+          "sim: \"argument\" is at most {} letters, digits, spaces, -, _ and dots", kMaxArgument));
     }
   } else {
     throw DataError("expected a command of status, press, watch, sim");

@@ -9,17 +9,21 @@ namespace plumb {
 
 inline constexpr std::size_t kMaxControlLine = 4096;  ///< Bytes of a request.
 
-/// {"command": "status" | "press" | "watch" | "sim", "long": bool with press, "action" and, optional, "argument": texts with sim}
+/// {"command": "status" | "press" | "watch" | "sim", "long": bool with press, "action" and,
+/// optional, "argument": texts with sim}
 struct ControlRequest {
   enum class Kind { kStatus, kPress, kWatch, kSim };
   Kind kind = Kind::kStatus;
   bool is_long = false;  ///< kPress
-  std::string action;    ///< kSim: one of plug, unplug, stall, resume, error, next-scene, glitch, speed.
-  std::string argument;  ///< kSim: a serial, what kind of glitch and how often, or how fast; words of letters, digits, -, _ and dots.
+  std::string
+      action;  ///< kSim: one of plug, unplug, stall, resume, error, next-scene, glitch, speed.
+  std::string argument;  ///< kSim: a serial, what kind of glitch and how often, or how fast; words
+                         ///< of letters, digits, -, _ and dots.
   bool operator==(const ControlRequest&) const = default;
 };
 
-/// @throws DataError saying what was expected: no JSON object, unknown command, key or action, a line too long.
+/// @throws DataError saying what was expected: no JSON object, unknown command, key or action, a
+/// line too long.
 [[nodiscard]] ControlRequest ParseControlRequest(std::string_view line);
 
 /// The line, without its end.

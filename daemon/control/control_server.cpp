@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb {
 
@@ -26,9 +26,11 @@ struct ControlServer::Client {
   }
 };
 
-ControlServer::ControlServer(EventLoop& loop, int listening, Handler handler, const ControlServerOptions& options)
+ControlServer::ControlServer(EventLoop& loop, int listening, Handler handler,
+                             const ControlServerOptions& options)
     : loop_(loop), listening_(listening), handler_(std::move(handler)), options_(options) {
-  source_ = loop_.WatchDescriptor("control", listening_, EPOLLIN, [this](std::uint32_t) { Accept(); });
+  source_ =
+      loop_.WatchDescriptor("control", listening_, EPOLLIN, [this](std::uint32_t) { Accept(); });
 }
 
 ControlServer::~ControlServer() {
@@ -53,7 +55,7 @@ void ControlServer::Accept() {
     if ((events & EPOLLIN) != 0) {
       Read(id);
     } else if ((events & (EPOLLHUP | EPOLLERR)) != 0) {
-      Drop(id);  // gone altogether: nobody is left to answer
+      Drop(id);  // disconnected: there is no one left to answer
     }
   });
   clients_.emplace(id, std::move(client));
@@ -69,7 +71,8 @@ void ControlServer::Read(std::uint64_t id) {
   if (count < 0) return Drop(id);
   if (count == 0) {
     client.at_end = true;
-    // Who shut down only its writing side still gets its answer; a watcher has nothing to wait for but its own end.
+    // Who shut down only its writing side still gets its answer; a watcher has nothing to wait for
+    // but its own end.
     if (client.out.empty() && client.unanswered == 0) return Drop(id);
     client.source.SetEvents(EPOLLOUT);
     return;
@@ -95,7 +98,8 @@ void ControlServer::HandleLine(std::uint64_t id, const std::string& line) {
     ++client.unanswered;
     handler_(request, [this, id, alive = alive_](const std::string& reply) {
       if (!*alive) return;
-      if (const auto found = clients_.find(id); found != clients_.end()) --found->second->unanswered;
+      if (const auto found = clients_.find(id); found != clients_.end())
+        --found->second->unanswered;
       Send(id, reply);
     });
   } catch (const DataError& error) {
@@ -118,7 +122,8 @@ void ControlServer::Flush(std::uint64_t id) {
   if (found == clients_.end()) return;
   Client& client = *found->second;
   while (!client.out.empty()) {
-    const ssize_t count = ::send(client.fd, client.out.data(), client.out.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    const ssize_t count =
+        ::send(client.fd, client.out.data(), client.out.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0 && errno != EAGAIN) return Drop(id);
     if (count < 0) break;

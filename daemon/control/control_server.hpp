@@ -9,16 +9,18 @@
 #include <string>
 
 #include "daemon/control/control_protocol.hpp"
-#include "daemon/event_loop.hpp"
+#include "daemon/loop/event_loop.hpp"
 
 namespace plumb {
 
 struct ControlServerOptions {
-  std::size_t max_clients = 32;         ///< More are turned away at once.
-  std::size_t max_waiting = 256 << 10;  ///< Bytes that a client has not read yet; then it is dropped.
+  std::size_t max_clients = 32;  ///< More are turned away at once.
+  std::size_t max_waiting =
+      256 << 10;  ///< Bytes that a client has not read yet; then it is dropped.
 };
 
-/// Belongs to the loop's thread. A client that never reads, floods or sends nonsense costs at most its own connection.
+/// Belongs to the loop's thread. A client that never reads, floods or sends nonsense costs at most
+/// its own connection.
 class ControlServer {
  public:
   using Reply = std::function<void(const std::string& line)>;
@@ -26,7 +28,8 @@ class ControlServer {
   using Handler = std::function<void(const ControlRequest& request, const Reply& reply)>;
 
   /// @param listening  A listening socket; taken over.
-  ControlServer(EventLoop& loop, int listening, Handler handler, const ControlServerOptions& options = {});
+  ControlServer(EventLoop& loop, int listening, Handler handler,
+                const ControlServerOptions& options = {});
   ~ControlServer();
   ControlServer(const ControlServer&) = delete;
   ControlServer& operator=(const ControlServer&) = delete;
@@ -51,7 +54,8 @@ class ControlServer {
   ControlServerOptions options_;
   std::map<std::uint64_t, std::unique_ptr<Client>> clients_;
   std::uint64_t next_id_ = 1;
-  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);  ///< For replies that come after this object is gone.
+  std::shared_ptr<bool> alive_ =
+      std::make_shared<bool>(true);  ///< For replies that come after this object is gone.
   EventLoop::Source source_;
 };
 

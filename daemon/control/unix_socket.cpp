@@ -10,16 +10,18 @@
 
 #include <fmt/format.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb {
 
-int WithUnixAddress(const std::filesystem::path& path, const std::function<int(const sockaddr*, socklen_t)>& use) {
+int WithUnixAddress(const std::filesystem::path& path,
+                    const std::function<int(const sockaddr*, socklen_t)>& use) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   std::string text = path.string();
   int folder = -1;
-  if (text.size() >= sizeof(address.sun_path)) {  // 107 characters are soon used up: go through the open folder
+  if (text.size() >=
+      sizeof(address.sun_path)) {  // 107 characters are soon used up: go through the open folder
     const std::filesystem::path parent = path.has_parent_path() ? path.parent_path() : ".";
     folder = ::open(parent.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC);
     if (folder < 0) return -1;
@@ -41,34 +43,42 @@ int WithUnixAddress(const std::filesystem::path& path, const std::function<int(c
 int ConnectUnix(const std::filesystem::path& path) {
   const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (fd < 0) throw DeviceError(fmt::format("cannot make a socket: {}", std::strerror(errno)));
-  if (WithUnixAddress(path, [&](const sockaddr* address, socklen_t size) { return ::connect(fd, address, size); }) == 0) return fd;
+  if (WithUnixAddress(path, [&](const sockaddr* address, socklen_t size) {
+        return ::connect(fd, address, size);
+      }) == 0)
+    return fd;
   const int error = errno;
   ::close(fd);
-  const char* remedy = error == EACCES ? "join the group plumb" : "is plumbd running, and is this its control socket?";
-  throw DeviceError(fmt::format("cannot reach plumbd at {}: {}; {}", path.string(), std::strerror(error), remedy));
+  const char* remedy = error == EACCES ? "join the group plumb"
+                                       : "is plumbd running, and is this its control socket?";
+  throw DeviceError(fmt::format("cannot reach plumbd at {}: {}; {}", path.string(),
+                                std::strerror(error), remedy));
 }
 
 namespace {
 
-/// Removes a socket that nobody listens on any more.
+/// Removes a socket on which no process listens any more.
 void RemoveDeadSocket(const std::filesystem::path& path) {
   struct stat status {};
   if (::lstat(path.c_str(), &status) != 0) return;
   if (!S_ISSOCK(status.st_mode))
-    throw IoError(fmt::format("cannot listen at {}: there is a file of that name; choose another path", path.string()));
+    throw IoError(fmt::format(
+        "cannot listen at {}: there is a file of that name; choose another path", path.string()));
   try {
     ::close(ConnectUnix(path));
   } catch (const DeviceError&) {
     ::unlink(path.c_str());
     return;
   }
-  throw IoError(fmt::format("cannot listen at {}: another plumbd does; stop it or choose another path", path.string()));
+  throw IoError(fmt::format(
+      "cannot listen at {}: another plumbd does; stop it or choose another path", path.string()));
 }
 
 void OpenToGroup(const std::filesystem::path& path) {
   ::chmod(path.c_str(), 0600);
   const group* plumb = ::getgrnam("plumb");
-  if (plumb != nullptr && ::lchown(path.c_str(), static_cast<uid_t>(-1), plumb->gr_gid) == 0) ::chmod(path.c_str(), 0660);
+  if (plumb != nullptr && ::lchown(path.c_str(), static_cast<uid_t>(-1), plumb->gr_gid) == 0)
+    ::chmod(path.c_str(), 0660);
 }
 
 }  // namespace
@@ -77,13 +87,15 @@ int ListenUnix(const std::filesystem::path& path) {
   RemoveDeadSocket(path);
   const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (fd < 0) throw IoError(fmt::format("cannot make a socket: {}", std::strerror(errno)));
-  const mode_t before = ::umask(0177);  // nobody else may connect before the mode is set
-  const int bound = WithUnixAddress(path, [&](const sockaddr* address, socklen_t size) { return ::bind(fd, address, size); });
+  const mode_t before = ::umask(0177);  // no other user may connect before the mode is set
+  const int bound = WithUnixAddress(
+      path, [&](const sockaddr* address, socklen_t size) { return ::bind(fd, address, size); });
   const int error = errno;
   ::umask(before);
   if (bound != 0 || ::listen(fd, 16) != 0) {
     ::close(fd);
-    throw IoError(fmt::format("cannot listen at {}: {}; the folder must exist and be writable", path.string(), std::strerror(error)));
+    throw IoError(fmt::format("cannot listen at {}: {}; the folder must exist and be writable",
+                              path.string(), std::strerror(error)));
   }
   OpenToGroup(path);
   return fd;

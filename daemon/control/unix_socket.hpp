@@ -9,15 +9,18 @@
 
 namespace plumb {
 
-/// Calls `use` with an address of the path; it holds during the call only. Returns what `use` returns: 0, or -1 with errno.
-/// The folder of the path must exist, else -1.
-int WithUnixAddress(const std::filesystem::path& path, const std::function<int(const sockaddr*, socklen_t)>& use);
+/// Calls `use` with an address of the path; it holds during the call only. Returns what `use`
+/// returns: 0, or -1 with errno. The folder of the path must exist, else -1.
+int WithUnixAddress(const std::filesystem::path& path,
+                    const std::function<int(const sockaddr*, socklen_t)>& use);
 
-/// A connection to the socket. @throws DeviceError saying that nobody listens there, or may.
+/// A connection to the socket. @throws DeviceError saying that no process listens there, or that
+/// access is denied.
 [[nodiscard]] int ConnectUnix(const std::filesystem::path& path);
 
-/// A listening socket at the path; one that a dead process left there is replaced. Mode 0660 and group plumb where there is such a group
-/// and this process may give it away, else 0600. @throws IoError, also if somebody listens there already.
+/// A listening socket at the path; one that a dead process left there is replaced. Mode 0660 and
+/// group plumb where there is such a group and this process may give it away, else 0600. @throws
+/// IoError, also if somebody listens there already.
 [[nodiscard]] int ListenUnix(const std::filesystem::path& path);
 
 }  // namespace plumb

@@ -6,8 +6,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "algo/base/units.hpp"
 #include "algo/geometry/rigid_fit.hpp"
-#include "algo/types/units.hpp"
 
 namespace plumb {
 namespace {
@@ -25,7 +25,8 @@ double InMillimetres(double metres) { return metres / kMillimetre; }
 HeightError SummariseHeights(std::vector<double> differences_m, std::size_t num_true) {
   HeightError error;
   error.count = differences_m.size();
-  if (num_true > 0) error.completeness = static_cast<double>(error.count) / static_cast<double>(num_true);
+  if (num_true > 0)
+    error.completeness = static_cast<double>(error.count) / static_cast<double>(num_true);
   if (differences_m.empty()) return error;
   std::sort(differences_m.begin(), differences_m.end());
   error.bias_mm = InMillimetres(Quantile(differences_m, 0.5));
@@ -46,7 +47,8 @@ ErrorSummary Summarise(std::vector<double> values) {
   const auto n = static_cast<double>(values.size());
   summary.count = values.size();
   summary.mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
-  summary.rms = std::sqrt(std::inner_product(values.begin(), values.end(), values.begin(), 0.0) / n);
+  summary.rms =
+      std::sqrt(std::inner_product(values.begin(), values.end(), values.begin(), 0.0) / n);
   summary.median = Quantile(values, 0.5);
   summary.p95 = Quantile(values, 0.95);
   summary.max = values.back();
@@ -55,17 +57,22 @@ ErrorSummary Summarise(std::vector<double> values) {
 
 Pose TrueMotion(const SceneTruth& reference, const SceneTruth& current) {
   const Pose& T_world_marker = reference.T_world_reference_marker;
-  return T_world_marker.inverse() * current.T_world_body * reference.T_world_body.inverse() * T_world_marker;
+  return T_world_marker.inverse() * current.T_world_body * reference.T_world_body.inverse() *
+         T_world_marker;
 }
 
-MotionError ErrorOfMotion(const Pose& estimated_motion, const SceneTruth& reference, const SceneTruth& current) {
+MotionError ErrorOfMotion(const Pose& estimated_motion, const SceneTruth& reference,
+                          const SceneTruth& current) {
   const Pose true_motion = TrueMotion(reference, current);
-  const Eigen::Vector3d centroid = reference.T_world_reference_marker.inverse() * reference.centroid_world();
+  const Eigen::Vector3d centroid =
+      reference.T_world_reference_marker.inverse() * reference.centroid_world();
   return {.rotation_deg = RotationAngle(estimated_motion.inverse() * true_motion) / kDegree,
-          .translation_mm = InMillimetres((estimated_motion * centroid - true_motion * centroid).norm())};
+          .translation_mm =
+              InMillimetres((estimated_motion * centroid - true_motion * centroid).norm())};
 }
 
-std::optional<TrajectoryError> ErrorOfTrajectory(std::span<const StampedPose> trajectory, const SceneTruth& truth) {
+std::optional<TrajectoryError> ErrorOfTrajectory(std::span<const StampedPose> trajectory,
+                                                 const SceneTruth& truth) {
   std::vector<Eigen::Vector3d> estimated, in_truth;
   std::vector<Pose> T_scene_camera, T_world_camera;
   for (const StampedPose& pose : trajectory) {
@@ -84,7 +91,8 @@ std::optional<TrajectoryError> ErrorOfTrajectory(std::span<const StampedPose> tr
   std::vector<double> distances_m, angles_deg;
   for (std::size_t i = 0; i < estimated.size(); ++i) {
     distances_m.push_back((fit.T_a_b * estimated[i] - in_truth[i]).norm());
-    angles_deg.push_back(RotationAngle(T_world_camera[i].inverse() * fit.T_a_b * T_scene_camera[i]) / kDegree);
+    angles_deg.push_back(
+        RotationAngle(T_world_camera[i].inverse() * fit.T_a_b * T_scene_camera[i]) / kDegree);
   }
   const ErrorSummary summary = Summarise(distances_m);
   error.rmse_mm = InMillimetres(summary.rms);
@@ -97,31 +105,39 @@ std::optional<TrajectoryError> ErrorOfTrajectory(std::span<const StampedPose> tr
   return error;
 }
 
-AlignmentError ErrorOfAlignment(const Pose& T_reference_current, const SceneTruth& reference, const SceneTruth& current,
-                                const Pose& T_world_reference_scene, const Pose& T_world_current_scene) {
+AlignmentError ErrorOfAlignment(const Pose& T_reference_current, const SceneTruth& reference,
+                                const SceneTruth& current, const Pose& T_world_reference_scene,
+                                const Pose& T_world_current_scene) {
   const auto figures = [&](const Pose& T_world_a, const Pose& T_world_b) {
-    // A true point of the current scene, in the current scene's frame, through the alignment, back into the world.
+    // A true point of the current scene, in the current scene's frame, through the alignment, back
+    // into the world.
     const Pose T_error = T_world_a * T_reference_current * T_world_b.inverse();
     std::vector<double> distances_m;
     for (const auto& [id, corners] : current.markers) {
       if (!reference.markers.contains(id)) continue;
-      for (const Eigen::Vector3d& corner : corners) distances_m.push_back((T_error * corner - corner).norm());
+      for (const Eigen::Vector3d& corner : corners)
+        distances_m.push_back((T_error * corner - corner).norm());
     }
     const Eigen::Vector3d centroid = current.centroid_world();
-    return AlignmentError::Figures{.corners_mm = InMillimetres(Summarise(distances_m).rms),
-                                   .body_mm = InMillimetres((T_error * centroid - centroid).norm())};
+    return AlignmentError::Figures{
+        .corners_mm = InMillimetres(Summarise(distances_m).rms),
+        .body_mm = InMillimetres((T_error * centroid - centroid).norm())};
   };
-  return {.in_true_frames = figures(reference.T_world_reference_marker, current.T_world_reference_marker),
+  return {.in_true_frames =
+              figures(reference.T_world_reference_marker, current.T_world_reference_marker),
           .in_own_frames = figures(T_world_reference_scene, T_world_current_scene)};
 }
 
-HeightMap TrueHeights(const SceneTruth& truth, const GridShape& grid, const Pose& T_world_frame, double min_frames_seen) {
+HeightMap TrueHeights(const SceneTruth& truth, const GridShape& grid, const Pose& T_world_frame,
+                      double min_frames_seen) {
   const Pose T_frame_world = T_world_frame.inverse();
   std::vector<Eigen::Vector3d> vertices;
   vertices.reserve(truth.body.vertices_world.size());
-  for (const Eigen::Vector3d& p_world : truth.body.vertices_world) vertices.push_back(T_frame_world * p_world);
+  for (const Eigen::Vector3d& p_world : truth.body.vertices_world)
+    vertices.push_back(T_frame_world * p_world);
 
-  // The highest triangle wins a cell, seen or not: a hidden part above must not uncover the part below it.
+  // The highest triangle wins a cell, seen or not: a hidden part above must not uncover the part
+  // below it.
   HeightMap heights(grid);
   std::vector<char> hidden(grid.num_cells(), 0);
   for (const auto& [i, j, k] : truth.body.triangles) {
@@ -138,14 +154,18 @@ HeightMap TrueHeights(const SceneTruth& truth, const GridShape& grid, const Pose
     };
     const int row_end = last(std::max({a.y(), b.y(), c.y()}), grid.y_min, grid.step, grid.height);
     const int column_end = last(std::max({a.x(), b.x(), c.x()}), grid.x_min, grid.step, grid.width);
-    for (int row = first(std::min({a.y(), b.y(), c.y()}), grid.y_min, grid.step); row <= row_end; ++row) {
-      for (int column = first(std::min({a.x(), b.x(), c.x()}), grid.x_min, grid.step); column <= column_end; ++column) {
+    for (int row = first(std::min({a.y(), b.y(), c.y()}), grid.y_min, grid.step); row <= row_end;
+         ++row) {
+      for (int column = first(std::min({a.x(), b.x(), c.x()}), grid.x_min, grid.step);
+           column <= column_end; ++column) {
         const double x = grid.x_centre(column), y = grid.y_centre(row);
         const double v = ((x - a.x()) * (c.y() - a.y()) - (c.x() - a.x()) * (y - a.y())) / area;
         const double w = ((b.x() - a.x()) * (y - a.y()) - (x - a.x()) * (b.y() - a.y())) / area;
         if (v < 0 || w < 0 || v + w > 1) continue;
         const auto z = static_cast<float>(a.z() + v * (b.z() - a.z()) + w * (c.z() - a.z()));
-        const std::size_t cell = static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(column);
+        const std::size_t cell =
+            static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) +
+            static_cast<std::size_t>(column);
         if (heights.z[cell] >= z) continue;
         heights.z[cell] = z;
         hidden[cell] = is_hidden ? 1 : 0;
@@ -164,7 +184,8 @@ HeightError ErrorOfHeights(const HeightMap& estimate, const HeightMap& truth) {
   for (std::size_t cell = 0; cell < truth.z.size(); ++cell) {
     if (!std::isfinite(truth.z[cell])) continue;
     ++num_true;
-    if (std::isfinite(estimate.z[cell])) differences_m.push_back(static_cast<double>(estimate.z[cell]) - truth.z[cell]);
+    if (std::isfinite(estimate.z[cell]))
+      differences_m.push_back(static_cast<double>(estimate.z[cell]) - truth.z[cell]);
   }
   return SummariseHeights(std::move(differences_m), num_true);
 }
@@ -181,9 +202,12 @@ std::optional<ShapeError> ErrorOfShape(const HeightMap& estimate, const HeightMa
   const auto width = static_cast<std::size_t>(grid.width);
   for (int row = 1; row + 1 < grid.height; row += kStride) {
     for (int column = 1; column + 1 < grid.width; column += kStride) {
-      const std::size_t cell = static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
-      const double hx = (static_cast<double>(truth.z[cell + 1]) - truth.z[cell - 1]) / (2 * grid.step);
-      const double hy = (static_cast<double>(truth.z[cell + width]) - truth.z[cell - width]) / (2 * grid.step);
+      const std::size_t cell =
+          static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
+      const double hx =
+          (static_cast<double>(truth.z[cell + 1]) - truth.z[cell - 1]) / (2 * grid.step);
+      const double hy =
+          (static_cast<double>(truth.z[cell + width]) - truth.z[cell - width]) / (2 * grid.step);
       const double difference = static_cast<double>(estimate.z[cell]) - truth.z[cell];
       // A vertical difference says little on a flank steeper than about 63 degrees.
       if (!std::isfinite(difference) || !std::isfinite(hx + hy) || std::hypot(hx, hy) > 2) continue;
@@ -220,7 +244,8 @@ std::optional<ShapeError> ErrorOfShape(const HeightMap& estimate, const HeightMa
   error.rotation_deg = solution.segment<3>(3) / kDegree;
   error.scale_permille = solution(6) * 1000.0;
   std::vector<double> left;
-  for (std::size_t i = 0; i < rows.size(); ++i) left.push_back(differences[i] - rows[i].dot(solution));
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    left.push_back(differences[i] - rows[i].dot(solution));
   error.left = SummariseHeights(std::move(left), rows.size());
   return error;
 }

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "algo/base/pose.hpp"
 #include "algo/types/height_map.hpp"
-#include "algo/types/pose.hpp"
 #include "algo/types/scene.hpp"
 #include "daemon/evaluation/truth.hpp"
 
@@ -28,16 +28,20 @@ struct MotionError {
   double translation_mm = 0;
 };
 
-/// The body's true motion from scene `reference` to scene `current`, in the true frame of the reference scene's marker:
-/// T_marker_world (M_current M_reference^-1) T_world_marker, M = T_world_body.
+/// The body's true motion from scene `reference` to scene `current`, in the true frame of the
+/// reference scene's marker: T_marker_world (M_current M_reference^-1) T_world_marker, M =
+/// T_world_body.
 [[nodiscard]] Pose TrueMotion(const SceneTruth& reference, const SceneTruth& current);
 
-/// Error of an estimated motion (reference-marker frame), its displacement taken at the reference body's centroid.
-[[nodiscard]] MotionError ErrorOfMotion(const Pose& estimated_motion, const SceneTruth& reference, const SceneTruth& current);
+/// Error of an estimated motion (reference-marker frame), its displacement taken at the reference
+/// body's centroid.
+[[nodiscard]] MotionError ErrorOfMotion(const Pose& estimated_motion, const SceneTruth& reference,
+                                        const SceneTruth& current);
 
-/// Error of an alignment T_reference_current: at the corners of all true markers (RMS) and at the current body's centroid.
-/// `in_true_frames` takes both scene frames for the true reference-marker frames, so it holds the errors of both frames;
-/// `in_own_frames` places each scene frame where its own keyframes fit the true trajectory.
+/// Error of an alignment T_reference_current: at the corners of all true markers (RMS) and at the
+/// current body's centroid. `in_true_frames` takes both scene frames for the true reference-marker
+/// frames, so it holds the errors of both frames; `in_own_frames` places each scene frame where its
+/// own keyframes fit the true trajectory.
 struct AlignmentError {
   struct Figures {
     double corners_mm = 0;
@@ -53,19 +57,24 @@ struct TrajectoryError {
   double median_mm = 0;
   double max_mm = 0;
   double rotation_rmse_deg = 0;
-  double drift_mm = 0;                    ///< Position error of the last pose relative to the first.
+  double drift_mm = 0;  ///< Position error of the last pose relative to the first.
   Pose T_world_scene = Pose::Identity();  ///< Where the fit places the scene's frame.
 };
 
 /// Nothing if fewer than three poses have a truth or they lie on one line.
-[[nodiscard]] std::optional<TrajectoryError> ErrorOfTrajectory(std::span<const StampedPose> trajectory, const SceneTruth& truth);
+[[nodiscard]] std::optional<TrajectoryError> ErrorOfTrajectory(
+    std::span<const StampedPose> trajectory, const SceneTruth& truth);
 
-[[nodiscard]] AlignmentError ErrorOfAlignment(const Pose& T_reference_current, const SceneTruth& reference, const SceneTruth& current,
-                                              const Pose& T_world_reference_scene, const Pose& T_world_current_scene);
+[[nodiscard]] AlignmentError ErrorOfAlignment(const Pose& T_reference_current,
+                                              const SceneTruth& reference,
+                                              const SceneTruth& current,
+                                              const Pose& T_world_reference_scene,
+                                              const Pose& T_world_current_scene);
 
-/// The true top surface on a grid whose axes are those of `T_world_frame`: heights, NaN off the body or where fewer than
-/// `min_frames_seen` frames measured the surface.
-[[nodiscard]] HeightMap TrueHeights(const SceneTruth& truth, const GridShape& grid, const Pose& T_world_frame, double min_frames_seen);
+/// The true top surface on a grid whose axes are those of `T_world_frame`: heights, NaN off the
+/// body or where fewer than `min_frames_seen` frames measured the surface.
+[[nodiscard]] HeightMap TrueHeights(const SceneTruth& truth, const GridShape& grid,
+                                    const Pose& T_world_frame, double min_frames_seen);
 
 /// Height errors over the visible body, metres converted to mm.
 struct HeightError {
@@ -79,15 +88,18 @@ struct HeightError {
 
 [[nodiscard]] HeightError ErrorOfHeights(const HeightMap& estimate, const HeightMap& truth);
 
-/// Which small similarity transform of the true surface explains a height map best, and what it leaves: tells a
-/// misplaced frame from a wrong shape or scale. Robust linear least squares on the differences.
+/// Which small similarity transform of the true surface explains a height map best, and what it
+/// leaves: tells a misplaced frame from a wrong shape or scale. Robust linear least squares on the
+/// differences.
 struct ShapeError {
-  Eigen::Vector3d shift_mm = Eigen::Vector3d::Zero();      ///< Of the body's centroid, reference-marker frame.
+  Eigen::Vector3d shift_mm =
+      Eigen::Vector3d::Zero();  ///< Of the body's centroid, reference-marker frame.
   Eigen::Vector3d rotation_deg = Eigen::Vector3d::Zero();  ///< Rotation vector.
   double scale_permille = 0;                               ///< Growth about the frame's origin.
   HeightError left;                                        ///< After the fit.
 };
 
-[[nodiscard]] std::optional<ShapeError> ErrorOfShape(const HeightMap& estimate, const HeightMap& truth);
+[[nodiscard]] std::optional<ShapeError> ErrorOfShape(const HeightMap& estimate,
+                                                     const HeightMap& truth);
 
 }  // namespace plumb

@@ -8,9 +8,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/errors.hpp"
+#include "algo/base/units.hpp"
 #include "algo/geometry/rigid_fit.hpp"
-#include "algo/types/errors.hpp"
-#include "algo/types/units.hpp"
 
 namespace plumb {
 namespace {
@@ -24,7 +24,8 @@ constexpr std::size_t kMaxScenes = 1000;
 std::string CheckedName(const json& value, const fs::path& file) {
   const std::string name = value.is_string() ? value.get<std::string>() : "";
   if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos) {
-    throw DataError(fmt::format("suite file '{}': expected the name of a scene, found {}", file.string(), value.dump()));
+    throw DataError(fmt::format("suite file '{}': expected the name of a scene, found {}",
+                                file.string(), value.dump()));
   }
   return name;
 }
@@ -35,10 +36,12 @@ void ReadSuiteFile(const fs::path& file, Suite& suite) {
     const json content = json::parse(in);
     suite.name = content.value("name", suite.name);
     for (const auto& scene : content.at("scenes")) suite.scenes.push_back(CheckedName(scene, file));
-    for (const auto& pair : content.at("pairs")) suite.pairs.emplace_back(CheckedName(pair.at(0), file), CheckedName(pair.at(1), file));
+    for (const auto& pair : content.at("pairs"))
+      suite.pairs.emplace_back(CheckedName(pair.at(0), file), CheckedName(pair.at(1), file));
   } catch (const json::exception& error) {
-    throw DataError(
-        fmt::format("suite file '{}': expected {{\"name\", \"scenes\": [..], \"pairs\": [[a, b], ..]}}; {}", file.string(), error.what()));
+    throw DataError(fmt::format(
+        "suite file '{}': expected {{\"name\", \"scenes\": [..], \"pairs\": [[a, b], ..]}}; {}",
+        file.string(), error.what()));
   }
 }
 
@@ -47,7 +50,8 @@ void FindScenes(const fs::path& folder, Suite& suite) {
     if (entry.is_directory()) suite.scenes.push_back(entry.path().filename().string());
   }
   std::sort(suite.scenes.begin(), suite.scenes.end());
-  std::stable_partition(suite.scenes.begin(), suite.scenes.end(), [](const std::string& name) { return name == "reference"; });
+  std::stable_partition(suite.scenes.begin(), suite.scenes.end(),
+                        [](const std::string& name) { return name == "reference"; });
   for (const std::string& reference : suite.scenes) {
     for (const std::string& current : suite.scenes) {
       if (reference != current) suite.pairs.emplace_back(reference, current);
@@ -55,7 +59,8 @@ void FindScenes(const fs::path& folder, Suite& suite) {
   }
 }
 
-/// Marker corners against the truth: their own rigid fit, and the scale that would be left to a similarity fit.
+/// Marker corners against the truth: their own rigid fit, and the scale that would be left to a
+/// similarity fit.
 void MeasureMarkers(const Scene& scene, const SceneTruth& truth, SceneEvaluation& result) {
   std::vector<Eigen::Vector3d> estimated, in_truth;
   for (const auto& [id, marker] : scene.markers) {
@@ -67,7 +72,8 @@ void MeasureMarkers(const Scene& scene, const SceneTruth& truth, SceneEvaluation
   if (estimated.size() < 4) return;
   const RigidFit fit = FitRigid(in_truth, estimated);
   Eigen::Vector3d centre_a = Eigen::Vector3d::Zero(), centre_b = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < estimated.size(); ++i) centre_a += in_truth[i], centre_b += estimated[i];
+  for (std::size_t i = 0; i < estimated.size(); ++i)
+    centre_a += in_truth[i], centre_b += estimated[i];
   centre_a /= static_cast<double>(estimated.size());
   centre_b /= static_cast<double>(estimated.size());
   double cross = 0, square = 0;
@@ -80,7 +86,8 @@ void MeasureMarkers(const Scene& scene, const SceneTruth& truth, SceneEvaluation
   result.marker_scale_permille = 1000 * (cross / square - 1);
 }
 
-SceneEvaluation MeasureScene(const std::string& name, const Scene& scene, const SceneTruth& truth, double min_frames_seen) {
+SceneEvaluation MeasureScene(const std::string& name, const Scene& scene, const SceneTruth& truth,
+                             double min_frames_seen) {
   SceneEvaluation result;
   result.name = name;
   result.frames_total = scene.frames_total;
@@ -93,7 +100,8 @@ SceneEvaluation MeasureScene(const std::string& name, const Scene& scene, const 
   result.timings_s = scene.timings_s;
   MeasureMarkers(scene, truth, result);
   if (scene.height_map) {
-    const HeightMap true_heights = TrueHeights(truth, scene.height_map->grid, truth.T_world_reference_marker, min_frames_seen);
+    const HeightMap true_heights =
+        TrueHeights(truth, scene.height_map->grid, truth.T_world_reference_marker, min_frames_seen);
     result.heights = ErrorOfHeights(*scene.height_map, true_heights);
     result.shape = ErrorOfShape(*scene.height_map, true_heights);
   }
@@ -108,37 +116,54 @@ struct KeptScene {
   bool has_world = false;
 };
 
-PairEvaluation MeasurePair(const std::string& reference_name, const std::string& current_name, const KeptScene& reference,
-                           const KeptScene& current, const Comparison& comparison, double min_frames_seen) {
+PairEvaluation MeasurePair(const std::string& reference_name, const std::string& current_name,
+                           const KeptScene& reference, const KeptScene& current,
+                           const Comparison& comparison, const EvaluateOptions& options) {
   PairEvaluation result;
   result.reference = reference_name;
   result.current = current_name;
   result.verdict = comparison.verdict;
   result.reasons = comparison.reasons;
   result.timings_s = comparison.timings_s;
-  if (comparison.motion) result.motion = ErrorOfMotion(comparison.motion->T, reference.truth, current.truth);
+  const Eigen::Vector3d true_centroid =
+      reference.truth.T_world_reference_marker.inverse() * reference.truth.centroid_world();
+  result.truth =
+      TrueNumbersOf(TrueMotion(reference.truth, current.truth),
+                    comparison.correction ? comparison.correction->isocentre_m : true_centroid,
+                    options.compare.T_iec_reference);
+  if (comparison.correction) {
+    result.numbers = ErrorsOfNumbers(*comparison.correction, result.truth);
+  }
+  if (comparison.motion)
+    result.motion = ErrorOfMotion(comparison.motion->T, reference.truth, current.truth);
   if (comparison.alignment && reference.has_world && current.has_world) {
-    result.alignment = ErrorOfAlignment(comparison.alignment->T_reference_current, reference.truth, current.truth, reference.T_world_scene,
-                                        current.T_world_scene);
+    result.alignment =
+        ErrorOfAlignment(comparison.alignment->T_reference_current, reference.truth, current.truth,
+                         reference.T_world_scene, current.T_world_scene);
   }
   if (comparison.deviation) {
     const GridShape& grid = comparison.deviation->grid;
     const Pose& T_world_marker = reference.truth.T_world_reference_marker;
-    HeightMap true_deviation = TrueHeights(current.truth, grid, T_world_marker, min_frames_seen);
-    const HeightMap before = TrueHeights(reference.truth, grid, T_world_marker, min_frames_seen);
-    for (std::size_t cell = 0; cell < before.z.size(); ++cell) true_deviation.z[cell] -= before.z[cell];
+    const double min_seen = options.min_frames_seen;
+    HeightMap true_deviation = TrueHeights(current.truth, grid, T_world_marker, min_seen);
+    const HeightMap before = TrueHeights(reference.truth, grid, T_world_marker, min_seen);
+    for (std::size_t cell = 0; cell < before.z.size(); ++cell)
+      true_deviation.z[cell] -= before.z[cell];
     result.deviation = ErrorOfHeights(*comparison.deviation, true_deviation);
   }
   return result;
 }
 
-MotionStatistics StatisticsOf(const std::vector<PairEvaluation>& pairs, const std::function<bool(const PairEvaluation&)>& counts) {
+MotionStatistics StatisticsOf(const Evaluation& evaluation,
+                              const std::function<bool(const PairEvaluation&)>& counts) {
   MotionStatistics statistics;
   std::vector<double> rotations, translations;
-  for (const PairEvaluation& pair : pairs) {
+  for (const PairEvaluation& pair : evaluation.pairs) {
     if (!counts(pair)) continue;
     ++statistics.num_pairs;
     if (pair.verdict == Verdict::kNoAnswer) ++statistics.num_no_answer;
+    statistics.verdicts.Add(pair.verdict, pair.truth, evaluation.limits);
+    if (pair.verdict != Verdict::kNoAnswer && pair.numbers) statistics.intervals.Add(*pair.numbers);
     if (!pair.motion) {
       ++statistics.num_without_motion;
       continue;
@@ -156,7 +181,9 @@ MotionStatistics StatisticsOf(const std::vector<PairEvaluation>& pairs, const st
 Suite OpenSuite(const fs::path& folder) {
   if (!fs::is_directory(folder / "truth")) {
     throw DataError(
-        fmt::format("'{}' is no suite: expected folders 'truth' and 'recordings' in it, as `plumb simulate` writes", folder.string()));
+        fmt::format("'{}' is no suite: expected folders 'truth' and 'recordings' in it, as `plumb "
+                    "simulate` writes",
+                    folder.string()));
   }
   Suite suite;
   suite.name = (folder.filename().empty() ? folder.parent_path() : folder).filename().string();
@@ -166,51 +193,61 @@ Suite OpenSuite(const fs::path& folder) {
     FindScenes(folder, suite);
   }
   if (suite.scenes.empty() || suite.scenes.size() > kMaxScenes) {
-    throw DataError(fmt::format("suite '{}': expected 1 to {} scenes, found {}", folder.string(), kMaxScenes, suite.scenes.size()));
+    throw DataError(fmt::format("suite '{}': expected 1 to {} scenes, found {}", folder.string(),
+                                kMaxScenes, suite.scenes.size()));
   }
   const std::set<std::string> known(suite.scenes.begin(), suite.scenes.end());
   for (const auto& [reference, current] : suite.pairs) {
     for (const std::string& name : {reference, current}) {
       if (!known.contains(name))
-        throw DataError(fmt::format("suite '{}': a pair names scene '{}', which is not listed", folder.string(), name));
+        throw DataError(fmt::format("suite '{}': a pair names scene '{}', which is not listed",
+                                    folder.string(), name));
     }
   }
   for (const std::string& name : suite.scenes) {
     const fs::path nested = folder / "recordings" / name;
     const fs::path file = folder / "recordings" / (name + ".oni");
-    suite.recordings[name] = fs::is_directory(nested) ? nested : fs::is_regular_file(file) ? file : folder / name;
+    suite.recordings[name] = fs::is_directory(nested)    ? nested
+                             : fs::is_regular_file(file) ? file
+                                                         : folder / name;
     suite.truths[name] = folder / "truth" / name;
     for (const fs::path& path : {suite.recordings[name], suite.truths[name]}) {
       if (!fs::is_directory(path) && path != file)
-        throw DataError(fmt::format("suite '{}': scene '{}' has no folder '{}'", folder.string(), name, path.string()));
+        throw DataError(fmt::format("suite '{}': scene '{}' has no folder '{}'", folder.string(),
+                                    name, path.string()));
     }
   }
   return suite;
 }
 
 MotionStatistics Evaluation::Total() const {
-  return StatisticsOf(pairs, [](const PairEvaluation&) { return true; });
+  return StatisticsOf(*this, [](const PairEvaluation&) { return true; });
 }
 
 MotionStatistics Evaluation::OfReference(const std::string& reference) const {
-  return StatisticsOf(pairs, [&](const PairEvaluation& pair) { return pair.reference == reference; });
+  return StatisticsOf(*this,
+                      [&](const PairEvaluation& pair) { return pair.reference == reference; });
 }
 
-Evaluation EvaluateSuite(const Suite& suite, const EvaluateOptions& options, const std::stop_token& stop,
-                         const std::function<void(const std::string& what, double fraction)>& progress) {
+Evaluation EvaluateSuite(
+    const Suite& suite, const EvaluateOptions& options, const std::stop_token& stop,
+    const std::function<void(const std::string& what, double fraction)>& progress) {
   Evaluation evaluation;
   evaluation.suite = suite.name;
   evaluation.preset = options.compare.preset;
+  evaluation.limits = options.compare.limits;
   std::map<std::string, KeptScene> kept;
   for (const std::string& name : suite.scenes) {
     KeptScene& entry = kept[name];
-    entry.truth = ReadSceneTruth(suite.truths.at(name));  // before the long work, so that a bad truth is told at once
+    entry.truth = ReadSceneTruth(
+        suite.truths.at(name));  // before the long work, so that a bad truth is told at once
   }
   for (const std::string& name : suite.scenes) {
     KeptScene& entry = kept[name];
     entry.scene = options.get_scene(name);
     if (stop.stop_requested()) throw Interrupted("the evaluation was interrupted");
-    evaluation.scenes.push_back(MeasureScene(name, entry.scene, entry.truth, options.min_frames_seen));
+    evaluation.scenes.push_back(
+        MeasureScene(name, entry.scene, entry.truth, options.min_frames_seen));
     if (const auto& trajectory = evaluation.scenes.back().keyframes) {
       entry.T_world_scene = trajectory->T_world_scene;
       entry.has_world = true;
@@ -219,10 +256,14 @@ Evaluation EvaluateSuite(const Suite& suite, const EvaluateOptions& options, con
   }
   for (const auto& [reference, current] : suite.pairs) {
     if (stop.stop_requested()) throw Interrupted("the evaluation was interrupted");
-    if (progress) progress("comparing", static_cast<double>(evaluation.pairs.size()) / static_cast<double>(suite.pairs.size()));
-    const Comparison comparison = Compare(kept.at(reference).scene, kept.at(current).scene, options.compare);
+    if (progress)
+      progress("comparing", static_cast<double>(evaluation.pairs.size()) /
+                                static_cast<double>(suite.pairs.size()));
+    const Comparison comparison =
+        Compare(kept.at(reference).scene, kept.at(current).scene, options.compare);
     if (options.store) options.store(reference, current, kept.at(reference).scene, comparison);
-    evaluation.pairs.push_back(MeasurePair(reference, current, kept.at(reference), kept.at(current), comparison, options.min_frames_seen));
+    evaluation.pairs.push_back(
+        MeasurePair(reference, current, kept.at(reference), kept.at(current), comparison, options));
   }
   return evaluation;
 }

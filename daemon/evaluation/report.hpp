@@ -10,7 +10,8 @@ namespace plumb {
 /// Tables: motion errors by reference scene and in total beside the paper's, scenes, and times.
 [[nodiscard]] std::string EvaluationTable(const Evaluation& evaluation);
 
-/// {"format": 1, "suite", "preset", "by_reference": {NAME: {...}}, "total": {...}, "pairs": [...], "scenes": {NAME: {...}}, "paper":
+/// {"format": 1, "suite", "preset", "by_reference": {NAME: {...}}, "total": {...}, "pairs": [...],
+/// "scenes": {NAME: {...}}, "paper":
 /// {...}}.
 [[nodiscard]] std::string EvaluationJson(const Evaluation& evaluation);
 

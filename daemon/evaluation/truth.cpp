@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb {
 namespace {
@@ -26,10 +26,14 @@ constexpr std::size_t kMaxElements = 20'000'000;
 
 std::string ReadWhole(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) Fail(file, "it does not exist or is not readable; a suite needs groundtruth.txt, markers.json, motion.json, body.ply per scene");
+  if (!in)
+    Fail(file,
+         "it does not exist or is not readable; a suite needs groundtruth.txt, markers.json, "
+         "motion.json, body.ply per scene");
   std::error_code error;
   const std::uintmax_t size = fs::file_size(file, error);
-  if (error || size > kMaxFileBytes) Fail(file, fmt::format("expected at most {} MiB", kMaxFileBytes >> 20));
+  if (error || size > kMaxFileBytes)
+    Fail(file, fmt::format("expected at most {} MiB", kMaxFileBytes >> 20));
   std::string text(static_cast<std::size_t>(size), '\0');
   in.read(text.data(), static_cast<std::streamsize>(size));
   if (in.gcount() != static_cast<std::streamsize>(size)) Fail(file, "the file ends early");
@@ -47,7 +51,8 @@ json ReadJson(const fs::path& file) {
 Pose ToPose(const json& rows) {
   Eigen::Matrix4d m;
   for (int r = 0; r < 4; ++r) {
-    for (int c = 0; c < 4; ++c) m(r, c) = rows.at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c)).get<double>();
+    for (int c = 0; c < 4; ++c)
+      m(r, c) = rows.at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c)).get<double>();
   }
   Pose T;
   T.matrix() = m;
@@ -67,7 +72,8 @@ std::vector<StampedPose> ReadTrajectory(const fs::path& file) {
     }
     const Eigen::Quaterniond q(qw, qx, qy, qz);
     if (!(q.norm() > 0.5)) Fail(file, fmt::format("line {}: the quaternion has no length", number));
-    if (!trajectory.empty() && !(t > trajectory.back().time_s)) Fail(file, fmt::format("line {}: expected rising times", number));
+    if (!trajectory.empty() && !(t > trajectory.back().time_s))
+      Fail(file, fmt::format("line {}: expected rising times", number));
     StampedPose pose{.time_s = t};
     pose.T_world_camera.linear() = q.normalized().toRotationMatrix();
     pose.T_world_camera.translation() = Eigen::Vector3d(x, y, z);
@@ -85,9 +91,10 @@ struct PlyProperty {
 
 PlyProperty ParseProperty(const fs::path& file, const std::string& type, const std::string& name) {
   static const std::map<std::string, std::pair<char, std::size_t>> kTypes = {
-      {"char", {'i', 1}},   {"int8", {'i', 1}},    {"uchar", {'u', 1}},  {"uint8", {'u', 1}},  {"short", {'i', 2}}, {"int16", {'i', 2}},
-      {"ushort", {'u', 2}}, {"uint16", {'u', 2}},  {"int", {'i', 4}},    {"int32", {'i', 4}},  {"uint", {'u', 4}},  {"uint32", {'u', 4}},
-      {"float", {'f', 4}},  {"float32", {'f', 4}}, {"double", {'f', 8}}, {"float64", {'f', 8}}};
+      {"char", {'i', 1}},  {"int8", {'i', 1}},    {"uchar", {'u', 1}},  {"uint8", {'u', 1}},
+      {"short", {'i', 2}}, {"int16", {'i', 2}},   {"ushort", {'u', 2}}, {"uint16", {'u', 2}},
+      {"int", {'i', 4}},   {"int32", {'i', 4}},   {"uint", {'u', 4}},   {"uint32", {'u', 4}},
+      {"float", {'f', 4}}, {"float32", {'f', 4}}, {"double", {'f', 8}}, {"float64", {'f', 8}}};
   const auto found = kTypes.find(type);
   if (found == kTypes.end()) Fail(file, fmt::format("unknown property type '{}'", type));
   return {name, found->second.first, found->second.second};
@@ -100,8 +107,12 @@ double Value(const PlyProperty& property, const char* at) {
   };
   if (property.kind == 'f') return property.bytes == 4 ? load(float{}) : load(double{});
   if (property.kind == 'i')
-    return property.bytes == 1 ? load(std::int8_t{}) : property.bytes == 2 ? load(std::int16_t{}) : load(std::int32_t{});
-  return property.bytes == 1 ? load(std::uint8_t{}) : property.bytes == 2 ? load(std::uint16_t{}) : load(std::uint32_t{});
+    return property.bytes == 1   ? load(std::int8_t{})
+           : property.bytes == 2 ? load(std::int16_t{})
+                                 : load(std::int32_t{});
+  return property.bytes == 1   ? load(std::uint8_t{})
+         : property.bytes == 2 ? load(std::uint16_t{})
+                               : load(std::uint32_t{});
 }
 
 struct PlyHeader {
@@ -122,11 +133,13 @@ PlyHeader ParseHeader(const fs::path& file, const std::string& data) {
     std::istringstream fields(line);
     std::string word, a, b, c, d;
     fields >> word >> a >> b >> c >> d;
-    if (word == "format" && a != "binary_little_endian") Fail(file, fmt::format("expected format binary_little_endian, found '{}'", a));
+    if (word == "format" && a != "binary_little_endian")
+      Fail(file, fmt::format("expected format binary_little_endian, found '{}'", a));
     if (word == "element") {
       element = a;
       const std::size_t count = std::strtoull(b.c_str(), nullptr, 10);
-      if (count > kMaxElements) Fail(file, fmt::format("expected at most {} elements, found {}", kMaxElements, count));
+      if (count > kMaxElements)
+        Fail(file, fmt::format("expected at most {} elements, found {}", kMaxElements, count));
       if (a == "vertex") header.num_vertices = count;
       if (a == "face") header.num_faces = count;
     } else if (word == "property" && element == "vertex") {
@@ -152,21 +165,26 @@ TrueSurface ReadSurface(const fs::path& file) {
   for (const char* name : {"x", "y", "z"}) {
     if (!columns.contains(name)) Fail(file, fmt::format("vertices have no property '{}'", name));
   }
-  if (header.data_offset + stride * header.num_vertices > data.size()) Fail(file, "the file ends within the vertices");
+  if (header.data_offset + stride * header.num_vertices > data.size())
+    Fail(file, "the file ends within the vertices");
 
   TrueSurface surface;
   const char* at = data.data() + header.data_offset;
-  const auto column = [&](const char* name) { return Value(columns.at(name).second, at + columns.at(name).first); };
+  const auto column = [&](const char* name) {
+    return Value(columns.at(name).second, at + columns.at(name).first);
+  };
   for (std::size_t i = 0; i < header.num_vertices; ++i, at += stride) {
     surface.vertices_world.emplace_back(column("x"), column("y"), column("z"));
-    surface.frames_seen.push_back(columns.contains("seen") ? static_cast<float>(column("seen")) : 1e9F);
+    surface.frames_seen.push_back(columns.contains("seen") ? static_cast<float>(column("seen"))
+                                                           : 1e9F);
   }
   const char* const last = data.data() + data.size();
   for (std::size_t i = 0; i < header.num_faces; ++i) {
     if (at + header.face_count.bytes > last) Fail(file, "the file ends within the faces");
     const auto count = static_cast<std::size_t>(Value(header.face_count, at));
     at += header.face_count.bytes;
-    if (count != 3 || at + 3 * header.face_index.bytes > last) Fail(file, fmt::format("face {}: expected a whole triangle", i));
+    if (count != 3 || at + 3 * header.face_index.bytes > last)
+      Fail(file, fmt::format("face {}: expected a whole triangle", i));
     std::array<std::uint32_t, 3> triangle{};
     for (std::uint32_t& index : triangle) {
       const double value = Value(header.face_index, at);
@@ -200,7 +218,9 @@ SceneTruth ReadSceneTruth(const fs::path& folder) {
   try {
     truth.T_world_body = ToPose(motion.at("T_world_body"));
     truth.T_world_reference_marker = ToPose(motion.at("T_world_reference_marker"));
-    for (int i = 0; i < 3; ++i) truth.centroid_body[i] = motion.at("centroid_body").at(static_cast<std::size_t>(i)).get<double>();
+    for (int i = 0; i < 3; ++i)
+      truth.centroid_body[i] =
+          motion.at("centroid_body").at(static_cast<std::size_t>(i)).get<double>();
   } catch (const std::exception& error) {
     Fail(folder / "motion.json", error.what());
   }
@@ -211,13 +231,16 @@ SceneTruth ReadSceneTruth(const fs::path& folder) {
 std::optional<Pose> TruePoseAt(std::span<const StampedPose> trajectory, double time_s) {
   constexpr double kMaxGap_s = 0.1;
   const auto after =
-      std::lower_bound(trajectory.begin(), trajectory.end(), time_s, [](const StampedPose& pose, double t) { return pose.time_s < t; });
-  if (after == trajectory.end() || (after == trajectory.begin() && after->time_s > time_s)) return std::nullopt;
+      std::lower_bound(trajectory.begin(), trajectory.end(), time_s,
+                       [](const StampedPose& pose, double t) { return pose.time_s < t; });
+  if (after == trajectory.end() || (after == trajectory.begin() && after->time_s > time_s))
+    return std::nullopt;
   if (after->time_s == time_s) return after->T_world_camera;
   const auto before = after - 1;
   const double gap_s = after->time_s - before->time_s;
   if (gap_s > kMaxGap_s) return std::nullopt;
-  return Interpolate(before->T_world_camera, after->T_world_camera, (time_s - before->time_s) / gap_s);
+  return Interpolate(before->T_world_camera, after->T_world_camera,
+                     (time_s - before->time_s) / gap_s);
 }
 
 }  // namespace plumb

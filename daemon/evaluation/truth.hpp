@@ -11,8 +11,8 @@
 
 #include <Eigen/Core>
 
+#include "algo/base/pose.hpp"
 #include "algo/types/marker.hpp"
-#include "algo/types/pose.hpp"
 #include "algo/types/scene.hpp"
 
 namespace plumb {
@@ -24,13 +24,15 @@ struct TrueSurface {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-/// Everything that is known of one scene. `world` is the simulator's own frame, shared by all scenes of a suite.
+/// Everything that is known of one scene. `world` is the simulator's own frame, shared by all
+/// scenes of a suite.
 struct SceneTruth {
   std::vector<StampedPose> trajectory;   ///< Of the colour camera, rising in time.
   std::map<int, MarkerCorners> markers;  ///< World, detector order, by id.
   Pose T_world_body = Pose::Identity();  ///< Placement of the body.
   Pose T_world_reference_marker = Pose::Identity();
-  Eigen::Vector3d centroid_body = Eigen::Vector3d::Zero();  ///< Area centroid of the body, in its own frame.
+  Eigen::Vector3d centroid_body =
+      Eigen::Vector3d::Zero();  ///< Area centroid of the body, in its own frame.
   TrueSurface body;
 
   [[nodiscard]] Eigen::Vector3d centroid_world() const { return T_world_body * centroid_body; }
@@ -40,8 +42,9 @@ struct SceneTruth {
 /// @throws DataError naming the file and what is wrong with it.
 [[nodiscard]] SceneTruth ReadSceneTruth(const std::filesystem::path& folder);
 
-/// The true camera pose at a time, interpolated between its neighbours; nothing outside the recorded time or where the
-/// neighbours lie more than 0.1 s apart.
-[[nodiscard]] std::optional<Pose> TruePoseAt(std::span<const StampedPose> trajectory, double time_s);
+/// The true camera pose at a time, interpolated between its neighbours; nothing outside the
+/// recorded time or where the neighbours lie more than 0.1 s apart.
+[[nodiscard]] std::optional<Pose> TruePoseAt(std::span<const StampedPose> trajectory,
+                                             double time_s);
 
 }  // namespace plumb

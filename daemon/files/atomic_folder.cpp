@@ -14,16 +14,17 @@
 #include <cstdio>
 #include <string>
 
-#include "algo/types/errors.hpp"
-#include "drivers/replay/file_io.hpp"
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
 
 namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::minutes kStaleAge{1};  // covers the moment between a folder's making and its locking
-constexpr std::size_t kMaxFsyncs = 64;        // beyond, one sync of the file system is cheaper
+constexpr std::chrono::minutes kStaleAge{
+    1};  // covers the moment between a folder's making and its locking
+constexpr std::size_t kMaxFsyncs = 64;  // beyond, one sync of the file system is cheaper
 
 /// Absolute, without trailing slash, links to folders followed.
 fs::path Normalised(const fs::path& target) {
@@ -37,7 +38,9 @@ fs::path Normalised(const fs::path& target) {
   return path;
 }
 
-std::string HiddenPrefix(const fs::path& target) { return fmt::format(".{}.plumb-", target.filename().string()); }
+std::string HiddenPrefix(const fs::path& target) {
+  return fmt::format(".{}.plumb-", target.filename().string());
+}
 
 /// Forces one file or folder to the disk.
 void Sync(const fs::path& path, bool whole_file_system = false) {
@@ -46,12 +49,14 @@ void Sync(const fs::path& path, bool whole_file_system = false) {
   const int result = whole_file_system ? ::syncfs(descriptor) : ::fsync(descriptor);
   const int error = errno;
   ::close(descriptor);
-  if (result != 0 && error != EINVAL) throw IoError(DescribeWriteError(path, error));  // EINVAL: a file system without fsync
+  if (result != 0 && error != EINVAL)
+    throw IoError(DescribeWriteError(path, error));  // EINVAL: a file system without fsync
 }
 
 void SyncTree(const fs::path& folder) {
   std::vector<fs::path> paths;
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) paths.push_back(entry.path());
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
+    paths.push_back(entry.path());
   if (paths.size() > kMaxFsyncs) {
     Sync(folder, true);
     return;
@@ -64,20 +69,27 @@ void CheckReplaceable(const fs::path& target, const OutputKind& kind) {
   const fs::file_status status = fs::symlink_status(target);
   if (!fs::exists(status)) return;
   if (!fs::is_directory(status)) {
-    throw IoError(fmt::format("cannot write {} {}: there is a file of that name; choose another or remove it", kind.name, target.string()));
+    throw IoError(
+        fmt::format("cannot write {} {}: there is a file of that name; choose another or remove it",
+                    kind.name, target.string()));
   }
   bool has_marker = false;
   for (const fs::directory_entry& entry : fs::directory_iterator(target)) {
     const std::string name = entry.path().filename().string();
-    if (std::find(kind.known_entries.begin(), kind.known_entries.end(), name) == kind.known_entries.end()) {
-      throw IoError(fmt::format("cannot write {} {}: the folder holds {}, which is no part of a {}; choose an empty or new folder",
-                                kind.name, target.string(), name, kind.name));
+    if (std::find(kind.known_entries.begin(), kind.known_entries.end(), name) ==
+        kind.known_entries.end()) {
+      throw IoError(
+          fmt::format("cannot write {} {}: the folder holds {}, which is no part of a {}; choose "
+                      "an empty or new folder",
+                      kind.name, target.string(), name, kind.name));
     }
     has_marker = has_marker || name == kind.marker_file;
   }
   if (!has_marker && !fs::is_empty(target)) {
-    throw IoError(fmt::format("cannot write {} {}: the folder is not empty and holds no {}; choose an empty or new folder", kind.name,
-                              target.string(), kind.marker_file));
+    throw IoError(
+        fmt::format("cannot write {} {}: the folder is not empty and holds no {}; choose an empty "
+                    "or new folder",
+                    kind.name, target.string(), kind.marker_file));
   }
 }
 
@@ -87,15 +99,18 @@ void Replace(const fs::path& hidden, const fs::path& target) {
   if (errno != ENOTEMPTY && errno != EEXIST) throw IoError(DescribeWriteError(target, errno));
   if (::renameat2(AT_FDCWD, hidden.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) != 0) {
     const fs::path aside = hidden.string() + "-old";
-    if (::rename(target.c_str(), aside.c_str()) != 0) throw IoError(DescribeWriteError(target, errno));
+    if (::rename(target.c_str(), aside.c_str()) != 0)
+      throw IoError(DescribeWriteError(target, errno));
     if (::rename(hidden.c_str(), target.c_str()) != 0) {
       const int error = errno;
       (void)::rename(aside.c_str(), target.c_str());
       throw IoError(DescribeWriteError(target, error));
     }
-    if (::rename(aside.c_str(), hidden.c_str()) != 0) throw IoError(DescribeWriteError(aside, errno));
+    if (::rename(aside.c_str(), hidden.c_str()) != 0)
+      throw IoError(DescribeWriteError(aside, errno));
   }
-  std::error_code ignored;  // the new output is in place; a rest of the old one under the hidden name is cleaned up later
+  std::error_code ignored;  // the new output is in place; a rest of the old one under the hidden
+                            // name is cleaned up later
   fs::remove_all(hidden, ignored);
 }
 
@@ -106,10 +121,12 @@ std::string UniqueSuffix() {
 
 }  // namespace
 
-AtomicFolder::AtomicFolder(const fs::path& target, OutputKind kind) : kind_(std::move(kind)), target_(Normalised(target)) {
+AtomicFolder::AtomicFolder(const fs::path& target, OutputKind kind)
+    : kind_(std::move(kind)), target_(Normalised(target)) {
   try {
     CheckReplaceable(target_, kind_);
-    for (fs::path parent = target_.parent_path(); !fs::exists(parent); parent = parent.parent_path()) {
+    for (fs::path parent = target_.parent_path(); !fs::exists(parent);
+         parent = parent.parent_path()) {
       made_parents_.insert(made_parents_.begin(), parent);
     }
     fs::create_directories(target_.parent_path());
@@ -141,8 +158,11 @@ void AtomicFolder::RemoveStale() const {
   std::vector<fs::path> stale;
   for (const fs::directory_entry& entry : fs::directory_iterator(target_.parent_path())) {
     std::error_code error;
-    const bool ours = entry.path().filename().string().starts_with(prefix) && entry.is_directory(error) && !entry.is_symlink(error);
-    if (!ours || fs::file_time_type::clock::now() - entry.last_write_time(error) < kStaleAge || error) continue;
+    const bool ours = entry.path().filename().string().starts_with(prefix) &&
+                      entry.is_directory(error) && !entry.is_symlink(error);
+    if (!ours || fs::file_time_type::clock::now() - entry.last_write_time(error) < kStaleAge ||
+        error)
+      continue;
     const int descriptor = ::open(entry.path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (descriptor < 0) continue;
     if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) stale.push_back(entry.path());
@@ -160,7 +180,8 @@ AtomicFolder::~AtomicFolder() {
 void AtomicFolder::Discard() {
   std::error_code ignored;
   if (!hidden_.empty()) fs::remove_all(hidden_, ignored);
-  for (auto parent = made_parents_.rbegin(); parent != made_parents_.rend(); ++parent) ::rmdir(parent->c_str());  // only empty ones go
+  for (auto parent = made_parents_.rbegin(); parent != made_parents_.rend(); ++parent)
+    ::rmdir(parent->c_str());  // only empty ones go
 }
 
 void AtomicFolder::Commit() {
@@ -175,13 +196,15 @@ void AtomicFolder::Commit() {
   }
 }
 
-void WriteFileAtomically(const fs::path& target, const std::function<void(const fs::path&)>& write) {
+void WriteFileAtomically(const fs::path& target,
+                         const std::function<void(const fs::path&)>& write) {
   const fs::path path = Normalised(target);
   std::error_code error;
   if (fs::is_directory(path, error)) {
     throw IoError(fmt::format("cannot write {}: it is a folder; name a file", path.string()));
   }
-  const fs::path hidden = path.parent_path() / (HiddenPrefix(path) + UniqueSuffix() + path.extension().string());
+  const fs::path hidden =
+      path.parent_path() / (HiddenPrefix(path) + UniqueSuffix() + path.extension().string());
   try {
     write(hidden);
     Sync(hidden);

@@ -13,16 +13,18 @@
 
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/ply_file.hpp"
-#include "drivers/replay/file_io.hpp"
+#include "drivers/files/file_io.hpp"
 
 namespace plumb {
 namespace {
 
 void CheckTriangles(const TriangleMesh& mesh) {
-  if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max()) throw std::invalid_argument("mesh: too many triangles");
+  if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max())
+    throw std::invalid_argument("mesh: too many triangles");
   for (const auto& triangle : mesh.triangles) {
     if (*std::max_element(triangle.begin(), triangle.end()) >= mesh.vertices.size()) {
-      throw std::invalid_argument(fmt::format("mesh: a triangle names a vertex that is not there ({} vertices)", mesh.vertices.size()));
+      throw std::invalid_argument(fmt::format(
+          "mesh: a triangle names a vertex that is not there ({} vertices)", mesh.vertices.size()));
     }
   }
 }
@@ -32,7 +34,8 @@ void CheckTriangles(const TriangleMesh& mesh) {
 void WriteMeshStl(const std::filesystem::path& path, const TriangleMesh& mesh) {
   CheckTriangles(mesh);
   FileWriter file(path);
-  std::string header = "Plumb mesh in metres";  // must not begin with "solid", the mark of the text form
+  std::string header =
+      "Plumb mesh in metres";  // must not begin with "solid", the mark of the text form
   header.resize(80, ' ');
   const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
   header.append(reinterpret_cast<const char*>(&count), sizeof count);
@@ -63,18 +66,21 @@ void WriteMeshObj(const std::filesystem::path& path, const TriangleMesh& mesh) {
     const Eigen::Vector3f& v = mesh.vertices[i];
     std::string line = fmt::format("v {:.6f} {:.6f} {:.6f}", v.x(), v.y(), v.z());
     if (has_colors) {
-      line += fmt::format(" {:.4f} {:.4f} {:.4f}", mesh.colors[i][0] / 255.0, mesh.colors[i][1] / 255.0, mesh.colors[i][2] / 255.0);
+      line += fmt::format(" {:.4f} {:.4f} {:.4f}", mesh.colors[i][0] / 255.0,
+                          mesh.colors[i][1] / 255.0, mesh.colors[i][2] / 255.0);
     }
     line += '\n';
     file.Write(line);
   }
   if (has_normals) {
-    for (const Eigen::Vector3f& n : mesh.normals) file.Write(fmt::format("vn {:.5f} {:.5f} {:.5f}\n", n.x(), n.y(), n.z()));
+    for (const Eigen::Vector3f& n : mesh.normals)
+      file.Write(fmt::format("vn {:.5f} {:.5f} {:.5f}\n", n.x(), n.y(), n.z()));
   }
   for (const auto& triangle : mesh.triangles) {
     std::string line = "f";
     for (const std::uint32_t index : triangle) {
-      line += has_normals ? fmt::format(" {}//{}", index + 1, index + 1) : fmt::format(" {}", index + 1);
+      line += has_normals ? fmt::format(" {}//{}", index + 1, index + 1)
+                          : fmt::format(" {}", index + 1);
     }
     line += '\n';
     file.Write(line);
@@ -84,13 +90,15 @@ void WriteMeshObj(const std::filesystem::path& path, const TriangleMesh& mesh) {
 
 void WriteMeshFile(const std::filesystem::path& path, const TriangleMesh& mesh) {
   std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   void (*write)(const std::filesystem::path&, const TriangleMesh&) = nullptr;
   if (ending == ".ply") write = WriteMeshPly;
   if (ending == ".stl") write = WriteMeshStl;
   if (ending == ".obj") write = WriteMeshObj;
   if (write == nullptr) {
-    throw std::invalid_argument(fmt::format("cannot write a mesh as {}: its name must end with .ply, .stl or .obj", path.string()));
+    throw std::invalid_argument(fmt::format(
+        "cannot write a mesh as {}: its name must end with .ply, .stl or .obj", path.string()));
   }
   WriteFileAtomically(path, [&](const std::filesystem::path& hidden) { write(hidden, mesh); });
 }

@@ -11,7 +11,8 @@ namespace plumb {
 /// @throws std::invalid_argument for a triangle whose vertex is not there; IoError.
 void WriteMeshStl(const std::filesystem::path& path, const TriangleMesh& mesh);
 
-/// OBJ, metres: vertices (with colours after the coordinates where there are any), vertex normals, faces.
+/// OBJ, metres: vertices (with colours after the coordinates where there are any), vertex normals,
+/// faces.
 /// @throws as WriteMeshStl().
 void WriteMeshObj(const std::filesystem::path& path, const TriangleMesh& mesh);
 

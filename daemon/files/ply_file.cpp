@@ -11,10 +11,11 @@
 #include <stdexcept>
 #include <vector>
 
-#include "algo/types/errors.hpp"
-#include "drivers/replay/file_io.hpp"
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
 
-static_assert(std::endian::native == std::endian::little, "PLY is written and read as the bytes in memory");
+static_assert(std::endian::native == std::endian::little,
+              "PLY is written and read as the bytes in memory");
 
 namespace plumb {
 namespace {
@@ -39,18 +40,22 @@ struct VertexColumns {
 
 void CheckColumns(const VertexColumns& columns) {
   const std::size_t n = columns.points.size();
-  if ((!columns.normals.empty() && columns.normals.size() != n) || (!columns.colors.empty() && columns.colors.size() != n)) {
-    throw std::invalid_argument(
-        fmt::format("PLY: {} points with {} normals and {} colours", n, columns.normals.size(), columns.colors.size()));
+  if ((!columns.normals.empty() && columns.normals.size() != n) ||
+      (!columns.colors.empty() && columns.colors.size() != n)) {
+    throw std::invalid_argument(fmt::format("PLY: {} points with {} normals and {} colours", n,
+                                            columns.normals.size(), columns.colors.size()));
   }
 }
 
 std::string VertexHeader(const VertexColumns& columns) {
   std::string header = fmt::format(
-      "ply\nformat binary_little_endian 1.0\ncomment metres\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n",
+      "ply\nformat binary_little_endian 1.0\ncomment metres\nelement vertex {}\nproperty float "
+      "x\nproperty float y\nproperty float z\n",
       columns.points.size());
-  if (!columns.normals.empty()) header += "property float nx\nproperty float ny\nproperty float nz\n";
-  if (!columns.colors.empty()) header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  if (!columns.normals.empty())
+    header += "property float nx\nproperty float ny\nproperty float nz\n";
+  if (!columns.colors.empty())
+    header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   return header;
 }
 
@@ -62,7 +67,8 @@ void WriteVertices(FileWriter& file, const VertexColumns& columns) {
     if (!columns.normals.empty()) {
       for (int axis = 0; axis < 3; ++axis) Append(row, columns.normals[i][axis]);
     }
-    if (!columns.colors.empty()) row.insert(row.end(), columns.colors[i].begin(), columns.colors[i].end());
+    if (!columns.colors.empty())
+      row.insert(row.end(), columns.colors[i].begin(), columns.colors[i].end());
     file.Write(row);
   }
 }
@@ -136,7 +142,8 @@ class PlyReader {
  public:
   PlyReader(std::span<const std::uint8_t> bytes, std::string name) : name_(std::move(name)) {
     constexpr std::string_view kEnd = "end_header\n";
-    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), std::min(bytes.size(), kMaxHeaderBytes));
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()),
+                                std::min(bytes.size(), kMaxHeaderBytes));
     const std::size_t end = text.find(kEnd);
     if (!text.starts_with("ply\n") || end == std::string_view::npos) Fail("it has no PLY header");
     ParseHeader(std::string(text.substr(0, end)));
@@ -161,7 +168,8 @@ class PlyReader {
       if (!cloud.points.back().allFinite()) Fail(fmt::format("vertex {} is not finite", i));
       if (normal) {
         cloud.normals.push_back(Vector(*normal, row));
-        if (!cloud.normals.back().allFinite()) Fail(fmt::format("the normal of vertex {} is not finite", i));
+        if (!cloud.normals.back().allFinite())
+          Fail(fmt::format("the normal of vertex {} is not finite", i));
       }
       if (color) {
         Color& out = cloud.colors.emplace_back();
@@ -177,9 +185,11 @@ class PlyReader {
 
   [[nodiscard]] std::vector<std::array<std::uint32_t, 3>> Triangles() const {
     const Element& vertex = elements_[0];
-    if (elements_.size() < 2 || elements_[1].name != "face") Fail("it has no faces after its vertices");
+    if (elements_.size() < 2 || elements_[1].name != "face")
+      Fail("it has no faces after its vertices");
     const Element& face = elements_[1];
-    if (face.properties.size() != 1 || !face.properties[0].list_count) Fail("its faces are no plain list of vertex indices");
+    if (face.properties.size() != 1 || !face.properties[0].list_count)
+      Fail("its faces are no plain list of vertex indices");
     const Scalar count_type = *face.properties[0].list_count;
     const Scalar index_type = face.properties[0].type;
     const std::size_t row_bytes = SizeOf(count_type) + 3 * SizeOf(index_type);
@@ -204,11 +214,14 @@ class PlyReader {
  private:
   using Columns = std::array<Property, 3>;
 
-  [[noreturn]] void Fail(const std::string& what) const { throw DataError(fmt::format("PLY file {} cannot be used: {}", name_, what)); }
+  [[noreturn]] void Fail(const std::string& what) const {
+    throw DataError(fmt::format("PLY file {} cannot be used: {}", name_, what));
+  }
 
   void Require(std::size_t bytes) const {
     if (body_.size() < bytes) {
-      Fail(fmt::format("it is truncated: {} bytes after its header, expected {}; make it again", body_.size(), bytes));
+      Fail(fmt::format("it is truncated: {} bytes after its header, expected {}; make it again",
+                       body_.size(), bytes));
     }
   }
 
@@ -225,7 +238,9 @@ class PlyReader {
       if (key == "format") {
         std::string format;
         words >> format;
-        if (format != "binary_little_endian") Fail(fmt::format("its format is {}, expected binary_little_endian", format.substr(0, 40)));
+        if (format != "binary_little_endian")
+          Fail(
+              fmt::format("its format is {}, expected binary_little_endian", format.substr(0, 40)));
         has_format = true;
       } else if (key == "element") {
         AddElement(words);
@@ -256,21 +271,24 @@ class PlyReader {
       std::string count_type;
       words >> count_type >> type;
       property.list_count = ScalarOf(count_type);
-      if (!property.list_count || element.name == "vertex") Fail("its header holds a list that is not understood");
+      if (!property.list_count || element.name == "vertex")
+        Fail("its header holds a list that is not understood");
     }
     const std::optional<Scalar> scalar = ScalarOf(type);
-    if (!scalar || !(words >> property.name)) Fail(fmt::format("a property of its header has the type \"{}\"", type.substr(0, 40)));
+    if (!scalar || !(words >> property.name))
+      Fail(fmt::format("a property of its header has the type \"{}\"", type.substr(0, 40)));
     property.type = *scalar;
     property.offset = element.row_bytes;
     element.row_bytes += SizeOf(*scalar);
     element.properties.push_back(std::move(property));
   }
 
-  static std::optional<Columns> Three(const Element& element, const std::array<std::string_view, 3>& names) {
+  static std::optional<Columns> Three(const Element& element,
+                                      const std::array<std::string_view, 3>& names) {
     Columns columns;
     for (std::size_t i = 0; i < 3; ++i) {
-      const auto at =
-          std::find_if(element.properties.begin(), element.properties.end(), [&](const Property& p) { return p.name == names[i]; });
+      const auto at = std::find_if(element.properties.begin(), element.properties.end(),
+                                   [&](const Property& p) { return p.name == names[i]; });
       if (at == element.properties.end()) return std::nullopt;
       columns[i] = *at;
     }
@@ -280,7 +298,8 @@ class PlyReader {
   static Eigen::Vector3f Vector(const Columns& columns, const std::uint8_t* row) {
     Eigen::Vector3f vector;
     for (std::size_t i = 0; i < 3; ++i) {
-      vector[static_cast<Eigen::Index>(i)] = static_cast<float>(Value(columns[i].type, row + columns[i].offset));
+      vector[static_cast<Eigen::Index>(i)] =
+          static_cast<float>(Value(columns[i].type, row + columns[i].offset));
     }
     return vector;
   }
@@ -306,12 +325,14 @@ void WriteMeshPly(const std::filesystem::path& path, const TriangleMesh& mesh) {
   CheckColumns(columns);
   for (const auto& triangle : mesh.triangles) {
     if (*std::max_element(triangle.begin(), triangle.end()) >= mesh.vertices.size()) {
-      throw std::invalid_argument(fmt::format("PLY: a triangle names a vertex that is not there ({} vertices)", mesh.vertices.size()));
+      throw std::invalid_argument(fmt::format(
+          "PLY: a triangle names a vertex that is not there ({} vertices)", mesh.vertices.size()));
     }
   }
   FileWriter file(path);
   file.Write(VertexHeader(columns) +
-             fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n", mesh.triangles.size()));
+             fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+                         mesh.triangles.size()));
   WriteVertices(file, columns);
   std::vector<std::uint8_t> row;
   for (const auto& triangle : mesh.triangles) {
@@ -322,9 +343,13 @@ void WriteMeshPly(const std::filesystem::path& path, const TriangleMesh& mesh) {
   file.Close();
 }
 
-PointCloud ParseCloudPly(std::span<const std::uint8_t> bytes, const std::string& name) { return PlyReader(bytes, name).Vertices(); }
+PointCloud ParseCloudPly(std::span<const std::uint8_t> bytes, const std::string& name) {
+  return PlyReader(bytes, name).Vertices();
+}
 
-PointCloud ReadCloudPly(const std::filesystem::path& path) { return ParseCloudPly(ReadWholeFile(path, kMaxFileBytes), path.string()); }
+PointCloud ReadCloudPly(const std::filesystem::path& path) {
+  return ParseCloudPly(ReadWholeFile(path, kMaxFileBytes), path.string());
+}
 
 TriangleMesh ParseMeshPly(std::span<const std::uint8_t> bytes, const std::string& name) {
   const PlyReader reader(bytes, name);
@@ -337,6 +362,8 @@ TriangleMesh ParseMeshPly(std::span<const std::uint8_t> bytes, const std::string
   return mesh;
 }
 
-TriangleMesh ReadMeshPly(const std::filesystem::path& path) { return ParseMeshPly(ReadWholeFile(path, kMaxFileBytes), path.string()); }
+TriangleMesh ReadMeshPly(const std::filesystem::path& path) {
+  return ParseMeshPly(ReadWholeFile(path, kMaxFileBytes), path.string());
+}
 
 }  // namespace plumb

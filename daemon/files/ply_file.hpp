@@ -11,7 +11,8 @@
 namespace plumb {
 
 /// float x y z, then, where the cloud has them, float nx ny nz and uchar red green blue.
-/// @throws std::invalid_argument if an attribute is neither empty nor as long as the points; IoError.
+/// @throws std::invalid_argument if an attribute is neither empty nor as long as the points;
+/// IoError.
 void WriteCloudPly(const std::filesystem::path& path, const PointCloud& cloud);
 
 /// As WriteCloudPly() for the vertices, then faces as "list uchar int vertex_indices".
@@ -19,12 +20,16 @@ void WriteCloudPly(const std::filesystem::path& path, const PointCloud& cloud);
 void WriteMeshPly(const std::filesystem::path& path, const TriangleMesh& mesh);
 
 /// Reads the vertices of a PLY in any layout of scalar properties; faces are passed over.
-/// @throws DataError naming the file if it is missing, truncated, not binary little-endian, or holds numbers that are not finite.
+/// @throws DataError naming the file if it is missing, truncated, not binary little-endian, or
+/// holds numbers that are not finite.
 [[nodiscard]] PointCloud ReadCloudPly(const std::filesystem::path& path);
-[[nodiscard]] PointCloud ParseCloudPly(std::span<const std::uint8_t> bytes, const std::string& name);
+[[nodiscard]] PointCloud ParseCloudPly(std::span<const std::uint8_t> bytes,
+                                       const std::string& name);
 
-/// Reads vertices and triangles. @throws DataError as above, and for faces that are no triangles of the vertices.
+/// Reads vertices and triangles. @throws DataError as above, and for faces that are no triangles of
+/// the vertices.
 [[nodiscard]] TriangleMesh ReadMeshPly(const std::filesystem::path& path);
-[[nodiscard]] TriangleMesh ParseMeshPly(std::span<const std::uint8_t> bytes, const std::string& name);
+[[nodiscard]] TriangleMesh ParseMeshPly(std::span<const std::uint8_t> bytes,
+                                        const std::string& name);
 
 }  // namespace plumb

@@ -4,13 +4,14 @@
 
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
+#include "algo/base/errors.hpp"
+#include "algo/base/units.hpp"
 #include "algo/render/error_image.hpp"
 #include "algo/render/overlay_image.hpp"
-#include "algo/types/errors.hpp"
-#include "algo/types/units.hpp"
-#include "drivers/replay/file_io.hpp"
-#include "drivers/replay/image_file.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
 
 namespace plumb {
 namespace {
@@ -19,7 +20,8 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr int kFormat = 1;
-constexpr double kSpokenHeight_m = 3 * kMillimetre;  // smaller differences of a part are not put into words
+constexpr double kSpokenHeight_m =
+    3 * kMillimetre;  // smaller differences of a part are not put into words
 constexpr std::size_t kMaxJsonBytes = std::size_t{16} << 20;
 
 template <typename Derived>
@@ -40,11 +42,14 @@ Json VectorJson(const Eigen::MatrixBase<Derived>& vector) {
   return values;
 }
 
-Json OptionalJson(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+Json OptionalJson(const std::optional<double>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
 
 Json AlignmentJson(const Alignment& alignment) {
   Json rejected = Json::object();
-  for (const auto& [id, residual_m] : alignment.markers_rejected) rejected[std::to_string(id)] = residual_m;
+  for (const auto& [id, residual_m] : alignment.markers_rejected)
+    rejected[std::to_string(id)] = residual_m;
   return {{"T_reference_current", MatrixJson(alignment.T_reference_current.matrix())},
           {"stretch", MatrixJson(alignment.stretch)},
           {"rms_m", alignment.rms_m},
@@ -55,12 +60,18 @@ Json AlignmentJson(const Alignment& alignment) {
 }
 
 Json MotionJson(const BodyMotion& motion) {
+  Json parts = Json::object();
+  for (const auto& [cause, covariance] : motion.uncertainty.Parts()) {
+    parts[cause] = MatrixJson(*covariance);
+  }
   Json weak = Json::array();
   for (const WeakDirection& direction : motion.weak_directions) {
-    weak.push_back(Json{{"name", direction.name}, {"u95", direction.u95}, {"unit", direction.unit}});
+    weak.push_back(
+        Json{{"name", direction.name}, {"u95", direction.u95}, {"unit", direction.unit}});
   }
   return {{"T", MatrixJson(motion.T.matrix())},
           {"covariance", MatrixJson(motion.covariance)},
+          {"covariance_parts", std::move(parts)},
           {"weak_directions", weak},
           {"residual_m", {{"median", motion.residual_median_m}, {"p95", motion.residual_p95_m}}},
           {"centroid_m", VectorJson(motion.centroid_m)},
@@ -80,13 +91,16 @@ Json CorrectionJson(const Correction& correction) {
   Json json = {{"isocentre", VectorJson(correction.isocentre_m)}};
   json.update(NumbersJson(correction.value));
   json["uncertainty"] = NumbersJson(correction.u95);
-  json["words"] = {{"vertical", correction.words[0]}, {"longitudinal", correction.words[1]}, {"lateral", correction.words[2]},
-                   {"pitch", correction.words[3]},    {"roll", correction.words[4]},         {"yaw", correction.words[5]}};
+  json["words"] = {{"vertical", correction.words[0]}, {"longitudinal", correction.words[1]},
+                   {"lateral", correction.words[2]},  {"pitch", correction.words[3]},
+                   {"roll", correction.words[4]},     {"yaw", correction.words[5]}};
   return json;
 }
 
 Json RegionJson(const RegionCoverage& region) {
-  return {{"coverage", region.coverage}, {"largest_hole_m", region.largest_hole_m}, {"hole_centre_m", VectorJson(region.hole_centre_m)}};
+  return {{"coverage", region.coverage},
+          {"largest_hole_m", region.largest_hole_m},
+          {"hole_centre_m", VectorJson(region.hole_centre_m)}};
 }
 
 Json BodyPartsJson(const BodyParts& body) {
@@ -109,24 +123,30 @@ Json BodyPartsJson(const BodyParts& body) {
 void WriteMap(const fs::path& file, const std::optional<HeightMap>& map) {
   if (!map || map->z.empty()) return;
   // The image borrows the values; it is only read.
-  WriteFloatTiff(file, cv::Mat(map->grid.height, map->grid.width, CV_32FC1, const_cast<float*>(map->z.data())));
+  WriteFloatTiff(file, cv::Mat(map->grid.height, map->grid.width, CV_32FC1,
+                               const_cast<float*>(map->z.data())));
 }
 
 }  // namespace
 
 OutputKind ResultOutput() {
-  return {
-      "result", "result.json", {"result.json", "deviation.tiff", "distance.tiff", "deviation_after.tiff", "error_map.png", "overlay.png"}};
+  return {"result",
+          "result.json",
+          {"result.json", "deviation.tiff", "distance.tiff", "deviation_after.tiff",
+           "error_map.png", "overlay.png", "region.png"}};
 }
 
 std::string ResultJson(const Comparison& comparison) {
   Json json;
   json["format"] = kFormat;
+  json["version"] = PLUMB_VERSION;
+  json["preset"] = Name(comparison.preset);
   json["verdict"] = Name(comparison.verdict);
   json["reasons"] = comparison.reasons;
   json["alignment"] = comparison.alignment ? AlignmentJson(*comparison.alignment) : Json(nullptr);
   json["motion"] = comparison.motion ? MotionJson(*comparison.motion) : Json(nullptr);
-  json["correction"] = comparison.correction ? CorrectionJson(*comparison.correction) : Json(nullptr);
+  json["correction"] =
+      comparison.correction ? CorrectionJson(*comparison.correction) : Json(nullptr);
   json["region"] = comparison.region ? RegionJson(*comparison.region) : Json(nullptr);
   json["body"] = comparison.body_parts ? BodyPartsJson(*comparison.body_parts) : Json(nullptr);
   json["warnings"] = comparison.warnings;
@@ -135,7 +155,23 @@ std::string ResultJson(const Comparison& comparison) {
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-ResultPictures DrawResult(const Comparison& comparison, const HeightMap* reference_height, const PictureOptions& options) {
+namespace {
+
+/// White where a cell of the reference's grid belongs to the region of interest.
+void WriteRegion(const fs::path& file, const Comparison& comparison) {
+  if (!comparison.deviation || comparison.region_mask.empty()) return;
+  const GridShape& grid = comparison.deviation->grid;
+  const cv::Mat mask(grid.height, grid.width, CV_8UC1,
+                     const_cast<std::uint8_t*>(comparison.region_mask.data()));
+  cv::Mat picture;
+  cv::threshold(mask, picture, 0, 255, cv::THRESH_BINARY);
+  WritePng(file, picture);
+}
+
+}  // namespace
+
+ResultPictures DrawResult(const Comparison& comparison, const HeightMap* reference_height,
+                          const PictureOptions& options) {
   ResultPictures pictures;
   if (comparison.deviation) {
     ErrorImageOptions error;
@@ -155,11 +191,13 @@ ResultPictures DrawResult(const Comparison& comparison, const HeightMap* referen
   return pictures;
 }
 
-void WriteResult(const Comparison& comparison, const ResultPictures& pictures, const fs::path& folder) {
+void WriteResult(const Comparison& comparison, const ResultPictures& pictures,
+                 const fs::path& folder) {
   AtomicFolder output(folder, ResultOutput());
   WriteMap(output.path() / "deviation.tiff", comparison.deviation);
   WriteMap(output.path() / "distance.tiff", comparison.distance);
   WriteMap(output.path() / "deviation_after.tiff", comparison.deviation_after);
+  WriteRegion(output.path() / "region.png", comparison);
   if (!pictures.error_map.empty()) WritePng(output.path() / "error_map.png", pictures.error_map);
   if (!pictures.overlay.empty()) WritePng(output.path() / "overlay.png", pictures.overlay);
   WriteWholeFile(output.path() / "result.json", ResultJson(comparison));
@@ -171,12 +209,16 @@ std::string ReadResultJson(const fs::path& folder) {
   std::string text = ReadTextFile(file, kMaxJsonBytes);
   const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (!json.is_object() || !json.contains("format") || !json["format"].is_number_integer()) {
-    throw DataError(fmt::format("{} is no result of plumb compare: expected a JSON object with a format; compare again", file.string()));
+    throw DataError(fmt::format(
+        "{} is no result of plumb compare: expected a JSON object with a format; compare again",
+        file.string()));
   }
   const auto format = json["format"].get<std::int64_t>();
   if (format != kFormat) {
-    throw DataError(fmt::format("{} has format {}, this version reads format {}; update Plumb or compare again with this version",
-                                file.string(), format, kFormat));
+    throw DataError(
+        fmt::format("{} has format {}, this version reads format {}; update Plumb or compare again "
+                    "with this version",
+                    file.string(), format, kFormat));
   }
   return text;
 }

@@ -12,10 +12,12 @@
 
 namespace plumb {
 
-/// result.json, deviation.tiff, distance.tiff, deviation_after.tiff, error_map.png, overlay.png.
+/// result.json, deviation.tiff, distance.tiff, deviation_after.tiff, error_map.png, overlay.png,
+/// region.png (the region that was compared, where there is one).
 [[nodiscard]] OutputKind ResultOutput();
 
-/// The text of result.json, also what `compare --json` prints. Absent results are null; numbers read back bit for bit.
+/// The text of result.json, also what `compare --json` prints. Absent results are null; numbers
+/// read back bit for bit.
 [[nodiscard]] std::string ResultJson(const Comparison& comparison);
 
 struct PictureOptions {
@@ -31,13 +33,15 @@ struct ResultPictures {
 };
 
 /// @param reference_height  Of the reference scene; null where it has none.
-[[nodiscard]] ResultPictures DrawResult(const Comparison& comparison, const HeightMap* reference_height,
+[[nodiscard]] ResultPictures DrawResult(const Comparison& comparison,
+                                        const HeightMap* reference_height,
                                         const PictureOptions& options = {});
 
-/// Writes a result, whole or not at all; replaces an older result at that place. Maps and pictures that do not exist are left
-/// out. Same comparison, same bytes.
+/// Writes a result, whole or not at all; replaces an older result at that place. Maps and pictures
+/// that do not exist are left out. Same comparison, same bytes.
 /// @throws IoError
-void WriteResult(const Comparison& comparison, const ResultPictures& pictures, const std::filesystem::path& folder);
+void WriteResult(const Comparison& comparison, const ResultPictures& pictures,
+                 const std::filesystem::path& folder);
 
 /// The text of a result's result.json, checked to be JSON of a format that this version knows.
 /// @throws DataError

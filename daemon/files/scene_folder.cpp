@@ -7,13 +7,13 @@
 #include <opencv2/core.hpp>
 #include <stdexcept>
 
-#include "algo/types/check_stop.hpp"
-#include "algo/types/errors.hpp"
+#include "algo/base/check_stop.hpp"
+#include "algo/base/errors.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "daemon/files/scene_json.hpp"
 #include "daemon/files/trajectory_file.hpp"
-#include "drivers/replay/file_io.hpp"
-#include "drivers/replay/image_file.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
 
 namespace plumb {
 namespace {
@@ -30,19 +30,22 @@ std::vector<StampedPose> ReadTrajectory(const fs::path& file) {
 HeightMap ReadHeightMap(const fs::path& file, const GridShape& grid) {
   const cv::Mat values = ReadFloatTiff(file);
   if (values.cols != grid.width || values.rows != grid.height) {
-    throw DataError(fmt::format("{} has {}x{} values, scene.json states {}x{}; make the scene again", file.string(), values.cols,
-                                values.rows, grid.width, grid.height));
+    throw DataError(
+        fmt::format("{} has {}x{} values, scene.json states {}x{}; make the scene again",
+                    file.string(), values.cols, values.rows, grid.width, grid.height));
   }
   HeightMap map(grid);
   for (int row = 0; row < grid.height; ++row) {
     const auto* in = values.ptr<float>(row);
     for (int column = 0; column < grid.width; ++column) {
       if (std::isinf(in[column])) {
-        throw DataError(fmt::format("{} holds an infinite height in row {}, column {}; make the scene again", file.string(), row, column));
+        throw DataError(
+            fmt::format("{} holds an infinite height in row {}, column {}; make the scene again",
+                        file.string(), row, column));
       }
     }
-    std::memcpy(map.z.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width), in,
-                static_cast<std::size_t>(grid.width) * sizeof(float));
+    std::memcpy(map.z.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width),
+                in, static_cast<std::size_t>(grid.width) * sizeof(float));
   }
   return map;
 }
@@ -51,12 +54,14 @@ HeightMap ReadHeightMap(const fs::path& file, const GridShape& grid) {
 void CheckFinite(const Scene& scene) {
   for (const auto* poses : {&scene.keyframes, &scene.trajectory}) {
     for (const StampedPose& pose : *poses) {
-      if (!std::isfinite(pose.time_s) || !IsFinite(pose.T_world_camera)) throw std::invalid_argument("scene: a pose is not finite");
+      if (!std::isfinite(pose.time_s) || !IsFinite(pose.T_world_camera))
+        throw std::invalid_argument("scene: a pose is not finite");
     }
   }
   for (const auto& [id, marker] : scene.markers) {
     for (const Eigen::Vector3d& corner : marker.corners) {
-      if (!corner.allFinite()) throw std::invalid_argument(fmt::format("scene: a corner of marker {} is not finite", id));
+      if (!corner.allFinite())
+        throw std::invalid_argument(fmt::format("scene: a corner of marker {} is not finite", id));
     }
   }
 }
@@ -64,7 +69,10 @@ void CheckFinite(const Scene& scene) {
 }  // namespace
 
 OutputKind SceneOutput() {
-  return {"scene", "scene.json", {"scene.json", "trajectory.txt", "trajectory_all.txt", "cloud.ply", "heightmap.tiff", "mesh.ply"}};
+  return {"scene",
+          "scene.json",
+          {"scene.json", "trajectory.txt", "trajectory_all.txt", "cloud.ply", "heightmap.tiff",
+           "mesh.ply"}};
 }
 
 void WriteScene(const Scene& scene, const fs::path& folder, const std::stop_token& stop) {
@@ -78,7 +86,8 @@ void WriteScene(const Scene& scene, const fs::path& folder, const std::stop_toke
   if (scene.height_map) {
     const HeightMap& map = *scene.height_map;
     // The image borrows the values; it is only read.
-    const cv::Mat values(map.grid.height, map.grid.width, CV_32FC1, const_cast<float*>(map.z.data()));
+    const cv::Mat values(map.grid.height, map.grid.width, CV_32FC1,
+                         const_cast<float*>(map.z.data()));
     WriteFloatTiff(output.path() / "heightmap.tiff", values);
   }
   CheckStop(stop);
@@ -91,7 +100,8 @@ void WriteScene(const Scene& scene, const fs::path& folder, const std::stop_toke
 Scene ReadScene(const fs::path& folder, const SceneParts& parts) {
   if (!IsSceneFolder(folder)) {
     std::error_code error;
-    throw DataError(fmt::format("scene {} {}; expected a folder that plumb reconstruct wrote", folder.string(),
+    throw DataError(fmt::format("scene {} {}; expected a folder that plumb reconstruct wrote",
+                                folder.string(),
                                 fs::exists(folder, error) ? "holds no scene.json" : "is missing"));
   }
   const fs::path json = folder / "scene.json";
@@ -99,12 +109,14 @@ Scene ReadScene(const fs::path& folder, const SceneParts& parts) {
   Scene scene = std::move(header.scene);
   scene.keyframes = ReadTrajectory(folder / "trajectory.txt");
   if (scene.keyframes.size() != header.num_keyframes) {
-    throw DataError(fmt::format("{} has {} poses, scene.json states {} keyframes; make the scene again",
-                                (folder / "trajectory.txt").string(), scene.keyframes.size(), header.num_keyframes));
+    throw DataError(fmt::format(
+        "{} has {} poses, scene.json states {} keyframes; make the scene again",
+        (folder / "trajectory.txt").string(), scene.keyframes.size(), header.num_keyframes));
   }
   scene.trajectory = ReadTrajectory(folder / "trajectory_all.txt");
   if (parts.cloud) scene.cloud = ReadCloudPly(folder / "cloud.ply");
-  if (parts.height_map && header.grid) scene.height_map = ReadHeightMap(folder / "heightmap.tiff", *header.grid);
+  if (parts.height_map && header.grid)
+    scene.height_map = ReadHeightMap(folder / "heightmap.tiff", *header.grid);
   const fs::path mesh = folder / "mesh.ply";
   if (parts.mesh && fs::exists(mesh)) scene.mesh = ReadMeshPly(mesh);
   return scene;

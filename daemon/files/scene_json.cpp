@@ -6,9 +6,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "algo/types/marker_dictionary.hpp"
-#include "drivers/replay/image_file.hpp"
+#include "drivers/files/image_file.hpp"
 
 namespace plumb {
 namespace {
@@ -34,11 +34,14 @@ class Value {
 
   [[nodiscard]] Value operator[](const char* key) const {
     if (!json_.is_object()) Fail("is no object");
-    if (!json_.contains(key)) throw DataError(fmt::format("{}.{} is missing; make the scene again", where_, key));
+    if (!json_.contains(key))
+      throw DataError(fmt::format("{}.{} is missing; make the scene again", where_, key));
     return {json_[key], fmt::format("{}.{}", where_, key)};
   }
 
-  [[nodiscard]] Value At(std::size_t index) const { return {json_[index], fmt::format("{}[{}]", where_, index)}; }
+  [[nodiscard]] Value At(std::size_t index) const {
+    return {json_[index], fmt::format("{}[{}]", where_, index)};
+  }
 
   [[nodiscard]] std::string Text() const {
     if (!json_.is_string()) Fail("is no text");
@@ -48,7 +51,8 @@ class Value {
   [[nodiscard]] double Number(double min, double max) const {
     if (!json_.is_number()) Fail("is no number");
     const double value = json_.get<double>();
-    if (!(value >= min && value <= max)) Fail(fmt::format("is {}, expected {} to {}", value, min, max));
+    if (!(value >= min && value <= max))
+      Fail(fmt::format("is {}, expected {} to {}", value, min, max));
     return value;
   }
 
@@ -65,10 +69,13 @@ class Value {
   template <typename Visit>
   void ForEach(const Visit& visit) const {
     if (!json_.is_object()) Fail("is no object");
-    for (const auto& [key, value] : json_.items()) visit(key, Value(value, fmt::format("{}.{}", where_, key.substr(0, 40))));
+    for (const auto& [key, value] : json_.items())
+      visit(key, Value(value, fmt::format("{}.{}", where_, key.substr(0, 40))));
   }
 
-  [[noreturn]] void Fail(const std::string& what) const { throw DataError(fmt::format("{} {}; make the scene again", where_, what)); }
+  [[noreturn]] void Fail(const std::string& what) const {
+    throw DataError(fmt::format("{} {}; make the scene again", where_, what));
+  }
 
  private:
   const Json& json_;
@@ -94,13 +101,15 @@ int MarkerId(const std::string& key, const Value& value) {
 void ReadMarkers(const Value& root, Scene& scene) {
   root["markers"].ForEach([&](const std::string& key, const Value& corners) {
     SceneMarker& marker = scene.markers[MarkerId(key, corners)];
-    if (scene.markers.size() > kMaxMarkers) corners.Fail(fmt::format("is one of more than {} markers", kMaxMarkers));
+    if (scene.markers.size() > kMaxMarkers)
+      corners.Fail(fmt::format("is one of more than {} markers", kMaxMarkers));
     corners.RequireArray(4);
     for (std::size_t k = 0; k < 4; ++k) {
       const Value corner = corners.At(k);
       corner.RequireArray(3);
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        marker.corners[k][static_cast<Eigen::Index>(axis)] = corner.At(axis).Number(-kMaxCoordinate_m, kMaxCoordinate_m);
+        marker.corners[k][static_cast<Eigen::Index>(axis)] =
+            corner.At(axis).Number(-kMaxCoordinate_m, kMaxCoordinate_m);
       }
     }
   });
@@ -110,11 +119,14 @@ void ReadMarkers(const Value& root, Scene& scene) {
     return marker->second;
   };
   if (root.has("marker_views")) {
-    root["marker_views"].ForEach(
-        [&](const std::string& key, const Value& views) { find(key, views).num_views = static_cast<int>(views.Integer(0, kMaxCount)); });
+    root["marker_views"].ForEach([&](const std::string& key, const Value& views) {
+      find(key, views).num_views = static_cast<int>(views.Integer(0, kMaxCount));
+    });
   }
   if (root.has("marker_sigma_m")) {
-    root["marker_sigma_m"].ForEach([&](const std::string& key, const Value& sigma) { find(key, sigma).sigma_m = sigma.Number(0, 1e3); });
+    root["marker_sigma_m"].ForEach([&](const std::string& key, const Value& sigma) {
+      find(key, sigma).sigma_m = sigma.Number(0, 1e3);
+    });
   }
 }
 
@@ -148,7 +160,8 @@ Json ParseText(std::string_view text, const std::string& name) {
   try {
     return Json::parse(text.begin(), text.end());
   } catch (const Json::exception& error) {
-    throw DataError(fmt::format("{} is no JSON: {}; make the scene again", name, std::string_view(error.what()).substr(0, 200)));
+    throw DataError(fmt::format("{} is no JSON: {}; make the scene again", name,
+                                std::string_view(error.what()).substr(0, 200)));
   }
 }
 
@@ -168,7 +181,8 @@ std::string SceneJson(const Scene& scene) {
   for (const auto& [id, marker] : scene.markers) {
     const std::string key = std::to_string(id);
     Json corners = Json::array();
-    for (const Eigen::Vector3d& corner : marker.corners) corners.push_back({corner.x(), corner.y(), corner.z()});
+    for (const Eigen::Vector3d& corner : marker.corners)
+      corners.push_back({corner.x(), corner.y(), corner.z()});
     json["markers"][key] = corners;
     json["marker_views"][key] = marker.num_views;
     json["marker_sigma_m"][key] = marker.sigma_m;
@@ -176,10 +190,16 @@ std::string SceneJson(const Scene& scene) {
   json["heightmap"] = nullptr;
   if (scene.height_map) {
     const GridShape& grid = scene.height_map->grid;
-    json["heightmap"] = {{"x_min", grid.x_min}, {"y_min", grid.y_min}, {"step", grid.step}, {"width", grid.width}, {"height", grid.height}};
+    json["heightmap"] = {{"x_min", grid.x_min},
+                         {"y_min", grid.y_min},
+                         {"step", grid.step},
+                         {"width", grid.width},
+                         {"height", grid.height}};
   }
   json["keyframes"] = scene.keyframes.size();
-  json["frames"] = {{"total", scene.frames_total}, {"tracked", scene.frames_tracked}, {"dropped", scene.frames_dropped}};
+  json["frames"] = {{"total", scene.frames_total},
+                    {"tracked", scene.frames_tracked},
+                    {"dropped", scene.frames_dropped}};
   json["longest_lost_s"] = scene.longest_lost_s;
   json["calibration"] = MapJson(scene.calibration);
   json["timings_s"] = MapJson(scene.timings_s);
@@ -194,21 +214,25 @@ SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
   const Value format_value = root["format"];
   const std::int64_t format = format_value.Integer(-kMaxCount, kMaxCount);
   if (format > kFormat) {
-    throw DataError(fmt::format("{} has format {}, this version reads format {}; update Plumb or make the scene again with this version",
-                                name, format, kFormat));
+    throw DataError(
+        fmt::format("{} has format {}, this version reads format {}; update Plumb or make the "
+                    "scene again with this version",
+                    name, format, kFormat));
   }
   if (format < kFormat) format_value.Fail(fmt::format("is {}, expected {}", format, kFormat));
 
   SceneHeader header;
   Scene& scene = header.scene;
   const std::string preset = root["preset"].Text();
-  if (preset != Name(Preset::kBest) && preset != Name(Preset::kPaper)) root["preset"].Fail("is neither best nor paper");
+  if (preset != Name(Preset::kBest) && preset != Name(Preset::kPaper))
+    root["preset"].Fail("is neither best nor paper");
   scene.preset = preset == Name(Preset::kBest) ? Preset::kBest : Preset::kPaper;
   const std::string frame = root["frame"].Text();
   if (frame != Name(SceneFrame::kReferenceMarker) && frame != Name(SceneFrame::kFirstKeyframe)) {
     root["frame"].Fail("is neither reference_marker nor first_keyframe");
   }
-  scene.frame = frame == Name(SceneFrame::kReferenceMarker) ? SceneFrame::kReferenceMarker : SceneFrame::kFirstKeyframe;
+  scene.frame = frame == Name(SceneFrame::kReferenceMarker) ? SceneFrame::kReferenceMarker
+                                                            : SceneFrame::kFirstKeyframe;
   ReadMarkerKind(root, scene);
   ReadMarkers(root, scene);
   header.grid = ReadGrid(root["heightmap"]);
@@ -219,15 +243,20 @@ SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
   scene.frames_dropped = frames["dropped"].Integer(0, kMaxCount);
   if (root.has("longest_lost_s")) scene.longest_lost_s = root["longest_lost_s"].Number(0, 1e9);
   if (root.has("calibration")) {
-    root["calibration"].ForEach([&](const std::string& key, const Value& value) { scene.calibration[key] = value.Number(-1e12, 1e12); });
+    root["calibration"].ForEach([&](const std::string& key, const Value& value) {
+      scene.calibration[key] = value.Number(-1e12, 1e12);
+    });
   }
   if (root.has("timings_s")) {
-    root["timings_s"].ForEach([&](const std::string& key, const Value& value) { scene.timings_s[key] = value.Number(0, 1e9); });
+    root["timings_s"].ForEach([&](const std::string& key, const Value& value) {
+      scene.timings_s[key] = value.Number(0, 1e9);
+    });
   }
   if (root.has("warnings")) {
     const Value warnings = root["warnings"];
     if (!warnings.json().is_array()) warnings.Fail("is no list");
-    for (std::size_t i = 0; i < warnings.json().size(); ++i) scene.warnings.push_back(warnings.At(i).Text());
+    for (std::size_t i = 0; i < warnings.json().size(); ++i)
+      scene.warnings.push_back(warnings.At(i).Text());
   }
   return header;
 }

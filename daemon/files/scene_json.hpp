@@ -11,10 +11,12 @@
 
 namespace plumb {
 
-/// The text of scene.json, also what `reconstruct --json` prints. Numbers read back bit for bit; keys in a fixed order.
+/// The text of scene.json, also what `reconstruct --json` prints. Numbers read back bit for bit;
+/// keys in a fixed order.
 [[nodiscard]] std::string SceneJson(const Scene& scene);
 
-/// What scene.json holds: a scene without its poses, cloud, heights and mesh, and how many or large those must be.
+/// The contents of scene.json: a scene without its poses, cloud, heights and mesh, and how many or
+/// large those must be.
 struct SceneHeader {
   Scene scene;
   std::size_t num_keyframes = 0;
@@ -23,7 +25,8 @@ struct SceneHeader {
 
 /// Reads and checks scene.json of format 1.
 /// @param name  Of the file, for messages.
-/// @throws DataError naming file and key: a newer format, a missing key, a number that is not finite or absurdly large.
+/// @throws DataError naming file and key: a newer format, a missing key, a number that is not
+/// finite or absurdly large.
 [[nodiscard]] SceneHeader ParseSceneJson(std::string_view text, const std::string& name);
 
 }  // namespace plumb

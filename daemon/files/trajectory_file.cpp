@@ -6,7 +6,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb {
 namespace {
@@ -33,8 +33,8 @@ std::string TrajectoryText(std::span<const StampedPose> poses) {
     Eigen::Quaterniond q(pose.T_world_camera.linear());
     q.normalize();
     if (q.w() < 0) q.coeffs() = -q.coeffs();
-    text += fmt::format("{:.6f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", pose.time_s, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(),
-                        q.w());
+    text += fmt::format("{:.6f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", pose.time_s,
+                        t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
   }
   return text;
 }
@@ -55,18 +55,23 @@ std::vector<StampedPose> ParseTrajectory(std::string_view text, const std::strin
     bool good = true;
     for (double& value : v) good = good && TakeNumber(line, value) && std::isfinite(value);
     if (!good || line.find_first_not_of(" \t") != std::string_view::npos) {
-      throw DataError(
-          fmt::format("{} line {}: expected 8 finite numbers, time tx ty tz qx qy qz qw; make the scene again", name, line_number));
+      throw DataError(fmt::format(
+          "{} line {}: expected 8 finite numbers, time tx ty tz qx qy qz qw; make the scene again",
+          name, line_number));
     }
     const Eigen::Vector3d translation_m(v[1], v[2], v[3]);
     const Eigen::Quaterniond q(v[7], v[4], v[5], v[6]);
-    if (std::abs(q.norm() - 1) > kQuaternionTolerance || translation_m.cwiseAbs().maxCoeff() > kMaxCoordinate_m) {
-      throw DataError(fmt::format("{} line {}: the pose has a quaternion of length {} at {:.3g} m; expected length 1 within {} m", name,
-                                  line_number, q.norm(), translation_m.norm(), kMaxCoordinate_m));
+    if (std::abs(q.norm() - 1) > kQuaternionTolerance ||
+        translation_m.cwiseAbs().maxCoeff() > kMaxCoordinate_m) {
+      throw DataError(
+          fmt::format("{} line {}: the pose has a quaternion of length {} at {:.3g} m; expected "
+                      "length 1 within {} m",
+                      name, line_number, q.norm(), translation_m.norm(), kMaxCoordinate_m));
     }
     if (!poses.empty() && !(v[0] > poses.back().time_s)) {
       throw DataError(
-          fmt::format("{} line {}: time {:.6f} is not later than the one before ({:.6f})", name, line_number, v[0], poses.back().time_s));
+          fmt::format("{} line {}: time {:.6f} is not later than the one before ({:.6f})", name,
+                      line_number, v[0], poses.back().time_s));
     }
     StampedPose pose{v[0], Pose::Identity()};
     pose.T_world_camera.linear() = q.normalized().toRotationMatrix();

@@ -14,7 +14,9 @@ namespace plumb {
 [[nodiscard]] std::string TrajectoryText(std::span<const StampedPose> poses);
 
 /// Reads what TrajectoryText() writes; comments (#) and empty lines are skipped.
-/// @throws DataError naming file and line: a number that is missing or not finite, no unit quaternion, stamps that do not rise.
-[[nodiscard]] std::vector<StampedPose> ParseTrajectory(std::string_view text, const std::string& name);
+/// @throws DataError naming file and line: a number that is missing or not finite, no unit
+/// quaternion, stamps that do not rise.
+[[nodiscard]] std::vector<StampedPose> ParseTrajectory(std::string_view text,
+                                                       const std::string& name);
 
 }  // namespace plumb

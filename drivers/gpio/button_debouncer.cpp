@@ -5,7 +5,12 @@
 namespace plumb {
 
 ButtonDebouncer::ButtonDebouncer(const Options& options, bool pressed, Clock::time_point now)
-    : options_(options), level_(pressed), stable_(pressed), ignored_(pressed), changed_(now), begin_(now) {}
+    : options_(options),
+      level_(pressed),
+      stable_(pressed),
+      ignored_(pressed),
+      changed_(now),
+      begin_(now) {}
 
 std::optional<ButtonPress> ButtonDebouncer::OnEdge(bool pressed, Clock::time_point then) {
   const std::optional<ButtonPress> press = OnTime(then);
@@ -22,7 +27,8 @@ std::optional<ButtonPress> ButtonDebouncer::OnLevel(bool pressed, Clock::time_po
 
 void ButtonDebouncer::Set(bool pressed, Clock::time_point then) {
   if (pressed == level_) return;
-  if (pressed && !stable_ && then - changed_ >= options_.debounce) begin_ = then;  // first contact after a rest
+  if (pressed && !stable_ && then - changed_ >= options_.debounce)
+    begin_ = then;  // first contact after a rest
   level_ = pressed;
   changed_ = then;
 }

@@ -12,13 +12,14 @@
 
 #include <fmt/format.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb {
 namespace {
 
 constexpr char kConsumer[] = "plumb";
-constexpr int kMaxEvents = 64;  // of one dispatch; a line that chatters for ever must not hold the loop
+constexpr int kMaxEvents =
+    64;  // of one dispatch; a line that never stops chattering must not block the loop
 
 struct ChipCloser {
   void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }  // releases its lines too
@@ -26,9 +27,11 @@ struct ChipCloser {
 using Chip = std::unique_ptr<gpiod_chip, ChipCloser>;
 
 std::string Reason(int error) {
-  if (error == EACCES || error == EPERM) return "no permission; put the user into the group of /dev/gpiochip* (usually gpio)";
+  if (error == EACCES || error == EPERM)
+    return "no permission; put the user into the group of /dev/gpiochip* (usually gpio)";
   if (error == EBUSY) return "another program uses it";
-  if (error == ENOENT || error == ENODEV) return "there is none; `plumb doctor` lists chips and lines";
+  if (error == ENOENT || error == ENODEV)
+    return "there is none; `plumb doctor` lists chips and lines";
   return std::strerror(error);
 }
 
@@ -43,12 +46,15 @@ gpiod_line* FindLine(const Chip& chip, const GpioLineName& where) {
   unsigned number = 0;
   if (where.line.starts_with('#')) {
     const char* end = where.line.data() + where.line.size();
-    if (std::from_chars(where.line.data() + 1, end, number).ptr == end) line = gpiod_chip_get_line(chip.get(), number);
+    if (std::from_chars(where.line.data() + 1, end, number).ptr == end)
+      line = gpiod_chip_get_line(chip.get(), number);
   } else {
     line = gpiod_chip_find_line(chip.get(), where.line.c_str());
   }
   if (line == nullptr)
-    throw DeviceError(fmt::format("GPIO line {} of chip {}: there is none; `plumb doctor` lists chips and lines", where.line, where.chip));
+    throw DeviceError(
+        fmt::format("GPIO line {} of chip {}: there is none; `plumb doctor` lists chips and lines",
+                    where.line, where.chip));
   return line;
 }
 
@@ -66,26 +72,33 @@ struct GpioButton::Impl {
     if (press && pressed) pressed(*press);
   }
 
-  /// When it happened by its stamp, so that a loop that comes late still sees how long the button was held. Stamps are of the monotonic
-  /// clock since Linux 5.7; one of another clock does not fit between the last time and now.
-  [[nodiscard]] Clock::time_point TimeOf(const gpiod_line_event& event, Clock::time_point now) const {
-    const Clock::time_point stamp{std::chrono::seconds(event.ts.tv_sec) + std::chrono::nanoseconds(event.ts.tv_nsec)};
+  /// When it happened by its stamp, so that a loop that comes late still sees how long the button
+  /// was held. Stamps are of the monotonic clock since Linux 5.7; one of another clock does not fit
+  /// between the last time and now.
+  [[nodiscard]] Clock::time_point TimeOf(const gpiod_line_event& event,
+                                         Clock::time_point now) const {
+    const Clock::time_point stamp{std::chrono::seconds(event.ts.tv_sec) +
+                                  std::chrono::nanoseconds(event.ts.tv_nsec)};
     return stamp >= last && stamp <= now ? stamp : now;
   }
 };
 
 GpioButton::GpioButton(const GpioButtonOptions& options) : impl_(std::make_unique<Impl>()) {
-  impl_->name = fmt::format("button on GPIO line {} of chip {}", options.where.line, options.where.chip);
+  impl_->name =
+      fmt::format("button on GPIO line {} of chip {}", options.where.line, options.where.chip);
   impl_->chip = OpenChip(options.where.chip);
   impl_->line = FindLine(impl_->chip, options.where);
   gpiod_line_request_config config{};
   config.consumer = kConsumer;
   config.request_type = GPIOD_LINE_REQUEST_EVENT_BOTH_EDGES;
-  config.flags = options.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW | GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP
-                                    : GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_DOWN;
+  config.flags = options.active_low
+                     ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW | GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP
+                     : GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_DOWN;
   if (gpiod_line_request(impl_->line, &config, 0) != 0) {
-    config.flags = options.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;  // a chip without pull resistors inside
-    if (gpiod_line_request(impl_->line, &config, 0) != 0) throw DeviceError(fmt::format("{}: {}", impl_->name, Reason(errno)));
+    config.flags = options.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW
+                                      : 0;  // a chip without pull resistors inside
+    if (gpiod_line_request(impl_->line, &config, 0) != 0)
+      throw DeviceError(fmt::format("{}: {}", impl_->name, Reason(errno)));
   }
   const int value = gpiod_line_get_value(impl_->line);
   impl_->last = Clock::now();
@@ -96,9 +109,13 @@ GpioButton::~GpioButton() = default;
 
 int GpioButton::fd() const { return gpiod_line_event_get_fd(impl_->line); }
 
-std::optional<GpioButton::Clock::time_point> GpioButton::deadline() const { return impl_->debouncer->deadline(); }
+std::optional<GpioButton::Clock::time_point> GpioButton::deadline() const {
+  return impl_->debouncer->deadline();
+}
 
-void GpioButton::SetListener(std::function<void(ButtonPress)> pressed) { impl_->pressed = std::move(pressed); }
+void GpioButton::SetListener(std::function<void(ButtonPress)> pressed) {
+  impl_->pressed = std::move(pressed);
+}
 
 void GpioButton::Dispatch(Clock::time_point now) {
   for (int i = 0; i < kMaxEvents; ++i) {
@@ -108,12 +125,15 @@ void GpioButton::Dispatch(Clock::time_point now) {
     if ((wait.revents & POLLIN) == 0 || gpiod_line_event_read(impl_->line, &event) != 0)
       throw DeviceError(fmt::format("{} is gone", impl_->name));
     impl_->last = impl_->TimeOf(event, now);
-    impl_->Tell(impl_->debouncer->OnEdge(event.event_type == GPIOD_LINE_EVENT_RISING_EDGE, impl_->last));
+    impl_->Tell(
+        impl_->debouncer->OnEdge(event.event_type == GPIOD_LINE_EVENT_RISING_EDGE, impl_->last));
   }
   impl_->last = now;
-  // The kernel keeps 16 edges and drops those that come after: where the line is in the end only it can tell.
+  // The kernel keeps 16 edges and drops those that come after: where the line is in the end only it
+  // can decide.
   const int value = gpiod_line_get_value(impl_->line);
-  impl_->Tell(value < 0 ? impl_->debouncer->OnTime(now) : impl_->debouncer->OnLevel(value == 1, now));
+  impl_->Tell(value < 0 ? impl_->debouncer->OnTime(now)
+                        : impl_->debouncer->OnLevel(value == 1, now));
 }
 
 struct GpioIndicator::Impl {
@@ -131,21 +151,25 @@ struct GpioIndicator::Impl {
     for (std::size_t i = 0; i < lines.size(); ++i) {
       if (lines[i] == nullptr) continue;
       const bool is_light = (1 << i) != kBeeper;
-      const bool on = is_light && num_lights == 1 ? (outputs & kColours) != 0 : (outputs >> i & 1) != 0;
+      const bool on =
+          is_light && num_lights == 1 ? (outputs & kColours) != 0 : (outputs >> i & 1) != 0;
       (void)gpiod_line_set_value(lines[i], on ? 1 : 0);
     }
   }
 };
 
-GpioIndicator::GpioIndicator(const GpioIndicatorOptions& options) : impl_(std::make_unique<Impl>()) {
+GpioIndicator::GpioIndicator(const GpioIndicatorOptions& options)
+    : impl_(std::make_unique<Impl>()) {
   impl_->chip = OpenChip(options.chip);
-  const std::array<std::string, 4> names{options.lights[0], options.lights[1], options.lights[2], options.beeper};
+  const std::array<std::string, 4> names{options.lights[0], options.lights[1], options.lights[2],
+                                         options.beeper};
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i].empty()) continue;
     gpiod_line* line = FindLine(impl_->chip, {options.chip, names[i]});
     const int flags = options.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
     if (gpiod_line_request_output_flags(line, kConsumer, flags, 0) != 0)
-      throw DeviceError(fmt::format("light on GPIO line {} of chip {}: {}", names[i], options.chip, Reason(errno)));
+      throw DeviceError(fmt::format("light on GPIO line {} of chip {}: {}", names[i], options.chip,
+                                    Reason(errno)));
     impl_->lines[i] = line;
     impl_->num_lights += i < options.lights.size() ? 1 : 0;
   }
@@ -158,7 +182,9 @@ void GpioIndicator::Show(IndicatorPattern pattern) noexcept {
   impl_->Write();
 }
 
-std::optional<GpioIndicator::Clock::time_point> GpioIndicator::deadline() const { return impl_->player.deadline(); }
+std::optional<GpioIndicator::Clock::time_point> GpioIndicator::deadline() const {
+  return impl_->player.deadline();
+}
 
 void GpioIndicator::Dispatch(Clock::time_point now) noexcept {
   impl_->player.OnTime(now);
@@ -181,10 +207,12 @@ std::vector<GpioChipDescription> ListGpioChips() {
     description.label = gpiod_chip_label(chip.get());
     for (unsigned i = 0; i < gpiod_chip_num_lines(chip.get()); ++i) {
       gpiod_line* line = gpiod_chip_get_line(chip.get(), i);
-      if (line != nullptr && gpiod_line_name(line) != nullptr) description.lines.emplace_back(gpiod_line_name(line));
+      if (line != nullptr && gpiod_line_name(line) != nullptr)
+        description.lines.emplace_back(gpiod_line_name(line));
     }
   }
-  std::sort(chips.begin(), chips.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+  std::sort(chips.begin(), chips.end(),
+            [](const auto& a, const auto& b) { return a.name < b.name; });
   return chips;
 }
 

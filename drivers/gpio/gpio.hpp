@@ -1,4 +1,5 @@
-// Button and light on GPIO lines, by the names of chip and line. One thread, the event loop's, uses everything here.
+// Button and light on GPIO lines, by the names of chip and line. One thread, the event loop's, uses
+// everything here.
 #pragma once
 
 #include <array>
@@ -17,12 +18,13 @@ namespace plumb {
 /// A line of a chip.
 struct GpioLineName {
   std::string chip = "gpiochip0";  ///< Name, label, number or path of the chip.
-  std::string line;                ///< Name of the line, as the device tree has it, or its number as `#17`.
+  std::string line;  ///< Name of the line, as the device tree has it, or its number as `#17`.
 };
 
 struct GpioButtonOptions {
   GpioLineName where;
-  bool active_low = true;  ///< Pressed pulls the line to ground; the pull-up inside the chip is switched on.
+  bool active_low =
+      true;  ///< Pressed pulls the line to ground; the pull-up inside the chip is switched on.
   ButtonDebouncer::Options timing = {};
 };
 
@@ -68,7 +70,7 @@ class GpioIndicator : public Indicator {
   std::unique_ptr<Impl> impl_;
 };
 
-/// What is there, for diagnosis.
+/// The lines and chips that exist, for diagnosis.
 struct GpioChipDescription {
   std::string name, label;
   std::vector<std::string> lines;  ///< Names, of those that have one.

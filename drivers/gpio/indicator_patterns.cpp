@@ -9,27 +9,42 @@ using std::chrono::milliseconds;
 constexpr std::uint8_t kYellow = kRed | kGreen;
 
 constexpr std::array kOffSteps{IndicatorStep{0, milliseconds(0)}};
-constexpr std::array kNoSensorSteps{IndicatorStep{kRed, milliseconds(150)}, IndicatorStep{0, milliseconds(1850)}};
+constexpr std::array kNoSensorSteps{IndicatorStep{kRed, milliseconds(150)},
+                                    IndicatorStep{0, milliseconds(1850)}};
 constexpr std::array kReadySteps{IndicatorStep{kGreen, milliseconds(0)}};
-constexpr std::array kScanningSteps{IndicatorStep{kBlue | kBeeper, milliseconds(80)}, IndicatorStep{kBlue, milliseconds(0)}};
-constexpr std::array kTooFastSteps{IndicatorStep{kYellow | kBeeper, milliseconds(100)}, IndicatorStep{0, milliseconds(100)}};
-constexpr std::array kTooNearSteps{IndicatorStep{kYellow, milliseconds(100)}, IndicatorStep{0, milliseconds(150)},
-                                   IndicatorStep{kYellow, milliseconds(100)}, IndicatorStep{0, milliseconds(650)}};
-constexpr std::array kTooFarSteps{IndicatorStep{kYellow, milliseconds(400)}, IndicatorStep{0, milliseconds(150)},
-                                  IndicatorStep{kYellow, milliseconds(400)}, IndicatorStep{0, milliseconds(650)}};
-constexpr std::array kWorkingSteps{IndicatorStep{kBlue, milliseconds(500)}, IndicatorStep{0, milliseconds(500)}};
-constexpr std::array kDoneSteps{IndicatorStep{kGreen | kBeeper, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(800)},
-                                IndicatorStep{kBlue, milliseconds(1000)}, IndicatorStep{kGreen, milliseconds(1000)}};
-constexpr std::array kInToleranceSteps{IndicatorStep{kGreen | kBeeper, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(1800)},
-                                       IndicatorStep{0, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(1800)}};
-constexpr std::array kMoveSteps{IndicatorStep{kYellow | kBeeper, milliseconds(200)}, IndicatorStep{kYellow, milliseconds(800)},
-                                IndicatorStep{0, milliseconds(800)}, IndicatorStep{kYellow, milliseconds(800)}};
-constexpr std::array kNoAnswerSteps{IndicatorStep{kRed | kBeeper, milliseconds(100)}, IndicatorStep{0, milliseconds(100)},
-                                    IndicatorStep{kRed | kBeeper, milliseconds(100)}, IndicatorStep{kRed, milliseconds(300)},
-                                    IndicatorStep{0, milliseconds(300)}};
-constexpr std::array kFaultSteps{IndicatorStep{kRed, milliseconds(80)}, IndicatorStep{0, milliseconds(80)}};
+constexpr std::array kScanningSteps{IndicatorStep{kBlue | kBeeper, milliseconds(80)},
+                                    IndicatorStep{kBlue, milliseconds(0)}};
+constexpr std::array kTooFastSteps{IndicatorStep{kYellow | kBeeper, milliseconds(100)},
+                                   IndicatorStep{0, milliseconds(100)}};
+constexpr std::array kTooNearSteps{
+    IndicatorStep{kYellow, milliseconds(100)}, IndicatorStep{0, milliseconds(150)},
+    IndicatorStep{kYellow, milliseconds(100)}, IndicatorStep{0, milliseconds(650)}};
+constexpr std::array kTooFarSteps{
+    IndicatorStep{kYellow, milliseconds(400)}, IndicatorStep{0, milliseconds(150)},
+    IndicatorStep{kYellow, milliseconds(400)}, IndicatorStep{0, milliseconds(650)}};
+constexpr std::array kWorkingSteps{IndicatorStep{kBlue, milliseconds(500)},
+                                   IndicatorStep{0, milliseconds(500)}};
+constexpr std::array kDoneSteps{
+    IndicatorStep{kGreen | kBeeper, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(800)},
+    IndicatorStep{kBlue, milliseconds(1000)}, IndicatorStep{kGreen, milliseconds(1000)}};
+constexpr std::array kInToleranceSteps{
+    IndicatorStep{kGreen | kBeeper, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(1800)},
+    IndicatorStep{0, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(1800)}};
+// Green for the values, yellow for what is not sure of them; never green alone.
+constexpr std::array kUnsureSteps{
+    IndicatorStep{kYellow | kBeeper, milliseconds(200)}, IndicatorStep{kYellow, milliseconds(600)},
+    IndicatorStep{kGreen, milliseconds(600)}, IndicatorStep{kYellow, milliseconds(600)}};
+constexpr std::array kMoveSteps{
+    IndicatorStep{kYellow | kBeeper, milliseconds(200)}, IndicatorStep{kYellow, milliseconds(800)},
+    IndicatorStep{0, milliseconds(800)}, IndicatorStep{kYellow, milliseconds(800)}};
+constexpr std::array kNoAnswerSteps{
+    IndicatorStep{kRed | kBeeper, milliseconds(100)}, IndicatorStep{0, milliseconds(100)},
+    IndicatorStep{kRed | kBeeper, milliseconds(100)}, IndicatorStep{kRed, milliseconds(300)},
+    IndicatorStep{0, milliseconds(300)}};
+constexpr std::array kFaultSteps{IndicatorStep{kRed, milliseconds(80)},
+                                 IndicatorStep{0, milliseconds(80)}};
 
-constexpr int kMaxCatchUp = 64;  // steps; the loop slept longer than any rhythm, so it starts anew
+constexpr int kMaxCatchUp = 64;  // steps; the loop slept longer than any rhythm, so it starts again
 
 }  // namespace
 
@@ -55,6 +70,8 @@ IndicatorProgram ProgramOf(IndicatorPattern pattern) {
       return {kDoneSteps, 2};
     case IndicatorPattern::kResultInTolerance:
       return {kInToleranceSteps, 2};
+    case IndicatorPattern::kResultUnsure:
+      return {kUnsureSteps, 2};
     case IndicatorPattern::kResultMove:
       return {kMoveSteps, 2};
     case IndicatorPattern::kNoAnswer:

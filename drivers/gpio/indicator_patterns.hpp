@@ -1,4 +1,4 @@
-// What the light and the beeper do for each state: data, and the player of it.
+// The patterns of light and beeper for each state, and their player.
 #pragma once
 
 #include <chrono>
@@ -24,7 +24,7 @@ struct IndicatorProgram {
   std::size_t repeat_from = 0;
 };
 
-/// Patterns differ in rhythm too, so that one lamp of one colour tells them apart.
+/// Patterns differ in rhythm too, so that a lamp of one colour can show them all.
 [[nodiscard]] IndicatorProgram ProgramOf(IndicatorPattern pattern);
 
 /// Plays the program of one pattern. Pure: the caller brings the time.

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb {
 namespace {
@@ -14,13 +14,16 @@ std::size_t Side(StreamKind kind) { return kind == StreamKind::kColor ? 0 : 1; }
 
 }  // namespace
 
-FrameBox::FrameBox(std::string name, std::chrono::microseconds max_gap, std::chrono::milliseconds stall_time)
+FrameBox::FrameBox(std::string name, std::chrono::microseconds max_gap,
+                   std::chrono::milliseconds stall_time)
     : name_(std::move(name)), stall_time_(stall_time), pairing_(max_gap.count()) {}
 
 void FrameBox::Add(StreamKind kind, std::int64_t stamp_us, cv::Mat image) {
   {
     const std::lock_guard lock(mutex_);
-    if (std::vector<std::int64_t>& stamps = stamps_us_[Side(kind)]; keep_stamps_ && stamps.size() < kMaxStamps) stamps.push_back(stamp_us);
+    if (std::vector<std::int64_t>& stamps = stamps_us_[Side(kind)];
+        keep_stamps_ && stamps.size() < kMaxStamps)
+      stamps.push_back(stamp_us);
     auto pair = pairing_.Add(kind, stamp_us, std::move(image));
     if (!pair) return;
     if (skip_ > 0) {
@@ -105,13 +108,17 @@ std::optional<FrameBox::Pair> FrameBox::Take() {
   for (;;) {
     if (interrupted_) return std::nullopt;
     if (lost_) throw DeviceLost(fmt::format("sensor {} was unplugged; plug it in again", name_));
-    if (failed_) throw DeviceError(fmt::format("the driver of sensor {} reports an error; unplug it and plug it in again", name_));
+    if (failed_)
+      throw DeviceError(fmt::format(
+          "the driver of sensor {} reports an error; unplug it and plug it in again", name_));
     if (!pairs_.empty()) break;
     const Clock::time_point limit = last_arrival_ + stall_time_;
     if (Clock::now() >= limit) {
       throw DeviceError(
-          fmt::format("sensor {} has given no pair of images for {} ms ({} unpaired, {} discarded so far); unplug it and plug it in again",
-                      name_, stall_time_.count(), pairing_.num_unpaired(), pairing_.num_discarded() + num_discarded_));
+          fmt::format("sensor {} has given no pair of images for {} ms ({} unpaired, {} discarded "
+                      "so far); unplug it and plug it in again",
+                      name_, stall_time_.count(), pairing_.num_unpaired(),
+                      pairing_.num_discarded() + num_discarded_));
     }
     changed_.wait_until(lock, limit);
   }
@@ -129,7 +136,8 @@ SensorStatistics FrameBox::statistics() const {
   statistics.num_discarded = pairing_.num_discarded() + num_discarded_;
   statistics.num_lost = num_lost_;
   const Clock::time_point begin = Clock::now() - kRateWindow;
-  for (const Clock::time_point& arrival : arrivals_) statistics.frames_per_second += arrival > begin ? 1.0 : 0.0;
+  for (const Clock::time_point& arrival : arrivals_)
+    statistics.frames_per_second += arrival > begin ? 1.0 : 0.0;
   return statistics;
 }
 

@@ -18,7 +18,8 @@
 
 namespace plumb {
 
-/// Pairs images and holds the newest few. All functions may be called from any thread; only Take() waits.
+/// Pairs images and holds the newest few. All functions may be called from any thread; only Take()
+/// waits.
 class FrameBox {
  public:
   using Clock = std::chrono::steady_clock;
@@ -28,11 +29,13 @@ class FrameBox {
   };
 
   /// @param name  Of the sensor, for messages.
-  FrameBox(std::string name, std::chrono::microseconds max_gap, std::chrono::milliseconds stall_time);
+  FrameBox(std::string name, std::chrono::microseconds max_gap,
+           std::chrono::milliseconds stall_time);
 
   void Add(StreamKind kind, std::int64_t stamp_us, cv::Mat image);
   void CountDiscarded();
-  /// Numbers of the images of a stream as the driver counts them, of wrong ones too: a gap shows what never came.
+  /// Numbers of the images of a stream as the driver counts them, of wrong ones too: a gap shows
+  /// what never came.
   void CountGaps(StreamKind kind, std::int64_t number);
   void Lose() noexcept;                  ///< The unit is gone for good.
   void SetFailed(bool failed) noexcept;  ///< The driver reports an error, or that it is over.
@@ -40,7 +43,8 @@ class FrameBox {
   void Flush() noexcept;
   void KeepStamps(bool keep);  ///< From now on, for StampsOf().
   [[nodiscard]] std::vector<std::int64_t> StampsOf(StreamKind kind) const;
-  /// The streams have started: from now on pairs must come (opening takes seconds on a slow bus), and the first so many are thrown away.
+  /// The streams have started: from now on pairs must come (opening takes seconds on a slow bus),
+  /// and the first so many are thrown away.
   void Begin(int pairs_to_skip);
 
   /// The oldest pair that waits; nothing once interrupted.
@@ -50,7 +54,8 @@ class FrameBox {
   [[nodiscard]] bool lost() const;
 
  private:
-  static constexpr std::size_t kCapacity = 4;  ///< Pairs of 1.5 MB; the user's own queue is the one that counts what it drops.
+  static constexpr std::size_t kCapacity =
+      4;  ///< Pairs of 1.5 MB; the user's own queue is the one that counts what it drops.
 
   const std::string name_;
   const std::chrono::milliseconds stall_time_;
@@ -65,7 +70,8 @@ class FrameBox {
   std::int64_t num_discarded_ = 0;
   std::int64_t num_lost_ = 0;
   std::array<std::optional<std::int64_t>, 2> last_number_;
-  std::array<std::vector<std::int64_t>, 2> stamps_us_;  ///< Of all images that came, colour and depth.
+  std::array<std::vector<std::int64_t>, 2>
+      stamps_us_;  ///< Of all images that came, colour and depth.
   bool keep_stamps_ = false;
   int skip_ = 0;
   bool lost_ = false;

@@ -10,8 +10,9 @@ namespace plumb {
 
 enum class StreamKind { kColor, kDepth };
 
-/// Pairs two streams of images whose stamps are of one clock. Because the gap allowed is under half of the frame period, an image has at
-/// most one partner, so it does not matter which stream delivers first. Pure: no clock, no thread.
+/// Pairs two streams of images whose stamps are of one clock. Because the gap allowed is under half
+/// of the frame period, an image has at most one partner, so it does not matter which stream
+/// delivers first. Pure: no clock, no thread.
 template <typename Image>
 class FramePairing {
  public:
@@ -25,7 +26,8 @@ class FramePairing {
   /// @param max_gap_us  Largest difference between the stamps of a pair.
   explicit FramePairing(std::int64_t max_gap_us) : max_gap_us_(max_gap_us) {}
 
-  /// Takes the next image of a stream. An image that is not later than the one before it in its stream is discarded.
+  /// Takes the next image of a stream. An image that is not later than the one before it in its
+  /// stream is discarded.
   std::optional<Pair> Add(StreamKind kind, std::int64_t stamp_us, Image image) {
     Side& side = kind == StreamKind::kColor ? color_ : depth_;
     if (side.last_us && stamp_us <= *side.last_us) {
@@ -43,8 +45,12 @@ class FramePairing {
     depth_.waiting.clear();
   }
 
-  [[nodiscard]] std::int64_t num_unpaired() const { return num_unpaired_; }    ///< Images that found no partner.
-  [[nodiscard]] std::int64_t num_discarded() const { return num_discarded_; }  ///< Images that came twice or out of order.
+  [[nodiscard]] std::int64_t num_unpaired() const {
+    return num_unpaired_;
+  }  ///< Images that found no partner.
+  [[nodiscard]] std::int64_t num_discarded() const {
+    return num_discarded_;
+  }  ///< Images that came twice or out of order.
 
  private:
   static constexpr std::size_t kMaxWaiting = 4;  ///< Of one stream while the other is silent.

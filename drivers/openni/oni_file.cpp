@@ -12,17 +12,18 @@
 #include <map>
 #include <utility>
 
-#include "algo/types/errors.hpp"
-#include "drivers/replay/file_io.hpp"
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
 
 namespace plumb {
 namespace {
 
-// All numbers are little-endian. File header: magic, version (8 bytes), largest stamp (8), largest node id (4).
+// All numbers are little-endian. File header: magic, version (8 bytes), largest stamp (8), largest
+// node id (4).
 constexpr std::array<std::uint8_t, 4> kFileMagic{'N', 'I', '1', '0'};
 constexpr std::uint64_t kFileHeader = 24;
-// Record header: magic, kind, node, size of header and fields, size of the payload that follows (4 bytes each), place of an undone record
-// (8).
+// Record header: magic, kind, node, size of header and fields, size of the payload that follows (4
+// bytes each), place of an undone record (8).
 constexpr std::array<std::uint8_t, 4> kRecordMagic{'N', 'I', 'R', 0};
 constexpr std::uint64_t kRecordHeader = 28;
 constexpr std::uint32_t kDataBegin = 8;
@@ -36,12 +37,14 @@ constexpr std::uint32_t kMaxName = 1024;
 constexpr std::uint64_t kMaxRecords = 20'000'000;
 
 std::uint32_t Number(std::span<const std::uint8_t> bytes, std::size_t at) {
-  return bytes[at] | std::uint32_t{bytes[at + 1]} << 8 | std::uint32_t{bytes[at + 2]} << 16 | std::uint32_t{bytes[at + 3]} << 24;
+  return bytes[at] | std::uint32_t{bytes[at + 1]} << 8 | std::uint32_t{bytes[at + 2]} << 16 |
+         std::uint32_t{bytes[at + 3]} << 24;
 }
 
 class Descriptor {
  public:
-  Descriptor(const std::filesystem::path& file, int flags) : value_(::open(file.c_str(), flags | O_CLOEXEC | O_NONBLOCK)) {}
+  Descriptor(const std::filesystem::path& file, int flags)
+      : value_(::open(file.c_str(), flags | O_CLOEXEC | O_NONBLOCK)) {}
   ~Descriptor() {
     if (value_ >= 0) ::close(value_);
   }
@@ -59,7 +62,8 @@ class Descriptor {
 
 bool ReadAt(int descriptor, std::uint64_t offset, std::span<std::uint8_t> bytes) {
   for (std::size_t done = 0; done < bytes.size();) {
-    const ssize_t got = ::pread(descriptor, bytes.data() + done, bytes.size() - done, static_cast<off_t>(offset + done));
+    const ssize_t got = ::pread(descriptor, bytes.data() + done, bytes.size() - done,
+                                static_cast<off_t>(offset + done));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) return false;
     done += static_cast<std::size_t>(got);
@@ -67,7 +71,7 @@ bool ReadAt(int descriptor, std::uint64_t offset, std::span<std::uint8_t> bytes)
   return true;
 }
 
-/// 0: cannot be told.
+/// 0: unknown.
 std::uint32_t NodeKind(const ReadBytes& read, std::uint64_t fields) {
   std::array<std::uint8_t, 4> bytes{};
   if (!read(fields, bytes)) return 0;
@@ -79,21 +83,26 @@ std::uint32_t NodeKind(const ReadBytes& read, std::uint64_t fields) {
 
 std::optional<OniFileSummary> SummariseOniFile(const ReadBytes& read) {
   std::array<std::uint8_t, kRecordHeader> bytes{};
-  if (!read(0, std::span(bytes).first(kFileMagic.size())) || !std::equal(kFileMagic.begin(), kFileMagic.end(), bytes.begin()))
+  if (!read(0, std::span(bytes).first(kFileMagic.size())) ||
+      !std::equal(kFileMagic.begin(), kFileMagic.end(), bytes.begin()))
     return std::nullopt;
   OniFileSummary found;
   found.end = kFileHeader;
   std::map<std::uint32_t, std::uint32_t> kinds;  // of the nodes
   for (std::uint64_t record = 0; record < kMaxRecords; ++record) {
-    if (!read(found.end, bytes) || !std::equal(kRecordMagic.begin(), kRecordMagic.end(), bytes.begin())) return std::nullopt;
+    if (!read(found.end, bytes) ||
+        !std::equal(kRecordMagic.begin(), kRecordMagic.end(), bytes.begin()))
+      return std::nullopt;
     const std::uint32_t kind = Number(bytes, 4), node = Number(bytes, 8);
     const std::uint64_t size = Number(bytes, 12), payload = Number(bytes, 16);
     if (size < kRecordHeader) return std::nullopt;
-    if (kind == kNodeAdded && kinds.size() < kMaxNodes) kinds[node] = NodeKind(read, found.end + kRecordHeader);
+    if (kind == kNodeAdded && kinds.size() < kMaxNodes)
+      kinds[node] = NodeKind(read, found.end + kRecordHeader);
     if (kind == kNewData) {
       std::array<std::uint8_t, 8> stamp{};
       if (!read(found.end + kRecordHeader, stamp)) return std::nullopt;
-      const auto stamp_us = static_cast<std::int64_t>(Number(stamp, 0) | std::uint64_t{Number(stamp, 4)} << 32);
+      const auto stamp_us =
+          static_cast<std::int64_t>(Number(stamp, 0) | std::uint64_t{Number(stamp, 4)} << 32);
       if (kinds[node] == kDepthNode) found.depth_us.push_back(stamp_us);
       if (kinds[node] == kColorNode) found.color_us.push_back(stamp_us);
     }
@@ -107,9 +116,11 @@ bool HasOniDataBegun(const std::filesystem::path& file, int num_streams) {
   const Descriptor descriptor(file, O_RDONLY);
   std::array<std::uint8_t, kRecordHeader> bytes{};
   int num_begun = 0;
-  for (std::uint64_t at = kFileHeader; num_begun < num_streams; at += Number(bytes, 12) + std::uint64_t{Number(bytes, 16)}) {
+  for (std::uint64_t at = kFileHeader; num_begun < num_streams;
+       at += Number(bytes, 12) + std::uint64_t{Number(bytes, 16)}) {
     if (!descriptor.is_regular() || !ReadAt(descriptor.get(), at, bytes)) return false;
-    const bool is_record = std::equal(kRecordMagic.begin(), kRecordMagic.end(), bytes.begin()) && Number(bytes, 12) >= kRecordHeader;
+    const bool is_record = std::equal(kRecordMagic.begin(), kRecordMagic.end(), bytes.begin()) &&
+                           Number(bytes, 12) >= kRecordHeader;
     if (!is_record) return false;
     num_begun += Number(bytes, 4) == kDataBegin ? 1 : 0;
   }
@@ -119,7 +130,9 @@ bool HasOniDataBegun(const std::filesystem::path& file, int num_streams) {
 std::optional<OniFileSummary> SummariseOniFile(const std::filesystem::path& file) {
   const Descriptor descriptor(file, O_RDONLY);
   if (!descriptor.is_regular()) return std::nullopt;
-  return SummariseOniFile([&](std::uint64_t offset, std::span<std::uint8_t> bytes) { return ReadAt(descriptor.get(), offset, bytes); });
+  return SummariseOniFile([&](std::uint64_t offset, std::span<std::uint8_t> bytes) {
+    return ReadAt(descriptor.get(), offset, bytes);
+  });
 }
 
 bool IsOniFile(const std::filesystem::path& file) {
@@ -130,18 +143,25 @@ bool IsOniFile(const std::filesystem::path& file) {
 
 OniFileSummary TrimOniFile(const std::filesystem::path& file) {
   std::optional<OniFileSummary> found = SummariseOniFile(file);
-  if (!found) throw IoError(fmt::format("recording {} was not finished by OpenNI2 (no END record); is the disk full?", file.string()));
+  if (!found)
+    throw IoError(
+        fmt::format("recording {} was not finished by OpenNI2 (no END record); is the disk full?",
+                    file.string()));
   const Descriptor descriptor(file, O_WRONLY);
   struct stat status {};
-  if (descriptor.get() < 0 || ::fstat(descriptor.get(), &status) != 0) throw IoError(DescribeWriteError(file, errno));
+  if (descriptor.get() < 0 || ::fstat(descriptor.get(), &status) != 0)
+    throw IoError(DescribeWriteError(file, errno));
   if (static_cast<std::uint64_t>(status.st_size) < found->end)
-    throw IoError(fmt::format("recording {} ends before its END record; is the disk full?", file.string()));
-  if (::ftruncate(descriptor.get(), static_cast<off_t>(found->end)) != 0 || ::fsync(descriptor.get()) != 0)
+    throw IoError(
+        fmt::format("recording {} ends before its END record; is the disk full?", file.string()));
+  if (::ftruncate(descriptor.get(), static_cast<off_t>(found->end)) != 0 ||
+      ::fsync(descriptor.get()) != 0)
     throw IoError(DescribeWriteError(file, errno));
   return std::move(*found);
 }
 
-std::optional<std::int64_t> FindOniBegin(std::span<const std::int64_t> recorded_us, std::span<const std::int64_t> seen_us) {
+std::optional<std::int64_t> FindOniBegin(std::span<const std::int64_t> recorded_us,
+                                         std::span<const std::int64_t> seen_us) {
   constexpr std::int64_t kTolerance_us = 2;
   constexpr std::size_t kMaxTried = 300, kMaxCompared = 100;
   std::vector<std::int64_t> seen(seen_us.begin(), seen_us.end());
@@ -153,7 +173,8 @@ std::optional<std::int64_t> FindOniBegin(std::span<const std::int64_t> recorded_
   const auto try_begin = [&](std::int64_t candidate) {
     std::size_t matches = 0;
     for (const std::int64_t stamp : recorded) {
-      const auto near = std::lower_bound(seen.begin(), seen.end(), candidate + stamp - kTolerance_us);
+      const auto near =
+          std::lower_bound(seen.begin(), seen.end(), candidate + stamp - kTolerance_us);
       matches += near != seen.end() && *near <= candidate + stamp + kTolerance_us ? 1 : 0;
     }
     if (matches > best) {

@@ -1,5 +1,6 @@
-// What plumb-oni-reader, the child process that alone touches .oni files, writes to its standard output. Same machine, same build: numbers
-// as they lie in memory. The parent trusts nothing of it all the same.
+// The protocol of plumb-oni-reader, the only process that opens .oni files, on its standard
+// output. Same machine, same build: numbers as they lie in memory. The parent trusts nothing of it
+// all the same.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +22,8 @@ struct Header {
 enum class Kind : std::uint32_t {
   kFrame = 1,  ///< A FrameStamps, RGB (3 bytes a pixel), depth in mm (2 bytes a pixel) follow.
   kEnd = 2,    ///< An End follows, then nothing.
-  kError = 3,  ///< A length (4 bytes) and a text follow, then nothing. May come instead of the header, after its magic.
+  kError = 3,  ///< A length (4 bytes) and a text follow, then nothing. May come instead of the
+               ///< header, after its magic.
 };
 
 struct FrameStamps {

@@ -1,8 +1,8 @@
-// plumb-oni-reader FILE COLOR_BEGIN_US DEPTH_BEGIN_US: plays an .oni file with the system's OpenNI2 and writes its pairs of images to the
-// standard output.
+// plumb-oni-reader FILE COLOR_BEGIN_US DEPTH_BEGIN_US: plays an .oni file with the system's OpenNI2
+// and writes its pairs of images to the standard output.
 //
-// A process of its own because the library crashes on damaged files. It has no rights that its parent has not, little memory, and ends with
-// its parent.
+// A process of its own because the library crashes on damaged files. It has no rights that its
+// parent has not, little memory, and ends with its parent.
 #include <poll.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -23,7 +23,7 @@
 
 #include <fmt/format.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "drivers/openni/frame_pairing.hpp"
 #include "drivers/openni/oni_protocol.hpp"
 #include "drivers/openni/openni_library.hpp"
@@ -60,30 +60,37 @@ class Player {
   using Image = std::vector<std::uint8_t>;
 
   /// @param begin_us  Added to the stamps of depth and colour.
-  Player(const std::string& file, const std::array<std::int64_t, 2>& begin_us) : begin_us_(begin_us), library_(OpenNiLibrary::Load({})) {
+  Player(const std::string& file, const std::array<std::int64_t, 2>& begin_us)
+      : begin_us_(begin_us), library_(OpenNiLibrary::Load({})) {
     OniDeviceCallbacks callbacks{};
     callbacks.deviceConnected = callbacks.deviceDisconnected = [](const OniDeviceInfo*, void*) {};
     callbacks.deviceStateChanged = [](const OniDeviceInfo*, OniDeviceState state, void* self) {
       if (state == ONI_DEVICE_STATE_EOF) static_cast<Player*>(self)->at_end_ = true;
     };
     callbacks_ = callbacks;
-    library_->Check("OpenNI2 does not report", library_->RegisterDeviceCallbacks(&callbacks_, this, &handle_));
+    library_->Check("OpenNI2 does not report",
+                    library_->RegisterDeviceCallbacks(&callbacks_, this, &handle_));
     library_->Check("OpenNI2 cannot open it", library_->DeviceOpen(file.c_str(), &device_));
-    library_->Check("it holds no depth", library_->DeviceCreateStream(device_, ONI_SENSOR_DEPTH, &streams_[0]));
-    library_->Check("it holds no colour", library_->DeviceCreateStream(device_, ONI_SENSOR_COLOR, &streams_[1]));
+    library_->Check("it holds no depth",
+                    library_->DeviceCreateStream(device_, ONI_SENSOR_DEPTH, &streams_[0]));
+    library_->Check("it holds no colour",
+                    library_->DeviceCreateStream(device_, ONI_SENSOR_COLOR, &streams_[1]));
     const float manual = -1.0F;  // every image, in order, as fast as they are taken
     const OniBool once = FALSE;
     library_->Check("it cannot be played",
-                    library_->DeviceSetProperty(device_, ONI_DEVICE_PROPERTY_PLAYBACK_SPEED, &manual, sizeof manual));
+                    library_->DeviceSetProperty(device_, ONI_DEVICE_PROPERTY_PLAYBACK_SPEED,
+                                                &manual, sizeof manual));
     library_->Check("it cannot be played once",
-                    library_->DeviceSetProperty(device_, ONI_DEVICE_PROPERTY_PLAYBACK_REPEAT_ENABLED, &once, sizeof once));
+                    library_->DeviceSetProperty(
+                        device_, ONI_DEVICE_PROPERTY_PLAYBACK_REPEAT_ENABLED, &once, sizeof once));
     ReadShape();
   }
 
   void WriteHeader() const { Write(header_); }
 
   void Play() {
-    for (OniStreamHandle stream : streams_) library_->Check("it does not start", library_->StreamStart(stream));
+    for (OniStreamHandle stream : streams_)
+      library_->Check("it does not start", library_->StreamStart(stream));
     FramePairing<Image> pairing(kMaxGap_us);
     std::array<int, 2> taken{};
     int waits = 0;
@@ -93,22 +100,26 @@ class Player {
       if (status != ONI_STATUS_OK || index < 0 || index > 1) {
         if (++waits < (at_end_ ? kMaxWaitsAfterEnd : kMaxWaits)) continue;
         if (at_end_) break;
-        throw DataError(fmt::format("OpenNI2 gives nothing more after {} depth and {} colour images of {} and {}", taken[0], taken[1],
-                                    num_images_[0], num_images_[1]));
+        throw DataError(fmt::format(
+            "OpenNI2 gives nothing more after {} depth and {} colour images of {} and {}", taken[0],
+            taken[1], num_images_[0], num_images_[1]));
       }
       waits = 0;
       OniFrame* frame = nullptr;
-      library_->Check("an image cannot be read", library_->StreamReadFrame(streams_[static_cast<std::size_t>(index)], &frame));
+      library_->Check("an image cannot be read",
+                      library_->StreamReadFrame(streams_[static_cast<std::size_t>(index)], &frame));
       ++taken[static_cast<std::size_t>(index)];
       std::optional<Image> image = Copy(*frame, index == 0);
       const std::int64_t stamp =
-          static_cast<std::int64_t>(std::min(frame->timestamp, kMaxStamp_us)) + begin_us_[static_cast<std::size_t>(index)];
+          static_cast<std::int64_t>(std::min(frame->timestamp, kMaxStamp_us)) +
+          begin_us_[static_cast<std::size_t>(index)];
       library_->FrameRelease(frame);
       if (!image) {
         ++num_damaged_;
         continue;
       }
-      if (const auto pair = pairing.Add(index == 0 ? StreamKind::kDepth : StreamKind::kColor, stamp, std::move(*image))) {
+      if (const auto pair = pairing.Add(index == 0 ? StreamKind::kDepth : StreamKind::kColor, stamp,
+                                        std::move(*image))) {
         Write(oni::Kind::kFrame);
         Write(oni::FrameStamps{pair->color_us, pair->depth_us});
         WriteAll(pair->color.data(), pair->color.size());
@@ -129,41 +140,52 @@ class Player {
   }
 
   void ReadShape() {
-    const auto depth = Get<OniVideoMode>(streams_[0], ONI_STREAM_PROPERTY_VIDEO_MODE, "its depth has no size");
-    const auto color = Get<OniVideoMode>(streams_[1], ONI_STREAM_PROPERTY_VIDEO_MODE, "its colour has no size");
-    if (depth.pixelFormat != ONI_PIXEL_FORMAT_DEPTH_1_MM || color.pixelFormat != ONI_PIXEL_FORMAT_RGB888) {
-      throw DataError(fmt::format("expected depth in millimetres and colour as RGB, found formats {} and {}",
-                                  static_cast<int>(depth.pixelFormat), static_cast<int>(color.pixelFormat)));
+    const auto depth =
+        Get<OniVideoMode>(streams_[0], ONI_STREAM_PROPERTY_VIDEO_MODE, "its depth has no size");
+    const auto color =
+        Get<OniVideoMode>(streams_[1], ONI_STREAM_PROPERTY_VIDEO_MODE, "its colour has no size");
+    if (depth.pixelFormat != ONI_PIXEL_FORMAT_DEPTH_1_MM ||
+        color.pixelFormat != ONI_PIXEL_FORMAT_RGB888) {
+      throw DataError(
+          fmt::format("expected depth in millimetres and colour as RGB, found formats {} and {}",
+                      static_cast<int>(depth.pixelFormat), static_cast<int>(color.pixelFormat)));
     }
-    const bool sane = depth.resolutionX == color.resolutionX && depth.resolutionY == color.resolutionY && depth.resolutionX > 0 &&
-                      depth.resolutionX <= kMaxSide && depth.resolutionY > 0 && depth.resolutionY <= kMaxSide;
+    const bool sane = depth.resolutionX == color.resolutionX &&
+                      depth.resolutionY == color.resolutionY && depth.resolutionX > 0 &&
+                      depth.resolutionX <= kMaxSide && depth.resolutionY > 0 &&
+                      depth.resolutionY <= kMaxSide;
     if (!sane) {
-      throw DataError(fmt::format("expected depth and colour of one size, found {}x{} and {}x{}", depth.resolutionX, depth.resolutionY,
-                                  color.resolutionX, color.resolutionY));
+      throw DataError(fmt::format("expected depth and colour of one size, found {}x{} and {}x{}",
+                                  depth.resolutionX, depth.resolutionY, color.resolutionX,
+                                  color.resolutionY));
     }
     header_.width = depth.resolutionX;
     header_.height = depth.resolutionY;
     for (std::size_t i = 0; i < 2; ++i)
-      num_images_[i] = std::max(0, Get<int>(streams_[i], ONI_STREAM_PROPERTY_NUMBER_OF_FRAMES, "it does not tell its length"));
+      num_images_[i] = std::max(
+          0, Get<int>(streams_[i], ONI_STREAM_PROPERTY_NUMBER_OF_FRAMES, "its length is unknown"));
     header_.num_frames = std::min(num_images_[0], num_images_[1]);
     int size = sizeof header_.horizontal_fov_rad;
-    if (library_->StreamGetProperty(streams_[1], ONI_STREAM_PROPERTY_HORIZONTAL_FOV, &header_.horizontal_fov_rad, &size) != ONI_STATUS_OK)
+    if (library_->StreamGetProperty(streams_[1], ONI_STREAM_PROPERTY_HORIZONTAL_FOV,
+                                    &header_.horizontal_fov_rad, &size) != ONI_STATUS_OK)
       header_.horizontal_fov_rad = 0.0F;
   }
 
   [[nodiscard]] std::optional<Image> Copy(const OniFrame& frame, bool is_depth) const {
     const int row = header_.width * (is_depth ? 2 : 3);
-    if (frame.width != header_.width || frame.height != header_.height || frame.stride < row || frame.data == nullptr ||
-        frame.dataSize / frame.stride < frame.height)
+    if (frame.width != header_.width || frame.height != header_.height || frame.stride < row ||
+        frame.data == nullptr || frame.dataSize / frame.stride < frame.height)
       return std::nullopt;
     Image image(static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.height));
     for (int y = 0; y < frame.height; ++y)
       std::memcpy(image.data() + static_cast<std::size_t>(y) * row,
-                  static_cast<const char*>(frame.data) + static_cast<std::size_t>(y) * frame.stride, row);
+                  static_cast<const char*>(frame.data) + static_cast<std::size_t>(y) * frame.stride,
+                  row);
     return image;
   }
 
-  // Nothing is closed: the process ends right after the last byte, and closing is where players have hung.
+  // Nothing is closed: the process ends right after the last byte, and closing is where players
+  // have hung.
   std::array<std::int64_t, 2> begin_us_;
   std::shared_ptr<const OpenNiLibrary> library_;
   OniDeviceCallbacks callbacks_{};
@@ -177,14 +199,16 @@ class Player {
 };
 
 void WriteError(const char* what, bool header_written) {
-  const auto length = static_cast<std::uint32_t>(std::min<std::size_t>(std::strlen(what), oni::kMaxText));
+  const auto length =
+      static_cast<std::uint32_t>(std::min<std::size_t>(std::strlen(what), oni::kMaxText));
   if (!header_written) Write(oni::kMagic);
   Write(oni::Kind::kError);
   Write(length);
   WriteAll(what, length);
 }
 
-/// The parent holds the other end of the pipe; once that is closed nobody waits for us, wherever the library hangs.
+/// The parent holds the other end of the pipe; once that is closed no one waits for us, wherever
+/// the library hangs.
 void EndWithParent() {
   ::signal(SIGPIPE, SIG_IGN);
   std::thread([] {

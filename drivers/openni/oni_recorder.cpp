@@ -8,17 +8,18 @@
 #include <thread>
 #include <utility>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
 #include "drivers/openni/openni_library.hpp"
 #include "drivers/openni/openni_sensor.hpp"
 #include "drivers/openni/sensor_calibration.hpp"
-#include "drivers/replay/file_io.hpp"
 #include "drivers/replay/tum_writer.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr std::chrono::seconds kStartTime{20};  // it starts on a thread of its own, mostly within 1 ms
+constexpr std::chrono::seconds kStartTime{
+    20};  // it starts on a thread of its own, mostly within 1 ms
 constexpr std::chrono::milliseconds kPoll{1};
 
 }  // namespace
@@ -45,26 +46,32 @@ struct OniRecorder::Impl {
   }
 };
 
-OniRecorder::OniRecorder(LiveSensor& sensor, std::filesystem::path file, const Options& options) : impl_(std::make_unique<Impl>()) {
+OniRecorder::OniRecorder(LiveSensor& sensor, std::filesystem::path file, const Options& options)
+    : impl_(std::make_unique<Impl>()) {
   auto* openni = dynamic_cast<OpenNiSensor*>(&sensor);
-  if (openni == nullptr) throw std::invalid_argument("only sensors of OpenNI2 can be recorded as .oni");
+  if (openni == nullptr)
+    throw std::invalid_argument("only sensors of OpenNI2 can be recorded as .oni");
   impl_->sensor = openni;
   impl_->library = openni->streams().library;
   impl_->file = std::move(file);
   impl_->side_car = CameraFileText(sensor.info(), 1000.0) +
-                    fmt::format("sensor_serial: \"{}\"\n", CalibrationFile({}, sensor.description().serial).stem().string());
+                    fmt::format("sensor_serial: \"{}\"\n",
+                                CalibrationFile({}, sensor.description().serial).stem().string());
   WriteWholeFile(impl_->file, std::string_view());  // says what is wrong where OpenNI2 only fails
   const OpenNiLibrary& library = *impl_->library;
   openni->box().KeepStamps(true);
   const std::string what = fmt::format("cannot record to {}", impl_->file.string());
   library.Check(what, library.CreateRecorder(impl_->file.c_str(), &impl_->recorder));
-  library.Check(what, library.RecorderAttachStream(impl_->recorder, openni->streams().depth, FALSE));
-  library.Check(what, library.RecorderAttachStream(impl_->recorder, openni->streams().color, options.jpeg ? TRUE : FALSE));
+  library.Check(what,
+                library.RecorderAttachStream(impl_->recorder, openni->streams().depth, FALSE));
+  library.Check(what, library.RecorderAttachStream(impl_->recorder, openni->streams().color,
+                                                   options.jpeg ? TRUE : FALSE));
   library.Check(what, library.RecorderStart(impl_->recorder));
   const auto limit = std::chrono::steady_clock::now() + kStartTime;
   while (!HasOniDataBegun(impl_->file, 2)) {
     if (std::chrono::steady_clock::now() > limit)
-      throw DeviceError(fmt::format("{}: OpenNI2 has not begun within {} s; is the disk too busy?", what, kStartTime.count()));
+      throw DeviceError(fmt::format("{}: OpenNI2 has not begun within {} s; is the disk too busy?",
+                                    what, kStartTime.count()));
     std::this_thread::sleep_for(kPoll);
   }
 }
@@ -75,11 +82,15 @@ OniFileSummary OniRecorder::Finish(const std::optional<OniBegin>& begin) {
   impl_->Stop();
   OniFileSummary summary = TrimOniFile(impl_->file);
   const FrameBox& box = impl_->sensor->box();
-  const std::optional<std::int64_t> color_us = begin ? begin->color_us : FindOniBegin(summary.color_us, box.StampsOf(StreamKind::kColor));
-  const std::optional<std::int64_t> depth_us = begin ? begin->depth_us : FindOniBegin(summary.depth_us, box.StampsOf(StreamKind::kDepth));
+  const std::optional<std::int64_t> color_us =
+      begin ? begin->color_us : FindOniBegin(summary.color_us, box.StampsOf(StreamKind::kColor));
+  const std::optional<std::int64_t> depth_us =
+      begin ? begin->depth_us : FindOniBegin(summary.depth_us, box.StampsOf(StreamKind::kDepth));
   if (!color_us || !depth_us) {
-    throw IoError(fmt::format("recording {} has stamps that the sensor did not give ({} colour, {} depth images); record again",
-                              impl_->file.string(), summary.color_us.size(), summary.depth_us.size()));
+    throw IoError(
+        fmt::format("recording {} has stamps that the sensor did not give ({} colour, {} depth "
+                    "images); record again",
+                    impl_->file.string(), summary.color_us.size(), summary.depth_us.size()));
   }
   WriteWholeFile(OniSideCar(impl_->file), impl_->side_car + OniBeginText({*color_us, *depth_us}));
   impl_->finished = true;

@@ -16,14 +16,14 @@
 #include <cstring>
 #include <string>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "algo/types/marker_dictionary.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
 #include "drivers/openni/oni_file.hpp"
 #include "drivers/openni/oni_protocol.hpp"
 #include "drivers/program_folders.hpp"
 #include "drivers/replay/camera_file.hpp"
-#include "drivers/replay/file_io.hpp"
-#include "drivers/replay/image_file.hpp"
 
 extern char** environ;
 
@@ -38,7 +38,10 @@ constexpr std::size_t kMaxCameraBytes = std::size_t{1} << 16;
 
 fs::path ReaderProgram() {
   const std::optional<fs::path> program = FindBesideProgram("lib/plumb/plumb-oni-reader");
-  if (!program) throw IoError("plumb-oni-reader is missing: expected lib/plumb/plumb-oni-reader in a folder above this program");
+  if (!program)
+    throw IoError(
+        "plumb-oni-reader is missing: expected lib/plumb/plumb-oni-reader in a folder above this "
+        "program");
   return *program;
 }
 
@@ -47,7 +50,8 @@ class Reader {
  public:
   Reader(const fs::path& program, const fs::path& file, const OniBegin& begin) {
     std::array<int, 2> ends{};
-    if (::pipe2(ends.data(), O_CLOEXEC) != 0) throw IoError(fmt::format("no pipe: {}", std::strerror(errno)));
+    if (::pipe2(ends.data(), O_CLOEXEC) != 0)
+      throw IoError(fmt::format("no pipe: {}", std::strerror(errno)));
     (void)::fcntl(ends[0], F_SETPIPE_SZ, kPipeBytes);
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
@@ -62,11 +66,14 @@ class Reader {
     ::posix_spawnattr_setsigmask(&attributes, &none);
     ::posix_spawnattr_setsigdefault(&attributes, &defaults);
     // A group of its own: Ctrl-C at the terminal reaches the parent, which ends the child.
-    ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+    ::posix_spawnattr_setflags(
+        &attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
     std::string name = program.string(), argument = file.string();
     std::string color = std::to_string(begin.color_us), depth = std::to_string(begin.depth_us);
-    std::array<char*, 5> arguments{name.data(), argument.data(), color.data(), depth.data(), nullptr};
-    const int error = ::posix_spawn(&pid_, name.c_str(), &actions, &attributes, arguments.data(), environ);
+    std::array<char*, 5> arguments{name.data(), argument.data(), color.data(), depth.data(),
+                                   nullptr};
+    const int error =
+        ::posix_spawn(&pid_, name.c_str(), &actions, &attributes, arguments.data(), environ);
     ::posix_spawn_file_actions_destroy(&actions);
     ::posix_spawnattr_destroy(&attributes);
     ::close(ends[1]);
@@ -91,7 +98,8 @@ class Reader {
     auto* to = static_cast<char*>(data);
     while (size > 0) {
       pollfd wait{descriptor_, POLLIN, 0};
-      const int ready = ::poll(&wait, 1, static_cast<int>(std::chrono::milliseconds(kPatience).count()));
+      const int ready =
+          ::poll(&wait, 1, static_cast<int>(std::chrono::milliseconds(kPatience).count()));
       if (ready < 0 && errno == EINTR) continue;
       if (ready <= 0) return Got::kSilence;
       const ssize_t got = ::read(descriptor_, to, size);
@@ -109,7 +117,8 @@ class Reader {
     while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
     }
     pid_ = -1;
-    if (WIFSIGNALED(status)) return fmt::format("OpenNI2 crashed on it (signal {})", WTERMSIG(status));
+    if (WIFSIGNALED(status))
+      return fmt::format("OpenNI2 crashed on it (signal {})", WTERMSIG(status));
     return fmt::format("its reader ended early (exit code {})", WEXITSTATUS(status));
   }
 
@@ -122,7 +131,9 @@ class Reader {
 
 struct OniRecording::Impl {
   Impl(fs::path path, const std::optional<std::string>& side_car_text, const fs::path& program)
-      : file(std::move(path)), side_car(side_car_text), reader(program, file, ParseOniBegin(side_car.value_or(""))) {}
+      : file(std::move(path)),
+        side_car(side_car_text),
+        reader(program, file, ParseOniBegin(side_car.value_or(""))) {}
 
   fs::path file;
   std::optional<std::string> side_car;  ///< Its text.
@@ -135,7 +146,8 @@ struct OniRecording::Impl {
 
   [[noreturn]] void Fail(const std::string& why) {
     finished = true;
-    throw DataError(fmt::format("recording {} is damaged or no .oni recording that Plumb can use: {}", file.string(), why));
+    throw DataError(fmt::format(
+        "recording {} is damaged or no .oni recording that Plumb can use: {}", file.string(), why));
   }
 
   void Read(void* data, std::size_t size) {
@@ -166,9 +178,11 @@ struct OniRecording::Impl {
     header.magic = Read<std::uint32_t>();
     if (header.magic != oni::kMagic) Fail("its reader is of another version");
     header.width = Read<std::int32_t>();
-    if (header.width == static_cast<std::int32_t>(oni::Kind::kError)) FailAsTold();  // no image is 3 pixels wide
+    if (header.width == static_cast<std::int32_t>(oni::Kind::kError))
+      FailAsTold();  // no image is 3 pixels wide
     Read(&header.height, sizeof header - offsetof(oni::Header, height));
-    if (header.width < 4 || header.width > kMaxImageSide || header.height < 4 || header.height > kMaxImageSide)
+    if (header.width < 4 || header.width > kMaxImageSide || header.height < 4 ||
+        header.height > kMaxImageSide)
       Fail(fmt::format("its images are {}x{}", header.width, header.height));
     return header;
   }
@@ -187,8 +201,9 @@ void OniRecording::Impl::ReadCamera(const oni::Header& header, const RecordingDe
   if (side_car) {
     const CameraFile camera = ParseCameraFile(*side_car, side_car_file.string());
     if (camera.color.width != header.width || camera.color.height != header.height) {
-      throw DataError(fmt::format("{} is for images of {}x{}, the recording has {}x{}", side_car_file.string(), camera.color.width,
-                                  camera.color.height, header.width, header.height));
+      throw DataError(fmt::format("{} is for images of {}x{}, the recording has {}x{}",
+                                  side_car_file.string(), camera.color.width, camera.color.height,
+                                  header.width, header.height));
     }
     info.intrinsics = camera.color;
     info.marker_dictionary = camera.marker_dictionary.value_or(info.marker_dictionary);
@@ -199,15 +214,18 @@ void OniRecording::Impl::ReadCamera(const oni::Header& header, const RecordingDe
   } else {
     info.intrinsics = Resized(Intrinsics{}, header.width, header.height);
     if (header.horizontal_fov_rad > 0.2F && header.horizontal_fov_rad < 2.5F)
-      info.intrinsics.fx = info.intrinsics.fy = 0.5 * header.width / std::tan(0.5 * header.horizontal_fov_rad);
+      info.intrinsics.fx = info.intrinsics.fy =
+          0.5 * header.width / std::tan(0.5 * header.horizontal_fov_rad);
     info.intrinsics_assumed = true;
     info.warnings.push_back(
-        fmt::format("no {}: nominal focal length of {:.1f} pixels, no distortion and depth registered to colour assumed",
+        fmt::format("no {}: nominal focal length of {:.1f} pixels, no distortion and depth "
+                    "registered to colour assumed",
                     side_car_file.filename().string(), info.intrinsics.fx));
   }
   if (!markers_known) {
-    info.warnings.push_back(fmt::format("the recording does not state its markers: assumed {} with a side of {} m", info.marker_dictionary,
-                                        info.marker_length_m));
+    info.warnings.push_back(
+        fmt::format("the recording does not state its markers: assumed {} with a side of {} m",
+                    info.marker_dictionary, info.marker_length_m));
   }
 }
 
@@ -217,7 +235,8 @@ Frame OniRecording::Impl::ReadFrame() {
   frame.index = next_index++;
   frame.color_time_s = 1e-6 * static_cast<double>(stamps.color_us);
   frame.depth_time_s = 1e-6 * static_cast<double>(stamps.depth_us);
-  if (frame.color_time_s <= last_color_s || frame.depth_time_s <= last_depth_s) Fail("its stamps do not increase");
+  if (frame.color_time_s <= last_color_s || frame.depth_time_s <= last_depth_s)
+    Fail("its stamps do not increase");
   last_color_s = frame.color_time_s;
   last_depth_s = frame.depth_time_s;
   frame.color_rgb.create(info.intrinsics.height, info.intrinsics.width, CV_8UC3);
@@ -231,14 +250,20 @@ Frame OniRecording::Impl::ReadFrame() {
 OniRecording::OniRecording(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 OniRecording::~OniRecording() = default;
 
-std::unique_ptr<OniRecording> OniRecording::Open(const fs::path& file, const RecordingDefaults& defaults) {
+std::unique_ptr<OniRecording> OniRecording::Open(const fs::path& file,
+                                                 const RecordingDefaults& defaults) {
   std::error_code error;
-  if (!fs::exists(file, error)) throw DataError(fmt::format("no recording at '{}': expected an .oni file, found nothing", file.string()));
-  if (!IsOniFile(file)) throw DataError(fmt::format("{} is no .oni recording of OpenNI2: it does not begin with NI10", file.string()));
+  if (!fs::exists(file, error))
+    throw DataError(
+        fmt::format("no recording at '{}': expected an .oni file, found nothing", file.string()));
+  if (!IsOniFile(file))
+    throw DataError(fmt::format("{} is no .oni recording of OpenNI2: it does not begin with NI10",
+                                file.string()));
   if (!(defaults.marker_length_m > 0 && MarkerDictionary::Find(defaults.marker_dictionary)))
     throw std::invalid_argument("RecordingDefaults: marker length or dictionary out of range");
   std::optional<std::string> side_car;
-  if (const fs::path name = OniSideCar(file); fs::exists(fs::symlink_status(name, error))) side_car = ReadTextFile(name, kMaxCameraBytes);
+  if (const fs::path name = OniSideCar(file); fs::exists(fs::symlink_status(name, error)))
+    side_car = ReadTextFile(name, kMaxCameraBytes);
   auto impl = std::make_unique<Impl>(fs::absolute(file), side_car, ReaderProgram());
   const oni::Header header = impl->ReadHeader();
   impl->ReadCamera(header, defaults);

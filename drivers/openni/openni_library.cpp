@@ -3,7 +3,7 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb {
 namespace {
@@ -33,19 +33,25 @@ const char* StatusName(OniStatus status) {
 
 }  // namespace
 
-// The library is never unloaded: its drivers leave threads and static objects behind that do not survive that.
+// The library is never unloaded: its drivers leave threads and static objects behind that do not
+// survive that.
 void OpenNiLibrary::Resolve(void* handle, const std::string& name) {
 #define PLUMB_ONI_RESOLVE(function)                                                  \
   function = reinterpret_cast<decltype(function)>(::dlsym(handle, "oni" #function)); \
-  if (function == nullptr) throw DeviceError(fmt::format("{} has no function oni" #function "; expected OpenNI2 2.2", name));
+  if (function == nullptr)                                                           \
+    throw DeviceError(                                                               \
+        fmt::format("{} has no function oni" #function "; expected OpenNI2 2.2", name));
   PLUMB_ONI_FUNCTIONS(PLUMB_ONI_RESOLVE)
 #undef PLUMB_ONI_RESOLVE
 }
 
 std::shared_ptr<const OpenNiLibrary> OpenNiLibrary::Load(const std::filesystem::path& file) {
-  const std::string name = file.empty() ? "libOpenNI2.so.0" : std::filesystem::absolute(file).string();
+  const std::string name =
+      file.empty() ? "libOpenNI2.so.0" : std::filesystem::absolute(file).string();
   void* handle = ::dlopen(name.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (handle == nullptr) throw DeviceError(fmt::format("OpenNI2 cannot be loaded: {}; install the package libopenni2-0", ::dlerror()));
+  if (handle == nullptr)
+    throw DeviceError(
+        fmt::format("OpenNI2 cannot be loaded: {}; install the package libopenni2-0", ::dlerror()));
   std::shared_ptr<OpenNiLibrary> library(new OpenNiLibrary);
   library->Resolve(handle, name);
   const OniStatus status = library->Initialize(kApiVersion);

@@ -13,8 +13,8 @@
 
 namespace plumb {
 
-/// The functions of one loaded and started library; its drivers are those in `OpenNI2/Drivers` beside it. Stops it when the last owner
-/// goes away. The functions may be called from any thread.
+/// The functions of one loaded and started library; its drivers are those in `OpenNI2/Drivers`
+/// beside it. Stops it when the last owner goes away. The functions may be called from any thread.
 class OpenNiLibrary {
  public:
   /// @param file  Empty: libOpenNI2.so.0 of the system.

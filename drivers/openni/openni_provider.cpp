@@ -8,21 +8,28 @@
 #include <mutex>
 #include <span>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "drivers/openni/openni_library.hpp"
 #include "drivers/openni/openni_sensor.hpp"
 
 namespace plumb {
 
-// No lock of ours is held while OpenNI2 is called: it calls back from the driver's thread under locks of its own.
+// No lock of ours is held while OpenNI2 is called: it calls back from the driver's thread under
+// locks of its own.
 struct OpenNiProvider::Impl {
-  explicit Impl(const OpenNiOptions& wanted) : options(wanted), library(OpenNiLibrary::Load(wanted.library)) {
-    callbacks.deviceConnected = [](const OniDeviceInfo*, void* self) { static_cast<Impl*>(self)->Notify(); };
-    callbacks.deviceDisconnected = [](const OniDeviceInfo* info, void* self) { static_cast<Impl*>(self)->OnGone(*info); };
+  explicit Impl(const OpenNiOptions& wanted)
+      : options(wanted), library(OpenNiLibrary::Load(wanted.library)) {
+    callbacks.deviceConnected = [](const OniDeviceInfo*, void* self) {
+      static_cast<Impl*>(self)->Notify();
+    };
+    callbacks.deviceDisconnected = [](const OniDeviceInfo* info, void* self) {
+      static_cast<Impl*>(self)->OnGone(*info);
+    };
     callbacks.deviceStateChanged = [](const OniDeviceInfo* info, OniDeviceState state, void* self) {
       static_cast<Impl*>(self)->OnState(*info, state);
     };
-    library->Check("OpenNI2 refuses to report what is plugged in", library->RegisterDeviceCallbacks(&callbacks, this, &handle));
+    library->Check("OpenNI2 refuses to report what is plugged in",
+                   library->RegisterDeviceCallbacks(&callbacks, this, &handle));
   }
   ~Impl() {
     if (handle != nullptr) library->UnregisterDeviceCallbacks(handle);
@@ -60,13 +67,14 @@ struct OpenNiProvider::Impl {
     Notify();
   }
 
-  /// Asks the unit; empty if it cannot be opened or tells none.
+  /// Asks the unit; empty if it cannot be opened or has none.
   std::string AskSerial(const OniDeviceInfo& info) const {
     OniDeviceHandle device = nullptr;
     if (library->DeviceOpen(info.uri, &device) != ONI_STATUS_OK) return {};
     std::array<char, ONI_MAX_STR> serial{};
     int size = static_cast<int>(serial.size());
-    const OniStatus status = library->DeviceGetProperty(device, ONI_DEVICE_PROPERTY_SERIAL_NUMBER, serial.data(), &size);
+    const OniStatus status =
+        library->DeviceGetProperty(device, ONI_DEVICE_PROPERTY_SERIAL_NUMBER, serial.data(), &size);
     library->DeviceClose(device);
     serial.back() = '\0';
     return status == ONI_STATUS_OK ? std::string(serial.data()) : std::string();
@@ -83,8 +91,8 @@ struct OpenNiProvider::Impl {
       const std::lock_guard lock(mutex);
       if (!serial.empty()) serials[info.uri] = serial;
     }
-    return {info.uri, serial.empty() ? info.uri : serial, fmt::format("{} {}", info.vendor, info.name), info.usbVendorId,
-            info.usbProductId};
+    return {info.uri, serial.empty() ? info.uri : serial,
+            fmt::format("{} {}", info.vendor, info.name), info.usbVendorId, info.usbProductId};
   }
 
   std::vector<SensorDescription> List() {
@@ -95,11 +103,13 @@ struct OpenNiProvider::Impl {
     library->ReleaseDeviceList(infos);
     std::vector<SensorDescription> sensors;
     for (const OniDeviceInfo& info : found) {
-      const bool known = std::any_of(sensors.begin(), sensors.end(), [&](const auto& sensor) { return sensor.uri == info.uri; });
+      const bool known = std::any_of(sensors.begin(), sensors.end(),
+                                     [&](const auto& sensor) { return sensor.uri == info.uri; });
       if (!known) sensors.push_back(Describe(info));
     }
-    std::sort(sensors.begin(), sensors.end(),
-              [](const auto& a, const auto& b) { return std::tie(a.serial, a.uri) < std::tie(b.serial, b.uri); });
+    std::sort(sensors.begin(), sensors.end(), [](const auto& a, const auto& b) {
+      return std::tie(a.serial, a.uri) < std::tie(b.serial, b.uri);
+    });
     return sensors;
   }
 
@@ -112,11 +122,12 @@ struct OpenNiProvider::Impl {
   std::function<void()> listener;
 
   std::mutex mutex;
-  std::map<std::string, std::string> serials;                          ///< By URI, of the units that are attached.
+  std::map<std::string, std::string> serials;  ///< By URI, of the units that are attached.
   std::vector<std::pair<std::string, std::weak_ptr<FrameBox>>> boxes;  ///< Of open sensors, by URI.
 };
 
-OpenNiProvider::OpenNiProvider(const OpenNiOptions& options) : impl_(std::make_shared<Impl>(options)) {}
+OpenNiProvider::OpenNiProvider(const OpenNiOptions& options)
+    : impl_(std::make_shared<Impl>(options)) {}
 
 OpenNiProvider::~OpenNiProvider() {
   SetListener(nullptr);
@@ -132,22 +143,28 @@ void OpenNiProvider::SetListener(std::function<void()> changed) {
 
 std::unique_ptr<LiveSensor> OpenNiProvider::Open(const std::string& serial) {
   const std::vector<SensorDescription> sensors = List();
-  const auto found =
-      std::find_if(sensors.begin(), sensors.end(), [&](const auto& sensor) { return serial.empty() || sensor.serial == serial; });
+  const auto found = std::find_if(sensors.begin(), sensors.end(), [&](const auto& sensor) {
+    return serial.empty() || sensor.serial == serial;
+  });
   if (found == sensors.end()) {
-    throw DeviceError(serial.empty() ? "no sensor is attached; plug one in, `plumb doctor` tells what is seen"
-                                     : fmt::format("sensor {} is not attached, found {}; plug it in", serial,
-                                                   sensors.empty() ? "none" : sensors.front().serial));
+    throw DeviceError(serial.empty()
+                          ? "no sensor is attached; plug one in, `plumb doctor` lists what is seen"
+                          : fmt::format("sensor {} is not attached, found {}; plug it in", serial,
+                                        sensors.empty() ? "none" : sensors.front().serial));
   }
-  auto box = std::make_shared<FrameBox>(found->serial, impl_->options.max_gap, impl_->options.stall_time);
+  auto box =
+      std::make_shared<FrameBox>(found->serial, impl_->options.max_gap, impl_->options.stall_time);
   {
     const std::lock_guard lock(impl_->mutex);
     impl_->boxes.emplace_back(found->uri, box);
   }
   auto streams = std::make_unique<OpenNiStreams>(impl_->library, *found);
-  // The box knows of an unplug from here on, so none is missed between the listing and the first image.
-  if (box->lost()) throw DeviceLost(fmt::format("sensor {} was unplugged while it was opened", found->serial));
-  return std::make_unique<OpenNiSensor>(std::move(streams), std::move(box), impl_, *found, impl_->options);
+  // The box knows of an unplug from here on, so none is missed between the listing and the first
+  // image.
+  if (box->lost())
+    throw DeviceLost(fmt::format("sensor {} was unplugged while it was opened", found->serial));
+  return std::make_unique<OpenNiSensor>(std::move(streams), std::move(box), impl_, *found,
+                                        impl_->options);
 }
 
 }  // namespace plumb

@@ -13,23 +13,28 @@
 namespace plumb {
 
 struct OpenNiOptions {
-  /// libOpenNI2.so.0 to load; its drivers are those in `OpenNI2/Drivers` beside it. Empty: the system's.
+  /// libOpenNI2.so.0 to load; its drivers are those in `OpenNI2/Drivers` beside it. Empty: the
+  /// system's.
   std::filesystem::path library = {};
-  /// Holds `SERIAL.yaml` for each calibrated unit, as camera.yaml; its depth_scale is ignored, live depth is in millimetres.
-  /// A unit without one gets nominal intrinsics from its field of view, and a warning.
+  /// Holds `SERIAL.yaml` for each calibrated unit, as camera.yaml; its depth_scale is ignored, live
+  /// depth is in millimetres. A unit without one gets nominal intrinsics from its field of view,
+  /// and a warning.
   std::filesystem::path calibration_folder = "/var/lib/plumb/calibration";
-  std::string marker_dictionary = "DICT_6X6_250";  ///< What holds where the calibration file does not say it.
+  std::string marker_dictionary =
+      "DICT_6X6_250";  ///< What holds where the calibration file does not say it.
   double marker_length_m = 0.104;
   std::optional<int> reference_marker = {};
   std::chrono::milliseconds stall_time{2000};  ///< Next() fails after so long without a pair.
-  std::chrono::microseconds max_gap{16000};    ///< Between the stamps of a pair; under half of the frame period.
-  /// Called before the library is stopped, which waits for its drivers' threads under a lock that their callbacks want: whoever makes a
-  /// driver call back must cease. Must not throw.
+  std::chrono::microseconds max_gap{
+      16000};  ///< Between the stamps of a pair; under half of the frame period.
+  /// Called before the library is stopped, which waits for its drivers' threads under a lock that
+  /// their callbacks want: anything that makes a driver call back must stop. Must not throw.
   std::function<void()> before_stop = {};
 };
 
-/// Wakes nobody's loop and takes its time: List() opens each unit that it has not seen before to ask its serial (about a second on real
-/// hardware), Open() starts streams. Call both from a worker thread, not from the event loop.
+/// May take long; call it off the event loop: List() opens each unit that it has not seen before to
+/// ask its serial (about a second on real hardware), Open() starts streams. Call both from a worker
+/// thread, not from the event loop.
 class OpenNiProvider : public SensorProvider {
  public:
   /// Starts OpenNI2 and its drivers. Block signals before: they start threads.

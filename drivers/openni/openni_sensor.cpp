@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "drivers/openni/sensor_calibration.hpp"
 #include "drivers/openni/stream_waiter.hpp"
 
@@ -10,7 +10,8 @@ namespace plumb {
 namespace {
 
 constexpr int kFps = 30;
-// Registration and exposure need a moment after the start; until then depth may still lie on its own grid.
+// Registration and exposure need a moment after the start; until then depth may still lie on its
+// own grid.
 constexpr int kPairsToSettle = 2;
 
 /// @return False where the stream has no such setting.
@@ -22,15 +23,16 @@ bool Set(const OpenNiLibrary& library, OniStreamHandle stream, int property, con
 
 }  // namespace
 
-OpenNiStreams::OpenNiStreams(std::shared_ptr<const OpenNiLibrary> loaded, const SensorDescription& description)
+OpenNiStreams::OpenNiStreams(std::shared_ptr<const OpenNiLibrary> loaded,
+                             const SensorDescription& description)
     : library(std::move(loaded)), name_(description.serial) {
   const OniStatus status = library->DeviceOpen(description.uri.c_str(), &device);
   if (status != ONI_STATUS_OK) {
-    throw DeviceError(
-        library->Describe(fmt::format("cannot open sensor {} ({}); `plumb doctor` tells whether it is attached and permitted, "
-                                      "or unplug it and plug it in again",
-                                      name_, description.name),
-                          status));
+    throw DeviceError(library->Describe(fmt::format("cannot open sensor {} ({}); `plumb doctor` "
+                                                    "says whether it is attached and permitted, "
+                                                    "or unplug it and plug it in again",
+                                                    name_, description.name),
+                                        status));
   }
   try {
     Create();
@@ -44,11 +46,14 @@ OpenNiStreams::OpenNiStreams(std::shared_ptr<const OpenNiLibrary> loaded, const 
 OpenNiStreams::~OpenNiStreams() { Close(); }
 
 void OpenNiStreams::Create() {
-  library->Check(fmt::format("sensor {} gives no depth", name_), library->DeviceCreateStream(device, ONI_SENSOR_DEPTH, &depth));
-  library->Check(fmt::format("sensor {} gives no colour", name_), library->DeviceCreateStream(device, ONI_SENSOR_COLOR, &color));
+  library->Check(fmt::format("sensor {} gives no depth", name_),
+                 library->DeviceCreateStream(device, ONI_SENSOR_DEPTH, &depth));
+  library->Check(fmt::format("sensor {} gives no colour", name_),
+                 library->DeviceCreateStream(device, ONI_SENSOR_COLOR, &color));
 }
 
-OniStatus OpenNiStreams::SetMode(OniStreamHandle stream, OniPixelFormat format, int mode_width, int mode_height) const {
+OniStatus OpenNiStreams::SetMode(OniStreamHandle stream, OniPixelFormat format, int mode_width,
+                                 int mode_height) const {
   const OniVideoMode mode{format, mode_width, mode_height, kFps};
   return library->StreamSetProperty(stream, ONI_STREAM_PROPERTY_VIDEO_MODE, &mode, sizeof mode);
 }
@@ -63,23 +68,31 @@ void OpenNiStreams::SetModes() {
     height = h;
     break;
   }
-  library->Check(fmt::format("sensor {} takes neither 640x480 nor 320x240 at {} Hz with depth in mm and colour as RGB", name_, kFps),
-                 status);
+  library->Check(
+      fmt::format(
+          "sensor {} takes neither 640x480 nor 320x240 at {} Hz with depth in mm and colour as RGB",
+          name_, kFps),
+      status);
   for (OniStreamHandle stream : {depth, color}) {
     const OniBool off = FALSE;
-    library->Check(fmt::format("sensor {} keeps its images mirrored", name_),
-                   library->StreamSetProperty(stream, ONI_STREAM_PROPERTY_MIRRORING, &off, sizeof off));
+    library->Check(
+        fmt::format("sensor {} keeps its images mirrored", name_),
+        library->StreamSetProperty(stream, ONI_STREAM_PROPERTY_MIRRORING, &off, sizeof off));
   }
-  (void)library->DeviceEnableDepthColorSync(device);  // a unit without it is paired by stamps all the same
+  (void)library->DeviceEnableDepthColorSync(
+      device);  // a unit without it is paired by stamps all the same
 }
 
 void OpenNiStreams::Start() {
   started_ = true;
-  library->Check(fmt::format("sensor {} does not start its depth", name_), library->StreamStart(depth));
-  library->Check(fmt::format("sensor {} does not start its colour", name_), library->StreamStart(color));
+  library->Check(fmt::format("sensor {} does not start its depth", name_),
+                 library->StreamStart(depth));
+  library->Check(fmt::format("sensor {} does not start its colour", name_),
+                 library->StreamStart(color));
   const int mode = ONI_IMAGE_REGISTRATION_DEPTH_TO_COLOR;  // set before the start, units forget it
   library->Check(fmt::format("sensor {} does not register depth to colour", name_),
-                 library->DeviceSetProperty(device, ONI_DEVICE_PROPERTY_IMAGE_REGISTRATION, &mode, sizeof mode));
+                 library->DeviceSetProperty(device, ONI_DEVICE_PROPERTY_IMAGE_REGISTRATION, &mode,
+                                            sizeof mode));
 }
 
 void OpenNiStreams::Close() noexcept {
@@ -91,19 +104,26 @@ void OpenNiStreams::Close() noexcept {
   if (device != nullptr) library->DeviceClose(device);
 }
 
-OpenNiSensor::OpenNiSensor(std::unique_ptr<OpenNiStreams> streams, std::shared_ptr<FrameBox> box, std::shared_ptr<const void> provider,
+OpenNiSensor::OpenNiSensor(std::unique_ptr<OpenNiStreams> streams, std::shared_ptr<FrameBox> box,
+                           std::shared_ptr<const void> provider,
                            const SensorDescription& description, const OpenNiOptions& options)
-    : description_(description), provider_(std::move(provider)), streams_(std::move(streams)), box_(std::move(box)) {
+    : description_(description),
+      provider_(std::move(provider)),
+      streams_(std::move(streams)),
+      box_(std::move(box)) {
   float fov_rad = 0;
   int size = sizeof fov_rad;
-  if (streams_->library->StreamGetProperty(streams_->color, ONI_STREAM_PROPERTY_HORIZONTAL_FOV, &fov_rad, &size) != ONI_STATUS_OK)
+  if (streams_->library->StreamGetProperty(streams_->color, ONI_STREAM_PROPERTY_HORIZONTAL_FOV,
+                                           &fov_rad, &size) != ONI_STATUS_OK)
     fov_rad = 0;
   info_ = LiveStreamInfo(options, description_.serial, streams_->width, streams_->height, fov_rad);
   streams_->Start();
   box_->Begin(kPairsToSettle);
   waiting_ = StreamWaiter::Of(*streams_->library)
                  .Add(*streams_->library, {streams_->depth, streams_->color},
-                      [this](int stream, const OniFrame& frame) { Accept(stream == 0 ? StreamKind::kDepth : StreamKind::kColor, frame); });
+                      [this](int stream, const OniFrame& frame) {
+                        Accept(stream == 0 ? StreamKind::kDepth : StreamKind::kColor, frame);
+                      });
 }
 
 OpenNiSensor::~OpenNiSensor() { StreamWaiter::Of(*streams_->library).Remove(waiting_); }
@@ -112,14 +132,17 @@ void OpenNiSensor::Accept(StreamKind kind, const OniFrame& frame) {
   const bool is_color = kind == StreamKind::kColor;
   box_->CountGaps(kind, frame.frameIndex);
   const int row_bytes = streams_->width * (is_color ? 3 : 2);
-  const bool fits = frame.width == streams_->width && frame.height == streams_->height && frame.stride >= row_bytes &&
-                    frame.data != nullptr && frame.dataSize / frame.stride >= frame.height &&
-                    frame.videoMode.pixelFormat == (is_color ? ONI_PIXEL_FORMAT_RGB888 : ONI_PIXEL_FORMAT_DEPTH_1_MM);
+  const bool fits = frame.width == streams_->width && frame.height == streams_->height &&
+                    frame.stride >= row_bytes && frame.data != nullptr &&
+                    frame.dataSize / frame.stride >= frame.height &&
+                    frame.videoMode.pixelFormat ==
+                        (is_color ? ONI_PIXEL_FORMAT_RGB888 : ONI_PIXEL_FORMAT_DEPTH_1_MM);
   if (!fits) {
     box_->CountDiscarded();
     return;
   }
-  const cv::Mat view(frame.height, frame.width, is_color ? CV_8UC3 : CV_16UC1, frame.data, static_cast<std::size_t>(frame.stride));
+  const cv::Mat view(frame.height, frame.width, is_color ? CV_8UC3 : CV_16UC1, frame.data,
+                     static_cast<std::size_t>(frame.stride));
   box_->Add(kind, static_cast<std::int64_t>(frame.timestamp), view.clone());
 }
 

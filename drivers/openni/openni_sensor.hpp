@@ -11,10 +11,12 @@
 
 namespace plumb {
 
-/// Frees the handles of one device with its depth and colour stream, in the order that OpenNI2 needs.
+/// Frees the handles of one device with its depth and colour stream, in the order that OpenNI2
+/// needs.
 class OpenNiStreams {
  public:
-  /// Opens and creates, sets both to 640x480 at 30 Hz (320x240 where that is refused), not mirrored, in step. Starts nothing.
+  /// Opens and creates, sets both to 640x480 at 30 Hz (320x240 where that is refused), not
+  /// mirrored, in step. Starts nothing.
   /// @throws DeviceError
   OpenNiStreams(std::shared_ptr<const OpenNiLibrary> library, const SensorDescription& description);
   ~OpenNiStreams();
@@ -34,19 +36,22 @@ class OpenNiStreams {
  private:
   void Create();
   void SetModes();
-  [[nodiscard]] OniStatus SetMode(OniStreamHandle stream, OniPixelFormat format, int mode_width, int mode_height) const;
+  [[nodiscard]] OniStatus SetMode(OniStreamHandle stream, OniPixelFormat format, int mode_width,
+                                  int mode_height) const;
   void Close() noexcept;
   std::string name_;
   bool started_ = false;
 };
 
-/// The StreamWaiter reads both streams all the time, so the newest images are at hand when a scan starts and the rate is known.
+/// The StreamWaiter reads both streams all the time, so the newest images are at hand when a scan
+/// starts and the rate is known.
 class OpenNiSensor : public LiveSensor {
  public:
   /// @param box       The provider reports an unplug or a failure there.
   /// @param provider  Kept alive as long as this sensor.
-  OpenNiSensor(std::unique_ptr<OpenNiStreams> streams, std::shared_ptr<FrameBox> box, std::shared_ptr<const void> provider,
-               const SensorDescription& description, const OpenNiOptions& options);
+  OpenNiSensor(std::unique_ptr<OpenNiStreams> streams, std::shared_ptr<FrameBox> box,
+               std::shared_ptr<const void> provider, const SensorDescription& description,
+               const OpenNiOptions& options);
   ~OpenNiSensor() override;
 
   [[nodiscard]] const SensorDescription& description() const override { return description_; }

@@ -6,48 +6,58 @@
 #include <cctype>
 #include <cmath>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
 #include "drivers/replay/camera_file.hpp"
-#include "drivers/replay/file_io.hpp"
 
 namespace plumb {
 namespace {
 
 constexpr std::size_t kMaxFileBytes = std::size_t{1} << 16;
 
-CameraFile ReadCalibration(const std::filesystem::path& file, const std::string& serial, int width, int height) try {
+CameraFile ReadCalibration(const std::filesystem::path& file, const std::string& serial, int width,
+                           int height) try {
   CameraFile camera = ParseCameraFile(ReadTextFile(file, kMaxFileBytes), file.string());
   if (camera.color.width * height != camera.color.height * width) {
-    throw DataError(fmt::format("{} is for images of {}x{}, expected {}x{} or a multiple", file.string(), camera.color.width,
-                                camera.color.height, width, height));
+    throw DataError(fmt::format("{} is for images of {}x{}, expected {}x{} or a multiple",
+                                file.string(), camera.color.width, camera.color.height, width,
+                                height));
   }
   if (camera.depth_camera) {
     camera.depth_camera.reset();
-    camera.warnings.push_back(fmt::format("{} states depth_registered 0: ignored, the sensor registers depth itself", file.string()));
+    camera.warnings.push_back(fmt::format(
+        "{} states depth_registered 0: ignored, the sensor registers depth itself", file.string()));
   }
   return camera;
 } catch (const DataError& error) {
-  throw DeviceError(fmt::format("the calibration of sensor {} cannot be used: {}; correct or remove the file", serial, error.what()));
+  throw DeviceError(
+      fmt::format("the calibration of sensor {} cannot be used: {}; correct or remove the file",
+                  serial, error.what()));
 }
 
 }  // namespace
 
-std::filesystem::path CalibrationFile(const std::filesystem::path& folder, const std::string& serial) {
+std::filesystem::path CalibrationFile(const std::filesystem::path& folder,
+                                      const std::string& serial) {
   std::string name = serial.substr(0, 100);
-  const auto is_plain = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_'; };
+  const auto is_plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_';
+  };
   std::replace_if(
       name.begin(), name.end(), [&](char c) { return !is_plain(c); }, '_');
   return folder / (name + ".yaml");
 }
 
-StreamInfo LiveStreamInfo(const OpenNiOptions& options, const std::string& serial, int width, int height, double horizontal_fov_rad) {
+StreamInfo LiveStreamInfo(const OpenNiOptions& options, const std::string& serial, int width,
+                          int height, double horizontal_fov_rad) {
   StreamInfo info;
   info.marker_dictionary = options.marker_dictionary;
   info.marker_length_m = options.marker_length_m;
   info.reference_marker = options.reference_marker;
   const std::filesystem::path file = CalibrationFile(options.calibration_folder, serial);
   std::error_code error;
-  if (!options.calibration_folder.empty() && std::filesystem::exists(std::filesystem::symlink_status(file, error))) {
+  if (!options.calibration_folder.empty() &&
+      std::filesystem::exists(std::filesystem::symlink_status(file, error))) {
     const CameraFile camera = ReadCalibration(file, serial, width, height);
     info.intrinsics = Resized(camera.color, width, height);
     info.marker_dictionary = camera.marker_dictionary.value_or(info.marker_dictionary);
@@ -61,8 +71,9 @@ StreamInfo LiveStreamInfo(const OpenNiOptions& options, const std::string& seria
     info.intrinsics.fx = info.intrinsics.fy = 0.5 * width / std::tan(0.5 * horizontal_fov_rad);
   info.intrinsics_assumed = true;
   info.warnings.push_back(
-      fmt::format("sensor {} is not calibrated (no {}): nominal focal length of {:.1f} pixels and no distortion assumed", serial,
-                  file.string(), info.intrinsics.fx));
+      fmt::format("sensor {} is not calibrated (no {}): nominal focal length of {:.1f} pixels and "
+                  "no distortion assumed",
+                  serial, file.string(), info.intrinsics.fx));
   return info;
 }
 

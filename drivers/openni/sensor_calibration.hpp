@@ -1,4 +1,4 @@
-// What is known of a live sensor's camera before its first frame.
+// The calibration of a live sensor's camera before its first frame.
 #pragma once
 
 #include <filesystem>
@@ -9,13 +9,17 @@
 
 namespace plumb {
 
-/// `FOLDER/SERIAL.yaml`; what a file name should not hold is replaced by `_`, since the serial comes from the device.
-[[nodiscard]] std::filesystem::path CalibrationFile(const std::filesystem::path& folder, const std::string& serial);
+/// `FOLDER/SERIAL.yaml`; what a file name should not hold is replaced by `_`, since the serial
+/// comes from the device.
+[[nodiscard]] std::filesystem::path CalibrationFile(const std::filesystem::path& folder,
+                                                    const std::string& serial);
 
-/// The calibration file of the unit, scaled to the image size, or nominal intrinsics with a warning.
-/// @param horizontal_fov_rad  Of the colour camera as the driver states it; out of (0.2, 2.5): TUM's published 525 pixels.
+/// The calibration file of the unit, scaled to the image size, or nominal intrinsics with a
+/// warning.
+/// @param horizontal_fov_rad  Of the colour camera as the driver states it; out of (0.2, 2.5):
+/// TUM's published 525 pixels.
 /// @throws DeviceError if the unit's file is there but damaged, or of another shape of image.
-[[nodiscard]] StreamInfo LiveStreamInfo(const OpenNiOptions& options, const std::string& serial, int width, int height,
-                                        double horizontal_fov_rad);
+[[nodiscard]] StreamInfo LiveStreamInfo(const OpenNiOptions& options, const std::string& serial,
+                                        int width, int height, double horizontal_fov_rad);
 
 }  // namespace plumb

@@ -7,8 +7,9 @@
 namespace plumb {
 namespace {
 
-constexpr int kWait_ms = 100;                         // of one look for images; the longest that Remove() takes
-constexpr std::chrono::milliseconds kAfterError{20};  // OpenNI2 may answer at once, and always the same, after an unplug
+constexpr int kWait_ms = 100;  // of one look for images; the longest that Remove() takes
+constexpr std::chrono::milliseconds kAfterError{
+    20};  // OpenNI2 may answer at once, and always the same, after an unplug
 
 }  // namespace
 
@@ -26,7 +27,8 @@ StreamWaiter::StreamWaiter() {
   std::thread([this] { Run(); }).detach();
 }
 
-std::int64_t StreamWaiter::Add(const OpenNiLibrary& library, const std::array<OniStreamHandle, 2>& streams, OnImage on_image) {
+std::int64_t StreamWaiter::Add(const OpenNiLibrary& library,
+                               const std::array<OniStreamHandle, 2>& streams, OnImage on_image) {
   const std::lock_guard lock(mutex_);
   entries_.push_back({next_id_, &library, streams, std::move(on_image)});
   changed_.notify_all();
@@ -59,15 +61,19 @@ void StreamWaiter::Run() {
 
 void StreamWaiter::WaitOnce(const std::vector<Entry>& entries) {
   std::vector<OniStreamHandle> streams;
-  for (const Entry& entry : entries) streams.insert(streams.end(), entry.streams.begin(), entry.streams.end());
+  for (const Entry& entry : entries)
+    streams.insert(streams.end(), entry.streams.begin(), entry.streams.end());
   const OpenNiLibrary& library = *entries.front().library;
   int index = -1;
-  const OniStatus status = library.WaitForAnyStream(streams.data(), static_cast<int>(streams.size()), &index, kWait_ms);
+  const OniStatus status =
+      library.WaitForAnyStream(streams.data(), static_cast<int>(streams.size()), &index, kWait_ms);
   if (status == ONI_STATUS_TIME_OUT) return;
   OniFrame* frame = nullptr;
   // Only a stream that has an image is read: reading one that was unplugged never returns.
-  const bool read = status == ONI_STATUS_OK && index >= 0 && index < static_cast<int>(streams.size()) &&
-                    library.StreamReadFrame(streams[static_cast<std::size_t>(index)], &frame) == ONI_STATUS_OK && frame != nullptr;
+  const bool read =
+      status == ONI_STATUS_OK && index >= 0 && index < static_cast<int>(streams.size()) &&
+      library.StreamReadFrame(streams[static_cast<std::size_t>(index)], &frame) == ONI_STATUS_OK &&
+      frame != nullptr;
   if (!read) {
     std::this_thread::sleep_for(kAfterError);
     return;

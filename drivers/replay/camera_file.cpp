@@ -8,9 +8,9 @@
 #include <charconv>
 #include <cmath>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "algo/types/marker_dictionary.hpp"
-#include "drivers/replay/image_file.hpp"
+#include "drivers/files/image_file.hpp"
 
 namespace plumb {
 namespace {
@@ -26,8 +26,11 @@ constexpr int kMaxMarkerId = 65535;
 
 /// Refuses texts whose nesting would take the parser's stack.
 void CheckText(std::string_view text, const std::string& name) {
-  if (text.size() > kMaxText) throw DataError(fmt::format("{} has {} bytes, at most {} are read", name, text.size(), kMaxText));
-  if (text.find('\0') != std::string_view::npos) throw DataError(fmt::format("{} holds zero bytes: it is no text", name));
+  if (text.size() > kMaxText)
+    throw DataError(
+        fmt::format("{} has {} bytes, at most {} are read", name, text.size(), kMaxText));
+  if (text.find('\0') != std::string_view::npos)
+    throw DataError(fmt::format("{} holds zero bytes: it is no text", name));
   int depth = 0;
   int dashes = 0;
   for (const char c : text) {
@@ -38,17 +41,21 @@ void CheckText(std::string_view text, const std::string& name) {
     } else if (c != ' ') {
       dashes = 0;
     }
-    if (depth > kMaxNesting || dashes > kMaxNesting) throw DataError(fmt::format("{} nests deeper than {} levels", name, kMaxNesting));
+    if (depth > kMaxNesting || dashes > kMaxNesting)
+      throw DataError(fmt::format("{} nests deeper than {} levels", name, kMaxNesting));
   }
 }
 
 /// The text as plain YAML: OpenCV's header `%YAML:1.0` is none of YAML's directives.
 std::string WithoutHeader(std::string_view text) {
-  while (text.starts_with('%')) text.remove_prefix(std::min(text.size(), text.find('\n') == text.npos ? text.size() : text.find('\n') + 1));
+  while (text.starts_with('%'))
+    text.remove_prefix(
+        std::min(text.size(), text.find('\n') == text.npos ? text.size() : text.find('\n') + 1));
   return std::string(text);
 }
 
-/// The keys of one file, typed and with messages. Read by yaml-cpp: OpenCV's own reader never returns from some broken texts.
+/// The keys of one file, typed and with messages. Read by yaml-cpp: OpenCV's own reader never
+/// returns from some broken texts.
 class Keys {
  public:
   Keys(std::string_view text, std::string name) : name_(std::move(name)) {
@@ -56,14 +63,21 @@ class Keys {
     try {
       root_ = YAML::Load(WithoutHeader(text));
     } catch (const YAML::Exception& error) {
-      throw DataError(fmt::format("{} cannot be parsed as YAML: {}", name_, FirstLine(error.what())));
+      throw DataError(
+          fmt::format("{} cannot be parsed as YAML: {}", name_, FirstLine(error.what())));
     }
-    if (!root_.IsMap()) throw DataError(fmt::format("{} holds no keys; expected OpenCV YAML as its FileStorage writes it", name_));
+    if (!root_.IsMap())
+      throw DataError(fmt::format(
+          "{} holds no keys; expected OpenCV YAML as its FileStorage writes it", name_));
   }
 
   [[nodiscard]] const std::string& name() const { return name_; }
-  [[nodiscard]] bool has(const char* key) const { return root_[key].IsDefined() && !root_[key].IsNull(); }
-  [[nodiscard]] std::string Where(const char* key) const { return fmt::format("{}: {}", name_, key); }
+  [[nodiscard]] bool has(const char* key) const {
+    return root_[key].IsDefined() && !root_[key].IsNull();
+  }
+  [[nodiscard]] std::string Where(const char* key) const {
+    return fmt::format("{}: {}", name_, key);
+  }
 
   [[nodiscard]] double Number(const char* key) const { return Number(Required(key), key); }
 
@@ -85,14 +99,17 @@ class Keys {
   [[nodiscard]] std::vector<double> Matrix(const char* key) const {
     const YAML::Node node = Required(key);
     const YAML::Node data = node.IsMap() ? node["data"] : node;
-    if (!data.IsDefined() || !data.IsSequence() || data.size() > 64) throw DataError(fmt::format("{} is no matrix of numbers", Where(key)));
+    if (!data.IsDefined() || !data.IsSequence() || data.size() > 64)
+      throw DataError(fmt::format("{} is no matrix of numbers", Where(key)));
     std::vector<double> values;
     for (const YAML::Node& element : data) values.push_back(Number(element, key));
     return values;
   }
 
  private:
-  static std::string FirstLine(std::string text) { return text.substr(0, std::min<std::size_t>(text.find('\n'), 200)); }
+  static std::string FirstLine(std::string text) {
+    return text.substr(0, std::min<std::size_t>(text.find('\n'), 200));
+  }
 
   [[nodiscard]] YAML::Node Required(const char* key) const {
     if (!has(key)) throw DataError(fmt::format("{} is missing", Where(key)));
@@ -106,8 +123,9 @@ class Keys {
     double value = 0;
     const auto [stop, error] = std::from_chars(begin, end, value);
     if (begin == end || stop != end || error != std::errc() || !std::isfinite(value)) {
-      throw DataError(fmt::format("{} holds {}, expected finite numbers", Where(key),
-                                  text.empty() ? "something else" : '"' + text.substr(0, 60) + '"'));
+      throw DataError(
+          fmt::format("{} holds {}, expected finite numbers", Where(key),
+                      text.empty() ? "something else" : '"' + text.substr(0, 60) + '"'));
     }
     return value;
   }
@@ -118,36 +136,47 @@ class Keys {
 
 void ReadCameraMatrix(const Keys& keys, const char* key, Intrinsics& intrinsics) {
   const std::vector<double> k = keys.Matrix(key);
-  if (k.size() != 9) throw DataError(fmt::format("{} has {} elements, expected 3x3", keys.Where(key), k.size()));
+  if (k.size() != 9)
+    throw DataError(fmt::format("{} has {} elements, expected 3x3", keys.Where(key), k.size()));
   if (!(k[0] > 0 && k[4] > 0)) {
-    throw DataError(
-        fmt::format("{} has focal lengths {} and {}, expected both > 0 pixels; calibrate the camera", keys.Where(key), k[0], k[4]));
+    throw DataError(fmt::format(
+        "{} has focal lengths {} and {}, expected both > 0 pixels; calibrate the camera",
+        keys.Where(key), k[0], k[4]));
   }
   if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
-    throw DataError(fmt::format("{} is [{}], expected [fx 0 cx, 0 fy cy, 0 0 1]", keys.Where(key), fmt::join(k, " ")));
+    throw DataError(fmt::format("{} is [{}], expected [fx 0 cx, 0 fy cy, 0 0 1]", keys.Where(key),
+                                fmt::join(k, " ")));
   }
   intrinsics.fx = k[0];
   intrinsics.fy = k[4];
   intrinsics.cx = k[2];
   intrinsics.cy = k[5];
-  // A principal point off the image, or a view narrower than 5 deg or wider than 150 deg, belongs to another image size.
-  const auto fits = [](double f, double c, int size) { return c > 0 && c < size && f > size * 0.13 && f < size * 12.0; };
+  // A principal point off the image, or a view narrower than 5 deg or wider than 150 deg, belongs
+  // to another image size.
+  const auto fits = [](double f, double c, int size) {
+    return c > 0 && c < size && f > size * 0.13 && f < size * 12.0;
+  };
   if (!fits(k[0], k[2], intrinsics.width) || !fits(k[4], k[5], intrinsics.height)) {
-    throw DataError(fmt::format("{} (fx {} fy {} cx {} cy {}) does not fit an image of {}x{}; was it calibrated at another size?",
-                                keys.Where(key), k[0], k[4], k[2], k[5], intrinsics.width, intrinsics.height));
+    throw DataError(
+        fmt::format("{} (fx {} fy {} cx {} cy {}) does not fit an image of {}x{}; was it "
+                    "calibrated at another size?",
+                    keys.Where(key), k[0], k[4], k[2], k[5], intrinsics.width, intrinsics.height));
   }
 }
 
 void ReadDistortion(const Keys& keys, const char* key, Intrinsics& intrinsics) {
   const std::vector<double> d = keys.Matrix(key);
-  const bool only_five = d.size() >= 4 && std::all_of(d.begin() + std::min<std::ptrdiff_t>(5, std::ssize(d)), d.end(),
-                                                      [](double value) { return value == 0; });
+  const bool only_five =
+      d.size() >= 4 && std::all_of(d.begin() + std::min<std::ptrdiff_t>(5, std::ssize(d)), d.end(),
+                                   [](double value) { return value == 0; });
   if (!only_five) {
-    throw DataError(
-        fmt::format("{} has {} elements, expected the five k1 k2 p1 p2 k3 of OpenCV's plain lens model", keys.Where(key), d.size()));
+    throw DataError(fmt::format(
+        "{} has {} elements, expected the five k1 k2 p1 p2 k3 of OpenCV's plain lens model",
+        keys.Where(key), d.size()));
   }
   for (std::size_t i = 0; i < std::min<std::size_t>(5, d.size()); ++i) {
-    if (std::abs(d[i]) > kMaxDistortion) throw DataError(fmt::format("{} holds {}, which is no lens", keys.Where(key), d[i]));
+    if (std::abs(d[i]) > kMaxDistortion)
+      throw DataError(fmt::format("{} holds {}, which is no lens", keys.Where(key), d[i]));
     intrinsics.distortion[i] = d[i];
   }
   // A lens model must be one to one over the whole image, or pixels cannot become rays.
@@ -157,31 +186,40 @@ void ReadDistortion(const Keys& keys, const char* key, Intrinsics& intrinsics) {
       const Eigen::Vector2d ray = Undistort(intrinsics, pixel);
       const double error_px = (Project(intrinsics, ray.homogeneous()) - pixel).norm();
       if (!(error_px < 0.5)) {
-        throw DataError(fmt::format("{} cannot be undone at pixel ({:.0f}, {:.0f}); is it for this camera and image size?", keys.Where(key),
-                                    pixel.x(), pixel.y()));
+        throw DataError(fmt::format(
+            "{} cannot be undone at pixel ({:.0f}, {:.0f}); is it for this camera and image size?",
+            keys.Where(key), pixel.x(), pixel.y()));
       }
     }
   }
 }
 
 void CheckSize(const Keys& keys, const Intrinsics& intrinsics, const char* what) {
-  if (intrinsics.width >= 1 && intrinsics.height >= 1 && intrinsics.width <= kMaxImageSide && intrinsics.height <= kMaxImageSide) return;
-  throw DataError(fmt::format("{}: the {} image is {}x{} pixels, expected 1 to {} a side", keys.name(), what, intrinsics.width,
-                              intrinsics.height, kMaxImageSide));
+  if (intrinsics.width >= 1 && intrinsics.height >= 1 && intrinsics.width <= kMaxImageSide &&
+      intrinsics.height <= kMaxImageSide)
+    return;
+  throw DataError(fmt::format("{}: the {} image is {}x{} pixels, expected 1 to {} a side",
+                              keys.name(), what, intrinsics.width, intrinsics.height,
+                              kMaxImageSide));
 }
 
 Pose ReadRigid(const Keys& keys, const char* key) {
   const std::vector<double> m = keys.Matrix(key);
-  if (m.size() != 16) throw DataError(fmt::format("{} has {} elements, expected 4x4", keys.Where(key), m.size()));
-  const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(m.data());
+  if (m.size() != 16)
+    throw DataError(fmt::format("{} has {} elements, expected 4x4", keys.Where(key), m.size()));
+  const Eigen::Matrix4d matrix =
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(m.data());
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
   constexpr double kTolerance = 1e-3;
-  const bool rigid = (rotation * rotation.transpose()).isApprox(Eigen::Matrix3d::Identity(), kTolerance) && rotation.determinant() > 0 &&
-                     matrix.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), kTolerance);
+  const bool rigid =
+      (rotation * rotation.transpose()).isApprox(Eigen::Matrix3d::Identity(), kTolerance) &&
+      rotation.determinant() > 0 &&
+      matrix.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), kTolerance);
   const Eigen::Vector3d translation_m = matrix.topRightCorner<3, 1>();
   if (!rigid || translation_m.norm() > kMaxBaseline_m) {
     throw DataError(
-        fmt::format("{} is no rigid transform of less than {} m; expected [R t; 0 0 0 1] in metres", keys.Where(key), kMaxBaseline_m));
+        fmt::format("{} is no rigid transform of less than {} m; expected [R t; 0 0 0 1] in metres",
+                    keys.Where(key), kMaxBaseline_m));
   }
   Pose T = Pose::Identity();
   T.linear() = rotation;
@@ -193,19 +231,24 @@ void ReadDepthCamera(const Keys& keys, CameraFile& camera) {
   if (!keys.has("depth_registered")) return;
   const int registered = keys.Integer("depth_registered");
   if (registered != 0 && registered != 1) {
-    throw DataError(fmt::format("{} is {}, expected 0 or 1", keys.Where("depth_registered"), registered));
+    throw DataError(
+        fmt::format("{} is {}, expected 0 or 1", keys.Where("depth_registered"), registered));
   }
   if (registered == 1) return;
-  if (!keys.has("depth_camera_matrix") || !keys.has("depth_distortion_coefficients") || !keys.has("T_color_depth")) {
+  if (!keys.has("depth_camera_matrix") || !keys.has("depth_distortion_coefficients") ||
+      !keys.has("T_color_depth")) {
     camera.warnings.push_back(
-        fmt::format("{}: depth_registered is 0 but depth_camera_matrix, depth_distortion_coefficients and T_color_depth are not all given; "
+        fmt::format("{}: depth_registered is 0 but depth_camera_matrix, "
+                    "depth_distortion_coefficients and T_color_depth are not all given; "
                     "depth is taken as registered to colour",
                     keys.name()));
     return;
   }
   DepthCamera depth;
-  depth.intrinsics.width = keys.has("depth_image_width") ? keys.Integer("depth_image_width") : camera.color.width;
-  depth.intrinsics.height = keys.has("depth_image_height") ? keys.Integer("depth_image_height") : camera.color.height;
+  depth.intrinsics.width =
+      keys.has("depth_image_width") ? keys.Integer("depth_image_width") : camera.color.width;
+  depth.intrinsics.height =
+      keys.has("depth_image_height") ? keys.Integer("depth_image_height") : camera.color.height;
   CheckSize(keys, depth.intrinsics, "depth");
   ReadCameraMatrix(keys, "depth_camera_matrix", depth.intrinsics);
   ReadDistortion(keys, "depth_distortion_coefficients", depth.intrinsics);
@@ -218,7 +261,8 @@ void ReadMarkers(const Keys& keys, CameraFile& camera) {
     const std::string name = keys.Text("marker_dictionary");
     const std::optional<MarkerDictionary> dictionary = MarkerDictionary::Find(name);
     if (!dictionary) {
-      throw DataError(fmt::format("{} is \"{}\", expected one of {}", keys.Where("marker_dictionary"), name.substr(0, 60),
+      throw DataError(fmt::format("{} is \"{}\", expected one of {}",
+                                  keys.Where("marker_dictionary"), name.substr(0, 60),
                                   fmt::join(MarkerDictionary::KnownNames(), ", ")));
     }
     camera.marker_dictionary = dictionary->name();
@@ -226,14 +270,16 @@ void ReadMarkers(const Keys& keys, CameraFile& camera) {
   if (keys.has("marker_length")) {
     camera.marker_length_m = keys.Number("marker_length");
     if (!(*camera.marker_length_m > 0 && *camera.marker_length_m < kMaxMarkerLength_m)) {
-      throw DataError(fmt::format("{} is {} m, expected more than 0 and less than {} m (the side of the black square)",
-                                  keys.Where("marker_length"), *camera.marker_length_m, kMaxMarkerLength_m));
+      throw DataError(fmt::format(
+          "{} is {} m, expected more than 0 and less than {} m (the side of the black square)",
+          keys.Where("marker_length"), *camera.marker_length_m, kMaxMarkerLength_m));
     }
   }
   if (keys.has("reference_marker")) {
     camera.reference_marker = keys.Integer("reference_marker");
     if (*camera.reference_marker < 0 || *camera.reference_marker > kMaxMarkerId) {
-      throw DataError(fmt::format("{} is {}, expected a marker id from 0 to {}", keys.Where("reference_marker"), *camera.reference_marker,
+      throw DataError(fmt::format("{} is {}, expected a marker id from 0 to {}",
+                                  keys.Where("reference_marker"), *camera.reference_marker,
                                   kMaxMarkerId));
     }
   }
@@ -251,20 +297,23 @@ CameraFile ParseCameraFile(std::string_view text, const std::string& name) try {
   if (keys.has("distortion_coefficients")) {
     ReadDistortion(keys, "distortion_coefficients", camera.color);
   } else {
-    camera.warnings.push_back(fmt::format("{} has no distortion_coefficients: the lens is taken as free of distortion", name));
+    camera.warnings.push_back(fmt::format(
+        "{} has no distortion_coefficients: the lens is taken as free of distortion", name));
   }
   if (keys.has("depth_scale")) {
     camera.depth_scale = keys.Number("depth_scale");
     if (!(camera.depth_scale >= kMinDepthScale && camera.depth_scale <= kMaxDepthScale)) {
-      throw DataError(fmt::format("{} is {}, expected units per metre from {} to {} (1000 for millimetres)", keys.Where("depth_scale"),
-                                  camera.depth_scale, kMinDepthScale, kMaxDepthScale));
+      throw DataError(fmt::format(
+          "{} is {}, expected units per metre from {} to {} (1000 for millimetres)",
+          keys.Where("depth_scale"), camera.depth_scale, kMinDepthScale, kMaxDepthScale));
     }
   }
   ReadDepthCamera(keys, camera);
   ReadMarkers(keys, camera);
   return camera;
 } catch (const YAML::Exception& error) {
-  throw DataError(fmt::format("{} cannot be read as YAML: {}", name, std::string(error.what()).substr(0, 200)));
+  throw DataError(
+      fmt::format("{} cannot be read as YAML: {}", name, std::string(error.what()).substr(0, 200)));
 }
 
 }  // namespace plumb

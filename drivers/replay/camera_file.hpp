@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "algo/types/intrinsics.hpp"
-#include "algo/types/pose.hpp"
+#include "algo/base/intrinsics.hpp"
+#include "algo/base/pose.hpp"
 
 namespace plumb {
 
@@ -17,10 +17,10 @@ struct DepthCamera {
   Pose T_color_depth = Pose::Identity();  ///< Depth camera's frame to colour camera's.
 };
 
-/// What camera.yaml states; everything is checked.
+/// The contents of camera.yaml; everything is checked.
 struct CameraFile {
   Intrinsics color;
-  double depth_scale = 5000.0;              ///< Units of a depth image per metre; TUM's 5000 when absent.
+  double depth_scale = 5000.0;  ///< Units of a depth image per metre; TUM's 5000 when absent.
   std::optional<DepthCamera> depth_camera;  ///< Set only if the depth is not registered.
   std::optional<std::string> marker_dictionary;
   std::optional<double> marker_length_m;
@@ -28,10 +28,12 @@ struct CameraFile {
   std::vector<std::string> warnings;
 };
 
-/// Reads OpenCV's FileStorage YAML. Keys: image_width, image_height, camera_matrix, distortion_coefficients, depth_scale,
-/// depth_registered, marker_dictionary, marker_length (metres), reference_marker; for depth_registered 0 also depth_camera_matrix,
-/// depth_distortion_coefficients, T_color_depth (4x4) and, if they differ from the colour image's, depth_image_width and
-/// depth_image_height. Without these three the depth is taken as registered, with a warning.
+/// Reads OpenCV's FileStorage YAML. Keys: image_width, image_height, camera_matrix,
+/// distortion_coefficients, depth_scale, depth_registered, marker_dictionary, marker_length
+/// (metres), reference_marker; for depth_registered 0 also depth_camera_matrix,
+/// depth_distortion_coefficients, T_color_depth (4x4) and, if they differ from the colour image's,
+/// depth_image_width and depth_image_height. Without these three the depth is taken as registered,
+/// with a warning.
 /// @param name  Of the file, for messages.
 /// @throws DataError naming file, key, what was found and what is expected.
 [[nodiscard]] CameraFile ParseCameraFile(std::string_view text, const std::string& name);

@@ -10,16 +10,21 @@
 namespace plumb {
 namespace {
 
-constexpr double kSameSurface = 0.02;  // relative difference of depths within which samples are taken as one surface
-constexpr double kOverlap = 1.1;       // samples cover a little more than their own area: no seams on slopes
+constexpr double kSameSurface =
+    0.02;  // relative difference of depths within which samples are taken as one surface
+constexpr double kOverlap =
+    1.1;  // samples cover a little more than their own area: no seams on slopes
 constexpr double kMinDepth_m = 0.05;
-constexpr double kMaxReach_px = 8.0;  // of one sample; a colour image is at most a few times finer than its depth image
+constexpr double kMaxReach_px =
+    8.0;  // of one sample; a colour image is at most a few times finer than its depth image
 
 }  // namespace
 
-DepthRegistration::DepthRegistration(const Intrinsics& depth, const Intrinsics& color, const Pose& T_color_depth)
+DepthRegistration::DepthRegistration(const Intrinsics& depth, const Intrinsics& color,
+                                     const Pose& T_color_depth)
     : depth_(depth), color_(color), baseline_m_(T_color_depth.translation()) {
-  ray_in_color_.reserve(static_cast<std::size_t>(depth.width) * static_cast<std::size_t>(depth.height));
+  ray_in_color_.reserve(static_cast<std::size_t>(depth.width) *
+                        static_cast<std::size_t>(depth.height));
   for (int y = 0; y < depth.height; ++y) {
     for (int x = 0; x < depth.width; ++x) {
       const Eigen::Vector2d ray = Undistort(depth, Eigen::Vector2d(x, y));
@@ -45,11 +50,14 @@ DepthRegistration::DepthRegistration(const Intrinsics& depth, const Intrinsics& 
 
 cv::Mat DepthRegistration::Register(const cv::Mat& depth_m) const {
   if (depth_m.type() != CV_32FC1 || depth_m.cols != depth_.width || depth_m.rows != depth_.height) {
-    throw std::invalid_argument(fmt::format("registration needs a CV_32FC1 depth image of {}x{}, got type {} of {}x{}", depth_.width,
-                                            depth_.height, depth_m.type(), depth_m.cols, depth_m.rows));
+    throw std::invalid_argument(
+        fmt::format("registration needs a CV_32FC1 depth image of {}x{}, got type {} of {}x{}",
+                    depth_.width, depth_.height, depth_m.type(), depth_m.cols, depth_m.rows));
   }
   cv::Mat registered = cv::Mat::zeros(color_.height, color_.width, CV_32FC1);
-  cv::Mat offset(color_.height, color_.width, CV_32FC1);  // squared distance of a pixel from the centre of its sample, set with it
+  cv::Mat offset(
+      color_.height, color_.width,
+      CV_32FC1);  // squared distance of a pixel from the centre of its sample, set with it
   const double magnification_x = 0.5 * kOverlap * color_.fx / depth_.fx;
   const double magnification_y = 0.5 * kOverlap * color_.fy / depth_.fy;
   const Eigen::Vector3d* ray = ray_in_color_.data();
@@ -74,7 +82,8 @@ cv::Mat DepthRegistration::Register(const cv::Mat& depth_m) const {
         for (int x = x_begin; x < x_end; ++x) {
           float& z_there = registered.at<float>(y, x);
           float& offset_there = offset.at<float>(y, x);
-          const auto offset_px2 = static_cast<float>((centre - Eigen::Vector2d(x, y)).squaredNorm());
+          const auto offset_px2 =
+              static_cast<float>((centre - Eigen::Vector2d(x, y)).squaredNorm());
           const bool same_surface = std::abs(z - z_there) <= kSameSurface * z;
           if (z_there == 0 || (same_surface ? offset_px2 < offset_there : z < z_there)) {
             z_there = z;

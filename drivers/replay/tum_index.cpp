@@ -7,15 +7,17 @@
 #include <cmath>
 #include <filesystem>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb {
 namespace {
 
 constexpr std::size_t kMaxEntries = 1'000'000;
 constexpr std::size_t kMaxLine = 4096;
-constexpr double kMaxTime_s = 1e11;        // the year 5138; milliseconds and nanoseconds since 1970 lie above
-constexpr std::ptrdiff_t kNeighbours = 4;  // candidates on either side of a stamp: bounds the work on absurdly dense stamps
+constexpr double kMaxTime_s =
+    1e11;  // the year 5138; milliseconds and nanoseconds since 1970 lie above
+constexpr std::ptrdiff_t kNeighbours =
+    4;  // candidates on either side of a stamp: bounds the work on absurdly dense stamps
 
 bool IsBlank(char c) { return c == ' ' || c == '\t' || c == ',' || c == '\r'; }
 
@@ -36,23 +38,28 @@ std::string Quoted(std::string_view text) {
 double ParseStamp(std::string_view token, const std::string& where) {
   double time_s = 0.0;
   const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), time_s);
-  if (error != std::errc{} || end != token.data() + token.size() || !std::isfinite(time_s) || time_s < 0) {
+  if (error != std::errc{} || end != token.data() + token.size() || !std::isfinite(time_s) ||
+      time_s < 0) {
     throw DataError(fmt::format("{}: {} is no time stamp, expected seconds", where, Quoted(token)));
   }
   if (time_s > kMaxTime_s) {
-    throw DataError(
-        fmt::format("{}: time stamp {} is too large for seconds; convert milli- or nanoseconds to seconds", where, Quoted(token)));
+    throw DataError(fmt::format(
+        "{}: time stamp {} is too large for seconds; convert milli- or nanoseconds to seconds",
+        where, Quoted(token)));
   }
   return time_s;
 }
 
 void CheckFileName(std::string_view file, const std::string& where) {
-  if (file.find('\0') != std::string_view::npos) throw DataError(fmt::format("{}: the file name holds a zero byte", where));
+  if (file.find('\0') != std::string_view::npos)
+    throw DataError(fmt::format("{}: the file name holds a zero byte", where));
   const std::filesystem::path path(file);
-  const bool climbs = std::any_of(path.begin(), path.end(), [](const std::filesystem::path& part) { return part == ".."; });
+  const bool climbs = std::any_of(path.begin(), path.end(),
+                                  [](const std::filesystem::path& part) { return part == ".."; });
   if (path.is_absolute() || climbs) {
-    throw DataError(
-        fmt::format("{}: file name {} leaves the recording's folder; list files inside it, relative to it", where, Quoted(file)));
+    throw DataError(fmt::format(
+        "{}: file name {} leaves the recording's folder; list files inside it, relative to it",
+        where, Quoted(file)));
   }
 }
 
@@ -60,7 +67,8 @@ void CheckFileName(std::string_view file, const std::string& where) {
 struct Candidate {
   IndexPair pair;
   double sum_s = 0.0;
-  std::ptrdiff_t previous = -1;  ///< Position of the candidate before it in the chain; -1 at its start.
+  std::ptrdiff_t previous =
+      -1;  ///< Position of the candidate before it in the chain; -1 at its start.
 };
 
 /// The best chain among those that end before a depth image: a Fenwick tree of maxima.
@@ -102,7 +110,9 @@ std::vector<IndexEntry> ParseIndex(std::string_view text, const std::string& nam
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     ++line_number;
     const std::string where = fmt::format("{} line {}", name, line_number);
-    if (line.size() > kMaxLine) throw DataError(fmt::format("{} has {} characters, at most {} are read", where, line.size(), kMaxLine));
+    if (line.size() > kMaxLine)
+      throw DataError(
+          fmt::format("{} has {} characters, at most {} are read", where, line.size(), kMaxLine));
     line = Trimmed(line);
     if (line.empty() || line.front() == '#') continue;
 
@@ -110,24 +120,32 @@ std::vector<IndexEntry> ParseIndex(std::string_view text, const std::string& nam
     const auto length = static_cast<std::size_t>(blank - line.begin());
     const double time_s = ParseStamp(line.substr(0, length), where);
     const std::string_view file = Trimmed(line.substr(length));
-    if (file.empty()) throw DataError(fmt::format("{}: the file name is missing, expected \"timestamp filename\"", where));
+    if (file.empty())
+      throw DataError(
+          fmt::format("{}: the file name is missing, expected \"timestamp filename\"", where));
     CheckFileName(file, where);
     if (!entries.empty() && !(time_s > entries.back().time_s)) {
-      throw DataError(
-          fmt::format("{}: time stamp {:.6f} {} the one before ({:.6f}); the list must rise strictly: sort it and remove doubles", where,
-                      time_s, time_s == entries.back().time_s ? "repeats" : "is earlier than", entries.back().time_s));
+      throw DataError(fmt::format(
+          "{}: time stamp {:.6f} {} the one before ({:.6f}); the list must rise strictly: sort it "
+          "and remove doubles",
+          where, time_s, time_s == entries.back().time_s ? "repeats" : "is earlier than",
+          entries.back().time_s));
     }
-    if (entries.size() == kMaxEntries) throw DataError(fmt::format("{} lists more than {} images", name, kMaxEntries));
+    if (entries.size() == kMaxEntries)
+      throw DataError(fmt::format("{} lists more than {} images", name, kMaxEntries));
     entries.push_back({time_s, std::string(file)});
   }
   return entries;
 }
 
-std::vector<IndexPair> AssociateByTime(std::span<const IndexEntry> color, std::span<const IndexEntry> depth, double max_gap_s) {
+std::vector<IndexPair> AssociateByTime(std::span<const IndexEntry> color,
+                                       std::span<const IndexEntry> depth, double max_gap_s) {
   std::vector<Candidate> candidates;
   BestChain best(depth.size());
   for (std::size_t c = 0; c < color.size(); ++c) {
-    const auto after = std::partition_point(depth.begin(), depth.end(), [&](const IndexEntry& d) { return d.time_s < color[c].time_s; });
+    const auto after = std::partition_point(depth.begin(), depth.end(), [&](const IndexEntry& d) {
+      return d.time_s < color[c].time_s;
+    });
     const auto first = after - std::min(kNeighbours, after - depth.begin());
     const auto last = after + std::min(kNeighbours, depth.end() - after);
     const std::size_t first_of_color = candidates.size();
@@ -144,7 +162,8 @@ std::vector<IndexPair> AssociateByTime(std::span<const IndexEntry> color, std::s
     }
   }
   std::vector<IndexPair> pairs;
-  for (std::ptrdiff_t i = best.Before(depth.size()).candidate; i >= 0; i = candidates[static_cast<std::size_t>(i)].previous) {
+  for (std::ptrdiff_t i = best.Before(depth.size()).candidate; i >= 0;
+       i = candidates[static_cast<std::size_t>(i)].previous) {
     pairs.push_back(candidates[static_cast<std::size_t>(i)].pair);
   }
   std::reverse(pairs.begin(), pairs.end());

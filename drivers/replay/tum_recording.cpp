@@ -14,11 +14,11 @@
 #include <thread>
 #include <vector>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "algo/types/marker_dictionary.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
 #include "drivers/replay/camera_file.hpp"
-#include "drivers/replay/file_io.hpp"
-#include "drivers/replay/image_file.hpp"
 #include "drivers/replay/registration.hpp"
 #include "drivers/replay/tum_index.hpp"
 
@@ -65,7 +65,8 @@ std::vector<IndexEntry> ReadIndex(const fs::path& file) {
 /// Typical time from one image to the next; 0 if there is only one.
 double MedianPeriod(const std::vector<IndexEntry>& entries) {
   std::vector<double> periods_s;
-  for (std::size_t i = 1; i < entries.size(); ++i) periods_s.push_back(entries[i].time_s - entries[i - 1].time_s);
+  for (std::size_t i = 1; i < entries.size(); ++i)
+    periods_s.push_back(entries[i].time_s - entries[i - 1].time_s);
   if (periods_s.empty()) return 0.0;
   const auto middle = periods_s.begin() + static_cast<std::ptrdiff_t>(periods_s.size() / 2);
   std::nth_element(periods_s.begin(), middle, periods_s.end());
@@ -77,12 +78,16 @@ fs::path Resolve(const fs::path& canonical_folder, const fs::path& index, const 
   std::error_code error;
   fs::path file = fs::canonical(canonical_folder / entry.file, error);
   if (error) {
-    throw DataError(fmt::format("image {} of {} (stamp {:.6f}) cannot be found: {}; copy the recording again or remove the line",
-                                entry.file, index.string(), entry.time_s, error.message()));
+    throw DataError(
+        fmt::format("image {} of {} (stamp {:.6f}) cannot be found: {}; copy the recording again "
+                    "or remove the line",
+                    entry.file, index.string(), entry.time_s, error.message()));
   }
-  if (std::mismatch(canonical_folder.begin(), canonical_folder.end(), file.begin(), file.end()).first != canonical_folder.end()) {
-    throw DataError(fmt::format("image {} of {} leads out of the recording's folder, to {}; copy it into the folder", entry.file,
-                                index.string(), file.string()));
+  if (std::mismatch(canonical_folder.begin(), canonical_folder.end(), file.begin(), file.end())
+          .first != canonical_folder.end()) {
+    throw DataError(fmt::format(
+        "image {} of {} leads out of the recording's folder, to {}; copy it into the folder",
+        entry.file, index.string(), file.string()));
   }
   return file;
 }
@@ -92,14 +97,16 @@ CameraFile AssumedCamera(const fs::path& first_image) {
   const cv::Mat image = ReadColorImage(first_image);
   if (image.cols * 3 != image.rows * 4) {
     throw DataError(
-        fmt::format("the recording has no camera.yaml and its images are {}x{}: nominal intrinsics are known only for 4:3 "
+        fmt::format("the recording has no camera.yaml and its images are {}x{}: nominal intrinsics "
+                    "are known only for 4:3 "
                     "(640x480, 320x240); add camera.yaml",
                     image.cols, image.rows));
   }
   CameraFile camera;
   camera.color = Resized(Intrinsics{}, image.cols, image.rows);
-  camera.warnings.push_back(fmt::format("no camera.yaml: assumed fx {} fy {} cx {} cy {}, no distortion and {} depth units per metre",
-                                        camera.color.fx, camera.color.fy, camera.color.cx, camera.color.cy, camera.depth_scale));
+  camera.warnings.push_back(fmt::format(
+      "no camera.yaml: assumed fx {} fy {} cx {} cy {}, no distortion and {} depth units per metre",
+      camera.color.fx, camera.color.fy, camera.color.cx, camera.color.cy, camera.depth_scale));
   return camera;
 }
 
@@ -120,10 +127,13 @@ bool ToMetres(const cv::Mat& depth_units, double units_per_metre, cv::Mat& depth
   return any != 0;
 }
 
-void CheckImageSize(const fs::path& file, const cv::Mat& image, const Intrinsics& camera, const char* what) {
+void CheckImageSize(const fs::path& file, const cv::Mat& image, const Intrinsics& camera,
+                    const char* what) {
   if (image.cols == camera.width && image.rows == camera.height) return;
-  throw DataError(fmt::format("{} image {} has {}x{} pixels, expected {}x{} as the camera states; use the calibration of this image size",
-                              what, file.string(), image.cols, image.rows, camera.width, camera.height));
+  throw DataError(
+      fmt::format("{} image {} has {}x{} pixels, expected {}x{} as the camera states; use the "
+                  "calibration of this image size",
+                  what, file.string(), image.cols, image.rows, camera.width, camera.height));
 }
 
 }  // namespace
@@ -155,27 +165,33 @@ void TumRecording::Impl::FindFrames(const fs::path& folder, double least_max_gap
   const std::vector<IndexEntry> color = ReadIndex(color_index);
   const std::vector<IndexEntry> depth = ReadIndex(depth_index);
   // The nearest partner is never more than half a period off; a tenth of that for jitter.
-  const double max_gap_s = std::max(least_max_gap_s, kMaxGapPeriods * std::max(MedianPeriod(color), MedianPeriod(depth)));
+  const double max_gap_s = std::max(
+      least_max_gap_s, kMaxGapPeriods * std::max(MedianPeriod(color), MedianPeriod(depth)));
   const std::vector<IndexPair> pairs = AssociateByTime(color, depth, max_gap_s);
   if (pairs.size() < kMinFrames) {
     throw DataError(
-        fmt::format("recording {} has {} frame{} ({} colour and {} depth images, stamps at most {:.0f} ms apart), expected at "
+        fmt::format("recording {} has {} frame{} ({} colour and {} depth images, stamps at most "
+                    "{:.0f} ms apart), expected at "
                     "least {}; are both lists of the same sweep and clock?",
-                    folder.string(), pairs.size(), pairs.size() == 1 ? "" : "s", color.size(), depth.size(), max_gap_s * 1e3, kMinFrames));
+                    folder.string(), pairs.size(), pairs.size() == 1 ? "" : "s", color.size(),
+                    depth.size(), max_gap_s * 1e3, kMinFrames));
   }
   const fs::path canonical_folder = fs::canonical(folder);
   plans.reserve(pairs.size());
   for (const IndexPair& pair : pairs) {
     const IndexEntry& c = color[pair.color];
     const IndexEntry& d = depth[pair.depth];
-    plans.push_back({Resolve(canonical_folder, color_index, c), Resolve(canonical_folder, depth_index, d), c.time_s, d.time_s});
+    plans.push_back({Resolve(canonical_folder, color_index, c),
+                     Resolve(canonical_folder, depth_index, d), c.time_s, d.time_s});
   }
   statistics.num_unmatched_color = std::ssize(color) - std::ssize(pairs);
   statistics.num_unmatched_depth = std::ssize(depth) - std::ssize(pairs);
   if (statistics.num_unmatched_color > 0 || statistics.num_unmatched_depth > 0) {
-    info.warnings.push_back(fmt::format("{} of {} colour and {} of {} depth images have no partner within {:.0f} ms and are left out",
-                                        statistics.num_unmatched_color, color.size(), statistics.num_unmatched_depth, depth.size(),
-                                        max_gap_s * 1e3));
+    info.warnings.push_back(
+        fmt::format("{} of {} colour and {} of {} depth images have no partner within {:.0f} ms "
+                    "and are left out",
+                    statistics.num_unmatched_color, color.size(), statistics.num_unmatched_depth,
+                    depth.size(), max_gap_s * 1e3));
   }
   info.num_frames = std::ssize(plans);
 }
@@ -184,20 +200,24 @@ void TumRecording::Impl::ReadCamera(const fs::path& folder, const RecordingDefau
   const fs::path file = folder / "camera.yaml";
   const bool given = fs::exists(fs::symlink_status(file));
   const CameraFile camera =
-      given ? ParseCameraFile(ReadTextFile(file, kMaxCameraBytes), file.string()) : AssumedCamera(plans.front().color_file);
+      given ? ParseCameraFile(ReadTextFile(file, kMaxCameraBytes), file.string())
+            : AssumedCamera(plans.front().color_file);
   info.intrinsics = camera.color;
   info.intrinsics_assumed = !given;
   info.marker_dictionary = camera.marker_dictionary.value_or(defaults.marker_dictionary);
   info.marker_length_m = camera.marker_length_m.value_or(defaults.marker_length_m);
-  info.reference_marker = camera.reference_marker ? camera.reference_marker : defaults.reference_marker;
+  info.reference_marker =
+      camera.reference_marker ? camera.reference_marker : defaults.reference_marker;
   info.warnings.insert(info.warnings.end(), camera.warnings.begin(), camera.warnings.end());
   if (!camera.marker_dictionary || !camera.marker_length_m) {
-    info.warnings.push_back(fmt::format("the recording does not state its markers: assumed {} with a side of {} m", info.marker_dictionary,
-                                        info.marker_length_m));
+    info.warnings.push_back(
+        fmt::format("the recording does not state its markers: assumed {} with a side of {} m",
+                    info.marker_dictionary, info.marker_length_m));
   }
   depth_scale = camera.depth_scale;
   depth_intrinsics = camera.depth_camera ? camera.depth_camera->intrinsics : camera.color;
-  if (camera.depth_camera) registration.emplace(depth_intrinsics, camera.color, camera.depth_camera->T_color_depth);
+  if (camera.depth_camera)
+    registration.emplace(depth_intrinsics, camera.color, camera.depth_camera->T_color_depth);
 }
 
 Decoded TumRecording::Impl::Decode(std::size_t i) const {
@@ -239,13 +259,16 @@ void TumRecording::Impl::DecodeAll(const std::stop_token& stop) {
 TumRecording::TumRecording(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 TumRecording::~TumRecording() = default;
 
-std::unique_ptr<TumRecording> TumRecording::Open(const fs::path& folder, const RecordingDefaults& defaults) {
-  if (!(defaults.max_stamp_gap_s > 0 && defaults.marker_length_m > 0 && MarkerDictionary::Find(defaults.marker_dictionary))) {
+std::unique_ptr<TumRecording> TumRecording::Open(const fs::path& folder,
+                                                 const RecordingDefaults& defaults) {
+  if (!(defaults.max_stamp_gap_s > 0 && defaults.marker_length_m > 0 &&
+        MarkerDictionary::Find(defaults.marker_dictionary))) {
     throw std::invalid_argument("RecordingDefaults: gap, marker length or dictionary out of range");
   }
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    throw DataError(fmt::format("recording {} is {}; expected a folder with rgb.txt and depth.txt", folder.string(),
+    throw DataError(fmt::format("recording {} is {}; expected a folder with rgb.txt and depth.txt",
+                                folder.string(),
                                 fs::exists(folder, error) ? "no folder" : "missing"));
   }
   auto impl = std::make_unique<Impl>();
@@ -253,7 +276,8 @@ std::unique_ptr<TumRecording> TumRecording::Open(const fs::path& folder, const R
     impl->FindFrames(folder, defaults.max_stamp_gap_s);
     impl->ReadCamera(folder, defaults);
   } catch (const fs::filesystem_error& failure) {
-    throw DataError(fmt::format("recording {} cannot be read: {}", folder.string(), failure.what()));
+    throw DataError(
+        fmt::format("recording {} cannot be read: {}", folder.string(), failure.what()));
   }
   return std::unique_ptr<TumRecording>(new TumRecording(std::move(impl)));
 }
@@ -263,7 +287,8 @@ const RecordingStatistics& TumRecording::statistics() const { return impl_->stat
 
 std::optional<Frame> TumRecording::Next() {
   Impl& impl = *impl_;
-  if (!impl.thread.joinable()) impl.thread = std::jthread([&impl](const std::stop_token& stop) { impl.DecodeAll(stop); });
+  if (!impl.thread.joinable())
+    impl.thread = std::jthread([&impl](const std::stop_token& stop) { impl.DecodeAll(stop); });
   std::unique_lock lock(impl.mutex);
   impl.changed.wait(lock, [&impl] { return !impl.queue.empty() || impl.finished; });
   if (impl.queue.empty()) return std::nullopt;

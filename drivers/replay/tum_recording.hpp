@@ -1,4 +1,5 @@
-// A recording in the TUM RGB-D layout, streamed: a folder with rgb.txt, depth.txt, their images and, mostly, camera.yaml.
+// A recording in the TUM RGB-D layout, streamed: a folder with rgb.txt, depth.txt, their images
+// and, mostly, camera.yaml.
 #pragma once
 
 #include <cstdint>
@@ -11,41 +12,49 @@
 
 namespace plumb {
 
-/// What holds where a recording does not say it itself.
+/// Defaults for everything that a recording does not state.
 struct RecordingDefaults {
   std::string marker_dictionary = "DICT_6X6_250";
   double marker_length_m = 0.104;
   std::optional<int> reference_marker;
-  /// Largest difference between the stamps of a colour image and its depth image; 0.55 periods of the slower stream, if that is more:
-  /// streams of a low rate that run half a period apart still pair.
+  /// Largest difference between the stamps of a colour image and its depth image; 0.55 periods of
+  /// the slower stream, if that is more: streams of a low rate that run half a period apart still
+  /// pair.
   double max_stamp_gap_s = 0.020;
 };
 
-/// What reading has found so far; complete once Next() has returned nothing.
+/// Statistics of reading so far; complete once Next() has returned nothing.
 struct RecordingStatistics {
   std::int64_t num_frames = 0;             ///< Handed out by Next().
   std::int64_t num_frames_with_depth = 0;  ///< Of these, with at least one valid depth pixel.
-  double decode_cpu_s = 0.0;               ///< CPU time of reading, decoding and registering these frames.
-  std::int64_t num_unmatched_color = 0;    ///< Colour images without a depth image close in time: left out.
+  double decode_cpu_s = 0.0;  ///< CPU time of reading, decoding and registering these frames.
+  std::int64_t num_unmatched_color =
+      0;  ///< Colour images without a depth image close in time: left out.
   std::int64_t num_unmatched_depth = 0;
 };
 
-/// Streams a recording. One thread of its own decodes up to three frames ahead, in order, so that decoding overlaps the work
-/// on the frames; what comes out does not depend on timing. Next(), info() and statistics() belong to one thread.
+/// Streams a recording. One thread of its own decodes up to three frames ahead, in order, so that
+/// decoding overlaps the work on the frames; what comes out does not depend on timing. Next(),
+/// info() and statistics() belong to one thread.
 ///
-/// Depth of 65535 units means "nothing" too (saturated). Depth that is not registered is registered here, see DepthRegistration.
+/// Depth of 65535 units means "nothing" too (saturated). Depth that is not registered is registered
+/// here, see DepthRegistration.
 class TumRecording : public FrameSource {
  public:
-  /// Reads the index and camera.yaml and finds every image, decoding none (but the first colour image when camera.yaml is
-  /// missing: TUM's published intrinsics are assumed, scaled to its size).
-  /// @throws DataError if anything is missing, damaged or contradictory, or fewer than two frames are there.
+  /// Reads the index and camera.yaml and finds every image, decoding none (but the first colour
+  /// image when camera.yaml is missing: TUM's published intrinsics are assumed, scaled to its
+  /// size).
+  /// @throws DataError if anything is missing, damaged or contradictory, or fewer than two frames
+  /// are there.
   /// @throws std::invalid_argument if the defaults make no sense.
-  [[nodiscard]] static std::unique_ptr<TumRecording> Open(const std::filesystem::path& folder, const RecordingDefaults& defaults = {});
+  [[nodiscard]] static std::unique_ptr<TumRecording> Open(const std::filesystem::path& folder,
+                                                          const RecordingDefaults& defaults = {});
 
   ~TumRecording() override;
   [[nodiscard]] const StreamInfo& info() const override;
 
-  /// @throws DataError on an image that is damaged or has another size than the camera; after that, nothing more comes.
+  /// @throws DataError on an image that is damaged or has another size than the camera; after that,
+  /// nothing more comes.
   [[nodiscard]] std::optional<Frame> Next() override;
 
   [[nodiscard]] const RecordingStatistics& statistics() const;

@@ -6,9 +6,9 @@
 #include <opencv2/core.hpp>
 #include <stdexcept>
 
-#include "algo/types/errors.hpp"
-#include "drivers/replay/file_io.hpp"
-#include "drivers/replay/image_file.hpp"
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
 
 namespace plumb {
 namespace {
@@ -24,7 +24,8 @@ void MakeFolder(const fs::path& folder) {
   if (error) throw IoError(DescribeWriteError(folder, error.value()));
 }
 
-/// Shortest text that reads back as the same number, always with a point or an exponent: FileStorage tells types apart by it.
+/// Shortest text that reads back as the same number, always with a point or an exponent:
+/// FileStorage distinguishes types by it.
 std::string Real(double value) {
   std::string text = fmt::format("{}", value);
   if (text.find_first_of(".en") == std::string::npos) text += '.';
@@ -38,7 +39,8 @@ cv::Mat ToUnits(const cv::Mat& depth_m, double units_per_metre) {
     auto* out = units.ptr<std::uint16_t>(row);
     for (int column = 0; column < depth_m.cols; ++column) {
       const double value = std::round(static_cast<double>(in[column]) * units_per_metre);
-      out[column] = value > 0 && value <= kMaxUnits ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
+      out[column] =
+          value > 0 && value <= kMaxUnits ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
     }
   }
   return units;
@@ -46,19 +48,23 @@ cv::Mat ToUnits(const cv::Mat& depth_m, double units_per_metre) {
 
 void CheckStamp(double time_s, double last_s, const char* what) {
   if (std::isfinite(time_s) && time_s >= last_s + kStampStep_s && time_s >= 0) return;
-  throw std::invalid_argument(fmt::format("{} stamp {:.6f} s must be later than the one before ({:.6f} s)", what, time_s, last_s));
+  throw std::invalid_argument(fmt::format(
+      "{} stamp {:.6f} s must be later than the one before ({:.6f} s)", what, time_s, last_s));
 }
 
 }  // namespace
 
 EncodedFrame EncodeFrame(const Frame& frame, const TumWriterOptions& options) {
-  if (frame.color_rgb.type() != CV_8UC3 || frame.depth_m.type() != CV_32FC1 || frame.color_rgb.size() != frame.depth_m.size()) {
-    throw std::invalid_argument("EncodeFrame needs colour as CV_8UC3 and depth as CV_32FC1 of one size");
+  if (frame.color_rgb.type() != CV_8UC3 || frame.depth_m.type() != CV_32FC1 ||
+      frame.color_rgb.size() != frame.depth_m.size()) {
+    throw std::invalid_argument(
+        "EncodeFrame needs colour as CV_8UC3 and depth as CV_32FC1 of one size");
   }
   EncodedFrame encoded;
   encoded.color_time_s = frame.color_time_s;
   encoded.depth_time_s = frame.depth_time_s;
-  encoded.color_file = options.jpeg_quality > 0 ? EncodeJpeg(frame.color_rgb, options.jpeg_quality) : EncodePng(frame.color_rgb);
+  encoded.color_file = options.jpeg_quality > 0 ? EncodeJpeg(frame.color_rgb, options.jpeg_quality)
+                                                : EncodePng(frame.color_rgb);
   encoded.depth_file = EncodePng(ToUnits(frame.depth_m, options.depth_scale));
   return encoded;
 }
@@ -69,11 +75,14 @@ std::string CameraFileText(const StreamInfo& info, double depth_scale) {
   std::string text = fmt::format(
       "%YAML:1.0\n---\n"
       "image_width: {}\nimage_height: {}\n"
-      "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ {}, 0., {}, 0., {}, {}, 0., 0., 1. ]\n"
-      "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ {}, {}, {}, {}, {} ]\n"
+      "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ {}, 0., {}, "
+      "0., {}, {}, 0., 0., 1. ]\n"
+      "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ {}, "
+      "{}, {}, {}, {} ]\n"
       "depth_scale: {}\ndepth_registered: 1\nmarker_dictionary: \"{}\"\nmarker_length: {}\n",
-      camera.width, camera.height, Real(camera.fx), Real(camera.cx), Real(camera.fy), Real(camera.cy), Real(d[0]), Real(d[1]), Real(d[2]),
-      Real(d[3]), Real(d[4]), Real(depth_scale), info.marker_dictionary, Real(info.marker_length_m));
+      camera.width, camera.height, Real(camera.fx), Real(camera.cx), Real(camera.fy),
+      Real(camera.cy), Real(d[0]), Real(d[1]), Real(d[2]), Real(d[3]), Real(d[4]),
+      Real(depth_scale), info.marker_dictionary, Real(info.marker_length_m));
   if (info.reference_marker) text += fmt::format("reference_marker: {}\n", *info.reference_marker);
   return text;
 }
@@ -92,7 +101,8 @@ void TumWriter::Add(const EncodedFrame& frame) {
   CheckStamp(frame.depth_time_s, last_depth_s_, "depth");
   last_color_s_ = frame.color_time_s;
   last_depth_s_ = frame.depth_time_s;
-  const std::string color_name = fmt::format("rgb/{:.6f}.{}", frame.color_time_s, options_.jpeg_quality > 0 ? "jpg" : "png");
+  const std::string color_name =
+      fmt::format("rgb/{:.6f}.{}", frame.color_time_s, options_.jpeg_quality > 0 ? "jpg" : "png");
   const std::string depth_name = fmt::format("depth/{:.6f}.png", frame.depth_time_s);
   WriteWholeFile(folder_ / color_name, frame.color_file);
   WriteWholeFile(folder_ / depth_name, frame.depth_file);

@@ -11,7 +11,8 @@
 namespace plumb {
 
 struct TumWriterOptions {
-  double depth_scale = 5000.0;  ///< Units per metre of the depth images; farther than 65534 units is written as nothing.
+  double depth_scale = 5000.0;  ///< Units per metre of the depth images; farther than 65534 units
+                                ///< is written as nothing.
   int jpeg_quality = 92;        ///< Of the colour images; 0 writes PNG instead.
 };
 
@@ -30,14 +31,17 @@ struct EncodedFrame {
 /// The text of camera.yaml; ParseCameraFile() gives the same camera back, bit for bit.
 [[nodiscard]] std::string CameraFileText(const StreamInfo& info, double depth_scale);
 
-/// Writes one recording. Images go to the disk as they come; the indices and camera.yaml come last, with Finish().
-/// Without it the folder is no recording: whoever stops early removes it (see daemon/files/atomic_folder.hpp). Not thread-safe.
+/// Writes one recording. Images go to the disk as they come; the indices and camera.yaml come last,
+/// with Finish(). Without it the folder is no recording: remove it when stopping early (see
+/// daemon/files/atomic_folder.hpp). Not thread-safe.
 class TumWriter {
  public:
   /// Creates the folder (its parent must exist) with rgb/ and depth/. @throws IoError
-  TumWriter(std::filesystem::path folder, const StreamInfo& info, const TumWriterOptions& options = {});
+  TumWriter(std::filesystem::path folder, const StreamInfo& info,
+            const TumWriterOptions& options = {});
 
-  /// @throws IoError; std::invalid_argument if a stamp is not later than the one before by a microsecond, the resolution of the files.
+  /// @throws IoError; std::invalid_argument if a stamp is not later than the one before by a
+  /// microsecond, the resolution of the files.
   void Add(const EncodedFrame& frame);
   void Add(const Frame& frame) { Add(EncodeFrame(frame, options_)); }
 

@@ -7,7 +7,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 #include "drivers/simulated/random.hpp"
 
 namespace plumb::simulated {
@@ -22,9 +22,11 @@ constexpr double kTwoPi = 2.0 * std::numbers::pi;
 Pose BoardPose(double x, double y, double yaw, double tilt, double tilt_direction) {
   Pose T = Pose::Identity();
   const Vector3d axis(std::cos(tilt_direction), std::sin(tilt_direction), 0.0);
-  T.linear() = (Eigen::AngleAxisd(tilt, axis) * Eigen::AngleAxisd(yaw, Vector3d::UnitZ())).toRotationMatrix();
+  T.linear() = (Eigen::AngleAxisd(tilt, axis) * Eigen::AngleAxisd(yaw, Vector3d::UnitZ()))
+                   .toRotationMatrix();
   double lowest = 0;
-  for (const Vector3d& corner : CornersInMarkerFrame(kBoardSide)) lowest = std::min(lowest, (T.linear() * corner).z());
+  for (const Vector3d& corner : CornersInMarkerFrame(kBoardSide))
+    lowest = std::min(lowest, (T.linear() * corner).z());
   T.translation() = Vector3d(x, y, 2 * kMillimetre - lowest);
   return T;
 }
@@ -49,7 +51,8 @@ class Views {
     for (const LayoutScene& scene : scenes) {
       const Trajectory trajectory(scene.sweep);
       for (int i = 0; i < kViewsPerSweep; ++i)
-        T_world_camera_.push_back(trajectory.T_world_camera(scene.sweep.duration_s * (i + 0.5) / kViewsPerSweep));
+        T_world_camera_.push_back(
+            trajectory.T_world_camera(scene.sweep.duration_s * (i + 0.5) / kViewsPerSweep));
     }
   }
 
@@ -60,7 +63,8 @@ class Views {
       const Vector3d p = T_camera_board * corner;
       if (p.z() < 0.2) return false;
       const Eigen::Vector2d pixel = Project(camera_, p);
-      if (pixel.x() < kBorder || pixel.y() < kBorder || pixel.x() > camera_.width - kBorder || pixel.y() > camera_.height - kBorder)
+      if (pixel.x() < kBorder || pixel.y() < kBorder || pixel.x() > camera_.width - kBorder ||
+          pixel.y() > camera_.height - kBorder)
         return false;
     }
     const LayoutScene& scene = scenes_[view / kViewsPerSweep];
@@ -68,8 +72,10 @@ class Views {
     const Eigen::Vector3f from = (T_body_world * T_world_camera_[view].translation()).cast<float>();
     const Vector3d grown(1.1, 1.1, 1.0);
     for (const Vector3d& corner : CornersInMarkerFrame(kMarkerLength)) {
-      const Eigen::Vector3f way = (T_body_world * (T_world_board * corner.cwiseProduct(grown))).cast<float>() - from;
-      if (std::isfinite(scene.body->Intersect(from, way.normalized(), 0.0F, way.norm()))) return false;
+      const Eigen::Vector3f way =
+          (T_body_world * (T_world_board * corner.cwiseProduct(grown))).cast<float>() - from;
+      if (std::isfinite(scene.body->Intersect(from, way.normalized(), 0.0F, way.norm())))
+        return false;
     }
     return true;
   }
@@ -88,14 +94,16 @@ class Views {
     double least = 1.0;
     for (std::size_t scene = 0; scene < scenes_.size(); ++scene) {
       int sights = 0;
-      for (std::size_t i = 0; i < kViewsPerSweep; ++i) sights += Sees(scene * kViewsPerSweep + i, T_world_board) ? 1 : 0;
+      for (std::size_t i = 0; i < kViewsPerSweep; ++i)
+        sights += Sees(scene * kViewsPerSweep + i, T_world_board) ? 1 : 0;
       least = std::min(least, static_cast<double>(sights) / kViewsPerSweep);
     }
     return least;
   }
 
   void Add(const Pose& T_world_board) {
-    for (std::size_t view = 0; view < seen_.size(); ++view) seen_[view] += Sees(view, T_world_board) ? 1 : 0;
+    for (std::size_t view = 0; view < seen_.size(); ++view)
+      seen_[view] += Sees(view, T_world_board) ? 1 : 0;
   }
 
  private:
@@ -105,7 +113,8 @@ class Views {
   std::vector<int> seen_;
 };
 
-Pose ReferencePose(const LayoutRegion& region, const std::vector<LayoutScene>& scenes, const Views& views, RandomStream& random) {
+Pose ReferencePose(const LayoutRegion& region, const std::vector<LayoutScene>& scenes,
+                   const Views& views, RandomStream& random) {
   const double yaw = random.Within(1.5 * kDegree);
   const double tilt = 0.3 * kDegree * random.Uniform();
   const double tilt_direction = random.Uniform(0.0, kTwoPi);
@@ -122,14 +131,16 @@ Pose ReferencePose(const LayoutRegion& region, const std::vector<LayoutScene>& s
       }
     }
   }
-  if (!best) throw std::invalid_argument("simulate: the sweeps are too short to see the reference marker in every scene");
+  if (!best)
+    throw std::invalid_argument(
+        "simulate: the sweeps are too short to see the reference marker in every scene");
   return *best;
 }
 
 }  // namespace
 
-std::vector<Board> LayBoards(const LayoutRegion& region, const std::vector<LayoutScene>& scenes, const Intrinsics& camera,
-                             std::uint64_t seed) {
+std::vector<Board> LayBoards(const LayoutRegion& region, const std::vector<LayoutScene>& scenes,
+                             const Intrinsics& camera, std::uint64_t seed) {
   RandomStream random(Hash(seed, 61));
   Views views(scenes, camera);
   std::vector<Board> boards;
@@ -154,7 +165,8 @@ std::vector<Board> LayBoards(const LayoutRegion& region, const std::vector<Layou
       const double x = random.Within(region.half_length);
       const double y = random.Within(region.half_width);
       // Most lie almost flat, some are propped up.
-      const double tilt = (random.Uniform() < 0.75 ? random.Uniform(0.0, 2.0) : random.Uniform(3.0, 9.0)) * kDegree;
+      const double tilt =
+          (random.Uniform() < 0.75 ? random.Uniform(0.0, 2.0) : random.Uniform(3.0, 9.0)) * kDegree;
       const double yaw = random.Uniform(0.0, kTwoPi);
       const Pose T = BoardPose(x, y, yaw, tilt, random.Uniform(0.0, kTwoPi));
       const bool crowded = std::any_of(boards.begin(), boards.end(), [&](const Board& other) {

@@ -20,9 +20,10 @@ constexpr int kSmoothSide = 2;            // 4 elsewhere.
 constexpr std::uint8_t kInkEdge = 1;      // Within reach two materials of one object meet,
 constexpr std::uint8_t kOutlineEdge = 2;  // or two objects.
 constexpr float kGain = 0.80F;            // Linear exposure: white boards stay below saturation.
-constexpr int kGammaLevels = 4096;
+constexpr int kLightLevels = 4096;
 
-// Share of light within the distance x of the centre's left, of a unit pixel seen through a Gaussian blur: by integration, once.
+// Share of light within the distance x of the centre's left, of a unit pixel seen through a
+// Gaussian blur: by integration, once.
 class PixelKernel {
  public:
   explicit PixelKernel(double blur_px) {
@@ -30,10 +31,10 @@ class PixelKernel {
     for (int i = 0; i <= kSteps; ++i) {
       const double x = -reach + 2.0 * reach * i / kSteps;
       places_.push_back(x);
-      const double density =
-          blur_px > 0
-              ? 0.5 * (std::erf((x + 0.5) / (blur_px * std::numbers::sqrt2)) - std::erf((x - 0.5) / (blur_px * std::numbers::sqrt2)))
-              : 1.0;
+      const double density = blur_px > 0
+                                 ? 0.5 * (std::erf((x + 0.5) / (blur_px * std::numbers::sqrt2)) -
+                                          std::erf((x - 0.5) / (blur_px * std::numbers::sqrt2)))
+                                 : 1.0;
       shares_.push_back(i == 0 ? 0.0 : shares_.back() + density);
     }
     for (double& share : shares_) share /= shares_.back();
@@ -43,7 +44,8 @@ class PixelKernel {
     const auto above = std::upper_bound(shares_.begin() + 1, shares_.end() - 1, share);
     const auto i = static_cast<std::size_t>(above - shares_.begin());
     const double step = shares_[i] - shares_[i - 1];
-    return places_[i - 1] + (places_[i] - places_[i - 1]) * (step > 0 ? (share - shares_[i - 1]) / step : 0.5);
+    return places_[i - 1] +
+           (places_[i] - places_[i - 1]) * (step > 0 ? (share - shares_[i - 1]) / step : 0.5);
   }
 
  private:
@@ -56,15 +58,15 @@ std::vector<int> Permutation(RandomStream& random, int size) {
   std::vector<int> order(static_cast<std::size_t>(size));
   std::iota(order.begin(), order.end(), 0);
   for (int i = size - 1; i > 0; --i)
-    std::swap(order[static_cast<std::size_t>(i)], order[static_cast<std::size_t>(random.Uniform() * (i + 1))]);
+    std::swap(order[static_cast<std::size_t>(i)],
+              order[static_cast<std::size_t>(random.Uniform() * (i + 1))]);
   return order;
 }
 
-float SrgbEncode(float linear) { return linear <= 0.0031308F ? 12.92F * linear : 1.055F * std::pow(linear, 1.0F / 2.4F) - 0.055F; }
-
 // Four almost normal numbers of unit variance in one go: sums of four bytes of a hash.
 float NearlyNormal(std::uint64_t hash) {
-  const auto sum = static_cast<float>((hash & 0xff) + ((hash >> 8) & 0xff) + ((hash >> 16) & 0xff) + ((hash >> 24) & 0xff));
+  const auto sum = static_cast<float>((hash & 0xff) + ((hash >> 8) & 0xff) + ((hash >> 16) & 0xff) +
+                                      ((hash >> 24) & 0xff));
   return (sum - 510.0F) * (1.0F / 147.8F);
 }
 
@@ -79,12 +81,16 @@ struct ColorCamera::Shot {
   cv::Mat edge;                        // CV_8UC1
   std::uint64_t noise_seed;
   int tiles_across;
+  Vector3f gain;  // Red, green, blue.
 };
 
-ColorCamera::ColorCamera(const SensorUnit& unit) : unit_(unit), rays_(unit.color_true) {
+ColorCamera::ColorCamera(const SensorUnit& unit)
+    : unit_(unit), rays_(unit.color_true, unit.color_lens_rest) {
   BuildSamples();
-  for (int i = 0; i < kGammaLevels; ++i) {
-    gamma_.push_back(static_cast<std::uint8_t>(std::lround(255.0F * SrgbEncode(static_cast<float>(i) / (kGammaLevels - 1)))));
+  for (int i = 0; i < kLightLevels; ++i) {
+    const double light = static_cast<double>(static_cast<float>(i) / (kLightLevels - 1));
+    const auto code = std::lround(255.0F * static_cast<float>(unit.tone.Encode(light)));
+    codes_.push_back(static_cast<std::uint8_t>(code));
   }
 }
 
@@ -92,7 +98,8 @@ void ColorCamera::BuildSamples() {
   const PixelKernel kernel(unit_.lens_blur_px);
   RandomStream random(Hash(unit_.seed, 91));
   const auto pattern = [&](int side) {
-    // Multi-jittered (Chiu, Shirley, Wang 1994): one sample a cell of the side x side grid, and one in each of the side^2 columns and rows.
+    // Multi-jittered (Chiu, Shirley, Wang 1994): one sample a cell of the side x side grid, and one
+    // in each of the side^2 columns and rows.
     const int count = side * side;
     std::vector<Eigen::Vector3f> samples;  // du, dv, dt
     std::vector<std::vector<int>> columns;
@@ -109,7 +116,8 @@ void ColorCamera::BuildSamples() {
         const double u = (i + (columns[a][b] + 0.5) / side) / side;
         const double v = (j + (rows[b][a] + 0.5) / side) / side;
         const double time = (times[static_cast<std::size_t>(j * side + i)] + 0.5) / count - 0.5;
-        samples.emplace_back(static_cast<float>(kernel.Inverse(u)), static_cast<float>(kernel.Inverse(v)),
+        samples.emplace_back(static_cast<float>(kernel.Inverse(u)),
+                             static_cast<float>(kernel.Inverse(v)),
                              static_cast<float>(unit_.exposure_s * time));
       }
     }
@@ -137,12 +145,16 @@ void ColorCamera::Cast(Shot& shot, int tile_row) const {
   const int y_end = std::min(rays_.height(), (tile_row + 1) * kTileSize);
   const int y_mid = std::min(rays_.height() - 1, tile_row * kTileSize + kTileSize / 2);
   // A tile's half diagonal, the lens's blur, and some room for the motion within the exposure.
-  const float spread = (0.75F * kTileSize + 4.0F * static_cast<float>(unit_.lens_blur_px) + 2.0F) / rays_.focal_px() +
+  const float spread = (0.75F * kTileSize + 4.0F * static_cast<float>(unit_.lens_blur_px) + 2.0F) /
+                           rays_.focal_px() +
                        0.6F * static_cast<float>(unit_.exposure_s);
-  const float margin = 0.002F + 0.6F * static_cast<float>(unit_.exposure_s + unit_.readout_s * kTileSize / rays_.height());
+  const float margin =
+      0.002F +
+      0.6F * static_cast<float>(unit_.exposure_s + unit_.readout_s * kTileSize / rays_.height());
   for (int tile = 0; tile < shot.tiles_across; ++tile) {
     const int x_mid = std::min(rays_.width() - 1, tile * kTileSize + kTileSize / 2);
-    const Ray centre = shot.rows[static_cast<std::size_t>(y_mid)].RayOf(rays_.At(x_mid, y_mid, -0.5F, -0.5F), 0.0F);
+    const Ray centre = shot.rows[static_cast<std::size_t>(y_mid)].RayOf(
+        rays_.At(x_mid, y_mid, -0.5F, -0.5F), 0.0F);
     const Candidates candidates = shot.world.FindCandidates(centre, spread, margin);
     shot.candidates[static_cast<std::size_t>(tile_row * shot.tiles_across + tile)] = candidates;
     for (int y = tile_row * kTileSize; y < y_end; ++y) {
@@ -162,9 +174,12 @@ void ColorCamera::Cast(Shot& shot, int tile_row) const {
 cv::Mat ColorCamera::EdgeMask(const Shot& shot) const {
   // How far an edge can smear: pixel and lens, and the motion during the exposure.
   const MovingPose& middle = shot.rows[shot.rows.size() / 2];
-  const float motion_px =
-      static_cast<float>(unit_.exposure_s) * rays_.focal_px() * (middle.angular_velocity.norm() + middle.velocity.norm() / 0.75F);
-  const int reach = std::clamp(static_cast<int>(std::ceil(0.5F + 2.0F * static_cast<float>(unit_.lens_blur_px) + 0.5F * motion_px)), 1, 8);
+  const float motion_px = static_cast<float>(unit_.exposure_s) * rays_.focal_px() *
+                          (middle.angular_velocity.norm() + middle.velocity.norm() / 0.75F);
+  const int reach =
+      std::clamp(static_cast<int>(std::ceil(0.5F + 2.0F * static_cast<float>(unit_.lens_blur_px) +
+                                            0.5F * motion_px)),
+                 1, 8);
   const int width = rays_.width();
   const int height = rays_.height();
   cv::Mat along_row(height, width, CV_8UC1);
@@ -175,17 +190,20 @@ cv::Mat ColorCamera::EdgeMask(const Shot& shot) const {
     std::fill(out, out + width, std::uint8_t{0});
     for (int x = 0; x < width; ++x) {
       const Material right = x + 1 < width ? material[x + 1] : material[x];
-      const Material below = y + 1 < height ? shot.material.at<std::uint16_t>(y + 1, x) : material[x];
+      const Material below =
+          y + 1 < height ? shot.material.at<std::uint16_t>(y + 1, x) : material[x];
       if (material[x] == right && material[x] == below) continue;
       const Material object = ObjectOf(material[x]);
-      const std::uint8_t kind = object == ObjectOf(right) && object == ObjectOf(below) ? kInkEdge : kOutlineEdge;
+      const std::uint8_t kind =
+          object == ObjectOf(right) && object == ObjectOf(below) ? kInkEdge : kOutlineEdge;
       for (int i = std::max(0, x - reach); i < std::min(width, x + reach + 2); ++i) out[i] |= kind;
     }
   });
   tbb::parallel_for(0, height, [&](int y) {
     auto* out = mask.ptr<std::uint8_t>(y);
     std::fill(out, out + width, std::uint8_t{0});
-    for (int other = std::max(0, y - reach - 1); other <= std::min(height - 1, y + reach); ++other) {
+    for (int other = std::max(0, y - reach - 1); other <= std::min(height - 1, y + reach);
+         ++other) {
       const auto* in = along_row.ptr<std::uint8_t>(other);
       for (int x = 0; x < width; ++x) out[x] |= in[x];
     }
@@ -196,7 +214,8 @@ cv::Mat ColorCamera::EdgeMask(const Shot& shot) const {
 Vector3f ColorCamera::GatherInk(const Shot& shot, int x, int y) const {
   const auto material = shot.material.at<std::uint16_t>(y, x);
   const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
-  // Everything in the board's frame, where a sample's place is linear in du, dv and dt before the division.
+  // Everything in the board's frame, where a sample's place is linear in du, dv and dt before the
+  // division.
   const World::BoardPlane& plane = shot.world.PlaneOf(BoardOf(material));
   const Vector3f origin = plane.R_board_world * (pose.p_world - plane.p_world);
   const Vector3f velocity = plane.R_board_world * pose.velocity;
@@ -204,32 +223,38 @@ Vector3f ColorCamera::GatherInk(const Shot& shot, int x, int y) const {
   const Vector3f direction = R_board_camera * rays_.At(x, y, 0, 0);
   const Vector3f along_u = R_board_camera * rays_.At(x, y, 1, 0) - direction;
   const Vector3f along_v = R_board_camera * rays_.At(x, y, 0, 1) - direction;
-  const Vector3f turn = plane.R_board_world * pose.angular_velocity.cross(pose.R_world_camera * rays_.At(x, y, 0, 0));
+  const Vector3f turn =
+      plane.R_board_world * pose.angular_velocity.cross(pose.R_world_camera * rays_.At(x, y, 0, 0));
   Int4 black = Splat(0);
   const auto& samples = PatternOf(ink_samples_, x, y);
   for (const Samples& four : samples) {
     const Vector3x4 o = four.dt * velocity + origin;
     const Vector3x4 d = four.du * along_u + four.dv * along_v + four.dt * turn + direction;
-    const Float4 t = -o.z / d.z;
+    Float4 t = -o.z / d.z;
+    if (plane.bulge != 0.0F) t = plane.MeetTop(o, d, t);
     black -= plane.IsBlack(o.x + t * d.x, o.y + t * d.y);
   }
   const Vector3f p = PointAt(shot, x, y);
-  const float share = static_cast<float>(black[0] + black[1] + black[2] + black[3]) / static_cast<float>(4 * samples.size());
+  const float share = static_cast<float>(black[0] + black[1] + black[2] + black[3]) /
+                      static_cast<float>(4 * samples.size());
   const Material white = ObjectOf(material);
   const Vector3f paper = shot.world.Albedo({white}, p);
   const Vector3f ink = shot.world.Albedo({static_cast<Material>(white + 1)}, p);
   return shot.world.ShadingAt(material, p).light.cwiseProduct(paper + share * (ink - paper));
 }
 
-Vector3f ColorCamera::GatherOutline(const Shot& shot, int x, int y, const Candidates& candidates) const {
+Vector3f ColorCamera::GatherOutline(const Shot& shot, int x, int y,
+                                    const Candidates& candidates) const {
   const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
   const auto centre = shot.material.at<std::uint16_t>(y, x);
   Vector3f sum = Vector3f::Zero();
   bool mixed = false;
   const auto& samples = PatternOf(outline_samples_, x, y);
   for (const Samples& four : samples) {
-    // The first four lie at the corners of the pattern: where they see nothing else, nothing else is in sight.
-    if (&four == &samples[1] && !mixed) return centre < kFirstBoard ? Vector3f(sum / 4.0F) : GatherSmooth(shot, x, y);
+    // The first four lie at the corners of the pattern: where they see nothing else, nothing else
+    // is in sight.
+    if (&four == &samples[1] && !mixed)
+      return centre < kFirstBoard ? Vector3f(sum / 4.0F) : GatherSmooth(shot, x, y);
     const Ray4 rays = pose.RayOf(rays_.At(x, y, four.du, four.dv), four.dt);
     const Hit4 hits = shot.world.Trace(rays, candidates);
     const Vector3x4 places = hits.t * rays.direction + rays.origin;
@@ -237,7 +262,8 @@ Vector3f ColorCamera::GatherOutline(const Shot& shot, int x, int y, const Candid
       const auto material = static_cast<Material>(hits.material[i]);
       const Vector3f p = Lane(places, i);
       const Shading shading = shot.world.ShadingAt(material, p);
-      sum += shot.world.Albedo(shot.world.PaintOf(material, shading.normal), p).cwiseProduct(shading.light);
+      sum += shot.world.Albedo(shot.world.PaintOf(material, shading.normal), p)
+                 .cwiseProduct(shading.light);
       mixed = mixed || material != centre;
     }
   }
@@ -249,19 +275,31 @@ Vector3f ColorCamera::GatherSmooth(const Shot& shot, int x, int y) const {
   const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
   const Vector3f p = PointAt(shot, x, y);
   const Shading shading = shot.world.ShadingAt(material, p);
-  if (material >= kFirstBoard) return shading.light.cwiseProduct(shot.world.Albedo(shot.world.PaintOf(material, shading.normal), p));
+  if (material >= kFirstBoard)
+    return shading.light.cwiseProduct(
+        shot.world.Albedo(shot.world.PaintOf(material, shading.normal), p));
   // The surface is its tangent plane over one pixel.
   static_assert(kSmoothSide * kSmoothSide == 4);
   const Samples& four = PatternOf(smooth_samples_, x, y).front();
   const Vector3x4 origin = four.dt * pose.velocity + pose.p_world;
   const Vector3x4 direction = pose.DirectionOf(rays_.At(x, y, four.du, four.dv), four.dt);
-  const Float4 t = (shading.normal.dot(p) - Dot(shading.normal, origin)) / Smaller(Dot(shading.normal, direction), Splat(-0.05F));
-  return shading.light.cwiseProduct(shot.world.MeanAlbedo(shot.world.PaintOf(material, shading.normal), t * direction + origin));
+  const Float4 t = (shading.normal.dot(p) - Dot(shading.normal, origin)) /
+                   Smaller(Dot(shading.normal, direction), Splat(-0.05F));
+  return shading.light.cwiseProduct(
+      shot.world.MeanAlbedo(shot.world.PaintOf(material, shading.normal), t * direction + origin));
 }
 
 Vector3f ColorCamera::PointAt(const Shot& shot, int x, int y) const {
   const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
   return pose.p_world + shot.depth.at<float>(y, x) * (pose.R_world_camera * rays_.At(x, y, 0, 0));
+}
+
+float ColorCamera::GlareAt(const Shot& shot, int x, int y) const {
+  if (shot.world.room().gloss <= 0.0F) return 0.0F;
+  const auto material = shot.material.at<std::uint16_t>(y, x);
+  if (!IsBoardTop(material)) return 0.0F;
+  const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
+  return shot.world.GlareAt(material, PointAt(shot, x, y), pose.p_world);
 }
 
 void ColorCamera::Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const {
@@ -270,39 +308,50 @@ void ColorCamera::Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const {
   const Intrinsics& camera = unit_.color_true;
   const auto cx = static_cast<float>(camera.cx);
   const auto cy = static_cast<float>(camera.cy);
-  const auto vignetting =
-      static_cast<float>(4.0 * unit_.vignetting / (static_cast<double>(width) * width + static_cast<double>(height) * height));
+  const auto vignetting = static_cast<float>(
+      4.0 * unit_.vignetting /
+      (static_cast<double>(width) * width + static_cast<double>(height) * height));
   const auto shot_noise = static_cast<float>(unit_.shot_noise);
   const auto read_variance = static_cast<float>(unit_.read_noise * unit_.read_noise);
   const bool noisy = unit_.shot_noise > 0 || unit_.read_noise > 0;
   const int y_end = std::min(height, (tile_row + 1) * kTileSize);
   // Tile by tile, so that neighbours find each other's texels in the cache.
   for (int tile = 0; tile < shot.tiles_across; ++tile) {
-    const Candidates& candidates = shot.candidates[static_cast<std::size_t>(tile_row * shot.tiles_across + tile)];
+    const Candidates& candidates =
+        shot.candidates[static_cast<std::size_t>(tile_row * shot.tiles_across + tile)];
     for (int y = tile_row * kTileSize; y < y_end; ++y) {
       for (int x = tile * kTileSize; x < std::min(width, (tile + 1) * kTileSize); ++x) {
         const std::uint8_t edge = shot.edge.at<std::uint8_t>(y, x);
         const bool only_ink = edge == kInkEdge && IsBoardTop(shot.material.at<std::uint16_t>(y, x));
-        Vector3f light = only_ink ? GatherInk(shot, x, y) : edge != 0 ? GatherOutline(shot, x, y, candidates) : GatherSmooth(shot, x, y);
+        Vector3f light = only_ink    ? GatherInk(shot, x, y)
+                         : edge != 0 ? GatherOutline(shot, x, y, candidates)
+                                     : GatherSmooth(shot, x, y);
         const float dx = static_cast<float>(x) - cx;
         const float dy = static_cast<float>(y) - cy;
+        light += Vector3f::Constant(GlareAt(shot, x, y));
         light *= kGain * (1.0F - vignetting * (dx * dx + dy * dy));
+        light = light.cwiseProduct(shot.gain);
         auto& pixel = rgb.at<cv::Vec3b>(y, x);
         const std::uint64_t hash =
-            noisy ? Hash(shot.noise_seed, static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) + static_cast<std::uint64_t>(x))
+            noisy ? Hash(shot.noise_seed,
+                         static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) +
+                             static_cast<std::uint64_t>(x))
                   : 0;
         for (int channel = 0; channel < 3; ++channel) {
           float value = light[channel];
           if (noisy)
-            value += std::sqrt(shot_noise * value + read_variance) * NearlyNormal(channel == 2 ? Hash(hash) : hash >> (32 * channel));
-          pixel[channel] = gamma_[static_cast<std::size_t>(std::clamp(value, 0.0F, 1.0F) * (kGammaLevels - 1) + 0.5F)];
+            value += std::sqrt(shot_noise * value + read_variance) *
+                     NearlyNormal(channel == 2 ? Hash(hash) : hash >> (32 * channel));
+          pixel[channel] = codes_[static_cast<std::size_t>(
+              std::clamp(value, 0.0F, 1.0F) * (kLightLevels - 1) + 0.5F)];
         }
       }
     }
   }
 }
 
-cv::Mat ColorCamera::Render(const World& world, const Trajectory& trajectory, double time_s, std::uint64_t noise_seed) const {
+cv::Mat ColorCamera::Render(const World& world, const Trajectory& trajectory, double time_s,
+                            std::uint64_t noise_seed, const Vector3f& gain) const {
   const int width = rays_.width();
   const int height = rays_.height();
   const int tile_rows = (height + kTileSize - 1) / kTileSize;
@@ -314,7 +363,8 @@ cv::Mat ColorCamera::Render(const World& world, const Trajectory& trajectory, do
             cv::Mat(height, width, CV_32FC1),
             cv::Mat(),
             noise_seed,
-            tiles_across};
+            tiles_across,
+            gain};
   tbb::parallel_for(0, height, [&](int y) {
     const double row_time = time_s + unit_.readout_s * ((y + 0.5) / height - 0.5);
     shot.rows[static_cast<std::size_t>(y)] = PoseAt(trajectory, row_time, Pose::Identity());

@@ -11,15 +11,21 @@
 
 namespace plumb::simulated {
 
-/// Renders colour images: light is gathered linearly over each pixel's area, the lens's blur and the exposure; then vignetting, noise,
-/// gamma. Pixels on an edge of a marker's print take 36 samples, stratified so that a straight edge's coverage is true to about 1 %; others
-/// fewer. Immutable: any number of threads may render; parallel inside, the result does not depend on the number of threads.
+/// Renders colour images: light is gathered linearly over each pixel's area, the lens's blur and
+/// the exposure; then vignetting, noise, tone curve. Pixels on an edge of a marker's print take 36
+/// samples, stratified so that a straight edge's coverage is true to about 1 %; others fewer.
+/// Immutable: any number of threads may render; parallel inside, the result does not depend on the
+/// number of threads.
 class ColorCamera {
  public:
   explicit ColorCamera(const SensorUnit& unit);
-  /// @param time_s  Mid-exposure of the middle row, trajectory time.  @param noise_seed  Of this image.
+  /// @param time_s  Mid-exposure of the middle row, trajectory time.  @param noise_seed  Of this
+  /// image.
+  /// @param gain  Of the linear red, green and blue: what automatic exposure and white balance did.
   /// @return CV_8UC3, red, green, blue.
-  [[nodiscard]] cv::Mat Render(const World& world, const Trajectory& trajectory, double time_s, std::uint64_t noise_seed) const;
+  [[nodiscard]] cv::Mat Render(const World& world, const Trajectory& trajectory, double time_s,
+                               std::uint64_t noise_seed,
+                               const Eigen::Vector3f& gain = Eigen::Vector3f::Ones()) const;
 
  private:
   struct Samples {
@@ -32,12 +38,16 @@ class ColorCamera {
   void Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const;
   static constexpr std::size_t kNumPatterns = 32;
   using Patterns = std::vector<std::vector<Samples>>;
-  [[nodiscard]] static const std::vector<Samples>& PatternOf(const Patterns& patterns, int x, int y) {
-    return patterns[Hash(static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y)) % kNumPatterns];
+  [[nodiscard]] static const std::vector<Samples>& PatternOf(const Patterns& patterns, int x,
+                                                             int y) {
+    return patterns[Hash(static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y)) %
+                    kNumPatterns];
   }
   [[nodiscard]] Eigen::Vector3f PointAt(const Shot& shot, int x, int y) const;
+  [[nodiscard]] float GlareAt(const Shot& shot, int x, int y) const;
   [[nodiscard]] Eigen::Vector3f GatherInk(const Shot& shot, int x, int y) const;
-  [[nodiscard]] Eigen::Vector3f GatherOutline(const Shot& shot, int x, int y, const Candidates& candidates) const;
+  [[nodiscard]] Eigen::Vector3f GatherOutline(const Shot& shot, int x, int y,
+                                              const Candidates& candidates) const;
   [[nodiscard]] Eigen::Vector3f GatherSmooth(const Shot& shot, int x, int y) const;
 
   SensorUnit unit_;
@@ -45,7 +55,7 @@ class ColorCamera {
   Patterns ink_samples_;  ///< Several patterns of each kind, chosen by pixel.
   Patterns outline_samples_;
   Patterns smooth_samples_;
-  std::vector<std::uint8_t> gamma_;  ///< 8-bit code of a linear value in 1/4095.
+  std::vector<std::uint8_t> codes_;  ///< 8-bit code of a linear value in 1/4095.
 };
 
 }  // namespace plumb::simulated

@@ -7,24 +7,30 @@
 
 #include <tbb/parallel_for.h>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 #include "drivers/simulated/noise_field.hpp"
 #include "drivers/simulated/ps1080.hpp"
 #include "drivers/simulated/random.hpp"
+#include "drivers/simulated/smooth_field.hpp"
 
 namespace plumb::simulated {
 namespace {
 
 using Eigen::Vector3f;
 
-constexpr double kJitterFilterPx = 1.5;                              // Of a 640-pixel image: the jitter of neighbours agrees a little.
-constexpr float kEdgeStep = 0.02F;                                   // Neighbours further apart in depth than this are an edge, metres.
-constexpr float kFlyingShare = 0.15F;                                // Edge pixels that get a depth in between.
-constexpr float kEdgeLossShare = 0.45F;                              // Edge pixels without depth.
+constexpr double kJitterFilterPx =
+    1.5;  // Of a 640-pixel image: the jitter of neighbours agrees a little.
+constexpr float kEdgeStep =
+    0.02F;  // Neighbours further apart in depth than this are an edge, metres.
+constexpr float kFlyingShare = 0.15F;    // Edge pixels that get a depth in between.
+constexpr float kEdgeLossShare = 0.45F;  // Edge pixels without depth.
 constexpr float kGrazingBegin = static_cast<float>(74.0 * kDegree);  // Losses begin here,
 constexpr float kGrazingEnd = static_cast<float>(82.0 * kDegree);    // and are complete here.
-constexpr float kSteepest = 1.3F;                                    // Radians; steeper surfaces still count as edges.
+constexpr float kSteepest = 1.3F;  // Radians; steeper surfaces still count as edges.
 constexpr int kSlantSteps = 2048;
+constexpr double kProjectorBaseline_m = 0.075;
+constexpr double kBendMiddle_m = 0.9;  // Of the depths of a sweep,
+constexpr double kBendReach_m = 0.4;   // and how far from it the field changes by half.
 
 // Share of the beams that a surface of this incidence loses, by its cosine.
 float GrazingLoss(float cosine) {
@@ -46,7 +52,8 @@ Float4 IncidenceCosine(const World& world, const Ray4& rays, const Hit4& hits) {
     const Vector3x4 places = hits.t * rays.direction + rays.origin;
     for (int i = 0; i < 4; ++i) {
       if (hits.material[i] > kSupport)
-        cosine[i] = -world.Normal(static_cast<Material>(hits.material[i]), Lane(places, i)).dot(Lane(rays.direction, i));
+        cosine[i] = -world.Normal(static_cast<Material>(hits.material[i]), Lane(places, i))
+                         .dot(Lane(rays.direction, i));
     }
   }
   return Smaller(Larger(cosine, Splat(0.0F)), Splat(1.0F));
@@ -56,31 +63,68 @@ Float4 IncidenceCosine(const World& world, const Ray4& rays, const Hit4& hits) {
 
 struct DepthCamera::Layers {
   std::vector<float> jitter_x, jitter_y, axial;  // Unit variance; empty when the effect is off.
+  double warm_up = 0.0;                          // Scale error of the moment.
 };
 
-DepthCamera::DepthCamera(const SensorUnit& unit) : unit_(unit), rays_(unit.depth_true) {
+// Radial error and field of every pixel; empty if the unit has neither.
+std::vector<float> BendOfPixels(const DepthBend& bend, int width, int height) {
+  if (bend.field_rms == 0 && bend.radial == 0) return {};
+  std::vector<float> relative(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  if (bend.field_rms != 0) relative = SmoothField(bend.field_seed, width, height);
+  const double corner_squared =
+      (static_cast<double>(width) * width + static_cast<double>(height) * height) / 4.0;
+  std::size_t index = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double u = x - (width - 1) / 2.0;
+      const double v = y - (height - 1) / 2.0;
+      const double r2 = (u * u + v * v) / corner_squared;
+      const double radial = r2 * (1.0 - bend.radial_quartic + bend.radial_quartic * r2);
+      float& value = relative[index++];
+      value = static_cast<float>(bend.field_rms * value + bend.radial * radial);
+    }
+  }
+  return relative;
+}
+
+DepthCamera::DepthCamera(const SensorUnit& unit)
+    : unit_(unit),
+      rays_(unit.depth_true),
+      bend_(BendOfPixels(unit.depth_bend, rays_.width(), rays_.height())) {
+  if (unit.speckle > 0) {
+    speckle_ = CorrelatedNoise(Hash(unit.seed, 117), rays_.width(), rays_.height(),
+                               FilterSigmaOfLag(unit.correlation_px));
+  }
+  if (unit.depth_bend.change_rms != 0) {
+    bend_change_ = SmoothField(unit.depth_bend.change_seed, rays_.width(), rays_.height());
+    for (float& value : bend_change_) value *= static_cast<float>(unit.depth_bend.change_rms);
+  }
   for (int i = 0; i <= kSlantSteps + 1; ++i)
-    slants_.push_back(static_cast<float>(NguyenSlant(std::acos(std::min(1.0, static_cast<double>(i) / kSlantSteps)))));
+    slants_.push_back(static_cast<float>(
+        NguyenSlant(std::acos(std::min(1.0, static_cast<double>(i) / kSlantSteps)))));
   const Intrinsics& camera = unit_.depth_assumed;
   const Eigen::Matrix3d R_color_depth = unit_.T_color_depth_assumed.linear();
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       const Eigen::Vector2d ideal = Undistort(camera, {x, y});
-      assumed_rays_.push_back((R_color_depth * Eigen::Vector3d(ideal.x(), ideal.y(), 1.0)).cast<float>());
+      assumed_rays_.push_back(
+          (R_color_depth * Eigen::Vector3d(ideal.x(), ideal.y(), 1.0)).cast<float>());
     }
   }
 }
 
-void DepthCamera::Cast(const World& world, std::span<const MovingPose> rows, int tile_row, const Layers& layers, cv::Mat& true_m,
-                       cv::Mat& incidence_cosine) const {
+void DepthCamera::Cast(const World& world, std::span<const MovingPose> rows, int tile_row,
+                       const Layers& layers, cv::Mat& true_m, cv::Mat& incidence_cosine) const {
   const int width = rays_.width();
   const int y_end = std::min(rays_.height(), (tile_row + 1) * kTileSize);
   const int y_mid = std::min(rays_.height() - 1, tile_row * kTileSize + kTileSize / 2);
-  const float spread = (0.75F * kTileSize + 6.0F * static_cast<float>(unit_.lateral_noise) + 1.0F) / rays_.focal_px();
-  const float margin = 0.002F + 0.6F * static_cast<float>(unit_.depth_readout_s * kTileSize / rays_.height());  // A hand's 0.6 m/s.
+  const float spread = (0.75F * kTileSize + 6.0F * static_cast<float>(unit_.lateral_noise) + 1.0F) /
+                       rays_.focal_px();
+  const float margin = 0.002F + 0.6F * static_cast<float>(unit_.depth_readout_s * kTileSize /
+                                                          rays_.height());  // A hand's 0.6 m/s.
   for (int x_begin = 0; x_begin < width; x_begin += kTileSize) {
-    const Ray centre =
-        rows[static_cast<std::size_t>(y_mid)].RayOf(rays_.At(std::min(width - 1, x_begin + kTileSize / 2), y_mid, -0.5F, -0.5F), 0.0F);
+    const Ray centre = rows[static_cast<std::size_t>(y_mid)].RayOf(
+        rays_.At(std::min(width - 1, x_begin + kTileSize / 2), y_mid, -0.5F, -0.5F), 0.0F);
     const Candidates candidates = world.FindCandidates(centre, spread, margin);
     float sigma_px = 0;
     if (!layers.jitter_x.empty()) {
@@ -94,7 +138,8 @@ void DepthCamera::Cast(const World& world, std::span<const MovingPose> rows, int
         Float4 du = Splat(0.0F);
         Float4 dv = Splat(0.0F);
         if (sigma_px > 0) {
-          const std::size_t index = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+          const std::size_t index = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                                    static_cast<std::size_t>(x);
           du = Smaller(Larger(sigma_px * Load(&layers.jitter_x[index]), Splat(-4.0F)), Splat(4.0F));
           dv = Smaller(Larger(sigma_px * Load(&layers.jitter_y[index]), Splat(-4.0F)), Splat(4.0F));
         }
@@ -118,11 +163,33 @@ inline float DepthCamera::SlantAt(float cosine) const {
   return slants_[i] + (place - static_cast<float>(i)) * (slants_[i + 1] - slants_[i]);
 }
 
-void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m, const cv::Mat& incidence_cosine, std::uint64_t noise_seed,
+inline double DepthCamera::BendAt(std::size_t pixel, double z) const {
+  double relative = bend_.empty() ? 0.0 : bend_[pixel];
+  if (!bend_change_.empty()) {
+    const double d = (z - kBendMiddle_m) / kBendReach_m;
+    relative += bend_change_[pixel] * d / (1.0 + std::abs(d));
+  }
+  return relative;
+}
+
+inline double DepthCamera::SpeckleAt(int x, int y, double z) const {
+  // Where in the projector's row the beam comes from that is seen here; the pattern repeats.
+  const int width = rays_.width();
+  double place = std::fmod(x - kProjectorBaseline_m * unit_.depth_true.fx / z, width);
+  if (place < 0) place += width;
+  const int column = std::min(static_cast<int>(place), width - 1);
+  const double share = place - column;
+  const float* row = &speckle_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width)];
+  return (1.0 - share) * row[column] + share * row[(column + 1) % width];
+}
+
+void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m,
+                          const cv::Mat& incidence_cosine, std::uint64_t noise_seed,
                           cv::Mat& measured_m) const {
   const int width = rays_.width();
   const int height = rays_.height();
-  const double inverse_corner_squared = 4.0 / (static_cast<double>(width) * width + static_cast<double>(height) * height);
+  const double inverse_corner_squared =
+      4.0 / (static_cast<double>(width) * width + static_cast<double>(height) * height);
   const double inverse_corner = std::sqrt(inverse_corner_squared);
   const auto* truth = true_m.ptr<float>(y);
   const auto* above = true_m.ptr<float>(std::max(0, y - 1));
@@ -133,7 +200,8 @@ void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m, co
     double z = truth[x];
     out[x] = 0;
     if (!(z > 0)) continue;
-    const std::size_t index = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+    const std::size_t index =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
     if (unit_.dropout > 0) {
       const std::uint64_t hash = Hash(noise_seed, index, 5);
       const auto chance = static_cast<float>(UnitUniform(hash));
@@ -143,32 +211,41 @@ void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m, co
       const float right = truth[std::min(width - 1, x + 1)];
       const float lowest = std::min({left, right, above[x], below[x], truth[x]});
       const float highest = std::max({left, right, above[x], below[x], truth[x]});
-      if (highest - lowest > kEdgeStep && highest - lowest > kEdgeStep + 0.02F * lowest * TangentOf(cosine[x])) {
+      if (highest - lowest > kEdgeStep &&
+          highest - lowest > kEdgeStep + 0.02F * lowest * TangentOf(cosine[x])) {
         const auto edge_chance = static_cast<float>(UnitUniform(Hash(hash)));
         if (edge_chance < kEdgeLossShare) continue;
-        if (edge_chance < kEdgeLossShare + kFlyingShare) z = lowest + UnitUniform(Hash(hash, 1)) * (highest - lowest);
+        if (edge_chance < kEdgeLossShare + kFlyingShare)
+          z = lowest + UnitUniform(Hash(hash, 1)) * (highest - lowest);
       }
     }
     const double u = x - (width - 1) / 2.0;
     const double v = y - (height - 1) / 2.0;
     const double true_z = z;
-    z = true_z * (1.0 + unit_.depth_scale_error) + unit_.depth_offset_m +
+    z = true_z * (1.0 + unit_.depth_scale_error + layers.warm_up + BendAt(index, true_z)) +
+        unit_.depth_offset_m +
         true_z * true_z *
             (unit_.depth_bow_per_m * ((u * u + v * v) * inverse_corner_squared - 0.5) +
              (unit_.depth_tilt_per_m[0] * u + unit_.depth_tilt_per_m[1] * v) * inverse_corner);
     if (!layers.axial.empty()) {
-      const double step = unit_.quantised ? z * z * 2.894e-3 : 0.0;  // The PS1080's step: 9000 / z_mm in units of 0.1042 / 4.
+      const double step = unit_.quantised
+                              ? z * z * 2.894e-3
+                              : 0.0;  // The PS1080's step: 9000 / z_mm in units of 0.1042 / 4.
       const double sigma = unit_.axial_noise * NguyenAxialSigma(true_z, SlantAt(cosine[x]));
       z += std::sqrt(std::max(0.0, sigma * sigma - step * step / 12.0)) * layers.axial[index];
     }
+    if (!speckle_.empty())
+      z += unit_.speckle * NguyenAxialSigma(true_z, SlantAt(cosine[x])) * SpeckleAt(x, y, true_z);
     if (!(z > unit_.min_range_m && z < unit_.max_range_m)) continue;
-    out[x] = static_cast<float>(unit_.quantised ? QuantisePs1080(z / kMillimetre) * kMillimetre : z);
+    out[x] =
+        static_cast<float>(unit_.quantised ? QuantisePs1080(z / kMillimetre) * kMillimetre : z);
   }
 }
 
 void DepthCamera::CastShadow(int y, const cv::Mat& true_m, cv::Mat& measured_m) const {
-  // The projector looks from the right: a pixel is dark if something further right in the row is hit by a beam further left,
-  // so near edges throw shadows of b f (1/z_f - 1/z_b) pixels to their left.
+  // The projector looks from the right: a pixel is dark if something further right in the row is
+  // hit by a beam further left, so near edges throw shadows of b f (1/z_f - 1/z_b) pixels to their
+  // left.
   const double baseline_px = unit_.projector_baseline_m * unit_.depth_true.fx;
   const auto* truth = true_m.ptr<float>(y);
   auto* out = measured_m.ptr<float>(y);
@@ -184,20 +261,22 @@ void DepthCamera::CastShadow(int y, const cv::Mat& true_m, cv::Mat& measured_m) 
 cv::Mat DepthCamera::Register(const cv::Mat& measured_m) const {
   const Intrinsics& color = unit_.color_true;
   const Vector3f offset = unit_.T_color_depth_assumed.translation().cast<float>();
-  const bool same_camera = unit_.level == NoiseLevel::kIdeal;
   cv::Mat registered = cv::Mat::zeros(color.height, color.width, CV_16UC1);
   for (int y = 0; y < measured_m.rows; ++y) {
     const auto* in = measured_m.ptr<float>(y);
     for (int x = 0; x < measured_m.cols; ++x) {
       if (!(in[x] > 0)) continue;
-      const Vector3f p =
-          in[x] * assumed_rays_[static_cast<std::size_t>(y) * static_cast<std::size_t>(measured_m.cols) + static_cast<std::size_t>(x)] +
-          offset;
+      const Vector3f p = in[x] * assumed_rays_[static_cast<std::size_t>(y) *
+                                                   static_cast<std::size_t>(measured_m.cols) +
+                                               static_cast<std::size_t>(x)] +
+                         offset;
       int u = x;
       int v = y;
-      if (!same_camera) {
+      if (!unit_.one_camera) {
         const Eigen::Vector2d pixel = Project(color, p.cast<double>());
-        if (!(pixel.x() >= -0.5 && pixel.y() >= -0.5 && pixel.x() < color.width - 0.5 && pixel.y() < color.height - 0.5)) continue;
+        if (!(pixel.x() >= -0.5 && pixel.y() >= -0.5 && pixel.x() < color.width - 0.5 &&
+              pixel.y() < color.height - 0.5))
+          continue;
         u = static_cast<int>(pixel.x() + 0.5);
         v = static_cast<int>(pixel.y() + 0.5);
       }
@@ -210,27 +289,34 @@ cv::Mat DepthCamera::Register(const cv::Mat& measured_m) const {
   return registered;
 }
 
-DepthShot DepthCamera::Render(const World& world, const Trajectory& trajectory, double time_s, std::uint64_t noise_seed) const {
+DepthShot DepthCamera::Render(const World& world, const Trajectory& trajectory, double time_s,
+                              std::uint64_t noise_seed, double warm_up) const {
   const int width = rays_.width();
   const int height = rays_.height();
   std::vector<MovingPose> rows;
   for (int y = 0; y < height; ++y)
-    rows.push_back(PoseAt(trajectory, time_s + unit_.depth_readout_s * ((y + 0.5) / height - 0.5), unit_.T_color_depth_true));
+    rows.push_back(PoseAt(trajectory, time_s + unit_.depth_readout_s * ((y + 0.5) / height - 0.5),
+                          unit_.T_color_depth_true));
   const double pixels = width / 640.0;
   Layers layers;
+  layers.warm_up = warm_up;
   if (unit_.lateral_noise > 0) {
     layers.jitter_x = CorrelatedNoise(Hash(noise_seed, 1), width, height, kJitterFilterPx * pixels);
     layers.jitter_y = CorrelatedNoise(Hash(noise_seed, 2), width, height, kJitterFilterPx * pixels);
   }
-  if (unit_.axial_noise > 0) layers.axial = CorrelatedNoise(Hash(noise_seed, 3), width, height, FilterSigmaOfLag(unit_.correlation_px));
+  if (unit_.axial_noise > 0)
+    layers.axial =
+        CorrelatedNoise(Hash(noise_seed, 3), width, height, FilterSigmaOfLag(unit_.correlation_px));
 
   DepthShot shot;
   shot.true_m = cv::Mat(height, width, CV_32FC1);
   shot.measured_m = cv::Mat(height, width, CV_32FC1);
   cv::Mat incidence_cosine;
-  if (unit_.axial_noise > 0 || unit_.dropout > 0) incidence_cosine = cv::Mat(height, width, CV_32FC1);
-  tbb::parallel_for(0, (height + kTileSize - 1) / kTileSize,
-                    [&](int row) { Cast(world, rows, row, layers, shot.true_m, incidence_cosine); });
+  if (unit_.axial_noise > 0 || unit_.speckle > 0 || unit_.dropout > 0)
+    incidence_cosine = cv::Mat(height, width, CV_32FC1);
+  tbb::parallel_for(0, (height + kTileSize - 1) / kTileSize, [&](int row) {
+    Cast(world, rows, row, layers, shot.true_m, incidence_cosine);
+  });
   tbb::parallel_for(0, height, [&](int y) {
     Measure(y, layers, shot.true_m, incidence_cosine, noise_seed, shot.measured_m);
     if (unit_.projector_baseline_m > 0) CastShadow(y, shot.true_m, shot.measured_m);

@@ -13,34 +13,49 @@ namespace plumb::simulated {
 
 /// A depth image with what was behind it.
 struct DepthShot {
-  cv::Mat registered;  ///< CV_16UC1 on the colour camera's grid, units of SensorUnit::depth_units_per_metre, 0: nothing.
+  cv::Mat registered;  ///< CV_16UC1 on the colour camera's grid, units of
+                       ///< SensorUnit::depth_units_per_metre, 0: nothing.
   cv::Mat measured_m;  ///< CV_32FC1 on the infrared camera's grid: what it measured, 0: nothing.
-  cv::Mat true_m;      ///< CV_32FC1 on the same grid: the true depth along each pixel's own centre or jittered ray, when its row was read.
+  cv::Mat true_m;  ///< CV_32FC1 on the same grid: the true depth along each pixel's own centre or
+                   ///< jittered ray, when its row was read.
 };
 
-/// Renders depth images by the chain true z -> scale, offset, bow -> lateral jitter -> correlated axial noise -> quantisation -> projector
-/// shadow -> drop-outs and flying pixels -> registration. Immutable; parallel inside, the result does not depend on the number of threads.
+/// Renders depth images by the chain true z -> scale, offset, bow, field -> lateral jitter ->
+/// correlated axial noise -> quantisation -> projector shadow -> drop-outs and flying pixels ->
+/// registration. Immutable; parallel inside, the result does not depend on the number of threads.
 class DepthCamera {
  public:
   explicit DepthCamera(const SensorUnit& unit);
-  /// @param time_s  Trajectory time at which the middle row is taken; the others follow SensorUnit::depth_readout_s.  @param noise_seed  Of
-  /// this image.
-  [[nodiscard]] DepthShot Render(const World& world, const Trajectory& trajectory, double time_s, std::uint64_t noise_seed) const;
+  /// @param time_s  Trajectory time at which the middle row is taken; the others follow
+  /// SensorUnit::depth_readout_s.  @param noise_seed  Of this image.
+  /// @param warm_up  Scale error of this moment, beside the unit's own.
+  [[nodiscard]] DepthShot Render(const World& world, const Trajectory& trajectory, double time_s,
+                                 std::uint64_t noise_seed, double warm_up = 0.0) const;
 
  private:
   struct Layers;
-  void Cast(const World& world, std::span<const MovingPose> rows, int tile_row, const Layers& layers, cv::Mat& true_m,
-            cv::Mat& incidence_cosine) const;
-  void Measure(int y, const Layers& layers, const cv::Mat& true_m, const cv::Mat& incidence_cosine, std::uint64_t noise_seed,
-               cv::Mat& measured_m) const;
+  void Cast(const World& world, std::span<const MovingPose> rows, int tile_row,
+            const Layers& layers, cv::Mat& true_m, cv::Mat& incidence_cosine) const;
+  void Measure(int y, const Layers& layers, const cv::Mat& true_m, const cv::Mat& incidence_cosine,
+               std::uint64_t noise_seed, cv::Mat& measured_m) const;
   void CastShadow(int y, const cv::Mat& true_m, cv::Mat& measured_m) const;
-  [[nodiscard]] float SlantAt(float cosine) const;  ///< NguyenSlant() by the cosine of the incidence.
+  [[nodiscard]] float SlantAt(
+      float cosine) const;  ///< NguyenSlant() by the cosine of the incidence.
   [[nodiscard]] cv::Mat Register(const cv::Mat& measured_m) const;
+
+  /// What the projected pattern adds where a surface of depth z is seen, unit variance.
+  [[nodiscard]] double SpeckleAt(int x, int y, double z) const;
+  /// Relative error of the depth z at a pixel, beside scale, offset, bow and tilt.
+  [[nodiscard]] double BendAt(std::size_t pixel, double z) const;
 
   SensorUnit unit_;
   PixelRays rays_;
-  std::vector<float> slants_;                  ///< By the cosine, in equal steps.
-  std::vector<Eigen::Vector3f> assumed_rays_;  ///< Of the registration: where each pixel looks in the colour camera's frame.
+  std::vector<float> bend_;         ///< Relative error of depth by pixel; empty: none.
+  std::vector<float> bend_change_;  ///< Its change with depth.
+  std::vector<float> speckle_;      ///< Unit variance, on the projector's grid; empty: none.
+  std::vector<float> slants_;       ///< By the cosine, in equal steps.
+  std::vector<Eigen::Vector3f>
+      assumed_rays_;  ///< Of the registration: where each pixel looks in the colour camera's frame.
 };
 
 }  // namespace plumb::simulated

@@ -13,7 +13,8 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// Solution of the eikonal equation at one node from its smallest neighbours along x, y and z (Zhao 2005).
+// Solution of the eikonal equation at one node from its smallest neighbours along x, y and z (Zhao
+// 2005).
 float SolveEikonal(float a, float b, float c, float h) {
   if (a > b) std::swap(a, b);
   if (b > c) std::swap(b, c);
@@ -23,14 +24,17 @@ float SolveEikonal(float a, float b, float c, float h) {
   u = 0.5F * (a + b + std::sqrt(2.0F * h * h - (a - b) * (a - b)));
   if (u <= c) return u;
   const float sum = a + b + c;
-  return (sum + std::sqrt(std::max(0.0F, sum * sum - 3.0F * (a * a + b * b + c * c - h * h)))) / 3.0F;
+  return (sum + std::sqrt(std::max(0.0F, sum * sum - 3.0F * (a * a + b * b + c * c - h * h)))) /
+         3.0F;
 }
 
 }  // namespace
 
-DistanceGrid::DistanceGrid(const std::function<double(const Eigen::Vector3d&)>& implicit, const Eigen::AlignedBox3d& box, double spacing)
+DistanceGrid::DistanceGrid(const std::function<double(const Eigen::Vector3d&)>& implicit,
+                           const Eigen::AlignedBox3d& box, double spacing)
     : spacing_(static_cast<float>(spacing)), inverse_spacing_(static_cast<float>(1.0 / spacing)) {
-  if (!(spacing > 0) || box.isEmpty()) throw std::invalid_argument("distance grid needs a box that is not empty and a spacing > 0");
+  if (!(spacing > 0) || box.isEmpty())
+    throw std::invalid_argument("distance grid needs a box that is not empty and a spacing > 0");
   size_ = ((box.sizes() / spacing).array().ceil().cast<int>() + 1).matrix();
   const Eigen::Vector3f low = box.min().cast<float>();
   box_ = Eigen::AlignedBox3f(low, low + (size_.cast<float>() - Eigen::Vector3f::Ones()) * spacing_);
@@ -57,10 +61,14 @@ std::vector<char> DistanceGrid::NormaliseNearSurface() {
     for (int y = 1; y + 1 < size_.y(); ++y) {
       for (int x = 1; x + 1 < size_.x(); ++x) {
         const float centre = values_[Index(x, y, z)];
-        const std::array<float, 6> around = {values_[Index(x - 1, y, z)], values_[Index(x + 1, y, z)], values_[Index(x, y - 1, z)],
-                                             values_[Index(x, y + 1, z)], values_[Index(x, y, z - 1)], values_[Index(x, y, z + 1)]};
-        if (std::none_of(around.begin(), around.end(), [&](float v) { return (v < 0) != (centre < 0); })) continue;
-        const Eigen::Vector3f gradient(around[1] - around[0], around[3] - around[2], around[5] - around[4]);
+        const std::array<float, 6> around = {
+            values_[Index(x - 1, y, z)], values_[Index(x + 1, y, z)], values_[Index(x, y - 1, z)],
+            values_[Index(x, y + 1, z)], values_[Index(x, y, z - 1)], values_[Index(x, y, z + 1)]};
+        if (std::none_of(around.begin(), around.end(),
+                         [&](float v) { return (v < 0) != (centre < 0); }))
+          continue;
+        const Eigen::Vector3f gradient(around[1] - around[0], around[3] - around[2],
+                                       around[5] - around[4]);
         const float slope = std::max(0.2F, gradient.norm() * 0.5F * inverse_spacing_);
         distances[Index(x, y, z)] = centre / slope;
         fixed[Index(x, y, z)] = 1;
@@ -75,7 +83,8 @@ void DistanceGrid::PropagateDistances(const std::vector<char>& fixed) {
   std::vector<float> far(values_.size());
   for (std::size_t i = 0; i < far.size(); ++i) far[i] = fixed[i] != 0 ? std::abs(values_[i]) : 1e3F;
   const auto at = [&](int x, int y, int z) {
-    const bool inside = x >= 0 && y >= 0 && z >= 0 && x < size_.x() && y < size_.y() && z < size_.z();
+    const bool inside =
+        x >= 0 && y >= 0 && z >= 0 && x < size_.x() && y < size_.y() && z < size_.z();
     return inside ? far[Index(x, y, z)] : 1e3F;
   };
   // Fast sweeping: eight passes, one per diagonal direction.
@@ -88,7 +97,8 @@ void DistanceGrid::PropagateDistances(const std::vector<char>& fixed) {
           const int x = (pass & 1) != 0 ? size_.x() - 1 - i : i;
           const std::size_t index = Index(x, y, z);
           if (fixed[index] != 0) continue;
-          const float u = SolveEikonal(std::min(at(x - 1, y, z), at(x + 1, y, z)), std::min(at(x, y - 1, z), at(x, y + 1, z)),
+          const float u = SolveEikonal(std::min(at(x - 1, y, z), at(x + 1, y, z)),
+                                       std::min(at(x, y - 1, z), at(x, y + 1, z)),
                                        std::min(at(x, y, z - 1), at(x, y, z + 1)), spacing_);
           far[index] = std::min(far[index], u);
         }
@@ -107,7 +117,8 @@ inline DistanceGrid::Place DistanceGrid::Locate(float gx, float gy, float gz) co
   const int x = static_cast<int>(gx);
   const int y = static_cast<int>(gy);
   const int z = static_cast<int>(gz);
-  return {Index(x, y, z), gx - static_cast<float>(x), gy - static_cast<float>(y), gz - static_cast<float>(z)};
+  return {Index(x, y, z), gx - static_cast<float>(x), gy - static_cast<float>(y),
+          gz - static_cast<float>(z)};
 }
 
 inline float DistanceGrid::ValueAt(const Place& at) const {
@@ -161,7 +172,8 @@ void DistanceGrid::BuildShades() {
     const Eigen::Vector3f surface = p - values_[Index(node.x(), node.y(), node.z())] * normal;
     const float open_near = std::clamp(Distance(surface + 0.03F * normal) / 0.03F, 0.0F, 1.0F);
     const float open_far = std::clamp(Distance(surface + 0.10F * normal) / 0.10F, 0.0F, 1.0F);
-    shades_[i + 1] = Eigen::Vector4f(normal.x(), normal.y(), normal.z(), 0.35F + 0.25F * open_near + 0.4F * open_far);
+    shades_[i + 1] = Eigen::Vector4f(normal.x(), normal.y(), normal.z(),
+                                     0.35F + 0.25F * open_near + 0.4F * open_far);
   });
 }
 
@@ -187,8 +199,8 @@ Eigen::Vector4f DistanceGrid::Shade(const Eigen::Vector3f& p) const {
   return shade;
 }
 
-float DistanceGrid::ConeStart(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float spread, float margin,
-                              float t_end) const {
+float DistanceGrid::ConeStart(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
+                              float spread, float margin, float t_end) const {
   float t = 0;
   for (int step = 0; step < 100; ++step) {
     const float room = 0.9F * Distance(origin + t * direction) - spread * t - margin;

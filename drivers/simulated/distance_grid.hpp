@@ -1,4 +1,5 @@
-// A closed smooth surface as signed distances on a regular grid: fast ray casting, normals, and its mesh.
+// A closed smooth surface as signed distances on a regular grid: fast ray casting, normals, and its
+// mesh.
 #pragma once
 
 #include <cstdint>
@@ -13,36 +14,48 @@
 
 namespace plumb::simulated {
 
-/// Signed distance to a surface, sampled at grid nodes, trilinear between them; negative inside. Metres, the surface's own frame.
-/// The surface *is* the zero set of the interpolated values: rays, normals and mesh all agree on it.
-/// Immutable after construction, so any number of threads may read.
+/// Signed distance to a surface, sampled at grid nodes, trilinear between them; negative inside.
+/// Metres, the surface's own frame. The surface *is* the zero set of the interpolated values: rays,
+/// normals and mesh all agree on it. Immutable after construction, so any number of threads may
+/// read.
 class DistanceGrid {
  public:
-  /// @param implicit  Negative inside, positive outside, smooth near its zero set; need not be a distance. Called from several threads.
+  /// @param implicit  Negative inside, positive outside, smooth near its zero set; need not be a
+  /// distance. Called from several threads.
   /// @param box       Holds the whole surface with at least two cells of room on every side.
   /// @param spacing   Grid step, metres, > 0.
-  DistanceGrid(const std::function<double(const Eigen::Vector3d&)>& implicit, const Eigen::AlignedBox3d& box, double spacing);
+  DistanceGrid(const std::function<double(const Eigen::Vector3d&)>& implicit,
+               const Eigen::AlignedBox3d& box, double spacing);
 
-  /// Signed distance; outside the box, the value at the nearest point of the box plus the way there.
+  /// Signed distance; outside the box, the value at the nearest point of the box plus the way
+  /// there.
   [[nodiscard]] float Distance(const Eigen::Vector3f& p) const;
 
-  /// Outward unit normal (x, y, z) and openness (w) near the surface: both interpolated between the nodes, so they vary smoothly.
-  /// Openness is 1 where nothing of the body is near in front of the surface and falls towards 0 in creases.
+  /// Outward unit normal (x, y, z) and openness (w) near the surface: both interpolated between the
+  /// nodes, so they vary smoothly. Openness is 1 where nothing of the body is near in front of the
+  /// surface and falls towards 0 in creases.
   [[nodiscard]] Eigen::Vector4f Shade(const Eigen::Vector3f& p) const;
-  [[nodiscard]] Eigen::Vector3f Normal(const Eigen::Vector3f& p) const { return Shade(p).head<3>(); }
+  [[nodiscard]] Eigen::Vector3f Normal(const Eigen::Vector3f& p) const {
+    return Shade(p).head<3>();
+  }
 
-  /// Distance along the ray to the surface, at or after t_begin and before t_end; infinity if there is none.
+  /// Distance along the ray to the surface, at or after t_begin and before t_end; infinity if there
+  /// is none.
   /// @param direction  Unit length.
-  [[nodiscard]] float Intersect(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float t_begin, float t_end) const;
+  [[nodiscard]] float Intersect(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
+                                float t_begin, float t_end) const;
 
   /// The same for four rays, which costs little more than one.
   /// @param origin, direction  The surface's own frame.
-  [[nodiscard]] Float4 Intersect(const Vector3x4& origin, const Vector3x4& direction, Float4 t_begin, Float4 t_end) const;
+  [[nodiscard]] Float4 Intersect(const Vector3x4& origin, const Vector3x4& direction,
+                                 Float4 t_begin, Float4 t_end) const;
 
-  /// How far a cone around the ray may advance before it can touch the surface; infinity if it never does.
-  /// @param spread  Radius of the cone per metre of way.  @param margin  Its radius at the origin, metres.
-  [[nodiscard]] float ConeStart(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float spread, float margin,
-                                float t_end) const;
+  /// How far a cone around the ray may advance before it can touch the surface; infinity if it
+  /// never does.
+  /// @param spread  Radius of the cone per metre of way.  @param margin  Its radius at the origin,
+  /// metres.
+  [[nodiscard]] float ConeStart(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
+                                float spread, float margin, float t_end) const;
 
   /// The surface as triangles, counter-clockwise seen from outside; vertices lie on the zero set.
   [[nodiscard]] TriangleMesh Surface() const;
@@ -51,7 +64,8 @@ class DistanceGrid {
 
  private:
   [[nodiscard]] std::size_t Index(int x, int y, int z) const {
-    return (static_cast<std::size_t>(z) * static_cast<std::size_t>(size_.y()) + static_cast<std::size_t>(y)) *
+    return (static_cast<std::size_t>(z) * static_cast<std::size_t>(size_.y()) +
+            static_cast<std::size_t>(y)) *
                static_cast<std::size_t>(size_.x()) +
            static_cast<std::size_t>(x);
   }

@@ -1,4 +1,5 @@
-// The zero set of a distance grid as triangles: surface nets (one vertex in each cell that the surface crosses).
+// The zero set of a distance grid as triangles: surface nets (one vertex in each cell that the
+// surface crosses).
 #include <array>
 #include <limits>
 
@@ -20,10 +21,12 @@ TriangleMesh DistanceGrid::Surface() const {
     for (int y = 0; y + 1 < size_.y(); ++y) {
       for (int x = 0; x + 1 < size_.x(); ++x) {
         int inside = 0;
-        for (int corner = 0; corner < 8; ++corner) inside += negative(x + (corner & 1), y + ((corner >> 1) & 1), z + (corner >> 2)) ? 1 : 0;
+        for (int corner = 0; corner < 8; ++corner)
+          inside += negative(x + (corner & 1), y + ((corner >> 1) & 1), z + (corner >> 2)) ? 1 : 0;
         if (inside == 0 || inside == 8) continue;
         // From the cell's centre down (or up) the gradient onto the zero set.
-        Eigen::Vector3f p = box_.min() + (Eigen::Vector3f(x, y, z) + Eigen::Vector3f::Constant(0.5F)) * spacing_;
+        Eigen::Vector3f p =
+            box_.min() + (Eigen::Vector3f(x, y, z) + Eigen::Vector3f::Constant(0.5F)) * spacing_;
         for (int step = 0; step < 6; ++step) p -= Interpolate(p) * Normal(p);
         vertex_of_cell[Index(x, y, z)] = static_cast<std::uint32_t>(mesh.vertices.size());
         mesh.vertices.push_back(p);
@@ -32,7 +35,8 @@ TriangleMesh DistanceGrid::Surface() const {
     }
   }
 
-  // Each grid edge that the surface crosses is shared by four cells: one quadrilateral, two triangles.
+  // Each grid edge that the surface crosses is shared by four cells: one quadrilateral, two
+  // triangles.
   for (int z = 1; z + 1 < size_.z(); ++z) {
     for (int y = 1; y + 1 < size_.y(); ++y) {
       for (int x = 1; x + 1 < size_.x(); ++x) {
@@ -44,8 +48,11 @@ TriangleMesh DistanceGrid::Surface() const {
           const Eigen::Vector3i end = node + along;
           const bool begin_inside = negative(x, y, z);
           if (begin_inside == negative(end.x(), end.y(), end.z())) continue;
-          const auto cell = [&](const Eigen::Vector3i& n) { return vertex_of_cell[Index(n.x(), n.y(), n.z())]; };
-          std::array<std::uint32_t, 4> quad = {cell(node - u - v), cell(node - v), cell(node), cell(node - u)};
+          const auto cell = [&](const Eigen::Vector3i& n) {
+            return vertex_of_cell[Index(n.x(), n.y(), n.z())];
+          };
+          std::array<std::uint32_t, 4> quad = {cell(node - u - v), cell(node - v), cell(node),
+                                               cell(node - u)};
           if (!begin_inside) std::swap(quad[1], quad[3]);
           mesh.triangles.push_back({quad[0], quad[1], quad[2]});
           mesh.triangles.push_back({quad[0], quad[2], quad[3]});

@@ -10,8 +10,9 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kTolerance = 2e-5F;
-constexpr float kFree = 0.9F;        // Below 1: the interpolated distance may be a little too large.
-constexpr float kLeastStep = 0.25F;  // Of a cell: what a ray grazes less deep than one micrometre (on a radius of 0.1 m) it may miss.
+constexpr float kFree = 0.9F;  // Below 1: the interpolated distance may be a little too large.
+constexpr float kLeastStep = 0.25F;  // Of a cell: what a ray grazes less deep than one micrometre
+                                     // (on a radius of 0.1 m) it may miss.
 constexpr int kMaxRounds = 4;        // Of false position.
 constexpr int kMaxSteps = 200;
 
@@ -25,9 +26,11 @@ void Clip(float low, float high, Float4 origin, Float4 direction, Float4& begin,
 }
 
 // The values at an index and at the next one, for four indices.
-void LoadPairs(const float* values, const std::array<std::size_t, 4>& index, Float4& here, Float4& next) {
+void LoadPairs(const float* values, const std::array<std::size_t, 4>& index, Float4& here,
+               Float4& next) {
   std::array<Float4, 2> pairs;
-  for (std::size_t i = 0; i < 4; ++i) std::memcpy(reinterpret_cast<char*>(pairs.data()) + 8 * i, values + index[i], 8);
+  for (std::size_t i = 0; i < 4; ++i)
+    std::memcpy(reinterpret_cast<char*>(pairs.data()) + 8 * i, values + index[i], 8);
   here = __builtin_shufflevector(pairs[0], pairs[1], 0, 2, 4, 6);
   next = __builtin_shufflevector(pairs[0], pairs[1], 1, 3, 5, 7);
 }
@@ -61,7 +64,8 @@ inline Float4 DistanceGrid::ValuesAt(Float4 gx, Float4 gy, Float4 gz) const {
   return v0 + z * (v1 - v0);
 }
 
-Float4 DistanceGrid::Intersect(const Vector3x4& origin, const Vector3x4& direction, Float4 t, Float4 t_end) const {
+Float4 DistanceGrid::Intersect(const Vector3x4& origin, const Vector3x4& direction, Float4 t,
+                               Float4 t_end) const {
   Clip(box_.min().x(), box_.max().x(), origin.x, direction.x, t, t_end);
   Clip(box_.min().y(), box_.max().y(), origin.y, direction.y, t, t_end);
   Clip(box_.min().z(), box_.max().z(), origin.z, direction.z, t, t_end);
@@ -71,12 +75,17 @@ Float4 DistanceGrid::Intersect(const Vector3x4& origin, const Vector3x4& directi
   t = active ? t : Splat(0.0F);
 
   // The rays in units of cells.
-  const Vector3x4 o{(origin.x - box_.min().x()) * inverse_spacing_, (origin.y - box_.min().y()) * inverse_spacing_,
+  const Vector3x4 o{(origin.x - box_.min().x()) * inverse_spacing_,
+                    (origin.y - box_.min().y()) * inverse_spacing_,
                     (origin.z - box_.min().z()) * inverse_spacing_};
-  const Vector3x4 way{direction.x * inverse_spacing_, direction.y * inverse_spacing_, direction.z * inverse_spacing_};
-  const auto distances = [&](Float4 at) { return ValuesAt(o.x + at * way.x, o.y + at * way.y, o.z + at * way.z); };
+  const Vector3x4 way{direction.x * inverse_spacing_, direction.y * inverse_spacing_,
+                      direction.z * inverse_spacing_};
+  const auto distances = [&](Float4 at) {
+    return ValuesAt(o.x + at * way.x, o.y + at * way.y, o.z + at * way.z);
+  };
 
-  // The surface lies after t (outside, d away from it), and once `bracketed` before t + width, where the distance is d_far <= tolerance.
+  // The surface lies after t (outside, d away from it), and once `bracketed` before t + width,
+  // where the distance is d_far <= tolerance.
   Float4 d = distances(t);
   const Int4 at_once = active & (d <= kTolerance);
   found = at_once ? t : found;
@@ -89,19 +98,24 @@ Float4 DistanceGrid::Intersect(const Vector3x4& origin, const Vector3x4& directi
   Int4 bracketed{0, 0, 0, 0};
   Int4 rounds{0, 0, 0, 0};
   for (int step = 0; step < kMaxSteps && Any(active); ++step) {
-    // Over-relaxed (Keinert et al. 2014): as far as the free balls around both ends still overlap, if the distance goes on falling so.
+    // Over-relaxed (Keinert et al. 2014): as far as the free balls around both ends still overlap,
+    // if the distance goes on falling so.
     const Float4 safe = Larger(kFree * d, Splat(least_step));
-    Float4 advance = careful ? safe : Larger(1.9F * kFree * d / Larger(1.0F + slope, Splat(0.5F)), safe);
+    Float4 advance =
+        careful ? safe : Larger(1.9F * kFree * d / Larger(1.0F + slope, Splat(0.5F)), safe);
     // Near the surface the distance falls linearly along the ray: try to step across it.
     const Float4 across = 1.2F * d / Larger(slope, Splat(0.05F)) + kTolerance;
-    const Int4 tries = (d <= spacing_) & (slope >= 0.05F) & (across <= spacing_) & (t + across < t_end) & ~bracketed & ~careful;
+    const Int4 tries = (d <= spacing_) & (slope >= 0.05F) & (across <= spacing_) &
+                       (t + across < t_end) & ~bracketed & ~careful;
     advance = tries ? across : advance;
-    advance = bracketed ? width * d / (d - Smaller(d_far, Splat(0.0F))) : advance;  // False position.
+    advance =
+        bracketed ? width * d / (d - Smaller(d_far, Splat(0.0F))) : advance;  // False position.
     active &= (t + safe < t_end) | bracketed;
     advance = Smaller(advance, t_end - t);
     const Float4 d_next = distances(t + advance);
 
-    const Int4 overlap = (kFree * (d + (d_next < 0.0F ? -d_next : d_next)) >= advance) | (advance <= safe);
+    const Int4 overlap =
+        (kFree * (d + (d_next < 0.0F ? -d_next : d_next)) >= advance) | (advance <= safe);
     const Int4 inside = bracketed | tries ? d_next <= 0.0F : (d_next <= kTolerance) & overlap;
     const Int4 outside = ~inside & (bracketed | (~tries & overlap));
     careful = ~inside & ~outside;
@@ -113,14 +127,16 @@ Float4 DistanceGrid::Intersect(const Vector3x4& origin, const Vector3x4& directi
     d = outside ? d_next : d;
 
     bracketed |= inside;
-    const Int4 done = active & bracketed & ((rounds == kMaxRounds) | ((d_next <= kTolerance) & (d_next >= -kTolerance)));
+    const Int4 done = active & bracketed &
+                      ((rounds == kMaxRounds) | ((d_next <= kTolerance) & (d_next >= -kTolerance)));
     found = done ? t + width * d / (d - Smaller(d_far, Splat(0.0F))) : found;
     active &= ~done;
   }
   return found;
 }
 
-float DistanceGrid::Intersect(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float t_begin, float t_end) const {
+float DistanceGrid::Intersect(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
+                              float t_begin, float t_end) const {
   return Intersect(Splat(origin), Splat(direction), Splat(t_begin), Splat(t_end))[0];
 }
 

@@ -10,11 +10,13 @@
 namespace plumb::simulated {
 namespace {
 
-// Sum of the four 16-bit parts of a hash: variance 1, mean 0, nearly normal, and normal after the filter.
+// Sum of the four 16-bit parts of a hash: variance 1, mean 0, nearly normal, and normal after the
+// filter.
 float White(std::uint64_t hash) {
   constexpr float kMean = 2.0F * 65535.0F;
   constexpr float kInverseSigma = 1.0F / 37837.2F;  // sqrt(4/12) 65536
-  const auto sum = static_cast<float>((hash & 0xffff) + ((hash >> 16) & 0xffff) + ((hash >> 32) & 0xffff) + (hash >> 48));
+  const auto sum = static_cast<float>((hash & 0xffff) + ((hash >> 16) & 0xffff) +
+                                      ((hash >> 32) & 0xffff) + (hash >> 48));
   return (sum - kMean) * kInverseSigma;
 }
 
@@ -45,7 +47,8 @@ std::vector<float> CorrelatedNoise(std::uint64_t seed, int width, int height, do
     // The row with its wrapped ends on both sides.
     std::vector<float> padded(w + 2 * static_cast<std::size_t>(reach));
     const auto r = static_cast<std::size_t>(reach);
-    for (std::size_t x = 0; x < w; ++x) padded[r + x] = White(Hash(seed, static_cast<std::uint64_t>(y) * w + x));
+    for (std::size_t x = 0; x < w; ++x)
+      padded[r + x] = White(Hash(seed, static_cast<std::uint64_t>(y) * w + x));
     for (std::size_t i = 0; i < r; ++i) {
       padded[r - 1 - i] = padded[r + (w - 1 - i % w)];
       padded[r + w + i] = padded[r + i % w];

@@ -1,5 +1,6 @@
-// Random numbers that are the same on every machine and in any order of evaluation: everything comes from a hash
-// of (seed, what for, index), so parallel loops draw the same values whatever the number of threads.
+// Random numbers that are the same on every machine and in any order of evaluation: everything
+// comes from a hash of (seed, what for, index), so parallel loops draw the same values whatever the
+// number of threads.
 #pragma once
 
 #include <cmath>
@@ -8,7 +9,8 @@
 
 namespace plumb::simulated {
 
-/// The finalizer of SplitMix64 (Steele, Lea, Flood 2014): every bit of the input reaches every bit of the output.
+/// The finalizer of SplitMix64 (Steele, Lea, Flood 2014): every bit of the input reaches every bit
+/// of the output.
 [[nodiscard]] constexpr std::uint64_t Hash(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
@@ -16,11 +18,17 @@ namespace plumb::simulated {
   return x ^ (x >> 31);
 }
 
-[[nodiscard]] constexpr std::uint64_t Hash(std::uint64_t a, std::uint64_t b) { return Hash(Hash(a) ^ b); }
-[[nodiscard]] constexpr std::uint64_t Hash(std::uint64_t a, std::uint64_t b, std::uint64_t c) { return Hash(Hash(a, b), c); }
+[[nodiscard]] constexpr std::uint64_t Hash(std::uint64_t a, std::uint64_t b) {
+  return Hash(Hash(a) ^ b);
+}
+[[nodiscard]] constexpr std::uint64_t Hash(std::uint64_t a, std::uint64_t b, std::uint64_t c) {
+  return Hash(Hash(a, b), c);
+}
 
 /// Uniform in [0, 1).
-[[nodiscard]] constexpr double UnitUniform(std::uint64_t hash) { return static_cast<double>(hash >> 11) * 0x1.0p-53; }
+[[nodiscard]] constexpr double UnitUniform(std::uint64_t hash) {
+  return static_cast<double>(hash >> 11) * 0x1.0p-53;
+}
 
 /// A sequence of random numbers. Not thread-safe; one per purpose.
 class RandomStream {

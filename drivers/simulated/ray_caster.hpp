@@ -6,7 +6,8 @@
 
 #include <Eigen/Core>
 
-#include "algo/types/intrinsics.hpp"
+#include "algo/base/intrinsics.hpp"
+#include "drivers/simulated/sensor_unit.hpp"
 #include "drivers/simulated/trajectory.hpp"
 #include "drivers/simulated/world.hpp"
 
@@ -14,11 +15,16 @@ namespace plumb::simulated {
 
 inline constexpr int kTileSize = 8;  ///< Pixels; the rays of one tile share their candidates.
 
+/// Ideal normalised coordinates of a pixel, through the whole lens.
+[[nodiscard]] Eigen::Vector2d Undistort(const Intrinsics& camera, const LensRest& rest,
+                                        const Eigen::Vector2d& pixel);
+
 /// The direction that each pixel looks in, camera frame. Made once per camera.
 class PixelRays {
  public:
-  explicit PixelRays(const Intrinsics& camera);
-  /// Ray through a place near the centre of pixel (x, y), du and dv pixels away; z = 1. Linear in du, dv over a few pixels.
+  explicit PixelRays(const Intrinsics& camera, const LensRest& rest = {});
+  /// Ray through a place near the centre of pixel (x, y), du and dv pixels away; z = 1. Linear in
+  /// du, dv over a few pixels.
   [[nodiscard]] Eigen::Vector3f At(int x, int y, float du, float dv) const {
     const std::size_t i = Index(x, y);
     return {x_[i] + du * x_du_[i] + dv * x_dv_[i], y_[i] + du * y_du_[i] + dv * y_dv_[i], 1.0F};
@@ -26,7 +32,8 @@ class PixelRays {
   /// Through four places near the centre of one pixel.
   [[nodiscard]] Vector3x4 At(int x, int y, Float4 du, Float4 dv) const {
     const std::size_t i = Index(x, y);
-    return {x_[i] + du * x_du_[i] + dv * x_dv_[i], y_[i] + du * y_du_[i] + dv * y_dv_[i], Splat(1.0F)};
+    return {x_[i] + du * x_du_[i] + dv * x_dv_[i], y_[i] + du * y_du_[i] + dv * y_dv_[i],
+            Splat(1.0F)};
   }
   /// Through the centres of the pixels x to x + 3 of a row.
   [[nodiscard]] Vector3x4 FourFrom(int x, int y) const {
@@ -36,8 +43,8 @@ class PixelRays {
   /// Through a place near each of them.
   [[nodiscard]] Vector3x4 FourFrom(int x, int y, Float4 du, Float4 dv) const {
     const std::size_t i = Index(x, y);
-    return {Load(&x_[i]) + du * Load(&x_du_[i]) + dv * Load(&x_dv_[i]), Load(&y_[i]) + du * Load(&y_du_[i]) + dv * Load(&y_dv_[i]),
-            Splat(1.0F)};
+    return {Load(&x_[i]) + du * Load(&x_du_[i]) + dv * Load(&x_dv_[i]),
+            Load(&y_[i]) + du * Load(&y_du_[i]) + dv * Load(&y_dv_[i]), Splat(1.0F)};
   }
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
@@ -45,7 +52,8 @@ class PixelRays {
 
  private:
   [[nodiscard]] std::size_t Index(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+           static_cast<std::size_t>(x);
   }
   int width_;
   int height_;
@@ -61,11 +69,13 @@ struct MovingPose {
   Eigen::Vector3f angular_velocity = Eigen::Vector3f::Zero();  ///< World, rad/s.
 
   /// World direction of a camera-frame direction, not normalised.
-  [[nodiscard]] Eigen::Vector3f DirectionOf(const Eigen::Vector3f& direction_camera, float dt) const {
+  [[nodiscard]] Eigen::Vector3f DirectionOf(const Eigen::Vector3f& direction_camera,
+                                            float dt) const {
     const Eigen::Vector3f direction = R_world_camera * direction_camera;
     return direction + dt * angular_velocity.cross(direction);
   }
-  /// Ray of a camera-frame direction, dt seconds after the pose's own time. Exact to second order in the turn (below 0.01 pixel).
+  /// Ray of a camera-frame direction, dt seconds after the pose's own time. Exact to second order
+  /// in the turn (below 0.01 pixel).
   [[nodiscard]] Ray RayOf(const Eigen::Vector3f& direction_camera, float dt) const {
     return {p_world + dt * velocity, DirectionOf(direction_camera, dt).normalized()};
   }
@@ -77,10 +87,14 @@ struct MovingPose {
     return Ray4(dt * velocity + p_world, DirectionOf(direction_camera, dt));
   }
   /// At the pose's own time.
-  [[nodiscard]] Ray4 RayOf(const Vector3x4& direction_camera) const { return Ray4(Splat(p_world), R_world_camera * direction_camera); }
+  [[nodiscard]] Ray4 RayOf(const Vector3x4& direction_camera) const {
+    return Ray4(Splat(p_world), R_world_camera * direction_camera);
+  }
 };
 
-/// @param T_carrier_camera  Where this camera sits on what the trajectory moves (the colour camera).
-[[nodiscard]] MovingPose PoseAt(const Trajectory& trajectory, double time_s, const Pose& T_carrier_camera);
+/// @param T_carrier_camera  Where this camera sits on what the trajectory moves (the colour
+/// camera).
+[[nodiscard]] MovingPose PoseAt(const Trajectory& trajectory, double time_s,
+                                const Pose& T_carrier_camera);
 
 }  // namespace plumb::simulated

@@ -9,6 +9,7 @@
 #include "algo/types/frame.hpp"
 #include "drivers/simulated/color_camera.hpp"
 #include "drivers/simulated/depth_camera.hpp"
+#include "drivers/simulated/scene_events.hpp"
 #include "drivers/simulated/sensor_unit.hpp"
 #include "drivers/simulated/trajectory.hpp"
 #include "drivers/simulated/world.hpp"
@@ -22,10 +23,13 @@ struct SimulatedSweep {
   double rate_hz = 15.0;
   double start_time_s = 0.0;  ///< Stamp of the trajectory's time 0.
   int reference_marker = 0;
-  std::uint64_t seed = 1;  ///< Of the noise of its images and stamps.
+  double on_before_s = 0.0;  ///< How long the sensor had been on at the trajectory's time 0.
+  std::uint64_t seed = 1;    ///< Of the noise of its images and stamps.
+  simulated::SceneEvents events = {};
 };
 
-/// What really happened while a frame was taken. Times on the scale of the stamps, but without their errors.
+/// What really happened while a frame was taken. Times on the scale of the stamps, but without
+/// their errors.
 struct FrameTruth {
   double color_time_s = 0.0;  ///< Mid-exposure of the colour image's middle row.
   double depth_time_s = 0.0;
@@ -34,10 +38,12 @@ struct FrameTruth {
   simulated::DepthShot depth;  ///< With the depth before registration.
 };
 
-/// Renders one sweep frame by frame; the same bits for the same arguments. Not thread-safe, parallel inside.
+/// Renders one sweep frame by frame; the same bits for the same arguments. Not thread-safe,
+/// parallel inside.
 class SimulatedSource : public FrameSource {
  public:
-  SimulatedSource(std::shared_ptr<const simulated::World> world, const simulated::SensorUnit& unit, const SimulatedSweep& sweep);
+  SimulatedSource(std::shared_ptr<const simulated::World> world, const simulated::SensorUnit& unit,
+                  const SimulatedSweep& sweep);
 
   [[nodiscard]] const StreamInfo& info() const override { return info_; }
   [[nodiscard]] std::optional<Frame> Next() override;
@@ -45,11 +51,18 @@ class SimulatedSource : public FrameSource {
   /// Truth of the frame that Next() gave last.
   [[nodiscard]] const FrameTruth& truth() const { return truth_; }
   /// True pose of the colour camera at a time on the scale of the stamps.
-  [[nodiscard]] Pose T_world_camera(double time_s) const { return trajectory_.T_world_camera(time_s - sweep_.start_time_s); }
+  [[nodiscard]] Pose T_world_camera(double time_s) const {
+    return trajectory_.T_world_camera(time_s - sweep_.start_time_s);
+  }
   [[nodiscard]] const simulated::SensorUnit& unit() const { return unit_; }
   [[nodiscard]] const SimulatedSweep& sweep() const { return sweep_; }
 
  private:
+  /// What the driver does with a pair of images.
+  enum class Fate { kGiven, kLost, kDoubled };
+  [[nodiscard]] Fate FateOf(int index) const;
+  void Take(Frame& frame, double color_time, double depth_time);
+
   std::shared_ptr<const simulated::World> world_;
   simulated::SensorUnit unit_;
   SimulatedSweep sweep_;
@@ -59,6 +72,8 @@ class SimulatedSource : public FrameSource {
   StreamInfo info_;
   FrameTruth truth_;
   int next_ = 0;
+  std::int64_t given_ = 0;
+  Frame last_;  ///< Kept only where the driver may give it again.
 };
 
 }  // namespace plumb

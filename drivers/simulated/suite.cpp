@@ -5,11 +5,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "algo/types/errors.hpp"
-#ifdef PLUMB_WITH_OPENNI
-#include "drivers/openni/oni_writer.hpp"
-#endif
-#include "drivers/replay/file_io.hpp"
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
 #include "drivers/replay/tum_writer.hpp"
 #include "drivers/simulated/suite_plan.hpp"
 #include "drivers/simulated/truth_writer.hpp"
@@ -27,8 +24,10 @@ class FolderBeside {
     out_ = name;
     std::error_code error;
     if (fs::exists(name, error) && !(fs::is_directory(name, error) && fs::is_empty(name, error))) {
-      throw DataError(fmt::format("cannot simulate into {}: expected a new or empty folder, found something there; choose another --out",
-                                  name.string()));
+      throw DataError(
+          fmt::format("cannot simulate into {}: expected a new or empty folder, found something "
+                      "there; choose another --out",
+                      name.string()));
     }
     if (name.has_parent_path()) fs::create_directories(name.parent_path(), error);
     if (error) throw IoError(DescribeWriteError(name.parent_path(), error.value()));
@@ -61,17 +60,27 @@ class FolderBeside {
   fs::path beside_;
 };
 
-void WriteSuiteFile(const fs::path& folder, const simulated::SuitePlan& plan) {
+void WriteSuiteFile(const fs::path& folder, const simulated::SuitePlan& plan,
+                    const SimulateOptions& options) {
   nlohmann::json scenes = nlohmann::json::array();
   for (const auto& scene : plan.scenes) scenes.push_back(scene.name);
   nlohmann::json pairs = nlohmann::json::array();
   for (const auto& [reference, current] : plan.pairs) pairs.push_back({reference, current});
-  WriteWholeFile(folder / "suite.json", nlohmann::json{{"name", plan.name}, {"scenes", scenes}, {"pairs", pairs}}.dump(1));
+  const nlohmann::json simulated{{"seed", options.seed},
+                                 {"unit", plan.unit.seed},
+                                 {"noise", ToString(options.noise)},
+                                 {"frames", options.frames},
+                                 {"rate_hz", options.rate_hz},
+                                 {"faults", plan.unit.faults.Names()}};
+  const nlohmann::json suite{
+      {"name", plan.name}, {"scenes", scenes}, {"pairs", pairs}, {"simulated", simulated}};
+  WriteWholeFile(folder / "suite.json", suite.dump(1));
 }
 
-void WriteTumRecording(const fs::path& folder, const simulated::SensorUnit& unit, SimulatedSource& source,
-                       const std::function<void()>& each) {
-  TumWriter writer(folder, source.info(), {.depth_scale = unit.depth_units_per_metre, .jpeg_quality = unit.jpeg_quality});
+void WriteTumRecording(const fs::path& folder, const simulated::SensorUnit& unit,
+                       SimulatedSource& source, const std::function<void()>& each) {
+  TumWriter writer(folder, source.info(),
+                   {.depth_scale = unit.depth_units_per_metre, .jpeg_quality = unit.jpeg_quality});
   while (const std::optional<Frame> frame = source.Next()) {
     writer.Add(*frame);
     each();
@@ -79,16 +88,13 @@ void WriteTumRecording(const fs::path& folder, const simulated::SensorUnit& unit
   writer.Finish();
 }
 
-void WriteOniRecording(const fs::path& file, SimulatedSource& source, const std::stop_token& stop, const std::function<void()>& each) {
-#ifdef PLUMB_WITH_OPENNI
-  WriteOni(file, source, stop, each);
-#else
-  (void)source, (void)stop, (void)each;
-  throw std::invalid_argument(fmt::format("cannot write {}: this build has no OpenNI2; use the format tum", file.string()));
-#endif
-}
-
 }  // namespace
+
+simulated::FaultSet FaultsOf(const SimulateOptions& options) {
+  if (options.faults) return *options.faults;
+  const bool mild = options.suite == "demo" && !options.unit;
+  return mild ? simulated::MildFaults(options.noise) : simulated::FaultsOf(options.noise);
+}
 
 std::optional<simulated::NoiseLevel> ParseNoiseLevel(std::string_view name) {
   if (name == "ideal") return simulated::NoiseLevel::kIdeal;
@@ -99,6 +105,9 @@ std::optional<simulated::NoiseLevel> ParseNoiseLevel(std::string_view name) {
 
 void SimulateSuite(const SimulateOptions& options, const std::stop_token& stop,
                    const std::function<void(double fraction, std::string_view what)>& progress) {
+  if (options.format == RecordingFormat::kOni && !options.write_oni)
+    throw std::invalid_argument(
+        "cannot write .oni files: this build has no OpenNI2; use the format tum");
   FolderBeside folder(options.out);
   const simulated::SuitePlan plan = simulated::PlanSuite(options);
   const double total = static_cast<double>(plan.scenes.size()) * options.frames;
@@ -115,15 +124,17 @@ void SimulateSuite(const SimulateOptions& options, const std::stop_token& stop,
       if (progress) progress(done / total, name);
       if (stop.stop_requested())
         throw Interrupted(
-            fmt::format("simulation stopped after {} of {} frames; nothing is left in {}", done, total, options.out.string()));
+            fmt::format("simulation stopped after {} of {} frames; nothing is left in {}", done,
+                        total, options.out.string()));
     };
     if (options.format == RecordingFormat::kOni)
-      WriteOniRecording(folder.path() / "recordings" / (name + ".oni"), *source, stop, each);
+      options.write_oni(folder.path() / "recordings" / (name + ".oni"), *source, stop, each);
     else
       WriteTumRecording(folder.path() / "recordings" / name, plan.unit, *source, each);
     simulated::WriteTruth(folder.path() / "truth" / name, plan, i, *source, sightings.counts());
   }
-  WriteSuiteFile(folder.path(), plan);
+  simulated::WriteUnit(folder.path() / "truth" / "unit.json", plan.unit);
+  WriteSuiteFile(folder.path(), plan, options);
   folder.Commit();
 }
 

@@ -14,7 +14,8 @@
 
 namespace plumb::simulated {
 
-/// A body, ready to be seen: its distances, its surface, and the area centroid of that surface (body frame).
+/// A body, ready to be seen: its distances, its surface, and the area centroid of that surface
+/// (body frame).
 struct BodyModel {
   BodyShape shape;
   std::shared_ptr<const DistanceGrid> grid;
@@ -27,18 +28,22 @@ struct ScenePlan {
   std::shared_ptr<const BodyModel> body;
   Pose T_world_body = Pose::Identity();
   SimulatedSweep sweep;
+  std::vector<Board> boards = {};  ///< Those of the room, as they lie at the sweep's start.
 };
 
-/// World frame of all scenes: z up from the supporting plane, x from head to feet, origin in the middle of the placements.
+/// World frame of all scenes: z up from the supporting plane, x from head to feet, origin in the
+/// middle of the placements.
 struct SuitePlan {
   std::string name;
   SensorUnit unit;
   Room room;
-  int reference_marker = 0;  ///< Lies at the head, right of the body (-x, -y); its x axis along the sweep.
+  int reference_marker =
+      0;  ///< Lies at the head, right of the body (-x, -y); its x axis along the sweep.
   std::vector<ScenePlan> scenes;
   std::vector<std::pair<std::string, std::string>> pairs;  ///< Reference scene, current scene.
 };
 
+[[nodiscard]] std::shared_ptr<const DistanceGrid> MakeGrid(const BodyShape& shape);
 [[nodiscard]] std::shared_ptr<const BodyModel> MakeBody(const BodyShape& shape);
 
 /// @throws std::invalid_argument for an unknown suite or numbers out of range.

@@ -14,7 +14,8 @@ namespace plumb::simulated {
 class Texture {
  public:
   /// @param low   Corner of the rectangle, metres.  @param step  Texel size, metres.
-  Texture(const Eigen::Vector2f& low, float step, int width, int height, const Eigen::Vector3f& albedo);
+  Texture(const Eigen::Vector2f& low, float step, int width, int height,
+          const Eigen::Vector3f& albedo);
 
   /// Albedo (red, green, blue) at a place, bilinear between texels.
   [[nodiscard]] Eigen::Vector3f At(float x, float y) const;
@@ -27,21 +28,27 @@ class Texture {
   /// Multiplies by a smooth noise of the given cell size: 1 +- amplitude.
   void Mottle(std::uint64_t seed, float cell, float amplitude);
   /// Blends a colour over a thick straight stroke.
-  void Stroke(const Eigen::Vector2f& from, const Eigen::Vector2f& to, float width, const Eigen::Vector3f& color, float opacity);
+  void Stroke(const Eigen::Vector2f& from, const Eigen::Vector2f& to, float width,
+              const Eigen::Vector3f& color, float opacity);
   /// Blends a colour over a disc.
-  void Disc(const Eigen::Vector2f& centre, float radius, const Eigen::Vector3f& color, float opacity);
+  void Disc(const Eigen::Vector2f& centre, float radius, const Eigen::Vector3f& color,
+            float opacity);
 
   [[nodiscard]] Eigen::Vector2f low() const { return low_; }
   [[nodiscard]] Eigen::Vector2f high() const {
-    return low_ + step_ * Eigen::Vector2f(static_cast<float>(width_ - 1), static_cast<float>(height_ - 1));
+    return low_ +
+           step_ * Eigen::Vector2f(static_cast<float>(width_ - 1), static_cast<float>(height_ - 1));
   }
 
  private:
-  using Texel = std::uint32_t;  ///< Square roots of red, green and blue albedo times 255, a byte each from the lowest.
+  using Texel = std::uint32_t;  ///< Square roots of red, green and blue albedo times 255, a byte
+                                ///< each from the lowest.
   [[nodiscard]] std::size_t Index(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+           static_cast<std::size_t>(x);
   }
-  /// Roots of red, green and blue times 255 * 256, between four texels; wu, wv in sixteenths of the way.
+  /// Roots of red, green and blue times 255 * 256, between four texels; wu, wv in sixteenths of the
+  /// way.
   [[nodiscard]] Int4 Between(int x0, int y0, int wu, int wv) const;
   void Blend(int x, int y, const Eigen::Vector3f& color, float opacity);
 

@@ -3,12 +3,14 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
-#include "algo/types/pose.hpp"
+#include "algo/base/pose.hpp"
 
 namespace plumb::simulated {
 
-/// A sweep in its own frame: x from head to feet, z up from the support, origin under the middle of the way.
+/// A sweep in its own frame: x from head to feet, z up from the support, origin under the middle of
+/// the way.
 struct SweepOptions {
   Pose T_world_sweep = Pose::Identity();
   double half_way_m = 0.6;  ///< The sensor goes from x = -half_way_m to +half_way_m.
@@ -17,6 +19,10 @@ struct SweepOptions {
   double swing_period_s = 3.6;
   double duration_s = 10.0;
   double tremor = 1.0;  ///< Multiplies the hand's tremor; 0: none.
+  /// A trembling hand beside that: RMS over 1 to 10 Hz, all axes together. Amplitudes fall with the
+  /// frequency, so every band moves equally fast.
+  double tremble_m = 0.0;
+  double tremble_rad = 0.0;
   std::uint64_t seed = 1;
 };
 
@@ -24,7 +30,8 @@ struct SweepOptions {
 class Trajectory {
  public:
   explicit Trajectory(const SweepOptions& options);
-  /// @param time_s  From 0 to the sweep's duration; the sensor stands still (but for its tremor) before and after.
+  /// @param time_s  From 0 to the sweep's duration; the sensor stands still (but for its tremor)
+  /// before and after.
   [[nodiscard]] Pose T_world_camera(double time_s) const;
 
  private:
@@ -32,8 +39,9 @@ class Trajectory {
     double amplitude, frequency_hz, phase;
     [[nodiscard]] double At(double time_s) const;
   };
-  using Waves = std::array<Wave, 5>;
+  using Waves = std::vector<Wave>;
   static double Sum(const Waves& waves, double time_s);
+  void AddTremble();
 
   SweepOptions options_;
   double swing_phase_;

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/types/marker.hpp"
-#include "drivers/replay/file_io.hpp"
+#include "drivers/files/file_io.hpp"
 
 namespace plumb::simulated {
 namespace {
@@ -22,7 +22,9 @@ json ToJson(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 json ToJson(const Pose& T) {
   json rows = json::array();
-  for (int row = 0; row < 4; ++row) rows.push_back({T.matrix()(row, 0), T.matrix()(row, 1), T.matrix()(row, 2), T.matrix()(row, 3)});
+  for (int row = 0; row < 4; ++row)
+    rows.push_back(
+        {T.matrix()(row, 0), T.matrix()(row, 1), T.matrix()(row, 2), T.matrix()(row, 3)});
   return rows;
 }
 
@@ -34,27 +36,40 @@ std::string TrajectoryText(const SimulatedSource& source) {
     const Pose T = source.T_world_camera(time);
     const Eigen::Vector3d t = T.translation();
     const Eigen::Quaterniond q(T.linear());
-    fmt::format_to(std::back_inserter(text), "{:.6f} {:.7f} {:.7f} {:.7f} {:.9f} {:.9f} {:.9f} {:.9f}\n", time, t.x(), t.y(), t.z(), q.x(),
-                   q.y(), q.z(), q.w());
+    fmt::format_to(std::back_inserter(text),
+                   "{:.6f} {:.7f} {:.7f} {:.7f} {:.9f} {:.9f} {:.9f} {:.9f}\n", time, t.x(), t.y(),
+                   t.z(), q.x(), q.y(), q.z(), q.w());
   }
   return text;
 }
 
-json Markers(const SuitePlan& plan) {
+json Markers(const ScenePlan& scene) {
   json markers;
-  for (const Board& board : plan.room.boards) {
-    const MarkerCorners corners = CornersInMarkerFrame(kMarkerLength);
+  for (const Board& board : scene.boards) {
+    const MarkerCorners corners = CornersOf(board);
     json in_paper_order = json::array();
     for (const std::size_t detector_corner : {3, 2, 1, 0})
-      in_paper_order.push_back(ToJson(board.T_world_marker * corners[detector_corner]));
-    markers[std::to_string(board.id)] = {{"T_world_marker", ToJson(board.T_world_marker)}, {"corners", in_paper_order}};
+      in_paper_order.push_back(ToJson(corners[detector_corner]));
+    markers[std::to_string(board.id)] = {{"T_world_marker", ToJson(board.T_world_marker)},
+                                         {"corners", in_paper_order}};
+  }
+  json pushed = nullptr;
+  if (scene.sweep.events.pushed) {
+    const PushedBoard& event = *scene.sweep.events.pushed;
+    pushed = {{"id", scene.boards[event.board].id},
+              {"begin_s", scene.sweep.start_time_s + event.begin_s},
+              {"end_s", scene.sweep.start_time_s + event.end_s},
+              {"T_world_marker_after", ToJson(event.T_world_after)}};
   }
   return {
       {"about",
-       "corners in world metres, paper order c1(-l/2,-l/2) c2(l/2,-l/2) c3(l/2,l/2) c4(-l/2,l/2) in the marker frame (x right, y up on the "
-       "printed sheet, z out of the paper); these are OpenCV detector corners 3,2,1,0"},
+       "corners in world metres, paper order c1(-l/2,-l/2) c2(l/2,-l/2) c3(l/2,l/2) "
+       "c4(-l/2,l/2) in the marker frame (x right, y up on the "
+       "printed sheet, z out of the paper); these are OpenCV detector corners 3,2,1,0; as they lie "
+       "when the sweep begins"},
       {"dictionary", kDictionary},
       {"length", kMarkerLength},
+      {"pushed", pushed},
       {"markers", markers}};
 }
 
@@ -63,17 +78,26 @@ json Motion(const SuitePlan& plan, const ScenePlan& scene) {
   const Pose T_world_reference_marker = plan.room.boards.front().T_world_marker;
   const Pose motion = scene.T_world_body * T_world_body0.inverse();
   const Eigen::Vector3d centroid = plan.scenes.front().body->centroid;
-  return {
-      {"about",
-       "motion_*: rigid transform from the placement of the suite's first scene (body0) to this scene's; centroid = area centroid of the "
-       "undeformed body's surface"},
-      {"T_world_body", ToJson(scene.T_world_body)},
-      {"T_world_body0", ToJson(T_world_body0)},
-      {"T_world_reference_marker", ToJson(T_world_reference_marker)},
-      {"centroid_body", ToJson(centroid)},
-      {"centroid_world", ToJson(scene.T_world_body * centroid)},
-      {"motion_reference_marker", ToJson(T_world_reference_marker.inverse() * motion * T_world_reference_marker)},
-      {"motion_world", ToJson(motion)}};
+  return {{"about",
+           "motion_*: rigid transform from the placement of the suite's first scene (body0) to "
+           "this scene's; centroid = area centroid of the "
+           "undeformed body's surface"},
+          {"T_world_body", ToJson(scene.T_world_body)},
+          {"T_world_body0", ToJson(T_world_body0)},
+          {"T_world_reference_marker", ToJson(T_world_reference_marker)},
+          {"centroid_body", ToJson(centroid)},
+          {"centroid_world", ToJson(scene.T_world_body * centroid)},
+          {"motion_reference_marker",
+           ToJson(T_world_reference_marker.inverse() * motion * T_world_reference_marker)},
+          {"motion_world", ToJson(motion)}};
+}
+
+json ToJson(const Intrinsics& camera) {
+  return {{"fx", camera.fx},
+          {"fy", camera.fy},
+          {"cx", camera.cx},
+          {"cy", camera.cy},
+          {"distortion", camera.distortion}};
 }
 
 void Append(std::vector<std::uint8_t>& bytes, const void* data, std::size_t size) {
@@ -84,8 +108,10 @@ void Append(std::vector<std::uint8_t>& bytes, const void* data, std::size_t size
 std::vector<std::uint8_t> BodyPly(const ScenePlan& scene, const std::vector<int>& sightings) {
   const TriangleMesh& mesh = scene.body->surface;
   const std::string header = fmt::format(
-      "ply\nformat binary_little_endian 1.0\ncomment true surface, world frame, metres; seen = frames that measured the vertex\n"
-      "element vertex {}\nproperty float x\nproperty float y\nproperty float z\nproperty float seen\nelement face {}\n"
+      "ply\nformat binary_little_endian 1.0\ncomment true surface, world frame, metres; seen = "
+      "frames that measured the vertex\n"
+      "element vertex {}\nproperty float x\nproperty float y\nproperty float z\nproperty float "
+      "seen\nelement face {}\n"
       "property list uchar int vertex_indices\nend_header\n",
       mesh.vertices.size(), mesh.triangles.size());
   std::vector<std::uint8_t> bytes(header.begin(), header.end());
@@ -104,16 +130,21 @@ std::vector<std::uint8_t> BodyPly(const ScenePlan& scene, const std::vector<int>
 
 }  // namespace
 
-VertexSightings::VertexSightings(const SuitePlan& plan, std::size_t scene) : plan_(plan), scene_(plan.scenes.at(scene)) {
+VertexSightings::VertexSightings(const SuitePlan& plan, std::size_t scene)
+    : plan_(plan), scene_(plan.scenes.at(scene)) {
   const TriangleMesh& mesh = scene_.body->surface;
-  for (const Eigen::Vector3f& vertex : mesh.vertices) vertices_in_world_.push_back(scene_.T_world_body * vertex.cast<double>());
-  for (const Eigen::Vector3f& normal : mesh.normals) normals_in_world_.push_back(scene_.T_world_body.linear() * normal.cast<double>());
+  for (const Eigen::Vector3f& vertex : mesh.vertices)
+    vertices_in_world_.push_back(scene_.T_world_body * vertex.cast<double>());
+  for (const Eigen::Vector3f& normal : mesh.normals)
+    normals_in_world_.push_back(scene_.T_world_body.linear() * normal.cast<double>());
   counts_.assign(mesh.vertices.size(), 0);
 }
 
 void VertexSightings::Add(const FrameTruth& truth) {
-  constexpr double kSame = 0.010;  // The true depth at the pixel is the vertex's own within this much, metres.
-  const Pose T_depth_world = (truth.T_world_camera_at_depth * plan_.unit.T_color_depth_true).inverse();
+  constexpr double kSame =
+      0.010;  // The true depth at the pixel is the vertex's own within this much, metres.
+  const Pose T_depth_world =
+      (truth.T_world_camera_at_depth * plan_.unit.T_color_depth_true).inverse();
   const Eigen::Vector3d centre = T_depth_world.inverse().translation();
   for (std::size_t i = 0; i < counts_.size(); ++i) {
     if (normals_in_world_[i].dot(centre - vertices_in_world_[i]) <= 0) continue;
@@ -123,17 +154,57 @@ void VertexSightings::Add(const FrameTruth& truth) {
     const int x = static_cast<int>(std::floor(pixel.x() + 0.5));
     const int y = static_cast<int>(std::floor(pixel.y() + 0.5));
     if (x < 0 || y < 0 || x >= truth.depth.true_m.cols || y >= truth.depth.true_m.rows) continue;
-    if (truth.depth.measured_m.at<float>(y, x) > 0 && std::abs(truth.depth.true_m.at<float>(y, x) - p.z()) < kSame) ++counts_[i];
+    if (truth.depth.measured_m.at<float>(y, x) > 0 &&
+        std::abs(truth.depth.true_m.at<float>(y, x) - p.z()) < kSame)
+      ++counts_[i];
   }
 }
 
-void WriteTruth(const std::filesystem::path& folder, const SuitePlan& plan, std::size_t scene, const SimulatedSource& source,
-                const std::vector<int>& vertex_sightings) {
+void WriteTruth(const std::filesystem::path& folder, const SuitePlan& plan, std::size_t scene,
+                const SimulatedSource& source, const std::vector<int>& vertex_sightings) {
   const ScenePlan& planned = plan.scenes.at(scene);
   WriteWholeFile(folder / "groundtruth.txt", TrajectoryText(source));
-  WriteWholeFile(folder / "markers.json", Markers(plan).dump(1));
+  WriteWholeFile(folder / "markers.json", Markers(planned).dump(1));
   WriteWholeFile(folder / "motion.json", Motion(plan, planned).dump(1));
   WriteWholeFile(folder / "body.ply", BodyPly(planned, vertex_sightings));
+}
+
+void WriteUnit(const std::filesystem::path& file, const SensorUnit& unit) {
+  const DepthBend& bend = unit.depth_bend;
+  const json depth{{"scale", unit.depth_scale_error},
+                   {"offset_m", unit.depth_offset_m},
+                   {"bow_per_m", unit.depth_bow_per_m},
+                   {"tilt_per_m", unit.depth_tilt_per_m},
+                   {"radial", bend.radial},
+                   {"radial_quartic_share", bend.radial_quartic},
+                   {"field_rms", bend.field_rms},
+                   {"field_change_rms", bend.change_rms}};
+  const json warm_up{{"scale", unit.warm_up}, {"on_before_s", unit.on_before_s}};
+  const json times{{"exposure_s", unit.exposure_s},
+                   {"color_readout_s", unit.readout_s},
+                   {"depth_readout_s", unit.depth_readout_s},
+                   {"depth_delay_s", unit.depth_delay_s},
+                   {"color_stamp_bias_s", unit.color_stamp_bias_s},
+                   {"stamp_jitter_s", unit.stamp_jitter_s}};
+  const json tone{{"kind", ToString(unit.tone.kind)},
+                  {"gamma", unit.tone.gamma},
+                  {"contrast", unit.tone.contrast}};
+  const json written{
+      {"unit", unit.seed},
+      {"faults", unit.faults.Names()},
+      {"color", ToJson(unit.color_true)},
+      {"color_written", ToJson(unit.color_written)},
+      {"infrared", ToJson(unit.depth_true)},
+      {"infrared_assumed", ToJson(unit.depth_assumed)},
+      {"T_color_depth", ToJson(unit.T_color_depth_true)},
+      {"T_color_depth_assumed", ToJson(unit.T_color_depth_assumed)},
+      {"lens_rest", {{"prism", unit.color_lens_rest.prism}, {"k4", unit.color_lens_rest.k4}}},
+      {"depth", depth},
+      {"warm_up", warm_up},
+      {"speckle", unit.speckle},
+      {"times", times},
+      {"tone_curve", tone}};
+  WriteWholeFile(file, written.dump(1));
 }
 
 }  // namespace plumb::simulated

@@ -23,9 +23,14 @@ class VertexSightings {
   std::vector<int> counts_;
 };
 
-/// Writes groundtruth.txt (500 Hz, colour camera to world), markers.json, motion.json and body.ply (world frame) into an existing folder.
+/// Writes groundtruth.txt (500 Hz, colour camera to world), markers.json, motion.json and body.ply
+/// (world frame) into an existing folder.
 /// @throws IoError
-void WriteTruth(const std::filesystem::path& folder, const SuitePlan& plan, std::size_t scene, const SimulatedSource& source,
-                const std::vector<int>& vertex_sightings);
+void WriteTruth(const std::filesystem::path& folder, const SuitePlan& plan, std::size_t scene,
+                const SimulatedSource& source, const std::vector<int>& vertex_sightings);
+
+/// Writes what is true of the sensor: its optics, depth errors, times and tone curve. @throws
+/// IoError
+void WriteUnit(const std::filesystem::path& file, const SensorUnit& unit);
 
 }  // namespace plumb::simulated

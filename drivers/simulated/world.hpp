@@ -11,8 +11,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "algo/base/pose.hpp"
 #include "algo/types/marker.hpp"
-#include "algo/types/pose.hpp"
 #include "drivers/simulated/distance_grid.hpp"
 #include "drivers/simulated/texture.hpp"
 
@@ -20,12 +20,36 @@ namespace plumb::simulated {
 
 inline constexpr const char* kDictionary = "DICT_6X6_250";
 inline constexpr double kMarkerLength = 0.104;  ///< Side of the black square, metres.
-inline constexpr double kBoardSide = 0.132;     ///< Side of the white board that it is printed on, metres.
+inline constexpr double kBoardSide =
+    0.132;  ///< Side of the white board that it is printed on, metres.
 
-/// A marker of DICT_6X6_250 printed on a stiff white board; the board's body reaches down into the support.
+/// A marker of DICT_6X6_250 printed on a stiff white board; the board's body reaches down into the
+/// support.
 struct Board {
   int id = 0;
-  Pose T_world_marker = Pose::Identity();  ///< Marker's frame: x right, y up on the print, z out of it.
+  Pose T_world_marker =
+      Pose::Identity();  ///< Marker's frame: x right, y up on the print, z out of it.
+  /// The printed square's sides, over kMarkerLength: along the marker's x and y.
+  std::array<double, 2> print_scale = {1.0, 1.0};
+  /// The print is a trough or ridge: height bulge_m (1 - (x / half side)^2), so its corners lie
+  /// where those of a flat print do.
+  double bulge_m = 0.0;
+  [[nodiscard]] bool IsCurled() const { return bulge_m != 0.0; }
+};
+
+/// The true corners of a board's print, world, detector order.
+[[nodiscard]] MarkerCorners CornersOf(const Board& board);
+
+/// Something thin or long that is no part of the room, a cable or an arm: a rod with round ends.
+struct Rod {
+  Eigen::Vector3f a = Eigen::Vector3f::Zero();  ///< World, metres.
+  Eigen::Vector3f b = Eigen::Vector3f::Zero();
+  float radius = 0.01F;
+};
+/// The rods in view, all of one colour.
+struct Rods {
+  std::vector<Rod> rods;
+  Eigen::Vector3f albedo = Eigen::Vector3f::Constant(0.05F);
 };
 
 /// The part of a world that all scenes of a suite share.
@@ -33,9 +57,11 @@ struct Room {
   std::vector<Board> boards;
   std::shared_ptr<const Texture> support_texture;
   std::shared_ptr<const Texture> skin_texture;
-  /// Couch top in the plane z = 0: everything outside is a floor far below. Without it z = 0 is the floor.
+  /// Couch top in the plane z = 0: everything outside is a floor far below. Without it z = 0 is the
+  /// floor.
   std::optional<Eigen::AlignedBox2f> couch;
   float floor_below_couch_m = 0.75F;
+  float gloss = 0.0F;  ///< Of the prints: how bright the mirrored lights are, over a white print.
 };
 
 /// What a ray met, as one number: two rays of different `material` have an edge between them.
@@ -45,14 +71,19 @@ inline constexpr Material kSupport = 1;
 inline constexpr Material kLowerFloor = 2;
 inline constexpr Material kCouchSide = 3;
 inline constexpr Material kBody = 4;
+inline constexpr Material kRod = 5;
 inline constexpr Material kFirstBoard = 8;  ///< Then four a board: white, black, side.
 
 /// The object that a material belongs to: all materials of one board are one object.
 [[nodiscard]] constexpr Material ObjectOf(Material material) {
   return material < kFirstBoard ? material : static_cast<Material>(material & ~3U);
 }
-[[nodiscard]] constexpr int BoardOf(Material material) { return material < kFirstBoard ? -1 : (material - kFirstBoard) / 4; }
-[[nodiscard]] constexpr bool IsBoardTop(Material material) { return material >= kFirstBoard && (material & 3U) < 2; }
+[[nodiscard]] constexpr int BoardOf(Material material) {
+  return material < kFirstBoard ? -1 : (material - kFirstBoard) / 4;
+}
+[[nodiscard]] constexpr bool IsBoardTop(Material material) {
+  return material >= kFirstBoard && (material & 3U) < 2;
+}
 
 struct Ray {
   Eigen::Vector3f origin;     ///< World, metres.
@@ -65,7 +96,8 @@ struct Ray4 {
   Vector3x4 direction;  ///< World, unit length.
   Float4 inverse_norm;  ///< Of the directions as they were given: 1 / |way|.
 
-  Ray4(const Vector3x4& start, const Vector3x4& way) : origin(start), inverse_norm(1.0F / Root(SquaredNorm(way))) {
+  Ray4(const Vector3x4& start, const Vector3x4& way)
+      : origin(start), inverse_norm(1.0F / Root(SquaredNorm(way))) {
     direction = inverse_norm * way;
   }
 };
@@ -82,23 +114,27 @@ struct Hit {
 
 struct Shading {
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  ///< World.
-  Eigen::Vector3f light = Eigen::Vector3f::Zero();    ///< Linear red, green, blue; about 1 on an open horizontal surface.
+  Eigen::Vector3f light =
+      Eigen::Vector3f::Zero();  ///< Linear red, green, blue; about 1 on an open horizontal surface.
 };
 
 /// What rays of one small bundle may meet; found once a bundle, so that single rays stay cheap.
 struct Candidates {
-  float body_start = std::numeric_limits<float>::infinity();  ///< No ray of the bundle meets the body before.
+  float body_start =
+      std::numeric_limits<float>::infinity();  ///< No ray of the bundle meets the body before.
   std::array<std::uint8_t, 12> boards{};
   int num_boards = 0;
+  bool rods = false;  ///< Whether rods may be met.
 };
 
-/// Immutable after construction: any number of threads may read.
+/// Any number of threads may read while none changes it. Copies are cheap.
 class World {
  public:
   /// @param body  Distances of the body in its own frame.
   World(const Room& room, std::shared_ptr<const DistanceGrid> body, const Pose& T_world_body);
 
-  /// @param spread  Radius of the bundle per metre, around `centre`.  @param margin  Radius of its origins, metres.
+  /// @param spread  Radius of the bundle per metre, around `centre`.  @param margin  Radius of its
+  /// origins, metres.
   [[nodiscard]] Candidates FindCandidates(const Ray& centre, float spread, float margin) const;
   [[nodiscard]] Hit Trace(const Ray& ray, const Candidates& candidates) const;
   /// Four rays at once, which costs little more than one.
@@ -110,12 +146,18 @@ class World {
   /// What covers a surface whose normal is the same over a few pixels.
   struct Paint {
     Material material = kNothing;
-    Eigen::Vector3f weight = Eigen::Vector3f::Zero();  ///< Of the skin's paint as projected along x, y and z of the body; sum 1.
+    Eigen::Vector3f weight = Eigen::Vector3f::Zero();  ///< Of the skin's paint as projected along
+                                                       ///< x, y and z of the body; sum 1.
   };
   [[nodiscard]] Paint PaintOf(Material material, const Eigen::Vector3f& normal) const;
   /// Share of the light that the surface sends back, linear red, green, blue.
   [[nodiscard]] Eigen::Vector3f Albedo(const Paint& paint, const Eigen::Vector3f& p_world) const;
-  [[nodiscard]] Eigen::Vector3f MeanAlbedo(const Paint& paint, const Vector3x4& p_world) const;  ///< Over four places.
+  [[nodiscard]] Eigen::Vector3f MeanAlbedo(const Paint& paint,
+                                           const Vector3x4& p_world) const;  ///< Over four places.
+
+  /// Light that a board's print mirrors towards `from`: white, beside what its paint sends back.
+  [[nodiscard]] float GlareAt(Material material, const Eigen::Vector3f& p_world,
+                              const Eigen::Vector3f& from) const;
 
   /// A board and its print.
   struct BoardPlane {
@@ -123,10 +165,25 @@ class World {
     Eigen::Vector3f p_world;
     std::array<std::uint8_t, 64> black;  ///< 8 x 8 cells, row 0 at the top of the print.
 
+    std::array<float, 2> print_half;  ///< Half sides of the print, metres.
+    float bulge = 0.0F;
+
+    /// Where rays in the board's frame meet its curved top. @param t  Where they meet its plane.
+    [[nodiscard]] Float4 MeetTop(const Vector3x4& origin, const Vector3x4& direction,
+                                 Float4 t) const;
+    /// World.  @param x  On the board.
+    [[nodiscard]] Eigen::Vector3f NormalAt(float x) const;
     /// @param x, y  On the board, metres from its centre.  @return Mask.
     [[nodiscard]] Int4 IsBlack(Float4 x, Float4 y) const;
   };
-  [[nodiscard]] const BoardPlane& PlaneOf(int board) const { return boards_[static_cast<std::size_t>(board)]; }
+  [[nodiscard]] const BoardPlane& PlaneOf(int board) const {
+    return boards_[static_cast<std::size_t>(board)];
+  }
+
+  // Between images.
+  void MoveBoard(std::size_t board, const Pose& T_world_marker);
+  void ChangeBody(std::shared_ptr<const DistanceGrid> body) { body_ = std::move(body); }
+  void PlaceRods(Rods rods) { rods_ = std::move(rods); }
 
   [[nodiscard]] const Pose& T_world_body() const { return T_world_body_; }
   [[nodiscard]] const Room& room() const { return room_; }
@@ -136,9 +193,13 @@ class World {
   void TraceBoard(int index, const Ray4& rays, Hit4& hits) const;
   void TraceSupport(const Ray4& rays, Hit4& hits) const;
   void TraceCouchSides(const Ray4& rays, Int4 beside, Hit4& hits) const;
-  [[nodiscard]] Eigen::Vector3f ToBody(const Eigen::Vector3f& p_world) const { return R_body_world_ * p_world + t_body_world_; }
+  [[nodiscard]] Eigen::Vector3f ToBody(const Eigen::Vector3f& p_world) const {
+    return R_body_world_ * p_world + t_body_world_;
+  }
   template <typename Place>
   [[nodiscard]] Eigen::Vector3f AlbedoOf(const Paint& paint, const Place& p_world) const;
+  void TraceRods(const Ray4& rays, Hit4& hits) const;
+  [[nodiscard]] Eigen::Vector3f RodNormal(const Eigen::Vector3f& p_world) const;
   void BakeSupportLight();
 
   Room room_;
@@ -147,7 +208,9 @@ class World {
   Eigen::Matrix3f R_body_world_;
   Eigen::Vector3f t_body_world_;
   std::vector<BoardPlane> boards_;
-  std::vector<float> support_light_;  ///< Share of the light that reaches the support, on a square grid.
+  Rods rods_;
+  std::vector<float>
+      support_light_;  ///< Share of the light that reaches the support, on a square grid.
 };
 
 }  // namespace plumb::simulated

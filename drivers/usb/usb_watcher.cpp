@@ -12,7 +12,7 @@
 
 #include <fmt/format.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb {
 namespace {
@@ -23,9 +23,15 @@ struct Model {
   std::uint16_t product;
   std::string_view name;
 };
-constexpr std::array kModels{Model{0x0200, "PrimeSense device"}, Model{0x0500, "PrimeSense sensor"}, Model{0x0600, "Xtion"},
-                             Model{0x0601, "Xtion Pro Live"},    Model{0x0609, "Carmine"},           Model{0x1250, "PSLink sensor"},
-                             Model{0x1260, "PSLink sensor"},     Model{0x1270, "PSLink sensor"},     Model{0x1280, "PSLink sensor"}};
+constexpr std::array kModels{Model{0x0200, "PrimeSense device"},
+                             Model{0x0500, "PrimeSense sensor"},
+                             Model{0x0600, "Xtion"},
+                             Model{0x0601, "Xtion Pro Live"},
+                             Model{0x0609, "Carmine"},
+                             Model{0x1250, "PSLink sensor"},
+                             Model{0x1260, "PSLink sensor"},
+                             Model{0x1270, "PSLink sensor"},
+                             Model{0x1280, "PSLink sensor"}};
 
 std::string SpeedText(int speed) {
   switch (speed) {
@@ -46,10 +52,12 @@ std::string SpeedText(int speed) {
 
 /// True if a hub above the device, or its controller, is of USB 3.
 bool BehindUsb3(libusb_device* device) {
-  for (libusb_device* hub = libusb_get_parent(device); hub != nullptr; hub = libusb_get_parent(hub)) {
+  for (libusb_device* hub = libusb_get_parent(device); hub != nullptr;
+       hub = libusb_get_parent(hub)) {
     libusb_device_descriptor descriptor{};
     if (libusb_get_device_speed(hub) >= LIBUSB_SPEED_SUPER) return true;
-    if (libusb_get_device_descriptor(hub, &descriptor) == 0 && descriptor.bcdUSB >= 0x0300) return true;
+    if (libusb_get_device_descriptor(hub, &descriptor) == 0 && descriptor.bcdUSB >= 0x0300)
+      return true;
   }
   return false;
 }
@@ -66,18 +74,21 @@ UsbSensor Describe(libusb_device* device, const libusb_device_descriptor& descri
   const std::string node = fmt::format("/dev/bus/usb/{:03}/{:03}", sensor.bus, sensor.address);
   sensor.permitted = ::access(node.c_str(), R_OK | W_OK) == 0;
   if (!sensor.permitted) {
-    sensor.problems.push_back(fmt::format(
-        "no permission for {}: install Plumb's udev rule (or the package libopenni2-0), put the user into the group plumb, and plug the "
-        "sensor in again",
-        node));
+    sensor.problems.push_back(
+        fmt::format("no permission for {}: install Plumb's udev rule (or the package "
+                    "libopenni2-0), put the user into the group plumb, and plug the "
+                    "sensor in again",
+                    node));
   }
   if (speed == LIBUSB_SPEED_LOW || speed == LIBUSB_SPEED_FULL) {
-    sensor.problems.push_back(
-        fmt::format("it runs at {} only, too slow for images: use another port or cable, without a hub", sensor.speed));
+    sensor.problems.push_back(fmt::format(
+        "it runs at {} only, too slow for images: use another port or cable, without a hub",
+        sensor.speed));
   }
   if (BehindUsb3(device)) {
     sensor.problems.push_back(
-        "it is on a USB 3 controller: old Xtion firmware fails there (no device, or set_interface errors); if so use a USB 2 port, or "
+        "it is on a USB 3 controller: old Xtion firmware fails there (no device, or set_interface "
+        "errors); if so use a USB 2 port, or "
         "update "
         "the firmware");
   }
@@ -88,7 +99,8 @@ UsbSensor Describe(libusb_device* device, const libusb_device_descriptor& descri
 
 std::optional<std::string> UsbSensorModel(std::uint16_t vendor, std::uint16_t product) {
   if (vendor != kPrimeSense) return std::nullopt;
-  const auto found = std::find_if(kModels.begin(), kModels.end(), [&](const Model& model) { return model.product == product; });
+  const auto found = std::find_if(kModels.begin(), kModels.end(),
+                                  [&](const Model& model) { return model.product == product; });
   return found == kModels.end() ? "unknown PrimeSense device" : std::string(found->name);
 }
 
@@ -100,27 +112,32 @@ struct UsbWatcher::Impl {
   std::function<void()> listener;
   std::function<void()> fd_listener;
 
-  static int LIBUSB_CALL OnHotplug(libusb_context*, libusb_device* device, libusb_hotplug_event event, void* self) {
+  static int LIBUSB_CALL OnHotplug(libusb_context*, libusb_device* device,
+                                   libusb_hotplug_event event, void* self) {
     static_cast<Impl*>(self)->OnDevice(device, event == LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED);
     return 0;
   }
 
-  // May be told of a device twice: registering enumerates while events are on their way.
+  // May hear of a device twice: registering enumerates while events are on their way.
   void OnDevice(libusb_device* device, bool arrived) {
     libusb_device_descriptor descriptor{};
     if (libusb_get_device_descriptor(device, &descriptor) != 0) return;
     const UsbSensor sensor = Describe(device, descriptor);
-    std::erase_if(sensors, [&](const UsbSensor& known) { return known.bus == sensor.bus && known.address == sensor.address; });
+    std::erase_if(sensors, [&](const UsbSensor& known) {
+      return known.bus == sensor.bus && known.address == sensor.address;
+    });
     if (arrived) sensors.push_back(sensor);
-    std::sort(sensors.begin(), sensors.end(),
-              [](const auto& a, const auto& b) { return std::tie(a.bus, a.address) < std::tie(b.bus, b.address); });
+    std::sort(sensors.begin(), sensors.end(), [](const auto& a, const auto& b) {
+      return std::tie(a.bus, a.address) < std::tie(b.bus, b.address);
+    });
     changed = true;
   }
 };
 
 UsbWatcher::UsbWatcher() : impl_(std::make_unique<Impl>()) {
   int status = libusb_init(&impl_->context);
-  if (status != 0) throw DeviceError(fmt::format("libusb does not start: {}", libusb_error_name(status)));
+  if (status != 0)
+    throw DeviceError(fmt::format("libusb does not start: {}", libusb_error_name(status)));
   libusb_set_pollfd_notifiers(
       impl_->context,
       [](int, short, void* self) {
@@ -130,9 +147,10 @@ UsbWatcher::UsbWatcher() : impl_(std::make_unique<Impl>()) {
         if (auto& listener = static_cast<Impl*>(self)->fd_listener) listener();
       },
       impl_.get());
-  status = libusb_hotplug_register_callback(impl_->context, LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED | LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT,
-                                            LIBUSB_HOTPLUG_ENUMERATE, kPrimeSense, LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY,
-                                            &Impl::OnHotplug, impl_.get(), &impl_->hotplug);
+  status = libusb_hotplug_register_callback(
+      impl_->context, LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED | LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT,
+      LIBUSB_HOTPLUG_ENUMERATE, kPrimeSense, LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY,
+      &Impl::OnHotplug, impl_.get(), &impl_->hotplug);
   if (status != 0) {
     libusb_exit(impl_->context);
     throw DeviceError(fmt::format("libusb cannot watch the bus: {}", libusb_error_name(status)));
@@ -152,13 +170,18 @@ std::vector<pollfd> UsbWatcher::fds() const {
   std::vector<pollfd> fds;
   const libusb_pollfd** list = libusb_get_pollfds(impl_->context);
   if (list == nullptr) return fds;
-  for (const libusb_pollfd** entry = list; *entry != nullptr; ++entry) fds.push_back({(*entry)->fd, (*entry)->events, 0});
+  for (const libusb_pollfd** entry = list; *entry != nullptr; ++entry)
+    fds.push_back({(*entry)->fd, (*entry)->events, 0});
   libusb_free_pollfds(list);
   return fds;
 }
 
-void UsbWatcher::SetFdListener(std::function<void()> changed) { impl_->fd_listener = std::move(changed); }
-void UsbWatcher::SetListener(std::function<void()> changed) { impl_->listener = std::move(changed); }
+void UsbWatcher::SetFdListener(std::function<void()> changed) {
+  impl_->fd_listener = std::move(changed);
+}
+void UsbWatcher::SetListener(std::function<void()> changed) {
+  impl_->listener = std::move(changed);
+}
 
 void UsbWatcher::Dispatch() {
   timeval now{0, 0};

@@ -1,4 +1,5 @@
-// Sensors of the Xtion class on the USB bus: who comes and goes, and whether we may use them. Knows nothing of images.
+// Sensors of the Xtion class on the USB bus: who comes and goes, and whether we may use them. Knows
+// nothing of images.
 #pragma once
 
 #include <poll.h>
@@ -26,9 +27,11 @@ struct UsbSensor {
 };
 
 /// Models by USB id (1d27:*); nothing for other devices.
-[[nodiscard]] std::optional<std::string> UsbSensorModel(std::uint16_t vendor, std::uint16_t product);
+[[nodiscard]] std::optional<std::string> UsbSensorModel(std::uint16_t vendor,
+                                                        std::uint16_t product);
 
-/// Watches the bus. One thread, the event loop's, uses everything; nothing blocks. Block signals before: libusb starts a thread.
+/// Watches the bus. One thread, the event loop's, uses everything; nothing blocks. Block signals
+/// before: libusb starts a thread.
 class UsbWatcher {
  public:
   using Clock = std::chrono::steady_clock;
@@ -42,7 +45,8 @@ class UsbWatcher {
   /// Sensors that are attached, by bus and address.
   [[nodiscard]] const std::vector<UsbSensor>& sensors() const;
 
-  /// What the loop waits for. The set may change; then `changed` is called, from within a call of this object.
+  /// The descriptors to wait for. The set may change; then `changed` is called, from within a call
+  /// of this object.
   [[nodiscard]] std::vector<pollfd> fds() const;
   void SetFdListener(std::function<void()> changed);
   /// To be called when one of them is ready, or at the deadline. @throws DeviceError

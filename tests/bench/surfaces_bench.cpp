@@ -1,5 +1,6 @@
-// The stages after the sweep, at the paper's size: 15 keyframes of 640x480. Each line shows the paper's seconds for the same
-// work (its table of computing times, i7-4700HQ laptop) and the accuracy on exact truth beside the time.
+// The stages after the sweep, at the paper's size: 15 keyframes of 640x480. Each line shows the
+// paper's seconds for the same work (its table of computing times, i7-4700HQ laptop) and the
+// accuracy on exact truth beside the time.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -20,12 +21,14 @@ namespace {
 
 constexpr int kNumKeyframes = 15;
 constexpr double kDepthNoise = 0.002;  // metres
-constexpr double kPoseErrorM = 0.01;   // of a keyframe's position, per axis: as METHOD's table starts from 1 cm / 0.5 deg
+constexpr double kPoseErrorM =
+    0.01;  // of a keyframe's position, per axis: as METHOD's table starts from 1 cm / 0.5 deg
 constexpr double kPoseErrorRad = 0.5 * kDegree / 1.7;
 
 /// A sweep over a dome, exact poses; rendered once.
 const std::vector<DepthView>& Views() {
-  static const std::vector<DepthView> views = testing::SweepOverDome(testing::DomeScene{}, kNumKeyframes, 640, kDepthNoise);
+  static const std::vector<DepthView> views =
+      testing::SweepOverDome(testing::DomeScene{}, kNumKeyframes, 640, kDepthNoise);
   return views;
 }
 
@@ -54,7 +57,8 @@ std::vector<Keyframe> Keyframes(const std::vector<Pose>& T_wrong_world) {
   return keyframes;
 }
 
-/// Root mean square by which the keyframes disagree about places on the dome, when moved by T_a_true each; millimetres.
+/// Root mean square by which the keyframes disagree about places on the dome, when moved by
+/// T_a_true each; millimetres.
 double DisagreementMm(const std::vector<Pose>& T_a_true) {
   const testing::DomeScene dome;
   double sum = 0.0;
@@ -81,23 +85,28 @@ double MedianErrorMm(const HeightMap& map) {
     for (int column = 0; column < map.grid.width; ++column) {
       const double x = map.grid.x_centre(column);
       const double y = map.grid.y_centre(row);
-      if (std::isnan(map.at(row, column)) || dome.Height(x, y) == 0.0 || dome.Normal(x, y).z() < 0.7) continue;
+      if (std::isnan(map.at(row, column)) || dome.Height(x, y) == 0.0 ||
+          dome.Normal(x, y).z() < 0.7)
+        continue;
       errors.push_back(std::abs(map.at(row, column) - dome.Height(x, y)));
     }
   }
   if (errors.empty()) return std::nan("");
-  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2), errors.end());
+  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2),
+                   errors.end());
   return 1e3 * errors[errors.size() / 2];
 }
 
 void Clouds(benchmark::State& state) {
-  const std::vector<Keyframe> keyframes = Keyframes(std::vector<Pose>(kNumKeyframes, Pose::Identity()));
+  const std::vector<Keyframe> keyframes =
+      Keyframes(std::vector<Pose>(kNumKeyframes, Pose::Identity()));
   for (auto _ : state) benchmark::DoNotOptimize(KeyframeClouds(keyframes));
   state.counters["paper_s"] = 3.121;
 }
 
 void PoissonDisk(benchmark::State& state) {
-  const std::vector<PointCloud> clouds = KeyframeClouds(Keyframes(std::vector<Pose>(kNumKeyframes, Pose::Identity())));
+  const std::vector<PointCloud> clouds =
+      KeyframeClouds(Keyframes(std::vector<Pose>(kNumKeyframes, Pose::Identity())));
   std::size_t kept = 0;
   for (auto _ : state) {
     kept = 0;
@@ -110,16 +119,19 @@ void AlgorithmOne(benchmark::State& state) {
   const std::vector<Pose> errors = PoseErrors();
   const std::vector<PointCloud> clouds = KeyframeClouds(Keyframes(errors));
   GlobalIcpResult result;
-  for (auto _ : state) result = RefinePoses(clouds, {.num_iterations = static_cast<int>(state.range(0))});
+  for (auto _ : state)
+    result = RefinePoses(clouds, {.num_iterations = static_cast<int>(state.range(0))});
   std::vector<Pose> after;
-  for (std::size_t j = 0; j < errors.size(); ++j) after.push_back(result.T_refined_world[j] * errors[j]);
+  for (std::size_t j = 0; j < errors.size(); ++j)
+    after.push_back(result.T_refined_world[j] * errors[j]);
   state.counters["before_mm"] = DisagreementMm(errors);
   state.counters["after_mm"] = DisagreementMm(after);
   if (state.range(0) == 50) state.counters["paper_s"] = 23.083;
 }
 
 void HeightMapAsPublished(benchmark::State& state) {
-  const std::vector<PointCloud> clouds = KeyframeClouds(Keyframes(std::vector<Pose>(kNumKeyframes, Pose::Identity())));
+  const std::vector<PointCloud> clouds =
+      KeyframeClouds(Keyframes(std::vector<Pose>(kNumKeyframes, Pose::Identity())));
   HeightMap map;
   for (auto _ : state) map = PaperHeightMap(clouds);
   state.counters["median_error_mm"] = MedianErrorMm(map);
@@ -152,20 +164,30 @@ void Mesh(benchmark::State& state) {
   state.counters["triangles"] = static_cast<double>(mesh.triangles.size());
 }
 
-/// FindTransform of 12 markers' corners; the paper's 0.312 s moves all clouds as well, which happens on the way here.
+/// FindTransform of 12 markers' corners; the paper's 0.312 s moves all clouds as well, which
+/// happens on the way here.
 void Align(benchmark::State& state) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   std::vector<Eigen::Vector3d> corners;
-  for (int i = 0; i < 48; ++i) corners.emplace_back(normal(random), normal(random), 0.01 * normal(random));
+  for (int i = 0; i < 48; ++i)
+    corners.emplace_back(normal(random), normal(random), 0.01 * normal(random));
   for (auto _ : state) benchmark::DoNotOptimize(FitRigid(corners, corners));
   state.counters["paper_s"] = 0.312;
 }
 
 BENCHMARK(Clouds)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
 BENCHMARK(PoissonDisk)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
-BENCHMARK(AlgorithmOne)->Arg(20)->Arg(50)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
-BENCHMARK(HeightMapAsPublished)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK(AlgorithmOne)
+    ->Arg(20)
+    ->Arg(50)
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
+BENCHMARK(HeightMapAsPublished)
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
 BENCHMARK(PrepareSurfaces)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
 BENCHMARK(HeightMapRobust)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
 BENCHMARK(Merge)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();

@@ -1,4 +1,5 @@
-// The commands around sensors and prints, through the real binary: record, .oni files, markers, doctor.
+// The commands around sensors and prints, through the real binary: record, .oni files, markers,
+// doctor.
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>
@@ -17,7 +18,8 @@ class DevicesTest : public CommandLineTest {
  protected:
   void SetUp() override {
     CommandLineTest::SetUp();
-    ::setenv("XDG_CACHE_HOME", PLUMB_INTEGRATION_DATA "/cache", 1);  // of what the virtual sensor shows
+    ::setenv("XDG_CACHE_HOME", PLUMB_INTEGRATION_DATA "/cache",
+             1);  // of what the virtual sensor shows
   }
 };
 
@@ -25,14 +27,16 @@ TEST_F(DevicesTest, MarkersAreDrawnAsPdfAndSvg) {
   const RunResult pdf = Plumb({"markers", "--ids", "0-3", "--out", (folder_ / "m.pdf").string()});
   EXPECT_EQ(pdf.exit_code, 0) << pdf.err;
   EXPECT_THAT(pdf.out, HasSubstr("2 pages"));
-  const RunResult svg = Plumb({"markers", "--ids", "0-3", "--paper", "A3", "--out", (folder_ / "m.svg").string()});
+  const RunResult svg =
+      Plumb({"markers", "--ids", "0-3", "--paper", "A3", "--out", (folder_ / "m.svg").string()});
   EXPECT_EQ(svg.exit_code, 0) << svg.err;
   EXPECT_THAT(ReadText(folder_ / "m.svg"), HasSubstr("width=\"297mm\""));
   EXPECT_THAT(LeftBehind({"m.pdf", "m.svg"}), IsEmpty());
 }
 
 TEST_F(DevicesTest, MarkersThatDoNotFitAreUsageErrors) {
-  EXPECT_EQ(Plumb({"markers", "--length", "1", "--out", (folder_ / "m.pdf").string()}).exit_code, 2);
+  EXPECT_EQ(Plumb({"markers", "--length", "1", "--out", (folder_ / "m.pdf").string()}).exit_code,
+            2);
   EXPECT_EQ(Plumb({"markers", "--ids", "900", "--out", (folder_ / "m.pdf").string()}).exit_code, 2);
   EXPECT_EQ(Plumb({"markers", "--out", (folder_ / "m.docx").string()}).exit_code, 2);
   EXPECT_EQ(Plumb({"markers", "--out", (folder_ / "missing" / "m.pdf").string()}).exit_code, 1);
@@ -68,7 +72,8 @@ TEST_F(DevicesTest, DoctorNamesADamagedConfiguration) {
 #ifdef PLUMB_WITH_OPENNI
 
 TEST_F(DevicesTest, WithoutASensorRecordIsADeviceError) {
-  const RunResult record = Plumb({"record", "--serial", "NOBODY", "--out", (folder_ / "r").string()});
+  const RunResult record =
+      Plumb({"record", "--serial", "NOBODY", "--out", (folder_ / "r").string()});
   EXPECT_EQ(record.exit_code, 5);
   EXPECT_THAT(record.err, HasSubstr("attached"));
   EXPECT_THAT(LeftBehind({}), IsEmpty());
@@ -76,15 +81,17 @@ TEST_F(DevicesTest, WithoutASensorRecordIsADeviceError) {
 
 TEST_F(DevicesTest, ASimulatedSuiteOfOniFilesIsReconstructedAndDescribed) {
   const fs::path suite = folder_ / "suite";
-  const RunResult simulate = Plumb({"simulate", "--suite", "demo", "--out", suite.string(), "--frames", "12", "--rate", "10", "--size",
-                                    "320x240", "--noise", "ideal", "--format", "oni"});
+  const RunResult simulate =
+      Plumb({"simulate", "--suite", "demo", "--out", suite.string(), "--frames", "12", "--rate",
+             "10", "--size", "320x240", "--noise", "ideal", "--format", "oni"});
   ASSERT_EQ(simulate.exit_code, 0) << simulate.err;
   const std::string file = (suite / "recordings" / "reference.oni").string();
   const json facts = json::parse(Plumb({"info", file, "--json"}).out);
   EXPECT_EQ(facts.at("frames"), 12);
   EXPECT_NEAR(facts.at("rate_hz").get<double>(), 10.0, 0.1);
   EXPECT_EQ(facts.at("warnings"), json::array());
-  const RunResult reconstruct = Plumb({"reconstruct", file, "--out", (folder_ / "scene").string(), "--json"});
+  const RunResult reconstruct =
+      Plumb({"reconstruct", file, "--out", (folder_ / "scene").string(), "--json"});
   ASSERT_EQ(reconstruct.exit_code, 0) << reconstruct.err;
   const json frames = json::parse(reconstruct.out).at("frames");
   EXPECT_EQ(frames.at("total"), 12);
@@ -94,8 +101,10 @@ TEST_F(DevicesTest, ASimulatedSuiteOfOniFilesIsReconstructedAndDescribed) {
 }
 
 TEST_F(DevicesTest, ADamagedOniFileIsBadInput) {
-  WriteText(folder_ / "bad.oni", "NI10 and nothing that follows makes sense, for a good number of bytes at least");
-  const RunResult reconstruct = Plumb({"reconstruct", (folder_ / "bad.oni").string(), "--out", (folder_ / "scene").string()});
+  WriteText(folder_ / "bad.oni",
+            "NI10 and nothing that follows makes sense, for a good number of bytes at least");
+  const RunResult reconstruct =
+      Plumb({"reconstruct", (folder_ / "bad.oni").string(), "--out", (folder_ / "scene").string()});
   EXPECT_EQ(reconstruct.exit_code, 3);
   EXPECT_THAT(reconstruct.err, HasSubstr("bad.oni"));
   EXPECT_THAT(LeftBehind({"bad.oni"}), IsEmpty());
@@ -103,7 +112,8 @@ TEST_F(DevicesTest, ADamagedOniFileIsBadInput) {
 
 TEST_F(DevicesTest, RecordsAVirtualSensorToAFolderAndToAnOniFile) {
   for (const char* name : {"r", "r.oni"}) {
-    const RunResult record = Plumb({"record", "--simulated", "demo", "--seconds", "0.5", "--out", (folder_ / name).string()});
+    const RunResult record = Plumb(
+        {"record", "--simulated", "demo", "--seconds", "0.5", "--out", (folder_ / name).string()});
     ASSERT_EQ(record.exit_code, 0) << record.err;
     EXPECT_THAT(record.out, HasSubstr("VIRTUAL-0001"));
     const json facts = json::parse(Plumb({"info", (folder_ / name).string(), "--json"}).out);

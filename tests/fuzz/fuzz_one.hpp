@@ -1,4 +1,5 @@
-// What every fuzz target does with one input: the reader may refuse it with DataError; anything else is a finding.
+// What every fuzz target does with one input: the reader may refuse it with DataError; anything
+// else is a finding.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +7,7 @@
 #include <span>
 #include <string_view>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb::fuzz {
 
@@ -19,6 +20,8 @@ int One(const Read& read) {
   return 0;
 }
 
-inline std::string_view Text(const std::uint8_t* data, std::size_t size) { return {reinterpret_cast<const char*>(data), size}; }
+inline std::string_view Text(const std::uint8_t* data, std::size_t size) {
+  return {reinterpret_cast<const char*>(data), size};
+}
 
 }  // namespace plumb::fuzz

@@ -6,7 +6,8 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   return plumb::fuzz::One([&] {
-    const std::vector<plumb::IndexEntry> entries = plumb::ParseIndex(plumb::fuzz::Text(data, size), "fuzz");
+    const std::vector<plumb::IndexEntry> entries =
+        plumb::ParseIndex(plumb::fuzz::Text(data, size), "fuzz");
     constexpr double kGap_s = 0.02;
     if (plumb::AssociateByTime(entries, entries, kGap_s).size() != entries.size()) std::abort();
   });

@@ -1,5 +1,5 @@
 // Any bytes as a colour image (JPEG by the seeds).
-#include "drivers/replay/image_file.hpp"
+#include "drivers/files/image_file.hpp"
 
 #include "tests/fuzz/fuzz_one.hpp"
 

@@ -1,15 +1,17 @@
-// Any bytes as a PNG, read as colour and as depth. Check sums are set right first: a mutation would hardly ever pass them.
+// Any bytes as a PNG, read as colour and as depth. Check sums are set right first: a mutation would
+// hardly ever pass them.
 #include <zlib.h>
 
 #include <vector>
 
-#include "drivers/replay/image_file.hpp"
+#include "drivers/files/image_file.hpp"
 #include "tests/fuzz/fuzz_one.hpp"
 
 namespace {
 
 std::uint32_t BigEndian(const std::uint8_t* at) {
-  return std::uint32_t{at[0]} << 24 | std::uint32_t{at[1]} << 16 | std::uint32_t{at[2]} << 8 | std::uint32_t{at[3]};
+  return std::uint32_t{at[0]} << 24 | std::uint32_t{at[1]} << 16 | std::uint32_t{at[2]} << 8 |
+         std::uint32_t{at[3]};
 }
 
 void SetCheckSums(std::vector<std::uint8_t>& png) {
@@ -18,8 +20,10 @@ void SetCheckSums(std::vector<std::uint8_t>& png) {
   while (at + 12 <= png.size()) {
     const std::size_t length = BigEndian(png.data() + at);
     if (length > png.size() - at - 12) return;
-    const auto sum = static_cast<std::uint32_t>(crc32(0, png.data() + at + 4, static_cast<uInt>(length + 4)));
-    for (std::size_t i = 0; i < 4; ++i) png[at + 8 + length + i] = static_cast<std::uint8_t>(sum >> (24 - 8 * i));
+    const auto sum =
+        static_cast<std::uint32_t>(crc32(0, png.data() + at + 4, static_cast<uInt>(length + 4)));
+    for (std::size_t i = 0; i < 4; ++i)
+      png[at + 8 + length + i] = static_cast<std::uint8_t>(sum >> (24 - 8 * i));
     at += length + 12;
   }
 }

@@ -1,12 +1,13 @@
-// Writes small good inputs for each fuzz target: plumb_fuzz_seeds FOLDER makes FOLDER/png, FOLDER/jpeg and so on.
+// Writes small good inputs for each fuzz target: plumb_fuzz_seeds FOLDER makes FOLDER/png,
+// FOLDER/jpeg and so on.
 #include <filesystem>
 #include <opencv2/core.hpp>
 
 #include "daemon/files/ply_file.hpp"
 #include "daemon/files/scene_json.hpp"
 #include "daemon/files/trajectory_file.hpp"
-#include "drivers/replay/file_io.hpp"
-#include "drivers/replay/image_file.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
 #include "drivers/replay/tum_writer.hpp"
 
 namespace plumb {
@@ -36,17 +37,21 @@ void WriteImages(const fs::path& root) {
 
 void WriteOni(const fs::path& root) {
   std::string file = "NI10" + std::string(20, '\0');
-  const auto add = [&](std::uint32_t kind, std::uint32_t node, const std::vector<std::uint32_t>& fields) {
+  const auto add = [&](std::uint32_t kind, std::uint32_t node,
+                       const std::vector<std::uint32_t>& fields) {
     const auto size = static_cast<std::uint32_t>(28 + 4 * fields.size());
-    for (const std::uint32_t number : {0x0052494eU, kind, node, size, 0U, 0U, 0U}) file.append(reinterpret_cast<const char*>(&number), 4);
-    for (const std::uint32_t number : fields) file.append(reinterpret_cast<const char*>(&number), 4);
+    for (const std::uint32_t number : {0x0052494eU, kind, node, size, 0U, 0U, 0U})
+      file.append(reinterpret_cast<const char*>(&number), 4);
+    for (const std::uint32_t number : fields)
+      file.append(reinterpret_cast<const char*>(&number), 4);
   };
   add(13, 1, {4, 0x67616d49, 3});
   add(13, 2, {4, 0x74706544, 2});
   for (const std::uint32_t node : {1U, 2U}) add(10, node, {33333, 0, 1});
   add(11, 0, {});
   WriteWholeFile(Folder(root / "oni") / "small", file);
-  WriteWholeFile(root / "oni/beside", std::string_view("a: 1\ncolor_begin_us: 17\ndepth_begin_us: 18\n"));
+  WriteWholeFile(root / "oni/beside",
+                 std::string_view("a: 1\ncolor_begin_us: 17\ndepth_begin_us: 18\n"));
 }
 
 void WriteTexts(const fs::path& root) {
@@ -55,12 +60,15 @@ void WriteTexts(const fs::path& root) {
   const std::string camera = CameraFileText(info, 5000);
   WriteWholeFile(Folder(root / "camera") / "registered", camera);
   std::string depth_camera = camera;
-  depth_camera.replace(depth_camera.find("depth_registered: 1"), 19,
-                       "depth_registered: 0\ndepth_camera_matrix: [ 570., 0., 320., 0., 570., 240., 0., 0., 1. ]\n"
-                       "depth_distortion_coefficients: [ 0.1, 0., 0., 0., 0. ]\n"
-                       "T_color_depth: [ 1., 0., 0., 0.02, 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1. ]");
+  depth_camera.replace(
+      depth_camera.find("depth_registered: 1"), 19,
+      "depth_registered: 0\ndepth_camera_matrix: [ 570., 0., 320., 0., 570., 240., 0., 0., 1. ]\n"
+      "depth_distortion_coefficients: [ 0.1, 0., 0., 0., 0. ]\n"
+      "T_color_depth: [ 1., 0., 0., 0.02, 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1. ]");
   WriteWholeFile(root / "camera/unregistered", depth_camera);
-  WriteWholeFile(Folder(root / "index") / "rgb", std::string_view("# c\n1.0 rgb/1.png\n1.033 rgb/2.png\r\n1305031102.175304 a b.png\n"));
+  WriteWholeFile(
+      Folder(root / "index") / "rgb",
+      std::string_view("# c\n1.0 rgb/1.png\n1.033 rgb/2.png\r\n1305031102.175304 a b.png\n"));
 
   Scene scene;
   scene.frame = SceneFrame::kReferenceMarker;

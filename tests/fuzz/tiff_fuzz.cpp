@@ -1,5 +1,5 @@
 // Any bytes as a float TIFF.
-#include "drivers/replay/image_file.hpp"
+#include "drivers/files/image_file.hpp"
 
 #include "tests/fuzz/fuzz_one.hpp"
 

@@ -4,5 +4,6 @@
 #include "tests/fuzz/fuzz_one.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  return plumb::fuzz::One([&] { (void)plumb::ParseTrajectory(plumb::fuzz::Text(data, size), "fuzz"); });
+  return plumb::fuzz::One(
+      [&] { (void)plumb::ParseTrajectory(plumb::fuzz::Text(data, size), "fuzz"); });
 }

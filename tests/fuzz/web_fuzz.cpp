@@ -1,10 +1,11 @@
-// What browsers send: bodies, headers, paths. The first byte chooses the reader; each either takes the text or refuses it.
+// What browsers send: bodies, headers, paths. The first byte chooses the reader; each either takes
+// the text or refuses it.
 #include <cstdlib>
 
 #include "tests/fuzz/fuzz_one.hpp"
+#include "web/api/json.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/router.hpp"
-#include "web/json.hpp"
 
 namespace {
 
@@ -16,17 +17,21 @@ void CheckForm(std::string_view text) {
 
 void CheckText(std::string_view text) {
   // What passes as plain text must pass through JSON without being replaced.
-  if (IsPlainText(text, true) && nlohmann::json::parse(nlohmann::json(std::string(text)).dump()) != std::string(text)) std::abort();
+  if (IsPlainText(text, true) &&
+      nlohmann::json::parse(nlohmann::json(std::string(text)).dump()) != std::string(text))
+    std::abort();
   if (EscapeHtml(text).find('<') != std::string::npos) std::abort();
 }
 
 void CheckNames(std::string_view text) {
-  if (IsName(text) && (text.find('/') != std::string_view::npos || text.starts_with('.'))) std::abort();
+  if (IsName(text) && (text.find('/') != std::string_view::npos || text.starts_with('.')))
+    std::abort();
   (void)CookieValue(text, "plumb_session");
   (void)AcceptsGzip(text);
   (void)IsSameOrigin(text, "localhost:80", false);
   const std::vector<std::string> names = {"plumb.example"};
-  if (IsKnownHost(text, names) && text.find_first_of("/@?#\\") != std::string_view::npos) std::abort();
+  if (IsKnownHost(text, names) && text.find_first_of("/@?#\\") != std::string_view::npos)
+    std::abort();
 }
 
 void CheckRoutes(std::string_view text) {

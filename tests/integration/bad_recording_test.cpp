@@ -1,11 +1,12 @@
-// Damaged and contradictory recordings: exit 3, a message that names the trouble, nothing left behind.
+// Damaged and contradictory recordings: exit 3, a message that names the trouble, nothing left
+// behind.
 #include <functional>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <opencv2/core.hpp>
 
-#include "drivers/replay/image_file.hpp"
+#include "drivers/files/image_file.hpp"
 #include "tests/integration/command_line.hpp"
 
 namespace plumb {
@@ -52,29 +53,53 @@ struct Damage {
 [[maybe_unused]] void PrintTo(const Damage& damage, std::ostream* out) { *out << damage.name; }
 
 std::vector<Damage> Damages() {
-  const auto change_line = [](const char* index, std::size_t line, const std::function<void(std::string&)>& change) {
+  const auto change_line = [](const char* index, std::size_t line,
+                              const std::function<void(std::string&)>& change) {
     return [=](const fs::path& recording) {
       auto lines = Lines(recording / index);
       change(lines.at(line));
       WriteLines(recording / index, lines);
     };
   };
-  const auto stamp = [](const std::string& value) { return [value](std::string& line) { line = value + line.substr(line.find(' ')); }; };
+  const auto stamp = [](const std::string& value) {
+    return [value](std::string& line) { line = value + line.substr(line.find(' ')); };
+  };
   return {
       {"NoIndex", [](const fs::path& r) { fs::remove(r / "rgb.txt"); }, "rgb.txt"},
-      {"EmptyIndex", [](const fs::path& r) { WriteText(r / "depth.txt", "# nothing\n"); }, "depth.txt"},
+      {"EmptyIndex", [](const fs::path& r) { WriteText(r / "depth.txt", "# nothing\n"); },
+       "depth.txt"},
       {"MissingImage", [](const fs::path& r) { fs::remove(ImageOf(r, "rgb.txt", 7)); }, "rgb/"},
-      {"TruncatedColour", [](const fs::path& r) { fs::resize_file(ImageOf(r, "rgb.txt", 7), fs::file_size(ImageOf(r, "rgb.txt", 7)) / 2); },
+      {"TruncatedColour",
+       [](const fs::path& r) {
+         fs::resize_file(ImageOf(r, "rgb.txt", 7), fs::file_size(ImageOf(r, "rgb.txt", 7)) / 2);
+       },
        "rgb/"},
       {"TruncatedDepth",
-       [](const fs::path& r) { fs::resize_file(ImageOf(r, "depth.txt", 7), fs::file_size(ImageOf(r, "depth.txt", 7)) / 2); }, "depth/"},
-      {"EmptyImage", [](const fs::path& r) { WriteText(ImageOf(r, "depth.txt", 7), ""); }, "depth/"},
-      {"WrongSizeColour", [](const fs::path& r) { WritePng(ImageOf(r, "rgb.txt", 7), cv::Mat(100, 100, CV_8UC3, cv::Scalar::all(90))); },
+       [](const fs::path& r) {
+         fs::resize_file(ImageOf(r, "depth.txt", 7), fs::file_size(ImageOf(r, "depth.txt", 7)) / 2);
+       },
+       "depth/"},
+      {"EmptyImage", [](const fs::path& r) { WriteText(ImageOf(r, "depth.txt", 7), ""); },
+       "depth/"},
+      {"WrongSizeColour",
+       [](const fs::path& r) {
+         WritePng(ImageOf(r, "rgb.txt", 7), cv::Mat(100, 100, CV_8UC3, cv::Scalar::all(90)));
+       },
        "100"},
-      {"WrongSizeDepth", [](const fs::path& r) { WritePng(ImageOf(r, "depth.txt", 7), cv::Mat(100, 100, CV_16UC1, cv::Scalar(5000))); },
+      {"WrongSizeDepth",
+       [](const fs::path& r) {
+         WritePng(ImageOf(r, "depth.txt", 7), cv::Mat(100, 100, CV_16UC1, cv::Scalar(5000)));
+       },
        "100"},
-      {"EightBitDepth", [](const fs::path& r) { WritePng(ImageOf(r, "depth.txt", 7), cv::Mat(240, 320, CV_8UC1, cv::Scalar(9))); }, "16"},
-      {"ColourAsDepth", [](const fs::path& r) { WritePng(ImageOf(r, "depth.txt", 7), cv::Mat(240, 320, CV_8UC3, cv::Scalar::all(9))); },
+      {"EightBitDepth",
+       [](const fs::path& r) {
+         WritePng(ImageOf(r, "depth.txt", 7), cv::Mat(240, 320, CV_8UC1, cv::Scalar(9)));
+       },
+       "16"},
+      {"ColourAsDepth",
+       [](const fs::path& r) {
+         WritePng(ImageOf(r, "depth.txt", 7), cv::Mat(240, 320, CV_8UC3, cv::Scalar::all(9)));
+       },
        "16"},
       {"NanStamp", change_line("depth.txt", 5, stamp("nan")), "depth.txt"},
       {"GarbageStamp", change_line("rgb.txt", 5, stamp("12:30")), "rgb.txt"},
@@ -92,11 +117,18 @@ std::vector<Damage> Damages() {
          WriteLines(r / "rgb.txt", lines);
        },
        "rgb.txt"},
-      {"PathOutside", change_line("rgb.txt", 5, [](std::string& line) { line = line.substr(0, line.find(' ')) + " ../../etc/passwd"; }),
+      {"PathOutside",
+       change_line(
+           "rgb.txt", 5,
+           [](std::string& line) { line = line.substr(0, line.find(' ')) + " ../../etc/passwd"; }),
        ".."},
-      {"AbsolutePath", change_line("rgb.txt", 5, [](std::string& line) { line = line.substr(0, line.find(' ')) + " /etc/passwd"; }),
+      {"AbsolutePath",
+       change_line(
+           "rgb.txt", 5,
+           [](std::string& line) { line = line.substr(0, line.find(' ')) + " /etc/passwd"; }),
        "/etc/passwd"},
-      {"OtherSizeInCalibration", [](const fs::path& r) { Replace(r / "camera.yaml", "image_width:", "640"); }, "image size"},
+      {"OtherSizeInCalibration",
+       [](const fs::path& r) { Replace(r / "camera.yaml", "image_width:", "640"); }, "image size"},
       {"ZeroFocalLength",
        [](const fs::path& r) {
          std::string text = ReadText(r / "camera.yaml");
@@ -105,10 +137,18 @@ std::vector<Damage> Damages() {
          WriteText(r / "camera.yaml", text);
        },
        "camera_matrix"},
-      {"UnknownDictionary", [](const fs::path& r) { Replace(r / "camera.yaml", "marker_dictionary:", "DICT_9X9_7"); }, "DICT_9X9_7"},
-      {"ZeroMarkerLength", [](const fs::path& r) { Replace(r / "camera.yaml", "marker_length:", "0."); }, "marker_length"},
-      {"NegativeMarkerLength", [](const fs::path& r) { Replace(r / "camera.yaml", "marker_length:", "-0.104"); }, "marker_length"},
-      {"BrokenCalibration", [](const fs::path& r) { WriteText(r / "camera.yaml", "%YAML:1.0\n---\nimage_width: ["); }, "camera.yaml"},
+      {"UnknownDictionary",
+       [](const fs::path& r) { Replace(r / "camera.yaml", "marker_dictionary:", "DICT_9X9_7"); },
+       "DICT_9X9_7"},
+      {"ZeroMarkerLength",
+       [](const fs::path& r) { Replace(r / "camera.yaml", "marker_length:", "0."); },
+       "marker_length"},
+      {"NegativeMarkerLength",
+       [](const fs::path& r) { Replace(r / "camera.yaml", "marker_length:", "-0.104"); },
+       "marker_length"},
+      {"BrokenCalibration",
+       [](const fs::path& r) { WriteText(r / "camera.yaml", "%YAML:1.0\n---\nimage_width: ["); },
+       "camera.yaml"},
       {"AllDepthZero",
        [](const fs::path& r) {
          for (std::size_t i = 0; i < Lines(r / "depth.txt").size(); ++i)
@@ -117,7 +157,8 @@ std::vector<Damage> Damages() {
        "depth"},
       {"SingleFrame",
        [](const fs::path& r) {
-         for (const char* index : {"rgb.txt", "depth.txt"}) WriteLines(r / index, {Lines(r / index).front()});
+         for (const char* index : {"rgb.txt", "depth.txt"})
+           WriteLines(r / index, {Lines(r / index).front()});
        },
        "frame"},
   };

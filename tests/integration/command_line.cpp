@@ -20,7 +20,8 @@ class DataLock {
  public:
   DataLock() {
     fs::create_directories(PLUMB_INTEGRATION_DATA);
-    fd_ = open((fs::path(PLUMB_INTEGRATION_DATA) / "lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
+    fd_ = open((fs::path(PLUMB_INTEGRATION_DATA) / "lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC,
+               0644);
     flock(fd_, LOCK_EX);
   }
   ~DataLock() { close(fd_); }
@@ -35,7 +36,8 @@ void MakeOnce(const fs::path& target, const std::vector<std::string>& arguments)
   const DataLock lock;
   if (fs::exists(target)) return;
   const RunResult result = Plumb(arguments);
-  if (result.exit_code != 0) throw std::runtime_error("cannot make " + target.string() + ": " + result.err);
+  if (result.exit_code != 0)
+    throw std::runtime_error("cannot make " + target.string() + ": " + result.err);
 }
 
 }  // namespace
@@ -53,14 +55,17 @@ const fs::path& SmallSuite() {
   static const fs::path suite = [] {
     const fs::path target = fs::path(PLUMB_INTEGRATION_DATA) / "suite";
     // 3 Hz over 10 s: as slow as a real sweep, with a tenth of its frames.
-    MakeOnce(target, {"simulate", "--suite", "demo", "--frames", "30", "--rate", "3", "--size", "320x240", "--seed", "5", "--out", target});
+    MakeOnce(target, {"simulate", "--suite", "demo", "--frames", "30", "--rate", "3", "--size",
+                      "320x240", "--seed", "5", "--out", target});
     return target;
   }();
   return suite;
 }
 
 const std::vector<std::string>& SmallNames() {
-  static const auto names = nlohmann::json::parse(ReadText(SmallSuite() / "suite.json")).at("scenes").get<std::vector<std::string>>();
+  static const auto names = nlohmann::json::parse(ReadText(SmallSuite() / "suite.json"))
+                                .at("scenes")
+                                .get<std::vector<std::string>>();
   return names;
 }
 
@@ -84,7 +89,9 @@ std::string ReadText(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-void WriteText(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary | std::ios::trunc) << text; }
+void WriteText(const fs::path& file, const std::string& text) {
+  std::ofstream(file, std::ios::binary | std::ios::trunc) << text;
+}
 
 void CommandLineTest::SetUp() {
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
@@ -100,7 +107,8 @@ void CommandLineTest::TearDown() { fs::remove_all(folder_); }
 fs::path CommandLineTest::Copy(const fs::path& folder, const std::string& name) {
   const fs::path copy = folder_ / name;
   fs::copy(folder, copy, fs::copy_options::recursive);
-  for (const auto& entry : fs::recursive_directory_iterator(copy)) fs::permissions(entry, fs::perms::owner_write, fs::perm_options::add);
+  for (const auto& entry : fs::recursive_directory_iterator(copy))
+    fs::permissions(entry, fs::perms::owner_write, fs::perm_options::add);
   return copy;
 }
 

@@ -14,10 +14,12 @@ namespace plumb {
 namespace fs = std::filesystem;
 
 /// Runs `plumb ARGUMENTS`.
-[[nodiscard]] RunResult Plumb(std::vector<std::string> arguments, const ProcessOptions& options = {});
+[[nodiscard]] RunResult Plumb(std::vector<std::string> arguments,
+                              const ProcessOptions& options = {});
 [[nodiscard]] std::vector<std::string> PlumbCommand(std::vector<std::string> arguments);
 
-/// A small demo suite (30 frames of 320 x 240 a scene), simulated by the binary itself the first time a test asks.
+/// A small demo suite (30 frames of 320 x 240 a scene), simulated by the binary itself the first
+/// time a test asks.
 [[nodiscard]] const fs::path& SmallSuite();
 /// One of its recordings, "reference" or "current", and the scene reconstructed from it.
 [[nodiscard]] fs::path SmallRecording(const std::string& name);
@@ -39,7 +41,8 @@ class CommandLineTest : public testing::Test {
   void TearDown() override;
   /// A writable copy of a recording or scene.
   fs::path Copy(const fs::path& folder, const std::string& name);
-  /// Everything in the test's folder but the named entries, hidden ones too: what a failed command left behind.
+  /// Everything in the test's folder but the named entries, hidden ones too: what a failed command
+  /// left behind.
   [[nodiscard]] std::vector<std::string> LeftBehind(const std::vector<std::string>& known) const;
 
   fs::path folder_;

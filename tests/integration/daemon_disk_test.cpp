@@ -1,4 +1,5 @@
-// Disks that become or are read-only under a real plumbd. Mounts of its own need root; without, these tests are skipped.
+// Disks that become or are read-only under a real plumbd. Mounts of its own need root; without,
+// these tests are skipped.
 #include <algorithm>
 #include <csignal>
 #include <cstdlib>
@@ -12,7 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "daemon/store/store.hpp"
+#include "daemon/records/store.hpp"
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
@@ -33,7 +34,8 @@ class DaemonDiskTest : public ::testing::Test {
   static void SetUpTestSuite() { testing::RenderOnce(); }
 
   void SetUp() override {
-    if (::geteuid() != 0 || ::unshare(CLONE_NEWNS) != 0 || ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
+    if (::geteuid() != 0 || ::unshare(CLONE_NEWNS) != 0 ||
+        ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
       GTEST_SKIP() << "mounts of its own are not permitted here (root and CAP_SYS_ADMIN)";
     fs::create_directories(state());
   }
@@ -50,7 +52,10 @@ class DaemonDiskTest : public ::testing::Test {
     mounted_ = true;
   }
   void SetReadOnly(bool read_only) const {
-    ASSERT_EQ(::mount("none", state().c_str(), nullptr, MS_REMOUNT | (read_only ? MS_RDONLY : 0), "size=200m"), 0) << std::strerror(errno);
+    ASSERT_EQ(::mount("none", state().c_str(), nullptr, MS_REMOUNT | (read_only ? MS_RDONLY : 0),
+                      "size=200m"),
+              0)
+        << std::strerror(errno);
   }
 
   /// A file system that refuses every write once it has met an error, as ext4 does on a dying disk.
@@ -59,12 +64,15 @@ class DaemonDiskTest : public ::testing::Test {
     if (!fs::exists(image)) {
       std::ofstream(image) << "";
       fs::resize_file(image, 200 << 20);
-      if (plumb::Run({"/sbin/mke2fs", "-q", "-F", "-t", "ext4", image}).exit_code != 0) return false;
+      if (plumb::Run({"/sbin/mke2fs", "-q", "-F", "-t", "ext4", image}).exit_code != 0)
+        return false;
     }
-    mounted_ = plumb::Run({"/bin/mount", "-o", "loop,errors=remount-ro", image, state()}).exit_code == 0;
+    mounted_ =
+        plumb::Run({"/bin/mount", "-o", "loop,errors=remount-ro", image, state()}).exit_code == 0;
     if (!mounted_) return false;
     const std::string device = plumb::Run({"/bin/findmnt", "-n", "-o", "SOURCE", state()}).out;
-    trigger_ = fs::path("/sys/fs/ext4") / fs::path(device.substr(0, device.find('\n'))).filename() / "trigger_fs_error";
+    trigger_ = fs::path("/sys/fs/ext4") / fs::path(device.substr(0, device.find('\n'))).filename() /
+               "trigger_fs_error";
     return fs::exists(trigger_);
   }
   void Unmount() {
@@ -77,7 +85,12 @@ class DaemonDiskTest : public ::testing::Test {
   static void Fill(Plumbd& plumbd) {
     plumbd.WaitForState("ready");
     HttpClient client(plumbd.port());
-    ASSERT_EQ(client.Post("/api/v1/setup", {{"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}}).status, 200);
+    ASSERT_EQ(
+        client
+            .Post("/api/v1/setup",
+                  {{"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}})
+            .status,
+        200);
     plumbd.ScanOnce();
   }
 
@@ -94,12 +107,14 @@ class DaemonDiskTest : public ::testing::Test {
     const json patients = client.Get("/api/v1/patients").json()["patients"];
     ASSERT_EQ(patients.size(), 1U) << patients.dump();
     const std::string id = patients[0]["id"].get<std::string>();
-    const json references = client.Get("/api/v1/patients/" + id + "/references").json()["references"];
+    const json references =
+        client.Get("/api/v1/patients/" + id + "/references").json()["references"];
     ASSERT_EQ(references.size(), 1U) << references.dump();
     EXPECT_EQ(references[0]["approved_by"], "auto");
     EXPECT_EQ(client.Get("/api/v1/scans/000001").status, 200);
     EXPECT_EQ(client.Get("/api/v1/scans/000001/files/mesh.ply").status, 200);
-    const HttpAnswer refused_patient = client.Post("/api/v1/patients/" + id + "/open", {{"purpose", "fraction"}, {"reason", ""}});
+    const HttpAnswer refused_patient =
+        client.Post("/api/v1/patients/" + id + "/open", {{"purpose", "fraction"}, {"reason", ""}});
     EXPECT_NE(refused_patient.status, 500);
   }
 
@@ -122,7 +137,8 @@ TEST_F(DaemonDiskTest, StartedOnAReadOnlyDiskItSaysSoAndReferencesCanBeRead) {
   {
     Plumbd plumbd(folder_.path());
     ASSERT_TRUE(plumbd.WaitUntilUp());
-    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(), HasSubstr(state().string() + ": Read-only file system"));
+    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(),
+                HasSubstr(state().string() + ": Read-only file system"));
     ExpectReadable(plumbd);
     EXPECT_EQ(plumbd.Stop(), 0);
   }
@@ -130,7 +146,8 @@ TEST_F(DaemonDiskTest, StartedOnAReadOnlyDiskItSaysSoAndReferencesCanBeRead) {
   Plumbd plumbd(folder_.path());
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
-  EXPECT_TRUE(plumbd.ScanOnce()["last_result"]["verdict"].is_string()) << "compared with the reference";
+  EXPECT_TRUE(plumbd.ScanOnce()["last_result"]["verdict"].is_string())
+      << "compared with the reference";
   EXPECT_EQ(plumbd.Stop(), 0);
 }
 
@@ -161,7 +178,8 @@ TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyWhileNobodyScansIsToldBeforeTheNe
     plumbd.Press(/*is_long=*/true);
     plumbd.WaitForState("ready");
     BreakDisk();
-    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(), HasSubstr("Read-only file system"));
+    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(),
+                HasSubstr("Read-only file system"));
     EXPECT_THAT(plumbd.log(), HasSubstr("safe mode"));
     ExpectReadable(plumbd);
     EXPECT_EQ(plumbd.Stop(), 0);
@@ -175,7 +193,8 @@ TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyWhileNobodyScansIsToldBeforeTheNe
   EXPECT_EQ(plumbd.Stop(), 0);
 }
 
-TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyDuringAScanFailsItWithTheReasonAndKeepsTheReference) {
+TEST_F(DaemonDiskTest,
+       ADiskThatBecomesReadOnlyDuringAScanFailsItWithTheReasonAndKeepsTheReference) {
   if (!MountImage()) GTEST_SKIP() << "no loop device with ext4 here";
   {
     Plumbd plumbd(folder_.path());
@@ -186,7 +205,8 @@ TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyDuringAScanFailsItWithTheReasonAn
     BreakDisk();
     plumbd.WaitForFrames(90);
     ASSERT_EQ(plumbd.Press()["ok"], true);
-    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(), HasSubstr("ead-only file system"));
+    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(),
+                HasSubstr("ead-only file system"));
     plumbd.WaitForLog("safe mode");
     ExpectReadable(plumbd);
     EXPECT_EQ(plumbd.Stop(), 0);
@@ -202,13 +222,15 @@ TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyDuringAScanFailsItWithTheReasonAn
   EXPECT_TRUE(store.ApprovedReference(scans[0].patient_id).has_value());
 }
 
-/// A kill keeps what the kernel has not written yet; a power cut does not. So the order is checked in which things reach the disk.
+/// A kill keeps what the kernel has not written yet; a power cut does not. So the order is checked
+/// in which things reach the disk.
 TEST(DaemonPowerCutTest, AScanIsCalledDoneOnlyAfterAllOfItIsOnTheDisk) {
   testing::RenderOnce();
   const testing::TempFolder folder;
   std::ofstream(folder / "plumb.toml") << "[appliance]\nkeep_recordings = true\n";
   Plumbd plumbd(folder.path(), {.arguments = {"--config", folder / "plumb.toml"},
-                                .environment = {{"LD_PRELOAD", PLUMB_SYNC_LOG}, {"PLUMB_SYNC_LOG", folder / "synced"}},
+                                .environment = {{"LD_PRELOAD", PLUMB_SYNC_LOG},
+                                                {"PLUMB_SYNC_LOG", folder / "synced"}},
                                 .scenes = 2});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
@@ -232,20 +254,27 @@ TEST(DaemonPowerCutTest, AScanIsCalledDoneOnlyAfterAllOfItIsOnTheDisk) {
   const fs::path scans = plumbd.state() / "scans";
   std::ptrdiff_t from = 0;
   for (const std::string id : {"000001", "000002"}) {
-    const std::ptrdiff_t renamed = find(fmt::format("rename {} {}", (scans / (".staging-" + id)).string(), (scans / id).string()), 0);
+    const std::ptrdiff_t renamed = find(
+        fmt::format("rename {} {}", (scans / (".staging-" + id)).string(), (scans / id).string()),
+        0);
     ASSERT_LT(renamed, end) << id;
     int num_files = 0;
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(scans / id)) {
       if (entry.path().string().find("/recording") != std::string::npos) continue;
-      EXPECT_LT(find(line_of(entry.path()), 0), renamed) << entry.path() << " was not on the disk as it is, or later";
+      EXPECT_LT(find(line_of(entry.path()), 0), renamed)
+          << entry.path() << " was not on the disk as it is, or later";
       num_files += entry.is_regular_file() ? 1 : 0;
     }
     EXPECT_GT(num_files, 3);
     EXPECT_LT(find(line_of(scans / id), 0), renamed) << "the names in it";
     EXPECT_LT(find("syncfs", from), renamed) << "the recording";
-    const auto is_of_scans = [&](const std::string& line) { return line.starts_with(line_of(scans).substr(0, line_of(scans).rfind(' '))); };
-    const auto folder_synced = std::find_if(log.begin() + renamed, log.end(), is_of_scans) - log.begin();
-    const std::ptrdiff_t row = find("fdatasync " + (plumbd.state() / "plumb.db-wal").string(), folder_synced);
+    const auto is_of_scans = [&](const std::string& line) {
+      return line.starts_with(line_of(scans).substr(0, line_of(scans).rfind(' ')));
+    };
+    const auto folder_synced =
+        std::find_if(log.begin() + renamed, log.end(), is_of_scans) - log.begin();
+    const std::ptrdiff_t row =
+        find("fdatasync " + (plumbd.state() / "plumb.db-wal").string(), folder_synced);
     EXPECT_LT(row, end) << "done, in the database, after that";
     from = renamed;
   }

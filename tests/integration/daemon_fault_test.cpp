@@ -1,4 +1,5 @@
-// What goes wrong around a real plumbd: sensors that go and stall, signals, power cuts, full and broken disks.
+// What goes wrong around a real plumbd: sensors that go and stall, signals, power cuts, full and
+// broken disks.
 #include <chrono>
 #include <csignal>
 #include <fstream>
@@ -11,7 +12,7 @@
 #include <unistd.h>
 
 #include "daemon/control/unix_socket.hpp"
-#include "daemon/store/store.hpp"
+#include "daemon/records/store.hpp"
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/sanitized.hpp"
@@ -32,7 +33,8 @@ class DaemonFaultTest : public ::testing::Test {
   /// Folders of scans, hidden ones too.
   [[nodiscard]] static std::vector<std::string> ScanFolders(const fs::path& state) {
     std::vector<std::string> names;
-    for (const auto& entry : fs::directory_iterator(state / "scans")) names.push_back(entry.path().filename());
+    for (const auto& entry : fs::directory_iterator(state / "scans"))
+      names.push_back(entry.path().filename());
     std::sort(names.begin(), names.end());
     return names;
   }
@@ -51,7 +53,9 @@ TEST_F(DaemonFaultTest, StartsWithoutASensorAndIsReadyOnceItIsPlugged) {
   const auto plugged = std::chrono::steady_clock::now();
   plumbd.Sim("plug");
   EXPECT_EQ(plumbd.WaitForState("ready")["sensor"]["serial"], "VIRTUAL-0001");
-  std::printf("plug to ready: %.0f ms\n", std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - plugged).count());
+  std::printf("plug to ready: %.0f ms\n",
+              std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - plugged)
+                  .count());
 }
 
 TEST_F(DaemonFaultTest, UnpluggedWhileIdleAndBackAgain) {
@@ -78,7 +82,8 @@ TEST_F(DaemonFaultTest, UnpluggedWhileScanningThePartialScanIsDiscarded) {
   plumbd.Sim("plug");
   plumbd.WaitForState("ready");
   plumbd.ScanOnce();
-  EXPECT_EQ(ScanFolders(plumbd.state()), std::vector<std::string>{"000002"}) << "the number of the lost scan is not used again";
+  EXPECT_EQ(ScanFolders(plumbd.state()), std::vector<std::string>{"000002"})
+      << "the number of the lost scan is not used again";
 }
 
 TEST_F(DaemonFaultTest, FramesThatStopAreAFaultWithAReasonUntilTheyComeAgain) {
@@ -138,10 +143,12 @@ TEST_F(DaemonFaultTest, ACancelledScanIsGoneSoonAndLeavesNothing) {
     ASSERT_EQ(plumbd.Press()["ok"], true);
     plumbd.WaitForFrames(frames);
     ASSERT_EQ(plumbd.Press(/*is_long=*/true)["ok"], true);
-    slowest_ms = std::max(slowest_ms, plumbd.WaitForState("ready")["scan"]["cancel_ms"].get<double>());
+    slowest_ms =
+        std::max(slowest_ms, plumbd.WaitForState("ready")["scan"]["cancel_ms"].get<double>());
   }
   std::printf("slowest cancellation: %.0f ms\n", slowest_ms);
-  testing::ExpectBelow("slowest cancellation in ms, 200 on a machine that does nothing else", slowest_ms, 2000);
+  testing::ExpectBelow("slowest cancellation in ms, 200 on a machine that does nothing else",
+                       slowest_ms, 2000);
   EXPECT_TRUE(ScanFolders(plumbd.state()).empty());
 }
 
@@ -163,14 +170,20 @@ TEST_F(DaemonFaultTest, AScanCancelledAtAnyMomentOfWorkingIsGoneSoonAndLeavesNot
     first_frames_ms.push_back(plumbd.WaitForFrames(100)["scan"]["first_frame_ms"].get<double>());
     ASSERT_EQ(plumbd.Press()["ok"], true);
     const auto begin = std::chrono::steady_clock::now();
-    const auto worked_s = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(); };
+    const auto worked_s = [&] {
+      return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    };
     // The first one is let through, to know how long it takes.
-    const double until_s = round == 0 ? 1e9 : work_s * std::uniform_real_distribution<>(0, 0.9)(random);
+    const double until_s =
+        round == 0 ? 1e9 : work_s * std::uniform_real_distribution<>(0, 0.9)(random);
     while (working() && worked_s() < until_s) std::this_thread::yield();
     if (round == 0) work_s = worked_s();
     ASSERT_EQ(plumbd.Press(/*is_long=*/true)["ok"], true);
-    const json status = plumbd.WaitFor("an end", [](const json& s) { return s["state"] == "ready" || s["state"] == "result"; });
-    if (status["scan"]["id"] == status["last_result"]["scan"]) {  // it was done before the press came, or stored already: then that is said
+    const json status = plumbd.WaitFor(
+        "an end", [](const json& s) { return s["state"] == "ready" || s["state"] == "result"; });
+    if (status["scan"]["id"] ==
+        status["last_result"]["scan"]) {  // it was done before the press came, or stored already:
+                                          // then that is said
       ++num_done;
       if (status["state"] == "ready") continue;
       plumbd.WaitForLog("its result stands");
@@ -183,10 +196,13 @@ TEST_F(DaemonFaultTest, AScanCancelledAtAnyMomentOfWorkingIsGoneSoonAndLeavesNot
   }
   ASSERT_FALSE(cancels_ms.empty());
   std::sort(cancels_ms.begin(), cancels_ms.end());
-  std::printf("%zu of %d cancelled while working: median %.0f ms, slowest %.0f ms; first frame used %.0f ms after the press at most\n",
-              cancels_ms.size(), rounds, cancels_ms[cancels_ms.size() / 2], cancels_ms.back(),
-              *std::max_element(first_frames_ms.begin(), first_frames_ms.end()));
-  testing::ExpectBelow("slowest cancellation in ms, 200 on a machine that does nothing else", cancels_ms.back(), 2000);
+  std::printf(
+      "%zu of %d cancelled while working: median %.0f ms, slowest %.0f ms; first frame used %.0f "
+      "ms after the press at most\n",
+      cancels_ms.size(), rounds, cancels_ms[cancels_ms.size() / 2], cancels_ms.back(),
+      *std::max_element(first_frames_ms.begin(), first_frames_ms.end()));
+  testing::ExpectBelow("slowest cancellation in ms, 200 on a machine that does nothing else",
+                       cancels_ms.back(), 2000);
 }
 
 TEST_F(DaemonFaultTest, SigtermWhileScanningAndWhileWorkingEndsCleanly) {
@@ -202,7 +218,8 @@ TEST_F(DaemonFaultTest, SigtermWhileScanningAndWhileWorkingEndsCleanly) {
     }
     EXPECT_TRUE(ScanFolders(folder_ / "state").empty());
     Store store(folder_ / "state");
-    EXPECT_EQ(store.recovery().interrupted_scans + store.recovery().orphaned_folders, 0) << "there was nothing left to put right";
+    EXPECT_EQ(store.recovery().interrupted_scans + store.recovery().orphaned_folders, 0)
+        << "there was nothing left to put right";
     EXPECT_EQ(store.Scans("", 1).at(0).outcome, web::ScanOutcome::kCancelled);
   }
 }
@@ -223,7 +240,8 @@ void ExpectConsistent(const fs::path& state) {
   }
   std::sort(with_folder.begin(), with_folder.end());
   std::vector<std::string> folders;
-  for (const auto& entry : fs::directory_iterator(state / "scans")) folders.push_back(entry.path().filename());
+  for (const auto& entry : fs::directory_iterator(state / "scans"))
+    folders.push_back(entry.path().filename());
   std::sort(folders.begin(), folders.end());
   EXPECT_EQ(folders, with_folder);
 }
@@ -252,7 +270,8 @@ TEST_F(DaemonFaultTest, KilledAtAnyMomentNothingIsHalf) {
       if (random() % 4 != 0) plumbd.Press();
       const auto delay = std::chrono::milliseconds(random() % 2500);
       const auto end = std::chrono::steady_clock::now() + delay;
-      while (std::chrono::steady_clock::now() < end && plumbd.Status()["state"] != "result") std::this_thread::yield();
+      while (std::chrono::steady_clock::now() < end && plumbd.Status()["state"] != "result")
+        std::this_thread::yield();
       plumbd.Signal(SIGKILL);
       EXPECT_EQ(plumbd.Wait(), -SIGKILL);
     }
@@ -260,8 +279,11 @@ TEST_F(DaemonFaultTest, KilledAtAnyMomentNothingIsHalf) {
   }
   Store store(folder_ / "state");
   const std::vector<web::Scan> scans = store.Scans("", 10000);
-  const auto num_done = std::count_if(scans.begin(), scans.end(), [](const web::Scan& s) { return s.outcome == web::ScanOutcome::kDone; });
-  std::printf("%d rounds: %d scans done, %zu begun\n", rounds, static_cast<int>(num_done), scans.size());
+  const auto num_done = std::count_if(scans.begin(), scans.end(), [](const web::Scan& s) {
+    return s.outcome == web::ScanOutcome::kDone;
+  });
+  std::printf("%d rounds: %d scans done, %zu begun\n", rounds, static_cast<int>(num_done),
+              scans.size());
 }
 
 TEST_F(DaemonFaultTest, AFullDiskFailsTheScanWithAReasonAndKeepsTheReference) {
@@ -273,13 +295,15 @@ TEST_F(DaemonFaultTest, AFullDiskFailsTheScanWithAReasonAndKeepsTheReference) {
     EXPECT_EQ(plumbd.Stop(), 0);
   }
   {
-    Plumbd plumbd(folder_.path(), {.max_file_bytes = 300'000});  // the database still fits, a scene does not
+    Plumbd plumbd(folder_.path(),
+                  {.max_file_bytes = 300'000});  // the database still fits, a scene does not
     ASSERT_TRUE(plumbd.WaitUntilUp());
     plumbd.WaitForState("ready");
     plumbd.Press();
     plumbd.WaitForFrames(90);
     plumbd.Press();
-    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(), HasSubstr("cannot write"));
+    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(),
+                HasSubstr("cannot write"));
     EXPECT_EQ(plumbd.Press()["ok"], true) << "a press acknowledges";
     plumbd.WaitForState("ready");
     EXPECT_EQ(plumbd.Stop(), 0);
@@ -288,7 +312,8 @@ TEST_F(DaemonFaultTest, AFullDiskFailsTheScanWithAReasonAndKeepsTheReference) {
 }
 
 TEST_F(DaemonFaultTest, AStateFolderThatCannotBeWrittenIsSafeModeWithAReason) {
-  const bool is_root = ::geteuid() == 0;  // for whom modes mean nothing: take a place where nobody can make anything
+  const bool is_root =
+      ::geteuid() == 0;  // for whom modes mean nothing: take a place where nobody can make anything
   const fs::path state = is_root ? fs::path("/proc/plumb-state") : folder_ / "locked" / "state";
   if (!is_root) {
     fs::create_directories(state.parent_path());
@@ -306,8 +331,9 @@ TEST_F(DaemonFaultTest, ACorruptDatabaseIsSafeModeAndTouchesNothing) {
   std::ofstream(folder_ / "state" / "plumb.db") << std::string(50000, 'x');
   Plumbd plumbd(folder_.path());
   ASSERT_TRUE(plumbd.WaitUntilUp());
-  const json status =
-      plumbd.WaitFor("fault and a sensor", [](const json& s) { return s["state"] == "fault" && s["sensor"]["present"] == true; });
+  const json status = plumbd.WaitFor("fault and a sensor", [](const json& s) {
+    return s["state"] == "fault" && s["sensor"]["present"] == true;
+  });
   EXPECT_THAT(status["reason"].get<std::string>(), HasSubstr("damaged"));
   EXPECT_THAT(plumbd.Press()["error"].get<std::string>(), HasSubstr("storage"));
   EXPECT_EQ(plumbd.Stop(), 0);
@@ -315,7 +341,8 @@ TEST_F(DaemonFaultTest, ACorruptDatabaseIsSafeModeAndTouchesNothing) {
 }
 
 TEST_F(DaemonFaultTest, ASecondPlumbdOnTheSameFolderIsSafeModeAndTheFirstGoesOn) {
-  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nauto_stop_s = 100\n";  // the second one may take long to start
+  std::ofstream(folder_ / "plumb.toml")
+      << "[appliance]\nauto_stop_s = 100\n";  // the second one may take long to start
   Plumbd first(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
   ASSERT_TRUE(first.WaitUntilUp());
   first.WaitForState("ready");
@@ -324,11 +351,13 @@ TEST_F(DaemonFaultTest, ASecondPlumbdOnTheSameFolderIsSafeModeAndTheFirstGoesOn)
   const testing::TempFolder other;
   Plumbd second(other.path(), {.state = first.state()});
   ASSERT_TRUE(second.WaitUntilUp());
-  EXPECT_THAT(second.WaitForState("fault")["reason"].get<std::string>(), HasSubstr("another plumbd"));
+  EXPECT_THAT(second.WaitForState("fault")["reason"].get<std::string>(),
+              HasSubstr("another plumbd"));
   EXPECT_EQ(second.Stop(), 0);
   EXPECT_EQ(first.Status()["state"], "scanning");
   EXPECT_EQ(first.Press()["ok"], true);
-  EXPECT_EQ(first.WaitForState("result")["last_result"]["is_reference"], true) << "its staging folder is still there";
+  EXPECT_EQ(first.WaitForState("result")["last_result"]["is_reference"], true)
+      << "its staging folder is still there";
 }
 
 TEST_F(DaemonFaultTest, ManyShortScansLeaveNoThreadsDescriptorsOrMemoryBehind) {
@@ -350,13 +379,17 @@ TEST_F(DaemonFaultTest, ManyShortScansLeaveNoThreadsDescriptorsOrMemoryBehind) {
     memory_kb = plumbd.resident_kb();
   }
   // The connection that asked last may be open for a moment yet.
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5 * testing::kSlowness);
-  while (plumbd.num_descriptors() > descriptors && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
-  std::printf("%d scans: descriptors %d -> %d, threads %d -> %d, memory %ld -> %ld kB\n", rounds, descriptors, plumbd.num_descriptors(),
-              threads, plumbd.num_threads(), memory_kb, plumbd.resident_kb());
+  const auto deadline =
+      std::chrono::steady_clock::now() + std::chrono::seconds(5 * testing::kSlowness);
+  while (plumbd.num_descriptors() > descriptors && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::yield();
+  std::printf("%d scans: descriptors %d -> %d, threads %d -> %d, memory %ld -> %ld kB\n", rounds,
+              descriptors, plumbd.num_descriptors(), threads, plumbd.num_threads(), memory_kb,
+              plumbd.resident_kb());
   EXPECT_LE(plumbd.num_descriptors(), descriptors);
   EXPECT_LE(plumbd.num_threads(), threads);
-  testing::ExpectBelow("memory in kB; the allocator's pools move by some megabytes", static_cast<double>(plumbd.resident_kb()),
+  testing::ExpectBelow("memory in kB; the allocator's pools move by some megabytes",
+                       static_cast<double>(plumbd.resident_kb()),
                        static_cast<double>(memory_kb + 30'000));
 }
 
@@ -369,7 +402,8 @@ TEST_F(DaemonFaultTest, SighupTakesAGoodConfigurationAndKeepsTheOldOneForABadOne
   std::ofstream(config) << "[appliance]\nscan_limit_s = -1\n";
   plumbd.Signal(SIGHUP);
   plumbd.WaitForLog("plumb.toml:2");
-  std::ofstream(config) << "[appliance]\nscan_limit_s = 1\n[markers]\nlength_m = 0.05\n[web]\nhost_names = [\"scan.example\"]\n";
+  std::ofstream(config) << "[appliance]\nscan_limit_s = 1\n[markers]\nlength_m = "
+                           "0.05\n[web]\nhost_names = [\"scan.example\"]\n";
   plumbd.Signal(SIGHUP);
   plumbd.WaitForLog("only after a restart: markers.length_m, web.host_names");
   plumbd.Press();
@@ -385,7 +419,9 @@ TEST_F(DaemonFaultTest, TheWatchdogIsFedWhileItScansAndAfter) {
   const auto fed = [&] {
     const std::string told = plumbd.notifications();
     int count = 0;
-    for (std::size_t at = told.find("WATCHDOG=1"); at != std::string::npos; at = told.find("WATCHDOG=1", at + 1)) ++count;
+    for (std::size_t at = told.find("WATCHDOG=1"); at != std::string::npos;
+         at = told.find("WATCHDOG=1", at + 1))
+      ++count;
     return count;
   };
   plumbd.Press();
@@ -400,7 +436,8 @@ TEST_F(DaemonFaultTest, AClockThatStepsDisturbsNoTimer) {
   std::ofstream(folder_ / "offset") << 0;
   std::ofstream(folder_ / "plumb.toml") << "[appliance]\nauto_stop_s = 1.5\n";
   Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"},
-                                 .environment = {{"LD_PRELOAD", PLUMB_CLOCK_STEP}, {"PLUMB_CLOCK_OFFSET", folder_ / "offset"}}});
+                                 .environment = {{"LD_PRELOAD", PLUMB_CLOCK_STEP},
+                                                 {"PLUMB_CLOCK_OFFSET", folder_ / "offset"}}});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   plumbd.Press();
@@ -408,7 +445,8 @@ TEST_F(DaemonFaultTest, AClockThatStepsDisturbsNoTimer) {
   std::ofstream(folder_ / "offset") << -86400;
   plumbd.WaitForFrames(60);
   std::ofstream(folder_ / "offset") << 86400 * 30;
-  EXPECT_EQ(plumbd.WaitForState("result")["last_result"]["is_reference"], true) << "neither cut short nor without end";
+  EXPECT_EQ(plumbd.WaitForState("result")["last_result"]["is_reference"], true)
+      << "neither cut short nor without end";
   std::ofstream(folder_ / "offset") << -86400;
   plumbd.ScanOnce();
   EXPECT_EQ(plumbd.Stop(), 0);
@@ -422,8 +460,10 @@ TEST_F(DaemonFaultTest, AClockThatStepsDisturbsNoTimer) {
 TEST_F(DaemonFaultTest, NonsenseAtTheControlSocketCostsOnlyItsOwnConnection) {
   Plumbd plumbd(folder_.path());
   ASSERT_TRUE(plumbd.WaitUntilUp());
-  for (const std::string& text : {std::string("\n"), std::string("{}\n"), std::string("[[[[[[[[\n"), std::string(100'000, 'a'),
-                                  std::string("{\"command\":\"sim\",\"action\":\"explode\"}\n"), std::string("\0\xFF\xFE\n", 4)}) {
+  for (const std::string& text :
+       {std::string("\n"), std::string("{}\n"), std::string("[[[[[[[[\n"),
+        std::string(100'000, 'a'), std::string("{\"command\":\"sim\",\"action\":\"explode\"}\n"),
+        std::string("\0\xFF\xFE\n", 4)}) {
     const int fd = ConnectUnix(plumbd.socket());
     (void)::send(fd, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     char buffer[512] = {};
@@ -432,7 +472,8 @@ TEST_F(DaemonFaultTest, NonsenseAtTheControlSocketCostsOnlyItsOwnConnection) {
     ::close(fd);
   }
   std::vector<int> silent;
-  for (int i = 0; i < 100; ++i) silent.push_back(ConnectUnix(plumbd.socket()));  // more than it keeps
+  for (int i = 0; i < 100; ++i)
+    silent.push_back(ConnectUnix(plumbd.socket()));  // more than it keeps
   for (const int fd : silent) ::close(fd);
   plumbd.WaitFor("its answer", [](const json& status) { return status.contains("state"); });
 }

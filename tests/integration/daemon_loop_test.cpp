@@ -1,4 +1,5 @@
-// Nothing on plumbd's event loop takes over 10 ms: the real process tells by its own meter, after what people do in a day.
+// Nothing on plumbd's event loop takes over 10 ms: the real process tells by its own meter, after
+// what people do in a day.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -20,8 +21,9 @@ using test::kPassword;
 using testing::Plumbd;
 
 constexpr bool kJudges = !testing::kIsSanitized;  // several times slower: only reported
-/// Seen by hand on a busy machine (load 8 to 10): 5 of 470 000 turns, all of them moving bytes only, with 10 to 14 ms of own time;
-/// supposedly interrupts, which the kernel charges to whoever runs. Work that is too long is too long each time.
+/// Seen by hand on a busy machine (load 8 to 10): 5 of 470 000 turns, all of them moving bytes
+/// only, with 10 to 14 ms of own time; supposedly interrupts, which the kernel charges to whoever
+/// runs. Work that is too long is too long each time.
 constexpr int kAttempts = 2;
 constexpr std::size_t kBundleMiB = 320;  // removed on the loop it would cost 17 to 50 ms
 
@@ -38,7 +40,8 @@ class Viewer {
  private:
   void Watch(const std::stop_token& stop) const {
     test::HttpConnection events(port_);
-    events.Send("GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\nCookie: " + cookie_ + "\r\n\r\n");
+    events.Send("GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\nCookie: " + cookie_ +
+                "\r\n\r\n");
     HttpClient client(port_);
     client.cookie = cookie_;
     while (!stop.stop_requested()) {
@@ -53,8 +56,9 @@ class Viewer {
 };
 
 void LookAtEverything(HttpClient& person, const std::vector<std::string>& scans) {
-  for (const char* path : {"/api/v1/scans", "/api/v1/patients", "/api/v1/patients/1/scans", "/api/v1/patients/1/references",
-                           "/api/v1/checks", "/api/v1/settings", "/api/v1/update", "/result", "/", "/health"}) {
+  for (const char* path : {"/api/v1/scans", "/api/v1/patients", "/api/v1/patients/1/scans",
+                           "/api/v1/patients/1/references", "/api/v1/checks", "/api/v1/settings",
+                           "/api/v1/update", "/result", "/", "/health"}) {
     EXPECT_EQ(person.Get(path).status, 200) << path;
   }
   for (const std::string& scan : scans) {
@@ -67,9 +71,10 @@ void LookAtEverything(HttpClient& person, const std::vector<std::string>& scans)
 /// Refused at its end, where there is no RAUC, or for its form: it goes to the disk and from there.
 void SendBundle(std::uint16_t port, const HttpClient& engineer) {
   test::HttpConnection connection(port);
-  connection.Send("POST /api/v1/update/bundles/a.raucb HTTP/1.1\r\nHost: localhost\r\nCookie: " + engineer.cookie +
-                  "\r\nX-CSRF-Token: " + engineer.csrf_token +
-                  "\r\nContent-Type: application/octet-stream\r\nContent-Length: " + std::to_string(kBundleMiB << 20) + "\r\n\r\n");
+  connection.Send("POST /api/v1/update/bundles/a.raucb HTTP/1.1\r\nHost: localhost\r\nCookie: " +
+                  engineer.cookie + "\r\nX-CSRF-Token: " + engineer.csrf_token +
+                  "\r\nContent-Type: application/octet-stream\r\nContent-Length: " +
+                  std::to_string(kBundleMiB << 20) + "\r\n\r\n");
   const std::string piece(1 << 20, 'x');
   for (std::size_t i = 0; i < kBundleMiB; ++i) connection.Send(piece);
   EXPECT_GE(connection.Read().status, 400);
@@ -82,9 +87,18 @@ json WorkflowFigures() {
   EXPECT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   HttpClient engineer(plumbd.port()), physicist(plumbd.port());
-  EXPECT_EQ(engineer.Post("/api/v1/setup", {{"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}}).status, 200);
+  EXPECT_EQ(
+      engineer
+          .Post("/api/v1/setup",
+                {{"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}})
+          .status,
+      200);
   engineer.FetchToken();
-  EXPECT_EQ(engineer.Post("/api/v1/users", {{"name", "physicist"}, {"role", "physicist"}, {"password", kPassword}}).status, 201);
+  EXPECT_EQ(engineer
+                .Post("/api/v1/users",
+                      {{"name", "physicist"}, {"role", "physicist"}, {"password", kPassword}})
+                .status,
+            201);
   EXPECT_EQ(physicist.LogIn("physicist", kPassword), 200);
   std::vector<std::string> scans;
   {
@@ -111,13 +125,17 @@ TEST_F(DaemonLoopTest, NothingTakesOver10MsOfTheLoopsOwnTime) {
   json loop;
   for (int attempt = 0; attempt < kAttempts && !HasFailure(); ++attempt) {
     loop = WorkflowFigures();
-    std::printf("%d turns; longest by its own time: %s; longest in wall time: %s; over 10 ms in wall time: %d\n", loop.value("turns", 0),
-                loop["longest_cpu"].dump().c_str(), loop["longest"].dump().c_str(), loop.value("over_10_ms", -1));
+    std::printf(
+        "%d turns; longest by its own time: %s; longest in wall time: %s; over 10 ms in wall time: "
+        "%d\n",
+        loop.value("turns", 0), loop["longest_cpu"].dump().c_str(), loop["longest"].dump().c_str(),
+        loop.value("over_10_ms", -1));
     std::fflush(stdout);
     EXPECT_GT(loop.value("turns", 0), 1000);
     if (!kJudges || loop["cpu_over_10_ms"] == 0) return;
   }
-  ADD_FAILURE() << "in each of " << kAttempts << " runs a turn took over 10 ms of the loop's own time: " << loop.dump();
+  ADD_FAILURE() << "in each of " << kAttempts
+                << " runs a turn took over 10 ms of the loop's own time: " << loop.dump();
 }
 
 }  // namespace

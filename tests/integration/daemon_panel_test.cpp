@@ -1,4 +1,5 @@
-// Start button and light of a real plumbd: its GPIO library is replaced by one of files, everything above it is the product's.
+// Start button and light of a real plumbd: its GPIO library is replaced by one of files, everything
+// above it is the product's.
 #include <algorithm>
 #include <csignal>
 #include <fstream>
@@ -39,15 +40,18 @@ class DaemonPanelTest : public ::testing::Test {
   DaemonPanelTest() {
     EXPECT_EQ(::mkfifo((folder_ / "button").c_str(), 0600), 0);
     button_ = ::open((folder_ / "button").c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
-    std::ofstream(folder_ / "plumb.toml") << "[button]\nline = \"start\"\n[light]\nred = \"red\"\ngreen = \"green\"\nblue = \"blue\"\n"
-                                          << "beeper = \"beeper\"\n[appliance]\nauto_stop_s = 100\n";
+    std::ofstream(folder_ / "plumb.toml")
+        << "[button]\nline = \"start\"\n[light]\nred = \"red\"\ngreen = \"green\"\nblue = "
+           "\"blue\"\n"
+        << "beeper = \"beeper\"\n[appliance]\nauto_stop_s = 100\n";
   }
   ~DaemonPanelTest() override { ::close(button_); }
 
   [[nodiscard]] testing::PlumbdOptions Options(std::vector<std::string> more = {}) const {
     std::vector<std::string> arguments = {"--config", folder_ / "plumb.toml"};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    return {.arguments = arguments, .environment = {{"LD_PRELOAD", PLUMB_FAKE_GPIOD}, {"PLUMB_FAKE_GPIO", folder_.path()}}};
+    return {.arguments = arguments,
+            .environment = {{"LD_PRELOAD", PLUMB_FAKE_GPIOD}, {"PLUMB_FAKE_GPIO", folder_.path()}}};
   }
 
   void Edge(char edge) const { ASSERT_EQ(::write(button_, &edge, 1), 1); }
@@ -69,12 +73,14 @@ class DaemonPanelTest : public ::testing::Test {
   /// Until the sensor has given so many more pairs: time that passes on a machine of any speed.
   static json WaitForPairs(Plumbd& plumbd, int more) {
     const int before = plumbd.Status()["sensor"]["pairs"].get<int>();
-    return plumbd.WaitFor("time", [&](const json& s) { return s["sensor"]["pairs"].get<int>() >= before + more; });
+    return plumbd.WaitFor(
+        "time", [&](const json& s) { return s["sensor"]["pairs"].get<int>() >= before + more; });
   }
 
   /// From now on only what the lamps do next counts.
   void ForgetLamps() { begin_ = ReadLamps().size(); }
-  /// What the lamps did: phases of 5 ms and more (lines are switched one after the other); the last goes on.
+  /// What the lamps did: phases of 5 ms and more (lines are switched one after the other); the last
+  /// goes on.
   [[nodiscard]] std::vector<Phase> Phases() const {
     const auto lines = ReadLamps();
     std::vector<Phase> phases;
@@ -82,7 +88,8 @@ class DaemonPanelTest : public ::testing::Test {
     for (std::size_t i = 0; i < lines.size(); ++i) {
       const auto& [time_ms, line, value] = lines[i];
       value ? void(on.insert(line)) : void(on.erase(line));
-      const long long length_ms = i + 1 < lines.size() ? std::get<0>(lines[i + 1]) - time_ms : 1'000'000;
+      const long long length_ms =
+          i + 1 < lines.size() ? std::get<0>(lines[i + 1]) - time_ms : 1'000'000;
       if (i + 1 < begin_ || length_ms < 5) continue;
       phases.push_back({on, length_ms});
     }
@@ -90,7 +97,8 @@ class DaemonPanelTest : public ::testing::Test {
   }
   [[nodiscard]] std::size_t NumPhases(const Lamps& on) const {
     const std::vector<Phase> phases = Phases();
-    return static_cast<std::size_t>(std::count_if(phases.begin(), phases.end(), [&](const Phase& phase) { return phase.on == on; }));
+    return static_cast<std::size_t>(std::count_if(
+        phases.begin(), phases.end(), [&](const Phase& phase) { return phase.on == on; }));
   }
   void WaitForPhases(Plumbd& plumbd, const Lamps& on, std::size_t count) const {
     plumbd.WaitFor("lamps", [&](const json&) { return NumPhases(on) >= count; });
@@ -108,7 +116,8 @@ class DaemonPanelTest : public ::testing::Test {
   /// The median: no timer is early, and a busy machine may be late.
   void ExpectLength(const Lamps& on, long long length_ms) const {
     EXPECT_GE(Length_ms(on), length_ms - 5);
-    testing::ExpectBelow("length of a phase in ms", static_cast<double>(Length_ms(on)), static_cast<double>(length_ms * 3 / 2 + 51));
+    testing::ExpectBelow("length of a phase in ms", static_cast<double>(Length_ms(on)),
+                         static_cast<double>(length_ms * 3 / 2 + 51));
   }
   [[nodiscard]] Lamps Seen() const {
     Lamps seen;
@@ -124,7 +133,8 @@ class DaemonPanelTest : public ::testing::Test {
     std::ifstream file(folder_ / "lights");
     long long time_ms = 0;
     std::string line;
-    for (bool value = false; file >> time_ms >> line >> value;) lines.emplace_back(time_ms, line, value);
+    for (bool value = false; file >> time_ms >> line >> value;)
+      lines.emplace_back(time_ms, line, value);
     return lines;
   }
 
@@ -166,7 +176,8 @@ TEST_F(DaemonPanelTest, PressedDuringWorkingItIsIgnoredAndHeldDownItDiscardsTheS
   Press();
   plumbd.WaitForFrames(90);
   EdgeWithChatter('1');
-  WaitForPairs(plumbd, 4);                // longer than contacts chatter, however many frames tracking has dropped by now
+  WaitForPairs(plumbd,
+               4);  // longer than contacts chatter, however many frames tracking has dropped by now
   ASSERT_EQ(plumbd.Press()["ok"], true);  // the page ends the sweep while the button is down
   plumbd.WaitFor("working", [](const json& s) { return s["state"] != "scanning"; });
   EdgeWithChatter('0');
@@ -229,7 +240,8 @@ TEST_F(DaemonPanelTest, TheLightShowsScanningWorkingAndResults) {
   if (!testing::kIsSanitized) {
     EXPECT_EQ(NumPhases({"blue", "beeper"}), 1U) << "a beep at the start";
   }
-  EXPECT_GE(NumPhases({"blue"}), 1U) << "steady; how often it comes back while the result is made depends on the machine";
+  EXPECT_GE(NumPhases({"blue"}), 1U)
+      << "steady; how often it comes back while the result is made depends on the machine";
   WaitForPhases(plumbd, {"green"}, 3);
   EXPECT_EQ(NumPhases({"green", "beeper"}), 1U);
   if (!testing::kIsSanitized) {

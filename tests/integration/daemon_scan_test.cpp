@@ -1,4 +1,5 @@
-// Scans of a real plumbd: from the press to the six numbers, against the truth and against their own recordings.
+// Scans of a real plumbd: from the press to the six numbers, against the truth and against their
+// own recordings.
 #include <csignal>
 #include <fstream>
 
@@ -6,8 +7,8 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "algo/types/units.hpp"
-#include "drivers/replay/file_io.hpp"
+#include "algo/base/units.hpp"
+#include "drivers/files/file_io.hpp"
 #include "tests/support/demo_truth.hpp"
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
@@ -21,7 +22,8 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::Plumbd;
 
-const std::vector<const char*> kSixNumbers = {"vertical_mm", "longitudinal_mm", "lateral_mm", "pitch_deg", "roll_deg", "yaw_deg"};
+const std::vector<const char*> kSixNumbers = {"vertical_mm", "longitudinal_mm", "lateral_mm",
+                                              "pitch_deg",   "roll_deg",        "yaw_deg"};
 
 class DaemonScanTest : public ::testing::Test {
  protected:
@@ -49,20 +51,25 @@ TEST_F(DaemonScanTest, TwoPressesAndTwoMoreGiveTheSixNumbersOfTheBodysTrueMotion
   EXPECT_TRUE(fs::exists(scan / "scene" / "scene.json"));
   const json result = ReadJson(scan / "result" / "result.json");
   for (const char* name : kSixNumbers) EXPECT_EQ(last[name], result["correction"][name]) << name;
-  // A quarter of the pixels at twice the usual speed; the motion itself is 50 mm and 3.4 deg. A wrong sign or frame misses by that much.
+  // A quarter of the pixels at twice the usual speed; the motion itself is 50 mm and 3.4 deg. A
+  // wrong sign or frame misses by that much.
   const testing::MotionError error = testing::ErrorOfMotion(result);
   EXPECT_LT(error.translation_m, 12 * kMillimetre);
   EXPECT_LT(error.rotation_rad, 1.0 * kDegree);
   ::testing::Test::RecordProperty("after_last_frame_s", last["after_last_frame_s"].dump());
-  std::printf("result %.2f s after the last frame, first frame used %.0f ms after the press, %d frames dropped\n",
-              last["after_last_frame_s"].get<double>(), second["scan"]["first_frame_ms"].get<double>(), last["frames_dropped"].get<int>());
+  std::printf(
+      "result %.2f s after the last frame, first frame used %.0f ms after the press, %d frames "
+      "dropped\n",
+      last["after_last_frame_s"].get<double>(), second["scan"]["first_frame_ms"].get<double>(),
+      last["frames_dropped"].get<int>());
   EXPECT_EQ(plumbd.Stop(), 0);
   EXPECT_THAT(plumbd.notifications(), HasSubstr("STOPPING=1"));
   EXPECT_FALSE(fs::exists(plumbd.state() / "scans" / ".staging-000003"));
 }
 
 TEST_F(DaemonScanTest, TheResultIsTheSameWhenTheRecordingIsComputedAgain) {
-  std::ofstream(folder_ / "plumb.toml") << "[appliance]\nkeep_recordings = true\n[reconstruct]\nkeep_color = false\n";
+  std::ofstream(folder_ / "plumb.toml")
+      << "[appliance]\nkeep_recordings = true\n[reconstruct]\nkeep_color = false\n";
   Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}, .scenes = 2});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
@@ -72,18 +79,23 @@ TEST_F(DaemonScanTest, TheResultIsTheSameWhenTheRecordingIsComputedAgain) {
   ASSERT_EQ(plumbd.Stop(), 0);
   for (const char* id : {"000001", "000002"}) {
     const fs::path recording = plumbd.state() / "scans" / id / "recording";
-    const RunResult again = plumb::Run({PLUMB_BINARY, "reconstruct", recording, "--out", folder_ / id, "--config", folder_ / "plumb.toml"});
+    const RunResult again = plumb::Run({PLUMB_BINARY, "reconstruct", recording, "--out",
+                                        folder_ / id, "--config", folder_ / "plumb.toml"});
     ASSERT_EQ(again.exit_code, 0) << again.err;
-    const auto live_poses = ReadTextFile(plumbd.state() / "scans" / id / "scene" / "trajectory.txt", 1 << 20);
+    const auto live_poses =
+        ReadTextFile(plumbd.state() / "scans" / id / "scene" / "trajectory.txt", 1 << 20);
     EXPECT_EQ(ReadTextFile(folder_ / id / "trajectory.txt", 1 << 20), live_poses)
         << id << ": the same frames, the same poses to the last digit";
   }
   const RunResult compared =
-      plumb::Run({PLUMB_BINARY, "compare", folder_ / "000001", folder_ / "000002", "--out", folder_ / "result", "--json"});
+      plumb::Run({PLUMB_BINARY, "compare", folder_ / "000001", folder_ / "000002", "--out",
+                  folder_ / "result", "--json"});
   ASSERT_EQ(compared.exit_code, 0) << compared.err;
   const json replayed = json::parse(compared.out)["correction"];
   for (const char* name : kSixNumbers) {
-    EXPECT_NEAR(replayed[name].get<double>(), live[name].get<double>(), std::string(name).ends_with("deg") ? 0.05 : 0.5) << name;
+    EXPECT_NEAR(replayed[name].get<double>(), live[name].get<double>(),
+                std::string(name).ends_with("deg") ? 0.05 : 0.5)
+        << name;
   }
 }
 
@@ -94,7 +106,9 @@ TEST_F(DaemonScanTest, ASweepEndsByItselfWhenNothingNewIsSeen) {
   plumbd.WaitForState("ready");
   EXPECT_EQ(plumbd.Press()["ok"], true);
   const json status = plumbd.WaitForState("result");
-  EXPECT_GE(status["last_result"]["frames"].get<int>() + status["last_result"]["frames_dropped"].get<int>(), 120)
+  EXPECT_GE(status["last_result"]["frames"].get<int>() +
+                status["last_result"]["frames_dropped"].get<int>(),
+            120)
       << "the whole sweep was used, and then some time in which nothing new came";
 }
 
@@ -121,14 +135,16 @@ TEST_F(DaemonScanTest, AResultIsPutAwayAfterItsTimeAndThePressStartsTheNextScanB
   EXPECT_EQ(plumbd.Press()["ok"], true) << "its 600 s are not over";
   const json later = plumbd.WaitForState("ready");
   EXPECT_TRUE(later["last_result"].is_object()) << "the last result is still told";
-  EXPECT_NE(later["last_result"]["scan"], first["last_result"]["scan"]) << "there was a second scan";
+  EXPECT_NE(later["last_result"]["scan"], first["last_result"]["scan"])
+      << "there was a second scan";
 }
 
 TEST_F(DaemonScanTest, WatchersSeeStatesAndProgressAndTheSocketIsTheOwnersOnly) {
   Plumbd plumbd(folder_.path());
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
-  Process watch({PLUMB_BINARY, "--control", plumbd.socket(), "watch"}, {.num_cpus = 0, .max_file_bytes = 0, .stdout_path = {}});
+  Process watch({PLUMB_BINARY, "--control", plumbd.socket(), "watch"},
+                {.num_cpus = 0, .max_file_bytes = 0, .stdout_path = {}});
   struct stat status {};
   ASSERT_EQ(::stat(plumbd.socket().c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0117, 0U) << "nobody but owner and group";

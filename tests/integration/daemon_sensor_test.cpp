@@ -1,4 +1,5 @@
-// Sensors that are not as they were: another unit, several at once, images that come late, twice, out of order or of a wrong size.
+// Sensors that are not as they were: another unit, several at once, images that come late, twice,
+// out of order or of a wrong size.
 #include <csignal>
 #include <fstream>
 #include <random>
@@ -10,10 +11,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 #include "daemon/control/unix_socket.hpp"
+#include "drivers/files/file_io.hpp"
 #include "drivers/replay/camera_file.hpp"
-#include "drivers/replay/file_io.hpp"
 #include "tests/support/demo_truth.hpp"
 #include "tests/support/plumbd.hpp"
 
@@ -33,11 +34,14 @@ class DaemonSensorTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() { testing::RenderOnce(); }
 
-  /// plumbd keeps its recordings, which tell what calibration a scan was made with, and the virtual sensor's files are in our reach.
+  /// plumbd keeps its recordings, which tell what calibration a scan was made with, and the virtual
+  /// sensor's files are in our reach.
   [[nodiscard]] testing::PlumbdOptions Options(const std::string& more = {}, int scenes = 1) const {
     std::ofstream(folder_ / "plumb.toml") << "[appliance]\nkeep_recordings = true\n" << more;
     fs::create_directories(folder_ / "tmp");
-    return {.arguments = {"--config", folder_ / "plumb.toml"}, .environment = {{"TMPDIR", folder_ / "tmp"}}, .scenes = scenes};
+    return {.arguments = {"--config", folder_ / "plumb.toml"},
+            .environment = {{"TMPDIR", folder_ / "tmp"}},
+            .scenes = scenes};
   }
 
   /// Gives a unit the first one's calibration with another focal length, and returns that.
@@ -58,12 +62,15 @@ class DaemonSensorTest : public ::testing::Test {
 
   /// Focal length that a stored scan was made with.
   [[nodiscard]] static double FocalLengthOf(const Plumbd& plumbd, const json& result) {
-    const fs::path scan = plumbd.state() / "scans" / result["last_result"]["scan"].get<std::string>();
+    const fs::path scan =
+        plumbd.state() / "scans" / result["last_result"]["scan"].get<std::string>();
     return ParseCameraFile(ReadTextFile(scan / "recording" / "camera.yaml", 1 << 16), "").color.fx;
   }
 
   static json WaitForSensor(Plumbd& plumbd, const std::string& serial) {
-    return plumbd.WaitFor("ready with " + serial, [&](const json& s) { return s["state"] == "ready" && s["sensor"]["serial"] == serial; });
+    return plumbd.WaitFor("ready with " + serial, [&](const json& s) {
+      return s["state"] == "ready" && s["sensor"]["serial"] == serial;
+    });
   }
 
   /// Tells the driver itself, which plumbd passes nothing on to while it ends.
@@ -72,7 +79,8 @@ class DaemonSensorTest : public ::testing::Test {
       const fs::path path = entry.path() / "sensor.sock";
       const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
       (void)WithUnixAddress(path, [&](const sockaddr* address, socklen_t size) {
-        return static_cast<int>(::sendto(fd, command.data(), command.size(), MSG_DONTWAIT, address, size));
+        return static_cast<int>(
+            ::sendto(fd, command.data(), command.size(), MSG_DONTWAIT, address, size));
       });
       ::close(fd);
     }
@@ -101,7 +109,8 @@ TEST_F(DaemonSensorTest, ReplacedWhileIdleTheOtherUnitIsToldAndUsedWithItsOwnCal
   EXPECT_THAT(plumbd.log(), HasSubstr("UNKNOWN-7 is not calibrated"));
 }
 
-TEST_F(DaemonSensorTest, ReplacedWhileScanningTheScanIsDiscardedAndTheNextOneUsesTheOtherUnitsCalibration) {
+TEST_F(DaemonSensorTest,
+       ReplacedWhileScanningTheScanIsDiscardedAndTheNextOneUsesTheOtherUnitsCalibration) {
   Plumbd plumbd(folder_.path(), Options());
   ASSERT_TRUE(plumbd.WaitUntilUp());
   WaitForSensor(plumbd, kFirst);
@@ -124,7 +133,9 @@ TEST_F(DaemonSensorTest, OfTwoSensorsTheOneInUseStaysAndTheOtherIsToldAndTakesOv
   ASSERT_TRUE(plumbd.WaitUntilUp());
   WaitForSensor(plumbd, kFirst);
   plumbd.Sim("plug", "VIRTUAL-0000");  // would come first in the order of serials
-  const auto has_other = [](const json& status) { return status["sensor"]["others"] == json{"VIRTUAL-0000"}; };
+  const auto has_other = [](const json& status) {
+    return status["sensor"]["others"] == json{"VIRTUAL-0000"};
+  };
   EXPECT_EQ(plumbd.WaitFor("the other one", has_other)["sensor"]["serial"], kFirst);
   plumbd.WaitForLog("2 sensors are attached: VIRTUAL-0001 is used, VIRTUAL-0000 not");
   ASSERT_EQ(plumbd.Press()["ok"], true);
@@ -132,10 +143,12 @@ TEST_F(DaemonSensorTest, OfTwoSensorsTheOneInUseStaysAndTheOtherIsToldAndTakesOv
   plumbd.Sim("plug", kSecond);
   plumbd.WaitForFrames(60);
   ASSERT_EQ(plumbd.Press()["ok"], true);
-  EXPECT_EQ(plumbd.WaitForState("result")["sensor"]["serial"], kFirst) << "a third one disturbs no scan";
+  EXPECT_EQ(plumbd.WaitForState("result")["sensor"]["serial"], kFirst)
+      << "a third one disturbs no scan";
   plumbd.WaitForLog("3 sensors are attached");
   plumbd.Sim("unplug", "VIRTUAL-0000");
-  plumbd.WaitFor("one other", [](const json& status) { return status["sensor"]["others"] == json{kSecond}; });
+  plumbd.WaitFor("one other",
+                 [](const json& status) { return status["sensor"]["others"] == json{kSecond}; });
   plumbd.Sim("unplug", kFirst);
   EXPECT_EQ(WaitForSensor(plumbd, kSecond)["sensor"]["others"], json::array());
 }
@@ -143,15 +156,19 @@ TEST_F(DaemonSensorTest, OfTwoSensorsTheOneInUseStaysAndTheOtherIsToldAndTakesOv
 TEST_F(DaemonSensorTest, OfTwoSensorsTheConfiguredOneIsUsedAndNoOther) {
   Plumbd plumbd(folder_.path(), Options(fmt::format("sensor_serial = \"{}\"\n", kSecond)));
   ASSERT_TRUE(plumbd.WaitUntilUp());
-  EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(), AllOf(HasSubstr(kFirst), HasSubstr(kSecond)));
+  EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(),
+              AllOf(HasSubstr(kFirst), HasSubstr(kSecond)));
   plumbd.Sim("plug", kSecond);
   EXPECT_EQ(WaitForSensor(plumbd, kSecond)["sensor"]["others"], json{kFirst});
   plumbd.Sim("unplug", kSecond);
   plumbd.WaitForState("fault");
 }
 
-TEST_F(DaemonSensorTest, FramesThatComeFasterThanTrackingAreDroppedCountedAndShownAndTheResultIsRightOrNone) {
-  Plumbd plumbd(folder_.path(), Options("auto_stop_s = 100\n", 2));  // the press is to end the second sweep, however slow tracking is
+TEST_F(DaemonSensorTest,
+       FramesThatComeFasterThanTrackingAreDroppedCountedAndShownAndTheResultIsRightOrNone) {
+  Plumbd plumbd(folder_.path(),
+                Options("auto_stop_s = 100\n",
+                        2));  // the press is to end the second sweep, however slow tracking is
   ASSERT_TRUE(plumbd.WaitUntilUp());
   WaitForSensor(plumbd, kFirst);
   plumbd.ScanOnce();
@@ -159,13 +176,15 @@ TEST_F(DaemonSensorTest, FramesThatComeFasterThanTrackingAreDroppedCountedAndSho
   ASSERT_EQ(plumbd.Sim("speed", "20")["ok"], true);  // stamps stay those of 30 Hz
   ASSERT_EQ(plumbd.Press()["ok"], true);
   const json during = plumbd.WaitFor("dropped frames while sweeping", [](const json& status) {
-    return status["scan"]["active"] == true && status["scan"]["frames_dropped"].get<int>() > 20 && status["scan"]["frames"].get<int>() > 20;
+    return status["scan"]["active"] == true && status["scan"]["frames_dropped"].get<int>() > 20 &&
+           status["scan"]["frames"].get<int>() > 20;
   });
   EXPECT_EQ(during["state"], "scanning");
   ASSERT_EQ(plumbd.Press()["ok"], true);
   const json last = plumbd.WaitForState("result")["last_result"];
-  std::printf("%d frames, %d dropped, %d images lost: %s\n", last["frames"].get<int>(), last["frames_dropped"].get<int>(),
-              last["images_lost"].get<int>(), last["verdict"].dump().c_str());
+  std::printf("%d frames, %d dropped, %d images lost: %s\n", last["frames"].get<int>(),
+              last["frames_dropped"].get<int>(), last["images_lost"].get<int>(),
+              last["verdict"].dump().c_str());
   EXPECT_GT(last["frames_dropped"].get<int>(), 20);
   const fs::path scan = plumbd.state() / "scans" / last["scan"].get<std::string>();
   if (last["verdict"] == "no_answer") {
@@ -174,7 +193,8 @@ TEST_F(DaemonSensorTest, FramesThatComeFasterThanTrackingAreDroppedCountedAndSho
   }
   const json scene = json::parse(ReadTextFile(scan / "scene" / "scene.json", 1 << 24));
   EXPECT_EQ(scene["frames"]["dropped"], last["frames_dropped"]);
-  const testing::MotionError error = testing::ErrorOfMotion(json::parse(ReadTextFile(scan / "result" / "result.json", 1 << 24)));
+  const testing::MotionError error =
+      testing::ErrorOfMotion(json::parse(ReadTextFile(scan / "result" / "result.json", 1 << 24)));
   EXPECT_LT(error.translation_m, 12 * kMillimetre) << "as with all frames";
   EXPECT_LT(error.rotation_rad, 1.0 * kDegree);
 }
@@ -191,7 +211,8 @@ TEST_F(DaemonSensorTest, UnpluggedWhileItIsClosedPlumbdEndsOrGoesOn) {
       plumbd.WaitForFrames(5);
     }
     plumbd.Signal(SIGTERM);
-    std::this_thread::sleep_for(std::chrono::microseconds(random() % 60'000));  // any moment of the way down
+    std::this_thread::sleep_for(
+        std::chrono::microseconds(random() % 60'000));  // any moment of the way down
     TellDriver("unplug");
     EXPECT_EQ(plumbd.Wait(), 0);
   }
@@ -209,7 +230,8 @@ TEST_F(DaemonSensorTest, UnpluggedWhileItIsClosedPlumbdEndsOrGoesOn) {
   }
 }
 
-TEST_F(DaemonSensorTest, ADriverThatDoesNotComeBackKeepsPlumbdFromEndingForSecondsOnlyAndNothingIsLost) {
+TEST_F(DaemonSensorTest,
+       ADriverThatDoesNotComeBackKeepsPlumbdFromEndingForSecondsOnlyAndNothingIsLost) {
   {
     Plumbd plumbd(folder_.path(), Options());
     ASSERT_TRUE(plumbd.WaitUntilUp());
@@ -222,11 +244,13 @@ TEST_F(DaemonSensorTest, ADriverThatDoesNotComeBackKeepsPlumbdFromEndingForSecon
   Plumbd plumbd(folder_.path(), Options());
   ASSERT_TRUE(plumbd.WaitUntilUp());
   WaitForSensor(plumbd, kFirst);
-  EXPECT_TRUE(plumbd.ScanOnce()["last_result"]["verdict"].is_string()) << "the first scan is the reference";
+  EXPECT_TRUE(plumbd.ScanOnce()["last_result"]["verdict"].is_string())
+      << "the first scan is the reference";
 }
 
 /// Pairs of images that go wrong in the middle of both sweeps.
-class DaemonGlitchTest : public DaemonSensorTest, public ::testing::WithParamInterface<const char*> {
+class DaemonGlitchTest : public DaemonSensorTest,
+                         public ::testing::WithParamInterface<const char*> {
  protected:
   static constexpr int kGlitches = 15;
 
@@ -234,9 +258,13 @@ class DaemonGlitchTest : public DaemonSensorTest, public ::testing::WithParamInt
     EXPECT_EQ(plumbd.Press()["ok"], true);
     plumbd.WaitForFrames(30);
     EXPECT_EQ(plumbd.Sim("glitch", fmt::format("{} {}", glitch, kGlitches))["ok"], true);
-    if (glitch == "late") plumbd.WaitFor("fewer frames a second", [](const json& s) { return s["sensor"]["fps"] < 25.0; });
-    // What was wrong does not come again: the sweep goes on with the next pairs, and ends when it shows nothing new.
-    return plumbd.WaitFor("an end", [](const json& s) { return s["state"] == "result" || s["state"] == "fault"; });
+    if (glitch == "late")
+      plumbd.WaitFor("fewer frames a second",
+                     [](const json& s) { return s["sensor"]["fps"] < 25.0; });
+    // What was wrong does not come again: the sweep goes on with the next pairs, and ends when it
+    // shows nothing new.
+    return plumbd.WaitFor(
+        "an end", [](const json& s) { return s["state"] == "result" || s["state"] == "fault"; });
   }
 };
 
@@ -251,9 +279,11 @@ TEST_P(DaemonGlitchTest, AreCountedAndTheResultIsRightOrSaidToBeNone) {
   const json second = ScanWith(plumbd, glitch);
   ASSERT_EQ(second["state"], "result") << second["reason"];
   const json last = second["last_result"];
-  std::printf("%s: %s; images lost %d, unpaired %d, discarded %d\n", glitch.c_str(), last["verdict"].dump().c_str(),
-              last["images_lost"].get<int>(), last["images_unpaired"].get<int>(), last["images_discarded"].get<int>());
-  // OpenNI2 keeps only the newest image of a stream, so on a busy machine some of the wrong ones go by unseen.
+  std::printf("%s: %s; images lost %d, unpaired %d, discarded %d\n", glitch.c_str(),
+              last["verdict"].dump().c_str(), last["images_lost"].get<int>(),
+              last["images_unpaired"].get<int>(), last["images_discarded"].get<int>());
+  // OpenNI2 keeps only the newest image of a stream, so on a busy machine some of the wrong ones go
+  // by unseen.
   if (glitch == "double" || glitch == "old" || glitch == "size") {
     EXPECT_GE(last["images_discarded"].get<int>(), kGlitches / 2);
   }
@@ -267,15 +297,20 @@ TEST_P(DaemonGlitchTest, AreCountedAndTheResultIsRightOrSaidToBeNone) {
     EXPECT_FALSE(last["reasons"].empty());
     return;
   }
-  const fs::path file = plumbd.state() / "scans" / last["scan"].get<std::string>() / "result" / "result.json";
-  const testing::MotionError error = testing::ErrorOfMotion(json::parse(ReadTextFile(file, 1 << 24)));
+  const fs::path file =
+      plumbd.state() / "scans" / last["scan"].get<std::string>() / "result" / "result.json";
+  const testing::MotionError error =
+      testing::ErrorOfMotion(json::parse(ReadTextFile(file, 1 << 24)));
   EXPECT_LT(error.translation_m, 12 * kMillimetre) << "as without glitches";
   EXPECT_LT(error.rotation_rad, 1.0 * kDegree);
   EXPECT_EQ(plumbd.Stop(), 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Images, DaemonGlitchTest, ::testing::Values("late", "double", "old", "size", "lone"),
-                         [](const ::testing::TestParamInfo<const char*>& glitch) { return std::string(glitch.param); });
+INSTANTIATE_TEST_SUITE_P(Images, DaemonGlitchTest,
+                         ::testing::Values("late", "double", "old", "size", "lone"),
+                         [](const ::testing::TestParamInfo<const char*>& glitch) {
+                           return std::string(glitch.param);
+                         });
 
 }  // namespace
 }  // namespace plumb

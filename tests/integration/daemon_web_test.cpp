@@ -1,4 +1,5 @@
-// The appliance through its page's interface: a real plumbd, real HTTP, the whole workflow of a patient.
+// The appliance through its page's interface: a real plumbd, real HTTP, the whole workflow of a
+// patient.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -57,26 +58,50 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
   const std::string code = plumbd.setup_code();
   ASSERT_NE(code, "") << "the first start prints it";
   HttpClient engineer(port), physicist(port), second(port), technician(port);
-  ASSERT_EQ(engineer.Post("/api/v1/setup", {{"code", code}, {"name", "engineer"}, {"password", kPassword}}).status, 200);
+  ASSERT_EQ(
+      engineer
+          .Post("/api/v1/setup", {{"code", code}, {"name", "engineer"}, {"password", kPassword}})
+          .status,
+      200);
   ASSERT_EQ(engineer.LogIn("engineer", kPassword), 200);
   for (const auto& [name, role] :
-       {std::pair("physicist", "physicist"), std::pair("second", "physicist"), std::pair("technician", "technician")}) {
-    ASSERT_EQ(engineer.Post("/api/v1/users", {{"name", name}, {"role", role}, {"password", kPassword}}).status, 201) << name;
+       {std::pair("physicist", "physicist"), std::pair("second", "physicist"),
+        std::pair("technician", "technician")}) {
+    ASSERT_EQ(
+        engineer.Post("/api/v1/users", {{"name", name}, {"role", role}, {"password", kPassword}})
+            .status,
+        201)
+        << name;
   }
   ASSERT_EQ(physicist.LogIn("physicist", kPassword), 200);
   ASSERT_EQ(second.LogIn("second", kPassword), 200);
   ASSERT_EQ(technician.LogIn("technician", kPassword), 200);
 
-  const std::string patient = technician.Post("/api/v1/patients", {{"code", "PX-17"}, {"site", "thorax"}}).json().value("id", "");
+  // The demo begins with a session of its own patient, and one is open at a time.
+  const json demo = technician.Get("/api/v1/status").json()["session"];
+  ASSERT_EQ(technician.Post("/api/v1/treatment/close", {{"session_id", demo["id"]}}).status, 200);
+  const std::string patient =
+      technician.Post("/api/v1/patients", {{"code", "PX-17"}, {"site", "thorax"}})
+          .json()
+          .value("id", "");
   ASSERT_NE(patient, "");
-  EXPECT_EQ(technician.Post("/api/v1/patients/" + patient + "/open", {{"purpose", "fraction"}, {"reason", ""}}).status, 409)
+  EXPECT_EQ(
+      technician
+          .Post("/api/v1/patients/" + patient + "/open", {{"purpose", "fraction"}, {"reason", ""}})
+          .status,
+      409)
       << "no reference yet";
-  ASSERT_EQ(technician.Post("/api/v1/patients/" + patient + "/open", {{"purpose", "reference"}, {"reason", "planning"}}).status, 200);
+  ASSERT_EQ(technician
+                .Post("/api/v1/patients/" + patient + "/open",
+                      {{"purpose", "reference"}, {"reason", "planning"}})
+                .status,
+            200);
   const auto scan = [&](HttpClient& client) {
     EXPECT_EQ(client.Post("/api/v1/scan/start").status, 200);
     EXPECT_EQ(client.Post("/api/v1/scan/start").status, 409) << "a second tap ends nothing";
     plumbd.WaitFor("the end of the sweep", [](const json& s) {
-      return s["state"] == "scanning" && s["scan"]["frames"].get<int>() + s["scan"]["frames_dropped"].get<int>() >= 120;
+      return s["state"] == "scanning" &&
+             s["scan"]["frames"].get<int>() + s["scan"]["frames_dropped"].get<int>() >= 120;
     });
     EXPECT_EQ(client.Get("/api/v1/status").json()["state"], "scanning");
     EXPECT_EQ(client.Get("/api/v1/preview").status, 200);
@@ -85,29 +110,71 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
     return plumbd.WaitForState("result")["last_result"]["scan"].get<std::string>();
   };
   const std::string first = scan(technician);
-  EXPECT_EQ(technician.Get("/api/v1/status").json()["light"], "done") << "compared with nothing: no word of tolerance";
-  EXPECT_EQ(technician.Get("/api/v1/status").json()["next_purpose"], "fraction") << "one reference, not all that follow";
-  const std::string reference = physicist.Post("/api/v1/references", {{"scan_id", first}, {"reason", "planning"}}).json().value("id", "");
-  ASSERT_NE(reference, "");
-  EXPECT_EQ(physicist.Post("/api/v1/references/" + reference + "/approve", {{"revision", 1}}).status, 403) << "not by who made it";
-  ASSERT_EQ(second.Post("/api/v1/references/" + reference + "/approve", {{"revision", 1}}).status, 200);
+  EXPECT_EQ(technician.Get("/api/v1/status").json()["light"], "done")
+      << "compared with nothing: no word of tolerance";
+  EXPECT_EQ(technician.Get("/api/v1/status").json()["next_purpose"], "fraction")
+      << "one reference, not all that follow";
+  const json waiting = technician.Get("/api/v1/status").json()["waiting"];
+  ASSERT_EQ(waiting.size(), 1U) << "the scan has made its draft";
+  const std::string reference = waiting[0]["reference_id"];
+  const json draft = physicist.Get("/api/v1/references/" + reference).json();
+  EXPECT_EQ(draft["scan_id"], first);
+  json plan = draft["plan"];
+  plan["shift_tolerance_mm"] = plan["tolerance"]["shift_mm"];
+  plan["rotation_tolerance_deg"] = plan["tolerance"]["rotation_deg"];
+  plan.erase("tolerance");
+  plan["revision"] = 1;
+  ASSERT_EQ(physicist.Put("/api/v1/references/" + reference + "/plan", plan).status, 200);
+  EXPECT_EQ(
+      physicist.Post("/api/v1/references/" + reference + "/approve", {{"revision", 2}}).status, 403)
+      << "not by the person who planned it";
+  ASSERT_EQ(second.Post("/api/v1/references/" + reference + "/approve", {{"revision", 2}}).status,
+            200);
 
   ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
-  ASSERT_EQ(technician.Post("/api/v1/patients/" + patient + "/open", {{"purpose", "fraction"}, {"reason", ""}}).status, 200);
+  ASSERT_EQ(
+      technician
+          .Post("/api/v1/patients/" + patient + "/open", {{"purpose", "fraction"}, {"reason", ""}})
+          .status,
+      200);
   const std::string fraction = scan(technician);
   const json result = technician.Get("/api/v1/results/" + fraction).json();
   EXPECT_EQ(result["verdict"], "move");
   EXPECT_EQ(technician.Get("/api/v1/scans/" + fraction + "/files/error_map.png").status, 200);
-  EXPECT_EQ(technician.Post("/api/v1/scans/" + fraction + "/accept").status, 200);
-  EXPECT_EQ(technician.Post("/api/v1/scans/" + fraction + "/accept").status, 409);
+  EXPECT_EQ(technician.Post("/api/v1/scans/" + fraction + "/accept").status, 409)
+      << "outside tolerance: not in one tap";
+  EXPECT_EQ(technician
+                .Post("/api/v1/scans/" + fraction + "/accept-outside",
+                      {{"reason", "known swelling"}, {"password", "wrong password"}})
+                .status,
+            403);
+  EXPECT_EQ(technician
+                .Post("/api/v1/scans/" + fraction + "/accept-outside",
+                      {{"reason", "known swelling"}, {"password", kPassword}})
+                .status,
+            200);
+  const json accepted = technician.Get("/api/v1/scans/" + fraction).json();
+  EXPECT_EQ(accepted["accepted_reason"], "known swelling");
+  EXPECT_EQ(accepted["fraction"], 1);
+  const HttpAnswer report = technician.Get("/api/v1/scans/" + fraction + "/report.pdf");
+  EXPECT_EQ(report.status, 200);
+  EXPECT_TRUE(report.body.starts_with("%PDF"));
+  EXPECT_EQ(technician.Get("/api/v1/scans/" + fraction + "/maps/deviation").status, 200);
+  EXPECT_EQ(
+      technician.Post("/api/v1/treatment/close", {{"session_id", accepted["session_id"]}}).status,
+      200);
+  EXPECT_EQ(technician.Get("/api/v1/status").json()["session"], nullptr);
 
   std::vector<std::string> actions;
   const json audit = physicist.Get("/api/v1/audit").json();
   for (const json& entry : audit["entries"]) {
     actions.push_back(entry["user"].get<std::string>() + " " + entry["action"].get<std::string>());
   }
-  EXPECT_THAT(actions, IsSupersetOf({"engineer user.add", "technician patient.add", "technician scan.start", "technician scan.end",
-                                     "physicist reference.add", "second reference.approve", "technician scan.accept"}));
+  EXPECT_THAT(
+      actions,
+      IsSupersetOf({"engineer user.add", "technician patient.add", "technician scan.start",
+                    "technician scan.end", "technician reference.add", "second reference.approve",
+                    "technician scan.accept_outside", "technician session.close"}));
   EXPECT_EQ(plumbd.log().find("PX-17"), std::string::npos) << "no patient's code in the log";
   EXPECT_EQ(physicist.Ask("DELETE", "/api/v1/patients/" + patient, "").status, 200);
   EXPECT_FALSE(fs::exists(plumbd.state() / "scans" / fraction));
@@ -119,10 +186,16 @@ TEST_F(DaemonWebTest, AnEventStreamTellsAScanFromThePressToTheResultAnUnplugAndT
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
   HttpClient client(plumbd.port());
-  ASSERT_EQ(client.Post("/api/v1/setup", {{"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}}).status, 200);
+  ASSERT_EQ(
+      client
+          .Post("/api/v1/setup",
+                {{"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}})
+          .status,
+      200);
   ASSERT_EQ(client.LogIn("engineer", kPassword), 200);
   HttpConnection stream(plumbd.port());
-  ASSERT_TRUE(stream.Send("GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie + "\r\n\r\n"));
+  ASSERT_TRUE(stream.Send(
+      "GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie + "\r\n\r\n"));
   EXPECT_THAT(stream.ReadUntil("\"state\":\"ready\""), HasSubstr("text/event-stream"));
   plumbd.ScanOnce();
   for (const char* news : {"\"state\":\"scanning\"", "\"state\":\"working\"", "event: result"}) {

@@ -19,7 +19,8 @@ class RobustnessTest : public CommandLineTest {
   /// Everything of a scene but the timings, which no run repeats.
   static std::map<std::string, std::string> Bytes(const fs::path& scene) {
     std::map<std::string, std::string> files;
-    for (const auto& entry : fs::directory_iterator(scene)) files[entry.path().filename().string()] = ReadText(entry.path());
+    for (const auto& entry : fs::directory_iterator(scene))
+      files[entry.path().filename().string()] = ReadText(entry.path());
     auto facts = nlohmann::json::parse(files.at("scene.json"));
     facts.erase("timings_s");
     files["scene.json"] = facts.dump();
@@ -29,33 +30,45 @@ class RobustnessTest : public CommandLineTest {
   void ExpectSame(const fs::path& a, const fs::path& b) {
     const auto first = Bytes(a), second = Bytes(b);
     ASSERT_EQ(first.size(), second.size());
-    for (const auto& [name, bytes] : first) EXPECT_TRUE(second.contains(name) && second.at(name) == bytes) << name << " differs";
+    for (const auto& [name, bytes] : first)
+      EXPECT_TRUE(second.contains(name) && second.at(name) == bytes) << name << " differs";
   }
 };
 
 TEST_F(RobustnessTest, TwoRunsGiveTheSameBytes) {
-  ASSERT_EQ(Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "again"}).exit_code, 0);
+  ASSERT_EQ(
+      Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "again"}).exit_code, 0);
   ExpectSame(SmallScene(Reference()), folder_ / "again");
 }
 
 TEST_F(RobustnessTest, OneProcessorGivesTheSameBytesAsTwo) {
-  ASSERT_EQ(Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "one"}, {.num_cpus = 1}).exit_code, 0);
-  ASSERT_EQ(Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "two"}, {.num_cpus = 2}).exit_code, 0);
+  ASSERT_EQ(
+      Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "one"}, {.num_cpus = 1})
+          .exit_code,
+      0);
+  ASSERT_EQ(
+      Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "two"}, {.num_cpus = 2})
+          .exit_code,
+      0);
   ExpectSame(folder_ / "one", folder_ / "two");
 }
 
 TEST_F(RobustnessTest, ThePaperPresetRepeatsToo) {
   for (const auto& [name, cpus] : {std::pair("one", 1), std::pair("two", 2)}) {
-    ASSERT_EQ(
-        Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / name, "--preset", "paper"}, {.num_cpus = cpus}).exit_code, 0);
+    ASSERT_EQ(Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / name,
+                     "--preset", "paper"},
+                    {.num_cpus = cpus})
+                  .exit_code,
+              0);
   }
   ExpectSame(folder_ / "one", folder_ / "two");
 }
 
 TEST_F(RobustnessTest, TheSimulatorRepeats) {
   for (const auto& [name, cpus] : {std::pair("one", 1), std::pair("two", 2)}) {
-    const RunResult made =
-        Plumb({"simulate", "--suite", "demo", "--frames", "3", "--size", "320x240", "--out", folder_ / name}, {.num_cpus = cpus});
+    const RunResult made = Plumb({"simulate", "--suite", "demo", "--frames", "3", "--size",
+                                  "320x240", "--out", folder_ / name},
+                                 {.num_cpus = cpus});
     ASSERT_EQ(made.exit_code, 0) << made.err;
   }
   for (const auto& entry : fs::recursive_directory_iterator(folder_ / "one")) {
@@ -72,10 +85,19 @@ TEST_F(RobustnessTest, CtrlCEndsWith130AndLeavesNothing) {
     int signal;
   };
   const std::vector<Case> cases = {
-      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene"}, "tracking", SIGINT},
-      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene"}, "tracking", SIGTERM},
-      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene", "--preset", "paper"}, "tracking", SIGINT},
-      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene", "--realtime"}, "tracking", SIGINT},
+      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene"},
+       "tracking",
+       SIGINT},
+      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene"},
+       "tracking",
+       SIGTERM},
+      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene", "--preset",
+        "paper"},
+       "tracking",
+       SIGINT},
+      {{"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene", "--realtime"},
+       "tracking",
+       SIGINT},
       {{"simulate", "--suite", "nine", "--out", folder_ / "suite"}, "simulating", SIGINT},
   };
   for (const Case& c : cases) {
@@ -93,31 +115,46 @@ TEST_F(RobustnessTest, AnInterruptedEvaluationLeavesNoHalfScene) {
   ASSERT_TRUE(process.WaitForStderr("tracking")) << process.err();
   process.Signal(SIGINT);
   EXPECT_EQ(process.Wait(), 130) << process.err();
-  for (const auto& entry : fs::recursive_directory_iterator(folder_)) EXPECT_FALSE(entry.is_regular_file()) << entry.path();
+  for (const auto& entry : fs::recursive_directory_iterator(folder_))
+    EXPECT_FALSE(entry.is_regular_file()) << entry.path();
 }
 
 TEST_F(RobustnessTest, AFullDiskIsExitOneAndLeavesNothing) {
-  // The largest file of a scene is some megabytes; RLIMIT_FSIZE fails the write as a full disk does.
-  const RunResult scene = Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene"}, {.max_file_bytes = 100'000});
+  // The largest file of a scene is some megabytes; RLIMIT_FSIZE fails the write as a full disk
+  // does.
+  const RunResult scene =
+      Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene"},
+            {.max_file_bytes = 100'000});
   EXPECT_EQ(scene.exit_code, 1) << scene.err;
   EXPECT_THAT(scene.err, HasSubstr("cannot write"));
-  const RunResult result =
-      Plumb({"compare", SmallScene(Reference()), SmallScene(Reference()), "--out", folder_ / "result"}, {.max_file_bytes = 100'000});
+  const RunResult result = Plumb(
+      {"compare", SmallScene(Reference()), SmallScene(Reference()), "--out", folder_ / "result"},
+      {.max_file_bytes = 100'000});
   EXPECT_EQ(result.exit_code, 1) << result.err;
-  EXPECT_EQ(Plumb({"mesh", SmallScene(Reference()), "--out", folder_ / "mesh.ply"}, {.max_file_bytes = 100'000}).exit_code, 1);
-  EXPECT_EQ(
-      Plumb({"simulate", "--suite", "demo", "--frames", "3", "--size", "320x240", "--out", folder_ / "suite"}, {.max_file_bytes = 1000})
-          .exit_code,
-      1);
+  EXPECT_EQ(Plumb({"mesh", SmallScene(Reference()), "--out", folder_ / "mesh.ply"},
+                  {.max_file_bytes = 100'000})
+                .exit_code,
+            1);
+  EXPECT_EQ(Plumb({"simulate", "--suite", "demo", "--frames", "3", "--size", "320x240", "--out",
+                   folder_ / "suite"},
+                  {.max_file_bytes = 1000})
+                .exit_code,
+            1);
   EXPECT_THAT(LeftBehind({}), IsEmpty());
 }
 
 TEST_F(RobustnessTest, AForeignFolderIsNeverReplaced) {
   fs::create_directory(folder_ / "mine");
   WriteText(folder_ / "mine" / "thesis.tex", "years of work");
-  EXPECT_NE(Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "mine"}).exit_code, 0);
-  EXPECT_NE(Plumb({"compare", SmallScene(Reference()), SmallScene(Reference()), "--out", folder_ / "mine"}).exit_code, 0);
-  EXPECT_NE(Plumb({"simulate", "--suite", "demo", "--frames", "3", "--out", folder_ / "mine"}).exit_code, 0);
+  EXPECT_NE(
+      Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "mine"}).exit_code, 0);
+  EXPECT_NE(Plumb({"compare", SmallScene(Reference()), SmallScene(Reference()), "--out",
+                   folder_ / "mine"})
+                .exit_code,
+            0);
+  EXPECT_NE(
+      Plumb({"simulate", "--suite", "demo", "--frames", "3", "--out", folder_ / "mine"}).exit_code,
+      0);
   EXPECT_EQ(ReadText(folder_ / "mine" / "thesis.tex"), "years of work");
   EXPECT_THAT(LeftBehind({"mine"}), IsEmpty());
 }
@@ -131,10 +168,13 @@ TEST_F(RobustnessTest, AnOlderOutputIsReplaced) {
 }
 
 TEST_F(RobustnessTest, DamagedScenesAreRefused) {
-  const auto refused = [this](const std::string& name, const std::function<void(const fs::path&)>& damage, const std::string& message) {
+  const auto refused = [this](const std::string& name,
+                              const std::function<void(const fs::path&)>& damage,
+                              const std::string& message) {
     const fs::path scene = Copy(SmallScene(Reference()), name);
     damage(scene);
-    const RunResult result = Plumb({"compare", SmallScene(Reference()), scene, "--out", folder_ / "result"});
+    const RunResult result =
+        Plumb({"compare", SmallScene(Reference()), scene, "--out", folder_ / "result"});
     EXPECT_EQ(result.exit_code, 3) << name << ": " << result.err;
     EXPECT_THAT(result.err, HasSubstr(message)) << name;
     EXPECT_FALSE(fs::exists(folder_ / "result")) << name;
@@ -148,7 +188,9 @@ TEST_F(RobustnessTest, DamagedScenesAreRefused) {
     };
   };
   const auto halve = [](const char* file) {
-    return [=](const fs::path& scene) { fs::resize_file(scene / file, fs::file_size(scene / file) / 2); };
+    return [=](const fs::path& scene) {
+      fs::resize_file(scene / file, fs::file_size(scene / file) / 2);
+    };
   };
   refused("newer", edit("format", 2), "format");
   refused(
@@ -158,7 +200,8 @@ TEST_F(RobustnessTest, DamagedScenesAreRefused) {
   refused("short-map", halve("heightmap.tiff"), "heightmap.tiff");
   refused("short-cloud", halve("cloud.ply"), "cloud.ply");
   refused(
-      "no-map", [](const fs::path& scene) { fs::remove(scene / "heightmap.tiff"); }, "heightmap.tiff");
+      "no-map", [](const fs::path& scene) { fs::remove(scene / "heightmap.tiff"); },
+      "heightmap.tiff");
   refused(
       "nan-pose",
       [](const fs::path& scene) {

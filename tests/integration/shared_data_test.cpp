@@ -1,4 +1,5 @@
-// The recordings beside the project, where they are there: another simulator's sweeps with truth, and a real sensor's.
+// The recordings beside the project, where they are there: another simulator's sweeps with truth,
+// and a real sensor's.
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -36,15 +37,16 @@ TEST_F(SharedDataTest, ARealSensorTracksWithTagsAndWithout) {
   if (recording.empty()) GTEST_SKIP() << "no recording at ../shared/data/real-tags";
   WriteText(folder_ / "keypoints.toml", "[reconstruct]\nuse_markers = false\n");
   const RunResult with = Plumb({"reconstruct", recording, "--out", folder_ / "with", "--json"});
-  const RunResult without =
-      Plumb({"reconstruct", recording, "--out", folder_ / "without", "--json", "--config", folder_ / "keypoints.toml"});
+  const RunResult without = Plumb({"reconstruct", recording, "--out", folder_ / "without", "--json",
+                                   "--config", folder_ / "keypoints.toml"});
   for (const RunResult& result : {with, without}) {
     ASSERT_EQ(result.exit_code, 0) << result.err;
     const json frames = json::parse(result.out).at("frames");
     EXPECT_EQ(frames.at("tracked"), frames.at("total"));
   }
   const SceneParts none{.cloud = false, .height_map = false, .mesh = false};
-  const std::vector<StampedPose> a = ReadScene(folder_ / "with", none).trajectory, b = ReadScene(folder_ / "without", none).trajectory;
+  const std::vector<StampedPose> a = ReadScene(folder_ / "with", none).trajectory,
+                                 b = ReadScene(folder_ / "without", none).trajectory;
   ASSERT_EQ(a.size(), b.size());
   SceneTruth path;  // one path measured against the other as if that were true
   path.trajectory = a;
@@ -53,9 +55,11 @@ TEST_F(SharedDataTest, ARealSensorTracksWithTagsAndWithout) {
   EXPECT_LE(error->rmse_mm, 3.0);  // measured 0.5
   for (const std::vector<StampedPose>& poses : {a, b}) {
     for (std::size_t i = 1; i + 1 < poses.size(); ++i) {
-      const Eigen::Vector3d bend =
-          poses[i - 1].T_world_camera.translation() - 2 * poses[i].T_world_camera.translation() + poses[i + 1].T_world_camera.translation();
-      // Measured: up to 9.3 mm at frame 47, where both paths agree (the recording skips there), below 6 mm elsewhere.
+      const Eigen::Vector3d bend = poses[i - 1].T_world_camera.translation() -
+                                   2 * poses[i].T_world_camera.translation() +
+                                   poses[i + 1].T_world_camera.translation();
+      // Measured: up to 9.3 mm at frame 47, where both paths agree (the recording skips there),
+      // below 6 mm elsewhere.
       EXPECT_LE(bend.norm(), 0.012) << "the camera jumps at frame " << i;
     }
   }

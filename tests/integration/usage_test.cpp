@@ -28,20 +28,21 @@ TEST(UsageTest, HelpListsEveryCommandAndCarriesTheNotice) {
 }
 
 TEST(UsageTest, WrongLinesEndWithTwo) {
-  const std::vector<std::vector<std::string>> lines = {{},
-                                                       {"recnstruct"},
-                                                       {"reconstruct"},
-                                                       {"reconstruct", "somewhere"},
-                                                       {"reconstruct", "somewhere", "--out", "x", "--preset", "fast"},
-                                                       {"compare", "a", "b"},
-                                                       {"compare", "a", "b", "--out", "c", "--isocentre", "1", "2"},
-                                                       {"compare", "a", "b", "--out", "c", "--isocentre", "1", "2", "x"},
-                                                       {"simulate", "--suite", "ten", "--out", "x"},
-                                                       {"simulate", "--suite", "demo", "--out", "x", "--noise", "none"},
-                                                       {"simulate", "--suite", "demo", "--out", "x", "--frames", "-3"},
-                                                       {"mesh", "a"},
-                                                       {"info"},
-                                                       {"info", "a", "--verbose"}};
+  const std::vector<std::vector<std::string>> lines = {
+      {},
+      {"recnstruct"},
+      {"reconstruct"},
+      {"reconstruct", "somewhere"},
+      {"reconstruct", "somewhere", "--out", "x", "--preset", "fast"},
+      {"compare", "a", "b"},
+      {"compare", "a", "b", "--out", "c", "--isocentre", "1", "2"},
+      {"compare", "a", "b", "--out", "c", "--isocentre", "1", "2", "x"},
+      {"simulate", "--suite", "ten", "--out", "x"},
+      {"simulate", "--suite", "demo", "--out", "x", "--noise", "none"},
+      {"simulate", "--suite", "demo", "--out", "x", "--frames", "-3"},
+      {"mesh", "a"},
+      {"info"},
+      {"info", "a", "--verbose"}};
   for (const auto& line : lines) {
     const RunResult result = Plumb(line);
     EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(line);
@@ -51,7 +52,8 @@ TEST(UsageTest, WrongLinesEndWithTwo) {
 }
 
 TEST(UsageTest, AClosedOrFullStandardOutputIsAnError) {
-  const RunResult result = Plumb({"info", SmallRecording(SmallNames()[0])}, {.stdout_path = "/dev/full"});
+  const RunResult result =
+      Plumb({"info", SmallRecording(SmallNames()[0])}, {.stdout_path = "/dev/full"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("standard output"));
 }

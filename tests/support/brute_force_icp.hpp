@@ -1,4 +1,5 @@
-// Algorithm 1 written down as it stands in the paper, with no data structure at all: the reference for RefinePoses().
+// Algorithm 1 written down as it stands in the paper, with no data structure at all: the reference
+// for RefinePoses().
 #pragma once
 
 #include <cmath>
@@ -8,7 +9,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 
-#include "algo/types/pose.hpp"
+#include "algo/base/pose.hpp"
 
 namespace plumb::testing {
 
@@ -17,8 +18,10 @@ struct BruteForceIcpResult {
   std::vector<double> rms_per_iteration;
 };
 
-/// Least-squares rigid transform by the SVD of the cross-covariance (Arun/Umeyama), apart from the code under test.
-inline Pose ArunFit(const std::vector<Eigen::Vector3d>& to, const std::vector<Eigen::Vector3d>& from) {
+/// Least-squares rigid transform by the SVD of the cross-covariance (Arun/Umeyama), apart from the
+/// code under test.
+inline Pose ArunFit(const std::vector<Eigen::Vector3d>& to,
+                    const std::vector<Eigen::Vector3d>& from) {
   Eigen::Matrix3Xd a(3, static_cast<Eigen::Index>(to.size()));
   Eigen::Matrix3Xd b(3, static_cast<Eigen::Index>(from.size()));
   for (std::size_t i = 0; i < to.size(); ++i) {
@@ -31,7 +34,8 @@ inline Pose ArunFit(const std::vector<Eigen::Vector3d>& to, const std::vector<Ei
 }
 
 /// Every pair of points is looked at. No subsampling: give it the points that take part.
-inline BruteForceIcpResult BruteForceGlobalIcp(std::vector<std::vector<Eigen::Vector3d>> clouds, int num_iterations, double max_radius,
+inline BruteForceIcpResult BruteForceGlobalIcp(std::vector<std::vector<Eigen::Vector3d>> clouds,
+                                               int num_iterations, double max_radius,
                                                double min_radius) {
   BruteForceIcpResult result;
   result.T_refined_world.assign(clouds.size(), Pose::Identity());
@@ -69,7 +73,8 @@ inline BruteForceIcpResult BruteForceGlobalIcp(std::vector<std::vector<Eigen::Ve
       result.T_refined_world[j] = moves[j] * result.T_refined_world[j];
       for (Eigen::Vector3d& p : clouds[j]) p = moves[j] * p;
     }
-    result.rms_per_iteration.push_back(num_pairs > 0 ? std::sqrt(sum_squared / static_cast<double>(num_pairs)) : 0.0);
+    result.rms_per_iteration.push_back(
+        num_pairs > 0 ? std::sqrt(sum_squared / static_cast<double>(num_pairs)) : 0.0);
     radius -= step;
   }
   return result;

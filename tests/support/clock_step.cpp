@@ -1,4 +1,5 @@
-// A library to be loaded before the others: the wall clock goes wrong by as many seconds as the file of PLUMB_CLOCK_OFFSET says.
+// A library to be loaded before the others: the wall clock goes wrong by as many seconds as the
+// file of PLUMB_CLOCK_OFFSET says.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -22,16 +23,20 @@ time_t OffsetSeconds() {
 
 }  // namespace
 
-extern "C" __attribute__((visibility("default"))) int clock_gettime(clockid_t clock, timespec* now) noexcept {
+extern "C" __attribute__((visibility("default"))) int clock_gettime(clockid_t clock,
+                                                                    timespec* now) noexcept {
   const auto result = static_cast<int>(::syscall(SYS_clock_gettime, clock, now));
   if (clock == CLOCK_REALTIME && result == 0) now->tv_sec += OffsetSeconds();
   return result;
 }
 
-// OpenNI2 waits for the end of its threads until a time of the wall clock and then cancels them. A clock that really steps takes the
-// kernel's along; ours does not, so that time is told to the kernel in the kernel's own.
-extern "C" __attribute__((visibility("default"))) int pthread_timedjoin_np(pthread_t thread, void** result, const timespec* deadline) {
-  static const auto kJoin = reinterpret_cast<decltype(&pthread_timedjoin_np)>(::dlsym(RTLD_NEXT, "pthread_timedjoin_np"));
+// OpenNI2 waits for the end of its threads until a time of the wall clock and then cancels them. A
+// clock that really steps takes the kernel's along; ours does not, so that time is told to the
+// kernel in the kernel's own.
+extern "C" __attribute__((visibility("default"))) int pthread_timedjoin_np(
+    pthread_t thread, void** result, const timespec* deadline) {
+  static const auto kJoin =
+      reinterpret_cast<decltype(&pthread_timedjoin_np)>(::dlsym(RTLD_NEXT, "pthread_timedjoin_np"));
   timespec kernels = *deadline;
   kernels.tv_sec -= OffsetSeconds();
   return kJoin(thread, result, &kernels);

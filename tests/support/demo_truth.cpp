@@ -1,6 +1,6 @@
 #include "tests/support/demo_truth.hpp"
 
-#include "algo/types/pose.hpp"
+#include "algo/base/pose.hpp"
 #include "drivers/simulated/suite_plan.hpp"
 
 namespace plumb::testing {
@@ -18,7 +18,8 @@ Pose TrueMotion() {
   for (const simulated::Board& board : plan.room.boards) {
     if (board.id == plan.reference_marker) T_world_marker = board.T_world_marker;
   }
-  return T_world_marker.inverse() * plan.scenes[1].T_world_body * plan.scenes[0].T_world_body.inverse() * T_world_marker;
+  return T_world_marker.inverse() * plan.scenes[1].T_world_body *
+         plan.scenes[0].T_world_body.inverse() * T_world_marker;
 }
 
 }  // namespace
@@ -31,7 +32,8 @@ MotionError ErrorOfMotion(const nlohmann::json& result) {
   const Pose M_true = TrueMotion();
   const auto& c = result["motion"]["centroid_m"];
   const Eigen::Vector3d centroid(c[0], c[1], c[2]);
-  return {.translation_m = (M * centroid - M_true * centroid).norm(), .rotation_rad = RotationAngle(M * M_true.inverse())};
+  return {.translation_m = (M * centroid - M_true * centroid).norm(),
+          .rotation_rad = RotationAngle(M * M_true.inverse())};
 }
 
 }  // namespace plumb::testing

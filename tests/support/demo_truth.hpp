@@ -11,8 +11,8 @@ struct MotionError {
   double rotation_rad = 0;
 };
 
-/// Of a result.json that compares the demo's second scene with its first, as the tests' plumbd plays them. The truth comes from the
-/// simulator's plan, not from images.
+/// Of a result.json that compares the demo's second scene with its first, as the tests' plumbd
+/// plays them. The truth comes from the simulator's plan, not from images.
 [[nodiscard]] MotionError ErrorOfMotion(const nlohmann::json& result);
 
 }  // namespace plumb::testing

@@ -1,6 +1,7 @@
-// A library to be loaded before libgpiod (version 1): button and lights of the unmodified program are files in the folder PLUMB_FAKE_GPIO.
-// `button` is a FIFO of edges, '1' pressed, '0' released, 'x' the line is gone; `held` exists: it is pressed at the start. `lights` gets a
-// line for each level that is set: milliseconds of the steady clock, name of the line, 0 or 1.
+// A library to be loaded before libgpiod (version 1): button and lights of the unmodified program
+// are files in the folder PLUMB_FAKE_GPIO. `button` is a FIFO of edges, '1' pressed, '0' released,
+// 'x' the line is gone; `held` exists: it is pressed at the start. `lights` gets a line for each
+// level that is set: milliseconds of the steady clock, name of the line, 0 or 1.
 #include <fcntl.h>
 #include <gpiod.h>
 #include <time.h>
@@ -33,9 +34,12 @@ void Tell(const gpiod_line& line, int value) {
   timespec now{};
   ::clock_gettime(CLOCK_MONOTONIC, &now);
   char text[128];
-  const int size = std::snprintf(text, sizeof text, "%lld %s %d\n", static_cast<long long>(now.tv_sec) * 1000 + now.tv_nsec / 1'000'000,
-                                 line.name.c_str(), value);
-  const int fd = ::open(InFolder("lights").c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  const int size =
+      std::snprintf(text, sizeof text, "%lld %s %d\n",
+                    static_cast<long long>(now.tv_sec) * 1000 + now.tv_nsec / 1'000'000,
+                    line.name.c_str(), value);
+  const int fd =
+      ::open(InFolder("lights").c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (fd < 0) return;
   (void)!::write(fd, text, static_cast<std::size_t>(size));
   ::close(fd);
@@ -82,6 +86,7 @@ PLUMB_FAKE int gpiod_line_event_read(gpiod_line* line, gpiod_line_event* event) 
   if (::read(line->button, &edge, 1) != 1 || edge == 'x') return -1;
   ::clock_gettime(CLOCK_MONOTONIC, &event->ts);
   line->is_pressed = edge == '1';
-  event->event_type = line->is_pressed ? GPIOD_LINE_EVENT_RISING_EDGE : GPIOD_LINE_EVENT_FALLING_EDGE;
+  event->event_type =
+      line->is_pressed ? GPIOD_LINE_EVENT_RISING_EDGE : GPIOD_LINE_EVENT_FALLING_EDGE;
   return 0;
 }

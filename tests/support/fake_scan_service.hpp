@@ -1,4 +1,5 @@
-// The appliance without a sensor, for tests of the web: everything in memory, a scan goes as its Tick() goes.
+// The appliance without a sensor, for tests of the web: everything in memory, a scan goes as its
+// Tick() goes.
 #pragma once
 
 #include <chrono>
@@ -8,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "web/scan_service.hpp"
+#include "web/service/scan_service.hpp"
 
 namespace plumb::test {
 
@@ -26,13 +27,19 @@ class FakeScanService : public web::ScanService {
   std::vector<web::Reference> references;
   std::vector<web::Scan> scans;  ///< Oldest first.
   web::CheckStatus checks;
-  std::optional<web::CheckRecord> next_check;  ///< What the next check scan finds; nothing: it passes.
+  std::optional<web::CheckRecord>
+      next_check;  ///< What the next check scan finds; nothing: it passes.
+  /// Reads a map of a scan's folder; none: there are no maps.
+  std::function<std::optional<std::string>(const std::filesystem::path&, const std::string&)>
+      make_map;
+  std::vector<web::Display> displays;
   std::vector<web::User> users;
   std::vector<web::AuditEntry> audit;  ///< Oldest first.
   std::shared_ptr<const std::string> preview;
   std::filesystem::path diagnostics_file;
   std::uint64_t uploaded_bytes = 0;
-  /// Folder of the n-th finished scan (0, 1, ...) with its result; a scan beyond the list uses the last.
+  /// Folder of the n-th finished scan (0, 1, ...) with its result; a scan beyond the list uses the
+  /// last.
   struct Recorded {
     std::filesystem::path folder;
     std::optional<web::ResultSummary> result;
@@ -41,11 +48,13 @@ class FakeScanService : public web::ScanService {
   std::optional<Recorded> next_recorded;  ///< Set: what the next finished scan shows, out of turn.
   std::chrono::milliseconds sweep{3000};
   std::chrono::milliseconds work{600};
+  std::optional<web::Guidance> guidance;  ///< Set: what every sweep advises.
   /// Set: completions wait here until the test calls them.
   bool hold_completions = false;
   std::vector<std::function<void()>> held;
 
-  /// Set: what is to be done aside waits here until the test does it: the work, then what follows on the loop.
+  /// Set: what is to be done aside waits here until the test does it: the work, then what follows
+  /// on the loop.
   bool hold_aside = false;
   std::vector<std::function<void()>> held_aside;
   bool refuse_aside = false;  ///< Too much waits already.
@@ -67,46 +76,76 @@ class FakeScanService : public web::ScanService {
   void StartSweep(const web::Actor& actor, web::Done done) override;
   void EndSweep(const web::Actor& actor, web::Done done) override;
   void Cancel(const web::Actor& actor, web::Done done) override;
-  void SetListener(std::function<void(web::EventKind)> listener) override { listener_ = std::move(listener); }
+  void SetListener(std::function<void(web::EventKind)> listener) override {
+    listener_ = std::move(listener);
+  }
   std::vector<web::Patient> Patients() override { return patients; }
   std::optional<web::Patient> FindPatient(const std::string& id) override;
-  void AddPatient(const web::Actor& actor, const std::string& code, const std::string& site, web::Done done) override;
+  void AddPatient(const web::Actor& actor, const std::string& code, const std::string& site,
+                  web::Done done) override;
   void WipePatient(const web::Actor& actor, const std::string& id, web::Done done) override;
-  void OpenPatient(const web::Actor& actor, const std::string& id, web::ScanPurpose purpose, const std::string& reason,
-                   web::Done done) override;
+  void OpenPatient(const web::Actor& actor, const std::string& id, web::ScanPurpose purpose,
+                   const std::string& reason, const std::string& replaces, web::Done done) override;
+  void CloseSession(const web::Actor& actor, const std::string& session_id,
+                    web::Done done) override;
   std::vector<web::Reference> References(const std::string& patient_id) override;
   std::optional<web::Reference> FindReference(const std::string& id) override;
-  void AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason, web::Done done) override;
-  void PlanReference(const web::Actor& actor, const std::string& id, int revision, const web::ReferencePlan& plan, web::Done done) override;
-  void ApproveReference(const web::Actor& actor, const std::string& id, int revision, web::Done done) override;
+  void AddReference(const web::Actor& actor, const std::string& scan_id, const std::string& reason,
+                    web::Done done) override;
+  void PlanReference(const web::Actor& actor, const std::string& id, int revision,
+                     const web::ReferencePlan& plan, web::Done done) override;
+  void ApproveReference(const web::Actor& actor, const std::string& id, int revision,
+                        const std::string& digest, web::Done done) override;
   std::vector<web::Scan> Scans(const std::string& patient_id, int limit) override;
   std::optional<web::Scan> FindScan(const std::string& id) override;
-  void AcceptScan(const web::Actor& actor, const std::string& id, web::Done done) override;
+  void AcceptScan(const web::Actor& actor, const std::string& id, const std::string& reason,
+                  web::Done done) override;
+  std::optional<std::string> CompactMap(const std::string& scan_id,
+                                        const std::string& name) override {
+    const auto scan = FindScan(scan_id);
+    return scan && make_map ? make_map(scan->folder, name) : std::nullopt;
+  }
+  std::optional<std::string> ScanReport(const std::string& scan_id) override {
+    return FindScan(scan_id) ? std::optional<std::string>("%PDF-1.5 a scan") : std::nullopt;
+  }
+  std::optional<std::string> CourseReport(const std::string& patient_id) override {
+    return FindPatient(patient_id) ? std::optional<std::string>("%PDF-1.5 a course") : std::nullopt;
+  }
   web::CheckStatus GetChecks() override { return checks; }
   void OpenCheck(const web::Actor& actor, web::Done done) override;
-  void SetCheckBaseline(const web::Actor& actor, const std::string& check_id, web::Done done) override;
+  void SetCheckBaseline(const web::Actor& actor, const std::string& check_id,
+                        web::Done done) override;
+  std::vector<web::Display> Displays() override { return displays; }
+  void AddDisplay(const web::Actor& actor, const web::Display& display, web::Done done) override;
+  void RemoveDisplay(const web::Actor& actor, const std::string& id, web::Done done) override;
   std::vector<web::User> Users() override { return users; }
   std::optional<web::User> FindUser(const std::string& name) override;
   void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;
   void ChangeUser(const web::Actor& actor, const web::UserChange& change, web::Done done) override;
-  void Log(const web::Actor& actor, const std::string& action, const std::string& subject, const std::string& detail) override;
+  void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
+           const std::string& detail) override;
   std::vector<web::AuditEntry> Audit(std::int64_t before, int limit) override;
   web::Settings GetSettings() override { return settings; }
-  void ChangeSettings(const web::Actor& actor, const web::Settings& changed, web::Done done) override;
+  void ChangeSettings(const web::Actor& actor, const web::Settings& changed,
+                      web::Done done) override;
   web::UpdateStatus GetUpdate() override { return update; }
-  void AddBundle(const web::Actor& actor, const std::filesystem::path& file, const std::string& name, web::Done done) override;
+  void AddBundle(const web::Actor& actor, const std::filesystem::path& file,
+                 const std::string& name, web::Done done) override;
   void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override;
   void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
   void WriteDiagnostics(const web::Actor& actor, web::Done done) override;
 
   /// A reference made of a scan, as AddReference() does it, without the log.
-  web::Reference& MakeReference(const web::Scan& scan, const std::string& by, const std::string& reason);
+  web::Reference& MakeReference(const web::Scan& scan, const std::string& by,
+                                const std::string& reason);
 
  private:
   void Finish(const web::Done& done, web::Change change);
-  void Did(const web::Actor& actor, const std::string& action, const std::string& subject, const web::Done& done,
-           const std::string& id = "");
+  void Did(const web::Actor& actor, const std::string& action, const std::string& subject,
+           const web::Done& done, const std::string& id = "");
   void EndScan();
+  void TellWaiting();
+  [[nodiscard]] bool IsOld(const web::Scan& scan) const;
   void EndCheck();
   void CloseCheck();
   [[nodiscard]] web::Patient* PatientOf(const std::string& id);
@@ -117,6 +156,7 @@ class FakeScanService : public web::ScanService {
   bool is_check_ = false;  ///< The next or running scan is a check.
   std::string checker_, patient_before_check_;
   int next_id_ = 1;
+  std::map<std::string, int> num_fractions_;
 };
 
 }  // namespace plumb::test

@@ -1,4 +1,5 @@
-// A sensor and its provider that do what a test says: frames of a wall, unplugging, stalls, failing drivers.
+// A sensor and its provider that do what a test says: frames of a wall, unplugging, stalls, failing
+// drivers.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "drivers/sensor.hpp"
 
 namespace plumb::testing {
@@ -97,7 +98,8 @@ class FakeBus {
 
 class FakeSensor : public LiveSensor {
  public:
-  FakeSensor(FakeBus& bus, const std::string& serial) : bus_(bus), description_{.uri = serial, .serial = serial, .name = "fake"} {}
+  FakeSensor(FakeBus& bus, const std::string& serial)
+      : bus_(bus), description_{.uri = serial, .serial = serial, .name = "fake"} {}
   [[nodiscard]] const StreamInfo& info() const override { return info_; }
   [[nodiscard]] const SensorDescription& description() const override { return description_; }
   [[nodiscard]] SensorStatistics statistics() const override { return {}; }
@@ -117,9 +119,12 @@ class FakeSensor : public LiveSensor {
   std::optional<Frame> Next() override {
     std::unique_lock lock(bus_.mutex_);
     const auto is_gone = [&] {
-      return std::find(bus_.attached_.begin(), bus_.attached_.end(), description_.serial) == bus_.attached_.end();
+      return std::find(bus_.attached_.begin(), bus_.attached_.end(), description_.serial) ==
+             bus_.attached_.end();
     };
-    bus_.changed_.wait(lock, [&] { return interrupted_ || !bus_.failure_.empty() || is_gone() || bus_.given_ > bus_.taken_; });
+    bus_.changed_.wait(lock, [&] {
+      return interrupted_ || !bus_.failure_.empty() || is_gone() || bus_.given_ > bus_.taken_;
+    });
     if (interrupted_) return std::nullopt;
     if (is_gone()) throw DeviceLost("gone");
     if (!bus_.failure_.empty()) throw DeviceError(std::exchange(bus_.failure_, {}));
@@ -140,7 +145,8 @@ class FakeProvider : public SensorProvider {
   [[nodiscard]] std::vector<SensorDescription> List() override {
     const std::lock_guard lock(bus_.mutex_);
     std::vector<SensorDescription> list;
-    for (const std::string& serial : bus_.attached_) list.push_back({.uri = serial, .serial = serial, .name = "fake"});
+    for (const std::string& serial : bus_.attached_)
+      list.push_back({.uri = serial, .serial = serial, .name = "fake"});
     return list;
   }
   void SetListener(std::function<void()> changed) override {

@@ -8,15 +8,15 @@
 
 #include <exception>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb::testing {
 
 /// How a write ended that ran against a full disk.
 enum class WriteOutcome : int { kDone = 0, kIoError = 1, kOtherError = 2, kDied = 3 };
 
-/// Runs `write` in a child process in which no file can grow beyond `max_bytes`: as on a full disk, the kernel cuts one write short
-/// and refuses the next (with EFBIG in place of ENOSPC).
+/// Runs `write` in a child process in which no file can grow beyond `max_bytes`: as on a full disk,
+/// the kernel cuts one write short and refuses the next (with EFBIG in place of ENOSPC).
 template <typename Write>
 WriteOutcome WriteOnFullDisk(unsigned long max_bytes, const Write& write) {
   const pid_t child = ::fork();
@@ -35,7 +35,8 @@ WriteOutcome WriteOnFullDisk(unsigned long max_bytes, const Write& write) {
     ::_exit(static_cast<int>(outcome));
   }
   int status = 0;
-  if (child < 0 || ::waitpid(child, &status, 0) != child || !WIFEXITED(status)) return WriteOutcome::kDied;
+  if (child < 0 || ::waitpid(child, &status, 0) != child || !WIFEXITED(status))
+    return WriteOutcome::kDied;
   return static_cast<WriteOutcome>(WEXITSTATUS(status));
 }
 

@@ -32,7 +32,8 @@ sockaddr_in Address(const std::string& text, std::uint16_t port) {
 }
 
 std::string Lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return text;
 }
 
@@ -43,7 +44,9 @@ HttpAnswer ParseHead(const std::string& head) {
   while (at < head.size()) {
     const std::size_t end = head.find("\r\n", at), colon = head.find(": ", at);
     if (end == std::string::npos || end == at) break;
-    if (colon < end) answer.headers.emplace(Lower(head.substr(at, colon - at)), head.substr(colon + 2, end - colon - 2));
+    if (colon < end)
+      answer.headers.emplace(Lower(head.substr(at, colon - at)),
+                             head.substr(colon + 2, end - colon - 2));
     at = end + 2;
   }
   return answer;
@@ -56,10 +59,12 @@ std::string HttpAnswer::Header(const std::string& name) const {
   return found == headers.end() ? "" : found->second;
 }
 
-HttpConnection::HttpConnection(std::uint16_t port, const std::string& from) : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+HttpConnection::HttpConnection(std::uint16_t port, const std::string& from)
+    : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
   if (!from.empty()) {
     const sockaddr_in own = Address(from, 0);
-    if (bind(fd_, reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0) throw std::runtime_error("cannot come from " + from);
+    if (bind(fd_, reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0)
+      throw std::runtime_error("cannot come from " + from);
   }
   const sockaddr_in address = Address("127.0.0.1", port);
   if (connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
@@ -75,7 +80,9 @@ HttpConnection::~HttpConnection() {
 HttpConnection::HttpConnection(HttpConnection&& other) noexcept
     : fd_(std::exchange(other.fd_, -1)), received_(std::move(other.received_)) {}
 
-void HttpConnection::SetReceiveBuffer(int bytes) const { setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes); }
+void HttpConnection::SetReceiveBuffer(int bytes) const {
+  setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
+}
 
 bool HttpConnection::Send(const std::string& bytes) {
   std::size_t sent = 0;
@@ -89,7 +96,8 @@ bool HttpConnection::Send(const std::string& bytes) {
 
 bool HttpConnection::Fill() {
   pollfd waiting{fd_, POLLIN, 0};
-  if (poll(&waiting, 1, kLimit_ms) != 1) throw std::runtime_error("no answer within the time limit");
+  if (poll(&waiting, 1, kLimit_ms) != 1)
+    throw std::runtime_error("no answer within the time limit");
   std::array<char, 65536> buffer{};
   const ssize_t count = recv(fd_, buffer.data(), buffer.size(), 0);
   if (count <= 0) return false;
@@ -134,17 +142,21 @@ bool HttpConnection::IsClosedBySoon() {
   }
 }
 
-HttpAnswer HttpClient::Ask(const std::string& method, const std::string& path, const std::string& body) {
-  std::string text = fmt::format("{} {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n", method, path, port_);
+HttpAnswer HttpClient::Ask(const std::string& method, const std::string& path,
+                           const std::string& body) {
+  std::string text = fmt::format("{} {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n",
+                                 method, path, port_);
   if (!cookie.empty()) text += fmt::format("Cookie: {}\r\n", cookie);
   if (!csrf_token.empty()) text += fmt::format("X-CSRF-Token: {}\r\n", csrf_token);
-  if (!body.empty() && !extra_headers.contains("Content-Type")) text += "Content-Type: application/json\r\n";
+  if (!body.empty() && !extra_headers.contains("Content-Type"))
+    text += "Content-Type: application/json\r\n";
   for (const auto& [name, value] : extra_headers) text += fmt::format("{}: {}\r\n", name, value);
   if (method != "GET") text += fmt::format("Content-Length: {}\r\n", body.size());
   HttpConnection connection(port_);
   connection.Send(text + "\r\n" + body);
   HttpAnswer answer = connection.Read(method == "HEAD");
-  if (const std::string set = answer.Header("set-cookie"); !set.empty()) cookie = set.substr(0, set.find(';'));
+  if (const std::string set = answer.Header("set-cookie"); !set.empty())
+    cookie = set.substr(0, set.find(';'));
   return answer;
 }
 
@@ -154,7 +166,9 @@ int HttpClient::LogIn(const std::string& name, const std::string& password) {
   return answer.status;
 }
 
-void HttpClient::FetchToken() { csrf_token = Get("/api/v1/session").json().value("csrf_token", ""); }
+void HttpClient::FetchToken() {
+  csrf_token = Get("/api/v1/session").json().value("csrf_token", "");
+}
 
 struct ServingLoop::Shared {
   std::mutex mutex;
@@ -181,8 +195,10 @@ ServingLoop::~ServingLoop() {
 void ServingLoop::Serve(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     const auto wait = server_.timeout();
-    std::array<pollfd, 2> waiting = {pollfd{server_.fd(), POLLIN, 0}, pollfd{shared_->wake_fd, POLLIN, 0}};
-    const int limit_ms = wait ? static_cast<int>(std::min<std::int64_t>(wait->count(), 1000)) : 1000;
+    std::array<pollfd, 2> waiting = {pollfd{server_.fd(), POLLIN, 0},
+                                     pollfd{shared_->wake_fd, POLLIN, 0}};
+    const int limit_ms =
+        wait ? static_cast<int>(std::min<std::int64_t>(wait->count(), 1000)) : 1000;
     poll(waiting.data(), waiting.size(), each_turn_ ? std::min(limit_ms, 20) : limit_ms);
     std::uint64_t count = 0;
     [[maybe_unused]] const auto drained = read(shared_->wake_fd, &count, sizeof count);

@@ -8,15 +8,16 @@
 #include <string>
 #include <thread>
 
-#include "web/http_server.hpp"
+#include "web/api/http_server.hpp"
 
 namespace plumb::test {
 
-inline constexpr const char* kPassword = "correct horse battery";  ///< Of every account that a test makes.
+inline constexpr const char* kPassword =
+    "correct horse battery";  ///< Of every account that a test makes.
 
 /// What came back.
 struct HttpAnswer {
-  int status = 0;                                   ///< 0: the connection was closed without an answer.
+  int status = 0;  ///< 0: the connection was closed without an answer.
   std::multimap<std::string, std::string> headers;  ///< Names in small letters.
   std::string body;
 
@@ -55,9 +56,13 @@ class HttpClient {
  public:
   explicit HttpClient(std::uint16_t port) : port_(port) {}
   HttpAnswer Get(const std::string& path) { return Ask("GET", path, ""); }
-  HttpAnswer Post(const std::string& path, const nlohmann::json& body) { return Ask("POST", path, body.dump()); }
+  HttpAnswer Post(const std::string& path, const nlohmann::json& body) {
+    return Ask("POST", path, body.dump());
+  }
   HttpAnswer Post(const std::string& path) { return Ask("POST", path, ""); }
-  HttpAnswer Put(const std::string& path, const nlohmann::json& body) { return Ask("PUT", path, body.dump()); }
+  HttpAnswer Put(const std::string& path, const nlohmann::json& body) {
+    return Ask("PUT", path, body.dump());
+  }
   HttpAnswer Ask(const std::string& method, const std::string& path, const std::string& body);
   /// Logs in and fetches the token. @return the status of the login.
   int LogIn(const std::string& name, const std::string& password);

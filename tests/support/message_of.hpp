@@ -1,15 +1,17 @@
-// Messages of expected exceptions: EXPECT_THAT(MessageOf<DataError>(call), HasSubstr("what a person needs to see")).
+// Messages of expected exceptions: EXPECT_THAT(MessageOf<DataError>(call), HasSubstr("what a person
+// needs to see")).
 #pragma once
 
 #include <gmock/gmock.h>
 
 #include <string>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb::testing {
 
-/// Runs `call` and returns the message of the `Error` it throws; a failure of the test if it throws nothing or another kind.
+/// Runs `call` and returns the message of the `Error` it throws; a failure of the test if it throws
+/// nothing or another kind.
 template <typename Error, typename Call>
 std::string MessageOf(Call&& call) {
   try {

@@ -33,7 +33,8 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::chrono::seconds kPatience{120 * kSlowness};  // the machine may be busy with much else
+constexpr std::chrono::seconds kPatience{120 *
+                                         kSlowness};  // the machine may be busy with much else
 constexpr std::chrono::milliseconds kBetweenLooks{20};
 
 std::string ReadAll(const fs::path& file) {
@@ -41,8 +42,8 @@ std::string ReadAll(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Where the frames of the virtual sensor are kept. One folder serves the builds with and without sanitizers: who renders, renders the same
-/// bits.
+/// Where the frames of the virtual sensor are kept. One folder serves the builds with and without
+/// sanitizers: who renders, renders the same bits.
 fs::path FrameFolder() {
   const char* shared = std::getenv("PLUMB_TEST_FRAMES");
   return shared != nullptr ? fs::path(shared) : fs::path(PLUMB_TEST_CACHE);
@@ -51,7 +52,8 @@ fs::path FrameFolder() {
 /// What sanitizers have said, from its first line on; empty if nothing.
 std::string SanitizerReport(const std::string& log) {
   std::size_t begin = std::string::npos;
-  for (const char* mark : {"ThreadSanitizer", "AddressSanitizer", "LeakSanitizer", "UndefinedBehaviorSanitizer", ": runtime error: "}) {
+  for (const char* mark : {"ThreadSanitizer", "AddressSanitizer", "LeakSanitizer",
+                           "UndefinedBehaviorSanitizer", ": runtime error: "}) {
     begin = std::min(begin, log.find(mark));
   }
   if (begin == std::string::npos) return {};
@@ -63,8 +65,10 @@ std::string SanitizerReport(const std::string& log) {
 int MakeNotifySocket(const fs::path& path) {
   ::unlink(path.c_str());
   const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  const int bound = WithUnixAddress(path, [&](const sockaddr* address, socklen_t size) { return ::bind(fd, address, size); });
-  if (fd < 0 || bound != 0) throw std::runtime_error("cannot make a notification socket at " + path.string());
+  const int bound = WithUnixAddress(
+      path, [&](const sockaddr* address, socklen_t size) { return ::bind(fd, address, size); });
+  if (fd < 0 || bound != 0)
+    throw std::runtime_error("cannot make a notification socket at " + path.string());
   return fd;
 }
 
@@ -91,7 +95,8 @@ Plumbd::Plumbd(const fs::path& folder, PlumbdOptions options)
   arguments.insert(arguments.end(), options.arguments.begin(), options.arguments.end());
   options.environment["XDG_CACHE_HOME"] = FrameFolder().string();
   options.environment["NOTIFY_SOCKET"] = (folder_ / "notify.sock").string();
-  if (const auto preload = options.environment.find("LD_PRELOAD"); preload != options.environment.end() && kIsSanitized) {
+  if (const auto preload = options.environment.find("LD_PRELOAD");
+      preload != options.environment.end() && kIsSanitized) {
     preload->second = PLUMB_SANITIZER_RUNTIME ":" + preload->second;
   }
   std::vector<char*> argv;
@@ -106,7 +111,8 @@ Plumbd::Plumbd(const fs::path& folder, PlumbdOptions options)
   for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
   if (options.max_file_bytes > 0) {
     ::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{static_cast<rlim_t>(options.max_file_bytes), static_cast<rlim_t>(options.max_file_bytes)};
+    const rlimit limit{static_cast<rlim_t>(options.max_file_bytes),
+                       static_cast<rlim_t>(options.max_file_bytes)};
     ::setrlimit(RLIMIT_FSIZE, &limit);
   }
   ::execv(argv[0], argv.data());
@@ -123,12 +129,14 @@ Plumbd::~Plumbd() {
   }
   ::close(notify_fd_);
   EXPECT_EQ(SanitizerReport(log()), "");
-  if (::testing::Test::HasFailure()) std::fprintf(stderr, "--- log of plumbd ---\n%s---\n", log().c_str());
+  if (::testing::Test::HasFailure())
+    std::fprintf(stderr, "--- log of plumbd ---\n%s---\n", log().c_str());
 }
 
 json Plumbd::Sim(const std::string& action, const std::string& argument) const {
   json answer;
-  for (const auto end = std::chrono::steady_clock::now() + kPatience; std::chrono::steady_clock::now() < end;) {
+  for (const auto end = std::chrono::steady_clock::now() + kPatience;
+       std::chrono::steady_clock::now() < end;) {
     answer = Ask({{"command", "sim"}, {"action", action}, {"argument", argument}});
     // The control socket answers before the driver is loaded; on a busy machine by seconds.
     if (answer.value("error", "").find("does not listen") == std::string::npos) break;
@@ -152,7 +160,9 @@ json Plumbd::Ask(const json& request) const {
     char buffer[4096];
     while (answer.find('\n') == std::string::npos) {
       pollfd ready{.fd = fd, .events = POLLIN, .revents = 0};
-      if (::poll(&ready, 1, std::chrono::duration_cast<std::chrono::milliseconds>(kPatience).count()) <= 0) break;
+      if (::poll(&ready, 1,
+                 std::chrono::duration_cast<std::chrono::milliseconds>(kPatience).count()) <= 0)
+        break;
       const ssize_t count = ::recv(fd, buffer, sizeof(buffer), 0);
       if (count <= 0) break;
       answer.append(buffer, static_cast<std::size_t>(count));
@@ -165,11 +175,13 @@ json Plumbd::Ask(const json& request) const {
 
 bool Plumbd::HasEnded() const {
   siginfo_t ended{};
-  return ::waitid(P_PID, static_cast<id_t>(pid_), &ended, WEXITED | WNOHANG | WNOWAIT) != 0 || ended.si_pid != 0;
+  return ::waitid(P_PID, static_cast<id_t>(pid_), &ended, WEXITED | WNOHANG | WNOWAIT) != 0 ||
+         ended.si_pid != 0;
 }
 
 bool Plumbd::WaitUntilUp() {
-  for (const auto end = std::chrono::steady_clock::now() + kPatience; std::chrono::steady_clock::now() < end;) {
+  for (const auto end = std::chrono::steady_clock::now() + kPatience;
+       std::chrono::steady_clock::now() < end;) {
     if (!Status().empty()) return true;
     if (HasEnded()) return false;
     std::this_thread::sleep_for(kBetweenLooks);
@@ -179,7 +191,8 @@ bool Plumbd::WaitUntilUp() {
 
 json Plumbd::WaitFor(const std::string& what, const std::function<bool(const json&)>& condition) {
   json status;
-  for (const auto end = std::chrono::steady_clock::now() + kPatience; std::chrono::steady_clock::now() < end;) {
+  for (const auto end = std::chrono::steady_clock::now() + kPatience;
+       std::chrono::steady_clock::now() < end;) {
     status = Status();
     if (!status.empty() && condition(status)) return status;
     if (HasEnded()) break;
@@ -196,7 +209,8 @@ json Plumbd::WaitForState(const std::string& state) {
 json Plumbd::WaitForFrames(int frames) {
   return WaitFor("frames", [&](const json& status) {
     const json& scan = status["scan"];
-    // Under a sanitizer most are dropped, and the sweep would end by itself before so many were used.
+    // Under a sanitizer most are dropped, and the sweep would end by itself before so many were
+    // used.
     const int dropped = kIsSanitized ? scan["frames_dropped"].get<int>() : 0;
     return scan["active"] == true && scan["frames"].get<int>() + dropped >= frames;
   });
@@ -209,7 +223,8 @@ void Plumbd::WaitForLog(const std::string& text) {
 json Plumbd::ScanOnce() {
   EXPECT_EQ(Press()["ok"], true);
   WaitFor("the end of the sweep", [](const json& status) {
-    return status["state"] == "scanning" && status["scan"]["frames"].get<int>() + status["scan"]["frames_dropped"].get<int>() >= 120;
+    return status["state"] == "scanning" &&
+           status["scan"]["frames"].get<int>() + status["scan"]["frames_dropped"].get<int>() >= 120;
   });
   EXPECT_EQ(Press()["ok"], true);
   return WaitForState("result");
@@ -219,8 +234,10 @@ void Plumbd::Signal(int signal) const { ::kill(pid_, signal); }
 
 int Plumbd::Wait() {
   // Its notifications are read meanwhile: it waits for whoever does not.
-  std::array<pollfd, 2> waits{{{static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0)), POLLIN, 0}, {notify_fd_, POLLIN, 0}}};
-  while (waits[0].revents == 0 && (::poll(waits.data(), waits.size(), -1) > 0 || errno == EINTR)) (void)notifications();
+  std::array<pollfd, 2> waits{
+      {{static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0)), POLLIN, 0}, {notify_fd_, POLLIN, 0}}};
+  while (waits[0].revents == 0 && (::poll(waits.data(), waits.size(), -1) > 0 || errno == EINTR))
+    (void)notifications();
   ::close(waits[0].fd);
   int status = 0;
   ::waitpid(pid_, &status, 0);
@@ -238,7 +255,9 @@ std::string Plumbd::log() const { return ReadAll(folder_ / "log"); }
 std::uint16_t Plumbd::port() const {
   const std::string text = log(), marker = "page is served at http://127.0.0.1:";
   const std::size_t at = text.rfind(marker);  // of the last start
-  return at == std::string::npos ? 0 : static_cast<std::uint16_t>(std::atoi(text.c_str() + at + marker.size()));
+  return at == std::string::npos
+             ? 0
+             : static_cast<std::uint16_t>(std::atoi(text.c_str() + at + marker.size()));
 }
 
 std::string Plumbd::setup_code() const {
@@ -277,7 +296,8 @@ long Plumbd::resident_kb() const {
 void RenderOnce() {
   if (std::getenv("PLUMB_TEST_FRAMES") != nullptr) return;  // whoever set it has
   fs::create_directories(PLUMB_TEST_CACHE);
-  const int lock = ::open((fs::path(PLUMB_TEST_CACHE) / "lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
+  const int lock =
+      ::open((fs::path(PLUMB_TEST_CACHE) / "lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
   ::flock(lock, LOCK_EX);
   {
     const TempFolder folder;

@@ -1,4 +1,5 @@
-// A real plumbd with the virtual sensor, as its own process, and what a person at the control socket does with it.
+// A real plumbd with the virtual sensor, as its own process, and what a person at the control
+// socket does with it.
 #pragma once
 
 #include <chrono>
@@ -21,13 +22,15 @@ struct PlumbdOptions {
   std::vector<std::string> arguments = {};  ///< Beside those that every test needs.
   std::map<std::string, std::string> environment = {};
   int sweep_frames = 120;
-  int scenes = 1;                    ///< Of the demo: 2 where `next-scene` shows the moved body. Each takes its time at the start.
+  int scenes = 1;  ///< Of the demo: 2 where `next-scene` shows the moved body. Each takes its time
+                   ///< at the start.
   long max_file_bytes = 0;           ///< > 0: larger files fail as on a full disk.
   std::filesystem::path state = {};  ///< Empty: a folder in the test's own.
 };
 
-/// Starts plumbd and speaks to it. Every wait is for a condition, with a generous end. Killed by its destructor if it still runs; under a
-/// sanitizer asked to end, and whatever that had to say is a failure.
+/// Starts plumbd and speaks to it. Every wait is for a condition, with a generous end. Killed by
+/// its destructor if it still runs; under a sanitizer asked to end, and whatever that had to say is
+/// a failure.
 class Plumbd {
  public:
   /// @param folder  Of the test; outlives it. Holds state/, control.sock, log and config.
@@ -39,8 +42,10 @@ class Plumbd {
   /// Until the control socket answers; false if the process ended before.
   bool WaitUntilUp();
   [[nodiscard]] bool HasEnded() const;
-  /// Until the status fulfils the condition; a failure of the test if it does not in time. Gives the last status.
-  nlohmann::json WaitFor(const std::string& what, const std::function<bool(const nlohmann::json& status)>& condition);
+  /// Until the status fulfils the condition; a failure of the test if it does not in time. Gives
+  /// the last status.
+  nlohmann::json WaitFor(const std::string& what,
+                         const std::function<bool(const nlohmann::json& status)>& condition);
   nlohmann::json WaitForState(const std::string& state);
   /// Until the scan has taken at least so many frames; under a sanitizer until so many have come.
   nlohmann::json WaitForFrames(int frames);
@@ -50,8 +55,11 @@ class Plumbd {
   nlohmann::json ScanOnce();
 
   [[nodiscard]] nlohmann::json Status() const { return Ask({{"command", "status"}}); }
-  nlohmann::json Press(bool is_long = false) const { return Ask({{"command", "press"}, {"long", is_long}}); }
-  /// Waits until the driver listens, which plumbd loads after it has begun to answer; a failure of the test if it then refuses.
+  nlohmann::json Press(bool is_long = false) const {
+    return Ask({{"command", "press"}, {"long", is_long}});
+  }
+  /// Waits until the driver listens, which plumbd loads after it has begun to answer; a failure of
+  /// the test if it then refuses.
   nlohmann::json Sim(const std::string& action, const std::string& argument = {}) const;
   /// One request, one answer; an empty object if nobody answers.
   [[nodiscard]] nlohmann::json Ask(const nlohmann::json& request) const;
@@ -84,8 +92,9 @@ class Plumbd {
   pid_t pid_ = -1;
 };
 
-/// Makes sure that the frames of the virtual sensor that all tests use are rendered. Slow once, quick later. Nothing is done where
-/// $PLUMB_TEST_FRAMES names a folder of frames: toolchain/test has the release build render those that the sanitized ones use.
+/// Makes sure that the frames of the virtual sensor that all tests use are rendered. Slow once,
+/// quick later. Nothing is done where $PLUMB_TEST_FRAMES names a folder of frames: toolchain/test
+/// has the release build render those that the sanitized ones use.
 void RenderOnce();
 
 }  // namespace plumb::testing

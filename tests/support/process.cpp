@@ -28,7 +28,8 @@ void PrepareChild(const ProcessOptions& options) {
   }
   if (options.max_file_bytes > 0) {
     std::signal(SIGXFSZ, SIG_IGN);  // the write fails instead of the process
-    const rlimit limit{static_cast<rlim_t>(options.max_file_bytes), static_cast<rlim_t>(options.max_file_bytes)};
+    const rlimit limit{static_cast<rlim_t>(options.max_file_bytes),
+                       static_cast<rlim_t>(options.max_file_bytes)};
     setrlimit(RLIMIT_FSIZE, &limit);
   }
 }
@@ -37,14 +38,17 @@ void PrepareChild(const ProcessOptions& options) {
 
 Process::Process(const std::vector<std::string>& arguments, const ProcessOptions& options) {
   std::array<int, 2> out{}, err{};
-  if (pipe2(out.data(), O_CLOEXEC) != 0 || pipe2(err.data(), O_CLOEXEC) != 0) throw std::runtime_error("pipe failed");
+  if (pipe2(out.data(), O_CLOEXEC) != 0 || pipe2(err.data(), O_CLOEXEC) != 0)
+    throw std::runtime_error("pipe failed");
   std::vector<char*> argv;
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
   pid_ = fork();
   if (pid_ == 0) {
     PrepareChild(options);
-    const int to = options.stdout_path.empty() ? out[1] : open(options.stdout_path.c_str(), O_WRONLY | O_CLOEXEC);
+    const int to = options.stdout_path.empty()
+                       ? out[1]
+                       : open(options.stdout_path.c_str(), O_WRONLY | O_CLOEXEC);
     dup2(to, STDOUT_FILENO);
     dup2(err[1], STDERR_FILENO);
     execv(argv[0], argv.data());

@@ -10,8 +10,9 @@
 namespace plumb {
 
 struct ProcessOptions {
-  int num_cpus = 0;         ///< > 0: only so many processors may be used.
-  long max_file_bytes = 0;  ///< > 0: writes beyond fail with EFBIG, as a full disk does with ENOSPC.
+  int num_cpus = 0;  ///< > 0: only so many processors may be used.
+  long max_file_bytes =
+      0;  ///< > 0: writes beyond fail with EFBIG, as a full disk does with ENOSPC.
   std::string stdout_path = {};  ///< Not empty: stdout goes there instead of being captured.
 };
 
@@ -48,6 +49,7 @@ struct RunResult {
 };
 
 /// Runs a program to its end.
-[[nodiscard]] RunResult Run(const std::vector<std::string>& arguments, const ProcessOptions& options = {});
+[[nodiscard]] RunResult Run(const std::vector<std::string>& arguments,
+                            const ProcessOptions& options = {});
 
 }  // namespace plumb

@@ -1,5 +1,6 @@
-// What a sanitizer changes for tests of whole programs: everything takes several times as long, so they wait longer, and figures of time
-// and memory say nothing of the product. The work itself is the same.
+// What a sanitizer changes for tests of whole programs: everything takes several times as long, so
+// they wait longer, and figures of time and memory say nothing of the product. The work itself is
+// the same.
 #pragma once
 
 #include <string>
@@ -17,13 +18,16 @@ inline constexpr int kSlowness = 1;
 #endif
 inline constexpr bool kIsSanitized = kSlowness > 1;
 
-/// A figure of time or memory that must stay below a limit. Under a sanitizer it is told, but not held against the limit.
+/// A figure of time or memory that must stay below a limit. Under a sanitizer it is told, but not
+/// held against the limit.
 inline void ExpectBelow(const std::string& what, double figure, double limit) {
   if (!kIsSanitized) {
     EXPECT_LT(figure, limit) << what;
   } else {
-    std::printf("%s: %.0f, not held against its limit of %.0f: a sanitizer takes time and memory of its own\n", what.c_str(), figure,
-                limit);
+    std::printf(
+        "%s: %.0f, not held against its limit of %.0f: a sanitizer takes time and memory of its "
+        "own\n",
+        what.c_str(), figure, limit);
   }
 }
 

@@ -1,5 +1,6 @@
-// A library to be loaded before the others: writes to the file of PLUMB_SYNC_LOG, in their order, what was put onto the disk and what was
-// renamed: `fsync INODE SIZE`, `fdatasync FILE`, `syncfs`, `rename FROM TO`.
+// A library to be loaded before the others: writes to the file of PLUMB_SYNC_LOG, in their order,
+// what was put onto the disk and what was renamed: `fsync INODE SIZE`, `fdatasync FILE`, `syncfs`,
+// `rename FROM TO`.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -19,7 +20,8 @@ Function* Next(const char* name) {
 
 void Note(const std::string& line) {
   const char* file = std::getenv("PLUMB_SYNC_LOG");
-  const int fd = file != nullptr ? ::open(file, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600) : -1;
+  const int fd =
+      file != nullptr ? ::open(file, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600) : -1;
   if (fd < 0) return;
   (void)!::write(fd, line.data(), line.size());
   ::close(fd);
@@ -35,7 +37,8 @@ int fsync(int fd) {
   struct stat status {};
   ::fstat(fd, &status);
   const int result = kNext(fd);
-  if (result == 0) Note("fsync " + std::to_string(status.st_ino) + " " + std::to_string(status.st_size) + "\n");
+  if (result == 0)
+    Note("fsync " + std::to_string(status.st_ino) + " " + std::to_string(status.st_size) + "\n");
   return result;
 }
 

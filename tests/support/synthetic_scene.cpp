@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 
 namespace plumb::test {
 namespace {
@@ -29,11 +29,15 @@ struct Section {
 };
 
 Section TorsoSection(double x, bool wide) {
-  const double end = std::sqrt(std::max(0.0, 1 - std::pow(std::abs(x) / 0.3, 6.0)));  // rounded ends
-  const double shoulders = wide ? 0.03 * std::exp(-std::pow((x - 0.2) / 0.09, 2)) : 0.05 * std::exp(-std::pow((x - 0.17) / 0.08, 2));
-  const double waist = wide ? 0.01 * std::exp(-std::pow((x + 0.02) / 0.1, 2)) : 0.03 * std::exp(-std::pow((x + 0.05) / 0.1, 2));
+  const double end =
+      std::sqrt(std::max(0.0, 1 - std::pow(std::abs(x) / 0.3, 6.0)));  // rounded ends
+  const double shoulders = wide ? 0.03 * std::exp(-std::pow((x - 0.2) / 0.09, 2))
+                                : 0.05 * std::exp(-std::pow((x - 0.17) / 0.08, 2));
+  const double waist = wide ? 0.01 * std::exp(-std::pow((x + 0.02) / 0.1, 2))
+                            : 0.03 * std::exp(-std::pow((x + 0.05) / 0.1, 2));
   const double width = (wide ? 0.2 : 0.165) + shoulders - waist;
-  const double height = (wide ? 0.17 : 0.2) + 0.05 * (x / 0.3) - 0.02 * std::exp(-std::pow((x + 0.1) / 0.07, 2));
+  const double height =
+      (wide ? 0.17 : 0.2) + 0.05 * (x / 0.3) - 0.02 * std::exp(-std::pow((x + 0.1) / 0.07, 2));
   return {std::max(width * end, 1e-4), std::max(height * end, 1e-4)};
 }
 
@@ -44,8 +48,9 @@ Eigen::Vector3d TorsoPoint(double u, double v, bool wide) {
   const double y = section.half_width * std::cos(angle);
   double z = section.height * std::pow(std::max(std::sin(angle), 0.0), 0.8);
   const double on_top = std::sin(angle) * std::min(1.0, section.height / 0.1);
-  z += on_top * (0.025 * Bump(x, y, 0.1, 0.08, 0.05, 0.05) + 0.018 * Bump(x, y, 0.1, -0.07, 0.05, 0.045) -
-                 0.012 * Bump(x, y, -0.12, 0.03, 0.05, 0.06));
+  z += on_top *
+       (0.025 * Bump(x, y, 0.1, 0.08, 0.05, 0.05) + 0.018 * Bump(x, y, 0.1, -0.07, 0.05, 0.045) -
+        0.012 * Bump(x, y, -0.12, 0.03, 0.05, 0.06));
   if (wide) z += on_top * 0.03 * Bump(x, y, -0.1, -0.02, 0.09, 0.1);
   return {x, y, z};
 }
@@ -68,9 +73,10 @@ double FullBodyHeight(double x, double y) {
   double sum = 0.0;
   for (const Limb& limb : limbs) {
     const Eigen::Vector2d along = limb.to - limb.from;
-    const double t = std::clamp((Eigen::Vector2d(x, y) - limb.from).dot(along) / along.squaredNorm(), 0.0, 1.0);
-    const double r =
-        ((Eigen::Vector2d(x, y) - limb.from) - t * along).norm() / (limb.radius_from + t * (limb.radius_to - limb.radius_from));
+    const double t =
+        std::clamp((Eigen::Vector2d(x, y) - limb.from).dot(along) / along.squaredNorm(), 0.0, 1.0);
+    const double r = ((Eigen::Vector2d(x, y) - limb.from) - t * along).norm() /
+                     (limb.radius_from + t * (limb.radius_to - limb.radius_from));
     const double profile = r < 1 ? std::sqrt(1 - r * r) : 0.0;
     sum += std::pow(limb.height * (0.75 + 0.25 * t) * profile, 4.0);
   }
@@ -96,7 +102,8 @@ Eigen::Vector3d BodyPoint(BodyShape shape, double u, double v) {
   return Eigen::Vector3d::Zero();
 }
 
-// Sum of random waves: smooth noise of the given standard deviation with features of some centimetres.
+// Sum of random waves: smooth noise of the given standard deviation with features of some
+// centimetres.
 class SmoothNoise {
  public:
   SmoothNoise(unsigned seed, double sigma_m) : sigma_m_(sigma_m) {
@@ -129,7 +136,8 @@ class VoxelCloud {
  public:
   void Add(const Eigen::Vector3d& p, const Eigen::Vector3d& n) {
     const Eigen::Array3i key = ((p.array() + 10.0) / 0.003).floor().cast<int>();
-    samples_.push_back({(std::int64_t{key[2]} << 40) | (std::int64_t{key[1]} << 20) | key[0], p, n});
+    samples_.push_back(
+        {(std::int64_t{key[2]} << 40) | (std::int64_t{key[1]} << 20) | key[0], p, n});
   }
   [[nodiscard]] PointCloud Take(const Pose& T_scene_reference) {
     std::vector<std::pair<std::int64_t, std::size_t>> order;
@@ -143,7 +151,8 @@ class VoxelCloud {
         p += samples_[order[end].second].p;
         n += samples_[order[end].second].n;
       }
-      cloud.points.push_back((T_scene_reference * (p / static_cast<double>(end - begin))).cast<float>());
+      cloud.points.push_back(
+          (T_scene_reference * (p / static_cast<double>(end - begin))).cast<float>());
       cloud.normals.push_back((T_scene_reference.linear() * n.normalized()).cast<float>());
     }
     return cloud;
@@ -162,7 +171,10 @@ class VoxelCloud {
 class Scanner {
  public:
   Scanner(const SyntheticOptions& options, const GridShape& grid)
-      : options_(options), map_(grid), noise_(options.seed * 7 + 1, options.noise_m), random_(options.seed) {}
+      : options_(options),
+        map_(grid),
+        noise_(options.seed * 7 + 1, options.noise_m),
+        random_(options.seed) {}
 
   void See(const Eigen::Vector3d& p, const Eigen::Vector3d& normal) {
     if (normal.z() < options_.min_up || (options_.hidden && options_.hidden(p))) return;
@@ -172,19 +184,22 @@ class Scanner {
     if (cell && !(map_.z[*cell] >= seen.z())) map_.z[*cell] = static_cast<float>(seen.z());
   }
 
-  // Level ground over the rectangle, where no body is above: a cloud point every second cell, with the four cells around it.
+  // Level ground over the rectangle, where no body is above: a cloud point every second cell, with
+  // the four cells around it.
   void SeeLevel(const std::vector<std::uint8_t>& shadow, double y_low, double y_high, double z) {
     const GridShape& grid = map_.grid;
     for (int row = 0; row + 1 < grid.height; row += 2) {
       if (grid.y_centre(row) < y_low || grid.y_centre(row) > y_high) continue;
       for (int column = 0; column + 1 < grid.width; column += 2) {
-        const Eigen::Vector3d p(grid.x_centre(column) + 0.5 * grid.step, grid.y_centre(row) + 0.5 * grid.step, z);
+        const Eigen::Vector3d p(grid.x_centre(column) + 0.5 * grid.step,
+                                grid.y_centre(row) + 0.5 * grid.step, z);
         if (options_.hidden && options_.hidden(p)) continue;
         const float height = static_cast<float>(z + noise_(p));
         bool seen = false;
         for (int k = 0; k < 4; ++k) {
           const std::size_t cell =
-              static_cast<std::size_t>(row + k / 2) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(column + k % 2);
+              static_cast<std::size_t>(row + k / 2) * static_cast<std::size_t>(grid.width) +
+              static_cast<std::size_t>(column + k % 2);
           if (shadow[cell] != 0) continue;
           if (!(map_.z[cell] >= height)) map_.z[cell] = height;
           seen = true;
@@ -194,7 +209,9 @@ class Scanner {
     }
   }
 
-  [[nodiscard]] double Jitter() { return std::uniform_real_distribution<double>(-0.5, 0.5)(random_); }
+  [[nodiscard]] double Jitter() {
+    return std::uniform_real_distribution<double>(-0.5, 0.5)(random_);
+  }
   [[nodiscard]] const HeightMap& map() const { return map_; }
   [[nodiscard]] VoxelCloud& cloud() { return cloud_; }
 
@@ -218,13 +235,15 @@ class SampleTable {
   explicit SampleTable(BodyShape shape) {
     std::vector<Eigen::Vector3d> points(static_cast<std::size_t>(kRows) * kColumns);
     for (int i = 0; i < kRows; ++i) {
-      for (int j = 0; j < kColumns; ++j) points[At(i, j)] = BodyPoint(shape, (i + 0.5) / kRows, (j + 0.5) / kColumns);
+      for (int j = 0; j < kColumns; ++j)
+        points[At(i, j)] = BodyPoint(shape, (i + 0.5) / kRows, (j + 0.5) / kColumns);
     }
     samples_.resize(points.size());
     for (int i = 1; i + 1 < kRows; ++i) {
       for (int j = 1; j + 1 < kColumns; ++j) {
-        const Eigen::Vector3d n =
-            (points[At(i + 1, j)] - points[At(i - 1, j)]).cross(points[At(i, j + 1)] - points[At(i, j - 1)]).normalized();
+        const Eigen::Vector3d n = (points[At(i + 1, j)] - points[At(i - 1, j)])
+                                      .cross(points[At(i, j + 1)] - points[At(i, j - 1)])
+                                      .normalized();
         samples_[At(i, j)] = {points[At(i, j)], n.z() < 0 ? Eigen::Vector3d(-n) : n};
       }
     }
@@ -241,7 +260,9 @@ class SampleTable {
   }
 
  private:
-  static std::size_t At(int i, int j) { return static_cast<std::size_t>(i) * kColumns + static_cast<std::size_t>(j); }
+  static std::size_t At(int i, int j) {
+    return static_cast<std::size_t>(i) * kColumns + static_cast<std::size_t>(j);
+  }
   std::vector<BodySample> samples_;
 };
 
@@ -252,7 +273,8 @@ std::vector<BodySample> BodySamples(BodyShape shape, Scanner& scanner) {
     const SampleTable& table = SampleTable::Of(shape);
     for (int i = 2; i + 2 < SampleTable::kRows; i += 2) {
       for (int j = 2; j + 2 < SampleTable::kColumns; j += 2) {
-        samples.push_back(table.at(i + (scanner.Jitter() > 0 ? 1 : 0), j + (scanner.Jitter() > 0 ? 1 : 0)));
+        samples.push_back(
+            table.at(i + (scanner.Jitter() > 0 ? 1 : 0), j + (scanner.Jitter() > 0 ? 1 : 0)));
       }
     }
     return samples;
@@ -271,7 +293,8 @@ std::vector<BodySample> BodySamples(BodyShape shape, Scanner& scanner) {
 
 void SeeBody(const SyntheticOptions& options, Scanner& scanner, std::vector<std::uint8_t>& shadow) {
   for (const BodySample& sample : BodySamples(options.shape, scanner)) {
-    const Eigen::Vector3d p_body = options.deform ? Eigen::Vector3d(sample.p + options.deform(sample.p)) : sample.p;
+    const Eigen::Vector3d p_body =
+        options.deform ? Eigen::Vector3d(sample.p + options.deform(sample.p)) : sample.p;
     const Eigen::Vector3d p = options.T_reference_body * p_body;
     if (p.z() < 0) continue;
     const auto cell = scanner.map().grid.cell(p.x(), p.y());
@@ -298,17 +321,20 @@ MarkerMap MakeMarkers(const SyntheticOptions& options, const GridShape& grid) {
   for (std::size_t k = 0; k < places.size(); ++k) {
     Pose T_reference_marker = Pose::Identity();
     T_reference_marker.linear() =
-        Eigen::AngleAxisd(k == 0 ? 0.0 : 0.7 * static_cast<double>(k), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+        Eigen::AngleAxisd(k == 0 ? 0.0 : 0.7 * static_cast<double>(k), Eigen::Vector3d::UnitZ())
+            .toRotationMatrix();
     T_reference_marker.translation() = Eigen::Vector3d(places[k].x(), places[k].y(), 0);
     SceneMarker marker;
     marker.num_views = 10;
     marker.sigma_m = std::max(options.marker_noise_m, 0.0003);
     marker.corners = CornersInMarkerFrame(0.104);
     for (Eigen::Vector3d& p : marker.corners) {
-      p = T_reference_marker * p + options.marker_noise_m * Eigen::Vector3d(noise(random), noise(random), noise(random));
+      p = T_reference_marker * p +
+          options.marker_noise_m * Eigen::Vector3d(noise(random), noise(random), noise(random));
       p = options.T_scene_reference * p;
     }
-    if (!options.hidden_markers.contains(static_cast<int>(k))) markers[static_cast<int>(k)] = marker;
+    if (!options.hidden_markers.contains(static_cast<int>(k)))
+      markers[static_cast<int>(k)] = marker;
   }
   return markers;
 }
@@ -338,8 +364,10 @@ Eigen::Vector3d BodyCentroid(BodyShape shape) {
   for (int i = 1; i < 100; ++i) {
     for (int j = 1; j < 100; ++j) {
       const double h = 0.004;
-      const Eigen::Vector3d du = BodyPoint(shape, i / 100.0 + h, j / 100.0) - BodyPoint(shape, i / 100.0 - h, j / 100.0);
-      const Eigen::Vector3d dv = BodyPoint(shape, i / 100.0, j / 100.0 + h) - BodyPoint(shape, i / 100.0, j / 100.0 - h);
+      const Eigen::Vector3d du =
+          BodyPoint(shape, i / 100.0 + h, j / 100.0) - BodyPoint(shape, i / 100.0 - h, j / 100.0);
+      const Eigen::Vector3d dv =
+          BodyPoint(shape, i / 100.0, j / 100.0 + h) - BodyPoint(shape, i / 100.0, j / 100.0 - h);
       const Eigen::Vector3d p = BodyPoint(shape, i / 100.0, j / 100.0);
       const double area = p.z() > 0.03 ? du.cross(dv).norm() : 0.0;
       sum += area * p;
@@ -374,7 +402,8 @@ Scene MakeSyntheticScene(const SyntheticOptions& options) {
   return scene;
 }
 
-Pose BodyMotionAbout(const Eigen::Vector3d& centre, const Eigen::Vector3d& shift_m, double yaw_deg, double pitch_deg, double roll_deg) {
+Pose BodyMotionAbout(const Eigen::Vector3d& centre, const Eigen::Vector3d& shift_m, double yaw_deg,
+                     double pitch_deg, double roll_deg) {
   const Pose R(Eigen::AngleAxisd(yaw_deg * kDegree, Eigen::Vector3d::UnitZ()) *
                Eigen::AngleAxisd(pitch_deg * kDegree, Eigen::Vector3d::UnitX()) *
                Eigen::AngleAxisd(roll_deg * kDegree, Eigen::Vector3d::UnitY()));

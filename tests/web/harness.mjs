@@ -69,7 +69,7 @@ export class Harness {
     await page.getByLabel('Name').fill(name);
     await page.getByLabel('Password', { exact: true }).fill(kPassword);
     await page.getByLabel('Password again').fill(kPassword);
-    await page.getByRole('button', { name: 'Make the account' }).click();
+    await page.getByRole('button', { name: 'Create account' }).click();
     await page.getByRole('navigation').waitFor();
   }
 
@@ -78,7 +78,7 @@ export class Harness {
     await page.getByLabel('Name').fill(name);
     await page.getByLabel('Password').fill(kPassword);
     await page.getByRole('button', { name: 'Log in' }).click();
-    await page.getByRole('navigation').waitFor();
+    await page.locator('#top .brand').waitFor();
   }
 
   /// On the screen of accounts.
@@ -133,7 +133,7 @@ export class Harness {
 
   /// Keeps a picture of the screen and lets axe look at it.
   async look(page, name, { axe = true, fullPage = true } = {}) {
-    await page.screenshot({ path: this.file(`${name}.png`), fullPage });
+    await page.screenshot({ path: this.file(`${name}.png`), fullPage, timeout: 90000 });
     if (!axe) return;
     // Through the debugger, not as a script element: the page's policy stays in force.
     await page.evaluate(this.axe);

@@ -21,7 +21,7 @@ await h.step('set-up makes the first account and refuses a wrong code', async ()
     await engineer.getByLabel('Name').fill('engineer');
     await engineer.getByLabel('Password', { exact: true }).fill(h.password);
     await engineer.getByLabel('Password again').fill(h.password);
-    await engineer.getByRole('button', { name: 'Make the account' }).click();
+    await engineer.getByRole('button', { name: 'Create account' }).click();
   };
   await fill('AAAA-AAAA');
   await engineer.getByRole('alert').getByText('setup code is wrong').waitFor();
@@ -46,15 +46,15 @@ await h.step('a wrong password is refused in words', async () => {
   await anna.getByRole('alert').getByText('name or password is wrong').waitFor();
   await h.look(anna, 'login');
   await h.logIn(anna, 'anna');
-  await anna.getByText('Last scans').waitFor();
-  equal(await anna.locator('.tile', { hasText: 'Light' }).locator('.big').innerText(), 'green', 'the light, as it is when ready');
+  await anna.getByText('Recent scans').waitFor();
+  await anna.locator('.tile', { hasText: 'Waiting for approval' }).getByText('nothing').waitFor();
   await h.look(anna, 'status');
 });
 
 await h.step('roles see only their own screens', async () => {
   equal(await anna.getByRole('link', { name: 'Log', exact: true }).count(), 0, 'the technician sees no log');
   await anna.goto(`${h.url}#/audit`);
-  await anna.getByText('Your role does not open this page.').waitFor();
+  await anna.getByText('Your role cannot open this page.').waitFor();
 });
 
 await h.step('a new patient is scanned for a reference', async () => {
@@ -63,14 +63,18 @@ await h.step('a new patient is scanned for a reference', async () => {
   await anna.getByLabel('Site').fill('thorax');
   await anna.getByRole('button', { name: 'Add a patient' }).click();
   await anna.getByRole('heading', { name: 'PX-0417' }).waitFor();
-  equal(await anna.getByRole('button', { name: 'Open for a fraction' }).isDisabled(), true, 'no fraction without a reference');
-  await anna.getByRole('button', { name: 'Take a new reference' }).click();
+  equal(await anna.getByRole('button', { name: 'Start treatment session' }).isDisabled(), true, 'no fraction without a reference');
+  await anna.getByRole('button', { name: 'Scan a new reference' }).click();
   await anna.getByText('Press the button to start a sweep.').waitFor();
   await h.look(anna, 'scan-ready');
   await scan(anna);
   await h.look(anna, 'result-reference');
+  // The draft is there by itself, and every screen says whose turn it is.
+  await anna.getByText('Saved as draft version 1.').waitFor();
+  await anna.getByRole('link', { name: 'Open the draft' }).waitFor();
   await anna.goto(`${h.url}#/status`);
-  await anna.locator('.tile', { hasText: 'Light' }).getByText('blue and green in turn').waitFor();  // done, compared with nothing
+  await anna.locator('.tile', { hasText: 'Waiting for approval' }).getByText('PX-0417').waitFor();
+  await h.look(anna, 'status-waiting');
 });
 
 await h.step('a physicist plans, a second one approves', async () => {
@@ -92,12 +96,29 @@ await h.step('a physicist plans, a second one approves', async () => {
   await h.look(bob, 'plan');
   await bob.getByRole('button', { name: 'Save plan' }).click();
   await bob.getByRole('status').getByText('Plan saved.').waitFor({ state: 'attached' });
-  await bob.getByRole('button', { name: 'Approve' }).click();
+  await bob.getByRole('button', { name: 'Review and approve' }).click();
+  await bob.getByRole('button', { name: 'Sign and approve' }).click();
   await bob.getByRole('alert').getByText('a second person must approve').waitFor();
   await h.logIn(clara, 'clara');
   await clara.goto(`${h.url}${new URL(bob.url()).hash}`);
   await clara.getByText('4 corners').waitFor();
-  await clara.getByRole('button', { name: 'Approve' }).click();
+  // With an unsaved edit nothing can be approved, and what is signed is read-only.
+  const review = clara.getByRole('button', { name: 'Review and approve' });
+  await clara.getByLabel('Shifts (mm)').fill('5');
+  equal(await review.getAttribute('aria-disabled'), 'true', 'no approval with unsaved edits');
+  await clara.getByText('There are unsaved changes.').waitFor();
+  await clara.getByLabel('Shifts (mm)').fill('3');
+  equal(await review.getAttribute('aria-disabled'), null, 'what is stored can be approved');
+  await review.click();
+  const signed = clara.getByRole('region', { name: 'You sign exactly this' });
+  await signed.getByText('4 corners').waitFor();
+  equal(await signed.locator('input').count(), 0, 'the summary is read-only');
+  await h.look(clara, 'plan-summary');
+  await clara.getByLabel('Shifts (mm)').fill('5');
+  await signed.waitFor({ state: 'detached' });
+  await clara.getByLabel('Shifts (mm)').fill('3');
+  await review.click();
+  await clara.getByRole('button', { name: 'Sign and approve' }).click();
   await clara.getByText('approved by clara').waitFor();
   await h.look(clara, 'plan-approved');
 });
@@ -106,7 +127,7 @@ await h.step('a fraction shows MOVE with the signs in words', async () => {
   await anna.goto(`${h.url}#/patients`);
   await anna.getByRole('link', { name: 'PX-0417' }).click();
   await h.look(anna, 'patient');
-  await anna.getByRole('button', { name: 'Open for a fraction' }).click();
+  await anna.getByRole('button', { name: 'Start treatment session' }).click();
   await scan(anna, /Start sweep|Scan again/);
   await anna.locator('.verdict.move').waitFor();
   // The body was carried by 6.2 mm to the gantry, 12.4 mm to its left and raised by 4.1 mm (within the turn's share): the correction goes back.
@@ -136,10 +157,12 @@ await h.step('the map reads millimetres by mouse and keyboard', async () => {
   const start = await read();
   check(Math.abs(start.mm) > 4, `the body lies off: ${start.value}`);
   await anna.getByLabel('After the correction').check();
+  await anna.locator('canvas.map[data-map=after]').waitFor();  // it comes only now
   const after = await read();
   near(after.x, start.x, 'the same place');
   check(Math.abs(after.mm) < 0.5 * Math.abs(start.mm), `the correction puts it right: ${start.value}, then ${after.value}`);
   await anna.getByLabel('Before', { exact: true }).check();
+  await anna.locator('canvas.map[data-map=before]').waitFor();
   equal((await read()).value, start.value, 'and back');
   await map.press('ArrowRight');
   await map.press('Shift+ArrowDown');
@@ -154,9 +177,9 @@ await h.step('the map reads millimetres by mouse and keyboard', async () => {
 await h.step('the surface opens in 3-D', async () => {
   await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
   await anna.locator('canvas.mesh[data-ready=yes]').waitFor({ timeout: 60000 });
-  await anna.getByLabel('Reference as a ghost').check();
+  await anna.getByLabel('Show the reference').check();
   await anna.locator('canvas.mesh').press('ArrowLeft');
-  await anna.waitForTimeout(1500);
+  await anna.locator('canvas.mesh[data-ghost=yes]').waitFor({ timeout: 60000 });
   await anna.locator('canvas.mesh').screenshot({ path: h.file('mesh.png') });
 });
 
@@ -218,7 +241,7 @@ await h.step('unplugging during a sweep discards the scan and says so', async ()
   h.tell('unplug');
   await anna.locator('.headline', { hasText: 'Sensor missing' }).waitFor();
   equal(await anna.getByRole('button', { name: 'Start sweep' }).isDisabled(), true, 'no start without a sensor');
-  await anna.getByRole('alert').getByText('The sensor is gone').waitFor();
+  await anna.getByRole('alert').getByText('The sensor was unplugged').waitFor();
   equal(await anna.locator('.verdict').count(), 0, 'no older result is shown for it');
   await h.look(anna, 'scan-unplugged');
   h.tell('plug');
@@ -248,11 +271,13 @@ await h.step('another open patient is pointed out on the result', async () => {
   await anna.goto(`${h.url}#/patients`);
   await anna.getByLabel('Code', { exact: true }).fill('PX-0999');
   await anna.getByRole('button', { name: 'Add a patient' }).click();
-  await anna.getByRole('button', { name: 'Take a new reference' }).click();
+  await anna.getByRole('button', { name: 'Scan a new reference' }).click();
+  await anna.getByRole('button', { name: 'Close PX-0417, open PX-0999' }).click();
+  await anna.locator('.who-line', { hasText: 'PX-0999' }).waitFor();
   const history = await anna.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
   const last = history.scans.find((one) => one.result);
   await anna.goto(`${h.url}#/result/${last.id}`);
-  await anna.getByText('Another patient (PX-0999) is open').waitFor();
+  await anna.getByText('The session of another patient (PX-0999) is open').waitFor();
 });
 
 await h.step('the daily check: overdue, without a baseline, passed, failed', async () => {
@@ -270,10 +295,10 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
   };
   await check();
   await anna.locator('.verdict', { hasText: 'NO BASELINE' }).waitFor();
-  equal(await anna.getByRole('button', { name: 'Take this check' }).count(), 0, 'a technician sets no baseline');
+  equal(await anna.getByRole('button', { name: 'Set as baseline' }).count(), 0, 'a technician sets no baseline');
   await bob.goto(`${h.url}#/check`);
-  await bob.getByRole('button', { name: 'Take this check as the baseline' }).click();
-  await bob.getByText('12 markers, taken by bob').waitFor();
+  await bob.getByRole('button', { name: 'Set as baseline' }).click();
+  await bob.getByText('12 markers, set by bob').waitFor();
   await check();
   await anna.locator('.verdict', { hasText: 'PASSED' }).waitFor();
   await h.look(anna, 'check-passed');
@@ -295,7 +320,7 @@ await h.step('patients, log, settings and update look finished', async () => {
   await bob.getByRole('cell', { name: 'reference.approve' }).waitFor();
   await h.look(bob, 'audit');
   await engineer.goto(`${h.url}#/settings`);
-  await engineer.getByLabel('Log off after idle minutes').fill('20');
+  await engineer.getByLabel('Log out after … min without use').fill('20');
   await engineer.getByRole('button', { name: 'Save' }).click();
   await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
   await h.look(engineer, 'settings');
@@ -303,8 +328,8 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.getByText('plumb-0.2.0.raucb').waitFor();
   await h.look(engineer, 'update');
   const send = async (name, text) => {
-    await engineer.getByLabel('Bundle', { exact: true }).setInputFiles({ name, mimeType: 'application/octet-stream', buffer: Buffer.from(text.padEnd(100000, 'x')) });
-    await engineer.getByRole('button', { name: 'Send' }).click();
+    await engineer.getByLabel('Update file', { exact: true }).setInputFiles({ name, mimeType: 'application/octet-stream', buffer: Buffer.from(text.padEnd(100000, 'x')) });
+    await engineer.getByRole('button', { name: 'Upload' }).click();
   };
   await send('photo.raucb', 'GIF89a');
   await engineer.getByRole('alert').getByText('photo.raucb is no bundle').waitFor();
@@ -318,7 +343,7 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.getByText('restart the appliance to use it').waitFor();
   await bob.goto(`${h.url}#/update`);
   await bob.getByText('plumb-0.3.0.raucb').first().waitFor();
-  equal(await bob.getByRole('button', { name: /Install|Send|Remove/ }).count(), 0, 'a physicist updates nothing');
+  equal(await bob.getByRole('button', { name: /Install|Upload|Remove/ }).count(), 0, 'a physicist updates nothing');
 });
 
 await h.step('a keyboard alone logs in, starts a sweep and ends it', async () => {
@@ -341,7 +366,7 @@ await h.step('a keyboard alone logs in, starts a sweep and ends it', async () =>
   h.tell('plug');
   await keys.locator('.tile.good', { hasText: 'attached' }).waitFor();
   const { body: { patients } } = await h.api(anna, 'patients');
-  equal((await h.api(anna, `patients/${patients.find((one) => one.code === 'PX-0417').id}/open`, 'POST', { purpose: 'fraction', reason: '' })).status, 200, 'a patient to compare');
+  equal((await h.api(anna, `patients/${patients.find((one) => one.code === 'PX-0417').id}/open`, 'POST', { purpose: 'fraction', reason: '', replaces: (await h.api(anna, 'status')).body.session?.id ?? '' })).status, 200, 'a patient to compare');
   await keys.locator('.brand').focus();
   for (let i = 0; i < 40 && (await focused()) !== 'Scan'; ++i) await keys.keyboard.press('Tab');
   await h.look(keys, 'focus', { axe: false });

@@ -1,8 +1,9 @@
-// The real HTTP server over a fake appliance whose scans show real results: for tests of the page in a browser.
-// plumb_web_test_server FOLDER: makes scenes and results in FOLDER, prints its address and "setup code: XXXX-XXXX", obeys lines on stdin:
-// unplug, plug, fail (of the running scan), slow (long sweeps), fast, old (the last result becomes 10 minutes old), quit; of what the next scan shows: markermoved (a
-// check), stranger (another body), shoulder (lifted), "moved AXIS AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by pitch,
-// roll, yaw by degrees).
+// The real HTTP server over a fake appliance whose scans show real results: for tests of the page
+// in a browser. plumb_web_test_server FOLDER: makes scenes and results in FOLDER, prints its
+// address and "setup code: XXXX-XXXX", obeys lines on stdin: unplug, plug, fail (of the running
+// scan), slow (long sweeps), fast, old (the last result becomes 10 minutes old), quit; of what the
+// next scan shows: markermoved (a check), stranger (another body), shoulder (lifted), "moved AXIS
+// AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by pitch, roll, yaw by degrees).
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
@@ -12,18 +13,20 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <map>
 #include <sstream>
 #include <string>
 
+#include "algo/base/units.hpp"
 #include "algo/comparison/comparison.hpp"
 #include "algo/reconstruction/surface_mesh.hpp"
-#include "algo/types/units.hpp"
+#include "daemon/files/compact_map.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
-#include "daemon/store/store_json.hpp"
+#include "daemon/records/store_json.hpp"
 #include "tests/support/fake_scan_service.hpp"
 #include "tests/support/synthetic_scene.hpp"
-#include "web/http_server.hpp"
+#include "web/api/http_server.hpp"
 
 namespace plumb::test {
 namespace {
@@ -51,10 +54,13 @@ SyntheticOptions At(const Pose& T_motion, unsigned seed, double noise_m) {
 /// What the sweeps show in turn: a body, carried, lying right, with its markers covered.
 std::vector<SyntheticOptions> Sweeps() {
   const SyntheticOptions reference = At(Pose::Identity(), 1, 0.0);
-  const SyntheticOptions moved = At(BodyMotionAbout(kCentre, {0.0062, -0.0124, 0.0041}, -2.4, 0.6, -0.5), 2, 0.0008);
-  const SyntheticOptions right = At(BodyMotionAbout(kCentre, {0.0006, -0.0004, 0.0003}, 0.05), 3, 0.0008);
+  const SyntheticOptions moved =
+      At(BodyMotionAbout(kCentre, {0.0062, -0.0124, 0.0041}, -2.4, 0.6, -0.5), 2, 0.0008);
+  const SyntheticOptions right =
+      At(BodyMotionAbout(kCentre, {0.0006, -0.0004, 0.0003}, 0.05), 3, 0.0008);
   SyntheticOptions covered = right;
-  for (const auto& [id, marker] : MakeSyntheticScene(reference).markers) covered.hidden_markers.insert(id);
+  for (const auto& [id, marker] : MakeSyntheticScene(reference).markers)
+    covered.hidden_markers.insert(id);
   covered.hidden_markers.erase(covered.hidden_markers.begin());
   return {reference, moved, right, covered};
 }
@@ -66,11 +72,13 @@ SyntheticOptions Stranger() {
   return stranger;
 }
 
-/// The body lies right, but its left side is lifted at the head end (x to the head, y to the right of who lies on the back).
+/// The body lies right, but its left side is lifted at the head end (x to the head, y to the right
+/// of who lies on the back).
 SyntheticOptions LiftedShoulder() {
   SyntheticOptions lifted = At(Pose::Identity(), 5, 0.0008);
   lifted.deform = [](const Eigen::Vector3d& p) {
-    const double share = std::clamp((p.x() - 0.08) / 0.05, 0.0, 1.0) * std::clamp((-p.y() - 0.01) / 0.04, 0.0, 1.0);
+    const double share =
+        std::clamp((p.x() - 0.08) / 0.05, 0.0, 1.0) * std::clamp((-p.y() - 0.01) / 0.04, 0.0, 1.0);
     return Eigen::Vector3d(0, 0, 0.016 * share);
   };
   return lifted;
@@ -93,17 +101,22 @@ class Recorder {
     return Write(folder, Compare(*reference_, scene, Options()));
   }
 
-  /// A result of which the body's motion in the room is known: `along` the axis (mm), or about it (degrees).
-  FakeScanService::Recorded RecordMotion(const Eigen::Vector3d& axis, bool is_turn, double amount, PatientPosture posture) {
-    if (!still_) still_ = Compare(*reference_, MakeSyntheticScene(At(Pose::Identity(), 6, 0.0)), Options());
+  /// A result of which the body's motion in the room is known: `along` the axis (mm), or about it
+  /// (degrees).
+  FakeScanService::Recorded RecordMotion(const Eigen::Vector3d& axis, bool is_turn, double amount,
+                                         PatientPosture posture) {
+    if (!still_)
+      still_ = Compare(*reference_, MakeSyntheticScene(At(Pose::Identity(), 6, 0.0)), Options());
     const Eigen::Vector3d isocentre = kT_iec_reference * still_->motion->centroid_m;
-    const Pose T_room =
-        is_turn ? Eigen::Translation3d(isocentre) * Pose(Eigen::AngleAxisd(amount * kDegree, axis)) * Eigen::Translation3d(-isocentre)
-                : Pose(Eigen::Translation3d(amount * kMillimetre * axis));
+    const Pose T_room = is_turn ? Eigen::Translation3d(isocentre) *
+                                      Pose(Eigen::AngleAxisd(amount * kDegree, axis)) *
+                                      Eigen::Translation3d(-isocentre)
+                                : Pose(Eigen::Translation3d(amount * kMillimetre * axis));
     Comparison comparison = *still_;
     comparison.motion->T = kT_iec_reference.inverse() * T_room * kT_iec_reference;
-    comparison.correction = CorrectionOf(comparison.motion->T, comparison.motion->covariance, comparison.motion->centroid_m,
-                                         comparison.motion->centroid_m, kT_iec_reference, MarkerKind::kRoom, posture);
+    comparison.correction = CorrectionOf(
+        comparison.motion->T, comparison.motion->covariance, comparison.motion->centroid_m,
+        comparison.motion->centroid_m, kT_iec_reference, MarkerKind::kRoom, posture);
     comparison.verdict = Verdict::kMove;
     comparison.reasons = {"known motion"};
     const fs::path folder = NewFolder();
@@ -129,12 +142,16 @@ class Recorder {
   std::optional<Comparison> still_;
 };
 
-/// "x" is to the right of who faces the gantry, "y" to the gantry, "z" up; "pitch", "roll", "yaw" are turns about them.
-FakeScanService::Recorded Moved(Recorder& recorder, const std::string& axis, double amount, const std::string& posture) {
+/// "x" is to the right of who faces the gantry, "y" to the gantry, "z" up; "pitch", "roll", "yaw"
+/// are turns about them.
+FakeScanService::Recorded Moved(Recorder& recorder, const std::string& axis, double amount,
+                                const std::string& posture) {
   const std::string names[] = {"x", "y", "z", "pitch", "roll", "yaw"};
   const auto which = std::find(std::begin(names), std::end(names), axis) - std::begin(names);
   PatientPosture lies = PatientPosture::kHeadFirstSupine;
-  for (const PatientPosture known : {PatientPosture::kHeadFirstProne, PatientPosture::kFeetFirstSupine, PatientPosture::kFeetFirstProne}) {
+  for (const PatientPosture known :
+       {PatientPosture::kHeadFirstProne, PatientPosture::kFeetFirstSupine,
+        PatientPosture::kFeetFirstProne}) {
     if (posture == Name(known)) lies = known;
   }
   return recorder.RecordMotion(Eigen::Vector3d::Unit(which % 3), which >= 3, amount, lies);
@@ -147,6 +164,17 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
   if (name == "unplug") service.Unplug();
   if (name == "plug") service.Plug();
   if (name == "fail") service.Fail("the recording cannot be written");
+  if (name == "press") service.Press({"button", ""}, [](const web::Change&) {});
+  if (name == "guide") {  // none: as the sweep goes
+    static const std::map<std::string, web::Guidance> kGuidance = {
+        {"good", web::Guidance::kNone},         {"slower", web::Guidance::kSlower},
+        {"closer", web::Guidance::kCloser},     {"farther", web::Guidance::kFarther},
+        {"lost", web::Guidance::kTrackingLost}, {"too_slow", web::Guidance::kComputerTooSlow}};
+    std::string what;
+    words >> what;
+    service.guidance.reset();
+    if (kGuidance.contains(what)) service.guidance = kGuidance.at(what);
+  }
   if (name == "slow") service.sweep = std::chrono::milliseconds(60000);
   if (name == "fast") service.sweep = std::chrono::milliseconds(1500);
   if (name == "installed") {
@@ -156,10 +184,12 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
   }
   if (name == "markermoved") {
     web::CheckRecord check;
-    check.reasons = {"marker 7 moved 12 mm", "the markers lie 3.4 mm (RMS) off where they lay, at most 3 mm are allowed"};
-    check.items = {{"markers_seen", 12, 12, "", true, ""},      {"misfit", 3.4, 3, "mm", false, ""},
-                   {"moved", 12.2, 5, "mm", false, "marker 7"}, {"scale", 0.08, 0.5, "%", true, ""},
-                   {"side", -0.4, 3, "%", true, "marker 9"},    {"depth_scale", 0.62, 3, "%", true, ""}};
+    check.reasons = {"marker 7 moved 12 mm",
+                     "the markers lie 3.4 mm (RMS) off where they lay, at most 3 mm are allowed"};
+    check.items = {
+        {"markers_seen", 12, 12, "", true, ""},      {"misfit", 3.4, 3, "mm", false, ""},
+        {"moved", 12.2, 5, "mm", false, "marker 7"}, {"scale", 0.08, 0.5, "%", true, ""},
+        {"side", -0.4, 3, "%", true, "marker 9"},    {"depth_scale", 0.62, 3, "%", true, ""}};
     check.num_markers = 12;
     service.next_check = check;
   }
@@ -170,6 +200,18 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
     double amount = 0;
     words >> axis >> amount >> posture;
     service.next_recorded = Moved(recorder, axis, amount, posture);
+  }
+  if (name == "tolerated" || name == "unsure") {
+    FakeScanService::Recorded shown = Moved(recorder, "z", 0, "HFS");
+    web::ResultSummary& result = *shown.result;
+    result.verdict = name == "unsure" ? "unsure" : "in_tolerance";
+    if (name == "unsure") {
+      result.correction->vertical_mm = -2.8;
+      result.u95->vertical_mm = 1.2;
+      result.correction->pitch_deg = 0.01;
+      result.u95->pitch_deg = 0.14;
+    }
+    service.next_recorded = shown;
   }
   if (name == "old" && !service.scans.empty()) {
     service.scans.back().finished_at = web::WallClock::now() - std::chrono::minutes(10);
@@ -185,14 +227,26 @@ std::vector<std::string> ReadCommands(std::string& rest) {
   if (count <= 0) return {"quit"};
   rest.append(buffer.data(), static_cast<std::size_t>(count));
   std::vector<std::string> lines;
-  for (std::size_t end; (end = rest.find('\n')) != std::string::npos; rest.erase(0, end + 1)) lines.push_back(rest.substr(0, end));
+  for (std::size_t end; (end = rest.find('\n')) != std::string::npos; rest.erase(0, end + 1))
+    lines.push_back(rest.substr(0, end));
   return lines;
 }
 
 int Serve(const fs::path& root) {
   FakeScanService service;
   Recorder recorder(root);
-  for (const SyntheticOptions& options : Sweeps()) service.recorded.push_back(recorder.Record(options));
+  for (const SyntheticOptions& options : Sweeps())
+    service.recorded.push_back(recorder.Record(options));
+  service.make_map = [](const fs::path& folder,
+                        const std::string& name) -> std::optional<std::string> {
+    try {
+      return CompactMap(folder, name);
+    } catch (const std::exception&) {
+      return std::nullopt;
+    }
+  };
+  service.status.right_xy = {kT_iec_reference(0, 0), kT_iec_reference(0, 1)};
+  service.status.gantry_xy = {kT_iec_reference(1, 0), kT_iec_reference(1, 1)};
   service.sweep = std::chrono::milliseconds(1500);
   service.update = {true, "", "A", false, 0.0, {"plumb-0.2.0.raucb"}};
   web::HttpServerOptions options;
@@ -201,13 +255,16 @@ int Serve(const fs::path& root) {
   options.upload_folder = root / "updates";
   options.max_upload_bytes = 4 << 20;
   web::HttpServer server(service, options);
-  fmt::print("http://127.0.0.1:{}/\nsetup code: {}\n", server.port(), server.setup_code().value_or(""));
+  fmt::print("http://127.0.0.1:{}/\nsetup code: {}\n", server.port(),
+             server.setup_code().value_or(""));
   std::fflush(stdout);
   std::string rest;
   while (true) {
-    std::array<pollfd, 2> waiting = {pollfd{server.fd(), POLLIN, 0}, pollfd{STDIN_FILENO, POLLIN, 0}};
+    std::array<pollfd, 2> waiting = {pollfd{server.fd(), POLLIN, 0},
+                                     pollfd{STDIN_FILENO, POLLIN, 0}};
     const auto wait = server.timeout();
-    poll(waiting.data(), waiting.size(), static_cast<int>(std::min<std::int64_t>(wait ? wait->count() : 50, 50)));
+    poll(waiting.data(), waiting.size(),
+         static_cast<int>(std::min<std::int64_t>(wait ? wait->count() : 50, 50)));
     if (waiting[1].revents != 0) {
       for (const std::string& command : ReadCommands(rest)) {
         if (command == "quit") return 0;

@@ -37,19 +37,22 @@ await h.step('accounts of three roles, a patient, an approved reference', async 
   for (const [, name, role] of kPeople) await h.addAccount(engineer, name, role);
   for (const [page, name] of kPeople) await h.logIn(page, name);
   await addPatient('PX-0001');
-  await anna.getByRole('button', { name: 'Take a new reference' }).click();
+  await anna.getByRole('button', { name: 'Scan a new reference' }).click();
   await scan();
   for (const page of [bob, clara]) {
     await page.goto(`${h.url}#/patients`);
     await page.getByRole('link', { name: 'PX-0001' }).click();
     await page.getByRole('link', { name: 'Plan, Version 1' }).click();
     if (page === bob) await page.getByRole('button', { name: 'Save plan' }).click();
-    else await page.getByRole('button', { name: 'Approve' }).click();
+    else {
+      await page.getByRole('button', { name: 'Review and approve' }).click();
+      await page.getByRole('button', { name: 'Sign and approve' }).click();
+    }
     await page.getByText(page === bob ? 'Plan saved.' : 'approved by clara').waitFor();
   }
   await anna.goto(`${h.url}#/patients`);
   await anna.getByRole('link', { name: 'PX-0001' }).click();
-  await anna.getByRole('button', { name: 'Open for a fraction' }).click();
+  await anna.getByRole('button', { name: 'Start treatment session' }).click();
 });
 
 // What the body did -> the words that put it back. Head first, supine: the head is at the gantry, the patient's left is on the right of
@@ -62,19 +65,19 @@ const kSigns = [
   ['y', -8, 'HFS', 'Longitudinal', '+8.0', 'toward gantry', { y: -1 }, 'too far from the gantry'],
   ['x', 8, 'HFS', 'Lateral', '−8.0', 'to patient right', { x: -1 }, 'too far to its own left'],
   ['x', -8, 'HFS', 'Lateral', '+8.0', 'to patient left', { x: 1 }, 'too far to its own right'],
-  ['pitch', 2, 'HFS', 'Pitch', '−2.00', 'head down', { y: 1 }, 'the head end is lifted'],
-  ['pitch', -2, 'HFS', 'Pitch', '+2.00', 'head up', { y: -1 }, 'the head end hangs'],
-  ['roll', 2, 'HFS', 'Roll', '−2.00', 'patient right side down', { y: 1, end: 'left' }, 'its left side hangs'],
-  ['roll', -2, 'HFS', 'Roll', '+2.00', 'patient left side down', { y: 1, end: 'right' }, 'its right side hangs'],
-  ['yaw', 2, 'HFS', 'Yaw', '−2.00', 'head to patient left', { clockwise: true }, 'turned against the clock: the head went to its right'],
-  ['yaw', -2, 'HFS', 'Yaw', '+2.00', 'head to patient right', { clockwise: false }, 'turned with the clock: the head went to its left'],
+  ['pitch', 2, 'HFS', 'Pitch', '−2.0', 'head down', { y: 1 }, 'the head end is lifted'],
+  ['pitch', -2, 'HFS', 'Pitch', '+2.0', 'head up', { y: -1 }, 'the head end hangs'],
+  ['roll', 2, 'HFS', 'Roll', '−2.0', 'patient right side down', { y: 1, end: 'left' }, 'its left side hangs'],
+  ['roll', -2, 'HFS', 'Roll', '+2.0', 'patient left side down', { y: 1, end: 'right' }, 'its right side hangs'],
+  ['yaw', 2, 'HFS', 'Yaw', '−2.0', 'head to patient left', { clockwise: true }, 'turned against the clock: the head went to its right'],
+  ['yaw', -2, 'HFS', 'Yaw', '+2.0', 'head to patient right', { clockwise: false }, 'turned with the clock: the head went to its left'],
   // The other postures turn the words over, never the sign or the arrow, which are the room's.
   ['x', 8, 'HFP', 'Lateral', '−8.0', 'to patient left', { x: -1 }, 'prone'],
   ['x', 8, 'FFS', 'Lateral', '−8.0', 'to patient left', { x: -1 }, 'feet first'],
   ['x', 8, 'FFP', 'Lateral', '−8.0', 'to patient right', { x: -1 }, 'feet first, prone'],
-  ['pitch', 2, 'FFS', 'Pitch', '−2.00', 'head up', { y: 1 }, 'feet first: what hangs now is the head'],
-  ['roll', 2, 'HFP', 'Roll', '−2.00', 'patient left side down', { y: 1, end: 'left' }, 'prone'],
-  ['yaw', 2, 'FFS', 'Yaw', '−2.00', 'head to patient left', { clockwise: true }, 'feet first: the feet went left of who faces the gantry, the head right'],
+  ['pitch', 2, 'FFS', 'Pitch', '−2.0', 'head up', { y: 1 }, 'feet first: what hangs now is the head'],
+  ['roll', 2, 'HFP', 'Roll', '−2.0', 'patient left side down', { y: 1, end: 'left' }, 'prone'],
+  ['yaw', 2, 'FFS', 'Yaw', '−2.0', 'head to patient left', { clockwise: true }, 'feet first: the feet went left of who faces the gantry, the head right'],
 ];
 
 /// Tail and tip of the card's arrow on the screen, and the middle of its drawing.
@@ -110,7 +113,7 @@ for (const [axis, amount, posture, name, value, words, toward, why] of kSigns) {
     for (const other of await anna.locator('.number').all()) {
       if (await other.getByRole('heading').innerText() === name) continue;
       check(/^0\.0/.test(await other.locator('.value').innerText()), `only ${name} moves: ${await other.innerText()}`);
-      equal(await other.locator('.word').innerText(), 'stays', 'no direction');
+      equal(await other.locator('.word').innerText(), 'no change', 'no direction');
     }
   });
 }
@@ -187,7 +190,7 @@ await h.step('a stream that says nothing any more is no connection', async () =>
     equal(await anna.getByText('No connection to the appliance').count(), 0, 'beats may be late');
     await h.setClockOn(anna, 20);
     await anna.getByRole('alert').getByText('No connection to the appliance').waitFor();
-    equal(await anna.locator('.chip').innerText(), 'No connection to the appliance. Trying again…', 'and above');
+    check(/^Last known: Result, \d+ s ago$/.test(await anna.locator('.chip').innerText()), 'and above');
   } finally {
     h.server.kill('SIGCONT');
   }
@@ -198,7 +201,7 @@ await h.step('a stream that says nothing any more is no connection', async () =>
 await h.step('who logs out without a connection sees no patient any more, and is logged out once there is one', async () => {
   await h.sleep(anna, 0);
   await anna.getByRole('button', { name: 'Log out' }).click();
-  await anna.getByText('You are logged out as soon as it answers.').waitFor();
+  await anna.getByText('You will be logged out as soon as it answers.').waitFor();
   equal(await anna.locator('.identity').count(), 0, 'no result');
   equal(await anna.getByRole('navigation').count(), 0, 'no way to one');
   await h.wake(anna);
@@ -210,11 +213,11 @@ await h.step('who logs out without a connection sees no patient any more, and is
 await h.step('scan again at a fraction takes a fraction, whatever the patient was opened for since', async () => {
   await anna.goto(`${h.url}#/patients`);
   await anna.getByRole('link', { name: 'PX-0001' }).click();
-  await anna.getByRole('button', { name: 'Take a new reference' }).click();
+  await anna.getByRole('button', { name: 'Scan a new reference' }).click();
   await anna.locator('.who-line', { hasText: 'New reference' }).waitFor();
   await anna.goto(`${h.url}#/result`);
   await anna.getByRole('button', { name: 'Scan again' }).click();
-  await anna.locator('.who-line', { hasText: 'PX-0001 · Fraction' }).waitFor();
+  await anna.locator('.who-line', { hasText: /PX-0001\s*Fraction/ }).waitFor();
 });
 
 await h.step('two at one plan: nobody saves over or approves what was not seen', async () => {
@@ -233,10 +236,10 @@ await h.step('two at one plan: nobody saves over or approves what was not seen',
   await clara.getByLabel('Rotations (degrees)').fill('2');
   await shift(bob).fill('6');
   await save(bob);
-  await clara.getByRole('alert').getByText('while you edit it').waitFor();
+  await clara.getByRole('alert').getByText('while you are editing it').waitFor();
   equal(await shift(clara).inputValue(), '5', 'what is edited stays');
   await save(clara);
-  await clara.getByRole('alert').getByText('changed by somebody else meanwhile').waitFor();
+  await clara.getByRole('alert').getByText('Someone else has changed the plan').waitFor();
   equal(await shift(clara).inputValue(), '6', 'what is stored');
   equal(await clara.getByLabel('Rotations (degrees)').inputValue(), '1', 'nothing of what was refused');
   // As an approval that was on its way while bob saved.
@@ -246,8 +249,9 @@ await h.step('two at one plan: nobody saves over or approves what was not seen',
     equal((await h.api(bob, `references/${reference.id}/plan`, 'PUT', { region_m, isocentre_m, posture, couch_markers, shift_tolerance_mm: 7, rotation_tolerance_deg: 1, revision: reference.revision })).status, 200, 'bob saves');
     await route.continue();
   });
-  await clara.getByRole('button', { name: 'Approve' }).click();
-  await clara.getByRole('alert').getByText('changed by somebody else meanwhile').waitFor();
+  await clara.getByRole('button', { name: 'Review and approve' }).click();
+  await clara.getByRole('button', { name: 'Sign and approve' }).click();
+  await clara.getByRole('alert').getByText('Someone else has changed the plan').waitFor();
   equal(await shift(clara).inputValue(), '7', 'what would have been approved unseen');
   await clara.getByText('draft').waitFor();
   await h.look(clara, 'plan-changed');
@@ -287,12 +291,13 @@ await h.step('an account: only what was changed is sent', async () => {
 await h.step('the wrong patient: both codes are on the screen', async () => {
   const last = (await h.api(anna, 'scans?limit=1')).body.scans[0];
   await addPatient('PX-0002');
-  await anna.getByText('Is PX-0002 the patient on the couch?').waitFor();
-  equal(await anna.getByRole('button', { name: 'Open for a fraction' }).isDisabled(), true, 'no fraction without a reference of its own');
-  await anna.getByRole('button', { name: 'Take a new reference' }).click();
+  await anna.getByText('Confirm: PX-0002 is on the couch').waitFor();
+  equal(await anna.getByRole('button', { name: 'Start treatment session' }).isDisabled(), true, 'no fraction without a reference of its own');
+  await anna.getByRole('button', { name: 'Scan a new reference' }).click();
+  await anna.getByRole('button', { name: 'Close PX-0001, open PX-0002' }).click();
   await anna.locator('.who-line', { hasText: 'PX-0002' }).waitFor();  // the scan screen names who is open
   await anna.goto(`${h.url}#/result/${last.id}`);
-  await anna.getByText('Another patient (PX-0002) is open').waitFor();
+  await anna.getByText('The session of another patient (PX-0002) is open').waitFor();
   check((await anna.locator('.identity').innerText()).includes('PX-0001'), 'the result names whose it is');
 });
 
@@ -322,7 +327,7 @@ await h.step('unplugged in the middle of a sweep: no result, and none of before 
   await anna.getByRole('button', { name: /Start sweep|Scan again/ }).click();
   await anna.getByRole('button', { name: 'End sweep' }).waitFor();
   h.tell('unplug');
-  await anna.getByRole('alert').getByText('The sensor is gone').waitFor();
+  await anna.getByRole('alert').getByText('The sensor was unplugged').waitFor();
   equal(await anna.locator('.number').count(), 0, 'no numbers');
   equal((await h.api(anna, 'scans?limit=1')).body.scans[0].outcome, 'failed', 'the scan');
 });

@@ -12,9 +12,30 @@ if(PLUMB_CCACHE)
 endif()
 
 add_library(plumb_options INTERFACE)
-target_include_directories(plumb_options INTERFACE ${PROJECT_SOURCE_DIR})
+target_include_directories(plumb_options INTERFACE
+  $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include/plumb>)
 # -ffp-contract=off: no fused multiply-add behind our back, so results agree between machines.
-target_compile_options(plumb_options INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -ffp-contract=off)
+target_compile_options(plumb_options INTERFACE
+  $<BUILD_INTERFACE:-Wall;-Wextra;-Wshadow;-Wnon-virtual-dtor> -ffp-contract=off)
+
+# Position-independent code, so that one set of objects serves the programs and the Python module.
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+target_compile_options(plumb_options INTERFACE $<BUILD_INTERFACE:-fno-semantic-interposition>)
+
+# What Debian's hardening=+all asks for. Sanitizers bring their own checks and clash with these.
+if(NOT PLUMB_SANITIZE)
+  target_compile_options(plumb_options INTERFACE
+    $<BUILD_INTERFACE:-fstack-protector-strong;-fstack-clash-protection>)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+    target_compile_options(plumb_options INTERFACE $<BUILD_INTERFACE:-fcf-protection>)
+  endif()
+  if(NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
+    target_compile_definitions(plumb_options INTERFACE $<BUILD_INTERFACE:_FORTIFY_SOURCE=2>)
+  endif()
+  target_link_options(plumb_options INTERFACE $<BUILD_INTERFACE:LINKER:-z,relro,-z,now>)
+  include(CheckPIESupported)
+  check_pie_supported()
+endif()
 # The sanitizer's library, which must come before any other that is preloaded.
 set(PLUMB_SANITIZER_RUNTIME "")
 foreach(pair address:libasan.so thread:libtsan.so)

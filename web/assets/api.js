@@ -1,9 +1,9 @@
 // Requests to the appliance, the session, and the stream of its state.
-import { S } from './strings.js';
+import { S, translated } from './strings.js';
 
 export class ApiError extends Error {
   constructor(status, body) {
-    super(body?.error ?? `The appliance answered ${status}.`);
+    super(translated(body?.error) ?? S.answered(status));
     this.status = status;
     this.body = body;
   }
@@ -16,49 +16,95 @@ const kSilent_s = 25;  // the appliance sends a beat every 10 s
 
 /// A moment, for since_s().
 export const now = () => ({ wall: Date.now(), steady: performance.now() });
-/// Seconds since that moment: never negative, and neither too few because the machine slept (the steady clock may have stood still) nor
-/// because its clock was set back.
-export const since_s = (moment) => Math.max(0, Date.now() - moment.wall, performance.now() - moment.steady) / 1000;
+/// Seconds since that moment: never negative, and neither too few because the machine slept (the
+/// steady clock may have stood still) nor because its clock was set back.
+export const since_s = (moment) =>
+  Math.max(0, Date.now() - moment.wall, performance.now() - moment.steady) / 1000;
 
 let session = null;
 let onLoggedOff = () => {};
+let touched = now();  // the session was last used
 
 export const currentSession = () => session;
 export const may = (permission) => session?.permissions.includes(permission) ?? false;
 export const setLoggedOffHandler = (handler) => { onLoggedOff = handler; };
+export const touchedAt = () => touched;
+
+function endSession() {
+  if (!session) return;
+  session = null;
+  onLoggedOff();
+}
 
 const asJson = (response) => response.json();
+const errorOf = async (response) => new ApiError(response.status,
+  await response.json().catch(() => null));
 
 /// What `read` makes of the answer.
-async function ask(method, path, body, { background = false, timeout_ms = kAnswer_ms, read = asJson } = {}) {
+async function ask(method, path, body,
+  { background = false, timeout_ms = kAnswer_ms, read = asJson } = {}) {
   const headers = {};
   if (method !== 'GET' && session) headers['X-CSRF-Token'] = session.csrf_token;
   if (body !== undefined) headers['Content-Type'] = 'application/json';
   if (background) headers['X-Plumb-Background'] = '1';
   let response;
   try {
-    response = await fetch(path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body), cache: 'no-store', signal: AbortSignal.timeout(timeout_ms) });
-    if (response.ok) return await read(response);
+    response = await fetch(path, {
+      method,
+      headers,
+      body: body === undefined ? undefined : JSON.stringify(body),
+      cache: 'no-store',
+      signal: AbortSignal.timeout(timeout_ms),
+    });
+    if (response.ok) {
+      if (!background) noteUse();
+      return await read(response);
+    }
   } catch {
     throw new ApiError(0, { error: S.noAnswer });
   }
-  const problem = await response.json().catch(() => null);
-  if (response.status === 401 && session) {
-    session = null;
-    onLoggedOff();
-  }
-  throw new ApiError(response.status, problem);
+  const problem = await errorOf(response);
+  if (response.status === 401) endSession();
+  throw problem;
 }
 
-const readFile = async (response) => ({ blob: await response.blob(), name: /filename="([^"]+)"/.exec(response.headers.get('Content-Disposition') ?? '')?.[1] ?? 'plumb' });
+function noteUse() {
+  touched = now();
+  channel?.postMessage({ kind: 'used' });
+}
+
+/// The bytes of an answer, with its progress: `onPart(received, total)`, total 0 where not known.
+async function readParts(response, onPart) {
+  const total = Number(response.headers.get('Content-Length') ?? 0);
+  const parts = [];
+  let received = 0;
+  for (const reader = response.body.getReader();;) {
+    const { done, value } = await reader.read();
+    if (done) break;
+    parts.push(value);
+    received += value.length;
+    onPart(received, total);
+  }
+  return new Blob(parts).arrayBuffer();
+}
+
+const nameOf = (response) =>
+  /filename="([^"]+)"/.exec(response.headers.get('Content-Disposition') ?? '')?.[1] ?? 'plumb';
+const readFile = async (response) => ({ blob: await response.blob(), name: nameOf(response) });
 const orNothing = (response) => response.json().catch(() => ({}));
-export const get = (path, background = false) => ask('GET', `/api/v1/${path}`, undefined, { background });
-export const getBytes = (path) => ask('GET', `/api/v1/${path}`, undefined, { timeout_ms: kLongAnswer_ms, read: (response) => response.arrayBuffer() });
-export const post = (path, body) => ask('POST', `/api/v1/${path}`, body, { read: orNothing });
-export const postForFile = (path) => ask('POST', `/api/v1/${path}`, undefined, { timeout_ms: kLongAnswer_ms, read: readFile });
-export const put = (path, body) => ask('PUT', `/api/v1/${path}`, body);
-export const remove = (path) => ask('DELETE', `/api/v1/${path}`, undefined, { timeout_ms: kLongAnswer_ms });
-export const fileUrl = (scanId, name, download) => `/api/v1/scans/${scanId}/files/${name}${download ? '?download' : ''}`;
+const api = (path) => `/api/v1/${path}`;
+export const get = (path, background = false) => ask('GET', api(path), undefined, { background });
+export const getBytes = (path, onPart) => ask('GET', api(path), undefined, {
+  timeout_ms: kLongAnswer_ms,
+  read: (response) => (onPart ? readParts(response, onPart) : response.arrayBuffer()),
+});
+export const post = (path, body) => ask('POST', api(path), body, { read: orNothing });
+export const postForFile = (path) =>
+  ask('POST', api(path), undefined, { timeout_ms: kLongAnswer_ms, read: readFile });
+export const put = (path, body) => ask('PUT', api(path), body);
+export const remove = (path) => ask('DELETE', api(path), undefined, { timeout_ms: kLongAnswer_ms });
+export const fileUrl = (scanId, name, download) =>
+  `/api/v1/scans/${scanId}/files/${name}${download ? '?download' : ''}`;
 
 /// The session, or null; `setupRequired` tells whether there is an account at all.
 export async function loadSession() {
@@ -77,54 +123,174 @@ export async function logOut() {
   session = null;
 }
 
+/// Tabs of one browser share one stream: HTTP/1.1 allows six connections to a host, and a stream
+/// takes one for itself. One visible tab has the stream and passes on what comes.
+const channel = typeof BroadcastChannel === 'function' ? new BroadcastChannel('plumb-live') : null;
+const kMe = `${Date.now()}-${Math.random()}`;
+const kPulse_s = 1;
+const kNoPulse_s = 3.5;
+const kHello_ms = 150;
+const kPoll_ms = 2000;
+const kStreamAgain_ms = 15000;
+
 /// The newest state and who wants to know; when it came, and when anything came at all.
 export const live = {
   status: null,
   received: now(),
-  heard: now(),
+  heard: now(),      // from the appliance, by the tab that has the stream
+  pulse: now(),      // from that tab, by the others
   listeners: new Set(),
   source: null,
-  wanted: false,  // by whoever is logged in, whether there is a stream just now or not
+  wanted: false,  // by a person who is logged in, whether there is a stream at the moment or not
+  leads: false,
+  polls: 0,
   connected: true,
 
   open() {
     this.close();
     this.wanted = true;
+    this.refresh();
+    if (!channel) {
+      this.lead();
+      return;
+    }
+    const before = now();
+    this.pulse = before;
+    channel.postMessage({ kind: 'hello', from: kMe });
+    setTimeout(() => {
+      const answered = this.pulse !== before;
+      if (this.wanted && !this.leads && !answered && !document.hidden) this.lead();
+    }, kHello_ms);
+  },
+  close() {
+    this.wanted = false;
+    this.stopLeading();
+  },
+  refresh() { this.refreshed(); },
+  /// Done once the newest state was asked for and taken.
+  async refreshed() {
+    try {
+      const status = await get('status', true);
+      if (this.wanted) this.take(status);
+    } catch { /* the stream says that there is no connection */ }
+  },
+
+  lead() {
+    this.stopLeading();
+    this.leads = true;
+    this.heard = now();
     const source = new EventSource('/api/v1/events');
     this.source = source;
-    this.heard = now();
     const on = (kind, take) => source.addEventListener(kind, (event) => {
       this.heard = now();
       take(event);
     });
     on('beat', () => {});
-    on('status', (event) => this.take(JSON.parse(event.data)));
-    for (const kind of ['result', 'data', 'update']) on(kind, () => this.tell(kind));
-    on('logged_off', () => {
-      this.close();
-      session = null;
-      onLoggedOff();
-    });
-    source.onopen = () => this.connection(true);
-    source.onerror = () => {
-      this.connection(false);
-      if (source.readyState !== EventSource.CLOSED) return;
-      // The browser gave up: the session is over, or the appliance restarts.
-      this.source = null;
-      const again = () => { if (this.wanted && !this.source) this.open(); };
-      setTimeout(() => { if (this.wanted && !this.source) get('session', true).then(again, (error) => { if (error.status !== 401) again(); }); }, 2000);
+    on('status', (event) => this.pass({ kind: 'status', status: JSON.parse(event.data) }));
+    for (const kind of ['result', 'data', 'update']) on(kind, () => this.pass({ kind }));
+    on('logged_off', () => this.pass({ kind: 'logged_off' }));
+    source.onopen = () => {
+      ++this.polls;
+      this.connection(true);
     };
+    source.onerror = () => {
+      if (source.readyState !== EventSource.CLOSED) {
+        this.connection(false);
+        return;
+      }
+      // The browser gave up: the session is over, the appliance restarts, or it has no stream left.
+      this.source = null;
+      this.poll();
+    };
+    this.sayPulse();
   },
-  close() {
-    this.wanted = false;
+  stopLeading() {
+    ++this.polls;
     this.source?.close();
     this.source = null;
+    if (this.leads) channel?.postMessage({ kind: 'left', from: kMe });
+    this.leads = false;
   },
-  /// A stream may die without an end that the browser sees (sleep, a network that is gone): then not even the beat comes.
+  sayPulse() {
+    channel?.postMessage({ kind: 'pulse', from: kMe, connected: this.connected });
+  },
+
+  /// Without a stream: asks for the state until one can be had again.
+  async poll() {
+    const mine = ++this.polls;
+    const begun = performance.now();
+    let result = this.status?.last_result?.id;
+    while (this.leads && mine === this.polls) {
+      try {
+        const status = await get('status', true);
+        if (mine !== this.polls) return;
+        this.heard = now();
+        this.connection(true);
+        this.pass({ kind: 'status', status });
+        if (status.last_result?.id !== result) {
+          result = status.last_result?.id;
+          this.pass({ kind: 'result' });
+          this.pass({ kind: 'data' });
+        }
+      } catch (error) {
+        if (mine !== this.polls || error.status === 401) return;
+        this.connection(false);
+      }
+      await new Promise((ready) => { setTimeout(ready, kPoll_ms); });
+      if (mine === this.polls && performance.now() - begun > kStreamAgain_ms) {
+        this.lead();
+        return;
+      }
+    }
+  },
+
+  /// A stream may die without an end that the browser sees (sleep, a network that is gone): then
+  /// not even the beat comes. A tab that led may be gone without a word.
   watch() {
-    if (!this.source || since_s(this.heard) <= kSilent_s) return;
+    if (!this.wanted || document.hidden) return;
+    if (!this.leads) {
+      if (!channel || since_s(this.pulse) > kNoPulse_s) this.lead();
+      return;
+    }
+    this.sayPulse();
+    if (since_s(this.heard) <= kSilent_s) return;
     this.connection(false);
-    this.open();
+    this.lead();
+  },
+  pass(message) {
+    channel?.postMessage({ ...message, from: kMe });
+    this.obey(message);
+  },
+  obey(message) {
+    if (message.kind === 'status') this.take(message.status);
+    else if (message.kind === 'logged_off') {
+      this.close();
+      endSession();
+    } else this.tell(message.kind);
+  },
+  /// What another tab says.
+  hear(message) {
+    if (message.kind === 'used') {
+      touched = now();
+      return;
+    }
+    if (!this.wanted) return;
+    if (message.kind === 'hello') {
+      if (this.leads) {
+        this.sayPulse();
+        if (this.status) channel.postMessage({ kind: 'status', status: this.status, from: kMe });
+      }
+    } else if (message.kind === 'left') {
+      setTimeout(() => this.watch(), 50 + 200 * Math.random());
+      this.pulse = { wall: 0, steady: -1e9 };
+    } else if (message.kind === 'pulse') {
+      this.pulse = now();
+      if (this.leads && message.from < kMe) this.stopLeading();
+      if (!this.leads) this.connection(message.connected);
+    } else if (!this.leads) {
+      this.pulse = now();
+      this.obey(message);
+    }
   },
   take(status) {
     this.status = status;
@@ -137,6 +303,7 @@ export const live = {
   connection(connected) {
     if (connected === this.connected) return;
     this.connected = connected;
+    if (this.leads) this.sayPulse();
     this.tell('connection');
     if (connected) this.tell('data');  // what was told meanwhile is not told again
   },
@@ -146,4 +313,16 @@ export const live = {
     return () => this.listeners.delete(listener);
   },
 };
-setInterval(() => live.watch(), 1000);
+channel?.addEventListener('message', (event) => live.hear(event.data));
+setInterval(() => live.watch(), 1000 * kPulse_s);
+// A tab that nobody sees needs no stream.
+document.addEventListener('visibilitychange', () => {
+  if (!live.wanted) return;
+  if (document.hidden) live.stopLeading();
+  else {
+    live.refresh();
+    live.watch();
+    live.tell('data');
+  }
+});
+window.addEventListener('pagehide', () => live.stopLeading());

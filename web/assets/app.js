@@ -1,6 +1,10 @@
 // The page: who is logged in, which screen is shown, and the bar above it.
-import { currentSession, get, live, loadSession, logOut, may, setLoggedOffHandler } from './api.js';
+import {
+  currentSession, get, live, loadSession, logOut, may, now, setLoggedOffHandler, since_s, touchedAt,
+} from './api.js';
 import { clear, h, say, warn } from './dom.js';
+import { mayLeave } from './leave.js';
+import { applyTheme } from './preferences.js';
 import { showAudit } from './screens/audit.js';
 import { showCheck } from './screens/check.js';
 import { showLogin } from './screens/login.js';
@@ -12,7 +16,8 @@ import { showSettings } from './screens/settings.js';
 import { showStatus } from './screens/status.js';
 import { showUpdate } from './screens/update.js';
 import { showUsers } from './screens/users.js';
-import { S } from './strings.js';
+import { languageOf, S, useLanguage } from './strings.js';
+import { followSession, forgetSession } from './treatment.js';
 
 const kScreens = {
   status: { show: showStatus, permission: 'view', nav: true },
@@ -29,6 +34,8 @@ const kScreens = {
 };
 
 const kAskAgain_ms = 3000;
+const kUseEvery_s = 30;
+const kWarn_s = 120;
 const main = document.getElementById('main');
 const top = document.getElementById('top');
 let cleanUp = null;
@@ -63,9 +70,19 @@ function buildTop(session) {
   const links = Object.entries(kScreens)
     .filter(([, screen]) => screen.nav && may(screen.permission))
     .map(([name]) => h('a', { href: `#/${name}` }, S.nav[name]));
+  const nav = h('nav', { 'aria-label': S.nav.label, id: 'nav' }, links);
+  // On a phone the menu takes no room until it is asked for.
+  const menu = h('button', {
+    class: 'quiet menu', type: 'button', 'aria-expanded': 'false', 'aria-controls': 'nav',
+  }, '☰ ', S.nav.menu);
+  const open = (wanted) => {
+    top.classList.toggle('menu-open', wanted);
+    menu.setAttribute('aria-expanded', String(wanted));
+  };
+  menu.addEventListener('click', () => open(!top.classList.contains('menu-open')));
+  nav.addEventListener('click', () => open(false));
   clear(top,
-    h('a', { class: 'brand', href: '#/status' }, S.product),
-    h('nav', { 'aria-label': S.nav.label }, links),
+    h('a', { class: 'brand', href: '#/status' }, S.product), menu, nav,
     h('p', { class: 'chip', id: 'chip' }),
     h('p', { class: 'who' }, S.loggedInAs(session.user, S.roles[session.role])),
     h('button', { class: 'quiet', onclick: () => leave().catch(report) }, S.logOut));
@@ -73,13 +90,14 @@ function buildTop(session) {
 
 let lastState = null;
 function drawChip() {
+  document.body.classList.toggle('disconnected', !live.connected);
   const chip = document.getElementById('chip');
   if (!chip || !live.status) return;
   const { state } = live.status;
-  if (chip.dataset.state !== state || !live.connected) {
-    chip.dataset.state = live.connected ? state : 'offline';
-    chip.textContent = live.connected ? S.states[state] : S.offline;
-  }
+  chip.dataset.state = live.connected ? state : 'offline';
+  const words = live.connected ? S.states[state]
+    : S.lastKnown(S.states[state], Math.floor(since_s(live.received)));
+  if (chip.textContent !== words) chip.textContent = words;
   if (state === lastState) return;
   lastState = state;
   say(S.states[state]);
@@ -109,14 +127,16 @@ async function show() {
   }
 }
 
-/// The focus goes to the new screen at once: later, when its data has come, somebody may have moved it.
+/// The focus goes to the new screen at once: later, when its data has come, somebody may have moved
+/// it.
 function showFocused() {
   const shown = show();
   main.focus({ preventScroll: true });
   return shown;
 }
 
-/// What `question` answers. As long as the appliance does not answer, nothing else is shown than that, and it is asked again.
+/// What `question` answers. As long as the appliance does not answer, nothing else is shown than
+/// that, and it is asked again.
 async function ask(question, text = S.offline) {
   const mine = ++turn;
   waiting = true;
@@ -133,24 +153,36 @@ async function ask(question, text = S.offline) {
         await new Promise((ready) => { setTimeout(ready, kAskAgain_ms); });
       }
     }
-    return null;  // somebody else asks
+    return null;  // another question has taken its place
   } finally {
     if (mine === turn) waiting = false;
   }
 }
 
 async function leave() {
+  if (!mayLeave()) return;
   live.close();
+  forgetSession();
   await ask(logOut, S.leavingOffline).catch(() => {});
   await begin();
+}
+
+function speak(who) {
+  useLanguage(languageOf(who));
+  document.querySelector('.skip').textContent = S.skip;
+  const notice = document.querySelector('.notice');
+  notice.setAttribute('aria-label', S.notice.label);
+  clear(notice.firstElementChild, h('strong', {}, S.notice.strong), ` ${S.notice.text}`);
 }
 
 async function begin(message) {
   const found = await ask(loadSession);
   if (!found) return;
   const { session, setupRequired } = found;
+  speak(session?.user ?? 'login');
+  applyTheme(session?.user ?? 'login');
   drawTop();
-  if (!session) {
+  if (!session || session.role === 'display') {
     document.title = `${S.login.title} · ${S.product}`;
     showLogin(main, setupRequired, () => begin());
     if (message) warn(message);
@@ -160,7 +192,8 @@ async function begin(message) {
   await showFocused();
 }
 
-/// A result that comes while the sweep is watched is shown at once; a scan that failed is said, and no older result is shown for it.
+/// A result that comes while the sweep is watched is shown at once; a scan that failed is said, and
+/// no older result is shown for it.
 async function followScan() {
   const { state, sensor } = await get('status', true);
   if (state === 'result') {
@@ -176,18 +209,82 @@ async function followScan() {
   if (scans[0]?.outcome === 'failed') warn(`${S.result.failed}: ${scans[0].failure}`);
 }
 
+/// Pointer and keys count as use: who draws a plan is not logged out at Save. Two minutes before
+/// the end the page warns.
+let used = now();
+let askedToStay = false;
+for (const kind of ['pointerdown', 'keydown', 'wheel', 'input']) {
+  document.addEventListener(kind, () => {
+    if (!currentSession() || since_s(used) < kUseEvery_s) return;
+    used = now();
+    if (since_s(touchedAt()) >= kUseEvery_s) get('session').catch(() => {});
+  }, { capture: true, passive: true });
+}
+function watchIdle() {
+  const session = currentSession();
+  if (!session || !live.wanted) return;
+  const idle_s = 60 * session.idle_logout_min;
+  const left_s = Math.floor(idle_s - since_s(touchedAt()));
+  const place = document.getElementById('idle');
+  if (left_s > Math.min(kWarn_s, idle_s / 2) || left_s <= 0) {
+    if (askedToStay) clear(place);
+    askedToStay = false;
+    return;
+  }
+  if (!askedToStay) {
+    const stay = h('button', { type: 'button' }, S.stay);
+    stay.addEventListener('click', () => get('session').catch(() => {}));
+    clear(place, h('div', { class: 'alert' }, h('span', { id: 'idle-text' }), stay));
+  }
+  askedToStay = true;
+  document.getElementById('idle-text').textContent = S.logOffSoon(left_s);
+}
+setInterval(() => {
+  watchIdle();
+  if (!live.connected) drawChip();
+}, 1000);
+
 const report = (error) => clear(main, h('p', { class: 'card' }, error.message));
 let lastPurpose = null;
-live.listen((kind) => {
-  lastPurpose = live.status?.scan?.purpose ?? lastPurpose;
-  if (kind === 'connection') warn(live.connected ? '' : S.offline);
-  if (kind === 'connection' && live.connected && failed) show();
-  if (kind === 'status' || kind === 'connection') drawChip();
-  if (kind === 'result' && route().name === 'scan') followScan().catch(() => {});
-});
-setLoggedOffHandler(() => { live.close(); begin(S.loggedOff).catch(report); });
-window.addEventListener('hashchange', () => {
-  if (!currentSession() || waiting) return;
-  showFocused();
-});
-begin().catch(report);
+const watchesSession = () => ['scan', 'result'].includes(route().name);
+
+function listen() {
+  live.listen((kind) => {
+    lastPurpose = live.status?.scan?.purpose ?? lastPurpose;
+    if (kind === 'connection') warn(live.connected ? '' : S.offline);
+    if (kind === 'connection' && live.connected && failed) show();
+    if (kind === 'status' || kind === 'connection') drawChip();
+    if (kind === 'status') followSession(watchesSession(), () => live.tell('acknowledged'));
+    if (kind === 'result' && route().name === 'scan') followScan().catch(() => {});
+  });
+  setLoggedOffHandler(() => {
+    live.close();
+    forgetSession();
+    clear(document.getElementById('idle'));
+    begin(S.loggedOff).catch(report);
+  });
+  window.addEventListener('plumb-language', () => {
+    drawnFor = null;
+    speak(currentSession().user);
+    showFocused();
+  });
+  let shownHash = location.hash;
+  window.addEventListener('hashchange', () => {
+    if (!currentSession() || waiting) return;
+    if (location.hash === shownHash) return;
+    if (!mayLeave()) {
+      history.replaceState(null, '', shownHash || '#/status');
+      return;
+    }
+    shownHash = location.hash;
+    showFocused();
+  });
+}
+
+if (location.pathname === '/room') {
+  import('./screens/room.js').then(({ showRoom }) => showRoom(main, { speak, applyTheme }))
+    .catch(report);
+} else {
+  listen();
+  begin().catch(report);
+}

@@ -62,7 +62,7 @@ const rows = assets.map((asset) => {
   return `    {${literal(Buffer.from(asset.path))}, ${literal(Buffer.from(asset.type))}, ${view(asset.data)},\n     ${view(packed)}, ${asset.hashed}},`;
 });
 writeFileSync(output, `// Made by web/assets/build.mjs.
-#include "web/assets.hpp"
+#include "web/assets/assets.hpp"
 
 namespace plumb::web {
 namespace {

@@ -1,4 +1,6 @@
 // Elements without markup in strings: what comes from outside is always text.
+import { S } from './strings.js';
+
 const kSvg = 'http://www.w3.org/2000/svg';
 
 function fill(element, properties, children) {
@@ -8,15 +10,18 @@ function fill(element, properties, children) {
     else if (name === 'value') element.value = value;
     else element.setAttribute(name, value === true ? '' : value);
   }
-  element.append(...children.flat(3).filter((child) => child !== null && child !== undefined && child !== false));
+  element.append(...children.flat(3).filter(isShown));
   return element;
 }
 
-export const h = (tag, properties, ...children) => fill(document.createElement(tag), properties, children);
-export const svg = (tag, properties, ...children) => fill(document.createElementNS(kSvg, tag), properties, children);
+const isShown = (child) => child !== null && child !== undefined && child !== false;
+export const h = (tag, properties, ...children) =>
+  fill(document.createElement(tag), properties, children);
+export const svg = (tag, properties, ...children) =>
+  fill(document.createElementNS(kSvg, tag), properties, children);
 
 export const clear = (element, ...children) => {
-  element.replaceChildren(...children.flat(3).filter((child) => child !== null && child !== undefined && child !== false));
+  element.replaceChildren(...children.flat(3).filter(isShown));
   return element;
 };
 
@@ -26,7 +31,8 @@ export function field(label, control, hint) {
   control.id ||= `f${++counter}`;
   const hintId = `${control.id}h`;
   if (hint) control.setAttribute('aria-describedby', hintId);
-  return h('div', { class: 'field' }, h('label', { for: control.id }, label), control, hint && h('p', { class: 'hint', id: hintId }, hint));
+  return h('div', { class: 'field' }, h('label', { for: control.id }, label), control,
+    hint && h('p', { class: 'hint', id: hintId }, hint));
 }
 
 export const checkbox = (label, checked, properties) => {
@@ -36,7 +42,8 @@ export const checkbox = (label, checked, properties) => {
 };
 
 export const select = (choices, value, properties) => {
-  const element = h('select', properties, ...Object.entries(choices).map(([key, text]) => h('option', { value: key }, text)));
+  const element = h('select', properties,
+    ...Object.entries(choices).map(([key, text]) => h('option', { value: key }, text)));
   element.value = value;
   return element;
 };
@@ -56,7 +63,10 @@ export const done = (text) => say(text, true);
 
 export function warn(text) {
   const place = document.getElementById('alert');
-  clear(place, text ? h('p', { class: 'alert' }, h('span', {}, text), h('button', { class: 'quiet', onclick: () => warn(''), 'aria-label': 'Close' }, '✕')) : '');
+  const close = () => h('button', {
+    class: 'quiet', onclick: () => warn(''), 'aria-label': S.close,
+  }, '✕');
+  clear(place, text ? h('p', { class: 'alert' }, h('span', {}, text), close()) : '');
 }
 
 /// A form that calls `submit` with its button off meanwhile.
@@ -70,7 +80,8 @@ export function form(properties, submit, ...children) {
   return element;
 }
 
-/// A button that is off says so, but can be focused: one that is `disabled` loses the focus, and who works by keys starts anew.
+/// A button that is off says so, but can be focused: one that is `disabled` loses the focus, and
+/// people who work with the keyboard would have to start again.
 export function enable(button, enabled) {
   button.dataset.off = enabled ? '' : 'yes';
   mark(button);
@@ -103,19 +114,22 @@ export function action(label, task, properties) {
   return button;
 }
 
-/// What tells a control from the others after it was built anew.
-const nameOf = (control) => [control.tagName, control.getAttribute('href'), control.getAttribute('aria-label') ?? control.textContent].join(' ');
+/// What identifies a control after it was built again.
+const nameOf = (control) => [control.tagName, control.getAttribute('href'),
+  control.getAttribute('aria-label') ?? control.textContent].join(' ');
 
 /// Changes what is in `element`; the focus stays on the same control, where there still is one.
 export function keepFocus(element, change) {
   const focused = element.contains(document.activeElement) ? nameOf(document.activeElement) : null;
   change();
   if (focused === null || element.contains(document.activeElement)) return;
-  [...element.querySelectorAll('a, button, input, select, summary, [tabindex]')].find((control) => nameOf(control) === focused)?.focus({ preventScroll: true });
+  [...element.querySelectorAll('a, button, input, select, summary, [tabindex]')]
+    .find((control) => nameOf(control) === focused)?.focus({ preventScroll: true });
 }
 
 const drawn = new WeakMap();
-/// As clear(), but what is there stays when nothing differs: neither the focus nor what a reader reads is taken away.
+/// As clear(), but what is there stays when nothing differs: neither the focus nor what a reader
+/// reads is taken away.
 export function redraw(element, ...children) {
   const fresh = clear(element.cloneNode(false), ...children);
   const html = fresh.innerHTML;
@@ -126,7 +140,14 @@ export function redraw(element, ...children) {
 
 export function table(headings, rows, caption) {
   return h('div', { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': caption },
-    h('table', {}, h('caption', { class: 'visually-hidden' }, caption), h('thead', {}, h('tr', {}, headings.map((text) => h('th', { scope: 'col' }, text)))), h('tbody', {}, rows)));
+    h('table', {}, h('caption', { class: 'visually-hidden' }, caption),
+      h('thead', {}, h('tr', {}, headings.map((text) => h('th', { scope: 'col' }, text)))),
+      h('tbody', {}, rows)));
 }
 
-export const localTime = (iso) => (iso ? new Date(iso).toLocaleString('en-GB', { year: 'numeric', month: 'short', day: '2-digit', hour: '2-digit', minute: '2-digit' }) : '–');
+export const localTime = (iso) => (iso ? new Date(iso).toLocaleString(S.locale, {
+  year: 'numeric', month: 'short', day: '2-digit', hour: '2-digit', minute: '2-digit',
+}) : '–');
+export const localDay = (iso) => (iso ? new Date(iso).toLocaleDateString(S.locale, {
+  month: 'short', day: '2-digit',
+}) : '–');

@@ -1,127 +1,234 @@
 // The error map with a cursor that reads millimetres, and the profile through it.
-import { fileUrl, get, getBytes } from './api.js';
+import { fileUrl, get, live } from './api.js';
 import { clear, h, svg } from './dom.js';
-import { cellAt, paintErrors, paintOverlay, readTiff } from './maps.js';
+import { compassOf, drawCropped, mapFrame, viewOf } from './map_frame.js';
+import { cellAt, errorColour, loadMap, paintErrors, paintOverlay } from './maps.js';
 import { signed } from './numbers.js';
 import { S } from './strings.js';
 
-function legend(tolerance_mm) {
+const kTicks = [-20, -10, -5, -2, -1, 1, 2, 5, 10, 20];  // tolerances
+
+/// The scale, evenly spaced by its stops: the white part is the tolerance, and every stop carries
+/// its number.
+export function legend(tolerance_mm) {
   const text = S.result;
-  return h('div', { class: 'legend' }, h('span', {}, `−${(20 * tolerance_mm).toFixed(0)} mm`), h('span', { class: 'scale', role: 'img', 'aria-label': `${text.lower}, ${text.higher}` }), h('span', {}, `+${(20 * tolerance_mm).toFixed(0)} mm`),
-    h('span', { class: 'keys' }, h('span', { class: 'key low' }, text.lower), h('span', { class: 'key high' }, text.higher), h('span', { class: 'key gap' }, text.unknown)));
+  const stops = kTicks.map((tick, i) => {
+    const [r, g, b] = errorColour(tick).map(Math.round);
+    return `rgb(${r} ${g} ${b}) ${(100 * (i + 0.5)) / kTicks.length}%`;
+  });
+  const said = `${text.lower}, ${text.higher}`;
+  const scale = h('div', { class: 'scale', role: 'img', 'aria-label': said });
+  scale.style.setProperty('background', `linear-gradient(90deg, ${stops.slice(0, 5).join(', ')}, `
+    + `#fafaf8 50%, ${stops.slice(5).join(', ')})`);
+  const label = (tick) => {
+    const value = Math.abs(tick * tolerance_mm);
+    return `${tick < 0 ? '−' : '+'}${Number.isInteger(value) ? value : value.toFixed(1)}`;
+  };
+  return h('div', { class: 'legend' },
+    h('div', { class: 'scale-box' }, scale,
+      h('div', { class: 'ticks', 'aria-hidden': 'true' }, kTicks.map((tick) =>
+        h('span', { class: Math.abs(tick) === 1 ? 'limit' : '' }, label(tick))))),
+    h('p', { class: 'hint' }, `mm, ${text.tolerance(tolerance_mm, 'mm')}`),
+    h('p', { class: 'keys' }, h('span', { class: 'key low' }, text.lower),
+      h('span', { class: 'key high' }, text.higher), h('span', { class: 'key gap' }, text.unknown),
+      h('span', { class: 'key hole' }, text.hole_),
+      h('span', { class: 'key edge' }, text.regionOutline)));
 }
 
-function profile(grid, reference, deviation, cursor, along) {
+const kProfile = { width: 640, height: 240, left: 42, bottom: 34, top: 8, right: 8 };
+
+/// Heights along a line through the cursor; both axes in centimetres, equally marked.
+function profile(grid, view, reference, deviation, cursor, along) {
+  const { width, height, left, bottom, top, right } = kProfile;
+  const from = along === 0 ? view.x_min : view.y_max - view.height;
+  const length = along === 0 ? view.width : view.height;
   const points = [];
-  const n = along === 0 ? grid.width : grid.height;
-  for (let i = 0; i < n; i += 2) {
-    const x = along === 0 ? grid.x_min + (i + 0.5) * grid.step : cursor.x;
-    const y = along === 0 ? cursor.y : grid.y_min + (i + 0.5) * grid.step;
-    const cell = cellAt(grid, x, y);
-    if (cell >= 0) points.push({ s: i / n, z: reference.values[cell], d: deviation.values[cell] });
+  for (let s = grid.step / 2; s < length; s += 2 * grid.step) {
+    const cell = cellAt(grid, along === 0 ? from + s : cursor.x, along === 0 ? cursor.y : from + s);
+    if (cell >= 0) points.push({ s, z: reference.values[cell], d: deviation.values[cell] });
   }
-  const heights = points.flatMap((point) => [point.z, point.z + point.d]).filter(Number.isFinite);
-  const low = Math.min(-0.02, ...heights);
-  const high = Math.max(0.1, ...heights);
+  const heights = points.flatMap(({ z, d }) => [z, z + d]).filter(Number.isFinite);
+  const low = Math.floor(10 * Math.min(0, ...heights)) / 10;
+  const high = Math.max(low + 0.1, Math.ceil(20 * Math.max(0.1, ...heights)) / 20);
+  const x = (s) => left + s / length * (width - left - right);
+  const y = (z) => height - bottom - (z - low) / (high - low) * (height - bottom - top);
   const path = (value) => {
     let pen = 'M';
     let d = '';
     for (const point of points) {
       const z = value(point);
       if (!Number.isFinite(z)) { pen = 'M'; continue; }
-      d += `${pen}${(point.s * 600).toFixed(1)} ${(150 - (z - low) / (high - low) * 140).toFixed(1)}`;
+      d += `${pen}${x(point.s).toFixed(1)} ${y(z).toFixed(1)}`;
       pen = 'L';
     }
     return d;
   };
-  const here = along === 0 ? (cursor.x - grid.x_min) / (grid.width * grid.step) : (cursor.y - grid.y_min) / (grid.height * grid.step);
-  return svg('svg', { viewBox: '0 0 600 160', class: 'profile', role: 'img', 'aria-label': S.result.sliceLabel, preserveAspectRatio: 'none' },
-    svg('line', { x1: here * 600, x2: here * 600, y1: 0, y2: 160, class: 'zero' }), svg('path', { d: path((point) => point.z), class: 'line-reference' }), svg('path', { d: path((point) => point.z + point.d), class: 'line-current' }));
+  const ticks = (low_m, high_m, step) => Array.from(
+    { length: Math.floor((high_m - low_m) / step + 1e-6) + 1 },
+    (_, i) => (Math.ceil(low_m / step - 1e-6) + i) * step).filter((v) => v <= high_m + 1e-6);
+  const cm = (v) => (100 * v).toFixed(0);
+  const here = along === 0 ? cursor.x - from : cursor.y - from;
+  return svg('svg', {
+    viewBox: `0 0 ${width} ${height}`, class: 'profile', role: 'img',
+    'aria-label': S.result.sliceLabel,
+  },
+  ticks(from, from + length, 0.1).map((v) => [
+    svg('line', { x1: x(v - from), x2: x(v - from), y1: top, y2: height - bottom, class: 'grid' }),
+    svg('text', { x: x(v - from), y: height - bottom + 14, class: 'tick middle' }, cm(v))]),
+  ticks(low, high, 0.05).map((v) => [
+    svg('line', { x1: left, x2: width - right, y1: y(v), y2: y(v), class: 'grid' }),
+    svg('text', { x: left - 5, y: y(v) + 4, class: 'tick' }, cm(v))]),
+  svg('text', { x: (left + width) / 2, y: height - 3, class: 'tick middle' }, S.result.sliceWay),
+  svg('text', {
+    x: 11, y: (height - bottom) / 2, class: 'tick middle',
+    transform: `rotate(-90 11 ${(height - bottom) / 2})`,
+  }, S.result.sliceHeight),
+  svg('line', { x1: x(here), x2: x(here), y1: top, y2: height - bottom, class: 'zero' }),
+  svg('path', { d: path(({ z }) => z), class: 'line-reference' }),
+  svg('path', { d: path(({ z, d }) => z + d), class: 'line-current' }));
 }
 
 /// Map and reading side by side; the map is never higher than three quarters of the window.
-function row(grid, ...children) {
+function row(view, ...children) {
   const element = h('div', { class: 'map-row' }, ...children);
-  element.style.setProperty('--map-width', `${75 * grid.width / grid.height}vh`);
+  element.style.setProperty('--map-width', `${75 * view.width / view.height}vh`);
   return element;
 }
 
 const kAround = 2;  // cells to each side: what is read is the surface, not one cell's noise
 function around({ width, values }, cell) {
   const known = [];
-  for (let dy = -kAround; dy <= kAround; ++dy) for (let dx = -kAround; dx <= kAround; ++dx) {
-    const value = values[cell + dy * width + dx];
-    if (Number.isFinite(value)) known.push(value);
+  for (let dy = -kAround; dy <= kAround; ++dy) {
+    for (let dx = -kAround; dx <= kAround; ++dx) {
+      const value = values[cell + dy * width + dx];
+      if (Number.isFinite(value)) known.push(value);
+    }
   }
-  return known.length * 4 < (2 * kAround + 1) ** 2 ? NaN : known.sort((a, b) => a - b)[known.length >> 1];
+  return known.length * 4 < (2 * kAround + 1) ** 2 ? NaN
+    : known.sort((a, b) => a - b)[known.length >> 1];
+}
+
+/// What came so far of all that was begun, into `place`.
+function progressIn(place) {
+  const bar = h('progress', { max: 1, 'aria-label': S.loading });
+  clear(place, h('p', { class: 'hint' }, S.loading), bar);
+  const parts = new Map();
+  return (name) => (received, total) => {
+    parts.set(name, [received, total]);
+    const sums = [...parts.values()].reduce(([a, b], [r, t]) => [a + r, b + t], [0, 0]);
+    if (sums[1] > 0) bar.value = sums[0] / sums[1];
+  };
+}
+
+async function loadAll(scan, reference, place) {
+  const scene = await get(`scans/${reference.scan_id}/files/scene.json`, true);
+  const grid = scene.heightmap;
+  const part = progressIn(place);
+  const [before, region, heights] = await Promise.all([
+    loadMap(scan.id, 'deviation', part('map')),
+    loadMap(scan.id, 'region', part('region')).catch(() => null),
+    loadMap(reference.scan_id, 'heightmap', part('heights'))]);
+  const fits = (map) => map.width === grid.width && map.height === grid.height;
+  if (!fits(before) || !fits(heights)) throw new Error();
+  return { grid, before, region, heights };
 }
 
 /// Figure with map, reading and profile for a scan with a result; falls back to the picture.
-export async function errorMap(scan, reference, tolerance_mm) {
+/// @param place  Shows the progress meanwhile.
+export async function errorMap(scan, reference, tolerance_mm, place) {
   const text = S.result;
-  const picture = () => h('figure', {}, h('img', { src: fileUrl(scan.id, 'error_map.png'), alt: text.mapPicture, class: 'picture' }));
-  let grid;
-  let maps;
-  let heights;
+  let loaded;
   try {
-    const scene = await get(`scans/${reference.scan_id}/files/scene.json`, true);
-    grid = scene.heightmap;
-    const [before, after, base] = await Promise.all([
-      getBytes(`scans/${scan.id}/files/deviation.tiff`).then(readTiff), getBytes(`scans/${scan.id}/files/deviation_after.tiff`).then(readTiff, () => null), getBytes(`scans/${reference.scan_id}/files/heightmap.tiff`).then(readTiff)]);
-    if (before.width !== grid.width || before.height !== grid.height || base.width !== grid.width) throw new Error();
-    maps = { before, after };
-    heights = base;
+    loaded = await loadAll(scan, reference, place);
   } catch {
-    return { element: h('div', {}, h('p', { class: 'hint' }, text.mapFailed), picture()), grid: null };
+    const picture = h('figure', {}, h('img', {
+      src: fileUrl(scan.id, 'error_map.png'), alt: text.mapPicture, class: 'picture',
+    }));
+    const element = h('div', {}, h('p', { class: 'hint' }, text.mapFailed), picture);
+    return { element, grid: null };
   }
+  const { grid, region, heights } = loaded;
+  const maps = { before: loaded.before, after: null };
+  const view = viewOf(grid, region);
+  const compass = compassOf(live.status?.room, reference.plan.posture);
+  const isocentre = scan.details?.correction?.isocentre;
 
-  const canvas = h('canvas', { class: 'map', tabindex: '0', role: 'application', 'aria-label': text.mapLabel });
+  const canvas = h('canvas', {
+    class: 'map', tabindex: '0', role: 'application', 'aria-label': text.mapLabel,
+  });
   const cross = h('div', { class: 'cross', 'aria-hidden': 'true' });
   const reading = h('p', { class: 'reading', 'aria-live': 'polite' });
   const slice = h('div', {});
   const shown = { map: 'before', along: 0 };
-  const cursor = { x: grid.x_min + grid.width * grid.step / 2, y: grid.y_min + grid.height * grid.step / 2 };
-  const isocentre = scan.details?.correction?.isocentre;
+  const y_min = view.y_max - view.height;
+  const cursor = { x: view.x_min + view.width / 2, y: y_min + view.height / 2 };
   if (isocentre) [cursor.x, cursor.y] = isocentre;
 
   const read = () => {
     const cell = cellAt(grid, cursor.x, cursor.y);
     const value = cell < 0 ? NaN : around(maps[shown.map], cell);
-    clear(reading, h('strong', {}, cell < 0 ? text.outsideMap : Number.isNaN(value) ? text.unknown : text.reads(signed(1000 * value))), ` ${text.at(cursor.x, cursor.y)}`);
-    cross.style.setProperty('left', `${100 * (cursor.x - grid.x_min) / (grid.width * grid.step)}%`);
-    cross.style.setProperty('top', `${100 * (1 - (cursor.y - grid.y_min) / (grid.height * grid.step))}%`);
-    clear(slice, profile(grid, heights, maps[shown.map], cursor, shown.along));
+    const words = cell < 0 ? text.outsideMap : Number.isNaN(value)
+      ? region?.values[cell] === 2 ? text.hole_ : text.unknown : text.reads(signed(1000 * value));
+    clear(reading, h('strong', {}, words), ` ${text.at(cursor.x, cursor.y)}`);
+    cross.style.setProperty('left', `${100 * (cursor.x - view.x_min) / view.width}%`);
+    cross.style.setProperty('top', `${100 * (view.y_max - cursor.y) / view.height}%`);
+    clear(slice, profile(grid, view, heights, maps[shown.map], cursor, shown.along));
   };
   const move = (x, y) => {
-    cursor.x = Math.max(grid.x_min, Math.min(grid.x_min + (grid.width - 0.5) * grid.step, x));
-    cursor.y = Math.max(grid.y_min, Math.min(grid.y_min + (grid.height - 0.5) * grid.step, y));
+    cursor.x = Math.max(view.x_min, Math.min(view.x_min + view.width - grid.step / 2, x));
+    cursor.y = Math.max(y_min, Math.min(view.y_max - grid.step / 2, y));
     read();
   };
   canvas.addEventListener('pointermove', (event) => {
     const box = canvas.getBoundingClientRect();
-    move(grid.x_min + (event.clientX - box.left) / box.width * grid.width * grid.step, grid.y_min + (1 - (event.clientY - box.top) / box.height) * grid.height * grid.step);
+    move(view.x_min + (event.clientX - box.left) / box.width * view.width,
+      view.y_max - (event.clientY - box.top) / box.height * view.height);
   });
   canvas.addEventListener('keydown', (event) => {
     const by = (event.shiftKey ? 0.05 : 0.005);
-    const direction = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    const direction = {
+      ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
+    }[event.key];
     if (!direction) return;
     event.preventDefault();
     move(cursor.x + by * direction[0], cursor.y + by * direction[1]);
   });
-  const draw = () => paintErrors(canvas, maps[shown.map], tolerance_mm / 1000, shown.map === 'before' ? maps.after : null);
+  const draw = () => {
+    drawCropped(canvas, view, (whole) =>
+      paintErrors(whole, maps[shown.map], tolerance_mm / 1000, region));
+    canvas.dataset.map = shown.map;
+  };
+  // The second map comes only when it is asked for.
   const choose = (name, value, label, apply) => {
-    const input = h('input', { type: 'radio', name, value, checked: value === shown[name === 'map' ? 'map' : 'along'] });
-    input.addEventListener('change', () => { shown[name === 'map' ? 'map' : 'along'] = value; apply(); });
+    const input = h('input', { type: 'radio', name, value, checked: value === shown[name] });
+    input.addEventListener('change', async () => {
+      if (name === 'map' && !maps[value]) maps[value] = await loadMap(scan.id, 'deviation_after');
+      shown[name] = value;
+      apply();
+    });
     return h('label', { class: 'check' }, input, ' ', label);
   };
   draw();
   read();
-  const box = h('div', { class: 'map-box' }, canvas, cross);
-  const profileBox = h('div', {}, h('h3', {}, text.slice), h('fieldset', { class: 'row plainset' }, h('legend', { class: 'visually-hidden' }, text.slice), choose('along', 0, text.sliceAlong[0], read), choose('along', 1, text.sliceAlong[1], read)), slice,
-    h('p', { class: 'keys' }, h('span', { class: 'key reference' }, text.reference_), h('span', { class: 'key current' }, text.current_)));
+  const both = () => { draw(); read(); };
+  const box = mapFrame({ grid, view, canvas, region, compass, isocentre, cross });
+  const profileBox = h('div', {}, h('h3', {}, text.slice),
+    h('fieldset', { class: 'row plainset' }, h('legend', { class: 'visually-hidden' }, text.slice),
+      choose('along', 0, text.sliceAlong[0], read), choose('along', 1, text.sliceAlong[1], read)),
+    slice, h('p', { class: 'keys' }, h('span', { class: 'key reference' }, text.reference_),
+      h('span', { class: 'key current' }, text.current_)));
   const element = h('div', {},
-    h('fieldset', { class: 'row plainset' }, h('legend', { class: 'visually-hidden' }, text.where), choose('map', 'before', text.before, () => { draw(); read(); }), maps.after && choose('map', 'after', text.after, () => { draw(); read(); })),
-    row(grid, box, h('div', { class: 'map-side' }, reading, legend(tolerance_mm), profileBox)));
-  const overlay = (target) => paintOverlay(target, heights, maps.before, tolerance_mm / 1000, grid.step);
-  return { element, grid, deviation: maps.before, region: maps.after, overlay };
+    h('fieldset', { class: 'row plainset' }, h('legend', { class: 'visually-hidden' }, text.where),
+      choose('map', 'before', text.before, both), choose('map', 'after', text.after, both)),
+    row(view, box, h('div', { class: 'map-side' }, reading, legend(tolerance_mm), profileBox)));
+  const overlay = () => {
+    const still = h('canvas', { class: 'still-map', role: 'img', 'aria-label': text.overlayAlt });
+    drawCropped(still, view, (whole) =>
+      paintOverlay(whole, heights, maps.before, tolerance_mm / 1000, grid.step));
+    return { element: mapFrame({ grid, view, canvas: still, region, compass, isocentre }) };
+  };
+  return {
+    element, grid, deviation: maps.before, region, overlay, compass,
+    legend: () => legend(tolerance_mm),
+  };
 }

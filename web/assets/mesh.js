@@ -23,12 +23,49 @@ function colourByError(geometry, grid, deviation, region, T, tolerance_m) {
   geometry.setAttribute('color', new THREE.BufferAttribute(colours, 3, true));
 }
 
-/// Draws into `canvas`; returns {setGhost(url), stop()}. Throws where there is no WebGL.
-export async function openMesh(canvas, { url, grid, deviation, region, T, tolerance_m }) {
-  const renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+const kGround = 0x0d1216;
+
+/// A small sign of what lies where: an arrow for the head and one for the patient's left.
+function compassArrows(compass, centre, size) {
+  const group = new THREE.Group();
+  if (!compass) return group;
+  const arrow = ([x, y], colour) => group.add(new THREE.ArrowHelper(
+    new THREE.Vector3(x, y, 0).normalize(), new THREE.Vector3(), size, colour, size / 3, size / 6));
+  arrow(compass.head, 0x7fd4c1);
+  arrow(compass.left, 0xffb95c);
+  group.add(new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), size, 0x8ec5ff,
+    size / 3, size / 6));
+  group.position.copy(centre);
+  return group;
+}
+
+/// Box of the vertices within the region of interest, else of all: what the camera looks at.
+function boxOfInterest(geometry, grid, region, T) {
+  const box = new THREE.Box3();
+  const position = geometry.getAttribute('position');
+  const point = new THREE.Vector3();
+  for (let i = 0; i < position.count; i += 3) {
+    point.fromBufferAttribute(position, i);
+    const { x, y, z } = point;
+    const u = T ? T[0][0] * x + T[0][1] * y + T[0][2] * z + T[0][3] : x;
+    const v = T ? T[1][0] * x + T[1][1] * y + T[1][2] * z + T[1][3] : y;
+    const cell = grid && region ? cellAt(grid, u, v) : -1;
+    if (cell >= 0 && !Number.isNaN(region.values[cell])) box.expandByPoint(point);
+  }
+  if (!box.isEmpty()) return box;
+  geometry.computeBoundingBox();
+  return geometry.boundingBox.clone();
+}
+
+/// Draws into `canvas`. Throws where there is no WebGL.
+/// Gives setGhost(url, share), setShare(share), look(name), picture(), stop().
+export async function openMesh(canvas, { url, grid, deviation, region, T, tolerance_m, compass }) {
+  const renderer = new THREE.WebGLRenderer({
+    canvas, antialias: true, logarithmicDepthBuffer: true, preserveDrawingBuffer: true,
+  });
   const scene = new THREE.Scene();
-  scene.background = new THREE.Color(0x0d1216);
-  const camera = new THREE.PerspectiveCamera(40, 1, 0.01, 20);
+  scene.background = new THREE.Color(kGround);
+  const camera = new THREE.PerspectiveCamera(40, 1, 0.05, 10);
   camera.up.set(0, 0, 1);
   scene.add(new THREE.HemisphereLight(0xffffff, 0x445566, 1.6));
   const sun = new THREE.DirectionalLight(0xffffff, 1.8);
@@ -37,13 +74,15 @@ export async function openMesh(canvas, { url, grid, deviation, region, T, tolera
   const loader = new PLYLoader();
   const geometry = await loader.loadAsync(url);
   colourByError(geometry, grid, deviation, region, T, tolerance_m);
-  const body = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.9, side: THREE.DoubleSide }));
-  scene.add(body);
-  geometry.computeBoundingSphere();
-  const { center, radius } = geometry.boundingSphere;
-  camera.position.set(center.x, center.y - 1.05 * radius, center.z + 1.15 * radius);
+  const material = new THREE.MeshStandardMaterial({
+    vertexColors: true, roughness: 0.9, side: THREE.DoubleSide,
+  });
+  scene.add(new THREE.Mesh(geometry, material));
+  const box = boxOfInterest(geometry, grid, region, T);
+  const { center, radius } = box.getBoundingSphere(new THREE.Sphere());
+  const corner = new THREE.Vector3(box.min.x, box.min.y, box.max.z + 0.05);
+  scene.add(compassArrows(compass, corner, 0.25 * radius));
   const controls = new OrbitControls(camera, canvas);
-  controls.target.copy(center);
   controls.enableDamping = false;
 
   let due = false;
@@ -65,8 +104,25 @@ export async function openMesh(canvas, { url, grid, deviation, region, T, tolera
   controls.addEventListener('change', request);
   const resize = new ResizeObserver(request);
   resize.observe(canvas);
+
+  /// From where the body is looked at; without a compass as if its head were at +y.
+  const look = (name) => {
+    const [hx, hy] = compass?.head ?? [0, 1];
+    const [lx, ly] = compass?.left ?? [-1, 0];
+    const from = {
+      top: [-0.01 * hx, -0.01 * hy, 1], left: [lx, ly, 0.35], right: [-lx, -ly, 0.35],
+      feet: [-hx, -hy, 0.35], reset: [-0.7 * hx, -0.7 * hy, 0.8],
+    }[name];
+    camera.position.copy(center)
+      .add(new THREE.Vector3(...from).normalize().multiplyScalar(2.6 * radius));
+    controls.target.copy(center);
+    controls.update();
+    request();
+  };
   canvas.addEventListener('keydown', (event) => {
-    const turn = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] }[event.key];
+    const turn = {
+      ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1],
+    }[event.key];
     const zoom = { '+': 0.9, '=': 0.9, '-': 1.1 }[event.key];
     if (!turn && !zoom) return;
     event.preventDefault();
@@ -82,19 +138,41 @@ export async function openMesh(canvas, { url, grid, deviation, region, T, tolera
     controls.update();
     request();
   });
-  controls.update();
-  request();
+  look('reset');
 
   let ghost = null;
+  // Both surfaces are drawn solid in turn by a screen-door pattern: nothing flickers where they lie
+  // in each other, as it does with transparency.
+  const setShare = (share) => {
+    if (!ghost) return;
+    ghost.material.opacity = Math.max(0.02, 1 - share);
+    material.opacity = Math.max(0.02, share);
+    material.alphaHash = ghost.visible;
+    material.needsUpdate = true;
+    request();
+  };
   return {
-    async setGhost(ghostUrl) {
+    look,
+    setShare,
+    async setGhost(ghostUrl, share) {
       if (!ghost && ghostUrl) {
-        ghost = new THREE.Mesh(await loader.loadAsync(ghostUrl), new THREE.MeshStandardMaterial({ color: 0x6ea8ff, transparent: true, opacity: 0.35, depthWrite: false, side: THREE.DoubleSide }));
+        ghost = new THREE.Mesh(await loader.loadAsync(ghostUrl), new THREE.MeshStandardMaterial({
+          color: 0x6ea8ff, alphaHash: true, side: THREE.DoubleSide,
+        }));
         if (T) ghost.applyMatrix4(new THREE.Matrix4().set(...T.flat()).invert());
         scene.add(ghost);
       }
       if (ghost) ghost.visible = Boolean(ghostUrl);
+      if (!ghostUrl) {
+        material.opacity = 1;
+        material.alphaHash = false;
+        material.needsUpdate = true;
+      } else setShare(share);
       request();
+    },
+    picture() {
+      draw();
+      return canvas.toDataURL('image/png');
     },
     stop() {
       resize.disconnect();

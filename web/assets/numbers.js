@@ -1,65 +1,130 @@
 // The six numbers: value, words, arrow, uncertainty, tolerance bar.
 import { h, svg } from './dom.js';
-import { S } from './strings.js';
+import { S, translated } from './strings.js';
 
 export const kAxes = [
-  { name: 'vertical', key: 'vertical_mm', unit: 'mm', shift: true }, { name: 'longitudinal', key: 'longitudinal_mm', unit: 'mm', shift: true }, { name: 'lateral', key: 'lateral_mm', unit: 'mm', shift: true },
-  { name: 'pitch', key: 'pitch_deg', unit: '°' }, { name: 'roll', key: 'roll_deg', unit: '°' }, { name: 'yaw', key: 'yaw_deg', unit: '°' },
+  { name: 'vertical', key: 'vertical_mm', unit: 'mm', shift: true },
+  { name: 'longitudinal', key: 'longitudinal_mm', unit: 'mm', shift: true },
+  { name: 'lateral', key: 'lateral_mm', unit: 'mm', shift: true },
+  { name: 'pitch', key: 'pitch_deg', unit: '°' },
+  { name: 'roll', key: 'roll_deg', unit: '°' },
+  { name: 'yaw', key: 'yaw_deg', unit: '°' },
 ];
+export const kJudgements = { in: '✓', unsure: '≈', out: '▲' };
 
 const printsAsZero = (value, digits) => Number(Math.abs(value).toFixed(digits)) === 0;
-export const signed = (value, digits = 1) => `${printsAsZero(value, digits) ? '' : value < 0 ? '−' : '+'}${Math.abs(value).toFixed(digits)}`;
+const number = (value, digits) => Math.abs(value).toFixed(digits).replace('.', S.decimal);
+export const signed = (value, digits = 1) =>
+  `${printsAsZero(value, digits) ? '' : value < 0 ? '−' : '+'}${number(value, digits)}`;
 
-// What the couch does, drawn for a positive value; a negative one is turned or mirrored. The gantry is the ring.
+/// Digits behind the point that the uncertainty lets a value have: none below its first digit.
+export function digitsOf(u95, most) {
+  if (!(u95 > 0)) return most;
+  return Math.max(0, Math.min(most, -Math.floor(Math.log10(u95) + 1e-9)));
+}
+export const mostDigits = (axis) => (axis.shift ? 1 : 2);
+
+/// One word of three: the value with its uncertainty is within tolerance ("in"), the value alone is
+/// ("unsure"), or it is not ("out").
+export function judge(value, u95, tolerance) {
+  if (Math.abs(value) + u95 <= tolerance) return 'in';
+  return Math.abs(value) <= tolerance ? 'unsure' : 'out';
+}
+
+// What the couch does, drawn for a positive value; a negative one is turned or mirrored. The gantry
+// is the ring.
+const stroke = (d) => svg('path', { d, class: 'stroke' });
+const ring = (d) => svg('path', { d, class: 'ring' });
 const kDrawings = {
-  vertical: { flip: 'rotate(180 24 24)', parts: () => [svg('path', { d: 'M24 42V10M13 20l11-12 11 12', class: 'stroke' })] },
-  longitudinal: { flip: 'rotate(180 24 27)', fixed: () => svg('path', { d: 'M10 6a14 6 0 0 1 28 0', class: 'ring' }), parts: () => [svg('path', { d: 'M24 45V16M14 25l10-10 10 10', class: 'stroke' })] },
-  lateral: { flip: 'rotate(180 24 24)', parts: () => [svg('path', { d: 'M6 24h32M28 13l12 11-12 11', class: 'stroke' })] },
-  pitch: { flip: 'matrix(1 0 0 -1 0 48)', parts: () => [svg('path', { d: 'M6 36l36-14', class: 'ring' }), svg('path', { d: 'M38 18V6M32 11l6-6 6 6', class: 'stroke' })] },
-  roll: { flip: 'matrix(-1 0 0 1 48 0)', parts: () => [svg('path', { d: 'M8 18l32 12', class: 'ring' }), svg('path', { d: 'M38 33v11M32 39l6 6 6-6', class: 'stroke' })] },
-  yaw: { flip: 'matrix(-1 0 0 1 48 0)', parts: () => [svg('path', { d: 'M37 35A17 17 0 1 0 11 36M11 25V36L1 33', class: 'stroke' })] },
+  vertical: { flip: 'rotate(180 24 24)', parts: () => [stroke('M24 42V10M13 20l11-12 11 12')] },
+  longitudinal: {
+    flip: 'rotate(180 24 27)', fixed: () => ring('M10 6a14 6 0 0 1 28 0'),
+    parts: () => [stroke('M24 45V16M14 25l10-10 10 10')],
+  },
+  lateral: { flip: 'rotate(180 24 24)', parts: () => [stroke('M6 24h32M28 13l12 11-12 11')] },
+  pitch: {
+    flip: 'matrix(1 0 0 -1 0 48)',
+    parts: () => [ring('M6 36l36-14'), stroke('M38 18V6M32 11l6-6 6 6')],
+  },
+  roll: {
+    flip: 'matrix(-1 0 0 1 48 0)',
+    parts: () => [ring('M8 18l32 12'), stroke('M38 33v11M32 39l6 6 6-6')],
+  },
+  yaw: {
+    flip: 'matrix(-1 0 0 1 48 0)', parts: () => [stroke('M37 35A17 17 0 1 0 11 36M11 25V36L1 33')],
+  },
 };
 
 function drawing(name, value) {
   const { flip, parts, fixed } = kDrawings[name];
-  return svg('svg', { viewBox: '0 0 48 48', class: 'arrow', 'aria-hidden': 'true' }, fixed?.(), svg('g', { transform: value < 0 ? flip : undefined }, parts()));
+  return svg('svg', { viewBox: '0 0 48 48', class: 'arrow', 'aria-hidden': 'true' }, fixed?.(),
+    svg('g', { transform: value < 0 ? flip : undefined }, parts()));
 }
 
+/// The value with its uncertainty on the range of tolerance, whose ends carry their numbers.
 function bar(value, u95, tolerance) {
   const span = 2.5 * tolerance;
   const x = (v) => 100 + 96 * Math.max(-1, Math.min(1, v / span));
   const beyond = Math.abs(value) > span;
-  return svg('svg', { viewBox: '0 0 200 26', class: 'tolerance-bar', 'aria-hidden': 'true', preserveAspectRatio: 'none' },
+  const tick = (v) => svg('text', { x: x(v), y: 36, class: 'bar-tick' },
+    `${v < 0 ? '−' : '+'}${number(v, Number.isInteger(v) ? 0 : 1)}`);
+  return svg('svg', { viewBox: '0 0 200 38', class: 'tolerance-bar', 'aria-hidden': 'true' },
     svg('rect', { x: 2, y: 9, width: 196, height: 8, rx: 4, class: 'track' }),
-    svg('rect', { x: x(-tolerance), y: 6, width: x(tolerance) - x(-tolerance), height: 14, rx: 3, class: 'zone' }),
+    svg('rect', {
+      x: x(-tolerance), y: 6, width: x(tolerance) - x(-tolerance), height: 14, rx: 3, class: 'zone',
+    }),
     svg('line', { x1: 100, x2: 100, y1: 3, y2: 23, class: 'zero' }),
     svg('line', { x1: x(value - u95), x2: x(value + u95), y1: 13, y2: 13, class: 'whisker' }),
-    beyond ? svg('path', { d: value > 0 ? 'M188 4l10 9-10 9z' : 'M12 4L2 13l10 9z', class: 'mark' }) : svg('rect', { x: x(value) - 2, y: 2, width: 4, height: 22, rx: 1, class: 'mark' }));
+    beyond
+      ? svg('path', { d: value > 0 ? 'M188 4l10 9-10 9z' : 'M12 4L2 13l10 9z', class: 'mark' })
+      : svg('rect', { x: x(value) - 2, y: 2, width: 4, height: 22, rx: 1, class: 'mark' }),
+    tick(-tolerance), tick(tolerance));
 }
 
-function card(axis, correction, u95, tolerance, words, weak) {
+const kWords = { in: 'within', unsure: 'unsure', out: 'outside' };
+
+/// @param commands  Whether this is a correction to apply; else a difference that is only told.
+function card(axis, { correction, u95, words }, tolerance, weak, commands) {
   const text = S.result;
   const value = correction[axis.key];
   const limit = axis.shift ? tolerance.shift_mm : tolerance.rotation_deg;
   const name = text.axes[axis.name];
-  if (value === null || value === undefined) return h('li', { class: 'number refused' }, h('h3', {}, name), h('p', { class: 'value' }, S.none), h('p', { class: 'word' }, text.refused));
+  if (value === null || value === undefined) {
+    return h('li', { class: 'number refused' }, h('h3', {}, name),
+      h('p', { class: 'value' }, S.none), h('p', { class: 'word' }, text.refused));
+  }
   const half = u95?.[axis.key] ?? 0;
-  const within = Math.abs(value) + half <= limit;
-  const digits = axis.shift ? 1 : Math.abs(value) < 10 ? 2 : 1;
-  const still = printsAsZero(value, digits);  // no direction either
-  const word = still ? text.still : words?.[axis.name] ?? S.none;
-  return h('li', { class: `number ${within ? 'within' : 'outside'}` },
-    h('h3', {}, name), !still && drawing(axis.name, value),
-    h('p', { class: 'value' }, signed(value, digits), h('span', { class: 'unit' }, axis.unit === '°' ? '°' : ` ${axis.unit}`)),
+  const judged = judge(value, half, limit);
+  const digits = digitsOf(half, mostDigits(axis));
+  const halfDigits = Math.min(2, digits + (/^[0.]*1/.test(half.toFixed(3)) ? 1 : 0));
+  // What is not known to differ from nothing has no direction.
+  const zero = printsAsZero(value, digits);
+  const still = zero || Math.abs(value) <= half;
+  const directed = commands && !still;
+  const word = !commands ? text.noMove : zero ? text.still : still ? text.insignificant
+    : translated(words?.[axis.name]) ?? S.none;
+  return h('li', { class: `number ${kWords[judged]}${commands ? '' : ' told'}` },
+    h('h3', {}, name), directed && drawing(axis.name, value),
+    h('p', { class: 'value' }, signed(value, digits),
+      h('span', { class: 'unit' }, axis.unit === '°' ? '°' : ` ${axis.unit}`)),
     h('p', { class: 'word' }, word),
     bar(value, half, limit),
-    h('p', { class: 'fine' }, h('span', {}, h('span', { class: 'visually-hidden' }, `${text.uncertaintyLong} `), text.uncertainty(half.toFixed(axis.shift ? 1 : 2), axis.unit)),
-      h('span', { class: 'judged' }, within ? `✓ ${text.within}` : `▲ ${text.outside}`)),
+    h('p', { class: 'fine' },
+      h('span', { class: 'half' },
+        h('span', { class: 'visually-hidden' }, `${text.uncertaintyLong} `),
+        text.uncertainty(number(half, halfDigits), axis.unit)),
+      h('span', { class: 'judged' }, `${kJudgements[judged]} ${text[kWords[judged]]}`),
+      h('span', { class: 'limit' }, text.tolerance(number(limit, Number.isInteger(limit) ? 0 : 1),
+        axis.unit))),
     weak && h('p', { class: 'caution' }, text.notSeen));
 }
 
+export const kDefaultTolerance = { shift_mm: 3, rotation_deg: 1 };
+export const toleranceOf = (reference) => reference?.plan.tolerance ?? kDefaultTolerance;
+
+/// Only a result that says MOVE commands moves.
 export function sixNumbers(result, reference, details) {
-  const tolerance = reference?.plan.tolerance ?? { shift_mm: 3, rotation_deg: 1 };
-  const weak = new Set((details?.motion?.weak_directions ?? []).map((direction) => direction.name));
-  return h('ol', { class: 'numbers' }, kAxes.map((axis) => card(axis, result.correction, result.u95, tolerance, result.words, weak.has(axis.name))));
+  const weak = new Set((details?.motion?.weak_directions ?? []).map(({ name }) => name));
+  return h('ol', { class: 'numbers' }, kAxes.map((axis) =>
+    card(axis, result, toleranceOf(reference), weak.has(axis.name), result.verdict === 'move')));
 }

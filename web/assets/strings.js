@@ -1,120 +1,31 @@
-// Every text of the page.
-export const S = {
-  product: 'Plumb',
-  nav: { label: 'Sections', status: 'Status', patients: 'Patients', scan: 'Scan', result: 'Result', check: 'Daily check', users: 'Accounts', audit: 'Log', settings: 'Settings', update: 'Update' },
-  roles: { technician: 'Technician', physicist: 'Physicist', engineer: 'Engineer' },
-  logOut: 'Log out',
-  loggedInAs: (user, role) => `${user}, ${role}`,
-  loading: 'Loading…',
-  none: '–',
-  offline: 'No connection to the appliance. Trying again…',
-  noAnswer: 'The appliance does not answer.',
-  leavingOffline: 'No connection to the appliance. You are logged out as soon as it answers. Trying again…',
-  online: 'Connected again.',
-  loggedOff: 'You were logged off. Log in again.',
-  notAllowed: 'Your role does not open this page.',
-  save: 'Save',
-  action: 'Action',
-  saved: 'Saved.',
-  cancel: 'Cancel',
-  back: 'Back',
-  states: {
-    no_sensor: 'Sensor missing', ready: 'Ready', scanning: 'Scanning', working: 'Working', result: 'Result', fault: 'Fault',
-  },
-  stateHints: {
-    no_sensor: 'Plug the sensor in. A scan that was running is discarded.',
-    ready: 'Press the button to start a sweep.',
-    scanning: 'Sweep from head to feet in about ten seconds.',
-    working: 'Computing the surface.',
-    result: 'The result is ready. Press to scan again.',
-    fault: 'The appliance needs help.',
-  },
-  faultHints: { scan: 'Acknowledge it on the scan screen or with the button, then scan again.', storage: 'Nothing can be scanned until it is put right.', sensor: 'Plug the sensor in anew.' },
-  purposes: { fraction: 'Fraction', reference: 'New reference', daily_check: 'Daily check' },
-  outcomes: { running: 'running', done: 'done', cancelled: 'cancelled', failed: 'failed' },
-  login: {
-    title: 'Log in', name: 'Name', password: 'Password', submit: 'Log in', wait: 'Checking…',
-    setupTitle: 'First start', setupText: 'This appliance has no account yet. Type the setup code that was printed on its console and in its journal, and make the first account: an engineer.',
-    code: 'Setup code', codeHint: 'XXXX-XXXX', passwordHint: 'At least 10 characters.', repeat: 'Password again', differ: 'The two passwords differ.', setupSubmit: 'Make the account',
-  },
-  status: {
-    title: 'Status', sensor: 'Sensor', light: 'Light', storage: 'Storage', version: 'Version', patient: 'Open patient', present: 'attached', missing: 'missing',
-    rate: (fps) => `${fps.toFixed(0)} images a second`, serial: 'serial', powered: (minutes) => `on for ${minutes} min`,
-    warm: 'Warm', warming: 'Warming up: measurements drift in the first 15 minutes.',
-    free: (free, total) => `${free} GB free of ${total} GB`, readOnly: 'read-only', lastScans: 'Last scans', noScans: 'No scan yet.',
-    goScan: 'Go to scan', preview: 'Camera', previewAlt: 'Picture of the camera', noPreview: 'The camera shows nothing now.',
-  },
-  lights: {
-    off: 'off', no_sensor: 'red, a short blink', ready: 'green', scanning: 'blue', too_fast: 'yellow, fast', too_near: 'yellow, two short', too_far: 'yellow, two long', working: 'blue, slow', done: 'blue and green in turn',
-    result_in_tolerance: 'green, short gaps', result_move: 'yellow, slow', no_answer: 'red, blinking', fault: 'red, flickering',
-  },
-  patients: {
-    title: 'Patients', code: 'Code', site: 'Site', added: 'Added', scans: 'Scans', reference: 'Reference', approved: 'approved', noReference: 'none', open: 'Open',
-    add: 'Add a patient', codeHint: 'A pseudonym: letters, digits, . _ - (no name)', siteHint: 'For example thorax', submit: 'Add',
-    empty: 'No patient yet.', search: 'Find a code', isOpen: 'open for the next scan',
-    openFraction: 'Open for a fraction', openReference: 'Take a new reference',
-    reason: 'Reason for the new reference', reasonShort: 'Reason', references: 'References', version: 'Version', made: 'Made', state: 'State', draft: 'draft', plan: 'Plan', planView: 'View plan',
-    approvedBy: (who, when) => `approved by ${who}, ${when}`, wipe: 'Wipe patient', wipeText: 'This removes the patient with every scan, reference and file, for good. Type the code to confirm.',
-    wipeSubmit: 'Wipe for good', history: 'Scans', when: 'When', purpose: 'For', outcome: 'Outcome', accepted: 'Accepted', needsReference: 'A fraction needs an approved reference.',
-    opened: (code) => `Patient ${code} is open for the next scan.`, noReferences: 'No reference yet: open the patient for a new reference and scan.', confirmWho: (code) => `Is ${code} the patient on the couch?`,
-  },
-  scan: {
-    title: 'Scan', start: 'Start sweep', stop: 'End sweep', acknowledge: 'Acknowledge', discard: 'Discard scan', again: 'Scan again', coverage: 'Covered', keyframes: 'Views kept', tracked: 'Tracked', dropped: 'Dropped', time: 'Time',
-    noPatient: 'No patient is open: the scan will be compared with nothing.', choose: 'Choose a patient', patient: 'Patient', counter: 'Scans of this session', show: 'Show result',
-    guidance: {
-      none: 'Good pace', slower: 'SLOWER', closer: 'CLOSER', farther: 'FARTHER', tracking_lost: 'LOST: go back to where you were', no_markers: 'NO MARKERS IN VIEW',
-    },
-    unknownCoverage: 'so far: not known yet', ignored: 'The button is ignored while the appliance works.', discarded: 'The scan was discarded.', lost: 'The sensor is gone: the scan was discarded.', step: { tracking: 'Finishing tracking', surfaces: 'Joining surfaces' }, seconds: (s) => `${s.toFixed(1)} s`,
-  },
-  result: {
-    title: 'Result', none: 'No result yet.', noneHint: 'Open a patient, then scan.', patient: 'Patient', reference: 'Reference', version: (v) => `version ${v}`, scanned: 'Scanned', age: 'Age',
-    old: 'OLD', oldText: 'This result is older than 2 minutes. Do not act on it: scan again.',
-    seconds: (s) => `${s} s`, minutes: (m) => `${m} min`, hours: (hours) => `${hours} h`, days: (days) => `${days} d`,
-    verdicts: { in_tolerance: 'IN TOLERANCE', move: 'MOVE', no_answer: 'NO ANSWER' },
-    why: { in_tolerance: 'Every value with its uncertainty is within tolerance.', move: 'Apply the correction below, then scan again.', no_answer: '' },
-    noReference: 'This scan was compared with nothing.', failed: 'This scan failed', cancelled: 'This scan was cancelled.',
-    numbers: 'Correction to apply', atIsocentre: 'at the isocentre', within: 'within tolerance', outside: 'outside tolerance', tolerance: (value, unit) => `tolerance ±${value} ${unit}`,
-    refused: 'not known with couch markers', still: 'stays', notSeen: 'not well seen', uncertainty: (value, unit) => `±${value} ${unit}`, uncertaintyLong: '95 % uncertainty',
-    axes: { vertical: 'Vertical', longitudinal: 'Longitudinal', lateral: 'Lateral', pitch: 'Pitch', roll: 'Roll', yaw: 'Yaw' },
-    trust: 'Why trust it', markers: 'Markers matched', markerRms: 'Marker misfit', coverage: 'Region covered', hole: 'Largest hole', residual: 'Surface misfit', views: 'Views kept', frames: 'Frames tracked',
-    depthScale: 'Depth scale corrected by', sensorOn: 'Sensor on for', rejected: 'Markers ignored', rejectedItem: (id, mm) => `marker ${id} moved ${mm} mm`, weak: 'Not well seen', warnings: 'Warnings', lost: 'Longest time lost',
-    medianAnd95: (median, p95) => `${median} mm median, ${p95} mm 95th percentile`,
-    where: 'Where on the body', before: 'Before', after: 'After the correction', mapLabel: 'Map of height errors, current minus reference. Move with the arrow keys to read values.', mapPicture: 'Error map',
-    bodyAfter: 'Posture: left after the correction', bodyAfterHint: 'Put this right first: no couch can.', bodyNow: 'Now', bodyNowHint: 'Against the reference, before the correction.', asReference: 'every part as in the reference, within 3 mm',
-    bodyByRoom: 'Parts are named by the axes of the room (IEC 61217): the posture is not known, or the body does not lie as it says.',
-    higher: 'current is higher', lower: 'current is lower', unknown: 'not measured', reads: (value) => `${value} mm`, at: (x, y) => `at x ${x.toFixed(3)}, y ${y.toFixed(3)} m`,
-    outsideMap: 'outside the map', mapFailed: 'The map cannot be read; the picture shows the same.', zone: 'Largest in tenths of the body',
-    heights: 'Heights seen by this sweep', overlay: 'Overlay', referenceHigher: 'reference on top', currentHigher: 'current on top', bothSame: 'both, within tolerance', overlayAlt: 'Overlay: reference blue, current red', slice: 'Profile', sliceLabel: 'Heights along the line through the cursor of the map: reference and current', sliceAlong: ['Along x', 'Along y'],
-    reference_: 'reference', current_: 'current', mesh: '3-D surface', meshOpen: 'Open the 3-D view', meshLoading: 'Loading the surface…', meshLabel: '3-D surface, coloured by the error. Arrow keys turn it, plus and minus zoom.',
-    meshFailed: 'This browser shows no 3-D (WebGL is missing). The pictures above show the same.', ghost: 'Reference as a ghost', trend: 'Trend', trendLabel: (axis) => `${axis} over the last scans`, trendWithout: 'This scan gave no answer and is not in the trend.', otherReasons: (n) => (n === 1 ? 'One more reason' : `${n} more reasons`), meshHint: 'Turns by mouse, finger or arrow keys.', trendEmpty: 'The trend begins with the second scan.',
-    rescan: 'Scan again', accept: 'Accept', acceptedBy: (who) => `Accepted by ${who}`, newReference: 'New reference from this scan', newReferenceReason: 'Reason for the new reference', export: 'Export', print: 'Print view',
-    files: { 'result.json': 'Result (JSON)', 'error_map.png': 'Error map (PNG)', 'overlay.png': 'Overlay (PNG)', 'deviation.tiff': 'Height errors (TIFF)', 'deviation_after.tiff': 'Errors after correction (TIFF)', 'distance.tiff': 'Distances (TIFF)', 'mesh.ply': 'Surface (PLY)', 'cloud.ply': 'Points (PLY)', 'heightmap.tiff': 'Heights (TIFF)' },
-    gone: 'There is no such scan.', fractions: (n) => `${n} scans`, differentPatient: (code) => `Another patient (${code}) is open for the next scan.`,
-  },
-  check: {
-    title: 'Daily check', verdicts: { passed: 'PASSED', failed: 'FAILED', no_baseline: 'NO BASELINE' }, none: 'NOT DONE', never: 'No check was done yet.',
-    overdue: 'overdue', overdueText: 'No check has passed today. Do it before the first patient.', today: 'Today’s check has passed.', start: 'Start a check', sweep: 'sweep over all markers of the room, without a patient',
-    how: 'Take everything off the couch, then sweep over all markers as over a patient. The markers must lie where they lay when the baseline was taken, and the sensor’s depth must agree with their size.',
-    baseline: 'Baseline', baselineOf: (who, when, markers) => `${markers} markers, taken by ${who}, ${when}`, noBaseline: 'none yet', takeBaseline: 'Take this check as the baseline', takeHint: 'Only when you know that every marker lies where it should. All further checks are compared with it.', baselineTaken: 'This check is the baseline now.',
-    number: 'Number', value: 'Value', limit: 'Limit', judged: 'Judged', within: 'within the limit', outside: 'outside the limit', notKnown: 'not known', history: 'Earlier checks', by: 'By', sensor: 'Sensor', markers: 'Markers', last: (when, who) => `${when}, by ${who}`,
-    items: { markers_seen: 'Markers seen', misfit: 'Marker misfit (RMS)', moved: 'Largest move of a marker', scale: 'Size of the marker map', side: 'Side of a marker', depth_scale: 'Depth scale' },
-    atLeast: (value) => `at least ${value}`, atMost: (sign, value, unit) => `at most ${sign}${value} ${unit}`, tile: 'Daily check',
-  },
-  plan: {
-    title: 'Plan', reference: 'Reference', region: 'Region of interest', regionHint: 'Click the map to add corners; drag a corner to move it; Delete removes the chosen one. Without corners the body found in the scan is the region.',
-    mapLabel: 'Height map of the reference with the region. Enter adds a corner in the middle, N chooses the next one, arrow keys move it, Delete removes it.', isocentre: 'Isocentre', isocentreHint: 'Metres in the reference marker’s frame. Empty: the middle of the region.', pick: 'Pick on the map', picking: 'Click the map where the isocentre lies.',
-    tolerance: 'Tolerance', shift: 'Shifts (mm)', rotation: 'Rotations (degrees)', posture: 'Posture', postures: { HFS: 'Head first, supine', HFP: 'Head first, prone', FFS: 'Feet first, supine', FFP: 'Feet first, prone' }, couch: 'Markers move with the couch (shifts are then refused)', isocentreBad: 'Three numbers in metres, or all three empty.', changedMeanwhile: 'The plan was changed by somebody else meanwhile. This is what is stored now: look at it, then try again.', changedWhileEditing: 'Somebody else has changed this plan while you edit it: saving will be refused. Load the page again to see it.', reloaded: 'The plan was changed by somebody else; this is what is stored now.',
-    save: 'Save plan', approve: 'Approve', approveHint: 'A second physicist approves. From then on this version cannot be changed.', approvedHint: 'This version is approved and cannot be changed. Saving makes a new version.', clear: 'Clear the region', corners: (n) => (n === 0 ? 'No corners: the whole body' : `${n} corners`), saved: 'Plan saved.', approved: 'Reference approved.', newVersion: 'A new version was made.', corner: (n, x, y) => `Corner ${n}: x ${x.toFixed(3)}, y ${y.toFixed(3)} m`, height: 'height', noMap: 'This scan has no height map.',
-  },
-  users: {
-    title: 'Accounts', name: 'Name', role: 'Role', state: 'State', active: 'active', disabled: 'disabled', add: 'Add an account', submit: 'Add', change: 'Change', password: 'Password', newPassword: 'New password (empty: stays)', disable: 'Disabled', own: 'My password', oldPassword: 'Old password', changeOwn: 'Change password', nameHint: 'Small letters, digits, . _ -', unchanged: 'Nothing was changed.',
-  },
-  audit: { title: 'Log', time: 'Time', user: 'Who', address: 'From', action: 'What', subject: 'On', detail: 'Detail', more: 'Older entries', empty: 'Nothing yet.' },
-  settings: {
-    title: 'Settings', shift_tolerance_mm: 'Tolerance of shifts for new references (mm)', rotation_tolerance_deg: 'Tolerance of rotations for new references (degrees)', posture: 'Posture of new references', couch_markers: 'Markers move with the couch',
-    auto_stop_s: 'End a sweep after seconds without new coverage', scan_limit_s: 'Longest sweep (seconds)', keep_recordings: 'Keep raw recordings (with colour)', retention_days: 'Remove scans after days (0: never)', idle_logout_min: 'Log off after idle minutes', readOnly: 'Only an engineer changes the settings.',
-  },
-  update: {
-    title: 'Update', installed: 'Installed version', slot: 'System', unsupported: 'Updates are not available here', bundles: 'Bundles on this machine', noBundles: 'No bundle yet: send one below.', remove: 'Remove', upload: 'Send a bundle', uploadHint: 'A signed system image (NAME.raucb). Its size and form are checked at once, its signature and version when it is installed.', bundle: 'Bundle', send: 'Send', uploading: 'Sending…', uploaded: 'The bundle is here.', uploadFailed: 'The bundle did not arrive: too large, or the connection broke.', install: 'Install', installing: 'Installing…', diagnostics: 'Diagnostics', diagnosticsText: 'A file for the maker: versions, logs, settings. No patient data.', download: 'Download diagnostics',
-  },
-};
+// The texts of the chosen language. Screens read S when they draw: after useLanguage() they must be
+// drawn again.
+import { en } from './strings/en.js';
+import { es } from './strings/es.js';
+
+export const kLanguages = { en, es };
+export const S = { ...en };
+
+const key = (who) => `plumb-language-${who}`;
+const stored = (name) => { try { return localStorage.getItem(name); } catch { return null; } };
+
+/// The choice of an account on this browser, or of the room's screen ("room"); else the browser's.
+export function languageOf(who) {
+  const chosen = stored(key(who));
+  if (kLanguages[chosen]) return chosen;
+  return kLanguages[navigator.language?.slice(0, 2)] ? navigator.language.slice(0, 2) : 'en';
+}
+
+export function useLanguage(name) {
+  delete S.translate;
+  Object.assign(S, kLanguages[name]);
+  document.documentElement.lang = name;
+}
+
+export function chooseLanguage(who, name) {
+  try { localStorage.setItem(key(who), name); } catch { /* private window: for this page only */ }
+  useLanguage(name);
+}
+
+/// Words that come from the appliance (directions, parts of the body, reasons), in this language.
+export const translated = (text) => S.translate?.(text) ?? text;

@@ -1,34 +1,97 @@
-// The six numbers over the last scans of a patient.
-import { h, svg } from './dom.js';
-import { kAxes, signed } from './numbers.js';
+// The six numbers over the fractions of a patient: the first and the last scan of each.
+import { h, localDay, svg } from './dom.js';
+import { judge, kAxes, signed } from './numbers.js';
 import { S } from './strings.js';
 
-const kWidth = 320;
-const kHeight = 120;
+const kWidth = 340;
+const kHeight = 150;
+const kLeft = 36;
+const kBottom = 24;
+const kMaxFractions = 40;
 
-function chart(axis, points, limit) {
-  const reach = Math.max(1.5 * limit, ...points.map((point) => Math.abs(point.value) + point.u95)) * 1.1;
-  const x = (i) => 34 + (points.length === 1 ? 0.5 : i / (points.length - 1)) * (kWidth - 50);
-  const y = (value) => kHeight / 2 - value / reach * (kHeight / 2 - 6);
-  const newest = points[points.length - 1];
-  const tick = (value) => svg('text', { x: 29, y: y(value) + 4, class: 'tick' }, `${value > 0 ? '+' : value < 0 ? '−' : ''}${Math.abs(value)}`);
+/// Scans of the same session are one fraction; those without a session count by themselves.
+export function fractionsOf(scans) {
+  const groups = new Map();
+  for (const scan of [...scans].reverse()) {
+    if (!scan.result?.correction || scan.result.verdict === 'no_answer') continue;
+    const key = scan.session_id ?? scan.id;
+    if (!groups.has(key)) groups.set(key, []);
+    groups.get(key).push(scan);
+  }
+  return [...groups.values()].slice(-kMaxFractions).map((group, i) => ({
+    number: group[0].fraction ?? i + 1, first: group[0], last: group[group.length - 1],
+  }));
+}
+
+const valueOf = (scan, axis) => ({
+  value: scan.result.correction[axis.key], u95: scan.result.u95?.[axis.key] ?? 0,
+});
+
+function chart(axis, fractions, limit) {
+  const points = fractions
+    .map((fraction, i) => ({
+      i, fraction, first: valueOf(fraction.first, axis), last: valueOf(fraction.last, axis),
+    }))
+    .filter(({ last }) => last.value !== null && last.value !== undefined);
+  if (!points.length) return null;
+  const all = points.flatMap(({ first, last }) => [first, last]);
+  const reach = 1.1 * Math.max(1.5 * limit, ...all.map((p) => Math.abs(p.value ?? 0) + p.u95));
+  const n = fractions.length;
+  const x = (i) => kLeft + (n === 1 ? 0.5 : (i + 0.3) / (n - 0.4)) * (kWidth - kLeft - 8);
+  const middle = (kHeight - kBottom) / 2;
+  const y = (value) => middle - value / reach * (middle - 6);
+  const text = (value) => `${value > 0 ? '+' : value < 0 ? '−' : ''}${Math.abs(value)}`;
+  const tick = (value) =>
+    svg('text', { x: kLeft - 5, y: y(value) + 4, class: 'tick' }, text(value));
+  const beyond = Math.floor(reach / limit) >= 2 ? Math.floor(reach / limit) * limit : 0;
+  const every = Math.ceil(n / 6);
+  const newest = points[points.length - 1].last;
+  const said = points.map(({ fraction, last }) =>
+    `${S.result.trendFraction(fraction.number, localDay(fraction.last.started_at))}: `
+    + `${signed(last.value)} ${axis.unit}`).join('; ');
+  const mark = (p, i, filled) => {
+    const kind = judge(p.value, p.u95, limit);
+    const tone = kind === 'in' ? 'within' : kind === 'out' ? 'outside' : 'unsure';
+    return svg('circle', {
+      cx: x(i) + (filled ? 3 : -3), cy: y(p.value), r: filled ? 5 : 3.5,
+      class: `mark ${tone}${filled ? '' : ' open'}`,
+    });
+  };
   return h('figure', { class: 'trend' },
-    h('figcaption', {}, S.result.axes[axis.name], ' ', h('strong', {}, `${signed(newest.value, axis.shift ? 1 : 2)} ${axis.unit}`)),
-    svg('svg', { viewBox: `0 0 ${kWidth} ${kHeight}`, role: 'img', 'aria-label': `${S.result.trendLabel(S.result.axes[axis.name])}: ${points.map((point) => signed(point.value)).join(', ')} ${axis.unit}` },
-      svg('rect', { x: 34, width: kWidth - 38, y: y(limit), height: y(-limit) - y(limit), class: 'zone' }), svg('line', { x1: 34, x2: kWidth - 4, y1: y(0), y2: y(0), class: 'zero' }),
-      y(0) - y(limit) > 12 && [tick(limit), tick(-limit)], tick(0),
-      svg('polyline', { points: points.map((point, i) => `${x(i)},${y(point.value)}`).join(' '), class: 'line' }),
-      points.map((point, i) => [svg('line', { x1: x(i), x2: x(i), y1: y(point.value - point.u95), y2: y(point.value + point.u95), class: 'whisker' }),
-        svg('circle', { cx: x(i), cy: y(point.value), r: i === points.length - 1 ? 6 : 4, class: Math.abs(point.value) + point.u95 <= limit ? 'mark within' : 'mark outside' })])));
+    h('figcaption', {}, S.result.axes[axis.name], ' ',
+      h('strong', {}, `${signed(newest.value)} ${axis.unit}`)),
+    svg('svg', {
+      viewBox: `0 0 ${kWidth} ${kHeight}`, role: 'img',
+      'aria-label': `${S.result.trendLabel(S.result.axes[axis.name])}: ${said}`,
+    },
+    svg('rect', {
+      x: kLeft, width: kWidth - kLeft - 4, y: y(limit), height: y(-limit) - y(limit), class: 'zone',
+    }),
+    svg('line', { x1: kLeft, x2: kWidth - 4, y1: y(0), y2: y(0), class: 'zero' }),
+    y(0) - y(limit) > 12 && [tick(limit), tick(-limit)], tick(0),
+    beyond > limit && [tick(beyond), tick(-beyond)],
+    svg('polyline', {
+      points: points.map((p) => `${x(p.i) + 3},${y(p.last.value)}`).join(' '), class: 'line',
+    }),
+    points.map(({ i, fraction, first, last }) => [
+      svg('line', {
+        x1: x(i) + 3, x2: x(i) + 3, y1: y(last.value - last.u95), y2: y(last.value + last.u95),
+        class: 'whisker',
+      }),
+      fraction.first !== fraction.last && first.value !== null && mark(first, i, false),
+      mark(last, i, true)]),
+    points.filter((p) => p.i % every === 0).map(({ i, fraction }) => svg('text', {
+      x: x(i), y: kHeight - 6, class: 'tick middle',
+    }, localDay(fraction.last.started_at)))));
 }
 
 /// @param scans  Newest first.
 export function trend(scans, tolerance) {
-  const shown = scans.filter((scan) => scan.result?.correction && scan.result.verdict !== 'no_answer').slice(0, 30).reverse();
-  if (shown.length < 2) return h('p', { class: 'hint' }, S.result.trendEmpty);
-  const charts = kAxes.map((axis) => {
-    const points = shown.filter((scan) => scan.result.correction[axis.key] !== null).map((scan) => ({ value: scan.result.correction[axis.key], u95: scan.result.u95?.[axis.key] ?? 0 }));
-    return points.length ? chart(axis, points, axis.shift ? tolerance.shift_mm : tolerance.rotation_deg) : null;
-  });
-  return h('div', { class: 'trends' }, charts);
+  const fractions = fractionsOf(scans);
+  const shown = new Set(fractions.flatMap(({ first, last }) => [first.id, last.id]));
+  if (shown.size < 2) return h('p', { class: 'hint' }, S.result.trendEmpty);
+  const charts = kAxes.map((axis) =>
+    chart(axis, fractions, axis.shift ? tolerance.shift_mm : tolerance.rotation_deg));
+  return h('div', {}, h('p', { class: 'hint' }, S.result.trendHint),
+    h('div', { class: 'trends' }, charts));
 }

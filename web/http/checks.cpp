@@ -21,11 +21,13 @@ std::string_view Trim(std::string_view text) {
 
 std::string Lower(std::string_view text) {
   std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return lower;
 }
 
-/// Bytes of the UTF-8 sequence that `text` begins with, 0 where malformed (overlong, surrogate, beyond U+10FFFF, truncated).
+/// Bytes of the UTF-8 sequence that `text` begins with, 0 where malformed (overlong, surrogate,
+/// beyond U+10FFFF, truncated).
 std::size_t SequenceLength(std::string_view text, std::uint32_t& code) {
   const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
   const std::uint8_t lead = byte(0);
@@ -33,7 +35,10 @@ std::size_t SequenceLength(std::string_view text, std::uint32_t& code) {
     code = lead;
     return 1;
   }
-  const std::size_t length = lead >= 0xF0 && lead < 0xF5 ? 4 : lead >= 0xE0 && lead < 0xF0 ? 3 : lead >= 0xC2 && lead < 0xE0 ? 2 : 0;
+  const std::size_t length = lead >= 0xF0 && lead < 0xF5   ? 4
+                             : lead >= 0xE0 && lead < 0xF0 ? 3
+                             : lead >= 0xC2 && lead < 0xE0 ? 2
+                                                           : 0;
   if (length == 0 || text.size() < length) return 0;
   code = lead & (0xFFU >> (length + 1));
   for (std::size_t i = 1; i < length; ++i) {
@@ -41,7 +46,8 @@ std::size_t SequenceLength(std::string_view text, std::uint32_t& code) {
     code = code << 6 | (byte(i) & 0x3FU);
   }
   constexpr std::array<std::uint32_t, 5> kSmallest = {0, 0, 0x80, 0x800, 0x10000};
-  const bool valid = code >= kSmallest[length] && code <= 0x10FFFF && (code < 0xD800 || code > 0xDFFF);
+  const bool valid =
+      code >= kSmallest[length] && code <= 0x10FFFF && (code < 0xD800 || code > 0xDFFF);
   return valid ? length : 0;
 }
 
@@ -99,11 +105,13 @@ bool IsKnownHost(std::string_view host, std::span<const std::string> names) {
   std::string name = Lower(host.substr(0, colon));
   if (colon != std::string_view::npos) {
     const std::string_view port = host.substr(colon + 1);
-    const bool digits = std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; });
+    const bool digits =
+        std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; });
     if (port.empty() || port.size() > 5 || !digits) return false;
   }
   if (name == "localhost" || IsNumericAddress(name)) return true;
-  return std::any_of(names.begin(), names.end(), [&](const std::string& known) { return Lower(known) == name; });
+  return std::any_of(names.begin(), names.end(),
+                     [&](const std::string& known) { return Lower(known) == name; });
 }
 
 bool IsSameOrigin(std::string_view origin, std::string_view host, bool tls) {
@@ -134,8 +142,10 @@ std::optional<std::map<std::string, std::string>> ParseForm(std::string_view bod
     body = end == std::string_view::npos ? std::string_view() : body.substr(end + 1);
     const auto equals = pair.find('=');
     if (equals == std::string_view::npos) return std::nullopt;
-    const auto name = UnescapeForm(pair.substr(0, equals)), value = UnescapeForm(pair.substr(equals + 1));
-    if (!name || !value || fields.size() >= kMaxFormFields || !fields.emplace(*name, *value).second) return std::nullopt;
+    const auto name = UnescapeForm(pair.substr(0, equals)),
+               value = UnescapeForm(pair.substr(equals + 1));
+    if (!name || !value || fields.size() >= kMaxFormFields || !fields.emplace(*name, *value).second)
+      return std::nullopt;
   }
   return fields;
 }
@@ -150,8 +160,10 @@ bool AcceptsGzip(std::optional<std::string_view> accept_encoding) {
     rest = end == std::string_view::npos ? std::string_view() : rest.substr(end + 1);
     const auto semicolon = item.find(';');
     const std::string coding(Trim(std::string_view(item).substr(0, semicolon)));
-    const std::string_view weight = semicolon == std::string::npos ? "" : Trim(std::string_view(item).substr(semicolon + 1));
-    const bool refused = weight.starts_with("q=0") && weight.find_first_of("123456789", 3) == std::string_view::npos;
+    const std::string_view weight =
+        semicolon == std::string::npos ? "" : Trim(std::string_view(item).substr(semicolon + 1));
+    const bool refused =
+        weight.starts_with("q=0") && weight.find_first_of("123456789", 3) == std::string_view::npos;
     if (coding == "gzip") return !refused;
     if (coding == "*" && !refused) any = true;
   }
@@ -161,7 +173,9 @@ bool AcceptsGzip(std::optional<std::string_view> accept_encoding) {
 bool IsName(std::string_view text) {
   constexpr std::size_t kMaxName = 64;
   if (text.empty() || text.size() > kMaxName || text.front() == '.') return false;
-  return std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isalnum(c) != 0 || c == '.' || c == '_' || c == '-'; });
+  return std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '.' || c == '_' || c == '-';
+  });
 }
 
 std::string EscapeHtml(std::string_view text) {

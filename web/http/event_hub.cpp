@@ -4,7 +4,9 @@
 
 namespace plumb::web {
 
-std::string_view EventStream::Peek(std::size_t max) const { return std::string_view(buffer_).substr(taken_, max); }
+std::string_view EventStream::Peek(std::size_t max) const {
+  return std::string_view(buffer_).substr(taken_, max);
+}
 
 void EventStream::Take(std::size_t count) {
   taken_ += count;
@@ -66,6 +68,8 @@ void EventHub::CloseAll() {
   for (const auto& stream : std::list(streams_)) stream->Close();
 }
 
-std::string FormatEvent(std::string_view event, std::string_view data) { return fmt::format("event: {}\ndata: {}\n\n", event, data); }
+std::string FormatEvent(std::string_view event, std::string_view data) {
+  return fmt::format("event: {}\ndata: {}\n\n", event, data);
+}
 
 }  // namespace plumb::web

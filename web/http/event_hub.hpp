@@ -16,9 +16,10 @@ namespace plumb::web {
 /// One open stream: bytes wait in a bounded buffer until the connection takes them.
 class EventStream {
  public:
-  EventStream(std::shared_ptr<Session> session, std::size_t capacity) : session_(std::move(session)), capacity_(capacity) {}
+  EventStream(std::shared_ptr<Session> session, std::size_t capacity)
+      : session_(std::move(session)), capacity_(capacity) {}
 
-  /// What the connection needs: called when there is something to take, or when the stream is over.
+  /// Wakes the connection: called when there is something to take, or when the stream is over.
   std::function<void()> wake;
   /// Called when the viewer is too slow: its connection is to be cut.
   std::function<void()> cut;
@@ -48,7 +49,8 @@ class EventHub {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  EventHub(std::size_t max_streams, std::size_t buffer_bytes) : max_streams_(max_streams), buffer_bytes_(buffer_bytes) {}
+  EventHub(std::size_t max_streams, std::size_t buffer_bytes)
+      : max_streams_(max_streams), buffer_bytes_(buffer_bytes) {}
 
   /// Null where there are too many.
   [[nodiscard]] std::shared_ptr<EventStream> Open(std::shared_ptr<Session> session);

@@ -1,20 +1,21 @@
 #include "web/http/gate.hpp"
 
+#include <fmt/format.h>
 #include <sodium.h>
 
 #include <algorithm>
 #include <cstdio>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "web/http/checks.hpp"
-#include "web/json.hpp"
 
 namespace plumb::web {
 namespace {
 
 bool IsType(std::string_view header, std::string_view type) {
   const std::string_view value = header.substr(0, header.find(';'));
-  return std::equal(value.begin(), value.end(), type.begin(), type.end(), [](char a, char b) { return std::tolower(a) == b; });
+  return std::equal(value.begin(), value.end(), type.begin(), type.end(),
+                    [](char a, char b) { return std::tolower(a) == b; });
 }
 
 Response InternalError(std::string_view name, const std::exception& error) {
@@ -22,7 +23,9 @@ Response InternalError(std::string_view name, const std::exception& error) {
   return ErrorResponse(500, "internal error; the journal says more");
 }
 
-bool SameToken(std::string_view a, std::string_view b) { return a.size() == b.size() && sodium_memcmp(a.data(), b.data(), a.size()) == 0; }
+bool SameToken(std::string_view a, std::string_view b) {
+  return a.size() == b.size() && sodium_memcmp(a.data(), b.data(), a.size()) == 0;
+}
 
 }  // namespace
 
@@ -36,20 +39,24 @@ bool Gate::IsOwnPage(const Request& request) const {
 Response Gate::NotLoggedIn() const {
   Response response;
   response.status = 401;
-  response.body = Dump({{"error", "log in first"}, {"setup_required", accounts_.needs_setup()}});
+  response.body =
+      fmt::format(R"({{"error":"log in first","setup_required":{}}})", sessions_.needs_setup());
   return response;
 }
 
 std::variant<const Route*, Response> Gate::Admit(Request& request) const {
   if (!IsKnownHost(request.Header("host"), host_names_)) {
-    return ErrorResponse(421, "unknown host name; use the appliance's address, or add the name to its configuration");
+    return ErrorResponse(
+        421,
+        "unknown host name; use the appliance's address, or add the name to its configuration");
   }
   Router::Match match = router_.Find(request.method, request.path);
   const bool api = request.path.starts_with("/api/");
-  // What the page asks by itself, without anybody at the screen, does not keep a session alive.
-  const bool touch = request.Header("x-plumb-background").empty() && request.path != "/api/v1/events" &&
+  // Requests that the page makes by itself, without a user, do not keep a session alive.
+  const bool touch = request.Header("x-plumb-background").empty() &&
+                     request.path != "/api/v1/events" &&
                      !(request.path == "/result" && request.query.contains("again"));
-  request.session = accounts_.SessionOf(request, touch);
+  request.session = sessions_.SessionOf(request, touch);
   if (match.route == nullptr) {
     if (api && !request.session) return NotLoggedIn();
     if (match.allowed.empty()) return ErrorResponse(404, "there is nothing at this address");
@@ -61,24 +68,31 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
   request.arguments = std::move(match.arguments);
   if (route.permission != Permission::kNone) {
     if (!request.session) return NotLoggedIn();
-    if (!May(request.session->role, route.permission)) return ErrorResponse(403, "your role may not do this");
+    if (!May(request.session->role, route.permission))
+      return ErrorResponse(403, "your role may not do this");
   }
   if (request.method != "GET") {
-    if (!IsOwnPage(request)) return ErrorResponse(403, "this change was asked for by a page from elsewhere");
-    if (route.permission != Permission::kNone && !SameToken(request.Header("x-csrf-token"), request.session->csrf_token)) {
-      return ErrorResponse(403, "the token of this session is missing or wrong; load the page again");
+    if (!IsOwnPage(request))
+      return ErrorResponse(403, "this change was asked for by a page from elsewhere");
+    if (route.permission != Permission::kNone &&
+        !SameToken(request.Header("x-csrf-token"), request.session->csrf_token)) {
+      return ErrorResponse(403,
+                           "the token of this session is missing or wrong; load the page again");
     }
   }
   const std::string_view type = request.Header("content-type");
-  if (route.body == BodyKind::kJson && !IsType(type, "application/json")) return ErrorResponse(415, "expected application/json");
-  if (route.body == BodyKind::kForm && !IsType(type, "application/x-www-form-urlencoded")) return ErrorResponse(415, "expected a form");
+  if (route.body == BodyKind::kJson && !IsType(type, "application/json"))
+    return ErrorResponse(415, "expected application/json");
+  if (route.body == BodyKind::kForm && !IsType(type, "application/x-www-form-urlencoded"))
+    return ErrorResponse(415, "expected a form");
   if (route.body == BodyKind::kFile && !IsType(type, "application/octet-stream"))
     return ErrorResponse(415, "expected application/octet-stream");
   return &route;
 }
 
 void Gate::Handle(const Route& route, const Request& request, const Respond& respond) {
-  if (route.body == BodyKind::kNone && !request.body.empty()) return respond(ErrorResponse(400, "expected no body"));
+  if (route.body == BodyKind::kNone && !request.body.empty())
+    return respond(ErrorResponse(400, "expected no body"));
   // The body may have taken its time, and the account may have been disabled meanwhile.
   if (route.permission != Permission::kNone && request.session->ended)
     return respond(ErrorResponse(401, "the session has ended: log in again"));
@@ -91,7 +105,8 @@ void Gate::Handle(const Route& route, const Request& request, const Respond& res
   }
 }
 
-void RespondAside(ScanService& service, const std::string& name, std::function<Response()> make, const Respond& respond) {
+void RespondAside(ScanService& service, const std::string& name, std::function<Response()> make,
+                  const Respond& respond) {
   auto made = std::make_shared<Response>();
   const auto work = [made, name, make = std::move(make)] {
     try {
@@ -109,9 +124,12 @@ void RespondAside(ScanService& service, const std::string& name, std::function<R
 }
 
 void AddSecurityHeaders(Response& response) {
-  const auto add = [&](const char* name, const char* value) { response.headers.emplace_back(name, value); };
+  const auto add = [&](const char* name, const char* value) {
+    response.headers.emplace_back(name, value);
+  };
   add("Content-Security-Policy",
-      "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; base-uri 'none'; "
+      "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src "
+      "'self'; base-uri 'none'; "
       "form-action 'self'; frame-ancestors 'none'");
   add("X-Content-Type-Options", "nosniff");
   add("X-Frame-Options", "DENY");
@@ -119,7 +137,8 @@ void AddSecurityHeaders(Response& response) {
   add("Cross-Origin-Opener-Policy", "same-origin");
   add("Cross-Origin-Resource-Policy", "same-origin");
   add("Permissions-Policy", "camera=(), microphone=(), geolocation=(), usb=()");
-  add("Cache-Control", response.cache_for_ever ? "public, max-age=31536000, immutable" : "no-store");
+  add("Cache-Control",
+      response.cache_for_ever ? "public, max-age=31536000, immutable" : "no-store");
 }
 
 }  // namespace plumb::web

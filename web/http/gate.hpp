@@ -1,19 +1,32 @@
-// What every request passes before its handler: host, route, login, role, origin, token, type.
+// The checks that every request passes before its handler: host, route, login, role, origin, token,
+// type.
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
 
-#include "web/accounts.hpp"
 #include "web/http/router.hpp"
+#include "web/service/scan_service.hpp"
 
 namespace plumb::web {
 
+/// Which session a request belongs to. Belongs to the loop thread.
+class SessionLookup {
+ public:
+  virtual ~SessionLookup() = default;
+  /// The session of a request, by its cookie; null without one. @param touch  Counts as a use.
+  [[nodiscard]] virtual std::shared_ptr<Session> SessionOf(const Request& request, bool touch) = 0;
+  /// True while there is no account yet.
+  [[nodiscard]] virtual bool needs_setup() const = 0;
+};
+
 class Gate {
  public:
-  Gate(const Router& router, Accounts& accounts, std::vector<std::string> host_names, bool tls)
-      : router_(router), accounts_(accounts), host_names_(std::move(host_names)), tls_(tls) {}
+  Gate(const Router& router, SessionLookup& sessions, std::vector<std::string> host_names, bool tls)
+      : router_(router), sessions_(sessions), host_names_(std::move(host_names)), tls_(tls) {}
 
   /// Judges a request by its head; fills in its session and arguments. The route, or the refusal.
   [[nodiscard]] std::variant<const Route*, Response> Admit(Request& request) const;
@@ -25,14 +38,16 @@ class Gate {
   [[nodiscard]] Response NotLoggedIn() const;
 
   const Router& router_;
-  Accounts& accounts_;
+  SessionLookup& sessions_;
   std::vector<std::string> host_names_;
   bool tls_;
 };
 
-/// An answer that takes its time: made by `make` on the service's thread for reads; what it throws becomes an answer as in Gate::Handle().
+/// An answer that takes its time: made by `make` on the service's thread for reads; what it throws
+/// becomes an answer as in Gate::Handle().
 /// @param name  Of the route.
-void RespondAside(ScanService& service, const std::string& name, std::function<Response()> make, const Respond& respond);
+void RespondAside(ScanService& service, const std::string& name, std::function<Response()> make,
+                  const Respond& respond);
 
 /// The headers of every answer, from one place.
 void AddSecurityHeaders(Response& response);

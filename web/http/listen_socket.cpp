@@ -9,7 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb::web {
 namespace {
@@ -20,7 +20,8 @@ sockaddr_storage AddressOf(int socket_fd) {
   sockaddr_storage address{};
   socklen_t length = sizeof address;
   if (getsockname(socket_fd, reinterpret_cast<sockaddr*>(&address), &length) != 0) {
-    throw IoError(fmt::format("cannot listen on descriptor {}: {}", socket_fd, std::strerror(errno)));
+    throw IoError(
+        fmt::format("cannot listen on descriptor {}: {}", socket_fd, std::strerror(errno)));
   }
   return address;
 }
@@ -36,24 +37,28 @@ int OpenListenSocket(const std::string& address, std::uint16_t port) {
   v6.sin6_port = htons(port);
   const bool is_v4 = inet_pton(AF_INET, address.c_str(), &v4.sin_addr) == 1;
   if (!is_v4 && inet_pton(AF_INET6, address.c_str(), &v6.sin6_addr) != 1) {
-    throw IoError(fmt::format("cannot listen on {}: expected an IPv4 or IPv6 address in numbers", address));
+    throw IoError(
+        fmt::format("cannot listen on {}: expected an IPv4 or IPv6 address in numbers", address));
   }
   const int fd = socket(is_v4 ? AF_INET : AF_INET6, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   const int on = 1;
-  const auto* bound = is_v4 ? reinterpret_cast<const sockaddr*>(&v4) : reinterpret_cast<const sockaddr*>(&v6);
+  const auto* bound =
+      is_v4 ? reinterpret_cast<const sockaddr*>(&v4) : reinterpret_cast<const sockaddr*>(&v6);
   const socklen_t length = is_v4 ? sizeof v4 : sizeof v6;
-  if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0 || bind(fd, bound, length) != 0 ||
-      listen(fd, kBacklog) != 0) {
+  if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0 ||
+      bind(fd, bound, length) != 0 || listen(fd, kBacklog) != 0) {
     const std::string reason = std::strerror(errno);
     if (fd >= 0) close(fd);
-    throw IoError(fmt::format("cannot listen on {} port {}: {}; is another server running there?", address, port, reason));
+    throw IoError(fmt::format("cannot listen on {} port {}: {}; is another server running there?",
+                              address, port, reason));
   }
   return fd;
 }
 
 std::uint16_t PortOf(int socket_fd) {
   const sockaddr_storage address = AddressOf(socket_fd);
-  if (address.ss_family == AF_INET6) return ntohs(reinterpret_cast<const sockaddr_in6&>(address).sin6_port);
+  if (address.ss_family == AF_INET6)
+    return ntohs(reinterpret_cast<const sockaddr_in6&>(address).sin6_port);
   return ntohs(reinterpret_cast<const sockaddr_in&>(address).sin_port);
 }
 

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb::web {
 
@@ -19,7 +19,8 @@ UploadFile::UploadFile(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder, ignored);
   std::string name = (folder / ".upload-XXXXXX").string();
   fd_ = ::mkostemp(name.data(), O_CLOEXEC);
-  if (fd_ < 0) throw IoError(fmt::format("cannot write to {}: {}", folder.string(), std::strerror(errno)));
+  if (fd_ < 0)
+    throw IoError(fmt::format("cannot write to {}: {}", folder.string(), std::strerror(errno)));
   path_ = name;
 }
 
@@ -33,7 +34,8 @@ void UploadFile::Append(std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t count = ::write(fd_, bytes.data(), bytes.size());
     if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) throw IoError(fmt::format("the disk takes no more of the upload: {}", std::strerror(errno)));
+    if (count <= 0)
+      throw IoError(fmt::format("the disk takes no more of the upload: {}", std::strerror(errno)));
     bytes.remove_prefix(static_cast<std::size_t>(count));
   }
 }
@@ -43,15 +45,19 @@ std::string_view Request::Header(const std::string& name) const {
   return found == headers.end() ? std::string_view() : std::string_view(found->second);
 }
 
-OpenFile::OpenFile(const std::filesystem::path& file) : fd_(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)) {
-  if (fd_ < 0) throw IoError(fmt::format("cannot open {}: {}", file.filename().string(), std::strerror(errno)));
+OpenFile::OpenFile(const std::filesystem::path& file)
+    : fd_(open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)) {
+  if (fd_ < 0)
+    throw IoError(
+        fmt::format("cannot open {}: {}", file.filename().string(), std::strerror(errno)));
   struct stat info {};
   if (fstat(fd_, &info) != 0 || !S_ISREG(info.st_mode)) {
     close(fd_);
     throw IoError(fmt::format("{} is no plain file", file.filename().string()));
   }
   size_ = static_cast<std::uint64_t>(info.st_size);
-  // Sending happens on the loop in small pieces; ask for the file now so that they come from memory.
+  // Sending happens on the loop in small pieces; ask for the file now so that they come from
+  // memory.
   posix_fadvise(fd_, 0, 0, POSIX_FADV_WILLNEED);
 }
 
@@ -64,7 +70,8 @@ int OpenFile::Release() { return std::exchange(fd_, -1); }
 Response ErrorResponse(int status, const std::string& message) {
   Response response;
   response.status = status;
-  response.body = nlohmann::json{{"error", message}}.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  response.body = nlohmann::json{{"error", message}}.dump(-1, ' ', false,
+                                                          nlohmann::json::error_handler_t::replace);
   return response;
 }
 

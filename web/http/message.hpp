@@ -16,8 +16,8 @@
 
 namespace plumb::web {
 
-/// A body on its way to the disk. Gone with its last owner, unless somebody gave it another name. One thread at a time; writing takes as
-/// long as the disk takes, and so does removing.
+/// A body on its way to the disk. Gone with its last owner, unless somebody gave it another name.
+/// One thread at a time; writing takes as long as the disk takes, and so does removing.
 class UploadFile {
  public:
   /// @throws IoError where nothing can be written.
@@ -42,7 +42,8 @@ struct Request {
   std::string body;
   std::shared_ptr<UploadFile> upload;  ///< Instead of body, of a route that takes a file.
   std::string address;                 ///< Of the browser.
-  std::vector<std::string> arguments;  ///< What the route's placeholders matched: [A-Za-z0-9._-]{1,64}, not beginning with a dot.
+  std::vector<std::string> arguments;  ///< What the route's placeholders matched:
+                                       ///< [A-Za-z0-9._-]{1,64}, not beginning with a dot.
   std::shared_ptr<Session> session;    ///< Set where the route wants a login.
 
   /// Empty if absent.
@@ -71,7 +72,8 @@ struct Response {
   int status = 200;
   std::string type = "application/json";
   std::string body;
-  std::string_view constant_body;  ///< Sent instead of body where not empty; lives as long as the program.
+  std::string_view
+      constant_body;  ///< Sent instead of body where not empty; lives as long as the program.
   std::shared_ptr<OpenFile> file;  ///< Sent instead of both.
   std::vector<std::pair<std::string, std::string>> headers;
   bool cache_for_ever = false;  ///< Else nothing is cached.
@@ -81,7 +83,7 @@ struct Response {
 /// {"error": message}
 [[nodiscard]] Response ErrorResponse(int status, const std::string& message);
 
-/// Gives the answer, once; later than the connection: to nobody.
+/// Gives the answer, once; ignored when the connection is gone.
 using Respond = std::function<void(Response)>;
 using Handler = std::function<void(const Request&, Respond)>;
 

@@ -16,7 +16,8 @@ std::string_view TakeSegment(std::string_view& path) {
 
 bool Matches(std::string_view pattern, std::string_view path, std::vector<std::string>& arguments) {
   if (path.empty() || path.front() != '/') return false;
-  if (std::count(pattern.begin(), pattern.end(), '/') != std::count(path.begin(), path.end(), '/')) return false;
+  if (std::count(pattern.begin(), pattern.end(), '/') != std::count(path.begin(), path.end(), '/'))
+    return false;
   pattern.remove_prefix(1);
   path.remove_prefix(1);
   while (!pattern.empty()) {

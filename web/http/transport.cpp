@@ -15,7 +15,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/listen_socket.hpp"
 
@@ -26,14 +26,16 @@ constexpr std::size_t kMaxPath = 256;
 constexpr std::size_t kMaxQueryFields = 8;
 constexpr std::size_t kMaxHeaders = 64;
 constexpr std::size_t kStreamBlock = 4096;
-constexpr std::size_t kUploadBlock = 1 << 20;  // a file that is sent is written in such pieces; one is written while the next comes
+constexpr std::size_t kUploadBlock =
+    1 << 20;  // a file that is sent is written in such pieces; one is written while the next comes
 
 std::string ReadPem(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
   text << in.rdbuf();
   if (!in || text.str().find("-----BEGIN") == std::string::npos) {
-    throw DataError(fmt::format("cannot read {}: expected a PEM file; check the path and its permissions", file.string()));
+    throw DataError(fmt::format(
+        "cannot read {}: expected a PEM file; check the path and its permissions", file.string()));
   }
   return text.str();
 }
@@ -43,9 +45,11 @@ std::string AddressOf(MHD_Connection* connection) {
   std::array<char, INET6_ADDRSTRLEN> text{};
   if (info == nullptr || info->client_addr == nullptr) return {};
   if (info->client_addr->sa_family == AF_INET) {
-    inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(info->client_addr)->sin_addr, text.data(), text.size());
+    inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(info->client_addr)->sin_addr,
+              text.data(), text.size());
   } else if (info->client_addr->sa_family == AF_INET6) {
-    inet_ntop(AF_INET6, &reinterpret_cast<const sockaddr_in6*>(info->client_addr)->sin6_addr, text.data(), text.size());
+    inet_ntop(AF_INET6, &reinterpret_cast<const sockaddr_in6*>(info->client_addr)->sin6_addr,
+              text.data(), text.size());
   }
   return text.data();
 }
@@ -53,7 +57,7 @@ std::string AddressOf(MHD_Connection* connection) {
 void CutSocket(MHD_Connection* connection) {
   const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
   if (info == nullptr) return;
-  // What waits in the kernel for a reader that does not read is dropped with the connection.
+  // Data waiting in the kernel for a reader that never reads is dropped with the connection.
   const linger drop{1, 0};
   setsockopt(info->connect_fd, SOL_SOCKET, SO_LINGER, &drop, sizeof drop);
   shutdown(info->connect_fd, SHUT_RDWR);
@@ -105,11 +109,13 @@ struct Transport::Exchange : std::enable_shared_from_this<Transport::Exchange> {
 struct Transport::Callbacks {
   static std::size_t KeepEscapes(void*, MHD_Connection*, char* text) { return std::strlen(text); }
 
-  static void OnConnection(void* self, MHD_Connection* connection, void** context, MHD_ConnectionNotificationCode code) {
+  static void OnConnection(void* self, MHD_Connection* connection, void** context,
+                           MHD_ConnectionNotificationCode code) {
     auto* transport = static_cast<Transport*>(self);
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
       const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-      auto made = std::make_unique<Connection>(Connection{info->connect_fd, transport->options_.now()});
+      auto made =
+          std::make_unique<Connection>(Connection{info->connect_fd, transport->options_.now()});
       transport->connections_.push_back(made.get());
       *context = made.release();
     } else {
@@ -124,7 +130,8 @@ struct Transport::Callbacks {
     return info != nullptr ? static_cast<Connection*>(info->socket_context) : nullptr;
   }
 
-  static void OnCompleted(void* self, MHD_Connection* connection, void** context, MHD_RequestTerminationCode) {
+  static void OnCompleted(void* self, MHD_Connection* connection, void** context,
+                          MHD_RequestTerminationCode) {
     auto* transport = static_cast<Transport*>(self);
     const Doing doing(transport->options_, "the end of a request");
     if (Connection* known = ConnectionOf(connection)) {
@@ -140,7 +147,7 @@ struct Transport::Callbacks {
       (*held)->stream->cut = nullptr;
       transport->hub_.Remove((*held)->stream);
     }
-    (*held)->response.emplace();  // whoever answers now answers nobody
+    (*held)->response.emplace();  // late responses are dropped
     delete held;
     *context = nullptr;
   }
@@ -148,14 +155,16 @@ struct Transport::Callbacks {
   static MHD_Result OnHeader(void* cls, MHD_ValueKind, const char* key, const char* value) {
     auto* exchange = static_cast<Exchange*>(cls);
     std::string name(key);
-    std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::transform(name.begin(), name.end(), name.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     const std::string_view text = value != nullptr ? value : "";
     exchange->num_hosts += name == "host" ? 1 : 0;
     auto& headers = exchange->request.headers;
     if (!IsPlainText(text) || headers.size() >= kMaxHeaders) exchange->malformed = true;
     const auto [where, fresh] = headers.emplace(std::move(name), text);
     if (!fresh && where->first == "cookie") where->second.append("; ").append(text);
-    if (!fresh && (where->first == "content-length" || where->first == "x-csrf-token" || where->first == "origin"))
+    if (!fresh && (where->first == "content-length" || where->first == "x-csrf-token" ||
+                   where->first == "origin"))
       exchange->malformed = true;
     return MHD_YES;
   }
@@ -164,41 +173,49 @@ struct Transport::Callbacks {
     auto* exchange = static_cast<Exchange*>(cls);
     const std::string_view text = value != nullptr ? value : "";
     auto& query = exchange->request.query;
-    const bool valid = IsName(key) && (text.empty() || IsName(text)) && query.size() < kMaxQueryFields;
+    const bool valid =
+        IsName(key) && (text.empty() || IsName(text)) && query.size() < kMaxQueryFields;
     if (!valid || !query.emplace(key, text).second) exchange->malformed = true;
     return MHD_YES;
   }
 
   static std::optional<Response> RefuseByHead(Exchange& exchange, std::size_t max_body) {
     const Request& request = exchange.request;
-    if (exchange.malformed || exchange.num_hosts != 1 || request.path.size() > kMaxPath) return ErrorResponse(400, "malformed request");
+    if (exchange.malformed || exchange.num_hosts != 1 || request.path.size() > kMaxPath)
+      return ErrorResponse(400, "malformed request");
     const std::string_view length = request.Header("content-length");
-    if (!length.empty() && !request.Header("transfer-encoding").empty()) return ErrorResponse(400, "two lengths for one body");
+    if (!length.empty() && !request.Header("transfer-encoding").empty())
+      return ErrorResponse(400, "two lengths for one body");
     std::uint64_t bytes = 0;
-    if (!length.empty() && std::from_chars(length.data(), length.data() + length.size(), bytes).ec != std::errc()) {
+    if (!length.empty() &&
+        std::from_chars(length.data(), length.data() + length.size(), bytes).ec != std::errc()) {
       return ErrorResponse(413, "the body is too long");
     }
     auto admitted = exchange.owner->gate_.Admit(exchange.request);
     if (auto* refusal = std::get_if<Response>(&admitted)) return std::move(*refusal);
     exchange.route = std::get<const Route*>(admitted);
     if (exchange.route->body == BodyKind::kFile) return BeginUpload(exchange, bytes);
-    if (bytes > max_body) return ErrorResponse(413, fmt::format("the body is too long: at most {} bytes", max_body));
+    if (bytes > max_body)
+      return ErrorResponse(413, fmt::format("the body is too long: at most {} bytes", max_body));
     return std::nullopt;
   }
 
   static std::optional<Response> BeginUpload(Exchange& exchange, std::uint64_t bytes) {
     Transport& transport = *exchange.owner;
     const HttpServerOptions& options = transport.options_;
-    if (options.upload_folder.empty()) return ErrorResponse(409, "no files are taken on this machine");
-    if (!transport.upload_.expired()) return ErrorResponse(409, "another file is being sent: wait until it is here");
+    if (options.upload_folder.empty())
+      return ErrorResponse(409, "no files are taken on this machine");
+    if (!transport.upload_.expired())
+      return ErrorResponse(409, "another file is being sent: wait until it is here");
     if (bytes == 0) return ErrorResponse(411, "a file must say its length, and have one");
     if (bytes > options.max_upload_bytes)
-      return ErrorResponse(413, fmt::format("the file is too large: at most {} MB", options.max_upload_bytes >> 20));
+      return ErrorResponse(
+          413, fmt::format("the file is too large: at most {} MB", options.max_upload_bytes >> 20));
     constexpr std::uintmax_t kSpare = 64U << 20;
     try {
       // Its removal takes as long as it is large.
-      exchange.request.upload =
-          std::shared_ptr<UploadFile>(new UploadFile(options.upload_folder), [&service = transport.service_](UploadFile* file) {
+      exchange.request.upload = std::shared_ptr<UploadFile>(
+          new UploadFile(options.upload_folder), [&service = transport.service_](UploadFile* file) {
             if (!service.Later(
                     Aside::kFiles, [file] { delete file; }, [] {}))
               delete file;
@@ -210,7 +227,8 @@ struct Transport::Callbacks {
     const auto space = std::filesystem::space(options.upload_folder, error);
     if (!error && space.available < bytes + kSpare) {
       exchange.request.upload.reset();
-      return ErrorResponse(507, fmt::format("the disk is too full: {} MB are free", space.available >> 20));
+      return ErrorResponse(
+          507, fmt::format("the disk is too full: {} MB are free", space.available >> 20));
     }
     transport.upload_ = exchange.request.upload;
     if (Connection* known = ConnectionOf(exchange.connection)) known->uploading = true;
@@ -220,7 +238,8 @@ struct Transport::Callbacks {
   /// A part of a body. @return  False: too long, the connection ends.
   static bool TakeBody(Exchange& exchange, std::string_view bytes) {
     const HttpServerOptions& options = exchange.owner->options_;
-    if (exchange.response) return true;  // refused in the middle of a file: the rest is read, and dropped
+    if (exchange.response)
+      return true;  // refused in the middle of a file: the rest is read, and dropped
     if (!exchange.request.upload) {
       if (exchange.request.body.size() + bytes.size() > options.max_body_bytes) return false;
       exchange.request.body.append(bytes);
@@ -237,7 +256,8 @@ struct Transport::Callbacks {
   static void WriteUpload(Exchange& exchange) {
     if (exchange.writing) return exchange.Suspend();
     const auto failure = std::make_shared<std::string>();
-    const auto work = [file = exchange.request.upload, bytes = std::exchange(exchange.unwritten, {}), failure] {
+    const auto work = [file = exchange.request.upload,
+                       bytes = std::exchange(exchange.unwritten, {}), failure] {
       try {
         file->Append(bytes);
       } catch (const IoError& error) {
@@ -245,9 +265,10 @@ struct Transport::Callbacks {
       }
     };
     exchange.writing = true;
-    const bool accepted = exchange.owner->service_.Later(Aside::kFiles, work, [weak = exchange.weak_from_this(), failure] {
-      if (const auto alive = weak.lock()) HaveWritten(*alive, *failure);
-    });
+    const bool accepted = exchange.owner->service_.Later(
+        Aside::kFiles, work, [weak = exchange.weak_from_this(), failure] {
+          if (const auto alive = weak.lock()) HaveWritten(*alive, *failure);
+        });
     if (!accepted) HaveWritten(exchange, "the disk is too busy; send the file again later");
   }
 
@@ -271,7 +292,8 @@ struct Transport::Callbacks {
     return false;
   }
 
-  static MHD_Result Begin(Transport& transport, MHD_Connection* connection, const char* url, const char* method, void** context) {
+  static MHD_Result Begin(Transport& transport, MHD_Connection* connection, const char* url,
+                          const char* method, void** context) {
     auto exchange = std::make_shared<Exchange>();
     exchange->owner = &transport;
     exchange->connection = connection;
@@ -286,15 +308,19 @@ struct Transport::Callbacks {
     if (auto refusal = RefuseByHead(*exchange, transport.options_.max_body_bytes)) {
       exchange->response = std::move(*refusal);
       exchange->started = true;
-      // An answer before the whole request ends the connection: only where a body would have to be read for nothing.
-      const bool has_body = !exchange->request.Header("transfer-encoding").empty() || exchange->malformed ||
-                            (!exchange->request.Header("content-length").empty() && exchange->request.Header("content-length") != "0");
+      // An answer before the whole request ends the connection: only where a body would have to be
+      // read for nothing.
+      const bool has_body = !exchange->request.Header("transfer-encoding").empty() ||
+                            exchange->malformed ||
+                            (!exchange->request.Header("content-length").empty() &&
+                             exchange->request.Header("content-length") != "0");
       if (has_body) return Queue(*exchange);
     }
     return MHD_YES;
   }
 
-  static MHD_Result OnRequest(void* self, MHD_Connection* connection, const char* url, const char* method, const char*, const char* upload,
+  static MHD_Result OnRequest(void* self, MHD_Connection* connection, const char* url,
+                              const char* method, const char*, const char* upload,
                               std::size_t* upload_size, void** context) {
     auto& transport = *static_cast<Transport*>(self);
     try {
@@ -313,10 +339,12 @@ struct Transport::Callbacks {
       if (!exchange->started && !HasWholeUpload(*exchange)) return MHD_YES;
       if (!exchange->started) {
         exchange->started = true;
-        const Doing doing(transport.options_, transport.options_.doing ? exchange->route->Name() : std::string());
-        Gate::Handle(*exchange->route, exchange->request, [weak = std::weak_ptr(exchange)](Response response) {
-          if (const auto alive = weak.lock()) alive->Answer(std::move(response));
-        });
+        const Doing doing(transport.options_,
+                          transport.options_.doing ? exchange->route->Name() : std::string());
+        Gate::Handle(*exchange->route, exchange->request,
+                     [weak = std::weak_ptr(exchange)](Response response) {
+                       if (const auto alive = weak.lock()) alive->Answer(std::move(response));
+                     });
       }
       if (exchange->response) return Queue(*exchange);
       exchange->Suspend();
@@ -356,7 +384,8 @@ struct Transport::Callbacks {
     };
     exchange.owner->greet_(*exchange.stream);
     auto held = std::make_unique<std::shared_ptr<Exchange>>(exchange.shared_from_this());
-    return MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, kStreamBlock, ReadStream, held.release(), FreeStream);
+    return MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, kStreamBlock, ReadStream,
+                                             held.release(), FreeStream);
   }
 
   static MHD_Response* MakeBody(Exchange& exchange) {
@@ -369,10 +398,12 @@ struct Transport::Callbacks {
       return MHD_create_response_from_fd64(size, response.file->Release());
     }
     if (!response.constant_body.empty()) {
-      return MHD_create_response_from_buffer(response.constant_body.size(), const_cast<char*>(response.constant_body.data()),
+      return MHD_create_response_from_buffer(response.constant_body.size(),
+                                             const_cast<char*>(response.constant_body.data()),
                                              MHD_RESPMEM_PERSISTENT);
     }
-    return MHD_create_response_from_buffer(response.body.size(), response.body.data(), MHD_RESPMEM_MUST_COPY);
+    return MHD_create_response_from_buffer(response.body.size(), response.body.data(),
+                                           MHD_RESPMEM_MUST_COPY);
   }
 
   static MHD_Result Queue(Exchange& exchange) {
@@ -381,18 +412,21 @@ struct Transport::Callbacks {
     Response& response = *exchange.response;
     AddSecurityHeaders(response);
     MHD_add_response_header(made, MHD_HTTP_HEADER_CONTENT_TYPE, response.type.c_str());
-    for (const auto& [name, value] : response.headers) MHD_add_response_header(made, name.c_str(), value.c_str());
-    const MHD_Result queued = MHD_queue_response(exchange.connection, static_cast<unsigned>(response.status), made);
+    for (const auto& [name, value] : response.headers)
+      MHD_add_response_header(made, name.c_str(), value.c_str());
+    const MHD_Result queued =
+        MHD_queue_response(exchange.connection, static_cast<unsigned>(response.status), made);
     MHD_destroy_response(made);
     return queued;
   }
 };
 
-Transport::Transport(const HttpServerOptions& options, ScanService& service, const Router& router, Accounts& accounts, EventHub& hub,
+Transport::Transport(const HttpServerOptions& options, ScanService& service, const Router& router,
+                     SessionLookup& sessions, EventHub& hub,
                      std::function<void(EventStream&)> greet)
     : options_(options),
       service_(service),
-      gate_(router, accounts, options.host_names, !options.tls_certificate.empty()),
+      gate_(router, sessions, options.host_names, !options.tls_certificate.empty()),
       hub_(hub),
       greet_(std::move(greet)),
       wake_fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
@@ -419,17 +453,20 @@ void Transport::Start(int listen_fd) {
     extra.push_back({MHD_OPTION_HTTPS_MEM_KEY, 0, key.data()});
   }
   extra.push_back({MHD_OPTION_END, 0, nullptr});
-  daemon_ = MHD_start_daemon(flags, 0, nullptr, nullptr, &Callbacks::OnRequest, this, MHD_OPTION_LISTEN_SOCKET, listen_fd,
-                             MHD_OPTION_CONNECTION_LIMIT, options_.max_connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT,
-                             options_.max_connections_per_ip, MHD_OPTION_CONNECTION_MEMORY_LIMIT, options_.connection_memory_bytes,
-                             MHD_OPTION_CONNECTION_TIMEOUT, static_cast<unsigned>(options_.request_timeout.count()),
-                             MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_UNESCAPE_CALLBACK, &Callbacks::KeepEscapes, nullptr,
-                             MHD_OPTION_NOTIFY_COMPLETED, &Callbacks::OnCompleted, this, MHD_OPTION_NOTIFY_CONNECTION,
-                             &Callbacks::OnConnection, this, MHD_OPTION_ARRAY, extra.data(), MHD_OPTION_END);
+  daemon_ = MHD_start_daemon(
+      flags, 0, nullptr, nullptr, &Callbacks::OnRequest, this, MHD_OPTION_LISTEN_SOCKET, listen_fd,
+      MHD_OPTION_CONNECTION_LIMIT, options_.max_connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT,
+      options_.max_connections_per_ip, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+      options_.connection_memory_bytes, MHD_OPTION_CONNECTION_TIMEOUT,
+      static_cast<unsigned>(options_.request_timeout.count()), MHD_OPTION_STRICT_FOR_CLIENT, 1,
+      MHD_OPTION_UNESCAPE_CALLBACK, &Callbacks::KeepEscapes, nullptr, MHD_OPTION_NOTIFY_COMPLETED,
+      &Callbacks::OnCompleted, this, MHD_OPTION_NOTIFY_CONNECTION, &Callbacks::OnConnection, this,
+      MHD_OPTION_ARRAY, extra.data(), MHD_OPTION_END);
   if (daemon_ == nullptr) {
     if (!options_.listen_fd) close(listen_fd);
-    throw IoError(fmt::format("cannot start the HTTP server on port {}{}", port_,
-                              certificate.empty() ? "" : "; do the TLS certificate and key belong together?"));
+    throw IoError(fmt::format(
+        "cannot start the HTTP server on port {}{}", port_,
+        certificate.empty() ? "" : "; do the TLS certificate and key belong together?"));
   }
   epoll_fd_ = MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_EPOLL_FD)->epoll_fd;
 }
@@ -454,7 +491,8 @@ void Transport::Run() {
 
 void Transport::Wake() const {
   const std::uint64_t one = 1;
-  [[maybe_unused]] const auto written = write(wake_fd_, &one, sizeof one);  // cannot fail below 2^64 - 1
+  [[maybe_unused]] const auto written =
+      write(wake_fd_, &one, sizeof one);  // cannot fail below 2^64 - 1
 }
 
 std::optional<std::chrono::milliseconds> Transport::timeout() const {
@@ -467,7 +505,8 @@ void Transport::CutLate() {
   const auto now = options_.now();
   for (const Connection* connection : connections_) {
     const auto limit = connection->uploading ? options_.upload_limit : options_.request_limit;
-    if (connection->receiving && now - connection->since > limit) shutdown(connection->fd, SHUT_RDWR);
+    if (connection->receiving && now - connection->since > limit)
+      shutdown(connection->fd, SHUT_RDWR);
   }
 }
 

@@ -10,7 +10,8 @@
 
 #include "web/http/event_hub.hpp"
 #include "web/http/gate.hpp"
-#include "web/http_server.hpp"
+#include "web/http/server_options.hpp"
+#include "web/service/scan_service.hpp"
 
 struct MHD_Daemon;
 
@@ -35,10 +36,10 @@ class Doing {
 /// Carries requests to the gate and answers back. Belongs to the loop thread.
 class Transport {
  public:
-  /// @param service  Writes files aside.
+  /// @param service  Writes files on its background thread.
   /// @param greet  Writes the first events into a new stream.
-  Transport(const HttpServerOptions& options, ScanService& service, const Router& router, Accounts& accounts, EventHub& hub,
-            std::function<void(EventStream&)> greet);
+  Transport(const HttpServerOptions& options, ScanService& service, const Router& router,
+            SessionLookup& sessions, EventHub& hub, std::function<void(EventStream&)> greet);
   ~Transport();
   Transport(const Transport&) = delete;
   Transport& operator=(const Transport&) = delete;

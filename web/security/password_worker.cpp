@@ -9,16 +9,18 @@
 #include <cstring>
 #include <utility>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb::web {
 namespace {
 
 constexpr std::size_t kMaxWaiting = 8;
 
-std::optional<std::string> HashPassword(const std::string& password, std::uint64_t operations, std::uint64_t memory_bytes) {
+std::optional<std::string> HashPassword(const std::string& password, std::uint64_t operations,
+                                        std::uint64_t memory_bytes) {
   std::array<char, crypto_pwhash_STRBYTES> hash{};
-  if (crypto_pwhash_str_alg(hash.data(), password.data(), password.size(), operations, memory_bytes, crypto_pwhash_ALG_ARGON2ID13) != 0) {
+  if (crypto_pwhash_str_alg(hash.data(), password.data(), password.size(), operations, memory_bytes,
+                            crypto_pwhash_ALG_ARGON2ID13) != 0) {
     return std::nullopt;
   }
   return std::string(hash.data());
@@ -50,20 +52,28 @@ bool PasswordWorker::Enqueue(Job job) {
   return true;
 }
 
-bool PasswordWorker::Hash(std::string password, std::function<void(std::optional<std::string>)> done) {
-  return Enqueue([this, password = std::move(password), done = std::move(done)]() mutable -> std::function<void()> {
+bool PasswordWorker::Hash(std::string password,
+                          std::function<void(std::optional<std::string>)> done) {
+  return Enqueue([this, password = std::move(password),
+                  done = std::move(done)]() mutable -> std::function<void()> {
     auto hash = HashPassword(password, operations_, memory_bytes_);
     Wipe(password);
     return [done = std::move(done), hash = std::move(hash)] { done(hash); };
   });
 }
 
-bool PasswordWorker::Verify(std::string password, std::string hash, std::function<void(bool)> done) {
-  return Enqueue([this, password = std::move(password), hash = std::move(hash), done = std::move(done)]() mutable -> std::function<void()> {
-    // An unknown name costs the same time as a wrong password, so names cannot be told apart by a clock.
-    if (dummy_hash_.empty()) dummy_hash_ = HashPassword("no account", operations_, memory_bytes_).value_or("");
+bool PasswordWorker::Verify(std::string password, std::string hash,
+                            std::function<void(bool)> done) {
+  return Enqueue([this, password = std::move(password), hash = std::move(hash),
+                  done = std::move(done)]() mutable -> std::function<void()> {
+    // An unknown name costs the same time as a wrong password, so names cannot be probed by a
+    // clock.
+    if (dummy_hash_.empty())
+      dummy_hash_ = HashPassword("no account", operations_, memory_bytes_).value_or("");
     const std::string& against = hash.empty() ? dummy_hash_ : hash;
-    const bool matches = crypto_pwhash_str_verify(against.c_str(), password.data(), password.size()) == 0 && !hash.empty();
+    const bool matches =
+        crypto_pwhash_str_verify(against.c_str(), password.data(), password.size()) == 0 &&
+        !hash.empty();
     Wipe(password);
     return [done = std::move(done), matches] { done(matches); };
   });
@@ -80,7 +90,8 @@ void PasswordWorker::Work(const std::stop_token& stop) {
     lock.lock();
     finished_.push_back(std::move(finish));
     const std::uint64_t one = 1;
-    [[maybe_unused]] const auto written = write(event_fd_, &one, sizeof one);  // cannot fail below 2^64 - 1
+    [[maybe_unused]] const auto written =
+        write(event_fd_, &one, sizeof one);  // cannot fail below 2^64 - 1
   }
 }
 

@@ -1,4 +1,5 @@
-// argon2id on a thread of its own: a hash takes tenths of a second and much memory, the event loop must not wait for it.
+// argon2id on a thread of its own: a hash takes tenths of a second and much memory, the event loop
+// must not wait for it.
 #pragma once
 
 #include <condition_variable>
@@ -12,7 +13,8 @@
 
 namespace plumb::web {
 
-/// One hash at a time, few waiting: the memory is bounded. Everything but the thread itself belongs to the loop thread.
+/// One hash at a time, few waiting: the memory is bounded. Everything but the thread itself belongs
+/// to the loop thread.
 class PasswordWorker {
  public:
   PasswordWorker(std::uint64_t operations, std::uint64_t memory_bytes);
@@ -20,8 +22,10 @@ class PasswordWorker {
   PasswordWorker(const PasswordWorker&) = delete;
   PasswordWorker& operator=(const PasswordWorker&) = delete;
 
-  /// False: too many wait already, done is not called. @param done  With the hash; nothing where memory ran out. Called by Dispatch().
-  [[nodiscard]] bool Hash(std::string password, std::function<void(std::optional<std::string>)> done);
+  /// False: too many wait already, done is not called. @param done  With the hash; nothing where
+  /// memory ran out. Called by Dispatch().
+  [[nodiscard]] bool Hash(std::string password,
+                          std::function<void(std::optional<std::string>)> done);
   /// The same for a check. An empty hash is never right but takes as long.
   [[nodiscard]] bool Verify(std::string password, std::string hash, std::function<void(bool)> done);
 
@@ -30,7 +34,8 @@ class PasswordWorker {
   void Dispatch();
 
  private:
-  using Job = std::function<std::function<void()>()>;  ///< Runs on the thread, gives what the loop shall run.
+  using Job = std::function<std::function<void()>()>;  ///< Runs on the thread, gives what the loop
+                                                       ///< shall run.
   [[nodiscard]] bool Enqueue(Job job);
   void Work(const std::stop_token& stop);
 

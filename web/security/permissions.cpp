@@ -8,20 +8,29 @@ namespace {
 struct Row {
   Permission permission;
   std::string_view name;
-  bool technician, physicist, engineer;
+  bool technician, physicist, engineer, display;
 };
 
 constexpr std::array kTable = {
-    Row{Permission::kNone, "none", true, true, true},          Row{Permission::kLogin, "login", true, true, true},
-    Row{Permission::kView, "view", true, true, true},          Row{Permission::kScan, "scan", true, true, true},
-    Row{Permission::kPatients, "patients", true, true, false}, Row{Permission::kPlan, "plan", false, true, false},
-    Row{Permission::kApprove, "approve", false, true, false},  Row{Permission::kAccept, "accept", true, true, false},
-    Row{Permission::kWipe, "wipe", false, true, false},        Row{Permission::kUsers, "users", false, false, true},
-    Row{Permission::kAudit, "audit", false, true, true},       Row{Permission::kSettings, "settings", false, false, true},
-    Row{Permission::kUpdate, "update", false, false, true},    Row{Permission::kDiagnostics, "diagnostics", false, false, true},
+    Row{Permission::kNone, "none", true, true, true, true},
+    Row{Permission::kLogin, "login", true, true, true, true},
+    Row{Permission::kRoom, "room", true, true, true, true},
+    Row{Permission::kView, "view", true, true, true, false},
+    Row{Permission::kScan, "scan", true, true, true, false},
+    Row{Permission::kPatients, "patients", true, true, false, false},
+    Row{Permission::kPlan, "plan", false, true, false, false},
+    Row{Permission::kApprove, "approve", false, true, false, false},
+    Row{Permission::kAccept, "accept", true, true, false, false},
+    Row{Permission::kWipe, "wipe", false, true, false, false},
+    Row{Permission::kUsers, "users", false, false, true, false},
+    Row{Permission::kAudit, "audit", false, true, true, false},
+    Row{Permission::kSettings, "settings", false, false, true, false},
+    Row{Permission::kUpdate, "update", false, false, true, false},
+    Row{Permission::kDiagnostics, "diagnostics", false, false, true, false},
 };
 
-constexpr std::array<std::string_view, 3> kRoles = {"technician", "physicist", "engineer"};
+constexpr std::array<std::string_view, 4> kRoles = {"technician", "physicist", "engineer",
+                                                    "display"};
 
 }  // namespace
 
@@ -35,6 +44,8 @@ bool May(Role role, Permission permission) {
         return row.physicist;
       case Role::kEngineer:
         return row.engineer;
+      case Role::kDisplay:
+        return row.display;
     }
   }
   return false;
@@ -58,7 +69,8 @@ std::string_view Name(Permission permission) {
 std::string_view Name(Role role) { return kRoles[static_cast<std::size_t>(role)]; }
 
 std::optional<Role> ParseRole(std::string_view name) {
-  for (std::size_t i = 0; i < kRoles.size(); ++i) {
+  // A display is paired, not an account.
+  for (std::size_t i = 0; i < static_cast<std::size_t>(Role::kDisplay); ++i) {
     if (kRoles[i] == name) return static_cast<Role>(i);
   }
   return std::nullopt;

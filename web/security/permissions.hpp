@@ -5,13 +5,14 @@
 #include <string_view>
 #include <vector>
 
-#include "web/service_types.hpp"
+#include "web/service/service_types.hpp"
 
 namespace plumb::web {
 
 enum class Permission {
   kNone,  ///< Nobody needs to be logged in.
   kLogin,
+  kRoom,  ///< What the screen in the room shows.
   kView,
   kScan,
   kPatients,

@@ -14,8 +14,9 @@ constexpr std::size_t kTokenBytes = 32;
 
 std::string HashOf(const std::string& token) {
   std::string hash(crypto_generichash_BYTES, '\0');
-  crypto_generichash(reinterpret_cast<unsigned char*>(hash.data()), hash.size(), reinterpret_cast<const unsigned char*>(token.data()),
-                     token.size(), nullptr, 0);
+  crypto_generichash(reinterpret_cast<unsigned char*>(hash.data()), hash.size(),
+                     reinterpret_cast<const unsigned char*>(token.data()), token.size(), nullptr,
+                     0);
   return hash;
 }
 
@@ -24,8 +25,10 @@ std::string HashOf(const std::string& token) {
 std::string RandomToken(std::size_t bytes) {
   std::vector<unsigned char> random(bytes);
   randombytes_buf(random.data(), random.size());
-  std::string text(sodium_base64_ENCODED_LEN(bytes, sodium_base64_VARIANT_URLSAFE_NO_PADDING), '\0');
-  sodium_bin2base64(text.data(), text.size(), random.data(), random.size(), sodium_base64_VARIANT_URLSAFE_NO_PADDING);
+  std::string text(sodium_base64_ENCODED_LEN(bytes, sodium_base64_VARIANT_URLSAFE_NO_PADDING),
+                   '\0');
+  sodium_bin2base64(text.data(), text.size(), random.data(), random.size(),
+                    sodium_base64_VARIANT_URLSAFE_NO_PADDING);
   text.pop_back();  // its terminating zero
   return text;
 }
@@ -37,12 +40,15 @@ bool Sessions::IsOver(const Session& session, TimePoint now) const {
 Sessions::Opened Sessions::Open(const User& user, TimePoint now) {
   Expire(now);
   if (sessions_.size() >= kMaxSessions) {
-    const auto oldest = std::min_element(sessions_.begin(), sessions_.end(),
-                                         [](const auto& a, const auto& b) { return a.second->last_used < b.second->last_used; });
+    const auto oldest = std::min_element(
+        sessions_.begin(), sessions_.end(),
+        [](const auto& a, const auto& b) { return a.second->last_used < b.second->last_used; });
     oldest->second->ended = true;
     sessions_.erase(oldest);
   }
-  Opened opened{RandomToken(kTokenBytes), std::make_shared<Session>(Session{user.name, user.role, RandomToken(kTokenBytes), now, now})};
+  Opened opened{
+      RandomToken(kTokenBytes),
+      std::make_shared<Session>(Session{user.name, user.role, RandomToken(kTokenBytes), now, now})};
   sessions_[HashOf(opened.token)] = opened.session;
   return opened;
 }

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "web/scan_service.hpp"
+#include "web/service/scan_service.hpp"
 
 namespace plumb::web {
 
@@ -32,10 +32,11 @@ class Sessions {
   };
   /// Ends the least recently used one where there are too many.
   [[nodiscard]] Opened Open(const User& user, TimePoint now);
-  /// Null where unknown or over. @param touch  Counts as a use: idle time begins anew.
+  /// Null where unknown or over. @param touch  Counts as a use: idle time starts again.
   [[nodiscard]] std::shared_ptr<Session> Find(const std::string& token, TimePoint now, bool touch);
   void End(const std::shared_ptr<Session>& session);
-  /// Of a user that was disabled, or whose role or password changed. @param but  Goes on; may be null.
+  /// Of a user that was disabled, or whose role or password changed. @param but  Goes on; may be
+  /// null.
   void EndAllOf(const std::string& user, const std::shared_ptr<Session>& but);
   /// Ends those that are over.
   void Expire(TimePoint now);

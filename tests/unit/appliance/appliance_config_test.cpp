@@ -1,8 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "algo/types/errors.hpp"
-#include "daemon/config.hpp"
+#include "algo/base/errors.hpp"
+#include "daemon/config/config.hpp"
 #include "tests/support/message_of.hpp"
 
 namespace plumb {
@@ -60,12 +60,17 @@ host_names = ["plumb.local", "couch"]
 }
 
 TEST(ApplianceConfigTest, WhatIsWrongIsToldWithItsLine) {
-  const auto complaint = [](const std::string& text) { return MessageOf<DataError>([&] { (void)ParseConfig(text, "plumb.toml"); }); };
+  const auto complaint = [](const std::string& text) {
+    return MessageOf<DataError>([&] { (void)ParseConfig(text, "plumb.toml"); });
+  };
   EXPECT_THAT(complaint("[appliance]\n\nstate = \"relative\"\n"),
               AllOf(HasSubstr("plumb.toml:3"), HasSubstr("absolute"), HasSubstr("relative")));
-  EXPECT_THAT(complaint("[appliance]\nauto_stop_s = 1000\n"), AllOf(HasSubstr(":2"), HasSubstr("120")));
-  EXPECT_THAT(complaint("[appliance]\nquota = 3\n"), AllOf(HasSubstr(":2"), HasSubstr("unknown key 'quota'"), HasSubstr("quota_gb")));
-  EXPECT_THAT(complaint("[web]\nlisten = \"8080\"\n"), AllOf(HasSubstr(":2"), HasSubstr("0.0.0.0:8080")));
+  EXPECT_THAT(complaint("[appliance]\nauto_stop_s = 1000\n"),
+              AllOf(HasSubstr(":2"), HasSubstr("120")));
+  EXPECT_THAT(complaint("[appliance]\nquota = 3\n"),
+              AllOf(HasSubstr(":2"), HasSubstr("unknown key 'quota'"), HasSubstr("quota_gb")));
+  EXPECT_THAT(complaint("[web]\nlisten = \"8080\"\n"),
+              AllOf(HasSubstr(":2"), HasSubstr("0.0.0.0:8080")));
   EXPECT_THAT(complaint("[web]\nhost_names = [1]\n"), HasSubstr(":2"));
   EXPECT_THAT(complaint("[gpio]\n"), HasSubstr("[appliance]"));
 }
@@ -73,7 +78,8 @@ TEST(ApplianceConfigTest, WhatIsWrongIsToldWithItsLine) {
 TEST(ApplianceConfigTest, ListenAddresses) {
   EXPECT_EQ(ParseListenAddress("127.0.0.1:8080")->port, 8080);
   EXPECT_EQ(ParseListenAddress("[::1]:0")->address, "::1");
-  for (const char* bad : {"", ":80", "80", "host:", "1.2.3.4:65536", "1.2.3.4:x", "::1:80", "[::1:80", "[1.2.3.4]:80", "a:-1"}) {
+  for (const char* bad : {"", ":80", "80", "host:", "1.2.3.4:65536", "1.2.3.4:x", "::1:80",
+                          "[::1:80", "[1.2.3.4]:80", "a:-1"}) {
     EXPECT_FALSE(ParseListenAddress(bad)) << bad;
   }
 }

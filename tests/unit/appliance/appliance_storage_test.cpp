@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/appliance.hpp"
+#include "daemon/appliance/appliance.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -25,12 +25,13 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
     Store store(config.appliance.state);  // and closed again: nothing of it is in anybody's memory
     (void)store.AddPatient({.user = "anna", .address = {}}, "A", "");
   }
-  Appliance appliance(loop, {.config = config,
-                             .make_provider = [&] { return std::make_unique<testing::FakeProvider>(bus); },
-                             .before_scan = {},
-                             .button = nullptr,
-                             .indicator = nullptr,
-                             .demo_patient = {}});
+  Appliance appliance(
+      loop, {.config = config,
+             .make_provider = [&] { return std::make_unique<testing::FakeProvider>(bus); },
+             .before_scan = {},
+             .button = nullptr,
+             .indicator = nullptr,
+             .demo_patient = {}});
   for (const fs::directory_entry& entry : fs::directory_iterator(config.appliance.state)) {
     if (!entry.is_regular_file()) continue;
     std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);

@@ -1,5 +1,5 @@
 // The appliance on its loop, with a sensor that does what a test says.
-#include "daemon/appliance.hpp"
+#include "daemon/appliance/appliance.hpp"
 
 #include <future>
 #include <thread>
@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/web_service.hpp"
+#include "daemon/appliance/web_service.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -20,7 +20,8 @@ using testing::FakeProvider;
 /// Its driver takes as long to open a sensor as the test wants.
 class SlowProvider : public FakeProvider {
  public:
-  SlowProvider(FakeBus& bus, std::shared_future<void> may_open) : FakeProvider(bus), may_open_(std::move(may_open)) {}
+  SlowProvider(FakeBus& bus, std::shared_future<void> may_open)
+      : FakeProvider(bus), may_open_(std::move(may_open)) {}
   [[nodiscard]] std::unique_ptr<LiveSensor> Open(const std::string& serial) override {
     may_open_.wait();
     return FakeProvider::Open(serial);
@@ -39,7 +40,8 @@ class ApplianceTest : public ::testing::Test {
     parts_.make_provider = [this] { return std::make_unique<SlowProvider>(bus_, may_open_); };
   }
 
-  /// Runs the test beside the loop, which has the main thread; a loop that has ended does not begin again.
+  /// Runs the test beside the loop, which has the main thread; a loop that has ended does not begin
+  /// again.
   void Play(const std::function<void()>& test) {
     appliance_ = std::make_unique<Appliance>(loop_, parts_);
     service_ = std::make_unique<WebService>(*appliance_, parts_.config.update);
@@ -55,7 +57,8 @@ class ApplianceTest : public ::testing::Test {
 
   /// On the loop's thread; waits for it.
   void On(const std::function<void()>& work) {
-    const auto done = std::make_shared<std::promise<void>>();  // shared: it wakes us while it is still at it
+    const auto done =
+        std::make_shared<std::promise<void>>();  // shared: it wakes us while it is still at it
     loop_.Post("test", [&work, done] {
       work();
       done->set_value();
@@ -136,14 +139,23 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
   Play([&] {
     MakeReady();
     std::promise<web::Change> added, wiped;
-    On([&] { service_->AddPatient(actor, "P1", "", [&](const web::Change& change) { added.set_value(change); }); });
-    const std::string id = added.get_future().get().id;
     On([&] {
-      service_->OpenPatient(actor, id, web::ScanPurpose::kReference, "", [](const web::Change&) {});
+      service_->AddPatient(actor, "P1", "",
+                           [&](const web::Change& change) { added.set_value(change); });
+    });
+    const std::string id = added.get_future().get().id;
+    std::promise<web::Change> opened;
+    On([&] {
+      service_->OpenPatient(actor, id, web::ScanPurpose::kReference, "", "",
+                            [&](const web::Change& change) { opened.set_value(change); });
+    });
+    EXPECT_EQ(opened.get_future().get().result, web::ChangeResult::kDone);
+    On([&] {
       EXPECT_EQ(appliance_->WebStatus().patient_id, id);
       EXPECT_EQ(appliance_->OpenCheck(actor), "");
       service_->WipePatient(actor, id, [&](const web::Change& change) { wiped.set_value(change); });
-      EXPECT_EQ(appliance_->WebStatus().next_purpose, web::ScanPurpose::kDailyCheck) << "the check stays open";
+      EXPECT_EQ(appliance_->WebStatus().next_purpose, web::ScanPurpose::kDailyCheck)
+          << "the check stays open";
     });
     EXPECT_EQ(wiped.get_future().get().result, web::ChangeResult::kDone);
     On([&] {

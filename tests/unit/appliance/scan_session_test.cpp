@@ -1,5 +1,5 @@
 // Scans of a still wall: how they end, and what they tell on the way.
-#include "daemon/scan_session.hpp"
+#include "daemon/appliance/scan_session.hpp"
 
 #include <condition_variable>
 #include <filesystem>
@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -55,7 +55,9 @@ class ScanSessionTest : public ::testing::Test {
   }
   ScanOutcome WaitForEnd() {
     std::unique_lock lock(mutex_);
-    EXPECT_TRUE(changed_.wait_for(lock, std::chrono::seconds(60), [&] { return outcome_.has_value(); })) << "the scan did not end";
+    EXPECT_TRUE(changed_.wait_for(lock, std::chrono::seconds(60), [&] {
+      return outcome_.has_value();
+    })) << "the scan did not end";
     return outcome_.value_or(ScanOutcome{});
   }
 
@@ -196,7 +198,8 @@ TEST_F(ScanSessionTest, ADiscardedRecordingIsNotWrittenToItsEnd) {
 TEST_F(ScanSessionTest, ARecordingThatCannotBeWrittenEndsTheSweepWithItsReason) {
   job_.keep_recording = true;
   callbacks_.begin = [this] {
-    std::filesystem::create_directories(folder_ / "recording" / "rgb" / "0.000000.png");  // where the first image is to be written
+    std::filesystem::create_directories(folder_ / "recording" / "rgb" /
+                                        "0.000000.png");  // where the first image is to be written
     return folder_.path();
   };
   std::promise<void> first_frame;  // none is dropped before it
@@ -219,7 +222,9 @@ TEST_F(ScanSessionTest, ARecordingHoldsWhatTrackingTook) {
   EXPECT_EQ(WaitForEnd().kind, Kind::kDone) << outcome_->reason;
   EXPECT_TRUE(std::filesystem::exists(folder_ / "recording" / "camera.yaml"));
   int num_images = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder_ / "recording" / "depth")) ++num_images;
+  for ([[maybe_unused]] const auto& entry :
+       std::filesystem::directory_iterator(folder_ / "recording" / "depth"))
+    ++num_images;
   EXPECT_EQ(num_images, 9);
 }
 

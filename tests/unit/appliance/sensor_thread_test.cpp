@@ -1,4 +1,4 @@
-#include "daemon/sensor_thread.hpp"
+#include "daemon/appliance/sensor_thread.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,7 +26,8 @@ class Told {
   /// Waits for the event with that number, from 0.
   SensorEvent At(std::size_t index) {
     std::unique_lock lock(mutex_);
-    if (!changed_.wait_for(lock, std::chrono::seconds(20), [&] { return events_.size() > index; })) {
+    if (!changed_.wait_for(lock, std::chrono::seconds(20),
+                           [&] { return events_.size() > index; })) {
       ADD_FAILURE() << "no event " << index;
       return {};
     }
@@ -44,8 +45,9 @@ class SensorThreadTest : public ::testing::Test {
   void Start(SensorThreadOptions options = {}) {
     options.first_retry = milliseconds(5);
     options.last_retry = milliseconds(20);
-    thread_ = std::make_unique<SensorThread>([this] { return std::make_unique<FakeProvider>(bus_); }, options,
-                                             [this](const SensorEvent& event) { told_(event); });
+    thread_ =
+        std::make_unique<SensorThread>([this] { return std::make_unique<FakeProvider>(bus_); },
+                                       options, [this](const SensorEvent& event) { told_(event); });
     EXPECT_EQ(told_.At(0).kind, Kind::kLost) << "nothing is attached yet";
   }
 
@@ -186,7 +188,8 @@ TEST_F(SensorThreadTest, OnlyTheConfiguredSensorIsUsed) {
   Start({.serial = "B", .before_scan = {}});
   bus_.Plug("A");
   EXPECT_EQ(told_.At(1).kind, Kind::kFailed);
-  EXPECT_THAT(told_.At(1).reason, ::testing::AllOf(::testing::HasSubstr("B"), ::testing::HasSubstr("A")));
+  EXPECT_THAT(told_.At(1).reason,
+              ::testing::AllOf(::testing::HasSubstr("B"), ::testing::HasSubstr("A")));
   bus_.Plug("B");
   bus_.GiveFrame();
   EXPECT_EQ(told_.At(2).sensor.serial, "B");
@@ -199,7 +202,10 @@ TEST_F(SensorThreadTest, ALibraryThatDoesNotStartIsAFailureThatIsTriedAgain) {
         if (++attempts < 3) throw DeviceError("the library is missing");
         return std::make_unique<FakeProvider>(bus_);
       },
-      SensorThreadOptions{.serial = {}, .before_scan = {}, .first_retry = milliseconds(1), .last_retry = milliseconds(2)},
+      SensorThreadOptions{.serial = {},
+                          .before_scan = {},
+                          .first_retry = milliseconds(1),
+                          .last_retry = milliseconds(2)},
       [this](const SensorEvent& event) { told_(event); });
   EXPECT_EQ(told_.At(0).reason, "the library is missing");
   EXPECT_EQ(told_.At(1).kind, Kind::kLost) << "and then it works, and sees no sensor";
@@ -222,7 +228,10 @@ TEST_F(SensorThreadTest, WaitingForALibraryThatDoesNotStartTakesNoProcessor) {
         waiting_s = processor_s() - before_s;
         return std::make_unique<FakeProvider>(bus_);
       },
-      SensorThreadOptions{.serial = {}, .before_scan = {}, .first_retry = milliseconds(300), .last_retry = milliseconds(300)},
+      SensorThreadOptions{.serial = {},
+                          .before_scan = {},
+                          .first_retry = milliseconds(300),
+                          .last_retry = milliseconds(300)},
       [this](const SensorEvent& event) { told_(event); });
   EXPECT_EQ(told_.At(1).kind, Kind::kLost) << "the second attempt works, and sees no sensor";
   EXPECT_LT(waiting_s, 0.01) << "of 0.3 s";

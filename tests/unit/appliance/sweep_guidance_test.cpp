@@ -1,14 +1,15 @@
 // Guidance over a flat table seen from above: areas, speeds and distances are known from geometry.
-#include "daemon/sweep_guidance.hpp"
+#include "daemon/appliance/sweep_guidance.hpp"
 
 #include <gtest/gtest.h>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr Intrinsics kCamera{.width = 320, .height = 240, .fx = 260, .fy = 260, .cx = 159.5, .cy = 119.5};
+constexpr Intrinsics kCamera{
+    .width = 320, .height = 240, .fx = 260, .fy = 260, .cx = 159.5, .cy = 119.5};
 constexpr double kFrame_s = 1.0 / 30;
 
 Frame TableAt(double distance_m, double time_s) {
@@ -28,15 +29,18 @@ TrackingReport SeenFrom(double x_m, double distance_m) {
 }
 
 /// Moves along x over the table for some seconds.
-SweepGuidance Sweep(SweepGuide& guide, double speed_m_s, double distance_m, double seconds, double from_s = 0) {
-  for (double t = 0; t < seconds; t += kFrame_s) guide.Add(TableAt(distance_m, from_s + t), SeenFrom(speed_m_s * t, distance_m));
+SweepGuidance Sweep(SweepGuide& guide, double speed_m_s, double distance_m, double seconds,
+                    double from_s = 0) {
+  for (double t = 0; t < seconds; t += kFrame_s)
+    guide.Add(TableAt(distance_m, from_s + t), SeenFrom(speed_m_s * t, distance_m));
   return guide.guidance();
 }
 
 TEST(SweepGuidanceTest, AreaIsThatOfTheTableThatWasSeen) {
   SweepGuide guide(kCamera);
   const SweepGuidance seen = Sweep(guide, 0.2, 0.9, 5.0);
-  // The points taken span 304/260 * 0.9 by 224/260 * 0.9 m; the camera moved by 1 m along the longer side. Cells of 5 cm round up.
+  // The points taken span 304/260 * 0.9 by 224/260 * 0.9 m; the camera moved by 1 m along the
+  // longer side. Cells of 5 cm round up.
   const double expected_m2 = (304.0 / 260 * 0.9 + 1.0) * (224.0 / 260 * 0.9);
   EXPECT_NEAR(seen.area_m2, expected_m2, 0.12 * expected_m2);
   EXPECT_EQ(seen.advice, SweepAdvice::kNone);
@@ -57,7 +61,8 @@ TEST(SweepGuidanceTest, TooNearTooFarAndBlindAreTold) {
   TrackingReport blind = SeenFrom(0, 0);
   blind.median_depth_m = 0;
   blind.valid_depth = 0.05;
-  EXPECT_EQ(guide.Add(TableAt(0, 2.0), blind).advice, SweepAdvice::kFarther) << "the sensor sees nothing when it is too near";
+  EXPECT_EQ(guide.Add(TableAt(0, 2.0), blind).advice, SweepAdvice::kFarther)
+      << "the sensor sees nothing when it is too near";
 }
 
 TEST(SweepGuidanceTest, LostTrackingIsToldAfterAMomentAndEndsWithTheNextPose) {
@@ -81,7 +86,8 @@ TEST(SweepGuidanceTest, LongSweepsWithTremblingHandsStillEnd) {
   SweepGuide guide(kCamera);
   unsigned random = 1;
   for (double t = 0; t < 12.0; t += kFrame_s) {
-    random = random * 1664525U + 1013904223U;  // a hand that shakes by some millimetres, and depth noise with it
+    random = random * 1664525U +
+             1013904223U;  // a hand that shakes by some millimetres, and depth noise with it
     const double shake_m = (static_cast<double>(random >> 16) / 65536 - 0.5) * 6 * kMillimetre;
     guide.Add(TableAt(0.9 + shake_m, t), SeenFrom(shake_m, 0.9 + shake_m));
   }

@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 
 namespace plumb {
 namespace {
@@ -18,8 +18,9 @@ using testing::Each;
 using testing::HasSubstr;
 using testing::Not;
 
-// A person drawn from above in words of anatomy: `down` metres from the crown towards the feet, `left` metres to the person's left.
-// Head 0.16 m wide, neck, shoulders 0.44 m wide from 0.28 m on, legs from 0.85 m; 1.6 m long.
+// A person drawn from above in words of anatomy: `down` metres from the crown towards the feet,
+// `left` metres to the person's left. Head 0.16 m wide, neck, shoulders 0.44 m wide from 0.28 m on,
+// legs from 0.85 m; 1.6 m long.
 bool IsPerson(double down, double left) {
   const double across = std::abs(left);
   if (down < 0 || down > 1.6) return false;
@@ -27,12 +28,15 @@ bool IsPerson(double down, double left) {
   if (down < 0.85) return across < 0.22;
   return across > 0.02 && across < 0.16;
 }
-bool IsTrunk(double down, double left) { return down >= 0.30 && down < 0.90 && std::abs(left) < 0.2; }
+bool IsTrunk(double down, double left) {
+  return down >= 0.30 && down < 0.90 && std::abs(left) < 0.2;
+}
 
 struct Case {
   PatientPosture posture;
-  // Where head and left point in the room, from what the postures mean: head first, the head is at the gantry (+Y). Seen from above with
-  // the head at the top of the picture, a supine person's left hand is on the right of the picture, a prone one's on the left.
+  // Where head and left point in the room, from what the postures mean: head first, the head is at
+  // the gantry (+Y). Seen from above with the head at the top of the picture, a supine person's
+  // left hand is on the right of the picture, a prone one's on the left.
   Eigen::Vector2d head, left;
 };
 const std::array<Case, 4> kCases = {{{PatientPosture::kHeadFirstSupine, {0, 1}, {1, 0}},
@@ -43,17 +47,23 @@ const std::array<Case, 4> kCases = {{{PatientPosture::kHeadFirstSupine, {0, 1}, 
 using Shape = std::function<bool(double down, double left)>;
 using Height = std::function<double(double down, double left)>;
 
-// Maps of a person who lies with the middle (0.8 m down) at the room's origin; the reference frame is turned against the room by turn_rad.
+// Maps of a person who lies with the middle (0.8 m down) at the room's origin; the reference frame
+// is turned against the room by turn_rad.
 class Lying {
  public:
   Lying(const Case& how, double turn_rad, const Shape& shape, const Height& deviation)
-      : T_iec_reference_(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ())), reference_(kGrid), deviation_(kGrid) {
+      : T_iec_reference_(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ())),
+        reference_(kGrid),
+        deviation_(kGrid) {
     mask_.assign(kGrid.num_cells(), 0);
     for (int row = 0; row < kGrid.height; ++row) {
       for (int column = 0; column < kGrid.width; ++column) {
-        const Eigen::Vector2d room = (T_iec_reference_ * Eigen::Vector3d(kGrid.x_centre(column), kGrid.y_centre(row), 0)).head<2>();
+        const Eigen::Vector2d room =
+            (T_iec_reference_ * Eigen::Vector3d(kGrid.x_centre(column), kGrid.y_centre(row), 0))
+                .head<2>();
         const double down = 0.8 - room.dot(how.head), left = room.dot(how.left);
-        const auto i = static_cast<std::size_t>(row) * static_cast<std::size_t>(kGrid.width) + static_cast<std::size_t>(column);
+        const auto i = static_cast<std::size_t>(row) * static_cast<std::size_t>(kGrid.width) +
+                       static_cast<std::size_t>(column);
         reference_.z[i] = shape(down, left) ? 0.2F : 0.0F;
         deviation_.z[i] = static_cast<float>(deviation(down, left));
         mask_[i] = shape(down, left) ? 1 : 0;
@@ -61,9 +71,12 @@ class Lying {
     }
   }
 
-  [[nodiscard]] BodyParts Describe(std::optional<PatientPosture> posture, const Pose& T_motion = Pose::Identity(),
-                                   MarkerKind kind = MarkerKind::kRoom, const Pose& extra = Pose::Identity()) const {
-    return DescribeBody({reference_, deviation_, mask_, mask_, T_motion, extra * T_iec_reference_, kind, posture});
+  [[nodiscard]] BodyParts Describe(std::optional<PatientPosture> posture,
+                                   const Pose& T_motion = Pose::Identity(),
+                                   MarkerKind kind = MarkerKind::kRoom,
+                                   const Pose& extra = Pose::Identity()) const {
+    return DescribeBody(
+        {reference_, deviation_, mask_, mask_, T_motion, extra * T_iec_reference_, kind, posture});
   }
 
  private:
@@ -77,7 +90,8 @@ class Lying {
 std::vector<std::string> Said(const BodyParts& body) {
   std::vector<std::string> said;
   for (const BodyPart& part : body.parts) {
-    if (const std::string words = HeightWords(part, part.after_m, 3 * kMillimetre); !words.empty()) said.push_back(words);
+    if (const std::string words = HeightWords(part, part.after_m, 3 * kMillimetre); !words.empty())
+      said.push_back(words);
   }
   return said;
 }
@@ -88,13 +102,17 @@ std::vector<std::string> NamesOf(const BodyParts& body) {
   return names;
 }
 
-double HighLeftShoulder(double down, double left) { return down > 0.28 && down < 0.41 && left > 0 ? 0.009 : 0.0; }
+double HighLeftShoulder(double down, double left) {
+  return down > 0.28 && down < 0.41 && left > 0 ? 0.009 : 0.0;
+}
 
 TEST(BodyPartsTest, AHighLeftShoulderIsSaidInEveryPostureAndHoweverTheMarkerLies) {
   for (const Case& how : kCases) {
     for (const double turn_rad : {0.0, 0.4, 1.6, 3.0, -1.3}) {
       const Lying person(how, turn_rad, IsPerson, HighLeftShoulder);
-      EXPECT_THAT(Said(person.Describe(how.posture)), testing::ElementsAre("left shoulder 9 mm high")) << Name(how.posture) << turn_rad;
+      EXPECT_THAT(Said(person.Describe(how.posture)),
+                  testing::ElementsAre("left shoulder 9 mm high"))
+          << Name(how.posture) << turn_rad;
     }
   }
 }
@@ -113,7 +131,9 @@ TEST(BodyPartsTest, EachPartIsFoundWhereItLies) {
                                         {1.55, 0.1, "left lower leg 6 mm low"}}};
   for (const Place& place : places) {
     const auto near = [&](double down, double left) {
-      return std::abs(down - place.down) < 0.11 && (place.left == 0 || left * place.left > 0) ? -0.006 : 0.0;
+      return std::abs(down - place.down) < 0.11 && (place.left == 0 || left * place.left > 0)
+                 ? -0.006
+                 : 0.0;
     };
     const Lying person(kCases[2], 0.7, IsPerson, near);
     EXPECT_THAT(Said(person.Describe(kCases[2].posture)), testing::Contains(place.words));
@@ -121,58 +141,74 @@ TEST(BodyPartsTest, EachPartIsFoundWhereItLies) {
 }
 
 TEST(BodyPartsTest, WithoutANeckTheEndsAreNamed) {
-  const Lying trunk(kCases[0], 0.3, IsTrunk, [](double down, double left) { return down > 0.72 && left < 0 ? -0.012 : 0.0; });
-  EXPECT_THAT(Said(trunk.Describe(kCases[0].posture)), testing::ElementsAre("right side at the feet end 12 mm low"));
+  const Lying trunk(kCases[0], 0.3, IsTrunk, [](double down, double left) {
+    return down > 0.72 && left < 0 ? -0.012 : 0.0;
+  });
+  EXPECT_THAT(Said(trunk.Describe(kCases[0].posture)),
+              testing::ElementsAre("right side at the feet end 12 mm low"));
 }
 
 TEST(BodyPartsTest, NothingIsLeftOrRightWhereThePostureIsUnknown) {
   const Lying person(kCases[0], 0.3, IsPerson, HighLeftShoulder);
   const BodyParts body = person.Describe(std::nullopt);
   EXPECT_FALSE(body.by_posture);
-  EXPECT_THAT(NamesOf(body), Each(AllOf(Not(HasSubstr("left")), Not(HasSubstr("right")), Not(HasSubstr("head")))));
+  EXPECT_THAT(NamesOf(body),
+              Each(AllOf(Not(HasSubstr("left")), Not(HasSubstr("right")), Not(HasSubstr("head")))));
   EXPECT_EQ(body.parts.size(), 6U);
 }
 
 TEST(BodyPartsTest, NothingIsLeftOrRightWhereTheBodyLiesAcrossWhatThePostureSays) {
   const Lying person(kCases[0], 0.3, IsPerson, HighLeftShoulder);
   const Pose across(Eigen::AngleAxisd(90 * kDegree, Eigen::Vector3d::UnitZ()));
-  const BodyParts body = person.Describe(PatientPosture::kHeadFirstSupine, Pose::Identity(), MarkerKind::kRoom, across);
+  const BodyParts body = person.Describe(PatientPosture::kHeadFirstSupine, Pose::Identity(),
+                                         MarkerKind::kRoom, across);
   EXPECT_FALSE(body.by_posture);
   EXPECT_THAT(NamesOf(body), Each(AllOf(Not(HasSubstr("left")), Not(HasSubstr("right")))));
 }
 
 TEST(BodyPartsTest, RoomWordsNameTheGantryEndAndTheSideOfX) {
   // Head at the gantry, prone: the left lies at -X.
-  const Lying person(kCases[1], 0.3, IsPerson, [](double down, double left) { return down < 0.6 && left > 0 ? 0.008 : 0.0; });
-  EXPECT_THAT(Said(person.Describe(std::nullopt)), testing::ElementsAre("-X side at the gantry end 8 mm high"));
-  const Lying turned(kCases[3], 0.3, IsPerson, [](double down, double left) { return down < 0.6 && left > 0 ? 0.008 : 0.0; });
-  EXPECT_THAT(Said(turned.Describe(std::nullopt)), testing::ElementsAre("+X side at the end away from the gantry 8 mm high"));
+  const Lying person(kCases[1], 0.3, IsPerson,
+                     [](double down, double left) { return down < 0.6 && left > 0 ? 0.008 : 0.0; });
+  EXPECT_THAT(Said(person.Describe(std::nullopt)),
+              testing::ElementsAre("-X side at the gantry end 8 mm high"));
+  const Lying turned(kCases[3], 0.3, IsPerson,
+                     [](double down, double left) { return down < 0.6 && left > 0 ? 0.008 : 0.0; });
+  EXPECT_THAT(Said(turned.Describe(std::nullopt)),
+              testing::ElementsAre("+X side at the end away from the gantry 8 mm high"));
 }
 
 TEST(BodyPartsTest, NowIsTheRiseOfThePartWithWhatItsPostureAdds) {
   const Lying person(kCases[0], 0.0, IsPerson, HighLeftShoulder);
-  // The person's left (+X, the reference frame is the room's) is lifted by 1 degree about the long axis, all of it by 4 mm.
-  const Pose T_motion(Eigen::Translation3d(0, 0, 0.004) * Eigen::AngleAxisd(-1 * kDegree, Eigen::Vector3d::UnitY()));
+  // The person's left (+X, the reference frame is the room's) is lifted by 1 degree about the long
+  // axis, all of it by 4 mm.
+  const Pose T_motion(Eigen::Translation3d(0, 0, 0.004) *
+                      Eigen::AngleAxisd(-1 * kDegree, Eigen::Vector3d::UnitY()));
   for (const BodyPart& part : person.Describe(kCases[0].posture, T_motion).parts) {
     if (part.name != "left shoulder" && part.name != "right shoulder") continue;
     // Half a shoulder's width of 0.22 m on, the middle lies 0.11 m out; 0.2 m high.
     const double side = part.name == "left shoulder" ? 0.11 : -0.11;
     const double rise = 0.004 + side * std::sin(1 * kDegree) + 0.2 * (std::cos(1 * kDegree) - 1);
-    EXPECT_NEAR(part.now_m.value(), rise + (side > 0 ? 0.009 : 0.0), 0.2 * kMillimetre) << part.name;
+    EXPECT_NEAR(part.now_m.value(), rise + (side > 0 ? 0.009 : 0.0), 0.2 * kMillimetre)
+        << part.name;
   }
   // A shift sideways lifts nothing.
-  for (const BodyPart& part : person.Describe(kCases[0].posture, Pose(Eigen::Translation3d(0.03, -0.02, 0))).parts) {
+  for (const BodyPart& part :
+       person.Describe(kCases[0].posture, Pose(Eigen::Translation3d(0.03, -0.02, 0))).parts) {
     EXPECT_NEAR(part.now_m.value(), part.after_m, 1e-6) << part.name;
   }
 }
 
 TEST(BodyPartsTest, CouchMarkersTellPostureOnly) {
   const Lying person(kCases[0], 0.0, IsPerson, HighLeftShoulder);
-  for (const BodyPart& part : person.Describe(kCases[0].posture, Pose::Identity(), MarkerKind::kCouch).parts) EXPECT_FALSE(part.now_m);
+  for (const BodyPart& part :
+       person.Describe(kCases[0].posture, Pose::Identity(), MarkerKind::kCouch).parts)
+    EXPECT_FALSE(part.now_m);
 }
 
 TEST(BodyPartsTest, WhatWasHardlyMeasuredIsNotSpokenOf) {
-  const Lying person(kCases[0], 0.0, IsPerson, [](double down, double left) { return left > 0 ? std::nan("") : down * 0.0; });
+  const Lying person(kCases[0], 0.0, IsPerson,
+                     [](double down, double left) { return left > 0 ? std::nan("") : down * 0.0; });
   EXPECT_THAT(NamesOf(person.Describe(kCases[0].posture)), Each(Not(HasSubstr("left"))));
 }
 

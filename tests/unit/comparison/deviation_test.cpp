@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "algo/types/pose.hpp"
-#include "algo/types/units.hpp"
+#include "algo/base/pose.hpp"
+#include "algo/base/units.hpp"
 
 namespace plumb {
 namespace {
@@ -17,16 +17,20 @@ HeightMap MapOf(const GridShape& grid, const auto& height) {
   HeightMap map(grid);
   for (int row = 0; row < grid.height; ++row) {
     for (int column = 0; column < grid.width; ++column) {
-      map.z[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(column)] =
+      map.z[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width) +
+            static_cast<std::size_t>(column)] =
           static_cast<float>(height(grid.x_centre(column), grid.y_centre(row)));
     }
   }
   return map;
 }
 
-// A dome of radius 0.2 m that reaches z = 0.1 m at (cx, 0); all of the grid lies on it, slopes up to 45 degrees.
+// A dome of radius 0.2 m that reaches z = 0.1 m at (cx, 0); all of the grid lies on it, slopes up
+// to 45 degrees.
 auto Dome(double cx, double radius = 0.2) {
-  return [=](double x, double y) { return 0.1 - 0.2 + std::sqrt(radius * radius - (x - cx) * (x - cx) - y * y); };
+  return [=](double x, double y) {
+    return 0.1 - 0.2 + std::sqrt(radius * radius - (x - cx) * (x - cx) - y * y);
+  };
 }
 
 TEST(DeviationTest, DifferenceIsCurrentMinusReferenceWhereBothAreKnown) {
@@ -61,7 +65,8 @@ TEST(DeviationTest, DistanceToALargerSphereIsTheDifferenceOfRadiiEverywhere) {
 }
 
 TEST(DeviationTest, ASidewaysShiftIsMeasuredAsDistanceNotAsHeight) {
-  // 10 mm sideways: at 45 degrees of slope heights differ by 10 mm and more, distances by at most 10 sin(slope).
+  // 10 mm sideways: at 45 degrees of slope heights differ by 10 mm and more, distances by at most
+  // 10 sin(slope).
   const HeightMap reference = MapOf(Grid(), Dome(0));
   const HeightMap current = MapOf(Grid(), Dome(0.010));
   const HeightMap distance = SignedDistance(current, reference);
@@ -78,7 +83,8 @@ TEST(DeviationTest, ASidewaysShiftIsMeasuredAsDistanceNotAsHeight) {
 
 TEST(DeviationTest, DistanceEndsWhereTheCurrentSurfaceEnds) {
   const HeightMap reference = MapOf(Grid(), [](double, double) { return 0.0; });
-  const HeightMap current = MapOf(Grid(), [](double x, double) { return x < 0 ? 0.003 : std::nan(""); });
+  const HeightMap current =
+      MapOf(Grid(), [](double x, double) { return x < 0 ? 0.003 : std::nan(""); });
   const HeightMap distance = SignedDistance(current, reference);
   EXPECT_NEAR(distance.at(100, 50), 0.003, 1e-6);
   EXPECT_TRUE(std::isnan(distance.at(100, 150)));
@@ -98,7 +104,8 @@ TEST(DeviationTest, MaskLimitsTheDistance) {
 
 TEST(DeviationTest, ResamplingMovesTheSurfaceAndLeavesNoPinholes) {
   const HeightMap source = MapOf(Grid(), Dome(0));
-  const Pose T(Eigen::Translation3d(0.0107, -0.0063, 0.002) * Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()) *
+  const Pose T(Eigen::Translation3d(0.0107, -0.0063, 0.002) *
+               Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()) *
                Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitX()));
   const HeightMap moved = ResampledHeightMap(source, T, Grid());
   const Eigen::Vector3d centre = T * Eigen::Vector3d(0, 0, -0.1);
@@ -114,13 +121,15 @@ TEST(DeviationTest, ResamplingMovesTheSurfaceAndLeavesNoPinholes) {
 
 TEST(DeviationTest, ResamplingDrawsNoSheetAcrossAJumpAndKeepsTheHigherSurface) {
   const HeightMap source = MapOf(Grid(), [](double x, double) { return x < 0 ? 0.0 : 0.1; });
-  const HeightMap moved = ResampledHeightMap(source, Pose(Eigen::Translation3d(0.0002, 0.0002, 0)), Grid());
+  const HeightMap moved =
+      ResampledHeightMap(source, Pose(Eigen::Translation3d(0.0002, 0.0002, 0)), Grid());
   for (const float z : moved.z) {
     EXPECT_TRUE(std::isnan(z) || std::abs(z) < 1e-6 || std::abs(z - 0.1F) < 1e-6) << z;
   }
   // Tipped upright, two sheets lie over one another: the upper one is seen.
   const HeightMap ramp = MapOf(Grid(), [](double x, double) { return 0.5 * x; });
-  const HeightMap turned = ResampledHeightMap(ramp, Pose(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY())), Grid());
+  const HeightMap turned =
+      ResampledHeightMap(ramp, Pose(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY())), Grid());
   EXPECT_TRUE(std::isfinite(turned.at(100, 100)));
 }
 
@@ -132,7 +141,8 @@ TEST(DeviationTest, ACloudAloneMakesAHeightMap) {
       const Eigen::Vector3d p(x, y, dome(x, y));
       cloud.points.push_back(p.cast<float>());
       cloud.normals.push_back((p - Eigen::Vector3d(0, 0, -0.1)).normalized().cast<float>());
-      cloud.points.emplace_back(x, y, p.z() - 0.05);  // a second surface below must not pull it down
+      cloud.points.emplace_back(x, y,
+                                p.z() - 0.05);  // a second surface below must not pull it down
       cloud.normals.emplace_back(0, 0, 1);
     }
   }
@@ -141,7 +151,8 @@ TEST(DeviationTest, ACloudAloneMakesAHeightMap) {
   for (int row = 40; row < 160; ++row) {
     for (int column = 40; column < 160; ++column) {
       ASSERT_TRUE(std::isfinite(map.at(row, column)));
-      EXPECT_NEAR(map.at(row, column), dome(grid.x_centre(column), grid.y_centre(row)), 6e-5);  // discs of 4 mm on 0.2 m: 4e-5
+      EXPECT_NEAR(map.at(row, column), dome(grid.x_centre(column), grid.y_centre(row)),
+                  6e-5);  // discs of 4 mm on 0.2 m: 4e-5
     }
   }
 }

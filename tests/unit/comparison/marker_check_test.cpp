@@ -48,7 +48,8 @@ MarkerCheck Against(const Scene& scene) { return CheckMarkers(scene, BaselineOf(
 
 TEST(MarkerCheckTest, TheSameMarkersFromElsewherePass) {
   Scene scene = Room();
-  const Pose T(Eigen::Translation3d(0.3, -1, 2) * Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 2, 3).normalized()));
+  const Pose T(Eigen::Translation3d(0.3, -1, 2) *
+               Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 2, 3).normalized()));
   for (auto& [id, marker] : scene.markers) {
     for (Eigen::Vector3d& corner : marker.corners) corner = T * corner;
   }
@@ -69,6 +70,21 @@ TEST(MarkerCheckTest, AMovedMarkerIsNamedWithHowFar) {
   EXPECT_NEAR(Item(check, "moved").value, 12.0, 0.5);
   EXPECT_EQ(Item(check, "moved").note, "marker 7");
   EXPECT_TRUE(Item(check, "misfit").passed) << "the moved one is not counted among the others";
+}
+
+TEST(MarkerCheckTest, TheLimitOfAMoveIsWhereItIsSaid) {
+  for (const Eigen::Vector3d& way : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 0, -1)}) {
+    Scene scene = Room();
+    Move(scene, 7, 0.0049 * way);
+    const MarkerCheck near = Against(scene);
+    EXPECT_EQ(near.status, MarkerCheckStatus::kPassed);
+    EXPECT_NEAR(Item(near, "moved").value, 4.9, 1e-6) << "the others do not follow it";
+    scene = Room();
+    Move(scene, 7, 0.0051 * way);
+    const MarkerCheck far = Against(scene);
+    EXPECT_EQ(far.status, MarkerCheckStatus::kFailed);
+    EXPECT_THAT(far.reasons, Contains(HasSubstr("marker 7 moved 5 mm")));
+  }
 }
 
 TEST(MarkerCheckTest, AMoveWithinTheLimitPasses) {
@@ -102,7 +118,8 @@ TEST(MarkerCheckTest, AWholeThatGrewIsACalibrationThatChanged) {
 TEST(MarkerCheckTest, APrintOfTheWrongSizeFails) {
   Scene scene = Room();
   const Eigen::Vector3d centre = (scene.markers[5].corners[0] + scene.markers[5].corners[2]) / 2;
-  for (Eigen::Vector3d& corner : scene.markers[5].corners) corner = centre + 0.96 * (corner - centre);
+  for (Eigen::Vector3d& corner : scene.markers[5].corners)
+    corner = centre + 0.96 * (corner - centre);
   const MarkerCheck check = Against(scene);
   EXPECT_NEAR(Item(check, "side").value, -4.0, 1e-6);
   EXPECT_EQ(Item(check, "side").note, "marker 5");

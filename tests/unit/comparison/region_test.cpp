@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 #include "tests/support/synthetic_scene.hpp"
 
 namespace plumb {
@@ -18,7 +18,8 @@ using test::SyntheticOptions;
 SyntheticOptions Lying(BodyShape shape = BodyShape::kTorso) {
   SyntheticOptions options;
   options.shape = shape;
-  options.T_reference_body = Pose(Eigen::Translation3d(shape == BodyShape::kFullBody ? 1.05 : 0.6, 0.45, 0.0));
+  options.T_reference_body =
+      Pose(Eigen::Translation3d(shape == BodyShape::kFullBody ? 1.05 : 0.6, 0.45, 0.0));
   return options;
 }
 
@@ -32,7 +33,8 @@ Body FindIn(const Scene& scene) { return FindBody(MakeSurface(scene.cloud, 0.01,
 
 // Area of the mask and of the same map's cells that the formula puts above the cut.
 double MaskArea_m2(const HeightMap& map, const std::vector<std::uint8_t>& mask) {
-  return static_cast<double>(std::count(mask.begin(), mask.end(), 1)) * map.grid.step * map.grid.step;
+  return static_cast<double>(std::count(mask.begin(), mask.end(), 1)) * map.grid.step *
+         map.grid.step;
 }
 
 TEST(RegionTest, ATorsoOnTheFloorStandsOnTheFloor) {
@@ -44,7 +46,8 @@ TEST(RegionTest, ATorsoOnTheFloorStandsOnTheFloor) {
   std::size_t above = 0;
   for (const float z : scene.height_map->z) above += z > 0.025F ? 1 : 0;
   const std::vector<std::uint8_t> mask = RegionMask(*scene.height_map, body, {});
-  // Everything over the cut is the body; cells of the outline may be lost at its rim: measured 0.2 %.
+  // Everything over the cut is the body; cells of the outline may be lost at its rim: measured 0.2
+  // %.
   const double truth_m2 = static_cast<double>(above) * 0.0015 * 0.0015;
   EXPECT_NEAR(MaskArea_m2(*scene.height_map, mask) / truth_m2, 1.0, 0.01);
 }
@@ -90,7 +93,8 @@ TEST(RegionTest, WithoutAnyFloorAllIsBody) {
   PointCloud cloud;
   for (double x = 0; x < 0.2; x += 0.003) {
     for (double y = 0; y < 0.2; y += 0.003) {
-      const Eigen::Vector3d p(x, y, std::sqrt(0.04 - (x - 0.1) * (x - 0.1) - (y - 0.1) * (y - 0.1)));
+      const Eigen::Vector3d p(x, y,
+                              std::sqrt(0.04 - (x - 0.1) * (x - 0.1) - (y - 0.1) * (y - 0.1)));
       cloud.points.push_back(p.cast<float>());
       cloud.normals.push_back((p - Eigen::Vector3d(0.1, 0.1, 0)).normalized().cast<float>());
     }
@@ -112,13 +116,15 @@ TEST(RegionTest, EmptyAndDamagedCloudsAreNoBody) {
 TEST(RegionTest, APolygonTakesThePartOfTheBodyInside) {
   const Scene& scene = Torso();
   const Body body = FindIn(scene);
-  const std::vector<std::uint8_t> mask = RegionMask(*scene.height_map, body, {{0.5, 0.0}, {0.7, 0.0}, {0.7, 0.9}, {0.5, 0.9}});
+  const std::vector<std::uint8_t> mask =
+      RegionMask(*scene.height_map, body, {{0.5, 0.0}, {0.7, 0.0}, {0.7, 0.9}, {0.5, 0.9}});
   const GridShape& grid = scene.height_map->grid;
   EXPECT_EQ(mask[*grid.cell(0.6, 0.45)], 1);
   EXPECT_EQ(mask[*grid.cell(0.75, 0.45)], 0);  // body, outside
   EXPECT_EQ(mask[*grid.cell(0.6, 0.02)], 0);   // floor, inside
   // On bare floor the polygon means the floor.
-  const std::vector<std::uint8_t> floor = RegionMask(*scene.height_map, body, {{0.0, 0.0}, {0.1, 0.0}, {0.1, 0.1}, {0.0, 0.1}});
+  const std::vector<std::uint8_t> floor =
+      RegionMask(*scene.height_map, body, {{0.0, 0.0}, {0.1, 0.0}, {0.1, 0.1}, {0.0, 0.1}});
   EXPECT_NEAR(MaskArea_m2(*scene.height_map, floor), 0.01, 2e-4);
 }
 
@@ -132,10 +138,14 @@ TEST(RegionTest, CoverageCountsWhatTheCurrentScanMeasuredAndFindsTheHole) {
     moved.seed = 2;
     moved.T_reference_body = T_motion * options.T_reference_body;
     const Eigen::Vector3d hole(0.55, 0.42, 0);  // on the body, in the reference
-    moved.hidden = [&](const Eigen::Vector3d& p) { return (T_motion.inverse() * p - hole).head<2>().norm() < radius; };
-    const RegionCoverage coverage = CoverageOf(*reference.height_map, mask, MakeSyntheticScene(moved).cloud, 0.003, T_motion);
+    moved.hidden = [&](const Eigen::Vector3d& p) {
+      return (T_motion.inverse() * p - hole).head<2>().norm() < radius;
+    };
+    const RegionCoverage coverage =
+        CoverageOf(*reference.height_map, mask, MakeSyntheticScene(moved).cloud, 0.003, T_motion);
     const double hole_share = 3.1416 * radius * radius / MaskArea_m2(*reference.height_map, mask);
-    // Cells of 6 mm count as measured when partly so: the hole shrinks by half a cell all round, 30 % of the smaller one's area.
+    // Cells of 6 mm count as measured when partly so: the hole shrinks by half a cell all round, 30
+    // % of the smaller one's area.
     EXPECT_NEAR(1.0 - coverage.coverage, hole_share, 0.4 * hole_share + 0.001);
     EXPECT_NEAR(coverage.largest_hole_m, 2 * radius, 0.009);
     if (radius == 0) continue;

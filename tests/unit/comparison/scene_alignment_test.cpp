@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 
 namespace plumb {
 namespace {
@@ -15,13 +15,8 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-const Pose kTrue(Eigen::Translation3d(0.3, -0.2, 0.1) * Eigen::AngleAxisd(0.8, Eigen::Vector3d(0.1, 0.2, 1).normalized()));
-
-CompareOptions Using(Preset preset) {
-  CompareOptions options;
-  options.preset = preset;
-  return options;
-}
+const Pose kTrue(Eigen::Translation3d(0.3, -0.2, 0.1) *
+                 Eigen::AngleAxisd(0.8, Eigen::Vector3d(0.1, 0.2, 1).normalized()));
 
 // Markers around a body, each turned another way.
 MarkerMap Room(int count, double sigma_m = 0.001) {
@@ -45,7 +40,9 @@ MarkerMap Seen(const MarkerMap& room, double noise_m, unsigned seed) {
   MarkerMap map = room;
   for (auto& [id, marker] : map) {
     for (Eigen::Vector3d& p : marker.corners)
-      p = kTrue.inverse() * p + (noise_m > 0 ? Eigen::Vector3d(noise(random), noise(random), noise(random)) : Eigen::Vector3d::Zero());
+      p = kTrue.inverse() * p + (noise_m > 0
+                                     ? Eigen::Vector3d(noise(random), noise(random), noise(random))
+                                     : Eigen::Vector3d::Zero());
   }
   return map;
 }
@@ -66,7 +63,7 @@ double WorstCorner_m(const Alignment& alignment, const MarkerMap& room) {
 TEST(SceneAlignmentTest, ExactMarkersGiveTheExactPose) {
   for (const Preset preset : {Preset::kBest, Preset::kPaper}) {
     const MarkerMap room = Room(6);
-    const AlignmentOutcome outcome = AlignScenes(room, Seen(room, 0, 1), Using(preset));
+    const AlignmentOutcome outcome = AlignScenes(room, Seen(room, 0, 1), preset);
     ASSERT_TRUE(outcome.alignment);
     EXPECT_LT(WorstCorner_m(*outcome.alignment, room), 1e-12);
     EXPECT_THAT(outcome.alignment->markers_used, ElementsAre(0, 1, 2, 3, 4, 5));
@@ -79,9 +76,10 @@ TEST(SceneAlignmentTest, NamesTheMarkerThatMovedAndLeavesItOut) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     MarkerMap current = Seen(room, 0.001, seed);
     Move(current, 4, {0.012, 0, 0});
-    const AlignmentOutcome outcome = AlignScenes(room, current, {});
+    const AlignmentOutcome outcome = AlignScenes(room, current);
     ASSERT_TRUE(outcome.alignment);
-    EXPECT_THAT(outcome.alignment->markers_rejected, ElementsAre(testing::Pair(4, testing::DoubleNear(0.012, 0.002))));
+    EXPECT_THAT(outcome.alignment->markers_rejected,
+                ElementsAre(testing::Pair(4, testing::DoubleNear(0.012, 0.002))));
     EXPECT_THAT(outcome.warnings, ElementsAre(HasSubstr("marker 4 moved")));
     // 20 corners of 1 mm; measured worst corner over these seeds 1.0 mm.
     EXPECT_LT(WorstCorner_m(*outcome.alignment, room), 0.002);
@@ -91,7 +89,7 @@ TEST(SceneAlignmentTest, NamesTheMarkerThatMovedAndLeavesItOut) {
 TEST(SceneAlignmentTest, NoisyDepthAccusesNobody) {
   const MarkerMap room = Room(6, 0.004);
   for (unsigned seed = 1; seed <= 50; ++seed) {
-    const AlignmentOutcome outcome = AlignScenes(room, Seen(room, 0.0056, seed), {});  // both maps 4 mm
+    const AlignmentOutcome outcome = AlignScenes(room, Seen(room, 0.0056, seed));  // both maps 4 mm
     ASSERT_TRUE(outcome.alignment);
     EXPECT_THAT(outcome.alignment->markers_rejected, IsEmpty()) << "seed " << seed;
   }
@@ -105,8 +103,8 @@ TEST(SceneAlignmentTest, ThreeGoodMarkersWinAgainstFourThatMovedEachItsOwnWay) {
     Move(current, 2, {0, -0.2, 0});
     Move(current, 3, {-0.1, 0.1, 0.05});
     Move(current, 6, {0.05, 0.2, 0});
-    const AlignmentOutcome outcome = AlignScenes(room, current, {});
-    ASSERT_TRUE(outcome.alignment) << outcome.failure;
+    const AlignmentOutcome outcome = AlignScenes(room, current);
+    ASSERT_TRUE(outcome.alignment);
     EXPECT_THAT(outcome.alignment->markers_used, ElementsAre(1, 4, 5));
     EXPECT_THAT(outcome.alignment->markers_rejected, SizeIs(4));
   }
@@ -119,33 +117,51 @@ TEST(SceneAlignmentTest, OneGoodMarkerAgainstManyMovedIsNoAnswer) {
   Move(current, 2, {0, -0.2, 0});
   Move(current, 3, {-0.1, 0.1, 0.05});
   Move(current, 4, {0.05, 0.2, 0});
-  const AlignmentOutcome outcome = AlignScenes(room, current, {});
+  const AlignmentOutcome outcome = AlignScenes(room, current);
   EXPECT_FALSE(outcome.alignment);
-  EXPECT_THAT(outcome.failure, HasSubstr("did not move"));
+  EXPECT_THAT(RefusalsOfMarkers(outcome.markers, 3), ElementsAre(HasSubstr("did not move")));
 }
 
 TEST(SceneAlignmentTest, TwoGroupsOfEqualSizeAreNoAnswer) {
   const MarkerMap room = Room(6);
   MarkerMap current = Seen(room, 0.0005, 4);
   for (const int id : {0, 1, 2}) Move(current, id, {0.1, 0.05, 0});
-  const AlignmentOutcome outcome = AlignScenes(room, current, {});
+  const AlignmentOutcome outcome = AlignScenes(room, current);
   EXPECT_FALSE(outcome.alignment);
-  EXPECT_THAT(outcome.failure, HasSubstr("two groups of 3"));
+  EXPECT_THAT(RefusalsOfMarkers(outcome.markers, 3), ElementsAre(HasSubstr("two groups of 3")));
 }
 
 TEST(SceneAlignmentTest, FewerThanThreeSharedMarkersAreNoAnswerInBestOnly) {
   const MarkerMap room = Room(6);
   MarkerMap current = Seen(room, 0.0005, 5);
   for (const int id : {0, 1, 2, 3}) current.erase(id);
-  const AlignmentOutcome best = AlignScenes(room, current, {});
+  const AlignmentOutcome best = AlignScenes(room, current);
   EXPECT_FALSE(best.alignment);
-  EXPECT_EQ(best.failure, "scan needs at least 3 markers shared with the reference, found 2 (ids 4, 5); keep the markers in view");
+  EXPECT_THAT(
+      RefusalsOfMarkers(best.markers, 3),
+      ElementsAre("scan needs at least 3 markers shared with the reference, found 2 (ids 4, 5); "
+                  "keep the markers in view"));
   current.erase(4);
-  const AlignmentOutcome paper = AlignScenes(room, current, Using(Preset::kPaper));
+  const AlignmentOutcome paper = AlignScenes(room, current, Preset::kPaper);
   ASSERT_TRUE(paper.alignment);  // four coplanar corners determine a pose
   EXPECT_THAT(paper.alignment->markers_used, ElementsAre(5));
+  EXPECT_THAT(RefusalsOfMarkers(paper.markers, 3), ElementsAre(HasSubstr("found 1 (id 5)")));
   current.clear();
-  EXPECT_FALSE(AlignScenes(room, current, Using(Preset::kPaper)).alignment);
+  EXPECT_FALSE(AlignScenes(room, current, Preset::kPaper).alignment);
+}
+
+TEST(SceneAlignmentTest, ThePaperPresetUsesAMovedMarkerAndTheGateIsShownIt) {
+  const MarkerMap room = Room(6);
+  MarkerMap current = Seen(room, 0.0005, 5);
+  Move(current, 4, {0.012, 0, 0});
+  const AlignmentOutcome paper = AlignScenes(room, current, Preset::kPaper);
+  ASSERT_TRUE(paper.alignment);
+  EXPECT_THAT(paper.alignment->markers_used, SizeIs(6));
+  EXPECT_THAT(paper.markers.moved_used, ElementsAre(4));
+  EXPECT_THAT(RefusalsOfMarkers(paper.markers, 3), ElementsAre(HasSubstr("marker 4 moved")));
+  const AlignmentOutcome best = AlignScenes(room, current);
+  EXPECT_THAT(best.markers.moved_used, IsEmpty());
+  EXPECT_THAT(RefusalsOfMarkers(best.markers, 3), IsEmpty());
 }
 
 TEST(SceneAlignmentTest, PreciseMarkersOutweighVagueOnes) {
@@ -157,13 +173,14 @@ TEST(SceneAlignmentTest, PreciseMarkersOutweighVagueOnes) {
     std::mt19937 random(seed);
     std::normal_distribution<double> noise(0, 0.02);
     for (const int id : {0, 2, 4}) {
-      for (Eigen::Vector3d& p : current.at(id).corners) p += Eigen::Vector3d(noise(random), noise(random), noise(random));
+      for (Eigen::Vector3d& p : current.at(id).corners)
+        p += Eigen::Vector3d(noise(random), noise(random), noise(random));
     }
-    const AlignmentOutcome best = AlignScenes(room, current, {});
+    const AlignmentOutcome best = AlignScenes(room, current);
     ASSERT_TRUE(best.alignment);
     EXPECT_THAT(best.alignment->markers_rejected, IsEmpty());
     weighted += WorstCorner_m(*best.alignment, room);
-    equal += WorstCorner_m(*AlignScenes(room, current, Using(Preset::kPaper)).alignment, room);
+    equal += WorstCorner_m(*AlignScenes(room, current, Preset::kPaper).alignment, room);
   }
   EXPECT_LT(weighted, 0.2 * equal);  // measured 0.06
 }
@@ -174,46 +191,66 @@ TEST(SceneAlignmentTest, CovarianceMatchesTheScatterOfRepeatedScans) {
   Matrix6d claimed = Matrix6d::Zero();
   constexpr int kTrials = 400;
   for (int trial = 0; trial < kTrials; ++trial) {
-    const AlignmentOutcome outcome = AlignScenes(room, Seen(room, 0.001 * std::sqrt(2.0), static_cast<unsigned>(trial) + 1), {});
+    const AlignmentOutcome outcome =
+        AlignScenes(room, Seen(room, 0.001 * std::sqrt(2.0), static_cast<unsigned>(trial) + 1));
     ASSERT_TRUE(outcome.alignment);
     const Eigen::Vector3d c = outcome.alignment->centre_m;
-    const Pose error = Eigen::Translation3d(-c) * outcome.alignment->T_reference_current * kTrue.inverse() * Eigen::Translation3d(c);
+    const Pose error = Eigen::Translation3d(-c) * outcome.alignment->T_reference_current *
+                       kTrue.inverse() * Eigen::Translation3d(c);
     const Vector6d twist = TwistFromPose(error);
     scatter += twist * twist.transpose() / kTrials;
     claimed += outcome.alignment->covariance / kTrials;
   }
-  // Corners here are independent, the claim counts four as two: it is twice the scatter.
-  for (int i = 0; i < 6; ++i) EXPECT_NEAR(claimed(i, i) / scatter(i, i), 2.0, 0.5) << i;
+  // Corners here are independent, the claim counts four as two: it is twice the scatter, and 7 %
+  // more because the variance factor is never taken below one. Measured 2.0 to 2.6.
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(claimed(i, i) / scatter(i, i), 2.14, 0.5) << i;
 }
 
 TEST(SceneAlignmentTest, AMapThatCameOutLongerThanItsReferenceIsPulledBackAlongThatDirectionOnly) {
   const MarkerMap room = Room(12);
   MarkerMap current = Seen(room, 0.0003, 6);
-  const Eigen::Vector3d along = kTrue.linear().transpose() * Eigen::Vector3d::UnitX();  // of the room, in the current frame
+  const Eigen::Vector3d along =
+      kTrue.linear().transpose() * Eigen::Vector3d::UnitX();  // of the room, in the current frame
   const Eigen::Vector3d origin = kTrue.inverse() * Eigen::Vector3d::Zero();
   for (auto& [id, marker] : current) {
     for (Eigen::Vector3d& p : marker.corners) p += 0.004 * along.dot(p - origin) * along;
   }
-  const AlignmentOutcome outcome = AlignScenes(room, current, {});
+  const AlignmentOutcome outcome = AlignScenes(room, current);
   ASSERT_TRUE(outcome.alignment);
   const Eigen::Matrix3d stretch = outcome.alignment->stretch;
-  // 48 corners of 1.4 mm (claimed) over 0.5 m leave 0.06 %, so 8 % of the stretch is held back by the prior: measured -0.0037.
+  // 48 corners of 1.4 mm (claimed) over 0.5 m leave 0.06 %, so 8 % of the stretch is held back by
+  // the prior: measured -0.0037.
   EXPECT_NEAR(stretch(0, 0), 1 - 0.0038, 0.0004);
   EXPECT_NEAR(stretch(1, 1), 1.0, 0.0004);
   EXPECT_NEAR(stretch(2, 2), 1.0, 1e-9);
   EXPECT_TRUE(stretch.isApprox(stretch.transpose()));
   // The paper's alignment is rigid, and so is one from vague markers.
-  EXPECT_EQ(AlignScenes(room, current, Using(Preset::kPaper)).alignment->stretch, Eigen::Matrix3d::Identity());
+  EXPECT_EQ(AlignScenes(room, current, Preset::kPaper).alignment->stretch,
+            Eigen::Matrix3d::Identity());
   MarkerMap vague = current;
   for (auto& [id, marker] : vague) marker.sigma_m = 0.05;
-  EXPECT_NEAR(AlignScenes(room, vague, {}).alignment->stretch(0, 0), 1.0, 0.0003);
+  EXPECT_NEAR(AlignScenes(room, vague).alignment->stretch(0, 0), 1.0, 0.0003);
+}
+
+TEST(SceneAlignmentTest, DistortionIsWhatTheMapsDisagreeByAtAMarker) {
+  const MarkerMap room = Room(12);
+  EXPECT_LT(AlignScenes(room, Seen(room, 0, 1)).alignment->distortion.norm(), 1e-20);
+  MarkerMap current = Seen(room, 0, 1);
+  // Every other marker 2 mm up, the others 2 mm down: no rigid motion and no stretch explains it.
+  const Eigen::Vector3d up = kTrue.linear().transpose() * Eigen::Vector3d::UnitZ();
+  for (auto& [id, marker] : current) {
+    for (Eigen::Vector3d& p : marker.corners) p += (id % 2 == 0 ? 0.002 : -0.002) * up;
+  }
+  const Eigen::Matrix3d distortion = AlignScenes(room, current).alignment->distortion;
+  EXPECT_NEAR(std::sqrt(distortion(2, 2)), 0.002, 0.0003);
+  EXPECT_NEAR(std::sqrt(distortion(0, 0)), 0.0, 0.0003);
 }
 
 TEST(SceneAlignmentTest, DamagedCornersAreNotShared) {
   const MarkerMap room = Room(4);
   MarkerMap current = Seen(room, 0, 1);
   current.at(2).corners[1].x() = std::nan("");
-  const AlignmentOutcome outcome = AlignScenes(room, current, {});
+  const AlignmentOutcome outcome = AlignScenes(room, current);
   ASSERT_TRUE(outcome.alignment);
   EXPECT_THAT(outcome.alignment->markers_used, ElementsAre(0, 1, 3));
 }

@@ -9,8 +9,8 @@
 #include <set>
 #include <string>
 
-#include "algo/types/errors.hpp"
-#include "drivers/replay/file_io.hpp"
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -32,7 +32,8 @@ OutputKind Kind() { return {"thing", "thing.json", {"thing.json", "data"}}; }
 
 std::set<std::string> Names(const fs::path& folder) {
   std::set<std::string> names;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename().string());
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    names.insert(entry.path().filename().string());
   return names;
 }
 
@@ -44,8 +45,9 @@ void WriteThing(const fs::path& target, const std::string& content) {
 
 TEST(AtomicFolderTest, WhereNoFolderCanBeMadeTheReasonIsTold) {
   // Nobody makes folders there, root neither.
-  EXPECT_THAT(MessageOf<IoError>([] { WriteThing("/sys/plumb-out", "1"); }),
-              AllOf(HasSubstr("/sys/plumb-out"), HasSubstr("choose a folder that you may write to")));
+  EXPECT_THAT(
+      MessageOf<IoError>([] { WriteThing("/sys/plumb-out", "1"); }),
+      AllOf(HasSubstr("/sys/plumb-out"), HasSubstr("choose a folder that you may write to")));
 }
 
 TEST(AtomicFolderTest, AppearsOnlyWithCommit) {
@@ -126,10 +128,12 @@ TEST(AtomicFolderTest, RefusesWhatIsNotItsOwn) {
 
   fs::create_directory(folder / "other");
   WriteWholeFile(folder / "other/data", std::string_view());
-  EXPECT_THAT(MessageOf<IoError>([&] { AtomicFolder(folder / "other", Kind()); }), HasSubstr("holds no thing.json"));
+  EXPECT_THAT(MessageOf<IoError>([&] { AtomicFolder(folder / "other", Kind()); }),
+              HasSubstr("holds no thing.json"));
 
   WriteWholeFile(folder / "file", std::string_view("1"));
-  EXPECT_THAT(MessageOf<IoError>([&] { AtomicFolder(folder / "file", Kind()); }), HasSubstr("there is a file of that name"));
+  EXPECT_THAT(MessageOf<IoError>([&] { AtomicFolder(folder / "file", Kind()); }),
+              HasSubstr("there is a file of that name"));
   EXPECT_THAT(Names(folder.path()), ElementsAre("file", "other", "out"));
 }
 
@@ -148,19 +152,25 @@ TEST(AtomicFolderTest, RefusesWhatBecameForeignMeanwhile) {
 
 TEST(AtomicFolderTest, ClearsWhatAKilledProcessLeftButNothingInUse) {
   const TempFolder folder;
-  const auto age = [](const fs::path& path) { fs::last_write_time(path, fs::file_time_type::clock::now() - std::chrono::hours(1)); };
+  const auto age = [](const fs::path& path) {
+    fs::last_write_time(path, fs::file_time_type::clock::now() - std::chrono::hours(1));
+  };
   fs::create_directory(folder / ".out.plumb-1-0");
   WriteWholeFile(folder / ".out.plumb-1-0/thing.json", std::string_view("half"));
   age(folder / ".out.plumb-1-0");
   const AtomicFolder in_use(folder / "out", Kind());
   age(in_use.path());
   WriteThing(folder / "out", "1");
-  EXPECT_THAT(Names(folder.path()), ::testing::UnorderedElementsAre("out", in_use.path().filename().string()));
+  EXPECT_THAT(Names(folder.path()),
+              ::testing::UnorderedElementsAre("out", in_use.path().filename().string()));
 }
 
 TEST(AtomicFolderTest, TheDisksRefusalIsAnIoErrorThatSaysWhatToDo) {
-  EXPECT_THAT(MessageOf<IoError>([] { AtomicFolder("/proc/plumb/out", Kind()); }), HasSubstr("/proc/plumb/out"));
-  EXPECT_THAT(DescribeWriteError("a/b", ENOSPC), AllOf(HasSubstr("cannot write a/b"), HasSubstr("No space left"), HasSubstr("free space")));
+  EXPECT_THAT(MessageOf<IoError>([] { AtomicFolder("/proc/plumb/out", Kind()); }),
+              HasSubstr("/proc/plumb/out"));
+  EXPECT_THAT(
+      DescribeWriteError("a/b", ENOSPC),
+      AllOf(HasSubstr("cannot write a/b"), HasSubstr("No space left"), HasSubstr("free space")));
 }
 
 TEST(AtomicFolderTest, ADiskThatFillsUpLeavesNothing) {
@@ -169,7 +179,8 @@ TEST(AtomicFolderTest, ADiskThatFillsUpLeavesNothing) {
   EXPECT_EQ(WriteOnFullDisk(1'000'000,
                             [&] {
                               AtomicFolder output(folder / "out", Kind());
-                              WriteWholeFile(output.path() / "data", std::vector<std::uint8_t>(3'000'000, 7));
+                              WriteWholeFile(output.path() / "data",
+                                             std::vector<std::uint8_t>(3'000'000, 7));
                               output.Commit();
                             }),
             WriteOutcome::kIoError);
@@ -179,7 +190,8 @@ TEST(AtomicFolderTest, ADiskThatFillsUpLeavesNothing) {
 
 TEST(AtomicFileTest, AppearsWholeOrNotAtAll) {
   const TempFolder folder;
-  WriteFileAtomically(folder / "a.txt", [](const fs::path& path) { WriteWholeFile(path, std::string_view("1")); });
+  WriteFileAtomically(folder / "a.txt",
+                      [](const fs::path& path) { WriteWholeFile(path, std::string_view("1")); });
   EXPECT_EQ(ReadTextFile(folder / "a.txt", 10), "1");
   EXPECT_THROW(WriteFileAtomically(folder / "a.txt",
                                    [](const fs::path& path) {
@@ -189,8 +201,12 @@ TEST(AtomicFileTest, AppearsWholeOrNotAtAll) {
                IoError);
   EXPECT_EQ(ReadTextFile(folder / "a.txt", 10), "1");
   EXPECT_THAT(Names(folder.path()), ElementsAre("a.txt"));
-  EXPECT_THAT(MessageOf<IoError>([&] { WriteFileAtomically(folder.path(), [](const fs::path&) {}); }), HasSubstr("is a folder"));
-  EXPECT_THROW(WriteFileAtomically(folder / "none/a.txt", [](const fs::path& path) { WriteWholeFile(path, std::string_view("1")); }),
+  EXPECT_THAT(
+      MessageOf<IoError>([&] { WriteFileAtomically(folder.path(), [](const fs::path&) {}); }),
+      HasSubstr("is a folder"));
+  EXPECT_THROW(WriteFileAtomically(
+                   folder / "none/a.txt",
+                   [](const fs::path& path) { WriteWholeFile(path, std::string_view("1")); }),
                IoError);
 }
 

@@ -7,9 +7,9 @@
 #include <limits>
 #include <string>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "daemon/files/mesh_file.hpp"
-#include "drivers/replay/file_io.hpp"
+#include "drivers/files/file_io.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -85,7 +85,8 @@ TEST(PlyFileTest, WritesTheBytesOfTheFormat) {
   mesh.triangles = {{0, 1, 2}};
   WriteMeshPly(folder / "m.ply", mesh);
   Bytes expected = Ascii(
-      "ply\nformat binary_little_endian 1.0\ncomment metres\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "ply\nformat binary_little_endian 1.0\ncomment metres\nelement vertex 3\nproperty float "
+      "x\nproperty float y\nproperty float z\n"
       "element face 1\nproperty list uchar int vertex_indices\nend_header\n");
   for (const float value : {1.F, 0.F, 0.F, 0.F, 2.F, 0.F, 0.F, 0.F, 3.F}) Append(expected, value);
   Append(expected, std::uint8_t{3});
@@ -95,8 +96,10 @@ TEST(PlyFileTest, WritesTheBytesOfTheFormat) {
 
 TEST(PlyFileTest, ReadsOtherLayouts) {
   Bytes bytes = Ascii(
-      "ply\nformat binary_little_endian 1.0\nobj_info x\nelement vertex 1\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
-      "property double z\nproperty double y\nproperty double x\nproperty float quality\nend_header\n");
+      "ply\nformat binary_little_endian 1.0\nobj_info x\nelement vertex 1\nproperty uchar "
+      "red\nproperty uchar green\nproperty uchar blue\n"
+      "property double z\nproperty double y\nproperty double x\nproperty float "
+      "quality\nend_header\n");
   for (const int color : {10, 20, 30}) Append(bytes, static_cast<std::uint8_t>(color));
   for (const double value : {3.0, 2.0, 1.0}) Append(bytes, value);
   Append(bytes, 0.5F);
@@ -107,11 +110,13 @@ TEST(PlyFileTest, ReadsOtherLayouts) {
 
 TEST(PlyFileTest, ColoursThatAreNoNumbersAreRefused) {
   Bytes bytes = Ascii(
-      "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+      "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float "
+      "y\nproperty float z\n"
       "property float red\nproperty float green\nproperty float blue\nend_header\n");
   for (int i = 0; i < 5; ++i) Append(bytes, 1.0F);
   Append(bytes, std::numeric_limits<float>::quiet_NaN());
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)ParseCloudPly(bytes, "c.ply"); }), HasSubstr("colour of vertex 0"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ParseCloudPly(bytes, "c.ply"); }),
+              HasSubstr("colour of vertex 0"));
 }
 
 TEST(PlyFileTest, EveryTruncationIsAnError) {
@@ -119,9 +124,12 @@ TEST(PlyFileTest, EveryTruncationIsAnError) {
   WriteMeshPly(folder / "m.ply", Tetrahedron());
   const Bytes bytes = ReadWholeFile(folder / "m.ply", 10000);
   for (std::size_t size = 0; size < bytes.size(); ++size) {
-    EXPECT_THROW((void)ParseMeshPly(std::span(bytes).first(size), "cut"), DataError) << size << " of " << bytes.size();
+    EXPECT_THROW((void)ParseMeshPly(std::span(bytes).first(size), "cut"), DataError)
+        << size << " of " << bytes.size();
   }
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)ParseMeshPly(std::span(bytes).first(bytes.size() - 1), "mesh.ply"); }),
+  EXPECT_THAT(MessageOf<DataError>([&] {
+                (void)ParseMeshPly(std::span(bytes).first(bytes.size() - 1), "mesh.ply");
+              }),
               AllOf(HasSubstr("mesh.ply"), HasSubstr("truncated"), HasSubstr("expected 112")));
 }
 
@@ -132,15 +140,22 @@ TEST(PlyFileTest, DamageIsNamed) {
     return MessageOf<DataError>([&] { (void)ParseMeshPly(bytes, "m.ply"); });
   };
   const std::string start = "ply\nformat binary_little_endian 1.0\n";
-  const std::string vertex = "element vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
+  const std::string vertex =
+      "element vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
   EXPECT_THAT(refusal("hello"), HasSubstr("no PLY header"));
-  EXPECT_THAT(refusal("ply\nformat ascii 1.0\n" + vertex + "end_header\n"), HasSubstr("format is ascii"));
+  EXPECT_THAT(refusal("ply\nformat ascii 1.0\n" + vertex + "end_header\n"),
+              HasSubstr("format is ascii"));
   EXPECT_THAT(refusal(start + "end_header\n"), HasSubstr("vertex"));
-  EXPECT_THAT(refusal(start + "element vertex 99999999999\nproperty float x\nend_header\n"), HasSubstr("count"));
-  EXPECT_THAT(refusal(start + "element vertex -1\nproperty float x\nend_header\n"), HasSubstr("count"));
-  EXPECT_THAT(refusal(start + "element vertex 90000000\nproperty double x\nend_header\n"), HasSubstr("truncated"));
-  EXPECT_THAT(refusal(start + "element vertex 1\nproperty quad x\nend_header\n"), HasSubstr("quad"));
-  EXPECT_THAT(refusal(start + "element vertex 0\nproperty float x\nend_header\n"), HasSubstr("no x, y, z"));
+  EXPECT_THAT(refusal(start + "element vertex 99999999999\nproperty float x\nend_header\n"),
+              HasSubstr("count"));
+  EXPECT_THAT(refusal(start + "element vertex -1\nproperty float x\nend_header\n"),
+              HasSubstr("count"));
+  EXPECT_THAT(refusal(start + "element vertex 90000000\nproperty double x\nend_header\n"),
+              HasSubstr("truncated"));
+  EXPECT_THAT(refusal(start + "element vertex 1\nproperty quad x\nend_header\n"),
+              HasSubstr("quad"));
+  EXPECT_THAT(refusal(start + "element vertex 0\nproperty float x\nend_header\n"),
+              HasSubstr("no x, y, z"));
   EXPECT_THAT(refusal(start + vertex + "banana\nend_header\n"), HasSubstr("banana"));
 
   Bytes nan;
@@ -177,7 +192,8 @@ TEST(MeshFileTest, StlHoldsTheTrianglesWithOutwardNormals) {
   EXPECT_EQ(count, 4U);
   float first[12];
   std::memcpy(first, bytes.data() + 84, sizeof first);
-  EXPECT_THAT(first, ElementsAre(0, 0, -1, 0, 0, 0, 0, 1, 0, 1, 0, 0));  // the bottom face looks down
+  EXPECT_THAT(first,
+              ElementsAre(0, 0, -1, 0, 0, 0, 0, 1, 0, 1, 0, 0));  // the bottom face looks down
   EXPECT_NE(std::string(bytes.begin(), bytes.begin() + 5), "solid");
 }
 
@@ -189,13 +205,16 @@ TEST(MeshFileTest, ObjCountsFromOne) {
   mesh.colors = {Color{255, 0, 0}, Color{0, 255, 0}, Color{0, 0, 255}};
   mesh.triangles = {{0, 1, 2}};
   WriteMeshFile(folder / "m.obj", mesh);
-  EXPECT_THAT(ReadTextFile(folder / "m.obj", 10000), AllOf(HasSubstr("v 0.000000 1.500000 0.000000 0.0000 0.0000 1.0000\n"),
-                                                           HasSubstr("vn 0.00000 0.00000 1.00000\n"), HasSubstr("f 1//1 2//2 3//3\n")));
+  EXPECT_THAT(ReadTextFile(folder / "m.obj", 10000),
+              AllOf(HasSubstr("v 0.000000 1.500000 0.000000 0.0000 0.0000 1.0000\n"),
+                    HasSubstr("vn 0.00000 0.00000 1.00000\n"), HasSubstr("f 1//1 2//2 3//3\n")));
 }
 
 TEST(MeshFileTest, OtherEndingsAreTheCallersMistake) {
   const TempFolder folder;
-  EXPECT_THAT(MessageOf<std::invalid_argument>([&] { WriteMeshFile(folder / "m.gltf", Tetrahedron()); }), HasSubstr(".ply, .stl or .obj"));
+  EXPECT_THAT(
+      MessageOf<std::invalid_argument>([&] { WriteMeshFile(folder / "m.gltf", Tetrahedron()); }),
+      HasSubstr(".ply, .stl or .obj"));
 }
 
 }  // namespace

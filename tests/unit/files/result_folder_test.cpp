@@ -9,9 +9,9 @@
 #include <opencv2/core.hpp>
 #include <set>
 
-#include "algo/types/errors.hpp"
-#include "drivers/replay/file_io.hpp"
-#include "drivers/replay/image_file.hpp"
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -27,7 +27,8 @@ using testing::TempFolder;
 
 std::set<std::string> Names(const fs::path& folder) {
   std::set<std::string> names;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename().string());
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    names.insert(entry.path().filename().string());
   return names;
 }
 
@@ -35,13 +36,15 @@ const GridShape kGrid{-0.1, -0.2, 0.0015, 120, 80};
 
 HeightMap Slope(double offset_m) {
   HeightMap map(kGrid);
-  for (std::size_t i = 0; i < map.z.size(); ++i) map.z[i] = static_cast<float>(offset_m + 1e-4 * static_cast<double>(i % 120));
+  for (std::size_t i = 0; i < map.z.size(); ++i)
+    map.z[i] = static_cast<float>(offset_m + 1e-4 * static_cast<double>(i % 120));
   map.z[5] = std::numeric_limits<float>::quiet_NaN();
   return map;
 }
 
 Comparison Answer() {
   Comparison comparison;
+  comparison.preset = Preset::kPaper;
   comparison.verdict = Verdict::kMove;
   comparison.reasons = {"vertical is 9.0 mm off"};
   Alignment alignment;
@@ -76,9 +79,12 @@ TEST(ResultFolderTest, HoldsTheKeysOfTheContract) {
   const auto json = nlohmann::json::parse(ResultJson(Answer()));
   EXPECT_EQ(json.at("format"), 1);
   EXPECT_EQ(json.at("verdict"), "move");
+  EXPECT_EQ(json.at("preset"), "paper");
+  EXPECT_FALSE(json.at("version").get<std::string>().empty());
   EXPECT_EQ(json.at("reasons").at(0), "vertical is 9.0 mm off");
   const auto& alignment = json.at("alignment");
-  EXPECT_EQ(alignment.at("T_reference_current").at(1).at(3), 0.5);  // row-major: the translation is the last column
+  EXPECT_EQ(alignment.at("T_reference_current").at(1).at(3),
+            0.5);  // row-major: the translation is the last column
   EXPECT_EQ(alignment.at("T_reference_current").at(3), (nlohmann::json{0.0, 0.0, 0.0, 1.0}));
   EXPECT_EQ(alignment.at("stretch").at(0), (nlohmann::json{1.0, 0.125, 0.0}));
   EXPECT_EQ(alignment.at("rms_m"), 0.001);
@@ -88,7 +94,8 @@ TEST(ResultFolderTest, HoldsTheKeysOfTheContract) {
   EXPECT_EQ(motion.at("T").at(2).at(3), 3.0);
   EXPECT_EQ(motion.at("covariance").size(), 6U);
   EXPECT_EQ(motion.at("covariance").at(0).at(5), 0.125);
-  EXPECT_EQ(motion.at("weak_directions").at(0), (nlohmann::json{{"name", "roll"}, {"u95", 2.5}, {"unit", "deg"}}));
+  EXPECT_EQ(motion.at("weak_directions").at(0),
+            (nlohmann::json{{"name", "roll"}, {"u95", 2.5}, {"unit", "deg"}}));
   EXPECT_EQ(motion.at("residual_m"), (nlohmann::json{{"median", 0.0015}, {"p95", 0.004}}));
   const auto& correction = json.at("correction");
   EXPECT_EQ(correction.at("isocentre"), (nlohmann::json{0.1, 0.2, 0.3}));
@@ -109,18 +116,21 @@ TEST(ResultFolderTest, AbsentResultsAreNull) {
   comparison.reasons = {"scan needs at least 3 markers shared with the reference, found 1"};
   auto json = nlohmann::json::parse(ResultJson(comparison));
   EXPECT_EQ(json.at("verdict"), "no_answer");
-  for (const char* key : {"alignment", "motion", "correction", "region"}) EXPECT_TRUE(json.at(key).is_null()) << key;
+  for (const char* key : {"alignment", "motion", "correction", "region"})
+    EXPECT_TRUE(json.at(key).is_null()) << key;
 
   comparison = Answer();
   comparison.correction->value.vertical_mm.reset();  // refused for couch-fixed markers
-  EXPECT_TRUE(nlohmann::json::parse(ResultJson(comparison)).at("correction").at("vertical_mm").is_null());
+  EXPECT_TRUE(
+      nlohmann::json::parse(ResultJson(comparison)).at("correction").at("vertical_mm").is_null());
 }
 
 TEST(ResultFolderTest, WritesMapsAndPictures) {
   const TempFolder folder;
   const HeightMap reference = Slope(0.1);
   WriteResult(Answer(), DrawResult(Answer(), &reference), folder / "result");
-  EXPECT_THAT(Names(folder / "result"), ElementsAre("deviation.tiff", "distance.tiff", "error_map.png", "overlay.png", "result.json"));
+  EXPECT_THAT(Names(folder / "result"), ElementsAre("deviation.tiff", "distance.tiff",
+                                                    "error_map.png", "overlay.png", "result.json"));
   const cv::Mat deviation = ReadFloatTiff(folder / "result/deviation.tiff");
   ASSERT_EQ(deviation.size(), cv::Size(120, 80));
   EXPECT_EQ(deviation.at<float>(0, 7), Slope(0.009).z[7]);  // row 0 is y_min
@@ -129,12 +139,23 @@ TEST(ResultFolderTest, WritesMapsAndPictures) {
   EXPECT_EQ(ReadResultJson(folder / "result"), ResultJson(Answer()));
 }
 
+TEST(ResultFolderTest, AResultWithARegionReplacesAnOlderOne) {
+  const TempFolder folder;
+  Comparison answer = Answer();
+  answer.region_mask.assign(120 * 80, 1);
+  for (int time = 0; time < 2; ++time) WriteResult(answer, {}, folder / "result");
+  EXPECT_THAT(Names(folder / "result"), ::testing::Contains("region.png"));
+}
+
 TEST(ResultFolderTest, SameResultSameBytes) {
   const TempFolder folder;
   const HeightMap reference = Slope(0.1);
-  for (const char* name : {"a", "b"}) WriteResult(Answer(), DrawResult(Answer(), &reference), folder / name);
+  for (const char* name : {"a", "b"})
+    WriteResult(Answer(), DrawResult(Answer(), &reference), folder / name);
   for (const std::string& name : Names(folder / "a")) {
-    EXPECT_EQ(ReadWholeFile(folder / "a" / name, 1 << 24), ReadWholeFile(folder / "b" / name, 1 << 24)) << name;
+    EXPECT_EQ(ReadWholeFile(folder / "a" / name, 1 << 24),
+              ReadWholeFile(folder / "b" / name, 1 << 24))
+        << name;
   }
 }
 
@@ -150,9 +171,11 @@ TEST(ResultFolderTest, NoAnswerIsWrittenWithoutMaps) {
 TEST(ResultFolderTest, AnotherFormatAndDamageAreNamed) {
   const TempFolder folder;
   WriteWholeFile(folder / "result.json", std::string_view("{\"format\": 2}"));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadResultJson(folder.path()); }), AllOf(HasSubstr("format 2"), HasSubstr("update")));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadResultJson(folder.path()); }),
+              AllOf(HasSubstr("format 2"), HasSubstr("update")));
   WriteWholeFile(folder / "result.json", std::string_view("{\"format\": 1"));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadResultJson(folder.path()); }), HasSubstr("no result of plumb compare"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadResultJson(folder.path()); }),
+              HasSubstr("no result of plumb compare"));
 }
 
 }  // namespace

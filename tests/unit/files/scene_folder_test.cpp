@@ -10,12 +10,12 @@
 #include <set>
 #include <string>
 
-#include "algo/types/errors.hpp"
-#include "algo/types/units.hpp"
+#include "algo/base/errors.hpp"
+#include "algo/base/units.hpp"
 #include "daemon/files/scene_json.hpp"
 #include "daemon/files/trajectory_file.hpp"
-#include "drivers/replay/file_io.hpp"
-#include "drivers/replay/image_file.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -85,7 +85,9 @@ class SceneFolderTest : public ::testing::Test {
     return Refusal();
   }
 
-  void Truncate(const char* name) const { fs::resize_file(scene_ / name, fs::file_size(scene_ / name) - 3); }
+  void Truncate(const char* name) const {
+    fs::resize_file(scene_ / name, fs::file_size(scene_ / name) - 3);
+  }
 
   TempFolder folder_;
   fs::path scene_ = folder_ / "scene";
@@ -110,8 +112,13 @@ TEST_F(SceneFolderTest, GivesBackWhatWasWritten) {
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(read.trajectory[i].time_s, scene.trajectory[i].time_s);
     // Nine decimals: half a nanometre in the translation, a few nanoradians in the rotation.
-    EXPECT_LT((read.trajectory[i].T_world_camera.translation() - scene.trajectory[i].T_world_camera.translation()).norm(), 1e-9);
-    EXPECT_LT(RotationAngle(read.trajectory[i].T_world_camera.inverse() * scene.trajectory[i].T_world_camera), 1e-8);
+    EXPECT_LT((read.trajectory[i].T_world_camera.translation() -
+               scene.trajectory[i].T_world_camera.translation())
+                  .norm(),
+              1e-9);
+    EXPECT_LT(RotationAngle(read.trajectory[i].T_world_camera.inverse() *
+                            scene.trajectory[i].T_world_camera),
+              1e-8);
   }
   EXPECT_EQ(read.frames_total, 5);
   EXPECT_EQ(read.frames_tracked, 3);
@@ -155,7 +162,9 @@ TEST_F(SceneFolderTest, SameSceneSameBytes) {
   WriteScene(SmallScene(), folder_ / "again");
   for (const fs::directory_entry& entry : fs::directory_iterator(scene_)) {
     const std::string name = entry.path().filename().string();
-    EXPECT_EQ(ReadWholeFile(entry.path(), 1 << 20), ReadWholeFile(folder_ / "again" / name, 1 << 20)) << name;
+    EXPECT_EQ(ReadWholeFile(entry.path(), 1 << 20),
+              ReadWholeFile(folder_ / "again" / name, 1 << 20))
+        << name;
   }
 }
 
@@ -168,7 +177,9 @@ TEST_F(SceneFolderTest, ASceneWithoutMarkersHasNoHeightMap) {
   scene.mesh = {};
   WriteScene(scene, scene_);
   EXPECT_FALSE(fs::exists(scene_ / "heightmap.tiff"));
-  EXPECT_TRUE(nlohmann::json::parse(ReadTextFile(scene_ / "scene.json", 1 << 20)).at("heightmap").is_null());
+  EXPECT_TRUE(nlohmann::json::parse(ReadTextFile(scene_ / "scene.json", 1 << 20))
+                  .at("heightmap")
+                  .is_null());
   const Scene read = ReadScene(scene_, {.mesh = true});
   EXPECT_EQ(read.frame, SceneFrame::kFirstKeyframe);
   EXPECT_FALSE(read.height_map);
@@ -181,12 +192,15 @@ TEST_F(SceneFolderTest, TrajectoryIsTumFormatWithSixDecimalsOfTime) {
   scene.trajectory = {{1700120000.0561461, Pose::Identity()}};
   WriteScene(scene, scene_);
   EXPECT_THAT(ReadTextFile(scene_ / "trajectory_all.txt", 1 << 20),
-              HasSubstr("\n1700120000.056146 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 0.000000000 1.000000000\n"));
+              HasSubstr("\n1700120000.056146 0.000000000 0.000000000 0.000000000 0.000000000 "
+                        "0.000000000 0.000000000 1.000000000\n"));
 }
 
 TEST_F(SceneFolderTest, AnotherProgramsSceneWithOnlyTheContractsKeysIsRead) {
   auto json = nlohmann::json::parse(SceneJson(SmallScene()));
-  for (const char* key : {"marker_dictionary", "marker_length_m", "reference_marker", "marker_sigma_m", "longest_lost_s"}) json.erase(key);
+  for (const char* key : {"marker_dictionary", "marker_length_m", "reference_marker",
+                          "marker_sigma_m", "longest_lost_s"})
+    json.erase(key);
   WriteWholeFile(scene_ / "scene.json", json.dump());
   EXPECT_EQ(ReadScene(scene_).markers.size(), 2U);
 }
@@ -212,20 +226,25 @@ TEST_F(SceneFolderTest, WhatIsNotFiniteIsNeverWritten) {
 TEST_F(SceneFolderTest, AFullDiskKeepsTheOldSceneAndLeavesNothingElse) {
   const std::string before = ReadTextFile(scene_ / "scene.json", 1 << 20);
   for (const unsigned long max_bytes : {0UL, 150UL, 300UL, 350UL}) {
-    const auto outcome = testing::WriteOnFullDisk(max_bytes, [&] { WriteScene(SmallScene(), scene_); });
+    const auto outcome =
+        testing::WriteOnFullDisk(max_bytes, [&] { WriteScene(SmallScene(), scene_); });
     EXPECT_EQ(outcome, testing::WriteOutcome::kIoError) << max_bytes;
     EXPECT_EQ(ReadTextFile(scene_ / "scene.json", 1 << 20), before);
-    EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()), 1) << max_bytes;
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()), 1)
+        << max_bytes;
     EXPECT_EQ(ReadScene(scene_, {.mesh = true}).cloud.size(), 2U);
   }
-  EXPECT_EQ(testing::WriteOnFullDisk(100'000, [&] { WriteScene(SmallScene(), scene_); }), testing::WriteOutcome::kDone);
+  EXPECT_EQ(testing::WriteOnFullDisk(100'000, [&] { WriteScene(SmallScene(), scene_); }),
+            testing::WriteOutcome::kDone);
 }
 
 // ---- bad input
 
 TEST_F(SceneFolderTest, MissingFoldersAndFilesAreNamed) {
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadScene(folder_ / "none"); }), AllOf(HasSubstr("none"), HasSubstr("is missing")));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadScene(folder_.path()); }), HasSubstr("holds no scene.json"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadScene(folder_ / "none"); }),
+              AllOf(HasSubstr("none"), HasSubstr("is missing")));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadScene(folder_.path()); }),
+              HasSubstr("holds no scene.json"));
   fs::remove(scene_ / "heightmap.tiff");
   EXPECT_THAT(Refusal(), AllOf(HasSubstr("heightmap.tiff"), HasSubstr("missing")));
   fs::remove(scene_ / "cloud.ply");
@@ -236,16 +255,19 @@ TEST_F(SceneFolderTest, MissingFoldersAndFilesAreNamed) {
 
 TEST_F(SceneFolderTest, ANewerFormatIsNamed) {
   EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = 2; }),
-              AllOf(HasSubstr("scene.json"), HasSubstr("format 2"), HasSubstr("reads format 1"), HasSubstr("update")));
+              AllOf(HasSubstr("scene.json"), HasSubstr("format 2"), HasSubstr("reads format 1"),
+                    HasSubstr("update")));
   EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = 0; }), HasSubstr("format is 0"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = "1"; }), HasSubstr("no whole number"));
-  EXPECT_THAT(RefusalWith([](auto& json) { json.erase("format"); }), HasSubstr("format is missing"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json.erase("format"); }),
+              HasSubstr("format is missing"));
 }
 
 TEST_F(SceneFolderTest, TruncatedFilesAreNamed) {
   Truncate("mesh.ply");
   EXPECT_THAT(Refusal(), AllOf(HasSubstr("mesh.ply"), HasSubstr("truncated")));
-  EXPECT_EQ(ReadScene(scene_).keyframes.size(), 2U);  // who does not ask for the mesh does not read it
+  EXPECT_EQ(ReadScene(scene_).keyframes.size(),
+            2U);  // who does not ask for the mesh does not read it
   fs::resize_file(scene_ / "heightmap.tiff", fs::file_size(scene_ / "heightmap.tiff") / 2);
   EXPECT_THAT(Refusal(), AllOf(HasSubstr("heightmap.tiff"), HasSubstr("truncated")));
   Truncate("cloud.ply");
@@ -255,17 +277,21 @@ TEST_F(SceneFolderTest, TruncatedFilesAreNamed) {
 }
 
 TEST_F(SceneFolderTest, ATruncatedTrajectoryIsNamed) {
-  Truncate("trajectory.txt");  // a pose without its last digits still parses: the count of lines is right, the number is not
+  Truncate("trajectory.txt");  // a pose without its last digits still parses: the count of lines is
+                               // right, the number is not
   fs::resize_file(scene_ / "trajectory.txt", fs::file_size(scene_ / "trajectory.txt") - 20);
   EXPECT_THAT(Refusal(), AllOf(HasSubstr("trajectory.txt line 3"), HasSubstr("8 finite numbers")));
 }
 
 TEST_F(SceneFolderTest, NanPosesAreNamed) {
-  WriteWholeFile(scene_ / "trajectory.txt", std::string_view("1.0 0 0 0 0 0 0 1\n2.0 nan 0 0 0 0 0 1\n"));
+  WriteWholeFile(scene_ / "trajectory.txt",
+                 std::string_view("1.0 0 0 0 0 0 0 1\n2.0 nan 0 0 0 0 0 1\n"));
   EXPECT_THAT(Refusal(), AllOf(HasSubstr("trajectory.txt line 2"), HasSubstr("finite")));
-  WriteWholeFile(scene_ / "trajectory.txt", std::string_view("1.0 0 0 0 0 0 0 0\n2.0 0 0 0 0 0 0 1\n"));
+  WriteWholeFile(scene_ / "trajectory.txt",
+                 std::string_view("1.0 0 0 0 0 0 0 0\n2.0 0 0 0 0 0 0 1\n"));
   EXPECT_THAT(Refusal(), AllOf(HasSubstr("line 1"), HasSubstr("quaternion of length 0")));
-  WriteWholeFile(scene_ / "trajectory.txt", std::string_view("2.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 0 1\n"));
+  WriteWholeFile(scene_ / "trajectory.txt",
+                 std::string_view("2.0 0 0 0 0 0 0 1\n2.0 0 0 0 0 0 0 1\n"));
   EXPECT_THAT(Refusal(), HasSubstr("not later"));
   WriteWholeFile(scene_ / "trajectory.txt", std::string_view("2.0 0 0 0 0 0 0 1 5\n"));
   EXPECT_THAT(Refusal(), HasSubstr("8 finite numbers"));
@@ -274,27 +300,39 @@ TEST_F(SceneFolderTest, NanPosesAreNamed) {
 TEST_F(SceneFolderTest, CornersThatAreNoNumbersAreNamed) {
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"][1][2] = nullptr; }),
               HasSubstr("scene.json.markers.11[1][2] is no number"));
-  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"][1][2] = 1e30; }), HasSubstr("1e+30"));
-  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"].erase(0); }), HasSubstr("no list of 4"));
-  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["-3"] = json["markers"]["11"]; }), HasSubstr("no marker id"));
-  EXPECT_THAT(RefusalWith([](auto& json) { json["marker_views"]["12"] = 3; }), HasSubstr("belongs to no marker"));
-  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"] = nlohmann::json::array(); }), HasSubstr("markers is no object"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"][1][2] = 1e30; }),
+              HasSubstr("1e+30"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"].erase(0); }),
+              HasSubstr("no list of 4"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["-3"] = json["markers"]["11"]; }),
+              HasSubstr("no marker id"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["marker_views"]["12"] = 3; }),
+              HasSubstr("belongs to no marker"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["markers"] = nlohmann::json::array(); }),
+              HasSubstr("markers is no object"));
 }
 
 TEST_F(SceneFolderTest, SizesThatDisagreeAreNamed) {
   EXPECT_THAT(RefusalWith([](auto& json) { json["heightmap"]["width"] = 8; }),
               AllOf(HasSubstr("heightmap.tiff has 7x3"), HasSubstr("scene.json states 8x3")));
-  EXPECT_THAT(RefusalWith([](auto& json) { json["keyframes"] = 3; }), AllOf(HasSubstr("2 poses"), HasSubstr("3 keyframes")));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["keyframes"] = 3; }),
+              AllOf(HasSubstr("2 poses"), HasSubstr("3 keyframes")));
 }
 
 TEST_F(SceneFolderTest, AbsurdNumbersAreNamed) {
-  EXPECT_THAT(RefusalWith([](auto& json) { json["heightmap"]["width"] = 1000000; }), AllOf(HasSubstr("width"), HasSubstr("1000000")));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["heightmap"]["width"] = 1000000; }),
+              AllOf(HasSubstr("width"), HasSubstr("1000000")));
   EXPECT_THAT(RefusalWith([](auto& json) { json["heightmap"]["step"] = 0; }), HasSubstr("step"));
-  EXPECT_THAT(RefusalWith([](auto& json) { json["heightmap"]["step"] = -0.0015; }), HasSubstr("step"));
-  EXPECT_THAT(RefusalWith([](auto& json) { json["frames"]["total"] = -1; }), HasSubstr("frames.total"));
-  EXPECT_THAT(RefusalWith([](auto& json) { json["frame"] = "moon"; }), HasSubstr("neither reference_marker nor first_keyframe"));
-  EXPECT_THAT(RefusalWith([](auto& json) { json["marker_dictionary"] = "DICT_9X9"; }), HasSubstr("DICT_9X9"));
-  EXPECT_THAT(RefusalWith([](auto& json) { json = nlohmann::json::array(); }), HasSubstr("no object"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["heightmap"]["step"] = -0.0015; }),
+              HasSubstr("step"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["frames"]["total"] = -1; }),
+              HasSubstr("frames.total"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["frame"] = "moon"; }),
+              HasSubstr("neither reference_marker nor first_keyframe"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["marker_dictionary"] = "DICT_9X9"; }),
+              HasSubstr("DICT_9X9"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json = nlohmann::json::array(); }),
+              HasSubstr("no object"));
   WriteWholeFile(scene_ / "scene.json", std::string(200'000, '['));
   EXPECT_THAT(Refusal(), HasSubstr("no JSON"));
 }

@@ -9,19 +9,23 @@ namespace plumb {
 namespace {
 
 Intrinsics WithLens() {
-  Intrinsics intrinsics{.width = 320, .height = 240, .fx = 262.0, .fy = 263.0, .cx = 158.3, .cy = 121.9};
+  Intrinsics intrinsics{
+      .width = 320, .height = 240, .fx = 262.0, .fy = 263.0, .cx = 158.3, .cy = 121.9};
   intrinsics.distortion = {0.0633, -0.2018, 4.8e-4, 2.1e-4, 0.0573};
   return intrinsics;
 }
 
 // Truth: the forward model. Whatever pixel the ray is drawn in must be the pixel it belongs to.
 TEST(RayTableTest, RaysProjectBackOntoTheirPixels) {
-  for (const Intrinsics& intrinsics : {WithLens(), Intrinsics{.width = 64, .height = 48, .fx = 60, .fy = 61, .cx = 30, .cy = 25}}) {
+  for (const Intrinsics& intrinsics :
+       {WithLens(),
+        Intrinsics{.width = 64, .height = 48, .fx = 60, .fy = 61, .cx = 30, .cy = 25}}) {
     const RayTable rays(intrinsics);
     double worst_px = 0.0;
     for (int row = 0; row < rays.height(); ++row) {
       for (int column = 0; column < rays.width(); ++column) {
-        const Eigen::Vector2d pixel = Project(intrinsics, rays.ideal(row, column).cast<double>().homogeneous());
+        const Eigen::Vector2d pixel =
+            Project(intrinsics, rays.ideal(row, column).cast<double>().homogeneous());
         worst_px = std::max(worst_px, (pixel - Eigen::Vector2d(column, row)).norm());
       }
     }

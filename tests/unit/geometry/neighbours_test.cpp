@@ -18,7 +18,8 @@ Clouds RandomClouds(std::size_t count, std::size_t size, unsigned seed) {
   // Flat clouds, each over its own stretch: some points have many others near, some none.
   for (std::size_t c = 0; c < count; ++c)
     for (std::size_t i = 0; i < size; ++i)
-      clouds[c].emplace_back(0.4F * uniform(random) + 0.15F * static_cast<float>(c), 0.4F * uniform(random), 0.02F * uniform(random));
+      clouds[c].emplace_back(0.4F * uniform(random) + 0.15F * static_cast<float>(c),
+                             0.4F * uniform(random), 0.02F * uniform(random));
   return clouds;
 }
 
@@ -39,12 +40,14 @@ std::uint32_t BruteForce(const Clouds& clouds, std::size_t cloud, std::size_t in
   return nearest;
 }
 
-// The memory of earlier searches must never change an answer: clouds drift, jump, and the radius shrinks.
+// The memory of earlier searches must never change an answer: clouds drift, jump, and the radius
+// shrinks.
 TEST(CloudNeighboursTest, EqualsBruteForceWhileCloudsMoveAndTheRadiusShrinks) {
   for (const double cell_size : {0.01, 0.03, 0.2}) {
     Clouds clouds = RandomClouds(4, 250, 3);
     CloudNeighbours neighbours(clouds, cell_size);
-    std::vector<std::vector<CloudNeighbours::Memory>> memory(clouds.size(), std::vector<CloudNeighbours::Memory>(250));
+    std::vector<std::vector<CloudNeighbours::Memory>> memory(
+        clouds.size(), std::vector<CloudNeighbours::Memory>(250));
     std::mt19937 random(7);
     std::normal_distribution<float> normal;
     int num_found = 0;
@@ -54,14 +57,17 @@ TEST(CloudNeighboursTest, EqualsBruteForceWhileCloudsMoveAndTheRadiusShrinks) {
       for (std::size_t c = 0; c < clouds.size(); ++c) {
         for (std::size_t i = 0; i < clouds[c].size(); ++i) {
           const std::uint32_t found = neighbours.Nearest(c, i, radius, memory[c][i]);
-          ASSERT_EQ(found, BruteForce(clouds, c, i, radius)) << "iteration " << iteration << " cloud " << c << " point " << i;
+          ASSERT_EQ(found, BruteForce(clouds, c, i, radius))
+              << "iteration " << iteration << " cloud " << c << " point " << i;
           ++(found == CloudNeighbours::kNone ? num_missing : num_found);
         }
       }
-      // Small steps, ever smaller ones towards the end, where old answers are reused most, and one jump among them.
+      // Small steps, ever smaller ones towards the end, where old answers are reused most, and one
+      // jump among them.
       const float step = iteration == 6 ? 0.03F : (iteration < 9 ? 0.0008F : 0.00005F);
       for (auto& cloud : clouds) {
-        const Eigen::Vector3f shift = step * Eigen::Vector3f(normal(random), normal(random), normal(random));
+        const Eigen::Vector3f shift =
+            step * Eigen::Vector3f(normal(random), normal(random), normal(random));
         for (Eigen::Vector3f& p : cloud) p += shift;
       }
       neighbours.Move(clouds);

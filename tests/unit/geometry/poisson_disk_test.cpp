@@ -10,25 +10,29 @@
 namespace plumb {
 namespace {
 
-std::vector<Eigen::Vector3f> RandomCloud(std::size_t count, const Eigen::Vector3f& extent, unsigned seed) {
+std::vector<Eigen::Vector3f> RandomCloud(std::size_t count, const Eigen::Vector3f& extent,
+                                         unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> uniform(-0.5F, 0.5F);
   std::vector<Eigen::Vector3f> points(count);
-  for (Eigen::Vector3f& p : points) p = extent.cwiseProduct(Eigen::Vector3f(uniform(random), uniform(random), uniform(random)));
+  for (Eigen::Vector3f& p : points)
+    p = extent.cwiseProduct(Eigen::Vector3f(uniform(random), uniform(random), uniform(random)));
   return points;
 }
 
 // The two halves of the definition, each by looking at every pair.
 TEST(PoissonDiskTest, KeptPointsKeepTheirDistanceAndEveryPointHasAKeptOneNear) {
   for (const Eigen::Vector3f& extent :
-       {Eigen::Vector3f(0.4F, 0.4F, 0.0F), Eigen::Vector3f(0.2F, 0.2F, 0.2F), Eigen::Vector3f(3.0F, 0.0F, 0.0F)}) {
+       {Eigen::Vector3f(0.4F, 0.4F, 0.0F), Eigen::Vector3f(0.2F, 0.2F, 0.2F),
+        Eigen::Vector3f(3.0F, 0.0F, 0.0F)}) {
     for (unsigned seed = 1; seed <= 3; ++seed) {
       const float spacing = 0.02F;
       const auto points = RandomCloud(4000, extent, seed);
       const auto kept = PoissonDiskSubset(points, spacing, seed);
       ASSERT_FALSE(kept.empty());
       for (std::size_t i = 0; i < kept.size(); ++i)
-        for (std::size_t k = i + 1; k < kept.size(); ++k) EXPECT_GE((points[kept[i]] - points[kept[k]]).norm(), spacing * (1 - 1e-6F));
+        for (std::size_t k = i + 1; k < kept.size(); ++k)
+          EXPECT_GE((points[kept[i]] - points[kept[k]]).norm(), spacing * (1 - 1e-6F));
       for (const Eigen::Vector3f& p : points) {
         float nearest = std::numeric_limits<float>::max();
         for (const std::uint32_t i : kept) nearest = std::min(nearest, (points[i] - p).norm());
@@ -39,10 +43,11 @@ TEST(PoissonDiskTest, KeptPointsKeepTheirDistanceAndEveryPointHasAKeptOneNear) {
 }
 
 TEST(PoissonDiskTest, VisitsInARandomOrder) {
-  // Dense points on a line: random sequential packing keeps 0.7476 of the most that fit (Renyi's parking constant); a
-  // sweep in memory order would keep nearly 1.
+  // Dense points on a line: random sequential packing keeps 0.7476 of the most that fit (Renyi's
+  // parking constant); a sweep in memory order would keep nearly 1.
   std::vector<Eigen::Vector3f> line(200000);
-  for (std::size_t i = 0; i < line.size(); ++i) line[i] = Eigen::Vector3f(10.0F * static_cast<float>(i) / 200000.0F, 0, 0);
+  for (std::size_t i = 0; i < line.size(); ++i)
+    line[i] = Eigen::Vector3f(10.0F * static_cast<float>(i) / 200000.0F, 0, 0);
   const auto kept = PoissonDiskSubset(line, 0.02, 5);
   // Standard deviation of the share for 500 sites: sqrt(0.038 / 500) = 0.009; limit four of them.
   EXPECT_NEAR(static_cast<double>(kept.size()) / 500.0, 0.7476, 0.035);

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 
 namespace plumb {
 namespace {
@@ -18,14 +18,17 @@ Points RandomPoints(std::mt19937& random, int count, const Eigen::Vector3d& exte
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   Points points;
   for (int i = 0; i < count; ++i)
-    points.emplace_back(extent.cwiseProduct(Eigen::Vector3d(uniform(random), uniform(random), uniform(random))));
+    points.emplace_back(
+        extent.cwiseProduct(Eigen::Vector3d(uniform(random), uniform(random), uniform(random))));
   return points;
 }
 
 Pose RandomPose(std::mt19937& random) {
   std::normal_distribution<double> normal;
   Pose T = Pose::Identity();
-  T.linear() = Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random)).normalized().toRotationMatrix();
+  T.linear() = Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random))
+                   .normalized()
+                   .toRotationMatrix();
   T.translation() = 2.0 * Eigen::Vector3d(normal(random), normal(random), normal(random));
   return T;
 }
@@ -39,15 +42,19 @@ Points Transformed(const Pose& T_a_b, const Points& points_b) {
 TEST(RigidFitTest, RecoversAnyPoseFromExactPairsOfEveryShape) {
   std::mt19937 random(1);
   // A volume, a plate, a nearly flat plate, a needle with some width, a single triangle.
-  const std::vector<std::pair<int, Eigen::Vector3d>> shapes = {
-      {20, {1, 1, 1}}, {4, {0.05, 0.05, 0}}, {12, {1, 0.5, 1e-4}}, {10, {1, 1e-3, 1e-3}}, {3, {0.1, 0.1, 0.1}}};
+  const std::vector<std::pair<int, Eigen::Vector3d>> shapes = {{20, {1, 1, 1}},
+                                                               {4, {0.05, 0.05, 0}},
+                                                               {12, {1, 0.5, 1e-4}},
+                                                               {10, {1, 1e-3, 1e-3}},
+                                                               {3, {0.1, 0.1, 0.1}}};
   for (const auto& [count, extent] : shapes) {
     for (int trial = 0; trial < 50; ++trial) {
       const Pose T_a_b = RandomPose(random);
       const Points points_b = RandomPoints(random, count, extent);
       const RigidFit fit = FitRigid(Transformed(T_a_b, points_b), points_b);
       ASSERT_TRUE(fit.valid);
-      // Rounding of coordinates of some metres over a width of 1 mm: about 1e-15 / 1e-3 in angle, measured 4e-12 at worst.
+      // Rounding of coordinates of some metres over a width of 1 mm: about 1e-15 / 1e-3 in angle,
+      // measured 4e-12 at worst.
       EXPECT_LT(RotationAngle(fit.T_a_b.inverse() * T_a_b), 1e-7);
       for (const Eigen::Vector3d& p : points_b) EXPECT_LT((fit.T_a_b * p - T_a_b * p).norm(), 1e-9);
       EXPECT_LT(fit.rms_m, 1e-9);
@@ -56,7 +63,8 @@ TEST(RigidFitTest, RecoversAnyPoseFromExactPairsOfEveryShape) {
 }
 
 TEST(RigidFitTest, FourCoplanarCornersFarFromTheOriginHaveRankTwoAndAreEnough) {
-  Points corners_b = {{-0.052, 0.052, 0}, {0.052, 0.052, 0}, {0.052, -0.052, 0}, {-0.052, -0.052, 0}};
+  Points corners_b = {
+      {-0.052, 0.052, 0}, {0.052, 0.052, 0}, {0.052, -0.052, 0}, {-0.052, -0.052, 0}};
   for (Eigen::Vector3d& p : corners_b) p += Eigen::Vector3d(3, -2, 1);
   std::mt19937 random(2);
   const Pose T_a_b = RandomPose(random);
@@ -104,7 +112,8 @@ TEST(RigidFitTest, WeightsAreMultiplicitiesAndZeroLeavesAPairOut) {
   const Points points_b = RandomPoints(random, 6, {1, 1, 1});
   Points points_a = Transformed(RandomPose(random), points_b);
   std::normal_distribution<double> noise(0, 0.01);
-  for (Eigen::Vector3d& p : points_a) p += Eigen::Vector3d(noise(random), noise(random), noise(random));
+  for (Eigen::Vector3d& p : points_a)
+    p += Eigen::Vector3d(noise(random), noise(random), noise(random));
 
   Points repeated_a = points_a, repeated_b = points_b;
   repeated_a.push_back(points_a[2]);
@@ -123,7 +132,8 @@ TEST(RigidFitTest, NoOtherPoseNearbyHasASmallerResidual) {
   const Points points_b = RandomPoints(random, 12, {0.5, 0.3, 0.01});
   Points points_a = Transformed(RandomPose(random), points_b);
   std::normal_distribution<double> noise(0, 0.02);
-  for (Eigen::Vector3d& p : points_a) p += Eigen::Vector3d(noise(random), noise(random), noise(random));
+  for (Eigen::Vector3d& p : points_a)
+    p += Eigen::Vector3d(noise(random), noise(random), noise(random));
   const RigidFit fit = FitRigid(points_a, points_b);
   std::normal_distribution<double> step(0, 1e-3);
   for (int trial = 0; trial < 200; ++trial) {
@@ -131,7 +141,8 @@ TEST(RigidFitTest, NoOtherPoseNearbyHasASmallerResidual) {
     for (int i = 0; i < 6; ++i) twist[i] = step(random);
     const Pose T_other = PoseFromTwist(twist) * fit.T_a_b;
     double sum = 0;
-    for (std::size_t i = 0; i < points_a.size(); ++i) sum += (points_a[i] - T_other * points_b[i]).squaredNorm();
+    for (std::size_t i = 0; i < points_a.size(); ++i)
+      sum += (points_a[i] - T_other * points_b[i]).squaredNorm();
     EXPECT_GE(std::sqrt(sum / static_cast<double>(points_a.size())), fit.rms_m - 1e-12);
   }
 }

@@ -145,7 +145,8 @@ TEST(ButtonDebouncerTest, APressWhoseEdgeWasLostBeginsWhenItIsSeen) {
   EXPECT_EQ(bench.presses, std::vector{ButtonPress::kShort});
 }
 
-// Contacts that chatter for up to 15 ms at each change: exactly one press each time, long or short as it was held.
+// Contacts that chatter for up to 15 ms at each change: exactly one press each time, long or short
+// as it was held.
 TEST(ButtonDebouncerTest, CountsPressesThroughChatter) {
   std::mt19937 random(11);
   std::uniform_int_distribution<int> bounces(0, 12), gap_ms(0, 2), hold_ms(100, 3000);

@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/under_umockdev.hpp"
 
@@ -29,22 +29,28 @@ using ::testing::HasSubstr;
 using testing::MessageOf;
 using Clock = Button::Clock;
 
-/// A chip of 8 lines: 3 is the button, 5 to 7 are lights. Its ioctls are answered by libumockdev on a thread of its own.
+/// A chip of 8 lines: 3 is the button, 5 to 7 are lights. Its ioctls are answered by libumockdev on
+/// a thread of its own.
 class FakeChip {
  public:
   FakeChip() : testbed_(umockdev_testbed_new()), handler_(umockdev_ioctl_base_new()) {
     GError* error = nullptr;
     const char* devices =
-        "P: /devices/platform/plumb/gpiochip0\nN: gpiochip0\nE: DEVNAME=/dev/gpiochip0\nE: SUBSYSTEM=gpio\nE: MAJOR=254\nE: MINOR=0\n"
+        "P: /devices/platform/plumb/gpiochip0\nN: gpiochip0\nE: DEVNAME=/dev/gpiochip0\nE: "
+        "SUBSYSTEM=gpio\nE: MAJOR=254\nE: MINOR=0\n"
         "A: dev=254:0\\n\n\n"
-        "P: /devices/virtual/misc/plumbout\nN: plumbout\nE: DEVNAME=/dev/plumbout\nE: SUBSYSTEM=misc\nE: MAJOR=10\nE: MINOR=99\n"
+        "P: /devices/virtual/misc/plumbout\nN: plumbout\nE: DEVNAME=/dev/plumbout\nE: "
+        "SUBSYSTEM=misc\nE: MAJOR=10\nE: MINOR=99\n"
         "A: dev=10:99\\n\n\n"
-        "P: /devices/virtual/misc/plumbin\nN: plumbin\nE: DEVNAME=/dev/plumbin\nE: SUBSYSTEM=misc\nE: MAJOR=10\nE: MINOR=98\n"
+        "P: /devices/virtual/misc/plumbin\nN: plumbin\nE: DEVNAME=/dev/plumbin\nE: "
+        "SUBSYSTEM=misc\nE: MAJOR=10\nE: MINOR=98\n"
         "A: dev=10:98\\n\n";
-    EXPECT_TRUE(umockdev_testbed_add_from_string(testbed_, devices, &error)) << (error ? error->message : "");
+    EXPECT_TRUE(umockdev_testbed_add_from_string(testbed_, devices, &error))
+        << (error ? error->message : "");
     g_signal_connect(handler_, "handle-ioctl", G_CALLBACK(&FakeChip::OnIoctl), this);
     for (const char* device : {"/dev/gpiochip0", "/dev/plumbout", kEvents})
-      EXPECT_TRUE(umockdev_testbed_attach_ioctl(testbed_, device, handler_, &error)) << (error ? error->message : "");
+      EXPECT_TRUE(umockdev_testbed_attach_ioctl(testbed_, device, handler_, &error))
+          << (error ? error->message : "");
     // Edges come through a pipe that is a device too, so that the line can be asked for its level.
     gchar* root = umockdev_testbed_get_root_dir(testbed_);
     const std::string node = root + std::string(kEvents);
@@ -63,10 +69,12 @@ class FakeChip {
   FakeChip& operator=(const FakeChip&) = delete;
 
   /// By default with a stamp of a clock that is not ours, as kernels before 5.7 give it.
-  void Edge(bool pressed, Clock::time_point at = Clock::time_point(std::chrono::hours(24 * 365 * 50))) {
+  void Edge(bool pressed,
+            Clock::time_point at = Clock::time_point(std::chrono::hours(24 * 365 * 50))) {
     held = pressed;
     gpioevent_data event{};
-    event.timestamp = static_cast<std::uint64_t>(std::chrono::nanoseconds(at.time_since_epoch()).count());
+    event.timestamp =
+        static_cast<std::uint64_t>(std::chrono::nanoseconds(at.time_since_epoch()).count());
     event.id = pressed ? GPIOEVENT_EVENT_RISING_EDGE : GPIOEVENT_EVENT_FALLING_EDGE;
     EXPECT_EQ(::write(events_, &event, sizeof event), static_cast<ssize_t>(sizeof event));
   }
@@ -76,7 +84,8 @@ class FakeChip {
 
  private:
   static const char* NameOf(unsigned line) {
-    static constexpr std::array<const char*, 8> kNames{"", "", "", "start-button", "", "led-red", "led-green", "beeper"};
+    static constexpr std::array<const char*, 8> kNames{"", "",        "",          "start-button",
+                                                       "", "led-red", "led-green", "beeper"};
     return line < kNames.size() ? kNames[line] : "";
   }
 
@@ -87,7 +96,8 @@ class FakeChip {
   gboolean Answer(UMockdevIoctlClient* client) {
     const gulong request = umockdev_ioctl_client_get_request(client);
     GError* error = nullptr;
-    UMockdevIoctlData* data = umockdev_ioctl_data_resolve(umockdev_ioctl_client_get_arg(client), 0, _IOC_SIZE(request), &error);
+    UMockdevIoctlData* data = umockdev_ioctl_data_resolve(umockdev_ioctl_client_get_arg(client), 0,
+                                                          _IOC_SIZE(request), &error);
     if (data == nullptr) return FALSE;
     gint length = 0;
     guint8* bytes = nullptr;
@@ -154,7 +164,8 @@ class FakeChip {
 class GpioTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!testing::UnderUmockdev()) GTEST_SKIP() << "not under umockdev: run it through ctest, or with umockdev-wrapper";
+    if (!testing::UnderUmockdev())
+      GTEST_SKIP() << "not under umockdev: run it through ctest, or with umockdev-wrapper";
     chip_ = std::make_unique<FakeChip>();
   }
   std::unique_ptr<FakeChip> chip_;
@@ -221,13 +232,20 @@ TEST_F(GpioTest, AButtonHeldAtTheStartIsNoPress) {
 }
 
 TEST_F(GpioTest, ChipsAndLinesThatAreNotThereAreNamed) {
-  EXPECT_THAT(MessageOf<DeviceError>([] { GpioButton button({.where = {"gpiochip7", "start-button"}}); }), HasSubstr("gpiochip7"));
-  EXPECT_THAT(MessageOf<DeviceError>([] { GpioButton button({.where = {"gpiochip0", "stop-button"}}); }), HasSubstr("stop-button"));
+  EXPECT_THAT(MessageOf<DeviceError>([] {
+                GpioButton button({.where = {"gpiochip7", "start-button"}});
+              }),
+              HasSubstr("gpiochip7"));
+  EXPECT_THAT(MessageOf<DeviceError>([] {
+                GpioButton button({.where = {"gpiochip0", "stop-button"}});
+              }),
+              HasSubstr("stop-button"));
 }
 
 TEST_F(GpioTest, ALightOfOneLineShowsEveryColour) {
   {
-    GpioIndicator indicator({.chip = "gpiochip0", .lights = {"led-red", "", ""}, .beeper = "", .active_low = false});
+    GpioIndicator indicator(
+        {.chip = "gpiochip0", .lights = {"led-red", "", ""}, .beeper = "", .active_low = false});
     indicator.Show(IndicatorPattern::kReady);  // green
     EXPECT_EQ(chip_->outputs[5], 1);
     EXPECT_FALSE(indicator.deadline());
@@ -246,7 +264,8 @@ TEST_F(GpioTest, ListsChipsWithTheirNamedLines) {
   const std::vector<GpioChipDescription> chips = ListGpioChips();
   ASSERT_EQ(chips.size(), 1U);
   EXPECT_EQ(chips[0].label, "plumb-test");
-  EXPECT_THAT(chips[0].lines, ::testing::ElementsAre("start-button", "led-red", "led-green", "beeper"));
+  EXPECT_THAT(chips[0].lines,
+              ::testing::ElementsAre("start-button", "led-red", "led-green", "beeper"));
 }
 
 }  // namespace

@@ -12,11 +12,20 @@ using std::chrono::milliseconds;
 using Clock = IndicatorPlayer::Clock;
 
 const std::vector<IndicatorPattern>& AllPatterns() {
-  static const std::vector<IndicatorPattern> patterns{
-      IndicatorPattern::kOff,        IndicatorPattern::kNoSensor, IndicatorPattern::kReady,
-      IndicatorPattern::kScanning,   IndicatorPattern::kTooFast,  IndicatorPattern::kTooNear,
-      IndicatorPattern::kTooFar,     IndicatorPattern::kWorking,  IndicatorPattern::kResultInTolerance,
-      IndicatorPattern::kResultMove, IndicatorPattern::kNoAnswer, IndicatorPattern::kFault};
+  static const std::vector<IndicatorPattern> patterns{IndicatorPattern::kOff,
+                                                      IndicatorPattern::kNoSensor,
+                                                      IndicatorPattern::kReady,
+                                                      IndicatorPattern::kScanning,
+                                                      IndicatorPattern::kTooFast,
+                                                      IndicatorPattern::kTooNear,
+                                                      IndicatorPattern::kTooFar,
+                                                      IndicatorPattern::kWorking,
+                                                      IndicatorPattern::kResultInTolerance,
+                                                      IndicatorPattern::kResultUnsure,
+                                                      IndicatorPattern::kResultMove,
+                                                      IndicatorPattern::kNoAnswer,
+                                                      IndicatorPattern::kDone,
+                                                      IndicatorPattern::kFault};
   return patterns;
 }
 
@@ -36,7 +45,9 @@ std::string Seen(IndicatorPattern pattern, int mask) {
 TEST(IndicatorPatternsTest, EachPatternLooksDifferentEvenInOneColour) {
   for (std::size_t i = 0; i < AllPatterns().size(); ++i) {
     for (std::size_t j = i + 1; j < AllPatterns().size(); ++j) {
-      EXPECT_NE(Seen(AllPatterns()[i], kRed | kGreen | kBlue), Seen(AllPatterns()[j], kRed | kGreen | kBlue)) << i << " and " << j;
+      EXPECT_NE(Seen(AllPatterns()[i], kRed | kGreen | kBlue),
+                Seen(AllPatterns()[j], kRed | kGreen | kBlue))
+          << i << " and " << j;
     }
   }
 }
@@ -45,7 +56,8 @@ TEST(IndicatorPatternsTest, NothingIsDarkForMoreThanTwoSeconds) {
   for (const IndicatorPattern pattern : AllPatterns()) {
     if (pattern == IndicatorPattern::kOff) continue;
     int dark = 0, longest = 0;
-    for (const char c : Seen(pattern, kRed | kGreen | kBlue)) longest = std::max(longest, dark = c == 'A' ? dark + 1 : 0);
+    for (const char c : Seen(pattern, kRed | kGreen | kBlue))
+      longest = std::max(longest, dark = c == 'A' ? dark + 1 : 0);
     EXPECT_LE(longest, 200) << static_cast<int>(pattern);
   }
 }

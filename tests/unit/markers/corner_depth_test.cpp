@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "algo/types/pose.hpp"
+#include "algo/base/pose.hpp"
 
 namespace plumb {
 namespace {
@@ -28,10 +28,10 @@ struct MarkerScene {
   explicit MarkerScene(int width, double noise_m = 0.0) : intrinsics(Camera(width)) {
     Pose T_camera_marker = Pose::Identity();
     // z of the marker towards the camera (pi about x), then tilted.
-    T_camera_marker.linear() =
-        (Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(EIGEN_PI - 0.3, Eigen::Vector3d::UnitX()) *
-         Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ()))
-            .toRotationMatrix();
+    T_camera_marker.linear() = (Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY()) *
+                                Eigen::AngleAxisd(EIGEN_PI - 0.3, Eigen::Vector3d::UnitX()) *
+                                Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ()))
+                                   .toRotationMatrix();
     T_camera_marker.translation() = Eigen::Vector3d(0.15, -0.1, 0.8);
     seen.id = 7;
     const MarkerCorners corners = CornersInMarkerFrame(0.104);
@@ -46,7 +46,8 @@ struct MarkerScene {
     std::normal_distribution<double> noise(0.0, 1.0);
     for (int row = 0; row < intrinsics.height; ++row)
       for (int column = 0; column < intrinsics.width; ++column) {
-        const Eigen::Vector3d ray = Undistort(intrinsics, Eigen::Vector2d(column, row)).homogeneous();
+        const Eigen::Vector3d ray =
+            Undistort(intrinsics, Eigen::Vector2d(column, row)).homogeneous();
         const double z = normal.dot(T_camera_marker.translation()) / normal.dot(ray);
         view.depth_m.at<float>(row, column) = static_cast<float>(z + noise_m * noise(random));
       }
@@ -71,12 +72,15 @@ TEST(CornerDepthTest, BothRulesFindExactCornersInCompleteDepth) {
     ASSERT_TRUE(face.has_value());
     for (std::size_t k = 0; k < 4; ++k) {
       ASSERT_TRUE(paper[k].has_value());
-      // The paper's depth is that of the pixel's centre, up to half a pixel from the corner: 0.7 px x 1.5 mm x tan 28 deg.
+      // The paper's depth is that of the pixel's centre, up to half a pixel from the corner: 0.7 px
+      // x 1.5 mm x tan 28 deg.
       EXPECT_LT((*paper[k] - scene.truth[k]).norm(), width == 640 ? 0.8e-3 : 1.6e-3);
-      EXPECT_LT((face->corners[k] - scene.truth[k]).norm(), 1e-6);  // measured 2e-8: single precision of the depth image
+      EXPECT_LT((face->corners[k] - scene.truth[k]).norm(),
+                1e-6);  // measured 2e-8: single precision of the depth image
     }
     EXPECT_NEAR(face->inlier_share, 1.0, 0.01);
-    // Counter-clockwise seen from the camera would mean a mirrored marker: z must come towards the camera.
+    // Counter-clockwise seen from the camera would mean a mirrored marker: z must come towards the
+    // camera.
     const Eigen::Vector3d x = face->corners[1] - face->corners[0];
     const Eigen::Vector3d y = face->corners[0] - face->corners[3];
     EXPECT_LT(x.cross(y).dot(face->corners[0]), 0.0);
@@ -86,10 +90,12 @@ TEST(CornerDepthTest, BothRulesFindExactCornersInCompleteDepth) {
 TEST(CornerDepthTest, MissingDepthPullsThePapersCornerSidewaysButNotThePlanes) {
   MarkerScene scene(640);
   const RayTable rays(scene.intrinsics);
-  // Depth is missing to the left of the left corners and at them, as where the projector's shadow falls.
+  // Depth is missing to the left of the left corners and at them, as where the projector's shadow
+  // falls.
   const double edge = std::max(scene.seen.corners[0].x(), scene.seen.corners[3].x()) + 2.0;
   for (int row = 0; row < 480; ++row)
-    for (int column = 0; column < static_cast<int>(edge); ++column) scene.view.depth_m.at<float>(row, column) = 0.0F;
+    for (int column = 0; column < static_cast<int>(edge); ++column)
+      scene.view.depth_m.at<float>(row, column) = 0.0F;
   const auto paper = PaperCornerPositions(scene.seen, scene.view, rays);
   const auto face = FitMarkerFace(scene.seen, scene.view, rays);
   ASSERT_TRUE(face.has_value());
@@ -105,10 +111,12 @@ TEST(CornerDepthTest, ThePlaneAveragesNoiseAndIgnoresAForeignObject) {
   const int column = static_cast<int>(scene.seen.corners[0].x());
   const int row = static_cast<int>(scene.seen.corners[0].y());
   for (int r = row; r < row + 25; ++r)
-    for (int c = column; c < column + 25; ++c) scene.view.depth_m.at<float>(r, c) -= 0.12F;  // a finger over one corner
+    for (int c = column; c < column + 25; ++c)
+      scene.view.depth_m.at<float>(r, c) -= 0.12F;  // a finger over one corner
   const auto face = FitMarkerFace(scene.seen, scene.view, rays);
   ASSERT_TRUE(face.has_value());
-  // 3 mm over some 3000 pixels: 0.1 mm in the middle, about 0.25 mm at a corner. Measured worst 0.3 mm.
+  // 3 mm over some 3000 pixels: 0.1 mm in the middle, about 0.25 mm at a corner. Measured worst 0.3
+  // mm.
   for (std::size_t k = 0; k < 4; ++k) EXPECT_LT((face->corners[k] - scene.truth[k]).norm(), 0.8e-3);
   EXPECT_LT(face->inlier_share, 0.95);
   EXPECT_NEAR(face->rms_m, 0.003, 0.0006);
@@ -120,7 +128,8 @@ TEST(CornerDepthTest, RefusesWhatDeterminesNoPlane) {
   MarkerScene sparse = scene;
   sparse.view.depth_m = cv::Mat::zeros(240, 320, CV_32FC1);
   EXPECT_FALSE(FitMarkerFace(sparse.seen, sparse.view, rays).has_value());
-  for (const auto& position : PaperCornerPositions(sparse.seen, sparse.view, rays)) EXPECT_FALSE(position.has_value());
+  for (const auto& position : PaperCornerPositions(sparse.seen, sparse.view, rays))
+    EXPECT_FALSE(position.has_value());
 
   MarkerObservation mirrored = scene.seen;
   std::swap(mirrored.corners[1], mirrored.corners[3]);
@@ -128,7 +137,8 @@ TEST(CornerDepthTest, RefusesWhatDeterminesNoPlane) {
   MarkerObservation outside = scene.seen;
   for (Eigen::Vector2d& corner : outside.corners) corner.x() += 1e9;
   EXPECT_FALSE(FitMarkerFace(outside, scene.view, rays).has_value());
-  for (const auto& position : PaperCornerPositions(outside, scene.view, rays)) EXPECT_FALSE(position.has_value());
+  for (const auto& position : PaperCornerPositions(outside, scene.view, rays))
+    EXPECT_FALSE(position.has_value());
   MarkerObservation damaged = scene.seen;
   damaged.corners[2].y() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(FitMarkerFace(damaged, scene.view, rays).has_value());

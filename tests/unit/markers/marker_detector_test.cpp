@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 #include "tests/unit/markers/marker_scene.hpp"
 
 namespace plumb {
@@ -56,7 +56,8 @@ TEST(MarkerDetectorTest, RefusesImagesThatAreNoneAndOptionsOutOfRange) {
 }
 
 TEST(MarkerDetectorTest, FindsNothingInBlankOrNoisyImages) {
-  const MarkerDetector detector(MarkerDictionary::ByName("DICT_4X4_1000"));  // the family with the least protection
+  const MarkerDetector detector(
+      MarkerDictionary::ByName("DICT_4X4_1000"));  // the family with the least protection
   EXPECT_THAT(detector.Detect(cv::Mat(480, 640, CV_8UC1, cv::Scalar(128))).markers, IsEmpty());
   cv::RNG random(5);
   for (const double sigma : {0.0, 1.0, 3.0}) {
@@ -78,29 +79,36 @@ TEST(MarkerDetectorTest, FindsMarkersOfEveryDictionary) {
     const MarkerDetector detector(dictionary);
     const int id = std::uniform_int_distribution<int>(1, dictionary.size() - 1)(random);
     const PlacedMarker marker = RandomMarker(id, 80, 40 * kDegree, kLength_m, Camera(), random);
-    const MarkerDetection found = detector.Detect(Render(dictionary, {marker}, Camera(), {}, random));
+    const MarkerDetection found =
+        detector.Detect(Render(dictionary, {marker}, Camera(), {}, random));
     ASSERT_THAT(Ids(found), ElementsAre(id)) << name;
     // Measured over 4 seeds x 22 families: at most 0.08 px.
-    EXPECT_LT(LargestError(found.markers[0].corners, TrueCorners(marker, kLength_m, Camera())), 0.15) << name;
+    EXPECT_LT(LargestError(found.markers[0].corners, TrueCorners(marker, kLength_m, Camera())),
+              0.15)
+        << name;
   }
 }
 
-// The paper's corner list puts z into the marker; ours must put the camera in front of the print. The normal is taken from the
-// homography's columns, not from a pose solver that knows the order itself.
+// The paper's corner list puts z into the marker; ours must put the camera in front of the print.
+// The normal is taken from the homography's columns, not from a pose solver that knows the order
+// itself.
 TEST(MarkerDetectorTest, CornerOrderPutsTheCameraOnThePositiveSideOfThePrint) {
   const MarkerDictionary dictionary = MarkerDictionary::ByName("DICT_ARUCO_MIP_36h12");
   const MarkerDetector detector(dictionary);
   std::mt19937 random(3);
   for (int trial = 0; trial < 10; ++trial) {
     const PlacedMarker marker = RandomMarker(trial, 70, 50 * kDegree, kLength_m, Camera(), random);
-    const MarkerDetection found = detector.Detect(Render(dictionary, {marker}, Camera(), {}, random));
+    const MarkerDetection found =
+        detector.Detect(Render(dictionary, {marker}, Camera(), {}, random));
     ASSERT_EQ(found.markers.size(), 1U);
-    // Direct linear transform of the plane: pixel ~ H (x, y, 1) with the marker frame's own corners.
+    // Direct linear transform of the plane: pixel ~ H (x, y, 1) with the marker frame's own
+    // corners.
     const MarkerCorners own = CornersInMarkerFrame(kLength_m);
     Eigen::Matrix<double, 8, 8> system;
     Eigen::Matrix<double, 8, 1> right;
     for (int k = 0; k < 4; ++k) {
-      const Eigen::Vector2d ideal = Undistort(Camera(), found.markers[0].corners[static_cast<std::size_t>(k)]);
+      const Eigen::Vector2d ideal =
+          Undistort(Camera(), found.markers[0].corners[static_cast<std::size_t>(k)]);
       const double x = own[static_cast<std::size_t>(k)].x();
       const double y = own[static_cast<std::size_t>(k)].y();
       system.row(2 * k) << x, y, 1, 0, 0, 0, -ideal.x() * x, -ideal.x() * y;
@@ -122,8 +130,9 @@ TEST(MarkerDetectorTest, ReportsIdsInOrderAndColourLikeGrey) {
   const MarkerDictionary dictionary = MarkerDictionary::ByName("DICT_6X6_250");
   const MarkerDetector detector(dictionary);
   std::mt19937 random(1);
-  const cv::Mat gray =
-      Render(dictionary, {FacingAt(42, -0.3, -0.2, 1), FacingAt(7, 0, 0, 1), FacingAt(19, 0.3, 0.2, 1)}, Camera(), {}, random);
+  const cv::Mat gray = Render(
+      dictionary, {FacingAt(42, -0.3, -0.2, 1), FacingAt(7, 0, 0, 1), FacingAt(19, 0.3, 0.2, 1)},
+      Camera(), {}, random);
   const MarkerDetection found = detector.Detect(gray);
   EXPECT_THAT(Ids(found), ElementsAre(7, 19, 42));
   cv::Mat rgb;
@@ -134,7 +143,9 @@ TEST(MarkerDetectorTest, ReportsIdsInOrderAndColourLikeGrey) {
 TEST(MarkerDetectorTest, DropsAndReportsAnIdThatIsThereTwice) {
   const MarkerDictionary dictionary = MarkerDictionary::ByName("DICT_6X6_250");
   std::mt19937 random(2);
-  const cv::Mat image = Render(dictionary, {FacingAt(7, -0.3, 0, 1), FacingAt(8, 0, 0, 1), FacingAt(7, 0.3, 0, 1)}, Camera(), {}, random);
+  const cv::Mat image =
+      Render(dictionary, {FacingAt(7, -0.3, 0, 1), FacingAt(8, 0, 0, 1), FacingAt(7, 0.3, 0, 1)},
+             Camera(), {}, random);
   const MarkerDetection found = MarkerDetector(dictionary).Detect(image);
   EXPECT_THAT(Ids(found), ElementsAre(8));
   EXPECT_THAT(found.duplicate_ids, ElementsAre(7));
@@ -143,12 +154,14 @@ TEST(MarkerDetectorTest, DropsAndReportsAnIdThatIsThereTwice) {
 TEST(MarkerDetectorTest, FindsNothingOfAnotherDictionary) {
   std::mt19937 random(4);
   std::vector<PlacedMarker> markers;
-  for (int k = 0; k < 12; ++k) markers.push_back(FacingAt(k, -0.36 + 0.24 * (k % 4), -0.24 + 0.24 * (k / 4), 1));
+  for (int k = 0; k < 12; ++k)
+    markers.push_back(FacingAt(k, -0.36 + 0.24 * (k % 4), -0.24 + 0.24 * (k / 4), 1));
   const MarkerDictionary shown = MarkerDictionary::ByName("DICT_ARUCO_MIP_36h12");
   const cv::Mat image = Render(shown, markers, Camera(), {}, random);
   EXPECT_EQ(MarkerDetector(shown).Detect(image).markers.size(), 12U);
   for (const char* other : {"DICT_6X6_250", "DICT_APRILTAG_36h11", "DICT_5X5_1000"}) {
-    EXPECT_THAT(MarkerDetector(MarkerDictionary::ByName(other)).Detect(image).markers, IsEmpty()) << other;
+    EXPECT_THAT(MarkerDetector(MarkerDictionary::ByName(other)).Detect(image).markers, IsEmpty())
+        << other;
   }
 }
 
@@ -156,7 +169,9 @@ TEST(MarkerDetectorTest, LeavesOutMarkersThatAreCutOrCovered) {
   const MarkerDictionary dictionary = MarkerDictionary::ByName("DICT_6X6_250");
   const MarkerDetector detector(dictionary);
   std::mt19937 random(6);
-  EXPECT_THAT(detector.Detect(Render(dictionary, {FacingAt(3, -0.6, 0, 1)}, Camera(), {}, random)).markers, IsEmpty());
+  EXPECT_THAT(
+      detector.Detect(Render(dictionary, {FacingAt(3, -0.6, 0, 1)}, Camera(), {}, random)).markers,
+      IsEmpty());
   cv::Mat covered = Render(dictionary, {FacingAt(3, 0, 0, 1)}, Camera(), {}, random);
   ASSERT_EQ(detector.Detect(covered).markers.size(), 1U);
   cv::circle(covered, {345, 270}, 14, cv::Scalar(170), cv::FILLED);  // on the lower right corner
@@ -173,23 +188,28 @@ TEST(MarkerDetectorTest, WorksOnHalfResolutionAndSmallMarkers) {
     const PlacedMarker near = RandomMarker(trial, 32, 35 * kDegree, kLength_m, half, random);
     const MarkerDetection seen = detector.Detect(Render(dictionary, {near}, half, {}, random));
     ASSERT_THAT(Ids(seen), ElementsAre(trial));
-    EXPECT_LT(LargestError(seen.markers[0].corners, TrueCorners(near, kLength_m, half)), 0.3);  // measured over 4 seeds: at most 0.15
+    EXPECT_LT(LargestError(seen.markers[0].corners, TrueCorners(near, kLength_m, half)),
+              0.3);  // measured over 4 seeds: at most 0.15
     const PlacedMarker far = RandomMarker(trial, 20, 25 * kDegree, kLength_m, half, random);
     const MarkerDetection small = detector.Detect(Render(dictionary, {far}, half, {}, random));
     if (small.markers.empty()) continue;
     ++found_20px;
     EXPECT_THAT(Ids(small), ElementsAre(trial));
-    EXPECT_LT(LargestError(small.markers[0].corners, TrueCorners(far, kLength_m, half)), 0.5);  // measured: at most 0.15
+    EXPECT_LT(LargestError(small.markers[0].corners, TrueCorners(far, kLength_m, half)),
+              0.5);  // measured: at most 0.15
   }
   EXPECT_GE(found_20px, 26);  // measured: 28 to 30
 }
 
-// Anything may come from outside: sizes from one pixel up, noise, stripes, checkerboards, shuffled pieces of markers.
+// Anything may come from outside: sizes from one pixel up, noise, stripes, checkerboards, shuffled
+// pieces of markers.
 TEST(MarkerDetectorTest, SurvivesArbitraryImages) {
   const MarkerDictionary dictionary = MarkerDictionary::ByName("DICT_4X4_50");
   const MarkerDetector detector(dictionary, {.min_side_px = 8, .border_px = 0});
   std::mt19937 random(9);
-  const auto draw = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+  const auto draw = [&](int low, int high) {
+    return std::uniform_int_distribution<int>(low, high)(random);
+  };
   for (int trial = 0; trial < 400; ++trial) {
     cv::Mat image(draw(1, 120), draw(1, 120), CV_8UC1, cv::Scalar(draw(0, 255)));
     for (int shapes = draw(0, 30); shapes > 0; --shapes) {
@@ -198,7 +218,8 @@ TEST(MarkerDetectorTest, SurvivesArbitraryImages) {
                                               {draw(-20, 140), draw(-20, 140)},
                                               {draw(-20, 140), draw(-20, 140)}};
       cv::fillConvexPoly(image, polygon, cv::Scalar(draw(0, 255)));
-      cv::rectangle(image, cv::Rect(draw(-10, 110), draw(-10, 110), draw(1, 40), draw(1, 40)), cv::Scalar(draw(0, 1) * 255), cv::FILLED);
+      cv::rectangle(image, cv::Rect(draw(-10, 110), draw(-10, 110), draw(1, 40), draw(1, 40)),
+                    cv::Scalar(draw(0, 1) * 255), cv::FILLED);
     }
     const MarkerDetection found = detector.Detect(image);
     for (const MarkerObservation& marker : found.markers) {
@@ -214,7 +235,8 @@ TEST(MarkerDetectorTest, SameImageSameBits) {
   const MarkerDictionary dictionary = MarkerDictionary::ByName("DICT_6X6_250");
   std::mt19937 random(10);
   std::vector<PlacedMarker> markers;
-  for (int k = 0; k < 6; ++k) markers.push_back(FacingAt(k, -0.24 + 0.24 * (k % 3), -0.12 + 0.24 * (k / 3), 1));
+  for (int k = 0; k < 6; ++k)
+    markers.push_back(FacingAt(k, -0.24 + 0.24 * (k % 3), -0.12 + 0.24 * (k / 3), 1));
   const cv::Mat image = Render(dictionary, markers, Camera(), {.motion_px = 3}, random);
   const MarkerDetector detector(dictionary);
   const MarkerDetection first = detector.Detect(image);

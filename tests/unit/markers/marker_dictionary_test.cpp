@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "tests/support/message_of.hpp"
 
 namespace plumb {
@@ -56,7 +56,8 @@ TEST(MarkerDictionaryTest, EveryKnownNameIsFoundWithItsSizeAndBits) {
 TEST(MarkerDictionaryTest, UnknownNameIsNothingOrAnErrorThatListsTheKnownOnes) {
   EXPECT_FALSE(MarkerDictionary::Find("DICT_8X8_50").has_value());
   EXPECT_FALSE(MarkerDictionary::Find("").has_value());
-  const std::string message = MessageOf<DataError>([] { (void)MarkerDictionary::ByName("DICT_8X8_50"); });
+  const std::string message =
+      MessageOf<DataError>([] { (void)MarkerDictionary::ByName("DICT_8X8_50"); });
   EXPECT_THAT(message, HasSubstr("DICT_8X8_50"));
   EXPECT_THAT(message, HasSubstr("DICT_6X6_250"));
   EXPECT_THAT(message, HasSubstr("DICT_ARUCO_MIP_36h12"));
@@ -66,17 +67,20 @@ TEST(MarkerDictionaryTest, OwnTableKeepsHammingDistanceTwelveOverAllRotations) {
   const MarkerDictionary dictionary = MarkerDictionary::ByName("DICT_ARUCO_MIP_36h12");
   EXPECT_EQ(dictionary.size(), 250);
   EXPECT_EQ(dictionary.bits_per_side(), 6);
-  EXPECT_EQ(SmallestDistance(dictionary), 12);                                       // the name says 12
-  EXPECT_EQ(SmallestDistance(MarkerDictionary::ByName("DICT_APRILTAG_36h11")), 11);  // the same function on a table of OpenCV's
+  EXPECT_EQ(SmallestDistance(dictionary), 12);  // the name says 12
+  EXPECT_EQ(SmallestDistance(MarkerDictionary::ByName("DICT_APRILTAG_36h11")),
+            11);  // the same function on a table of OpenCV's
 }
 
 TEST(MarkerDictionaryTest, PatternOfMarkerZeroIsTheKnownPrint) {
-  // 0xd2b63a09d, row by row from the top left: what sheet generators print for id 0 of ARUCO_MIP_36h12.
+  // 0xd2b63a09d, row by row from the top left: what sheet generators print for id 0 of
+  // ARUCO_MIP_36h12.
   const char* const expected[] = {"110100", "101011", "011000", "111010", "000010", "011101"};
   const MarkerDictionary dictionary = MarkerDictionary::ByName("DICT_ARUCO_MIP_36h12");
   for (int row = 0; row < 6; ++row)
     for (int column = 0; column < 6; ++column)
-      EXPECT_EQ(dictionary.Bit(0, row, column), expected[row][column] == '1') << row << ' ' << column;
+      EXPECT_EQ(dictionary.Bit(0, row, column), expected[row][column] == '1')
+          << row << ' ' << column;
 }
 
 TEST(MarkerDictionaryTest, RefusesIdsAndCellsThatDoNotExist) {

@@ -2,14 +2,15 @@
 
 #include <gtest/gtest.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 
 namespace plumb {
 namespace {
 
 using std::chrono::milliseconds;
 
-// A unit on a slow bus takes longer to open than its images may stay away: the time counts from its start, not from the box's making.
+// A unit on a slow bus takes longer to open than its images may stay away: the time counts from its
+// start, not from the box's making.
 TEST(FrameBoxTest, ImagesAreMissedOnlyAfterTheStreamsStarted) {
   constexpr milliseconds kStallTime{50};
   FrameBox box("X", milliseconds(20), kStallTime);

@@ -53,7 +53,8 @@ TEST(FramePairingTest, ForgetsTheOldestOfAStreamWhoseOtherIsSilent) {
   EXPECT_EQ(pair->depth, 99);
 }
 
-// Losses, jitter and any interleaving: every pair made must be the true one, and none that both arrived for may be missed.
+// Losses, jitter and any interleaving: every pair made must be the true one, and none that both
+// arrived for may be missed.
 TEST(FramePairingTest, FindsTheTruePartnersUnderLossesAndJitter) {
   std::mt19937 random(5);
   std::uniform_int_distribution<int> jitter(-400, 400), percent(0, 99), delay(4000, 8000);
@@ -69,7 +70,8 @@ TEST(FramePairingTest, FindsTheTruePartnersUnderLossesAndJitter) {
       const bool depth_first = percent(random) < 50;
       for (const bool depth : {depth_first, !depth_first}) {
         if (!(depth ? depth_comes : color_comes)) continue;
-        if (const auto pair = pairing.Add(depth ? StreamKind::kDepth : StreamKind::kColor, depth ? depth_us : color_us, i)) {
+        if (const auto pair = pairing.Add(depth ? StreamKind::kDepth : StreamKind::kColor,
+                                          depth ? depth_us : color_us, i)) {
           EXPECT_EQ(pair->color, pair->depth);
           ++found;
         }

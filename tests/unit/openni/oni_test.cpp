@@ -1,4 +1,5 @@
-// .oni recordings: written through OpenNI2's recorder, read through its player in the child process.
+// .oni recordings: written through OpenNI2's recorder, read through its player in the child
+// process.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,13 +12,13 @@
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
 #include "drivers/openni/oni_file.hpp"
 #include "drivers/openni/oni_recorder.hpp"
 #include "drivers/openni/oni_recording.hpp"
-#include "drivers/openni/oni_writer.hpp"
-#include "drivers/replay/file_io.hpp"
 #include "drivers/simulated/suite_plan.hpp"
+#include "drivers/virtual/oni_writer.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/openni/virtual_rig.hpp"
@@ -124,11 +125,14 @@ TEST(OniTest, WithoutSideCarTheCameraIsNominalAndThatIsSaid) {
 
 TEST(OniTest, WhatIsNoOniFileIsRefused) {
   const TempFolder folder;
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)OniRecording::Open(folder / "none.oni"); }), HasSubstr("found nothing"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OniRecording::Open(folder / "none.oni"); }),
+              HasSubstr("found nothing"));
   WriteWholeFile(folder / "text.oni", std::string_view("hello"));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)OniRecording::Open(folder / "text.oni"); }), HasSubstr("does not begin with NI10"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OniRecording::Open(folder / "text.oni"); }),
+              HasSubstr("does not begin with NI10"));
   WriteWholeFile(folder / "short.oni", std::string_view("NI10"));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)OniRecording::Open(folder / "short.oni"); }), HasSubstr("short.oni"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)OniRecording::Open(folder / "short.oni"); }),
+              HasSubstr("short.oni"));
 }
 
 // The library crashes on some of these; this process must not, nor wait for ever.
@@ -167,7 +171,8 @@ int CountReaders() {
   for (const auto& entry : fs::directory_iterator("/proc", error)) {
     std::ifstream status(entry.path() / "stat");
     std::string id, name, state, parent;
-    if (status >> id >> name >> state >> parent) count += name == "(plumb-oni-reade)" && parent == std::to_string(::getpid()) ? 1 : 0;
+    if (status >> id >> name >> state >> parent)
+      count += name == "(plumb-oni-reade)" && parent == std::to_string(::getpid()) ? 1 : 0;
   }
   return count;
 }
@@ -181,7 +186,8 @@ TEST(OniTest, MayBeReadOnAnotherThreadThanItWasOpenedOnAndLeavesNoProcess) {
   EXPECT_EQ(CountReaders(), 0);
 }
 
-// The recorder forgets where each stream's stamps began; the side-car brings the delay between colour and depth back.
+// The recorder forgets where each stream's stamps began; the side-car brings the delay between
+// colour and depth back.
 TEST(OniTest, RecordsALiveSensorWithItsStamps) {
   const TempFolder folder;
   VirtualRig rig;
@@ -194,13 +200,15 @@ TEST(OniTest, RecordsALiveSensorWithItsStamps) {
     written = recorder.Finish();
   }
   EXPECT_GE(written.color_us.size(), 10U);
-  EXPECT_THAT(ReadTextFile(folder / "live.oni.yaml", 4096), HasSubstr("sensor_serial: \"VIRTUAL-0001\""));
+  EXPECT_THAT(ReadTextFile(folder / "live.oni.yaml", 4096),
+              HasSubstr("sensor_serial: \"VIRTUAL-0001\""));
   const auto recording = OniRecording::Open(folder / "live.oni");
   EXPECT_FALSE(recording->info().intrinsics_assumed);
   int found = 0;
   for (const Frame& frame : ReadAll(*recording)) {
-    const auto same =
-        std::find_if(live.begin(), live.end(), [&](const Frame& f) { return std::abs(f.depth_time_s - frame.depth_time_s) < 5e-6; });
+    const auto same = std::find_if(live.begin(), live.end(), [&](const Frame& f) {
+      return std::abs(f.depth_time_s - frame.depth_time_s) < 5e-6;
+    });
     if (same == live.end()) continue;
     ++found;
     EXPECT_NEAR(frame.color_time_s, same->color_time_s, 5e-6);
@@ -217,14 +225,20 @@ TEST(OniTest, AnUnfinishedRecordingIsRemoved) {
     (void)sensor->Next();
   }
   EXPECT_TRUE(fs::is_empty(folder.path()));
-  EXPECT_THAT(MessageOf<IoError>([&] { OniRecorder recorder(*sensor, folder / "missing" / "live.oni", {}); }), HasSubstr("missing"));
+  EXPECT_THAT(MessageOf<IoError>(
+                  [&] { OniRecorder recorder(*sensor, folder / "missing" / "live.oni", {}); }),
+              HasSubstr("missing"));
 }
 
-void AddNumber(std::string& file, std::uint32_t number) { file.append(reinterpret_cast<const char*>(&number), sizeof number); }
+void AddNumber(std::string& file, std::uint32_t number) {
+  file.append(reinterpret_cast<const char*>(&number), sizeof number);
+}
 
-void AddRecord(std::string& file, std::uint32_t kind, std::uint32_t node, const std::string& fields, std::uint32_t payload) {
+void AddRecord(std::string& file, std::uint32_t kind, std::uint32_t node, const std::string& fields,
+               std::uint32_t payload) {
   const auto size = static_cast<std::uint32_t>(28 + fields.size());
-  for (const std::uint32_t number : {0x0052494eU, kind, node, size, payload, 0U, 0U}) AddNumber(file, number);
+  for (const std::uint32_t number : {0x0052494eU, kind, node, size, payload, 0U, 0U})
+    AddNumber(file, number);
   file += fields + std::string(payload, 'x');
 }
 
@@ -238,7 +252,8 @@ std::string NodeFields(std::uint32_t kind) {
 
 std::string DataFields(std::uint32_t stamp_us) {
   std::string fields;
-  for (const std::uint32_t number : {stamp_us, 1U, 7U}) AddNumber(fields, number);  // the stamp has 64 bits
+  for (const std::uint32_t number : {stamp_us, 1U, 7U})
+    AddNumber(fields, number);  // the stamp has 64 bits
   return fields;
 }
 

@@ -10,9 +10,9 @@
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
 #include "drivers/openni/openni_provider.hpp"
-#include "drivers/replay/file_io.hpp"
 #include "drivers/simulated/suite_plan.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -33,7 +33,8 @@ std::vector<Frame> Take(LiveSensor& sensor, int count) {
   return frames;
 }
 
-// OpenNI2 keeps only the newest image of a stream: a loaded machine may lose some, so frames are recognised, not counted.
+// OpenNI2 keeps only the newest image of a stream: a loaded machine may lose some, so frames are
+// recognised, not counted.
 TEST(OpenNiSensorTest, GivesTheSimulatorsSweepToTheBit) {
   VirtualRig rig;
   const auto sensor = rig.provider.Open("");
@@ -53,15 +54,20 @@ TEST(OpenNiSensorTest, GivesTheSimulatorsSweepToTheBit) {
   std::optional<double> begin_s;  // of the simulator's time, on the sensor's clock
   while (last + 1 < truth.size()) {
     const Frame frame = sensor->Next().value();
-    const auto same = [&](const Frame& other) { return cv::norm(frame.color_rgb, other.color_rgb, cv::NORM_INF) == 0.0; };
-    const auto found = std::find_if(truth.begin() + static_cast<std::ptrdiff_t>(last), truth.end(), same);
+    const auto same = [&](const Frame& other) {
+      return cv::norm(frame.color_rgb, other.color_rgb, cv::NORM_INF) == 0.0;
+    };
+    const auto found =
+        std::find_if(truth.begin() + static_cast<std::ptrdiff_t>(last), truth.end(), same);
     ASSERT_NE(found, truth.end()) << "no such colour image, or out of order, after frame " << last;
     last = static_cast<std::size_t>(found - truth.begin());
     ++seen;
     if (!begin_s) begin_s = frame.color_time_s - found->color_time_s;
-    EXPECT_NEAR(frame.color_time_s - found->color_time_s, *begin_s, 3e-6);  // stamps count microseconds
+    EXPECT_NEAR(frame.color_time_s - found->color_time_s, *begin_s,
+                3e-6);  // stamps count microseconds
     EXPECT_NEAR(frame.depth_time_s - found->depth_time_s, *begin_s, 3e-6);
-    EXPECT_LE(cv::norm(frame.depth_m, found->depth_m, cv::NORM_INF), 0.00051);  // depth is rounded to millimetres
+    EXPECT_LE(cv::norm(frame.depth_m, found->depth_m, cv::NORM_INF),
+              0.00051);  // depth is rounded to millimetres
   }
   EXPECT_GE(seen, truth.size() / 2);
 }
@@ -82,7 +88,8 @@ TEST(OpenNiSensorTest, ComesAndGoesAndHasAnotherUriAfterEachPlug) {
   std::atomic<int> changes{0};
   rig.provider.SetListener([&] { ++changes; });
   EXPECT_TRUE(rig.provider.List().empty());
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)rig.provider.Open(""); }), HasSubstr("no sensor is attached"));
+  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)rig.provider.Open(""); }),
+              HasSubstr("no sensor is attached"));
 
   rig.sensor.Plug();
   ASSERT_TRUE(Eventually([&] { return changes > 0 && rig.provider.List().size() == 1; }));
@@ -130,7 +137,8 @@ TEST(OpenNiSensorTest, OpensByTheSerialAmongTwo) {
   rig.sensor.Unplug();  // the first
   EXPECT_THROW(Take(*first, 1000), DeviceLost);
   (void)Take(*second, 10);
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)rig.provider.Open("VIRTUAL-0001"); }), HasSubstr("not attached, found VIRTUAL-0002"));
+  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)rig.provider.Open("VIRTUAL-0001"); }),
+              HasSubstr("not attached, found VIRTUAL-0002"));
 }
 
 TEST(OpenNiSensorTest, SilenceIsADeviceErrorAndItsEndIsNone) {
@@ -138,7 +146,8 @@ TEST(OpenNiSensorTest, SilenceIsADeviceErrorAndItsEndIsNone) {
   const auto sensor = rig.provider.Open("");
   (void)Take(*sensor, 2);
   rig.sensor.Stall();
-  EXPECT_THAT(MessageOf<DeviceError>([&] { Take(*sensor, 1000); }), HasSubstr("no pair of images for 300 ms"));
+  EXPECT_THAT(MessageOf<DeviceError>([&] { Take(*sensor, 1000); }),
+              HasSubstr("no pair of images for 300 ms"));
   rig.sensor.Resume();
   ASSERT_TRUE(Eventually([&] {
     try {
@@ -180,7 +189,8 @@ TEST(OpenNiSensorTest, DiscardsAndCountsBadImages) {
   for (const char* kind : {"double", "old", "size"}) {
     const std::int64_t before = sensor->statistics().num_discarded;
     (void)rig.sensor.Command(fmt::format("glitch {} 10", kind));
-    EXPECT_TRUE(Eventually([&] { return sensor->statistics().num_discarded >= before + 4; })) << kind;
+    EXPECT_TRUE(Eventually([&] { return sensor->statistics().num_discarded >= before + 4; }))
+        << kind;
   }
   const std::int64_t before = sensor->statistics().num_unpaired;
   (void)rig.sensor.Command("glitch lone 6");
@@ -234,8 +244,10 @@ TEST(OpenNiSensorTest, RunsAtThirtyHertz) {
 
 TEST(OpenNiSensorTest, ADamagedCalibrationIsRefusedByName) {
   VirtualRig rig;
-  WriteWholeFile(rig.sensor.calibration_folder() / "VIRTUAL-0001.yaml", std::string_view("%YAML:1.0\n---\nimage_width: 0\n"));
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)rig.provider.Open(""); }), HasSubstr("VIRTUAL-0001.yaml"));
+  WriteWholeFile(rig.sensor.calibration_folder() / "VIRTUAL-0001.yaml",
+                 std::string_view("%YAML:1.0\n---\nimage_width: 0\n"));
+  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)rig.provider.Open(""); }),
+              HasSubstr("VIRTUAL-0001.yaml"));
 }
 
 TEST(OpenNiSensorTest, TheSensorMayOutliveItsProvider) {
@@ -264,7 +276,8 @@ TEST(OpenNiSensorTest, TheLibraryStopsWhileUnitsComeAndGo) {
     auto provider = std::make_unique<OpenNiProvider>(options);
     std::jthread toggler([&] {
       try {
-        for (; !closing; ++toggles) toggles % 2 == 0 ? virtual_sensor.Unplug() : virtual_sensor.Plug();
+        for (; !closing; ++toggles)
+          toggles % 2 == 0 ? virtual_sensor.Unplug() : virtual_sensor.Plug();
       } catch (const DeviceError&) {
         // Sent after the driver had quit.
       }
@@ -277,7 +290,8 @@ TEST(OpenNiSensorTest, TheLibraryStopsWhileUnitsComeAndGo) {
 TEST(OpenNiSensorTest, AMissingLibraryIsNamed) {
   OpenNiOptions options;
   options.library = "/nowhere/libOpenNI2.so.0";
-  EXPECT_THAT(MessageOf<DeviceError>([&] { OpenNiProvider provider(options); }), HasSubstr("/nowhere/libOpenNI2.so.0"));
+  EXPECT_THAT(MessageOf<DeviceError>([&] { OpenNiProvider provider(options); }),
+              HasSubstr("/nowhere/libOpenNI2.so.0"));
 }
 
 TEST(VirtualSensorTest, RendersAgainWhatTheCacheHoldsNoMore) {
@@ -293,7 +307,8 @@ TEST(VirtualSensorTest, RendersAgainWhatTheCacheHoldsNoMore) {
   };
   prepare();
   EXPECT_GT(rendered, 0);
-  const std::filesystem::path stale = folder / "x.frames.partial-99999999";  // no process has this number
+  const std::filesystem::path stale =
+      folder / "x.frames.partial-99999999";  // no process has this number
   WriteWholeFile(stale, std::string_view("half"));
   prepare();
   EXPECT_EQ(rendered, 0);
@@ -310,8 +325,10 @@ TEST(VirtualSensorTest, CommandsFailClearly) {
   OpenNiOptions options;
   options.library = alone.runtime_library();
   OpenNiProvider provider(options);
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)alone.Command("dance"); }), HasSubstr("unknown command dance"));
-  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)alone.Command("stall NOBODY"); }), HasSubstr("no such unit"));
+  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)alone.Command("dance"); }),
+              HasSubstr("unknown command dance"));
+  EXPECT_THAT(MessageOf<DeviceError>([&] { (void)alone.Command("stall NOBODY"); }),
+              HasSubstr("no such unit"));
   EXPECT_THAT(alone.Command("state"), HasSubstr("frames=20"));
 }
 

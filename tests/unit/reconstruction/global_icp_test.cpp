@@ -22,7 +22,9 @@ PointCloud BumpySheet(std::size_t count, unsigned seed) {
   for (std::size_t i = 0; i < count; ++i) {
     const double x = 0.5 * uniform(random);
     const double y = 0.4 * uniform(random);
-    cloud.points.emplace_back(Eigen::Vector3d(x, y, 0.08 * std::sin(14 * x) * std::cos(11 * y) + 0.1 * x * y).cast<float>());
+    cloud.points.emplace_back(
+        Eigen::Vector3d(x, y, 0.08 * std::sin(14 * x) * std::cos(11 * y) + 0.1 * x * y)
+            .cast<float>());
   }
   return cloud;
 }
@@ -30,8 +32,10 @@ PointCloud BumpySheet(std::size_t count, unsigned seed) {
 Pose Displacement(double rotation_deg, double translation_m, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
-  const Eigen::Vector3d axis = Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
-  const Eigen::Vector3d direction = Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
+  const Eigen::Vector3d axis =
+      Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
+  const Eigen::Vector3d direction =
+      Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
   Vector6d twist;
   twist << rotation_deg * kDegree * axis, translation_m * direction;
   return PoseFromTwist(twist);
@@ -39,13 +43,15 @@ Pose Displacement(double rotation_deg, double translation_m, unsigned seed) {
 
 PointCloud Moved(const Pose& T, const PointCloud& cloud) {
   PointCloud moved;
-  for (const Eigen::Vector3f& p : cloud.points) moved.points.emplace_back((T * p.cast<double>()).cast<float>());
+  for (const Eigen::Vector3f& p : cloud.points)
+    moved.points.emplace_back((T * p.cast<double>()).cast<float>());
   return moved;
 }
 
 std::vector<PointCloud> FourViews(std::size_t count) {
   std::vector<PointCloud> clouds;
-  for (unsigned j = 0; j < 4; ++j) clouds.push_back(Moved(Displacement(0.5, 0.006, 10 + j), BumpySheet(count, 20 + j)));
+  for (unsigned j = 0; j < 4; ++j)
+    clouds.push_back(Moved(Displacement(0.5, 0.006, 10 + j), BumpySheet(count, 20 + j)));
   return clouds;
 }
 
@@ -56,33 +62,44 @@ TEST(GlobalIcpTest, EqualsAlgorithmOneWrittenDownAndRunByBruteForce) {
     for (const Eigen::Vector3f& p : clouds[j].points) exact[j].push_back(p.cast<double>());
   const auto expected = testing::BruteForceGlobalIcp(exact, 20, 0.05, 0.005);
 
-  const GlobalIcpResult result = RefinePoses(clouds, {.num_iterations = 20, .subsample_spacing = 0.0});
+  const GlobalIcpResult result =
+      RefinePoses(clouds, {.num_iterations = 20, .subsample_spacing = 0.0});
 
   ASSERT_EQ(result.rms_per_iteration.size(), 20U);
   for (std::size_t i = 0; i < 20; ++i)
-    // Points are kept in single precision (6e-8 of half a metre) here and in double there: measured 4e-9.
-    EXPECT_NEAR(result.rms_per_iteration[i], expected.rms_per_iteration[i], 1e-7) << "iteration " << i;
+    // Points are kept in single precision (6e-8 of half a metre) here and in double there: measured
+    // 4e-9.
+    EXPECT_NEAR(result.rms_per_iteration[i], expected.rms_per_iteration[i], 1e-7)
+        << "iteration " << i;
   for (std::size_t j = 0; j < clouds.size(); ++j)
-    EXPECT_LT((result.T_refined_world[j].matrix() - expected.T_refined_world[j].matrix()).cwiseAbs().maxCoeff(), 2e-6);
+    EXPECT_LT((result.T_refined_world[j].matrix() - expected.T_refined_world[j].matrix())
+                  .cwiseAbs()
+                  .maxCoeff(),
+              2e-6);
 }
 
-// Two views of one surface, the second displaced by a known amount: the truth comes from the displacement.
+// Two views of one surface, the second displaced by a known amount: the truth comes from the
+// displacement.
 TEST(GlobalIcpTest, UndoesKnownDisplacementBetweenTwoViews) {
   const PointCloud reference = BumpySheet(3000, 7);
   const Pose T_displaced = Displacement(1.0, 0.008, 3);
   const std::vector<PointCloud> clouds = {reference, Moved(T_displaced, reference)};
-  const GlobalIcpResult result = RefinePoses(clouds, {.num_iterations = 50, .subsample_spacing = 0.0});
-  const Pose T_error = result.T_refined_world[0].inverse() * result.T_refined_world[1] * T_displaced;
-  // Points lie 8 mm apart, as far as the displacement: nearest points are often wrong ones, and the late, small
-  // radii freeze that. Measured 0.59 mm, 0.064 deg (brute force the same); limits are about twice that.
+  const GlobalIcpResult result =
+      RefinePoses(clouds, {.num_iterations = 50, .subsample_spacing = 0.0});
+  const Pose T_error =
+      result.T_refined_world[0].inverse() * result.T_refined_world[1] * T_displaced;
+  // Points lie 8 mm apart, as far as the displacement: nearest points are often wrong ones, and the
+  // late, small radii freeze that. Measured 0.59 mm, 0.064 deg (brute force the same); limits are
+  // about twice that.
   EXPECT_LT(T_error.translation().norm(), 1.2 * kMillimetre);
   EXPECT_LT(RotationAngle(T_error), 0.15 * kDegree);
   EXPECT_LT(result.rms_per_iteration.back(), 0.3 * result.rms_per_iteration.front());
 }
 
 TEST(GlobalIcpTest, TheRadiusShrinksAfterUse) {
-  // Two pairs of triangles, 7.2 mm apart: within the last pass's radius of the paper's schedule (7.25 mm for N = 20), not
-  // within min_radius (5 mm). The clouds must still be paired in the last pass of one that cannot move (collinear points).
+  // Two pairs of triangles, 7.2 mm apart: within the last pass's radius of the paper's schedule
+  // (7.25 mm for N = 20), not within min_radius (5 mm). The clouds must still be paired in the last
+  // pass of one that cannot move (collinear points).
   PointCloud a;
   PointCloud b;
   for (int i = 0; i < 5; ++i) {
@@ -90,10 +107,12 @@ TEST(GlobalIcpTest, TheRadiusShrinksAfterUse) {
     b.points.emplace_back(0.1F * static_cast<float>(i), 0.0072F, 0.0F);
   }
   const std::vector<PointCloud> clouds = {a, b};
-  const GlobalIcpResult result = RefinePoses(clouds, {.num_iterations = 20, .subsample_spacing = 0.0});
+  const GlobalIcpResult result =
+      RefinePoses(clouds, {.num_iterations = 20, .subsample_spacing = 0.0});
   EXPECT_EQ(result.pairs_per_iteration.front(), 10);
   EXPECT_EQ(result.pairs_per_iteration.back(), 10);
-  for (const Pose& T : result.T_refined_world) EXPECT_TRUE(T.isApprox(Pose::Identity()));  // a line determines no pose
+  for (const Pose& T : result.T_refined_world)
+    EXPECT_TRUE(T.isApprox(Pose::Identity()));  // a line determines no pose
 }
 
 TEST(GlobalIcpTest, RemovingTheMeanMotionKeepsRelativePoses) {
@@ -103,10 +122,14 @@ TEST(GlobalIcpTest, RemovingTheMeanMotionKeepsRelativePoses) {
   const Pose T_first = as_published.T_refined_world[0] * fixed.T_refined_world[0].inverse();
   Eigen::Vector3d mean_shift = Eigen::Vector3d::Zero();
   for (std::size_t j = 0; j < clouds.size(); ++j) {
-    EXPECT_TRUE((as_published.T_refined_world[j] * fixed.T_refined_world[j].inverse()).isApprox(T_first, 1e-9));
-    mean_shift += (fixed.T_refined_world[j] * Eigen::Vector3d(0.25, 0.2, 0.0) - Eigen::Vector3d(0.25, 0.2, 0.0)) / 4.0;
+    EXPECT_TRUE((as_published.T_refined_world[j] * fixed.T_refined_world[j].inverse())
+                    .isApprox(T_first, 1e-9));
+    mean_shift += (fixed.T_refined_world[j] * Eigen::Vector3d(0.25, 0.2, 0.0) -
+                   Eigen::Vector3d(0.25, 0.2, 0.0)) /
+                  4.0;
   }
-  // At the middle of the clouds the mean displacement is gone, up to rotation times the distance to their exact centroid.
+  // At the middle of the clouds the mean displacement is gone, up to rotation times the distance to
+  // their exact centroid.
   EXPECT_LT(mean_shift.norm(), 2e-4);
 }
 
@@ -116,7 +139,8 @@ TEST(GlobalIcpTest, SameBitsWhateverTheNumberOfThreads) {
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   const GlobalIcpResult second = RefinePoses(clouds);
   EXPECT_EQ(first.rms_per_iteration, second.rms_per_iteration);
-  for (std::size_t j = 0; j < clouds.size(); ++j) EXPECT_EQ(first.T_refined_world[j].matrix(), second.T_refined_world[j].matrix());
+  for (std::size_t j = 0; j < clouds.size(); ++j)
+    EXPECT_EQ(first.T_refined_world[j].matrix(), second.T_refined_world[j].matrix());
 }
 
 TEST(GlobalIcpTest, StopsOnRequestWithThePosesOfTheLastWholeIteration) {
@@ -124,10 +148,11 @@ TEST(GlobalIcpTest, StopsOnRequestWithThePosesOfTheLastWholeIteration) {
   const GlobalIcpResult three = RefinePoses(clouds, {.num_iterations = 20});
   std::stop_source stop;
   std::vector<double> fractions;
-  const GlobalIcpResult result = RefinePoses(clouds, {.num_iterations = 20}, stop.get_token(), [&](double fraction) {
-    fractions.push_back(fraction);
-    if (fractions.size() == 3) stop.request_stop();
-  });
+  const GlobalIcpResult result =
+      RefinePoses(clouds, {.num_iterations = 20}, stop.get_token(), [&](double fraction) {
+        fractions.push_back(fraction);
+        if (fractions.size() == 3) stop.request_stop();
+      });
   EXPECT_TRUE(result.cancelled);
   EXPECT_THAT(fractions, ::testing::ElementsAre(0.05, 0.10, 0.15));
   ASSERT_EQ(result.rms_per_iteration.size(), 3U);

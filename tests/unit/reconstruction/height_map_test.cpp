@@ -28,11 +28,14 @@ TEST(PaperHeightMapTest, TheDefaultGridHas1400By800Cells) {
 }
 
 TEST(PaperHeightMapTest, AveragesTheTopBandOfEachCloudAndThenTheClouds) {
-  const HeightMapOptions options{.x_min = 0, .x_max = 0.3, .y_min = 0, .y_max = 0.2, .cell_size = 0.1};
-  // Cell (0, 0): cloud 0 holds 0.10 and 0.08 in the band, and 0.07 just outside (0.10 - 0.07 is not < 0.03 in the
-  // numbers chosen: 0.0699); cloud 1 sees only the couch at 0.02; cloud 2 does not hold the cell.
-  const std::vector<PointCloud> clouds = {Cloud({{0.05F, 0.05F, 0.10F}, {0.06F, 0.02F, 0.08F}, {0.01F, 0.01F, 0.0699F}}),
-                                          Cloud({{0.05F, 0.05F, 0.02F}}), Cloud({{0.25F, 0.15F, 0.5F}, {0.25F, 0.15F, std::nanf("")}})};
+  const HeightMapOptions options{
+      .x_min = 0, .x_max = 0.3, .y_min = 0, .y_max = 0.2, .cell_size = 0.1};
+  // Cell (0, 0): cloud 0 holds 0.10 and 0.08 in the band, and 0.07 just outside (0.10 - 0.07 is not
+  // < 0.03 in the numbers chosen: 0.0699); cloud 1 sees only the couch at 0.02; cloud 2 does not
+  // hold the cell.
+  const std::vector<PointCloud> clouds = {
+      Cloud({{0.05F, 0.05F, 0.10F}, {0.06F, 0.02F, 0.08F}, {0.01F, 0.01F, 0.0699F}}),
+      Cloud({{0.05F, 0.05F, 0.02F}}), Cloud({{0.25F, 0.15F, 0.5F}, {0.25F, 0.15F, std::nanf("")}})};
   const HeightMap map = PaperHeightMap(clouds, options);
   EXPECT_NEAR(map.at(0, 0), (0.09 + 0.02) / 2, 1e-6);
   EXPECT_NEAR(map.at(1, 2), 0.5, 1e-6);
@@ -40,8 +43,10 @@ TEST(PaperHeightMapTest, AveragesTheTopBandOfEachCloudAndThenTheClouds) {
 }
 
 TEST(PaperHeightMapTest, CellsAreHalfOpenAndPosesMoveTheClouds) {
-  const HeightMapOptions options{.x_min = 0, .x_max = 0.5, .y_min = 0, .y_max = 0.25, .cell_size = 0.25};
-  const std::vector<PointCloud> clouds = {Cloud({{0.0F, 0.0F, 1.0F}, {0.25F, 0.0F, 2.0F}, {0.5F, 0.0F, 3.0F}, {0.0F, 0.25F, 4.0F}})};
+  const HeightMapOptions options{
+      .x_min = 0, .x_max = 0.5, .y_min = 0, .y_max = 0.25, .cell_size = 0.25};
+  const std::vector<PointCloud> clouds = {
+      Cloud({{0.0F, 0.0F, 1.0F}, {0.25F, 0.0F, 2.0F}, {0.5F, 0.0F, 3.0F}, {0.0F, 0.25F, 4.0F}})};
   const HeightMap map = PaperHeightMap(clouds, options);
   EXPECT_EQ(map.at(0, 0), 1.0F);
   EXPECT_EQ(map.at(0, 1), 2.0F);
@@ -57,7 +62,8 @@ TEST(PaperHeightMapTest, NamesACallersMistake) {
   EXPECT_THROW((void)PaperHeightMap({}, {.cell_size = 0}), std::invalid_argument);
   EXPECT_THROW((void)PaperHeightMap({}, {.cell_size = 1e-7}), std::invalid_argument);
   EXPECT_THROW((void)PaperHeightMap({}, {.top_surface_band = std::nan("")}), std::invalid_argument);
-  EXPECT_THROW((void)PaperHeightMap(std::vector<PointCloud>(2), std::vector<Pose>(1)), std::invalid_argument);
+  EXPECT_THROW((void)PaperHeightMap(std::vector<PointCloud>(2), std::vector<Pose>(1)),
+               std::invalid_argument);
   EXPECT_EQ(PaperHeightMap({}).z.size(), 1400U * 800U);
 }
 
@@ -99,7 +105,8 @@ TEST(RobustHeightMapTest, FollowsAKnownSurfaceAtBothImageSizes) {
     const ColoredHeightMap heights = RobustHeightMap(views);
     const MapErrors errors = Compare(heights.map, scene);
     RecordProperty("median_um_" + std::to_string(width), static_cast<int>(errors.median_m * 1e6));
-    // Noise of 1.5 mm a pixel, averaged over about five views. Measured at 640/320: see the limits, half of them.
+    // Noise of 1.5 mm a pixel, averaged over about five views. Measured at 640/320: see the limits,
+    // half of them.
     EXPECT_LT(std::abs(errors.bias_m), 0.3e-3) << width;
     EXPECT_LT(errors.median_m, width == 640 ? 0.6e-3 : 1.0e-3);
     EXPECT_LT(errors.p95_m, width == 640 ? 2.0e-3 : 3.2e-3);
@@ -128,8 +135,10 @@ TEST(RobustHeightMapTest, KeepsToTheHeightCropAndTheGivenGrid) {
   options.grid = GridShape{.x_min = 0.2, .y_min = 0.1, .step = 0.002, .width = 301, .height = 203};
   const ColoredHeightMap heights = RobustHeightMap(views, options);
   EXPECT_EQ(heights.map.grid, *options.grid);
-  EXPECT_TRUE(std::none_of(heights.map.z.begin(), heights.map.z.end(), [](float z) { return z > 0.05F; }));
-  EXPECT_TRUE(std::any_of(heights.map.z.begin(), heights.map.z.end(), [](float z) { return z > 0.02F; }));
+  EXPECT_TRUE(
+      std::none_of(heights.map.z.begin(), heights.map.z.end(), [](float z) { return z > 0.05F; }));
+  EXPECT_TRUE(
+      std::any_of(heights.map.z.begin(), heights.map.z.end(), [](float z) { return z > 0.02F; }));
 }
 
 TEST(RobustHeightMapTest, GridsFromDataLieOnOneLatticeWithinTheExtent) {
@@ -154,8 +163,9 @@ TEST(RobustHeightMapTest, SameBitsWhateverTheNumberOfThreads) {
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   const ColoredHeightMap second = RobustHeightMap(views);
   ASSERT_EQ(first.map.grid, second.map.grid);
-  EXPECT_TRUE(std::equal(first.map.z.begin(), first.map.z.end(), second.map.z.begin(),
-                         [](float a, float b) { return a == b || (std::isnan(a) && std::isnan(b)); }));
+  EXPECT_TRUE(
+      std::equal(first.map.z.begin(), first.map.z.end(), second.map.z.begin(),
+                 [](float a, float b) { return a == b || (std::isnan(a) && std::isnan(b)); }));
   EXPECT_EQ(first.colors, second.colors);
 }
 
@@ -164,7 +174,8 @@ TEST(RobustHeightMapTest, NothingInNothingOut) {
   DepthView blind;
   blind.depth_m = cv::Mat::zeros(480, 640, CV_32FC1);
   EXPECT_EQ(RobustHeightMap(std::vector<DepthView>{blind}).map.grid.num_cells(), 0U);
-  EXPECT_THROW((void)RobustHeightMap(std::vector<DepthView>{blind}, {.cell_size = -1}), std::invalid_argument);
+  EXPECT_THROW((void)RobustHeightMap(std::vector<DepthView>{blind}, {.cell_size = -1}),
+               std::invalid_argument);
   blind.depth_m = cv::Mat::zeros(240, 640, CV_32FC1);
   EXPECT_THROW((void)RobustHeightMap(std::vector<DepthView>{blind}), std::invalid_argument);
 }

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "tests/unit/tracking/synthetic_map.hpp"
 
 namespace plumb {
@@ -17,8 +17,11 @@ using synthetic::Disturb;
 using synthetic::MakeTrueMap;
 using synthetic::TrueMap;
 
-constexpr synthetic::MapOptions kLandscape{
-    .num_keyframes = 8, .num_landmarks = 120, .dense = true, .pixel_noise = 0.1, .image_noise_m = 0.001};
+constexpr synthetic::MapOptions kLandscape{.num_keyframes = 8,
+                                           .num_landmarks = 120,
+                                           .dense = true,
+                                           .pixel_noise = 0.1,
+                                           .image_noise_m = 0.001};
 
 TEST(RegisterJointly, FindsDisturbedPosesByDenseDepth) {
   const TrueMap truth = MakeTrueMap(kLandscape);
@@ -27,8 +30,9 @@ TEST(RegisterJointly, FindsDisturbedPosesByDenseDepth) {
   const double before = Compare(map, truth.map).translation_m;
   const auto result = RegisterJointly(truth.stated, {}, map);
   const auto error = Compare(map, truth.map);
-  fmt::print("{:.2e} -> {:.2e} m, {:.2e} rad, consistency {:.2e} -> {:.2e} m, {} pairs\n", before, error.translation_m, error.rotation_rad,
-             result.consistency_before_m, result.consistency_after_m, result.num_pairs);
+  fmt::print("{:.2e} -> {:.2e} m, {:.2e} rad, consistency {:.2e} -> {:.2e} m, {} pairs\n", before,
+             error.translation_m, error.rotation_rad, result.consistency_before_m,
+             result.consistency_after_m, result.num_pairs);
   EXPECT_GT(result.num_pairs, 6);
   EXPECT_LE(result.consistency_after_m, result.consistency_before_m);
   EXPECT_TRUE(result.accepted);
@@ -39,18 +43,22 @@ TEST(RegisterJointly, FindsDisturbedPosesByDenseDepth) {
 TEST(RegisterJointly, KeepsAKeyframeThatSawNextToNothingWhereTrackingPutIt) {
   // A blank wall: no depth, four keypoints, and those are taken for others.
   const auto error_m = [](bool tracked) {
-    TrueMap truth = MakeTrueMap({.num_keyframes = 8, .num_landmarks = 120, .markers = false, .pixel_noise = 0.1});
+    TrueMap truth = MakeTrueMap(
+        {.num_keyframes = 8, .num_landmarks = 120, .markers = false, .pixel_noise = 0.1});
     constexpr std::size_t kBlank = 4;
     MapKeyframe& blank = truth.map.keyframes[kBlank];
     blank.keypoints.resize(4);
-    for (KeypointObservation& o : blank.keypoints) o = {o.landmark, o.pixel + Eigen::Vector2d(15, -10), 0.0};
+    for (KeypointObservation& o : blank.keypoints)
+      o = {o.landmark, o.pixel + Eigen::Vector2d(15, -10), 0.0};
     if (tracked) {
       blank.previous = kBlank - 1;
-      blank.T_previous_color = truth.map.keyframes[kBlank - 1].T_world_color.inverse() * blank.T_world_color;
+      blank.T_previous_color =
+          truth.map.keyframes[kBlank - 1].T_world_color.inverse() * blank.T_world_color;
     }
     TrackingMap map = truth.map;
     (void)RegisterJointly(truth.stated, {.use_dense = false}, map);
-    return (map.keyframes[kBlank].T_world_color.translation() - blank.T_world_color.translation()).norm();
+    return (map.keyframes[kBlank].T_world_color.translation() - blank.T_world_color.translation())
+        .norm();
   };
   const double tracked_m = error_m(true), alone_m = error_m(false);
   fmt::print("with tracking's word {:.2e} m, without {:.2e} m\n", tracked_m, alone_m);
@@ -67,10 +75,11 @@ TEST(RegisterJointly, FindsWhatTheDepthCameraGetsWrong) {
   TrackingMap map = truth.map;
   const auto result = RegisterJointly(truth.stated, {}, map);
   const auto& d = result.calibration.depth;
-  // Scale and offset stand in for each other within one range of depths: what they do at the working distance counts.
+  // Scale and offset stand in for each other within one range of depths: what they do at the
+  // working distance counts.
   const double at_working_distance = result.calibration.CorrectedDepth(0.9, {0, 0}) - 0.9;
-  fmt::print("depth +{:.4f} m of {:.4f}, shift {:.2f} px of 1.50, delay {:.4f} s of 0.0040\n", at_working_distance, 0.9 * 0.008, d[3],
-             d[5]);
+  fmt::print("depth +{:.4f} m of {:.4f}, shift {:.2f} px of 1.50, delay {:.4f} s of 0.0040\n",
+             at_working_distance, 0.9 * 0.008, d[3], d[5]);
   EXPECT_NEAR(at_working_distance, 0.9 * 0.008, 0.001);  // Measured: within 0.05 mm.
   EXPECT_NEAR(d[3], 1.5, 0.4);                           // Measured: 1.63.
   EXPECT_NEAR(d[5], 0.004, 0.001);                       // Measured: 0.0041.
@@ -88,7 +97,8 @@ TEST(RegisterJointly, SameBitsOnAnyNumberOfThreads) {
   EXPECT_EQ(calibrations[0].depth, calibrations[1].depth);
   EXPECT_EQ(calibrations[0].lens, calibrations[1].lens);
   for (std::size_t k = 0; k < maps[0].keyframes.size(); ++k)
-    EXPECT_EQ(maps[0].keyframes[k].T_world_color.matrix(), maps[1].keyframes[k].T_world_color.matrix());
+    EXPECT_EQ(maps[0].keyframes[k].T_world_color.matrix(),
+              maps[1].keyframes[k].T_world_color.matrix());
 }
 
 TEST(RegisterJointly, TheFirstKeyframeIsTheGauge) {
@@ -104,7 +114,8 @@ TEST(RegisterJointly, StopsOnRequestAndLeavesTinyMapsAlone) {
   TrackingMap map = truth.map;
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_THROW(static_cast<void>(RegisterJointly(truth.stated, {}, map, stop.get_token())), Interrupted);
+  EXPECT_THROW(static_cast<void>(RegisterJointly(truth.stated, {}, map, stop.get_token())),
+               Interrupted);
   TrackingMap one;
   one.keyframes.resize(1);
   EXPECT_FALSE(RegisterJointly(truth.stated, {}, one).accepted);

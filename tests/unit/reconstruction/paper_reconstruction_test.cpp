@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "tests/support/analytic_scene.hpp"
 
 namespace plumb {
@@ -22,7 +22,10 @@ constexpr int kReference = 95;
 std::map<int, Pose> MarkersOnFloor() {
   std::map<int, Pose> T_world_marker;
   const std::vector<std::tuple<int, double, double, double>> places = {
-      {kReference, 0.15, 0.12, 0.1}, {3, 0.85, 0.12, -0.6}, {4, 0.18, 0.6, 2.0}, {5, 0.82, 0.6, 1.2}};
+      {kReference, 0.15, 0.12, 0.1},
+      {3, 0.85, 0.12, -0.6},
+      {4, 0.18, 0.6, 2.0},
+      {5, 0.82, 0.6, 1.2}};
   for (const auto& [id, x, y, angle] : places) {
     Pose T = Pose::Identity();
     T.linear() = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
@@ -38,7 +41,8 @@ bool AllInside(const MarkerObservation& marker, const Intrinsics& intrinsics) {
   });
 }
 
-/// Keyframes of a sweep with exact images and corners; the poses that tracking claims are off by `error_m`.
+/// Keyframes of a sweep with exact images and corners; the poses that tracking claims are off by
+/// `error_m`.
 std::vector<Keyframe> Sweep(double error_m) {
   std::vector<Keyframe> keyframes;
   std::mt19937 random(4);
@@ -50,7 +54,8 @@ std::vector<Keyframe> Sweep(double error_m) {
       MarkerObservation seen;
       seen.id = id;
       const MarkerCorners corners = CornersInMarkerFrame(kLength);
-      for (std::size_t k = 0; k < 4; ++k) seen.corners[k] = Project(view.intrinsics, T_camera_world * T_world_marker * corners[k]);
+      for (std::size_t k = 0; k < 4; ++k)
+        seen.corners[k] = Project(view.intrinsics, T_camera_world * T_world_marker * corners[k]);
       if (AllInside(seen, view.intrinsics)) keyframe.markers.push_back(seen);
     }
     Vector6d twist;
@@ -72,30 +77,36 @@ TEST(PaperReconstructionTest, ExactPosesGiveTheTrueHeightMapInTheReferenceMarker
   for (const auto& [id, marker] : markers) {
     const MarkerCorners corners = CornersInMarkerFrame(kLength);
     EXPECT_GE(marker.num_views, 1);
-    // Depth of the nearest pixel: half a working pixel (3.5 mm) on a floor seen up to 35 deg off: measured up to 1.3 mm.
-    for (std::size_t k = 0; k < 4; ++k) EXPECT_LT((marker.corners[k] - truth.at(id) * corners[k]).norm(), 2.5e-3) << "marker " << id;
+    // Depth of the nearest pixel: half a working pixel (3.5 mm) on a floor seen up to 35 deg off:
+    // measured up to 1.3 mm.
+    for (std::size_t k = 0; k < 4; ++k)
+      EXPECT_LT((marker.corners[k] - truth.at(id) * corners[k]).norm(), 2.5e-3) << "marker " << id;
   }
   const auto T_marker_world = ReferenceFrame(markers, kReference, kLength);
   ASSERT_TRUE(T_marker_world.has_value());
   const Pose T_error = *T_marker_world * truth.at(kReference);
   EXPECT_LT(T_error.translation().norm(), 1.5e-3);
   // The marker's z comes out of the print: the cameras lie above it.
-  for (const Keyframe& keyframe : keyframes) EXPECT_GT((*T_marker_world * keyframe.view.T_world_camera.translation()).z(), 0.5);
+  for (const Keyframe& keyframe : keyframes)
+    EXPECT_GT((*T_marker_world * keyframe.view.T_world_camera.translation()).z(), 0.5);
 
-  const HeightMap map = HeightMapOfKeyframes(KeyframeClouds(keyframes), no_correction, truth.at(kReference).inverse());
+  const HeightMap map = HeightMapOfKeyframes(KeyframeClouds(keyframes), no_correction,
+                                             truth.at(kReference).inverse());
   std::vector<double> errors;
   for (int row = 0; row < map.grid.height; ++row) {
     for (int column = 0; column < map.grid.width; ++column) {
       if (std::isnan(map.at(row, column))) continue;
       const Eigen::Vector3d p =
-          truth.at(kReference) * Eigen::Vector3d(map.grid.x_centre(column), map.grid.y_centre(row), map.at(row, column));
+          truth.at(kReference) *
+          Eigen::Vector3d(map.grid.x_centre(column), map.grid.y_centre(row), map.at(row, column));
       if (dome.Height(p.x(), p.y()) > 0.0 && dome.Normal(p.x(), p.y()).z() > 0.7)
         errors.push_back(std::abs(p.z() - dome.Height(p.x(), p.y())));
     }
   }
   ASSERT_GT(errors.size(), 20000U);
   std::sort(errors.begin(), errors.end());
-  // Exact depth; what is left is where in its cell a point lies (0.75 mm times the slope). Measured median 0.15 mm.
+  // Exact depth; what is left is where in its cell a point lies (0.75 mm times the slope). Measured
+  // median 0.15 mm.
   EXPECT_LT(errors[errors.size() / 2], 0.5e-3);
   EXPECT_LT(errors[errors.size() * 95 / 100], 1.5e-3);
 }
@@ -109,14 +120,16 @@ TEST(PaperReconstructionTest, AllStagesRunInOrderAndImproveTheAgreementOfTheClou
   const PaperReconstruction result = ReconstructAsPublished(
       keyframes, options, {}, [&](std::string_view stage) { stages.emplace_back(stage); },
       [&](double fraction) { last_fraction = fraction; });
-  EXPECT_THAT(stages, ::testing::ElementsAre("clouds", "global_registration", "markers", "height_map", ""));
+  EXPECT_THAT(stages,
+              ::testing::ElementsAre("clouds", "global_registration", "markers", "height_map", ""));
   EXPECT_EQ(last_fraction, 1.0);
   EXPECT_EQ(result.T_refined_world.size(), keyframes.size());
   ASSERT_EQ(result.icp_rms_m.size(), 20U);
   EXPECT_LT(result.icp_rms_m.back(), result.icp_rms_m.front());
   ASSERT_TRUE(result.height_map.has_value());
   EXPECT_EQ(result.height_map->grid.width, 1400);
-  // Corners are placed by T_j P_j: they are where the corrected keyframes see them, not near the world's origin.
+  // Corners are placed by T_j P_j: they are where the corrected keyframes see them, not near the
+  // world's origin.
   const auto truth = MarkersOnFloor();
   for (const auto& [id, marker] : result.markers_in_world)
     EXPECT_LT((marker.corners[0] - truth.at(id) * CornersInMarkerFrame(kLength)[0]).norm(), 0.03);

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "algo/types/errors.hpp"
-#include "algo/types/units.hpp"
+#include "algo/base/errors.hpp"
+#include "algo/base/units.hpp"
 #include "tests/unit/tracking/ball_sweep.hpp"
 
 namespace plumb {
@@ -75,15 +75,16 @@ TEST_F(ReconstructorTest, SceneOfTheBallIsTrue) {
   double worst_path = 0;
   for (std::size_t i = 0; i < scene.trajectory.size(); ++i) {
     const Pose T_true = sweep().T_world_reference.inverse() * sweep().T_world_color[i];
-    worst_path = std::max(worst_path, (T_true.inverse() * scene.trajectory[i].T_world_camera).translation().norm());
+    worst_path = std::max(
+        worst_path, (T_true.inverse() * scene.trajectory[i].T_world_camera).translation().norm());
   }
   ASSERT_TRUE(scene.height_map.has_value());
   const Eigen::Vector3d centre = sweep().T_world_reference.inverse() * sweep().ball_centre;
   const auto cell = scene.height_map->grid.cell(centre.x(), centre.y());
   ASSERT_TRUE(cell.has_value());
   const double top = scene.height_map->z[*cell];
-  fmt::print("ball {:.2e} m rms of {} points, path {:.2e} m, top {:.4f} of {:.4f} m\n", rms, count, worst_path, top,
-             centre.z() + kSweptBallRadius);
+  fmt::print("ball {:.2e} m rms of {} points, path {:.2e} m, top {:.4f} of {:.4f} m\n", rms, count,
+             worst_path, top, centre.z() + kSweptBallRadius);
   EXPECT_GT(count, 1000);
   EXPECT_LT(rms, 0.0003);                                  // Measured: 0.08 mm.
   EXPECT_LT(worst_path, 0.003);                            // Measured: 1.1 mm.
@@ -163,7 +164,8 @@ TEST_F(ReconstructorTest, CountsLostAndDroppedFrames) {
   Reconstructor reconstructor(sweep().info, {});
   for (std::size_t i = 0; i < 10; ++i) {
     const bool blank = i < 2 || i == 6;
-    const TrackingReport report = reconstructor.AddFrame(blank ? Blank(sweep().frames[i]) : sweep().frames[i]);
+    const TrackingReport report =
+        reconstructor.AddFrame(blank ? Blank(sweep().frames[i]) : sweep().frames[i]);
     EXPECT_EQ(report.tracked, !blank) << i;
     EXPECT_EQ(report.median_depth_m > 0, !blank);
   }
@@ -228,7 +230,9 @@ TEST_F(ReconstructorTest, AMarkerOfFewFramesIsNoFrameAndTheWarningSaysHowMany) {
   for (const Frame& frame : Static(sweep().frames, 4)) reconstructor.AddFrame(frame);
   const Scene scene = reconstructor.Finish();
   EXPECT_EQ(scene.frame, SceneFrame::kFirstKeyframe);
-  EXPECT_THAT(scene.warnings, testing::Contains(HasSubstr("in 1 keyframes and 4 tracked frames, 3 or 5 are needed")));
+  EXPECT_THAT(
+      scene.warnings,
+      testing::Contains(HasSubstr("in 1 keyframes and 4 tracked frames, 3 or 5 are needed")));
 }
 
 TEST_F(ReconstructorTest, PaperPresetWarnsOfItsOwnFrameOnly) {
@@ -238,7 +242,8 @@ TEST_F(ReconstructorTest, PaperPresetWarnsOfItsOwnFrameOnly) {
   Reconstructor reconstructor(sweep().info, options);
   for (const Frame& frame : Static(sweep().frames, 4)) reconstructor.AddFrame(frame);
   const Scene scene = reconstructor.Finish();
-  EXPECT_EQ(scene.frame, SceneFrame::kReferenceMarker) << "one keyframe is enough for the published means";
+  EXPECT_EQ(scene.frame, SceneFrame::kReferenceMarker)
+      << "one keyframe is enough for the published means";
   EXPECT_THAT(scene.warnings, testing::Not(testing::Contains(HasSubstr("first keyframe's frame"))));
 }
 
@@ -250,8 +255,8 @@ TEST_F(ReconstructorTest, TimesEveryStage) {
     double now_s = 0;
     options.now_s = [&] { return now_s += 1.0; };
     const Scene scene = Reconstruct(options);
-    for (const char* stage :
-         {"tracking_per_frame_median", "clouds", "global_registration", "markers", "height_map", "mesh", "after_last_frame"})
+    for (const char* stage : {"tracking_per_frame_median", "clouds", "global_registration",
+                              "markers", "height_map", "mesh", "after_last_frame"})
       EXPECT_GT(scene.timings_s.count(stage), 0U) << Name(preset) << ": " << stage;
   }
 }
@@ -264,7 +269,8 @@ TEST_F(ReconstructorTest, DepthOutOfRangeIsRefusedWithItsDistance) {
 
 TEST_F(ReconstructorTest, ImagesThatNeverCameAreTold) {
   std::vector<Frame> frames = Static(sweep().frames, 12);
-  for (std::size_t i = 6; i < frames.size(); ++i) frames[i].color_time_s += 1.5, frames[i].depth_time_s += 1.5;
+  for (std::size_t i = 6; i < frames.size(); ++i)
+    frames[i].color_time_s += 1.5, frames[i].depth_time_s += 1.5;
   Reconstructor reconstructor(sweep().info, {});
   for (const Frame& frame : frames) reconstructor.AddFrame(frame);
   const Scene scene = reconstructor.Finish();

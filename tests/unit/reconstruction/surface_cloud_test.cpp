@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "algo/types/units.hpp"
+#include "algo/base/units.hpp"
 #include "tests/support/analytic_scene.hpp"
 
 namespace plumb {
@@ -17,7 +17,8 @@ namespace {
 using testing::DomeScene;
 using testing::SweepOverDome;
 
-/// Distance from the dome's surface along its normal (first order), where the surface is not steep; NaN elsewhere.
+/// Distance from the dome's surface along its normal (first order), where the surface is not steep;
+/// NaN elsewhere.
 double Distance(const DomeScene& scene, const Eigen::Vector3f& p) {
   const Eigen::Vector3d n = scene.Normal(p.x(), p.y());
   return n.z() < 0.5 ? std::nan("") : (p.z() - scene.Height(p.x(), p.y())) * n.z();
@@ -38,13 +39,15 @@ TEST(MergeSurfaceTest, IsThinnerThanTheNoiseOfAnyView) {
       const double distance = Distance(scene, p);
       if (!std::isfinite(distance) || scene.Height(p.x(), p.y()) < 0.02) continue;
       sum_squared += distance * distance;
-      const double tilt = std::acos(std::min(1.0, cloud.normals[i].cast<double>().dot(scene.Normal(p.x(), p.y()))));
+      const double tilt =
+          std::acos(std::min(1.0, cloud.normals[i].cast<double>().dot(scene.Normal(p.x(), p.y()))));
       sum_tilt += tilt;
       worst_tilt = std::max(worst_tilt, tilt);
       ++count;
     }
     ASSERT_GT(count, 8000);
-    // Noise 3 mm a pixel, 1.5 mm a working pixel at 640 columns; merged measured 0.75 mm (640) and 1.4 mm (320).
+    // Noise 3 mm a pixel, 1.5 mm a working pixel at 640 columns; merged measured 0.75 mm (640)
+    // and 1.4 mm (320).
     EXPECT_LT(std::sqrt(sum_squared / count), width == 640 ? 1.1e-3 : 2.0e-3);
     EXPECT_LT(sum_tilt / count, 6 * kDegree);
   }
@@ -59,7 +62,8 @@ TEST(MergeSurfaceTest, OnePointAVoxelAndColoursOfTheirPlace) {
   int num_wrong = 0;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Eigen::Vector3f& p = cloud.points[i];
-    voxels.insert({static_cast<int>(std::floor(p.x() / 0.005F)), static_cast<int>(std::floor(p.y() / 0.005F)),
+    voxels.insert({static_cast<int>(std::floor(p.x() / 0.005F)),
+                   static_cast<int>(std::floor(p.y() / 0.005F)),
                    static_cast<int>(std::floor(p.z() / 0.005F))});
     const double height = scene.Height(p.x(), p.y());
     if (height > 0.03) num_wrong += cloud.colors[i][0] == 200 ? 0 : 1;
@@ -73,7 +77,8 @@ TEST(MergeSurfaceTest, OnePointAVoxelAndColoursOfTheirPlace) {
 TEST(MergeSurfaceTest, WhatOneViewAloneSawIsLeftOut) {
   const DomeScene scene;
   auto views = SweepOverDome(scene, 6, 320, 0.0);
-  testing::ShiftDepth(views[2], cv::Rect(100, 80, 60, 60), -0.2F);  // a hand, 20 cm above everything
+  testing::ShiftDepth(views[2], cv::Rect(100, 80, 60, 60),
+                      -0.2F);  // a hand, 20 cm above everything
   for (const Eigen::Vector3f& p : MergeSurface(views).points) EXPECT_LT(p.z(), scene.c + 0.02);
 }
 
@@ -115,7 +120,8 @@ TEST(MergeSurfaceTest, EmptyInputsAndCallersMistakes) {
   DepthView blind;
   blind.depth_m = cv::Mat::zeros(480, 640, CV_32FC1);
   EXPECT_TRUE(MergeSurface(std::vector<DepthView>{blind}).empty());
-  EXPECT_THROW((void)MergeSurface(std::vector<DepthView>{blind}, {.voxel_size_m = 0.0F}), std::invalid_argument);
+  EXPECT_THROW((void)MergeSurface(std::vector<DepthView>{blind}, {.voxel_size_m = 0.0F}),
+               std::invalid_argument);
   blind.T_world_camera.translation().x() = std::nan("");
   EXPECT_THROW((void)MergeSurface(std::vector<DepthView>{blind}), std::invalid_argument);
 }

@@ -12,10 +12,12 @@ namespace plumb {
 namespace {
 
 HeightMap Tilted(int width, int height, float slope_x) {
-  HeightMap map(GridShape{.x_min = -0.1, .y_min = 0.2, .step = 0.01, .width = width, .height = height});
+  HeightMap map(
+      GridShape{.x_min = -0.1, .y_min = 0.2, .step = 0.01, .width = width, .height = height});
   for (int row = 0; row < height; ++row)
     for (int column = 0; column < width; ++column)
-      map.z[static_cast<std::size_t>(row * width + column)] = 1.0F + slope_x * 0.01F * static_cast<float>(column);
+      map.z[static_cast<std::size_t>(row * width + column)] =
+          1.0F + slope_x * 0.01F * static_cast<float>(column);
   return map;
 }
 
@@ -28,7 +30,8 @@ TEST(SurfaceMeshTest, AFullMapBecomesTwoTrianglesASquareFacingUp) {
   const Eigen::Vector3f normal = Eigen::Vector3f(-0.5F, 0, 1).normalized();
   double area = 0.0;
   for (const auto& t : mesh.triangles) {
-    const Eigen::Vector3f cross = (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]);
+    const Eigen::Vector3f cross = (mesh.vertices[t[1]] - mesh.vertices[t[0]])
+                                      .cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]);
     EXPECT_GT(cross.z(), 0.0F);
     area += 0.5 * cross.norm();
   }
@@ -41,14 +44,16 @@ TEST(SurfaceMeshTest, AFullMapBecomesTwoTrianglesASquareFacingUp) {
 TEST(SurfaceMeshTest, HolesAndStepsStayOpen) {
   HeightMap map = Tilted(6, 3, 0.0F);
   for (int row = 0; row < 3; ++row)
-    for (int column = 3; column < 6; ++column) map.z[static_cast<std::size_t>(row * 6 + column)] += 0.5F;  // a step of half a metre
+    for (int column = 3; column < 6; ++column)
+      map.z[static_cast<std::size_t>(row * 6 + column)] += 0.5F;  // a step of half a metre
   map.z[0] = std::numeric_limits<float>::quiet_NaN();
   const TriangleMesh mesh = MeshOfHeightMap(map);
   // Each side has 2 x 2 squares = 8 triangles; the missing corner costs one and its vertex.
   EXPECT_EQ(mesh.triangles.size(), 15U);
   EXPECT_EQ(mesh.vertices.size(), 17U);
   for (const auto& t : mesh.triangles)
-    EXPECT_LT(std::abs(mesh.vertices[t[0]].z() - mesh.vertices[t[1]].z()) + std::abs(mesh.vertices[t[0]].z() - mesh.vertices[t[2]].z()),
+    EXPECT_LT(std::abs(mesh.vertices[t[0]].z() - mesh.vertices[t[1]].z()) +
+                  std::abs(mesh.vertices[t[0]].z() - mesh.vertices[t[2]].z()),
               0.1F);
 }
 
@@ -68,8 +73,10 @@ TEST(SurfaceMeshTest, EmptyMapsGiveEmptyMeshesAndMistakesAreNamed) {
   EXPECT_TRUE(MeshOfHeightMap(HeightMap{}).triangles.empty());
   EXPECT_TRUE(MeshOfHeightMap(HeightMap(GridShape{.width = 4, .height = 4})).vertices.empty());
   EXPECT_THROW((void)MeshOfHeightMap(HeightMap{}, {}, {.decimation = 0}), std::invalid_argument);
-  EXPECT_THROW((void)MeshOfHeightMap(HeightMap{}, {}, {.max_slope_deg = 90.0}), std::invalid_argument);
-  EXPECT_THROW((void)MeshOfHeightMap(Tilted(3, 3, 0), std::vector<Color>(8)), std::invalid_argument);
+  EXPECT_THROW((void)MeshOfHeightMap(HeightMap{}, {}, {.max_slope_deg = 90.0}),
+               std::invalid_argument);
+  EXPECT_THROW((void)MeshOfHeightMap(Tilted(3, 3, 0), std::vector<Color>(8)),
+               std::invalid_argument);
 }
 
 TEST(ColorsFromCloudTest, ACellTakesItsOwnPointNearestInHeightElseItsNeighbours) {

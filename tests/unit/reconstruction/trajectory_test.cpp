@@ -49,17 +49,25 @@ TEST(Trajectory, FramesBetweenKeyframesTakeTheirShareOfTheRefinement) {
   const auto poses = ColorPoses(path.frames, path.map);
   ASSERT_EQ(poses.size(), 6U);
   for (int i = 0; i <= 4; ++i)
-    EXPECT_LT((poses[static_cast<std::size_t>(i)].translation() - Vector3d(0.1 * i, 0.02 * i, 0)).norm(), 1e-12) << i;
-  EXPECT_LT((poses[5].translation() - Vector3d(0.5, 0.08, 0)).norm(), 1e-12) << "after the last keyframe: rigidly with it";
+    EXPECT_LT(
+        (poses[static_cast<std::size_t>(i)].translation() - Vector3d(0.1 * i, 0.02 * i, 0)).norm(),
+        1e-12)
+        << i;
+  EXPECT_LT((poses[5].translation() - Vector3d(0.5, 0.08, 0)).norm(), 1e-12)
+      << "after the last keyframe: rigidly with it";
 }
 
 TEST(Trajectory, KeyframeThatMovesTakesItsFramesAlong) {
   Path path = Tracked();
   const Pose T_moved = At(3, 1, 0.5);
-  for (MapKeyframe& keyframe : path.map.keyframes) keyframe.T_world_color = T_moved * keyframe.T_world_color;
+  for (MapKeyframe& keyframe : path.map.keyframes)
+    keyframe.T_world_color = T_moved * keyframe.T_world_color;
   const auto poses = ColorPoses(path.frames, path.map);
   for (int i = 0; i < 6; ++i)
-    EXPECT_LT((poses[static_cast<std::size_t>(i)].matrix() - (T_moved * At(0.1 * i)).matrix()).norm(), 1e-12) << i;
+    EXPECT_LT(
+        (poses[static_cast<std::size_t>(i)].matrix() - (T_moved * At(0.1 * i)).matrix()).norm(),
+        1e-12)
+        << i;
 }
 
 TEST(Trajectory, UntrackedFramesHaveNoPose) {
@@ -72,7 +80,8 @@ TEST(Trajectory, UntrackedFramesHaveNoPose) {
 TEST(Trajectory, DepthPosesAreTakenAtTheDepthStampAndItsDelay) {
   Path path = Tracked();
   RefreshVelocities(path.frames, path.map);
-  for (const TrackedFrame& frame : path.frames) EXPECT_LT((frame.velocity_per_s.tail<3>() - Vector3d(1, 0, 0)).norm(), 1e-9);
+  for (const TrackedFrame& frame : path.frames)
+    EXPECT_LT((frame.velocity_per_s.tail<3>() - Vector3d(1, 0, 0)).norm(), 1e-9);
   EXPECT_LT((path.map.keyframes[1].velocity_per_s.tail<3>() - Vector3d(1, 0, 0)).norm(), 1e-9);
   CalibrationModel calibration;
   calibration.depth[5] = 0.005;
@@ -86,7 +95,8 @@ TEST(Trajectory, VelocityIsNotTakenAcrossAGap) {
   Path path = Tracked();
   for (std::size_t i = 3; i < 6; ++i) path.frames[i].color_time_s += 5.0;
   RefreshVelocities(path.frames, path.map);
-  EXPECT_LT((path.frames[2].velocity_per_s.tail<3>() - Vector3d(1, 0, 0)).norm(), 1e-9) << "backward difference";
+  EXPECT_LT((path.frames[2].velocity_per_s.tail<3>() - Vector3d(1, 0, 0)).norm(), 1e-9)
+      << "backward difference";
 }
 
 TEST(LongestLost, CountsTheTimeWithoutAPose) {
@@ -111,9 +121,11 @@ TEST(LongestLost, CountsImagesThatNeverCame) {
 
 TEST(LongestLost, LowAndUnevenRatesAreNoGaps) {
   Path path = Tracked();
-  for (TrackedFrame& frame : path.frames) frame.color_time_s = 1.2 * static_cast<double>(frame.frame_index);
+  for (TrackedFrame& frame : path.frames)
+    frame.color_time_s = 1.2 * static_cast<double>(frame.frame_index);
   EXPECT_EQ(LongestLost(path.frames), 0.0) << "a slow recording";
-  const std::vector<double> uneven = {0.0, 0.04, 0.11, 0.24, 0.30, 0.36};  // Two images skipped now and then.
+  const std::vector<double> uneven = {0.0,  0.04, 0.11,
+                                      0.24, 0.30, 0.36};  // Two images skipped now and then.
   for (std::size_t i = 0; i < uneven.size(); ++i) path.frames[i].color_time_s = uneven[i];
   EXPECT_EQ(LongestLost(path.frames), 0.0);
 }

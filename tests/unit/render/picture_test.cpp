@@ -29,7 +29,8 @@ double Share(const cv::Mat& picture, const Color& color, int tolerance = 3) {
     for (int column = 0; column < picture.cols; ++column) {
       const auto& p = picture.at<cv::Vec3b>(row, column);
       bool is_near = true;
-      for (int i = 0; i < 3; ++i) is_near = is_near && std::abs(p[i] - color[static_cast<std::size_t>(i)]) <= tolerance;
+      for (int i = 0; i < 3; ++i)
+        is_near = is_near && std::abs(p[i] - color[static_cast<std::size_t>(i)]) <= tolerance;
       count += is_near ? 1 : 0;
     }
   }
@@ -42,7 +43,8 @@ double MeanRow(const cv::Mat& picture, const Color& color, int last_column) {
   int count = 0;
   for (int row = 0; row < picture.rows; ++row) {
     for (int column = 0; column < last_column; ++column) {
-      if (picture.at<cv::Vec3b>(row, column) == cv::Vec3b(color[0], color[1], color[2])) sum += row, ++count;
+      if (picture.at<cv::Vec3b>(row, column) == cv::Vec3b(color[0], color[1], color[2]))
+        sum += row, ++count;
     }
   }
   return count == 0 ? -1 : sum / count / picture.rows;
@@ -61,7 +63,8 @@ TEST(ErrorImageTest, DrawsYUp) {
 TEST(ErrorImageTest, HolesAreGreyAndNeverTheColourOfZero) {
   HeightMap difference = Flat(0);
   SetRows(difference, 30, 60, std::numeric_limits<float>::quiet_NaN());
-  const double with_hole = Share(DrawErrorImage(difference), kHoleColor), without = Share(DrawErrorImage(Flat(0)), kHoleColor);
+  const double with_hole = Share(DrawErrorImage(difference), kHoleColor),
+               without = Share(DrawErrorImage(Flat(0)), kHoleColor);
   EXPECT_GT(with_hole - without, 0.1);  // a quarter of a map that takes half of the page
 }
 
@@ -88,15 +91,19 @@ TEST(ErrorImageTest, ShowsThePartThatHoldsData) {
 }
 
 TEST(ErrorImageTest, DrawsAnEmptyMapAndATinyOne) {
-  EXPECT_FALSE(DrawErrorImage(HeightMap({.x_min = 0, .y_min = 0, .step = 0.0015, .width = 400, .height = 300})).empty());
+  EXPECT_FALSE(DrawErrorImage(
+                   HeightMap({.x_min = 0, .y_min = 0, .step = 0.0015, .width = 400, .height = 300}))
+                   .empty());
   HeightMap cell({.x_min = 0, .y_min = 0, .step = 0.0015, .width = 1, .height = 1});
   cell.z[0] = 0.001F;
   EXPECT_FALSE(DrawErrorImage(cell).empty());
 }
 
 TEST(ErrorImageTest, StaysSmallForAnyGrid) {
-  for (const auto& [width, height] : {std::pair(2666, 2666), std::pair(2666, 20), std::pair(20, 2666)}) {
-    HeightMap difference({.x_min = 0, .y_min = 0, .step = 0.0015, .width = width, .height = height});
+  for (const auto& [width, height] :
+       {std::pair(2666, 2666), std::pair(2666, 20), std::pair(20, 2666)}) {
+    HeightMap difference(
+        {.x_min = 0, .y_min = 0, .step = 0.0015, .width = width, .height = height});
     std::fill(difference.z.begin(), difference.z.end(), 0.0F);
     const cv::Mat picture = DrawErrorImage(difference);
     EXPECT_LE(picture.cols, 1700);
@@ -105,7 +112,9 @@ TEST(ErrorImageTest, StaysSmallForAnyGrid) {
 }
 
 TEST(ErrorImageTest, RefusesOtherGridsAndEmptyOnes) {
-  EXPECT_THROW((void)DrawErrorImage(HeightMap({.x_min = 0, .y_min = 0, .step = 0.0015, .width = 0, .height = 0})), std::invalid_argument);
+  EXPECT_THROW((void)DrawErrorImage(
+                   HeightMap({.x_min = 0, .y_min = 0, .step = 0.0015, .width = 0, .height = 0})),
+               std::invalid_argument);
   const HeightMap other({.x_min = 0, .y_min = 0, .step = 0.01, .width = 3, .height = 3});
   EXPECT_THROW((void)DrawErrorImage(Flat(0), {.relief = &other}), std::invalid_argument);
   const std::vector<std::uint8_t> mask(7, 1);

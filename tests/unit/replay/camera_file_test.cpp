@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "tests/support/message_of.hpp"
 
 namespace plumb {
@@ -20,10 +20,12 @@ using ::testing::SizeIs;
 
 constexpr const char* kGood =
     "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
-    "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 517.3, 0., 318.6, 0., 516.5, 255.3, 0., 0., 1. ]\n"
+    "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 517.3, 0., "
+    "318.6, 0., 516.5, 255.3, 0., 0., 1. ]\n"
     "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n"
     "   data: [ 0.2624, -0.9531, -0.0054, 0.0026, 1.1633 ]\n"
-    "depth_scale: 1000.\ndepth_registered: 1\nmarker_dictionary: \"DICT_ARUCO_MIP_36h12\"\nmarker_length: 1.04e-01\nreference_marker: 7\n";
+    "depth_scale: 1000.\ndepth_registered: 1\nmarker_dictionary: "
+    "\"DICT_ARUCO_MIP_36h12\"\nmarker_length: 1.04e-01\nreference_marker: 7\n";
 
 /// The good file with one piece of text exchanged.
 std::string With(std::string_view old_text, std::string_view new_text) {
@@ -55,8 +57,10 @@ TEST(CameraFileTest, ReadsEveryKey) {
 }
 
 TEST(CameraFileTest, AbsentKeysKeepTheirDefaults) {
-  const CameraFile camera =
-      ParseCameraFile("image_width: 320\nimage_height: 240\ncamera_matrix: [ 262, 0, 159.5, 0, 262, 119.5, 0, 0, 1 ]\n", "camera.yaml");
+  const CameraFile camera = ParseCameraFile(
+      "image_width: 320\nimage_height: 240\ncamera_matrix: [ 262, 0, 159.5, 0, 262, 119.5, 0, 0, 1 "
+      "]\n",
+      "camera.yaml");
   EXPECT_EQ(camera.color.fx, 262.0);
   EXPECT_EQ(camera.depth_scale, 5000.0);
   EXPECT_FALSE(camera.marker_dictionary || camera.marker_length_m || camera.reference_marker);
@@ -64,55 +68,70 @@ TEST(CameraFileTest, AbsentKeysKeepTheirDefaults) {
 }
 
 TEST(CameraFileTest, ZeroNegativeAndNonFiniteFocalLengthsAreNamed) {
-  EXPECT_THAT(Refusal(With("517.3", "0.")), AllOf(HasSubstr("rec/camera.yaml: camera_matrix"), HasSubstr("0 and 516.5"), HasSubstr("> 0")));
+  EXPECT_THAT(Refusal(With("517.3", "0.")), AllOf(HasSubstr("rec/camera.yaml: camera_matrix"),
+                                                  HasSubstr("0 and 516.5"), HasSubstr("> 0")));
   EXPECT_THAT(Refusal(With("516.5", "-516.5")), HasSubstr("-516.5"));
   EXPECT_THAT(Refusal(With("517.3", ".Nan")), HasSubstr("finite"));
   EXPECT_THAT(Refusal(With("517.3", ".Inf")), HasSubstr("finite"));
 }
 
 TEST(CameraFileTest, IntrinsicsOfAnotherImageSizeAreNamed) {
-  EXPECT_THAT(Refusal(With("image_width: 640\nimage_height: 480", "image_width: 320\nimage_height: 240")),
-              AllOf(HasSubstr("does not fit an image of 320x240"), HasSubstr("another size")));
+  EXPECT_THAT(
+      Refusal(With("image_width: 640\nimage_height: 480", "image_width: 320\nimage_height: 240")),
+      AllOf(HasSubstr("does not fit an image of 320x240"), HasSubstr("another size")));
 }
 
 TEST(CameraFileTest, SizesOutOfRangeAreNamed) {
   EXPECT_THAT(Refusal(With("image_width: 640", "image_width: 0")), HasSubstr("0x480"));
-  EXPECT_THAT(Refusal(With("image_height: 480", "image_height: 1000000000")), HasSubstr("640x1000000000"));
+  EXPECT_THAT(Refusal(With("image_height: 480", "image_height: 1000000000")),
+              HasSubstr("640x1000000000"));
   EXPECT_THAT(Refusal(With("image_width: 640", "image_width: 640.5")), HasSubstr("whole number"));
-  EXPECT_THAT(Refusal(With("image_width: 640", "image_width: \"wide\"")), HasSubstr("expected finite numbers"));
+  EXPECT_THAT(Refusal(With("image_width: 640", "image_width: \"wide\"")),
+              HasSubstr("expected finite numbers"));
   EXPECT_THAT(Refusal(With("image_width: 640\n", "")), HasSubstr("image_width is missing"));
 }
 
 TEST(CameraFileTest, MatricesOfAnotherShapeAreNamed) {
-  EXPECT_THAT(Refusal(With(", 0., 0., 1. ]", " ]")), AllOf(HasSubstr("camera_matrix"), HasSubstr("6 elements")));
-  EXPECT_THAT(Refusal(With("0., 0., 1. ]", "0., 0., 2. ]")), HasSubstr("expected [fx 0 cx, 0 fy cy, 0 0 1]"));
-  EXPECT_THAT(Refusal(With(", 1.1633 ]", ", 1.1633, 0.5 ]")), AllOf(HasSubstr("distortion_coefficients"), HasSubstr("6 elements")));
-  EXPECT_EQ(ParseCameraFile(With(", 1.1633 ]", ", 1.1633, 0., 0., 0. ]"), "c").color.distortion[4], 1.1633);
+  EXPECT_THAT(Refusal(With(", 0., 0., 1. ]", " ]")),
+              AllOf(HasSubstr("camera_matrix"), HasSubstr("6 elements")));
+  EXPECT_THAT(Refusal(With("0., 0., 1. ]", "0., 0., 2. ]")),
+              HasSubstr("expected [fx 0 cx, 0 fy cy, 0 0 1]"));
+  EXPECT_THAT(Refusal(With(", 1.1633 ]", ", 1.1633, 0.5 ]")),
+              AllOf(HasSubstr("distortion_coefficients"), HasSubstr("6 elements")));
+  EXPECT_EQ(ParseCameraFile(With(", 1.1633 ]", ", 1.1633, 0., 0., 0. ]"), "c").color.distortion[4],
+            1.1633);
 }
 
 TEST(CameraFileTest, LensesThatCannotBeUndoneAreNamed) {
   EXPECT_THAT(Refusal(With("0.2624", "1e30")), HasSubstr("no lens"));
-  EXPECT_THAT(Refusal(With("0.2624, -0.9531", "-2.5, 0.")), AllOf(HasSubstr("distortion_coefficients"), HasSubstr("cannot be undone")));
+  EXPECT_THAT(Refusal(With("0.2624, -0.9531", "-2.5, 0.")),
+              AllOf(HasSubstr("distortion_coefficients"), HasSubstr("cannot be undone")));
 }
 
 TEST(CameraFileTest, DepthScaleIsUnitsPerMetre) {
   EXPECT_THAT(Refusal(With("depth_scale: 1000.", "depth_scale: 0.")),
               AllOf(HasSubstr("depth_scale is 0"), HasSubstr("1000 for millimetres")));
-  EXPECT_THAT(Refusal(With("depth_scale: 1000.", "depth_scale: 0.001")), HasSubstr("units per metre"));
-  EXPECT_THAT(Refusal(With("depth_scale: 1000.", "depth_scale: -5000.")), HasSubstr("depth_scale is -5000"));
+  EXPECT_THAT(Refusal(With("depth_scale: 1000.", "depth_scale: 0.001")),
+              HasSubstr("units per metre"));
+  EXPECT_THAT(Refusal(With("depth_scale: 1000.", "depth_scale: -5000.")),
+              HasSubstr("depth_scale is -5000"));
 }
 
 TEST(CameraFileTest, UnknownDictionaryIsNamedWithTheKnownOnes) {
-  EXPECT_THAT(Refusal(With("DICT_ARUCO_MIP_36h12", "DICT_9X9_10")), AllOf(HasSubstr("marker_dictionary"), HasSubstr("DICT_9X9_10"),
-                                                                          HasSubstr("DICT_6X6_250"), HasSubstr("DICT_ARUCO_MIP_36h12")));
-  EXPECT_THAT(Refusal(With("\"DICT_ARUCO_MIP_36h12\"", "5")), HasSubstr("is \"5\", expected one of"));
+  EXPECT_THAT(Refusal(With("DICT_ARUCO_MIP_36h12", "DICT_9X9_10")),
+              AllOf(HasSubstr("marker_dictionary"), HasSubstr("DICT_9X9_10"),
+                    HasSubstr("DICT_6X6_250"), HasSubstr("DICT_ARUCO_MIP_36h12")));
+  EXPECT_THAT(Refusal(With("\"DICT_ARUCO_MIP_36h12\"", "5")),
+              HasSubstr("is \"5\", expected one of"));
 }
 
 TEST(CameraFileTest, MarkerLengthAndIdOutOfRangeAreNamed) {
-  EXPECT_THAT(Refusal(With("1.04e-01", "0.")), AllOf(HasSubstr("marker_length is 0 m"), HasSubstr("more than 0")));
+  EXPECT_THAT(Refusal(With("1.04e-01", "0.")),
+              AllOf(HasSubstr("marker_length is 0 m"), HasSubstr("more than 0")));
   EXPECT_THAT(Refusal(With("1.04e-01", "-0.1")), HasSubstr("-0.1"));
   EXPECT_THAT(Refusal(With("1.04e-01", "104.")), HasSubstr("104 m"));
-  EXPECT_THAT(Refusal(With("reference_marker: 7", "reference_marker: -1")), HasSubstr("reference_marker is -1"));
+  EXPECT_THAT(Refusal(With("reference_marker: 7", "reference_marker: -1")),
+              HasSubstr("reference_marker is -1"));
 }
 
 TEST(CameraFileTest, WhatIsNoYamlIsRefused) {
@@ -129,33 +148,40 @@ TEST(CameraFileTest, WhatIsNoYamlIsRefused) {
 
 TEST(CameraFileTest, TextsThatParsersDoNotReturnFromAreRefused) {
   // Found by fuzzing: the reader of OpenCV 4.6 loops for ever on the first.
-  for (const char* text :
-       {"%YAML:1.0\n---%YAML:1.0\ni\n-m", "%YAML:1.0", "%", "---\n---\n---", "a: &a [ *a ]\nimage_width: *a", "? {a: b}\n: -"})
+  for (const char* text : {"%YAML:1.0\n---%YAML:1.0\ni\n-m", "%YAML:1.0", "%", "---\n---\n---",
+                           "a: &a [ *a ]\nimage_width: *a", "? {a: b}\n: -"})
     EXPECT_THAT(Refusal(text), HasSubstr("camera.yaml")) << text;
 }
 
 TEST(CameraFileTest, NumbersAsOpenCvWritesThem) {
-  const CameraFile camera = ParseCameraFile(With("depth_scale: 1000.", "depth_scale: +5.0000000000000000e+03"), "camera.yaml");
+  const CameraFile camera = ParseCameraFile(
+      With("depth_scale: 1000.", "depth_scale: +5.0000000000000000e+03"), "camera.yaml");
   EXPECT_EQ(camera.depth_scale, 5000.0);
-  EXPECT_THAT(Refusal(With("depth_scale: 1000.", "depth_scale: .Nan")), HasSubstr("expected finite numbers"));
-  EXPECT_THAT(Refusal(With("depth_scale: 1000.", "depth_scale: 5000 mm")), HasSubstr("expected finite numbers"));
+  EXPECT_THAT(Refusal(With("depth_scale: 1000.", "depth_scale: .Nan")),
+              HasSubstr("expected finite numbers"));
+  EXPECT_THAT(Refusal(With("depth_scale: 1000.", "depth_scale: 5000 mm")),
+              HasSubstr("expected finite numbers"));
 }
 
 constexpr const char* kDepthCamera =
     "depth_registered: 0\ndepth_image_width: 320\ndepth_image_height: 240\n"
-    "depth_camera_matrix: [ 290., 0., 158., 0., 291., 121., 0., 0., 1. ]\ndepth_distortion_coefficients: [ 0., 0., 0., 0., 0. ]\n"
+    "depth_camera_matrix: [ 290., 0., 158., 0., 291., 121., 0., 0., 1. "
+    "]\ndepth_distortion_coefficients: [ 0., 0., 0., 0., 0. ]\n"
     "T_color_depth: [ 1., 0., 0., 0.025, 0., 1., 0., 0.001, 0., 0., 1., -0.002, 0., 0., 0., 1. ]";
 
 TEST(CameraFileTest, ReadsTheDepthCamera) {
-  const CameraFile camera = ParseCameraFile(With("depth_registered: 1", kDepthCamera), "camera.yaml");
+  const CameraFile camera =
+      ParseCameraFile(With("depth_registered: 1", kDepthCamera), "camera.yaml");
   ASSERT_TRUE(camera.depth_camera);
   EXPECT_EQ(camera.depth_camera->intrinsics.width, 320);
   EXPECT_EQ(camera.depth_camera->intrinsics.fy, 291.0);
-  EXPECT_TRUE(camera.depth_camera->T_color_depth.translation().isApprox(Eigen::Vector3d(0.025, 0.001, -0.002)));
+  EXPECT_TRUE(camera.depth_camera->T_color_depth.translation().isApprox(
+      Eigen::Vector3d(0.025, 0.001, -0.002)));
 }
 
 TEST(CameraFileTest, UnregisteredDepthWithoutItsCameraIsTakenAsRegisteredWithAWarning) {
-  const CameraFile camera = ParseCameraFile(With("depth_registered: 1", "depth_registered: 0"), "camera.yaml");
+  const CameraFile camera =
+      ParseCameraFile(With("depth_registered: 1", "depth_registered: 0"), "camera.yaml");
   EXPECT_FALSE(camera.depth_camera);
   ASSERT_THAT(camera.warnings, SizeIs(1));
   EXPECT_THAT(camera.warnings[0], HasSubstr("taken as registered"));
@@ -168,7 +194,8 @@ TEST(CameraFileTest, ATransformThatIsNotRigidIsNamed) {
   text = With("depth_registered: 1", kDepthCamera);
   text.replace(text.find("0.025"), 5, "25.00");
   EXPECT_THAT(Refusal(text), AllOf(HasSubstr("T_color_depth"), HasSubstr("metres")));
-  EXPECT_THAT(Refusal(With("depth_registered: 1", "depth_registered: 2")), HasSubstr("expected 0 or 1"));
+  EXPECT_THAT(Refusal(With("depth_registered: 1", "depth_registered: 2")),
+              HasSubstr("expected 0 or 1"));
 }
 
 }  // namespace

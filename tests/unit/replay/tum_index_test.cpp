@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "tests/support/message_of.hpp"
 
 namespace plumb {
@@ -27,7 +27,9 @@ std::string Refusal(std::string_view text) {
 }
 
 TEST(TumIndexTest, ReadsStampsAndNamesAroundComments) {
-  const auto entries = ParseIndex("# color\r\n\n1.5 rgb/a.png\r\n  2.25\trgb/b c.png  \n1305031102.175304,rgb/d.png", "rgb.txt");
+  const auto entries =
+      ParseIndex("# color\r\n\n1.5 rgb/a.png\r\n  2.25\trgb/b c.png  \n1305031102.175304,rgb/d.png",
+                 "rgb.txt");
   ASSERT_EQ(entries.size(), 3U);
   EXPECT_EQ(entries[0].time_s, 1.5);
   EXPECT_EQ(entries[0].file, "rgb/a.png");
@@ -37,7 +39,8 @@ TEST(TumIndexTest, ReadsStampsAndNamesAroundComments) {
 }
 
 TEST(TumIndexTest, NanAndGarbageStampsAreNamedWithTheirLine) {
-  EXPECT_THAT(Refusal("1.0 a\nnan b\n"), AllOf(HasSubstr("rgb.txt line 2"), HasSubstr("\"nan\""), HasSubstr("seconds")));
+  EXPECT_THAT(Refusal("1.0 a\nnan b\n"),
+              AllOf(HasSubstr("rgb.txt line 2"), HasSubstr("\"nan\""), HasSubstr("seconds")));
   EXPECT_THAT(Refusal("1.0 a\ninf b\n"), HasSubstr("\"inf\""));
   EXPECT_THAT(Refusal("1.0x a\n"), HasSubstr("\"1.0x\""));
   EXPECT_THAT(Refusal("-1.0 a\n"), HasSubstr("\"-1.0\""));
@@ -48,15 +51,18 @@ TEST(TumIndexTest, NanAndGarbageStampsAreNamedWithTheirLine) {
 }
 
 TEST(TumIndexTest, UnsortedAndRepeatedStampsAreNamed) {
-  EXPECT_THAT(Refusal("1.0 a\n3.0 b\n2.0 c\n"), AllOf(HasSubstr("line 3"), HasSubstr("earlier"), HasSubstr("3.000000"), HasSubstr("sort")));
+  EXPECT_THAT(Refusal("1.0 a\n3.0 b\n2.0 c\n"), AllOf(HasSubstr("line 3"), HasSubstr("earlier"),
+                                                      HasSubstr("3.000000"), HasSubstr("sort")));
   EXPECT_THAT(Refusal("1.0 a\n1.0 b\n"), AllOf(HasSubstr("line 2"), HasSubstr("repeats")));
 }
 
 TEST(TumIndexTest, PathsThatLeaveTheFolderAreNamed) {
-  EXPECT_THAT(Refusal("1.0 ../../etc/passwd\n"), AllOf(HasSubstr("line 1"), HasSubstr("leaves"), HasSubstr("../../etc/passwd")));
+  EXPECT_THAT(Refusal("1.0 ../../etc/passwd\n"),
+              AllOf(HasSubstr("line 1"), HasSubstr("leaves"), HasSubstr("../../etc/passwd")));
   EXPECT_THAT(Refusal("1.0 /etc/passwd\n"), HasSubstr("leaves"));
   EXPECT_THAT(Refusal("1.0 rgb/../../a.png\n"), HasSubstr("leaves"));
-  EXPECT_EQ(ParseIndex("1.0 rgb/..a.png\n", "rgb.txt").size(), 1U);  // dots in a name are no way out
+  EXPECT_EQ(ParseIndex("1.0 rgb/..a.png\n", "rgb.txt").size(),
+            1U);  // dots in a name are no way out
 }
 
 TEST(TumIndexTest, MissingNamesAndEndlessLinesAreNamed) {
@@ -71,20 +77,23 @@ TEST(TumIndexTest, PairsNearestStamps) {
 }
 
 TEST(TumIndexTest, GapsLeaveImagesWithoutPartner) {
-  EXPECT_THAT(AssociateByTime(At({0.0, 0.1, 0.2, 0.3}), At({0.005, 0.205, 0.9}), 0.02), ElementsAre(IndexPair{0, 0}, IndexPair{2, 1}));
+  EXPECT_THAT(AssociateByTime(At({0.0, 0.1, 0.2, 0.3}), At({0.005, 0.205, 0.9}), 0.02),
+              ElementsAre(IndexPair{0, 0}, IndexPair{2, 1}));
   EXPECT_THAT(AssociateByTime(At({0.0}), At({0.0201}), 0.02), ElementsAre());
   EXPECT_THAT(AssociateByTime({}, At({0.0}), 0.02), ElementsAre());
 }
 
-// Half a frame apart with jitter: taking the nearest pairs first, 0-0 (16.2 ms) and 2-1 (15.5 ms), would leave 1 and 2 alone.
+// Half a frame apart with jitter: taking the nearest pairs first, 0-0 (16.2 ms) and 2-1 (15.5 ms),
+// would leave 1 and 2 alone.
 TEST(TumIndexTest, StreamsHalfAFrameApartLoseNoImage) {
   EXPECT_THAT(AssociateByTime(At({0.000, 0.033, 0.066}), At({0.0162, 0.0505, 0.082}), 0.02),
               ElementsAre(IndexPair{0, 0}, IndexPair{1, 1}, IndexPair{2, 2}));
 }
 
 TEST(TumIndexTest, ASlowerDepthStreamTakesTheNearestColour) {
-  EXPECT_THAT(AssociateByTime(At({0.0, 0.0167, 0.0333, 0.05, 0.0667}), At({0.001, 0.0343, 0.0677}), 0.02),
-              ElementsAre(IndexPair{0, 0}, IndexPair{2, 1}, IndexPair{4, 2}));
+  EXPECT_THAT(
+      AssociateByTime(At({0.0, 0.0167, 0.0333, 0.05, 0.0667}), At({0.001, 0.0343, 0.0677}), 0.02),
+      ElementsAre(IndexPair{0, 0}, IndexPair{2, 1}, IndexPair{4, 2}));
 }
 
 TEST(TumIndexTest, StampsDenserThanTheGapKeepTimeRising) {

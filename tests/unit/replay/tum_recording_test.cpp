@@ -9,9 +9,9 @@
 #include <functional>
 #include <opencv2/core.hpp>
 
-#include "algo/types/errors.hpp"
-#include "drivers/replay/file_io.hpp"
-#include "drivers/replay/image_file.hpp"
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
 #include "drivers/replay/tum_writer.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -30,7 +30,13 @@ constexpr int kNumFrames = 12;
 
 StreamInfo SmallCamera() {
   StreamInfo info;
-  info.intrinsics = {.width = 64, .height = 48, .fx = 52.5, .fy = 52.4, .cx = 31.7, .cy = 23.6, .distortion = {0.01, -0.02, 0.001, 0, 0}};
+  info.intrinsics = {.width = 64,
+                     .height = 48,
+                     .fx = 52.5,
+                     .fy = 52.4,
+                     .cx = 31.7,
+                     .cy = 23.6,
+                     .distortion = {0.01, -0.02, 0.001, 0, 0}};
   info.marker_dictionary = "DICT_5X5_100";
   info.marker_length_m = 0.08;
   info.reference_marker = 3;
@@ -67,8 +73,12 @@ class TumRecordingTest : public ::testing::Test {
     });
   }
 
-  [[nodiscard]] fs::path ColorFile(int i) const { return recording_ / fmt::format("rgb/{:.6f}.png", NumberedFrame(i).color_time_s); }
-  [[nodiscard]] fs::path DepthFile(int i) const { return recording_ / fmt::format("depth/{:.6f}.png", NumberedFrame(i).depth_time_s); }
+  [[nodiscard]] fs::path ColorFile(int i) const {
+    return recording_ / fmt::format("rgb/{:.6f}.png", NumberedFrame(i).color_time_s);
+  }
+  [[nodiscard]] fs::path DepthFile(int i) const {
+    return recording_ / fmt::format("depth/{:.6f}.png", NumberedFrame(i).depth_time_s);
+  }
 
   TempFolder folder_;
   fs::path recording_ = folder_ / "recording";
@@ -91,7 +101,8 @@ TEST_F(TumRecordingTest, GivesBackWhatWasWritten) {
     EXPECT_NEAR(frame->color_time_s, expected.color_time_s, 5e-7);  // stamps have microseconds
     EXPECT_NEAR(frame->depth_time_s, expected.depth_time_s, 5e-7);
     EXPECT_EQ(cv::norm(frame->color_rgb, expected.color_rgb, cv::NORM_INF), 0);
-    EXPECT_LE(cv::norm(frame->depth_m, expected.depth_m, cv::NORM_INF), 1e-4 + 1e-6);  // half a unit of 1/5000 m
+    EXPECT_LE(cv::norm(frame->depth_m, expected.depth_m, cv::NORM_INF),
+              1e-4 + 1e-6);  // half a unit of 1/5000 m
     EXPECT_EQ(frame->depth_m.at<float>(7, 5), 0.0F);
   }
   EXPECT_FALSE(source->Next());
@@ -128,7 +139,8 @@ TEST_F(TumRecordingTest, UnmatchedImagesAreLeftOutAndCounted) {
   EXPECT_EQ(source->info().num_frames, kNumFrames - 1);
   EXPECT_EQ(source->statistics().num_unmatched_color, 1);
   EXPECT_EQ(source->statistics().num_unmatched_depth, 0);
-  EXPECT_THAT(source->info().warnings, Contains(HasSubstr("1 of 12 colour and 0 of 11 depth images")));
+  EXPECT_THAT(source->info().warnings,
+              Contains(HasSubstr("1 of 12 colour and 0 of 11 depth images")));
   for (int i = 0; i < 3; ++i) (void)source->Next();
   const auto after_gap = source->Next();
   EXPECT_NEAR(after_gap->color_time_s, NumberedFrame(4).color_time_s, 1e-6);
@@ -136,7 +148,8 @@ TEST_F(TumRecordingTest, UnmatchedImagesAreLeftOutAndCounted) {
 }
 
 // A recording of its own rate whose depth stamps lie that much later.
-std::unique_ptr<TumRecording> OpenWithOffset(const fs::path& folder, double rate_hz, double offset_s) {
+std::unique_ptr<TumRecording> OpenWithOffset(const fs::path& folder, double rate_hz,
+                                             double offset_s) {
   TumWriter writer(folder, SmallCamera(), {.jpeg_quality = 0});
   for (int i = 0; i < kNumFrames; ++i) {
     Frame frame = NumberedFrame(i);
@@ -150,7 +163,8 @@ std::unique_ptr<TumRecording> OpenWithOffset(const fs::path& folder, double rate
 
 TEST_F(TumRecordingTest, SlowStreamsPairWithTheirNearestWhateverTheirOffset) {
   for (const int offset_ms : {0, 19, 25, 30, 33}) {
-    const auto source = OpenWithOffset(folder_ / fmt::format("offset{}", offset_ms), 15.0, offset_ms * 1e-3);
+    const auto source =
+        OpenWithOffset(folder_ / fmt::format("offset{}", offset_ms), 15.0, offset_ms * 1e-3);
     EXPECT_EQ(source->info().num_frames, kNumFrames) << offset_ms;
     EXPECT_EQ(source->statistics().num_unmatched_color, 0) << offset_ms;
     const std::optional<Frame> frame = source->Next();
@@ -169,12 +183,15 @@ TEST_F(TumRecordingTest, SlowStreamsDoNotPairAcrossALostImage) {
   WriteWholeFile(slow / "depth.txt", index);
   const auto source = TumRecording::Open(slow);
   EXPECT_EQ(source->info().num_frames, kNumFrames - 1);
-  while (const auto frame = source->Next()) EXPECT_NEAR(frame->depth_time_s - frame->color_time_s, 0.005, 2e-6);
+  while (const auto frame = source->Next())
+    EXPECT_NEAR(frame->depth_time_s - frame->color_time_s, 0.005, 2e-6);
 }
 
 TEST_F(TumRecordingTest, WithoutCameraFileTumsCameraIsAssumedAtTheImagesSize) {
   fs::remove(recording_ / "camera.yaml");
-  const auto source = TumRecording::Open(recording_, {.marker_dictionary = "DICT_4X4_50", .marker_length_m = 0.1, .reference_marker = 9});
+  const auto source = TumRecording::Open(
+      recording_,
+      {.marker_dictionary = "DICT_4X4_50", .marker_length_m = 0.1, .reference_marker = 9});
   EXPECT_TRUE(source->info().intrinsics_assumed);
   EXPECT_EQ(source->info().intrinsics.width, 64);
   EXPECT_DOUBLE_EQ(source->info().intrinsics.fx, 52.5);
@@ -191,20 +208,23 @@ TEST_F(TumRecordingTest, WithoutCameraFileOtherShapesNeedOne) {
   for (int i = 0; i < 2; ++i) writer.Add(NumberedFrame(i, 80, 48));
   writer.Finish();
   fs::remove(wide / "camera.yaml");
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(wide); }), AllOf(HasSubstr("80x48"), HasSubstr("add camera.yaml")));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(wide); }),
+              AllOf(HasSubstr("80x48"), HasSubstr("add camera.yaml")));
 }
 
 TEST_F(TumRecordingTest, UnregisteredDepthIsRegistered) {
   std::string text = ReadTextFile(recording_ / "camera.yaml", 1 << 16);
   const std::string registered = "depth_registered: 1";
-  text.replace(text.find(registered), registered.size(),
-               "depth_registered: 0\ndepth_camera_matrix: [ 52.5, 0, 31.7, 0, 52.4, 23.6, 0, 0, 1 ]\n"
-               "depth_distortion_coefficients: [ 0.01, -0.02, 0.001, 0, 0 ]\n"
-               "T_color_depth: [ 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0.25, 0, 0, 0, 1 ]");
+  text.replace(
+      text.find(registered), registered.size(),
+      "depth_registered: 0\ndepth_camera_matrix: [ 52.5, 0, 31.7, 0, 52.4, 23.6, 0, 0, 1 ]\n"
+      "depth_distortion_coefficients: [ 0.01, -0.02, 0.001, 0, 0 ]\n"
+      "T_color_depth: [ 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0.25, 0, 0, 0, 1 ]");
   WriteWholeFile(recording_ / "camera.yaml", text);
   const auto frame = TumRecording::Open(recording_)->Next();
   ASSERT_TRUE(frame);
-  EXPECT_NEAR(frame->depth_m.at<float>(24, 32), 0.75F, 1e-4);  // 0.5 m before a depth camera that stands 0.25 m in front
+  EXPECT_NEAR(frame->depth_m.at<float>(24, 32), 0.75F,
+              1e-4);  // 0.5 m before a depth camera that stands 0.25 m in front
 }
 
 TEST_F(TumRecordingTest, AllDepthZeroIsCountedWhileReading) {
@@ -226,9 +246,12 @@ TEST_F(TumRecordingTest, SaturatedDepthIsNothing) {
 // ---- bad input: each is refused with the file, what was found and what is expected
 
 TEST_F(TumRecordingTest, MissingFolderAndAFileInItsPlaceAreNamed) {
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(folder_ / "none"); }), AllOf(HasSubstr("none"), HasSubstr("missing")));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(recording_ / "rgb.txt"); }), HasSubstr("no folder"));
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(folder_.path()); }), HasSubstr("rgb.txt is missing"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(folder_ / "none"); }),
+              AllOf(HasSubstr("none"), HasSubstr("missing")));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(recording_ / "rgb.txt"); }),
+              HasSubstr("no folder"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(folder_.path()); }),
+              HasSubstr("rgb.txt is missing"));
 }
 
 TEST_F(TumRecordingTest, MissingIndexIsNamed) {
@@ -244,23 +267,27 @@ TEST_F(TumRecordingTest, EmptyIndexIsNamed) {
 TEST_F(TumRecordingTest, MissingImageIsNamedBeforeAnyWork) {
   fs::remove(ColorFile(7));
   EXPECT_THAT(MessageOf<DataError>([&] { (void)TumRecording::Open(recording_); }),
-              AllOf(HasSubstr(ColorFile(7).filename()), HasSubstr("rgb.txt"), HasSubstr("cannot be found")));
+              AllOf(HasSubstr(ColorFile(7).filename()), HasSubstr("rgb.txt"),
+                    HasSubstr("cannot be found")));
 }
 
 TEST_F(TumRecordingTest, TruncatedImageIsNamedAfterTheGoodFrames) {
   fs::resize_file(DepthFile(7), fs::file_size(DepthFile(7)) / 2);
   const auto source = TumRecording::Open(recording_);
   for (int i = 0; i < 7; ++i) EXPECT_TRUE(source->Next());
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)source->Next(); }), AllOf(HasSubstr(DepthFile(7).filename()), HasSubstr("damaged")));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)source->Next(); }),
+              AllOf(HasSubstr(DepthFile(7).filename()), HasSubstr("damaged")));
   EXPECT_FALSE(source->Next());
 }
 
 TEST_F(TumRecordingTest, WrongSizeImagesAreNamed) {
   WritePng(ColorFile(2), cv::Mat::zeros(24, 32, CV_8UC3));
-  EXPECT_THAT(Refusal(), AllOf(HasSubstr(ColorFile(2).filename()), HasSubstr("32x24"), HasSubstr("expected 64x48")));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr(ColorFile(2).filename()), HasSubstr("32x24"),
+                               HasSubstr("expected 64x48")));
   WritePng(ColorFile(2), cv::Mat::zeros(48, 64, CV_8UC3));
   WritePng(DepthFile(3), cv::Mat::zeros(24, 32, CV_16UC1));
-  EXPECT_THAT(Refusal(), AllOf(HasSubstr("depth image"), HasSubstr("32x24"), HasSubstr("expected 64x48")));
+  EXPECT_THAT(Refusal(),
+              AllOf(HasSubstr("depth image"), HasSubstr("32x24"), HasSubstr("expected 64x48")));
 }
 
 TEST_F(TumRecordingTest, EightBitAndColourDepthAreNamed) {
@@ -285,7 +312,8 @@ TEST_F(TumRecordingTest, BadCameraFileIsNamed) {
 TEST_F(TumRecordingTest, LinksOutOfTheFolderAreNamed) {
   fs::rename(ColorFile(5), folder_ / "outside.png");
   fs::create_symlink(folder_ / "outside.png", ColorFile(5));
-  EXPECT_THAT(Refusal(), AllOf(HasSubstr(ColorFile(5).filename()), HasSubstr("out of the recording's folder")));
+  EXPECT_THAT(Refusal(), AllOf(HasSubstr(ColorFile(5).filename()),
+                               HasSubstr("out of the recording's folder")));
   fs::remove(ColorFile(5));
   fs::copy_file(ColorFile(4), recording_ / "kept.png");
   fs::create_symlink("../kept.png", ColorFile(5));  // a link inside the folder is fine
@@ -300,13 +328,15 @@ TEST_F(TumRecordingTest, AFolderWhoseNameBeginsTheSameIsOutside) {
 }
 
 TEST_F(TumRecordingTest, ASingleFrameIsNamed) {
-  WriteWholeFile(recording_ / "rgb.txt", fmt::format("1000.000000 rgb/{}\n", ColorFile(0).filename().string()));
+  WriteWholeFile(recording_ / "rgb.txt",
+                 fmt::format("1000.000000 rgb/{}\n", ColorFile(0).filename().string()));
   EXPECT_THAT(Refusal(), AllOf(HasSubstr("has 1 frame ("), HasSubstr("at least 2")));
 }
 
 TEST_F(TumRecordingTest, ListsOfDifferentClocksAreNamed) {
   WriteWholeFile(recording_ / "rgb.txt",
-                 fmt::format("5.0 rgb/{}\n6.0 rgb/{}\n", ColorFile(0).filename().string(), ColorFile(1).filename().string()));
+                 fmt::format("5.0 rgb/{}\n6.0 rgb/{}\n", ColorFile(0).filename().string(),
+                             ColorFile(1).filename().string()));
   EXPECT_THAT(Refusal(), AllOf(HasSubstr("has 0 frames"), HasSubstr("clock")));
 }
 

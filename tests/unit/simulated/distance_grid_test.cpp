@@ -22,8 +22,10 @@ TEST(DistanceGridTest, RaysMeetABallWhereGeometrySays) {
   RandomStream random(3);
   int hits = 0;
   for (int i = 0; i < 5000; ++i) {
-    const Vector3f origin(static_cast<float>(random.Within(0.3)), static_cast<float>(random.Within(0.3)), 0.8F);
-    const Vector3f target(static_cast<float>(random.Within(0.12)), static_cast<float>(random.Within(0.12)),
+    const Vector3f origin(static_cast<float>(random.Within(0.3)),
+                          static_cast<float>(random.Within(0.3)), 0.8F);
+    const Vector3f target(static_cast<float>(random.Within(0.12)),
+                          static_cast<float>(random.Within(0.12)),
                           static_cast<float>(random.Within(0.12)));
     const Vector3f direction = (target - origin).normalized();
     const float along = -origin.dot(direction);
@@ -34,8 +36,8 @@ TEST(DistanceGridTest, RaysMeetABallWhereGeometrySays) {
       EXPECT_FALSE(std::isfinite(t));
     } else if (beside_squared < 0.9 * radius * radius) {
       ++hits;
-      // Trilinear cells of 5 mm cut a ball of 0.1 m short by up to 3 h^2 / (8 r) = 0.09 mm; at this incidence up to three times that along
-      // the ray.
+      // Trilinear cells of 5 mm cut a ball of 0.1 m short by up to 3 h^2 / (8 r) = 0.09 mm; at this
+      // incidence up to three times that along the ray.
       EXPECT_NEAR(t, along - std::sqrt(radius * radius - beside_squared), 3e-4);
     }
   }
@@ -62,7 +64,8 @@ TEST(DistanceGridTest, FourRaysAtOnceFindWhatEachFindsAlone) {
     for (int i = 0; i < 4; ++i) {
       // Beside, grazing and through the ball; some from inside of the box, some that end before it.
       const Vector3f origin(within(0.3), within(0.3), random.Uniform() < 0.2 ? 0.11F : 0.8F);
-      const Vector3f direction = (Vector3f(within(0.14), within(0.14), within(0.05)) - origin).normalized();
+      const Vector3f direction =
+          (Vector3f(within(0.14), within(0.14), within(0.05)) - origin).normalized();
       set(origins, i, origin);
       set(directions, i, direction);
       begin[i] = static_cast<float>(random.Uniform(0.0, 0.1));
@@ -83,9 +86,11 @@ TEST(DistanceGridTest, NormalsPointAwayFromABallsCentre) {
   const auto ball = Ball();
   for (int i = 0; i < 200; ++i) {
     const float angle = 0.1F * static_cast<float>(i);
-    const Vector3f direction = Vector3f(std::cos(angle), std::sin(angle), std::cos(2.7F * angle)).normalized();
+    const Vector3f direction =
+        Vector3f(std::cos(angle), std::sin(angle), std::cos(2.7F * angle)).normalized();
     // Measured: at most 0.3 degrees.
-    EXPECT_GT(ball->Normal(static_cast<float>(kBallRadius) * direction).dot(direction), std::cos(0.6F * 0.01745F));
+    EXPECT_GT(ball->Normal(static_cast<float>(kBallRadius) * direction).dot(direction),
+              std::cos(0.6F * 0.01745F));
   }
 }
 
@@ -93,12 +98,16 @@ TEST(DistanceGridTest, AConeNeverStepsOverTheSurface) {
   const auto ball = Ball();
   RandomStream random(4);
   for (int i = 0; i < 2000; ++i) {
-    const Vector3f origin(static_cast<float>(random.Within(0.3)), static_cast<float>(random.Within(0.3)), 0.8F);
-    const Vector3f axis =
-        (Vector3f(static_cast<float>(random.Within(0.2)), static_cast<float>(random.Within(0.2)), 0) - origin).normalized();
+    const Vector3f origin(static_cast<float>(random.Within(0.3)),
+                          static_cast<float>(random.Within(0.3)), 0.8F);
+    const Vector3f axis = (Vector3f(static_cast<float>(random.Within(0.2)),
+                                    static_cast<float>(random.Within(0.2)), 0) -
+                           origin)
+                              .normalized();
     const float start = ball->ConeStart(origin, axis, 0.02F, 0.002F, 3.0F);
-    const Vector3f inside =
-        (axis + 0.0135F * Vector3f(static_cast<float>(random.Within(1)), static_cast<float>(random.Within(1)), 0)).normalized();
+    const Vector3f inside = (axis + 0.0135F * Vector3f(static_cast<float>(random.Within(1)),
+                                                       static_cast<float>(random.Within(1)), 0))
+                                .normalized();
     const float t = ball->Intersect(origin, inside, 0.0F, 3.0F);
     EXPECT_TRUE(!std::isfinite(t) || start <= t);
   }
@@ -110,7 +119,8 @@ TEST_P(BodySurfaceTest, IsAClosedMeshOnTheZeroSet) {
   const auto body = MakeBody({.kind = GetParam()});
   ASSERT_GT(body->surface.vertices.size(), 10000U);
   float worst = 0;
-  for (const Vector3f& vertex : body->surface.vertices) worst = std::max(worst, std::abs(body->grid->Distance(vertex)));
+  for (const Vector3f& vertex : body->surface.vertices)
+    worst = std::max(worst, std::abs(body->grid->Distance(vertex)));
   EXPECT_LT(worst, 1e-4F);  // Measured 3e-6.
 
   // Closed and consistently oriented: every directed edge has its opposite.
@@ -122,8 +132,11 @@ TEST_P(BodySurfaceTest, IsAClosedMeshOnTheZeroSet) {
       edges.emplace_back(triangle[i], triangle[(i + 1) % 3]);
       opposites.emplace_back(triangle[(i + 1) % 3], triangle[i]);
     }
-    const auto at = [&](std::size_t i) { return body->surface.vertices[triangle[i]].cast<double>(); };
-    volume += Eigen::Vector3d(at(0)).dot(Eigen::Vector3d(at(1)).cross(Eigen::Vector3d(at(2)))) / 6.0;
+    const auto at = [&](std::size_t i) {
+      return body->surface.vertices[triangle[i]].cast<double>();
+    };
+    volume +=
+        Eigen::Vector3d(at(0)).dot(Eigen::Vector3d(at(1)).cross(Eigen::Vector3d(at(2)))) / 6.0;
   }
   std::sort(edges.begin(), edges.end());
   std::sort(opposites.begin(), opposites.end());
@@ -133,7 +146,8 @@ TEST_P(BodySurfaceTest, IsAClosedMeshOnTheZeroSet) {
   EXPECT_LT(volume, GetParam() == BodyKind::kTorso ? 0.050 : 0.090);
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, BodySurfaceTest, testing::Values(BodyKind::kTorso, BodyKind::kFullBody));
+INSTANTIATE_TEST_SUITE_P(Kinds, BodySurfaceTest,
+                         testing::Values(BodyKind::kTorso, BodyKind::kFullBody));
 
 TEST(BodyTest, DeformationsMoveWhatTheyNameAndLeaveTheRest) {
   const BodyShape relaxed{.kind = BodyKind::kFullBody};

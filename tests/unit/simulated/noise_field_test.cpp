@@ -15,7 +15,8 @@ double Correlation(const std::vector<float>& field, int lag) {
   double sum = 0;
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
-      sum += field[static_cast<std::size_t>(y * kWidth + x)] * field[static_cast<std::size_t>(y * kWidth + (x + lag) % kWidth)];
+      sum += field[static_cast<std::size_t>(y * kWidth + x)] *
+             field[static_cast<std::size_t>(y * kWidth + (x + lag) % kWidth)];
     }
   }
   return sum / (kWidth * kHeight);
@@ -23,8 +24,8 @@ double Correlation(const std::vector<float>& field, int lag) {
 
 TEST(NoiseFieldTest, HasUnitVarianceAndTheGaussiansCorrelation) {
   const double sigma = FilterSigmaOfLag(9.0);
-  // A field of 640 x 480 with this filter holds about 2700 independent values: the spread of a second moment is sqrt(2 / 2700) = 0.027;
-  // limits are three times that.
+  // A field of 640 x 480 with this filter holds about 2700 independent values: the spread of a
+  // second moment is sqrt(2 / 2700) = 0.027; limits are three times that.
   const std::vector<float> field = CorrelatedNoise(5, kWidth, kHeight, sigma);
   double mean = 0;
   for (const float value : field) mean += value;

@@ -15,7 +15,8 @@ int StepAt(int depth_mm) {
 }
 
 TEST(Ps1080Test, StepsAreThoseOfAnEighthOfAPixel) {
-  // z^2 / (8 b f) with b = 75 mm, f = 575.8 px: 1.42 mm at 0.7 m, 2.89 mm at 1.0 m; truncation adds at most 1 mm to eight steps.
+  // z^2 / (8 b f) with b = 75 mm, f = 575.8 px: 1.42 mm at 0.7 m, 2.89 mm at 1.0 m; truncation adds
+  // at most 1 mm to eight steps.
   EXPECT_NEAR(StepAt(700), 8 * 1.42, 1.0);
   EXPECT_NEAR(StepAt(1000), 8 * 2.89, 1.0);
 }

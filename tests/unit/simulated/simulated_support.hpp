@@ -11,15 +11,18 @@ namespace plumb::simulated {
 inline constexpr double kBallRadius = 0.10;
 
 inline std::shared_ptr<const DistanceGrid> Ball() {
-  const Eigen::AlignedBox3d box(Eigen::Vector3d::Constant(-kBallRadius - 0.03), Eigen::Vector3d::Constant(kBallRadius + 0.03));
-  return std::make_shared<const DistanceGrid>([](const Eigen::Vector3d& p) { return p.norm() - kBallRadius; }, box, 0.005);
+  const Eigen::AlignedBox3d box(Eigen::Vector3d::Constant(-kBallRadius - 0.03),
+                                Eigen::Vector3d::Constant(kBallRadius + 0.03));
+  return std::make_shared<const DistanceGrid>(
+      [](const Eigen::Vector3d& p) { return p.norm() - kBallRadius; }, box, 0.005);
 }
 
 /// A ball with its centre at the given place over a uniformly grey floor, and boards.
 inline World BallWorld(const Eigen::Vector3d& centre, const std::vector<Board>& boards = {}) {
   Room room;
   room.boards = boards;
-  room.support_texture = std::make_shared<const Texture>(Eigen::Vector2f(-1, -1), 0.05F, 40, 40, Eigen::Vector3f::Constant(0.3F));
+  room.support_texture = std::make_shared<const Texture>(Eigen::Vector2f(-1, -1), 0.05F, 40, 40,
+                                                         Eigen::Vector3f::Constant(0.3F));
   room.skin_texture = room.support_texture;
   Pose T_world_body = Pose::Identity();
   T_world_body.translation() = centre;

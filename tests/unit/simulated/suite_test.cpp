@@ -13,10 +13,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
+#include "algo/base/pose.hpp"
+#include "algo/base/units.hpp"
 #include "algo/types/marker.hpp"
-#include "algo/types/pose.hpp"
-#include "algo/types/units.hpp"
 #include "drivers/simulated/suite_plan.hpp"
 
 namespace plumb {
@@ -57,12 +57,15 @@ Pose ToPose(const json& rows) {
   Pose T = Pose::Identity();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column)
-      T.matrix()(row, column) = rows.at(static_cast<std::size_t>(row)).at(static_cast<std::size_t>(column)).get<double>();
+      T.matrix()(row, column) =
+          rows.at(static_cast<std::size_t>(row)).at(static_cast<std::size_t>(column)).get<double>();
   }
   return T;
 }
 
-Eigen::Vector3d ToPoint(const json& values) { return {values.at(0).get<double>(), values.at(1).get<double>(), values.at(2).get<double>()}; }
+Eigen::Vector3d ToPoint(const json& values) {
+  return {values.at(0).get<double>(), values.at(1).get<double>(), values.at(2).get<double>()};
+}
 
 std::vector<Eigen::Vector3f> PlyVertices(const fs::path& path, std::vector<float>* seen) {
   const std::string bytes = Text(path);
@@ -82,7 +85,12 @@ TEST_F(SuiteTest, WritesRecordingsAndATruthThatAgreesWithItself) {
   SimulateSuite(Small("demo"));
   const fs::path out = folder_ / "demo";
   const json suite = json::parse(Text(out / "suite.json"));
-  EXPECT_EQ(suite, json({{"name", "demo"}, {"scenes", {"reference", "moved"}}, {"pairs", json::array({{"reference", "moved"}})}}));
+  EXPECT_EQ(suite.at("name"), "demo");
+  EXPECT_EQ(suite.at("scenes"), json({"reference", "moved"}));
+  EXPECT_EQ(suite.at("pairs"), json::array({{"reference", "moved"}}));
+  EXPECT_EQ(suite.at("simulated").at("unit"), 5);
+  EXPECT_EQ(suite.at("simulated").at("faults"),
+            simulated::MildFaults(simulated::NoiseLevel::kNominal).Names());
   for (const char* name : {"reference", "moved"}) {
     for (const char* file : {"rgb.txt", "depth.txt", "camera.yaml"})
       EXPECT_TRUE(fs::exists(out / "recordings" / name / file)) << name << file;
@@ -90,7 +98,8 @@ TEST_F(SuiteTest, WritesRecordingsAndATruthThatAgreesWithItself) {
     EXPECT_EQ(std::distance(fs::directory_iterator(out / "recordings" / name / "depth"), {}), 3);
   }
 
-  // The motion maps the reference body's surface onto the moved one's, in the world and in the marker's frame.
+  // The motion maps the reference body's surface onto the moved one's, in the world and in the
+  // marker's frame.
   const json motion = json::parse(Text(out / "truth/moved/motion.json"));
   std::vector<float> seen;
   const auto before = PlyVertices(out / "truth/reference/body.ply", &seen);
@@ -103,10 +112,17 @@ TEST_F(SuiteTest, WritesRecordingsAndATruthThatAgreesWithItself) {
   for (std::size_t i = 0; i < before.size(); i += 97) {
     const Eigen::Vector3d moved = M * before[i].cast<double>();
     EXPECT_LT((moved - after[i].cast<double>()).norm(), 1e-6);  // Floats in the file.
-    EXPECT_LT((T_world_marker * M_marker * T_world_marker.inverse() * before[i].cast<double>() - moved).norm(), 1e-9);
+    EXPECT_LT(
+        (T_world_marker * M_marker * T_world_marker.inverse() * before[i].cast<double>() - moved)
+            .norm(),
+        1e-9);
   }
-  EXPECT_TRUE(M.isApprox(ToPose(motion.at("T_world_body")) * ToPose(motion.at("T_world_body0")).inverse(), 1e-9));
-  EXPECT_LT((ToPoint(motion.at("centroid_world")) - ToPose(motion.at("T_world_body")) * ToPoint(motion.at("centroid_body"))).norm(), 1e-9);
+  EXPECT_TRUE(M.isApprox(
+      ToPose(motion.at("T_world_body")) * ToPose(motion.at("T_world_body0")).inverse(), 1e-9));
+  EXPECT_LT((ToPoint(motion.at("centroid_world")) -
+             ToPose(motion.at("T_world_body")) * ToPoint(motion.at("centroid_body")))
+                .norm(),
+            1e-9);
   EXPECT_GT(*std::max_element(seen.begin(), seen.end()), 0.0F);
   EXPECT_LE(*std::max_element(seen.begin(), seen.end()), 3.0F);
 
@@ -114,16 +130,19 @@ TEST_F(SuiteTest, WritesRecordingsAndATruthThatAgreesWithItself) {
   const json markers = json::parse(Text(out / "truth/moved/markers.json"));
   EXPECT_GE(markers.at("markers").size(), 10U);
   const double h = 0.052;
-  const std::array<Eigen::Vector3d, 4> paper = {Eigen::Vector3d(-h, -h, 0), Eigen::Vector3d(h, -h, 0), Eigen::Vector3d(h, h, 0),
+  const std::array<Eigen::Vector3d, 4> paper = {Eigen::Vector3d(-h, -h, 0),
+                                                Eigen::Vector3d(h, -h, 0), Eigen::Vector3d(h, h, 0),
                                                 Eigen::Vector3d(-h, h, 0)};
   bool found = false;
   for (const auto& [id, marker] : markers.at("markers").items()) {
     const Pose T = ToPose(marker.at("T_world_marker"));
-    for (std::size_t i = 0; i < 4; ++i) EXPECT_LT((T * paper[i] - ToPoint(marker.at("corners").at(i))).norm(), 1e-9) << id;
+    for (std::size_t i = 0; i < 4; ++i)
+      EXPECT_LT((T * paper[i] - ToPoint(marker.at("corners").at(i))).norm(), 1e-9) << id;
     EXPECT_GT(T.linear()(2, 2), 0.98) << "boards lie almost flat";
     if (T.isApprox(T_world_marker, 1e-9)) {
       found = true;
-      EXPECT_THAT(Text(out / "recordings/moved/camera.yaml"), testing::HasSubstr("reference_marker: " + id + "\n"));
+      EXPECT_THAT(Text(out / "recordings/moved/camera.yaml"),
+                  testing::HasSubstr("reference_marker: " + id + "\n"));
     }
   }
   EXPECT_TRUE(found);
@@ -134,7 +153,8 @@ TEST_F(SuiteTest, WritesRecordingsAndATruthThatAgreesWithItself) {
   std::getline(trajectory, line);
   int poses = 0;
   double last = 0;
-  for (double t = 0, x, y, z, qx, qy, qz, qw; trajectory >> t >> x >> y >> z >> qx >> qy >> qz >> qw; ++poses) {
+  for (double t = 0, x, y, z, qx, qy, qz, qw;
+       trajectory >> t >> x >> y >> z >> qx >> qy >> qz >> qw; ++poses) {
     if (poses > 0) {
       EXPECT_NEAR(t - last, 0.002, 1e-6);
     }
@@ -150,13 +170,16 @@ TEST_F(SuiteTest, TheSameSeedGivesTheSameBytes) {
   SimulateSuite(Small("b"));
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder_ / "a")) {
     if (!entry.is_regular_file()) continue;
-    EXPECT_EQ(Text(entry.path()), Text(folder_ / "b" / fs::relative(entry.path(), folder_ / "a"))) << entry.path();
+    EXPECT_EQ(Text(entry.path()), Text(folder_ / "b" / fs::relative(entry.path(), folder_ / "a")))
+        << entry.path();
   }
 }
 
 TEST_F(SuiteTest, AStopLeavesNothingBehind) {
   std::stop_source stop;
-  EXPECT_THROW(SimulateSuite(Small("demo"), stop.get_token(), [&](double, std::string_view) { stop.request_stop(); }), Interrupted);
+  EXPECT_THROW(SimulateSuite(Small("demo"), stop.get_token(),
+                             [&](double, std::string_view) { stop.request_stop(); }),
+               Interrupted);
   EXPECT_TRUE(fs::is_empty(folder_));
 }
 
@@ -196,7 +219,8 @@ TEST(SuitePlanTest, NineHasSeventyTwoPairsAndMarkersThatEverySweepSees) {
       for (const simulated::Board& board : plan.room.boards) {
         bool inside = true;
         for (const Eigen::Vector3d& corner : CornersInMarkerFrame(simulated::kMarkerLength)) {
-          const Eigen::Vector2d pixel = Project(plan.unit.color_true, T_camera_world * (board.T_world_marker * corner));
+          const Eigen::Vector2d pixel =
+              Project(plan.unit.color_true, T_camera_world * (board.T_world_marker * corner));
           inside = inside && pixel.x() > 4 && pixel.y() > 4 && pixel.x() < 635 && pixel.y() < 475;
         }
         seen += inside ? 1 : 0;
@@ -211,6 +235,56 @@ TEST(SuitePlanTest, NineHasSeventyTwoPairsAndMarkersThatEverySweepSees) {
       lowest = std::min(lowest, (scene.T_world_body * vertex.cast<double>()).z());
     EXPECT_NEAR(lowest, -0.001, 1e-5);
   }
+}
+
+TEST(SuitePlanTest, SmallMovesAreSmallAndSomeAreInToleranceByHalf) {
+  const simulated::SuitePlan plan = simulated::PlanSuite({.suite = "small", .out = {}, .seed = 3});
+  EXPECT_EQ(plan.scenes.size(), 10U);
+  EXPECT_EQ(plan.pairs.size(), 90U);
+  int close = 0, far = 0;
+  for (const simulated::ScenePlan& a : plan.scenes) {
+    for (const simulated::ScenePlan& b : plan.scenes) {
+      if (&a == &b) continue;
+      const Pose M = b.T_world_body * a.T_world_body.inverse();
+      const Eigen::Vector3d shift =
+          b.T_world_body * b.body->centroid - a.T_world_body * a.body->centroid;
+      EXPECT_LT(shift.norm(), 12 * kMillimetre);
+      EXPECT_LT(RotationAngle(M), 3 * kDegree);
+      close += shift.cwiseAbs().maxCoeff() < 1.5 * kMillimetre && RotationAngle(M) < 0.5 * kDegree;
+      far += shift.cwiseAbs().maxCoeff() > 3 * kMillimetre || RotationAngle(M) > 1 * kDegree;
+    }
+  }
+  EXPECT_GE(close, 10);
+  EXPECT_GE(far, 40);
+}
+
+TEST(SuitePlanTest, TheUnitChangesTheSensorAndNothingElse) {
+  const simulated::SuitePlan a = simulated::PlanSuite({.suite = "nine", .out = {}, .seed = 2});
+  const simulated::SuitePlan b =
+      simulated::PlanSuite({.suite = "nine", .out = {}, .seed = 2, .unit = 7});
+  EXPECT_EQ(a.unit.seed, 2U);
+  EXPECT_EQ(b.unit.seed, 7U);
+  EXPECT_NE(a.unit.color_true, b.unit.color_true);
+  EXPECT_EQ(a.unit.faults, simulated::FaultsOf(simulated::NoiseLevel::kNominal));
+  ASSERT_EQ(a.room.boards.size(), b.room.boards.size());
+  for (std::size_t i = 0; i < a.room.boards.size(); ++i) {
+    EXPECT_EQ(a.room.boards[i].id, b.room.boards[i].id);
+    EXPECT_TRUE(a.room.boards[i].T_world_marker.isApprox(b.room.boards[i].T_world_marker, 0.0));
+  }
+  const simulated::Trajectory one(a.scenes[4].sweep.motion), other(b.scenes[4].sweep.motion);
+  EXPECT_TRUE(one.T_world_camera(3.3).isApprox(other.T_world_camera(3.3), 0.0));
+}
+
+TEST(SuitePlanTest, OnlyADemoOfNoUnitIsMild) {
+  using simulated::NoiseLevel;
+  EXPECT_EQ(FaultsOf({.suite = "demo", .out = {}}), simulated::MildFaults(NoiseLevel::kNominal));
+  EXPECT_EQ(FaultsOf({.suite = "demo", .out = {}, .unit = 1}),
+            simulated::FaultsOf(NoiseLevel::kNominal));
+  EXPECT_EQ(FaultsOf({.suite = "nine", .out = {}}), simulated::FaultsOf(NoiseLevel::kNominal));
+  EXPECT_EQ(FaultsOf({.suite = "nine", .out = {}, .noise = NoiseLevel::kIdeal}),
+            simulated::FaultSet());
+  EXPECT_EQ(FaultsOf({.suite = "nine", .out = {}, .faults = simulated::FaultSet()}),
+            simulated::FaultSet());
 }
 
 }  // namespace

@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
+#include "algo/base/pose.hpp"
 #include "algo/types/frame.hpp"
-#include "algo/types/pose.hpp"
 
 namespace plumb {
 

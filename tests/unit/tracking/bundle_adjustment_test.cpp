@@ -35,19 +35,22 @@ TEST(BundleAdjust, FindsDisturbedPosesWithTheCalibrationAsStated) {
   TrackingMap map = truth.map;
   Disturb(map, 0.01, 0.01);
   CalibrationModel calibration;
-  const BundleSummary summary = BundleAdjust(truth.stated, FreeAllButTheFirst(map), {}, map, calibration);
+  const BundleSummary summary =
+      BundleAdjust(truth.stated, FreeAllButTheFirst(map), {}, map, calibration);
   EXPECT_TRUE(summary.usable);
   EXPECT_EQ(calibration.lens, CalibrationModel{}.lens) << "not free, must not move";
   const auto error = Compare(map, truth.map);
-  fmt::print("poses {:.2e} m {:.2e} rad in {} iterations\n", error.translation_m, error.rotation_rad, summary.num_iterations);
+  fmt::print("poses {:.2e} m {:.2e} rad in {} iterations\n", error.translation_m,
+             error.rotation_rad, summary.num_iterations);
   EXPECT_LT(error.translation_m, 1e-4);  // Measured: 0.025 mm, where the solver is content.
   EXPECT_LT(error.rotation_rad, 1e-4);   // Measured: 0.016 mrad.
   // Derivatives that were off would crawl; Gauss-Newton with true ones is there in 4.
   EXPECT_LE(summary.num_iterations, 8);
 }
 
-// One parameter of the sensor wrong at a time: the solve must find just that, whatever the sign. Measured: within a fortieth of what
-// is wrong, except for the edge bias (0.042 of 0.050): larger markers and a smaller scene look nearly alike, and the priors choose.
+// One parameter of the sensor wrong at a time: the solve must find just that, whatever the sign.
+// Measured: within a fortieth of what is wrong, except for the edge bias (0.042 of 0.050): larger
+// markers and a smaller scene look nearly alike, and the priors choose.
 struct WrongSensor {
   const char* name;
   std::function<double&(CalibrationModel&)> value;
@@ -70,8 +73,8 @@ TEST_P(BundleAdjustCalibration, FindsWhatIsWrong) {
     const BundleSummary summary = BundleAdjust(truth.stated, bundle, {}, map, found);
     const auto error = Compare(map, truth.map);
     const double value = GetParam().value(found);
-    fmt::print("{}: {:.6f} of {:.6f}, poses {:.2e} m, {} iterations\n", GetParam().name, value, sign * GetParam().wrong_by,
-               error.translation_m, summary.num_iterations);
+    fmt::print("{}: {:.6f} of {:.6f}, poses {:.2e} m, {} iterations\n", GetParam().name, value,
+               sign * GetParam().wrong_by, error.translation_m, summary.num_iterations);
     EXPECT_TRUE(summary.usable);
     EXPECT_NEAR(value, sign * GetParam().wrong_by, GetParam().tolerance);
     EXPECT_LT(error.translation_m, 3e-4);
@@ -80,27 +83,42 @@ TEST_P(BundleAdjustCalibration, FindsWhatIsWrong) {
 
 INSTANTIATE_TEST_SUITE_P(
     Parameters, BundleAdjustCalibration,
-    testing::Values(WrongSensor{"focal_x", [](CalibrationModel& c) -> double& { return c.lens[0]; }, 0.003, 1e-4},
-                    WrongSensor{"focal_y", [](CalibrationModel& c) -> double& { return c.lens[1]; }, 0.003, 1e-4},
-                    WrongSensor{"centre_x", [](CalibrationModel& c) -> double& { return c.lens[2]; }, 2.0, 0.05},
-                    WrongSensor{"centre_y", [](CalibrationModel& c) -> double& { return c.lens[3]; }, 2.0, 0.05},
-                    WrongSensor{"k1", [](CalibrationModel& c) -> double& { return c.lens[4]; }, 0.01, 0.001},
-                    WrongSensor{"k2", [](CalibrationModel& c) -> double& { return c.lens[5]; }, 0.02, 0.003},
-                    WrongSensor{"readout", [](CalibrationModel& c) -> double& { return c.readout_s[0]; }, 0.02, 4e-4},
-                    WrongSensor{"edge_bias", [](CalibrationModel& c) -> double& { return c.edge_bias_px[0]; }, 0.05, 0.015},
-                    WrongSensor{"depth_scale", [](CalibrationModel& c) -> double& { return c.depth[0]; }, 0.01, 3e-4},
-                    WrongSensor{"depth_offset", [](CalibrationModel& c) -> double& { return c.depth[1]; }, 0.005, 3e-4},
-                    WrongSensor{"depth_bow", [](CalibrationModel& c) -> double& { return c.depth[2]; }, 0.005, 2e-4},
-                    WrongSensor{"depth_delay", [](CalibrationModel& c) -> double& { return c.depth[5]; }, 0.005, 2e-4},
-                    WrongSensor{"depth_slope_x", [](CalibrationModel& c) -> double& { return c.depth[6]; }, 0.003, 2e-4},
-                    WrongSensor{"depth_slope_y", [](CalibrationModel& c) -> double& { return c.depth[7]; }, 0.003, 2e-4},
-                    WrongSensor{"depth_readout", [](CalibrationModel& c) -> double& { return c.depth[8]; }, 0.02, 1e-3}),
+    testing::Values(
+        WrongSensor{"focal_x", [](CalibrationModel& c) -> double& { return c.lens[0]; }, 0.003,
+                    1e-4},
+        WrongSensor{"focal_y", [](CalibrationModel& c) -> double& { return c.lens[1]; }, 0.003,
+                    1e-4},
+        WrongSensor{"centre_x", [](CalibrationModel& c) -> double& { return c.lens[2]; }, 2.0,
+                    0.05},
+        WrongSensor{"centre_y", [](CalibrationModel& c) -> double& { return c.lens[3]; }, 2.0,
+                    0.05},
+        WrongSensor{"k1", [](CalibrationModel& c) -> double& { return c.lens[4]; }, 0.01, 0.001},
+        WrongSensor{"k2", [](CalibrationModel& c) -> double& { return c.lens[5]; }, 0.02, 0.003},
+        WrongSensor{"readout", [](CalibrationModel& c) -> double& { return c.readout_s[0]; }, 0.02,
+                    4e-4},
+        WrongSensor{"edge_bias", [](CalibrationModel& c) -> double& { return c.edge_bias_px[0]; },
+                    0.05, 0.015},
+        WrongSensor{"depth_scale", [](CalibrationModel& c) -> double& { return c.depth[0]; }, 0.01,
+                    3e-4},
+        WrongSensor{"depth_offset", [](CalibrationModel& c) -> double& { return c.depth[1]; },
+                    0.005, 3e-4},
+        WrongSensor{"depth_bow", [](CalibrationModel& c) -> double& { return c.depth[2]; }, 0.005,
+                    2e-4},
+        WrongSensor{"depth_delay", [](CalibrationModel& c) -> double& { return c.depth[5]; }, 0.005,
+                    2e-4},
+        WrongSensor{"depth_slope_x", [](CalibrationModel& c) -> double& { return c.depth[6]; },
+                    0.003, 2e-4},
+        WrongSensor{"depth_slope_y", [](CalibrationModel& c) -> double& { return c.depth[7]; },
+                    0.003, 2e-4},
+        WrongSensor{"depth_readout", [](CalibrationModel& c) -> double& { return c.depth[8]; },
+                    0.02, 1e-3}),
     [](const auto& given) { return std::string(given.param.name); });
 
 TEST(BundleAdjust, NoiseOnDepthDoesNotShrinkTheScene) {
-  // No markers: the scene's size hangs on depth alone, whose scale is free. Residuals in the scene's own metres would
-  // make a smaller scene look better.
-  const auto truth = MakeTrueMap({.num_landmarks = 400, .markers = false, .pixel_noise = 0.3, .depth_noise_sigmas = 3.0});
+  // No markers: the scene's size hangs on depth alone, whose scale is free. Residuals in the
+  // scene's own metres would make a smaller scene look better.
+  const auto truth = MakeTrueMap(
+      {.num_landmarks = 400, .markers = false, .pixel_noise = 0.3, .depth_noise_sigmas = 3.0});
   TrackingMap map = truth.map;
   CalibrationModel calibration;
   BundleOptions options = FreeAllButTheFirst(map);
@@ -111,7 +129,8 @@ TEST(BundleAdjust, NoiseOnDepthDoesNotShrinkTheScene) {
   const auto way = [](const TrackingMap& m) {
     double sum = 0;
     for (const MapKeyframe& k : m.keyframes)
-      sum += (k.T_world_color.translation() - m.keyframes.front().T_world_color.translation()).norm();
+      sum +=
+          (k.T_world_color.translation() - m.keyframes.front().T_world_color.translation()).norm();
     return sum;
   };
   const double scale = way(map) / way(truth.map);
@@ -131,7 +150,8 @@ TEST(BundleAdjust, SameBitsEveryTime) {
     BundleAdjust(truth.stated, options, {}, map, calibration);
   }
   for (std::size_t k = 0; k < maps[0].keyframes.size(); ++k)
-    EXPECT_EQ(maps[0].keyframes[k].T_world_color.matrix(), maps[1].keyframes[k].T_world_color.matrix());
+    EXPECT_EQ(maps[0].keyframes[k].T_world_color.matrix(),
+              maps[1].keyframes[k].T_world_color.matrix());
 }
 
 TEST(BundleAdjust, KeyframesThatAreNotFreeStay) {
@@ -144,7 +164,8 @@ TEST(BundleAdjust, KeyframesThatAreNotFreeStay) {
   CalibrationModel calibration;
   BundleAdjust(truth.stated, options, {}, map, calibration);
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
-    const bool same = map.keyframes[k].T_world_color.matrix() == start.keyframes[k].T_world_color.matrix();
+    const bool same =
+        map.keyframes[k].T_world_color.matrix() == start.keyframes[k].T_world_color.matrix();
     EXPECT_EQ(same, k != 3 && k != 4) << k;
   }
 }
@@ -166,7 +187,9 @@ TEST(BundleAdjust, QuadraticTermPullsToItsMinimum) {
   Intrinsics stated;
   EXPECT_TRUE(BundleAdjust(stated, options, {term}, map, calibration).usable);
   const Vector6d moved = TwistFromPose(map.keyframes[1].T_world_color);
-  for (int i = 0; i < 6; ++i) EXPECT_NEAR(moved[i], 0.001 * (i - 2), 1e-7) << i;  // Measured: 2e-10; the solver's first trust region.
+  for (int i = 0; i < 6; ++i)
+    EXPECT_NEAR(moved[i], 0.001 * (i - 2), 1e-7)
+        << i;  // Measured: 2e-10; the solver's first trust region.
 }
 
 }  // namespace

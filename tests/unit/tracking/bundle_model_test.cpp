@@ -19,15 +19,20 @@ CameraState SomeCamera() {
   return camera;
 }
 
-Intrinsics SomeLens() { return {320, 240, 262.0, 263.0, 158.0, 121.0, {0.06, -0.15, 0.001, -0.0008, 0.03}}; }
+Intrinsics SomeLens() {
+  return {320, 240, 262.0, 263.0, 158.0, 121.0, {0.06, -0.15, 0.001, -0.0008, 0.03}};
+}
 
 const Eigen::Vector3d kPoint(0.2, 0.35, 0.9);
 constexpr double kLate_s = 0.02;
 
-// Largest difference between a derivative and central differences of `value` over the coordinates of a vector.
+// Largest difference between a derivative and central differences of `value` over the coordinates
+// of a vector.
 template <int kRows, int kColumns>
-double Mismatch(const Eigen::Matrix<double, kRows, kColumns>& derivative,
-                const std::function<Eigen::Matrix<double, kRows, 1>(const Eigen::Matrix<double, kColumns, 1>&)>& value) {
+double Mismatch(
+    const Eigen::Matrix<double, kRows, kColumns>& derivative,
+    const std::function<Eigen::Matrix<double, kRows, 1>(const Eigen::Matrix<double, kColumns, 1>&)>&
+        value) {
   double worst = 0;
   for (int i = 0; i < kColumns; ++i) {
     Eigen::Matrix<double, kColumns, 1> step = Eigen::Matrix<double, kColumns, 1>::Zero();
@@ -39,27 +44,36 @@ double Mismatch(const Eigen::Matrix<double, kRows, kColumns>& derivative,
 }
 
 TEST(BundleModel, PoseDerivativeOfASeenPoint) {
-  const double worst = Mismatch<3, 6>(See(SomeCamera(), kPoint, kLate_s).J_pose, [](const Vector6d& step) {
-    CameraState camera = SomeCamera();
-    camera.twist += step;
-    camera.Prepare();
-    return See(camera, kPoint, kLate_s).p;
-  });
+  const double worst =
+      Mismatch<3, 6>(See(SomeCamera(), kPoint, kLate_s).J_pose, [](const Vector6d& step) {
+        CameraState camera = SomeCamera();
+        camera.twist += step;
+        camera.Prepare();
+        return See(camera, kPoint, kLate_s).p;
+      });
   EXPECT_LT(worst, 1e-5);  // The right Jacobian is of second order: w^3 / 24 is 1e-6 here.
 }
 
 TEST(BundleModel, WorldAndTimeDerivativesOfASeenPoint) {
   const SeenPoint seen = See(SomeCamera(), kPoint, kLate_s);
-  EXPECT_LT((Mismatch<3, 3>(seen.J_world, [](const Eigen::Vector3d& step) { return See(SomeCamera(), kPoint + step, kLate_s).p; })), 1e-8);
-  EXPECT_LT(
-      (Mismatch<3, 1>(seen.J_time, [](const Eigen::Matrix<double, 1, 1>& step) { return See(SomeCamera(), kPoint, kLate_s + step[0]).p; })),
-      1e-8);
+  EXPECT_LT((Mismatch<3, 3>(seen.J_world,
+                            [](const Eigen::Vector3d& step) {
+                              return See(SomeCamera(), kPoint + step, kLate_s).p;
+                            })),
+            1e-8);
+  EXPECT_LT((Mismatch<3, 1>(seen.J_time,
+                            [](const Eigen::Matrix<double, 1, 1>& step) {
+                              return See(SomeCamera(), kPoint, kLate_s + step[0]).p;
+                            })),
+            1e-8);
 }
 
 TEST(BundleModel, ASeenPointMovesAsTheCameraDoes) {
   // Exactly, by the pose itself some time later; what differs is of second order in that time.
   const CameraState camera = SomeCamera();
-  const Eigen::Vector3d exact = (camera.T_camera_world.inverse() * PoseFromTwist(camera.velocity_per_s * kLate_s)).inverse() * kPoint;
+  const Eigen::Vector3d exact =
+      (camera.T_camera_world.inverse() * PoseFromTwist(camera.velocity_per_s * kLate_s)).inverse() *
+      kPoint;
   EXPECT_LT((See(camera, kPoint, kLate_s).p - exact).norm(), 2e-4);
   EXPECT_GT((See(camera, kPoint, 0.0).p - exact).norm(), 2e-3);
 }
@@ -68,12 +82,16 @@ TEST(BundleModel, DerivativesOfAPixel) {
   const std::array<double, 6> lens = {0.002, -0.001, 0.5, -0.7, 0.01, -0.02};
   const Eigen::Vector3d p(0.31, -0.22, 0.8);
   const SeenPixel seen = ProjectCorrected(SomeLens(), lens, p);
-  EXPECT_LT((Mismatch<2, 3>(seen.J_point, [&](const Eigen::Vector3d& step) { return ProjectCorrected(SomeLens(), lens, p + step).pixel; })),
+  EXPECT_LT((Mismatch<2, 3>(seen.J_point,
+                            [&](const Eigen::Vector3d& step) {
+                              return ProjectCorrected(SomeLens(), lens, p + step).pixel;
+                            })),
             1e-5);
   EXPECT_LT((Mismatch<2, 6>(seen.J_lens,
                             [&](const Vector6d& step) {
                               std::array<double, 6> moved = lens;
-                              for (int i = 0; i < 6; ++i) moved[static_cast<std::size_t>(i)] += step[i];
+                              for (int i = 0; i < 6; ++i)
+                                moved[static_cast<std::size_t>(i)] += step[i];
                               return ProjectCorrected(SomeLens(), moved, p).pixel;
                             })),
             1e-5);
@@ -88,18 +106,22 @@ TEST(BundleModel, DerivativesOfAPredictedDepth) {
   const Eigen::Vector2d centred(0.6, -0.4);
   constexpr double kRowShare = 0.3;
   const auto predict = [&](const CalibrationModel& c) {
-    return PredictDepth(c, See(SomeCamera(), kPoint, c.depth[5] + kRowShare * c.depth[8]), centred, kRowShare);
+    return PredictDepth(c, See(SomeCamera(), kPoint, c.depth[5] + kRowShare * c.depth[8]), centred,
+                        kRowShare);
   };
   const PredictedDepth predicted = predict(calibration);
-  const double worst = Mismatch<1, kSize>(predicted.J_depth, [&](const Eigen::Matrix<double, kSize, 1>& step) {
-    CalibrationModel moved = calibration;
-    for (int i = 0; i < kSize; ++i) moved.depth[static_cast<std::size_t>(i)] += step[i];
-    return Eigen::Matrix<double, 1, 1>(predict(moved).z_m);
-  });
+  const double worst =
+      Mismatch<1, kSize>(predicted.J_depth, [&](const Eigen::Matrix<double, kSize, 1>& step) {
+        CalibrationModel moved = calibration;
+        for (int i = 0; i < kSize; ++i) moved.depth[static_cast<std::size_t>(i)] += step[i];
+        return Eigen::Matrix<double, 1, 1>(predict(moved).z_m);
+      });
   EXPECT_LT(worst, 1e-7);
   // What the model corrects, it also predicts: measured -> corrected -> measured.
   const SeenPoint seen = See(SomeCamera(), kPoint, 0.0);
-  EXPECT_NEAR(calibration.CorrectedDepth(PredictDepth(calibration, seen, centred, 0.0).z_m, centred), seen.p.z(), 1e-12);
+  EXPECT_NEAR(
+      calibration.CorrectedDepth(PredictDepth(calibration, seen, centred, 0.0).z_m, centred),
+      seen.p.z(), 1e-12);
 }
 
 }  // namespace

@@ -15,15 +15,17 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector2f;
 
-// A smooth pattern known at every real place, so that images moved by fractions of a pixel are exact.
+// A smooth pattern known at every real place, so that images moved by fractions of a pixel are
+// exact.
 cv::Mat Pattern(double dx, double dy, int width = 320, int height = 240) {
   cv::Mat image(height, width, CV_8UC1);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const double u = x - dx;
       const double v = y - dy;
-      const double value = 128 + 40 * std::sin(0.31 * u + 0.05 * v) * std::cos(0.27 * v - 0.04 * u) + 30 * std::sin(0.11 * u - 0.13 * v) +
-                           25 * std::cos(0.19 * v + 0.07 * u + 0.001 * u * v);
+      const double value =
+          128 + 40 * std::sin(0.31 * u + 0.05 * v) * std::cos(0.27 * v - 0.04 * u) +
+          30 * std::sin(0.11 * u - 0.13 * v) + 25 * std::cos(0.19 * v + 0.07 * u + 0.001 * u * v);
       image.at<unsigned char>(y, x) = cv::saturate_cast<unsigned char>(value);
     }
   }
@@ -38,15 +40,19 @@ TEST(Keypoints, FollowsAShiftToAFractionOfAPixel) {
   const auto corners = DetectCorners(from, {}, options);
   ASSERT_GT(corners.size(), 100U);
   const KltResult result =
-      TrackKlt(MakePyramid(from, options), MakePyramid(Pattern(dx, dy), options), corners, corners, options.levels, options);
+      TrackKlt(MakePyramid(from, options), MakePyramid(Pattern(dx, dy), options), corners, corners,
+               options.levels, options);
   std::vector<float> errors;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     if (!result.found[i]) continue;
-    errors.push_back((result.points[i] - corners[i] - Vector2f(static_cast<float>(dx), static_cast<float>(dy))).norm());
+    errors.push_back(
+        (result.points[i] - corners[i] - Vector2f(static_cast<float>(dx), static_cast<float>(dy)))
+            .norm());
   }
   ASSERT_GT(errors.size(), corners.size() * 8 / 10);
   std::sort(errors.begin(), errors.end());
-  fmt::print("KLT: median {:.3f} px, 80 % below {:.3f} px\n", errors[errors.size() / 2], errors[errors.size() * 8 / 10]);
+  fmt::print("KLT: median {:.3f} px, 80 % below {:.3f} px\n", errors[errors.size() / 2],
+             errors[errors.size() * 8 / 10]);
   EXPECT_LT(errors[errors.size() / 2], 0.05F);
   EXPECT_LT(errors[errors.size() * 8 / 10], 0.1F);
 }
@@ -59,12 +65,14 @@ TEST(Keypoints, FollowsThroughAChangeOfTheExposureOnceItsRatioIsKnown) {
   const double ratio = BrightnessRatio(from, darker, corners, corners);
   EXPECT_NEAR(ratio, 0.6, 0.03);  // The pattern moved a little too.
   const auto found = [&](const cv::Mat& start) {
-    const KltResult result = TrackKlt(MakePyramid(start, options), MakePyramid(darker, options), corners, corners, options.levels, options);
+    const KltResult result = TrackKlt(MakePyramid(start, options), MakePyramid(darker, options),
+                                      corners, corners, options.levels, options);
     return static_cast<std::size_t>(std::count(result.found.begin(), result.found.end(), true));
   };
   EXPECT_LT(found(from), corners.size() / 2) << "the change does no harm: nothing is tested";
   EXPECT_GT(found(from * ratio), corners.size() * 8 / 10);
-  EXPECT_EQ(BrightnessRatio(from, darker, {corners[0]}, {corners[0]}), 1.0) << "one point tells nothing";
+  EXPECT_EQ(BrightnessRatio(from, darker, {corners[0]}, {corners[0]}), 1.0)
+      << "one point tells nothing";
 }
 
 TEST(Keypoints, LosesWhatIsNoLongerThere) {
@@ -72,7 +80,8 @@ TEST(Keypoints, LosesWhatIsNoLongerThere) {
   const cv::Mat from = Pattern(0, 0);
   const auto corners = DetectCorners(from, {}, options);
   const cv::Mat black = cv::Mat::zeros(from.size(), CV_8UC1);
-  const KltResult result = TrackKlt(MakePyramid(from, options), MakePyramid(black, options), corners, corners, options.levels, options);
+  const KltResult result = TrackKlt(MakePyramid(from, options), MakePyramid(black, options),
+                                    corners, corners, options.levels, options);
   for (std::size_t i = 0; i < corners.size(); ++i) EXPECT_FALSE(result.found[i]);
 }
 
@@ -83,7 +92,8 @@ TEST(Keypoints, OneCornerACellAndNoneWhereOneIs) {
   const int cell = 16;  // 32 at 640 columns.
   std::vector<int> count(20 * 15, 0);
   for (const Vector2f& p : corners)
-    ++count[static_cast<std::size_t>(static_cast<int>(std::lround(p.y())) / cell * 20 + static_cast<int>(std::lround(p.x())) / cell)];
+    ++count[static_cast<std::size_t>(static_cast<int>(std::lround(p.y())) / cell * 20 +
+                                     static_cast<int>(std::lround(p.x())) / cell)];
   for (const int n : count) EXPECT_LE(n, 2);  // Two where a peak lies on the cells' border.
   const auto again = DetectCorners(image, corners, options);
   EXPECT_LT(again.size(), corners.size() / 5);
@@ -94,12 +104,15 @@ TEST(Keypoints, FindsACornerWhereItIs) {
   image(cv::Rect(100, 80, 220, 160)).setTo(180);  // Its corner is at pixel border (99.5, 79.5).
   const auto corners = DetectCorners(image, {}, {});
   double nearest = 1e9;
-  for (const Vector2f& p : corners) nearest = std::min<double>(nearest, (p - Vector2f(99.5F, 79.5F)).norm());
+  for (const Vector2f& p : corners)
+    nearest = std::min<double>(nearest, (p - Vector2f(99.5F, 79.5F)).norm());
   // The score's window pulls the peak inwards a little.
   EXPECT_LT(nearest, 1.5);
 }
 
-TEST(Keypoints, FlatImagesHaveNoCorners) { EXPECT_TRUE(DetectCorners(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)), {}, {}).empty()); }
+TEST(Keypoints, FlatImagesHaveNoCorners) {
+  EXPECT_TRUE(DetectCorners(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)), {}, {}).empty());
+}
 
 TEST(Keypoints, DepthIsTheMedianAndNothingAtEdgesAndHoles) {
   cv::Mat depth(20, 20, CV_32FC1, cv::Scalar(0.8));
@@ -110,7 +123,8 @@ TEST(Keypoints, DepthIsTheMedianAndNothingAtEdgesAndHoles) {
   cv::Mat holes = cv::Mat::zeros(20, 20, CV_32FC1);
   holes.at<float>(5, 5) = 0.9F;
   EXPECT_EQ(DepthAt(holes, {5, 5}), 0.0) << "too little around";
-  for (const Vector2d& outside : {Vector2d(-3, 5), Vector2d(0, 0), Vector2d(25, 5), Vector2d(5, 19), Vector2d(1e9, -1e9)})
+  for (const Vector2d& outside :
+       {Vector2d(-3, 5), Vector2d(0, 0), Vector2d(25, 5), Vector2d(5, 19), Vector2d(1e9, -1e9)})
     EXPECT_EQ(DepthAt(depth, outside), 0.0);
 }
 
@@ -121,7 +135,8 @@ TEST(DenseView, PlaneHasItsNormalAndDepth) {
   cv::Mat depth(480, 640, CV_32FC1);
   for (int r = 0; r < 480; ++r)
     for (int c = 0; c < 640; ++c)
-      depth.at<float>(r, c) = static_cast<float>(0.6 / n.dot(Eigen::Vector3d((c - k.cx) / k.fx, (r - k.cy) / k.fy, 1)));
+      depth.at<float>(r, c) =
+          static_cast<float>(0.6 / n.dot(Eigen::Vector3d((c - k.cx) / k.fx, (r - k.cy) / k.fy, 1)));
   depth(cv::Rect(200, 200, 40, 40)).setTo(0);
   const DenseView view = DenseViewMaker(k).Make(depth);
   ASSERT_EQ(view.width, 160);

@@ -32,17 +32,23 @@ TEST(LocalBundle, FindsDisturbedPosesLandmarksAndMarkers) {
   Disturb(map, 0.01, 0.01);
   const LocalBundleSummary summary = AdjustLocalMap(truth.stated, FreeFrom(1, map), map);
   const auto error = Compare(map, truth.map);
-  fmt::print("poses {:.2e} m {:.2e} rad, cost {:.3g} -> {:.3g} in {} iterations\n", error.translation_m, error.rotation_rad,
-             summary.initial_cost, summary.final_cost, summary.num_iterations);
-  // Measured: 0.025 mm and 0.016 mrad, what the depth stamp's motion to first order leaves (the other solver stops there too).
+  fmt::print("poses {:.2e} m {:.2e} rad, cost {:.3g} -> {:.3g} in {} iterations\n",
+             error.translation_m, error.rotation_rad, summary.initial_cost, summary.final_cost,
+             summary.num_iterations);
+  // Measured: 0.025 mm and 0.016 mrad, what the depth stamp's motion to first order leaves (the
+  // other solver stops there too).
   EXPECT_LT(error.translation_m, 5e-5);
   EXPECT_LT(error.rotation_rad, 5e-5);
   for (const auto& [id, marker] : map.markers)
-    EXPECT_LT((marker.T_world_marker.translation() - truth.map.markers.at(id).T_world_marker.translation()).norm(), 5e-5)
+    EXPECT_LT((marker.T_world_marker.translation() -
+               truth.map.markers.at(id).T_world_marker.translation())
+                  .norm(),
+              5e-5)
         << "marker " << id;
 }
 
-// Wrong derivatives still creep downhill; true ones converge quadratically once the damping is gone.
+// Wrong derivatives still creep downhill; true ones converge quadratically once the damping is
+// gone.
 TEST(LocalBundle, ConvergesInAFewIterations) {
   const auto truth = MakeTrueMap({});
   TrackingMap map = truth.map;
@@ -77,12 +83,15 @@ TEST(LocalBundle, LeavesTheOtherKeyframesAlone) {
   const TrackingMap before = map;
   AdjustLocalMap(truth.stated, FreeFrom(6, map), map);
   for (std::size_t k = 0; k < 6; ++k)
-    EXPECT_TRUE(map.keyframes[k].T_world_color.isApprox(before.keyframes[k].T_world_color, 0.0)) << "keyframe " << k;
+    EXPECT_TRUE(map.keyframes[k].T_world_color.isApprox(before.keyframes[k].T_world_color, 0.0))
+        << "keyframe " << k;
   for (std::size_t k = 6; k < map.keyframes.size(); ++k)
-    EXPECT_FALSE(map.keyframes[k].T_world_color.isApprox(before.keyframes[k].T_world_color, 1e-9)) << "keyframe " << k;
+    EXPECT_FALSE(map.keyframes[k].T_world_color.isApprox(before.keyframes[k].T_world_color, 1e-9))
+        << "keyframe " << k;
 }
 
-// The whole map's solver shares nothing with this one but the model. Where this one stops, that one must find next to nothing left.
+// The whole map's solver shares nothing with this one but the model. Where this one stops, that one
+// must find next to nothing left.
 TEST(LocalBundle, StopsWhereTheWholeMapsSolverStopsToo) {
   const auto truth = MakeTrueMap({.pixel_noise = 0.4, .depth_noise_sigmas = 1.0});
   TrackingMap map = truth.map;
@@ -98,8 +107,8 @@ TEST(LocalBundle, StopsWhereTheWholeMapsSolverStopsToo) {
   CalibrationModel none;
   const BundleSummary summary = BundleAdjust(truth.stated, whole, {}, again, none);
   const auto moved = Compare(again, map);
-  fmt::print("left for the other solver: cost {:.6g} -> {:.6g}, {:.2e} m, {:.2e} rad\n", summary.initial_cost, summary.final_cost,
-             moved.translation_m, moved.rotation_rad);
+  fmt::print("left for the other solver: cost {:.6g} -> {:.6g}, {:.2e} m, {:.2e} rad\n",
+             summary.initial_cost, summary.final_cost, moved.translation_m, moved.rotation_rad);
   EXPECT_LT(summary.initial_cost - summary.final_cost, 1e-3 * summary.initial_cost);
   EXPECT_LT(moved.translation_m, 2e-4);
   EXPECT_LT(moved.rotation_rad, 2e-4);
@@ -109,11 +118,13 @@ TEST(LocalBundle, WrongObservationsWeighLittle) {
   const auto truth = MakeTrueMap({});
   TrackingMap map = truth.map;
   for (MapKeyframe& keyframe : map.keyframes)
-    for (std::size_t i = 0; i < keyframe.keypoints.size(); i += 10) keyframe.keypoints[i].pixel.x() += 25.0;
+    for (std::size_t i = 0; i < keyframe.keypoints.size(); i += 10)
+      keyframe.keypoints[i].pixel.x() += 25.0;
   Disturb(map, 0.003, 0.003);
   AdjustLocalMap(truth.stated, FreeFrom(1, map), map);
   const auto error = Compare(map, truth.map);
-  fmt::print("with 10 % wrong by 25 px: {:.2e} m {:.2e} rad\n", error.translation_m, error.rotation_rad);
+  fmt::print("with 10 % wrong by 25 px: {:.2e} m {:.2e} rad\n", error.translation_m,
+             error.rotation_rad);
   EXPECT_LT(error.translation_m, 1e-3);
 }
 
@@ -125,14 +136,17 @@ TEST(LocalBundle, SameBitsTwice) {
   AdjustLocalMap(truth.stated, FreeFrom(1, a), a);
   AdjustLocalMap(truth.stated, FreeFrom(1, b), b);
   for (std::size_t k = 0; k < a.keyframes.size(); ++k)
-    EXPECT_EQ(std::memcmp(a.keyframes[k].T_world_color.data(), b.keyframes[k].T_world_color.data(), 16 * sizeof(double)), 0);
+    EXPECT_EQ(std::memcmp(a.keyframes[k].T_world_color.data(), b.keyframes[k].T_world_color.data(),
+                          16 * sizeof(double)),
+              0);
 }
 
 TEST(LocalBundle, LeavesAMapThatShowsNothingAsItIs) {
   TrackingMap map;
   map.keyframes.resize(2);
   map.keyframes[1].T_world_color.translation().x() = 0.1;
-  const LocalBundleSummary summary = AdjustLocalMap(MakeTrueMap({.num_landmarks = 1}).stated, {.free_keyframes = {1}}, map);
+  const LocalBundleSummary summary =
+      AdjustLocalMap(MakeTrueMap({.num_landmarks = 1}).stated, {.free_keyframes = {1}}, map);
   EXPECT_EQ(summary.num_observations, 0);
   EXPECT_DOUBLE_EQ(map.keyframes[1].T_world_color.translation().x(), 0.1);
 }

@@ -23,17 +23,19 @@ Pose TrueCamera(int k) {
   return T;
 }
 
-// A walk round a circle whose every step is a little too long and turned: the last camera, truly where the first is, is far off.
-// Each keyframe shares `kLandmarksEach` landmarks with the next.
+// A walk round a circle whose every step is a little too long and turned: the last camera, truly
+// where the first is, is far off. Each keyframe shares `kLandmarksEach` landmarks with the next.
 TrackingMap DriftedCircle(const Vector6d& drift_a_step) {
   TrackingMap map;
   for (int k = 0; k < kNumKeyframes; ++k) {
     MapKeyframe keyframe;
     keyframe.previous = k - 1;
     if (k > 0) {
-      keyframe.T_previous_color = TrueCamera(k - 1).inverse() * TrueCamera(k) * PoseFromTwist(drift_a_step);
+      keyframe.T_previous_color =
+          TrueCamera(k - 1).inverse() * TrueCamera(k) * PoseFromTwist(drift_a_step);
       keyframe.T_world_color = map.keyframes.back().T_world_color * keyframe.T_previous_color;
-      for (int i = 0; i < kLandmarksEach; ++i) keyframe.keypoints.push_back({(k - 1) * kLandmarksEach + i, {0, 0}, 1.0});
+      for (int i = 0; i < kLandmarksEach; ++i)
+        keyframe.keypoints.push_back({(k - 1) * kLandmarksEach + i, {0, 0}, 1.0});
     } else {
       keyframe.T_world_color = TrueCamera(0);
     }
@@ -56,7 +58,10 @@ const Vector6d kDrift = (Vector6d() << 0, 0.002, 0.0005, 0.002, 0, 0.001).finish
 double WorstError(const TrackingMap& map) {
   double worst = 0;
   for (int k = 0; k < kNumKeyframes; ++k)
-    worst = std::max(worst, (map.keyframes[static_cast<std::size_t>(k)].T_world_color.translation() - TrueCamera(k).translation()).norm());
+    worst =
+        std::max(worst, (map.keyframes[static_cast<std::size_t>(k)].T_world_color.translation() -
+                         TrueCamera(k).translation())
+                            .norm());
   return worst;
 }
 
@@ -65,10 +70,13 @@ TEST(LoopCandidates, AreOldKeyframesWithinTheDriftThatShareNoLandmarks) {
   const std::vector<int> candidates = LoopCandidates(map);
   ASSERT_FALSE(candidates.empty());
   EXPECT_LE(candidates.size(), 4U);
-  for (const int k : candidates) EXPECT_LE(k, 6) << "looks the other way, or is the last one's neighbour";
+  for (const int k : candidates)
+    EXPECT_LE(k, 6) << "looks the other way, or is the last one's neighbour";
   // Already known to each other.
   for (std::size_t i = 0; i < 7; ++i)
-    for (int id = 0; id < 10; ++id) map.keyframes[i].keypoints.push_back({(kNumKeyframes - 1) * kLandmarksEach + id, {0, 0}, 1.0});
+    for (int id = 0; id < 10; ++id)
+      map.keyframes[i].keypoints.push_back(
+          {(kNumKeyframes - 1) * kLandmarksEach + id, {0, 0}, 1.0});
   EXPECT_THAT(LoopCandidates(map), testing::IsEmpty());
   map.keyframes.resize(kLoopMinGap);
   EXPECT_THAT(LoopCandidates(map), testing::IsEmpty()) << "too young a map";
@@ -90,13 +98,16 @@ TEST(BendMap, SpreadsTheDriftOverTheWay) {
   ASSERT_GT(before, 0.08);
   const Pose T_first = map.keyframes[0].T_world_color;
   BendMap({{0, kNumKeyframes - 1, TrueCamera(0).inverse() * TrueCamera(kNumKeyframes - 1)}}, map);
-  const Pose T_ends = map.keyframes.front().T_world_color.inverse() * map.keyframes.back().T_world_color;
+  const Pose T_ends =
+      map.keyframes.front().T_world_color.inverse() * map.keyframes.back().T_world_color;
   EXPECT_LT(T_ends.translation().norm(), 0.1 * before);
   EXPECT_LT(WorstError(map), 0.35 * before);
   EXPECT_TRUE(map.keyframes[0].T_world_color.isApprox(T_first, 1e-12));
   // Landmarks stay where the keyframe that saw them first saw them.
   for (const Landmark& landmark : map.landmarks) {
-    const Vector3d p = map.keyframes[static_cast<std::size_t>(landmark.first_keyframe)].T_world_color.inverse() * landmark.p_world;
+    const Vector3d p =
+        map.keyframes[static_cast<std::size_t>(landmark.first_keyframe)].T_world_color.inverse() *
+        landmark.p_world;
     ASSERT_NEAR(p.z(), 1.0, 1e-9);
   }
   // Neighbours still stand to each other nearly as before.
@@ -114,8 +125,11 @@ TEST(BendMap, MovesMarkersWithTheKeyframeThatSawThemFirst) {
   map.keyframes[35].data.markers.push_back(seen);
   map.markers[7] = {map.keyframes[20].T_world_color * Pose(Eigen::Translation3d(0, 0, 1)), 2};
   BendMap({{0, kNumKeyframes - 1, TrueCamera(0).inverse() * TrueCamera(kNumKeyframes - 1)}}, map);
-  EXPECT_NEAR((map.keyframes[20].T_world_color.inverse() * map.markers[7].T_world_marker.translation() - Vector3d(0, 0, 1)).norm(), 0,
-              1e-9);
+  EXPECT_NEAR(
+      (map.keyframes[20].T_world_color.inverse() * map.markers[7].T_world_marker.translation() -
+       Vector3d(0, 0, 1))
+          .norm(),
+      0, 1e-9);
 }
 
 TEST(BendMap, LeavesAMapThatAgreesWithItsLinks) {
@@ -127,12 +141,18 @@ TEST(BendMap, LeavesAMapThatAgreesWithItsLinks) {
 TEST(LinkEquations, AgreeWithFiniteDifferences) {
   const Pose T_a = PoseFromTwist((Vector6d() << 0.3, -0.2, 0.1, 1, 2, 3).finished());
   const Pose T_b = T_a * PoseFromTwist((Vector6d() << 0.1, 0.2, -0.3, 0.3, -0.1, 0.2).finished());
-  KeyframeLink link{0, 1, T_a.inverse() * T_b * PoseFromTwist((Vector6d() << 2e-4, -1e-4, 3e-4, 0.003, 0.001, -0.002).finished())};
+  KeyframeLink link{
+      0, 1,
+      T_a.inverse() * T_b *
+          PoseFromTwist((Vector6d() << 2e-4, -1e-4, 3e-4, 0.003, 0.001, -0.002).finished())};
   const double sigma_rad = 0.01, sigma_m = 0.02;
   const auto cost = [&](const Eigen::Matrix<double, 12, 1>& x) {
-    const Pose T = (T_a * PoseFromTwist(x.head<6>())).inverse() * (T_b * PoseFromTwist(x.tail<6>()));
-    const Vector3d turn = VectorFromRotation(link.T_a_b.linear().transpose() * T.linear()) / sigma_rad;
-    return 0.5 * (turn.squaredNorm() + ((T.translation() - link.T_a_b.translation()) / sigma_m).squaredNorm());
+    const Pose T =
+        (T_a * PoseFromTwist(x.head<6>())).inverse() * (T_b * PoseFromTwist(x.tail<6>()));
+    const Vector3d turn =
+        VectorFromRotation(link.T_a_b.linear().transpose() * T.linear()) / sigma_rad;
+    return 0.5 * (turn.squaredNorm() +
+                  ((T.translation() - link.T_a_b.translation()) / sigma_m).squaredNorm());
   };
   const LinkEquations equations = Linearise(link, T_a, T_b, sigma_rad, sigma_m);
   for (int i = 0; i < 12; ++i) {

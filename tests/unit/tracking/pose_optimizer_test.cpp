@@ -57,7 +57,8 @@ TEST(OptimizePose, FortyPercentOutliersDoNotPull) {
   problem.points = Points(200, 0.4, 0.001, true);
   problem.num_iterations = 30;
   const PoseEstimate estimate = OptimizePose(problem, kTruth * kOff);
-  fmt::print("translation {:.2e} m, {} inliers\n", Translation(estimate.T_world_camera), estimate.num_inliers);
+  fmt::print("translation {:.2e} m, {} inliers\n", Translation(estimate.T_world_camera),
+             estimate.num_inliers);
   EXPECT_LT(Translation(estimate.T_world_camera), 0.001);
   int wrong = 0;
   for (std::size_t i = 80; i < 200; ++i) wrong += estimate.inlier[i] ? 0 : 1;
@@ -68,8 +69,10 @@ TEST(OptimizePose, FortyPercentOutliersDoNotPull) {
 TEST(OptimizePose, FourCornersOfAMarkerSuffice) {
   PoseProblem problem;
   constexpr double h = 0.052;
-  for (const Vector3d& p : {Vector3d(-h, h, 0.8), Vector3d(h, h, 0.82), Vector3d(h, -h, 0.84), Vector3d(-h, -h, 0.82)})
-    problem.points.push_back({.p_world = kTruth * p, .ideal = p.head<2>() / p.z(), .sigma = 0.0005});
+  for (const Vector3d& p :
+       {Vector3d(-h, h, 0.8), Vector3d(h, h, 0.82), Vector3d(h, -h, 0.84), Vector3d(-h, -h, 0.82)})
+    problem.points.push_back(
+        {.p_world = kTruth * p, .ideal = p.head<2>() / p.z(), .sigma = 0.0005});
   problem.num_iterations = 30;
   const PoseEstimate estimate = OptimizePose(problem, kTruth * kOff);
   EXPECT_LT(Translation(estimate.T_world_camera), 1e-4);
@@ -77,7 +80,8 @@ TEST(OptimizePose, FourCornersOfAMarkerSuffice) {
 
 TEST(OptimizePose, DepthAloneHoldsThePoseOverShape) {
   // Two views of the landscape, no points at all.
-  const auto truth = synthetic::MakeTrueMap({.num_keyframes = 16, .num_landmarks = 0, .markers = false, .dense = true});
+  const auto truth = synthetic::MakeTrueMap(
+      {.num_keyframes = 16, .num_landmarks = 0, .markers = false, .dense = true});
   const MapKeyframe& target = truth.map.keyframes[7];
   const MapKeyframe& frame = truth.map.keyframes[8];
   const auto depth_pose = [](const MapKeyframe& k) {
@@ -90,11 +94,13 @@ TEST(OptimizePose, DepthAloneHoldsThePoseOverShape) {
   problem.T_world_target = depth_pose(target);
   problem.T_color_depth = frame.T_world_color.inverse() * depth_pose(frame);
   problem.num_iterations = 30;
-  Pose T_start = frame.T_world_color * PoseFromTwist((Vector6d() << 0.01, -0.008, 0.01, 0.012, -0.01, 0.01).finished());
+  Pose T_start = frame.T_world_color *
+                 PoseFromTwist((Vector6d() << 0.01, -0.008, 0.01, 0.012, -0.01, 0.01).finished());
   const PoseEstimate estimate = OptimizePose(problem, T_start);
   const Pose error = frame.T_world_color.inverse() * estimate.T_world_camera;
-  fmt::print("dense: {:.2e} m {:.2e} rad, overlap {:.2f}, rms {:.2e} m\n", error.translation().norm(), RotationAngle(error),
-             estimate.dense_overlap, estimate.dense_rms_m);
+  fmt::print("dense: {:.2e} m {:.2e} rad, overlap {:.2f}, rms {:.2e} m\n",
+             error.translation().norm(), RotationAngle(error), estimate.dense_overlap,
+             estimate.dense_rms_m);
   EXPECT_LT(error.translation().norm(), 1e-4);  // Measured: 0.004 mm.
   EXPECT_LT(RotationAngle(error), 1e-4);
   EXPECT_GT(estimate.dense_overlap, 0.5);

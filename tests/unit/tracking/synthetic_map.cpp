@@ -32,16 +32,19 @@ struct Camera {
     const double f = 1 + (d[0] + l[4]) * r2 + (d[1] + l[5]) * r2 * r2 + d[4] * r2 * r2 * r2;
     const double xd = x * f + 2 * d[2] * x * y + d[3] * (r2 + 2 * x * x);
     const double yd = y * f + d[2] * (r2 + 2 * y * y) + 2 * d[3] * x * y;
-    return {stated.fx * (1 + l[0]) * xd + stated.cx + l[2] * scale(), stated.fy * (1 + l[1]) * yd + stated.cy + l[3] * scale()};
+    return {stated.fx * (1 + l[0]) * xd + stated.cx + l[2] * scale(),
+            stated.fy * (1 + l[1]) * yd + stated.cy + l[3] * scale()};
   }
   [[nodiscard]] double Share(double row) const { return (row + 0.5) / stated.height - 0.5; }
   [[nodiscard]] Vector2d Centred(const Vector2d& px) const {
-    return {(px.x() + 0.5 - stated.width / 2.0) / (stated.width / 2.0), (px.y() + 0.5 - stated.height / 2.0) / (stated.width / 2.0)};
+    return {(px.x() + 0.5 - stated.width / 2.0) / (stated.width / 2.0),
+            (px.y() + 0.5 - stated.height / 2.0) / (stated.width / 2.0)};
   }
   // What the depth camera says of a true depth.
   [[nodiscard]] double Measured(double z, const Vector2d& centred) const {
     const auto& d = sensor.depth;
-    return (z - d[1] - d[2] * centred.squaredNorm()) / (1 + d[0] + d[6] * centred.x() + d[7] * centred.y());
+    return (z - d[1] - d[2] * centred.squaredNorm()) /
+           (1 + d[0] + d[6] * centred.x() + d[7] * centred.y());
   }
 };
 
@@ -54,14 +57,18 @@ Pose Moved(const MapKeyframe& keyframe, double dt_s) {
 }
 
 // The row that sees a point decides when it is seen.
-std::optional<Vector2d> Seen(const Camera& camera, const MapKeyframe& keyframe, const Vector3d& p_world) {
+std::optional<Vector2d> Seen(const Camera& camera, const MapKeyframe& keyframe,
+                             const Vector3d& p_world) {
   Vector2d px(0, camera.stated.height / 2.0);
   for (int i = 0; i < 6; ++i) {
-    const Vector3d p = Moved(keyframe, camera.sensor.readout_s[0] * camera.Share(px.y())).inverse() * p_world;
+    const Vector3d p =
+        Moved(keyframe, camera.sensor.readout_s[0] * camera.Share(px.y())).inverse() * p_world;
     if (p.z() < 0.1) return std::nullopt;
     px = camera.ToPixel(p);
   }
-  if (px.x() < 3 || px.y() < 3 || px.x() > camera.stated.width - 4 || px.y() > camera.stated.height - 4) return std::nullopt;
+  if (px.x() < 3 || px.y() < 3 || px.x() > camera.stated.width - 4 ||
+      px.y() > camera.stated.height - 4)
+    return std::nullopt;
   return px;
 }
 
@@ -70,7 +77,8 @@ double DepthTime(const Camera& camera, double row) {
 }
 
 // Depth along a ray: of the landscape by bisection from above, or of a board before it.
-double CastDepth(const Pose& T_world_camera, const Vector3d& ray, const std::map<int, MapMarker>& boards) {
+double CastDepth(const Pose& T_world_camera, const Vector3d& ray,
+                 const std::map<int, MapMarker>& boards) {
   const Vector3d origin = T_world_camera.translation();
   const Vector3d direction = T_world_camera.linear() * ray;
   double low = 0.4;
@@ -82,15 +90,18 @@ double CastDepth(const Pose& T_world_camera, const Vector3d& ray, const std::map
   }
   for (const auto& [id, board] : boards) {
     const Vector3d normal = board.T_world_marker.linear().col(2);
-    const double z = normal.dot(board.T_world_marker.translation() - origin) / normal.dot(direction);
-    const Vector3d p = board.T_world_marker.linear().transpose() * (origin + z * direction - board.T_world_marker.translation());
-    if (std::abs(p.x()) < kBoardSide / 2 && std::abs(p.y()) < kBoardSide / 2) low = std::min(low, z);
+    const double z =
+        normal.dot(board.T_world_marker.translation() - origin) / normal.dot(direction);
+    const Vector3d p = board.T_world_marker.linear().transpose() *
+                       (origin + z * direction - board.T_world_marker.translation());
+    if (std::abs(p.x()) < kBoardSide / 2 && std::abs(p.y()) < kBoardSide / 2)
+      low = std::min(low, z);
   }
   return low;
 }
 
-cv::Mat RenderDepth(const Camera& camera, const MapKeyframe& keyframe, const std::map<int, MapMarker>& boards, double noise_m,
-                    std::mt19937& random) {
+cv::Mat RenderDepth(const Camera& camera, const MapKeyframe& keyframe,
+                    const std::map<int, MapMarker>& boards, double noise_m, std::mt19937& random) {
   const Intrinsics& k = camera.stated;
   const auto& l = camera.sensor.lens;
   const auto& d = camera.sensor.depth;
@@ -100,10 +111,12 @@ cv::Mat RenderDepth(const Camera& camera, const MapKeyframe& keyframe, const std
     const Pose T = Moved(keyframe, DepthTime(camera, r));
     for (int c = 0; c < k.width; ++c) {
       // The depth image lies to the right of and below the colour image by d[3], d[4].
-      const Vector3d ray((c - d[3] * camera.scale() - k.cx - l[2] * camera.scale()) / (k.fx * (1 + l[0])),
-                         (r - d[4] * camera.scale() - k.cy - l[3] * camera.scale()) / (k.fy * (1 + l[1])), 1.0);
+      const Vector3d ray(
+          (c - d[3] * camera.scale() - k.cx - l[2] * camera.scale()) / (k.fx * (1 + l[0])),
+          (r - d[4] * camera.scale() - k.cy - l[3] * camera.scale()) / (k.fy * (1 + l[1])), 1.0);
       depth.at<float>(r, c) =
-          static_cast<float>(camera.Measured(CastDepth(T, ray, boards), camera.Centred({c, r})) + noise_m * normal(random));
+          static_cast<float>(camera.Measured(CastDepth(T, ray, boards), camera.Centred({c, r})) +
+                             noise_m * normal(random));
     }
   }
   return depth;
@@ -112,7 +125,8 @@ cv::Mat RenderDepth(const Camera& camera, const MapKeyframe& keyframe, const std
 Pose LookDown(const Vector3d& position, const Vector3d& tilt) {
   Pose T = Pose::Identity();
   T.linear() = Vector3d(1, -1, -1).asDiagonal();
-  T.linear() *= (Eigen::AngleAxisd(tilt.x(), Vector3d::UnitX()) * Eigen::AngleAxisd(tilt.y(), Vector3d::UnitY()) *
+  T.linear() *= (Eigen::AngleAxisd(tilt.x(), Vector3d::UnitX()) *
+                 Eigen::AngleAxisd(tilt.y(), Vector3d::UnitY()) *
                  Eigen::AngleAxisd(tilt.z(), Vector3d::UnitZ()))
                     .toRotationMatrix();
   T.translation() = position;
@@ -124,7 +138,9 @@ void PlaceMarkers(TrackingMap& map) {
     const double x = -0.35 + 0.28 * (id % 3);
     const double y = id < 3 ? -0.25 : 0.25;
     Pose T = Pose::Identity();
-    T.linear() = (Eigen::AngleAxisd(0.4 * id, Vector3d::UnitZ()) * Eigen::AngleAxisd(0.1, Vector3d::UnitX())).toRotationMatrix();
+    T.linear() =
+        (Eigen::AngleAxisd(0.4 * id, Vector3d::UnitZ()) * Eigen::AngleAxisd(0.1, Vector3d::UnitX()))
+            .toRotationMatrix();
     T.translation() = Vector3d(x, y, Height(x, y) + kBoardHeight);
     map.markers[id] = {T, 0};
   }
@@ -133,7 +149,8 @@ void PlaceMarkers(TrackingMap& map) {
 void ObserveMarkers(const Camera& camera, double noise, std::mt19937& random, TrackingMap& map) {
   std::normal_distribution<double> normal;
   constexpr double h = kMarkerLength / 2;
-  const std::array<Vector3d, 4> in_marker = {Vector3d(-h, h, 0), Vector3d(h, h, 0), Vector3d(h, -h, 0), Vector3d(-h, -h, 0)};
+  const std::array<Vector3d, 4> in_marker = {Vector3d(-h, h, 0), Vector3d(h, h, 0),
+                                             Vector3d(h, -h, 0), Vector3d(-h, -h, 0)};
   for (MapKeyframe& keyframe : map.keyframes) {
     for (auto& [id, marker] : map.markers) {
       ImageCorners ideal;
@@ -147,7 +164,8 @@ void ObserveMarkers(const Camera& camera, double noise, std::mt19937& random, Tr
       MarkerObservation observation{.id = id, .corners = ideal, .sigma_px = {}};
       observation.sigma_px.fill(std::max(0.01, noise));
       for (std::size_t i = 0; i < 4; ++i) {
-        const Vector2d inward = (ideal[(i + 1) % 4] - ideal[i]).normalized() + (ideal[(i + 3) % 4] - ideal[i]).normalized();
+        const Vector2d inward = (ideal[(i + 1) % 4] - ideal[i]).normalized() +
+                                (ideal[(i + 3) % 4] - ideal[i]).normalized();
         observation.corners[i] += camera.sensor.edge_bias_px[0] * camera.scale() * inward;
         observation.corners[i] += noise * Vector2d(normal(random), normal(random));
       }
@@ -157,7 +175,8 @@ void ObserveMarkers(const Camera& camera, double noise, std::mt19937& random, Tr
   }
 }
 
-void AddLandmarks(const Camera& camera, const MapOptions& options, std::mt19937& random, TrackingMap& map) {
+void AddLandmarks(const Camera& camera, const MapOptions& options, std::mt19937& random,
+                  TrackingMap& map) {
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(-1, 1);
   for (int i = 0; i < options.num_landmarks; ++i) {
@@ -166,7 +185,9 @@ void AddLandmarks(const Camera& camera, const MapOptions& options, std::mt19937&
     const double y = 0.5 * uniform(random);
     landmark.p_world = {x, y, Height(x, y)};
     // Boards hide what is under and behind them.
-    const auto hides = [&](const auto& board) { return (board.second.T_world_marker.translation() - landmark.p_world).norm() < 0.17; };
+    const auto hides = [&](const auto& board) {
+      return (board.second.T_world_marker.translation() - landmark.p_world).norm() < 0.17;
+    };
     if (std::any_of(map.markers.begin(), map.markers.end(), hides)) landmark.usable = false;
     for (MapKeyframe& keyframe : map.keyframes) {
       if (!landmark.usable) break;
@@ -187,7 +208,8 @@ void AddLandmarks(const Camera& camera, const MapOptions& options, std::mt19937&
 
 double Height(double x, double y) {
   return 0.10 * std::exp(-((x - 0.1) * (x - 0.1) + (y + 0.05) * (y + 0.05)) / 0.03) +
-         0.07 * std::exp(-((x + 0.25) * (x + 0.25) + (y - 0.1) * (y - 0.1)) / 0.015) + 0.03 * std::sin(9 * x) * std::cos(7 * y);
+         0.07 * std::exp(-((x + 0.25) * (x + 0.25) + (y - 0.1) * (y - 0.1)) / 0.015) +
+         0.03 * std::sin(9 * x) * std::cos(7 * y);
 }
 
 TrueMap MakeTrueMap(const MapOptions& options) {
@@ -209,13 +231,16 @@ TrueMap MakeTrueMap(const MapOptions& options) {
     keyframe.data.frame_index = 5 * i;
     keyframe.data.color_time_s = 100.0 + 0.4 * i;
     keyframe.data.depth_time_s = keyframe.data.color_time_s + kColorToDepth_s;
-    keyframe.T_world_color = LookDown({0.3 * s, 0.14 * std::sin(3.5 * s), 0.9 + 0.08 * std::cos(5 * s)},
-                                      {0.22 * std::sin(4 * s), 0.2 * std::cos(6 * s), 0.35 * std::sin(2.6 * s)});
-    keyframe.velocity_per_s << 0.25 * std::cos(7 * s), -0.3 * std::sin(5 * s), 0.2 * std::cos(4 * s), 0.30 * std::cos(9 * s),
-        0.35 * std::sin(8 * s), 0.25 * std::cos(11 * s + 1);
+    keyframe.T_world_color =
+        LookDown({0.3 * s, 0.14 * std::sin(3.5 * s), 0.9 + 0.08 * std::cos(5 * s)},
+                 {0.22 * std::sin(4 * s), 0.2 * std::cos(6 * s), 0.35 * std::sin(2.6 * s)});
+    keyframe.velocity_per_s << 0.25 * std::cos(7 * s), -0.3 * std::sin(5 * s),
+        0.2 * std::cos(4 * s), 0.30 * std::cos(9 * s), 0.35 * std::sin(8 * s),
+        0.25 * std::cos(11 * s + 1);
     keyframe.data.view.intrinsics = truth.stated;
     if (options.dense) {
-      keyframe.data.view.depth_m = RenderDepth(camera, keyframe, truth.map.markers, options.image_noise_m, random);
+      keyframe.data.view.depth_m =
+          RenderDepth(camera, keyframe, truth.map.markers, options.image_noise_m, random);
       keyframe.dense = maker.Make(keyframe.data.view.depth_m);
     }
     truth.map.keyframes.push_back(std::move(keyframe));
@@ -241,9 +266,11 @@ void Disturb(TrackingMap& map, double translation_m, double rotation_rad) {
 MapError Compare(const TrackingMap& map, const TrackingMap& truth) {
   MapError error;
   for (std::size_t k = 0; k < truth.keyframes.size(); ++k) {
-    const Pose difference = truth.keyframes[k].T_world_color.inverse() * map.keyframes[k].T_world_color;
+    const Pose difference =
+        truth.keyframes[k].T_world_color.inverse() * map.keyframes[k].T_world_color;
     error.translation_m = std::max(error.translation_m, difference.translation().norm());
-    error.rotation_rad = std::max(error.rotation_rad, Eigen::AngleAxisd(difference.linear()).angle());
+    error.rotation_rad =
+        std::max(error.rotation_rad, Eigen::AngleAxisd(difference.linear()).angle());
   }
   return error;
 }

@@ -1,22 +1,25 @@
-// Keyframes over a known landscape with a known sensor: everything is projected here, by no code of the method.
+// Keyframes over a known landscape with a known sensor: everything is projected here, by no code of
+// the method.
 #pragma once
 
 #include <vector>
 
-#include "algo/tracking/calibration_model.hpp"
+#include "algo/sensor_model/calibration_model.hpp"
 #include "algo/tracking/map.hpp"
 
 namespace plumb::synthetic {
 
 struct MapOptions {
-  CalibrationModel sensor{};  ///< What the sensor really does; lens in addition to the stated intrinsics.
+  CalibrationModel
+      sensor{};  ///< What the sensor really does; lens in addition to the stated intrinsics.
   int num_keyframes = 10;
   int num_landmarks = 250;
   bool markers = true;
-  bool dense = false;               ///< Render depth images and their dense views too (lens without distortion).
-  double pixel_noise = 0.0;         ///< Of keypoints and corners, pixels.
-  double depth_noise_sigmas = 0.0;  ///< Of the keypoints' depth, in standard deviations of the noise model.
-  double image_noise_m = 0.0;       ///< Of the depth images, white.
+  bool dense = false;  ///< Render depth images and their dense views too (lens without distortion).
+  double pixel_noise = 0.0;  ///< Of keypoints and corners, pixels.
+  double depth_noise_sigmas =
+      0.0;  ///< Of the keypoints' depth, in standard deviations of the noise model.
+  double image_noise_m = 0.0;  ///< Of the depth images, white.
 };
 
 struct TrueMap {
@@ -27,7 +30,8 @@ struct TrueMap {
 /// z of the landscape, metres: a plane with smooth hills and hollows.
 [[nodiscard]] double Height(double x, double y);
 
-/// Sweep of a moving camera about 0.9 m above the landscape; 320x240; the first keyframe is not the origin.
+/// Sweep of a moving camera about 0.9 m above the landscape; 320x240; the first keyframe is not the
+/// origin.
 [[nodiscard]] TrueMap MakeTrueMap(const MapOptions& options);
 
 /// Moves all but the first keyframe, the landmarks and the markers away from where they are.

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "algo/types/errors.hpp"
+#include "algo/base/errors.hpp"
 #include "tests/unit/tracking/ball_sweep.hpp"
 
 namespace plumb {
@@ -20,13 +20,16 @@ class TrackerTest : public testing::Test {
   static void TearDownTestSuite() { delete sweep_; }
   static const BallSweep& sweep() { return *sweep_; }
 
-  // Farthest that a tracked frame's camera is from its true place, both in the first frame's camera.
+  // Farthest that a tracked frame's camera is from its true place, both in the first frame's
+  // camera.
   static double WorstError(const Tracker& tracker, std::size_t first = 0) {
     double worst = 0;
     for (const TrackedFrame& frame : tracker.frames()) {
       if (!frame.tracked) continue;
-      const Pose T_true = sweep().T_world_color[first].inverse() * sweep().T_world_color[static_cast<std::size_t>(frame.frame_index)];
-      worst = std::max(worst, (T_true.inverse() * tracker.T_world_color(frame)).translation().norm());
+      const Pose T_true = sweep().T_world_color[first].inverse() *
+                          sweep().T_world_color[static_cast<std::size_t>(frame.frame_index)];
+      worst =
+          std::max(worst, (T_true.inverse() * tracker.T_world_color(frame)).translation().norm());
     }
     return worst;
   }
@@ -44,19 +47,23 @@ struct Case {
 };
 
 TEST_F(TrackerTest, FollowsASweepWithAnyOfItsMeans) {
-  // Measured: 0.5, 1.8, 0.3, 0.5 and 0.7 mm. Markers alone: only while the map's own markers are in sight.
-  const Case cases[] = {{"all", {}, 0.001},
-                        {"markers and depth", {.use_keypoints = false}, 0.003},
-                        {"markers only", {.use_keypoints = false, .use_dense = false}, 0.003, 9, 17},
-                        {"keypoints and depth", {.use_markers = false}, 0.0015},
-                        {"keypoints only", {.use_markers = false, .use_dense = false}, 0.0015}};
+  // Measured: 0.5, 1.8, 0.3, 0.5 and 0.7 mm. Markers alone: only while the map's own markers are in
+  // sight.
+  const Case cases[] = {
+      {"all", {}, 0.001},
+      {"markers and depth", {.use_keypoints = false}, 0.003},
+      {"markers only", {.use_keypoints = false, .use_dense = false}, 0.003, 9, 17},
+      {"keypoints and depth", {.use_markers = false}, 0.0015},
+      {"keypoints only", {.use_markers = false, .use_dense = false}, 0.0015}};
   for (const Case& c : cases) {
     Tracker tracker(sweep().info, c.options);
     std::size_t tracked = 0;
-    for (std::size_t i = c.first; i < c.end; ++i) tracked += tracker.Track(sweep().frames[i]).tracked ? 1U : 0U;
+    for (std::size_t i = c.first; i < c.end; ++i)
+      tracked += tracker.Track(sweep().frames[i]).tracked ? 1U : 0U;
     const double worst = WorstError(tracker, c.first);
-    fmt::print("{}: {} of {} frames, worst {:.2e} m, {} keyframes, {} landmarks, {} markers\n", c.name, tracked, c.end - c.first, worst,
-               tracker.map().keyframes.size(), tracker.map().landmarks.size(), tracker.map().markers.size());
+    fmt::print("{}: {} of {} frames, worst {:.2e} m, {} keyframes, {} landmarks, {} markers\n",
+               c.name, tracked, c.end - c.first, worst, tracker.map().keyframes.size(),
+               tracker.map().landmarks.size(), tracker.map().markers.size());
     EXPECT_EQ(tracked, c.end - c.first) << c.name;
     EXPECT_LT(worst, c.tolerance_m) << c.name;
     EXPECT_GE(tracker.map().keyframes.size(), 3U) << c.name;
@@ -84,7 +91,8 @@ TEST_F(TrackerTest, SaysLostOnBlankFramesAndComesBack) {
       const bool blank = i >= 8 && i < 12;
       const Frame frame = blank ? Blank(sweep().frames[i]) : sweep().frames[i];
       const TrackedFrame result = tracker.Track(frame);
-      EXPECT_EQ(result.tracked, !blank) << "frame " << i << (use_markers ? ", markers" : ", features");
+      EXPECT_EQ(result.tracked, !blank)
+          << "frame " << i << (use_markers ? ", markers" : ", features");
     }
     const double worst = WorstError(tracker);
     fmt::print("after the gap: worst {:.2e} m\n", worst);
@@ -107,9 +115,11 @@ TEST_F(TrackerTest, SameBitsOnAnyNumberOfThreads) {
   for (std::size_t run = 0; run < 2; ++run) {
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, run + 1);
     Tracker tracker(sweep().info, {});
-    for (std::size_t i = 0; i < 14; ++i) poses[run].push_back(tracker.T_world_color(tracker.Track(sweep().frames[i])));
+    for (std::size_t i = 0; i < 14; ++i)
+      poses[run].push_back(tracker.T_world_color(tracker.Track(sweep().frames[i])));
   }
-  for (std::size_t i = 0; i < poses[0].size(); ++i) EXPECT_EQ(poses[0][i].matrix(), poses[1][i].matrix()) << i;
+  for (std::size_t i = 0; i < poses[0].size(); ++i)
+    EXPECT_EQ(poses[0][i].matrix(), poses[1][i].matrix()) << i;
 }
 
 TEST_F(TrackerTest, RefusesWhatItCannotUse) {

@@ -21,26 +21,33 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::array<unsigned char, 18> kHubDescriptor{0x12, 0x01, 0x00, 0x02, 0x09, 0x00, 0x01, 0x40, 0x6b,
-                                                       0x1d, 0x02, 0x00, 0x01, 0x06, 0x03, 0x02, 0x01, 0x01};
-// An Xtion Pro Live: device descriptor, one configuration with one interface of the vendor's own class.
-std::string SensorDescriptors(unsigned char vendor_low, unsigned char product_low, unsigned char product_high) {
-  const std::array<unsigned char, 36> bytes{0x12, 0x01, 0x00, 0x02, 0x00, 0x00, 0x00, 0x40, vendor_low, 0x1d, product_low, product_high,
-                                            0x01, 0x00, 0x02, 0x01, 0x00, 0x01, 9,    2,    18,         0,    1,           1,
-                                            0,    0x80, 250,  9,    4,    0,    0,    0,    0xff,       0,    0,           0};
+constexpr std::array<unsigned char, 18> kHubDescriptor{0x12, 0x01, 0x00, 0x02, 0x09, 0x00,
+                                                       0x01, 0x40, 0x6b, 0x1d, 0x02, 0x00,
+                                                       0x01, 0x06, 0x03, 0x02, 0x01, 0x01};
+// An Xtion Pro Live: device descriptor, one configuration with one interface of the vendor's own
+// class.
+std::string SensorDescriptors(unsigned char vendor_low, unsigned char product_low,
+                              unsigned char product_high) {
+  const std::array<unsigned char, 36> bytes{
+      0x12, 0x01, 0x00, 0x02, 0x00, 0x00, 0x00, 0x40, vendor_low, 0x1d, product_low, product_high,
+      0x01, 0x00, 0x02, 0x01, 0x00, 0x01, 9,    2,    18,         0,    1,           1,
+      0,    0x80, 250,  9,    4,    0,    0,    0,    0xff,       0,    0,           0};
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 class UsbWatcherTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!testing::UnderUmockdev()) GTEST_SKIP() << "not under umockdev: run it through ctest, or with umockdev-wrapper";
+    if (!testing::UnderUmockdev())
+      GTEST_SKIP() << "not under umockdev: run it through ctest, or with umockdev-wrapper";
     testbed_ = umockdev_testbed_new();
-    hub_ = umockdev_testbed_add_device(testbed_, "usb", "usb1", nullptr, "busnum", "1", "devnum", "1", "idVendor", "1d6b", "idProduct",
-                                       "0002", "speed", "480", "bConfigurationValue", "1", "bDeviceClass", "09", nullptr, "DEVTYPE",
-                                       "usb_device", "DEVNAME", "/dev/bus/usb/001/001", "BUSNUM", "001", "DEVNUM", "001", "MAJOR", "189",
-                                       "MINOR", "0", nullptr);
-    umockdev_testbed_set_attribute_binary(testbed_, hub_, "descriptors", const_cast<unsigned char*>(kHubDescriptor.data()),
+    hub_ = umockdev_testbed_add_device(
+        testbed_, "usb", "usb1", nullptr, "busnum", "1", "devnum", "1", "idVendor", "1d6b",
+        "idProduct", "0002", "speed", "480", "bConfigurationValue", "1", "bDeviceClass", "09",
+        nullptr, "DEVTYPE", "usb_device", "DEVNAME", "/dev/bus/usb/001/001", "BUSNUM", "001",
+        "DEVNUM", "001", "MAJOR", "189", "MINOR", "0", nullptr);
+    umockdev_testbed_set_attribute_binary(testbed_, hub_, "descriptors",
+                                          const_cast<unsigned char*>(kHubDescriptor.data()),
                                           kHubDescriptor.size());
   }
   void TearDown() override {
@@ -50,16 +57,18 @@ class UsbWatcherTest : public ::testing::Test {
   std::string Plug(int address, const char* speed = "480", unsigned char vendor_low = 0x27) {
     const std::string number = std::to_string(address), padded = fmt::format("{:03}", address);
     const std::string node = "/dev/bus/usb/001/" + padded;
-    gchar* path = umockdev_testbed_add_device(testbed_, "usb", "1-1", hub_, "busnum", "1", "devnum", number.c_str(), "idVendor",
-                                              vendor_low == 0x27 ? "1d27" : "1d50", "idProduct", "0601", "speed", speed,
-                                              "bConfigurationValue", "1", "bDeviceClass", "00", nullptr, "DEVTYPE", "usb_device", "DEVNAME",
-                                              node.c_str(), "BUSNUM", "001", "DEVNUM", padded.c_str(), "MAJOR", "189", "MINOR", "1",
-                                              "PRODUCT", "1d27/601/1", "SUBSYSTEM", "usb", nullptr);
+    gchar* path = umockdev_testbed_add_device(
+        testbed_, "usb", "1-1", hub_, "busnum", "1", "devnum", number.c_str(), "idVendor",
+        vendor_low == 0x27 ? "1d27" : "1d50", "idProduct", "0601", "speed", speed,
+        "bConfigurationValue", "1", "bDeviceClass", "00", nullptr, "DEVTYPE", "usb_device",
+        "DEVNAME", node.c_str(), "BUSNUM", "001", "DEVNUM", padded.c_str(), "MAJOR", "189", "MINOR",
+        "1", "PRODUCT", "1d27/601/1", "SUBSYSTEM", "usb", nullptr);
     EXPECT_NE(path, nullptr);
     const std::string descriptors = SensorDescriptors(vendor_low, 0x01, 0x06);
-    umockdev_testbed_set_attribute_binary(testbed_, path, "descriptors",
-                                          reinterpret_cast<unsigned char*>(const_cast<char*>(descriptors.data())),
-                                          static_cast<gint>(descriptors.size()));
+    umockdev_testbed_set_attribute_binary(
+        testbed_, path, "descriptors",
+        reinterpret_cast<unsigned char*>(const_cast<char*>(descriptors.data())),
+        static_cast<gint>(descriptors.size()));
     umockdev_testbed_uevent(testbed_, path, "add");  // the first one came before the descriptors
     std::string result = path;
     g_free(path);

@@ -15,10 +15,22 @@ TEST_F(AccountsTest, FirstStartGivesASetupCodeThatMakesOneEngineer) {
   EXPECT_THAT(setup_code_, MatchesRegex("[2-9A-HJ-NP-Z]{4}-[2-9A-HJ-NP-Z]{4}"));
   HttpClient client(port_);
   EXPECT_TRUE(client.Get("/api/v1/session").json().value("setup_required", false));
-  EXPECT_EQ(client.Post("/api/v1/setup", {{"code", "AAAA-AAAA"}, {"name", "eve"}, {"password", kPassword}}).status, 403);
+  EXPECT_EQ(
+      client
+          .Post("/api/v1/setup", {{"code", "AAAA-AAAA"}, {"name", "eve"}, {"password", kPassword}})
+          .status,
+      403);
   EXPECT_TRUE(service_.users.empty());
-  EXPECT_EQ(client.Post("/api/v1/setup", {{"code", setup_code_}, {"name", "eve"}, {"password", kPassword}}).status, 200);
-  EXPECT_EQ(client.Post("/api/v1/setup", {{"code", setup_code_}, {"name", "eve2"}, {"password", kPassword}}).status, 409);
+  EXPECT_EQ(
+      client
+          .Post("/api/v1/setup", {{"code", setup_code_}, {"name", "eve"}, {"password", kPassword}})
+          .status,
+      200);
+  EXPECT_EQ(
+      client
+          .Post("/api/v1/setup", {{"code", setup_code_}, {"name", "eve2"}, {"password", kPassword}})
+          .status,
+      409);
   ASSERT_EQ(service_.users.size(), 1U);
   EXPECT_EQ(service_.users[0].role, web::Role::kEngineer);
   EXPECT_THAT(service_.users[0].password_hash, HasSubstr("$argon2id$"));
@@ -29,24 +41,39 @@ TEST_F(AccountsTest, SetupCodeCannotBeGuessedQuickly) {
   Start();
   HttpClient client(port_);
   for (int i = 0; i < 5; ++i) {
-    EXPECT_EQ(client.Post("/api/v1/setup", {{"code", "AAAA-AAAA"}, {"name", "eve"}, {"password", kPassword}}).status, 403);
+    EXPECT_EQ(client
+                  .Post("/api/v1/setup",
+                        {{"code", "AAAA-AAAA"}, {"name", "eve"}, {"password", kPassword}})
+                  .status,
+              403);
   }
-  const HttpAnswer right = client.Post("/api/v1/setup", {{"code", setup_code_}, {"name", "eve"}, {"password", kPassword}});
+  const HttpAnswer right = client.Post(
+      "/api/v1/setup", {{"code", setup_code_}, {"name", "eve"}, {"password", kPassword}});
   EXPECT_EQ(right.status, 429);
   EXPECT_FALSE(right.Header("retry-after").empty());
   skipped_s_ = 61;
-  EXPECT_EQ(client.Post("/api/v1/setup", {{"code", setup_code_}, {"name", "eve"}, {"password", kPassword}}).status, 200);
+  EXPECT_EQ(
+      client
+          .Post("/api/v1/setup", {{"code", setup_code_}, {"name", "eve"}, {"password", kPassword}})
+          .status,
+      200);
 }
 
 TEST_F(AccountsTest, WeakOrStrangeAccountsAreRefused) {
   Start();
   HttpClient client(port_);
-  const auto set_up = [&](const nlohmann::json& body) { return client.Post("/api/v1/setup", body).status; };
+  const auto set_up = [&](const nlohmann::json& body) {
+    return client.Post("/api/v1/setup", body).status;
+  };
   EXPECT_EQ(set_up({{"code", setup_code_}, {"name", "eve"}, {"password", "short"}}), 400);
   EXPECT_EQ(set_up({{"code", setup_code_}, {"name", "../eve"}, {"password", kPassword}}), 400);
   EXPECT_EQ(set_up({{"code", setup_code_}, {"name", "Eve"}, {"password", kPassword}}), 400);
-  EXPECT_EQ(set_up({{"code", setup_code_}, {"name", "eve"}, {"password", std::string(200, 'x')}}), 400);
-  EXPECT_EQ(set_up({{"code", setup_code_}, {"name", "eve"}, {"password", kPassword}, {"role", "engineer"}}), 400);
+  EXPECT_EQ(set_up({{"code", setup_code_}, {"name", "eve"}, {"password", std::string(200, 'x')}}),
+            400);
+  EXPECT_EQ(
+      set_up(
+          {{"code", setup_code_}, {"name", "eve"}, {"password", kPassword}, {"role", "engineer"}}),
+      400);
   EXPECT_TRUE(service_.users.empty());
 }
 
@@ -54,7 +81,8 @@ TEST_F(AccountsTest, CookieIsOutOfReachOfScriptsAndOtherSites) {
   Start();
   SetUpAccounts();
   HttpClient client(port_);
-  const HttpAnswer answer = client.Post("/api/v1/login", {{"name", "engineer"}, {"password", kPassword}});
+  const HttpAnswer answer =
+      client.Post("/api/v1/login", {{"name", "engineer"}, {"password", kPassword}});
   EXPECT_THAT(answer.Header("set-cookie"), HasSubstr("HttpOnly"));
   EXPECT_THAT(answer.Header("set-cookie"), HasSubstr("SameSite=Strict"));
   EXPECT_THAT(answer.body, ::testing::Not(HasSubstr("argon2")));
@@ -64,8 +92,10 @@ TEST_F(AccountsTest, WrongPasswordAndUnknownNameLookTheSame) {
   Start();
   SetUpAccounts();
   HttpClient client(port_);
-  const HttpAnswer wrong = client.Post("/api/v1/login", {{"name", "engineer"}, {"password", "not this one"}});
-  const HttpAnswer unknown = client.Post("/api/v1/login", {{"name", "nobody"}, {"password", "not this one"}});
+  const HttpAnswer wrong =
+      client.Post("/api/v1/login", {{"name", "engineer"}, {"password", "not this one"}});
+  const HttpAnswer unknown =
+      client.Post("/api/v1/login", {{"name", "nobody"}, {"password", "not this one"}});
   EXPECT_EQ(wrong.status, 403);
   EXPECT_EQ(unknown.status, 403);
   EXPECT_EQ(wrong.body, unknown.body);
@@ -121,18 +151,34 @@ TEST_F(AccountsTest, DisablingAnAccountEndsItsSessions) {
   SetUpAccounts();
   HttpClient technician = LoggedIn("technician");
   HttpClient engineer = LoggedIn("engineer");
-  EXPECT_EQ(engineer.Put("/api/v1/users/technician", {{"role", "technician"}, {"disabled", true}, {"password", ""}}).status, 200);
+  EXPECT_EQ(engineer
+                .Put("/api/v1/users/technician",
+                     {{"role", "technician"}, {"disabled", true}, {"password", ""}})
+                .status,
+            200);
   EXPECT_EQ(technician.Get("/api/v1/status").status, 401);
   EXPECT_EQ(technician.LogIn("technician", kPassword), 403);
-  EXPECT_EQ(engineer.Put("/api/v1/users/engineer", {{"role", "technician"}, {"disabled", false}, {"password", ""}}).status, 409);
+  EXPECT_EQ(engineer
+                .Put("/api/v1/users/engineer",
+                     {{"role", "technician"}, {"disabled", false}, {"password", ""}})
+                .status,
+            409);
 }
 
 TEST_F(AccountsTest, OwnPasswordNeedsTheOldOneAndEndsOtherSessions) {
   Start();
   SetUpAccounts();
   HttpClient first = LoggedIn("physicist"), second = LoggedIn("physicist");
-  EXPECT_EQ(first.Post("/api/v1/session/password", {{"old_password", "wrong"}, {"password", "another long one"}}).status, 403);
-  EXPECT_EQ(first.Post("/api/v1/session/password", {{"old_password", kPassword}, {"password", "another long one"}}).status, 200);
+  EXPECT_EQ(first
+                .Post("/api/v1/session/password",
+                      {{"old_password", "wrong"}, {"password", "another long one"}})
+                .status,
+            403);
+  EXPECT_EQ(first
+                .Post("/api/v1/session/password",
+                      {{"old_password", kPassword}, {"password", "another long one"}})
+                .status,
+            200);
   EXPECT_EQ(first.Get("/api/v1/status").status, 200);
   EXPECT_EQ(second.Get("/api/v1/status").status, 401);
   EXPECT_EQ(second.LogIn("physicist", "another long one"), 200);
@@ -141,12 +187,21 @@ TEST_F(AccountsTest, OwnPasswordNeedsTheOldOneAndEndsOtherSessions) {
 TEST_F(AccountsTest, RolesReachOnlyWhatIsTheirs) {
   Start();
   SetUpAccounts();
-  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist"), engineer = LoggedIn("engineer");
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist"),
+             engineer = LoggedIn("engineer");
   EXPECT_EQ(technician.Get("/api/v1/users").status, 403);
   EXPECT_EQ(physicist.Get("/api/v1/users").status, 403);
   EXPECT_EQ(engineer.Get("/api/v1/users").status, 200);
-  EXPECT_EQ(technician.Post("/api/v1/users", {{"name", "evil"}, {"role", "engineer"}, {"password", kPassword}}).status, 403);
-  EXPECT_EQ(technician.Put("/api/v1/users/technician", {{"role", "engineer"}, {"disabled", false}, {"password", ""}}).status, 403);
+  EXPECT_EQ(
+      technician
+          .Post("/api/v1/users", {{"name", "evil"}, {"role", "engineer"}, {"password", kPassword}})
+          .status,
+      403);
+  EXPECT_EQ(technician
+                .Put("/api/v1/users/technician",
+                     {{"role", "engineer"}, {"disabled", false}, {"password", ""}})
+                .status,
+            403);
   EXPECT_EQ(technician.Get("/api/v1/audit").status, 403);
   EXPECT_EQ(physicist.Get("/api/v1/audit").status, 200);
   EXPECT_EQ(technician.Post("/api/v1/references/x/approve", {{"revision", 1}}).status, 403);
@@ -161,7 +216,8 @@ TEST_F(AccountsTest, LoginWithoutScriptLeadsToTheResult) {
   HttpClient client(port_);
   EXPECT_THAT(client.Get("/result").body, HasSubstr("<form method=\"post\" action=\"/login\""));
   client.extra_headers["Content-Type"] = "application/x-www-form-urlencoded";
-  const HttpAnswer answer = client.Ask("POST", "/login", "name=technician&password=correct+horse%20battery");
+  const HttpAnswer answer =
+      client.Ask("POST", "/login", "name=technician&password=correct+horse%20battery");
   EXPECT_EQ(answer.status, 303);
   EXPECT_EQ(answer.Header("location"), "/result");
   client.extra_headers.clear();
@@ -175,8 +231,10 @@ TEST_F(AccountsTest, PasswordsThatArriveTogetherAreCountedTogether) {
   const std::string body = R"({"name":"engineer","password":"not this one"})";
   for (int i = 0; i < 12; ++i) {
     connections.emplace_back(port_);
-    connections.back().Send("POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: " +
-                            std::to_string(body.size()) + "\r\n\r\n" + body);
+    connections.back().Send(
+        "POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: "
+        "application/json\r\nContent-Length: " +
+        std::to_string(body.size()) + "\r\n\r\n" + body);
   }
   int judged = 0;
   for (HttpConnection& connection : connections) judged += connection.Read().status == 403 ? 1 : 0;

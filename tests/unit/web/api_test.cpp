@@ -18,7 +18,9 @@ class ApiTest : public WebTest {
   }
 
   std::string AddPatient(HttpClient& client, const std::string& code) {
-    return client.Post("/api/v1/patients", {{"code", code}, {"site", "thorax"}}).json().value("id", "");
+    return client.Post("/api/v1/patients", {{"code", code}, {"site", "thorax"}})
+        .json()
+        .value("id", "");
   }
 
   static nlohmann::json Plan(int revision = 1) {
@@ -40,7 +42,8 @@ TEST_F(ApiTest, NothingUnderTheApiAnswersWithoutLogin) {
     const std::string permission = path.substr(path.rfind(' ') + 1);
     path = path.substr(0, path.rfind(' '));
     if (permission == "none") continue;
-    for (std::size_t at; (at = path.find('{')) != std::string::npos;) path.replace(at, path.find('}') - at + 1, "x1");
+    for (std::size_t at; (at = path.find('{')) != std::string::npos;)
+      path.replace(at, path.find('}') - at + 1, "x1");
     EXPECT_EQ(stranger.Ask(method, path, method == "GET" ? "" : "{}").status, 401) << route;
   }
   EXPECT_EQ(stranger.Get("/api/v1/nothing").status, 401);
@@ -75,7 +78,8 @@ TEST_F(ApiTest, ChangesFromOtherSitesAreRefusedEvenWithTheToken) {
   EXPECT_EQ(client.Post("/api/v1/press").status, 403);
   client.extra_headers = {{"Sec-Fetch-Site", "cross-site"}};
   EXPECT_EQ(client.Post("/api/v1/press").status, 403);
-  client.extra_headers = {{"Origin", "http://127.0.0.1:" + std::to_string(port_)}, {"Sec-Fetch-Site", "same-origin"}};
+  client.extra_headers = {{"Origin", "http://127.0.0.1:" + std::to_string(port_)},
+                          {"Sec-Fetch-Site", "same-origin"}};
   EXPECT_EQ(client.Post("/api/v1/press").status, 200);
 }
 
@@ -88,8 +92,10 @@ TEST_F(ApiTest, ScanGoesFromPressToResultAndIsAudited) {
   EXPECT_EQ(client.Post("/api/v1/cancel").status, 409);
   const nlohmann::json entries = LoggedIn("physicist").Get("/api/v1/audit").json()["entries"];
   std::vector<std::string> actions;
-  for (const auto& entry : entries) actions.push_back(entry["user"].get<std::string>() + " " + entry["action"].get<std::string>());
-  EXPECT_THAT(actions, ::testing::IsSupersetOf({"technician login", "technician press", "technician cancel", "physicist login"}));
+  for (const auto& entry : entries)
+    actions.push_back(entry["user"].get<std::string>() + " " + entry["action"].get<std::string>());
+  EXPECT_THAT(actions, ::testing::IsSupersetOf({"technician login", "technician press",
+                                                "technician cancel", "physicist login"}));
 }
 
 TEST_F(ApiTest, TheDailyCheckIsOpenedScannedAndBecomesABaseline) {
@@ -101,7 +107,8 @@ TEST_F(ApiTest, TheDailyCheckIsOpenedScannedAndBecomesABaseline) {
     EXPECT_EQ(technician.Post("/api/v1/press").status, 200);
     EXPECT_EQ(technician.Post("/api/v1/checks/open").status, 409) << "not during a scan";
     loop_->Do([&] {
-      for (int i = 0; i < 20; ++i) service_.Tick(std::chrono::steady_clock::now() + std::chrono::seconds(10 * i));
+      for (int i = 0; i < 20; ++i)
+        service_.Tick(std::chrono::steady_clock::now() + std::chrono::seconds(10 * i));
     });
   };
   scan();
@@ -112,7 +119,8 @@ TEST_F(ApiTest, TheDailyCheckIsOpenedScannedAndBecomesABaseline) {
   EXPECT_EQ(first["checks"][0]["user"], "technician");
   EXPECT_EQ(first["checks"][0]["items"][1]["name"], "misfit");
   EXPECT_EQ(first["baseline"], nullptr);
-  const std::string baseline = "/api/v1/checks/" + first["checks"][0]["id"].get<std::string>() + "/baseline";
+  const std::string baseline =
+      "/api/v1/checks/" + first["checks"][0]["id"].get<std::string>() + "/baseline";
   EXPECT_EQ(technician.Post(baseline).status, 403);
   EXPECT_EQ(physicist.Post(baseline).status, 200);
   EXPECT_EQ(physicist.Post("/api/v1/checks/none/baseline").status, 404);
@@ -126,10 +134,19 @@ TEST_F(ApiTest, TheDailyCheckIsOpenedScannedAndBecomesABaseline) {
 }
 
 TEST_F(ApiTest, AReferenceIsApprovedByASecondPerson) {
-  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist"), second = LoggedIn("second");
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist"),
+             second = LoggedIn("second");
   const std::string patient = AddPatient(technician, "PX-17");
-  EXPECT_EQ(technician.Post("/api/v1/patients/" + patient + "/open", {{"purpose", "fraction"}, {"reason", ""}}).status, 409);
-  EXPECT_EQ(technician.Post("/api/v1/patients/" + patient + "/open", {{"purpose", "reference"}, {"reason", "first"}}).status, 200);
+  EXPECT_EQ(
+      technician
+          .Post("/api/v1/patients/" + patient + "/open", {{"purpose", "fraction"}, {"reason", ""}})
+          .status,
+      409);
+  EXPECT_EQ(technician
+                .Post("/api/v1/patients/" + patient + "/open",
+                      {{"purpose", "reference"}, {"reason", "first"}})
+                .status,
+            200);
   loop_->Do([&] {
     web::Scan scan;
     scan.id = "s1";
@@ -137,10 +154,13 @@ TEST_F(ApiTest, AReferenceIsApprovedByASecondPerson) {
     scan.outcome = web::ScanOutcome::kDone;
     service_.scans.push_back(scan);
   });
-  const std::string id = physicist.Post("/api/v1/references", {{"scan_id", "s1"}, {"reason", "planning"}}).json()["id"];
+  const std::string id =
+      physicist.Post("/api/v1/references", {{"scan_id", "s1"}, {"reason", "planning"}})
+          .json()["id"];
   EXPECT_EQ(physicist.Put("/api/v1/references/" + id + "/plan", Plan()).status, 200);
   EXPECT_EQ(technician.Put("/api/v1/references/" + id + "/plan", Plan()).status, 403);
-  EXPECT_EQ(physicist.Put("/api/v1/references/" + id + "/plan", Plan()).status, 409) << "another one was saved since";
+  EXPECT_EQ(physicist.Put("/api/v1/references/" + id + "/plan", Plan()).status, 409)
+      << "another one was saved since";
   EXPECT_EQ(second.Post("/api/v1/references/" + id + "/approve", {{"revision", 1}}).status, 409);
   EXPECT_EQ(second.Get("/api/v1/references/" + id).json()["revision"], 2);
   EXPECT_EQ(physicist.Post("/api/v1/references/" + id + "/approve", {{"revision", 2}}).status, 403);
@@ -174,7 +194,9 @@ TEST_F(ApiTest, PlansOutOfRangeAreRefusedWithTheField) {
 
 TEST_F(ApiTest, BodiesMustBeSmallShallowWholeJsonInUtf8) {
   HttpClient client = LoggedIn("technician");
-  const auto status = [&](const std::string& body) { return client.Ask("POST", "/api/v1/patients", body).status; };
+  const auto status = [&](const std::string& body) {
+    return client.Ask("POST", "/api/v1/patients", body).status;
+  };
   EXPECT_EQ(status("{\"code\": \"A\""), 400);
   EXPECT_EQ(status("[]"), 400);
   EXPECT_EQ(status("null"), 400);
@@ -230,9 +252,11 @@ TEST_F(FilesTest, ResultsAreDownloadedUnderASafeName) {
 TEST_F(FilesTest, NoPathLeadsOutOfAScan) {
   HttpClient client = LoggedIn("technician");
   for (const char* path :
-       {"/api/v1/scans/s1/files/../../secret", "/api/v1/scans/s1/files/..%2f..%2fsecret", "/api/v1/scans/s1/files/..",
-        "/api/v1/scans/s1/files/secret", "/api/v1/scans/../scans/s1/files/result.json", "/api/v1/scans/s1/files//etc/passwd",
-        "/assets/../../etc/passwd", "/assets/..%2f..%2fetc%2fpasswd", "/%2e%2e/etc/passwd", "/api/v1/scans/s1/files/result.json%00.png"}) {
+       {"/api/v1/scans/s1/files/../../secret", "/api/v1/scans/s1/files/..%2f..%2fsecret",
+        "/api/v1/scans/s1/files/..", "/api/v1/scans/s1/files/secret",
+        "/api/v1/scans/../scans/s1/files/result.json", "/api/v1/scans/s1/files//etc/passwd",
+        "/assets/../../etc/passwd", "/assets/..%2f..%2fetc%2fpasswd", "/%2e%2e/etc/passwd",
+        "/api/v1/scans/s1/files/result.json%00.png"}) {
     EXPECT_EQ(client.Get(path).status, 404) << path;
   }
   EXPECT_EQ(client.Get("/api/v1/scans/s1/files/overlay.png").status, 404) << "a link";
@@ -259,9 +283,11 @@ class UploadTest : public WebTest {
     SetUpAccounts();
   }
   std::string Head(const HttpClient& client, const std::string& name, std::size_t bytes) {
-    return "POST /api/v1/update/bundles/" + name + " HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie +
+    return "POST /api/v1/update/bundles/" + name +
+           " HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie +
            "\r\nX-CSRF-Token: " + client.csrf_token +
-           "\r\nContent-Type: application/octet-stream\r\nContent-Length: " + std::to_string(bytes) + "\r\n\r\n";
+           "\r\nContent-Type: application/octet-stream\r\nContent-Length: " +
+           std::to_string(bytes) + "\r\n\r\n";
   }
   HttpAnswer Send(const HttpClient& client, const std::string& name, const std::string& body) {
     HttpConnection connection(port_);
@@ -272,7 +298,9 @@ class UploadTest : public WebTest {
   [[nodiscard]] std::size_t FilesLeft() const {
     std::size_t count = 0;
     std::error_code error;
-    for (std::filesystem::directory_iterator entry(folder_ / "updates", error), end; !error && entry != end; ++entry) ++count;
+    for (std::filesystem::directory_iterator entry(folder_ / "updates", error), end;
+         !error && entry != end; ++entry)
+      ++count;
     return count;
   }
 
@@ -319,7 +347,8 @@ TEST_F(UploadTest, ABrokenUploadLeavesNothing) {
     bool begun = false;
     for (int i = 0; i < 2000 && !begun; ++i) begun = FilesLeft() == 1, ::usleep(1000);
     EXPECT_TRUE(begun);
-    EXPECT_EQ(Send(engineer, "second.raucb", "hsqs" + std::string(5000, 'x')).status, 409) << "one at a time";
+    EXPECT_EQ(Send(engineer, "second.raucb", "hsqs" + std::string(5000, 'x')).status, 409)
+        << "one at a time";
   }
   EXPECT_TRUE(BecomesEmpty());
   EXPECT_EQ(Send(engineer, "third.raucb", "hsqs" + std::string(5000, 'x')).status, 200);
@@ -336,8 +365,9 @@ TEST_F(UploadTest, OnlyAnEngineerSendsBundles) {
 TEST_F(ApiTest, WithoutAFolderNoFilesAreTaken) {
   const HttpClient engineer = LoggedIn("engineer");
   HttpConnection connection(port_);
-  connection.Send("POST /api/v1/update/bundles/a.raucb HTTP/1.1\r\nHost: localhost\r\nCookie: " + engineer.cookie + "\r\nX-CSRF-Token: " +
-                  engineer.csrf_token + "\r\nContent-Type: application/octet-stream\r\nContent-Length: 5\r\n\r\nhsqs!");
+  connection.Send("POST /api/v1/update/bundles/a.raucb HTTP/1.1\r\nHost: localhost\r\nCookie: " +
+                  engineer.cookie + "\r\nX-CSRF-Token: " + engineer.csrf_token +
+                  "\r\nContent-Type: application/octet-stream\r\nContent-Length: 5\r\n\r\nhsqs!");
   EXPECT_EQ(connection.Read().status, 409);
 }
 
@@ -354,8 +384,8 @@ TEST_F(ApiTest, SlowCompletionsAreWaitedForAndLateOnesFindNobody) {
   asking.join();
   {
     HttpConnection gone(port_);
-    gone.Send("POST /api/v1/cancel HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie + "\r\nX-CSRF-Token: " + client.csrf_token +
-              "\r\nContent-Length: 0\r\n\r\n");
+    gone.Send("POST /api/v1/cancel HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie +
+              "\r\nX-CSRF-Token: " + client.csrf_token + "\r\nContent-Length: 0\r\n\r\n");
     held = false;
     while (!held) loop_->Do([&] { held = !service_.held.empty(); });
   }

@@ -1,4 +1,5 @@
-// What takes its time is done beside the loop: lists, files, and writing what is sent. Here the work stands still until the test does it.
+// What takes its time is done beside the loop: lists, files, and writing what is sent. Here the
+// work stands still until the test does it.
 #include <gmock/gmock.h>
 
 #include <atomic>
@@ -56,7 +57,8 @@ TEST_F(AsideTest, AListThatTakesItsTimeKeepsNobodyWaiting) {
         listed = true;
       });
       WaitUntilHeld();
-      EXPECT_EQ(engineer_->Get("/api/v1/status").status, 200) << "while " << path << " is being made";
+      EXPECT_EQ(engineer_->Get("/api/v1/status").status, 200)
+          << "while " << path << " is being made";
       EXPECT_FALSE(listed) << path;
       DoHeld();
     }
@@ -67,7 +69,8 @@ TEST_F(AsideTest, AListThatTakesItsTimeKeepsNobodyWaiting) {
 TEST_F(AsideTest, AListForSomebodyWhoIsGoneIsForNobody) {
   {
     HttpConnection gone(port_);
-    gone.Send("GET /api/v1/scans HTTP/1.1\r\nHost: localhost\r\nCookie: " + engineer_->cookie + "\r\n\r\n");
+    gone.Send("GET /api/v1/scans HTTP/1.1\r\nHost: localhost\r\nCookie: " + engineer_->cookie +
+              "\r\n\r\n");
     WaitUntilHeld();
   }
   DoHeld();
@@ -87,16 +90,18 @@ TEST_F(AsideTest, AnUploadGoesNoFasterThanTheDiskAndKeepsNobodyWaiting) {
   HttpAnswer answer;
   std::jthread sending([&] {
     HttpConnection connection(port_);
-    connection.Send("POST /api/v1/update/bundles/a.raucb HTTP/1.1\r\nHost: localhost\r\nCookie: " + engineer_->cookie +
-                    "\r\nX-CSRF-Token: " + engineer_->csrf_token +
-                    "\r\nContent-Type: application/octet-stream\r\nContent-Length: " + std::to_string(bundle.size()) + "\r\n\r\n");
+    connection.Send("POST /api/v1/update/bundles/a.raucb HTTP/1.1\r\nHost: localhost\r\nCookie: " +
+                    engineer_->cookie + "\r\nX-CSRF-Token: " + engineer_->csrf_token +
+                    "\r\nContent-Type: application/octet-stream\r\nContent-Length: " +
+                    std::to_string(bundle.size()) + "\r\n\r\n");
     connection.Send(bundle);
     sent = true;
     answer = connection.Read();
     answered = true;
   });
   WaitUntilHeld();
-  for (int i = 0; i < 200; ++i) ASSERT_EQ(engineer_->Get("/health").status, 200) << "the disk stands still";
+  for (int i = 0; i < 200; ++i)
+    ASSERT_EQ(engineer_->Get("/health").status, 200) << "the disk stands still";
   EXPECT_EQ(NumHeld(), 1U) << "one piece at a time";
   EXPECT_FALSE(sent) << "the rest waits with who sends it";
   std::size_t pieces = 0;
@@ -117,9 +122,10 @@ TEST_F(AsideTest, AnUploadGoesNoFasterThanTheDiskAndKeepsNobodyWaiting) {
 TEST_F(AsideTest, AnUploadThatTheDiskDoesNotTakeIsRefused) {
   loop_->Do([&] { service_.refuse_aside = true; });
   HttpConnection connection(port_);
-  connection.Send("POST /api/v1/update/bundles/a.raucb HTTP/1.1\r\nHost: localhost\r\nCookie: " + engineer_->cookie +
-                  "\r\nX-CSRF-Token: " + engineer_->csrf_token +
-                  "\r\nContent-Type: application/octet-stream\r\nContent-Length: 5004\r\n\r\nhsqs" + std::string(5000, 'x'));
+  connection.Send("POST /api/v1/update/bundles/a.raucb HTTP/1.1\r\nHost: localhost\r\nCookie: " +
+                  engineer_->cookie + "\r\nX-CSRF-Token: " + engineer_->csrf_token +
+                  "\r\nContent-Type: application/octet-stream\r\nContent-Length: 5004\r\n\r\nhsqs" +
+                  std::string(5000, 'x'));
   EXPECT_EQ(connection.Read().status, 507);
 }
 

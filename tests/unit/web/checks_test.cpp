@@ -54,11 +54,14 @@ TEST(ChecksTest, GzipIsTakenOnlyWhereAccepted) {
 
 TEST(ChecksTest, NamesLeadNowhere) {
   EXPECT_TRUE(IsName("app.1A2b.js"));
-  for (const char* bad : {"", ".", "..", ".hidden", "a/b", "a\\b", "a%2f", "a b", "\xC3\xA4"}) EXPECT_FALSE(IsName(bad)) << bad;
+  for (const char* bad : {"", ".", "..", ".hidden", "a/b", "a\\b", "a%2f", "a b", "\xC3\xA4"})
+    EXPECT_FALSE(IsName(bad)) << bad;
   EXPECT_FALSE(IsName(std::string(65, 'a')));
 }
 
-TEST(ChecksTest, HtmlIsEscaped) { EXPECT_EQ(EscapeHtml("<a href=\"x\">&'"), "&lt;a href=&quot;x&quot;&gt;&amp;&#39;"); }
+TEST(ChecksTest, HtmlIsEscaped) {
+  EXPECT_EQ(EscapeHtml("<a href=\"x\">&'"), "&lt;a href=&quot;x&quot;&gt;&amp;&#39;");
+}
 
 }  // namespace
 }  // namespace plumb::web

@@ -9,8 +9,8 @@
 namespace plumb::test {
 namespace {
 
-/// "GET /path permission" of every operation. The file is written so that indentation alone tells: paths by two, methods by four, the rest
-/// deeper.
+/// "GET /path permission" of every operation. The file is written so that indentation alone tells:
+/// paths by two, methods by four, the rest deeper.
 std::set<std::string> DocumentedOperations() {
   std::ifstream in(PLUMB_SOURCE_DIR "/web/openapi.yaml");
   std::set<std::string> operations;
@@ -22,10 +22,12 @@ std::set<std::string> DocumentedOperations() {
     if (line.starts_with("  /")) path = line.substr(2, line.find(':') - 2);
     if (line.starts_with("    ") && line.size() > 4 && line[4] != ' ') {
       method = line.substr(4, line.find(':') - 4);
-      std::transform(method.begin(), method.end(), method.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+      std::transform(method.begin(), method.end(), method.begin(),
+                     [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
     }
     const std::string key = "      x-permission: ";
-    if (line.starts_with(key)) operations.insert(method + " " + path + " " + line.substr(key.size()));
+    if (line.starts_with(key))
+      operations.insert(method + " " + path + " " + line.substr(key.size()));
   }
   return operations;
 }

@@ -13,7 +13,8 @@ class StreamTest : public WebTest {
   HttpConnection OpenStream(const HttpClient& client, int receive_buffer = 0) {
     HttpConnection connection(port_);
     if (receive_buffer > 0) connection.SetReceiveBuffer(receive_buffer);
-    connection.Send("GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie + "\r\n\r\n");
+    connection.Send("GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie +
+                    "\r\n\r\n");
     return connection;
   }
 };
@@ -47,7 +48,8 @@ TEST_F(StreamTest, ManyChangesInAShortTimeAreSentTogether) {
   });
   const std::string text = until_data + stream.ReadUntil("end of test");
   std::size_t count = 0;
-  for (std::size_t at = 0; (at = text.find("event: status", at)) != std::string::npos; ++at) ++count;
+  for (std::size_t at = 0; (at = text.find("event: status", at)) != std::string::npos; ++at)
+    ++count;
   EXPECT_LE(count, 4U);
 }
 
@@ -65,7 +67,8 @@ TEST_F(StreamTest, EndsWithinASecondHoweverTheSessionEnds) {
   Start();
   SetUpAccounts();
   HttpClient engineer = LoggedIn("engineer");
-  const auto ends_within_a_second = [&](const std::string& name, const std::function<void(HttpClient&)>& end) {
+  const auto ends_within_a_second = [&](const std::string& name,
+                                        const std::function<void(HttpClient&)>& end) {
     HttpClient client = LoggedIn(name);
     HttpConnection stream = OpenStream(client);
     stream.ReadUntil("event: status");
@@ -73,15 +76,20 @@ TEST_F(StreamTest, EndsWithinASecondHoweverTheSessionEnds) {
     const auto since = std::chrono::steady_clock::now();
     EXPECT_FALSE(stream.ReadUntil("logged_off").empty());
     EXPECT_FALSE(stream.ReadUntil("0\r\n\r\n").empty()) << "nothing comes after it";
-    const double passed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count();
+    const double passed_s =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count();
     return passed_s;
   };
   // Asked for: 1 s. The last one waits for the timer of half a second.
-  EXPECT_LT(ends_within_a_second("technician", [](HttpClient& client) { client.Post("/api/v1/logout"); }), 1.0);
-  EXPECT_LT(ends_within_a_second("technician",
-                                 [&](HttpClient&) {
-                                   engineer.Put("/api/v1/users/technician", {{"role", "technician"}, {"disabled", true}, {"password", ""}});
-                                 }),
+  EXPECT_LT(
+      ends_within_a_second("technician", [](HttpClient& client) { client.Post("/api/v1/logout"); }),
+      1.0);
+  EXPECT_LT(ends_within_a_second(
+                "technician",
+                [&](HttpClient&) {
+                  engineer.Put("/api/v1/users/technician",
+                               {{"role", "technician"}, {"disabled", true}, {"password", ""}});
+                }),
             1.0);
   EXPECT_LT(ends_within_a_second("physicist", [&](HttpClient&) { skipped_s_ += 3600; }), 1.0);
 }

@@ -8,18 +8,21 @@
 
 #include "tests/support/fake_scan_service.hpp"
 #include "tests/support/http_client.hpp"
-#include "web/http_server.hpp"
+#include "web/api/http_server.hpp"
 
 namespace plumb::test {
 
 class WebTest : public ::testing::Test {
  protected:
-  /// Cheap passwords: what they cost is libsodium's affair. @param change  Adjusts the options before the server starts.
+  /// Cheap passwords: what they cost is libsodium's affair. @param change  Adjusts the options
+  /// before the server starts.
   void Start(const std::function<void(web::HttpServerOptions&)>& change = {}) {
     web::HttpServerOptions options;
     options.password_memory_bytes = 1 << 20;
     options.password_operations = 1;
-    options.now = [this] { return std::chrono::steady_clock::now() + std::chrono::seconds(skipped_s_.load()); };
+    options.now = [this] {
+      return std::chrono::steady_clock::now() + std::chrono::seconds(skipped_s_.load());
+    };
     if (change) change(options);
     server_ = std::make_unique<web::HttpServer>(service_, options);
     port_ = server_->port();
@@ -35,10 +38,20 @@ class WebTest : public ::testing::Test {
   /// Sets up the first account ("engineer") and adds one of each other role; each has kPassword.
   void SetUpAccounts() {
     HttpClient engineer(port_);
-    ASSERT_EQ(engineer.Post("/api/v1/setup", {{"code", setup_code_}, {"name", "engineer"}, {"password", kPassword}}).status, 200);
+    ASSERT_EQ(engineer
+                  .Post("/api/v1/setup",
+                        {{"code", setup_code_}, {"name", "engineer"}, {"password", kPassword}})
+                  .status,
+              200);
     engineer.FetchToken();
-    for (const auto& [name, role] : {std::pair{"technician", "technician"}, {"physicist", "physicist"}, {"second", "physicist"}}) {
-      ASSERT_EQ(engineer.Post("/api/v1/users", {{"name", name}, {"role", role}, {"password", kPassword}}).status, 201) << name;
+    for (const auto& [name, role] : {std::pair{"technician", "technician"},
+                                     {"physicist", "physicist"},
+                                     {"second", "physicist"}}) {
+      ASSERT_EQ(
+          engineer.Post("/api/v1/users", {{"name", name}, {"role", role}, {"password", kPassword}})
+              .status,
+          201)
+          << name;
     }
   }
 

@@ -12,10 +12,15 @@ export async function showAudit(place) {
   const load = async () => {
     const { entries } = await get(`audit?before=${oldest}&limit=${kPage}`);
     for (const entry of entries) {
-      rows.push(h('tr', {}, h('td', {}, entry.time.replace('T', ' ').replace('Z', '')), h('td', {}, entry.user || S.none), h('td', {}, entry.action), h('td', {}, entry.subject || S.none), h('td', {}, entry.detail || S.none), h('td', {}, entry.address || S.none)));
+      const cell = (value) => h('td', {}, value || S.none);
+      rows.push(h('tr', {}, cell(entry.time.replace('T', ' ').replace('Z', '')), cell(entry.user),
+        cell(entry.action), cell(entry.subject), cell(entry.detail), cell(entry.address)));
       oldest = entry.number;
     }
-    clear(list, rows.length ? table([`${text.time} (UTC)`, text.user, text.action, text.subject, text.detail, text.address], rows, text.title) : h('p', { class: 'hint' }, text.empty));
+    const heads = [`${text.time} (UTC)`, text.user, text.action, text.subject, text.detail,
+      text.address];
+    clear(list, rows.length ? table(heads, rows, text.title)
+      : h('p', { class: 'hint' }, text.empty));
     more.hidden = entries.length < kPage;
   };
   const more = action(text.more, load, {});

@@ -1,60 +1,152 @@
-import { get, live, may, post } from '../api.js';
-import { action, done, h, localTime, redraw, table } from '../dom.js';
+// The daily check of the room's markers: today's, its numbers over time, and the baseline.
+import { currentSession, get, live, may, post } from '../api.js';
+import { action, done, h, localDay, localTime, redraw, svg, table } from '../dom.js';
 import { signed } from '../numbers.js';
-import { S } from '../strings.js';
+import { S, translated } from '../strings.js';
+import { sentence } from './common.js';
 
 const kIcons = { passed: '✓', failed: '▲', no_baseline: '?' };
 const kTones = { passed: 'in_tolerance', failed: 'move', no_baseline: 'no_answer' };
 
 /// A length: it has no sign.
 const isSize = (item) => item.name === 'misfit' || item.name === 'moved';
+const isCount = (item) => item.name === 'markers_seen';
 
 function itemRow(item) {
   const text = S.check;
-  const isCount = item.name === 'markers_seen';
-  const value = item.value === null ? text.notKnown : isCount ? `${item.value}` : `${isSize(item) ? item.value.toFixed(1) : signed(item.value, 2)} ${item.unit}`;
-  return h('tr', {}, h('th', { scope: 'row' }, text.items[item.name] ?? item.name), h('td', { class: 'figure' }, value, item.note && h('small', {}, ` ${item.note}`)),
-    h('td', {}, isCount ? text.atLeast(item.limit) : text.atMost(isSize(item) ? '' : '±', item.limit, item.unit)), h('td', { class: item.passed ? 'judged-in' : 'judged-out' }, item.passed ? `✓ ${text.within}` : `▲ ${text.outside}`));
+  const number = item.value === null ? ''
+    : isSize(item) ? item.value.toFixed(1) : signed(item.value, 2);
+  const value = item.value === null ? text.notKnown
+    : isCount(item) ? `${item.value}` : `${number} ${item.unit}`;
+  const limit = isCount(item) ? text.atLeast(item.limit)
+    : text.atMost(isSize(item) ? '' : '±', item.limit, item.unit);
+  return h('tr', {}, h('th', { scope: 'row' }, text.items[item.name] ?? item.name),
+    h('td', { class: 'figure' }, value, item.note && h('small', {}, ` ${translated(item.note)}`)),
+    h('td', {}, limit),
+    h('td', { class: item.passed ? 'judged-in' : 'judged-out' },
+      item.passed ? `✓ ${text.within}` : `▲ ${text.outside}`));
 }
 
 function verdict(check, overdue) {
   const text = S.check;
-  if (!check) return h('section', { class: 'verdict none' }, h('p', { class: 'word' }, text.none), h('p', { class: 'why' }, text.never));
-  const why = check.status === 'passed' ? (overdue ? text.overdueText : text.today) : check.reasons[0] ?? '';
-  return h('section', { class: `verdict ${check.status === 'passed' && overdue ? 'none' : kTones[check.status]}` },
-    h('p', { class: 'word' }, h('span', { class: 'icon', 'aria-hidden': 'true' }, kIcons[check.status]), text.verdicts[check.status]),
-    h('p', { class: 'why' }, why), h('p', { class: 'when' }, text.last(localTime(check.time), check.user)));
+  if (!check) {
+    return h('section', { class: 'verdict none' }, h('p', { class: 'word' }, text.none),
+      h('p', { class: 'why' }, text.never));
+  }
+  const passed = check.status === 'passed';
+  const why = passed ? (overdue ? text.overdueText : text.today) : sentence(check.reasons[0] ?? '');
+  return h('section', { class: `verdict ${passed && overdue ? 'none' : kTones[check.status]}` },
+    h('p', { class: 'word' },
+      h('span', { class: 'icon', 'aria-hidden': 'true' }, kIcons[check.status]),
+      text.verdicts[check.status]),
+    h('p', { class: 'why' }, why),
+    h('p', { class: 'when' }, text.last(localTime(check.time), check.user)));
+}
+
+/// The person who took a check does not make it the baseline: a second one looks at it.
+function baselineButton(check, load) {
+  const text = S.check;
+  const own = check.user === currentSession()?.user;
+  return h('div', { class: 'row below' }, own ? h('p', { class: 'hint' }, text.secondPerson)
+    : [action(text.takeBaseline, async () => {
+      await post(`checks/${check.id}/baseline`);
+      done(text.baselineTaken);
+      await load();
+    }, { 'data-check': check.id }), h('p', { class: 'hint' }, text.takeHint)]);
 }
 
 function newest(check, load) {
   const text = S.check;
-  return h('section', { class: 'card' }, h('h2', {}, localTime(check.time)), table([text.number, text.value, text.limit, text.judged], check.items.map(itemRow), text.title),
-    check.reasons.length > 1 && h('ul', { class: 'findings small' }, check.reasons.slice(1).map((reason) => h('li', {}, reason))),
-    may('plan') && check.num_markers >= 3 && h('div', { class: 'row below' }, action(text.takeBaseline, async () => {
-      await post(`checks/${check.id}/baseline`);
-      done(text.baselineTaken);
-      await load();
-    }, { 'data-check': check.id }), h('p', { class: 'hint' }, text.takeHint)));
+  const more = check.reasons.slice(1).map((reason) => h('li', {}, sentence(reason)));
+  return h('section', { class: 'card' }, h('h2', {}, localTime(check.time)),
+    table([text.number, text.value, text.limit, text.judged], check.items.map(itemRow), text.title),
+    more.length > 0 && h('ul', { class: 'findings small' }, more),
+    may('plan') && check.num_markers >= 3 && baselineButton(check, load));
+}
+
+const kWidth = 340;
+const kHeight = 130;
+const kLeft = 40;
+
+/// One number of the checks over time, in its limit.
+function chart(name, checks) {
+  const points = checks.map((check) => ({
+    check, item: check.items.find((item) => item.name === name),
+  })).filter(({ item }) => item && item.value !== null).reverse();
+  if (points.length < 2 || name === 'markers_seen') return null;
+  const { limit, unit } = points[points.length - 1].item;
+  const low = isSize({ name }) ? 0 : -limit;
+  const values = points.map(({ item }) => item.value);
+  const top = 1.1 * Math.max(limit, ...values);
+  const bottom = 1.1 * Math.min(low, ...values);
+  const x = (i) => kLeft + i / (points.length - 1) * (kWidth - kLeft - 12);
+  const y = (value) => 8 + (top - value) / (top - bottom) * (kHeight - 32);
+  const tick = (value) => svg('text', { x: kLeft - 5, y: y(value) + 4, class: 'tick' }, `${value}`);
+  const every = Math.ceil(points.length / 5);
+  return h('figure', { class: 'trend' },
+    h('figcaption', {}, S.check.items[name], ' ', h('strong', {}, `${values.at(-1)} ${unit}`)),
+    svg('svg', {
+      viewBox: `0 0 ${kWidth} ${kHeight}`, role: 'img',
+      'aria-label': `${S.check.items[name]}: ${values.join(', ')} ${unit}`,
+    },
+    svg('rect', {
+      x: kLeft, width: kWidth - kLeft - 4, y: y(limit), height: y(low) - y(limit), class: 'zone',
+    }), tick(limit), tick(0), low < 0 && tick(low),
+    svg('polyline', { points: values.map((v, i) => `${x(i)},${y(v)}`).join(' '), class: 'line' }),
+    points.map(({ item }, i) => svg('circle', {
+      cx: x(i), cy: y(item.value), r: 4, class: `mark ${item.passed ? 'within' : 'outside'}`,
+    })),
+    points.map(({ check }, i) => i % every === 0 && svg('text', {
+      x: x(i), y: kHeight - 6, class: 'tick middle',
+    }, localDay(check.time)))));
+}
+
+function trends(checks) {
+  const names = Object.keys(S.check.items);
+  const charts = names.map((name) => chart(name, checks)).filter(Boolean);
+  if (!charts.length) return null;
+  return h('section', { class: 'card' }, h('h2', {}, S.check.trend),
+    h('div', { class: 'trends' }, charts));
 }
 
 function earlier(checks) {
   const text = S.check;
-  const rows = checks.map((check) => h('tr', {}, h('td', {}, localTime(check.time)), h('td', {}, h('span', { class: `badge ${kTones[check.status]}` }, `${kIcons[check.status]} ${text.verdicts[check.status]}`)), h('td', {}, check.num_markers), h('td', {}, check.sensor_serial || S.none), h('td', {}, check.user)));
-  return h('section', { class: 'card' }, h('h2', {}, text.history), table([S.patients.when, S.patients.outcome, text.markers, text.sensor, text.by], rows, text.history));
+  const value = (check, name) => {
+    const item = check.items.find((one) => one.name === name);
+    return item?.value === null || item?.value === undefined ? S.none
+      : `${item.value.toFixed(1)} ${item.unit}`;
+  };
+  const rows = checks.map((check) => h('tr', {}, h('td', {}, localTime(check.time)),
+    h('td', {}, h('span', { class: `badge ${kTones[check.status]}` },
+      `${kIcons[check.status]} ${text.verdicts[check.status]}`)),
+    h('td', {}, check.num_markers), h('td', {}, value(check, 'misfit')),
+    h('td', {}, value(check, 'moved')), h('td', {}, check.sensor_serial || S.none),
+    h('td', {}, check.user)));
+  const heads = [S.patients.when, S.patients.outcome, text.markers, text.items.misfit,
+    text.items.moved, text.sensor, text.by];
+  return h('section', { class: 'card' }, h('h2', {}, text.history),
+    table(heads, rows, text.history));
 }
 
 export async function showCheck(place) {
   const text = S.check;
   const load = async () => {
     const { checks, baseline, overdue } = await get('checks', true);
+    const of = baseline
+      ? text.baselineOf(baseline.set_by, localTime(baseline.set_at), baseline.num_markers)
+      : text.noBaseline;
     redraw(place, h('h1', { class: 'visually-hidden' }, text.title), verdict(checks[0], overdue),
-      h('section', { class: 'card split' }, h('div', {}, h('p', {}, text.how), h('p', { class: 'hint' }, `${text.baseline}: ${baseline ? text.baselineOf(baseline.set_by, localTime(baseline.set_at), baseline.num_markers) : text.noBaseline}`)),
+      h('section', { class: 'card split' },
+        h('div', {}, h('p', {}, text.how), h('p', { class: 'hint' }, `${text.baseline}: ${of}`)),
         may('scan') && action(text.start, async () => {
           await post('checks/open');
           location.hash = '#/scan';
         }, { class: 'primary' })),
-      checks.length > 0 && newest(checks[0], load), checks.length > 1 && earlier(checks.slice(1)));
+      checks.length > 0 && newest(checks[0], load), trends(checks),
+      checks.length > 1 && earlier(checks.slice(1)));
   };
   await load();
-  return live.listen((kind) => { if (kind === 'data' || kind === 'result') load().catch(() => {}); });
+  return live.listen((kind) => {
+    if (kind === 'data' || kind === 'result') load().catch(() => {});
+  });
 }

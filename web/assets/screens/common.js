@@ -1,16 +1,41 @@
 // What several screens show.
 import { get } from '../api.js';
 import { h } from '../dom.js';
-import { S } from '../strings.js';
+import { S, translated } from '../strings.js';
+
+export const kWarmUp_s = 15 * 60;
+export const kOldAfter_s = 120;
+
+const capital = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1)}`;
+/// A reason as a sentence.
+export const sentence = (reason = '') => {
+  const text = translated(reason);
+  return `${capital(text).replaceAll('+-', '±')}${/[.!]$/.test(text) || !text ? '' : '.'}`;
+};
 
 /// What is wrong and what to do about it; nothing where nothing is.
-export const faultWords = ({ fault, fault_kind: kind }) => (fault ? `${fault.charAt(0).toUpperCase()}${fault.slice(1).replace(/[.!]$/, '')}. ${S.faultHints[kind] ?? ''}`.trim() : null);
+export function faultWords({ fault, fault_kind: kind }) {
+  if (!fault) return null;
+  const words = capital(translated(fault)).replace(/[.!]$/, '');
+  return `${words}. ${S.faultHints[kind] ?? ''}`.trim();
+}
 
-export const verdictIcon = (verdict) => ({ in_tolerance: '✓', move: '↔', no_answer: '?' })[verdict] ?? '–';
+export const verdictIcon = (verdict) =>
+  ({ in_tolerance: '✓', unsure: '≈', move: '↔', no_answer: '?' })[verdict] ?? '–';
 
-export const verdictBadge = (verdict) => h('span', { class: `badge ${verdict}` }, `${verdictIcon(verdict)} ${S.result.verdicts[verdict]}`);
+export const verdictBadge = (verdict) => h('span', { class: `badge ${verdict}` },
+  `${verdictIcon(verdict)} ${S.result.verdicts[verdict] ?? verdict}`);
 
-export const outcomeBadge = (scan) => (scan.result ? verdictBadge(scan.result.verdict) : h('span', { class: 'badge' }, scan.outcome === 'done' ? S.purposes[scan.purpose] : S.outcomes[scan.outcome]));
+export const outcomeBadge = (scan) => (scan.result ? verdictBadge(scan.result.verdict)
+  : h('span', { class: 'badge' }, scan.outcome === 'done'
+    ? scan.patient_id || scan.purpose === 'daily_check' ? S.purposes[scan.purpose]
+      : S.room.unassigned
+    : S.outcomes[scan.outcome]));
+
+/// NO ANSWER is a result, but none to act on: then no number, word or trend is shown that somebody
+/// could apply.
+export const isAdvice = (scan) =>
+  Boolean(scan.result?.correction) && scan.result.verdict !== 'no_answer';
 
 /// Codes by patient id, for lists.
 export async function patientCodes() {
@@ -25,3 +50,22 @@ export function ageText(seconds) {
   if (seconds < 48 * 3600) return text.hours(Math.floor(seconds / 3600));
   return text.days(Math.floor(seconds / 86400));
 }
+
+/// What lessens the trust in a result, beside its verdict.
+export function qualityFlags(scan, scene) {
+  const text = S.result.flags;
+  const flags = [];
+  const { total = 0, dropped = 0 } = scene?.frames ?? {};
+  const lost = total > 0 ? Math.round(100 * dropped / total) : 0;
+  if (lost >= 5) flags.push(text.framesLost(lost));
+  if (scan.sensor_on_s !== null && scan.sensor_on_s !== undefined && scan.sensor_on_s < kWarmUp_s) {
+    flags.push(text.warming(Math.floor(scan.sensor_on_s / 60)));
+  }
+  if (scan.check_overdue) flags.push(text.overdue);
+  return flags;
+}
+
+export const flagList = (scan, scene) => {
+  const flags = qualityFlags(scan, scene);
+  return flags.length > 0 && h('ul', { class: 'flags' }, flags.map((flag) => h('li', {}, flag)));
+};

@@ -1,51 +1,105 @@
+// Patients, their references and scans, and the treatment session that people open here.
 import { get, live, may, post, remove } from '../api.js';
-import { action, clear, done, enable, field, form, h, localTime, redraw, table, warn } from '../dom.js';
+import {
+  action, clear, done, enable, field, form, h, localTime, redraw, table, warn,
+} from '../dom.js';
 import { S } from '../strings.js';
+import { closeSession, openPatient } from '../treatment.js';
 import { outcomeBadge } from './common.js';
+
+function referenceState(patient) {
+  const text = S.patients;
+  const approved = patient.approved_reference_id && `✓ ${text.approved}`;
+  const waits = patient.draft_reference_id && h('a', {
+    href: `#/plan/${patient.draft_reference_id}`, class: 'badge move',
+  }, text.waits);
+  return approved || waits ? [approved, approved && waits && ' ', waits] : text.noReference;
+}
 
 export async function showPatients(place) {
   const text = S.patients;
   const list = h('div', {});
   const search = h('input', { type: 'search', autocomplete: 'off' });
-  const code = h('input', { required: true, maxlength: 32, pattern: '[A-Za-z0-9_\\-][A-Za-z0-9._\\-]*', autocomplete: 'off', spellcheck: 'false' });
+  const code = h('input', {
+    required: true, maxlength: 32, pattern: '[A-Za-z0-9_\\-][A-Za-z0-9._\\-]*', autocomplete: 'off',
+    spellcheck: 'false',
+  });
   const site = h('input', { maxlength: 64, autocomplete: 'off' });
   let patients = [];
 
-  const draw = () => {
+  const matching = () => {
     const wanted = search.value.trim().toLowerCase();
-    const rows = patients.filter((patient) => patient.code.toLowerCase().includes(wanted)).map((patient) => h('tr', { class: patient.id === live.status?.patient_id ? 'chosen' : '' },
-      h('td', {}, h('a', { href: `#/patient/${patient.id}` }, patient.code), patient.id === live.status?.patient_id && h('span', { class: 'badge here' }, text.isOpen)),
-      h('td', {}, patient.site || S.none), h('td', {}, patient.num_scans), h('td', {}, patient.approved_reference_id ? `✓ ${text.approved}` : text.noReference), h('td', {}, localTime(patient.created_at))));
-    redraw(list, rows.length ? table([text.code, text.site, text.scans, text.reference, text.added], rows, text.title) : h('p', { class: 'hint' }, text.empty));
+    return patients.filter((patient) => patient.code.toLowerCase().includes(wanted));
+  };
+  const row = (patient) => {
+    const isOpen = patient.id === live.status?.session?.patient_id;
+    return h('tr', { class: isOpen ? 'chosen' : '' },
+      h('td', {}, h('a', { href: `#/patient/${patient.id}` }, patient.code),
+        isOpen && h('span', { class: 'badge here' }, text.isOpen)),
+      h('td', {}, patient.site || S.none), h('td', {}, patient.num_scans),
+      h('td', {}, referenceState(patient)), h('td', {}, localTime(patient.created_at)));
+  };
+  const draw = () => {
+    const rows = matching().map(row);
+    redraw(list, rows.length
+      ? table([text.code, text.site, text.scans, text.reference, text.added], rows, text.title)
+      : h('p', { class: 'hint' }, text.empty));
   };
   const load = async () => {
     ({ patients } = await get('patients', true));
     draw();
   };
   search.addEventListener('input', draw);
+  // A scanner of wristbands types the code and Enter.
+  search.addEventListener('keydown', (event) => {
+    if (event.key !== 'Enter') return;
+    const wanted = search.value.trim().toLowerCase();
+    const exact = patients.find((patient) => patient.code.toLowerCase() === wanted);
+    const found = exact ?? (matching().length === 1 ? matching()[0] : null);
+    if (found) location.hash = `#/patient/${found.id}`;
+  });
   clear(place, h('h1', {}, text.title),
     h('section', { class: 'card' }, field(text.search, search), list),
-    may('patients') && h('section', { class: 'card' }, h('h2', {}, text.add), form({ class: 'form inline' }, async () => {
-      const { id } = await post('patients', { code: code.value.trim(), site: site.value.trim() });
-      location.hash = `#/patient/${id}`;
-    }, field(text.code, code, text.codeHint), field(text.site, site, text.siteHint), h('button', { class: 'primary' }, text.add))));
+    may('patients') && h('section', { class: 'card' }, h('h2', {}, text.add),
+      form({ class: 'form inline' }, async () => {
+        const body = { code: code.value.trim(), site: site.value.trim() };
+        const { id } = await post('patients', body);
+        location.hash = `#/patient/${id}`;
+      }, field(text.code, code, text.codeHint), field(text.site, site, text.siteHint),
+      h('button', { class: 'primary' }, text.add))));
   await load();
   return live.listen((kind) => { if (kind === 'data') load().catch(() => {}); });
 }
 
+/// Where another patient's session is open, it is named and closed by the same tap.
 function openButtons(patient) {
   const text = S.patients;
   const reason = h('input', { maxlength: 200, autocomplete: 'off' });
+  const question = h('div', {});
   const open = (purpose) => async () => {
-    await post(`patients/${patient.id}/open`, { purpose, reason: purpose === 'reference' ? reason.value.trim() : '' });
-    done(text.opened(patient.code));
-    location.hash = '#/scan';
+    const session = live.status?.session;
+    const begin = async (replaces) => {
+      await openPatient(patient, purpose, purpose === 'reference' ? reason.value.trim() : '',
+        replaces);
+      location.hash = '#/scan';
+    };
+    if (!session || session.patient_id === patient.id) {
+      await begin('');
+      return;
+    }
+    clear(question, h('p', { class: 'lead caution' },
+      S.session.replace(session.patient_code, patient.code)),
+    h('div', { class: 'row' },
+      action(S.session.replaceSubmit(session.patient_code, patient.code),
+        () => begin(session.id), { class: 'danger' }),
+      action(S.cancel, async () => clear(question), {})));
   };
   const fraction = action(text.openFraction, open('fraction'), { class: 'primary' });
   enable(fraction, Boolean(patient.approved_reference_id));
   return h('div', { class: 'form' },
     h('p', { class: 'lead' }, text.confirmWho(patient.code)),
     h('div', { class: 'row' }, fraction, action(text.openReference, open('reference'), {})),
+    question,
     !patient.approved_reference_id && h('p', { class: 'hint' }, text.needsReference),
     field(text.reason, reason));
 }
@@ -53,45 +107,96 @@ function openButtons(patient) {
 function referenceTable(references) {
   const text = S.patients;
   if (!references.length) return h('p', { class: 'hint' }, text.noReferences);
+  const plan = may('plan') ? text.plan : text.planView;
   const rows = references.map((reference) => h('tr', {},
-    h('td', {}, reference.version), h('td', {}, `${localTime(reference.created_at)}, ${reference.created_by}`), h('td', {}, reference.reason || S.none),
-    h('td', {}, reference.approved_by ? `✓ ${text.approvedBy(reference.approved_by, localTime(reference.approved_at))}` : h('span', { class: 'badge move' }, text.draft)),
-    h('td', {}, h('a', { class: 'button', href: `#/plan/${reference.id}`, 'aria-label': `${may('plan') ? text.plan : text.planView}, ${text.version} ${reference.version}` }, may('plan') ? text.plan : text.planView))));
-  return table([text.version, text.made, text.reasonShort, text.state, S.action], rows, text.references);
+    h('td', {}, reference.version),
+    h('td', {}, `${localTime(reference.created_at)}, ${reference.created_by}`),
+    h('td', {}, reference.reason || S.none),
+    h('td', {}, reference.approved_by
+      ? `✓ ${text.approvedBy(reference.approved_by, localTime(reference.approved_at))}`
+      : h('span', { class: 'badge move' }, `${text.draft}, ${text.waits}`)),
+    h('td', {}, h('a', {
+      class: 'button', href: `#/plan/${reference.id}`,
+      'aria-label': `${plan}, ${text.version} ${reference.version}`,
+    }, plan))));
+  return table([text.version, text.made, text.reasonShort, text.state, S.action], rows,
+    text.references);
 }
 
 function scanTable(scans) {
   const text = S.patients;
   if (!scans.length) return h('p', { class: 'hint' }, S.status.noScans);
-  const rows = scans.map((scan) => h('tr', {}, h('td', {}, h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at))), h('td', {}, S.purposes[scan.purpose]), h('td', {}, outcomeBadge(scan)), h('td', {}, scan.accepted_by ? `✓ ${scan.accepted_by}` : S.none)));
-  return table([text.when, text.purpose, text.outcome, text.accepted], rows, text.history);
+  const accepted = (scan) => (!scan.accepted_by ? S.none : scan.accepted_reason
+    ? `▲ ${scan.accepted_by}: ${scan.accepted_reason}` : `✓ ${scan.accepted_by}`);
+  const rows = scans.map((scan) => h('tr', {},
+    h('td', {}, h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at))),
+    h('td', {}, scan.fraction ?? S.none),
+    h('td', {}, S.purposes[scan.purpose]), h('td', {}, outcomeBadge(scan)),
+    h('td', {}, accepted(scan))));
+  return table([text.when, text.fraction, text.purpose, text.outcome, text.accepted], rows,
+    text.history);
 }
 
 function wipe(patient) {
   const text = S.patients;
   const code = h('input', { required: true, autocomplete: 'off', spellcheck: 'false' });
-  return h('details', { class: 'card' }, h('summary', {}, text.wipe), h('p', {}, text.wipeText), form({ class: 'form inline' }, async () => {
-    if (code.value !== patient.code) throw new Error(text.wipeText);
-    await remove(`patients/${patient.id}`);
-    location.hash = '#/patients';
-  }, field(text.code, code), h('button', { class: 'danger' }, text.wipeSubmit)));
+  return h('details', { class: 'card' }, h('summary', {}, text.wipe), h('p', {}, text.wipeText),
+    form({ class: 'form inline' }, async () => {
+      if (code.value !== patient.code) throw new Error(text.wipeText);
+      await remove(`patients/${patient.id}`);
+      location.hash = '#/patients';
+    }, field(text.code, code), h('button', { class: 'danger' }, text.wipeSubmit)));
+}
+
+function openNow(patient) {
+  const session = live.status?.session;
+  if (session?.patient_id !== patient.id) return null;
+  return h('p', { class: 'lead' }, h('strong', {}, S.patients.isOpen), ' ',
+    session.fraction ? S.session.fraction(session.fraction) : S.purposes.reference, ' ',
+    may('scan') && action(S.session.close, () => closeSession(session), {}));
 }
 
 export async function showPatient(place, id) {
   const text = S.patients;
-  const patient = await get(`patients/${id}`);
   const references = h('div', {});
   const scans = h('div', {});
+  const opening = h('div', {});
+  let approved;
   const load = async () => {
-    const [found, history] = await Promise.all([get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
+    const [patient, found, history] = await Promise.all([get(`patients/${id}`, true),
+      get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
+    // What is typed as a reason stays as long as nothing else is offered.
+    if (approved !== patient.approved_reference_id) {
+      approved = patient.approved_reference_id;
+      clear(opening, openButtons(patient));
+    }
     redraw(references, referenceTable(found.references));
     redraw(scans, scanTable(history.scans));
   };
+  const patient = await get(`patients/${id}`);
+  const session = h('div', {});
+  const file = (name, label) => h('a', {
+    class: 'button', href: `/api/v1/patients/${id}/${name}`, download: '',
+  }, label);
   clear(place, h('h1', {}, patient.code, ' ', h('small', {}, patient.site)),
-    may('scan') && h('section', { class: 'card' }, h('h2', {}, text.open), openButtons(patient)),
+    may('scan') && h('section', { class: 'card' }, h('h2', {}, text.open), session, opening),
     h('section', { class: 'card' }, h('h2', {}, text.references), references),
-    h('section', { class: 'card' }, h('h2', {}, text.history), scans),
+    h('section', { class: 'card' }, h('h2', {}, text.history), scans,
+      h('div', { class: 'row below' }, file('report.pdf', text.report),
+        file('numbers.csv', text.csv), file('numbers.json', text.json))),
     may('wipe') && wipe(patient));
+  let shownSession = null;
+  const drawSession = () => {
+    const now = live.status?.session ?? null;
+    const key = JSON.stringify(now);
+    if (shownSession === key) return;
+    shownSession = key;
+    clear(session, openNow(patient));
+  };
+  drawSession();
   await load();
-  return live.listen((kind) => { if (kind === 'data' || kind === 'result') load().catch((error) => warn(error.message)); });
+  return live.listen((kind) => {
+    if (kind === 'status') drawSession();
+    if (kind === 'data' || kind === 'result') load().catch((error) => warn(error.message));
+  });
 }

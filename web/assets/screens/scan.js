@@ -1,6 +1,8 @@
-import { get, live, may, now, post, since_s } from '../api.js';
+// The sweep: guidance, coverage, the camera, and the button.
+import { currentSession, get, live, may, now, post, since_s } from '../api.js';
 import { action, clear, done, enable, h, redraw, say } from '../dom.js';
 import { S } from '../strings.js';
+import { isAcknowledged, sessionLine } from '../treatment.js';
 import { faultWords } from './common.js';
 
 const kPreviewEvery_ms = 250;
@@ -8,7 +10,7 @@ const kPreviewAnswer_ms = 5000;
 const kSecondTap_s = 0.8;
 
 /// The camera's picture, as long as there is one.
-function preview() {
+export function preview() {
   const text = S.status;
   const picture = h('img', { alt: text.previewAlt, hidden: true });
   const none = h('p', { class: 'hint' }, text.noPreview);
@@ -17,7 +19,10 @@ function preview() {
   const next = async () => {
     if (stopped) return;
     try {
-      const response = await fetch('/api/v1/preview', { headers: { 'X-Plumb-Background': '1' }, cache: 'no-store', signal: AbortSignal.timeout(kPreviewAnswer_ms) });
+      const response = await fetch('/api/v1/preview', {
+        headers: { 'X-Plumb-Background': '1' }, cache: 'no-store',
+        signal: AbortSignal.timeout(kPreviewAnswer_ms),
+      });
       if (!response.ok) throw new Error();
       const fresh = URL.createObjectURL(await response.blob());
       picture.src = fresh;
@@ -34,7 +39,9 @@ function preview() {
     }
   };
   next();
-  return { element: h('figure', { class: 'preview' }, picture, none), stop: () => { stopped = true; } };
+  return {
+    element: h('figure', { class: 'preview' }, picture, none), stop: () => { stopped = true; },
+  };
 }
 
 /// What the large button does now: its words and its request; nothing where it is off.
@@ -42,6 +49,7 @@ function offer({ state, fault_kind: fault }) {
   const text = S.scan;
   if (state === 'scanning') return { label: text.stop, request: 'scan/end' };
   if (state === 'fault' && fault === 'scan') return { label: text.acknowledge, request: 'press' };
+  if (state === 'working') return { label: S.states.working, request: '' };
   if (state === 'result') return { label: text.again, request: 'scan/start' };
   return { label: text.start, request: state === 'ready' ? 'scan/start' : '' };
 }
@@ -51,7 +59,8 @@ function buttons() {
   let request = '';
   let tapped = null;
   const press = action('', async () => {
-    if (tapped && since_s(tapped) < kSecondTap_s) return;  // the second of two was meant for what the button said before
+    // The second of two taps was meant for what the button said before.
+    if (tapped && since_s(tapped) < kSecondTap_s) return;
     tapped = now();
     await post(request);
   }, { class: 'primary giant' });
@@ -64,12 +73,22 @@ function buttons() {
     request = next.request;
     if (press.textContent !== next.label) press.textContent = next.label;
     press.classList.toggle('stop', status.state === 'scanning');
-    enable(press, Boolean(request));
+    enable(press, Boolean(request) && live.connected && isAcknowledged());
+    enable(discard, live.connected);
     const isOver = !['scanning', 'working'].includes(status.state);
     if (isOver && document.activeElement === discard) press.focus();
     discard.hidden = isOver;
   };
-  return { draw, element: may('scan') ? h('div', { class: 'controls' }, press, discard) : h('div', {}) };
+  return {
+    draw, element: may('scan') ? h('div', { class: 'controls' }, press, discard) : h('div', {}),
+  };
+}
+
+/// The tone and words of what the person who sweeps should do.
+export function adviceOf(status) {
+  if (status.state !== 'scanning') return { hint: '', words: S.stateHints[status.state], tone: '' };
+  const hint = status.scan?.guidance ?? 'none';
+  return { hint, words: S.scan.guidance[hint], tone: hint === 'none' ? 'good' : 'bad' };
 }
 
 export async function showScan(place) {
@@ -78,58 +97,77 @@ export async function showScan(place) {
   const who = h('p', { class: 'lead who-line' });
   const headline = h('p', { class: 'headline' });
   const guidance = h('p', { class: 'guidance' });
+  const known = h('p', { class: 'old-note', role: 'status', hidden: true });
+  const caution = h('p', { class: 'caution' });
   const bar = h('progress', { max: 1, 'aria-label': text.coverage });
   const barText = h('p', { class: 'bar-text' });
   const facts = h('dl', { class: 'facts' });
   const control = buttons();
-  let patient = null;
+  const drawSession = sessionLine(who, { mayClose: may('scan') });
   let shown = {};
 
   clear(place, h('h1', { class: 'visually-hidden' }, text.title),
     h('div', { class: 'scan-grid' },
-      h('section', { class: 'card sweep' }, who, headline, guidance, h('div', { class: 'bar' }, bar, barText), control.element),
+      h('section', { class: 'card sweep' }, who, known, headline, guidance, caution,
+        h('div', { class: 'bar' }, bar, barText), control.element),
       h('section', { class: 'card' }, h('h2', {}, S.status.preview), camera.element, facts)));
 
   const drawWho = (status) => {
     const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
-    redraw(who, isCheck ? [h('strong', {}, S.purposes.daily_check), ` · ${S.check.sweep}`] : status.patient_id
-      ? [`${text.patient} `, h('strong', {}, patient?.code ?? '…'), ` · ${S.purposes[status.next_purpose]} · ${text.counter}: ${status.scans_today}`]
-      : [text.noPatient, ' ', h('a', { href: '#/patients' }, text.choose)]);
+    const key = JSON.stringify([isCheck, status.session, status.state === 'scanning'
+      || status.state === 'working']);
+    if (shown.who === key) return;
+    shown.who = key;
+    if (isCheck) {
+      redraw(who, h('strong', { class: 'code-big' }, S.purposes.daily_check), ` ${S.check.sweep}`);
+    } else drawSession();
   };
   const drawProgress = (status) => {
     const { scan, state } = status;
     const fraction = state === 'working' ? scan?.step_fraction : scan?.coverage;
-    const known = scan && fraction !== null && fraction !== undefined;
+    const isKnown = scan && fraction !== null && fraction !== undefined;
     bar.parentElement.hidden = !scan;
-    if (known) bar.value = fraction;
+    if (isKnown) bar.value = fraction;
     else bar.removeAttribute('value');
-    barText.textContent = state === 'working' ? `${text.step[scan?.step] ?? scan?.step ?? ''} ${Math.round((fraction ?? 0) * 100)} %` : `${text.coverage} ${known ? `${Math.round(fraction * 100)} %` : text.unknownCoverage}`;
-    const hint = state === 'scanning' ? scan?.guidance ?? 'none' : '';
-    guidance.textContent = hint ? text.guidance[hint] : S.stateHints[state];
-    guidance.dataset.tone = !hint ? '' : hint === 'none' ? 'good' : 'bad';
-    if (hint && hint !== 'none' && hint !== shown.hint) say(text.guidance[hint]);
-    shown.hint = hint;
+    const percent = `${Math.round((fraction ?? 0) * 100)} %`;
+    barText.textContent = state === 'working'
+      ? `${text.step[scan?.step] ?? scan?.step ?? ''} ${percent}`
+      : isKnown ? `${text.coverage} ${percent}` : text.unknownCoverage;
+    const advice = adviceOf(status);
+    guidance.textContent = advice.words;
+    guidance.dataset.tone = advice.tone;
+    if (advice.tone === 'bad' && advice.hint !== shown.hint) say(advice.words);
+    shown.hint = advice.hint;
     const pair = (name, value) => [h('dt', {}, name), h('dd', {}, value)];
-    clear(facts, scan ? [pair(text.time, text.seconds(scan.elapsed_s)), pair(text.keyframes, scan.keyframes), pair(text.tracked, `${scan.frames_tracked} / ${scan.frames}`), pair(text.dropped, scan.frames_dropped)] : []);
+    clear(facts, scan ? [pair(text.time, text.seconds(scan.elapsed_s)),
+      pair(text.keyframes, scan.keyframes),
+      pair(text.tracked, `${scan.frames_tracked} / ${scan.frames + scan.frames_dropped}`),
+      pair(text.dropped, scan.frames_dropped)] : []);
   };
   const draw = () => {
     const { status } = live;
-    if (!status) return;
+    if (!status || !currentSession()) return;
+    place.classList.toggle('off', !live.connected);
+    known.hidden = live.connected;
+    if (!live.connected) {
+      known.textContent = S.lastKnown(S.states[status.state], Math.floor(since_s(live.received)));
+    }
     headline.textContent = S.states[status.state];
     headline.dataset.state = status.state;
     control.draw(status);
     drawProgress(status);
     if (status.fault) guidance.textContent = faultWords(status);
+    const overdue = status.check_overdue && status.next_purpose === 'reference'
+      && status.state === 'ready';
+    caution.textContent = overdue ? text.overdueReference : '';
     drawWho(status);
-    if (status.patient_id !== shown.patient) {
-      shown.patient = status.patient_id;
-      patient = null;
-      if (status.patient_id) get(`patients/${status.patient_id}`, true).then((found) => { patient = found; drawWho(live.status); }, () => {});
-    }
   };
   draw();
+  if (!live.status) get('status', true).then((status) => live.take(status), () => {});
   const stop = live.listen(draw);
+  const timer = setInterval(() => { if (!live.connected) draw(); }, 1000);
   return () => {
+    clearInterval(timer);
     stop();
     camera.stop();
   };

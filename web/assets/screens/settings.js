@@ -3,7 +3,12 @@ import { checkbox, clear, done, field, form, h, select } from '../dom.js';
 import { S } from '../strings.js';
 
 const kNumbers = {
-  shift_tolerance_mm: [0.1, 50, 0.1], rotation_tolerance_deg: [0.1, 20, 0.1], auto_stop_s: [1, 120, 1], scan_limit_s: [5, 600, 1], retention_days: [0, 36500, 1], idle_logout_min: [1, 240, 1],
+  shift_tolerance_mm: [0.1, 50, 0.1],
+  rotation_tolerance_deg: [0.1, 20, 0.1],
+  auto_stop_s: [1, 120, 1],
+  scan_limit_s: [5, 600, 1],
+  retention_days: [0, 36500, 1],
+  idle_logout_min: [1, 240, 1],
 };
 const kFlags = ['couch_markers', 'keep_recordings'];
 

@@ -1,35 +1,58 @@
+// What the appliance does, what waits, and what lets people scan.
 import { get, live, may } from '../api.js';
 import { clear, h, localTime, redraw, table } from '../dom.js';
 import { S } from '../strings.js';
-import { faultWords, outcomeBadge, patientCodes } from './common.js';
+import { sessionName } from '../treatment.js';
+import { faultWords, kWarmUp_s, outcomeBadge, patientCodes } from './common.js';
 
-const kWarmUp_s = 15 * 60;
 const gigabytes = (bytes) => Math.round(bytes / 2 ** 30);
 
 /// Whether the room was checked today, and how that went.
 function checkTile({ last_check: last, check_overdue: overdue }, tile) {
   const text = S.check;
   const good = last?.status === 'passed' && !overdue;
-  const word = good ? text.verdicts.passed : last && last.status !== 'passed' ? text.verdicts[last.status] : text.overdue;
-  return tile(text.tile, word.toLowerCase(), good ? 'good' : 'bad', last && h('p', {}, text.last(localTime(last.time), last.user)), overdue && h('p', { class: 'caution' }, text.overdueText), h('p', {}, h('a', { href: '#/check' }, S.nav.check)));
+  const word = good ? text.verdicts.passed
+    : last && last.status !== 'passed' ? text.verdicts[last.status] : text.overdue;
+  return tile(text.tile, word.toLowerCase(), good ? 'good' : 'bad',
+    last && h('p', {}, text.last(localTime(last.time), last.user)),
+    overdue && h('p', { class: 'caution' }, text.overdueText),
+    h('p', {}, h('a', { href: '#/check' }, S.nav.check)));
 }
 
-function tiles(status, codes) {
+/// Drafts that somebody has to plan or approve: whose turn it is.
+function waitingTile({ waiting = [] }, tile) {
   const text = S.status;
-  const { sensor, storage } = status;
+  const rows = waiting.map((one) => h('li', {},
+    h('a', { href: `#/plan/${one.reference_id}` }, one.patient_code), ' ',
+    text.waitingVersion(one.version)));
+  return tile(text.waitingApproval, waiting.length ? `${waiting.length}` : text.nothingWaits,
+    waiting.length ? 'waits' : '', rows.length > 0 && h('ul', {}, rows));
+}
+
+function tiles(status) {
+  const text = S.status;
+  const { sensor, storage, session } = status;
   const used = storage.total_bytes > 0 ? 1 - storage.free_bytes / storage.total_bytes : 0;
-  const tile = (title, value, tone, ...more) => h('section', { class: `card tile ${tone}` }, h('h2', {}, title), h('p', { class: 'big' }, value), ...more);
+  const tile = (title, value, tone, ...more) => h('section', { class: `card tile ${tone}` },
+    h('h2', {}, title), h('p', { class: 'big' }, value), ...more);
+  const isCheck = status.next_purpose === 'daily_check';
   return [
+    tile(text.patient, isCheck ? S.purposes.daily_check : sessionName(session), '',
+      session && !isCheck && h('p', {}, S.purposes[session.purpose]),
+      session && h('p', {}, S.session.openedBy(session.opened_by))),
+    waitingTile(status, tile),
+    checkTile(status, tile),
     tile(text.sensor, sensor.present ? text.present : text.missing, sensor.present ? 'good' : 'bad',
       sensor.present && h('p', {}, `${sensor.name}, ${text.serial} ${sensor.serial}`),
-      sensor.present && h('p', {}, `${text.rate(sensor.fps)}, ${text.powered(Math.floor(sensor.powered_s / 60))}`),
-      sensor.present && sensor.powered_s < kWarmUp_s && h('p', { class: 'caution' }, text.warming)),
-    tile(text.patient, codes.get(status.patient_id) ?? S.none, '', h('p', {}, S.purposes[status.next_purpose])),
-    checkTile(status, tile),
-    tile(text.storage, storage.writable ? text.free(gigabytes(storage.free_bytes), gigabytes(storage.total_bytes)) : text.readOnly, storage.writable && used < 0.95 ? 'good' : 'bad',
-      h('meter', { min: 0, max: 1, high: 0.9, value: used, 'aria-label': text.storage })),
-    tile(text.light, S.lights[status.light] ?? status.light, ''),
-    tile(text.version, status.version, ''),
+      sensor.present && h('p', {},
+        `${text.rate(sensor.fps)}, ${text.powered(Math.floor(sensor.powered_s / 60))}`),
+      sensor.present && sensor.powered_s < kWarmUp_s
+        && h('p', { class: 'caution' }, text.warming)),
+    tile(text.storage, storage.writable
+      ? text.free(gigabytes(storage.free_bytes), gigabytes(storage.total_bytes)) : text.readOnly,
+    storage.writable && used < 0.95 ? 'good' : 'bad',
+    h('meter', { min: 0, max: 1, high: 0.9, value: used, 'aria-label': text.storage }),
+    h('p', {}, `${S.product} ${status.version}`)),
   ];
 }
 
@@ -42,7 +65,8 @@ export async function showStatus(place) {
   let codes = await patientCodes();
   clear(place,
     h('h1', { class: 'visually-hidden' }, text.title),
-    h('section', { class: 'card hero' }, h('div', {}, headline, hint), may('scan') && h('a', { class: 'button primary', href: '#/scan' }, text.goScan)),
+    h('section', { class: 'card hero' }, h('div', {}, headline, hint),
+      may('scan') && h('a', { class: 'button primary', href: '#/scan' }, text.goScan)),
     grid,
     h('section', { class: 'card' }, h('h2', {}, text.lastScans), list));
 
@@ -52,14 +76,18 @@ export async function showStatus(place) {
     headline.textContent = S.states[status.state];
     headline.dataset.state = status.state;
     hint.textContent = faultWords(status) ?? S.stateHints[status.state];
-    redraw(grid, tiles(status, codes));
+    redraw(grid, tiles(status));
   };
   const load = async () => {
     codes = await patientCodes();
     const { scans } = await get('scans?limit=8', true);
     const rows = scans.map((scan) => h('tr', {},
-      h('td', {}, h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at))), h('td', {}, codes.get(scan.patient_id) ?? S.none), h('td', {}, S.purposes[scan.purpose]), h('td', {}, outcomeBadge(scan))));
-    redraw(list, rows.length ? table([S.patients.when, S.result.patient, S.patients.purpose, S.patients.outcome], rows, text.lastScans) : h('p', { class: 'hint' }, text.noScans));
+      h('td', {}, h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at))),
+      h('td', {}, codes.get(scan.patient_id) ?? S.none), h('td', {}, S.purposes[scan.purpose]),
+      h('td', {}, outcomeBadge(scan))));
+    const heads = [S.patients.when, S.result.patient, S.patients.purpose, S.patients.outcome];
+    redraw(list, rows.length ? table(heads, rows, text.lastScans)
+      : h('p', { class: 'hint' }, text.noScans));
     draw();
   };
   draw();  // what is known already; the list may take a moment

@@ -1,8 +1,51 @@
-import { currentSession, get, may, post, put } from '../api.js';
-import { checkbox, clear, done, field, form, h, localTime, select, table, warn } from '../dom.js';
+// Accounts, one's own password and preferences, and the screens in the room.
+import { currentSession, get, may, post, put, remove } from '../api.js';
+import {
+  action, checkbox, clear, done, field, form, h, localTime, select, table, warn,
+} from '../dom.js';
+import { preferences } from '../preferences.js';
 import { S } from '../strings.js';
 
-const password = (properties) => h('input', { type: 'password', autocomplete: 'new-password', maxlength: 128, ...properties });
+const password = (properties) => h('input', {
+  type: 'password', autocomplete: 'new-password', maxlength: 128, ...properties,
+});
+const accountRoles = () => Object.fromEntries(
+  Object.entries(S.roles).filter(([name]) => name !== 'display'));
+
+function ownPreferences() {
+  const again = () => window.dispatchEvent(new Event('plumb-language'));
+  return h('section', { class: 'card' }, h('h2', {}, S.users.preferences),
+    h('div', { class: 'form inline' }, preferences(currentSession().user, again)));
+}
+
+/// Screens are paired by the code that they show.
+function displays() {
+  const text = S.displays;
+  const code = h('input', {
+    required: true, maxlength: 7, autocomplete: 'off', spellcheck: 'false', class: 'code',
+  });
+  const name = h('input', { required: true, maxlength: 32, autocomplete: 'off' });
+  const list = h('div', {});
+  const load = async () => {
+    const { displays: paired } = await get('displays');
+    const rows = paired.map((one) => h('tr', {}, h('td', {}, one.name),
+      h('td', {}, localTime(one.paired_at)), h('td', {}, one.paired_by),
+      h('td', {}, action(text.remove, async () => {
+        await remove(`displays/${one.id}`);
+        await load();
+      }, { 'aria-label': `${text.remove} ${one.name}` }))));
+    clear(list, rows.length ? table([text.name, text.when, text.by, S.action], rows, text.title)
+      : h('p', { class: 'hint' }, text.none));
+  };
+  load().catch((error) => warn(error.message));
+  return h('section', { class: 'card' }, h('h2', {}, text.title), h('p', { class: 'hint' }, text.hint),
+    list, form({ class: 'form inline' }, async () => {
+      await post('displays', { code: code.value.trim(), name: name.value.trim() });
+      code.value = name.value = '';
+      done(text.paired);
+      await load();
+    }, field(text.code, code), field(text.name, name), h('button', {}, text.pair)));
+}
 
 function ownPassword() {
   const text = S.users;
@@ -17,7 +60,7 @@ function ownPassword() {
 
 function userRow(user, reload) {
   const text = S.users;
-  const role = select(S.roles, user.role, { 'aria-label': `${text.role}, ${user.name}` });
+  const role = select(accountRoles(), user.role, { 'aria-label': `${text.role}, ${user.name}` });
   const disabled = checkbox(text.disable, user.disabled, {});
   const fresh = password({ minlength: 10 });
   return h('tr', {}, h('td', {}, user.name), h('td', {}, S.roles[user.role]), h('td', {}, user.disabled ? text.disabled : `✓ ${text.active}`), h('td', {}, localTime(user.created_at)),
@@ -38,7 +81,7 @@ export async function showUsers(place) {
   const text = S.users;
   const list = h('div', {});
   const name = h('input', { required: true, maxlength: 32, autocomplete: 'off', spellcheck: 'false', autocapitalize: 'none' });
-  const role = select(S.roles, 'technician', {});
+  const role = select(accountRoles(), 'technician', {});
   const fresh = password({ required: true, minlength: 10 });
   const load = async () => {
     const { users } = await get('users');
@@ -52,6 +95,6 @@ export async function showUsers(place) {
       done(S.saved);
       await load();
     }, field(text.name, name, text.nameHint), field(text.role, role), field(text.password, fresh, S.login.passwordHint), h('button', { class: 'primary' }, text.submit))),
-    ownPassword());
+    may('users') && displays(), ownPreferences(), ownPassword());
   if (may('users')) await load().catch((error) => warn(error.message));
 }

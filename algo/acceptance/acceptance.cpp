@@ -1,0 +1,181 @@
+#include "algo/acceptance/acceptance.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace plumb {
+namespace {
+
+using Reasons = std::vector<std::string>;
+
+// Each gate passes only on a comparison that is true, so that a NaN refuses.
+
+void JudgeRegion(const Evidence& evidence, const AcceptanceLimits& limits, Reasons& reasons) {
+  // Without a support the region would be all that was measured, and a couch that stands still
+  // would hide that the body moved.
+  if (!evidence.reference_has_support && !evidence.region_is_drawn) {
+    reasons.emplace_back(
+        "no flat support was found in the reference scan, so the body cannot be separated from "
+        "what it lies on; draw a region on the body, or scan the reference again with more of the "
+        "couch in view");
+  }
+  if (std::isnan(evidence.coverage)) {
+    reasons.emplace_back("how much of the region the current scan covers could not be measured");
+  } else if (!(evidence.coverage >= limits.min_coverage)) {
+    reasons.push_back(
+        fmt::format("the current scan covers {:.1f} % of the region, at least {:g} % are needed; "
+                    "sweep all of it",
+                    100 * evidence.coverage, 100 * limits.min_coverage));
+  }
+  if (std::isnan(evidence.largest_hole_m)) {
+    reasons.emplace_back("the holes of the current scan could not be measured");
+  } else if (!(evidence.largest_hole_m <= limits.max_hole_m)) {
+    reasons.push_back(fmt::format(
+        "the current scan has a hole of {:.0f} mm in the region at x {:.2f} m, y {:.2f} m; at most "
+        "{:g} mm are allowed; sweep over it",
+        evidence.largest_hole_m / kMillimetre, evidence.hole_centre_m.x(),
+        evidence.hole_centre_m.y(), limits.max_hole_m / kMillimetre));
+  }
+  if (std::isnan(evidence.residual_p95_m)) {
+    reasons.emplace_back("how well the surfaces fit could not be measured");
+  } else if (!(evidence.residual_p95_m <= limits.max_residual_p95_m)) {
+    reasons.push_back(
+        fmt::format("the body does not look like this reference: 5 % of the region lie more than "
+                    "{:.0f} mm away after the best motion",
+                    evidence.residual_p95_m / kMillimetre));
+  }
+}
+
+void JudgeTracking(const Evidence& evidence, const AcceptanceLimits& limits, Reasons& reasons) {
+  const auto judge = [&](double lost_s, const char* scan) {
+    if (lost_s <= limits.max_lost_s) return;
+    if (std::isnan(lost_s)) {
+      reasons.push_back(
+          fmt::format("it is not known how long tracking was lost in the {} scan", scan));
+      return;
+    }
+    reasons.push_back(
+        fmt::format("tracking was lost for {:.1f} s in the {} scan, or no image came; sweep again, "
+                    "more slowly",
+                    lost_s, scan));
+  };
+  judge(evidence.reference_lost_s, "reference");
+  judge(evidence.current_lost_s, "current");
+}
+
+void JudgeUncertainty(const Evidence& evidence, const AcceptanceLimits& limits, Reasons& reasons) {
+  for (std::size_t i = 0; i < evidence.numbers.size(); ++i) {
+    const std::optional<MeasuredNumber>& number = evidence.numbers[i];
+    if (!number) {
+      if (!IsShift(i)) reasons.push_back(fmt::format("{} was not measured", kNumberNames[i]));
+      continue;
+    }
+    if (!std::isfinite(number->value)) {
+      reasons.push_back(fmt::format("{} was not measured", kNumberNames[i]));
+    } else if (!(number->u95 >= 0 && number->u95 <= ToleranceOf(limits, i))) {
+      reasons.push_back(fmt::format(
+          "{} is not well determined: \u00b1{:.2g} {} at 95 %, the tolerance is {:g} {}",
+          kNumberNames[i], number->u95, UnitOf(i), ToleranceOf(limits, i), UnitOf(i)));
+    }
+  }
+}
+
+Decision JudgeValues(const Evidence& evidence, const AcceptanceLimits& limits) {
+  Reasons outside;
+  Reasons unsure;
+  for (std::size_t i = 0; i < evidence.numbers.size(); ++i) {
+    if (!evidence.numbers[i]) continue;
+    const MeasuredNumber& number = *evidence.numbers[i];
+    const double tolerance = ToleranceOf(limits, i);
+    const double size = std::abs(number.value);
+    if (size > tolerance) {
+      outside.push_back(fmt::format("{} {:+.1f} {} ({})", kNumberNames[i], number.value, UnitOf(i),
+                                    number.words));
+    } else if (!(size + number.u95 <= tolerance)) {
+      unsure.push_back(fmt::format("{} {:+.1f} \u00b1{:.1f} {}", kNumberNames[i], number.value,
+                                   number.u95, UnitOf(i)));
+    }
+  }
+  const std::string tolerances =
+      fmt::format("{:g} mm and {:g} deg", ToleranceOf(limits, 0), ToleranceOf(limits, 3));
+  if (!outside.empty()) {
+    return {Verdict::kMove, {fmt::format("outside {}: {}", tolerances, fmt::join(outside, ", "))}};
+  }
+  if (!unsure.empty()) {
+    return {Verdict::kUnsure,
+            {fmt::format("not surely within {}: {}", tolerances, fmt::join(unsure, ", "))}};
+  }
+  return {Verdict::kInTolerance,
+          {fmt::format("every value and its uncertainty lie within {}", tolerances)}};
+}
+
+}  // namespace
+
+std::vector<std::string> RefusalsOfMarkers(const MarkerEvidence& markers, int min_shared_markers) {
+  std::vector<std::string> reasons;
+  const std::size_t shared = markers.shared_ids.size();
+  if (static_cast<int>(shared) < min_shared_markers) {
+    const std::string ids = shared == 0 ? ""
+                                        : fmt::format(" (id{} {})", shared == 1 ? "" : "s",
+                                                      fmt::join(markers.shared_ids, ", "));
+    reasons.push_back(
+        fmt::format("scan needs at least {} markers shared with the reference, found {}{}; keep "
+                    "the markers in view",
+                    min_shared_markers, shared, ids));
+  } else if (markers.good < min_shared_markers) {
+    reasons.push_back(
+        fmt::format("scan needs at least {} markers that did not move since the reference, {} of "
+                    "{} shared ones agree; check where the markers lie",
+                    min_shared_markers, markers.good, shared));
+  } else if (markers.two_groups) {
+    reasons.push_back(
+        fmt::format("the markers fall into two groups of {} that moved against each other; check "
+                    "where the markers lie",
+                    markers.good));
+  }
+  if (!markers.moved_used.empty()) {
+    const bool one = markers.moved_used.size() == 1;
+    reasons.push_back(
+        fmt::format("marker{} {} moved since the reference, and this preset aligns the scans by {} "
+                    "nevertheless; use preset best",
+                    one ? "" : "s", fmt::join(markers.moved_used, ", "), one ? "it" : "them"));
+  }
+  return reasons;
+}
+
+double ToleranceOf(const AcceptanceLimits& limits, std::size_t number) {
+  return IsShift(number) ? limits.shift_tolerance_m / kMillimetre
+                         : limits.rotation_tolerance_rad / kDegree;
+}
+
+void CheckLimits(const AcceptanceLimits& limits) {
+  const auto positive = [](double value, const char* name) {
+    if (value > 0 && std::isfinite(value)) return;
+    throw std::invalid_argument(
+        fmt::format("acceptance: {} must be positive, got {}", name, value));
+  };
+  positive(limits.shift_tolerance_m, "the shift tolerance");
+  positive(limits.rotation_tolerance_rad, "the rotation tolerance");
+  positive(limits.max_hole_m, "the largest hole");
+  positive(limits.max_residual_p95_m, "the residual limit");
+  positive(limits.max_lost_s, "the limit of lost tracking");
+  if (!(limits.min_coverage >= 0 && limits.min_coverage <= 1)) {
+    throw std::invalid_argument(
+        fmt::format("acceptance: coverage must lie in 0..1, got {}", limits.min_coverage));
+  }
+}
+
+Decision Decide(const Evidence& evidence, const AcceptanceLimits& limits) {
+  if (!evidence.failure.empty()) return {Verdict::kNoAnswer, {evidence.failure}};
+  Reasons reasons = RefusalsOfMarkers(evidence.markers, limits.min_shared_markers);
+  JudgeRegion(evidence, limits, reasons);
+  JudgeTracking(evidence, limits, reasons);
+  JudgeUncertainty(evidence, limits, reasons);
+  if (!reasons.empty()) return {Verdict::kNoAnswer, std::move(reasons)};
+  return JudgeValues(evidence, limits);
+}
+
+}  // namespace plumb

@@ -1,0 +1,102 @@
+// When the numbers of a comparison may be acted on: all gates, their limits, and the verdict.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "algo/acceptance/verdict.hpp"
+#include "algo/base/units.hpp"
+
+namespace plumb {
+
+/// Limits of the gates. They hold for every preset: a preset chooses how numbers are made, never
+/// whether they may be shown as an answer.
+struct AcceptanceLimits {
+  double shift_tolerance_m = 3 * kMillimetre;   ///< Of each of the three shifts.
+  double rotation_tolerance_rad = 1 * kDegree;  ///< Of each of the three rotations.
+
+  int min_shared_markers = 3;                    ///< Fewer that stayed in place: no answer.
+  double min_coverage = 0.9;                     ///< Fraction of the region measured by the scan.
+  double max_hole_m = 5 * kCentimetre;           ///< Largest hole in the region, as a diameter.
+  double max_residual_p95_m = 25 * kMillimetre;  ///< 95th percentile after the best motion.
+  double max_lost_s = 1.0;                       ///< Longest time without tracking, each scan.
+};
+
+/// @throws std::invalid_argument naming a limit that is not positive and finite, or a coverage
+///         outside 0..1.
+void CheckLimits(const AcceptanceLimits& limits);
+
+/// The six numbers in the order of results: vertical, longitudinal, lateral, pitch, roll, yaw.
+inline constexpr std::array<const char*, 6> kNumberNames = {"vertical", "longitudinal", "lateral",
+                                                            "pitch",    "roll",         "yaw"};
+[[nodiscard]] constexpr bool IsShift(std::size_t number) { return number < 3; }
+[[nodiscard]] constexpr const char* UnitOf(std::size_t number) {
+  return IsShift(number) ? "mm" : "deg";
+}
+
+/// Tolerance of one of the six numbers, in its unit.
+[[nodiscard]] double ToleranceOf(const AcceptanceLimits& limits, std::size_t number);
+
+/// One of the six numbers in mm or degrees.
+struct MeasuredNumber {
+  double value = 0.0;
+  double u95 = 0.0;   ///< 95 % half-width.
+  std::string words;  ///< Which way, e.g. "up"; for the reason.
+};
+
+/// What the markers that both scans saw say about each other.
+struct MarkerEvidence {
+  std::vector<int> shared_ids;  ///< Of all markers that both scans saw, ascending.
+  int good = 0;                 ///< How many of them agree with each other.
+  std::vector<int> moved_used;  ///< Markers that moved, yet the alignment uses them (`paper`).
+  bool two_groups = false;      ///< They fall into two groups of equal size that disagree.
+};
+
+/// Everything that the gates look at. A quantity that could not be computed stays NaN or absent,
+/// and the gate that needs it refuses.
+struct Evidence {
+  /// Why the comparison ended before there was anything to judge, as a sentence; empty: it ran
+  /// through. It is a refusal of its own and comes first.
+  std::string failure;
+
+  MarkerEvidence markers;
+  bool reference_has_support = false;  ///< A couch or floor was found beneath the body.
+  bool region_is_drawn = false;        ///< By a person; else it is the segmented body.
+
+  double coverage = kNotMeasured;
+  double largest_hole_m = kNotMeasured;
+  Eigen::Vector2d hole_centre_m = Eigen::Vector2d::Zero();  ///< Reference-marker frame.
+  double residual_p95_m = kNotMeasured;
+  double reference_lost_s = kNotMeasured;
+  double current_lost_s = kNotMeasured;
+
+  /// Absent: refused, as shifts are where the markers are fixed to the couch.
+  std::array<std::optional<MeasuredNumber>, 6> numbers;
+
+  static constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
+};
+
+struct Decision {
+  Verdict verdict = Verdict::kNoAnswer;
+  std::vector<std::string>
+      reasons;  ///< Whole sentences' content, most important first; never empty.
+};
+
+/// What the gates of the markers refuse; empty: they pass.
+[[nodiscard]] std::vector<std::string> RefusalsOfMarkers(const MarkerEvidence& markers,
+                                                         int min_shared_markers);
+
+/// The verdict: no_answer if any gate refuses, in the order markers, support, coverage, hole,
+/// residual, tracking, uncertainty; move if a value lies outside its tolerance; unsure if a value
+/// plus its uncertainty does; else in_tolerance. A value at a limit is within it.
+///
+/// Pure: numbers in, verdict out. Rotations are always needed; shifts only where they are present.
+[[nodiscard]] Decision Decide(const Evidence& evidence, const AcceptanceLimits& limits);
+
+}  // namespace plumb

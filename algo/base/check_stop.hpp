@@ -1,0 +1,15 @@
+// Long work asks now and then whether it is still wanted.
+#pragma once
+
+#include <stop_token>
+
+#include "algo/base/errors.hpp"
+
+namespace plumb {
+
+/// @throws Interrupted on a stop request.
+inline void CheckStop(const std::stop_token& stop) {
+  if (stop.stop_requested()) throw Interrupted("stopped on request");
+}
+
+}  // namespace plumb

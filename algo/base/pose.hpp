@@ -1,0 +1,45 @@
+// Rigid poses and the few operations on them that Eigen does not name.
+#pragma once
+
+#include <Eigen/Geometry>
+
+namespace plumb {
+
+/// A rigid transform. A variable `T_a_b` maps coordinates in b to coordinates in a: p_a = T_a_b *
+/// p_b. Composition is Eigen's own product only (the paper's "T.T' = (RR', t+t')" is no rigid
+/// composition).
+using Pose = Eigen::Isometry3d;
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+/// [w]x, so that Skew(w) * p = w.cross(p).
+[[nodiscard]] Eigen::Matrix3d Skew(const Eigen::Vector3d& w);
+
+/// Rotation of a rotation vector (radians), exact for any length.
+[[nodiscard]] Eigen::Matrix3d RotationFromVector(const Eigen::Vector3d& rotation_vector);
+
+/// Inverse of RotationFromVector(), length in [0, pi].
+[[nodiscard]] Eigen::Vector3d VectorFromRotation(const Eigen::Matrix3d& rotation);
+
+/// Pose of the twist (rotation vector, translation): rotation and translation apart, not the SE(3)
+/// exponential.
+[[nodiscard]] Pose PoseFromTwist(const Vector6d& rotation_then_translation);
+
+/// Inverse of PoseFromTwist().
+[[nodiscard]] Vector6d TwistFromPose(const Pose& T);
+
+/// Nearest rigid transform to T: its rotation part made orthonormal, determinant +1.
+[[nodiscard]] Pose Orthonormalised(const Pose& T);
+
+/// Between T_a (fraction 0) and T_b (fraction 1): slerp of the rotation, straight line of the
+/// translation. Fractions outside [0, 1] extrapolate with the same constant velocity.
+[[nodiscard]] Pose Interpolate(const Pose& T_a, const Pose& T_b, double fraction);
+
+/// Angle of the rotation part, radians in [0, pi].
+[[nodiscard]] double RotationAngle(const Pose& T);
+
+/// True if every entry is finite.
+[[nodiscard]] bool IsFinite(const Pose& T);
+
+}  // namespace plumb

@@ -1,0 +1,353 @@
+// What the appliance tells about itself: status, events, light.
+#include <sys/statvfs.h>
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "daemon/appliance/appliance.hpp"
+#include "daemon/config/version.hpp"
+#include "daemon/loop/loop_report.hpp"
+#include "daemon/records/store_json.hpp"
+
+namespace plumb {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Json = nlohmann::json;
+
+/// What both the status and an event tell of a scan.
+Json ProgressFields(const ScanUpdate& update, std::optional<double> coverage) {
+  return {{"step", update.step},
+          {"fraction", update.fraction},
+          {"frames", update.frames},
+          {"frames_tracked", update.frames_tracked},
+          {"frames_dropped", update.frames_dropped},
+          {"advice", Name(update.guidance.advice)},
+          {"speed_m_s", update.guidance.speed_m_s},
+          {"median_depth_m", update.guidance.median_depth_m},
+          {"area_m2", update.guidance.area_m2},
+          {"coverage", coverage ? Json(*coverage) : Json(nullptr)}};
+}
+
+double WallSeconds() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+double SecondsSince(Clock::time_point time) {
+  return std::chrono::duration<double>(Clock::now() - time).count();
+}
+
+web::ApplianceState WebState(ScanPhase phase) {
+  return static_cast<web::ApplianceState>(static_cast<int>(phase));
+}
+static_assert(static_cast<int>(web::ApplianceState::kFault) == static_cast<int>(ScanPhase::kFault));
+static_assert(static_cast<int>(web::FaultKind::kSensor) == static_cast<int>(FaultKind::kSensor));
+static_assert(static_cast<int>(web::FaultKind::kScan) == static_cast<int>(FaultKind::kScan));
+static_assert(static_cast<int>(web::FaultKind::kStorage) == static_cast<int>(FaultKind::kStorage));
+
+web::Guidance WebGuidance(SweepAdvice advice) {
+  switch (advice) {
+    case SweepAdvice::kNone:
+      return web::Guidance::kNone;
+    case SweepAdvice::kSlower:
+      return web::Guidance::kSlower;
+    case SweepAdvice::kCloser:
+      return web::Guidance::kCloser;
+    case SweepAdvice::kFarther:
+      return web::Guidance::kFarther;
+    case SweepAdvice::kLost:
+      break;
+  }
+  return web::Guidance::kTrackingLost;
+}
+
+constexpr double kTooManyDropped = 0.2;
+
+/// Of a sweep. Lost images make every other advice worthless but that tracking is lost.
+web::Guidance GuidanceOf(SweepAdvice advice, double dropped_share) {
+  if (advice != SweepAdvice::kLost && dropped_share > kTooManyDropped)
+    return web::Guidance::kComputerTooSlow;
+  return WebGuidance(advice);
+}
+
+web::StorageStatus StorageOf(const std::filesystem::path& folder, bool is_open) {
+  struct statvfs status {};
+  if (::statvfs(folder.c_str(), &status) != 0) return {.writable = false};
+  const auto block = static_cast<std::int64_t>(status.f_frsize);
+  return {.free_bytes = static_cast<std::int64_t>(status.f_bavail) * block,
+          .total_bytes = static_cast<std::int64_t>(status.f_blocks) * block,
+          .writable = is_open && (status.f_flag & ST_RDONLY) == 0};
+}
+
+web::WallClock::time_point StartOfDay() {
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  ::localtime_r(&now, &local);
+  local.tm_hour = local.tm_min = local.tm_sec = 0;
+  return web::WallClock::from_time_t(std::mktime(&local));
+}
+
+}  // namespace
+
+const char* Name(IndicatorPattern pattern) {
+  static constexpr const char* kNames[] = {
+      "off",           "no_sensor",   "ready",     "scanning", "too_fast",
+      "too_near",      "too_far",     "working",   "done",     "result_in_tolerance",
+      "result_unsure", "result_move", "no_answer", "fault"};
+  return kNames[static_cast<int>(pattern)];
+}
+
+IndicatorPattern Appliance::Pattern() const {
+  switch (state_.phase) {
+    case ScanPhase::kNoSensor:
+      return IndicatorPattern::kNoSensor;
+    case ScanPhase::kReady:
+      return IndicatorPattern::kReady;
+    case ScanPhase::kWorking:
+      return IndicatorPattern::kWorking;
+    case ScanPhase::kFault:
+      return IndicatorPattern::kFault;
+    case ScanPhase::kScanning:
+      break;
+    case ScanPhase::kResult:
+      if (scan_.outcome.kind == ScanOutcome::Kind::kNoScene ||
+          scan_.outcome.verdict == Verdict::kNoAnswer)
+        return IndicatorPattern::kNoAnswer;
+      if (!scan_.outcome.verdict)
+        return IndicatorPattern::kDone;  // compared with nothing: nothing is known of tolerance
+      if (scan_.outcome.verdict == Verdict::kUnsure) return IndicatorPattern::kResultUnsure;
+      return scan_.outcome.verdict == Verdict::kMove ? IndicatorPattern::kResultMove
+                                                     : IndicatorPattern::kResultInTolerance;
+  }
+  switch (scan_.update.guidance.advice) {
+    case SweepAdvice::kNone:
+      break;
+    case SweepAdvice::kSlower:
+    case SweepAdvice::kLost:
+      return IndicatorPattern::kTooFast;
+    case SweepAdvice::kFarther:
+      return IndicatorPattern::kTooNear;
+    case SweepAdvice::kCloser:
+      return IndicatorPattern::kTooFar;
+  }
+  return IndicatorPattern::kScanning;
+}
+
+void Appliance::Show() {
+  const IndicatorPattern pattern = Pattern();
+  if (pattern == shown_) return;
+  shown_ = pattern;
+  if (parts_.indicator != nullptr) parts_.indicator->Show(pattern);
+  TellEvent("light",
+            Json{{"pattern", Name(pattern)}}.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+void Appliance::TellEvent(const char* event, const std::string& fields_json) {
+  if (!tell_watchers_) return;
+  Json line = {{"event", event}, {"time", WallSeconds()}};
+  line.update(Json::parse(fields_json));
+  tell_watchers_(line.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+void Appliance::TellState() {
+  Show();
+  TellEvent("state", Json{{"state", Name(state_.phase)},
+                          {"reason", FaultReason()},
+                          {"cancelling", state_.cancelling}}
+                         .dump(-1, ' ', false, Json::error_handler_t::replace));
+  TellWeb(web::EventKind::kStatus);
+}
+
+void Appliance::TellWeb(web::EventKind kind) {
+  if (tell_web_) tell_web_(kind);
+}
+
+std::string Appliance::FaultReason() const {
+  if (state_.phase != ScanPhase::kFault) return {};
+  switch (state_.fault) {
+    case FaultKind::kStorage:
+      return storage_fault_;
+    case FaultKind::kScan:
+      return scan_fault_;
+    case FaultKind::kSensor:
+      return sensor_fault_;
+    case FaultKind::kNone:
+      break;
+  }
+  return {};
+}
+
+std::optional<double> Appliance::Coverage() const {
+  if (scan_.reference_area_m2 <= 0) return std::nullopt;
+  return std::min(1.0, scan_.update.guidance.area_m2 / scan_.reference_area_m2);
+}
+
+std::string Appliance::StatusLine() const {
+  std::string line = fmt::format("{}", Name(state_.phase));
+  if (state_.phase == ScanPhase::kScanning) line += fmt::format(", {} frames", scan_.update.frames);
+  if (state_.phase == ScanPhase::kWorking) line += fmt::format(", {}", scan_.update.step);
+  if (state_.phase == ScanPhase::kFault) line += ": " + FaultReason();
+  return line;
+}
+
+void Appliance::TellProgress() {
+  Json progress = ProgressFields(scan_.update, Coverage());
+  progress["scan"] = scan_.id;
+  TellEvent("progress", progress.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+std::string Appliance::StatusJson() {
+  const SensorSnapshot sensor = sensors_->snapshot();
+  const ScanUpdate& update = scan_.update;
+  const bool is_running =
+      state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking;
+  Json scan = ProgressFields(update, Coverage());
+  scan["active"] = is_running;
+  scan["id"] = scan_.id;
+  scan["valid_depth"] = update.guidance.valid_depth;
+  scan["without_new_area_s"] = update.guidance.without_new_area_s;
+  scan["first_frame_ms"] = scan_.first_frame_ms;
+  scan["cancel_ms"] = scan_.cancel_ms;
+  Json last = nullptr;
+  if (last_result_) {
+    const ScanOutcome& outcome = last_result_->outcome;
+    last = {
+        {"scan", last_result_->id},
+        {"is_reference", outcome.kind == ScanOutcome::Kind::kDone && outcome.result_json.empty()},
+        {"verdict",
+         outcome.kind == ScanOutcome::Kind::kNoScene ? Json("no_answer") : Json(nullptr)},
+        {"reasons",
+         outcome.kind == ScanOutcome::Kind::kNoScene ? Json{outcome.reason} : Json::array()},
+        {"correction", nullptr},
+        {"frames", outcome.frames},
+        {"frames_dropped", outcome.frames_dropped},
+        {"images_lost", last_result_->images.num_lost},
+        {"images_unpaired", last_result_->images.num_unpaired},
+        {"images_discarded", last_result_->images.num_discarded},
+        {"after_last_frame_s", outcome.after_last_frame_s}};
+    if (!outcome.result_json.empty()) {
+      const Json result = Json::parse(outcome.result_json);
+      last["verdict"] = result["verdict"];
+      last["reasons"] = result["reasons"];
+      last["correction"] = result["correction"];
+      for (const char* name :
+           {"vertical_mm", "longitudinal_mm", "lateral_mm", "pitch_deg", "roll_deg", "yaw_deg"}) {
+        last[name] = result["correction"].is_object() ? result["correction"][name] : Json(nullptr);
+      }
+    }
+  }
+  const Json status = {{"state", Name(state_.phase)},
+                       {"reason", FaultReason()},
+                       {"sensor",
+                        {{"present", sensor.present},
+                         {"serial", sensor.sensor.serial},
+                         {"name", sensor.sensor.name},
+                         {"fps", sensor.present ? sensor.statistics.frames_per_second : 0.0},
+                         {"pairs", sensor.statistics.num_pairs},
+                         {"unpaired", sensor.statistics.num_unpaired},
+                         {"discarded", sensor.statistics.num_discarded},
+                         {"lost", sensor.statistics.num_lost},
+                         {"calibrated", sensor.present && !sensor.info.intrinsics_assumed},
+                         {"warnings", sensor.info.warnings},
+                         {"others", sensor.others}}},
+                       {"scan", scan},
+                       {"last_result", last},
+                       {"light", Name(shown_)},
+                       {"loop", LoopJson(loop_.meter())},
+                       {"version", Version()}};
+  return status.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+web::Status Appliance::WebStatus() {
+  const SensorSnapshot sensor = sensors_->snapshot();
+  web::Status status;
+  status.state = WebState(state_.phase);
+  status.fault = FaultReason();
+  if (state_.phase == ScanPhase::kFault)
+    status.fault_kind = static_cast<web::FaultKind>(state_.fault);
+  status.sensor = {.present = sensor.present,
+                   .serial = sensor.sensor.serial,
+                   .name = sensor.sensor.name,
+                   .frames_per_second = sensor.present ? sensor.statistics.frames_per_second : 0.0,
+                   .powered_s = sensor.present ? SecondsSince(sensor_since_) : 0.0};
+  status.storage = StorageOf(parts_.config.appliance.state, storage_fault_.empty());
+  status.light = Name(shown_);
+  status.patient_id = check_ ? std::string() : open_patient_;
+  status.next_purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
+  if (state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking) {
+    status.scan =
+        web::LiveScan{.id = scan_.id,
+                      .patient_id = scan_.patient_id,
+                      .purpose = scan_.purpose,
+                      .elapsed_s = SecondsSince(scan_.started),
+                      .coverage = Coverage(),
+                      .guidance = GuidanceOf(scan_.update.guidance.advice, scan_.dropped_share),
+                      .keyframes = scan_.update.keyframes,
+                      .frames = scan_.update.frames,
+                      .frames_tracked = scan_.update.frames_tracked,
+                      .frames_dropped = scan_.update.frames_dropped,
+                      .step = scan_.update.step,
+                      .step_fraction = scan_.update.fraction};
+  }
+  status.version = Version();
+  const Eigen::Matrix3d R_iec_reference = parts_.config.compare.T_iec_reference.linear();
+  status.right_xy = {R_iec_reference(0, 0), R_iec_reference(0, 1)};
+  status.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)};
+  ReadStored(status);
+  return status;
+}
+
+std::optional<double> Appliance::AgeOf(const std::string& scan_id) const {
+  return last_result_ && last_result_->id == scan_id
+             ? std::optional(SecondsSince(last_result_->ended))
+             : std::nullopt;
+}
+
+std::optional<double> Appliance::SecondsSinceSensor() const {
+  return sensors_->snapshot().present ? std::optional(SecondsSince(sensor_since_)) : std::nullopt;
+}
+
+bool Appliance::IsCheckOverdue() {
+  return !store_->HasPassedCheckSince(StartOfDay(), sensors_->snapshot().sensor.serial);
+}
+
+void Appliance::ReadStored(web::Status& status) {
+  if (store_ == nullptr) return;
+  try {
+    status.check_overdue = IsCheckOverdue();
+    status.session = store_->OpenedSession();
+    if (status.session && status.session->id != session_id_) status.session.reset();
+    status.waiting = store_->WaitingReferences();
+    status.last_check = store_->LastCheck();
+    if (!open_patient_.empty())
+      status.scans_today = store_->ScansSince(open_patient_, StartOfDay());
+    if (last_result_) status.last_result = store_->FindScan(last_result_->id);
+    if (status.last_result) status.last_result->age_s = AgeOf(status.last_result->id);
+  } catch (const std::exception& error) {
+    // Whoever asks for the status must not end the appliance. Posted: this may be a part of telling
+    // it.
+    loop_.Post("store failed", [this, what = std::string(error.what())] { FailStorage(what); });
+  }
+}
+
+web::CheckStatus Appliance::Checks() {
+  constexpr int kShown = 60;
+  return {.checks = store_->Checks(kShown),
+          .baseline = store_->CheckBaseline(),
+          .overdue = IsCheckOverdue()};
+}
+
+web::Health Appliance::Health() {
+  if (!storage_fault_.empty()) return {.ok = false, .reason = "storage: " + storage_fault_};
+  if (!StorageOf(parts_.config.appliance.state, true).writable)
+    return {.ok = false, .reason = "storage: the state folder is on a read-only disk"};
+  if (!WorkersAreAlive()) return {.ok = false, .reason = "a worker thread shows no progress"};
+  if (state_.phase == ScanPhase::kFault && state_.fault == FaultKind::kSensor)
+    return {.ok = false, .reason = "sensor: " + sensor_fault_};
+  return {};
+}
+
+}  // namespace plumb

@@ -1,0 +1,86 @@
+#include "daemon/appliance/panel.hpp"
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/loop/log.hpp"
+#ifdef PLUMB_WITH_GPIO
+#include "drivers/gpio/gpio.hpp"
+#endif
+
+namespace plumb {
+
+#ifdef PLUMB_WITH_GPIO
+namespace {
+
+/// Blinks by a timer of the loop.
+class BlinkingLight : public Indicator {
+ public:
+  BlinkingLight(EventLoop& loop, const GpioIndicatorOptions& options) : light_(options) {
+    timer_ = loop.MakeTimer("light", [this] {
+      light_.Dispatch(GpioIndicator::Clock::now());
+      Arm();
+    });
+  }
+  void Show(IndicatorPattern pattern) noexcept override {
+    light_.Show(pattern);
+    Arm();
+  }
+
+ private:
+  void Arm() noexcept {
+    try {
+      if (const auto deadline = light_.deadline()) {
+        timer_.ArmAt(*deadline);
+      } else {
+        timer_.Disarm();
+      }
+    } catch (const std::exception&) {  // the light stands still: it must not stop a scan
+    }
+  }
+
+  GpioIndicator light_;
+  EventLoop::Source timer_;
+};
+
+}  // namespace
+
+Panel::Panel(EventLoop& loop, const PanelConfig& config) {
+  try {
+    if (!config.button_line.empty()) {
+      GpioButtonOptions options;
+      options.where = {.chip = config.button_chip, .line = config.button_line};
+      options.active_low = config.button_active_low;
+      button_ = std::make_unique<GpioButton>(options);
+    }
+  } catch (const DeviceError& error) {
+    Log(LogLevel::kError, fmt::format("no hardware button: {}", error.what()));
+  }
+  const bool has_light = !config.red_line.empty() || !config.green_line.empty() ||
+                         !config.blue_line.empty() || !config.beeper_line.empty();
+  try {
+    if (!has_light) return;
+    GpioIndicatorOptions options;
+    options.chip = config.light_chip;
+    options.lights = {config.red_line, config.green_line, config.blue_line};
+    options.beeper = config.beeper_line;
+    options.active_low = config.light_active_low;
+    light_ = std::make_unique<BlinkingLight>(loop, options);
+  } catch (const DeviceError& error) {
+    Log(LogLevel::kError, fmt::format("no light: {}", error.what()));
+  }
+}
+#else
+Panel::Panel(EventLoop&, const PanelConfig& config) {
+  if (!config.button_line.empty() || !config.red_line.empty() || !config.green_line.empty() ||
+      !config.blue_line.empty()) {
+    Log(LogLevel::kError,
+        "button and light are configured, but this plumbd was built without them: build it with "
+        "PLUMB_WITH_GPIO");
+  }
+}
+#endif
+
+Panel::~Panel() = default;
+
+}  // namespace plumb

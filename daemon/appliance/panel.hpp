@@ -1,0 +1,32 @@
+// The hardware panel of the appliance: start button and light on GPIO lines, where they are
+// configured and there.
+#pragma once
+
+#include <memory>
+
+#include "daemon/config/config.hpp"
+#include "daemon/loop/event_loop.hpp"
+#include "drivers/button.hpp"
+#include "drivers/indicator.hpp"
+
+namespace plumb {
+
+/// Belongs to the loop's thread. What is configured and cannot be opened is logged with its remedy
+/// and left out: the page's button stays.
+class Panel {
+ public:
+  Panel(EventLoop& loop, const PanelConfig& config);
+  ~Panel();
+  Panel(const Panel&) = delete;
+  Panel& operator=(const Panel&) = delete;
+
+  /// Null where there is none.
+  [[nodiscard]] Button* button() { return button_.get(); }
+  [[nodiscard]] Indicator* light() { return light_.get(); }
+
+ private:
+  std::unique_ptr<Button> button_;
+  std::unique_ptr<Indicator> light_;
+};
+
+}  // namespace plumb

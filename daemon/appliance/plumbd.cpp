@@ -1,0 +1,454 @@
+#include "daemon/appliance/plumbd.hpp"
+
+#include <signal.h>
+#include <sys/epoll.h>
+#include <systemd/sd-daemon.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "algo/base/errors.hpp"
+#include "algo/base/notice.hpp"
+#include "daemon/appliance/appliance.hpp"
+#include "daemon/appliance/panel.hpp"
+#include "daemon/appliance/web_service.hpp"
+#include "daemon/config/version.hpp"
+#include "daemon/control/control_server.hpp"
+#include "daemon/control/unix_socket.hpp"
+#include "daemon/loop/end_guard.hpp"
+#include "daemon/loop/log.hpp"
+#include "daemon/loop/loop_report.hpp"
+#include "daemon/loop/work_thread.hpp"
+#ifdef PLUMB_WITH_OPENNI
+#include "drivers/openni/openni_provider.hpp"
+#include "drivers/virtual/virtual_sensor.hpp"
+#endif
+#include "web/api/http_server.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kDeviceFailed = 5;                 // exit code, as the command line's
+constexpr std::chrono::seconds kLongestEnd{10};  // less than the unit's TimeoutStopSec
+
+struct Options {
+  std::optional<fs::path> config_file;
+  bool check_config = false;
+  std::string simulated;  ///< Suite; empty: real sensors.
+  std::optional<fs::path> state, control;
+  std::optional<std::string> listen;
+  int sim_frames = 300, sim_scenes = 0;
+  unsigned sim_seed = 1;
+  std::string sim_size = "640x480";
+  bool sim_unplugged = false;
+};
+
+constexpr const char* kDefaultConfig = "/etc/plumb/plumb.toml";
+
+void AddOptions(CLI::App& app, Options& options) {
+  app.set_version_flag("--version", fmt::format("plumbd {}", Version()),
+                       "Print the version and exit");
+  app.add_option("--config", options.config_file,
+                 "Configuration, as TOML; default: /etc/plumb/plumb.toml where it exists")
+      ->type_name("FILE");
+  app.add_flag("--check-config", options.check_config,
+               "Check the configuration, say what is wrong with it, and exit");
+  app.add_option("--simulated", options.simulated,
+                 "With a virtual sensor that plays the scenes of a simulated suite")
+      ->check(CLI::IsMember({"demo", "nine", "patient"}))
+      ->type_name("demo|nine|patient");
+  app.add_option("--state", options.state, "Folder of database, scans and results")
+      ->type_name("DIR");
+  app.add_option("--listen", options.listen, "Where the page is served")->type_name("ADDRESS:PORT");
+  app.add_option("--control", options.control, "Control socket")->type_name("SOCK");
+  app.add_option("--sim-frames", options.sim_frames, "Frames of a simulated sweep, 30 a second")
+      ->check(CLI::Range(2, 20000))
+      ->group("Virtual sensor");
+  app.add_option("--sim-size", options.sim_size, "Of its images")
+      ->check(CLI::IsMember({"640x480", "320x240"}))
+      ->group("Virtual sensor");
+  app.add_option("--sim-seed", options.sim_seed, "Of its scenes and noise")
+      ->group("Virtual sensor");
+  app.add_option("--sim-scenes", options.sim_scenes, "Only so many of the suite's scenes; 0: all")
+      ->check(CLI::Range(0, 1000))
+      ->group("Virtual sensor");
+  app.add_flag("--sim-unplugged", options.sim_unplugged, "It is not attached at the start")
+      ->group("Virtual sensor");
+  app.footer(fmt::format("\n{}", kResearchNotice));
+}
+
+Config ReadConfiguration(const Options& options) {
+  Config config;
+  std::error_code ignored;
+  if (options.config_file) {
+    config = ReadConfig(*options.config_file, ConfigUse::kAppliance);
+  } else if (options.simulated.empty() && fs::exists(kDefaultConfig, ignored)) {
+    config = ReadConfig(kDefaultConfig, ConfigUse::kAppliance);
+  }
+  if (options.simulated.empty()) RefuseResearchPresets(config);
+  if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
+  if (config.web.tls_certificate.empty() != config.web.tls_key.empty()) {
+    throw DataError("web.tls_certificate and web.tls_key: expected both or none, found one");
+  }
+  if (options.state) {
+    config.appliance.state = fs::absolute(*options.state);
+    config.update.folder = config.appliance.state / "updates";
+  }
+  if (options.control) config.appliance.control = fs::absolute(*options.control);
+  if (options.listen) {
+    if (!ParseListenAddress(*options.listen)) {
+      throw std::invalid_argument(
+          fmt::format("--listen: expected an address and a port such as 127.0.0.1:8080, found '{}'",
+                      *options.listen));
+    }
+    config.web.listen = *options.listen;
+  }
+  return config;
+}
+
+#ifdef PLUMB_WITH_OPENNI
+/// True if a signal waits for the loop, which does not run yet.
+bool IsToldToEnd() {
+  sigset_t pending;
+  sigemptyset(&pending);
+  sigpending(&pending);
+  return sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1;
+}
+#endif
+
+/// Sensor of this run: the virtual one and its provider, or the real ones.
+class Sensors {
+ public:
+  Sensors(const Options& options, const Config& config) {
+#ifdef PLUMB_WITH_OPENNI
+    provider_.calibration_folder = config.appliance.calibration;
+    if (!options.simulated.empty()) MakeVirtual(options);
+    if (config.markers.dictionary) provider_.marker_dictionary = *config.markers.dictionary;
+    if (config.markers.length_m) provider_.marker_length_m = *config.markers.length_m;
+    if (config.markers.reference) provider_.reference_marker = config.markers.reference;
+#else
+    (void)config;
+    if (!options.simulated.empty())
+      throw std::invalid_argument(
+          "--simulated: this plumbd was built without OpenNI2; build it with PLUMB_WITH_OPENNI");
+#endif
+  }
+
+  [[nodiscard]] std::unique_ptr<SensorProvider> MakeProvider() const {
+#ifdef PLUMB_WITH_OPENNI
+    return std::make_unique<OpenNiProvider>(provider_);
+#else
+    throw DeviceError("this plumbd was built without OpenNI2: no sensor can be used");
+#endif
+  }
+
+  [[nodiscard]] std::function<void()> BeforeScan() const {
+#ifdef PLUMB_WITH_OPENNI
+    if (virtual_) return [this] { virtual_->Rewind(); };
+#endif
+    return {};
+  }
+
+  /// Does what `sim ACTION` asks. @throws DeviceError
+  void Simulate(const std::string& command) const {
+#ifdef PLUMB_WITH_OPENNI
+    if (virtual_) {
+      (void)virtual_->Command(command);
+      return;
+    }
+#endif
+    throw DeviceError(
+        fmt::format("sim {}: there is no virtual sensor; start plumbd with --simulated", command));
+  }
+
+ private:
+#ifdef PLUMB_WITH_OPENNI
+  void MakeVirtual(const Options& options) {
+    const bool is_small = options.sim_size == "320x240";
+    const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
+    std::stop_source rendering;
+    virtual_ = std::make_unique<VirtualSensor>(
+        VirtualSensorOptions{.suite = options.simulated,
+                             .seed = options.sim_seed,
+                             .frames = options.sim_frames,
+                             .width = is_small ? 320 : 640,
+                             .height = is_small ? 240 : 480,
+                             .max_scenes = static_cast<std::size_t>(options.sim_scenes),
+                             .plugged = !options.sim_unplugged},
+        rendering.get_token(), [&, told = -1](double fraction, std::string_view scene) mutable {
+          if (IsToldToEnd()) rendering.request_stop();
+          const int percent = static_cast<int>(100 * fraction);
+          if (percent == told || (!is_terminal && percent / 10 == told / 10 && told >= 0)) return;
+          told = percent;
+          Log(LogLevel::kInfo,
+              fmt::format("rendering what the virtual sensor shows: {} %, {}", percent, scene));
+        });
+    provider_.library = virtual_->runtime_library();
+    provider_.calibration_folder = virtual_->calibration_folder();
+    provider_.before_stop = [sensor = virtual_.get()] { sensor->Quit(); };
+  }
+
+  std::unique_ptr<VirtualSensor> virtual_;
+  OpenNiOptions provider_;
+#endif
+};
+
+/// Sockets that systemd opened for us, by their names.
+std::optional<int> InheritedSocket(const std::string& name) {
+  char** names = nullptr;
+  const int count = sd_listen_fds_with_names(0, &names);
+  std::optional<int> found;
+  for (int i = 0; i < count; ++i) {
+    if (names[i] == name && !found) found = SD_LISTEN_FDS_START + i;
+    std::free(names[i]);
+  }
+  std::free(names);
+  return found;
+}
+
+class Plumbd {
+ public:
+  Plumbd(const Options& options, const Config& config)
+      : options_(options),
+        sensors_(options, config),
+        panel_(loop_, config.panel),
+        appliance_(loop_, {.config = config,
+                           .make_provider = [this] { return sensors_.MakeProvider(); },
+                           .before_scan = sensors_.BeforeScan(),
+                           .button = panel_.button(),
+                           .indicator = panel_.light(),
+                           .demo_patient = options.simulated.empty() ? "" : "demo"}),
+        service_(appliance_, config.update),
+        http_(service_, HttpOptions(config)),
+        control_(loop_, ControlSocket(config),
+                 [this](const ControlRequest& request, const ControlServer::Reply& reply) {
+                   Answer(request, reply);
+                 }) {
+    appliance_.SetEventListener([this](const std::string& line) { control_.Broadcast(line); });
+    http_timer_ = loop_.MakeTimer("http", [this] { RunHttp(); });
+    http_source_ =
+        loop_.WatchDescriptor("http", http_.fd(), EPOLLIN, [this](std::uint32_t) { RunHttp(); });
+    for (const int signal : {SIGTERM, SIGINT})
+      signals_.push_back(loop_.WatchSignal(signal, [this] { Stop(); }));
+    signals_.push_back(loop_.WatchSignal(SIGHUP, [this] { Reload(); }));
+    std::uint64_t watchdog_us = 0;
+    has_watchdog_ = sd_watchdog_enabled(0, &watchdog_us) > 0;
+    if (has_watchdog_) watchdog_period_ = std::chrono::microseconds(watchdog_us / 3);
+    loop_.meter().SetSlowListener([](const LoopTurn& turn, std::int64_t unsaid) {
+      Log(LogLevel::kWarning, SlowTurnText(turn, unsaid));
+    });
+    tick_ = loop_.MakeTimer("watchdog", [this] { Tick(); });
+  }
+
+  int Run() {
+    Tick();
+    RunHttp();
+    const std::string page =
+        fmt::format("{}://{}:{}/", is_https_ ? "https" : "http", page_host_, http_.port());
+    Log(LogLevel::kNotice, "the page is served at " + page);
+    if (const std::optional<std::string> code = http_.setup_code();
+        code && appliance_.storage_fault().empty()) {
+      fmt::print("setup code: {}\n", *code);  // under systemd the standard output is the journal
+      std::fflush(stdout);
+    }
+    sd_notify(0, "READY=1");
+    Log(LogLevel::kNotice,
+        fmt::format("plumbd {} is ready; research use only, not a medical device", Version()));
+    const int code = loop_.Run();
+    appliance_.SetEventListener({});
+    return code;
+  }
+
+ private:
+  static int ControlSocket(const Config& config) {
+    if (const std::optional<int> inherited = InheritedSocket("control")) return *inherited;
+    return ListenUnix(config.appliance.control);
+  }
+
+  web::HttpServerOptions HttpOptions(const Config& config) {
+    const ListenAddress listen = ParseListenAddress(config.web.listen).value_or(ListenAddress{});
+    is_https_ = !config.web.tls_certificate.empty();
+    page_host_ =
+        listen.address.find(':') == std::string::npos ? listen.address : "[" + listen.address + "]";
+    web::HttpServerOptions options;
+    options.address = listen.address;
+    options.port = listen.port;
+    options.listen_fd = InheritedSocket("http");
+    options.tls_certificate = config.web.tls_certificate;
+    options.tls_key = config.web.tls_key;
+    options.host_names = config.web.host_names;
+    options.upload_folder = config.update.folder;
+    options.doing = [this](std::string_view what) { loop_.meter().Part(what); };
+    options.max_upload_bytes = static_cast<std::uint64_t>(config.update.max_bundle_mb) << 20;
+    return options;
+  }
+
+  void RunHttp() {
+    http_.Run();
+    if (const auto timeout = http_.timeout()) {
+      http_timer_.ArmAfter(*timeout);
+    } else {
+      http_timer_.Disarm();
+    }
+  }
+
+  void Answer(const ControlRequest& request, const ControlServer::Reply& reply) {
+    using Kind = ControlRequest::Kind;
+    switch (request.kind) {
+      case Kind::kStatus:
+      case Kind::kWatch:  // what is, then what happens
+        return reply(request.kind == Kind::kStatus
+                         ? appliance_.StatusJson()
+                         : R"({"event":"status","time":)" + fmt::format("{:.6f}", SystemSeconds()) +
+                               R"(,"status":)" + appliance_.StatusJson() + "}");
+      case Kind::kPress: {
+        const std::string refusal =
+            appliance_.Press(request.is_long ? ButtonPress::kLong : ButtonPress::kShort);
+        return reply(refusal.empty() ? ControlDone() : ControlRefusal(refusal));
+      }
+      case Kind::kSim:
+        break;
+    }
+    const bool posted = device_thread_.Post(
+        [this, reply, command = fmt::format("{} {}", request.action, request.argument)] {
+          std::string answer = ControlDone();
+          try {
+            sensors_.Simulate(command);
+          } catch (const DeviceError& error) {
+            answer = ControlRefusal(error.what());
+          }
+          loop_.Post("sim", [reply, answer] { reply(answer); });
+        });
+    if (!posted) reply(ControlRefusal("the virtual sensor is busy: try again"));
+  }
+
+  static double SystemSeconds() {
+    return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch())
+        .count();
+  }
+
+  void Tick() {
+    tick_.ArmAfter(std::min(watchdog_period_, std::chrono::microseconds(1'000'000)));
+    if (const std::string line = appliance_.StatusLine(); line != status_line_) {
+      status_line_ = line;
+      sd_notifyf(0, "STATUS=%s", line.c_str());
+    }
+    if (!has_watchdog_) return;
+    if (appliance_.WorkersAreAlive()) {
+      sd_notify(0, "WATCHDOG=1");
+    } else {
+      Log(LogLevel::kError, "a worker thread shows no progress: the watchdog is not fed");
+    }
+  }
+
+  void Stop() {
+    sd_notify(0, "STOPPING=1");
+    Log(LogLevel::kNotice, "stopping");
+    appliance_.Stop([this] { loop_.Quit(0); });
+  }
+
+  void Reload() {
+    sd_notify(0, fmt::format("RELOADING=1\nMONOTONIC_USEC={}",
+                             std::chrono::duration_cast<std::chrono::microseconds>(
+                                 EventLoop::Clock::now().time_since_epoch())
+                                 .count())
+                     .c_str());
+    try {
+      appliance_.Reload(ReadConfiguration(options_));
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError, fmt::format("the configuration stays as it was: {}", error.what()));
+    }
+    sd_notify(0, "READY=1");
+  }
+
+  const Options options_;
+  EventLoop loop_;  // first: blocks signals before any thread starts
+  Sensors sensors_;
+  WorkThread device_thread_{16};
+  Panel panel_;
+  Appliance appliance_;
+  bool is_https_ = false;
+  std::string page_host_;
+  WebService service_;
+  web::HttpServer http_;
+  ControlServer control_;
+  EventLoop::Source http_source_, http_timer_;
+  std::vector<EventLoop::Source> signals_;
+  EventLoop::Source tick_;
+  bool has_watchdog_ = false;
+  std::chrono::microseconds watchdog_period_{1'000'000};
+  std::string status_line_;
+};
+
+int RunChecked(const Options& options) {
+  const Config config = ReadConfiguration(options);
+  if (options.check_config) {
+    fmt::print("the configuration is good\n");
+    return 0;
+  }
+  if (options.simulated.empty() == false && !options.state)
+    throw std::invalid_argument("--simulated needs --state DIR, a folder of its own");
+  std::error_code ignored;
+  fs::create_directories(config.appliance.state,
+                         ignored);  // what cannot be made is told when the store opens
+  std::optional<EndGuard> guard;    // outlives the threads that it waits for
+  Plumbd plumbd(options, config);
+  const int code = plumbd.Run();
+  guard.emplace(kLongestEnd, [] {
+    Log(LogLevel::kError,
+        fmt::format("{} s after the end began a thread still runs, supposedly in the sensor's "
+                    "driver: plumbd ends without it. "
+                    "What was scanned is stored; unplug the sensor if this comes again",
+                    kLongestEnd.count()));
+    std::_Exit(kDeviceFailed);
+  });
+  return code;
+}
+
+}  // namespace
+
+int RunPlumbd(int argc, char** argv) {
+  CLI::App app("Plumb's appliance: sensor, button and light, scans, results and the page.",
+               "plumbd");
+  Options options;
+  AddOptions(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  const auto fail = [](const char* what, int code) {
+    Log(LogLevel::kError, what);
+    return code;
+  };
+  try {
+    return RunChecked(options);
+  } catch (const Interrupted&) {
+    return 0;
+  } catch (const DataError& error) {
+    return fail(error.what(), 3);
+  } catch (const DeviceError& error) {
+    return fail(error.what(), kDeviceFailed);
+  } catch (const std::invalid_argument& error) {
+    return fail(error.what(), 2);
+  } catch (const std::exception& error) {
+    return fail(error.what(), 1);
+  }
+}
+
+}  // namespace plumb

@@ -1,0 +1,201 @@
+#include "daemon/appliance/scan_session.hpp"
+
+#include <future>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/files/result_folder.hpp"
+#include "daemon/files/scene_folder.hpp"
+#include "daemon/files/text_report.hpp"
+#include "daemon/pipeline/recording_feed.hpp"
+#include "daemon/pipeline/scan_runner.hpp"
+#include "daemon/records/check_json.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr double kUpdateEvery_s = 0.1;
+
+Scene ReadReference(const std::filesystem::path& folder) {
+  try {
+    return ReadScene(folder);
+  } catch (const std::exception& error) {
+    throw std::runtime_error(
+        fmt::format("the patient's reference cannot be read: {}; put a backup of the scan's files "
+                    "in their place, or "
+                    "take a new reference",
+                    error.what()));
+  }
+}
+
+void ThrowIfStopped(const std::stop_token& stop) {
+  if (stop.stop_requested()) throw Interrupted("the scan was discarded");
+}
+
+}  // namespace
+
+ScanSession::ScanSession(ScanJob job, ScanCallbacks callbacks)
+    : job_(std::move(job)),
+      callbacks_(std::move(callbacks)),
+      feed_(std::make_shared<LiveFeed>(job_.queue_capacity)),
+      guide_(job_.info.intrinsics, job_.guidance),
+      heartbeat_s_(SteadySeconds()),
+      thread_([this](const std::stop_token& stop) { Run(stop); }) {}
+
+ScanSession::~ScanSession() { Cancel(); }
+
+void ScanSession::Cancel() {
+  thread_.request_stop();
+  feed_->Close();
+}
+
+void ScanSession::Run(const std::stop_token& stop) {
+  try {
+    Scan(stop);
+    outcome_.kind = ScanOutcome::Kind::kDone;
+  } catch (const Interrupted&) {
+    outcome_.kind = ScanOutcome::Kind::kCancelled;
+  } catch (const DataError& error) {
+    outcome_.kind = ScanOutcome::Kind::kNoScene;
+    outcome_.reason = error.what();
+    if (job_.check)
+      outcome_.check_json = CheckJson(
+          {.status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {error.what()}}, {});
+  } catch (const std::bad_alloc&) {
+    outcome_.kind = ScanOutcome::Kind::kFailed;
+    outcome_.reason = "out of memory: sweep a shorter way, or close what else runs";
+  } catch (const std::exception& error) {
+    outcome_.kind = ScanOutcome::Kind::kFailed;
+    outcome_.reason = error.what();
+  }
+  if (outcome_.kind != ScanOutcome::Kind::kDone && stop.stop_requested())
+    outcome_.kind = ScanOutcome::Kind::kCancelled;
+  Save();
+  callbacks_.ended(outcome_);
+}
+
+void ScanSession::Scan(const std::stop_token& stop) {
+  folder_ = callbacks_.begin();
+  // Read while the sweep goes on: it is wanted as soon as the new scene is there.
+  if (!job_.reference_scene.empty()) {
+    reference_ = std::async(std::launch::async, [folder = job_.reference_scene] {
+                   return ReadReference(folder);
+                 }).share();
+  }
+  const Scene scene = Track(stop);
+  if (job_.check) {
+    Check(scene);
+  } else {
+    Evaluate(scene, stop);
+    ThrowIfStopped(stop);  // from here on it is stored
+  }
+  if (const std::optional<double> last_s = feed_->last_frame_s())
+    outcome_.after_last_frame_s = SteadySeconds() - *last_s;
+}
+
+void ScanSession::Save() {
+  try {
+    callbacks_.save(outcome_);
+    return;
+  } catch (const std::exception& error) {
+    if (outcome_.kind == ScanOutcome::Kind::kDone || outcome_.reason.empty())
+      outcome_.reason = error.what();
+    outcome_.kind = ScanOutcome::Kind::kFailed;
+  }
+  try {
+    callbacks_.save(outcome_);
+  } catch (const std::exception&) {  // said already; the next start puts the store right
+  }
+}
+
+Scene ScanSession::Track(const std::stop_token& stop) {
+  std::optional<RecordingFeed> recording;
+  if (job_.keep_recording) recording.emplace(*feed_, job_.info, folder_ / "recording");
+  FrameFeed& feed = recording ? static_cast<FrameFeed&>(*recording) : *feed_;
+  Scene scene = RunScan(feed, job_.info, job_.reconstructor, stop,
+                        [this](const ScanProgress& progress) { OnProgress(progress); });
+  if (recording) recording->Complete(stop);
+  return scene;
+}
+
+void ScanSession::OnProgress(const ScanProgress& progress) {
+  // Nobody shall sweep in vain.
+  if (reference_.valid() &&
+      reference_.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
+    (void)reference_.get();
+  heartbeat_s_ = SteadySeconds();
+  update_.frames = outcome_.frames = progress.frames;
+  update_.frames_tracked = outcome_.frames_tracked = progress.frames_tracked;
+  update_.frames_dropped = outcome_.frames_dropped = progress.frames_dropped;
+  if (progress.tracking != nullptr && progress.frame != nullptr) {
+    update_.keyframes += progress.tracking->is_keyframe ? 1 : 0;
+    update_.guidance = guide_.Add(*progress.frame, *progress.tracking);
+    outcome_.swept_area_m2 = update_.guidance.area_m2;
+    if (update_.guidance.without_new_area_s >= job_.stop_after_s &&
+        !std::exchange(told_complete_, true))
+      callbacks_.sweep_complete();
+  }
+  Tell(std::string(progress.step), progress.fraction);
+}
+
+/// Tells at most ten times a second, but each new step and the first frame at once.
+void ScanSession::Tell(std::string step, double fraction) {
+  const double now_s = SteadySeconds();
+  heartbeat_s_ = now_s;
+  if (step == update_.step && now_s - told_s_ < kUpdateEvery_s) return;
+  told_s_ = now_s;
+  update_.step = std::move(step);
+  update_.fraction = fraction;
+  if (callbacks_.update) callbacks_.update(update_);
+}
+
+void ScanSession::Check(const Scene& scene) {
+  Tell("checking", 0.0);
+  const MarkerCheck check = CheckMarkers(scene, job_.check->baseline, job_.check->limits);
+  outcome_.check_json = CheckJson(check, BaselineOf(scene, job_.check->limits));
+  outcome_.verdict =
+      check.status == MarkerCheckStatus::kPassed ? Verdict::kInTolerance : Verdict::kNoAnswer;
+}
+
+void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
+  ThrowIfStopped(stop);
+  if (job_.is_reference && (scene.frame != SceneFrame::kReferenceMarker || !scene.height_map)) {
+    throw DataError(
+        "this scan cannot become a reference: the reference marker was not seen; keep it in view "
+        "during a part of the sweep");
+  }
+  Tell("saving", 0.0);
+  // The scene goes to the disk while it is compared.
+  std::future<void> writing =
+      std::async(std::launch::async, [&] { WriteScene(scene, folder_ / "scene", stop); });
+  std::optional<Comparison> comparison;
+  ResultPictures pictures;
+  if (reference_.valid()) {
+    Tell("comparing", 0.0);
+    const Scene& reference = reference_.get();
+    ThrowIfStopped(stop);
+    CompareOptions compare = job_.compare;
+    compare.stop = stop;
+    try {
+      comparison = Compare(reference, scene, compare);
+    } catch (const DataError& error) {  // not the sweep's fault: another one would end the same
+      throw std::runtime_error(
+          fmt::format("the scan does not fit its reference: {}", error.what()));
+    }
+    ThrowIfStopped(stop);
+    pictures = DrawResult(*comparison, reference.height_map ? &*reference.height_map : nullptr,
+                          {.tolerance_m = job_.compare.limits.shift_tolerance_m,
+                           .subtitle = PictureSubtitle(*comparison)});
+    Tell("saving", 0.5);
+  }
+  writing.get();
+  if (!comparison) return;
+  ThrowIfStopped(stop);
+  WriteResult(*comparison, pictures, folder_ / "result");
+  outcome_.result_json = ResultJson(*comparison);
+  outcome_.verdict = comparison->verdict;
+}
+
+}  // namespace plumb

@@ -1,0 +1,123 @@
+// One scan, from its first live frame to what is stored: the tracking thread and what it tells.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <future>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
+
+#include "algo/comparison/comparison.hpp"
+#include "algo/comparison/marker_check.hpp"
+#include "algo/reconstruction/reconstructor.hpp"
+#include "daemon/appliance/sweep_guidance.hpp"
+#include "daemon/pipeline/live_feed.hpp"
+
+namespace plumb {
+
+/// A scan of the room's markers, not of a patient.
+struct CheckJob {
+  std::optional<MarkerBaseline> baseline;
+  MarkerCheckLimits limits;
+};
+
+/// What a scan is made for.
+struct ScanJob {
+  StreamInfo info;  ///< Of the sensor.
+  ReconstructorOptions reconstructor;
+  CompareOptions compare;
+  GuidanceOptions guidance;
+  std::filesystem::path reference_scene;  ///< SCENE to compare with; empty: none.
+  bool is_reference =
+      false;  ///< The scene must be one that others can be compared with, else there is no answer.
+  std::optional<CheckJob> check;  ///< Set: the daily check; nothing but its numbers is kept.
+  bool keep_recording = false;
+  std::size_t queue_capacity = 15;  ///< Frames that may wait for tracking: half a second.
+  double stop_after_s = 10.0;       ///< Without new coverage: the sweep is complete.
+};
+
+/// How far it is; for the light, the page and `watch`.
+struct ScanUpdate {
+  std::string step;  ///< "tracking", then what the reconstruction names, "comparing", "saving".
+  double fraction = 0.0;  ///< Of this step.
+  std::int64_t frames = 0;
+  std::int64_t frames_tracked = 0;
+  std::int64_t frames_dropped = 0;
+  std::int64_t keyframes = 0;
+  SweepGuidance guidance;
+};
+
+/// How it ended.
+struct ScanOutcome {
+  enum class Kind { kDone, kNoScene, kCancelled, kFailed };
+  Kind kind = Kind::kFailed;
+  std::string reason;              ///< kNoScene: why the frames make no scene. kFailed: what broke.
+  std::string result_json;         ///< kDone with a reference: as result.json.
+  std::string check_json;          ///< kDone or kNoScene of a check: as CheckJson().
+  std::optional<Verdict> verdict;  ///< Of a check: in tolerance where it passed, else no answer.
+  std::int64_t frames = 0, frames_tracked = 0, frames_dropped = 0;
+  double swept_area_m2 = 0.0;
+  double after_last_frame_s = 0.0;  ///< Until everything was written.
+};
+
+/// Called on the tracking thread; they post to the loop, but for the first two, which use the
+/// store. These may throw: the scan has then failed.
+struct ScanCallbacks {
+  /// First: gives the folder in which `scene`, `result` and `recording` are written.
+  std::function<std::filesystem::path()> begin;
+  /// Stores the outcome, whatever it is, and what the folder holds. If that of a scan that is done
+  /// fails, it is called again for the failed one.
+  std::function<void(const ScanOutcome&)> save;
+  std::function<void(const ScanUpdate&)> update;
+  std::function<void()> sweep_complete;           ///< No new coverage for long enough; once.
+  std::function<void(const ScanOutcome&)> ended;  ///< Last; exactly once.
+};
+
+/// Starts with its construction. The sensor thread pushes into feed(); closing the feed ends the
+/// sweep. The owner's functions are called from one thread (the loop's); the destructor cancels and
+/// waits.
+class ScanSession {
+ public:
+  ScanSession(ScanJob job, ScanCallbacks callbacks);
+  ~ScanSession();
+  ScanSession(const ScanSession&) = delete;
+  ScanSession& operator=(const ScanSession&) = delete;
+
+  [[nodiscard]] const std::shared_ptr<LiveFeed>& feed() const { return feed_; }
+  /// Discards the scan; `ended` follows with kCancelled, mostly within 100 ms. Does not wait.
+  void Cancel();
+  /// Steady seconds at which the tracking thread last got on. While it waits for a frame that is
+  /// the last one's arrival.
+  [[nodiscard]] double heartbeat_s() const { return heartbeat_s_; }
+
+ private:
+  void Run(const std::stop_token& stop);
+  void Scan(const std::stop_token& stop);
+  void Save();
+  [[nodiscard]] Scene Track(const std::stop_token& stop);
+  void Check(const Scene& scene);
+  void Evaluate(const Scene& scene, const std::stop_token& stop);
+  void OnProgress(const struct ScanProgress& progress);
+  void Tell(std::string step, double fraction);
+
+  ScanJob job_;
+  ScanCallbacks callbacks_;
+  std::filesystem::path folder_;
+  std::shared_ptr<LiveFeed> feed_;
+  std::shared_future<Scene>
+      reference_;  ///< Belongs to the thread; valid if there is one to compare with.
+  SweepGuide guide_;
+  ScanUpdate update_;
+  ScanOutcome outcome_;
+  bool told_complete_ = false;
+  double told_s_ = 0.0;
+  std::atomic<double> heartbeat_s_;
+  std::jthread thread_;  // last: starts when everything above is there
+};
+
+}  // namespace plumb

@@ -1,0 +1,295 @@
+#include "daemon/appliance/sensor_thread.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <stop_token>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+
+namespace plumb {
+
+using Clock = std::chrono::steady_clock;
+
+namespace {
+constexpr std::chrono::seconds kListAgain{2};
+}
+
+/// Everything in it belongs to the sensor thread, but what the mutex guards and the atomics.
+struct SensorThread::Impl {
+  Impl(std::function<std::unique_ptr<SensorProvider>()> make, SensorThreadOptions its_options,
+       std::function<void(const SensorEvent&)> tell)
+      : make_provider(std::move(make)),
+        options(std::move(its_options)),
+        notify(std::move(tell)),
+        retry(options.first_retry) {
+    thread = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+  }
+  ~Impl() {
+    thread.request_stop();
+    {
+      const std::lock_guard lock(mutex);
+      if (sensor) sensor->Interrupt();
+    }
+    thread.join();
+  }
+
+  const std::function<std::unique_ptr<SensorProvider>()> make_provider;
+  const SensorThreadOptions options;
+  const std::function<void(const SensorEvent&)> notify;
+
+  mutable std::mutex mutex;
+  std::condition_variable_any changed;
+  bool bus_changed = true;             // guarded: the provider's listener spoke
+  std::shared_ptr<LiveFeed> wanted;    // guarded: where the frames shall go
+  std::shared_ptr<LiveSensor> sensor;  // guarded for others: written by the sensor thread only
+  SensorSnapshot current;              // guarded
+  std::optional<Frame> newest;         // guarded
+  std::atomic<double> heartbeat = SteadySeconds();
+
+  std::unique_ptr<SensorProvider> provider;
+  std::shared_ptr<LiveFeed> feed;  // where the frames go
+  std::weak_ptr<LiveFeed>
+      spoiled;         // its sensor went: what comes from the next one does not belong to it
+  bool ready = false;  // kReady was told for this sensor
+  std::optional<SensorEvent::Kind> told;
+  std::string told_reason;
+  std::chrono::milliseconds retry;
+  std::optional<Clock::time_point> retry_at;
+  Clock::time_point listed_at;
+  std::jthread thread;  // last: starts when everything above is there
+
+  void Run(const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      heartbeat = SteadySeconds();
+      try {
+        if (!provider) MakeProvider();
+        if (!sensor) Find();
+        if (sensor) {
+          Read(stop);
+        } else {
+          Wait(stop);
+        }
+      } catch (const DeviceLost&) {
+        Drop();
+        {
+          const std::lock_guard lock(mutex);
+          bus_changed = true;  // another one may be there already
+        }
+        Tell(SensorEvent::Kind::kLost, {});
+      } catch (const std::exception& error) {
+        Drop();
+        Tell(SensorEvent::Kind::kFailed, error.what());
+        retry_at = Clock::now() + retry;
+        retry = std::min(2 * retry, options.last_retry);
+      }
+    }
+    Drop();
+    provider.reset();
+  }
+
+  void MakeProvider() {
+    if (retry_at && Clock::now() < *retry_at) return;
+    provider = make_provider();
+    provider->SetListener([this] {
+      const std::lock_guard lock(mutex);
+      bus_changed = true;
+      changed.notify_all();
+    });
+  }
+
+  /// Opens a sensor if one is there and the time has come; tells that there is none.
+  void Find() {
+    if (!provider) return;
+    {
+      const std::lock_guard lock(mutex);
+      // Looked for even if nothing was said: a plug that the driver did not report must not wait
+      // for a restart.
+      const bool due = Clock::now() >= (retry_at ? *retry_at : listed_at + kListAgain);
+      if (!bus_changed && !due) return;
+      bus_changed = false;
+      listed_at = Clock::now();
+    }
+    const std::vector<SensorDescription> attached = provider->List();
+    const auto match =
+        std::find_if(attached.begin(), attached.end(), [&](const SensorDescription& sensor_there) {
+          return options.serial.empty() || sensor_there.serial == options.serial;
+        });
+    if (match == attached.end()) {
+      retry_at.reset();
+      retry = options.first_retry;
+      if (attached.empty() || options.serial.empty()) {
+        Tell(SensorEvent::Kind::kLost, {});
+      } else {
+        Tell(SensorEvent::Kind::kFailed,
+             fmt::format(
+                 "the sensor {} is not attached, but {} is: attach the configured one or change "
+                 "appliance.sensor_serial",
+                 options.serial, attached.front().serial));
+      }
+      return;
+    }
+    retry_at.reset();
+    std::shared_ptr<LiveSensor> opened = provider->Open(match->serial);
+    const std::lock_guard lock(mutex);
+    sensor = std::move(opened);
+    ready = false;
+    current = {.present = false,
+               .sensor = sensor->description(),
+               .statistics = {},
+               .info = sensor->info(),
+               .others = Others(attached, sensor->description())};
+  }
+
+  static std::vector<std::string> Others(const std::vector<SensorDescription>& attached,
+                                         const SensorDescription& used) {
+    std::vector<std::string> others;
+    for (const SensorDescription& one : attached) {
+      if (one.uri != used.uri) others.push_back(one.serial);
+    }
+    return others;
+  }
+
+  /// Who else is there now? Asking a new unit for its serial takes its time, so not while a scan
+  /// runs.
+  void LookForOthers() {
+    {
+      const std::lock_guard lock(mutex);
+      if (feed || !ready || !std::exchange(bus_changed, false)) return;
+    }
+    const std::vector<SensorDescription> attached = provider->List();
+    std::vector<std::string> others = Others(attached, sensor->description());
+    if (others.size() == attached.size()) return;  // the one in use is gone: Next() will say so
+    {
+      const std::lock_guard lock(mutex);
+      if (others == current.others) return;
+      current.others = std::move(others);
+    }
+    Notify(SensorEvent::Kind::kOthers, {});
+  }
+
+  void Wait(const std::stop_token& stop) {
+    std::unique_lock lock(mutex);
+    const Clock::time_point heartbeat_due = Clock::now() + std::chrono::milliseconds(500);
+    const Clock::time_point until = retry_at ? std::min(*retry_at, heartbeat_due) : heartbeat_due;
+    // Without a provider nobody looks at the bus, so what it said would not be done with: only the
+    // next attempt is waited for.
+    changed.wait_until(lock, stop, until, [this] { return provider != nullptr && bus_changed; });
+  }
+
+  void Read(const std::stop_token& stop) {
+    SwitchFeed();
+    LookForOthers();
+    std::optional<Frame> frame = sensor->Next();
+    if (!frame) {
+      if (!stop.stop_requested()) throw DeviceError("the sensor's stream ended");
+      return;
+    }
+    heartbeat = SteadySeconds();
+    bool is_new = false;
+    {
+      const std::lock_guard lock(mutex);
+      current.present = true;
+      current.statistics = sensor->statistics();
+      newest = *frame;
+      if (WantedFeed() != feed) return;  // a scan began or ended while this frame was on its way
+      is_new = !std::exchange(ready, true);
+    }
+    if (feed) feed->Push(std::move(*frame));
+    if (is_new) {
+      retry = options.first_retry;
+      Tell(SensorEvent::Kind::kReady, {});
+    }
+  }
+
+  /// Needs the lock.
+  [[nodiscard]] std::shared_ptr<LiveFeed> WantedFeed() const {
+    return wanted && wanted == spoiled.lock() ? nullptr : wanted;
+  }
+
+  void SwitchFeed() {
+    std::shared_ptr<LiveFeed> next;
+    {
+      const std::lock_guard lock(mutex);
+      next = WantedFeed();
+    }
+    if (next == feed) return;
+    feed = next;
+    sensor->LockExposure(feed != nullptr);
+    if (!feed) return;
+    if (options.before_scan) options.before_scan();
+    sensor->Flush();
+  }
+
+  void Drop() {
+    if (feed) spoiled = std::exchange(feed, nullptr);
+    std::shared_ptr<LiveSensor> gone;
+    const std::lock_guard lock(mutex);
+    gone = std::move(sensor);
+    sensor.reset();
+    current.present = false;
+    newest.reset();
+  }
+
+  void Tell(SensorEvent::Kind kind, const std::string& reason) {
+    if (told == kind && told_reason == reason && kind != SensorEvent::Kind::kReady) return;
+    told = kind;
+    told_reason = reason;
+    if (kind == SensorEvent::Kind::kLost) {
+      const std::lock_guard lock(mutex);
+      current = {};
+    }
+    Notify(kind, reason);
+  }
+
+  void Notify(SensorEvent::Kind kind, const std::string& reason) {
+    SensorEvent event{.kind = kind, .sensor = {}, .reason = reason, .others = {}};
+    {
+      const std::lock_guard lock(mutex);
+      event.sensor = current.sensor;
+      event.others = current.others;
+    }
+    notify(event);
+  }
+};
+
+SensorThread::SensorThread(std::function<std::unique_ptr<SensorProvider>()> make_provider,
+                           SensorThreadOptions options,
+                           std::function<void(const SensorEvent&)> notify)
+    : impl_(std::make_unique<Impl>(std::move(make_provider), std::move(options),
+                                   std::move(notify))) {}
+
+SensorThread::~SensorThread() = default;
+
+void SensorThread::BeginScan(std::shared_ptr<LiveFeed> feed) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->wanted = std::move(feed);
+}
+
+void SensorThread::EndScan() {
+  std::shared_ptr<LiveFeed> feed;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    feed = std::exchange(impl_->wanted, nullptr);
+  }
+  if (feed) feed->Close();
+}
+
+SensorSnapshot SensorThread::snapshot() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->current;
+}
+
+std::optional<Frame> SensorThread::latest() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->newest;
+}
+
+double SensorThread::heartbeat_s() const { return impl_->heartbeat; }
+
+}  // namespace plumb

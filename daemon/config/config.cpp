@@ -1,0 +1,368 @@
+#include "daemon/config/config.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/base/errors.hpp"
+#include "algo/base/units.hpp"
+#include "algo/types/marker_dictionary.hpp"
+#include "daemon/config/config_section.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr std::uintmax_t kMaxFileBytes = 1 << 20;
+
+std::string ReadText(const std::filesystem::path& file, std::string_view what) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  if (error)
+    throw DataError(
+        fmt::format("cannot read the {} '{}': {}", what, file.string(), error.message()));
+  if (size > kMaxFileBytes) {
+    throw DataError(fmt::format("the {} '{}' has {} bytes, expected at most {}", what,
+                                file.string(), size, kMaxFileBytes));
+  }
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw DataError(fmt::format("cannot open the {} '{}' for reading", what, file.string()));
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+const auto kAny = [](const auto&) { return true; };
+const std::vector<std::pair<std::string, Preset>> kPresets = {{"best", Preset::kBest},
+                                                              {"paper", Preset::kPaper}};
+
+void ReadMarkers(Section section, MarkerConfig& markers) {
+  std::string dictionary;
+  section.Take("dictionary", dictionary,
+               fmt::format("one of {}", fmt::join(MarkerDictionary::KnownNames(), ", ")),
+               [](const std::string& s) { return MarkerDictionary::Find(s).has_value(); });
+  if (!dictionary.empty()) markers.dictionary = dictionary;
+  double length_m = 0;
+  section.Take("length_m", length_m, "a marker's side in metres, above 0 and at most 2",
+               [](double v) { return v > 0 && v <= 2; });
+  if (length_m > 0) markers.length_m = length_m;
+  int reference = -1;
+  section.Take("reference", reference, "a marker's id, 0 or more", [](int id) { return id >= 0; });
+  if (reference >= 0) markers.reference = reference;
+  section.RefuseTheRest();
+}
+
+void ReadReconstruct(Section section, ReconstructorOptions& options) {
+  section.TakeName("preset", options.preset, kPresets);
+  section.Take("keep_color", options.keep_color, "true or false", kAny);
+  section.Take("use_markers", options.use_markers, "true or false", kAny);
+  section.Take("use_keypoints", options.use_keypoints, "true or false", kAny);
+  section.Take("num_icp_iterations", options.num_icp_iterations, "a whole number from 1 to 1000",
+               [](int n) { return n >= 1 && n <= 1000; });
+  section.Take("seed", options.seed, "a whole number, 0 or more", kAny);
+  section.RefuseTheRest();
+}
+
+// Keys of [compare] that are a patient's: plumbd takes them from the approved plan of the
+// reference, so that a value in its file would either be hidden data of every patient or have no
+// effect.
+void RefuseKeysOfThePlan(const Section& section) {
+  const char* const plan =
+      "it belongs to the plan of each reference: set it on the page, where it is approved";
+  section.Refuse("region", plan);
+  section.Refuse("isocentre_m", plan);
+  const char* const settings =
+      "it belongs to the plan of each reference: set it there, or its default in the settings of "
+      "the page";
+  for (const char* key : {"marker_kind", "posture", "shift_tolerance_mm", "rotation_tolerance_deg"})
+    section.Refuse(key, settings);
+}
+
+void ReadCompare(Section section, ConfigUse use, Config& config) {
+  CompareOptions& options = config.compare;
+  if (use == ConfigUse::kAppliance) RefuseKeysOfThePlan(section);
+  section.TakeName("preset", options.preset, kPresets);
+  std::string region;
+  section.Take("region", region, "the path of a region file",
+               [](const std::string& s) { return !s.empty(); });
+  if (!region.empty()) config.region_file = region;
+  if (const auto rows = section.TakeRows("isocentre_m", 1, 3, "[x, y, z] in metres")) {
+    options.isocentre_m = Eigen::Vector3d(rows->front().data());
+  }
+  section.TakeName("marker_kind", options.marker_kind,
+                   {{"room", MarkerKind::kRoom}, {"couch", MarkerKind::kCouch}});
+  section.TakeName("posture", options.posture,
+                   {{"HFS", PatientPosture::kHeadFirstSupine},
+                    {"HFP", PatientPosture::kHeadFirstProne},
+                    {"FFS", PatientPosture::kFeetFirstSupine},
+                    {"FFP", PatientPosture::kFeetFirstProne}});
+  section.TakeScaled("shift_tolerance_mm", options.limits.shift_tolerance_m, kMillimetre,
+                     "millimetres above 0");
+  section.TakeScaled("rotation_tolerance_deg", options.limits.rotation_tolerance_rad, kDegree,
+                     "degrees above 0");
+  section.Take("min_shared_markers", options.limits.min_shared_markers,
+               "a whole number from 1 to 1000", [](int n) { return n >= 1 && n <= 1000; });
+  section.TakeScaled("moved_marker_mm", options.markers.moved_m, kMillimetre,
+                     "millimetres above 0");
+  section.TakeScaled("moved_marker_sigmas", options.markers.moved_sigmas, 1.0, "a number above 0");
+  section.Take("min_coverage", options.limits.min_coverage, "a share from 0 to 1",
+               [](double v) { return v >= 0 && v <= 1; });
+  section.TakeScaled("max_hole_mm", options.limits.max_hole_m, kMillimetre, "millimetres above 0");
+  section.TakeScaled("max_residual_p95_mm", options.limits.max_residual_p95_m, kMillimetre,
+                     "millimetres above 0");
+  section.TakeScaled("max_lost_s", options.limits.max_lost_s, 1.0, "seconds above 0");
+  section.RefuseTheRest();
+}
+
+void ReadCheck(Section section, MarkerCheckLimits& limits) {
+  constexpr double kPercent = 0.01;
+  section.TakeScaled("misfit_mm", limits.max_misfit_m, kMillimetre, "millimetres above 0");
+  section.TakeScaled("moved_mm", limits.max_moved_m, kMillimetre, "millimetres above 0");
+  section.TakeScaled("side_percent", limits.max_side_share, kPercent, "percent above 0");
+  section.TakeScaled("scale_percent", limits.max_scale_share, kPercent, "percent above 0");
+  section.TakeScaled("depth_percent", limits.max_depth_share, kPercent, "percent above 0");
+  section.Take("min_views", limits.min_views, "a whole number from 1 to 1000",
+               [](int n) { return n >= 1 && n <= 1000; });
+  section.RefuseTheRest();
+}
+
+void ReadIec(Section section, const toml::table& root, Pose& T_iec_reference) {
+  const std::string_view expected =
+      "a rigid transform: 4 rows of 4 numbers, a rotation and a translation in metres, last row 0 "
+      "0 0 1";
+  if (const auto rows = section.TakeRows("T_iec_reference", 4, 4, expected)) {
+    Eigen::Matrix4d matrix;
+    for (Eigen::Index r = 0; r < 4; ++r)
+      matrix.row(r) = Eigen::RowVector4d((*rows)[static_cast<std::size_t>(r)].data());
+    Pose T;
+    T.matrix() = matrix;
+    const bool is_rotation =
+        (T.linear() * T.linear().transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-4 &&
+        T.linear().determinant() > 0;
+    const bool is_affine = (matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() == 0;
+    if (!is_rotation || !is_affine)
+      section.Fail(*root["iec"]["T_iec_reference"].node(), "T_iec_reference", expected);
+    T_iec_reference = Orthonormalised(T);
+  }
+  section.RefuseTheRest();
+}
+
+void ReadAppliance(Section section, ApplianceConfig& appliance) {
+  const auto take_path = [&](std::string_view key, std::filesystem::path& path) {
+    std::string text;
+    section.Take(key, text, "an absolute path",
+                 [](const std::string& s) { return s.starts_with('/') && s.size() < 4096; });
+    if (!text.empty()) path = text;
+  };
+  const auto take_seconds = [&](std::string_view key, std::optional<double>& value, double least,
+                                double most) {
+    double seconds = -1;
+    section.Take(key, seconds, fmt::format("seconds from {} to {}", least, most),
+                 [&](double v) { return v >= least && v <= most; });
+    if (seconds >= 0) value = seconds;
+  };
+  take_path("state", appliance.state);
+  take_path("control", appliance.control);
+  take_path("calibration", appliance.calibration);
+  section.Take("sensor_serial", appliance.sensor_serial, "the serial of a sensor",
+               [](const std::string& s) { return s.size() <= 64; });
+  section.Take("keep_recordings", appliance.keep_recordings, "true or false", kAny);
+  section.Take("quota_gb", appliance.quota_gb, "gigabytes from 1 to 100000",
+               [](double v) { return v >= 1 && v <= 100000; });
+  take_seconds("auto_stop_s", appliance.auto_stop_s, 1, 120);
+  take_seconds("scan_limit_s", appliance.scan_limit_s, 1, 600);
+  std::optional<double> result_s;
+  take_seconds("result_s", result_s, 1, 3600);
+  appliance.result_s = result_s.value_or(appliance.result_s);
+  section.RefuseTheRest();
+}
+
+void ReadPanel(Section button, Section light, PanelConfig& panel) {
+  const auto take = [](Section& section, std::string_view key, std::string& name) {
+    section.Take(key, name, "a name of at most 64 characters",
+                 [](const std::string& s) { return !s.empty() && s.size() <= 64; });
+  };
+  take(button, "chip", panel.button_chip);
+  take(button, "line", panel.button_line);
+  button.Take("active_low", panel.button_active_low, "true or false", kAny);
+  button.RefuseTheRest();
+  take(light, "chip", panel.light_chip);
+  take(light, "red", panel.red_line);
+  take(light, "green", panel.green_line);
+  take(light, "blue", panel.blue_line);
+  take(light, "beeper", panel.beeper_line);
+  light.Take("active_low", panel.light_active_low, "true or false", kAny);
+  light.RefuseTheRest();
+}
+
+void ReadUpdate(Section section, UpdateConfig& update) {
+  std::string folder;
+  section.Take("folder", folder, "an absolute path",
+               [](const std::string& text) { return text.starts_with('/') && text.size() < 4096; });
+  if (!folder.empty()) update.folder = folder;
+  section.Take("max_bundle_mb", update.max_bundle_mb, "a whole number from 1 to 65536",
+               [](int n) { return n >= 1 && n <= 65536; });
+  section.RefuseTheRest();
+}
+
+void ReadWeb(Section section, WebConfig& web) {
+  section.Take("listen", web.listen,
+               "an address and a port, such as \"0.0.0.0:8080\" or \"[::]:8080\"",
+               [](const std::string& s) { return ParseListenAddress(s).has_value(); });
+  const auto take_path = [&](std::string_view key, std::filesystem::path& path) {
+    std::string text;
+    section.Take(key, text, "an absolute path",
+                 [](const std::string& s) { return s.starts_with('/') && s.size() < 4096; });
+    if (!text.empty()) path = text;
+  };
+  take_path("tls_certificate", web.tls_certificate);
+  take_path("tls_key", web.tls_key);
+  section.TakeNames("host_names", web.host_names, "a list of at most 16 host names", 16);
+  section.RefuseTheRest();
+}
+
+}  // namespace
+
+std::optional<ListenAddress> ParseListenAddress(std::string_view text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string_view::npos || colon == 0) return std::nullopt;
+  std::string_view address = text.substr(0, colon);
+  const std::string_view digits = text.substr(colon + 1);
+  if (address.starts_with('[') != address.ends_with(']')) return std::nullopt;
+  const bool is_v6 = address.starts_with('[');
+  if (is_v6) address = address.substr(1, address.size() - 2);
+  if (address.empty() || (address.find(':') != std::string_view::npos) != is_v6)
+    return std::nullopt;
+  unsigned port = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
+  if (error != std::errc() || end != digits.data() + digits.size() || port > 65535)
+    return std::nullopt;
+  return ListenAddress{.address = std::string(address), .port = static_cast<std::uint16_t>(port)};
+}
+
+Config ParseConfig(const std::string& text, const std::string& name, ConfigUse use) {
+  toml::table root;
+  try {
+    root = toml::parse(text, name);
+  } catch (const toml::parse_error& error) {
+    throw DataError(fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line,
+                                error.description()));
+  }
+  static constexpr std::array<std::string_view, 10> kSections = {
+      "markers",   "reconstruct", "compare", "check", "iec",
+      "appliance", "button",      "light",   "web",   "update"};
+  for (const auto& [key, node] : root) {
+    if (std::find(kSections.begin(), kSections.end(), key.str()) != kSections.end()) continue;
+    throw DataError(fmt::format("{}:{}: unknown table or key '{}'; known are [{}]", name,
+                                node.source().begin.line, key.str(), fmt::join(kSections, "], [")));
+  }
+  Config config;
+  ReadMarkers(Section(root, "markers", name), config.markers);
+  ReadReconstruct(Section(root, "reconstruct", name), config.reconstruct);
+  ReadCompare(Section(root, "compare", name), use, config);
+  ReadCheck(Section(root, "check", name), config.check);
+  ReadIec(Section(root, "iec", name), root, config.compare.T_iec_reference);
+  ReadAppliance(Section(root, "appliance", name), config.appliance);
+  ReadPanel(Section(root, "button", name), Section(root, "light", name), config.panel);
+  ReadWeb(Section(root, "web", name), config.web);
+  ReadUpdate(Section(root, "update", name), config.update);
+  return config;
+}
+
+Config ReadConfig(const std::filesystem::path& file, ConfigUse use) {
+  Config config = ParseConfig(ReadText(file, "configuration"), file.string(), use);
+  if (config.region_file && config.region_file->is_relative())
+    config.region_file = file.parent_path() / *config.region_file;
+  return config;
+}
+
+void RefuseResearchPresets(const Config& config) {
+  const auto refuse = [](Preset preset, const char* section) {
+    if (preset == Preset::kBest) return;
+    throw DataError(fmt::format(
+        "[{}] preset: expected \"best\", found \"{}\"; plumbd takes preset \"{}\" only with "
+        "--simulated, because it is the published method kept for comparison. Remove the "
+        "key, or compare scans with `plumb compare --preset {}`",
+        section, Name(preset), Name(preset), Name(preset)));
+  };
+  refuse(config.reconstruct.preset, "reconstruct");
+  refuse(config.compare.preset, "compare");
+}
+
+std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
+  std::vector<std::string> kept;
+  const auto keep = [&kept](const char* key, const auto& used, auto& wanted) {
+    if (wanted == used) return;
+    kept.emplace_back(key);
+    wanted = used;
+  };
+  keep("markers.dictionary", in_use.markers.dictionary, next.markers.dictionary);
+  keep("markers.length_m", in_use.markers.length_m, next.markers.length_m);
+  keep("markers.reference", in_use.markers.reference, next.markers.reference);
+  keep("appliance.state", in_use.appliance.state, next.appliance.state);
+  keep("appliance.control", in_use.appliance.control, next.appliance.control);
+  keep("appliance.calibration", in_use.appliance.calibration, next.appliance.calibration);
+  keep("appliance.sensor_serial", in_use.appliance.sensor_serial, next.appliance.sensor_serial);
+  keep("button.chip", in_use.panel.button_chip, next.panel.button_chip);
+  keep("button.line", in_use.panel.button_line, next.panel.button_line);
+  keep("button.active_low", in_use.panel.button_active_low, next.panel.button_active_low);
+  keep("light.chip", in_use.panel.light_chip, next.panel.light_chip);
+  keep("light.red", in_use.panel.red_line, next.panel.red_line);
+  keep("light.green", in_use.panel.green_line, next.panel.green_line);
+  keep("light.blue", in_use.panel.blue_line, next.panel.blue_line);
+  keep("light.beeper", in_use.panel.beeper_line, next.panel.beeper_line);
+  keep("light.active_low", in_use.panel.light_active_low, next.panel.light_active_low);
+  keep("web.listen", in_use.web.listen, next.web.listen);
+  keep("web.tls_certificate", in_use.web.tls_certificate, next.web.tls_certificate);
+  keep("web.tls_key", in_use.web.tls_key, next.web.tls_key);
+  keep("web.host_names", in_use.web.host_names, next.web.host_names);
+  keep("update.folder", in_use.update.folder, next.update.folder);
+  keep("update.max_bundle_mb", in_use.update.max_bundle_mb, next.update.max_bundle_mb);
+  return kept;
+}
+
+std::vector<Eigen::Vector2d> ReadRegion(const std::filesystem::path& file) {
+  const std::string text = ReadText(file, "region file");
+  const auto fail = [&](std::string_view what) {
+    throw DataError(fmt::format("region file '{}': {}", file.string(), what));
+  };
+  nlohmann::json json;
+  try {
+    json = nlohmann::json::parse(text);
+  } catch (const nlohmann::json::exception& error) {
+    fail(fmt::format("not valid JSON ({})", error.what()));
+  }
+  if (!json.is_object()) fail("expected an object with \"format\", \"frame\" and \"polygon_m\"");
+  if (json.value("format", nlohmann::json()) != 1)
+    fail(fmt::format("expected \"format\": 1, found {}",
+                     json.value("format", nlohmann::json()).dump()));
+  if (json.value("frame", nlohmann::json()) != "reference_marker") {
+    fail(fmt::format("expected \"frame\": \"reference_marker\", found {}",
+                     json.value("frame", nlohmann::json()).dump()));
+  }
+  const nlohmann::json vertices = json.value("polygon_m", nlohmann::json());
+  if (!vertices.is_array() || vertices.size() < 3 || vertices.size() > 10000)
+    fail("expected \"polygon_m\" with 3 to 10000 vertices [x, y] in metres");
+  std::vector<Eigen::Vector2d> polygon;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const nlohmann::json& vertex = vertices[i];
+    const bool is_point =
+        vertex.is_array() && vertex.size() == 2 && vertex[0].is_number() && vertex[1].is_number();
+    if (!is_point)
+      fail(fmt::format("polygon_m[{}]: expected [x, y] in metres, found {}", i,
+                       vertex.dump().substr(0, 80)));
+    polygon.emplace_back(vertex[0].get<double>(), vertex[1].get<double>());
+    if (!(polygon.back().cwiseAbs().maxCoeff() <= 100))
+      fail(fmt::format("polygon_m[{}]: expected metres within 100 m", i));
+  }
+  return polygon;
+}
+
+}  // namespace plumb

@@ -1,0 +1,127 @@
+// The configuration file (TOML): options of reconstruct and compare, checked, with line numbers in
+// every complaint.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "algo/comparison/comparison.hpp"
+#include "algo/comparison/marker_check.hpp"
+#include "algo/reconstruction/reconstructor.hpp"
+
+namespace plumb {
+
+/// Markers of the room, for recordings that bring no camera.yaml.
+struct MarkerConfig {
+  std::optional<std::string> dictionary;  ///< OpenCV's name, or DICT_ARUCO_MIP_36h12.
+  std::optional<double> length_m;
+  std::optional<int> reference;  ///< Id whose frame is the scene's frame.
+};
+
+/// For the appliance, plumbd; the command line ignores it.
+struct ApplianceConfig {
+  std::filesystem::path state = "/var/lib/plumb";
+  std::filesystem::path control = "/run/plumb/control.sock";
+  std::filesystem::path calibration =
+      "/var/lib/plumb/calibration";  ///< SERIAL.yaml for each calibrated sensor.
+  std::string sensor_serial;         ///< Only this sensor; empty: the first one.
+  bool keep_recordings = false;      ///< Of every scan, whatever the page's settings say.
+  double quota_gb = 100.0;           ///< Of all scans; beyond, the oldest go.
+  std::optional<double>
+      auto_stop_s;  ///< Sweep ends after so long without new coverage; none: the page's setting.
+  std::optional<double> scan_limit_s;  ///< Longest sweep; none: the page's setting.
+  double result_s = 120.0;             ///< A result is shown for so long.
+};
+
+/// Start button and light on GPIO lines. A line is its name as the device tree has it, or its
+/// number as "#17"; empty: none.
+struct PanelConfig {
+  std::string button_chip = "gpiochip0", button_line;
+  bool button_active_low = true;
+  std::string light_chip = "gpiochip0", red_line, green_line, blue_line, beeper_line;
+  bool light_active_low = false;
+};
+
+/// For the page that plumbd serves.
+struct WebConfig {
+  std::string listen = "0.0.0.0:8080";
+  std::filesystem::path tls_certificate, tls_key;  ///< PEM; both or none.
+  std::vector<std::string> host_names;  ///< By which browsers reach it, beside addresses.
+};
+
+/// System updates, where the machine has an installer.
+struct UpdateConfig {
+  std::filesystem::path folder = "/var/lib/plumb/updates";  ///< Bundles: NAME.raucb.
+  int max_bundle_mb = 2048;
+};
+
+struct ListenAddress {
+  std::string address;
+  std::uint16_t port = 0;
+};
+/// "127.0.0.1:8080", "[::1]:8080"; nothing if it is neither. Port 0: any free one.
+[[nodiscard]] std::optional<ListenAddress> ParseListenAddress(std::string_view text);
+
+/// The contents of a configuration file; keys that it omits keep these defaults.
+struct Config {
+  MarkerConfig markers;
+  ReconstructorOptions reconstruct;
+  CompareOptions compare;
+  MarkerCheckLimits check;  ///< Of the daily check.
+  ApplianceConfig appliance;
+  PanelConfig panel;
+  WebConfig web;
+  UpdateConfig update;
+  std::optional<std::filesystem::path>
+      region_file;  ///< Absolute, or relative to the configuration file's folder.
+};
+
+/// Who reads a file. The keys are the same for both, but plumbd refuses those of [compare] that are
+/// a patient's (region, isocentre_m, marker_kind, posture and the two tolerances): it takes them
+/// from the approved plan of the reference.
+enum class ConfigUse { kCommandLine, kAppliance };
+
+/// Reads and checks a file.
+///
+///     [markers]      dictionary, length_m, reference
+///     [reconstruct]  preset, keep_color, use_markers, use_keypoints, num_icp_iterations, seed
+///     [compare]      preset, region, isocentre_m = [x, y, z], marker_kind = "room"|"couch",
+///     posture = "HFS"|"HFP"|"FFS"|"FFP",
+///                    shift_tolerance_mm, rotation_tolerance_deg, min_shared_markers,
+///                    moved_marker_mm, moved_marker_sigmas, min_coverage, max_hole_mm,
+///                    max_residual_p95_mm, max_lost_s
+///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views:
+///     limits of the daily check [iec]          T_iec_reference = 4 rows of 4: reference marker's
+///     frame to the IEC fixed frame [appliance]    state, control, calibration, sensor_serial,
+///     keep_recordings, quota_gb, auto_stop_s, scan_limit_s, result_s [button]       chip, line,
+///     active_low [light]        chip, red, green, blue, beeper, active_low [web]          listen,
+///     tls_certificate, tls_key, host_names [update]       folder, max_bundle_mb
+///
+/// @throws DataError naming file, line, key, what was expected and found. A key that is not listed
+/// is an error.
+[[nodiscard]] Config ReadConfig(const std::filesystem::path& file,
+                                ConfigUse use = ConfigUse::kCommandLine);
+
+/// As ReadConfig(), of a text; `name` stands for the file in messages.
+[[nodiscard]] Config ParseConfig(const std::string& text, const std::string& name,
+                                 ConfigUse use = ConfigUse::kCommandLine);
+
+/// Refuses what must not decide about a patient: plumbd answers with preset `best` alone, unless
+/// its sensor is simulated.
+/// @throws DataError naming the key.
+void RefuseResearchPresets(const Config& config);
+
+/// What takes effect only at the start stays in `next` as it is in use. Gives the keys that would
+/// have changed, such as "web.listen".
+[[nodiscard]] std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next);
+
+/// Vertices of a region file: {"format": 1, "frame": "reference_marker", "polygon_m": [[x, y],
+/// ...]}; metres.
+/// @throws DataError naming the file and what is wrong with it.
+[[nodiscard]] std::vector<Eigen::Vector2d> ReadRegion(const std::filesystem::path& file);
+
+}  // namespace plumb

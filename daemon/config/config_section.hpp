@@ -1,0 +1,160 @@
+// One table of a configuration file: values are taken key by key, with line numbers in every
+// complaint.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+
+#include "algo/base/errors.hpp"
+
+namespace plumb {
+
+/// Keys that were not consumed are unknown, and refused. All functions throw DataError.
+class Section {
+ public:
+  Section(const toml::table& root, std::string name, const std::string& file)
+      : name_(std::move(name)), file_(file) {
+    const toml::node* node = root.get(name_);
+    if (node == nullptr) return;
+    table_ = node->as_table();
+    if (table_ == nullptr) Fail(*node, name_, "a table, [" + name_ + "]");
+  }
+
+  template <typename T, typename Check>
+  void Take(std::string_view key, T& value, std::string_view expected, Check is_valid) {
+    const toml::node* node = Find(key);
+    if (node == nullptr) return;
+    std::optional<T> found;
+    if constexpr (std::floating_point<T>) {
+      if (node->is_number()) found = node->value<double>();
+    } else if constexpr (std::integral<T> && !std::same_as<T, bool>) {
+      if (const std::optional<std::int64_t> number = node->value_exact<std::int64_t>();
+          number && std::in_range<T>(*number))
+        found = static_cast<T>(*number);
+    } else {
+      found = node->value_exact<T>();
+    }
+    if (!found || !is_valid(*found)) Fail(*node, key, expected);
+    value = *found;
+  }
+
+  /// A positive number in another unit than inside.
+  void TakeScaled(std::string_view key, double& value, double unit, std::string_view expected) {
+    double number = value / unit;
+    bool taken = false;
+    Take(key, number, expected, [&](double v) { return taken = std::isfinite(v) && v > 0; });
+    if (taken) value = number * unit;
+  }
+
+  template <typename T>
+  void TakeName(std::string_view key, T& value,
+                const std::vector<std::pair<std::string, T>>& names) {
+    std::vector<std::string> known;
+    for (const auto& [name, unused] : names) known.push_back('"' + name + '"');
+    std::string found;
+    const auto match = [&](const std::string& text) {
+      return std::find_if(names.begin(), names.end(),
+                          [&](const auto& name) { return name.first == text; });
+    };
+    Take(key, found, fmt::format("one of {}", fmt::join(known, ", ")),
+         [&](const std::string& text) { return match(text) != names.end(); });
+    if (!found.empty()) value = match(found)->second;
+  }
+
+  /// A list of texts that are not empty.
+  void TakeNames(std::string_view key, std::vector<std::string>& names, std::string_view expected,
+                 std::size_t most) {
+    const toml::node* node = Find(key);
+    if (node == nullptr) return;
+    const toml::array* array = node->as_array();
+    if (array == nullptr || array->size() > most) Fail(*node, key, expected);
+    names.clear();
+    for (const toml::node& element : *array) {
+      const std::optional<std::string> name = element.value_exact<std::string>();
+      if (!name || name->empty() || name->size() > 255) Fail(element, key, expected);
+      names.push_back(*name);
+    }
+  }
+
+  /// Rows of finite numbers; nothing if the key is absent. One row may be written without the outer
+  /// brackets.
+  std::optional<std::vector<std::vector<double>>> TakeRows(std::string_view key,
+                                                           std::size_t num_rows,
+                                                           std::size_t num_columns,
+                                                           std::string_view expected) {
+    const toml::node* node = Find(key);
+    if (node == nullptr) return std::nullopt;
+    std::vector<std::vector<double>> rows;
+    const auto read_row = [&](const toml::node& row_node) {
+      const toml::array* row = row_node.as_array();
+      if (row == nullptr || row->size() != num_columns) Fail(row_node, key, expected);
+      rows.emplace_back();
+      for (const toml::node& element : *row) {
+        const std::optional<double> number =
+            element.is_number() ? element.value<double>() : std::nullopt;
+        if (!number || !std::isfinite(*number)) Fail(element, key, expected);
+        rows.back().push_back(*number);
+      }
+    };
+    if (num_rows == 1) {
+      read_row(*node);
+    } else {
+      const toml::array* array = node->as_array();
+      if (array == nullptr || array->size() != num_rows) Fail(*node, key, expected);
+      for (const toml::node& row : *array) read_row(row);
+    }
+    return rows;
+  }
+
+  /// A key that this program does not take from the file. @param where  Where its value belongs.
+  void Refuse(std::string_view key, std::string_view where) const {
+    if (table_ == nullptr) return;
+    const toml::node* node = table_->get(key);
+    if (node == nullptr) return;
+    throw DataError(fmt::format("{}:{}: {}.{} is not taken from this file: {}; remove the line",
+                                file_, node->source().begin.line, name_, key, where));
+  }
+
+  void RefuseTheRest() const {
+    if (table_ == nullptr) return;
+    for (const auto& [key, node] : *table_) {
+      if (std::find(taken_.begin(), taken_.end(), key.str()) != taken_.end()) continue;
+      throw DataError(fmt::format("{}:{}: unknown key '{}' in [{}]; known are {}", file_,
+                                  node.source().begin.line, key.str(), name_,
+                                  fmt::join(taken_, ", ")));
+    }
+  }
+
+  [[noreturn]] void Fail(const toml::node& node, std::string_view key,
+                         std::string_view expected) const {
+    std::ostringstream found;
+    node.visit([&found](const auto& n) { found << n; });
+    throw DataError(fmt::format("{}:{}: {}.{}: expected {}, found {}", file_,
+                                node.source().begin.line, name_, key, expected, found.str()));
+  }
+
+ private:
+  const toml::node* Find(std::string_view key) {
+    taken_.emplace_back(key);
+    return table_ == nullptr ? nullptr : table_->get(key);
+  }
+
+  std::string name_;
+  const std::string& file_;
+  const toml::table* table_ = nullptr;
+  std::vector<std::string> taken_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,7 @@
+#include "daemon/config/version.hpp"
+
+namespace plumb {
+
+std::string_view Version() { return PLUMB_VERSION; }
+
+}  // namespace plumb

@@ -1,0 +1,119 @@
+#include "daemon/files/compact_map.hpp"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <fmt/format.h>
+#include <opencv2/core.hpp>
+
+#include "algo/base/errors.hpp"
+#include "drivers/files/image_file.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int16_t kNone = std::numeric_limits<std::int16_t>::min();
+constexpr float kSteps_per_m = 10000.0F;
+constexpr float kMost = 32767.0F;
+
+cv::Mat Tenths(const cv::Mat& metres) {
+  cv::Mat tenths(metres.size(), CV_16SC1);
+  for (int row = 0; row < metres.rows; ++row) {
+    const float* in = metres.ptr<float>(row);
+    auto* out = tenths.ptr<std::int16_t>(row);
+    for (int column = 0; column < metres.cols; ++column) {
+      const float value = in[column] * kSteps_per_m;
+      out[column] = std::isnan(value)
+                        ? kNone
+                        : static_cast<std::int16_t>(std::lround(std::clamp(value, -kMost, kMost)));
+    }
+  }
+  return tenths;
+}
+
+/// Results of older versions have no picture of the region: what was compared in it stands for it.
+cv::Mat Region(const fs::path& result) {
+  const cv::Mat deviation = ReadFloatTiff(result / "deviation.tiff");
+  cv::Mat region(deviation.size(), CV_16SC1, cv::Scalar(kNone));
+  std::error_code ignored;
+  const bool has_picture = fs::exists(result / "region.png", ignored);
+  const cv::Mat mask = has_picture ? ReadColorImage(result / "region.png")
+                                   : ReadFloatTiff(result / "deviation_after.tiff");
+  if (mask.size() != deviation.size())
+    throw DataError("the region of this result has another size than its map");
+  for (int row = 0; row < mask.rows; ++row) {
+    for (int column = 0; column < mask.cols; ++column) {
+      const bool inside = has_picture ? mask.at<cv::Vec3b>(row, column)[0] != 0
+                                      : !std::isnan(mask.at<float>(row, column));
+      if (!inside) continue;
+      region.at<std::int16_t>(row, column) = std::isnan(deviation.at<float>(row, column)) ? 2 : 1;
+    }
+  }
+  return region;
+}
+
+/// The smallest part that holds every value; a cell where there is none.
+cv::Rect PartWithValues(const cv::Mat& map) {
+  int left = map.cols, right = -1, top = map.rows, bottom = -1;
+  for (int row = 0; row < map.rows; ++row) {
+    const auto* cells = map.ptr<std::int16_t>(row);
+    for (int column = 0; column < map.cols; ++column) {
+      if (cells[column] == kNone) continue;
+      left = std::min(left, column);
+      right = std::max(right, column);
+      top = std::min(top, row);
+      bottom = row;
+    }
+  }
+  return right < 0 ? cv::Rect(0, 0, 1, 1) : cv::Rect(left, top, right - left + 1, bottom - top + 1);
+}
+
+void Append(std::string& bytes, std::uint16_t value) {
+  bytes += static_cast<char>(value & 0xFFU);
+  bytes += static_cast<char>(value >> 8U);
+}
+
+std::string Packed(const cv::Mat& map) {
+  if (map.cols > 0xFFFF || map.rows > 0xFFFF) throw DataError("this map is too large");
+  const cv::Rect part = PartWithValues(map);
+  std::string bytes = "PLM1";
+  for (const int number : {map.cols, map.rows, part.x, part.y, part.width, part.height})
+    Append(bytes, static_cast<std::uint16_t>(number));
+  std::string differences;
+  differences.reserve(2 * static_cast<std::size_t>(part.area()));
+  for (int row = part.y; row < part.y + part.height; ++row) {
+    std::uint16_t before = 0;
+    for (int column = part.x; column < part.x + part.width; ++column) {
+      const auto cell = static_cast<std::uint16_t>(map.at<std::int16_t>(row, column));
+      Append(differences, static_cast<std::uint16_t>(cell - before));
+      before = cell;
+    }
+  }
+  uLongf size = compressBound(differences.size());
+  std::vector<Bytef> stream(size);
+  if (compress2(stream.data(), &size, reinterpret_cast<const Bytef*>(differences.data()),
+                differences.size(), 6) != Z_OK)
+    throw IoError("not enough memory to pack a map");
+  bytes.append(reinterpret_cast<const char*>(stream.data()), size);
+  return bytes;
+}
+
+}  // namespace
+
+std::string CompactMap(const fs::path& scan_folder, std::string_view name) {
+  if (name == "region") return Packed(Region(scan_folder / "result"));
+  if (name == "heightmap")
+    return Packed(Tenths(ReadFloatTiff(scan_folder / "scene/heightmap.tiff")));
+  if (name == "deviation" || name == "deviation_after")
+    return Packed(Tenths(ReadFloatTiff(scan_folder / fmt::format("result/{}.tiff", name))));
+  throw DataError(fmt::format("there is no map of that name: {}", name));
+}
+
+}  // namespace plumb

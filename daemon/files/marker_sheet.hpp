@@ -1,0 +1,69 @@
+// Printable sheets of markers at true size.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <opencv2/core/mat.hpp>
+
+#include "algo/types/marker_dictionary.hpp"
+
+namespace plumb {
+
+struct SheetOptions {
+  std::string dictionary = "DICT_6X6_250";
+  std::vector<int> ids;      ///< In the order in which they are drawn.
+  double length_m = 0.104;   ///< Side of the black square.
+  std::string paper = "A4";  ///< A4 or A3, upright.
+};
+
+/// Where one marker lies on its page: millimetres from the page's top left corner, y down.
+struct PlacedMarker {
+  int id = 0;
+  double left_mm = 0.0;  ///< Of the black square.
+  double top_mm = 0.0;
+};
+
+/// Pages of markers, each with its id, an arrow that points up in the print, a white margin of at
+/// least one cell, and on each page a ruler of 100 mm to check the printer's scale. Immutable.
+class MarkerSheet {
+ public:
+  /// @throws std::invalid_argument for an unknown dictionary or paper, ids that it has not, no ids
+  /// or more than 1000, or a marker that is
+  ///         larger than the paper; the message says what fits.
+  explicit MarkerSheet(const SheetOptions& options);
+
+  [[nodiscard]] int num_pages() const { return static_cast<int>(pages_.size()); }
+  [[nodiscard]] double width_mm() const { return width_mm_; }
+  [[nodiscard]] double height_mm() const { return height_mm_; }
+  [[nodiscard]] const std::vector<PlacedMarker>& markers(int page) const {
+    return pages_.at(static_cast<std::size_t>(page));
+  }
+
+  /// All pages as one PDF. @throws IoError
+  void WritePdf(const std::filesystem::path& file) const;
+  /// One page as SVG. @throws IoError
+  void WriteSvg(const std::filesystem::path& file, int page) const;
+  /// One page as picture, CV_8UC3.
+  [[nodiscard]] cv::Mat Rasterise(int page, double dots_per_inch) const;
+
+ private:
+  struct Canvas;
+  void Lay();
+  void Draw(const Canvas& canvas, int page) const;
+  void DrawMarker(const Canvas& canvas, const PlacedMarker& marker) const;
+  void DrawRuler(const Canvas& canvas, int page) const;
+
+  SheetOptions options_;
+  MarkerDictionary dictionary_;
+  double width_mm_ = 0.0;
+  double height_mm_ = 0.0;
+  std::vector<std::vector<PlacedMarker>> pages_;
+};
+
+/// "0-15,20" as numbers. @throws std::invalid_argument saying what is expected.
+[[nodiscard]] std::vector<int> ParseIds(std::string_view text);
+
+}  // namespace plumb

@@ -1,0 +1,37 @@
+// Whether the wall clock can be trusted for what is done by dates: boards without a battery start
+// in the past, and time servers set them right.
+#pragma once
+
+#include <chrono>
+
+namespace plumb {
+
+/// Watches the wall clock against the monotonic one. Belongs to one thread.
+class ClockWatch {
+ public:
+  using Wall = std::chrono::system_clock::time_point;
+  using Steady = std::chrono::steady_clock::time_point;
+
+  ClockWatch(Wall wall, Steady steady) : wall_(wall), steady_(steady) {}
+
+  /// A clock that has stepped since the last look is trusted from now on.
+  void Look(Wall wall, Steady steady) {
+    const auto gone =
+        std::chrono::duration_cast<std::chrono::milliseconds>((wall - wall_) - (steady - steady_));
+    if (std::chrono::abs(gone) > kStep) *this = ClockWatch(wall, steady);
+    last_ = steady;
+  }
+
+  /// For how long it has not stepped, as of the last look.
+  [[nodiscard]] std::chrono::steady_clock::duration held() const { return last_ - steady_; }
+
+ private:
+  static constexpr std::chrono::minutes kStep{
+      1};  // a clock that only drifts takes months for it, and is then trusted a little later
+
+  Wall wall_;
+  Steady steady_;
+  Steady last_ = steady_;
+};
+
+}  // namespace plumb

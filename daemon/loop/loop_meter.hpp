@@ -1,0 +1,98 @@
+// How long the event loop's callbacks take, and what they spend it on.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace plumb {
+
+/// Resources that a thread has used so far; only differences are meaningful.
+struct LoopClocks {
+  using Nanoseconds = std::chrono::nanoseconds;
+  std::function<Nanoseconds()> wall;
+  std::function<Nanoseconds()> cpu;     ///< Of the thread alone.
+  std::function<Nanoseconds()> queued;  ///< Ready to run, but without a processor.
+};
+
+/// For the calling thread; they belong to it. `queued` stands still where the kernel does not
+/// count it.
+[[nodiscard]] LoopClocks ClocksOfThisThread();
+
+/// One turn of the loop: a callback of a source, or one posted call.
+struct LoopTurn {
+  std::string what;  ///< "tick", or of a turn with parts also the one that took longest: "http: GET
+                     ///< /api/v1/scans".
+  std::chrono::nanoseconds wall{}, cpu{};
+  std::chrono::nanoseconds queued{};  ///< Of wall: waiting for a processor.
+  std::chrono::nanoseconds
+      blocked{};  ///< Of wall: what is left, that is waiting for a disk, a lock, a pipe.
+};
+
+/// All turns of one kind, or all parts of one name.
+struct LoopFigures {
+  std::int64_t count = 0;
+  std::int64_t over_limit = 0;  ///< In wall time.
+  std::int64_t cpu_over_limit =
+      0;  ///< In the thread's own processor time: our fault, however busy the machine is.
+  std::chrono::nanoseconds longest{}, longest_cpu{};
+};
+
+/// Measures each turn, in about a microsecond. Belongs to the loop's thread.
+class LoopMeter {
+ public:
+  static constexpr std::chrono::milliseconds kLimit{10};  ///< What no turn should take.
+  static constexpr std::chrono::minutes kTellEvery{1};
+  /// @param unsaid  Turns over the limit since the last call that were not logged.
+  using SlowListener = std::function<void(const LoopTurn& turn, std::int64_t unsaid)>;
+
+  explicit LoopMeter(LoopClocks clocks = ClocksOfThisThread()) : clocks_(std::move(clocks)) {}
+
+  /// A turn begins. @param what  A name from the program's text, never anything from outside: names
+  /// are kept.
+  void Begin(std::string_view what);
+  /// From now on the turn does this; empty: the rest of it. For turns that serve many; outside a
+  /// turn nothing happens.
+  void Part(std::string_view what);
+  void End();
+
+  /// Called at the end of a turn over the limit in wall time, at most once in kTellEvery.
+  void SetSlowListener(SlowListener listener) { slow_ = std::move(listener); }
+
+  [[nodiscard]] const LoopFigures& all() const { return all_; }
+  /// The turn that took longest, by wall time and by processor time. Nothing before the first turn.
+  [[nodiscard]] const std::optional<LoopTurn>& longest() const { return longest_; }
+  [[nodiscard]] const std::optional<LoopTurn>& longest_cpu() const { return longest_cpu_; }
+  /// By name of source or part; those of a turn with parts count what is between its parts.
+  [[nodiscard]] const std::map<std::string, LoopFigures, std::less<>>& by_name() const {
+    return by_name_;
+  }
+
+ private:
+  void ClosePart(std::chrono::nanoseconds wall, std::chrono::nanoseconds cpu);
+  void Count(std::string_view name, std::chrono::nanoseconds wall, std::chrono::nanoseconds cpu);
+  [[nodiscard]] LoopTurn Describe(std::chrono::nanoseconds wall,
+                                  std::chrono::nanoseconds cpu) const;
+  void TellSlow(const LoopTurn& turn, std::chrono::nanoseconds now);
+
+  LoopClocks clocks_;
+  SlowListener slow_;
+  std::string turn_;  ///< Empty: none runs.
+  std::chrono::nanoseconds wall_at_begin_{}, cpu_at_begin_{}, queued_at_begin_{};
+  std::string part_;  ///< Empty: between the parts.
+  std::chrono::nanoseconds wall_at_part_{}, cpu_at_part_{};
+  std::string longest_part_;
+  std::chrono::nanoseconds longest_part_wall_{};
+  LoopFigures all_;
+  std::optional<LoopTurn> longest_, longest_cpu_;
+  std::map<std::string, LoopFigures, std::less<>> by_name_;
+  std::optional<std::chrono::nanoseconds> told_at_;
+  std::int64_t unsaid_ = 0;
+};
+
+}  // namespace plumb

@@ -1,0 +1,34 @@
+// A thread that does one thing after the other: what may wait for a disk or a device and so does
+// not belong on the loop.
+#pragma once
+
+#include <functional>
+#include <stop_token>
+#include <thread>
+#include <utility>
+
+#include "daemon/loop/bounded_queue.hpp"
+
+namespace plumb {
+
+/// Destroyed, it finishes what was posted. Work must not throw.
+class WorkThread {
+ public:
+  explicit WorkThread(std::size_t capacity) : queue_(capacity), thread_([this] { Run(); }) {}
+  ~WorkThread() { queue_.Close(); }
+  WorkThread(const WorkThread&) = delete;
+  WorkThread& operator=(const WorkThread&) = delete;
+
+  /// False if too much is waiting already: the work is then not done. Thread-safe, does not wait.
+  [[nodiscard]] bool Post(std::function<void()> work) { return queue_.TryPush(std::move(work)); }
+
+ private:
+  void Run() {
+    while (const std::optional<std::function<void()>> work = queue_.Pop()) (*work)();
+  }
+
+  BoundedQueue<std::function<void()>> queue_;
+  std::jthread thread_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,53 @@
+// Live frames on their way from the sensor thread to the tracking thread.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "daemon/loop/bounded_queue.hpp"
+#include "daemon/pipeline/scan_runner.hpp"
+
+namespace plumb {
+
+/// A bounded queue that drops its oldest frame when tracking is late. All functions are
+/// thread-safe.
+class LiveFeed : public FrameFeed {
+ public:
+  explicit LiveFeed(std::size_t capacity) : queue_(capacity) {}
+
+  /// Sensor thread: hands a frame over, never waits.
+  void Push(Frame frame) {
+    const std::lock_guard lock(mutex_);
+    if (closed_) return;  // came after the sweep's end: no part of it, and no loss
+    last_frame_s_ = SteadySeconds();
+    dropped_ += queue_.PushDroppingOldest(std::move(frame));
+    ++num_pushed_;
+  }
+  /// No frames come any more; what waits is still handed out.
+  void Close() {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    queue_.Close();
+  }
+
+  [[nodiscard]] std::int64_t num_pushed() const { return num_pushed_; }
+
+  std::optional<Frame> Next(const std::stop_token& stop) override { return queue_.Pop(stop); }
+  int TakeDropped() override { return dropped_.exchange(0); }
+  void Finish() override {}
+  [[nodiscard]] std::optional<double> last_frame_s() const override { return last_frame_s_; }
+
+ private:
+  BoundedQueue<Frame> queue_;
+  std::mutex mutex_;  // of pushing and closing
+  bool closed_ = false;
+  std::atomic<int> dropped_ = 0;
+  std::atomic<std::int64_t> num_pushed_ = 0;
+  std::atomic<double> last_frame_s_ = 0.0;
+};
+
+}  // namespace plumb

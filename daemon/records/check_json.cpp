@@ -1,0 +1,92 @@
+#include "daemon/records/check_json.hpp"
+
+#include <charconv>
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+namespace plumb {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::optional<SceneMarker> MarkerIn(const Json& json) {
+  SceneMarker marker;
+  const Json corners = json.value("corners_m", Json());
+  if (!corners.is_array() || corners.size() != marker.corners.size()) return std::nullopt;
+  for (std::size_t i = 0; i < marker.corners.size(); ++i) {
+    if (!corners[i].is_array() || corners[i].size() != 3) return std::nullopt;
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!corners[i][k].is_number()) return std::nullopt;
+      marker.corners[i][static_cast<Eigen::Index>(k)] = corners[i][k].get<double>();
+    }
+  }
+  marker.num_views = json.value("views", 0);
+  marker.sigma_m = json.value("sigma_m", marker.sigma_m);
+  return marker;
+}
+
+}  // namespace
+
+std::string CheckJson(const MarkerCheck& check, const MarkerBaseline& seen) {
+  Json json = {
+      {"status", Name(check.status)}, {"reasons", check.reasons}, {"items", Json::array()}};
+  for (const MarkerCheckItem& item : check.items) {
+    json["items"].push_back(
+        Json{{"name", item.name},
+             {"value", std::isfinite(item.value) ? Json(item.value) : Json(nullptr)},
+             {"limit", item.limit},
+             {"unit", item.unit},
+             {"passed", item.passed},
+             {"note", item.note}});
+  }
+  json["dictionary"] = seen.dictionary;
+  json["marker_length_m"] = seen.marker_length_m;
+  json["markers"] = Json::object();
+  for (const auto& [id, marker] : seen.markers) {
+    Json corners = Json::array();
+    for (const Eigen::Vector3d& p : marker.corners) corners.push_back({p.x(), p.y(), p.z()});
+    json["markers"][std::to_string(id)] = {
+        {"corners_m", corners}, {"views", marker.num_views}, {"sigma_m", marker.sigma_m}};
+  }
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::optional<MarkerBaseline> BaselineIn(const std::string& check_json) {
+  const Json json = Json::parse(check_json, nullptr, /*allow_exceptions=*/false);
+  if (!json.is_object() || !json.value("markers", Json()).is_object() || json["markers"].empty())
+    return std::nullopt;
+  MarkerBaseline baseline{
+      {}, json.value("dictionary", std::string()), json.value("marker_length_m", 0.0)};
+  for (const auto& [name, value] : json["markers"].items()) {
+    int id = -1;
+    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), id);
+    const auto marker = MarkerIn(value);
+    if (error != std::errc() || end != name.data() + name.size() || id < 0 || !marker)
+      return std::nullopt;
+    baseline.markers.emplace(id, *marker);
+  }
+  return baseline;
+}
+
+web::CheckRecord CheckIn(const std::string& check_json) {
+  web::CheckRecord record;
+  const Json json = Json::parse(check_json, nullptr, /*allow_exceptions=*/false);
+  if (!json.is_object()) return record;
+  record.status = json.value("status", record.status);
+  record.reasons = json.value("reasons", record.reasons);
+  record.num_markers = json.value("markers", Json::object()).size();
+  for (const Json& item : json.value("items", Json::array())) {
+    const Json value = item.value("value", Json());
+    record.items.push_back(
+        {.name = item.value("name", std::string()),
+         .value = value.is_number() ? std::optional(value.get<double>()) : std::nullopt,
+         .limit = item.value("limit", 0.0),
+         .unit = item.value("unit", std::string()),
+         .passed = item.value("passed", false),
+         .note = item.value("note", std::string())});
+  }
+  return record;
+}
+
+}  // namespace plumb

@@ -1,0 +1,22 @@
+// The daily check as the store keeps it.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "algo/comparison/marker_check.hpp"
+#include "web/service/service_types.hpp"
+
+namespace plumb {
+
+/// A check with the markers that it saw: the next baseline may be made of them.
+[[nodiscard]] std::string CheckJson(const MarkerCheck& check, const MarkerBaseline& seen);
+
+/// The markers in such a text; nothing if it is none.
+[[nodiscard]] std::optional<MarkerBaseline> BaselineIn(const std::string& check_json);
+
+/// What the page shows of it; id, time, user and sensor are left to the caller. What cannot be read
+/// is left out: the text is our own.
+[[nodiscard]] web::CheckRecord CheckIn(const std::string& check_json);
+
+}  // namespace plumb

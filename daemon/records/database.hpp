@@ -1,0 +1,124 @@
+// SQLite, as far as the store needs it: statements, transactions, and errors that say what to do.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "algo/base/errors.hpp"
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace plumb {
+
+/// The file is no database, or a damaged one.
+class DatabaseCorrupt : public IoError {
+ public:
+  using IoError::IoError;
+};
+
+/// The disk is full or may not be written.
+class DiskRefused : public IoError {
+ public:
+  using IoError::IoError;
+};
+
+/// A rule of the tables was broken: a name taken, an approved row changed.
+class ConstraintBroken : public IoError {
+ public:
+  using IoError::IoError;
+};
+
+class Database;
+
+/// One statement, bound and stepped; returned to the database's cache when it goes. Parameters and
+/// columns count from 0.
+class Statement {
+ public:
+  ~Statement();
+  Statement(Statement&& other) noexcept;
+  Statement& operator=(Statement&&) = delete;
+
+  Statement& Bind(std::int64_t value);
+  Statement& Bind(double value);
+  Statement& Bind(std::string_view value);
+  Statement& BindNull();
+  template <typename T>
+  Statement& Bind(const std::optional<T>& value) {
+    return value ? Bind(*value) : BindNull();
+  }
+
+  /// True if there is a (further) row. @throws IoError and its kinds
+  bool Step();
+  /// Steps to the end.
+  void Run();
+
+  [[nodiscard]] bool IsNull(int column) const;
+  [[nodiscard]] std::int64_t Integer(int column) const;
+  [[nodiscard]] double Real(int column) const;
+  [[nodiscard]] std::string Text(int column) const;
+
+ private:
+  friend class Database;
+  Statement(Database& database, const char* key, sqlite3_stmt* statement)
+      : database_(&database), key_(key), statement_(statement) {}
+  Database* database_;
+  const char* key_;
+  sqlite3_stmt* statement_;
+  int next_ = 1;
+};
+
+/// One connection; belongs to one thread at a time. Write-ahead log, foreign keys on, commits are
+/// on the disk when they return. The file belongs to one process at a time: what connections share
+/// is in its memory and not in a mapped file, whose disk may become read-only.
+class Database {
+ public:
+  enum class Access {
+    kReadWrite,
+    kReadOnly,  ///< Beside one that writes.
+    kFrozen,    ///< On a disk that cannot be written by anybody.
+  };
+  /// @throws IoError and its kinds.
+  Database(const std::filesystem::path& file, Access access);
+  ~Database();
+  Database(const Database&) = delete;
+  Database& operator=(const Database&) = delete;
+
+  /// Runs one or more statements without parameters.
+  void Execute(const std::string& sql);
+  /// Prepared once, kept for the next call. The text must be a literal: the cache only grows.
+  [[nodiscard]] Statement Prepare(const char* sql);
+  [[nodiscard]] std::int64_t last_id() const;
+  [[nodiscard]] int num_changed() const;
+  /// @throws DatabaseCorrupt naming what SQLite found.
+  void CheckIntegrity();
+
+ private:
+  friend class Statement;
+  [[noreturn]] void Fail(int code, const char* doing) const;
+
+  std::filesystem::path file_;
+  sqlite3* handle_ = nullptr;
+  std::map<const char*, sqlite3_stmt*> idle_;
+};
+
+/// Rolled back unless Commit() was called. Takes the write lock at once.
+class Transaction {
+ public:
+  explicit Transaction(Database& database);
+  ~Transaction();
+  Transaction(const Transaction&) = delete;
+  Transaction& operator=(const Transaction&) = delete;
+  void Commit();
+
+ private:
+  Database& database_;
+  bool open_ = true;
+};
+
+}  // namespace plumb

@@ -1,0 +1,157 @@
+#include "daemon/records/schema.hpp"
+
+#include <array>
+
+#include <fmt/format.h>
+
+namespace plumb {
+namespace {
+
+// Times are microseconds since 1970, UTC. Order comes from ids, which only count up: clocks step.
+constexpr const char* kVersion1 = R"sql(
+CREATE TABLE patients (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  code TEXT NOT NULL UNIQUE,
+  site TEXT NOT NULL,
+  created_at INTEGER NOT NULL,
+  wiping INTEGER NOT NULL DEFAULT 0
+) STRICT;
+CREATE TABLE scans (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  patient_id INTEGER NOT NULL REFERENCES patients(id) ON DELETE CASCADE,
+  reference_id INTEGER REFERENCES refs(id) ON DELETE SET NULL,
+  purpose TEXT NOT NULL CHECK (purpose IN ('fraction', 'reference', 'daily_check')),
+  outcome TEXT NOT NULL CHECK (outcome IN ('running', 'done', 'cancelled', 'failed')),
+  failure TEXT NOT NULL DEFAULT '',
+  started_at INTEGER NOT NULL,
+  finished_at INTEGER,
+  sensor_serial TEXT NOT NULL,
+  swept_area_m2 REAL NOT NULL DEFAULT 0,
+  reason TEXT NOT NULL DEFAULT '',
+  accepted_by TEXT NOT NULL DEFAULT '',
+  has_folder INTEGER NOT NULL DEFAULT 0
+) STRICT;
+CREATE INDEX scans_of_patient ON scans(patient_id, id);
+CREATE TABLE results (
+  scan_id INTEGER PRIMARY KEY REFERENCES scans(id) ON DELETE CASCADE,
+  json TEXT NOT NULL
+) STRICT;
+CREATE TABLE refs (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  patient_id INTEGER NOT NULL REFERENCES patients(id) ON DELETE CASCADE,
+  version INTEGER NOT NULL,
+  scan_id INTEGER NOT NULL REFERENCES scans(id),
+  created_at INTEGER NOT NULL,
+  created_by TEXT NOT NULL,
+  planned_by TEXT NOT NULL,
+  reason TEXT NOT NULL,
+  plan TEXT NOT NULL,
+  approved_by TEXT NOT NULL DEFAULT '',
+  approved_at INTEGER,
+  UNIQUE (patient_id, version)
+) STRICT;
+CREATE TRIGGER refs_immutable BEFORE UPDATE ON refs WHEN OLD.approved_by <> ''
+  BEGIN SELECT RAISE(ABORT, 'an approved reference is never changed'); END;
+CREATE TRIGGER refs_stay BEFORE DELETE ON refs
+  WHEN OLD.approved_by <> '' AND EXISTS (SELECT 1 FROM patients WHERE id = OLD.patient_id AND wiping = 0)
+  BEGIN SELECT RAISE(ABORT, 'an approved reference goes only with its patient'); END;
+CREATE TABLE users (
+  name TEXT PRIMARY KEY,
+  role TEXT NOT NULL CHECK (role IN ('technician', 'physicist', 'engineer')),
+  password_hash TEXT NOT NULL,
+  disabled INTEGER NOT NULL DEFAULT 0,
+  created_at INTEGER NOT NULL
+) STRICT;
+CREATE TABLE audit (
+  number INTEGER PRIMARY KEY AUTOINCREMENT,
+  time INTEGER NOT NULL,
+  user TEXT NOT NULL,
+  address TEXT NOT NULL,
+  action TEXT NOT NULL,
+  subject TEXT NOT NULL,
+  detail TEXT NOT NULL
+) STRICT;
+CREATE TRIGGER audit_no_update BEFORE UPDATE ON audit BEGIN SELECT RAISE(ABORT, 'the audit log is append-only'); END;
+CREATE TRIGGER audit_no_delete BEFORE DELETE ON audit BEGIN SELECT RAISE(ABORT, 'the audit log is append-only'); END;
+CREATE TABLE settings (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
+)sql";
+
+// The daily check, and which one the others are compared with. Neither is ever changed.
+constexpr const char* kVersion2 = R"sql(
+CREATE TABLE checks (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  time INTEGER NOT NULL,
+  user TEXT NOT NULL,
+  sensor_serial TEXT NOT NULL,
+  status TEXT NOT NULL CHECK (status IN ('passed', 'failed', 'no_baseline')),
+  json TEXT NOT NULL
+) STRICT;
+CREATE INDEX checks_by_time ON checks(status, time);
+CREATE TABLE check_baselines (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  check_id INTEGER NOT NULL REFERENCES checks(id),
+  set_at INTEGER NOT NULL,
+  set_by TEXT NOT NULL
+) STRICT;
+CREATE TRIGGER checks_no_update BEFORE UPDATE ON checks BEGIN SELECT RAISE(ABORT, 'checks are append-only'); END;
+CREATE TRIGGER checks_no_delete BEFORE DELETE ON checks BEGIN SELECT RAISE(ABORT, 'checks are append-only'); END;
+)sql";
+
+// Who approves a plan says which one was read.
+constexpr const char* kVersion3 =
+    "ALTER TABLE refs ADD COLUMN revision INTEGER NOT NULL DEFAULT 1;";
+
+// Treatment sessions, what was known when a scan began and why it was accepted, and paired screens.
+// Scans without a session belong to patient 0, whose number and code no request can name.
+constexpr const char* kVersion4 = R"sql(
+CREATE TABLE sessions (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  patient_id INTEGER NOT NULL REFERENCES patients(id) ON DELETE CASCADE,
+  purpose TEXT NOT NULL CHECK (purpose IN ('fraction', 'reference')),
+  fraction INTEGER NOT NULL DEFAULT 0,
+  opened_at INTEGER NOT NULL,
+  opened_by TEXT NOT NULL,
+  closed_at INTEGER,
+  closed_by TEXT NOT NULL DEFAULT ''
+) STRICT;
+CREATE INDEX sessions_of_patient ON sessions(patient_id, id);
+ALTER TABLE scans ADD COLUMN session_id INTEGER REFERENCES sessions(id) ON DELETE SET NULL;
+CREATE INDEX scans_of_session ON scans(session_id);
+ALTER TABLE scans ADD COLUMN accepted_reason TEXT NOT NULL DEFAULT '';
+ALTER TABLE scans ADD COLUMN sensor_on_s REAL;
+ALTER TABLE scans ADD COLUMN check_overdue INTEGER NOT NULL DEFAULT 0;
+INSERT INTO patients (id, code, site, created_at) VALUES (0, '(unassigned)', '', 0);
+CREATE TABLE displays (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  name TEXT NOT NULL,
+  token_hash TEXT NOT NULL UNIQUE,
+  paired_at INTEGER NOT NULL,
+  paired_by TEXT NOT NULL
+) STRICT;
+)sql";
+
+constexpr std::array<const char*, kSchemaVersion> kSteps = {kVersion1, kVersion2, kVersion3,
+                                                            kVersion4};
+
+}  // namespace
+
+void Migrate(Database& database) {
+  int version = 0;
+  {
+    Statement query = database.Prepare("PRAGMA user_version");
+    if (query.Step()) version = static_cast<int>(query.Integer(0));
+  }
+  if (version < 0 || version > kSchemaVersion) {
+    throw DatabaseCorrupt(fmt::format(
+        "the database has version {}, this Plumb knows up to {}: install the newer Plumb again",
+        version, kSchemaVersion));
+  }
+  for (; version < kSchemaVersion; ++version) {
+    Transaction transaction(database);
+    database.Execute(kSteps[static_cast<std::size_t>(version)]);
+    database.Execute(fmt::format("PRAGMA user_version = {}", version + 1));
+    transaction.Commit();
+  }
+}
+
+}  // namespace plumb

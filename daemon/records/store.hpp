@@ -1,0 +1,194 @@
+// What the appliance keeps: patients, references, scans, results, accounts, the audit log. SQLite
+// beside folders of files.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "daemon/records/database.hpp"
+#include "web/service/scan_service.hpp"
+
+namespace plumb {
+
+/// A change that the store does not make, and why; for the person who asked.
+class StoreRefusal : public std::runtime_error {
+ public:
+  StoreRefusal(web::ChangeResult result, const std::string& message)
+      : std::runtime_error(message), result_(result) {}
+  [[nodiscard]] web::ChangeResult result() const { return result_; }
+
+ private:
+  web::ChangeResult result_;
+};
+
+/// What a start found after a crash, and put right.
+struct RecoveryReport {
+  int interrupted_scans = 0;  ///< Had begun and not ended: failed now.
+  int orphaned_folders = 0;   ///< Of no finished scan: removed.
+  int foreign_folders =
+      0;               ///< Of scans that this database has never numbered: moved to DIR/set-aside.
+  int lost_scans = 0;  ///< Finished, but their files are gone: marked.
+  int broken_references = 0;  ///< Approved, but their scene is gone: to be told loudly.
+};
+
+/// What a scan begins with.
+struct NewScan {
+  std::string patient_id;
+  std::string reference_id;  ///< Empty: none.
+  web::ScanPurpose purpose = web::ScanPurpose::kFraction;
+  std::string sensor_serial;
+  std::string reason;           ///< Why a new reference is taken.
+  std::string session_id = {};  ///< Empty: none is open.
+  std::optional<double> sensor_on_s = {};
+  bool check_overdue = false;
+};
+
+/// How it ended.
+struct FinishedScan {
+  web::ScanOutcome outcome = web::ScanOutcome::kFailed;
+  std::string failure;
+  std::string result_json;  ///< Empty: nothing was compared.
+  double swept_area_m2 = 0.0;
+};
+
+/// DIR/plumb.db and DIR/scans/ID/. A scan's files are made in a hidden staging folder and appear
+/// under their id in one step; its row says `done` only after that, so a crash at any point leaves
+/// either a whole scan or none. Changes and their audit entries are one transaction.
+///
+/// Thread-safe: changes take turns; reads of single rows and lists have a connection each: they
+/// never wait for the disk writes of a change, nor a row for a list. Changes throw StoreRefusal,
+/// and IoError with its kinds when the disk or the database fails.
+class Store {
+ public:
+  /// Opens or makes the store, checks and migrates the database, recovers from a crash.
+  /// @throws IoError and its kinds: DatabaseCorrupt, DiskRefused.
+  explicit Store(const std::filesystem::path& folder);
+  /// What can be read of a store on a disk that cannot be written: nothing is checked, put right or
+  /// changed; every change throws DiskRefused.
+  /// @throws IoError and its kinds.
+  [[nodiscard]] static std::unique_ptr<Store> OpenReadable(const std::filesystem::path& folder);
+  /// Tries to write beside the database. @throws DiskRefused saying why that fails, unless the disk
+  /// is only full.
+  void CheckWritable() const;
+
+  [[nodiscard]] const RecoveryReport& recovery() const { return recovery_; }
+  [[nodiscard]] std::filesystem::path ScanFolder(const std::string& scan_id) const;
+
+  // --- patients
+  [[nodiscard]] std::vector<web::Patient> Patients();
+  [[nodiscard]] std::optional<web::Patient> FindPatient(const std::string& id);
+  [[nodiscard]] std::optional<web::Patient> FindPatientByCode(const std::string& code);
+  std::string AddPatient(const web::Actor& actor, const std::string& code, const std::string& site);
+  void WipePatient(const web::Actor& actor, const std::string& id);
+
+  // --- treatment sessions, screens in the room
+  /// Ends the one that is open, if any. Gives the id.
+  std::string OpenSession(const web::Actor& actor, const std::string& patient_id,
+                          web::ScanPurpose purpose);
+  /// All that are open.
+  void CloseSessions(const web::Actor& actor);
+  [[nodiscard]] std::optional<web::TreatmentSession> OpenedSession();
+  [[nodiscard]] std::vector<web::Display> Displays();
+  std::string AddDisplay(const web::Actor& actor, const web::Display& display);
+  void RemoveDisplay(const web::Actor& actor, const std::string& id);
+
+  // --- references
+  /// Drafts that are newer than the approved version of their patient; at most 20.
+  [[nodiscard]] std::vector<web::WaitingReference> WaitingReferences();
+  [[nodiscard]] std::vector<web::Reference> References(const std::string& patient_id);
+  [[nodiscard]] std::optional<web::Reference> FindReference(const std::string& id);
+  [[nodiscard]] std::optional<web::Reference> ApprovedReference(const std::string& patient_id);
+  std::string AddReference(const web::Actor& actor, const std::string& scan_id,
+                           const std::string& reason, const web::ReferencePlan& plan);
+  /// @param revision  That was read; another one has been saved since: kConflict.
+  std::string PlanReference(const web::Actor& actor, const std::string& id, int revision,
+                            const web::ReferencePlan& plan);
+  /// @param digest  Of what was read and is signed; another one is stored: kConflict. Empty: not
+  /// looked at.
+  /// @param two_users  The approver must be another than who made or planned it; false only for the
+  /// demo's "auto".
+  void ApproveReference(const web::Actor& actor, const std::string& id, int revision,
+                        const std::string& digest = {}, bool two_users = true);
+
+  // --- scans
+  [[nodiscard]] std::vector<web::Scan> Scans(const std::string& patient_id, int limit);
+  [[nodiscard]] std::optional<web::Scan> FindScan(const std::string& id);
+  [[nodiscard]] int ScansSince(const std::string& patient_id, web::WallClock::time_point since);
+  /// Surface seen by a scan's sweep; 0 unknown.
+  [[nodiscard]] double SweptArea(const std::string& scan_id);
+  /// A row that says `running`, and an empty staging folder. Gives the id.
+  std::string BeginScan(const NewScan& scan);
+  [[nodiscard]] std::filesystem::path StagingFolder(const std::string& scan_id) const;
+  /// kDone: the staging folder becomes the scan's. Else it is removed.
+  void FinishScan(const std::string& scan_id, const FinishedScan& finished);
+  /// Verdict, numbers and reason go into the log. kConflict where a newer scan of the patient is
+  /// done or runs, and for a result that is not in tolerance without a reason.
+  void AcceptScan(const web::Actor& actor, const std::string& id, const std::string& reason = {});
+  /// Removes scans older than so many days (0: none) but those that references are made of. Gives
+  /// how many. Their age is by the wall clock: call it while that can be trusted.
+  int RemoveOldScans(int retention_days, const std::stop_token& stop = {});
+  /// Removes the oldest recordings, then the oldest scans as above, until the scans take at most so
+  /// many bytes. Gives how many scans lost something.
+  int KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop = {});
+
+  // --- daily check
+  /// @param check_json  Of CheckJson(). Gives the id.
+  std::string AddCheck(const web::Actor& actor, const std::string& sensor_serial,
+                       const std::string& check_json);
+  [[nodiscard]] std::vector<web::CheckRecord> Checks(int limit);  ///< Newest first.
+  [[nodiscard]] std::optional<web::CheckRecord> LastCheck();
+  /// Not in the future. @param sensor_serial  Of the unit that is to be checked; empty: any.
+  [[nodiscard]] bool HasPassedCheckSince(web::WallClock::time_point since,
+                                         const std::string& sensor_serial = {});
+  [[nodiscard]] std::optional<web::CheckBaseline> CheckBaseline();
+  [[nodiscard]] std::string
+  CheckBaselineJson();  ///< Of the check that is the baseline; empty: none.
+  void SetCheckBaseline(const web::Actor& actor, const std::string& check_id);
+
+  // --- accounts, log, settings
+  [[nodiscard]] std::vector<web::User> Users();
+  [[nodiscard]] std::optional<web::User> FindUser(const std::string& name);
+  void AddUser(const web::Actor& actor, const web::User& user);
+  void ChangeUser(const web::Actor& actor, const web::UserChange& change);
+  void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
+           const std::string& detail);
+  [[nodiscard]] std::vector<web::AuditEntry> Audit(std::int64_t before, int limit);
+  [[nodiscard]] web::Settings GetSettings();
+  void ChangeSettings(const web::Actor& actor, const web::Settings& settings);
+
+ private:
+  Store() = default;
+  void Recover();
+  void FailInterrupted();
+  void RefuseScansOfAnother();
+  void CollectOrphans();
+  void SetAside(const std::filesystem::path& folder);
+  [[nodiscard]] std::vector<std::filesystem::path> ScanFolders()
+      const;  ///< Those of numbers, and staging.
+  void CloseOpenSessions(const web::Actor& actor);
+  void NoteEnd(const std::string& scan_id, const FinishedScan& finished);
+  void Write(const web::Actor& actor, const std::string& action, const std::string& subject,
+             const std::string& detail);
+  void RemoveScanFiles(const std::string& scan_id);
+  [[nodiscard]] static std::vector<std::string> ScansOf(Statement query);
+  bool ForgetScan(const std::string& scan_id);  ///< False if it has become a reference.
+
+  std::filesystem::path folder_;
+  std::mutex write_mutex_;
+  std::unique_ptr<Database> write_;
+  std::optional<std::int64_t> running_;  ///< Scan that has begun and not ended.
+  std::mutex read_mutex_;
+  std::unique_ptr<Database> read_;  ///< Single rows, for the loop too.
+  std::mutex list_mutex_;
+  std::unique_ptr<Database> list_;  ///< Lists, which may take their time.
+  RecoveryReport recovery_;
+};
+
+}  // namespace plumb

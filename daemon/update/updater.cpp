@@ -1,0 +1,504 @@
+#include "daemon/update/updater.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/epoll.h>
+#include <sys/stat.h>
+#include <systemd/sd-bus.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstring>
+#include <ctime>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "daemon/loop/log.hpp"
+
+namespace plumb {
+
+using web::ChangeResult;
+
+namespace {
+
+constexpr const char* kService = "de.pengutronix.rauc";
+constexpr const char* kPath = "/";
+constexpr const char* kInstaller = "de.pengutronix.rauc.Installer";
+constexpr const char* kProperties = "org.freedesktop.DBus.Properties";
+constexpr auto kLookAgain = std::chrono::seconds(5);
+constexpr std::uint64_t kCallTimeout_us =
+    60'000'000;  // RAUC reads the whole bundle before it answers
+constexpr std::size_t kMaxListed = 32;
+constexpr std::size_t kMaxKept = 4;
+constexpr std::string_view kEnding = ".raucb";
+constexpr std::size_t kMaxText = 500;
+
+/// A bundle ends with its signature and, in eight bytes, that one's size; it begins as a squashfs.
+constexpr std::string_view kSquashfs = "hsqs";
+constexpr std::uint64_t kMaxSignature = 64 << 10;
+constexpr std::uint64_t kLeastBundle = 4096;
+
+web::Change Refused(ChangeResult result, std::string message) {
+  return {.result = result, .message = std::move(message), .id = {}, .file = {}};
+}
+
+/// Keeps a file's contents until its destruction, so that taking its name away is quick.
+class Keep {
+ public:
+  Keep(const std::filesystem::path& file, const std::function<void(int)>& close_aside)
+      : close_aside_(close_aside),
+        fd_(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK)) {}
+  ~Keep() {
+    if (fd_ < 0) return;
+    if (close_aside_) {
+      close_aside_(fd_);
+    } else {
+      ::close(fd_);
+    }
+  }
+  Keep(const Keep&) = delete;
+  Keep& operator=(const Keep&) = delete;
+
+ private:
+  const std::function<void(int)>& close_aside_;
+  int fd_;
+};
+
+/// What a service says is shown to people: bounded, and without what is no text.
+std::string Shown(const char* text) {
+  std::string shown(text != nullptr ? text : "");
+  if (shown.size() > kMaxText) shown.resize(kMaxText);
+  std::replace_if(
+      shown.begin(), shown.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }, ' ');
+  return shown;
+}
+
+}  // namespace
+
+struct Updater::Impl {
+  Impl(EventLoop& on, UpdaterOptions given) : loop(on), options(std::move(given)) {
+    timer = loop.MakeTimer("bus", [this] { Process(); });
+    RemoveBroken();
+    Connect();
+  }
+  ~Impl() { Disconnect(); }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  EventLoop& loop;
+  UpdaterOptions options;
+  sd_bus* bus = nullptr;
+  EventLoop::Source source, timer;
+  std::chrono::steady_clock::time_point looked_at;
+  bool is_there = false;
+  bool is_installing = false;
+  std::string slot, step, last_error, outcome;
+  double fraction = 0.0;
+  std::string bundle;
+  web::Done done;
+
+  /// What was being sent when the power went.
+  void RemoveBroken() const {
+    std::error_code error;
+    std::vector<std::filesystem::path> broken;
+    for (std::filesystem::directory_iterator entry(options.folder, error), end;
+         !error && entry != end; entry.increment(error)) {
+      if (entry->path().filename().string().starts_with(".upload-"))
+        broken.push_back(entry->path());
+    }
+    for (const std::filesystem::path& file : broken) std::filesystem::remove(file, error);
+  }
+
+  void Disconnect() {
+    source = {};
+    timer.Disarm();
+    is_there = false;
+    if (bus != nullptr) sd_bus_close_unref(std::exchange(bus, nullptr));
+  }
+
+  void Connect() {
+    looked_at = std::chrono::steady_clock::now();
+    int result = 0;
+    if (options.bus_address.empty()) {
+      result = sd_bus_open_system(&bus);
+    } else {
+      result = sd_bus_new(&bus);
+      if (result >= 0) result = sd_bus_set_address(bus, options.bus_address.c_str());
+      if (result >= 0) result = sd_bus_set_bus_client(bus, 1);
+      if (result >= 0) result = sd_bus_start(bus);
+    }
+    if (result < 0) return Disconnect();  // no bus on this machine
+    sd_bus_set_method_call_timeout(bus, kCallTimeout_us);
+    sd_bus_match_signal_async(bus, nullptr, kService, kPath, kProperties, "PropertiesChanged",
+                              &Impl::OnChanged, nullptr, this);
+    sd_bus_match_signal_async(bus, nullptr, kService, kPath, kInstaller, "Completed",
+                              &Impl::OnCompleted, nullptr, this);
+    const std::string owner = fmt::format(
+        "type='signal',sender='{0}',path='/org/freedesktop/DBus',interface='{0}',"
+        "member='NameOwnerChanged',arg0='{1}'",
+        "org.freedesktop.DBus", kService);
+    sd_bus_add_match_async(bus, nullptr, owner.c_str(), &Impl::OnOwner, nullptr, this);
+    source = loop.WatchDescriptor("bus", sd_bus_get_fd(bus), EPOLLIN,
+                                  [this](std::uint32_t) { Process(); });
+    Look();
+    Process();
+  }
+
+  void Look() {
+    looked_at = std::chrono::steady_clock::now();
+    sd_bus_call_method_async(bus, nullptr, kService, kPath, kProperties, "GetAll",
+                             &Impl::OnProperties, this, "s", kInstaller);
+  }
+
+  void Process() {
+    while (bus != nullptr) {
+      const int result = sd_bus_process(bus, nullptr);
+      if (result == 0) break;
+      if (result < 0) {
+        if (is_installing)
+          End("the connection to the installer broke: look at its log, then try again");
+        Disconnect();
+        return Tell();
+      }
+    }
+    if (bus == nullptr) return;
+    const int events = sd_bus_get_events(bus);
+    if (events >= 0)
+      source.SetEvents(((events & POLLIN) != 0 ? EPOLLIN : 0U) |
+                       ((events & POLLOUT) != 0 ? EPOLLOUT : 0U));
+    std::uint64_t until_us = UINT64_MAX;
+    if (sd_bus_get_timeout(bus, &until_us) >= 0 && until_us != UINT64_MAX) {
+      timer.ArmAt(EventLoop::Clock::time_point(
+          std::chrono::microseconds(until_us)));  // both count the monotonic clock
+    } else {
+      timer.Disarm();
+    }
+  }
+
+  void Tell() const {
+    if (options.changed) options.changed();
+  }
+
+  void Answer(web::Change change) {
+    if (auto asked = std::exchange(done, nullptr)) asked(change);
+  }
+
+  void End(const std::string& failure) {
+    is_installing = false;
+    fraction = failure.empty() ? 1.0 : 0.0;
+    outcome = failure.empty()
+                  ? fmt::format("{} is installed: restart the appliance to use it", bundle)
+                  : fmt::format("{} was not installed: {}", bundle, failure);
+    Log(failure.empty() ? LogLevel::kNotice : LogLevel::kError, outcome);
+    if (options.ended) options.ended(bundle, failure);
+    Tell();
+  }
+
+  /// Name and value of one property; what is not known is skipped.
+  void ReadProperty(sd_bus_message* message) {
+    const char* name = nullptr;
+    if (sd_bus_message_read_basic(message, 's', &name) < 0) return;
+    const std::string key = name;
+    const char* text = nullptr;
+    if (key == "Progress") {
+      std::int32_t percent = 0, depth = 0;
+      if (sd_bus_message_read(message, "v", "(isi)", &percent, &text, &depth) < 0) return;
+      fraction = std::clamp(percent, 0, 100) / 100.0;
+      step = Shown(text);
+    } else if (key == "BootSlot" || key == "LastError" || key == "Operation") {
+      if (sd_bus_message_read(message, "v", "s", &text) < 0) return;
+      if (key == "BootSlot") slot = Shown(text);
+      if (key == "LastError") last_error = Shown(text);
+    } else {
+      sd_bus_message_skip(message, "v");
+    }
+  }
+
+  void ReadProperties(sd_bus_message* message) {
+    if (sd_bus_message_enter_container(message, 'a', "{sv}") < 0) return;
+    while (sd_bus_message_enter_container(message, 'e', "sv") > 0) {
+      ReadProperty(message);
+      if (sd_bus_message_exit_container(message) < 0) return;
+    }
+    sd_bus_message_exit_container(message);
+  }
+
+  static int OnProperties(sd_bus_message* message, void* self, sd_bus_error*) {
+    auto* impl = static_cast<Impl*>(self);
+    const bool was_there = impl->is_there;
+    impl->is_there = sd_bus_message_is_method_error(message, nullptr) == 0;
+    if (impl->is_there) impl->ReadProperties(message);
+    if (impl->is_there != was_there) impl->Tell();
+    return 0;
+  }
+
+  static int OnChanged(sd_bus_message* message, void* self, sd_bus_error*) {
+    auto* impl = static_cast<Impl*>(self);
+    const char* interface = nullptr;
+    if (sd_bus_message_read_basic(message, 's', &interface) < 0 ||
+        std::strcmp(interface, kInstaller) != 0)
+      return 0;
+    impl->is_there = true;
+    impl->ReadProperties(message);
+    impl->Tell();
+    return 0;
+  }
+
+  static int OnCompleted(sd_bus_message* message, void* self, sd_bus_error*) {
+    auto* impl = static_cast<Impl*>(self);
+    std::int32_t result = -1;
+    if (!impl->is_installing || sd_bus_message_read_basic(message, 'i', &result) < 0) return 0;
+    impl->End(result == 0                ? ""
+              : impl->last_error.empty() ? "the installer does not say why"
+                                         : impl->last_error);
+    return 0;
+  }
+
+  /// RAUC has gone: it will never say that the installation ended. A call that it has not answered
+  /// is answered by the bus.
+  static int OnOwner(sd_bus_message* message, void* self, sd_bus_error*) {
+    auto* impl = static_cast<Impl*>(self);
+    const char *name = nullptr, *before = nullptr, *now = nullptr;
+    if (sd_bus_message_read(message, "sss", &name, &before, &now) < 0 || *now != '\0') return 0;
+    impl->is_there = false;
+    if (impl->is_installing && !impl->done) {
+      impl->End("the installer ended before it was done: look at its log, then try again");
+    } else {
+      impl->Tell();
+    }
+    return 0;
+  }
+
+  static std::string ErrorOf(sd_bus_message* message) {
+    const sd_bus_error* error = sd_bus_message_get_error(message);
+    const std::string text = error != nullptr ? Shown(error->message) : "";
+    return text.empty() ? "the installer does not say why" : text;
+  }
+
+  /// RAUC has looked at the bundle: its signature is good, and this is what it is.
+  static int OnInfo(sd_bus_message* message, void* self, sd_bus_error*) {
+    auto* impl = static_cast<Impl*>(self);
+    if (sd_bus_message_is_method_error(message, nullptr) != 0) {
+      impl->Refuse(ChangeResult::kInvalid,
+                   "the installer refuses this bundle: " + ErrorOf(message));
+      return 0;
+    }
+    const char *compatible = nullptr, *version = nullptr;
+    if (sd_bus_message_read(message, "ss", &compatible, &version) < 0) {
+      impl->Refuse(ChangeResult::kFailed, "the installer's answer cannot be read: is it RAUC 1.8?");
+      return 0;
+    }
+    if (IsOlder(Shown(version), impl->options.version)) {
+      impl->Refuse(ChangeResult::kConflict,
+                   fmt::format("this bundle holds version {}, older than {} which runs",
+                               Shown(version), impl->options.version));
+      return 0;
+    }
+    // To look at a large bundle takes its time.
+    if (const std::string why = impl->options.hindrance ? impl->options.hindrance() : std::string();
+        !why.empty()) {
+      impl->Refuse(ChangeResult::kConflict, why);
+      return 0;
+    }
+    impl->Call();
+    return 0;
+  }
+
+  void Refuse(ChangeResult result, const std::string& message) {
+    is_installing = false;
+    outcome = message;
+    Answer(Refused(result, message));
+    Tell();
+  }
+
+  void Call() {
+    const std::string path = (options.folder / bundle).string();
+    const int result =
+        sd_bus_call_method_async(bus, nullptr, kService, kPath, kInstaller, "InstallBundle",
+                                 &Impl::OnBegun, this, "sa{sv}", path.c_str(), 0);
+    if (result < 0) Refuse(ChangeResult::kFailed, "the installer cannot be asked");
+  }
+
+  static int OnBegun(sd_bus_message* message, void* self, sd_bus_error*) {
+    auto* impl = static_cast<Impl*>(self);
+    if (sd_bus_message_is_method_error(message, nullptr) != 0) {
+      impl->Refuse(ChangeResult::kFailed, "the installer did not begin: " + ErrorOf(message));
+      return 0;
+    }
+    impl->Answer({});
+    impl->Tell();
+    return 0;
+  }
+
+  void Install(const std::string& name, web::Done asked) {
+    if (bus == nullptr || !is_there)
+      return asked(
+          Refused(ChangeResult::kConflict, "there is no installer (RAUC) on this machine"));
+    if (is_installing)
+      return asked(Refused(ChangeResult::kConflict,
+                           fmt::format("{} is being installed: wait until it is done", bundle)));
+    const std::vector<std::string> known = Bundles();
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      return asked(Refused(ChangeResult::kNotFound, "there is no such bundle"));
+    const std::filesystem::path file = options.folder / name;
+    if (const std::string why = WhyNoBundle(file, options.max_bytes); !why.empty())
+      return asked(Refused(ChangeResult::kInvalid, why));
+    is_installing = true;
+    bundle = name;
+    fraction = 0.0;
+    step = "checking the signature";
+    last_error.clear();
+    outcome.clear();
+    done = std::move(asked);
+    const int result = sd_bus_call_method_async(bus, nullptr, kService, kPath, kInstaller, "Info",
+                                                &Impl::OnInfo, this, "s", file.c_str());
+    if (result < 0) return Refuse(ChangeResult::kFailed, "the installer cannot be asked");
+    Process();
+    Tell();
+  }
+
+  [[nodiscard]] std::vector<std::string> Bundles() const {
+    std::vector<std::string> names;
+    std::error_code error;
+    for (std::filesystem::directory_iterator entry(options.folder, error), end;
+         !error && entry != end; entry.increment(error)) {
+      const std::string name = entry->path().filename().string();
+      if (name.ends_with(kEnding) && !name.starts_with('.') && names.size() < kMaxListed)
+        names.push_back(name);
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+};
+
+Updater::Updater(EventLoop& loop, UpdaterOptions options)
+    : impl_(std::make_unique<Impl>(loop, std::move(options))) {}
+Updater::~Updater() = default;
+
+bool Updater::is_installing() const { return impl_->is_installing; }
+
+web::UpdateStatus Updater::status() {
+  if (!impl_->is_there && std::chrono::steady_clock::now() - impl_->looked_at >= kLookAgain) {
+    if (impl_->bus == nullptr) {
+      impl_->Connect();
+    } else {
+      impl_->Look();
+      impl_->Process();
+    }
+  }
+  web::UpdateStatus status;
+  status.supported = impl_->is_there;
+  if (!status.supported) {
+    status.message =
+        impl_->outcome.empty()
+            ? "there is no installer (RAUC) on this machine; update its packages instead"
+            : impl_->outcome;
+    return status;
+  }
+  status.message = impl_->is_installing ? impl_->step : impl_->outcome;
+  status.slot = impl_->slot;
+  status.installing = impl_->is_installing;
+  status.fraction = impl_->fraction;
+  status.bundles = impl_->Bundles();
+  return status;
+}
+
+web::Change Updater::Add(const std::filesystem::path& file, const std::string& name) {
+  if (!impl_->is_there)
+    return Refused(ChangeResult::kConflict, "there is no installer (RAUC) on this machine");
+  if (impl_->is_installing)
+    return Refused(ChangeResult::kConflict, "a bundle is being installed: wait until it is done");
+  if (const std::string why = WhyNoBundle(file, impl_->options.max_bytes); !why.empty()) {
+    return Refused(ChangeResult::kInvalid,
+                   name + why.substr(std::min(why.size(), file.filename().string().size())));
+  }
+  const std::vector<std::string> known = impl_->Bundles();
+  const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
+  if (!is_known && known.size() >= kMaxKept)
+    return Refused(ChangeResult::kConflict, "there are too many bundles: remove one first");
+  const Keep replaced(impl_->options.folder / name, impl_->options.close_aside);
+  if (::rename(file.c_str(), (impl_->options.folder / name).c_str()) != 0) {
+    return Refused(ChangeResult::kNoSpace,
+                   fmt::format("{} cannot be kept: {}", name, std::strerror(errno)));
+  }
+  impl_->Tell();
+  return {};
+}
+
+web::Change Updater::Remove(const std::string& name) {
+  if (impl_->is_installing)
+    return Refused(ChangeResult::kConflict, "a bundle is being installed: wait until it is done");
+  const std::vector<std::string> known = impl_->Bundles();
+  if (std::find(known.begin(), known.end(), name) == known.end())
+    return Refused(ChangeResult::kNotFound, "there is no such bundle");
+  std::error_code error;
+  const Keep removed(impl_->options.folder / name, impl_->options.close_aside);
+  std::filesystem::remove(impl_->options.folder / name, error);
+  if (error)
+    return Refused(ChangeResult::kFailed,
+                   fmt::format("{} cannot be removed: {}", name, error.message()));
+  impl_->Tell();
+  return {};
+}
+
+void Updater::Install(const std::string& name, web::Done done) {
+  impl_->Install(name, std::move(done));
+}
+
+std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_bytes) {
+  const std::string name = file.filename().string();
+  const int fd = ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK);
+  if (fd < 0) return fmt::format("{} cannot be read: {}", name, std::strerror(errno));
+  const auto check = [&]() -> std::string {
+    struct stat info {};
+    if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) return name + " is no plain file";
+    const auto size = static_cast<std::uint64_t>(info.st_size);
+    if (size < kLeastBundle)
+      return fmt::format("{} is too short for a bundle: {} bytes; copy it again", name, size);
+    if (size > max_bytes)
+      return fmt::format("{} is too large: {} MB, at most {} MB", name, size >> 20,
+                         max_bytes >> 20);
+    std::array<char, 4> magic{};
+    std::array<unsigned char, 8> tail{};
+    if (::pread(fd, magic.data(), magic.size(), 0) != static_cast<ssize_t>(magic.size()) ||
+        ::pread(fd, tail.data(), tail.size(), static_cast<off_t>(size - tail.size())) !=
+            static_cast<ssize_t>(tail.size())) {
+      return fmt::format("{} cannot be read: {}", name, std::strerror(errno));
+    }
+    std::uint64_t signature = 0;
+    for (const unsigned char byte : tail) signature = signature << 8 | byte;
+    if (std::string_view(magic.data(), magic.size()) != kSquashfs)
+      return name + " is no bundle: expected a squashfs image";
+    if (signature == 0 || signature > kMaxSignature || signature + tail.size() >= size) {
+      return name + " is no whole bundle: no signature at its end; copy it again";
+    }
+    return {};
+  };
+  std::string why = check();
+  ::close(fd);
+  return why;
+}
+
+bool IsOlder(const std::string& a, const std::string& b) {
+  const auto next = [](std::string_view& rest) {
+    const auto dot = rest.find('.');
+    const std::string_view part = rest.substr(0, dot);
+    rest = dot == std::string_view::npos ? std::string_view() : rest.substr(dot + 1);
+    long number = 0;
+    std::from_chars(part.data(), part.data() + part.size(), number);
+    return number;
+  };
+  std::string_view left = a, right = b;
+  while (!left.empty() || !right.empty()) {
+    const long x = next(left), y = next(right);
+    if (x != y) return x < y;
+  }
+  return false;
+}
+
+}  // namespace plumb

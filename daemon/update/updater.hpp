@@ -1,0 +1,66 @@
+// System updates through RAUC, the image's installer, over D-Bus (de.pengutronix.rauc.Installer).
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "daemon/loop/event_loop.hpp"
+#include "web/service/scan_service.hpp"
+
+namespace plumb {
+
+struct UpdaterOptions {
+  std::filesystem::path folder = "/var/lib/plumb/updates";  ///< Bundles lie here: NAME.raucb.
+  std::uint64_t max_bytes = std::uint64_t{2} << 30;         ///< Of one bundle.
+  std::string bus_address;                                  ///< Empty: the system bus.
+  std::string version;  ///< Of what runs: an older bundle is refused.
+  std::function<std::string()>
+      hindrance;  ///< Asked before RAUC is told to begin: why it may not now, or nothing.
+  std::function<void()> changed;  ///< Called on the loop when status() has changed.
+  /// Closes a descriptor on another thread: that of a large file whose name is gone takes its time.
+  /// Empty: closed at once.
+  std::function<void(int fd)> close_aside;
+  /// Called on the loop when an installation that had begun has ended; empty text: it worked.
+  std::function<void(const std::string& bundle, const std::string& failure)> ended;
+};
+
+/// Nothing waits: every call of the bus is answered later. A machine without a bus or without RAUC
+/// is no error: status() says so. What makes a bundle acceptable is RAUC's matter (signature,
+/// compatible system); before it is asked, size and form are checked here, and the version
+/// afterwards. Belongs to the loop's thread.
+class Updater {
+ public:
+  Updater(EventLoop& loop, UpdaterOptions options);
+  ~Updater();
+  Updater(const Updater&) = delete;
+  Updater& operator=(const Updater&) = delete;
+
+  [[nodiscard]] bool is_installing() const;
+  /// Also looks again for RAUC where there was none, at most every few seconds.
+  [[nodiscard]] web::UpdateStatus status();
+  /// Takes a file among the bundles, by moving it: kInvalid where it can be none, kConflict where
+  /// there are too many.
+  web::Change Add(const std::filesystem::path& file, const std::string& name);
+  web::Change Remove(const std::string& name);
+  /// Has RAUC check and install NAME of the folder. `done` comes once it has begun, or with the
+  /// reason why not.
+  void Install(const std::string& name, web::Done done);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Empty, or why the file can be no bundle: not a plain file, empty, too large, not a squashfs with
+/// a signature behind it.
+[[nodiscard]] std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_bytes);
+
+/// True where `a` is an older version than `b`: numbers between dots, compared one by one; what is
+/// no number counts as 0.
+[[nodiscard]] bool IsOlder(const std::string& a, const std::string& b);
+
+}  // namespace plumb

@@ -1,7 +1,0 @@
-#include "daemon/version.hpp"
-
-namespace plumb {
-
-std::string_view Version() { return PLUMB_VERSION; }
-
-}  // namespace plumb

@@ -1,0 +1,160 @@
+#include "drivers/files/file_io.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "algo/base/errors.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr std::size_t kBufferBytes = std::size_t{1} << 18;
+
+std::string ErrorText(int error_number) { return std::generic_category().message(error_number); }
+
+/// Closes a descriptor that was opened for reading.
+class ReadDescriptor {
+ public:
+  explicit ReadDescriptor(int descriptor) : descriptor_(descriptor) {}
+  ~ReadDescriptor() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  ReadDescriptor(const ReadDescriptor&) = delete;
+  ReadDescriptor& operator=(const ReadDescriptor&) = delete;
+  [[nodiscard]] int get() const { return descriptor_; }
+
+ private:
+  int descriptor_;
+};
+
+/// Reads a regular file into any contiguous container of bytes.
+template <typename Container>
+Container ReadInto(const std::filesystem::path& path, std::size_t max_bytes) {
+  // O_NONBLOCK: opening a FIFO must not wait for a writer; regular files ignore it.
+  const ReadDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (file.get() < 0) {
+    const int error = errno;
+    if (error == ENOENT || error == ENOTDIR)
+      throw DataError(fmt::format("file {} is missing", path.string()));
+    throw DataError(fmt::format("cannot open {}: {}", path.string(), ErrorText(error)));
+  }
+  struct stat status {};
+  if (::fstat(file.get(), &status) != 0)
+    throw DataError(fmt::format("cannot stat {}: {}", path.string(), ErrorText(errno)));
+  if (!S_ISREG(status.st_mode))
+    throw DataError(fmt::format("{} is no regular file", path.string()));
+  const auto size = static_cast<std::size_t>(status.st_size);
+  if (size > max_bytes) {
+    throw DataError(
+        fmt::format("file {} has {} bytes, at most {} are read", path.string(), size, max_bytes));
+  }
+  Container bytes(size, {});
+  std::size_t done = 0;
+  while (done < size) {
+    const ssize_t got = ::read(file.get(), bytes.data() + done, size - done);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0)
+      throw DataError(fmt::format("cannot read {}: {}", path.string(), ErrorText(errno)));
+    if (got == 0) break;  // the file shrank meanwhile: its reader will find it truncated
+    done += static_cast<std::size_t>(got);
+  }
+  bytes.resize(done);
+  return bytes;
+}
+
+std::span<const std::uint8_t> AsBytes(std::string_view text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> ReadWholeFile(const std::filesystem::path& path, std::size_t max_bytes) {
+  return ReadInto<std::vector<std::uint8_t>>(path, max_bytes);
+}
+
+std::string ReadTextFile(const std::filesystem::path& path, std::size_t max_bytes) {
+  return ReadInto<std::string>(path, max_bytes);
+}
+
+std::string DescribeWriteError(const std::filesystem::path& path, int error_number) {
+  std::string text = fmt::format("cannot write {}: {}", path.string(), ErrorText(error_number));
+  if (error_number == ENOSPC || error_number == EDQUOT)
+    text += "; free space on that disk or write elsewhere";
+  if (error_number == EFBIG)
+    text += "; raise the limit of file sizes (ulimit -f) or write elsewhere";
+  if (error_number == EACCES || error_number == EPERM || error_number == EROFS)
+    text += "; choose a folder that you may write to";
+  if (error_number == ENOENT) text += "; create the parent folder first";
+  return text;
+}
+
+FileWriter::FileWriter(std::filesystem::path path) : path_(std::move(path)) {
+  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (descriptor_ < 0) throw IoError(DescribeWriteError(path_, errno));
+  struct stat status {};
+  regular_ = ::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode);
+  buffer_.reserve(kBufferBytes);
+}
+
+FileWriter::~FileWriter() {
+  if (descriptor_ < 0) return;
+  ::close(descriptor_);
+  Discard();
+}
+
+void FileWriter::Discard() {
+  if (regular_) ::unlink(path_.c_str());
+}
+
+void FileWriter::Write(std::span<const std::uint8_t> bytes) {
+  if (buffer_.size() + bytes.size() > kBufferBytes) Flush();
+  if (bytes.size() > kBufferBytes) {
+    WriteThrough(bytes);
+  } else {
+    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  }
+}
+
+void FileWriter::Write(std::string_view text) { Write(AsBytes(text)); }
+
+void FileWriter::Flush() {
+  WriteThrough(buffer_);
+  buffer_.clear();
+}
+
+void FileWriter::WriteThrough(std::span<const std::uint8_t> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) throw IoError(DescribeWriteError(path_, errno));
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+}
+
+void FileWriter::Close() {
+  Flush();
+  const int descriptor = std::exchange(descriptor_, -1);
+  if (::close(descriptor) != 0) {
+    const int error = errno;
+    Discard();
+    throw IoError(DescribeWriteError(path_, error));
+  }
+}
+
+void WriteWholeFile(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
+  FileWriter file(path);
+  file.Write(bytes);
+  file.Close();
+}
+
+void WriteWholeFile(const std::filesystem::path& path, std::string_view text) {
+  WriteWholeFile(path, AsBytes(text));
+}
+
+}  // namespace plumb

@@ -1,0 +1,62 @@
+// Whole files in and out, with the errors that the rest of Plumb expects.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace plumb {
+
+/// The bytes of a regular file. Never blocks on a pipe or device that stands where a file should.
+/// @throws DataError if the file is missing, unreadable, no regular file or longer than
+/// `max_bytes`.
+[[nodiscard]] std::vector<std::uint8_t> ReadWholeFile(const std::filesystem::path& path,
+                                                      std::size_t max_bytes);
+
+/// The same as text.
+[[nodiscard]] std::string ReadTextFile(const std::filesystem::path& path, std::size_t max_bytes);
+
+/// A new file, written through one buffer. The owner calls Close(); a writer that goes away without
+/// it (an exception passed by) removes its file, unless what stands there is a device or a pipe.
+/// Not thread-safe.
+class FileWriter {
+ public:
+  /// Creates or truncates the file. @throws IoError
+  explicit FileWriter(std::filesystem::path path);
+  ~FileWriter();
+  FileWriter(const FileWriter&) = delete;
+  FileWriter& operator=(const FileWriter&) = delete;
+
+  /// @throws IoError, with the hint to free space when the disk is full.
+  void Write(std::span<const std::uint8_t> bytes);
+  void Write(std::string_view text);
+
+  /// Writes what is buffered and closes. @throws IoError
+  void Close();
+
+ private:
+  void Flush();
+  void Discard();
+  void WriteThrough(std::span<const std::uint8_t> bytes);
+
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+  bool regular_ = false;
+  std::vector<std::uint8_t> buffer_;
+};
+
+/// Creates or replaces a file. A failed write leaves no file behind. Not atomic: see
+/// daemon/files/atomic_folder.hpp.
+/// @throws IoError
+void WriteWholeFile(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
+void WriteWholeFile(const std::filesystem::path& path, std::string_view text);
+
+/// "cannot write FILE: REASON", with what to do where that is known (ENOSPC, EDQUOT, EFBIG, EACCES,
+/// EROFS).
+[[nodiscard]] std::string DescribeWriteError(const std::filesystem::path& path, int error_number);
+
+}  // namespace plumb

@@ -1,0 +1,25 @@
+// The decoders behind image_file.hpp, one file a library. Only image_file.cpp includes this.
+//
+// libpng and libjpeg report errors by longjmp. Every function that calls setjmp here holds nothing
+// with a destructor and calls nothing of C++ that could; memory belongs to its caller, who then
+// throws.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include <opencv2/core/mat.hpp>
+
+namespace plumb::codec {
+
+enum class PngKind { kColor, kDepth };
+
+/// @throws DataError if the sides are not in [1, max_side].
+void CheckImageSide(const std::string& name, long width, long height, int max_side);
+
+[[nodiscard]] cv::Mat DecodePng(std::span<const std::uint8_t> bytes, const std::string& name,
+                                PngKind kind);
+[[nodiscard]] cv::Mat DecodeJpeg(std::span<const std::uint8_t> bytes, const std::string& name);
+
+}  // namespace plumb::codec

@@ -1,0 +1,57 @@
+// Frames rendered beforehand, raw on the disk: what the virtual sensor plays. Knows nothing of
+// images, so that the plug-in stays small.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+namespace plumb::simulated {
+
+/// Stamps of one pair, microseconds from the sweep's start.
+struct CachedStamps {
+  std::int64_t color_us = 0;
+  std::int64_t depth_us = 0;
+};
+
+struct FrameCacheShape {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint32_t num_frames = 0;
+  std::uint32_t period_us = 0;  ///< Nominal, between frames.
+  std::uint32_t version = 0;    ///< Of the simulator that rendered them.
+  bool operator==(const FrameCacheShape&) const = default;
+  [[nodiscard]] std::size_t color_bytes() const { return std::size_t{3} * width * height; }
+  [[nodiscard]] std::size_t depth_bytes() const { return std::size_t{2} * width * height; }
+  [[nodiscard]] std::size_t record_bytes() const {
+    return sizeof(CachedStamps) + color_bytes() + depth_bytes();
+  }
+};
+
+/// Reads frames in any order, straight from the file (the kernel keeps hot ones), so it takes no
+/// memory of its own. Immutable after opening: any number of threads may read.
+class FrameCacheReader {
+ public:
+  /// @throws std::runtime_error if the file is missing, no cache or not whole.
+  explicit FrameCacheReader(const std::filesystem::path& file);
+  ~FrameCacheReader();
+  FrameCacheReader(const FrameCacheReader&) = delete;
+  FrameCacheReader& operator=(const FrameCacheReader&) = delete;
+
+  [[nodiscard]] const FrameCacheShape& shape() const { return shape_; }
+  /// @param rgb    Of color_bytes().  @param depth_mm  Of width x height.
+  /// @throws std::runtime_error if the disk fails; std::out_of_range.
+  [[nodiscard]] CachedStamps Read(std::uint32_t frame, std::span<std::uint8_t> rgb,
+                                  std::span<std::uint16_t> depth_mm) const;
+
+ private:
+  int descriptor_ = -1;
+  FrameCacheShape shape_;
+};
+
+/// The header before the first frame.
+[[nodiscard]] std::string FrameCacheHeader(const FrameCacheShape& shape);
+
+}  // namespace plumb::simulated

@@ -1,0 +1,66 @@
+// The frames that the virtual units show, and the commands to them. Shared by the command thread
+// and the units' own.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "drivers/virtual/frame_cache.hpp"
+
+namespace plumb::simulated {
+
+/// The scenes, which of them is shown and how.
+class Stage {
+ public:
+  enum class Motion {
+    kStill,      ///< Holds the first frame.
+    kSweep,      ///< Plays from the first frame, then holds the last one.
+    kSweepOnce,  ///< Plays from the first frame, then gives nothing: for recordings of exactly one
+                 ///< sweep.
+  };
+  struct View {
+    std::shared_ptr<const FrameCacheReader> scene;
+    std::size_t index = 0;
+    Motion motion = Motion::kStill;
+    std::uint64_t epoch = 0;      ///< Changes whenever something changed: start again.
+    double speed = 1.0;           ///< 0: as fast as it goes.
+    std::int64_t origin_us = -1;  ///< Stamp of the sweep's time 0; negative: whenever it starts.
+  };
+
+  /// @throws std::runtime_error unless there are scenes, all of one shape.
+  explicit Stage(const std::vector<std::string>& files);
+
+  [[nodiscard]] const FrameCacheShape& shape() const { return scenes_.front()->shape(); }
+  [[nodiscard]] std::size_t size() const { return scenes_.size(); }
+  [[nodiscard]] View Now() const;
+  void Show(std::size_t scene, Motion motion, std::int64_t origin_us = -1);
+  void SetSpeed(double speed);
+
+ private:
+  std::vector<std::shared_ptr<const FrameCacheReader>> scenes_;
+  mutable std::mutex mutex_;
+  View view_;
+};
+
+/// Faults of the next frames, each as a real sensor or its driver may have it.
+enum class Glitch { kNone, kLate, kDouble, kOld, kSize, kLone };
+
+/// One unit from plugging in to unplugging.
+struct Unit {
+  std::string serial;
+  std::string uri;
+  std::atomic<bool> gone{false};
+  std::atomic<bool> stalled{false};
+  std::atomic<bool> failed{false};
+  std::atomic<Glitch> glitch{Glitch::kNone};
+  std::atomic<int> glitches_left{0};
+  std::atomic<int> position{-1};  ///< Frame that was given last; -1: none since the stage changed.
+
+  [[nodiscard]] bool silent() const { return gone || stalled || failed; }
+};
+
+}  // namespace plumb::simulated

@@ -1,0 +1,186 @@
+#include "drivers/virtual/virtual_sensor.hpp"
+
+#include <signal.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/program_folders.hpp"
+#include "drivers/simulated/suite.hpp"
+#include "drivers/simulated/suite_plan.hpp"
+#include "drivers/virtual/frame_cache.hpp"
+#include "drivers/virtual/raw_frame.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using simulated::FrameCacheReader;
+using simulated::FrameCacheShape;
+using simulated::MakeRaw;
+using simulated::RawFrame;
+using simulated::WriteRaw;
+
+/// True if the file holds the scene as the simulator renders it today: of this version, and its
+/// first frame is the same to the bit.
+bool IsCurrent(const fs::path& file, const FrameCacheShape& shape, const RawFrame& first) try {
+  const FrameCacheReader cache(file);
+  if (cache.shape() != shape) return false;
+  RawFrame cached;
+  cached.rgb.resize(shape.color_bytes());
+  cached.depth_mm.resize(shape.depth_bytes() / 2);
+  cached.stamps = cache.Read(0, cached.rgb, cached.depth_mm);
+  return cached == first;
+} catch (const std::runtime_error&) {
+  return false;
+}
+
+/// Removes what killed processes have left half-written; it may be half a gigabyte each.
+void RemoveStale(const fs::path& folder) {
+  constexpr std::string_view kMark = ".partial-";
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    const std::size_t mark = name.find(kMark);
+    if (mark == std::string::npos) continue;
+    const int pid = std::atoi(name.c_str() + mark + kMark.size());
+    if (pid > 0 && ::kill(pid, 0) != 0 && errno == ESRCH) fs::remove(entry.path(), error);
+  }
+}
+
+/// Renders scenes into the cache, those that are missing.
+class Renderer {
+ public:
+  Renderer(const VirtualSensorOptions& options, const SimulateOptions& simulate)
+      : options_(options),
+        plan_(simulated::PlanSuite(simulate)),
+        shape_{static_cast<std::uint32_t>(options.width),
+               static_cast<std::uint32_t>(options.height),
+               static_cast<std::uint32_t>(options.frames),
+               static_cast<std::uint32_t>(std::lround(1e6 / options.rate_hz)),
+               PLUMB_SIMULATOR_VERSION},
+        folder_(options.cache_folder.empty() ? DefaultVirtualSensorCache() : options.cache_folder) {
+    std::error_code error;
+    fs::create_directories(folder_, error);
+    if (error) throw IoError(DescribeWriteError(folder_, error.value()));
+    RemoveStale(folder_);
+  }
+
+  [[nodiscard]] const simulated::SuitePlan& plan() const { return plan_; }
+
+  fs::path Prepare(std::size_t scene, const std::stop_token& stop,
+                   const std::function<void(double)>& progress) const {
+    const auto source = simulated::MakeSource(plan_, scene);
+    const double start_s = source->sweep().start_time_s;
+    const fs::path file =
+        folder_ / fmt::format("{}-{}-seed{}-{}x{}-{}at{:g}hz-{}.frames", plan_.name,
+                              static_cast<int>(options_.noise), options_.seed, options_.width,
+                              options_.height, options_.frames, options_.rate_hz,
+                              plan_.scenes[scene].name);
+    const RawFrame first = MakeRaw(source->Next().value(), start_s);
+    if (IsCurrent(file, shape_, first)) return file;
+    fs::path beside = file;
+    beside += fmt::format(".partial-{}", ::getpid());
+    FileWriter writer(beside);
+    writer.Write(simulated::FrameCacheHeader(shape_));
+    WriteRaw(writer, first);
+    double done = 1;
+    while (const std::optional<Frame> frame = source->Next()) {
+      WriteRaw(writer, MakeRaw(*frame, start_s));
+      if (progress) progress(++done / options_.frames);
+      if (stop.stop_requested())
+        throw Interrupted(
+            "rendering of the virtual sensor's scenes was stopped; it starts again next time");
+    }
+    writer.Close();
+    std::error_code error;
+    fs::rename(beside, file, error);
+    if (error) throw IoError(DescribeWriteError(file, error.value()));
+    return file;
+  }
+
+ private:
+  const VirtualSensorOptions& options_;
+  simulated::SuitePlan plan_;
+  FrameCacheShape shape_;
+  fs::path folder_;
+};
+
+}  // namespace
+
+SimulateOptions ScenesOf(const VirtualSensorOptions& options) {
+  const bool known_size = (options.width == 640 && options.height == 480) ||
+                          (options.width == 320 && options.height == 240);
+  if (!known_size) throw std::invalid_argument("the virtual sensor is 640x480 or 320x240");
+  SimulateOptions simulate;
+  simulate.suite = options.suite;
+  simulate.seed = options.seed;
+  simulate.noise = options.noise;
+  simulate.faults = simulated::MildFaults(options.noise);
+  simulate.frames = options.frames;
+  simulate.rate_hz = options.rate_hz;
+  simulate.width = options.width;
+  simulate.height = options.height;
+  return simulate;
+}
+
+fs::path DefaultVirtualSensorCache() {
+  if (const char* cache = ::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache == '/')
+    return fs::path(cache) / "plumb/virtual-sensor";
+  if (const char* home = ::getenv("HOME"); home != nullptr && *home == '/')
+    return fs::path(home) / ".cache/plumb/virtual-sensor";
+  return fs::temp_directory_path() / "plumb-virtual-sensor";
+}
+
+fs::path FindVirtualSensorRuntime() {
+  const std::optional<fs::path> found =
+      FindBesideProgram("lib/plumb/virtual-sensor/libOpenNI2.so.0");
+  if (!found)
+    throw IoError(
+        "the virtual sensor's driver is missing: expected lib/plumb/virtual-sensor/libOpenNI2.so.0 "
+        "in a folder above this program; build "
+        "the "
+        "target plumb_virtual_sensor or install the component virtual_sensor");
+  return *found;
+}
+
+VirtualSensor::VirtualSensor(const VirtualSensorOptions& options, const std::stop_token& stop,
+                             const std::function<void(double, std::string_view)>& progress)
+    : runtime_library_(options.runtime.empty() ? FindVirtualSensorRuntime() : options.runtime),
+      frames_(options.frames) {
+  const Renderer renderer(options, ScenesOf(options));
+  const std::size_t total = renderer.plan().scenes.size();
+  const std::size_t count = options.max_scenes == 0 ? total : std::min(total, options.max_scenes);
+  std::vector<fs::path> caches;
+  for (std::size_t i = 0; i < count; ++i) {
+    scenes_.push_back(renderer.plan().scenes[i].name);
+    caches.push_back(renderer.Prepare(i, stop, [&](double fraction) {
+      if (progress)
+        progress((static_cast<double>(i) + fraction) / static_cast<double>(count), scenes_.back());
+    }));
+  }
+
+  session_ = std::make_unique<VirtualSession>(VirtualSession::Contents{
+      options.serial, options.plugged, caches, simulated::MakeSource(renderer.plan(), 0)->info()});
+}
+
+VirtualSensor::~VirtualSensor() = default;
+
+void VirtualSensor::Quit() const noexcept {
+  try {
+    (void)Command("quit");
+  } catch (const std::exception&) {
+    // It does not listen as it is.
+  }
+}
+
+}  // namespace plumb

@@ -1,0 +1,122 @@
+#include "drivers/virtual/virtual_session.hpp"
+
+#include <poll.h>
+#include <stdlib.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
+#include "drivers/replay/tum_writer.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kEnvironment[] = "PLUMB_VIRTUAL_SENSOR";
+constexpr std::chrono::seconds kAnswerTime{1};
+
+/// A socket of our own to which answers come.
+class AnswerSocket {
+ public:
+  AnswerSocket() : descriptor_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;  // No name: the kernel chooses one.
+    if (descriptor_ < 0 ||
+        ::bind(descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof(sa_family_t)) != 0)
+      throw DeviceError(
+          fmt::format("virtual sensor: no socket to command it: {}", std::strerror(errno)));
+  }
+  ~AnswerSocket() { ::close(descriptor_); }
+  AnswerSocket(const AnswerSocket&) = delete;
+  AnswerSocket& operator=(const AnswerSocket&) = delete;
+  [[nodiscard]] int get() const { return descriptor_; }
+
+ private:
+  int descriptor_;
+};
+
+}  // namespace
+
+VirtualSession::VirtualSession(const Contents& contents) {
+  const auto is_plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_';
+  };
+  if (contents.serial.empty() || contents.serial.size() > 64 ||
+      !std::all_of(contents.serial.begin(), contents.serial.end(), is_plain))
+    throw std::invalid_argument("a virtual sensor's serial is 1 to 64 letters, digits, - and _");
+  std::string folder = (fs::temp_directory_path() / "plumb-virtual-XXXXXX").string();
+  if (::mkdtemp(folder.data()) == nullptr) throw IoError(DescribeWriteError(folder, errno));
+  folder_ = folder;
+  socket_ = folder_ / "sensor.sock";
+  calibration_folder_ = folder_ / "calibration";
+  try {
+    Write(contents);
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+    throw;
+  }
+  ::setenv(kEnvironment, folder_.c_str(), 1);
+}
+
+VirtualSession::~VirtualSession() {
+  ::unsetenv(kEnvironment);
+  std::error_code ignored;
+  fs::remove_all(folder_, ignored);
+}
+
+void VirtualSession::Write(const Contents& contents) const {
+  std::error_code error;
+  fs::create_directory(calibration_folder_, error);
+  if (error) throw IoError(DescribeWriteError(calibration_folder_, error.value()));
+  std::string text =
+      fmt::format("serial {}\nplugged {}\n", contents.serial, contents.plugged ? 1 : 0);
+  for (const fs::path& scene : contents.scenes)
+    text += fmt::format("scene {}\n", fs::absolute(scene).string());
+  WriteWholeFile(folder_ / "session", text);
+  WriteWholeFile(calibration_folder_ / (contents.serial + ".yaml"),
+                 CameraFileText(contents.camera, 1000.0));
+}
+
+std::string VirtualSession::Command(std::string_view command) const {
+  const AnswerSocket answers;
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::string path = socket_.string();
+  if (path.size() >= sizeof address.sun_path)
+    throw DeviceError(fmt::format("virtual sensor: the socket's path is too long: {}", path));
+  std::memcpy(address.sun_path, path.data(), path.size());
+  if (::sendto(answers.get(), command.data(), command.size(), 0,
+               reinterpret_cast<const sockaddr*>(&address), sizeof address) < 0)
+    throw DeviceError(
+        fmt::format("virtual sensor does not listen ({}); is an OpenNiProvider of it open?",
+                    std::strerror(errno)));
+  pollfd wait{answers.get(), POLLIN, 0};
+  const int ready =
+      ::poll(&wait, 1, static_cast<int>(std::chrono::milliseconds(kAnswerTime).count()));
+  std::array<char, 512> buffer{};
+  const ssize_t size = ready > 0 ? ::recv(answers.get(), buffer.data(), buffer.size(), 0) : -1;
+  if (size < 0)
+    throw DeviceError(fmt::format("virtual sensor did not answer \"{}\" within {} s", command,
+                                  kAnswerTime.count()));
+  std::string answer(buffer.data(), static_cast<std::size_t>(size));
+  if (!answer.starts_with("ok"))
+    throw DeviceError(fmt::format("virtual sensor, command \"{}\": {}", command, answer));
+  answer.erase(0, answer.starts_with("ok ") ? 3 : 2);
+  return answer;
+}
+
+}  // namespace plumb

@@ -1,0 +1,48 @@
+// The session that the virtual sensor's plug-in plays, and the line to command it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "algo/types/frame.hpp"
+
+namespace plumb {
+
+/// The folder that the plug-in reads when an OpenNI2 library with it starts. Only one lives in a
+/// process at a time: the constructor sets an environment variable, so it is made before other
+/// threads start, and destroyed after the library was stopped.
+class VirtualSession {
+ public:
+  struct Contents {
+    std::string serial = "VIRTUAL-0001";  ///< 1 to 64 letters, digits, - and _.
+    bool plugged = true;
+    std::vector<std::filesystem::path> scenes;  ///< Files as frame_cache.hpp describes them.
+    StreamInfo camera;                          ///< Becomes the calibration file of the unit.
+  };
+  /// @throws IoError; std::invalid_argument for a bad serial.
+  explicit VirtualSession(const Contents& contents);
+  ~VirtualSession();
+  VirtualSession(const VirtualSession&) = delete;
+  VirtualSession& operator=(const VirtualSession&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& calibration_folder() const {
+    return calibration_folder_;
+  }
+  [[nodiscard]] const std::filesystem::path& socket() const { return socket_; }
+
+  /// Sends one line as listed in drivers/simulated/README.md and returns the answer without its
+  /// leading "ok". Any thread; waits for at most a second. @throws DeviceError if there is no
+  /// answer or the command is refused.
+  std::string Command(std::string_view command) const;
+
+ private:
+  void Write(const Contents& contents) const;
+
+  std::filesystem::path folder_;
+  std::filesystem::path calibration_folder_;
+  std::filesystem::path socket_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,12 @@
+# Installs the library into a folder of its own, builds a project against it and runs that.
+file(REMOVE_RECURSE ${WORK})
+foreach(step
+    "${CMAKE_COMMAND};--install;${BUILD};--prefix;${WORK}/prefix;--component;dev"
+    "${CMAKE_COMMAND};-S;${SOURCE};-B;${WORK}/build;-G;Ninja;-DCMAKE_PREFIX_PATH=${WORK}/prefix"
+    "${CMAKE_COMMAND};--build;${WORK}/build"
+    "${WORK}/build/consumer")
+  execute_process(COMMAND ${step} RESULT_VARIABLE failed)
+  if(failed)
+    message(FATAL_ERROR "failed: ${step}")
+  endif()
+endforeach()

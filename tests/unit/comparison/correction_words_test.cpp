@@ -1,0 +1,77 @@
+// The words beside the six numbers, for every posture, number and sign, from a table written by
+// hand: left and right of the patient are where a mistake would be dangerous.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <string>
+
+#include "algo/base/units.hpp"
+#include "algo/comparison/correction.hpp"
+
+namespace plumb {
+namespace {
+
+struct Row {
+  PatientPosture posture;
+  // Vertical, longitudinal, lateral, pitch, roll, yaw; each for a positive and a negative number.
+  std::array<std::array<const char*, 2>, 6> words;
+};
+
+constexpr std::array<const char*, 2> kVertical = {"up", "down"};
+constexpr std::array<const char*, 2> kLongitudinal = {"toward gantry", "away from gantry"};
+constexpr std::array<const char*, 2> kToLeft = {"to patient left", "to patient right"};
+constexpr std::array<const char*, 2> kToRight = {"to patient right", "to patient left"};
+constexpr std::array<const char*, 2> kHeadUp = {"head up", "head down"};
+constexpr std::array<const char*, 2> kHeadDown = {"head down", "head up"};
+constexpr std::array<const char*, 2> kLeftDown = {"patient left side down",
+                                                  "patient right side down"};
+constexpr std::array<const char*, 2> kRightDown = {"patient right side down",
+                                                   "patient left side down"};
+constexpr std::array<const char*, 2> kHeadToLeft = {"head to patient left",
+                                                    "head to patient right"};
+constexpr std::array<const char*, 2> kHeadToRight = {"head to patient right",
+                                                     "head to patient left"};
+
+// Facing the gantry: +X to the right, +Y to the gantry, +Z up. The patient's left is +X head first
+// supine and feet first prone, -X in the two other postures. Positive pitch lifts the end at the
+// gantry, positive roll lowers +X, positive yaw carries the end at the gantry to -X.
+constexpr std::array<Row, 4> kTable = {
+    Row{PatientPosture::kHeadFirstSupine,
+        {kVertical, kLongitudinal, kToLeft, kHeadUp, kLeftDown, kHeadToRight}},
+    Row{PatientPosture::kHeadFirstProne,
+        {kVertical, kLongitudinal, kToRight, kHeadUp, kRightDown, kHeadToLeft}},
+    Row{PatientPosture::kFeetFirstSupine,
+        {kVertical, kLongitudinal, kToRight, kHeadDown, kRightDown, kHeadToRight}},
+    Row{PatientPosture::kFeetFirstProne,
+        {kVertical, kLongitudinal, kToLeft, kHeadDown, kLeftDown, kHeadToLeft}}};
+
+// A motion of the body that one of the six numbers alone puts right.
+Pose MotionFor(int number, double sign) {
+  const double shift = sign * 10 * kMillimetre, turn = sign * 2 * kDegree;
+  Pose apply = Pose::Identity();
+  if (number == 0) apply.translation().z() = shift;
+  if (number == 1) apply.translation().y() = shift;
+  if (number == 2) apply.translation().x() = shift;
+  if (number == 3) apply.linear() = CouchRotation(turn, 0, 0);
+  if (number == 4) apply.linear() = CouchRotation(0, turn, 0);
+  if (number == 5) apply.linear() = CouchRotation(0, 0, turn);
+  return apply.inverse();
+}
+
+TEST(CorrectionWordsTest, EveryPostureNumberAndSignHasItsWords) {
+  for (const Row& row : kTable) {
+    for (int number = 0; number < 6; ++number) {
+      for (const double sign : {1.0, -1.0}) {
+        const Correction correction = CorrectionOf(
+            MotionFor(number, sign), Matrix6d::Identity() * 1e-8, Eigen::Vector3d::Zero(),
+            Eigen::Vector3d::Zero(), Pose::Identity(), MarkerKind::kRoom, row.posture);
+        const auto i = static_cast<std::size_t>(number);
+        EXPECT_EQ(correction.words[i], row.words[i][sign > 0 ? 0 : 1])
+            << Name(row.posture) << ", number " << number << ", sign " << sign;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,100 @@
+#include "algo/comparison/motion_uncertainty.hpp"
+
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "algo/base/units.hpp"
+
+namespace plumb {
+namespace {
+
+// Markers that agree to 1 mm a coordinate over 0.7 m, centred beside the body.
+Alignment SomeAlignment() {
+  Alignment alignment;
+  alignment.centre_m = {0.5, 0.4, 0.0};
+  alignment.spread_m = 0.7;
+  alignment.stretch_sigma = 0.0005;
+  alignment.distortion = 1e-6 * Eigen::Matrix3d::Identity();
+  alignment.covariance = 1e-8 * Matrix6d::Identity();
+  return alignment;
+}
+
+constexpr double kMillimetre2 = kMillimetre * kMillimetre;
+const Eigen::Vector3d kCentroid(0.6, 0.45, 0.1);
+
+MotionUncertainty Of(const Pose& T_motion, const Alignment& alignment = SomeAlignment()) {
+  static const Matrix6d kSurface = 1e-9 * Matrix6d::Identity();
+  return Uncertainty(
+      {.alignment = alignment, .surface = kSurface, .T_motion = T_motion, .centroid_m = kCentroid});
+}
+
+TEST(MotionUncertaintyTest, TheTotalIsTheSumOfItsNamedParts) {
+  const MotionUncertainty uncertainty = Of(Pose(Eigen::Translation3d(0.2, 0.1, 0)));
+  Matrix6d sum = Matrix6d::Zero();
+  for (const auto& [name, part] : uncertainty.Parts()) {
+    EXPECT_GE(part->diagonal().minCoeff(), 0.0) << name;
+    EXPECT_GT(part->trace(), 0.0) << name;
+    sum += *part;
+  }
+  EXPECT_TRUE(sum.isApprox(uncertainty.Total()));
+}
+
+TEST(MotionUncertaintyTest, WhatTheMapsDisagreeByAtAPlaceIsNotAveragedAway) {
+  const MotionUncertainty uncertainty = Of(Pose::Identity());
+  EXPECT_NEAR(uncertainty.distortion(4, 4), kMillimetre2, 1e-12);
+  EXPECT_NEAR(std::sqrt(uncertainty.distortion(1, 1)), 0.001 / 0.7, 1e-9);
+  Alignment along_x = SomeAlignment();
+  along_x.distortion = Eigen::Vector3d(9e-6, 0, 0).asDiagonal();
+  EXPECT_NEAR(Of(Pose::Identity(), along_x).distortion(3, 3), 9 * kMillimetre2, 1e-12);
+  EXPECT_EQ(Of(Pose::Identity(), along_x).distortion(4, 4), 0.0);
+}
+
+TEST(MotionUncertaintyTest, FrameAndScaleCountOnlyForABodyThatMoved) {
+  const MotionUncertainty still = Of(Pose::Identity());
+  EXPECT_NEAR(still.frame.norm(), 0.0, 1e-15);
+  const MotionUncertainty shifted = Of(Pose(Eigen::Translation3d(0.3, 0, 0)));
+  // A frame tilted by 1 mm / sqrt(2) over 0.3 m lifts the end of a way of 0.3 m by 0.7 mm.
+  EXPECT_NEAR(std::sqrt(shifted.frame(5, 5)) / kMillimetre, 0.707, 0.01);
+  EXPECT_NEAR((shifted.frame.topLeftCorner<3, 3>()).norm(), 0.0, 1e-12) << "a shift turns nothing";
+  EXPECT_GT(shifted.scale(3, 3), still.scale(3, 3) + 0.1 * kMillimetre2);
+  EXPECT_NEAR(shifted.scale(4, 4), still.scale(4, 4), 1e-12) << "only along the way";
+}
+
+// The analytic frame term against motions that were turned into other frames, one after the other.
+TEST(MotionUncertaintyTest, TheFrameTermIsTheScatterOverFrames) {
+  const Pose T_motion = Eigen::Translation3d(0.1, -0.2, 0.02) *
+                        Pose(Eigen::AngleAxisd(0.6, Eigen::Vector3d(0.1, 0, 1).normalized()));
+  const Matrix6d claimed = Of(T_motion).frame;
+  const double sigma_m = std::sqrt(0.5) * kMillimetre;
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  Matrix6d scatter = Matrix6d::Zero();
+  constexpr int kTrials = 4000;
+  const Eigen::Vector3d moved = T_motion * kCentroid;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Vector6d twist;
+    for (int i = 0; i < 6; ++i) twist[i] = sigma_m * normal(random);
+    twist[0] /= 0.3, twist[1] /= 0.3, twist[2] /= 2.0;
+    const Pose F = PoseFromTwist(twist);
+    const Pose error = F * T_motion * F.inverse() * T_motion.inverse();
+    Vector6d off;
+    off << VectorFromRotation(error.linear()), error * moved - moved;
+    scatter += off * off.transpose() / kTrials;
+  }
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_NEAR(claimed(i, i) / scatter(i, i), 1.0, 0.1) << i;  // 4000 trials: 2 % of a variance
+  }
+}
+
+TEST(MotionUncertaintyTest, ACovarianceAboutAnotherPointMovesThatPointAsTheFirstSays) {
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance(2, 2) = 1e-6;  // a turn about z alone
+  const Matrix6d moved = CovarianceAbout(covariance, {0, 0, 0}, {2, 0, 0});
+  EXPECT_NEAR(moved(4, 4), 4e-6, 1e-15);
+  EXPECT_NEAR(moved(3, 3), 0.0, 1e-15);
+  EXPECT_NEAR(moved(2, 4), 2e-6, 1e-15);
+}
+
+}  // namespace
+}  // namespace plumb

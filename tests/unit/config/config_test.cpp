@@ -1,0 +1,255 @@
+#include "daemon/config/config.hpp"
+
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "algo/base/errors.hpp"
+#include "algo/base/units.hpp"
+
+namespace plumb {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+std::string ErrorOf(const std::string& text) {
+  try {
+    (void)ParseConfig(text, "test.toml");
+  } catch (const DataError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(ConfigTest, AnEmptyFileKeepsEveryDefault) {
+  const Config config = ParseConfig("", "test.toml");
+  EXPECT_EQ(config.reconstruct.preset, Preset::kBest);
+  EXPECT_DOUBLE_EQ(config.compare.limits.shift_tolerance_m,
+                   CompareOptions{}.limits.shift_tolerance_m);
+  EXPECT_FALSE(config.markers.dictionary);
+  EXPECT_FALSE(config.region_file);
+}
+
+TEST(ConfigTest, ReadsEveryKeyInItsUnit) {
+  const Config config = ParseConfig(R"(
+[markers]
+dictionary = "DICT_ARUCO_MIP_36h12"
+length_m = 0.08
+reference = 12
+[reconstruct]
+preset = "paper"
+keep_color = false
+use_markers = false
+use_keypoints = false
+num_icp_iterations = 50
+seed = 9
+[compare]
+preset = "paper"
+region = "torso.json"
+isocentre_m = [0.4, 0.2, 0]
+marker_kind = "couch"
+posture = "FFP"
+shift_tolerance_mm = 2
+rotation_tolerance_deg = 0.5
+min_shared_markers = 4
+moved_marker_mm = 6.5
+moved_marker_sigmas = 4
+min_coverage = 0.8
+max_hole_mm = 40
+max_residual_p95_mm = 20
+max_lost_s = 2
+[iec]
+T_iec_reference = [[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]]
+)",
+                                    "test.toml");
+  EXPECT_EQ(config.markers.dictionary, "DICT_ARUCO_MIP_36h12");
+  EXPECT_EQ(config.markers.length_m, 0.08);
+  EXPECT_EQ(config.markers.reference, 12);
+  EXPECT_EQ(config.reconstruct.preset, Preset::kPaper);
+  EXPECT_FALSE(config.reconstruct.keep_color);
+  EXPECT_FALSE(config.reconstruct.use_markers);
+  EXPECT_FALSE(config.reconstruct.use_keypoints);
+  EXPECT_EQ(config.reconstruct.num_icp_iterations, 50);
+  EXPECT_EQ(config.reconstruct.seed, 9U);
+  EXPECT_EQ(config.compare.preset, Preset::kPaper);
+  EXPECT_EQ(config.region_file, "torso.json");
+  EXPECT_EQ(config.compare.isocentre_m, Eigen::Vector3d(0.4, 0.2, 0));
+  EXPECT_EQ(config.compare.marker_kind, MarkerKind::kCouch);
+  EXPECT_EQ(config.compare.posture, PatientPosture::kFeetFirstProne);
+  EXPECT_DOUBLE_EQ(config.compare.limits.shift_tolerance_m, 0.002);
+  EXPECT_DOUBLE_EQ(config.compare.limits.rotation_tolerance_rad, 0.5 * kDegree);
+  EXPECT_EQ(config.compare.limits.min_shared_markers, 4);
+  EXPECT_DOUBLE_EQ(config.compare.markers.moved_m, 0.0065);
+  EXPECT_DOUBLE_EQ(config.compare.markers.moved_sigmas, 4);
+  EXPECT_DOUBLE_EQ(config.compare.limits.min_coverage, 0.8);
+  EXPECT_DOUBLE_EQ(config.compare.limits.max_hole_m, 0.04);
+  EXPECT_DOUBLE_EQ(config.compare.limits.max_residual_p95_m, 0.02);
+  EXPECT_DOUBLE_EQ(config.compare.limits.max_lost_s, 2);
+  EXPECT_NEAR(
+      (config.compare.T_iec_reference * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(0.1, 1.2, 0.3))
+          .norm(),
+      0, 1e-12);
+}
+
+TEST(ConfigTest, NamesTheLineOfAnUnknownKey) {
+  EXPECT_THAT(ErrorOf("[reconstruct]\nseed = 1\ncolour = true\n"),
+              AllOf(HasSubstr("test.toml:3:"), HasSubstr("unknown key 'colour'")));
+  EXPECT_THAT(ErrorOf("[recnstruct]\n"), AllOf(HasSubstr("test.toml:1:"), HasSubstr("recnstruct")));
+}
+
+TEST(ConfigTest, NamesLineKeyExpectedAndFound) {
+  EXPECT_THAT(ErrorOf("\n[markers]\nlength_m = -0.1\n"),
+              AllOf(HasSubstr("test.toml:3:"), HasSubstr("markers.length_m"), HasSubstr("-0.1")));
+  EXPECT_THAT(ErrorOf("[markers]\ndictionary = \"DICT_6X6_25O\"\n"),
+              AllOf(HasSubstr("test.toml:2: markers.dictionary"), HasSubstr("DICT_6X6_25O"),
+                    HasSubstr("DICT_6X6_250, ")));
+  EXPECT_THAT(ErrorOf("[reconstruct]\nseed = \"one\"\n"),
+              AllOf(HasSubstr("test.toml:2:"), HasSubstr("seed"), HasSubstr("one")));
+  EXPECT_THAT(ErrorOf("[reconstruct]\nseed = -1\n"), HasSubstr("reconstruct.seed"));
+  EXPECT_THAT(ErrorOf("[reconstruct]\nnum_icp_iterations = 99999999999999\n"),
+              HasSubstr("1 to 1000"));
+  EXPECT_THAT(ErrorOf("[reconstruct]\npreset = \"fast\"\n"),
+              AllOf(HasSubstr("\"best\", \"paper\""), HasSubstr("fast")));
+  EXPECT_THAT(ErrorOf("[compare]\nshift_tolerance_mm = nan\n"), HasSubstr("shift_tolerance_mm"));
+  EXPECT_THAT(ErrorOf("[compare]\nisocentre_m = [1, 2]\n"), HasSubstr("[x, y, z]"));
+  EXPECT_THAT(ErrorOf("[iec]\nT_iec_reference = [[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n"),
+              HasSubstr("rigid transform"));
+  EXPECT_THAT(ErrorOf("compare = 3\n"), HasSubstr("a table"));
+  EXPECT_THAT(ErrorOf("[compare\n"), AllOf(HasSubstr("test.toml:1:"), HasSubstr("not valid TOML")));
+}
+
+// What a patient's plan holds must not come from a file of the room.
+TEST(ConfigTest, PlumbdRefusesTheKeysOfThePlanAndSaysWhereTheyBelong) {
+  for (const char* line :
+       {"region = \"torso.json\"", "isocentre_m = [0.1, 0.2, 0.3]", "marker_kind = \"couch\"",
+        "posture = \"HFP\"", "shift_tolerance_mm = 3", "rotation_tolerance_deg = 1"}) {
+    const std::string text = std::string("[compare]\nmax_hole_mm = 40\n") + line + "\n";
+    const std::string key = std::string(line).substr(0, std::string(line).find(' '));
+    try {
+      (void)ParseConfig(text, "plumb.toml", ConfigUse::kAppliance);
+      ADD_FAILURE() << line << " was taken";
+    } catch (const DataError& error) {
+      EXPECT_THAT(error.what(), AllOf(HasSubstr("plumb.toml:3: compare." + key),
+                                      HasSubstr("plan of each reference"), HasSubstr("page")));
+    }
+    EXPECT_NO_THROW((void)ParseConfig(text, "plumb.toml", ConfigUse::kCommandLine)) << line;
+  }
+  EXPECT_DOUBLE_EQ(ParseConfig("[compare]\nmax_hole_mm = 40\n", "plumb.toml", ConfigUse::kAppliance)
+                       .compare.limits.max_hole_m,
+                   0.04)
+      << "the limits of the room stay";
+}
+
+TEST(ConfigTest, WhatTakesEffectAtTheStartIsKeptAndNamed) {
+  const std::string at_start = R"(
+[markers]
+dictionary = "DICT_4X4_50"
+length_m = 0.08
+reference = 12
+[button]
+chip = "a"
+line = "b"
+active_low = false
+[light]
+chip = "c"
+red = "d"
+green = "e"
+blue = "f"
+beeper = "g"
+active_low = true
+[update]
+folder = "/updates"
+max_bundle_mb = 7
+[web]
+listen = "127.0.0.1:1"
+tls_certificate = "/c"
+tls_key = "/k"
+host_names = ["h"]
+[appliance]
+state = "/s"
+control = "/c"
+calibration = "/d"
+sensor_serial = "7"
+)";
+  const Config in_use = ParseConfig("", "test.toml");
+  Config next = ParseConfig(at_start + "result_s = 5\n[check]\nmin_views = 3\n", "test.toml");
+  EXPECT_THAT(
+      KeepUntilRestart(in_use, next),
+      testing::UnorderedElementsAre(
+          "markers.dictionary", "markers.length_m", "markers.reference", "button.chip",
+          "button.line", "button.active_low", "light.chip", "light.red", "light.green",
+          "light.blue", "light.beeper", "light.active_low", "update.folder", "update.max_bundle_mb",
+          "web.listen", "web.tls_certificate", "web.tls_key", "web.host_names", "appliance.state",
+          "appliance.control", "appliance.calibration", "appliance.sensor_serial"));
+  EXPECT_EQ(next.web.listen, in_use.web.listen);
+  EXPECT_EQ(next.appliance.result_s, 5);
+  EXPECT_EQ(next.check.min_views, 3);
+  EXPECT_THAT(KeepUntilRestart(in_use, next), testing::IsEmpty());
+}
+
+TEST(ConfigTest, TheAppliancesPresetIsBestAlone) {
+  EXPECT_NO_THROW(RefuseResearchPresets(Config{}));
+  EXPECT_NO_THROW(RefuseResearchPresets(ParseConfig("[compare]\npreset = \"best\"\n", "t")));
+  for (const std::string section : {"compare", "reconstruct"}) {
+    const Config config = ParseConfig("[" + section + "]\npreset = \"paper\"\n", "t");
+    EXPECT_THAT([&] { RefuseResearchPresets(config); },
+                testing::ThrowsMessage<DataError>(
+                    HasSubstr("[" + section + "] preset: expected \"best\"")));
+  }
+}
+
+TEST(ConfigTest, AMissingFileIsBadInput) {
+  EXPECT_THROW((void)ReadConfig("/nonexistent/plumb.toml"), DataError);
+}
+
+class RegionTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    file_ = std::filesystem::path(testing::TempDir()) /
+            (std::string("region_") +
+             testing::UnitTest::GetInstance()->current_test_info()->name() + ".json");
+  }
+  void TearDown() override { std::filesystem::remove(file_); }
+  std::vector<Eigen::Vector2d> Read(const std::string& text) {
+    std::ofstream(file_) << text;
+    return ReadRegion(file_);
+  }
+  std::filesystem::path file_;
+};
+
+TEST_F(RegionTest, ReadsAPolygon) {
+  const auto polygon = Read(
+      R"({"format": 1, "frame": "reference_marker", "polygon_m": [[0, 0], [0.5, 0], [0.5, 0.25]]})");
+  ASSERT_EQ(polygon.size(), 3U);
+  EXPECT_EQ(polygon[2], Eigen::Vector2d(0.5, 0.25));
+}
+
+TEST_F(RegionTest, RefusesWhatIsNoRegion) {
+  EXPECT_THROW((void)Read("{"), DataError);
+  EXPECT_THROW((void)Read("[]"), DataError);
+  EXPECT_THROW(
+      (void)Read(
+          R"({"format": 2, "frame": "reference_marker", "polygon_m": [[0, 0], [1, 0], [1, 1]]})"),
+      DataError);
+  EXPECT_THROW(
+      (void)Read(R"({"format": 1, "frame": "world", "polygon_m": [[0, 0], [1, 0], [1, 1]]})"),
+      DataError);
+  EXPECT_THROW(
+      (void)Read(R"({"format": 1, "frame": "reference_marker", "polygon_m": [[0, 0], [1, 0]]})"),
+      DataError);
+  EXPECT_THROW(
+      (void)Read(
+          R"({"format": 1, "frame": "reference_marker", "polygon_m": [[0, 0], [1, 0], [1, "a"]]})"),
+      DataError);
+  EXPECT_THROW(
+      (void)Read(
+          R"({"format": 1, "frame": "reference_marker", "polygon_m": [[0, 0], [1, 0], [1, 1e30]]})"),
+      DataError);
+  EXPECT_THROW((void)ReadRegion("/nonexistent.json"), DataError);
+}
+
+}  // namespace
+}  // namespace plumb

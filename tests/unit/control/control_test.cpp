@@ -1,0 +1,190 @@
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <string>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/control/control_protocol.hpp"
+#include "daemon/control/control_server.hpp"
+#include "daemon/control/unix_socket.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::MessageOf;
+using Kind = ControlRequest::Kind;
+
+TEST(ControlProtocolTest, EveryRequestReadsBack) {
+  for (const ControlRequest& request :
+       {ControlRequest{.kind = Kind::kStatus, .action = {}, .argument = {}},
+        ControlRequest{.kind = Kind::kWatch, .action = {}, .argument = {}},
+        ControlRequest{.kind = Kind::kPress, .is_long = false, .action = {}, .argument = {}},
+        ControlRequest{.kind = Kind::kPress, .is_long = true, .action = {}, .argument = {}},
+        ControlRequest{.kind = Kind::kSim, .action = "next-scene", .argument = {}},
+        ControlRequest{.kind = Kind::kSim, .action = "glitch", .argument = "late 30"}}) {
+    EXPECT_EQ(ParseControlRequest(ControlRequestText(request)), request);
+  }
+}
+
+TEST(ControlProtocolTest, RefusesEverythingElse) {
+  for (const char* line :
+       {"", "status", "[]", "{}", "null", "{\"command\":1}", "{\"command\":\"reboot\"}",
+        "{\"command\":\"status\",\"x\":1}", "{\"command\":\"press\",\"long\":\"yes\"}",
+        "{\"command\":\"sim\"}", "{\"command\":\"sim\",\"action\":\"explode\"}",
+        "{\"command\":\"sim\",\"action\":\"plug\",\"argument\":7}",
+        "{\"command\":\"sim\",\"action\":\"plug\",\"argument\":\"a\\nb\"}",
+        "{\"command\":{\"a\":{\"b\":{}}}}", "{\"command\":\"status\"} {}",
+        "{\"command\":\"status\"", "\xff\xfe"}) {
+    EXPECT_THROW((void)ParseControlRequest(line), DataError) << line;
+  }
+  EXPECT_THROW((void)ParseControlRequest(std::string(100'000, '[')), DataError);
+  EXPECT_THAT(MessageOf<DataError>(
+                  [] { (void)ParseControlRequest("{\"command\":\"sim\",\"action\":\"x\"}"); }),
+              HasSubstr("next-scene"));
+}
+
+TEST(UnixSocketTest, WorksAtAPathThatIsLongerThanAnAddress) {
+  const testing::TempFolder folder;
+  const std::filesystem::path deep = folder / std::string(100, 'd') / std::string(60, 'e');
+  std::filesystem::create_directories(deep);
+  const int listening = ListenUnix(deep / "control.sock");
+  const int client = ConnectUnix(deep / "control.sock");
+  EXPECT_GE(client, 0);
+  ::close(client);
+  ::close(listening);
+}
+
+TEST(UnixSocketTest, ReplacesTheSocketOfADeadProcessOnly) {
+  const testing::TempFolder folder;
+  const int first = ListenUnix(folder / "s");
+  EXPECT_THAT(MessageOf<IoError>([&] { (void)ListenUnix(folder / "s"); }),
+              HasSubstr("another plumbd"));
+  ::close(first);  // the file stays, as after a crash
+  const int second = ListenUnix(folder / "s");
+  struct stat status {};
+  ASSERT_EQ(::stat((folder / "s").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0117, 0U) << "nobody but owner and group";
+  ::close(second);
+  EXPECT_THAT(MessageOf<DeviceError>([&] { ::close(ConnectUnix(folder / "s")); }),
+              HasSubstr("running"));
+}
+
+/// A server whose handler echoes the command, and clients that live on their own threads.
+class ControlServerTest : public ::testing::Test {
+ protected:
+  ControlServerTest()
+      : server_(loop_, ListenUnix(folder_ / "s"),
+                [this](const auto& request, const auto& reply) { Handle(request, reply); },
+                {.max_clients = 4, .max_waiting = 64 << 10}) {}
+
+  void Handle(const ControlRequest& request, const ControlServer::Reply& reply) {
+    if (request.kind == Kind::kSim) {  // answered later
+      later_ = loop_.MakeTimer("later", [reply] { reply(ControlDone()); });
+      later_.ArmAfter(std::chrono::milliseconds(20));
+    } else {
+      reply(ControlDone());
+    }
+  }
+
+  static void Send(int fd, const std::string& text) {
+    (void)::send(fd, text.data(), text.size(), MSG_NOSIGNAL);
+  }
+  /// Until the end of a line, or of the connection.
+  static std::string ReadLine(int fd) {
+    std::string line;
+    for (char c = 0; ::recv(fd, &c, 1, 0) == 1 && c != '\n';) line += c;
+    return line;
+  }
+  /// Runs the loop while `client` does its part on another thread.
+  template <typename Client>
+  void RunWith(const Client& client) {
+    std::jthread thread([&] {
+      client();
+      loop_.Quit(0);
+    });
+    loop_.Run();
+  }
+
+  testing::TempFolder folder_;
+  EventLoop loop_;
+  ControlServer server_;
+  EventLoop::Source later_;
+};
+
+TEST_F(ControlServerTest, AnswersSeveralRequestsInOnePieceAndOneInSeveral) {
+  RunWith([&] {
+    const int fd = ConnectUnix(folder_ / "s");
+    Send(fd, "{\"command\":\"status\"}\n{\"command\":\"status\"}\n{\"comm");
+    EXPECT_EQ(ReadLine(fd), ControlDone());
+    EXPECT_EQ(ReadLine(fd), ControlDone());
+    Send(fd, "and\":\"status\"}\n");
+    EXPECT_EQ(ReadLine(fd), ControlDone());
+    ::close(fd);
+  });
+}
+
+TEST_F(ControlServerTest, WhoStopsWritingStillGetsALateAnswer) {
+  RunWith([&] {
+    const int fd = ConnectUnix(folder_ / "s");
+    Send(fd, "{\"command\":\"sim\",\"action\":\"plug\"}\n");
+    ::shutdown(fd, SHUT_WR);
+    EXPECT_EQ(ReadLine(fd), ControlDone());
+    EXPECT_EQ(ReadLine(fd), "") << "and then the connection ends";
+    ::close(fd);
+  });
+  EXPECT_EQ(server_.num_clients(), 0U);
+}
+
+TEST_F(ControlServerTest, AWatcherThatNeverReadsIsDroppedAndOthersAreNot) {
+  const int deaf = ConnectUnix(folder_ / "s"), good = ConnectUnix(folder_ / "s");
+  Send(deaf, "{\"command\":\"watch\"}\n");
+  Send(good, "{\"command\":\"watch\"}\n");
+  constexpr int kLines = 1000;
+  int received = 0;
+  RunWith([&] {
+    EXPECT_EQ(ReadLine(good), ControlDone());
+    for (; received < kLines; ++received) {
+      loop_.Post("broadcast",
+                 [&] { server_.Broadcast("{\"event\":\"" + std::string(1000, 'x') + "\"}"); });
+      if (ReadLine(good).size() < 1000) break;
+    }
+  });
+  EXPECT_EQ(received, kLines);
+  EXPECT_EQ(server_.num_clients(), 1U) << "a megabyte was more than may wait for the deaf one";
+  ::close(deaf);
+  ::close(good);
+}
+
+TEST_F(ControlServerTest, TooManyClientsAreTurnedAwayAndRoomComesBack) {
+  RunWith([&] {
+    std::vector<int> fds;
+    for (int i = 0; i < 4; ++i) {
+      fds.push_back(ConnectUnix(folder_ / "s"));
+      Send(fds.back(), "{\"command\":\"status\"}\n");
+      EXPECT_EQ(ReadLine(fds.back()), ControlDone());
+    }
+    const int fifth = ConnectUnix(folder_ / "s");
+    EXPECT_EQ(ReadLine(fifth), "");
+    ::close(fifth);
+    for (const int fd : fds) ::close(fd);
+    std::string answer;  // the loop notices the free places in its own time
+    while (answer.empty()) {
+      const int fd = ConnectUnix(folder_ / "s");
+      Send(fd, "{\"command\":\"status\"}\n");
+      answer = ReadLine(fd);
+      ::close(fd);
+    }
+    EXPECT_EQ(answer, ControlDone());
+  });
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,128 @@
+// Packed maps read back as the maps they were made of, and reports are whole PDF files.
+#include "daemon/files/compact_map.hpp"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+
+#include "algo/base/errors.hpp"
+#include "daemon/files/pdf_report.hpp"
+#include "drivers/files/image_file.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+/// As a browser reads it, written from the description in the header.
+cv::Mat Unpacked(const std::string& bytes) {
+  const auto number = [&](std::size_t i) {
+    return static_cast<unsigned char>(bytes[4 + 2 * i]) |
+           static_cast<unsigned char>(bytes[5 + 2 * i]) << 8;
+  };
+  EXPECT_EQ(bytes.substr(0, 4), "PLM1");
+  const int x0 = number(2), y0 = number(3), w = number(4), h = number(5);
+  std::vector<unsigned char> cells(2 * static_cast<std::size_t>(w) * static_cast<std::size_t>(h));
+  uLongf size = cells.size();
+  EXPECT_EQ(uncompress(cells.data(), &size, reinterpret_cast<const Bytef*>(bytes.data() + 16),
+                       bytes.size() - 16),
+            Z_OK);
+  EXPECT_EQ(size, cells.size());
+  cv::Mat map(number(1), number(0), CV_16SC1, cv::Scalar(-32768));
+  for (int row = 0; row < h; ++row) {
+    std::uint16_t cell = 0;
+    for (int column = 0; column < w; ++column) {
+      const std::size_t at = 2 * (static_cast<std::size_t>(row) * static_cast<std::size_t>(w) +
+                                  static_cast<std::size_t>(column));
+      cell = static_cast<std::uint16_t>(cell + (cells[at] | cells[at + 1] << 8));
+      map.at<std::int16_t>(y0 + row, x0 + column) = static_cast<std::int16_t>(cell);
+    }
+  }
+  return map;
+}
+
+TEST(CompactMap, KeepsTenthsOfAMillimetreAndWhatIsEmpty) {
+  const testing::TempFolder folder;
+  fs::create_directories(folder / "scene");
+  cv::Mat heights(50, 70, CV_32FC1, cv::Scalar(kNaN));
+  for (int row = 10; row < 40; ++row) {
+    for (int column = 20; column < 60; ++column)
+      heights.at<float>(row, column) = 0.001F * static_cast<float>(row - 2 * column);
+  }
+  heights.at<float>(20, 30) = kNaN;
+  heights.at<float>(21, 30) = 9.0F;  // beyond what 16 bits hold
+  WriteFloatTiff(folder / "scene/heightmap.tiff", heights);
+  const std::string packed = CompactMap(folder / "", "heightmap");
+  EXPECT_LT(packed.size(), 1500U);
+  const cv::Mat map = Unpacked(packed);
+  ASSERT_EQ(map.size(), heights.size());
+  for (int row = 0; row < map.rows; ++row) {
+    for (int column = 0; column < map.cols; ++column) {
+      const float metres = heights.at<float>(row, column);
+      const int expected = std::isnan(metres)
+                               ? -32768
+                               : std::min(32767, static_cast<int>(std::lround(metres * 10000)));
+      ASSERT_EQ(map.at<std::int16_t>(row, column), expected) << row << ", " << column;
+    }
+  }
+}
+
+TEST(CompactMap, TellsAHoleOfTheRegionFromWhatLiesOutside) {
+  const testing::TempFolder folder;
+  fs::create_directories(folder / "result");
+  cv::Mat deviation(6, 6, CV_32FC1, cv::Scalar(0.002)), region(6, 6, CV_8UC1, cv::Scalar(0));
+  region(cv::Rect(1, 1, 4, 4)) = 255;
+  deviation.at<float>(2, 2) = kNaN;
+  deviation.at<float>(0, 0) = kNaN;
+  WriteFloatTiff(folder / "result/deviation.tiff", deviation);
+  WritePng(folder / "result/region.png", region);
+  const cv::Mat map = Unpacked(CompactMap(folder / "", "region"));
+  EXPECT_EQ(map.at<std::int16_t>(1, 1), 1);
+  EXPECT_EQ(map.at<std::int16_t>(2, 2), 2);
+  EXPECT_EQ(map.at<std::int16_t>(0, 0), -32768);
+  EXPECT_THROW((void)CompactMap(folder / "", "deviation_after"), DataError);
+  EXPECT_THROW((void)CompactMap(folder / "", "../../etc/passwd"), DataError);
+}
+
+TEST(PdfReport, IsAWholeFileWhateverIsMissing) {
+  ScanReport report{.title = "Scan report",
+                    .verdict = "MOVE",
+                    .why = "The correction below was to be applied.",
+                    .identity = {{"Patient", "P-0042"}, {"Approved by", "clara"}},
+                    .numbers = {{"vertical", "mm", -8.04, 0.6, 3.0, "down"},
+                                {"pitch", "\xC2\xB0", 0.01, 0.14, 1.0, "below its uncertainty"},
+                                {"lateral", "mm", std::nullopt, 0.0, 3.0, ""}},
+                    .cautions = {"The daily check was overdue at this scan."},
+                    .quality = {{"Markers matched", "8"}},
+                    .body = {},
+                    .pictures = {"/nowhere/error_map.png"},
+                    .footer = "Plumb"};
+  const std::string pdf = PdfOf(report);
+  EXPECT_EQ(pdf.substr(0, 5), "%PDF-");
+  EXPECT_NE(pdf.find("%%EOF"), std::string::npos);
+  CourseReport course{.title = "Course", .identity = {}, .rows = {}, .footer = ""};
+  const std::size_t empty = PdfOf(course).size();
+  for (int i = 0; i < 120; ++i)
+    course.rows.push_back({.fraction = std::to_string(i),
+                           .when = "2026-01-01 10:00",
+                           .verdict = "IN TOLERANCE",
+                           .accepted = "anna",
+                           .values = {0.1, 0.2, 0.3, 0.01, 0.02, 0.03}});
+  const std::string long_course = PdfOf(course);
+  EXPECT_GT(long_course.size(), empty);
+  EXPECT_NE(long_course.find("/Count 3"), std::string::npos) << "pages";
+}
+
+}  // namespace
+}  // namespace plumb

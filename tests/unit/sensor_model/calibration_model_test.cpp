@@ -1,0 +1,56 @@
+#include "algo/sensor_model/calibration_model.hpp"
+
+#include <gtest/gtest.h>
+
+namespace plumb {
+namespace {
+
+TEST(CalibrationModel, NothingWrongChangesNothing) {
+  const CalibrationModel model;
+  Intrinsics k;
+  k.distortion = {0.1, -0.2, 0.001, 0.002, 0.03};
+  EXPECT_EQ(model.Corrected(k), k);
+  EXPECT_EQ(model.CorrectedDepth(0.87, {0.4, -0.3}), 0.87);
+}
+
+TEST(CalibrationModel, CorrectsTheLensInPixelsOfSixHundredAndFortyColumns) {
+  CalibrationModel model;
+  model.lens = {0.01, -0.02, 3.0, -4.0, 0.05, 0.06};
+  Intrinsics k;
+  k.width = 320;
+  k.height = 240;
+  k.fx = 200;
+  k.fy = 300;
+  k.cx = 160;
+  k.cy = 120;
+  const Intrinsics c = model.Corrected(k);
+  EXPECT_DOUBLE_EQ(c.fx, 202.0);
+  EXPECT_DOUBLE_EQ(c.fy, 294.0);
+  EXPECT_DOUBLE_EQ(c.cx, 161.5);
+  EXPECT_DOUBLE_EQ(c.cy, 118.0);
+  EXPECT_DOUBLE_EQ(c.distortion[0], 0.05);
+  EXPECT_DOUBLE_EQ(c.distortion[1], 0.06);
+}
+
+TEST(CalibrationModel, CorrectsDepthTermByTerm) {
+  CalibrationModel model;
+  model.depth = {0.01, 0.002, 0.004,  9, 9,
+                 9,    0.003, -0.005, 9};  // Shifts and times are no matter of one depth value.
+  // 0.8 (1 + 0.01 + 0.003 * 0.5 - 0.005 * -0.2) + 0.002 + 0.004 (0.25 + 0.04)
+  EXPECT_NEAR(model.CorrectedDepth(0.8, {0.5, -0.2}), 0.8 * 1.0125 + 0.002 + 0.00116, 1e-15);
+}
+
+TEST(CalibrationModel, CentredCoordinatesStartInTheMiddleAndGoByHalfWidths) {
+  EXPECT_EQ(CentredCoordinates(319.5, 239.5, 640, 480), Eigen::Vector2d(0, 0));
+  EXPECT_EQ(CentredCoordinates(-0.5, 239.5, 640, 480), Eigen::Vector2d(-1, 0));
+  EXPECT_EQ(CentredCoordinates(319.5, 479.5, 640, 480), Eigen::Vector2d(0, 0.75));
+  // The same place at half the size.
+  EXPECT_EQ(CentredCoordinates(-0.5, 119.5, 320, 240), Eigen::Vector2d(-1, 0));
+}
+
+TEST(CalibrationModel, NamesEveryParameter) {
+  EXPECT_EQ(CalibrationModel{}.Named().size(), 6U + 1U + 1U + CalibrationModel::kDepthSize);
+}
+
+}  // namespace
+}  // namespace plumb

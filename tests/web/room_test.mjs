@@ -1,0 +1,341 @@
+// The room and the treatment session: room_test.mjs NODE_MODULES SERVER OUT_FOLDER CHROMIUM
+// Who is on the couch, what may be acted on, who follows the button, and many screens at once.
+import { Harness } from './harness.mjs';
+
+const [modules, server, folder, chromium] = process.argv.slice(2);
+const h = await Harness.start({ modules, command: [server, 'FOLDER'], folder, chromium });
+const { check, equal } = h;
+const kSlow = { timeout: 60000 };
+
+const engineer = await h.person('engineer');
+const anna = await h.person('anna');
+const bob = await h.person('bob');
+const clara = await h.person('clara');
+
+const ok = async (page, path, method, body) => {
+  const answer = await h.api(page, path, method, body);
+  check(answer.status < 300, `${method} ${path}: ${answer.status} ${JSON.stringify(answer.body)}`);
+  return answer.body;
+};
+const state = async () => (await h.api(bob, 'status')).body;
+const until = async (what, holds) => {
+  for (const begun = Date.now(); !holds(await state());) {
+    check(Date.now() - begun < 60000, what);
+    await new Promise((ready) => { setTimeout(ready, 100); });
+  }
+};
+const inState = (name) => until(`state ${name}`, (status) => status.state === name);
+/// A sweep with the button, to its result.
+async function press() {
+  const before = (await state()).last_result?.id;
+  h.tell('press');
+  await until('a result', (status) => status.state === 'result' && status.last_result?.id !== before);
+}
+async function addPatient(code) {
+  return (await ok(anna, 'patients', 'POST', { code, site: 'thorax' })).id;
+}
+async function approvedPatient(code) {
+  const id = await addPatient(code);
+  const open = (await state()).session?.id ?? '';
+  await ok(anna, `patients/${id}/open`, 'POST', { purpose: 'reference', reason: '', replaces: open });
+  await press();
+  const { draft_reference_id: draft } = await ok(anna, `patients/${id}`, 'GET');
+  const { digest, revision } = await ok(clara, `references/${draft}`, 'GET');
+  await ok(clara, `references/${draft}/approve`, 'POST', { revision, digest });
+  return id;
+}
+const openOnPage = async (page, code) => {
+  await page.goto(`${h.url}#/patients`);
+  await page.getByRole('link', { name: code, exact: true }).click();
+  await page.getByRole('button', { name: 'Start treatment session' }).click();
+};
+
+let patient;
+await h.step('accounts, and a patient with an approved reference', async () => {
+  await h.firstStart(engineer);
+  for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'], ['clara', 'physicist']]) {
+    await ok(engineer, 'users', 'POST', { name, role, password: h.password });
+  }
+  for (const [page, name] of [[anna, 'anna'], [bob, 'bob'], [clara, 'clara']]) {
+    await h.logIn(page, name);
+  }
+  patient = await approvedPatient('P-0042');
+});
+
+const room = await h.person('room');
+await h.step('the room display is paired by the code that it shows, and changes nothing', async () => {
+  await room.goto(`${h.url}room`);
+  const code = await room.locator('.pair-code').innerText();
+  check(/^[0-9A-Z]{3}-[0-9A-Z]{3}$/.test(code), `a code to type: ${code}`);
+  await h.look(room, 'room-pairing');
+  await engineer.goto(`${h.url}#/users`);
+  await engineer.getByLabel('Code on the screen').fill('ZZZ-ZZZ');
+  await engineer.getByLabel('Name of the screen').fill('couch side');
+  await engineer.getByRole('button', { name: 'Pair the screen' }).click();
+  await engineer.getByRole('alert').getByText('no screen shows this code').waitFor();
+  await engineer.getByLabel('Code on the screen').fill(code.toLowerCase());
+  await engineer.getByRole('button', { name: 'Pair the screen' }).click();
+  await engineer.getByRole('cell', { name: 'couch side', exact: true }).waitFor();
+  await h.look(engineer, 'displays');
+  await room.locator('.room-code').waitFor();
+  for (const [method, path, body] of [['POST', 'press'], ['POST', 'scan/start'], ['GET', 'patients'],
+    ['GET', 'users'], ['POST', `patients/${patient}/open`, { purpose: 'fraction', reason: '' }],
+    ['POST', 'treatment/close', { session_id: '' }]]) {
+    equal((await h.api(room, path, method, body)).status, 403, `${method} ${path} by the display`);
+  }
+});
+
+await h.step('one tap opens, confirms and leads to the sweep; the room says whose session', async () => {
+  await openOnPage(anna, 'P-0042');
+  await anna.getByRole('button', { name: /Start sweep|Scan again/ }).waitFor();
+  await room.locator('.room-code', { hasText: 'P-0042' }).waitFor();
+  await room.locator('.room-fraction', { hasText: 'Fraction 1' }).waitFor();
+});
+
+await h.step('the room follows the button by itself, in words of 10 cm', async () => {
+  h.tell('slow');
+  h.tell('moved z 8 HFS');
+  h.tell('press');
+  for (const [advice, word] of [['slower', 'SLOWER'], ['closer', 'CLOSER'], ['farther', 'FARTHER'],
+    ['lost', 'LOST'], ['too_slow', 'COMPUTER TOO SLOW'], ['good', 'GOOD']]) {
+    h.tell(`guide ${advice}`);
+    const shown = room.locator('.room-word', { hasText: word });
+    await shown.waitFor(kSlow);
+    // On a screen of 40 inches (88 cm wide): the height of capital letters.
+    const size = await shown.evaluate((element) => parseFloat(getComputedStyle(element).fontSize));
+    const cm = size * 0.73 * 88.5 / 1920;
+    check(cm >= (word.length > 9 ? 5 : 10), `${word} is ${cm.toFixed(1)} cm high`);
+    const box = await shown.boundingBox();
+    check(box.x >= 0 && box.x + box.width <= 1920, `${word} fits`);
+    await h.look(room, `room-${advice}`, { fullPage: false });
+  }
+  equal(await room.locator('.number').count(), 0, 'no result during the sweep');
+  h.tell('guide');
+  h.tell('fast');
+  await room.locator('.room-word', { hasText: 'COMPUTING' }).waitFor(kSlow);
+  equal(await room.locator('.number').count(), 0, 'nor while it is computed');
+  await room.locator('.verdict.move').waitFor(kSlow);
+  equal(await room.locator('.number').count(), 6, 'six numbers');
+  await room.locator('.room-map canvas').waitFor();
+  await h.look(room, 'room-move', { fullPage: false });
+});
+
+await h.step('while a sweep runs or is computed no older result looks valid', async () => {
+  await anna.goto(`${h.url}#/result`);
+  await anna.locator('.verdict.move').waitFor();
+  equal(await anna.locator('.is-old').count(), 0, 'fresh at first');
+  h.tell('slow');
+  h.tell('press');
+  await inState('scanning');
+  await anna.getByText('A NEW SCAN IS RUNNING').waitFor();
+  equal(await anna.locator('.is-old').count(), 1, 'no longer valid');
+  equal(await anna.getByRole('button', { name: /^Accept/ }).count(), 0, 'nothing to accept');
+  await h.look(anna, 'result-while-scanning', { axe: false });
+  const old = await state();
+  equal((await h.api(anna, `scans/${old.last_result.id}/accept-outside`, 'POST',
+    { reason: 'because', password: h.password })).status, 409, 'nor through the interface');
+  await bob.goto(`${h.url}result?scan=${old.last_result.id}`);
+  await bob.getByText('A new scan is running.').waitFor();
+  await bob.goto(h.url);
+  h.tell('moved x 8 HFS');
+  h.tell('fast');
+  await anna.getByText('A NEW SCAN IS RUNNING').waitFor({ state: 'detached', ...kSlow });
+  await anna.locator('.number', { hasText: 'Lateral' }).getByText('−8.0').waitFor();
+  equal(await anna.locator('.is-old').count(), 0, 'the new one is valid');
+});
+
+await h.step('accepting outside tolerance takes a reason and the password', async () => {
+  const last = (await state()).last_result.id;
+  equal((await h.api(anna, `scans/${last}/accept`, 'POST')).status, 409, 'not in one tap');
+  equal(await anna.getByRole('button', { name: 'Accept', exact: true }).count(), 0, 'no such button');
+  await anna.getByText('Accept outside tolerance…').click();
+  await anna.getByLabel('Reason', { exact: true }).fill('swelling, known to the physician');
+  await anna.getByLabel('Your password').fill('not this one, no');
+  await anna.getByRole('button', { name: 'Accept outside tolerance' }).click();
+  await anna.getByRole('alert').getByText('the password is wrong').waitFor();
+  await anna.getByLabel('Your password').fill(h.password);
+  await h.look(anna, 'accept-outside');
+  await anna.getByRole('button', { name: 'Accept outside tolerance' }).click();
+  await anna.getByText('Accepted outside tolerance by anna: swelling').waitFor();
+  const { entries } = await ok(bob, 'audit?limit=20', 'GET');
+  check(entries.some(({ action }) => action === 'scan.accept_outside'), 'it is in the log');
+});
+
+await h.step('in tolerance: one tap accepts, and nothing commands a move', async () => {
+  h.tell('moved z 0 HFS');
+  h.tell('tolerated');
+  await press();
+  await anna.locator('.verdict.in_tolerance').waitFor();
+  await anna.getByText('Remaining difference: no move needed').waitFor();
+  equal(await anna.locator('.number .arrow').count(), 0, 'no arrows');
+  for (const word of await anna.locator('.number .word').allInnerTexts()) {
+    equal(word, 'no move needed', 'the words');
+  }
+  await anna.getByRole('button', { name: 'Accept', exact: true }).click();
+  await anna.getByText('Accepted by anna').waitFor();
+});
+
+await h.step('three words: within, not surely within, outside; no digits below the uncertainty', async () => {
+  h.tell('unsure');
+  await press();
+  await anna.locator('.verdict.unsure').waitFor();
+  await anna.locator('.verdict', { hasText: 'NOT SURELY WITHIN' }).waitFor();
+  const card = anna.locator('.number', { hasText: 'Vertical' });
+  equal(await card.locator('.judged').innerText(), '≈ not surely within', 'the word');
+  equal((await card.locator('.value').innerText()).replace(/\s/g, ''), '−3mm', '−2.8 ±1.2');
+  await card.getByText('tolerance ±3 mm').waitFor();
+  const pitch = anna.locator('.number', { hasText: 'Pitch' });
+  equal(await pitch.locator('.value').innerText(), '0.0°', '0.01 ±0.14');
+  await h.look(anna, 'result-unsure');
+  equal(await anna.getByRole('button', { name: 'Accept', exact: true }).count(), 0, 'not in one tap');
+});
+
+await h.step('fraction numbers count sessions, not scans', async () => {
+  const { scans } = await ok(anna, `patients/${patient}/scans`, 'GET');
+  const fractions = scans.filter(({ purpose }) => purpose === 'fraction');
+  check(fractions.length >= 4, 'several scans');
+  equal(new Set(fractions.map(({ fraction }) => fraction)).size, 1, 'of one fraction');
+  await anna.goto(`${h.url}#/scan`);
+  await anna.getByRole('button', { name: 'Close session' }).click();
+  await anna.getByText('No session open').first().waitFor();
+  await openOnPage(anna, 'P-0042');
+  await anna.locator('.who-line', { hasText: 'Fraction 2' }).waitFor();
+});
+
+await h.step('a change from elsewhere is an alert to acknowledge', async () => {
+  const second = await approvedPatient('P-0050');  // its session has taken the place of P-0042's
+  await anna.getByRole('dialog').getByText('Now: P-0050').waitFor();
+  await anna.getByText('Check who is on the couch').waitFor();
+  await h.look(anna, 'session-alert', { fullPage: false });
+  equal(await anna.evaluate(() => document.querySelector('dialog').matches(':modal')), true,
+    'nothing else can be used before');
+  await anna.getByRole('button', { name: 'I have seen it' }).click();
+  equal(await anna.getByRole('dialog').count(), 0, 'acknowledged');
+  // Opening another patient names the one whose session ends.
+  await openOnPage(anna, 'P-0042');
+  await anna.getByText('The session of P-0050 is open.').first().waitFor();
+  equal((await state()).session.patient_id, second, 'nothing was changed yet');
+  equal((await h.api(anna, `patients/${patient}/open`, 'POST', { purpose: 'fraction', reason: '' }))
+    .status, 409, 'nor through the interface');
+  await anna.getByRole('button', { name: 'Close P-0050, open P-0042' }).click();
+  await anna.locator('.who-line', { hasText: 'P-0042' }).waitFor();
+  equal(await anna.getByRole('dialog').count(), 0, 'one’s own change is no alert');
+});
+
+await h.step('codes are unique without regard to case, and a wristband opens', async () => {
+  await anna.goto(`${h.url}#/patients`);
+  await anna.getByLabel('Code', { exact: true }).fill('p-0042');
+  await anna.getByRole('button', { name: 'Add a patient' }).click();
+  await anna.getByRole('alert').getByText(/there is a patient/).waitFor();
+  await anna.getByLabel('Find a code').fill('p-0050');
+  await anna.getByLabel('Find a code').press('Enter');
+  await anna.getByRole('heading', { name: 'P-0050' }).waitFor();
+});
+
+await h.step('without a session the button makes an unassigned scan that says so', async () => {
+  const { session } = await state();
+  await ok(anna, 'treatment/close', 'POST', { session_id: session.id });
+  await room.locator('.room-word', { hasText: 'NO SESSION' }).waitFor();
+  await h.look(room, 'room-no-session', { fullPage: false });
+  await anna.goto(`${h.url}#/scan`);
+  await press();
+  await room.locator('.verdict', { hasText: 'UNASSIGNED SCAN' }).waitFor();
+  await anna.locator('.verdict', { hasText: 'UNASSIGNED SCAN' }).waitFor();
+  await h.look(anna, 'result-unassigned');
+});
+
+await h.step('eight tabs of one browser and three browsers: every one live, one stream a browser', async () => {
+  const { session } = await state();
+  check(session === null, 'none is open');
+  const context = clara.context();
+  const tabs = [clara];
+  let streams = 0;
+  const watch = (page) => {
+    page.on('request', (one) => { if (one.url().endsWith('/events')) ++streams; });
+    page.on('requestfinished', (one) => { if (one.url().endsWith('/events')) --streams; });
+    page.on('requestfailed', (one) => { if (one.url().endsWith('/events')) --streams; });
+  };
+  for (let i = 1; i < 8; ++i) {
+    const tab = await context.newPage();
+    tab.setDefaultTimeout(20000);
+    watch(tab);
+    await tab.goto(`${h.url}#/scan`);
+    await tab.getByRole('button', { name: /Start sweep|Scan again/ }).waitFor();
+    tabs.push(tab);
+  }
+  await clara.goto(`${h.url}#/scan`);
+  await bob.goto(`${h.url}#/scan`);
+  await anna.goto(`${h.url}#/scan`);
+  check(streams <= 1, `streams of the tabs: ${streams}`);
+  h.tell('slow');
+  h.tell('press');
+  for (const page of [...tabs, bob, anna]) {
+    await page.getByRole('button', { name: 'End sweep' }).waitFor(kSlow);
+  }
+  // The tab that has the stream goes: another one takes its place.
+  await tabs.pop().close();
+  await clara.getByRole('button', { name: 'Discard scan' }).click();
+  for (const page of [...tabs, bob, anna]) {
+    await page.locator('.headline', { hasText: 'Ready' }).waitFor(kSlow);
+  }
+  h.tell('fast');
+  for (const page of tabs.slice(1)) await page.close();
+});
+
+await h.step('disconnected: states and buttons are off, and say how old they are', async () => {
+  h.server.kill('SIGSTOP');
+  try {
+    for (let i = 0; i < 8 && !(await anna.locator('.disconnected').count()); ++i) {
+      await h.setClockOn(anna, 30);
+      await anna.locator('.disconnected').waitFor({ timeout: 2500 }).catch(() => {});
+    }
+    await anna.getByText(/Last known: Ready, \d+ s ago/).first().waitFor();
+    const start = anna.getByRole('button', { name: 'Start sweep' });
+    equal(await start.getAttribute('aria-disabled'), 'true', 'the button is off');
+    await h.look(anna, 'scan-disconnected', { axe: false });
+  } finally {
+    h.server.kill('SIGCONT');
+  }
+  await anna.locator('.disconnected').waitFor({ state: 'detached', ...kSlow });
+});
+
+await h.step('Spanish and light: complete, and kept for the account and for the room', async () => {
+  await bob.goto(`${h.url}#/users`);
+  await bob.getByLabel('Language').selectOption('es');
+  await bob.getByRole('heading', { name: 'Cuentas' }).waitFor();
+  await bob.getByLabel('Tema').selectOption('light');
+  await bob.goto(`${h.url}#/result`);
+  await bob.locator('.verdict').waitFor();
+  await h.look(bob, 'result-spanish-light');
+  await bob.goto(`${h.url}#/status`);
+  await bob.locator('.tile').first().waitFor();
+  await h.look(bob, 'status-spanish-light');
+  await bob.reload();
+  await bob.getByRole('link', { name: 'Estado', exact: true }).waitFor();
+  await room.goto(`${h.url}room?language=es`);
+  await room.locator('.room-word', { hasText: 'SIN SESIÓN' }).waitFor();
+  await h.look(room, 'room-spanish', { fullPage: false });
+});
+
+await h.step('the numbers of a patient as CSV, JSON and PDF', async () => {
+  const get = (path) => anna.evaluate(async (where) => {
+    const response = await fetch(`/api/v1/${where}`);
+    return { status: response.status, text: await response.text() };
+  }, path);
+  const csv = await get(`patients/${patient}/numbers.csv`);
+  equal(csv.status, 200, 'CSV');
+  const [head, ...rows] = csv.text.trim().split('\r\n');
+  check(head.startsWith('patient,scan,fraction'), head);
+  check(rows.length >= 5, `${rows.length} rows`);
+  equal((await get(`patients/${patient}/numbers.json`)).status, 200, 'JSON');
+  check((await get(`patients/${patient}/report.pdf`)).text.startsWith('%PDF'), 'PDF');
+});
+
+await h.step('an unpaired display is out at once', async () => {
+  await engineer.goto(`${h.url}#/users`);
+  await engineer.getByRole('button', { name: 'Remove couch side' }).click();
+  await engineer.getByText('No screen is paired.').waitFor();
+  await room.locator('.pair-code').waitFor(kSlow);
+});
+
+await h.finish();

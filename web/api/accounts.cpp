@@ -1,0 +1,403 @@
+#include "web/api/accounts.hpp"
+
+#include <fmt/format.h>
+#include <sodium.h>
+
+#include <algorithm>
+
+#include "algo/base/errors.hpp"
+#include "web/api/json.hpp"
+#include "web/http/checks.hpp"
+
+namespace plumb::web {
+namespace {
+
+constexpr std::size_t kMinPassword = 10;
+constexpr std::size_t kMaxPassword = 128;
+constexpr std::size_t kMaxName = 32;
+
+/// "XXXX-XXXX" without letters that are easily mistaken: 40 bits.
+std::string MakeSetupCode() {
+  constexpr std::string_view kLetters = "23456789ABCDEFGHJKLMNPQRSTUVWXYZ";
+  std::string code;
+  for (int i = 0; i < 8; ++i) {
+    if (i == 4) code += '-';
+    code += kLetters[randombytes_uniform(static_cast<std::uint32_t>(kLetters.size()))];
+  }
+  return code;
+}
+
+bool SameText(const std::string& a, const std::string& b) {
+  return a.size() == b.size() && sodium_memcmp(a.data(), b.data(), a.size()) == 0;
+}
+
+std::string ReadName(Fields& fields) {
+  std::string name = fields.Text("name", 1, kMaxName);
+  const bool valid = IsName(name) && std::none_of(name.begin(), name.end(),
+                                                  [](char c) { return c >= 'A' && c <= 'Z'; });
+  if (!valid)
+    throw DataError(
+        "name must be small letters, digits, '.', '-' or '_', and not begin with a dot");
+  return name;
+}
+
+Role ReadRole(Fields& fields) {
+  const auto role = ParseRole(fields.Text("role", 1, kMaxName));
+  if (!role) throw DataError("role must be technician, physicist or engineer");
+  return *role;
+}
+
+Response Busy() {
+  Response response = ErrorResponse(503, "too many logins wait; try again in a few seconds");
+  response.headers.emplace_back("Retry-After", "5");
+  return response;
+}
+
+Response TooMany(std::chrono::seconds wait) {
+  Response response =
+      ErrorResponse(429, fmt::format("too many wrong passwords; wait {} seconds", wait.count()));
+  response.headers.emplace_back("Retry-After", std::to_string(wait.count()));
+  return response;
+}
+
+Response Redirect(const std::string& where) {
+  Response response;
+  response.status = 303;
+  response.type = "text/plain; charset=utf-8";
+  response.headers.emplace_back("Location", where);
+  return response;
+}
+
+}  // namespace
+
+Response ChangeResponse(const Change& change) {
+  switch (change.result) {
+    case ChangeResult::kDone:
+      break;
+    case ChangeResult::kInvalid:
+      return ErrorResponse(400, change.message);
+    case ChangeResult::kNotFound:
+      return ErrorResponse(404, change.message);
+    case ChangeResult::kConflict:
+      return ErrorResponse(409, change.message);
+    case ChangeResult::kRefused:
+      return ErrorResponse(403, change.message);
+    case ChangeResult::kNoSpace:
+      return ErrorResponse(507, change.message);
+    case ChangeResult::kFailed:
+      return ErrorResponse(500, change.message);
+  }
+  Response response;
+  response.status = change.id.empty() ? 200 : 201;
+  Json json = Json::object();
+  if (!change.id.empty()) json["id"] = change.id;
+  if (!change.message.empty()) json["message"] = change.message;
+  response.body = Dump(json);
+  return response;
+}
+
+Accounts::Accounts(ScanService& service, AccountOptions options)
+    : service_(service),
+      options_(std::move(options)),
+      displays_(service, options_.tls, options_.now),
+      worker_(options_.password_operations, options_.password_memory_bytes) {
+  if (service_.Users().empty()) setup_code_ = MakeSetupCode();
+  Expire();
+}
+
+std::optional<std::string> Accounts::setup_code() const {
+  return setup_code_.empty() ? std::nullopt : std::optional(setup_code_);
+}
+
+void Accounts::Expire() {
+  sessions_.SetLimits(std::chrono::minutes(service_.GetSettings().idle_logout_min),
+                      options_.session_limit);
+  sessions_.Expire(options_.now());
+}
+
+std::shared_ptr<Session> Accounts::SessionOf(const Request& request, bool touch) {
+  const auto token = CookieValue(request.Header("cookie"), cookie_name());
+  auto session = token ? sessions_.Find(*token, options_.now(), touch) : nullptr;
+  return session ? session : displays_.SessionOf(request);
+}
+
+std::string Accounts::Cookie(const std::string& token, bool end) const {
+  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict{}{}", cookie_name(), token,
+                     options_.tls ? "; Secure" : "", end ? "; Max-Age=0" : "");
+}
+
+Done Accounts::WhileAlive(Done done) const {
+  return [alive = std::weak_ptr(alive_), done = std::move(done)](const Change& change) {
+    if (!alive.expired()) done(change);
+  };
+}
+
+void Accounts::AddRoutes(Router& router) {
+  displays_.AddRoutes(router);
+  const auto bind = [this](void (Accounts::*handler)(const Request&, const Respond&)) {
+    return [this, handler](const Request& request, const Respond& respond) {
+      (this->*handler)(request, respond);
+    };
+  };
+  router.Add({"POST", "/api/v1/setup", Permission::kNone, BodyKind::kJson, bind(&Accounts::SetUp)});
+  router.Add({"POST", "/api/v1/login", Permission::kNone, BodyKind::kJson,
+              [this](const Request& request, const Respond& respond) {
+                Fields fields(request.body);
+                const std::string name = fields.Text("name", 1, kMaxName);
+                std::string password = fields.Text("password", 1, kMaxPassword);
+                fields.Finish();
+                LogIn(request, name, std::move(password), /*form=*/false, respond);
+              }});
+  router.Add({"POST", "/login", Permission::kNone, BodyKind::kForm,
+              [this](const Request& request, const Respond& respond) {
+                auto form = ParseForm(request.body);
+                if (!form || !IsPlainText((*form)["name"]) || (*form)["name"].size() > kMaxName ||
+                    (*form)["password"].size() > kMaxPassword) {
+                  return respond(ErrorResponse(400, "expected the fields name and password"));
+                }
+                LogIn(request, (*form)["name"], (*form)["password"], /*form=*/true, respond);
+              }});
+  router.Add(
+      {"POST", "/api/v1/logout", Permission::kLogin, BodyKind::kNone, bind(&Accounts::LogOut)});
+  router.Add({"GET", "/api/v1/session", Permission::kLogin, BodyKind::kNone,
+              bind(&Accounts::DescribeSession)});
+  router.Add({"POST", "/api/v1/session/password", Permission::kLogin, BodyKind::kJson,
+              bind(&Accounts::ChangeOwnPassword)});
+  router.Add({"POST", "/api/v1/scans/{id}/accept-outside", Permission::kAccept, BodyKind::kJson,
+              bind(&Accounts::AcceptOutside)});
+  router.Add({"GET", "/api/v1/users", Permission::kUsers, BodyKind::kNone,
+              [this](const Request&, const Respond& respond) {
+                Json users = Json::array();
+                for (const User& user : service_.Users()) users.push_back(ToJson(user));
+                Response response;
+                response.body = Dump({{"users", users}});
+                respond(std::move(response));
+              }});
+  router.Add(
+      {"POST", "/api/v1/users", Permission::kUsers, BodyKind::kJson, bind(&Accounts::AddUser)});
+  router.Add({"PUT", "/api/v1/users/{name}", Permission::kUsers, BodyKind::kJson,
+              bind(&Accounts::ChangeUser)});
+}
+
+void Accounts::HashThen(std::string password, const Respond& respond,
+                        std::function<void(const std::string&)> then) {
+  const bool accepted =
+      worker_.Hash(std::move(password),
+                   [respond, then = std::move(then)](const std::optional<std::string>& hash) {
+                     if (!hash)
+                       return respond(ErrorResponse(
+                           503, "not enough memory to hash a password; try again later"));
+                     then(*hash);
+                   });
+  if (!accepted) respond(Busy());
+}
+
+Response Accounts::Welcome(const User& user, bool form) {
+  const Sessions::Opened opened = sessions_.Open(user, options_.now());
+  Response response = form ? Redirect("/result") : Response{};
+  response.headers.emplace_back("Set-Cookie", Cookie(opened.token, /*end=*/false));
+  if (!form) response.body = Dump({{"user", user.name}, {"role", Name(user.role)}});
+  return response;
+}
+
+void Accounts::SetUp(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  const std::string code = fields.Text("code", 9, 9);
+  const std::string name = ReadName(fields);
+  std::string password = fields.Text("password", kMinPassword, kMaxPassword);
+  fields.Finish();
+  if (!needs_setup() || setting_up_)
+    return respond(ErrorResponse(409, "this appliance is set up already; log in"));
+  const auto now = options_.now();
+  // One counter for everybody: the code is short, so guesses are slow from wherever they come.
+  const std::string key = "setup";
+  if (const auto wait = limiter_.Wait(key, now); wait.count() > 0) return respond(TooMany(wait));
+  if (!SameText(code, setup_code_)) {
+    limiter_.Failed(key, now);
+    service_.Log(request.actor(), "setup.failed", "", "wrong code");
+    return respond(ErrorResponse(
+        403, "the setup code is wrong; it is printed on the console and in the journal"));
+  }
+  setting_up_ = true;
+  const Actor actor{name, request.address};
+  const Respond finish = [this, respond](Response response) {
+    setting_up_ = false;
+    respond(std::move(response));
+  };
+  HashThen(std::move(password), finish, [this, name, actor, finish](const std::string& hash) {
+    const User user{name, Role::kEngineer, hash, false, WallClock::now()};
+    service_.AddUser(actor, user, WhileAlive([this, user, finish](const Change& change) {
+                       if (change.result != ChangeResult::kDone)
+                         return finish(ChangeResponse(change));
+                       setup_code_.clear();
+                       finish(Welcome(user, /*form=*/false));
+                     }));
+  });
+}
+
+void Accounts::LogIn(const Request& request, const std::string& name, std::string password,
+                     bool form, const Respond& respond) {
+  const auto now = options_.now();
+  const std::string address_key = "address " + request.address, name_key = "name " + name;
+  const auto wait = std::max(limiter_.Wait(address_key, now), limiter_.Wait(name_key, now));
+  if (wait.count() > 0) return respond(TooMany(wait));
+  // Counted before the hash is done: many guesses sent at once are as slow as one after the other.
+  limiter_.Failed(address_key, now);
+  limiter_.Failed(name_key, now);
+  const auto user = service_.FindUser(name);
+  const std::string hash = user && !user->disabled ? user->password_hash : std::string();
+  const Actor actor{name, request.address};
+  const bool accepted = worker_.Verify(
+      std::move(password), hash,
+      [this, actor, hash, address_key, name_key, form, respond](bool matches) {
+        const auto still = service_.FindUser(actor.user);
+        if (!matches || !still || still->disabled || still->password_hash != hash) {
+          // Whatever was typed as a name stays out of the log: people type passwords there.
+          service_.Log({still ? actor.user : std::string(), actor.address}, "login.failed", "", "");
+          if (form) return respond(Redirect("/result?failed=1"));
+          return respond(ErrorResponse(403, "name or password is wrong"));
+        }
+        limiter_.Succeeded(address_key);
+        limiter_.Succeeded(name_key);
+        service_.Log(actor, "login", "", "");
+        respond(Welcome(*still, form));
+      });
+  if (!accepted) respond(Busy());
+}
+
+void Accounts::LogOut(const Request& request, const Respond& respond) {
+  sessions_.End(request.session);
+  service_.Log(request.actor(), "logout", "", "");
+  Response response;
+  response.headers.emplace_back("Set-Cookie", Cookie("", /*end=*/true));
+  response.body = "{}";
+  respond(std::move(response));
+}
+
+void Accounts::DescribeSession(const Request& request, const Respond& respond) {
+  Json permissions = Json::array();
+  for (const Permission permission : PermissionsOf(request.session->role))
+    permissions.push_back(Name(permission));
+  Response response;
+  response.body = Dump({{"user", request.session->user},
+                        {"role", Name(request.session->role)},
+                        {"permissions", permissions},
+                        {"csrf_token", request.session->csrf_token},
+                        {"idle_logout_min", service_.GetSettings().idle_logout_min}});
+  respond(std::move(response));
+}
+
+void Accounts::ChangeOwnPassword(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  std::string old_password = fields.Text("old_password", 1, kMaxPassword);
+  const std::string password = fields.Text("password", kMinPassword, kMaxPassword);
+  fields.Finish();
+  const auto user = service_.FindUser(request.session->user);
+  if (!user) return respond(ErrorResponse(409, "the account is gone"));
+  const std::string key = "name " + user->name;
+  if (const auto wait = limiter_.Wait(key, options_.now()); wait.count() > 0)
+    return respond(TooMany(wait));
+  limiter_.Failed(key, options_.now());
+  const bool accepted = worker_.Verify(
+      std::move(old_password), user->password_hash,
+      [this, user = *user, password, actor = request.actor(), session = request.session, key,
+       respond](bool matches) {
+        if (!matches) return respond(ErrorResponse(403, "the old password is wrong"));
+        limiter_.Succeeded(key);
+        HashThen(password, respond, [this, user, actor, session, respond](const std::string& hash) {
+          const UserChange wanted{.name = user.name,
+                                  .role = {},
+                                  .disabled = {},
+                                  .password_hash = hash,
+                                  .expected_hash = user.password_hash};
+          service_.ChangeUser(
+              actor, wanted,
+              WhileAlive([this, name = user.name, session, respond](const Change& change) {
+                if (change.result == ChangeResult::kDone) sessions_.EndAllOf(name, session);
+                respond(ChangeResponse(change));
+              }));
+        });
+      });
+  if (!accepted) respond(Busy());
+}
+
+void Accounts::AcceptOutside(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  const std::string reason = fields.Text("reason", 3, 200);
+  std::string password = fields.Text("password", 1, kMaxPassword);
+  fields.Finish();
+  const auto user = service_.FindUser(request.session->user);
+  if (!user) return respond(ErrorResponse(409, "the account is gone"));
+  const std::string key = "name " + user->name;
+  if (const auto wait = limiter_.Wait(key, options_.now()); wait.count() > 0)
+    return respond(TooMany(wait));
+  limiter_.Failed(key, options_.now());
+  const bool accepted = worker_.Verify(
+      std::move(password), user->password_hash,
+      [this, reason, actor = request.actor(), session = request.session,
+       scan = request.arguments.at(0), key, respond](bool matches) {
+        if (!matches) return respond(ErrorResponse(403, "the password is wrong"));
+        limiter_.Succeeded(key);
+        if (session->ended)
+          return respond(ErrorResponse(401, "the session has ended: log in again"));
+        service_.AcceptScan(actor, scan, reason, WhileAlive([respond](const Change& change) {
+                              respond(ChangeResponse(change));
+                            }));
+      });
+  if (!accepted) respond(Busy());
+}
+
+void Accounts::AddUser(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  User user;
+  user.name = ReadName(fields);
+  user.role = ReadRole(fields);
+  user.created_at = WallClock::now();
+  std::string password = fields.Text("password", kMinPassword, kMaxPassword);
+  fields.Finish();
+  HashThen(std::move(password), respond,
+           [this, user, actor = request.actor(), respond](const std::string& hash) {
+             User added = user;
+             added.password_hash = hash;
+             service_.AddUser(actor, added, [respond](const Change& change) {
+               Response response = ChangeResponse(change);
+               if (change.result == ChangeResult::kDone) response.status = 201;
+               respond(std::move(response));
+             });
+           });
+}
+
+void Accounts::ChangeUser(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  if (!service_.FindUser(request.arguments.at(0)))
+    return respond(ErrorResponse(404, "no account of that name"));
+  UserChange change{.name = request.arguments.at(0),
+                    .role = {},
+                    .disabled = {},
+                    .password_hash = {},
+                    .expected_hash = {}};
+  if (fields.Has("role")) change.role = ReadRole(fields);
+  if (fields.Has("disabled")) change.disabled = fields.Flag("disabled");
+  std::string password = fields.Has("password") ? fields.Text("password", 0, kMaxPassword)
+                                                : std::string();  // empty: stays as it is
+  fields.Finish();
+  const auto save = [this, actor = request.actor(), respond](const UserChange& what) {
+    service_.ChangeUser(actor, what,
+                        WhileAlive([this, name = what.name, respond](const Change& done) {
+                          // What an account may do is fixed at login: its sessions end, its own
+                          // too.
+                          if (done.result == ChangeResult::kDone) sessions_.EndAllOf(name, nullptr);
+                          respond(ChangeResponse(done));
+                        }));
+  };
+  if (password.empty()) return save(change);
+  if (password.size() < kMinPassword)
+    throw DataError(fmt::format("password must have at least {} bytes", kMinPassword));
+  HashThen(std::move(password), respond, [save, change](const std::string& hash) {
+    UserChange with_password = change;
+    with_password.password_hash = hash;
+    save(with_password);
+  });
+}
+
+}  // namespace plumb::web

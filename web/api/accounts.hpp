@@ -1,0 +1,83 @@
+// Set-up, login, accounts: everything that knows passwords.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "web/api/displays.hpp"
+#include "web/http/gate.hpp"
+#include "web/http/router.hpp"
+#include "web/security/login_limiter.hpp"
+#include "web/security/password_worker.hpp"
+#include "web/security/sessions.hpp"
+#include "web/service/scan_service.hpp"
+
+namespace plumb::web {
+
+struct AccountOptions {
+  std::uint64_t password_operations = 3;
+  std::uint64_t password_memory_bytes = 64 << 20;
+  std::chrono::seconds session_limit{12 * 3600};
+  bool tls = false;
+  std::function<std::chrono::steady_clock::time_point()> now;
+};
+
+/// Belongs to the loop thread.
+class Accounts : public SessionLookup {
+ public:
+  Accounts(ScanService& service, AccountOptions options);
+
+  void AddRoutes(Router& router);
+
+  /// The session of a request, by its cookie. @param touch  Counts as a use.
+  [[nodiscard]] std::shared_ptr<Session> SessionOf(const Request& request, bool touch) override;
+  [[nodiscard]] bool needs_setup() const override { return !setup_code_.empty(); }
+  [[nodiscard]] std::optional<std::string> setup_code() const;
+
+  /// Of the password thread: readable when Dispatch() has something to do.
+  [[nodiscard]] int fd() const { return worker_.fd(); }
+  void Dispatch() { worker_.Dispatch(); }
+  /// Ends idle sessions; follows the idle time of the settings.
+  void Expire();
+
+ private:
+  void SetUp(const Request& request, const Respond& respond);
+  void LogIn(const Request& request, const std::string& name, std::string password, bool form,
+             const Respond& respond);
+  void LogOut(const Request& request, const Respond& respond);
+  void DescribeSession(const Request& request, const Respond& respond);
+  void ChangeOwnPassword(const Request& request, const Respond& respond);
+  /// Accepts a result that is not in tolerance: with a reason and the person's own password.
+  void AcceptOutside(const Request& request, const Respond& respond);
+  void AddUser(const Request& request, const Respond& respond);
+  void ChangeUser(const Request& request, const Respond& respond);
+  /// Opens a session and tells the page about it.
+  [[nodiscard]] Response Welcome(const User& user, bool form);
+  /// Calls `then` with the hash, or answers why there is none.
+  void HashThen(std::string password, const Respond& respond,
+                std::function<void(const std::string&)> then);
+  /// The same completion, which does nothing once this object is gone.
+  [[nodiscard]] Done WhileAlive(Done done) const;
+  [[nodiscard]] std::string Cookie(const std::string& token, bool end) const;
+  [[nodiscard]] std::string cookie_name() const {
+    return options_.tls ? "__Host-plumb_session" : "plumb_session";
+  }
+
+  ScanService& service_;
+  AccountOptions options_;
+  Sessions sessions_;
+  Displays displays_;
+  LoginLimiter limiter_;
+  std::string setup_code_;  ///< Empty once there is an account.
+  bool setting_up_ = false;
+  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+  PasswordWorker worker_;
+};
+
+/// A change's answer as HTTP: 200, 201 with an id, or the error.
+[[nodiscard]] Response ChangeResponse(const Change& change);
+
+}  // namespace plumb::web

@@ -1,0 +1,58 @@
+// Screens in the room: how one is paired, and how it is known again.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "web/http/message.hpp"
+#include "web/http/router.hpp"
+#include "web/security/sessions.hpp"
+
+namespace plumb::web {
+
+/// A screen asks to be paired and shows a code; an engineer types the code on the page; the screen
+/// then holds a cookie that does not expire and gives the role `display`. Belongs to the loop
+/// thread.
+class Displays {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
+  Displays(ScanService& service, bool tls, std::function<TimePoint()> now);
+
+  void AddRoutes(Router& router);
+  /// Of a request with a paired screen's cookie; null for all others.
+  [[nodiscard]] std::shared_ptr<Session> SessionOf(const Request& request);
+
+ private:
+  struct Pairing {
+    std::string code;        ///< Shown on the screen, typed by an engineer.
+    std::string token_hash;  ///< Of the secret that the screen keeps.
+    TimePoint begun;
+  };
+
+  void Begin(const Request& request, const Respond& respond);
+  void Claim(const Request& request, const Respond& respond);
+  void Approve(const Request& request, const Respond& respond);
+  void List(const Request& request, const Respond& respond);
+  void Remove(const Request& request, const Respond& respond);
+  void Expire();
+  void Load();
+  [[nodiscard]] std::string cookie_name() const {
+    return tls_ ? "__Host-plumb_display" : "plumb_display";
+  }
+
+  ScanService& service_;
+  bool tls_;
+  std::function<TimePoint()> now_;
+  std::vector<Pairing> pairings_;
+  std::map<std::string, std::shared_ptr<Session>> sessions_;  ///< By the token's hash.
+  int wrong_codes_ = 0;  ///< Since the oldest pairing that waits began.
+  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+};
+
+}  // namespace plumb::web

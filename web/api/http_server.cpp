@@ -1,0 +1,214 @@
+#include "web/api/http_server.hpp"
+
+#include <fmt/format.h>
+#include <sys/epoll.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "algo/base/errors.hpp"
+#include "web/api/accounts.hpp"
+#include "web/api/api.hpp"
+#include "web/api/json.hpp"
+#include "web/assets/assets.hpp"
+#include "web/http/checks.hpp"
+#include "web/http/transport.hpp"
+
+namespace plumb::web {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kBeat{5000};
+constexpr std::chrono::milliseconds kExpireEvery{
+    500};  // while somebody watches: a session's end is seen within a second
+constexpr std::chrono::milliseconds kMinEventGap{100};
+
+AccountOptions AccountsOptions(const HttpServerOptions& options) {
+  return {options.password_operations, options.password_memory_bytes, options.session_limit,
+          !options.tls_certificate.empty(), options.now};
+}
+
+HttpServerOptions Completed(HttpServerOptions options) {
+  if (!options.now) options.now = [] { return SteadyClock::now(); };
+  return options;
+}
+
+std::string_view Name(EventKind kind) {
+  switch (kind) {
+    case EventKind::kResult:
+      return "result";
+    case EventKind::kData:
+      return "data";
+    case EventKind::kUpdate:
+      return "update";
+    default:
+      return "status";
+  }
+}
+
+}  // namespace
+
+class HttpServer::Impl {
+ public:
+  Impl(ScanService& service, HttpServerOptions options)
+      : service_(service),
+        options_(Completed(std::move(options))),
+        accounts_(service, AccountsOptions(options_)),
+        hub_(options_.max_event_streams, options_.event_buffer_bytes),
+        transport_(options_, service_, router_, accounts_, hub_,
+                   [this](EventStream& stream) { stream.Send(StatusEvent()); }) {
+    accounts_.AddRoutes(router_);
+    AddApiRoutes(router_, service_);
+    AddResultPage(router_, service_);
+    AddExportRoutes(router_, service_);
+    AddPageRoutes();
+    epoll_fd_ = epoll_create1(EPOLL_CLOEXEC);
+    if (epoll_fd_ < 0)
+      throw IoError(fmt::format("cannot make an epoll descriptor: {}", std::strerror(errno)));
+    Watch(transport_.fd());
+    Watch(transport_.wake_fd());
+    Watch(accounts_.fd());
+    next_beat_ = SteadyClock::now() + kBeat;
+    service_.SetListener([this](EventKind kind) { OnEvent(kind); });
+  }
+
+  ~Impl() {
+    service_.SetListener({});
+    hub_.CloseAll();
+    close(epoll_fd_);
+  }
+
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  [[nodiscard]] int fd() const { return epoll_fd_; }
+  [[nodiscard]] const Accounts& accounts() const { return accounts_; }
+  [[nodiscard]] const Transport& transport() const { return transport_; }
+  [[nodiscard]] const Router& router() const { return router_; }
+
+  void Run() {
+    {
+      const Doing doing(options_, "passwords");
+      accounts_.Dispatch();
+    }
+    const auto now = SteadyClock::now();
+    if (status_due_ && now >= *status_due_) SendStatus(now);
+    if (hub_.size() > 0 && now >= next_expiry_) {
+      next_expiry_ = now + kExpireEvery;
+      accounts_.Expire();
+    }
+    if (now >= next_beat_) {
+      next_beat_ = now + kBeat;
+      accounts_.Expire();
+      hub_.Beat();
+      transport_.CutLate();
+    }
+    transport_.Run();
+    if (hub_.EndOver())
+      transport_.Run();  // a log-out that has just come ends its own streams at once
+  }
+
+  [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const {
+    const auto now = SteadyClock::now();
+    auto due = next_beat_;
+    if (hub_.size() > 0) due = std::min(due, next_expiry_);
+    if (status_due_) due = std::min(due, *status_due_);
+    auto wait = std::max(std::chrono::milliseconds(0),
+                         std::chrono::ceil<std::chrono::milliseconds>(due - now));
+    if (const auto own = transport_.timeout()) wait = std::min(wait, *own);
+    return wait;
+  }
+
+ private:
+  void Watch(int watched) {
+    epoll_event event{};
+    event.events = EPOLLIN;
+    event.data.fd = watched;
+    if (epoll_ctl(epoll_fd_, EPOLL_CTL_ADD, watched, &event) != 0)
+      throw IoError(fmt::format("cannot watch a descriptor: {}", std::strerror(errno)));
+  }
+
+  void AddPageRoutes() {
+    const auto serve = [](const Request& request, const Respond& respond) {
+      const Asset* asset = FindAsset(request.path == "/room" ? "/" : request.path);
+      if (asset == nullptr) return respond(ErrorResponse(404, "no such file"));
+      const auto accepted = request.headers.find("accept-encoding");
+      Response response;
+      response.type = std::string(asset->type);
+      response.cache_for_ever = asset->hashed;
+      response.headers.emplace_back("Vary", "Accept-Encoding");
+      response.constant_body = asset->plain;
+      if (AcceptsGzip(accepted == request.headers.end()
+                          ? std::optional<std::string_view>("identity")
+                          : accepted->second)) {
+        response.constant_body = asset->gzip;
+        response.headers.emplace_back("Content-Encoding", "gzip");
+      }
+      respond(std::move(response));
+    };
+    router_.Add({"GET", "/", Permission::kNone, BodyKind::kNone, serve});
+    router_.Add({"GET", "/room", Permission::kNone, BodyKind::kNone, serve});
+    router_.Add({"GET", "/assets/{name}", Permission::kNone, BodyKind::kNone, serve});
+    router_.Add({"GET", "/api/v1/events", Permission::kRoom, BodyKind::kNone,
+                 [](const Request&, const Respond& respond) {
+                   Response response;
+                   response.type = "text/event-stream";
+                   response.event_stream = true;
+                   respond(std::move(response));
+                 }});
+  }
+
+  [[nodiscard]] std::string StatusEvent() {
+    return FormatEvent("status", Dump(ToJson(service_.GetStatus(), WallClock::now())));
+  }
+
+  void SendStatus(SteadyClock::time_point now) {
+    status_due_.reset();
+    last_status_ = now;
+    const Doing doing(options_, "status to viewers");
+    if (hub_.size() > 0)
+      hub_.Broadcast("status", Dump(ToJson(service_.GetStatus(), WallClock::now())));
+  }
+
+  /// The state goes out at once but at most ten times a second; the rest are hints to ask again.
+  void OnEvent(EventKind kind) {
+    if (kind != EventKind::kStatus && kind != EventKind::kProgress)
+      hub_.Broadcast(Name(kind), "{}");
+    if (kind == EventKind::kData || kind == EventKind::kUpdate) return;
+    if (!status_due_) status_due_ = std::max(SteadyClock::now(), last_status_ + kMinEventGap);
+    transport_.Wake();
+  }
+
+  ScanService& service_;
+  HttpServerOptions options_;
+  Router router_;
+  Accounts accounts_;
+  EventHub hub_;
+  Transport transport_;
+  int epoll_fd_ = -1;
+  SteadyClock::time_point next_beat_;
+  SteadyClock::time_point next_expiry_;
+  SteadyClock::time_point last_status_;
+  std::optional<SteadyClock::time_point> status_due_;
+};
+
+HttpServer::HttpServer(ScanService& service, HttpServerOptions options)
+    : impl_(std::make_unique<Impl>(service, std::move(options))) {}
+HttpServer::~HttpServer() = default;
+int HttpServer::fd() const { return impl_->fd(); }
+void HttpServer::Run() { impl_->Run(); }
+std::optional<std::chrono::milliseconds> HttpServer::timeout() const { return impl_->timeout(); }
+std::uint16_t HttpServer::port() const { return impl_->transport().port(); }
+std::optional<std::string> HttpServer::setup_code() const { return impl_->accounts().setup_code(); }
+std::vector<std::string> HttpServer::RouteNames() const {
+  std::vector<std::string> names;
+  for (const Route& route : impl_->router().routes()) {
+    names.push_back(
+        fmt::format("{} {} {}", route.method, route.pattern, plumb::web::Name(route.permission)));
+  }
+  return names;
+}
+
+}  // namespace plumb::web

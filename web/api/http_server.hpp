@@ -1,0 +1,54 @@
+// The appliance's HTTP server, driven by the daemon's event loop.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "web/http/server_options.hpp"
+#include "web/service/scan_service.hpp"
+
+namespace plumb::web {
+
+/// Serves the page, the API under /api/v1 (web/openapi.yaml), the event stream and GET /health.
+///
+/// Belongs to the loop thread: everything is called there and calls the service there. Passwords
+/// are hashed on a thread of its own. Signals must be blocked before it is made. Destroying it
+/// closes every connection; completions that come later find nobody.
+class HttpServer {
+ public:
+  /// Listens at once; nothing is answered before the first Run(). @throws IoError with address and
+  /// reason, DataError for the TLS files.
+  HttpServer(ScanService& service, HttpServerOptions options);
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+
+  /// An epoll descriptor: wait for EPOLLIN on it, then call Run().
+  [[nodiscard]] int fd() const;
+  /// Does what is due; never waits.
+  void Run();
+  /// Call Run() after that time even if fd() stays silent; nothing: no need. Ask again after each
+  /// Run().
+  [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const;
+
+  [[nodiscard]] std::uint16_t port() const;
+  /// "GET /api/v1/status view" for each route: method, path and permission; for the documentation
+  /// and its test.
+  [[nodiscard]] std::vector<std::string> RouteNames() const;
+  /// "XXXX-XXXX" while there is no account: whoever types it makes the first one, an engineer.
+  /// Print it where only the owner looks.
+  [[nodiscard]] std::optional<std::string> setup_code() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace plumb::web

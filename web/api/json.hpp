@@ -1,0 +1,65 @@
+// The service's values as JSON, and JSON from browsers as values.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+
+#include "web/security/sessions.hpp"
+#include "web/service/scan_service.hpp"
+
+namespace plumb::web {
+
+using Json = nlohmann::ordered_json;
+
+[[nodiscard]] Json ToJson(const Status& status, WallClock::time_point now);
+/// @param now  Gives age_s, so that a page does not trust its own clock.
+[[nodiscard]] Json ToJson(const Scan& scan, WallClock::time_point now);
+[[nodiscard]] Json ToJson(const Patient& patient);
+[[nodiscard]] Json ToJson(const Reference& reference);
+[[nodiscard]] Json ToJson(const CheckStatus& checks, WallClock::time_point now);
+[[nodiscard]] Json ToJson(const User& user);  ///< Without the hash.
+[[nodiscard]] Json ToJson(const AuditEntry& entry);
+[[nodiscard]] Json ToJson(const Settings& settings);
+[[nodiscard]] Json ToJson(const UpdateStatus& update);
+[[nodiscard]] std::string Dump(const Json& json);
+
+/// "2026-03-01T09:30:00Z"
+[[nodiscard]] std::string TimeText(WallClock::time_point time);
+[[nodiscard]] std::string_view Name(ApplianceState state);
+[[nodiscard]] std::string_view Name(ScanPurpose purpose);
+
+/// The fields of a request's body. Every accessor throws DataError that names the field, what was
+/// expected and what was found.
+class Fields {
+ public:
+  /// @throws DataError unless body is one JSON object, nested at most 8 deep.
+  explicit Fields(const std::string& body);
+
+  [[nodiscard]] std::string Text(const char* name, std::size_t min, std::size_t max);
+  [[nodiscard]] double Number(const char* name, double min, double max);
+  [[nodiscard]] int Integer(const char* name, int min, int max);
+  [[nodiscard]] bool Flag(const char* name);
+  /// List of lists of `width` finite numbers, each at most 100 in size; at most `max` of them.
+  [[nodiscard]] std::vector<std::vector<double>> Points(const char* name, std::size_t width,
+                                                        std::size_t max);
+  /// A list of `width` such numbers; nothing where null.
+  [[nodiscard]] std::optional<std::vector<double>> Point(const char* name, std::size_t width);
+  [[nodiscard]] bool Has(const char* name);
+  /// Throws if a field was sent that nobody asked for.
+  void Finish() const;
+
+ private:
+  [[nodiscard]] const nlohmann::json& Get(const char* name);
+
+  nlohmann::json json_;
+  std::set<std::string> known_;
+};
+
+inline constexpr int kMaxRevision = 1'000'000'000;
+/// And the revision that it was made from.
+[[nodiscard]] std::pair<ReferencePlan, int> ParsePlan(const std::string& body);
+[[nodiscard]] Settings ParseSettings(const std::string& body);
+[[nodiscard]] ScanPurpose ParsePurpose(const std::string& name);
+
+}  // namespace plumb::web

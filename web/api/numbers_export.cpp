@@ -1,0 +1,115 @@
+// The numbers of a patient for other programs: CSV and JSON; and the reports as files.
+#include <fmt/format.h>
+
+#include <array>
+
+#include "web/api/api.hpp"
+#include "web/api/json.hpp"
+#include "web/http/gate.hpp"
+
+namespace plumb::web {
+namespace {
+
+constexpr int kMaxScans = 1000;
+
+/// A cell that no spreadsheet takes for a formula, quoted where it must be.
+std::string Cell(std::string text) {
+  if (!text.empty() && std::string_view("=+-@\t\r").find(text[0]) != std::string_view::npos)
+    text = "'" + text;
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+/// Numbers are no text that somebody typed: a minus stays a minus.
+std::string Number(const std::optional<double>& value) {
+  return value ? fmt::format("{:.4f}", *value) : std::string();
+}
+
+std::array<std::optional<double>, 6> Values(const std::optional<SixNumbers>& numbers) {
+  if (!numbers) return {};
+  return {numbers->vertical_mm, numbers->longitudinal_mm, numbers->lateral_mm,
+          numbers->pitch_deg,   numbers->roll_deg,        numbers->yaw_deg};
+}
+
+std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
+  std::string text =
+      "patient,scan,fraction,purpose,started_at,verdict,vertical_mm,longitudinal_mm,lateral_mm,"
+      "pitch_deg,roll_deg,yaw_deg,u95_vertical_mm,u95_longitudinal_mm,u95_lateral_mm,u95_pitch_deg,"
+      "u95_roll_deg,u95_yaw_deg,accepted_by,accepted_reason\r\n";
+  for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
+    if (scan->outcome != ScanOutcome::kDone) continue;
+    const bool is_advice = scan->result && scan->result->verdict != "no_answer";
+    text +=
+        fmt::format("{},{},{},{},{},{}", Cell(patient.code), Cell(scan->id),
+                    scan->fraction > 0 ? std::to_string(scan->fraction) : "", Name(scan->purpose),
+                    TimeText(scan->started_at), scan->result ? Cell(scan->result->verdict) : "");
+    if (is_advice) {
+      for (const auto& value : Values(scan->result->correction)) text += "," + Number(value);
+      for (const auto& value : Values(scan->result->u95)) text += "," + Number(value);
+    } else {
+      text.append(12, ',');
+    }
+    text += fmt::format(",{},{}\r\n", Cell(scan->accepted_by), Cell(scan->accepted_reason));
+  }
+  return text;
+}
+
+Response File(std::string body, std::string type, const std::string& name) {
+  Response response;
+  response.type = std::move(type);
+  response.body = std::move(body);
+  response.headers.emplace_back("Content-Disposition",
+                                fmt::format("attachment; filename=\"{}\"", name));
+  return response;
+}
+
+void Add(Router& router, ScanService& service, const char* pattern,
+         Response (*make)(ScanService&, const Request&)) {
+  router.Add({"GET", pattern, Permission::kView, BodyKind::kNone,
+              [&service, name = std::string("GET ") + pattern, make](const Request& request,
+                                                                     const Respond& respond) {
+                RespondAside(
+                    service, name, [&service, make, request] { return make(service, request); },
+                    respond);
+              }});
+}
+
+}  // namespace
+
+void AddExportRoutes(Router& router, ScanService& service) {
+  Add(router, service, "/api/v1/scans/{id}/report.pdf",
+      [](ScanService& from, const Request& request) {
+        auto pdf = from.ScanReport(request.arguments[0]);
+        if (!pdf) return ErrorResponse(404, "there is no such scan");
+        return File(std::move(*pdf), "application/pdf",
+                    fmt::format("plumb_scan_{}.pdf", request.arguments[0]));
+      });
+  Add(router, service, "/api/v1/patients/{id}/report.pdf",
+      [](ScanService& from, const Request& request) {
+        auto pdf = from.CourseReport(request.arguments[0]);
+        if (!pdf) return ErrorResponse(404, "there is no such patient");
+        return File(std::move(*pdf), "application/pdf",
+                    fmt::format("plumb_course_{}.pdf", request.arguments[0]));
+      });
+  Add(router, service, "/api/v1/patients/{id}/numbers.csv",
+      [](ScanService& from, const Request& request) {
+        const auto patient = from.FindPatient(request.arguments[0]);
+        if (!patient) return ErrorResponse(404, "there is no such patient");
+        return File(Csv(*patient, from.Scans(patient->id, kMaxScans)), "text/csv; charset=utf-8",
+                    fmt::format("plumb_numbers_{}.csv", patient->code));
+      });
+  Add(router, service, "/api/v1/patients/{id}/numbers.json",
+      [](ScanService& from, const Request& request) {
+        const auto patient = from.FindPatient(request.arguments[0]);
+        if (!patient) return ErrorResponse(404, "there is no such patient");
+        Json list = Json::array();
+        for (const Scan& scan : from.Scans(patient->id, kMaxScans))
+          list.push_back(ToJson(scan, WallClock::now()));
+        return File(Dump({{"patient", ToJson(*patient)}, {"scans", list}}), "application/json",
+                    fmt::format("plumb_numbers_{}.json", patient->code));
+      });
+}
+
+}  // namespace plumb::web

@@ -1,0 +1,249 @@
+// The last result as plain HTML: for browsers without script, and for printing.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "web/api/api.hpp"
+#include "web/api/json.hpp"
+#include "web/assets/assets.hpp"
+#include "web/http/checks.hpp"
+#include "web/http/gate.hpp"
+
+namespace plumb::web {
+namespace {
+
+constexpr std::string_view kNotice =
+    "Research use only. Not a medical device. Do not use to position patients for treatment or to "
+    "replace image guidance.";
+constexpr std::chrono::minutes kOldAfter{2};
+constexpr std::chrono::seconds kRefreshEvery{10};
+
+struct NumberRow {
+  const char* name;
+  const char* unit;
+  std::optional<double> value, u95;
+};
+
+std::array<NumberRow, 6> Rows(const SixNumbers& value, const SixNumbers& u95) {
+  return {NumberRow{"vertical", "mm", value.vertical_mm, u95.vertical_mm},
+          NumberRow{"longitudinal", "mm", value.longitudinal_mm, u95.longitudinal_mm},
+          NumberRow{"lateral", "mm", value.lateral_mm, u95.lateral_mm},
+          NumberRow{"pitch", "\xC2\xB0", value.pitch_deg, u95.pitch_deg},
+          NumberRow{"roll", "\xC2\xB0", value.roll_deg, u95.roll_deg},
+          NumberRow{"yaw", "\xC2\xB0", value.yaw_deg, u95.yaw_deg}};
+}
+
+/// @param refresh  Asks for itself again, without counting as use: nobody should act on what was
+/// true when the page was opened.
+std::string Document(const std::string& body, const std::string& refresh = "") {
+  std::string style;
+  for (const Asset& asset : Assets()) {
+    if (asset.type.starts_with("text/css"))
+      style += fmt::format("<link rel=\"stylesheet\" href=\"{}\">", asset.path);
+  }
+  return fmt::format(
+      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+      "content=\"width=device-width\">"
+      "<title>Plumb result</title>{}{}</head><body class=\"plain\"><aside class=\"notice\" "
+      "aria-label=\"Notice\"><p>{}</p></aside><main>{}</main></body></html>",
+      refresh.empty() ? ""
+                      : fmt::format("<meta http-equiv=\"refresh\" content=\"{};url={}\">",
+                                    kRefreshEvery.count(), refresh),
+      style, kNotice, body);
+}
+
+std::string LoginForm(bool failed) {
+  return fmt::format(
+      "<h1>Log in</h1>{}<form method=\"post\" action=\"/login\" class=\"card form\">"
+      "<label>Name <input name=\"name\" autocomplete=\"username\" required "
+      "maxlength=\"32\"></label>"
+      "<label>Password <input name=\"password\" type=\"password\" "
+      "autocomplete=\"current-password\" required maxlength=\"128\"></label>"
+      "<button class=\"primary\">Log in</button></form>",
+      failed ? "<p role=\"alert\">Name or password is wrong.</p>" : "");
+}
+
+/// Digits that the uncertainty lets a value have: none below its first digit.
+int DigitsOf(double u95, int most) {
+  if (!(u95 > 0)) return most;
+  return std::clamp(static_cast<int>(-std::floor(std::log10(u95) + 1e-9)), 0, most);
+}
+
+/// A row of the table. Only MOVE commands moves.
+std::string NumberCells(const NumberRow& row, const std::string& words, double tolerance,
+                        bool moves) {
+  if (!row.value)
+    return fmt::format(
+        "<tr><th scope=\"row\">{}</th><td>not known</td><td></td><td></td><td></td>"
+        "<td></td></tr>",
+        row.name);
+  const double value = *row.value, u95 = row.u95.value_or(0.0), size = std::abs(value);
+  const int most = std::string_view(row.unit) == "mm" ? 1 : 2;
+  const int digits = DigitsOf(u95, most);
+  const bool is_zero = size < 0.5 * std::pow(10.0, -digits);  // no sign, no direction
+  const bool in = size + u95 <= tolerance, unsure = !in && size <= tolerance;
+  const std::string direction = !moves        ? "no move needed"
+                                : is_zero     ? "no change"
+                                : size <= u95 ? "below its uncertainty"
+                                              : EscapeHtml(words);
+  return fmt::format(
+      "<tr><th scope=\"row\">{}</th><td>{}</td><td>\xC2\xB1 {:.{}f}</td><td>\xC2\xB1 {:g}</td>"
+      "<td>{}</td><td>{}</td></tr>",
+      row.name,
+      is_zero ? fmt::format("{:.{}f} {}", 0.0, digits, row.unit)
+              : fmt::format("{:+.{}f} {}", value, digits, row.unit),
+      u95, most, tolerance,
+      in       ? "in tolerance"
+      : unsure ? "not surely within"
+               : "outside tolerance",
+      direction);
+}
+
+/// A correction that is no answer is no advice: it is left out.
+std::string NumbersTable(const ResultSummary& result, const Tolerance& tolerance) {
+  if (!result.correction || result.verdict == "no_answer") return "";
+  const bool moves = result.verdict == "move";
+  std::string rows;
+  std::size_t i = 0;
+  for (const NumberRow& row : Rows(*result.correction, result.u95.value_or(SixNumbers{}))) {
+    rows += NumberCells(row, result.words[i], i < 3 ? tolerance.shift_mm : tolerance.rotation_deg,
+                        moves);
+    ++i;
+  }
+  return fmt::format(
+      "<table><caption>{}</caption><thead><tr><th scope=\"col\">axis</th><th "
+      "scope=\"col\">value</th><th scope=\"col\">95 %</th><th scope=\"col\">tolerance</th><th "
+      "scope=\"col\">judgement</th><th scope=\"col\">direction</th></tr></thead><tbody>{}</tbody>"
+      "</table>",
+      moves ? "Correction to apply at the isocentre"
+            : "Remaining difference at the isocentre: no move needed",
+      rows);
+}
+
+std::string BodyList(const ResultSummary& result) {
+  if (!result.correction || result.verdict == "no_answer") return "";
+  const auto list = [](const char* title, const std::vector<std::string>& words) {
+    std::string items;
+    for (const std::string& text : words) items += fmt::format("<li>{}</li>", EscapeHtml(text));
+    return fmt::format(
+        "<h3>{}</h3><ul class=\"findings\">{}</ul>", title,
+        items.empty() ? "<li class=\"fine-part\">as in the reference, within 3 mm</li>" : items);
+  };
+  return "<h2>Where on the body</h2>" + list("Now", result.body_now) +
+         list("Posture difference that remains after the shift", result.body_after);
+}
+
+std::string Pictures(const Scan& scan) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(scan.folder / "result/error_map.png", ignored)) return "";
+  return fmt::format(
+      "<figure><img src=\"/api/v1/scans/{0}/files/error_map.png\" alt=\"Map of height errors, "
+      "current minus reference\"></figure>"
+      "<figure><img src=\"/api/v1/scans/{0}/files/overlay.png\" alt=\"Reference blue, current "
+      "red\"></figure>",
+      scan.id);
+}
+
+/// @param newer  A later scan that gave no result; null: none.
+/// @param runs   A new scan runs or is computed.
+std::string ResultBody(ScanService& service, const Scan& scan, const Scan* newer, bool runs) {
+  const auto patient = service.FindPatient(scan.patient_id);
+  const auto reference = service.FindReference(scan.reference_id);
+  const auto age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
+  const bool is_known = age >= age.zero();  // else the clock has stepped
+  const bool old = !is_known || age > kOldAfter || newer != nullptr || runs;
+  const std::string when =
+      is_known ? fmt::format("{} min ago", std::chrono::floor<std::chrono::minutes>(age).count())
+               : "at an unknown time: the clock has stepped";
+  std::string body;
+  if (newer != nullptr) {
+    body += fmt::format(
+        "<p role=\"alert\"><strong>NO ANSWER</strong> from the last scan, of {}: {} What follows "
+        "is from before it.</p>",
+        TimeText(newer->started_at), EscapeHtml(newer->failure));
+  }
+  if (runs)
+    body +=
+        "<p role=\"alert\"><strong>A new scan is running.</strong> What follows is no longer "
+        "valid.</p>";
+  body += fmt::format("<h1>Patient {}</h1><p>Scan {} of {}, {}.{}</p>",
+                      patient ? EscapeHtml(patient->code) : "none", EscapeHtml(scan.id),
+                      TimeText(scan.started_at), when,
+                      old ? " <strong>OLD: do not act on it.</strong>" : "");
+  if (!scan.accepted_by.empty())
+    body += fmt::format("<p>Accepted by {}{}.</p>", EscapeHtml(scan.accepted_by),
+                        scan.accepted_reason.empty()
+                            ? ""
+                            : " outside tolerance: " + EscapeHtml(scan.accepted_reason));
+  if (scan.check_overdue) body += "<p>The daily check was overdue at this scan.</p>";
+  if (scan.outcome != ScanOutcome::kDone)
+    return body + fmt::format(
+                      "<section class=\"old\"><p class=\"verdict no_answer\">NO "
+                      "ANSWER</p><p>{}</p></section>",
+                      EscapeHtml(scan.failure));
+  if (reference)
+    body += fmt::format("<p>Reference version {} of {}, approved by {}.</p>", reference->version,
+                        TimeText(reference->created_at), EscapeHtml(reference->approved_by));
+  if (!scan.result) return body + "<p>No comparison: this scan has no reference.</p>";
+  const std::string& verdict = scan.result->verdict;
+  body += fmt::format("<section class=\"{}\"><p class=\"verdict {}\">{}</p>", old ? "old" : "fresh",
+                      EscapeHtml(scan.result->verdict),
+                      verdict == "in_tolerance" ? "IN TOLERANCE"
+                      : verdict == "unsure"     ? "NOT SURELY WITHIN"
+                      : verdict == "move"       ? "MOVE"
+                                                : "NO ANSWER");
+  for (const std::string& reason : scan.result->reasons)
+    body += fmt::format("<p>{}</p>", EscapeHtml(reason));
+  return body + NumbersTable(*scan.result, reference ? reference->plan.tolerance : Tolerance{}) +
+         BodyList(*scan.result) + Pictures(scan) + "</section>";
+}
+
+/// Of the newest scan that was done, where none is named; one after it that failed is told.
+Response ResultPage(ScanService& service, const std::optional<std::string>& wanted, bool runs) {
+  std::optional<Scan> scan, failed;
+  if (wanted) {
+    scan = service.FindScan(*wanted);
+  } else {
+    for (Scan& candidate : service.Scans("", 20)) {
+      if (candidate.outcome == ScanOutcome::kFailed && !failed) failed = candidate;
+      if (candidate.outcome != ScanOutcome::kDone) continue;
+      scan = std::move(candidate);
+      break;
+    }
+    if (!scan) std::swap(scan, failed);
+  }
+  Response response;
+  response.type = "text/html; charset=utf-8";
+  // What is asked for by name is read or printed: it does not load itself again.
+  response.body = Document(scan ? ResultBody(service, *scan, failed ? &*failed : nullptr, runs)
+                                : "<h1>No result yet</h1>",
+                           wanted ? "" : "/result?again");
+  return response;
+}
+
+}  // namespace
+
+void AddResultPage(Router& router, ScanService& service) {
+  router.Add(
+      {"GET", "/result", Permission::kNone, BodyKind::kNone,
+       [&service](const Request& request, const Respond& respond) {
+         if (!request.session) {
+           Response response;
+           response.type = "text/html; charset=utf-8";
+           response.body = Document(LoginForm(request.query.contains("failed")));
+           return respond(std::move(response));
+         }
+         const auto named = request.query.find("scan");
+         const auto wanted =
+             named == request.query.end() ? std::nullopt : std::optional(named->second);
+         const ApplianceState state = service.GetStatus().state;
+         const bool runs = state == ApplianceState::kScanning || state == ApplianceState::kWorking;
+         RespondAside(
+             service, "GET /result",
+             [&service, wanted, runs] { return ResultPage(service, wanted, runs); }, respond);
+       }});
+}
+
+}  // namespace plumb::web

@@ -1,0 +1,122 @@
+// A map as a picture that can be read: cropped, with axes, a scale bar, the edge of the region, and
+// marks that say where head, feet, left, right and the gantry are.
+import { h, svg } from './dom.js';
+import { cropOf, outlineOf } from './maps.js';
+import { S } from './strings.js';
+
+const kTick_m = 0.1;
+const kMargin_m = 0.1;
+
+/// Directions on the map (unit vectors, x right, y up) that follow from the room's axes and the
+/// posture; null where the room is not known.
+export function compassOf(room, posture = 'HFS') {
+  const gantry = room?.gantry_xy;
+  const right = room?.right_xy;  // of a person who faces the gantry
+  if (!gantry || !right) return null;
+  const times = ([x, y], k) => [k * x, k * y];
+  const head = times(gantry, posture.startsWith('H') ? 1 : -1);
+  const left = times(right, posture === 'HFS' || posture === 'FFP' ? 1 : -1);
+  return { gantry, head, feet: times(head, -1), left, right: times(left, -1) };
+}
+
+/// The part of the grid that is shown, in metres.
+export function viewOf(grid, region) {
+  const crop = region ? cropOf(region, grid, kMargin_m) : { left: 0, top: 0, width: 1, height: 1 };
+  const width = grid.width * grid.step;
+  const height = grid.height * grid.step;
+  return {
+    crop,
+    x_min: grid.x_min + crop.left * width,
+    y_max: grid.y_min + (1 - crop.top) * height,
+    width: crop.width * width,
+    height: crop.height * height,
+  };
+}
+
+/// Shows the cropped part of what `draw(canvas)` paints for the whole grid.
+export function drawCropped(canvas, view, draw) {
+  const whole = document.createElement('canvas');
+  draw(whole);
+  const { crop } = view;
+  const [left, top, width, height] = [crop.left * whole.width, crop.top * whole.height,
+    crop.width * whole.width, crop.height * whole.height].map(Math.round);
+  canvas.width = width;
+  canvas.height = height;
+  canvas.getContext('2d').drawImage(whole, left, top, width, height, 0, 0, width, height);
+}
+
+function axes(view, size) {
+  const marks = [];
+  const label = (value) => (100 * value).toFixed(0);
+  const first = (low) => Math.ceil(low / kTick_m - 1e-6);
+  for (let i = first(view.x_min); i * kTick_m <= view.x_min + view.width; ++i) {
+    const x = i * kTick_m - view.x_min;
+    marks.push(svg('line', { x1: x, x2: x, y1: view.height, y2: view.height - size / 2 }),
+      i % 2 === 0 && x > size && x < view.width - size
+        && svg('text', { x, y: view.height - 0.7 * size, class: 'middle' }, label(i * kTick_m)));
+  }
+  const y_min = view.y_max - view.height;
+  for (let i = first(y_min); i * kTick_m <= view.y_max; ++i) {
+    const y = view.y_max - i * kTick_m;
+    marks.push(svg('line', { x1: 0, x2: size / 2, y1: y, y2: y }),
+      i % 2 === 0 && y > 2 * size && y < view.height - 2 * size
+        && svg('text', { x: 0.7 * size, y: y + 0.35 * size }, label(i * kTick_m)));
+  }
+  return svg('g', { class: 'axes' }, marks,
+    svg('text', { x: view.width - 0.3 * size, y: view.height - 0.7 * size, class: 'end' }, 'x cm'),
+    svg('text', { x: 0.7 * size, y: 1.1 * size }, 'y cm'));
+}
+
+/// Where the body's ends and sides are; the gantry's mark stands outside the head's or feet's.
+function marks(view, compass, size) {
+  if (!compass) return null;
+  const text = S.result.marks;
+  const place = (name, [dx, dy], along, down) => {
+    const reach = Math.min(Math.abs(dx) > 0.3 ? view.width / 2 / Math.abs(dx) : Infinity,
+      Math.abs(dy) > 0.3 ? view.height / 2 / Math.abs(dy) : Infinity);
+    const x = view.width / 2 + dx * reach;
+    const y = view.height / 2 - dy * reach;
+    const wide = 0.35 * size * text[name].length + 1.2 * size;
+    const side = wide + along * Math.abs(dx);
+    return svg('text', {
+      x: Math.max(side, Math.min(view.width - side, x)),
+      y: Math.max(1.6 * size + down * Math.abs(dy),
+        Math.min(view.height - 2.6 * size - down * Math.abs(dy), y)) + 0.35 * size,
+      class: `way ${name}`, 'data-mark': name,
+    }, text[name]);
+  };
+  // The gantry's mark stands at the very edge, head or feet within it.
+  const within = [5.6 * size, 1.5 * size];
+  return svg('g', { class: 'ways' }, place('head', compass.head, ...within),
+    place('feet', compass.feet, ...within), place('left', compass.left, 0, 0),
+    place('right', compass.right, 0, 0), place('gantry', compass.gantry, 0, 0));
+}
+
+/// @param canvas  Shows the view; what stands over it is drawn beside it.
+export function mapFrame({ grid, view, canvas, region, compass, isocentre, cross }) {
+  const size = Math.max(view.width, view.height) / 42;
+  const outline = region && outlineOf(region, grid);
+  const shift = svg('g', {
+    transform: `translate(${-view.crop.left * grid.width * grid.step} `
+      + `${-view.crop.top * grid.height * grid.step})`,
+  }, outline && svg('path', { d: outline, class: 'outline' }),
+  isocentre && (() => {
+    const x = isocentre[0] - grid.x_min;
+    const y = grid.height * grid.step - (isocentre[1] - grid.y_min);
+    return svg('path', {
+      d: `M${x - size} ${y}h${2 * size}M${x} ${y - size}v${2 * size}`, class: 'isocentre',
+    });
+  })());
+  const bar = Math.min(0.1, view.width / 3);
+  const drawing = svg('svg', {
+    viewBox: `0 0 ${view.width} ${view.height}`, class: 'frame', 'aria-hidden': 'true',
+    'font-size': size,
+  }, shift, axes(view, size), marks(view, compass, size),
+  svg('g', { class: 'scale-bar' },
+    svg('path', {
+      d: `M${view.width - size - bar} ${1.2 * size}v${0.6 * size}h${bar}v${-0.6 * size}`,
+    }),
+    svg('text', { x: view.width - size - bar / 2, y: 1.3 * size, class: 'middle' },
+      S.result.scaleBar)));
+  return h('div', { class: 'map-box' }, canvas, drawing, cross);
+}

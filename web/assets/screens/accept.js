@@ -1,0 +1,108 @@
+// What people do with a result: scan again, accept it, make a reference of it, take it away.
+import { fileUrl, live, may, post } from '../api.js';
+import { action, clear, done, field, form, h } from '../dom.js';
+import { S } from '../strings.js';
+import { openPatient } from '../treatment.js';
+import { whyNotValid } from './verdict.js';
+
+function rescanButton({ scan, patient }) {
+  return action(S.result.rescan, async () => {
+    const purpose = scan.purpose === 'reference' ? 'reference' : 'fraction';
+    const open = live.status?.session;
+    if (open?.patient_id !== patient.id || open.purpose !== purpose) {
+      await openPatient(patient, purpose);
+    }
+    location.hash = '#/scan';
+  }, { class: 'primary' });
+}
+
+function outsideForm(scan, reload) {
+  const text = S.result;
+  const reason = h('input', { required: true, minlength: 3, maxlength: 200, autocomplete: 'off' });
+  const password = h('input', {
+    type: 'password', required: true, maxlength: 128, autocomplete: 'current-password',
+  });
+  return h('details', { class: 'accept-outside' }, h('summary', {}, `${text.acceptOutside}…`),
+    h('p', { class: 'hint' }, text.acceptOutsideHint),
+    form({ class: 'form inline' }, async () => {
+      const body = { reason: reason.value.trim(), password: password.value };
+      password.value = '';
+      await post(`scans/${scan.id}/accept-outside`, body);
+      done(S.saved);
+      await reload();
+    }, field(text.acceptReason, reason), field(text.acceptPassword, password),
+    h('button', { class: 'danger' }, text.acceptOutside)));
+}
+
+/// Only a valid result can be accepted: one tap in tolerance, else a reason and the password.
+function acceptance({ scan, received }, reload) {
+  const text = S.result;
+  if (scan.accepted_by) {
+    const { accepted_by: who, accepted_reason: why } = scan;
+    const words = why ? text.acceptedOutside(who, why) : text.acceptedBy(who);
+    return {
+      element: h('p', { class: `badge wide ${scan.accepted_reason ? 'move' : 'in_tolerance'}` },
+        `✓ ${words}`),
+      tick: () => {},
+    };
+  }
+  const element = h('div', { class: 'acceptance' });
+  const possible = may('accept') && scan.result && scan.result.verdict !== 'no_answer';
+  let shown = null;
+  const tick = () => {
+    if (!possible) return;
+    const valid = !whyNotValid(scan, received);
+    if (shown === valid) return;
+    shown = valid;
+    if (!valid) clear(element, h('p', { class: 'hint' }, text.cannotAccept));
+    else if (scan.result.verdict === 'in_tolerance') {
+      clear(element, action(text.accept, async () => {
+        await post(`scans/${scan.id}/accept`);
+        done(S.saved);
+        await reload();
+      }, { class: 'primary' }));
+    } else clear(element, outsideForm(scan, reload));
+  };
+  return { element, tick };
+}
+
+function files(scan) {
+  const ofResult = /result|map\.png|overlay|deviation|distance/;
+  const rows = Object.entries(S.result.files)
+    .filter(([name]) => scan.result || !ofResult.test(name))
+    .map(([name, label]) => h('li', {},
+      h('a', { href: fileUrl(scan.id, name, true), download: '' }, label)));
+  return h('details', {}, h('summary', {}, S.result.export), h('ul', { class: 'files' }, rows));
+}
+
+/// A reference scan has made its draft by itself; this says whose turn it is.
+function nextStep({ scan, draft }) {
+  const text = S.result;
+  if (scan.purpose !== 'reference' || scan.outcome !== 'done' || !draft) return null;
+  const words = draft.approved_by ? '' : `${text.draftSaved(draft.version)} ${text.draftNext} `;
+  return h('p', { class: 'lead next-step' }, words,
+    h('a', { class: 'button', href: `#/plan/${draft.id}` }, text.draftLink));
+}
+
+/// Calls tick() when the validity may have changed.
+export function actions(data, reload) {
+  const text = S.result;
+  const { scan, patient } = data;
+  const reason = h('input', { maxlength: 200, autocomplete: 'off' });
+  const accept = acceptance(data, reload);
+  const newReference = may('plan') && scan.outcome === 'done' && patient
+    && scan.purpose !== 'reference'
+    && form({ class: 'form inline' }, async () => {
+      const body = { scan_id: scan.id, reason: reason.value.trim() };
+      const { id } = await post('references', body);
+      location.hash = `#/plan/${id}`;
+    }, field(text.newReferenceReason, reason), h('button', {}, text.newReference));
+  const element = h('div', {}, nextStep(data),
+    h('div', { class: 'row' }, may('scan') && patient && rescanButton(data), accept.element,
+      scan.outcome === 'done' && h('a', {
+        class: 'button', href: `/api/v1/scans/${scan.id}/report.pdf`, download: '',
+      }, text.report),
+      scan.result && h('a', { class: 'button', href: `/result?scan=${scan.id}` }, text.print)),
+    newReference, files(scan));
+  return { element, tick: accept.tick };
+}

@@ -1,0 +1,66 @@
+// The card of the 3-D view, which is loaded only when it is opened.
+import { fileUrl } from '../api.js';
+import { action, checkbox, clear, h, warn } from '../dom.js';
+import { S } from '../strings.js';
+
+const kViews = ['top', 'left', 'right', 'feet', 'reset'];
+
+function controls(view, canvas, ghostUrl, scan) {
+  const text = S.result;
+  const buttons = kViews.map((name) => action(text.views3d[name], async () => view.look(name), {}));
+  const picture = action(text.screenshot, async () => {
+    h('a', { href: view.picture(), download: `plumb_${scan.id}_3d.png` }).click();
+  }, {});
+  if (!ghostUrl) return h('div', { class: 'row' }, buttons, picture);
+  const ghost = checkbox(text.ghost, false, {});
+  const share = h('input', {
+    type: 'range', min: 0, max: 1, step: 0.05, value: 0.5, 'aria-label': text.ghostShare,
+    hidden: true,
+  });
+  const state = h('span', { class: 'hint', role: 'status' });
+  ghost.box.addEventListener('change', async () => {
+    share.hidden = !ghost.box.checked;
+    state.textContent = ghost.box.checked ? text.ghostLoading : '';
+    try {
+      await view.setGhost(ghost.box.checked ? ghostUrl : null, Number(share.value));
+    } catch (error) {
+      warn(error.message);
+    }
+    state.textContent = '';
+    canvas.dataset.ghost = ghost.box.checked ? 'yes' : '';
+  });
+  share.addEventListener('input', () => view.setShare(Number(share.value)));
+  return h('div', { class: 'row' }, buttons, picture, ghost.element, share, state);
+}
+
+export function meshView({ scan, reference, details }, map, tolerance_mm) {
+  const text = S.result;
+  const place = h('div', { class: 'mesh-place' });
+  let view = null;
+  const open = action(text.meshOpen, async () => {
+    place.classList.remove('waiting');
+    clear(place, h('p', { class: 'hint' }, text.meshLoading));
+    const canvas = h('canvas', {
+      class: 'mesh', tabindex: '0', role: 'application', 'aria-label': text.meshLabel,
+    });
+    try {
+      if (!document.createElement('canvas').getContext('webgl2')) throw new Error(text.meshFailed);
+      const { openMesh } = await import('../mesh.js');
+      const below = h('div', {});
+      clear(place, canvas, map?.legend?.(), below);
+      view = await openMesh(canvas, {
+        url: fileUrl(scan.id, 'mesh.ply'), grid: map?.grid, deviation: map?.deviation,
+        region: map?.region, T: details?.alignment?.T_reference_current,
+        tolerance_m: tolerance_mm / 1000, compass: map?.compass,
+      });
+      canvas.dataset.ready = 'yes';
+      const ghostUrl = reference && fileUrl(reference.scan_id, 'mesh.ply');
+      clear(below, controls(view, canvas, ghostUrl, scan));
+    } catch {
+      clear(place, h('p', { class: 'hint' }, text.meshFailed));
+    }
+  }, {});
+  place.classList.add('waiting');
+  clear(place, open, h('p', { class: 'hint' }, text.meshHint));
+  return { element: place, stop: () => view?.stop() };
+}

@@ -1,0 +1,283 @@
+// The screen in the room: one address that follows the button by itself. Sees, and changes nothing.
+import {
+  currentSession, get, live, loadSession, may, now, setLoggedOffHandler, since_s,
+} from '../api.js';
+import { clear, h, say } from '../dom.js';
+import { compassOf, drawCropped, mapFrame, viewOf } from '../map_frame.js';
+import { loadMap, paintErrors } from '../maps.js';
+import { sixNumbers, toleranceOf } from '../numbers.js';
+import { chooseLanguage, kLanguages, languageOf, S } from '../strings.js';
+import { faultWords, flagList, isAdvice, kWarmUp_s, sentence } from './common.js';
+import { showLogin } from './login.js';
+import { preview } from './scan.js';
+import { validityNote, verdictStrip } from './verdict.js';
+
+const kAsk_ms = 2000;
+const kWho = 'room';
+const optional = (path) => get(path, true).catch(() => null);
+const wait = (ms) => new Promise((ready) => { setTimeout(ready, ms); });
+
+/// Shows a code until an engineer has typed it on the page; then this screen has its cookie.
+async function pair(main, logIn) {
+  const text = S.room;
+  for (;;) {
+    const asked = await fetch('/api/v1/displays/pair', { method: 'POST' }).catch(() => null);
+    if (!asked?.ok) {
+      clear(main, h('p', { class: 'card' }, S.noAnswer));
+      await wait(2 * kAsk_ms);
+      continue;
+    }
+    const { code, secret } = await asked.json();
+    clear(main, h('section', { class: 'room pairing' }, h('h1', {}, text.pairTitle),
+      h('p', { class: 'pair-code' }, code), h('p', { class: 'lead' }, text.pairText),
+      h('p', { class: 'hint' }, text.pairWaiting),
+      logIn && h('button', { class: 'quiet', type: 'button', onclick: logIn }, S.login.title)));
+    for (;;) {
+      await wait(kAsk_ms);
+      if (currentSession()) return;
+      const answer = await fetch('/api/v1/displays/claim', {
+        method: 'POST', headers: { 'Content-Type': 'application/json' },
+        body: JSON.stringify({ secret }),
+      }).catch(() => null);
+      if (!answer) continue;  // no connection: the code stays valid
+      if (!answer.ok) break;  // its time is over: another code
+      if ((await answer.json()).paired) {
+        await loadSession();
+        return;
+      }
+    }
+  }
+}
+
+/// Who is open, and whether check and sensor let people scan.
+function top(status) {
+  const text = S.room;
+  const { session, sensor } = status;
+  const warm = sensor.powered_s >= kWarmUp_s;
+  const mark = (good, words) => h('li', { class: good ? 'good' : 'bad' }, words);
+  const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
+  return h('header', { class: 'room-top' },
+    h('p', { class: 'room-code' }, isCheck ? S.purposes.daily_check
+      : session?.patient_code ?? text.noSession),
+    !isCheck && session && h('p', { class: 'room-fraction' }, session.purpose === 'reference'
+      ? S.purposes.reference : S.session.fraction(session.fraction),
+    h('span', {}, ` · ${S.session.scans(session.num_scans)}`)),
+    h('ul', { class: 'room-marks' },
+      mark(!status.check_overdue, status.check_overdue ? text.checkOverdue : text.checkDone),
+      sensor.present && mark(warm, warm ? text.warm
+        : text.warming(Math.floor(sensor.powered_s / 60)))));
+}
+
+/// Short words are 10 cm high on a screen of 40 inches; long ones take the width that there is.
+const word = (text, tone) =>
+  h('p', { class: `room-word ${tone}${text.length > 9 ? ' long' : ''}` }, text);
+
+function sweep(status, camera) {
+  const text = S.room;
+  const { guidance, coverage } = status.scan ?? { guidance: 'none' };
+  const percent = Math.round(100 * (coverage ?? 0));
+  const known = coverage !== null && coverage !== undefined;
+  return [
+    word(text.words[guidance], guidance === 'none' ? 'good' : 'bad'),
+    text.hints[guidance] && h('p', { class: 'room-hint' }, text.hints[guidance]),
+    h('div', { class: 'room-sweep' }, camera, h('div', { class: 'room-cover' },
+      h('p', { class: 'room-percent' }, known ? text.covered(percent) : text.notCovered),
+      known && h('progress', { max: 1, value: coverage, 'aria-label': text.covered(percent) })))];
+}
+
+const computing = (status) => [word(S.room.computing, 'info'),
+  h('progress', {
+    max: 1, value: status.scan?.step_fraction ?? 0, 'aria-label': S.room.computing,
+  }),
+  h('p', { class: 'room-hint' }, S.scan.step[status.scan?.step] ?? '')];
+
+function resting(status) {
+  const text = S.room;
+  if (status.state === 'no_sensor') {
+    return [word(text.sensorMissing, 'bad'),
+      h('p', { class: 'room-hint' }, S.stateHints.no_sensor)];
+  }
+  if (status.state === 'fault') {
+    return [word(text.fault, 'bad'),
+      h('p', { class: 'room-hint' }, faultWords(status))];
+  }
+  const open = status.session || status.next_purpose === 'daily_check';
+  return [word(open ? text.ready : text.noSession, open ? 'good' : 'bad'),
+    h('p', { class: 'room-hint' }, open ? text.press : text.openOne)];
+}
+
+/// The result of the scan that has just ended, as large as it can be read.
+function result() {
+  const place = h('div', { class: 'room-result' });
+  let shown = null;
+  let note = null;
+  const map = async (data, box) => {
+    const { scan, reference } = data;
+    if (!data.details?.alignment || !reference) return;
+    const scene = await get(`scans/${reference.scan_id}/files/scene.json`, true);
+    const [values, region] = await Promise.all([loadMap(scan.id, 'deviation'),
+      loadMap(scan.id, 'region').catch(() => null)]);
+    const grid = scene.heightmap;
+    const view = viewOf(grid, region);
+    const said = S.result.mapPicture;
+    const canvas = h('canvas', { class: 'still-map', role: 'img', 'aria-label': said });
+    drawCropped(canvas, view, (whole) =>
+      paintErrors(whole, values, toleranceOf(reference).shift_mm / 1000, region));
+    const compass = compassOf(live.status?.room, reference.plan.posture);
+    clear(box, mapFrame({ grid, view, canvas, region, compass }));
+  };
+  const load = async (scan) => {
+    const received = now();
+    const [reference, details, scene] = await Promise.all([
+      scan.reference_id ? optional(`references/${scan.reference_id}`) : null,
+      scan.result ? optional(`results/${scan.id}`) : null,
+      optional(`scans/${scan.id}/files/scene.json`)]);
+    if (shown !== scan.id) return;
+    const data = { scan, reference, details, scene, received, patient: scan.patient_id };
+    note = validityNote(scan, received, false);
+    const box = h('div', { class: 'room-map' });
+    const reasons = scan.result?.verdict === 'no_answer' ? scan.result.reasons.map(sentence) : [];
+    clear(place, note.element, scan.result ? verdictStrip(data) : withoutResult(scan),
+      !scan.result && flagList(scan, scene), reasons.length > 1 && h('p', {}, reasons[1]),
+      h('div', { class: 'room-answer' }, isAdvice(scan) && h('section', {},
+        h('h2', { class: 'visually-hidden' }, S.result.atIsocentre),
+        sixNumbers(scan.result, reference, details)), box));
+    await map(data, box).catch(() => {});
+    if (scan.result) say(S.result.verdicts[scan.result.verdict] ?? '');
+  };
+  return {
+    element: place,
+    show(scan) {
+      const key = scan?.id ?? null;
+      if (key !== shown) {
+        shown = key;
+        note = null;
+        clear(place);
+        if (scan) load(scan);
+      }
+    },
+    tick() { place.classList.toggle('is-old', Boolean(note?.tick())); },
+  };
+}
+
+function withoutResult(scan) {
+  const text = S.room;
+  const reference = scan.purpose === 'reference';
+  return h('section', { class: 'verdict none' },
+    h('p', { class: 'word' }, reference ? text.reference : text.unassigned),
+    h('p', { class: 'why' }, reference ? text.referenceHint : S.result.noReference));
+}
+
+function checkResult(check) {
+  const tone = { passed: 'in_tolerance', failed: 'move' }[check?.status] ?? 'no_answer';
+  return h('section', { class: `verdict ${tone}` },
+    h('p', { class: 'word' }, `${S.room.checkDoneTitle}: `, S.check.verdicts[check?.status] ?? ''),
+    h('p', { class: 'why' }, sentence(check?.reasons[0] ?? '')));
+}
+
+/// Draws what the appliance does now. What changes ten times a second is drawn again, the camera
+/// and the result stay.
+function display(main) {
+  const head = h('div', {});
+  const offline = h('p', { class: 'room-offline', role: 'alert', hidden: true });
+  const body = h('div', { class: 'room-body' });
+  const answer = result();
+  let camera = null;
+  let lastPurpose = null;
+  let drawn = '';
+  let shownMarks = '';
+  clear(main, h('section', { class: 'room' }, h('h1', { class: 'visually-hidden' }, S.room.title),
+    offline, head, body, answer.element));
+  const withCamera = (wanted) => {
+    if (wanted && !camera) camera = preview();
+    if (!wanted && camera) {
+      camera.stop();
+      camera = null;
+    }
+  };
+  const draw = () => {
+    const { status } = live;
+    if (!status) return;
+    lastPurpose = status.scan?.purpose ?? lastPurpose;
+    offline.hidden = live.connected;
+    main.classList.toggle('off', !live.connected);
+    if (!live.connected) {
+      offline.textContent = `${S.room.offline}. `
+        + S.lastKnown(S.states[status.state], Math.floor(since_s(live.received)));
+    }
+    const marks = JSON.stringify([S.languageName, status.session, status.check_overdue,
+      status.next_purpose, status.sensor.present, Math.floor(status.sensor.powered_s / 60)]);
+    if (marks !== shownMarks) {
+      shownMarks = marks;
+      clear(head, top(status));
+    }
+    main.dataset.state = status.state;
+    withCamera(status.state === 'scanning');
+    const last = status.last_result;
+    const isCheck = status.state === 'result' && lastPurpose === 'daily_check';
+    // An answer is shown only in its own state: never during a sweep, nor for another patient.
+    const mine = last && (last.patient_id ?? null) === (status.session?.patient_id ?? null);
+    const visible = status.state === 'result' && !isCheck && mine ? last : null;
+    answer.show(visible);
+    answer.element.hidden = !visible;
+    answer.tick();
+    if (visible) {
+      clear(body);
+      drawn = '';
+      return;
+    }
+    const { scan } = status;
+    const fraction = status.state === 'scanning' ? scan?.coverage : scan?.step_fraction;
+    const key = JSON.stringify([S.languageName, status.state, scan?.guidance,
+      fraction === null, scan?.step, isCheck && status.last_check, faultWords(status),
+      status.session?.id, status.next_purpose]);
+    if (key === drawn && body.hasChildNodes()) {
+      update(fraction);
+      return;
+    }
+    drawn = key;
+    const parts = status.state === 'scanning' ? sweep(status, camera?.element)
+      : status.state === 'working' ? computing(status)
+        : isCheck ? [checkResult(status.last_check)] : resting(status);
+    clear(body, parts);
+    say(parts[0].textContent);
+  };
+  /// What grows while the rest stays as it is.
+  const update = (fraction) => {
+    const bar = body.querySelector('progress');
+    if (bar && fraction !== null && fraction !== undefined) bar.value = fraction;
+    const percent = body.querySelector('.room-percent');
+    if (percent && fraction !== null && fraction !== undefined) {
+      percent.textContent = S.room.covered(Math.round(100 * fraction));
+    }
+  };
+  live.listen(draw);
+  setInterval(draw, 1000);
+  live.open();
+  draw();
+}
+
+export async function showRoom(main, { speak, applyTheme }) {
+  document.documentElement.classList.add('room-page');
+  speak(kWho);
+  applyTheme(kWho);
+  document.title = `${S.room.title} · ${S.product}`;
+  const wanted = new URLSearchParams(location.search).get('language');
+  if (kLanguages[wanted] && wanted !== languageOf(kWho)) {
+    chooseLanguage(kWho, wanted);
+    speak(kWho);
+  }
+  for (;;) {
+    try {
+      const { session } = await loadSession();
+      if (session && may('room')) break;
+      await pair(main, () => showLogin(main, false, () => location.reload()));
+      break;
+    } catch {
+      clear(main, h('p', { class: 'card' }, S.offline));
+      await wait(kAsk_ms);
+    }
+  }
+  setLoggedOffHandler(() => location.reload());
+  display(main);
+}

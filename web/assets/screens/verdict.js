@@ -1,0 +1,96 @@
+// What a result says first: whose it is, how old, the verdict, and whether it can be acted on.
+import { live, since_s } from '../api.js';
+import { clear, h, localTime } from '../dom.js';
+import { S } from '../strings.js';
+import { ageText, flagList, kOldAfter_s, sentence, verdictIcon } from './common.js';
+
+/// Seconds since the scan ended; Infinity where that is not known: such a result is old.
+export function ageOf(scan, received) {
+  const last = live.status?.last_result;
+  const told = last?.id === scan.id ? { age_s: last.age_s, at: live.received }
+    : { age_s: scan.age_s, at: received };
+  return (told.age_s ?? Infinity) + since_s(told.at);
+}
+
+/// Why nobody may act on this result: "running", "superseded", "old"; null: it is valid.
+export function whyNotValid(scan, received) {
+  if (!scan.result) return null;
+  const { status } = live;
+  if (status?.state === 'scanning' || status?.state === 'working') return 'running';
+  if (status?.last_result && status.last_result.id !== scan.id
+      && status.last_result.patient_id === scan.patient_id) return 'superseded';
+  return ageOf(scan, received) > kOldAfter_s ? 'old' : null;
+}
+
+export function identity({ scan, patient, reference, received }) {
+  const text = S.result;
+  const age = h('strong', {});
+  const item = (label, ...value) => h('div', {}, h('dt', {}, label), h('dd', {}, ...value));
+  const element = h('dl', { class: 'identity' },
+    item(text.patient, h('strong', { class: 'code' },
+      patient ? h('a', { href: `#/patient/${patient.id}` }, patient.code) : S.none)),
+    scan.fraction && item(text.fraction, `${scan.fraction}`),
+    item(text.reference, reference
+      ? `${text.version(reference.version)}, ${localTime(reference.created_at)}` : S.none),
+    item(text.scanned, localTime(scan.started_at)),
+    item(text.age, age));
+  const tick = () => {
+    const seconds = ageOf(scan, received);
+    age.textContent = Number.isFinite(seconds) ? ageText(seconds) : S.none;
+  };
+  return { element, tick };
+}
+
+/// @param review  The result was opened from the history: it is read, not acted on.
+export function validityNote(scan, received, review) {
+  const text = S.result;
+  const element = h('p', { class: 'old-note', role: 'status' });
+  const words = {
+    running: [text.running, text.runningText],
+    superseded: [text.superseded, text.supersededText],
+    old: [text.old, text.oldText],
+  };
+  const tick = () => {
+    const why = whyNotValid(scan, received);
+    const shown = why && review && why !== 'running' ? 'review' : why ?? '';
+    if (element.dataset.shown === shown) return why;
+    element.dataset.shown = shown;
+    if (!shown) clear(element);
+    else {
+      const [word, rest] = shown === 'review'
+        ? [text.reviewTitle, text.review(localTime(scan.started_at))] : words[shown];
+      clear(element, h('strong', {}, word), ' ', rest);
+    }
+    return why;
+  };
+  return { element, tick };
+}
+
+function withoutResult({ scan, patient }) {
+  const text = S.result;
+  const unassigned = scan.outcome === 'done' && !scan.patient_id;
+  const words = { failed: text.failed, cancelled: text.cancelled }[scan.outcome]
+    ?? (unassigned ? `${text.unassigned} ${text.noReference}` : text.noReference);
+  const draft = scan.purpose === 'reference' && scan.outcome === 'done' && patient;
+  return h('section', { class: 'verdict none' },
+    h('p', { class: 'word' }, unassigned ? S.room.unassigned : S.purposes[scan.purpose]),
+    h('p', { class: 'why' }, scan.failure ? `${words}: ${scan.failure}` : draft ? '' : words));
+}
+
+export function verdictStrip({ scan, scene, patient }) {
+  const text = S.result;
+  const { result } = scan;
+  if (!result) return withoutResult({ scan, patient });
+  // The first reason decides; nobody reads a wall of text.
+  const [first, ...others] = result.verdict === 'no_answer' ? result.reasons
+    : [text.why[result.verdict] ?? result.reasons[0]];
+  return h('section', { class: `verdict ${result.verdict}` },
+    h('p', { class: 'word' },
+      h('span', { class: 'icon', 'aria-hidden': 'true' }, verdictIcon(result.verdict)),
+      text.verdicts[result.verdict] ?? result.verdict),
+    h('p', { class: 'why' }, sentence(first)),
+    flagList(scan, scene),
+    others.length > 0 && h('details', { class: 'other-reasons' },
+      h('summary', {}, text.otherReasons(others.length)),
+      h('ul', {}, others.map((reason) => h('li', {}, sentence(reason))))));
+}
