@@ -16,6 +16,7 @@
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/signals.hpp"
 #include "daemon/config/version.hpp"
+#include "daemon/loop/crash_report.hpp"
 
 namespace plumb {
 namespace {
@@ -121,6 +122,7 @@ void PrintOut(const std::string& text) {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
+  plumb::ReportCrashes("plumb", plumb::Version().data());
   try {
     return plumb::Main(argc, argv);
   } catch (const std::exception& error) {

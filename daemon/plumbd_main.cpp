@@ -1,3 +1,8 @@
 #include "daemon/appliance/plumbd.hpp"
+#include "daemon/config/version.hpp"
+#include "daemon/loop/crash_report.hpp"
 
-int main(int argc, char** argv) { return plumb::RunPlumbd(argc, argv); }
+int main(int argc, char** argv) {
+  plumb::ReportCrashes("plumbd", plumb::Version().data());
+  return plumb::RunPlumbd(argc, argv);
+}

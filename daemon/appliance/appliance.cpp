@@ -75,6 +75,11 @@ Appliance::~Appliance() {
 }
 
 void Appliance::OpenStore() {
+  if (!parts_.configuration_fault.empty()) {
+    storage_fault_ = parts_.configuration_fault;
+    Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", storage_fault_));
+    return;
+  }
   try {
     store_ = std::make_unique<Store>(parts_.config.appliance.state);
     const RecoveryReport& found = store_->recovery();

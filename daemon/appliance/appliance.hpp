@@ -28,6 +28,9 @@ namespace plumb {
 /// What an appliance is made of. Borrowed objects live longer than it.
 struct ApplianceParts {
   Config config;
+  /// Why the configuration cannot be used; empty: it can. If not, the appliance is in safe mode and
+  /// touches nothing that is stored, because the folder may be another than the one that was meant.
+  std::string configuration_fault;
   std::function<std::unique_ptr<SensorProvider>()> make_provider;  ///< Called on the sensor thread.
   std::function<void()> before_scan;                               ///< See SensorThreadOptions.
   Button* button = nullptr;                                        ///< None: only others press.

@@ -341,6 +341,7 @@ web::CheckStatus Appliance::Checks() {
 }
 
 web::Health Appliance::Health() {
+  if (!parts_.configuration_fault.empty()) return {.ok = false, .reason = storage_fault_};
   if (!storage_fault_.empty()) return {.ok = false, .reason = "storage: " + storage_fault_};
   if (!StorageOf(parts_.config.appliance.state, true).writable)
     return {.ok = false, .reason = "storage: the state folder is on a read-only disk"};

@@ -48,6 +48,7 @@ constexpr std::chrono::seconds kLongestEnd{10};  // less than the unit's Timeout
 
 struct Options {
   std::optional<fs::path> config_file;
+  bool use_default_config = true;  ///< Where it exists and no file is named.
   bool check_config = false;
   std::string simulated;  ///< Suite; empty: real sensors.
   std::optional<fs::path> state, control;
@@ -97,7 +98,8 @@ Config ReadConfiguration(const Options& options) {
   std::error_code ignored;
   if (options.config_file) {
     config = ReadConfig(*options.config_file, ConfigUse::kAppliance);
-  } else if (options.simulated.empty() && fs::exists(kDefaultConfig, ignored)) {
+  } else if (options.use_default_config && options.simulated.empty() &&
+             fs::exists(kDefaultConfig, ignored)) {
     config = ReadConfig(kDefaultConfig, ConfigUse::kAppliance);
   }
   if (options.simulated.empty()) RefuseResearchPresets(config);
@@ -130,6 +132,30 @@ bool IsToldToEnd() {
   return sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1;
 }
 #endif
+
+/// A configuration, and why the one that was meant cannot be used.
+struct Configured {
+  Config config;
+  std::string fault;
+};
+
+/// As ReadConfiguration(). A file that cannot be used is no reason to be gone: page, light and
+/// socket say what is wrong with it, at the places that the defaults and the command line name.
+Configured ReadOrExplain(const Options& options) {
+  try {
+    return {.config = ReadConfiguration(options), .fault = {}};
+  } catch (const std::invalid_argument&) {
+    throw;  // of the command line
+  } catch (const std::exception& error) {
+    Options without_file = options;
+    without_file.config_file.reset();
+    without_file.use_default_config = false;
+    return {.config = ReadConfiguration(without_file),
+            .fault = fmt::format("the configuration cannot be used: {}. Correct the file, then "
+                                 "restart: systemctl restart plumbd",
+                                 error.what())};
+  }
+}
 
 /// Sensor of this run: the virtual one and its provider, or the real ones.
 class Sensors {
@@ -223,11 +249,12 @@ std::optional<int> InheritedSocket(const std::string& name) {
 
 class Plumbd {
  public:
-  Plumbd(const Options& options, const Config& config)
+  Plumbd(const Options& options, const Config& config, const std::string& fault)
       : options_(options),
         sensors_(options, config),
         panel_(loop_, config.panel),
         appliance_(loop_, {.config = config,
+                           .configuration_fault = fault,
                            .make_provider = [this] { return sensors_.MakeProvider(); },
                            .before_scan = sensors_.BeforeScan(),
                            .button = panel_.button(),
@@ -396,18 +423,19 @@ class Plumbd {
 };
 
 int RunChecked(const Options& options) {
-  const Config config = ReadConfiguration(options);
   if (options.check_config) {
+    (void)ReadConfiguration(options);
     fmt::print("the configuration is good\n");
     return 0;
   }
   if (options.simulated.empty() == false && !options.state)
     throw std::invalid_argument("--simulated needs --state DIR, a folder of its own");
+  const Configured configured = ReadOrExplain(options);
   std::error_code ignored;
-  fs::create_directories(config.appliance.state,
+  fs::create_directories(configured.config.appliance.state,
                          ignored);  // what cannot be made is told when the store opens
   std::optional<EndGuard> guard;    // outlives the threads that it waits for
-  Plumbd plumbd(options, config);
+  Plumbd plumbd(options, configured.config, configured.fault);
   const int code = plumbd.Run();
   guard.emplace(kLongestEnd, [] {
     Log(LogLevel::kError,

@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Installs the packages with apt into a clean Debian that runs in systemd-nspawn, changes the configuration, upgrades, removes and purges them.
+#   install_in_container.sh BUILD_FOLDER WORK_FOLDER
+# WORK_FOLDER keeps the Debian and what apt fetched for the next time. Exit code 77: it cannot run here, and the last line says why.
+set -euo pipefail
+build=$(realpath "$1") here=$(cd "$(dirname "$0")" && pwd)
+source=$(cd "$here/../.." && pwd)
+mkdir -p "$2"
+work=$(realpath "$2") root=$work/root
+skip() { echo "skipped: $1"; exit 77; }
+[ "$(id -u)" = 0 ] || skip "needs root"
+for program in systemd-nspawn mmdebstrap dh; do
+  command -v $program >/dev/null || skip "$program is missing: run toolchain/install"
+done
+
+# A Debian with systemd and curl, and nothing that Plumb needs.
+sources=$(cat /etc/apt/sources.list /etc/apt/sources.list.d/debian.sources 2>/dev/null || true)
+wanted=$(echo "1 $sources" | sha256sum)
+if [ "$(cat "$work/wanted" 2>/dev/null)" != "$wanted" ]; then
+  rm -rf "$root" "$work/wanted" "$work/cache"
+  mmdebstrap --variant=minbase --include=systemd,systemd-sysv,udev,dbus,curl --aptopt='APT::Install-Recommends "false"' \
+    --skip=cleanup/apt "$(. /etc/os-release && echo "$VERSION_CODENAME")" "$root" - <<<"$sources" || skip "no Debian could be made: see above"
+  echo "$wanted" >"$work/wanted"
+fi
+
+rm -rf "$work/out" "$work/debs"
+mkdir -p "$work/out" "$work/debs" "$work/cache/archives/partial"
+"$source/toolchain/package" --build "$build" --out "$work/debs/old" --version 0.0.1-1 >/dev/null
+"$source/toolchain/package" --build "$build" --out "$work/debs/new" >/dev/null
+# The container has no network: what the packages depend on is fetched here.
+apt-get -q -y -o Dir::State="$root/var/lib/apt" -o Dir::State::status="$root/var/lib/dpkg/status" \
+  -o Dir::Etc::sourcelist="$root/etc/apt/sources.list" -o Dir::Etc::sourceparts="$root/etc/apt/sources.list.d" \
+  -o Dir::Cache="$work/cache" -o APT::Sandbox::User=root --no-install-recommends --download-only install "$work"/debs/new/plumb{,d}_*.deb >"$work/out/fetch" 2>&1 || { tail -5 "$work/out/fetch"; exit 1; }
+
+install -m 755 "$here/in_container.sh" "$work/debs/checks"
+cat >"$root/etc/systemd/system/plumb-checks.service" <<'UNIT'
+[Unit]
+After=multi-user.target
+[Service]
+Type=oneshot
+ExecStart=/debs/checks
+UNIT
+mkdir -p "$root/etc/systemd/system/multi-user.target.wants"
+ln -sf ../plumb-checks.service "$root/etc/systemd/system/multi-user.target.wants/plumb-checks.service"
+timeout -k 5 240 systemd-nspawn --directory="$root" --volatile=overlay --bind="$work/out:/checks" --bind-ro="$work/debs:/debs" \
+  --bind="$work/cache/archives:/var/cache/apt/archives" \
+  --register=no --keep-unit --boot --quiet --private-network </dev/null >"$work/console" 2>&1 || true
+[ -e "$work/out/log" ] || { tail -5 "$work/console"; skip "systemd does not boot in a container here: see above"; }
+cat "$work/out/log"
+if grep -q '^CHECK FAILED' "$work/out/log" || ! grep -q '^CHECKS DONE' "$work/out/log"; then
+  tail -n 60 "$work/out/apt" "$work/out/journal" 2>/dev/null || true
+  exit 1
+fi

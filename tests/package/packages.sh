@@ -1,0 +1,96 @@
+#!/usr/bin/env bash
+# Makes the packages of a build twice and looks into them.
+#   packages.sh BUILD_FOLDER WORK_FOLDER
+# Exit code 77: it cannot run here, and the last line says why.
+set -euo pipefail
+build=$(realpath "$1") here=$(cd "$(dirname "$0")" && pwd)
+source=$(cd "$here/../.." && pwd)
+for program in dh lintian; do
+  command -v $program >/dev/null || { echo "skipped: $program is missing: run toolchain/install"; exit 77; }
+done
+rm -rf "$2"
+mkdir -p "$2"
+cd "$2"
+failed=0
+check() { # NAME COMMAND...
+  local name=$1
+  shift
+  if "$@" >check.log 2>&1; then echo "ok      $name"; else failed=1; echo "FAILED  $name"; sed 's/^/        /' check.log; fi
+}
+
+"$source/toolchain/package" --build "$build" --out once >made
+# Another place, time zone, language and umask must not show.
+(umask 077 && TMPDIR=$(mktemp -d -p "$PWD") TZ=Asia/Tokyo LANG=de_DE "$source/toolchain/package" --build "$build" --out twice >/dev/null)
+check "two runs give the same bytes" diff -r once twice
+check "lintian finds no error" lintian --allow-root --fail-on error --suppress-tags debug-file-with-no-debug-symbols once/*.deb
+
+mkdir tree
+for package in plumb plumbd plumb-virtual-sensor libplumb-dev; do dpkg-deb -x once/${package}_*.deb "tree/$package"; done
+check "binaries are hardened" "$here/hardening.sh" tree
+cat check.log
+
+every_library_is_depended_upon() {
+  local package file library owner bad=0
+  for package in plumb plumbd plumb-virtual-sensor; do
+    depends=" $(dpkg-deb -f once/${package}_*.deb Depends) "
+    while IFS= read -r file; do
+      case "$file" in *libOpenNI2.so* | *libOniFile.so*) continue ;; esac
+      for library in $(readelf -dW "$file" 2>/dev/null | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p'); do
+        owner=$(for path in {,/usr}/lib/"$(dpkg-architecture -qDEB_HOST_MULTIARCH)"/"$library"; do
+          dpkg -S "$path" 2>/dev/null || true; done | sed 's/:.*//' | sort -u | head -1)
+        [[ $depends =~ [\ ,]"$owner"[\ ,\(] ]] || { echo "$package: $library of '$owner' is not in Depends:$depends"; bad=1; }
+      done
+    done < <(find "tree/$package" -type f)
+  done
+  return $bad
+}
+check "every library used is in Depends" every_library_is_depended_upon
+
+files_are_there() {
+  local file bad=0
+  for file in plumb/usr/share/man/man1/plumb.1.gz plumbd/usr/share/man/man8/plumbd.8.gz plumbd/usr/share/man/man5/plumb.toml.5.gz \
+    plumb/usr/share/doc/plumb/{README.md.gz,changelog.gz,changelog.Debian.gz,copyright} plumbd/usr/share/doc/plumbd/copyright \
+    plumbd/lib/systemd/system/plumbd.{service,socket} plumbd/lib/udev/rules.d/60-plumb.rules plumbd/usr/lib/sysusers.d/plumb.conf \
+    plumbd/usr/lib/tmpfiles.d/plumb.conf; do
+    [ -s "tree/$file" ] || { echo "missing: $file"; bad=1; }
+  done
+  grep -q '^ExecStart=/usr/bin/plumbd' tree/plumbd/lib/systemd/system/plumbd.service || { echo "the unit starts another program"; bad=1; }
+  return $bad
+}
+check "manual, licence and units are in" files_are_there
+
+dpkg-deb -e once/plumbd_*.deb control
+check "the configuration is a conffile" grep -qx /etc/plumb/plumb.toml control/conffiles
+check "no maintainer script removes data" bash -c '! grep -nE "rm .*/var/lib|deluser|userdel" control/postrm control/prerm'
+check "the configuration as delivered is good" tree/plumbd/usr/bin/plumbd --config tree/plumbd/etc/plumb/plumb.toml --check-config
+# Every example in it too: a line "# key = ..." becomes one that counts.
+sed -E 's/^# ([a-z_]+ = )/\1/' tree/plumbd/etc/plumb/plumb.toml >examples.toml
+check "its examples are good" tree/plumbd/usr/bin/plumbd --config examples.toml --check-config
+
+# Options in a page as man shows it, and those that --help tells.
+shown() { MANWIDTH=1000 man -l "$1" 2>/dev/null | col -b; }
+every_option_is_in_the_manual() {
+  local command option bad=0 page
+  page=$(shown tree/plumb/usr/share/man/man1/plumb.1.gz)
+  for command in $(tree/plumb/usr/bin/plumb --help | sed -n '/^Subcommands:/,/^$/s/^  \([a-z]\+\) .*/\1/p'); do
+    grep -q "plumb $command" <<<"$page" || { echo "plumb $command is not in plumb.1"; bad=1; }
+    for option in $(tree/plumb/usr/bin/plumb "$command" --help | grep -oE '^ +(-h,)?--[a-z-]+' | grep -oE '\-\-[a-z-]+'); do
+      grep -q -- "$option\b" <<<"$page" || { echo "plumb $command $option is not in plumb.1"; bad=1; }
+    done
+  done
+  [ -n "$command" ] || { echo "plumb --help lists no command"; bad=1; }
+  page=$(shown tree/plumbd/usr/share/man/man8/plumbd.8.gz)
+  for option in $(tree/plumbd/usr/bin/plumbd --help | grep -oE '^ +(-h,)?--[a-z-]+' | grep -oE '\-\-[a-z-]+'); do
+    grep -q -- "$option\b" <<<"$page" || { echo "plumbd $option is not in plumbd.8"; bad=1; }
+  done
+  return $bad
+}
+check "every command and option is in the manual" every_option_is_in_the_manual
+man_pages_are_well_formed() {
+  local page text=
+  for page in "$source"/toolchain/man/*; do text+=$(LC_ALL=C.UTF-8 man --warnings -l -Tutf8 "$page" 2>&1 >/dev/null); done
+  echo "$text"
+  [ -z "$text" ]
+}
+check "the manual is well-formed" man_pages_are_well_formed
+exit $failed
