@@ -54,26 +54,24 @@ std::string CheckSettings(const web::Settings& s) {
 
 WebService::WebService(Appliance& appliance, const UpdateConfig& update)
     : appliance_(appliance),
-      updater_(appliance.loop(),
-               UpdaterOptions{.folder = update.folder,
-                              .max_bytes = static_cast<std::uint64_t>(update.max_bundle_mb) << 20,
-                              .bus_address = {},
-                              .version = std::string(Version()),
-                              .hindrance = [this] { return WhyNoUpdate(); },
-                              .changed =
-                                  [this] {
-                                    if (listener_) listener_(web::EventKind::kUpdate);
-                                  },
-                              .close_aside =
-                                  [this](int fd) {
-                                    if (!files_.Post([fd] { ::close(fd); })) ::close(fd);
-                                  },
-                              .ended =
-                                  [this](const std::string& bundle, const std::string& failure) {
-                                    Log({.user = "installer", .address = {}},
-                                        failure.empty() ? "update.done" : "update.fail", bundle,
-                                        failure);
-                                  }}) {
+      updater_(
+          appliance.loop(),
+          UpdaterOptions{
+              .folder = update.folder,
+              .max_bytes = static_cast<std::uint64_t>(update.max_bundle_mb) << 20,
+              .bus_address = {},
+              .version = std::string(Version()),
+              .hindrance = [this] { return WhyNoUpdate(); },
+              .changed =
+                  [this] {
+                    if (listener_) listener_(web::EventKind::kUpdate);
+                  },
+              .aside = [this](std::function<void()> work) { return files_.Post(std::move(work)); },
+              .ended =
+                  [this](const std::string& bundle, const std::string& failure) {
+                    Log({.user = "installer", .address = {}},
+                        failure.empty() ? "update.done" : "update.fail", bundle, failure);
+                  }}) {
   appliance_.SetHindrance([this] {
     return updater_.is_installing()
                ? std::string("a system update is being installed: wait until it is done")

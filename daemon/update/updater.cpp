@@ -12,6 +12,7 @@
 #include <charconv>
 #include <cstring>
 #include <ctime>
+#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -50,22 +51,18 @@ web::Change Refused(ChangeResult result, std::string message) {
 /// Keeps a file's contents until its destruction, so that taking its name away is quick.
 class Keep {
  public:
-  Keep(const std::filesystem::path& file, const std::function<void(int)>& close_aside)
-      : close_aside_(close_aside),
-        fd_(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK)) {}
+  using Aside = std::function<bool(std::function<void()>)>;
+  Keep(const std::filesystem::path& file, const Aside& aside)
+      : aside_(aside), fd_(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK)) {}
   ~Keep() {
     if (fd_ < 0) return;
-    if (close_aside_) {
-      close_aside_(fd_);
-    } else {
-      ::close(fd_);
-    }
+    if (!aside_ || !aside_([fd = fd_] { ::close(fd); })) ::close(fd_);
   }
   Keep(const Keep&) = delete;
   Keep& operator=(const Keep&) = delete;
 
  private:
-  const std::function<void(int)>& close_aside_;
+  const Aside& aside_;
   int fd_;
 };
 
@@ -86,7 +83,10 @@ struct Updater::Impl {
     RemoveBroken();
     Connect();
   }
-  ~Impl() { Disconnect(); }
+  ~Impl() {
+    *alive = false;
+    Disconnect();
+  }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
@@ -97,7 +97,10 @@ struct Updater::Impl {
   std::chrono::steady_clock::time_point looked_at;
   bool is_there = false;
   bool is_installing = false;
-  std::string slot, step, last_error, outcome;
+  std::string slot, compatible, step, last_error, outcome;
+  BundleState state = BundleState::kUnknown;  ///< Of the bundle that is installed or looked at.
+  std::map<std::string, BundleState> states;  ///< Of those looked at before.
+  std::shared_ptr<bool> alive = std::make_shared<bool>(true);  ///< For work that is done aside.
   double fraction = 0.0;
   std::string bundle;
   web::Done done;
@@ -210,8 +213,10 @@ struct Updater::Impl {
       if (sd_bus_message_read(message, "v", "(isi)", &percent, &text, &depth) < 0) return;
       fraction = std::clamp(percent, 0, 100) / 100.0;
       step = Shown(text);
-    } else if (key == "BootSlot" || key == "LastError" || key == "Operation") {
+    } else if (key == "BootSlot" || key == "Compatible" || key == "LastError" ||
+               key == "Operation") {
       if (sd_bus_message_read(message, "v", "s", &text) < 0) return;
+      if (key == "Compatible") compatible = Shown(text);
       if (key == "BootSlot") slot = Shown(text);
       if (key == "LastError") last_error = Shown(text);
     } else {
@@ -280,17 +285,41 @@ struct Updater::Impl {
     return text.empty() ? "the installer does not say why" : text;
   }
 
+  /// RAUC 1.8 gives no reason over the bus: what the bundle itself shows is said as well.
+  [[nodiscard]] std::string WhyRefused(const std::string& error) const {
+    switch (state) {
+      case BundleState::kDamaged:
+        return fmt::format(
+            "the bundle was damaged on its way: its contents are not what was signed; copy it "
+            "again (the installer: {})",
+            error);
+      case BundleState::kWhole:
+        return fmt::format(
+            "the bundle is not signed by a key that this machine trusts: it came as it was made, "
+            "so ask who made it (the installer: {})",
+            error);
+      case BundleState::kUnknown:
+        break;
+    }
+    return "the installer refuses this bundle: " + error;
+  }
+
   /// RAUC has looked at the bundle: its signature is good, and this is what it is.
   static int OnInfo(sd_bus_message* message, void* self, sd_bus_error*) {
     auto* impl = static_cast<Impl*>(self);
     if (sd_bus_message_is_method_error(message, nullptr) != 0) {
-      impl->Refuse(ChangeResult::kInvalid,
-                   "the installer refuses this bundle: " + ErrorOf(message));
+      impl->Refuse(ChangeResult::kInvalid, impl->WhyRefused(ErrorOf(message)));
       return 0;
     }
     const char *compatible = nullptr, *version = nullptr;
     if (sd_bus_message_read(message, "ss", &compatible, &version) < 0) {
       impl->Refuse(ChangeResult::kFailed, "the installer's answer cannot be read: is it RAUC 1.8?");
+      return 0;
+    }
+    if (Shown(compatible) != impl->compatible) {
+      impl->Refuse(ChangeResult::kConflict,
+                   fmt::format("this bundle is for another machine: it is for '{}', this is '{}'",
+                               Shown(compatible), impl->compatible));
       return 0;
     }
     if (IsOlder(Shown(version), impl->options.version)) {
@@ -355,11 +384,33 @@ struct Updater::Impl {
     last_error.clear();
     outcome.clear();
     done = std::move(asked);
-    const int result = sd_bus_call_method_async(bus, nullptr, kService, kPath, kInstaller, "Info",
-                                                &Impl::OnInfo, this, "s", file.c_str());
+    state = BundleState::kUnknown;
+    Tell();
+    const auto look = [this, file, is_alive = alive, &on = loop] {
+      const BundleState found = LookForDamage(file);
+      on.Post("bundle", [this, file, found, is_alive] {
+        if (*is_alive) Ask(file, found);
+      });
+    };
+    if (!options.aside || !options.aside(look)) look();
+  }
+
+  /// A file that RAUC has taken over at an earlier attempt cannot be read again: what it was then,
+  /// it still is.
+  void Ask(const std::filesystem::path& file, BundleState found) {
+    if (!is_installing) return;
+    if (found != BundleState::kUnknown) {
+      states[bundle] = found;
+    } else if (const auto known = states.find(bundle); known != states.end()) {
+      found = known->second;
+    }
+    state = found;
+    const int result =
+        bus == nullptr ? -1
+                       : sd_bus_call_method_async(bus, nullptr, kService, kPath, kInstaller, "Info",
+                                                  &Impl::OnInfo, this, "s", file.c_str());
     if (result < 0) return Refuse(ChangeResult::kFailed, "the installer cannot be asked");
     Process();
-    Tell();
   }
 
   [[nodiscard]] std::vector<std::string> Bundles() const {
@@ -421,11 +472,12 @@ web::Change Updater::Add(const std::filesystem::path& file, const std::string& n
   const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
   if (!is_known && known.size() >= kMaxKept)
     return Refused(ChangeResult::kConflict, "there are too many bundles: remove one first");
-  const Keep replaced(impl_->options.folder / name, impl_->options.close_aside);
+  const Keep replaced(impl_->options.folder / name, impl_->options.aside);
   if (::rename(file.c_str(), (impl_->options.folder / name).c_str()) != 0) {
     return Refused(ChangeResult::kNoSpace,
                    fmt::format("{} cannot be kept: {}", name, std::strerror(errno)));
   }
+  impl_->states.erase(name);
   impl_->Tell();
   return {};
 }
@@ -437,11 +489,12 @@ web::Change Updater::Remove(const std::string& name) {
   if (std::find(known.begin(), known.end(), name) == known.end())
     return Refused(ChangeResult::kNotFound, "there is no such bundle");
   std::error_code error;
-  const Keep removed(impl_->options.folder / name, impl_->options.close_aside);
+  const Keep removed(impl_->options.folder / name, impl_->options.aside);
   std::filesystem::remove(impl_->options.folder / name, error);
   if (error)
     return Refused(ChangeResult::kFailed,
                    fmt::format("{} cannot be removed: {}", name, error.message()));
+  impl_->states.erase(name);
   impl_->Tell();
   return {};
 }
@@ -453,7 +506,14 @@ void Updater::Install(const std::string& name, web::Done done) {
 std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_bytes) {
   const std::string name = file.filename().string();
   const int fd = ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) return fmt::format("{} cannot be read: {}", name, std::strerror(errno));
+  if (fd < 0) {
+    const int why = errno;
+    struct stat info {};
+    if (why == EACCES && ::lstat(file.c_str(), &info) == 0 && S_ISREG(info.st_mode) &&
+        info.st_uid == 0 && (info.st_mode & 077) == 0)
+      return {};
+    return fmt::format("{} cannot be read: {}", name, std::strerror(why));
+  }
   const auto check = [&]() -> std::string {
     struct stat info {};
     if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) return name + " is no plain file";

@@ -21,9 +21,9 @@ struct UpdaterOptions {
   std::function<std::string()>
       hindrance;  ///< Asked before RAUC is told to begin: why it may not now, or nothing.
   std::function<void()> changed;  ///< Called on the loop when status() has changed.
-  /// Closes a descriptor on another thread: that of a large file whose name is gone takes its time.
-  /// Empty: closed at once.
-  std::function<void(int fd)> close_aside;
+  /// Does what takes its time on another thread: reading a whole bundle, closing a large file whose
+  /// name is gone. False: it has too much to do. Empty: all is done at once, on the loop.
+  std::function<bool(std::function<void()>)> aside;
   /// Called on the loop when an installation that had begun has ended; empty text: it worked.
   std::function<void(const std::string& bundle, const std::string& failure)> ended;
 };
@@ -56,8 +56,16 @@ class Updater {
 };
 
 /// Empty, or why the file can be no bundle: not a plain file, empty, too large, not a squashfs with
-/// a signature behind it.
+/// a signature behind it. RAUC takes over what it looks at (owner root, readable by root alone): of
+/// such a file nothing is said here, nobody can have changed it since.
 [[nodiscard]] std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_bytes);
+
+enum class BundleState { kUnknown, kWhole, kDamaged };
+
+/// Whether a bundle still is what was signed: a digest of its contents must be in the signature.
+/// Says nothing about who signed it: that is RAUC's to judge, and this only words its refusal.
+/// Verity bundles carry their manifest in the signature: there it alone is looked at.
+[[nodiscard]] BundleState LookForDamage(const std::filesystem::path& file);
 
 /// True where `a` is an older version than `b`: numbers between dots, compared one by one; what is
 /// no number counts as 0.

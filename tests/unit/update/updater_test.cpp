@@ -210,7 +210,7 @@ class UpdaterTest : public ::testing::Test {
                                 .version = "0.1.0",
                                 .hindrance = [this] { return hindrance_; },
                                 .changed = [this] { ++num_changes_; },
-                                .close_aside = {},
+                                .aside = {},
                                 .ended =
                                     [this](const std::string& bundle, const std::string& failure) {
                                       ended_ = bundle + ": " + failure;

@@ -1,0 +1,122 @@
+// Whether a bundle still is what was signed. A bundle is a squashfs, behind it a signature (CMS,
+// DER) and in eight bytes the signature's size. Signed attributes hold the SHA-256 of what was
+// signed: of the squashfs (plain format), or of the manifest, which then is part of the CMS (verity
+// format).
+#include <fcntl.h>
+#include <sodium.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "daemon/update/updater.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr std::uint64_t kMaxSignature = 64 << 10;
+constexpr std::string_view kManifestBegin = "[update]";
+/// Object identifier of SHA-256 as DER has it: without it another digest was used.
+constexpr std::array<unsigned char, 11> kSha256{0x06, 0x09, 0x60, 0x86, 0x48, 0x01,
+                                                0x65, 0x03, 0x04, 0x02, 0x01};
+
+using Bytes = std::vector<unsigned char>;
+using Digest = std::array<unsigned char, crypto_hash_sha256_BYTES>;
+
+template <typename Wanted>
+bool Holds(const Bytes& bytes, const Wanted& wanted) {
+  return std::search(bytes.begin(), bytes.end(), wanted.begin(), wanted.end()) != bytes.end();
+}
+
+class File {
+ public:
+  explicit File(const std::filesystem::path& path)
+      : fd_(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK)) {}
+  ~File() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+
+  [[nodiscard]] std::uint64_t size() const {
+    const off_t end = fd_ < 0 ? -1 : ::lseek(fd_, 0, SEEK_END);
+    return end < 0 ? 0 : static_cast<std::uint64_t>(end);
+  }
+  [[nodiscard]] std::optional<Bytes> Read(std::uint64_t at, std::size_t count) const {
+    Bytes bytes(count);
+    const ssize_t read = ::pread(fd_, bytes.data(), count, static_cast<off_t>(at));
+    if (read != static_cast<ssize_t>(count)) return std::nullopt;
+    return bytes;
+  }
+
+ private:
+  int fd_;
+};
+
+/// The content that a CMS carries, from its own beginning on; its length stands in front of it.
+std::optional<Bytes> ManifestIn(const Bytes& cms) {
+  const auto begin =
+      std::search(cms.begin(), cms.end(), kManifestBegin.begin(), kManifestBegin.end());
+  if (begin == cms.end()) return std::nullopt;
+  // An octet string: 04 LL, 04 81 LL or 04 82 LL LL.
+  const auto before = [&](std::ptrdiff_t back) -> unsigned {
+    return begin - cms.begin() >= back ? *(begin - back) : 0U;
+  };
+  std::size_t length = 0;
+  if (before(4) == 0x04 && before(3) == 0x82) {
+    length = before(2) << 8 | before(1);
+  } else if (before(3) == 0x04 && before(2) == 0x81) {
+    length = before(1);
+  } else if (before(2) == 0x04 && before(1) < 0x80) {
+    length = before(1);
+  }
+  if (length == 0 || length > static_cast<std::size_t>(cms.end() - begin)) return std::nullopt;
+  return Bytes(begin, begin + static_cast<std::ptrdiff_t>(length));
+}
+
+std::optional<Digest> DigestOf(const File& file, std::uint64_t count) {
+  constexpr std::size_t kStep = 1 << 20;
+  crypto_hash_sha256_state state;
+  crypto_hash_sha256_init(&state);
+  for (std::uint64_t at = 0; at < count; at += kStep) {
+    const auto bytes =
+        file.Read(at, static_cast<std::size_t>(std::min<std::uint64_t>(kStep, count - at)));
+    if (!bytes) return std::nullopt;
+    crypto_hash_sha256_update(&state, bytes->data(), bytes->size());
+  }
+  Digest digest;
+  crypto_hash_sha256_final(&state, digest.data());
+  return digest;
+}
+
+}  // namespace
+
+BundleState LookForDamage(const std::filesystem::path& path) {
+  const File file(path);
+  const std::uint64_t size = file.size();
+  if (size <= 8) return BundleState::kUnknown;
+  const auto tail = file.Read(size - 8, 8);
+  if (!tail) return BundleState::kUnknown;
+  std::uint64_t signature = 0;
+  for (const unsigned char byte : *tail) signature = signature << 8 | byte;
+  if (signature == 0 || signature > kMaxSignature || signature + 8 >= size)
+    return BundleState::kUnknown;
+  const auto cms = file.Read(size - 8 - signature, static_cast<std::size_t>(signature));
+  if (!cms || !Holds(*cms, kSha256)) return BundleState::kUnknown;
+
+  if (const auto manifest = ManifestIn(*cms)) {
+    Digest digest;
+    crypto_hash_sha256(digest.data(), manifest->data(), manifest->size());
+    return Holds(*cms, digest) ? BundleState::kWhole : BundleState::kDamaged;
+  }
+  const auto digest = DigestOf(file, size - 8 - signature);
+  if (!digest) return BundleState::kUnknown;
+  return Holds(*cms, *digest) ? BundleState::kWhole : BundleState::kDamaged;
+}
+
+}  // namespace plumb

@@ -1,0 +1,66 @@
+#!/usr/bin/env bash
+# The health gate with programs of the test's own around it: only a healthy system is marked, each fault has its sentence, and only a release that has
+# never been good is left.
+#   health_gate.sh BUILD_FOLDER      plumb of the build does the self test
+set -euo pipefail
+gate=$(cd "$(dirname "$0")/../../systemd" && pwd)/health-gate plumb=$(realpath "$1/daemon/plumb")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+mkdir bin state gate
+for program in systemctl curl rauc; do printf '#!/bin/sh\necho "%s $*" >>%s/calls\n. %s/%s\n' $program "$work" "$work" $program >bin/$program; done
+ln -s "$plumb" bin/plumb
+chmod +x bin/systemctl bin/curl bin/rauc
+echo "0.2.0 one" >release
+export PATH=$work/bin:$PATH PLUMB_STATE=$work/state PLUMB_GATE_STATE=$work/gate PLUMB_RELEASE=$work/release PLUMB_GATE_WAIT=2 PLUMB_GATE_FRAMES=30
+failed=0
+check() { if [[ $3 =~ $2 ]]; then echo "ok      $1"; else failed=1; printf 'FAILED  %s: expected %s, found %s\n' "$1" "$2" "$3"; fi; }
+healthy() {
+  : >calls
+  rm -rf gate/*
+  echo '[ "$1" = is-active ] && { [ "$2" = --quiet ] || echo active; }; true' >systemctl
+  echo 'case "$*" in *https*) exit 35 ;; esac; echo "{\"status\":\"ok\"}"' >curl
+  echo true >rauc
+  export PLUMB_GATE_SELF_TEST=no
+}
+run() { "$gate" "$@" >told 2>&1 && code=0 || code=$?; }
+is_marked() { grep -c 'rauc status mark-good' calls || true; }
+
+healthy
+PLUMB_GATE_SELF_TEST=yes run
+check "a healthy system with its self test" '^0 1 0.2.0 one$' "$code $(is_marked) $(cat gate/good)"
+run roll-back
+check "a release that was good is not left" '^0 $' "$code $(grep reboot calls || true)"
+echo "0.2.1 two" >release
+run roll-back
+check "a new one is" '^0 systemctl --no-block reboot$' "$code $(grep reboot calls || true)"
+
+refused() { # NAME SENTENCE
+  run
+  check "$1" "^1 0 not marked good: $2" "$code $(is_marked) $(grep 'not marked' told || true)"
+  check "$1: nothing is remembered" '^none$' "$([ -e gate/good ] || echo none)"
+}
+healthy; echo 'exit 7' >curl
+refused "no page" "the page does not answer on port 8080"
+healthy; echo '[ "$2" = --quiet ] && exit 3; echo failed' >systemctl
+refused "no service" "plumbd.service is failed"
+healthy; echo 'echo "{\"status\":\"failed\",\"reason\":\"storage: no\"}"' >curl
+refused "a fault of the storage" "the page reports: .*storage: no"
+healthy
+PLUMB_STATE=$work/none refused "a state folder that cannot be written" "nothing can be written to"
+healthy; rm bin/plumb; printf '#!/bin/sh\necho "out of memory"; exit 1\n' >bin/plumb; chmod +x bin/plumb
+PLUMB_GATE_SELF_TEST=yes refused "a self test that fails" "the self test failed: out of memory"
+healthy; printf '#!/bin/sh\nmkdir -p "$5" 2>/dev/null; [ "$1" != compare ] || echo "{\\"verdict\\": \\"in_tolerance\\"}" >"$5/result.json"\n' >bin/plumb
+PLUMB_GATE_SELF_TEST=yes refused "a self test with a wrong answer" "the self test's body moved"
+healthy; echo 'exit 1' >rauc
+run
+check "RAUC refuses" '^1 .*RAUC cannot mark' "$code $(cat told)"
+
+healthy; echo 'echo "{\"status\":\"failed\",\"reason\":\"sensor: unplug it\"}"' >curl
+run
+check "a fault of the sensor is not the release's" '^0 1$' "$code $(is_marked)"
+healthy
+printf '[web]\nlisten = "0.0.0.0:9443"\n' >plumb.toml
+PLUMB_CONFIG=$work/plumb.toml run
+check "the configured port is asked" '127.0.0.1:9443/health' "$(cat calls)"
+exit $failed
