@@ -72,19 +72,28 @@ std::optional<MarkerBaseline> BaselineIn(const std::string& check_json) {
 web::CheckRecord CheckIn(const std::string& check_json) {
   web::CheckRecord record;
   const Json json = Json::parse(check_json, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object()) return record;
-  record.status = json.value("status", record.status);
-  record.reasons = json.value("reasons", record.reasons);
-  record.num_markers = json.value("markers", Json::object()).size();
-  for (const Json& item : json.value("items", Json::array())) {
-    const Json value = item.value("value", Json());
-    record.items.push_back(
-        {.name = item.value("name", std::string()),
-         .value = value.is_number() ? std::optional(value.get<double>()) : std::nullopt,
-         .limit = item.value("limit", 0.0),
-         .unit = item.value("unit", std::string()),
-         .passed = item.value("passed", false),
-         .note = item.value("note", std::string())});
+  const auto unreadable = [&record](const char* why) {
+    record = {};
+    record.reasons = {std::string("this check cannot be read: ") + why};
+    return record;
+  };
+  if (!json.is_object()) return unreadable("it is no JSON object");
+  try {
+    record.status = json.at("status").get<std::string>();
+    record.reasons = json.value("reasons", record.reasons);
+    record.num_markers = json.value("markers", Json::object()).size();
+    for (const Json& item : json.value("items", Json::array())) {
+      const Json value = item.value("value", Json());
+      record.items.push_back(
+          {.name = item.value("name", std::string()),
+           .value = value.is_number() ? std::optional(value.get<double>()) : std::nullopt,
+           .limit = item.value("limit", 0.0),
+           .unit = item.value("unit", std::string()),
+           .passed = item.value("passed", false),
+           .note = item.value("note", std::string())});
+    }
+  } catch (const Json::exception&) {
+    return unreadable("a value of it has another type than expected");
   }
   return record;
 }

@@ -15,8 +15,8 @@ namespace plumb {
 /// The markers in such a text; nothing if it is none.
 [[nodiscard]] std::optional<MarkerBaseline> BaselineIn(const std::string& check_json);
 
-/// What the page shows of it; id, time, user and sensor are left to the caller. What cannot be read
-/// is left out: the text is our own.
+/// What the page shows of it; id, time, user and sensor are left to the caller. One that cannot be
+/// read is a failed check whose reason says so.
 [[nodiscard]] web::CheckRecord CheckIn(const std::string& check_json);
 
 }  // namespace plumb

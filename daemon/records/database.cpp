@@ -9,8 +9,6 @@
 namespace plumb {
 namespace {
 
-constexpr int kBusyTimeout_ms = 5000;
-
 /// The name as an address, with what SQLite must know of the disk.
 std::string UriOf(const std::filesystem::path& file, Database::Access access) {
   std::string uri = "file:";
@@ -102,7 +100,9 @@ std::string Statement::Text(int column) const {
           static_cast<std::size_t>(sqlite3_column_bytes(statement_, column))};
 }
 
-Database::Database(const std::filesystem::path& file, Access access) : file_(file) {
+Database::Database(const std::filesystem::path& file, Access access,
+                   std::chrono::milliseconds busy_wait)
+    : file_(file) {
   const int flags = access == Access::kReadWrite ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE
                                                  : SQLITE_OPEN_READONLY;
   const char* const system =
@@ -114,7 +114,7 @@ Database::Database(const std::filesystem::path& file, Access access) : file_(fil
       Fail(code, "open");
     }
     sqlite3_extended_result_codes(handle_, 1);
-    sqlite3_busy_timeout(handle_, kBusyTimeout_ms);
+    sqlite3_busy_timeout(handle_, static_cast<int>(busy_wait.count()));
     if (access == Access::kFrozen)
       Execute("PRAGMA locking_mode = EXCLUSIVE");  // the log's index is kept in memory
     // A file from elsewhere shall not be able to run anything.
@@ -157,17 +157,54 @@ Statement Database::Prepare(const char* sql) {
 std::int64_t Database::last_id() const { return sqlite3_last_insert_rowid(handle_); }
 int Database::num_changed() const { return sqlite3_changes(handle_); }
 
-void Database::CheckIntegrity() {
-  Statement check = Prepare("PRAGMA integrity_check(3)");
+bool Database::CheckIntegrity(std::chrono::milliseconds limit) {
+  using Clock = std::chrono::steady_clock;
+  constexpr int kStepsBetween = 10'000;
+  Clock::time_point end = Clock::now() + limit;
+  sqlite3_progress_handler(
+      handle_, kStepsBetween,
+      [](void* until) { return Clock::now() > *static_cast<Clock::time_point*>(until) ? 1 : 0; },
+      &end);
   std::string found;
-  while (check.Step()) found += (found.empty() ? "" : "; ") + check.Text(0);
-  if (found != "ok") {
+  int code = SQLITE_OK;
+  {
+    Statement check = Prepare("PRAGMA integrity_check(3)");
+    while ((code = sqlite3_step(check.statement_)) == SQLITE_ROW)
+      found += (found.empty() ? "" : "; ") + check.Text(0);
+  }
+  sqlite3_progress_handler(handle_, 0, nullptr, nullptr);
+  const bool is_cut_short = (code & 0xFF) == SQLITE_INTERRUPT;
+  if (code != SQLITE_DONE && !is_cut_short) Fail(code, "read");
+  if (found != "ok" && !(is_cut_short && found.empty())) {
     throw DatabaseCorrupt(
         fmt::format("the database {} is damaged ({}): put a backup in its place, or move it and "
                     "the folder scans away to "
                     "begin anew",
                     file_.string(), found));
   }
+  return !is_cut_short;
+}
+
+void Database::CopyTo(const std::filesystem::path& file) {
+  sqlite3* copy = nullptr;
+  int code =
+      sqlite3_open_v2(file.c_str(), &copy,
+                      SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
+  if (code == SQLITE_OK) {
+    // In one step: a writer in between would make it begin again, and in this mode of the log
+    // readers hold nobody up.
+    sqlite3_backup* backup = sqlite3_backup_init(copy, "main", handle_, "main");
+    code = backup == nullptr ? sqlite3_errcode(copy) : sqlite3_backup_step(backup, -1);
+    const int end = backup == nullptr ? code : sqlite3_backup_finish(backup);
+    if (code == SQLITE_DONE) code = end;
+  }
+  const std::string what = sqlite3_errstr(code);
+  const int closed = sqlite3_close(copy);
+  if (code == SQLITE_OK && closed == SQLITE_OK) return;
+  throw DiskRefused(
+      fmt::format("cannot copy the database {} to {}: {}; the disk may be full or "
+                  "failing",
+                  file_.string(), file.string(), what));
 }
 
 void Database::Fail(int code, const char* doing) const {
@@ -190,7 +227,7 @@ void Database::Fail(int code, const char* doing) const {
     case SQLITE_IOERR:
       throw DiskRefused(message + "; the disk may be full or failing");
     case SQLITE_BUSY:
-      throw IoError(message + "; does another plumbd use this folder?");
+      throw DatabaseBusy(message + "; does another plumbd use this folder?");
     case SQLITE_CONSTRAINT:
       throw ConstraintBroken(message);
     default:

@@ -1,6 +1,7 @@
 // SQLite, as far as the store needs it: statements, transactions, and errors that say what to do.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -24,6 +25,12 @@ class DatabaseCorrupt : public IoError {
 
 /// The disk is full or may not be written.
 class DiskRefused : public IoError {
+ public:
+  using IoError::IoError;
+};
+
+/// Another process, or connection, holds it.
+class DatabaseBusy : public IoError {
  public:
   using IoError::IoError;
 };
@@ -83,8 +90,10 @@ class Database {
     kReadOnly,  ///< Beside one that writes.
     kFrozen,    ///< On a disk that cannot be written by anybody.
   };
+  /// @param busy_wait  For another connection that holds the file, before DatabaseBusy.
   /// @throws IoError and its kinds.
-  Database(const std::filesystem::path& file, Access access);
+  Database(const std::filesystem::path& file, Access access,
+           std::chrono::milliseconds busy_wait = std::chrono::seconds(5));
   ~Database();
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
@@ -95,8 +104,12 @@ class Database {
   [[nodiscard]] Statement Prepare(const char* sql);
   [[nodiscard]] std::int64_t last_id() const;
   [[nodiscard]] int num_changed() const;
+  /// Looks at everything, for at most so long. False: not all was looked at in that time.
   /// @throws DatabaseCorrupt naming what SQLite found.
-  void CheckIntegrity();
+  bool CheckIntegrity(std::chrono::milliseconds limit = std::chrono::hours(1));
+  /// A copy as of one moment; others may write meanwhile. The file must not exist.
+  /// @throws IoError and its kinds
+  void CopyTo(const std::filesystem::path& file);
 
  private:
   friend class Statement;

@@ -130,8 +130,29 @@ CREATE TABLE displays (
 ) STRICT;
 )sql";
 
+// What was stored can be held against what is there; what was removed on purpose is told from what
+// is only out of sight; and each line of the log carries the digest of the one before. A scan whose
+// files an older Plumb did not see keeps its folder from now on.
+constexpr const char* kVersion5 = R"sql(
+CREATE TABLE scan_files (
+  scan_id INTEGER NOT NULL REFERENCES scans(id) ON DELETE CASCADE,
+  path TEXT NOT NULL,
+  bytes INTEGER NOT NULL,
+  sha256 TEXT NOT NULL,
+  PRIMARY KEY (scan_id, path)
+) STRICT, WITHOUT ROWID;
+CREATE TRIGGER scan_files_no_update BEFORE UPDATE ON scan_files
+  BEGIN SELECT RAISE(ABORT, 'the digest of a stored file is never changed'); END;
+CREATE TABLE removed_scans (id INTEGER PRIMARY KEY) STRICT;
+ALTER TABLE scans ADD COLUMN unavailable TEXT NOT NULL DEFAULT '';
+ALTER TABLE scans ADD COLUMN checked_at INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE audit ADD COLUMN chain TEXT NOT NULL DEFAULT '';
+UPDATE scans SET has_folder = 1, unavailable = failure, failure = ''
+  WHERE outcome = 'done' AND has_folder = 0;
+)sql";
+
 constexpr std::array<const char*, kSchemaVersion> kSteps = {kVersion1, kVersion2, kVersion3,
-                                                            kVersion4};
+                                                            kVersion4, kVersion5};
 
 }  // namespace
 

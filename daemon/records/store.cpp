@@ -1,11 +1,8 @@
 #include "daemon/records/store.hpp"
 
-#include <array>
 #include <utility>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
-#include <sodium.h>
 
 #include "daemon/records/schema.hpp"
 #include "daemon/records/store_internal.hpp"
@@ -87,9 +84,18 @@ std::string DigestOf(const std::string& patient_id, int version, const std::stri
                      const std::string& plan_json) {
   const std::string text =
       fmt::format("patient {}\nversion {}\nscan {}\n{}", patient_id, version, scan_id, plan_json);
-  std::array<unsigned char, crypto_hash_sha256_BYTES> hash{};
-  crypto_hash_sha256(hash.data(), reinterpret_cast<const unsigned char*>(text.data()), text.size());
-  return fmt::format("{:02x}", fmt::join(hash, ""));
+  Sha256 hash;
+  hash.Add(text.data(), text.size());
+  return hash.Hex();
+}
+
+/// @throws DataError naming the version whose plan cannot be read: nothing is compared with it.
+web::ReferencePlan PlanIn(const Statement& row) {
+  try {
+    return ParsePlan(row.Text(9));
+  } catch (const DataError& error) {
+    throw DataError(fmt::format("version {} of the reference: {}", row.Integer(2), error.what()));
+  }
 }
 
 web::Reference ReadReference(const Statement& row) {
@@ -105,7 +111,7 @@ web::Reference ReadReference(const Statement& row) {
                            .planned_by = row.Text(11),
                            .approved_by = row.Text(7),
                            .approved_at = {},
-                           .plan = ParsePlan(row.Text(9))};
+                           .plan = PlanIn(row)};
   if (!row.IsNull(8)) reference.approved_at = FromStored(row.Integer(8));
   reference.digest = DigestOf(row.Text(1), reference.version, reference.scan_id, row.Text(9));
   return reference;
@@ -171,6 +177,7 @@ std::string Store::AddPatient(const web::Actor& actor, const std::string& code,
 void Store::WipePatient(const web::Actor& actor, const std::string& id) {
   const std::int64_t number = RequireId(id, "patient");
   std::vector<std::string> scans;
+  const std::unique_lock removals = LockRemovals();
   {
     const std::lock_guard lock(write_mutex_);
     Transaction transaction(*write_);
@@ -188,13 +195,14 @@ void Store::WipePatient(const web::Actor& actor, const std::string& id) {
     write_->Prepare("UPDATE patients SET wiping = 1 WHERE id = ?").Bind(number).Run();
     if (write_->num_changed() == 0)
       throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
+    for (const std::string& scan : scans) NoteRemoved(scan);
     write_->Prepare("DELETE FROM refs WHERE patient_id = ?").Bind(number).Run();
     write_->Prepare("DELETE FROM patients WHERE id = ?").Bind(number).Run();
     Write(actor, "patient.wipe", id, fmt::format("{} scans", scans.size()));
     transaction.Commit();
   }
   for (const std::string& scan : scans)
-    RemoveScanFiles(scan);  // what a crash leaves here is an orphan at the next start
+    RemoveScanFiles(scan);  // what a crash leaves here goes at the next start
   const std::lock_guard lock(write_mutex_);
   write_->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Run();  // nor does the log keep what was wiped
 }
@@ -332,6 +340,14 @@ std::string Store::PlanReference(const web::Actor& actor, const std::string& id,
 void Store::ApproveReference(const web::Actor& actor, const std::string& id, int revision,
                              const std::string& digest, bool two_users) {
   const std::int64_t number = RequireId(id, "reference");
+  if (const std::optional<web::Reference> reference = FindReference(id)) {  // before the lock
+    const std::string fault = CheckFiles(reference->scan_id, /*scene_only=*/true);
+    if (!fault.empty())
+      throw StoreRefusal(ChangeResult::kConflict,
+                         fmt::format("the scan of this reference is not as it was stored: {}; put "
+                                     "a backup of its files in their place, or scan again",
+                                     fault));
+  }
   std::string signed_digest;
   const std::lock_guard lock(write_mutex_);
   Transaction transaction(*write_);

@@ -2,6 +2,8 @@
 // beside folders of files.
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -12,7 +14,9 @@
 #include <string>
 #include <vector>
 
+#include "daemon/records/backup.hpp"
 #include "daemon/records/database.hpp"
+#include "daemon/records/scan_files.hpp"
 #include "web/service/scan_service.hpp"
 
 namespace plumb {
@@ -28,14 +32,47 @@ class StoreRefusal : public std::runtime_error {
   web::ChangeResult result_;
 };
 
-/// What a start found after a crash, and put right.
+/// Most of the stored scans cannot be seen: supposedly their disk is not mounted. Nothing was
+/// changed.
+class ScansMissing : public DiskRefused {
+ public:
+  using DiskRefused::DiskRefused;
+};
+
+/// What a start found after a crash, and put right. Each step is in the audit log too.
 struct RecoveryReport {
   int interrupted_scans = 0;  ///< Had begun and not ended: failed now.
-  int orphaned_folders = 0;   ///< Of no finished scan: removed.
-  int foreign_folders =
-      0;               ///< Of scans that this database has never numbered: moved to DIR/set-aside.
-  int lost_scans = 0;  ///< Finished, but their files are gone: marked.
-  int broken_references = 0;  ///< Approved, but their scene is gone: to be told loudly.
+  int orphaned_folders = 0;   ///< Staging, or of scans that failed or were removed: removed.
+  int foreign_folders = 0;    ///< Of scans that no row knows to have ended: moved to DIR/set-aside.
+  int lost_scans = 0;         ///< Finished, but their files cannot be seen now: unavailable.
+  int attached_scans = 0;     ///< Were unavailable, and their files are there again.
+  int broken_references = 0;  ///< Approved, but their scene cannot be seen: to be told loudly.
+  bool checked_database = true;  ///< False: there was not time to look at all of it.
+};
+
+/// Held on a folder while one store has it, against another process's.
+class FolderLock {
+ public:
+  FolderLock() = default;
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+  /// @throws DatabaseBusy if another has it.
+  void Take(const std::filesystem::path& folder);
+
+ private:
+  int fd_ = -1;
+};
+
+struct StoreOptions {
+  LookAtPath look = LookAt;
+  /// A database that another process holds is asked for again until then; a copying program lets
+  /// go of it.
+  std::chrono::milliseconds lock_wait = std::chrono::minutes(1);
+  std::chrono::milliseconds busy_wait = std::chrono::seconds(5);  ///< Within each of these.
+  std::function<void(std::chrono::milliseconds)> sleep = {};      ///< Empty: the thread's.
+  /// The database is looked at for so long before the start goes on.
+  std::chrono::milliseconds check_limit = std::chrono::seconds(20);
 };
 
 /// What a scan begins with.
@@ -69,7 +106,7 @@ class Store {
  public:
   /// Opens or makes the store, checks and migrates the database, recovers from a crash.
   /// @throws IoError and its kinds: DatabaseCorrupt, DiskRefused.
-  explicit Store(const std::filesystem::path& folder);
+  explicit Store(const std::filesystem::path& folder, StoreOptions options = {});
   /// What can be read of a store on a disk that cannot be written: nothing is checked, put right or
   /// changed; every change throws DiskRefused.
   /// @throws IoError and its kinds.
@@ -126,17 +163,42 @@ class Store {
   /// A row that says `running`, and an empty staging folder. Gives the id.
   std::string BeginScan(const NewScan& scan);
   [[nodiscard]] std::filesystem::path StagingFolder(const std::string& scan_id) const;
-  /// kDone: the staging folder becomes the scan's. Else it is removed.
+  /// kDone: the staging folder becomes the scan's. kFailed: only the recording in it, where it is
+  /// complete. Else it is removed.
   void FinishScan(const std::string& scan_id, const FinishedScan& finished);
   /// Verdict, numbers and reason go into the log. kConflict where a newer scan of the patient is
   /// done or runs, and for a result that is not in tolerance without a reason.
   void AcceptScan(const web::Actor& actor, const std::string& id, const std::string& reason = {});
+  /// kConflict for a scan that references are made of, that runs, and while a backup is made;
+  /// kInvalid without a reason.
+  void RemoveScan(const web::Actor& actor, const std::string& id, const std::string& reason);
   /// Removes scans older than so many days (0: none) but those that references are made of. Gives
   /// how many. Their age is by the wall clock: call it while that can be trusted.
   int RemoveOldScans(int retention_days, const std::stop_token& stop = {});
   /// Removes the oldest recordings, then the oldest scans as above, until the scans take at most so
   /// many bytes. Gives how many scans lost something.
   int KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop = {});
+
+  // --- integrity
+  /// Why the files of a scan cannot be used, by their SHA-256: "scene/cloud.ply has been changed
+  /// ...". Empty: they are what was stored. Files that have no digest yet get one ("first seen").
+  /// Changes the scan's row and the log where that is news. @throws IoError; Interrupted
+  /// @param scene_only  Only what a comparison reads.
+  [[nodiscard]] std::string CheckFiles(const std::string& scan_id, bool scene_only,
+                                       const std::stop_token& stop = {});
+  /// The same for the scan that was not checked for longest, if that is longer ago than
+  /// `at_least`. Gives its id and what is wrong; nothing if none is due.
+  struct CheckedScan {
+    std::string id, fault;
+  };
+  std::optional<CheckedScan> CheckNextScan(std::chrono::hours at_least,
+                                           const std::stop_token& stop = {});
+
+  // --- backup
+  /// While scans go on; nothing is removed meanwhile. See backup.hpp. @throws StoreRefusal where
+  /// one is being made already; IoError; Interrupted
+  BackupReport Backup(const web::Actor& actor, const std::filesystem::path& target,
+                      const std::stop_token& stop = {});
 
   // --- daily check
   /// @param check_json  Of CheckJson(). Gives the id.
@@ -160,27 +222,54 @@ class Store {
   void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
            const std::string& detail);
   [[nodiscard]] std::vector<web::AuditEntry> Audit(std::int64_t before, int limit);
+  /// Each entry carries the SHA-256 of the one before and of itself. Gives the number of the first
+  /// that does not fit; nothing: the log is as it was written. Entries of before schema 5 are
+  /// covered together.
+  [[nodiscard]] std::optional<std::int64_t> FirstBrokenAuditEntry();
   [[nodiscard]] web::Settings GetSettings();
   void ChangeSettings(const web::Actor& actor, const web::Settings& settings);
 
  private:
   Store() = default;
+  /// A finished scan and what a look at its files gave.
+  struct LookedAt {
+    std::int64_t id = 0;
+    std::string before, now;  ///< Why its files cannot be used; empty: they can.
+    bool is_approved = false;
+  };
+  void OpenDatabase();
   void Recover();
   void FailInterrupted();
   void RefuseScansOfAnother();
+  [[nodiscard]] std::vector<LookedAt> LookAtScans();
+  void RefuseIfMostAreMissing(const std::vector<LookedAt>& scans);
+  void NoteAvailability(const std::vector<LookedAt>& scans);
   void CollectOrphans();
-  void SetAside(const std::filesystem::path& folder);
+  void CollectOrphan(const std::filesystem::path& folder);
+  void Discard(const std::filesystem::path& folder, const std::string& why);
+  void SetAside(const std::filesystem::path& folder, const std::string& name,
+                const std::string& why);
   [[nodiscard]] std::vector<std::filesystem::path> ScanFolders()
       const;  ///< Those of numbers, and staging.
+  [[nodiscard]] std::vector<FileDigest> StoredDigests(std::int64_t scan);
+  void StoreDigests(std::int64_t scan, const std::vector<FileDigest>& files);
+  void SetUnavailable(std::int64_t scan, const std::string& before, const std::string& now);
   void CloseOpenSessions(const web::Actor& actor);
-  void NoteEnd(const std::string& scan_id, const FinishedScan& finished);
+  void NoteEnd(const std::string& scan_id, const FinishedScan& finished, bool has_folder,
+               const std::vector<FileDigest>& files);
   void Write(const web::Actor& actor, const std::string& action, const std::string& subject,
              const std::string& detail);
+  /// Held while files are removed. @throws StoreRefusal while a backup is made.
+  [[nodiscard]] std::unique_lock<std::mutex> LockRemovals();
+  void NoteRemoved(const std::string& scan_id);
   void RemoveScanFiles(const std::string& scan_id);
   [[nodiscard]] static std::vector<std::string> ScansOf(Statement query);
+  void ForgetRecording(const std::string& scan_id);
   bool ForgetScan(const std::string& scan_id);  ///< False if it has become a reference.
 
   std::filesystem::path folder_;
+  FolderLock folder_lock_;
+  StoreOptions options_;
   std::mutex write_mutex_;
   std::unique_ptr<Database> write_;
   std::optional<std::int64_t> running_;  ///< Scan that has begun and not ended.
@@ -188,6 +277,8 @@ class Store {
   std::unique_ptr<Database> read_;  ///< Single rows, for the loop too.
   std::mutex list_mutex_;
   std::unique_ptr<Database> list_;  ///< Lists, which may take their time.
+  std::mutex removal_mutex_;
+  std::atomic<bool> backing_up_ = false;
   RecoveryReport recovery_;
 };
 

@@ -102,23 +102,9 @@ void Store::ChangeUser(const web::Actor& actor, const web::UserChange& change) {
 void Store::Log(const web::Actor& actor, const std::string& action, const std::string& subject,
                 const std::string& detail) {
   const std::lock_guard lock(write_mutex_);
+  Transaction transaction(*write_);
   Write(actor, action, subject, detail);
-}
-
-/// Within a transaction, or as one of its own.
-void Store::Write(const web::Actor& actor, const std::string& action, const std::string& subject,
-                  const std::string& detail) {
-  write_
-      ->Prepare(
-          "INSERT INTO audit (time, user, address, action, subject, detail) VALUES (?, ?, ?, ?, ?, "
-          "?)")
-      .Bind(ToStored(web::WallClock::now()))
-      .Bind(actor.user)
-      .Bind(actor.address)
-      .Bind(action)
-      .Bind(subject)
-      .Bind(detail)
-      .Run();
+  transaction.Commit();
 }
 
 std::vector<web::AuditEntry> Store::Audit(std::int64_t before, int limit) {

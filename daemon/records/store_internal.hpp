@@ -12,6 +12,13 @@
 
 namespace plumb::store {
 
+/// Who the appliance is in the audit log.
+inline const web::Actor kSelf{.user = "plumbd", .address = ""};
+/// What a complete folder of a scan that was interrupted gets behind its number in set-aside.
+inline constexpr const char* kInterruptedSuffix = "-interrupted";
+inline constexpr std::string_view kInterrupted =
+    "interrupted: the appliance was switched off or its disk refused the scan";
+
 [[nodiscard]] inline std::int64_t ToStored(web::WallClock::time_point time) {
   return std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count();
 }

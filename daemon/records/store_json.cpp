@@ -45,6 +45,69 @@ void ReadWords(const Json& result, web::ResultSummary& summary) {
   }
 }
 
+/// A stored object whose values are taken one by one and checked.
+class Stored {
+ public:
+  Stored(const std::string& text, const char* what)
+      : json_(Json::parse(text, nullptr, /*allow_exceptions=*/false)), what_(what) {
+    if (!json_.is_object()) Fail("expected a JSON object, found none");
+  }
+
+  [[noreturn]] void Fail(const std::string& why) const {
+    throw DataError(
+        fmt::format("{} cannot be read: {}; it was changed from outside, or its disk "
+                    "failed. Put a backup of the database in its place, or save it anew",
+                    what_, why));
+  }
+  [[nodiscard]] const Json* Find(const char* key) const {
+    const auto found = json_.find(key);
+    return found == json_.end() ? nullptr : &*found;
+  }
+  [[nodiscard]] double Number(const char* key, double least, double most) const {
+    const Json* value = Find(key);
+    if (value == nullptr || !value->is_number()) Fail(fmt::format("{} is no number", key));
+    return InRange(key, value->get<double>(), least, most);
+  }
+  [[nodiscard]] bool Flag(const char* key) const {
+    const Json* value = Find(key);
+    if (value == nullptr || !value->is_boolean()) Fail(fmt::format("{} is not true or false", key));
+    return value->get<bool>();
+  }
+  [[nodiscard]] std::string Posture(const char* key) const {
+    const Json* value = Find(key);
+    for (const char* posture : {"HFS", "HFP", "FFS", "FFP"}) {
+      if (value != nullptr && *value == posture) return posture;
+    }
+    Fail(fmt::format("{} is none of HFS, HFP, FFS, FFP", key));
+  }
+  /// A point of finite numbers.
+  template <std::size_t kSize>
+  [[nodiscard]] std::array<double, kSize> Point(const char* key, const Json& json) const {
+    std::array<double, kSize> point{};
+    if (!json.is_array() || json.size() != kSize)
+      Fail(fmt::format("{} is no point of {} numbers", key, kSize));
+    for (std::size_t i = 0; i < kSize; ++i) {
+      if (!json[i].is_number()) Fail(fmt::format("{} holds what is no number", key));
+      point[i] = InRange(key, json[i].get<double>(), -kMaxCoordinate_m, kMaxCoordinate_m);
+    }
+    return point;
+  }
+
+ private:
+  static constexpr double kMaxCoordinate_m = 1000.0;
+
+  [[nodiscard]] double InRange(const char* key, double value, double least, double most) const {
+    if (!(value >= least && value <= most))
+      Fail(fmt::format("{} is {}, expected {} to {}", key, value, least, most));
+    return value;
+  }
+
+  Json json_;
+  const char* what_;
+};
+
+constexpr double kMaxShift_mm = 1000.0, kMaxRotation_deg = 180.0;
+
 }  // namespace
 
 std::string PlanJson(const web::ReferencePlan& plan) {
@@ -58,16 +121,20 @@ std::string PlanJson(const web::ReferencePlan& plan) {
 }
 
 web::ReferencePlan ParsePlan(const std::string& text) {
+  const Stored stored(text, "a stored plan");
   web::ReferencePlan plan;
-  const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object()) return plan;
-  plan.region_m = json.value("region_m", plan.region_m);
-  plan.tolerance.shift_mm = json.value("shift_tolerance_mm", plan.tolerance.shift_mm);
-  plan.tolerance.rotation_deg = json.value("rotation_tolerance_deg", plan.tolerance.rotation_deg);
-  plan.posture = json.value("posture", plan.posture);
-  plan.couch_markers = json.value("couch_markers", plan.couch_markers);
-  if (json.contains("isocentre_m"))
-    plan.isocentre_m = json["isocentre_m"].get<std::array<double, 3>>();
+  const Json* region = stored.Find("region_m");
+  if (region == nullptr || !region->is_array()) stored.Fail("region_m is no list of points");
+  for (const Json& point : *region) plan.region_m.push_back(stored.Point<2>("region_m", point));
+  if (plan.region_m.size() == 1 || plan.region_m.size() == 2)
+    stored.Fail("region_m has fewer than 3 points");
+  plan.tolerance = {
+      .shift_mm = stored.Number("shift_tolerance_mm", 0.001, kMaxShift_mm),
+      .rotation_deg = stored.Number("rotation_tolerance_deg", 0.001, kMaxRotation_deg)};
+  plan.posture = stored.Posture("posture");
+  plan.couch_markers = stored.Flag("couch_markers");
+  if (const Json* isocentre = stored.Find("isocentre_m"))
+    plan.isocentre_m = stored.Point<3>("isocentre_m", *isocentre);
   return plan;
 }
 
@@ -85,18 +152,25 @@ std::string SettingsJson(const web::Settings& s) {
 }
 
 web::Settings ParseSettings(const std::string& text) {
+  const Stored stored(text, "the stored settings");
   web::Settings s;
-  const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object()) return s;
-  s.tolerance.shift_mm = json.value("shift_tolerance_mm", s.tolerance.shift_mm);
-  s.tolerance.rotation_deg = json.value("rotation_tolerance_deg", s.tolerance.rotation_deg);
-  s.posture = json.value("posture", s.posture);
-  s.couch_markers = json.value("couch_markers", s.couch_markers);
-  s.auto_stop_s = json.value("auto_stop_s", s.auto_stop_s);
-  s.scan_limit_s = json.value("scan_limit_s", s.scan_limit_s);
-  s.keep_recordings = json.value("keep_recordings", s.keep_recordings);
-  s.retention_days = json.value("retention_days", s.retention_days);
-  s.idle_logout_min = json.value("idle_logout_min", s.idle_logout_min);
+  const auto number = [&](const char* key, double& value, double least, double most) {
+    if (stored.Find(key) != nullptr) value = stored.Number(key, least, most);
+  };
+  const auto whole = [&](const char* key, int& value, int least, int most) {
+    double read = value;
+    number(key, read, least, most);
+    value = static_cast<int>(read);
+  };
+  s.tolerance = {.shift_mm = stored.Number("shift_tolerance_mm", 0.001, kMaxShift_mm),
+                 .rotation_deg = stored.Number("rotation_tolerance_deg", 0.001, kMaxRotation_deg)};
+  s.posture = stored.Posture("posture");
+  s.couch_markers = stored.Flag("couch_markers");
+  number("auto_stop_s", s.auto_stop_s, 0.1, 3600);
+  number("scan_limit_s", s.scan_limit_s, 0.1, 3600);
+  if (stored.Find("keep_recordings") != nullptr) s.keep_recordings = stored.Flag("keep_recordings");
+  whole("retention_days", s.retention_days, 0, 1'000'000);
+  whole("idle_logout_min", s.idle_logout_min, 1, 100'000);
   return s;
 }
 

@@ -8,10 +8,13 @@
 namespace plumb {
 
 [[nodiscard]] std::string PlanJson(const web::ReferencePlan& plan);
-/// What cannot be read keeps its default: the text is our own.
+/// What decides about a patient is never guessed: all must be there and make sense.
+/// @throws DataError saying what is wrong with it.
 [[nodiscard]] web::ReferencePlan ParsePlan(const std::string& text);
 
 [[nodiscard]] std::string SettingsJson(const web::Settings& settings);
+/// What an older Plumb did not know may be missing and has its default; nothing else.
+/// @throws DataError saying what is wrong with it.
 [[nodiscard]] web::Settings ParseSettings(const std::string& text);
 
 /// The list entry of a result.json. @throws DataError if it is none.

@@ -22,12 +22,11 @@ using web::ChangeResult;
 
 namespace {
 
-constexpr const char* kRecording = "recording";  // folder of a scan whose images were kept
 constexpr const char* kScanColumns =
     "SELECT scans.id, patient_id, reference_id, purpose, outcome, failure, started_at, "
     "finished_at, accepted_by, has_folder, results.json, accepted_reason, session_id, "
-    "(SELECT fraction FROM sessions WHERE sessions.id = session_id), sensor_on_s, check_overdue"
-    " FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
+    "(SELECT fraction FROM sessions WHERE sessions.id = session_id), sensor_on_s, check_overdue, "
+    "unavailable FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
 
 web::Scan ReadScan(const Statement& row, const Store& store) {
   web::Scan scan{.id = ScanId(row.Integer(0)),
@@ -48,7 +47,11 @@ web::Scan ReadScan(const Statement& row, const Store& store) {
                  .folder = {}};
   if (!row.IsNull(14)) scan.sensor_on_s = row.Real(14);
   if (!row.IsNull(7)) scan.finished_at = FromStored(row.Integer(7));
-  if (row.Integer(9) != 0) scan.folder = store.ScanFolder(scan.id);
+  if (const std::string unavailable = row.Text(16); !unavailable.empty()) {
+    scan.failure = "its files cannot be used now: " + unavailable;
+  } else if (row.Integer(9) != 0) {
+    scan.folder = store.ScanFolder(scan.id);
+  }
   if (!row.IsNull(10)) scan.result = SummaryOf(row.Text(10));
   return scan;
 }
@@ -155,38 +158,48 @@ std::string Store::BeginScan(const NewScan& scan) {
 void Store::FailInterrupted() {
   write_
       ->Prepare(
-          "UPDATE scans SET outcome = 'failed', failure = 'interrupted: the appliance was switched "
-          "off or its disk refused the scan',"
-          " has_folder = 0 WHERE outcome = 'running'")
+          "UPDATE scans SET outcome = 'failed', failure = ?, has_folder = 0 WHERE outcome = "
+          "'running'")
+      .Bind(store::kInterrupted)
       .Run();
 }
 
 void Store::FinishScan(const std::string& scan_id, const FinishedScan& finished) {
   const bool is_done = finished.outcome == web::ScanOutcome::kDone;
+  const fs::path staging = StagingFolder(scan_id);
+  std::error_code ignored;
+  // The sweep that failed is the one to be looked at. Its images count where all of them are there.
+  const bool has_recording = fs::exists(staging / kRecordingFolder / "rgb.txt", ignored);
+  const bool is_kept = is_done || (finished.outcome == web::ScanOutcome::kFailed && has_recording);
+  // Read before the lock is taken: nobody else waits for it.
+  const std::vector<FileDigest> files =
+      is_done ? DigestsOfScan(staging) : std::vector<FileDigest>();
   const std::lock_guard lock(write_mutex_);
   running_.reset();
+  if (!is_kept) {
+    fs::remove_all(staging, ignored);
+    return NoteEnd(scan_id, finished, is_kept, {});
+  }
   if (!is_done) {
-    std::error_code ignored;
-    fs::remove_all(StagingFolder(scan_id), ignored);
-    return NoteEnd(scan_id, finished);
+    for (const char* part : {"scene", "result"}) fs::remove_all(staging / part, ignored);
   }
   // Scene and result are on the disk; the images of a recording are too many to be synced one by
   // one.
-  std::error_code ignored;
-  if (fs::exists(StagingFolder(scan_id) / kRecording, ignored)) Sync(folder_ / "scans", ::syncfs);
-  if (::rename(StagingFolder(scan_id).c_str(), ScanFolder(scan_id).c_str()) != 0) {
+  if (fs::exists(staging / kRecordingFolder, ignored)) Sync(folder_ / "scans", ::syncfs);
+  if (::rename(staging.c_str(), ScanFolder(scan_id).c_str()) != 0) {
     throw DiskRefused(DescribeWriteError(ScanFolder(scan_id), errno));
   }
   try {
     Sync(folder_ / "scans");
-    NoteEnd(scan_id, finished);
+    NoteEnd(scan_id, finished, is_kept, files);
   } catch (...) {  // without its row it is none
-    ::rename(ScanFolder(scan_id).c_str(), StagingFolder(scan_id).c_str());
+    ::rename(ScanFolder(scan_id).c_str(), staging.c_str());
     throw;
   }
 }
 
-void Store::NoteEnd(const std::string& scan_id, const FinishedScan& finished) {
+void Store::NoteEnd(const std::string& scan_id, const FinishedScan& finished, bool has_folder,
+                    const std::vector<FileDigest>& files) {
   const std::int64_t number = ParseId(scan_id).value_or(0);
   Transaction transaction(*write_);
   write_
@@ -197,7 +210,7 @@ void Store::NoteEnd(const std::string& scan_id, const FinishedScan& finished) {
       .Bind(finished.failure)
       .Bind(ToStored(web::WallClock::now()))
       .Bind(finished.swept_area_m2)
-      .Bind(std::int64_t{finished.outcome == web::ScanOutcome::kDone})
+      .Bind(std::int64_t{has_folder})
       .Bind(number)
       .Run();
   if (!finished.result_json.empty()) {
@@ -206,6 +219,7 @@ void Store::NoteEnd(const std::string& scan_id, const FinishedScan& finished) {
         .Bind(finished.result_json)
         .Run();
   }
+  StoreDigests(number, files);
   transaction.Commit();
 }
 
@@ -271,10 +285,18 @@ void Store::AcceptScan(const web::Actor& actor, const std::string& id, const std
   transaction.Commit();
 }
 
+/// So that a start tells what was removed from what it cannot explain.
+void Store::NoteRemoved(const std::string& scan_id) {
+  write_->Prepare("INSERT OR IGNORE INTO removed_scans (id) VALUES (?)")
+      .Bind(ParseId(scan_id))
+      .Run();
+}
+
 void Store::RemoveScanFiles(const std::string& scan_id) {
-  std::error_code ignored;  // what stays is an orphan at the next start
+  std::error_code ignored;  // what stays goes at the next start
   fs::remove_all(ScanFolder(scan_id), ignored);
   fs::remove_all(StagingFolder(scan_id), ignored);
+  fs::remove_all(folder_ / "set-aside" / (scan_id + store::kInterruptedSuffix), ignored);
 }
 
 std::vector<std::string> Store::ScansOf(Statement query) {
@@ -283,8 +305,35 @@ std::vector<std::string> Store::ScansOf(Statement query) {
   return scans;
 }
 
+void Store::RemoveScan(const web::Actor& actor, const std::string& id, const std::string& reason) {
+  const std::optional<std::int64_t> number = ParseId(id);
+  if (reason.empty())
+    throw StoreRefusal(ChangeResult::kInvalid, "a scan is removed for a reason: state it");
+  const std::unique_lock removals = LockRemovals();
+  {
+    const std::lock_guard lock(write_mutex_);
+    Transaction transaction(*write_);
+    Statement query = write_->Prepare(
+        "SELECT outcome, EXISTS (SELECT 1 FROM refs WHERE scan_id = scans.id) FROM scans WHERE id "
+        "= ?");
+    if (!number || !query.Bind(*number).Step())
+      throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
+    if (query.Text(0) == "running")
+      throw StoreRefusal(ChangeResult::kConflict, "this scan is running: discard it instead");
+    if (query.Integer(1) != 0)
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "a reference is made of this scan: it goes only with its patient");
+    NoteRemoved(ScanId(*number));
+    write_->Prepare("DELETE FROM scans WHERE id = ?").Bind(*number).Run();
+    Write(actor, "scan.remove", ScanId(*number), reason);
+    transaction.Commit();
+  }
+  RemoveScanFiles(ScanId(*number));
+}
+
 /// Its files go after the lock is free: a scan that begins meanwhile must not wait for a slow disk.
 bool Store::ForgetScan(const std::string& scan_id) {
+  const std::unique_lock removals = LockRemovals();
   {
     const std::lock_guard lock(write_mutex_);
     Transaction transaction(*write_);
@@ -295,7 +344,8 @@ bool Store::ForgetScan(const std::string& scan_id) {
         .Bind(ParseId(scan_id))
         .Run();
     if (write_->num_changed() == 0) return false;
-    Write({.user = "plumbd", .address = ""}, "scan.remove", scan_id, "retention");
+    NoteRemoved(scan_id);
+    Write(store::kSelf, "scan.remove", scan_id, "retention");
     transaction.Commit();
   }
   RemoveScanFiles(scan_id);
@@ -326,6 +376,22 @@ int Store::RemoveOldScans(int retention_days, const std::stop_token& stop) {
   return num_removed;
 }
 
+/// Its digest goes first: what is removed on purpose is not missed.
+void Store::ForgetRecording(const std::string& scan_id) {
+  const std::unique_lock removals = LockRemovals();
+  {
+    const std::lock_guard lock(write_mutex_);
+    Transaction transaction(*write_);
+    write_->Prepare("DELETE FROM scan_files WHERE scan_id = ? AND path = 'recording'")
+        .Bind(ParseId(scan_id))
+        .Run();
+    Write(store::kSelf, "recording.remove", scan_id, "quota");
+    transaction.Commit();
+  }
+  std::error_code ignored;
+  fs::remove_all(ScanFolder(scan_id) / kRecordingFolder, ignored);
+}
+
 int Store::KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop) {
   std::uint64_t bytes = BytesOf(folder_ / "scans", stop);
   if (bytes <= max_bytes) return 0;
@@ -333,18 +399,17 @@ int Store::KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop)
   std::vector<std::string> all, removable;
   {
     const std::lock_guard lock(write_mutex_);
-    all = ScansOf(write_->Prepare(
-        "SELECT id FROM scans WHERE outcome = 'done' AND has_folder = 1 ORDER BY id"));
+    all = ScansOf(write_->Prepare("SELECT id FROM scans WHERE has_folder = 1 ORDER BY id"));
     removable =
-        ScansOf(write_->Prepare("SELECT id FROM scans WHERE outcome = 'done' AND has_folder = 1 "
+        ScansOf(write_->Prepare("SELECT id FROM scans WHERE has_folder = 1 "
                                 "AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id"));
   }
   for (const std::string& scan : all) {  // raw recordings are large, and nothing hangs on them
-    const fs::path recording = ScanFolder(scan) / kRecording;
+    const fs::path recording = ScanFolder(scan) / kRecordingFolder;
     std::error_code ignored;
     if (bytes <= max_bytes || stop.stop_requested() || !fs::exists(recording, ignored)) continue;
     bytes -= std::min(bytes, BytesOf(recording, stop));
-    fs::remove_all(recording, ignored);
+    ForgetRecording(scan);
     ++num_touched;
   }
   for (const std::string& scan : removable) {

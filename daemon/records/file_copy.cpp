@@ -1,0 +1,99 @@
+#include "daemon/records/file_copy.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "algo/base/check_stop.hpp"
+#include "drivers/files/file_io.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+void MakeFolders(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw IoError(DescribeWriteError(folder, error.value()));
+}
+
+[[noreturn]] void FailToRead(const fs::path& path, int error) {
+  throw SourceUnreadable(fmt::format("cannot read {}: {}", path.string(), std::strerror(error)));
+}
+
+/// A read-only descriptor of a regular file.
+class Source {
+ public:
+  explicit Source(const fs::path& path)
+      : fd_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {
+    if (fd_ < 0) FailToRead(path, errno);
+  }
+  ~Source() { ::close(fd_); }
+  Source(const Source&) = delete;
+  Source& operator=(const Source&) = delete;
+  [[nodiscard]] int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+}  // namespace
+
+FileDigest Copy(const fs::path& from, const fs::path& to, const std::string& path,
+                const std::stop_token& stop) {
+  const fs::path source = from / path, target = to / path;
+  const Source file(source);
+  struct stat status {};
+  if (::fstat(file.get(), &status) != 0) FailToRead(source, errno);
+  if (!S_ISREG(status.st_mode)) FailToRead(source, EINVAL);
+  MakeFolders(target.parent_path());
+  Sha256 hash;
+  FileDigest digest{.path = path, .bytes = 0, .sha256 = {}};
+  FileWriter copy(target);
+  std::vector<std::uint8_t> buffer(std::size_t{256} << 10);
+  for (;;) {
+    CheckStop(stop);
+    const ssize_t count = ::read(file.get(), buffer.data(), buffer.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) FailToRead(source, errno);
+    if (count == 0) break;
+    const std::span<const std::uint8_t> bytes(buffer.data(), static_cast<std::size_t>(count));
+    hash.Add(bytes.data(), bytes.size());
+    copy.Write(bytes);
+    digest.bytes += bytes.size();
+  }
+  copy.Close();
+  ::chmod(target.c_str(), 0640);
+  digest.sha256 = hash.Hex();
+  return digest;
+}
+
+FileDigest LinkOrCopy(const fs::path& from, const fs::path& to, const std::string& path,
+                      const std::stop_token& stop) {
+  const fs::path target = to / path;
+  MakeFolders(target.parent_path());
+  if (::link((from / path).c_str(), target.c_str()) != 0) return Copy(from, to, path, stop);
+  try {
+    return DigestOfFile(to, path, stop);
+  } catch (const IoError& error) {
+    ::unlink(target.c_str());
+    throw SourceUnreadable(error.what());
+  }
+}
+
+void SyncDisk(const fs::path& folder) {
+  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const int result = fd < 0 ? -1 : ::syncfs(fd);
+  const int error = errno;
+  if (fd >= 0) ::close(fd);
+  if (result != 0) throw IoError(DescribeWriteError(folder, error));
+}
+
+}  // namespace plumb

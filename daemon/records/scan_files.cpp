@@ -1,0 +1,183 @@
+#include "daemon/records/scan_files.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sodium.h>
+
+#include "algo/base/check_stop.hpp"
+#include "algo/base/errors.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Closes what it holds.
+class Descriptor {
+ public:
+  explicit Descriptor(const fs::path& path)
+      : fd_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY)) {}
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  [[nodiscard]] int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+[[noreturn]] void FailToRead(const fs::path& path, int error) {
+  throw IoError(fmt::format("cannot read {}: {}", path.string(), std::strerror(error)));
+}
+
+/// The files below a folder of the scan, by path; none where it does not exist.
+std::vector<std::string> FilesIn(const fs::path& folder, const char* name) {
+  std::vector<std::string> files;
+  std::error_code error;
+  const fs::path top = folder / name;
+  fs::recursive_directory_iterator entry(top, error);
+  if (error == std::errc::no_such_file_or_directory) return files;
+  for (const fs::recursive_directory_iterator end; !error && entry != end; entry.increment(error)) {
+    std::error_code ignored;
+    if (entry->is_regular_file(ignored)) files.push_back(entry->path().lexically_relative(folder));
+  }
+  if (error) FailToRead(top, error.value());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::string Difference(const FileLook& look, const FileDigest& file) {
+  const bool is_recording = file.path == kRecordingFolder;
+  if (look.error == ENOENT && look.is_link) return "is a link that leads nowhere";
+  if (look.error == ENOENT) return "is missing";
+  if (look.error != 0) return fmt::format("cannot be read: {}", std::strerror(look.error));
+  if (is_recording) return look.is_folder ? "" : "is no folder";
+  if (!look.is_file) return look.is_folder ? "is a folder, not a file" : "is not a regular file";
+  if (!file.sha256.empty() && look.bytes != file.bytes)
+    return fmt::format("has {} bytes, {} were stored", look.bytes, file.bytes);
+  return {};
+}
+
+}  // namespace
+
+Sha256::Sha256() { crypto_hash_sha256_init(&state_); }
+
+void Sha256::Add(const void* bytes, std::size_t count) {
+  crypto_hash_sha256_update(&state_, static_cast<const unsigned char*>(bytes), count);
+}
+
+std::string Sha256::Hex() {
+  std::array<unsigned char, crypto_hash_sha256_BYTES> hash{};
+  crypto_hash_sha256_final(&state_, hash.data());
+  return fmt::format("{:02x}", fmt::join(hash, ""));
+}
+
+FileLook LookAt(const fs::path& path) {
+  FileLook look;
+  const Descriptor file(path);
+  struct stat status {};
+  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) {
+    look.error = errno;
+    struct stat link {};
+    look.is_link = ::lstat(path.c_str(), &link) == 0 && S_ISLNK(link.st_mode);
+    return look;
+  }
+  look.is_file = S_ISREG(status.st_mode);
+  look.is_folder = S_ISDIR(status.st_mode);
+  look.bytes = static_cast<std::uint64_t>(status.st_size);
+  return look;
+}
+
+FileDigest DigestOfFile(const fs::path& folder, const std::string& path,
+                        const std::stop_token& stop) {
+  const fs::path full = folder / path;
+  const Descriptor file(full);
+  struct stat status {};
+  if (file.get() < 0 || ::fstat(file.get(), &status) != 0) FailToRead(full, errno);
+  if (!S_ISREG(status.st_mode)) FailToRead(full, S_ISDIR(status.st_mode) ? EISDIR : EINVAL);
+  Sha256 hash;
+  FileDigest digest{.path = path, .bytes = 0, .sha256 = {}};
+  std::vector<char> buffer(std::size_t{256} << 10);
+  for (;;) {
+    CheckStop(stop);
+    const ssize_t count = ::read(file.get(), buffer.data(), buffer.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) FailToRead(full, errno);
+    if (count == 0) break;
+    hash.Add(buffer.data(), static_cast<std::size_t>(count));
+    digest.bytes += static_cast<std::uint64_t>(count);
+  }
+  digest.sha256 = hash.Hex();
+  return digest;
+}
+
+std::vector<FileDigest> DigestsOfScan(const fs::path& folder, const std::stop_token& stop) {
+  std::vector<FileDigest> digests;
+  for (const char* part : {"result", "scene"}) {
+    for (const std::string& file : FilesIn(folder, part))
+      digests.push_back(DigestOfFile(folder, file, stop));
+  }
+  return digests;
+}
+
+std::optional<FileDigest> DigestOfRecording(const fs::path& folder, const std::stop_token& stop) {
+  const std::vector<std::string> files = FilesIn(folder, kRecordingFolder);
+  if (files.empty()) return std::nullopt;
+  Sha256 hash;
+  FileDigest all{.path = kRecordingFolder, .bytes = 0, .sha256 = {}};
+  for (const std::string& file : files) {
+    const FileDigest one = DigestOfFile(folder, file, stop);
+    const std::string line = fmt::format("{}  {}\n", one.sha256, one.path);
+    hash.Add(line.data(), line.size());
+    all.bytes += one.bytes;
+  }
+  all.sha256 = hash.Hex();
+  return all;
+}
+
+std::string WhyNotThere(const fs::path& folder, const std::vector<FileDigest>& files,
+                        const LookAtPath& look) {
+  // Without its folder a scan has lost every file: that is said, and not the first file's name.
+  if (const FileLook found = look(folder); found.error != 0 || !found.is_folder) {
+    return "its folder " + (found.error == 0 ? std::string("is no folder")
+                                             : Difference(found, {.path = {}, .sha256 = {}}));
+  }
+  for (const FileDigest& file : files) {
+    if (const std::string why = Difference(look(folder / file.path), file); !why.empty())
+      return file.path + " " + why;
+  }
+  return {};
+}
+
+std::string WhyNotIntact(const fs::path& folder, const std::vector<FileDigest>& files,
+                         std::string_view prefix, const std::stop_token& stop) {
+  for (const FileDigest& file : files) {
+    if (!std::string_view(file.path).starts_with(prefix)) continue;
+    if (const std::string why = Difference(LookAt(folder / file.path), file); !why.empty())
+      return file.path + " " + why;
+    try {
+      const std::optional<FileDigest> now = file.path == kRecordingFolder
+                                                ? DigestOfRecording(folder, stop)
+                                                : DigestOfFile(folder, file.path, stop);
+      if (!now) return file.path + " is empty";
+      if (now->sha256 != file.sha256 || now->bytes != file.bytes)
+        return file.path + " has been changed since it was stored (another SHA-256)";
+    } catch (const IoError& error) {
+      return fmt::format("{} cannot be used: {}", file.path, error.what());
+    }
+  }
+  return {};
+}
+
+}  // namespace plumb

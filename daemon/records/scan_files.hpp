@@ -1,0 +1,75 @@
+// The files of a scan on the disk: whether they can be seen, and whether they are what was stored.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <sodium/crypto_hash_sha256.h>
+
+namespace plumb {
+
+/// SHA-256 of what is added, in hexadecimal.
+class Sha256 {
+ public:
+  Sha256();
+  void Add(const void* bytes, std::size_t count);
+  [[nodiscard]] std::string Hex();  ///< Once.
+
+ private:
+  crypto_hash_sha256_state state_{};
+};
+
+/// What one look at a path tells.
+struct FileLook {
+  int error = 0;         ///< As errno has it; 0: it can be opened for reading.
+  bool is_link = false;  ///< With ENOENT: a link that leads nowhere.
+  bool is_file = false;  ///< A regular file.
+  bool is_folder = false;
+  std::uint64_t bytes = 0;
+};
+
+/// A function, so that a test can let a disk fail.
+using LookAtPath = std::function<FileLook(const std::filesystem::path&)>;
+[[nodiscard]] FileLook LookAt(const std::filesystem::path& path);
+
+/// A file as it was stored. Of a recording, whose images are many, there is one for all of them.
+struct FileDigest {
+  std::string path;  ///< In the scan's folder: "scene/cloud.ply"; "recording".
+  std::uint64_t bytes = 0;
+  std::string sha256;  ///< Hexadecimal. Of a recording: of the list of its files' digests.
+  bool operator==(const FileDigest&) const = default;
+};
+
+inline constexpr const char* kSceneMarker = "scene/scene.json";
+inline constexpr const char* kRecordingFolder = "recording";
+
+/// SHA-256 of a file, read in pieces, and how long it is. @throws IoError naming the file;
+/// Interrupted.
+[[nodiscard]] FileDigest DigestOfFile(const std::filesystem::path& folder, const std::string& path,
+                                      const std::stop_token& stop = {});
+/// Of all files in scene/ and result/, by path. @throws as above.
+[[nodiscard]] std::vector<FileDigest> DigestsOfScan(const std::filesystem::path& folder,
+                                                    const std::stop_token& stop = {});
+/// Nothing where no images were kept. @throws as above.
+[[nodiscard]] std::optional<FileDigest> DigestOfRecording(const std::filesystem::path& folder,
+                                                          const std::stop_token& stop = {});
+
+/// Why these files of a scan cannot be used, as far as a look can tell: "scene/cloud.ply is
+/// missing". Empty: all are there, with the size that they had.
+[[nodiscard]] std::string WhyNotThere(const std::filesystem::path& folder,
+                                      const std::vector<FileDigest>& files, const LookAtPath& look);
+
+/// The same by their content, for those whose path begins so.
+/// @throws Interrupted
+[[nodiscard]] std::string WhyNotIntact(const std::filesystem::path& folder,
+                                       const std::vector<FileDigest>& files,
+                                       std::string_view prefix = {},
+                                       const std::stop_token& stop = {});
+
+}  // namespace plumb

@@ -1,0 +1,206 @@
+// Backups and what is restored of them.
+#include "daemon/records/backup.hpp"
+
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/records/scan_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using testing::FilesBelow;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::kAnna;
+using testing::kBert;
+using testing::MessageOf;
+using testing::StoreScan;
+
+class BackupTest : public ::testing::Test {
+ protected:
+  BackupTest() {
+    Store store(state());
+    patient_ = store.AddPatient(kAnna, "P", "thorax");
+    reference_ = StoreScan(store, patient_);
+    store.ApproveReference(kBert, store.AddReference(kAnna, reference_, "", {}), 1);
+    for (int i = 0; i < 3; ++i) scan_ = StoreScan(store, patient_);
+    fs::create_directories(state() / "calibration");
+    WriteWholeFile(state() / "calibration" / "S1.yaml", std::string_view("fx: 1"));
+    fs::create_directories(state() / "set-aside" / "000099" / "scene");
+    WriteWholeFile(state() / "set-aside" / "000099" / "scene" / "scene.json",
+                   std::string_view("{}"));
+  }
+  [[nodiscard]] fs::path state() const { return folder_ / "state"; }
+  [[nodiscard]] fs::path backup() const { return folder_ / "backup"; }
+  [[nodiscard]] fs::path restored() const { return folder_ / "restored"; }
+
+  /// Without the database, whose pages a start changes.
+  static auto FilesOf(const fs::path& folder) {
+    auto files = FilesBelow(folder);
+    std::erase_if(files, [](const auto& entry) { return entry.first.starts_with("plumb.db"); });
+    return files;
+  }
+
+  testing::TempFolder folder_;
+  std::string patient_, reference_, scan_;
+};
+
+TEST_F(BackupTest, WhatIsRestoredIsByteIdentical) {
+  const BackupReport made = BackUpStopped(state(), backup());
+  EXPECT_EQ(made.scans, 4U);
+  EXPECT_EQ(made.files, 1U + 4 * 7 + 2);
+  EXPECT_THAT(made.problems, IsEmpty());
+  const BackupReport report = RestoreBackup(backup(), restored());
+  EXPECT_EQ(report.scans, 4U);
+  EXPECT_EQ(report.files, made.files);
+  EXPECT_EQ(report.bytes, made.bytes);
+  EXPECT_EQ(FilesOf(restored()), FilesOf(state()));
+  EXPECT_EQ(FilesBelow(restored()).at("plumb.db"), FilesBelow(backup()).at("plumb.db"));
+  Store store(restored());
+  EXPECT_EQ(store.recovery().lost_scans + store.recovery().foreign_folders, 0);
+  EXPECT_EQ(store.ApprovedReference(patient_)->scan_id, reference_);
+  for (const web::Scan& scan : store.Scans(patient_, 100))
+    EXPECT_EQ(store.CheckFiles(scan.id, false), "");
+  EXPECT_EQ(store.FirstBrokenAuditEntry(), std::nullopt);
+}
+
+TEST_F(BackupTest, IsMadeWhileScansGoOnAndHoldsOneMoment) {
+  Store store(state());
+  std::jthread scanning([&](const std::stop_token& stop) {
+    while (!stop.stop_requested()) (void)StoreScan(store, patient_);
+  });
+  for (int round = 0; round < 5; ++round) {
+    const BackupReport made = store.Backup(kAnna, backup());  // replaces the one before
+    EXPECT_THAT(made.problems, IsEmpty());
+    const fs::path target = folder_ / fmt::format("restored-{}", round);
+    EXPECT_EQ(RestoreBackup(backup(), target).scans, made.scans);
+    Store copy(target);
+    EXPECT_EQ(copy.recovery().lost_scans + copy.recovery().foreign_folders, 0);
+    for (const web::Scan& scan : copy.Scans(patient_, 1000)) {
+      if (scan.outcome != web::ScanOutcome::kDone) continue;
+      EXPECT_EQ(copy.CheckFiles(scan.id, false), "") << scan.id;
+    }
+  }
+  scanning.request_stop();
+  scanning.join();
+  EXPECT_EQ(store.Audit(0, 1000).back().action, "patient.add");
+}
+
+TEST_F(BackupTest, NothingIsRemovedWhileItIsMade) {
+  Store store(state());
+  std::atomic<bool> ended = false;
+  std::jthread backing_up([&] {
+    for (int i = 0; i < 20; ++i) (void)store.Backup(kAnna, backup());
+    ended = true;
+  });
+  int refused = 0;
+  while (!ended) {
+    try {
+      (void)store.KeepWithinQuota(0);
+    } catch (const StoreRefusal& refusal) {
+      EXPECT_THAT(refusal.what(), HasSubstr("backup"));
+      ++refused;
+    }
+    const std::string scan = StoreScan(store, patient_);
+  }
+  backing_up.join();
+  EXPECT_GT(refused, 0);
+  const fs::path target = restored();
+  (void)store.Backup(kAnna, backup());
+  (void)RestoreBackup(backup(), target);
+  EXPECT_EQ(Store(target).recovery().lost_scans, 0);
+}
+
+TEST_F(BackupTest, TellsWhatIsNotAsItWasStoredAndKeepsTheRest) {
+  WriteWholeFile(state() / "scans" / scan_ / "scene" / "cloud.ply", std::string_view("changed"));
+  fs::remove(state() / "scans" / scan_ / "scene" / "mesh.ply");
+  const BackupReport made = BackUpStopped(state(), backup());
+  EXPECT_THAT(made.problems,
+              ElementsAre(AllOf(HasSubstr(scan_), HasSubstr("cloud.ply"), HasSubstr("not what")),
+                          AllOf(HasSubstr(scan_), HasSubstr("mesh.ply"), HasSubstr("missing"))));
+  EXPECT_EQ(made.files, 1U + 4 * 7 - 1 + 2);
+  (void)RestoreBackup(backup(), restored());
+  Store store(restored());
+  EXPECT_FALSE(store.FindScan(scan_)->failure.empty()) << "restored as damaged as it was";
+}
+
+TEST_F(BackupTest, ADamagedBackupRestoresNothingAndSaysWhich) {
+  (void)BackUpStopped(state(), backup());
+  const auto files = FilesBelow(backup());
+  for (const auto& [name, content] : files) {
+    SCOPED_TRACE(name);
+    fs::remove(backup() / name);  // the store's own file has this name too
+    WriteWholeFile(backup() / name,
+                   content.substr(0, content.size() / 2) + "!" +
+                       content.substr(std::min(content.size(), content.size() / 2 + 1)));
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)RestoreBackup(backup(), restored()); }),
+                HasSubstr("nothing was restored"));
+    EXPECT_FALSE(fs::exists(restored()));
+    fs::remove(backup() / name);
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)RestoreBackup(backup(), restored()); }),
+                AllOf(HasSubstr(name), HasSubstr("nothing was restored")));
+    WriteWholeFile(backup() / name, content);
+  }
+  EXPECT_EQ(RestoreBackup(backup(), restored()).files, files.size() - 2);
+}
+
+TEST_F(BackupTest, APathOutsideIsRefused) {
+  (void)BackUpStopped(state(), backup());
+  const auto files = FilesBelow(backup());
+  for (const char* path : {"../evil", "/etc/evil", "scans/../../evil", "other/file", "scans//x",
+                           "plumb.db/x", "scans/a\tb", ""}) {
+    const std::string sums = files.at("SHA256SUMS") + std::string(64, '0') + "  " + path + "\n";
+    WriteWholeFile(backup() / "SHA256SUMS", sums);
+    std::string about = files.at("backup.json");
+    const std::size_t at = about.find("\"sha256sums\": \"") + 15;
+    about.replace(at, 64, DigestOfFile(backup(), "SHA256SUMS").sha256);
+    WriteWholeFile(backup() / "backup.json", about);
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)RestoreBackup(backup(), restored()); }),
+                HasSubstr("SHA256SUMS"))
+        << path;
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "evil"));
+}
+
+TEST_F(BackupTest, IsRestoredIntoAnEmptyFolderOnly) {
+  (void)BackUpStopped(state(), backup());
+  EXPECT_THAT(MessageOf<std::invalid_argument>([&] { (void)RestoreBackup(backup(), state()); }),
+              HasSubstr("empty"));
+  fs::create_directories(restored() / ".restore" / "scans");  // an interrupted one
+  EXPECT_EQ(RestoreBackup(backup(), restored()).scans, 4U);
+  EXPECT_FALSE(fs::exists(restored() / ".restore"));
+}
+
+TEST_F(BackupTest, AnInterruptedRestoreIsNoStore) {
+  (void)BackUpStopped(state(), backup());
+  (void)RestoreBackup(backup(), restored());
+  fs::remove(restored() / "plumb.db");  // it comes last
+  EXPECT_THROW(Store{restored()}, DatabaseCorrupt);
+}
+
+TEST_F(BackupTest, AnotherFolderIsNotOverwritten) {
+  fs::create_directories(backup());
+  WriteWholeFile(backup() / "thesis.tex", std::string_view("x"));
+  EXPECT_THROW((void)BackUpStopped(state(), backup()), IoError);
+  EXPECT_TRUE(fs::exists(backup() / "thesis.tex"));
+  EXPECT_THROW((void)BackUpStopped(folder_ / "nothing", folder_ / "other"), IoError);
+  EXPECT_FALSE(fs::exists(folder_ / "nothing" / "plumb.db"));
+}
+
+TEST_F(BackupTest, AStopLeavesNothing) {
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THROW((void)BackUpStopped(state(), backup(), stop.get_token()), Interrupted);
+  EXPECT_FALSE(fs::exists(backup()));
+}
+
+}  // namespace
+}  // namespace plumb

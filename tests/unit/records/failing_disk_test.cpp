@@ -1,0 +1,271 @@
+// The n-th call to the system fails, for every n and every kind of call, while a scan is stored,
+// while a store starts after a crash, and while a backup is made: nothing that was finished is
+// lost, and the next start puts the rest right. Then databases that are not what was written.
+#include <cstdlib>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/failing_calls.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/records/scan_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Arm;
+using testing::CallFault;
+using testing::Disarm;
+using testing::FailingCall;
+using testing::kAnna;
+using testing::kBert;
+using testing::StoreScan;
+
+constexpr const char* kCallNames[] = {"open", "write", "sync", "rename", "mkdir"};
+
+/// So many times as many rounds; for long runs.
+int Repeats() {
+  const char* text = std::getenv("PLUMB_FAULT_REPEATS");
+  return text == nullptr ? 1 : std::max(1, std::atoi(text));
+}
+
+class FailingDiskTest : public ::testing::Test {
+ protected:
+  FailingDiskTest() {
+    Store store(prepared());
+    patient_ = store.AddPatient(kAnna, "P", "");
+    reference_ = StoreScan(store, patient_);
+    store.ApproveReference(kBert, store.AddReference(kAnna, reference_, "", {}), 1);
+    for (int i = 0; i < 2; ++i) (void)StoreScan(store, patient_);
+    const std::string interrupted = store.BeginScan(testing::Begun(patient_));
+    testing::FillScan(store.StagingFolder(interrupted));
+  }
+  void SetUp() override {
+    if (!Arm({})) GTEST_SKIP() << "the library of failing calls is not loaded (see CMakeLists.txt)";
+  }
+
+  [[nodiscard]] fs::path prepared() const { return folder_ / "prepared"; }
+  [[nodiscard]] fs::path state() const { return folder_ / "state"; }
+  [[nodiscard]] fs::path backup() const { return folder_ / "backup"; }
+
+  void Prepare() const {
+    for (const char* name : {"state", "backup", "restored"}) fs::remove_all(folder_ / name);
+    fs::copy(prepared(), state(), fs::copy_options::recursive);
+  }
+
+  /// Whatever was finished is whole, before and after the next start.
+  void ExpectNothingLost(const std::vector<std::string>& finished) const {
+    for (const std::string& scan : finished)
+      EXPECT_EQ(testing::FilesBelow(state() / "scans" / scan).size(), 7U) << scan;
+    Store store(state());
+    for (const std::string& scan : finished) {
+      const auto found = store.FindScan(scan);
+      ASSERT_TRUE(found) << scan;
+      EXPECT_EQ(found->outcome, web::ScanOutcome::kDone);
+      EXPECT_EQ(found->failure, "");
+      EXPECT_EQ(store.CheckFiles(scan, false), "");
+    }
+    EXPECT_EQ(store.FirstBrokenAuditEntry(), std::nullopt);
+    EXPECT_EQ(store.ApprovedReference(patient_)->scan_id, reference_);
+    (void)StoreScan(store, patient_);  // and it goes on
+  }
+
+  /// Calls `round` with each fault in turn, until one is not met any more.
+  template <typename Round>
+  void ForEachFault(const char* what, const Round& round) {
+    struct Kind {
+      int error;
+      bool for_good;
+    };
+    int rounds = 0, met = 0;
+    for (int repeat = 0; repeat < Repeats(); ++repeat) {
+      for (int call = 0; call < testing::kNumFailingCalls; ++call) {
+        for (const Kind kind : {Kind{EIO, false}, Kind{ENOSPC, true}, Kind{0, false}}) {
+          if (kind.error == 0 && call != static_cast<int>(FailingCall::kWrite)) continue;
+          for (long nth = 1;; ++nth) {
+            SCOPED_TRACE(fmt::format("{}: {} number {}, {}{}", what, kCallNames[call], nth,
+                                     kind.error == 0 ? "cut short" : std::strerror(kind.error),
+                                     kind.for_good ? " for good" : ""));
+            Prepare();
+            const std::string below = folder_.path().string();
+            const long failed = round(CallFault{static_cast<FailingCall>(call), nth, kind.error,
+                                                kind.for_good, below.c_str()});
+            ++rounds;
+            met += failed > 0 ? 1 : 0;
+            if (::testing::Test::HasFailure() || failed == 0) break;
+          }
+          if (::testing::Test::HasFailure()) return;
+        }
+      }
+    }
+    RecordProperty(std::string(what) + " rounds", rounds);
+    fmt::print("{}: {} rounds, {} with a call that failed\n", what, rounds, met);
+    EXPECT_GT(met, 30) << "the library must be in effect";
+  }
+
+  testing::TempFolder folder_;
+  std::string patient_, reference_;
+};
+
+TEST_F(FailingDiskTest, WhileAScanIsStored) {
+  ForEachFault("storing a scan", [&](const CallFault& fault) {
+    std::vector<std::string> finished = {"000001", "000002", "000003"};
+    long failed = 0;
+    {
+      Store store(state());
+      (void)Arm(fault);
+      try {
+        finished.push_back(StoreScan(store, patient_));
+      } catch (const std::exception&) {  // told to the person, who scans again
+      }
+      failed = Disarm();
+    }
+    ExpectNothingLost(finished);
+    return failed;
+  });
+}
+
+TEST_F(FailingDiskTest, WhileAStoreStartsAfterACrash) {
+  ForEachFault("starting", [&](const CallFault& fault) {
+    (void)Arm(fault);
+    try {
+      StoreOptions options;
+      options.lock_wait = std::chrono::milliseconds(0);
+      Store store(state(), options);
+    } catch (const IoError&) {  // safe mode
+    }
+    const long failed = Disarm();
+    ExpectNothingLost({"000001", "000002", "000003"});
+    return failed;
+  });
+}
+
+TEST_F(FailingDiskTest, WhileABackupIsMade) {
+  ForEachFault("backing up", [&](const CallFault& fault) {
+    long failed = 0;
+    {
+      Store store(state());
+      (void)Arm(fault);
+      bool is_made = false;
+      try {
+        is_made = store.Backup(kAnna, backup()).problems.empty();
+      } catch (const IoError&) {
+      }
+      failed = Disarm();
+      EXPECT_TRUE(is_made || failed > 0);
+      if (is_made) {
+        EXPECT_EQ(RestoreBackup(backup(), folder_ / "restored").scans, 3U);
+      }
+      if (!is_made && fs::exists(backup())) {  // whole, with a problem that it tells
+        EXPECT_NO_THROW((void)RestoreBackup(backup(), folder_ / "restored"));
+      }
+    }
+    ExpectNothingLost({"000001", "000002", "000003"});
+    return failed;
+  });
+}
+
+// --- databases that are not what was written
+
+/// One of the ways in which a disk or a person damages a file.
+std::string Damaged(std::string bytes, std::mt19937& random) {
+  const auto at = [&](std::size_t size) {
+    return std::uniform_int_distribution<std::size_t>(0, size - 1)(random);
+  };
+  constexpr std::size_t kPage = 4096;
+  const auto page = [&] { return at(bytes.size() / kPage) * kPage; };
+  switch (at(6)) {
+    case 0:  // bits
+      for (std::size_t n = 1 + at(8); n > 0; --n)
+        bytes[at(bytes.size())] ^= static_cast<char>(1 << at(8));
+      break;
+    case 1:  // a page of zeros
+      bytes.replace(page(), kPage, kPage, '\0');
+      break;
+    case 2: {  // two pages in each other's place
+      const std::size_t a = page(), b = page();
+      const std::string kept = bytes.substr(a, kPage);
+      bytes.replace(a, kPage, bytes.substr(b, kPage));
+      bytes.replace(b, kPage, kept);
+      break;
+    }
+    case 3:  // cut off
+      bytes.resize(at(bytes.size()));
+      break;
+    case 4: {  // noise
+      const std::size_t begin = at(bytes.size());
+      for (std::size_t i = begin; i < std::min(bytes.size(), begin + 1 + at(600)); ++i)
+        bytes[i] = static_cast<char>(at(256));
+      break;
+    }
+    default:  // of the text, such as the tables' own statements and JSON
+      for (std::size_t i = at(bytes.size()); i < bytes.size(); ++i) {
+        if (bytes[i] < 'a' || bytes[i] > 'z') continue;
+        bytes[i] = static_cast<char>(0x80 + at(128));
+        break;
+      }
+  }
+  return bytes;
+}
+
+TEST(DamagedDatabaseTest, IsOpenedOrRefusedAndNoScanIsDeleted) {
+  const testing::TempFolder folder;
+  const fs::path state = folder / "state";
+  {
+    Store store(state);
+    const std::string patient = store.AddPatient(kAnna, "P", "thorax");
+    const std::string scan = StoreScan(store, patient);
+    store.ApproveReference(kBert, store.AddReference(kAnna, scan, "", {}), 1);
+    (void)StoreScan(store, patient);
+    store.ChangeSettings(kAnna, {});
+    for (int i = 0; i < 50; ++i) store.Log(kAnna, "note", "", std::string(100, 'n'));
+  }
+  const auto bytes = ReadWholeFile(state / "plumb.db", std::size_t{1} << 26);
+  const std::string whole(bytes.begin(), bytes.end());
+  const auto files = testing::FilesBelow(state / "scans");
+  std::mt19937 random(20);
+  int opened = 0, refused = 0, unreadable = 0;
+  for (int round = 0; round < 200 * Repeats(); ++round) {
+    SCOPED_TRACE(round);
+    for (const char* name : {"plumb.db", "plumb.db-wal", "plumb.db-shm"}) fs::remove(state / name);
+    WriteWholeFile(state / "plumb.db", Damaged(whole, random));
+    try {
+      Store store(state);
+      ++opened;
+      try {
+        for (const web::Patient& patient : store.Patients()) {
+          (void)store.References(patient.id);
+          (void)store.Scans(patient.id, 100);
+          (void)store.ApprovedReference(patient.id);
+        }
+        (void)store.GetSettings();
+        (void)store.Audit(0, 100);
+        (void)store.FirstBrokenAuditEntry();
+      } catch (const std::exception&) {  // of one record, said so
+        ++unreadable;
+      }
+    } catch (const IoError&) {  // safe mode
+      ++refused;
+    }
+    auto kept = testing::FilesBelow(state / "scans");
+    for (auto& [name, content] : testing::FilesBelow(state / "set-aside")) {
+      const std::size_t slash = name.find('/');  // "000001-2/scene/..." was scan 000001's
+      kept[name.substr(0, 6) + name.substr(slash)] = content;
+    }
+    EXPECT_EQ(kept, files);
+    if (fs::exists(state / "set-aside")) {  // back for the next round
+      for (const auto& entry : fs::directory_iterator(state / "set-aside"))
+        fs::rename(entry.path(), state / "scans" / entry.path().filename().string().substr(0, 6));
+    }
+    if (::testing::Test::HasFailure()) return;
+  }
+  fmt::print("{} databases opened ({} with a record that cannot be read), {} refused\n", opened,
+             unreadable, refused);
+  EXPECT_GT(opened, 0);
+  EXPECT_GT(refused, 0);
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,61 @@
+// Scans with files of known content, for tests of what the store keeps.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "daemon/records/store.hpp"
+#include "drivers/files/file_io.hpp"
+
+namespace plumb::testing {
+
+inline const web::Actor kAnna{.user = "anna", .address = "::1"};
+inline const web::Actor kBert{.user = "bert", .address = "::1"};
+
+/// What a compared scan leaves.
+inline constexpr const char* kScanFiles[] = {
+    "scene/scene.json", "scene/trajectory.txt", "scene/cloud.ply",     "scene/heightmap.tiff",
+    "scene/mesh.ply",   "result/result.json",   "result/error_map.png"};
+
+inline void FillScan(const std::filesystem::path& folder) {
+  for (const std::string file : kScanFiles) {
+    std::filesystem::create_directories((folder / file).parent_path());
+    WriteWholeFile(folder / file, fmt::format("{} of {}", file, folder.string()));
+  }
+}
+
+inline NewScan Begun(const std::string& patient) {
+  return {.patient_id = patient,
+          .reference_id = {},
+          .purpose = {},
+          .sensor_serial = "S1",
+          .reason = {}};
+}
+
+inline std::string StoreScan(Store& store, const std::string& patient) {
+  const std::string id = store.BeginScan(Begun(patient));
+  FillScan(store.StagingFolder(id));
+  store.FinishScan(id, {.outcome = web::ScanOutcome::kDone,
+                        .failure = {},
+                        .result_json = R"({"verdict":"in_tolerance"})",
+                        .swept_area_m2 = 1.0});
+  return id;
+}
+
+/// Path within the folder to content, of all regular files below it.
+inline std::map<std::string, std::string> FilesBelow(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> files;
+  if (!std::filesystem::exists(folder)) return files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file() || entry.is_symlink()) continue;
+    const auto bytes = ReadWholeFile(entry.path(), std::size_t{1} << 26);
+    files[entry.path().lexically_relative(folder)] = std::string(bytes.begin(), bytes.end());
+  }
+  return files;
+}
+
+}  // namespace plumb::testing

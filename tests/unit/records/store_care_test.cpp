@@ -1,0 +1,227 @@
+// Removing scans, keeping sweeps that failed, a database that is held, and records that cannot be
+// read.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "daemon/records/check_json.hpp"
+#include "daemon/records/store_json.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/records/scan_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::kAnna;
+using testing::kBert;
+using testing::MessageOf;
+using testing::StoreScan;
+using web::ChangeResult;
+
+class StoreCareTest : public ::testing::Test {
+ protected:
+  StoreCareTest() : store_(std::make_unique<Store>(state())) {
+    patient_ = store_->AddPatient(kAnna, "P", "");
+  }
+  [[nodiscard]] fs::path state() const { return folder_ / "state"; }
+  ChangeResult RefusalOfRemoving(const std::string& scan, const std::string& reason = "blurred") {
+    try {
+      store_->RemoveScan(kBert, scan, reason);
+    } catch (const StoreRefusal& refusal) {
+      return refusal.result();
+    }
+    return ChangeResult::kDone;
+  }
+  void Execute(const std::string& sql) const {
+    Database(state() / "plumb.db", Database::Access::kReadWrite).Execute(sql);
+  }
+
+  testing::TempFolder folder_;
+  std::unique_ptr<Store> store_;
+  std::string patient_;
+};
+
+TEST_F(StoreCareTest, AScanIsRemovedForAReasonAndAReferenceIsNot) {
+  const std::string reference = StoreScan(*store_, patient_), scan = StoreScan(*store_, patient_);
+  (void)store_->AddReference(kAnna, reference, "", {});
+  const std::string running = store_->BeginScan(testing::Begun(patient_));
+  EXPECT_EQ(RefusalOfRemoving(scan, ""), ChangeResult::kInvalid);
+  EXPECT_EQ(RefusalOfRemoving(reference), ChangeResult::kConflict) << "a draft is made of it";
+  EXPECT_EQ(RefusalOfRemoving(running), ChangeResult::kConflict);
+  for (const char* id : {"", "99", "../1"})
+    EXPECT_EQ(RefusalOfRemoving(id), ChangeResult::kNotFound) << id;
+  EXPECT_EQ(testing::FilesBelow(store_->ScanFolder(scan)).size(), 7U);
+  EXPECT_EQ(RefusalOfRemoving(scan), ChangeResult::kDone);
+  EXPECT_FALSE(store_->FindScan(scan));
+  EXPECT_FALSE(fs::exists(store_->ScanFolder(scan)));
+  const web::AuditEntry logged = store_->Audit(0, 1).at(0);
+  EXPECT_EQ(logged.user + " " + logged.action + " " + logged.subject + ": " + logged.detail,
+            "bert scan.remove " + scan + ": blurred");
+  EXPECT_EQ(RefusalOfRemoving(scan), ChangeResult::kNotFound);
+}
+
+class FailedSweepTest : public StoreCareTest,
+                        public ::testing::WithParamInterface<web::ScanOutcome> {};
+
+TEST_P(FailedSweepTest, KeepsACompleteRecordingOfOneThatFailed) {
+  const bool is_kept = GetParam() == web::ScanOutcome::kFailed;
+  for (const bool is_complete : {true, false}) {
+    const std::string id = store_->BeginScan(testing::Begun(patient_));
+    testing::FillScan(store_->StagingFolder(id));
+    const fs::path recording = store_->StagingFolder(id) / "recording";
+    fs::create_directories(recording / "rgb");
+    WriteWholeFile(recording / "rgb" / "1.png", std::string_view("image"));
+    if (is_complete) WriteWholeFile(recording / "rgb.txt", std::string_view("1 rgb/1.png"));
+    store_->FinishScan(id,
+                       {.outcome = GetParam(), .failure = "marker not seen", .result_json = {}});
+    EXPECT_FALSE(fs::exists(store_->StagingFolder(id)));
+    EXPECT_EQ(testing::FilesBelow(store_->ScanFolder(id)).size(), is_kept && is_complete ? 2U : 0U);
+    EXPECT_EQ(store_->FindScan(id)->failure, "marker not seen");
+    store_.reset();
+    store_ = std::make_unique<Store>(state());
+    EXPECT_EQ(store_->recovery().orphaned_folders + store_->recovery().lost_scans, 0);
+    EXPECT_EQ(fs::exists(store_->ScanFolder(id)), is_kept && is_complete);
+    if (!is_kept || !is_complete) continue;
+    EXPECT_EQ(store_->CheckFiles(id, false), "");
+    EXPECT_THROW((void)store_->AddReference(kAnna, id, "", {}), StoreRefusal);
+    EXPECT_EQ(store_->KeepWithinQuota(0) > 0, true);
+    EXPECT_FALSE(fs::exists(store_->ScanFolder(id) / "recording"));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Outcomes, FailedSweepTest,
+                         ::testing::Values(web::ScanOutcome::kFailed,
+                                           web::ScanOutcome::kCancelled));
+
+TEST_F(StoreCareTest, ADatabaseThatAnotherHoldsIsWaitedForWithinTheLimit) {
+  store_.reset();
+  // The locks are of processes: a child holds the file.
+  const auto open = [&](int release_after) {
+    int to_child[2] = {}, from_child[2] = {};
+    EXPECT_EQ(::pipe(to_child) + ::pipe(from_child), 0);
+    const pid_t child = ::fork();
+    if (child == 0) {
+      char byte = 0;
+      {
+        Database held(state() / "plumb.db", Database::Access::kReadWrite);
+        (void)held.CheckIntegrity();  // takes the lock
+        (void)!::write(from_child[1], "x", 1);
+        (void)!::read(to_child[0], &byte, 1);
+      }
+      (void)!::write(from_child[1], "x", 1);
+      ::_exit(0);
+    }
+    char byte = 0;
+    (void)!::read(from_child[0], &byte, 1);
+    int slept = 0;
+    std::string result;
+    StoreOptions options;
+    options.busy_wait = std::chrono::milliseconds(10);
+    options.lock_wait = std::chrono::seconds(2);
+    options.sleep = [&](std::chrono::milliseconds pause) {
+      EXPECT_EQ(pause, std::chrono::milliseconds(500));
+      if (++slept != release_after) return;
+      (void)!::write(to_child[1], "x", 1);
+      (void)!::read(from_child[0], &byte, 1);
+    };
+    try {
+      Store store(state(), options);
+    } catch (const DatabaseBusy& error) {
+      result = error.what();
+      (void)!::write(to_child[1], "x", 1);
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    for (const int fd : {to_child[0], to_child[1], from_child[0], from_child[1]}) ::close(fd);
+    return fmt::format("{} {}", slept, result);
+  };
+  EXPECT_EQ(open(/*release_after=*/4), "4 ") << "2 s are four pauses";
+  EXPECT_THAT(open(/*release_after=*/5),
+              ::testing::AllOf(::testing::StartsWith("4 "), HasSubstr("locked")));
+}
+
+TEST_F(StoreCareTest, AnotherStoreOnTheFolderIsRefusedAtOnce) {
+  StoreOptions options;
+  options.sleep = [](std::chrono::milliseconds) { ADD_FAILURE() << "it does not let go"; };
+  EXPECT_THAT(MessageOf<DatabaseBusy>([&] { Store second(state(), options); }),
+              HasSubstr("another plumbd"));
+  store_.reset();
+  Store second(state(), options);
+}
+
+TEST_F(StoreCareTest, AStoredPlanThatCannotBeReadIsAnErrorAndNoDefault) {
+  const std::string scan = StoreScan(*store_, patient_);
+  const std::string id = store_->AddReference(kAnna, scan, "", {});
+  const std::string good = PlanJson({});
+  EXPECT_EQ(ParsePlan(good).tolerance.shift_mm, web::ReferencePlan{}.tolerance.shift_mm);
+  for (
+      const char* bad :
+      {"", "null", "[]", "{", "{}",
+       R"({"region_m":[],"shift_tolerance_mm":"3","rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false})",
+       R"({"region_m":[],"shift_tolerance_mm":0,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false})",
+       R"({"region_m":[],"shift_tolerance_mm":3,"rotation_tolerance_deg":-1,"posture":"HFS","couch_markers":false})",
+       R"({"region_m":[],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HF","couch_markers":false})",
+       R"({"region_m":[],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":0})",
+       R"({"region_m":[],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS"})",
+       R"({"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false})",
+       R"({"region_m":[[0,0],[1,1]],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false})",
+       R"({"region_m":[[0,0],[1,1],[1,null]],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false})",
+       R"({"region_m":[],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false,"isocentre_m":[0,1]})"}) {
+    Execute(fmt::format("UPDATE refs SET plan = '{}' WHERE id = {}", bad, id));
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)store_->FindReference(id); }),
+                HasSubstr("version 1 of the reference"))
+        << bad;
+  }
+  Execute(fmt::format("UPDATE refs SET plan = '{}' WHERE id = {}", good, id));
+  EXPECT_TRUE(store_->FindReference(id));
+}
+
+TEST_F(StoreCareTest, StoredSettingsThatCannotBeReadAreAnErrorAndOlderOnesAreNot) {
+  web::Settings settings;
+  settings.retention_days = 7;
+  store_->ChangeSettings(kAnna, settings);
+  const std::string good = SettingsJson(settings);
+  const auto store = [&](const std::string& text) {
+    Execute(fmt::format("UPDATE settings SET value = '{}'", text));
+  };
+  for (
+      const char* bad :
+      {"", "null", "{}", R"({"shift_tolerance_mm":3})",
+       R"({"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false,"retention_days":"7"})",
+       R"({"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false,"retention_days":-7})"}) {
+    store(bad);
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)store_->GetSettings(); }), HasSubstr("settings"))
+        << bad;
+  }
+  store(
+      R"({"shift_tolerance_mm":4,"rotation_tolerance_deg":1,"posture":"FFS","couch_markers":true})");
+  EXPECT_EQ(store_->GetSettings().tolerance.shift_mm, 4);
+  EXPECT_EQ(store_->GetSettings().idle_logout_min, web::Settings{}.idle_logout_min);
+  store(good);
+  EXPECT_EQ(store_->GetSettings().retention_days, 7);
+}
+
+TEST_F(StoreCareTest, ACheckThatCannotBeReadHasNotPassed) {
+  for (const char* bad : {"", "[]", "{}", R"({"status":1})", R"({"status":"passed","items":[1]})",
+                          R"({"status":"passed","reasons":7})"}) {
+    const web::CheckRecord record = CheckIn(bad);
+    EXPECT_EQ(record.status, "failed") << bad;
+    EXPECT_THAT(record.reasons, ::testing::ElementsAre(HasSubstr("cannot be read"))) << bad;
+  }
+}
+
+TEST_F(StoreCareTest, TheCheckOfTheDatabaseEndsInTime) {
+  for (int i = 0; i < 300; ++i) store_->Log(kAnna, "note", "", std::string(1000, 'n'));
+  Database database(state() / "plumb.db", Database::Access::kReadOnly);
+  EXPECT_TRUE(database.CheckIntegrity());
+  EXPECT_FALSE(database.CheckIntegrity(std::chrono::milliseconds(-1)));
+  EXPECT_TRUE(database.CheckIntegrity()) << "the limit was for that check";
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,139 @@
+// What is stored is held against what was stored.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/records/scan_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::kAnna;
+using testing::kBert;
+using testing::StoreScan;
+
+class StoreIntegrityTest : public ::testing::Test {
+ protected:
+  StoreIntegrityTest() : store_(folder_ / "state") {
+    patient_ = store_.AddPatient(kAnna, "P", "");
+    scan_ = StoreScan(store_, patient_);
+  }
+  [[nodiscard]] fs::path File(const std::string& name) const {
+    return store_.ScanFolder(scan_) / name;
+  }
+  /// One byte becomes another; size and all else stay.
+  void Flip(const std::string& name) const {
+    auto bytes = ReadWholeFile(File(name), 1 << 20);
+    bytes[bytes.size() / 2] ^= 1;
+    WriteWholeFile(File(name), bytes);
+  }
+
+  testing::TempFolder folder_;
+  Store store_;
+  std::string patient_, scan_;
+};
+
+TEST_F(StoreIntegrityTest, TheDigestIsSha256) {
+  WriteWholeFile(folder_ / "abc", std::string_view("abc"));
+  const FileDigest digest = DigestOfFile(folder_.path(), "abc");
+  EXPECT_EQ(digest.sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(digest.bytes, 3U);
+  WriteWholeFile(folder_ / "long", std::string(1'000'000, 'a'));  // more than one piece
+  EXPECT_EQ(DigestOfFile(folder_.path(), "long").sha256,
+            "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+}
+
+TEST_F(StoreIntegrityTest, OneFlippedBitInAnyFileIsFoundAndNamed) {
+  EXPECT_EQ(store_.CheckFiles(scan_, false), "");
+  for (const std::string file : testing::kScanFiles) {
+    Flip(file);
+    EXPECT_THAT(store_.CheckFiles(scan_, false), AllOf(HasSubstr(file), HasSubstr("changed")));
+    EXPECT_TRUE(store_.FindScan(scan_)->folder.empty());
+    EXPECT_THAT(store_.FindScan(scan_)->failure, HasSubstr(file));
+    EXPECT_EQ(store_.Audit(0, 1).at(0).action, "scan.unavailable");
+    EXPECT_EQ(store_.CheckFiles(scan_, true).empty(), file.starts_with("result/"))
+        << "a comparison reads the scene alone";
+    Flip(file);
+    EXPECT_EQ(store_.CheckFiles(scan_, false), "");
+    EXPECT_FALSE(store_.FindScan(scan_)->folder.empty());
+    EXPECT_EQ(store_.Audit(0, 1).at(0).action, "scan.available");
+  }
+}
+
+TEST_F(StoreIntegrityTest, AFileThatCameLaterIsNotTakenForAStoredOne) {
+  WriteWholeFile(File("scene/extra.ply"), std::string_view("x"));
+  EXPECT_EQ(store_.CheckFiles(scan_, false), "");
+  fs::remove(File("scene/extra.ply"));
+  EXPECT_EQ(store_.CheckFiles(scan_, false), "");
+}
+
+TEST_F(StoreIntegrityTest, ARecordingIsNotedWhenFirstSeenAndMayGoForTheQuota) {
+  fs::create_directory(File("recording"));
+  for (const char* name : {"rgb.txt", "depth.txt"})
+    WriteWholeFile(File("recording") / name, std::string(1000, name[0]));
+  EXPECT_EQ(store_.CheckFiles(scan_, false), "");
+  Flip("recording/depth.txt");
+  EXPECT_THAT(store_.CheckFiles(scan_, false), HasSubstr("recording"));
+  EXPECT_EQ(store_.CheckFiles(scan_, true), "") << "no comparison reads it";
+  Flip("recording/depth.txt");
+  EXPECT_EQ(store_.CheckFiles(scan_, false), "");
+  EXPECT_EQ(store_.KeepWithinQuota(1000), 1);
+  EXPECT_FALSE(fs::exists(File("recording")));
+  EXPECT_EQ(store_.CheckFiles(scan_, false), "") << "it was removed on purpose";
+}
+
+TEST_F(StoreIntegrityTest, ScansAreCheckedInTurnAndNotTooOften) {
+  const std::string second = StoreScan(store_, patient_);
+  using std::chrono::hours;
+  EXPECT_EQ(store_.CheckNextScan(hours(24))->id, scan_);
+  Flip("scene/cloud.ply");
+  EXPECT_EQ(store_.CheckNextScan(hours(24))->id, second);
+  EXPECT_FALSE(store_.CheckNextScan(hours(24)));
+  const auto checked = store_.CheckNextScan(hours(0));
+  ASSERT_TRUE(checked);
+  EXPECT_EQ(checked->id, scan_);
+  EXPECT_THAT(checked->fault, HasSubstr("scene/cloud.ply"));
+}
+
+TEST_F(StoreIntegrityTest, AReferenceIsApprovedOnlyAsItWasStored) {
+  const std::string reference = store_.AddReference(kAnna, scan_, "", {});
+  Flip("scene/heightmap.tiff");
+  EXPECT_THAT(
+      testing::MessageOf<StoreRefusal>([&] { store_.ApproveReference(kBert, reference, 1); }),
+      HasSubstr("scene/heightmap.tiff"));
+  EXPECT_FALSE(store_.ApprovedReference(patient_));
+  Flip("scene/heightmap.tiff");
+  store_.ApproveReference(kBert, reference, 1);
+  EXPECT_TRUE(store_.ApprovedReference(patient_));
+}
+
+TEST_F(StoreIntegrityTest, TheDigestOfAStoredFileCannotBeChanged) {
+  Database direct(folder_ / "state" / "plumb.db", Database::Access::kReadWrite);
+  EXPECT_THROW(direct.Execute("UPDATE scan_files SET sha256 = 'x'"), ConstraintBroken);
+}
+
+TEST_F(StoreIntegrityTest, TheAuditLogShowsWhatWasChangedInItOrTakenFromIt) {
+  for (int i = 0; i < 5; ++i) store_.Log(kAnna, "note", std::to_string(i), "text");
+  ASSERT_EQ(store_.FirstBrokenAuditEntry(), std::nullopt);
+  Database direct(folder_ / "state" / "plumb.db", Database::Access::kReadWrite);
+  direct.Execute("DROP TRIGGER audit_no_update; DROP TRIGGER audit_no_delete");
+  const auto number = store_.Audit(0, 3).at(2).number;
+  const auto restore = [&](const std::string& detail) {
+    direct.Execute(fmt::format("UPDATE audit SET detail = '{}' WHERE number = {}", detail, number));
+  };
+  restore("texT");
+  EXPECT_EQ(store_.FirstBrokenAuditEntry(), number);
+  restore("text");
+  EXPECT_EQ(store_.FirstBrokenAuditEntry(), std::nullopt);
+  direct.Execute(fmt::format("DELETE FROM audit WHERE number > {}", number));
+  EXPECT_EQ(store_.FirstBrokenAuditEntry(), number + 1) << "the newest entries are gone";
+  direct.Execute(fmt::format("DELETE FROM audit WHERE number = {}", number - 1));
+  EXPECT_EQ(store_.FirstBrokenAuditEntry(), number - 1);
+}
+
+}  // namespace
+}  // namespace plumb

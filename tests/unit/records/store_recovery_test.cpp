@@ -1,0 +1,332 @@
+// A start never deletes what once was a finished scan, whatever a look at its files gives.
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/records/scan_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::Contains;
+using testing::FillScan;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::kAnna;
+using testing::kBert;
+using testing::kScanFiles;
+using testing::MessageOf;
+using ::testing::StartsWith;
+using testing::StoreScan;
+
+enum class Damage { kAbsent, kAbsentOnce, kTruncated, kUnreadable, kDanglingLink, kFolder };
+constexpr Damage kDamages[] = {Damage::kAbsent,     Damage::kAbsentOnce,   Damage::kTruncated,
+                               Damage::kUnreadable, Damage::kDanglingLink, Damage::kFolder};
+const char* NameOf(Damage damage) {
+  static constexpr const char* kNames[] = {"absent",     "absent once",   "truncated",
+                                           "unreadable", "dangling link", "folder"};
+  return kNames[static_cast<int>(damage)];
+}
+
+class StoreRecoveryTest : public ::testing::Test {
+ protected:
+  [[nodiscard]] fs::path state() const { return folder_ / "state"; }
+  [[nodiscard]] std::unique_ptr<Store> Open(StoreOptions options = {}) const {
+    return std::make_unique<Store>(state(), std::move(options));
+  }
+  static std::vector<std::string> Actions(Store& store) {
+    std::vector<std::string> actions;
+    for (const web::AuditEntry& entry : store.Audit(0, 1000))
+      actions.push_back(entry.action + " " + entry.subject + ": " + entry.detail);
+    return actions;
+  }
+
+  testing::TempFolder folder_;
+};
+
+/// One reference and five scans, of which one file is damaged; a scan that had begun beside them.
+class OneDamagedFile {
+ public:
+  OneDamagedFile(const fs::path& state, const std::string& file, bool of_reference, Damage damage)
+      : state_(state), damage_(damage) {
+    Store store(state);
+    const std::string patient = store.AddPatient(kAnna, "P", "");
+    reference = StoreScan(store, patient);
+    store.ApproveReference(kBert, store.AddReference(kAnna, reference, "", {}), 1);
+    for (int i = 0; i < 5; ++i) scans.push_back(StoreScan(store, patient));
+    hit = of_reference ? reference : scans[2];
+    FillScan(store.StagingFolder(store.BeginScan(testing::Begun(patient))));
+    path_ = store.ScanFolder(hit) / file;
+    before = testing::FilesBelow(state / "scans");
+    std::erase_if(before, [](const auto& entry) { return entry.first.starts_with(".staging"); });
+  }
+
+  void Break() {
+    const fs::path aside = state_.parent_path() / "aside";
+    if (damage_ == Damage::kUnreadable) return;
+    fs::rename(path_, aside);
+    if (damage_ == Damage::kTruncated) WriteWholeFile(path_, std::string_view("x"));
+    if (damage_ == Damage::kDanglingLink) fs::create_symlink("nowhere", path_);
+    if (damage_ == Damage::kFolder) fs::create_directory(path_);
+  }
+  void Mend() {
+    if (damage_ == Damage::kUnreadable) return;
+    fs::remove_all(path_);
+    fs::rename(state_.parent_path() / "aside", path_);
+  }
+  /// As the start sees the disk while it is damaged.
+  [[nodiscard]] StoreOptions Options() const {
+    StoreOptions options;
+    if (damage_ == Damage::kUnreadable) {
+      options.look = [path = path_](const fs::path& file) {
+        return file == path ? FileLook{.error = EIO} : LookAt(file);
+      };
+    }
+    return options;
+  }
+
+  std::string reference, hit;
+  std::vector<std::string> scans;
+  std::map<std::string, std::string> before;
+
+ private:
+  fs::path state_, path_;
+  Damage damage_;
+};
+
+TEST_F(StoreRecoveryTest, NoDamageToAFileOfAScanMakesAStartDeleteAnything) {
+  int rounds = 0;
+  for (const bool of_reference : {true, false}) {
+    for (const std::string file : kScanFiles) {
+      for (const Damage damage : kDamages) {
+        SCOPED_TRACE(fmt::format("{} of a {}: {}", file, of_reference ? "reference" : "scan",
+                                 NameOf(damage)));
+        const testing::TempFolder folder;
+        const fs::path state = folder / "state";
+        OneDamagedFile damaged(state, file, of_reference, damage);
+        damaged.Break();
+        auto expected = damaged.before;
+        if (damage != Damage::kUnreadable) expected.erase(damaged.hit + "/" + file);
+        if (damage == Damage::kTruncated) expected[damaged.hit + "/" + file] = "x";
+        for (int start = 0; start < 2; ++start) {
+          Store store(state, damaged.Options());
+          EXPECT_EQ(store.recovery().lost_scans, start == 0 ? 1 : 0);
+          EXPECT_EQ(store.recovery().foreign_folders, 0);
+          EXPECT_EQ(store.recovery().broken_references, of_reference ? 1 : 0);
+          EXPECT_EQ(testing::FilesBelow(state / "scans"), expected);
+          const auto scan = store.FindScan(damaged.hit);
+          ASSERT_TRUE(scan);
+          EXPECT_TRUE(scan->folder.empty()) << "what cannot be seen whole is not shown";
+          EXPECT_THAT(scan->failure, HasSubstr(file));
+          EXPECT_EQ(scan->outcome, web::ScanOutcome::kDone);
+          EXPECT_TRUE(scan->result) << "its numbers are in the database";
+          EXPECT_THAT(Actions(store), Contains(StartsWith("scan.unavailable " + damaged.hit)));
+          if (start == 0 && damage == Damage::kAbsentOnce) break;
+        }
+        damaged.Mend();
+        Store store(state);
+        EXPECT_EQ(store.recovery().attached_scans, 1);
+        EXPECT_EQ(store.FindScan(damaged.hit)->folder, store.ScanFolder(damaged.hit));
+        EXPECT_EQ(store.FindScan(damaged.hit)->failure, "");
+        EXPECT_EQ(testing::FilesBelow(state / "scans"), damaged.before);
+        EXPECT_THAT(Actions(store), Contains(StartsWith("scan.available " + damaged.hit)));
+        ++rounds;
+      }
+    }
+  }
+  EXPECT_EQ(rounds, 2 * 7 * 6);
+}
+
+TEST_F(StoreRecoveryTest, NoDamageToAFileOfAStagingFolderHoldsItBack) {
+  for (const std::string file : kScanFiles) {
+    for (const Damage damage : kDamages) {
+      if (damage == Damage::kUnreadable) continue;  // nobody looks into a staging folder
+      SCOPED_TRACE(fmt::format("{}: {}", file, NameOf(damage)));
+      const testing::TempFolder folder;
+      std::string id, done;
+      {
+        Store store(folder / "state");
+        const std::string patient = store.AddPatient(kAnna, "P", "");
+        done = StoreScan(store, patient);
+        id = store.BeginScan(testing::Begun(patient));
+        FillScan(store.StagingFolder(id));
+        const fs::path path = store.StagingFolder(id) / file;
+        fs::remove(path);
+        if (damage == Damage::kTruncated) WriteWholeFile(path, std::string_view("x"));
+        if (damage == Damage::kDanglingLink) fs::create_symlink("nowhere", path);
+        if (damage == Damage::kFolder) fs::create_directory(path);
+      }
+      Store store(folder / "state");
+      EXPECT_EQ(store.recovery().interrupted_scans, 1);
+      EXPECT_EQ(store.recovery().orphaned_folders, 1);
+      EXPECT_EQ(store.recovery().lost_scans, 0);
+      EXPECT_FALSE(fs::exists(store.StagingFolder(id)));
+      EXPECT_EQ(store.FindScan(id)->outcome, web::ScanOutcome::kFailed);
+      EXPECT_FALSE(store.FindScan(done)->folder.empty());
+      EXPECT_THAT(Actions(store), Contains(StartsWith("folder.remove .staging-" + id)));
+    }
+  }
+}
+
+TEST_F(StoreRecoveryTest, WithoutTheFolderOfScansItIsSafeModeAndNothingIsChanged) {
+  std::vector<std::string> scans;
+  std::size_t entries = 0;
+  {
+    const auto store = Open();
+    const std::string patient = store->AddPatient(kAnna, "P", "");
+    for (int i = 0; i < 4; ++i) scans.push_back(StoreScan(*store, patient));
+    (void)store->BeginScan(testing::Begun(patient));  // and the power goes
+    entries = Actions(*store).size();
+  }
+  const auto before = testing::FilesBelow(state() / "scans");
+  fs::rename(state() / "scans", folder_ / "disk");
+  for (int start = 0; start < 2; ++start) {
+    EXPECT_THAT(MessageOf<ScansMissing>([&] { (void)Open(); }),
+                AllOf(HasSubstr("4 of 4"), HasSubstr("mounted"), HasSubstr(scans[0])));
+    EXPECT_FALSE(fs::exists(state() / "scans"));
+    const auto readable = Store::OpenReadable(state());
+    EXPECT_EQ(Actions(*readable).size(), entries);
+    EXPECT_EQ(readable->FindScan("5")->outcome, web::ScanOutcome::kRunning);
+  }
+  fs::rename(folder_ / "disk", state() / "scans");
+  const auto store = Open();
+  EXPECT_EQ(store->recovery().lost_scans, 0);
+  for (const std::string& scan : scans) EXPECT_FALSE(store->FindScan(scan)->folder.empty());
+  EXPECT_EQ(testing::FilesBelow(state() / "scans"), before);
+}
+
+TEST_F(StoreRecoveryTest, HalfOfTheScansIsSafeModeAndLessIsNot) {
+  std::vector<std::string> scans;
+  {
+    const auto store = Open();
+    const std::string patient = store->AddPatient(kAnna, "P", "");
+    for (int i = 0; i < 5; ++i) scans.push_back(StoreScan(*store, patient));
+  }
+  const auto hide = [&](std::size_t n) {
+    StoreOptions options;
+    options.look = [this, &scans, n](const fs::path& path) {
+      for (std::size_t i = 0; i < n; ++i) {
+        if (path == state() / "scans" / scans[i]) return FileLook{.error = EACCES};
+      }
+      return LookAt(path);
+    };
+    return options;
+  };
+  EXPECT_THROW((void)Open(hide(3)), ScansMissing);
+  EXPECT_EQ(Open(hide(2))->recovery().lost_scans, 2) << "2 of 5 are less than half";
+  EXPECT_EQ(Open(hide(3))->recovery().lost_scans, 1) << "1 more of the 3 that were seen";
+  EXPECT_THROW((void)Open(hide(5)), ScansMissing) << "2 of 2";
+  EXPECT_EQ(Open()->recovery().attached_scans, 3);
+}
+
+TEST_F(StoreRecoveryTest, APersonSaysThatTheFilesAreGoneForGood) {
+  {
+    const auto store = Open();
+    const std::string patient = store->AddPatient(kAnna, "P", "");
+    for (int i = 0; i < 3; ++i) fs::remove_all(store->ScanFolder(StoreScan(*store, patient)));
+  }
+  EXPECT_THAT(MessageOf<ScansMissing>([&] { (void)Open(); }), HasSubstr("scans-are-lost"));
+  WriteWholeFile(state() / "scans-are-lost", std::string_view());
+  EXPECT_EQ(Open()->recovery().lost_scans, 3);
+  EXPECT_FALSE(fs::exists(state() / "scans-are-lost")) << "it counts once";
+  EXPECT_EQ(Open()->recovery().lost_scans, 0);
+}
+
+TEST_F(StoreRecoveryTest, TheOnlyScanMayBeMissingAndComesBack) {
+  std::string scan;
+  {
+    const auto store = Open();
+    scan = StoreScan(*store, store->AddPatient(kAnna, "P", ""));
+  }
+  fs::rename(state() / "scans", folder_ / "disk");
+  EXPECT_EQ(Open()->recovery().lost_scans, 1);
+  fs::remove_all(state() / "scans");
+  fs::rename(folder_ / "disk", state() / "scans");
+  EXPECT_EQ(Open()->recovery().attached_scans, 1);
+  EXPECT_EQ(Open()->FindScan(scan)->folder, state() / "scans" / scan);
+}
+
+TEST_F(StoreRecoveryTest, ACompleteFolderOfAScanThatNoRowKnowsToHaveEndedIsSetAside) {
+  std::string id;
+  {
+    const auto store = Open();
+    id = store->BeginScan(testing::Begun(store->AddPatient(kAnna, "A", "")));
+    FillScan(store->StagingFolder(id));
+    fs::rename(store->StagingFolder(id), store->ScanFolder(id));  // and here the power goes
+  }
+  const auto store = Open();
+  EXPECT_EQ(store->recovery().orphaned_folders, 0);
+  EXPECT_EQ(store->recovery().foreign_folders, 1);
+  EXPECT_FALSE(fs::exists(store->ScanFolder(id)));
+  EXPECT_TRUE(fs::exists(state() / "set-aside" / (id + "-interrupted") / "scene" / "scene.json"));
+  EXPECT_EQ(store->FindScan(id)->outcome, web::ScanOutcome::kFailed);
+  store->WipePatient(kAnna, store->FindPatientByCode("A")->id);
+  EXPECT_THAT(testing::FilesBelow(state() / "set-aside"), IsEmpty()) << "the patient's too";
+}
+
+TEST_F(StoreRecoveryTest, WhatWasRemovedOnPurposeAndCameBackGoesAtTheNextStart) {
+  std::string scan;
+  {
+    const auto store = Open();
+    const std::string patient = store->AddPatient(kAnna, "A", "");
+    scan = StoreScan(*store, patient);
+    fs::copy(store->ScanFolder(scan), folder_ / "copy", fs::copy_options::recursive);
+    store->WipePatient(kAnna, patient);
+    fs::rename(folder_ / "copy", store->ScanFolder(scan));  // as if the power had gone before
+  }
+  const auto store = Open();
+  EXPECT_EQ(store->recovery().orphaned_folders, 1);
+  EXPECT_FALSE(fs::exists(store->ScanFolder(scan)));
+  EXPECT_THAT(Actions(*store), Contains(StartsWith("folder.remove " + scan)));
+}
+
+TEST_F(StoreRecoveryTest, AFolderOfANumberThatWasGivenOutAndHasNoRowIsSetAside) {
+  const std::string scan = "000001";
+  {
+    const auto store = Open();
+    ASSERT_EQ(StoreScan(*store, store->AddPatient(kAnna, "A", "")), scan);
+  }
+  {
+    Database direct(state() / "plumb.db", Database::Access::kReadWrite);
+    direct.Execute("DELETE FROM scans");  // by no function of the store
+  }
+  EXPECT_EQ(Open()->recovery().foreign_folders, 1);
+  EXPECT_THAT(testing::FilesBelow(state() / "set-aside" / scan), ::testing::SizeIs(7));
+}
+
+TEST_F(StoreRecoveryTest, AStoreOfVersion4KeepsScansThatItHadGivenUp) {
+  std::string kept, given_up;
+  {
+    const auto store = Open();
+    const std::string patient = store->AddPatient(kAnna, "A", "");
+    kept = StoreScan(*store, patient);
+    given_up = StoreScan(*store, patient);
+  }
+  {
+    Database direct(state() / "plumb.db", Database::Access::kReadWrite);
+    direct.Execute(
+        "DROP TABLE scan_files; DROP TABLE removed_scans; ALTER TABLE scans DROP COLUMN "
+        "unavailable; ALTER TABLE scans DROP COLUMN checked_at; ALTER TABLE audit DROP COLUMN "
+        "chain; UPDATE scans SET has_folder = 0, failure = 'its files are gone' WHERE id = 2; "
+        "PRAGMA user_version = 4");
+  }
+  const auto store = Open();
+  EXPECT_EQ(store->recovery().orphaned_folders, 0);
+  EXPECT_EQ(store->recovery().attached_scans, 1);
+  for (const std::string& scan : {kept, given_up}) {
+    EXPECT_EQ(store->FindScan(scan)->folder, store->ScanFolder(scan));
+    EXPECT_EQ(store->FindScan(scan)->failure, "");
+    EXPECT_EQ(store->CheckFiles(scan, false), "") << "first seen";
+    WriteWholeFile(store->ScanFolder(scan) / "scene" / "mesh.ply", std::string_view("another"));
+    EXPECT_THAT(store->CheckFiles(scan, false), HasSubstr("scene/mesh.ply"));
+  }
+  EXPECT_EQ(store->FirstBrokenAuditEntry(), std::nullopt) << "older entries have no chain";
+}
+
+}  // namespace
+}  // namespace plumb
