@@ -35,6 +35,11 @@ echo "0.2.1 two" >release
 run roll-back
 check "a new one is" '^0 systemctl --no-block reboot$' "$code $(grep reboot calls || true)"
 
+rm gate/good
+: >calls
+run roll-back
+check "on a machine where none was good, none is left" '^0 $' "$code $(cat calls)"
+
 refused() { # NAME SENTENCE
   run
   check "$1" "^1 0 not marked good: $2" "$code $(is_marked) $(grep 'not marked' told || true)"

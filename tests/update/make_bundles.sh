@@ -1,0 +1,84 @@
+#!/usr/bin/env bash
+# A machine for RAUC made of files, two certificate authorities, and bundles good and bad. Keys live in FOLDER alone.
+#   make_bundles.sh FOLDER
+set -euo pipefail
+cd "$1"
+mkdir -p slots pki state
+authority() { # NAME: certificate authority and a certificate that may sign code
+  openssl req -x509 -newkey rsa:2048 -nodes -sha256 -days 7300 -subj "/CN=Plumb test $1" -keyout "pki/$1-ca.key" -out "pki/$1-ca.pem"
+  openssl req -newkey rsa:2048 -nodes -sha256 -subj "/CN=$1 signer" -keyout "pki/$1.key" -out "pki/$1.csr"
+  openssl x509 -req -in "pki/$1.csr" -CA "pki/$1-ca.pem" -CAkey "pki/$1-ca.key" -CAcreateserial -days 7300 -sha256 -out "pki/$1.pem" \
+    -extfile <(printf 'basicConstraints=CA:FALSE\nkeyUsage=digitalSignature\nextendedKeyUsage=codeSigning\nsubjectKeyIdentifier=hash\nauthorityKeyIdentifier=keyid\n')
+}
+authority own
+authority stranger
+
+bundle() { # NAME VERSION COMPATIBLE SIGNER FORMAT
+  rm -rf content
+  mkdir content
+  head -c 1500000 /dev/zero | openssl enc -aes-128-ctr -K "$(printf '%032x' "${2//[^0-9]/}")" -iv "$(printf '%032x' 1)" >content/rootfs.img
+  printf '[update]\ncompatible=%s\nversion=%s\n\n[bundle]\nformat=%s\n\n[image.rootfs]\nfilename=rootfs.img\n' "$3" "$2" "$5" >content/manifest.raucm
+  rm -f "$1.raucb"
+  rauc --cert="pki/$4.pem" --key="pki/$4.key" bundle content "$1.raucb"
+  cp content/rootfs.img "$1.img"
+}
+bundle good 9.1.0 plumb-test own plain
+bundle older 0.0.9 plumb-test own plain
+bundle other 9.1.0 plumb-other-machine own plain
+bundle stranger 9.1.0 plumb-test stranger plain
+bundle verity 9.1.0 plumb-test own verity
+bundle strangers-verity 9.1.0 plumb-test stranger verity
+# One bit of what was signed; half of the file; one letter of the manifest inside the signature.
+python3 - <<'PYTHON'
+whole = bytearray(open("good.raucb", "rb").read())
+open("truncated.raucb", "wb").write(whole[: len(whole) // 2])
+whole[400_000] ^= 1
+open("damaged.raucb", "wb").write(whole)
+verity = bytearray(open("verity.raucb", "rb").read())
+at = verity.rindex(b"verity-hash=") + 12
+verity[at] = ord("0") if verity[at] != ord("0") else ord("1")
+open("damaged-verity.raucb", "wb").write(verity)
+PYTHON
+
+head -c 2000000 /dev/zero >slots/a.img
+cp slots/a.img slots/b.img
+cat >boot-backend <<'SCRIPT'
+#!/bin/sh
+# RAUC's custom boot loader: what it is told is kept in files.
+state=$(dirname "$0")/state
+echo "$@" >>"$state/calls"
+case "$1" in
+  get-primary) cat "$state/primary" 2>/dev/null || echo A ;;
+  set-primary) echo "$2" >"$state/primary"; echo good >"$state/state.$2" ;;
+  get-state) cat "$state/state.$2" 2>/dev/null || echo good ;;
+  set-state) echo "$3" >"$state/state.$2" ;;
+  *) exit 1 ;;
+esac
+SCRIPT
+chmod +x boot-backend
+cat >system.conf <<CONF
+[system]
+compatible=plumb-test
+bootloader=custom
+mountprefix=$PWD/mount
+statusfile=$PWD/state/status
+max-bundle-download-size=100000000
+
+[handlers]
+bootloader-custom-backend=$PWD/boot-backend
+
+[keyring]
+path=$PWD/pki/own-ca.pem
+check-purpose=codesign
+
+[slot.rootfs.0]
+device=$PWD/slots/a.img
+type=raw
+bootname=A
+
+[slot.rootfs.1]
+device=$PWD/slots/b.img
+type=raw
+bootname=B
+CONF
+mkdir -p mount

@@ -1,0 +1,312 @@
+// Bundles through RAUC itself, on a bus and a machine made of files. plumbd's part runs as nobody,
+// as plumbd does: what RAUC takes over it cannot read any more.
+#include <signal.h>
+#include <spawn.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <future>
+#include <iterator>
+#include <memory>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/update/updater.hpp"
+#include "tests/support/temp_folder.hpp"
+
+extern char** environ;
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::TempFolder;
+using web::ChangeResult;
+
+constexpr uid_t kNobody = 65534;
+
+class Child {
+ public:
+  Child() = default;
+  explicit Child(std::vector<std::string> command) {
+    std::vector<char*> arguments;
+    for (std::string& word : command) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    posix_spawnattr_t attributes;
+    ::posix_spawnattr_init(&attributes);
+    sigset_t none;
+    sigemptyset(&none);
+    ::posix_spawnattr_setsigmask(&attributes, &none);
+    ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+    if (::posix_spawnp(&pid_, arguments[0], nullptr, &attributes, arguments.data(), environ) != 0)
+      pid_ = -1;
+    ::posix_spawnattr_destroy(&attributes);
+  }
+  ~Child() {
+    if (pid_ <= 0) return;
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+  [[nodiscard]] int Wait() {
+    int status = -1;
+    if (pid_ > 0) ::waitpid(std::exchange(pid_, -1), &status, 0);
+    return status;
+  }
+
+ private:
+  pid_t pid_ = -1;
+};
+
+std::string Bytes(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::string WhyNotHere() {
+  if (::geteuid() != 0) return "needs root: RAUC mounts bundles and takes them over";
+  if (::access("/usr/bin/rauc", X_OK) != 0) return "rauc is missing: run toolchain/install";
+  if (::access("/dev/loop-control", W_OK) != 0) return "no loop devices here, RAUC needs one";
+  return {};
+}
+
+class RaucTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    if (!WhyNotHere().empty()) return;
+    made_ = std::make_unique<TempFolder>();
+    const std::string log = (*made_ / "made").string();
+    Child make({"/bin/sh", "-c",
+                std::string(PLUMB_SOURCE_DIR) + "/tests/update/make_bundles.sh " +
+                    made_->path().string() + " >" + log + " 2>&1"});
+    ASSERT_EQ(make.Wait(), 0) << Bytes(log);
+    fs::permissions(made_->path(), fs::perms(0755));  // nobody looks at the slots
+  }
+  static void TearDownTestSuite() { made_.reset(); }
+
+  void SetUp() override {
+    if (const std::string why = WhyNotHere(); !why.empty()) GTEST_SKIP() << why;
+    fs::create_directories(folder_ / "updates");
+    for (const fs::path& path : {folder_.path(), folder_ / "updates"})
+      ASSERT_EQ(::chown(path.c_str(), kNobody, kNobody), 0);
+    for (const char* name : {"a.img", "b.img"})
+      std::ofstream(*made_ / "slots" / name, std::ios::binary) << std::string(2'000'000, '\0');
+    for (const char* name : {"primary", "state.A", "state.B", "status"})
+      fs::remove(*made_ / "state" / name);
+    address_ = "unix:path=" + (folder_ / "bus").string();
+    std::ofstream(folder_ / "bus.conf")
+        << R"(<!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-BUS Bus Configuration 1.0//EN"
+ "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd"><busconfig><type>session</type><listen>)"
+        << address_ << R"(</listen><auth>EXTERNAL</auth><policy context="default"><allow user="*"/>
+<allow send_destination="*" eavesdrop="true"/><allow eavesdrop="true"/><allow own="*"/></policy></busconfig>)";
+    bus_ = std::make_unique<Child>(std::vector<std::string>{
+        "dbus-daemon", "--nofork", "--config-file=" + (folder_ / "bus.conf").string()});
+    for (int i = 0; i < 2000 && !fs::exists(folder_ / "bus"); ++i) ::usleep(5000);
+    ::setenv("DBUS_SYSTEM_BUS_ADDRESS", address_.c_str(), 1);
+    ::setenv("DBUS_STARTER_BUS_TYPE", "system", 1);
+    StartRauc();
+    ASSERT_EQ(::seteuid(kNobody), 0);
+  }
+  void TearDown() override {
+    if (::geteuid() == kNobody) ASSERT_EQ(::seteuid(0), 0);
+  }
+
+  void StartRauc() {
+    rauc_ = std::make_unique<Child>(
+        std::vector<std::string>{"rauc", "--conf=" + (*made_ / "system.conf").string(), "service",
+                                 "--override-boot-slot=A"});
+  }
+
+  /// Puts a bundle where an upload would.
+  void Take(const std::string& name) {
+    ASSERT_EQ(::seteuid(0), 0);
+    const fs::path to = folder_ / "updates" / (name + ".raucb");
+    fs::copy_file(*made_ / (name + ".raucb"), to, fs::copy_options::overwrite_existing);
+    ASSERT_EQ(::chown(to.c_str(), kNobody, kNobody), 0);
+    ASSERT_EQ(::chmod(to.c_str(), 0600), 0);  // as plumbd's unit has it (UMask=)
+    ASSERT_EQ(::seteuid(kNobody), 0);
+  }
+
+  /// The loop has the main thread.
+  void Play(const std::function<void()>& test) {
+    std::jthread player([&] {
+      On([this] {
+        updater_ = std::make_unique<Updater>(
+            loop_, UpdaterOptions{.folder = folder_ / "updates",
+                                  .max_bytes = 100 << 20,
+                                  .bus_address = address_,
+                                  .version = "1.0.0",
+                                  .hindrance = {},
+                                  .changed = {},
+                                  .aside = {},
+                                  .ended = [this](const std::string&, const std::string& failure) {
+                                    ++num_ended_;
+                                    failure_ = failure;
+                                  }});
+      });
+      if (Becomes([&] { return StatusNow().supported; })) {
+        test();
+      } else {
+        ADD_FAILURE() << "RAUC does not answer";
+      }
+      On([this] { updater_.reset(); });
+      loop_.Quit(0);
+    });
+    loop_.Run();
+  }
+  void On(const std::function<void()>& work) {
+    std::promise<void> done;
+    loop_.Post("test", [&] {
+      work();
+      done.set_value();
+    });
+    done.get_future().wait();
+  }
+  [[nodiscard]] web::UpdateStatus StatusNow() {
+    web::UpdateStatus status;
+    On([&] { status = updater_->status(); });
+    return status;
+  }
+  [[nodiscard]] static bool Becomes(const std::function<bool()>& holds) {
+    const auto until = EventLoop::Clock::now() + std::chrono::seconds(60);
+    while (!holds()) {
+      if (EventLoop::Clock::now() > until) return false;
+      ::usleep(5000);
+    }
+    return true;
+  }
+  web::Change Install(const std::string& name) {
+    auto answer = std::make_shared<std::promise<web::Change>>();
+    On([&] {
+      updater_->Install(name + ".raucb",
+                        [answer](const web::Change& change) { answer->set_value(change); });
+    });
+    auto future = answer->get_future();
+    if (future.wait_for(std::chrono::seconds(60)) != std::future_status::ready) {
+      ADD_FAILURE() << "no answer";
+      return {};
+    }
+    return future.get();
+  }
+  /// Also waits for its end. Gives why it failed, or nothing.
+  std::string InstallToTheEnd(const std::string& name) {
+    const int before = num_ended_;
+    const web::Change change = Install(name);
+    if (change.result != ChangeResult::kDone) return change.message;
+    if (!Becomes([&] { return num_ended_ > before; })) return "it does not end";
+    return failure_;
+  }
+  [[nodiscard]] static bool SlotHolds(const std::string& slot, const std::string& image) {
+    return Bytes(*made_ / "slots" / (slot + ".img")).starts_with(Bytes(*made_ / (image + ".img")));
+  }
+  [[nodiscard]] static bool IsUntouched() {
+    return Bytes(*made_ / "slots" / "b.img") == std::string(2'000'000, '\0') &&
+           Bytes(*made_ / "slots" / "a.img") == std::string(2'000'000, '\0');
+  }
+  void ExpectRefusal(const std::string& bundle, const ::testing::Matcher<std::string>& why) {
+    Take(bundle);
+    EXPECT_THAT(InstallToTheEnd(bundle), why) << bundle;
+    EXPECT_FALSE(StatusNow().installing);
+    EXPECT_TRUE(IsUntouched()) << bundle;
+  }
+
+  static inline std::unique_ptr<TempFolder> made_;
+  EventLoop loop_;  // first: blocks signals before any thread starts
+  TempFolder folder_;
+  std::string address_;
+  std::unique_ptr<Child> bus_, rauc_;
+  std::unique_ptr<Updater> updater_;
+  std::atomic<int> num_ended_{0};
+  std::string failure_;
+};
+
+TEST_F(RaucTest, AGoodBundleFillsTheOtherSlotAndIsStartedNext) {
+  Take("good");
+  Play([&] {
+    EXPECT_EQ(StatusNow().slot, "A");
+    EXPECT_EQ(InstallToTheEnd("good"), "");
+    EXPECT_TRUE(SlotHolds("b", "good"));
+    EXPECT_FALSE(SlotHolds("a", "good"));
+    EXPECT_EQ(Bytes(*made_ / "state" / "primary"), "B\n");
+    EXPECT_THAT(StatusNow().message, HasSubstr("restart the appliance to use it"));
+    EXPECT_EQ(StatusNow().fraction, 1.0);
+  });
+}
+
+TEST_F(RaucTest, EachBadBundleIsRefusedWithItsOwnSentence) {
+  Play([&] {
+    ExpectRefusal("older", HasSubstr("holds version 0.0.9, older than 1.0.0 which runs"));
+    ExpectRefusal("other", HasSubstr("is for another machine: it is for 'plumb-other-machine', "
+                                     "this is 'plumb-test'"));
+    ExpectRefusal("stranger", HasSubstr("not signed by a key that this machine trusts"));
+    ExpectRefusal("strangers-verity", HasSubstr("not signed by a key that this machine trusts"));
+    ExpectRefusal("damaged", HasSubstr("was damaged on its way"));
+    ExpectRefusal("damaged-verity", HasSubstr("was damaged on its way"));
+    ExpectRefusal("truncated", HasSubstr("is no whole bundle"));
+  });
+}
+
+/// RAUC makes root the owner of what it has looked at.
+TEST_F(RaucTest, ASecondAttemptOnABundleThatRaucHasTakenOverWorks) {
+  Take("good");
+  Play([&] {
+    EXPECT_EQ(InstallToTheEnd("good"), "");
+    EXPECT_NE(::eaccess((folder_ / "updates" / "good.raucb").c_str(), R_OK), 0)
+        << "RAUC did not take it over: this test shows nothing";
+    ASSERT_EQ(::seteuid(0), 0);
+    std::ofstream(*made_ / "slots" / "b.img", std::ios::binary) << std::string(2'000'000, '\0');
+    ASSERT_EQ(::seteuid(kNobody), 0);
+    EXPECT_EQ(InstallToTheEnd("good"), "");
+    EXPECT_TRUE(SlotHolds("b", "good"));
+  });
+}
+
+TEST_F(RaucTest, ASecondAttemptOnARefusedBundleGivesTheSameReason) {
+  Play([&] {
+    ExpectRefusal("stranger", HasSubstr("not signed by a key that this machine trusts"));
+    EXPECT_THAT(InstallToTheEnd("stranger"), HasSubstr("not signed by a key that this machine"));
+    // Sent again, it is another file.
+    Take("good");
+    ASSERT_EQ(::rename((folder_ / "updates" / "good.raucb").c_str(),
+                       (folder_ / "updates" / ".upload-1").c_str()),
+              0);
+    web::Change change;
+    On([&] { change = updater_->Add(folder_ / "updates" / ".upload-1", "stranger.raucb"); });
+    EXPECT_EQ(change.result, ChangeResult::kDone) << change.message;
+    EXPECT_EQ(InstallToTheEnd("stranger"), "");
+    EXPECT_TRUE(SlotHolds("b", "good"));
+  });
+}
+
+TEST_F(RaucTest, ABundleCanBeRemovedAfterRaucHasTakenItOver) {
+  Take("good");
+  Play([&] {
+    EXPECT_EQ(InstallToTheEnd("good"), "");
+    web::Change change;
+    On([&] { change = updater_->Remove("good.raucb"); });
+    EXPECT_EQ(change.result, ChangeResult::kDone) << change.message;
+    EXPECT_TRUE(StatusNow().bundles.empty());
+  });
+}
+
+TEST(BundleDamageTest, WhatIsNoBundleIsUnknown) {
+  const TempFolder folder;
+  EXPECT_EQ(LookForDamage(folder / "none"), BundleState::kUnknown);
+  for (const std::size_t size : {0U, 7U, 8U, 9U, 100U, 5000U}) {
+    for (const char fill : {'\0', '\1', '\xFF'}) {
+      std::ofstream(folder / "file", std::ios::binary) << std::string(size, fill);
+      EXPECT_EQ(LookForDamage(folder / "file"), BundleState::kUnknown) << size;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace plumb
