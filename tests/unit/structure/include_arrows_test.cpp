@@ -88,7 +88,7 @@ const Arrows kAllowed = {
       "daemon/evaluation", "daemon/files",        "daemon/loop",       "daemon/pipeline",
       "drivers",           "drivers/files",       "drivers/gpio",      "drivers/openni",
       "drivers/replay",    "drivers/simulated",   "drivers/usb",       "drivers/virtual"}},
-    {"daemon", {"algo/base", "daemon/appliance", "daemon/cli", "daemon/config"}},
+    {"daemon", {"algo/base", "daemon/appliance", "daemon/cli", "daemon/config", "daemon/loop"}},
 };
 
 struct Include {
