@@ -17,6 +17,7 @@
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/skip.hpp"
 
 namespace plumb {
 namespace {
@@ -36,7 +37,7 @@ class DaemonDiskTest : public ::testing::Test {
   void SetUp() override {
     if (::geteuid() != 0 || ::unshare(CLONE_NEWNS) != 0 ||
         ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
-      GTEST_SKIP() << "mounts of its own are not permitted here (root and CAP_SYS_ADMIN)";
+      PLUMB_SKIP("mounts of its own are not permitted here (root and CAP_SYS_ADMIN)");
     fs::create_directories(state());
   }
   void TearDown() override {
@@ -170,7 +171,7 @@ TEST_F(DaemonDiskTest, StartedOnAReadOnlyDiskAfterAPowerCutItReadsTheLogToo) {
 }
 
 TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyWhileNobodyScansIsToldBeforeTheNextScan) {
-  if (!MountImage()) GTEST_SKIP() << "no loop device with ext4 here";
+  if (!MountImage()) PLUMB_SKIP("no loop device with ext4 here");
   {
     Plumbd plumbd(folder_.path());
     ASSERT_TRUE(plumbd.WaitUntilUp());
@@ -195,7 +196,7 @@ TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyWhileNobodyScansIsToldBeforeTheNe
 
 TEST_F(DaemonDiskTest,
        ADiskThatBecomesReadOnlyDuringAScanFailsItWithTheReasonAndKeepsTheReference) {
-  if (!MountImage()) GTEST_SKIP() << "no loop device with ext4 here";
+  if (!MountImage()) PLUMB_SKIP("no loop device with ext4 here");
   {
     Plumbd plumbd(folder_.path());
     ASSERT_TRUE(plumbd.WaitUntilUp());

@@ -19,6 +19,7 @@
 
 #include "algo/base/errors.hpp"
 #include "tests/support/message_of.hpp"
+#include "tests/support/skip.hpp"
 #include "tests/support/under_umockdev.hpp"
 
 namespace plumb {
@@ -165,7 +166,7 @@ class GpioTest : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!testing::UnderUmockdev())
-      GTEST_SKIP() << "not under umockdev: run it through ctest, or with umockdev-wrapper";
+      PLUMB_SKIP("not under umockdev: run it through ctest, or with umockdev-wrapper");
     chip_ = std::make_unique<FakeChip>();
   }
   std::unique_ptr<FakeChip> chip_;

@@ -15,6 +15,7 @@
 
 #include "daemon/loop/event_loop.hpp"
 #include "daemon/loop/loop_report.hpp"
+#include "tests/support/skip.hpp"
 
 namespace plumb {
 namespace {
@@ -162,7 +163,7 @@ TEST(LoopMeterClocksTest, WorkIsWorkAndSleepIsNone) {
 
 TEST(LoopMeterClocksTest, SharingAProcessorIsWaitingForIt) {
   if (!std::ifstream("/proc/thread-self/schedstat").good())
-    GTEST_SKIP() << "this kernel does not count it";
+    PLUMB_SKIP("this kernel does not count it");
   cpu_set_t allowed, one;
   ASSERT_EQ(pthread_getaffinity_np(pthread_self(), sizeof allowed, &allowed), 0);
   CPU_ZERO(&one);

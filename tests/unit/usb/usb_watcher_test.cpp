@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "tests/support/skip.hpp"
 #include "tests/support/under_umockdev.hpp"
 
 namespace plumb {
@@ -39,7 +40,7 @@ class UsbWatcherTest : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!testing::UnderUmockdev())
-      GTEST_SKIP() << "not under umockdev: run it through ctest, or with umockdev-wrapper";
+      PLUMB_SKIP("not under umockdev: run it through ctest, or with umockdev-wrapper");
     testbed_ = umockdev_testbed_new();
     hub_ = umockdev_testbed_add_device(
         testbed_, "usb", "usb1", nullptr, "busnum", "1", "devnum", "1", "idVendor", "1d6b",
