@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
+#include "daemon/appliance/plan_options.hpp"
 #include "daemon/files/scene_json.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/records/check_json.hpp"
@@ -27,15 +28,6 @@ constexpr std::chrono::minutes kSessionIdle{30};
 constexpr double kDroppedSmoothing_s = 1.0;
 const web::Actor kSelf{.user = "plumbd", .address = ""};
 const web::Actor kAuto{.user = "auto", .address = ""};
-
-PatientPosture PostureOf(const std::string& name, PatientPosture otherwise) {
-  for (const PatientPosture posture :
-       {PatientPosture::kHeadFirstSupine, PatientPosture::kHeadFirstProne,
-        PatientPosture::kFeetFirstSupine, PatientPosture::kFeetFirstProne}) {
-    if (name == Name(posture)) return posture;
-  }
-  return otherwise;
-}
 
 double Milliseconds(Clock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
@@ -285,24 +277,10 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
   if (reference && scan_.purpose == web::ScanPurpose::kFraction) {
     scan_.reference_id = reference->id;
     job.reference_scene = store_->ScanFolder(reference->scan_id) / "scene";
-    job.compare = CompareOptionsFor(reference->plan);
+    job.compare = CompareOptionsFor(reference->plan, parts_.config.compare);
+    job.compare.now_s = SteadySeconds;
   }
   return job;
-}
-
-CompareOptions Appliance::CompareOptionsFor(const web::ReferencePlan& plan) const {
-  CompareOptions options = parts_.config.compare;
-  options.now_s = SteadySeconds;
-  if (!plan.region_m.empty()) {
-    options.region_polygon_m.clear();
-    for (const auto& [x, y] : plan.region_m) options.region_polygon_m.emplace_back(x, y);
-  }
-  if (plan.isocentre_m) options.isocentre_m = Eigen::Vector3d(plan.isocentre_m->data());
-  options.marker_kind = plan.couch_markers ? MarkerKind::kCouch : MarkerKind::kRoom;
-  options.posture = PostureOf(plan.posture, options.posture);
-  options.limits.shift_tolerance_m = plan.tolerance.shift_mm * kMillimetre;
-  options.limits.rotation_tolerance_rad = plan.tolerance.rotation_deg * kDegree;
-  return options;
 }
 
 web::ReferencePlan Appliance::DefaultPlan() {

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/appliance/page_identity.hpp"
 #include "daemon/appliance/scan_session.hpp"
 #include "daemon/appliance/scan_state.hpp"
 #include "daemon/appliance/sensor_thread.hpp"
@@ -93,6 +94,8 @@ class Appliance {
     tell_web_ = std::move(listener);
   }
 
+  /// What the status says of the page.
+  void SetPage(PageNotes page) { page_ = std::move(page); }
   [[nodiscard]] std::string StatusJson();
   [[nodiscard]] web::Status WebStatus();
   [[nodiscard]] web::Health Health();
@@ -153,7 +156,6 @@ class Appliance {
   [[nodiscard]] ScanCallbacks MakeCheckCallbacks(const NewScan& scan);
   void AddListeners(ScanCallbacks& callbacks);
   [[nodiscard]] ScanCallbacks MakeCallbacks(const NewScan& scan);
-  [[nodiscard]] CompareOptions CompareOptionsFor(const web::ReferencePlan& plan) const;
   void OnSensor(const SensorEvent& event);
   void LogSensor(const SensorEvent& event);
   void OnUpdate(const ScanUpdate& update);
@@ -195,6 +197,7 @@ class Appliance {
   std::optional<CurrentScan> last_result_;
   std::chrono::steady_clock::time_point sensor_since_;
   std::string last_serial_;  ///< Of the sensor that was used last.
+  PageNotes page_;
   IndicatorPattern shown_ = IndicatorPattern::kOff;
   std::function<void(const std::string&)> tell_watchers_;
   std::function<void(web::EventKind)> tell_web_;

@@ -239,25 +239,28 @@ std::string Appliance::StatusJson() {
       }
     }
   }
-  const Json status = {{"state", Name(state_.phase)},
-                       {"reason", FaultReason()},
-                       {"sensor",
-                        {{"present", sensor.present},
-                         {"serial", sensor.sensor.serial},
-                         {"name", sensor.sensor.name},
-                         {"fps", sensor.present ? sensor.statistics.frames_per_second : 0.0},
-                         {"pairs", sensor.statistics.num_pairs},
-                         {"unpaired", sensor.statistics.num_unpaired},
-                         {"discarded", sensor.statistics.num_discarded},
-                         {"lost", sensor.statistics.num_lost},
-                         {"calibrated", sensor.present && !sensor.info.intrinsics_assumed},
-                         {"warnings", sensor.info.warnings},
-                         {"others", sensor.others}}},
-                       {"scan", scan},
-                       {"last_result", last},
-                       {"light", Name(shown_)},
-                       {"loop", LoopJson(loop_.meter())},
-                       {"version", Version()}};
+  const Json status = {
+      {"state", Name(state_.phase)},
+      {"reason", FaultReason()},
+      {"sensor",
+       {{"present", sensor.present},
+        {"serial", sensor.sensor.serial},
+        {"name", sensor.sensor.name},
+        {"fps", sensor.present ? sensor.statistics.frames_per_second : 0.0},
+        {"pairs", sensor.statistics.num_pairs},
+        {"unpaired", sensor.statistics.num_unpaired},
+        {"discarded", sensor.statistics.num_discarded},
+        {"lost", sensor.statistics.num_lost},
+        {"calibrated", sensor.present && !sensor.info.intrinsics_assumed},
+        {"warnings", sensor.info.warnings},
+        {"others", sensor.others}}},
+      {"scan", scan},
+      {"last_result", last},
+      {"light", Name(shown_)},
+      {"page",
+       {{"url", page_.url}, {"certificate", page_.certificate}, {"warnings", page_.warnings}}},
+      {"loop", LoopJson(loop_.meter())},
+      {"version", Version()}};
   return status.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -293,6 +296,7 @@ web::Status Appliance::WebStatus() {
                       .step_fraction = scan_.update.fraction};
   }
   status.version = Version();
+  status.warnings = page_.warnings;
   const Eigen::Matrix3d R_iec_reference = parts_.config.compare.T_iec_reference.linear();
   status.right_xy = {R_iec_reference(0, 0), R_iec_reference(0, 1)};
   status.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)};

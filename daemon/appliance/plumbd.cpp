@@ -104,9 +104,7 @@ Config ReadConfiguration(const Options& options) {
   }
   if (options.simulated.empty()) RefuseResearchPresets(config);
   if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
-  if (config.web.tls_certificate.empty() != config.web.tls_key.empty()) {
-    throw DataError("web.tls_certificate and web.tls_key: expected both or none, found one");
-  }
+  CheckPageIdentity(config.web);
   if (options.state) {
     config.appliance.state = fs::absolute(*options.state);
     config.update.folder = config.appliance.state / "updates";
@@ -167,6 +165,7 @@ class Sensors {
     if (config.markers.dictionary) provider_.marker_dictionary = *config.markers.dictionary;
     if (config.markers.length_m) provider_.marker_length_m = *config.markers.length_m;
     if (config.markers.reference) provider_.reference_marker = config.markers.reference;
+    provider_.markers_are_the_rooms = options.simulated.empty();
 #else
     (void)config;
     if (!options.simulated.empty())
@@ -285,9 +284,12 @@ class Plumbd {
   int Run() {
     Tick();
     RunHttp();
-    const std::string page =
-        fmt::format("{}://{}:{}/", is_https_ ? "https" : "http", page_host_, http_.port());
-    Log(LogLevel::kNotice, "the page is served at " + page);
+    page_.url += fmt::format(":{}/", http_.port());
+    Log(LogLevel::kNotice, "the page is served at " + page_.url);
+    if (!page_.certificate.empty())
+      Log(LogLevel::kNotice, "SHA-256 of the page's certificate: " + page_.certificate);
+    for (const std::string& warning : page_.warnings) Log(LogLevel::kWarning, warning);
+    appliance_.SetPage(page_);
     if (const std::optional<std::string> code = http_.setup_code();
         code && appliance_.storage_fault().empty()) {
       fmt::print("setup code: {}\n", *code);  // under systemd the standard output is the journal
@@ -309,16 +311,12 @@ class Plumbd {
 
   web::HttpServerOptions HttpOptions(const Config& config) {
     const ListenAddress listen = ParseListenAddress(config.web.listen).value_or(ListenAddress{});
-    is_https_ = !config.web.tls_certificate.empty();
-    page_host_ =
-        listen.address.find(':') == std::string::npos ? listen.address : "[" + listen.address + "]";
     web::HttpServerOptions options;
     options.address = listen.address;
     options.port = listen.port;
     options.listen_fd = InheritedSocket("http");
-    options.tls_certificate = config.web.tls_certificate;
-    options.tls_key = config.web.tls_key;
     options.host_names = config.web.host_names;
+    page_ = IdentifyPage(config, options);
     options.upload_folder = config.update.folder;
     options.doing = [this](std::string_view what) { loop_.meter().Part(what); };
     options.max_upload_bytes = static_cast<std::uint64_t>(config.update.max_bundle_mb) << 20;
@@ -409,8 +407,7 @@ class Plumbd {
   WorkThread device_thread_{16};
   Panel panel_;
   Appliance appliance_;
-  bool is_https_ = false;
-  std::string page_host_;
+  PageNotes page_;
   WebService service_;
   web::HttpServer http_;
   ControlServer control_;

@@ -104,6 +104,12 @@ std::string StatusText(const Json& status) {
                         other.is_string() ? other.get<std::string>() : "");
   for (const Json& warning : sensor.value("warnings", Json::array()))
     text += fmt::format("         {}\n", warning.is_string() ? warning.get<std::string>() : "");
+  const Json page = status.value("page", Json::object());
+  text += fmt::format("page     {}\n", page.value("url", ""));
+  if (const std::string certificate = page.value("certificate", ""); !certificate.empty())
+    text += fmt::format("         certificate, SHA-256: {}\n", certificate);
+  for (const Json& warning : page.value("warnings", Json::array()))
+    text += fmt::format("         {}\n", warning.is_string() ? warning.get<std::string>() : "");
   if (const auto lost =
           sensor.value("lost", 0) + sensor.value("unpaired", 0) + sensor.value("discarded", 0);
       lost > 0) {

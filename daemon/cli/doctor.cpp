@@ -155,6 +155,10 @@ void CheckSensor(Report& report, const Config& config) {
   try {
     OpenNiOptions options;
     options.calibration_folder = config.appliance.calibration;
+    if (config.markers.dictionary) options.marker_dictionary = *config.markers.dictionary;
+    if (config.markers.length_m) options.marker_length_m = *config.markers.length_m;
+    options.reference_marker = config.markers.reference;
+    options.markers_are_the_rooms = true;
     OpenNiProvider provider(options);
     const std::vector<SensorDescription> sensors = provider.List();
     report.Good("OpenNI2",

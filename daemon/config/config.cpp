@@ -224,6 +224,7 @@ void ReadWeb(Section section, WebConfig& web) {
   };
   take_path("tls_certificate", web.tls_certificate);
   take_path("tls_key", web.tls_key);
+  section.Take("plain_http", web.plain_http, "true or false", kAny);
   section.TakeNames("host_names", web.host_names, "a list of at most 16 host names", 16);
   section.RefuseTheRest();
 }
@@ -245,6 +246,19 @@ std::optional<ListenAddress> ParseListenAddress(std::string_view text) {
   if (error != std::errc() || end != digits.data() + digits.size() || port > 65535)
     return std::nullopt;
   return ListenAddress{.address = std::string(address), .port = static_cast<std::uint16_t>(port)};
+}
+
+PageTransport TransportOf(const WebConfig& web, bool is_loopback) {
+  if (web.tls_certificate.empty() != web.tls_key.empty())
+    throw DataError("web.tls_certificate and web.tls_key: expected both or none, found one");
+  const bool is_given = !web.tls_certificate.empty();
+  if (is_given && web.plain_http)
+    throw DataError(
+        "web.plain_http: expected false beside web.tls_certificate, found true; remove one of the "
+        "two");
+  if (is_given) return PageTransport::kGivenTls;
+  if (is_loopback) return PageTransport::kPlain;
+  return web.plain_http ? PageTransport::kPlainOnNetwork : PageTransport::kOwnTls;
 }
 
 Config ParseConfig(const std::string& text, const std::string& name, ConfigUse use) {
@@ -322,6 +336,7 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
   keep("web.listen", in_use.web.listen, next.web.listen);
   keep("web.tls_certificate", in_use.web.tls_certificate, next.web.tls_certificate);
   keep("web.tls_key", in_use.web.tls_key, next.web.tls_key);
+  keep("web.plain_http", in_use.web.plain_http, next.web.plain_http);
   keep("web.host_names", in_use.web.host_names, next.web.host_names);
   keep("update.folder", in_use.update.folder, next.update.folder);
   keep("update.max_bundle_mb", in_use.update.max_bundle_mb, next.update.max_bundle_mb);

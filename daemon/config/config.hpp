@@ -49,7 +49,9 @@ struct PanelConfig {
 /// For the page that plumbd serves.
 struct WebConfig {
   std::string listen = "0.0.0.0:8080";
-  std::filesystem::path tls_certificate, tls_key;  ///< PEM; both or none.
+  /// PEM; both or none. None: off loopback a certificate of the appliance's own is used.
+  std::filesystem::path tls_certificate, tls_key;
+  bool plain_http = false;  ///< Off loopback without TLS: everything can be read on the way.
   std::vector<std::string> host_names;  ///< By which browsers reach it, beside addresses.
 };
 
@@ -63,6 +65,18 @@ struct ListenAddress {
   std::string address;
   std::uint16_t port = 0;
 };
+/// How the page is served.
+enum class PageTransport {
+  kPlain,           ///< HTTP, on loopback.
+  kPlainOnNetwork,  ///< HTTP where others can read along, because `plain_http` says so.
+  kGivenTls,        ///< HTTPS with the certificate of the configuration.
+  kOwnTls,          ///< HTTPS with the appliance's own certificate.
+};
+/// @param is_loopback  Of the address that is listened on.
+/// @throws DataError where certificate and key are not both or none, or `plain_http` stands beside
+/// them.
+[[nodiscard]] PageTransport TransportOf(const WebConfig& web, bool is_loopback);
+
 /// "127.0.0.1:8080", "[::1]:8080"; nothing if it is neither. Port 0: any free one.
 [[nodiscard]] std::optional<ListenAddress> ParseListenAddress(std::string_view text);
 
@@ -99,7 +113,7 @@ enum class ConfigUse { kCommandLine, kAppliance };
 ///     frame to the IEC fixed frame [appliance]    state, control, calibration, sensor_serial,
 ///     keep_recordings, quota_gb, auto_stop_s, scan_limit_s, result_s [button]       chip, line,
 ///     active_low [light]        chip, red, green, blue, beeper, active_low [web]          listen,
-///     tls_certificate, tls_key, host_names [update]       folder, max_bundle_mb
+///     tls_certificate, tls_key, plain_http, host_names [update]       folder, max_bundle_mb
 ///
 /// @throws DataError naming file, line, key, what was expected and found. A key that is not listed
 /// is an error.

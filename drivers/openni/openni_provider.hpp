@@ -24,6 +24,9 @@ struct OpenNiOptions {
       "DICT_6X6_250";  ///< What holds where the calibration file does not say it.
   double marker_length_m = 0.104;
   std::optional<int> reference_marker = {};
+  /// The three above are the room's: a calibration file that states other markers is refused. Off
+  /// for recordings and the virtual sensor, whose file is all that is known of their markers.
+  bool markers_are_the_rooms = false;
   std::chrono::milliseconds stall_time{2000};  ///< Next() fails after so long without a pair.
   std::chrono::microseconds max_gap{
       16000};  ///< Between the stamps of a pair; under half of the frame period.

@@ -35,6 +35,30 @@ CameraFile ReadCalibration(const std::filesystem::path& file, const std::string&
                   serial, error.what()));
 }
 
+/// Where the room says which markers it has, a sensor's file cannot say otherwise: the side of a
+/// marker is the scale of everything, and the reference marker is the frame of every plan.
+void RefuseOtherMarkers(const OpenNiOptions& room, const CameraFile& camera,
+                        const std::filesystem::path& file) {
+  const auto refuse = [&](const char* key, const char* setting, const std::string& found,
+                          const std::string& expected) {
+    throw DeviceError(fmt::format(
+        "{}: {} is {}, but this room has {}; the markers are the room's, not the sensor's: remove "
+        "the key from the file, or correct {} in the configuration",
+        file.string(), key, found, expected, setting));
+  };
+  if (camera.marker_dictionary && *camera.marker_dictionary != room.marker_dictionary)
+    refuse("marker_dictionary", "markers.dictionary", *camera.marker_dictionary,
+           room.marker_dictionary);
+  constexpr double kSame_m = 1e-9;
+  if (camera.marker_length_m &&
+      !(std::abs(*camera.marker_length_m - room.marker_length_m) < kSame_m))
+    refuse("marker_length", "markers.length_m", fmt::format("{} m", *camera.marker_length_m),
+           fmt::format("{} m", room.marker_length_m));
+  if (camera.reference_marker && camera.reference_marker != room.reference_marker)
+    refuse("reference_marker", "markers.reference", fmt::format("{}", *camera.reference_marker),
+           room.reference_marker ? fmt::format("{}", *room.reference_marker) : "none configured");
+}
+
 }  // namespace
 
 std::filesystem::path CalibrationFile(const std::filesystem::path& folder,
@@ -59,6 +83,7 @@ StreamInfo LiveStreamInfo(const OpenNiOptions& options, const std::string& seria
   if (!options.calibration_folder.empty() &&
       std::filesystem::exists(std::filesystem::symlink_status(file, error))) {
     const CameraFile camera = ReadCalibration(file, serial, width, height);
+    if (options.markers_are_the_rooms) RefuseOtherMarkers(options, camera, file);
     info.intrinsics = Resized(camera.color, width, height);
     info.marker_dictionary = camera.marker_dictionary.value_or(info.marker_dictionary);
     info.marker_length_m = camera.marker_length_m.value_or(info.marker_length_m);

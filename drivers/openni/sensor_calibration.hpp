@@ -18,7 +18,8 @@ namespace plumb {
 /// warning.
 /// @param horizontal_fov_rad  Of the colour camera as the driver states it; out of (0.2, 2.5):
 /// TUM's published 525 pixels.
-/// @throws DeviceError if the unit's file is there but damaged, or of another shape of image.
+/// @throws DeviceError if the unit's file is there but damaged, of another shape of image, or names
+/// other markers than the room's (OpenNiOptions::markers_are_the_rooms).
 [[nodiscard]] StreamInfo LiveStreamInfo(const OpenNiOptions& options, const std::string& serial,
                                         int width, int height, double horizontal_fov_rad);
 

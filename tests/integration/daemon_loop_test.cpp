@@ -94,11 +94,7 @@ json WorkflowFigures() {
           .status,
       200);
   engineer.FetchToken();
-  EXPECT_EQ(engineer
-                .Post("/api/v1/users",
-                      {{"name", "physicist"}, {"role", "physicist"}, {"password", kPassword}})
-                .status,
-            201);
+  EXPECT_TRUE(test::AddAccount(plumbd.port(), engineer, "physicist", "physicist"));
   EXPECT_EQ(physicist.LogIn("physicist", kPassword), 200);
   std::vector<std::string> scans;
   {

@@ -1,5 +1,9 @@
 // The appliance through its page's interface: a real plumbd, real HTTP, the whole workflow of a
 // patient.
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -67,11 +71,7 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
   for (const auto& [name, role] :
        {std::pair("physicist", "physicist"), std::pair("second", "physicist"),
         std::pair("technician", "technician")}) {
-    ASSERT_EQ(
-        engineer.Post("/api/v1/users", {{"name", name}, {"role", role}, {"password", kPassword}})
-            .status,
-        201)
-        << name;
+    ASSERT_TRUE(test::AddAccount(port, engineer, name, role)) << name;
   }
   ASSERT_EQ(physicist.LogIn("physicist", kPassword), 200);
   ASSERT_EQ(second.LogIn("second", kPassword), 200);
@@ -179,6 +179,50 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
   EXPECT_EQ(physicist.Ask("DELETE", "/api/v1/patients/" + patient, "").status, 200);
   EXPECT_FALSE(fs::exists(plumbd.state() / "scans" / fraction));
   EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+TEST_F(DaemonWebTest, OffLoopbackItIsServedByTlsWithACertificateOfItsOwnThatStays) {
+  std::string certificate;
+  for (int start = 0; start < 2; ++start) {
+    Plumbd plumbd(folder_.path(), {.listen = "0.0.0.0:0"});
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    const json page = plumbd.WaitFor(
+        "its page", [](const json& status) { return status["page"]["url"] != ""; })["page"];
+    EXPECT_THAT(page["url"].get<std::string>(), ::testing::StartsWith("https://0.0.0.0:"));
+    EXPECT_THAT(page["warnings"], ::testing::IsEmpty());
+    if (start == 0) certificate = page["certificate"];
+    EXPECT_EQ(page["certificate"], certificate) << "the same after a restart";
+    EXPECT_THAT(plumbd.log(), HasSubstr("SHA-256 of the page's certificate: " + certificate));
+    const fs::path answer = folder_ / "answer";
+    const std::string ask =
+        "printf 'GET /health HTTP/1.1\\r\\nHost: localhost\\r\\nConnection: "
+        "close\\r\\n\\r\\n' | timeout 60 openssl s_client -quiet -connect "
+        "127.0.0.1:" +
+        std::to_string(plumbd.port()) + " > " + answer.string() + " 2>&1";
+    EXPECT_EQ(std::system(ask.c_str()), 0);
+    std::ifstream in(answer);
+    EXPECT_THAT(std::string(std::istreambuf_iterator<char>(in), {}), HasSubstr("HTTP/1.1 200"));
+    HttpConnection plain(plumbd.port());
+    plain.Send("GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    EXPECT_EQ(plain.Read().status, 0) << "no answer without TLS";
+    EXPECT_EQ(plumbd.Stop(), 0);
+  }
+  EXPECT_EQ(fs::status(folder_ / "state" / "page-key.pem").permissions(), fs::perms(0600));
+  EXPECT_EQ(fs::status(folder_ / "state" / "device.key").permissions(), fs::perms(0600));
+}
+
+TEST_F(DaemonWebTest, WithoutTlsOffLoopbackOnlyIfItIsSaidAndThenWithAWarning) {
+  std::ofstream(folder_ / "plumb.toml") << "[web]\nplain_http = true\n";
+  Plumbd plumbd(folder_.path(),
+                {.arguments = {"--config", folder_ / "plumb.toml"}, .listen = "0.0.0.0:0"});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  const json page = plumbd.WaitFor(
+      "its page", [](const json& status) { return status["page"]["url"] != ""; })["page"];
+  EXPECT_EQ(HttpClient(plumbd.port()).Get("/health").status, 200);
+  EXPECT_EQ(page["certificate"], "");
+  ASSERT_EQ(page["warnings"].size(), 1U);
+  EXPECT_THAT(page["warnings"][0].get<std::string>(), HasSubstr("without TLS"));
+  EXPECT_THAT(plumbd.log(), HasSubstr("without TLS"));
 }
 
 TEST_F(DaemonWebTest, AnEventStreamTellsAScanFromThePressToTheResultAnUnplugAndTheEnd) {

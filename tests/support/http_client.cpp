@@ -146,7 +146,10 @@ HttpAnswer HttpClient::Ask(const std::string& method, const std::string& path,
                            const std::string& body) {
   std::string text = fmt::format("{} {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n",
                                  method, path, port_);
-  if (!cookie.empty()) text += fmt::format("Cookie: {}\r\n", cookie);
+  std::string cookies = cookie;
+  for (const auto& [name, value] : device_cookies)
+    cookies += fmt::format("{}{}={}", cookies.empty() ? "" : "; ", name, value);
+  if (!cookies.empty()) text += fmt::format("Cookie: {}\r\n", cookies);
   if (!csrf_token.empty()) text += fmt::format("X-CSRF-Token: {}\r\n", csrf_token);
   if (!body.empty() && !extra_headers.contains("Content-Type"))
     text += "Content-Type: application/json\r\n";
@@ -155,8 +158,15 @@ HttpAnswer HttpClient::Ask(const std::string& method, const std::string& path,
   HttpConnection connection(port_);
   connection.Send(text + "\r\n" + body);
   HttpAnswer answer = connection.Read(method == "HEAD");
-  if (const std::string set = answer.Header("set-cookie"); !set.empty())
-    cookie = set.substr(0, set.find(';'));
+  const auto [begin, end] = answer.headers.equal_range("set-cookie");
+  for (auto header = begin; header != end; ++header) {
+    const std::string set = header->second.substr(0, header->second.find(';'));
+    if (set.find("plumb_device_") == std::string::npos) {
+      cookie = set;
+    } else {
+      device_cookies[set.substr(0, set.find('='))] = set.substr(set.find('=') + 1);
+    }
+  }
   return answer;
 }
 
@@ -164,6 +174,18 @@ int HttpClient::LogIn(const std::string& name, const std::string& password) {
   const HttpAnswer answer = Post("/api/v1/login", {{"name", name}, {"password", password}});
   if (answer.status == 200) FetchToken();
   return answer.status;
+}
+
+bool AddAccount(std::uint16_t port, HttpClient& engineer, const std::string& name,
+                const std::string& role) {
+  const int added =
+      engineer.Post("/api/v1/users", {{"name", name}, {"role", role}, {"password", kFirstPassword}})
+          .status;
+  HttpClient person(port);
+  return added == 201 && person.LogIn(name, kFirstPassword) == 200 &&
+         person.Post("/api/v1/session/password",
+                     {{"old_password", kFirstPassword}, {"password", kPassword}})
+                 .status == 200;
 }
 
 void HttpClient::FetchToken() {

@@ -14,6 +14,8 @@ namespace plumb::test {
 
 inline constexpr const char* kPassword =
     "correct horse battery";  ///< Of every account that a test makes.
+inline constexpr const char* kFirstPassword =
+    "first horse of the day";  ///< That an engineer gives a new account.
 
 /// What came back.
 struct HttpAnswer {
@@ -69,12 +71,18 @@ class HttpClient {
   void FetchToken();
 
   std::map<std::string, std::string> extra_headers;
-  std::string cookie;
+  std::string cookie;  ///< Of the session.
   std::string csrf_token;
+  std::map<std::string, std::string> device_cookies;  ///< Of people who logged in from here.
 
  private:
   std::uint16_t port_;
 };
+
+/// Has the engineer add an account, and its person replace the first password by kPassword.
+/// @return True if every answer was as it should be.
+[[nodiscard]] bool AddAccount(std::uint16_t port, HttpClient& engineer, const std::string& name,
+                              const std::string& role);
 
 /// Serves on a thread of its own until destroyed; `each_turn` runs there after each turn.
 class ServingLoop {

@@ -91,7 +91,7 @@ Plumbd::Plumbd(const fs::path& folder, PlumbdOptions options)
                                         "--control",
                                         socket().string(),
                                         "--listen",
-                                        "127.0.0.1:0"};
+                                        options.listen};
   arguments.insert(arguments.end(), options.arguments.begin(), options.arguments.end());
   options.environment["XDG_CACHE_HOME"] = FrameFolder().string();
   options.environment["NOTIFY_SOCKET"] = (folder_ / "notify.sock").string();
@@ -253,11 +253,11 @@ int Plumbd::Stop() {
 std::string Plumbd::log() const { return ReadAll(folder_ / "log"); }
 
 std::uint16_t Plumbd::port() const {
-  const std::string text = log(), marker = "page is served at http://127.0.0.1:";
+  const std::string text = log(), marker = "page is served at ";
   const std::size_t at = text.rfind(marker);  // of the last start
-  return at == std::string::npos
-             ? 0
-             : static_cast<std::uint16_t>(std::atoi(text.c_str() + at + marker.size()));
+  if (at == std::string::npos) return 0;
+  const std::size_t colon = text.rfind(':', text.find('\n', at));
+  return static_cast<std::uint16_t>(std::atoi(text.c_str() + colon + 1));
 }
 
 std::string Plumbd::setup_code() const {

@@ -26,6 +26,7 @@ struct PlumbdOptions {
                    ///< at the start.
   long max_file_bytes = 0;           ///< > 0: larger files fail as on a full disk.
   std::filesystem::path state = {};  ///< Empty: a folder in the test's own.
+  std::string listen = "127.0.0.1:0";
 };
 
 /// Starts plumbd and speaks to it. Every wait is for a condition, with a generous end. Killed by

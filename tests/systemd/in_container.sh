@@ -37,7 +37,7 @@ check "no new privileges" "NoNewPrivs:1" "$(status_of NoNewPrivs)"
 check "no capabilities" "CapBnd:0000000000000000" "$(status_of CapBnd)"
 check "memory is never writable and executable" "yes" "$(show MemoryDenyWriteExecute)"
 check "control socket is the unit's" "plumb plumb 660" "$(stat -c '%U %G %a' /run/plumb/control.sock)"
-check "page" '*"status":"ok"*' "$(curl -s http://127.0.0.1:8080/health)"
+check "page" '*"status":"ok"*' "$(curl -sk https://127.0.0.1:8080/health)"
 check "files outside its folders" "*Read-only file system*" "$(nsenter -t "$(show MainPID)" -m touch /usr/probe 2>&1)"
 
 plumb press

@@ -54,7 +54,7 @@ let patient;
 await h.step('accounts, and a patient with an approved reference', async () => {
   await h.firstStart(engineer);
   for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'], ['clara', 'physicist']]) {
-    await ok(engineer, 'users', 'POST', { name, role, password: h.password });
+    await h.addAccountByApi(engineer, name, role);
   }
   for (const [page, name] of [[anna, 'anna'], [bob, 'bob'], [clara, 'clara']]) {
     await h.logIn(page, name);

@@ -15,6 +15,7 @@ target_include_directories(tomlplusplus::tomlplusplus INTERFACE ${PLUMB_TOMLPP_I
 if(PLUMB_WITH_APPLIANCE)
   pkg_check_modules(systemd REQUIRED IMPORTED_TARGET libsystemd)
   pkg_check_modules(microhttpd REQUIRED IMPORTED_TARGET libmicrohttpd)
+  pkg_check_modules(gnutls REQUIRED IMPORTED_TARGET gnutls)
   pkg_check_modules(sqlite3 REQUIRED IMPORTED_TARGET sqlite3)
   pkg_check_modules(sodium REQUIRED IMPORTED_TARGET libsodium)
 endif()

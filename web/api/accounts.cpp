@@ -8,13 +8,26 @@
 #include "algo/base/errors.hpp"
 #include "web/api/json.hpp"
 #include "web/http/checks.hpp"
+#include "web/security/password_rules.hpp"
 
 namespace plumb::web {
 namespace {
 
-constexpr std::size_t kMinPassword = 10;
-constexpr std::size_t kMaxPassword = 128;
 constexpr std::size_t kMaxName = 32;
+/// Before the hash of a password that somebody else chose: the person changes it at the next login.
+constexpr std::string_view kFirst = "first ";
+
+bool IsFirst(const std::string& stored) { return stored.starts_with(kFirst); }
+/// As libsodium takes it.
+std::string HashIn(const std::string& stored) {
+  return IsFirst(stored) ? stored.substr(kFirst.size()) : stored;
+}
+
+std::string ReadNewPassword(Fields& fields, const std::string& user) {
+  std::string password = fields.Text("password", kMinPassword, kMaxPassword);
+  if (const std::string why = WhyNotPassword(password, user); !why.empty()) throw DataError(why);
+  return password;
+}
 
 /// "XXXX-XXXX" without letters that are easily mistaken: 40 bits.
 std::string MakeSetupCode() {
@@ -100,6 +113,7 @@ Accounts::Accounts(ScanService& service, AccountOptions options)
     : service_(service),
       options_(std::move(options)),
       displays_(service, options_.tls, options_.now),
+      devices_(options_.device_key, options_.tls),
       worker_(options_.password_operations, options_.password_memory_bytes) {
   if (service_.Users().empty()) setup_code_ = MakeSetupCode();
   Expire();
@@ -193,8 +207,11 @@ void Accounts::HashThen(std::string password, const Respond& respond,
 }
 
 Response Accounts::Welcome(const User& user, bool form) {
+  if (form && IsFirst(user.password_hash)) return Redirect("/result?first=1");
   const Sessions::Opened opened = sessions_.Open(user, options_.now());
+  opened.session->must_change_password = IsFirst(user.password_hash);
   Response response = form ? Redirect("/result") : Response{};
+  response.headers.emplace_back("Set-Cookie", DeviceCookie(user.name, user.password_hash));
   response.headers.emplace_back("Set-Cookie", Cookie(opened.token, /*end=*/false));
   if (!form) response.body = Dump({{"user", user.name}, {"role", Name(user.role)}});
   return response;
@@ -204,7 +221,7 @@ void Accounts::SetUp(const Request& request, const Respond& respond) {
   Fields fields(request.body);
   const std::string code = fields.Text("code", 9, 9);
   const std::string name = ReadName(fields);
-  std::string password = fields.Text("password", kMinPassword, kMaxPassword);
+  std::string password = ReadNewPassword(fields, name);
   fields.Finish();
   if (!needs_setup() || setting_up_)
     return respond(ErrorResponse(409, "this appliance is set up already; log in"));
@@ -235,34 +252,58 @@ void Accounts::SetUp(const Request& request, const Respond& respond) {
   });
 }
 
+std::string Accounts::DeviceCookie(const std::string& user, const std::string& stored) const {
+  constexpr int kYear_s = 365 * 24 * 3600;
+  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}",
+                     devices_.NameFor(user), devices_.Make(user, stored), kYear_s,
+                     options_.tls ? "; Secure" : "");
+}
+
+std::vector<std::string> Accounts::CountersOf(const Request& request, const std::string& name,
+                                              const std::string& stored) const {
+  const auto cookie = CookieValue(request.Header("cookie"), devices_.NameFor(name));
+  if (const auto device = cookie ? devices_.Identify(*cookie, name, stored) : std::nullopt)
+    return {"device " + *device};
+  return {"address " + request.address, "name " + name};
+}
+
+std::optional<Response> Accounts::CountGuess(const std::vector<std::string>& counters) {
+  const auto now = options_.now();
+  std::chrono::seconds wait{0};
+  for (const std::string& counter : counters) wait = std::max(wait, limiter_.Wait(counter, now));
+  if (wait.count() > 0) return TooMany(wait);
+  // Counted before the hash is done: many guesses sent at once are as slow as one after the other.
+  for (const std::string& counter : counters) limiter_.Failed(counter, now);
+  return std::nullopt;
+}
+
 void Accounts::LogIn(const Request& request, const std::string& name, std::string password,
                      bool form, const Respond& respond) {
-  const auto now = options_.now();
-  const std::string address_key = "address " + request.address, name_key = "name " + name;
-  const auto wait = std::max(limiter_.Wait(address_key, now), limiter_.Wait(name_key, now));
-  if (wait.count() > 0) return respond(TooMany(wait));
-  // Counted before the hash is done: many guesses sent at once are as slow as one after the other.
-  limiter_.Failed(address_key, now);
-  limiter_.Failed(name_key, now);
   const auto user = service_.FindUser(name);
-  const std::string hash = user && !user->disabled ? user->password_hash : std::string();
-  const Actor actor{name, request.address};
+  const std::string stored = user && !user->disabled ? user->password_hash : std::string();
+  const std::vector<std::string> counters = CountersOf(request, name, stored);
+  if (auto refusal = CountGuess(counters)) return respond(std::move(*refusal));
+  const bool is_known = counters.size() == 1;
   const bool accepted = worker_.Verify(
-      std::move(password), hash,
-      [this, actor, hash, address_key, name_key, form, respond](bool matches) {
-        const auto still = service_.FindUser(actor.user);
-        if (!matches || !still || still->disabled || still->password_hash != hash) {
-          // Whatever was typed as a name stays out of the log: people type passwords there.
-          service_.Log({still ? actor.user : std::string(), actor.address}, "login.failed", "", "");
-          if (form) return respond(Redirect("/result?failed=1"));
-          return respond(ErrorResponse(403, "name or password is wrong"));
-        }
-        limiter_.Succeeded(address_key);
-        limiter_.Succeeded(name_key);
-        service_.Log(actor, "login", "", "");
-        respond(Welcome(*still, form));
+      std::move(password), HashIn(stored), is_known,
+      [this, actor = Actor{name, request.address}, stored, form, counters, respond](bool matches) {
+        FinishLogIn(actor, stored, matches, form, counters, respond);
       });
   if (!accepted) respond(Busy());
+}
+
+void Accounts::FinishLogIn(const Actor& actor, const std::string& stored, bool matches, bool form,
+                           const std::vector<std::string>& counters, const Respond& respond) {
+  const auto still = service_.FindUser(actor.user);
+  if (!matches || !still || still->disabled || still->password_hash != stored) {
+    // Whatever was typed as a name stays out of the log: people type passwords there.
+    service_.Log({still ? actor.user : std::string(), actor.address}, "login.failed", "", "");
+    if (form) return respond(Redirect("/result?failed=1"));
+    return respond(ErrorResponse(403, "name or password is wrong"));
+  }
+  for (const std::string& counter : counters) limiter_.Succeeded(counter);
+  service_.Log(actor, "login", "", "");
+  respond(Welcome(*still, form));
 }
 
 void Accounts::LogOut(const Request& request, const Respond& respond) {
@@ -283,27 +324,41 @@ void Accounts::DescribeSession(const Request& request, const Respond& respond) {
                         {"role", Name(request.session->role)},
                         {"permissions", permissions},
                         {"csrf_token", request.session->csrf_token},
+                        {"password_change_required", request.session->must_change_password},
                         {"idle_logout_min", service_.GetSettings().idle_logout_min}});
   respond(std::move(response));
+}
+
+void Accounts::VerifyOwn(const Request& request, std::string password, const char* wrong,
+                         const Respond& respond, std::function<void(const User&)> then) {
+  const auto user = service_.FindUser(request.session->user);
+  if (!user) return respond(ErrorResponse(409, "the account is gone"));
+  // A counter of its own: guesses at the login do not keep who is logged in from signing.
+  const std::vector<std::string> counters = {"own " + user->name};
+  if (auto refusal = CountGuess(counters)) return respond(std::move(*refusal));
+  const bool accepted =
+      worker_.Verify(std::move(password), HashIn(user->password_hash), /*trusted=*/true,
+                     [this, user = *user, wrong, counters, session = request.session, respond,
+                      then = std::move(then)](bool matches) {
+                       if (!matches) return respond(ErrorResponse(403, wrong));
+                       limiter_.Succeeded(counters.front());
+                       if (session->ended)
+                         return respond(ErrorResponse(401, "the session has ended: log in again"));
+                       then(user);
+                     });
+  if (!accepted) respond(Busy());
 }
 
 void Accounts::ChangeOwnPassword(const Request& request, const Respond& respond) {
   Fields fields(request.body);
   std::string old_password = fields.Text("old_password", 1, kMaxPassword);
-  const std::string password = fields.Text("password", kMinPassword, kMaxPassword);
+  const std::string password = ReadNewPassword(fields, request.session->user);
   fields.Finish();
-  const auto user = service_.FindUser(request.session->user);
-  if (!user) return respond(ErrorResponse(409, "the account is gone"));
-  const std::string key = "name " + user->name;
-  if (const auto wait = limiter_.Wait(key, options_.now()); wait.count() > 0)
-    return respond(TooMany(wait));
-  limiter_.Failed(key, options_.now());
-  const bool accepted = worker_.Verify(
-      std::move(old_password), user->password_hash,
-      [this, user = *user, password, actor = request.actor(), session = request.session, key,
-       respond](bool matches) {
-        if (!matches) return respond(ErrorResponse(403, "the old password is wrong"));
-        limiter_.Succeeded(key);
+  if (password == old_password) throw DataError("the new password is the old one");
+  VerifyOwn(
+      request, std::move(old_password), "the old password is wrong", respond,
+      [this, password, actor = request.actor(), session = request.session,
+       respond](const User& user) {
         HashThen(password, respond, [this, user, actor, session, respond](const std::string& hash) {
           const UserChange wanted{.name = user.name,
                                   .role = {},
@@ -312,13 +367,17 @@ void Accounts::ChangeOwnPassword(const Request& request, const Respond& respond)
                                   .expected_hash = user.password_hash};
           service_.ChangeUser(
               actor, wanted,
-              WhileAlive([this, name = user.name, session, respond](const Change& change) {
-                if (change.result == ChangeResult::kDone) sessions_.EndAllOf(name, session);
-                respond(ChangeResponse(change));
+              WhileAlive([this, name = user.name, hash, session, respond](const Change& change) {
+                Response response = ChangeResponse(change);
+                if (change.result == ChangeResult::kDone) {
+                  sessions_.EndAllOf(name, session);
+                  session->must_change_password = false;
+                  response.headers.emplace_back("Set-Cookie", DeviceCookie(name, hash));
+                }
+                respond(std::move(response));
               }));
         });
       });
-  if (!accepted) respond(Busy());
 }
 
 void Accounts::AcceptOutside(const Request& request, const Respond& respond) {
@@ -326,25 +385,13 @@ void Accounts::AcceptOutside(const Request& request, const Respond& respond) {
   const std::string reason = fields.Text("reason", 3, 200);
   std::string password = fields.Text("password", 1, kMaxPassword);
   fields.Finish();
-  const auto user = service_.FindUser(request.session->user);
-  if (!user) return respond(ErrorResponse(409, "the account is gone"));
-  const std::string key = "name " + user->name;
-  if (const auto wait = limiter_.Wait(key, options_.now()); wait.count() > 0)
-    return respond(TooMany(wait));
-  limiter_.Failed(key, options_.now());
-  const bool accepted = worker_.Verify(
-      std::move(password), user->password_hash,
-      [this, reason, actor = request.actor(), session = request.session,
-       scan = request.arguments.at(0), key, respond](bool matches) {
-        if (!matches) return respond(ErrorResponse(403, "the password is wrong"));
-        limiter_.Succeeded(key);
-        if (session->ended)
-          return respond(ErrorResponse(401, "the session has ended: log in again"));
-        service_.AcceptScan(actor, scan, reason, WhileAlive([respond](const Change& change) {
-                              respond(ChangeResponse(change));
-                            }));
-      });
-  if (!accepted) respond(Busy());
+  VerifyOwn(request, std::move(password), "the password is wrong", respond,
+            [this, reason, actor = request.actor(), scan = request.arguments.at(0),
+             respond](const User&) {
+              service_.AcceptScan(actor, scan, reason, WhileAlive([respond](const Change& change) {
+                                    respond(ChangeResponse(change));
+                                  }));
+            });
 }
 
 void Accounts::AddUser(const Request& request, const Respond& respond) {
@@ -353,12 +400,12 @@ void Accounts::AddUser(const Request& request, const Respond& respond) {
   user.name = ReadName(fields);
   user.role = ReadRole(fields);
   user.created_at = WallClock::now();
-  std::string password = fields.Text("password", kMinPassword, kMaxPassword);
+  std::string password = ReadNewPassword(fields, user.name);
   fields.Finish();
   HashThen(std::move(password), respond,
            [this, user, actor = request.actor(), respond](const std::string& hash) {
              User added = user;
-             added.password_hash = hash;
+             added.password_hash = std::string(kFirst) + hash;
              service_.AddUser(actor, added, [respond](const Change& change) {
                Response response = ChangeResponse(change);
                if (change.result == ChangeResult::kDone) response.status = 201;
@@ -380,6 +427,9 @@ void Accounts::ChangeUser(const Request& request, const Respond& respond) {
   if (fields.Has("disabled")) change.disabled = fields.Flag("disabled");
   std::string password = fields.Has("password") ? fields.Text("password", 0, kMaxPassword)
                                                 : std::string();  // empty: stays as it is
+  if (const std::string why = WhyNotPassword(password, change.name);
+      !password.empty() && !why.empty())
+    throw DataError(why);
   fields.Finish();
   const auto save = [this, actor = request.actor(), respond](const UserChange& what) {
     service_.ChangeUser(actor, what,
@@ -391,11 +441,10 @@ void Accounts::ChangeUser(const Request& request, const Respond& respond) {
                         }));
   };
   if (password.empty()) return save(change);
-  if (password.size() < kMinPassword)
-    throw DataError(fmt::format("password must have at least {} bytes", kMinPassword));
-  HashThen(std::move(password), respond, [save, change](const std::string& hash) {
+  const bool is_own = change.name == request.session->user;
+  HashThen(std::move(password), respond, [save, change, is_own](const std::string& hash) {
     UserChange with_password = change;
-    with_password.password_hash = hash;
+    with_password.password_hash = is_own ? hash : std::string(kFirst) + hash;
     save(with_password);
   });
 }

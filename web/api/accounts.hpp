@@ -6,10 +6,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "web/api/displays.hpp"
 #include "web/http/gate.hpp"
 #include "web/http/router.hpp"
+#include "web/security/device_cookies.hpp"
 #include "web/security/login_limiter.hpp"
 #include "web/security/password_worker.hpp"
 #include "web/security/sessions.hpp"
@@ -22,6 +24,8 @@ struct AccountOptions {
   std::uint64_t password_memory_bytes = 64 << 20;
   std::chrono::seconds session_limit{12 * 3600};
   bool tls = false;
+  std::string device_key;       ///< See DeviceCookies.
+  std::string tls_fingerprint;  ///< Shown at the first set-up, to be compared with the journal's.
   std::function<std::chrono::steady_clock::time_point()> now;
 };
 
@@ -35,6 +39,7 @@ class Accounts : public SessionLookup {
   /// The session of a request, by its cookie. @param touch  Counts as a use.
   [[nodiscard]] std::shared_ptr<Session> SessionOf(const Request& request, bool touch) override;
   [[nodiscard]] bool needs_setup() const override { return !setup_code_.empty(); }
+  [[nodiscard]] std::string tls_fingerprint() const override { return options_.tls_fingerprint; }
   [[nodiscard]] std::optional<std::string> setup_code() const;
 
   /// Of the password thread: readable when Dispatch() has something to do.
@@ -47,6 +52,17 @@ class Accounts : public SessionLookup {
   void SetUp(const Request& request, const Respond& respond);
   void LogIn(const Request& request, const std::string& name, std::string password, bool form,
              const Respond& respond);
+  void FinishLogIn(const Actor& actor, const std::string& stored, bool matches, bool form,
+                   const std::vector<std::string>& counters, const Respond& respond);
+  /// The counters that a guess at this name is charged to: its browser's alone where the person
+  /// has logged in from it before, else those of address and name.
+  [[nodiscard]] std::vector<std::string> CountersOf(const Request& request, const std::string& name,
+                                                    const std::string& stored) const;
+  /// How long until the next guess, or nothing; the guess is then counted.
+  [[nodiscard]] std::optional<Response> CountGuess(const std::vector<std::string>& counters);
+  /// Checks the password of a person who is logged in; `then` is called if it is right.
+  void VerifyOwn(const Request& request, std::string password, const char* wrong,
+                 const Respond& respond, std::function<void(const User&)> then);
   void LogOut(const Request& request, const Respond& respond);
   void DescribeSession(const Request& request, const Respond& respond);
   void ChangeOwnPassword(const Request& request, const Respond& respond);
@@ -56,6 +72,8 @@ class Accounts : public SessionLookup {
   void ChangeUser(const Request& request, const Respond& respond);
   /// Opens a session and tells the page about it.
   [[nodiscard]] Response Welcome(const User& user, bool form);
+  /// The cookie by which this browser is known from now on.
+  [[nodiscard]] std::string DeviceCookie(const std::string& user, const std::string& stored) const;
   /// Calls `then` with the hash, or answers why there is none.
   void HashThen(std::string password, const Respond& respond,
                 std::function<void(const std::string&)> then);
@@ -70,6 +88,7 @@ class Accounts : public SessionLookup {
   AccountOptions options_;
   Sessions sessions_;
   Displays displays_;
+  DeviceCookies devices_;
   LoginLimiter limiter_;
   std::string setup_code_;  ///< Empty once there is an account.
   bool setting_up_ = false;

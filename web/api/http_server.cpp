@@ -24,10 +24,16 @@ constexpr std::chrono::milliseconds kBeat{5000};
 constexpr std::chrono::milliseconds kExpireEvery{
     500};  // while somebody watches: a session's end is seen within a second
 constexpr std::chrono::milliseconds kMinEventGap{100};
+constexpr std::chrono::milliseconds kCutEvery{1000};
 
 AccountOptions AccountsOptions(const HttpServerOptions& options) {
-  return {options.password_operations, options.password_memory_bytes, options.session_limit,
-          !options.tls_certificate.empty(), options.now};
+  return {options.password_operations,
+          options.password_memory_bytes,
+          options.session_limit,
+          options.tls.has_value(),
+          options.device_key,
+          options.tls ? options.tls->fingerprint : std::string(),
+          options.now};
 }
 
 HttpServerOptions Completed(HttpServerOptions options) {
@@ -56,7 +62,8 @@ class HttpServer::Impl {
       : service_(service),
         options_(Completed(std::move(options))),
         accounts_(service, AccountsOptions(options_)),
-        hub_(options_.max_event_streams, options_.event_buffer_bytes),
+        hub_(options_.max_event_streams, options_.max_streams_per_session,
+             options_.event_buffer_bytes),
         transport_(options_, service_, router_, accounts_, hub_,
                    [this](EventStream& stream) { stream.Send(StatusEvent()); }) {
     accounts_.AddRoutes(router_);
@@ -103,6 +110,9 @@ class HttpServer::Impl {
       next_beat_ = now + kBeat;
       accounts_.Expire();
       hub_.Beat();
+    }
+    if (now >= next_cut_) {
+      next_cut_ = now + kCutEvery;
       transport_.CutLate();
     }
     transport_.Run();
@@ -114,6 +124,7 @@ class HttpServer::Impl {
     const auto now = SteadyClock::now();
     auto due = next_beat_;
     if (hub_.size() > 0) due = std::min(due, next_expiry_);
+    if (transport_.has_connections()) due = std::min(due, next_cut_);
     if (status_due_) due = std::min(due, *status_due_);
     auto wait = std::max(std::chrono::milliseconds(0),
                          std::chrono::ceil<std::chrono::milliseconds>(due - now));
@@ -190,6 +201,7 @@ class HttpServer::Impl {
   int epoll_fd_ = -1;
   SteadyClock::time_point next_beat_;
   SteadyClock::time_point next_expiry_;
+  SteadyClock::time_point next_cut_;
   SteadyClock::time_point last_status_;
   std::optional<SteadyClock::time_point> status_due_;
 };

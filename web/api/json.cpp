@@ -253,7 +253,8 @@ Json ToJson(const Status& status, WallClock::time_point now) {
           {"last_check", status.last_check ? CheckJson(*status.last_check, now) : Json(nullptr)},
           {"last_result", status.last_result ? ToJson(*status.last_result, now) : Json(nullptr)},
           {"time", TimeText(now)},
-          {"version", status.version}};
+          {"version", status.version},
+          {"warnings", status.warnings}};
 }
 
 Json ToJson(const Patient& patient) {

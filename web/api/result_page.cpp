@@ -54,7 +54,7 @@ std::string Document(const std::string& body, const std::string& refresh = "") {
       style, kNotice, body);
 }
 
-std::string LoginForm(bool failed) {
+std::string LoginForm(std::string_view trouble) {
   return fmt::format(
       "<h1>Log in</h1>{}<form method=\"post\" action=\"/login\" class=\"card form\">"
       "<label>Name <input name=\"name\" autocomplete=\"username\" required "
@@ -62,7 +62,7 @@ std::string LoginForm(bool failed) {
       "<label>Password <input name=\"password\" type=\"password\" "
       "autocomplete=\"current-password\" required maxlength=\"128\"></label>"
       "<button class=\"primary\">Log in</button></form>",
-      failed ? "<p role=\"alert\">Name or password is wrong.</p>" : "");
+      trouble.empty() ? "" : fmt::format("<p role=\"alert\">{}</p>", trouble));
 }
 
 /// Digits that the uncertainty lets a value have: none below its first digit.
@@ -232,7 +232,11 @@ void AddResultPage(Router& router, ScanService& service) {
          if (!request.session) {
            Response response;
            response.type = "text/html; charset=utf-8";
-           response.body = Document(LoginForm(request.query.contains("failed")));
+           response.body = Document(LoginForm(
+               request.query.contains("failed")  ? "Name or password is wrong."
+               : request.query.contains("first") ? "Somebody else chose this password: log in on "
+                                                   "the page with script once, and change it."
+                                                 : ""));
            return respond(std::move(response));
          }
          const auto named = request.query.find("scan");

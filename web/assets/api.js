@@ -110,11 +110,15 @@ export const fileUrl = (scanId, name, download) =>
 export async function loadSession() {
   try {
     session = await get('session');
-    return { session, setupRequired: false };
+    return { session, setupRequired: false, certificate: '' };
   } catch (error) {
     if (error.status !== 401) throw error;
     session = null;
-    return { session: null, setupRequired: error.body?.setup_required ?? false };
+    return {
+      session: null,
+      setupRequired: error.body?.setup_required ?? false,
+      certificate: error.body?.certificate ?? '',
+    };
   }
 }
 

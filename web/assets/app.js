@@ -7,7 +7,7 @@ import { mayLeave } from './leave.js';
 import { applyTheme } from './preferences.js';
 import { showAudit } from './screens/audit.js';
 import { showCheck } from './screens/check.js';
-import { showLogin } from './screens/login.js';
+import { showFirstPassword, showLogin } from './screens/login.js';
 import { showPatient, showPatients } from './screens/patients.js';
 import { showPlan } from './screens/plan.js';
 import { showResult } from './screens/result.js';
@@ -178,14 +178,19 @@ function speak(who) {
 async function begin(message) {
   const found = await ask(loadSession);
   if (!found) return;
-  const { session, setupRequired } = found;
+  const { session, setupRequired, certificate } = found;
   speak(session?.user ?? 'login');
   applyTheme(session?.user ?? 'login');
   drawTop();
   if (!session || session.role === 'display') {
     document.title = `${S.login.title} · ${S.product}`;
-    showLogin(main, setupRequired, () => begin());
+    showLogin(main, setupRequired, certificate, () => begin());
     if (message) warn(message);
+    return;
+  }
+  if (session.password_change_required) {
+    document.title = `${S.login.firstTitle} · ${S.product}`;
+    showFirstPassword(main, session.user, () => begin());
     return;
   }
   live.open();

@@ -39,6 +39,11 @@ void EventStream::Close() {
 }
 
 std::shared_ptr<EventStream> EventHub::Open(std::shared_ptr<Session> session) {
+  std::list<std::shared_ptr<EventStream>> own;
+  for (const auto& stream : streams_) {
+    if (&stream->session() == session.get() && !stream->closed()) own.push_back(stream);
+  }
+  if (own.size() >= max_per_session_) own.front()->Close();
   if (streams_.size() >= max_streams_) return nullptr;
   streams_.push_back(std::make_shared<EventStream>(std::move(session), buffer_bytes_));
   return streams_.back();

@@ -49,10 +49,10 @@ class EventHub {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  EventHub(std::size_t max_streams, std::size_t buffer_bytes)
-      : max_streams_(max_streams), buffer_bytes_(buffer_bytes) {}
+  EventHub(std::size_t max_streams, std::size_t max_per_session, std::size_t buffer_bytes)
+      : max_streams_(max_streams), max_per_session_(max_per_session), buffer_bytes_(buffer_bytes) {}
 
-  /// Null where there are too many.
+  /// Null where there are too many. Where one session has too many its oldest ends.
   [[nodiscard]] std::shared_ptr<EventStream> Open(std::shared_ptr<Session> session);
   void Remove(const std::shared_ptr<EventStream>& stream) { streams_.remove(stream); }
   /// To every stream. @param data  One line.
@@ -66,6 +66,7 @@ class EventHub {
 
  private:
   std::size_t max_streams_;
+  std::size_t max_per_session_;
   std::size_t buffer_bytes_;
   std::list<std::shared_ptr<EventStream>> streams_;
 };

@@ -39,8 +39,9 @@ bool Gate::IsOwnPage(const Request& request) const {
 Response Gate::NotLoggedIn() const {
   Response response;
   response.status = 401;
-  response.body =
-      fmt::format(R"({{"error":"log in first","setup_required":{}}})", sessions_.needs_setup());
+  response.body = fmt::format(
+      R"({{"error":"log in first","setup_required":{},"certificate":"{}"}})",
+      sessions_.needs_setup(), sessions_.needs_setup() ? sessions_.tls_fingerprint() : "");
   return response;
 }
 
@@ -70,6 +71,10 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
     if (!request.session) return NotLoggedIn();
     if (!May(request.session->role, route.permission))
       return ErrorResponse(403, "your role may not do this");
+    if (request.session->must_change_password && route.permission != Permission::kLogin)
+      return ErrorResponse(403, "choose a password of your own first");
+  } else if (request.session && request.session->must_change_password) {
+    request.session.reset();  // pages that show more to who is logged in
   }
   if (request.method != "GET") {
     if (!IsOwnPage(request))
@@ -123,7 +128,7 @@ void RespondAside(ScanService& service, const std::string& name, std::function<R
   respond(std::move(busy));
 }
 
-void AddSecurityHeaders(Response& response) {
+void AddSecurityHeaders(Response& response, bool tls) {
   const auto add = [&](const char* name, const char* value) {
     response.headers.emplace_back(name, value);
   };
@@ -137,6 +142,7 @@ void AddSecurityHeaders(Response& response) {
   add("Cross-Origin-Opener-Policy", "same-origin");
   add("Cross-Origin-Resource-Policy", "same-origin");
   add("Permissions-Policy", "camera=(), microphone=(), geolocation=(), usb=()");
+  if (tls) add("Strict-Transport-Security", "max-age=31536000");
   add("Cache-Control",
       response.cache_for_ever ? "public, max-age=31536000, immutable" : "no-store");
 }

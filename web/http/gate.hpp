@@ -21,6 +21,8 @@ class SessionLookup {
   [[nodiscard]] virtual std::shared_ptr<Session> SessionOf(const Request& request, bool touch) = 0;
   /// True while there is no account yet.
   [[nodiscard]] virtual bool needs_setup() const = 0;
+  /// Of the server's certificate; empty without TLS.
+  [[nodiscard]] virtual std::string tls_fingerprint() const = 0;
 };
 
 class Gate {
@@ -49,7 +51,8 @@ class Gate {
 void RespondAside(ScanService& service, const std::string& name, std::function<Response()> make,
                   const Respond& respond);
 
-/// The headers of every answer, from one place.
-void AddSecurityHeaders(Response& response);
+/// The headers of every answer, from one place. @param tls  The answer goes over TLS: the browser
+/// is to come back by TLS only.
+void AddSecurityHeaders(Response& response, bool tls);
 
 }  // namespace plumb::web

@@ -11,5 +11,9 @@ namespace plumb::web {
 /// @throws IoError if the descriptor is no socket.
 [[nodiscard]] std::uint16_t PortOf(int socket_fd);
 [[nodiscard]] bool IsIpv6(int socket_fd);
+/// The address that it listens on, in numbers.
+[[nodiscard]] std::string AddressTextOf(int socket_fd);
+/// True for an address that only this machine reaches: 127.0.0.0/8, ::1.
+[[nodiscard]] bool IsLoopback(const std::string& address);
 
 }  // namespace plumb::web

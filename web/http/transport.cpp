@@ -12,8 +12,6 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <fstream>
-#include <sstream>
 
 #include "algo/base/errors.hpp"
 #include "web/http/checks.hpp"
@@ -28,17 +26,6 @@ constexpr std::size_t kMaxHeaders = 64;
 constexpr std::size_t kStreamBlock = 4096;
 constexpr std::size_t kUploadBlock =
     1 << 20;  // a file that is sent is written in such pieces; one is written while the next comes
-
-std::string ReadPem(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in || text.str().find("-----BEGIN") == std::string::npos) {
-    throw DataError(fmt::format(
-        "cannot read {}: expected a PEM file; check the path and its permissions", file.string()));
-  }
-  return text.str();
-}
 
 std::string AddressOf(MHD_Connection* connection) {
   const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
@@ -64,13 +51,6 @@ void CutSocket(MHD_Connection* connection) {
 }
 
 }  // namespace
-
-struct Transport::Connection {
-  int fd = -1;
-  std::chrono::steady_clock::time_point since;  ///< When its present request could have begun.
-  bool receiving = true;
-  bool uploading = false;
-};
 
 /// One request and its answer.
 struct Transport::Exchange : std::enable_shared_from_this<Transport::Exchange> {
@@ -114,13 +94,12 @@ struct Transport::Callbacks {
     auto* transport = static_cast<Transport*>(self);
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
       const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-      auto made =
-          std::make_unique<Connection>(Connection{info->connect_fd, transport->options_.now()});
-      transport->connections_.push_back(made.get());
-      *context = made.release();
+      *context = transport->connections_.Add(info->connect_fd, AddressOf(connection),
+                                             transport->options_.now());
+      while (const Connection* leaving = transport->connections_.NextOverLimit())
+        shutdown(leaving->fd, SHUT_RDWR);
     } else {
-      transport->connections_.remove(static_cast<Connection*>(*context));
-      delete static_cast<Connection*>(*context);
+      transport->connections_.Remove(static_cast<Connection*>(*context));
       *context = nullptr;
     }
   }
@@ -137,6 +116,7 @@ struct Transport::Callbacks {
     if (Connection* known = ConnectionOf(connection)) {
       known->since = transport->options_.now();
       known->receiving = true;
+      known->has_head = false;
       known->uploading = false;
     }
     auto* held = static_cast<std::shared_ptr<Exchange>*>(*context);
@@ -192,6 +172,8 @@ struct Transport::Callbacks {
       return ErrorResponse(413, "the body is too long");
     }
     auto admitted = exchange.owner->gate_.Admit(exchange.request);
+    if (Connection* known = ConnectionOf(exchange.connection))
+      known->user = request.session ? request.session->user : std::string();
     if (auto* refusal = std::get_if<Response>(&admitted)) return std::move(*refusal);
     exchange.route = std::get<const Route*>(admitted);
     if (exchange.route->body == BodyKind::kFile) return BeginUpload(exchange, bytes);
@@ -303,6 +285,7 @@ struct Transport::Callbacks {
     exchange->request.address = AddressOf(connection);
     MHD_get_connection_values(connection, MHD_HEADER_KIND, OnHeader, exchange.get());
     MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, OnQuery, exchange.get());
+    if (Connection* known = ConnectionOf(connection)) known->has_head = true;
     transport.exchanges_.push_back(exchange.get());
     *context = new std::shared_ptr<Exchange>(exchange);
     if (auto refusal = RefuseByHead(*exchange, transport.options_.max_body_bytes)) {
@@ -410,7 +393,7 @@ struct Transport::Callbacks {
     MHD_Response* made = MakeBody(exchange);
     if (made == nullptr) return MHD_NO;
     Response& response = *exchange.response;
-    AddSecurityHeaders(response);
+    AddSecurityHeaders(response, exchange.owner->options_.tls.has_value());
     MHD_add_response_header(made, MHD_HTTP_HEADER_CONTENT_TYPE, response.type.c_str());
     for (const auto& [name, value] : response.headers)
       MHD_add_response_header(made, name.c_str(), value.c_str());
@@ -426,9 +409,10 @@ Transport::Transport(const HttpServerOptions& options, ScanService& service, con
                      std::function<void(EventStream&)> greet)
     : options_(options),
       service_(service),
-      gate_(router, sessions, options.host_names, !options.tls_certificate.empty()),
+      gate_(router, sessions, options.host_names, options.tls.has_value()),
       hub_(hub),
       greet_(std::move(greet)),
+      connections_(options_),
       wake_fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   if (wake_fd_ < 0) throw IoError(fmt::format("cannot make an eventfd: {}", std::strerror(errno)));
   try {
@@ -443,20 +427,18 @@ void Transport::Start(int listen_fd) {
   port_ = PortOf(listen_fd);
   unsigned flags = MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC;
   if (IsIpv6(listen_fd)) flags |= MHD_USE_IPv6;
-  std::string certificate, key;
+  std::string priorities = kTlsPriorities;
   std::vector<MHD_OptionItem> extra;
-  if (!options_.tls_certificate.empty()) {
+  if (options_.tls) {
     flags |= MHD_USE_TLS;
-    certificate = ReadPem(options_.tls_certificate);
-    key = ReadPem(options_.tls_key);
-    extra.push_back({MHD_OPTION_HTTPS_MEM_CERT, 0, certificate.data()});
-    extra.push_back({MHD_OPTION_HTTPS_MEM_KEY, 0, key.data()});
+    extra.push_back({MHD_OPTION_HTTPS_MEM_CERT, 0, options_.tls->certificate_pem.data()});
+    extra.push_back({MHD_OPTION_HTTPS_MEM_KEY, 0, options_.tls->key_pem.data()});
+    extra.push_back({MHD_OPTION_HTTPS_PRIORITIES, 0, priorities.data()});
   }
   extra.push_back({MHD_OPTION_END, 0, nullptr});
   daemon_ = MHD_start_daemon(
       flags, 0, nullptr, nullptr, &Callbacks::OnRequest, this, MHD_OPTION_LISTEN_SOCKET, listen_fd,
-      MHD_OPTION_CONNECTION_LIMIT, options_.max_connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT,
-      options_.max_connections_per_ip, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+      MHD_OPTION_CONNECTION_LIMIT, options_.max_connections, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
       options_.connection_memory_bytes, MHD_OPTION_CONNECTION_TIMEOUT,
       static_cast<unsigned>(options_.request_timeout.count()), MHD_OPTION_STRICT_FOR_CLIENT, 1,
       MHD_OPTION_UNESCAPE_CALLBACK, &Callbacks::KeepEscapes, nullptr, MHD_OPTION_NOTIFY_COMPLETED,
@@ -464,9 +446,8 @@ void Transport::Start(int listen_fd) {
       MHD_OPTION_ARRAY, extra.data(), MHD_OPTION_END);
   if (daemon_ == nullptr) {
     if (!options_.listen_fd) close(listen_fd);
-    throw IoError(fmt::format(
-        "cannot start the HTTP server on port {}{}", port_,
-        certificate.empty() ? "" : "; do the TLS certificate and key belong together?"));
+    throw IoError(fmt::format("cannot start the HTTP server on port {}{}", port_,
+                              options_.tls ? "; can the TLS certificate and key be used?" : ""));
   }
   epoll_fd_ = MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_EPOLL_FD)->epoll_fd;
 }
@@ -503,11 +484,7 @@ std::optional<std::chrono::milliseconds> Transport::timeout() const {
 
 void Transport::CutLate() {
   const auto now = options_.now();
-  for (const Connection* connection : connections_) {
-    const auto limit = connection->uploading ? options_.upload_limit : options_.request_limit;
-    if (connection->receiving && now - connection->since > limit)
-      shutdown(connection->fd, SHUT_RDWR);
-  }
+  while (const Connection* late = connections_.NextLate(now)) shutdown(late->fd, SHUT_RDWR);
 }
 
 }  // namespace plumb::web

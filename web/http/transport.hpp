@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "web/http/connection_table.hpp"
 #include "web/http/event_hub.hpp"
 #include "web/http/gate.hpp"
 #include "web/http/server_options.hpp"
@@ -50,11 +51,11 @@ class Transport {
   void Run();
   void Wake() const;
   [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const;
-  /// Closes connections whose request is not whole in time.
+  /// Closes connections whose request is not there in time.
   void CutLate();
+  [[nodiscard]] bool has_connections() const { return !connections_.empty(); }
   [[nodiscard]] std::uint16_t port() const { return port_; }
 
-  struct Connection;
   struct Exchange;
   /// libmicrohttpd's callbacks; only the .cpp knows its types.
   struct Callbacks;
@@ -67,7 +68,7 @@ class Transport {
   Gate gate_;
   EventHub& hub_;
   std::function<void(EventStream&)> greet_;
-  std::list<Connection*> connections_;
+  ConnectionTable connections_;
   std::list<Exchange*> exchanges_;
   std::weak_ptr<UploadFile> upload_;  ///< One at a time.
   std::uint16_t port_ = 0;

@@ -44,47 +44,53 @@ PasswordWorker::~PasswordWorker() {
   close(event_fd_);
 }
 
-bool PasswordWorker::Enqueue(Job job) {
+bool PasswordWorker::Enqueue(std::deque<Job>& jobs, Job job) {
   const std::lock_guard lock(mutex_);
-  if (jobs_.size() >= kMaxWaiting) return false;
-  jobs_.push_back(std::move(job));
+  if (jobs.size() >= kMaxWaiting) return false;
+  jobs.push_back(std::move(job));
   wake_.notify_one();
   return true;
 }
 
 bool PasswordWorker::Hash(std::string password,
                           std::function<void(std::optional<std::string>)> done) {
-  return Enqueue([this, password = std::move(password),
+  // Only people who are logged in, or hold the setup code, set passwords.
+  return Enqueue(trusted_jobs_,
+                 [this, password = std::move(password),
                   done = std::move(done)]() mutable -> std::function<void()> {
-    auto hash = HashPassword(password, operations_, memory_bytes_);
-    Wipe(password);
-    return [done = std::move(done), hash = std::move(hash)] { done(hash); };
-  });
+                   auto hash = HashPassword(password, operations_, memory_bytes_);
+                   Wipe(password);
+                   return [done = std::move(done), hash = std::move(hash)] { done(hash); };
+                 });
 }
 
-bool PasswordWorker::Verify(std::string password, std::string hash,
+bool PasswordWorker::Verify(std::string password, std::string hash, bool trusted,
                             std::function<void(bool)> done) {
-  return Enqueue([this, password = std::move(password), hash = std::move(hash),
+  return Enqueue(trusted ? trusted_jobs_ : jobs_,
+                 [this, password = std::move(password), hash = std::move(hash),
                   done = std::move(done)]() mutable -> std::function<void()> {
-    // An unknown name costs the same time as a wrong password, so names cannot be probed by a
-    // clock.
-    if (dummy_hash_.empty())
-      dummy_hash_ = HashPassword("no account", operations_, memory_bytes_).value_or("");
-    const std::string& against = hash.empty() ? dummy_hash_ : hash;
-    const bool matches =
-        crypto_pwhash_str_verify(against.c_str(), password.data(), password.size()) == 0 &&
-        !hash.empty();
-    Wipe(password);
-    return [done = std::move(done), matches] { done(matches); };
-  });
+                   // An unknown name costs the same time as a wrong password, so names cannot be
+                   // probed by a clock.
+                   if (dummy_hash_.empty())
+                     dummy_hash_ =
+                         HashPassword("no account", operations_, memory_bytes_).value_or("");
+                   const std::string& against = hash.empty() ? dummy_hash_ : hash;
+                   const bool matches = crypto_pwhash_str_verify(against.c_str(), password.data(),
+                                                                 password.size()) == 0 &&
+                                        !hash.empty();
+                   Wipe(password);
+                   return [done = std::move(done), matches] { done(matches); };
+                 });
 }
 
 void PasswordWorker::Work(const std::stop_token& stop) {
   while (true) {
     std::unique_lock lock(mutex_);
-    if (!wake_.wait(lock, stop, [this] { return !jobs_.empty(); }) || stop.stop_requested()) return;
-    Job job = std::move(jobs_.front());
-    jobs_.pop_front();
+    const auto has_work = [this] { return !jobs_.empty() || !trusted_jobs_.empty(); };
+    if (!wake_.wait(lock, stop, has_work) || stop.stop_requested()) return;
+    std::deque<Job>& jobs = trusted_jobs_.empty() ? jobs_ : trusted_jobs_;
+    Job job = std::move(jobs.front());
+    jobs.pop_front();
     lock.unlock();
     std::function<void()> finish = job();
     lock.lock();

@@ -27,7 +27,10 @@ class PasswordWorker {
   [[nodiscard]] bool Hash(std::string password,
                           std::function<void(std::optional<std::string>)> done);
   /// The same for a check. An empty hash is never right but takes as long.
-  [[nodiscard]] bool Verify(std::string password, std::string hash, std::function<void(bool)> done);
+  /// @param trusted  Of a browser or person that is known: done before what strangers wait for,
+  ///                 and with places of its own, so that guesses do not keep them waiting.
+  [[nodiscard]] bool Verify(std::string password, std::string hash, bool trusted,
+                            std::function<void(bool)> done);
 
   /// Readable when something is done.
   [[nodiscard]] int fd() const { return event_fd_; }
@@ -36,7 +39,7 @@ class PasswordWorker {
  private:
   using Job = std::function<std::function<void()>()>;  ///< Runs on the thread, gives what the loop
                                                        ///< shall run.
-  [[nodiscard]] bool Enqueue(Job job);
+  [[nodiscard]] bool Enqueue(std::deque<Job>& jobs, Job job);
   void Work(const std::stop_token& stop);
 
   std::uint64_t operations_;
@@ -45,7 +48,7 @@ class PasswordWorker {
   int event_fd_ = -1;
   std::mutex mutex_;
   std::condition_variable_any wake_;
-  std::deque<Job> jobs_;
+  std::deque<Job> jobs_, trusted_jobs_;
   std::deque<std::function<void()>> finished_;
   std::jthread thread_;
 };

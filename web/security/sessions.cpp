@@ -3,8 +3,9 @@
 #include <sodium.h>
 
 #include <algorithm>
-#include <array>
 #include <vector>
+
+#include "algo/base/errors.hpp"
 
 namespace plumb::web {
 namespace {
@@ -22,13 +23,19 @@ std::string HashOf(const std::string& token) {
 
 }  // namespace
 
-std::string RandomToken(std::size_t bytes) {
-  std::vector<unsigned char> random(bytes);
+std::string RandomBytes(std::size_t bytes) {
+  if (sodium_init() < 0) throw IoError("libsodium found no random generator");
+  std::string random(bytes, '\0');
   randombytes_buf(random.data(), random.size());
+  return random;
+}
+
+std::string RandomToken(std::size_t bytes) {
+  const std::string random = RandomBytes(bytes);
   std::string text(sodium_base64_ENCODED_LEN(bytes, sodium_base64_VARIANT_URLSAFE_NO_PADDING),
                    '\0');
-  sodium_bin2base64(text.data(), text.size(), random.data(), random.size(),
-                    sodium_base64_VARIANT_URLSAFE_NO_PADDING);
+  sodium_bin2base64(text.data(), text.size(), reinterpret_cast<const unsigned char*>(random.data()),
+                    random.size(), sodium_base64_VARIANT_URLSAFE_NO_PADDING);
   text.pop_back();  // its terminating zero
   return text;
 }

@@ -17,10 +17,15 @@ struct Session {
   std::chrono::steady_clock::time_point begun;
   std::chrono::steady_clock::time_point last_used;
   bool ended = false;  ///< Set once it is over, for who still holds it.
+  /// Somebody else chose the password: until the person has changed it nothing else is allowed.
+  bool must_change_password = false;
 };
 
 /// Random text of that many bytes from the system's generator, in letters, digits, '-' and '_'.
 [[nodiscard]] std::string RandomToken(std::size_t bytes);
+
+/// That many bytes of the same.
+[[nodiscard]] std::string RandomBytes(std::size_t bytes);
 
 class Sessions {
  public:

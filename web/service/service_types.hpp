@@ -244,6 +244,7 @@ struct Status {
   bool check_overdue = true;        ///< No daily check passed today.
   std::optional<Scan> last_result;  ///< The newest finished scan of this run.
   std::string version;
+  std::vector<std::string> warnings;  ///< Of how the appliance is set up.
 };
 
 struct User {

@@ -167,6 +167,7 @@ max_bundle_mb = 7
 listen = "127.0.0.1:1"
 tls_certificate = "/c"
 tls_key = "/k"
+plain_http = true
 host_names = ["h"]
 [appliance]
 state = "/s"
@@ -176,18 +177,38 @@ sensor_serial = "7"
 )";
   const Config in_use = ParseConfig("", "test.toml");
   Config next = ParseConfig(at_start + "result_s = 5\n[check]\nmin_views = 3\n", "test.toml");
-  EXPECT_THAT(
-      KeepUntilRestart(in_use, next),
-      testing::UnorderedElementsAre(
-          "markers.dictionary", "markers.length_m", "markers.reference", "button.chip",
-          "button.line", "button.active_low", "light.chip", "light.red", "light.green",
-          "light.blue", "light.beeper", "light.active_low", "update.folder", "update.max_bundle_mb",
-          "web.listen", "web.tls_certificate", "web.tls_key", "web.host_names", "appliance.state",
-          "appliance.control", "appliance.calibration", "appliance.sensor_serial"));
+  EXPECT_THAT(KeepUntilRestart(in_use, next),
+              testing::UnorderedElementsAre(
+                  "markers.dictionary", "markers.length_m", "markers.reference", "button.chip",
+                  "button.line", "button.active_low", "light.chip", "light.red", "light.green",
+                  "light.blue", "light.beeper", "light.active_low", "update.folder",
+                  "update.max_bundle_mb", "web.listen", "web.tls_certificate", "web.tls_key",
+                  "web.plain_http", "web.host_names", "appliance.state", "appliance.control",
+                  "appliance.calibration", "appliance.sensor_serial"));
   EXPECT_EQ(next.web.listen, in_use.web.listen);
   EXPECT_EQ(next.appliance.result_s, 5);
   EXPECT_EQ(next.check.min_views, 3);
   EXPECT_THAT(KeepUntilRestart(in_use, next), testing::IsEmpty());
+}
+
+TEST(ConfigTest, OffLoopbackThePageIsServedByTlsUnlessItIsSaidOtherwise) {
+  const auto transport = [](const std::string& keys, bool is_loopback) {
+    return TransportOf(ParseConfig("[web]\n" + keys, "t").web, is_loopback);
+  };
+  const std::string given = "tls_certificate = \"/c\"\ntls_key = \"/k\"\n";
+  EXPECT_EQ(transport("", true), PageTransport::kPlain);
+  EXPECT_EQ(transport("", false), PageTransport::kOwnTls);
+  EXPECT_EQ(transport("plain_http = false\n", false), PageTransport::kOwnTls);
+  EXPECT_EQ(transport("plain_http = true\n", false), PageTransport::kPlainOnNetwork);
+  EXPECT_EQ(transport("plain_http = true\n", true), PageTransport::kPlain);
+  EXPECT_EQ(transport(given, false), PageTransport::kGivenTls);
+  EXPECT_EQ(transport(given, true), PageTransport::kGivenTls);
+  for (const std::string& bad :
+       {std::string("tls_key = \"/k\"\n"), std::string("tls_certificate = \"/c\"\n"),
+        given + "plain_http = true\n"}) {
+    EXPECT_THROW((void)transport(bad, false), DataError) << bad;
+    EXPECT_THROW((void)transport(bad, true), DataError) << bad;
+  }
 }
 
 TEST(ConfigTest, TheAppliancesPresetIsBestAlone) {

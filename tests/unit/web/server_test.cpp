@@ -2,12 +2,16 @@
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
+#include <unistd.h>
+
 #include <cstdlib>
 #include <fstream>
 
 #include "algo/base/errors.hpp"
+#include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/web/web_fixture.hpp"
+#include "web/http/connection_table.hpp"
 
 namespace plumb::test {
 namespace {
@@ -186,19 +190,120 @@ TEST_F(ServerTest, AnIdleConnectionIsClosed) {
   EXPECT_TRUE(idle.IsClosedBySoon());
 }
 
-TEST_F(ServerTest, AThousandIdleConnectionsDoNotShutOutOthers) {
-  Start();
-  rlimit files{};
-  getrlimit(RLIMIT_NOFILE, &files);
-  files.rlim_cur = std::min<rlim_t>(files.rlim_max, 8192);
-  setrlimit(RLIMIT_NOFILE, &files);
-  std::vector<HttpConnection> idle;
-  for (int i = 0; i < 1000; ++i) idle.emplace_back(port_);
-  HttpConnection other(port_, "127.0.0.2");
-  other.Send("GET /health HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
-  EXPECT_EQ(other.Read().status, 200);
-  idle.clear();
+TEST_F(ServerTest, ASlowHeadEndsInTenSecondsUnlessOneIsLoggedIn) {
+  Start([](web::HttpServerOptions& options) {
+    options.request_timeout = std::chrono::seconds(3600);
+  });
+  SetUpAccounts();
+  const HttpClient client = LoggedIn("technician");
+  HttpConnection slow(port_), known(port_), kept(port_);
+  for (HttpConnection* connection : {&known, &kept}) {
+    connection->Send("GET /api/v1/session HTTP/1.1\r\nHost: localhost\r\n" +
+                     (connection == &known ? "Cookie: " + client.cookie + "\r\n" : "") + "\r\n");
+    EXPECT_EQ(connection->Read().status, connection == &known ? 200 : 401);
+  }
+  for (HttpConnection* connection : {&slow, &known, &kept})
+    connection->Send("GET /health HTTP/1.1\r\nHo");
+  ExpectAlive();  // what was sent has arrived before this answer
+  skipped_s_ = 6;
+  ::usleep(1'500'000);  // longer than the server takes between two looks
   ExpectAlive();
+  for (HttpConnection* connection : {&slow, &known, &kept})
+    EXPECT_TRUE(connection->Send("s")) << "eight seconds are in time";
+  skipped_s_ = 12;
+  EXPECT_TRUE(slow.IsClosedBySoon());
+  EXPECT_TRUE(kept.IsClosedBySoon()) << "a further request of a stranger";
+  EXPECT_TRUE(known.Send("t: localhost\r\n\r\n"));
+  EXPECT_EQ(known.Read().status, 200);
+}
+
+class CrowdTest : public ServerTest {
+ protected:
+  void SetUp() override {
+    rlimit files{};
+    getrlimit(RLIMIT_NOFILE, &files);
+    files.rlim_cur = std::min<rlim_t>(files.rlim_max, 8192);
+    setrlimit(RLIMIT_NOFILE, &files);
+    Start();
+    SetUpAccounts();
+  }
+  /// Connections that send nothing, from 18 addresses.
+  static std::vector<HttpConnection> Crowd(std::uint16_t port, int count, int addresses = 18) {
+    std::vector<HttpConnection> idle;
+    for (int i = 0; i < count; ++i)
+      idle.emplace_back(port, "127.0.0." + std::to_string(2 + i % addresses));
+    return idle;
+  }
+};
+
+TEST_F(CrowdTest, AThousandIdleConnectionsShutOutNeitherThisMachineNorTheLoggedInNorAStranger) {
+  HttpClient client = LoggedIn("technician");
+  HttpConnection stream(port_, "127.0.1.1");
+  stream.Send("GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie +
+              "\r\n\r\n");
+  EXPECT_FALSE(stream.ReadUntil("event: status").empty());
+  HttpConnection kept(port_, "127.0.1.1");
+  const std::string status =
+      "GET /api/v1/status HTTP/1.1\r\nHost: localhost\r\nCookie: " + client.cookie + "\r\n\r\n";
+  kept.Send(status);
+  EXPECT_EQ(kept.Read().status, 200);
+  const std::vector<HttpConnection> idle = Crowd(port_, 1000);
+  const auto begun = std::chrono::steady_clock::now();
+  ExpectAlive();
+  EXPECT_TRUE(kept.Send(status));
+  EXPECT_EQ(kept.Read().status, 200) << "a connection that a logged-in browser keeps";
+  HttpConnection fresh(port_, "127.0.1.2");
+  fresh.Send(status);
+  EXPECT_EQ(fresh.Read().status, 200) << "a new connection of a logged-in browser";
+  HttpConnection stranger(port_, "127.0.1.3");
+  stranger.Send("GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_EQ(stranger.Read().status, 200) << "somebody who wants to log in";
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(5))
+      << "at once, not when the idle ones have timed out";
+  loop_->Do([&] { service_.Tell(web::EventKind::kData); });
+  EXPECT_FALSE(stream.ReadUntil("event: data").empty()) << "the stream stays";
+}
+
+TEST_F(CrowdTest, OneAddressKeepsItsNewestConnections) {
+  std::vector<HttpConnection> idle = Crowd(port_, 80, 1);
+  ExpectAlive();
+  EXPECT_TRUE(idle.front().IsClosedBySoon()) << "the oldest went";
+  idle.back().Send("GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_EQ(idle.back().Read().status, 200);
+}
+
+TEST(ConnectionTableTest, TheLimitsHoldOnBothSides) {
+  web::HttpServerOptions options;
+  options.max_connections = 10;
+  options.max_strangers = 4;
+  options.max_strangers_per_address = 3;
+  web::ConnectionTable table(options);
+  const auto now = std::chrono::steady_clock::now();
+  int fd = 0;
+  const auto add = [&](const std::string& address, const std::string& user = "") {
+    web::Connection* made = table.Add(++fd, address, now + std::chrono::milliseconds(fd));
+    made->user = user;
+    return made;
+  };
+  for (const char* address : {"10.0.0.1", "10.0.0.1", "10.0.0.1", "10.0.0.2"}) add(address);
+  EXPECT_EQ(table.NextOverLimit(), nullptr) << "four strangers, three of one address";
+  for (int i = 0; i < 3; ++i) add("127.0.0.1");
+  EXPECT_EQ(table.NextOverLimit(), nullptr) << "this machine is no stranger";
+  add("10.0.0.2");
+  const web::Connection* gone = table.NextOverLimit();
+  ASSERT_NE(gone, nullptr);
+  EXPECT_EQ(gone->fd, 1) << "the oldest of the address with the most";
+  EXPECT_EQ(table.NextOverLimit(), nullptr) << "one was enough, though it is not closed yet";
+  add("127.0.0.1");
+  EXPECT_EQ(table.NextOverLimit()->address, "127.0.0.1") << "four of one address";
+  for (int i = 0; i < 3; ++i) add("10.0.0.3", i < 2 ? "anna" : "bob")->receiving = i != 0;
+  EXPECT_EQ(table.NextOverLimit(), nullptr) << "three logged in: 10 - 4 - 3";
+  add("10.0.0.4", "bob");
+  add("10.0.0.4", "anna");
+  const web::Connection* over = table.NextOverLimit();
+  ASSERT_NE(over, nullptr);
+  EXPECT_EQ(over->user, "anna");
+  EXPECT_TRUE(over->receiving) << "not the one that is being answered";
 }
 
 TEST_F(ServerTest, AnAddressInUseIsSaid) {
@@ -216,53 +321,118 @@ TEST_F(ServerTest, AnAddressInUseIsSaid) {
   EXPECT_THROW(web::HttpServer(service_, options), IoError);
 }
 
-TEST_F(ServerTest, MissingOrWrongCertificatesAreSaid) {
-  const plumb::testing::TempFolder folder;
-  web::HttpServerOptions options;
-  options.tls_certificate = folder / "cert.pem";
-  options.tls_key = folder / "key.pem";
-  EXPECT_THROW(web::HttpServer(service_, options), DataError);
-  for (const char* name : {"cert.pem", "key.pem"})
-    std::ofstream(folder / name) << "-----BEGIN NONSENSE-----\n";
-  EXPECT_THROW(web::HttpServer(service_, options), IoError);
+/// The server over TLS with a certificate of its own, as openssl sees it.
+class TlsTest : public ServerTest {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(std::system("openssl version > /dev/null 2>&1"), 0)
+        << "no openssl (Debian package openssl)";
+    identity_ = web::MakeTlsIdentity({"plumb.example"});
+    std::ofstream(folder_ / "certificate.pem") << identity_.certificate_pem;
+    Start([&](web::HttpServerOptions& options) { options.tls = identity_; });
+  }
+
+  /// What `openssl s_client` says when it sends the text. @param options  Of its command line.
+  std::string Speak(const std::string& options, const std::string& text) {
+    std::ofstream(folder_ / "request") << text;
+    const std::string answer_file = (folder_ / "answer").string();
+    const std::string command = "timeout 60 openssl s_client " + options + " -CAfile " +
+                                (folder_ / "certificate.pem").string() +
+                                " -connect 127.0.0.1:" + std::to_string(port_) + " < " +
+                                (folder_ / "request").string() + " > " + answer_file + " 2>&1";
+    exit_code_ = std::system(command.c_str());
+    std::ifstream in(answer_file);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+
+  const std::string kHealth =
+      "GET /health HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+  plumb::testing::TempFolder folder_;
+  web::TlsIdentity identity_;
+  int exit_code_ = -1;
+};
+
+TEST_F(TlsTest, VersionsBefore12AreRefusedAnd12And13AreSpoken) {
+  // Level 0: the client itself would speak the old ones.
+  const std::string old = " -quiet -cipher ALL:@SECLEVEL=0";
+  for (const char* version : {"-tls1", "-tls1_1"}) {
+    EXPECT_THAT(Speak(version + old, kHealth), ::testing::Not(HasSubstr("HTTP/1.1"))) << version;
+    EXPECT_NE(exit_code_, 0) << version;
+  }
+  for (const char* version : {"-tls1_2", "-tls1_3"}) {
+    EXPECT_THAT(Speak(version + std::string(" -quiet"), kHealth), HasSubstr("HTTP/1.1 200"))
+        << version;
+  }
+  EXPECT_THAT(Speak("-tls1_2 -quiet -cipher AES128-GCM-SHA256", kHealth),
+              ::testing::Not(HasSubstr("HTTP/1.1")))
+      << "no forward secrecy";
+  EXPECT_THAT(Speak("-tls1_2 -quiet -cipher ALL:eNULL:@SECLEVEL=0 -no_tls1_2 -tls1_1", kHealth),
+              ::testing::Not(HasSubstr("HTTP/1.1")));
 }
 
-/// A certificate for this test alone, and what a TLS client makes of the server.
-TEST_F(ServerTest, ServesTlsWithASecureCookie) {
-  if (std::system("openssl version > /dev/null 2>&1") != 0)
-    GTEST_SKIP() << "no openssl (Debian package openssl)";
-  const plumb::testing::TempFolder folder;
-  const std::string certificate = (folder / "cert.pem").string(),
-                    key = (folder / "key.pem").string();
-  ASSERT_EQ(std::system(("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 "
-                         "-nodes -days 2 -subj /CN=localhost -keyout " +
-                         key + " -out " + certificate + " 2> /dev/null")
+TEST_F(TlsTest, TheCertificateHasTheNamesAndTheFingerprintThatAreTold) {
+  EXPECT_THAT(Speak("-verify_return_error -verify_hostname plumb.example", kHealth),
+              HasSubstr("Verify return code: 0"));
+  EXPECT_THAT(Speak("-verify_return_error -verify_ip 127.0.0.1", kHealth),
+              HasSubstr("Verify return code: 0"));
+  (void)Speak("-verify_return_error -verify_hostname other.example", kHealth);
+  EXPECT_NE(exit_code_, 0);
+  ASSERT_EQ(std::system(("openssl x509 -noout -sha256 -fingerprint -in " +
+                         (folder_ / "certificate.pem").string() + " > " +
+                         (folder_ / "fingerprint").string())
                             .c_str()),
             0);
-  Start([&](web::HttpServerOptions& options) {
-    options.tls_certificate = certificate;
-    options.tls_key = key;
-  });
+  std::ifstream in(folder_ / "fingerprint");
+  const std::string told((std::istreambuf_iterator<char>(in)), {});
+  EXPECT_THAT(told, HasSubstr("=" + identity_.fingerprint));
+  EXPECT_EQ(identity_.fingerprint.size(), 95U);
+  const std::string request =
+      "GET /api/v1/session HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+  EXPECT_THAT(Speak("-quiet", request), HasSubstr(identity_.fingerprint))
+      << "the set-up page shows it";
+}
+
+TEST_F(TlsTest, BrowsersAreToldToComeBackByTlsAndCookiesGoNoOtherWay) {
   const std::string body =
       nlohmann::json{{"code", setup_code_}, {"name", "eve"}, {"password", kPassword}}.dump();
-  std::ofstream(folder / "request")
-      << "POST /api/v1/setup HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Type: "
-         "application/json\r\n"
-      << "Origin: https://localhost\r\nContent-Length: " << body.size() << "\r\n\r\n"
-      << body;
-  const std::string answer_file = (folder / "answer").string();
-  ASSERT_EQ(std::system(("timeout 60 openssl s_client -quiet -verify_return_error -CAfile " +
-                         certificate + " -connect 127.0.0.1:" + std::to_string(port_) + " < " +
-                         (folder / "request").string() + " > " + answer_file + " 2> /dev/null")
-                            .c_str()),
-            0);
-  std::ifstream in(answer_file);
-  const std::string answer((std::istreambuf_iterator<char>(in)), {});
+  const std::string answer =
+      Speak("-quiet -verify_return_error",
+            "POST /api/v1/setup HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
+            "Content-Type: application/json\r\nOrigin: https://localhost\r\nContent-Length: " +
+                std::to_string(body.size()) + "\r\n\r\n" + body);
   EXPECT_THAT(answer, HasSubstr("HTTP/1.1 200"));
+  EXPECT_THAT(answer, HasSubstr("Strict-Transport-Security: max-age="));
   EXPECT_THAT(answer, HasSubstr("__Host-plumb_session="));
-  EXPECT_THAT(answer, HasSubstr("; Secure"));
+  EXPECT_THAT(answer, HasSubstr("__Host-plumb_device_"));
+  std::size_t secure = 0;
+  for (std::size_t at = answer.find("; Secure"); at != std::string::npos;
+       at = answer.find("; Secure", at + 1))
+    ++secure;
+  EXPECT_EQ(secure, 2U) << "of both cookies";
   EXPECT_EQ(StatusOf("GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n"), 0)
       << "no answer without TLS";
+}
+
+TEST_F(ServerTest, WithoutTlsNobodyIsToldToComeBackByIt) {
+  Start();
+  const HttpAnswer answer = HttpClient(port_).Get("/health");
+  EXPECT_EQ(answer.Header("strict-transport-security"), "");
+  EXPECT_EQ(HttpClient(port_).Get("/api/v1/session").json()["certificate"], "");
+}
+
+TEST(TlsIdentityTest, WhatIsNoPairOfCertificateAndKeyIsRefusedByName) {
+  const web::TlsIdentity one = web::MakeTlsIdentity({}), other = web::MakeTlsIdentity({});
+  const auto complaint = [](const std::string& certificate, const std::string& key) {
+    return plumb::testing::MessageOf<DataError>(
+        [&] { (void)web::CheckedTlsIdentity(certificate, key, "/etc/cert.pem"); });
+  };
+  EXPECT_THAT(complaint("-----BEGIN NONSENSE-----\n", one.key_pem), HasSubstr("/etc/cert.pem"));
+  EXPECT_THAT(complaint("", one.key_pem), HasSubstr("no certificate"));
+  EXPECT_THAT(complaint(one.certificate_pem, ""), HasSubstr("no key"));
+  EXPECT_THAT(complaint(one.certificate_pem, other.key_pem), HasSubstr("not that of"));
+  const std::string both = one.certificate_pem + one.key_pem;
+  EXPECT_EQ(web::CheckedTlsIdentity(both, both, "").fingerprint, one.fingerprint);
+  EXPECT_NE(one.fingerprint, other.fingerprint);
 }
 
 }  // namespace

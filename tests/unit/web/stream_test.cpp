@@ -133,7 +133,7 @@ TEST_F(StreamTest, StreamsAreFew) {
 }
 
 TEST(EventHubTest, AFullBufferClosesTheStreamAndFreesIt) {
-  web::EventHub hub(4, 100);
+  web::EventHub hub(4, 4, 100);
   const auto stream = hub.Open(std::make_shared<web::Session>());
   bool cut = false;
   stream->cut = [&] { cut = true; };
@@ -146,7 +146,7 @@ TEST(EventHubTest, AFullBufferClosesTheStreamAndFreesIt) {
 }
 
 TEST(EventHubTest, WhatIsTakenMakesRoom) {
-  web::EventHub hub(4, 100);
+  web::EventHub hub(4, 4, 100);
   const auto stream = hub.Open(std::make_shared<web::Session>());
   for (int i = 0; i < 1000; ++i) {
     hub.Broadcast("status", std::string(40, 'x'));

@@ -47,11 +47,7 @@ class WebTest : public ::testing::Test {
     for (const auto& [name, role] : {std::pair{"technician", "technician"},
                                      {"physicist", "physicist"},
                                      {"second", "physicist"}}) {
-      ASSERT_EQ(
-          engineer.Post("/api/v1/users", {{"name", name}, {"role", role}, {"password", kPassword}})
-              .status,
-          201)
-          << name;
+      ASSERT_TRUE(AddAccount(port_, engineer, name, role)) << name;
     }
   }
 

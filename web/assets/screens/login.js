@@ -2,7 +2,7 @@ import { loadSession, post } from '../api.js';
 import { clear, field, form, h } from '../dom.js';
 import { S } from '../strings.js';
 
-export function showLogin(main, setupRequired, done) {
+export function showLogin(main, setupRequired, certificate, done) {
   const text = S.login;
   const name = h('input', { name: 'name', autocomplete: 'username', required: true, maxlength: 32, spellcheck: 'false', autocapitalize: 'none' });
   const password = h('input', { name: 'password', type: 'password', required: true, maxlength: 128, autocomplete: setupRequired ? 'new-password' : 'current-password', minlength: setupRequired ? 10 : undefined });
@@ -23,10 +23,34 @@ export function showLogin(main, setupRequired, done) {
   code.addEventListener('input', () => { code.value = code.value.toUpperCase(); });
   const repeat = h('input', { type: 'password', required: true, maxlength: 128, autocomplete: 'new-password' });
   clear(main, h('section', { class: 'login card' }, h('h1', {}, text.setupTitle), h('p', {}, text.setupText),
+    certificate && h('p', { class: 'hint' }, text.certificate, ' ', h('code', { class: 'fingerprint' }, certificate)),
     form({ class: 'form' }, async () => {
       if (password.value !== repeat.value) throw new Error(text.differ);
       await post('setup', { code: code.value.trim(), name: name.value, password: password.value });
       await finish();
     }, field(text.code, code), field(text.name, name, S.users.nameHint), field(text.password, password, text.passwordHint), field(text.repeat, repeat), h('button', { class: 'primary' }, text.setupSubmit))));
   code.focus();
+}
+
+/// Somebody else chose the password: the person takes one of their own before anything else.
+export function showFirstPassword(main, user, done) {
+  const text = S.login;
+  const name = h('input', { name: 'name', autocomplete: 'username', readonly: true, value: user });
+  const secret = (autocomplete, more) => h('input', {
+    type: 'password', required: true, maxlength: 128, autocomplete, ...more,
+  });
+  const old = secret('current-password');
+  const fresh = secret('new-password', { minlength: 10 });
+  const repeat = secret('new-password');
+  clear(main, h('section', { class: 'login card' }, h('h1', {}, text.firstTitle),
+    h('p', {}, text.firstText),
+    form({ class: 'form' }, async () => {
+      if (fresh.value !== repeat.value) throw new Error(text.differ);
+      await post('session/password', { old_password: old.value, password: fresh.value });
+      await loadSession();
+      await done();
+    }, field(text.name, name), field(text.firstOld, old),
+    field(text.firstNew, fresh, text.passwordHint), field(text.repeat, repeat),
+    h('button', { class: 'primary' }, text.firstSubmit))));
+  old.focus();
 }

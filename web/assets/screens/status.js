@@ -60,6 +60,7 @@ export async function showStatus(place) {
   const text = S.status;
   const headline = h('p', { class: 'headline' });
   const hint = h('p', { class: 'lead' });
+  const warnings = h('div', {});
   const grid = h('div', { class: 'tiles' });
   const list = h('div', {});
   let codes = await patientCodes();
@@ -67,12 +68,13 @@ export async function showStatus(place) {
     h('h1', { class: 'visually-hidden' }, text.title),
     h('section', { class: 'card hero' }, h('div', {}, headline, hint),
       may('scan') && h('a', { class: 'button primary', href: '#/scan' }, text.goScan)),
-    grid,
+    warnings, grid,
     h('section', { class: 'card' }, h('h2', {}, text.lastScans), list));
 
   const draw = () => {
     const { status } = live;
     if (!status) return;
+    clear(warnings, (status.warnings ?? []).map((one) => h('p', { class: 'caution' }, one)));
     headline.textContent = S.states[status.state];
     headline.dataset.state = status.state;
     hint.textContent = faultWords(status) ?? S.stateHints[status.state];

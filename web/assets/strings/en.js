@@ -70,6 +70,12 @@ export const en = {
       + 'console and in its journal, and create the first account: an engineer.',
     code: 'Setup code', codeHint: 'XXXX-XXXX', passwordHint: 'At least 10 characters.',
     repeat: 'Password again', differ: 'The two passwords differ.', setupSubmit: 'Create account',
+    certificate: 'Certificate of this appliance (SHA-256). Compare it with the one in its journal '
+      + 'and the one that the browser shows:',
+    firstTitle: 'Choose your password',
+    firstText: 'Somebody else chose the password of this account. Choose one that only you know.',
+    firstOld: 'Password that you were given', firstNew: 'Your own password',
+    firstSubmit: 'Change password',
   },
   session: {
     label: 'Treatment session',

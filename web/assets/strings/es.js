@@ -124,6 +124,12 @@ export const es = {
     code: 'Código de instalación', codeHint: 'XXXX-XXXX', passwordHint: 'Al menos 10 caracteres.',
     repeat: 'Repetir la contraseña', differ: 'Las dos contraseñas son distintas.',
     setupSubmit: 'Crear cuenta',
+    certificate: 'Certificado de este equipo (SHA-256). Compárelo con el de su registro y con el '
+      + 'que muestra el navegador:',
+    firstTitle: 'Elija su contraseña',
+    firstText: 'Otra persona eligió la contraseña de esta cuenta. Elija una que solo usted conozca.',
+    firstOld: 'Contraseña que recibió', firstNew: 'Su propia contraseña',
+    firstSubmit: 'Cambiar contraseña',
   },
   session: {
     label: 'Sesión de tratamiento',

@@ -1,0 +1,144 @@
+#include "daemon/appliance/page_identity.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <functional>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
+#include "web/http/listen_socket.hpp"
+#include "web/security/sessions.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr std::size_t kMaxBytes = 64 << 10;
+constexpr const char* kKeyFile = "page-key.pem";  // certificate and key, so that they stay together
+constexpr const char* kDeviceFile = "device.key";
+
+/// Closes a descriptor when it goes.
+struct Descriptor {
+  explicit Descriptor(int opened) : fd(opened) {}
+  ~Descriptor() {
+    if (fd >= 0) ::close(fd);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  const int fd;
+};
+
+void Sync(const fs::path& path, int flags) {
+  const Descriptor opened(::open(path.c_str(), flags | O_CLOEXEC));
+  if (opened.fd < 0 || ::fsync(opened.fd) != 0) throw IoError(DescribeWriteError(path, errno));
+}
+
+void WriteSecret(const fs::path& file, const std::string& contents) {
+  const fs::path hidden = file.parent_path() / ("." + file.filename().string() + ".new");
+  ::unlink(hidden.c_str());  // of a start that was interrupted
+  {
+    const Descriptor opened(
+        ::open(hidden.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600));
+    if (opened.fd < 0) throw IoError(DescribeWriteError(hidden, errno));
+    for (std::size_t done = 0; done < contents.size();) {
+      const ssize_t count = ::write(opened.fd, contents.data() + done, contents.size() - done);
+      if (count < 0 && errno == EINTR) continue;
+      if (count <= 0) throw IoError(DescribeWriteError(hidden, errno));
+      done += static_cast<std::size_t>(count);
+    }
+    if (::fchmod(opened.fd, 0600) != 0 || ::fsync(opened.fd) != 0)
+      throw IoError(DescribeWriteError(hidden, errno));
+  }
+  if (::rename(hidden.c_str(), file.c_str()) != 0) throw IoError(DescribeWriteError(file, errno));
+  Sync(file.parent_path(), O_RDONLY | O_DIRECTORY);
+}
+
+web::TlsIdentity GivenTls(const WebConfig& web) {
+  const std::string name = fmt::format("web.tls_certificate {} with web.tls_key {}",
+                                       web.tls_certificate.string(), web.tls_key.string());
+  return web::CheckedTlsIdentity(ReadTextFile(web.tls_certificate, kMaxBytes),
+                                 ReadTextFile(web.tls_key, kMaxBytes), name);
+}
+
+web::TlsIdentity OwnTls(const Config& config, std::vector<std::string>& warnings) {
+  const fs::path file = config.appliance.state / kKeyFile;
+  try {
+    const std::string pem = ReadOrMakeSecret(file, [&] {
+      const web::TlsIdentity made = web::MakeTlsIdentity(config.web.host_names);
+      return made.certificate_pem + made.key_pem;
+    });
+    return web::CheckedTlsIdentity(pem, pem, file.string());
+  } catch (const std::runtime_error& error) {
+    warnings.push_back(fmt::format(
+        "the certificate of the page is for this run only: {}; remove or correct the file",
+        error.what()));
+  }
+  return web::MakeTlsIdentity(config.web.host_names);
+}
+
+std::string DeviceKey(const Config& config, std::vector<std::string>& warnings) {
+  constexpr std::size_t kBytes = 32;
+  const fs::path file = config.appliance.state / kDeviceFile;
+  try {
+    std::string key = ReadOrMakeSecret(file, [] { return web::RandomBytes(kBytes); });
+    if (key.size() == kBytes) return key;
+    warnings.push_back(
+        fmt::format("{} has {} bytes, expected {}: browsers are not known again "
+                    "after a restart; remove the file",
+                    file.string(), key.size(), kBytes));
+  } catch (const std::runtime_error& error) {
+    warnings.push_back(
+        fmt::format("browsers are not known again after a restart: {}", error.what()));
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string ReadOrMakeSecret(const fs::path& file, const std::function<std::string()>& make) {
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(file, error);
+  if (status.type() == fs::file_type::not_found) {
+    const std::string contents = make();
+    WriteSecret(file, contents);
+    return contents;
+  }
+  if (status.type() != fs::file_type::regular)
+    throw DataError(
+        fmt::format("{} is no plain file: {}", file.string(),
+                    error ? error.message() : "expected a file of the appliance's own"));
+  ::chmod(file.c_str(), 0600);  // a copy of the folder may have lost it
+  return ReadTextFile(file, kMaxBytes);
+}
+
+void CheckPageIdentity(const WebConfig& web) {
+  if (TransportOf(web, /*is_loopback=*/false) == PageTransport::kGivenTls) (void)GivenTls(web);
+}
+
+PageNotes IdentifyPage(const Config& config, web::HttpServerOptions& options) {
+  PageNotes notes;
+  const std::string address =
+      options.listen_fd ? web::AddressTextOf(*options.listen_fd) : options.address;
+  const PageTransport transport = TransportOf(config.web, web::IsLoopback(address));
+  if (transport == PageTransport::kGivenTls) options.tls = GivenTls(config.web);
+  if (transport == PageTransport::kOwnTls) options.tls = OwnTls(config, notes.warnings);
+  if (transport == PageTransport::kPlainOnNetwork)
+    notes.warnings.emplace_back(
+        "the page is served without TLS (web.plain_http): passwords and patient data can be read "
+        "and changed on the network");
+  options.device_key = DeviceKey(config, notes.warnings);
+  if (options.tls) notes.certificate = options.tls->fingerprint;
+  const bool is_v6 = address.find(':') != std::string::npos;
+  notes.url =
+      fmt::format("{}://{}", options.tls ? "https" : "http", is_v6 ? "[" + address + "]" : address);
+  return notes;
+}
+
+}  // namespace plumb

@@ -1,0 +1,83 @@
+// Which markers hold for a live sensor: the room's.
+#include "drivers/openni/sensor_calibration.hpp"
+
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "algo/base/errors.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::MessageOf;
+
+class SensorCalibrationTest : public ::testing::Test {
+ protected:
+  SensorCalibrationTest() {
+    room_.calibration_folder = folder_.path();
+    room_.marker_dictionary = "DICT_4X4_50";
+    room_.marker_length_m = 0.083;
+    room_.reference_marker = 7;
+    room_.markers_are_the_rooms = true;
+  }
+  void Write(const std::string& keys) const {
+    std::ofstream(folder_ / "S1.yaml") << "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
+                                          "camera_matrix: [525, 0, 319.5, 0, 525, 239.5, 0, 0, 1]\n"
+                                          "distortion_coefficients: [0, 0, 0, 0, 0]\n"
+                                       << keys;
+  }
+  [[nodiscard]] StreamInfo Info() const { return LiveStreamInfo(room_, "S1", 640, 480, 0.0); }
+  [[nodiscard]] std::string Complaint(const std::string& keys) const {
+    Write(keys);
+    return MessageOf<DeviceError>([&] { (void)Info(); });
+  }
+
+  testing::TempFolder folder_;
+  OpenNiOptions room_;
+};
+
+TEST_F(SensorCalibrationTest, TheMarkersAreTheRoomsWhateverTheFileLeavesOut) {
+  Write("");
+  const StreamInfo info = Info();
+  EXPECT_EQ(info.marker_dictionary, "DICT_4X4_50");
+  EXPECT_EQ(info.marker_length_m, 0.083);
+  EXPECT_EQ(info.reference_marker, 7);
+  EXPECT_FALSE(info.intrinsics_assumed);
+}
+
+TEST_F(SensorCalibrationTest, AFileThatSaysTheSameIsTaken) {
+  Write("marker_dictionary: DICT_4X4_50\nmarker_length: 0.083\nreference_marker: 7\n");
+  EXPECT_EQ(Info().marker_length_m, 0.083);
+  EXPECT_EQ(Info().reference_marker, 7);
+}
+
+TEST_F(SensorCalibrationTest, AFileWithOtherMarkersThanTheRoomIsRefused) {
+  EXPECT_THAT(Complaint("marker_length: 0.104\n"),
+              AllOf(HasSubstr("S1.yaml"), HasSubstr("marker_length"), HasSubstr("0.104"),
+                    HasSubstr("0.083"), HasSubstr("markers.length_m")));
+  EXPECT_THAT(Complaint("marker_length: 0.0831\n"), HasSubstr("0.0831"));
+  EXPECT_THAT(Complaint("marker_dictionary: DICT_6X6_250\n"),
+              AllOf(HasSubstr("DICT_6X6_250"), HasSubstr("DICT_4X4_50")));
+  EXPECT_THAT(Complaint("reference_marker: 8\n"),
+              AllOf(HasSubstr("reference_marker is 8"), HasSubstr("this room has 7")));
+  room_.reference_marker.reset();
+  EXPECT_THAT(Complaint("reference_marker: 7\n"), HasSubstr("none configured"));
+}
+
+TEST_F(SensorCalibrationTest, WithoutARoomTheFileSaysWhichMarkersThereAre) {
+  room_.markers_are_the_rooms = false;
+  Write("marker_dictionary: DICT_6X6_250\nmarker_length: 0.104\nreference_marker: 8\n");
+  const StreamInfo info = Info();
+  EXPECT_EQ(info.marker_dictionary, "DICT_6X6_250");
+  EXPECT_EQ(info.marker_length_m, 0.104);
+  EXPECT_EQ(info.reference_marker, 8);
+}
+
+}  // namespace
+}  // namespace plumb

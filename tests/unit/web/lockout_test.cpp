@@ -1,0 +1,236 @@
+// Who may guess how often, and who is not kept out by others who guess; which passwords are taken.
+#include <gmock/gmock.h>
+
+#include <numeric>
+
+#include "tests/unit/web/web_fixture.hpp"
+#include "web/security/device_cookies.hpp"
+#include "web/security/login_limiter.hpp"
+#include "web/security/password_rules.hpp"
+
+namespace plumb::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kWrong = "not this one at all";
+
+class LockoutTest : public WebTest {
+ protected:
+  void SetUp() override {
+    Start();
+    SetUpAccounts();
+  }
+  /// The status of a login from an address, with the cookies of a browser.
+  int LogInFrom(const std::string& address, const std::string& name, const std::string& password,
+                const HttpClient* browser = nullptr) {
+    std::string cookies;
+    if (browser != nullptr) {
+      for (const auto& [key, value] : browser->device_cookies)
+        cookies += (cookies.empty() ? "Cookie: " : "; ") + key + "=" + value;
+    }
+    const std::string body = nlohmann::json{{"name", name}, {"password", password}}.dump();
+    HttpConnection connection(port_, address);
+    connection.Send("POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\n" +
+                    (cookies.empty() ? "" : cookies + "\r\n") +
+                    "Content-Type: application/json\r\nContent-Length: " +
+                    std::to_string(body.size()) + "\r\n\r\n" + body);
+    return connection.Read().status;
+  }
+};
+
+TEST_F(LockoutTest, AnAddressThatTriesManyNamesIsSlowedDown) {
+  for (int i = 0; i < 5; ++i)
+    EXPECT_EQ(LogInFrom("127.0.0.2", "name" + std::to_string(i), kWrong), 403) << i;
+  EXPECT_EQ(LogInFrom("127.0.0.2", "technician", kPassword), 429) << "a sixth name";
+  EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword), 200) << "another address";
+  skipped_s_ = 61;
+  EXPECT_EQ(LogInFrom("127.0.0.2", "technician", kPassword), 200);
+}
+
+TEST_F(LockoutTest, ANameThatIsTriedFromManyAddressesIsSlowedDown) {
+  for (int i = 0; i < 5; ++i)
+    EXPECT_EQ(LogInFrom("127.0.0." + std::to_string(10 + i), "technician", kWrong), 403) << i;
+  EXPECT_EQ(LogInFrom("127.0.0.20", "technician", kPassword), 429) << "a sixth address";
+  EXPECT_EQ(LogInFrom("127.0.0.20", "physicist", kPassword), 200) << "another name";
+}
+
+TEST_F(LockoutTest, ABrowserThatLoggedInBeforeIsNotLockedOutByOthers) {
+  const HttpClient browser = LoggedIn("technician");
+  ASSERT_EQ(browser.device_cookies.size(), 1U);
+  for (int i = 0; i < 8; ++i) (void)LogInFrom("127.0.0.2", "technician", kWrong);
+  EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword), 429) << "a browser that is not known";
+  EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword, &browser), 200);
+  EXPECT_EQ(LogInFrom("127.0.0.2", "technician", kPassword, &browser), 200)
+      << "even beside the one who guesses";
+}
+
+TEST_F(LockoutTest, AKnownBrowserIsSlowedDownByItsOwnGuessesAlone) {
+  const HttpClient browser = LoggedIn("technician"), other = LoggedIn("technician");
+  for (int i = 0; i < 5; ++i)
+    EXPECT_EQ(LogInFrom("127.0.0.2", "technician", kWrong, &browser), 403) << i;
+  EXPECT_EQ(LogInFrom("127.0.0.2", "technician", kPassword, &browser), 429);
+  EXPECT_EQ(LogInFrom("127.0.0.2", "technician", kPassword, &other), 200) << "another browser";
+  EXPECT_EQ(LogInFrom("127.0.0.2", "physicist", kPassword), 200)
+      << "a colleague at the same screen";
+  skipped_s_ = 61;
+  EXPECT_EQ(LogInFrom("127.0.0.2", "technician", kPassword, &browser), 200);
+}
+
+TEST_F(LockoutTest, ADeviceCookieHelpsOnlyItsOwnNameAndEndsWithThePassword) {
+  HttpClient browser = LoggedIn("technician");
+  HttpClient forged = browser;
+  for (auto& [key, value] : forged.device_cookies) value.back() = value.back() == '0' ? '1' : '0';
+  for (int i = 0; i < 8; ++i) {
+    (void)LogInFrom("127.0.0.2", "technician", kWrong);
+    (void)LogInFrom("127.0.0.4", "physicist", kWrong);
+  }
+  EXPECT_EQ(LogInFrom("127.0.0.3", "technician", kPassword, &forged), 429);
+  EXPECT_EQ(LogInFrom("127.0.0.3", "physicist", kPassword, &browser), 429) << "another name";
+  const HttpClient old = browser;
+  EXPECT_EQ(browser
+                .Post("/api/v1/session/password",
+                      {{"old_password", kPassword}, {"password", "another long one"}})
+                .status,
+            200);
+  EXPECT_EQ(LogInFrom("127.0.0.3", "technician", "another long one", &old), 429)
+      << "a copy from before the change";
+  EXPECT_EQ(LogInFrom("127.0.0.3", "technician", "another long one", &browser), 200);
+}
+
+TEST_F(LockoutTest, GuessesAtTheLoginDoNotKeepWhoIsLoggedInFromSigning) {
+  HttpClient client = LoggedIn("technician");
+  for (int i = 0; i < 8; ++i) (void)LogInFrom("127.0.0.2", "technician", kWrong);
+  const auto sign = [&](const std::string& password) {
+    return client
+        .Post("/api/v1/scans/none/accept-outside", {{"reason", "because"}, {"password", password}})
+        .status;
+  };
+  EXPECT_EQ(sign(kPassword), 404) << "no such scan, but the password was right";
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(sign(kWrong), 403) << i;
+  EXPECT_EQ(sign(kPassword), 429) << "guesses at the signature are counted";
+}
+
+TEST_F(LockoutTest, TheCookieIsOutOfReachOfScriptsAndLastsForAYear) {
+  const HttpAnswer answer =
+      HttpClient(port_).Post("/api/v1/login", {{"name", "engineer"}, {"password", kPassword}});
+  const auto [begin, end] = answer.headers.equal_range("set-cookie");
+  const std::string both =
+      std::accumulate(begin, end, std::string(), [](const std::string& text, const auto& header) {
+        return header.second.find("plumb_device_") == 0 ? text + header.second : text;
+      });
+  for (const char* part : {"HttpOnly", "SameSite=Strict", "Path=/", "Max-Age=31536000"})
+    EXPECT_THAT(both, HasSubstr(part));
+}
+
+TEST_F(LockoutTest, WhoWasGivenAPasswordChangesItBeforeAnythingElse) {
+  HttpClient engineer = LoggedIn("engineer");
+  ASSERT_EQ(engineer
+                .Post("/api/v1/users",
+                      {{"name", "dora"}, {"role", "physicist"}, {"password", kFirstPassword}})
+                .status,
+            201);
+  HttpClient dora(port_);
+  ASSERT_EQ(dora.LogIn("dora", kFirstPassword), 200);
+  EXPECT_EQ(dora.Get("/api/v1/session").json()["password_change_required"], true);
+  for (const char* path : {"/api/v1/status", "/api/v1/patients", "/api/v1/audit", "/api/v1/events"})
+    EXPECT_EQ(dora.Get(path).status, 403) << path;
+  EXPECT_EQ(dora.Post("/api/v1/press").status, 403);
+  EXPECT_THAT(dora.Get("/result").body, HasSubstr("Log in"));
+  const auto change = [&](const std::string& password) {
+    return dora
+        .Post("/api/v1/session/password",
+              {{"old_password", kFirstPassword}, {"password", password}})
+        .status;
+  };
+  EXPECT_EQ(change(kFirstPassword), 400) << "the old one again";
+  EXPECT_EQ(change(kPassword), 200);
+  EXPECT_EQ(dora.Get("/api/v1/status").status, 200);
+  EXPECT_EQ(dora.Get("/api/v1/session").json()["password_change_required"], false);
+  HttpClient again(port_);
+  EXPECT_EQ(again.LogIn("dora", kPassword), 200);
+  EXPECT_EQ(again.Get("/api/v1/status").status, 200);
+  // An engineer who sets it anew begins the same; who sets their own does not.
+  EXPECT_EQ(engineer.Put("/api/v1/users/dora", {{"password", "yet another horse"}}).status, 200);
+  EXPECT_EQ(again.LogIn("dora", "yet another horse"), 200);
+  EXPECT_EQ(again.Get("/api/v1/status").status, 403);
+  EXPECT_EQ(engineer.Put("/api/v1/users/engineer", {{"password", "an own new horse"}}).status, 200);
+  HttpClient own(port_);
+  EXPECT_EQ(own.LogIn("engineer", "an own new horse"), 200);
+  EXPECT_EQ(own.Get("/api/v1/users").status, 200);
+}
+
+TEST_F(LockoutTest, CommonPasswordsAreRefusedWhereverOneIsSet) {
+  HttpClient engineer = LoggedIn("engineer");
+  const auto add = [&](const std::string& name, const std::string& password) {
+    return engineer
+        .Post("/api/v1/users", {{"name", name}, {"role", "technician"}, {"password", password}})
+        .status;
+  };
+  EXPECT_EQ(add("dora", "password12"), 400);
+  EXPECT_EQ(add("radiographer", "radiographer"), 400);
+  EXPECT_EQ(engineer.Put("/api/v1/users/technician", {{"password", "Qwertyuiop1!"}}).status, 400);
+  EXPECT_EQ(engineer
+                .Post("/api/v1/session/password",
+                      {{"old_password", kPassword}, {"password", "iloveyou2024"}})
+                .status,
+            400);
+  EXPECT_EQ(add("dora", kFirstPassword), 201);
+}
+
+TEST(PasswordRulesTest, WhatIsTriedFirstIsRefusedAndALengthOfTenIsEnough) {
+  for (const char* bad :
+       {"password12", "PASSWORD12", "Passw0rd!!!", "1234567890", "qwertyuiop", "administrator",
+        "Krankenhaus1", "aaaaaaaaaaaa", "abababababab", "12341234123412", "linaclinac",
+        "changeme!!!", "mueller2024", "muellermueller", "Mueller!!!!!"}) {
+    EXPECT_NE(web::WhyNotPassword(bad, "mueller"), "") << bad;
+  }
+  for (const char* good : {"correct horse battery", "kx7-tree-boat", "mueller likes tea",
+                           "8402 5519 33", "passwordless sea", "\xC3\xA4pfel und birnen"}) {
+    EXPECT_EQ(web::WhyNotPassword(good, "mueller"), "") << good;
+  }
+  EXPECT_NE(web::WhyNotPassword("ninebytes", "x"), "");
+  EXPECT_EQ(web::WhyNotPassword("ten bytes!", "x"), "");
+  EXPECT_EQ(web::WhyNotPassword("ab" + std::string(125, 'x') + "c", "x"), "");
+  EXPECT_NE(web::WhyNotPassword("ab" + std::string(126, 'x') + "c", "x"), "");
+}
+
+TEST(LoginLimiterTest, FiveFailuresAMinuteAndNotOneMore) {
+  using std::chrono::seconds;
+  web::LoginLimiter limiter;
+  const auto now = std::chrono::steady_clock::now();
+  for (int i = 0; i < 4; ++i) limiter.Failed("a", now);
+  EXPECT_EQ(limiter.Wait("a", now), seconds(0)) << "four";
+  limiter.Failed("a", now);
+  EXPECT_EQ(limiter.Wait("a", now), seconds(60)) << "five";
+  EXPECT_EQ(limiter.Wait("b", now), seconds(0));
+  EXPECT_EQ(limiter.Wait("a", now + seconds(59)), seconds(1));
+  EXPECT_EQ(limiter.Wait("a", now + seconds(60)), seconds(0));
+  limiter.Succeeded("a");
+  EXPECT_EQ(limiter.Wait("a", now), seconds(0));
+}
+
+TEST(DeviceCookiesTest, AreBoundToKeyNameAndPassword) {
+  const std::string key(32, 'k');
+  const web::DeviceCookies cookies(key, false), other(std::string(32, 'j'), false);
+  const std::string value = cookies.Make("anna", "hash");
+  EXPECT_TRUE(cookies.Identify(value, "anna", "hash"));
+  EXPECT_EQ(web::DeviceCookies(key, false).Identify(value, "anna", "hash"),
+            cookies.Identify(value, "anna", "hash"))
+      << "after a restart";
+  EXPECT_FALSE(cookies.Identify(value, "bob", "hash"));
+  EXPECT_FALSE(cookies.Identify(value, "anna", "another"));
+  EXPECT_FALSE(cookies.Identify(value, "anna", "")) << "a disabled account";
+  EXPECT_FALSE(other.Identify(value, "anna", "hash"));
+  EXPECT_FALSE(cookies.Identify("", "anna", "hash"));
+  EXPECT_FALSE(cookies.Identify(value.substr(0, value.size() - 1), "anna", "hash"));
+  EXPECT_NE(cookies.Identify(cookies.Make("anna", "hash"), "anna", "hash"),
+            cookies.Identify(value, "anna", "hash"))
+      << "each browser is its own";
+  EXPECT_NE(cookies.NameFor("anna"), cookies.NameFor("bob"));
+  EXPECT_TRUE(web::DeviceCookies(key, true).NameFor("anna").starts_with("__Host-"));
+  EXPECT_THROW(web::DeviceCookies("short", false), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace plumb::test
