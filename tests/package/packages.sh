@@ -86,6 +86,15 @@ every_option_is_in_the_manual() {
   return $bad
 }
 check "every command and option is in the manual" every_option_is_in_the_manual
+every_key_is_in_the_manual() {
+  local key bad=0 page keys
+  page=$(shown tree/plumbd/usr/share/man/man5/plumb.toml.5.gz)
+  keys=$(grep -ohE '[Tt]ake[A-Za-z_]*\((section, |button, |light, )?"[a-z_0-9]+"' "$source/daemon/config/config.cpp" | grep -oE '"[a-z_0-9]+"' | tr -d '"' | sort -u)
+  [ "$(wc -w <<<"$keys")" -ge 40 ] || { echo "only these keys were found: $keys"; bad=1; }
+  for key in $keys; do grep -qw "$key" <<<"$page" || { echo "$key is not in plumb.toml.5"; bad=1; }; done
+  return $bad
+}
+check "every key of the configuration is in the manual" every_key_is_in_the_manual
 man_pages_are_well_formed() {
   local page text=
   for page in "$source"/toolchain/man/*; do text+=$(LC_ALL=C.UTF-8 man --warnings -l -Tutf8 "$page" 2>&1 >/dev/null); done
