@@ -58,7 +58,8 @@ int Main(int argc, char** argv) {
   app.set_help_flag("-h,--help", "Print this help, or with a command its own, and exit");
   app.require_subcommand(1);
   std::filesystem::path control = "/run/plumb/control.sock";
-  app.add_option("--control", control, "Control socket of plumbd, for status, press, watch and sim")
+  app.add_option("--control", control,
+                 "Control socket of plumbd, for status, press, watch, sim and backup")
       ->type_name("SOCK")
       ->capture_default_str();
   app.get_formatter()->column_width(34);
@@ -97,6 +98,11 @@ int Main(int argc, char** argv) {
   add("press", "Press the button of a running plumbd", AddPress);
   add("watch", "Print the events of a running plumbd, one JSON object a line", AddWatch);
   add("sim", "Plug, unplug, stall or move on the virtual sensor of a running plumbd", AddSim);
+#ifdef PLUMB_WITH_APPLIANCE
+  add("backup", "Copy what plumbd stores: database, scans, calibrations; also while it runs",
+      AddBackup);
+  add("restore", "Make a state folder of a backup, after checking every file of it", AddRestore);
+#endif
 
   try {
     app.parse(argc, argv);

@@ -66,55 +66,6 @@ Appliance::~Appliance() {
   sensors_.reset();
 }
 
-void Appliance::OpenStore() {
-  if (!parts_.configuration_fault.empty()) {
-    storage_fault_ = parts_.configuration_fault;
-    Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", storage_fault_));
-    return;
-  }
-  try {
-    store_ = std::make_unique<Store>(parts_.config.appliance.state);
-    const RecoveryReport& found = store_->recovery();
-    if (found.interrupted_scans + found.orphaned_folders + found.lost_scans > 0) {
-      Log(LogLevel::kWarning,
-          fmt::format("put right after an interruption: {} scans had not ended, {} folders of "
-                      "none, {} scans without files",
-                      found.interrupted_scans, found.orphaned_folders, found.lost_scans));
-    }
-    if (found.foreign_folders > 0) {
-      Log(LogLevel::kError,
-          fmt::format("{} scans are unknown to the database and were moved to {}: is it an older "
-                      "backup? They can be read with plumb info",
-                      found.foreign_folders,
-                      (parts_.config.appliance.state / "set-aside").string()));
-    }
-    if (found.broken_references > 0) {
-      Log(LogLevel::kError, fmt::format("the files of {} approved references are gone: put a "
-                                        "backup of the state folder in its place",
-                                        found.broken_references));
-    }
-    store_->CloseSessions(kSelf);  // who lies on the couch now, nobody has said
-    if (!parts_.demo_patient.empty()) {
-      const auto patient = store_->FindPatientByCode(parts_.demo_patient);
-      open_patient_ = patient ? patient->id : store_->AddPatient(kSelf, parts_.demo_patient, "");
-      session_id_ = store_->OpenSession(kSelf, open_patient_, web::ScanPurpose::kFraction);
-      opened_by_ = kSelf;
-    }
-  } catch (const IoError& error) {
-    store_.reset();
-    storage_fault_ = error.what();
-    Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", storage_fault_));
-    if (dynamic_cast<const DiskRefused*>(&error) == nullptr) return;
-  }
-  if (store_) return;
-  try {
-    store_ = Store::OpenReadable(parts_.config.appliance.state);
-    Log(LogLevel::kNotice, "what is stored can be read");
-  } catch (const IoError& error) {
-    Log(LogLevel::kError, fmt::format("nor can anything be read: {}", error.what()));
-  }
-}
-
 void Appliance::WatchButton() {
   if (parts_.button == nullptr) return;
   parts_.button->SetListener([this](ButtonPress press) { (void)Press(press); });
@@ -165,14 +116,7 @@ Appliance::Answer Appliance::WhyNotScan() const {
     return hindrance;
   if (store_ == nullptr || !storage_fault_.empty()) return "nothing can be stored";
   if (opening_) return "a patient is being opened: press again in a moment";
-  constexpr std::uintmax_t kLeast = 48U << 20;
-  std::error_code error;
-  const std::filesystem::space_info space =
-      std::filesystem::space(parts_.config.appliance.state, error);
-  if (!error && space.available < kLeast)
-    return fmt::format("the disk is full: {} MB are free, a scan needs about 50; free space first",
-                       space.available >> 20);
-  return {};
+  return WhyNoSpace();
 }
 
 Appliance::Answer Appliance::Handle(ScanEvent event) {
@@ -265,7 +209,10 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
   job.stop_after_s = parts_.config.appliance.auto_stop_s.value_or(settings.auto_stop_s);
   if (check_) {
     job.keep_recording = false;
-    job.check = CheckJob{BaselineIn(store_->CheckBaselineJson()), parts_.config.check};
+    const std::string baseline = store_->CheckBaselineJson();
+    job.check = CheckJob{BaselineIn(baseline), parts_.config.check};
+    if (!baseline.empty() && !job.check->baseline)
+      throw DataError("the stored baseline of the daily check cannot be read: set another one");
     return job;
   }
   if (scan_.patient_id.empty()) return job;  // no session is open: compared with nothing
@@ -277,6 +224,9 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
   if (reference && scan_.purpose == web::ScanPurpose::kFraction) {
     scan_.reference_id = reference->id;
     job.reference_scene = store_->ScanFolder(reference->scan_id) / "scene";
+    job.check_reference = [this, scan = reference->scan_id](const std::stop_token& stop) {
+      return store_->CheckFiles(scan, /*scene_only=*/true, stop);
+    };
     job.compare = CompareOptionsFor(reference->plan, parts_.config.compare);
     job.compare.now_s = SteadySeconds;
   }
@@ -489,50 +439,6 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
   if (stopped_) std::exchange(stopped_, nullptr)();
 }
 
-/// A disk that has become read-only must be known before a patient is scanned in vain. Off the
-/// loop.
-void Appliance::CheckDisk() {
-  ticks_to_disk_check_ = kDiskCheckTicks;
-  if (store_ == nullptr || !storage_fault_.empty()) return;
-  (void)store_thread_.Post([this] {
-    try {
-      store_->CheckWritable();
-    } catch (const DiskRefused& error) {
-      loop_.Post("disk check", [this, what = std::string(error.what())] { FailStorage(what); });
-    }
-  });
-}
-
-void Appliance::FailStorage(const std::string& what) {
-  if (!storage_fault_.empty()) return;
-  storage_fault_ = what;
-  Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", what));
-  (void)Handle(ScanEvent::kStorageFailed);
-  TellState();
-}
-
-/// Retention and quota, off the loop.
-void Appliance::Care() {
-  ticks_to_care_ = kCareTicks;
-  if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
-  constexpr std::chrono::hours kTrusted{1};  // until then a time server may set it right
-  const bool has_clock = clock_.held() >= kTrusted;
-  const auto quota = static_cast<std::uint64_t>(parts_.config.appliance.quota_gb * 1e9);
-  const bool posted = store_thread_.Post([this, quota, has_clock, stop = care_.get_token()] {
-    try {
-      const int old =
-          has_clock ? store_->RemoveOldScans(store_->GetSettings().retention_days, stop) : 0;
-      const int over = store_->KeepWithinQuota(quota, stop);
-      if (old + over > 0)
-        Log(LogLevel::kNotice,
-            fmt::format("removed {} scans for their age, {} for the quota", old, over));
-    } catch (const std::exception& error) {
-      Log(LogLevel::kError, fmt::format("cannot remove old scans: {}", error.what()));
-    }
-  });
-  if (!posted) Log(LogLevel::kWarning, "the store is too busy to remove old scans now");
-}
-
 void Appliance::OpenSession(const std::string& session_id, const std::string& patient_id,
                             web::ScanPurpose purpose, const std::string& reason,
                             const web::Actor& actor) {
@@ -616,6 +522,8 @@ void Appliance::OnTick() {
   clock_.Look(std::chrono::system_clock::now(), Clock::now());
   if (!is_running && --ticks_to_disk_check_ <= 0) CheckDisk();
   if (!is_running && --ticks_to_care_ <= 0) Care();
+  if (!is_running && --ticks_to_file_check_ <= 0) CheckStoredFiles();
+  if (!is_running && --ticks_to_backup_ <= 0) BackUpIfDue();
   if (parts_.button != nullptr && button_source_.is_armed()) ArmButtonTimer();
 }
 

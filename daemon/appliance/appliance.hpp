@@ -63,6 +63,12 @@ class Appliance {
   Answer EndSweep();
   /// Discards the running scan.
   Answer Cancel();
+  /// Off the loop, while scans go on. Calls `done` on the loop, with why none was made (empty: it
+  /// was) and what it holds.
+  void BackUp(const web::Actor& actor, const std::filesystem::path& folder,
+              std::function<void(const std::string& error, const BackupReport& report)> done);
+  /// Where a backup of today belongs; empty: no folder is configured.
+  [[nodiscard]] std::filesystem::path BackupTarget() const;
   /// Asked before each scan: a reason why none may begin now, or nothing.
   void SetHindrance(std::function<std::string()> hindrance) { hindrance_ = std::move(hindrance); }
   /// The session that the store has opened: scans belong to it until it is closed.
@@ -138,8 +144,11 @@ class Appliance {
 
   static constexpr int kDiskCheckTicks = 10;  ///< Seconds, while no scan runs.
   static constexpr int kCareTicks = 3600;     ///< Likewise.
+  static constexpr int kFirstFileCheckTicks = 30;
+  static constexpr int kBackupTicks = 60;  ///< Until it is looked at whether one is due.
 
   void OpenStore();
+  void LogRecovery(const RecoveryReport& found) const;
   Answer Handle(ScanEvent event);
   void ArmSessionTimer();
   void OnSessionTimer();
@@ -165,6 +174,12 @@ class Appliance {
   void ArmButtonTimer();
   void Care();
   void CheckDisk();
+  void CheckStoredFiles();
+  void BackUpIfDue();
+  [[nodiscard]] std::uint64_t NeededBytes() const;
+  [[nodiscard]] Answer WhyNoSpace() const;
+  [[nodiscard]] std::vector<std::string> StorageWarnings() const;
+  [[nodiscard]] std::uint64_t QuotaBytes() const;
   void FailStorage(const std::string& what);
   void ReadStored(web::Status& status);
   void Show();
@@ -179,10 +194,12 @@ class Appliance {
   EventLoop& loop_;
   ApplianceParts parts_;
   std::unique_ptr<Store> store_;
-  std::string storage_fault_;
+  std::string storage_fault_, backup_fault_;
   std::function<std::string()> hindrance_;
   int ticks_to_disk_check_ = kDiskCheckTicks;
   int ticks_to_care_ = kCareTicks;
+  int ticks_to_file_check_ = kFirstFileCheckTicks;
+  int ticks_to_backup_ = kBackupTicks;
   ClockWatch clock_{std::chrono::system_clock::now(), std::chrono::steady_clock::now()};
   std::stop_source care_;  ///< Stopped when the appliance ends.
   ScanState state_;
@@ -205,6 +222,7 @@ class Appliance {
   EventLoop::Source result_timer_, limit_timer_, session_timer_, tick_timer_, button_source_,
       button_timer_;
   WorkThread store_thread_{256};
+  WorkThread check_thread_{4};  ///< Reads stored files; changes do not wait for it.
   std::unique_ptr<SensorThread> sensors_;
   std::unique_ptr<ScanSession> session_;  // last: its thread uses what is above
 };

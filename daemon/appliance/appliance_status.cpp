@@ -257,6 +257,7 @@ std::string Appliance::StatusJson() {
       {"scan", scan},
       {"last_result", last},
       {"light", Name(shown_)},
+      {"warnings", StorageWarnings()},
       {"page",
        {{"url", page_.url}, {"certificate", page_.certificate}, {"warnings", page_.warnings}}},
       {"loop", LoopJson(loop_.meter())},
@@ -277,6 +278,7 @@ web::Status Appliance::WebStatus() {
                    .frames_per_second = sensor.present ? sensor.statistics.frames_per_second : 0.0,
                    .powered_s = sensor.present ? SecondsSince(sensor_since_) : 0.0};
   status.storage = StorageOf(parts_.config.appliance.state, storage_fault_.empty());
+  status.storage.warnings = StorageWarnings();
   status.light = Name(shown_);
   status.patient_id = check_ ? std::string() : open_patient_;
   status.next_purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
@@ -349,6 +351,8 @@ web::Health Appliance::Health() {
   if (!storage_fault_.empty()) return {.ok = false, .reason = "storage: " + storage_fault_};
   if (!StorageOf(parts_.config.appliance.state, true).writable)
     return {.ok = false, .reason = "storage: the state folder is on a read-only disk"};
+  if (const std::string full = WhyNoSpace(); !full.empty())
+    return {.ok = false, .reason = "storage: " + full};
   if (!WorkersAreAlive()) return {.ok = false, .reason = "a worker thread shows no progress"};
   if (state_.phase == ScanPhase::kFault && state_.fault == FaultKind::kSensor)
     return {.ok = false, .reason = "sensor: " + sensor_fault_};

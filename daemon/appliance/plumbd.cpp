@@ -2,6 +2,7 @@
 
 #include <signal.h>
 #include <sys/epoll.h>
+#include <sys/stat.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
@@ -19,6 +20,7 @@
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
 #include "algo/base/notice.hpp"
@@ -246,6 +248,15 @@ std::optional<int> InheritedSocket(const std::string& name) {
   return found;
 }
 
+std::string BackupDone(const BackupReport& report) {
+  return nlohmann::json{{"ok", true},
+                        {"scans", report.scans},
+                        {"files", report.files},
+                        {"bytes", report.bytes},
+                        {"problems", report.problems}}
+      .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 class Plumbd {
  public:
   Plumbd(const Options& options, const Config& config, const std::string& fault)
@@ -346,6 +357,12 @@ class Plumbd {
             appliance_.Press(request.is_long ? ButtonPress::kLong : ButtonPress::kShort);
         return reply(refusal.empty() ? ControlDone() : ControlRefusal(refusal));
       }
+      case Kind::kBackup:
+        return appliance_.BackUp(
+            {.user = "control socket", .address = {}}, request.folder,
+            [reply](const std::string& error, const BackupReport& report) {
+              reply(error.empty() ? BackupDone(report) : ControlRefusal(error));
+            });
       case Kind::kSim:
         break;
     }
@@ -428,6 +445,8 @@ int RunChecked(const Options& options) {
   if (options.simulated.empty() == false && !options.state)
     throw std::invalid_argument("--simulated needs --state DIR, a folder of its own");
   const Configured configured = ReadOrExplain(options);
+  // What is stored is for this account and at most its group.
+  ::umask(::umask(0077) | 0027);
   std::error_code ignored;
   fs::create_directories(configured.config.appliance.state,
                          ignored);  // what cannot be made is told when the store opens

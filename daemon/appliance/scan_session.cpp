@@ -18,15 +18,22 @@ namespace {
 
 constexpr double kUpdateEvery_s = 0.1;
 
-Scene ReadReference(const std::filesystem::path& folder) {
+/// A reference that is not what was approved gives no verdict.
+Scene ReadReference(const ScanJob& job, const std::stop_token& stop) {
+  constexpr const char* kRemedy =
+      "put a backup of the scan's files in their place, or take a new reference";
+  if (job.check_reference) {
+    const std::string fault = job.check_reference(stop);
+    if (!fault.empty())
+      throw std::runtime_error(fmt::format("the patient's reference cannot be used: {} in {}; {}",
+                                           fault, job.reference_scene.parent_path().string(),
+                                           kRemedy));
+  }
   try {
-    return ReadScene(folder);
+    return ReadScene(job.reference_scene);
   } catch (const std::exception& error) {
     throw std::runtime_error(
-        fmt::format("the patient's reference cannot be read: {}; put a backup of the scan's files "
-                    "in their place, or "
-                    "take a new reference",
-                    error.what()));
+        fmt::format("the patient's reference cannot be read: {}; {}", error.what(), kRemedy));
   }
 }
 
@@ -80,9 +87,8 @@ void ScanSession::Scan(const std::stop_token& stop) {
   folder_ = callbacks_.begin();
   // Read while the sweep goes on: it is wanted as soon as the new scene is there.
   if (!job_.reference_scene.empty()) {
-    reference_ = std::async(std::launch::async, [folder = job_.reference_scene] {
-                   return ReadReference(folder);
-                 }).share();
+    reference_ =
+        std::async(std::launch::async, [this, stop] { return ReadReference(job_, stop); }).share();
   }
   const Scene scene = Track(stop);
   if (job_.check) {
@@ -110,14 +116,32 @@ void ScanSession::Save() {
   }
 }
 
+namespace {
+
+/// What made the scan fail is told; that its images cannot be written either is not.
+void KeepFailed(RecordingFeed& recording, const std::stop_token& stop) {
+  try {
+    recording.Finish();
+    recording.Complete(stop);
+  } catch (const std::exception&) {  // an incomplete recording is not kept
+  }
+}
+
+}  // namespace
+
 Scene ScanSession::Track(const std::stop_token& stop) {
   std::optional<RecordingFeed> recording;
   if (job_.keep_recording) recording.emplace(*feed_, job_.info, folder_ / "recording");
   FrameFeed& feed = recording ? static_cast<FrameFeed&>(*recording) : *feed_;
-  Scene scene = RunScan(feed, job_.info, job_.reconstructor, stop,
-                        [this](const ScanProgress& progress) { OnProgress(progress); });
-  if (recording) recording->Complete(stop);
-  return scene;
+  try {
+    Scene scene = RunScan(feed, job_.info, job_.reconstructor, stop,
+                          [this](const ScanProgress& progress) { OnProgress(progress); });
+    if (recording) recording->Complete(stop);
+    return scene;
+  } catch (...) {
+    if (recording && !stop.stop_requested()) KeepFailed(*recording, stop);
+    throw;
+  }
 }
 
 void ScanSession::OnProgress(const ScanProgress& progress) {

@@ -33,6 +33,8 @@ struct ScanJob {
   CompareOptions compare;
   GuidanceOptions guidance;
   std::filesystem::path reference_scene;  ///< SCENE to compare with; empty: none.
+  /// Why the reference is not what was approved; empty: it is. Asked before it is read.
+  std::function<std::string(const std::stop_token&)> check_reference;
   bool is_reference =
       false;  ///< The scene must be one that others can be compared with, else there is no answer.
   std::optional<CheckJob> check;  ///< Set: the daily check; nothing but its numbers is kept.

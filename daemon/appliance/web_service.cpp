@@ -287,8 +287,8 @@ std::optional<web::Reference> WebService::FindReference(const std::string& id) {
 
 void WebService::AddReference(const web::Actor& actor, const std::string& scan_id,
                               const std::string& reason, web::Done done) {
-  Change(std::move(done), [=, plan = appliance_.DefaultPlan()](Store& store) {
-    return store.AddReference(actor, scan_id, reason, plan);
+  Change(std::move(done), [=, this](Store& store) {
+    return store.AddReference(actor, scan_id, reason, appliance_.DefaultPlan());
   });
 }
 void WebService::PlanReference(const web::Actor& actor, const std::string& id, int revision,
@@ -328,6 +328,29 @@ void WebService::AcceptScan(const web::Actor& actor, const std::string& id,
     return done(AnswerOf("this result is older than 2 minutes: scan again, then accept"));
   Change(std::move(done),
          [=](Store& store) { return store.AcceptScan(actor, id, reason), std::string(); });
+}
+
+void WebService::RemoveScan(const web::Actor& actor, const std::string& id,
+                            const std::string& reason, web::Done done) {
+  Change(std::move(done),
+         [=](Store& store) { return store.RemoveScan(actor, id, reason), std::string(); });
+}
+
+void WebService::MakeBackup(const web::Actor& actor, web::Done done) {
+  const std::filesystem::path folder = appliance_.BackupTarget();
+  if (folder.empty())
+    return done({.result = ChangeResult::kInvalid,
+                 .message = "no folder for backups is configured: set backup_folder in [storage]",
+                 .id = {},
+                 .file = {}});
+  appliance_.BackUp(actor, folder,
+                    [done, alive = alive_](const std::string& error, const BackupReport&) {
+                      if (!*alive) return;
+                      done({.result = error.empty() ? ChangeResult::kDone : ChangeResult::kFailed,
+                            .message = error,
+                            .id = {},
+                            .file = {}});
+                    });
 }
 
 std::optional<std::string> WebService::CompactMap(const std::string& scan_id,

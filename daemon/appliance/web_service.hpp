@@ -53,6 +53,9 @@ class WebService : public web::ScanService {
 
   [[nodiscard]] std::vector<web::Scan> Scans(const std::string& patient_id, int limit) override;
   [[nodiscard]] std::optional<web::Scan> FindScan(const std::string& id) override;
+  void RemoveScan(const web::Actor& actor, const std::string& id, const std::string& reason,
+                  web::Done done) override;
+  void MakeBackup(const web::Actor& actor, web::Done done) override;
   void AcceptScan(const web::Actor& actor, const std::string& id, const std::string& reason,
                   web::Done done) override;
 

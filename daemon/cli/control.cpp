@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
+#include "daemon/cli/ask_plumbd.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/control/control_protocol.hpp"
 #include "daemon/control/unix_socket.hpp"
@@ -75,13 +76,7 @@ class ControlConnection {
 Json Ask(const std::filesystem::path& socket, const ControlRequest& request,
          const CommandContext& context) {
   constexpr int kTimeout_ms = 10'000;
-  ControlConnection connection(socket, request);
-  const std::optional<std::string> line = connection.ReadLine(context.stop, kTimeout_ms);
-  if (!line) throw DeviceError("plumbd hung up without an answer");
-  const Json answer = Json::parse(*line, nullptr, /*allow_exceptions=*/false);
-  if (!answer.is_object())
-    throw DeviceError("plumbd's answer is no JSON object; are both of one version?");
-  return answer;
+  return AskPlumbd(socket, request, context.stop, kTimeout_ms);
 }
 
 std::string NumberText(const Json& result, const char* name) {
@@ -138,6 +133,8 @@ std::string StatusText(const Json& status) {
     for (const Json& reason : last.value("reasons", Json::array()))
       text += fmt::format("         {}\n", reason.is_string() ? reason.get<std::string>() : "");
   }
+  for (const Json& warning : status.value("warnings", Json::array()))
+    text += fmt::format("warning  {}\n", warning.is_string() ? warning.get<std::string>() : "");
   return text + fmt::format("version  {}\n", status.value("version", ""));
 }
 
@@ -198,6 +195,17 @@ int Watch(const CommandContext& context) {
 }
 
 }  // namespace
+
+nlohmann::json AskPlumbd(const std::filesystem::path& socket, const ControlRequest& request,
+                         const std::stop_token& stop, std::optional<int> timeout_ms) {
+  ControlConnection connection(socket, request);
+  const std::optional<std::string> line = connection.ReadLine(stop, timeout_ms);
+  if (!line) throw DeviceError("plumbd hung up without an answer");
+  Json answer = Json::parse(*line, nullptr, /*allow_exceptions=*/false);
+  if (!answer.is_object())
+    throw DeviceError("plumbd's answer is no JSON object; are both of one version?");
+  return answer;
+}
 
 Command AddStatus(CLI::App& app) {
   auto options = std::make_shared<StatusOptions>();

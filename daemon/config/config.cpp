@@ -174,13 +174,25 @@ void ReadAppliance(Section section, ApplianceConfig& appliance) {
   section.Take("sensor_serial", appliance.sensor_serial, "the serial of a sensor",
                [](const std::string& s) { return s.size() <= 64; });
   section.Take("keep_recordings", appliance.keep_recordings, "true or false", kAny);
-  section.Take("quota_gb", appliance.quota_gb, "gigabytes from 1 to 100000",
+  double quota_gb = -1;
+  section.Take("quota_gb", quota_gb, "gigabytes from 1 to 100000",
                [](double v) { return v >= 1 && v <= 100000; });
+  if (quota_gb >= 0) appliance.quota_gb = quota_gb;
   take_seconds("auto_stop_s", appliance.auto_stop_s, 1, 120);
   take_seconds("scan_limit_s", appliance.scan_limit_s, 1, 600);
   std::optional<double> result_s;
   take_seconds("result_s", result_s, 1, 3600);
   appliance.result_s = result_s.value_or(appliance.result_s);
+  section.RefuseTheRest();
+}
+
+void ReadStorage(Section section, ApplianceConfig& appliance) {
+  std::string folder;
+  section.Take("backup_folder", folder, "an absolute path",
+               [](const std::string& s) { return s.starts_with('/') && s.size() < 1024; });
+  if (!folder.empty()) appliance.backup_folder = folder;
+  section.Take("backup_hours", appliance.backup_hours, "hours from 1 to 8760",
+               [](double v) { return v >= 1 && v <= 8760; });
   section.RefuseTheRest();
 }
 
@@ -269,9 +281,9 @@ Config ParseConfig(const std::string& text, const std::string& name, ConfigUse u
     throw DataError(fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line,
                                 error.description()));
   }
-  static constexpr std::array<std::string_view, 10> kSections = {
-      "markers",   "reconstruct", "compare", "check", "iec",
-      "appliance", "button",      "light",   "web",   "update"};
+  static constexpr std::array<std::string_view, 11> kSections = {
+      "markers", "reconstruct", "compare", "check", "iec",   "appliance",
+      "storage", "button",      "light",   "web",   "update"};
   for (const auto& [key, node] : root) {
     if (std::find(kSections.begin(), kSections.end(), key.str()) != kSections.end()) continue;
     throw DataError(fmt::format("{}:{}: unknown table or key '{}'; known are [{}]", name,
@@ -284,6 +296,7 @@ Config ParseConfig(const std::string& text, const std::string& name, ConfigUse u
   ReadCheck(Section(root, "check", name), config.check);
   ReadIec(Section(root, "iec", name), root, config.compare.T_iec_reference);
   ReadAppliance(Section(root, "appliance", name), config.appliance);
+  ReadStorage(Section(root, "storage", name), config.appliance);
   ReadPanel(Section(root, "button", name), Section(root, "light", name), config.panel);
   ReadWeb(Section(root, "web", name), config.web);
   ReadUpdate(Section(root, "update", name), config.update);

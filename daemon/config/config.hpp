@@ -30,11 +30,14 @@ struct ApplianceConfig {
       "/var/lib/plumb/calibration";  ///< SERIAL.yaml for each calibrated sensor.
   std::string sensor_serial;         ///< Only this sensor; empty: the first one.
   bool keep_recordings = false;      ///< Of every scan, whatever the page's settings say.
-  double quota_gb = 100.0;           ///< Of all scans; beyond, the oldest go.
+  std::optional<double> quota_gb;    ///< Of all scans; beyond, the oldest go. None: a share of the
+                                     ///< disk.
   std::optional<double>
       auto_stop_s;  ///< Sweep ends after so long without new coverage; none: the page's setting.
-  std::optional<double> scan_limit_s;  ///< Longest sweep; none: the page's setting.
-  double result_s = 120.0;             ///< A result is shown for so long.
+  std::optional<double> scan_limit_s;   ///< Longest sweep; none: the page's setting.
+  double result_s = 120.0;              ///< A result is shown for so long.
+  std::filesystem::path backup_folder;  ///< Of the backups made by the clock; empty: none are.
+  double backup_hours = 24.0;
 };
 
 /// Start button and light on GPIO lines. A line is its name as the device tree has it, or its
@@ -110,10 +113,11 @@ enum class ConfigUse { kCommandLine, kAppliance };
 ///                    max_residual_p95_mm, max_lost_s
 ///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views:
 ///     limits of the daily check [iec]          T_iec_reference = 4 rows of 4: reference marker's
-///     frame to the IEC fixed frame [appliance]    state, control, calibration, sensor_serial,
-///     keep_recordings, quota_gb, auto_stop_s, scan_limit_s, result_s [button]       chip, line,
-///     active_low [light]        chip, red, green, blue, beeper, active_low [web]          listen,
-///     tls_certificate, tls_key, plain_http, host_names [update]       folder, max_bundle_mb
+///     frame to the IEC fixed frame [storage] backup_folder, backup_hours [appliance]    state,
+///     control, calibration, sensor_serial, keep_recordings, quota_gb, auto_stop_s, scan_limit_s,
+///     result_s [button]       chip, line, active_low [light]        chip, red, green, blue,
+///     beeper, active_low [web]          listen, tls_certificate, tls_key, plain_http, host_names
+///     [update] folder, max_bundle_mb
 ///
 /// @throws DataError naming file, line, key, what was expected and found. A key that is not listed
 /// is an error.

@@ -20,6 +20,7 @@ using Kind = ControlRequest::Kind;
 constexpr std::array<std::string_view, 8> kActions = {"plug",  "unplug",     "stall",  "resume",
                                                       "error", "next-scene", "glitch", "speed"};
 constexpr std::size_t kMaxArgument = 80;
+constexpr std::size_t kMaxFolder = 1024;
 
 /// The argument goes on to the virtual sensor in one line with the action.
 bool IsWords(const std::string& text) {
@@ -82,8 +83,15 @@ ControlRequest ParseControlRequest(std::string_view line) {
       throw DataError(fmt::format(
           "sim: \"argument\" is at most {} letters, digits, spaces, -, _ and dots", kMaxArgument));
     }
+  } else if (command == "backup") {
+    request.kind = Kind::kBackup;
+    allow_only({"command", "folder"});
+    request.folder = text("folder");
+    if (!request.folder.starts_with('/') || request.folder.size() > kMaxFolder ||
+        request.folder.find('\0') != std::string::npos)
+      throw DataError("backup: \"folder\" is an absolute path");
   } else {
-    throw DataError("expected a command of status, press, watch, sim");
+    throw DataError("expected a command of status, press, watch, sim, backup");
   }
   return request;
 }
@@ -96,6 +104,8 @@ std::string ControlRequestText(const ControlRequest& request) {
       return Json{{"command", "watch"}}.dump();
     case Kind::kPress:
       return Json{{"command", "press"}, {"long", request.is_long}}.dump();
+    case Kind::kBackup:
+      return Json{{"command", "backup"}, {"folder", request.folder}}.dump();
     case Kind::kSim:
       break;
   }

@@ -9,16 +9,17 @@ namespace plumb {
 
 inline constexpr std::size_t kMaxControlLine = 4096;  ///< Bytes of a request.
 
-/// {"command": "status" | "press" | "watch" | "sim", "long": bool with press, "action" and,
-/// optional, "argument": texts with sim}
+/// {"command": "status" | "press" | "watch" | "sim" | "backup", "long": bool with press, "action"
+/// and, optional, "argument": texts with sim, "folder": an absolute path with backup}
 struct ControlRequest {
-  enum class Kind { kStatus, kPress, kWatch, kSim };
+  enum class Kind { kStatus, kPress, kWatch, kSim, kBackup };
   Kind kind = Kind::kStatus;
   bool is_long = false;  ///< kPress
   std::string
       action;  ///< kSim: one of plug, unplug, stall, resume, error, next-scene, glitch, speed.
   std::string argument;  ///< kSim: a serial, what kind of glitch and how often, or how fast; words
                          ///< of letters, digits, -, _ and dots.
+  std::string folder = {};  ///< kBackup: where it is made.
   bool operator==(const ControlRequest&) const = default;
 };
 

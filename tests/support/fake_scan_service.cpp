@@ -510,6 +510,22 @@ std::vector<Scan> FakeScanService::Scans(const std::string& patient_id, int limi
 
 std::optional<Scan> FakeScanService::FindScan(const std::string& id) { return FindById(scans, id); }
 
+void FakeScanService::RemoveScan(const Actor& actor, const std::string& id, const std::string&,
+                                 Done done) {
+  for (const Reference& reference : references) {
+    if (reference.scan_id == id)
+      return Finish(done, Refusal(ChangeResult::kConflict, "a reference is made of this scan"));
+  }
+  if (std::erase_if(scans, [&](const Scan& scan) { return scan.id == id; }) == 0)
+    return Finish(done, Refusal(ChangeResult::kNotFound, "there is no such scan"));
+  Tell(EventKind::kData);
+  Did(actor, "scan.remove", id, done);
+}
+
+void FakeScanService::MakeBackup(const Actor& actor, Done done) {
+  Did(actor, "backup.make", "", done);
+}
+
 void FakeScanService::AcceptScan(const Actor& actor, const std::string& id,
                                  const std::string& reason, Done done) {
   const auto found =

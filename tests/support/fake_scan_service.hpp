@@ -98,6 +98,9 @@ class FakeScanService : public web::ScanService {
                         const std::string& digest, web::Done done) override;
   std::vector<web::Scan> Scans(const std::string& patient_id, int limit) override;
   std::optional<web::Scan> FindScan(const std::string& id) override;
+  void RemoveScan(const web::Actor& actor, const std::string& id, const std::string& reason,
+                  web::Done done) override;
+  void MakeBackup(const web::Actor& actor, web::Done done) override;
   void AcceptScan(const web::Actor& actor, const std::string& id, const std::string& reason,
                   web::Done done) override;
   std::optional<std::string> CompactMap(const std::string& scan_id,

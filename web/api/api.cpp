@@ -284,6 +284,13 @@ void AddScanRoutes(Table& table) {
                return scan ? JsonResponse(ToJson(*scan, WallClock::now()))
                            : ErrorResponse(404, "no such scan");
              });
+  table.Write("DELETE", "/api/v1/scans/{id}", Permission::kWipe, BodyKind::kJson,
+              [](ScanService& service, const Request& request, const Respond& respond) {
+                Fields fields(request.body);
+                const std::string reason = fields.Text("reason", 3, 200);
+                fields.Finish();
+                service.RemoveScan(request.actor(), request.arguments[0], reason, Answer(respond));
+              });
   table.Write("POST", "/api/v1/scans/{id}/accept", Permission::kAccept, BodyKind::kNone,
               [](ScanService& service, const Request& request, const Respond& respond) {
                 service.AcceptScan(request.actor(), request.arguments[0], /*reason=*/{},
@@ -363,6 +370,10 @@ void AddCareRoutes(Table& table) {
   table.Write("DELETE", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kNone,
               [](ScanService& service, const Request& request, const Respond& respond) {
                 service.RemoveBundle(request.actor(), request.arguments[0], Answer(respond));
+              });
+  table.Write("POST", "/api/v1/backup", Permission::kSettings, BodyKind::kNone,
+              [](ScanService& service, const Request& request, const Respond& respond) {
+                service.MakeBackup(request.actor(), Answer(respond));
               });
   table.Write("POST", "/api/v1/diagnostics", Permission::kDiagnostics, BodyKind::kNone,
               [](ScanService& service, const Request& request, const Respond& respond) {

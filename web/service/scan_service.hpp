@@ -132,6 +132,10 @@ class ScanService {
   ///                is accepted, for this reason.
   virtual void AcceptScan(const Actor& actor, const std::string& id, const std::string& reason,
                           Done done) = 0;
+  /// Removes the scan with its files, for a reason that the log keeps. kConflict for one that a
+  /// reference is made of, that runs, and while a backup is made.
+  virtual void RemoveScan(const Actor& actor, const std::string& id, const std::string& reason,
+                          Done done) = 0;
 
   /// A map of a scan in few bytes (daemon/files/compact_map.hpp); nothing where there is none
   /// (aside). @param name  "heightmap", "deviation", "deviation_after" or "region".
@@ -180,6 +184,9 @@ class ScanService {
   virtual void RemoveBundle(const Actor& actor, const std::string& name, Done done) = 0;
   virtual void InstallUpdate(const Actor& actor, const std::string& bundle,
                              Done done) = 0;  ///< kConflict during a scan.
+  /// In the configured folder, while scans go on; answers when it is done. kInvalid where no folder
+  /// is configured. The message names what was not as it was stored.
+  virtual void MakeBackup(const Actor& actor, Done done) = 0;
   /// Gives a file (no patient data in it) that is downloaded once and then removed.
   virtual void WriteDiagnostics(const Actor& actor, Done done) = 0;
 };

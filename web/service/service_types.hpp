@@ -68,6 +68,7 @@ struct StorageStatus {
   std::int64_t free_bytes = 0;
   std::int64_t total_bytes = 0;
   bool writable = true;
+  std::vector<std::string> warnings = {};  ///< Sentences for people: nearly full, no backup.
 };
 
 struct SixNumbers {

@@ -25,6 +25,9 @@ quota_gb = 12.5
 auto_stop_s = 4
 scan_limit_s = 30
 result_s = 300
+[storage]
+backup_folder = "/mnt/backup"
+backup_hours = 12
 [button]
 chip = "gpiochip1"
 line = "start"
@@ -45,6 +48,8 @@ host_names = ["plumb.local", "couch"]
   EXPECT_EQ(config.appliance.sensor_serial, "1804060024");
   EXPECT_TRUE(config.appliance.keep_recordings);
   EXPECT_EQ(config.appliance.quota_gb, 12.5);
+  EXPECT_EQ(config.appliance.backup_folder, "/mnt/backup");
+  EXPECT_EQ(config.appliance.backup_hours, 12);
   EXPECT_EQ(config.appliance.auto_stop_s, 4.0);
   EXPECT_EQ(config.appliance.scan_limit_s, 30.0);
   EXPECT_EQ(config.appliance.result_s, 300.0);
@@ -67,6 +72,8 @@ TEST(ApplianceConfigTest, WhatIsWrongIsToldWithItsLine) {
               AllOf(HasSubstr("plumb.toml:3"), HasSubstr("absolute"), HasSubstr("relative")));
   EXPECT_THAT(complaint("[appliance]\nauto_stop_s = 1000\n"),
               AllOf(HasSubstr(":2"), HasSubstr("120")));
+  EXPECT_THAT(complaint("[storage]\nbackup_hours = 0.5\n"), HasSubstr("1 to 8760"));
+  EXPECT_THAT(complaint("[storage]\nbackup_folder = \"usb\"\n"), HasSubstr("absolute"));
   EXPECT_THAT(complaint("[appliance]\nquota = 3\n"),
               AllOf(HasSubstr(":2"), HasSubstr("unknown key 'quota'"), HasSubstr("quota_gb")));
   EXPECT_THAT(complaint("[web]\nlisten = \"8080\"\n"),

@@ -31,7 +31,8 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
              .before_scan = {},
              .button = nullptr,
              .indicator = nullptr,
-             .demo_patient = {}});
+             .demo_patient = {},
+             .configuration_fault = {}});
   for (const fs::directory_entry& entry : fs::directory_iterator(config.appliance.state)) {
     if (!entry.is_regular_file()) continue;
     std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
@@ -45,6 +46,66 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
   EXPECT_THAT(appliance.storage_fault(), HasSubstr("damaged"));
   EXPECT_FALSE(appliance.WebStatus().fault.empty());
   EXPECT_FALSE(appliance.Health().ok);
+}
+
+/// Until `done`, or for 20 s.
+template <typename Done>
+bool RunUntil(EventLoop& loop, const Done& done) {
+  bool is_done = false;
+  EventLoop::Source end = loop.MakeTimer("end", [&] { loop.Quit(0); });
+  end.ArmAfter(std::chrono::seconds(20));
+  EventLoop::Source look = loop.MakeTimer("look", [&] {
+    is_done = done();
+    if (is_done) return loop.Quit(0);
+    look.ArmAfter(std::chrono::milliseconds(20));
+  });
+  look.ArmAfter(std::chrono::milliseconds(1));
+  (void)loop.Run();
+  return is_done;
+}
+
+ApplianceParts PartsOf(const Config& config, testing::FakeBus& bus) {
+  return {.config = config,
+          .make_provider = [&bus] { return std::make_unique<testing::FakeProvider>(bus); },
+          .before_scan = {},
+          .button = nullptr,
+          .indicator = nullptr,
+          .demo_patient = {},
+          .configuration_fault = {}};
+}
+
+TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {
+  const testing::TempFolder folder;
+  testing::FakeBus bus;
+  EventLoop loop;
+  Config config;
+  config.appliance.state = folder / "state";
+  {
+    Appliance appliance(loop, PartsOf(config, bus));
+    EXPECT_TRUE(appliance.BackupTarget().empty());
+    std::optional<std::string> made, refused;
+    appliance.BackUp({.user = "anna", .address = {}}, folder / "backup",
+                     [&](const std::string& error, const BackupReport& report) {
+                       made = error;
+                       EXPECT_EQ(report.files, 1U);
+                     });
+    appliance.BackUp({.user = "anna", .address = {}}, "/proc/backup",
+                     [&](const std::string& error, const BackupReport&) { refused = error; });
+    EXPECT_FALSE(made || refused) << "the loop does not wait";
+    EXPECT_TRUE(RunUntil(loop, [&] { return made && refused; }));
+    EXPECT_EQ(made, "");
+    EXPECT_THAT(refused.value_or(""), HasSubstr("/proc"));
+  }
+  EXPECT_EQ(RestoreBackup(folder / "backup", folder / "restored").files, 1U);
+  {
+    std::ofstream(config.appliance.state / "plumb.db") << std::string(20000, 'x');
+    EventLoop another;
+    Appliance appliance(another, PartsOf(config, bus));
+    std::string answer;
+    appliance.BackUp({.user = "anna", .address = {}}, folder / "other",
+                     [&](const std::string& error, const BackupReport&) { answer = error; });
+    EXPECT_THAT(answer, HasSubstr("safe mode"));
+  }
 }
 
 }  // namespace

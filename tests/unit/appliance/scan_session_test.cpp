@@ -175,6 +175,30 @@ TEST_F(ScanSessionTest, AReferenceThatCannotBeReadEndsTheSweepAsAFault) {
   EXPECT_THAT(saved_, ElementsAre(Kind::kFailed));
 }
 
+TEST_F(ScanSessionTest, AReferenceThatIsNotWhatWasStoredGivesNoVerdict) {
+  job_.reference_scene = folder_ / "000007" / "scene";
+  job_.check_reference = [](const std::stop_token&) {
+    return std::string("scene/cloud.ply has been changed");
+  };
+  Start();
+  PushUntilTheEnd();
+  const ScanOutcome outcome = WaitForEnd();
+  EXPECT_EQ(outcome.kind, Kind::kFailed);
+  EXPECT_FALSE(outcome.verdict);
+  EXPECT_THAT(outcome.reason, ::testing::AllOf(HasSubstr("scene/cloud.ply has been changed"),
+                                               HasSubstr("000007"), HasSubstr("backup")));
+}
+
+TEST_F(ScanSessionTest, AFailedSweepLeavesItsWholeRecording) {
+  job_.keep_recording = true;
+  job_.queue_capacity = 100;
+  job_.reference_scene = folder_ / "nowhere";
+  Start();
+  PushUntilTheEnd();
+  EXPECT_EQ(WaitForEnd().kind, Kind::kFailed);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "recording" / "rgb.txt"));
+}
+
 TEST_F(ScanSessionTest, TheSweepIsCompleteOnceWhenNothingNewIsSeenForLongEnough) {
   job_.stop_after_s = 1.0;
   job_.queue_capacity = 100;

@@ -29,20 +29,36 @@ TEST(ControlProtocolTest, EveryRequestReadsBack) {
         ControlRequest{.kind = Kind::kPress, .is_long = false, .action = {}, .argument = {}},
         ControlRequest{.kind = Kind::kPress, .is_long = true, .action = {}, .argument = {}},
         ControlRequest{.kind = Kind::kSim, .action = "next-scene", .argument = {}},
+        ControlRequest{
+            .kind = Kind::kBackup, .action = {}, .argument = {}, .folder = "/mnt/a \"b\""},
         ControlRequest{.kind = Kind::kSim, .action = "glitch", .argument = "late 30"}}) {
     EXPECT_EQ(ParseControlRequest(ControlRequestText(request)), request);
   }
 }
 
 TEST(ControlProtocolTest, RefusesEverythingElse) {
-  for (const char* line :
-       {"", "status", "[]", "{}", "null", "{\"command\":1}", "{\"command\":\"reboot\"}",
-        "{\"command\":\"status\",\"x\":1}", "{\"command\":\"press\",\"long\":\"yes\"}",
-        "{\"command\":\"sim\"}", "{\"command\":\"sim\",\"action\":\"explode\"}",
-        "{\"command\":\"sim\",\"action\":\"plug\",\"argument\":7}",
-        "{\"command\":\"sim\",\"action\":\"plug\",\"argument\":\"a\\nb\"}",
-        "{\"command\":{\"a\":{\"b\":{}}}}", "{\"command\":\"status\"} {}",
-        "{\"command\":\"status\"", "\xff\xfe"}) {
+  for (const char* line : {"",
+                           "status",
+                           "[]",
+                           "{}",
+                           "null",
+                           "{\"command\":1}",
+                           "{\"command\":\"reboot\"}",
+                           "{\"command\":\"status\",\"x\":1}",
+                           "{\"command\":\"press\",\"long\":\"yes\"}",
+                           "{\"command\":\"sim\"}",
+                           "{\"command\":\"sim\",\"action\":\"explode\"}",
+                           "{\"command\":\"sim\",\"action\":\"plug\",\"argument\":7}",
+                           "{\"command\":\"sim\",\"action\":\"plug\",\"argument\":\"a\\nb\"}",
+                           "{\"command\":\"backup\"}",
+                           "{\"command\":\"backup\",\"folder\":\"relative\"}",
+                           "{\"command\":\"backup\",\"folder\":7}",
+                           "{\"command\":\"backup\",\"folder\":\"/a\\u0000b\"}",
+                           "{\"command\":\"status\",\"folder\":\"/a\"}",
+                           "{\"command\":{\"a\":{\"b\":{}}}}",
+                           "{\"command\":\"status\"} {}",
+                           "{\"command\":\"status\"",
+                           "\xff\xfe"}) {
     EXPECT_THROW((void)ParseControlRequest(line), DataError) << line;
   }
   EXPECT_THROW((void)ParseControlRequest(std::string(100'000, '[')), DataError);

@@ -98,6 +98,36 @@ TEST_F(ApiTest, ScanGoesFromPressToResultAndIsAudited) {
                                                 "technician cancel", "physicist login"}));
 }
 
+TEST_F(ApiTest, AScanIsRemovedForAReasonByWhoMayAndAReferenceIsNot) {
+  loop_->Do([&] {
+    for (const char* id : {"000001", "000002"}) {
+      service_.scans.emplace_back();
+      service_.scans.back().id = id;
+    }
+    service_.references.emplace_back();
+    service_.references.back().scan_id = "000001";
+  });
+  HttpClient physicist = LoggedIn("physicist");
+  const std::string reason = R"({"reason":"blurred"})";
+  for (const char* role : {"technician", "engineer"})
+    EXPECT_EQ(LoggedIn(role).Ask("DELETE", "/api/v1/scans/000002", reason).status, 403) << role;
+  EXPECT_EQ(physicist.Ask("DELETE", "/api/v1/scans/000002", "{}").status, 400);
+  EXPECT_EQ(physicist.Ask("DELETE", "/api/v1/scans/000002", R"({"reason":"x"})").status, 400);
+  EXPECT_EQ(physicist.Ask("DELETE", "/api/v1/scans/000001", reason).status, 409);
+  EXPECT_EQ(physicist.Ask("DELETE", "/api/v1/scans/000002", reason).status, 200);
+  EXPECT_EQ(physicist.Ask("DELETE", "/api/v1/scans/000002", reason).status, 404);
+  loop_->Do([&] { EXPECT_EQ(service_.scans.size(), 1U); });
+}
+
+TEST_F(ApiTest, ABackupIsMadeByTheEngineerAndWarningsReachTheStatus) {
+  EXPECT_EQ(LoggedIn("technician").Post("/api/v1/backup").status, 403);
+  EXPECT_EQ(LoggedIn("physicist").Post("/api/v1/backup").status, 403);
+  EXPECT_EQ(LoggedIn("engineer").Post("/api/v1/backup").status, 200);
+  loop_->Do([&] { service_.status.storage.warnings = {"The disk is 83 % full."}; });
+  EXPECT_EQ(LoggedIn("technician").Get("/api/v1/status").json()["storage"]["warnings"][0],
+            "The disk is 83 % full.");
+}
+
 TEST_F(ApiTest, TheDailyCheckIsOpenedScannedAndBecomesABaseline) {
   HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
   EXPECT_TRUE(technician.Get("/api/v1/status").json()["check_overdue"]);

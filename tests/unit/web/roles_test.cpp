@@ -47,6 +47,7 @@ const std::map<std::string, std::string> kWhoMay = {
     {"POST /api/v1/references/{id}/approve", "P"},
     {"GET /api/v1/scans", "TPE"},
     {"GET /api/v1/scans/{id}", "TPED"},
+    {"DELETE /api/v1/scans/{id}", "P"},
     {"POST /api/v1/scans/{id}/accept", "TP"},
     {"POST /api/v1/scans/{id}/accept-outside", "TP"},
     {"GET /api/v1/scans/{id}/report.pdf", "TPE"},
@@ -69,6 +70,7 @@ const std::map<std::string, std::string> kWhoMay = {
     {"POST /api/v1/update", "E"},
     {"POST /api/v1/update/bundles/{name}", "E"},
     {"DELETE /api/v1/update/bundles/{name}", "E"},
+    {"POST /api/v1/backup", "E"},
     {"POST /api/v1/diagnostics", "E"},
 };
 

@@ -51,6 +51,7 @@ function tiles(status) {
     tile(text.storage, storage.writable
       ? text.free(gigabytes(storage.free_bytes), gigabytes(storage.total_bytes)) : text.readOnly,
     storage.writable && used < 0.95 ? 'good' : 'bad',
+    ...(storage.warnings ?? []).map((warning) => h('p', { class: 'caution' }, warning)),
     h('meter', { min: 0, max: 1, high: 0.9, value: used, 'aria-label': text.storage }),
     h('p', {}, `${S.product} ${status.version}`)),
   ];

@@ -1,0 +1,295 @@
+// The appliance's care for what is stored: opening, space, retention, and the check of its files.
+#include <algorithm>
+#include <ctime>
+#include <filesystem>
+#include <limits>
+#include <thread>
+#include <utility>
+
+#include <systemd/sd-daemon.h>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/appliance/appliance.hpp"
+#include "daemon/loop/log.hpp"
+
+namespace plumb {
+namespace {
+
+const web::Actor kSelf{.user = "plumbd", .address = ""};
+
+/// Seconds between the checks of two stored scans, and until it is asked again whether one is due.
+constexpr int kFileCheckTicks = 5, kNoFileCheckTicks = 600;
+constexpr std::chrono::hours kFileCheckEvery{24};
+
+}  // namespace
+
+void Appliance::OpenStore() {
+  if (!parts_.configuration_fault.empty()) {
+    storage_fault_ = parts_.configuration_fault;
+    Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", storage_fault_));
+    return;
+  }
+  try {
+    StoreOptions options;
+    options.sleep = [told = false](std::chrono::milliseconds pause) mutable {
+      if (!std::exchange(told, true))
+        Log(LogLevel::kWarning, "another program holds the database: waiting for it");
+      sd_notify(0, "EXTEND_TIMEOUT_USEC=20000000");  // the start is not over
+      std::this_thread::sleep_for(pause);
+    };
+    store_ = std::make_unique<Store>(parts_.config.appliance.state, options);
+    LogRecovery(store_->recovery());
+    store_->CloseSessions(kSelf);  // who lies on the couch now, nobody has said
+    if (!parts_.demo_patient.empty()) {
+      const auto patient = store_->FindPatientByCode(parts_.demo_patient);
+      open_patient_ = patient ? patient->id : store_->AddPatient(kSelf, parts_.demo_patient, "");
+      session_id_ = store_->OpenSession(kSelf, open_patient_, web::ScanPurpose::kFraction);
+      opened_by_ = kSelf;
+    }
+  } catch (const std::exception& error) {  // whatever a damaged store holds, the page must say so
+    store_.reset();
+    storage_fault_ = error.what();
+    Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", storage_fault_));
+    if (dynamic_cast<const DiskRefused*>(&error) == nullptr) return;
+  }
+  if (store_) return;
+  try {
+    store_ = Store::OpenReadable(parts_.config.appliance.state);
+    Log(LogLevel::kNotice, "what is stored can be read");
+  } catch (const std::exception& error) {
+    Log(LogLevel::kError, fmt::format("nor can anything be read: {}", error.what()));
+  }
+}
+
+void Appliance::LogRecovery(const RecoveryReport& found) const {
+  const std::filesystem::path& state = parts_.config.appliance.state;
+  if (found.interrupted_scans + found.orphaned_folders > 0) {
+    Log(LogLevel::kWarning,
+        fmt::format("put right after an interruption: {} scans had not ended, {} folders of scans "
+                    "that had not ended, failed or were removed were deleted",
+                    found.interrupted_scans, found.orphaned_folders));
+  }
+  if (found.lost_scans > 0) {
+    Log(LogLevel::kError,
+        fmt::format("the files of {} scans cannot be seen: they are marked unavailable until the "
+                    "files are back, nothing was deleted; the audit log names them",
+                    found.lost_scans));
+  }
+  if (found.attached_scans > 0)
+    Log(LogLevel::kNotice, fmt::format("the files of {} scans are back", found.attached_scans));
+  if (found.foreign_folders > 0) {
+    Log(LogLevel::kError,
+        fmt::format("{} scans are unknown to the database and were moved to {}: is it an older "
+                    "backup? They can be read with plumb info",
+                    found.foreign_folders, (state / "set-aside").string()));
+  }
+  if (found.broken_references > 0) {
+    Log(LogLevel::kError, fmt::format("the files of {} approved references cannot be seen: put a "
+                                      "backup of the state folder in its place",
+                                      found.broken_references));
+  }
+}
+
+/// What the next scan may take at most.
+std::uint64_t Appliance::NeededBytes() const {
+  // Measured: a compared scan of 640x480 has 40 MB; a recording 2.35 bytes a pixel and frame.
+  constexpr double kScene = 16e6, kSceneOfPixel = 110.0, kFrameOfPixel = 2.6, kFramesPerSecond = 30;
+  const Intrinsics camera = sensors_->snapshot().info.intrinsics;
+  const double pixels = std::max(320.0 * 240.0, static_cast<double>(camera.width) * camera.height);
+  const web::Settings settings = store_ ? store_->GetSettings() : web::Settings{};
+  double bytes = kScene + kSceneOfPixel * pixels;
+  if (!check_ && (parts_.config.appliance.keep_recordings || settings.keep_recordings)) {
+    const double sweep_s = parts_.config.appliance.scan_limit_s.value_or(settings.scan_limit_s);
+    bytes += kFrameOfPixel * pixels * kFramesPerSecond * sweep_s;
+  }
+  return static_cast<std::uint64_t>(bytes);
+}
+
+/// Why no scan can be stored now; empty: one can.
+Appliance::Answer Appliance::WhyNoSpace() const {
+  std::error_code error;
+  const std::filesystem::space_info space =
+      std::filesystem::space(parts_.config.appliance.state, error);
+  if (error) return {};  // a disk that cannot be looked at is another fault
+  try {
+    const std::uint64_t needed = NeededBytes();
+    if (space.available >= needed) return {};
+    return fmt::format(
+        "the disk is full: {} MB are free, a scan may need {}; remove scans that are not wanted",
+        space.available / 1'000'000, needed / 1'000'000);
+  } catch (const std::exception& failure) {
+    return fmt::format("no scan can begin: {}", failure.what());
+  }
+}
+
+std::vector<std::string> Appliance::StorageWarnings() const {
+  constexpr double kNearlyFull = 0.8;
+  std::vector<std::string> warnings;
+  std::error_code error;
+  const std::filesystem::space_info space =
+      std::filesystem::space(parts_.config.appliance.state, error);
+  if (!error && space.capacity > 0) {
+    const double used =
+        1.0 - static_cast<double>(space.available) / static_cast<double>(space.capacity);
+    if (used >= kNearlyFull)
+      warnings.push_back(
+          fmt::format("The disk is {:.0f} % full: back up and remove scans.", 100 * used));
+  }
+  if (!backup_fault_.empty()) warnings.push_back("The last backup failed: " + backup_fault_);
+  return warnings;
+}
+
+/// As configured, else a share of the disk on which the scans are.
+std::uint64_t Appliance::QuotaBytes() const {
+  constexpr double kShare = 0.9;
+  if (parts_.config.appliance.quota_gb)
+    return static_cast<std::uint64_t>(*parts_.config.appliance.quota_gb * 1e9);
+  std::error_code error;
+  const std::filesystem::space_info space =
+      std::filesystem::space(parts_.config.appliance.state / "scans", error);
+  if (error || space.capacity == 0) return std::numeric_limits<std::uint64_t>::max();
+  return static_cast<std::uint64_t>(kShare * static_cast<double>(space.capacity));
+}
+
+/// A disk that has become read-only must be known before a patient is scanned in vain. Off the
+/// loop.
+void Appliance::CheckDisk() {
+  ticks_to_disk_check_ = kDiskCheckTicks;
+  if (store_ == nullptr || !storage_fault_.empty()) return;
+  (void)store_thread_.Post([this] {
+    try {
+      store_->CheckWritable();
+    } catch (const DiskRefused& error) {
+      loop_.Post("disk check", [this, what = std::string(error.what())] { FailStorage(what); });
+    }
+  });
+}
+
+void Appliance::FailStorage(const std::string& what) {
+  if (!storage_fault_.empty()) return;
+  storage_fault_ = what;
+  Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", what));
+  (void)Handle(ScanEvent::kStorageFailed);
+  TellState();
+}
+
+/// Retention and quota, off the loop.
+void Appliance::Care() {
+  ticks_to_care_ = kCareTicks;
+  if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
+  constexpr std::chrono::hours kTrusted{1};  // until then a time server may set it right
+  const bool has_clock = clock_.held() >= kTrusted;
+  const std::uint64_t quota = QuotaBytes();
+  const bool posted = store_thread_.Post([this, quota, has_clock, stop = care_.get_token()] {
+    try {
+      const int old =
+          has_clock ? store_->RemoveOldScans(store_->GetSettings().retention_days, stop) : 0;
+      const int over = store_->KeepWithinQuota(quota, stop);
+      if (old + over > 0)
+        Log(LogLevel::kNotice,
+            fmt::format("removed {} scans for their age, {} for the quota", old, over));
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError, fmt::format("cannot remove old scans: {}", error.what()));
+    }
+  });
+  if (!posted) Log(LogLevel::kWarning, "the store is too busy to remove old scans now");
+}
+
+/// One scan at a time, off the loop, and none while a scan runs: what was changed or has become
+/// unreadable is known before it is wanted.
+void Appliance::CheckStoredFiles() {
+  ticks_to_file_check_ = kNoFileCheckTicks;  // until this one has ended
+  if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
+  (void)check_thread_.Post([this, stop = care_.get_token()] {
+    std::optional<Store::CheckedScan> checked;
+    try {
+      checked = store_->CheckNextScan(kFileCheckEvery, stop);
+    } catch (const Interrupted&) {
+      return;
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError, fmt::format("cannot check the stored scans: {}", error.what()));
+    }
+    if (checked) {
+      loop_.Post("file check", [this, checked] {
+        ticks_to_file_check_ = kFileCheckTicks;
+        if (checked->fault.empty()) return;
+        Log(LogLevel::kError, fmt::format("the stored scan is not as it was: {}", checked->fault),
+            {{"SCAN", checked->id}});
+        TellWeb(web::EventKind::kData);
+      });
+    }
+  });
+}
+
+void Appliance::BackUp(
+    const web::Actor& actor, const std::filesystem::path& folder,
+    std::function<void(const std::string& error, const BackupReport& report)> done) {
+  if (store_ == nullptr || !storage_fault_.empty())
+    return done("nothing can be backed up in safe mode: " + storage_fault_, {});
+  const bool posted = check_thread_.Post([this, actor, folder, done, stop = care_.get_token()] {
+    BackupReport report;
+    std::string error;
+    try {
+      report = store_->Backup(actor, folder, stop);
+    } catch (const std::exception& failure) {
+      error = failure.what();
+    }
+    Log(error.empty() ? LogLevel::kNotice : LogLevel::kError,
+        error.empty() ? fmt::format("backup made: {}, {} scans, {} problems", folder.string(),
+                                    report.scans, report.problems.size())
+                      : fmt::format("no backup was made in {}: {}", folder.string(), error));
+    loop_.Post("backup", [done, error, report] { done(error, report); });
+  });
+  if (!posted) done("too much waits already: try again", {});
+}
+
+/// One folder for each day of the week: the eighth backup replaces the first.
+std::filesystem::path Appliance::BackupTarget() const {
+  if (parts_.config.appliance.backup_folder.empty()) return {};
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  return parts_.config.appliance.backup_folder /
+         fmt::format("plumb-{}", utc.tm_wday == 0 ? 7 : utc.tm_wday);
+}
+
+namespace {
+
+/// True if no backup in the folder is younger than that.
+bool IsBackupDue(const std::filesystem::path& folder, std::chrono::duration<double> every) {
+  using FileClock = std::filesystem::file_time_type::clock;
+  for (int day = 1; day <= 7; ++day) {
+    std::error_code error;
+    const auto made = std::filesystem::last_write_time(
+        folder / fmt::format("plumb-{}", day) / "backup.json", error);
+    const std::chrono::duration<double> age = FileClock::now() - made;
+    if (!error && age.count() >= 0 && age < every) return false;  // a stamp of the future is none
+  }
+  return true;
+}
+
+}  // namespace
+
+/// The disk of the backups may be slow or gone: the loop does not look at it.
+void Appliance::BackUpIfDue() {
+  ticks_to_backup_ = kBackupTicks;
+  const std::filesystem::path folder = parts_.config.appliance.backup_folder;
+  if (folder.empty() || store_ == nullptr || !storage_fault_.empty() || stopped_) return;
+  const std::chrono::duration<double> every =
+      std::chrono::duration<double, std::ratio<3600>>(parts_.config.appliance.backup_hours);
+  (void)check_thread_.Post([this, folder, every] {
+    if (!IsBackupDue(folder, every)) return;
+    loop_.Post("backup due", [this] {
+      constexpr int kAgainTicks = 3600;  // one that fails is not tried again at once
+      ticks_to_backup_ = kAgainTicks;
+      BackUp(kSelf, BackupTarget(), [this](const std::string& error, const BackupReport&) {
+        backup_fault_ = error;
+        ticks_to_backup_ = error.empty() ? kBackupTicks : kAgainTicks;
+      });
+    });
+  });
+}
+
+}  // namespace plumb
