@@ -26,7 +26,8 @@ struct PageNotes {
 [[nodiscard]] std::string ReadOrMakeSecret(const std::filesystem::path& file,
                                            const std::function<std::string()>& make);
 
-/// @throws DataError for keys of [web] that do not fit together, or a certificate or key that cannot
+/// @throws DataError for keys of [web] that do not fit together, or a certificate or key that
+/// cannot
 ///         be used.
 void CheckPageIdentity(const WebConfig& web);
 

@@ -37,7 +37,7 @@ class DaemonDiskTest : public ::testing::Test {
   void SetUp() override {
     if (::geteuid() != 0 || ::unshare(CLONE_NEWNS) != 0 ||
         ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
-      PLUMB_SKIP("mounts of its own are not permitted here (root and CAP_SYS_ADMIN)");
+      GTEST_SKIP() << ("mounts of its own are not permitted here (root and CAP_SYS_ADMIN)");
     fs::create_directories(state());
   }
   void TearDown() override {
@@ -171,7 +171,7 @@ TEST_F(DaemonDiskTest, StartedOnAReadOnlyDiskAfterAPowerCutItReadsTheLogToo) {
 }
 
 TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyWhileNobodyScansIsToldBeforeTheNextScan) {
-  if (!MountImage()) PLUMB_SKIP("no loop device with ext4 here");
+  if (!MountImage()) GTEST_SKIP() << ("no loop device with ext4 here");
   {
     Plumbd plumbd(folder_.path());
     ASSERT_TRUE(plumbd.WaitUntilUp());
@@ -196,7 +196,7 @@ TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyWhileNobodyScansIsToldBeforeTheNe
 
 TEST_F(DaemonDiskTest,
        ADiskThatBecomesReadOnlyDuringAScanFailsItWithTheReasonAndKeepsTheReference) {
-  if (!MountImage()) PLUMB_SKIP("no loop device with ext4 here");
+  if (!MountImage()) GTEST_SKIP() << ("no loop device with ext4 here");
   {
     Plumbd plumbd(folder_.path());
     ASSERT_TRUE(plumbd.WaitUntilUp());

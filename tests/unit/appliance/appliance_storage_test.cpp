@@ -27,12 +27,12 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
   }
   Appliance appliance(
       loop, {.config = config,
+             .configuration_fault = {},
              .make_provider = [&] { return std::make_unique<testing::FakeProvider>(bus); },
              .before_scan = {},
              .button = nullptr,
              .indicator = nullptr,
-             .demo_patient = {},
-             .configuration_fault = {}});
+             .demo_patient = {}});
   for (const fs::directory_entry& entry : fs::directory_iterator(config.appliance.state)) {
     if (!entry.is_regular_file()) continue;
     std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
@@ -66,12 +66,12 @@ bool RunUntil(EventLoop& loop, const Done& done) {
 
 ApplianceParts PartsOf(const Config& config, testing::FakeBus& bus) {
   return {.config = config,
+          .configuration_fault = {},
           .make_provider = [&bus] { return std::make_unique<testing::FakeProvider>(bus); },
           .before_scan = {},
           .button = nullptr,
           .indicator = nullptr,
-          .demo_patient = {},
-          .configuration_fault = {}};
+          .demo_patient = {}};
 }
 
 TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {
