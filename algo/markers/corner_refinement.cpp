@@ -64,22 +64,26 @@ const NormalTable& Normal() {
   return table;
 }
 
-using ToneTable = std::array<float, 256>;
-
-/// Pixel value to light, 0 to 1.
-const ToneTable& Tone(bool linear_light) {
-  static const std::array<ToneTable, 2> tables = [] {
-    std::array<ToneTable, 2> both{};
-    for (std::size_t i = 0; i < 256; ++i) {
-      const double v = static_cast<double>(i) / 255.0;
-      both[0][i] = static_cast<float>(v);
-      both[1][i] =
-          static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
-    }
-    return both;
-  }();
-  return tables[linear_light ? 1 : 0];
+const ToneTable& EncodedValues() {
+  static const ToneTable table = PowerTone(1.0);
+  return table;
 }
+
+/// A tone curve and its inverse's slope.
+struct Tone {
+  explicit Tone(const ToneTable& table) : light(table) {
+    constexpr float kLeastLight = 1e-4F;  // Per level: some curves are flat at black.
+    for (std::size_t i = 0; i < 256; ++i) {
+      const std::size_t below = i > 0 ? i - 1 : i;
+      const std::size_t above = i < 255 ? i + 1 : i;
+      const float light_per_level =
+          (table[above] - table[below]) / static_cast<float>(above - below);
+      levels_per_light[i] = 1.0F / std::max(light_per_level, kLeastLight);
+    }
+  }
+  const ToneTable& light;
+  std::array<float, 256> levels_per_light{};
+};
 
 /// A side of the square in its own coordinates: `along` from its first corner, `depth` towards the
 /// marker's inside, pixels.
@@ -105,12 +109,15 @@ struct SideFit {
   double white = 0, white_slope = 0, step = 0,
          step_slope = 0;  ///< At the middle, and from end to end.
   Eigen::Matrix2d ends_covariance = Eigen::Matrix2d::Identity();
+  double edge_shift_px = 0;
   double residual_rms = 0;
+  double residual_levels = 0;
   bool valid = false;
 };
 
 struct Sample {
   float depth, along, value;      ///< along: 0..1
+  float levels_per_light;         ///< Of the tone curve at this value.
   std::array<float, 3> darkness;  ///< of border, first and second code row at this place
 };
 
@@ -130,8 +137,9 @@ bool WhiteFromSide(const MarkerPattern& pattern, int side, int row, int column) 
 }
 
 /// Darkness along the side of depth row `row` (0 border), blurred by a Gaussian of `blur_cells`.
+/// White is wider than black by `shift_cells` at each end.
 void FillDarkness(const MarkerPattern& pattern, int side, int row, double blur_cells,
-                  std::vector<float>& table) {
+                  double shift_cells, std::vector<float>& table) {
   const int cells = pattern.bits_per_side + 2;
   std::array<float, 12> dark{};  // with paper at both ends
   for (int i = 0; i < cells; ++i) {
@@ -143,12 +151,13 @@ void FillDarkness(const MarkerPattern& pattern, int side, int row, double blur_c
   for (int i = 0; i <= cells; ++i) {
     const float change = dark[static_cast<std::size_t>(i + 1)] - dark[static_cast<std::size_t>(i)];
     if (change == 0.0F) continue;
+    const double edge = i + (change > 0 ? shift_cells : -shift_cells);
     const auto reach = static_cast<int>(std::ceil(4 * blur_cells * kTablePerCell));
     const int size = static_cast<int>(table.size());
     for (int k = std::max(0, i * kTablePerCell - reach); k < size; ++k) {
       const double position = static_cast<double>(k) / kTablePerCell;
       table[static_cast<std::size_t>(k)] +=
-          change * Normal().At(static_cast<float>((position - i) / blur_cells)).first;
+          change * Normal().At(static_cast<float>((position - edge) / blur_cells)).first;
     }
   }
 }
@@ -169,7 +178,8 @@ double Bow(const Intrinsics& intrinsics, const Eigen::Vector2d& a, const Eigen::
 }
 
 std::optional<Side> MakeSide(const ImageCorners& corners, int index, const MarkerPattern& pattern,
-                             double blur_along_px, const std::optional<Intrinsics>& intrinsics) {
+                             double blur_along_px, double edge_shift_px,
+                             const std::optional<Intrinsics>& intrinsics) {
   const auto at = [&](int k) -> const Eigen::Vector2d& {
     return corners[static_cast<std::size_t>((index + k) % 4)];
   };
@@ -201,13 +211,14 @@ std::optional<Side> MakeSide(const ImageCorners& corners, int index, const Marke
 
   const double blur_cells = std::max(blur_along_px, kMinBlur_px) * cells / side.length_px;
   for (int row = 0; row < 3; ++row)
-    FillDarkness(pattern, index, row, blur_cells, side.darkness[static_cast<std::size_t>(row)]);
+    FillDarkness(pattern, index, row, blur_cells, edge_shift_px * cells / side.length_px,
+                 side.darkness[static_cast<std::size_t>(row)]);
   return side;
 }
 
 /// The pixels of the image in a band along the side, as many as are useful. No interpolation: each
 /// is itself a measurement.
-void CollectSamples(const cv::Mat& gray, const ToneTable& tone, const Side& side, int wanted,
+void CollectSamples(const cv::Mat& gray, const Tone& tone, const Side& side, int wanted,
                     std::vector<Sample>& samples) {
   samples.clear();
   const double margin_px = std::max(1.0, 0.06 * side.length_px);
@@ -242,20 +253,22 @@ void CollectSamples(const cv::Mat& gray, const ToneTable& tone, const Side& side
       samples.push_back(
           {static_cast<float>(side.normal.dot(offset) - 4 * side.bow_px * along * (1 - along)),
            static_cast<float>(along),
-           tone[gray.ptr<std::uint8_t>(y)[x]],
+           tone.light[gray.ptr<std::uint8_t>(y)[x]],
+           tone.levels_per_light[gray.ptr<std::uint8_t>(y)[x]],
            {Lookup(side.darkness[0], column), Lookup(side.darkness[1], column),
             Lookup(side.darkness[2], column)}});
     }
   }
 }
 
-/// Darkness of the model at a sample, and its derivatives by depth and by the logarithm of the
-/// blur.
+/// Darkness of the model at a sample, and its derivatives by depth, by the logarithm of the blur
+/// and by the edge shift.
 struct Modelled {
-  float darkness = 0, by_depth = 0, by_log_blur = 0;
+  float darkness = 0, by_depth = 0, by_log_blur = 0, by_shift = 0;
 };
 
-Modelled Model(const Side& side, const Sample& sample, float line_depth, float inverse_blur) {
+Modelled Model(const Side& side, const Sample& sample, float line_depth, float inverse_blur,
+               float edge_shift) {
   const float along = sample.along;
   const std::array<float, 3> edges = {
       line_depth,
@@ -267,12 +280,14 @@ Modelled Model(const Side& side, const Sample& sample, float line_depth, float i
                                        sample.darkness[2] - sample.darkness[1]};
   Modelled result;
   for (std::size_t k = 0; k < 3; ++k) {
-    const float z = (sample.depth - edges[k]) * inverse_blur;
+    const float towards_black = change[k] >= 0 ? 1.0F : -1.0F;
+    const float z = (sample.depth - edges[k] - towards_black * edge_shift) * inverse_blur;
     if (z <= -4.0F) break;  // deeper edges are farther still
     const auto [cdf, pdf] = Normal().At(z);
     result.darkness += change[k] * cdf;
     result.by_depth += change[k] * pdf * inverse_blur;
     result.by_log_blur -= change[k] * pdf * z;
+    result.by_shift -= std::abs(change[k]) * pdf * inverse_blur;
   }
   return result;
 }
@@ -298,22 +313,24 @@ bool StartLevels(const Side& side, const std::vector<Sample>& samples, SideFit& 
   return fit.step > kMinContrast;
 }
 
-using Vector7 = Eigen::Matrix<double, 7, 1>;
-using Matrix7 = Eigen::Matrix<double, 7, 7>;
+using Vector8 = Eigen::Matrix<double, 8, 1>;
+using Matrix8 = Eigen::Matrix<double, 8, 8>;
 
 /// One robust Gauss-Newton step on a side's samples. False if the system is singular.
-bool Step(const Side& side, const std::vector<Sample>& samples, SideFit& fit) {
+bool Step(const Side& side, const std::vector<Sample>& samples, bool find_edge_shift,
+          SideFit& fit) {
   // In single precision and by hand: this loop is most of the cost of a frame.
-  std::array<std::array<float, 8>, 8> sums{};  // J^T W J, the residual as the eighth column of J
-  double weighted_square = 0, weights = 0;
+  std::array<std::array<float, 9>, 9> sums{};  // J^T W J, the residual as the ninth column of J
+  double weighted_square = 0, weights = 0, levels_square = 0;
   const auto inverse_blur = static_cast<float>(1.0 / fit.blur_px);
   const auto limit = static_cast<float>(0.12 * fit.step);
+  const auto shift = static_cast<float>(fit.edge_shift_px);
   for (const Sample& sample : samples) {
     const float along = sample.along;
     const float from_middle = along - 0.5F;
     const float line_depth =
         static_cast<float>(fit.ends[0]) * (1 - along) + static_cast<float>(fit.ends[1]) * along;
-    const Modelled model = Model(side, sample, line_depth, inverse_blur);
+    const Modelled model = Model(side, sample, line_depth, inverse_blur, shift);
     const float step =
         static_cast<float>(fit.step) + static_cast<float>(fit.step_slope) * from_middle;
     const float white =
@@ -321,22 +338,30 @@ bool Step(const Side& side, const std::vector<Sample>& samples, SideFit& fit) {
     const float residual = sample.value - (white - step * model.darkness);
     const float weight = std::abs(residual) <= limit ? 1.0F : limit / std::abs(residual);
     const float by_line = step * model.by_depth;  // value grows when the line moves inward
-    const std::array<float, 8> jacobian = {
-        by_line * (1 - along), by_line * along, -step * model.by_log_blur,     1.0F,
-        from_middle,           -model.darkness, -model.darkness * from_middle, residual};
-    for (std::size_t i = 0; i < 7; ++i) {
+    const std::array<float, 9> jacobian = {by_line * (1 - along),
+                                           by_line * along,
+                                           -step * model.by_log_blur,
+                                           1.0F,
+                                           from_middle,
+                                           -model.darkness,
+                                           -model.darkness * from_middle,
+                                           -step * model.by_shift,
+                                           residual};
+    for (std::size_t i = 0; i < 8; ++i) {
       const float weighted = weight * jacobian[i];
-      for (std::size_t j = 0; j < 8; ++j) sums[i][j] += weighted * jacobian[j];
+      for (std::size_t j = 0; j < 9; ++j) sums[i][j] += weighted * jacobian[j];
     }
     weighted_square += static_cast<double>(weight) * residual * residual;
     weights += weight;
+    const float levels = residual * sample.levels_per_light;
+    levels_square += static_cast<double>(weight) * levels * levels;
   }
-  Matrix7 normal;
-  Vector7 right;
-  for (int i = 0; i < 7; ++i) {
-    for (int j = 0; j < 7; ++j)
+  Matrix8 normal;
+  Vector8 right;
+  for (int i = 0; i < 8; ++i) {
+    for (int j = 0; j < 8; ++j)
       normal(i, j) = sums[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
-    right[i] = sums[static_cast<std::size_t>(i)][7];
+    right[i] = sums[static_cast<std::size_t>(i)][8];
   }
   // A weak prior on blur and slopes keeps the system regular on faint or tiny sides.
   const double scale = fit.step * fit.step;
@@ -347,9 +372,15 @@ bool Step(const Side& side, const std::vector<Sample>& samples, SideFit& fit) {
   right[6] -= 2 * fit.step_slope;
   normal(0, 0) += 1e-3 * scale;
   normal(1, 1) += 1e-3 * scale;
-  const Eigen::LDLT<Matrix7> solver(normal);
+  if (!find_edge_shift) {
+    normal.row(7).setZero();
+    normal.col(7).setZero();
+    right[7] = 0;
+  }
+  normal(7, 7) += 1e-1 * scale;
+  const Eigen::LDLT<Matrix8> solver(normal);
   if (solver.info() != Eigen::Success || !solver.isPositive()) return false;
-  const Vector7 change = solver.solve(right);
+  const Vector8 change = solver.solve(right);
   if (!change.allFinite()) return false;
 
   const double largest = std::max(1.0, 0.3 * side.cell_px);
@@ -360,14 +391,16 @@ bool Step(const Side& side, const std::vector<Sample>& samples, SideFit& fit) {
   fit.white_slope += change[4];
   fit.step += change[5];
   fit.step_slope += change[6];
+  fit.edge_shift_px += std::clamp(change[7], -0.3, 0.3);
   fit.residual_rms = std::sqrt(weighted_square / std::max(weights, 1.0));
+  fit.residual_levels = std::sqrt(levels_square / std::max(weights, 1.0));
   const double variance = weighted_square / std::max(1.0, weights - 7);
-  fit.ends_covariance = variance * solver.solve(Matrix7::Identity()).topLeftCorner<2, 2>();
+  fit.ends_covariance = variance * solver.solve(Matrix8::Identity()).topLeftCorner<2, 2>();
   return fit.step > kMinContrast;
 }
 
 /// Fits a side from scratch (`fit` invalid, only its blur is used) or from the round before.
-void FitSide(const cv::Mat& gray, const ToneTable& tone, const Side& side,
+void FitSide(const cv::Mat& gray, const Tone& tone, const Side& side, bool find_edge_shift,
              std::vector<Sample>& samples, SideFit& fit) {
   const bool first = !fit.valid;
   CollectSamples(gray, tone, side, first ? kFirstSideSamples : kSideSamples, samples);
@@ -375,7 +408,7 @@ void FitSide(const cv::Mat& gray, const ToneTable& tone, const Side& side,
   fit.valid = false;
   if (samples.size() < 24 || (first && !StartLevels(side, samples, fit))) return;
   for (int step = 0; step < (first ? kFirstSteps : 1); ++step)
-    if (!Step(side, samples, fit)) return;
+    if (!Step(side, samples, find_edge_shift, fit)) return;
   fit.valid = true;
 }
 
@@ -421,6 +454,25 @@ double CornerSigma(const std::array<Side, 4>& sides, const std::array<SideFit, 4
 
 }  // namespace
 
+const ToneTable& SrgbTone() {
+  static const ToneTable table = [] {
+    ToneTable light{};
+    for (std::size_t i = 0; i < 256; ++i) {
+      const double v = static_cast<double>(i) / 255.0;
+      light[i] = static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+    }
+    return light;
+  }();
+  return table;
+}
+
+ToneTable PowerTone(double gamma) {
+  ToneTable light{};
+  for (std::size_t i = 0; i < 256; ++i)
+    light[i] = static_cast<float>(std::pow(static_cast<double>(i) / 255.0, gamma));
+  return light;
+}
+
 std::optional<CornerRefinement> RefineCorners(const cv::Mat& gray, const ImageCorners& initial,
                                               const MarkerPattern& pattern,
                                               const CornerRefinementOptions& options) {
@@ -432,11 +484,14 @@ std::optional<CornerRefinement> RefineCorners(const cv::Mat& gray, const ImageCo
   for (const Eigen::Vector2d& p : initial) {
     if (!(p.x() > -1 && p.y() > -1 && p.x() < gray.cols && p.y() < gray.rows)) return std::nullopt;
   }
-  const ToneTable& tone = Tone(options.linear_light);
+  const Tone tone(options.tone != nullptr ? *options.tone
+                  : options.linear_light  ? SrgbTone()
+                                          : EncodedValues());
   CornerRefinement result;
   result.corners = initial;
   std::array<Side, 4> sides;
   std::array<SideFit, 4> fits;
+  for (SideFit& fit : fits) fit.edge_shift_px = options.edge_shift_px;
   std::vector<Sample> samples;
   for (int round = 0; round < kOuterRounds; ++round) {
     for (int k = 0; k < 4; ++k) {
@@ -444,10 +499,11 @@ std::optional<CornerRefinement> RefineCorners(const cv::Mat& gray, const ImageCo
       const double along =
           0.5 * (fits[(i + 1) % 4].blur_px +
                  fits[(i + 3) % 4].blur_px);  // the neighbours' blur runs along this side
-      std::optional<Side> side = MakeSide(result.corners, k, pattern, along, options.intrinsics);
+      std::optional<Side> side =
+          MakeSide(result.corners, k, pattern, along, fits[i].edge_shift_px, options.intrinsics);
       if (!side) return std::nullopt;
       sides[i] = *std::move(side);
-      FitSide(gray, tone, sides[i], samples, fits[i]);
+      FitSide(gray, tone, sides[i], options.find_edge_shift, samples, fits[i]);
       if (!fits[i].valid) return std::nullopt;
     }
     double moved = 0;
@@ -474,6 +530,8 @@ std::optional<CornerRefinement> RefineCorners(const cv::Mat& gray, const ImageCo
     result.sigma_px[i] = CornerSigma(sides, fits, i);
     result.blur_px += fits[i].blur_px / 4;
     result.contrast += fits[i].step / 4;
+    result.edge_shift_px += fits[i].edge_shift_px / 4;
+    result.residual_levels += fits[i].residual_levels / 4;
     result.relative_residual += fits[i].residual_rms / std::max(fits[i].step, kMinContrast) / 4;
   }
   const double allowed_px = std::max(2.5, 0.6 * cell_px);

@@ -24,12 +24,26 @@ struct MarkerPattern {
   }
 };
 
+/// Light, 0 to 1, of each value of an 8-bit image.
+using ToneTable = std::array<float, 256>;
+[[nodiscard]] const ToneTable& SrgbTone();
+/// Light is the value's power `gamma`; 1 is a camera that does not encode at all. > 0.
+[[nodiscard]] ToneTable PowerTone(double gamma);
+
 /// Parameters of RefineCorners().
 struct CornerRefinementOptions {
   /// Undo the sRGB tone curve before anything is measured. Light is blurred before it is encoded,
   /// so in encoded values the white paper eats into the black border and corners move inward by up
   /// to half a pixel.
   bool linear_light = true;
+  /// If given, undone instead of the sRGB curve; must outlive the call.
+  const ToneTable* tone = nullptr;
+  /// By how much white reaches into black, pixels of this image: what is left of a wrong tone
+  /// curve, or ink that ran (< 0). Edges are taken back by it.
+  double edge_shift_px = 0.0;
+  /// Find the edge shift with the rest: black and white cells of a marker are of one size, so that
+  /// white ones that look wider than black ones tell.
+  bool find_edge_shift = false;
   /// If given, the bow that the lens puts on the sides is taken into account; coefficients of the
   /// image that is searched.
   std::optional<Intrinsics> intrinsics = std::nullopt;
@@ -44,6 +58,10 @@ struct CornerRefinement {
       0.0;  ///< Mean step from black to white, 0 to 1 of full scale (linear light if so asked).
   double relative_residual =
       0.0;  ///< RMS of the fit's residual over the contrast; about 0.02 on clean images.
+  double edge_shift_px = 0.0;  ///< As given or found.
+  /// RMS of the fit's residual in the image's own grey levels, whatever curve was undone: fits
+  /// under several curves can be held against each other.
+  double residual_levels = 0.0;
 };
 
 /// Fits the four sides of a marker's black square and intersects them.

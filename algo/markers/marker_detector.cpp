@@ -86,8 +86,10 @@ struct MarkerDetector::Impl {
     observation.sigma_px.fill(kUnrefinedSigma_px);
     if (!options.refine_corners) return observation;
     const MarkerPattern pattern{dictionary.Code(marker.id), dictionary.bits_per_side()};
-    if (const auto refined = RefineCorners(gray, marker.corners, pattern,
-                                           {options.linear_light, options.intrinsics})) {
+    CornerRefinementOptions refinement;
+    refinement.linear_light = options.linear_light;
+    refinement.intrinsics = options.intrinsics;
+    if (const auto refined = RefineCorners(gray, marker.corners, pattern, refinement)) {
       observation.corners = refined->corners;
       observation.sigma_px = refined->sigma_px;
     }

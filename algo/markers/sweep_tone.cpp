@@ -1,0 +1,128 @@
+#include "algo/markers/sweep_tone.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include <tbb/parallel_for.h>
+
+#include "algo/base/check_stop.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr double kMinSide_px = 28.0;       // Smaller markers' edges lie too close to each other.
+constexpr std::size_t kMaxSightings = 96;  // Beyond, time is better spent elsewhere.
+constexpr std::size_t kMinSightings = 8;
+constexpr double kFirstGamma = 0.8;
+constexpr double kGammaStep = 0.2;
+constexpr std::size_t kNumGammas = 13;  // To 3.2.
+constexpr std::size_t kNumGroups = 4;
+
+double ShortestSide(const ImageCorners& corners) {
+  double shortest = 1e9;
+  for (std::size_t i = 0; i < 4; ++i)
+    shortest = std::min(shortest, (corners[(i + 1) % 4] - corners[i]).norm());
+  return shortest;
+}
+
+// Evenly spread over those that are large enough.
+std::vector<const MarkerSighting*> Chosen(const std::vector<MarkerSighting>& sightings) {
+  std::vector<const MarkerSighting*> large;
+  for (const MarkerSighting& sighting : sightings)
+    if (ShortestSide(sighting.corners) >= kMinSide_px) large.push_back(&sighting);
+  if (large.size() <= kMaxSightings) return large;
+  std::vector<const MarkerSighting*> chosen;
+  for (std::size_t i = 0; i < kMaxSightings; ++i)
+    chosen.push_back(large[i * large.size() / kMaxSightings]);
+  return chosen;
+}
+
+using Losses = std::array<double, kNumGammas>;
+
+// Logarithm of the residual under each curve: a sighting counts by how much a curve betters it, not
+// by how badly it fits. Nothing if one of the fits fails.
+std::optional<Losses> LossesOf(const MarkerSighting& sighting,
+                               const std::array<ToneTable, kNumGammas>& tables) {
+  Losses losses{};
+  for (std::size_t g = 0; g < kNumGammas; ++g) {
+    CornerRefinementOptions options;
+    options.tone = &tables[g];
+    const auto fit = RefineCorners(sighting.gray, sighting.corners, sighting.pattern, options);
+    if (!fit || !(fit->residual_levels > 0)) return std::nullopt;
+    losses[g] = std::log(fit->residual_levels);
+  }
+  return losses;
+}
+
+// Of the smallest mean, by a parabola through it and its neighbours.
+double BestGamma(const std::vector<Losses>& losses, std::size_t first, std::size_t stride) {
+  Losses sum{};
+  for (std::size_t i = first; i < losses.size(); i += stride)
+    for (std::size_t g = 0; g < kNumGammas; ++g) sum[g] += losses[i][g];
+  const auto best =
+      static_cast<std::size_t>(std::min_element(sum.begin(), sum.end()) - sum.begin());
+  double place = static_cast<double>(best);
+  if (best > 0 && best + 1 < kNumGammas) {
+    const double bend = sum[best - 1] - 2 * sum[best] + sum[best + 1];
+    if (bend > 0) place += 0.5 * (sum[best - 1] - sum[best + 1]) / bend;
+  }
+  return kFirstGamma + kGammaStep * place;
+}
+
+// Median over the sightings, with its standard deviation from their spread.
+void FindEdgeShift(const std::vector<const MarkerSighting*>& sightings, SweepTone& tone) {
+  std::vector<std::optional<double>> all(sightings.size());
+  tbb::parallel_for(std::size_t{0}, sightings.size(), [&](std::size_t i) {
+    CornerRefinementOptions options;
+    options.tone = &tone.table;
+    options.find_edge_shift = true;
+    const MarkerSighting& sighting = *sightings[i];
+    if (const auto fit = RefineCorners(sighting.gray, sighting.corners, sighting.pattern, options))
+      all[i] = fit->edge_shift_px;
+  });
+  std::vector<double> shifts;
+  for (const auto& one : all)
+    if (one) shifts.push_back(*one);
+  if (shifts.size() < kMinSightings) return;
+  std::sort(shifts.begin(), shifts.end());
+  const auto at = [&](double share) {
+    return shifts[static_cast<std::size_t>(share * static_cast<double>(shifts.size() - 1))];
+  };
+  tone.edge_shift_px = at(0.5);
+  // A median of n has 1.25 times a mean's standard deviation; quartiles lie 1.35 sigma apart.
+  tone.sigma_edge_shift_px =
+      1.25 * (at(0.75) - at(0.25)) / 1.35 / std::sqrt(static_cast<double>(shifts.size()));
+}
+
+}  // namespace
+
+std::optional<SweepTone> EstimateTone(const std::vector<MarkerSighting>& sightings,
+                                      const std::stop_token& stop) {
+  const std::vector<const MarkerSighting*> chosen = Chosen(sightings);
+  std::array<ToneTable, kNumGammas> tables;
+  for (std::size_t g = 0; g < kNumGammas; ++g)
+    tables[g] = PowerTone(kFirstGamma + kGammaStep * static_cast<double>(g));
+  std::vector<std::optional<Losses>> all(chosen.size());
+  tbb::parallel_for(std::size_t{0}, chosen.size(), [&](std::size_t i) {
+    CheckStop(stop);
+    all[i] = LossesOf(*chosen[i], tables);
+  });
+  std::vector<Losses> losses;
+  for (const auto& one : all)
+    if (one) losses.push_back(*one);
+  if (losses.size() < kMinSightings) return std::nullopt;
+  SweepTone tone;
+  tone.num_sightings = static_cast<int>(losses.size());
+  tone.gamma = BestGamma(losses, 0, 1);
+  double square = 0;
+  for (std::size_t group = 0; group < kNumGroups; ++group)
+    square += std::pow(BestGamma(losses, group, kNumGroups) - tone.gamma, 2);
+  tone.sigma_gamma = std::sqrt(square / (kNumGroups * (kNumGroups - 1)));
+  tone.table = PowerTone(tone.gamma);
+  FindEdgeShift(chosen, tone);
+  return tone;
+}
+
+}  // namespace plumb
