@@ -9,12 +9,14 @@
 #include <tbb/parallel_for.h>
 
 #include "algo/base/check_stop.hpp"
+#include "algo/sensor_model/depth_correction.hpp"
 #include "algo/tracking/keyframe_link.hpp"
 
 namespace plumb {
 namespace {
 
 using TermVector = Eigen::Matrix<double, QuadraticTerm::kSize, 1>;
+using DepthVector = Eigen::Matrix<double, CalibrationModel::kDepthSize, 1>;
 
 struct KeyframePair {
   int a = 0;  // Whose cells are projected.
@@ -22,13 +24,32 @@ struct KeyframePair {
   double overlap = 0;
 };
 
+// What every keyframe's cells have in common: where they lie in the depth model.
+struct Cells {
+  std::vector<Eigen::Vector2f> centred;
+  std::vector<FieldRow> products;
+};
+
+Cells MakeCells(const Intrinsics& stated, const TrackingMap& map) {
+  const DenseView& first = map.keyframes[0].dense;
+  Cells cells;
+  for (int r = 0; r < first.height; ++r)
+    for (int c = 0; c < first.width; ++c)
+      cells.centred.push_back(CentredCoordinates((c + 0.5) * first.window_px - 0.5,
+                                                 (r + 0.5) * first.window_px - 0.5, stated.width,
+                                                 stated.height)
+                                  .cast<float>());
+  cells.products = FieldProductsOfCells(stated.width, stated.height, first.window_px);
+  return cells;
+}
+
 // A keyframe as this round's calibration sees it.
 struct CalibratedView {
   const MapKeyframe* keyframe = nullptr;
   Pose T_world_depth;
   Pose T_color_depth;
-  std::vector<Eigen::Vector3f> points;   // Corrected, depth camera frame; z 0 where nothing.
-  std::vector<Eigen::Vector2f> centred;  // Coordinates of each cell in the depth model.
+  std::vector<Eigen::Vector3f> points;  // Corrected, depth camera frame; z 0 where nothing.
+  const Cells* cells = nullptr;
   int width = 0;
   int height = 0;
 };
@@ -46,31 +67,30 @@ Sensor MakeSensor(const Intrinsics& stated, const CalibrationModel& calibration)
   sensor.corrected = calibration.Corrected(stated);
   sensor.scale = stated.width / 640.0;
   sensor.depth = sensor.corrected;
-  sensor.depth.cx += calibration.depth[3] * sensor.scale;
-  sensor.depth.cy += calibration.depth[4] * sensor.scale;
+  sensor.depth.cx += calibration.depth[kDepthShiftX] * sensor.scale;
+  sensor.depth.cy += calibration.depth[kDepthShiftY] * sensor.scale;
   return sensor;
 }
 
 std::vector<CalibratedView> MakeViews(const Sensor& sensor, const CalibrationModel& calibration,
-                                      const TrackingMap& map) {
+                                      const Cells& cells, const TrackingMap& map) {
   std::vector<CalibratedView> views(map.keyframes.size());
   if (map.keyframes.empty()) return views;
   const DenseView& first = map.keyframes[0].dense;
   std::vector<Eigen::Vector2f> rays(first.size());
-  std::vector<Eigen::Vector2f> centred(first.size());
+  const DepthCorrection correction(calibration, sensor.stated.width, sensor.stated.height,
+                                   first.window_px);
   for (int r = 0; r < first.height; ++r) {
     for (int c = 0; c < first.width; ++c) {
       const auto i = static_cast<std::size_t>(r * first.width + c);
       const double x = (c + 0.5) * first.window_px - 0.5;
       const double y = (r + 0.5) * first.window_px - 0.5;
       rays[i] = Undistort(sensor.depth, {x, y}).cast<float>();
-      centred[i] =
-          CentredCoordinates(x, y, sensor.stated.width, sensor.stated.height).cast<float>();
     }
   }
   // Rows are read one after the other: each cell is moved to where the camera at the stamp would
   // have it.
-  const auto readout_s = static_cast<float>(calibration.depth[8]);
+  const auto readout_s = static_cast<float>(calibration.depth[kDepthReadout]);
   std::vector<float> row_share;
   for (int r = 0; r < first.height; ++r)
     row_share.push_back((static_cast<float>(r) + 0.5F) / static_cast<float>(first.height) - 0.5F);
@@ -82,15 +102,14 @@ std::vector<CalibratedView> MakeViews(const Sensor& sensor, const CalibrationMod
     view.T_color_depth = keyframe.T_world_color.inverse() * view.T_world_depth;
     view.width = keyframe.dense.width;
     view.height = keyframe.dense.height;
-    view.centred = centred;
+    view.cells = &cells;
     view.points.assign(keyframe.dense.size(), Eigen::Vector3f::Zero());
     const Eigen::Vector3f w = keyframe.velocity_per_s.head<3>().cast<float>();
     const Eigen::Vector3f v = keyframe.velocity_per_s.tail<3>().cast<float>();
     for (std::size_t i = 0; i < view.points.size(); ++i) {
       const float z = keyframe.dense.z_m[i];
       if (z <= 0) continue;
-      const auto corrected =
-          static_cast<float>(calibration.CorrectedDepth(z, centred[i].cast<double>()));
+      const auto corrected = static_cast<float>(correction.Correct(i, z));
       const Eigen::Vector3f p(rays[i].x() * corrected, rays[i].y() * corrected, corrected);
       const float late_s = row_share[i / static_cast<std::size_t>(view.width)] * readout_s;
       view.points[i] = p + late_s * (w.cross(p) + v);
@@ -197,43 +216,85 @@ std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistratio
   return pairs;
 }
 
+// Derivative of a cell's corrected depth to the depth calibration, but for its times and shifts,
+// which move the point sideways too.
+DepthVector DepthJacobian(const CalibratedView& view, std::size_t i) {
+  const double z_raw = view.keyframe->dense.z_m[i];
+  const Eigen::Vector2f& centred = view.cells->centred[i];
+  const FieldRow& products = view.cells->products[i];
+  DepthVector J = DepthVector::Zero();
+  J[kDepthScale] = z_raw;
+  J[kDepthOffset] = 1.0;
+  J[kDepthBow] = centred.squaredNorm();
+  J[kDepthSlopeX] = z_raw * centred.x();
+  J[kDepthSlopeY] = z_raw * centred.y();
+  J.segment<kNumFieldTerms>(kDepthField) = z_raw * products.head<kNumFieldTerms>().cast<double>();
+  J.segment<kNumGrowthTerms>(kDepthGrowth) =
+      z_raw * FieldGrowth(z_raw) * products.tail<kNumGrowthTerms>().cast<double>();
+  return J;
+}
+
 // Derivative of a corrected point's position with the depth calibration, dotted with a direction m
 // of its own camera.
-void AddDepthJacobian(const Sensor& sensor, const CalibratedView& view, std::size_t i,
-                      const Eigen::Vector3d& m, double sign, TermVector& J) {
+DepthVector PositionJacobian(const Sensor& sensor, const CalibratedView& view, std::size_t i,
+                             const DepthVector& J_depth, const Eigen::Vector3d& m) {
   const Eigen::Vector3d p = view.points[i].cast<double>();
-  const Eigen::Vector3d ray = p / p.z();
-  const double z_raw = view.keyframe->dense.z_m[i];
-  const double along = sign * m.dot(ray);
-  J[12] += along * z_raw;
-  J[13] += along;
-  J[14] += along * view.centred[i].squaredNorm();
-  J[18] += along * z_raw * view.centred[i].x();
-  J[19] += along * z_raw * view.centred[i].y();
-  J[15] -= sign * m.x() * p.z() * sensor.scale / sensor.depth.fx;
-  J[16] -= sign * m.y() * p.z() * sensor.scale / sensor.depth.fy;
+  DepthVector J = m.dot(p) / p.z() * J_depth;
+  J[kDepthShiftX] = -m.x() * p.z() * sensor.scale / sensor.depth.fx;
+  J[kDepthShiftY] = -m.y() * p.z() * sensor.scale / sensor.depth.fy;
   const Vector6d& v = view.keyframe->velocity_per_s;
-  const double along_motion = sign * m.dot(v.head<3>().cross(p) + v.tail<3>());
-  J[17] += along_motion;
+  const double along_motion = m.dot(v.head<3>().cross(p) + v.tail<3>());
+  J[kDepthDelay] = along_motion;
   const auto row = static_cast<double>(i / static_cast<std::size_t>(view.width));
-  J[20] += along_motion * ((row + 0.5) / view.height - 0.5);
+  J[kDepthReadout] = along_motion * ((row + 0.5) / view.height - 0.5);
+  return J;
 }
 
 // A residual in metres of the scene shrinks with the scene, so the solver would shrink it: the
 // residual is taken back to the units of the measurement, r z_raw / z_corrected, and J follows.
 // Returns that factor times the residual.
-double InRawUnits(const CalibratedView& view, std::size_t i, double residual, TermVector& J) {
-  const double z_raw = view.keyframe->dense.z_m[i];
+double InRawUnits(const CalibratedView& view, std::size_t i, const DepthVector& J_depth,
+                  double residual, TermVector& J) {
   const double z = view.points[i].z();
-  const double factor = z_raw / z;
+  const double factor = view.keyframe->dense.z_m[i] / z;
   J *= factor;
-  J[12] -= residual * factor * factor;
-  J[13] -= residual * factor / z;
-  J[14] -= residual * factor / z * view.centred[i].squaredNorm();
-  J[18] -= residual * factor * factor * view.centred[i].x();
-  J[19] -= residual * factor * factor * view.centred[i].y();
+  J.tail<CalibrationModel::kDepthSize>() -= residual * factor / z * J_depth;
   return residual * factor;
 }
+
+// Sums residuals' squares into a term. Rows are gathered and multiplied in blocks, several times
+// faster than one by one. Not in single precision: what a stamp's last bit changes would show in
+// the poses, and a recording would not repeat what was seen live.
+class TermSum {
+ public:
+  explicit TermSum(QuadraticTerm& term) : term_(term) {}
+  void Add(const TermVector& J, double residual, double weight) {
+    const double root = std::sqrt(weight);
+    rows_.col(count_) = root * J;
+    residuals_[count_] = root * residual;
+    if (++count_ == kBlock) Flush();
+  }
+  void Finish() {
+    Flush();
+    term_.H.triangularView<Eigen::StrictlyUpper>() = term_.H.transpose();
+  }
+
+ private:
+  static constexpr int kBlock = 64;
+  void Flush() {
+    if (count_ == 0) return;
+    block_.setZero();
+    block_.selfadjointView<Eigen::Lower>().rankUpdate(rows_.leftCols(count_));
+    term_.H.triangularView<Eigen::Lower>() += block_;
+    term_.g.noalias() += rows_.leftCols(count_) * residuals_.head(count_);
+    count_ = 0;
+  }
+  QuadraticTerm& term_;
+  int count_ = 0;
+  Eigen::Matrix<double, QuadraticTerm::kSize, kBlock> rows_;
+  Eigen::Matrix<double, kBlock, 1> residuals_;
+  Eigen::MatrixXd block_ = Eigen::MatrixXd::Zero(QuadraticTerm::kSize, QuadraticTerm::kSize);
+};
 
 double CauchyWeight(double residual_in_sigmas) {
   return 1.0 / (1.0 + residual_in_sigmas * residual_in_sigmas / 4.0);
@@ -244,6 +305,7 @@ QuadraticTerm DenseTerm(const Sensor& sensor, const CalibratedView& a, const Cal
   QuadraticTerm term;
   term.keyframe_a = pair.a;
   term.keyframe_b = pair.b;
+  TermSum sum(term);
   const Eigen::Matrix3d R_b_a = (b.T_world_depth.inverse() * a.T_world_depth).linear();
   ForEachProjected(
       sensor, a, b, phase, 2,
@@ -256,20 +318,21 @@ QuadraticTerm DenseTerm(const Sensor& sensor, const CalibratedView& a, const Cal
         const Eigen::Vector3d n_color_a = a.T_color_depth.linear() * n_a;
         const Eigen::Vector3d q_color = b.T_color_depth * q_b.cast<double>();
         const Eigen::Vector3d n_color_b = b.T_color_depth.linear() * n_b;
-        TermVector J = TermVector::Zero();
+        TermVector J;
         J.segment<3>(0) = p_color.cross(n_color_a);
         J.segment<3>(3) = n_color_a;
         J.segment<3>(6) = -q_color.cross(n_color_b);
         J.segment<3>(9) = -n_color_b;
-        AddDepthJacobian(sensor, a, i, n_a, 1.0, J);
-        AddDepthJacobian(sensor, b, j, n_b, -1.0, J);
-        const double residual = InRawUnits(a, i, match->residual, J);
+        const DepthVector J_depth = DepthJacobian(a, i);
+        J.tail<CalibrationModel::kDepthSize>() =
+            PositionJacobian(sensor, a, i, J_depth, n_a) -
+            PositionJacobian(sensor, b, j, DepthJacobian(b, j), n_b);
+        const double residual = InRawUnits(a, i, J_depth, match->residual, J);
         const double w =
             weight * CauchyWeight(residual / match->sigma) / (match->sigma * match->sigma);
-        term.H.selfadjointView<Eigen::Lower>().rankUpdate(J, w);
-        term.g.noalias() += w * residual * J;
+        sum.Add(J, residual, w);
       });
-  term.H.triangularView<Eigen::StrictlyUpper>() = term.H.transpose();
+  sum.Finish();
   return term;
 }
 
@@ -291,6 +354,7 @@ std::optional<QuadraticTerm> MarkerFaceTerm(const Sensor& sensor, const Calibrat
     high = high.cwiseMax(corner);
   }
   const int window = view.keyframe->dense.window_px;
+  TermSum sum(term);
   int count = 0;
   for (int r = std::max(1, static_cast<int>(low.y()) / window);
        r <= std::min(view.height - 2, static_cast<int>(high.y()) / window); ++r) {
@@ -311,19 +375,19 @@ std::optional<QuadraticTerm> MarkerFaceTerm(const Sensor& sensor, const Calibrat
       J.segment<3>(3) = n_color;
       J.segment<3>(6) = -in_marker.cross(Eigen::Vector3d::UnitZ());
       J[11] = -1.0;
-      AddDepthJacobian(sensor, view, i, n_depth, 1.0, J);
+      const DepthVector J_depth = DepthJacobian(view, i);
+      J.tail<CalibrationModel::kDepthSize>() = PositionJacobian(sensor, view, i, J_depth, n_depth);
       const double cosine = std::clamp(-n_depth.dot(p.normalized()), 0.2, 1.0);
       const double sigma = std::hypot(DepthSigma(p.z(), cosine) * cosine, 0.001);
       // Neighbouring cells share their noise: four cells count as one.
-      const double residual = InRawUnits(view, i, in_marker.z(), J);
+      const double residual = InRawUnits(view, i, J_depth, in_marker.z(), J);
       const double w = 0.25 * CauchyWeight(residual / sigma) / (sigma * sigma);
-      term.H.selfadjointView<Eigen::Lower>().rankUpdate(J, w);
-      term.g.noalias() += w * residual * J;
+      sum.Add(J, residual, w);
       ++count;
     }
   }
   if (count < 8) return std::nullopt;
-  term.H.triangularView<Eigen::StrictlyUpper>() = term.H.transpose();
+  sum.Finish();
   return term;
 }
 
@@ -409,8 +473,9 @@ void AddTrackedLinks(const TrackingMap& map, std::vector<QuadraticTerm>& terms) 
 }  // namespace
 
 Pose DepthPose(const MapKeyframe& keyframe, const CalibrationModel& calibration) {
-  return PoseAfter(keyframe.T_world_color, keyframe.velocity_per_s,
-                   keyframe.data.depth_time_s - keyframe.data.color_time_s + calibration.depth[5]);
+  return PoseAfter(
+      keyframe.T_world_color, keyframe.velocity_per_s,
+      keyframe.data.depth_time_s - keyframe.data.color_time_s + calibration.depth[kDepthDelay]);
 }
 
 JointRegistrationResult RegisterJointly(const Intrinsics& stated,
@@ -423,6 +488,8 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   bundle.calibrate = options.calibrate;
   bundle.keypoint_sigma_px = options.keypoint_sigma_px;
   bundle.keypoint_depth_sigmas = options.keypoint_depth_sigmas;
+  bundle.edge_bias_sigma_px = options.edge_bias_sigma_px;
+  bundle.fix_depth_field = !options.use_depth_field;
   bundle.stop = stop;
   bundle.max_iterations = 10;
   bundle.free_keyframes.resize(map.keyframes.size() - 1);
@@ -432,6 +499,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   BundleAdjust(stated, bundle, links, map, result.calibration);
   if (!options.use_dense) return result;
 
+  const Cells cells = MakeCells(stated, map);
   const TrackingMap before = map;
   const CalibrationModel calibration_before = result.calibration;
   double gate_m = options.max_gate_m;
@@ -443,7 +511,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   for (int round = 0; round < options.num_rounds; ++round) {
     CheckStop(stop);
     const Sensor sensor = MakeSensor(stated, result.calibration);
-    const std::vector<CalibratedView> views = MakeViews(sensor, result.calibration, map);
+    const std::vector<CalibratedView> views = MakeViews(sensor, result.calibration, cells, map);
     CheckStop(stop);
     if (round == 0) pairs = FindPairs(sensor, options, views, stop);
     std::vector<QuadraticTerm> terms = MakeTerms(sensor, options, map, views, pairs, gate_m, stop);
@@ -463,7 +531,8 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   const auto consistency = [&](const TrackingMap& of, const CalibrationModel& calibration) {
     CheckStop(stop);
     const Sensor sensor = MakeSensor(stated, calibration);
-    return Consistency(sensor, MakeViews(sensor, calibration, of), pairs, options.max_gate_m);
+    return Consistency(sensor, MakeViews(sensor, calibration, cells, of), pairs,
+                       options.max_gate_m);
   };
   result.consistency_before_m = consistency(before, calibration_before);
   result.consistency_after_m = consistency(map, result.calibration);

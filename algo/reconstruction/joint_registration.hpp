@@ -10,9 +10,10 @@ namespace plumb {
 
 struct JointRegistrationOptions {
   double marker_length_m = 0.104;
-  bool calibrate = true;  ///< Estimate the sensor's calibration with the poses.
-  bool use_dense = true;  ///< false: keypoints and markers only.
-  int num_rounds = 5;     ///< Of association and solution.
+  bool calibrate = true;        ///< Estimate the sensor's calibration with the poses.
+  bool use_depth_field = true;  ///< false: without the terms from kDepthField on.
+  bool use_dense = true;        ///< false: keypoints and markers only.
+  int num_rounds = 5;           ///< Of association and solution.
   double max_gate_m =
       0.06;  ///< Farthest point-to-plane residual of the first round; shrinks by 0.6 a round.
   double min_gate_m = 0.012;
@@ -21,11 +22,12 @@ struct JointRegistrationOptions {
   double min_overlap = 0.2;  ///< Share of a keyframe's cells that fall into the other.
   /// Of the dense terms against their noise model: what the model leaves out is shared by
   /// neighbouring cells and views.
-  double dense_weight = 0.05;
-  /// Pixels at 640 columns. Far above the noise of one sighting: a track's error is common to its
+  double dense_weight = 0.4;
+  /// Pixels at 640 columns. Above the noise of one sighting: a track's error is common to its
   /// views.
-  double keypoint_sigma_px = 3.0;
-  double keypoint_depth_sigmas = 4.0;  ///< In standard deviations of the noise model.
+  double keypoint_sigma_px = 1.0;
+  double keypoint_depth_sigmas = 1.5;  ///< In standard deviations of the noise model.
+  double edge_bias_sigma_px = CalibrationModel::kEdgeBiasSigma;  ///< Pixels at 640 columns.
 };
 
 struct JointRegistrationResult {

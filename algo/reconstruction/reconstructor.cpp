@@ -8,10 +8,12 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/geometry/back_projection.hpp"
+#include "algo/markers/sweep_tone.hpp"
 #include "algo/reconstruction/height_map_builder.hpp"
 #include "algo/reconstruction/joint_registration.hpp"
 #include "algo/reconstruction/paper_reconstruction.hpp"
@@ -19,7 +21,9 @@
 #include "algo/reconstruction/surface_mesh.hpp"
 #include "algo/reconstruction/trajectory.hpp"
 #include "algo/reconstruction/view_surface.hpp"
+#include "algo/sensor_model/depth_correction.hpp"
 #include "algo/tracking/tracker.hpp"
+#include "algo/types/marker_dictionary.hpp"
 
 namespace plumb {
 namespace {
@@ -29,6 +33,9 @@ constexpr std::size_t kMaxPaperKeyframes = 20;  // The paper had about 15 a swee
 // one keyframe, so frames count too.
 constexpr int kMinReferenceViews = 3;
 constexpr int kMinReferenceFrames = 5;
+// Edges of markers once the tone curve and the edge shift are measured: what changes with blur and
+// exposure is left.
+constexpr double kMeasuredEdgeSigma_px = 0.01;
 constexpr double kGapWorthTelling_s = 0.5;  // A comparison refuses above 1 s.
 
 TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
@@ -40,7 +47,7 @@ TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
 
 // Depth as the calibration corrects it, as a camera at the stamp would have measured it in one
 // instant: each pixel takes its value from where the moving camera's row saw that point.
-cv::Mat CorrectedDepth(const cv::Mat& depth_m, const CalibrationModel& calibration,
+cv::Mat CorrectedDepth(const cv::Mat& depth_m, const DepthCorrection& correction, double readout_s,
                        const Intrinsics& intrinsics, const RayTable& rays,
                        const Vector6d& velocity_per_s) {
   cv::Mat corrected = cv::Mat::zeros(depth_m.size(), CV_32FC1);
@@ -52,8 +59,7 @@ cv::Mat CorrectedDepth(const cv::Mat& depth_m, const CalibrationModel& calibrati
     const float* here = depth_m.ptr<float>(r);
     float* out = corrected.ptr<float>(r);
     const Eigen::Vector2f* ray = rays.row(r);
-    const float late_s =
-        static_cast<float>(calibration.depth[8] * ((r + 0.5) / depth_m.rows - 0.5));
+    const auto late_s = static_cast<float>(readout_s * ((r + 0.5) / depth_m.rows - 0.5));
     for (int c = 0; c < depth_m.cols; ++c) {
       if (here[c] <= 0) continue;
       const Eigen::Vector3f p(ray[c].x() * here[c], ray[c].y() * here[c], here[c]);
@@ -67,8 +73,7 @@ cv::Mat CorrectedDepth(const cv::Mat& depth_m, const CalibrationModel& calibrati
       const float z = depth_m.at<float>(y, x);
       if (z <= 0) continue;
       const double metric =
-          calibration.CorrectedDepth(z, CentredCoordinates(x, y, depth_m.cols, depth_m.rows)) +
-          moved.z();
+          correction.Correct(static_cast<std::size_t>(y * depth_m.cols + x), z) + moved.z();
       if (metric > 0) out[c] = static_cast<float>(metric);
     }
   }
@@ -214,18 +219,69 @@ struct Reconstructor::Impl {
 
   using Report = std::function<void(double, std::string_view)>;
 
+  // Finds the camera's tone curve and measures the keyframes' markers again under it: tracking took
+  // the sRGB curve.
+  [[nodiscard]] std::optional<SweepTone> RefineMarkers(TrackingMap& map,
+                                                       const std::stop_token& stop) const {
+    if (!options.use_markers) return std::nullopt;
+    const MarkerDictionary dictionary = MarkerDictionary::ByName(info.marker_dictionary);
+    std::vector<MarkerSighting> sightings;
+    std::vector<MarkerObservation*> observations;
+    for (MapKeyframe& keyframe : map.keyframes) {
+      if (keyframe.data.markers.empty() || keyframe.data.view.color_rgb.empty()) continue;
+      cv::Mat gray;
+      cv::cvtColor(keyframe.data.view.color_rgb, gray, cv::COLOR_RGB2GRAY);
+      for (MarkerObservation& observation : keyframe.data.markers) {
+        observations.push_back(&observation);
+        sightings.push_back({gray,
+                             observation.corners,
+                             {dictionary.Code(observation.id), dictionary.bits_per_side()}});
+      }
+    }
+    const std::optional<SweepTone> tone = EstimateTone(sightings, stop);
+    if (!tone) return std::nullopt;
+    tbb::parallel_for(std::size_t{0}, sightings.size(), [&](std::size_t i) {
+      CornerRefinementOptions refinement;
+      refinement.tone = &tone->table;
+      refinement.edge_shift_px = tone->edge_shift_px;
+      const auto refined =
+          RefineCorners(sightings[i].gray, sightings[i].corners, sightings[i].pattern, refinement);
+      if (!refined) return;
+      observations[i]->corners = refined->corners;
+      observations[i]->sigma_px = refined->sigma_px;
+    });
+    return tone;
+  }
+
   void ReconstructBest(const std::vector<TrackedFrame>& frames, TrackingMap& map, Scene& scene,
                        const std::stop_token& stop, const Report& report) const {
-    report(0.0, "registration");
+    report(0.0, "markers");
     double stage = Now();
+    const std::optional<SweepTone> tone =
+        options.use_tone_curve ? RefineMarkers(map, stop) : std::nullopt;
+    const double tone_s = Now() - stage;
+    report(0.05, "registration");
+    stage = Now();
     JointRegistrationOptions joint_options;
     joint_options.marker_length_m = info.marker_length_m;
+    joint_options.use_depth_field = options.use_depth_field;
+    joint_options.use_dense = options.use_dense_depth;
+    if (tone.has_value())
+      joint_options.edge_bias_sigma_px =
+          std::hypot(kMeasuredEdgeSigma_px, tone->sigma_edge_shift_px);
     const JointRegistrationResult joint =
         RegisterJointly(info.intrinsics, joint_options, map, stop);
     const double solved = Now();
     scene = MakeScene(frames, map, joint.calibration, SceneFromWorld(map));
     WarnOfFrame(map, scene);
     for (const auto& [name, value] : joint.calibration.Named()) scene.calibration[name] = value;
+    if (tone) {
+      scene.calibration["tone_gamma"] = tone->gamma;
+      scene.calibration["marker_edge_shift_px"] = tone->edge_shift_px;
+      scene.calibration["marker_edge_shift_sigma_px"] = tone->sigma_edge_shift_px;
+      scene.calibration["tone_gamma_sigma"] = tone->sigma_gamma;
+    }
+    scene.timings_s["tone_curve"] = tone_s;
     scene.calibration["consistency_before_m"] = joint.consistency_before_m;
     scene.calibration["consistency_after_m"] = joint.consistency_after_m;
     if (!joint.accepted && joint.num_pairs > 0)
@@ -445,14 +501,16 @@ struct Reconstructor::Impl {
     std::vector<DepthView> views(map.keyframes.size());
     Intrinsics corrected = calibration.Corrected(info.intrinsics);
     const double scale = info.intrinsics.width / 640.0;
-    corrected.cx += calibration.depth[3] * scale;
-    corrected.cy += calibration.depth[4] * scale;
+    corrected.cx += calibration.depth[kDepthShiftX] * scale;
+    corrected.cy += calibration.depth[kDepthShiftY] * scale;
     const RayTable rays(corrected);
+    const DepthCorrection correction(calibration, corrected.width, corrected.height, 1);
     tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t k) {
       MapKeyframe& keyframe = map.keyframes[k];
       views[k].intrinsics = corrected;
-      views[k].depth_m = CorrectedDepth(keyframe.data.view.depth_m, calibration, corrected, rays,
-                                        keyframe.velocity_per_s);
+      views[k].depth_m =
+          CorrectedDepth(keyframe.data.view.depth_m, correction, calibration.depth[kDepthReadout],
+                         corrected, rays, keyframe.velocity_per_s);
       keyframe.data.view.depth_m.release();
       if (options.keep_color) views[k].color_rgb = keyframe.data.view.color_rgb;
       views[k].T_world_camera = T_scene_world * DepthPose(keyframe, calibration);

@@ -13,9 +13,13 @@ namespace plumb {
 
 struct ReconstructorOptions {
   Preset preset = Preset::kBest;
-  bool keep_color = true;       ///< false: clouds and meshes carry no colours (patients).
-  bool use_markers = true;      ///< false: track and reconstruct by keypoints and depth alone.
-  bool use_keypoints = true;    ///< false: track by markers (and depth) alone.
+  bool keep_color = true;     ///< false: clouds and meshes carry no colours (patients).
+  bool use_markers = true;    ///< false: track and reconstruct by keypoints and depth alone.
+  bool use_keypoints = true;  ///< false: track by markers (and depth) alone.
+  /// Preset `best`; each may be switched off to see what it is worth.
+  bool use_tone_curve = true;   ///< Find the camera's tone curve and measure the markers under it.
+  bool use_depth_field = true;  ///< Find the depth image's distortion over the image.
+  bool use_dense_depth = true;  ///< Register overlapping depth images.
   int num_icp_iterations = 20;  ///< Preset `paper`: iterations of Algorithm 1.
   unsigned seed = 1;            ///< Of random subsampling.
   /// Wall clock in seconds for `Scene::timings_s`; none: no timings. The method itself never looks

@@ -86,7 +86,8 @@ std::vector<StampedPose> DepthTrajectory(const std::vector<TrackedFrame>& frames
   std::vector<StampedPose> trajectory;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (!frames[i].tracked) continue;
-    const double dt = frames[i].depth_time_s - frames[i].color_time_s + calibration.depth[5];
+    const double dt =
+        frames[i].depth_time_s - frames[i].color_time_s + calibration.depth[kDepthDelay];
     trajectory.push_back({frames[i].depth_time_s,
                           T_scene_world * PoseAfter(poses[i], frames[i].velocity_per_s, dt)});
   }

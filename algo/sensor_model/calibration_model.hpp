@@ -7,6 +7,7 @@
 #include <string>
 
 #include "algo/base/intrinsics.hpp"
+#include "algo/sensor_model/depth_field.hpp"
 
 namespace plumb {
 
@@ -21,13 +22,8 @@ struct CalibrationModel {
   std::array<double, 1> readout_s{};
   /// Edges of markers seen too far inside the black (> 0), pixels at 640 columns.
   std::array<double, 1> edge_bias_px{};
-  /// z' = z (1 + d[0] + d[6] x + d[7] y) + d[1] + d[2] (x^2 + y^2), with x to the right and y down
-  /// from the image centre, half a width = 1. The slopes d[6], d[7] are a depth camera turned
-  /// against the colour camera. d[3], d[4]: pixels (at 640 columns) that the depth image lies to
-  /// the right of and below the colour image; d[5]: seconds that depth was taken later than
-  /// stamped, relative to colour. d[8]: seconds to read the depth image from top to bottom; its
-  /// stamp belongs to the middle row.
-  static constexpr int kDepthSize = 9;
+  /// What is wrong with the depth images, by DepthTerm: see DepthCorrection for the equation.
+  static constexpr int kDepthSize = kNumDepthTerms;
   std::array<double, kDepthSize> depth{};
 
   /// Prior standard deviations, in the same order: what consumer sensors and their calibrations
@@ -35,20 +31,13 @@ struct CalibrationModel {
   static constexpr std::array<double, 6> kLensSigma = {0.002, 0.002, 1.5, 1.5, 0.01, 0.02};
   static constexpr double kReadoutSigma = 0.02;
   static constexpr double kEdgeBiasSigma = 0.04;
-  static constexpr std::array<double, kDepthSize> kDepthSigma = {0.01,  0.003, 0.004, 2.0, 2.0,
-                                                                 0.004, 0.003, 0.003, 0.02};
+  static const std::array<double, kDepthSize> kDepthSigma;
 
   [[nodiscard]] Intrinsics Corrected(const Intrinsics& stated) const;
-  /// Corrected depth of a measurement at CentredCoordinates().
-  [[nodiscard]] double CorrectedDepth(double z_m, const Eigen::Vector2d& centred) const {
-    return z_m * (1.0 + depth[0] + depth[6] * centred.x() + depth[7] * centred.y()) + depth[1] +
-           depth[2] * centred.squaredNorm();
-  }
+  /// Corrected depth of one measurement at CentredCoordinates(); images go through DepthCorrection.
+  [[nodiscard]] double CorrectedDepth(double z_m, const Eigen::Vector2d& centred) const;
   /// For reports: names carry units.
   [[nodiscard]] std::map<std::string, double> Named() const;
 };
-
-/// Image coordinates of the depth model: from the centre, half an image width = 1.
-[[nodiscard]] Eigen::Vector2d CentredCoordinates(double x_px, double y_px, int width, int height);
 
 }  // namespace plumb

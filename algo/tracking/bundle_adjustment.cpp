@@ -17,10 +17,15 @@ namespace {
 
 using namespace bundle;  // NOLINT: the model is this file's own vocabulary
 using Matrix2x6d = Eigen::Matrix<double, 2, 6>;
-using Matrix6x3d = Eigen::Matrix<double, 6, 3>;
-using Matrix17d = Eigen::Matrix<double, kCalibrationSize, kCalibrationSize>;
-using Matrix17x6d = Eigen::Matrix<double, kCalibrationSize, 6>;
-using Matrix17x3d = Eigen::Matrix<double, kCalibrationSize, 3>;
+constexpr int kCamera = 6;  // Unknowns of a keyframe: its twist.
+using CameraVector = Eigen::Matrix<double, kCamera, 1>;
+using CameraMatrix = Eigen::Matrix<double, kCamera, kCamera>;
+using CameraPoint = Eigen::Matrix<double, kCamera, 3>;
+using CameraRows2 = Eigen::Matrix<double, 2, kCamera>;
+using CameraRows3 = Eigen::Matrix<double, 3, kCamera>;
+using CalibrationMatrix = Eigen::Matrix<double, kCalibrationSize, kCalibrationSize>;
+using CalibrationCamera = Eigen::Matrix<double, kCalibrationSize, kCamera>;
+using CalibrationPoint = Eigen::Matrix<double, kCalibrationSize, 3>;
 
 constexpr Eigen::Index kLargestDenseSystem =
     1200;  // Unknowns; beyond, a sparse factorisation is faster.
@@ -34,17 +39,15 @@ struct PointView {
   int keyframe = 0;
   int landmark = 0;  // Slot.
   Eigen::Vector2d pixel;
-  Eigen::Vector2d centred;
-  double row_share = 0;
+  DepthPlace place;
   double z_m = 0;  // 0: none.
   double weight_z = 0;
 
   Eigen::Vector3d r = Eigen::Vector3d::Zero();
   Eigen::Matrix3d J_point = Eigen::Matrix3d::Zero();
-  Matrix3x6d J_pose = Matrix3x6d::Zero();
+  CameraRows3 J_camera = CameraRows3::Zero();
   Eigen::Matrix<double, 2, 7> J_lens = Eigen::Matrix<double, 2, 7>::Zero();  // Lens and readout.
-  Eigen::Matrix<double, 1, CalibrationModel::kDepthSize> J_depth =
-      Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>::Zero();
+  DepthRow J_depth = DepthRow::Zero();
 
   // J' M for this observation's derivatives J to the whole calibration.
   template <int kColumns>
@@ -74,8 +77,8 @@ struct CornerView {
 struct PointSystem {
   Eigen::Matrix3d V_inverse;
   Eigen::Vector3d g;
-  std::vector<std::pair<int, Matrix6x3d>> W;  // Pose slot, ascending.
-  Matrix17x3d W_calibration;
+  std::vector<std::pair<int, CameraPoint>> W;  // Camera slot, ascending.
+  CalibrationPoint W_calibration;
 };
 
 // Sum of the unit directions from corner i to its two neighbours.
@@ -113,7 +116,8 @@ class Bundle {
     }
     CollectMarkers();
     CollectPoints();
-    calibration_at_ = 6 * static_cast<Eigen::Index>(free_.size() + markers_.size());
+    markers_at_ = kCamera * static_cast<Eigen::Index>(free_.size());
+    calibration_at_ = markers_at_ + 6 * static_cast<Eigen::Index>(markers_.size());
     size_ = calibration_at_ + (options.calibrate ? kCalibrationSize : 0);
   }
 
@@ -199,13 +203,7 @@ class Bundle {
       for (const KeypointObservation& o : map_.keyframes[k].keypoints) {
         const int s = slot[static_cast<std::size_t>(o.landmark)];
         if (s < 0) continue;
-        PointView view;
-        view.keyframe = static_cast<int>(k);
-        view.landmark = s;
-        view.pixel = o.pixel;
-        view.centred = CentredCoordinates(o.pixel.x(), o.pixel.y(), stated_.width, stated_.height);
-        view.row_share = RowShare(o.pixel.y(), stated_.height);
-        view.z_m = o.z_m;
+        PointView view{static_cast<int>(k), s, o.pixel, DepthPlace(o.pixel, stated_), o.z_m};
         if (o.z_m > 0)
           view.weight_z = 1.0 / (options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8));
         views_.push_back(view);
@@ -265,13 +263,17 @@ class Bundle {
     return T_world_marker0_[static_cast<std::size_t>(slot)];
   }
 
+  // Of a keyframe's unknowns; negative if it stays.
+  [[nodiscard]] Eigen::Index CameraAt(int keyframe) const {
+    return kCamera * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(keyframe)]);
+  }
   [[nodiscard]] double PixelWeight() const {
     return 1.0 / (options_.keypoint_sigma_px * stated_.width / 640.0);
   }
   [[nodiscard]] double DepthDelay(const State& state, int keyframe, double row_share) const {
     const Keyframe& data = map_.keyframes[static_cast<std::size_t>(keyframe)].data;
-    return data.depth_time_s - data.color_time_s + state.calibration.depth[5] +
-           row_share * state.calibration.depth[8];
+    return data.depth_time_s - data.color_time_s + state.calibration.depth[kDepthDelay] +
+           row_share * state.calibration.depth[kDepthReadout];
   }
 
   // ---- cost
@@ -299,8 +301,9 @@ class Bundle {
       cost += x.dot(0.5 * (term.H * x) + term.g);
     }
     if (options_.calibrate)
-      cost +=
-          0.5 * (CalibrationVector(state.calibration).cwiseProduct(PriorWeights())).squaredNorm();
+      cost += 0.5 *
+              (ToVector(state.calibration).cwiseProduct(PriorWeights(options_.edge_bias_sigma_px)))
+                  .squaredNorm();
     return cost;
   }
 
@@ -309,19 +312,17 @@ class Bundle {
     const Eigen::Vector3d p = PointInCamera(state, view);
     const Eigen::Vector3d motion =
         -(camera.velocity_per_s.head<3>().cross(p) + camera.velocity_per_s.tail<3>());
-    const Eigen::Vector3d at_row = p + state.calibration.readout_s[0] * view.row_share * motion;
+    const Eigen::Vector3d at_row =
+        p + state.calibration.readout_s[0] * view.place.row_share * motion;
     if (at_row.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
     const Eigen::Vector2d r =
         (ProjectCorrected(stated_, state.calibration.lens, at_row).pixel - view.pixel) *
         PixelWeight();
     double cost = 0.5 * CauchyLoss(r.squaredNorm(), kKeypointLossScale);
     if (view.z_m > 0) {
-      SeenPoint late;
-      late.p = p + DepthDelay(state, view.keyframe, view.row_share) * motion;
-      late.J_time = motion;
+      const double z = p.z() + DepthDelay(state, view.keyframe, view.place.row_share) * motion.z();
       const double rz =
-          (PredictDepth(state.calibration, late, view.centred, view.row_share).z_m - view.z_m) *
-          view.weight_z;
+          (PredictDepthOnly(state.calibration, z, view.place) - view.z_m) * view.weight_z;
       cost += 0.5 * CauchyLoss(rz * rz, kKeypointLossScale);
     }
     return cost;
@@ -355,8 +356,8 @@ class Bundle {
   void Linearise(const State& state) {
     H_ = Eigen::MatrixXd::Zero(size_, size_);
     g_ = Eigen::VectorXd::Zero(size_);
-    std::vector<Matrix17d> H_calibration(map_.keyframes.size(), Matrix17d::Zero());
-    std::vector<Vector17d> g_calibration(map_.keyframes.size(), Vector17d::Zero());
+    std::vector<CalibrationMatrix> H_calibration(map_.keyframes.size(), CalibrationMatrix::Zero());
+    std::vector<CalibrationVector> g_calibration(map_.keyframes.size(), CalibrationVector::Zero());
     tbb::parallel_for(std::size_t{0}, map_.keyframes.size(), [&](std::size_t k) {
       LineariseKeyframe(state, k, H_calibration[k], g_calibration[k]);
     });
@@ -365,68 +366,69 @@ class Bundle {
         H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += H_calibration[k];
         g_.tail<kCalibrationSize>() += g_calibration[k];
       }
-      const Vector17d w = PriorWeights();
+      const CalibrationVector w = PriorWeights(options_.edge_bias_sigma_px);
       H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>().diagonal() += w.cwiseAbs2();
-      g_.tail<kCalibrationSize>() +=
-          w.cwiseAbs2().cwiseProduct(CalibrationVector(state.calibration));
+      g_.tail<kCalibrationSize>() += w.cwiseAbs2().cwiseProduct(ToVector(state.calibration));
     }
     for (const CornerView& view : corners_) AddCorner(state, view);
     for (const QuadraticTerm& term : terms_) AddTerm(state, term);
     points_.resize(landmarks_.size());
   }
 
-  void LineariseKeyframe(const State& state, std::size_t k, Matrix17d& H_calibration,
-                         Vector17d& g_calibration) {
+  void LineariseKeyframe(const State& state, std::size_t k, CalibrationMatrix& H_calibration,
+                         CalibrationVector& g_calibration) {
     const int slot = pose_slot_[k];
-    Matrix6d H = Matrix6d::Zero();
-    Vector6d g = Vector6d::Zero();
-    Matrix17x6d H_coupled = Matrix17x6d::Zero();
+    CameraMatrix H = CameraMatrix::Zero();
+    CameraVector g = CameraVector::Zero();
+    CalibrationCamera H_coupled = CalibrationCamera::Zero();
     for (const std::uint32_t i : views_of_keyframe_[k]) {
       PointView& view = views_[i];
       LineariseView(state, view);
       if (slot >= 0) {
-        H.noalias() += view.J_pose.transpose() * view.J_pose;
-        g.noalias() += view.J_pose.transpose() * view.r;
+        H.noalias() += view.J_camera.transpose() * view.J_camera;
+        g.noalias() += view.J_camera.transpose() * view.r;
       }
       if (!options_.calibrate) continue;
-      if (slot >= 0) H_coupled += view.CalibrationTimes<6>(view.J_pose);
+      if (slot >= 0) H_coupled += view.CalibrationTimes<kCamera>(view.J_camera);
       H_calibration.topLeftCorner<7, 7>().noalias() += view.J_lens.transpose() * view.J_lens;
       H_calibration.bottomRightCorner<CalibrationModel::kDepthSize, CalibrationModel::kDepthSize>()
           .noalias() += view.J_depth.transpose() * view.J_depth;
       g_calibration += view.CalibrationTimes<1>(view.r);
     }
     if (slot < 0) return;
-    H_.block<6, 6>(6 * slot, 6 * slot) += H;
-    g_.segment<6>(6 * slot) += g;
-    if (options_.calibrate) H_.block<kCalibrationSize, 6>(calibration_at_, 6 * slot) += H_coupled;
+    H_.block<kCamera, kCamera>(kCamera * slot, kCamera * slot) += H;
+    g_.segment<kCamera>(kCamera * slot) += g;
+    if (options_.calibrate)
+      H_.block<kCalibrationSize, kCamera>(calibration_at_, kCamera * slot) += H_coupled;
   }
 
   void LineariseView(const State& state, PointView& view) const {
     const CameraState& camera = state.cameras[static_cast<std::size_t>(view.keyframe)];
     const Eigen::Vector3d& p_world = state.landmarks[static_cast<std::size_t>(view.landmark)];
-    const SeenPoint point = See(camera, p_world, state.calibration.readout_s[0] * view.row_share);
+    const double row_s = state.calibration.readout_s[0] * view.place.row_share;
+    const SeenPoint point = See(camera, p_world, row_s);
     const SeenPixel seen = ProjectCorrected(stated_, state.calibration.lens, point.p);
     const Eigen::Vector2d r = (seen.pixel - view.pixel) * PixelWeight();
     const double w = PixelWeight() * std::sqrt(CauchyWeight(r.squaredNorm(), kKeypointLossScale));
     const Eigen::Matrix<double, 2, 3> J = w * seen.J_point;
     view.r.head<2>() = w * (seen.pixel - view.pixel);
     view.J_point.topRows<2>().noalias() = J * point.J_world;
-    view.J_pose.topRows<2>().noalias() = J * point.J_pose;
+    view.J_camera.topRows<2>() = J * point.J_pose;
     view.J_lens.leftCols<6>() = w * seen.J_lens;
-    view.J_lens.col(6) = view.row_share * (J * point.J_time);
+    view.J_lens.col(6) = view.place.row_share * (J * point.J_time);
     view.r[2] = 0;
     view.J_point.row(2).setZero();
-    view.J_pose.row(2).setZero();
+    view.J_camera.row(2).setZero();
     view.J_depth.setZero();
     if (!(view.z_m > 0)) return;
-    const SeenPoint late = See(camera, p_world, DepthDelay(state, view.keyframe, view.row_share));
-    const PredictedDepth predicted =
-        PredictDepth(state.calibration, late, view.centred, view.row_share);
+    const double late_s = DepthDelay(state, view.keyframe, view.place.row_share);
+    const SeenPoint late = See(camera, p_world, late_s);
+    const PredictedDepth predicted = PredictDepth(state.calibration, late, view.place);
     const double rz = (predicted.z_m - view.z_m) * view.weight_z;
     const double wz = view.weight_z * std::sqrt(CauchyWeight(rz * rz, kKeypointLossScale));
     view.r[2] = wz * (predicted.z_m - view.z_m);
     view.J_point.row(2) = wz * predicted.J_z * late.J_world.row(2);
-    view.J_pose.row(2) = wz * predicted.J_z * late.J_pose.row(2);
+    view.J_camera.row(2) = wz * predicted.J_z * late.J_pose.row(2);
     view.J_depth = wz * predicted.J_depth;
   }
 
@@ -439,8 +441,9 @@ class Bundle {
     const double share = RowShare(view.pixel.y(), stated_.height);
     const Eigen::Vector3d p_world =
         MarkerPose(view.marker) * (PoseFromTwist(twist) * view.in_marker);
-    const SeenPoint point = See(state.cameras[static_cast<std::size_t>(view.keyframe)], p_world,
-                                state.calibration.readout_s[0] * share);
+    const double row_s = state.calibration.readout_s[0] * share;
+    const SeenPoint point =
+        See(state.cameras[static_cast<std::size_t>(view.keyframe)], p_world, row_s);
     const SeenPixel seen = ProjectCorrected(stated_, state.calibration.lens, point.p);
     Eigen::Vector2d r = CornerResidual(state, view, point.p);
     const double robust = std::sqrt(CauchyWeight(r.squaredNorm(), kCornerLossScale));
@@ -452,16 +455,15 @@ class Bundle {
         -T_world_marker.linear() * Skew(view.in_marker) * marker_side.J_right;
     J_in_world.rightCols<3>() = MarkerPose(view.marker).linear();
     const Matrix2x6d J_marker = J * point.J_world * J_in_world;
-    const Matrix2x6d J_pose = J * point.J_pose;
-    const Eigen::Index m = 6 * (static_cast<Eigen::Index>(free_.size()) + view.marker);
-    const Eigen::Index a =
-        6 * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(view.keyframe)]);
+    const CameraRows2 J_camera = J * point.J_pose;
+    const Eigen::Index m = markers_at_ + 6 * view.marker;
+    const Eigen::Index a = CameraAt(view.keyframe);
     H_.block<6, 6>(m, m).noalias() += J_marker.transpose() * J_marker;
     g_.segment<6>(m).noalias() += J_marker.transpose() * r;
     if (a >= 0) {
-      H_.block<6, 6>(a, a).noalias() += J_pose.transpose() * J_pose;
-      H_.block<6, 6>(m, a).noalias() += J_marker.transpose() * J_pose;
-      g_.segment<6>(a).noalias() += J_pose.transpose() * r;
+      H_.block<kCamera, kCamera>(a, a).noalias() += J_camera.transpose() * J_camera;
+      H_.block<6, kCamera>(m, a).noalias() += J_marker.transpose() * J_camera;
+      g_.segment<kCamera>(a).noalias() += J_camera.transpose() * r;
     }
     if (!options_.calibrate) return;
     Eigen::Matrix<double, 2, 8> J_calibration;  // Lens, readout, edge bias.
@@ -469,19 +471,17 @@ class Bundle {
     H_.block<8, 8>(calibration_at_, calibration_at_).noalias() +=
         J_calibration.transpose() * J_calibration;
     H_.block<8, 6>(calibration_at_, m).noalias() += J_calibration.transpose() * J_marker;
-    if (a >= 0) H_.block<8, 6>(calibration_at_, a).noalias() += J_calibration.transpose() * J_pose;
+    if (a >= 0)
+      H_.block<8, kCamera>(calibration_at_, a).noalias() += J_calibration.transpose() * J_camera;
     g_.segment<8>(calibration_at_).noalias() += J_calibration.transpose() * r;
   }
 
   void AddTerm(const State& state, const QuadraticTerm& term) {
     const TermVector slope = term.H * TermState(state, term) + term.g;
     constexpr int kDepthSize = CalibrationModel::kDepthSize;
-    const Eigen::Index a =
-        6 * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(term.keyframe_a)]);
-    const Eigen::Index b =
-        term.keyframe_b >= 0
-            ? 6 * static_cast<Eigen::Index>(pose_slot_[static_cast<std::size_t>(term.keyframe_b)])
-            : 6 * (static_cast<Eigen::Index>(free_.size()) + markers_.at(term.marker));
+    const Eigen::Index a = CameraAt(term.keyframe_a);
+    const Eigen::Index b = term.keyframe_b >= 0 ? CameraAt(term.keyframe_b)
+                                                : markers_at_ + 6 * markers_.at(term.marker);
     const Eigen::Index d = calibration_at_ + kDepth;
     if (a >= 0) {
       H_.block<6, 6>(a, a) += term.H.topLeftCorner<6, 6>();
@@ -519,7 +519,7 @@ class Bundle {
       V.noalias() += view.J_point.transpose() * view.J_point;
       point.g.noalias() += view.J_point.transpose() * view.r;
       const int slot = pose_slot_[static_cast<std::size_t>(view.keyframe)];
-      if (slot >= 0) point.W.emplace_back(slot, view.J_pose.transpose() * view.J_point);
+      if (slot >= 0) point.W.emplace_back(slot, view.J_camera.transpose() * view.J_point);
       if (options_.calibrate) point.W_calibration += view.CalibrationTimes<3>(view.J_point);
     }
     V.diagonal() *= 1.0 + damping;
@@ -537,22 +537,25 @@ class Bundle {
     Eigen::VectorXd right = g_;
     Eliminate(S, right);
     if (options_.calibrate && options_.fix_lens) Pin(calibration_at_ + kLens, 6, S, right);
+    if (options_.calibrate && options_.fix_depth_field)
+      Pin(calibration_at_ + kDepth + kDepthField, kNumDepthTerms - kDepthField, S, right);
     Eigen::VectorXd x;
     if (!Solve(S, right, x)) return false;
     next = state;
     for (std::size_t slot = 0; slot < free_.size(); ++slot) {
       CameraState& camera = next.cameras[static_cast<std::size_t>(free_[slot])];
-      camera.twist -= x.segment<6>(6 * static_cast<Eigen::Index>(slot));
+      camera.twist -= x.segment<6>(kCamera * static_cast<Eigen::Index>(slot));
       camera.Prepare();
     }
     for (std::size_t m = 0; m < markers_.size(); ++m)
-      next.markers[m] -= x.segment<6>(6 * static_cast<Eigen::Index>(free_.size() + m));
+      next.markers[m] -= x.segment<6>(markers_at_ + 6 * static_cast<Eigen::Index>(m));
     if (options_.calibrate) MoveCalibration(-x.tail<kCalibrationSize>(), next.calibration);
     tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t s) {
       const PointSystem& point = points_[s];
       Eigen::Vector3d rest = point.g;
       for (const auto& [a, W] : point.W)
-        rest.noalias() -= W.transpose() * x.segment<6>(6 * static_cast<Eigen::Index>(a));
+        rest.noalias() -=
+            W.transpose() * x.segment<kCamera>(kCamera * static_cast<Eigen::Index>(a));
       if (options_.calibrate)
         rest.noalias() -= point.W_calibration.transpose() * x.tail<kCalibrationSize>();
       next.landmarks[s] -= point.V_inverse * rest;
@@ -564,23 +567,25 @@ class Bundle {
   // so every block has one writer.
   void Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const {
     tbb::parallel_for(std::size_t{0}, free_.size(), [&](std::size_t slot) {
-      const auto a = 6 * static_cast<Eigen::Index>(slot);
+      const auto a = kCamera * static_cast<Eigen::Index>(slot);
       for (const std::uint32_t i : views_of_keyframe_[static_cast<std::size_t>(free_[slot])]) {
         const PointSystem& point = points_[static_cast<std::size_t>(views_[i].landmark)];
-        const Matrix6x3d WV = views_[i].J_pose.transpose() * (views_[i].J_point * point.V_inverse);
-        right.segment<6>(a).noalias() -= WV * point.g;
+        const CameraPoint WV =
+            views_[i].J_camera.transpose() * (views_[i].J_point * point.V_inverse);
+        right.segment<kCamera>(a).noalias() -= WV * point.g;
         for (const auto& [b, W] : point.W)
           if (b <= static_cast<int>(slot))
-            S.block<6, 6>(a, 6 * static_cast<Eigen::Index>(b)).noalias() -= WV * W.transpose();
+            S.block<kCamera, kCamera>(a, kCamera * static_cast<Eigen::Index>(b)).noalias() -=
+                WV * W.transpose();
         if (options_.calibrate)
-          S.block<kCalibrationSize, 6>(calibration_at_, a).noalias() -=
+          S.block<kCalibrationSize, kCamera>(calibration_at_, a).noalias() -=
               point.W_calibration * WV.transpose();
       }
     });
     if (!options_.calibrate) return;
-    Matrix17d H = Matrix17d::Zero();
+    CalibrationMatrix H = CalibrationMatrix::Zero();
     for (const PointSystem& point : points_) {
-      const Matrix17x3d WV = point.W_calibration * point.V_inverse;
+      const CalibrationPoint WV = point.W_calibration * point.V_inverse;
       H.noalias() += WV * point.W_calibration.transpose();
       right.tail<kCalibrationSize>().noalias() -= WV * point.g;
     }
@@ -641,6 +646,7 @@ class Bundle {
   std::vector<CornerView> corners_;
   std::vector<std::vector<std::uint32_t>> views_of_landmark_;
   std::vector<std::vector<std::uint32_t>> views_of_keyframe_;
+  Eigen::Index markers_at_ = 0;
   Eigen::Index calibration_at_ = 0;
   Eigen::Index size_ = 0;
   Eigen::MatrixXd H_;

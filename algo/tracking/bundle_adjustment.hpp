@@ -26,6 +26,8 @@ struct BundleOptions {
   std::vector<int> free_keyframes;  ///< To move; the others that share landmarks or markers stay.
   bool calibrate = false;           ///< Move the calibration too.
   bool fix_lens = false;            ///< Keep CalibrationModel::lens even so.
+  bool fix_depth_field = false;     ///< Keep the depth terms from kDepthField on.
+  double edge_bias_sigma_px = CalibrationModel::kEdgeBiasSigma;  ///< Of its prior.
   int max_iterations = 8;
   double keypoint_sigma_px = 0.6;  ///< At 640 columns.
   double keypoint_depth_sigmas =

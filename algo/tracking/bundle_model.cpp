@@ -13,8 +13,8 @@ Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& w) {
 
 }  // namespace
 
-Vector17d CalibrationVector(const CalibrationModel& c) {
-  Vector17d x;
+CalibrationVector ToVector(const CalibrationModel& c) {
+  CalibrationVector x;
   for (int i = 0; i < 6; ++i) x[kLens + i] = c.lens[static_cast<std::size_t>(i)];
   x[kReadout] = c.readout_s[0];
   x[kEdgeBias] = c.edge_bias_px[0];
@@ -23,18 +23,18 @@ Vector17d CalibrationVector(const CalibrationModel& c) {
   return x;
 }
 
-Vector17d PriorWeights() {
+CalibrationVector PriorWeights(double edge_bias_sigma_px) {
   using C = CalibrationModel;
-  Vector17d w;
+  CalibrationVector w;
   for (int i = 0; i < 6; ++i) w[kLens + i] = 1.0 / C::kLensSigma[static_cast<std::size_t>(i)];
   w[kReadout] = 1.0 / C::kReadoutSigma;
-  w[kEdgeBias] = 1.0 / C::kEdgeBiasSigma;
+  w[kEdgeBias] = 1.0 / edge_bias_sigma_px;
   for (int i = 0; i < C::kDepthSize; ++i)
     w[kDepth + i] = 1.0 / C::kDepthSigma[static_cast<std::size_t>(i)];
   return w;
 }
 
-void MoveCalibration(const Vector17d& by, CalibrationModel& c) {
+void MoveCalibration(const CalibrationVector& by, CalibrationModel& c) {
   for (int i = 0; i < 6; ++i) c.lens[static_cast<std::size_t>(i)] += by[kLens + i];
   c.readout_s[0] += by[kReadout];
   c.edge_bias_px[0] += by[kEdgeBias];
@@ -92,18 +92,69 @@ SeenPixel ProjectCorrected(const Intrinsics& k, const std::array<double, 6>& len
   return seen;
 }
 
+DepthPlace::DepthPlace(const Eigen::Vector2d& pixel, const Intrinsics& stated)
+    : centred(CentredCoordinates(pixel.x(), pixel.y(), stated.width, stated.height)),
+      products(FieldProducts(centred)),
+      row_share(RowShare(pixel.y(), stated.height)) {}
+
+namespace {
+
+// By which a raw depth is multiplied, and its change with depth. Growth follows the true depth
+// instead of the raw one: they differ by one percent of a term that is itself below one percent.
+struct DepthFactor {
+  DepthFactor(const CalibrationModel& calibration, double z_true_m, const DepthPlace& place) {
+    const auto& d = calibration.depth;
+    value = 1.0 + d[kDepthScale] + d[kDepthSlopeX] * place.centred.x() +
+            d[kDepthSlopeY] * place.centred.y();
+    for (int i = 0; i < kNumFieldTerms; ++i)
+      value += d[static_cast<std::size_t>(kDepthField + i)] * place.products[i];
+    for (int i = 0; i < kNumGrowthTerms; ++i)
+      by_growth +=
+          d[static_cast<std::size_t>(kDepthGrowth + i)] * place.products[kNumFieldTerms + i];
+    value += by_growth * FieldGrowth(z_true_m);
+    slope = by_growth * FieldGrowthSlope(z_true_m);
+  }
+  double value = 1;
+  double by_growth = 0;
+  double slope = 0;  // Per metre.
+};
+
+double RawDepth(const CalibrationModel& calibration, double z_true_m, const DepthPlace& place,
+                double factor) {
+  return (z_true_m - calibration.depth[kDepthOffset] -
+          calibration.depth[kDepthBow] * place.centred.squaredNorm()) /
+         factor;
+}
+
+}  // namespace
+
+double PredictDepthOnly(const CalibrationModel& calibration, double z_true_m,
+                        const DepthPlace& place) {
+  return RawDepth(calibration, z_true_m, place, DepthFactor(calibration, z_true_m, place).value);
+}
+
 PredictedDepth PredictDepth(const CalibrationModel& calibration, const SeenPoint& seen,
-                            const Eigen::Vector2d& centred, double row_share) {
-  const auto& d = calibration.depth;
-  const double bow = centred.squaredNorm();
-  const double scale = 1.0 + d[0] + d[6] * centred.x() + d[7] * centred.y();
+                            const DepthPlace& place) {
+  const DepthFactor of_depth(calibration, seen.p.z(), place);
+  const double factor = of_depth.value;
   PredictedDepth predicted;
-  predicted.z_m = (seen.p.z() - d[1] - d[2] * bow) / scale;
-  predicted.J_z = 1.0 / scale;
-  const double late = seen.J_time.z() / scale;
-  const double z = predicted.z_m / scale;
-  predicted.J_depth << -z, -1.0 / scale, -bow / scale, 0, 0, late, -z * centred.x(),
-      -z * centred.y(), late * row_share;
+  predicted.z_m = RawDepth(calibration, seen.p.z(), place, factor);
+  predicted.J_z = (1.0 - predicted.z_m * of_depth.slope) / factor;
+  const double late = seen.J_time.z() * predicted.J_z;
+  const double z = predicted.z_m / factor;
+  DepthRow& J = predicted.J_depth;
+  J[kDepthScale] = -z;
+  J[kDepthOffset] = -1.0 / factor;
+  J[kDepthBow] = -place.centred.squaredNorm() / factor;
+  J[kDepthDelay] = late;
+  J[kDepthSlopeX] = -z * place.centred.x();
+  J[kDepthSlopeY] = -z * place.centred.y();
+  J[kDepthReadout] = late * place.row_share;
+  J.segment<kNumFieldTerms>(kDepthField) =
+      -z * place.products.head<kNumFieldTerms>().cast<double>().transpose();
+  J.segment<kNumGrowthTerms>(kDepthGrowth) =
+      -z * FieldGrowth(seen.p.z()) *
+      place.products.tail<kNumGrowthTerms>().cast<double>().transpose();
   return predicted;
 }
 

@@ -12,7 +12,6 @@
 
 namespace plumb::bundle {
 
-using Vector17d = Eigen::Matrix<double, 17, 1>;
 using Matrix3x6d = Eigen::Matrix<double, 3, 6>;
 
 /// Places of CalibrationModel's blocks in one vector of all that can be calibrated.
@@ -21,13 +20,14 @@ inline constexpr int kReadout = 6;
 inline constexpr int kEdgeBias = 7;
 inline constexpr int kDepth = 8;
 inline constexpr int kCalibrationSize = kDepth + CalibrationModel::kDepthSize;
-static_assert(kCalibrationSize == 17);
+using CalibrationVector = Eigen::Matrix<double, kCalibrationSize, 1>;
+using DepthRow = Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>;
 
 /// Of a calibration, in these places.
-[[nodiscard]] Vector17d CalibrationVector(const CalibrationModel& calibration);
+[[nodiscard]] CalibrationVector ToVector(const CalibrationModel& calibration);
 /// 1 / standard deviation of each one's prior.
-[[nodiscard]] Vector17d PriorWeights();
-void MoveCalibration(const Vector17d& by, CalibrationModel& calibration);
+[[nodiscard]] CalibrationVector PriorWeights(double edge_bias_sigma_px);
+void MoveCalibration(const CalibrationVector& by, CalibrationModel& calibration);
 
 /// In front of the camera; nearer, projections mean nothing.
 inline constexpr double kNearestPoint_m = 0.02;
@@ -76,15 +76,22 @@ struct SeenPixel {
 /// scene would look better).
 struct PredictedDepth {
   double z_m = 0;
-  double J_z = 0;  ///< To the true depth.
-  Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>
-      J_depth;  ///< To CalibrationModel::depth, times included.
+  double J_z = 0;                       ///< To the true depth.
+  DepthRow J_depth = DepthRow::Zero();  ///< To CalibrationModel::depth, times included.
 };
-/// @param seen  The point at the time of the reading. @param centred  CentredCoordinates() of its
-/// pixel.
+/// Where a depth reading lies in its image.
+struct DepthPlace {
+  DepthPlace(const Eigen::Vector2d& pixel, const Intrinsics& stated);
+  Eigen::Vector2d centred;  ///< CentredCoordinates()
+  FieldRow products;        ///< FieldProducts()
+  double row_share = 0;
+};
+/// @param seen  The point at the time of the reading.
 [[nodiscard]] PredictedDepth PredictDepth(const CalibrationModel& calibration,
-                                          const SeenPoint& seen, const Eigen::Vector2d& centred,
-                                          double row_share);
+                                          const SeenPoint& seen, const DepthPlace& place);
+/// The same without derivatives.
+[[nodiscard]] double PredictDepthOnly(const CalibrationModel& calibration, double z_true_m,
+                                      const DepthPlace& place);
 
 /// Cauchy's loss of a squared residual, and the weight of its reweighted square.
 [[nodiscard]] double CauchyLoss(double squared, double scale);

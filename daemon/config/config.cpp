@@ -64,6 +64,9 @@ void ReadReconstruct(Section section, ReconstructorOptions& options) {
   section.Take("keep_color", options.keep_color, "true or false", kAny);
   section.Take("use_markers", options.use_markers, "true or false", kAny);
   section.Take("use_keypoints", options.use_keypoints, "true or false", kAny);
+  section.Take("use_tone_curve", options.use_tone_curve, "true or false", kAny);
+  section.Take("use_depth_field", options.use_depth_field, "true or false", kAny);
+  section.Take("use_dense_depth", options.use_dense_depth, "true or false", kAny);
   section.Take("num_icp_iterations", options.num_icp_iterations, "a whole number from 1 to 1000",
                [](int n) { return n >= 1 && n <= 1000; });
   section.Take("seed", options.seed, "a whole number, 0 or more", kAny);

@@ -1,6 +1,7 @@
 // The derivatives that bundle adjustment uses, against differences of the values.
 #include "algo/tracking/bundle_model.hpp"
 
+#include <cmath>
 #include <functional>
 
 #include <gtest/gtest.h>
@@ -103,11 +104,14 @@ TEST(BundleModel, DerivativesOfAPredictedDepth) {
   constexpr int kSize = CalibrationModel::kDepthSize;
   CalibrationModel calibration;
   calibration.depth = {0.01, 0.004, -0.003, 0.4, -0.3, 0.003, 0.002, -0.0015, 0.02};
-  const Eigen::Vector2d centred(0.6, -0.4);
-  constexpr double kRowShare = 0.3;
+  for (int i = kDepthField; i < kSize; ++i)
+    calibration.depth[static_cast<std::size_t>(i)] = 0.001 * std::sin(i);
+  const DepthPlace place({255.5, 55.5}, SomeLens());
   const auto predict = [&](const CalibrationModel& c) {
-    return PredictDepth(c, See(SomeCamera(), kPoint, c.depth[5] + kRowShare * c.depth[8]), centred,
-                        kRowShare);
+    return PredictDepth(
+        c,
+        See(SomeCamera(), kPoint, c.depth[kDepthDelay] + place.row_share * c.depth[kDepthReadout]),
+        place);
   };
   const PredictedDepth predicted = predict(calibration);
   const double worst =
@@ -117,11 +121,12 @@ TEST(BundleModel, DerivativesOfAPredictedDepth) {
         return Eigen::Matrix<double, 1, 1>(predict(moved).z_m);
       });
   EXPECT_LT(worst, 1e-7);
-  // What the model corrects, it also predicts: measured -> corrected -> measured.
+  // What the model corrects, it also predicts, but for the growth's own change between the true and
+  // the measured depth: measured -> corrected -> measured.
   const SeenPoint seen = See(SomeCamera(), kPoint, 0.0);
-  EXPECT_NEAR(
-      calibration.CorrectedDepth(PredictDepth(calibration, seen, centred, 0.0).z_m, centred),
-      seen.p.z(), 1e-12);
+  const double raw_m = PredictDepth(calibration, seen, place).z_m;
+  EXPECT_NEAR(calibration.CorrectedDepth(raw_m, place.centred), seen.p.z(), 1e-4);
+  EXPECT_DOUBLE_EQ(PredictDepthOnly(calibration, seen.p.z(), place), raw_m);
 }
 
 }  // namespace

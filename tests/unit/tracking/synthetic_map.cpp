@@ -43,8 +43,14 @@ struct Camera {
   // What the depth camera says of a true depth.
   [[nodiscard]] double Measured(double z, const Vector2d& centred) const {
     const auto& d = sensor.depth;
-    return (z - d[1] - d[2] * centred.squaredNorm()) /
-           (1 + d[0] + d[6] * centred.x() + d[7] * centred.y());
+    double raw = (z - d[1] - d[2] * centred.squaredNorm()) /
+                 (1 + d[0] + d[6] * centred.x() + d[7] * centred.y());
+    // A field has no inverse in closed form; the error shrinks to a hundredth in each round.
+    const bool has_field =
+        std::any_of(d.begin() + kDepthField, d.end(), [](double term) { return term != 0; });
+    for (int round = 0; has_field && round < 5; ++round)
+      raw += z - sensor.CorrectedDepth(raw, centred);
+    return raw;
   }
 };
 

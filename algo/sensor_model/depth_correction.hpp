@@ -1,0 +1,40 @@
+// A calibration's correction of depth, laid out over an image.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "algo/sensor_model/calibration_model.hpp"
+
+namespace plumb {
+
+/// z' = z (1 + scale + slope_x x + slope_y y + field(x, y) + growth(x, y) FieldGrowth(z)) + offset
+/// + bow (x^2 + y^2), with x, y the CentredCoordinates() of a cell's centre. Cells are windows of
+/// `window_px` pixels, row-major; 1 for an image itself. Immutable; threads may share it.
+class DepthCorrection {
+ public:
+  DepthCorrection(const CalibrationModel& calibration, int image_width, int image_height,
+                  int window_px);
+  [[nodiscard]] double Correct(std::size_t cell, double z_m) const {
+    const Cell& c = cells_[cell];
+    return z_m * (1.0 + c.factor + c.growth * FieldGrowth(z_m)) + c.offset_m;
+  }
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+
+ private:
+  struct Cell {
+    double factor = 0;
+    double growth = 0;
+    double offset_m = 0;
+  };
+  int width_;
+  int height_;
+  std::vector<Cell> cells_;
+};
+
+/// FieldProducts() of each cell's centre, laid out as DepthCorrection's cells.
+[[nodiscard]] std::vector<FieldRow> FieldProductsOfCells(int image_width, int image_height,
+                                                         int window_px);
+
+}  // namespace plumb
