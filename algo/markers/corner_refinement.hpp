@@ -41,8 +41,8 @@ struct CornerRefinementOptions {
   /// By how much white reaches into black, pixels of this image: what is left of a wrong tone
   /// curve, or ink that ran (< 0). Edges are taken back by it.
   double edge_shift_px = 0.0;
-  /// Find the edge shift with the rest: black and white cells of a marker are of one size, so that
-  /// white ones that look wider than black ones tell.
+  /// Find the edge shift with the rest: a marker's black and white cells have one size, so white
+  /// ones that look wider than black ones reveal it.
   bool find_edge_shift = false;
   /// If given, the bow that the lens puts on the sides is taken into account; coefficients of the
   /// image that is searched.

@@ -33,7 +33,7 @@ struct SweepTone {
 /// or too large. The power of the value that lets the markers' sides be fitted best, over all
 /// sightings, is taken. A camera's true curve is no power, but between a marker's black and white
 /// one power has the same asymmetry.
-/// @return nothing where too few sightings tell: then the sRGB curve is as good a guess as any.
+/// @return nothing if there are too few usable sightings; the caller then assumes the sRGB curve.
 /// Deterministic, spread over TBB's threads. @throws Interrupted on a stop request.
 [[nodiscard]] std::optional<SweepTone> EstimateTone(const std::vector<MarkerSighting>& sightings,
                                                     const std::stop_token& stop = {});

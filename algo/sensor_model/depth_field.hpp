@@ -43,7 +43,7 @@ using FieldRow = Eigen::Matrix<float, kNumFieldTerms + kNumGrowthTerms, 1>;
 [[nodiscard]] FieldRow FieldProducts(const Eigen::Vector2d& centred);
 
 /// What the growing terms are multiplied by: depth beyond one metre, in metres. It stops at 2 m
-/// from the sensor, where a sweep has next to no readings to tell.
+/// from the sensor: beyond, a sweep has hardly any readings.
 [[nodiscard]] double FieldGrowth(double z_m);
 /// Its derivative.
 [[nodiscard]] double FieldGrowthSlope(double z_m);

@@ -35,8 +35,8 @@ struct Relocalization {
                                                                  const DescribedFeatures& features);
 
 /// Pose of one marker in the camera frame from its four corners: the square's two candidate poses,
-/// told apart by depth inside it, or by reprojection where it is clear. Nothing where neither
-/// decides.
+/// told apart by depth inside it, or by reprojection where that is clear. Nothing is returned if
+/// neither decides.
 [[nodiscard]] std::optional<Pose> MarkerPoseInCamera(const Intrinsics& intrinsics,
                                                      double marker_length_m,
                                                      const MarkerObservation& marker,

@@ -41,7 +41,8 @@ void Appliance::OpenStore() {
     };
     store_ = std::make_unique<Store>(parts_.config.appliance.state, options);
     LogRecovery(store_->recovery());
-    store_->CloseSessions(kSelf);  // who lies on the couch now, nobody has said
+    store_->CloseSessions(kSelf);  // a session does not outlive the process: nobody has confirmed
+                                   // who is on the couch now
     if (!parts_.demo_patient.empty()) {
       const auto patient = store_->FindPatientByCode(parts_.demo_patient);
       open_patient_ = patient ? patient->id : store_->AddPatient(kSelf, parts_.demo_patient, "");
