@@ -96,11 +96,24 @@ bool Appliance::IsRunning() const {
   return state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking;
 }
 
+/// The demo's, which is open from the start and stays.
+bool Appliance::IsOwnSession() const { return opened_by_.user == kSelf.user; }
+
+Appliance::Answer Appliance::WhyNotRestart() const {
+  if (IsRunning())
+    return fmt::format(
+        "in state {}, trying to restart the machine, requires that no scan runs: wait for its "
+        "result",
+        Name(state_.phase));
+  if (opening_ || (!session_id_.empty() && !IsOwnSession()))
+    return "the session of a patient is open: close it first, then restart";
+  return {};
+}
+
 /// A long press when nothing runs and no result is shown ends the treatment session.
 Appliance::Answer Appliance::Press(ButtonPress press) {
-  const bool is_own = opened_by_.user == kSelf.user;  // the demo's, which stays
   if (press == ButtonPress::kLong && state_.phase == ScanPhase::kReady && !session_id_.empty() &&
-      !is_own)
+      !IsOwnSession())
     return CloseSession({.user = "button", .address = {}});
   return Handle(press == ButtonPress::kShort ? ScanEvent::kShortPress : ScanEvent::kLongPress);
 }

@@ -78,6 +78,12 @@ class Appliance {
   Answer CloseSession(const web::Actor& actor);
   /// Until the store has opened a session no scan begins.
   void SetOpening(bool opening) { opening_ = opening; }
+  [[nodiscard]] bool IsRunning() const;
+  /// Why the machine may not be restarted now: a scan runs, or a patient's session is open (the
+  /// demo's counts as none). Empty: it may.
+  [[nodiscard]] Answer WhyNotRestart() const;
+  /// Told by status and light until it is empty: the machine has gone back to the system before.
+  void SetRolledBack(const std::string& text);
   [[nodiscard]] const std::string& session_id() const { return session_id_; }
   /// If this one is open, none is any more. A daily check that is open stays so.
   void ClosePatient(const std::string& patient_id);
@@ -153,7 +159,7 @@ class Appliance {
   void ArmSessionTimer();
   void OnSessionTimer();
   void ForgetSession();
-  [[nodiscard]] bool IsRunning() const;
+  [[nodiscard]] bool IsOwnSession() const;
   [[nodiscard]] std::optional<double> SecondsSinceSensor() const;
   [[nodiscard]] bool IsCheckOverdue();
   void NoteDropped(const ScanUpdate& update);
@@ -203,7 +209,7 @@ class Appliance {
   ClockWatch clock_{std::chrono::system_clock::now(), std::chrono::steady_clock::now()};
   std::stop_source care_;  ///< Stopped when the appliance ends.
   ScanState state_;
-  std::string sensor_fault_, scan_fault_;
+  std::string sensor_fault_, scan_fault_, rolled_back_;
   std::string session_id_, open_patient_, reference_reason_;
   web::Actor opened_by_;  ///< The session.
   web::ScanPurpose purpose_ = web::ScanPurpose::kFraction;

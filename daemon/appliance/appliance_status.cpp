@@ -96,7 +96,7 @@ const char* Name(IndicatorPattern pattern) {
   static constexpr const char* kNames[] = {
       "off",           "no_sensor",   "ready",     "scanning", "too_fast",
       "too_near",      "too_far",     "working",   "done",     "result_in_tolerance",
-      "result_unsure", "result_move", "no_answer", "fault"};
+      "result_unsure", "result_move", "no_answer", "fault",    "ready_rolled_back"};
   return kNames[static_cast<int>(pattern)];
 }
 
@@ -105,7 +105,7 @@ IndicatorPattern Appliance::Pattern() const {
     case ScanPhase::kNoSensor:
       return IndicatorPattern::kNoSensor;
     case ScanPhase::kReady:
-      return IndicatorPattern::kReady;
+      return rolled_back_.empty() ? IndicatorPattern::kReady : IndicatorPattern::kReadyRolledBack;
     case ScanPhase::kWorking:
       return IndicatorPattern::kWorking;
     case ScanPhase::kFault:
@@ -143,6 +143,12 @@ void Appliance::Show() {
   if (parts_.indicator != nullptr) parts_.indicator->Show(pattern);
   TellEvent("light",
             Json{{"pattern", Name(pattern)}}.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+void Appliance::SetRolledBack(const std::string& text) {
+  rolled_back_ = text;
+  Show();
+  TellWeb(web::EventKind::kStatus);
 }
 
 void Appliance::TellEvent(const char* event, const std::string& fields_json) {
@@ -257,6 +263,7 @@ std::string Appliance::StatusJson() {
       {"scan", scan},
       {"last_result", last},
       {"light", Name(shown_)},
+      {"rolled_back", rolled_back_},
       {"warnings", StorageWarnings()},
       {"page",
        {{"url", page_.url}, {"certificate", page_.certificate}, {"warnings", page_.warnings}}},
@@ -299,6 +306,7 @@ web::Status Appliance::WebStatus() {
   }
   status.version = Version();
   status.warnings = page_.warnings;
+  status.rolled_back = rolled_back_;
   const Eigen::Matrix3d R_iec_reference = parts_.config.compare.T_iec_reference.linear();
   status.right_xy = {R_iec_reference(0, 0), R_iec_reference(0, 1)};
   status.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)};

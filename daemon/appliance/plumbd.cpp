@@ -270,7 +270,7 @@ class Plumbd {
                            .button = panel_.button(),
                            .indicator = panel_.light(),
                            .demo_patient = options.simulated.empty() ? "" : "demo"}),
-        service_(appliance_, config.update),
+        service_(appliance_, config.update, MakeLogindRestart(loop_, {})),
         http_(service_, HttpOptions(config)),
         control_(loop_, ControlSocket(config),
                  [this](const ControlRequest& request, const ControlServer::Reply& reply) {

@@ -1,7 +1,10 @@
 #include "daemon/appliance/web_service.hpp"
 
+#include <systemd/sd-id128.h>
 #include <unistd.h>
 
+#include <array>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <utility>
@@ -34,6 +37,14 @@ web::Change AnswerOf(const std::string& refusal) {
           .file = {}};
 }
 
+/// Of this start of the machine. The unit passes it on, because its sandbox hides where it stands.
+std::string BootId() {
+  if (const char* given = std::getenv("PLUMB_BOOT_ID"); given != nullptr) return given;
+  sd_id128_t id{};
+  std::array<char, SD_ID128_STRING_MAX> text{};
+  return sd_id128_get_boot(&id) < 0 ? std::string() : sd_id128_to_string(id, text.data());
+}
+
 std::string CheckSettings(const web::Settings& s) {
   const auto out_of = [](double v, double least, double most) {
     return !(v >= least && v <= most);
@@ -52,45 +63,22 @@ std::string CheckSettings(const web::Settings& s) {
 
 }  // namespace
 
-WebService::WebService(Appliance& appliance, const UpdateConfig& update)
+WebService::WebService(Appliance& appliance, const UpdateConfig& update,
+                       std::unique_ptr<SystemRestart> restart)
     : appliance_(appliance),
-      updater_(
-          appliance.loop(),
-          UpdaterOptions{
-              .folder = update.folder,
-              .max_bytes = static_cast<std::uint64_t>(update.max_bundle_mb) << 20,
-              .bus_address = {},
-              .version = std::string(Version()),
-              .hindrance = [this] { return WhyNoUpdate(); },
-              .changed =
-                  [this] {
-                    if (listener_) listener_(web::EventKind::kUpdate);
-                  },
-              .aside = [this](std::function<void()> work) { return files_.Post(std::move(work)); },
-              .ended =
-                  [this](const std::string& bundle, const std::string& failure) {
-                    Log({.user = "installer", .address = {}},
-                        failure.empty() ? "update.done" : "update.fail", bundle, failure);
-                  }}) {
-  appliance_.SetHindrance([this] {
-    return updater_.is_installing()
-               ? std::string("a system update is being installed: wait until it is done")
-               : std::string();
-  });
-}
+      updates_(
+          appliance, std::move(restart),
+          {.config = update,
+           .boot = BootId(),
+           .aside = [this](std::function<void()> work) { return files_.Post(std::move(work)); },
+           .changed =
+               [this] {
+                 if (listener_) listener_(web::EventKind::kUpdate);
+               },
+           .log = [this](const web::Actor& actor, const char* action, const std::string& subject,
+                         const std::string& detail) { Log(actor, action, subject, detail); }}) {}
 
-WebService::~WebService() {
-  *alive_ = false;
-  appliance_.SetHindrance({});
-}
-
-std::string WebService::WhyNoUpdate() const {
-  const ScanPhase phase = appliance_.state().phase;
-  if (phase != ScanPhase::kScanning && phase != ScanPhase::kWorking) return {};
-  return fmt::format(
-      "in state {}, trying to update, requires that no scan runs: wait for its result",
-      Name(phase));
-}
+WebService::~WebService() { *alive_ = false; }
 
 void WebService::SetListener(std::function<void(web::EventKind)> listener) {
   listener_ = listener;
@@ -106,8 +94,9 @@ void WebService::Change(web::Done done, std::function<std::string(Store&)> chang
           .file = {}});
     return;
   }
-  const bool posted = appliance_.store_thread().Post([this, store, done, change = std::move(change),
-                                                      alive = alive_] {
+  // The store's thread outlives this object: it must not be used there.
+  const bool posted = appliance_.store_thread().Post([store, done, appliance = &appliance_,
+                                                      change = std::move(change), alive = alive_] {
     web::Change answer;
     try {
       answer.id = change(*store);
@@ -118,10 +107,10 @@ void WebService::Change(web::Done done, std::function<std::string(Store&)> chang
     } catch (const std::exception& error) {
       answer = {.result = ChangeResult::kFailed, .message = error.what(), .id = {}, .file = {}};
     }
-    appliance_.loop().Post("store changed", [this, done, answer, alive] {
+    appliance->loop().Post("store changed", [appliance, done, answer, alive] {
       if (!*alive) return;
       done(answer);
-      if (answer.result == ChangeResult::kDone) appliance_.TellData();
+      if (answer.result == ChangeResult::kDone) appliance->TellData();
     });
   });
   if (!posted)
@@ -288,7 +277,7 @@ std::optional<web::Reference> WebService::FindReference(const std::string& id) {
 void WebService::AddReference(const web::Actor& actor, const std::string& scan_id,
                               const std::string& reason, web::Done done) {
   Change(std::move(done), [=, this](Store& store) {
-    return store.AddReference(actor, scan_id, reason, appliance_.DefaultPlan());
+    return store.AddReference(actor, scan_id, reason, appliance->DefaultPlan());
   });
 }
 void WebService::PlanReference(const web::Actor& actor, const std::string& id, int revision,
@@ -453,32 +442,6 @@ void WebService::ChangeSettings(const web::Actor& actor, const web::Settings& se
   }
   Change(std::move(done),
          [=](Store& store) { return store.ChangeSettings(actor, settings), std::string(); });
-}
-
-web::UpdateStatus WebService::GetUpdate() { return updater_.status(); }
-
-void WebService::AddBundle(const web::Actor& actor, const std::filesystem::path& file,
-                           const std::string& name, web::Done done) {
-  const web::Change change = updater_.Add(file, name);
-  Log(actor, change.result == ChangeResult::kDone ? "update.upload" : "update.refuse", name,
-      change.message);
-  done(change);
-}
-
-void WebService::RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) {
-  const web::Change change = updater_.Remove(name);
-  if (change.result == ChangeResult::kDone) Log(actor, "update.remove", name, "");
-  done(change);
-}
-
-void WebService::InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) {
-  if (const std::string why = WhyNoUpdate(); !why.empty()) return done(AnswerOf(why));
-  updater_.Install(
-      bundle, [this, actor, bundle, done = std::move(done)](const web::Change& change) {
-        Log(actor, change.result == ChangeResult::kDone ? "update.install" : "update.refuse",
-            bundle, change.message);
-        done(change);
-      });
 }
 
 /// Versions, status, health and the audit log's actions: nothing of a patient, no names of scans'

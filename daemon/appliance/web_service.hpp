@@ -7,7 +7,7 @@
 #include <string>
 
 #include "daemon/appliance/appliance.hpp"
-#include "daemon/update/updater.hpp"
+#include "daemon/appliance/updates.hpp"
 #include "web/service/scan_service.hpp"
 
 namespace plumb {
@@ -17,8 +17,9 @@ namespace plumb {
 /// changes fail with the reason.
 class WebService : public web::ScanService {
  public:
-  /// Borrowed; lives longer.
-  WebService(Appliance& appliance, const UpdateConfig& update);
+  /// The appliance is borrowed; lives longer. @param restart  How the machine is restarted.
+  WebService(Appliance& appliance, const UpdateConfig& update,
+             std::unique_ptr<SystemRestart> restart);
   ~WebService() override;
 
   [[nodiscard]] bool Later(web::Aside where, std::function<void()> work,
@@ -85,16 +86,27 @@ class WebService : public web::ScanService {
   void ChangeSettings(const web::Actor& actor, const web::Settings& settings,
                       web::Done done) override;
 
-  [[nodiscard]] web::UpdateStatus GetUpdate() override;
+  [[nodiscard]] web::UpdateStatus GetUpdate() override { return updates_.GetStatus(); }
   void AddBundle(const web::Actor& actor, const std::filesystem::path& file,
-                 const std::string& name, web::Done done) override;
-  void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override;
-  void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
+                 const std::string& name, web::Done done) override {
+    updates_.Add(actor, file, name, done);
+  }
+  void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override {
+    updates_.Remove(actor, name, done);
+  }
+  void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override {
+    updates_.Install(actor, bundle, std::move(done));
+  }
+  void RestartSystem(const web::Actor& actor, web::Done done) override {
+    updates_.Restart(actor, std::move(done));
+  }
+  void ForgetRollBack(const web::Actor& actor, web::Done done) override {
+    updates_.ForgetRollBack(actor, done);
+  }
   void WriteDiagnostics(const web::Actor& actor, web::Done done) override;
+  [[nodiscard]] Updates& updates() { return updates_; }
 
  private:
-  /// Why no update may begin now; empty: it may.
-  [[nodiscard]] std::string WhyNoUpdate() const;
   /// Runs `change` on the store's thread; what it returns is the id of what was made, what it
   /// throws becomes the answer.
   void Change(web::Done done, std::function<std::string(Store&)> change);
@@ -108,7 +120,7 @@ class WebService : public web::ScanService {
   std::shared_ptr<const std::string> preview_;
   std::int64_t preview_index_ = -1;
   std::chrono::steady_clock::time_point preview_at_;
-  Updater updater_;                   // what it tells uses the rest
+  Updates updates_;                   // what it tells uses the rest
   WorkThread reads_{64}, files_{64};  // last: what they do uses the rest
 };
 

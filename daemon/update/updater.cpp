@@ -1,10 +1,7 @@
 #include "daemon/update/updater.hpp"
 
 #include <fcntl.h>
-#include <poll.h>
-#include <sys/epoll.h>
 #include <sys/stat.h>
-#include <systemd/sd-bus.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -20,6 +17,8 @@
 #include <fmt/format.h>
 
 #include "daemon/loop/log.hpp"
+#include "daemon/update/bus.hpp"
+#include "daemon/update/last_update.hpp"
 
 namespace plumb {
 
@@ -32,8 +31,7 @@ constexpr const char* kPath = "/";
 constexpr const char* kInstaller = "de.pengutronix.rauc.Installer";
 constexpr const char* kProperties = "org.freedesktop.DBus.Properties";
 constexpr auto kLookAgain = std::chrono::seconds(5);
-constexpr std::uint64_t kCallTimeout_us =
-    60'000'000;  // RAUC reads the whole bundle before it answers
+constexpr std::chrono::seconds kCallTimeout{60};  // RAUC reads the whole bundle before it answers
 constexpr std::size_t kMaxListed = 32;
 constexpr std::size_t kMaxKept = 4;
 constexpr std::string_view kEnding = ".raucb";
@@ -78,9 +76,10 @@ std::string Shown(const char* text) {
 }  // namespace
 
 struct Updater::Impl {
-  Impl(EventLoop& on, UpdaterOptions given) : loop(on), options(std::move(given)) {
-    timer = loop.MakeTimer("bus", [this] { Process(); });
+  Impl(EventLoop& on, UpdaterOptions given)
+      : loop(on), options(std::move(given)), bus(on, "bus", [this] { OnBroken(); }) {
     RemoveBroken();
+    last = ReadLastUpdate(options.folder);
     Connect();
   }
   ~Impl() {
@@ -92,12 +91,15 @@ struct Updater::Impl {
 
   EventLoop& loop;
   UpdaterOptions options;
-  sd_bus* bus = nullptr;
-  EventLoop::Source source, timer;
+  Bus bus;
+  std::optional<LastUpdate> last;  ///< That the machine was not restarted after, or did not keep.
+  bool told_of_roll_back = false;
   std::chrono::steady_clock::time_point looked_at;
   bool is_there = false;
   bool is_installing = false;
   std::string slot, compatible, step, last_error, outcome;
+  std::string version;       ///< Of the bundle that is or was installed.
+  std::string last_failure;  ///< Of the last attempt; empty: it went well, or there was none.
   BundleState state = BundleState::kUnknown;  ///< Of the bundle that is installed or looked at.
   std::map<std::string, BundleState> states;  ///< Of those looked at before.
   std::shared_ptr<bool> alive = std::make_shared<bool>(true);  ///< For work that is done aside.
@@ -118,69 +120,37 @@ struct Updater::Impl {
   }
 
   void Disconnect() {
-    source = {};
-    timer.Disarm();
     is_there = false;
-    if (bus != nullptr) sd_bus_close_unref(std::exchange(bus, nullptr));
+    bus.Close();
+  }
+
+  void OnBroken() {
+    if (is_installing)
+      End("the connection to the installer broke: look at its log, then try again");
+    is_there = false;
+    Tell();
   }
 
   void Connect() {
     looked_at = std::chrono::steady_clock::now();
-    int result = 0;
-    if (options.bus_address.empty()) {
-      result = sd_bus_open_system(&bus);
-    } else {
-      result = sd_bus_new(&bus);
-      if (result >= 0) result = sd_bus_set_address(bus, options.bus_address.c_str());
-      if (result >= 0) result = sd_bus_set_bus_client(bus, 1);
-      if (result >= 0) result = sd_bus_start(bus);
-    }
-    if (result < 0) return Disconnect();  // no bus on this machine
-    sd_bus_set_method_call_timeout(bus, kCallTimeout_us);
-    sd_bus_match_signal_async(bus, nullptr, kService, kPath, kProperties, "PropertiesChanged",
+    if (!bus.Open(options.bus_address, kCallTimeout)) return;  // no bus on this machine
+    sd_bus_match_signal_async(bus.get(), nullptr, kService, kPath, kProperties, "PropertiesChanged",
                               &Impl::OnChanged, nullptr, this);
-    sd_bus_match_signal_async(bus, nullptr, kService, kPath, kInstaller, "Completed",
+    sd_bus_match_signal_async(bus.get(), nullptr, kService, kPath, kInstaller, "Completed",
                               &Impl::OnCompleted, nullptr, this);
     const std::string owner = fmt::format(
         "type='signal',sender='{0}',path='/org/freedesktop/DBus',interface='{0}',"
         "member='NameOwnerChanged',arg0='{1}'",
         "org.freedesktop.DBus", kService);
-    sd_bus_add_match_async(bus, nullptr, owner.c_str(), &Impl::OnOwner, nullptr, this);
-    source = loop.WatchDescriptor("bus", sd_bus_get_fd(bus), EPOLLIN,
-                                  [this](std::uint32_t) { Process(); });
+    sd_bus_add_match_async(bus.get(), nullptr, owner.c_str(), &Impl::OnOwner, nullptr, this);
     Look();
-    Process();
+    bus.Process();
   }
 
   void Look() {
     looked_at = std::chrono::steady_clock::now();
-    sd_bus_call_method_async(bus, nullptr, kService, kPath, kProperties, "GetAll",
+    sd_bus_call_method_async(bus.get(), nullptr, kService, kPath, kProperties, "GetAll",
                              &Impl::OnProperties, this, "s", kInstaller);
-  }
-
-  void Process() {
-    while (bus != nullptr) {
-      const int result = sd_bus_process(bus, nullptr);
-      if (result == 0) break;
-      if (result < 0) {
-        if (is_installing)
-          End("the connection to the installer broke: look at its log, then try again");
-        Disconnect();
-        return Tell();
-      }
-    }
-    if (bus == nullptr) return;
-    const int events = sd_bus_get_events(bus);
-    if (events >= 0)
-      source.SetEvents(((events & POLLIN) != 0 ? EPOLLIN : 0U) |
-                       ((events & POLLOUT) != 0 ? EPOLLOUT : 0U));
-    std::uint64_t until_us = UINT64_MAX;
-    if (sd_bus_get_timeout(bus, &until_us) >= 0 && until_us != UINT64_MAX) {
-      timer.ArmAt(EventLoop::Clock::time_point(
-          std::chrono::microseconds(until_us)));  // both count the monotonic clock
-    } else {
-      timer.Disarm();
-    }
   }
 
   void Tell() const {
@@ -193,6 +163,8 @@ struct Updater::Impl {
 
   void End(const std::string& failure) {
     is_installing = false;
+    last_failure = failure;
+    if (failure.empty()) Remember();
     fraction = failure.empty() ? 1.0 : 0.0;
     outcome = failure.empty()
                   ? fmt::format("{} is installed: restart the appliance to use it", bundle)
@@ -200,6 +172,32 @@ struct Updater::Impl {
     Log(failure.empty() ? LogLevel::kNotice : LogLevel::kError, outcome);
     if (options.ended) options.ended(bundle, failure);
     Tell();
+  }
+
+  /// The next start must know what was installed, and from where.
+  void Remember() {
+    last = LastUpdate{.version = version, .from_slot = slot, .boot = options.boot};
+    told_of_roll_back = false;
+    try {
+      WriteLastUpdate(options.folder, *last);
+    } catch (const std::exception& error) {
+      Log(LogLevel::kWarning,
+          fmt::format("after a restart nothing will say whether {} was kept: {}", version,
+                      error.what()));
+    }
+  }
+
+  [[nodiscard]] std::string RolledBack() const {
+    return last && is_there ? WhyRolledBack(*last, slot, options.boot, options.version)
+                            : std::string();
+  }
+
+  void NoteRollBack() {
+    const std::string text = RolledBack();
+    if (text.empty() || told_of_roll_back) return;
+    told_of_roll_back = true;
+    Log(LogLevel::kError, text);
+    if (options.rolled_back) options.rolled_back(text);
   }
 
   /// Name and value of one property; what is not known is skipped.
@@ -238,6 +236,7 @@ struct Updater::Impl {
     const bool was_there = impl->is_there;
     impl->is_there = sd_bus_message_is_method_error(message, nullptr) == 0;
     if (impl->is_there) impl->ReadProperties(message);
+    impl->NoteRollBack();
     if (impl->is_there != was_there) impl->Tell();
     return 0;
   }
@@ -311,8 +310,8 @@ struct Updater::Impl {
       impl->Refuse(ChangeResult::kInvalid, impl->WhyRefused(ErrorOf(message)));
       return 0;
     }
-    const char *compatible = nullptr, *version = nullptr;
-    if (sd_bus_message_read(message, "ss", &compatible, &version) < 0) {
+    const char *compatible = nullptr, *held = nullptr;
+    if (sd_bus_message_read(message, "ss", &compatible, &held) < 0) {
       impl->Refuse(ChangeResult::kFailed, "the installer's answer cannot be read: is it RAUC 1.8?");
       return 0;
     }
@@ -322,10 +321,11 @@ struct Updater::Impl {
                                Shown(compatible), impl->compatible));
       return 0;
     }
-    if (IsOlder(Shown(version), impl->options.version)) {
+    impl->version = Shown(held);
+    if (IsOlder(impl->version, impl->options.version)) {
       impl->Refuse(ChangeResult::kConflict,
                    fmt::format("this bundle holds version {}, older than {} which runs",
-                               Shown(version), impl->options.version));
+                               impl->version, impl->options.version));
       return 0;
     }
     // To look at a large bundle takes its time.
@@ -340,7 +340,7 @@ struct Updater::Impl {
 
   void Refuse(ChangeResult result, const std::string& message) {
     is_installing = false;
-    outcome = message;
+    outcome = last_failure = message;
     Answer(Refused(result, message));
     Tell();
   }
@@ -348,7 +348,7 @@ struct Updater::Impl {
   void Call() {
     const std::string path = (options.folder / bundle).string();
     const int result =
-        sd_bus_call_method_async(bus, nullptr, kService, kPath, kInstaller, "InstallBundle",
+        sd_bus_call_method_async(bus.get(), nullptr, kService, kPath, kInstaller, "InstallBundle",
                                  &Impl::OnBegun, this, "sa{sv}", path.c_str(), 0);
     if (result < 0) Refuse(ChangeResult::kFailed, "the installer cannot be asked");
   }
@@ -365,7 +365,7 @@ struct Updater::Impl {
   }
 
   void Install(const std::string& name, web::Done asked) {
-    if (bus == nullptr || !is_there)
+    if (bus.get() == nullptr || !is_there)
       return asked(
           Refused(ChangeResult::kConflict, "there is no installer (RAUC) on this machine"));
     if (is_installing)
@@ -383,6 +383,7 @@ struct Updater::Impl {
     step = "checking the signature";
     last_error.clear();
     outcome.clear();
+    last_failure.clear();
     done = std::move(asked);
     state = BundleState::kUnknown;
     Tell();
@@ -405,12 +406,12 @@ struct Updater::Impl {
       found = known->second;
     }
     state = found;
-    const int result =
-        bus == nullptr ? -1
-                       : sd_bus_call_method_async(bus, nullptr, kService, kPath, kInstaller, "Info",
-                                                  &Impl::OnInfo, this, "s", file.c_str());
+    const int result = bus.get() == nullptr ? -1
+                                            : sd_bus_call_method_async(
+                                                  bus.get(), nullptr, kService, kPath, kInstaller,
+                                                  "Info", &Impl::OnInfo, this, "s", file.c_str());
     if (result < 0) return Refuse(ChangeResult::kFailed, "the installer cannot be asked");
-    Process();
+    bus.Process();
   }
 
   [[nodiscard]] std::vector<std::string> Bundles() const {
@@ -435,15 +436,19 @@ bool Updater::is_installing() const { return impl_->is_installing; }
 
 web::UpdateStatus Updater::status() {
   if (!impl_->is_there && std::chrono::steady_clock::now() - impl_->looked_at >= kLookAgain) {
-    if (impl_->bus == nullptr) {
+    if (impl_->bus.get() == nullptr) {
       impl_->Connect();
     } else {
       impl_->Look();
-      impl_->Process();
+      impl_->bus.Process();
     }
   }
   web::UpdateStatus status;
   status.supported = impl_->is_there;
+  status.failure = impl_->is_installing ? std::string() : impl_->last_failure;
+  status.restart_needed =
+      impl_->last && !impl_->is_installing && impl_->last->boot == impl_->options.boot;
+  status.rolled_back = impl_->RolledBack();
   if (!status.supported) {
     status.message =
         impl_->outcome.empty()
@@ -497,6 +502,13 @@ web::Change Updater::Remove(const std::string& name) {
   impl_->states.erase(name);
   impl_->Tell();
   return {};
+}
+
+void Updater::ForgetRollBack() {
+  if (impl_->RolledBack().empty()) return;
+  impl_->last.reset();
+  RemoveLastUpdate(impl_->options.folder);
+  impl_->Tell();
 }
 
 void Updater::Install(const std::string& name, web::Done done) {

@@ -17,7 +17,8 @@ struct UpdaterOptions {
   std::filesystem::path folder = "/var/lib/plumb/updates";  ///< Bundles lie here: NAME.raucb.
   std::uint64_t max_bytes = std::uint64_t{2} << 30;         ///< Of one bundle.
   std::string bus_address;                                  ///< Empty: the system bus.
-  std::string version;  ///< Of what runs: an older bundle is refused.
+  std::string version;    ///< Of what runs: an older bundle is refused.
+  std::string boot = {};  ///< Another text at each start of the machine.
   std::function<std::string()>
       hindrance;  ///< Asked before RAUC is told to begin: why it may not now, or nothing.
   std::function<void()> changed;  ///< Called on the loop when status() has changed.
@@ -26,6 +27,9 @@ struct UpdaterOptions {
   std::function<bool(std::function<void()>)> aside;
   /// Called on the loop when an installation that had begun has ended; empty text: it worked.
   std::function<void(const std::string& bundle, const std::string& failure)> ended;
+  /// Called on the loop, once: the machine has started the system before the last update, and why
+  /// that is known.
+  std::function<void(const std::string& text)> rolled_back = {};
 };
 
 /// Nothing waits: every call of the bus is answered later. A machine without a bus or without RAUC
@@ -49,6 +53,8 @@ class Updater {
   /// Has RAUC check and install NAME of the folder. `done` comes once it has begun, or with the
   /// reason why not.
   void Install(const std::string& name, web::Done done);
+  /// Somebody has taken note of the roll-back: nothing tells of it any more.
+  void ForgetRollBack();
 
  private:
   struct Impl;

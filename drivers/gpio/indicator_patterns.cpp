@@ -44,6 +44,10 @@ constexpr std::array kNoAnswerSteps{
 constexpr std::array kFaultSteps{IndicatorStep{kRed, milliseconds(80)},
                                  IndicatorStep{0, milliseconds(80)}};
 
+// Mostly what ready is: scans can be made.
+constexpr std::array kReadyRolledBackSteps{IndicatorStep{kGreen, milliseconds(1500)},
+                                           IndicatorStep{kRed, milliseconds(300)}};
+
 constexpr int kMaxCatchUp = 64;  // steps; the loop slept longer than any rhythm, so it starts again
 
 }  // namespace
@@ -78,6 +82,8 @@ IndicatorProgram ProgramOf(IndicatorPattern pattern) {
       return {kNoAnswerSteps, 3};
     case IndicatorPattern::kFault:
       return {kFaultSteps};
+    case IndicatorPattern::kReadyRolledBack:
+      return {kReadyRolledBackSteps};
   }
   return {kFaultSteps};
 }

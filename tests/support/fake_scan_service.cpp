@@ -648,6 +648,23 @@ void FakeScanService::InstallUpdate(const Actor& actor, const std::string& bundl
   Did(actor, "update.install", bundle, done);
 }
 
+void FakeScanService::RestartSystem(const Actor& actor, Done done) {
+  const auto refuse = [&](const char* why) { Finish(done, Refusal(ChangeResult::kConflict, why)); };
+  if (update.installing) return refuse("a system update is being installed: wait until it is done");
+  if (status.scan) return refuse("a scan is running: wait for its result");
+  if (status.session) return refuse("the session of a patient is open: close it first");
+  ++num_restarts;
+  Did(actor, "system.restart", "", done);
+}
+
+void FakeScanService::ForgetRollBack(const Actor& actor, Done done) {
+  status.rolled_back.clear();
+  update.rolled_back.clear();
+  Tell(EventKind::kUpdate);
+  Tell(EventKind::kStatus);
+  Did(actor, "update.seen", "", done);
+}
+
 void FakeScanService::WriteDiagnostics(const Actor& actor, Done done) {
   Log(actor, "diagnostics", "", "");
   Finish(done, {ChangeResult::kDone, "", "", diagnostics_file});

@@ -38,6 +38,7 @@ class FakeScanService : public web::ScanService {
   std::shared_ptr<const std::string> preview;
   std::filesystem::path diagnostics_file;
   std::uint64_t uploaded_bytes = 0;
+  int num_restarts = 0;  ///< Asked for and done; a fake machine stays on.
   /// Folder of the n-th finished scan (0, 1, ...) with its result; a scan beyond the list uses the
   /// last.
   struct Recorded {
@@ -136,6 +137,8 @@ class FakeScanService : public web::ScanService {
                  const std::string& name, web::Done done) override;
   void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override;
   void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
+  void RestartSystem(const web::Actor& actor, web::Done done) override;
+  void ForgetRollBack(const web::Actor& actor, web::Done done) override;
   void WriteDiagnostics(const web::Actor& actor, web::Done done) override;
 
   /// A reference made of a scan, as AddReference() does it, without the log.

@@ -179,6 +179,8 @@ void Accounts::AddRoutes(Router& router) {
               bind(&Accounts::ChangeOwnPassword)});
   router.Add({"POST", "/api/v1/scans/{id}/accept-outside", Permission::kAccept, BodyKind::kJson,
               bind(&Accounts::AcceptOutside)});
+  router.Add({"POST", "/api/v1/update/restart", Permission::kUpdate, BodyKind::kJson,
+              bind(&Accounts::RestartSystem)});
   router.Add({"GET", "/api/v1/users", Permission::kUsers, BodyKind::kNone,
               [this](const Request&, const Respond& respond) {
                 Json users = Json::array();
@@ -391,6 +393,18 @@ void Accounts::AcceptOutside(const Request& request, const Respond& respond) {
               service_.AcceptScan(actor, scan, reason, WhileAlive([respond](const Change& change) {
                                     respond(ChangeResponse(change));
                                   }));
+            });
+}
+
+void Accounts::RestartSystem(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  std::string password = fields.Text("password", 1, kMaxPassword);
+  fields.Finish();
+  VerifyOwn(request, std::move(password), "the password is wrong", respond,
+            [this, actor = request.actor(), respond](const User&) {
+              service_.RestartSystem(actor, WhileAlive([respond](const Change& change) {
+                                       respond(ChangeResponse(change));
+                                     }));
             });
 }
 

@@ -68,6 +68,8 @@ class Accounts : public SessionLookup {
   void ChangeOwnPassword(const Request& request, const Respond& respond);
   /// Accepts a result that is not in tolerance: with a reason and the person's own password.
   void AcceptOutside(const Request& request, const Respond& respond);
+  /// Restarts the machine: with the person's own password.
+  void RestartSystem(const Request& request, const Respond& respond);
   void AddUser(const Request& request, const Respond& respond);
   void ChangeUser(const Request& request, const Respond& respond);
   /// Opens a session and tells the page about it.

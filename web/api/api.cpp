@@ -367,6 +367,10 @@ void AddCareRoutes(Table& table) {
                       respond(ChangeResponse(change));
                     });
               });
+  table.Write("POST", "/api/v1/update/seen", Permission::kUpdate, BodyKind::kNone,
+              [](ScanService& service, const Request& request, const Respond& respond) {
+                service.ForgetRollBack(request.actor(), Answer(respond));
+              });
   table.Write("DELETE", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kNone,
               [](ScanService& service, const Request& request, const Respond& respond) {
                 service.RemoveBundle(request.actor(), request.arguments[0], Answer(respond));

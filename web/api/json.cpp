@@ -255,7 +255,8 @@ Json ToJson(const Status& status, WallClock::time_point now) {
           {"last_result", status.last_result ? ToJson(*status.last_result, now) : Json(nullptr)},
           {"time", TimeText(now)},
           {"version", status.version},
-          {"warnings", status.warnings}};
+          {"warnings", status.warnings},
+          {"rolled_back", TextOrNull(status.rolled_back)}};
 }
 
 Json ToJson(const Patient& patient) {
@@ -318,9 +319,15 @@ Json ToJson(const Settings& settings) {
 }
 
 Json ToJson(const UpdateStatus& update) {
-  return {{"supported", update.supported}, {"message", update.message},
-          {"slot", update.slot},           {"installing", update.installing},
-          {"fraction", update.fraction},   {"bundles", update.bundles}};
+  return {{"supported", update.supported},
+          {"message", update.message},
+          {"slot", update.slot},
+          {"installing", update.installing},
+          {"fraction", update.fraction},
+          {"bundles", update.bundles},
+          {"restart_needed", update.restart_needed},
+          {"failure", TextOrNull(update.failure)},
+          {"rolled_back", TextOrNull(update.rolled_back)}};
 }
 
 Fields::Fields(const std::string& body) : json_(ParseShallow(body)) {

@@ -184,6 +184,10 @@ class ScanService {
   virtual void RemoveBundle(const Actor& actor, const std::string& name, Done done) = 0;
   virtual void InstallUpdate(const Actor& actor, const std::string& bundle,
                              Done done) = 0;  ///< kConflict during a scan.
+  /// Restarts the machine. kConflict during a treatment session, a scan and an installation.
+  virtual void RestartSystem(const Actor& actor, Done done) = 0;
+  /// A roll-back is not told of any more.
+  virtual void ForgetRollBack(const Actor& actor, Done done) = 0;
   /// In the configured folder, while scans go on; answers when it is done. kInvalid where no folder
   /// is configured. The message names what was not as it was stored.
   virtual void MakeBackup(const Actor& actor, Done done) = 0;

@@ -246,6 +246,7 @@ struct Status {
   std::optional<Scan> last_result;  ///< The newest finished scan of this run.
   std::string version;
   std::vector<std::string> warnings;  ///< Of how the appliance is set up.
+  std::string rolled_back;            ///< As in UpdateStatus.
 };
 
 struct User {
@@ -295,6 +296,9 @@ struct UpdateStatus {
   bool installing = false;
   double fraction = 0.0;
   std::vector<std::string> bundles;  ///< Names of bundles on attached media.
+  bool restart_needed = false;       ///< One is installed and starts at the next restart.
+  std::string failure;      ///< Why the last attempt was refused or failed; empty: it was not.
+  std::string rolled_back;  ///< A sentence, where the machine has gone back to the system before.
 };
 
 struct Health {

@@ -31,6 +31,17 @@ class SlowProvider : public FakeProvider {
   std::shared_future<void> may_open_;
 };
 
+/// A machine that stays on.
+class FakeRestart : public SystemRestart {
+ public:
+  void Restart(std::function<void(const std::string&)> done) override {
+    ++num_asked;
+    done(failure);
+  }
+  int num_asked = 0;
+  std::string failure;
+};
+
 class ApplianceTest : public ::testing::Test {
  protected:
   ApplianceTest() {
@@ -44,7 +55,9 @@ class ApplianceTest : public ::testing::Test {
   /// again.
   void Play(const std::function<void()>& test) {
     appliance_ = std::make_unique<Appliance>(loop_, parts_);
-    service_ = std::make_unique<WebService>(*appliance_, parts_.config.update);
+    auto restart = std::make_unique<FakeRestart>();
+    restart_ = restart.get();
+    service_ = std::make_unique<WebService>(*appliance_, parts_.config.update, std::move(restart));
     std::jthread player([&] {
       test();
       if (!opens_) LetOpen();
@@ -97,6 +110,7 @@ class ApplianceTest : public ::testing::Test {
   ApplianceParts parts_;
   std::unique_ptr<Appliance> appliance_;
   std::unique_ptr<WebService> service_;
+  FakeRestart* restart_ = nullptr;
   std::promise<void> opener_;
   std::shared_future<void> may_open_ = opener_.get_future().share();
   bool opens_ = false;
@@ -165,6 +179,83 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
     On([&] {
       EXPECT_NE(appliance_->WebStatus().next_purpose, web::ScanPurpose::kDailyCheck);
       EXPECT_EQ(appliance_->WebStatus().patient_id, "");
+    });
+  });
+}
+
+/// What RestartSystem() answers, on the loop.
+web::Change Restarted(WebService& service) {
+  web::Change answer{.result = web::ChangeResult::kFailed, .message = "none", .id = {}, .file = {}};
+  service.RestartSystem({.user = "erik", .address = {}},
+                        [&](const web::Change& change) { answer = change; });
+  return answer;
+}
+
+TEST_F(ApplianceTest, TheMachineIsNotRestartedUnderAScan) {
+  Play([&] {
+    MakeReady();
+    On([&] {
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
+      ASSERT_EQ(appliance_->state().phase, ScanPhase::kScanning);
+      EXPECT_EQ(Restarted(*service_).result, web::ChangeResult::kConflict);
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
+      ASSERT_EQ(appliance_->state().phase, ScanPhase::kWorking);
+      const web::Change answer = Restarted(*service_);
+      EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
+      EXPECT_THAT(answer.message, ::testing::HasSubstr("wait for its result"));
+      EXPECT_EQ(restart_->num_asked, 0);
+    });
+    EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
+    On([&] {
+      EXPECT_EQ(Restarted(*service_).result, web::ChangeResult::kDone);
+      EXPECT_EQ(restart_->num_asked, 1);
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort), ::testing::HasSubstr("being restarted"));
+      EXPECT_THAT(Restarted(*service_).message, ::testing::HasSubstr("being restarted"));
+      EXPECT_EQ(restart_->num_asked, 1);
+    });
+  });
+}
+
+TEST_F(ApplianceTest, TheMachineIsNotRestartedInASessionAndAFailedRestartLeavesItUsable) {
+  parts_.demo_patient.clear();
+  Play([&] {
+    MakeReady();
+    On([&] {
+      appliance_->OpenSession("1", "p", web::ScanPurpose::kReference, "",
+                              {.user = "tess", .address = {}});
+      const web::Change answer = Restarted(*service_);
+      EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
+      EXPECT_THAT(answer.message, ::testing::HasSubstr("session of a patient is open"));
+      EXPECT_EQ(restart_->num_asked, 0);
+      EXPECT_EQ(appliance_->CloseSession({.user = "tess", .address = {}}), "");
+      restart_->failure = "the machine cannot be restarted from here: no";
+      const web::Change failed = Restarted(*service_);
+      EXPECT_EQ(failed.result, web::ChangeResult::kFailed);
+      EXPECT_EQ(failed.message, restart_->failure);
+      restart_->failure.clear();
+      EXPECT_EQ(Restarted(*service_).result, web::ChangeResult::kDone) << "asked again";
+      EXPECT_EQ(restart_->num_asked, 2);
+    });
+  });
+}
+
+TEST_F(ApplianceTest, ARollBackIsToldByStatusAndLightUntilItIsSeen) {
+  Play([&] {
+    MakeReady();
+    On([&] {
+      EXPECT_EQ(appliance_->WebStatus().light, "ready");
+      appliance_->SetRolledBack("the machine has gone back");
+      EXPECT_EQ(appliance_->WebStatus().light, "ready_rolled_back");
+      EXPECT_EQ(appliance_->WebStatus().rolled_back, "the machine has gone back");
+      EXPECT_THAT(appliance_->StatusJson(), ::testing::HasSubstr("the machine has gone back"));
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "") << "scans go on";
+      EXPECT_EQ(appliance_->WebStatus().light, "scanning");
+      EXPECT_EQ(appliance_->Cancel(), "");
+    });
+    EXPECT_TRUE(Becomes([&] { return appliance_->WebStatus().light == "ready_rolled_back"; }));
+    On([&] {
+      appliance_->SetRolledBack({});
+      EXPECT_EQ(appliance_->WebStatus().light, "ready");
     });
   });
 }

@@ -25,7 +25,8 @@ const std::vector<IndicatorPattern>& AllPatterns() {
                                                       IndicatorPattern::kResultMove,
                                                       IndicatorPattern::kNoAnswer,
                                                       IndicatorPattern::kDone,
-                                                      IndicatorPattern::kFault};
+                                                      IndicatorPattern::kFault,
+                                                      IndicatorPattern::kReadyRolledBack};
   return patterns;
 }
 

@@ -1,9 +1,6 @@
 // Updates through a RAUC of our own making on a bus of our own.
 #include "daemon/update/updater.hpp"
 
-#include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <systemd/sd-bus.h>
 #include <unistd.h>
 
@@ -16,48 +13,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/private_bus.hpp"
 #include "tests/support/temp_folder.hpp"
-
-extern char** environ;
 
 namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using testing::PrivateBus;
 using testing::TempFolder;
 using web::ChangeResult;
-
-/// A dbus-daemon that only this test knows. Ends with it.
-class PrivateBus {
- public:
-  explicit PrivateBus(const fs::path& folder) : address_("unix:path=" + (folder / "bus").string()) {
-    const fs::path config = folder / "bus.conf";
-    std::ofstream(config)
-        << R"(<!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-BUS Bus Configuration 1.0//EN"
- "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd"><busconfig><type>session</type><listen>)"
-        << address_
-        << R"(</listen><policy context="default"><allow send_destination="*" eavesdrop="true"/>
-<allow eavesdrop="true"/><allow own="*"/></policy></busconfig>)";
-    const std::string file = "--config-file=" + config.string();
-    std::string program = "dbus-daemon", nofork = "--nofork", argument = file;
-    char* arguments[] = {program.data(), nofork.data(), argument.data(), nullptr};
-    if (::posix_spawnp(&pid_, "dbus-daemon", nullptr, nullptr, arguments, environ) != 0) pid_ = -1;
-    for (int i = 0; pid_ > 0 && i < 2000 && !fs::exists(folder / "bus"); ++i) ::usleep(5000);
-  }
-  ~PrivateBus() { Stop(); }
-  void Stop() {
-    if (pid_ <= 0) return;
-    ::kill(pid_, SIGKILL);  // it has inherited that the loop blocks SIGTERM
-    ::waitpid(pid_, nullptr, 0);
-    pid_ = -1;
-  }
-  [[nodiscard]] const std::string& address() const { return address_; }
-
- private:
-  std::string address_;
-  pid_t pid_ = -1;
-};
 
 /// As much of RAUC 1.8 as the updater speaks with: names, signatures and order of signals are
 /// RAUC's.
@@ -65,7 +31,7 @@ class FakeRauc {
  public:
   std::atomic<bool> refuses_signature{false};
   std::atomic<bool> fails{false};
-  std::string version = "9.0";
+  std::string version = "9.0", slot = "A";
 
   explicit FakeRauc(const std::string& address) {
     sd_bus_new(&bus_);
@@ -138,7 +104,7 @@ class FakeRauc {
     return sd_bus_message_append(reply, "s",
                                  property == "Operation"   ? rauc->operation_
                                  : property == "LastError" ? rauc->last_error_
-                                 : property == "BootSlot"  ? "A"
+                                 : property == "BootSlot"  ? rauc->slot.c_str()
                                                            : "plumb-amd64");
   }
 
@@ -208,13 +174,15 @@ class UpdaterTest : public ::testing::Test {
                                 .max_bytes = 1 << 20,
                                 .bus_address = bus_.address(),
                                 .version = "0.1.0",
+                                .boot = boot_,
                                 .hindrance = [this] { return hindrance_; },
                                 .changed = [this] { ++num_changes_; },
                                 .aside = {},
                                 .ended =
                                     [this](const std::string& bundle, const std::string& failure) {
                                       ended_ = bundle + ": " + failure;
-                                    }});
+                                    },
+                                .rolled_back = [this](const std::string& text) { told_ += text; }});
     });
   }
 
@@ -261,7 +229,8 @@ class UpdaterTest : public ::testing::Test {
   std::unique_ptr<Updater> updater_;
   int num_changes_ = 0;
   std::string hindrance_;
-  std::string ended_;
+  std::string ended_, told_;
+  std::string boot_ = "first";
 };
 
 TEST_F(UpdaterTest, WithoutABusItSaysThatThereIsNoInstaller) {
@@ -304,6 +273,75 @@ TEST_F(UpdaterTest, AGoodBundleIsInstalledWithProgress) {
   });
 }
 
+/// One installs 9.0 from system A; the test then starts the machine as if anew.
+class RollBackTest : public UpdaterTest {
+ protected:
+  void InstallAndEnd() {
+    Start();
+    WaitForRauc();
+    EXPECT_FALSE(StatusNow().restart_needed);
+    EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone);
+    rauc_->Release();
+    EXPECT_TRUE(Becomes([&] { return !StatusNow().installing; }));
+    EXPECT_TRUE(StatusNow().restart_needed);
+    EXPECT_EQ(StatusNow().failure, "");
+    On([&] { updater_.reset(); });
+  }
+  void StartAs(const std::string& boot) {
+    boot_ = boot;
+    Start();
+    WaitForRauc();
+  }
+  std::unique_ptr<FakeRauc> rauc_ = std::make_unique<FakeRauc>(bus_.address());
+};
+
+TEST_F(RollBackTest, TheSameStartStillNeedsItsRestart) {
+  Play([&] {
+    InstallAndEnd();
+    StartAs("first");
+    EXPECT_TRUE(StatusNow().restart_needed);
+    EXPECT_EQ(StatusNow().rolled_back, "");
+    EXPECT_EQ(told_, "");
+  });
+}
+
+TEST_F(RollBackTest, AMachineThatStartsTheSystemBeforeSaysSoUntilSomebodyHasSeenIt) {
+  Play([&] {
+    InstallAndEnd();
+    StartAs("second");
+    EXPECT_FALSE(StatusNow().restart_needed);
+    EXPECT_THAT(StatusNow().rolled_back, HasSubstr("version 9.0 was installed, but"));
+    EXPECT_THAT(StatusNow().rolled_back, HasSubstr("0.1.0"));
+    On([&] { EXPECT_EQ(told_, updater_->status().rolled_back) << "once"; });
+    On([&] { updater_.reset(); });
+    StartAs("third");
+    EXPECT_NE(StatusNow().rolled_back, "") << "a second restart does not hide it";
+    On([&] { updater_->ForgetRollBack(); });
+    EXPECT_EQ(StatusNow().rolled_back, "");
+    On([&] { updater_.reset(); });
+    StartAs("fourth");
+    EXPECT_EQ(StatusNow().rolled_back, "");
+  });
+}
+
+TEST_F(RollBackTest, AMachineThatStartsTheNewSystemHasNothingToSay) {
+  Play([&] {
+    InstallAndEnd();
+    rauc_->slot = "B";
+    StartAs("second");
+    EXPECT_EQ(StatusNow().slot, "B");
+    EXPECT_FALSE(StatusNow().restart_needed);
+    EXPECT_EQ(StatusNow().rolled_back, "");
+    On([&] {
+      updater_->ForgetRollBack();
+      updater_.reset();
+    });
+    rauc_->slot = "A";  // the boot counter gave up on it later
+    StartAs("third");
+    EXPECT_NE(StatusNow().rolled_back, "");
+  });
+}
+
 TEST_F(UpdaterTest, ABundleOfAStrangersKeyIsRefusedInRaucsWords) {
   Play([&] {
     FakeRauc rauc(bus_.address());
@@ -313,6 +351,8 @@ TEST_F(UpdaterTest, ABundleOfAStrangersKeyIsRefusedInRaucsWords) {
     const web::Change answer = Install("plumb-9.0.raucb");
     EXPECT_EQ(answer.result, ChangeResult::kInvalid);
     EXPECT_THAT(answer.message, HasSubstr("signature verification failed"));
+    EXPECT_EQ(StatusNow().failure, answer.message);
+    EXPECT_FALSE(StatusNow().restart_needed);
     EXPECT_EQ(rauc.installed(), "");
     EXPECT_FALSE(StatusNow().installing);
   });
@@ -450,14 +490,6 @@ TEST_F(UpdaterTest, WhatIsNoBundleIsRefusedBeforeRaucIsAsked) {
   EXPECT_THAT(why("folder.raucb"), HasSubstr("no plain file"));
   fs::create_symlink("/etc/passwd", folder_ / "updates" / "link.raucb");
   EXPECT_THAT(why("link.raucb"), HasSubstr("cannot be read"));
-}
-
-TEST(VersionTest, AreComparedNumberByNumber) {
-  EXPECT_TRUE(IsOlder("0.9", "0.10"));
-  EXPECT_TRUE(IsOlder("0.1.0", "0.1.1"));
-  EXPECT_TRUE(IsOlder("", "0.1"));
-  EXPECT_FALSE(IsOlder("0.1", "0.1.0"));
-  EXPECT_FALSE(IsOlder("1.0", "0.99.99"));
 }
 
 }  // namespace

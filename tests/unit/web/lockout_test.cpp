@@ -111,6 +111,34 @@ TEST_F(LockoutTest, GuessesAtTheLoginDoNotKeepWhoIsLoggedInFromSigning) {
   EXPECT_EQ(sign(kPassword), 429) << "guesses at the signature are counted";
 }
 
+TEST_F(LockoutTest, TheMachineIsRestartedForAnEngineerWithThePassword) {
+  HttpClient engineer = LoggedIn("engineer");
+  const auto restart = [&](const nlohmann::json& body) {
+    return engineer.Post("/api/v1/update/restart", body);
+  };
+  EXPECT_EQ(restart(nlohmann::json::object()).status, 400);
+  EXPECT_EQ(restart({{"password", kWrong}}).status, 403);
+  EXPECT_EQ(LoggedIn("physicist").Post("/api/v1/update/restart", {{"password", kPassword}}).status,
+            403);
+  EXPECT_EQ(service_.num_restarts, 0);
+  service_.update.installing = true;
+  const HttpAnswer answer = restart({{"password", kPassword}});
+  EXPECT_EQ(answer.status, 409);
+  EXPECT_THAT(answer.body, HasSubstr("being installed"));
+  service_.update.installing = false;
+  EXPECT_EQ(restart({{"password", kPassword}}).status, 200);
+  EXPECT_EQ(service_.num_restarts, 1);
+}
+
+TEST_F(LockoutTest, ARollBackIsShownUntilAnEngineerHasSeenIt) {
+  service_.status.rolled_back = service_.update.rolled_back = "version 2 was installed, but";
+  HttpClient engineer = LoggedIn("engineer");
+  EXPECT_EQ(engineer.Get("/api/v1/status").json()["rolled_back"], "version 2 was installed, but");
+  EXPECT_EQ(engineer.Get("/api/v1/update").json()["rolled_back"], "version 2 was installed, but");
+  EXPECT_EQ(engineer.Post("/api/v1/update/seen").status, 200);
+  EXPECT_EQ(engineer.Get("/api/v1/status").json()["rolled_back"], nullptr);
+}
+
 TEST_F(LockoutTest, TheCookieIsOutOfReachOfScriptsAndLastsForAYear) {
   const HttpAnswer answer =
       HttpClient(port_).Post("/api/v1/login", {{"name", "engineer"}, {"password", kPassword}});

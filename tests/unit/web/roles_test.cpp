@@ -69,6 +69,8 @@ const std::map<std::string, std::string> kWhoMay = {
     {"GET /api/v1/update", "TPE"},
     {"POST /api/v1/update", "E"},
     {"POST /api/v1/update/bundles/{name}", "E"},
+    {"POST /api/v1/update/restart", "E"},
+    {"POST /api/v1/update/seen", "E"},
     {"DELETE /api/v1/update/bundles/{name}", "E"},
     {"POST /api/v1/backup", "E"},
     {"POST /api/v1/diagnostics", "E"},

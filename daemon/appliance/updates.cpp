@@ -1,0 +1,124 @@
+#include "daemon/appliance/updates.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "daemon/config/version.hpp"
+#include "daemon/loop/log.hpp"
+
+namespace plumb {
+
+using web::ChangeResult;
+
+namespace {
+
+const web::Actor kInstaller{.user = "installer", .address = {}};
+
+web::Change Conflict(std::string why) {
+  return {.result = ChangeResult::kConflict, .message = std::move(why), .id = {}, .file = {}};
+}
+
+}  // namespace
+
+Updates::Updates(Appliance& appliance, std::unique_ptr<SystemRestart> restart,
+                 UpdatesOptions options)
+    : appliance_(appliance),
+      restart_(std::move(restart)),
+      options_(std::move(options)),
+      updater_(appliance.loop(),
+               UpdaterOptions{
+                   .folder = options_.config.folder,
+                   .max_bytes = static_cast<std::uint64_t>(options_.config.max_bundle_mb) << 20,
+                   .bus_address = options_.bus_address,
+                   .version = std::string(Version()),
+                   .boot = options_.boot,
+                   .hindrance = [this] { return WhyNotInstall(); },
+                   .changed = [this] { options_.changed(); },
+                   .aside = options_.aside,
+                   .ended =
+                       [this](const std::string& bundle, const std::string& failure) {
+                         options_.log(kInstaller, failure.empty() ? "update.done" : "update.fail",
+                                      bundle, failure);
+                       },
+                   .rolled_back =
+                       [this](const std::string& text) {
+                         options_.log(kInstaller, "update.rolled_back", "", text);
+                         appliance_.SetRolledBack(text);
+                       }}) {
+  appliance_.SetHindrance([this] { return WhyNotScan(); });
+}
+
+Updates::~Updates() {
+  *alive_ = false;
+  appliance_.SetHindrance({});
+}
+
+std::string Updates::WhyNotScan() const {
+  if (restarting_) return "the machine is being restarted";
+  if (updater_.is_installing()) return "a system update is being installed: wait until it is done";
+  return {};
+}
+
+std::string Updates::WhyNotInstall() const {
+  if (restarting_) return "the machine is being restarted";
+  if (!appliance_.IsRunning()) return {};
+  return fmt::format(
+      "in state {}, trying to update, requires that no scan runs: wait for its result",
+      Name(appliance_.state().phase));
+}
+
+std::string Updates::WhyNotRestart() const {
+  if (std::string why = WhyNotScan(); !why.empty()) return why;
+  return appliance_.WhyNotRestart();
+}
+
+void Updates::Add(const web::Actor& actor, const std::filesystem::path& file,
+                  const std::string& name, const web::Done& done) {
+  const web::Change change = updater_.Add(file, name);
+  options_.log(actor, change.result == ChangeResult::kDone ? "update.upload" : "update.refuse",
+               name, change.message);
+  done(change);
+}
+
+void Updates::Remove(const web::Actor& actor, const std::string& name, const web::Done& done) {
+  const web::Change change = updater_.Remove(name);
+  if (change.result == ChangeResult::kDone) options_.log(actor, "update.remove", name, "");
+  done(change);
+}
+
+void Updates::Install(const web::Actor& actor, const std::string& name, web::Done done) {
+  if (const std::string why = WhyNotInstall(); !why.empty()) return done(Conflict(why));
+  updater_.Install(name, [this, actor, name, done = std::move(done)](const web::Change& change) {
+    options_.log(actor, change.result == ChangeResult::kDone ? "update.install" : "update.refuse",
+                 name, change.message);
+    done(change);
+  });
+}
+
+void Updates::Restart(const web::Actor& actor, web::Done done) {
+  if (const std::string why = WhyNotRestart(); !why.empty()) return done(Conflict(why));
+  restarting_ = true;  // until the machine goes down nobody begins what it would interrupt
+  options_.log(actor, "system.restart", "", "");
+  Log(LogLevel::kNotice, fmt::format("{} restarts the machine", actor.user));
+  restart_->Restart(
+      [this, actor, done = std::move(done), alive = alive_](const std::string& failure) {
+        if (!*alive) return;
+        if (failure.empty()) return done({});
+        restarting_ = false;
+        options_.log(actor, "system.restart_failed", "", failure);
+        Log(LogLevel::kError, failure);
+        done({.result = ChangeResult::kFailed, .message = failure, .id = {}, .file = {}});
+      });
+}
+
+void Updates::ForgetRollBack(const web::Actor& actor, const web::Done& done) {
+  if (updater_.status().rolled_back.empty())
+    return done(Conflict("the machine has not gone back to another system"));
+  updater_.ForgetRollBack();
+  appliance_.SetRolledBack({});
+  options_.log(actor, "update.seen", "", "");
+  done({});
+}
+
+}  // namespace plumb

@@ -1,0 +1,59 @@
+// System updates, and the restart after them, for the page and for the control socket.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "daemon/appliance/appliance.hpp"
+#include "daemon/update/system_restart.hpp"
+#include "daemon/update/updater.hpp"
+
+namespace plumb {
+
+struct UpdatesOptions {
+  UpdateConfig config;
+  std::string bus_address = {};  ///< Empty: the system bus.
+  std::string boot = {};         ///< Another text at each start of the machine; empty: not known.
+  std::function<bool(std::function<void()>)> aside;  ///< See UpdaterOptions.
+  std::function<void()> changed;                     ///< GetStatus() has changed.
+  std::function<void(const web::Actor& actor, const char* action, const std::string& subject,
+                     const std::string& detail)>
+      log;  ///< To the audit log.
+};
+
+/// Belongs to the loop's thread. Nothing is installed, and nothing restarted, while somebody is
+/// scanned; no scan begins while it goes on.
+class Updates {
+ public:
+  /// @param restart  How the machine is restarted.
+  Updates(Appliance& appliance, std::unique_ptr<SystemRestart> restart, UpdatesOptions options);
+  ~Updates();
+  Updates(const Updates&) = delete;
+  Updates& operator=(const Updates&) = delete;
+
+  [[nodiscard]] web::UpdateStatus GetStatus() { return updater_.status(); }
+  /// As web::ScanService has them.
+  void Add(const web::Actor& actor, const std::filesystem::path& file, const std::string& name,
+           const web::Done& done);
+  void Remove(const web::Actor& actor, const std::string& name, const web::Done& done);
+  void Install(const web::Actor& actor, const std::string& name, web::Done done);
+  void Restart(const web::Actor& actor, web::Done done);
+  void ForgetRollBack(const web::Actor& actor, const web::Done& done);
+
+ private:
+  /// Why no update may begin now; empty: it may.
+  [[nodiscard]] std::string WhyNotInstall() const;
+  [[nodiscard]] std::string WhyNotRestart() const;
+  /// Why no scan may begin now.
+  [[nodiscard]] std::string WhyNotScan() const;
+
+  Appliance& appliance_;
+  std::unique_ptr<SystemRestart> restart_;
+  UpdatesOptions options_;
+  bool restarting_ = false;
+  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+  Updater updater_;  // last: what it tells uses the rest
+};
+
+}  // namespace plumb

@@ -1,0 +1,70 @@
+#include "daemon/update/last_update.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/base/errors.hpp"
+#include "drivers/files/file_io.hpp"
+
+namespace plumb {
+namespace {
+
+using Json = nlohmann::json;
+constexpr const char* kFile = "last-update.json";
+constexpr std::size_t kMaxBytes = 4096;
+
+void Sync(const std::filesystem::path& path) {
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool done = fd >= 0 && ::fsync(fd) == 0;
+  const int error = errno;
+  if (fd >= 0) ::close(fd);
+  if (!done) throw IoError(DescribeWriteError(path, error));
+}
+
+}  // namespace
+
+std::optional<LastUpdate> ReadLastUpdate(const std::filesystem::path& folder) {
+  try {
+    const Json json =
+        Json::parse(ReadTextFile(folder / kFile, kMaxBytes), nullptr, /*allow_exceptions=*/false);
+    if (!json.is_object()) return std::nullopt;
+    return LastUpdate{.version = json.at("version").get<std::string>(),
+                      .from_slot = json.at("from_slot").get<std::string>(),
+                      .boot = json.at("boot").get<std::string>()};
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
+}
+
+void WriteLastUpdate(const std::filesystem::path& folder, const LastUpdate& update) {
+  const std::filesystem::path temporary = folder / ".upload-last-update";  // a start removes it
+  WriteWholeFile(
+      temporary,
+      Json{{"version", update.version}, {"from_slot", update.from_slot}, {"boot", update.boot}}
+          .dump(-1, ' ', false, Json::error_handler_t::replace));
+  Sync(temporary);
+  std::filesystem::rename(temporary, folder / kFile);
+  Sync(folder);
+}
+
+void RemoveLastUpdate(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  std::filesystem::remove(folder / kFile, ignored);
+}
+
+std::string WhyRolledBack(const LastUpdate& update, const std::string& slot,
+                          const std::string& boot, const std::string& version) {
+  if (slot.empty() || boot.empty() || update.boot.empty()) return {};
+  if (update.boot == boot || update.from_slot != slot) return {};
+  return fmt::format(
+      "version {} was installed, but the machine has gone back to the system before it, {}: the "
+      "new one did not start or was not fit for work",
+      update.version, version);
+}
+
+}  // namespace plumb

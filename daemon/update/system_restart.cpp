@@ -1,0 +1,66 @@
+#include "daemon/update/system_restart.hpp"
+
+#include <chrono>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "daemon/update/bus.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr std::chrono::seconds kCallTimeout{20};
+
+class LogindRestart : public SystemRestart {
+ public:
+  LogindRestart(EventLoop& loop, std::string address)
+      : bus_(loop, "bus", [this] { Answer("the connection to the system's bus broke"); }),
+        address_(std::move(address)) {}
+
+  void Restart(std::function<void(const std::string&)> done) override {
+    if (done_) return done("the machine is being asked to restart already");
+    done_ = std::move(done);
+    constexpr int kNobodyIsAsked = 0;  // no dialogue: nobody sits at this machine
+    if (!bus_.Open(address_, kCallTimeout) ||
+        sd_bus_call_method_async(bus_.get(), nullptr, "org.freedesktop.login1",
+                                 "/org/freedesktop/login1", "org.freedesktop.login1.Manager",
+                                 "Reboot", &LogindRestart::OnAnswer, this, "b",
+                                 kNobodyIsAsked) < 0) {
+      bus_.Close();
+      return Answer("this machine has no system bus");
+    }
+    bus_.Process();
+  }
+
+ private:
+  static int OnAnswer(sd_bus_message* message, void* self, sd_bus_error*) {
+    auto* restart = static_cast<LogindRestart*>(self);
+    const sd_bus_error* error = sd_bus_message_get_error(message);
+    restart->Answer(error == nullptr            ? ""
+                    : error->message == nullptr ? error->name
+                                                : error->message);
+    return 0;
+  }
+
+  void Answer(const std::string& why) {
+    auto done = std::exchange(done_, nullptr);
+    if (!done) return;
+    done(why.empty() ? std::string()
+                     : fmt::format("the machine cannot be restarted from here: {}; restart it at "
+                                   "its console or its switch",
+                                   why));
+  }
+
+  Bus bus_;
+  std::string address_;
+  std::function<void(const std::string&)> done_;
+};
+
+}  // namespace
+
+std::unique_ptr<SystemRestart> MakeLogindRestart(EventLoop& loop, const std::string& bus_address) {
+  return std::make_unique<LogindRestart>(loop, bus_address);
+}
+
+}  // namespace plumb

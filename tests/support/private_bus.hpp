@@ -1,0 +1,50 @@
+// A message bus that only one test knows.
+#pragma once
+
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+extern char** environ;
+
+namespace plumb::testing {
+
+namespace fs = std::filesystem;
+
+/// A dbus-daemon that only this test knows. Ends with it.
+class PrivateBus {
+ public:
+  explicit PrivateBus(const fs::path& folder) : address_("unix:path=" + (folder / "bus").string()) {
+    const fs::path config = folder / "bus.conf";
+    std::ofstream(config)
+        << R"(<!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-BUS Bus Configuration 1.0//EN"
+ "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd"><busconfig><type>session</type><listen>)"
+        << address_
+        << R"(</listen><policy context="default"><allow send_destination="*" eavesdrop="true"/>
+<allow eavesdrop="true"/><allow own="*"/></policy></busconfig>)";
+    const std::string file = "--config-file=" + config.string();
+    std::string program = "dbus-daemon", nofork = "--nofork", argument = file;
+    char* arguments[] = {program.data(), nofork.data(), argument.data(), nullptr};
+    if (::posix_spawnp(&pid_, "dbus-daemon", nullptr, nullptr, arguments, environ) != 0) pid_ = -1;
+    for (int i = 0; pid_ > 0 && i < 2000 && !fs::exists(folder / "bus"); ++i) ::usleep(5000);
+  }
+  ~PrivateBus() { Stop(); }
+  void Stop() {
+    if (pid_ <= 0) return;
+    ::kill(pid_, SIGKILL);  // it has inherited that the loop blocks SIGTERM
+    ::waitpid(pid_, nullptr, 0);
+    pid_ = -1;
+  }
+  [[nodiscard]] const std::string& address() const { return address_; }
+
+ private:
+  std::string address_;
+  pid_t pid_ = -1;
+};
+
+}  // namespace plumb::testing

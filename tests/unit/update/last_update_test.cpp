@@ -1,0 +1,40 @@
+#include "daemon/update/last_update.hpp"
+
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include "daemon/update/updater.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+TEST(LastUpdateTest, WhatIsNotKnownIsNoRollBack) {
+  const testing::TempFolder folder;
+
+  const LastUpdate update{.version = "2", .from_slot = "A", .boot = "first"};
+  EXPECT_NE(WhyRolledBack(update, "A", "second", "1"), "");
+  EXPECT_EQ(WhyRolledBack(update, "A", "first", "1"), "");
+  EXPECT_EQ(WhyRolledBack(update, "B", "second", "1"), "");
+  EXPECT_EQ(WhyRolledBack(update, "", "second", "1"), "");
+  EXPECT_EQ(WhyRolledBack(update, "A", "", "1"), "");
+  EXPECT_EQ(WhyRolledBack({.version = "2", .from_slot = "A", .boot = ""}, "A", "second", "1"), "");
+  for (const char* text : {"", "[]", "{", "{\"version\": 2}", "\xff\xfe"}) {
+    std::ofstream(folder / "last-update.json") << text;
+    EXPECT_FALSE(ReadLastUpdate(folder.path())) << text;
+  }
+  WriteLastUpdate(folder.path(), update);
+  EXPECT_EQ(ReadLastUpdate(folder.path()), update);
+}
+
+TEST(VersionTest, AreComparedNumberByNumber) {
+  EXPECT_TRUE(IsOlder("0.9", "0.10"));
+  EXPECT_TRUE(IsOlder("0.1.0", "0.1.1"));
+  EXPECT_TRUE(IsOlder("", "0.1"));
+  EXPECT_FALSE(IsOlder("0.1", "0.1.0"));
+  EXPECT_FALSE(IsOlder("1.0", "0.99.99"));
+}
+
+}  // namespace
+}  // namespace plumb
