@@ -276,7 +276,7 @@ std::optional<web::Reference> WebService::FindReference(const std::string& id) {
 
 void WebService::AddReference(const web::Actor& actor, const std::string& scan_id,
                               const std::string& reason, web::Done done) {
-  Change(std::move(done), [=, this](Store& store) {
+  Change(std::move(done), [=, appliance = &appliance_](Store& store) {
     return store.AddReference(actor, scan_id, reason, appliance->DefaultPlan());
   });
 }
