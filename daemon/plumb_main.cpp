@@ -59,7 +59,7 @@ int Main(int argc, char** argv) {
   app.require_subcommand(1);
   std::filesystem::path control = "/run/plumb/control.sock";
   app.add_option("--control", control,
-                 "Control socket of plumbd, for status, press, watch, sim and backup")
+                 "Control socket of plumbd, for status, press, watch, sim, backup and update")
       ->type_name("SOCK")
       ->capture_default_str();
   app.get_formatter()->column_width(34);
@@ -98,6 +98,7 @@ int Main(int argc, char** argv) {
   add("press", "Press the button of a running plumbd", AddPress);
   add("watch", "Print the events of a running plumbd, one JSON object a line", AddWatch);
   add("sim", "Plug, unplug, stall or move on the virtual sensor of a running plumbd", AddSim);
+  add("update", "Install a bundle on the machine of a running plumbd, and restart it", AddUpdate);
 #ifdef PLUMB_WITH_APPLIANCE
   add("backup", "Copy what plumbd stores: database, scans, calibrations; also while it runs",
       AddBackup);

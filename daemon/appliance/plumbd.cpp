@@ -20,11 +20,11 @@
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
 #include "algo/base/notice.hpp"
 #include "daemon/appliance/appliance.hpp"
+#include "daemon/appliance/control_desk.hpp"
 #include "daemon/appliance/panel.hpp"
 #include "daemon/appliance/web_service.hpp"
 #include "daemon/config/version.hpp"
@@ -33,7 +33,6 @@
 #include "daemon/loop/end_guard.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/loop/loop_report.hpp"
-#include "daemon/loop/work_thread.hpp"
 #ifdef PLUMB_WITH_OPENNI
 #include "drivers/openni/openni_provider.hpp"
 #include "drivers/virtual/virtual_sensor.hpp"
@@ -248,15 +247,6 @@ std::optional<int> InheritedSocket(const std::string& name) {
   return found;
 }
 
-std::string BackupDone(const BackupReport& report) {
-  return nlohmann::json{{"ok", true},
-                        {"scans", report.scans},
-                        {"files", report.files},
-                        {"bytes", report.bytes},
-                        {"problems", report.problems}}
-      .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
 class Plumbd {
  public:
   Plumbd(const Options& options, const Config& config, const std::string& fault)
@@ -272,9 +262,11 @@ class Plumbd {
                            .demo_patient = options.simulated.empty() ? "" : "demo"}),
         service_(appliance_, config.update, MakeLogindRestart(loop_, {})),
         http_(service_, HttpOptions(config)),
+        desk_(appliance_, service_.updates(),
+              [this](const std::string& command) { sensors_.Simulate(command); }),
         control_(loop_, ControlSocket(config),
                  [this](const ControlRequest& request, const ControlServer::Reply& reply) {
-                   Answer(request, reply);
+                   desk_.Answer(request, reply);
                  }) {
     appliance_.SetEventListener([this](const std::string& line) { control_.Broadcast(line); });
     http_timer_ = loop_.MakeTimer("http", [this] { RunHttp(); });
@@ -343,47 +335,6 @@ class Plumbd {
     }
   }
 
-  void Answer(const ControlRequest& request, const ControlServer::Reply& reply) {
-    using Kind = ControlRequest::Kind;
-    switch (request.kind) {
-      case Kind::kStatus:
-      case Kind::kWatch:  // what is, then what happens
-        return reply(request.kind == Kind::kStatus
-                         ? appliance_.StatusJson()
-                         : R"({"event":"status","time":)" + fmt::format("{:.6f}", SystemSeconds()) +
-                               R"(,"status":)" + appliance_.StatusJson() + "}");
-      case Kind::kPress: {
-        const std::string refusal =
-            appliance_.Press(request.is_long ? ButtonPress::kLong : ButtonPress::kShort);
-        return reply(refusal.empty() ? ControlDone() : ControlRefusal(refusal));
-      }
-      case Kind::kBackup:
-        return appliance_.BackUp(
-            {.user = "control socket", .address = {}}, request.folder,
-            [reply](const std::string& error, const BackupReport& report) {
-              reply(error.empty() ? BackupDone(report) : ControlRefusal(error));
-            });
-      case Kind::kSim:
-        break;
-    }
-    const bool posted = device_thread_.Post(
-        [this, reply, command = fmt::format("{} {}", request.action, request.argument)] {
-          std::string answer = ControlDone();
-          try {
-            sensors_.Simulate(command);
-          } catch (const DeviceError& error) {
-            answer = ControlRefusal(error.what());
-          }
-          loop_.Post("sim", [reply, answer] { reply(answer); });
-        });
-    if (!posted) reply(ControlRefusal("the virtual sensor is busy: try again"));
-  }
-
-  static double SystemSeconds() {
-    return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch())
-        .count();
-  }
-
   void Tick() {
     tick_.ArmAfter(std::min(watchdog_period_, std::chrono::microseconds(1'000'000)));
     if (const std::string line = appliance_.StatusLine(); line != status_line_) {
@@ -421,12 +372,12 @@ class Plumbd {
   const Options options_;
   EventLoop loop_;  // first: blocks signals before any thread starts
   Sensors sensors_;
-  WorkThread device_thread_{16};
   Panel panel_;
   Appliance appliance_;
   PageNotes page_;
   WebService service_;
   web::HttpServer http_;
+  ControlDesk desk_;
   ControlServer control_;
   EventLoop::Source http_source_, http_timer_;
   std::vector<EventLoop::Source> signals_;

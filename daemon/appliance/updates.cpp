@@ -4,8 +4,10 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/errors.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/update/bundle_copy.hpp"
 
 namespace plumb {
 
@@ -94,6 +96,49 @@ void Updates::Install(const web::Actor& actor, const std::string& name, web::Don
                  name, change.message);
     done(change);
   });
+}
+
+void Updates::InstallFile(const web::Actor& actor, std::shared_ptr<const AttachedFile> file,
+                          const std::string& name, web::Done done) {
+  if (const std::string why = WhyNotInstall(); !why.empty()) return done(Conflict(why));
+  if (const web::UpdateStatus status = updater_.status(); !status.supported)
+    return done(Conflict(status.message));
+  if (copying_ || updater_.is_installing())
+    return done(Conflict("another bundle is being installed: wait until it is done"));
+  copying_ = true;
+  const auto copied = [this, actor, name, done](const std::filesystem::path& copy,
+                                                const web::Change& failure) {
+    copying_ = false;
+    if (copy.empty()) {
+      options_.log(actor, "update.refuse", name, failure.message);
+      return done(failure);
+    }
+    Add(actor, copy, name, [this, actor, name, copy, done](const web::Change& added) {
+      if (added.result == ChangeResult::kDone) return Install(actor, name, done);
+      std::error_code ignored;
+      std::filesystem::remove(copy, ignored);
+      done(added);
+    });
+  };
+  const auto work = [file = std::move(file), folder = options_.config.folder,
+                     max_bytes = static_cast<std::uint64_t>(options_.config.max_bundle_mb) << 20,
+                     copied, &loop = appliance_.loop(), alive = alive_] {
+    web::Change failure;
+    std::filesystem::path copy;
+    try {
+      copy = CopyBundle(file->fd(), folder, max_bytes);
+    } catch (const DataError& error) {
+      failure = {.result = ChangeResult::kInvalid, .message = error.what(), .id = {}, .file = {}};
+    } catch (const std::exception& error) {
+      failure = {.result = ChangeResult::kFailed, .message = error.what(), .id = {}, .file = {}};
+    }
+    loop.Post("bundle copied", [copied, copy, failure, alive] {
+      if (*alive) copied(copy, failure);
+    });
+  };
+  if (options_.aside(work)) return;
+  copying_ = false;
+  done(Conflict("the disk is busy: try again"));
 }
 
 void Updates::Restart(const web::Actor& actor, web::Done done) {

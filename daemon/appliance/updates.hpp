@@ -6,6 +6,7 @@
 #include <string>
 
 #include "daemon/appliance/appliance.hpp"
+#include "daemon/control/attached_file.hpp"
 #include "daemon/update/system_restart.hpp"
 #include "daemon/update/updater.hpp"
 
@@ -38,6 +39,9 @@ class Updates {
            const web::Done& done);
   void Remove(const web::Actor& actor, const std::string& name, const web::Done& done);
   void Install(const web::Actor& actor, const std::string& name, web::Done done);
+  /// Copies the open file among the bundles, off the loop, then installs it.
+  void InstallFile(const web::Actor& actor, std::shared_ptr<const AttachedFile> file,
+                   const std::string& name, web::Done done);
   void Restart(const web::Actor& actor, web::Done done);
   void ForgetRollBack(const web::Actor& actor, const web::Done& done);
 
@@ -51,7 +55,7 @@ class Updates {
   Appliance& appliance_;
   std::unique_ptr<SystemRestart> restart_;
   UpdatesOptions options_;
-  bool restarting_ = false;
+  bool restarting_ = false, copying_ = false;
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
   Updater updater_;  // last: what it tells uses the rest
 };

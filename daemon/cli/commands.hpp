@@ -47,6 +47,7 @@ using Command = std::function<int(const CommandContext&)>;
 [[nodiscard]] Command AddPress(CLI::App& app);
 [[nodiscard]] Command AddWatch(CLI::App& app);
 [[nodiscard]] Command AddSim(CLI::App& app);
+[[nodiscard]] Command AddUpdate(CLI::App& app);
 [[nodiscard]] Command AddBackup(CLI::App& app);
 [[nodiscard]] Command AddRestore(CLI::App& app);
 

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <memory>
@@ -34,7 +35,7 @@ class ControlConnection {
   ControlConnection(const std::filesystem::path& socket, const ControlRequest& request)
       : fd_(ConnectUnix(socket)) {
     const std::string line = ControlRequestText(request) + "\n";
-    if (::send(fd_, line.data(), line.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(line.size())) {
+    if (Send(line, request.file ? request.file->fd() : -1) != static_cast<ssize_t>(line.size())) {
       ::close(fd_);
       throw DeviceError("plumbd hung up before it was asked");
     }
@@ -69,6 +70,24 @@ class ControlConnection {
   }
 
  private:
+  /// @param attached  An open file that goes along; negative: none.
+  [[nodiscard]] ssize_t Send(const std::string& line, int attached) const {
+    if (attached < 0) return ::send(fd_, line.data(), line.size(), MSG_NOSIGNAL);
+    iovec part{.iov_base = const_cast<char*>(line.data()), .iov_len = line.size()};
+    alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> space{};
+    msghdr message{};
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    message.msg_control = space.data();
+    message.msg_controllen = space.size();
+    cmsghdr* header = CMSG_FIRSTHDR(&message);
+    header->cmsg_level = SOL_SOCKET;
+    header->cmsg_type = SCM_RIGHTS;
+    header->cmsg_len = CMSG_LEN(sizeof(int));
+    std::memcpy(CMSG_DATA(header), &attached, sizeof(attached));
+    return ::sendmsg(fd_, &message, MSG_NOSIGNAL);
+  }
+
   int fd_;
   std::string received_;
 };

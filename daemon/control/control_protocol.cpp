@@ -29,6 +29,11 @@ bool IsWords(const std::string& text) {
          });
 }
 
+bool IsBundleName(const std::string& text) {
+  return text.size() <= 64 && text.ends_with(".raucb") && text.front() != '.' && IsWords(text) &&
+         text.find(' ') == std::string::npos;
+}
+
 bool IsFlat(const Json& json) {
   return std::all_of(json.begin(), json.end(),
                      [](const Json& value) { return !value.is_structured(); });
@@ -90,8 +95,19 @@ ControlRequest ParseControlRequest(std::string_view line) {
     if (!request.folder.starts_with('/') || request.folder.size() > kMaxFolder ||
         request.folder.find('\0') != std::string::npos)
       throw DataError("backup: \"folder\" is an absolute path");
+  } else if (command == "update") {
+    request.kind = Kind::kUpdate;
+    allow_only({"command", "name"});
+    request.name = text("name");
+    if (!IsBundleName(request.name))
+      throw DataError(
+          "update: \"name\" is at most 64 letters, digits, -, _ and dots, and ends with .raucb");
+  } else if (command == "update-status" || command == "restart") {
+    request.kind = command == "restart" ? Kind::kRestart : Kind::kUpdateStatus;
+    allow_only({"command"});
   } else {
-    throw DataError("expected a command of status, press, watch, sim, backup");
+    throw DataError(
+        "expected a command of status, press, watch, sim, backup, update, update-status, restart");
   }
   return request;
 }
@@ -106,6 +122,12 @@ std::string ControlRequestText(const ControlRequest& request) {
       return Json{{"command", "press"}, {"long", request.is_long}}.dump();
     case Kind::kBackup:
       return Json{{"command", "backup"}, {"folder", request.folder}}.dump();
+    case Kind::kUpdate:
+      return Json{{"command", "update"}, {"name", request.name}}.dump();
+    case Kind::kUpdateStatus:
+      return Json{{"command", "update-status"}}.dump();
+    case Kind::kRestart:
+      return Json{{"command", "restart"}}.dump();
     case Kind::kSim:
       break;
   }
@@ -116,8 +138,10 @@ std::string ControlRequestText(const ControlRequest& request) {
 
 std::string ControlDone() { return R"({"ok":true})"; }
 
-std::string ControlRefusal(std::string_view error) {
-  return Json{{"ok", false}, {"error", error}}.dump(-1, ' ', false, Json::error_handler_t::replace);
+std::string ControlRefusal(std::string_view error, bool is_input) {
+  Json refusal = {{"ok", false}, {"error", error}};
+  if (is_input) refusal["input"] = true;
+  return refusal.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace plumb

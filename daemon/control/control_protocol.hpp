@@ -2,24 +2,31 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <string>
 #include <string_view>
+
+#include "daemon/control/attached_file.hpp"
 
 namespace plumb {
 
 inline constexpr std::size_t kMaxControlLine = 4096;  ///< Bytes of a request.
 
-/// {"command": "status" | "press" | "watch" | "sim" | "backup", "long": bool with press, "action"
-/// and, optional, "argument": texts with sim, "folder": an absolute path with backup}
+/// {"command": "status" | "press" | "watch" | "sim" | "backup" | "update" | "update-status" |
+/// "restart", "long": bool with press, "action" and, optional, "argument": texts with sim,
+/// "folder": an absolute path with backup, "name": NAME.raucb with update, whose message carries
+/// the open file (SCM_RIGHTS)}
 struct ControlRequest {
-  enum class Kind { kStatus, kPress, kWatch, kSim, kBackup };
+  enum class Kind { kStatus, kPress, kWatch, kSim, kBackup, kUpdate, kUpdateStatus, kRestart };
   Kind kind = Kind::kStatus;
   bool is_long = false;  ///< kPress
   std::string
       action;  ///< kSim: one of plug, unplug, stall, resume, error, next-scene, glitch, speed.
   std::string argument;  ///< kSim: a serial, what kind of glitch and how often, or how fast; words
                          ///< of letters, digits, -, _ and dots.
-  std::string folder = {};  ///< kBackup: where it is made.
+  std::string folder = {};                        ///< kBackup: where it is made.
+  std::string name = {};                          ///< kUpdate: of the bundle.
+  std::shared_ptr<const AttachedFile> file = {};  ///< kUpdate: the bundle, open for reading.
   bool operator==(const ControlRequest&) const = default;
 };
 
@@ -32,6 +39,7 @@ struct ControlRequest {
 
 /// {"ok": true} or {"ok": false, "error": text}
 [[nodiscard]] std::string ControlDone();
-[[nodiscard]] std::string ControlRefusal(std::string_view error);
+/// @param is_input  What was sent is at fault, not the moment: "input": true.
+[[nodiscard]] std::string ControlRefusal(std::string_view error, bool is_input = false);
 
 }  // namespace plumb

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cerrno>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -19,12 +20,43 @@ struct ControlServer::Client {
   bool watches = false;
   bool at_end = false;  ///< It sends no more; it goes once it has read what waits for it.
   int unanswered = 0;
+  std::shared_ptr<const AttachedFile> attached;  ///< For the request that takes one.
   EventLoop::Source source;
   ~Client() {
     source = {};
     if (fd >= 0) ::close(fd);
   }
 };
+
+namespace {
+
+/// As recv(); the last open file that comes along is taken over, others are closed.
+ssize_t Receive(int fd, std::array<char, 4096>& buffer,
+                std::shared_ptr<const AttachedFile>& attached) {
+  iovec part{.iov_base = buffer.data(), .iov_len = buffer.size()};
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> space;
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = space.data();
+  message.msg_controllen = space.size();
+  const ssize_t count = ::recvmsg(fd, &message, MSG_CMSG_CLOEXEC);
+  if (count < 0) return count;
+  for (cmsghdr* part_of = CMSG_FIRSTHDR(&message); part_of != nullptr;
+       part_of = CMSG_NXTHDR(&message, part_of)) {
+    if (part_of->cmsg_level != SOL_SOCKET || part_of->cmsg_type != SCM_RIGHTS) continue;
+    // Room for one is room for two: the space is rounded up.
+    const std::size_t num = (part_of->cmsg_len - CMSG_LEN(0)) / sizeof(int);
+    for (std::size_t i = 0; i < num; ++i) {
+      int received = -1;
+      std::memcpy(&received, CMSG_DATA(part_of) + i * sizeof(int), sizeof(received));
+      attached = std::make_shared<const AttachedFile>(received);  // closes the one before
+    }
+  }
+  return count;
+}
+
+}  // namespace
 
 ControlServer::ControlServer(EventLoop& loop, int listening, Handler handler,
                              const ControlServerOptions& options)
@@ -66,7 +98,7 @@ void ControlServer::Read(std::uint64_t id) {
   if (found == clients_.end()) return;
   Client& client = *found->second;
   std::array<char, 4096> buffer;
-  const ssize_t count = ::recv(client.fd, buffer.data(), buffer.size(), 0);
+  const ssize_t count = Receive(client.fd, buffer, client.attached);
   if (count < 0 && (errno == EAGAIN || errno == EINTR)) return;
   if (count < 0) return Drop(id);
   if (count == 0) {
@@ -92,8 +124,12 @@ void ControlServer::Read(std::uint64_t id) {
 
 void ControlServer::HandleLine(std::uint64_t id, const std::string& line) {
   try {
-    const ControlRequest request = ParseControlRequest(line);
+    ControlRequest request = ParseControlRequest(line);
     Client& client = *clients_.at(id);
+    if (request.kind == ControlRequest::Kind::kUpdate) {
+      request.file = std::move(client.attached);
+      if (!request.file) throw DataError("update: the open file must come along (SCM_RIGHTS)");
+    }
     if (request.kind == ControlRequest::Kind::kWatch) client.watches = true;
     ++client.unanswered;
     handler_(request, [this, id, alive = alive_](const std::string& reply) {
@@ -103,7 +139,7 @@ void ControlServer::HandleLine(std::uint64_t id, const std::string& line) {
       Send(id, reply);
     });
   } catch (const DataError& error) {
-    Send(id, ControlRefusal(error.what()));
+    Send(id, ControlRefusal(error.what(), /*is_input=*/true));
   }
 }
 

@@ -1,6 +1,11 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <fcntl.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <thread>
 
@@ -31,6 +36,13 @@ TEST(ControlProtocolTest, EveryRequestReadsBack) {
         ControlRequest{.kind = Kind::kSim, .action = "next-scene", .argument = {}},
         ControlRequest{
             .kind = Kind::kBackup, .action = {}, .argument = {}, .folder = "/mnt/a \"b\""},
+        ControlRequest{.kind = Kind::kUpdate,
+        .action = {},
+        .argument = {},
+        .folder = {},
+        .name = "plumb-0.2_1.raucb"},
+        ControlRequest{.kind = Kind::kUpdateStatus, .action = {}, .argument = {}},
+        ControlRequest{.kind = Kind::kRestart, .action = {}, .argument = {}},
         ControlRequest{.kind = Kind::kSim, .action = "glitch", .argument = "late 30"}}) {
     EXPECT_EQ(ParseControlRequest(ControlRequestText(request)), request);
   }
@@ -54,6 +66,12 @@ TEST(ControlProtocolTest, RefusesEverythingElse) {
                            "{\"command\":\"backup\",\"folder\":\"relative\"}",
                            "{\"command\":\"backup\",\"folder\":7}",
                            "{\"command\":\"backup\",\"folder\":\"/a\\u0000b\"}",
+                           "{\"command\":\"update\"}",
+                           "{\"command\":\"update\",\"name\":\".raucb\"}",
+                           "{\"command\":\"update\",\"name\":\"../a.raucb\"}",
+                           "{\"command\":\"update\",\"name\":\"a b.raucb\"}",
+                           "{\"command\":\"update\",\"name\":\"a.deb\"}",
+                           "{\"command\":\"restart\",\"name\":\"a.raucb\"}",
                            "{\"command\":\"status\",\"folder\":\"/a\"}",
                            "{\"command\":{\"a\":{\"b\":{}}}}",
                            "{\"command\":\"status\"} {}",
@@ -105,9 +123,33 @@ class ControlServerTest : public ::testing::Test {
     if (request.kind == Kind::kSim) {  // answered later
       later_ = loop_.MakeTimer("later", [reply] { reply(ControlDone()); });
       later_.ArmAfter(std::chrono::milliseconds(20));
+    } else if (request.kind == Kind::kUpdate) {
+      std::string text(16, '\0');
+      const ssize_t count = ::pread(request.file->fd(), text.data(), text.size(), 0);
+      reply(request.name + ' ' + text.substr(0, static_cast<std::size_t>(std::max(count, {}))));
     } else {
       reply(ControlDone());
     }
+  }
+
+  /// With descriptors that go along.
+  static void SendWith(int fd, const std::string& text, const std::vector<int>& attached) {
+    iovec part{.iov_base = const_cast<char*>(text.data()), .iov_len = text.size()};
+    std::vector<char> space(CMSG_SPACE(attached.size() * sizeof(int)));
+    msghdr message{};
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    message.msg_control = space.data();
+    message.msg_controllen = space.size();
+    cmsghdr* header = CMSG_FIRSTHDR(&message);
+    header->cmsg_level = SOL_SOCKET;
+    header->cmsg_type = SCM_RIGHTS;
+    header->cmsg_len = CMSG_LEN(attached.size() * sizeof(int));
+    std::memcpy(CMSG_DATA(header), attached.data(), attached.size() * sizeof(int));
+    (void)::sendmsg(fd, &message, MSG_NOSIGNAL);
+  }
+  [[nodiscard]] static std::ptrdiff_t NumOpenFiles() {
+    return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
   }
 
   static void Send(int fd, const std::string& text) {
@@ -177,6 +219,29 @@ TEST_F(ControlServerTest, AWatcherThatNeverReadsIsDroppedAndOthersAreNot) {
   EXPECT_EQ(server_.num_clients(), 1U) << "a megabyte was more than may wait for the deaf one";
   ::close(deaf);
   ::close(good);
+}
+
+TEST_F(ControlServerTest, AnOpenFileComesAlongAndWhatNobodyAskedForIsClosed) {
+  std::ofstream(folder_ / "bundle") << "what is in it";
+  const int file = ::open((folder_ / "bundle").c_str(), O_RDONLY | O_CLOEXEC);
+  const std::string update = "{\"command\":\"update\",\"name\":\"a.raucb\"}\n";
+  const auto before = NumOpenFiles();
+  RunWith([&] {
+    const int fd = ConnectUnix(folder_ / "s");
+    Send(fd, update);
+    EXPECT_THAT(ReadLine(fd), HasSubstr("must come along"));
+    SendWith(fd, update, {file});
+    EXPECT_EQ(ReadLine(fd), "a.raucb what is in it");
+    Send(fd, update);
+    EXPECT_THAT(ReadLine(fd), HasSubstr("must come along")) << "it was for one request";
+    for (int i = 0; i < 50; ++i) {
+      SendWith(fd, "{\"command\":\"status\"}\n", {file, file, file});
+      EXPECT_EQ(ReadLine(fd), ControlDone());
+    }
+    ::close(fd);
+  });
+  EXPECT_LE(NumOpenFiles(), before + 3) << "the loop's own, at most";
+  ::close(file);
 }
 
 TEST_F(ControlServerTest, TooManyClientsAreTurnedAwayAndRoomComesBack) {

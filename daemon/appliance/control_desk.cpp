@@ -1,0 +1,100 @@
+#include "daemon/appliance/control_desk.hpp"
+
+#include <chrono>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/base/errors.hpp"
+
+namespace plumb {
+namespace {
+
+using Json = nlohmann::json;
+const web::Actor kSocket{.user = "control socket", .address = {}};
+
+std::string Line(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string BackupDone(const BackupReport& report) {
+  return Line({{"ok", true},
+               {"scans", report.scans},
+               {"files", report.files},
+               {"bytes", report.bytes},
+               {"problems", report.problems}});
+}
+
+std::string UpdateLine(const web::UpdateStatus& status) {
+  return Line({{"ok", true},
+               {"installing", status.installing},
+               {"fraction", status.fraction},
+               {"message", status.message},
+               {"failure", status.failure},
+               {"restart_needed", status.restart_needed},
+               {"rolled_back", status.rolled_back}});
+}
+
+web::Done ReplyWith(const ControlServer::Reply& reply) {
+  return [reply](const web::Change& change) {
+    reply(change.result == web::ChangeResult::kDone
+              ? ControlDone()
+              : ControlRefusal(change.message, change.result == web::ChangeResult::kInvalid));
+  };
+}
+
+double SystemSeconds() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+}  // namespace
+
+ControlDesk::ControlDesk(Appliance& appliance, Updates& updates,
+                         std::function<void(const std::string&)> simulate)
+    : appliance_(appliance), updates_(updates), simulate_(std::move(simulate)) {}
+
+void ControlDesk::Answer(const ControlRequest& request, const ControlServer::Reply& reply) {
+  using Kind = ControlRequest::Kind;
+  switch (request.kind) {
+    case Kind::kStatus:
+      return reply(appliance_.StatusJson());
+    case Kind::kWatch:  // what is, then what happens
+      return reply(R"({"event":"status","time":)" + fmt::format("{:.6f}", SystemSeconds()) +
+                   R"(,"status":)" + appliance_.StatusJson() + "}");
+    case Kind::kPress: {
+      const std::string refusal =
+          appliance_.Press(request.is_long ? ButtonPress::kLong : ButtonPress::kShort);
+      return reply(refusal.empty() ? ControlDone() : ControlRefusal(refusal));
+    }
+    case Kind::kBackup:
+      return appliance_.BackUp(kSocket, request.folder,
+                               [reply](const std::string& error, const BackupReport& report) {
+                                 reply(error.empty() ? BackupDone(report) : ControlRefusal(error));
+                               });
+    case Kind::kUpdate:
+      return updates_.InstallFile(kSocket, request.file, request.name, ReplyWith(reply));
+    case Kind::kUpdateStatus:
+      return reply(UpdateLine(updates_.GetStatus()));
+    case Kind::kRestart:
+      return updates_.Restart(kSocket, ReplyWith(reply));
+    case Kind::kSim:
+      return Simulate(request, reply);
+  }
+}
+
+void ControlDesk::Simulate(const ControlRequest& request, const ControlServer::Reply& reply) {
+  const bool posted = device_thread_.Post(
+      [this, reply, command = fmt::format("{} {}", request.action, request.argument)] {
+        std::string answer = ControlDone();
+        try {
+          simulate_(command);
+        } catch (const DeviceError& error) {
+          answer = ControlRefusal(error.what());
+        }
+        appliance_.loop().Post("sim", [reply, answer] { reply(answer); });
+      });
+  if (!posted) reply(ControlRefusal("the virtual sensor is busy: try again"));
+}
+
+}  // namespace plumb

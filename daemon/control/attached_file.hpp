@@ -1,0 +1,23 @@
+// An open file that goes along with a request.
+#pragma once
+
+#include <unistd.h>
+
+namespace plumb {
+
+class AttachedFile {
+ public:
+  /// Takes the descriptor over.
+  explicit AttachedFile(int fd) : fd_(fd) {}
+  ~AttachedFile() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  AttachedFile(const AttachedFile&) = delete;
+  AttachedFile& operator=(const AttachedFile&) = delete;
+  [[nodiscard]] int fd() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+}  // namespace plumb

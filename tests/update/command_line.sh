@@ -1,0 +1,79 @@
+#!/usr/bin/env bash
+# `plumb update` with the real plumbd and RAUC itself, on a bus and a machine made of files: a good bundle, each bad one with its own sentence, the
+# restart, and a machine that starts the system before.
+#   command_line.sh BUILD_FOLDER
+set -euo pipefail
+for program in rauc dbus-daemon openssl; do command -v $program >/dev/null || { echo "$program is missing: run toolchain/install"; exit 77; }; done
+[ "$(id -u)" = 0 ] && [ -w /dev/loop-control ] || { echo "needs root and loop devices: RAUC mounts bundles"; exit 77; }
+plumbd=$(realpath "$1/daemon/plumbd") plumb=$(realpath "$1/daemon/plumb") here=$(cd "$(dirname "$0")" && pwd)
+work=$(mktemp -d)
+cd "$work"
+pids=
+trap 'kill -KILL $pids 2>/dev/null; rm -rf "$work"' EXIT
+failed=0
+check() { # NAME EXPECTED-REGEX FOUND
+  if [[ $3 =~ $2 ]]; then echo "ok      $1"; else failed=1; printf 'FAILED  %s: expected %s, found %s\n' "$1" "$2" "$3"; fi
+}
+mkdir machine
+"$here/make_bundles.sh" machine >made 2>&1 || { cat made; exit 1; }
+cat >bus.conf <<CONF
+<!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-BUS Bus Configuration 1.0//EN"
+ "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd"><busconfig><type>session</type><listen>unix:path=$work/bus</listen>
+<policy context="default"><allow send_destination="*" eavesdrop="true"/><allow eavesdrop="true"/><allow own="*"/></policy></busconfig>
+CONF
+export DBUS_SYSTEM_BUS_ADDRESS=unix:path=$work/bus DBUS_STARTER_BUS_TYPE=system
+dbus-daemon --nofork --config-file=bus.conf >bus.log 2>&1 & pids="$pids $!"
+for _ in $(seq 100); do [ -S bus ] && break; sleep 0.05; done
+rauc --conf=machine/system.conf service --override-boot-slot=A >rauc.log 2>&1 & pids="$pids $!"
+
+start() { # BOOT
+  PLUMB_BOOT_ID=$1 "$plumbd" --state "$work/state" --control "$work/control" --listen 127.0.0.1:0 >log 2>&1 &
+  daemon=$!
+  pids="$pids $daemon"
+  for _ in $(seq 300); do "$plumb" --control control status >/dev/null 2>&1 && return; sleep 0.1; done
+  echo "plumbd does not answer:"; cat log
+  exit 1
+}
+run() { "$plumb" --control control update "$@" >out 2>&1 && code=0 || code=$?; }
+seen() { echo "$code $(tr '\n' ' ' <out)"; }
+
+run machine/good.raucb
+check "no plumbd" '^5 .*cannot reach plumbd' "$(seen)"
+start one
+for _ in $(seq 50); do run machine/other.raucb; grep -q 'no installer' out || break; sleep 0.1; done
+check "another machine" "^5 .*for another machine: it is for 'plumb-other-machine'" "$(seen)"
+run machine/older.raucb
+check "an older version" '^5 .*older than 0\.' "$(seen)"
+run machine/stranger.raucb
+check "a stranger's key" '^3 .*not signed by a key that this machine trusts' "$(seen)"
+run machine/damaged.raucb
+check "a damaged one" '^3 .*damaged on its way' "$(seen)"
+run machine/truncated.raucb
+check "half of one" '^3 .*truncated.raucb' "$(seen)"
+check "none of them has touched a system" '^same$' "$(cmp -s machine/slots/a.img machine/slots/b.img && echo same)"
+run "$work"
+check "a folder" '^3 .*no plain file' "$(seen)"
+run machine/none.raucb
+check "a file that is missing" '^3 .*none.raucb cannot be read' "$(seen)"
+cp machine/good.raucb notes.txt
+run notes.txt
+check "a file of another name" '^3 .*ends with .raucb' "$(seen)"
+run
+check "nothing at all" '^2 ' "$(seen)"
+check "nothing is left of the refused ones but the bundles" '^0$' "$(find state/updates -name '.upload*' | wc -l)"
+for name in state/updates/*.raucb; do rm -f "$name"; done
+
+run machine/good.raucb --restart
+check "a good one is installed" 'good.raucb is installed and starts at the next restart' "$(seen)"
+check "and written to the other system" '^same$' "$(cmp -s -n 1500000 machine/good.img machine/slots/b.img && echo same)"
+check "a machine without logind says that it cannot restart" '^5 .*cannot be restarted from here' "$(seen)"
+run machine/good.raucb
+check "a second time" '^0 .*is installed' "$(seen)"
+
+kill -TERM $daemon
+wait $daemon || true
+start two # the same system, though the other was installed
+for _ in $(seq 50); do told=$("$plumb" --control control status --get rolled_back); [ -z "$told" ] || break; sleep 0.1; done
+check "a machine that starts the system before says so" 'version 9.1.0 was installed, but the machine has gone back' "$told"
+check "in the journal too" 'gone back to the system before' "$(cat log)"
+exit $failed
