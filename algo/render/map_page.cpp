@@ -20,7 +20,7 @@ constexpr Color kNoticePaper = {253, 240, 222};
 
 constexpr int kMapWidth_px = 1240, kMapHeight_px = 940;  // the map fits into this
 constexpr int kMinMapHeight_px = 520;                    // room for the legend beside it
-constexpr int kLeft_px = 84, kTop_px = 92, kLegend_px = 236, kAxis_px = 62, kGap_px = 28;
+constexpr int kLeft_px = 84, kTop_px = 108, kLegend_px = 236, kAxis_px = 62, kGap_px = 28;
 
 /// Rounded length of 1, 2 or 5 times a power of ten, the largest that is not above `length_m`.
 double RoundLength(double length_m) {
@@ -97,8 +97,8 @@ void DrawAxes(Figure& figure, const MapArea& area) {
                         kFaint);
   figure.Text(area.box.x + area.box.width / 2.0, bottom + 49, "x (m), reference marker's frame",
               label);
-  left.align = HorizontalAlign::kLeft;
-  figure.Text(14, area.box.y + area.box.height / 2.0 + 6, "y (m)", left);
+  // Above the axis, where no tick's number can be.
+  figure.Text(area.box.x - 11, area.box.y - 15, "y (m)", left);
 }
 
 void DrawScaleBar(Figure& figure, const MapArea& area) {

@@ -310,6 +310,8 @@ web::Status Appliance::WebStatus() {
   const Eigen::Matrix3d R_iec_reference = parts_.config.compare.T_iec_reference.linear();
   status.right_xy = {R_iec_reference(0, 0), R_iec_reference(0, 1)};
   status.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)};
+  // No marker lies exactly at the isocentre, along the room's axes: the default says nothing.
+  status.is_room_known = !parts_.config.compare.T_iec_reference.isApprox(Pose::Identity(), 0.0);
   ReadStored(status);
   return status;
 }

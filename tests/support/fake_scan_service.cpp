@@ -523,6 +523,7 @@ void FakeScanService::RemoveScan(const Actor& actor, const std::string& id, cons
 }
 
 void FakeScanService::MakeBackup(const Actor& actor, Done done) {
+  if (!backup_fault.empty()) return Finish(done, Refusal(ChangeResult::kInvalid, backup_fault));
   Did(actor, "backup.make", "", done);
 }
 

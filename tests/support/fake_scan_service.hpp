@@ -46,6 +46,7 @@ class FakeScanService : public web::ScanService {
     std::optional<web::ResultSummary> result;
   };
   std::vector<Recorded> recorded;
+  std::string backup_fault;               ///< Why no backup can be made; empty: one can.
   std::optional<Recorded> next_recorded;  ///< Set: what the next finished scan shows, out of turn.
   std::chrono::milliseconds sweep{3000};
   std::chrono::milliseconds work{600};

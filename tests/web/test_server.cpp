@@ -1,9 +1,12 @@
 // The real HTTP server over a fake appliance whose scans show real results: for tests of the page
 // in a browser. plumb_web_test_server FOLDER: makes scenes and results in FOLDER, prints its
 // address and "setup code: XXXX-XXXX", obeys lines on stdin: unplug, plug, fail (of the running
-// scan), slow (long sweeps), fast, old (the last result becomes 10 minutes old), quit; of what the
-// next scan shows: markermoved (a check), stranger (another body), shoulder (lifted), "moved AXIS
-// AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by pitch, roll, yaw by degrees).
+// scan), nobackup (backups fail), slow (long sweeps), fast, swift (half a
+// second from the start to the result), old (the last result becomes 10 minutes
+// old), quit; of what the next scan shows: markermoved (a check), stranger (another body), shoulder
+// (lifted), across (the body lies across the room's axes), "moved AXIS AMOUNT POSTURE" (the body
+// moved along x, y, z by mm or turned by pitch, roll, yaw by degrees); "room known", "room
+// unknown": what the status says.
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
@@ -101,6 +104,18 @@ class Recorder {
     return Write(folder, Compare(*reference_, scene, Options()));
   }
 
+  /// A moved body, in a room whose axes are turned by 90 degrees: the plan's posture is not its
+  /// own.
+  FakeScanService::Recorded RecordAcross() {
+    Scene scene = MakeSyntheticScene(Sweeps()[1]);
+    if (scene.height_map) scene.mesh = MeshOfHeightMap(*scene.height_map, {}, {.decimation = 3});
+    CompareOptions across = Options();
+    across.T_iec_reference = Pose::Identity();
+    const fs::path folder = NewFolder();
+    WriteScene(scene, folder / "scene");
+    return Write(folder, Compare(*reference_, scene, across));
+  }
+
   /// A result of which the body's motion in the room is known: `along` the axis (mm), or about it
   /// (degrees).
   FakeScanService::Recorded RecordMotion(const Eigen::Vector3d& axis, bool is_turn, double amount,
@@ -177,10 +192,23 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
   }
   if (name == "slow") service.sweep = std::chrono::milliseconds(60000);
   if (name == "fast") service.sweep = std::chrono::milliseconds(1500);
+  if (name == "swift") {
+    service.sweep = std::chrono::milliseconds(300);
+    service.work = std::chrono::milliseconds(200);
+  }
+  if (name == "nobackup") service.backup_fault = "no folder for backups is configured";
   if (name == "installed") {
     service.update.installing = false;
     service.update.message = "plumb-0.3.0.raucb is installed: restart the appliance to use it";
+    service.update.restart_needed = true;
     service.Tell(web::EventKind::kUpdate);
+  }
+  if (name == "rolledback") {
+    service.update.restart_needed = false;
+    service.update.rolled_back = "The machine went back to the system before, version 0.2.0.";
+    service.status.rolled_back = service.update.rolled_back;
+    service.Tell(web::EventKind::kUpdate);
+    service.Tell(web::EventKind::kStatus);
   }
   if (name == "markermoved") {
     web::CheckRecord check;
@@ -194,6 +222,13 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
     service.next_check = check;
   }
   if (name == "stranger") service.next_recorded = recorder.Record(Stranger());
+  if (name == "across") service.next_recorded = recorder.RecordAcross();
+  if (name == "room") {
+    std::string what;
+    words >> what;
+    service.status.is_room_known = what == "known";
+    service.Tell(web::EventKind::kStatus);
+  }
   if (name == "shoulder") service.next_recorded = recorder.Record(LiftedShoulder());
   if (name == "moved") {
     std::string axis, posture;
@@ -247,6 +282,7 @@ int Serve(const fs::path& root) {
   };
   service.status.right_xy = {kT_iec_reference(0, 0), kT_iec_reference(0, 1)};
   service.status.gantry_xy = {kT_iec_reference(1, 0), kT_iec_reference(1, 1)};
+  service.status.is_room_known = true;
   service.sweep = std::chrono::milliseconds(1500);
   service.update = {true, "", "A", false, 0.0, {"plumb-0.2.0.raucb"}};
   web::HttpServerOptions options;

@@ -92,6 +92,7 @@ const arrowOf = (card) => card.locator('svg.arrow').evaluate((drawing) => {
   return { tail: at(0), before: at(0.9), tip: at(1), middle: { x: box.x + box.width / 2, y: box.y + box.height / 2 } };
 });
 
+h.tell('swift');
 for (const [axis, amount, posture, name, value, words, toward, why] of kSigns) {
   await h.step(`sign of ${name.toLowerCase()}, ${posture}, ${why}`, async () => {
     h.tell(`moved ${axis} ${amount} ${posture}`);
@@ -118,6 +119,26 @@ for (const [axis, amount, posture, name, value, words, toward, why] of kSigns) {
   });
 }
 
+await h.step('couch readings: the sum is done, only for a move, only where the room is known', async () => {
+  h.tell('moved y -8 HFS');  // put right by +8 mm toward the gantry, which counts up
+  await scan();
+  await anna.getByText('Couch readings: what to set').click();
+  await anna.getByLabel('Longitudinal (cm)').fill('-12.4');
+  await anna.getByText('Longitudinal: set to −11.6 cm').waitFor();
+  await anna.getByLabel('Lateral (cm)').fill('999');
+  await anna.getByText('a number in cm').waitFor();
+  await anna.getByLabel('Lateral (cm)').fill('0,3');
+  await anna.getByText('Lateral: set to 0.3 cm').waitFor();  // below its uncertainty: it stays
+  await h.look(anna, 'result-couch');
+  h.tell('room unknown');
+  await anna.goto(`${h.url}#/status`);
+  await anna.reload();
+  await anna.goto(`${h.url}#/result`);
+  await anna.locator('.number').first().waitFor();
+  equal(await anna.locator('.couch').count(), 0, 'not in an unknown room');
+  h.tell('room known');
+});
+
 await h.step('a lifted shoulder is said in words, on the page and in print', async () => {
   h.tell('shoulder');
   const shown = await scan();
@@ -132,6 +153,70 @@ await h.step('a lifted shoulder is said in words, on the page and in print', asy
   await anna.goto(`${h.url}result?scan=${shown.id}`);
   await anna.getByText(/left side at the head end \d+ mm high/).first().waitFor();
   await anna.screenshot({ path: h.file('print.png'), fullPage: true });
+});
+
+// Which side is the patient's is decided once, with the words; no picture may claim more than they do.
+const kPatients = ['feet', 'head', 'left', 'right'];
+const marksIn = async (page, where) => [...new Set(await page.locator(`${where} [data-mark]`).evaluateAll((marks) => marks.map((mark) => mark.dataset.mark)))].sort();
+const kPictures = ['.map-row .map-box .ways', '.map-row .profile', '.halves .map-box .ways'];
+/// Map, profile, overlay and 3-D of the result that anna sees.
+async function marksOfResult(name) {
+  await anna.locator('.map-row .map-box .ways').waitFor();
+  const found = {};
+  for (const where of kPictures) found[where] = await marksIn(anna, where);
+  await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
+  await anna.locator('canvas.mesh[data-ready=yes]').waitFor({ timeout: 60000 });
+  const views = await anna.locator('.mesh-place').getByRole('button').allInnerTexts();
+  await h.look(anna, name, { axe: false });
+  return { found, views };
+}
+
+await h.step('as planned: the pictures name the sides of the patient', async () => {
+  h.tell('moved z 8 HFS');
+  await scan();
+  const { found, views } = await marksOfResult('marks-patient');
+  equal(found[kPictures[0]].join(), 'feet,gantry,head,left,right', 'the map');
+  equal(found[kPictures[2]].join(), 'feet,gantry,head,left,right', 'the overlay');
+  equal(found[kPictures[1]].length, 2, 'both ends of the profile');
+  check(found[kPictures[1]].every((name) => kPatients.includes(name)), `the profile: ${found[kPictures[1]]}`);
+  check(views.includes('Left') && views.includes('Feet'), `3-D views: ${views}`);
+  equal(await anna.locator('.marks-note').count(), 0, 'nothing to warn of');
+});
+
+await h.step('not as planned: no picture names a side of the patient, in a known room and in an unknown one', async () => {
+  const sides = (list) => list.filter((name) => kPatients.includes(name.toLowerCase()));
+  h.tell('across');
+  const { id } = await scan();
+  equal((await h.api(anna, `results/${id}`)).body.body.named_by, 'room', 'the words are the room’s');
+  const { found, views } = await marksOfResult('marks-room');
+  equal(found[kPictures[0]].join(), 'gantry,minusX,plusX', 'the map');
+  equal(found[kPictures[2]].join(), 'gantry,minusX,plusX', 'the overlay');
+  for (const where of kPictures) equal(sides(found[where]).join(), '', where);
+  equal(sides(views).join(), '', '3-D views');
+  await anna.getByText('axes of the room (IEC 61217), not the patient’s sides').first().waitFor();
+  h.tell('room unknown');
+  await anna.goto(`${h.url}#/status`);
+  await anna.reload();  // or the status might be an older one
+  await anna.goto(`${h.url}#/result/${id}`);
+  const unknown = await marksOfResult('marks-axes');
+  equal(unknown.found[kPictures[0]].join(), 'minusX,minusY,plusX,plusY', 'the map’s own axes');
+  for (const where of kPictures) equal(sides(unknown.found[where]).join(), '', where);
+  equal(sides(unknown.views).join(), '', '3-D views');
+  await anna.getByText('axes of the reference marker, not the patient’s sides').first().waitFor();
+  check(!/gantry/i.test((await anna.locator('.map-row .ways').allInnerTexts()).join()), 'no gantry');
+  h.tell('room known');
+});
+
+await h.step('unknown, without an answer: no picture names a side of the patient, nor does the plan', async () => {
+  h.tell('stranger');
+  await scan();
+  const { found, views } = await marksOfResult('marks-no-answer');
+  equal(found[kPictures[0]].join(), 'gantry,minusX,plusX', 'the map');
+  check(!views.some((name) => kPatients.includes(name.toLowerCase())), `3-D views: ${views}`);
+  const { body } = await h.api(bob, 'scans?limit=1');
+  await bob.goto(`${h.url}#/plan/${body.scans[0].reference_id}`);
+  await bob.locator('.plan-grid .ways').waitFor();
+  equal((await marksIn(bob, '.plan-grid')).join(), 'gantry,minusX,plusX', 'the plan');
 });
 
 await h.step('a wrong reference is NO ANSWER with its reason, and nothing to apply', async () => {

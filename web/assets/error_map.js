@@ -1,9 +1,12 @@
 // The error map with a cursor that reads millimetres, and the profile through it.
 import { fileUrl, get, live } from './api.js';
-import { clear, h, svg } from './dom.js';
-import { compassOf, drawCropped, mapFrame, viewOf } from './map_frame.js';
+import { clear, h, svg, warn } from './dom.js';
+import {
+  compassOf, drawCropped, mapFrame, markToward, marksNote, viewOf,
+} from './map_frame.js';
 import { cellAt, errorColour, loadMap, paintErrors, paintOverlay } from './maps.js';
 import { signed } from './numbers.js';
+import { namedBy } from './screens/common.js';
 import { S } from './strings.js';
 
 const kTicks = [-20, -10, -5, -2, -1, 1, 2, 5, 10, 20];  // tolerances
@@ -38,7 +41,7 @@ export function legend(tolerance_mm) {
 const kProfile = { width: 640, height: 240, left: 42, bottom: 34, top: 8, right: 8 };
 
 /// Heights along a line through the cursor; both axes in centimetres, equally marked.
-function profile(grid, view, reference, deviation, cursor, along) {
+function profile(grid, view, reference, deviation, cursor, along, compass) {
   const { width, height, left, bottom, top, right } = kProfile;
   const from = along === 0 ? view.x_min : view.y_max - view.height;
   const length = along === 0 ? view.width : view.height;
@@ -68,6 +71,12 @@ function profile(grid, view, reference, deviation, cursor, along) {
     (_, i) => (Math.ceil(low_m / step - 1e-6) + i) * step).filter((v) => v <= high_m + 1e-6);
   const cm = (v) => (100 * v).toFixed(0);
   const here = along === 0 ? cursor.x - from : cursor.y - from;
+  const end = (at, anchor, way) => {
+    const name = markToward(compass, along === 0 ? [way, 0] : [0, way]);
+    return name && svg('text', {
+      x: at, y: height - 3, class: `tick ${anchor}`, 'data-mark': name,
+    }, S.result.marks[name]);
+  };
   return svg('svg', {
     viewBox: `0 0 ${width} ${height}`, class: 'profile', role: 'img',
     'aria-label': S.result.sliceLabel,
@@ -79,6 +88,7 @@ function profile(grid, view, reference, deviation, cursor, along) {
     svg('line', { x1: left, x2: width - right, y1: y(v), y2: y(v), class: 'grid' }),
     svg('text', { x: left - 5, y: y(v) + 4, class: 'tick' }, cm(v))]),
   svg('text', { x: (left + width) / 2, y: height - 3, class: 'tick middle' }, S.result.sliceWay),
+  end(left, 'start', -1), end(width - right, 'end', 1),
   svg('text', {
     x: 11, y: (height - bottom) / 2, class: 'tick middle',
     transform: `rotate(-90 11 ${(height - bottom) / 2})`,
@@ -150,7 +160,8 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
   const { grid, region, heights } = loaded;
   const maps = { before: loaded.before, after: null };
   const view = viewOf(grid, region);
-  const compass = compassOf(live.status?.room, reference.plan.posture);
+  const compass = compassOf(live.status?.room, namedBy(scan, scan.details),
+    reference.plan.posture);
   const isocentre = scan.details?.correction?.isocentre;
 
   const canvas = h('canvas', {
@@ -172,7 +183,7 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
     clear(reading, h('strong', {}, words), ` ${text.at(cursor.x, cursor.y)}`);
     cross.style.setProperty('left', `${100 * (cursor.x - view.x_min) / view.width}%`);
     cross.style.setProperty('top', `${100 * (view.y_max - cursor.y) / view.height}%`);
-    clear(slice, profile(grid, view, heights, maps[shown.map], cursor, shown.along));
+    clear(slice, profile(grid, view, heights, maps[shown.map], cursor, shown.along, compass));
   };
   const move = (x, y) => {
     cursor.x = Math.max(view.x_min, Math.min(view.x_min + view.width - grid.step / 2, x));
@@ -202,7 +213,15 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
   const choose = (name, value, label, apply) => {
     const input = h('input', { type: 'radio', name, value, checked: value === shown[name] });
     input.addEventListener('change', async () => {
-      if (name === 'map' && !maps[value]) maps[value] = await loadMap(scan.id, 'deviation_after');
+      try {
+        if (name === 'map') maps[value] ??= await loadMap(scan.id, 'deviation_after');
+      } catch (error) {
+        // The other map stays, and its name is the one that is marked.
+        input.closest('fieldset').querySelector(`[value="${shown[name]}"]`).checked = true;
+        warn(`${text.mapMissing} ${error.message}`);
+        return;
+      }
+      if (!input.checked) return;  // somebody chose again meanwhile
       shown[name] = value;
       apply();
     });
@@ -220,7 +239,8 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
   const element = h('div', {},
     h('fieldset', { class: 'row plainset' }, h('legend', { class: 'visually-hidden' }, text.where),
       choose('map', 'before', text.before, both), choose('map', 'after', text.after, both)),
-    row(view, box, h('div', { class: 'map-side' }, reading, legend(tolerance_mm), profileBox)));
+    row(view, h('div', {}, box, marksNote(compass)),
+      h('div', { class: 'map-side' }, reading, legend(tolerance_mm), profileBox)));
   const overlay = () => {
     const still = h('canvas', { class: 'still-map', role: 'img', 'aria-label': text.overlayAlt });
     drawCropped(still, view, (whole) =>

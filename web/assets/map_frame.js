@@ -1,5 +1,5 @@
 // A map as a picture that can be read: cropped, with axes, a scale bar, the edge of the region, and
-// marks that say where head, feet, left, right and the gantry are.
+// marks that say which way is which.
 import { h, svg } from './dom.js';
 import { cropOf, outlineOf } from './maps.js';
 import { S } from './strings.js';
@@ -7,17 +7,44 @@ import { S } from './strings.js';
 const kTick_m = 0.1;
 const kMargin_m = 0.1;
 
-/// Directions on the map (unit vectors, x right, y up) that follow from the room's axes and the
-/// posture; null where the room is not known.
-export function compassOf(room, posture = 'HFS') {
-  const gantry = room?.gantry_xy;
-  const right = room?.right_xy;  // of a person who faces the gantry
+const times = ([x, y], k) => [k * x, k * y];
+
+/// What the marks on a picture are, and where they lie: {by, ways: {NAME: [x, y]}}, unit vectors of
+/// the map, x right, y up.
+///
+/// Which side is the patient's was decided where the words were made: only a result whose body
+/// "named_by" is "posture" shows head, feet, left and right. Else ("room") the marks are the axes
+/// of the room, as in the words; where its place is not known, the map's own.
+/// @param named_by  Of the result's body; anything but "posture": nothing is the patient's.
+export function compassOf(room, named_by, posture) {
+  // Right of a person who faces the gantry.
+  const { gantry_xy: gantry, right_xy: right, known } = room ?? {};
   if (!gantry || !right) return null;
-  const times = ([x, y], k) => [k * x, k * y];
-  const head = times(gantry, posture.startsWith('H') ? 1 : -1);
-  const left = times(right, posture === 'HFS' || posture === 'FFP' ? 1 : -1);
-  return { gantry, head, feet: times(head, -1), left, right: times(left, -1) };
+  if (named_by === 'posture' && posture) {
+    const head = times(gantry, posture.startsWith('H') ? 1 : -1);
+    const left = times(right, posture === 'HFS' || posture === 'FFP' ? 1 : -1);
+    const ways = { head, feet: times(head, -1), left, right: times(left, -1) };
+    return { by: 'posture', ways: known ? { ...ways, gantry } : ways };
+  }
+  if (known) return { by: 'room', ways: { gantry, plusX: right, minusX: times(right, -1) } };
+  return {
+    by: 'axes', ways: { plusX: [1, 0], minusX: [-1, 0], plusY: [0, 1], minusY: [0, -1] },
+  };
 }
+
+/// Name of the mark toward which a direction of the map points; nothing where none is near it.
+export function markToward(compass, [x, y]) {
+  const nearest = Object.entries(compass?.ways ?? {}).filter(([name]) => name !== 'gantry')
+    .map(([name, [wx, wy]]) => [wx * x + wy * y, name]).sort(([a], [b]) => b - a)[0];
+  if (nearest?.[0] > 0.8) return nearest[1];
+  const { gantry } = compass?.ways ?? {};
+  return gantry && gantry[0] * x + gantry[1] * y > 0.8 ? 'gantry' : null;
+}
+
+/// Says of what the marks are, where they are not the patient's.
+export const marksNote = (compass) => compass && compass.by !== 'posture'
+  && h('p', { class: 'hint marks-note' },
+    compass.by === 'room' ? S.result.marksOfRoom : S.result.marksOfAxes);
 
 /// The part of the grid that is shown, in metres.
 export function viewOf(grid, region) {
@@ -46,28 +73,28 @@ export function drawCropped(canvas, view, draw) {
 }
 
 function axes(view, size) {
-  const marks = [];
+  const ticks = [];
   const label = (value) => (100 * value).toFixed(0);
   const first = (low) => Math.ceil(low / kTick_m - 1e-6);
   for (let i = first(view.x_min); i * kTick_m <= view.x_min + view.width; ++i) {
     const x = i * kTick_m - view.x_min;
-    marks.push(svg('line', { x1: x, x2: x, y1: view.height, y2: view.height - size / 2 }),
+    ticks.push(svg('line', { x1: x, x2: x, y1: view.height, y2: view.height - size / 2 }),
       i % 2 === 0 && x > size && x < view.width - size
         && svg('text', { x, y: view.height - 0.7 * size, class: 'middle' }, label(i * kTick_m)));
   }
   const y_min = view.y_max - view.height;
   for (let i = first(y_min); i * kTick_m <= view.y_max; ++i) {
     const y = view.y_max - i * kTick_m;
-    marks.push(svg('line', { x1: 0, x2: size / 2, y1: y, y2: y }),
+    ticks.push(svg('line', { x1: 0, x2: size / 2, y1: y, y2: y }),
       i % 2 === 0 && y > 2 * size && y < view.height - 2 * size
         && svg('text', { x: 0.7 * size, y: y + 0.35 * size }, label(i * kTick_m)));
   }
-  return svg('g', { class: 'axes' }, marks,
+  return svg('g', { class: 'axes' }, ticks,
     svg('text', { x: view.width - 0.3 * size, y: view.height - 0.7 * size, class: 'end' }, 'x cm'),
     svg('text', { x: 0.7 * size, y: 1.1 * size }, 'y cm'));
 }
 
-/// Where the body's ends and sides are; the gantry's mark stands outside the head's or feet's.
+/// The gantry's mark stands outside the head's or feet's.
 function marks(view, compass, size) {
   if (!compass) return null;
   const text = S.result.marks;
@@ -87,9 +114,9 @@ function marks(view, compass, size) {
   };
   // The gantry's mark stands at the very edge, head or feet within it.
   const within = [5.6 * size, 1.5 * size];
-  return svg('g', { class: 'ways' }, place('head', compass.head, ...within),
-    place('feet', compass.feet, ...within), place('left', compass.left, 0, 0),
-    place('right', compass.right, 0, 0), place('gantry', compass.gantry, 0, 0));
+  return svg('g', { class: 'ways', 'data-by': compass.by },
+    Object.entries(compass.ways).map(([name, way]) =>
+      place(name, way, ...(name === 'head' || name === 'feet' ? within : [0, 0]))));
 }
 
 /// @param canvas  Shows the view; what stands over it is drawn beside it.

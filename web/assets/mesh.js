@@ -18,24 +18,51 @@ function colourByError(geometry, grid, deviation, region, T, tolerance_m) {
     const value = cell < 0 ? NaN : deviation.values[cell];
     const at = 3 * errorIndex(value / tolerance_m);
     const light = cell >= 0 && region && Number.isNaN(region.values[cell]) ? kOutside : 1;
-    for (let k = 0; k < 3; ++k) colours[3 * i + k] = Number.isNaN(value) ? 80 : scale[at + k] * light;
+    for (let k = 0; k < 3; ++k) {
+      colours[3 * i + k] = Number.isNaN(value) ? 80 : scale[at + k] * light;
+    }
   }
   geometry.setAttribute('color', new THREE.BufferAttribute(colours, 3, true));
 }
 
 const kGround = 0x0d1216;
 
-/// A small sign of what lies where: an arrow for the head and one for the patient's left.
-function compassArrows(compass, centre, size) {
+/// A word that faces the viewer and hides behind nothing.
+function label(text, height) {
+  const canvas = document.createElement('canvas');
+  const context = canvas.getContext('2d');
+  const font = '600 48px sans-serif';
+  context.font = font;
+  canvas.width = Math.ceil(context.measureText(text).width) + 16;
+  canvas.height = 64;
+  context.font = font;  // a new size forgets it
+  context.lineWidth = 8;
+  context.strokeStyle = '#05080a';
+  context.fillStyle = '#ffe08a';
+  context.textBaseline = 'middle';
+  context.strokeText(text, 8, 34);
+  context.fillText(text, 8, 34);
+  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({
+    map: new THREE.CanvasTexture(canvas), depthTest: false, transparent: true,
+  }));
+  sprite.scale.set(height * canvas.width / canvas.height, height, 1);
+  return sprite;
+}
+
+/// What lies where, around the box that is looked at: the marks of the maps.
+function marksAround(compass, words, box, radius) {
   const group = new THREE.Group();
-  if (!compass) return group;
-  const arrow = ([x, y], colour) => group.add(new THREE.ArrowHelper(
-    new THREE.Vector3(x, y, 0).normalize(), new THREE.Vector3(), size, colour, size / 3, size / 6));
-  arrow(compass.head, 0x7fd4c1);
-  arrow(compass.left, 0xffb95c);
-  group.add(new THREE.ArrowHelper(new THREE.Vector3(0, 0, 1), new THREE.Vector3(), size, 0x8ec5ff,
-    size / 3, size / 6));
-  group.position.copy(centre);
+  const centre = box.getCenter(new THREE.Vector3());
+  const half = box.getSize(new THREE.Vector3()).multiplyScalar(0.5);
+  for (const [name, [x, y]] of Object.entries(compass?.ways ?? {})) {
+    const reach = Math.min(Math.abs(x) > 0.3 ? half.x / Math.abs(x) : Infinity,
+      Math.abs(y) > 0.3 ? half.y / Math.abs(y) : Infinity);
+    // The gantry stands behind the head or the feet.
+    const away = reach + (name === 'gantry' ? 0.36 : 0.16) * radius;
+    const sprite = label(words[name], 0.13 * radius);
+    sprite.position.set(centre.x + x * away, centre.y + y * away, box.min.z + half.z);
+    group.add(sprite);
+  }
   return group;
 }
 
@@ -58,8 +85,11 @@ function boxOfInterest(geometry, grid, region, T) {
 }
 
 /// Draws into `canvas`. Throws where there is no WebGL.
+/// @param words  Of the compass's marks.
 /// Gives setGhost(url, share), setShare(share), look(name), picture(), stop().
-export async function openMesh(canvas, { url, grid, deviation, region, T, tolerance_m, compass }) {
+export async function openMesh(canvas, {
+  url, grid, deviation, region, T, tolerance_m, compass, words,
+}) {
   const renderer = new THREE.WebGLRenderer({
     canvas, antialias: true, logarithmicDepthBuffer: true, preserveDrawingBuffer: true,
   });
@@ -77,11 +107,9 @@ export async function openMesh(canvas, { url, grid, deviation, region, T, tolera
   const material = new THREE.MeshStandardMaterial({
     vertexColors: true, roughness: 0.9, side: THREE.DoubleSide,
   });
-  scene.add(new THREE.Mesh(geometry, material));
   const box = boxOfInterest(geometry, grid, region, T);
   const { center, radius } = box.getBoundingSphere(new THREE.Sphere());
-  const corner = new THREE.Vector3(box.min.x, box.min.y, box.max.z + 0.05);
-  scene.add(compassArrows(compass, corner, 0.25 * radius));
+  scene.add(new THREE.Mesh(geometry, material), marksAround(compass, words, box, radius));
   const controls = new OrbitControls(camera, canvas);
   controls.enableDamping = false;
 
@@ -105,16 +133,16 @@ export async function openMesh(canvas, { url, grid, deviation, region, T, tolera
   const resize = new ResizeObserver(request);
   resize.observe(canvas);
 
-  /// From where the body is looked at; without a compass as if its head were at +y.
+  /// From the side of a mark, from above, or askew ("reset").
   const look = (name) => {
-    const [hx, hy] = compass?.head ?? [0, 1];
-    const [lx, ly] = compass?.left ?? [-1, 0];
+    // Upright on the screen is the way of the first mark: the head, the gantry or +X.
+    const [ux, uy] = Object.values(compass?.ways ?? {})[0] ?? [0, 1];
+    const [x, y] = compass?.ways[name] ?? [0, 0];
     const from = {
-      top: [-0.01 * hx, -0.01 * hy, 1], left: [lx, ly, 0.35], right: [-lx, -ly, 0.35],
-      feet: [-hx, -hy, 0.35], reset: [-0.7 * hx, -0.7 * hy, 0.8],
-    }[name];
+      top: [-0.01 * ux, -0.01 * uy, 1], reset: [-0.7 * ux, -0.7 * uy, 0.8],
+    }[name] ?? [x, y, 0.35];
     camera.position.copy(center)
-      .add(new THREE.Vector3(...from).normalize().multiplyScalar(2.6 * radius));
+      .add(new THREE.Vector3(...from).normalize().multiplyScalar(2.8 * radius));
     controls.target.copy(center);
     controls.update();
     request();

@@ -1,13 +1,18 @@
 // The card of the 3-D view, which is loaded only when it is opened.
 import { fileUrl } from '../api.js';
 import { action, checkbox, clear, h, warn } from '../dom.js';
+import { marksNote } from '../map_frame.js';
 import { S } from '../strings.js';
 
-const kViews = ['top', 'left', 'right', 'feet', 'reset'];
+/// Standard views: from above, from each mark but those that say the same twice, and askew.
+const viewsOf = (compass) => ['top',
+  ...Object.keys(compass?.ways ?? {}).filter((name) => name !== 'head' && name !== 'gantry'),
+  'reset'];
 
-function controls(view, canvas, ghostUrl, scan) {
+function controls(view, canvas, ghostUrl, scan, compass) {
   const text = S.result;
-  const buttons = kViews.map((name) => action(text.views3d[name], async () => view.look(name), {}));
+  const buttons = viewsOf(compass).map((name) =>
+    action(text.views3d[name] ?? text.marks[name], async () => view.look(name), {}));
   const picture = action(text.screenshot, async () => {
     h('a', { href: view.picture(), download: `plumb_${scan.id}_3d.png` }).click();
   }, {});
@@ -51,11 +56,11 @@ export function meshView({ scan, reference, details }, map, tolerance_mm) {
       view = await openMesh(canvas, {
         url: fileUrl(scan.id, 'mesh.ply'), grid: map?.grid, deviation: map?.deviation,
         region: map?.region, T: details?.alignment?.T_reference_current,
-        tolerance_m: tolerance_mm / 1000, compass: map?.compass,
+        tolerance_m: tolerance_mm / 1000, compass: map?.compass, words: text.marks,
       });
       canvas.dataset.ready = 'yes';
       const ghostUrl = reference && fileUrl(reference.scan_id, 'mesh.ply');
-      clear(below, controls(view, canvas, ghostUrl, scan));
+      clear(below, marksNote(map?.compass), controls(view, canvas, ghostUrl, scan, map?.compass));
     } catch {
       clear(place, h('p', { class: 'hint' }, text.meshFailed));
     }

@@ -5,7 +5,7 @@ import {
   action, checkbox, clear, done, enable, field, h, keepFocus, localTime, say, select, svg, warn,
 } from '../dom.js';
 import { guardLeaving } from '../leave.js';
-import { compassOf, mapFrame, viewOf } from '../map_frame.js';
+import { compassOf, mapFrame, marksNote, viewOf } from '../map_frame.js';
 import { cellAt, loadMap, paintHeights } from '../maps.js';
 import { S } from '../strings.js';
 
@@ -317,6 +317,8 @@ async function draft(place, reference, store) {
   let stored;  // as written when nothing is edited
   let drawing = null;
   let loaded = null;
+  // Nothing has been compared: whether the body lies as the plan says, nobody has looked at yet.
+  const compass = compassOf(live.status?.room, null);
   const isEdited = () => stored !== undefined && inputs.written() !== stored;
   const sign = may('approve') && !reference.approved_by
     && action(text.summaryReview, async () => showSummary(), {});
@@ -344,16 +346,14 @@ async function draft(place, reference, store) {
   const unsaved = h('p', { class: 'caution', role: 'status' });
   try {
     loaded = await loadHeights(reference);
-    const compass = compassOf(live.status?.room, plan.posture);
     drawing = editor(loaded.grid, loaded.map, model, editable, changed, compass);
-    clear(mapPlace, drawing.element);
+    clear(mapPlace, drawing.element, marksNote(compass));
   } catch (error) {
     clear(mapPlace, h('p', { class: 'hint' }, error.message));
   }
   const picture = () => {
     if (!loaded) return null;
     const shown = { region: reference.plan.region_m, isocentre: reference.plan.isocentre_m };
-    const compass = compassOf(live.status?.room, reference.plan.posture);
     return editor(loaded.grid, loaded.map, shown, false, () => {}, compass).element;
   };
   const showSummary = () => {
