@@ -132,7 +132,7 @@ await h.step('a physicist plans a new version, a second one approves', async () 
 await h.step('the daily check of the real markers: no baseline, then passed', async () => {
   const bob = await h.person('checker');
   await h.logIn(bob, 'bob');
-  const check = async (verdict) => {
+  const takeCheck = async (verdict) => {
     await bob.goto(`${h.url}#/check`);
     await bob.getByRole('button', { name: 'Start a check' }).click();
     await bob.getByRole('button', { name: /Start sweep|Scan again/ }).click(kSlow);
@@ -140,14 +140,14 @@ await h.step('the daily check of the real markers: no baseline, then passed', as
     await bob.locator('.verdict', { hasText: verdict }).waitFor(kSlow);
     console.log(`    ${(await bob.locator('tbody tr').allInnerTexts()).slice(0, 6).join(' | ').replace(/\s+/g, ' ')}`);
   };
-  await check('NO BASELINE');
+  await takeCheck('NO BASELINE');
   await bob.getByText('Another physicist than the one who took this check').waitFor();
   const second = await h.person('second');
   await h.logIn(second, 'clara');
   await second.goto(`${h.url}#/check`);
   await second.getByRole('button', { name: 'Set as baseline' }).click();
   await bob.getByText('set by clara').waitFor();
-  await check('PASSED');
+  await takeCheck('PASSED');
   await h.look(bob, 'check');
   await bob.goto(`${h.url}#/status`);
   await bob.locator('.tile.good', { hasText: 'Daily check' }).waitFor();

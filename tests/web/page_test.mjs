@@ -1,4 +1,5 @@
 // A run through the page in a real browser: page_test.mjs NODE_MODULES SERVER OUT_FOLDER CHROMIUM
+import { readFileSync } from 'node:fs';
 import { Harness } from './harness.mjs';
 
 const [modules, server, folder, chromium] = process.argv.slice(2);
@@ -247,6 +248,7 @@ await h.step('unplugging during a sweep discards the scan and says so', async ()
   h.tell('plug');
   h.tell('fast');
   await anna.locator('.headline', { hasText: 'Ready' }).waitFor();
+  await anna.getByText('The sensor was unplugged').waitFor({ state: 'detached' });
 });
 
 await h.step('a failed scan is acknowledged on the page', async () => {
@@ -286,24 +288,24 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
   await anna.goto(`${h.url}#/check`);
   await anna.getByText('NOT DONE').waitFor();
   await h.look(anna, 'check-never');
-  const check = async () => {
+  const takeCheck = async () => {
     await anna.goto(`${h.url}#/check`);
     await anna.getByRole('button', { name: 'Start a check' }).click();
     await anna.getByText('sweep over all markers of the room').waitFor();
     await anna.getByRole('button', { name: /Start sweep|Scan again/ }).click();
     await anna.waitForURL(/#\/check/, { timeout: 60000 });
   };
-  await check();
+  await takeCheck();
   await anna.locator('.verdict', { hasText: 'NO BASELINE' }).waitFor();
   equal(await anna.getByRole('button', { name: 'Set as baseline' }).count(), 0, 'a technician sets no baseline');
   await bob.goto(`${h.url}#/check`);
   await bob.getByRole('button', { name: 'Set as baseline' }).click();
   await bob.getByText('12 markers, set by bob').waitFor();
-  await check();
+  await takeCheck();
   await anna.locator('.verdict', { hasText: 'PASSED' }).waitFor();
   await h.look(anna, 'check-passed');
   h.tell('markermoved');
-  await check();
+  await takeCheck();
   await anna.locator('.verdict', { hasText: 'FAILED' }).waitFor();
   await anna.getByText('marker 7 moved 12 mm').first().waitFor();
   await h.look(anna, 'check-failed');
@@ -317,12 +319,25 @@ await h.step('patients, log, settings and update look finished', async () => {
   await bob.getByRole('link', { name: 'PX-0417' }).waitFor();
   await h.look(bob, 'patients');
   await bob.goto(`${h.url}#/audit`);
-  await bob.getByRole('cell', { name: 'reference.approve' }).waitFor();
+  await bob.getByRole('cell', { name: 'Reference approved' }).waitFor();
   await h.look(bob, 'audit');
+  await bob.getByLabel('Filter').fill('reference approved');
+  await bob.getByText(/^1 of \d+ entries$/).waitFor();
+  equal(await bob.locator('tbody tr').count(), 1, 'only what was looked for');
+  const [download] = await Promise.all([bob.waitForEvent('download'), bob.getByRole('button', { name: 'Download as CSV' }).click()]);
+  const csv = readFileSync(await download.path(), 'utf8').trim().split('\r\n');
+  equal(csv.length, 2, 'a head and one entry');
+  check(csv[1].includes('"Reference approved"'), csv[1]);
   await engineer.goto(`${h.url}#/settings`);
   await engineer.getByLabel('Log out after … min without use').fill('20');
   await engineer.getByRole('button', { name: 'Save' }).click();
   await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
+  await engineer.getByText('No backup has been made yet.').waitFor();
+  await engineer.getByRole('button', { name: 'Back up now' }).click();
+  await engineer.getByText(/Last backup: .*, by engineer\./).waitFor();
+  h.tell('nobackup');
+  await engineer.getByRole('button', { name: 'Back up now' }).click();
+  await engineer.getByRole('alert').getByText('no folder for backups is configured').waitFor();
   await h.look(engineer, 'settings');
   await engineer.goto(`${h.url}#/update`);
   await engineer.getByText('plumb-0.2.0.raucb').waitFor();
@@ -343,7 +358,79 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.getByText('restart the appliance to use it').waitFor();
   await bob.goto(`${h.url}#/update`);
   await bob.getByText('plumb-0.3.0.raucb').first().waitFor();
-  equal(await bob.getByRole('button', { name: /Install|Upload|Remove/ }).count(), 0, 'a physicist updates nothing');
+  equal(await bob.getByRole('button', { name: /Install|Upload|Remove|Restart/ }).count(), 0, 'a physicist updates nothing');
+});
+
+await h.step('the restart into an update: with the password, never beside a session; a roll-back is told until it is seen', async () => {
+  const restart = async (password) => {
+    await engineer.getByLabel('Your password').fill(password);
+    await engineer.getByRole('button', { name: 'Restart now' }).click();
+  };
+  const alert = engineer.getByRole('alert');
+  await h.look(engineer, 'update-restart');
+  await restart('not the password');
+  await alert.getByText('the password is wrong').waitFor();
+  const session = async () => (await h.api(anna, 'status')).body.session;
+  check(await session() !== null, 'a session is open');
+  await restart(h.password);
+  await alert.getByText('The session of a patient is open').or(alert.getByText('the session of a patient is open')).waitFor();
+  equal((await h.api(anna, 'treatment/close', 'POST', { session_id: (await session()).id })).status, 200, 'closed');
+  await restart(h.password);
+  await engineer.getByRole('status').getByText('The appliance restarts').waitFor({ state: 'attached' });
+  h.tell('rolledback');
+  await engineer.getByText('went back to the system before').waitFor();
+  equal(await engineer.getByRole('button', { name: 'Restart now' }).count(), 0, 'nothing waits for a restart');
+  await h.look(engineer, 'update-rolled-back');
+  await bob.goto(`${h.url}#/status`);
+  await bob.getByText('went back to the system before').waitFor();
+  await engineer.getByRole('button', { name: 'I have seen it' }).click();
+  await engineer.getByText('went back to the system before').waitFor({ state: 'detached' });
+});
+
+await h.step('a scan is deleted with a reason and its number; one that a reference is made of is not', async () => {
+  const { scans } = (await h.api(bob, 'scans')).body;
+  const reference = scans.find((one) => one.purpose === 'reference' && one.outcome === 'done');
+  await bob.goto(`${h.url}#/result/${reference.id}`);
+  await bob.locator('.verdict').waitFor();
+  await bob.getByText('Delete this scan…').click();
+  await bob.getByText(/Reference version \d+ is made of this scan/).waitFor();
+  equal(await bob.getByRole('button', { name: 'Delete permanently' }).count(), 0, 'nothing to press');
+  equal((await h.api(bob, `scans/${reference.id}`, 'DELETE', { reason: 'a test' })).status, 409, 'nor through the interface');
+  const { id } = scans.find((one) => one.outcome === 'failed');
+  await anna.goto(`${h.url}#/result/${id}`);
+  await anna.locator('.verdict').waitFor();
+  equal(await anna.getByText('Delete this scan…').count(), 0, 'a technician deletes nothing');
+  await bob.goto(`${h.url}#/result/${id}`);
+  await bob.getByText('Delete this scan…').click();
+  await bob.getByText('The log keeps the number of the scan').waitFor();
+  await bob.locator('.remove-scan').scrollIntoViewIfNeeded();
+  await h.look(bob, 'result-delete');
+  await bob.locator('.remove-scan').getByLabel('Reason').fill('markers were covered');
+  await bob.getByLabel(`Type ${id} to confirm`).fill('something');
+  await bob.getByRole('button', { name: 'Delete permanently' }).click();
+  await bob.getByRole('alert').getByText(`Type the number ${id}`).waitFor();
+  equal((await h.api(bob, `scans/${id}`)).status, 200, 'it is still there');
+  await bob.getByLabel(`Type ${id} to confirm`).fill(id);
+  await bob.getByRole('button', { name: 'Delete permanently' }).click();
+  await bob.waitForURL(/#\/patient\//);
+  equal((await h.api(bob, `scans/${id}`)).status, 404, 'it is gone');
+  const { entries } = (await h.api(bob, 'audit')).body;
+  equal(entries.find((one) => one.action === 'scan.remove').subject, id, 'the log keeps its number');
+});
+
+await h.step('the last log-in and failed attempts are told', async () => {
+  const again = await h.person('again');
+  for (let i = 0; i < 2; ++i) {
+    await again.goto(h.url);
+    await again.getByLabel('Name').fill('clara');
+    await again.getByLabel('Password').fill('not her password');
+    await again.getByRole('button', { name: 'Log in' }).click();
+    await again.getByRole('alert').getByText('name or password is wrong').waitFor();
+  }
+  await h.logIn(again, 'clara');
+  await again.locator('.last-login', { hasText: /Last log-in: .*, from 127\.0\.0\.1\. 2 failed attempts since/ }).waitFor();
+  await h.look(again, 'last-login');
+  await again.context().close();
 });
 
 await h.step('a keyboard alone logs in, starts a sweep and ends it', async () => {

@@ -7,7 +7,9 @@
 
 #include "algo/base/errors.hpp"
 #include "web/api/json.hpp"
+#include "web/api/look_back.hpp"
 #include "web/http/checks.hpp"
+#include "web/http/gate.hpp"
 #include "web/security/password_rules.hpp"
 
 namespace plumb::web {
@@ -175,6 +177,8 @@ void Accounts::AddRoutes(Router& router) {
       {"POST", "/api/v1/logout", Permission::kLogin, BodyKind::kNone, bind(&Accounts::LogOut)});
   router.Add({"GET", "/api/v1/session", Permission::kLogin, BodyKind::kNone,
               bind(&Accounts::DescribeSession)});
+  router.Add({"GET", "/api/v1/session/last-login", Permission::kLogin, BodyKind::kNone,
+              bind(&Accounts::TellLastLogin)});
   router.Add({"POST", "/api/v1/session/password", Permission::kLogin, BodyKind::kJson,
               bind(&Accounts::ChangeOwnPassword)});
   router.Add({"POST", "/api/v1/scans/{id}/accept-outside", Permission::kAccept, BodyKind::kJson,
@@ -329,6 +333,26 @@ void Accounts::DescribeSession(const Request& request, const Respond& respond) {
                         {"password_change_required", request.session->must_change_password},
                         {"idle_logout_min", service_.GetSettings().idle_logout_min}});
   respond(std::move(response));
+}
+
+void Accounts::TellLastLogin(const Request& request, const Respond& respond) {
+  // The entry of this log-in itself may bear a stamp shortly before or after the session's begin.
+  constexpr std::chrono::seconds kOwnEntry{2};
+  const auto age =
+      std::chrono::duration_cast<WallClock::duration>(options_.now() - request.session->begun);
+  const WallClock::time_point begun = WallClock::now() - age - kOwnEntry;
+  RespondAside(
+      service_, "last login",
+      [this, user = request.session->user, begun] {
+        const LoginHistory history = LoginsBefore(service_, user, begun);
+        Response response;
+        response.body = Dump({{"last", history.last ? Json{{"time", TimeText(history.last->time)},
+                                                           {"address", history.last->address}}
+                                                    : Json(nullptr)},
+                              {"failed", history.failed}});
+        return response;
+      },
+      respond);
 }
 
 void Accounts::VerifyOwn(const Request& request, std::string password, const char* wrong,

@@ -65,6 +65,8 @@ class Accounts : public SessionLookup {
                  const Respond& respond, std::function<void(const User&)> then);
   void LogOut(const Request& request, const Respond& respond);
   void DescribeSession(const Request& request, const Respond& respond);
+  /// The log-in before this one, and what was tried since.
+  void TellLastLogin(const Request& request, const Respond& respond);
   void ChangeOwnPassword(const Request& request, const Respond& respond);
   /// Accepts a result that is not in tolerance: with a reason and the person's own password.
   void AcceptOutside(const Request& request, const Respond& respond);

@@ -9,6 +9,7 @@
 #include "algo/base/errors.hpp"
 #include "web/api/accounts.hpp"
 #include "web/api/json.hpp"
+#include "web/api/look_back.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/gate.hpp"
 
@@ -375,6 +376,11 @@ void AddCareRoutes(Table& table) {
               [](ScanService& service, const Request& request, const Respond& respond) {
                 service.RemoveBundle(request.actor(), request.arguments[0], Answer(respond));
               });
+  table.ReadAside("/api/v1/backup", Permission::kSettings,
+                  [](ScanService& service, const Request&) {
+                    const std::optional<AuditEntry> last = LastBackup(service);
+                    return JsonResponse({{"last", last ? ToJson(*last) : Json(nullptr)}});
+                  });
   table.Write("POST", "/api/v1/backup", Permission::kSettings, BodyKind::kNone,
               [](ScanService& service, const Request& request, const Respond& respond) {
                 service.MakeBackup(request.actor(), Answer(respond));

@@ -11,6 +11,7 @@ export class ApiError extends Error {
 
 const kAnswer_ms = 20000;
 const kLongAnswer_ms = 60000;  // files, and what removes or packs many
+const kVeryLongAnswer_ms = 3600000;  // a backup of a full disk
 const kLogOut_ms = 5000;
 const kSilent_s = 25;  // the appliance sends a beat every 10 s
 
@@ -102,6 +103,11 @@ export const post = (path, body) => ask('POST', api(path), body, { read: orNothi
 export const postForFile = (path) =>
   ask('POST', api(path), undefined, { timeout_ms: kLongAnswer_ms, read: readFile });
 export const put = (path, body) => ask('PUT', api(path), body);
+export const removeFor = (path, body) => ask('DELETE', api(path), body,
+  { timeout_ms: kLongAnswer_ms, read: orNothing });
+/// For what copies much: the answer comes when it is done.
+export const postLong = (path) => ask('POST', api(path), undefined,
+  { timeout_ms: kVeryLongAnswer_ms, read: orNothing });
 export const remove = (path) => ask('DELETE', api(path), undefined, { timeout_ms: kLongAnswer_ms });
 export const fileUrl = (scanId, name, download) =>
   `/api/v1/scans/${scanId}/files/${name}${download ? '?download' : ''}`;

@@ -2,7 +2,8 @@
 import {
   currentSession, get, live, loadSession, logOut, may, now, setLoggedOffHandler, since_s, touchedAt,
 } from './api.js';
-import { clear, h, say, warn } from './dom.js';
+import { clear, forgetWarning, h, say, warn } from './dom.js';
+import { lastLogin, lastLoginWords } from './last_login.js';
 import { mayLeave } from './leave.js';
 import { applyTheme } from './preferences.js';
 import { showAudit } from './screens/audit.js';
@@ -184,7 +185,11 @@ async function begin(message) {
   drawTop();
   if (!session || session.role === 'display') {
     document.title = `${S.login.title} · ${S.product}`;
-    showLogin(main, setupRequired, certificate, () => begin());
+    showLogin(main, setupRequired, certificate, async () => {
+      await begin();
+      const answer = currentSession() && await lastLogin();
+      if (answer) say(lastLoginWords(answer), true);
+    });
     if (message) warn(message);
     return;
   }
@@ -259,6 +264,7 @@ function listen() {
     if (kind === 'connection') warn(live.connected ? '' : S.offline);
     if (kind === 'connection' && live.connected && failed) show();
     if (kind === 'status' || kind === 'connection') drawChip();
+    if (kind === 'status' && live.status.sensor.present) forgetWarning(S.scan.lost);
     if (kind === 'status') followSession(watchesSession(), () => live.tell('acknowledged'));
     if (kind === 'result' && route().name === 'scan') followScan().catch(() => {});
   });

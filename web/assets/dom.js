@@ -63,10 +63,18 @@ export const done = (text) => say(text, true);
 
 export function warn(text) {
   const place = document.getElementById('alert');
+  if (text) say('');  // what worked before is not shown beside what did not
   const close = () => h('button', {
     class: 'quiet', onclick: () => warn(''), 'aria-label': S.close,
   }, '✕');
-  clear(place, text ? h('p', { class: 'alert' }, h('span', {}, text), close()) : '');
+  clear(place, text ? h('p', { class: 'alert' },
+    h('span', {}, text[0].toUpperCase() + text.slice(1)), close()) : '');
+}
+
+/// Takes that warning away, if it is the one that is shown: what it told of is over.
+export function forgetWarning(text) {
+  const shown = document.querySelector('#alert .alert span');
+  if (shown?.textContent === text) warn('');
 }
 
 /// A form that calls `submit` with its button off meanwhile.

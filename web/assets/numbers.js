@@ -24,6 +24,10 @@ export function digitsOf(u95, most) {
 }
 export const mostDigits = (axis) => (axis.shift ? 1 : 2);
 
+/// Whether a value is not known to differ from nothing: it has no direction and commands nothing.
+export const isStill = (value, u95, most = 1) =>
+  printsAsZero(value, digitsOf(u95, most)) || Math.abs(value) <= u95;
+
 /// One word of three: the value with its uncertainty is within tolerance ("in"), the value alone is
 /// ("unsure"), or it is not ("out").
 export function judge(value, u95, tolerance) {
@@ -97,9 +101,8 @@ function card(axis, { correction, u95, words }, tolerance, weak, commands) {
   const judged = judge(value, half, limit);
   const digits = digitsOf(half, mostDigits(axis));
   const halfDigits = Math.min(2, digits + (/^[0.]*1/.test(half.toFixed(3)) ? 1 : 0));
-  // What is not known to differ from nothing has no direction.
   const zero = printsAsZero(value, digits);
-  const still = zero || Math.abs(value) <= half;
+  const still = isStill(value, half, mostDigits(axis));
   const directed = commands && !still;
   const word = !commands ? text.noMove : zero ? text.still : still ? text.insignificant
     : translated(words?.[axis.name]) ?? S.none;
@@ -117,6 +120,17 @@ function card(axis, { correction, u95, words }, tolerance, weak, commands) {
       h('span', { class: 'limit' }, text.tolerance(number(limit, Number.isInteger(limit) ? 0 : 1),
         axis.unit))),
     weak && h('p', { class: 'caution' }, text.notSeen));
+}
+
+/// The six in one line, for lists: shifts, then rotations, each with the digits that are known.
+export function numbersLine({ correction, u95 }) {
+  const one = (axis) => {
+    const value = correction[axis.key];
+    return value === null || value === undefined ? S.none
+      : signed(value, digitsOf(u95?.[axis.key] ?? 0, mostDigits(axis)));
+  };
+  const part = (shift) => kAxes.filter((axis) => Boolean(axis.shift) === shift).map(one).join(', ');
+  return `${part(true)} · ${part(false)}`;
 }
 
 export const kDefaultTolerance = { shift_mm: 3, rotation_deg: 1 };

@@ -3,6 +3,7 @@ import { fileUrl, live, may, post } from '../api.js';
 import { action, clear, done, field, form, h } from '../dom.js';
 import { S } from '../strings.js';
 import { openPatient } from '../treatment.js';
+import { removeScan } from './remove_scan.js';
 import { whyNotValid } from './verdict.js';
 
 function rescanButton({ scan, patient }) {
@@ -103,6 +104,6 @@ export function actions(data, reload) {
         class: 'button', href: `/api/v1/scans/${scan.id}/report.pdf`, download: '',
       }, text.report),
       scan.result && h('a', { class: 'button', href: `/result?scan=${scan.id}` }, text.print)),
-    newReference, files(scan));
+    newReference, files(scan), removeScan(data));
   return { element, tick: accept.tick };
 }

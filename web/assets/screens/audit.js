@@ -1,29 +1,58 @@
+// The audit log: what was done, by whom, from where; filtered and taken away as CSV.
 import { get } from '../api.js';
-import { action, clear, h, table } from '../dom.js';
+import { action, clear, field, h, redraw, table } from '../dom.js';
 import { S } from '../strings.js';
 
 const kPage = 100;
 
+/// A field of a CSV file: one that a spreadsheet would take as a formula is text.
+export function csvField(value) {
+  const text = String(value ?? '');
+  const safe = /^[=+\-@\t\r]/.test(text) ? `'${text}` : text;
+  return `"${safe.replaceAll('"', '""')}"`;
+}
+
+const csvOf = (heads, rows) => [heads, ...rows]
+  .map((row) => `${row.map(csvField).join(',')}\r\n`).join('');
+
 export async function showAudit(place) {
   const text = S.audit;
-  const rows = [];
+  const rows = [];  // of words
   const list = h('div', {});
+  const count = h('p', { class: 'hint', role: 'status' });
+  const filter = h('input', { type: 'search', autocomplete: 'off' });
+  const heads = [`${text.time} (UTC)`, text.user, text.action, text.subject, text.detail,
+    text.address];
   let oldest = 0;
+  const matching = () => {
+    const wanted = filter.value.trim().toLowerCase();
+    return rows.filter((row) => row.join(' ').toLowerCase().includes(wanted));
+  };
+  const draw = () => {
+    const found = matching();
+    count.textContent = text.shown(found.length, rows.length);
+    redraw(list, found.length ? table(heads, found.map((row) => h('tr', {}, row.map((cell) =>
+      h('td', {}, cell || S.none)))), text.title) : h('p', { class: 'hint' }, text.empty));
+  };
   const load = async () => {
     const { entries } = await get(`audit?before=${oldest}&limit=${kPage}`);
     for (const entry of entries) {
-      const cell = (value) => h('td', {}, value || S.none);
-      rows.push(h('tr', {}, cell(entry.time.replace('T', ' ').replace('Z', '')), cell(entry.user),
-        cell(entry.action), cell(entry.subject), cell(entry.detail), cell(entry.address)));
+      rows.push([entry.time.replace('T', ' ').replace('Z', ''), entry.user,
+        text.actions[entry.action] ?? entry.action, entry.subject, entry.detail, entry.address]);
       oldest = entry.number;
     }
-    const heads = [`${text.time} (UTC)`, text.user, text.action, text.subject, text.detail,
-      text.address];
-    clear(list, rows.length ? table(heads, rows, text.title)
-      : h('p', { class: 'hint' }, text.empty));
+    draw();
     more.hidden = entries.length < kPage;
   };
   const more = action(text.more, load, {});
-  clear(place, h('h1', {}, text.title), h('section', { class: 'card' }, list, more));
+  const take = action(text.csv, async () => {
+    const url = URL.createObjectURL(new Blob([csvOf(heads, matching())], { type: 'text/csv' }));
+    h('a', { href: url, download: 'plumb-log.csv' }).click();
+    setTimeout(() => URL.revokeObjectURL(url), 10000);
+  }, {});
+  filter.addEventListener('input', draw);
+  clear(place, h('h1', {}, text.title), h('section', { class: 'card' },
+    field(text.filter, filter, text.filterHint), count, list,
+    h('div', { class: 'row' }, more, take)));
   await load();
 }

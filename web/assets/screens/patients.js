@@ -1,11 +1,12 @@
 // Patients, their references and scans, and the treatment session that people open here.
 import { get, live, may, post, remove } from '../api.js';
 import {
-  action, clear, done, enable, field, form, h, localTime, redraw, table, warn,
+  action, clear, enable, field, form, h, localTime, redraw, table, warn,
 } from '../dom.js';
+import { numbersLine } from '../numbers.js';
 import { S } from '../strings.js';
 import { closeSession, openPatient } from '../treatment.js';
-import { outcomeBadge } from './common.js';
+import { isAdvice, outcomeBadge } from './common.js';
 
 function referenceState(patient) {
   const text = S.patients;
@@ -132,9 +133,11 @@ function scanTable(scans) {
     h('td', {}, h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at))),
     h('td', {}, scan.fraction ?? S.none),
     h('td', {}, S.purposes[scan.purpose]), h('td', {}, outcomeBadge(scan)),
+    h('td', { class: 'digits' }, isAdvice(scan) ? numbersLine(scan.result) : S.none),
     h('td', {}, accepted(scan))));
-  return table([text.when, text.fraction, text.purpose, text.outcome, text.accepted], rows,
-    text.history);
+  const heads = [text.when, text.fraction, text.purpose, text.outcome, text.numbers,
+    text.accepted];
+  return table(heads, rows, text.history);
 }
 
 function wipe(patient) {

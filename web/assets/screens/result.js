@@ -1,5 +1,5 @@
 // One result, from its verdict down to the pictures.
-import { fileUrl, get, getBytes, live, now } from '../api.js';
+import { fileUrl, get, live, now } from '../api.js';
 import { clear, h, keepFocus, warn } from '../dom.js';
 import { errorMap } from '../error_map.js';
 import { loadMap, paintHeights } from '../maps.js';
@@ -8,6 +8,7 @@ import { S, translated } from '../strings.js';
 import { trend } from '../trend.js';
 import { actions } from './accept.js';
 import { isAdvice } from './common.js';
+import { couchReadings } from './couch.js';
 import { meshView } from './mesh_view.js';
 import { identity, validityNote, verdictStrip } from './verdict.js';
 
@@ -149,7 +150,7 @@ function build(data, reload, id) {
     h('div', { class: 'fresh' }, verdictStrip(data),
       isAdvice(scan) && h('section', { class: 'correction' },
         h('h2', {}, numbersTitle(scan), ' ', h('small', {}, text.atIsocentre)),
-        sixNumbers(scan.result, reference, data.details))),
+        sixNumbers(scan.result, reference, data.details), couchReadings(scan))),
     h('section', { class: 'card actions' }, parts.actions.element),
     data.details && card(text.trust, trust(data)),
     mapped && card(text.where, bodyWords(data), parts.map),

@@ -104,7 +104,7 @@ export async function showScan(place) {
   const facts = h('dl', { class: 'facts' });
   const control = buttons();
   const drawSession = sessionLine(who, { mayClose: may('scan') });
-  let shown = {};
+  const shown = {};
 
   clear(place, h('h1', { class: 'visually-hidden' }, text.title),
     h('div', { class: 'scan-grid' },

@@ -1,5 +1,5 @@
-import { get, may, put } from '../api.js';
-import { checkbox, clear, done, field, form, h, select } from '../dom.js';
+import { get, live, may, postLong, put } from '../api.js';
+import { action, checkbox, clear, done, field, form, h, localTime, select } from '../dom.js';
 import { S } from '../strings.js';
 
 const kNumbers = {
@@ -12,13 +12,42 @@ const kNumbers = {
 };
 const kFlags = ['couch_markers', 'keep_recordings'];
 
+/// When the last backup was made and how it went, and one more now.
+function backupCard() {
+  const text = S.settings;
+  const last = h('p', { class: 'last-backup' });
+  const running = h('p', { class: 'hint', role: 'status' });
+  const draw = async () => {
+    const { last: entry } = await get('backup', true);
+    const warnings = live.status?.storage.warnings ?? [];
+    clear(last, entry ? text.backupLast(localTime(entry.time), entry.user || S.product)
+      : text.backupNone, entry && [' ', h('code', {}, entry.detail)],
+    warnings.map((one) => h('span', { class: 'caution' }, ' ', one)));
+  };
+  const now = action(text.backupNow, async () => {
+    running.textContent = text.backupRunning;
+    try {
+      await postLong('backup');
+      done(text.backupDone);
+    } finally {
+      running.textContent = '';
+      await draw().catch(() => {});
+    }
+  }, {});
+  draw().catch((error) => clear(last, error.message));
+  return h('section', { class: 'card' }, h('h2', {}, text.backup),
+    h('p', { class: 'hint' }, text.backupHint), last, now, running);
+}
+
 export async function showSettings(place) {
   const text = S.settings;
   const settings = await get('settings');
   const editable = may('settings');
   const inputs = {};
   const numbers = Object.entries(kNumbers).map(([name, [min, max, step]]) => {
-    inputs[name] = h('input', { type: 'number', min, max, step, value: settings[name], required: true, disabled: !editable });
+    inputs[name] = h('input', {
+      type: 'number', min, max, step, value: settings[name], required: true, disabled: !editable,
+    });
     return field(text[name], inputs[name]);
   });
   const flags = kFlags.map((name) => {
@@ -26,11 +55,16 @@ export async function showSettings(place) {
     return inputs[name].element;
   });
   const posture = select(S.plan.postures, settings.posture, { disabled: !editable });
-  clear(place, h('h1', {}, text.title), !editable && h('p', { class: 'lead' }, text.readOnly), h('section', { class: 'card' }, form({ class: 'form columns' }, async () => {
+  const save = async () => {
     const changed = { posture: posture.value };
     for (const name of Object.keys(kNumbers)) changed[name] = Number(inputs[name].value);
     for (const name of kFlags) changed[name] = inputs[name].box.checked;
     await put('settings', changed);
     done(S.saved);
-  }, numbers, field(text.posture, posture), flags, editable && h('div', { class: 'row' }, h('button', { class: 'primary' }, S.save)))));
+  };
+  clear(place, h('h1', {}, text.title), !editable && h('p', { class: 'lead' }, text.readOnly),
+    h('section', { class: 'card' }, form({ class: 'form columns' }, save, numbers,
+      field(text.posture, posture), flags,
+      editable && h('div', { class: 'row' }, h('button', { class: 'primary' }, S.save)))),
+    editable && backupCard());
 }

@@ -1,7 +1,8 @@
 // What the appliance does, what waits, and what lets people scan.
 import { get, live, may } from '../api.js';
 import { clear, h, localTime, redraw, table } from '../dom.js';
-import { S } from '../strings.js';
+import { lastLogin, lastLoginWords } from '../last_login.js';
+import { S, translated } from '../strings.js';
 import { sessionName } from '../treatment.js';
 import { faultWords, kWarmUp_s, outcomeBadge, patientCodes } from './common.js';
 
@@ -64,18 +65,25 @@ export async function showStatus(place) {
   const warnings = h('div', {});
   const grid = h('div', { class: 'tiles' });
   const list = h('div', {});
+  const login = h('p', { class: 'hint last-login' });
+  lastLogin().then((answer) => {
+    if (!answer) return;
+    login.textContent = lastLoginWords(answer);
+    login.classList.toggle('caution', answer.failed > 0);
+  });
   let codes = await patientCodes();
   clear(place,
     h('h1', { class: 'visually-hidden' }, text.title),
     h('section', { class: 'card hero' }, h('div', {}, headline, hint),
       may('scan') && h('a', { class: 'button primary', href: '#/scan' }, text.goScan)),
     warnings, grid,
-    h('section', { class: 'card' }, h('h2', {}, text.lastScans), list));
+    h('section', { class: 'card' }, h('h2', {}, text.lastScans), list), login);
 
   const draw = () => {
     const { status } = live;
     if (!status) return;
-    clear(warnings, (status.warnings ?? []).map((one) => h('p', { class: 'caution' }, one)));
+    clear(warnings, [status.rolled_back, ...(status.warnings ?? [])].filter(Boolean)
+      .map((one) => h('p', { class: 'caution' }, translated(one))));
     headline.textContent = S.states[status.state];
     headline.dataset.state = status.state;
     hint.textContent = faultWords(status) ?? S.stateHints[status.state];

@@ -1,6 +1,7 @@
+// Which system runs, updates of it, the restart into them, and the diagnostics.
 import { currentSession, get, live, may, post, postForFile, remove } from '../api.js';
 import { action, clear, done, field, form, h } from '../dom.js';
-import { S } from '../strings.js';
+import { S, translated } from '../strings.js';
 
 /// Sends a bundle with a bar; fetch tells nothing of what has left.
 function upload() {
@@ -13,44 +14,99 @@ function upload() {
     request.setRequestHeader('X-CSRF-Token', currentSession().csrf_token);
     request.setRequestHeader('Content-Type', 'application/octet-stream');
     request.upload.onprogress = (event) => { bar.value = event.loaded / event.total; };
-    request.onload = () => (request.status < 300 ? resolve() : reject(new Error(JSON.parse(request.responseText || '{}').error ?? text.uploadFailed)));
+    request.onload = () => {
+      if (request.status < 300) resolve();
+      else reject(new Error(JSON.parse(request.responseText || '{}').error ?? text.uploadFailed));
+    };
     request.onerror = () => reject(new Error(text.uploadFailed));
     request.send(file);
   });
-  return h('section', { class: 'card', hidden: true }, h('h2', {}, text.upload), h('p', { class: 'hint' }, text.uploadHint), form({ class: 'form inline' }, async () => {
-    bar.hidden = false;
-    try {
-      await send(input.files[0]);
-      input.value = '';
-      done(text.uploaded);
-    } finally {
-      bar.hidden = true;
-    }
-  }, field(text.bundle, input), h('button', {}, text.send)), bar);
+  return h('section', { class: 'card', hidden: true }, h('h2', {}, text.upload),
+    h('p', { class: 'hint' }, text.uploadHint),
+    form({ class: 'form inline' }, async () => {
+      bar.hidden = false;
+      try {
+        await send(input.files[0]);
+        input.value = '';
+        done(text.uploaded);
+      } finally {
+        bar.hidden = true;
+      }
+    }, field(text.bundle, input), h('button', {}, text.send)), bar);
+}
+
+/// Only for who may, and with the password again: the machine goes down.
+function restart() {
+  const text = S.update;
+  const password = h('input', {
+    type: 'password', required: true, maxlength: 128, autocomplete: 'current-password',
+  });
+  return h('section', { class: 'card restart', hidden: true }, h('h2', {}, text.restart),
+    h('p', { class: 'lead' }, text.restartNeeded), h('p', { class: 'hint' }, text.restartHint),
+    form({ class: 'form inline' }, async () => {
+      const body = { password: password.value };
+      password.value = '';
+      await post('update/restart', body);
+      done(text.restarting);
+    }, field(S.result.acceptPassword, password),
+    h('button', { class: 'danger' }, text.restartSubmit)));
+}
+
+function diagnostics() {
+  const text = S.update;
+  return h('section', { class: 'card' }, h('h2', {}, text.diagnostics),
+    h('p', {}, text.diagnosticsText), action(text.download, async () => {
+      const { blob, name } = await postForFile('diagnostics');
+      const url = URL.createObjectURL(blob);
+      h('a', { href: url, download: name }).click();
+      setTimeout(() => URL.revokeObjectURL(url), 10000);
+    }, {}));
+}
+
+function bundles(update) {
+  const text = S.update;
+  const rows = update.bundles.map((name) => h('li', { class: 'row' },
+    h('span', { class: 'bundle' }, name), may('update') && [
+      action(text.install, () => post('update', { bundle: name }), {
+        class: 'primary', 'aria-label': `${text.install} ${name}`, disabled: update.installing,
+      }),
+      action(text.remove, () => remove(`update/bundles/${name}`), {
+        'aria-label': `${text.remove} ${name}`, disabled: update.installing,
+      })]));
+  return [h('h2', {}, text.bundles),
+    rows.length ? h('ul', { class: 'files' }, rows) : h('p', { class: 'hint' }, text.noBundles)];
 }
 
 export async function showUpdate(place) {
   const text = S.update;
   const body = h('div', {});
   const sender = upload();
+  const starter = restart();
   const draw = async () => {
     const update = await get('update', true);
-    const choices = update.bundles.map((name) => h('li', { class: 'row' }, h('span', { class: 'bundle' }, name), may('update') && [
-      action(text.install, () => post('update', { bundle: name }), { class: 'primary', 'aria-label': `${text.install} ${name}`, disabled: update.installing }),
-      action(text.remove, () => remove(`update/bundles/${name}`), { 'aria-label': `${text.remove} ${name}`, disabled: update.installing })]));
-    clear(body, h('dl', { class: 'facts' }, h('dt', {}, text.installed), h('dd', {}, live.status?.version ?? S.none), update.slot && [h('dt', {}, text.slot), h('dd', {}, update.slot)]),
-      update.installing && [h('p', { class: 'lead' }, text.installing, ' ', update.message), h('progress', { max: 1, value: update.fraction, 'aria-label': text.installing })],
-      update.supported ? [h('h2', {}, text.bundles), choices.length ? h('ul', { class: 'files' }, choices) : h('p', { class: 'hint' }, text.noBundles)] : h('p', { class: 'caution' }, `${text.unsupported}: ${update.message}`),
-      update.supported && !update.installing && update.message && h('p', { class: 'lead' }, update.message));
-    sender.hidden = !update.supported || !may('update');
+    const { supported, installing, message, failure } = update;
+    clear(body,
+      update.rolled_back && h('div', { class: 'rolled-back' },
+        h('p', { class: 'caution' }, translated(update.rolled_back)),
+        may('update') && action(text.seen, () => post('update/seen'), {})),
+      h('dl', { class: 'facts' },
+        h('dt', {}, text.installed), h('dd', {}, live.status?.version ?? S.none),
+        update.slot && [h('dt', {}, text.slot), h('dd', {}, text.runs(update.slot))]),
+      installing && [h('p', { class: 'lead' }, text.installing, ' ', message), h('progress', {
+        max: 1, value: update.fraction, 'aria-label': text.installing,
+      })],
+      failure && !installing && h('p', { class: 'caution' }, translated(failure)),
+      supported ? bundles(update)
+        : h('p', { class: 'caution' }, `${text.unsupported}: ${message}`),
+      supported && !installing && message && message !== failure
+        && h('p', { class: 'lead' }, message));
+    sender.hidden = !supported || !may('update');
+    starter.hidden = !update.restart_needed || installing || !may('update');
   };
-  clear(place, h('h1', {}, text.title), h('section', { class: 'card' }, body), sender,
-    may('diagnostics') && h('section', { class: 'card' }, h('h2', {}, text.diagnostics), h('p', {}, text.diagnosticsText), action(text.download, async () => {
-      const { blob, name } = await postForFile('diagnostics');
-      const url = URL.createObjectURL(blob);
-      h('a', { href: url, download: name }).click();
-      setTimeout(() => URL.revokeObjectURL(url), 10000);
-    }, {})));
+  clear(place, h('h1', {}, text.title), h('section', { class: 'card' }, body), starter, sender,
+    may('diagnostics') && diagnostics());
   await draw();
-  return live.listen((kind) => { if (kind === 'update') draw().catch(() => {}); });
+  return live.listen((kind) => {
+    if (kind === 'update' || kind === 'connection') draw().catch(() => {});
+  });
 }

@@ -1,0 +1,22 @@
+// What the log knows of earlier times: the last log-in of a person, the last backup.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "web/service/scan_service.hpp"
+
+namespace plumb::web {
+
+struct LoginHistory {
+  std::optional<AuditEntry> last;  ///< The log-in before this one.
+  int failed = 0;                  ///< Wrong passwords for this name since then.
+};
+
+/// To be called within Later(): both read at most the newest 5000 entries of the log.
+/// @param before  When the present session began.
+[[nodiscard]] LoginHistory LoginsBefore(ScanService& service, const std::string& user,
+                                        WallClock::time_point before);
+[[nodiscard]] std::optional<AuditEntry> LastBackup(ScanService& service);
+
+}  // namespace plumb::web

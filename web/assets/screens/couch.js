@@ -1,0 +1,51 @@
+// From what the couch reads now to what it is set to: sums that nobody should do in their head.
+import { live } from '../api.js';
+import { clear, field, h } from '../dom.js';
+import { isStill, kAxes } from '../numbers.js';
+import { S } from '../strings.js';
+
+const kMax_cm = 300;
+
+/// A reading as people type it: nothing where it is no number that a couch could show.
+export function readingOf(text) {
+  const words = text.trim().replace(',', '.').replace('−', '-');
+  if (!/^[+-]?\d{1,3}(\.\d{1,2})?$/.test(words)) return null;
+  const value = Number(words);
+  return Math.abs(value) <= kMax_cm ? value : null;
+}
+
+/// What the axis is set to, in centimetres with one digit as couches show it; a shift that is not
+/// known to differ from nothing leaves it where it is.
+export function targetOf(reading_cm, correction_mm, u95_mm) {
+  const shift_cm = isStill(correction_mm, u95_mm) ? 0 : correction_mm / 10;
+  return Math.round(10 * (reading_cm + shift_cm)) / 10;
+}
+
+/// Only for a result that commands moves, and where the room's axes are known.
+export function couchReadings({ result }) {
+  const text = S.result;
+  if (result?.verdict !== 'move' || !live.status?.room?.known) return null;
+  const axes = kAxes.filter((axis) => axis.shift && Number.isFinite(result.correction[axis.key]));
+  if (!axes.length) return null;
+  const rows = axes.map((axis) => {
+    const input = h('input', {
+      inputmode: 'decimal', autocomplete: 'off', maxlength: 8, size: 8,
+    });
+    const target = h('output', { class: 'couch-target', 'aria-live': 'polite' });
+    input.addEventListener('input', () => {
+      const reading = readingOf(input.value);
+      const bad = input.value.trim() !== '' && reading === null;
+      input.setAttribute('aria-invalid', String(bad));
+      if (bad) clear(target, text.couchBad);
+      else if (reading === null) clear(target);
+      else {
+        const value = targetOf(reading, result.correction[axis.key], result.u95?.[axis.key] ?? 0);
+        clear(target, text.couchSet(text.axes[axis.name],
+          `${value < 0 ? '−' : ''}${Math.abs(value).toFixed(1).replace('.', S.decimal)}`));
+      }
+    });
+    return h('div', { class: 'couch-axis' }, field(`${text.axes[axis.name]} (cm)`, input), target);
+  });
+  return h('details', { class: 'couch' }, h('summary', {}, text.couch),
+    h('p', { class: 'hint' }, text.couchHint), h('div', { class: 'couch-axes' }, rows));
+}
