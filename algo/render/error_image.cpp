@@ -105,7 +105,8 @@ cv::Mat DrawErrorImage(const HeightMap& difference, const ErrorImageOptions& opt
                                             bad_relief ? "relief" : "region"));
   const ColorScale scale =
       options.paper_colors ? ColorScale::Paper() : ColorScale::Signed(options.tolerance_m);
-  const cv::Rect cells = CellsWithData(difference.grid, {difference.z});
+  const cv::Rect cells = CellsAroundRegion(
+      difference.grid, CellsWithData(difference.grid, {difference.z}), options.region_mask);
   std::vector<std::uint8_t> outline;
   if (!options.region_mask.empty()) {
     for (int row = cells.y; row < cells.y + cells.height; ++row) {

@@ -25,8 +25,8 @@ struct ErrorImageOptions {
 };
 
 /// Draws a map of differences (metres) with y up, holes grey, axes, scale bar, legend with units,
-/// and the research notice. The picture shows the part of the grid that holds data. CV_8UC3,
-/// channels red, green, blue.
+/// and the research notice. The picture shows the part of the grid that holds data, of that the
+/// region and 10 cm around it. CV_8UC3, channels red, green, blue.
 /// @throws std::invalid_argument if the grid is empty, or relief or region have another grid.
 [[nodiscard]] cv::Mat DrawErrorImage(const HeightMap& difference,
                                      const ErrorImageOptions& options = {});

@@ -147,6 +147,20 @@ cv::Rect CellsWithData(const GridShape& grid, std::initializer_list<std::span<co
          whole;
 }
 
+cv::Rect CellsAroundRegion(const GridShape& grid, const cv::Rect& with_data,
+                           std::span<const std::uint8_t> region) {
+  constexpr double kMargin_m = 0.1;
+  if (region.empty()) return with_data;
+  const cv::Mat mask(grid.height, grid.width, CV_8UC1, const_cast<std::uint8_t*>(region.data()));
+  const cv::Rect box = cv::boundingRect(mask);
+  if (box.empty()) return with_data;
+  const int margin = static_cast<int>(std::lround(kMargin_m / grid.step));
+  const cv::Rect around(box.x - margin, box.y - margin, box.width + 2 * margin,
+                        box.height + 2 * margin);
+  const cv::Rect shown = around & with_data;
+  return shown.empty() ? with_data : shown;
+}
+
 GridShape Part(const GridShape& grid, const cv::Rect& cells) {
   return {.x_min = grid.x_min + cells.x * grid.step,
           .y_min = grid.y_min + cells.y * grid.step,

@@ -32,6 +32,11 @@ struct MapPage {
 [[nodiscard]] cv::Rect CellsWithData(const GridShape& grid,
                                      std::initializer_list<std::span<const float>> maps);
 
+/// Of those, the region and 10 cm around it, where there is a region: the body fills the picture.
+/// @param region  Cells inside (1) or not (0), as the grid; may be empty.
+[[nodiscard]] cv::Rect CellsAroundRegion(const GridShape& grid, const cv::Rect& with_data,
+                                         std::span<const std::uint8_t> region);
+
 /// That part of a grid.
 [[nodiscard]] GridShape Part(const GridShape& grid, const cv::Rect& cells);
 

@@ -53,7 +53,10 @@ cv::Mat DrawOverlayImage(const HeightMap& reference, const HeightMap& current,
   if (!(options.tolerance_m > 0))
     throw std::invalid_argument(
         fmt::format("an overlay needs a tolerance above 0 m, found {}", options.tolerance_m));
-  const cv::Rect cells = CellsWithData(reference.grid, {reference.z, current.z});
+  if (!options.region_mask.empty() && options.region_mask.size() != reference.grid.num_cells())
+    throw std::invalid_argument("the region of an overlay lies on another grid");
+  const cv::Rect cells = CellsAroundRegion(
+      reference.grid, CellsWithData(reference.grid, {reference.z, current.z}), options.region_mask);
   const cv::Mat reference_relief = Relief(reference, cells),
                 current_relief = Relief(current, cells);
   cv::Mat picture(cells.height, cells.width, CV_8UC3);

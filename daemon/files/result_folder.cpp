@@ -186,6 +186,7 @@ ResultPictures DrawResult(const Comparison& comparison, const HeightMap* referen
     OverlayImageOptions overlay;
     overlay.tolerance_m = options.tolerance_m;
     overlay.subtitle = options.subtitle;
+    overlay.region_mask = comparison.region_mask;
     pictures.overlay = DrawOverlayImage(*reference_height, *comparison.current_height, overlay);
   }
   return pictures;

@@ -35,6 +35,7 @@ const rules = {
   'no-use-before-define': ['error', { functions: false, variables: false }],
   'no-useless-return': 'error',
   'no-var': 'error',
+  'max-len': ['error', { code: 100 }],
   'object-shorthand': 'error',
   'prefer-const': 'error',
   'prefer-promise-reject-errors': 'error',
@@ -56,8 +57,11 @@ const eslint = new ESLint({
   overrideConfig: [
     { linterOptions: { reportUnusedDisableDirectives: 'error', noInlineConfig: true }, rules },
     { files: ['web/assets/**/*.js'], languageOptions: language(['browser']) },
-    // Tests hold functions that run in the browser.
-    { files: ['**/*.mjs'], languageOptions: language(['node', 'browser']) },
+    // Tests hold functions that run in the browser; a step is a list of long lines.
+    {
+      files: ['**/*.mjs'], languageOptions: language(['node', 'browser']),
+      rules: { 'max-len': 'off' },
+    },
   ],
 });
 const results = await eslint.lintFiles(

@@ -188,7 +188,8 @@ async function begin(message) {
     showLogin(main, setupRequired, certificate, async () => {
       await begin();
       const answer = currentSession() && await lastLogin();
-      if (answer) say(lastLoginWords(answer), true);
+      if (answer?.failed > 0) warn(lastLoginWords(answer));
+      else if (answer) say(lastLoginWords(answer), true);
     });
     if (message) warn(message);
     return;

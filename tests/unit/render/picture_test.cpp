@@ -90,6 +90,25 @@ TEST(ErrorImageTest, ShowsThePartThatHoldsData) {
   EXPECT_GT(Share(DrawErrorImage(difference), ColorScale::Signed(0.003)(0.02)), 0.25);
 }
 
+TEST(ErrorImageTest, ShowsTheRegionAndTenCentimetresAroundIt) {
+  // 2 m x 2 m, of which a square of 20 cm is the region: with its surroundings 40 cm are shown.
+  HeightMap difference({.x_min = 0, .y_min = 0, .step = 0.01, .width = 200, .height = 200});
+  std::fill(difference.z.begin(), difference.z.end(), 0.0F);
+  std::vector<std::uint8_t> region(difference.grid.num_cells(), 0);
+  for (std::size_t row = 90; row < 110; ++row) {
+    for (std::size_t column = 30; column < 50; ++column) {
+      region[row * 200 + column] = 1;
+      difference.z[row * 200 + column] = 0.02F;
+    }
+  }
+  const Color high = ColorScale::Signed(0.003)(0.02);
+  // A quarter of a map that takes half of the page; without the region it is a hundredth.
+  EXPECT_GT(Share(DrawErrorImage(difference, {.region_mask = region}), high), 0.08);
+  EXPECT_LT(Share(DrawErrorImage(difference), high), 0.02);
+  const std::vector<std::uint8_t> nowhere(region.size(), 0);
+  EXPECT_LT(Share(DrawErrorImage(difference, {.region_mask = nowhere}), high), 0.02);
+}
+
 TEST(ErrorImageTest, DrawsAnEmptyMapAndATinyOne) {
   EXPECT_FALSE(DrawErrorImage(
                    HeightMap({.x_min = 0, .y_min = 0, .step = 0.0015, .width = 400, .height = 300}))
@@ -139,6 +158,25 @@ TEST(OverlayImageTest, ASurfaceThatOnlyOneScanSawKeepsItsColour) {
   SetRows(reference, 0, 120, std::numeric_limits<float>::quiet_NaN());
   EXPECT_GT(Share(DrawOverlayImage(reference, current), {226, 62, 46}), 0.3);
   EXPECT_GT(Share(DrawOverlayImage(current, reference), {40, 104, 214}), 0.3);
+}
+
+TEST(OverlayImageTest, ShowsTheRegionAndTenCentimetresAroundIt) {
+  HeightMap reference({.x_min = 0, .y_min = 0, .step = 0.01, .width = 200, .height = 200});
+  std::fill(reference.z.begin(), reference.z.end(), 0.0F);
+  HeightMap current = reference;
+  std::vector<std::uint8_t> region(reference.grid.num_cells(), 0);
+  for (std::size_t row = 90; row < 110; ++row) {
+    for (std::size_t column = 30; column < 50; ++column) {
+      region[row * 200 + column] = 1;
+      current.z[row * 200 + column] = 0.02F;
+    }
+  }
+  const Color red = {226, 62, 46};
+  EXPECT_GT(Share(DrawOverlayImage(reference, current, {.region_mask = region}), red, 60), 0.05);
+  EXPECT_LT(Share(DrawOverlayImage(reference, current), red, 60), 0.02);
+  const std::vector<std::uint8_t> other(7, 1);
+  EXPECT_THROW((void)DrawOverlayImage(reference, current, {.region_mask = other}),
+               std::invalid_argument);
 }
 
 TEST(OverlayImageTest, RefusesTwoGrids) {

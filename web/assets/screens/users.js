@@ -38,8 +38,8 @@ function displays() {
       : h('p', { class: 'hint' }, text.none));
   };
   load().catch((error) => warn(error.message));
-  return h('section', { class: 'card' }, h('h2', {}, text.title), h('p', { class: 'hint' }, text.hint),
-    list, form({ class: 'form inline' }, async () => {
+  return h('section', { class: 'card' }, h('h2', {}, text.title),
+    h('p', { class: 'hint' }, text.hint), list, form({ class: 'form inline' }, async () => {
       await post('displays', { code: code.value.trim(), name: name.value.trim() });
       code.value = name.value = '';
       done(text.paired);
@@ -51,11 +51,14 @@ function ownPassword() {
   const text = S.users;
   const old = password({ required: true, autocomplete: 'current-password' });
   const fresh = password({ required: true, minlength: 10 });
-  return h('section', { class: 'card' }, h('h2', {}, text.own), form({ class: 'form inline' }, async () => {
+  const change = async () => {
     await post('session/password', { old_password: old.value, password: fresh.value });
     old.value = fresh.value = '';
     done(S.saved);
-  }, field(text.oldPassword, old), field(text.password, fresh, S.login.passwordHint), h('button', {}, text.changeOwn)));
+  };
+  return h('section', { class: 'card' }, h('h2', {}, text.own),
+    form({ class: 'form inline' }, change, field(text.oldPassword, old),
+      field(text.password, fresh, S.login.passwordHint), h('button', {}, text.changeOwn)));
 }
 
 function userRow(user, reload) {
@@ -63,38 +66,52 @@ function userRow(user, reload) {
   const role = select(accountRoles(), user.role, { 'aria-label': `${text.role}, ${user.name}` });
   const disabled = checkbox(text.disable, user.disabled, {});
   const fresh = password({ minlength: 10 });
-  return h('tr', {}, h('td', {}, user.name), h('td', {}, S.roles[user.role]), h('td', {}, user.disabled ? text.disabled : `✓ ${text.active}`), h('td', {}, localTime(user.created_at)),
-    h('td', {}, h('details', {}, h('summary', { 'aria-label': `${text.change} ${user.name}` }, text.change), form({ class: 'form' }, async () => {
-      // Only what this person changed: the rest may have been changed by somebody else since it was read.
-      const changes = {};
-      if (role.value !== user.role) changes.role = role.value;
-      if (disabled.box.checked !== user.disabled) changes.disabled = disabled.box.checked;
-      if (fresh.value) changes.password = fresh.value;
-      if (!Object.keys(changes).length) throw new Error(text.unchanged);
-      await put(`users/${user.name}`, changes);
-      done(S.saved);
-      if (user.name !== currentSession()?.user) await reload();
-    }, field(text.role, role), disabled.element, field(text.newPassword, fresh), h('button', { class: 'primary' }, S.save)))));
+  const change = async () => {
+    // Only what this person changed: somebody else may have changed the rest since it was read.
+    const changes = {};
+    if (role.value !== user.role) changes.role = role.value;
+    if (disabled.box.checked !== user.disabled) changes.disabled = disabled.box.checked;
+    if (fresh.value) changes.password = fresh.value;
+    if (!Object.keys(changes).length) throw new Error(text.unchanged);
+    await put(`users/${user.name}`, changes);
+    done(S.saved);
+    if (user.name !== currentSession()?.user) await reload();
+  };
+  const editor = h('details', {},
+    h('summary', { 'aria-label': `${text.change} ${user.name}` }, text.change),
+    form({ class: 'form' }, change, field(text.role, role), disabled.element,
+      field(text.newPassword, fresh), h('button', { class: 'primary' }, S.save)));
+  return h('tr', {}, h('td', {}, user.name), h('td', {}, S.roles[user.role]),
+    h('td', {}, user.disabled ? text.disabled : `✓ ${text.active}`),
+    h('td', {}, localTime(user.created_at)), h('td', {}, editor));
 }
 
 export async function showUsers(place) {
   const text = S.users;
   const list = h('div', {});
-  const name = h('input', { required: true, maxlength: 32, autocomplete: 'off', spellcheck: 'false', autocapitalize: 'none' });
+  const name = h('input', {
+    required: true, maxlength: 32, autocomplete: 'off', spellcheck: 'false',
+    autocapitalize: 'none',
+  });
   const role = select(accountRoles(), 'technician', {});
   const fresh = password({ required: true, minlength: 10 });
   const load = async () => {
     const { users } = await get('users');
-    clear(list, table([text.name, text.role, text.state, S.patients.added, S.action], users.map((user) => userRow(user, () => load())), text.title));
+    const heads = [text.name, text.role, text.state, S.patients.added, S.action];
+    clear(list, table(heads, users.map((user) => userRow(user, () => load())), text.title));
+  };
+  const add = async () => {
+    await post('users', { name: name.value.trim(), role: role.value, password: fresh.value });
+    name.value = fresh.value = '';
+    done(S.saved);
+    await load();
   };
   clear(place, h('h1', {}, text.title),
     may('users') && h('section', { class: 'card' }, list),
-    may('users') && h('section', { class: 'card' }, h('h2', {}, text.add), form({ class: 'form inline' }, async () => {
-      await post('users', { name: name.value.trim(), role: role.value, password: fresh.value });
-      name.value = fresh.value = '';
-      done(S.saved);
-      await load();
-    }, field(text.name, name, text.nameHint), field(text.role, role), field(text.password, fresh, S.login.passwordHint), h('button', { class: 'primary' }, text.submit))),
+    may('users') && h('section', { class: 'card' }, h('h2', {}, text.add),
+      form({ class: 'form inline' }, add, field(text.name, name, text.nameHint),
+        field(text.role, role), field(text.password, fresh, S.login.passwordHint),
+        h('button', { class: 'primary' }, text.submit))),
     may('users') && displays(), ownPreferences(), ownPassword());
   if (may('users')) await load().catch((error) => warn(error.message));
 }

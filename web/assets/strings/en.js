@@ -229,8 +229,8 @@ export const en = {
     within: 'in tolerance', unsure: 'not surely within', outside: 'outside tolerance',
     tolerance: (value, unit) => `tolerance ±${value} ${unit}`,
     couch: 'Couch readings: what to set',
-    couchHint: 'Type what the couch reads now. Shifts only, on scales as in IEC 61217: up, toward the '
-      + 'gantry, and to the right of a person who faces it count up. Where your couch counts '
+    couchHint: 'Type what the couch reads now. Shifts only, on scales as in IEC 61217: up, toward '
+      + 'the gantry, and to the right of a person who faces it count up. Where your couch counts '
       + 'otherwise, do not use this.',
     couchSet: (axis, cm) => `${axis}: set to ${cm} cm`,
     couchBad: 'a number in cm, with at most two digits after the point',
@@ -331,8 +331,8 @@ export const en = {
       + 'markers must be where they were when the baseline was set, and the sensor’s depth must '
       + 'agree with their size.',
     baseline: 'Baseline',
-    baselineOf: (who, when, markers) => `${markers} ${plural(markers, 'marker', 'markers')}, set by `
-      + `${who}, ${when}`,
+    baselineOf: (who, when, markers) => `${markers} ${plural(markers, 'marker', 'markers')}, set `
+      + `by ${who}, ${when}`,
     noBaseline: 'none yet', takeBaseline: 'Set as baseline',
     takeHint: 'Only when you know that every marker is where it should be. All further checks are '
       + 'compared with it.',

@@ -46,7 +46,8 @@ const kPatterns = [
       head: 'la cabeza', feet: 'los pies', gantry: 'gantry' }[end]}: ${mm} mm `
       + `${way === 'high' ? 'demasiado alto' : 'demasiado bajo'}`],
   [/^(.+) (\d+) mm (?:too )?(high|low)$/,
-    ([, part, mm, way]) => `${part}: ${mm} mm ${way === 'high' ? 'demasiado alto' : 'demasiado bajo'}`],
+    ([, part, mm, way]) => `${part}: ${mm} mm `
+      + `${way === 'high' ? 'demasiado alto' : 'demasiado bajo'}`],
   [/^marker (\d+) moved ([\d.]+) mm(.*)$/,
     ([, id, mm, rest]) => `el marcador ${id} se movió ${mm} mm${rest}`],
   [/^marker (\d+)$/, ([, id]) => `marcador ${id}`],
@@ -140,12 +141,13 @@ export const es = {
     certificate: 'Certificado de este equipo (SHA-256). Compárelo con el de su registro y con el '
       + 'que muestra el navegador:',
     firstTitle: 'Elija su contraseña',
-    firstText: 'Otra persona eligió la contraseña de esta cuenta. Elija una que solo usted conozca.',
+    firstText: 'Otra persona eligió la contraseña de esta cuenta. Elija una que solo usted '
+      + 'conozca.',
     firstOld: 'Contraseña que recibió', firstNew: 'Su propia contraseña',
     firstSubmit: 'Cambiar contraseña',
     last: (when, address) => `Último acceso: ${when}, desde ${address}.`,
     first: 'Es el primer acceso de esta cuenta que consta en el registro.',
-    failedSince: (n) => `Desde entonces, ${n} ${plural(n, 'intento fallido', 'intentos fallidos')}. `
+    failedSince: (n) => `Desde entonces ${n} ${plural(n, 'intento fallido', 'intentos fallidos')}. `
       + 'Si no fue usted, cambie su contraseña.',
   },
   removeScan: {
@@ -156,8 +158,8 @@ export const es = {
     type: (id) => `Escriba ${id} para confirmar`,
     differs: (id) => `Escriba el número ${id} para confirmar.`,
     gone: (id) => `El escaneo ${id} se ha borrado.`,
-    isReference: (version) => `La versión ${version} de la referencia procede de este escaneo. Solo `
-      + 'se borra con los datos de su paciente.',
+    isReference: (version) => `La versión ${version} de la referencia procede de este escaneo. `
+      + 'Solo se borra con los datos de su paciente.',
   },
   session: {
     label: 'Sesión de tratamiento',
@@ -302,8 +304,8 @@ export const es = {
     tolerance: (value, unit) => `tolerancia ±${value} ${unit}`,
     couch: 'Lecturas de la camilla: qué ajustar',
     couchHint: 'Escriba lo que indica la camilla ahora. Solo desplazamientos, en escalas como en '
-      + 'IEC 61217: crecen hacia arriba, hacia el gantry y hacia la derecha de quien lo mira. Si su '
-      + 'camilla cuenta de otro modo, no use esto.',
+      + 'IEC 61217: crecen hacia arriba, hacia el gantry y hacia la derecha de quien lo mira. Si '
+      + 'su camilla cuenta de otro modo, no use esto.',
     couchSet: (axis, cm) => `${axis}: poner en ${cm} cm`,
     couchBad: 'un número en cm, con dos cifras decimales como máximo',
     refused: 'no se conoce con marcadores en la camilla', still: 'sin cambio',
@@ -366,8 +368,8 @@ export const es = {
     meshOpen: 'Abrir la vista en 3-D', meshLoading: 'Cargando la superficie…',
     meshLabel: 'Superficie en 3-D, coloreada por el error. Las flechas la giran; más y menos la '
       + 'acercan y alejan.',
-    meshFailed: 'Este navegador no puede mostrar 3-D (falta WebGL). Las imágenes de arriba muestran '
-      + 'lo mismo.',
+    meshFailed: 'Este navegador no puede mostrar 3-D (falta WebGL). Las imágenes de arriba '
+      + 'muestran lo mismo.',
     ghost: 'Mostrar la referencia', ghostLoading: 'Cargando la referencia…',
     ghostShare: 'De la referencia a la actual', views3d: {
       top: 'Arriba', left: 'Izquierda', right: 'Derecha', feet: 'Pies', reset: 'Restablecer',
@@ -436,7 +438,8 @@ export const es = {
     mapLabel: 'Mapa de alturas de la referencia con la región. Intro añade un vértice en el '
       + 'centro, N elige el siguiente, las flechas lo mueven, Supr lo borra, U deshace.',
     isocentre: 'Isocentro',
-    isocentreHint: 'Metros en el sistema del marcador de referencia. Vacío: el centro de la región.',
+    isocentreHint: 'Metros en el sistema del marcador de referencia. Vacío: el centro de la '
+      + 'región.',
     pick: 'Elegir en el mapa', picking: 'Pulse en el mapa donde está el isocentro.',
     pickHint: 'Un punto elegido está en la piel. Escriba z para un isocentro dentro del cuerpo.',
     isocentreOutside: 'Este isocentro está fuera de la región.',
@@ -450,12 +453,13 @@ export const es = {
     isocentreBad: 'Tres números en metros, o los tres vacíos.',
     changedMeanwhile: 'Otra persona ha cambiado el plan entretanto. Esto es lo guardado ahora: '
       + 'mírelo e inténtelo de nuevo.',
-    changedWhileEditing: 'Otra persona ha cambiado este plan mientras lo edita: no se podrá guardar. '
-      + 'Recargue la página para verlo.',
+    changedWhileEditing: 'Otra persona ha cambiado este plan mientras lo edita: no se podrá '
+      + 'guardar. Recargue la página para verlo.',
     reloaded: 'Otra persona ha cambiado el plan; esto es lo guardado ahora.',
     save: 'Guardar el plan', approve: 'Aprobar', undo: 'Deshacer',
     approveHint: 'Aprueba un segundo físico. Después esta versión no se puede cambiar.',
-    approvedHint: 'Esta versión está aprobada y no se puede cambiar. Guardar crea una versión nueva.',
+    approvedHint: 'Esta versión está aprobada y no se puede cambiar. Guardar crea una versión '
+      + 'nueva.',
     unsaved: 'Hay cambios sin guardar. Guárdelos antes de la aprobación.',
     leave: 'Hay cambios sin guardar. ¿Salir sin guardar?',
     draftKept: 'Se conservaron sus cambios anteriores sin guardar.',
@@ -482,7 +486,8 @@ export const es = {
     unchanged: 'No se ha cambiado nada.', preferences: 'Mis preferencias',
   },
   audit: {
-    title: 'Registro', time: 'Hora', user: 'Quién', address: 'Desde', action: 'Qué', subject: 'Sobre',
+    title: 'Registro', time: 'Hora', user: 'Quién', address: 'Desde', action: 'Qué',
+    subject: 'Sobre',
     detail: 'Detalle', more: 'Entradas anteriores', empty: 'Ninguna entrada.', filter: 'Filtrar',
     filterHint: 'Busca en las entradas de abajo; cargue las anteriores para buscarlas también.',
     shown: (found, all) => `${found} de ${all} ${plural(all, 'entrada', 'entradas')}`,
