@@ -127,6 +127,7 @@ await h.step('a physicist plans, a second one approves', async () => {
 await h.step('a fraction shows MOVE with the signs in words', async () => {
   await anna.goto(`${h.url}#/patients`);
   await anna.getByRole('link', { name: 'PX-0417' }).click();
+  await anna.locator('table').nth(1).waitFor();
   await h.look(anna, 'patient');
   await anna.getByRole('button', { name: 'Start treatment session' }).click();
   await scan(anna, /Start sweep|Scan again/);
@@ -232,6 +233,13 @@ await h.step('NO ANSWER says why', async () => {
 await h.step('the trend shows the fractions', async () => {
   await anna.locator('.trend').first().waitFor();
   equal(await anna.locator('.trend').count(), 6, 'six trends');
+  await anna.locator('.identity').getByRole('link', { name: 'PX-0417' }).click();
+  // Each scan that answered says its numbers, with the digits that are known; one without an answer none.
+  await anna.getByText('Vert., long., lat. (mm)').waitFor();
+  const numbers = await anna.locator('td.digits').allInnerTexts();
+  check(numbers.filter((line) => /^[−+]?\d+(\.\d)?, .+ · .+, .+, [−+]?\d/.test(line)).length >= 2, `numbers: ${numbers.join(' | ')}`);
+  check(numbers.includes('–'), 'and none where there is no answer');
+  await h.look(anna, 'patient-scans');
 });
 
 await h.step('unplugging during a sweep discards the scan and says so', async () => {

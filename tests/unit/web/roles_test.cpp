@@ -22,6 +22,7 @@ const std::map<std::string, std::string> kWhoMay = {
     {"POST /api/v1/displays/claim", "any"},
     {"POST /api/v1/logout", "TPED"},
     {"GET /api/v1/session", "TPED"},
+    {"GET /api/v1/session/last-login", "TPED"},
     {"POST /api/v1/session/password", "TPED"},
     {"GET /api/v1/status", "TPED"},
     {"GET /api/v1/events", "TPED"},
@@ -72,6 +73,7 @@ const std::map<std::string, std::string> kWhoMay = {
     {"POST /api/v1/update/restart", "E"},
     {"POST /api/v1/update/seen", "E"},
     {"DELETE /api/v1/update/bundles/{name}", "E"},
+    {"GET /api/v1/backup", "E"},
     {"POST /api/v1/backup", "E"},
     {"POST /api/v1/diagnostics", "E"},
 };
