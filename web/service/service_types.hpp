@@ -239,7 +239,7 @@ struct Status {
   /// Directions of the room on maps (x, y of the reference marker's frame): to the gantry, and to
   /// the right of a person who faces it.
   std::array<double, 2> gantry_xy = {0, 1}, right_xy = {1, 0};
-  bool is_room_known = false;  ///< False: as if the marker's axes were the room's.
+  bool is_room_known = false;             ///< False: as if the marker's axes were the room's.
   std::vector<WaitingReference> waiting;  ///< For a plan or an approval; at most 20.
   std::optional<LiveScan> scan;           ///< In states scanning and working.
   std::optional<CheckRecord> last_check;
