@@ -139,7 +139,7 @@ class Writing {
       return {};
     }
     try {
-      const FileDigest digest = LinkOrCopy(state_, output_.path(), file, stop_);
+      const FileDigest digest = CloneOrCopy(state_, output_.path(), file, stop_);
       Note(digest);
       return digest.sha256;
     } catch (const SourceUnreadable& error) {

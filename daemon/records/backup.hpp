@@ -28,8 +28,9 @@ struct BackupReport {
 };
 
 /// Of a store that is open; its files may not be removed meanwhile. The database is copied as it is
-/// at one moment, and the scans that it knows then. Files are linked where `target` is on the same
-/// disk, else copied; each is read once. An older backup at `target` is replaced.
+/// at one moment, and the scans that it knows then. Files are copied (their blocks are shared until
+/// one side is written to, where the file system can); each is read once. An older backup at
+/// `target` is replaced.
 /// @throws IoError if the backup cannot be written; Interrupted
 [[nodiscard]] BackupReport WriteBackup(const std::filesystem::path& state, Database& database,
                                        const std::filesystem::path& target,

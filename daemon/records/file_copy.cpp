@@ -1,6 +1,8 @@
 #include "daemon/records/file_copy.hpp"
 
 #include <fcntl.h>
+#include <linux/fs.h>
+#include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -75,11 +77,27 @@ FileDigest Copy(const fs::path& from, const fs::path& to, const std::string& pat
   return digest;
 }
 
-FileDigest LinkOrCopy(const fs::path& from, const fs::path& to, const std::string& path,
-                      const std::stop_token& stop) {
+namespace {
+
+/// False where the file system cannot, or for another reason that copying tells better.
+bool Clone(const fs::path& from, const fs::path& to) {
+  const int source = ::open(from.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (source < 0) return false;
+  const int target = ::open(to.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
+  const bool done = target >= 0 && ::ioctl(target, FICLONE, source) == 0;
+  if (target >= 0) ::close(target);
+  if (target >= 0 && !done) ::unlink(to.c_str());
+  ::close(source);
+  return done;
+}
+
+}  // namespace
+
+FileDigest CloneOrCopy(const fs::path& from, const fs::path& to, const std::string& path,
+                       const std::stop_token& stop) {
   const fs::path target = to / path;
   MakeFolders(target.parent_path());
-  if (::link((from / path).c_str(), target.c_str()) != 0) return Copy(from, to, path, stop);
+  if (!Clone(from / path, target)) return Copy(from, to, path, stop);
   try {
     return DigestOfFile(to, path, stop);
   } catch (const IoError& error) {

@@ -22,11 +22,12 @@ class SourceUnreadable : public IoError {
 [[nodiscard]] FileDigest Copy(const std::filesystem::path& from, const std::filesystem::path& to,
                               const std::string& path, const std::stop_token& stop);
 
-/// The same, but a second name of the same file where both are on one disk. Files of a scan are
-/// never written again in their place.
-[[nodiscard]] FileDigest LinkOrCopy(const std::filesystem::path& from,
-                                    const std::filesystem::path& to, const std::string& path,
-                                    const std::stop_token& stop);
+/// The same, but where the file system can (btrfs, XFS) the copy shares the blocks of the original
+/// until one of them is written to. Never a second name of the same file: what damages one would
+/// damage the other.
+[[nodiscard]] FileDigest CloneOrCopy(const std::filesystem::path& from,
+                                     const std::filesystem::path& to, const std::string& path,
+                                     const std::stop_token& stop);
 
 /// Forces everything on a folder's disk to it. @throws IoError
 void SyncDisk(const std::filesystem::path& folder);

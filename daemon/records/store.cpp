@@ -98,7 +98,8 @@ web::ReferencePlan PlanIn(const Statement& row) {
   }
 }
 
-web::Reference ReadReference(const Statement& row) {
+/// Without its plan.
+web::Reference ReadReferenceRow(const Statement& row) {
   web::Reference reference{.id = row.Text(0),
                            .patient_id = row.Text(1),
                            .version = static_cast<int>(row.Integer(2)),
@@ -111,9 +112,27 @@ web::Reference ReadReference(const Statement& row) {
                            .planned_by = row.Text(11),
                            .approved_by = row.Text(7),
                            .approved_at = {},
-                           .plan = PlanIn(row)};
+                           .plan = {}};
   if (!row.IsNull(8)) reference.approved_at = FromStored(row.Integer(8));
   reference.digest = DigestOf(row.Text(1), reference.version, reference.scan_id, row.Text(9));
+  return reference;
+}
+
+/// @throws DataError where the plan cannot be read: it is never a default.
+web::Reference ReadReference(const Statement& row) {
+  web::Reference reference = ReadReferenceRow(row);
+  reference.plan = PlanIn(row);
+  return reference;
+}
+
+/// For lists: one that cannot be read does not hide the others.
+web::Reference ListReference(const Statement& row) {
+  web::Reference reference = ReadReferenceRow(row);
+  try {
+    reference.plan = PlanIn(row);
+  } catch (const DataError& error) {
+    reference.unreadable = error.what();
+  }
   return reference;
 }
 
@@ -224,7 +243,7 @@ std::vector<web::Reference> Store::References(const std::string& patient_id) {
       std::string(kReferenceColumns) + "WHERE patient_id = ? ORDER BY version DESC LIMIT 1000";
   Statement query = list_->Prepare(kSql.c_str());
   query.Bind(*number);
-  while (query.Step()) references.push_back(ReadReference(query));
+  while (query.Step()) references.push_back(ListReference(query));
   return references;
 }
 

@@ -272,9 +272,21 @@ Json ToJson(const Patient& patient) {
           {"draft_reference_id", TextOrNull(patient.draft_reference_id)}};
 }
 
-Json ToJson(const Reference& reference) {
+namespace {
+
+Json PlanJson(const ReferencePlan& plan) {
   Json region = Json::array();
-  for (const auto& [x, y] : reference.plan.region_m) region.push_back({x, y});
+  for (const auto& [x, y] : plan.region_m) region.push_back({x, y});
+  return {{"region_m", region},
+          {"isocentre_m", OrNull(plan.isocentre_m)},
+          {"tolerance", ToleranceJson(plan.tolerance)},
+          {"posture", plan.posture},
+          {"couch_markers", plan.couch_markers}};
+}
+
+}  // namespace
+
+Json ToJson(const Reference& reference) {
   return {{"id", reference.id},
           {"patient_id", reference.patient_id},
           {"version", reference.version},
@@ -288,12 +300,8 @@ Json ToJson(const Reference& reference) {
           {"approved_by", TextOrNull(reference.approved_by)},
           {"approved_at",
            reference.approved_at ? Json(TimeText(*reference.approved_at)) : Json(nullptr)},
-          {"plan",
-           {{"region_m", region},
-            {"isocentre_m", OrNull(reference.plan.isocentre_m)},
-            {"tolerance", ToleranceJson(reference.plan.tolerance)},
-            {"posture", reference.plan.posture},
-            {"couch_markers", reference.plan.couch_markers}}}};
+          {"plan", reference.unreadable.empty() ? PlanJson(reference.plan) : Json(nullptr)},
+          {"unreadable", TextOrNull(reference.unreadable)}};
 }
 
 Json ToJson(const User& user) {

@@ -187,6 +187,7 @@ struct Reference {
   std::string approved_by;  ///< Empty: a draft. "auto": the demo's.
   std::optional<WallClock::time_point> approved_at;
   ReferencePlan plan;
+  std::string unreadable = {};  ///< Why the stored plan cannot be read: `plan` then says nothing.
 };
 
 /// One number of a daily check.

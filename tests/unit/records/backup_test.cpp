@@ -1,6 +1,7 @@
 // Backups and what is restored of them.
 #include "daemon/records/backup.hpp"
 
+#include <fstream>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -130,6 +131,22 @@ TEST_F(BackupTest, TellsWhatIsNotAsItWasStoredAndKeepsTheRest) {
   (void)RestoreBackup(backup(), restored());
   Store store(restored());
   EXPECT_FALSE(store.FindScan(scan_)->failure.empty()) << "restored as damaged as it was";
+}
+
+TEST_F(BackupTest, WhatDamagesTheOriginalLeavesTheBackupWhole) {
+  (void)BackUpStopped(state(), backup());
+  const fs::path file = fs::path("scans") / scan_ / "scene" / "cloud.ply";
+  {
+    std::fstream original(state() / file, std::ios::in | std::ios::out | std::ios::binary);
+    original.put('X');
+  }
+  fs::resize_file(state() / "scans" / scan_ / "scene" / "scene.json", 1);
+  EXPECT_EQ(fs::hard_link_count(backup() / file), 1U);
+  const BackupReport report = RestoreBackup(backup(), restored());
+  EXPECT_EQ(report.scans, 4U);
+  Store store(restored());
+  EXPECT_EQ(store.CheckFiles(scan_, false), "");
+  EXPECT_NE(Store(state()).CheckFiles(scan_, false), "") << "the original is what was damaged";
 }
 
 TEST_F(BackupTest, ADamagedBackupRestoresNothingAndSaysWhich) {

@@ -206,6 +206,21 @@ TEST_F(StoreCareTest, StoredSettingsThatCannotBeReadAreAnErrorAndOlderOnesAreNot
   EXPECT_EQ(store_->GetSettings().retention_days, 7);
 }
 
+TEST_F(StoreCareTest, APlanThatCannotBeReadHidesNoOtherOfThePatient) {
+  const std::string first = store_->AddReference(kAnna, StoreScan(*store_, patient_), "", {});
+  const std::string second = store_->AddReference(kAnna, StoreScan(*store_, patient_), "", {});
+  store_.reset();
+  Execute("UPDATE refs SET plan = '{' WHERE id = " + second);
+  store_ = std::make_unique<Store>(state());
+  const std::vector<web::Reference> references = store_->References(patient_);
+  ASSERT_EQ(references.size(), 2U);
+  EXPECT_EQ(references[0].id, second);
+  EXPECT_THAT(references[0].unreadable, HasSubstr("cannot be read"));
+  EXPECT_EQ(references[1].unreadable, "");
+  EXPECT_THROW((void)store_->FindReference(second), DataError) << "never used as a default";
+  EXPECT_EQ(store_->FindReference(first)->id, first);
+}
+
 TEST_F(StoreCareTest, ACheckThatCannotBeReadHasNotPassed) {
   for (const char* bad : {"", "[]", "{}", R"({"status":1})", R"({"status":"passed","items":[1]})",
                           R"({"status":"passed","reasons":7})"}) {
