@@ -226,7 +226,7 @@ await h.step('codes are unique without regard to case, and a wristband opens', a
   await anna.goto(`${h.url}#/patients`);
   await anna.getByLabel('Code', { exact: true }).fill('p-0042');
   await anna.getByRole('button', { name: 'Add a patient' }).click();
-  await anna.getByRole('alert').getByText(/there is a patient/).waitFor();
+  await anna.getByRole('alert').getByText(/there is a patient/i).waitFor();
   await anna.getByLabel('Find a code').fill('p-0050');
   await anna.getByLabel('Find a code').press('Enter');
   await anna.getByRole('heading', { name: 'P-0050' }).waitFor();
