@@ -284,6 +284,13 @@ class Plumbd {
     tick_ = loop_.MakeTimer("watchdog", [this] { Tick(); });
   }
 
+  ~Plumbd() {
+    // systemd's own stays: it is what starts plumbd again.
+    if (!own_socket_.empty()) ::unlink(own_socket_.c_str());
+  }
+  Plumbd(const Plumbd&) = delete;
+  Plumbd& operator=(const Plumbd&) = delete;
+
   int Run() {
     Tick();
     RunHttp();
@@ -307,9 +314,11 @@ class Plumbd {
   }
 
  private:
-  static int ControlSocket(const Config& config) {
+  int ControlSocket(const Config& config) {
     if (const std::optional<int> inherited = InheritedSocket("control")) return *inherited;
-    return ListenUnix(config.appliance.control);
+    const int listening = ListenUnix(config.appliance.control);
+    own_socket_ = config.appliance.control;
+    return listening;
   }
 
   web::HttpServerOptions HttpOptions(const Config& config) {
@@ -375,6 +384,7 @@ class Plumbd {
   Panel panel_;
   Appliance appliance_;
   PageNotes page_;
+  fs::path own_socket_;  ///< The control socket where this process made it.
   WebService service_;
   web::HttpServer http_;
   ControlDesk desk_;

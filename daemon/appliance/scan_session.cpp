@@ -9,6 +9,7 @@
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/files/text_report.hpp"
+#include "daemon/loop/explain.hpp"
 #include "daemon/pipeline/recording_feed.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
 #include "daemon/records/check_json.hpp"
@@ -75,7 +76,7 @@ void ScanSession::Run(const std::stop_token& stop) {
     outcome_.reason = "out of memory: sweep a shorter way, or close what else runs";
   } catch (const std::exception& error) {
     outcome_.kind = ScanOutcome::Kind::kFailed;
-    outcome_.reason = error.what();
+    outcome_.reason = Explain(error);
   }
   if (outcome_.kind != ScanOutcome::Kind::kDone && stop.stop_requested())
     outcome_.kind = ScanOutcome::Kind::kCancelled;

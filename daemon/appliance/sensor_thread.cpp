@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "daemon/loop/explain.hpp"
 
 namespace plumb {
 
@@ -84,7 +85,7 @@ struct SensorThread::Impl {
         Tell(SensorEvent::Kind::kLost, {});
       } catch (const std::exception& error) {
         Drop();
-        Tell(SensorEvent::Kind::kFailed, error.what());
+        Tell(SensorEvent::Kind::kFailed, Explain(error));
         retry_at = Clock::now() + retry;
         retry = std::min(2 * retry, options.last_retry);
       }

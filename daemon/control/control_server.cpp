@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "algo/base/errors.hpp"
 
 namespace plumb {
@@ -75,7 +77,12 @@ ControlServer::~ControlServer() {
 void ControlServer::Accept() {
   const int fd = ::accept4(listening_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
   if (fd < 0) return;
-  if (clients_.size() >= options_.max_clients) {
+  if (clients_.size() >= options_.max_clients && !MakeRoom()) {
+    const std::string why =
+        ControlRefusal(fmt::format("{} others are connected: end one of them, then try again",
+                                   clients_.size())) +
+        "\n";
+    (void)::send(fd, why.data(), why.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     ::close(fd);
     return;
   }
@@ -91,6 +98,16 @@ void ControlServer::Accept() {
     }
   });
   clients_.emplace(id, std::move(client));
+}
+
+bool ControlServer::MakeRoom() {
+  // By number: who came first has been silent for longest, near enough.
+  for (const auto& [id, client] : clients_) {
+    if (client->watches || client->unanswered > 0 || !client->out.empty()) continue;
+    Drop(id);
+    return true;
+  }
+  return false;
 }
 
 void ControlServer::Read(std::uint64_t id) {

@@ -14,7 +14,9 @@
 namespace plumb {
 
 struct ControlServerOptions {
-  std::size_t max_clients = 32;  ///< More are turned away at once.
+  /// One more takes the place of who has waited longest without a question; where all are waited
+  /// for or watch, it is turned away with the reason.
+  std::size_t max_clients = 32;
   std::size_t max_waiting =
       256 << 10;  ///< Bytes that a client has not read yet; then it is dropped.
 };
@@ -42,6 +44,8 @@ class ControlServer {
  private:
   struct Client;
   void Accept();
+  /// False where nobody can go.
+  [[nodiscard]] bool MakeRoom();
   void Read(std::uint64_t id);
   void HandleLine(std::uint64_t id, const std::string& line);
   void Send(std::uint64_t id, const std::string& line);

@@ -42,6 +42,10 @@ Container ReadInto(const std::filesystem::path& path, std::size_t max_bytes) {
     const int error = errno;
     if (error == ENOENT || error == ENOTDIR)
       throw DataError(fmt::format("file {} is missing", path.string()));
+    if (error == EMFILE || error == ENFILE)  // not the file's fault: nobody should correct it
+      throw IoError(fmt::format(
+          "cannot open {}: {}; close what else is open, or raise the limit (LimitNOFILE)",
+          path.string(), ErrorText(error)));
     throw DataError(fmt::format("cannot open {}: {}", path.string(), ErrorText(error)));
   }
   struct stat status {};

@@ -244,26 +244,39 @@ TEST_F(ControlServerTest, AnOpenFileComesAlongAndWhatNobodyAskedForIsClosed) {
   ::close(file);
 }
 
-TEST_F(ControlServerTest, TooManyClientsAreTurnedAwayAndRoomComesBack) {
+TEST_F(ControlServerTest, WatchersKeepTheirPlacesAndOneTooManyIsToldSo) {
   RunWith([&] {
     std::vector<int> fds;
     for (int i = 0; i < 4; ++i) {
       fds.push_back(ConnectUnix(folder_ / "s"));
-      Send(fds.back(), "{\"command\":\"status\"}\n");
+      Send(fds.back(), "{\"command\":\"watch\"}\n");
       EXPECT_EQ(ReadLine(fds.back()), ControlDone());
     }
     const int fifth = ConnectUnix(folder_ / "s");
+    EXPECT_THAT(ReadLine(fifth), HasSubstr("4 others are connected"));
     EXPECT_EQ(ReadLine(fifth), "");
     ::close(fifth);
     for (const int fd : fds) ::close(fd);
     std::string answer;  // the loop notices the free places in its own time
-    while (answer.empty()) {
+    while (answer != ControlDone()) {
       const int fd = ConnectUnix(folder_ / "s");
       Send(fd, "{\"command\":\"status\"}\n");
       answer = ReadLine(fd);
       ::close(fd);
     }
-    EXPECT_EQ(answer, ControlDone());
+  });
+}
+
+TEST_F(ControlServerTest, WhoAsksNothingDoesNotKeepOthersOut) {
+  RunWith([&] {
+    std::vector<int> idle;
+    for (int i = 0; i < 40; ++i) idle.push_back(ConnectUnix(folder_ / "s"));
+    const int asker = ConnectUnix(folder_ / "s");
+    Send(asker, "{\"command\":\"status\"}\n");
+    EXPECT_EQ(ReadLine(asker), ControlDone());
+    EXPECT_EQ(ReadLine(idle.front()), "") << "it was there first, and asked nothing";
+    ::close(asker);
+    for (const int fd : idle) ::close(fd);
   });
 }
 

@@ -1,5 +1,7 @@
 #include "drivers/files/image_file.hpp"
 
+#include <sys/resource.h>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -276,6 +278,25 @@ TEST(ImageFileTest, WritingWhatCannotBeWrittenIsTheCallersMistake) {
   EXPECT_THROW((void)EncodeJpeg(DepthRamp(8, 8), 90), std::invalid_argument);
   EXPECT_THROW((void)EncodeFloatTiff(DepthRamp(8, 8)), std::invalid_argument);
   EXPECT_THROW(WritePng("/nonexistent/folder/a.png", ColorRamp(4, 4)), IoError);
+}
+
+TEST(FileIoTest, TooManyOpenFilesAreNotTheFilesFault) {
+  const testing::TempFolder folder;
+  WriteWholeFile(folder / "good", std::string_view("text"));
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  const rlimit none{.rlim_cur = 0, .rlim_max = before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  std::string told;
+  try {
+    (void)ReadTextFile(folder / "good", 100);
+  } catch (const DataError&) {
+    told = "the file is blamed";
+  } catch (const IoError& error) {
+    told = error.what();
+  }
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+  EXPECT_THAT(told, ::testing::HasSubstr("LimitNOFILE"));
 }
 
 }  // namespace

@@ -1,0 +1,23 @@
+// What an exception of the system says, with its subject.
+#pragma once
+
+#include <exception>
+#include <new>
+#include <string>
+#include <system_error>
+
+namespace plumb {
+
+/// A thread that cannot be started says "Resource temporarily unavailable" and memory that is used
+/// up "std::bad_alloc"; people need to read of what.
+inline std::string Explain(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr)
+    return "memory is used up: close what else runs, or raise the limit (MemoryMax)";
+  const auto* system = dynamic_cast<const std::system_error*>(&error);
+  if (system != nullptr && system->code() == std::errc::resource_unavailable_try_again)
+    return "the machine gives plumbd no further thread: memory or the number of threads (TasksMax) "
+           "is used up";
+  return error.what();
+}
+
+}  // namespace plumb
