@@ -238,10 +238,13 @@ std::string Appliance::StatusJson() {
       const Json result = Json::parse(outcome.result_json);
       last["verdict"] = result["verdict"];
       last["reasons"] = result["reasons"];
-      last["correction"] = result["correction"];
+      // Numbers of a result that is no answer are for nobody to act on.
+      const Json correction =
+          result["verdict"] == "no_answer" ? Json(nullptr) : result["correction"];
+      last["correction"] = correction;
       for (const char* name :
            {"vertical_mm", "longitudinal_mm", "lateral_mm", "pitch_deg", "roll_deg", "yaw_deg"}) {
-        last[name] = result["correction"].is_object() ? result["correction"][name] : Json(nullptr);
+        last[name] = correction.is_object() ? correction[name] : Json(nullptr);
       }
     }
   }
