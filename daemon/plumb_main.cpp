@@ -81,6 +81,9 @@ int Main(int argc, char** argv) {
       AddSimulate);
   add("reconstruct", "Turn a recording into a scene: trajectory, markers, surface, height map",
       AddReconstruct);
+  add("calibrate",
+      "Learn a sensor unit's profile from ordinary sweeps, for reconstruct --sensor-profile",
+      AddCalibrate);
   add("compare",
       "Compare a current scene with a reference: error map, motion of the body, six couch numbers, "
       "verdict",

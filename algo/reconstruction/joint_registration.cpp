@@ -300,6 +300,12 @@ double CauchyWeight(double residual_in_sigmas) {
   return 1.0 / (1.0 + residual_in_sigmas * residual_in_sigmas / 4.0);
 }
 
+// Every fourth cell each way, another sixteenth for each pair. Neighbouring cells share most of
+// their error: the others would cost time and add nothing.
+constexpr int kLattice = 4;
+constexpr double kCellsForOne = 4.0;  // Cells that one stands for, against a lattice of two.
+constexpr int kHeldOut = 5;           // The sixteenth that only Consistency() looks at.
+
 QuadraticTerm DenseTerm(const Sensor& sensor, const CalibratedView& a, const CalibratedView& b,
                         const KeyframePair& pair, int phase, double gate_m, double weight) {
   QuadraticTerm term;
@@ -308,7 +314,7 @@ QuadraticTerm DenseTerm(const Sensor& sensor, const CalibratedView& a, const Cal
   TermSum sum(term);
   const Eigen::Matrix3d R_b_a = (b.T_world_depth.inverse() * a.T_world_depth).linear();
   ForEachProjected(
-      sensor, a, b, phase, 2,
+      sensor, a, b, phase, kLattice,
       [&](std::size_t i, std::size_t j, const Eigen::Vector3f& q_b, const Eigen::Matrix3f& R) {
         const auto match = Correspond(a, b, i, j, q_b, R, gate_m);
         if (!match) return;
@@ -391,7 +397,7 @@ std::optional<QuadraticTerm> MarkerFaceTerm(const Sensor& sensor, const Calibrat
   return term;
 }
 
-// Median |point-to-plane| of cells that no solution used (the other checkerboard colour).
+// Median |point-to-plane| of cells that no solution used.
 double Consistency(const Sensor& sensor, const std::vector<CalibratedView>& views,
                    const std::vector<KeyframePair>& pairs, double gate_m) {
   std::vector<std::vector<float>> parts(pairs.size());
@@ -399,7 +405,7 @@ double Consistency(const Sensor& sensor, const std::vector<CalibratedView>& view
     const CalibratedView& a = views[static_cast<std::size_t>(pairs[p].a)];
     const CalibratedView& b = views[static_cast<std::size_t>(pairs[p].b)];
     ForEachProjected(
-        sensor, a, b, 5, 4,
+        sensor, a, b, kHeldOut, kLattice,
         [&](std::size_t i, std::size_t j, const Eigen::Vector3f& q, const Eigen::Matrix3f& R) {
           if (const auto match = Correspond(a, b, i, j, q, R, gate_m))
             parts[p].push_back(static_cast<float>(std::abs(match->residual)));
@@ -429,11 +435,11 @@ std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrati
     const auto a = static_cast<std::size_t>(pairs[p].a);
     const auto b = static_cast<std::size_t>(pairs[p].b);
     // A keyframe's noise enters all its pairs: together they weigh as much as its cells once.
-    const double weight =
-        options.dense_weight * 2.0 / std::sqrt(static_cast<double>(uses[a]) * uses[b]);
-    // Phases 0..3 of the 2x2 lattice except 3, which Consistency() holds out.
-    terms[p] =
-        DenseTerm(sensor, views[a], views[b], pairs[p], static_cast<int>(p % 3), gate_m, weight);
+    const double weight = options.dense_weight * kCellsForOne * 2.0 /
+                          std::sqrt(static_cast<double>(uses[a]) * uses[b]);
+    auto phase = static_cast<int>(p % (kLattice * kLattice - 1));
+    phase += phase >= kHeldOut ? 1 : 0;
+    terms[p] = DenseTerm(sensor, views[a], views[b], pairs[p], phase, gate_m, weight);
   });
   for (std::size_t k = 0; k < views.size(); ++k) {
     for (const MarkerObservation& observation : map.keyframes[k].data.markers) {
@@ -470,6 +476,20 @@ void AddTrackedLinks(const TrackingMap& map, std::vector<QuadraticTerm>& terms) 
   }
 }
 
+// What a keyframe's motion model leaves out is common to all its keypoints: beyond a number that
+// covers the image, more of them say nothing new. By how much each one's standard deviation grows.
+double KeypointCrowding(const TrackingMap& map) {
+  constexpr double kEnough = 150.0;  // In a keyframe.
+  std::size_t count = 0;
+  for (const MapKeyframe& keyframe : map.keyframes)
+    for (const KeypointObservation& o : keyframe.keypoints) {
+      const Landmark& landmark = map.landmarks[static_cast<std::size_t>(o.landmark)];
+      count += landmark.usable && landmark.num_observations > 1 ? 1 : 0;
+    }
+  const double mean = static_cast<double>(count) / static_cast<double>(map.keyframes.size());
+  return std::sqrt(std::max(1.0, mean / kEnough));
+}
+
 }  // namespace
 
 Pose DepthPose(const MapKeyframe& keyframe, const CalibrationModel& calibration) {
@@ -486,9 +506,10 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   BundleOptions bundle;
   bundle.marker_length_m = options.marker_length_m;
   bundle.calibrate = options.calibrate;
-  bundle.keypoint_sigma_px = options.keypoint_sigma_px;
+  bundle.keypoint_sigma_px = options.keypoint_sigma_px * KeypointCrowding(map);
   bundle.keypoint_depth_sigmas = options.keypoint_depth_sigmas;
-  bundle.edge_bias_sigma_px = options.edge_bias_sigma_px;
+  bundle.prior = options.prior;
+  if (options.calibrate) MoveCalibration(options.prior.mean, result.calibration);
   bundle.fix_depth_field = !options.use_depth_field;
   bundle.stop = stop;
   bundle.max_iterations = 10;
@@ -504,19 +525,22 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   const CalibrationModel calibration_before = result.calibration;
   double gate_m = options.max_gate_m;
   std::vector<KeyframePair> pairs;
+  BundleSummary last;
   bundle.max_iterations = 4;
   // The dense terms know nothing of the lens: left free here it would follow what they do to the
   // poses.
   bundle.fix_lens = true;
   for (int round = 0; round < options.num_rounds; ++round) {
     CheckStop(stop);
+    if (options.refresh_velocities) options.refresh_velocities(map);
     const Sensor sensor = MakeSensor(stated, result.calibration);
     const std::vector<CalibratedView> views = MakeViews(sensor, result.calibration, cells, map);
     CheckStop(stop);
     if (round == 0) pairs = FindPairs(sensor, options, views, stop);
     std::vector<QuadraticTerm> terms = MakeTerms(sensor, options, map, views, pairs, gate_m, stop);
     AddTrackedLinks(map, terms);
-    BundleAdjust(stated, bundle, terms, map, result.calibration);
+    bundle.find_information = options.find_evidence;
+    last = BundleAdjust(stated, bundle, terms, map, result.calibration);
     CheckStop(stop);
     double farthest_m = 0.0;
     for (const CalibratedView& view : views)
@@ -540,6 +564,9 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   if (!result.accepted) {
     map = before;
     result.calibration = calibration_before;
+  } else if (options.find_evidence && options.calibrate) {
+    result.evidence.solution = ToVector(result.calibration);
+    result.evidence.information = last.information;
   }
   return result;
 }

@@ -2,8 +2,10 @@
 // dense depth.
 #pragma once
 
+#include <functional>
 #include <stop_token>
 
+#include "algo/sensor_model/sensor_profile.hpp"
 #include "algo/tracking/bundle_adjustment.hpp"
 
 namespace plumb {
@@ -22,12 +24,15 @@ struct JointRegistrationOptions {
   double min_overlap = 0.2;  ///< Share of a keyframe's cells that fall into the other.
   /// Of the dense terms against their noise model: what the model leaves out is shared by
   /// neighbouring cells and views.
-  double dense_weight = 0.4;
+  double dense_weight = 0.3;
   /// Pixels at 640 columns. Above the noise of one sighting: a track's error is common to its
   /// views.
-  double keypoint_sigma_px = 1.0;
+  double keypoint_sigma_px = 0.5;
   double keypoint_depth_sigmas = 1.5;  ///< In standard deviations of the noise model.
-  double edge_bias_sigma_px = CalibrationModel::kEdgeBiasSigma;  ///< Pixels at 640 columns.
+  CalibrationPrior prior = PriorOfAnyUnit();
+  bool find_evidence = false;  ///< Fill JointRegistrationResult::evidence.
+  /// Called before each dense round: makes the keyframes' velocities follow their poses.
+  std::function<void(TrackingMap&)> refresh_velocities;
 };
 
 struct JointRegistrationResult {
@@ -38,6 +43,7 @@ struct JointRegistrationResult {
       0.0;  ///< Median point-to-plane residual of held-out cells between overlapping keyframes.
   double consistency_after_m = 0.0;
   int num_pairs = 0;
+  SweepEvidence evidence;  ///< About the sensor.
 };
 
 /// Refines the map in place: bundle adjustment with the calibration free, then rounds of projective

@@ -107,6 +107,12 @@ std::string WhyNoSurface(std::span<const ViewSurface> surfaces, double median_de
       surfaces.size(), median_depth_m, range.min_depth_m, range.max_depth_m);
 }
 
+// How far markers' edges may be off once the sweep's tone curve has been taken into account.
+double EdgeSigma(const std::optional<SweepTone>& tone) {
+  if (!tone.has_value()) return CalibrationModel::kEdgeBiasSigma;
+  return std::hypot(kMeasuredEdgeSigma_px, tone.value().sigma_edge_shift_px);
+}
+
 }  // namespace
 
 struct Reconstructor::Impl {
@@ -253,7 +259,7 @@ struct Reconstructor::Impl {
     return tone;
   }
 
-  void ReconstructBest(const std::vector<TrackedFrame>& frames, TrackingMap& map, Scene& scene,
+  void ReconstructBest(std::vector<TrackedFrame>& frames, TrackingMap& map, Scene& scene,
                        const std::stop_token& stop, const Report& report) const {
     report(0.0, "markers");
     double stage = Now();
@@ -266,14 +272,26 @@ struct Reconstructor::Impl {
     joint_options.marker_length_m = info.marker_length_m;
     joint_options.use_depth_field = options.use_depth_field;
     joint_options.use_dense = options.use_dense_depth;
-    if (tone.has_value())
-      joint_options.edge_bias_sigma_px =
-          std::hypot(kMeasuredEdgeSigma_px, tone->sigma_edge_shift_px);
+    joint_options.refresh_velocities = [&frames](TrackingMap& moved) {
+      RefreshVelocities(frames, moved);
+    };
+    const double edge_sigma_px = EdgeSigma(tone);
+    joint_options.prior = options.profile
+                              ? PriorOfNextSweep(*options.profile, info.intrinsics, edge_sigma_px)
+                              : PriorOfAnyUnit(edge_sigma_px);
+    joint_options.find_evidence = options.on_learned != nullptr;
     const JointRegistrationResult joint =
         RegisterJointly(info.intrinsics, joint_options, map, stop);
     const double solved = Now();
+    if (options.on_learned && joint.accepted)
+      options.on_learned(Learn(options.profile.value_or(ProfileOfAnyUnit(info.intrinsics)),
+                               joint_options.prior, joint.evidence));
     scene = MakeScene(frames, map, joint.calibration, SceneFromWorld(map));
     WarnOfFrame(map, scene);
+    if (options.profile)
+      scene.sensor_profile =
+          fmt::format("{}, {} sweep{}", options.profile->name, options.profile->num_sweeps,
+                      options.profile->num_sweeps == 1 ? "" : "s");
     for (const auto& [name, value] : joint.calibration.Named()) scene.calibration[name] = value;
     if (tone) {
       scene.calibration["tone_gamma"] = tone->gamma;

@@ -3,9 +3,11 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string_view>
 
+#include "algo/sensor_model/sensor_profile.hpp"
 #include "algo/types/frame.hpp"
 #include "algo/types/scene.hpp"
 
@@ -20,6 +22,11 @@ struct ReconstructorOptions {
   bool use_tone_curve = true;   ///< Find the camera's tone curve and measure the markers under it.
   bool use_depth_field = true;  ///< Find the depth image's distortion over the image.
   bool use_dense_depth = true;  ///< Register overlapping depth images.
+  /// What is known of the sensor unit; without it the sweep begins from the stated calibration.
+  std::optional<SensorProfile> profile;
+  /// Called by Finish() with the profile that this sweep makes of `profile`, unless the sweep's own
+  /// checks failed.
+  std::function<void(const SensorProfile&)> on_learned;
   int num_icp_iterations = 20;  ///< Preset `paper`: iterations of Algorithm 1.
   unsigned seed = 1;            ///< Of random subsampling.
   /// Wall clock in seconds for `Scene::timings_s`; none: no timings. The method itself never looks

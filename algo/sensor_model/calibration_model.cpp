@@ -42,8 +42,7 @@ Intrinsics CalibrationModel::Corrected(const Intrinsics& stated) const {
   corrected.fy *= 1.0 + lens[1];
   corrected.cx += lens[2] * scale;
   corrected.cy += lens[3] * scale;
-  corrected.distortion[0] += lens[4];
-  corrected.distortion[1] += lens[5];
+  for (std::size_t i = 0; i < 4; ++i) corrected.distortion[i] += lens[4 + i];
   return corrected;
 }
 
@@ -54,6 +53,8 @@ std::map<std::string, double> CalibrationModel::Named() const {
                                          {"centre_y_px", lens[3]},
                                          {"distortion_k1", lens[4]},
                                          {"distortion_k2", lens[5]},
+                                         {"distortion_p1", lens[6]},
+                                         {"distortion_p2", lens[7]},
                                          {"color_readout_s", readout_s[0]},
                                          {"marker_edge_bias_px", edge_bias_px[0]},
                                          {"depth_scale", 1.0 + depth[kDepthScale]},

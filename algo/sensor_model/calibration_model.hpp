@@ -15,8 +15,10 @@ namespace plumb {
 /// solver wants them so.
 struct CalibrationModel {
   /// fx' = fx (1 + l[0]), fy' = fy (1 + l[1]), cx' = cx + l[2], cy' = cy + l[3], k1' = k1 + l[4],
-  /// k2' = k2 + l[5].
-  std::array<double, 6> lens{};
+  /// k2' = k2 + l[5], p1' = p1 + l[6], p2' = p2 + l[7].
+  static constexpr int kLensSize = 8;
+  using Lens = std::array<double, kLensSize>;
+  Lens lens{};
   /// Time to read the colour image's rows from top to bottom, seconds; the stamp belongs to the
   /// middle row.
   std::array<double, 1> readout_s{};
@@ -28,7 +30,7 @@ struct CalibrationModel {
 
   /// Prior standard deviations, in the same order: what consumer sensors and their calibrations
   /// scatter.
-  static constexpr std::array<double, 6> kLensSigma = {0.002, 0.002, 1.5, 1.5, 0.01, 0.02};
+  static constexpr Lens kLensSigma = {0.002, 0.002, 1.5, 1.5, 0.01, 0.02, 0.0007, 0.0007};
   static constexpr double kReadoutSigma = 0.02;
   static constexpr double kEdgeBiasSigma = 0.04;
   static const std::array<double, kDepthSize> kDepthSigma;

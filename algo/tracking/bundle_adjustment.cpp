@@ -18,12 +18,13 @@ namespace {
 using namespace bundle;  // NOLINT: the model is this file's own vocabulary
 using Matrix2x6d = Eigen::Matrix<double, 2, 6>;
 constexpr int kCamera = 6;  // Unknowns of a keyframe: its twist.
+constexpr int kLensAndReadout = kReadoutAt + 1;
+constexpr int kSeenByCorners = kEdgeBiasAt + 1;  // Unknowns of the calibration that corners see.
 using CameraVector = Eigen::Matrix<double, kCamera, 1>;
 using CameraMatrix = Eigen::Matrix<double, kCamera, kCamera>;
 using CameraPoint = Eigen::Matrix<double, kCamera, 3>;
 using CameraRows2 = Eigen::Matrix<double, 2, kCamera>;
 using CameraRows3 = Eigen::Matrix<double, 3, kCamera>;
-using CalibrationMatrix = Eigen::Matrix<double, kCalibrationSize, kCalibrationSize>;
 using CalibrationCamera = Eigen::Matrix<double, kCalibrationSize, kCamera>;
 using CalibrationPoint = Eigen::Matrix<double, kCalibrationSize, 3>;
 
@@ -46,7 +47,9 @@ struct PointView {
   Eigen::Vector3d r = Eigen::Vector3d::Zero();
   Eigen::Matrix3d J_point = Eigen::Matrix3d::Zero();
   CameraRows3 J_camera = CameraRows3::Zero();
-  Eigen::Matrix<double, 2, 7> J_lens = Eigen::Matrix<double, 2, 7>::Zero();  // Lens and readout.
+  // Lens and readout.
+  Eigen::Matrix<double, 2, kLensAndReadout> J_lens =
+      Eigen::Matrix<double, 2, kLensAndReadout>::Zero();
   DepthRow J_depth = DepthRow::Zero();
 
   // J' M for this observation's derivatives J to the whole calibration.
@@ -54,8 +57,9 @@ struct PointView {
   [[nodiscard]] Eigen::Matrix<double, kCalibrationSize, kColumns> CalibrationTimes(
       const Eigen::Matrix<double, 3, kColumns>& M) const {
     Eigen::Matrix<double, kCalibrationSize, kColumns> product;
-    product.template topRows<7>().noalias() = J_lens.transpose() * M.template topRows<2>();
-    product.row(kEdgeBias).setZero();
+    product.template topRows<kLensAndReadout>().noalias() =
+        J_lens.transpose() * M.template topRows<2>();
+    product.row(kEdgeBiasAt).setZero();
     product.template bottomRows<CalibrationModel::kDepthSize>().noalias() =
         J_depth.transpose() * M.row(2);
     return product;
@@ -153,6 +157,7 @@ class Bundle {
       if (settled) break;
     }
     summary.final_cost = cost;
+    if (options_.find_information && options_.calibrate) summary.information = Information(state);
     Write(state);
     return summary;
   }
@@ -300,10 +305,7 @@ class Bundle {
       const TermVector x = TermState(state, term);
       cost += x.dot(0.5 * (term.H * x) + term.g);
     }
-    if (options_.calibrate)
-      cost += 0.5 *
-              (ToVector(state.calibration).cwiseProduct(PriorWeights(options_.edge_bias_sigma_px)))
-                  .squaredNorm();
+    if (options_.calibrate) cost += options_.prior.Cost(ToVector(state.calibration));
     return cost;
   }
 
@@ -366,9 +368,9 @@ class Bundle {
         H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += H_calibration[k];
         g_.tail<kCalibrationSize>() += g_calibration[k];
       }
-      const CalibrationVector w = PriorWeights(options_.edge_bias_sigma_px);
-      H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>().diagonal() += w.cwiseAbs2();
-      g_.tail<kCalibrationSize>() += w.cwiseAbs2().cwiseProduct(ToVector(state.calibration));
+      const CalibrationMatrix& prior = options_.prior.information;
+      H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += prior;
+      g_.tail<kCalibrationSize>() += prior * (ToVector(state.calibration) - options_.prior.mean);
     }
     for (const CornerView& view : corners_) AddCorner(state, view);
     for (const QuadraticTerm& term : terms_) AddTerm(state, term);
@@ -390,7 +392,8 @@ class Bundle {
       }
       if (!options_.calibrate) continue;
       if (slot >= 0) H_coupled += view.CalibrationTimes<kCamera>(view.J_camera);
-      H_calibration.topLeftCorner<7, 7>().noalias() += view.J_lens.transpose() * view.J_lens;
+      H_calibration.topLeftCorner<kLensAndReadout, kLensAndReadout>().noalias() +=
+          view.J_lens.transpose() * view.J_lens;
       H_calibration.bottomRightCorner<CalibrationModel::kDepthSize, CalibrationModel::kDepthSize>()
           .noalias() += view.J_depth.transpose() * view.J_depth;
       g_calibration += view.CalibrationTimes<1>(view.r);
@@ -414,8 +417,8 @@ class Bundle {
     view.r.head<2>() = w * (seen.pixel - view.pixel);
     view.J_point.topRows<2>().noalias() = J * point.J_world;
     view.J_camera.topRows<2>() = J * point.J_pose;
-    view.J_lens.leftCols<6>() = w * seen.J_lens;
-    view.J_lens.col(6) = view.place.row_share * (J * point.J_time);
+    view.J_lens.leftCols<CalibrationModel::kLensSize>() = w * seen.J_lens;
+    view.J_lens.col(kReadoutAt) = view.place.row_share * (J * point.J_time);
     view.r[2] = 0;
     view.J_point.row(2).setZero();
     view.J_camera.row(2).setZero();
@@ -466,14 +469,16 @@ class Bundle {
       g_.segment<kCamera>(a).noalias() += J_camera.transpose() * r;
     }
     if (!options_.calibrate) return;
-    Eigen::Matrix<double, 2, 8> J_calibration;  // Lens, readout, edge bias.
+    Eigen::Matrix<double, 2, kSeenByCorners> J_calibration;
     J_calibration << w * seen.J_lens, share * (J * point.J_time), w * view.inward;
-    H_.block<8, 8>(calibration_at_, calibration_at_).noalias() +=
+    H_.block<kSeenByCorners, kSeenByCorners>(calibration_at_, calibration_at_).noalias() +=
         J_calibration.transpose() * J_calibration;
-    H_.block<8, 6>(calibration_at_, m).noalias() += J_calibration.transpose() * J_marker;
+    H_.block<kSeenByCorners, 6>(calibration_at_, m).noalias() +=
+        J_calibration.transpose() * J_marker;
     if (a >= 0)
-      H_.block<8, kCamera>(calibration_at_, a).noalias() += J_calibration.transpose() * J_camera;
-    g_.segment<8>(calibration_at_).noalias() += J_calibration.transpose() * r;
+      H_.block<kSeenByCorners, kCamera>(calibration_at_, a).noalias() +=
+          J_calibration.transpose() * J_camera;
+    g_.segment<kSeenByCorners>(calibration_at_).noalias() += J_calibration.transpose() * r;
   }
 
   void AddTerm(const State& state, const QuadraticTerm& term) {
@@ -482,7 +487,7 @@ class Bundle {
     const Eigen::Index a = CameraAt(term.keyframe_a);
     const Eigen::Index b = term.keyframe_b >= 0 ? CameraAt(term.keyframe_b)
                                                 : markers_at_ + 6 * markers_.at(term.marker);
-    const Eigen::Index d = calibration_at_ + kDepth;
+    const Eigen::Index d = calibration_at_ + kDepthAt;
     if (a >= 0) {
       H_.block<6, 6>(a, a) += term.H.topLeftCorner<6, 6>();
       g_.segment<6>(a) += slope.head<6>();
@@ -536,9 +541,10 @@ class Bundle {
     S.diagonal().array() += 1e-9;
     Eigen::VectorXd right = g_;
     Eliminate(S, right);
-    if (options_.calibrate && options_.fix_lens) Pin(calibration_at_ + kLens, 6, S, right);
+    if (options_.calibrate && options_.fix_lens)
+      Pin(calibration_at_ + kLensAt, CalibrationModel::kLensSize, S, right);
     if (options_.calibrate && options_.fix_depth_field)
-      Pin(calibration_at_ + kDepth + kDepthField, kNumDepthTerms - kDepthField, S, right);
+      Pin(calibration_at_ + kDepthAt + kDepthField, kNumDepthTerms - kDepthField, S, right);
     Eigen::VectorXd x;
     if (!Solve(S, right, x)) return false;
     next = state;
@@ -561,6 +567,25 @@ class Bundle {
       next.landmarks[s] -= point.V_inverse * rest;
     });
     return true;
+  }
+
+  // What the residuals say of the calibration once everything else has been eliminated.
+  [[nodiscard]] CalibrationMatrix Information(const State& state) {
+    Linearise(state);
+    tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t s) { MakePoint(s, 0.0); });
+    Eigen::MatrixXd S = H_;
+    S.diagonal().array() += 1e-9;
+    Eigen::VectorXd right = g_;
+    Eliminate(S, right);
+    const Eigen::MatrixXd poses = S.topLeftCorner(calibration_at_, calibration_at_);
+    const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> solver(poses);
+    if (solver.info() != Eigen::Success) return CalibrationMatrix::Zero();
+    const Eigen::MatrixXd coupling = S.bottomLeftCorner(kCalibrationSize, calibration_at_);
+    CalibrationMatrix information =
+        S.bottomRightCorner<kCalibrationSize, kCalibrationSize>().selfadjointView<Eigen::Lower>();
+    information -= coupling * solver.solve(coupling.transpose());
+    information -= options_.prior.information;
+    return 0.5 * (information + information.transpose());
   }
 
   // S -= W V^-1 W', right -= W V^-1 g over all landmarks. Each free keyframe's rows are one task,

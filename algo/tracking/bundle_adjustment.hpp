@@ -4,7 +4,7 @@
 #include <stop_token>
 #include <vector>
 
-#include "algo/sensor_model/calibration_model.hpp"
+#include "algo/sensor_model/calibration_prior.hpp"
 #include "algo/tracking/map.hpp"
 
 namespace plumb {
@@ -27,7 +27,8 @@ struct BundleOptions {
   bool calibrate = false;           ///< Move the calibration too.
   bool fix_lens = false;            ///< Keep CalibrationModel::lens even so.
   bool fix_depth_field = false;     ///< Keep the depth terms from kDepthField on.
-  double edge_bias_sigma_px = CalibrationModel::kEdgeBiasSigma;  ///< Of its prior.
+  CalibrationPrior prior = PriorOfAnyUnit();  ///< Of the calibration.
+  bool find_information = false;              ///< Fill BundleSummary::information.
   int max_iterations = 8;
   double keypoint_sigma_px = 0.6;  ///< At 640 columns.
   double keypoint_depth_sigmas =
@@ -43,6 +44,9 @@ struct BundleSummary {
   int num_iterations = 0;
   double initial_cost = 0;
   double final_cost = 0;
+  /// Of the residuals alone about the calibration, all else free and eliminated; zero where the
+  /// equations could not be solved.
+  CalibrationMatrix information = CalibrationMatrix::Zero();
 };
 
 /// Moves what the options free, in place, by Levenberg-Marquardt with Cauchy weights; landmarks are

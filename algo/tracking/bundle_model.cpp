@@ -13,35 +13,6 @@ Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& w) {
 
 }  // namespace
 
-CalibrationVector ToVector(const CalibrationModel& c) {
-  CalibrationVector x;
-  for (int i = 0; i < 6; ++i) x[kLens + i] = c.lens[static_cast<std::size_t>(i)];
-  x[kReadout] = c.readout_s[0];
-  x[kEdgeBias] = c.edge_bias_px[0];
-  for (int i = 0; i < CalibrationModel::kDepthSize; ++i)
-    x[kDepth + i] = c.depth[static_cast<std::size_t>(i)];
-  return x;
-}
-
-CalibrationVector PriorWeights(double edge_bias_sigma_px) {
-  using C = CalibrationModel;
-  CalibrationVector w;
-  for (int i = 0; i < 6; ++i) w[kLens + i] = 1.0 / C::kLensSigma[static_cast<std::size_t>(i)];
-  w[kReadout] = 1.0 / C::kReadoutSigma;
-  w[kEdgeBias] = 1.0 / edge_bias_sigma_px;
-  for (int i = 0; i < C::kDepthSize; ++i)
-    w[kDepth + i] = 1.0 / C::kDepthSigma[static_cast<std::size_t>(i)];
-  return w;
-}
-
-void MoveCalibration(const CalibrationVector& by, CalibrationModel& c) {
-  for (int i = 0; i < 6; ++i) c.lens[static_cast<std::size_t>(i)] += by[kLens + i];
-  c.readout_s[0] += by[kReadout];
-  c.edge_bias_px[0] += by[kEdgeBias];
-  for (int i = 0; i < CalibrationModel::kDepthSize; ++i)
-    c.depth[static_cast<std::size_t>(i)] += by[kDepth + i];
-}
-
 void CameraState::Prepare() {
   T_camera_world = PoseFromTwist(twist).inverse() * T_camera0_world;
   R_inverse = RotationFromVector(-twist.head<3>());
@@ -62,7 +33,7 @@ SeenPoint See(const CameraState& camera, const Eigen::Vector3d& p_world, double 
   return seen;
 }
 
-SeenPixel ProjectCorrected(const Intrinsics& k, const std::array<double, 6>& lens,
+SeenPixel ProjectCorrected(const Intrinsics& k, const CalibrationModel::Lens& lens,
                            const Eigen::Vector3d& p) {
   const double iz = 1.0 / p.z();
   const double x = p.x() * iz;
@@ -70,8 +41,8 @@ SeenPixel ProjectCorrected(const Intrinsics& k, const std::array<double, 6>& len
   const double r2 = x * x + y * y;
   const double k1 = k.distortion[0] + lens[4];
   const double k2 = k.distortion[1] + lens[5];
-  const double p1 = k.distortion[2];
-  const double p2 = k.distortion[3];
+  const double p1 = k.distortion[2] + lens[6];
+  const double p2 = k.distortion[3] + lens[7];
   const double k3 = k.distortion[4];
   const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
   const double slope = 2.0 * (k1 + r2 * (2.0 * k2 + 3.0 * r2 * k3));  // d radial / dx = slope x
@@ -87,8 +58,10 @@ SeenPixel ProjectCorrected(const Intrinsics& k, const std::array<double, 6>& len
   const double dyy = radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
   seen.J_point << fx * dxx * iz, fx * dxy * iz, -fx * (dxx * x + dxy * y) * iz,  //
       fy * dxy * iz, fy * dyy * iz, -fy * (dxy * x + dyy * y) * iz;
-  seen.J_lens << k.fx * xd, 0, scale, 0, fx * x * r2, fx * x * r2 * r2,  //
-      0, k.fy * yd, 0, scale, fy * y * r2, fy * y * r2 * r2;
+  seen.J_lens << k.fx * xd, 0, scale, 0, fx * x * r2, fx * x * r2 * r2, fx * 2.0 * x * y,
+      fx * (r2 + 2.0 * x * x),  //
+      0, k.fy * yd, 0, scale, fy * y * r2, fy * y * r2 * r2, fy * (r2 + 2.0 * y * y),
+      fy * 2.0 * x * y;
   return seen;
 }
 

@@ -8,26 +8,13 @@
 
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/pose.hpp"
-#include "algo/sensor_model/calibration_model.hpp"
+#include "algo/sensor_model/calibration_prior.hpp"
 
 namespace plumb::bundle {
 
 using Matrix3x6d = Eigen::Matrix<double, 3, 6>;
 
-/// Places of CalibrationModel's blocks in one vector of all that can be calibrated.
-inline constexpr int kLens = 0;
-inline constexpr int kReadout = 6;
-inline constexpr int kEdgeBias = 7;
-inline constexpr int kDepth = 8;
-inline constexpr int kCalibrationSize = kDepth + CalibrationModel::kDepthSize;
-using CalibrationVector = Eigen::Matrix<double, kCalibrationSize, 1>;
 using DepthRow = Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>;
-
-/// Of a calibration, in these places.
-[[nodiscard]] CalibrationVector ToVector(const CalibrationModel& calibration);
-/// 1 / standard deviation of each one's prior.
-[[nodiscard]] CalibrationVector PriorWeights(double edge_bias_sigma_px);
-void MoveCalibration(const CalibrationVector& by, CalibrationModel& calibration);
 
 /// In front of the camera; nearer, projections mean nothing.
 inline constexpr double kNearestPoint_m = 0.02;
@@ -60,10 +47,10 @@ struct SeenPoint {
 struct SeenPixel {
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, 3> J_point;
-  Eigen::Matrix<double, 2, 6> J_lens;
+  Eigen::Matrix<double, 2, CalibrationModel::kLensSize> J_lens;
 };
 [[nodiscard]] SeenPixel ProjectCorrected(const Intrinsics& stated,
-                                         const std::array<double, 6>& lens,
+                                         const CalibrationModel::Lens& lens,
                                          const Eigen::Vector3d& p);
 
 /// Share of the readout before or after the stamp at an image row: -0.5 at the top, 0.5 at the

@@ -50,6 +50,7 @@ struct Scene {
   std::optional<HeightMap> height_map;  ///< Only in the reference marker's frame.
   TriangleMesh mesh;                    ///< Of the height map, or empty.
 
+  std::optional<std::string> sensor_profile;  ///< Name of what was known of the sensor unit.
   std::map<std::string, double> calibration;  ///< What was estimated; keys carry their units.
   std::map<std::string, double> timings_s;
   std::vector<std::string> warnings;

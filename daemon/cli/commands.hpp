@@ -36,6 +36,7 @@ using Command = std::function<int(const CommandContext&)>;
 /// Adds the subcommand to `app` and returns how to run it once the line is parsed.
 [[nodiscard]] Command AddSimulate(CLI::App& app);
 [[nodiscard]] Command AddReconstruct(CLI::App& app);
+[[nodiscard]] Command AddCalibrate(CLI::App& app);
 [[nodiscard]] Command AddCompare(CLI::App& app);
 [[nodiscard]] Command AddMesh(CLI::App& app);
 [[nodiscard]] Command AddInfo(CLI::App& app);

@@ -5,6 +5,7 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/cli/progress.hpp"
+#include "daemon/files/sensor_profile_file.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
 #ifdef PLUMB_WITH_OPENNI
 #include "drivers/openni/oni_recording.hpp"
@@ -21,11 +22,18 @@ void MethodOptions::AddTo(CLI::App& app) {
   app.add_option("--config", config_file, "Options of the method, as TOML")->type_name("FILE");
 }
 
+void MethodOptions::AddSensorTo(CLI::App& app) {
+  app.add_option("--sensor-profile", profile_file,
+                 "What plumb calibrate learned of this sensor unit")
+      ->type_name("PROFILE");
+}
+
 Config MethodOptions::Read() const {
   Config config = config_file ? ReadConfig(*config_file) : Config{};
   if (preset)
     config.reconstruct.preset = config.compare.preset =
         *preset == "paper" ? Preset::kPaper : Preset::kBest;
+  if (profile_file) config.reconstruct.profile = ReadSensorProfile(*profile_file);
   if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
   return config;
 }

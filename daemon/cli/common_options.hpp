@@ -20,12 +20,16 @@ namespace plumb {
 class Progress;
 struct ScanProgress;
 
-/// --preset and --config, and what they say together: the option on the line wins over the file.
+/// --preset, --config and --sensor-profile, and what they say together: the option on the line wins
+/// over the file.
 struct MethodOptions {
   std::optional<std::string> preset;
   std::optional<std::filesystem::path> config_file;
+  std::optional<std::filesystem::path> profile_file;
 
   void AddTo(CLI::App& app);
+  /// --sensor-profile, for commands that reconstruct.
+  void AddSensorTo(CLI::App& app);
   /// The region file that the configuration names is read too.
   /// @throws DataError from either file.
   [[nodiscard]] Config Read() const;

@@ -90,6 +90,7 @@ Command AddEvaluate(CLI::App& app) {
                  "Folder for scenes and figures; default SUITE_DIR/results-PRESET")
       ->type_name("DIR");
   options->method.AddTo(app);
+  options->method.AddSensorTo(app);
   app.add_flag("--reuse", options->reuse,
                "Keep the scenes that an earlier run left in the folder instead of reconstructing "
                "them again");

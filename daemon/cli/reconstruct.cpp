@@ -76,6 +76,7 @@ Command AddReconstruct(CLI::App& app) {
       ->type_name("RECORDING");
   app.add_option("--out", options->out, "Scene folder to write")->required()->type_name("SCENE");
   options->method.AddTo(app);
+  options->method.AddSensorTo(app);
   app.add_flag("--realtime", options->realtime,
                "Play the recording at its own pace, dropping frames as a live sensor would");
   app.add_flag("--json", options->json, "Print scene.json on the standard output");

@@ -201,6 +201,7 @@ std::string SceneJson(const Scene& scene) {
                     {"tracked", scene.frames_tracked},
                     {"dropped", scene.frames_dropped}};
   json["longest_lost_s"] = scene.longest_lost_s;
+  json["sensor_profile"] = scene.sensor_profile ? Json(*scene.sensor_profile) : Json();
   json["calibration"] = MapJson(scene.calibration);
   json["timings_s"] = MapJson(scene.timings_s);
   json["warnings"] = scene.warnings;
@@ -242,6 +243,8 @@ SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
   scene.frames_tracked = frames["tracked"].Integer(0, kMaxCount);
   scene.frames_dropped = frames["dropped"].Integer(0, kMaxCount);
   if (root.has("longest_lost_s")) scene.longest_lost_s = root["longest_lost_s"].Number(0, 1e9);
+  if (root.has("sensor_profile") && !root["sensor_profile"].is_null())
+    scene.sensor_profile = root["sensor_profile"].Text();
   if (root.has("calibration")) {
     root["calibration"].ForEach([&](const std::string& key, const Value& value) {
       scene.calibration[key] = value.Number(-1e12, 1e12);

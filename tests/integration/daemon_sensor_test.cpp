@@ -189,6 +189,8 @@ TEST_F(DaemonSensorTest,
   const fs::path scan = plumbd.state() / "scans" / last["scan"].get<std::string>();
   if (last["verdict"] == "no_answer") {
     EXPECT_FALSE(last["reasons"].empty());
+    EXPECT_TRUE(last["correction"].is_null());
+    EXPECT_TRUE(last.value("vertical_mm", json()).is_null());
     return;
   }
   const json scene = json::parse(ReadTextFile(scan / "scene" / "scene.json", 1 << 24));
@@ -295,6 +297,8 @@ TEST_P(DaemonGlitchTest, AreCountedAndTheResultIsRightOrSaidToBeNone) {
   EXPECT_EQ(first["last_result"]["is_reference"], true);
   if (last["verdict"] == "no_answer") {
     EXPECT_FALSE(last["reasons"].empty());
+    EXPECT_TRUE(last["correction"].is_null());
+    EXPECT_TRUE(last.value("vertical_mm", json()).is_null());
     return;
   }
   const fs::path file =

@@ -40,6 +40,47 @@ TEST_F(ScenesTest, ReconstructWritesEveryFileOfTheContract) {
   EXPECT_GE(facts.at("markers").size(), 3U);
 }
 
+TEST_F(ScenesTest, AProfileLearnedFromASweepServesTheNext) {
+  const fs::path profile = folder_ / "unit.json";
+  const RunResult learned =
+      Plumb({"calibrate", SmallRecording(Reference()), "--out", profile, "--json"});
+  ASSERT_EQ(learned.exit_code, 0) << learned.err;
+  EXPECT_EQ(json::parse(learned.out), json::parse(ReadText(profile)));
+  EXPECT_EQ(json::parse(learned.out).at("sweeps"), 1);
+  const RunResult twice = Plumb({"calibrate", SmallRecording(Current()), "--sensor-profile",
+                                 profile, "--out", folder_ / "two.json", "--json"});
+  ASSERT_EQ(twice.exit_code, 0) << twice.err;
+  EXPECT_EQ(json::parse(twice.out).at("sweeps"), 2);
+
+  const RunResult with = Plumb({"reconstruct", SmallRecording(Current()), "--sensor-profile",
+                                profile, "--out", folder_ / "scene", "--json"});
+  ASSERT_EQ(with.exit_code, 0) << with.err;
+  const json facts = json::parse(with.out);
+  EXPECT_EQ(facts.at("sensor_profile"), "unit.json, 1 sweep");
+  const json without = json::parse(ReadText(SmallScene(Current()) / "scene.json"));
+  EXPECT_TRUE(without.at("sensor_profile").is_null());
+  // It acts: the lens comes out nearer to what the profile says.
+  const double said = json::parse(learned.out).at("calibration").at("focal_x_scale");
+  EXPECT_LT(std::abs(facts.at("calibration").at("focal_x_scale").get<double>() - said),
+            std::abs(without.at("calibration").at("focal_x_scale").get<double>() - said));
+}
+
+TEST_F(ScenesTest, AProfileOfAnotherUnitIsRefusedAndNothingIsWritten) {
+  const fs::path profile = folder_ / "unit.json";
+  ASSERT_EQ(Plumb({"calibrate", SmallRecording(Reference()), "--out", profile}).exit_code, 0);
+  json other = json::parse(ReadText(profile));
+  other["stated_intrinsics"]["fx_px"] = other["stated_intrinsics"]["fx_px"].get<double>() + 1.0;
+  WriteText(folder_ / "other.json", other.dump());
+  WriteText(folder_ / "broken.json", "{}");
+  for (const char* name : {"other.json", "broken.json", "missing.json"}) {
+    const RunResult result = Plumb({"reconstruct", SmallRecording(Current()), "--sensor-profile",
+                                    folder_ / name, "--out", folder_ / "scene"});
+    EXPECT_EQ(result.exit_code, 3) << name << result.err;
+    EXPECT_THAT(result.err, HasSubstr("profile"));
+  }
+  EXPECT_THAT(LeftBehind({"unit.json", "other.json", "broken.json"}), IsEmpty());
+}
+
 TEST_F(ScenesTest, JsonOnTheStandardOutputIsTheFile) {
   const RunResult result =
       Plumb({"reconstruct", SmallRecording(Reference()), "--out", folder_ / "scene", "--json"});

@@ -85,6 +85,42 @@ TEST(RegisterJointly, FindsWhatTheDepthCameraGetsWrong) {
   EXPECT_NEAR(d[5], 0.004, 0.001);                       // Measured: 0.0041.
 }
 
+TEST(RegisterJointly, BeginsFromWhatIsKnownOfTheSensorAndSaysWhatTheSweepShowed) {
+  synthetic::MapOptions options = kLandscape;
+  options.sensor.depth[kDepthScale] = 0.008;
+  const TrueMap truth = MakeTrueMap(options);
+  JointRegistrationOptions known;
+  known.find_evidence = true;
+  known.prior.mean[kDepthAt + kDepthScale] = 0.004;
+  known.prior.information(kDepthAt + kDepthScale, kDepthAt + kDepthScale) = 1e16;
+  TrackingMap map = truth.map;
+  const auto held = RegisterJointly(truth.stated, known, map);
+  EXPECT_NEAR(held.calibration.depth[kDepthScale], 0.004, 1e-5) << "the prior does not act";
+  TrackingMap again = truth.map;
+  const auto free = RegisterJointly(truth.stated, {.find_evidence = true}, again);
+  ASSERT_TRUE(free.accepted);
+  EXPECT_EQ(free.evidence.solution, ToVector(free.calibration));
+  const auto& information = free.evidence.information;
+  EXPECT_TRUE(information.isApprox(information.transpose()));
+  EXPECT_GT(information(kLensAt, kLensAt), 1e4);  // A focal length to better than one percent.
+  EXPECT_GT(information(kDepthAt + kDepthShiftX, kDepthAt + kDepthShiftX), 1.0);
+}
+
+TEST(RegisterJointly, AsksForVelocitiesBeforeEachDenseRound) {
+  const TrueMap truth = MakeTrueMap({.num_keyframes = 5, .num_landmarks = 60, .dense = true});
+  TrackingMap map = truth.map;
+  int asked = 0;
+  JointRegistrationOptions options;
+  options.num_rounds = 2;
+  options.settled_m = 0.0;
+  options.refresh_velocities = [&](TrackingMap& moved) {
+    EXPECT_EQ(&moved, &map);
+    ++asked;
+  };
+  static_cast<void>(RegisterJointly(truth.stated, options, map));
+  EXPECT_EQ(asked, 2);
+}
+
 TEST(RegisterJointly, SameBitsOnAnyNumberOfThreads) {
   const TrueMap truth = MakeTrueMap({.num_keyframes = 5, .num_landmarks = 60, .dense = true});
   std::vector<TrackingMap> maps(2, truth.map);

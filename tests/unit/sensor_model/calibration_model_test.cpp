@@ -15,7 +15,7 @@ TEST(CalibrationModel, NothingWrongChangesNothing) {
 
 TEST(CalibrationModel, CorrectsTheLensInPixelsOfSixHundredAndFortyColumns) {
   CalibrationModel model;
-  model.lens = {0.01, -0.02, 3.0, -4.0, 0.05, 0.06};
+  model.lens = {0.01, -0.02, 3.0, -4.0, 0.05, 0.06, 0.007, 0.008};
   Intrinsics k;
   k.width = 320;
   k.height = 240;
@@ -30,6 +30,8 @@ TEST(CalibrationModel, CorrectsTheLensInPixelsOfSixHundredAndFortyColumns) {
   EXPECT_DOUBLE_EQ(c.cy, 118.0);
   EXPECT_DOUBLE_EQ(c.distortion[0], 0.05);
   EXPECT_DOUBLE_EQ(c.distortion[1], 0.06);
+  EXPECT_DOUBLE_EQ(c.distortion[2], 0.007);
+  EXPECT_DOUBLE_EQ(c.distortion[3], 0.008);
 }
 
 TEST(CalibrationModel, CorrectsDepthTermByTerm) {
@@ -49,7 +51,8 @@ TEST(CalibrationModel, CentredCoordinatesStartInTheMiddleAndGoByHalfWidths) {
 }
 
 TEST(CalibrationModel, NamesEveryParameter) {
-  EXPECT_EQ(CalibrationModel{}.Named().size(), 6U + 1U + 1U + CalibrationModel::kDepthSize);
+  EXPECT_EQ(CalibrationModel{}.Named().size(),
+            CalibrationModel::kLensSize + 1U + 1U + CalibrationModel::kDepthSize);
 }
 
 }  // namespace

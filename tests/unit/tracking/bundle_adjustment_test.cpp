@@ -125,6 +125,8 @@ INSTANTIATE_TEST_SUITE_P(
                     0.05},
         WrongSensor{"k1", [](CalibrationModel& c) -> double& { return c.lens[4]; }, 0.01, 0.001},
         WrongSensor{"k2", [](CalibrationModel& c) -> double& { return c.lens[5]; }, 0.02, 0.003},
+        WrongSensor{"p1", [](CalibrationModel& c) -> double& { return c.lens[6]; }, 0.001, 1e-4},
+        WrongSensor{"p2", [](CalibrationModel& c) -> double& { return c.lens[7]; }, 0.001, 1e-4},
         WrongSensor{"readout", [](CalibrationModel& c) -> double& { return c.readout_s[0]; }, 0.02,
                     4e-4},
         WrongSensor{"edge_bias", [](CalibrationModel& c) -> double& { return c.edge_bias_px[0]; },

@@ -80,7 +80,8 @@ TEST(BundleModel, ASeenPointMovesAsTheCameraDoes) {
 }
 
 TEST(BundleModel, DerivativesOfAPixel) {
-  const std::array<double, 6> lens = {0.002, -0.001, 0.5, -0.7, 0.01, -0.02};
+  constexpr int kSize = CalibrationModel::kLensSize;
+  const CalibrationModel::Lens lens = {0.002, -0.001, 0.5, -0.7, 0.01, -0.02, 0.003, -0.002};
   const Eigen::Vector3d p(0.31, -0.22, 0.8);
   const SeenPixel seen = ProjectCorrected(SomeLens(), lens, p);
   EXPECT_LT((Mismatch<2, 3>(seen.J_point,
@@ -88,14 +89,13 @@ TEST(BundleModel, DerivativesOfAPixel) {
                               return ProjectCorrected(SomeLens(), lens, p + step).pixel;
                             })),
             1e-5);
-  EXPECT_LT((Mismatch<2, 6>(seen.J_lens,
-                            [&](const Vector6d& step) {
-                              std::array<double, 6> moved = lens;
-                              for (int i = 0; i < 6; ++i)
-                                moved[static_cast<std::size_t>(i)] += step[i];
-                              return ProjectCorrected(SomeLens(), moved, p).pixel;
-                            })),
-            1e-5);
+  const double worst =
+      Mismatch<2, kSize>(seen.J_lens, [&](const Eigen::Matrix<double, kSize, 1>& step) {
+        CalibrationModel::Lens moved = lens;
+        for (int i = 0; i < kSize; ++i) moved[static_cast<std::size_t>(i)] += step[i];
+        return ProjectCorrected(SomeLens(), moved, p).pixel;
+      });
+  EXPECT_LT(worst, 1e-5);
   // Without corrections it is the stated lens.
   EXPECT_LT((ProjectCorrected(SomeLens(), {}, p).pixel - Project(SomeLens(), p)).norm(), 1e-9);
 }

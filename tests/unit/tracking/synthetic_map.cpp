@@ -30,8 +30,10 @@ struct Camera {
     const double y = p.y() / p.z();
     const double r2 = x * x + y * y;
     const double f = 1 + (d[0] + l[4]) * r2 + (d[1] + l[5]) * r2 * r2 + d[4] * r2 * r2 * r2;
-    const double xd = x * f + 2 * d[2] * x * y + d[3] * (r2 + 2 * x * x);
-    const double yd = y * f + d[2] * (r2 + 2 * y * y) + 2 * d[3] * x * y;
+    const double p1 = d[2] + l[6];
+    const double p2 = d[3] + l[7];
+    const double xd = x * f + 2 * p1 * x * y + p2 * (r2 + 2 * x * x);
+    const double yd = y * f + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y;
     return {stated.fx * (1 + l[0]) * xd + stated.cx + l[2] * scale(),
             stated.fy * (1 + l[1]) * yd + stated.cy + l[3] * scale()};
   }

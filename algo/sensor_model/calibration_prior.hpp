@@ -1,0 +1,37 @@
+// A calibration as one vector, and what is known of it before a sweep.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "algo/sensor_model/calibration_model.hpp"
+
+namespace plumb {
+
+/// Places of CalibrationModel's blocks in the vector.
+inline constexpr int kLensAt = 0;
+inline constexpr int kReadoutAt = kLensAt + CalibrationModel::kLensSize;
+inline constexpr int kEdgeBiasAt = kReadoutAt + 1;
+inline constexpr int kDepthAt = kEdgeBiasAt + 1;
+inline constexpr int kCalibrationSize = kDepthAt + CalibrationModel::kDepthSize;
+using CalibrationVector = Eigen::Matrix<double, kCalibrationSize, 1>;
+using CalibrationMatrix = Eigen::Matrix<double, kCalibrationSize, kCalibrationSize>;
+
+[[nodiscard]] CalibrationVector ToVector(const CalibrationModel& calibration);
+void MoveCalibration(const CalibrationVector& by, CalibrationModel& calibration);
+
+/// Normal distribution of a sensor's calibration: 1/2 (x - mean)' information (x - mean) is what it
+/// adds to a least-squares problem.
+struct CalibrationPrior {
+  CalibrationVector mean = CalibrationVector::Zero();
+  CalibrationMatrix information = CalibrationMatrix::Zero();
+
+  [[nodiscard]] double Cost(const CalibrationVector& x) const {
+    return 0.5 * (x - mean).dot(information * (x - mean));
+  }
+};
+
+/// Of a unit that nothing is known of but its stated calibration.
+[[nodiscard]] CalibrationPrior PriorOfAnyUnit(
+    double edge_bias_sigma_px = CalibrationModel::kEdgeBiasSigma);
+
+}  // namespace plumb

@@ -1,0 +1,76 @@
+#include <memory>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "algo/base/errors.hpp"
+#include "daemon/cli/commands.hpp"
+#include "daemon/cli/common_options.hpp"
+#include "daemon/cli/progress.hpp"
+#include "daemon/files/sensor_profile_file.hpp"
+#include "daemon/pipeline/scan_runner.hpp"
+
+namespace plumb {
+namespace {
+
+struct Options {
+  std::vector<std::filesystem::path> recordings;
+  std::filesystem::path out;
+  MethodOptions method;
+  bool json = false;
+};
+
+int Run(const Options& options, const CommandContext& context) {
+  Config config = options.method.Read();
+  if (config.reconstruct.preset == Preset::kPaper)
+    throw std::invalid_argument("the preset paper takes the sensor at its word: it learns nothing");
+  Progress progress;
+  std::vector<std::string> left_out;
+  for (const std::filesystem::path& path : options.recordings) {
+    const std::unique_ptr<FrameSource> recording = OpenRecording(path, config.markers);
+    std::optional<SensorProfile> learned;
+    config.reconstruct.on_learned = [&](const SensorProfile& profile) { learned = profile; };
+    const Scene scene = RunScan(
+        *recording, {.reconstructor = config.reconstruct}, context.stop,
+        [&](const ScanProgress& scan) { Show(progress, path.filename().string() + ": ", scan); });
+    if (learned && !scene.markers.empty()) {
+      config.reconstruct.profile = std::move(learned);
+    } else {
+      left_out.push_back(fmt::format(
+          "{}: {}", path.string(),
+          scene.markers.empty() ? "no marker was seen, so nothing tells the true size of what was "
+                                  "seen"
+                                : "its views did not agree better under any calibration"));
+    }
+  }
+  progress.Clear();
+  for (const std::string& reason : left_out) fmt::print(stderr, "left out {}\n", reason);
+  if (left_out.size() == options.recordings.size())
+    throw DataError(
+        "no recording could be used: sweep slowly over a scene with several markers, and try "
+        "again");
+  const SensorProfile& profile = *config.reconstruct.profile;
+  WriteSensorProfile(profile, options.out);
+  PrintOut(options.json
+               ? SensorProfileJson(profile)
+               : fmt::format("{}\n  sweeps     {}\n", options.out.string(), profile.num_sweeps));
+  return kDone;
+}
+
+}  // namespace
+
+Command AddCalibrate(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("recordings", options->recordings,
+                 "Ordinary sweeps by one sensor unit over any scenes with markers; better several")
+      ->required()
+      ->type_name("RECORDING");
+  app.add_option("--out", options->out, "Profile to write")->required()->type_name("PROFILE");
+  options->method.AddTo(app);
+  options->method.AddSensorTo(app);
+  app.add_flag("--json", options->json, "Print the profile on the standard output");
+  return [options](const CommandContext& context) { return Run(*options, context); };
+}
+
+}  // namespace plumb

@@ -1,0 +1,21 @@
+// A sensor unit's profile as a JSON file.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "algo/sensor_model/sensor_profile.hpp"
+
+namespace plumb {
+
+/// Names the profile after the file.
+/// @throws DataError if the file is missing, too large, no profile, of another version, or its
+/// covariance is not positive definite.
+[[nodiscard]] SensorProfile ReadSensorProfile(const std::filesystem::path& file);
+
+/// Replaces the file at once, or leaves it as it was. @throws IoError
+void WriteSensorProfile(const SensorProfile& profile, const std::filesystem::path& file);
+
+[[nodiscard]] std::string SensorProfileJson(const SensorProfile& profile);
+
+}  // namespace plumb

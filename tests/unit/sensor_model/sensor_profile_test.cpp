@@ -1,0 +1,104 @@
+#include "algo/sensor_model/sensor_profile.hpp"
+
+#include <gtest/gtest.h>
+#include <Eigen/Cholesky>
+
+#include "algo/base/errors.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr int kFocal = kLensAt;
+constexpr int kScale = kDepthAt + kDepthScale;
+
+Intrinsics Stated() {
+  Intrinsics k;
+  k.width = 640;
+  k.height = 480;
+  k.fx = k.fy = 525;
+  k.cx = 319.5;
+  k.cy = 239.5;
+  return k;
+}
+
+double Sigma(const SensorProfile& profile, int term) {
+  return std::sqrt(profile.covariance(term, term));
+}
+
+// A sweep that sees two terms, each with this standard deviation of its own, at these values; and
+// what a solver makes of it under the prior.
+SweepEvidence Sweep(const CalibrationPrior& prior, double focal, double scale, double sigma) {
+  SweepEvidence evidence;
+  evidence.information(kFocal, kFocal) = evidence.information(kScale, kScale) =
+      1.0 / (sigma * sigma);
+  CalibrationVector own = CalibrationVector::Zero();
+  own[kFocal] = focal;
+  own[kScale] = scale;
+  const CalibrationMatrix both = evidence.information + prior.information;
+  evidence.solution = both.llt().solve(evidence.information * own + prior.information * prior.mean);
+  return evidence;
+}
+
+TEST(SensorProfile, AUnitThatNothingIsKnownOfHasThePriorOfAnyUnit) {
+  const SensorProfile profile = ProfileOfAnyUnit(Stated());
+  const CalibrationPrior any = PriorOfAnyUnit();
+  EXPECT_EQ(profile.num_sweeps, 0);
+  EXPECT_TRUE(profile.mean.isZero());
+  EXPECT_NEAR(Sigma(profile, kFocal), CalibrationModel::kLensSigma[0], 1e-12);
+  EXPECT_NEAR(any.information(kFocal, kFocal) * profile.covariance(kFocal, kFocal), 1.0, 1e-9);
+}
+
+TEST(SensorProfile, GoesToWhatSweepsAgreeOnAndGrowsSurer) {
+  SensorProfile profile = ProfileOfAnyUnit(Stated());
+  double last = Sigma(profile, kFocal);
+  for (int sweep = 1; sweep <= 6; ++sweep) {
+    const CalibrationPrior prior = PriorOfNextSweep(profile, Stated(), 0.01);
+    profile = Learn(profile, prior, Sweep(prior, 0.0015, -0.008, 1e-4));
+    EXPECT_EQ(profile.num_sweeps, sweep);
+    EXPECT_LT(Sigma(profile, kFocal), last) << sweep;
+    last =
+        Sigma(profile, kFocal) + 1e-5;  // It settles where what changes from sweep to sweep wins.
+  }
+  EXPECT_NEAR(profile.mean[kFocal], 0.0015, 2e-5);
+  EXPECT_NEAR(profile.mean[kScale], -0.008, 2e-4);
+  // What no sweep showed stays as it was.
+  EXPECT_EQ(profile.mean[kLensAt + 4], 0.0);
+  EXPECT_GE(Sigma(profile, kLensAt + 4), CalibrationModel::kLensSigma[4]);
+}
+
+TEST(SensorProfile, SweepsThatContradictEachOtherMeetBetween) {
+  SensorProfile profile = ProfileOfAnyUnit(Stated());
+  for (const double focal : {0.001, 0.002}) {
+    const CalibrationPrior prior = PriorOfNextSweep(profile, Stated(), 0.01);
+    profile = Learn(profile, prior, Sweep(prior, focal, 0.0, 1e-4));
+  }
+  EXPECT_GT(profile.mean[kFocal], 0.0012);
+  EXPECT_LT(profile.mean[kFocal], 0.0018);
+}
+
+TEST(SensorProfile, TheEdgeShiftIsNeverCarriedOver) {
+  SensorProfile profile = ProfileOfAnyUnit(Stated());
+  profile.mean[kEdgeBiasAt] = 0.3;
+  profile.covariance(kEdgeBiasAt, kFocal) = profile.covariance(kFocal, kEdgeBiasAt) = 1e-5;
+  const CalibrationPrior prior = PriorOfNextSweep(profile, Stated(), 0.02);
+  EXPECT_EQ(prior.mean[kEdgeBiasAt], 0.0);
+  EXPECT_NEAR(prior.information(kEdgeBiasAt, kEdgeBiasAt), 1.0 / (0.02 * 0.02), 1e-6);
+  EXPECT_NEAR(prior.information(kEdgeBiasAt, kFocal), 0.0, 1e-9);
+}
+
+TEST(SensorProfile, IsRefusedForAnotherCamera) {
+  const SensorProfile profile = ProfileOfAnyUnit(Stated());
+  Intrinsics other = Stated();
+  other.fx += 0.01;
+  EXPECT_THROW(static_cast<void>(PriorOfNextSweep(profile, other, 0.02)), DataError);
+  EXPECT_NO_THROW(static_cast<void>(PriorOfNextSweep(profile, Stated(), 0.02)));
+}
+
+TEST(SensorProfile, IsRefusedWithoutAProperCovariance) {
+  SensorProfile profile = ProfileOfAnyUnit(Stated());
+  profile.covariance(kScale, kScale) = -1.0;
+  EXPECT_THROW(static_cast<void>(PriorOfNextSweep(profile, Stated(), 0.02)), DataError);
+}
+
+}  // namespace
+}  // namespace plumb
