@@ -476,9 +476,10 @@ void AddTrackedLinks(const TrackingMap& map, std::vector<QuadraticTerm>& terms) 
   }
 }
 
-// What a keyframe's motion model leaves out is common to all its keypoints: beyond a number that
-// covers the image, more of them say nothing new. By how much each one's standard deviation grows.
-double KeypointCrowding(const TrackingMap& map) {
+// Errors of a keyframe's motion model are common to all its keypoints. Beyond the number that
+// covers the image more keypoints therefore add no information, and the standard deviation of each
+// grows by this factor.
+double KeypointSigmaFactor(const TrackingMap& map) {
   constexpr double kEnough = 150.0;  // In a keyframe.
   std::size_t count = 0;
   for (const MapKeyframe& keyframe : map.keyframes)
@@ -506,7 +507,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   BundleOptions bundle;
   bundle.marker_length_m = options.marker_length_m;
   bundle.calibrate = options.calibrate;
-  bundle.keypoint_sigma_px = options.keypoint_sigma_px * KeypointCrowding(map);
+  bundle.keypoint_sigma_px = options.keypoint_sigma_px * KeypointSigmaFactor(map);
   bundle.keypoint_depth_sigmas = options.keypoint_depth_sigmas;
   bundle.prior = options.prior;
   if (options.calibrate) MoveCalibration(options.prior.mean, result.calibration);

@@ -34,9 +34,9 @@ struct Relocalization {
                                                                  const Intrinsics& intrinsics,
                                                                  const DescribedFeatures& features);
 
-/// Pose of one marker in the camera frame from its four corners: the square's two candidate poses,
-/// told apart by depth inside it, or by reprojection where that is clear. Nothing is returned if
-/// neither decides.
+/// Pose of one marker in the camera frame from its four corners. A square has two candidate poses;
+/// the depth inside it decides between them, or else a clear difference in reprojection error.
+/// Returns nothing if neither decides.
 [[nodiscard]] std::optional<Pose> MarkerPoseInCamera(const Intrinsics& intrinsics,
                                                      double marker_length_m,
                                                      const MarkerObservation& marker,

@@ -492,7 +492,7 @@ Appliance::Answer Appliance::CloseSession(const web::Actor& actor) {
   return {};
 }
 
-/// The demo's own session never expires, because nobody is at the screen to open it again.
+/// The demo's session does not expire: there is no user who could open it again.
 void Appliance::ArmSessionTimer() {
   if (session_id_.empty() || opened_by_.user == kSelf.user) return session_timer_.Disarm();
   session_timer_.ArmAfter(kSessionIdle);

@@ -238,7 +238,7 @@ std::string Appliance::StatusJson() {
       const Json result = Json::parse(outcome.result_json);
       last["verdict"] = result["verdict"];
       last["reasons"] = result["reasons"];
-      // Numbers of a result that is no answer are for nobody to act on.
+      // A result without an answer shows no numbers, so that nobody acts on them.
       const Json correction =
           result["verdict"] == "no_answer" ? Json(nullptr) : result["correction"];
       last["correction"] = correction;

@@ -41,8 +41,8 @@ void Appliance::OpenStore() {
     };
     store_ = std::make_unique<Store>(parts_.config.appliance.state, options);
     LogRecovery(store_->recovery());
-    store_->CloseSessions(kSelf);  // a session does not outlive the process: nobody has confirmed
-                                   // who is on the couch now
+    // Sessions end with the process: who is on the couch has to be confirmed again.
+    store_->CloseSessions(kSelf);
     if (!parts_.demo_patient.empty()) {
       const auto patient = store_->FindPatientByCode(parts_.demo_patient);
       open_patient_ = patient ? patient->id : store_->AddPatient(kSelf, parts_.demo_patient, "");

@@ -143,7 +143,7 @@ void Updates::InstallFile(const web::Actor& actor, std::shared_ptr<const Attache
 
 void Updates::Restart(const web::Actor& actor, web::Done done) {
   if (const std::string why = WhyNotRestart(); !why.empty()) return done(Conflict(why));
-  restarting_ = true;  // until the machine goes down nobody begins what it would interrupt
+  restarting_ = true;  // No scan, session or update may begin before the machine goes down.
   options_.log(actor, "system.restart", "", "");
   Log(LogLevel::kNotice, fmt::format("{} restarts the machine", actor.user));
   restart_->Restart(

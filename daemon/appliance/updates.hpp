@@ -57,7 +57,7 @@ class Updates {
   UpdatesOptions options_;
   bool restarting_ = false, copying_ = false;
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
-  Updater updater_;  // last: what it tells uses the rest
+  Updater updater_;  // Declared last, so destroyed first: its callbacks use the members above.
 };
 
 }  // namespace plumb

@@ -120,8 +120,9 @@ class WebService : public web::ScanService {
   std::shared_ptr<const std::string> preview_;
   std::int64_t preview_index_ = -1;
   std::chrono::steady_clock::time_point preview_at_;
-  Updates updates_;                   // what it tells uses the rest
-  WorkThread reads_{64}, files_{64};  // last: what they do uses the rest
+  // Declared last, so destroyed first: their callbacks use the members above.
+  Updates updates_;
+  WorkThread reads_{64}, files_{64};
 };
 
 }  // namespace plumb

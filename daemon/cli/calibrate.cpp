@@ -24,7 +24,8 @@ struct Options {
 int Run(const Options& options, const CommandContext& context) {
   Config config = options.method.Read();
   if (config.reconstruct.preset == Preset::kPaper)
-    throw std::invalid_argument("the preset paper takes the sensor at its word: it learns nothing");
+    throw std::invalid_argument(
+        "the preset paper uses the stated calibration, so it cannot learn a profile");
   Progress progress;
   std::vector<std::string> left_out;
   for (const std::filesystem::path& path : options.recordings) {

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using Kind = ControlRequest::Kind;
 
-constexpr std::chrono::milliseconds kLookEvery{300};
+constexpr std::chrono::milliseconds kPollInterval{300};
 
 struct Options {
   std::optional<fs::path> file;
@@ -67,7 +67,7 @@ void Follow(Progress& progress, const CommandContext& context) {
     progress.Update(step.empty() ? "installing" : step, status.value("fraction", 0.0));
     if (context.stop.stop_requested())
       throw Interrupted("plumbd goes on with the installation; its page shows how far it is");
-    std::this_thread::sleep_for(kLookEvery);
+    std::this_thread::sleep_for(kPollInterval);
   }
 }
 

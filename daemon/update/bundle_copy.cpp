@@ -1,5 +1,6 @@
 #include "daemon/update/bundle_copy.hpp"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -62,7 +63,7 @@ std::filesystem::path CopyBundle(int fd, const std::filesystem::path& folder,
   std::filesystem::create_directories(folder, ignored);
   CheckRoom(folder, bytes);
   std::string path = (folder / ".upload-XXXXXX").string();
-  const int copy = ::mkstemp(path.data());
+  const int copy = ::mkostemp(path.data(), O_CLOEXEC);
   if (copy < 0) throw IoError(DescribeWriteError(folder, errno));
   try {
     CopyAll(fd, copy, bytes, path);
