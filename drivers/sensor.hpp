@@ -7,9 +7,17 @@
 #include <string>
 #include <vector>
 
+#include "algo/base/errors.hpp"
 #include "algo/types/frame.hpp"
 
 namespace plumb {
+
+/// This process did not get to run for as long as a sensor may be silent. That says nothing about
+/// the sensor, which can be read on; what was being recorded has a gap.
+class ProcessStalled : public DeviceError {
+ public:
+  using DeviceError::DeviceError;
+};
 
 /// A sensor that is attached now.
 struct SensorDescription {
@@ -59,7 +67,8 @@ class LiveSensor : public FrameSource {
   virtual void LockExposure(bool locked) = 0;
 
   // Next() throws DeviceLost once the sensor is unplugged, DeviceError if no pair arrives for the
-  // stall time or the driver reports an error.
+  // stall time or the driver reports an error, ProcessStalled if it did not get to listen for so
+  // long.
 };
 
 /// The sensors of one library. All functions belong to one thread, but the listener is called on

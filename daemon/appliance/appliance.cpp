@@ -330,14 +330,14 @@ Appliance::Answer Appliance::OpenCheck(const web::Actor& actor) {
 
 void Appliance::OnSensor(const SensorEvent& event) {
   LogSensor(event);
-  const char* kNames[] = {"ready", "lost", "failed", "others"};
+  const char* kNames[] = {"ready", "lost", "failed", "others", "stalled"};
   TellEvent("sensor", Json{{"what", kNames[static_cast<int>(event.kind)]},
                            {"serial", event.sensor.serial},
                            {"reason", event.reason},
                            {"others", event.others}}
                           .dump(-1, ' ', false, Json::error_handler_t::replace));
   TellWeb(web::EventKind::kStatus);
-  if (event.kind == SensorEvent::Kind::kOthers) return;
+  if (event.kind == SensorEvent::Kind::kOthers || event.kind == SensorEvent::Kind::kStalled) return;
   sensor_fault_ = event.reason;
   (void)Handle(event.kind == SensorEvent::Kind::kReady  ? ScanEvent::kSensorReady
                : event.kind == SensorEvent::Kind::kLost ? ScanEvent::kSensorLost
@@ -350,6 +350,8 @@ void Appliance::LogSensor(const SensorEvent& event) {
   if (event.kind == SensorEvent::Kind::kFailed)
     Log(LogLevel::kError, fmt::format("the sensor does not work: {}", event.reason),
         {{"SERIAL", serial}});
+  if (event.kind == SensorEvent::Kind::kStalled)
+    Log(LogLevel::kWarning, event.reason, {{"SERIAL", serial}});
   if (event.kind == SensorEvent::Kind::kReady) {
     sensor_since_ = Clock::now();
     Log(LogLevel::kInfo, "the sensor is ready", {{"SERIAL", serial}});

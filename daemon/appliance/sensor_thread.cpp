@@ -186,7 +186,13 @@ struct SensorThread::Impl {
   void Read(const std::stop_token& stop) {
     SwitchFeed();
     LookForOthers();
-    std::optional<Frame> frame = sensor->Next();
+    std::optional<Frame> frame;
+    try {
+      frame = sensor->Next();
+    } catch (const ProcessStalled& error) {
+      FailFeed(error.what());
+      return;
+    }
     if (!frame) {
       if (!stop.stop_requested()) throw DeviceError("the sensor's stream ended");
       return;
@@ -225,6 +231,16 @@ struct SensorThread::Impl {
     if (!feed) return;
     if (options.before_scan) options.before_scan();
     sensor->Flush();
+  }
+
+  /// The sweep has a gap; the sensor is read on.
+  void FailFeed(const std::string& why) {
+    if (feed) {
+      feed->Fail(why + ". Scan again");
+      spoiled = std::exchange(feed, nullptr);
+      sensor->LockExposure(false);
+    }
+    Notify(SensorEvent::Kind::kStalled, why);
   }
 
   void Drop() {

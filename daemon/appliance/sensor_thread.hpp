@@ -25,10 +25,10 @@ struct SensorThreadOptions {
 
 /// What happened to the sensor.
 struct SensorEvent {
-  enum class Kind { kReady, kLost, kFailed, kOthers };
+  enum class Kind { kReady, kLost, kFailed, kOthers, kStalled };
   Kind kind = Kind::kLost;
   SensorDescription sensor;  ///< kReady, kOthers, and kFailed where known.
-  std::string reason;        ///< kFailed: a sentence with a remedy.
+  std::string reason;        ///< kFailed: a sentence with a remedy. kStalled: a sentence.
   std::vector<std::string>
       others;  ///< kReady, kOthers: serials of the units that are attached and not used.
 };
@@ -50,8 +50,8 @@ class SensorThread {
  public:
   /// @param make_provider  Called on the sensor thread, again after it threw DeviceError.
   /// @param notify  Called on the sensor thread for each event; it posts to the loop. kReady comes
-  /// with the first frame, kOthers when the
-  ///                units that are not used became others.
+  /// with the first frame, kOthers when the units that are not used became others, kStalled when
+  /// the process did not get to run: the sensor stays, but a running scan's feed fails.
   SensorThread(std::function<std::unique_ptr<SensorProvider>()> make_provider,
                SensorThreadOptions options, std::function<void(const SensorEvent&)> notify);
   ~SensorThread();

@@ -6,8 +6,10 @@
 #include <cstdint>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <utility>
 
+#include "algo/base/errors.hpp"
 #include "daemon/loop/bounded_queue.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
 
@@ -34,17 +36,37 @@ class LiveFeed : public FrameFeed {
     queue_.Close();
   }
 
+  /// What came is no whole sweep, and why: Next() throws that. Too late once closed.
+  void Fail(std::string why) {
+    const std::lock_guard lock(mutex_);
+    if (closed_) return;
+    failure_ = std::move(why);
+    closed_ = true;
+    queue_.Close();
+  }
+
   [[nodiscard]] std::int64_t num_pushed() const { return num_pushed_; }
 
-  std::optional<Frame> Next(const std::stop_token& stop) override { return queue_.Pop(stop); }
+  /// @throws DeviceError after Fail().
+  std::optional<Frame> Next(const std::stop_token& stop) override {
+    std::optional<Frame> frame = queue_.Pop(stop);
+    if (!frame) ThrowFailure();
+    return frame;
+  }
   int TakeDropped() override { return dropped_.exchange(0); }
   void Finish() override {}
   [[nodiscard]] std::optional<double> last_frame_s() const override { return last_frame_s_; }
 
  private:
+  void ThrowFailure() {
+    const std::lock_guard lock(mutex_);
+    if (!failure_.empty()) throw DeviceError(failure_);
+  }
+
   BoundedQueue<Frame> queue_;
   std::mutex mutex_;  // of pushing and closing
   bool closed_ = false;
+  std::string failure_;
   std::atomic<int> dropped_ = 0;
   std::atomic<std::int64_t> num_pushed_ = 0;
   std::atomic<double> last_frame_s_ = 0.0;

@@ -1,5 +1,7 @@
 #include "drivers/openni/frame_box.hpp"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
@@ -8,6 +10,7 @@ namespace plumb {
 namespace {
 
 constexpr std::chrono::seconds kRateWindow{1};
+constexpr std::chrono::milliseconds kLook{100};  // Take() looks at the clock at least so often
 constexpr std::size_t kMaxStamps = 100'000;
 
 std::size_t Side(StreamKind kind) { return kind == StreamKind::kColor ? 0 : 1; }
@@ -30,7 +33,8 @@ void FrameBox::Add(StreamKind kind, std::int64_t stamp_us, cv::Mat image) {
       --skip_;
       return;
     }
-    last_arrival_ = Clock::now();
+    const Clock::time_point now = Clock::now();
+    longest_gap_ = std::max(longest_gap_, now - std::exchange(last_arrival_, now));
     arrivals_.push_back(last_arrival_);
     while (arrivals_.front() + kRateWindow < last_arrival_) arrivals_.pop_front();
     pairs_.push_back({std::move(*pair), next_index_++});
@@ -83,6 +87,8 @@ void FrameBox::Flush() noexcept {
   const std::lock_guard lock(mutex_);
   pairs_.clear();
   pairing_.Clear();
+  listened_ = Clock::now();
+  absent_ = longest_gap_ = {};
   next_index_ = 0;
 }
 
@@ -100,28 +106,50 @@ std::vector<std::int64_t> FrameBox::StampsOf(StreamKind kind) const {
 void FrameBox::Begin(int pairs_to_skip) {
   const std::lock_guard lock(mutex_);
   skip_ = pairs_to_skip;
-  last_arrival_ = Clock::now();
+  last_arrival_ = listened_ = Clock::now();
+  absent_ = longest_gap_ = {};
+}
+
+/// A process that is stopped, or gets no processor, comes late to where it waits. The driver's
+/// threads belong to it, so that no pairs come then says nothing about the sensor. Where pairs came
+/// all the same, only the caller was busy.
+void FrameBox::NoteAbsence() {
+  const Clock::time_point now = Clock::now();
+  absent_ += std::max(Clock::duration::zero(), now - listened_ - kLook);
+  listened_ = now;
 }
 
 std::optional<FrameBox::Pair> FrameBox::Take() {
   std::unique_lock lock(mutex_);
   for (;;) {
+    NoteAbsence();
     if (interrupted_) return std::nullopt;
     if (lost_) throw DeviceLost(fmt::format("sensor {} was unplugged; plug it in again", name_));
     if (failed_)
       throw DeviceError(fmt::format(
           "the driver of sensor {} reports an error; unplug it and plug it in again", name_));
+    if (std::min(absent_, std::max(longest_gap_, listened_ - last_arrival_)) >= stall_time_) {
+      const auto absent = std::chrono::duration_cast<std::chrono::milliseconds>(
+          std::exchange(absent_, Clock::duration::zero()));
+      last_arrival_ = listened_;
+      longest_gap_ = {};
+      throw ProcessStalled(
+          fmt::format("this program did not get to read sensor {} for {:.1f} s: it was stopped, or "
+                      "the machine has too much else to do; the sensor is not at fault",
+                      name_, 1e-3 * static_cast<double>(absent.count())));
+    }
     if (!pairs_.empty()) break;
-    const Clock::time_point limit = last_arrival_ + stall_time_;
-    if (Clock::now() >= limit) {
+    const Clock::time_point limit = last_arrival_ + stall_time_ + absent_;
+    if (listened_ >= limit) {
       throw DeviceError(
           fmt::format("sensor {} has given no pair of images for {} ms ({} unpaired, {} discarded "
                       "so far); unplug it and plug it in again",
                       name_, stall_time_.count(), pairing_.num_unpaired(),
                       pairing_.num_discarded() + num_discarded_));
     }
-    changed_.wait_until(lock, limit);
+    changed_.wait_until(lock, std::min(limit, listened_ + kLook));
   }
+  absent_ = longest_gap_ = {};
   Pair pair = std::move(pairs_.front());
   pairs_.pop_front();
   ++num_taken_;

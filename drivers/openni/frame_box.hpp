@@ -47,13 +47,16 @@ class FrameBox {
   /// and the first so many are thrown away.
   void Begin(int pairs_to_skip);
 
-  /// The oldest pair that waits; nothing once interrupted.
-  /// @throws DeviceLost, DeviceError as LiveSensor::Next().
+  /// The oldest pair that waits; nothing once interrupted. To be called again and again: the sensor
+  /// is blamed for the stall time only while somebody listened.
+  /// @throws ProcessStalled, DeviceLost, DeviceError as LiveSensor::Next().
   [[nodiscard]] std::optional<Pair> Take();
   [[nodiscard]] SensorStatistics statistics() const;
   [[nodiscard]] bool lost() const;
 
  private:
+  void NoteAbsence();
+
   static constexpr std::size_t kCapacity =
       4;  ///< Pairs of 1.5 MB; the user's own queue is the one that counts what it drops.
 
@@ -65,6 +68,9 @@ class FrameBox {
   std::deque<Pair> pairs_;
   std::deque<Clock::time_point> arrivals_;  ///< Of pairs, within the last second.
   Clock::time_point last_arrival_ = Clock::now();
+  Clock::time_point listened_ = Clock::now();  ///< When Take() last ran.
+  Clock::duration absent_{};       ///< By how much it ran late since it last had a pair,
+  Clock::duration longest_gap_{};  ///< and between two pairs since then.
   std::int64_t next_index_ = 0;
   std::int64_t num_taken_ = 0;
   std::int64_t num_discarded_ = 0;

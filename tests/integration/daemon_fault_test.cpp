@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using ::testing::AnyOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using testing::Plumbd;
 
 class DaemonFaultTest : public ::testing::Test {
@@ -109,6 +110,34 @@ TEST_F(DaemonFaultTest, AStallWhileScanningEndsTheScanAndNotThePlumbd) {
   EXPECT_TRUE(ScanFolders(plumbd.state()).empty());
   plumbd.Sim("resume");
   plumbd.WaitForState("ready");
+}
+
+// The virtual sensor's threads are plumbd's, so the whole process stands still and the sensor with
+// it, for longer than a sensor may be silent.
+TEST_F(DaemonFaultTest, AProcessThatWasStoppedFailsTheSweepWithoutBlamingTheSensor) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  const auto stop_for = [&](std::chrono::milliseconds time) {
+    plumbd.Signal(SIGSTOP);
+    std::this_thread::sleep_for(time);
+    plumbd.Signal(SIGCONT);
+  };
+  plumbd.Press();
+  plumbd.WaitForFrames(10);
+  stop_for(std::chrono::milliseconds(3000));
+  const std::string reason = plumbd.WaitForState("fault")["reason"];
+  EXPECT_THAT(reason, HasSubstr("this program did not get to read sensor VIRTUAL-0001"));
+  EXPECT_THAT(reason, HasSubstr("Scan again"));
+  EXPECT_THAT(reason, Not(HasSubstr("unplug")));
+  EXPECT_EQ(plumbd.Status()["sensor"]["present"], true);
+  EXPECT_TRUE(ScanFolders(plumbd.state()).empty());
+  EXPECT_EQ(plumbd.Press()["ok"], true) << "a press acknowledges";
+  plumbd.WaitForState("ready");
+  stop_for(std::chrono::milliseconds(3000));
+  plumbd.ScanOnce();  // nothing was spoiled while nobody scanned
+  EXPECT_THAT(plumbd.log(), Not(HasSubstr("unplug it")));
+  EXPECT_THAT(plumbd.log(), Not(HasSubstr("the sensor does not work")));
 }
 
 TEST_F(DaemonFaultTest, AnErrorOfTheDriverIsToldAndOverOnceItWorksAgain) {

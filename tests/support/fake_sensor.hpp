@@ -34,6 +34,10 @@ class FakeBus {
   void FailOnce(const std::string& why) {
     Change([&] { failure_ = why; });
   }
+  /// The next Next() throws ProcessStalled.
+  void StallOnce(const std::string& why) {
+    Change([&] { stall_ = why; });
+  }
   void RefuseToOpen(const std::string& why) {
     Change([&] { refusal_ = why; });
   }
@@ -90,7 +94,7 @@ class FakeBus {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::string> attached_;
-  std::string failure_, refusal_;
+  std::string failure_, stall_, refusal_;
   std::function<void()> listener_;
   int given_ = 0, taken_ = 0, opened_ = 0, flushed_ = 0;
   bool locked_ = false;
@@ -123,11 +127,13 @@ class FakeSensor : public LiveSensor {
              bus_.attached_.end();
     };
     bus_.changed_.wait(lock, [&] {
-      return interrupted_ || !bus_.failure_.empty() || is_gone() || bus_.given_ > bus_.taken_;
+      return interrupted_ || !bus_.failure_.empty() || !bus_.stall_.empty() || is_gone() ||
+             bus_.given_ > bus_.taken_;
     });
     if (interrupted_) return std::nullopt;
     if (is_gone()) throw DeviceLost("gone");
     if (!bus_.failure_.empty()) throw DeviceError(std::exchange(bus_.failure_, {}));
+    if (!bus_.stall_.empty()) throw ProcessStalled(std::exchange(bus_.stall_, {}));
     return FakeBus::Wall(bus_.taken_++);
   }
 

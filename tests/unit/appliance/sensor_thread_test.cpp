@@ -244,5 +244,34 @@ TEST_F(SensorThreadTest, EndsAtOnceWhileItWaitsForAFrame) {
   thread_.reset();  // would hang if nobody interrupted the sensor
 }
 
+TEST_F(SensorThreadTest, AStalledProcessFailsTheScanAndKeepsTheSensor) {
+  Start();
+  bus_.Plug("A");
+  bus_.GiveFrame();
+  EXPECT_EQ(told_.At(1).kind, Kind::kReady);
+  const auto feed = std::make_shared<LiveFeed>(10);
+  thread_->BeginScan(feed);
+  bus_.GiveFrame();
+  while (bus_.flushed() == 0) std::this_thread::yield();
+  bus_.StallOnce("not run for 3 s");
+  EXPECT_EQ(told_.At(2).kind, Kind::kStalled);
+  try {
+    while (feed->Next({})) continue;
+    FAIL() << "a sweep with a gap ended as a whole one";
+  } catch (const DeviceError& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("not run for 3 s. Scan again"));
+  }
+  EXPECT_FALSE(bus_.exposure_locked());
+  EXPECT_TRUE(thread_->snapshot().present);
+  EXPECT_EQ(bus_.opened(), 1);
+  thread_->EndScan();
+  const auto next = std::make_shared<LiveFeed>(10);
+  thread_->BeginScan(next);
+  bus_.GiveFrame();
+  while (bus_.flushed() < 2) std::this_thread::yield();
+  bus_.GiveFrame();
+  EXPECT_TRUE(next->Next({}));
+}
+
 }  // namespace
 }  // namespace plumb
