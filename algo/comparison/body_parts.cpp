@@ -25,6 +25,8 @@ constexpr double kShoulderShare = 0.8;    // of the widest: shoulders have begun
 constexpr double kMinNeck_m = 0.04;       // shorter is the rounded end of a trunk
 constexpr double kMaxHead_m = 0.45;       // head and neck
 constexpr double kTrunk_m = 0.6;          // behind the first end, the widest part is looked for
+constexpr double kMinHead_m = 0.15;       // head and neck, where they alone tell the ends apart
+constexpr double kShouldersOfAll = 0.85;  // of the widest of all: knees behind feet are narrower
 
 // Ends of the bands below the shoulder line, in widths of the shoulders (about 0.45 m with arms);
 // then the lower legs.
@@ -45,6 +47,9 @@ struct Axes {
   Eigen::Vector2d along, side;
   bool by_posture = false;
 };
+
+// Whose words name the parts.
+enum class Words { kPatient, kRoom, kMarker };
 
 struct Outline {
   Eigen::Vector2d centre, principal;
@@ -75,8 +80,8 @@ Outline OutlineOf(const GridShape& grid, const std::vector<std::uint8_t>& mask) 
   return {mean, solver.eigenvectors().col(1), spread[1] / spread[0]};
 }
 
-Axes AxesOf(const BodyView& view, const Outline& outline) {
-  const Eigen::Matrix3d R_reference_iec = view.T_iec_reference.linear().transpose();
+Axes AxesByRoom(const BodyView& view, const Outline& outline) {
+  const Eigen::Matrix3d R_reference_iec = view.T_iec_reference->linear().transpose();
   const auto in_plane = [&](const Eigen::Vector3d& iec) -> Eigen::Vector2d {
     return (R_reference_iec * iec).head<2>().normalized();
   };
@@ -151,6 +156,33 @@ std::optional<Shoulders> FindShoulders(const Profile& profile) {
   return std::nullopt;
 }
 
+bool ShowsHead(const Profile& profile) {
+  const std::optional<Shoulders> shoulders = FindShoulders(profile);
+  if (!shoulders || shoulders->line_m - profile.begin_m < kMinHead_m) return false;
+  double widest = 0.0;
+  for (std::size_t i = 0; i < profile.size(); ++i) widest = std::max(widest, profile.width(i));
+  return shoulders->width_m >= kShouldersOfAll * widest;
+}
+
+// The room is not known, and which end lies where neither: only the body itself can tell.
+Axes AxesByBody(const BodyView& view, const Outline& outline) {
+  const Axes marker = {-Eigen::Vector2d::UnitY(), Eigen::Vector2d::UnitX(), false};
+  if (!view.posture || outline.elongation < kElongated) return marker;
+  const bool supine = *view.posture == PatientPosture::kHeadFirstSupine ||
+                      *view.posture == PatientPosture::kFeetFirstSupine;
+  const auto axes_along = [&](const Eigen::Vector2d& along) {
+    const Eigen::Vector2d left_supine(-along.y(), along.x());
+    return Axes{along, supine ? left_supine : Eigen::Vector2d(-left_supine), true};
+  };
+  const Axes one = axes_along(outline.principal), other = axes_along(-outline.principal);
+  const auto shows_head = [&](const Axes& axes) {
+    return ShowsHead(Profile(view.reference.grid, view.body_mask, axes));
+  };
+  const bool one_shows = shows_head(one), other_shows = shows_head(other);
+  if (one_shows == other_shows) return marker;
+  return one_shows ? one : other;
+}
+
 // The middle of the outline along the body, as a line: limbs and slant must not move it from bin to
 // bin.
 struct Midline {
@@ -174,12 +206,9 @@ struct Midline {
 // Names of parts in the order head to feet; two sides each but for the head.
 class Naming {
  public:
-  Naming(const Profile& profile, bool by_posture)
-      : begin_m_(profile.begin_m),
-        length_m_(profile.length_m()),
-        midline_(profile),
-        by_posture_(by_posture) {
-    if (by_posture) shoulders_ = FindShoulders(profile);
+  Naming(const Profile& profile, Words words)
+      : begin_m_(profile.begin_m), length_m_(profile.length_m()), midline_(profile), words_(words) {
+    if (words == Words::kPatient) shoulders_ = FindShoulders(profile);
   }
 
   /// Number of the part that holds a place; parts are listed in this order.
@@ -203,15 +232,18 @@ class Naming {
                                                               "at the feet end"};
     static constexpr std::array<const char*, 3> kByRoom = {"at the gantry end", "in the middle",
                                                            "at the end away from the gantry"};
-    if (by_posture_)
+    static constexpr std::array<const char*, 3> kByMarker = {"at the +Y end", "in the middle",
+                                                             "at the -Y end"};
+    if (words_ == Words::kPatient)
       return fmt::format("{} side {}", is_plus ? "left" : "right", kByPosture[place]);
-    return fmt::format("{} side {}", is_plus ? "+X" : "-X", kByRoom[place]);
+    return fmt::format("{} side {}", is_plus ? "+X" : "-X",
+                       words_ == Words::kRoom ? kByRoom[place] : kByMarker[place]);
   }
 
  private:
   double begin_m_, length_m_;
   Midline midline_;
-  bool by_posture_;
+  Words words_;
   std::optional<Shoulders> shoulders_;
 };
 
@@ -234,11 +266,20 @@ void CheckSizes(const BodyView& view) {
 BodyParts DescribeBody(const BodyView& view) {
   CheckSizes(view);
   const GridShape& grid = view.reference.grid;
-  const Axes axes = AxesOf(view, OutlineOf(grid, view.body_mask));
+  const Outline outline = OutlineOf(grid, view.body_mask);
+  const bool is_room_known = view.T_iec_reference.has_value();
+  const Axes axes = is_room_known ? AxesByRoom(view, outline) : AxesByBody(view, outline);
   const Profile profile(grid, view.body_mask, axes);
-  BodyParts result{.by_posture = axes.by_posture, .parts = {}};
+  BodyParts result{.by_posture = axes.by_posture,
+                   .is_room_known = is_room_known,
+                   .patient = std::nullopt,
+                   .parts = {}};
+  if (axes.by_posture) result.patient = PatientAxes{.head = -axes.along, .left = axes.side};
   if (profile.size() == 0) return result;
-  const Naming naming(profile, axes.by_posture);
+  const Words words = axes.by_posture ? Words::kPatient
+                      : is_room_known ? Words::kRoom
+                                      : Words::kMarker;
+  const Naming naming(profile, words);
 
   std::map<int, Collected> collected;
   for (std::size_t i = 0; i < view.region_mask.size(); ++i) {

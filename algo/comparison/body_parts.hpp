@@ -18,7 +18,7 @@ namespace plumb {
 /// positive.
 struct BodyPart {
   std::string name;  ///< "left shoulder", "left side at the head end"; by the room: "+X side at the
-                     ///< gantry end".
+                     ///< gantry end"; by the marker: "+X side at the +Y end".
   Eigen::Vector3d centre_m =
       Eigen::Vector3d::Zero();  ///< Mean of its reference surface, reference frame.
   std::optional<double>
@@ -30,7 +30,9 @@ struct BodyParts {
   /// Names follow the patient's posture. False: posture unknown, or the body does not lie as it
   /// says; then no name holds a left or right.
   bool by_posture = false;
-  std::vector<BodyPart> parts;  ///< From head to feet (by the room: from the gantry away).
+  bool is_room_known = true;           ///< False: T_iec_reference was never set.
+  std::optional<PatientAxes> patient;  ///< Where head and left point; exactly where by_posture.
+  std::vector<BodyPart> parts;         ///< From head to feet (by the room: from the gantry away).
 };
 
 /// What DescribeBody() looks at. All maps and masks share one grid, the reference scene's.
@@ -41,7 +43,7 @@ struct BodyView {
   const std::vector<std::uint8_t>& region_mask;  ///< 1: of the region of interest.
   const std::vector<std::uint8_t>& body_mask;  ///< 1: of the whole body; it locates the shoulders.
   Pose T_motion = Pose::Identity();  ///< p_current = T_motion * p_reference, reference frame.
-  Pose T_iec_reference = Pose::Identity();
+  std::optional<Pose> T_iec_reference = Pose::Identity();  ///< None: never set.
   MarkerKind marker_kind = MarkerKind::kRoom;
   std::optional<PatientPosture> posture;  ///< None: unknown.
 };
@@ -51,9 +53,11 @@ struct BodyView {
 /// A body whose neck is seen is named by shoulder, chest, abdomen, pelvis, thigh and lower leg; one
 /// without by its ends. Which end is the head and which side is left follow from posture and
 /// T_iec_reference; where the body's outline clearly lies across the axis that they state, neither
-/// is believed. `now_m` is the rise of the part under the rigid motion plus what the motion leaves:
-/// a shift sideways lifts nothing. Parts of less than 20 cm2, or of which less than a third was
-/// measured, are left out.
+/// is believed. Without T_iec_reference the outline alone says where the head is: one end of a long
+/// outline, and only one, shows head, neck and shoulders that are about as wide as anything else of
+/// it; supine or prone then gives the left. `now_m` is the rise of the part under the rigid motion
+/// plus what the motion leaves: a shift sideways lifts nothing. Parts of less than 20 cm2, or of
+/// which less than a third was measured, are left out.
 /// @throws std::invalid_argument if grids or masks differ in size.
 [[nodiscard]] BodyParts DescribeBody(const BodyView& view);
 

@@ -47,7 +47,7 @@ void CheckOptions(const CompareOptions& options) {
   }
   if (options.isocentre_m && !options.isocentre_m->allFinite())
     throw std::invalid_argument("comparison: the isocentre is not finite");
-  if (!IsFinite(options.T_iec_reference))
+  if (options.T_iec_reference && !IsFinite(*options.T_iec_reference))
     throw std::invalid_argument("comparison: the IEC transform is not finite");
 }
 
@@ -251,9 +251,10 @@ class Comparer {
                       .posture = options_.posture});
     const std::optional<PatientPosture> posture =
         result_.body_parts->by_posture ? std::optional(options_.posture) : std::nullopt;
-    result_.correction = CorrectionOf(motion.T, motion.covariance, motion.centroid_m,
-                                      options_.isocentre_m.value_or(motion.centroid_m),
-                                      options_.T_iec_reference, options_.marker_kind, posture);
+    result_.correction =
+        CorrectionOf(motion.T, motion.covariance, motion.centroid_m,
+                     options_.isocentre_m.value_or(motion.centroid_m), options_.T_iec_reference,
+                     options_.marker_kind, posture, result_.body_parts->patient);
     evidence_.coverage = result_.region->coverage;
     evidence_.largest_hole_m = result_.region->largest_hole_m;
     evidence_.hole_centre_m = result_.region->hole_centre_m;

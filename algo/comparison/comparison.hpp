@@ -32,7 +32,9 @@ struct CompareOptions {
       region_polygon_m;  ///< x, y in the reference frame; empty: the segmented body.
   std::optional<Eigen::Vector3d>
       isocentre_m;  ///< Reference frame; none: centroid of the reference region.
-  Pose T_iec_reference = Pose::Identity();     ///< Reference frame to the IEC fixed frame.
+  /// Reference frame to the IEC fixed frame; none: nobody has said how the room lies. The numbers
+  /// are then along the reference marker's axes, and no word speaks of couch or gantry.
+  std::optional<Pose> T_iec_reference;
   MarkerKind marker_kind = MarkerKind::kRoom;  ///< kCouch: shifts are refused, posture only.
   PatientPosture posture = PatientPosture::kHeadFirstSupine;  ///< For the words left and right.
   MarkerConsensusOptions markers;                             ///< When a marker counts as moved.

@@ -45,6 +45,72 @@ CouchNumbers NumbersOf(const Vector6d& couch, MarkerKind kind) {
   return numbers;
 }
 
+bool IsSupine(PatientPosture posture) {
+  return posture == PatientPosture::kHeadFirstSupine || posture == PatientPosture::kFeetFirstSupine;
+}
+
+// Which of the patient's eight directions a way in the plane is nearest to: -1 feet, 0, +1 head;
+// -1 right, 0, +1 left.
+struct PatientWay {
+  int head = 0, left = 0;
+};
+
+PatientWay WayOf(const PatientAxes& patient, const Eigen::Vector2d& way) {
+  const double limit = std::sin(22.5 * kDegree);
+  const auto side = [&](double share) { return share > limit ? 1 : (share < -limit ? -1 : 0); };
+  return {side(way.dot(patient.head)), side(way.dot(patient.left))};
+}
+
+std::string ShiftWords(const PatientWay& way) {
+  const std::string end = way.head > 0 ? "toward the head" : "toward the feet";
+  const std::string side = way.left > 0 ? "patient left" : "patient right";
+  if (way.left == 0) return end;
+  return way.head == 0 ? "to " + side : end + " and " + side;
+}
+
+std::string TiltWords(const PatientWay& rising) {
+  if (rising.left == 0) return rising.head > 0 ? "head up" : "head down";
+  if (rising.head == 0)
+    return rising.left > 0 ? "patient right side down" : "patient left side down";
+  return std::string(rising.head > 0 ? "head" : "feet") + " and patient " +
+         (rising.left > 0 ? "left" : "right") + " side up";
+}
+
+// Words where nobody has said how the room lies: the patient's, by where head and left point, else
+// the axes of the reference marker, along which the numbers are. Never the couch's or gantry's.
+std::array<std::string, 6> WordsWithoutRoom(const Vector6d& couch, MarkerKind kind,
+                                            const std::optional<PatientPosture>& posture,
+                                            const std::optional<PatientAxes>& patient) {
+  const auto sign = [&](Eigen::Index i) { return couch[i] >= 0 ? 1.0 : -1.0; };
+  const auto letter = [&](Eigen::Index i) { return couch[i] >= 0 ? "+" : "-"; };
+  std::array<std::string, 6> words;
+  if (patient && posture) {
+    if (kind == MarkerKind::kRoom) {
+      const bool is_anterior = (couch[2] >= 0) == IsSupine(*posture);
+      words[0] = std::string(couch[2] >= 0 ? "up" : "down") +
+                 (is_anterior ? " (anterior)" : " (posterior)");
+      words[1] = ShiftWords(WayOf(*patient, sign(1) * Eigen::Vector2d::UnitY()));
+      words[2] = ShiftWords(WayOf(*patient, sign(0) * Eigen::Vector2d::UnitX()));
+    }
+    // A turn about an axis lifts what lies along z cross that axis.
+    words[3] = TiltWords(WayOf(*patient, sign(3) * Eigen::Vector2d::UnitY()));
+    words[4] = TiltWords(WayOf(*patient, -sign(4) * Eigen::Vector2d::UnitX()));
+    const Eigen::Vector2d turned(-patient->head.y(), patient->head.x());
+    words[5] = std::string("head to patient ") +
+               (sign(5) * turned.dot(patient->left) > 0 ? "left" : "right");
+    return words;
+  }
+  if (kind == MarkerKind::kRoom) {
+    words[0] = couch[2] >= 0 ? "up" : "down";
+    words[1] = std::string("along ") + letter(1) + "Y of the reference marker";
+    words[2] = std::string("along ") + letter(0) + "X of the reference marker";
+  }
+  words[3] = std::string(letter(3)) + "Y side of the reference marker up";
+  words[4] = std::string(letter(4)) + "X side of the reference marker down";
+  words[5] = couch[5] >= 0 ? "counter-clockwise from above" : "clockwise from above";
+  return words;
+}
+
 // Words for the signs. The patient's left is +X (viewer's right) head first supine; each of prone
 // and feet first turns it over.
 std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind,
@@ -63,9 +129,7 @@ std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind,
 
   const bool head_first =
       *posture == PatientPosture::kHeadFirstSupine || *posture == PatientPosture::kHeadFirstProne;
-  const bool supine =
-      *posture == PatientPosture::kHeadFirstSupine || *posture == PatientPosture::kFeetFirstSupine;
-  const bool left_is_plus_x = head_first == supine;
+  const bool left_is_plus_x = head_first == IsSupine(*posture);
   const auto side = [&](bool plus_x) { return plus_x == left_is_plus_x ? "left" : "right"; };
   if (kind == MarkerKind::kRoom) words[2] = std::string("to patient ") + side(couch[0] >= 0);
   words[3] = (couch[3] >= 0) == head_first ? "head up" : "head down";
@@ -115,16 +179,19 @@ Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_refe
 
 Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance,
                         const Eigen::Vector3d& centroid, const Eigen::Vector3d& isocentre_reference,
-                        const Pose& T_iec_reference, MarkerKind kind,
-                        std::optional<PatientPosture> posture) {
-  const Vector6d couch = CouchVector(T_motion, isocentre_reference, T_iec_reference);
+                        const std::optional<Pose>& T_iec_reference, MarkerKind kind,
+                        std::optional<PatientPosture> posture,
+                        const std::optional<PatientAxes>& patient) {
+  const Pose T_axes = T_iec_reference.value_or(Pose::Identity());
+  const Vector6d couch = CouchVector(T_motion, isocentre_reference, T_axes);
   Correction correction;
   correction.isocentre_m = isocentre_reference;
   correction.value = NumbersOf(couch, kind);
   correction.u95 = NumbersOf(kNormal95 * CouchSigmas(T_motion, covariance, T_motion * centroid,
-                                                     isocentre_reference, T_iec_reference),
+                                                     isocentre_reference, T_axes),
                              kind);
-  correction.words = WordsOf(couch, kind, posture);
+  correction.words = T_iec_reference ? WordsOf(couch, kind, posture)
+                                     : WordsWithoutRoom(couch, kind, posture, patient);
   return correction;
 }
 

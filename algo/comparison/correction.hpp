@@ -19,6 +19,13 @@ enum class MarkerKind { kRoom, kCouch };
 enum class PatientPosture { kHeadFirstSupine, kHeadFirstProne, kFeetFirstSupine, kFeetFirstProne };
 [[nodiscard]] const char* Name(PatientPosture posture);  ///< "HFS", "HFP", "FFS", "FFP"
 
+/// Where the patient's head and left side point, unit vectors in the plane (x, y) of the reference
+/// marker.
+struct PatientAxes {
+  Eigen::Vector2d head = Eigen::Vector2d::UnitY();
+  Eigen::Vector2d left = Eigen::Vector2d::UnitX();
+};
+
 /// Six values or their uncertainties. Shifts are absent where they are refused (couch-fixed
 /// markers).
 struct CouchNumbers {
@@ -57,12 +64,17 @@ struct Correction {
 /// centroid, T_motion * centroid,
 ///                    so that its translation part is the uncertainty of where the centroid went.
 /// @param centroid    Of the region in the reference scene, reference-marker frame.
+/// @param T_iec_reference  None: nobody has said where the room lies. The numbers are along and
+/// about the reference marker's axes, and no word speaks of couch or gantry.
 /// @param posture     Turns the words into the patient's left, right and head; none: it is not to
-/// be believed, the words are the room's.
+/// be believed, the words are the room's, or the marker's where the room is not known.
+/// @param patient     Needed for the patient's words where the room is not known; else not looked
+/// at.
 [[nodiscard]] Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance,
                                       const Eigen::Vector3d& centroid,
                                       const Eigen::Vector3d& isocentre_reference,
-                                      const Pose& T_iec_reference, MarkerKind kind,
-                                      std::optional<PatientPosture> posture);
+                                      const std::optional<Pose>& T_iec_reference, MarkerKind kind,
+                                      std::optional<PatientPosture> posture,
+                                      const std::optional<PatientAxes>& patient = std::nullopt);
 
 }  // namespace plumb

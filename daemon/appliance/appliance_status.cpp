@@ -310,11 +310,11 @@ web::Status Appliance::WebStatus() {
   status.version = Version();
   status.warnings = page_.warnings;
   status.rolled_back = rolled_back_;
-  const Eigen::Matrix3d R_iec_reference = parts_.config.compare.T_iec_reference.linear();
+  const std::optional<Pose>& T_iec_reference = parts_.config.compare.T_iec_reference;
+  const Eigen::Matrix3d R_iec_reference = T_iec_reference.value_or(Pose::Identity()).linear();
   status.right_xy = {R_iec_reference(0, 0), R_iec_reference(0, 1)};
   status.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)};
-  // No marker lies exactly at the isocentre, along the room's axes: the default says nothing.
-  status.is_room_known = !parts_.config.compare.T_iec_reference.isApprox(Pose::Identity(), 0.0);
+  status.is_room_known = T_iec_reference.has_value();
   ReadStored(status);
   return status;
 }

@@ -136,7 +136,7 @@ void ReadCheck(Section section, MarkerCheckLimits& limits) {
   section.RefuseTheRest();
 }
 
-void ReadIec(Section section, const toml::table& root, Pose& T_iec_reference) {
+void ReadIec(Section section, const toml::table& root, std::optional<Pose>& T_iec_reference) {
   const std::string_view expected =
       "a rigid transform: 4 rows of 4 numbers, a rotation and a translation in metres, last row 0 "
       "0 0 1";

@@ -130,7 +130,7 @@ PairEvaluation MeasurePair(const std::string& reference_name, const std::string&
   result.truth =
       TrueNumbersOf(TrueMotion(reference.truth, current.truth),
                     comparison.correction ? comparison.correction->isocentre_m : true_centroid,
-                    options.compare.T_iec_reference);
+                    options.compare.T_iec_reference.value_or(Pose::Identity()));
   if (comparison.correction) {
     result.numbers = ErrorsOfNumbers(*comparison.correction, result.truth);
   }

@@ -117,7 +117,15 @@ Json BodyPartsJson(const BodyParts& body) {
                          {"words_now", words(part, part.now_m)},
                          {"words_after", words(part, part.after_m)}});
   }
-  return {{"named_by", body.by_posture ? "posture" : "room"}, {"parts", parts}};
+  const char* named_by = body.is_room_known ? "room" : "axes";
+  Json json = {{"named_by", body.by_posture ? "posture" : named_by},
+               {"room_known", body.is_room_known},
+               {"parts", parts}};
+  if (body.patient) {
+    json["head_xy"] = {body.patient->head.x(), body.patient->head.y()};
+    json["left_xy"] = {body.patient->left.x(), body.patient->left.y()};
+  }
+  return json;
 }
 
 void WriteMap(const fs::path& file, const std::optional<HeightMap>& map) {

@@ -99,7 +99,14 @@ std::string TrustLines(const Comparison& comparison) {
 std::string ComparisonText(const Comparison& comparison, const CompareOptions& options) {
   std::string text = std::string(Title(comparison.verdict)) + "\n";
   for (const std::string& reason : comparison.reasons) text += fmt::format("  {}\n", reason);
-  if (comparison.correction) text += CorrectionTable(*comparison.correction, options);
+  if (comparison.correction) {
+    text += CorrectionTable(*comparison.correction, options);
+    if (!options.T_iec_reference)
+      text +=
+          "\n  The room is not known ([iec] T_iec_reference is not set): the numbers are along "
+          "and\n"
+          "  about the reference marker's axes, not the couch's.\n";
+  }
   return text + TrustLines(comparison) + "\n" + std::string(kResearchNotice) + "\n";
 }
 

@@ -6,7 +6,7 @@
 // old), quit; of what the next scan shows: markermoved (a check), stranger (another body), shoulder
 // (lifted), across (the body lies across the room's axes), "moved AXIS AMOUNT POSTURE" (the body
 // moved along x, y, z by mm or turned by pitch, roll, yaw by degrees); "room known", "room
-// unknown": what the status says.
+// unknown": what the status says; "moved z 8 HFS bare": as compared where the room is not known.
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
@@ -119,7 +119,7 @@ class Recorder {
   /// A result of which the body's motion in the room is known: `along` the axis (mm), or about it
   /// (degrees).
   FakeScanService::Recorded RecordMotion(const Eigen::Vector3d& axis, bool is_turn, double amount,
-                                         PatientPosture posture) {
+                                         PatientPosture posture, bool is_room_known) {
     if (!still_)
       still_ = Compare(*reference_, MakeSyntheticScene(At(Pose::Identity(), 6, 0.0)), Options());
     const Eigen::Vector3d isocentre = kT_iec_reference * still_->motion->centroid_m;
@@ -129,9 +129,12 @@ class Recorder {
                                 : Pose(Eigen::Translation3d(amount * kMillimetre * axis));
     Comparison comparison = *still_;
     comparison.motion->T = kT_iec_reference.inverse() * T_room * kT_iec_reference;
-    comparison.correction = CorrectionOf(
-        comparison.motion->T, comparison.motion->covariance, comparison.motion->centroid_m,
-        comparison.motion->centroid_m, kT_iec_reference, MarkerKind::kRoom, posture);
+    comparison.correction =
+        CorrectionOf(comparison.motion->T, comparison.motion->covariance,
+                     comparison.motion->centroid_m, comparison.motion->centroid_m,
+                     is_room_known ? std::optional(kT_iec_reference) : std::nullopt,
+                     MarkerKind::kRoom, posture, comparison.body_parts->patient);
+    comparison.body_parts->is_room_known = is_room_known;
     comparison.verdict = Verdict::kMove;
     comparison.reasons = {"known motion"};
     const fs::path folder = NewFolder();
@@ -160,7 +163,7 @@ class Recorder {
 /// "x" is to the right of who faces the gantry, "y" to the gantry, "z" up; "pitch", "roll", "yaw"
 /// are turns about them.
 FakeScanService::Recorded Moved(Recorder& recorder, const std::string& axis, double amount,
-                                const std::string& posture) {
+                                const std::string& posture, bool is_room_known = true) {
   const std::string names[] = {"x", "y", "z", "pitch", "roll", "yaw"};
   const auto which = std::find(std::begin(names), std::end(names), axis) - std::begin(names);
   PatientPosture lies = PatientPosture::kHeadFirstSupine;
@@ -169,7 +172,8 @@ FakeScanService::Recorded Moved(Recorder& recorder, const std::string& axis, dou
         PatientPosture::kFeetFirstProne}) {
     if (posture == Name(known)) lies = known;
   }
-  return recorder.RecordMotion(Eigen::Vector3d::Unit(which % 3), which >= 3, amount, lies);
+  return recorder.RecordMotion(Eigen::Vector3d::Unit(which % 3), which >= 3, amount, lies,
+                               is_room_known);
 }
 
 void Obey(FakeScanService& service, Recorder& recorder, const std::string& command) {
@@ -234,7 +238,9 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
     std::string axis, posture;
     double amount = 0;
     words >> axis >> amount >> posture;
-    service.next_recorded = Moved(recorder, axis, amount, posture);
+    std::string room;  // "bare": nobody ever said how the room lies
+    words >> room;
+    service.next_recorded = Moved(recorder, axis, amount, posture, room != "bare");
   }
   if (name == "tolerated" || name == "unsure") {
     FakeScanService::Recorded shown = Moved(recorder, "z", 0, "HFS");

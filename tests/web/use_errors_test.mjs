@@ -19,6 +19,9 @@ async function addPatient(code) {
   await anna.getByRole('heading', { name: code }).waitFor();
 }
 
+// Which side is the patient's is decided once, with the words; no picture may claim more than they do.
+const marksIn = async (page, where) => [...new Set(await page.locator(`${where} [data-mark]`).evaluateAll((marks) => marks.map((mark) => mark.dataset.mark)))].sort();
+
 /// A sweep from the scan screen to its result.
 async function scan() {
   const before = (await h.api(anna, 'scans?limit=1')).body.scans[0]?.id;
@@ -139,6 +142,57 @@ await h.step('couch readings: the sum is done, only for a move, only where the r
   h.tell('room known');
 });
 
+await h.step('where the room was never said: the words are the patient’s, no arrow, mark or reading is the couch’s', async () => {
+  h.tell('room unknown');
+  await anna.goto(`${h.url}#/status`);
+  await anna.reload();
+  h.tell('moved y -8 HFS bare');  // to the feet: along the marker's x axis, where the head lies
+  await scan();
+  const card = (name) => anna.locator('.number', { has: anna.getByRole('heading', { name, exact: true }) });
+  await card('Lateral').waitFor();
+  equal(await card('Lateral').locator('.value').innerText(), '+8.0 mm', 'along the marker’s axis');
+  equal(await card('Lateral').locator('.word').innerText(), 'toward the head', 'the words');
+  equal(await card('Lateral').locator('.arrow').count(), 0, 'no arrow of the couch');
+  await anna.getByText('The room has not been calibrated').waitFor();
+  equal(await anna.locator('.couch').count(), 0, 'no couch readings');
+  await anna.locator('.map-row .map-box .ways').waitFor();
+  equal((await marksIn(anna, '.map-row .map-box .ways')).join(), 'feet,head,left,right', 'the map');
+  check(!/gantry/i.test(await anna.locator('main').innerText()), 'no word of the gantry');
+  await h.look(anna, 'result-no-room', { axe: false });
+  h.tell('moved z 8 HFS bare');  // up needs no room
+  await scan();
+  equal(await card('Vertical').locator('.word').innerText(), 'down (posterior)', 'the words');
+  equal(await card('Vertical').locator('.arrow').count(), 1, 'down is down everywhere');
+  h.tell('room known');
+  h.tell('moved y -8 HFS');  // set, as it was: the room's words and arrows
+  await scan();
+  equal(await card('Longitudinal').locator('.word').innerText(), 'toward gantry', 'in a known room');
+  equal(await card('Longitudinal').locator('.arrow').count(), 1, 'with its arrow');
+  equal(await anna.getByText('The room has not been calibrated').count(), 0, 'nothing to warn of');
+});
+
+await h.step('a result that can no longer be acted on says what was found, and commands nothing', async () => {
+  h.tell('moved y -8 HFS');
+  const shown = await scan();
+  await anna.getByRole('heading', { name: /^Correction to apply/ }).waitFor();
+  equal(await anna.locator('.number .arrow').count(), 1, 'while it is valid it commands');
+  h.tell('old');
+  await anna.getByRole('heading', { name: /^Correction found then/ }).waitFor();
+  for (const where of [`${h.url}#/result`, `${h.url}#/result/${shown.id}`]) {
+    await anna.goto(`${h.url}#/status`);
+    await anna.goto(where);
+    await anna.getByRole('heading', { name: /^Correction found then/ }).waitFor();
+    equal(await anna.locator('.number .arrow').count(), 0, 'no arrow');
+    equal(await anna.locator('.couch').count(), 0, 'nothing to set');
+    equal(await anna.locator('.verdict .word').innerText(), '↔WAS OUTSIDE TOLERANCE', 'the verdict');
+    check(!/Correction to apply|Apply the correction/.test(await anna.locator('main').innerText()), 'nothing to apply');
+  }
+  await h.look(anna, 'result-review', { axe: false });
+  await anna.goto(`${h.url}result?scan=${shown.id}`);
+  await anna.getByText('Correction found then, at the isocentre: not to be applied now').waitFor();
+  check(!/Correction to apply|MOVE/.test(await anna.locator('main').innerText()), 'nor in print');
+});
+
 await h.step('a lifted shoulder is said in words, on the page and in print', async () => {
   h.tell('shoulder');
   const shown = await scan();
@@ -155,9 +209,7 @@ await h.step('a lifted shoulder is said in words, on the page and in print', asy
   await anna.screenshot({ path: h.file('print.png'), fullPage: true });
 });
 
-// Which side is the patient's is decided once, with the words; no picture may claim more than they do.
 const kPatients = ['feet', 'head', 'left', 'right'];
-const marksIn = async (page, where) => [...new Set(await page.locator(`${where} [data-mark]`).evaluateAll((marks) => marks.map((mark) => mark.dataset.mark)))].sort();
 const kPictures = ['.map-row .map-box .ways', '.map-row .profile', '.halves .map-box .ways'];
 /// Map, profile, overlay and 3-D of the result that anna sees.
 async function marksOfResult(name) {

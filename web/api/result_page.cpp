@@ -102,7 +102,8 @@ std::string NumberCells(const NumberRow& row, const std::string& words, double t
 }
 
 /// A correction that is no answer is no advice: it is left out.
-std::string NumbersTable(const ResultSummary& result, const Tolerance& tolerance) {
+/// @param review  It is read or printed, or can no longer be acted on: it says what was found.
+std::string NumbersTable(const ResultSummary& result, const Tolerance& tolerance, bool review) {
   if (!result.correction || result.verdict == "no_answer") return "";
   const bool moves = result.verdict == "move";
   std::string rows;
@@ -117,8 +118,10 @@ std::string NumbersTable(const ResultSummary& result, const Tolerance& tolerance
       "scope=\"col\">value</th><th scope=\"col\">95 %</th><th scope=\"col\">tolerance</th><th "
       "scope=\"col\">judgement</th><th scope=\"col\">direction</th></tr></thead><tbody>{}</tbody>"
       "</table>",
-      moves ? "Correction to apply at the isocentre"
-            : "Remaining difference at the isocentre: no move needed",
+      moves && review ? "Correction found then, at the isocentre: not to be applied now"
+      : moves         ? "Correction to apply at the isocentre"
+      : review        ? "Difference that remained then, at the isocentre"
+                      : "Remaining difference at the isocentre: no move needed",
       rows);
 }
 
@@ -146,9 +149,18 @@ std::string Pictures(const Scan& scan) {
       scan.id);
 }
 
+std::string VerdictText(const std::string& verdict, bool review) {
+  if (verdict == "in_tolerance") return review ? "WAS IN TOLERANCE" : "IN TOLERANCE";
+  if (verdict == "unsure") return review ? "WAS NOT SURELY WITHIN" : "NOT SURELY WITHIN";
+  if (verdict == "move") return review ? "WAS OUTSIDE TOLERANCE" : "MOVE";
+  return "NO ANSWER";
+}
+
 /// @param newer  A later scan that gave no result; null: none.
 /// @param runs   A new scan runs or is computed.
-std::string ResultBody(ScanService& service, const Scan& scan, const Scan* newer, bool runs) {
+/// @param named  Asked for by its number, to be read or printed.
+std::string ResultBody(ScanService& service, const Scan& scan, const Scan* newer, bool runs,
+                       bool named) {
   const auto patient = service.FindPatient(scan.patient_id);
   const auto reference = service.FindReference(scan.reference_id);
   const auto age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
@@ -188,15 +200,13 @@ std::string ResultBody(ScanService& service, const Scan& scan, const Scan* newer
                         TimeText(reference->created_at), EscapeHtml(reference->approved_by));
   if (!scan.result) return body + "<p>No comparison: this scan has no reference.</p>";
   const std::string& verdict = scan.result->verdict;
+  const bool review = old || named;
   body += fmt::format("<section class=\"{}\"><p class=\"verdict {}\">{}</p>", old ? "old" : "fresh",
-                      EscapeHtml(scan.result->verdict),
-                      verdict == "in_tolerance" ? "IN TOLERANCE"
-                      : verdict == "unsure"     ? "NOT SURELY WITHIN"
-                      : verdict == "move"       ? "MOVE"
-                                                : "NO ANSWER");
+                      EscapeHtml(scan.result->verdict), VerdictText(verdict, review));
   for (const std::string& reason : scan.result->reasons)
     body += fmt::format("<p>{}</p>", EscapeHtml(reason));
-  return body + NumbersTable(*scan.result, reference ? reference->plan.tolerance : Tolerance{}) +
+  return body +
+         NumbersTable(*scan.result, reference ? reference->plan.tolerance : Tolerance{}, review) +
          BodyList(*scan.result) + Pictures(scan) + "</section>";
 }
 
@@ -217,9 +227,10 @@ Response ResultPage(ScanService& service, const std::optional<std::string>& want
   Response response;
   response.type = "text/html; charset=utf-8";
   // What is asked for by name is read or printed: it does not load itself again.
-  response.body = Document(scan ? ResultBody(service, *scan, failed ? &*failed : nullptr, runs)
-                                : "<h1>No result yet</h1>",
-                           wanted ? "" : "/result?again");
+  response.body = Document(
+      scan ? ResultBody(service, *scan, failed ? &*failed : nullptr, runs, wanted.has_value())
+           : "<h1>No result yet</h1>",
+      wanted ? "" : "/result?again");
   return response;
 }
 

@@ -6,7 +6,7 @@ import {
 } from './map_frame.js';
 import { cellAt, errorColour, loadMap, paintErrors, paintOverlay } from './maps.js';
 import { signed } from './numbers.js';
-import { namedBy } from './screens/common.js';
+import { sidesOf } from './screens/common.js';
 import { S } from './strings.js';
 
 const kTicks = [-20, -10, -5, -2, -1, 1, 2, 5, 10, 20];  // tolerances
@@ -160,7 +160,7 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
   const { grid, region, heights } = loaded;
   const maps = { before: loaded.before, after: null };
   const view = viewOf(grid, region);
-  const compass = compassOf(live.status?.room, namedBy(scan, scan.details),
+  const compass = compassOf(live.status?.room, sidesOf(scan, scan.details),
     reference.plan.posture);
   const isocentre = scan.details?.correction?.isocentre;
 

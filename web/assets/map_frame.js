@@ -13,20 +13,23 @@ const times = ([x, y], k) => [k * x, k * y];
 /// the map, x right, y up.
 ///
 /// Which side is the patient's was decided where the words were made: only a result whose body
-/// "named_by" is "posture" shows head, feet, left and right. Else ("room") the marks are the axes
-/// of the room, as in the words; where its place is not known, the map's own.
-/// @param named_by  Of the result's body; anything but "posture": nothing is the patient's.
-export function compassOf(room, named_by, posture) {
+/// "named_by" is "posture" shows head, feet, left and right, where the comparison found them. Else
+/// the marks are the axes of the room, as in the words; where its place is not known, the map's own.
+/// @param body  Of the result: named_by, head_xy, left_xy; none: nothing is the patient's.
+export function compassOf(room, body, posture) {
   // Right of a person who faces the gantry.
   const { gantry_xy: gantry, right_xy: right, known } = room ?? {};
   if (!gantry || !right) return null;
-  if (named_by === 'posture' && posture) {
-    const head = times(gantry, posture.startsWith('H') ? 1 : -1);
-    const left = times(right, posture === 'HFS' || posture === 'FFP' ? 1 : -1);
+  // Results before 0.2.0 tell the posture alone: it says something where the room is known.
+  if (body?.named_by === 'posture' && (body.head_xy || (known && posture))) {
+    const head = body.head_xy ?? times(gantry, posture.startsWith('H') ? 1 : -1);
+    const left = body.left_xy ?? times(right, posture === 'HFS' || posture === 'FFP' ? 1 : -1);
     const ways = { head, feet: times(head, -1), left, right: times(left, -1) };
     return { by: 'posture', ways: known ? { ...ways, gantry } : ways };
   }
-  if (known) return { by: 'room', ways: { gantry, plusX: right, minusX: times(right, -1) } };
+  if (known && body?.named_by !== 'axes') {
+    return { by: 'room', ways: { gantry, plusX: right, minusX: times(right, -1) } };
+  }
   return {
     by: 'axes', ways: { plusX: [1, 0], minusX: [-1, 0], plusY: [0, 1], minusY: [0, -1] },
   };

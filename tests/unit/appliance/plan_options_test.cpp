@@ -30,7 +30,7 @@ CompareOptions UnlikeThePlan() {
   room.preset = Preset::kPaper;
   room.region_polygon_m = {{9, 9}, {8, 9}, {8, 8}};
   room.isocentre_m = Eigen::Vector3d(9, 9, 9);
-  room.T_iec_reference.translation() = Eigen::Vector3d(1, 2, 3);
+  room.T_iec_reference = Pose(Eigen::Translation3d(1, 2, 3));
   room.marker_kind = MarkerKind::kRoom;
   room.posture = PatientPosture::kHeadFirstProne;
   room.markers = {.moved_m = 0.004, .moved_sigmas = 2.5};
@@ -68,7 +68,7 @@ TEST(PlanOptionsTest, WhatIsTheRoomsStaysAsConfigured) {
   const CompareOptions room = UnlikeThePlan();
   const CompareOptions options = CompareOptionsFor(UnlikeTheDefaults(), room);
   EXPECT_EQ(options.preset, Preset::kPaper);
-  EXPECT_EQ(options.T_iec_reference.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(options.T_iec_reference->translation(), Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(options.markers.moved_m, 0.004);
   EXPECT_EQ(options.markers.moved_sigmas, 2.5);
   EXPECT_EQ(options.limits.min_shared_markers, 5);

@@ -79,6 +79,12 @@ class Lying {
         {reference_, deviation_, mask_, mask_, T_motion, extra * T_iec_reference_, kind, posture});
   }
 
+  /// As where nobody ever said how the room lies.
+  [[nodiscard]] BodyParts DescribeWithoutRoom(std::optional<PatientPosture> posture) const {
+    return DescribeBody({reference_, deviation_, mask_, mask_, Pose::Identity(), std::nullopt,
+                         MarkerKind::kRoom, posture});
+  }
+
  private:
   static constexpr GridShape kGrid = {-1.2, -1.2, 0.005, 480, 480};
   Pose T_iec_reference_;
@@ -176,6 +182,50 @@ TEST(BodyPartsTest, RoomWordsNameTheGantryEndAndTheSideOfX) {
                      [](double down, double left) { return down < 0.6 && left > 0 ? 0.008 : 0.0; });
   EXPECT_THAT(Said(turned.Describe(std::nullopt)),
               testing::ElementsAre("+X side at the end away from the gantry 8 mm high"));
+}
+
+TEST(BodyPartsTest, WithoutARoomTheBodyItselfSaysWhereItsHeadIs) {
+  for (const Case& how : kCases) {
+    for (const double turn_rad : {0.0, 0.4, 1.6, 3.0, -1.3}) {
+      const Lying person(how, turn_rad, IsPerson, HighLeftShoulder);
+      const BodyParts body = person.DescribeWithoutRoom(how.posture);
+      EXPECT_THAT(Said(body), testing::ElementsAre("left shoulder 9 mm high"))
+          << Name(how.posture) << turn_rad;
+      EXPECT_FALSE(body.is_room_known);
+      ASSERT_TRUE(body.patient);
+      const Eigen::Rotation2Dd to_reference(-turn_rad);
+      EXPECT_LT((body.patient->head - to_reference * how.head).norm(), 0.02) << turn_rad;
+      EXPECT_LT((body.patient->left - to_reference * how.left).norm(), 0.02) << turn_rad;
+    }
+  }
+}
+
+TEST(BodyPartsTest, WithARoomHeadAndLeftAreGivenTooAndItsAxesWhereThePostureIsNotBelieved) {
+  const Lying person(kCases[1], 0.4, IsPerson, HighLeftShoulder);
+  const BodyParts body = person.Describe(kCases[1].posture);
+  EXPECT_TRUE(body.is_room_known);
+  ASSERT_TRUE(body.patient);
+  const Eigen::Rotation2Dd to_reference(-0.4);
+  EXPECT_LT((body.patient->head - to_reference * kCases[1].head).norm(), 0.02);
+  EXPECT_LT((body.patient->left - to_reference * kCases[1].left).norm(), 0.02);
+  EXPECT_FALSE(person.Describe(std::nullopt).patient);
+}
+
+TEST(BodyPartsTest, WithoutARoomAndWithoutAHeadTheMarkersAxesName) {
+  const auto high = [](double down, double left) { return down < 0.5 && left > 0 ? 0.012 : 0.0; };
+  const Lying trunk(kCases[0], 0.0, IsTrunk, high);
+  const BodyParts body = trunk.DescribeWithoutRoom(kCases[0].posture);
+  EXPECT_FALSE(body.by_posture);
+  EXPECT_FALSE(body.patient);
+  EXPECT_THAT(Said(body), testing::ElementsAre("+X side at the +Y end 12 mm high"));
+  // Feet, calves and thighs alone are no head, neck and shoulders.
+  const auto legs = [](double down, double left) {
+    const double half = down < 0.6 ? 0.22 : (down < 1.2 ? 0.15 : 0.09);
+    return down > 0.1 && down < 1.5 && std::abs(left) < half;
+  };
+  EXPECT_FALSE(Lying(kCases[0], 0.0, legs, high).DescribeWithoutRoom(kCases[0].posture).patient);
+  // Supine or prone is not known: then neither is the left.
+  EXPECT_FALSE(Lying(kCases[0], 0.0, IsPerson, high).DescribeWithoutRoom(std::nullopt).patient);
 }
 
 TEST(BodyPartsTest, NowIsTheRiseOfThePartWithWhatItsPostureAdds) {

@@ -379,6 +379,27 @@ TEST(ComparisonTest, TheNumbersAreThoseOfTheRoomsAxes) {
   EXPECT_EQ(comparison.correction->words[1], "away from gantry");
 }
 
+TEST(ComparisonTest, WhereTheRoomWasNeverSaidNoWordSpeaksOfIt) {
+  const Pose T_motion(Eigen::Translation3d(0.012, 0.02, 0));
+  const Scene moved = MakeSyntheticScene(MovedBy(T_motion, ReferenceOptions()));
+  CompareOptions options;
+  const Comparison unset = Compare(PerfectReference(), moved, options);
+  options.T_iec_reference = Pose::Identity();
+  const Comparison set = Compare(PerfectReference(), moved, options);
+  const auto said = [](const Comparison& comparison) {
+    std::string text;
+    for (const std::string& word : comparison.correction->words) text += word + "; ";
+    for (const std::string& reason : comparison.reasons) text += reason + "; ";
+    for (const BodyPart& part : comparison.body_parts->parts) text += part.name + "; ";
+    return text;
+  };
+  EXPECT_THAT(said(unset), testing::Not(HasSubstr("gantry")));
+  EXPECT_THAT(said(set), HasSubstr("gantry"));
+  EXPECT_FALSE(unset.body_parts->is_room_known);
+  EXPECT_TRUE(set.body_parts->is_room_known);
+  EXPECT_EQ(unset.correction->value.longitudinal_mm, set.correction->value.longitudinal_mm);
+}
+
 TEST(ComparisonTest, CouchMarkersRefuseShiftsAndJudgePostureOnly) {
   CompareOptions options;
   options.marker_kind = MarkerKind::kCouch;

@@ -73,5 +73,72 @@ TEST(CorrectionWordsTest, EveryPostureNumberAndSignHasItsWords) {
   }
 }
 
+// Where nobody has said how the room lies: `turn_deg` from the marker's y axis to the head,
+// counter- clockwise from above; the plan's "head first" says nothing then, supine and prone do.
+std::array<std::string, 6> WithoutRoom(double turn_deg, PatientPosture posture, double sign,
+                                       MarkerKind kind = MarkerKind::kRoom) {
+  const bool is_supine =
+      posture == PatientPosture::kHeadFirstSupine || posture == PatientPosture::kFeetFirstSupine;
+  const Eigen::Rotation2Dd turn(turn_deg * kDegree);
+  const PatientAxes patient = {turn * Eigen::Vector2d::UnitY(),
+                               turn * Eigen::Vector2d(is_supine ? 1 : -1, 0)};
+  std::array<std::string, 6> words;
+  for (int number = 0; number < 6; ++number) {
+    words[static_cast<std::size_t>(number)] =
+        CorrectionOf(MotionFor(number, sign), Matrix6d::Identity() * 1e-8, Eigen::Vector3d::Zero(),
+                     Eigen::Vector3d::Zero(), std::nullopt, kind, posture, patient)
+            .words[static_cast<std::size_t>(number)];
+  }
+  return words;
+}
+
+TEST(CorrectionWordsTest, WithoutARoomTheWordsAreThePatients) {
+  using Words = std::array<std::string, 6>;
+  constexpr auto kSupine = PatientPosture::kHeadFirstSupine;
+  constexpr auto kProne = PatientPosture::kHeadFirstProne;
+  const Words along = {"up (anterior)", "toward the head",        "to patient left",
+                       "head up",       "patient left side down", "head to patient right"};
+  EXPECT_EQ(WithoutRoom(0, kSupine, 1), along);
+  EXPECT_EQ(WithoutRoom(0, PatientPosture::kFeetFirstSupine, 1), along);
+  EXPECT_EQ(WithoutRoom(20, kSupine, 1), along);
+  EXPECT_EQ(WithoutRoom(0, kSupine, -1),
+            (Words{"down (posterior)", "toward the feet", "to patient right", "head down",
+                   "patient right side down", "head to patient left"}));
+  EXPECT_EQ(WithoutRoom(0, kProne, 1),
+            (Words{"up (posterior)", "toward the head", "to patient right", "head up",
+                   "patient right side down", "head to patient left"}));
+  // The head lies at -X: then a supine person's left hand lies at +Y.
+  EXPECT_EQ(WithoutRoom(90, kSupine, 1),
+            (Words{"up (anterior)", "to patient left", "toward the feet", "patient right side down",
+                   "head up", "head to patient right"}));
+  EXPECT_EQ(WithoutRoom(45, kSupine, 1),
+            (Words{"up (anterior)", "toward the head and patient left",
+                   "toward the feet and patient left", "head and patient left side up",
+                   "head and patient right side up", "head to patient right"}));
+  const Words posture_only = WithoutRoom(0, kSupine, 1, MarkerKind::kCouch);
+  EXPECT_EQ(posture_only[0] + posture_only[1] + posture_only[2], "");
+  EXPECT_EQ(posture_only[3], "head up");
+}
+
+TEST(CorrectionWordsTest, WithoutARoomNoWordSpeaksOfCouchOrGantry) {
+  for (const double sign : {1.0, -1.0}) {
+    for (int number = 0; number < 6; ++number) {
+      const auto i = static_cast<std::size_t>(number);
+      const auto words = [&](const std::optional<Pose>& T_iec_reference) {
+        return CorrectionOf(MotionFor(number, sign), Matrix6d::Identity() * 1e-8,
+                            Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), T_iec_reference,
+                            MarkerKind::kRoom, std::nullopt)
+            .words[i];
+      };
+      EXPECT_EQ(words(std::nullopt).find("gantry"), std::string::npos) << words(std::nullopt);
+      EXPECT_FALSE(words(std::nullopt).empty());
+      // Set to the identity, the room is known all the same.
+      EXPECT_EQ(words(Pose::Identity()).find("gantry") != std::string::npos,
+                number > 0 && number < 5)
+          << words(Pose::Identity());
+    }
+  }
+}
+
 }  // namespace
 }  // namespace plumb

@@ -89,7 +89,7 @@ T_iec_reference = [[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]
   EXPECT_DOUBLE_EQ(config.compare.limits.max_residual_p95_m, 0.02);
   EXPECT_DOUBLE_EQ(config.compare.limits.max_lost_s, 2);
   EXPECT_NEAR(
-      (config.compare.T_iec_reference * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(0.1, 1.2, 0.3))
+      (*config.compare.T_iec_reference * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(0.1, 1.2, 0.3))
           .norm(),
       0, 1e-12);
 }

@@ -37,9 +37,9 @@ export const outcomeBadge = (scan) => (scan.result ? verdictBadge(scan.result.ve
 export const isAdvice = (scan) =>
   Boolean(scan.result?.correction) && scan.result.verdict !== 'no_answer';
 
-/// What the comparison named the directions by, for the marks on pictures: no answer, no side of
+/// Where the comparison found the patient's sides, for the marks on pictures: no answer, no side of
 /// the patient.
-export const namedBy = (scan, details) => (isAdvice(scan) ? details?.body?.named_by : undefined);
+export const sidesOf = (scan, details) => (isAdvice(scan) ? details?.body : undefined);
 
 /// Codes by patient id, for lists.
 export async function patientCodes() {

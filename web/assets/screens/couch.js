@@ -22,9 +22,10 @@ export function targetOf(reading_cm, correction_mm, u95_mm) {
 }
 
 /// Only for a result that commands moves, and where the room's axes are known.
-export function couchReadings({ result }) {
+export function couchReadings({ result, details }) {
   const text = S.result;
-  if (result?.verdict !== 'move' || !live.status?.room?.known) return null;
+  const roomKnown = live.status?.room?.known && details?.body?.room_known !== false;
+  if (result?.verdict !== 'move' || !roomKnown) return null;
   const axes = kAxes.filter((axis) => axis.shift && Number.isFinite(result.correction[axis.key]));
   if (!axes.length) return null;
   const rows = axes.map((axis) => {

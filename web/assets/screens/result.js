@@ -107,7 +107,8 @@ function bodyWords({ scan, details }) {
       list(text.bodyAfter, text.bodyAfterHint, scan.result.body.after),
       details.correction?.vertical_mm !== null
         && list(text.bodyNow, text.bodyNowHint, scan.result.body.now)),
-    details.body.named_by === 'room' && h('p', { class: 'caution' }, text.bodyByRoom));
+    details.body.named_by === 'room' && h('p', { class: 'caution' }, text.bodyByRoom),
+    details.body.named_by === 'axes' && h('p', { class: 'caution' }, text.bodyByAxes));
 }
 
 /// What the sweep saw, where there is nothing to compare it with.
@@ -119,16 +120,28 @@ function seen({ scan, scene }) {
   return box;
 }
 
-function numbersTitle({ result }) {
+function numbersTitle({ result }, valid) {
   const text = S.result;
-  if (result.verdict === 'in_tolerance') return text.remaining;
-  return result.verdict === 'move' ? text.numbers : text.measured;
+  if (result.verdict === 'in_tolerance') return valid ? text.remaining : text.remainingThen;
+  if (result.verdict !== 'move') return text.measured;
+  return valid ? text.numbers : text.numbersThen;
+}
+
+/// Verdict and numbers. What can no longer be acted on says what was found, and commands nothing.
+function answer(data, valid) {
+  const text = S.result;
+  const { scan, reference, details } = data;
+  return [verdictStrip(data, valid),
+    isAdvice(scan) && h('section', { class: 'correction' },
+      h('h2', {}, numbersTitle(scan, valid), ' ', h('small', {}, text.atIsocentre)),
+      details?.body?.room_known === false && h('p', { class: 'caution' }, text.roomUnknown),
+      sixNumbers(scan.result, reference, details, valid), valid && couchReadings(scan))];
 }
 
 /// The parts of the screen; pictures come later into their places.
 function build(data, reload, id) {
   const text = S.result;
-  const { scan, reference, history } = data;
+  const { scan, history, reference } = data;
   const mapped = Boolean(data.details?.alignment);
   const card = (title, ...content) =>
     h('section', { class: 'card' }, h('h2', {}, title), ...content);
@@ -140,6 +153,14 @@ function build(data, reload, id) {
     mesh: h('div', {}),
     overlay: h('div', {}, h('p', { class: 'hint' }, S.loading)),
     actions: actions(data, reload),
+    fresh: h('div', { class: 'fresh' }),
+    isValid: null,
+  };
+  /// Draws the answer again once it can no longer be acted on.
+  parts.judge = (why) => {
+    if (parts.isValid === !why) return;
+    parts.isValid = !why;
+    clear(parts.fresh, answer(data, !why));
   };
   const pictures = h('div', { class: mapped || data.scene?.heightmap ? 'halves' : '' },
     mapped && card(text.overlay, parts.overlay),
@@ -147,10 +168,7 @@ function build(data, reload, id) {
     scan.outcome === 'done' && card(text.mesh, parts.mesh));
   parts.element = [h('h1', { class: 'visually-hidden' }, text.title), parts.who.element,
     parts.note.element, parts.other,
-    h('div', { class: 'fresh' }, verdictStrip(data),
-      isAdvice(scan) && h('section', { class: 'correction' },
-        h('h2', {}, numbersTitle(scan), ' ', h('small', {}, text.atIsocentre)),
-        sixNumbers(scan.result, reference, data.details), couchReadings(scan))),
+    parts.fresh,
     h('section', { class: 'card actions' }, parts.actions.element),
     data.details && card(text.trust, trust(data)),
     mapped && card(text.where, bodyWords(data), parts.map),
@@ -199,6 +217,7 @@ export async function showResult(place, id) {
     tick = () => {
       parts.who.tick();
       const why = parts.note.tick();
+      parts.judge(why);
       place.classList.toggle('is-old', Boolean(why));
       parts.actions.tick();
       noteOther(parts.other, data.patient);

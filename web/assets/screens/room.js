@@ -7,7 +7,7 @@ import { compassOf, drawCropped, mapFrame, marksNote, viewOf } from '../map_fram
 import { loadMap, paintErrors } from '../maps.js';
 import { sixNumbers, toleranceOf } from '../numbers.js';
 import { chooseLanguage, kLanguages, languageOf, S } from '../strings.js';
-import { faultWords, flagList, isAdvice, kWarmUp_s, namedBy, sentence } from './common.js';
+import { faultWords, flagList, isAdvice, kWarmUp_s, sidesOf, sentence } from './common.js';
 import { showLogin } from './login.js';
 import { preview } from './scan.js';
 import { validityNote, verdictStrip } from './verdict.js';
@@ -123,7 +123,7 @@ function result() {
     const canvas = h('canvas', { class: 'still-map', role: 'img', 'aria-label': said });
     drawCropped(canvas, view, (whole) =>
       paintErrors(whole, values, toleranceOf(reference).shift_mm / 1000, region));
-    const compass = compassOf(live.status?.room, namedBy(scan, data.details),
+    const compass = compassOf(live.status?.room, sidesOf(scan, data.details),
       reference.plan.posture);
     clear(box, mapFrame({ grid, view, canvas, region, compass }), marksNote(compass));
   };

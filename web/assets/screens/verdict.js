@@ -77,17 +77,18 @@ function withoutResult({ scan, patient }) {
     h('p', { class: 'why' }, scan.failure ? `${words}: ${scan.failure}` : draft ? '' : words));
 }
 
-export function verdictStrip({ scan, scene, patient }) {
+/// @param valid  Whether it can be acted on; else it says what was found, and asks for nothing.
+export function verdictStrip({ scan, scene, patient }, valid = true) {
   const text = S.result;
   const { result } = scan;
   if (!result) return withoutResult({ scan, patient });
   // The first reason decides; nobody reads a wall of text.
   const [first, ...others] = result.verdict === 'no_answer' ? result.reasons
-    : [text.why[result.verdict] ?? result.reasons[0]];
+    : [(valid ? text.why : text.whyThen)[result.verdict] ?? result.reasons[0]];
   return h('section', { class: `verdict ${result.verdict}` },
     h('p', { class: 'word' },
       h('span', { class: 'icon', 'aria-hidden': 'true' }, verdictIcon(result.verdict)),
-      text.verdicts[result.verdict] ?? result.verdict),
+      (valid ? text.verdicts : text.verdictsThen)[result.verdict] ?? result.verdict),
     h('p', { class: 'why' }, sentence(first)),
     flagList(scan, scene),
     others.length > 0 && h('details', { class: 'other-reasons' },

@@ -219,12 +219,23 @@ export const en = {
       unsure: 'Every value is within tolerance, but not with its uncertainty. Scan again, slowly.',
       move: 'Apply the correction below, then scan again.', no_answer: '',
     },
+    // Of a result that can no longer be acted on.
+    verdictsThen: {
+      in_tolerance: 'WAS IN TOLERANCE', unsure: 'WAS NOT SURELY WITHIN',
+      move: 'WAS OUTSIDE TOLERANCE', no_answer: 'NO ANSWER',
+    },
+    whyThen: {
+      in_tolerance: 'Every value, with its uncertainty, was within tolerance.',
+      unsure: 'Every value was within tolerance, but not with its uncertainty.',
+      move: 'The correction below was found at this scan. Do not apply it now.', no_answer: '',
+    },
     noReference: 'No comparison: this scan has no reference.',
     failed: 'This scan failed', cancelled: 'This scan was cancelled.',
     draftSaved: (version) => `Saved as draft version ${version}.`,
     draftNext: 'A physicist plans it, a second physicist approves it.',
     draftLink: 'Open the draft',
-    numbers: 'Correction to apply', remaining: 'Remaining difference: no move needed',
+    numbers: 'Correction to apply', numbersThen: 'Correction found then',
+    remainingThen: 'Difference that remained then', remaining: 'Remaining difference: no move needed',
     measured: 'Measured difference', atIsocentre: 'at the isocentre',
     within: 'in tolerance', unsure: 'not surely within', outside: 'outside tolerance',
     tolerance: (value, unit) => `tolerance ±${value} ${unit}`,
@@ -264,6 +275,10 @@ export const en = {
     asReference: 'every part as in the reference, within 3 mm',
     bodyByRoom: 'Parts are named by the axes of the room (IEC 61217): patient orientation unknown '
       + 'or not as planned.',
+    bodyByAxes: 'Parts and directions are named by the axes of the reference marker: the room has '
+      + 'not been calibrated, and the surface does not show where the head lies.',
+    roomUnknown: 'The room has not been calibrated (T_iec_reference): the numbers run along and '
+      + 'about the axes of the reference marker, not of the couch.',
     higher: 'Patient is higher than reference', lower: 'Patient is lower than reference',
     unknown: 'not measured', hole_: 'hole in the region', regionOutline: 'region',
     reads: (value) => `${value} mm`,

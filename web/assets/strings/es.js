@@ -17,6 +17,17 @@ const kWords = {
   'left side down, facing the gantry': 'lado izquierdo abajo, mirando al gantry',
   'counter-clockwise from above': 'en sentido antihorario visto desde arriba',
   'clockwise from above': 'en sentido horario visto desde arriba',
+  'up (anterior)': 'arriba (anterior)', 'up (posterior)': 'arriba (posterior)',
+  'down (anterior)': 'abajo (anterior)', 'down (posterior)': 'abajo (posterior)',
+  'toward the head': 'hacia la cabeza', 'toward the feet': 'hacia los pies',
+  'toward the head and patient left': 'hacia la cabeza y la izquierda del paciente',
+  'toward the head and patient right': 'hacia la cabeza y la derecha del paciente',
+  'toward the feet and patient left': 'hacia los pies y la izquierda del paciente',
+  'toward the feet and patient right': 'hacia los pies y la derecha del paciente',
+  'head and patient left side up': 'cabeza y lado izquierdo del paciente arriba',
+  'head and patient right side up': 'cabeza y lado derecho del paciente arriba',
+  'feet and patient left side up': 'pies y lado izquierdo del paciente arriba',
+  'feet and patient right side up': 'pies y lado derecho del paciente arriba',
   'a reference is made of this scan: it goes only with its patient':
     'una referencia procede de este escaneo: solo se borra con su paciente',
   'the session of a patient is open: close it first':
@@ -41,13 +52,18 @@ const kWords = {
     'este resultado tiene más de 2 minutos: escanee de nuevo y acepte después',
 };
 const kPatterns = [
-  [/^(.+) at the (head|feet|gantry) end (\d+) mm (?:too )?(high|low)$/,
+  [/^(.+) at the (head|feet|gantry|\+Y|-Y) end (\d+) mm (?:too )?(high|low)$/,
     ([, part, end, mm, way]) => `${part} en el extremo de ${{
-      head: 'la cabeza', feet: 'los pies', gantry: 'gantry' }[end]}: ${mm} mm `
+      head: 'la cabeza', feet: 'los pies', gantry: 'gantry' }[end] ?? end}: ${mm} mm `
       + `${way === 'high' ? 'demasiado alto' : 'demasiado bajo'}`],
   [/^(.+) (\d+) mm (?:too )?(high|low)$/,
     ([, part, mm, way]) => `${part}: ${mm} mm `
       + `${way === 'high' ? 'demasiado alto' : 'demasiado bajo'}`],
+  [/^along ([+-][XY]) of the reference marker$/,
+    ([, axis]) => `según ${axis} del marcador de referencia`],
+  [/^([+-][XY]) side of the reference marker (up|down)$/,
+    ([, axis, way]) => `lado ${axis} del marcador de referencia `
+      + `${way === 'up' ? 'arriba' : 'abajo'}`],
   [/^marker (\d+) moved ([\d.]+) mm(.*)$/,
     ([, id, mm, rest]) => `el marcador ${id} se movió ${mm} mm${rest}`],
   [/^marker (\d+)$/, ([, id]) => `marcador ${id}`],
@@ -293,12 +309,25 @@ export const es = {
         + 'nuevo, despacio.',
       move: 'Aplique la corrección de abajo y escanee de nuevo.', no_answer: '',
     },
+    // Of a result that can no longer be acted on.
+    verdictsThen: {
+      in_tolerance: 'ESTABA EN TOLERANCIA', unsure: 'ESTABA DENTRO SIN SEGURIDAD',
+      move: 'ESTABA FUERA DE TOLERANCIA', no_answer: 'SIN RESPUESTA',
+    },
+    whyThen: {
+      in_tolerance: 'Cada valor, con su incertidumbre, estaba dentro de la tolerancia.',
+      unsure: 'Cada valor estaba dentro de la tolerancia, pero no con su incertidumbre.',
+      move: 'La corrección siguiente se halló en este escaneo. No la aplique ahora.',
+      no_answer: '',
+    },
     noReference: 'Sin comparación: este escaneo no tiene referencia.',
     failed: 'Este escaneo falló', cancelled: 'Este escaneo se canceló.',
     draftSaved: (version) => `Guardado como borrador, versión ${version}.`,
     draftNext: 'Un físico lo planifica y un segundo físico lo aprueba.',
     draftLink: 'Abrir el borrador',
-    numbers: 'Corrección que aplicar', remaining: 'Diferencia restante: no hay que mover',
+    numbers: 'Corrección que aplicar', numbersThen: 'Corrección hallada entonces',
+    remainingThen: 'Diferencia que quedaba entonces',
+    remaining: 'Diferencia restante: no hay que mover',
     measured: 'Diferencia medida', atIsocentre: 'en el isocentro',
     within: 'en tolerancia', unsure: 'dentro sin seguridad', outside: 'fuera de tolerancia',
     tolerance: (value, unit) => `tolerancia ±${value} ${unit}`,
@@ -342,6 +371,10 @@ export const es = {
     asReference: 'todas las partes como en la referencia, dentro de 3 mm',
     bodyByRoom: 'Las partes se nombran por los ejes de la sala (IEC 61217): la orientación del '
       + 'paciente no se conoce o no es la planificada.',
+    bodyByAxes: 'Las partes y direcciones se nombran por los ejes del marcador de referencia: la '
+      + 'sala no está calibrada y la superficie no muestra dónde está la cabeza.',
+    roomUnknown: 'La sala no está calibrada (T_iec_reference): los números siguen los ejes del '
+      + 'marcador de referencia, no los de la camilla.',
     higher: 'El paciente está más alto que la referencia',
     lower: 'El paciente está más bajo que la referencia',
     unknown: 'no medido', hole_: 'hueco en la región', regionOutline: 'región',
