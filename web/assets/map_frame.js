@@ -14,7 +14,7 @@ const times = ([x, y], k) => [k * x, k * y];
 ///
 /// Which side is the patient's was decided where the words were made: only a result whose body
 /// "named_by" is "posture" shows head, feet, left and right, where the comparison found them. Else
-/// the marks are the axes of the room, as in the words; where its place is not known, the map's own.
+/// the marks are the axes of the room, as in the words; where that is not known, the map's own.
 /// @param body  Of the result: named_by, head_xy, left_xy; none: nothing is the patient's.
 export function compassOf(room, body, posture) {
   // Right of a person who faces the gantry.

@@ -87,11 +87,11 @@ function bar(value, u95, tolerance) {
 
 const kWords = { in: 'within', unsure: 'unsure', out: 'outside' };
 
-/// @param commands  Whether this is a correction to apply, or was one; else a difference that is only
-/// told.
+/// @param commands  Whether this is a correction to apply, or was one; else a difference that is
+/// only told.
 /// @param pictured  Whether an arrow shows the way: only for what is to be applied, and, but for up
 /// and down, only in a room whose axes are known.
-function card(axis, { correction, u95, words }, tolerance, weak, { commands, pictured }) {
+function card(axis, { correction, u95, words }, tolerance, { weak, commands, pictured }) {
   const text = S.result;
   const value = correction[axis.key];
   const limit = axis.shift ? tolerance.shift_mm : tolerance.rotation_deg;
@@ -110,7 +110,7 @@ function card(axis, { correction, u95, words }, tolerance, weak, { commands, pic
   const word = !commands ? text.noMove : zero ? text.still : still ? text.insignificant
     : translated(words?.[axis.name]) ?? S.none;
   return h('li', { class: `number ${kWords[judged]}${commands ? '' : ' told'}` },
-    h('h3', {}, name), directed && pictured(axis) && drawing(axis.name, value),
+    h('h3', {}, name), directed && pictured && drawing(axis.name, value),
     h('p', { class: 'value' }, signed(value, digits),
       h('span', { class: 'unit' }, axis.unit === '°' ? '°' : ` ${axis.unit}`)),
     h('p', { class: 'word' }, word),
@@ -139,12 +139,15 @@ export function numbersLine({ correction, u95 }) {
 export const kDefaultTolerance = { shift_mm: 3, rotation_deg: 1 };
 export const toleranceOf = (reference) => reference?.plan.tolerance ?? kDefaultTolerance;
 
-/// Only a result that says MOVE commands moves, and only while it is valid; later its words say what
-/// was found.
+/// Only a result that says MOVE commands moves, and only while it is valid; later its words say
+/// what was found.
 export function sixNumbers(result, reference, details, valid = true) {
-  const roomKnown = details?.body?.room_known !== false;
-  const pictured = (axis) => valid && (roomKnown || axis.name === 'vertical');
   const weak = new Set((details?.motion?.weak_directions ?? []).map(({ name }) => name));
+  const roomKnown = details?.body?.room_known !== false;
+  const commands = result.verdict === 'move';
   return h('ol', { class: 'numbers' }, kAxes.map((axis) =>
-    card(axis, result, toleranceOf(reference), weak.has(axis.name), { commands: result.verdict === 'move', pictured })));
+    card(axis, result, toleranceOf(reference), {
+      weak: weak.has(axis.name), commands,
+      pictured: valid && (roomKnown || axis.name === 'vertical'),
+    })));
 }
