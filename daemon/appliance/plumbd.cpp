@@ -27,16 +27,14 @@
 #include "daemon/appliance/control_desk.hpp"
 #include "daemon/appliance/panel.hpp"
 #include "daemon/appliance/web_service.hpp"
+#include "daemon/config/sensor_settings.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/unix_socket.hpp"
 #include "daemon/loop/end_guard.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/loop/loop_report.hpp"
-#ifdef PLUMB_WITH_OPENNI
-#include "drivers/openni/openni_provider.hpp"
-#include "drivers/virtual/virtual_sensor.hpp"
-#endif
+#include "drivers/live/sensor_driver.hpp"
 #include "web/api/http_server.hpp"
 
 namespace plumb {
@@ -94,7 +92,7 @@ void AddOptions(CLI::App& app, Options& options) {
   app.footer(fmt::format("\n{}", kResearchNotice));
 }
 
-Config ReadConfiguration(const Options& options) {
+Config ReadConfiguration(const Options& options, const SensorRegistry& registry) {
   Config config;
   std::error_code ignored;
   if (options.config_file) {
@@ -106,6 +104,7 @@ Config ReadConfiguration(const Options& options) {
   if (options.simulated.empty()) RefuseResearchPresets(config);
   if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
   CheckPageIdentity(config.web);
+  (void)registry.Choose(config.appliance.sensor_driver, !options.simulated.empty());
   if (options.state) {
     config.appliance.state = fs::absolute(*options.state);
     config.update.folder = config.appliance.state / "updates";
@@ -122,7 +121,6 @@ Config ReadConfiguration(const Options& options) {
   return config;
 }
 
-#ifdef PLUMB_WITH_OPENNI
 /// True if a signal waits for the loop, which does not run yet.
 bool IsToldToEnd() {
   sigset_t pending;
@@ -130,7 +128,6 @@ bool IsToldToEnd() {
   sigpending(&pending);
   return sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1;
 }
-#endif
 
 /// A configuration, and why the one that was meant cannot be used.
 struct Configured {
@@ -140,99 +137,51 @@ struct Configured {
 
 /// As ReadConfiguration(). A file that cannot be used is no reason to be gone: page, light and
 /// socket say what is wrong with it, at the places that the defaults and the command line name.
-Configured ReadOrExplain(const Options& options) {
+Configured ReadOrExplain(const Options& options, const SensorRegistry& registry) {
   try {
-    return {.config = ReadConfiguration(options), .fault = {}};
+    return {.config = ReadConfiguration(options, registry), .fault = {}};
   } catch (const std::invalid_argument&) {
     throw;  // of the command line
   } catch (const std::exception& error) {
     Options without_file = options;
     without_file.config_file.reset();
     without_file.use_default_config = false;
-    return {.config = ReadConfiguration(without_file),
+    return {.config = ReadConfiguration(without_file, registry),
             .fault = fmt::format("the configuration cannot be used: {}. Correct the file, then "
                                  "restart: systemctl restart plumbd",
                                  error.what())};
   }
 }
 
-/// Sensor of this run: the virtual one and its provider, or the real ones.
-class Sensors {
- public:
-  Sensors(const Options& options, const Config& config) {
-#ifdef PLUMB_WITH_OPENNI
-    provider_.calibration_folder = config.appliance.calibration;
-    if (!options.simulated.empty()) MakeVirtual(options);
-    if (config.markers.dictionary) provider_.marker_dictionary = *config.markers.dictionary;
-    if (config.markers.length_m) provider_.marker_length_m = *config.markers.length_m;
-    if (config.markers.reference) provider_.reference_marker = config.markers.reference;
-    provider_.markers_are_the_rooms = options.simulated.empty();
-#else
-    (void)config;
-    if (!options.simulated.empty())
-      throw std::invalid_argument(
-          "--simulated: this plumbd was built without OpenNI2; build it with PLUMB_WITH_OPENNI");
-#endif
-  }
-
-  [[nodiscard]] std::unique_ptr<SensorProvider> MakeProvider() const {
-#ifdef PLUMB_WITH_OPENNI
-    return std::make_unique<OpenNiProvider>(provider_);
-#else
-    throw DeviceError("this plumbd was built without OpenNI2: no sensor can be used");
-#endif
-  }
-
-  [[nodiscard]] std::function<void()> BeforeScan() const {
-#ifdef PLUMB_WITH_OPENNI
-    if (virtual_) return [this] { virtual_->Rewind(); };
-#endif
-    return {};
-  }
-
-  /// Does what `sim ACTION` asks. @throws DeviceError
-  void Simulate(const std::string& command) const {
-#ifdef PLUMB_WITH_OPENNI
-    if (virtual_) {
-      (void)virtual_->Command(command);
-      return;
-    }
-#endif
-    throw DeviceError(
-        fmt::format("sim {}: there is no virtual sensor; start plumbd with --simulated", command));
-  }
-
- private:
-#ifdef PLUMB_WITH_OPENNI
-  void MakeVirtual(const Options& options) {
-    const bool is_small = options.sim_size == "320x240";
-    const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
-    std::stop_source rendering;
-    virtual_ = std::make_unique<VirtualSensor>(
-        VirtualSensorOptions{.suite = options.simulated,
-                             .seed = options.sim_seed,
-                             .frames = options.sim_frames,
-                             .width = is_small ? 320 : 640,
-                             .height = is_small ? 240 : 480,
-                             .max_scenes = static_cast<std::size_t>(options.sim_scenes),
-                             .plugged = !options.sim_unplugged},
-        rendering.get_token(), [&, told = -1](double fraction, std::string_view scene) mutable {
-          if (IsToldToEnd()) rendering.request_stop();
-          const int percent = static_cast<int>(100 * fraction);
-          if (percent == told || (!is_terminal && percent / 10 == told / 10 && told >= 0)) return;
-          told = percent;
-          Log(LogLevel::kInfo,
-              fmt::format("rendering what the virtual sensor shows: {} %, {}", percent, scene));
-        });
-    provider_.library = virtual_->runtime_library();
-    provider_.calibration_folder = virtual_->calibration_folder();
-    provider_.before_stop = [sensor = virtual_.get()] { sensor->Quit(); };
-  }
-
-  std::unique_ptr<VirtualSensor> virtual_;
-  OpenNiOptions provider_;
-#endif
-};
+/// The driver of this run, ready for use. A simulated one renders its scenes here.
+std::unique_ptr<const SensorSetup> SetUpSensors(const Options& options, const Config& config,
+                                                const SensorRegistry& registry) {
+  const SensorDriver& driver =
+      registry.Choose(config.appliance.sensor_driver, !options.simulated.empty());
+  SensorSettings settings = SensorSettingsOf(config);
+  settings.markers_are_the_rooms = !driver.is_simulated;
+  const bool is_small = options.sim_size == "320x240";
+  const SimulatedSweeps sweeps{.suite = options.simulated.empty() ? "demo" : options.simulated,
+                               .seed = options.sim_seed,
+                               .frames = options.sim_frames,
+                               .width = is_small ? 320 : 640,
+                               .height = is_small ? 240 : 480,
+                               .max_scenes = static_cast<std::size_t>(options.sim_scenes),
+                               .plugged = !options.sim_unplugged};
+  const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
+  std::stop_source rendering;
+  return driver.set_up(
+      settings, sweeps, rendering.get_token(),
+      [&, reported = -1](double fraction, std::string_view scene) mutable {
+        if (IsToldToEnd()) rendering.request_stop();
+        const int percent = static_cast<int>(100 * fraction);
+        if (percent == reported || (!is_terminal && percent / 10 == reported / 10 && reported >= 0))
+          return;
+        reported = percent;
+        Log(LogLevel::kInfo,
+            fmt::format("rendering what the virtual sensor shows: {} %, {}", percent, scene));
+      });
+}
 
 /// Sockets that systemd opened for us, by their names.
 std::optional<int> InheritedSocket(const std::string& name) {
@@ -249,21 +198,23 @@ std::optional<int> InheritedSocket(const std::string& name) {
 
 class Plumbd {
  public:
-  Plumbd(const Options& options, const Config& config, const std::string& fault)
+  Plumbd(const Options& options, const Config& config, const std::string& fault,
+         const SensorRegistry& registry)
       : options_(options),
-        sensors_(options, config),
+        registry_(registry),
+        sensors_(SetUpSensors(options, config, registry)),
         panel_(loop_, config.panel),
         appliance_(loop_, {.config = config,
                            .configuration_fault = fault,
-                           .make_provider = [this] { return sensors_.MakeProvider(); },
-                           .before_scan = sensors_.BeforeScan(),
+                           .make_provider = [this] { return sensors_->MakeProvider(); },
+                           .before_scan = [this] { sensors_->BeforeScan(); },
                            .button = panel_.button(),
                            .indicator = panel_.light(),
                            .demo_patient = options.simulated.empty() ? "" : "demo"}),
         service_(appliance_, config.update, MakeLogindRestart(loop_, {})),
         http_(service_, HttpOptions(config)),
         desk_(appliance_, service_.updates(),
-              [this](const std::string& command) { sensors_.Simulate(command); }),
+              [this](const std::string& command) { (void)sensors_->Command(command); }),
         control_(loop_, ControlSocket(config),
                  [this](const ControlRequest& request, const ControlServer::Reply& reply) {
                    desk_.Answer(request, reply);
@@ -371,7 +322,7 @@ class Plumbd {
                                  .count())
                      .c_str());
     try {
-      appliance_.Reload(ReadConfiguration(options_));
+      appliance_.Reload(ReadConfiguration(options_, registry_));
     } catch (const std::exception& error) {
       Log(LogLevel::kError, fmt::format("the configuration stays as it was: {}", error.what()));
     }
@@ -379,8 +330,9 @@ class Plumbd {
   }
 
   const Options options_;
+  const SensorRegistry& registry_;
   EventLoop loop_;  // first: blocks signals before any thread starts
-  Sensors sensors_;
+  const std::unique_ptr<const SensorSetup> sensors_;
   Panel panel_;
   Appliance appliance_;
   PageNotes page_;
@@ -397,22 +349,22 @@ class Plumbd {
   std::string status_line_;
 };
 
-int RunChecked(const Options& options) {
+int RunChecked(const Options& options, const SensorRegistry& registry) {
   if (options.check_config) {
-    (void)ReadConfiguration(options);
+    (void)ReadConfiguration(options, registry);
     fmt::print("the configuration is good\n");
     return 0;
   }
   if (options.simulated.empty() == false && !options.state)
     throw std::invalid_argument("--simulated needs --state DIR, a folder of its own");
-  const Configured configured = ReadOrExplain(options);
+  const Configured configured = ReadOrExplain(options, registry);
   // What is stored is for this account and at most its group.
   ::umask(::umask(0077) | 0027);
   std::error_code ignored;
   fs::create_directories(configured.config.appliance.state,
                          ignored);  // what cannot be made is told when the store opens
   std::optional<EndGuard> guard;    // outlives the threads that it waits for
-  Plumbd plumbd(options, configured.config, configured.fault);
+  Plumbd plumbd(options, configured.config, configured.fault, registry);
   const int code = plumbd.Run();
   guard.emplace(kLongestEnd, [] {
     Log(LogLevel::kError,
@@ -427,7 +379,7 @@ int RunChecked(const Options& options) {
 
 }  // namespace
 
-int RunPlumbd(int argc, char** argv) {
+int RunPlumbd(int argc, char** argv, const SensorRegistry& registry) {
   CLI::App app("Plumb's appliance: sensor, button and light, scans, results and the page.",
                "plumbd");
   Options options;
@@ -442,7 +394,7 @@ int RunPlumbd(int argc, char** argv) {
     return code;
   };
   try {
-    return RunChecked(options);
+    return RunChecked(options, registry);
   } catch (const Interrupted&) {
     return 0;
   } catch (const DataError& error) {

@@ -7,9 +7,7 @@
 #include "daemon/cli/progress.hpp"
 #include "daemon/files/sensor_profile_file.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
-#ifdef PLUMB_WITH_OPENNI
-#include "drivers/openni/oni_recording.hpp"
-#endif
+#include "drivers/live/sensor_driver.hpp"
 #include "drivers/replay/tum_recording.hpp"
 
 namespace plumb {
@@ -52,13 +50,14 @@ std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path,
   if (markers.length_m) defaults.marker_length_m = *markers.length_m;
   defaults.reference_marker = markers.reference;
   if (std::filesystem::is_directory(path, error)) return TumRecording::Open(path, defaults);
-#ifdef PLUMB_WITH_OPENNI
-  return OniRecording::Open(path, defaults);
-#else
+  if (const RecordingKind* kind = BuiltInSensors().KindWithExtension(path.extension().string()))
+    return kind->Open(path, defaults);
+  // Whatever its name, the contents may be one.
+  if (const RecordingKind* kind = BuiltInSensors().KindOf(path)) return kind->Open(path, defaults);
   throw DataError(
-      fmt::format("recording {} is no folder; this build has no OpenNI2 and reads no .oni files",
+      fmt::format("recording {} is no folder, and this build knows no such kind of file; expected "
+                  "a folder in the TUM RGB-D layout, or build with PLUMB_WITH_OPENNI for .oni",
                   path.string()));
-#endif
 }
 
 void EnsureFolder(const std::filesystem::path& folder) {

@@ -17,15 +17,10 @@
 #include "algo/base/errors.hpp"
 #include "daemon/cli/commands.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/config/sensor_settings.hpp"
 #include "daemon/control/unix_socket.hpp"
-#include "drivers/program_folders.hpp"
-#ifdef PLUMB_WITH_OPENNI
-#include "drivers/openni/openni_provider.hpp"
-#include "drivers/openni/sensor_calibration.hpp"
-#endif
-#ifdef PLUMB_WITH_USB
-#include "drivers/usb/usb_watcher.hpp"
-#endif
+#include "drivers/live/sensor_calibration.hpp"
+#include "drivers/live/sensor_driver.hpp"
 #ifdef PLUMB_WITH_GPIO
 #include "drivers/gpio/gpio.hpp"
 #endif
@@ -121,87 +116,65 @@ Config CheckConfig(Report& report, const std::optional<fs::path>& wanted) {
   }
 }
 
-void CheckUsb(Report& report) {
-#ifdef PLUMB_WITH_USB
-  try {
-    const UsbWatcher watcher;
-    if (watcher.sensors().empty()) {
-      report.Note("USB", "no sensor of the Xtion or Carmine kind (1d27:*)",
-                  "plug one in; its own lamp must light up");
-    }
-    for (const UsbSensor& sensor : watcher.sensors()) {
-      const std::string found = fmt::format(
-          "{} {:04x}:{:04x} at bus {} address {}{}{}", sensor.model, sensor.vendor, sensor.product,
-          sensor.bus, sensor.address, sensor.speed.empty() ? "" : ", ", sensor.speed);
-      if (sensor.problems.empty()) report.Good("USB", found);
-      for (const std::string& problem : sensor.problems) {
-        if (sensor.permitted)
-          report.Note("USB", found, problem);
-        else
-          report.Bad("USB", found, problem);
-      }
-    }
-  } catch (const DeviceError& error) {
-    report.Note("USB", error.what(), "sensors are found through OpenNI2 all the same");
+/// The calibration of one attached sensor.
+void CheckCalibration(Report& report, const SensorSettings& settings, const std::string& serial) {
+  const fs::path file = CalibrationFile(settings.calibration_folder, serial);
+  std::error_code error;
+  if (!fs::exists(file, error)) {
+    report.Note("calibration", fmt::format("none for {}: nominal intrinsics are used", serial),
+                fmt::format("calibrate the unit and put its camera.yaml at {}", file.string()));
+    return;
   }
-#else
-  report.Note("USB", "this build does not watch the bus",
-              "build with PLUMB_WITH_USB for permissions and speeds");
-#endif
+  try {
+    const StreamInfo info = LiveStreamInfo(settings, serial, 640, 480, 0.0);
+    report.Good("calibration",
+                fmt::format("{}, focal length {:.1f} pixels", file.string(), info.intrinsics.fx));
+  } catch (const DeviceError& problem) {
+    report.Bad("calibration", problem.what(), "");
+  }
 }
 
-void CheckSensor(Report& report, const Config& config) {
-#ifdef PLUMB_WITH_OPENNI
-  try {
-    OpenNiOptions options;
-    options.calibration_folder = config.appliance.calibration;
-    if (config.markers.dictionary) options.marker_dictionary = *config.markers.dictionary;
-    if (config.markers.length_m) options.marker_length_m = *config.markers.length_m;
-    options.reference_marker = config.markers.reference;
-    options.markers_are_the_rooms = true;
-    OpenNiProvider provider(options);
-    const std::vector<SensorDescription> sensors = provider.List();
-    report.Good("OpenNI2",
-                fmt::format("loaded, {} sensor{}", sensors.size(), sensors.size() == 1 ? "" : "s"));
-    if (sensors.empty())
-      report.Bad("sensor", "none is attached", "plug one in; look at USB above if it is");
-    const std::string& wanted = config.appliance.sensor_serial;
-    bool found_wanted = wanted.empty();
-    for (const SensorDescription& sensor : sensors) {
-      found_wanted = found_wanted || sensor.serial == wanted;
-      report.Good("sensor", fmt::format("{}, serial {}", sensor.name, sensor.serial));
-      const fs::path file = CalibrationFile(options.calibration_folder, sensor.serial);
-      std::error_code error;
-      if (!fs::exists(file, error)) {
-        report.Note("calibration",
-                    fmt::format("none for {}: nominal intrinsics are used", sensor.serial),
-                    fmt::format("calibrate the unit and put its camera.yaml at {}", file.string()));
-        continue;
-      }
-      try {
-        const StreamInfo info = LiveStreamInfo(options, sensor.serial, 640, 480, 0.0);
-        report.Good("calibration", fmt::format("{}, focal length {:.1f} pixels", file.string(),
-                                               info.intrinsics.fx));
-      } catch (const DeviceError& problem) {
-        report.Bad("calibration", problem.what(), "");
-      }
-    }
-    if (!found_wanted && !sensors.empty())
-      report.Bad("sensor", fmt::format("the configuration wants serial {}", wanted),
-                 "plug that one in, or change sensor_serial");
-  } catch (const DeviceError& error) {
-    report.Bad("OpenNI2", error.what(), "");
+void CheckAttached(Report& report, const SensorDriver& driver, const SensorSettings& settings,
+                   const std::string& wanted) {
+  const auto setup = driver.set_up(settings, {}, {}, {});
+  const auto provider = setup->MakeProvider();
+  const std::vector<SensorDescription> sensors = provider->List();
+  report.Good(driver.title,
+              fmt::format("loaded, {} sensor{}", sensors.size(), sensors.size() == 1 ? "" : "s"));
+  if (sensors.empty())
+    report.Bad("sensor", "none is attached", "plug one in; look at USB above if it is");
+  bool found_wanted = wanted.empty();
+  for (const SensorDescription& sensor : sensors) {
+    found_wanted = found_wanted || sensor.serial == wanted;
+    report.Good("sensor", fmt::format("{}, serial {}", sensor.name, sensor.serial));
+    CheckCalibration(report, settings, sensor.serial);
   }
-  if (const auto reader = FindBesideProgram("lib/plumb/plumb-oni-reader"))
-    report.Good(".oni files", reader->string());
-  else
-    report.Note(".oni files", "plumb-oni-reader is missing: recordings of OpenNI2 cannot be read",
-                "install Plumb again");
-#else
-  (void)config;
-  report.Bad("OpenNI2", "this build has none: no sensor can be used",
-             "build with PLUMB_WITH_OPENNI");
-#endif
+  if (!found_wanted && !sensors.empty())
+    report.Bad("sensor", fmt::format("the configuration wants serial {}", wanted),
+               "plug that one in, or change sensor_serial");
+}
+
+void CheckSensor(Report& report, const Config& config) try {
+  const SensorDriver& driver = BuiltInSensors().Choose(config.appliance.sensor_driver, false);
+  if (driver.examine) {
+    for (const SensorFinding& finding : driver.examine()) {
+      if (finding.state == SensorFinding::State::kGood)
+        report.Good(finding.what, finding.found);
+      else if (finding.state == SensorFinding::State::kNote)
+        report.Note(finding.what, finding.found, finding.remedy);
+      else
+        report.Bad(finding.what, finding.found, finding.remedy);
+    }
+  }
+  SensorSettings settings = SensorSettingsOf(config);
+  settings.markers_are_the_rooms = true;
+  try {
+    CheckAttached(report, driver, settings, config.appliance.sensor_serial);
+  } catch (const DeviceError& error) {
+    report.Bad(driver.title, error.what(), "");
+  }
+} catch (const DataError& problem) {
+  report.Bad("configuration", problem.what(), "", kBadInput);
 }
 
 void CheckGpio(Report& report) {
@@ -268,7 +241,6 @@ Command AddDoctor(CLI::App& app) {
   return [options](const CommandContext& context) {
     Report report;
     const Config config = CheckConfig(report, options->config);
-    CheckUsb(report);
     CheckSensor(report, config);
     CheckGpio(report);
     CheckFolder(report, "state", config.appliance.state);

@@ -11,11 +11,9 @@
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/files/scene_json.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/live/sensor_driver.hpp"
 #include "drivers/replay/tum_index.hpp"
 #include "drivers/replay/tum_recording.hpp"
-#ifdef PLUMB_WITH_OPENNI
-#include "drivers/openni/oni_file.hpp"
-#endif
 
 namespace plumb {
 namespace {
@@ -32,18 +30,9 @@ struct Options {
 
 /// Stamps of the depth images, seconds; found without decoding any.
 std::vector<double> DepthStamps(const fs::path& recording) {
+  if (const RecordingKind* kind = BuiltInSensors().KindOf(recording))
+    return kind->DepthStamps(recording);
   std::vector<double> stamps_s;
-#ifdef PLUMB_WITH_OPENNI
-  if (!fs::is_directory(recording)) {
-    const std::optional<OniFileSummary> summary = SummariseOniFile(recording);
-    if (!summary)
-      throw DataError(
-          fmt::format("recording {} is not whole: it has no END record", recording.string()));
-    for (const std::int64_t stamp_us : summary->depth_us)
-      stamps_s.push_back(1e-6 * static_cast<double>(stamp_us));
-    return stamps_s;
-  }
-#endif
   const fs::path index = recording / "depth.txt";
   for (const IndexEntry& entry : ParseIndex(ReadTextFile(index, kMaxJsonBytes), index.string()))
     stamps_s.push_back(entry.time_s);
@@ -51,10 +40,7 @@ std::vector<double> DepthStamps(const fs::path& recording) {
 }
 
 bool IsRecording(const fs::path& path) {
-#ifdef PLUMB_WITH_OPENNI
-  if (IsOniFile(path)) return true;
-#endif
-  return IsTumRecording(path);
+  return BuiltInSensors().KindOf(path) != nullptr || IsTumRecording(path);
 }
 
 ordered_json RecordingFacts(const fs::path& path) {

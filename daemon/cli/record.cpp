@@ -1,9 +1,12 @@
 // `plumb record`: a sensor's images into a folder or an .oni file.
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <memory>
 #include <optional>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -12,14 +15,11 @@
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/common_options.hpp"
 #include "daemon/cli/progress.hpp"
+#include "daemon/config/sensor_settings.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/loop/bounded_queue.hpp"
+#include "drivers/live/sensor_driver.hpp"
 #include "drivers/replay/tum_writer.hpp"
-#ifdef PLUMB_WITH_OPENNI
-#include "drivers/openni/oni_recorder.hpp"
-#include "drivers/openni/openni_provider.hpp"
-#include "drivers/virtual/virtual_sensor.hpp"
-#endif
 
 namespace plumb {
 namespace {
@@ -36,45 +36,50 @@ struct Options {
   MethodOptions method;
 };
 
-#ifdef PLUMB_WITH_OPENNI
-
 constexpr std::size_t kQueue = 120;             // frames of 2 MB that wait for the encoder
-constexpr double kDepthUnitsPerMetre = 1000.0;  // what the sensor gives
+constexpr double kDepthUnitsPerMetre = 1000.0;  // as sensors give it
+constexpr double kSimulatedRate_hz = 30.0;
 
-/// The virtual sensor where one is asked for, and whatever sensor is recorded.
+/// The driver whose sensor a recording of this kind is made from; null: a folder, from any.
+const SensorDriver& DriverFor(const RecordingKind* kind, const Config& config, bool simulated) {
+  const SensorRegistry& registry = BuiltInSensors();
+  const std::string& wanted = config.appliance.sensor_driver;
+  if (kind == nullptr || !wanted.empty()) return registry.Choose(wanted, simulated);
+  for (const SensorDriver& driver : registry.drivers()) {
+    const std::vector<std::string> names = kind->drivers();
+    if (driver.is_simulated == simulated &&
+        std::find(names.begin(), names.end(), driver.name) != names.end())
+      return driver;
+  }
+  return registry.Choose("", simulated);
+}
+
+/// The sensor that is recorded, and what it needs.
 struct Attached {
-  std::unique_ptr<VirtualSensor> virtual_sensor;
-  std::unique_ptr<OpenNiProvider> provider;
+  std::unique_ptr<SensorSetup> setup;
+  std::unique_ptr<SensorProvider> provider;
   std::unique_ptr<LiveSensor> sensor;
 
-  Attached(const Options& options, const Config& config, const std::stop_token& stop,
-           Progress& progress) {
-    OpenNiOptions openni;
-    openni.calibration_folder = options.calibration;
-    openni.marker_dictionary = config.markers.dictionary.value_or(openni.marker_dictionary);
-    openni.marker_length_m = config.markers.length_m.value_or(openni.marker_length_m);
-    openni.reference_marker = config.markers.reference;
-    if (options.simulated) {
-      VirtualSensorOptions simulated;
-      simulated.suite = *options.simulated;
-      simulated.max_scenes = 1;
-      simulated.frames = std::max(2, static_cast<int>(options.seconds * simulated.rate_hz));
-      virtual_sensor = std::make_unique<VirtualSensor>(
-          simulated, stop, [&](double fraction, std::string_view scene) {
-            progress.Update("rendering", fraction, scene);
-          });
-      openni.library = virtual_sensor->runtime_library();
-      openni.calibration_folder = virtual_sensor->calibration_folder();
-      openni.before_stop = [virtual_sensor = virtual_sensor.get()] { virtual_sensor->Quit(); };
-    }
-    provider = std::make_unique<OpenNiProvider>(openni);
+  Attached(const Options& options, const RecordingKind* kind, const Config& config,
+           const std::stop_token& stop, Progress& progress) {
+    SensorSettings settings = SensorSettingsOf(config);
+    settings.calibration_folder = options.calibration;
+    SimulatedSweeps sweeps;
+    sweeps.suite = options.simulated.value_or(sweeps.suite);
+    sweeps.max_scenes = 1;
+    sweeps.frames = std::max(2, static_cast<int>(options.seconds * kSimulatedRate_hz));
+    setup = DriverFor(kind, config, options.simulated.has_value())
+                .set_up(settings, sweeps, stop, [&](double fraction, std::string_view scene) {
+                  progress.Update("rendering", fraction, scene);
+                });
+    provider = setup->MakeProvider();
     sensor = provider->Open(options.serial);
     sensor->LockExposure(true);
   }
 
   /// Recording begins now.
   void Begin() const {
-    if (virtual_sensor) virtual_sensor->Rewind();
+    setup->BeforeScan();
     sensor->Flush();
   }
 };
@@ -97,22 +102,21 @@ std::int64_t ReadFor(LiveSensor& sensor, double seconds, const std::stop_token& 
   }
 }
 
-std::string RecordOni(const Options& options, const Attached& attached, const std::stop_token& stop,
-                      Progress& progress) {
-  OniFileSummary summary;
+std::string RecordFile(const Options& options, const RecordingKind& kind, const Attached& attached,
+                       const std::stop_token& stop, Progress& progress) {
+  FileRecorder::Summary summary;
   WriteFileAtomically(options.out, [&](const fs::path& hidden) {
-    OniRecorder recorder(*attached.sensor, hidden, {.jpeg = options.jpeg});
+    const std::unique_ptr<FileRecorder> recorder =
+        kind.Record(*attached.sensor, hidden, options.jpeg);
     attached.Begin();
     (void)ReadFor(*attached.sensor, options.seconds, stop, progress, [](Frame&&) {});
-    summary = recorder.Finish();
+    summary = recorder->Finish();
+    const fs::path beside = kind.SideCar(options.out);
     std::error_code error;
-    fs::rename(OniSideCar(hidden), OniSideCar(options.out), error);
-    if (error)
-      throw IoError(
-          fmt::format("cannot write {}: {}", OniSideCar(options.out).string(), error.message()));
+    fs::rename(kind.SideCar(hidden), beside, error);
+    if (error) throw IoError(fmt::format("cannot write {}: {}", beside.string(), error.message()));
   });
-  return fmt::format("{} colour and {} depth images", summary.color_us.size(),
-                     summary.depth_us.size());
+  return fmt::format("{} colour and {} depth images", summary.num_color, summary.num_depth);
 }
 
 std::string RecordFolder(const Options& options, const Attached& attached,
@@ -161,9 +165,10 @@ std::string RecordFolder(const Options& options, const Attached& attached,
 int Run(const Options& options, const CommandContext& context) {
   const Config config = options.method.Read();
   Progress progress;
-  const Attached attached(options, config, context.stop, progress);
-  const bool oni = options.out.extension() == ".oni";
-  const std::string what = oni ? RecordOni(options, attached, context.stop, progress)
+  const RecordingKind* kind = BuiltInSensors().KindWithExtension(options.out.extension().string());
+  const Attached attached(options, kind, config, context.stop, progress);
+  const std::string what = kind != nullptr
+                               ? RecordFile(options, *kind, attached, context.stop, progress)
                                : RecordFolder(options, attached, context.stop, progress);
   progress.Clear();
   std::string text = fmt::format("{}: {} of sensor {}\n", options.out.string(), what,
@@ -173,14 +178,6 @@ int Run(const Options& options, const CommandContext& context) {
   PrintOut(text);
   return kDone;
 }
-
-#else
-
-int Run(const Options&, const CommandContext&) {
-  throw DeviceError("this build has no OpenNI2: it reads no sensor");
-}
-
-#endif
 
 }  // namespace
 

@@ -8,10 +8,8 @@
 
 #include "daemon/cli/commands.hpp"
 #include "daemon/cli/progress.hpp"
+#include "drivers/live/sensor_driver.hpp"
 #include "drivers/simulated/suite.hpp"
-#ifdef PLUMB_WITH_OPENNI
-#include "drivers/virtual/oni_writer.hpp"
-#endif
 
 namespace plumb {
 namespace {
@@ -70,9 +68,11 @@ int Run(const Options& options, const CommandContext& context) {
   simulated::FaultSet faults = FaultsOf(simulate);
   for (const auto& [fault, on] : options.switches) faults.Set(fault, on);
   simulate.faults = faults;
-#ifdef PLUMB_WITH_OPENNI
-  simulate.write_oni = WriteOni;
-#endif
+  if (const RecordingKind* kind = BuiltInSensors().KindWithExtension(".oni")) {
+    simulate.write_oni = [kind](const auto& file, FrameSource& source, const auto&... rest) {
+      kind->Write(file, source, rest...);
+    };
+  }
   Progress progress;
   SimulateSuite(simulate, context.stop, [&](double fraction, std::string_view what) {
     progress.Update("simulating", fraction, what);

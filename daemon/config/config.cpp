@@ -189,6 +189,13 @@ void ReadAppliance(Section section, ApplianceConfig& appliance) {
   section.RefuseTheRest();
 }
 
+void ReadSensor(Section section, ApplianceConfig& appliance) {
+  // Which names are known is the drivers' business, and checked by the program.
+  section.Take("driver", appliance.sensor_driver, "the name of a sensor driver",
+               [](const std::string& s) { return !s.empty() && s.size() <= 64; });
+  section.RefuseTheRest();
+}
+
 void ReadStorage(Section section, ApplianceConfig& appliance) {
   std::string folder;
   section.Take("backup_folder", folder, "an absolute path",
@@ -284,9 +291,9 @@ Config ParseConfig(const std::string& text, const std::string& name, ConfigUse u
     throw DataError(fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line,
                                 error.description()));
   }
-  static constexpr std::array<std::string_view, 11> kSections = {
-      "markers", "reconstruct", "compare", "check", "iec",   "appliance",
-      "storage", "button",      "light",   "web",   "update"};
+  static constexpr std::array<std::string_view, 12> kSections = {
+      "markers", "reconstruct", "compare", "check", "iec", "appliance",
+      "storage", "sensor",      "button",  "light", "web", "update"};
   for (const auto& [key, node] : root) {
     if (std::find(kSections.begin(), kSections.end(), key.str()) != kSections.end()) continue;
     throw DataError(fmt::format("{}:{}: unknown table or key '{}'; known are [{}]", name,
@@ -300,6 +307,7 @@ Config ParseConfig(const std::string& text, const std::string& name, ConfigUse u
   ReadIec(Section(root, "iec", name), root, config.compare.T_iec_reference);
   ReadAppliance(Section(root, "appliance", name), config.appliance);
   ReadStorage(Section(root, "storage", name), config.appliance);
+  ReadSensor(Section(root, "sensor", name), config.appliance);
   ReadPanel(Section(root, "button", name), Section(root, "light", name), config.panel);
   ReadWeb(Section(root, "web", name), config.web);
   ReadUpdate(Section(root, "update", name), config.update);
@@ -340,6 +348,7 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
   keep("appliance.control", in_use.appliance.control, next.appliance.control);
   keep("appliance.calibration", in_use.appliance.calibration, next.appliance.calibration);
   keep("appliance.sensor_serial", in_use.appliance.sensor_serial, next.appliance.sensor_serial);
+  keep("sensor.driver", in_use.appliance.sensor_driver, next.appliance.sensor_driver);
   keep("button.chip", in_use.panel.button_chip, next.panel.button_chip);
   keep("button.line", in_use.panel.button_line, next.panel.button_line);
   keep("button.active_low", in_use.panel.button_active_low, next.panel.button_active_low);

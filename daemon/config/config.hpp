@@ -29,6 +29,7 @@ struct ApplianceConfig {
   std::filesystem::path calibration =
       "/var/lib/plumb/calibration";  ///< SERIAL.yaml for each calibrated sensor.
   std::string sensor_serial;         ///< Only this sensor; empty: the first one.
+  std::string sensor_driver;         ///< By which sensors are read; empty: the first of the build.
   bool keep_recordings = false;      ///< Of every scan, whatever the page's settings say.
   std::optional<double> quota_gb;    ///< Of all scans; beyond, the oldest go. None: a share of the
                                      ///< disk.
@@ -108,17 +109,20 @@ enum class ConfigUse { kCommandLine, kAppliance };
 ///     [reconstruct]  preset, keep_color, use_markers, use_keypoints, use_tone_curve,
 ///                    use_depth_field, use_dense_depth, num_icp_iterations, seed
 ///     [compare]      preset, region, isocentre_m = [x, y, z], marker_kind = "room"|"couch",
-///     posture = "HFS"|"HFP"|"FFS"|"FFP",
+///                    posture = "HFS"|"HFP"|"FFS"|"FFP",
 ///                    shift_tolerance_mm, rotation_tolerance_deg, min_shared_markers,
 ///                    moved_marker_mm, moved_marker_sigmas, min_coverage, max_hole_mm,
 ///                    max_residual_p95_mm, max_lost_s
-///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views:
-///     limits of the daily check [iec]          T_iec_reference = 4 rows of 4: reference marker's
-///     frame to the IEC fixed frame [storage] backup_folder, backup_hours [appliance]    state,
-///     control, calibration, sensor_serial, keep_recordings, quota_gb, auto_stop_s, scan_limit_s,
-///     result_s [button]       chip, line, active_low [light]        chip, red, green, blue,
-///     beeper, active_low [web]          listen, tls_certificate, tls_key, plain_http, host_names
-///     [update] folder, max_bundle_mb
+///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views
+///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to the IEC fixed
+///     frame [storage]      backup_folder, backup_hours [appliance]    state, control, calibration,
+///     sensor_serial, keep_recordings, quota_gb,
+///                    auto_stop_s, scan_limit_s, result_s
+///     [sensor]       driver
+///     [button]       chip, line, active_low
+///     [light]        chip, red, green, blue, beeper, active_low
+///     [web]          listen, tls_certificate, tls_key, plain_http, host_names
+///     [update]       folder, max_bundle_mb
 ///
 /// @throws DataError naming file, line, key, what was expected and found. A key that is not listed
 /// is an error.

@@ -24,7 +24,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
-#include "drivers/openni/frame_pairing.hpp"
+#include "drivers/live/frame_pairing.hpp"
 #include "drivers/openni/oni_protocol.hpp"
 #include "drivers/openni/openni_library.hpp"
 

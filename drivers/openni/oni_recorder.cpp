@@ -10,9 +10,9 @@
 
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/live/sensor_calibration.hpp"
 #include "drivers/openni/openni_library.hpp"
 #include "drivers/openni/openni_sensor.hpp"
-#include "drivers/openni/sensor_calibration.hpp"
 #include "drivers/replay/tum_writer.hpp"
 
 namespace plumb {

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "algo/base/errors.hpp"
+#include "drivers/live/sensor_events.hpp"
 #include "drivers/openni/openni_library.hpp"
 #include "drivers/openni/openni_sensor.hpp"
 
@@ -20,7 +21,7 @@ struct OpenNiProvider::Impl {
   explicit Impl(const OpenNiOptions& wanted)
       : options(wanted), library(OpenNiLibrary::Load(wanted.library)) {
     callbacks.deviceConnected = [](const OniDeviceInfo*, void* self) {
-      static_cast<Impl*>(self)->Notify();
+      static_cast<Impl*>(self)->events.Notify();
     };
     callbacks.deviceDisconnected = [](const OniDeviceInfo* info, void* self) {
       static_cast<Impl*>(self)->OnGone(*info);
@@ -37,34 +38,20 @@ struct OpenNiProvider::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  void Notify() {
-    const std::lock_guard lock(listener_mutex);
-    if (listener) listener();
-  }
-
-  template <typename Change>
-  void ForBoxes(const std::string& uri, Change&& change) {
-    const std::lock_guard lock(mutex);
-    for (const auto& [box_uri, weak] : boxes) {
-      if (const auto box = weak.lock(); box && box_uri == uri) change(*box);
-    }
-  }
-
   void OnGone(const OniDeviceInfo& info) {
-    ForBoxes(info.uri, [](FrameBox& box) { box.Lose(); });
+    events.Lose(info.uri);
     {
       const std::lock_guard lock(mutex);
       serials.erase(info.uri);
-      std::erase_if(boxes, [](const auto& entry) { return entry.second.expired(); });
     }
-    Notify();
+    events.Notify();
   }
 
   void OnState(const OniDeviceInfo& info, OniDeviceState state) {
     // "Not ready" comes with unplugging too, which has a callback of its own.
     if (state == ONI_DEVICE_STATE_ERROR || state == ONI_DEVICE_STATE_OK)
-      ForBoxes(info.uri, [&](FrameBox& box) { box.SetFailed(state == ONI_DEVICE_STATE_ERROR); });
-    Notify();
+      events.SetFailed(info.uri, state == ONI_DEVICE_STATE_ERROR);
+    events.Notify();
   }
 
   /// Asks the unit; empty if it cannot be opened or has none.
@@ -118,12 +105,10 @@ struct OpenNiProvider::Impl {
   OniDeviceCallbacks callbacks{};
   OniCallbackHandle handle = nullptr;
 
-  std::mutex listener_mutex;
-  std::function<void()> listener;
+  SensorEvents events;
 
   std::mutex mutex;
   std::map<std::string, std::string> serials;  ///< By URI, of the units that are attached.
-  std::vector<std::pair<std::string, std::weak_ptr<FrameBox>>> boxes;  ///< Of open sensors, by URI.
 };
 
 OpenNiProvider::OpenNiProvider(const OpenNiOptions& options)
@@ -137,33 +122,21 @@ OpenNiProvider::~OpenNiProvider() {
 std::vector<SensorDescription> OpenNiProvider::List() { return impl_->List(); }
 
 void OpenNiProvider::SetListener(std::function<void()> changed) {
-  const std::lock_guard lock(impl_->listener_mutex);
-  impl_->listener = std::move(changed);
+  impl_->events.SetListener(std::move(changed));
 }
 
 std::unique_ptr<LiveSensor> OpenNiProvider::Open(const std::string& serial) {
   const std::vector<SensorDescription> sensors = List();
-  const auto found = std::find_if(sensors.begin(), sensors.end(), [&](const auto& sensor) {
-    return serial.empty() || sensor.serial == serial;
-  });
-  if (found == sensors.end()) {
-    throw DeviceError(serial.empty()
-                          ? "no sensor is attached; plug one in, `plumb doctor` lists what is seen"
-                          : fmt::format("sensor {} is not attached, found {}; plug it in", serial,
-                                        sensors.empty() ? "none" : sensors.front().serial));
-  }
+  const SensorDescription& found = ChooseSensor(sensors, serial);
   auto box =
-      std::make_shared<FrameBox>(found->serial, impl_->options.max_gap, impl_->options.stall_time);
-  {
-    const std::lock_guard lock(impl_->mutex);
-    impl_->boxes.emplace_back(found->uri, box);
-  }
-  auto streams = std::make_unique<OpenNiStreams>(impl_->library, *found);
+      std::make_shared<FrameBox>(found.serial, impl_->options.max_gap, impl_->options.stall_time);
+  impl_->events.Watch(found.uri, box);
+  auto streams = std::make_unique<OpenNiStreams>(impl_->library, found);
   // The box knows of an unplug from here on, so none is missed between the listing and the first
   // image.
   if (box->lost())
-    throw DeviceLost(fmt::format("sensor {} was unplugged while it was opened", found->serial));
-  return std::make_unique<OpenNiSensor>(std::move(streams), std::move(box), impl_, *found,
+    throw DeviceLost(fmt::format("sensor {} was unplugged while it was opened", found.serial));
+  return std::make_unique<OpenNiSensor>(std::move(streams), std::move(box), impl_, found,
                                         impl_->options);
 }
 

@@ -5,28 +5,17 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
+#include "drivers/live/sensor_driver.hpp"
 #include "drivers/sensor.hpp"
 
 namespace plumb {
 
-struct OpenNiOptions {
+struct OpenNiOptions : SensorSettings {
   /// libOpenNI2.so.0 to load; its drivers are those in `OpenNI2/Drivers` beside it. Empty: the
   /// system's.
   std::filesystem::path library = {};
-  /// Holds `SERIAL.yaml` for each calibrated unit, as camera.yaml; its depth_scale is ignored, live
-  /// depth is in millimetres. A unit without one gets nominal intrinsics from its field of view,
-  /// and a warning.
-  std::filesystem::path calibration_folder = "/var/lib/plumb/calibration";
-  std::string marker_dictionary =
-      "DICT_6X6_250";  ///< What holds where the calibration file does not say it.
-  double marker_length_m = 0.104;
-  std::optional<int> reference_marker = {};
-  /// The three above are the room's: a calibration file that states other markers is refused. Off
-  /// for recordings and the virtual sensor, whose file is all that is known of their markers.
-  bool markers_are_the_rooms = false;
   std::chrono::milliseconds stall_time{2000};  ///< Next() fails after so long without a pair.
   std::chrono::microseconds max_gap{
       16000};  ///< Between the stamps of a pair; under half of the frame period.

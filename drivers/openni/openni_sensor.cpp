@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
-#include "drivers/openni/sensor_calibration.hpp"
+#include "drivers/live/sensor_calibration.hpp"
 #include "drivers/openni/stream_waiter.hpp"
 
 namespace plumb {
@@ -107,18 +107,17 @@ void OpenNiStreams::Close() noexcept {
 OpenNiSensor::OpenNiSensor(std::unique_ptr<OpenNiStreams> streams, std::shared_ptr<FrameBox> box,
                            std::shared_ptr<const void> provider,
                            const SensorDescription& description, const OpenNiOptions& options)
-    : description_(description),
+    : BoxedSensor(description, std::move(box)),
       provider_(std::move(provider)),
-      streams_(std::move(streams)),
-      box_(std::move(box)) {
+      streams_(std::move(streams)) {
   float fov_rad = 0;
   int size = sizeof fov_rad;
   if (streams_->library->StreamGetProperty(streams_->color, ONI_STREAM_PROPERTY_HORIZONTAL_FOV,
                                            &fov_rad, &size) != ONI_STATUS_OK)
     fov_rad = 0;
-  info_ = LiveStreamInfo(options, description_.serial, streams_->width, streams_->height, fov_rad);
+  SetInfo(LiveStreamInfo(options, description.serial, streams_->width, streams_->height, fov_rad));
   streams_->Start();
-  box_->Begin(kPairsToSettle);
+  this->box().Begin(kPairsToSettle);
   waiting_ = StreamWaiter::Of(*streams_->library)
                  .Add(*streams_->library, {streams_->depth, streams_->color},
                       [this](int stream, const OniFrame& frame) {
@@ -130,7 +129,7 @@ OpenNiSensor::~OpenNiSensor() { StreamWaiter::Of(*streams_->library).Remove(wait
 
 void OpenNiSensor::Accept(StreamKind kind, const OniFrame& frame) {
   const bool is_color = kind == StreamKind::kColor;
-  box_->CountGaps(kind, frame.frameIndex);
+  box().CountGaps(kind, frame.frameIndex);
   const int row_bytes = streams_->width * (is_color ? 3 : 2);
   const bool fits = frame.width == streams_->width && frame.height == streams_->height &&
                     frame.stride >= row_bytes && frame.data != nullptr &&
@@ -138,24 +137,12 @@ void OpenNiSensor::Accept(StreamKind kind, const OniFrame& frame) {
                     frame.videoMode.pixelFormat ==
                         (is_color ? ONI_PIXEL_FORMAT_RGB888 : ONI_PIXEL_FORMAT_DEPTH_1_MM);
   if (!fits) {
-    box_->CountDiscarded();
+    box().CountDiscarded();
     return;
   }
   const cv::Mat view(frame.height, frame.width, is_color ? CV_8UC3 : CV_16UC1, frame.data,
                      static_cast<std::size_t>(frame.stride));
-  box_->Add(kind, static_cast<std::int64_t>(frame.timestamp), view.clone());
-}
-
-std::optional<Frame> OpenNiSensor::Next() {
-  std::optional<FrameBox::Pair> pair = box_->Take();
-  if (!pair) return std::nullopt;
-  Frame frame;
-  frame.index = pair->index;
-  frame.color_time_s = 1e-6 * static_cast<double>(pair->images.color_us);
-  frame.depth_time_s = 1e-6 * static_cast<double>(pair->images.depth_us);
-  frame.color_rgb = std::move(pair->images.color);
-  pair->images.depth.convertTo(frame.depth_m, CV_32F, 1e-3);
-  return frame;
+  box().Add(kind, static_cast<std::int64_t>(frame.timestamp), view.clone());
 }
 
 void OpenNiSensor::LockExposure(bool locked) {

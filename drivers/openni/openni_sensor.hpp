@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "drivers/openni/frame_box.hpp"
+#include "drivers/live/boxed_sensor.hpp"
 #include "drivers/openni/openni_library.hpp"
 #include "drivers/openni/openni_provider.hpp"
 
@@ -45,7 +45,7 @@ class OpenNiStreams {
 
 /// The StreamWaiter reads both streams all the time, so the newest images are at hand when a scan
 /// starts and the rate is known.
-class OpenNiSensor : public LiveSensor {
+class OpenNiSensor : public BoxedSensor {
  public:
   /// @param box       The provider reports an unplug or a failure there.
   /// @param provider  Kept alive as long as this sensor.
@@ -54,26 +54,16 @@ class OpenNiSensor : public LiveSensor {
                const OpenNiOptions& options);
   ~OpenNiSensor() override;
 
-  [[nodiscard]] const SensorDescription& description() const override { return description_; }
-  [[nodiscard]] SensorStatistics statistics() const override { return box_->statistics(); }
-  [[nodiscard]] const StreamInfo& info() const override { return info_; }
-  [[nodiscard]] std::optional<Frame> Next() override;
-  void Interrupt() noexcept override { box_->Interrupt(); }
-  void Flush() noexcept override { box_->Flush(); }
   void LockExposure(bool locked) override;
 
   /// For the recorder, which attaches to the streams and wants the stamps.
   [[nodiscard]] const OpenNiStreams& streams() const { return *streams_; }
-  [[nodiscard]] FrameBox& box() { return *box_; }
 
  private:
   void Accept(StreamKind kind, const OniFrame& frame);
 
-  SensorDescription description_;
   std::shared_ptr<const void> provider_;
   std::unique_ptr<OpenNiStreams> streams_;
-  std::shared_ptr<FrameBox> box_;
-  StreamInfo info_;
   std::int64_t waiting_ = 0;  ///< At the StreamWaiter.
 };
 

@@ -34,10 +34,13 @@ class DaemonSensorTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() { testing::RenderOnce(); }
 
-  /// plumbd keeps its recordings, which tell what calibration a scan was made with, and the virtual
-  /// sensor's files are in our reach.
+  /// The virtual sensor is seen through OpenNI2, as real ones are. plumbd keeps its recordings,
+  /// which tell what calibration a scan was made with, and the virtual sensor's files are in our
+  /// reach.
   [[nodiscard]] testing::PlumbdOptions Options(const std::string& more = {}, int scenes = 1) const {
-    std::ofstream(folder_ / "plumb.toml") << "[appliance]\nkeep_recordings = true\n" << more;
+    std::ofstream(folder_ / "plumb.toml") << "[sensor]\ndriver = \"virtual-openni\"\n"
+                                             "[appliance]\nkeep_recordings = true\n"
+                                          << more;
     fs::create_directories(folder_ / "tmp");
     return {.arguments = {"--config", folder_ / "plumb.toml"},
             .environment = {{"TMPDIR", folder_ / "tmp"}},

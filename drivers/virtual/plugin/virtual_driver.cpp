@@ -7,23 +7,19 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
-#include <atomic>
 #include <cstdlib>
 #include <fstream>
-#include <list>
-#include <sstream>
+#include <memory>
+#include <thread>
 
 #include "drivers/virtual/plugin/oni_driver.hpp"
-#include "drivers/virtual/plugin/stage.hpp"
 #include "drivers/virtual/plugin/virtual_device.hpp"
+#include "drivers/virtual/virtual_bus.hpp"
 
 namespace plumb::simulated {
 namespace {
 
-constexpr std::uint16_t kUsbVendor = 0x1d27;
-constexpr std::uint16_t kUsbProduct = 0x0601;  // Xtion Pro Live
 constexpr std::size_t kMaxCommand = 256;
 
 struct Session {
@@ -51,19 +47,9 @@ OniDeviceInfo InfoOf(const Unit& unit) {
   std::strncpy(info.uri, unit.uri.c_str(), sizeof info.uri - 1);
   std::strncpy(info.vendor, "Plumb", sizeof info.vendor - 1);
   std::strncpy(info.name, "Virtual Xtion", sizeof info.name - 1);
-  info.usbVendorId = kUsbVendor;
-  info.usbProductId = kUsbProduct;
+  info.usbVendorId = kVirtualUsbVendor;
+  info.usbProductId = kVirtualUsbProduct;
   return info;
-}
-
-/// @throws std::invalid_argument for an unknown name.
-Glitch ParseGlitch(const std::string& name) {
-  if (name == "late") return Glitch::kLate;
-  if (name == "double") return Glitch::kDouble;
-  if (name == "old") return Glitch::kOld;
-  if (name == "size") return Glitch::kSize;
-  if (name == "lone") return Glitch::kLone;
-  throw std::invalid_argument("unknown glitch " + name);
 }
 
 class VirtualDriver : public oni::driver::DriverBase {
@@ -78,10 +64,10 @@ class VirtualDriver : public oni::driver::DriverBase {
     if (folder == nullptr) return ONI_STATUS_ERROR;
     try {
       const Session session = ReadSession(folder);
-      stage_ = std::make_shared<Stage>(session.scenes);
-      default_serial_ = session.serial;
+      bus_ = std::make_unique<VirtualBus>(std::make_shared<Stage>(session.scenes), session.serial);
+      bus_->SetListener([this](const Unit& unit, VirtualBus::Event event) { Pass(unit, event); });
       Listen(std::string(folder) + "/sensor.sock");
-      if (session.plugged) Plug(session.serial);
+      if (session.plugged) (void)bus_->Obey("plug");
     } catch (const std::exception& error) {
       getServices().errorLoggerAppend("virtual sensor: %s", error.what());
       return ONI_STATUS_ERROR;
@@ -90,7 +76,7 @@ class VirtualDriver : public oni::driver::DriverBase {
   }
 
   void shutdown() override {
-    while (hangs_) ::pause();
+    while (bus_ && bus_->hangs()) ::pause();
     if (thread_.joinable()) {
       ::eventfd_write(stop_, 1);
       thread_.join();
@@ -107,11 +93,8 @@ class VirtualDriver : public oni::driver::DriverBase {
   OniStatus tryDevice(const char*) override { return ONI_STATUS_ERROR; }
 
   oni::driver::DeviceBase* deviceOpen(const char* uri, const char*) override {
-    const std::lock_guard lock(mutex_);
-    for (const auto& unit : units_) {
-      if (unit->uri == uri) return new VirtualDevice(unit, stage_);
-    }
-    return nullptr;
+    const std::shared_ptr<Unit> unit = bus_->At(uri);
+    return unit ? new VirtualDevice(unit, bus_->stage()) : nullptr;
   }
   void deviceClose(oni::driver::DeviceBase* device) override { delete device; }
 
@@ -150,7 +133,7 @@ class VirtualDriver : public oni::driver::DriverBase {
       if (size <= 0) continue;
       const std::string command(buffer.data(), static_cast<std::size_t>(size));
       const bool quits = command == "quit";
-      const std::string answer = quits ? "ok" : Obey(command);
+      const std::string answer = quits ? "ok" : bus_->Obey(command);
       if (length > sizeof(sa_family_t))
         ::sendto(socket_, answer.data(), answer.size(), MSG_DONTWAIT,
                  reinterpret_cast<const sockaddr*>(&sender), length);
@@ -158,135 +141,30 @@ class VirtualDriver : public oni::driver::DriverBase {
     }
   }
 
-  std::string Obey(const std::string& line) try {
-    std::istringstream words(line);
-    std::string verb, argument;
-    words >> verb >> argument;
-    if (verb == "plug") return Plug(argument.empty() ? default_serial_ : argument);
-    if (verb == "next-scene") return Show(stage_->Now().index + 1, Stage::Motion::kStill);
-    if (verb == "scene") return Show(std::stoul(argument), Stage::Motion::kStill);
-    if (verb == "rewind") {
-      std::int64_t origin_us = -1;
-      words >> origin_us;
-      return Show(stage_->Now().index,
-                  argument == "once" ? Stage::Motion::kSweepOnce : Stage::Motion::kSweep,
-                  words ? origin_us : -1);
+  void Pass(const Unit& unit, VirtualBus::Event event) {
+    const OniDeviceInfo info = InfoOf(unit);
+    switch (event) {
+      case VirtualBus::Event::kPlugged:
+        deviceConnected(&info);
+        return;
+      case VirtualBus::Event::kUnplugged:
+        deviceStateChanged(&info, ONI_DEVICE_STATE_NOT_READY);
+        deviceDisconnected(&info);
+        return;
+      case VirtualBus::Event::kFailed:
+        deviceStateChanged(&info, ONI_DEVICE_STATE_ERROR);
+        return;
+      case VirtualBus::Event::kWorksAgain:
+        deviceStateChanged(&info, ONI_DEVICE_STATE_OK);
+        return;
     }
-    if (verb == "hold") return Show(stage_->Now().index, Stage::Motion::kStill);
-    if (verb == "state") return State();
-    if (verb == "speed") {
-      const double speed = std::stod(argument);
-      if (!(speed >= 0 && speed <= 1000)) return "refused: speed must be 0 to 1000";
-      stage_->SetSpeed(speed);
-      return "ok";
-    }
-    if (verb == "glitch") {
-      int count = 1;
-      if (!(words >> count)) count = 1;
-      return OnUnit("", [&, glitch = ParseGlitch(argument)](Unit& unit) {
-        unit.glitch = glitch;
-        unit.glitches_left = std::clamp(count, 0, 10000);
-      });
-    }
-    if (verb == "hang") {
-      hangs_ = true;
-      return "ok";
-    }
-    if (verb == "unplug") return Unplug(argument);
-    if (verb == "stall") return OnUnit(argument, [](Unit& unit) { unit.stalled = true; });
-    if (verb == "error") return Report(argument, true);
-    if (verb == "resume") return Report(argument, false);
-    return "refused: unknown command " + verb;
-  } catch (const std::exception&) {
-    return "refused: cannot understand the argument of " + line;
   }
 
-  std::string Show(std::size_t scene, Stage::Motion motion, std::int64_t origin_us = -1) {
-    stage_->Show(scene, motion, origin_us);
-    return "ok";
-  }
-
-  std::string State() {
-    const Stage::View view = stage_->Now();
-    std::ostringstream text;
-    text << "ok scene=" << view.index << " scenes=" << stage_->size()
-         << " frames=" << view.scene->shape().num_frames;
-    const std::lock_guard lock(mutex_);
-    for (const auto& unit : units_)
-      text << " unit=" << unit->serial << " position=" << unit->position;
-    return text.str();
-  }
-
-  // Callbacks go out without the lock: listeners may open or close a unit from them.
-  std::string Plug(const std::string& serial) {
-    OniDeviceInfo info{};
-    {
-      const std::lock_guard lock(mutex_);
-      if (Find(serial)) return "ok already plugged";
-      auto unit = std::make_shared<Unit>();
-      unit->serial = serial;
-      unit->uri = "plumb-virtual/" + std::to_string(++num_plugs_);
-      units_.push_back(unit);
-      info = InfoOf(*unit);
-    }
-    deviceConnected(&info);
-    return "ok";
-  }
-
-  std::string Unplug(const std::string& serial) {
-    std::shared_ptr<Unit> unit;
-    {
-      const std::lock_guard lock(mutex_);
-      unit = Find(serial);
-      if (!unit) return "ok not plugged";
-      units_.remove(unit);
-    }
-    unit->gone = true;
-    const OniDeviceInfo info = InfoOf(*unit);
-    deviceStateChanged(&info, ONI_DEVICE_STATE_NOT_READY);
-    deviceDisconnected(&info);
-    return "ok";
-  }
-
-  std::string Report(const std::string& serial, bool failed) {
-    OniDeviceInfo info{};
-    const std::string answer = OnUnit(serial, [&](Unit& unit) {
-      unit.failed = failed;
-      if (!failed) unit.stalled = false;
-      info = InfoOf(unit);
-    });
-    if (answer == "ok")
-      deviceStateChanged(&info, failed ? ONI_DEVICE_STATE_ERROR : ONI_DEVICE_STATE_OK);
-    return answer;
-  }
-
-  template <typename Change>
-  std::string OnUnit(const std::string& serial, Change&& change) {
-    const std::lock_guard lock(mutex_);
-    const std::shared_ptr<Unit> unit = Find(serial);
-    if (!unit) return "refused: no such unit is plugged";
-    change(*unit);
-    return "ok";
-  }
-
-  // Needs the lock. Empty: the unit that was plugged first.
-  std::shared_ptr<Unit> Find(const std::string& serial) {
-    const auto found = std::find_if(units_.begin(), units_.end(), [&](const auto& unit) {
-      return serial.empty() || unit->serial == serial;
-    });
-    return found == units_.end() ? nullptr : *found;
-  }
-
-  std::shared_ptr<Stage> stage_;
-  std::string default_serial_;
-  std::mutex mutex_;
-  std::list<std::shared_ptr<Unit>> units_;
-  int num_plugs_ = 0;
+  std::unique_ptr<VirtualBus> bus_;
   std::string path_;
   int socket_ = -1;
   int stop_ = -1;
   std::thread thread_;
-  std::atomic<bool> hangs_ = false;
 };
 
 }  // namespace

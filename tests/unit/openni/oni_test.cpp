@@ -18,7 +18,7 @@
 #include "drivers/openni/oni_recorder.hpp"
 #include "drivers/openni/oni_recording.hpp"
 #include "drivers/simulated/suite_plan.hpp"
-#include "drivers/virtual/oni_writer.hpp"
+#include "drivers/virtual/openni/oni_writer.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/openni/virtual_rig.hpp"

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "drivers/openni/openni_provider.hpp"
-#include "drivers/virtual/virtual_sensor.hpp"
+#include "drivers/virtual/openni/virtual_sensor.hpp"
 
 namespace plumb::testing {
 

@@ -1,4 +1,4 @@
-#include "drivers/openni/sensor_calibration.hpp"
+#include "drivers/live/sensor_calibration.hpp"
 
 #include <fmt/format.h>
 
@@ -15,36 +15,31 @@ namespace {
 
 constexpr std::size_t kMaxFileBytes = std::size_t{1} << 16;
 
-CameraFile ReadCalibration(const std::filesystem::path& file, const std::string& serial, int width,
-                           int height) try {
-  CameraFile camera = ParseCameraFile(ReadTextFile(file, kMaxFileBytes), file.string());
+CameraFile ParseCalibration(const std::string& text, const std::string& name, int width,
+                            int height) {
+  CameraFile camera = ParseCameraFile(text, name);
   if (camera.color.width * height != camera.color.height * width) {
-    throw DataError(fmt::format("{} is for images of {}x{}, expected {}x{} or a multiple",
-                                file.string(), camera.color.width, camera.color.height, width,
-                                height));
+    throw DataError(fmt::format("{} is for images of {}x{}, expected {}x{} or a multiple", name,
+                                camera.color.width, camera.color.height, width, height));
   }
   if (camera.depth_camera) {
     camera.depth_camera.reset();
     camera.warnings.push_back(fmt::format(
-        "{} states depth_registered 0: ignored, the sensor registers depth itself", file.string()));
+        "{} states depth_registered 0: ignored, the sensor registers depth itself", name));
   }
   return camera;
-} catch (const DataError& error) {
-  throw DeviceError(
-      fmt::format("the calibration of sensor {} cannot be used: {}; correct or remove the file",
-                  serial, error.what()));
 }
 
 /// Where the room says which markers it has, a sensor's file cannot say otherwise: the side of a
 /// marker is the scale of everything, and the reference marker is the frame of every plan.
-void RefuseOtherMarkers(const OpenNiOptions& room, const CameraFile& camera,
-                        const std::filesystem::path& file) {
+void RefuseOtherMarkers(const SensorSettings& room, const CameraFile& camera,
+                        const std::string& file) {
   const auto refuse = [&](const char* key, const char* setting, const std::string& found,
                           const std::string& expected) {
     throw DeviceError(fmt::format(
         "{}: {} is {}, but this room has {}; the markers are the room's, not the sensor's: remove "
         "the key from the file, or correct {} in the configuration",
-        file.string(), key, found, expected, setting));
+        file, key, found, expected, setting));
   };
   if (camera.marker_dictionary && *camera.marker_dictionary != room.marker_dictionary)
     refuse("marker_dictionary", "markers.dictionary", *camera.marker_dictionary,
@@ -57,6 +52,16 @@ void RefuseOtherMarkers(const OpenNiOptions& room, const CameraFile& camera,
   if (camera.reference_marker && camera.reference_marker != room.reference_marker)
     refuse("reference_marker", "markers.reference", fmt::format("{}", *camera.reference_marker),
            room.reference_marker ? fmt::format("{}", *room.reference_marker) : "none configured");
+}
+
+/// What `read` gives; its DataError becomes the sensor's, with what to do about it.
+template <typename Read>
+auto ForSensor(const std::string& serial, Read&& read) try {
+  return read();
+} catch (const DataError& error) {
+  throw DeviceError(
+      fmt::format("the calibration of sensor {} cannot be used: {}; correct or remove the file",
+                  serial, error.what()));
 }
 
 }  // namespace
@@ -72,25 +77,36 @@ std::filesystem::path CalibrationFile(const std::filesystem::path& folder,
   return folder / (name + ".yaml");
 }
 
-StreamInfo LiveStreamInfo(const OpenNiOptions& options, const std::string& serial, int width,
-                          int height, double horizontal_fov_rad) {
+StreamInfo CalibratedStreamInfo(const SensorSettings& settings, const std::string& text,
+                                const std::string& name, const std::string& serial, int width,
+                                int height) {
+  const CameraFile camera =
+      ForSensor(serial, [&] { return ParseCalibration(text, name, width, height); });
+  if (settings.markers_are_the_rooms) RefuseOtherMarkers(settings, camera, name);
   StreamInfo info;
-  info.marker_dictionary = options.marker_dictionary;
-  info.marker_length_m = options.marker_length_m;
-  info.reference_marker = options.reference_marker;
-  const std::filesystem::path file = CalibrationFile(options.calibration_folder, serial);
+  info.intrinsics = Resized(camera.color, width, height);
+  info.marker_dictionary = camera.marker_dictionary.value_or(settings.marker_dictionary);
+  info.marker_length_m = camera.marker_length_m.value_or(settings.marker_length_m);
+  info.reference_marker =
+      camera.reference_marker ? camera.reference_marker : settings.reference_marker;
+  info.warnings = camera.warnings;
+  return info;
+}
+
+StreamInfo LiveStreamInfo(const SensorSettings& settings, const std::string& serial, int width,
+                          int height, double horizontal_fov_rad) {
+  const std::filesystem::path file = CalibrationFile(settings.calibration_folder, serial);
   std::error_code error;
-  if (!options.calibration_folder.empty() &&
+  if (!settings.calibration_folder.empty() &&
       std::filesystem::exists(std::filesystem::symlink_status(file, error))) {
-    const CameraFile camera = ReadCalibration(file, serial, width, height);
-    if (options.markers_are_the_rooms) RefuseOtherMarkers(options, camera, file);
-    info.intrinsics = Resized(camera.color, width, height);
-    info.marker_dictionary = camera.marker_dictionary.value_or(info.marker_dictionary);
-    info.marker_length_m = camera.marker_length_m.value_or(info.marker_length_m);
-    if (camera.reference_marker) info.reference_marker = camera.reference_marker;
-    info.warnings = camera.warnings;
-    return info;
+    return CalibratedStreamInfo(
+        settings, ForSensor(serial, [&] { return ReadTextFile(file, kMaxFileBytes); }),
+        file.string(), serial, width, height);
   }
+  StreamInfo info;
+  info.marker_dictionary = settings.marker_dictionary;
+  info.marker_length_m = settings.marker_length_m;
+  info.reference_marker = settings.reference_marker;
   info.intrinsics = Resized(Intrinsics{}, width, height);
   if (horizontal_fov_rad > 0.2 && horizontal_fov_rad < 2.5)
     info.intrinsics.fx = info.intrinsics.fy = 0.5 * width / std::tan(0.5 * horizontal_fov_rad);

@@ -1,4 +1,4 @@
-#include "drivers/openni/frame_pairing.hpp"
+#include "drivers/live/frame_pairing.hpp"
 
 #include <gtest/gtest.h>
 

@@ -13,7 +13,7 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include "drivers/openni/frame_pairing.hpp"
+#include "drivers/live/frame_pairing.hpp"
 #include "drivers/sensor.hpp"
 
 namespace plumb {

@@ -1,4 +1,4 @@
-#include "drivers/virtual/virtual_sensor.hpp"
+#include "drivers/virtual/virtual_scenes.hpp"
 
 #include <signal.h>
 #include <stdlib.h>
@@ -14,8 +14,6 @@
 
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
-#include "drivers/program_folders.hpp"
-#include "drivers/simulated/suite.hpp"
 #include "drivers/simulated/suite_plan.hpp"
 #include "drivers/virtual/frame_cache.hpp"
 #include "drivers/virtual/raw_frame.hpp"
@@ -141,46 +139,41 @@ fs::path DefaultVirtualSensorCache() {
   return fs::temp_directory_path() / "plumb-virtual-sensor";
 }
 
-fs::path FindVirtualSensorRuntime() {
-  const std::optional<fs::path> found =
-      FindBesideProgram("lib/plumb/virtual-sensor/libOpenNI2.so.0");
-  if (!found)
-    throw IoError(
-        "the virtual sensor's driver is missing: expected lib/plumb/virtual-sensor/libOpenNI2.so.0 "
-        "in a folder above this program; build "
-        "the "
-        "target plumb_virtual_sensor or install the component virtual_sensor");
-  return *found;
+VirtualSensorOptions VirtualOptionsOf(const SimulatedSweeps& sweeps) {
+  VirtualSensorOptions options;
+  options.suite = sweeps.suite;
+  options.seed = sweeps.seed;
+  options.frames = sweeps.frames;
+  options.width = sweeps.width;
+  options.height = sweeps.height;
+  options.max_scenes = sweeps.max_scenes;
+  options.plugged = sweeps.plugged;
+  return options;
 }
 
-VirtualSensor::VirtualSensor(const VirtualSensorOptions& options, const std::stop_token& stop,
-                             const std::function<void(double, std::string_view)>& progress)
-    : runtime_library_(options.runtime.empty() ? FindVirtualSensorRuntime() : options.runtime),
-      frames_(options.frames) {
+RenderedScenes RenderScenes(const VirtualSensorOptions& options, const std::stop_token& stop,
+                            const SetUpProgress& progress) {
   const Renderer renderer(options, ScenesOf(options));
   const std::size_t total = renderer.plan().scenes.size();
   const std::size_t count = options.max_scenes == 0 ? total : std::min(total, options.max_scenes);
-  std::vector<fs::path> caches;
+  RenderedScenes scenes;
   for (std::size_t i = 0; i < count; ++i) {
-    scenes_.push_back(renderer.plan().scenes[i].name);
-    caches.push_back(renderer.Prepare(i, stop, [&](double fraction) {
+    scenes.names.push_back(renderer.plan().scenes[i].name);
+    scenes.caches.push_back(renderer.Prepare(i, stop, [&](double fraction) {
       if (progress)
-        progress((static_cast<double>(i) + fraction) / static_cast<double>(count), scenes_.back());
+        progress((static_cast<double>(i) + fraction) / static_cast<double>(count),
+                 scenes.names.back());
     }));
   }
-
-  session_ = std::make_unique<VirtualSession>(VirtualSession::Contents{
-      options.serial, options.plugged, caches, simulated::MakeSource(renderer.plan(), 0)->info()});
+  scenes.camera = simulated::MakeSource(renderer.plan(), 0)->info();
+  return scenes;
 }
 
-VirtualSensor::~VirtualSensor() = default;
-
-void VirtualSensor::Quit() const noexcept {
-  try {
-    (void)Command("quit");
-  } catch (const std::exception&) {
-    // It does not listen as it is.
-  }
+std::string AcceptedAnswer(std::string_view command, std::string answer) {
+  if (!answer.starts_with("ok"))
+    throw DeviceError(fmt::format("virtual sensor, command \"{}\": {}", command, answer));
+  answer.erase(0, answer.starts_with("ok ") ? 3 : 2);
+  return answer;
 }
 
 }  // namespace plumb

@@ -2,45 +2,17 @@
 // beforehand.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "drivers/simulated/sensor_unit.hpp"
-#include "drivers/simulated/suite.hpp"
-#include "drivers/virtual/virtual_session.hpp"
+#include "drivers/virtual/openni/virtual_session.hpp"
+#include "drivers/virtual/virtual_scenes.hpp"
 
 namespace plumb {
-
-struct VirtualSensorOptions {
-  std::string suite = "demo";  ///< demo, nine or patient, as `plumb simulate` has them.
-  unsigned seed = 1;
-  simulated::NoiseLevel noise = simulated::NoiseLevel::kNominal;
-  int frames = 300;  ///< A scene; a sweep lasts frames / rate_hz.
-  double rate_hz = 30.0;
-  int width = 640;  ///< 640 x 480 or 320 x 240.
-  int height = 480;
-  std::size_t max_scenes = 0;  ///< Only so many of the suite's scenes; 0: all.
-  std::filesystem::path cache_folder =
-      {};  ///< Of the rendered frames, 1.5 MB each; empty: DefaultVirtualSensorCache().
-  std::string serial = "VIRTUAL-0001";  ///< Of the unit that is there at the start.
-  bool plugged = true;                  ///< Whether it is attached then.
-  std::filesystem::path runtime = {};   ///< Library of the private driver tree; empty: the one
-                                        ///< beside the program, see FindVirtualSensorRuntime().
-};
-
-/// The suite that the virtual sensor plays, as `plumb simulate` renders it. @throws
-/// std::invalid_argument for another image size.
-[[nodiscard]] SimulateOptions ScenesOf(const VirtualSensorOptions& options);
-
-/// $XDG_CACHE_HOME/plumb/virtual-sensor, else ~/.cache/plumb/virtual-sensor, else a folder of the
-/// system's temporary one.
-[[nodiscard]] std::filesystem::path DefaultVirtualSensorCache();
 
 /// The private copy of libOpenNI2.so.0 whose drivers are the plug-in and the file player, and
 /// nothing else: `lib/plumb/virtual-sensor` in a parent folder of the running program, in the build
@@ -63,14 +35,10 @@ struct VirtualSensorOptions {
 /// and within a sweep they are those of the simulator.
 class VirtualSensor {
  public:
-  /// @param progress  If set, called on the calling thread with the fraction rendered and the
-  /// scene's name.
-  /// @throws std::invalid_argument for an unknown suite or numbers out of range, IoError if cache
-  /// or driver tree cannot be used,
-  ///         Interrupted on a stop.
-  explicit VirtualSensor(
-      const VirtualSensorOptions& options, const std::stop_token& stop = {},
-      const std::function<void(double fraction, std::string_view scene)>& progress = {});
+  /// Parameters and exceptions are those of RenderScenes(); IoError too if the driver tree cannot
+  /// be used.
+  explicit VirtualSensor(const VirtualSensorOptions& options, const std::stop_token& stop = {},
+                         const SetUpProgress& progress = {});
   ~VirtualSensor();
   VirtualSensor(const VirtualSensor&) = delete;
   VirtualSensor& operator=(const VirtualSensor&) = delete;
@@ -86,7 +54,7 @@ class VirtualSensor {
   /// Where the plug-in listens; datagrams with one command each, the answer goes to the sender.
   [[nodiscard]] const std::filesystem::path& socket() const { return session_->socket(); }
 
-  /// Sends one line as listed in drivers/simulated/README.md and returns the answer without its
+  /// Sends one line as listed in drivers/virtual/README.md and returns the answer without its
   /// leading "ok".
   std::string Command(std::string_view command) const { return session_->Command(command); }
 

@@ -1,4 +1,4 @@
-#include "drivers/virtual/virtual_session.hpp"
+#include "drivers/virtual/openni/virtual_session.hpp"
 
 #include <poll.h>
 #include <stdlib.h>
@@ -19,6 +19,7 @@
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/replay/tum_writer.hpp"
+#include "drivers/virtual/virtual_scenes.hpp"
 
 namespace plumb {
 namespace {
@@ -112,11 +113,7 @@ std::string VirtualSession::Command(std::string_view command) const {
   if (size < 0)
     throw DeviceError(fmt::format("virtual sensor did not answer \"{}\" within {} s", command,
                                   kAnswerTime.count()));
-  std::string answer(buffer.data(), static_cast<std::size_t>(size));
-  if (!answer.starts_with("ok"))
-    throw DeviceError(fmt::format("virtual sensor, command \"{}\": {}", command, answer));
-  answer.erase(0, answer.starts_with("ok ") ? 3 : 2);
-  return answer;
+  return AcceptedAnswer(command, std::string(buffer.data(), static_cast<std::size_t>(size)));
 }
 
 }  // namespace plumb

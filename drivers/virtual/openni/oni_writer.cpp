@@ -1,4 +1,4 @@
-#include "drivers/virtual/oni_writer.hpp"
+#include "drivers/virtual/openni/oni_writer.hpp"
 
 #include <fmt/format.h>
 
@@ -13,8 +13,8 @@
 #include "drivers/files/file_io.hpp"
 #include "drivers/openni/oni_recorder.hpp"
 #include "drivers/openni/openni_provider.hpp"
+#include "drivers/virtual/openni/virtual_sensor.hpp"
 #include "drivers/virtual/raw_frame.hpp"
-#include "drivers/virtual/virtual_sensor.hpp"
 
 namespace plumb {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "algo/types/frame.hpp"
-#include "drivers/openni/openni_provider.hpp"
+#include "drivers/live/sensor_driver.hpp"
 
 namespace plumb {
 
@@ -19,8 +19,14 @@ namespace plumb {
 /// @param horizontal_fov_rad  Of the colour camera as the driver states it; out of (0.2, 2.5):
 /// TUM's published 525 pixels.
 /// @throws DeviceError if the unit's file is there but damaged, of another shape of image, or names
-/// other markers than the room's (OpenNiOptions::markers_are_the_rooms).
-[[nodiscard]] StreamInfo LiveStreamInfo(const OpenNiOptions& options, const std::string& serial,
+/// other markers than the room's (SensorSettings::markers_are_the_rooms).
+[[nodiscard]] StreamInfo LiveStreamInfo(const SensorSettings& settings, const std::string& serial,
                                         int width, int height, double horizontal_fov_rad);
+
+/// As LiveStreamInfo() of a unit whose calibration file has this text.
+/// @param name  Of the file, for messages.
+[[nodiscard]] StreamInfo CalibratedStreamInfo(const SensorSettings& settings,
+                                              const std::string& text, const std::string& name,
+                                              const std::string& serial, int width, int height);
 
 }  // namespace plumb

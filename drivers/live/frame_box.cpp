@@ -1,4 +1,4 @@
-#include "drivers/openni/frame_box.hpp"
+#include "drivers/live/frame_box.hpp"
 
 #include <algorithm>
 

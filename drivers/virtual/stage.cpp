@@ -1,4 +1,4 @@
-#include "drivers/virtual/plugin/stage.hpp"
+#include "drivers/virtual/stage.hpp"
 
 #include <stdexcept>
 

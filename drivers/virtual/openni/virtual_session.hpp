@@ -32,7 +32,7 @@ class VirtualSession {
   }
   [[nodiscard]] const std::filesystem::path& socket() const { return socket_; }
 
-  /// Sends one line as listed in drivers/simulated/README.md and returns the answer without its
+  /// Sends one line as listed in drivers/virtual/README.md and returns the answer without its
   /// leading "ok". Any thread; waits for at most a second. @throws DeviceError if there is no
   /// answer or the command is refused.
   std::string Command(std::string_view command) const;

@@ -1,5 +1,5 @@
 // Which markers hold for a live sensor: the room's.
-#include "drivers/openni/sensor_calibration.hpp"
+#include "drivers/live/sensor_calibration.hpp"
 
 #include <fstream>
 
@@ -39,7 +39,7 @@ class SensorCalibrationTest : public ::testing::Test {
   }
 
   testing::TempFolder folder_;
-  OpenNiOptions room_;
+  SensorSettings room_;
 };
 
 TEST_F(SensorCalibrationTest, TheMarkersAreTheRoomsWhateverTheFileLeavesOut) {

@@ -1,0 +1,46 @@
+// The part of a live sensor that is the same for all drivers: pairs come out of a FrameBox.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "drivers/live/frame_box.hpp"
+#include "drivers/sensor.hpp"
+
+namespace plumb {
+
+/// The driver's thread puts images into the box, CV_8UC3 as RGB and CV_16UC1 in millimetres.
+class BoxedSensor : public LiveSensor {
+ public:
+  [[nodiscard]] const SensorDescription& description() const override { return description_; }
+  [[nodiscard]] SensorStatistics statistics() const override { return box_->statistics(); }
+  [[nodiscard]] const StreamInfo& info() const override { return info_; }
+  [[nodiscard]] std::optional<Frame> Next() override {
+    std::optional<FrameBox::Pair> pair = box_->Take();
+    if (!pair) return std::nullopt;
+    Frame frame;
+    frame.index = pair->index;
+    frame.color_time_s = 1e-6 * static_cast<double>(pair->images.color_us);
+    frame.depth_time_s = 1e-6 * static_cast<double>(pair->images.depth_us);
+    frame.color_rgb = std::move(pair->images.color);
+    pair->images.depth.convertTo(frame.depth_m, CV_32F, 1e-3);
+    return frame;
+  }
+  void Interrupt() noexcept override { box_->Interrupt(); }
+  void Flush() noexcept override { box_->Flush(); }
+
+  [[nodiscard]] FrameBox& box() { return *box_; }
+
+ protected:
+  BoxedSensor(SensorDescription description, std::shared_ptr<FrameBox> box)
+      : description_(std::move(description)), box_(std::move(box)) {}
+  void SetInfo(StreamInfo info) { info_ = std::move(info); }
+
+ private:
+  SensorDescription description_;
+  std::shared_ptr<FrameBox> box_;
+  StreamInfo info_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,82 @@
+#include "drivers/openni/openni_driver.hpp"
+
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "drivers/openni/openni_provider.hpp"
+#include "drivers/program_folders.hpp"
+#ifdef PLUMB_WITH_USB
+#include "drivers/usb/usb_watcher.hpp"
+#endif
+
+namespace plumb {
+namespace {
+
+using State = SensorFinding::State;
+
+class OpenNiSetup : public SensorSetup {
+ public:
+  explicit OpenNiSetup(const SensorSettings& settings) : options_{settings} {}
+  [[nodiscard]] std::unique_ptr<SensorProvider> MakeProvider() const override {
+    return std::make_unique<OpenNiProvider>(options_);
+  }
+
+ private:
+  OpenNiOptions options_;
+};
+
+void ExamineUsb(std::vector<SensorFinding>& findings) {
+#ifdef PLUMB_WITH_USB
+  try {
+    const UsbWatcher watcher;
+    if (watcher.sensors().empty()) {
+      findings.push_back({State::kNote, "USB", "no sensor of the Xtion or Carmine kind (1d27:*)",
+                          "plug one in; its own lamp must light up"});
+    }
+    for (const UsbSensor& sensor : watcher.sensors()) {
+      const std::string found = fmt::format(
+          "{} {:04x}:{:04x} at bus {} address {}{}{}", sensor.model, sensor.vendor, sensor.product,
+          sensor.bus, sensor.address, sensor.speed.empty() ? "" : ", ", sensor.speed);
+      if (sensor.problems.empty()) findings.push_back({State::kGood, "USB", found, {}});
+      for (const std::string& problem : sensor.problems)
+        findings.push_back({sensor.permitted ? State::kNote : State::kBad, "USB", found, problem});
+    }
+  } catch (const DeviceError& error) {
+    findings.push_back(
+        {State::kNote, "USB", error.what(), "sensors are found through OpenNI2 all the same"});
+  }
+#else
+  findings.push_back({State::kNote, "USB", "this build does not watch the bus",
+                      "build with PLUMB_WITH_USB for permissions and speeds"});
+#endif
+}
+
+std::vector<SensorFinding> Examine() {
+  std::vector<SensorFinding> findings;
+  ExamineUsb(findings);
+  if (const auto reader = FindBesideProgram("lib/plumb/plumb-oni-reader")) {
+    findings.push_back({State::kGood, ".oni files", reader->string(), {}});
+  } else {
+    findings.push_back({State::kNote, ".oni files",
+                        "plumb-oni-reader is missing: recordings of OpenNI2 cannot be read",
+                        "install Plumb again"});
+  }
+  return findings;
+}
+
+}  // namespace
+
+void AddOpenNiDriver(SensorRegistry& registry) {
+  registry.Add(
+      {.name = "openni",
+       .title = "OpenNI2",
+       .is_simulated = false,
+       .set_up = [](const SensorSettings& settings, const SimulatedSweeps&, const std::stop_token&,
+                    const SetUpProgress&) { return std::make_unique<OpenNiSetup>(settings); },
+       .examine = Examine});
+}
+
+}  // namespace plumb

@@ -1,0 +1,70 @@
+// Plays the stage to one open virtual unit, in real time.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <stop_token>
+#include <thread>
+#include <vector>
+
+#include "drivers/virtual/stage.hpp"
+
+namespace plumb::simulated {
+
+/// One pair as the unit gives it.
+struct PlayedPair {
+  CachedStamps stamps;  ///< Of the unit's own clock.
+  int frame_index = 0;
+  std::span<const std::uint8_t> rgb;
+  std::span<const std::uint16_t> depth_mm;
+  bool small = false;       ///< Claims to be, and is, of half the size.
+  bool depth_only = false;  ///< Its colour image never comes.
+};
+
+/// A thread of its own gives a pair each period while somebody wants them.
+class SweepPlayer {
+ public:
+  /// @param wanted, emit  Called on the player's thread until it is destroyed.
+  SweepPlayer(std::shared_ptr<Unit> unit, std::shared_ptr<const Stage> stage,
+              std::function<bool()> wanted, std::function<void(const PlayedPair&)> emit);
+  ~SweepPlayer();
+  SweepPlayer(const SweepPlayer&) = delete;
+  SweepPlayer& operator=(const SweepPlayer&) = delete;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void Run(const std::stop_token& stop);
+  void Tick(const std::stop_token& stop);
+  void Give(PlayedPair pair, const std::stop_token& stop);
+  void Load(std::uint32_t frame);
+  void SleepUntil(Clock::time_point time, const std::stop_token& stop);
+
+  const std::shared_ptr<Unit> unit_;
+  const std::shared_ptr<const Stage> stage_;
+  const std::function<bool()> wanted_;
+  const std::function<void(const PlayedPair&)> emit_;
+
+  std::mutex mutex_;  ///< For waiting alone.
+  std::condition_variable_any wake_;
+
+  // Of the thread.
+  Stage::View view_;
+  std::vector<std::uint8_t> rgb_;
+  std::vector<std::uint16_t> depth_mm_;
+  CachedStamps loaded_stamps_;
+  std::int64_t loaded_frame_ = -1;
+  std::uint32_t next_ = 0;  ///< Position in the scene.
+  int wait_ticks_ = 0;  ///< Before a sweep, so that what was on its way is not taken for its begin.
+  std::int64_t device_us_ = 1000000;  ///< The unit's own clock.
+  std::int64_t sweep_begin_us_ = 0;
+  int frame_index_ = 0;
+  Clock::time_point due_;
+  std::jthread thread_;  ///< Last: joined before the others go.
+};
+
+}  // namespace plumb::simulated

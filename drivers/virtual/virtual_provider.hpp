@@ -1,0 +1,45 @@
+// The virtual sensor in this process, without a driver library.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/live/sensor_driver.hpp"
+#include "drivers/live/sensor_events.hpp"
+#include "drivers/virtual/virtual_bus.hpp"
+
+namespace plumb {
+
+/// What the units of a bus are and how their sensors behave.
+struct VirtualUnits {
+  std::shared_ptr<simulated::VirtualBus> bus;
+  SensorSettings settings;
+  std::string serial;       ///< Of the calibrated unit; others get nominal intrinsics.
+  std::string calibration;  ///< Text of its calibration file, as recordings have it.
+  std::chrono::milliseconds stall_time{2000};  ///< Next() fails after so long without a pair.
+};
+
+/// Sees the units of a bus. At most one lives for a bus at a time; its sensors may outlive it.
+class VirtualProvider : public SensorProvider {
+ public:
+  explicit VirtualProvider(VirtualUnits units);
+  ~VirtualProvider() override;
+  VirtualProvider(const VirtualProvider&) = delete;
+  VirtualProvider& operator=(const VirtualProvider&) = delete;
+
+  [[nodiscard]] std::vector<SensorDescription> List() override;
+  void SetListener(std::function<void()> changed) override;
+  [[nodiscard]] std::unique_ptr<LiveSensor> Open(const std::string& serial) override;
+
+ private:
+  const VirtualUnits units_;
+  const std::shared_ptr<SensorEvents> events_;
+};
+
+/// The driver "virtual".
+void AddVirtualDriver(SensorRegistry& registry);
+
+}  // namespace plumb

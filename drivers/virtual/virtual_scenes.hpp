@@ -1,0 +1,67 @@
+// The sweeps that a virtual sensor shows: rendered beforehand into a cache on the disk.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "algo/types/frame.hpp"
+#include "drivers/live/sensor_driver.hpp"
+#include "drivers/simulated/sensor_unit.hpp"
+#include "drivers/simulated/suite.hpp"
+
+namespace plumb {
+
+struct VirtualSensorOptions {
+  std::string suite = "demo";  ///< demo, nine or patient, as `plumb simulate` has them.
+  unsigned seed = 1;
+  simulated::NoiseLevel noise = simulated::NoiseLevel::kNominal;
+  int frames = 300;  ///< A scene; a sweep lasts frames / rate_hz.
+  double rate_hz = 30.0;
+  int width = 640;  ///< 640 x 480 or 320 x 240.
+  int height = 480;
+  std::size_t max_scenes = 0;  ///< Only so many of the suite's scenes; 0: all.
+  std::filesystem::path cache_folder =
+      {};  ///< Of the rendered frames, 1.5 MB each; empty: DefaultVirtualSensorCache().
+  std::string serial = "VIRTUAL-0001";  ///< Of the unit that is there at the start.
+  bool plugged = true;                  ///< Whether it is attached then.
+  std::filesystem::path runtime =
+      {};  ///< Library of the private driver tree, where OpenNI2 shows the sensor; empty: the one
+           ///< beside the program, see FindVirtualSensorRuntime().
+};
+
+/// The suite that the virtual sensor plays, as `plumb simulate` renders it. @throws
+/// std::invalid_argument for another image size.
+[[nodiscard]] SimulateOptions ScenesOf(const VirtualSensorOptions& options);
+
+/// $XDG_CACHE_HOME/plumb/virtual-sensor, else ~/.cache/plumb/virtual-sensor, else a folder of the
+/// system's temporary one.
+[[nodiscard]] std::filesystem::path DefaultVirtualSensorCache();
+
+/// What a program asked for, as options of the virtual sensor.
+[[nodiscard]] VirtualSensorOptions VirtualOptionsOf(const SimulatedSweeps& sweeps);
+
+/// The scenes of a suite, ready to be played.
+struct RenderedScenes {
+  std::vector<std::string> names;             ///< In the order in which they are shown.
+  std::vector<std::filesystem::path> caches;  ///< As frame_cache.hpp describes them.
+  StreamInfo camera;                          ///< Of the unit that shows them.
+};
+
+/// Renders what is not in the cache yet.
+/// @param progress  If set, called on the calling thread with the fraction rendered and the scene's
+/// name.
+/// @throws std::invalid_argument for an unknown suite or numbers out of range, IoError if the cache
+/// cannot be used, Interrupted on a stop.
+[[nodiscard]] RenderedScenes RenderScenes(const VirtualSensorOptions& options,
+                                          const std::stop_token& stop = {},
+                                          const SetUpProgress& progress = {});
+
+/// Takes the leading "ok" from the answer to a command. @throws DeviceError if it was refused.
+[[nodiscard]] std::string AcceptedAnswer(std::string_view command, std::string answer);
+
+}  // namespace plumb

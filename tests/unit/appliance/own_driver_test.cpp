@@ -1,0 +1,220 @@
+// A driver that only this test knows, from its name in a configuration file to a stored scan: what
+// somebody does who adds a sensor.
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <future>
+#include <mutex>
+#include <thread>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/base/errors.hpp"
+#include "daemon/appliance/appliance.hpp"
+#include "daemon/config/sensor_settings.hpp"
+#include "drivers/live/sensor_driver.hpp"
+#include "drivers/simulated/suite.hpp"
+#include "drivers/simulated/suite_plan.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::MessageOf;
+
+constexpr int kFrames = 90;
+
+/// A sweep of the simulator's demo at 15 Hz: made once, read by all sensors.
+struct Sweep {
+  Sweep() {
+    SimulateOptions options;
+    options.suite = "demo";
+    options.faults = simulated::MildFaults(options.noise);
+    options.frames = kFrames;
+    options.rate_hz = 15.0;
+    options.width = 320;
+    options.height = 240;
+    const auto source = simulated::MakeSource(simulated::PlanSuite(options), 0);
+    info = source->info();
+    while (std::optional<Frame> frame = source->Next()) frames.push_back(std::move(*frame));
+  }
+  StreamInfo info;
+  std::vector<Frame> frames;
+  std::atomic<bool> begins = false;  ///< The next frame is the sweep's first.
+};
+
+/// Gives the first frame again and again, the sweep once a scan has begun, then its last frame.
+class SweepSensor : public LiveSensor {
+ public:
+  SweepSensor(std::shared_ptr<Sweep> sweep, const SensorSettings& settings)
+      : sweep_(std::move(sweep)), info_(sweep_->info) {
+    info_.marker_dictionary = settings.marker_dictionary;
+    info_.marker_length_m = settings.marker_length_m;
+    info_.reference_marker = settings.reference_marker;
+  }
+  [[nodiscard]] const StreamInfo& info() const override { return info_; }
+  [[nodiscard]] const SensorDescription& description() const override { return description_; }
+  [[nodiscard]] SensorStatistics statistics() const override {
+    return {.num_pairs = num_given_, .frames_per_second = 15.0};
+  }
+  void Interrupt() noexcept override {
+    {
+      const std::lock_guard lock(mutex_);
+      interrupted_ = true;
+    }
+    changed_.notify_all();
+  }
+  void Flush() noexcept override {}
+  void LockExposure(bool) override {}
+
+  std::optional<Frame> Next() override {
+    if (sweep_->begins.exchange(false)) position_ = 0;
+    std::unique_lock lock(mutex_);
+    // Slower than the sweep was: every frame is tracked, on a busy machine too.
+    if (changed_.wait_for(lock, std::chrono::milliseconds(80), [&] { return interrupted_; }))
+      return std::nullopt;
+    Frame frame = sweep_->frames.at(std::min<std::size_t>(position_, kFrames - 1));
+    frame.index = num_given_++;
+    frame.color_time_s = frame.depth_time_s = static_cast<double>(frame.index) / 15.0;
+    if (is_sweeping()) ++position_;
+    return frame;
+  }
+
+ private:
+  [[nodiscard]] bool is_sweeping() const { return position_ < kFrames; }
+
+  const std::shared_ptr<Sweep> sweep_;
+  StreamInfo info_;
+  const SensorDescription description_{
+      .uri = "sweep:1", .serial = "SWEEP-1", .name = "a sensor of the test's own"};
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool interrupted_ = false;
+  std::size_t position_ = kFrames;
+  std::atomic<std::int64_t> num_given_ = 0;
+};
+
+class SweepProvider : public SensorProvider {
+ public:
+  SweepProvider(std::shared_ptr<Sweep> sweep, SensorSettings settings)
+      : sweep_(std::move(sweep)), settings_(std::move(settings)) {}
+  [[nodiscard]] std::vector<SensorDescription> List() override {
+    return {{.uri = "sweep:1", .serial = "SWEEP-1", .name = "a sensor of the test's own"}};
+  }
+  void SetListener(std::function<void()>) override {}
+  [[nodiscard]] std::unique_ptr<LiveSensor> Open(const std::string&) override {
+    return std::make_unique<SweepSensor>(sweep_, settings_);
+  }
+
+ private:
+  const std::shared_ptr<Sweep> sweep_;
+  const SensorSettings settings_;
+};
+
+class SweepSetup : public SensorSetup {
+ public:
+  SweepSetup(SensorSettings settings, std::shared_ptr<Sweep> sweep)
+      : settings_(std::move(settings)), sweep_(std::move(sweep)) {}
+  [[nodiscard]] std::unique_ptr<SensorProvider> MakeProvider() const override {
+    return std::make_unique<SweepProvider>(sweep_, settings_);
+  }
+  void BeforeScan() const override { sweep_->begins = true; }
+
+ private:
+  const SensorSettings settings_;
+  const std::shared_ptr<Sweep> sweep_;
+};
+
+/// The whole of what the new folder would contribute to a build.
+void AddSweepDriver(SensorRegistry& registry, const std::shared_ptr<Sweep>& sweep) {
+  registry.Add({.name = "sweep",
+                .title = "the test's own",
+                .set_up = [sweep](const SensorSettings& settings, const SimulatedSweeps&,
+                                  const std::stop_token&, const SetUpProgress&) {
+                  return std::make_unique<SweepSetup>(settings, sweep);
+                }});
+}
+
+class OwnDriverTest : public ::testing::Test {
+ protected:
+  OwnDriverTest() { AddSweepDriver(registry_, sweep_); }
+  const std::shared_ptr<Sweep> sweep_ = std::make_shared<Sweep>();
+  SensorRegistry registry_;
+};
+
+TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReference) {
+  EventLoop loop;  // first: blocks signals before any thread starts
+  const testing::TempFolder folder;
+  Config config =
+      ParseConfig(fmt::format("[sensor]\ndriver = \"sweep\"\n"
+                              "[markers]\ndictionary = \"{}\"\nlength_m = {}\nreference = {}\n",
+                              sweep_->info.marker_dictionary, sweep_->info.marker_length_m,
+                              sweep_->info.reference_marker.value()),
+                  "plumb.toml");
+  config.appliance.state = folder / "state";
+  const std::unique_ptr<SensorSetup> setup = registry_.Choose(config.appliance.sensor_driver, false)
+                                                 .set_up(SensorSettingsOf(config), {}, {}, {});
+  ApplianceParts parts;
+  parts.config = config;
+  parts.make_provider = [&] { return setup->MakeProvider(); };
+  parts.before_scan = [&] { setup->BeforeScan(); };
+  parts.demo_patient = "demo";
+  Appliance appliance(loop, parts);
+
+  const auto on_loop = [&](const std::function<void()>& work) {
+    const auto done = std::make_shared<std::promise<void>>();
+    loop.Post("test", [&work, done] {
+      work();
+      done->set_value();
+    });
+    done->get_future().wait();
+  };
+  const auto becomes = [&](const std::function<bool()>& holds) {
+    const auto until = EventLoop::Clock::now() + std::chrono::seconds(120);
+    bool does = false;
+    while (!does && EventLoop::Clock::now() < until) {
+      on_loop([&] { does = holds(); });
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return does;
+  };
+  nlohmann::json status;
+  std::jthread person([&] {
+    EXPECT_TRUE(becomes([&] { return appliance.state().phase == ScanPhase::kReady; }));
+    on_loop([&] { EXPECT_EQ(appliance.StartSweep(), ""); });
+    EXPECT_TRUE(becomes([&] {
+      status = nlohmann::json::parse(appliance.StatusJson());
+      return status["scan"].is_object() && status["scan"].value("frames", 0) >= kFrames;
+    }));
+    on_loop([&] { EXPECT_EQ(appliance.EndSweep(), ""); });
+    EXPECT_TRUE(becomes([&] { return appliance.state().phase == ScanPhase::kResult; }));
+    on_loop([&] { status = nlohmann::json::parse(appliance.StatusJson()); });
+    loop.Quit(0);
+  });
+  loop.Run();
+  person.join();
+  EXPECT_EQ(status["sensor"]["serial"], "SWEEP-1") << status.dump(2);
+  EXPECT_EQ(status["last_result"]["is_reference"], true);
+  EXPECT_TRUE(std::filesystem::exists(folder / "state" / "scans" /
+                                      status["last_result"]["scan"].get<std::string>() / "scene" /
+                                      "scene.json"));
+}
+
+TEST_F(OwnDriverTest, ANameThatIsMisspeltIsAnsweredWithTheNamesThatAreKnown) {
+  const Config config = ParseConfig("[sensor]\ndriver = \"seep\"\n", "plumb.toml");
+  EXPECT_THAT(
+      MessageOf<DataError>([&] { (void)registry_.Choose(config.appliance.sensor_driver, false); }),
+      AllOf(HasSubstr("[sensor] driver"), HasSubstr("\"sweep\""), HasSubstr("\"seep\"")));
+  EXPECT_THAT(
+      MessageOf<DataError>([] { (void)ParseConfig("[sensor]\ndriver = 7\n", "plumb.toml"); }),
+      AllOf(HasSubstr("plumb.toml:2"), HasSubstr("sensor.driver")));
+}
+
+}  // namespace
+}  // namespace plumb
