@@ -54,10 +54,11 @@ std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path,
     return kind->Open(path, defaults);
   // Whatever its name, the contents may be one.
   if (const RecordingKind* kind = BuiltInSensors().KindOf(path)) return kind->Open(path, defaults);
-  throw DataError(
-      fmt::format("recording {} is no folder, and this build knows no such kind of file; expected "
-                  "a folder in the TUM RGB-D layout, or build with PLUMB_WITH_OPENNI for .oni",
-                  path.string()));
+  throw DataError(fmt::format(
+      "'{}' is neither a folder nor a file of a kind that this build reads; expected a "
+      "folder in the TUM RGB-D layout (rgb.txt, depth.txt), or an .oni file where Plumb "
+      "was built with OpenNI2",
+      path.string()));
 }
 
 void EnsureFolder(const std::filesystem::path& folder) {
