@@ -106,6 +106,8 @@ int Main(int argc, char** argv) {
   add("backup", "Copy what plumbd stores: database, scans, calibrations; also while it runs",
       AddBackup);
   add("restore", "Make a state folder of a backup, after checking every file of it", AddRestore);
+  add("export-patient", "Copy one patient out of a state folder or a backup", AddExportPatient);
+  add("import-patient", "Add an exported patient to a state folder", AddImportPatient);
 #endif
 
   try {

@@ -65,8 +65,10 @@ class Appliance {
   Answer Cancel();
   /// Off the loop, while scans go on. Calls `done` on the loop, with why none was made (empty: it
   /// was) and what it holds.
+  /// @param key_file  Whose key encrypts it; empty: the configured one, if any.
   void BackUp(const web::Actor& actor, const std::filesystem::path& folder,
-              std::function<void(const std::string& error, const BackupReport& report)> done);
+              std::function<void(const std::string& error, const BackupReport& report)> done,
+              const std::filesystem::path& key_file = {});
   /// Where a backup of today belongs; empty: no folder is configured.
   [[nodiscard]] std::filesystem::path BackupTarget() const;
   /// Asked before each scan: a reason why none may begin now, or nothing.

@@ -13,6 +13,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/records/file_cipher.hpp"
 
 namespace plumb {
 namespace {
@@ -226,23 +227,29 @@ void Appliance::CheckStoredFiles() {
 
 void Appliance::BackUp(
     const web::Actor& actor, const std::filesystem::path& folder,
-    std::function<void(const std::string& error, const BackupReport& report)> done) {
+    std::function<void(const std::string& error, const BackupReport& report)> done,
+    const std::filesystem::path& key_file) {
   if (store_ == nullptr || !storage_fault_.empty())
     return done("nothing can be backed up in safe mode: " + storage_fault_, {});
-  const bool posted = check_thread_.Post([this, actor, folder, done, stop = care_.get_token()] {
-    BackupReport report;
-    std::string error;
-    try {
-      report = store_->Backup(actor, folder, stop);
-    } catch (const std::exception& failure) {
-      error = failure.what();
-    }
-    Log(error.empty() ? LogLevel::kNotice : LogLevel::kError,
-        error.empty() ? fmt::format("backup made: {}, {} scans, {} problems", folder.string(),
-                                    report.scans, report.problems.size())
-                      : fmt::format("no backup was made in {}: {}", folder.string(), error));
-    loop_.Post("backup", [done, error, report] { done(error, report); });
-  });
+  const std::filesystem::path key =
+      key_file.empty() ? parts_.config.appliance.backup_key_file : key_file;
+  const bool posted =
+      check_thread_.Post([this, actor, folder, done, key, stop = care_.get_token()] {
+        BackupReport report;
+        std::string error;
+        try {
+          std::optional<BackupSecret> secret;
+          if (!key.empty()) secret.emplace(key);
+          report = store_->Backup(actor, folder, stop, secret ? &*secret : nullptr);
+        } catch (const std::exception& failure) {
+          error = failure.what();
+        }
+        Log(error.empty() ? LogLevel::kNotice : LogLevel::kError,
+            error.empty() ? fmt::format("backup made: {}, {} scans, {} problems", folder.string(),
+                                        report.scans, report.problems.size())
+                          : fmt::format("no backup was made in {}: {}", folder.string(), error));
+        loop_.Post("backup", [done, error, report] { done(error, report); });
+      });
   if (!posted) done("too much waits already: try again", {});
 }
 

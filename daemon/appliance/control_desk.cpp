@@ -68,10 +68,12 @@ void ControlDesk::Answer(const ControlRequest& request, const ControlServer::Rep
       return reply(refusal.empty() ? ControlDone() : ControlRefusal(refusal));
     }
     case Kind::kBackup:
-      return appliance_.BackUp(kSocket, request.folder,
-                               [reply](const std::string& error, const BackupReport& report) {
-                                 reply(error.empty() ? BackupDone(report) : ControlRefusal(error));
-                               });
+      return appliance_.BackUp(
+          kSocket, request.folder,
+          [reply](const std::string& error, const BackupReport& report) {
+            reply(error.empty() ? BackupDone(report) : ControlRefusal(error));
+          },
+          request.key_file);
     case Kind::kUpdate:
       return updates_.InstallFile(kSocket, request.file, request.name, ReplyWith(reply));
     case Kind::kUpdateStatus:

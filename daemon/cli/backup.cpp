@@ -14,6 +14,7 @@
 #include "daemon/control/unix_socket.hpp"
 #include "daemon/records/backup.hpp"
 #include "daemon/records/database.hpp"
+#include "daemon/records/file_cipher.hpp"
 
 namespace plumb {
 namespace {
@@ -24,6 +25,7 @@ constexpr const char* kDefaultConfig = "/etc/plumb/plumb.toml";
 
 struct Options {
   fs::path folder;
+  std::optional<fs::path> key_file;
   std::optional<fs::path> state;
 };
 
@@ -52,13 +54,25 @@ void PrintReport(const char* done, const fs::path& folder, const BackupReport& r
   PrintOut(text);
 }
 
-BackupReport AskForBackup(const fs::path& folder, const CommandContext& context) {
-  const nlohmann::json answer = AskPlumbd(context.control,
-                                          {.kind = ControlRequest::Kind::kBackup,
-                                           .action = {},
-                                           .argument = {},
-                                           .folder = folder.string()},
-                                          context.stop, std::nullopt);
+std::unique_ptr<BackupSecret> SecretOf(const Options& options) {
+  return options.key_file ? std::make_unique<BackupSecret>(*options.key_file) : nullptr;
+}
+
+void AddKeyFile(CLI::App& app, Options& options, const char* what) {
+  app.add_option("--key-file", options.key_file, what)->type_name("FILE");
+}
+
+/// plumbd reads the key file itself, so that no key goes through a socket.
+BackupReport AskForBackup(const fs::path& folder, const Options& options,
+                          const CommandContext& context) {
+  const nlohmann::json answer = AskPlumbd(
+      context.control,
+      {.kind = ControlRequest::Kind::kBackup,
+       .action = {},
+       .argument = {},
+       .folder = folder.string(),
+       .key_file = options.key_file ? fs::absolute(*options.key_file).string() : std::string()},
+      context.stop, std::nullopt);
   if (!answer.value("ok", false)) throw IoError(answer.value("error", "refused without a reason"));
   return {.scans = answer.value("scans", std::size_t{0}),
           .files = answer.value("files", std::size_t{0}),
@@ -72,10 +86,10 @@ int Backup(const Options& options, const CommandContext& context) {
   const fs::path folder = fs::absolute(options.folder);
   BackupReport report;
   if (!options.state && IsPlumbdThere(context.control)) {
-    report = AskForBackup(folder, context);
+    report = AskForBackup(folder, options, context);
   } else {
     try {
-      report = BackUpStopped(StateFolder(options), folder, context.stop);
+      report = BackUpStopped(StateFolder(options), folder, context.stop, SecretOf(options).get());
     } catch (const DatabaseBusy& error) {
       throw IoError(
           fmt::format("{}. A running plumbd makes the backup itself: leave out --state, "
@@ -89,8 +103,9 @@ int Backup(const Options& options, const CommandContext& context) {
 
 int Restore(const Options& options, const CommandContext& context) {
   const fs::path state = StateFolder(options);
-  PrintReport("restored into", state,
-              RestoreBackup(fs::absolute(options.folder), state, context.stop));
+  PrintReport(
+      "restored into", state,
+      RestoreBackup(fs::absolute(options.folder), state, context.stop, SecretOf(options).get()));
   return kDone;
 }
 
@@ -105,6 +120,9 @@ Command AddBackup(CLI::App& app) {
   app.add_option("--state", options->state,
                  "State folder that no plumbd uses; without it a running plumbd makes the backup")
       ->type_name("DIR");
+  AddKeyFile(app, *options,
+             "Encrypt with the key in this file: one line, a passphrase or a random key. A running "
+             "plumbd must be able to read it");
   return [options](const CommandContext& context) { return Backup(*options, context); };
 }
 
@@ -114,6 +132,7 @@ Command AddRestore(CLI::App& app) {
   app.add_option("--state", options->state,
                  "State folder, missing or empty; default: the one of the configuration")
       ->type_name("DIR");
+  AddKeyFile(app, *options, "Of an encrypted backup: the file with its key");
   return [options](const CommandContext& context) { return Restore(*options, context); };
 }
 

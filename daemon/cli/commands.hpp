@@ -51,6 +51,8 @@ using Command = std::function<int(const CommandContext&)>;
 [[nodiscard]] Command AddUpdate(CLI::App& app);
 [[nodiscard]] Command AddBackup(CLI::App& app);
 [[nodiscard]] Command AddRestore(CLI::App& app);
+[[nodiscard]] Command AddExportPatient(CLI::App& app);
+[[nodiscard]] Command AddImportPatient(CLI::App& app);
 
 /// Writes to stdout.
 /// @throws IoError if stdout does not take it (closed pipe, full disk).

@@ -203,6 +203,10 @@ void ReadStorage(Section section, ApplianceConfig& appliance) {
   if (!folder.empty()) appliance.backup_folder = folder;
   section.Take("backup_hours", appliance.backup_hours, "hours from 1 to 8760",
                [](double v) { return v >= 1 && v <= 8760; });
+  std::string key_file;
+  section.Take("backup_key_file", key_file, "an absolute path",
+               [](const std::string& s) { return s.starts_with('/') && s.size() < 1024; });
+  appliance.backup_key_file = key_file;
   section.RefuseTheRest();
 }
 

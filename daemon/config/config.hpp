@@ -39,6 +39,8 @@ struct ApplianceConfig {
   double result_s = 120.0;              ///< A result is shown for so long.
   std::filesystem::path backup_folder;  ///< Of the backups made by the clock; empty: none are.
   double backup_hours = 24.0;
+  std::filesystem::path backup_key_file;  ///< Its key encrypts every backup that plumbd makes;
+                                          ///< empty: they are not encrypted.
 };
 
 /// Start button and light on GPIO lines. A line is its name as the device tree has it, or its
@@ -115,7 +117,9 @@ enum class ConfigUse { kCommandLine, kAppliance };
 ///                    max_residual_p95_mm, max_lost_s
 ///     [check]        misfit_mm, moved_mm, side_percent, scale_percent, depth_percent, min_views
 ///     [iec]          T_iec_reference = 4 rows of 4: reference marker's frame to the IEC fixed
-///     frame [storage]      backup_folder, backup_hours [appliance]    state, control, calibration,
+///     frame
+///     [storage]      backup_folder, backup_hours, backup_key_file
+///     [appliance]    state, control, calibration,
 ///     sensor_serial, keep_recordings, quota_gb,
 ///                    auto_stop_s, scan_limit_s, result_s
 ///     [sensor]       driver

@@ -39,6 +39,10 @@ bool IsFlat(const Json& json) {
                      [](const Json& value) { return !value.is_structured(); });
 }
 
+bool IsAbsolute(const std::string& path) {
+  return path.starts_with('/') && path.size() <= kMaxFolder && path.find('\0') == std::string::npos;
+}
+
 }  // namespace
 
 ControlRequest ParseControlRequest(std::string_view line) {
@@ -90,11 +94,12 @@ ControlRequest ParseControlRequest(std::string_view line) {
     }
   } else if (command == "backup") {
     request.kind = Kind::kBackup;
-    allow_only({"command", "folder"});
+    allow_only({"command", "folder", "key_file"});
     request.folder = text("folder");
-    if (!request.folder.starts_with('/') || request.folder.size() > kMaxFolder ||
-        request.folder.find('\0') != std::string::npos)
-      throw DataError("backup: \"folder\" is an absolute path");
+    request.key_file = text("key_file");
+    if (!IsAbsolute(request.folder)) throw DataError("backup: \"folder\" is an absolute path");
+    if (json.contains("key_file") && !IsAbsolute(request.key_file))
+      throw DataError("backup: \"key_file\" is an absolute path");
   } else if (command == "update") {
     request.kind = Kind::kUpdate;
     allow_only({"command", "name"});
@@ -120,8 +125,11 @@ std::string ControlRequestText(const ControlRequest& request) {
       return Json{{"command", "watch"}}.dump();
     case Kind::kPress:
       return Json{{"command", "press"}, {"long", request.is_long}}.dump();
-    case Kind::kBackup:
-      return Json{{"command", "backup"}, {"folder", request.folder}}.dump();
+    case Kind::kBackup: {
+      Json backup{{"command", "backup"}, {"folder", request.folder}};
+      if (!request.key_file.empty()) backup["key_file"] = request.key_file;
+      return backup.dump();
+    }
     case Kind::kUpdate:
       return Json{{"command", "update"}, {"name", request.name}}.dump();
     case Kind::kUpdateStatus:

@@ -14,8 +14,8 @@ inline constexpr std::size_t kMaxControlLine = 4096;  ///< Bytes of a request.
 
 /// {"command": "status" | "press" | "watch" | "sim" | "backup" | "update" | "update-status" |
 /// "restart", "long": bool with press, "action" and, optional, "argument": texts with sim,
-/// "folder": an absolute path with backup, "name": NAME.raucb with update, whose message carries
-/// the open file (SCM_RIGHTS)}
+/// "folder": an absolute path with backup, and, optional, "key_file": another, "name": NAME.raucb
+/// with update, whose message carries the open file (SCM_RIGHTS)}
 struct ControlRequest {
   enum class Kind { kStatus, kPress, kWatch, kSim, kBackup, kUpdate, kUpdateStatus, kRestart };
   Kind kind = Kind::kStatus;
@@ -25,6 +25,7 @@ struct ControlRequest {
   std::string argument;  ///< kSim: a serial, what kind of glitch and how often, or how fast; words
                          ///< of letters, digits, -, _ and dots.
   std::string folder = {};                        ///< kBackup: where it is made.
+  std::string key_file = {};                      ///< kBackup: whose key encrypts it.
   std::string name = {};                          ///< kUpdate: of the bundle.
   std::shared_ptr<const AttachedFile> file = {};  ///< kUpdate: the bundle, open for reading.
   bool operator==(const ControlRequest&) const = default;

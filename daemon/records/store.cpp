@@ -222,6 +222,8 @@ void Store::WipePatient(const web::Actor& actor, const std::string& id) {
   }
   for (const std::string& scan : scans)
     RemoveScanFiles(scan);  // what a crash leaves here goes at the next start
+  std::error_code ignored;
+  std::filesystem::remove(folder_ / "imports" / (std::to_string(number) + ".json"), ignored);
   const std::lock_guard lock(write_mutex_);
   write_->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Run();  // nor does the log keep what was wiped
 }

@@ -198,7 +198,7 @@ class Store {
   /// While scans go on; nothing is removed meanwhile. See backup.hpp. @throws StoreRefusal where
   /// one is being made already; IoError; Interrupted
   BackupReport Backup(const web::Actor& actor, const std::filesystem::path& target,
-                      const std::stop_token& stop = {});
+                      const std::stop_token& stop = {}, const BackupSecret* secret = nullptr);
 
   // --- daily check
   /// @param check_json  Of CheckJson(). Gives the id.
@@ -230,6 +230,7 @@ class Store {
   void ChangeSettings(const web::Actor& actor, const web::Settings& settings);
 
  private:
+  friend class PatientImport;  ///< Of patient_transfer.cpp.
   Store() = default;
   /// A finished scan and what a look at its files gave.
   struct LookedAt {

@@ -27,16 +27,17 @@ class WhileBackingUp {
 }  // namespace
 
 BackupReport Store::Backup(const web::Actor& actor, const std::filesystem::path& target,
-                           const std::stop_token& stop) {
+                           const std::stop_token& stop, const BackupSecret* secret) {
   const WhileBackingUp guard(removal_mutex_, backing_up_);
   BackupReport report;
   {
     Database source(folder_ / "plumb.db", Database::Access::kReadOnly);
-    report = WriteBackup(folder_, source, target, stop);
+    report = WriteBackup(folder_, source, target, stop, secret);
   }
   Log(actor, "backup.make", "",
-      fmt::format("{}: {} scans, {} files, {} bytes, {} problems", target.string(), report.scans,
-                  report.files, report.bytes, report.problems.size()));
+      fmt::format("{}: {} scans, {} files, {} bytes, {} problems{}", target.string(), report.scans,
+                  report.files, report.bytes, report.problems.size(),
+                  secret != nullptr ? ", encrypted" : ""));
   return report;
 }
 

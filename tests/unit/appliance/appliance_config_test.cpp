@@ -28,6 +28,7 @@ result_s = 300
 [storage]
 backup_folder = "/mnt/backup"
 backup_hours = 12
+backup_key_file = "/etc/plumb/backup.key"
 [button]
 chip = "gpiochip1"
 line = "start"
@@ -50,6 +51,7 @@ host_names = ["plumb.local", "couch"]
   EXPECT_EQ(config.appliance.quota_gb, 12.5);
   EXPECT_EQ(config.appliance.backup_folder, "/mnt/backup");
   EXPECT_EQ(config.appliance.backup_hours, 12);
+  EXPECT_EQ(config.appliance.backup_key_file, "/etc/plumb/backup.key");
   EXPECT_EQ(config.appliance.auto_stop_s, 4.0);
   EXPECT_EQ(config.appliance.scan_limit_s, 30.0);
   EXPECT_EQ(config.appliance.result_s, 300.0);
@@ -74,6 +76,7 @@ TEST(ApplianceConfigTest, WhatIsWrongIsToldWithItsLine) {
               AllOf(HasSubstr(":2"), HasSubstr("120")));
   EXPECT_THAT(complaint("[storage]\nbackup_hours = 0.5\n"), HasSubstr("1 to 8760"));
   EXPECT_THAT(complaint("[storage]\nbackup_folder = \"usb\"\n"), HasSubstr("absolute"));
+  EXPECT_THAT(complaint("[storage]\nbackup_key_file = \"key\"\n"), HasSubstr("absolute"));
   EXPECT_THAT(complaint("[appliance]\nquota = 3\n"),
               AllOf(HasSubstr(":2"), HasSubstr("unknown key 'quota'"), HasSubstr("quota_gb")));
   EXPECT_THAT(complaint("[web]\nlisten = \"8080\"\n"),

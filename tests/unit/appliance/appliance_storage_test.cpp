@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "daemon/appliance/appliance.hpp"
+#include "daemon/records/file_cipher.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -97,6 +98,29 @@ TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {
     EXPECT_THAT(refused.value_or(""), HasSubstr("/proc"));
   }
   EXPECT_EQ(RestoreBackup(folder / "backup", folder / "restored").files, 1U);
+  // With a key in the configuration every backup is encrypted, the clock's and the page's too.
+  std::ofstream(folder / "key") << "a passphrase of some length\n";
+  fs::permissions(folder / "key", fs::perms::owner_read | fs::perms::owner_write);
+  {
+    ApplianceConfig& appliance_config = config.appliance;
+    appliance_config.backup_key_file = folder / "key";
+    EventLoop another;
+    Appliance appliance(another, PartsOf(config, bus));
+    std::optional<std::string> made, refused;
+    appliance.BackUp({.user = "anna", .address = {}}, folder / "sealed",
+                     [&](const std::string& error, const BackupReport&) { made = error; });
+    appliance.BackUp(
+        {.user = "anna", .address = {}}, folder / "none",
+        [&](const std::string& error, const BackupReport&) { refused = error; },
+        folder / "no-such-key");
+    EXPECT_TRUE(RunUntil(another, [&] { return made && refused; }));
+    EXPECT_EQ(made, "");
+    EXPECT_THAT(refused.value_or(""), HasSubstr("no-such-key"));
+    EXPECT_FALSE(fs::exists(folder / "none"));
+  }
+  EXPECT_THROW((void)RestoreBackup(folder / "sealed", folder / "opened"), DataError);
+  const BackupSecret secret(folder / "key");
+  EXPECT_EQ(RestoreBackup(folder / "sealed", folder / "opened", {}, &secret).files, 1U);
   {
     std::ofstream(config.appliance.state / "plumb.db") << std::string(20000, 'x');
     EventLoop another;

@@ -65,6 +65,8 @@ TEST(ControlProtocolTest, RefusesEverythingElse) {
                            "{\"command\":\"backup\"}",
                            "{\"command\":\"backup\",\"folder\":\"relative\"}",
                            "{\"command\":\"backup\",\"folder\":7}",
+                           "{\"command\":\"backup\",\"folder\":\"/a\",\"key_file\":\"k\"}",
+                           "{\"command\":\"backup\",\"folder\":\"/a\",\"key_file\":7}",
                            "{\"command\":\"backup\",\"folder\":\"/a\\u0000b\"}",
                            "{\"command\":\"update\"}",
                            "{\"command\":\"update\",\"name\":\".raucb\"}",

@@ -1,0 +1,278 @@
+#include "daemon/records/file_cipher.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <vector>
+
+#include <fmt/format.h>
+#include <sodium/core.h>
+#include <sodium/crypto_pwhash_argon2id.h>
+#include <sodium/crypto_secretstream_xchacha20poly1305.h>
+#include <sodium/randombytes.h>
+#include <sodium/utils.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/base/check_stop.hpp"
+#include "algo/base/errors.hpp"
+#include "daemon/records/file_copy.hpp"
+#include "drivers/files/file_io.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMinSecret = 16, kMaxSecret = 1024;
+constexpr std::size_t kPiece = std::size_t{64} << 10;
+constexpr std::size_t kOverhead = crypto_secretstream_xchacha20poly1305_ABYTES;
+// What a backup may ask of the machine that restores it.
+constexpr std::uint64_t kMaxOperations = 16, kMaxMemory = std::uint64_t{512} << 20;
+constexpr const char* kAlgorithm = "argon2id, xchacha20poly1305";
+
+void StartSodium() {
+  if (::sodium_init() < 0) throw IoError("libsodium does not start: it finds no random numbers");
+}
+
+/// Reads the pieces of a file, each with whether it is the last.
+class Pieces {
+ public:
+  Pieces(const fs::path& path, std::size_t size)
+      : path_(path), fd_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)), next_(size) {
+    if (fd_ < 0) Fail(errno);
+    struct stat status {};
+    const int error = ::fstat(fd_, &status) != 0 ? errno : S_ISREG(status.st_mode) ? 0 : EINVAL;
+    if (error != 0) {
+      ::close(fd_);
+      Fail(error);
+    }
+  }
+  ~Pieces() { ::close(fd_); }
+  Pieces(const Pieces&) = delete;
+  Pieces& operator=(const Pieces&) = delete;
+
+  /// At most so many bytes; fewer at the end of the file only.
+  std::vector<std::uint8_t> Exactly(std::size_t count) {
+    std::vector<std::uint8_t> bytes(count);
+    std::size_t filled = 0;
+    while (filled < count) {
+      const ssize_t got = ::read(fd_, bytes.data() + filled, count - filled);
+      if (got < 0 && errno == EINTR) continue;
+      if (got < 0) Fail(errno);
+      if (got == 0) break;
+      filled += static_cast<std::size_t>(got);
+    }
+    bytes.resize(filled);
+    return bytes;
+  }
+  /// Begins the pieces after what Exactly() gave.
+  void Begin() { ahead_ = Exactly(next_); }
+  std::vector<std::uint8_t> Take() {
+    std::vector<std::uint8_t> piece = std::move(ahead_);
+    ahead_ = piece.size() < next_ ? std::vector<std::uint8_t>() : Exactly(next_);
+    return piece;
+  }
+  [[nodiscard]] bool is_last() const { return ahead_.empty(); }  ///< What Take() gave last.
+
+ private:
+  [[noreturn]] void Fail(int error) const {
+    throw SourceUnreadable(fmt::format("cannot read {}: {}", path_.string(), std::strerror(error)));
+  }
+  fs::path path_;
+  int fd_;
+  std::size_t next_;
+  std::vector<std::uint8_t> ahead_;
+};
+
+/// The copy, and what it is and was made of.
+class Target {
+ public:
+  Target(const fs::path& to, const std::string& path) : path_(path), file_(Made(to / path)) {}
+  void Write(const std::vector<std::uint8_t>& bytes) {
+    hash_.Add(bytes.data(), bytes.size());
+    file_.Write(bytes);
+    bytes_ += bytes.size();
+  }
+  FileDigest Close(const fs::path& to) {
+    file_.Close();
+    ::chmod((to / path_).c_str(), 0640);
+    return {.path = path_, .bytes = bytes_, .sha256 = hash_.Hex()};
+  }
+
+ private:
+  static const fs::path& Made(const fs::path& file) {
+    std::error_code error;
+    fs::create_directories(file.parent_path(), error);
+    if (error) throw IoError(DescribeWriteError(file.parent_path(), error.value()));
+    return file;
+  }
+  std::string path_;
+  FileWriter file_;
+  Sha256 hash_;
+  std::uint64_t bytes_ = 0;
+};
+
+const unsigned char* Bytes(const std::string& text) {
+  return reinterpret_cast<const unsigned char*>(text.data());
+}
+
+std::string Hex(const unsigned char* bytes, std::size_t count) {
+  std::string text(2 * count + 1, '\0');
+  ::sodium_bin2hex(text.data(), text.size(), bytes, count);
+  text.pop_back();
+  return text;
+}
+
+}  // namespace
+
+BackupSecret::BackupSecret(const fs::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) == 0 && (status.st_mode & S_IROTH) != 0)
+    throw DataError(
+        fmt::format("the key file {} can be read by everybody: chmod o= it first", file.string()));
+  text_ = ReadTextFile(file, kMaxSecret + 1);
+  while (!text_.empty() && (text_.back() == '\n' || text_.back() == '\r')) text_.pop_back();
+  if (text_.size() < kMinSecret || text_.size() > kMaxSecret ||
+      text_.find('\n') != std::string::npos)
+    throw DataError(fmt::format(
+        "the key file {} holds no key: expected one line of {} to {} bytes, for example of "
+        "`openssl rand -hex 32`",
+        file.string(), kMinSecret, kMaxSecret));
+}
+
+BackupSecret::~BackupSecret() { ::sodium_memzero(text_.data(), text_.size()); }
+
+FileCipher::FileCipher(const BackupSecret& secret) {
+  StartSodium();
+  ::randombytes_buf(salt_.data(), salt_.size());
+  Derive(secret);
+}
+
+FileCipher::FileCipher(const BackupSecret& secret, const Json& header) {
+  StartSodium();
+  std::size_t length = 0;
+  const auto text = [&](const char* name) {
+    const auto field = header.is_object() ? header.find(name) : header.end();
+    return header.is_object() && field != header.end() && field->is_string()
+               ? field->get<std::string>()
+               : std::string();
+  };
+  const auto number = [&](const char* name, std::uint64_t most) -> std::uint64_t {
+    const auto field = header.find(name);
+    if (field == header.end() || !field->is_number_unsigned() || *field > most) return 0;
+    return field->get<std::uint64_t>();
+  };
+  const std::string salt = text("salt");
+  const bool has_salt = ::sodium_hex2bin(salt_.data(), salt_.size(), salt.data(), salt.size(),
+                                         nullptr, &length, nullptr) == 0 &&
+                        length == salt_.size() && salt.size() == 2 * salt_.size();
+  if (text("algorithm") != kAlgorithm || !has_salt)
+    throw DataError("how it was encrypted is not known to this Plumb");
+  operations_ = number("operations", kMaxOperations);
+  memory_bytes_ = number("memory_bytes", kMaxMemory);
+  Derive(secret);
+  if (text("key") != KeyedHash("key", ""))
+    throw DataError("it was encrypted with another key than that of the key file");
+}
+
+FileCipher::~FileCipher() { ::sodium_memzero(key_.data(), key_.size()); }
+
+void FileCipher::Derive(const BackupSecret& secret) {
+  if (::crypto_pwhash_argon2id(key_.data(), key_.size(), secret.text_.data(), secret.text_.size(),
+                               salt_.data(), operations_, memory_bytes_,
+                               crypto_pwhash_argon2id_ALG_ARGON2ID13) != 0)
+    throw DataError(fmt::format("no key can be made with {} operations on {} bytes of memory",
+                                operations_, memory_bytes_));
+}
+
+Json FileCipher::Header() const {
+  return {{"algorithm", kAlgorithm},
+          {"salt", Hex(salt_.data(), salt_.size())},
+          {"operations", operations_},
+          {"memory_bytes", memory_bytes_},
+          {"key", KeyedHash("key", "")}};
+}
+
+std::string FileCipher::KeyedHash(const char* purpose, const std::string& text) const {
+  std::array<unsigned char, crypto_generichash_BYTES> hash{};
+  const std::string named = fmt::format("plumb backup, {}\n{}", purpose, text);
+  ::crypto_generichash(hash.data(), hash.size(), Bytes(named), named.size(), key_.data(),
+                       key_.size());
+  return Hex(hash.data(), hash.size());
+}
+
+std::string FileCipher::Signature(const std::string& text) const {
+  return KeyedHash("signature", text);
+}
+
+FileCipher::Written FileCipher::Seal(const fs::path& from, const fs::path& to,
+                                     const std::string& path, const std::stop_token& stop) const {
+  Pieces pieces(from / path, kPiece);
+  pieces.Begin();
+  Target target(to, path);
+  crypto_secretstream_xchacha20poly1305_state state;
+  std::vector<std::uint8_t> sealed(crypto_secretstream_xchacha20poly1305_HEADERBYTES);
+  ::crypto_secretstream_xchacha20poly1305_init_push(&state, sealed.data(), key_.data());
+  target.Write(sealed);
+  Written written{.plain = {.path = path, .bytes = 0, .sha256 = {}}, .sealed = {}};
+  Sha256 hash;
+  do {
+    CheckStop(stop);
+    const std::vector<std::uint8_t> piece = pieces.Take();
+    sealed.resize(piece.size() + kOverhead);
+    ::crypto_secretstream_xchacha20poly1305_push(
+        &state, sealed.data(), nullptr, piece.data(), piece.size(), Bytes(path), path.size(),
+        pieces.is_last() ? crypto_secretstream_xchacha20poly1305_TAG_FINAL : 0);
+    target.Write(sealed);
+    hash.Add(piece.data(), piece.size());
+    written.plain.bytes += piece.size();
+  } while (!pieces.is_last());
+  ::sodium_memzero(&state, sizeof state);
+  written.sealed = target.Close(to);
+  written.plain.sha256 = hash.Hex();
+  return written;
+}
+
+FileCipher::Written FileCipher::Open(const fs::path& from, const fs::path& to,
+                                     const std::string& path, const std::stop_token& stop) const {
+  const auto fail = [&path] {
+    throw DataError(path + " is not what was encrypted there: it was changed or put together anew");
+  };
+  Pieces pieces(from / path, kPiece + kOverhead);
+  const std::vector<std::uint8_t> header =
+      pieces.Exactly(crypto_secretstream_xchacha20poly1305_HEADERBYTES);
+  crypto_secretstream_xchacha20poly1305_state state;
+  if (header.size() != crypto_secretstream_xchacha20poly1305_HEADERBYTES ||
+      ::crypto_secretstream_xchacha20poly1305_init_pull(&state, header.data(), key_.data()) != 0)
+    fail();
+  pieces.Begin();
+  Target target(to, path);
+  Sha256 sealed_hash;
+  sealed_hash.Add(header.data(), header.size());
+  Written written{.plain = {}, .sealed = {.path = path, .bytes = header.size(), .sha256 = {}}};
+  do {
+    CheckStop(stop);
+    const std::vector<std::uint8_t> piece = pieces.Take();
+    if (piece.size() < kOverhead) fail();
+    std::vector<std::uint8_t> plain(piece.size() - kOverhead);
+    unsigned char tag = 0;
+    if (::crypto_secretstream_xchacha20poly1305_pull(&state, plain.data(), nullptr, &tag,
+                                                     piece.data(), piece.size(), Bytes(path),
+                                                     path.size()) != 0 ||
+        (tag == crypto_secretstream_xchacha20poly1305_TAG_FINAL) != pieces.is_last())
+      fail();
+    target.Write(plain);
+    sealed_hash.Add(piece.data(), piece.size());
+    written.sealed.bytes += piece.size();
+  } while (!pieces.is_last());
+  ::sodium_memzero(&state, sizeof state);
+  written.plain = target.Close(to);
+  written.sealed.sha256 = sealed_hash.Hex();
+  return written;
+}
+
+}  // namespace plumb

@@ -1,0 +1,39 @@
+// The rows of one patient as JSON, for its export and import.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "daemon/records/database.hpp"
+
+namespace plumb {
+
+/// The tables of a patient, in the order in which rows can be inserted.
+inline constexpr const char* kPatientTables[] = {"patients", "sessions", "scans",
+                                                 "results",  "refs",     "scan_files"};
+
+/// A column as the database has it.
+struct ColumnOf {
+  std::string name, type;
+  bool is_required = false;  ///< Must be there: has no default and may not be NULL.
+  bool may_be_null = false;
+};
+[[nodiscard]] std::vector<ColumnOf> ColumnsOf(Database& database, const std::string& table);
+
+/// {"patients": [{"id": 3, "code": "P", ...}], ...}: without what the appliance notes of its own
+/// care for files (`checked_at`), and without a scan that runs.
+[[nodiscard]] nlohmann::ordered_json PatientRows(Database& database, std::int64_t patient);
+/// The log's entries on the patient, its sessions, scans and references, and the last daily check
+/// before each scan.
+[[nodiscard]] nlohmann::ordered_json PatientEvidence(Database& database, std::int64_t patient);
+
+/// Holds rows from outside against the tables: known columns of the right type, bounded numbers and
+/// texts, plans and results that can be read, numbers that refer to rows of the same record.
+/// @throws DataError naming table and column
+void CheckPatientRows(Database& database, const nlohmann::ordered_json& rows);
+
+}  // namespace plumb

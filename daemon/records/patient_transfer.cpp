@@ -1,0 +1,378 @@
+#include "daemon/records/patient_transfer.hpp"
+
+#include <stdlib.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "algo/base/check_stop.hpp"
+#include "algo/base/errors.hpp"
+#include "daemon/records/file_copy.hpp"
+#include "daemon/records/patient_record.hpp"
+#include "daemon/records/schema.hpp"
+#include "daemon/records/store.hpp"
+#include "daemon/records/store_internal.hpp"
+#include "daemon/records/summed_folder.hpp"
+#include "drivers/files/file_io.hpp"
+
+namespace plumb {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+using store::ScanId;
+
+namespace {
+
+constexpr const char* kAbout = "patient.json";
+constexpr const char* kRecord = "record.json";
+constexpr const char* kScans = "scans";
+constexpr const char* kImports = "imports";
+constexpr const char* kImporting = ".import";
+constexpr std::size_t kMaxRecord = std::size_t{256} << 20, kMaxCode = 32;
+const web::Actor kCommand{.user = "command line", .address = ""};
+
+/// "scans/000004/..." gives 4.
+std::optional<std::int64_t> ScanOf(const std::string& path) {
+  const fs::path parts(path);
+  auto part = parts.begin();
+  if (*part++ != kScans || part == parts.end()) return std::nullopt;
+  const std::optional<std::int64_t> scan = store::ParseId(part->string());
+  const bool is_ours = scan && ScanId(*scan) == part->string() && ++part != parts.end();
+  return is_ours ? scan : std::nullopt;
+}
+
+bool MayHold(const std::string& path) { return path == kRecord || ScanOf(path).has_value(); }
+
+const SummedKind kKind{.name = "export", .about_file = kAbout, .format = 1, .may_hold = MayHold};
+
+/// A folder of this process alone, gone with it.
+class PrivateFolder {
+ public:
+  PrivateFolder() {
+    std::string name = fs::temp_directory_path() / "plumb-XXXXXX";
+    if (::mkdtemp(name.data()) == nullptr) throw IoError(DescribeWriteError(name, errno));
+    path_ = name;
+  }
+  ~PrivateFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  PrivateFolder(const PrivateFolder&) = delete;
+  PrivateFolder& operator=(const PrivateFolder&) = delete;
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// Opens what an export is made of: a backup is not changed.
+std::unique_ptr<Database> OpenSource(const fs::path& state) {
+  std::error_code error;
+  const bool is_backup = fs::exists(state / "backup.json", error);
+  if (!fs::is_regular_file(state / "plumb.db", error))
+    throw IoError(
+        fmt::format("cannot export from {}: it holds no plumb.db; name a state folder or "
+                    "a backup",
+                    state.string()));
+  auto database = std::make_unique<Database>(
+      state / "plumb.db", is_backup ? Database::Access::kFrozen : Database::Access::kReadWrite);
+  if (!is_backup) {
+    Migrate(*database);
+    return database;
+  }
+  Statement version = database->Prepare("PRAGMA user_version");
+  if (!version.Step() || version.Integer(0) != kSchemaVersion)
+    throw DataError(fmt::format(
+        "the backup {} is of another version of Plumb: restore it first, and export from there",
+        state.string()));
+  return database;
+}
+
+std::optional<std::int64_t> FindCode(Database& database, const std::string& code) {
+  Statement query =
+      database.Prepare("SELECT id FROM patients WHERE code = ? COLLATE NOCASE AND id > 0");
+  query.Bind(code);
+  return query.Step() ? std::optional(query.Integer(0)) : std::nullopt;
+}
+
+fs::path ImportedFile(const fs::path& state, std::int64_t patient) {
+  return state / kImports / fmt::format("{}.json", patient);
+}
+
+/// What an earlier import said; empty: the patient was made here.
+Json EarlierEvidence(const fs::path& state, std::int64_t patient) {
+  std::error_code error;
+  const fs::path file = ImportedFile(state, patient);
+  if (!fs::exists(file, error)) return nullptr;
+  Json earlier = Json::parse(ReadTextFile(file, kMaxRecord), nullptr, false);
+  if (earlier.is_discarded())
+    throw DataError(fmt::format("{} is damaged: put a backup of it in its place, or move it away",
+                                file.string()));
+  return earlier;
+}
+
+}  // namespace
+
+PatientReport ExportPatient(const fs::path& state, const std::string& code, const fs::path& target,
+                            const std::stop_token& stop, const BackupSecret* secret) {
+  const std::unique_ptr<Database> database = OpenSource(state);
+  const std::optional<std::int64_t> patient = FindCode(*database, code);
+  if (!patient)
+    throw DataError(fmt::format("there is no patient with the code '{}' in {}",
+                                code.substr(0, kMaxCode), state.string()));
+  const Json rows = PatientRows(*database, *patient);
+  const PrivateFolder own;
+  WriteWholeFile(own.path() / kRecord, Json{{"rows", rows},
+                                            {"evidence", PatientEvidence(*database, *patient)},
+                                            {"earlier", EarlierEvidence(state, *patient)}}
+                                           .dump(1, ' ', false, Json::error_handler_t::replace));
+  SummedWriter output(target, kKind, {"export", kAbout, {kAbout, "SHA256SUMS", kRecord, kScans}},
+                      secret, stop);
+  output.AddOwn(own.path(), kRecord);
+  std::map<std::string, std::string> found;
+  for (const Json& scan : rows["scans"]) {
+    if (scan["has_folder"] == 0) continue;
+    for (const std::string& file : FilesBelow(state, state / kScans / ScanId(scan["id"])))
+      found[file] = output.Add(state, file);
+  }
+  for (const Json& file : rows["scan_files"]) {
+    const std::string path =
+        fmt::format("{}/{}/{}", kScans, ScanId(file["scan_id"]), file["path"].get<std::string>());
+    if (file["path"] == kRecordingFolder) continue;  // its own check tells
+    if (const auto copy = found.find(path); copy == found.end() || copy->second != file["sha256"])
+      output.Tell(path + (copy == found.end() ? " is missing" : " is not what was stored"));
+  }
+  output.Commit({{"scans", rows["scans"].size()}, {"references", rows["refs"].size()}});
+  return {.code = rows["patients"][0]["code"],
+          .scans = rows["scans"].size(),
+          .references = rows["refs"].size(),
+          .files = output.files(),
+          .bytes = output.bytes(),
+          .problems = output.problems()};
+}
+
+/// One export that is being put into a store.
+class PatientImport {
+ public:
+  PatientImport(const fs::path& folder, const fs::path& state, const BackupSecret* secret,
+                std::stop_token stop)
+      : reader_(folder, kKind, secret), store_(state), stop_(std::move(stop)) {}
+  ~PatientImport() {
+    std::error_code ignored;
+    fs::remove_all(Made(), ignored);
+  }
+  PatientImport(const PatientImport&) = delete;
+  PatientImport& operator=(const PatientImport&) = delete;
+
+  PatientReport Import() {
+    if (reader_.files().empty() || reader_.files().front().path != kRecord)
+      reader_.Fail(fmt::format("it holds no {}", kRecord));
+    reader_.Verify(stop_);
+    fs::remove_all(Made());  // of an import that was interrupted
+    fs::create_directory(Made());
+    ::chmod(Made().c_str(), 0700);
+    ReadRecord();
+    if (IsThere()) {
+      report_.was_there = true;
+      return report_;
+    }
+    CopyFiles();
+    Insert();
+    return report_;
+  }
+
+ private:
+  [[nodiscard]] fs::path Made() const { return store_.folder_ / kImporting; }
+
+  void ReadRecord() {
+    (void)reader_.CopyTo(Made(), reader_.files().front(), stop_);
+    record_ = Json::parse(ReadTextFile(Made() / kRecord, kMaxRecord), nullptr, false);
+    try {
+      if (!record_.is_object()) throw DataError(fmt::format("its {} cannot be read", kRecord));
+      CheckPatientRows(*store_.write_, record_.value("rows", Json()));
+    } catch (const DataError& error) {
+      reader_.Fail(error.what());
+    }
+    const Json& patient = rows().at("patients")[0];
+    report_.code = patient.value("code", "");
+    const bool is_code = !report_.code.empty() && report_.code.size() <= kMaxCode &&
+                         report_.code.find_first_not_of(
+                             "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                             "abcdefghijklmnopqrstuvwxyz"
+                             "0123456789.-_") == std::string::npos;
+    if (!is_code) reader_.Fail("its record has a code that none can have");
+    report_.scans = rows().at("scans").size();
+    report_.references = rows().at("refs").size();
+  }
+
+  [[nodiscard]] const Json& rows() const { return record_.at("rows"); }
+
+  /// @throws std::invalid_argument if somebody else, or other data, is.
+  bool IsThere() {
+    const std::optional<std::int64_t> patient = FindCode(*store_.write_, report_.code);
+    if (!patient) return false;
+    if (PatientRows(*store_.write_, *patient) == rows()) return true;  // where it was exported
+    const Json earlier = EarlierEvidence(store_.folder_, *patient);
+    if (earlier.is_object() && earlier.value("rows", Json()) == rows()) return true;
+    throw std::invalid_argument(fmt::format(
+        "there is a patient with the code {} already, and not with the same data: nothing was "
+        "imported. Give one of them another code where it was exported",
+        report_.code));
+  }
+
+  void CopyFiles() {
+    std::map<std::int64_t, bool> keeps_files;
+    for (const Json& scan : rows().at("scans"))
+      keeps_files[scan.at("id")] = scan.value("has_folder", 0) != 0;
+    for (const FileDigest& file : reader_.files()) {
+      CheckStop(stop_);
+      const std::optional<std::int64_t> scan = ScanOf(file.path);
+      if (scan && !keeps_files[*scan])
+        reader_.Fail(fmt::format("{} belongs to no scan of its record", file.path));
+      report_.bytes += scan ? reader_.CopyTo(Made(), file, stop_).bytes : 0;
+      ++report_.files;
+    }
+    SyncDisk(store_.folder_);
+  }
+
+  void Insert() {
+    const std::lock_guard lock(store_.write_mutex_);
+    std::vector<fs::path> moved;
+    try {
+      Transaction transaction(*store_.write_);
+      InsertRows();
+      const std::int64_t patient = new_ids_["patients"].begin()->second;
+      for (const auto& [before, now] : new_ids_["scans"]) {
+        const fs::path from = Made() / kScans / ScanId(before), to = store_.ScanFolder(ScanId(now));
+        if (!fs::exists(from)) continue;
+        if (::rename(from.c_str(), to.c_str()) != 0) throw IoError(DescribeWriteError(to, errno));
+        moved.push_back(to);
+      }
+      fs::create_directories(store_.folder_ / kImports);
+      moved.push_back(ImportedFile(store_.folder_, patient));
+      WriteWholeFile(moved.back(), record_.dump(1, ' ', false, Json::error_handler_t::replace));
+      GiveToOwner(moved);
+      SyncDisk(store_.folder_);
+      store_.Write(kCommand, "patient.import", std::to_string(patient),
+                   fmt::format("{}: {} scans, {} references as drafts, sha256 {}", report_.code,
+                               report_.scans, report_.references, reader_.digest()));
+      transaction.Commit();
+    } catch (const ConstraintBroken& error) {
+      Remove(moved);
+      reader_.Fail(fmt::format("its record breaks a rule of the database: {}", error.what()));
+    } catch (const fs::filesystem_error& error) {
+      Remove(moved);
+      throw IoError(DescribeWriteError(store_.folder_, error.code().value()));
+    } catch (...) {
+      Remove(moved);
+      throw;
+    }
+  }
+
+  static void Remove(const std::vector<fs::path>& moved) {
+    std::error_code ignored;
+    for (const fs::path& path : moved) fs::remove_all(path, ignored);
+  }
+
+  /// Who imports as root imports for the account that runs plumbd.
+  void GiveToOwner(const std::vector<fs::path>& moved) const {
+    struct stat owner {};
+    if (::geteuid() != 0 || ::stat(store_.folder_.c_str(), &owner) != 0 || owner.st_uid == 0)
+      return;
+    const auto give = [&owner](const fs::path& path) {
+      if (::lchown(path.c_str(), owner.st_uid, owner.st_gid) != 0)
+        throw IoError(DescribeWriteError(path, errno));
+    };
+    give(store_.folder_ / kImports);
+    for (const fs::path& path : moved) {
+      give(path);
+      if (!fs::is_directory(path)) continue;
+      for (const fs::directory_entry& entry : fs::recursive_directory_iterator(path))
+        give(entry.path());
+    }
+  }
+
+  void InsertRows() {
+    for (const char* table : kPatientTables) {
+      const std::vector<ColumnOf> columns = ColumnsOf(*store_.write_, table);
+      for (const Json& row : rows().at(table)) InsertRow(table, columns, row);
+    }
+    // A scan and the reference that it was compared with name each other.
+    for (const Json& scan : rows().at("scans")) {
+      if (!scan.contains("reference_id") || scan["reference_id"].is_null()) continue;
+      store_.write_->Prepare("UPDATE scans SET reference_id = ? WHERE id = ?")
+          .Bind(new_ids_["refs"].at(scan["reference_id"]))
+          .Bind(new_ids_["scans"].at(scan["id"]))
+          .Run();
+    }
+  }
+
+  void InsertRow(const std::string& table, const std::vector<ColumnOf>& columns, const Json& row) {
+    std::string names, marks;
+    std::vector<Json> values;
+    for (const ColumnOf& column : columns) {
+      if (column.name == "id" || !row.contains(column.name)) continue;
+      names += (names.empty() ? "" : ", ") + column.name;
+      marks += marks.empty() ? "?" : ", ?";
+      values.push_back(ValueHere(table, column.name, row));
+    }
+    // The database keeps a statement by the address of its text.
+    const std::string sql = fmt::format("INSERT INTO {} ({}) VALUES ({})", table, names, marks);
+    Statement insert = store_.write_->Prepare(statements_.insert(sql).first->c_str());
+    for (const Json& value : values) {
+      if (value.is_null()) {
+        insert.BindNull();
+      } else if (value.is_string()) {
+        insert.Bind(std::string_view(value.get_ref<const std::string&>()));
+      } else if (value.is_number_integer()) {
+        insert.Bind(value.get<std::int64_t>());
+      } else {
+        insert.Bind(value.get<double>());
+      }
+    }
+    insert.Run();
+    if (row.contains("id")) new_ids_[table][row["id"]] = store_.write_->last_id();
+  }
+
+  /// A value as it is in this store: with its numbers, and with nothing that was decided elsewhere.
+  Json ValueHere(const std::string& table, const std::string& column, const Json& row) {
+    const Json& value = row[column];
+    if (column == "patient_id") return new_ids_["patients"].at(value);
+    if (column == "scan_id") return new_ids_["scans"].at(value);
+    if (column == "session_id" && !value.is_null()) return new_ids_["sessions"].at(value);
+    if (column == "reference_id") return nullptr;  // put in once the references are there
+    if (table == "refs" && column == "approved_by") return "";
+    if (table == "refs" && column == "approved_at") return nullptr;
+    if (table == "patients" && column == "wiping") return 0;
+    if (table == "sessions" && column == "closed_at" && value.is_null()) return row["opened_at"];
+    return value;
+  }
+
+  SummedReader reader_;
+  std::set<std::string> statements_;  // outlives the store, which keeps the compiled ones
+  Store store_;
+  std::stop_token stop_;
+  Json record_;
+  PatientReport report_;
+  std::map<std::string, std::map<std::int64_t, std::int64_t>> new_ids_;  ///< Of each table.
+};
+
+PatientReport ImportPatient(const fs::path& folder, const fs::path& state,
+                            const std::stop_token& stop, const BackupSecret* secret) {
+  std::error_code error;
+  if (!fs::is_regular_file(state / "plumb.db", error))
+    throw IoError(
+        fmt::format("cannot import into {}: it holds no plumb.db; name the state folder "
+                    "of a plumbd that has run",
+                    state.string()));
+  return PatientImport(folder, state, secret, stop).Import();
+}
+
+}  // namespace plumb
