@@ -196,6 +196,9 @@ void Appliance::BeginSession() {
   scan_.purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
   scan_.started = Clock::now();
   ScanJob job = MakeJob(settings);
+  if (job.is_reference) {
+    if (const std::string why = WhyNoReference(); !why.empty()) throw DataError(why);
+  }
   const NewScan record{.patient_id = scan_.patient_id,
                        .reference_id = scan_.reference_id,
                        .purpose = scan_.purpose,

@@ -74,6 +74,10 @@ class Appliance {
   /// Asked before each scan: a reason why none may begin now, or nothing.
   void SetHindrance(std::function<std::string()> hindrance) { hindrance_ = std::move(hindrance); }
   /// The session that the store has opened: scans belong to it until it is closed.
+  /// Why no reference may be scanned or approved now, with the next step: no daily check has passed
+  /// today. Empty: it may, as always in the demo. @param scan_was_overdue  When the scan that is to
+  /// be the reference was taken.
+  [[nodiscard]] std::string WhyNoReference(bool scan_was_overdue = false);
   void OpenSession(const std::string& session_id, const std::string& patient_id,
                    web::ScanPurpose purpose, const std::string& reason, const web::Actor& actor);
   /// The session is over, in the store too. Not while a scan runs.

@@ -333,10 +333,24 @@ bool Appliance::IsCheckOverdue() {
   return !store_->HasPassedCheckSince(StartOfDay(), sensors_->snapshot().sensor.serial);
 }
 
+std::string Appliance::WhyNoReference(bool scan_was_overdue) {
+  if (!parts_.demo_patient.empty() || store_ == nullptr) return {};
+  if (IsCheckOverdue()) {
+    return "the daily check is overdue, and references need one that has passed today: open Daily "
+           "check, sweep over all markers of the room, then go on here";
+  }
+  if (scan_was_overdue) {
+    return "this scan was taken while the daily check was overdue: scan the reference again, now "
+           "that the check has passed";
+  }
+  return {};
+}
+
 void Appliance::ReadStored(web::Status& status) {
   if (store_ == nullptr) return;
   try {
     status.check_overdue = IsCheckOverdue();
+    status.reference_block = WhyNoReference();
     status.session = store_->OpenedSession();
     if (status.session && status.session->id != session_id_) status.session.reset();
     status.waiting = store_->WaitingReferences();

@@ -23,6 +23,7 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/notice.hpp"
+#include "algo/base/pose.hpp"
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/control_desk.hpp"
 #include "daemon/appliance/panel.hpp"
@@ -92,6 +93,14 @@ void AddOptions(CLI::App& app, Options& options) {
   app.footer(fmt::format("\n{}", kResearchNotice));
 }
 
+/// The simulated room: the reference marker's x axis runs from head to feet of a body that lies on
+/// its back, its z axis is up, and the head points to the gantry.
+Pose SimulatedRoom() {
+  Pose T_iec_reference = Pose::Identity();
+  T_iec_reference.linear() << 0, 1, 0, -1, 0, 0, 0, 0, 1;
+  return T_iec_reference;
+}
+
 Config ReadConfiguration(const Options& options, const SensorRegistry& registry) {
   Config config;
   std::error_code ignored;
@@ -101,7 +110,10 @@ Config ReadConfiguration(const Options& options, const SensorRegistry& registry)
              fs::exists(kDefaultConfig, ignored)) {
     config = ReadConfig(kDefaultConfig, ConfigUse::kAppliance);
   }
-  if (options.simulated.empty()) RefuseResearchPresets(config);
+  if (options.simulated.empty())
+    RefuseResearchPresets(config);
+  else if (!config.compare.T_iec_reference)
+    config.compare.T_iec_reference = SimulatedRoom();
   if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
   CheckPageIdentity(config.web);
   (void)registry.Choose(config.appliance.sensor_driver, !options.simulated.empty());

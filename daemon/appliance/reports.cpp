@@ -195,6 +195,7 @@ std::string CourseReportPdf(Store& store, const web::Patient& patient) {
                              .rows = {},
                              .footer = Footer()};
   std::vector<web::Scan> scans = store.Scans(patient.id, kMaxScans);
+  bool is_any_overdue = false;
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != web::ScanOutcome::kDone) continue;
     CourseRow row{.fraction = scan->fraction > 0 ? fmt::format("{}", scan->fraction) : "-",
@@ -202,11 +203,16 @@ std::string CourseReportPdf(Store& store, const web::Patient& patient) {
                   .verdict = VerdictOf(*scan),
                   .accepted = scan->accepted_by,
                   .values = {}};
+    if (scan->check_overdue) {
+      row.verdict += " *";
+      is_any_overdue = true;
+    }
     if (!scan->accepted_reason.empty()) row.accepted += ": " + scan->accepted_reason;
     if (scan->result && scan->result->verdict != "no_answer")
       row.values = ValuesOf(scan->result->correction);
     report.rows.push_back(std::move(row));
   }
+  if (is_any_overdue) report.identity.emplace_back("* Daily check", "overdue at this scan");
   return PdfOf(report);
 }
 

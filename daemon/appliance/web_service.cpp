@@ -197,6 +197,18 @@ void WebService::AddPatient(const web::Actor& actor, const std::string& code,
   Change(std::move(done), [=](Store& store) { return store.AddPatient(actor, code, site); });
 }
 
+void WebService::ChangePatient(const web::Actor& actor, const std::string& id,
+                               const std::string& site, const std::string& note, web::Done done) {
+  Change(std::move(done),
+         [=](Store& store) { return store.ChangePatient(actor, id, site, note), std::string(); });
+}
+
+void WebService::ArchivePatient(const web::Actor& actor, const std::string& id, bool archived,
+                                web::Done done) {
+  Change(std::move(done),
+         [=](Store& store) { return store.ArchivePatient(actor, id, archived), std::string(); });
+}
+
 void WebService::WipePatient(const web::Actor& actor, const std::string& id, web::Done done) {
   const web::Status status = appliance_.WebStatus();
   if (status.scan && status.scan->patient_id == id) {
@@ -237,6 +249,10 @@ void WebService::OpenPatient(const web::Actor& actor, const std::string& id,
   }
   if (const std::string why = WhyNotOpen(appliance_.state().phase, *patient, purpose); !why.empty())
     return done(AnswerOf(why));
+  if (purpose == web::ScanPurpose::kReference) {
+    if (const std::string why = appliance_.WhyNoReference(); !why.empty())
+      return done(AnswerOf(why));
+  }
   const auto open = appliance_.WebStatus().session;
   if (open && open->patient_id == id && open->purpose == purpose &&
       purpose == web::ScanPurpose::kFraction) {
@@ -276,6 +292,9 @@ std::optional<web::Reference> WebService::FindReference(const std::string& id) {
 
 void WebService::AddReference(const web::Actor& actor, const std::string& scan_id,
                               const std::string& reason, web::Done done) {
+  const std::optional<web::Scan> scan = FindScan(scan_id);
+  if (const std::string why = appliance_.WhyNoReference(scan && scan->check_overdue); !why.empty())
+    return done(AnswerOf(why));
   Change(std::move(done), [=, appliance = &appliance_](Store& store) {
     return store.AddReference(actor, scan_id, reason, appliance->DefaultPlan());
   });
@@ -289,6 +308,11 @@ void WebService::PlanReference(const web::Actor& actor, const std::string& id, i
 }
 void WebService::ApproveReference(const web::Actor& actor, const std::string& id, int revision,
                                   const std::string& digest, web::Done done) {
+  const std::optional<web::Reference> reference = FindReference(id);
+  const std::optional<web::Scan> scan =
+      reference ? FindScan(reference->scan_id) : std::optional<web::Scan>();
+  if (const std::string why = appliance_.WhyNoReference(scan && scan->check_overdue); !why.empty())
+    return done(AnswerOf(why));
   Change(std::move(done), [=](Store& store) {
     return store.ApproveReference(actor, id, revision, digest), std::string();
   });
@@ -431,6 +455,21 @@ std::vector<web::AuditEntry> WebService::Audit(std::int64_t before, int limit) {
   return Read<std::vector<web::AuditEntry>>(
       [&](Store& store) { return store.Audit(before, limit); }, {});
 }
+std::vector<web::PlanTemplate> WebService::Templates() {
+  return Read<std::vector<web::PlanTemplate>>([](Store& store) { return store.Templates(); }, {});
+}
+
+void WebService::SetTemplate(const web::Actor& actor, const web::PlanTemplate& wanted,
+                             web::Done done) {
+  Change(std::move(done),
+         [=](Store& store) { return store.SetTemplate(actor, wanted), std::string(); });
+}
+
+void WebService::RemoveTemplate(const web::Actor& actor, const std::string& site, web::Done done) {
+  Change(std::move(done),
+         [=](Store& store) { return store.RemoveTemplate(actor, site), std::string(); });
+}
+
 web::Settings WebService::GetSettings() {
   return Read<web::Settings>([](Store& store) { return store.GetSettings(); }, {});
 }

@@ -37,6 +37,10 @@ class WebService : public web::ScanService {
   [[nodiscard]] std::optional<web::Patient> FindPatient(const std::string& id) override;
   void AddPatient(const web::Actor& actor, const std::string& code, const std::string& site,
                   web::Done done) override;
+  void ChangePatient(const web::Actor& actor, const std::string& id, const std::string& site,
+                     const std::string& note, web::Done done) override;
+  void ArchivePatient(const web::Actor& actor, const std::string& id, bool archived,
+                      web::Done done) override;
   void WipePatient(const web::Actor& actor, const std::string& id, web::Done done) override;
   void OpenPatient(const web::Actor& actor, const std::string& id, web::ScanPurpose purpose,
                    const std::string& reason, const std::string& replaces, web::Done done) override;
@@ -82,6 +86,10 @@ class WebService : public web::ScanService {
   void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
            const std::string& detail) override;
   [[nodiscard]] std::vector<web::AuditEntry> Audit(std::int64_t before, int limit) override;
+  [[nodiscard]] std::vector<web::PlanTemplate> Templates() override;
+  void SetTemplate(const web::Actor& actor, const web::PlanTemplate& wanted,
+                   web::Done done) override;
+  void RemoveTemplate(const web::Actor& actor, const std::string& site, web::Done done) override;
   [[nodiscard]] web::Settings GetSettings() override;
   void ChangeSettings(const web::Actor& actor, const web::Settings& settings,
                       web::Done done) override;

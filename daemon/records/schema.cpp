@@ -151,8 +151,22 @@ UPDATE scans SET has_folder = 1, unavailable = failure, failure = ''
   WHERE outcome = 'done' AND has_folder = 0;
 )sql";
 
+// What people note of a course, patients that are out of the list, and what plans begin with.
+constexpr const char* kVersion6 = R"sql(
+ALTER TABLE patients ADD COLUMN note TEXT NOT NULL DEFAULT '';
+ALTER TABLE patients ADD COLUMN archived INTEGER NOT NULL DEFAULT 0;
+CREATE TABLE templates (
+  site TEXT PRIMARY KEY COLLATE NOCASE,
+  width_mm REAL NOT NULL,
+  height_mm REAL NOT NULL,
+  shift_mm REAL NOT NULL,
+  rotation_deg REAL NOT NULL,
+  changed_by TEXT NOT NULL
+) STRICT;
+)sql";
+
 constexpr std::array<const char*, kSchemaVersion> kSteps = {kVersion1, kVersion2, kVersion3,
-                                                            kVersion4, kVersion5};
+                                                            kVersion4, kVersion5, kVersion6};
 
 }  // namespace
 

@@ -67,7 +67,7 @@ constexpr const char* kPatientColumns =
     " (SELECT count(*) FROM scans WHERE scans.patient_id = patients.id AND outcome = 'done'),"
     " (SELECT id FROM refs WHERE refs.patient_id = patients.id AND approved_by = '' AND version > "
     "   (SELECT ifnull(max(version), 0) FROM refs AS r WHERE r.patient_id = patients.id AND "
-    "r.approved_by <> '') ORDER BY version DESC LIMIT 1) FROM patients ";
+    "r.approved_by <> '') ORDER BY version DESC LIMIT 1), note, archived FROM patients ";
 
 web::Patient ReadPatient(const Statement& row) {
   return {.id = row.Text(0),
@@ -76,7 +76,9 @@ web::Patient ReadPatient(const Statement& row) {
           .created_at = FromStored(row.Integer(3)),
           .approved_reference_id = row.Text(4),
           .num_scans = row.Integer(5),
-          .draft_reference_id = row.Text(6)};
+          .draft_reference_id = row.Text(6),
+          .note = row.Text(7),
+          .archived = row.Integer(8) != 0};
 }
 
 /// SHA-256 of what an approval signs.
@@ -191,6 +193,43 @@ std::string Store::AddPatient(const web::Actor& actor, const std::string& code,
   Write(actor, "patient.add", id, "");
   transaction.Commit();
   return id;
+}
+
+void Store::ChangePatient(const web::Actor& actor, const std::string& id, const std::string& site,
+                          const std::string& note) {
+  const std::int64_t number = RequireId(id, "patient");
+  const std::lock_guard lock(write_mutex_);
+  Transaction transaction(*write_);
+  write_->Prepare("UPDATE patients SET site = ?, note = ? WHERE id = ? AND id > 0")
+      .Bind(site)
+      .Bind(note)
+      .Bind(number)
+      .Run();
+  if (write_->num_changed() == 0)
+    throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
+  Write(actor, "patient.change", id, "site and note");  // never their text
+  transaction.Commit();
+}
+
+void Store::ArchivePatient(const web::Actor& actor, const std::string& id, bool archived) {
+  const std::int64_t number = RequireId(id, "patient");
+  const std::lock_guard lock(write_mutex_);
+  Transaction transaction(*write_);
+  {
+    Statement query =
+        write_->Prepare("SELECT 1 FROM sessions WHERE patient_id = ? AND closed_at IS NULL");
+    if (archived && query.Bind(number).Step())
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "the session of this patient is open: close it first");
+  }
+  write_->Prepare("UPDATE patients SET archived = ? WHERE id = ? AND id > 0")
+      .Bind(std::int64_t{archived})
+      .Bind(number)
+      .Run();
+  if (write_->num_changed() == 0)
+    throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
+  Write(actor, archived ? "patient.archive" : "patient.unarchive", id, "");
+  transaction.Commit();
 }
 
 void Store::WipePatient(const web::Actor& actor, const std::string& id) {

@@ -123,6 +123,10 @@ class Store {
   [[nodiscard]] std::optional<web::Patient> FindPatient(const std::string& id);
   [[nodiscard]] std::optional<web::Patient> FindPatientByCode(const std::string& code);
   std::string AddPatient(const web::Actor& actor, const std::string& code, const std::string& site);
+  void ChangePatient(const web::Actor& actor, const std::string& id, const std::string& site,
+                     const std::string& note);
+  /// kConflict while a session of the patient is open.
+  void ArchivePatient(const web::Actor& actor, const std::string& id, bool archived);
   void WipePatient(const web::Actor& actor, const std::string& id);
 
   // --- treatment sessions, screens in the room
@@ -153,6 +157,11 @@ class Store {
   /// demo's "auto".
   void ApproveReference(const web::Actor& actor, const std::string& id, int revision,
                         const std::string& digest = {}, bool two_users = true);
+
+  [[nodiscard]] std::vector<web::PlanTemplate> Templates();  ///< By site.
+  /// In place of the one of that site. kConflict above 100 sites.
+  void SetTemplate(const web::Actor& actor, const web::PlanTemplate& wanted);
+  void RemoveTemplate(const web::Actor& actor, const std::string& site);
 
   // --- scans
   [[nodiscard]] std::vector<web::Scan> Scans(const std::string& patient_id, int limit);

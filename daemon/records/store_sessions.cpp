@@ -37,9 +37,12 @@ std::string Store::OpenSession(const web::Actor& actor, const std::string& patie
     Statement query = write_->Prepare(
         "SELECT (SELECT count(*) FROM sessions WHERE patient_id = patients.id AND purpose = "
         "'fraction' AND EXISTS (SELECT 1 FROM scans JOIN results ON scan_id = scans.id WHERE "
-        "session_id = sessions.id)) FROM patients WHERE id = ?");
+        "session_id = sessions.id)), archived FROM patients WHERE id = ?");
     if (!patient || !query.Bind(*patient).Step())
       throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
+    if (query.Integer(1) != 0)
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "this patient is archived: take it out of the archive first");
     if (purpose == web::ScanPurpose::kFraction) fraction = 1 + query.Integer(0);
   }
   write_
@@ -87,7 +90,8 @@ std::vector<web::WaitingReference> Store::WaitingReferences() {
   const std::lock_guard lock(read_mutex_);
   Statement query = read_->Prepare(
       "SELECT refs.id, patient_id, code, version FROM refs JOIN patients ON patients.id = "
-      "patient_id WHERE approved_by = '' AND version > (SELECT ifnull(max(version), 0) FROM refs "
+      "patient_id WHERE archived = 0 AND approved_by = '' AND version > (SELECT "
+      "ifnull(max(version), 0) FROM refs "
       "AS r WHERE r.patient_id = refs.patient_id AND r.approved_by <> '') AND NOT EXISTS (SELECT 1 "
       "FROM refs AS newer WHERE newer.patient_id = refs.patient_id AND newer.version > "
       "refs.version) ORDER BY refs.id DESC LIMIT 20");

@@ -87,9 +87,13 @@ TEST_F(DaemonScanTest, TheResultIsTheSameWhenTheRecordingIsComputedAgain) {
     EXPECT_EQ(ReadTextFile(folder_ / id / "trajectory.txt", 1 << 20), live_poses)
         << id << ": the same frames, the same poses to the last digit";
   }
+  // The simulated room's axes, which plumbd takes by itself: the head points to the gantry.
+  WriteWholeFile(folder_ / "room.toml",
+                 std::string_view("[iec]\nT_iec_reference = [[0, 1, 0, 0], [-1, 0, 0, 0], "
+                                  "[0, 0, 1, 0], [0, 0, 0, 1]]\n"));
   const RunResult compared =
       plumb::Run({PLUMB_BINARY, "compare", folder_ / "000001", folder_ / "000002", "--out",
-                  folder_ / "result", "--json"});
+                  folder_ / "result", "--config", folder_ / "room.toml", "--json"});
   ASSERT_EQ(compared.exit_code, 0) << compared.err;
   const json replayed = json::parse(compared.out)["correction"];
   for (const char* name : kSixNumbers) {
@@ -97,6 +101,8 @@ TEST_F(DaemonScanTest, TheResultIsTheSameWhenTheRecordingIsComputedAgain) {
                 std::string(name).ends_with("deg") ? 0.05 : 0.5)
         << name;
   }
+  const json body = json::parse(compared.out)["body"];
+  EXPECT_EQ(body["named_by"], "posture") << "the demo lies head first supine, along the couch";
 }
 
 TEST_F(DaemonScanTest, ASweepEndsByItselfWhenNothingNewIsSeen) {

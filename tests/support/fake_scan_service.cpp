@@ -213,7 +213,10 @@ void FakeScanService::EndCheck() {
   check.user = checker_;
   check.sensor_serial = status.sensor.serial;
   checks.checks.insert(checks.checks.begin(), check);
-  if (check.status == "passed") checks.overdue = false;
+  if (check.status == "passed") {
+    checks.overdue = false;
+    status.reference_block.clear();
+  }
   status.last_check = check;
   status.check_overdue = checks.overdue;
   status.scan.reset();
@@ -331,6 +334,47 @@ void FakeScanService::AddPatient(const Actor& actor, const std::string& code,
   Did(actor, "patient.add", patients.back().id, done, patients.back().id);
 }
 
+void FakeScanService::SetTemplate(const Actor& actor, const PlanTemplate& wanted, Done done) {
+  std::erase_if(templates, [&](const PlanTemplate& old) {
+    return strcasecmp(old.site.c_str(), wanted.site.c_str()) == 0;
+  });
+  templates.push_back(wanted);
+  templates.back().changed_by = actor.user;
+  Did(actor, "template.set", "", done);
+}
+
+void FakeScanService::RemoveTemplate(const Actor& actor, const std::string& site, Done done) {
+  if (std::erase_if(templates, [&](const PlanTemplate& old) {
+        return strcasecmp(old.site.c_str(), site.c_str()) == 0;
+      }) == 0)
+    return Finish(done, Refusal(ChangeResult::kNotFound, "there is no template of this site"));
+  Did(actor, "template.remove", "", done);
+}
+
+void FakeScanService::ChangePatient(const Actor& actor, const std::string& id,
+                                    const std::string& site, const std::string& note, Done done) {
+  for (Patient& patient : patients) {
+    if (patient.id != id) continue;
+    patient.site = site;
+    patient.note = note;
+    return Did(actor, "patient.change", id, done);
+  }
+  Finish(done, Refusal(ChangeResult::kNotFound, "there is no such patient"));
+}
+
+void FakeScanService::ArchivePatient(const Actor& actor, const std::string& id, bool archived,
+                                     Done done) {
+  for (Patient& patient : patients) {
+    if (patient.id != id) continue;
+    if (archived && status.session && status.session->patient_id == id)
+      return Finish(done, Refusal(ChangeResult::kConflict,
+                                  "the session of this patient is open: close it first"));
+    patient.archived = archived;
+    return Did(actor, archived ? "patient.archive" : "patient.unarchive", id, done);
+  }
+  Finish(done, Refusal(ChangeResult::kNotFound, "there is no such patient"));
+}
+
 void FakeScanService::WipePatient(const Actor& actor, const std::string& id, Done done) {
   if (std::erase_if(patients, [&](const Patient& patient) { return patient.id == id; }) == 0) {
     return Finish(done, Refusal(ChangeResult::kNotFound, "no such patient"));
@@ -355,6 +399,11 @@ void FakeScanService::OpenPatient(const Actor& actor, const std::string& id, Sca
                                 "this patient has no approved reference; take one first"));
   }
   if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running"));
+  if (patient->archived)
+    return Finish(done, Refusal(ChangeResult::kConflict,
+                                "this patient is archived: take it out of the archive first"));
+  if (purpose == ScanPurpose::kReference && !status.reference_block.empty())
+    return Finish(done, Refusal(ChangeResult::kConflict, status.reference_block));
   CloseCheck();
   if (status.session && status.session->patient_id == id && status.session->purpose == purpose) {
     const std::string same = status.session->id;
@@ -480,6 +529,8 @@ void FakeScanService::ApproveReference(const Actor& actor, const std::string& id
                                   [&](const Reference& reference) { return reference.id == id; });
   if (found == references.end())
     return Finish(done, Refusal(ChangeResult::kNotFound, "no such reference"));
+  if (!status.reference_block.empty())
+    return Finish(done, Refusal(ChangeResult::kConflict, status.reference_block));
   if (!found->approved_by.empty())
     return Finish(done, Refusal(ChangeResult::kConflict, "this reference is approved already"));
   if (found->revision != revision)

@@ -85,6 +85,21 @@ class FakeScanService : public web::ScanService {
   std::optional<web::Patient> FindPatient(const std::string& id) override;
   void AddPatient(const web::Actor& actor, const std::string& code, const std::string& site,
                   web::Done done) override;
+  /// No check has passed today; `block` as in Status::reference_block. Empty: one has.
+  void SetOverdue(const std::string& block) {
+    checks.overdue = status.check_overdue = !block.empty();
+    status.reference_block = block;
+    Tell(web::EventKind::kStatus);
+  }
+  std::vector<web::PlanTemplate> templates;
+  [[nodiscard]] std::vector<web::PlanTemplate> Templates() override { return templates; }
+  void SetTemplate(const web::Actor& actor, const web::PlanTemplate& wanted,
+                   web::Done done) override;
+  void RemoveTemplate(const web::Actor& actor, const std::string& site, web::Done done) override;
+  void ChangePatient(const web::Actor& actor, const std::string& id, const std::string& site,
+                     const std::string& note, web::Done done) override;
+  void ArchivePatient(const web::Actor& actor, const std::string& id, bool archived,
+                      web::Done done) override;
   void WipePatient(const web::Actor& actor, const std::string& id, web::Done done) override;
   void OpenPatient(const web::Actor& actor, const std::string& id, web::ScanPurpose purpose,
                    const std::string& reason, const std::string& replaces, web::Done done) override;

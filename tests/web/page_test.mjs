@@ -94,6 +94,22 @@ await h.step('a physicist plans, a second one approves', async () => {
   const scrolled = await map.boundingBox();
   await bob.mouse.click(scrolled.x + 0.5 * scrolled.width, scrolled.y + 0.5 * scrolled.height);
   check(Number(await bob.getByLabel('Isocentre z').inputValue()) > 0.02, 'the isocentre lies on the body');
+  // The site's template: made of what is here, used again after it was cleared.
+  await bob.getByText('There is no template for this site yet.').waitFor();
+  await bob.getByLabel('Shifts (mm)').fill('4');
+  await bob.getByRole('button', { name: 'Keep this size and tolerance as the template' }).click();
+  await bob.getByText(/^Region \d+(\.\d+)? × \d+(\.\d+)? cm \(x × y\) about the isocentre, ±4 mm, ±1°/).waitFor();
+  const size = (await h.api(bob, 'templates')).body.templates[0];
+  equal(size.site, 'thorax', 'of the site of the patient');
+  await bob.getByRole('button', { name: 'Clear the region' }).click();
+  await bob.getByLabel('Shifts (mm)').fill('3');
+  await bob.getByRole('button', { name: 'Use the template' }).click();
+  await bob.getByText('4 corners').waitFor();
+  equal(await bob.getByLabel('Shifts (mm)').inputValue(), '4', 'its tolerance');
+  await bob.getByRole('button', { name: 'Undo' }).click();
+  await bob.getByRole('button', { name: 'Undo' }).click();
+  await bob.getByLabel('Shifts (mm)').fill('3');
+  await bob.getByText('4 corners').waitFor();
   await h.look(bob, 'plan');
   await bob.getByRole('button', { name: 'Save plan' }).click();
   await bob.getByRole('status').getByText('Plan saved.').waitFor({ state: 'attached' });
@@ -110,6 +126,14 @@ await h.step('a physicist plans, a second one approves', async () => {
   await clara.getByText('There are unsaved changes.').waitFor();
   await clara.getByLabel('Shifts (mm)').fill('3');
   equal(await review.getAttribute('aria-disabled'), null, 'what is stored can be approved');
+  // Without today's check nothing is approved, and the screen says what to do.
+  h.tell('overdue');
+  await clara.getByText('The daily check is overdue').waitFor();
+  equal(await review.getAttribute('aria-disabled'), 'true', 'no approval while the check is overdue');
+  await h.look(clara, 'plan-overdue', { axe: false });
+  h.tell('checked');
+  await clara.getByText('The daily check is overdue').waitFor({ state: 'detached' });
+  equal(await review.getAttribute('aria-disabled'), null, 'it can be approved again');
   await review.click();
   const signed = clara.getByRole('region', { name: 'You sign exactly this' });
   await signed.getByText('4 corners').waitFor();

@@ -1,12 +1,13 @@
 // The real HTTP server over a fake appliance whose scans show real results: for tests of the page
 // in a browser. plumb_web_test_server FOLDER: makes scenes and results in FOLDER, prints its
 // address and "setup code: XXXX-XXXX", obeys lines on stdin: unplug, plug, fail (of the running
-// scan), nobackup (backups fail), slow (long sweeps), fast, swift (half a
-// second from the start to the result), old (the last result becomes 10 minutes
-// old), quit; of what the next scan shows: markermoved (a check), stranger (another body), shoulder
-// (lifted), across (the body lies across the room's axes), "moved AXIS AMOUNT POSTURE" (the body
-// moved along x, y, z by mm or turned by pitch, roll, yaw by degrees); "room known", "room
-// unknown": what the status says; "moved z 8 HFS bare": as compared where the room is not known.
+// scan), nobackup (backups fail), overdue (no check has passed, references are blocked), checked,
+// slow (long sweeps), fast, swift (half a second from the start to the result), old (the last
+// result becomes 10 minutes old), quit; of what the next scan shows: markermoved (a check),
+// stranger (another body), shoulder (lifted), across (the body lies across the room's axes), "moved
+// AXIS AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by pitch, roll, yaw by
+// degrees); "room known", "room unknown": what the status says; "moved z 8 HFS bare": as compared
+// where the room is not known.
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
@@ -233,6 +234,11 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
     service.status.is_room_known = what == "known";
     service.Tell(web::EventKind::kStatus);
   }
+  if (name == "overdue")
+    service.SetOverdue(
+        "the daily check is overdue, and references need one that has passed today: "
+        "open Daily check, sweep over all markers of the room, then go on here");
+  if (name == "checked") service.SetOverdue("");
   if (name == "shoulder") service.next_recorded = recorder.Record(LiftedShoulder());
   if (name == "moved") {
     std::string axis, posture;

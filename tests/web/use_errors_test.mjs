@@ -458,6 +458,58 @@ await h.step('three roles: what a screen hides the interface refuses', async () 
   }
 });
 
+await h.step('no check today: no new reference, and a fraction is marked in the history', async () => {
+  const patient = (await h.api(anna, 'patients')).body.patients.find(({ code }) => code === 'PX-0001');
+  const marked = () => anna.locator('.badge.overdue').count();
+  h.tell('checked');
+  await anna.goto(`${h.url}#/patient/${patient.id}`);
+  await anna.getByRole('button', { name: 'Scan a new reference' }).waitFor();
+  equal(await anna.getByRole('button', { name: 'Scan a new reference' }).getAttribute('aria-disabled'), null, 'after the check');
+  const before = await marked();
+  await anna.getByRole('button', { name: 'Start treatment session' }).click();
+  await anna.getByRole('button', { name: /^Close PX-0002/ }).click();
+  await anna.locator('.who-line', { hasText: 'PX-0001' }).waitFor();
+  await scan();
+  h.tell('overdue');
+  await scan();
+  await anna.getByText('The daily check was overdue at this scan.').waitFor();
+  await anna.goto(`${h.url}#/patient/${patient.id}`);
+  await anna.getByText('The daily check is overdue').waitFor();
+  equal(await anna.getByRole('button', { name: 'Scan a new reference' }).getAttribute('aria-disabled'), 'true', 'blocked');
+  equal(await anna.locator('.reference-block a').getAttribute('href'), '#/check', 'the next step');
+  equal(await marked(), before + 1, 'one of the two is marked');
+  const refused = await h.api(anna, `patients/${patient.id}/open`, 'POST', { purpose: 'reference', reason: '' });
+  equal(refused.status, 409, 'the interface refuses too');
+  await h.look(anna, 'patient-overdue', { axe: false });
+  h.tell('checked');
+});
+
+await h.step('site and note are corrected; an archived patient is out of the list, not gone', async () => {
+  const open = (await h.api(anna, 'patients')).body.patients.find(({ code }) => code === 'PX-0002');
+  await bob.goto(`${h.url}#/patient/${open.id}`);
+  await bob.getByLabel('Site').fill('pelvis');
+  await bob.getByLabel('Note').fill('knee rest,\narms on the chest');
+  await bob.getByRole('button', { name: 'Save', exact: true }).click();
+  await bob.getByRole('heading', { name: 'PX-0002 pelvis' }).waitFor();
+  equal((await h.api(bob, `patients/${open.id}`)).body.note, 'knee rest, arms on the chest', 'one line');
+  await h.look(bob, 'patient-about');
+  await bob.getByRole('button', { name: 'Archive', exact: true }).click();
+  await bob.getByText('This patient is archived and cannot be opened').first().waitFor();
+  equal(await bob.getByRole('button', { name: 'Scan a new reference' }).count(), 0, 'not to be opened');
+  await bob.goto(`${h.url}#/patients`);
+  await bob.getByRole('link', { name: 'PX-0001' }).waitFor();
+  equal(await bob.getByRole('link', { name: 'PX-0002' }).count(), 0, 'out of the list');
+  await bob.getByLabel('Show archived patients too').check();
+  await bob.getByRole('link', { name: 'PX-0002' }).click();
+  await bob.getByRole('button', { name: 'Take out of the archive' }).click();
+  await bob.getByRole('button', { name: 'Archive', exact: true }).waitFor();
+  await bob.goto(`${h.url}#/patients`);
+  await bob.getByRole('link', { name: 'PX-0002' }).waitFor();
+  await anna.goto(`${h.url}#/patient/${open.id}`);
+  await anna.getByLabel('Note').waitFor();
+  equal(await anna.getByRole('button', { name: 'Archive', exact: true }).count(), 0, 'not offered to a technician');
+});
+
 await h.step('unplugged in the middle of a sweep: no result, and none of before in its place', async () => {
   h.tell('slow');
   await anna.goto(`${h.url}#/scan`);

@@ -188,7 +188,8 @@ void AddPatientRoutes(Table& table) {
       "POST", "/api/v1/patients", Permission::kPatients, BodyKind::kJson,
       [](ScanService& service, const Request& request, const Respond& respond) {
         Fields fields(request.body);
-        const std::string code = fields.Text("code", 1, 32), site = fields.Text("site", 0, 64);
+        const std::string code = fields.Text("code", 1, 32),
+                          site = fields.Text("site", 0, kMaxSite);
         fields.Finish();
         if (!IsName(code))
           throw DataError("code must be letters, digits, '.', '-' or '_': a pseudonym, no name");
@@ -199,6 +200,23 @@ void AddPatientRoutes(Table& table) {
         const auto patient = service.FindPatient(request.arguments[0]);
         return patient ? JsonResponse(ToJson(*patient)) : ErrorResponse(404, "no such patient");
       });
+  table.Write("PUT", "/api/v1/patients/{id}", Permission::kPatients, BodyKind::kJson,
+              [](ScanService& service, const Request& request, const Respond& respond) {
+                Fields fields(request.body);
+                const std::string site = fields.Text("site", 0, kMaxSite),
+                                  note = fields.Text("note", 0, kMaxNote);
+                fields.Finish();
+                service.ChangePatient(request.actor(), request.arguments[0], site, note,
+                                      Answer(respond));
+              });
+  table.Write("POST", "/api/v1/patients/{id}/archive", Permission::kPlan, BodyKind::kJson,
+              [](ScanService& service, const Request& request, const Respond& respond) {
+                Fields fields(request.body);
+                const bool archived = fields.Flag("archived");
+                fields.Finish();
+                service.ArchivePatient(request.actor(), request.arguments[0], archived,
+                                       Answer(respond));
+              });
   table.Write("DELETE", "/api/v1/patients/{id}", Permission::kWipe, BodyKind::kNone,
               [](ScanService& service, const Request& request, const Respond& respond) {
                 service.WipePatient(request.actor(), request.arguments[0], Answer(respond));
@@ -241,6 +259,20 @@ void AddPatientRoutes(Table& table) {
 }
 
 void AddReferenceRoutes(Table& table) {
+  table.Read("/api/v1/templates", Permission::kView, [](ScanService& service, const Request&) {
+    return JsonResponse({{"templates", ListJson(service.Templates())}});
+  });
+  table.Write("PUT", "/api/v1/templates", Permission::kPlan, BodyKind::kJson,
+              [](ScanService& service, const Request& request, const Respond& respond) {
+                service.SetTemplate(request.actor(), ParseTemplate(request.body), Answer(respond));
+              });
+  table.Write("POST", "/api/v1/templates/remove", Permission::kPlan, BodyKind::kJson,
+              [](ScanService& service, const Request& request, const Respond& respond) {
+                Fields fields(request.body);
+                const std::string site = fields.Text("site", 1, kMaxSite);
+                fields.Finish();
+                service.RemoveTemplate(request.actor(), site, Answer(respond));
+              });
   table.Write("POST", "/api/v1/references", Permission::kPlan, BodyKind::kJson,
               [](ScanService& service, const Request& request, const Respond& respond) {
                 Fields fields(request.body);

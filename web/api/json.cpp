@@ -254,12 +254,21 @@ Json ToJson(const Status& status, WallClock::time_point now) {
           {"waiting", WaitingJson(status.waiting)},
           {"scan", status.scan ? LiveScanJson(*status.scan) : Json(nullptr)},
           {"check_overdue", status.check_overdue},
+          {"reference_block", TextOrNull(status.reference_block)},
           {"last_check", status.last_check ? CheckJson(*status.last_check, now) : Json(nullptr)},
           {"last_result", status.last_result ? ToJson(*status.last_result, now) : Json(nullptr)},
           {"time", TimeText(now)},
           {"version", status.version},
           {"warnings", status.warnings},
           {"rolled_back", TextOrNull(status.rolled_back)}};
+}
+
+Json ToJson(const PlanTemplate& wanted) {
+  return {{"site", wanted.site},
+          {"width_mm", wanted.width_mm},
+          {"height_mm", wanted.height_mm},
+          {"tolerance", ToleranceJson(wanted.tolerance)},
+          {"changed_by", wanted.changed_by}};
 }
 
 Json ToJson(const Patient& patient) {
@@ -269,7 +278,9 @@ Json ToJson(const Patient& patient) {
           {"created_at", TimeText(patient.created_at)},
           {"approved_reference_id", TextOrNull(patient.approved_reference_id)},
           {"num_scans", patient.num_scans},
-          {"draft_reference_id", TextOrNull(patient.draft_reference_id)}};
+          {"draft_reference_id", TextOrNull(patient.draft_reference_id)},
+          {"note", patient.note},
+          {"archived", patient.archived}};
 }
 
 namespace {
@@ -418,6 +429,19 @@ void Fields::Finish() const {
       throw DataError(
           fmt::format("unknown field in the body; known are: {}", fmt::join(known_, ", ")));
   }
+}
+
+PlanTemplate ParseTemplate(const std::string& body) {
+  constexpr double kMin_mm = 20, kMax_mm = 3000;
+  Fields fields(body);
+  PlanTemplate wanted;
+  wanted.site = fields.Text("site", 1, kMaxSite);
+  wanted.width_mm = fields.Number("width_mm", kMin_mm, kMax_mm);
+  wanted.height_mm = fields.Number("height_mm", kMin_mm, kMax_mm);
+  wanted.tolerance.shift_mm = fields.Number("shift_tolerance_mm", 0.1, 50);
+  wanted.tolerance.rotation_deg = fields.Number("rotation_tolerance_deg", 0.1, 20);
+  fields.Finish();
+  return wanted;
 }
 
 ScanPurpose ParsePurpose(const std::string& name) {

@@ -16,6 +16,7 @@ using Json = nlohmann::ordered_json;
 /// @param now  Gives age_s, so that a page does not trust its own clock.
 [[nodiscard]] Json ToJson(const Scan& scan, WallClock::time_point now);
 [[nodiscard]] Json ToJson(const Patient& patient);
+[[nodiscard]] Json ToJson(const PlanTemplate& wanted);
 [[nodiscard]] Json ToJson(const Reference& reference);
 [[nodiscard]] Json ToJson(const CheckStatus& checks, WallClock::time_point now);
 [[nodiscard]] Json ToJson(const User& user);  ///< Without the hash.
@@ -60,6 +61,7 @@ inline constexpr int kMaxRevision = 1'000'000'000;
 /// And the revision that it was made from.
 [[nodiscard]] std::pair<ReferencePlan, int> ParsePlan(const std::string& body);
 [[nodiscard]] Settings ParseSettings(const std::string& body);
+[[nodiscard]] PlanTemplate ParseTemplate(const std::string& body);
 [[nodiscard]] ScanPurpose ParsePurpose(const std::string& name);
 
 }  // namespace plumb::web

@@ -89,6 +89,11 @@ class ScanService {
   virtual void AddPatient(const Actor& actor, const std::string& code, const std::string& site,
                           Done done) = 0;  ///< Gives the id.
   /// Removes the patient with scans, references and files ("wipe patient"); the audit log keeps
+  virtual void ChangePatient(const Actor& actor, const std::string& id, const std::string& site,
+                             const std::string& note, Done done) = 0;
+  /// Out of the list, or back into it. kConflict while a session of the patient is open.
+  virtual void ArchivePatient(const Actor& actor, const std::string& id, bool archived,
+                              Done done) = 0;
   /// that it was done.
   virtual void WipePatient(const Actor& actor, const std::string& id, Done done) = 0;
   /// Begins a treatment session: scans, from any button, are of this patient and for this until it
@@ -171,6 +176,10 @@ class ScanService {
                    const std::string& detail) = 0;
   /// Newest first, older than number `before` (0: all) (aside).
   [[nodiscard]] virtual std::vector<AuditEntry> Audit(std::int64_t before, int limit) = 0;
+  [[nodiscard]] virtual std::vector<PlanTemplate> Templates() = 0;  ///< By site.
+  /// In place of the one of that site; at most 100 sites.
+  virtual void SetTemplate(const Actor& actor, const PlanTemplate& wanted, Done done) = 0;
+  virtual void RemoveTemplate(const Actor& actor, const std::string& site, Done done) = 0;
   [[nodiscard]] virtual Settings GetSettings() = 0;
   virtual void ChangeSettings(const Actor& actor, const Settings& settings,
                               Done done) = 0;  ///< kInvalid names the field.

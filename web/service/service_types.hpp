@@ -129,7 +129,11 @@ struct Patient {
       approved_reference_id;  ///< The one that fractions are compared with; empty: none yet.
   std::int64_t num_scans = 0;
   std::string draft_reference_id;  ///< The newest draft after the approved one; empty: none waits.
+  std::string note = {};  ///< What people wrote of this course, at most kMaxNote bytes; no name.
+  bool archived = false;  ///< Out of the list and not to be opened; nothing is deleted.
 };
+
+inline constexpr std::size_t kMaxSite = 64, kMaxNote = 500;  // bytes
 
 /// A patient on the couch, from opening to closing. One at a time.
 struct TreatmentSession {
@@ -169,6 +173,15 @@ struct ReferencePlan {
   Tolerance tolerance;
   std::string posture = "HFS";  ///< HFS, HFP, FFS, FFP.
   bool couch_markers = false;   ///< Markers move with the couch: shifts are refused.
+};
+
+/// What plans of one site begin with. Sites are the same whatever the case of their letters.
+struct PlanTemplate {
+  std::string site;
+  double width_mm = 300.0;   ///< Of the region along x of the reference marker.
+  double height_mm = 400.0;  ///< Along y.
+  Tolerance tolerance;
+  std::string changed_by;
 };
 
 /// Immutable once approved; a change of plan makes a new version.
@@ -244,7 +257,9 @@ struct Status {
   std::vector<WaitingReference> waiting;  ///< For a plan or an approval; at most 20.
   std::optional<LiveScan> scan;           ///< In states scanning and working.
   std::optional<CheckRecord> last_check;
-  bool check_overdue = true;        ///< No daily check passed today.
+  bool check_overdue = true;  ///< No daily check passed today.
+  /// Why no reference may be scanned or approved now, with the next step; empty: it may.
+  std::string reference_block = {};
   std::optional<Scan> last_result;  ///< The newest finished scan of this run.
   std::string version;
   std::vector<std::string> warnings;  ///< Of how the appliance is set up.

@@ -1,5 +1,6 @@
 // The appliance on its loop, with a sensor that does what a test says.
 #include "daemon/appliance/appliance.hpp"
+#include "daemon/records/check_json.hpp"
 
 #include <future>
 #include <thread>
@@ -235,6 +236,59 @@ TEST_F(ApplianceTest, TheMachineIsNotRestartedInASessionAndAFailedRestartLeavesI
       restart_->failure.clear();
       EXPECT_EQ(Restarted(*service_).result, web::ChangeResult::kDone) << "asked again";
       EXPECT_EQ(restart_->num_asked, 2);
+    });
+  });
+}
+
+TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
+  parts_.demo_patient.clear();
+  Play([&] {
+    MakeReady();
+    const web::Actor tess = {.user = "tess", .address = {}};
+    web::Change answer;
+    const web::Done keep = [&](const web::Change& change) { answer = change; };
+    std::string patient;
+    On([&] {
+      patient = appliance_->store()->AddPatient(tess, "P-1", "");
+      EXPECT_THAT(appliance_->WebStatus().reference_block, ::testing::HasSubstr("daily check"));
+      service_->OpenPatient(tess, patient, web::ScanPurpose::kReference, "", "", keep);
+      EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
+      EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
+      service_->ApproveReference(tess, "1", 1, "", keep);
+      EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
+      service_->AddReference(tess, "1", "", keep);
+      EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
+      // A session that was open since yesterday.
+      appliance_->OpenSession("1", patient, web::ScanPurpose::kReference, "", tess);
+      (void)appliance_->Press(ButtonPress::kShort);
+    });
+    EXPECT_TRUE(Becomes([&] {
+      return appliance_->WebStatus().fault.find("open Daily check") != std::string::npos;
+    }));
+    On([&] {
+      EXPECT_TRUE(appliance_->store()->Scans("", 10).empty()) << "nothing was scanned";
+      (void)appliance_->store()->AddCheck(tess, appliance_->WebStatus().sensor.serial,
+                                          CheckJson({.status = MarkerCheckStatus::kPassed}, {}));
+      EXPECT_EQ(appliance_->WebStatus().reference_block, "");
+      EXPECT_EQ(appliance_->WhyNoReference(false), "");
+      EXPECT_THAT(appliance_->WhyNoReference(true),
+                  ::testing::HasSubstr("scan the reference again"))
+          << "of a scan from before the check";
+      (void)appliance_->CloseSession(tess);
+      (void)appliance_->Press(ButtonPress::kShort);  // acknowledges the fault
+      service_->OpenPatient(tess, patient, web::ScanPurpose::kReference, "", "", keep);
+    });
+    EXPECT_TRUE(Becomes([&] { return appliance_->WebStatus().session.has_value(); }));
+  });
+}
+
+TEST_F(ApplianceTest, TheDemoNeedsNoCheckForItsReference) {
+  Play([&] {
+    MakeReady();
+    On([&] {
+      EXPECT_TRUE(appliance_->WebStatus().check_overdue);
+      EXPECT_EQ(appliance_->WebStatus().reference_block, "");
+      EXPECT_EQ(appliance_->WhyNoReference(true), "");
     });
   });
 }

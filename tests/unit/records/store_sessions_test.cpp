@@ -100,6 +100,53 @@ TEST_F(StoreSessionsTest, AScanWithoutASessionIsOfNoPatient) {
   EXPECT_THAT(store.Scans("", 10), SizeIs(1));
 }
 
+TEST_F(StoreSessionsTest, SiteAndNoteAreChangedAndTheirTextIsNotInTheLog) {
+  std::string patient;
+  {
+    Store store(folder_ / "state");
+    patient = store.AddPatient(kAnna, "P-1", "thorx");
+    EXPECT_EQ(store.FindPatient(patient)->note, "");
+    store.ChangePatient(kBert, patient, "thorax", "arms up, knee rest");
+    EXPECT_EQ(RefusalOf([&] { store.ChangePatient(kBert, "77", "", ""); }),
+              ChangeResult::kNotFound);
+    EXPECT_EQ(RefusalOf([&] { store.ChangePatient(kBert, "0", "", ""); }), ChangeResult::kNotFound)
+        << "the one of unassigned scans";
+  }
+  Store store(folder_ / "state");
+  EXPECT_EQ(store.FindPatient(patient)->site, "thorax");
+  EXPECT_EQ(store.FindPatient(patient)->note, "arms up, knee rest");
+  const web::AuditEntry entry = store.Audit(0, 1).at(0);
+  EXPECT_EQ(entry.action, "patient.change");
+  EXPECT_EQ(entry.user, "bert");
+  EXPECT_EQ((entry.subject + entry.detail).find("knee"), std::string::npos);
+}
+
+TEST_F(StoreSessionsTest, AnArchivedPatientKeepsEverythingAndIsNotOpened) {
+  Store store(folder_ / "state");
+  const std::string patient = store.AddPatient(kAnna, "P-1", "");
+  const std::string session = store.OpenSession(kAnna, patient, ScanPurpose::kReference);
+  const std::string scan = Scan(store, patient, session);
+  (void)store.AddReference(kAnna, scan, "first", {});
+  EXPECT_THAT(store.WaitingReferences(), SizeIs(1));
+  EXPECT_EQ(RefusalOf([&] { store.ArchivePatient(kBert, patient, true); }), ChangeResult::kConflict)
+      << "while the session is open";
+  store.CloseSessions(kAnna);
+  store.ArchivePatient(kBert, patient, true);
+  EXPECT_EQ(store.Audit(0, 1).at(0).action, "patient.archive");
+  EXPECT_TRUE(store.FindPatient(patient)->archived);
+  EXPECT_THAT(store.Patients(), SizeIs(1)) << "still there for who asks";
+  EXPECT_THAT(store.Scans(patient, 10), SizeIs(1));
+  EXPECT_THAT(store.References(patient), SizeIs(1));
+  EXPECT_THAT(store.WaitingReferences(), SizeIs(0)) << "waits for nobody";
+  EXPECT_EQ(RefusalOf([&] { (void)store.OpenSession(kAnna, patient, ScanPurpose::kReference); }),
+            ChangeResult::kConflict);
+  store.ArchivePatient(kBert, patient, false);
+  EXPECT_EQ(store.Audit(0, 1).at(0).action, "patient.unarchive");
+  EXPECT_FALSE(store.FindPatient(patient)->archived);
+  EXPECT_THAT(store.WaitingReferences(), SizeIs(1));
+  EXPECT_FALSE(store.OpenSession(kAnna, patient, ScanPurpose::kReference).empty());
+}
+
 TEST_F(StoreSessionsTest, CodesDifferByMoreThanCase) {
   Store store(folder_ / "state");
   const std::string id = store.AddPatient(kAnna, "P-0042", "");

@@ -613,13 +613,69 @@ TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
         "DROP COLUMN accepted_reason; ALTER TABLE scans DROP COLUMN sensor_on_s; ALTER TABLE scans "
         "DROP COLUMN check_overdue; ALTER TABLE scans DROP COLUMN unavailable; ALTER TABLE scans "
         "DROP COLUMN checked_at; ALTER TABLE audit DROP COLUMN chain; DROP TABLE scan_files; DROP "
-        "TABLE removed_scans; DROP TABLE sessions; DROP TABLE displays; DELETE FROM patients "
+        "TABLE removed_scans; ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients DROP "
+        "COLUMN archived; DROP TABLE templates; DROP TABLE sessions; DROP TABLE displays; DELETE "
+        "FROM patients "
         "WHERE id = 0; PRAGMA user_version = 1");
   }
   const auto store = Open();
   EXPECT_THAT(store->Patients(), SizeIs(1));
   EXPECT_THAT(store->Checks(10), SizeIs(0));
   EXPECT_EQ(store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kFailed)), "1");
+}
+
+TEST_F(StoreTest, ATemplateIsOfOneSiteWhateverItsCaseAndIsLogged) {
+  {
+    const auto store = Open();
+    store->SetTemplate(kAnna, {.site = "Thorax",
+                               .width_mm = 300,
+                               .height_mm = 400,
+                               .tolerance = {.shift_mm = 5, .rotation_deg = 2},
+                               .changed_by = {}});
+    store->SetTemplate(kBert, {.site = "thorax",
+                               .width_mm = 320,
+                               .height_mm = 410,
+                               .tolerance = {.shift_mm = 4, .rotation_deg = 1.5},
+                               .changed_by = {}});
+  }
+  const auto store = Open();
+  ASSERT_THAT(store->Templates(), SizeIs(1));
+  const web::PlanTemplate stored = store->Templates().at(0);
+  EXPECT_EQ(stored.site, "thorax");
+  EXPECT_EQ(stored.width_mm, 320);
+  EXPECT_EQ(stored.height_mm, 410);
+  EXPECT_EQ(stored.tolerance.shift_mm, 4);
+  EXPECT_EQ(stored.tolerance.rotation_deg, 1.5);
+  EXPECT_EQ(stored.changed_by, "bert");
+  EXPECT_THAT(store->Audit(0, 1).at(0).detail, HasSubstr("320 x 410 mm"));
+  EXPECT_EQ(RefusalOf([&] { store->RemoveTemplate(kAnna, "pelvis"); }), ChangeResult::kNotFound);
+  store->RemoveTemplate(kAnna, "THORAX");
+  EXPECT_THAT(store->Templates(), SizeIs(0));
+  for (int i = 0; i < 100; ++i)
+    store->SetTemplate(kAnna, {.site = std::to_string(i), .tolerance = {}, .changed_by = {}});
+  EXPECT_EQ(RefusalOf([&] {
+              store->SetTemplate(kAnna, {.site = "100", .tolerance = {}, .changed_by = {}});
+            }),
+            ChangeResult::kConflict);
+  store->SetTemplate(kAnna, {.site = "99", .tolerance = {}, .changed_by = {}});
+}
+
+TEST_F(StoreTest, PatientsOfTheSchemaBeforeArchivesKeepWhatTheyHad) {
+  const std::string patient = Open()->AddPatient(kAnna, "P-1", "thorax");
+  {
+    Database direct(database(), Database::Access::kReadWrite);
+    direct.Execute(
+        "ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients DROP COLUMN archived; DROP "
+        "TABLE templates; PRAGMA "
+        "user_version = 5");
+  }
+  const auto store = Open();
+  ASSERT_THAT(store->Patients(), SizeIs(1));
+  EXPECT_EQ(store->FindPatient(patient)->site, "thorax");
+  EXPECT_EQ(store->FindPatient(patient)->note, "");
+  EXPECT_FALSE(store->FindPatient(patient)->archived);
+  store->ChangePatient(kAnna, patient, "thorax", "note");
+  EXPECT_EQ(store->FindPatient(patient)->note, "note");
 }
 
 TEST_F(StoreTest, ScanNumbersAreNeverUsedTwice) {

@@ -83,6 +83,59 @@ TEST_F(ApiTest, ChangesFromOtherSitesAreRefusedEvenWithTheToken) {
   EXPECT_EQ(client.Post("/api/v1/press").status, 200);
 }
 
+TEST_F(ApiTest, SiteAndNoteAreBoundedAndArchivingIsThePhysicists) {
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
+  const std::string id =
+      technician.Post("/api/v1/patients", {{"code", "P-77"}, {"site", ""}}).json()["id"];
+  const std::string path = "/api/v1/patients/" + id;
+  EXPECT_EQ(technician.Put(path, {{"site", "pelvis"}, {"note", std::string(500, 'n')}}).status,
+            200);
+  EXPECT_EQ(technician.Put(path, {{"site", "pelvis"}, {"note", std::string(501, 'n')}}).status,
+            400);
+  EXPECT_EQ(technician.Put(path, {{"site", std::string(65, 's')}, {"note", ""}}).status, 400);
+  EXPECT_EQ(technician.Put(path, {{"site", "pelvis"}}).status, 400) << "both, or neither is known";
+  const nlohmann::json patient = technician.Get(path).json();
+  EXPECT_EQ(patient["site"], "pelvis");
+  EXPECT_EQ(patient["note"], std::string(500, 'n'));
+  EXPECT_EQ(patient["archived"], false);
+  EXPECT_EQ(technician.Post(path + "/archive", {{"archived", true}}).status, 403);
+  EXPECT_EQ(physicist.Post(path + "/archive", {{"archived", "yes"}}).status, 400);
+  EXPECT_EQ(physicist.Post(path + "/archive", {{"archived", true}}).status, 200);
+  EXPECT_EQ(technician.Get(path).json()["archived"], true);
+  EXPECT_EQ(technician.Post(path + "/open", {{"purpose", "reference"}, {"reason", ""}}).status,
+            409);
+  EXPECT_EQ(physicist.Post(path + "/archive", {{"archived", false}}).status, 200);
+}
+
+TEST_F(ApiTest, TemplatesArePhysicistsAndBounded) {
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
+  nlohmann::json wanted = {{"site", "thorax"},
+                           {"width_mm", 300},
+                           {"height_mm", 400},
+                           {"shift_tolerance_mm", 5},
+                           {"rotation_tolerance_deg", 2}};
+  EXPECT_EQ(technician.Put("/api/v1/templates", wanted).status, 403);
+  EXPECT_EQ(physicist.Put("/api/v1/templates", wanted).status, 200);
+  const nlohmann::json kept = technician.Get("/api/v1/templates").json()["templates"];
+  ASSERT_EQ(kept.size(), 1U);
+  EXPECT_EQ(kept[0]["height_mm"], 400);
+  EXPECT_EQ(kept[0]["tolerance"]["shift_mm"], 5);
+  EXPECT_EQ(kept[0]["changed_by"], "physicist");
+  for (const auto& [field, value] :
+       std::map<std::string, nlohmann::json>{{"width_mm", 19.9},
+                                             {"height_mm", 3001},
+                                             {"shift_tolerance_mm", 0},
+                                             {"rotation_tolerance_deg", 21},
+                                             {"site", ""}}) {
+    nlohmann::json wrong = wanted;
+    wrong[field] = value;
+    EXPECT_EQ(physicist.Put("/api/v1/templates", wrong).status, 400) << field;
+  }
+  EXPECT_EQ(physicist.Post("/api/v1/templates/remove", {{"site", "pelvis"}}).status, 404);
+  EXPECT_EQ(physicist.Post("/api/v1/templates/remove", {{"site", "thorax"}}).status, 200);
+  EXPECT_TRUE(technician.Get("/api/v1/templates").json()["templates"].empty());
+}
+
 TEST_F(ApiTest, ScanGoesFromPressToResultAndIsAudited) {
   HttpClient client = LoggedIn("technician");
   EXPECT_EQ(client.Get("/api/v1/status").json()["state"], "ready");

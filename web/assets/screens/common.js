@@ -1,6 +1,6 @@
 // What several screens show.
-import { get } from '../api.js';
-import { h } from '../dom.js';
+import { get, live } from '../api.js';
+import { clear, h } from '../dom.js';
 import { S, translated } from '../strings.js';
 
 export const kWarmUp_s = 15 * 60;
@@ -40,6 +40,28 @@ export const isAdvice = (scan) =>
 /// Where the comparison found the patient's sides, for the marks on pictures: no answer, no side of
 /// the patient.
 export const sidesOf = (scan, details) => (isAdvice(scan) ? details?.body : undefined);
+
+/// Why no reference may be scanned or approved now, with the way to what is needed; follows the
+/// status while it is shown. `tell(why)` hears of it first at once.
+export function blockNote(tell) {
+  const element = h('p', { class: 'caution reference-block', role: 'status' });
+  let shown;
+  const draw = () => {
+    const why = live.status?.reference_block ?? null;
+    if (why === shown) return;
+    shown = why;
+    clear(element, why && [sentence(why), ' ', h('a', { href: '#/check' }, S.nav.check)]);
+    tell(why);
+  };
+  draw();
+  const stop = live.listen(() => {
+    // Nobody says when a screen goes: what has been taken out of the page listens no more.
+    if (shown !== undefined && element.dataset.seen && !element.isConnected) stop();
+    else draw();
+    if (element.isConnected) element.dataset.seen = 'yes';
+  });
+  return element;
+}
 
 /// Codes by patient id, for lists.
 export async function patientCodes() {

@@ -1,12 +1,12 @@
 // Patients, their references and scans, and the treatment session that people open here.
-import { get, live, may, post, remove } from '../api.js';
+import { get, live, may, post, put, remove } from '../api.js';
 import {
-  action, clear, enable, field, form, h, localTime, redraw, table, warn,
+  action, clear, done, enable, field, form, h, localTime, redraw, table, warn,
 } from '../dom.js';
 import { numbersLine } from '../numbers.js';
 import { S } from '../strings.js';
 import { closeSession, openPatient } from '../treatment.js';
-import { isAdvice, outcomeBadge } from './common.js';
+import { blockNote, isAdvice, outcomeBadge } from './common.js';
 
 function referenceState(patient) {
   const text = S.patients;
@@ -26,17 +26,20 @@ export async function showPatients(place) {
     spellcheck: 'false',
   });
   const site = h('input', { maxlength: 64, autocomplete: 'off' });
+  const archived = h('input', { type: 'checkbox' });
   let patients = [];
 
   const matching = () => {
     const wanted = search.value.trim().toLowerCase();
-    return patients.filter((patient) => patient.code.toLowerCase().includes(wanted));
+    return patients.filter((patient) => (archived.checked || !patient.archived)
+      && patient.code.toLowerCase().includes(wanted));
   };
   const row = (patient) => {
     const isOpen = patient.id === live.status?.session?.patient_id;
     return h('tr', { class: isOpen ? 'chosen' : '' },
       h('td', {}, h('a', { href: `#/patient/${patient.id}` }, patient.code),
-        isOpen && h('span', { class: 'badge here' }, text.isOpen)),
+        isOpen && h('span', { class: 'badge here' }, text.isOpen),
+        patient.archived && h('span', { class: 'badge' }, text.archived)),
       h('td', {}, patient.site || S.none), h('td', {}, patient.num_scans),
       h('td', {}, referenceState(patient)), h('td', {}, localTime(patient.created_at)));
   };
@@ -51,6 +54,7 @@ export async function showPatients(place) {
     draw();
   };
   search.addEventListener('input', draw);
+  archived.addEventListener('change', draw);
   // A scanner of wristbands types the code and Enter.
   search.addEventListener('keydown', (event) => {
     if (event.key !== 'Enter') return;
@@ -60,7 +64,8 @@ export async function showPatients(place) {
     if (found) location.hash = `#/patient/${found.id}`;
   });
   clear(place, h('h1', {}, text.title),
-    h('section', { class: 'card' }, field(text.search, search), list),
+    h('section', { class: 'card' }, field(text.search, search), list,
+      h('label', { class: 'check below' }, archived, ' ', text.showArchived)),
     may('patients') && h('section', { class: 'card' }, h('h2', {}, text.add),
       form({ class: 'form inline' }, async () => {
         const body = { code: code.value.trim(), site: site.value.trim() };
@@ -97,12 +102,37 @@ function openButtons(patient) {
   };
   const fraction = action(text.openFraction, open('fraction'), { class: 'primary' });
   enable(fraction, Boolean(patient.approved_reference_id));
+  const reference = action(text.openReference, open('reference'), {});
   return h('div', { class: 'form' },
     h('p', { class: 'lead' }, text.confirmWho(patient.code)),
-    h('div', { class: 'row' }, fraction, action(text.openReference, open('reference'), {})),
-    question,
+    h('div', { class: 'row' }, fraction, reference),
+    blockNote((why) => enable(reference, !why)), question,
     !patient.approved_reference_id && h('p', { class: 'hint' }, text.needsReference),
     field(text.reason, reason));
+}
+
+/// Site, note and archive: what people say of a course, and whether it is still in the list.
+function aboutPatient(patient, reload) {
+  const text = S.patients;
+  const site = h('input', { maxlength: 64, autocomplete: 'off', value: patient.site });
+  const note = h('textarea', { maxlength: 500, rows: 3 });
+  note.value = patient.note;
+  const editable = may('patients');
+  return h('section', { class: 'card' }, h('h2', {}, text.about),
+    editable ? form({ class: 'form' }, async () => {
+      const body = { site: site.value.trim(), note: note.value.replace(/\s+/g, ' ').trim() };
+      await put(`patients/${patient.id}`, body);
+      done(S.saved);
+      await reload();
+    }, field(text.site, site, text.siteHint), field(text.note, note, text.noteHint),
+    h('button', {}, S.save))
+      : h('p', { class: 'note' }, patient.note || S.none),
+    patient.archived && h('p', { class: 'caution' }, text.isArchived),
+    may('plan') && h('div', { class: 'row below' },
+      action(patient.archived ? text.unarchive : text.archive, async () => {
+        await post(`patients/${patient.id}/archive`, { archived: !patient.archived });
+        await reload();
+      }, {}), !patient.archived && h('p', { class: 'hint' }, text.archiveHint)));
 }
 
 function referenceTable(references) {
@@ -132,7 +162,9 @@ function scanTable(scans) {
   const rows = scans.map((scan) => h('tr', {},
     h('td', {}, h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at))),
     h('td', {}, scan.fraction ?? S.none),
-    h('td', {}, S.purposes[scan.purpose]), h('td', {}, outcomeBadge(scan)),
+    h('td', {}, S.purposes[scan.purpose]),
+    h('td', {}, outcomeBadge(scan), scan.check_overdue
+      && h('span', { class: 'badge move overdue' }, `▲ ${text.checkOverdue}`)),
     h('td', { class: 'digits' }, isAdvice(scan) ? numbersLine(scan.result) : S.none),
     h('td', {}, accepted(scan))));
   const heads = [text.when, text.fraction, text.purpose, text.outcome, text.numbers,
@@ -164,14 +196,25 @@ export async function showPatient(place, id) {
   const references = h('div', {});
   const scans = h('div', {});
   const opening = h('div', {});
+  const about = h('div', {});
+  const heading = h('h1', {});
   let approved;
+  let told;
   const load = async () => {
     const [patient, found, history] = await Promise.all([get(`patients/${id}`, true),
       get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
     // What is typed as a reason stays as long as nothing else is offered.
-    if (approved !== patient.approved_reference_id) {
-      approved = patient.approved_reference_id;
-      clear(opening, openButtons(patient));
+    const opens = `${patient.approved_reference_id} ${patient.archived}`;
+    if (approved !== opens) {
+      approved = opens;
+      clear(opening, patient.archived ? h('p', { class: 'hint' }, text.isArchived)
+        : openButtons(patient));
+    }
+    const says = JSON.stringify([patient.site, patient.note, patient.archived]);
+    if (told !== says) {
+      told = says;
+      clear(heading, patient.code, ' ', h('small', {}, patient.site));
+      clear(about, aboutPatient(patient, load));
     }
     redraw(references, referenceTable(found.references));
     redraw(scans, scanTable(history.scans));
@@ -181,13 +224,13 @@ export async function showPatient(place, id) {
   const file = (name, label) => h('a', {
     class: 'button', href: `/api/v1/patients/${id}/${name}`, download: '',
   }, label);
-  clear(place, h('h1', {}, patient.code, ' ', h('small', {}, patient.site)),
+  clear(place, heading,
     may('scan') && h('section', { class: 'card' }, h('h2', {}, text.open), session, opening),
     h('section', { class: 'card' }, h('h2', {}, text.references), references),
     h('section', { class: 'card' }, h('h2', {}, text.history), scans,
       h('div', { class: 'row below' }, file('report.pdf', text.report),
         file('numbers.csv', text.csv), file('numbers.json', text.json))),
-    may('wipe') && wipe(patient));
+    about, may('wipe') && wipe(patient));
   let shownSession = null;
   const drawSession = () => {
     const now = live.status?.session ?? null;

@@ -8,6 +8,8 @@ import { guardLeaving } from '../leave.js';
 import { compassOf, mapFrame, marksNote, viewOf } from '../map_frame.js';
 import { cellAt, loadMap, paintHeights } from '../maps.js';
 import { S } from '../strings.js';
+import { blockNote } from './common.js';
+import { templateOf } from './plan_template.js';
 
 const kStep_m = 0.005;
 
@@ -162,6 +164,13 @@ function editor(grid, map, model, editable, changed, compass) {
   draw();
   return {
     element: box, draw, undo,
+    /// In place of all corners; can be undone.
+    set: (region) => {
+      remember();
+      model.region.splice(0, model.region.length, ...region);
+      state.chosen = -1;
+      update();
+    },
     clear: () => {
       remember();
       model.region.length = 0;
@@ -314,6 +323,7 @@ async function draft(place, reference, store) {
   const outside = h('p', { class: 'caution' });
   const mapPlace = h('div', {});
   const signPlace = h('div', {});
+  const templatePlace = h('div', {});
   let stored;  // as written when nothing is edited
   let drawing = null;
   let loaded = null;
@@ -322,6 +332,11 @@ async function draft(place, reference, store) {
   const isEdited = () => stored !== undefined && inputs.written() !== stored;
   const sign = may('approve') && !reference.approved_by
     && action(text.summaryReview, async () => showSummary(), {});
+  let blocked = null;
+  const block = sign && blockNote((why) => {
+    blocked = why;
+    if (stored !== undefined) note();
+  });
   const note = () => {
     const point = model.isocentre;
     outside.textContent = point && model.region.length > 2 && !isInside(model.region, point)
@@ -334,7 +349,7 @@ async function draft(place, reference, store) {
     const edited = isEdited();
     if (edited) drafts.write(reference, inputs.body());
     else drafts.remove(reference);
-    if (sign) enable(sign, !edited);
+    if (sign) enable(sign, !edited && !blocked);
     unsaved.textContent = edited && sign ? text.unsaved : '';
     if (edited) clear(signPlace);
   };
@@ -403,11 +418,15 @@ async function draft(place, reference, store) {
           h('div', { class: 'triple' }, inputs.axes), inputs.bad, outside),
         h('fieldset', {}, h('legend', {}, text.tolerance), field(text.shift, inputs.shift),
           field(text.rotation, inputs.rotation)),
-        field(text.posture, inputs.posture), inputs.couch.element,
+        templatePlace, field(text.posture, inputs.posture), inputs.couch.element,
         editable && h('p', { class: 'hint' },
           reference.approved_by ? text.approvedHint : text.approveHint),
-        unsaved, h('div', { class: 'row' }, editable && save, sign))),
+        unsaved, block, h('div', { class: 'row' }, editable && save, sign))),
     signPlace));
+  if (editable && drawing) {
+    templateOf(patient, loaded.grid, model, inputs, drawing, changed)
+      .then((element) => clear(templatePlace, element), (error) => warn(error.message));
+  }
   if (kept) {
     // What was stored is what an edit is compared with, not what was kept.
     const blank = controls(reference,

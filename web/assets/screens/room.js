@@ -111,6 +111,7 @@ function result() {
   const place = h('div', { class: 'room-result' });
   let shown = null;
   let note = null;
+  let judge = () => {};
   const map = async (data, box) => {
     const { scan, reference } = data;
     if (!data.details?.alignment || !reference) return;
@@ -138,11 +139,22 @@ function result() {
     note = validityNote(scan, received, false);
     const box = h('div', { class: 'room-map' });
     const reasons = scan.result?.verdict === 'no_answer' ? scan.result.reasons.map(sentence) : [];
-    clear(place, note.element, scan.result ? verdictStrip(data) : withoutResult(scan),
-      !scan.result && flagList(scan, scene), reasons.length > 1 && h('p', {}, reasons[1]),
-      h('div', { class: 'room-answer' }, isAdvice(scan) && h('section', {},
-        h('h2', { class: 'visually-hidden' }, S.result.atIsocentre),
-        sixNumbers(scan.result, reference, details)), box));
+    const strip = h('div', { class: 'room-strip' });
+    const six = isAdvice(scan) && h('section', {});
+    let isValid = null;
+    judge = (why) => {
+      if (isValid === !why) return;
+      isValid = !why;
+      clear(strip, scan.result ? verdictStrip(data, isValid) : withoutResult(scan));
+      if (six) {
+        clear(six, h('h2', { class: 'visually-hidden' }, S.result.atIsocentre),
+          details?.body?.room_known === false && h('p', { class: 'caution' }, S.result.roomUnknown),
+          sixNumbers(scan.result, reference, details, isValid));
+      }
+    };
+    judge(note.tick());
+    clear(place, note.element, strip, !scan.result && flagList(scan, scene),
+      reasons.length > 1 && h('p', {}, reasons[1]), h('div', { class: 'room-answer' }, six, box));
     await map(data, box).catch(() => {});
     if (scan.result) say(S.result.verdicts[scan.result.verdict] ?? '');
   };
@@ -153,11 +165,16 @@ function result() {
       if (key !== shown) {
         shown = key;
         note = null;
+        judge = () => {};
         clear(place);
         if (scan) load(scan);
       }
     },
-    tick() { place.classList.toggle('is-old', Boolean(note?.tick())); },
+    tick() {
+      const why = note?.tick();
+      if (note) judge(why);
+      place.classList.toggle('is-old', Boolean(why));
+    },
   };
 }
 

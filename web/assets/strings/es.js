@@ -42,6 +42,21 @@ const kWords = {
   'name or password is wrong': 'nombre o contraseña incorrectos',
   'the password is wrong': 'la contraseña es incorrecta',
   'no session is open': 'no hay ninguna sesión abierta',
+  'the session of this patient is open: close it first':
+    'la sesión de este paciente está abierta: ciérrela primero',
+  'this patient is archived: take it out of the archive first':
+    'este paciente está archivado: sáquelo antes del archivo',
+  ['the daily check is overdue, and references need one that has passed today: open Daily check, '
+    + 'sweep over all markers of the room, then go on here']:
+    'el control diario está pendiente y las referencias necesitan uno superado hoy: abra Control '
+    + 'diario, barra todos los marcadores de la sala y siga después aquí',
+  ['this scan was taken while the daily check was overdue: scan the reference again, now that the '
+    + 'check has passed']:
+    'este escaneo se hizo con el control diario pendiente: escanee otra vez la referencia, ahora '
+    + 'que el control se ha superado',
+  'there is no template of this site': 'no hay ninguna plantilla de esta localización',
+  'there are templates of 100 sites already: remove one first':
+    'ya hay plantillas de 100 localizaciones: borre antes una',
   'there is no such scan': 'no existe ese escaneo',
   'there is no such patient': 'no existe ese paciente',
   'a scan is running already: end or cancel it first':
@@ -209,6 +224,12 @@ export const es = {
   },
   patients: {
     title: 'Pacientes', code: 'Código', site: 'Localización', added: 'Añadido', scans: 'Escaneos',
+    about: 'Localización, nota, archivo', note: 'Nota',
+    noteHint: 'Como máximo 500 caracteres; sin nombre ni fecha de nacimiento.',
+    archive: 'Archivar', unarchive: 'Sacar del archivo', archived: 'archivado',
+    archiveHint: 'Quita al paciente de la lista. No se borra nada.',
+    isArchived: 'Este paciente está archivado y no se puede abrir para una sesión.',
+    showArchived: 'Mostrar también los archivados', checkOverdue: 'control pendiente',
     reference: 'Referencia', approved: 'aprobada', noReference: 'ninguna',
     waits: 'pendiente de aprobación', open: 'Sesión',
     add: 'Añadir un paciente', codeHint: 'Un seudónimo: letras, cifras, . _ - (sin nombre)',
@@ -465,6 +486,14 @@ export const es = {
     atMost: (sign, value, unit) => `como máximo ${sign}${value} ${unit}`, tile: 'Control diario',
   },
   plan: {
+    template: (site) => `Plantilla para ${site}`, templateUse: 'Usar la plantilla',
+    templateKeep: 'Guardar este tamaño y tolerancia como plantilla',
+    templateRemove: 'Borrar la plantilla',
+    templateNone: 'Aún no hay plantilla para esta localización.',
+    templateIs: (width, height, mm, degrees) => `Región de ${width} × ${height} cm (x × y) en `
+      + `torno al isocentro, ±${mm} mm, ±${degrees}°.`,
+    templateNeedsRegion: 'Dibuje antes la región: al menos tres esquinas.',
+    templateNoSite: 'El paciente no tiene localización: escriba una para usar una plantilla.',
     title: 'Plan', reference: 'Referencia', region: 'Región de interés',
     regionHint: 'Pulse en el mapa para añadir vértices; arrastre un vértice para moverlo; Supr '
       + 'borra el elegido. Sin vértices, la región es el cuerpo hallado en el escaneo (perfilado).',
@@ -530,7 +559,12 @@ export const es = {
       'login.failed': 'Acceso fallido',
       logout: 'Salida',
       'setup.failed': 'Puesta en marcha fallida',
+      'template.set': 'Plantilla guardada',
+      'template.remove': 'Plantilla borrada',
       'patient.add': 'Paciente añadido',
+      'patient.change': 'Localización y nota cambiadas',
+      'patient.archive': 'Paciente archivado',
+      'patient.unarchive': 'Paciente sacado del archivo',
       'patient.wipe': 'Datos de paciente borrados',
       'session.open': 'Sesión abierta',
       'session.close': 'Sesión cerrada',
