@@ -315,6 +315,7 @@ await h.step('another open patient is pointed out on the result', async () => {
 });
 
 await h.step('the daily check: overdue, without a baseline, passed, failed', async () => {
+  h.tell('overdue');
   await anna.goto(`${h.url}#/status`);
   await anna.getByText('No check has passed today.').waitFor();
   await anna.goto(`${h.url}#/check`);

@@ -161,6 +161,9 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
     const std::string id = added.get_future().get().id;
     std::promise<web::Change> opened;
     On([&] {
+      (void)appliance_->store()->AddCheck(
+          actor, appliance_->WebStatus().sensor.serial,
+          CheckJson({.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}, {}));
       service_->OpenPatient(actor, id, web::ScanPurpose::kReference, "", "",
                             [&](const web::Change& change) { opened.set_value(change); });
     });
@@ -267,8 +270,9 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
     }));
     On([&] {
       EXPECT_TRUE(appliance_->store()->Scans("", 10).empty()) << "nothing was scanned";
-      (void)appliance_->store()->AddCheck(tess, appliance_->WebStatus().sensor.serial,
-                                          CheckJson({.status = MarkerCheckStatus::kPassed}, {}));
+      (void)appliance_->store()->AddCheck(
+          tess, appliance_->WebStatus().sensor.serial,
+          CheckJson({.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}, {}));
       EXPECT_EQ(appliance_->WebStatus().reference_block, "");
       EXPECT_EQ(appliance_->WhyNoReference(false), "");
       EXPECT_THAT(appliance_->WhyNoReference(true),
