@@ -11,6 +11,7 @@
 #include "algo/base/check_stop.hpp"
 #include "algo/sensor_model/depth_correction.hpp"
 #include "algo/tracking/keyframe_link.hpp"
+#include "algo/tracking/velocity_refinement.hpp"
 
 namespace plumb {
 namespace {
@@ -519,6 +520,20 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   std::vector<QuadraticTerm> links;
   AddTrackedLinks(map, links);
   BundleAdjust(stated, bundle, links, map, result.calibration);
+  const auto refresh_velocities = [&] {
+    if (!options.refresh_velocities) return;
+    options.refresh_velocities(map);
+    if (!options.use_row_motion) return;
+    VelocityOptions velocity;
+    velocity.marker_length_m = options.marker_length_m;
+    velocity.keypoint_sigma_px = bundle.keypoint_sigma_px;
+    RefineVelocities(stated, result.calibration, velocity, map);
+  };
+  // The lens is found here, so the velocities must be right here already.
+  for (int round = 0; options.refresh_velocities && round < options.num_velocity_rounds; ++round) {
+    refresh_velocities();
+    BundleAdjust(stated, bundle, links, map, result.calibration);
+  }
   if (!options.use_dense) return result;
 
   const Cells cells = MakeCells(stated, map);
@@ -533,7 +548,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   bundle.fix_lens = true;
   for (int round = 0; round < options.num_rounds; ++round) {
     CheckStop(stop);
-    if (options.refresh_velocities) options.refresh_velocities(map);
+    refresh_velocities();
     const Sensor sensor = MakeSensor(stated, result.calibration);
     const std::vector<CalibratedView> views = MakeViews(sensor, result.calibration, cells, map);
     CheckStop(stop);

@@ -24,15 +24,19 @@ struct JointRegistrationOptions {
   double min_overlap = 0.2;  ///< Share of a keyframe's cells that fall into the other.
   /// Of the dense terms against their noise model: what the model leaves out is shared by
   /// neighbouring cells and views.
-  double dense_weight = 0.3;
+  double dense_weight = 0.2;
   /// Pixels at 640 columns. Above the noise of one sighting: a track's error is common to its
   /// views.
-  double keypoint_sigma_px = 0.5;
+  double keypoint_sigma_px = 0.4;
   double keypoint_depth_sigmas = 1.5;  ///< In standard deviations of the noise model.
   CalibrationPrior prior = PriorOfAnyUnit();
   bool find_evidence = false;  ///< Fill JointRegistrationResult::evidence.
-  /// Called before each dense round: makes the keyframes' velocities follow their poses.
-  std::function<void(TrackingMap&)> refresh_velocities;
+  /// Called before each round: makes the keyframes' velocities follow their poses.
+  std::function<void(TrackingMap&)> refresh_velocities = {};
+  /// Then find each keyframe's velocity from the rows of its own image: RefineVelocities().
+  bool use_row_motion = true;
+  /// Of bundle adjustment with new velocities, before the dense rounds: the lens is found here.
+  int num_velocity_rounds = 2;
 };
 
 struct JointRegistrationResult {

@@ -272,6 +272,7 @@ struct Reconstructor::Impl {
     joint_options.marker_length_m = info.marker_length_m;
     joint_options.use_depth_field = options.use_depth_field;
     joint_options.use_dense = options.use_dense_depth;
+    joint_options.use_row_motion = options.use_row_motion;
     joint_options.refresh_velocities = [&frames](TrackingMap& moved) {
       RefreshVelocities(frames, moved);
     };

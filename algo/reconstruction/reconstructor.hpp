@@ -19,6 +19,7 @@ struct ReconstructorOptions {
   bool use_markers = true;    ///< false: track and reconstruct by keypoints and depth alone.
   bool use_keypoints = true;  ///< false: track by markers (and depth) alone.
   /// Preset `best`; each may be switched off to see what it is worth.
+  bool use_row_motion = true;   ///< Find each keyframe's velocity from the rows of its own image.
   bool use_tone_curve = true;   ///< Find the camera's tone curve and measure the markers under it.
   bool use_depth_field = true;  ///< Find the depth image's distortion over the image.
   bool use_dense_depth = true;  ///< Register overlapping depth images.

@@ -64,6 +64,7 @@ void ReadReconstruct(Section section, ReconstructorOptions& options) {
   section.Take("keep_color", options.keep_color, "true or false", kAny);
   section.Take("use_markers", options.use_markers, "true or false", kAny);
   section.Take("use_keypoints", options.use_keypoints, "true or false", kAny);
+  section.Take("use_row_motion", options.use_row_motion, "true or false", kAny);
   section.Take("use_tone_curve", options.use_tone_curve, "true or false", kAny);
   section.Take("use_depth_field", options.use_depth_field, "true or false", kAny);
   section.Take("use_dense_depth", options.use_dense_depth, "true or false", kAny);

@@ -106,19 +106,46 @@ TEST(RegisterJointly, BeginsFromWhatIsKnownOfTheSensorAndSaysWhatTheSweepShowed)
   EXPECT_GT(information(kDepthAt + kDepthShiftX, kDepthAt + kDepthShiftX), 1.0);
 }
 
-TEST(RegisterJointly, AsksForVelocitiesBeforeEachDenseRound) {
+TEST(RegisterJointly, AsksForVelocitiesBeforeEachRound) {
   const TrueMap truth = MakeTrueMap({.num_keyframes = 5, .num_landmarks = 60, .dense = true});
   TrackingMap map = truth.map;
   int asked = 0;
   JointRegistrationOptions options;
   options.num_rounds = 2;
+  options.num_velocity_rounds = 3;
   options.settled_m = 0.0;
   options.refresh_velocities = [&](TrackingMap& moved) {
     EXPECT_EQ(&moved, &map);
     ++asked;
   };
   static_cast<void>(RegisterJointly(truth.stated, options, map));
-  EXPECT_EQ(asked, 2);
+  EXPECT_EQ(asked, 5);
+}
+
+TEST(RegisterJointly, FindsVelocitiesInTheRowsUnlessToldNotTo) {
+  synthetic::MapOptions with_readout{.num_keyframes = 6, .num_landmarks = 120};
+  with_readout.sensor.readout_s[0] = 0.025;
+  const TrueMap truth = MakeTrueMap(with_readout);
+  JointRegistrationOptions options;
+  options.use_dense = false;
+  options.refresh_velocities = [&](TrackingMap& moved) {
+    for (std::size_t k = 0; k < moved.keyframes.size(); ++k) {
+      moved.keyframes[k].velocity_per_s = truth.map.keyframes[k].velocity_per_s;
+      moved.keyframes[k].velocity_per_s[2] += 0.05;  // Only the rows can know better.
+    }
+  };
+  const auto error = [&](bool use_row_motion) {
+    options.use_row_motion = use_row_motion;
+    TrackingMap map = truth.map;
+    static_cast<void>(RegisterJointly(truth.stated, options, map));
+    double sum = 0;
+    for (std::size_t k = 0; k < map.keyframes.size(); ++k)
+      sum +=
+          std::abs(map.keyframes[k].velocity_per_s[2] - truth.map.keyframes[k].velocity_per_s[2]);
+    return sum / static_cast<double>(map.keyframes.size());
+  };
+  EXPECT_NEAR(error(false), 0.05, 1e-12);
+  EXPECT_LT(error(true), 0.035);
 }
 
 TEST(RegisterJointly, SameBitsOnAnyNumberOfThreads) {

@@ -91,6 +91,40 @@ TEST(Trajectory, DepthPosesAreTakenAtTheDepthStampAndItsDelay) {
   EXPECT_LT((trajectory[3].T_world_camera.translation() - Vector3d(0.325, 7, 0)).norm(), 1e-9);
 }
 
+TEST(Trajectory, VelocitiesFollowATremblingHand) {
+  // 8 Hz at 30 images a second: the neighbours' difference alone would see 0.59 of it.
+  constexpr double kTurnsPerSecond = 8.0;
+  constexpr double kAmplitude_m = 0.002;
+  constexpr double kRate = 2.0 * 3.14159265358979 * kTurnsPerSecond;
+  Path path;
+  path.map.keyframes.resize(1);
+  for (int i = 0; i < 60; ++i) {
+    TrackedFrame frame;
+    frame.frame_index = i;
+    frame.color_time_s = frame.depth_time_s = i / 30.0;
+    frame.tracked = true;
+    frame.reference_keyframe = 0;
+    frame.keyframe = i == 0 ? 0 : -1;
+    // The camera looks another way than the world's axes: velocities are in its own.
+    frame.T_reference_color =
+        At(kAmplitude_m * std::sin(kRate * frame.color_time_s), 0, 0.5 * 3.14159265358979);
+    path.frames.push_back(frame);
+  }
+  path.frames[0].T_reference_color = Pose::Identity();
+  path.map.keyframes[0].T_world_color = Pose::Identity();
+  RefreshVelocities(path.frames, path.map);
+  double seen = 0;
+  double shaken = 0;
+  for (std::size_t i = 5; i < 55; ++i) {
+    const double expected = kAmplitude_m * kRate * std::cos(kRate * path.frames[i].color_time_s);
+    seen += -path.frames[i].velocity_per_s[4] * expected;
+    shaken += expected * expected;
+    EXPECT_LT(std::abs(path.frames[i].velocity_per_s[3]), 1e-9);
+  }
+  EXPECT_GT(seen / shaken, 0.7);
+  EXPECT_LT(seen / shaken, 1.0);
+}
+
 TEST(Trajectory, VelocityIsNotTakenAcrossAGap) {
   Path path = Tracked();
   for (std::size_t i = 3; i < 6; ++i) path.frames[i].color_time_s += 5.0;

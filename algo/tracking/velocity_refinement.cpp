@@ -1,0 +1,124 @@
+#include "algo/tracking/velocity_refinement.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+#include <Eigen/Cholesky>
+
+#include "algo/tracking/bundle_model.hpp"
+
+namespace plumb {
+namespace {
+
+using namespace bundle;  // NOLINT: the residuals' own vocabulary
+using Vector12d = Eigen::Matrix<double, 12, 1>;
+using Matrix12d = Eigen::Matrix<double, 12, 12>;
+using Rows = Eigen::Matrix<double, 2, 12>;
+
+constexpr int kIterations = 4;
+constexpr int kMinPoints = 12;  // Fewer hold a pose and a velocity only by the prior.
+
+// One keyframe's equations: its twist and the change of its velocity.
+class ImageMotion {
+ public:
+  ImageMotion(const Intrinsics& stated, const CalibrationModel& calibration,
+              const VelocityOptions& options, const TrackingMap& map, const MapKeyframe& keyframe)
+      : stated_(stated),
+        calibration_(calibration),
+        options_(options),
+        map_(map),
+        keyframe_(keyframe) {
+    camera_.T_camera0_world = keyframe.T_world_color.inverse();
+    camera_.velocity_per_s = keyframe.velocity_per_s;
+  }
+
+  Vector6d Solve() {
+    prior_.tail<6>() << Eigen::Vector3d::Constant(std::pow(options_.turning_sigma_rad_per_s, -2)),
+        Eigen::Vector3d::Constant(std::pow(options_.shifting_sigma_m_per_s, -2));
+    for (int i = 0; i < kIterations; ++i) {
+      camera_.Prepare();
+      H_ = prior_.asDiagonal();
+      g_ = prior_.cwiseProduct(change_);
+      count_ = 0;
+      AddKeypoints();
+      AddCorners();
+      if (count_ < kMinPoints) return keyframe_.velocity_per_s;
+      const Vector12d step = H_.ldlt().solve(g_);
+      if (!step.allFinite()) return keyframe_.velocity_per_s;
+      camera_.twist -= step.head<6>();
+      change_ -= step;
+      camera_.velocity_per_s = keyframe_.velocity_per_s + change_.tail<6>();
+    }
+    return camera_.velocity_per_s;
+  }
+
+ private:
+  void AddKeypoints() {
+    const double weight = 640.0 / (options_.keypoint_sigma_px * stated_.width);
+    for (const KeypointObservation& o : keyframe_.keypoints) {
+      const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
+      if (!landmark.usable || landmark.num_observations < 2) continue;
+      Add(landmark.p_world, o.pixel, Eigen::Vector2d::Zero(), weight, kKeypointLossScale);
+    }
+  }
+
+  void AddCorners() {
+    const MarkerCorners in_marker = CornersInMarkerFrame(options_.marker_length_m);
+    const double scale = stated_.width / 640.0;
+    for (const MarkerObservation& m : keyframe_.data.markers) {
+      const auto found = map_.markers.find(m.id);
+      if (found == map_.markers.end()) continue;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const Eigen::Vector2d edges = (m.corners[(i + 1) % 4] - m.corners[i]).normalized() +
+                                      (m.corners[(i + 3) % 4] - m.corners[i]).normalized();
+        Add(found->second.T_world_marker * in_marker[i], m.corners[i],
+            calibration_.edge_bias_px[0] * scale * edges,
+            1.0 / std::max(options_.min_corner_sigma_px * scale, m.sigma_px[i]), kCornerLossScale);
+      }
+    }
+  }
+
+  void Add(const Eigen::Vector3d& p_world, const Eigen::Vector2d& pixel,
+           const Eigen::Vector2d& shift, double weight, double loss_scale) {
+    const double dt_s = calibration_.readout_s[0] * RowShare(pixel.y(), stated_.height);
+    const SeenPoint seen = See(camera_, p_world, dt_s);
+    if (seen.p.z() < kNearestPoint_m) return;
+    const SeenPixel projected = ProjectCorrected(stated_, calibration_.lens, seen.p);
+    Eigen::Vector2d r = (projected.pixel + shift - pixel) * weight;
+    const double robust = std::sqrt(CauchyWeight(r.squaredNorm(), loss_scale));
+    r *= robust;
+    const Eigen::Matrix<double, 2, 3> J_point = robust * weight * projected.J_point;
+    Rows J;
+    J.leftCols<6>() = J_point * seen.J_pose;
+    J.middleCols<3>(6) = dt_s * J_point * Skew(camera_.T_camera_world * p_world);
+    J.rightCols<3>() = -dt_s * J_point;
+    H_.noalias() += J.transpose() * J;
+    g_.noalias() += J.transpose() * r;
+    ++count_;
+  }
+
+  const Intrinsics& stated_;
+  const CalibrationModel& calibration_;
+  const VelocityOptions& options_;
+  const TrackingMap& map_;
+  const MapKeyframe& keyframe_;
+  CameraState camera_;
+  Vector12d prior_ = Vector12d::Zero();
+  Vector12d change_ = Vector12d::Zero();
+  Matrix12d H_ = Matrix12d::Zero();
+  Vector12d g_ = Vector12d::Zero();
+  int count_ = 0;
+};
+
+}  // namespace
+
+void RefineVelocities(const Intrinsics& stated, const CalibrationModel& calibration,
+                      const VelocityOptions& options, TrackingMap& map) {
+  tbb::parallel_for(std::size_t{0}, map.keyframes.size(), [&](std::size_t k) {
+    MapKeyframe& keyframe = map.keyframes[k];
+    keyframe.velocity_per_s = ImageMotion(stated, calibration, options, map, keyframe).Solve();
+  });
+}
+
+}  // namespace plumb
