@@ -23,7 +23,7 @@ TEST_F(SharedDataTest, AnotherSimulatorsSweepsWithTruth) {
   const json figures = json::parse(result.out);
   for (const auto& pair : figures.at("pairs")) {
     EXPECT_LE(pair.at("translation_mm").get<double>(), 1.45);  // Measured: 1.18.
-    EXPECT_LE(pair.at("rotation_deg").get<double>(), 0.07);   // Measured: 0.054.
+    EXPECT_LE(pair.at("rotation_deg").get<double>(), 0.07);    // Measured: 0.054.
   }
   for (const auto& [name, scene] : figures.at("scenes").items()) {
     EXPECT_EQ(scene.at("frames").at("tracked"), scene.at("frames").at("total")) << name;
