@@ -1,5 +1,6 @@
-// Both languages of the page hold the same texts: catalogue_test.mjs SOURCE_FOLDER
-import { copyFileSync, mkdtempSync, rmSync } from 'node:fs';
+// Both languages of the page hold the same texts, and words for every action that the sources write
+// into the audit log: catalogue_test.mjs SOURCE_FOLDER
+import { copyFileSync, mkdtempSync, readFileSync, readdirSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
@@ -33,6 +34,54 @@ function compare(a, b, path) {
   }
 }
 compare(en, es, '');
+
+/// The actions of one source file: the second argument of every call that writes an audit entry,
+/// which is a literal or a choice of literals. A definition is told by its typed parameter; the
+/// journal's Log() begins with a level.
+function actionsOf(text, file) {
+  const actions = new Set();
+  for (const call of text.matchAll(/(\b(?:Write|Log)|\blog_?)\(/g)) {
+    const parts = [''];
+    let [depth, quoted] = [0, false];
+    for (let i = call.index + call[0].length; i < text.length; ++i) {
+      const c = text[i];
+      if (c === '\\' && quoted) { parts[parts.length - 1] += c + text[++i]; continue; }
+      if (c === '"') quoted = !quoted;
+      if (!quoted && '([{'.includes(c)) ++depth;
+      if (!quoted && ')]}'.includes(c) && --depth < 0) break;
+      if (!quoted && c === ',' && depth === 0) parts.push('');
+      else parts[parts.length - 1] += c;
+    }
+    const [who, what] = parts.map((part) => part.trim());
+    if (parts.length !== 4 || /^LogLevel::|&\s*\w+$/.test(who)) continue;
+    if (what === 'action') continue;  // is handed on: the caller's literal is looked at
+    const found = what.match(/"[^"]*"/g) ?? [];
+    if (!found.length) failures.push(`${file}: the action in "${what}" cannot be read`);
+    for (const literal of found) actions.add(literal.slice(1, -1));
+  }
+  return actions;
+}
+const written = new Set();
+for (const top of ['daemon', 'web']) {
+  for (const file of readdirSync(join(source, top), { recursive: true })) {
+    if (!file.endsWith('.cpp') || file.includes('node_modules')) continue;
+    for (const one of actionsOf(readFileSync(join(source, top, file), 'utf8'), join(top, file))) {
+      written.add(one);
+    }
+  }
+}
+for (const one of ['login', 'patient.import', 'scan.accept_outside', 'update.done',
+  'system.restart_failed']) {
+  if (!written.has(one)) failures.push(`the sources are said not to write ${one}`);
+}
+for (const one of written) {
+  for (const [name, words] of [['English', en], ['Spanish', es]]) {
+    if (!words.audit.actions[one]) failures.push(`the action ${one} has no words in ${name}`);
+  }
+}
+for (const one of Object.keys(en.audit.actions)) {
+  if (!written.has(one)) failures.push(`nothing writes the action ${one} that has words`);
+}
 for (const [text, expected] of [
   ['up', 'arriba'], ['to patient left', 'hacia la izquierda del paciente'],
   ['left side at the head end 9 mm high',

@@ -1,7 +1,10 @@
 // Backups and what is restored of them.
 #include "daemon/records/backup.hpp"
 
+#include <atomic>
+#include <chrono>
 #include <fstream>
+#include <set>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -99,23 +102,35 @@ TEST_F(BackupTest, IsMadeWhileScansGoOnAndHoldsOneMoment) {
 
 TEST_F(BackupTest, NothingIsRemovedWhileItIsMade) {
   Store store(state());
-  std::atomic<bool> ended = false;
-  std::jthread backing_up([&] {
-    for (int i = 0; i < 20; ++i) (void)store.Backup(kAnna, backup());
-    ended = true;
+  std::atomic<int> made = 0;
+  std::jthread backing_up([&](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      EXPECT_THAT(store.Backup(kAnna, backup()).problems, IsEmpty());
+      ++made;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));  // removals have their turn
+    }
   });
-  int refused = 0;
-  while (!ended) {
+  std::set<int> refused_in;  // the backups during which it was
+  int removed = 0;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+  while ((refused_in.size() < 5 || removed < 3) && std::chrono::steady_clock::now() < end) {
+    const int during = made;
     try {
       (void)store.KeepWithinQuota(0);
+      ++removed;
+      // Something for the next one to take, and no more: backups take the longer, the more there
+      // is.
+      for (int i = 0; i < 3; ++i) (void)StoreScan(store, patient_);
     } catch (const StoreRefusal& refusal) {
       EXPECT_THAT(refusal.what(), HasSubstr("backup"));
-      ++refused;
+      refused_in.insert(during);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    const std::string scan = StoreScan(store, patient_);
   }
+  backing_up.request_stop();
   backing_up.join();
-  EXPECT_GT(refused, 0);
+  EXPECT_GE(refused_in.size(), 5U);
+  EXPECT_GE(removed, 3) << "nothing could be removed between two backups either";
   const fs::path target = restored();
   (void)store.Backup(kAnna, backup());
   (void)RestoreBackup(backup(), target);
