@@ -70,7 +70,7 @@ TEST(DaemonBackupTest, ABackupOf200ScansDisturbsNoSweepAndIsRestoredByteIdentica
             lost = status["last_result"]["frames_dropped"];
   std::printf("%d frames, %d dropped, %d backups of %d scans meanwhile\n", frames, lost,
               made_meanwhile, kScans);
-  EXPECT_GE(made, 1);  // the sweep was not over before one began
+  EXPECT_GE(made, 1);
   if (!testing::kIsSanitized) {
     EXPECT_LE(lost, kMostDropped * (frames + lost));
   }
