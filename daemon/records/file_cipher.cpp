@@ -120,6 +120,9 @@ const unsigned char* Bytes(const std::string& text) {
   return reinterpret_cast<const unsigned char*>(text.data());
 }
 
+/// Sealed into each piece of a file, so that files of one backup cannot change places.
+const std::string& PlaceOf(const std::string& path) { return path; }
+
 std::string Hex(const unsigned char* bytes, std::size_t count) {
   std::string text(2 * count + 1, '\0');
   ::sodium_bin2hex(text.data(), text.size(), bytes, count);
@@ -211,6 +214,7 @@ std::string FileCipher::Signature(const std::string& text) const {
 
 FileCipher::Written FileCipher::Seal(const fs::path& from, const fs::path& to,
                                      const std::string& path, const std::stop_token& stop) const {
+  const std::string& place = PlaceOf(path);
   Pieces pieces(from / path, kPiece);
   pieces.Begin();
   Target target(to, path);
@@ -225,7 +229,7 @@ FileCipher::Written FileCipher::Seal(const fs::path& from, const fs::path& to,
     const std::vector<std::uint8_t> piece = pieces.Take();
     sealed.resize(piece.size() + kOverhead);
     ::crypto_secretstream_xchacha20poly1305_push(
-        &state, sealed.data(), nullptr, piece.data(), piece.size(), Bytes(path), path.size(),
+        &state, sealed.data(), nullptr, piece.data(), piece.size(), Bytes(place), place.size(),
         pieces.is_last() ? crypto_secretstream_xchacha20poly1305_TAG_FINAL : 0);
     target.Write(sealed);
     hash.Add(piece.data(), piece.size());
@@ -242,6 +246,7 @@ FileCipher::Written FileCipher::Open(const fs::path& from, const fs::path& to,
   const auto fail = [&path] {
     throw DataError(path + " is not what was encrypted there: it was changed or put together anew");
   };
+  const std::string& place = PlaceOf(path);
   Pieces pieces(from / path, kPiece + kOverhead);
   const std::vector<std::uint8_t> header =
       pieces.Exactly(crypto_secretstream_xchacha20poly1305_HEADERBYTES);
@@ -261,8 +266,8 @@ FileCipher::Written FileCipher::Open(const fs::path& from, const fs::path& to,
     std::vector<std::uint8_t> plain(piece.size() - kOverhead);
     unsigned char tag = 0;
     if (::crypto_secretstream_xchacha20poly1305_pull(&state, plain.data(), nullptr, &tag,
-                                                     piece.data(), piece.size(), Bytes(path),
-                                                     path.size()) != 0 ||
+                                                     piece.data(), piece.size(), Bytes(place),
+                                                     place.size()) != 0 ||
         (tag == crypto_secretstream_xchacha20poly1305_TAG_FINAL) != pieces.is_last())
       fail();
     target.Write(plain);

@@ -240,6 +240,17 @@ TEST(ComparisonTest, DeviationIsCurrentMinusReferenceAndVanishesAfterTheCorrecti
   EXPECT_LT(*comparison.correction->value.vertical_mm, -11.9);
 }
 
+TEST(ComparisonTest, TheMeasuredResidualMeetsItsLimit) {
+  const Scene reference = PerfectReference(), current = PerfectRepeat();
+  const double residual_m = Compare(reference, current).motion->residual_p95_m;
+  ASSERT_GT(residual_m, 0);
+  CompareOptions options;
+  options.limits.max_residual_p95_m = 1.001 * residual_m;
+  EXPECT_EQ(Compare(reference, current, options).verdict, Verdict::kInTolerance);
+  options.limits.max_residual_p95_m = 0.999 * residual_m;
+  EXPECT_EQ(Compare(reference, current, options).verdict, Verdict::kNoAnswer);
+}
+
 TEST(ComparisonTest, EachDoubtIsNoAnswerWithItsReason) {
   const SyntheticOptions reference = ReferenceOptions();
   SyntheticOptions half = MovedBy(Pose::Identity(), reference);

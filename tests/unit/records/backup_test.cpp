@@ -186,6 +186,17 @@ TEST_F(BackupTest, ADamagedBackupRestoresNothingAndSaysWhich) {
   EXPECT_EQ(RestoreBackup(backup(), restored()).files, files.size() - 2);
 }
 
+// Before the first file is copied, so that the message counts all of them.
+TEST_F(BackupTest, EveryDamagedFileIsCountedBeforeAnyIsCopied) {
+  const BackupReport made = BackUpStopped(state(), backup());
+  for (const std::string& scan : {reference_, scan_})
+    WriteWholeFile(backup() / "scans" / scan / "scene" / "cloud.ply", std::string_view("changed"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)RestoreBackup(backup(), restored()); }),
+              HasSubstr(fmt::format("2 of {} files are damaged (scans/{}/scene/cloud.ply",
+                                    made.files, reference_)));
+  EXPECT_FALSE(fs::exists(restored()));
+}
+
 TEST_F(BackupTest, APathOutsideIsRefused) {
   (void)BackUpStopped(state(), backup());
   const auto files = FilesBelow(backup());

@@ -154,6 +154,27 @@ TEST_F(StoreCareTest, AnotherStoreOnTheFolderIsRefusedAtOnce) {
   Store second(state(), options);
 }
 
+TEST_F(StoreCareTest, EveryFieldOfAPlanComesBackAsItWasStored) {
+  const std::string scan = StoreScan(*store_, patient_);
+  for (const char* posture : {"HFP", "FFS", "FFP", "HFS"}) {
+    for (const bool couch_markers : {true, false}) {
+      const web::ReferencePlan plan{.region_m = {{0.25, -0.5}, {1.5, 0.75}, {-1, 2}},
+                                    .isocentre_m = {{0.125, -0.25, 0.5}},
+                                    .tolerance = {.shift_mm = 7.5, .rotation_deg = 2.25},
+                                    .posture = posture,
+                                    .couch_markers = couch_markers};
+      const std::string id = store_->AddReference(kAnna, scan, "", plan);
+      const web::ReferencePlan stored = store_->FindReference(id)->plan;
+      EXPECT_EQ(stored.region_m, plan.region_m);
+      EXPECT_EQ(stored.isocentre_m, plan.isocentre_m);
+      EXPECT_EQ(stored.tolerance.shift_mm, 7.5);
+      EXPECT_EQ(stored.tolerance.rotation_deg, 2.25);
+      EXPECT_EQ(stored.posture, posture);
+      EXPECT_EQ(stored.couch_markers, couch_markers);
+    }
+  }
+}
+
 TEST_F(StoreCareTest, AStoredPlanThatCannotBeReadIsAnErrorAndNoDefault) {
   const std::string scan = StoreScan(*store_, patient_);
   const std::string id = store_->AddReference(kAnna, scan, "", {});
