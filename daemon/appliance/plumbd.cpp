@@ -37,6 +37,7 @@
 #include "daemon/loop/loop_report.hpp"
 #include "drivers/live/sensor_driver.hpp"
 #include "web/api/http_server.hpp"
+#include "web/security/certificate_care.hpp"
 
 namespace plumb {
 namespace {
@@ -245,6 +246,7 @@ class Plumbd {
       Log(LogLevel::kWarning, SlowTurnText(turn, unsaid));
     });
     tick_ = loop_.MakeTimer("watchdog", [this] { Tick(); });
+    certificate_timer_ = loop_.MakeTimer("certificate", [this] { LookAtCertificate(); });
   }
 
   ~Plumbd() {
@@ -262,7 +264,7 @@ class Plumbd {
     if (!page_.certificate.empty())
       Log(LogLevel::kNotice, "SHA-256 of the page's certificate: " + page_.certificate);
     for (const std::string& warning : page_.warnings) Log(LogLevel::kWarning, warning);
-    appliance_.SetPage(page_);
+    LookAtCertificate();
     if (const std::optional<std::string> code = http_.setup_code();
         code && appliance_.storage_fault().empty()) {
       fmt::print("setup code: {}\n", *code);  // under systemd the standard output is the journal
@@ -292,6 +294,7 @@ class Plumbd {
     options.listen_fd = InheritedSocket("http");
     options.host_names = config.web.host_names;
     page_ = IdentifyPage(config, options);
+    if (options.tls) certificate_pem_ = options.tls->certificate_pem;
     options.upload_folder = config.update.folder;
     options.doing = [this](std::string_view what) { loop_.meter().Part(what); };
     options.max_upload_bytes = static_cast<std::uint64_t>(config.update.max_bundle_mb) << 20;
@@ -305,6 +308,22 @@ class Plumbd {
     } else {
       http_timer_.Disarm();
     }
+  }
+
+  /// The end of a certificate comes while the service runs.
+  void LookAtCertificate() {
+    PageNotes page = page_;
+    if (!certificate_pem_.empty()) {
+      std::vector<std::string> told =
+          web::CertificateWarnings(certificate_pem_, std::chrono::system_clock::now());
+      if (told != certificate_warnings_) {
+        for (const std::string& warning : told) Log(LogLevel::kWarning, warning);
+      }
+      page.warnings.insert(page.warnings.end(), told.begin(), told.end());
+      certificate_warnings_ = std::move(told);
+    }
+    appliance_.SetPage(std::move(page));
+    certificate_timer_.ArmAfter(std::chrono::hours(1));
   }
 
   void Tick() {
@@ -348,6 +367,8 @@ class Plumbd {
   Panel panel_;
   Appliance appliance_;
   PageNotes page_;
+  std::string certificate_pem_;  ///< Empty: no TLS.
+  std::vector<std::string> certificate_warnings_;
   fs::path own_socket_;  ///< The control socket where this process made it.
   WebService service_;
   web::HttpServer http_;
@@ -355,7 +376,7 @@ class Plumbd {
   ControlServer control_;
   EventLoop::Source http_source_, http_timer_;
   std::vector<EventLoop::Source> signals_;
-  EventLoop::Source tick_;
+  EventLoop::Source tick_, certificate_timer_;
   bool has_watchdog_ = false;
   std::chrono::microseconds watchdog_period_{1'000'000};
   std::string status_line_;

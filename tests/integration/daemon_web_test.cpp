@@ -4,6 +4,7 @@
 #include <fstream>
 #include <iterator>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -209,6 +210,30 @@ TEST_F(DaemonWebTest, OffLoopbackItIsServedByTlsWithACertificateOfItsOwnThatStay
   }
   EXPECT_EQ(fs::status(folder_ / "state" / "page-key.pem").permissions(), fs::perms(0600));
   EXPECT_EQ(fs::status(folder_ / "state" / "device.key").permissions(), fs::perms(0600));
+}
+
+TEST_F(DaemonWebTest, TheEndOfItsCertificateIsToldFromThirtyDaysBefore) {
+  std::ofstream(folder_ / "plumb.toml")
+      << fmt::format("[web]\ntls_certificate = '{}'\ntls_key = '{}'\n",
+                     (folder_ / "certificate.pem").string(), (folder_ / "key.pem").string());
+  for (const int days : {29, 31}) {
+    const std::string make = fmt::format(
+        "cd {} && openssl req -x509 -newkey rsa:2048 -nodes -days {} -subj '/CN=room 1' -keyout "
+        "key.pem -out certificate.pem 2> /dev/null",
+        folder_.path().string(), days);
+    ASSERT_EQ(std::system(make.c_str()), 0);
+    Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}});
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    const json page = plumbd.WaitFor(
+        "its page", [](const json& status) { return status["page"]["url"] != ""; })["page"];
+    EXPECT_EQ(page["certificate"].get<std::string>().size(), 95U);
+    ASSERT_EQ(page["warnings"].size(), days == 29 ? 1U : 0U) << page;
+    if (days == 29) {
+      EXPECT_THAT(page["warnings"][0].get<std::string>(), HasSubstr("CN=room 1 ends on "));
+      EXPECT_THAT(plumbd.log(), HasSubstr("CN=room 1 ends on "));
+    }
+    EXPECT_EQ(plumbd.Stop(), 0);
+  }
 }
 
 TEST_F(DaemonWebTest, WithoutTlsOffLoopbackOnlyIfItIsSaidAndThenWithAWarning) {

@@ -1,0 +1,94 @@
+// What is told of a certificate, on both sides of each boundary; openssl makes them.
+#include "web/security/certificate_care.hpp"
+
+#include <cstdlib>
+#include <ctime>
+#include <fstream>
+#include <iterator>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "algo/base/errors.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "web/security/tls_identity.hpp"
+
+namespace plumb::web {
+namespace {
+
+using std::chrono::system_clock;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class CertificateCareTest : public ::testing::Test {
+ protected:
+  std::string Run(const std::string& arguments, const std::string& written) {
+    const std::string command =
+        fmt::format("cd {} && openssl {} 2>/dev/null", folder_.path().string(), arguments);
+    EXPECT_EQ(std::system(command.c_str()), 0) << command;
+    std::ifstream in(folder_ / written);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  /// Of `days` from now, for a key as `openssl req -newkey` names it.
+  std::string Made(const std::string& key, int days, const std::string& name = "room 1") {
+    return Run(fmt::format("req -x509 -newkey {} -nodes -days {} -subj '/CN={}' -keyout key.pem "
+                           "-out certificate.pem",
+                           key, days, name),
+               "certificate.pem");
+  }
+
+  // Later than what the tests make: certificates begin with the second in which they are made.
+  const system_clock::time_point begin_ = system_clock::now(),
+                                 now_ = begin_ + std::chrono::minutes(1);
+  testing::TempFolder folder_;
+};
+
+constexpr const char* kCurve = "ec -pkeyopt ec_paramgen_curve:P-256";
+
+TEST_F(CertificateCareTest, ItsEndIsToldFromThirtyDaysBefore) {
+  const std::string pem = Made(kCurve, 100);
+  const std::chrono::hours day(24);
+  const std::chrono::minutes late(1);
+  EXPECT_THAT(CertificateWarnings(pem, now_), IsEmpty());
+  EXPECT_THAT(CertificateWarnings(pem, begin_ + 70 * day - late), IsEmpty());
+  EXPECT_THAT(CertificateWarnings(pem, begin_ + 70 * day + late),
+              ElementsAre(AllOf(HasSubstr("CN=room 1"), HasSubstr(" ends on "))));
+  EXPECT_THAT(CertificateWarnings(pem, begin_ + 100 * day - late),
+              ElementsAre(HasSubstr(" ends on ")));
+  EXPECT_THAT(CertificateWarnings(pem, begin_ + 100 * day + late),
+              ElementsAre(HasSubstr(" ended on ")));
+  EXPECT_THAT(CertificateWarnings(pem, begin_ - late), ElementsAre(HasSubstr("valid only from")));
+}
+
+TEST_F(CertificateCareTest, TheEndOfEachOfAChainIsTold) {
+  const std::string first = Made(kCurve, 100, "the page"), second = Made(kCurve, 20, "authority");
+  EXPECT_THAT(CertificateWarnings(first + second, now_),
+              ElementsAre(AllOf(HasSubstr("CN=authority"), HasSubstr(" ends on "))));
+}
+
+TEST_F(CertificateCareTest, AWeakKeyIsTold) {
+  EXPECT_THAT(CertificateWarnings(Made("rsa:1024", 100), now_),
+              ElementsAre(AllOf(HasSubstr("too weak"), HasSubstr("1024 bits"))));
+  EXPECT_THAT(CertificateWarnings(Made("rsa:2047", 100), now_),
+              ElementsAre(HasSubstr("2047 bits")));
+  EXPECT_THAT(CertificateWarnings(Made("rsa:2048", 100), now_), IsEmpty());
+  EXPECT_THAT(CertificateWarnings(Made("ec -pkeyopt ec_paramgen_curve:P-192", 100), now_),
+              ElementsAre(HasSubstr("192 bits")));
+}
+
+TEST_F(CertificateCareTest, TheAppliancesOwnIsNothingToTellOf) {
+  const TlsIdentity own = MakeTlsIdentity({});
+  EXPECT_THAT(CertificateWarnings(own.certificate_pem, now_), IsEmpty());
+  EXPECT_THAT(CertificateWarnings(own.key_pem + own.certificate_pem, now_), IsEmpty());
+}
+
+TEST_F(CertificateCareTest, WhatIsNoCertificateIsRefused) {
+  for (const char* text : {"", "no certificate", "-----BEGIN CERTIFICATE-----\nAAAA\n"})
+    EXPECT_THROW((void)CertificateWarnings(text, now_), DataError) << text;
+}
+
+}  // namespace
+}  // namespace plumb::web
