@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 
 #include "algo/base/errors.hpp"
+#include "algo/sensor_model/profile_gate.hpp"
 
 namespace plumb {
 namespace {
@@ -11,20 +12,6 @@ namespace {
 // residuals share the errors that the model leaves out. Measured on three sweeps of one simulated
 // unit with known truth: all lens terms then lie within 1.5 standard deviations.
 constexpr double kSharedErrors = 3.0;
-
-// What changes from one sweep to the next of the same unit.
-CalibrationVector Drift() {
-  CalibrationVector sigma;
-  sigma.segment<CalibrationModel::kLensSize>(kLensAt) << 0.0001, 0.0001, 0.05, 0.05, 0.0003, 0.0006,
-      0.00002, 0.00002;
-  sigma[kReadoutAt] = 0.0001;
-  sigma[kEdgeBiasAt] = 0.0;
-  sigma.segment<kDepthField>(kDepthAt) << 0.001, 0.0005, 0.0003, 0.1, 0.1, 0.0005, 0.0003, 0.0003,
-      0.0003;
-  sigma.segment<kNumFieldTerms>(kDepthAt + kDepthField).setConstant(0.0001);
-  sigma.segment<kNumGrowthTerms>(kDepthAt + kDepthGrowth).setConstant(0.0002);
-  return sigma;
-}
 
 CalibrationMatrix Inverse(const CalibrationMatrix& m, const char* of) {
   const Eigen::LLT<CalibrationMatrix> solver(m);
@@ -36,6 +23,19 @@ CalibrationMatrix Inverse(const CalibrationMatrix& m, const char* of) {
 }
 
 }  // namespace
+
+CalibrationVector DriftBetweenSweeps() {
+  CalibrationVector sigma;
+  sigma.segment<CalibrationModel::kLensSize>(kLensAt) << 0.0001, 0.0001, 0.05, 0.05, 0.0003, 0.0006,
+      0.00002, 0.00002;
+  sigma[kReadoutAt] = 0.0001;
+  sigma[kEdgeBiasAt] = 0.0;
+  sigma.segment<kDepthField>(kDepthAt) << 0.001, 0.0005, 0.0003, 0.1, 0.1, 0.0005, 0.0003, 0.0003,
+      0.0003;
+  sigma.segment<kNumFieldTerms>(kDepthAt + kDepthField).setConstant(0.0001);
+  sigma.segment<kNumGrowthTerms>(kDepthAt + kDepthGrowth).setConstant(0.0002);
+  return sigma;
+}
 
 SensorProfile ProfileOfAnyUnit(const Intrinsics& stated) {
   SensorProfile profile;
@@ -52,7 +52,7 @@ CalibrationPrior PriorOfNextSweep(const SensorProfile& profile, const Intrinsics
         "the sensor profile belongs to a sensor with another camera.yaml than this recording's: "
         "use the profile of this unit, or make one with plumb calibrate");
   CalibrationMatrix covariance = profile.covariance;
-  covariance.diagonal() += Drift().cwiseAbs2();
+  covariance.diagonal() += DriftBetweenSweeps().cwiseAbs2();
   covariance.row(kEdgeBiasAt).setZero();
   covariance.col(kEdgeBiasAt).setZero();
   covariance(kEdgeBiasAt, kEdgeBiasAt) = edge_bias_sigma_px * edge_bias_sigma_px;

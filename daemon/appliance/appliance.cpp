@@ -36,7 +36,9 @@ double Milliseconds(Clock::duration duration) {
 }  // namespace
 
 Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
-    : loop_(loop), parts_(std::move(parts)) {
+    : loop_(loop),
+      parts_(std::move(parts)),
+      profiles_(std::make_shared<ProfileShelf>(parts_.config.appliance.state / "sensor-profiles")) {
   OpenStore();
   result_timer_ =
       loop_.MakeTimer("result expired", [this] { (void)Handle(ScanEvent::kResultExpired); });
@@ -222,6 +224,7 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
   job.reconstructor = parts_.config.reconstruct;
   job.reconstructor.keep_color = false;  // of a patient only the shape is kept
   job.keep_recording = parts_.config.appliance.keep_recordings || settings.keep_recordings;
+  job.unit_profile = MakeUnitProfile();
   job.stop_after_s = parts_.config.appliance.auto_stop_s.value_or(settings.auto_stop_s);
   if (check_) {
     job.keep_recording = false;
@@ -247,6 +250,19 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
     job.compare.now_s = SteadySeconds;
   }
   return job;
+}
+
+/// Null where none is kept: switched off, another preset than `best`, or a unit without a serial.
+std::shared_ptr<UnitProfile> Appliance::MakeUnitProfile() {
+  const SensorSnapshot sensor = sensors_->snapshot();
+  if (!HasProfile(sensor.sensor)) return nullptr;
+  return std::make_shared<UnitProfile>(profiles_, sensor.sensor.serial, sensor.info.intrinsics);
+}
+
+bool Appliance::HasProfile(const SensorDescription& sensor) const {
+  return parts_.config.appliance.sensor_profiles &&
+         parts_.config.reconstruct.preset == Preset::kBest && !sensor.serial.empty() &&
+         sensor.serial != sensor.uri;
 }
 
 web::ReferencePlan Appliance::DefaultPlan() {
@@ -358,6 +374,11 @@ void Appliance::LogSensor(const SensorEvent& event) {
   if (event.kind == SensorEvent::Kind::kReady) {
     sensor_since_ = Clock::now();
     Log(LogLevel::kInfo, "the sensor is ready", {{"SERIAL", serial}});
+    if (parts_.config.appliance.sensor_profiles && !HasProfile(event.sensor))
+      Log(LogLevel::kNotice,
+          "no profile is kept of this sensor: it has no serial by which it would be known again, "
+          "or the preset is another than best",
+          {{"SERIAL", serial}});
     const StreamInfo info = sensors_->snapshot().info;
     if (!last_serial_.empty() && last_serial_ != serial) {
       Log(LogLevel::kNotice,
@@ -450,6 +471,7 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
     TellEvent("result", Json{{"scan", scan_.id}, {"answer", answer}}.dump(
                             -1, ' ', false, Json::error_handler_t::replace));
   }
+  if (outcome.kind == Kind::kDone) profile_fault_ = outcome.drift;
   check_.reset();
   TellWeb(web::EventKind::kResult);
   TellWeb(web::EventKind::kData);

@@ -174,6 +174,8 @@ class Appliance {
   void StartScan();
   void BeginSession();
   [[nodiscard]] ScanJob MakeJob(const web::Settings& settings);
+  [[nodiscard]] std::shared_ptr<UnitProfile> MakeUnitProfile();
+  [[nodiscard]] bool HasProfile(const SensorDescription& sensor) const;
   [[nodiscard]] ScanCallbacks MakeCheckCallbacks(const NewScan& scan);
   void AddListeners(ScanCallbacks& callbacks);
   [[nodiscard]] ScanCallbacks MakeCallbacks(const NewScan& scan);
@@ -207,6 +209,8 @@ class Appliance {
   ApplianceParts parts_;
   std::unique_ptr<Store> store_;
   std::string storage_fault_, backup_fault_;
+  std::shared_ptr<ProfileShelf> profiles_;
+  std::string profile_fault_;  ///< That the sensor contradicted its profile in the last scan.
   std::function<std::string()> hindrance_;
   int ticks_to_disk_check_ = kDiskCheckTicks;
   int ticks_to_care_ = kCareTicks;

@@ -262,6 +262,7 @@ std::string Appliance::StatusJson() {
         {"lost", sensor.statistics.num_lost},
         {"calibrated", sensor.present && !sensor.info.intrinsics_assumed},
         {"warnings", sensor.info.warnings},
+        {"profile_fault", profile_fault_},
         {"others", sensor.others}}},
       {"scan", scan},
       {"last_result", last},
@@ -309,6 +310,7 @@ web::Status Appliance::WebStatus() {
   }
   status.version = Version();
   status.warnings = page_.warnings;
+  if (!profile_fault_.empty()) status.warnings.push_back(profile_fault_);
   status.rolled_back = rolled_back_;
   const std::optional<Pose>& T_iec_reference = parts_.config.compare.T_iec_reference;
   const Eigen::Matrix3d R_iec_reference = T_iec_reference.value_or(Pose::Identity()).linear();

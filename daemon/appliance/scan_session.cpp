@@ -81,6 +81,10 @@ void ScanSession::Run(const std::stop_token& stop) {
   if (outcome_.kind != ScanOutcome::Kind::kDone && stop.stop_requested())
     outcome_.kind = ScanOutcome::Kind::kCancelled;
   Save();
+  // What is stored was good, and only now.
+  if (outcome_.kind == ScanOutcome::Kind::kDone && job_.unit_profile &&
+      outcome_.teaches_nothing.empty())
+    job_.unit_profile->Teach();
   callbacks_.ended(outcome_);
 }
 
@@ -91,11 +95,15 @@ void ScanSession::Scan(const std::stop_token& stop) {
     reference_ =
         std::async(std::launch::async, [this, stop] { return ReadReference(job_, stop); }).share();
   }
+  if (job_.unit_profile) job_.unit_profile->Begin(job_.reconstructor);
   const Scene scene = Track(stop);
+  if (job_.unit_profile) outcome_.drift = job_.unit_profile->Drift();
   if (job_.check) {
     Check(scene);
+    outcome_.teaches_nothing = WhyItTeachesNothing(scene, outcome_.verdict, job_.compare.limits);
   } else {
     Evaluate(scene, stop);
+    outcome_.teaches_nothing = WhyItTeachesNothing(scene, outcome_.verdict, job_.compare.limits);
     ThrowIfStopped(stop);  // from here on it is stored
   }
   if (const std::optional<double> last_s = feed_->last_frame_s())
@@ -178,7 +186,11 @@ void ScanSession::Tell(std::string step, double fraction) {
 
 void ScanSession::Check(const Scene& scene) {
   Tell("checking", 0.0);
-  const MarkerCheck check = CheckMarkers(scene, job_.check->baseline, job_.check->limits);
+  MarkerCheck check = CheckMarkers(scene, job_.check->baseline, job_.check->limits);
+  if (!outcome_.drift.empty()) {
+    check.status = MarkerCheckStatus::kFailed;
+    check.reasons.push_back(outcome_.drift);
+  }
   outcome_.check_json = CheckJson(check, BaselineOf(scene, job_.check->limits));
   outcome_.verdict =
       check.status == MarkerCheckStatus::kPassed ? Verdict::kInTolerance : Verdict::kNoAnswer;

@@ -16,6 +16,7 @@
 #include "algo/comparison/marker_check.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
 #include "daemon/appliance/sweep_guidance.hpp"
+#include "daemon/appliance/unit_profile.hpp"
 #include "daemon/pipeline/live_feed.hpp"
 
 namespace plumb {
@@ -38,6 +39,7 @@ struct ScanJob {
   bool is_reference =
       false;  ///< The scene must be one that others can be compared with, else there is no answer.
   std::optional<CheckJob> check;  ///< Set: the daily check; nothing but its numbers is kept.
+  std::shared_ptr<UnitProfile> unit_profile;  ///< Null: nothing is known of the sensor, nor kept.
   bool keep_recording = false;
   std::size_t queue_capacity = 15;  ///< Frames that may wait for tracking: half a second.
   double stop_after_s = 10.0;       ///< Without new coverage: the sweep is complete.
@@ -64,6 +66,8 @@ struct ScanOutcome {
   std::optional<Verdict> verdict;  ///< Of a check: in tolerance where it passed, else no answer.
   std::int64_t frames = 0, frames_tracked = 0, frames_dropped = 0;
   double swept_area_m2 = 0.0;
+  std::string drift;                ///< That the sensor contradicts its profile; empty: no.
+  std::string teaches_nothing;      ///< Why nothing was learned of the sensor; empty: it may be.
   double after_last_frame_s = 0.0;  ///< Until everything was written.
 };
 

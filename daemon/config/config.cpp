@@ -177,6 +177,7 @@ void ReadAppliance(Section section, ApplianceConfig& appliance) {
   take_path("calibration", appliance.calibration);
   section.Take("sensor_serial", appliance.sensor_serial, "the serial of a sensor",
                [](const std::string& s) { return s.size() <= 64; });
+  section.Take("sensor_profiles", appliance.sensor_profiles, "true or false", kAny);
   section.Take("keep_recordings", appliance.keep_recordings, "true or false", kAny);
   double quota_gb = -1;
   section.Take("quota_gb", quota_gb, "gigabytes from 1 to 100000",

@@ -30,9 +30,10 @@ struct ApplianceConfig {
       "/var/lib/plumb/calibration";  ///< SERIAL.yaml for each calibrated sensor.
   std::string sensor_serial;         ///< Only this sensor; empty: the first one.
   std::string sensor_driver;         ///< By which sensors are read; empty: the first of the build.
-  bool keep_recordings = false;      ///< Of every scan, whatever the page's settings say.
-  std::optional<double> quota_gb;    ///< Of all scans; beyond, the oldest go. None: a share of the
-                                     ///< disk.
+  bool sensor_profiles = true;  ///< Scans begin from what earlier ones learned of this sensor unit.
+  bool keep_recordings = false;    ///< Of every scan, whatever the page's settings say.
+  std::optional<double> quota_gb;  ///< Of all scans; beyond, the oldest go. None: a share of the
+                                   ///< disk.
   std::optional<double>
       auto_stop_s;  ///< Sweep ends after so long without new coverage; none: the page's setting.
   std::optional<double> scan_limit_s;   ///< Longest sweep; none: the page's setting.
@@ -120,7 +121,7 @@ enum class ConfigUse { kCommandLine, kAppliance };
 ///     frame
 ///     [storage]      backup_folder, backup_hours, backup_key_file
 ///     [appliance]    state, control, calibration,
-///     sensor_serial, keep_recordings, quota_gb,
+///     sensor_serial, sensor_profiles, keep_recordings, quota_gb,
 ///                    auto_stop_s, scan_limit_s, result_s
 ///     [sensor]       driver
 ///     [button]       chip, line, active_low

@@ -82,6 +82,14 @@ SensorProfile Parse(const std::string& text) {
 
 }  // namespace
 
+SensorProfile ParseSensorProfile(const std::string& text) {
+  try {
+    return Parse(text);
+  } catch (const nlohmann::json::exception& error) {
+    throw DataError(fmt::format("not a sensor profile: {}", error.what()));
+  }
+}
+
 SensorProfile ReadSensorProfile(const std::filesystem::path& file) {
   try {
     SensorProfile profile = Parse(ReadTextFile(file, kMaxBytes));

@@ -13,6 +13,9 @@ namespace plumb {
 /// covariance is not positive definite.
 [[nodiscard]] SensorProfile ReadSensorProfile(const std::filesystem::path& file);
 
+/// As ReadSensorProfile() of a text; the name is left empty. @throws DataError
+[[nodiscard]] SensorProfile ParseSensorProfile(const std::string& text);
+
 /// Replaces the file at once, or leaves it as it was. @throws IoError
 void WriteSensorProfile(const SensorProfile& profile, const std::filesystem::path& file);
 

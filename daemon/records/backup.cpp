@@ -31,7 +31,8 @@ constexpr const char* kSums = "SHA256SUMS";
 constexpr const char* kDatabase = "plumb.db";
 constexpr const char* kScans = "scans";
 /// What else of a state folder is kept; each where it exists.
-constexpr std::array<const char*, 3> kOtherFolders = {"set-aside", "calibration", "imports"};
+constexpr std::array<const char*, 4> kOtherFolders = {"set-aside", "calibration", "imports",
+                                                      "sensor-profiles"};
 constexpr const char* kRestoring = ".restore";
 constexpr const char* kBackingUp = ".backup";
 
@@ -184,8 +185,9 @@ void GiveToOwnerOf(const fs::path& state, const fs::path& tree) {
 }
 
 void MoveIn(const fs::path& made, const fs::path& state) {
-  std::vector<std::string> names = {kScans, kOtherFolders[0], kOtherFolders[1], kOtherFolders[2],
-                                    kDatabase};
+  std::vector<std::string> names = {kScans};
+  names.insert(names.end(), kOtherFolders.begin(), kOtherFolders.end());
+  names.emplace_back(kDatabase);
   for (const std::string& name :
        names) {  // the database last: without it nothing is taken for whole
     std::error_code error;
@@ -201,9 +203,9 @@ void MoveIn(const fs::path& made, const fs::path& state) {
 }  // namespace
 
 OutputKind BackupOutput() {
-  return {"backup",
-          kAbout,
-          {kAbout, kSums, kDatabase, kScans, kOtherFolders[0], kOtherFolders[1], kOtherFolders[2]}};
+  std::vector<std::string_view> entries = {kAbout, kSums, kDatabase, kScans};
+  entries.insert(entries.end(), kOtherFolders.begin(), kOtherFolders.end());
+  return {"backup", kAbout, entries};
 }
 
 BackupReport WriteBackup(const fs::path& state, Database& database, const fs::path& target,

@@ -69,7 +69,8 @@ TEST_F(DaemonScanTest, TwoPressesAndTwoMoreGiveTheSixNumbersOfTheBodysTrueMotion
 
 TEST_F(DaemonScanTest, TheResultIsTheSameWhenTheRecordingIsComputedAgain) {
   std::ofstream(folder_ / "plumb.toml")
-      << "[appliance]\nkeep_recordings = true\n[reconstruct]\nkeep_color = false\n";
+      << "[appliance]\nkeep_recordings = true\nsensor_profiles = false\n"
+         "[reconstruct]\nkeep_color = false\n";
   Plumbd plumbd(folder_.path(), {.arguments = {"--config", folder_ / "plumb.toml"}, .scenes = 2});
   ASSERT_TRUE(plumbd.WaitUntilUp());
   plumbd.WaitForState("ready");
@@ -77,6 +78,7 @@ TEST_F(DaemonScanTest, TheResultIsTheSameWhenTheRecordingIsComputedAgain) {
   ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
   const json live = plumbd.ScanOnce()["last_result"];
   ASSERT_EQ(plumbd.Stop(), 0);
+  EXPECT_FALSE(fs::exists(plumbd.state() / "sensor-profiles")) << "switched off";
   for (const char* id : {"000001", "000002"}) {
     const fs::path recording = plumbd.state() / "scans" / id / "recording";
     const RunResult again = plumb::Run({PLUMB_BINARY, "reconstruct", recording, "--out",
@@ -103,6 +105,23 @@ TEST_F(DaemonScanTest, TheResultIsTheSameWhenTheRecordingIsComputedAgain) {
   }
   const json body = json::parse(compared.out)["body"];
   EXPECT_EQ(body["named_by"], "posture") << "the demo lies head first supine, along the couch";
+}
+
+TEST_F(DaemonScanTest, WhatAGoodScanTaughtOfTheSensorIsWhereTheNextOneBegins) {
+  Plumbd plumbd(folder_.path(), {.scenes = 2});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  const std::string serial = plumbd.WaitForState("ready")["sensor"]["serial"];
+  const fs::path profiles = plumbd.state() / "sensor-profiles" / serial;
+  const auto scene_of = [&](const json& status) {
+    const std::string scan = status["last_result"]["scan"];
+    return ReadJson(plumbd.state() / "scans" / scan / "scene" / "scene.json");
+  };
+  EXPECT_TRUE(scene_of(plumbd.ScanOnce())["sensor_profile"].is_null());
+  EXPECT_TRUE(fs::exists(profiles / "000001.profile")) << plumbd.log();
+  ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
+  EXPECT_EQ(scene_of(plumbd.ScanOnce())["sensor_profile"], serial + " version 1, 1 sweep");
+  EXPECT_TRUE(fs::exists(profiles / "000002.profile")) << plumbd.log();
+  EXPECT_EQ(plumbd.Stop(), 0);
 }
 
 TEST_F(DaemonScanTest, ASweepEndsByItselfWhenNothingNewIsSeen) {

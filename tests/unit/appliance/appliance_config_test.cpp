@@ -20,6 +20,7 @@ state = "/data/plumb"
 control = "/run/p.sock"
 calibration = "/data/cal"
 sensor_serial = "1804060024"
+sensor_profiles = false
 keep_recordings = true
 quota_gb = 12.5
 auto_stop_s = 4
@@ -47,6 +48,8 @@ host_names = ["plumb.local", "couch"]
   EXPECT_EQ(config.appliance.control, "/run/p.sock");
   EXPECT_EQ(config.appliance.calibration, "/data/cal");
   EXPECT_EQ(config.appliance.sensor_serial, "1804060024");
+  EXPECT_FALSE(config.appliance.sensor_profiles);
+  EXPECT_TRUE(Config().appliance.sensor_profiles);
   EXPECT_TRUE(config.appliance.keep_recordings);
   EXPECT_EQ(config.appliance.quota_gb, 12.5);
   EXPECT_EQ(config.appliance.backup_folder, "/mnt/backup");

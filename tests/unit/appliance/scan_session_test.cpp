@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "algo/base/errors.hpp"
+#include "daemon/files/scene_folder.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -83,6 +84,30 @@ TEST_F(ScanSessionTest, ClosingTheFeedEndsTheSweepWithEveryFrameThatWaited) {
   EXPECT_EQ(outcome.frames_dropped, 0);
   EXPECT_THAT(saved_, ElementsAre(Kind::kDone));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "scene" / "scene.json"));
+}
+
+TEST_F(ScanSessionTest, WhatIsKnownOfTheSensorReachesTheSceneAndAScanWithoutMarkersTeachesNothing) {
+  auto shelf = std::make_shared<ProfileShelf>(folder_ / "profiles");
+  SensorProfile known = ProfileOfAnyUnit(job_.info.intrinsics);
+  known.num_sweeps = 4;
+  (void)shelf->Add("A", known);
+  const auto scan_with = [&](const char* serial) {
+    job_.unit_profile = std::make_shared<UnitProfile>(shelf, serial, job_.info.intrinsics);
+    outcome_.reset();
+    Start();
+    Push(12);
+    session_->feed()->Close();
+    const ScanOutcome outcome = WaitForEnd();
+    EXPECT_EQ(outcome.kind, Kind::kDone) << outcome.reason;
+    EXPECT_THAT(outcome.teaches_nothing, HasSubstr("0 markers"));
+    const Scene scene = ReadScene(folder_ / "scene");
+    EXPECT_EQ(scene.sensor_profile.value_or(""),
+              serial == std::string("A") ? "A version 1, 4 sweeps" : "");
+  };
+  scan_with("A");
+  scan_with("B");
+  EXPECT_EQ(shelf->Versions("A").size(), 1U);
+  EXPECT_TRUE(shelf->Versions("B").empty());
 }
 
 TEST_F(ScanSessionTest, FramesThatTrackingIsTooLateForAreDroppedAndCounted) {

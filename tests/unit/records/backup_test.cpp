@@ -40,6 +40,8 @@ class BackupTest : public ::testing::Test {
     for (int i = 0; i < 3; ++i) scan_ = StoreScan(store, patient_);
     fs::create_directories(state() / "calibration");
     WriteWholeFile(state() / "calibration" / "S1.yaml", std::string_view("fx: 1"));
+    fs::create_directories(state() / "sensor-profiles" / "S1");
+    WriteWholeFile(state() / "sensor-profiles" / "S1" / "000001.profile", std::string_view("1"));
     fs::create_directories(state() / "set-aside" / "000099" / "scene");
     WriteWholeFile(state() / "set-aside" / "000099" / "scene" / "scene.json",
                    std::string_view("{}"));
@@ -62,7 +64,7 @@ class BackupTest : public ::testing::Test {
 TEST_F(BackupTest, WhatIsRestoredIsByteIdentical) {
   const BackupReport made = BackUpStopped(state(), backup());
   EXPECT_EQ(made.scans, 4U);
-  EXPECT_EQ(made.files, 1U + 4 * 7 + 2);
+  EXPECT_EQ(made.files, 1U + 4 * 7 + 3);
   EXPECT_THAT(made.problems, IsEmpty());
   const BackupReport report = RestoreBackup(backup(), restored());
   EXPECT_EQ(report.scans, 4U);
@@ -144,7 +146,7 @@ TEST_F(BackupTest, TellsWhatIsNotAsItWasStoredAndKeepsTheRest) {
   EXPECT_THAT(made.problems,
               ElementsAre(AllOf(HasSubstr(scan_), HasSubstr("cloud.ply"), HasSubstr("not what")),
                           AllOf(HasSubstr(scan_), HasSubstr("mesh.ply"), HasSubstr("missing"))));
-  EXPECT_EQ(made.files, 1U + 4 * 7 - 1 + 2);
+  EXPECT_EQ(made.files, 1U + 4 * 7 - 1 + 3);
   (void)RestoreBackup(backup(), restored());
   Store store(restored());
   EXPECT_FALSE(store.FindScan(scan_)->failure.empty()) << "restored as damaged as it was";

@@ -1,0 +1,97 @@
+#include "daemon/appliance/unit_profile.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "daemon/loop/log.hpp"
+
+namespace plumb {
+
+UnitProfile::UnitProfile(std::shared_ptr<ProfileShelf> shelf, std::string serial, Intrinsics stated)
+    : shelf_(std::move(shelf)), serial_(std::move(serial)), stated_(std::move(stated)) {}
+
+void UnitProfile::Begin(ReconstructorOptions& options) {
+  try {
+    ProfileShelf::InUse in_use = shelf_->Read(serial_);
+    if (!in_use.fault.empty()) Log(LogLevel::kError, in_use.fault, {{"SERIAL", serial_}});
+    if (in_use.newest && in_use.newest->profile && in_use.newest->profile->stated != stated_) {
+      Log(LogLevel::kWarning,
+          fmt::format("the profile of sensor {} belongs to another calibration file: it is not "
+                      "used, and a new one is learned",
+                      serial_),
+          {{"SERIAL", serial_}});
+    } else if (in_use.newest && in_use.newest->profile) {
+      using Days = std::chrono::duration<double, std::ratio<86400>>;
+      const Days age = std::chrono::system_clock::now() - in_use.newest->made;
+      // In whole days: a recording that is computed again on the same day gives the same scene.
+      before_ = Aged(*in_use.newest->profile, std::floor(age.count()));
+      // That its covariance is a proper one is checked here, where a scan can still do without it.
+      (void)PriorOfNextSweep(*before_, stated_, CalibrationModel::kEdgeBiasSigma);
+    }
+  } catch (const std::exception& error) {
+    before_.reset();
+    Log(LogLevel::kError,
+        fmt::format("the profile of sensor {} is not used: {}", serial_, error.what()),
+        {{"SERIAL", serial_}});
+  }
+  options.profile = before_;
+  options.on_learned = [this](const SensorProfile& profile) { learned_ = profile; };
+}
+
+std::optional<ProfileAgreement> UnitProfile::Compared() const {
+  if (!before_ || !learned_) return std::nullopt;
+  try {
+    return Agreement(*before_, *learned_);
+  } catch (const std::exception&) {  // Begin() has looked at the covariance
+    return std::nullopt;
+  }
+}
+
+std::string UnitProfile::Drift() const {
+  const std::optional<ProfileAgreement> compared = Compared();
+  if (!compared || compared->agrees()) return {};
+  return fmt::format(
+      "the sensor {} no longer measures as its profile says (chi-square {:.0f}, at most {:.0f} for "
+      "{} terms): let it warm up and repeat the check; if this comes again, reset its profile",
+      serial_, compared->chi_square, compared->limit, compared->num_terms);
+}
+
+void UnitProfile::Teach() {
+  if (!learned_) return;
+  if (const std::string drift = Drift(); !drift.empty()) {
+    Log(LogLevel::kWarning, drift + "; this sweep was not joined with it", {{"SERIAL", serial_}});
+    return;
+  }
+  try {
+    const std::optional<ProfileAgreement> compared = Compared();
+    const int version = shelf_->Add(serial_, *learned_);
+    Log(LogLevel::kInfo,
+        fmt::format("the profile of sensor {} has version {} now, from {} sweeps{}", serial_,
+                    version, learned_->num_sweeps,
+                    compared ? fmt::format(" (chi-square {:.1f}, at most {:.1f})",
+                                           compared->chi_square, compared->limit)
+                             : std::string()),
+        {{"SERIAL", serial_}});
+  } catch (const std::exception& error) {
+    Log(LogLevel::kError,
+        fmt::format("what the sweep taught of sensor {} is lost: {}", serial_, error.what()),
+        {{"SERIAL", serial_}});
+  }
+}
+
+std::string WhyItTeachesNothing(const Scene& scene, const std::optional<Verdict>& verdict,
+                                const AcceptanceLimits& limits) {
+  if (verdict == Verdict::kNoAnswer) return "it gave no answer";
+  if (static_cast<int>(scene.markers.size()) < limits.min_shared_markers)
+    return fmt::format("{} markers were seen, at least {} are needed", scene.markers.size(),
+                       limits.min_shared_markers);
+  if (!(scene.longest_lost_s <= limits.max_lost_s))
+    return fmt::format("tracking was lost for {:.1f} s, at most {:.1f} s are allowed",
+                       scene.longest_lost_s, limits.max_lost_s);
+  return {};
+}
+
+}  // namespace plumb

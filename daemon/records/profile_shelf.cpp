@@ -1,0 +1,193 @@
+#include "daemon/records/profile_shelf.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/base/errors.hpp"
+#include "daemon/files/atomic_folder.hpp"
+#include "daemon/files/sensor_profile_file.hpp"
+#include "daemon/records/scan_files.hpp"
+#include "drivers/files/file_io.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::system_clock;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kHead = "plumb-profile-version 1 ";
+constexpr const char* kEnding = ".profile";
+constexpr const char* kSetAside = "set-aside";
+constexpr std::size_t kMaxBytes = 1U << 20U;
+constexpr int kMaxVersion = 999'999'999;
+
+std::string SumOf(std::string_view text) {
+  Sha256 hash;
+  hash.Add(text.data(), text.size());
+  return hash.Hex();
+}
+
+// Of a plain serial itself; two serials never share a folder.
+std::string FolderName(const std::string& serial) {
+  constexpr std::size_t kLongest = 64;
+  const auto is_plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_';
+  };
+  std::string name = serial.substr(0, kLongest);
+  std::replace_if(
+      name.begin(), name.end(), [&](char c) { return !is_plain(c); }, '_');
+  if (name == serial && name != kSetAside) return name;
+  return fmt::format("{}-{}", name, SumOf(serial).substr(0, 16));
+}
+
+// @throws DataError, nlohmann::json::exception
+ProfileVersion Parse(const std::string& text, const std::string& serial, int version) {
+  const std::size_t line = text.find('\n');
+  const std::string_view head(kHead);
+  if (line == std::string::npos || !text.starts_with(head))
+    throw DataError("it does not begin as a profile of this version of Plumb");
+  const std::string body = text.substr(line + 1);
+  if (text.substr(head.size(), line - head.size()) != SumOf(body))
+    throw DataError("its checksum is wrong: it was damaged or changed");
+  const Json json = Json::parse(body);
+  if (json.at("serial") != serial)
+    throw DataError(fmt::format("it belongs to the unit {}", json.at("serial").dump()));
+  ProfileVersion found;
+  found.version = version;
+  found.made = Clock::time_point(std::chrono::seconds(json.at("made_s").get<std::int64_t>()));
+  found.cause = json.at("cause").get<std::string>();
+  if (json.at("profile").is_null()) return found;
+  found.profile = ParseSensorProfile(json["profile"].dump());
+  found.profile->name = fmt::format("{} version {}", serial, version);
+  return found;
+}
+
+ProfileVersion ReadVersion(const fs::path& file, const std::string& serial, int version) {
+  try {
+    return Parse(ReadTextFile(file, kMaxBytes), serial, version);
+  } catch (const nlohmann::json::exception& error) {
+    throw DataError(error.what());
+  }
+}
+
+}  // namespace
+
+ProfileShelf::ProfileShelf(fs::path folder) : folder_(std::move(folder)) {}
+
+fs::path ProfileShelf::FolderOf(const std::string& serial) const {
+  if (serial.empty()) throw std::invalid_argument("a unit without a serial has no profile");
+  return folder_ / FolderName(serial);
+}
+
+// Newest first. What is not named as a version is not ours.
+std::vector<ProfileShelf::Entry> ProfileShelf::Entries(const std::string& serial) const {
+  std::vector<Entry> entries;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(FolderOf(serial), error)) {
+    const std::string name = entry.path().stem().string();
+    int version = 0;
+    const auto [end, failed] = std::from_chars(name.data(), name.data() + name.size(), version);
+    if (entry.path().extension() == kEnding && failed == std::errc() &&
+        end == name.data() + name.size() && version > 0 && version < kMaxVersion)
+      entries.push_back({version, entry.path()});
+  }
+  std::sort(entries.begin(), entries.end(),
+            [](const Entry& a, const Entry& b) { return a.version > b.version; });
+  return entries;
+}
+
+ProfileShelf::InUse ProfileShelf::Read(const std::string& serial) {
+  const std::lock_guard lock(mutex_);
+  InUse in_use;
+  const std::vector<Entry> entries = Entries(serial);
+  if (entries.empty()) return in_use;
+  const fs::path& file = entries.front().file;
+  try {
+    in_use.newest = ReadVersion(file, serial, entries.front().version);
+    return in_use;
+  } catch (const DataError& error) {
+    in_use.fault = fmt::format("the profile of sensor {} cannot be read: {}", serial, error.what());
+  }
+  try {
+    // First, so that no earlier version takes its place unnoticed at the next scan.
+    (void)Write(serial, "unreadable", std::nullopt);
+    const fs::path aside =
+        folder_ / kSetAside / fmt::format("{}-{}", FolderName(serial), file.filename().string());
+    fs::create_directories(aside.parent_path());
+    fs::rename(file, aside);
+    in_use.fault += fmt::format(
+        "; it was moved to {}, and scans go on without a profile until one is learned again or an "
+        "earlier version is taken back",
+        aside.string());
+  } catch (const std::exception& error) {
+    in_use.fault += fmt::format("; it stays where it is ({})", error.what());
+  }
+  return in_use;
+}
+
+std::vector<ProfileVersion> ProfileShelf::Versions(const std::string& serial) const {
+  const std::lock_guard lock(mutex_);
+  std::vector<ProfileVersion> versions;
+  for (const Entry& entry : Entries(serial)) {
+    try {
+      versions.push_back(ReadVersion(entry.file, serial, entry.version));
+    } catch (const DataError&) {  // the newest one is told of by Read()
+    }
+  }
+  return versions;
+}
+
+int ProfileShelf::Write(const std::string& serial, const char* cause,
+                        const std::optional<SensorProfile>& profile) {
+  const std::vector<Entry> entries = Entries(serial);
+  const int version = entries.empty() ? 1 : entries.front().version + 1;
+  Json json;
+  json["serial"] = serial;
+  json["made_s"] =
+      std::chrono::duration_cast<std::chrono::seconds>(Clock::now().time_since_epoch()).count();
+  json["cause"] = cause;
+  json["profile"] = profile ? Json::parse(SensorProfileJson(*profile)) : Json();
+  const std::string body = json.dump(1) + "\n";
+  const fs::path folder = FolderOf(serial);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw IoError(DescribeWriteError(folder, error.value()));
+  WriteFileAtomically(folder / fmt::format("{:06}{}", version, kEnding), [&](const fs::path& at) {
+    WriteWholeFile(at, kHead + SumOf(body) + "\n" + body);
+  });
+  for (std::size_t i = kKeptVersions - 1; i < entries.size(); ++i)
+    fs::remove(entries[i].file, error);
+  return version;
+}
+
+int ProfileShelf::Add(const std::string& serial, const SensorProfile& profile) {
+  const std::lock_guard lock(mutex_);
+  return Write(serial, "learned", profile);
+}
+
+int ProfileShelf::Reset(const std::string& serial) {
+  const std::lock_guard lock(mutex_);
+  return Write(serial, "reset", std::nullopt);
+}
+
+int ProfileShelf::RollBack(const std::string& serial, int version) {
+  const std::lock_guard lock(mutex_);
+  for (const Entry& entry : Entries(serial)) {
+    if (entry.version != version) continue;
+    const ProfileVersion earlier = ReadVersion(entry.file, serial, version);
+    if (!earlier.profile) break;
+    return Write(serial, "rolled_back", earlier.profile);
+  }
+  throw DataError(
+      fmt::format("the sensor {} has no profile of version {}: choose one of those that "
+                  "are shown",
+                  serial, version));
+}
+
+}  // namespace plumb
