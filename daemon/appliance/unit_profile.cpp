@@ -55,7 +55,8 @@ std::string UnitProfile::Drift() const {
   if (!compared || compared->agrees()) return {};
   return fmt::format(
       "the sensor {} no longer measures as its profile says (chi-square {:.0f}, at most {:.0f} for "
-      "{} terms): let it warm up and repeat the check; if this comes again, reset its profile",
+      "{} terms): let it warm up and repeat the check; if this comes again, move its "
+      "folder in sensor-profiles away, and the unit begins again",
       serial_, compared->chi_square, compared->limit, compared->num_terms);
 }
 

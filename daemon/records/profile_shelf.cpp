@@ -122,8 +122,7 @@ ProfileShelf::InUse ProfileShelf::Read(const std::string& serial) {
     fs::create_directories(aside.parent_path());
     fs::rename(file, aside);
     in_use.fault += fmt::format(
-        "; it was moved to {}, and scans go on without a profile until one is learned again or an "
-        "earlier version is taken back",
+        "; it was moved to {}, and scans go on without a profile until one is learned again",
         aside.string());
   } catch (const std::exception& error) {
     in_use.fault += fmt::format("; it stays where it is ({})", error.what());
