@@ -28,7 +28,9 @@ struct JointRegistrationOptions {
   /// Pixels at 640 columns. Above the noise of one sighting: a track's error is common to its
   /// views.
   double keypoint_sigma_px = 0.4;
-  double keypoint_depth_sigmas = 1.5;  ///< In standard deviations of the noise model.
+  /// In standard deviations of the noise model. Above one: what a track triangulates is off by an
+  /// error that all its views share.
+  double keypoint_depth_sigmas = 2.0;
   CalibrationPrior prior = PriorOfAnyUnit();
   bool find_evidence = false;  ///< Fill JointRegistrationResult::evidence.
   /// Called before each round: makes the keyframes' velocities follow their poses.

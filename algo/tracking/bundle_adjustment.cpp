@@ -343,9 +343,13 @@ class Bundle {
     x.segment<6>(6) = term.keyframe_b >= 0
                           ? state.cameras[static_cast<std::size_t>(term.keyframe_b)].twist
                           : state.markers[static_cast<std::size_t>(markers_.at(term.marker))];
+    for (int i = 0; i < QuadraticTerm::kFocal; ++i)
+      x[QuadraticTerm::kFocalAt + i] = state.calibration.lens[static_cast<std::size_t>(i)] -
+                                       calibration_.lens[static_cast<std::size_t>(i)];
     for (int i = 0; i < CalibrationModel::kDepthSize; ++i)
-      x[12 + i] = state.calibration.depth[static_cast<std::size_t>(i)] -
-                  calibration_.depth[static_cast<std::size_t>(i)];
+      x[QuadraticTerm::kDepthCalibrationAt + i] =
+          state.calibration.depth[static_cast<std::size_t>(i)] -
+          calibration_.depth[static_cast<std::size_t>(i)];
     return x;
   }
 
@@ -483,21 +487,24 @@ class Bundle {
 
   void AddTerm(const State& state, const QuadraticTerm& term) {
     const TermVector slope = term.H * TermState(state, term) + term.g;
+    constexpr int kFocal = QuadraticTerm::kFocal;
+    constexpr int kFocalAt = QuadraticTerm::kFocalAt;
     constexpr int kDepthSize = CalibrationModel::kDepthSize;
+    constexpr int kDepth = QuadraticTerm::kDepthCalibrationAt;
     const Eigen::Index a = CameraAt(term.keyframe_a);
     const Eigen::Index b = term.keyframe_b >= 0 ? CameraAt(term.keyframe_b)
                                                 : markers_at_ + 6 * markers_.at(term.marker);
+    const Eigen::Index f = calibration_at_ + kLensAt;
     const Eigen::Index d = calibration_at_ + kDepthAt;
-    if (a >= 0) {
-      H_.block<6, 6>(a, a) += term.H.topLeftCorner<6, 6>();
-      g_.segment<6>(a) += slope.head<6>();
-      if (options_.calibrate) H_.block<kDepthSize, 6>(d, a) += term.H.block<kDepthSize, 6>(12, 0);
-    }
-    if (b >= 0) {
-      H_.block<6, 6>(b, b) += term.H.block<6, 6>(6, 6);
-      g_.segment<6>(b) += slope.segment<6>(6);
-      if (options_.calibrate) H_.block<kDepthSize, 6>(d, b) += term.H.block<kDepthSize, 6>(12, 6);
-    }
+    const auto add_pose = [&](Eigen::Index at, Eigen::Index in_term) {
+      H_.block<6, 6>(at, at) += term.H.block<6, 6>(in_term, in_term);
+      g_.segment<6>(at) += slope.segment<6>(in_term);
+      if (!options_.calibrate) return;
+      H_.block<kFocal, 6>(f, at) += term.H.block<kFocal, 6>(kFocalAt, in_term);
+      H_.block<kDepthSize, 6>(d, at) += term.H.block<kDepthSize, 6>(kDepth, in_term);
+    };
+    if (a >= 0) add_pose(a, 0);
+    if (b >= 0) add_pose(b, 6);
     if (a >= 0 && b >= 0) {
       if (b > a) {
         H_.block<6, 6>(b, a) += term.H.block<6, 6>(6, 0);
@@ -506,7 +513,10 @@ class Bundle {
       }
     }
     if (!options_.calibrate) return;
+    H_.block<kFocal, kFocal>(f, f) += term.H.block<kFocal, kFocal>(kFocalAt, kFocalAt);
+    H_.block<kDepthSize, kFocal>(d, f) += term.H.block<kDepthSize, kFocal>(kDepth, kFocalAt);
     H_.block<kDepthSize, kDepthSize>(d, d) += term.H.bottomRightCorner<kDepthSize, kDepthSize>();
+    g_.segment<kFocal>(f) += slope.segment<kFocal>(kFocalAt);
     g_.segment<kDepthSize>(d) += slope.tail<kDepthSize>();
   }
 
@@ -541,8 +551,9 @@ class Bundle {
     S.diagonal().array() += 1e-9;
     Eigen::VectorXd right = g_;
     Eliminate(S, right);
-    if (options_.calibrate && options_.fix_lens)
-      Pin(calibration_at_ + kLensAt, CalibrationModel::kLensSize, S, right);
+    if (options_.calibrate && options_.fix_centre_and_distortion)
+      Pin(calibration_at_ + kLensAt + QuadraticTerm::kFocal,
+          CalibrationModel::kLensSize - QuadraticTerm::kFocal, S, right);
     if (options_.calibrate && options_.fix_depth_field)
       Pin(calibration_at_ + kDepthAt + kDepthField, kNumDepthTerms - kDepthField, S, right);
     Eigen::VectorXd x;

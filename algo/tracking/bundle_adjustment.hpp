@@ -9,12 +9,16 @@
 
 namespace plumb {
 
-/// A quadratic in the twists of two keyframes (or of one keyframe and a marker) and the depth
-/// calibration: 1/2 x' H x + g' x, where x holds the twists from the poses at the time of
-/// linearisation (twist on the camera's or the marker's side) and the change of
-/// CalibrationModel::depth. Sums of millions of point-to-plane residuals come in this form.
+/// A quadratic in the twists of two keyframes (or of one keyframe and a marker), the focal lengths
+/// and the depth calibration: 1/2 x' H x + g' x, where x holds the twists from the poses at the
+/// time of linearisation (twist on the camera's or the marker's side) and the changes of the first
+/// kFocal entries of CalibrationModel::lens and of CalibrationModel::depth. Sums of millions of
+/// point-to-plane residuals come in this form.
 struct QuadraticTerm {
-  static constexpr int kSize = 12 + CalibrationModel::kDepthSize;
+  static constexpr int kFocal = 2;
+  static constexpr int kFocalAt = 12;
+  static constexpr int kDepthCalibrationAt = kFocalAt + kFocal;
+  static constexpr int kSize = kDepthCalibrationAt + CalibrationModel::kDepthSize;
   int keyframe_a = -1;
   int keyframe_b = -1;  ///< Second keyframe, or -1 where `marker` is the second.
   int marker = -1;      ///< Id.
@@ -25,8 +29,9 @@ struct QuadraticTerm {
 struct BundleOptions {
   std::vector<int> free_keyframes;  ///< To move; the others that share landmarks or markers stay.
   bool calibrate = false;           ///< Move the calibration too.
-  bool fix_lens = false;            ///< Keep CalibrationModel::lens even so.
-  bool fix_depth_field = false;     ///< Keep the depth terms from kDepthField on.
+  /// Keep CalibrationModel::lens but for its focal lengths even so.
+  bool fix_centre_and_distortion = false;
+  bool fix_depth_field = false;               ///< Keep the depth terms from kDepthField on.
   CalibrationPrior prior = PriorOfAnyUnit();  ///< Of the calibration.
   bool find_information = false;              ///< Fill BundleSummary::information.
   int max_iterations = 8;

@@ -52,6 +52,10 @@ struct KltResult {
 /// Depth at a pixel: the median of its 3x3 neighbours, 0 at edges and holes.
 [[nodiscard]] double DepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel);
 
+/// The same to be measured with: that of the plane through the 5x5 neighbours, and 0 too where the
+/// surface about them is no plane, since a track whose window covers an edge follows neither side.
+[[nodiscard]] double SurfaceDepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel);
+
 /// ORB features with depth, for relocalisation.
 struct DescribedFeatures {
   std::vector<Eigen::Vector2f> pixels;

@@ -560,7 +560,8 @@ struct Tracker::Impl {
 
   void AddObservation(const ActivePoint& a, MapKeyframe& keyframe) {
     const Eigen::Vector2d pixel = a.pixel.cast<double>();
-    keyframe.keypoints.push_back({a.landmark, pixel, DepthAt(keyframe.data.view.depth_m, pixel)});
+    keyframe.keypoints.push_back(
+        {a.landmark, pixel, SurfaceDepthAt(keyframe.data.view.depth_m, pixel)});
     ++map.landmarks[static_cast<std::size_t>(a.landmark)].num_observations;
   }
 
@@ -599,7 +600,7 @@ struct Tracker::Impl {
       landmark.num_observations = 1;
       const int id = static_cast<int>(map.landmarks.size());
       map.landmarks.push_back(landmark);
-      keyframe.keypoints.push_back({id, pixel, z});
+      keyframe.keypoints.push_back({id, pixel, SurfaceDepthAt(depth_m, pixel)});
       active.push_back({id, corner});
     }
   }

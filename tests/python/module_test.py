@@ -97,7 +97,7 @@ class SceneTest(unittest.TestCase):
         centre = np.append(np.linalg.inv(T_world_marker)[:3, :3] @ start[:3, 3]
                            + np.linalg.inv(T_world_marker)[:3, 3], 1.0)
         miss_mm = 1000 * np.linalg.norm(((result.motion - expected) @ centre)[:3])
-        self.assertLess(miss_mm, 1.5)  # measured: 0.44 mm
+        self.assertLess(miss_mm, 1.5)  # measured: 1.24 mm at 320 columns
         self.assertEqual(result.covariance.shape, (6, 6))
         self.assertEqual(json.loads(result.to_json())["verdict"], result.verdict)
 

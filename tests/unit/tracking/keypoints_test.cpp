@@ -128,6 +128,39 @@ TEST(Keypoints, DepthIsTheMedianAndNothingAtEdgesAndHoles) {
     EXPECT_EQ(DepthAt(depth, outside), 0.0);
 }
 
+TEST(Keypoints, SurfaceDepthIsThatOfThePlaneAtTheVeryPixel) {
+  // Inverse depth grows by 0.02 a pixel: from pixel to pixel depth changes by 1.3 %.
+  cv::Mat depth(40, 40, CV_32FC1);
+  const auto z_at = [](double x, double y) {
+    return 1.0 / (1.5 + 0.02 * (x - 20) - 0.01 * (y - 20));
+  };
+  for (int r = 0; r < 40; ++r)
+    for (int c = 0; c < 40; ++c) depth.at<float>(r, c) = static_cast<float>(z_at(c, r));
+  EXPECT_NEAR(SurfaceDepthAt(depth, {20.4, 18.7}), z_at(20.4, 18.7), 1e-6);
+  EXPECT_GT(std::abs(DepthAt(depth, {20.4, 18.7}) - z_at(20.4, 18.7)), 0.001);
+}
+
+TEST(Keypoints, SurfaceDepthIsNothingWhereAWindowCoversAnEdge) {
+  cv::Mat depth(60, 60, CV_32FC1, cv::Scalar(0.8));
+  depth(cv::Rect(40, 0, 20, 60)).setTo(0.9);
+  EXPECT_NEAR(SurfaceDepthAt(depth, {33, 30}), 0.8, 1e-6);
+  EXPECT_EQ(SurfaceDepthAt(depth, {34, 30}), 0.0) << "the edge is 6 pixels away";
+  EXPECT_GT(DepthAt(depth, {34, 30}), 0.0);
+  // 1.4 % of inverse depth are the limit at 0.8 m.
+  depth(cv::Rect(40, 0, 20, 60)).setTo(0.8 * 1.013);
+  EXPECT_GT(SurfaceDepthAt(depth, {34, 30}), 0.0) << "relief and noise";
+  depth(cv::Rect(40, 0, 20, 60)).setTo(0.8 * 1.015);
+  EXPECT_EQ(SurfaceDepthAt(depth, {34, 30}), 0.0);
+  for (const Vector2d& outside :
+       {Vector2d(-3, 5), Vector2d(5, 30), Vector2d(55, 30), Vector2d(1e9, -1e9)})
+    EXPECT_EQ(SurfaceDepthAt(depth, outside), 0.0);
+  cv::Mat holes = cv::Mat::zeros(60, 60, CV_32FC1);
+  holes(cv::Rect(28, 28, 5, 3)).setTo(0.9);
+  EXPECT_EQ(SurfaceDepthAt(holes, {30, 30}), 0.0) << "15 of 25 neighbours";
+  holes(cv::Rect(28, 28, 5, 4)).setTo(0.9);
+  EXPECT_NEAR(SurfaceDepthAt(holes, {30, 30}), 0.9, 1e-6) << "20 of 25";
+}
+
 TEST(DenseView, PlaneHasItsNormalAndDepth) {
   Intrinsics k;
   // n . p = 0.6 with the plane tilted about both axes.
