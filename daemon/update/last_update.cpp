@@ -18,14 +18,6 @@ using Json = nlohmann::json;
 constexpr const char* kFile = "last-update.json";
 constexpr std::size_t kMaxBytes = 4096;
 
-void Sync(const std::filesystem::path& path) {
-  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  const bool done = fd >= 0 && ::fsync(fd) == 0;
-  const int error = errno;
-  if (fd >= 0) ::close(fd);
-  if (!done) throw IoError(DescribeWriteError(path, error));
-}
-
 }  // namespace
 
 std::optional<LastUpdate> ReadLastUpdate(const std::filesystem::path& folder) {
@@ -47,9 +39,9 @@ void WriteLastUpdate(const std::filesystem::path& folder, const LastUpdate& upda
       temporary,
       Json{{"version", update.version}, {"from_slot", update.from_slot}, {"boot", update.boot}}
           .dump(-1, ' ', false, Json::error_handler_t::replace));
-  Sync(temporary);
+  SyncToDisk(temporary);
   std::filesystem::rename(temporary, folder / kFile);
-  Sync(folder);
+  SyncToDisk(folder);
 }
 
 void RemoveLastUpdate(const std::filesystem::path& folder) {

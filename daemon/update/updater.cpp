@@ -16,9 +16,11 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/errors.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/update/bus.hpp"
 #include "daemon/update/last_update.hpp"
+#include "drivers/files/file_io.hpp"
 
 namespace plumb {
 
@@ -478,9 +480,14 @@ web::Change Updater::Add(const std::filesystem::path& file, const std::string& n
   if (!is_known && known.size() >= kMaxKept)
     return Refused(ChangeResult::kConflict, "there are too many bundles: remove one first");
   const Keep replaced(impl_->options.folder / name, impl_->options.aside);
-  if (::rename(file.c_str(), (impl_->options.folder / name).c_str()) != 0) {
-    return Refused(ChangeResult::kNoSpace,
-                   fmt::format("{} cannot be kept: {}", name, std::strerror(errno)));
+  // A power cut soon after would else leave the name with nothing behind it.
+  try {
+    SyncToDisk(file);
+    if (::rename(file.c_str(), (impl_->options.folder / name).c_str()) != 0)
+      throw IoError(DescribeWriteError(name, errno));
+    SyncToDisk(impl_->options.folder);
+  } catch (const std::exception& error) {
+    return Refused(ChangeResult::kNoSpace, error.what());
   }
   impl_->states.erase(name);
   impl_->Tell();

@@ -161,4 +161,14 @@ void WriteWholeFile(const std::filesystem::path& path, std::string_view text) {
   WriteWholeFile(path, AsBytes(text));
 }
 
+void SyncToDisk(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) throw IoError(DescribeWriteError(path, errno));
+  const int result = ::fsync(descriptor);
+  const int error = errno;
+  ::close(descriptor);
+  if (result != 0 && error != EINVAL)  // EINVAL: a file system without fsync
+    throw IoError(DescribeWriteError(path, error));
+}
+
 }  // namespace plumb

@@ -55,6 +55,9 @@ class FileWriter {
 void WriteWholeFile(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 void WriteWholeFile(const std::filesystem::path& path, std::string_view text);
 
+/// Forces a file's or a folder's contents to the disk. @throws IoError
+void SyncToDisk(const std::filesystem::path& path);
+
 /// "cannot write FILE: REASON", with what to do where that is known (ENOSPC, EDQUOT, EFBIG, EACCES,
 /// EROFS).
 [[nodiscard]] std::string DescribeWriteError(const std::filesystem::path& path, int error_number);

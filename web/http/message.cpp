@@ -37,7 +37,13 @@ void UploadFile::Append(std::string_view bytes) {
     if (count <= 0)
       throw IoError(fmt::format("the disk takes no more of the upload: {}", std::strerror(errno)));
     bytes.remove_prefix(static_cast<std::size_t>(count));
+    written_ += count;
   }
+  // Written out as it comes, so that who keeps the file does not wait for all of it at the end.
+  constexpr std::int64_t kPiece = 8 << 20;
+  if (written_ - started_ < kPiece) return;
+  ::sync_file_range(fd_, started_, written_ - started_, SYNC_FILE_RANGE_WRITE);
+  started_ = written_;
 }
 
 std::string_view Request::Header(const std::string& name) const {

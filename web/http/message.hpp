@@ -32,6 +32,8 @@ class UploadFile {
  private:
   std::filesystem::path path_;
   int fd_ = -1;
+  std::int64_t written_ = 0;  // Bytes.
+  std::int64_t started_ = 0;  // Of them, on their way to the disk.
 };
 
 struct Request {
