@@ -75,9 +75,10 @@ class Appliance {
   void SetHindrance(std::function<std::string()> hindrance) { hindrance_ = std::move(hindrance); }
   /// The session that the store has opened: scans belong to it until it is closed.
   /// Why no reference may be scanned or approved now, with the next step: no daily check has passed
-  /// today. Empty: it may, as always in the demo. @param scan_was_overdue  When the scan that is to
-  /// be the reference was taken.
-  [[nodiscard]] std::string WhyNoReference(bool scan_was_overdue = false);
+  /// today. Empty: it may, as always in the demo. @param scan  That is to be the reference: one
+  /// that was taken while the check was overdue is confirmed by a check of the same day
+  /// (Store::IsConfirmedByLaterCheck), or has to be repeated.
+  [[nodiscard]] std::string WhyNoReference(const std::optional<web::Scan>& scan = {});
   void OpenSession(const std::string& session_id, const std::string& patient_id,
                    web::ScanPurpose purpose, const std::string& reason, const web::Actor& actor);
   /// The session is over, in the store too. Not while a scan runs.

@@ -335,15 +335,16 @@ bool Appliance::IsCheckOverdue() {
   return !store_->HasPassedCheckSince(StartOfDay(), sensors_->snapshot().sensor.serial);
 }
 
-std::string Appliance::WhyNoReference(bool scan_was_overdue) {
+std::string Appliance::WhyNoReference(const std::optional<web::Scan>& scan) {
   if (!parts_.demo_patient.empty() || store_ == nullptr) return {};
   if (IsCheckOverdue()) {
     return "the daily check is overdue, and references need one that has passed today: open Daily "
            "check, sweep over all markers of the room, then go on here";
   }
-  if (scan_was_overdue) {
-    return "this scan was taken while the daily check was overdue: scan the reference again, now "
-           "that the check has passed";
+  if (scan && scan->check_overdue && !store_->IsConfirmedByLaterCheck(scan->id)) {
+    return "this scan was taken while the daily check was overdue, and no check of the same day "
+           "and "
+           "sensor has confirmed it: scan the reference again";
   }
   return {};
 }

@@ -1,5 +1,6 @@
 #include "daemon/appliance/reports.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <ctime>
@@ -7,21 +8,38 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "daemon/appliance/report_words.hpp"
 #include "daemon/config/version.hpp"
-#include "daemon/files/pdf_report.hpp"
 #include "drivers/files/file_io.hpp"
 
 namespace plumb {
 namespace {
 
 using Json = nlohmann::json;
+using web::Language;
 
 constexpr double kWarmUp_s = 15 * 60;
 constexpr double kManyLost = 0.05;
 constexpr int kMaxScans = 1000;
 constexpr std::size_t kMaxJsonBytes = std::size_t{16} << 20;
-constexpr std::array<const char*, 6> kAxes = {"vertical", "longitudinal", "lateral",
-                                              "pitch",    "roll",         "yaw"};
+
+/// A pattern of the words, filled in.
+template <typename... Values>
+std::string Filled(std::string_view pattern, const Values&... values) {
+  return fmt::format(fmt::runtime(pattern), values...);
+}
+
+/// A number in the language.
+std::string Said(double value, int digits, const ReportWords& words) {
+  std::string text = fmt::format("{:.{}f}", value, digits);
+  std::replace(text.begin(), text.end(), '.', words.decimal);
+  return text;
+}
+std::string Said(double value, const ReportWords& words) {
+  std::string text = fmt::format("{:g}", value);
+  std::replace(text.begin(), text.end(), '.', words.decimal);
+  return text;
+}
 
 /// Local time with its zone.
 std::string TimeOf(web::WallClock::time_point time) {
@@ -33,8 +51,27 @@ std::string TimeOf(web::WallClock::time_point time) {
   return {text.data(), size};
 }
 
-std::string Footer() {
-  return fmt::format("Plumb {}, printed {}", Version(), TimeOf(web::WallClock::now()));
+std::string Footer(const ReportWords& words) {
+  return Filled(words.printed, Version(), TimeOf(web::WallClock::now()));
+}
+
+ReportTexts TextsOf(const ReportWords& words) {
+  ReportTexts texts;
+  texts.notice = words.notice;
+  texts.page = words.page;
+  texts.posture = words.posture;
+  texts.quality = words.quality;
+  texts.within = words.within;
+  texts.unsure = words.unsure;
+  texts.outside = words.outside;
+  texts.not_known = words.not_known;
+  texts.tolerance = words.tolerance;
+  texts.heads = {std::string(words.fraction), std::string(words.when), std::string(words.verdict)};
+  for (std::size_t i = 0; i < words.short_axes.size(); ++i)
+    texts.heads[3 + i] = words.short_axes[i];
+  texts.heads[9] = words.accepted;
+  texts.decimal = words.decimal;
+  return texts;
 }
 
 /// Nothing where the file is missing or no JSON: the report then leaves out what it says.
@@ -46,22 +83,26 @@ Json JsonIn(const std::filesystem::path& file) {
   }
 }
 
-std::string VerdictOf(const web::Scan& scan) {
-  if (!scan.result) return scan.purpose == web::ScanPurpose::kReference ? "REFERENCE" : "NO RESULT";
+std::string_view VerdictOf(const web::Scan& scan, const ReportWords& words) {
+  if (!scan.result) {
+    return scan.purpose == web::ScanPurpose::kReference ? words.verdict_reference
+                                                        : words.verdict_none;
+  }
   const std::string& verdict = scan.result->verdict;
-  return verdict == "in_tolerance" ? "IN TOLERANCE"
-         : verdict == "unsure"     ? "NOT SURELY WITHIN"
-         : verdict == "move"       ? "MOVE"
-                                   : "NO ANSWER";
+  return verdict == "in_tolerance" ? words.verdict_in
+         : verdict == "unsure"     ? words.verdict_unsure
+         : verdict == "move"       ? words.verdict_move
+                                   : words.verdict_no_answer;
 }
 
-std::string WhyOf(const web::Scan& scan) {
-  if (!scan.result) return scan.failure;
+std::string WhyOf(const web::Scan& scan, Language language) {
+  const ReportWords& words = WordsOf(language);
+  if (!scan.result) return Translated(scan.failure, language);
   const std::string& verdict = scan.result->verdict;
-  if (verdict == "in_tolerance") return "Every value, with its uncertainty, is within tolerance.";
-  if (verdict == "unsure") return "Every value is within tolerance, but not with its uncertainty.";
-  if (verdict == "move") return "The correction below was to be applied.";
-  return scan.result->reasons.empty() ? "" : scan.result->reasons.front();
+  if (verdict == "in_tolerance") return std::string(words.why_in);
+  if (verdict == "unsure") return std::string(words.why_unsure);
+  if (verdict == "move") return std::string(words.why_move);
+  return scan.result->reasons.empty() ? "" : Translated(scan.result->reasons.front(), language);
 }
 
 std::array<std::optional<double>, 6> ValuesOf(const std::optional<web::SixNumbers>& numbers) {
@@ -71,149 +112,218 @@ std::array<std::optional<double>, 6> ValuesOf(const std::optional<web::SixNumber
 }
 
 /// A correction that is no answer is no advice: it is left out.
-std::vector<ReportNumber> NumbersOf(const web::Scan& scan, const web::Tolerance& tolerance) {
+bool IsAdvice(const web::Scan& scan) {
+  return scan.result && scan.result->correction && scan.result->verdict != "no_answer";
+}
+
+std::vector<ReportNumber> NumbersOf(const web::Scan& scan, const web::Tolerance& tolerance,
+                                    Language language) {
   std::vector<ReportNumber> numbers;
-  if (!scan.result || !scan.result->correction || scan.result->verdict == "no_answer")
-    return numbers;
+  if (!IsAdvice(scan)) return numbers;
+  const ReportWords& words = WordsOf(language);
   const auto values = ValuesOf(scan.result->correction), u95 = ValuesOf(scan.result->u95);
   const bool moves = scan.result->verdict == "move";
-  for (std::size_t i = 0; i < kAxes.size(); ++i) {
+  for (std::size_t i = 0; i < words.axes.size(); ++i) {
     const bool is_shift = i < 3;
     const double half = u95[i].value_or(0.0);
     const bool known = values[i] && std::abs(*values[i]) > half;
-    numbers.push_back({.name = kAxes[i],
-                       .unit = is_shift ? "mm" : "\xC2\xB0",
+    numbers.push_back({.name = std::string(words.axes[i]),
+                       .unit = is_shift ? "mm" : "\u00b0",
                        .value = values[i],
                        .u95 = half,
                        .tolerance = is_shift ? tolerance.shift_mm : tolerance.rotation_deg,
-                       .words = !moves  ? "no move needed"
-                                : known ? scan.result->words[i]
-                                        : "below its uncertainty"});
+                       .words = !moves  ? std::string(words.no_move)
+                                : known ? Translated(scan.result->words[i], language)
+                                        : std::string(words.insignificant)});
   }
   return numbers;
 }
 
-ReportFacts QualityOf(const web::Scan& scan, const Json& scene, const Json& result) {
+ReportFacts QualityOf(const web::Scan& scan, const Json& scene, const Json& result,
+                      const ReportWords& words) {
   ReportFacts facts;
+  const auto add = [&](std::string_view name, std::string value) {
+    facts.emplace_back(name, std::move(value));
+  };
   if (result.is_object() && result.contains("alignment") && result["alignment"].is_object()) {
-    facts.emplace_back(
-        "Markers matched",
-        fmt::format("{}", result["alignment"].value("markers_used", Json::array()).size()));
-    facts.emplace_back("Marker misfit",
-                       fmt::format("{:.2f} mm", 1000 * result["alignment"].value("rms_m", 0.0)));
+    const Json& alignment = result["alignment"];
+    add(words.markers, std::to_string(alignment.value("markers_used", Json::array()).size()));
+    add(words.misfit, Said(1000 * alignment.value("rms_m", 0.0), 2, words) + " mm");
   }
   if (result.is_object() && result.contains("region") && result["region"].is_object()) {
-    facts.emplace_back("Region covered",
-                       fmt::format("{:.1f} %", 100 * result["region"].value("coverage", 0.0)));
-    facts.emplace_back("Largest hole", fmt::format("{:.0f} mm", 1000 * result["region"].value(
-                                                                           "largest_hole_m", 0.0)));
+    const Json& region = result["region"];
+    add(words.covered, Said(100 * region.value("coverage", 0.0), 1, words) + " %");
+    add(words.hole, Said(1000 * region.value("largest_hole_m", 0.0), 0, words) + " mm");
   }
   if (scene.is_object() && scene.contains("frames")) {
     const Json& frames = scene["frames"];
-    facts.emplace_back("Frames tracked", fmt::format("{} of {}", frames.value("tracked", 0),
-                                                     frames.value("total", 0)));
-    facts.emplace_back("Frames lost", fmt::format("{}", frames.value("dropped", 0)));
-    facts.emplace_back("Keyframes", fmt::format("{}", scene.value("keyframes", 0)));
+    add(words.tracked,
+        Filled(words.tracked_of, frames.value("tracked", 0), frames.value("total", 0)));
+    add(words.lost, std::to_string(frames.value("dropped", 0)));
+    add(words.keyframes, std::to_string(scene.value("keyframes", 0)));
   }
-  if (scan.sensor_on_s)
-    facts.emplace_back("Sensor on for", fmt::format("{:.0f} min", *scan.sensor_on_s / 60));
+  if (scan.sensor_on_s) add(words.sensor_on, Said(*scan.sensor_on_s / 60, 0, words) + " min");
   return facts;
 }
 
-std::vector<std::string> CautionsOf(const web::Scan& scan, const Json& scene) {
+std::vector<std::string> CautionsOf(const web::Scan& scan, const Json& scene,
+                                    const ReportWords& words) {
   std::vector<std::string> cautions;
   if (scene.is_object() && scene.contains("frames")) {
     const double total = scene["frames"].value("total", 0.0);
     const double lost = scene["frames"].value("dropped", 0.0);
     if (total > 0 && lost / total >= kManyLost)
-      cautions.push_back(fmt::format("{:.0f} % of the frames were lost.", 100 * lost / total));
+      cautions.push_back(Filled(words.frames_lost, 100 * lost / total));
   }
-  if (scan.sensor_on_s && *scan.sensor_on_s < kWarmUp_s)
-    cautions.emplace_back("The sensor was still warming up.");
-  if (scan.check_overdue) cautions.emplace_back("The daily check was overdue at this scan.");
+  if (scan.sensor_on_s && *scan.sensor_on_s < kWarmUp_s) cautions.emplace_back(words.warming);
+  if (scan.check_overdue) cautions.emplace_back(words.overdue);
   return cautions;
 }
 
-std::string PlanText(const web::ReferencePlan& plan) {
-  return fmt::format("{}, {} markers, tolerance {:g} mm and {:g}\xC2\xB0", plan.posture,
-                     plan.couch_markers ? "couch" : "room", plan.tolerance.shift_mm,
-                     plan.tolerance.rotation_deg);
+std::string PlanText(const web::ReferencePlan& plan, const ReportWords& words) {
+  constexpr std::array<std::string_view, 4> kNames = {"HFS", "HFP", "FFS", "FFP"};
+  const auto name = std::find(kNames.begin(), kNames.end(), plan.posture);
+  const std::string posture =
+      name == kNames.end()
+          ? plan.posture
+          : std::string(
+                words.postures[static_cast<std::size_t>(std::distance(kNames.begin(), name))]);
+  return fmt::format("{}, {}", posture,
+                     plan.couch_markers ? words.couch_markers : words.room_markers);
+}
+
+std::string ToleranceText(const web::Tolerance& tolerance, const ReportWords& words) {
+  return fmt::format("\u00b1{} mm, \u00b1{}\u00b0", Said(tolerance.shift_mm, words),
+                     Said(tolerance.rotation_deg, words));
+}
+
+std::string RegionText(const web::ReferencePlan& plan, const ReportWords& words) {
+  const auto& region = plan.region_m;
+  if (region.size() < 3) return std::string(words.whole_body);
+  double twice_m2 = 0.0;
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    const auto &a = region[i], &b = region[(i + 1) % region.size()];
+    twice_m2 += a[0] * b[1] - b[0] * a[1];
+  }
+  return Filled(words.corners, region.size(), 1e4 * std::abs(twice_m2) / 2);
+}
+
+std::string IsocentreText(const web::ReferencePlan& plan, const ReportWords& words) {
+  if (!plan.isocentre_m) return std::string(words.middle);
+  const auto& [x, y, z] = *plan.isocentre_m;
+  return fmt::format("x {}; y {}; z {} m", Said(x, 3, words), Said(y, 3, words), Said(z, 3, words));
+}
+
+void AddReferenceTo(ReportFacts& facts, const web::Reference& reference, const ReportWords& words) {
+  facts.emplace_back(words.reference,
+                     Filled(words.version, reference.version, TimeOf(reference.created_at)));
+  facts.emplace_back(words.plan, PlanText(reference.plan, words));
+  facts.emplace_back(words.tolerance_fact, ToleranceText(reference.plan.tolerance, words));
+  facts.emplace_back(words.region, RegionText(reference.plan, words));
+  facts.emplace_back(words.isocentre, IsocentreText(reference.plan, words));
+  facts.emplace_back(words.planned_by, reference.planned_by);
+  facts.emplace_back(words.approved_by, reference.approved_at
+                                            ? fmt::format("{}, {}", reference.approved_by,
+                                                          TimeOf(*reference.approved_at))
+                                            : std::string(words.not_approved));
+  facts.emplace_back(words.checksum, reference.digest.substr(0, 16));
+}
+
+std::string AcceptedText(const web::Scan& scan, const ReportWords& words) {
+  if (scan.accepted_by.empty()) return {};
+  return scan.accepted_reason.empty()
+             ? Filled(words.accepted_by, scan.accepted_by)
+             : Filled(words.accepted_outside, scan.accepted_by, scan.accepted_reason);
 }
 
 ReportFacts IdentityOf(const web::Scan& scan, const std::optional<web::Patient>& patient,
-                       const std::optional<web::Reference>& reference) {
-  ReportFacts facts = {{"Patient", patient ? patient->code : "none (unassigned)"},
-                       {"Site", patient && !patient->site.empty() ? patient->site : "-"},
-                       {"Fraction", scan.fraction > 0 ? fmt::format("{}", scan.fraction) : "-"},
-                       {"Scan", fmt::format("{}, {}", scan.id, TimeOf(scan.started_at))}};
-  if (reference) {
-    facts.emplace_back("Reference", fmt::format("version {}, {}", reference->version,
-                                                TimeOf(reference->created_at)));
-    facts.emplace_back("Plan", PlanText(reference->plan));
-    facts.emplace_back("Planned by", reference->planned_by);
-    facts.emplace_back("Approved by", reference->approved_at
-                                          ? fmt::format("{}, {}", reference->approved_by,
-                                                        TimeOf(*reference->approved_at))
-                                          : std::string("not approved"));
-    facts.emplace_back("Checksum", reference->digest.substr(0, 16));
-  }
-  facts.emplace_back("Accepted", scan.accepted_by.empty() ? std::string("no")
-                                 : scan.accepted_reason.empty()
-                                     ? "by " + scan.accepted_by
-                                     : fmt::format("outside tolerance by {}: {}", scan.accepted_by,
-                                                   scan.accepted_reason));
+                       const std::optional<web::Reference>& reference, const ReportWords& words) {
+  ReportFacts facts;
+  const auto add = [&](std::string_view name, std::string value) {
+    facts.emplace_back(name, std::move(value));
+  };
+  add(words.patient, patient ? patient->code : std::string(words.unassigned));
+  add(words.site, patient && !patient->site.empty() ? patient->site : "-");
+  add(words.fraction, scan.fraction > 0 ? std::to_string(scan.fraction) : "-");
+  add(words.scan, fmt::format("{}, {}", scan.id, TimeOf(scan.started_at)));
+  if (reference) AddReferenceTo(facts, *reference, words);
+  const std::string accepted = AcceptedText(scan, words);
+  add(words.accepted, accepted.empty() ? std::string(words.no) : accepted);
   return facts;
 }
 
 }  // namespace
 
-std::string ScanReportPdf(Store& store, const web::Scan& scan) {
+ScanReport DescribeScan(Store& store, const web::Scan& scan, Language language) {
+  const ReportWords& words = WordsOf(language);
   const std::optional<web::Patient> patient = store.FindPatient(scan.patient_id);
   const std::optional<web::Reference> reference = store.FindReference(scan.reference_id);
   const Json scene = JsonIn(scan.folder / "scene/scene.json");
   const Json result = JsonIn(scan.folder / "result/result.json");
   const web::Tolerance tolerance = reference ? reference->plan.tolerance : web::Tolerance{};
-  plumb::ScanReport report{
-      .title = "Scan report",
-      .verdict = VerdictOf(scan),
-      .why = WhyOf(scan),
-      .identity = IdentityOf(scan, patient, reference),
-      .numbers = NumbersOf(scan, tolerance),
-      .cautions = CautionsOf(scan, scene),
-      .quality = QualityOf(scan, scene, result),
+  ScanReport report{
+      .texts = TextsOf(words),
+      .title = std::string(words.scan_title),
+      .verdict = std::string(VerdictOf(scan, words)),
+      .why = WhyOf(scan, language),
+      .identity = IdentityOf(scan, patient, reference, words),
+      .numbers = NumbersOf(scan, tolerance, language),
+      .cautions = CautionsOf(scan, scene, words),
+      .quality = QualityOf(scan, scene, result, words),
       .body = {},
       .pictures = {scan.folder / "result/error_map.png", scan.folder / "result/overlay.png"},
-      .footer = Footer()};
-  if (!report.numbers.empty()) report.body = scan.result->body_after;
-  return PdfOf(report);
+      .footer = Footer(words)};
+  if (report.numbers.empty()) return report;
+  for (const std::string& part : scan.result->body_after)
+    report.body.push_back(Translated(part, language));
+  if (report.body.empty()) report.body.emplace_back(words.as_reference);
+  return report;
 }
 
-std::string CourseReportPdf(Store& store, const web::Patient& patient) {
-  plumb::CourseReport report{.title = fmt::format("Course of {}", patient.code),
-                             .identity = {{"Site", patient.site.empty() ? "-" : patient.site},
-                                          {"Scans", fmt::format("{}", patient.num_scans)}},
-                             .rows = {},
-                             .footer = Footer()};
+CourseReport DescribeCourse(Store& store, const web::Patient& patient, Language language) {
+  const ReportWords& words = WordsOf(language);
+  CourseReport report{
+      .texts = TextsOf(words),
+      .title = Filled(words.course_title, patient.code),
+      .identity = {{std::string(words.site), patient.site.empty() ? "-" : patient.site},
+                   {std::string(words.scans), std::to_string(patient.num_scans)}},
+      .rows = {},
+      .note = std::string(words.digits_note),
+      .footer = Footer(words)};
+  if (const auto reference = store.FindReference(patient.approved_reference_id))
+    AddReferenceTo(report.identity, *reference, words);
   std::vector<web::Scan> scans = store.Scans(patient.id, kMaxScans);
   bool is_any_overdue = false;
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != web::ScanOutcome::kDone) continue;
-    CourseRow row{.fraction = scan->fraction > 0 ? fmt::format("{}", scan->fraction) : "-",
-                  .when = TimeOf(scan->started_at).substr(0, 16),
-                  .verdict = VerdictOf(*scan),
-                  .accepted = scan->accepted_by,
+    CourseRow row{.fraction = scan->fraction > 0 ? std::to_string(scan->fraction) : "-",
+                  .when = TimeOf(scan->started_at),
+                  .verdict = std::string(VerdictOf(*scan, words)),
+                  .accepted = AcceptedText(*scan, words),
                   .values = {}};
     if (scan->check_overdue) {
       row.verdict += " *";
       is_any_overdue = true;
     }
-    if (!scan->accepted_reason.empty()) row.accepted += ": " + scan->accepted_reason;
-    if (scan->result && scan->result->verdict != "no_answer")
-      row.values = ValuesOf(scan->result->correction);
+    if (IsAdvice(*scan)) {
+      const auto values = ValuesOf(scan->result->correction), u95 = ValuesOf(scan->result->u95);
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        if (values[i]) row.values[i] = CourseValue{*values[i], u95[i].value_or(0.0)};
+      }
+    }
     report.rows.push_back(std::move(row));
   }
-  if (is_any_overdue) report.identity.emplace_back("* Daily check", "overdue at this scan");
-  return PdfOf(report);
+  if (is_any_overdue)
+    report.identity.emplace_back(words.overdue_mark, std::string(words.overdue_words));
+  return report;
+}
+
+std::string ScanReportPdf(Store& store, const web::Scan& scan, Language language) {
+  return PdfOf(DescribeScan(store, scan, language));
+}
+
+std::string CourseReportPdf(Store& store, const web::Patient& patient, Language language) {
+  return PdfOf(DescribeCourse(store, patient, language));
 }
 
 }  // namespace plumb

@@ -293,7 +293,7 @@ std::optional<web::Reference> WebService::FindReference(const std::string& id) {
 void WebService::AddReference(const web::Actor& actor, const std::string& scan_id,
                               const std::string& reason, web::Done done) {
   const std::optional<web::Scan> scan = FindScan(scan_id);
-  if (const std::string why = appliance_.WhyNoReference(scan && scan->check_overdue); !why.empty())
+  if (const std::string why = appliance_.WhyNoReference(scan); !why.empty())
     return done(AnswerOf(why));
   Change(std::move(done), [=, appliance = &appliance_](Store& store) {
     return store.AddReference(actor, scan_id, reason, appliance->DefaultPlan());
@@ -311,7 +311,7 @@ void WebService::ApproveReference(const web::Actor& actor, const std::string& id
   const std::optional<web::Reference> reference = FindReference(id);
   const std::optional<web::Scan> scan =
       reference ? FindScan(reference->scan_id) : std::optional<web::Scan>();
-  if (const std::string why = appliance_.WhyNoReference(scan && scan->check_overdue); !why.empty())
+  if (const std::string why = appliance_.WhyNoReference(scan); !why.empty())
     return done(AnswerOf(why));
   Change(std::move(done), [=](Store& store) {
     return store.ApproveReference(actor, id, revision, digest), std::string();
@@ -379,20 +379,22 @@ std::optional<std::string> WebService::CompactMap(const std::string& scan_id,
   }
 }
 
-std::optional<std::string> WebService::ScanReport(const std::string& scan_id) {
+std::optional<std::string> WebService::ScanReport(const std::string& scan_id,
+                                                  web::Language language) {
   return Read<std::optional<std::string>>(
       [&](Store& store) -> std::optional<std::string> {
         const std::optional<web::Scan> scan = store.FindScan(scan_id);
-        return scan ? std::optional(ScanReportPdf(store, *scan)) : std::nullopt;
+        return scan ? std::optional(ScanReportPdf(store, *scan, language)) : std::nullopt;
       },
       {});
 }
 
-std::optional<std::string> WebService::CourseReport(const std::string& patient_id) {
+std::optional<std::string> WebService::CourseReport(const std::string& patient_id,
+                                                    web::Language language) {
   return Read<std::optional<std::string>>(
       [&](Store& store) -> std::optional<std::string> {
         const std::optional<web::Patient> patient = store.FindPatient(patient_id);
-        return patient ? std::optional(CourseReportPdf(store, *patient)) : std::nullopt;
+        return patient ? std::optional(CourseReportPdf(store, *patient, language)) : std::nullopt;
       },
       {});
 }

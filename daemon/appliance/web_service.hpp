@@ -67,8 +67,10 @@ class WebService : public web::ScanService {
   [[nodiscard]] std::optional<std::string> CompactMap(const std::string& scan_id,
                                                       const std::string& name) override;
 
-  [[nodiscard]] std::optional<std::string> ScanReport(const std::string& scan_id) override;
-  [[nodiscard]] std::optional<std::string> CourseReport(const std::string& patient_id) override;
+  [[nodiscard]] std::optional<std::string> ScanReport(const std::string& scan_id,
+                                                      web::Language language) override;
+  [[nodiscard]] std::optional<std::string> CourseReport(const std::string& patient_id,
+                                                        web::Language language) override;
 
   [[nodiscard]] web::CheckStatus GetChecks() override;
   void OpenCheck(const web::Actor& actor, web::Done done) override;

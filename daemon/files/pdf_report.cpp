@@ -29,7 +29,7 @@ constexpr Ink kGood{0.04, 0.4, 0.24}, kMove{0.58, 0.3, 0.0};
 /// Points, y down.
 class Pages {
  public:
-  explicit Pages(std::string footer) : footer_(std::move(footer)) {
+  Pages(const ReportTexts& texts, std::string footer) : texts_(texts), footer_(std::move(footer)) {
     surface_.reset(cairo_pdf_surface_create_for_stream(&Append, &bytes_, kWidth, kHeight));
     context_.reset(cairo_create(surface_.get()));
     Top();
@@ -119,16 +119,18 @@ class Pages {
   void Top() {
     ++page_;
     y = kMargin - 12;
-    Paragraph(kMargin, kInner, std::string(kResearchNotice), 7.5, kMove, true);
+    Paragraph(kMargin, kInner, texts_.notice.empty() ? std::string(kResearchNotice) : texts_.notice,
+              7.5, kMove, true);
     Rule(y += 5);
   }
   void Foot() {
     Rule(kHeight - 44);
     Text(kMargin, kHeight - 30, footer_, 7.5, kGrey);
-    const std::string number = fmt::format("{}", page_);
+    const std::string number = fmt::format(fmt::runtime(texts_.page), page_);
     Text(kWidth - kMargin - Width(number, 8), kHeight - 30, number, 8, kGrey);
   }
 
+  const ReportTexts& texts_;
   std::string bytes_, footer_;
   int page_ = 0;
   std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface_{
@@ -165,35 +167,79 @@ int DigitsOf(double u95, int most) {
   return std::clamp(static_cast<int>(-std::floor(std::log10(u95) + 1e-9)), 0, most);
 }
 
-void NumberLine(Pages& pages, const ReportNumber& number) {
+/// With a minus that is one, no sign before zero, and the decimal sign of the language.
+std::string Number(double value, int digits, bool is_signed, char decimal) {
+  std::string text = fmt::format("{:.{}f}", std::abs(value), digits);
+  const bool is_zero = text.find_first_not_of("0.") == std::string::npos;
+  std::replace(text.begin(), text.end(), '.', decimal);
+  if (!is_signed || is_zero) return text;
+  return (value < 0 ? "\u2212" : "+") + text;
+}
+
+std::string Plain(double value, char decimal) {
+  std::string text = fmt::format("{:g}", value);
+  std::replace(text.begin(), text.end(), '.', decimal);
+  return text;
+}
+
+void NumberLine(Pages& pages, const ReportNumber& number, const ReportTexts& texts) {
   const double line = pages.y += 15;
   pages.Text(kMargin, line, number.name, 9.5, kBlack, true);
   if (!number.value) {
-    pages.Text(kMargin + 90, line, "not known", 9.5, kGrey);
+    pages.Text(kMargin + 85, line, texts.not_known, 9.5, kGrey);
     return;
   }
-  const double value = *number.value, size = std::abs(value);
-  const int most = number.unit == "mm" ? 1 : 2;
-  const int digits = DigitsOf(number.u95, most);
+  const double size = std::abs(*number.value);
   const bool in = size + number.u95 <= number.tolerance, unsure = !in && size <= number.tolerance;
-  pages.Text(
-      kMargin + 90, line,
-      fmt::format("{:+.{}f} {} \xC2\xB1 {:.{}f}", value, digits, number.unit, number.u95, most),
-      9.5, kBlack, true);
-  pages.Text(kMargin + 205, line, fmt::format("tolerance \xC2\xB1{:g}", number.tolerance), 8.5,
-             kGrey);
-  pages.Text(kMargin + 295, line,
-             in       ? "in tolerance"
-             : unsure ? "not surely within"
-                      : "outside tolerance",
+  pages.Text(kMargin + 85, line,
+             fmt::format("{} {}",
+                         ValueWithUncertainty(*number.value, number.u95,
+                                              number.unit == "mm" ? 1 : 2, texts.decimal),
+                         number.unit),
+             9.5, kBlack, true);
+  pages.Text(kMargin + 180, line,
+             fmt::format(fmt::runtime(texts.tolerance), Plain(number.tolerance, texts.decimal),
+                         number.unit),
+             8.5, kGrey);
+  pages.Text(kMargin + 265, line,
+             in       ? texts.within
+             : unsure ? texts.unsure
+                      : texts.outside,
              8.5, in ? kGood : kMove, true);
-  pages.Text(kMargin + 395, line, number.words, 8.5);
+  constexpr double kWordsAt = 372, kWordsSize = 8;
+  pages.y = line - 1.3 * kWordsSize;  // the first line of the words stands on this one
+  pages.Paragraph(kMargin + kWordsAt, kInner - kWordsAt, number.words, kWordsSize);
+  pages.y = std::max(pages.y, line);
+}
+
+/// Below each other, each as large as the room lets them all be; what is missing leaves no gap.
+void Pictures(Pages& pages, const std::vector<std::filesystem::path>& files) {
+  constexpr double kLeast = 60, kGap = 8;
+  auto left = static_cast<double>(files.size());
+  for (const std::filesystem::path& file : files) {
+    const double height = (kBottom - pages.y - 6) / left - kGap;
+    left -= 1;
+    if (height < kLeast) return;
+    if (pages.Picture(file, kMargin, pages.y + 6, kInner, height)) pages.y += height + kGap;
+  }
 }
 
 }  // namespace
 
+std::string ValueWithUncertainty(double value, double u95, int most, char decimal) {
+  const int digits = DigitsOf(u95, most);
+  const std::string said = Number(value, digits, /*is_signed=*/true, decimal);
+  if (!(u95 > 0)) return said;
+  // One digit more of an uncertainty that begins with 1, as on the page.
+  const std::string half = fmt::format("{:.3f}", u95);
+  const std::size_t first = half.find_first_not_of("0.");
+  const bool begins_with_1 = first != std::string::npos && half[first] == '1';
+  return said + " \u00b1" +
+         Number(u95, std::min(2, digits + (begins_with_1 ? 1 : 0)), /*is_signed=*/false, decimal);
+}
+
 std::string PdfOf(const ScanReport& report) {
-  Pages pages(report.footer);
+  Pages pages(report.texts, report.footer);
   pages.y += 6;
   pages.Paragraph(kMargin, kInner, report.title, 16, kBlack, true);
   pages.y += 2;
@@ -204,56 +250,59 @@ std::string PdfOf(const ScanReport& report) {
   for (const std::string& caution : report.cautions)
     pages.Paragraph(kMargin, kInner, "! " + caution, 9, kMove, true);
   if (!report.numbers.empty()) pages.y += 2;
-  for (const ReportNumber& number : report.numbers) NumberLine(pages, number);
+  for (const ReportNumber& number : report.numbers) NumberLine(pages, number, report.texts);
   if (!report.body.empty()) {
-    Heading(pages, "Posture");
+    Heading(pages, report.texts.posture);
     for (const std::string& words : report.body) pages.Paragraph(kMargin, kInner, words, 8.5);
   }
   if (!report.quality.empty()) {
-    Heading(pages, "Scan quality");
+    Heading(pages, report.texts.quality);
     Facts(pages, report.quality);
   }
-  const double room = kBottom - pages.y - 6;
-  const auto count = static_cast<double>(std::max<std::size_t>(1, report.pictures.size()));
-  const double width = (kInner - 10 * (count - 1)) / count;
-  double x = kMargin;
-  for (const std::filesystem::path& picture : report.pictures) {
-    if (room > 60 && pages.Picture(picture, x, pages.y + 6, width, room)) x += width + 10;
-  }
+  Pictures(pages, report.pictures);
   return pages.Finish();
 }
 
 std::string PdfOf(const CourseReport& report) {
-  constexpr std::array<double, 10> kColumns = {0, 42, 140, 236, 272, 308, 344, 380, 416, 452};
-  constexpr std::array<const char*, 10> kHeads = {"Fraction", "When",    "Verdict", "Vert mm",
-                                                  "Long mm",  "Lat mm",  "Pitch °", "Roll °",
-                                                  "Yaw °",    "Accepted"};
-  Pages pages(report.footer);
+  constexpr std::array<double, 10> kColumns = {0, 38, 122, 214, 256, 298, 340, 398, 456, 0};
+  constexpr double kSize = 7.5, kSmall = 6.8;
+  const ReportTexts& texts = report.texts;
+  Pages pages(texts, report.footer);
   pages.y += 6;
   pages.Paragraph(kMargin, kInner, report.title, 16, kBlack, true);
   Facts(pages, report.identity);
   const auto heads = [&] {
-    pages.y += 16;
-    for (std::size_t i = 0; i < kHeads.size(); ++i)
-      pages.Text(kMargin + kColumns[i], pages.y, kHeads[i], 7.5, kGrey, true);
+    pages.y += 14;
+    for (std::size_t i = 0; i + 1 < texts.heads.size(); ++i)
+      pages.Text(kMargin + kColumns[i], pages.y, texts.heads[i], kSmall, kGrey, true);
     pages.Rule(pages.y += 4);
   };
   heads();
   for (const CourseRow& row : report.rows) {
-    if (pages.y > kBottom - 16) {
+    if (pages.y > kBottom - 44) {
       pages.Next();
       heads();
     }
     const double line = pages.y += 13;
-    pages.Text(kMargin + kColumns[0], line, row.fraction, 8);
-    pages.Text(kMargin + kColumns[1], line, row.when, 8);
-    pages.Text(kMargin + kColumns[2], line, row.verdict, 8, kBlack, true);
+    pages.Text(kMargin + kColumns[0], line, row.fraction, kSize);
+    pages.Text(kMargin + kColumns[1], line, row.when, kSmall);
+    pages.Text(kMargin + kColumns[2], line, row.verdict, kSmall, kBlack, true);
     for (std::size_t i = 0; i < row.values.size(); ++i) {
-      if (row.values[i])
-        pages.Text(kMargin + kColumns[3 + i], line,
-                   fmt::format("{:+.{}f}", *row.values[i], i < 3 ? 1 : 2), 8);
+      if (!row.values[i]) continue;
+      const auto [value, u95] = *row.values[i];
+      pages.Text(kMargin + kColumns[3 + i], line,
+                 ValueWithUncertainty(value, u95, i < 3 ? 1 : 2, texts.decimal), kSmall);
     }
-    pages.Text(kMargin + kColumns[9], line, row.accepted, 7.5);
+    // Below, over the whole width: who accepted, and why it was outside tolerance.
+    if (!row.accepted.empty()) {
+      pages.y += 1;
+      pages.Paragraph(kMargin + kColumns[1], kInner - kColumns[1],
+                      fmt::format("{}: {}", texts.heads[9], row.accepted), kSmall, kGrey);
+    }
+  }
+  if (!report.note.empty()) {
+    pages.y += 8;
+    pages.Paragraph(kMargin, kInner, report.note, kSmall, kGrey);
   }
   return pages.Finish();
 }

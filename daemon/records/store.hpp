@@ -218,6 +218,10 @@ class Store {
   /// Not in the future. @param sensor_serial  Of the unit that is to be checked; empty: any.
   [[nodiscard]] bool HasPassedCheckSince(web::WallClock::time_point since,
                                          const std::string& sensor_serial = {});
+  /// Whether a check shows after the fact that sensor and markers were right at this scan: of the
+  /// same unit, passed on the day of the scan and after it, with no failed check in between and
+  /// against a baseline from before the scan.
+  [[nodiscard]] bool IsConfirmedByLaterCheck(const std::string& scan_id);
   [[nodiscard]] std::optional<web::CheckBaseline> CheckBaseline();
   [[nodiscard]] std::string
   CheckBaselineJson();  ///< Of the check that is the baseline; empty: none.

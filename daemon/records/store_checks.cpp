@@ -74,6 +74,25 @@ bool Store::HasPassedCheckSince(web::WallClock::time_point since,
       .Step();
 }
 
+bool Store::IsConfirmedByLaterCheck(const std::string& scan_id) {
+  const std::optional<std::int64_t> number = ParseId(scan_id);
+  if (!number) return false;
+  const std::lock_guard lock(read_mutex_);
+  Statement query = read_->Prepare(
+      "SELECT 1 FROM scans JOIN checks ON checks.status = 'passed' AND checks.sensor_serial = "
+      "scans.sensor_serial AND checks.time >= scans.finished_at AND checks.time <= ?2 AND "
+      "date(checks.time / 1000000, 'unixepoch', 'localtime') = "
+      "date(scans.started_at / 1000000, 'unixepoch', 'localtime') "
+      "WHERE scans.id = ?1 AND scans.sensor_serial <> '' "
+      "AND NOT EXISTS (SELECT 1 FROM checks AS other WHERE other.status = 'failed' AND "
+      "other.sensor_serial = scans.sensor_serial AND other.time >= scans.started_at AND "
+      "other.time <= checks.time) "
+      "AND EXISTS (SELECT 1 FROM check_baselines WHERE set_at <= scans.started_at) "
+      "AND NOT EXISTS (SELECT 1 FROM check_baselines WHERE set_at > scans.started_at AND "
+      "set_at <= checks.time) LIMIT 1");
+  return query.Bind(*number).Bind(ToStored(web::WallClock::now())).Step();
+}
+
 std::optional<web::CheckBaseline> Store::CheckBaseline() {
   const std::lock_guard lock(read_mutex_);
   Statement query = read_->Prepare(

@@ -125,12 +125,17 @@ class FakeScanService : public web::ScanService {
     const auto scan = FindScan(scan_id);
     return scan && make_map ? make_map(scan->folder, name) : std::nullopt;
   }
-  std::optional<std::string> ScanReport(const std::string& scan_id) override {
+  std::optional<std::string> ScanReport(const std::string& scan_id,
+                                        web::Language language) override {
+    report_language = language;
     return FindScan(scan_id) ? std::optional<std::string>("%PDF-1.5 a scan") : std::nullopt;
   }
-  std::optional<std::string> CourseReport(const std::string& patient_id) override {
+  std::optional<std::string> CourseReport(const std::string& patient_id,
+                                          web::Language language) override {
+    report_language = language;
     return FindPatient(patient_id) ? std::optional<std::string>("%PDF-1.5 a course") : std::nullopt;
   }
+  web::Language report_language = web::Language::kEnglish;  ///< Of the last report.
   web::CheckStatus GetChecks() override { return checks; }
   void OpenCheck(const web::Actor& actor, web::Done done) override;
   void SetCheckBaseline(const web::Actor& actor, const std::string& check_id,

@@ -1,17 +1,21 @@
 // Both languages of the page hold the same texts, and words for every action that the sources write
 // into the audit log: catalogue_test.mjs SOURCE_FOLDER
-import { copyFileSync, mkdtempSync, readFileSync, readdirSync, rmSync } from 'node:fs';
+import {
+  copyFileSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync,
+} from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
 const [source] = process.argv.slice(2);
 const folder = mkdtempSync(join(tmpdir(), 'plumb-catalogue-'));
-const load = async (name) => {  // as a module, whatever the folder's package says
-  copyFileSync(join(source, 'web/assets/strings', `${name}.js`), join(folder, `${name}.mjs`));
-  return (await import(pathToFileURL(join(folder, `${name}.mjs`)).href))[name];
-};
-const { en, es } = { en: await load('en'), es: await load('es') };
+writeFileSync(join(folder, 'package.json'), '{"type": "module"}');
+const load = async (name) => (await import(pathToFileURL(join(folder, `${name}.js`)).href));
+for (const name of ['en', 'es', 'es_appliance']) {
+  copyFileSync(join(source, 'web/assets/strings', `${name}.js`), join(folder, `${name}.js`));
+}
+const [{ en }, { es }] = [await load('en'), await load('es')];
+const { kWords, kPatterns } = await load('es_appliance');
 rmSync(folder, { recursive: true });
 
 const failures = [];
@@ -86,8 +90,37 @@ for (const [text, expected] of [
   ['up', 'arriba'], ['to patient left', 'hacia la izquierda del paciente'],
   ['left side at the head end 9 mm high',
     'lado izquierdo en el extremo de la cabeza: 9 mm demasiado alto'],
-  ['marker 7 moved 12 mm', 'el marcador 7 se movió 12 mm'], ['something else', undefined]]) {
+  ['marker 7 moved 12 mm', 'el marcador 7 se movió 12 mm'], ['something else', undefined],
+  ['toString', undefined],
+  ['left side of the abdomen 6 mm low', 'lado izquierdo del abdomen: 6 mm demasiado bajo'],
+  ['-X side at the end away from the gantry 4 mm high',
+    'lado −X en el extremo opuesto al gantry: 4 mm demasiado alto'],
+  ['the current scan covers 81.5 % of the region, at least 90 % are needed; sweep all of it',
+    'el escaneo actual cubre el 81,5 % de la región y se necesita al menos el 90 %; bárrala toda'],
+  ['pitch is not well determined: ±1.4 deg at 95 %, the tolerance is 1 deg',
+    'cabeceo: no está bien determinado, ±1,4 ° al 95 %; la tolerancia es 1 °'],
+  ['scan needs at least 3 markers shared with the reference, found 1 (id 7); keep the markers in '
+    + 'view', 'el escaneo necesita al menos 3 marcadores comunes con la referencia y tiene 1; '
+    + 'mantenga los marcadores a la vista']]) {
   if (es.translate(text) !== expected) failures.push(`"${text}" becomes "${es.translate(text)}"`);
+}
+// The phrases are those that the method writes: one that was reworded there loses its Spanish.
+const sources = [];
+for (const top of ['algo', 'daemon', 'web']) {
+  for (const file of readdirSync(join(source, top), { recursive: true })) {
+    if (file.endsWith('.cpp') && !file.includes('node_modules')) {
+      sources.push(readFileSync(join(source, top, file), 'utf8').replace(/"\s*\n\s*"/g, ''));
+    }
+  }
+}
+const all = sources.join('\n');
+for (const phrase of Object.keys(kWords).filter((words) => words.length > 45)) {
+  if (!all.includes(phrase)) failures.push(`nothing says "${phrase}"`);
+}
+for (const [pattern] of kPatterns) {
+  const fixed = pattern.replace(/\\(.)/g, '$1').split(/[$^()[\]?|]+/)
+    .sort((a, b) => b.length - a.length)[0];
+  if (fixed.length > 20 && !all.includes(fixed)) failures.push(`nothing says "${fixed}"`);
 }
 if (en.patients && en.session.scans(1) === en.session.scans(2).replace('2', '1')) {
   failures.push('one scan is said as many');

@@ -94,6 +94,28 @@ await h.step('a physicist plans, a second one approves', async () => {
   const scrolled = await map.boundingBox();
   await bob.mouse.click(scrolled.x + 0.5 * scrolled.width, scrolled.y + 0.5 * scrolled.height);
   check(Number(await bob.getByLabel('Isocentre z').inputValue()) > 0.02, 'the isocentre lies on the body');
+  // The same by keys, at the height that it has; what is undone stands in the fields again.
+  const typed = async () => {
+    const values = [];
+    for (const axis of ['x', 'y', 'z']) values.push(await bob.getByLabel(`Isocentre ${axis}`).inputValue());
+    return values.map(Number);
+  };
+  const picked = await typed();
+  await map.press('i');
+  await map.press('ArrowRight');
+  await map.press('Shift+ArrowUp');
+  const moved = await typed();
+  check(Math.abs(moved[0] - picked[0] - 0.005) < 1e-9, `5 mm to the right: ${picked} to ${moved}`);
+  check(Math.abs(moved[1] - picked[1] - 0.05) < 1e-9, `50 mm up: ${picked} to ${moved}`);
+  equal(moved[2], picked[2], 'at the same height');
+  await map.press('Delete');
+  equal(await bob.getByLabel('Isocentre x').inputValue(), '', 'no isocentre');
+  await map.press('i');
+  check((await typed())[2] > 0.02, 'a new one lies on the skin in the middle of the region');
+  await map.press('Shift+ArrowLeft');
+  for (let i = 0; i < 5; ++i) await map.press('u');
+  equal((await typed()).join(), picked.join(), 'undone');
+  await bob.getByText('4 corners').waitFor();
   // The site's template: made of what is here, used again after it was cleared.
   await bob.getByText('There is no template for this site yet.').waitFor();
   await bob.getByLabel('Shifts (mm)').fill('4');
@@ -336,6 +358,8 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
   await bob.getByText('12 markers, set by bob').waitFor();
   await takeCheck();
   await anna.locator('.verdict', { hasText: 'PASSED' }).waitFor();
+  const trends = (await anna.locator('.trend figcaption').allInnerTexts()).join('; ');
+  check(!/\d\.\d{3}/.test(trends), `no digits that nobody measured: ${trends}`);
   await h.look(anna, 'check-passed');
   h.tell('markermoved');
   await takeCheck();
@@ -534,6 +558,10 @@ await h.step('phone and 4K', async () => {
       await page.waitForTimeout(1000);
       const overflow = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
       check(overflow <= 0, `${name} ${screen} does not scroll sideways (${overflow} px too wide)`);
+      // Nothing of a table lies out of view to the side.
+      const beyond = await page.evaluate(() => [...document.querySelectorAll('td, th')]
+        .filter((cell) => cell.getBoundingClientRect().right > innerWidth).map((cell) => cell.textContent));
+      equal(beyond.join(), '', `${name} ${screen}: cells in view`);
       await h.look(page, `${name}-${screen}`, { fullPage: false });
     }
     await page.context().close();

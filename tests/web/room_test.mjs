@@ -117,6 +117,26 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
   await room.locator('.verdict.move').waitFor(kSlow);
   equal(await room.locator('.number').count(), 6, 'six numbers');
   await room.locator('.room-map canvas').waitFor();
+  // Patient and uncertainty are read from 3 m: digits of 1 cm at least, and nothing below the edge.
+  for (const [place, least] of [['.room-code', 2], ['.number .value', 2], ['.number .half', 1]]) {
+    const size = await room.locator(place).first().evaluate((element) => parseFloat(getComputedStyle(element).fontSize));
+    const cm = size * 0.73 * 88.5 / 1920;
+    check(cm >= least, `${place} is ${cm.toFixed(1)} cm high`);
+  }
+  for (const [width, height] of [[1280, 800], [1920, 1080]]) {
+    await room.setViewportSize({ width, height });
+    // With the longest words that there are in either language.
+    const lowest = await room.evaluate(() => {
+      const words = { '.number .word': 'hacia la izquierda del paciente', '.number .judged': '▲ fuera de tolerancia' };
+      const texts = Object.entries(words).flatMap(([where, text]) =>
+        [...document.querySelectorAll(where)].map((element) => [element, element.textContent, text]));
+      for (const [element, , text] of texts) element.textContent = text;
+      const bottom = Math.max(...[...document.querySelectorAll('.number')].map((card) => card.getBoundingClientRect().bottom));
+      for (const [element, text] of texts) element.textContent = text;
+      return bottom;
+    });
+    check(lowest <= height, `all six in view at ${width}x${height}: down to ${lowest}`);
+  }
   await h.look(room, 'room-move', { fullPage: false });
 });
 

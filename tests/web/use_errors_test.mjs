@@ -426,7 +426,8 @@ await h.step('an account: only what was changed is sent', async () => {
 });
 
 await h.step('the wrong patient: both codes are on the screen', async () => {
-  const last = (await h.api(anna, 'scans?limit=1')).body.scans[0];
+  h.tell('moved z 8 HFS');
+  const last = await scan();
   await addPatient('PX-0002');
   await anna.getByText('Confirm: PX-0002 is on the couch').waitFor();
   equal(await anna.getByRole('button', { name: 'Start treatment session' }).isDisabled(), true, 'no fraction without a reference of its own');
@@ -436,6 +437,13 @@ await h.step('the wrong patient: both codes are on the screen', async () => {
   await anna.goto(`${h.url}#/result/${last.id}`);
   await anna.getByText('The session of another patient (PX-0002) is open').waitFor();
   check((await anna.locator('.identity').innerText()).includes('PX-0001'), 'the result names whose it is');
+  // A minute old, but of somebody who is not on the couch any more: nothing of it is to be applied.
+  await anna.goto(`${h.url}#/result`);
+  await anna.getByText('SESSION NOT OPEN').waitFor();
+  await anna.locator('.verdict', { hasText: 'WAS OUTSIDE TOLERANCE' }).waitFor();
+  equal(await anna.locator('.number .arrow').count(), 0, 'no arrow');
+  equal(await anna.getByText('Accept outside tolerance').count(), 0, 'nothing to accept');
+  await h.look(anna, 'result-other-session');
 });
 
 await h.step('three roles: what a screen hides the interface refuses', async () => {

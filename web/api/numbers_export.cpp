@@ -57,6 +57,14 @@ std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
   return text;
 }
 
+/// Which the page asks for: "?language=es"; nothing for one that there is not.
+std::optional<Language> LanguageOf(const Request& request) {
+  const auto found = request.query.find("language");
+  if (found == request.query.end() || found->second == "en") return Language::kEnglish;
+  return found->second == "es" ? std::optional(Language::kSpanish) : std::nullopt;
+}
+Response NoSuchLanguage() { return ErrorResponse(400, "language: expected en or es"); }
+
 Response File(std::string body, std::string type, const std::string& name) {
   Response response;
   response.type = std::move(type);
@@ -82,14 +90,18 @@ void Add(Router& router, ScanService& service, const char* pattern,
 void AddExportRoutes(Router& router, ScanService& service) {
   Add(router, service, "/api/v1/scans/{id}/report.pdf",
       [](ScanService& from, const Request& request) {
-        auto pdf = from.ScanReport(request.arguments[0]);
+        const std::optional<Language> language = LanguageOf(request);
+        if (!language) return NoSuchLanguage();
+        auto pdf = from.ScanReport(request.arguments[0], *language);
         if (!pdf) return ErrorResponse(404, "there is no such scan");
         return File(std::move(*pdf), "application/pdf",
                     fmt::format("plumb_scan_{}.pdf", request.arguments[0]));
       });
   Add(router, service, "/api/v1/patients/{id}/report.pdf",
       [](ScanService& from, const Request& request) {
-        auto pdf = from.CourseReport(request.arguments[0]);
+        const std::optional<Language> language = LanguageOf(request);
+        if (!language) return NoSuchLanguage();
+        auto pdf = from.CourseReport(request.arguments[0], *language);
         if (!pdf) return ErrorResponse(404, "there is no such patient");
         return File(std::move(*pdf), "application/pdf",
                     fmt::format("plumb_course_{}.pdf", request.arguments[0]));

@@ -86,7 +86,7 @@ function buildTop(session) {
     h('a', { class: 'brand', href: '#/status' }, S.product), menu, nav,
     h('p', { class: 'chip', id: 'chip' }),
     h('p', { class: 'who' }, S.loggedInAs(session.user, S.roles[session.role])),
-    h('button', { class: 'quiet', onclick: () => leave().catch(report) }, S.logOut));
+    h('button', { class: 'quiet log-out', onclick: () => leave().catch(report) }, S.logOut));
 }
 
 let lastState = null;

@@ -18,4 +18,12 @@ struct Asset {
 /// Null if there is none.
 [[nodiscard]] const Asset* FindAsset(std::string_view path);
 
+/// Words of the appliance in Spanish, from `assets/strings/es_appliance.js`: phrases, and patterns
+/// (regular expressions of ECMAScript) whose words name their groups "$1" to "$9".
+struct Phrase {
+  std::string_view text, words;
+};
+[[nodiscard]] std::span<const Phrase> SpanishPhrases();
+[[nodiscard]] std::span<const Phrase> SpanishPatterns();
+
 }  // namespace plumb::web

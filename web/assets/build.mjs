@@ -1,9 +1,9 @@
 // Bundles the page and writes it as a C++ source: build.mjs NODE_MODULES WORK_FOLDER OUT.cpp
 import { createHash } from 'node:crypto';
-import { mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { copyFileSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { dirname, extname, join } from 'node:path';
-import { fileURLToPath } from 'node:url';
+import { fileURLToPath, pathToFileURL } from 'node:url';
 import { gzipSync } from 'node:zlib';
 
 const [modules, work, output] = process.argv.slice(2);
@@ -61,6 +61,13 @@ const rows = assets.map((asset) => {
   console.log(`  ${name} ${String(asset.data.length).padStart(8)} bytes, ${String(packed.length).padStart(7)} gzip`);
   return `    {${literal(Buffer.from(asset.path))}, ${literal(Buffer.from(asset.type))}, ${view(asset.data)},\n     ${view(packed)}, ${asset.hashed}},`;
 });
+
+// The appliance's words, for the reports that the server makes.
+const module = join(work, '..', 'es_appliance.mjs');
+copyFileSync(join(here, 'strings', 'es_appliance.js'), module);
+const { kWords, kPatterns } = await import(pathToFileURL(module).href);
+const phrases = (list) => list.map(([text, words]) =>
+  `    {${literal(Buffer.from(text))}, ${literal(Buffer.from(words))}},`).join('\n');
 writeFileSync(output, `// Made by web/assets/build.mjs.
 #include "web/assets/assets.hpp"
 
@@ -71,9 +78,18 @@ constexpr Asset kAssets[] = {
 ${rows.join('\n')}
 };
 
+constexpr Phrase kPhrases[] = {
+${phrases(Object.entries(kWords))}
+};
+constexpr Phrase kPatterns[] = {
+${phrases(kPatterns)}
+};
+
 }  // namespace
 
 std::span<const Asset> Assets() { return kAssets; }
+std::span<const Phrase> SpanishPhrases() { return kPhrases; }
+std::span<const Phrase> SpanishPatterns() { return kPatterns; }
 
 }  // namespace plumb::web
 `);

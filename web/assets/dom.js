@@ -147,11 +147,22 @@ export function redraw(element, ...children) {
 }
 
 export function table(headings, rows, caption) {
+  // A narrow window shows each cell with its heading, and not what is empty.
+  for (const row of rows.flat(2).filter(isShown)) {
+    [...row.children].forEach((cell, i) => {
+      cell.dataset.label = headings[i] ?? '';
+      if (['', S.none].includes(cell.textContent) && !cell.children.length) cell.dataset.empty = '';
+    });
+  }
   return h('div', { class: 'scroll', tabindex: '0', role: 'region', 'aria-label': caption },
     h('table', {}, h('caption', { class: 'visually-hidden' }, caption),
       h('thead', {}, h('tr', {}, headings.map((text) => h('th', { scope: 'col' }, text)))),
       h('tbody', {}, rows)));
 }
+
+/// With the decimal sign of the language, and a minus that is one.
+export const fixed = (value, digits) =>
+  value.toFixed(digits).replace('-', '−').replace('.', S.decimal);
 
 export const localTime = (iso) => (iso ? new Date(iso).toLocaleString(S.locale, {
   year: 'numeric', month: 'short', day: '2-digit', hour: '2-digit', minute: '2-digit',

@@ -1,6 +1,6 @@
 // The error map with a cursor that reads millimetres, and the profile through it.
 import { fileUrl, get, live } from './api.js';
-import { clear, h, svg, warn } from './dom.js';
+import { clear, fixed, h, svg, warn } from './dom.js';
 import {
   compassOf, drawCropped, mapFrame, markToward, marksNote, viewOf,
 } from './map_frame.js';
@@ -25,20 +25,21 @@ export function legend(tolerance_mm) {
     + `#fafaf8 50%, ${stops.slice(5).join(', ')})`);
   const label = (tick) => {
     const value = Math.abs(tick * tolerance_mm);
-    return `${tick < 0 ? '−' : '+'}${Number.isInteger(value) ? value : value.toFixed(1)}`;
+    return `${tick < 0 ? '−' : '+'}${Number.isInteger(value) ? value : fixed(value, 1)}`;
   };
   return h('div', { class: 'legend' },
     h('div', { class: 'scale-box' }, scale,
       h('div', { class: 'ticks', 'aria-hidden': 'true' }, kTicks.map((tick) =>
         h('span', { class: Math.abs(tick) === 1 ? 'limit' : '' }, label(tick))))),
-    h('p', { class: 'hint' }, `mm, ${text.tolerance(tolerance_mm, 'mm')}`),
+    h('p', { class: 'hint' },
+      `mm, ${text.tolerance(`${tolerance_mm}`.replace('.', S.decimal), 'mm')}`),
     h('p', { class: 'keys' }, h('span', { class: 'key low' }, text.lower),
       h('span', { class: 'key high' }, text.higher), h('span', { class: 'key gap' }, text.unknown),
       h('span', { class: 'key hole' }, text.hole_),
       h('span', { class: 'key edge' }, text.regionOutline)));
 }
 
-const kProfile = { width: 640, height: 240, left: 42, bottom: 34, top: 8, right: 8 };
+const kProfile = { width: 420, height: 220, left: 42, bottom: 34, top: 8, right: 14 };
 
 /// Heights along a line through the cursor; both axes in centimetres, equally marked.
 function profile(grid, view, reference, deviation, cursor, along, compass) {
@@ -69,7 +70,7 @@ function profile(grid, view, reference, deviation, cursor, along, compass) {
   const ticks = (low_m, high_m, step) => Array.from(
     { length: Math.floor((high_m - low_m) / step + 1e-6) + 1 },
     (_, i) => (Math.ceil(low_m / step - 1e-6) + i) * step).filter((v) => v <= high_m + 1e-6);
-  const cm = (v) => (100 * v).toFixed(0);
+  const cm = (v) => fixed(100 * v, 0);
   const here = along === 0 ? cursor.x - from : cursor.y - from;
   const end = (at, anchor, way) => {
     const name = markToward(compass, along === 0 ? [way, 0] : [0, way]);

@@ -1,6 +1,6 @@
 // A map as a picture that can be read: cropped, with axes, a scale bar, the edge of the region, and
 // marks that say which way is which.
-import { h, svg } from './dom.js';
+import { fixed, h, svg } from './dom.js';
 import { cropOf, outlineOf } from './maps.js';
 import { S } from './strings.js';
 
@@ -77,19 +77,20 @@ export function drawCropped(canvas, view, draw) {
 
 function axes(view, size) {
   const ticks = [];
-  const label = (value) => (100 * value).toFixed(0);
+  const label = (value) => fixed(100 * value, 0);
   const first = (low) => Math.ceil(low / kTick_m - 1e-6);
   for (let i = first(view.x_min); i * kTick_m <= view.x_min + view.width; ++i) {
     const x = i * kTick_m - view.x_min;
     ticks.push(svg('line', { x1: x, x2: x, y1: view.height, y2: view.height - size / 2 }),
-      i % 2 === 0 && x > size && x < view.width - size
+      // Not where the axis is named.
+      i % 2 === 0 && x > size && x < view.width - 4.2 * size
         && svg('text', { x, y: view.height - 0.7 * size, class: 'middle' }, label(i * kTick_m)));
   }
   const y_min = view.y_max - view.height;
   for (let i = first(y_min); i * kTick_m <= view.y_max; ++i) {
     const y = view.y_max - i * kTick_m;
     ticks.push(svg('line', { x1: 0, x2: size / 2, y1: y, y2: y }),
-      i % 2 === 0 && y > 2 * size && y < view.height - 2 * size
+      i % 2 === 0 && y > 2.4 * size && y < view.height - 2 * size
         && svg('text', { x: 0.7 * size, y: y + 0.35 * size }, label(i * kTick_m)));
   }
   return svg('g', { class: 'axes' }, ticks,

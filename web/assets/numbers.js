@@ -132,7 +132,9 @@ export function numbersLine({ correction, u95 }) {
     return value === null || value === undefined ? S.none
       : signed(value, digitsOf(u95?.[axis.key] ?? 0, mostDigits(axis)));
   };
-  const part = (shift) => kAxes.filter((axis) => Boolean(axis.shift) === shift).map(one).join(', ');
+  const between = S.decimal === ',' ? '; ' : ', ';
+  const part = (shift) => kAxes.filter((axis) => Boolean(axis.shift) === shift).map(one)
+    .join(between);
   return `${part(true)} · ${part(false)}`;
 }
 

@@ -1,6 +1,6 @@
 // The six numbers over the fractions of a patient: the first and the last scan of each.
 import { h, localDay, svg } from './dom.js';
-import { judge, kAxes, signed } from './numbers.js';
+import { digitsOf, judge, kAxes, mostDigits, signed } from './numbers.js';
 import { S } from './strings.js';
 
 const kWidth = 340;
@@ -40,7 +40,9 @@ function chart(axis, fractions, limit) {
   const x = (i) => kLeft + (n === 1 ? 0.5 : (i + 0.3) / (n - 0.4)) * (kWidth - kLeft - 8);
   const middle = (kHeight - kBottom) / 2;
   const y = (value) => middle - value / reach * (middle - 6);
-  const text = (value) => `${value > 0 ? '+' : value < 0 ? '−' : ''}${Math.abs(value)}`;
+  const written = ({ value, u95 }) => signed(value, digitsOf(u95, mostDigits(axis)));
+  const sign = (value) => (value > 0 ? '+' : value < 0 ? '−' : '');
+  const text = (value) => `${sign(value)}${Math.abs(value)}`.replace('.', S.decimal);
   const tick = (value) =>
     svg('text', { x: kLeft - 5, y: y(value) + 4, class: 'tick' }, text(value));
   const beyond = Math.floor(reach / limit) >= 2 ? Math.floor(reach / limit) * limit : 0;
@@ -48,7 +50,7 @@ function chart(axis, fractions, limit) {
   const newest = points[points.length - 1].last;
   const said = points.map(({ fraction, last }) =>
     `${S.result.trendFraction(fraction.number, localDay(fraction.last.started_at))}: `
-    + `${signed(last.value)} ${axis.unit}`).join('; ');
+    + `${written(last)} ${axis.unit}`).join('; ');
   const mark = (p, i, filled) => {
     const kind = judge(p.value, p.u95, limit);
     const tone = kind === 'in' ? 'within' : kind === 'out' ? 'outside' : 'unsure';
@@ -59,7 +61,7 @@ function chart(axis, fractions, limit) {
   };
   return h('figure', { class: 'trend' },
     h('figcaption', {}, S.result.axes[axis.name], ' ',
-      h('strong', {}, `${signed(newest.value)} ${axis.unit}`)),
+      h('strong', {}, `${written(newest)} ${axis.unit}`)),
     svg('svg', {
       viewBox: `0 0 ${kWidth} ${kHeight}`, role: 'img',
       'aria-label': `${S.result.trendLabel(S.result.axes[axis.name])}: ${said}`,

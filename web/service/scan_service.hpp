@@ -46,6 +46,9 @@ enum class Aside {
   kFiles,  ///< Writing and removing large files.
 };
 
+/// Of a report; more in `daemon/appliance/report_words.hpp`.
+enum class Language { kEnglish, kSpanish };
+
 /// The appliance as the page sees it.
 ///
 /// Every function is called on the loop thread and returns within a few milliseconds: reads answer
@@ -149,8 +152,10 @@ class ScanService {
 
   /// One page about a scan, or the course of a patient, as a PDF file; nothing where there is no
   /// such scan or patient, or the report cannot be drawn (aside).
-  [[nodiscard]] virtual std::optional<std::string> ScanReport(const std::string& scan_id) = 0;
-  [[nodiscard]] virtual std::optional<std::string> CourseReport(const std::string& patient_id) = 0;
+  [[nodiscard]] virtual std::optional<std::string> ScanReport(const std::string& scan_id,
+                                                              Language language) = 0;
+  [[nodiscard]] virtual std::optional<std::string> CourseReport(const std::string& patient_id,
+                                                                Language language) = 0;
 
   // --- daily check
   [[nodiscard]] virtual CheckStatus GetChecks() = 0;  ///< (aside)

@@ -274,8 +274,8 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
           tess, appliance_->WebStatus().sensor.serial,
           CheckJson({.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}, {}));
       EXPECT_EQ(appliance_->WebStatus().reference_block, "");
-      EXPECT_EQ(appliance_->WhyNoReference(false), "");
-      EXPECT_THAT(appliance_->WhyNoReference(true),
+      EXPECT_EQ(appliance_->WhyNoReference(web::Scan{.id = "1"}), "");
+      EXPECT_THAT(appliance_->WhyNoReference(web::Scan{.id = "1", .check_overdue = true}),
                   ::testing::HasSubstr("scan the reference again"))
           << "of a scan from before the check";
       (void)appliance_->CloseSession(tess);
@@ -292,7 +292,7 @@ TEST_F(ApplianceTest, TheDemoNeedsNoCheckForItsReference) {
     On([&] {
       EXPECT_TRUE(appliance_->WebStatus().check_overdue);
       EXPECT_EQ(appliance_->WebStatus().reference_block, "");
-      EXPECT_EQ(appliance_->WhyNoReference(true), "");
+      EXPECT_EQ(appliance_->WhyNoReference(web::Scan{.id = "1", .check_overdue = true}), "");
     });
   });
 }

@@ -96,7 +96,8 @@ TEST(CompactMap, TellsAHoleOfTheRegionFromWhatLiesOutside) {
 }
 
 TEST(PdfReport, IsAWholeFileWhateverIsMissing) {
-  ScanReport report{.title = "Scan report",
+  ScanReport report{.texts = {},
+                    .title = "Scan report",
                     .verdict = "MOVE",
                     .why = "The correction below was to be applied.",
                     .identity = {{"Patient", "P-0042"}, {"Approved by", "clara"}},
@@ -111,17 +112,28 @@ TEST(PdfReport, IsAWholeFileWhateverIsMissing) {
   const std::string pdf = PdfOf(report);
   EXPECT_EQ(pdf.substr(0, 5), "%PDF-");
   EXPECT_NE(pdf.find("%%EOF"), std::string::npos);
-  CourseReport course{.title = "Course", .identity = {}, .rows = {}, .footer = ""};
+  CourseReport course{
+      .texts = {}, .title = "Course", .identity = {}, .rows = {}, .note = "", .footer = ""};
   const std::size_t empty = PdfOf(course).size();
   for (int i = 0; i < 120; ++i)
     course.rows.push_back({.fraction = std::to_string(i),
                            .when = "2026-01-01 10:00",
                            .verdict = "IN TOLERANCE",
                            .accepted = "anna",
-                           .values = {0.1, 0.2, 0.3, 0.01, 0.02, 0.03}});
+                           .values = {CourseValue{0.1, 0.9}, CourseValue{-3.2, 1.1}}});
   const std::string long_course = PdfOf(course);
   EXPECT_GT(long_course.size(), empty);
-  EXPECT_NE(long_course.find("/Count 3"), std::string::npos) << "pages";
+  EXPECT_NE(long_course.find("/Count 5"), std::string::npos) << "pages, of two lines a scan";
+}
+
+TEST(PdfReport, AValueHasNoDigitBelowItsUncertainty) {
+  EXPECT_EQ(ValueWithUncertainty(-2.93, 1.06, 1, '.'), "\u22123 \u00b11.1");
+  EXPECT_EQ(ValueWithUncertainty(-2.93, 0.96, 1, '.'), "\u22122.9 \u00b11.0");
+  EXPECT_EQ(ValueWithUncertainty(-39.04, 1.1, 1, ','), "\u221239 \u00b11,1");
+  EXPECT_EQ(ValueWithUncertainty(-0.814, 0.09, 2, ','), "\u22120,81 \u00b10,09");
+  EXPECT_EQ(ValueWithUncertainty(-0.164, 0.12, 2, '.'), "\u22120.2 \u00b10.12");
+  EXPECT_EQ(ValueWithUncertainty(-0.02, 1.1, 1, '.'), "0 \u00b11.1") << "zero has no sign";
+  EXPECT_EQ(ValueWithUncertainty(4.26, 0.0, 1, '.'), "+4.3") << "no uncertainty is known";
 }
 
 }  // namespace

@@ -538,6 +538,50 @@ TEST_F(StoreTest, ACheckWithAStampOfTheFutureCountsForNoDay) {
   EXPECT_FALSE(store->HasPassedCheckSince(web::WallClock::now()));
 }
 
+TEST_F(StoreTest, ACheckOfTheSameDaySensorAndBaselineConfirmsAScanFromBeforeIt) {
+  const auto store = Open();
+  const std::string patient = store->AddPatient(kAnna, "P-1", "");
+  const auto scan = [&](const char* serial) {
+    const std::string id = store->BeginScan({.patient_id = patient,
+                                             .reference_id = "",
+                                             .sensor_serial = serial,
+                                             .reason = "",
+                                             .check_overdue = true});
+    store->FinishScan(
+        id, {.outcome = web::ScanOutcome::kFailed, .failure = "of this test", .result_json = ""});
+    return id;
+  };
+  const std::string early = scan("S1");
+  const std::string first =
+      store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
+  store->SetCheckBaseline(kBert, first);
+  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck(early)) << "the baseline is younger than the scan";
+
+  const std::string good = scan("S1"), other = scan("S2"), unnamed = scan("");
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck(good)) << "the check that passed is older";
+  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_TRUE(store->IsConfirmedByLaterCheck(good));
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck(other)) << "another unit";
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck(unnamed));
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck("none"));
+
+  const std::string doubtful = scan("S1");
+  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kFailed));
+  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck(doubtful)) << "a check failed in between";
+
+  const std::string yesterday = scan("S1");
+  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_TRUE(store->IsConfirmedByLaterCheck(yesterday)) << "still of today";
+  Database(database(), Database::Access::kReadWrite)
+      .Execute(
+          "UPDATE check_baselines SET set_at = 0; UPDATE scans SET started_at = started_at - "
+          "86400000000, finished_at = finished_at - 86400000000 WHERE id = " +
+          yesterday);
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck(yesterday)) << "a check of another day";
+}
+
 TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   const auto before = web::WallClock::now() - std::chrono::seconds(1);
   {

@@ -57,6 +57,20 @@ TEST_F(ApiTest, HealthSaysWhyItIsNotWell) {
   EXPECT_THAT(answer.body, HasSubstr("the disk is full"));
 }
 
+TEST_F(ApiTest, AReportComesInTheLanguageThatIsAskedFor) {
+  HttpClient client = LoggedIn("technician");
+  const std::string patient = AddPatient(client, "P-1");
+  const std::string path = "/api/v1/patients/" + patient + "/report.pdf";
+  EXPECT_EQ(client.Get(path + "?language=es").status, 200);
+  loop_->Do([&] { EXPECT_EQ(service_.report_language, web::Language::kSpanish); });
+  EXPECT_EQ(client.Get(path).status, 200);
+  loop_->Do([&] { EXPECT_EQ(service_.report_language, web::Language::kEnglish); });
+  const HttpAnswer unknown = client.Get(path + "?language=xx");
+  EXPECT_EQ(unknown.status, 400);
+  EXPECT_THAT(unknown.body, HasSubstr("expected en or es"));
+  EXPECT_EQ(client.Get("/api/v1/scans/x1/report.pdf?language=../etc").status, 400);
+}
+
 TEST_F(ApiTest, ChangesNeedTheSessionsToken) {
   HttpClient client = LoggedIn("technician");
   const std::string token = client.csrf_token;

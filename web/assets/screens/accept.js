@@ -101,7 +101,8 @@ export function actions(data, reload) {
   const element = h('div', {}, nextStep(data),
     h('div', { class: 'row' }, may('scan') && patient && rescanButton(data), accept.element,
       scan.outcome === 'done' && h('a', {
-        class: 'button', href: `/api/v1/scans/${scan.id}/report.pdf`, download: '',
+        class: 'button', download: '',
+        href: `/api/v1/scans/${scan.id}/report.pdf?language=${document.documentElement.lang}`,
       }, text.report),
       scan.result && h('a', { class: 'button', href: `/result?scan=${scan.id}` }, text.print)),
     newReference, files(scan), removeScan(data));

@@ -1,6 +1,6 @@
 // The daily check of the room's markers: today's, its numbers over time, and the baseline.
 import { currentSession, get, live, may, post } from '../api.js';
-import { action, done, h, localDay, localTime, redraw, svg, table } from '../dom.js';
+import { action, done, fixed, h, localDay, localTime, redraw, svg, table } from '../dom.js';
 import { signed } from '../numbers.js';
 import { S, translated } from '../strings.js';
 import { sentence } from './common.js';
@@ -11,15 +11,15 @@ const kTones = { passed: 'in_tolerance', failed: 'move', no_baseline: 'no_answer
 /// A length: it has no sign.
 const isSize = (item) => item.name === 'misfit' || item.name === 'moved';
 const isCount = (item) => item.name === 'markers_seen';
+const written = (item) => (isSize(item) ? fixed(item.value, 1) : signed(item.value, 2));
+const plain = (value) => `${value}`.replace('-', '−').replace('.', S.decimal);
 
 function itemRow(item) {
   const text = S.check;
-  const number = item.value === null ? ''
-    : isSize(item) ? item.value.toFixed(1) : signed(item.value, 2);
   const value = item.value === null ? text.notKnown
-    : isCount(item) ? `${item.value}` : `${number} ${item.unit}`;
+    : isCount(item) ? `${item.value}` : `${written(item)} ${item.unit}`;
   const limit = isCount(item) ? text.atLeast(item.limit)
-    : text.atMost(isSize(item) ? '' : '±', item.limit, item.unit);
+    : text.atMost(isSize(item) ? '' : '±', plain(item.limit), item.unit);
   return h('tr', {}, h('th', { scope: 'row' }, text.items[item.name] ?? item.name),
     h('td', { class: 'figure' }, value, item.note && h('small', {}, ` ${translated(item.note)}`)),
     h('td', {}, limit),
@@ -77,17 +77,19 @@ function chart(name, checks) {
   const { limit, unit } = points[points.length - 1].item;
   const low = isSize({ name }) ? 0 : -limit;
   const values = points.map(({ item }) => item.value);
+  const said = points.map(({ item }) => written(item));
   const top = 1.1 * Math.max(limit, ...values);
   const bottom = 1.1 * Math.min(low, ...values);
-  const x = (i) => kLeft + i / (points.length - 1) * (kWidth - kLeft - 12);
+  const x = (i) => kLeft + 14 + i / (points.length - 1) * (kWidth - kLeft - 42);
   const y = (value) => 8 + (top - value) / (top - bottom) * (kHeight - 32);
-  const tick = (value) => svg('text', { x: kLeft - 5, y: y(value) + 4, class: 'tick' }, `${value}`);
+  const tick = (value) =>
+    svg('text', { x: kLeft - 5, y: y(value) + 4, class: 'tick' }, plain(value));
   const every = Math.ceil(points.length / 5);
   return h('figure', { class: 'trend' },
-    h('figcaption', {}, S.check.items[name], ' ', h('strong', {}, `${values.at(-1)} ${unit}`)),
+    h('figcaption', {}, S.check.items[name], ' ', h('strong', {}, `${said.at(-1)} ${unit}`)),
     svg('svg', {
       viewBox: `0 0 ${kWidth} ${kHeight}`, role: 'img',
-      'aria-label': `${S.check.items[name]}: ${values.join(', ')} ${unit}`,
+      'aria-label': `${S.check.items[name]}: ${said.join('; ')} ${unit}`,
     },
     svg('rect', {
       x: kLeft, width: kWidth - kLeft - 4, y: y(limit), height: y(low) - y(limit), class: 'zone',
@@ -114,7 +116,7 @@ function earlier(checks) {
   const value = (check, name) => {
     const item = check.items.find((one) => one.name === name);
     return item?.value === null || item?.value === undefined ? S.none
-      : `${item.value.toFixed(1)} ${item.unit}`;
+      : `${fixed(item.value, 1)} ${item.unit}`;
   };
   const rows = checks.map((check) => h('tr', {}, h('td', {}, localTime(check.time)),
     h('td', {}, h('span', { class: `badge ${kTones[check.status]}` },

@@ -228,7 +228,8 @@ export async function showPatient(place, id) {
     may('scan') && h('section', { class: 'card' }, h('h2', {}, text.open), session, opening),
     h('section', { class: 'card' }, h('h2', {}, text.references), references),
     h('section', { class: 'card' }, h('h2', {}, text.history), scans,
-      h('div', { class: 'row below' }, file('report.pdf', text.report),
+      h('div', { class: 'row below' },
+        file(`report.pdf?language=${document.documentElement.lang}`, text.report),
         file('numbers.csv', text.csv), file('numbers.json', text.json))),
     about, may('wipe') && wipe(patient));
   let shownSession = null;

@@ -2,203 +2,15 @@
 // what is stored.
 import { get, live, may, post, put } from '../api.js';
 import {
-  action, checkbox, clear, done, enable, field, h, keepFocus, localTime, say, select, svg, warn,
+  action, checkbox, clear, done, enable, field, fixed, h, keepFocus, localTime, say, select, warn,
 } from '../dom.js';
 import { guardLeaving } from '../leave.js';
-import { compassOf, mapFrame, marksNote, viewOf } from '../map_frame.js';
-import { cellAt, loadMap, paintHeights } from '../maps.js';
+import { compassOf, marksNote } from '../map_frame.js';
+import { loadMap } from '../maps.js';
 import { S } from '../strings.js';
 import { blockNote } from './common.js';
+import { editor, measure } from './plan_editor.js';
 import { templateOf } from './plan_template.js';
-
-const kStep_m = 0.005;
-
-const kSnap_m = 0.012;
-const kUndoSteps = 200;
-const distance = ([ax, ay], [bx, by]) => Math.hypot(ax - bx, ay - by);
-
-/// Area in square centimetres and length of the outline in centimetres.
-function measure(region) {
-  let area = 0;
-  let round = 0;
-  region.forEach(([ax, ay], i) => {
-    const [bx, by] = region[(i + 1) % region.length];
-    area += (ax * by - bx * ay) / 2;
-    round += Math.hypot(bx - ax, by - ay);
-  });
-  return { cm2: Math.round(1e4 * Math.abs(area)), cm: Math.round(100 * round) };
-}
-
-/// Height map with a polygon and a point that people draw, by pointer or keys. `model` is {region,
-/// isocentre}; `changed` is called after each change.
-function editor(grid, map, model, editable, changed, compass) {
-  const text = S.plan;
-  const canvas = h('canvas', { class: 'map', 'aria-hidden': 'true' });
-  paintHeights(canvas, map, grid.step);
-  const width = grid.width * grid.step;
-  const height = grid.height * grid.step;
-  const overlay = svg('svg', {
-    viewBox: `0 0 ${width} ${height}`, class: 'draw', tabindex: '0', role: 'application',
-    'aria-label': text.mapLabel,
-  });
-  const box = mapFrame({ grid, view: viewOf(grid, null), canvas, compass, cross: overlay });
-  box.style.setProperty('max-width', `${75 * width / height}vh`);
-  const state = { chosen: -1, dragging: false, picking: false };
-  const before = [];  // for undo
-  const remember = () => {
-    before.push(JSON.stringify([model.region, model.isocentre]));
-    if (before.length > kUndoSteps) before.shift();
-  };
-  const toMap = ([x, y]) => [x - grid.x_min, height - (y - grid.y_min)];
-  const round = (value) => Math.round(value * 1000) / 1000;
-  const fromEvent = (event) => {
-    const area = overlay.getBoundingClientRect();
-    return [round(grid.x_min + (event.clientX - area.left) / area.width * width),
-      round(grid.y_min + (1 - (event.clientY - area.top) / area.height) * height)];
-  };
-  /// A corner that is dragged lies straight beside its neighbours where it nearly does.
-  const snapped = (point, i) => {
-    const n = model.region.length;
-    for (const other of [model.region[(i + n - 1) % n], model.region[(i + 1) % n]]) {
-      for (const k of [0, 1]) if (Math.abs(point[k] - other[k]) < kSnap_m) point[k] = other[k];
-    }
-    return point;
-  };
-  const lengths = (points, size) => points.length > 1 && points.map(([ax, ay], i) => {
-    if (i + 1 === points.length && points.length < 3) return null;
-    const [bx, by] = points[(i + 1) % points.length];
-    const cm = 100 * Math.hypot(bx - ax, by - ay);
-    return cm > 4 && svg('text', {
-      x: (ax + bx) / 2, y: (ay + by) / 2, class: 'length', 'font-size': 1.6 * size,
-    }, `${cm.toFixed(0)} cm`);
-  });
-  const draw = () => {
-    const points = model.region.map(toMap);
-    const size = width / 110;
-    clear(overlay,
-      points.length > 1 && svg(points.length > 2 ? 'polygon' : 'polyline', {
-        points: points.map((point) => point.join(',')).join(' '), class: 'region',
-      }),
-      lengths(points, size),
-      editable && points.map(([x, y], i) => svg('circle', {
-        cx: x, cy: y, r: size, class: i === state.chosen ? 'corner chosen' : 'corner',
-        'data-corner': i,
-      })),
-      model.isocentre && (() => {
-        const [x, y] = toMap(model.isocentre);
-        return svg('path', {
-          d: `M${x - 2 * size} ${y}h${4 * size}M${x} ${y - 2 * size}v${4 * size}`,
-          class: 'isocentre',
-        });
-      })());
-  };
-  const update = () => { draw(); changed(); };
-  const undo = () => {
-    const last = before.pop();
-    if (!last) return;
-    const [region, isocentre] = JSON.parse(last);
-    model.region.splice(0, model.region.length, ...region);
-    model.isocentre = isocentre;
-    state.chosen = Math.min(state.chosen, region.length - 1);
-    update();
-  };
-  if (editable) {
-    overlay.addEventListener('pointerdown', (event) => {
-      overlay.focus();
-      const point = fromEvent(event);
-      remember();
-      if (state.picking) {
-        const cell = cellAt(grid, ...point);
-        const z = cell < 0 ? NaN : map.values[cell];
-        model.isocentre = [...point, Number.isNaN(z) ? 0 : round(z)];
-        state.picking = false;
-        overlay.classList.remove('picking');
-      } else if (event.target.dataset?.corner !== undefined) {
-        state.chosen = Number(event.target.dataset.corner);
-        state.dragging = true;
-        overlay.setPointerCapture(event.pointerId);
-      } else {
-        // Into the edge that is nearest, so that clicks around the body make no crossing lines.
-        model.region.splice(nearestEdge(model.region, point), 0, point);
-        state.chosen = model.region.findIndex((other) => other === point);
-      }
-      update();
-    });
-    overlay.addEventListener('pointermove', (event) => {
-      if (!state.dragging) return;
-      model.region[state.chosen] = snapped(fromEvent(event), state.chosen);
-      update();
-    });
-    overlay.addEventListener('pointerup', () => { state.dragging = false; });
-    overlay.addEventListener('keydown', (event) => {
-      const chosen = model.region[state.chosen];
-      const direction = {
-        ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
-      }[event.key];
-      const changes = event.key === 'Enter' || (chosen && (direction
-        || event.key === 'Delete' || event.key === 'Backspace'));
-      if (changes) remember();
-      if (event.key.toLowerCase() === 'u' || (event.key === 'z' && event.ctrlKey)) {
-        undo();
-      } else if (event.key === 'Enter') {
-        model.region.push([round(grid.x_min + width / 2), round(grid.y_min + height / 2)]);
-        state.chosen = model.region.length - 1;
-      } else if (event.key.toLowerCase() === 'n' && model.region.length) {
-        state.chosen = (state.chosen + 1) % model.region.length;
-      } else if ((event.key === 'Delete' || event.key === 'Backspace') && chosen) {
-        model.region.splice(state.chosen, 1);
-        state.chosen = Math.min(state.chosen, model.region.length - 1);
-      } else if (direction && chosen) {
-        const by = kStep_m * (event.shiftKey ? 10 : 1);
-        model.region[state.chosen] = [round(chosen[0] + by * direction[0]),
-          round(chosen[1] + by * direction[1])];
-      } else {
-        return;
-      }
-      event.preventDefault();
-      update();
-      const now = model.region[state.chosen];
-      if (now) say(text.corner(state.chosen + 1, ...now));
-    });
-  }
-  draw();
-  return {
-    element: box, draw, undo,
-    /// In place of all corners; can be undone.
-    set: (region) => {
-      remember();
-      model.region.splice(0, model.region.length, ...region);
-      state.chosen = -1;
-      update();
-    },
-    clear: () => {
-      remember();
-      model.region.length = 0;
-      state.chosen = -1;
-      update();
-    },
-    pick: () => {
-      state.picking = true;
-      overlay.classList.add('picking');
-      overlay.focus();
-      say(text.picking);
-    },
-  };
-}
-
-function nearestEdge(region, [x, y]) {
-  if (region.length < 3) return region.length;
-  let best = [Infinity, region.length];
-  region.forEach(([ax, ay], i) => {
-    const [bx, by] = region[(i + 1) % region.length];
-    const length2 = (bx - ax) ** 2 + (by - ay) ** 2 || 1e-9;
-    const along = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / length2;
-    const share = Math.max(0, Math.min(1, along));
-    const away = distance([x, y], [ax + share * (bx - ax), ay + share * (by - ay)]);
-    if (away < best[0]) best = [away, i + 1];
-  });
-  return best[1];
-}
 
 async function loadHeights(reference) {
   const scene = await get(`scans/${reference.scan_id}/files/scene.json`);
@@ -225,7 +37,7 @@ function controls(reference, model, plan, editable) {
   });
   const bad = h('p', { class: 'caution', id: 'isocentre-bad', role: 'alert' });
   const axes = ['x', 'y', 'z'].map((axis, i) => number(model.isocentre?.[i], '0.001', {
-    'aria-label': `${text.isocentre} ${axis}`, placeholder: axis, 'aria-describedby': bad.id,
+    'aria-label': `${text.isocentre} ${axis} (m)`, 'aria-describedby': bad.id,
   }));
   const shift = number(plan.shift_tolerance_mm, '0.1', { min: 0.1, max: 50 });
   const rotation = number(plan.rotation_tolerance_deg, '0.1', { min: 0.1, max: 20 });
@@ -283,13 +95,14 @@ function summary(reference, patient, scene, picture, approve) {
   const text = S.plan;
   const { plan } = reference;
   const row = (name, value) => [h('dt', {}, name), h('dd', {}, value)];
-  const metres = (point) => point.map((v) => v.toFixed(3)).join(', ');
+  const metres = (point) => point.map((v) => fixed(v, 3)).join('; ');
+  const number = (value) => `${value}`.replace('.', S.decimal);
   const size = measure(plan.region_m);
   const frames = scene?.frames;
   const button = action(text.summarySubmit, approve, { class: 'primary' });
   const element = h('section', { class: 'card summary', 'aria-label': text.summary },
-    h('h2', {}, text.summary), picture,
-    h('dl', { class: 'facts' },
+    h('h2', {}, text.summary), h('div', { class: 'summary-grid' },
+      picture, h('dl', { class: 'facts' },
       row(S.patients.code, patient.code), row(S.patients.version, `${reference.version}`),
       row(S.patients.made, `${localTime(reference.created_at)}, ${reference.created_by}`),
       row(text.planned, reference.planned_by ?? reference.created_by),
@@ -298,14 +111,14 @@ function summary(reference, patient, scene, picture, approve) {
         ? `${text.corners(plan.region_m.length)}, ${text.area(size.cm2, size.cm)}`
         : text.wholeBody),
       row(text.isocentre, plan.isocentre_m ? `${metres(plan.isocentre_m)} m` : text.middle),
-      row(text.shift, `±${plan.tolerance.shift_mm}`),
-      row(text.rotation, `±${plan.tolerance.rotation_deg}`),
+      row(text.shiftSigned, `±${number(plan.tolerance.shift_mm)} mm`),
+      row(text.rotationSigned, `±${number(plan.tolerance.rotation_deg)}°`),
       row(text.posture, text.postures[plan.posture]),
       row(text.markerKind, plan.couch_markers ? text.couchMarkers : text.roomMarkers),
       frames && row(text.scanQuality,
         `${S.result.frames} ${frames.tracked} / ${frames.total}, `
           + `${S.result.views} ${scene.keyframes}`),
-      row(text.signature, h('code', {}, reference.digest))),
+      row(text.signature, h('code', {}, reference.digest)))),
     h('p', { class: 'hint' }, text.approveHint), button);
   return { element, button };
 }
@@ -326,6 +139,7 @@ async function draft(place, reference, store) {
   const templatePlace = h('div', {});
   let stored;  // as written when nothing is edited
   let drawing = null;
+  let hadIsocentre = Boolean(model.isocentre);
   let loaded = null;
   // Nothing has been compared: whether the body lies as the plan says, nobody has looked at yet.
   const compass = compassOf(live.status?.room, null);
@@ -356,6 +170,8 @@ async function draft(place, reference, store) {
   const changed = () => {
     // Without a picked point the fields keep what was typed: it may be half of one.
     if (model.isocentre) inputs.axes.forEach((input, i) => { input.value = model.isocentre[i]; });
+    else if (hadIsocentre) inputs.axes.forEach((input) => { input.value = ''; });
+    hadIsocentre = Boolean(model.isocentre);
     note();
   };
   const unsaved = h('p', { class: 'caution', role: 'status' });
@@ -401,8 +217,7 @@ async function draft(place, reference, store) {
       ` ${localTime(reference.created_at)}, ${reference.created_by}`];
   const tools = editable && drawing && h('div', { class: 'row' },
     action(text.undo, async () => drawing.undo(), {}),
-    action(text.clear, async () => drawing.clear(), {}),
-    action(text.pick, async () => drawing.pick(), {}));
+    action(text.clear, async () => drawing.clear(), {}));
   keepFocus(place, () => clear(place,
     h('h1', {}, `${text.reference} ${reference.version} · `,
       h('a', { href: `#/patient/${patient.id}` }, patient.code)),
@@ -415,7 +230,9 @@ async function draft(place, reference, store) {
         h('fieldset', {}, h('legend', {}, text.isocentre),
           h('p', { class: 'hint' }, text.isocentreHint),
           editable && h('p', { class: 'hint' }, text.pickHint),
-          h('div', { class: 'triple' }, inputs.axes), inputs.bad, outside),
+          h('div', { class: 'triple' }, inputs.axes.map((input, i) =>
+            field(`${'xyz'[i]} (m)`, input))), inputs.bad, outside,
+          editable && drawing && action(text.pick, async () => drawing.pick(), {})),
         h('fieldset', {}, h('legend', {}, text.tolerance), field(text.shift, inputs.shift),
           field(text.rotation, inputs.rotation)),
         templatePlace, field(text.posture, inputs.posture), inputs.couch.element,

@@ -1,6 +1,6 @@
 // One result, from its verdict down to the pictures.
 import { fileUrl, get, live, now } from '../api.js';
-import { clear, h, keepFocus, warn } from '../dom.js';
+import { clear, fixed, h, keepFocus, warn } from '../dom.js';
 import { errorMap } from '../error_map.js';
 import { loadMap, paintHeights } from '../maps.js';
 import { sixNumbers, toleranceOf } from '../numbers.js';
@@ -12,7 +12,7 @@ import { couchReadings } from './couch.js';
 import { meshView } from './mesh_view.js';
 import { identity, validityNote, verdictStrip } from './verdict.js';
 
-const mm = (metres, digits = 1) => (1000 * metres).toFixed(digits);
+const mm = (metres, digits = 1) => fixed(1000 * metres, digits);
 const optional = (path) => get(path, true).catch(() => null);
 
 /// The newest finished scan: of this run of the appliance, else the newest that is stored.
@@ -49,7 +49,7 @@ function trust({ scan, details, scene }) {
   const { alignment, motion, region } = details ?? {};
   add(text.markers, alignment && `${alignment.markers_used.length}`);
   add(text.markerRms, alignment && `${mm(alignment.rms_m, 2)} mm`);
-  add(text.coverage, region && `${(100 * region.coverage).toFixed(1)} %`,
+  add(text.coverage, region && `${fixed(100 * region.coverage, 1)} %`,
     region && region.coverage < 0.9 ? 'caution' : '');
   add(text.hole, region && `${mm(region.largest_hole_m, 0)} mm`,
     region && region.largest_hole_m > 0.05 ? 'caution' : '');
@@ -61,10 +61,10 @@ function trust({ scan, details, scene }) {
   const share = lost > 0 ? Math.round(100 * lost / Math.max(1, scene.frames.total)) : 0;
   add(text.framesLost, lost > 0 ? text.framesLostOf(lost, share) : null,
     share >= 5 ? 'caution' : '');
-  add(text.lost, scene?.longest_lost_s > 0 ? `${scene.longest_lost_s.toFixed(1)} s` : null,
+  add(text.lost, scene?.longest_lost_s > 0 ? `${fixed(scene.longest_lost_s, 1)} s` : null,
     'caution');
   add(text.depthScale, scene?.calibration?.depth_scale
-    && `${(100 * (scene.calibration.depth_scale - 1)).toFixed(2)} %`);
+    && `${fixed(100 * (scene.calibration.depth_scale - 1), 2)} %`);
   add(text.sensorOn, scan.sensor_on_s !== null && scan.sensor_on_s !== undefined
     ? text.minutes(Math.floor(scan.sensor_on_s / 60)) : null);
   const rejected = Object.entries(alignment?.markers_rejected ?? {})

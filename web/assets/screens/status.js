@@ -39,7 +39,7 @@ function tiles(status) {
   const isCheck = status.next_purpose === 'daily_check';
   return [
     tile(text.patient, isCheck ? S.purposes.daily_check : sessionName(session), '',
-      session && !isCheck && h('p', {}, S.purposes[session.purpose]),
+      session?.purpose === 'reference' && !isCheck && h('p', {}, S.purposes[session.purpose]),
       session && h('p', {}, S.session.openedBy(session.opened_by))),
     waitingTile(status, tile),
     checkTile(status, tile),
@@ -52,7 +52,7 @@ function tiles(status) {
     tile(text.storage, storage.writable
       ? text.free(gigabytes(storage.free_bytes), gigabytes(storage.total_bytes)) : text.readOnly,
     storage.writable && used < 0.95 ? 'good' : 'bad',
-    ...(storage.warnings ?? []).map((warning) => h('p', { class: 'caution' }, warning)),
+    ...(storage.warnings ?? []).map((warning) => h('p', { class: 'caution' }, translated(warning))),
     h('meter', { min: 0, max: 1, high: 0.9, value: used, 'aria-label': text.storage }),
     h('p', {}, `${S.product} ${status.version}`)),
   ];

@@ -97,7 +97,7 @@ export async function showUpdate(place) {
       })],
       failure && !installing && h('p', { class: 'caution' }, translated(failure)),
       supported ? bundles(update)
-        : h('p', { class: 'caution' }, `${text.unsupported}: ${message}`),
+        : h('p', { class: 'caution' }, `${text.unsupported}: ${translated(message)}`),
       supported && !installing && message && message !== failure
         && h('p', { class: 'lead' }, message));
     sender.hidden = !supported || !may('update');

@@ -12,14 +12,17 @@ export function ageOf(scan, received) {
   return (told.age_s ?? Infinity) + since_s(told.at);
 }
 
-/// Why nobody may act on this result: "running", "superseded", "old"; null: it is valid.
+/// Why nobody may act on this result: "running", "superseded", "closed" (its patient's session is
+/// not the one that is open), "old"; null: it is valid.
 export function whyNotValid(scan, received) {
   if (!scan.result) return null;
   const { status } = live;
   if (status?.state === 'scanning' || status?.state === 'working') return 'running';
   if (status?.last_result && status.last_result.id !== scan.id
       && status.last_result.patient_id === scan.patient_id) return 'superseded';
-  return ageOf(scan, received) > kOldAfter_s ? 'old' : null;
+  if (ageOf(scan, received) > kOldAfter_s) return 'old';
+  return status && scan.patient_id && status.session?.patient_id !== scan.patient_id
+    ? 'closed' : null;
 }
 
 export function identity({ scan, patient, reference, received }) {
@@ -48,6 +51,7 @@ export function validityNote(scan, received, review) {
   const words = {
     running: [text.running, text.runningText],
     superseded: [text.superseded, text.supersededText],
+    closed: [text.closed, text.closedText],
     old: [text.old, text.oldText],
   };
   const tick = () => {

@@ -211,6 +211,8 @@ export const en = {
     runningText: 'This result is no longer valid. Wait for the new one.',
     superseded: 'SUPERSEDED',
     supersededText: 'There is a newer scan. Do not act on this result.',
+    closed: 'SESSION NOT OPEN',
+    closedText: 'The session of this patient is not open. Do not act on this result.',
     review: (when) => `Result of ${when}, for review. Do not act on it.`,
     reviewTitle: 'REVIEW',
     unassigned: 'Unassigned scan: no session was open.',
@@ -328,7 +330,7 @@ export const en = {
     acceptOutside: 'Accept outside tolerance',
     acceptOutsideHint: 'Your reason, the verdict and the numbers are stored in the log.',
     acceptReason: 'Reason', acceptPassword: 'Your password',
-    cannotAccept: 'An old or superseded result cannot be accepted.',
+    cannotAccept: 'Only the newest result of the open session can be accepted, for 2 minutes.',
     newReference: 'New reference from this scan',
     newReferenceReason: 'Reason for the new reference', export: 'Export', print: 'Print view',
     report: 'Report (PDF)',
@@ -383,11 +385,17 @@ export const en = {
     regionHint: 'Click the map to add corners; drag a corner to move it; Delete removes the '
       + 'selected one. Without corners the body found in the scan is the region (outlined).',
     mapLabel: 'Height map of the reference with the region. Enter adds a corner in the middle, N '
-      + 'selects the next one, arrow keys move it, Delete removes it, U undoes.',
+      + 'selects the next one, arrow keys move it, Delete removes it, U undoes. I selects the '
+      + 'isocentre, or puts one in the middle of the region.',
+    isocentreAt: (x, y, z) => `Isocentre: x ${x.toFixed(3)}, y ${y.toFixed(3)}, `
+      + `z ${z.toFixed(3)} m`,
+    isocentreGone: 'No isocentre: the middle of the region.',
+    shiftSigned: 'Tolerance of shifts', rotationSigned: 'Tolerance of rotations',
     isocentre: 'Isocentre',
     isocentreHint: 'Metres in the reference marker’s frame. Empty: the middle of the region.',
     pick: 'Pick on the map', picking: 'Click the map where the isocentre is.',
-    pickHint: 'A picked point lies on the skin. Type z for an isocentre inside the body.',
+    pickHint: 'A picked point lies on the skin: type z for an isocentre inside the body. By keys: '
+      + 'I on the map, then the arrows.',
     isocentreOutside: 'This isocentre is outside the region.',
     tolerance: 'Tolerance', shift: 'Shifts (mm)', rotation: 'Rotations (degrees)',
     posture: 'Posture',

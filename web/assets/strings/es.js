@@ -1,97 +1,21 @@
-// Every text of the page in Spanish, and the words of the appliance in it.
+// Every text of the page in Spanish.
+import { kPatterns, kWords } from './es_appliance.js';
+
 const plural = (n, one, many) => (n === 1 ? one : many);
 
-// Words that come from the appliance: whole sentences first, then patterns.
-const kWords = {
-  up: 'arriba', down: 'abajo', 'toward gantry': 'hacia el gantry',
-  'away from gantry': 'alejándose del gantry', 'to patient left': 'hacia la izquierda del paciente',
-  'to patient right': 'hacia la derecha del paciente', 'head up': 'cabeza arriba',
-  'head down': 'cabeza abajo', 'patient left side down': 'lado izquierdo del paciente abajo',
-  'patient right side down': 'lado derecho del paciente abajo',
-  'head to patient left': 'cabeza hacia la izquierda del paciente',
-  'head to patient right': 'cabeza hacia la derecha del paciente',
-  'to the right, facing the gantry': 'a la derecha, mirando al gantry',
-  'to the left, facing the gantry': 'a la izquierda, mirando al gantry',
-  'gantry end up': 'extremo del gantry arriba', 'gantry end down': 'extremo del gantry abajo',
-  'right side down, facing the gantry': 'lado derecho abajo, mirando al gantry',
-  'left side down, facing the gantry': 'lado izquierdo abajo, mirando al gantry',
-  'counter-clockwise from above': 'en sentido antihorario visto desde arriba',
-  'clockwise from above': 'en sentido horario visto desde arriba',
-  'up (anterior)': 'arriba (anterior)', 'up (posterior)': 'arriba (posterior)',
-  'down (anterior)': 'abajo (anterior)', 'down (posterior)': 'abajo (posterior)',
-  'toward the head': 'hacia la cabeza', 'toward the feet': 'hacia los pies',
-  'toward the head and patient left': 'hacia la cabeza y la izquierda del paciente',
-  'toward the head and patient right': 'hacia la cabeza y la derecha del paciente',
-  'toward the feet and patient left': 'hacia los pies y la izquierda del paciente',
-  'toward the feet and patient right': 'hacia los pies y la derecha del paciente',
-  'head and patient left side up': 'cabeza y lado izquierdo del paciente arriba',
-  'head and patient right side up': 'cabeza y lado derecho del paciente arriba',
-  'feet and patient left side up': 'pies y lado izquierdo del paciente arriba',
-  'feet and patient right side up': 'pies y lado derecho del paciente arriba',
-  'a reference is made of this scan: it goes only with its patient':
-    'una referencia procede de este escaneo: solo se borra con su paciente',
-  'the session of a patient is open: close it first':
-    'hay una sesión de un paciente abierta: ciérrela primero',
-  'a scan is running: wait for its result': 'hay un escaneo en curso: espere su resultado',
-  '+X side': 'lado +X', '-X side': 'lado −X',
-  'left side': 'lado izquierdo', 'right side': 'lado derecho', middle: 'centro',
-  'a scan is running: wait for its result, then open the patient':
-    'hay un escaneo en curso: espere su resultado y abra después el paciente',
-  'this patient has no approved reference: scan and approve one first':
-    'este paciente no tiene referencia aprobada: escanee y apruebe una primero',
-  'name or password is wrong': 'nombre o contraseña incorrectos',
-  'the password is wrong': 'la contraseña es incorrecta',
-  'no session is open': 'no hay ninguna sesión abierta',
-  'the session of this patient is open: close it first':
-    'la sesión de este paciente está abierta: ciérrela primero',
-  'this patient is archived: take it out of the archive first':
-    'este paciente está archivado: sáquelo antes del archivo',
-  ['the daily check is overdue, and references need one that has passed today: open Daily check, '
-    + 'sweep over all markers of the room, then go on here']:
-    'el control diario está pendiente y las referencias necesitan uno superado hoy: abra Control '
-    + 'diario, barra todos los marcadores de la sala y siga después aquí',
-  ['this scan was taken while the daily check was overdue: scan the reference again, now that the '
-    + 'check has passed']:
-    'este escaneo se hizo con el control diario pendiente: escanee otra vez la referencia, ahora '
-    + 'que el control se ha superado',
-  'there is no template of this site': 'no hay ninguna plantilla de esta localización',
-  'there are templates of 100 sites already: remove one first':
-    'ya hay plantillas de 100 localizaciones: borre antes una',
-  'there is no such scan': 'no existe ese escaneo',
-  'there is no such patient': 'no existe ese paciente',
-  'a scan is running already: end or cancel it first':
-    'ya hay un escaneo en curso: termínelo o descártelo primero',
-  'your role may not do this': 'su función no permite hacer esto',
-  'this scan is accepted already': 'este escaneo ya está aceptado',
-  'this result is older than 2 minutes: scan again, then accept':
-    'este resultado tiene más de 2 minutos: escanee de nuevo y acepte después',
-};
-const kPatterns = [
-  [/^(.+) at the (head|feet|gantry|\+Y|-Y) end (\d+) mm (?:too )?(high|low)$/,
-    ([, part, end, mm, way]) => `${part} en el extremo de ${{
-      head: 'la cabeza', feet: 'los pies', gantry: 'gantry' }[end] ?? end}: ${mm} mm `
-      + `${way === 'high' ? 'demasiado alto' : 'demasiado bajo'}`],
-  [/^(.+) (\d+) mm (?:too )?(high|low)$/,
-    ([, part, mm, way]) => `${part}: ${mm} mm `
-      + `${way === 'high' ? 'demasiado alto' : 'demasiado bajo'}`],
-  [/^along ([+-][XY]) of the reference marker$/,
-    ([, axis]) => `según ${axis} del marcador de referencia`],
-  [/^([+-][XY]) side of the reference marker (up|down)$/,
-    ([, axis, way]) => `lado ${axis} del marcador de referencia `
-      + `${way === 'up' ? 'arriba' : 'abajo'}`],
-  [/^marker (\d+) moved ([\d.]+) mm(.*)$/,
-    ([, id, mm, rest]) => `el marcador ${id} se movió ${mm} mm${rest}`],
-  [/^marker (\d+)$/, ([, id]) => `marcador ${id}`],
-  [/^the session of (\S+) is open \(opened by (.+)\): close it first$/,
-    ([, code, who]) => `la sesión de ${code} está abierta (la abrió ${who}): ciérrela primero`],
-];
+const compiled = kPatterns.map(([pattern, words]) => [new RegExp(pattern), words]);
 
+/// Words of the appliance in Spanish; nothing where there are none. The server reads the same data:
+/// daemon/appliance/report_words.cpp.
 function translate(text) {
   if (typeof text !== 'string' || !text) return undefined;
-  if (kWords[text]) return kWords[text];
-  for (const [pattern, words] of kPatterns) {
+  if (Object.hasOwn(kWords, text)) return kWords[text];
+  if (/^[+-]?\d+\.\d+$/.test(text)) return text.replace('.', ',');
+  for (const [pattern, words] of compiled) {
     const found = pattern.exec(text);
-    if (found) return words(found.map((part) => kWords[part] ?? part));
+    if (found) {
+      return words.replace(/\$(\d)/g, (_, n) => translate(found[n]) ?? found[n] ?? '');
+    }
   }
   return undefined;
 }
@@ -117,7 +41,7 @@ export const es = {
   roles: {
     technician: 'Técnico', physicist: 'Físico', engineer: 'Ingeniero', display: 'Pantalla',
   },
-  logOut: 'Cerrar sesión',
+  logOut: 'Salir',
   loggedInAs: (user, role) => `${user}, ${role}`,
   loading: 'Cargando…',
   none: '–',
@@ -126,10 +50,10 @@ export const es = {
   lastKnown: (state, seconds) => `Último estado conocido: ${state}, hace ${seconds} s`,
   noAnswer: 'El equipo no responde.',
   answered: (status) => `El equipo respondió ${status}.`,
-  leavingOffline: 'Sin conexión con el equipo. La sesión se cerrará en cuanto responda. '
+  leavingOffline: 'Sin conexión con el equipo. Saldrá de su cuenta en cuanto responda. '
     + 'Reintentando…',
-  loggedOff: 'Su sesión se ha cerrado. Vuelva a identificarse.',
-  logOffSoon: (seconds) => `Su sesión se cerrará en ${seconds} s por falta de uso.`,
+  loggedOff: 'Ha salido de su cuenta. Vuelva a identificarse.',
+  logOffSoon: (seconds) => `Saldrá de su cuenta en ${seconds} s por falta de uso.`,
   stay: 'Seguir conectado',
   notAllowed: 'Su función no permite abrir esta página.',
   save: 'Guardar',
@@ -271,7 +195,7 @@ export const es = {
       tracking: 'Terminando el seguimiento', surfaces: 'Uniendo superficies',
       comparing: 'Comparando', saving: 'Guardando', checking: 'Comprobando los marcadores',
     },
-    seconds: (s) => `${s.toFixed(1)} s`,
+    seconds: (s) => `${s.toFixed(1).replace('.', ',')} s`,
     overdueReference: 'El control diario está pendiente. Hágalo antes de escanear una referencia.',
   },
   room: {
@@ -289,7 +213,7 @@ export const es = {
     computing: 'CALCULANDO', press: 'Pulse el botón para empezar.',
     openOne: 'Abra un paciente en la página. Un escaneo ahora quedaría sin asignar.',
     checkDone: 'Control diario superado', checkOverdue: 'Control diario pendiente',
-    warm: 'Sensor caliente', warming: (minutes) => `Sensor calentando: ${minutes} de 15 min`,
+    warm: 'Sensor a temperatura', warming: (minutes) => `Sensor calentando: ${minutes} de 15 min`,
     covered: (percent) => `${percent} % cubierto`, notCovered: 'La cobertura no se mide',
     offline: 'SIN CONEXIÓN', pairTitle: 'Vincular esta pantalla',
     pairText: 'Un ingeniero escribe este código en la página, en Cuentas, Pantallas.',
@@ -315,6 +239,8 @@ export const es = {
     runningText: 'Este resultado ya no es válido. Espere el nuevo.',
     superseded: 'REEMPLAZADO',
     supersededText: 'Hay un escaneo más nuevo. No actúe según este resultado.',
+    closed: 'SESIÓN NO ABIERTA',
+    closedText: 'La sesión de este paciente no está abierta. No actúe según este resultado.',
     review: (when) => `Resultado del ${when}, para revisión. No actúe según él.`,
     reviewTitle: 'REVISIÓN',
     unassigned: 'Escaneo sin asignar: no había ninguna sesión abierta.',
@@ -400,7 +326,7 @@ export const es = {
     lower: 'El paciente está más bajo que la referencia',
     unknown: 'no medido', hole_: 'hueco en la región', regionOutline: 'región',
     reads: (value) => `${value} mm`,
-    at: (x, y) => `en x ${x.toFixed(3)}, y ${y.toFixed(3)} m`,
+    at: (x, y) => `en x ${x.toFixed(3)}; y ${y.toFixed(3)} m`.replaceAll('.', ','),
     outsideMap: 'fuera del mapa',
     mapMissing: 'Este mapa no se puede cargar; inténtelo de nuevo.',
     mapFailed: 'El mapa no se puede leer; la imagen muestra lo mismo.',
@@ -441,7 +367,8 @@ export const es = {
     acceptOutside: 'Aceptar fuera de tolerancia',
     acceptOutsideHint: 'Su motivo, el veredicto y los valores se guardan en el registro.',
     acceptReason: 'Motivo', acceptPassword: 'Su contraseña',
-    cannotAccept: 'Un resultado antiguo o reemplazado no se puede aceptar.',
+    cannotAccept: 'Solo se puede aceptar el último resultado de la sesión abierta, durante 2 '
+      + 'minutos.',
     newReference: 'Nueva referencia con este escaneo',
     newReferenceReason: 'Motivo de la nueva referencia', export: 'Exportar',
     print: 'Vista para imprimir', report: 'Informe (PDF)',
@@ -498,12 +425,18 @@ export const es = {
     regionHint: 'Pulse en el mapa para añadir vértices; arrastre un vértice para moverlo; Supr '
       + 'borra el elegido. Sin vértices, la región es el cuerpo hallado en el escaneo (perfilado).',
     mapLabel: 'Mapa de alturas de la referencia con la región. Intro añade un vértice en el '
-      + 'centro, N elige el siguiente, las flechas lo mueven, Supr lo borra, U deshace.',
+      + 'centro, N elige el siguiente, las flechas lo mueven, Supr lo borra, U deshace. I elige el '
+      + 'isocentro, o pone uno en el centro de la región.',
+    isocentreAt: (x, y, z) => `Isocentro: x ${x.toFixed(3)}; y ${y.toFixed(3)}; z ${z.toFixed(3)}`
+      .replaceAll('.', ',').concat(' m'),
+    isocentreGone: 'Sin isocentro: el centro de la región.',
+    shiftSigned: 'Tolerancia de desplazamiento', rotationSigned: 'Tolerancia de rotación',
     isocentre: 'Isocentro',
     isocentreHint: 'Metros en el sistema del marcador de referencia. Vacío: el centro de la '
       + 'región.',
     pick: 'Elegir en el mapa', picking: 'Pulse en el mapa donde está el isocentro.',
-    pickHint: 'Un punto elegido está en la piel. Escriba z para un isocentro dentro del cuerpo.',
+    pickHint: 'Un punto elegido está en la piel: escriba z para un isocentro dentro del cuerpo. '
+      + 'Con teclas: I en el mapa y después las flechas.',
     isocentreOutside: 'Este isocentro está fuera de la región.',
     tolerance: 'Tolerancia', shift: 'Desplazamientos (mm)', rotation: 'Rotaciones (grados)',
     posture: 'Postura',
@@ -536,7 +469,8 @@ export const es = {
     area: (cm2, round) => `área ${cm2} cm², contorno ${round} cm`,
     saved: 'Plan guardado.', approved: 'Referencia aprobada.',
     newVersion: 'Se ha creado una versión nueva.',
-    corner: (n, x, y) => `Vértice ${n}: x ${x.toFixed(3)}, y ${y.toFixed(3)} m`,
+    corner: (n, x, y) => `Vértice ${n}: x ${x.toFixed(3)}; y ${y.toFixed(3)} m`
+      .replaceAll('.', ','),
     noMap: 'Este escaneo no tiene mapa de alturas.',
   },
   users: {

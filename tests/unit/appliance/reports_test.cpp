@@ -1,0 +1,140 @@
+#include "daemon/appliance/reports.hpp"
+
+#include <gmock/gmock.h>
+
+#include "daemon/appliance/report_words.hpp"
+#include "drivers/files/file_io.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+using web::Language;
+
+const web::Actor kAnna{.user = "anna", .address = {}};
+const web::Actor kBob{.user = "bob", .address = {}};
+const web::Actor kClara{.user = "clara", .address = {}};
+
+class ReportsTest : public ::testing::Test {
+ protected:
+  std::string Scan(const std::string& reference, const std::string& result, bool overdue = false) {
+    const std::string id = store_.BeginScan(
+        {.patient_id = patient_,
+         .reference_id = reference,
+         .purpose = reference.empty() ? web::ScanPurpose::kReference : web::ScanPurpose::kFraction,
+         .sensor_serial = "S1",
+         .reason = "",
+         .check_overdue = overdue});
+    std::filesystem::create_directories(store_.StagingFolder(id) / "scene");
+    WriteWholeFile(store_.StagingFolder(id) / "scene/scene.json",
+                   R"({"frames":{"total":300,"tracked":270,"dropped":30},"keyframes":40})");
+    store_.FinishScan(id,
+                      {.outcome = web::ScanOutcome::kDone, .failure = "", .result_json = result});
+    return id;
+  }
+  std::string Approved() {
+    const std::string id = store_.AddReference(kAnna, Scan("", ""), "first", {});
+    web::ReferencePlan plan;
+    plan.region_m = {{0, 0}, {0.5, 0}, {0.5, 0.4}, {0, 0.4}};
+    plan.isocentre_m = {{0.45, 0.35, 0.12}};
+    plan.tolerance = {.shift_mm = 2.5, .rotation_deg = 1};
+    store_.PlanReference(kBob, id, 1, plan);
+    const auto planned = store_.FindReference(id);
+    store_.ApproveReference(kClara, id, planned->revision, planned->digest);
+    return id;
+  }
+
+  testing::TempFolder folder_;
+  Store store_{folder_.path()};
+  std::string patient_ = store_.AddPatient(kAnna, "P-0042", "thorax");
+};
+
+constexpr const char* kMove =
+    R"({"verdict":"move","reasons":[],
+        "correction":{"vertical_mm":-8.04,"longitudinal_mm":0.4,"lateral_mm":0.0,"pitch_deg":0.0,
+          "roll_deg":0.0,"yaw_deg":-3.3,
+          "uncertainty":{"vertical_mm":1.06,"longitudinal_mm":1.1,"lateral_mm":1.0,"pitch_deg":0.1,
+            "roll_deg":0.1,"yaw_deg":0.09},
+          "words":{"vertical":"down","longitudinal":"toward gantry","lateral":"to patient left",
+            "pitch":"head up","roll":"patient left side down","yaw":"head to patient left"}},
+        "body":{"parts":[{"words_now":"left shoulder 12 mm high",
+          "words_after":"left shoulder 9 mm high"}]}})";
+
+std::string ValueOf(const ReportFacts& facts, std::string_view name) {
+  for (const auto& [key, value] : facts) {
+    if (key == name) return value;
+  }
+  return "nothing";
+}
+
+TEST_F(ReportsTest, AScanIsToldInTheLanguageThatIsAskedFor) {
+  const std::string id = Scan(Approved(), kMove, /*overdue=*/true);
+  const web::Scan scan = *store_.FindScan(id);
+  const ScanReport english = DescribeScan(store_, scan, Language::kEnglish);
+  const ScanReport spanish = DescribeScan(store_, scan, Language::kSpanish);
+  EXPECT_EQ(english.verdict, "MOVE");
+  EXPECT_EQ(spanish.verdict, "MOVER");
+  EXPECT_THAT(spanish.texts.notice, HasSubstr("Solo para investigación"));
+  ASSERT_THAT(spanish.numbers, SizeIs(6));
+  EXPECT_EQ(english.numbers[0].words, "down");
+  EXPECT_EQ(spanish.numbers[0].words, "abajo");
+  EXPECT_EQ(spanish.numbers[1].words, "menor que su incertidumbre");
+  EXPECT_EQ(spanish.numbers[5].words, "cabeza hacia la izquierda del paciente");
+  EXPECT_THAT(spanish.body, ElementsAre("hombro izquierdo: 9 mm demasiado alto"));
+  EXPECT_THAT(spanish.cautions, ElementsAre("Se perdió el 10 % de las imágenes.",
+                                            "El control diario estaba pendiente en este escaneo."));
+  EXPECT_EQ(ValueOf(spanish.identity, "Isocentro"), "x 0,450; y 0,350; z 0,120 m");
+  EXPECT_EQ(ValueOf(spanish.identity, "Región"), "4 vértices, 2000 cm\u00b2");
+  EXPECT_EQ(ValueOf(spanish.identity, "Tolerancia"), "\u00b12,5 mm, \u00b11\u00b0");
+  EXPECT_EQ(ValueOf(english.identity, "Plan"), "head first, supine, markers fixed to the room");
+  EXPECT_THAT(ValueOf(english.identity, "Approved by"), HasSubstr("clara"));
+  // Nothing of one language is left in the other.
+  for (std::size_t i = 0; i < english.identity.size(); ++i) {
+    if (english.identity[i].first == "Plan") continue;
+    EXPECT_NE(english.identity[i].first, spanish.identity[i].first);
+  }
+  EXPECT_TRUE(PdfOf(spanish).starts_with("%PDF-"));
+}
+
+TEST_F(ReportsTest, NoAnswerGivesItsReasonAndNoNumbers) {
+  const std::string id = Scan(
+      Approved(),
+      R"({"verdict":"no_answer","reasons":["the current scan covers 81.5 % of the region, at least 90 % are needed; sweep all of it"],
+          "correction":{"vertical_mm":-8.04,"longitudinal_mm":0.4,"lateral_mm":0.0,"pitch_deg":0.0,"roll_deg":0.0,"yaw_deg":0.0}})");
+  const ScanReport report = DescribeScan(store_, *store_.FindScan(id), Language::kSpanish);
+  EXPECT_EQ(report.verdict, "SIN RESPUESTA");
+  EXPECT_EQ(report.why,
+            "el escaneo actual cubre el 81,5 % de la región y se necesita al menos el 90 %; "
+            "bárrala toda");
+  EXPECT_TRUE(report.numbers.empty());
+  EXPECT_TRUE(report.body.empty());
+}
+
+TEST_F(ReportsTest, ACourseNamesItsReferenceAndWhoAcceptedWhat) {
+  const std::string id = Scan(Approved(), kMove);
+  store_.AcceptScan(kAnna, id, "the arm cannot be moved");
+  const CourseReport course =
+      DescribeCourse(store_, *store_.FindPatient(patient_), Language::kSpanish);
+  ASSERT_THAT(course.rows, SizeIs(2));
+  EXPECT_EQ(course.rows[0].verdict, "REFERENCIA");
+  EXPECT_EQ(course.rows[1].accepted, "fuera de tolerancia por anna: the arm cannot be moved");
+  ASSERT_TRUE(course.rows[1].values[0]);
+  EXPECT_EQ(course.rows[1].values[0]->u95, 1.06);
+  EXPECT_THAT(ValueOf(course.identity, "Aprobado por"), HasSubstr("clara"));
+  EXPECT_TRUE(PdfOf(course).starts_with("%PDF-"));
+}
+
+TEST(ReportWords, WhatHasNoWordsStaysAsItIs) {
+  EXPECT_EQ(Translated("something else", Language::kSpanish), "something else");
+  EXPECT_EQ(Translated("", Language::kSpanish), "");
+  const std::string bomb(100000, 'a');
+  EXPECT_EQ(Translated(bomb + " 3 mm high", Language::kSpanish), bomb + " 3 mm high");
+  EXPECT_EQ(Translated("marker 7 moved 12.5 mm", Language::kSpanish),
+            "el marcador 7 se movió 12,5 mm");
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,226 @@
+// The map of a plan on which region and isocentre are drawn, by pointer or by keys.
+import { clear, h, say, svg } from '../dom.js';
+import { mapFrame, viewOf } from '../map_frame.js';
+import { cellAt, paintHeights } from '../maps.js';
+import { S } from '../strings.js';
+
+const kStep_m = 0.005;
+const kSnap_m = 0.012;
+const kUndoSteps = 200;
+const distance = ([ax, ay], [bx, by]) => Math.hypot(ax - bx, ay - by);
+
+/// Area in square centimetres and length of the outline in centimetres.
+export function measure(region) {
+  let area = 0;
+  let round = 0;
+  region.forEach(([ax, ay], i) => {
+    const [bx, by] = region[(i + 1) % region.length];
+    area += (ax * by - bx * ay) / 2;
+    round += Math.hypot(bx - ax, by - ay);
+  });
+  return { cm2: Math.round(1e4 * Math.abs(area)), cm: Math.round(100 * round) };
+}
+
+/// Height map with a polygon and a point that people draw, by pointer or keys. `model` is {region,
+/// isocentre}; `changed` is called after each change.
+export function editor(grid, map, model, editable, changed, compass) {
+  const text = S.plan;
+  const canvas = h('canvas', { class: 'map', 'aria-hidden': 'true' });
+  paintHeights(canvas, map, grid.step);
+  const width = grid.width * grid.step;
+  const height = grid.height * grid.step;
+  const overlay = svg('svg', {
+    viewBox: `0 0 ${width} ${height}`, class: 'draw', tabindex: '0', role: 'application',
+    'aria-label': text.mapLabel,
+  });
+  const box = mapFrame({ grid, view: viewOf(grid, null), canvas, compass, cross: overlay });
+  box.style.setProperty('max-width', `${75 * width / height}vh`);
+  const state = { chosen: -1, dragging: false, picking: false, onIsocentre: false };
+  const before = [];  // for undo
+  const remember = () => {
+    before.push(JSON.stringify([model.region, model.isocentre]));
+    if (before.length > kUndoSteps) before.shift();
+  };
+  const toMap = ([x, y]) => [x - grid.x_min, height - (y - grid.y_min)];
+  const round = (value) => Math.round(value * 1000) / 1000;
+  const fromEvent = (event) => {
+    const area = overlay.getBoundingClientRect();
+    return [round(grid.x_min + (event.clientX - area.left) / area.width * width),
+      round(grid.y_min + (1 - (event.clientY - area.top) / area.height) * height)];
+  };
+  /// A corner that is dragged lies straight beside its neighbours where it nearly does.
+  const snapped = (point, i) => {
+    const n = model.region.length;
+    for (const other of [model.region[(i + n - 1) % n], model.region[(i + 1) % n]]) {
+      for (const k of [0, 1]) if (Math.abs(point[k] - other[k]) < kSnap_m) point[k] = other[k];
+    }
+    return point;
+  };
+  const lengths = (points, size) => points.length > 1 && points.map(([ax, ay], i) => {
+    if (i + 1 === points.length && points.length < 3) return null;
+    const [bx, by] = points[(i + 1) % points.length];
+    const cm = 100 * Math.hypot(bx - ax, by - ay);
+    return cm > 4 && svg('text', {
+      x: (ax + bx) / 2, y: (ay + by) / 2, class: 'length', 'font-size': 1.6 * size,
+    }, `${cm.toFixed(0)} cm`);
+  });
+  const draw = () => {
+    const points = model.region.map(toMap);
+    const size = width / 110;
+    clear(overlay,
+      points.length > 1 && svg(points.length > 2 ? 'polygon' : 'polyline', {
+        points: points.map((point) => point.join(',')).join(' '), class: 'region',
+      }),
+      lengths(points, size),
+      editable && points.map(([x, y], i) => svg('circle', {
+        cx: x, cy: y, r: size, class: i === state.chosen ? 'corner chosen' : 'corner',
+        'data-corner': i,
+      })),
+      model.isocentre && (() => {
+        const [x, y] = toMap(model.isocentre);
+        return svg('path', {
+          d: `M${x - 2 * size} ${y}h${4 * size}M${x} ${y - 2 * size}v${4 * size}`,
+          class: state.onIsocentre ? 'isocentre chosen' : 'isocentre',
+        });
+      })());
+  };
+  const skinAt = (point) => {
+    const cell = cellAt(grid, ...point);
+    return cell < 0 || Number.isNaN(map.values[cell]) ? 0 : round(map.values[cell]);
+  };
+  const middle = () => {
+    const n = model.region.length;
+    const mean = (k) => round(model.region.reduce((sum, point) => sum + point[k], 0) / n);
+    return n > 2 ? [mean(0), mean(1)]
+      : [round(grid.x_min + width / 2), round(grid.y_min + height / 2)];
+  };
+  /// The isocentre by keys: put on the skin, then moved at the height that it has.
+  const keyOnIsocentre = (key, direction, by) => {
+    if (key !== 'i' || !model.isocentre) remember();
+    if (key === 'i') {
+      state.onIsocentre = true;
+      state.chosen = -1;
+      model.isocentre ??= [...middle(), skinAt(middle())];
+    } else if (direction) {
+      const [x, y, z] = model.isocentre;
+      model.isocentre = [round(x + by * direction[0]), round(y + by * direction[1]), z];
+    } else {
+      model.isocentre = null;
+      state.onIsocentre = false;
+    }
+    update();
+    say(model.isocentre ? text.isocentreAt(...model.isocentre) : text.isocentreGone);
+  };
+  const update = () => { draw(); changed(); };
+  const undo = () => {
+    const last = before.pop();
+    if (!last) return;
+    const [region, isocentre] = JSON.parse(last);
+    model.region.splice(0, model.region.length, ...region);
+    model.isocentre = isocentre;
+    state.chosen = Math.min(state.chosen, region.length - 1);
+    update();
+  };
+  if (editable) {
+    overlay.addEventListener('pointerdown', (event) => {
+      overlay.focus();
+      const point = fromEvent(event);
+      remember();
+      state.onIsocentre = false;
+      if (state.picking) {
+        model.isocentre = [...point, skinAt(point)];
+        state.picking = false;
+        overlay.classList.remove('picking');
+      } else if (event.target.dataset?.corner !== undefined) {
+        state.chosen = Number(event.target.dataset.corner);
+        state.dragging = true;
+        overlay.setPointerCapture(event.pointerId);
+      } else {
+        // Into the edge that is nearest, so that clicks around the body make no crossing lines.
+        model.region.splice(nearestEdge(model.region, point), 0, point);
+        state.chosen = model.region.findIndex((other) => other === point);
+      }
+      update();
+    });
+    overlay.addEventListener('pointermove', (event) => {
+      if (!state.dragging) return;
+      model.region[state.chosen] = snapped(fromEvent(event), state.chosen);
+      update();
+    });
+    overlay.addEventListener('pointerup', () => { state.dragging = false; });
+    overlay.addEventListener('keydown', (event) => {
+      const chosen = model.region[state.chosen];
+      const direction = {
+        ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
+      }[event.key];
+      const by = kStep_m * (event.shiftKey ? 10 : 1);
+      const isDelete = event.key === 'Delete' || event.key === 'Backspace';
+      const key = event.key.toLowerCase();
+      if (!event.ctrlKey && !event.altKey && !event.metaKey && (key === 'i'
+        || (state.onIsocentre && model.isocentre && (direction || isDelete)))) {
+        event.preventDefault();
+        keyOnIsocentre(key, direction, by);
+        return;
+      }
+      if (key === 'n' || key === 'enter') state.onIsocentre = false;
+      if (event.key === 'Enter' || (chosen && (direction || isDelete))) remember();
+      if (key === 'u' || (event.key === 'z' && event.ctrlKey)) {
+        undo();
+      } else if (event.key === 'Enter') {
+        model.region.push([round(grid.x_min + width / 2), round(grid.y_min + height / 2)]);
+        state.chosen = model.region.length - 1;
+      } else if (key === 'n' && model.region.length) {
+        state.chosen = (state.chosen + 1) % model.region.length;
+      } else if (isDelete && chosen) {
+        model.region.splice(state.chosen, 1);
+        state.chosen = Math.min(state.chosen, model.region.length - 1);
+      } else if (direction && chosen) {
+        model.region[state.chosen] = [round(chosen[0] + by * direction[0]),
+          round(chosen[1] + by * direction[1])];
+      } else {
+        return;
+      }
+      event.preventDefault();
+      update();
+      const now = model.region[state.chosen];
+      if (now) say(text.corner(state.chosen + 1, ...now));
+    });
+  }
+  draw();
+  return {
+    element: box, draw, undo,
+    /// In place of all corners; can be undone.
+    set: (region) => {
+      remember();
+      model.region.splice(0, model.region.length, ...region);
+      state.chosen = -1;
+      update();
+    },
+    clear: () => {
+      remember();
+      model.region.length = 0;
+      state.chosen = -1;
+      update();
+    },
+    pick: () => {
+      state.picking = true;
+      overlay.classList.add('picking');
+      overlay.focus();
+      say(text.picking);
+    },
+  };
+}
+
+function nearestEdge(region, [x, y]) {
+  if (region.length < 3) return region.length;
+  let best = [Infinity, region.length];
+  region.forEach(([ax, ay], i) => {
+    const [bx, by] = region[(i + 1) % region.length];
+    const length2 = (bx - ax) ** 2 + (by - ay) ** 2 || 1e-9;
+    const along = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / length2;
+    const share = Math.max(0, Math.min(1, along));
+    const away = distance([x, y], [ax + share * (bx - ax), ay + share * (by - ay)]);
+    if (away < best[0]) best = [away, i + 1];
+  });
+  return best[1];
+}

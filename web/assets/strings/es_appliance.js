@@ -1,0 +1,214 @@
+// The appliance's words in Spanish, as data: the page and the server's reports read them. Whole
+// phrases first, then patterns, whose groups ($1, $2, ...) are translated by themselves; numbers
+// get the decimal comma.
+export const kWords = {
+  up: 'arriba', down: 'abajo', 'toward gantry': 'hacia el gantry',
+  'away from gantry': 'alejándose del gantry', 'to patient left': 'hacia la izquierda del paciente',
+  'to patient right': 'hacia la derecha del paciente', 'head up': 'cabeza arriba',
+  'head down': 'cabeza abajo', 'patient left side down': 'lado izquierdo del paciente abajo',
+  'patient right side down': 'lado derecho del paciente abajo',
+  'head to patient left': 'cabeza hacia la izquierda del paciente',
+  'head to patient right': 'cabeza hacia la derecha del paciente',
+  'to the right, facing the gantry': 'a la derecha, mirando al gantry',
+  'to the left, facing the gantry': 'a la izquierda, mirando al gantry',
+  'gantry end up': 'extremo del gantry arriba', 'gantry end down': 'extremo del gantry abajo',
+  'right side down, facing the gantry': 'lado derecho abajo, mirando al gantry',
+  'left side down, facing the gantry': 'lado izquierdo abajo, mirando al gantry',
+  'counter-clockwise from above': 'en sentido antihorario visto desde arriba',
+  'clockwise from above': 'en sentido horario visto desde arriba',
+  'up (anterior)': 'arriba (anterior)', 'up (posterior)': 'arriba (posterior)',
+  'down (anterior)': 'abajo (anterior)', 'down (posterior)': 'abajo (posterior)',
+  'toward the head': 'hacia la cabeza', 'toward the feet': 'hacia los pies',
+  'toward the head and patient left': 'hacia la cabeza y la izquierda del paciente',
+  'toward the head and patient right': 'hacia la cabeza y la derecha del paciente',
+  'toward the feet and patient left': 'hacia los pies y la izquierda del paciente',
+  'toward the feet and patient right': 'hacia los pies y la derecha del paciente',
+  'head and patient left side up': 'cabeza y lado izquierdo del paciente arriba',
+  'head and patient right side up': 'cabeza y lado derecho del paciente arriba',
+  'feet and patient left side up': 'pies y lado izquierdo del paciente arriba',
+  'feet and patient right side up': 'pies y lado derecho del paciente arriba',
+  'a reference is made of this scan: it goes only with its patient':
+    'una referencia procede de este escaneo: solo se borra con su paciente',
+  'the session of a patient is open: close it first':
+    'hay una sesión de un paciente abierta: ciérrela primero',
+  'a scan is running: wait for its result': 'hay un escaneo en curso: espere su resultado',
+  '+X side': 'lado +X', '-X side': 'lado −X',
+  'left side': 'lado izquierdo', 'right side': 'lado derecho', middle: 'centro',
+  'a scan is running: wait for its result, then open the patient':
+    'hay un escaneo en curso: espere su resultado y abra después el paciente',
+  'this patient has no approved reference: scan and approve one first':
+    'este paciente no tiene referencia aprobada: escanee y apruebe una primero',
+  'name or password is wrong': 'nombre o contraseña incorrectos',
+  'the password is wrong': 'la contraseña es incorrecta',
+  'no session is open': 'no hay ninguna sesión abierta',
+  'the session of this patient is open: close it first':
+    'la sesión de este paciente está abierta: ciérrela primero',
+  'this patient is archived: take it out of the archive first':
+    'este paciente está archivado: sáquelo antes del archivo',
+  ['the daily check is overdue, and references need one that has passed today: open Daily check, '
+    + 'sweep over all markers of the room, then go on here']:
+    'el control diario está pendiente y las referencias necesitan uno superado hoy: abra Control '
+    + 'diario, barra todos los marcadores de la sala y siga después aquí',
+  ['this scan was taken while the daily check was overdue, and no check of the same day and sensor '
+    + 'has confirmed it: scan the reference again']:
+    'este escaneo se hizo con el control diario pendiente y ningún control del mismo día y sensor '
+    + 'lo ha confirmado: escanee otra vez la referencia',
+  'there is no template of this site': 'no hay ninguna plantilla de esta localización',
+  'there are templates of 100 sites already: remove one first':
+    'ya hay plantillas de 100 localizaciones: borre antes una',
+  'there is no such scan': 'no existe ese escaneo',
+  'there is no such patient': 'no existe ese paciente',
+  'a scan is running already: end or cancel it first':
+    'ya hay un escaneo en curso: termínelo o descártelo primero',
+  'your role may not do this': 'su función no permite hacer esto',
+  'this scan is accepted already': 'este escaneo ya está aceptado',
+  'this result is older than 2 minutes: scan again, then accept':
+    'este resultado tiene más de 2 minutos: escanee de nuevo y acepte después',
+  'patient left': 'izquierda del paciente', 'patient right': 'derecha del paciente',
+  head: 'cabeza', feet: 'pies', high: 'demasiado alto', low: 'demasiado bajo',
+  'head and neck': 'cabeza y cuello',
+  'left shoulder': 'hombro izquierdo', 'right shoulder': 'hombro derecho',
+  'left chest': 'lado izquierdo del tórax', 'right chest': 'lado derecho del tórax',
+  'left side of the abdomen': 'lado izquierdo del abdomen',
+  'right side of the abdomen': 'lado derecho del abdomen',
+  'left side of the pelvis': 'lado izquierdo de la pelvis',
+  'right side of the pelvis': 'lado derecho de la pelvis',
+  'left thigh': 'muslo izquierdo', 'right thigh': 'muslo derecho',
+  'left lower leg': 'pierna izquierda', 'right lower leg': 'pierna derecha',
+  'at the head end': 'en el extremo de la cabeza', 'at the feet end': 'en el extremo de los pies',
+  'in the middle': 'en el centro', 'at the gantry end': 'en el extremo del gantry',
+  'at the end away from the gantry': 'en el extremo opuesto al gantry',
+  'at the +Y end': 'en el extremo +Y', 'at the -Y end': 'en el extremo −Y',
+  vertical: 'vertical', longitudinal: 'longitudinal', lateral: 'lateral', pitch: 'cabeceo',
+  roll: 'balanceo', yaw: 'guiñada', deg: '°', current: 'actual', reference: 'referencia',
+  // Why there is no answer.
+  ['no flat support was found in the reference scan, so the body cannot be separated from what it '
+    + 'lies on; draw a region on the body, or scan the reference again with more of the couch in '
+    + 'view']:
+    'no se halló un apoyo plano en el escaneo de referencia y el cuerpo no se distingue de él; '
+    + 'dibuje una región sobre el cuerpo o repita la referencia mostrando más camilla',
+  'how much of the region the current scan covers could not be measured':
+    'no se pudo medir qué parte de la región cubre el escaneo actual',
+  'the holes of the current scan could not be measured':
+    'no se pudieron medir los huecos del escaneo actual',
+  'how well the surfaces fit could not be measured':
+    'no se pudo medir cómo encajan las superficies',
+  'the shared markers determine no alignment':
+    'los marcadores comunes no determinan ninguna alineación',
+  ['the reference scan did not see its reference marker well enough, so it has no height map; scan '
+    + 'the reference again with that marker in view']:
+    'el escaneo de referencia no vio bastante bien su marcador de referencia y no tiene mapa de '
+    + 'alturas; repita la referencia con ese marcador a la vista',
+  ['the reference scan measured no surface around its reference marker, so it has no height map; '
+    + 'lay the marker flat beside the body and scan the reference again']:
+    'el escaneo de referencia no midió superficie alrededor de su marcador y no tiene mapa de '
+    + 'alturas; ponga el marcador plano junto al cuerpo y repita la referencia',
+  'the reference scan shows no body over its support; check the reference scan':
+    'el escaneo de referencia no muestra un cuerpo sobre su apoyo; revise el escaneo de referencia',
+  'the reference scan measured nothing inside the region; draw the region on the body':
+    'el escaneo de referencia no midió nada dentro de la región; dibuje la región sobre el cuerpo',
+  'the current scan does not look like this reference: no motion of the body explains it':
+    'el escaneo actual no se parece a esta referencia: ningún movimiento del cuerpo lo explica',
+  'there is no installer (RAUC) on this machine; update its packages instead':
+    'no hay instalador (RAUC) en esta máquina; actualice sus paquetes',
+  // Warnings of a scan.
+  'the markers are fixed to the couch: posture only, shifts are refused':
+    'los marcadores están fijos a la camilla: solo postura, sin desplazamientos',
+  'no flat support was found in the reference scan: all of it counts as body':
+    'no se halló un apoyo plano en el escaneo de referencia: todo cuenta como cuerpo',
+  'no flat support was found in the current scan: all of it counts as body':
+    'no se halló un apoyo plano en el escaneo actual: todo cuenta como cuerpo',
+  'the dense registration did not make the views agree better and was left out':
+    'el registro denso no mejoró el acuerdo entre las vistas y no se usó',
+  ['no marker was seen: the scene lies in the first keyframe\'s frame and cannot be compared']:
+    'no se vio ningún marcador: la escena está en el sistema de la primera imagen clave y no se '
+    + 'puede comparar',
+  // The daily check.
+  ['there is no baseline yet: somebody who knows that the markers lie right takes this check as '
+    + 'the baseline']:
+    'aún no hay base: quien sepa que los marcadores están bien fija este control como base',
+  'no marker was seen, so none could be measured':
+    'no se vio ningún marcador y no se pudo medir ninguno',
+};
+export const kPatterns = [
+  ['^(.+) (\\d+) mm (?:too )?(high|low)$', '$1: $2 mm $3'],
+  ['^(left side|right side|[+-]X side) (at the .+|in the middle)$', '$1 $2'],
+  ['^along ([+-][XY]) of the reference marker$', 'según $1 del marcador de referencia'],
+  ['^([+-][XY]) side of the reference marker (up|down)$',
+    'lado $1 del marcador de referencia $2'],
+  ['^marker (\\d+) moved ([\\d.]+) mm$', 'el marcador $1 se movió $2 mm'],
+  ['^marker (\\d+) moved ([\\d.]+) mm since the reference; ignored$',
+    'el marcador $1 se movió $2 mm desde la referencia; no se usa'],
+  ['^marker (\\d+)$', 'marcador $1'],
+  ['^missing: (.+)$', 'faltan: $1'],
+  ['^the session of (\\S+) is open \\(opened by (.+)\\): close it first$',
+    'la sesión de $1 está abierta (la abrió $2): ciérrela primero'],
+  // Why there is no answer.
+  ['^the current scan covers ([\\d.]+) % of the region, at least ([\\d.]+) % are needed; sweep '
+    + 'all of it$',
+  'el escaneo actual cubre el $1 % de la región y se necesita al menos el $2 %; bárrala toda'],
+  ['^the current scan has a hole of ([\\d.]+) mm in the region at x ([-\\d.]+) m, y ([-\\d.]+) m; '
+    + 'at most ([\\d.]+) mm are allowed; sweep over it$',
+  'el escaneo actual tiene un hueco de $1 mm en la región, en x $2 m, y $3 m; se admiten $4 mm '
+    + 'como máximo; barra sobre él'],
+  ['^the body does not look like this reference: 5 % of the region lie more than ([\\d.]+) mm away '
+    + 'after the best motion$',
+  'el cuerpo no se parece a esta referencia: el 5 % de la región queda a más de $1 mm tras el '
+    + 'mejor ajuste'],
+  ['^it is not known how long tracking was lost in the (reference|current) scan$',
+    'no se sabe cuánto tiempo se perdió el seguimiento en el escaneo ($1)'],
+  ['^tracking was lost for ([\\d.]+) s in the (reference|current) scan, or no image came; sweep '
+    + 'again, more slowly$',
+  'el seguimiento se perdió durante $1 s en el escaneo ($2), o no llegó ninguna imagen; barra de '
+    + 'nuevo, más despacio'],
+  ['^(\\w+) was not measured$', '$1: no se midió'],
+  ['^(\\w+) is not well determined: ±([\\d.e-]+) (\\w+) at 95 %, the tolerance is '
+    + '([\\d.]+) (\\w+)$',
+    '$1: no está bien determinado, ±$2 $3 al 95 %; la tolerancia es $4 $5'],
+  ['^scan needs at least (\\d+) markers shared with the reference, found (\\d+)(?: \\(ids? '
+    + '([\\d, ]+)\\))?; keep the markers in view$',
+  'el escaneo necesita al menos $1 marcadores comunes con la referencia y tiene $2; mantenga los '
+    + 'marcadores a la vista'],
+  ['^scan needs at least (\\d+) markers that did not move since the reference, (\\d+) of (\\d+) '
+    + 'shared ones agree; check where the markers lie$',
+  'el escaneo necesita al menos $1 marcadores que no se hayan movido desde la referencia; '
+    + 'concuerdan $2 de los $3 comunes; revise dónde están los marcadores'],
+  ['^the markers fall into two groups of (\\d+) that moved against each other; check where the '
+    + 'markers lie$',
+  'los marcadores forman dos grupos de $1 que se movieron uno respecto a otro; revise dónde están'],
+  ['^markers? ([\\d, ]+) moved since the reference, and this preset aligns the scans by '
+    + '(?:it|them) nevertheless; use preset best$',
+  'los marcadores $1 se movieron desde la referencia y este preajuste los usa igualmente; use el '
+    + 'preajuste best'],
+  // Warnings of a scan.
+  ['^(\\d+) of (\\d+) frames were not tracked, ([\\d.]+) s at longest$',
+    '$1 de $2 imágenes sin seguimiento, $3 s como máximo'],
+  ['^no image came for ([\\d.]+) s in the sweep; what the sensor passed meanwhile is missing$',
+    'no llegó ninguna imagen durante $1 s del barrido; falta lo que el sensor recorrió entretanto'],
+  ['^reference marker (\\d+) was seen from (\\d+) places? only: the scene\'s frame is less certain '
+    + 'than that of a sweep$',
+  'el marcador de referencia $1 se vio solo desde $2 lugares: el sistema de la escena es menos '
+    + 'seguro que el de un barrido'],
+  // Storage and update.
+  ['^The disk is (\\d+) % full: back up and remove scans.$',
+    'El disco está lleno al $1 %: haga una copia de seguridad y borre escaneos.'],
+  ['^The last backup failed: (.+)$', 'La última copia de seguridad falló: $1'],
+  // The daily check.
+  ['^(\\d+) markers were seen, at least (\\d+) are needed; sweep over all of them$',
+    'se vieron $1 marcadores y se necesitan al menos $2; bárralos todos'],
+  ['^markers ([\\d, ]+) were not seen well: look whether they are there, clean and uncovered, and '
+    + 'sweep over all$',
+  'los marcadores $1 no se vieron bien: mire si están, limpios y descubiertos, y bárralos todos'],
+  ['^the markers lie ([\\d.]+) mm \\(RMS\\) off where they lay, at most ([\\d.]+) mm are allowed$',
+    'los marcadores están a $1 mm (RMS) de donde estaban; se admiten $2 mm como máximo'],
+  ['^the markers lie (-?[\\d.]+) % farther apart than they did: the sensor\'s calibration may have '
+    + 'changed$',
+  'los marcadores están un $1 % más separados que antes: puede haber cambiado la calibración del '
+    + 'sensor'],
+  ['^marker (\\d+) measures ([+-][\\d.]+) % of its length: is its print of the right size\\?$',
+    'el marcador $1 mide un $2 % de diferencia con su longitud: ¿está impreso a su tamaño?'],
+  ['^the sensor\'s depth is off by ([+-][\\d.]+) %: let it warm up, check again, then have it '
+    + 'calibrated$',
+  'la profundidad del sensor se desvía un $1 %: déjelo calentar, repita el control y hágalo '
+    + 'calibrar'],
+];
