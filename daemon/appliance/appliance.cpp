@@ -38,7 +38,8 @@ double Milliseconds(Clock::duration duration) {
 Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
     : loop_(loop),
       parts_(std::move(parts)),
-      profiles_(std::make_shared<ProfileShelf>(parts_.config.appliance.state / "sensor-profiles")) {
+      profiles_(std::make_shared<ProfileShelf>(parts_.config.appliance.state / "sensor-profiles")),
+      profiles_off_(ProfilesOff(parts_.config)) {
   OpenStore();
   result_timer_ =
       loop_.MakeTimer("result expired", [this] { (void)Handle(ScanEvent::kResultExpired); });
@@ -252,19 +253,6 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
   return job;
 }
 
-/// Null where none is kept: switched off, another preset than `best`, or a unit without a serial.
-std::shared_ptr<UnitProfile> Appliance::MakeUnitProfile() {
-  const SensorSnapshot sensor = sensors_->snapshot();
-  if (!HasProfile(sensor.sensor)) return nullptr;
-  return std::make_shared<UnitProfile>(profiles_, sensor.sensor.serial, sensor.info.intrinsics);
-}
-
-bool Appliance::HasProfile(const SensorDescription& sensor) const {
-  return parts_.config.appliance.sensor_profiles &&
-         parts_.config.reconstruct.preset == Preset::kBest && !sensor.serial.empty() &&
-         sensor.serial != sensor.uri;
-}
-
 web::ReferencePlan Appliance::DefaultPlan() {
   const web::Settings settings = store_ ? store_->GetSettings() : web::Settings{};
   return {.region_m = {},
@@ -374,10 +362,8 @@ void Appliance::LogSensor(const SensorEvent& event) {
   if (event.kind == SensorEvent::Kind::kReady) {
     sensor_since_ = Clock::now();
     Log(LogLevel::kInfo, "the sensor is ready", {{"SERIAL", serial}});
-    if (parts_.config.appliance.sensor_profiles && !HasProfile(event.sensor))
-      Log(LogLevel::kNotice,
-          "no profile is kept of this sensor: it has no serial by which it would be known again, "
-          "or the preset is another than best",
+    if (const std::string why = WhyNoProfile(event.sensor); !why.empty())
+      Log(LogLevel::kNotice, fmt::format("no profile is kept of this sensor: {}", why),
           {{"SERIAL", serial}});
     const StreamInfo info = sensors_->snapshot().info;
     if (!last_serial_.empty() && last_serial_ != serial) {
@@ -539,6 +525,7 @@ void Appliance::Reload(const Config& config) {
   Config next = config;
   const std::vector<std::string> kept = KeepUntilRestart(parts_.config, next);
   parts_.config = std::move(next);
+  profiles_off_ = ProfilesOff(parts_.config);
   Log(LogLevel::kInfo, "the configuration was read again");
   if (!kept.empty())
     Log(LogLevel::kWarning,

@@ -1,6 +1,7 @@
 // The appliance: sensor, button, light, scans and store behind one state, on the event loop.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
@@ -98,6 +99,14 @@ class Appliance {
   /// patient again.
   Answer OpenCheck(const web::Actor& actor);
   [[nodiscard]] web::CheckStatus Checks();
+  /// Of the connected sensor unit; from any thread.
+  [[nodiscard]] web::SensorProfiles SensorProfiles() const;
+  [[nodiscard]] std::optional<std::string> SensorProfileFile(int version) const;
+  /// Why the profile of that unit may not be changed now; empty: it may.
+  [[nodiscard]] Answer WhyNotChangeProfile(const std::string& serial) const;
+  [[nodiscard]] const std::shared_ptr<ProfileShelf>& profiles() const { return profiles_; }
+  /// What the last scan said against the profile is of the past.
+  void ForgetDrift();
   /// Of the last result of this run, by a clock that does not step; nothing for another scan.
   [[nodiscard]] std::optional<double> AgeOf(const std::string& scan_id) const;
   /// Takes over what may change while running; what may not is logged. For SIGHUP.
@@ -176,7 +185,8 @@ class Appliance {
   void BeginSession();
   [[nodiscard]] ScanJob MakeJob(const web::Settings& settings);
   [[nodiscard]] std::shared_ptr<UnitProfile> MakeUnitProfile();
-  [[nodiscard]] bool HasProfile(const SensorDescription& sensor) const;
+  [[nodiscard]] std::string WhyNoProfile(const SensorDescription& sensor) const;
+  [[nodiscard]] static bool ProfilesOff(const Config& config);
   [[nodiscard]] ScanCallbacks MakeCheckCallbacks(const NewScan& scan);
   void AddListeners(ScanCallbacks& callbacks);
   [[nodiscard]] ScanCallbacks MakeCallbacks(const NewScan& scan);
@@ -211,6 +221,7 @@ class Appliance {
   std::unique_ptr<Store> store_;
   std::string storage_fault_, backup_fault_;
   std::shared_ptr<ProfileShelf> profiles_;
+  std::atomic<bool> profiles_off_;
   std::string profile_fault_;  ///< That the sensor contradicted its profile in the last scan.
   std::function<std::string()> hindrance_;
   int ticks_to_disk_check_ = kDiskCheckTicks;

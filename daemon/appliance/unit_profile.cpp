@@ -16,6 +16,7 @@ UnitProfile::UnitProfile(std::shared_ptr<ProfileShelf> shelf, std::string serial
 void UnitProfile::Begin(ReconstructorOptions& options) {
   try {
     ProfileShelf::InUse in_use = shelf_->Read(serial_);
+    begun_from_ = in_use.version;
     if (!in_use.fault.empty()) Log(LogLevel::kError, in_use.fault, {{"SERIAL", serial_}});
     if (in_use.newest && in_use.newest->profile && in_use.newest->profile->stated != stated_) {
       Log(LogLevel::kWarning,
@@ -55,8 +56,8 @@ std::string UnitProfile::Drift() const {
   if (!compared || compared->agrees()) return {};
   return fmt::format(
       "the sensor {} no longer measures as its profile says (chi-square {:.0f}, at most {:.0f} for "
-      "{} terms): let it warm up and repeat the check; if this comes again, move its "
-      "folder in sensor-profiles away, and the unit begins again",
+      "{} terms): let it warm up and repeat the check; if this comes again, reset the unit's "
+      "profile on the settings page",
       serial_, compared->chi_square, compared->limit, compared->num_terms);
 }
 
@@ -68,7 +69,7 @@ void UnitProfile::Teach() {
   }
   try {
     const std::optional<ProfileAgreement> compared = Compared();
-    const int version = shelf_->Add(serial_, *learned_);
+    const int version = shelf_->Add(serial_, *learned_, begun_from_);
     Log(LogLevel::kInfo,
         fmt::format("the profile of sensor {} has version {} now, from {} sweeps{}", serial_,
                     version, learned_->num_sweeps,

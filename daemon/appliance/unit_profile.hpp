@@ -37,6 +37,7 @@ class UnitProfile {
   std::string serial_;
   Intrinsics stated_;
   std::optional<SensorProfile> before_, learned_;
+  int begun_from_ = 0;
 };
 
 /// Why a scan that ended teaches nothing of its sensor; empty: it may. The gates that a scene alone

@@ -76,6 +76,12 @@ class WebService : public web::ScanService {
   void OpenCheck(const web::Actor& actor, web::Done done) override;
   void SetCheckBaseline(const web::Actor& actor, const std::string& check_id,
                         web::Done done) override;
+  [[nodiscard]] web::SensorProfiles GetSensorProfiles() override;
+  [[nodiscard]] std::optional<std::string> SensorProfileFile(int version) override;
+  void ResetSensorProfile(const web::Actor& actor, const std::string& serial,
+                          web::Done done) override;
+  void RollBackSensorProfile(const web::Actor& actor, const std::string& serial, int version,
+                             web::Done done) override;
 
   [[nodiscard]] std::vector<web::Display> Displays() override;
   void AddDisplay(const web::Actor& actor, const web::Display& display, web::Done done) override;
@@ -117,6 +123,9 @@ class WebService : public web::ScanService {
   [[nodiscard]] Updates& updates() { return updates_; }
 
  private:
+  /// As Change(); once it is done the last scan's word against the profile is forgotten.
+  void ChangeProfile(const std::string& serial, web::Done done,
+                     std::function<std::string(Store&)> change);
   /// Runs `change` on the store's thread; what it returns is the id of what was made, what it
   /// throws becomes the answer.
   void Change(web::Done done, std::function<std::string(Store&)> change);

@@ -108,6 +108,7 @@ ProfileShelf::InUse ProfileShelf::Read(const std::string& serial) {
   const std::vector<Entry> entries = Entries(serial);
   if (entries.empty()) return in_use;
   const fs::path& file = entries.front().file;
+  in_use.version = entries.front().version;
   try {
     in_use.newest = ReadVersion(file, serial, entries.front().version);
     return in_use;
@@ -116,7 +117,7 @@ ProfileShelf::InUse ProfileShelf::Read(const std::string& serial) {
   }
   try {
     // First, so that no earlier version takes its place unnoticed at the next scan.
-    (void)Write(serial, "unreadable", std::nullopt);
+    in_use.version = Write(serial, "unreadable", std::nullopt);
     const fs::path aside =
         folder_ / kSetAside / fmt::format("{}-{}", FolderName(serial), file.filename().string());
     fs::create_directories(aside.parent_path());
@@ -165,8 +166,12 @@ int ProfileShelf::Write(const std::string& serial, const char* cause,
   return version;
 }
 
-int ProfileShelf::Add(const std::string& serial, const SensorProfile& profile) {
+int ProfileShelf::Add(const std::string& serial, const SensorProfile& profile,
+                      std::optional<int> begun_from) {
   const std::lock_guard lock(mutex_);
+  const std::vector<Entry> entries = Entries(serial);
+  if (begun_from && (entries.empty() ? 0 : entries.front().version) != *begun_from)
+    throw DataError("the profile was reset or taken back while the sweep went on");
   return Write(serial, "learned", profile);
 }
 

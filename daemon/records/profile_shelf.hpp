@@ -34,6 +34,7 @@ class ProfileShelf {
   /// What the unit's next scan begins from. The profile is named "SERIAL version N".
   struct InUse {
     std::optional<ProfileVersion> newest;  ///< None: the unit has no version at all.
+    int version = 0;                       ///< The newest after this call; 0: none.
     /// Set: the newest version could not be read and was moved to FOLDER/set-aside; the sentence
     /// says where it is. Scans go on without a profile.
     std::string fault;
@@ -44,8 +45,11 @@ class ProfileShelf {
   /// Newest first; those that cannot be read are left out.
   [[nodiscard]] std::vector<ProfileVersion> Versions(const std::string& serial) const;
 
-  /// Adds a version that a sweep has taught; gives its number. @throws IoError
-  int Add(const std::string& serial, const SensorProfile& profile);
+  /// Adds a version that a sweep has taught; gives its number.
+  /// @param begun_from  InUse::version when the sweep began; none: whatever it is.
+  /// @throws DataError if another one was made meanwhile: what was reset stays reset; IoError
+  int Add(const std::string& serial, const SensorProfile& profile,
+          std::optional<int> begun_from = std::nullopt);
   /// The unit begins again; earlier versions stay. Gives the number. @throws IoError
   int Reset(const std::string& serial);
   /// Adds an earlier version again, as the newest. Gives the number.

@@ -248,6 +248,37 @@ void FakeScanService::SetCheckBaseline(const Actor& actor, const std::string& ch
   Did(actor, "check.baseline", check_id, done);
 }
 
+std::optional<std::string> FakeScanService::SensorProfileFile(int version) {
+  for (const SensorProfileVersion& one : profiles.versions)
+    if (one.version == version && one.num_sweeps > 0) return "{}";
+  return std::nullopt;
+}
+
+void FakeScanService::ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) {
+  if (serial != profiles.serial)
+    return Finish(done, Refusal(ChangeResult::kConflict, "the sensor is not connected"));
+  SensorProfileVersion reset;
+  reset.version = profiles.versions.empty() ? 1 : profiles.versions.front().version + 1;
+  reset.made_at = WallClock::now();
+  reset.cause = "reset";
+  profiles.versions.insert(profiles.versions.begin(), reset);
+  Did(actor, "profile.reset", serial, done);
+}
+
+void FakeScanService::RollBackSensorProfile(const Actor& actor, const std::string& serial,
+                                            int version, Done done) {
+  if (serial != profiles.serial)
+    return Finish(done, Refusal(ChangeResult::kConflict, "the sensor is not connected"));
+  for (SensorProfileVersion one : profiles.versions) {
+    if (one.version != version || one.num_sweeps == 0) continue;
+    one.version = profiles.versions.front().version + 1;
+    one.cause = "rolled_back";
+    profiles.versions.insert(profiles.versions.begin(), one);
+    return Did(actor, "profile.roll_back", serial, done);
+  }
+  Finish(done, Refusal(ChangeResult::kNotFound, "there is no such version"));
+}
+
 void FakeScanService::EndScan() {
   if (is_check_) return EndCheck();
   Scan& scan = scans.back();

@@ -27,6 +27,7 @@ class FakeScanService : public web::ScanService {
   std::vector<web::Reference> references;
   std::vector<web::Scan> scans;  ///< Oldest first.
   web::CheckStatus checks;
+  web::SensorProfiles profiles;
   std::optional<web::CheckRecord>
       next_check;  ///< What the next check scan finds; nothing: it passes.
   /// Reads a map of a scan's folder; none: there are no maps.
@@ -140,6 +141,12 @@ class FakeScanService : public web::ScanService {
   void OpenCheck(const web::Actor& actor, web::Done done) override;
   void SetCheckBaseline(const web::Actor& actor, const std::string& check_id,
                         web::Done done) override;
+  web::SensorProfiles GetSensorProfiles() override { return profiles; }
+  std::optional<std::string> SensorProfileFile(int version) override;
+  void ResetSensorProfile(const web::Actor& actor, const std::string& serial,
+                          web::Done done) override;
+  void RollBackSensorProfile(const web::Actor& actor, const std::string& serial, int version,
+                             web::Done done) override;
   std::vector<web::Display> Displays() override { return displays; }
   void AddDisplay(const web::Actor& actor, const web::Display& display, web::Done done) override;
   void RemoveDisplay(const web::Actor& actor, const std::string& id, web::Done done) override;

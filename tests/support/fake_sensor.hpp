@@ -103,7 +103,7 @@ class FakeBus {
 class FakeSensor : public LiveSensor {
  public:
   FakeSensor(FakeBus& bus, const std::string& serial)
-      : bus_(bus), description_{.uri = serial, .serial = serial, .name = "fake"} {}
+      : bus_(bus), description_{.uri = "fake/" + serial, .serial = serial, .name = "fake"} {}
   [[nodiscard]] const StreamInfo& info() const override { return info_; }
   [[nodiscard]] const SensorDescription& description() const override { return description_; }
   [[nodiscard]] SensorStatistics statistics() const override { return {}; }
@@ -152,7 +152,7 @@ class FakeProvider : public SensorProvider {
     const std::lock_guard lock(bus_.mutex_);
     std::vector<SensorDescription> list;
     for (const std::string& serial : bus_.attached_)
-      list.push_back({.uri = serial, .serial = serial, .name = "fake"});
+      list.push_back({.uri = "fake/" + serial, .serial = serial, .name = "fake"});
     return list;
   }
   void SetListener(std::function<void()> changed) override {

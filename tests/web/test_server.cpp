@@ -279,6 +279,26 @@ std::vector<std::string> ReadCommands(std::string& rest) {
   return lines;
 }
 
+/// Of a sensor whose fourth sweep showed another focal length.
+web::SensorProfiles KnownSensor() {
+  const auto learned = [](int version, double focal) {
+    const int age_days = 30 - 7 * version;
+    return web::SensorProfileVersion{
+        .version = version,
+        .made_at = web::WallClock::now() - std::chrono::hours(24 * age_days),
+        .cause = "learned",
+        .num_sweeps = version,
+        .values = {{"focal_x_scale", focal},
+                   {"focal_y_scale", focal},
+                   {"depth_scale", 1.0123},
+                   {"depth_offset_m", -0.0042},
+                   {"color_readout_s", 0.0267}}};
+  };
+  return {.serial = "17110415",
+          .why_none = {},
+          .versions = {learned(4, 0.981), learned(3, 1.0046), learned(2, 1.0045)}};
+}
+
 int Serve(const fs::path& root) {
   FakeScanService service;
   Recorder recorder(root);
@@ -296,6 +316,7 @@ int Serve(const fs::path& root) {
   service.status.gantry_xy = {kT_iec_reference(1, 0), kT_iec_reference(1, 1)};
   service.status.is_room_known = true;
   service.sweep = std::chrono::milliseconds(1500);
+  service.profiles = KnownSensor();
   service.update = {true, "", "A", false, 0.0, {"plumb-0.2.0.raucb"}};
   web::HttpServerOptions options;
   options.password_memory_bytes = 1 << 20;

@@ -185,6 +185,10 @@ void Accounts::AddRoutes(Router& router) {
               bind(&Accounts::AcceptOutside)});
   router.Add({"POST", "/api/v1/update/restart", Permission::kUpdate, BodyKind::kJson,
               bind(&Accounts::RestartSystem)});
+  router.Add({"POST", "/api/v1/sensor-profile/reset", Permission::kSettings, BodyKind::kJson,
+              bind(&Accounts::ResetSensorProfile)});
+  router.Add({"POST", "/api/v1/sensor-profile/roll-back", Permission::kSettings, BodyKind::kJson,
+              bind(&Accounts::RollBackSensorProfile)});
   router.Add({"GET", "/api/v1/users", Permission::kUsers, BodyKind::kNone,
               [this](const Request&, const Respond& respond) {
                 Json users = Json::array();
@@ -404,32 +408,6 @@ void Accounts::ChangeOwnPassword(const Request& request, const Respond& respond)
               }));
         });
       });
-}
-
-void Accounts::AcceptOutside(const Request& request, const Respond& respond) {
-  Fields fields(request.body);
-  const std::string reason = fields.Text("reason", 3, 200);
-  std::string password = fields.Text("password", 1, kMaxPassword);
-  fields.Finish();
-  VerifyOwn(request, std::move(password), "the password is wrong", respond,
-            [this, reason, actor = request.actor(), scan = request.arguments.at(0),
-             respond](const User&) {
-              service_.AcceptScan(actor, scan, reason, WhileAlive([respond](const Change& change) {
-                                    respond(ChangeResponse(change));
-                                  }));
-            });
-}
-
-void Accounts::RestartSystem(const Request& request, const Respond& respond) {
-  Fields fields(request.body);
-  std::string password = fields.Text("password", 1, kMaxPassword);
-  fields.Finish();
-  VerifyOwn(request, std::move(password), "the password is wrong", respond,
-            [this, actor = request.actor(), respond](const User&) {
-              service_.RestartSystem(actor, WhileAlive([respond](const Change& change) {
-                                       respond(ChangeResponse(change));
-                                     }));
-            });
 }
 
 void Accounts::AddUser(const Request& request, const Respond& respond) {

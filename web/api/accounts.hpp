@@ -70,6 +70,11 @@ class Accounts : public SessionLookup {
   void ChangeOwnPassword(const Request& request, const Respond& respond);
   /// Accepts a result that is not in tolerance: with a reason and the person's own password.
   void AcceptOutside(const Request& request, const Respond& respond);
+  /// Calls `act` if the password is the person's own, and answers with what became of it.
+  void Signed(const Request& request, std::string password, const Respond& respond,
+              std::function<void(const Actor&, Done)> act);
+  void ResetSensorProfile(const Request& request, const Respond& respond);
+  void RollBackSensorProfile(const Request& request, const Respond& respond);
   /// Restarts the machine: with the person's own password.
   void RestartSystem(const Request& request, const Respond& respond);
   void AddUser(const Request& request, const Respond& respond);

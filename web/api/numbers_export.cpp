@@ -1,7 +1,8 @@
-// The numbers of a patient for other programs: CSV and JSON; and the reports as files.
+// What other programs read: the numbers of a patient as CSV and JSON, reports, sensor profiles.
 #include <fmt/format.h>
 
 #include <array>
+#include <charconv>
 
 #include "web/api/api.hpp"
 #include "web/api/json.hpp"
@@ -85,6 +86,24 @@ void Add(Router& router, ScanService& service, const char* pattern,
               }});
 }
 
+Json ProfilesJson(const SensorProfiles& profiles) {
+  Json json = {
+      {"serial", profiles.serial}, {"why_none", profiles.why_none}, {"versions", Json::array()}};
+  for (const SensorProfileVersion& one : profiles.versions)
+    json["versions"].push_back({{"version", one.version},
+                                {"made_at", TimeText(one.made_at)},
+                                {"cause", one.cause},
+                                {"num_sweeps", one.num_sweeps},
+                                {"values", one.values}});
+  return json;
+}
+
+int VersionIn(const std::string& text) {
+  int version = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), version);
+  return error == std::errc() && end == text.data() + text.size() ? version : 0;
+}
+
 }  // namespace
 
 void AddExportRoutes(Router& router, ScanService& service) {
@@ -122,6 +141,18 @@ void AddExportRoutes(Router& router, ScanService& service) {
           list.push_back(ToJson(scan, WallClock::now()));
         return File(Dump({{"patient", ToJson(*patient)}, {"scans", list}}), "application/json",
                     fmt::format("plumb_numbers_{}.json", patient->code));
+      });
+  Add(router, service, "/api/v1/sensor-profile", [](ScanService& from, const Request&) {
+    Response response;
+    response.body = Dump(ProfilesJson(from.GetSensorProfiles()));
+    return response;
+  });
+  Add(router, service, "/api/v1/sensor-profile/{version}/file",
+      [](ScanService& from, const Request& request) {
+        auto text = from.SensorProfileFile(VersionIn(request.arguments[0]));
+        if (!text) return ErrorResponse(404, "there is no such profile");
+        return File(std::move(*text), "application/json",
+                    fmt::format("plumb_sensor_profile_{}.json", request.arguments[0]));
       });
 }
 

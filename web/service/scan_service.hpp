@@ -164,6 +164,17 @@ class ScanService {
   /// From now on checks are compared with this one. kRefused for the person who took it.
   virtual void SetCheckBaseline(const Actor& actor, const std::string& check_id, Done done) = 0;
 
+  // --- what is known of the sensor unit
+  [[nodiscard]] virtual SensorProfiles GetSensorProfiles() = 0;  ///< (aside)
+  /// One version as `plumb calibrate` writes it; nothing where there is none (aside).
+  [[nodiscard]] virtual std::optional<std::string> SensorProfileFile(int version) = 0;
+  /// The unit begins again from its stated calibration. @param serial  Of the unit that the person
+  /// has seen; kConflict where another one is connected by now, and during a scan.
+  virtual void ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) = 0;
+  /// Takes an earlier version back, as the newest. kNotFound where it holds no profile.
+  virtual void RollBackSensorProfile(const Actor& actor, const std::string& serial, int version,
+                                     Done done) = 0;
+
   // --- screens in the room
   [[nodiscard]] virtual std::vector<Display> Displays() = 0;
   virtual void AddDisplay(const Actor& actor, const Display& display, Done done) = 0;

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -237,6 +238,22 @@ struct CheckStatus {
   std::vector<CheckRecord> checks;  ///< Newest first.
   std::optional<CheckBaseline> baseline;
   bool overdue = true;  ///< None passed today.
+};
+
+/// What was known of a sensor unit from then on.
+struct SensorProfileVersion {
+  int version = 0;
+  WallClock::time_point made_at;
+  std::string cause;   ///< "learned", "rolled_back", "reset" or "unreadable".
+  int num_sweeps = 0;  ///< That it was learned from; 0: from here on nothing was known.
+  std::map<std::string, double> values;  ///< As scene.json names them.
+};
+
+/// Of the connected sensor unit.
+struct SensorProfiles {
+  std::string serial;
+  std::string why_none;                        ///< Why no profile is kept; empty: one is.
+  std::vector<SensorProfileVersion> versions;  ///< Newest first; the first one is in use.
 };
 
 struct Status {

@@ -5,10 +5,13 @@
 #include <future>
 #include <thread>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/appliance/unit_profile.hpp"
 #include "daemon/appliance/web_service.hpp"
+#include "daemon/records/profile_shelf.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -315,6 +318,86 @@ TEST_F(ApplianceTest, ARollBackIsToldByStatusAndLightUntilItIsSeen) {
       appliance_->SetRolledBack({});
       EXPECT_EQ(appliance_->WebStatus().light, "ready");
     });
+  });
+}
+
+class ApplianceProfileTest : public ApplianceTest {
+ protected:
+  /// What the page's last request was answered.
+  web::Change Asked(const std::function<void(web::Done)>& ask) {
+    const auto answer = std::make_shared<std::promise<web::Change>>();
+    On([&] { ask([answer](const web::Change& change) { answer->set_value(change); }); });
+    return answer->get_future().get();
+  }
+  web::Change Reset(const std::string& serial) {
+    return Asked([&](web::Done done) { service_->ResetSensorProfile(erik_, serial, done); });
+  }
+  web::Change RollBack(int version) {
+    return Asked(
+        [&](web::Done done) { service_->RollBackSensorProfile(erik_, "A", version, done); });
+  }
+  /// The profile that a scan of now begins from: read as each scan reads it, from the same shelf.
+  [[nodiscard]] std::string NextScanBeginsFrom() const {
+    UnitProfile unit(appliance_->profiles(), "A", FakeBus::Info().intrinsics);
+    ReconstructorOptions options;
+    unit.Begin(options);
+    if (!options.profile) return "none";
+    return fmt::format("{}, {} sweeps", options.profile->name, options.profile->num_sweeps);
+  }
+
+  const web::Actor erik_{.user = "erik", .address = {}};
+};
+
+TEST_F(ApplianceProfileTest, WhatThePageAsksIsWhatTheNextScanBeginsFrom) {
+  SensorProfile known = ProfileOfAnyUnit(FakeBus::Info().intrinsics);
+  ProfileShelf shelf(folder_ / "state" / "sensor-profiles");
+  for (known.num_sweeps = 4; known.num_sweeps <= 5; ++known.num_sweeps) (void)shelf.Add("A", known);
+  Play([&] {
+    EXPECT_EQ(service_->GetSensorProfiles().why_none, "no sensor is attached");
+    EXPECT_EQ(Reset("A").result, web::ChangeResult::kConflict);
+    MakeReady();
+    const web::SensorProfiles shown = service_->GetSensorProfiles();
+    EXPECT_EQ(shown.serial, "A");
+    EXPECT_EQ(shown.why_none, "");
+    ASSERT_EQ(shown.versions.size(), 2U);
+    EXPECT_EQ(shown.versions[0].version, 2);
+    EXPECT_EQ(shown.versions[0].num_sweeps, 5);
+    EXPECT_EQ(shown.versions[0].cause, "learned");
+    EXPECT_EQ(NextScanBeginsFrom(), "A version 2, 5 sweeps");
+
+    EXPECT_EQ(Reset("B").result, web::ChangeResult::kConflict) << "another unit";
+    EXPECT_EQ(RollBack(7).result, web::ChangeResult::kNotFound);
+    EXPECT_EQ(NextScanBeginsFrom(), "A version 2, 5 sweeps") << "refused: nothing has changed";
+    EXPECT_EQ(Reset("A").result, web::ChangeResult::kDone);
+    EXPECT_EQ(NextScanBeginsFrom(), "none");
+    EXPECT_EQ(RollBack(1).result, web::ChangeResult::kDone);
+    EXPECT_EQ(NextScanBeginsFrom(), "A version 4, 4 sweeps");
+    EXPECT_FALSE(service_->SensorProfileFile(3)) << "the reset";
+    EXPECT_THAT(service_->SensorProfileFile(4).value_or(""), ::testing::HasSubstr("calibration"));
+  });
+}
+
+TEST_F(ApplianceProfileTest, NothingChangesUnderAScan) {
+  Play([&] {
+    MakeReady();
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort), ""); });
+    const web::Change answer = Reset("A");
+    EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
+    EXPECT_THAT(answer.message, ::testing::HasSubstr("wait for its result"));
+    EXPECT_TRUE(service_->GetSensorProfiles().versions.empty());
+    On([&] { EXPECT_EQ(appliance_->Cancel(), ""); });
+    EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
+    EXPECT_EQ(Reset("A").result, web::ChangeResult::kDone);
+    EXPECT_EQ(service_->GetSensorProfiles().versions.size(), 1U);
+  });
+}
+
+TEST_F(ApplianceProfileTest, SwitchedOffItSaysSo) {
+  parts_.config.appliance.sensor_profiles = false;
+  Play([&] {
+    MakeReady();
+    EXPECT_THAT(service_->GetSensorProfiles().why_none, ::testing::HasSubstr("switched off"));
+    EXPECT_EQ(Reset("A").result, web::ChangeResult::kConflict);
   });
 }
 

@@ -92,6 +92,7 @@ TEST_F(UnitProfileTest, ASweepBeyondTheGateIsNotJoinedAndReported) {
   beyond.Begin(options_);
   Sweep(options_, 0.001 + 0.00043);
   EXPECT_THAT(beyond.Drift(), HasSubstr("sensor A no longer measures as its profile says"));
+  EXPECT_THAT(beyond.Drift(), HasSubstr("on the settings page"));
   beyond.Teach();
   EXPECT_EQ(shelf_->Versions("A").size(), 3U) << "nothing was added";
   EXPECT_EQ(shelf_->Read("A").newest.value().profile.value().mean[kFocal], 0.001);
@@ -117,6 +118,16 @@ TEST_F(UnitProfileTest, AProfileOfAnotherCalibrationFileIsNotUsedAndANewOneIsBeg
   const SensorProfile now = shelf_->Read("A").newest.value().profile.value();
   EXPECT_EQ(now.stated, Stated());
   EXPECT_EQ(now.num_sweeps, 1);
+}
+
+TEST_F(UnitProfileTest, WhatWasResetDuringTheSweepStaysReset) {
+  (void)shelf_->Add("A", Profile(0.001));
+  UnitProfile unit = Of("A");
+  unit.Begin(options_);
+  Sweep(options_, 0.001);
+  (void)shelf_->Reset("A");
+  unit.Teach();
+  EXPECT_FALSE(shelf_->Read("A").newest.value().profile);
 }
 
 TEST_F(UnitProfileTest, ADamagedProfileIsDoneWithout) {

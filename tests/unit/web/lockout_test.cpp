@@ -130,6 +130,50 @@ TEST_F(LockoutTest, TheMachineIsRestartedForAnEngineerWithThePassword) {
   EXPECT_EQ(service_.num_restarts, 1);
 }
 
+TEST_F(LockoutTest, ASensorProfileIsSeenByAllAndChangedByAnEngineerWithThePassword) {
+  const auto version = [](int number, int sweeps) {
+    web::SensorProfileVersion one;
+    one.version = number;
+    one.cause = "learned";
+    one.num_sweeps = sweeps;
+    one.values = {{"depth_scale", 0.992}};
+    return one;
+  };
+  service_.profiles.serial = "S1";
+  service_.profiles.versions = {version(2, 2), version(1, 1)};
+  HttpClient engineer = LoggedIn("engineer");
+  const auto newest = [&] {
+    return LoggedIn("technician").Get("/api/v1/sensor-profile").json()["versions"][0];
+  };
+  EXPECT_EQ(newest()["num_sweeps"], 2);
+  EXPECT_EQ(newest()["values"]["depth_scale"], 0.992);
+  EXPECT_EQ(engineer.Get("/api/v1/sensor-profile/2/file").status, 200);
+  for (const char* none : {"3", "x", "-1", "99999999999999"})
+    EXPECT_EQ(engineer.Get(std::string("/api/v1/sensor-profile/") + none + "/file").status, 404);
+  const auto post = [&](HttpClient& client, const char* act, nlohmann::json body) {
+    return client.Post(std::string("/api/v1/sensor-profile/") + act, body).status;
+  };
+  EXPECT_EQ(post(engineer, "reset", {{"serial", "S1"}}), 400);
+  EXPECT_EQ(post(engineer, "reset", {{"serial", "S1"}, {"password", kWrong}}), 403);
+  HttpClient physicist = LoggedIn("physicist");
+  EXPECT_EQ(post(physicist, "reset", {{"serial", "S1"}, {"password", kPassword}}), 403);
+  EXPECT_EQ(post(engineer, "reset", {{"serial", "S2"}, {"password", kPassword}}), 409);
+  EXPECT_EQ(newest()["version"], 2);
+  EXPECT_EQ(post(engineer, "reset", {{"serial", "S1"}, {"password", kPassword}}), 200);
+  EXPECT_EQ(newest()["version"], 3);
+  EXPECT_EQ(newest()["num_sweeps"], 0);
+  const auto roll_back = [&](int wanted, const char* password) {
+    return post(engineer, "roll-back",
+                {{"serial", "S1"}, {"version", wanted}, {"password", password}});
+  };
+  EXPECT_EQ(roll_back(1, kWrong), 403);
+  EXPECT_EQ(roll_back(3, kPassword), 404) << "it holds no profile";
+  EXPECT_EQ(roll_back(0, kPassword), 400);
+  EXPECT_EQ(roll_back(1, kPassword), 200);
+  EXPECT_EQ(newest()["num_sweeps"], 1);
+  EXPECT_EQ(newest()["cause"], "rolled_back");
+}
+
 TEST_F(LockoutTest, ARollBackIsShownUntilAnEngineerHasSeenIt) {
   service_.status.rolled_back = service_.update.rolled_back = "version 2 was installed, but";
   HttpClient engineer = LoggedIn("engineer");

@@ -1,6 +1,7 @@
 import { get, live, may, postLong, put } from '../api.js';
 import { action, checkbox, clear, done, field, form, h, localTime, select } from '../dom.js';
 import { S } from '../strings.js';
+import { profileCard } from './sensor_profile.js';
 
 const kNumbers = {
   shift_tolerance_mm: [0.1, 50, 0.1],
@@ -66,5 +67,5 @@ export async function showSettings(place) {
     h('section', { class: 'card' }, form({ class: 'form columns' }, save, numbers,
       field(text.posture, posture), flags,
       editable && h('div', { class: 'row' }, h('button', { class: 'primary' }, S.save)))),
-    editable && backupCard());
+    profileCard(), editable && backupCard());
 }

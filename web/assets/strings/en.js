@@ -492,6 +492,8 @@ export const en = {
       'update.refuse': 'Update refused',
       'update.rolled_back': 'Went back to the system before',
       'update.seen': 'Roll-back seen',
+      'profile.reset': 'Sensor profile reset',
+      'profile.roll_back': 'Sensor profile taken back',
       'system.restart': 'Machine restarted',
       'system.restart_failed': 'Restart failed',
     },
@@ -511,6 +513,23 @@ export const en = {
     backupNow: 'Back up now', backupRunning: 'Backing up. This may take minutes…',
     backupDone: 'Backup made.', backupNone: 'No backup has been made yet.',
     backupLast: (when, who) => `Last backup: ${when}, by ${who}.`,
+  },
+  profile: {
+    title: 'Sensor profile',
+    hint: 'What good scans have taught of this sensor. The next scan begins from the newest '
+      + 'version.',
+    none: 'No profile yet: the next good scan makes one.', noneKept: 'No profile is kept here: ',
+    serial: 'Serial number', version: 'Version', made: 'Made', sweeps: 'Scans', cause: 'How',
+    causes: {
+      learned: 'learned', rolled_back: 'taken back', reset: 'reset', unreadable: 'was unreadable',
+    },
+    focal: 'Focal length', depthScale: 'Depth scale', depthOffset: 'Depth offset',
+    readout: 'Colour image read in', download: 'Download',
+    resetDone: 'The next scan begins without a profile.',
+    takenBack: 'The earlier version is in use.', which: 'What to do',
+    resetChoice: 'Begin again without a profile',
+    takeBackChoice: (version) => `Take version ${version} back`,
+    submit: 'Change the profile',
   },
   update: {
     title: 'Update', installed: 'Installed version', slot: 'System',

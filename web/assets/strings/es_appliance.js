@@ -61,6 +61,11 @@ export const kWords = {
   'a scan is running already: end or cancel it first':
     'ya hay un escaneo en curso: termínelo o descártelo primero',
   'your role may not do this': 'su función no permite hacer esto',
+  'no sensor is attached': 'no hay ningún sensor conectado',
+  'profiles are switched off in the configuration':
+    'los perfiles están desactivados en la configuración',
+  'it has no serial by which it would be known again':
+    'el sensor no tiene un número de serie por el que se le reconozca',
   'this scan is accepted already': 'este escaneo ya está aceptado',
   'this result is older than 2 minutes: scan again, then accept':
     'este resultado tiene más de 2 minutos: escanee de nuevo y acepte después',
@@ -141,6 +146,8 @@ export const kPatterns = [
     'el marcador $1 se movió $2 mm desde la referencia; no se usa'],
   ['^marker (\\d+)$', 'marcador $1'],
   ['^missing: (.+)$', 'faltan: $1'],
+  ['^the sensor (\\S+) is not connected: look at this page again$',
+    'el sensor $1 no está conectado: vuelva a abrir esta página'],
   ['^the session of (\\S+) is open \\(opened by (.+)\\): close it first$',
     'la sesión de $1 está abierta (la abrió $2): ciérrela primero'],
   // Why there is no answer.

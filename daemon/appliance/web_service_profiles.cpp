@@ -1,0 +1,53 @@
+// What the page asks of the sensor's profile.
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/appliance/web_service.hpp"
+
+namespace plumb {
+
+using web::ChangeResult;
+
+web::SensorProfiles WebService::GetSensorProfiles() { return appliance_.SensorProfiles(); }
+std::optional<std::string> WebService::SensorProfileFile(int version) {
+  return appliance_.SensorProfileFile(version);
+}
+
+void WebService::ChangeProfile(const std::string& serial, web::Done done,
+                               std::function<std::string(Store&)> change) {
+  if (const std::string why = appliance_.WhyNotChangeProfile(serial); !why.empty())
+    return done({.result = ChangeResult::kConflict, .message = why, .id = {}, .file = {}});
+  Change(
+      [this, done, alive = alive_](const web::Change& answer) {
+        if (*alive && answer.result == ChangeResult::kDone) appliance_.ForgetDrift();
+        done(answer);
+      },
+      std::move(change));
+}
+
+void WebService::ResetSensorProfile(const web::Actor& actor, const std::string& serial,
+                                    web::Done done) {
+  ChangeProfile(serial, std::move(done), [=, shelf = appliance_.profiles()](Store& store) {
+    const int version = shelf->Reset(serial);
+    store.Log(actor, "profile.reset", serial, fmt::format("version {}", version));
+    return std::string();
+  });
+}
+
+void WebService::RollBackSensorProfile(const web::Actor& actor, const std::string& serial,
+                                       int version, web::Done done) {
+  ChangeProfile(serial, std::move(done), [=, shelf = appliance_.profiles()](Store& store) {
+    try {
+      const int made = shelf->RollBack(serial, version);
+      store.Log(actor, "profile.roll_back", serial,
+                fmt::format("to version {}, which is version {} now", version, made));
+    } catch (const DataError& error) {
+      throw StoreRefusal(ChangeResult::kNotFound, error.what());
+    }
+    return std::string();
+  });
+}
+
+}  // namespace plumb

@@ -1,0 +1,60 @@
+// What a person signs with the own password, although logged in.
+#include <utility>
+
+#include "web/api/accounts.hpp"
+#include "web/api/json.hpp"
+#include "web/security/password_rules.hpp"
+
+namespace plumb::web {
+
+void Accounts::AcceptOutside(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  const std::string reason = fields.Text("reason", 3, 200);
+  std::string password = fields.Text("password", 1, kMaxPassword);
+  fields.Finish();
+  Signed(request, std::move(password), respond,
+         [this, reason, scan = request.arguments.at(0)](const Actor& actor, Done done) {
+           service_.AcceptScan(actor, scan, reason, std::move(done));
+         });
+}
+
+void Accounts::Signed(const Request& request, std::string password, const Respond& respond,
+                      std::function<void(const Actor&, Done)> act) {
+  VerifyOwn(request, std::move(password), "the password is wrong", respond,
+            [this, act = std::move(act), actor = request.actor(), respond](const User&) {
+              act(actor,
+                  WhileAlive([respond](const Change& change) { respond(ChangeResponse(change)); }));
+            });
+}
+
+void Accounts::RestartSystem(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  std::string password = fields.Text("password", 1, kMaxPassword);
+  fields.Finish();
+  Signed(request, std::move(password), respond,
+         [this](const Actor& actor, Done done) { service_.RestartSystem(actor, std::move(done)); });
+}
+
+void Accounts::ResetSensorProfile(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  const std::string serial = fields.Text("serial", 1, 256);
+  std::string password = fields.Text("password", 1, kMaxPassword);
+  fields.Finish();
+  Signed(request, std::move(password), respond, [this, serial](const Actor& actor, Done done) {
+    service_.ResetSensorProfile(actor, serial, std::move(done));
+  });
+}
+
+void Accounts::RollBackSensorProfile(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  const std::string serial = fields.Text("serial", 1, 256);
+  const int version = fields.Integer("version", 1, 999'999'999);
+  std::string password = fields.Text("password", 1, kMaxPassword);
+  fields.Finish();
+  Signed(request, std::move(password), respond,
+         [this, serial, version](const Actor& actor, Done done) {
+           service_.RollBackSensorProfile(actor, serial, version, std::move(done));
+         });
+}
+
+}  // namespace plumb::web
