@@ -339,6 +339,10 @@ void WebService::AcceptScan(const web::Actor& actor, const std::string& id,
   // A scan of an earlier run of the appliance is older than any that can be acted on.
   if (scan->result && appliance_.AgeOf(id).value_or(web::kResultValid_s + 1) > web::kResultValid_s)
     return done(AnswerOf("this result is older than 2 minutes: scan again, then accept"));
+  // Somebody else may lie on the couch by now.
+  const auto open = appliance_.WebStatus().session;
+  if (!scan->patient_id.empty() && (!open || open->patient_id != scan->patient_id))
+    return done(AnswerOf("the session of this patient is not open: a result is accepted in it"));
   Change(std::move(done),
          [=](Store& store) { return store.AcceptScan(actor, id, reason), std::string(); });
 }

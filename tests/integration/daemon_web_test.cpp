@@ -149,11 +149,20 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
                       {{"reason", "known swelling"}, {"password", "wrong password"}})
                 .status,
             403);
-  EXPECT_EQ(technician
-                .Post("/api/v1/scans/" + fraction + "/accept-outside",
-                      {{"reason", "known swelling"}, {"password", kPassword}})
-                .status,
-            200);
+  const auto accept = [&] {
+    return technician.Post("/api/v1/scans/" + fraction + "/accept-outside",
+                           {{"reason", "known swelling"}, {"password", kPassword}});
+  };
+  EXPECT_EQ(technician.Post("/api/v1/treatment/close", {{"session_id", ""}}).status, 200);
+  const HttpAnswer closed = accept();
+  EXPECT_EQ(closed.status, 409);
+  EXPECT_THAT(closed.body, HasSubstr("the session of this patient is not open"));
+  ASSERT_EQ(
+      technician
+          .Post("/api/v1/patients/" + patient + "/open", {{"purpose", "fraction"}, {"reason", ""}})
+          .status,
+      200);
+  EXPECT_EQ(accept().status, 200);
   const json accepted = technician.Get("/api/v1/scans/" + fraction).json();
   EXPECT_EQ(accepted["accepted_reason"], "known swelling");
   EXPECT_EQ(accepted["fraction"], 1);
@@ -163,7 +172,9 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
   EXPECT_EQ(technician.Get("/api/v1/scans/" + fraction + "/maps/deviation").status, 200);
   EXPECT_EQ(
       technician.Post("/api/v1/treatment/close", {{"session_id", accepted["session_id"]}}).status,
-      200);
+      409)
+      << "another session is open by now";
+  EXPECT_EQ(technician.Post("/api/v1/treatment/close", {{"session_id", ""}}).status, 200);
   EXPECT_EQ(technician.Get("/api/v1/status").json()["session"], nullptr);
 
   std::vector<std::string> actions;

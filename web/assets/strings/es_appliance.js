@@ -69,6 +69,8 @@ export const kWords = {
   'this scan is accepted already': 'este escaneo ya está aceptado',
   'this result is older than 2 minutes: scan again, then accept':
     'este resultado tiene más de 2 minutos: escanee de nuevo y acepte después',
+  'the session of this patient is not open: a result is accepted in it':
+    'la sesión de este paciente no está abierta: los resultados se aceptan en ella',
   'patient left': 'izquierda del paciente', 'patient right': 'derecha del paciente',
   head: 'cabeza', feet: 'pies', high: 'demasiado alto', low: 'demasiado bajo',
   'head and neck': 'cabeza y cuello',
