@@ -42,6 +42,9 @@ TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
   TrackerOptions tracking;
   tracking.use_markers = options.use_markers;
   tracking.use_keypoints = options.use_keypoints;
+  tracking.keyframe_distance *= options.keyframe_spacing;
+  tracking.keyframe_angle_rad *= options.keyframe_spacing;
+  tracking.min_tracked_share = 1.0 - options.keyframe_spacing * (1.0 - tracking.min_tracked_share);
   return tracking;
 }
 

@@ -23,6 +23,9 @@ struct ReconstructorOptions {
   bool use_tone_curve = true;   ///< Find the camera's tone curve and measure the markers under it.
   bool use_depth_field = true;  ///< Find the depth image's distortion over the image.
   bool use_dense_depth = true;  ///< Register overlapping depth images.
+  /// Of the usual motion between keyframes, 0.5 to 2. Figures of accuracy that hold at one spacing
+  /// only are luck.
+  double keyframe_spacing = 1.0;
   /// What is known of the sensor unit; without it the sweep begins from the stated calibration.
   std::optional<SensorProfile> profile;
   /// Called by Finish() with the profile that this sweep makes of `profile`, unless the sweep's own

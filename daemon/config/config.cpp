@@ -68,6 +68,9 @@ void ReadReconstruct(Section section, ReconstructorOptions& options) {
   section.Take("use_tone_curve", options.use_tone_curve, "true or false", kAny);
   section.Take("use_depth_field", options.use_depth_field, "true or false", kAny);
   section.Take("use_dense_depth", options.use_dense_depth, "true or false", kAny);
+  section.Take("keyframe_spacing", options.keyframe_spacing,
+               "a number from 0.5 to 2, of the usual spacing",
+               [](double v) { return v >= 0.5 && v <= 2; });
   section.Take("num_icp_iterations", options.num_icp_iterations, "a whole number from 1 to 1000",
                [](int n) { return n >= 1 && n <= 1000; });
   section.Take("seed", options.seed, "a whole number, 0 or more", kAny);

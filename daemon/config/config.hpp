@@ -110,7 +110,8 @@ enum class ConfigUse { kCommandLine, kAppliance };
 ///
 ///     [markers]      dictionary, length_m, reference
 ///     [reconstruct]  preset, keep_color, use_markers, use_keypoints, use_row_motion,
-///                    use_tone_curve, use_depth_field, use_dense_depth, num_icp_iterations, seed
+///                    use_tone_curve, use_depth_field, use_dense_depth, keyframe_spacing,
+///                    num_icp_iterations, seed
 ///     [compare]      preset, region, isocentre_m = [x, y, z], marker_kind = "room"|"couch",
 ///                    posture = "HFS"|"HFP"|"FFS"|"FFP",
 ///                    shift_tolerance_mm, rotation_tolerance_deg, min_shared_markers,

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -44,6 +45,7 @@ preset = "paper"
 keep_color = false
 use_markers = false
 use_keypoints = false
+keyframe_spacing = 1.3
 num_icp_iterations = 50
 seed = 9
 [compare]
@@ -72,6 +74,7 @@ T_iec_reference = [[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]
   EXPECT_FALSE(config.reconstruct.keep_color);
   EXPECT_FALSE(config.reconstruct.use_markers);
   EXPECT_FALSE(config.reconstruct.use_keypoints);
+  EXPECT_DOUBLE_EQ(config.reconstruct.keyframe_spacing, 1.3);
   EXPECT_EQ(config.reconstruct.num_icp_iterations, 50);
   EXPECT_EQ(config.reconstruct.seed, 9U);
   EXPECT_EQ(config.compare.preset, Preset::kPaper);
@@ -92,6 +95,14 @@ T_iec_reference = [[0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]
       (*config.compare.T_iec_reference * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(0.1, 1.2, 0.3))
           .norm(),
       0, 1e-12);
+}
+
+TEST(ConfigTest, KeyframesAreHalfToTwiceAsFarApart) {
+  for (const char* accepted : {"0.5", "2"})
+    EXPECT_EQ(ErrorOf(fmt::format("[reconstruct]\nkeyframe_spacing = {}\n", accepted)), "no error");
+  for (const char* refused : {"0.499", "2.001", "nan"})
+    EXPECT_THAT(ErrorOf(fmt::format("[reconstruct]\nkeyframe_spacing = {}\n", refused)),
+                AllOf(HasSubstr("reconstruct.keyframe_spacing"), HasSubstr("from 0.5 to 2")));
 }
 
 TEST(ConfigTest, NamesTheLineOfAnUnknownKey) {

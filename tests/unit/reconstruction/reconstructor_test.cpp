@@ -108,6 +108,17 @@ TEST_F(ReconstructorTest, WithoutMarkersTheFirstKeyframeIsTheFrame) {
   EXPECT_THAT(scene.warnings.back(), HasSubstr("no marker was seen"));
 }
 
+TEST_F(ReconstructorTest, KeyframesAreAsFarApartAsAskedFor) {
+  ReconstructorOptions options;
+  std::vector<std::size_t> num_keyframes;
+  for (const double spacing : {0.5, 1.0, 2.0}) {
+    options.keyframe_spacing = spacing;
+    num_keyframes.push_back(Reconstruct(options).keyframes.size());
+  }
+  EXPECT_GT(num_keyframes[0], num_keyframes[1]);
+  EXPECT_GT(num_keyframes[1], num_keyframes[2]);
+}
+
 TEST_F(ReconstructorTest, PaperPresetMakesItsScene) {
   ReconstructorOptions options;
   options.preset = Preset::kPaper;
