@@ -24,7 +24,7 @@ struct JointRegistrationOptions {
   double min_overlap = 0.2;  ///< Share of a keyframe's cells that fall into the other.
   /// Of the dense terms against their noise model: what the model leaves out is shared by
   /// neighbouring cells and views.
-  double dense_weight = 0.2;
+  double dense_weight = 0.1;
   /// Pixels at 640 columns. Above the noise of one sighting: a track's error is common to its
   /// views.
   double keypoint_sigma_px = 0.4;

@@ -29,9 +29,7 @@ using CalibrationCamera = Eigen::Matrix<double, kCalibrationSize, kCamera>;
 using CalibrationPoint = Eigen::Matrix<double, kCalibrationSize, 3>;
 
 constexpr Eigen::Index kLargestDenseSystem =
-    1200;  // Unknowns; beyond, a sparse factorisation is faster.
-constexpr double kFunctionTolerance =
-    1e-5;                                // Relative decrease that is not worth another iteration.
+    1200;                                // Unknowns; beyond, a sparse factorisation is faster.
 constexpr double kLargestDamping = 1e8;  // Steps so short that improve nothing: at the minimum.
 
 // A keypoint's observation and what the last linearisation made of it: rows pixel x, pixel y,
@@ -149,7 +147,7 @@ class Bundle {
         damping *= 10.0;
         continue;
       }
-      const bool settled = cost - next_cost < kFunctionTolerance * std::abs(cost);
+      const bool settled = cost - next_cost < options_.function_tolerance * std::abs(cost);
       state = std::move(next);
       cost = next_cost;
       damping = std::max(1e-9, 0.2 * damping);

@@ -35,7 +35,8 @@ struct BundleOptions {
   CalibrationPrior prior = PriorOfAnyUnit();  ///< Of the calibration.
   bool find_information = false;              ///< Fill BundleSummary::information.
   int max_iterations = 8;
-  double keypoint_sigma_px = 0.6;  ///< At 640 columns.
+  double function_tolerance = 1e-5;  ///< Relative decrease that is not worth another iteration.
+  double keypoint_sigma_px = 0.6;    ///< At 640 columns.
   double keypoint_depth_sigmas =
       1.5;  ///< Standard deviation of a keypoint's depth, in those of the noise model.
   double min_corner_sigma_px = 0.05;

@@ -1,0 +1,70 @@
+// What overlapping depth images and markers' faces say of the poses and of the sensor's
+// calibration: the dense part of RegisterJointly().
+#pragma once
+
+#include <stop_token>
+#include <vector>
+
+#include "algo/reconstruction/joint_registration.hpp"
+#include "algo/sensor_model/depth_field.hpp"
+
+namespace plumb::dense {
+
+/// Where the cells of every keyframe lie in the depth model.
+struct Cells {
+  std::vector<Eigen::Vector2f> centred;  ///< Centred image coordinates, row by row.
+  std::vector<FieldRow> products;
+};
+
+/// The cameras under one calibration.
+struct Sensor {
+  Intrinsics stated;
+  Intrinsics corrected;  ///< Of the colour camera.
+  Intrinsics depth;      ///< The same with the depth image's shift.
+  double scale = 1;      ///< Pixels here for one pixel at 640 columns.
+};
+
+/// A keyframe as this round's calibration sees it.
+struct View {
+  const MapKeyframe* keyframe = nullptr;
+  Pose T_world_depth;
+  Pose T_color_depth;
+  std::vector<Eigen::Vector3f> points;  ///< Corrected, depth camera frame; z 0 where nothing.
+  const Cells* cells = nullptr;
+  int width = 0;
+  int height = 0;
+};
+
+struct KeyframePair {
+  int a = 0;  ///< Whose cells are projected.
+  int b = 0;  ///< Into whose view.
+  double overlap = 0;
+};
+
+Cells MakeCells(const Intrinsics& stated, const TrackingMap& map);
+
+Sensor MakeSensor(const Intrinsics& stated, const CalibrationModel& calibration);
+
+/// @param cells, map  Must outlive the views.
+std::vector<View> MakeViews(const Sensor& sensor, const CalibrationModel& calibration,
+                            const Cells& cells, const TrackingMap& map);
+
+/// Pairs of views that overlap enough, at most JointRegistrationOptions::max_pairs for each view.
+/// @throws Interrupted on a stop request
+std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistrationOptions& options,
+                                    const std::vector<View>& views, const std::stop_token& stop);
+
+/// Point-to-plane residuals of each pair, and of the depth on each marker's face, linearised.
+/// @param gate_m  Residuals beyond are no correspondences.
+/// @throws Interrupted on a stop request
+std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
+                                     const TrackingMap& map, const std::vector<View>& views,
+                                     const std::vector<KeyframePair>& pairs, double gate_m,
+                                     const std::stop_token& stop);
+
+/// Median absolute point-to-plane distance of cells that MakeTerms() never uses, metres; 0 without
+/// any.
+double Consistency(const Sensor& sensor, const std::vector<View>& views,
+                   const std::vector<KeyframePair>& pairs, double gate_m);
+
+}  // namespace plumb::dense
