@@ -252,12 +252,24 @@ ReportFacts IdentityOf(const web::Scan& scan, const std::optional<web::Patient>&
   return facts;
 }
 
+/// What the scan was compared with; of a scan for a reference, the reference that was made of it,
+/// with its plan and who approved it.
+std::optional<web::Reference> ReferenceFor(Store& store, const web::Scan& scan) {
+  if (!scan.reference_id.empty() || scan.purpose != web::ScanPurpose::kReference)
+    return store.FindReference(scan.reference_id);
+  const std::vector<web::Reference> references = store.References(scan.patient_id);
+  const auto found =
+      std::find_if(references.begin(), references.end(),
+                   [&](const web::Reference& one) { return one.scan_id == scan.id; });
+  return found == references.end() ? std::nullopt : std::optional(*found);
+}
+
 }  // namespace
 
 ScanReport DescribeScan(Store& store, const web::Scan& scan, Language language) {
   const ReportWords& words = WordsOf(language);
   const std::optional<web::Patient> patient = store.FindPatient(scan.patient_id);
-  const std::optional<web::Reference> reference = store.FindReference(scan.reference_id);
+  const std::optional<web::Reference> reference = ReferenceFor(store, scan);
   const Json scene = JsonIn(scan.folder / "scene/scene.json");
   const Json result = JsonIn(scan.folder / "result/result.json");
   const web::Tolerance tolerance = reference ? reference->plan.tolerance : web::Tolerance{};

@@ -20,7 +20,7 @@ rmSync(folder, { recursive: true });
 
 const failures = [];
 const kSame = new Set(['product', 'none', 'codeHint', 'scaleBar', 'title', 'sensor', 'gantry',
-  'vertical', 'longitudinal', 'lateral', 'plan']);
+  'anterior', 'posterior', 'vertical', 'longitudinal', 'lateral', 'plan']);
 const sample = (f) => f(...Array.from({ length: f.length }, () => 7));
 function compare(a, b, path) {
   for (const key of new Set([...Object.keys(a), ...Object.keys(b)])) {

@@ -1,5 +1,5 @@
 // A run through the page in a real browser: page_test.mjs NODE_MODULES SERVER OUT_FOLDER CHROMIUM
-import { readFileSync } from 'node:fs';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { Harness } from './harness.mjs';
 
 const [modules, server, folder, chromium] = process.argv.slice(2);
@@ -225,10 +225,68 @@ await h.step('the map reads millimetres by mouse and keyboard', async () => {
 await h.step('the surface opens in 3-D', async () => {
   await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
   await anna.locator('canvas.mesh[data-ready=yes]').waitFor({ timeout: 60000 });
+  const mesh = anna.locator('canvas.mesh');
+  // What is drawn after the next frame: its bytes, and how much of it is not the ground.
+  const drawn = () => mesh.evaluate(async (canvas) => {
+    for (let i = 0; i < 3; ++i) await new Promise((ready) => { requestAnimationFrame(ready); });
+    const copy = document.createElement('canvas');
+    [copy.width, copy.height] = [canvas.width, canvas.height];
+    const context = copy.getContext('2d');
+    context.drawImage(canvas, 0, 0);
+    const { data } = context.getImageData(0, 0, copy.width, copy.height);
+    let bright = 0;
+    let corner = 0;
+    for (let i = 0; i < data.length; i += 4) {
+      if (data[i] + data[i + 1] + data[i + 2] < 90) continue;
+      ++bright;
+      const [x, y] = [(i / 4) % copy.width, Math.floor(i / 4 / copy.width)];
+      if (x > copy.width - 0.2 * copy.height && y > 0.8 * copy.height) ++corner;
+    }
+    return { bytes: canvas.toDataURL('image/png'), bright, corner: corner / (0.04 * copy.height ** 2) };
+  });
+  const keep = (name, bytes) => writeFileSync(h.file(`${name}.png`), Buffer.from(bytes.split(',')[1], 'base64'));
+  const seen = new Map();
+  for (const name of ['Anterior', 'Left', 'Right', 'Head', 'Feet', 'Reset']) {
+    const button = anna.locator('.mesh-place').getByRole('button', { name, exact: true });
+    await button.focus();
+    await anna.keyboard.press('Enter');
+    const { bytes, corner } = await drawn();
+    equal(seen.get(bytes), undefined, `${name} looks like another view`);
+    check(corner > 0.15, `${name}: the cube is in the corner (${corner.toFixed(2)})`);
+    seen.set(bytes, name);
+    keep(`mesh-${name.toLowerCase()}`, bytes);
+  }
+  // The cut takes away, the more the further it goes; without it all is there again.
+  const whole = await drawn();
+  await anna.getByLabel('Cut', { exact: true }).selectOption({ label: 'lengthwise' });
+  const where = anna.getByLabel('Place of the cut');
+  const half = await drawn();
+  check(half.bright < 0.9 * whole.bright, `the cut leaves ${half.bright} of ${whole.bright}`);
+  keep('mesh-cut', half.bytes);
+  await where.focus();
+  for (let i = 0; i < 12; ++i) await anna.keyboard.press('ArrowLeft');
+  const less = await drawn();
+  check(less.bright < half.bright, `further, ${less.bright} of ${half.bright}`);
+  await anna.getByLabel('Cut', { exact: true }).selectOption({ label: 'none' });
+  equal((await drawn()).bytes, whole.bytes, 'and all of it again');
   await anna.getByLabel('Show the reference').check();
-  await anna.locator('canvas.mesh').press('ArrowLeft');
   await anna.locator('canvas.mesh[data-ghost=yes]').waitFor({ timeout: 60000 });
-  await anna.locator('canvas.mesh').screenshot({ path: h.file('mesh.png') });
+  const both = await drawn();
+  check(both.bytes !== whole.bytes, 'the reference is seen');
+  await mesh.press('ArrowLeft');
+  check((await drawn()).bytes !== both.bytes, 'the keys turn it');
+  await mesh.press('ArrowRight');
+  const share = anna.getByLabel('Reference to current');
+  await share.focus();
+  for (let i = 0; i < 20; ++i) await anna.keyboard.press('ArrowRight');
+  const current = await drawn();
+  check(current.bytes !== both.bytes, 'the slider goes to the current surface');
+  equal((await drawn()).bytes, current.bytes, 'drawn again, nothing flickers');
+  for (let i = 0; i < 10; ++i) await anna.keyboard.press('ArrowLeft');
+  keep('mesh', (await drawn()).bytes);
+  const [picture] = await Promise.all([anna.waitForEvent('download'), anna.getByRole('button', { name: 'Save picture' }).click()]);
+  check(/_3d\.png$/.test(picture.suggestedFilename()), picture.suggestedFilename());
+  await h.look(anna, 'result-3d');
 });
 
 await h.step('a second page follows the same scan', async () => {

@@ -118,7 +118,8 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
   equal(await room.locator('.number').count(), 6, 'six numbers');
   await room.locator('.room-map canvas').waitFor();
   // Patient and uncertainty are read from 3 m: digits of 1 cm at least, and nothing below the edge.
-  for (const [place, least] of [['.room-code', 2], ['.number .value', 2], ['.number .half', 1]]) {
+  for (const [place, least] of [['.room-code', 2], ['.number .value', 2], ['.number .half', 1],
+    ['.number .limit', 0.9]]) {
     const size = await room.locator(place).first().evaluate((element) => parseFloat(getComputedStyle(element).fontSize));
     const cm = size * 0.73 * 88.5 / 1920;
     check(cm >= least, `${place} is ${cm.toFixed(1)} cm high`);
@@ -220,6 +221,11 @@ await h.step('fraction numbers count sessions, not scans', async () => {
   await anna.getByText('No session open').first().waitFor();
   await openOnPage(anna, 'P-0042');
   await anna.locator('.who-line', { hasText: 'Fraction 2' }).waitFor();
+  // The next thing to press is the scan, not another session.
+  await anna.goto(`${h.url}#/patient/${patient}`);
+  await anna.locator('a.primary', { hasText: 'Go to scan' }).waitFor();
+  equal(await anna.locator('.primary.start-session').count(), 0, 'no second session comes first');
+  await anna.goto(`${h.url}#/scan`);
 });
 
 await h.step('a change from elsewhere is an alert to acknowledge', async () => {
@@ -256,6 +262,7 @@ await h.step('without a session the button makes an unassigned scan that says so
   const { session } = await state();
   await ok(anna, 'treatment/close', 'POST', { session_id: session.id });
   await room.locator('.room-word', { hasText: 'NO SESSION' }).waitFor();
+  equal(await room.locator('.room').getByText('NO SESSION').count(), 1, 'it is said once');
   await h.look(room, 'room-no-session', { fullPage: false });
   await anna.goto(`${h.url}#/scan`);
   await press();

@@ -3,6 +3,7 @@ import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { PLYLoader } from 'three/examples/jsm/loaders/PLYLoader.js';
 import { cellAt, errorIndex, errorTable, kOutside } from './maps.js';
+import { orientationCube } from './mesh_cube.js';
 
 /// Colours each vertex by the error map; T maps the mesh's frame to the map's.
 /// @param region  NaN outside the region of interest: dimmed there, as the map is.
@@ -58,7 +59,7 @@ function marksAround(compass, words, box, radius) {
     const reach = Math.min(Math.abs(x) > 0.3 ? half.x / Math.abs(x) : Infinity,
       Math.abs(y) > 0.3 ? half.y / Math.abs(y) : Infinity);
     // The gantry stands behind the head or the feet.
-    const away = reach + (name === 'gantry' ? 0.36 : 0.16) * radius;
+    const away = reach + (name === 'gantry' ? 0.62 : 0.16) * radius;
     const sprite = label(words[name], 0.13 * radius);
     sprite.position.set(centre.x + x * away, centre.y + y * away, box.min.z + half.z);
     group.add(sprite);
@@ -86,13 +87,14 @@ function boxOfInterest(geometry, grid, region, T) {
 
 /// Draws into `canvas`. Throws where there is no WebGL.
 /// @param words  Of the compass's marks.
-/// Gives setGhost(url, share), setShare(share), look(name), picture(), stop().
+/// Gives setGhost(url, share), setShare(share), look(name), cut(way, share), picture(), stop().
 export async function openMesh(canvas, {
   url, grid, deviation, region, T, tolerance_m, compass, words,
 }) {
   const renderer = new THREE.WebGLRenderer({
     canvas, antialias: true, logarithmicDepthBuffer: true, preserveDrawingBuffer: true,
   });
+  renderer.localClippingEnabled = true;
   const scene = new THREE.Scene();
   scene.background = new THREE.Color(kGround);
   const camera = new THREE.PerspectiveCamera(40, 1, 0.05, 10);
@@ -110,6 +112,7 @@ export async function openMesh(canvas, {
   const box = boxOfInterest(geometry, grid, region, T);
   const { center, radius } = box.getBoundingSphere(new THREE.Sphere());
   scene.add(new THREE.Mesh(geometry, material), marksAround(compass, words, box, radius));
+  const cube = orientationCube(compass, words);
   const controls = new OrbitControls(camera, canvas);
   controls.enableDamping = false;
 
@@ -123,6 +126,7 @@ export async function openMesh(canvas, {
     camera.aspect = clientWidth / clientHeight;
     camera.updateProjectionMatrix();
     renderer.render(scene, camera);
+    cube.draw(renderer, camera, controls.target);
   };
   const request = () => {
     if (due) return;
@@ -179,13 +183,37 @@ export async function openMesh(canvas, {
     material.needsUpdate = true;
     request();
   };
+  /// Takes away what lies beyond a plane: above it ("height"), or toward the first mark ("along")
+  /// or to the right of that ("across"). `share` of the box stays; nothing is cut without a way.
+  const cut = (way, share) => {
+    const [ux, uy] = Object.values(compass?.ways ?? {})[0] ?? [0, 1];
+    const normal = { height: [0, 0, -1], along: [-ux, -uy, 0], across: [-uy, ux, 0] }[way];
+    let planes = null;
+    if (normal) {
+      const plane = new THREE.Plane(new THREE.Vector3(...normal));
+      const ends = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => plane.normal.dot(new THREE.Vector3(
+        i & 1 ? box.max.x : box.min.x, i & 2 ? box.max.y : box.min.y,
+        i & 4 ? box.max.z : box.min.z)));
+      const [least, most] = [Math.min(...ends), Math.max(...ends)];
+      plane.constant = -(most + share * (least - most));
+      planes = [plane];
+    }
+    for (const one of [material, ghost?.material]) {
+      if (!one) continue;
+      one.clippingPlanes = planes;
+      one.needsUpdate = true;
+    }
+    request();
+  };
   return {
     look,
     setShare,
+    cut,
     async setGhost(ghostUrl, share) {
       if (!ghost && ghostUrl) {
         ghost = new THREE.Mesh(await loader.loadAsync(ghostUrl), new THREE.MeshStandardMaterial({
           color: 0x6ea8ff, alphaHash: true, side: THREE.DoubleSide,
+          clippingPlanes: material.clippingPlanes,
         }));
         if (T) ghost.applyMatrix4(new THREE.Matrix4().set(...T.flat()).invert());
         scene.add(ghost);
@@ -205,6 +233,7 @@ export async function openMesh(canvas, {
     stop() {
       resize.disconnect();
       controls.dispose();
+      cube.dispose();
       geometry.dispose();
       renderer.dispose();
     },

@@ -11,6 +11,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::SizeIs;
 using web::Language;
 
@@ -111,6 +112,28 @@ TEST_F(ReportsTest, NoAnswerGivesItsReasonAndNoNumbers) {
             "bárrala toda");
   EXPECT_TRUE(report.numbers.empty());
   EXPECT_TRUE(report.body.empty());
+}
+
+TEST_F(ReportsTest, AScanForAReferenceNamesThePlanThatWasMadeOfItAndWhoApprovedIt) {
+  const std::string loose = Scan("", "");
+  EXPECT_EQ(ValueOf(DescribeScan(store_, *store_.FindScan(loose), Language::kEnglish).identity,
+                    "Approved by"),
+            "nothing");
+  const std::string draft = store_.AddReference(kAnna, loose, "first", {});
+  const std::string before = ValueOf(
+      DescribeScan(store_, *store_.FindScan(loose), Language::kEnglish).identity, "Approved by");
+  EXPECT_THAT(before, Not(HasSubstr("clara")));
+  EXPECT_NE(before, "nothing");
+  const std::string approved = Approved();
+  const web::Scan scan = *store_.FindScan(store_.FindReference(approved)->scan_id);
+  const ScanReport report = DescribeScan(store_, scan, Language::kEnglish);
+  EXPECT_THAT(ValueOf(report.identity, "Approved by"), HasSubstr("clara, 20"));
+  EXPECT_EQ(ValueOf(report.identity, "Plan"), "head first, supine, markers fixed to the room");
+  // Each scan its own: the other one's draft is still not approved.
+  EXPECT_EQ(ValueOf(DescribeScan(store_, *store_.FindScan(loose), Language::kEnglish).identity,
+                    "Approved by"),
+            before);
+  EXPECT_TRUE(PdfOf(report).starts_with("%PDF-"));
 }
 
 TEST_F(ReportsTest, ACourseNamesItsReferenceAndWhoAcceptedWhat) {

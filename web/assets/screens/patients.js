@@ -100,7 +100,7 @@ function openButtons(patient) {
         () => begin(session.id), { class: 'danger' }),
       action(S.cancel, async () => clear(question), {})));
   };
-  const fraction = action(text.openFraction, open('fraction'), { class: 'primary' });
+  const fraction = action(text.openFraction, open('fraction'), { class: 'start-session' });
   enable(fraction, Boolean(patient.approved_reference_id));
   const reference = action(text.openReference, open('reference'), {});
   return h('div', { class: 'form' },
@@ -188,6 +188,7 @@ function openNow(patient) {
   if (session?.patient_id !== patient.id) return null;
   return h('p', { class: 'lead' }, h('strong', {}, S.patients.isOpen), ' ',
     session.fraction ? S.session.fraction(session.fraction) : S.purposes.reference, ' ',
+    h('a', { class: 'button primary', href: '#/scan' }, S.status.goScan), ' ',
     may('scan') && action(S.session.close, () => closeSession(session), {}));
 }
 
@@ -200,6 +201,9 @@ export async function showPatient(place, id) {
   const heading = h('h1', {});
   let approved;
   let told;
+  /// What begins a session is the first thing to press only where this patient's is not open.
+  const weigh = () => opening.querySelector('.start-session')
+    ?.classList.toggle('primary', live.status?.session?.patient_id !== id);
   const load = async () => {
     const [patient, found, history] = await Promise.all([get(`patients/${id}`, true),
       get(`patients/${id}/references`, true), get(`patients/${id}/scans`, true)]);
@@ -209,6 +213,7 @@ export async function showPatient(place, id) {
       approved = opens;
       clear(opening, patient.archived ? h('p', { class: 'hint' }, text.isArchived)
         : openButtons(patient));
+      weigh();
     }
     const says = JSON.stringify([patient.site, patient.note, patient.archived]);
     if (told !== says) {
@@ -239,6 +244,7 @@ export async function showPatient(place, id) {
     if (shownSession === key) return;
     shownSession = key;
     clear(session, openNow(patient));
+    weigh();
   };
   drawSession();
   await load();

@@ -50,14 +50,15 @@ async function pair(main, logIn) {
 }
 
 /// Who is open, and whether check and sensor let people scan.
-function top(status) {
+/// @param said  The large word below says already that no session is open.
+function top(status, said) {
   const text = S.room;
   const { session, sensor } = status;
   const warm = sensor.powered_s >= kWarmUp_s;
   const mark = (good, words) => h('li', { class: good ? 'good' : 'bad' }, words);
   const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
   return h('header', { class: 'room-top' },
-    h('p', { class: 'room-code' }, isCheck ? S.purposes.daily_check
+    !said && h('p', { class: 'room-code' }, isCheck ? S.purposes.daily_check
       : session?.patient_code ?? text.noSession),
     !isCheck && session && h('p', { class: 'room-fraction' }, session.purpose === 'reference'
       ? S.purposes.reference : S.session.fraction(session.fraction),
@@ -91,6 +92,10 @@ const computing = (status) => [word(S.room.computing, 'info'),
   }),
   h('p', { class: 'room-hint' }, S.scan.step[status.scan?.step] ?? '')];
 
+/// Whether what is shown between scans is that nobody's session is open.
+const saysNoSession = (status) => (status.state === 'ready' || status.state === 'result')
+  && !status.session && status.next_purpose !== 'daily_check';
+
 function resting(status) {
   const text = S.room;
   if (status.state === 'no_sensor') {
@@ -101,9 +106,9 @@ function resting(status) {
     return [word(text.fault, 'bad'),
       h('p', { class: 'room-hint' }, faultWords(status))];
   }
-  const open = status.session || status.next_purpose === 'daily_check';
-  return [word(open ? text.ready : text.noSession, open ? 'good' : 'bad'),
-    h('p', { class: 'room-hint' }, open ? text.press : text.openOne)];
+  const closed = saysNoSession(status);
+  return [word(closed ? text.noSession : text.ready, closed ? 'bad' : 'good'),
+    h('p', { class: 'room-hint' }, closed ? text.openOne : text.press)];
 }
 
 /// The result of the scan that has just ended, as large as it can be read.
@@ -223,12 +228,6 @@ function display(main) {
       offline.textContent = `${S.room.offline}. `
         + S.lastKnown(S.states[status.state], Math.floor(since_s(live.received)));
     }
-    const marks = JSON.stringify([S.languageName, status.session, status.check_overdue,
-      status.next_purpose, status.sensor.present, Math.floor(status.sensor.powered_s / 60)]);
-    if (marks !== shownMarks) {
-      shownMarks = marks;
-      clear(head, top(status));
-    }
     main.dataset.state = status.state;
     withCamera(status.state === 'scanning');
     const last = status.last_result;
@@ -236,6 +235,13 @@ function display(main) {
     // An answer is shown only in its own state: never during a sweep, nor for another patient.
     const mine = last && (last.patient_id ?? null) === (status.session?.patient_id ?? null);
     const visible = status.state === 'result' && !isCheck && mine ? last : null;
+    const said = !visible && !isCheck && saysNoSession(status);
+    const marks = JSON.stringify([S.languageName, status.session, status.check_overdue, said,
+      status.next_purpose, status.sensor.present, Math.floor(status.sensor.powered_s / 60)]);
+    if (marks !== shownMarks) {
+      shownMarks = marks;
+      clear(head, top(status, said));
+    }
     answer.show(visible);
     answer.element.hidden = !visible;
     answer.tick();

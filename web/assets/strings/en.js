@@ -315,8 +315,12 @@ export const en = {
       + 'same.',
     ghost: 'Show the reference', ghostLoading: 'Loading the reference…',
     ghostShare: 'Reference to current', views3d: {
-      top: 'Top', left: 'Left', right: 'Right', feet: 'Feet', reset: 'Reset',
+      top: 'Top', anterior: 'Anterior', posterior: 'Posterior', left: 'Left', right: 'Right',
+      head: 'Head', feet: 'Feet', reset: 'Reset',
     },
+    cube: { anterior: 'ANT', posterior: 'POST', top: 'TOP', bottom: 'BOTTOM' },
+    cut: 'Cut', cutWhere: 'Place of the cut',
+    cutWays: { '': 'none', height: 'from above', along: 'across', across: 'lengthwise' },
     screenshot: 'Save picture',
     meshHint: 'Turn it with the mouse, a finger or the arrow keys.',
     trend: 'Trend', trendLabel: (axis) => `${axis} over the fractions`,

@@ -247,7 +247,7 @@ export const es = {
     seconds: (s) => `${s} s`, minutes: (m) => `${m} min`, hours: (hours) => `${hours} h`,
     days: (days) => `${days} ${plural(days, 'día', 'días')}`,
     verdicts: {
-      in_tolerance: 'EN TOLERANCIA', unsure: 'DENTRO SIN SEGURIDAD', move: 'MOVER',
+      in_tolerance: 'EN TOLERANCIA', unsure: 'NO CONCLUYENTE', move: 'MOVER',
       no_answer: 'SIN RESPUESTA',
     },
     why: {
@@ -258,7 +258,7 @@ export const es = {
     },
     // Of a result that can no longer be acted on.
     verdictsThen: {
-      in_tolerance: 'ESTABA EN TOLERANCIA', unsure: 'ESTABA DENTRO SIN SEGURIDAD',
+      in_tolerance: 'ESTABA EN TOLERANCIA', unsure: 'NO ERA CONCLUYENTE',
       move: 'ESTABA FUERA DE TOLERANCIA', no_answer: 'SIN RESPUESTA',
     },
     whyThen: {
@@ -276,7 +276,7 @@ export const es = {
     remainingThen: 'Diferencia que quedaba entonces',
     remaining: 'Diferencia restante: no hay que mover',
     measured: 'Diferencia medida', atIsocentre: 'en el isocentro',
-    within: 'en tolerancia', unsure: 'dentro sin seguridad', outside: 'fuera de tolerancia',
+    within: 'en tolerancia', unsure: 'no concluyente', outside: 'fuera de tolerancia',
     tolerance: (value, unit) => `tolerancia ±${value} ${unit}`,
     couch: 'Lecturas de la camilla: qué ajustar',
     couchHint: 'Escriba lo que indica la camilla ahora. Solo desplazamientos, en escalas como en '
@@ -352,7 +352,13 @@ export const es = {
       + 'muestran lo mismo.',
     ghost: 'Mostrar la referencia', ghostLoading: 'Cargando la referencia…',
     ghostShare: 'De la referencia a la actual', views3d: {
-      top: 'Arriba', left: 'Izquierda', right: 'Derecha', feet: 'Pies', reset: 'Restablecer',
+      top: 'Arriba', anterior: 'Anterior', posterior: 'Posterior', left: 'Izquierda',
+      right: 'Derecha', head: 'Cabeza', feet: 'Pies', reset: 'Restablecer',
+    },
+    cube: { anterior: 'ANT', posterior: 'POST', top: 'ARRIBA', bottom: 'ABAJO' },
+    cut: 'Corte', cutWhere: 'Posición del corte',
+    cutWays: {
+      '': 'ninguno', height: 'desde arriba', along: 'transversal', across: 'longitudinal',
     },
     screenshot: 'Guardar la imagen',
     meshHint: 'Gírela con el ratón, un dedo o las flechas.',
