@@ -80,6 +80,8 @@ std::string Shown(const char* text) {
 struct Updater::Impl {
   Impl(EventLoop& on, UpdaterOptions given)
       : loop(on), options(std::move(given)), bus(on, "bus", [this] { OnBroken(); }) {
+    if (!options.now) options.now = [] { return std::chrono::steady_clock::now(); };
+    watch = loop.MakeTimer("update progress", [this] { LookAtProgress(); });
     RemoveBroken();
     last = ReadLastUpdate(options.folder);
     Connect();
@@ -105,6 +107,9 @@ struct Updater::Impl {
   BundleState state = BundleState::kUnknown;  ///< Of the bundle that is installed or looked at.
   std::map<std::string, BundleState> states;  ///< Of those looked at before.
   std::shared_ptr<bool> alive = std::make_shared<bool>(true);  ///< For work that is done aside.
+  EventLoop::Source watch;                                     ///< Armed while RAUC installs.
+  std::chrono::steady_clock::time_point moved_at;              ///< When its progress last changed.
+  bool given_up = false;  ///< The last installation stood still; RAUC may still end it.
   double fraction = 0.0;
   std::string bundle;
   web::Done done;
@@ -163,8 +168,22 @@ struct Updater::Impl {
     if (auto asked = std::exchange(done, nullptr)) asked(change);
   }
 
+  /// Whatever RAUC waits for, people are not left waiting with it.
+  void LookAtProgress() {
+    if (!is_installing) return;
+    const std::chrono::minutes longest =
+        step.find("Copying") != std::string::npos ? kLongestCopy : kLongestOtherStep;
+    if (options.now() - moved_at < longest) return watch.ArmAfter(options.look_every);
+    End(fmt::format(
+        "the installer has made no progress for {} minutes, at {:.0f} % of '{}': restart the "
+        "appliance, then try again",
+        longest.count(), 100.0 * fraction, step));
+    given_up = true;
+  }
+
   void End(const std::string& failure) {
-    is_installing = false;
+    is_installing = given_up = false;
+    watch.Disarm();
     last_failure = failure;
     if (failure.empty()) Remember();
     fraction = failure.empty() ? 1.0 : 0.0;
@@ -211,7 +230,9 @@ struct Updater::Impl {
     if (key == "Progress") {
       std::int32_t percent = 0, depth = 0;
       if (sd_bus_message_read(message, "v", "(isi)", &percent, &text, &depth) < 0) return;
-      fraction = std::clamp(percent, 0, 100) / 100.0;
+      const double now_done = std::clamp(percent, 0, 100) / 100.0;
+      if (now_done != fraction || step != Shown(text)) moved_at = options.now();
+      if (!given_up) fraction = now_done;
       step = Shown(text);
     } else if (key == "BootSlot" || key == "Compatible" || key == "LastError" ||
                key == "Operation") {
@@ -258,7 +279,9 @@ struct Updater::Impl {
   static int OnCompleted(sd_bus_message* message, void* self, sd_bus_error*) {
     auto* impl = static_cast<Impl*>(self);
     std::int32_t result = -1;
-    if (!impl->is_installing || sd_bus_message_read_basic(message, 'i', &result) < 0) return 0;
+    if (!(impl->is_installing || impl->given_up) || impl->done ||
+        sd_bus_message_read_basic(message, 'i', &result) < 0)
+      return 0;
     impl->End(result == 0                ? ""
               : impl->last_error.empty() ? "the installer does not say why"
                                          : impl->last_error);
@@ -270,8 +293,9 @@ struct Updater::Impl {
   static int OnOwner(sd_bus_message* message, void* self, sd_bus_error*) {
     auto* impl = static_cast<Impl*>(self);
     const char *name = nullptr, *before = nullptr, *now = nullptr;
-    if (sd_bus_message_read(message, "sss", &name, &before, &now) < 0 || *now != '\0') return 0;
-    impl->is_there = false;
+    if (sd_bus_message_read(message, "sss", &name, &before, &now) < 0 || *before == '\0') return 0;
+    impl->is_there = *now != '\0';
+    impl->given_up = false;
     if (impl->is_installing && !impl->done) {
       impl->End("the installer ended before it was done: look at its log, then try again");
     } else {
@@ -361,6 +385,8 @@ struct Updater::Impl {
       impl->Refuse(ChangeResult::kFailed, "the installer did not begin: " + ErrorOf(message));
       return 0;
     }
+    impl->moved_at = impl->options.now();
+    impl->watch.ArmAfter(impl->options.look_every);
     impl->Answer({});
     impl->Tell();
     return 0;
@@ -380,6 +406,7 @@ struct Updater::Impl {
     if (const std::string why = WhyNoBundle(file, options.max_bytes); !why.empty())
       return asked(Refused(ChangeResult::kInvalid, why));
     is_installing = true;
+    given_up = false;
     bundle = name;
     fraction = 0.0;
     step = "checking the signature";

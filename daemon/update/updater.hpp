@@ -13,6 +13,11 @@
 
 namespace plumb {
 
+/// An installation whose progress (percent or step) stands still for so long has failed. RAUC says
+/// nothing while it copies an image, which takes a slow card some ten minutes; each other step is
+/// one of seconds.
+inline constexpr std::chrono::minutes kLongestCopy{30}, kLongestOtherStep{5};
+
 struct UpdaterOptions {
   std::filesystem::path folder = "/var/lib/plumb/updates";  ///< Bundles lie here: NAME.raucb.
   std::uint64_t max_bytes = std::uint64_t{2} << 30;         ///< Of one bundle.
@@ -30,12 +35,16 @@ struct UpdaterOptions {
   /// Called on the loop, once: the machine has started the system before the last update, and why
   /// that is known.
   std::function<void(const std::string& text)> rolled_back = {};
+  std::chrono::milliseconds look_every{10'000};  ///< How often to look whether progress stands.
+  /// For tests; empty: the steady clock.
+  std::function<std::chrono::steady_clock::time_point()> now = {};
 };
 
 /// Nothing waits: every call of the bus is answered later. A machine without a bus or without RAUC
 /// is no error: status() says so. What makes a bundle acceptable is RAUC's matter (signature,
 /// compatible system); before it is asked, size and form are checked here, and the version
-/// afterwards. Belongs to the loop's thread.
+/// afterwards. An installation ends with RAUC's word, with RAUC leaving the bus, or with progress
+/// that stands still; each time another attempt can be made. Belongs to the loop's thread.
 class Updater {
  public:
   Updater(EventLoop& loop, UpdaterOptions options);

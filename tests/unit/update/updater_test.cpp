@@ -32,6 +32,8 @@ class FakeRauc {
   std::atomic<bool> refuses_signature{false};
   std::atomic<bool> fails{false};
   std::string version = "9.0", slot = "A";
+  std::atomic<int> first_percent{40};
+  std::atomic<const char*> first_step{"Copying image to rootfs.1"};
 
   explicit FakeRauc(const std::string& address) {
     sd_bus_new(&bus_);
@@ -43,6 +45,11 @@ class FakeRauc {
     thread_ = std::jthread([this](const std::stop_token& stop) {
       while (!stop.stop_requested()) {
         if (sd_bus_process(bus_, nullptr) == 0) sd_bus_wait(bus_, 20000);
+        if (const int percent = reach_.exchange(-1); percent >= 0) {
+          percent_ = percent;
+          sd_bus_emit_properties_changed(bus_, "/", "de.pengutronix.rauc.Installer", "Progress",
+                                         nullptr);
+        }
         if (release_.exchange(false)) Finish();
       }
     });
@@ -54,6 +61,8 @@ class FakeRauc {
   }
   /// The installation that waits goes on to its end.
   void Release() { release_ = true; }
+  /// The installation that waits comes so far.
+  void Reach(int percent) { reach_ = percent; }
   [[nodiscard]] std::string installed() const {
     const std::lock_guard lock(mutex_);
     return installed_;
@@ -77,8 +86,8 @@ class FakeRauc {
     }
     sd_bus_reply_method_return(message, "");
     rauc->operation_ = "installing";
-    rauc->percent_ = 40;
-    rauc->text_ = "Copying image to rootfs.1";
+    rauc->percent_ = rauc->first_percent;
+    rauc->text_ = rauc->first_step;
     sd_bus_emit_properties_changed(rauc->bus_, "/", "de.pengutronix.rauc.Installer", "Operation",
                                    "Progress", nullptr);
     return 1;
@@ -125,6 +134,7 @@ class FakeRauc {
   const char *operation_ = "idle", *last_error_ = "", *text_ = "";
   int percent_ = 0;
   std::atomic<bool> release_{false};
+  std::atomic<int> reach_{-1};
   mutable std::mutex mutex_;
   std::string installed_;
   std::jthread thread_;
@@ -182,7 +192,13 @@ class UpdaterTest : public ::testing::Test {
                                     [this](const std::string& bundle, const std::string& failure) {
                                       ended_ = bundle + ": " + failure;
                                     },
-                                .rolled_back = [this](const std::string& text) { told_ += text; }});
+                                .rolled_back = [this](const std::string& text) { told_ += text; },
+                                .look_every = std::chrono::milliseconds(1),
+                                .now =
+                                    [this] {
+                                      ++num_looks_;
+                                      return EventLoop::Clock::time_point() + passed_.load();
+                                    }});
     });
   }
 
@@ -231,6 +247,8 @@ class UpdaterTest : public ::testing::Test {
   std::string hindrance_;
   std::string ended_, told_;
   std::string boot_ = "first";
+  std::atomic<std::chrono::seconds> passed_{std::chrono::seconds(0)};
+  std::atomic<int> num_looks_ = 0;
 };
 
 TEST_F(UpdaterTest, WithoutABusItSaysThatThereIsNoInstaller) {
@@ -424,6 +442,78 @@ TEST_F(UpdaterTest, AnInstallerThatDiesInTheMiddleEndsTheInstallation) {
     rauc = std::make_unique<FakeRauc>(bus_.address());
     WaitForRauc();
     EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone) << "again, once it is back";
+  });
+}
+
+/// The updater's clock is the test's.
+class StandstillTest : public UpdaterTest {
+ protected:
+  void BeginAt(FakeRauc& rauc, const char* step, int percent) {
+    rauc.first_step = step;
+    rauc.first_percent = percent;
+    EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone);
+    EXPECT_TRUE(Becomes([&] { return StatusNow().message == step; }));
+  }
+  /// Whether it goes on although that much time has passed and been looked at.
+  bool GoesOnAt(std::chrono::seconds passed) {
+    passed_ = passed;
+    const int before = num_looks_;
+    EXPECT_TRUE(Becomes([&] { return num_looks_ >= before + 3; }));
+    return StatusNow().installing;
+  }
+  bool EndsAt(std::chrono::seconds passed) {
+    passed_ = passed;
+    return Becomes([&] { return !StatusNow().installing; });
+  }
+};
+
+TEST_F(StandstillTest, AStepThatDoesNotEndIsAFailureAndAnotherAttemptCanBeMade) {
+  Play([&] {
+    FakeRauc rauc(bus_.address());
+    Start();
+    WaitForRauc();
+    BeginAt(rauc, "Determining slot states", 0);
+    EXPECT_TRUE(GoesOnAt(kLongestOtherStep - std::chrono::seconds(1)));
+    EXPECT_TRUE(EndsAt(kLongestOtherStep));
+    EXPECT_THAT(StatusNow().message,
+                HasSubstr("no progress for 5 minutes, at 0 % of 'Determining"));
+    EXPECT_EQ(Ended(), "plumb-9.0.raucb: " + StatusNow().failure);
+    EXPECT_FALSE(StatusNow().restart_needed);
+    BeginAt(rauc, "Copying image to rootfs.1", 40);
+    rauc.Release();
+    EXPECT_TRUE(Becomes([&] { return StatusNow().restart_needed; }));
+    EXPECT_EQ(Ended(), "plumb-9.0.raucb: ");
+  });
+}
+
+TEST_F(StandstillTest, ACopyHasLongerAndProgressBeginsTheTimeAnew) {
+  Play([&] {
+    FakeRauc rauc(bus_.address());
+    Start();
+    WaitForRauc();
+    BeginAt(rauc, "Copying image to rootfs.1", 40);
+    const std::chrono::seconds first = kLongestCopy - std::chrono::seconds(1);
+    EXPECT_TRUE(GoesOnAt(first));
+    rauc.Reach(60);
+    EXPECT_TRUE(Becomes([&] { return StatusNow().fraction == 0.6; }));
+    EXPECT_TRUE(GoesOnAt(first + first));
+    EXPECT_TRUE(EndsAt(first + kLongestCopy));
+    EXPECT_THAT(StatusNow().failure, HasSubstr("no progress for 30 minutes, at 60 % of 'Copying"));
+  });
+}
+
+TEST_F(StandstillTest, AnInstallationThatEndsAfterItWasGivenUpIsStillTold) {
+  Play([&] {
+    FakeRauc rauc(bus_.address());
+    Start();
+    WaitForRauc();
+    BeginAt(rauc, "Copying image to rootfs.1", 40);
+    EXPECT_TRUE(EndsAt(kLongestCopy));
+    EXPECT_FALSE(StatusNow().restart_needed);
+    rauc.Release();
+    EXPECT_TRUE(Becomes([&] { return StatusNow().restart_needed; }))
+        << "the next start is one of the new system";
+    EXPECT_EQ(StatusNow().failure, "");
   });
 }
 
