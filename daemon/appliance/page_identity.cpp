@@ -128,7 +128,12 @@ PageNotes IdentifyPage(const Config& config, web::HttpServerOptions& options) {
       options.listen_fd ? web::AddressTextOf(*options.listen_fd) : options.address;
   const PageTransport transport = TransportOf(config.web, web::IsLoopback(address));
   if (transport == PageTransport::kGivenTls) options.tls = GivenTls(config.web);
-  if (transport == PageTransport::kOwnTls) options.tls = OwnTls(config, notes.warnings);
+  if (transport == PageTransport::kOwnTls) {
+    options.tls = OwnTls(config, notes.warnings);
+    options.keep_certificate = [file = config.appliance.state / kKeyFile](const auto& identity) {
+      WriteSecret(file, identity.certificate_pem + "\n" + identity.key_pem);
+    };
+  }
   if (transport == PageTransport::kPlainOnNetwork)
     notes.warnings.emplace_back(
         "the page is served without TLS (web.plain_http): passwords and patient data can be read "

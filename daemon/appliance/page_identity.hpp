@@ -31,7 +31,8 @@ struct PageNotes {
 ///         be used.
 void CheckPageIdentity(const WebConfig& web);
 
-/// Fills in `tls` and `device_key` of the options by the configuration, and gives what there is to
+/// Fills in `tls`, `keep_certificate` (not for a certificate that the configuration names) and
+/// `device_key` of the options by the configuration, and gives what there is to
 /// tell. A secret of the appliance's own that cannot be kept is made for this run, with a warning.
 /// @throws DataError for the certificate or key that the configuration names.
 [[nodiscard]] PageNotes IdentifyPage(const Config& config, web::HttpServerOptions& options);

@@ -295,6 +295,16 @@ class Plumbd {
     options.host_names = config.web.host_names;
     page_ = IdentifyPage(config, options);
     if (options.tls) certificate_pem_ = options.tls->certificate_pem;
+    if (auto keep = std::exchange(options.keep_certificate, nullptr)) {
+      options.keep_certificate = [this, keep = std::move(keep)](const web::TlsIdentity& identity) {
+        keep(identity);
+        page_.certificate = identity.fingerprint;
+        certificate_pem_ = identity.certificate_pem;
+        Log(LogLevel::kNotice,
+            "the page's certificate was replaced; its SHA-256 now: " + page_.certificate);
+        LookAtCertificate();
+      };
+    }
     options.upload_folder = config.update.folder;
     options.doing = [this](std::string_view what) { loop_.meter().Part(what); };
     options.max_upload_bytes = static_cast<std::uint64_t>(config.update.max_bundle_mb) << 20;

@@ -114,8 +114,8 @@ Response ChangeResponse(const Change& change) {
 Accounts::Accounts(ScanService& service, AccountOptions options)
     : service_(service),
       options_(std::move(options)),
-      displays_(service, options_.tls, options_.now),
-      devices_(options_.device_key, options_.tls),
+      displays_(service, options_.certificate.has_value(), options_.now),
+      devices_(options_.device_key, options_.certificate.has_value()),
       worker_(options_.password_operations, options_.password_memory_bytes) {
   if (service_.Users().empty()) setup_code_ = MakeSetupCode();
   Expire();
@@ -139,7 +139,7 @@ std::shared_ptr<Session> Accounts::SessionOf(const Request& request, bool touch)
 
 std::string Accounts::Cookie(const std::string& token, bool end) const {
   return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict{}{}", cookie_name(), token,
-                     options_.tls ? "; Secure" : "", end ? "; Max-Age=0" : "");
+                     options_.certificate ? "; Secure" : "", end ? "; Max-Age=0" : "");
 }
 
 Done Accounts::WhileAlive(Done done) const {
@@ -189,6 +189,12 @@ void Accounts::AddRoutes(Router& router) {
               bind(&Accounts::ResetSensorProfile)});
   router.Add({"POST", "/api/v1/sensor-profile/roll-back", Permission::kSettings, BodyKind::kJson,
               bind(&Accounts::RollBackSensorProfile)});
+  router.Add({"GET", "/api/v1/certificate", Permission::kSettings, BodyKind::kNone,
+              bind(&Accounts::DescribeCertificate)});
+  router.Add({"PUT", "/api/v1/certificate", Permission::kSettings, BodyKind::kJson,
+              bind(&Accounts::ReplaceCertificate)});
+  router.Add({"POST", "/api/v1/certificate/new", Permission::kSettings, BodyKind::kJson,
+              bind(&Accounts::MakeNewCertificate)});
   router.Add({"GET", "/api/v1/users", Permission::kUsers, BodyKind::kNone,
               [this](const Request&, const Respond& respond) {
                 Json users = Json::array();
@@ -266,7 +272,7 @@ std::string Accounts::DeviceCookie(const std::string& user, const std::string& s
   constexpr int kYear_s = 365 * 24 * 3600;
   return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}",
                      devices_.NameFor(user), devices_.Make(user, stored), kYear_s,
-                     options_.tls ? "; Secure" : "");
+                     options_.certificate ? "; Secure" : "");
 }
 
 std::vector<std::string> Accounts::CountersOf(const Request& request, const std::string& name,

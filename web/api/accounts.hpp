@@ -15,6 +15,7 @@
 #include "web/security/login_limiter.hpp"
 #include "web/security/password_worker.hpp"
 #include "web/security/sessions.hpp"
+#include "web/security/tls_identity.hpp"
 #include "web/service/scan_service.hpp"
 
 namespace plumb::web {
@@ -23,10 +24,13 @@ struct AccountOptions {
   std::uint64_t password_operations = 3;
   std::uint64_t password_memory_bytes = 64 << 20;
   std::chrono::seconds session_limit{12 * 3600};
-  bool tls = false;
-  std::string device_key;       ///< See DeviceCookies.
-  std::string tls_fingerprint;  ///< Shown at the first set-up, to be compared with the journal's.
+  std::string device_key;                  ///< See DeviceCookies.
+  std::optional<TlsIdentity> certificate;  ///< Its fingerprint is shown at the first set-up.
   std::function<std::chrono::steady_clock::time_point()> now;
+  std::vector<std::string> host_names;  ///< Of a new certificate.
+  /// Keeps and serves another one; throws DataError or IoError, and then the one before stays.
+  /// Empty: it cannot be replaced.
+  std::function<void(const TlsIdentity&)> replace_certificate;
 };
 
 /// Belongs to the loop thread.
@@ -39,7 +43,9 @@ class Accounts : public SessionLookup {
   /// The session of a request, by its cookie. @param touch  Counts as a use.
   [[nodiscard]] std::shared_ptr<Session> SessionOf(const Request& request, bool touch) override;
   [[nodiscard]] bool needs_setup() const override { return !setup_code_.empty(); }
-  [[nodiscard]] std::string tls_fingerprint() const override { return options_.tls_fingerprint; }
+  [[nodiscard]] std::string tls_fingerprint() const override {
+    return options_.certificate ? options_.certificate->fingerprint : std::string();
+  }
   [[nodiscard]] std::optional<std::string> setup_code() const;
 
   /// Of the password thread: readable when Dispatch() has something to do.
@@ -77,6 +83,13 @@ class Accounts : public SessionLookup {
   void RollBackSensorProfile(const Request& request, const Respond& respond);
   /// Restarts the machine: with the person's own password.
   void RestartSystem(const Request& request, const Respond& respond);
+  /// The certificate that the page is served with.
+  void DescribeCertificate(const Request& request, const Respond& respond);
+  /// One that is handed in, or a new one that signs itself: with the person's own password.
+  void ReplaceCertificate(const Request& request, const Respond& respond);
+  void MakeNewCertificate(const Request& request, const Respond& respond);
+  void ServeCertificate(const Actor& actor, const TlsIdentity& identity, bool is_self_made,
+                        const Respond& respond);
   void AddUser(const Request& request, const Respond& respond);
   void ChangeUser(const Request& request, const Respond& respond);
   /// Opens a session and tells the page about it.
@@ -90,7 +103,7 @@ class Accounts : public SessionLookup {
   [[nodiscard]] Done WhileAlive(Done done) const;
   [[nodiscard]] std::string Cookie(const std::string& token, bool end) const;
   [[nodiscard]] std::string cookie_name() const {
-    return options_.tls ? "__Host-plumb_session" : "plumb_session";
+    return options_.certificate ? "__Host-plumb_session" : "plumb_session";
   }
 
   ScanService& service_;

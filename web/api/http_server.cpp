@@ -26,14 +26,16 @@ constexpr std::chrono::milliseconds kExpireEvery{
 constexpr std::chrono::milliseconds kMinEventGap{100};
 constexpr std::chrono::milliseconds kCutEvery{1000};
 
-AccountOptions AccountsOptions(const HttpServerOptions& options) {
+AccountOptions AccountsOptions(const HttpServerOptions& options,
+                               std::function<void(const TlsIdentity&)> replace_certificate) {
   return {options.password_operations,
           options.password_memory_bytes,
           options.session_limit,
-          options.tls.has_value(),
           options.device_key,
-          options.tls ? options.tls->fingerprint : std::string(),
-          options.now};
+          options.tls,
+          options.now,
+          options.host_names,
+          std::move(replace_certificate)};
 }
 
 HttpServerOptions Completed(HttpServerOptions options) {
@@ -61,7 +63,7 @@ class HttpServer::Impl {
   Impl(ScanService& service, HttpServerOptions options)
       : service_(service),
         options_(Completed(std::move(options))),
-        accounts_(service, AccountsOptions(options_)),
+        accounts_(service, AccountsOptions(options_, CertificateReplacer())),
         hub_(options_.max_event_streams, options_.max_streams_per_session,
              options_.event_buffer_bytes),
         transport_(options_, service_, router_, accounts_, hub_,
@@ -111,11 +113,13 @@ class HttpServer::Impl {
       accounts_.Expire();
       hub_.Beat();
     }
+    transport_.Run();  // first: what has come by now is not late
     if (now >= next_cut_) {
+      // After a pause of the appliance itself who connects gets the time that it took from them.
+      const bool was_paused = transport_.has_connections() && now > next_cut_ + 2 * kCutEvery;
       next_cut_ = now + kCutEvery;
-      transport_.CutLate();
+      if (!was_paused) transport_.CutLate();
     }
-    transport_.Run();
     if (hub_.EndOver())
       transport_.Run();  // a log-out that has just come ends its own streams at once
   }
@@ -133,6 +137,13 @@ class HttpServer::Impl {
   }
 
  private:
+  [[nodiscard]] std::function<void(const TlsIdentity&)> CertificateReplacer() {
+    if (!options_.tls || !options_.keep_certificate) return {};
+    return [this](const TlsIdentity& identity) {
+      transport_.Serve(identity, options_.keep_certificate);
+    };
+  }
+
   void Watch(int watched) {
     epoll_event event{};
     event.events = EPOLLIN;

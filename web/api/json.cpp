@@ -369,7 +369,7 @@ bool Fields::Has(const char* name) {
   return json_.contains(name);
 }
 
-std::string Fields::Text(const char* name, std::size_t min, std::size_t max) {
+std::string Fields::Text(const char* name, std::size_t min, std::size_t max, bool allow_lines) {
   const nlohmann::json& value = Get(name);
   if (!value.is_string())
     throw DataError(fmt::format("{} must be text, found {}", name, value.type_name()));
@@ -378,7 +378,7 @@ std::string Fields::Text(const char* name, std::size_t min, std::size_t max) {
     throw DataError(
         fmt::format("{} must have {} to {} bytes, found {}", name, min, max, text.size()));
   }
-  if (!IsPlainText(text))
+  if (!IsPlainText(text, allow_lines))
     throw DataError(fmt::format("{} must be plain text without control characters", name));
   return text;
 }

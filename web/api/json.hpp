@@ -37,7 +37,8 @@ class Fields {
   /// @throws DataError unless body is one JSON object, nested at most 8 deep.
   explicit Fields(const std::string& body);
 
-  [[nodiscard]] std::string Text(const char* name, std::size_t min, std::size_t max);
+  [[nodiscard]] std::string Text(const char* name, std::size_t min, std::size_t max,
+                                 bool allow_lines = false);
   [[nodiscard]] double Number(const char* name, double min, double max);
   [[nodiscard]] int Integer(const char* name, int min, int max);
   [[nodiscard]] bool Flag(const char* name);

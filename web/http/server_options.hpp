@@ -21,6 +21,9 @@ struct HttpServerOptions {
   std::optional<int> listen_fd;    ///< A listening socket from outside (socket activation); address
                                    ///< and port are then unused.
   std::optional<TlsIdentity> tls;  ///< HTTPS instead of HTTP; see CheckedTlsIdentity().
+  /// Keeps another one durably, before it is served. Throws IoError, and then the one before stays.
+  /// Empty: the certificate cannot be replaced on the page.
+  std::function<void(const TlsIdentity&)> keep_certificate;
   /// 32 random bytes that outlive a restart, for the cookies of browsers that logged in before.
   /// Empty: made anew, so that a restart forgets those browsers.
   std::string device_key;

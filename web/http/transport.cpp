@@ -16,6 +16,7 @@
 #include "algo/base/errors.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/listen_socket.hpp"
+#include "web/http/served_certificate.hpp"
 
 namespace plumb::web {
 namespace {
@@ -49,6 +50,10 @@ void CutSocket(MHD_Connection* connection) {
   setsockopt(info->connect_fd, SOL_SOCKET, SO_LINGER, &drop, sizeof drop);
   shutdown(info->connect_fd, SHUT_RDWR);
 }
+
+/// Whose library runs on this thread: it asks for the certificate of a handshake without saying for
+/// which server.
+thread_local Transport* serving = nullptr;
 
 }  // namespace
 
@@ -87,6 +92,16 @@ struct Transport::Exchange : std::enable_shared_from_this<Transport::Exchange> {
 };
 
 struct Transport::Callbacks {
+  static int OnHandshake(gnutls_session_t, const gnutls_datum_t*, int, const gnutls_pk_algorithm_t*,
+                         int, gnutls_pcert_st** chain, unsigned* length, gnutls_privkey_t* key) {
+    if (serving == nullptr || serving->certificates_.empty()) return -1;
+    ServedCertificate& certificate = *serving->certificates_.back();
+    *chain = certificate.chain();
+    *length = certificate.length();
+    *key = certificate.key();
+    return 0;
+  }
+
   static std::size_t KeepEscapes(void*, MHD_Connection*, char* text) { return std::strlen(text); }
 
   static void OnConnection(void* self, MHD_Connection* connection, void** context,
@@ -416,6 +431,7 @@ Transport::Transport(const HttpServerOptions& options, ScanService& service, con
       wake_fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   if (wake_fd_ < 0) throw IoError(fmt::format("cannot make an eventfd: {}", std::strerror(errno)));
   try {
+    if (options_.tls) Serve(*options_.tls);
     Start(options.listen_fd ? *options.listen_fd : OpenListenSocket(options.address, options.port));
   } catch (...) {
     close(wake_fd_);
@@ -431,8 +447,8 @@ void Transport::Start(int listen_fd) {
   std::vector<MHD_OptionItem> extra;
   if (options_.tls) {
     flags |= MHD_USE_TLS;
-    extra.push_back({MHD_OPTION_HTTPS_MEM_CERT, 0, options_.tls->certificate_pem.data()});
-    extra.push_back({MHD_OPTION_HTTPS_MEM_KEY, 0, options_.tls->key_pem.data()});
+    extra.push_back(
+        {MHD_OPTION_HTTPS_CERT_CALLBACK, 0, reinterpret_cast<void*>(&Callbacks::OnHandshake)});
     extra.push_back({MHD_OPTION_HTTPS_PRIORITIES, 0, priorities.data()});
   }
   extra.push_back({MHD_OPTION_END, 0, nullptr});
@@ -458,7 +474,7 @@ Transport::~Transport() {
     if (!exchange->response) exchange->response = ErrorResponse(503, "the appliance is stopping");
     exchange->Resume();
   }
-  MHD_run(daemon_);
+  RunLibrary();
   for (Exchange* exchange : std::list(exchanges_)) exchange->Resume();
   MHD_stop_daemon(daemon_);
   close(wake_fd_);
@@ -467,7 +483,20 @@ Transport::~Transport() {
 void Transport::Run() {
   std::uint64_t count = 0;
   [[maybe_unused]] const auto drained = read(wake_fd_, &count, sizeof count);
+  RunLibrary();
+}
+
+void Transport::RunLibrary() {
+  serving = this;
   MHD_run(daemon_);
+  serving = nullptr;
+}
+
+void Transport::Serve(const TlsIdentity& identity,
+                      const std::function<void(const TlsIdentity&)>& keep) {
+  auto certificate = std::make_unique<ServedCertificate>(identity);
+  if (keep) keep(identity);
+  certificates_.push_back(std::move(certificate));
 }
 
 void Transport::Wake() const {

@@ -7,6 +7,7 @@
 #include <list>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "web/http/connection_table.hpp"
 #include "web/http/event_hub.hpp"
@@ -17,6 +18,8 @@
 struct MHD_Daemon;
 
 namespace plumb::web {
+
+class ServedCertificate;
 
 /// Tells HttpServerOptions::doing what runs while it lives.
 class Doing {
@@ -53,6 +56,9 @@ class Transport {
   [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const;
   /// Closes connections whose request is not there in time.
   void CutLate();
+  /// For each TLS connection from now on; those that are open stay as they are.
+  /// @param keep  Called once it is known that the identity can be served; may throw.
+  void Serve(const TlsIdentity& identity, const std::function<void(const TlsIdentity&)>& keep = {});
   [[nodiscard]] bool has_connections() const { return !connections_.empty(); }
   [[nodiscard]] std::uint16_t port() const { return port_; }
 
@@ -62,6 +68,7 @@ class Transport {
 
  private:
   void Start(int listen_fd);
+  void RunLibrary();
 
   HttpServerOptions options_;
   ScanService& service_;
@@ -71,6 +78,9 @@ class Transport {
   ConnectionTable connections_;
   std::list<Exchange*> exchanges_;
   std::weak_ptr<UploadFile> upload_;  ///< One at a time.
+  /// The last is served. Handshakes that have begun may still hold those before it, so they stay;
+  /// they are few, as a person replaces them.
+  std::vector<std::unique_ptr<ServedCertificate>> certificates_;
   std::uint16_t port_ = 0;
   int wake_fd_ = -1;
   int epoll_fd_ = -1;

@@ -1,5 +1,6 @@
 #include "web/security/certificate_care.hpp"
 
+#include <algorithm>
 #include <array>
 #include <ctime>
 #include <memory>
@@ -51,6 +52,12 @@ std::string Day(std::time_t time) {
   return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(time));
 }
 
+bool HasWeakKey(const Certificate& certificate, unsigned& bits) {
+  const int algorithm = gnutls_x509_crt_get_pk_algorithm(certificate.get(), &bits);
+  return algorithm < 0 || gnutls_pk_bits_to_sec_param(static_cast<gnutls_pk_algorithm_t>(algorithm),
+                                                      bits) < GNUTLS_SEC_PARAM_MEDIUM;
+}
+
 void WarnOfDates(const Certificate& certificate, std::time_t now, std::vector<std::string>& told) {
   const std::time_t begin = gnutls_x509_crt_get_activation_time(certificate.get());
   const std::time_t end = gnutls_x509_crt_get_expiration_time(certificate.get());
@@ -79,9 +86,7 @@ std::vector<std::string> CertificateWarnings(const std::string& pem,
   std::vector<std::string> told;
   const std::vector<Certificate> chain = ChainOf(pem);
   unsigned bits = 0;
-  const int algorithm = gnutls_x509_crt_get_pk_algorithm(chain.front().get(), &bits);
-  if (algorithm < 0 || gnutls_pk_bits_to_sec_param(static_cast<gnutls_pk_algorithm_t>(algorithm),
-                                                   bits) < GNUTLS_SEC_PARAM_MEDIUM) {
+  if (HasWeakKey(chain.front(), bits)) {
     told.push_back(fmt::format(
         "the key of the page's certificate {} is too weak ({} bits): browsers refuse it; make one "
         "of 256 bits on an elliptic curve, or of 2048 with RSA",
@@ -90,6 +95,38 @@ std::vector<std::string> CertificateWarnings(const std::string& pem,
   for (const Certificate& certificate : chain)
     WarnOfDates(certificate, std::chrono::system_clock::to_time_t(now), told);
   return told;
+}
+
+CertificateFacts FactsOfCertificate(const std::string& pem) {
+  const std::vector<Certificate> chain = ChainOf(pem);
+  CertificateFacts facts{.subject = SubjectOf(chain.front()),
+                         .valid_until = gnutls_x509_crt_get_expiration_time(chain.front().get())};
+  for (const Certificate& certificate : chain)
+    facts.valid_until =
+        std::min(facts.valid_until, gnutls_x509_crt_get_expiration_time(certificate.get()));
+  return facts;
+}
+
+TlsIdentity UsableTlsIdentity(const std::string& certificate_pem, const std::string& key_pem,
+                              std::chrono::system_clock::time_point now) {
+  TlsIdentity identity = CheckedTlsIdentity(certificate_pem, key_pem, "what was handed in");
+  const std::vector<Certificate> chain = ChainOf(certificate_pem);
+  const auto refuse = [](const Certificate& certificate, const std::string& why) {
+    throw DataError(fmt::format("the certificate {} {}", SubjectOf(certificate), why));
+  };
+  if (unsigned bits = 0; HasWeakKey(chain.front(), bits))
+    refuse(chain.front(), fmt::format("has a key of only {} bits: make one of 256 on an elliptic "
+                                      "curve, or of 2048 with RSA",
+                                      bits));
+  const std::time_t time = std::chrono::system_clock::to_time_t(now);
+  for (const Certificate& certificate : chain) {
+    const std::time_t begin = gnutls_x509_crt_get_activation_time(certificate.get());
+    const std::time_t end = gnutls_x509_crt_get_expiration_time(certificate.get());
+    if (time >= end) refuse(certificate, fmt::format("ended on {}: hand in a newer one", Day(end)));
+    if (time < begin)
+      refuse(certificate, fmt::format("is valid only from {}: check the clock", Day(begin)));
+  }
+  return identity;
 }
 
 }  // namespace plumb::web

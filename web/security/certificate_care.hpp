@@ -2,8 +2,11 @@
 #pragma once
 
 #include <chrono>
+#include <ctime>
 #include <string>
 #include <vector>
+
+#include "web/security/tls_identity.hpp"
 
 namespace plumb::web {
 
@@ -18,5 +21,20 @@ inline constexpr std::chrono::hours kWarnBeforeEnd{30 * 24};
 /// @throws DataError if there is no certificate in it that can be read.
 [[nodiscard]] std::vector<std::string> CertificateWarnings(
     const std::string& pem, std::chrono::system_clock::time_point now);
+
+/// What people compare and plan by.
+struct CertificateFacts {
+  std::string subject;
+  std::time_t valid_until = 0;  ///< Of the certificate of its chain that ends first.
+};
+/// @throws DataError as CertificateWarnings().
+[[nodiscard]] CertificateFacts FactsOfCertificate(const std::string& pem);
+
+/// CheckedTlsIdentity() for what a person hands in: also refuses what browsers would refuse now, a
+/// weak key, an end that has come, a beginning that has not.
+/// @throws DataError
+[[nodiscard]] TlsIdentity UsableTlsIdentity(const std::string& certificate_pem,
+                                            const std::string& key_pem,
+                                            std::chrono::system_clock::time_point now);
 
 }  // namespace plumb::web

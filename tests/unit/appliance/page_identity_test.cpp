@@ -120,6 +120,24 @@ TEST_F(PageIdentityTest, TheConfigurationsCertificateIsUsedOrRefusedByName) {
   EXPECT_THAT(MessageOf<DataError>([&] { (void)Identify("0.0.0.0"); }), HasSubstr("cert.pem"));
 }
 
+TEST_F(PageIdentityTest, WhatReplacesItIsServedAtTheNextStartForTheOwnerAlone) {
+  const std::string own = Identify("0.0.0.0").certificate;
+  ASSERT_TRUE(options_.keep_certificate);
+  const web::TlsIdentity other = web::MakeTlsIdentity({});
+  options_.keep_certificate(other);
+  EXPECT_EQ(fs::status(folder_ / "page-key.pem").permissions(), fs::perms(0600));
+  EXPECT_NE(own, other.fingerprint);
+  EXPECT_EQ(Identify("0.0.0.0").certificate, other.fingerprint);
+  EXPECT_NE(options_.tls->key_pem.find(other.key_pem), std::string::npos);
+}
+
+TEST_F(PageIdentityTest, WhereTheDiskRefusesTheOneBeforeStays) {
+  const std::string own = Identify("0.0.0.0").certificate;
+  fs::create_directory(folder_ / ".page-key.pem.new");  // in the way of what is written
+  EXPECT_THROW(options_.keep_certificate(web::MakeTlsIdentity({})), IoError);
+  EXPECT_EQ(Identify("0.0.0.0").certificate, own);
+}
+
 TEST_F(PageIdentityTest, PlainHttpOffLoopbackWarns) {
   config_.web.plain_http = true;
   EXPECT_THAT(Identify("0.0.0.0").warnings, ElementsAre(HasSubstr("without TLS")));

@@ -83,6 +83,9 @@ const std::map<std::string, std::string> kWhoMay = {
     {"POST /api/v1/update/seen", "E"},
     {"DELETE /api/v1/update/bundles/{name}", "E"},
     {"GET /api/v1/backup", "E"},
+    {"GET /api/v1/certificate", "E"},
+    {"PUT /api/v1/certificate", "E"},
+    {"POST /api/v1/certificate/new", "E"},
     {"POST /api/v1/backup", "E"},
     {"POST /api/v1/diagnostics", "E"},
 };

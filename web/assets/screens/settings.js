@@ -1,6 +1,7 @@
 import { get, live, may, postLong, put } from '../api.js';
 import { action, checkbox, clear, done, field, form, h, localTime, select } from '../dom.js';
 import { S } from '../strings.js';
+import { certificateCard } from './certificate.js';
 import { profileCard } from './sensor_profile.js';
 
 const kNumbers = {
@@ -67,5 +68,6 @@ export async function showSettings(place) {
     h('section', { class: 'card' }, form({ class: 'form columns' }, save, numbers,
       field(text.posture, posture), flags,
       editable && h('div', { class: 'row' }, h('button', { class: 'primary' }, S.save)))),
-    profileCard(), editable && backupCard());
+    profileCard(), editable && backupCard(),
+    editable && certificateCard());
 }

@@ -487,6 +487,8 @@ export const en = {
       'display.remove': 'Screen removed',
       'settings.change': 'Settings changed',
       'backup.make': 'Backup made',
+      'certificate.replace': 'Certificate of the page replaced',
+      'certificate.new': 'New self-made certificate of the page',
       'diagnostics.write': 'Diagnostics downloaded',
       'update.upload': 'Update file uploaded',
       'update.remove': 'Update file removed',
@@ -517,6 +519,20 @@ export const en = {
     backupNow: 'Back up now', backupRunning: 'Backing up. This may take minutes…',
     backupDone: 'Backup made.', backupNone: 'No backup has been made yet.',
     backupLast: (when, who) => `Last backup: ${when}, by ${who}.`,
+  },
+  certificate: {
+    title: 'Certificate of the page',
+    hint: 'Browsers know this appliance by its certificate. Another one is used for every new '
+      + 'connection at once; compare its fingerprint with the one that your browser then shows.',
+    fingerprint: 'SHA-256 fingerprint', subject: 'Made out to', validUntil: 'Valid until',
+    fixed: 'It cannot be replaced here: the page is served without TLS, or the configuration '
+      + 'names its certificate (web.tls_certificate).',
+    which: 'What to do',
+    choices: { given: 'Use a certificate of your own', own: 'Make a new self-made certificate' },
+    chain: 'Certificate, then those that lead from it to an authority (PEM file)',
+    key: 'Its key, without a password (PEM file)', tooLarge: (name) => `${name} is too large.`,
+    submit: 'Replace the certificate',
+    replaced: 'The certificate is replaced. Your browser may ask about the new one.',
   },
   profile: {
     title: 'Sensor profile',

@@ -534,6 +534,8 @@ export const es = {
       'display.remove': 'Pantalla quitada',
       'settings.change': 'Ajustes cambiados',
       'backup.make': 'Copia hecha',
+      'certificate.replace': 'Certificado de la página sustituido',
+      'certificate.new': 'Nuevo certificado autofirmado de la página',
       'diagnostics.write': 'Diagnóstico descargado',
       'update.upload': 'Archivo de actualización cargado',
       'update.remove': 'Archivo de actualización quitado',
@@ -567,6 +569,23 @@ export const es = {
     backupNow: 'Hacer una copia ahora', backupRunning: 'Copiando. Puede tardar minutos…',
     backupDone: 'Copia hecha.', backupNone: 'Aún no se ha hecho ninguna copia.',
     backupLast: (when, who) => `Última copia: ${when}, por ${who}.`,
+  },
+  certificate: {
+    title: 'Certificado de la página',
+    hint: 'Los navegadores reconocen este equipo por su certificado. Uno nuevo se usa de inmediato '
+      + 'en cada conexión nueva; compare su huella con la que muestre entonces su navegador.',
+    fingerprint: 'Huella SHA-256', subject: 'Emitido para', validUntil: 'Válido hasta',
+    fixed: 'No se puede sustituir aquí: la página se sirve sin TLS, o la configuración indica su '
+      + 'certificado (web.tls_certificate).',
+    which: 'Qué hacer',
+    choices: {
+      given: 'Usar un certificado propio', own: 'Crear un nuevo certificado autofirmado',
+    },
+    chain: 'Certificado, seguido de los que llevan de él a una autoridad (archivo PEM)',
+    key: 'Su clave, sin contraseña (archivo PEM)',
+    tooLarge: (name) => `${name} es demasiado grande.`,
+    submit: 'Sustituir el certificado',
+    replaced: 'Certificado sustituido. Su navegador puede preguntarle por el nuevo.',
   },
   profile: {
     title: 'Perfil del sensor',

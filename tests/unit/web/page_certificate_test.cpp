@@ -1,0 +1,222 @@
+// Replacing the page's certificate: who may, what is refused, what is logged, and what a browser
+// that connects afterwards is shown. openssl is the browser and makes the certificates.
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/web/web_fixture.hpp"
+#include "web/security/certificate_care.hpp"
+
+namespace plumb::test {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+struct Certificate {
+  std::string chain, key, fingerprint;
+};
+
+class PageCertificateTest : public WebTest {
+ protected:
+  void SetUp() override {
+    Start([this](web::HttpServerOptions& options) {
+      options.tls = own_;
+      options.keep_certificate = [this](const web::TlsIdentity& identity) {
+        if (is_full_) throw IoError("no space left on the disk");
+        kept_ = identity;
+      };
+    });
+    const json body = {{"code", setup_code_}, {"name", "engineer"}, {"password", kPassword}};
+    const std::string answer = Ask("POST", "/api/v1/setup", body);
+    const auto begin = answer.find("__Host-plumb_session=");
+    ASSERT_NE(begin, std::string::npos) << answer;
+    session_ = answer.substr(begin, answer.find(';', begin) - begin);
+    token_ = JsonOf(Ask("GET", "/api/v1/session")).value("csrf_token", "");
+    ASSERT_NE(token_, "");
+  }
+
+  std::string Run(const std::string& command, const char* written) {
+    EXPECT_EQ(
+        std::system(
+            fmt::format("cd {} && ({}) 2> /dev/null", folder_.path().string(), command).c_str()),
+        0)
+        << command;
+    std::ifstream in(folder_ / written);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  /// The answer's text; each request on a connection of its own.
+  std::string Ask(const std::string& method, const std::string& path, const json& body = {}) {
+    const std::string text = body.is_null() ? "" : body.dump();
+    std::ofstream(folder_ / "request")
+        << fmt::format("{} {} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n", method, path)
+        << (session_.empty() ? "" : fmt::format("Cookie: {}\r\n", session_))
+        << (token_.empty() ? "" : fmt::format("X-CSRF-Token: {}\r\n", token_))
+        << (text.empty() ? ""
+                         : fmt::format("Content-Type: application/json\r\nOrigin: "
+                                       "https://localhost\r\nContent-Length: {}\r\n",
+                                       text.size()))
+        << "\r\n"
+        << text;
+    return Run(fmt::format("timeout 60 openssl s_client -quiet -connect 127.0.0.1:{} < request > "
+                           "answer",
+                           port_),
+               "answer");
+  }
+  static json JsonOf(const std::string& answer) {
+    return json::parse(answer.substr(answer.find("\r\n\r\n") + 4), nullptr, false);
+  }
+  /// Of what a new connection is shown.
+  std::string Shown() {
+    return FingerprintIn(Run(fmt::format("timeout 60 openssl s_client -connect 127.0.0.1:{} < "
+                                         "/dev/null | openssl x509 -noout -sha256 -fingerprint > "
+                                         "shown",
+                                         port_),
+                             "shown"));
+  }
+  static std::string FingerprintIn(const std::string& text) {
+    return text.substr(text.find('=') + 1, 95);
+  }
+  Certificate Made(const std::string& key, const std::string& options = "") {
+    Certificate made;
+    made.chain = Run(fmt::format("openssl req -x509 -newkey {} -nodes -days 20 -subj '/CN=room 1' "
+                                 "-keyout key.pem -out certificate.pem {}",
+                                 key, options),
+                     "certificate.pem");
+    std::ifstream in(folder_ / "key.pem");
+    made.key.assign(std::istreambuf_iterator<char>(in), {});
+    made.fingerprint = FingerprintIn(
+        Run("openssl x509 -noout -sha256 -fingerprint -in certificate.pem > print", "print"));
+    return made;
+  }
+  std::string Put(const std::string& chain, const std::string& key,
+                  const std::string& password = kPassword) {
+    return Ask("PUT", "/api/v1/certificate",
+               {{"certificate", chain}, {"key", key}, {"password", password}});
+  }
+  void ExpectNothingChanged() {
+    EXPECT_FALSE(kept_);
+    EXPECT_EQ(Shown(), own_.fingerprint);
+    EXPECT_THAT(Ask("GET", "/api/v1/audit"), Not(HasSubstr("\"certificate.")));
+  }
+
+  plumb::testing::TempFolder folder_;
+  const web::TlsIdentity own_ = web::MakeTlsIdentity({});
+  std::optional<web::TlsIdentity> kept_;
+  bool is_full_ = false;
+  std::string session_, token_;
+};
+
+TEST_F(PageCertificateTest, ANewConnectionIsShownTheNewOneAndTheLogHasBothFingerprints) {
+  ASSERT_EQ(Shown(), own_.fingerprint);
+  for (const char* key : {"rsa:2048", "ec -pkeyopt ec_paramgen_curve:P-256"}) {
+    const std::string before = Shown();
+    const Certificate made = Made(key);
+    EXPECT_THAT(Put(made.chain, made.key), HasSubstr("HTTP/1.1 200"));
+    EXPECT_EQ(Shown(), made.fingerprint);
+    ASSERT_TRUE(kept_);
+    EXPECT_EQ(kept_->key_pem, made.key);
+    EXPECT_EQ(kept_->fingerprint, made.fingerprint);
+    const std::string told = Ask("GET", "/api/v1/certificate");
+    EXPECT_EQ(JsonOf(told)["fingerprint"], made.fingerprint);
+    EXPECT_EQ(JsonOf(told)["subject"], "CN=room 1");
+    EXPECT_EQ(JsonOf(told)["replaceable"], true);
+    const std::string log = Ask("GET", "/api/v1/audit");
+    EXPECT_THAT(log, HasSubstr("certificate.replace"));
+    EXPECT_THAT(log, HasSubstr(before + " -> " + made.fingerprint));
+    EXPECT_THAT(told + log, Not(HasSubstr("PRIVATE"))) << "the key never comes back";
+  }
+}
+
+TEST_F(PageCertificateTest, ASelfMadeOneIsNewEachTime) {
+  EXPECT_THAT(Ask("POST", "/api/v1/certificate/new", {{"password", "another password"}}),
+              HasSubstr("HTTP/1.1 403"));
+  ExpectNothingChanged();
+  EXPECT_THAT(Ask("POST", "/api/v1/certificate/new", {{"password", kPassword}}),
+              HasSubstr("HTTP/1.1 200"));
+  ASSERT_TRUE(kept_);
+  EXPECT_NE(kept_->fingerprint, own_.fingerprint);
+  EXPECT_EQ(Shown(), kept_->fingerprint);
+  EXPECT_THAT(Ask("GET", "/api/v1/audit"),
+              HasSubstr(own_.fingerprint + " -> " + kept_->fingerprint));
+}
+
+TEST_F(PageCertificateTest, AWrongPasswordChangesNothing) {
+  const Certificate made = Made("rsa:2048");
+  EXPECT_THAT(Put(made.chain, made.key, "another password"), HasSubstr("HTTP/1.1 403"));
+  ExpectNothingChanged();
+}
+
+TEST_F(PageCertificateTest, WhatCannotBeServedIsRefusedWithTheReason) {
+  const Certificate made = Made("rsa:2048");
+  const auto expect_refused = [this](const std::string& answer, const char* why) {
+    EXPECT_THAT(answer, HasSubstr("HTTP/1.1 400")) << why;
+    EXPECT_THAT(answer, HasSubstr(why));
+  };
+  expect_refused(Put(made.chain, own_.key_pem), "not that of the certificate");
+  expect_refused(Put(made.chain, "no key"), "holds no key");
+  expect_refused(Put("garbage", made.key), "holds no certificate");
+  expect_refused(Put(made.key, made.key), "holds no certificate");
+  expect_refused(Put("", made.key), "certificate must have 1 to 32768 bytes");
+  expect_refused(Put(std::string(32769, 'A'), made.key), "certificate must have 1 to 32768 bytes");
+  expect_refused(Put(std::string(32768, 'A'), made.key), "holds no certificate");
+  expect_refused(Put(made.chain, std::string(16385, 'A')), "key must have 1 to 16384 bytes");
+  const Certificate weak = Made("rsa:1024");
+  expect_refused(Put(weak.chain, weak.key), "1024 bits");
+  ExpectNothingChanged();
+}
+
+TEST_F(PageCertificateTest, AFullDiskIsToldAndTheOneBeforeStays) {
+  is_full_ = true;
+  const Certificate made = Made("rsa:2048");
+  const std::string answer = Put(made.chain, made.key);
+  EXPECT_THAT(answer, HasSubstr("HTTP/1.1 500"));
+  EXPECT_THAT(answer, HasSubstr("no space left on the disk"));
+  ExpectNothingChanged();
+}
+
+/// Without TLS, or where the configuration names the certificate.
+class FixedCertificateTest : public WebTest {};
+
+TEST_F(FixedCertificateTest, ItIsRefusedAndSaysWhy) {
+  Start();
+  SetUpAccounts();
+  HttpClient engineer = LoggedIn("engineer");
+  EXPECT_EQ(engineer.Get("/api/v1/certificate").json()["replaceable"], false);
+  const HttpAnswer answer = engineer.Post("/api/v1/certificate/new", {{"password", kPassword}});
+  EXPECT_EQ(answer.status, 409);
+  EXPECT_THAT(answer.body, HasSubstr("web.tls_certificate"));
+  for (const char* name : {"technician", "physicist"}) {
+    HttpClient other = LoggedIn(name);
+    EXPECT_EQ(other.Post("/api/v1/certificate/new", {{"password", kPassword}}).status, 403) << name;
+    EXPECT_EQ(other.Put("/api/v1/certificate", json::object()).status, 403) << name;
+    EXPECT_EQ(other.Get("/api/v1/certificate").status, 403) << name;
+  }
+}
+
+TEST(UsableTlsIdentityTest, IsOnlyOneThatIsValidNow) {
+  const web::TlsIdentity own = web::MakeTlsIdentity({});  // from 2020 on
+  const auto at = [&](std::time_t time) {
+    return web::UsableTlsIdentity(own.certificate_pem, own.key_pem,
+                                  std::chrono::system_clock::from_time_t(time))
+        .fingerprint;
+  };
+  const std::time_t end = web::FactsOfCertificate(own.certificate_pem).valid_until;
+  using plumb::testing::MessageOf;
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)at(1577836799); }), HasSubstr("valid only from"));
+  EXPECT_EQ(at(1577836800), own.fingerprint);
+  EXPECT_EQ(at(end - 1), own.fingerprint);
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)at(end); }), HasSubstr("ended on"));
+}
+
+}  // namespace
+}  // namespace plumb::test

@@ -1,0 +1,65 @@
+// The certificate by which browsers know the appliance, and another one in its place.
+import { get, post, put } from '../api.js';
+import { clear, done, field, form, h, localTime, select } from '../dom.js';
+import { S } from '../strings.js';
+
+const kMaxChain = 32 * 1024;
+const kMaxKey = 16 * 1024;
+
+/// Line ends as other systems write them are taken too.
+async function pemOf(input, max) {
+  const [file] = input.files;
+  if (file.size > max) throw new Error(S.certificate.tooLarge(file.name));
+  return (await file.text()).replaceAll('\r', '');
+}
+
+function fileInput() {
+  return h('input', { type: 'file', accept: '.pem,.crt,.cer,.key', required: true });
+}
+
+/// With the password again: who holds the key is the appliance to every browser.
+function change(load) {
+  const text = S.certificate;
+  const chain = fileInput();
+  const key = fileInput();
+  const files = h('div', {}, field(text.chain, chain), field(text.key, key));
+  const choice = select(text.choices, 'given', {
+    onchange: () => {
+      const given = choice.value === 'given';
+      files.hidden = !given;
+      for (const input of [chain, key]) input.disabled = !given;
+    },
+  });
+  const password = h('input', {
+    type: 'password', required: true, maxlength: 128, autocomplete: 'current-password',
+  });
+  return form({ class: 'form' }, async () => {
+    const body = { password: password.value };
+    password.value = '';
+    if (choice.value === 'given') {
+      body.certificate = await pemOf(chain, kMaxChain);
+      body.key = await pemOf(key, kMaxKey);
+      await put('certificate', body);
+    } else {
+      await post('certificate/new', body);
+    }
+    done(text.replaced);
+    await load();
+  }, field(text.which, choice), files, field(S.result.acceptPassword, password),
+  h('div', { class: 'row' }, h('button', { class: 'danger' }, text.submit)));
+}
+
+export function certificateCard() {
+  const text = S.certificate;
+  const place = h('section', { class: 'card certificate' });
+  const load = async () => {
+    const now = await get('certificate', true);
+    clear(place, h('h2', {}, text.title), h('p', { class: 'hint' }, text.hint),
+      now.fingerprint && h('p', {}, `${text.fingerprint}: `, h('code', {}, now.fingerprint)),
+      now.subject && h('p', {}, `${text.subject}: ${now.subject}. ${text.validUntil}: `,
+        `${localTime(now.valid_until)}.`),
+      now.replaceable ? change(load) : h('p', {}, text.fixed));
+  };
+  load().catch((error) => clear(place, error.message));
+  return place;
+}
