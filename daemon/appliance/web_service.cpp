@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "daemon/appliance/diagnostics.hpp"
 #include "daemon/appliance/reports.hpp"
-#include "daemon/config/version.hpp"
 #include "daemon/files/compact_map.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/loop/loop_report.hpp"
@@ -489,8 +489,6 @@ void WebService::ChangeSettings(const web::Actor& actor, const web::Settings& se
          [=](Store& store) { return store.ChangeSettings(actor, settings), std::string(); });
 }
 
-/// Versions, status, health and the audit log's actions: nothing of a patient, no names of scans'
-/// owners.
 void WebService::WriteDiagnostics(const web::Actor& actor, web::Done done) {
   const std::string status = appliance_.StatusJson();
   const std::string loop = LoopTable(appliance_.loop().meter());
@@ -501,11 +499,7 @@ void WebService::WriteDiagnostics(const web::Actor& actor, web::Done done) {
     done(answer);
   };
   Change(report, [=](Store& store) {
-    std::string text =
-        fmt::format("plumbd {}\nhealth: {}\nstatus: {}\n\nthe event loop:\n{}\nlast actions:\n",
-                    Version(), health.ok ? "ok" : health.reason, status, loop);
-    for (const web::AuditEntry& entry : store.Audit(0, 500))
-      text += fmt::format("{} {} {}\n", entry.number, entry.action, entry.subject);
+    const std::string text = DiagnosticsText(status, health, loop, store.Audit(0, 500));
     std::string name =
         (std::filesystem::temp_directory_path() / "plumb-diagnostics-XXXXXX").string();
     const int fd = ::mkstemp(name.data());

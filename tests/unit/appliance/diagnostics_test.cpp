@@ -1,0 +1,46 @@
+// The diagnostics hold nothing of a patient and no account.
+#include "daemon/appliance/diagnostics.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+namespace plumb {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(DiagnosticsTest, HoldHowTheApplianceDoesAndNothingOfPatientsOrAccounts) {
+  const nlohmann::json status = {{"state", "result"},
+                                 {"sensor", {{"serial", "ABC123"}}},
+                                 {"scan", {{"id", "000777"}}},
+                                 {"later", "a field that nobody thought of"},
+                                 {"last_result",
+                                  {{"scan", "000777"},
+                                   {"verdict", "move"},
+                                   {"vertical_mm", 8.57},
+                                   {"reasons", {"the left arm moved"}},
+                                   {"frames", 301}}}};
+  web::AuditEntry entry;
+  entry.number = 12;
+  entry.user = "anna";
+  entry.action = "patient.add";
+  entry.subject = "PAT-0042";
+  entry.detail = "left breast";
+  web::Health health;
+  health.ok = false;
+  health.reason = "the disk is full";
+  const std::string text = DiagnosticsText(status.dump(), health, "turns 5", {entry});
+  for (const char* held : {"the disk is full", "ABC123", "\"frames\":301", "turns 5",
+                           "12 patient.add", "\"state\":\"result\""})
+    EXPECT_THAT(text, HasSubstr(held));
+  for (const char* not_held : {"000777", "\"move\"", "8.57", "left arm", "anna", "PAT-0042",
+                               "left breast", "nobody thought of"})
+    EXPECT_THAT(text, Not(HasSubstr(not_held)));
+  EXPECT_THAT(DiagnosticsText(R"({"last_result": null})", health, "", {}),
+              HasSubstr("\"last_result\":{}"));
+}
+
+}  // namespace
+}  // namespace plumb
