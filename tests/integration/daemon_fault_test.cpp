@@ -369,6 +369,39 @@ TEST_F(DaemonFaultTest, ACorruptDatabaseIsSafeModeAndTouchesNothing) {
   EXPECT_TRUE(fs::exists(folder_ / "state" / "scans" / "000001" / "scene"));
 }
 
+TEST_F(DaemonFaultTest, DamageInAFolderWhoseNameIsNoUtf8IsToldAndNotTheEnd) {
+  const fs::path state = folder_ /
+                         "archivo_se\xF1"
+                         "al";
+  fs::create_directories(state);
+  std::ofstream(state / "plumb.db") << std::string(50000, 'x');
+  Plumbd plumbd(folder_.path(), {.state = state});
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(), HasSubstr("damaged"));
+  EXPECT_EQ(plumbd.Press()["ok"], false) << "a refusal that quotes the reason";
+  EXPECT_EQ(plumbd.Status()["state"], "fault") << "still up";
+  EXPECT_EQ(plumbd.Stop(), 0);
+}
+
+TEST_F(DaemonFaultTest, WhatItStoresIsForItsAccountAndItsGroupWhateverTheUmask) {
+  const mode_t before = ::umask(0);
+  Plumbd plumbd(folder_.path());
+  ::umask(before);
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  plumbd.WaitForState("ready");
+  (void)plumbd.ScanOnce();
+  EXPECT_EQ(plumbd.Stop(), 0);
+  const fs::path state = plumbd.state();
+  EXPECT_EQ(fs::status(state).permissions(), fs::perms(0750));
+  int num_files = 0;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(state)) {
+    const auto mode = static_cast<unsigned>(entry.symlink_status().permissions());
+    EXPECT_EQ(mode & ~(entry.is_directory() ? 0750U : 0640U), 0U) << entry.path();
+    num_files += entry.is_regular_file() ? 1 : 0;
+  }
+  EXPECT_GT(num_files, 5);
+}
+
 TEST_F(DaemonFaultTest, ASecondPlumbdOnTheSameFolderIsSafeModeAndTheFirstGoesOn) {
   std::ofstream(folder_ / "plumb.toml")
       << "[appliance]\nauto_stop_s = 100\n";  // the second one may take long to start
