@@ -17,7 +17,7 @@ struct ErrorImageOptions {
   double tolerance_m = 3 * kMillimetre;  ///< The signed scale is tied to it; > 0.
   bool paper_colors = false;  ///< The paper's scale instead: |e|, blue at 0, red at 10 cm.
   std::string title = "Height error: current \u2212 reference";
-  std::string subtitle;
+  std::string subtitle = {};
   const HeightMap* relief =
       nullptr;  ///< Heights on the same grid, whose shape shades the colours a little.
   std::span<const std::uint8_t> region_mask =

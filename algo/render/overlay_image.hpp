@@ -15,7 +15,7 @@ namespace plumb {
 struct OverlayImageOptions {
   double tolerance_m = 3 * kMillimetre;  ///< Surfaces closer than this look like one (violet); > 0.
   std::string title = "Overlay: reference blue, current red";
-  std::string subtitle;
+  std::string subtitle = {};
   std::span<const std::uint8_t> region_mask = {};  ///< Cells inside the region (1), as the grid:
                                                    ///< with 10 cm around it they fill the picture.
 };

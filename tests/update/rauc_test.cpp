@@ -116,7 +116,9 @@ class RaucTest : public ::testing::Test {
     ASSERT_EQ(::seteuid(kNobody), 0);
   }
   void TearDown() override {
-    if (::geteuid() == kNobody) ASSERT_EQ(::seteuid(0), 0);
+    if (::geteuid() == kNobody) {
+      ASSERT_EQ(::seteuid(0), 0);
+    }
   }
 
   void StartRauc() {

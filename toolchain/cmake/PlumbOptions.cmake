@@ -17,6 +17,12 @@ target_include_directories(plumb_options INTERFACE
 # -ffp-contract=off: no fused multiply-add behind our back, so results agree between machines.
 target_compile_options(plumb_options INTERFACE
   $<BUILD_INTERFACE:-Wall;-Wextra;-Wshadow;-Wnon-virtual-dtor> -ffp-contract=off)
+# The presets make warnings errors, but for what GCC 12 sees where nothing is: in inlined std::string
+# and std::vector of its own library, and in optional and Eigen values that are set before use.
+if(CMAKE_COMPILE_WARNING_AS_ERROR AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(plumb_options INTERFACE
+    $<BUILD_INTERFACE:-Wno-error=restrict;-Wno-error=stringop-overflow;-Wno-error=maybe-uninitialized>)
+endif()
 
 # Position-independent code, so that one set of objects serves the programs and the Python module.
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)

@@ -46,6 +46,13 @@ class FakeRestart : public SystemRestart {
   std::string failure;
 };
 
+web::Scan ScanOf(bool check_overdue) {
+  web::Scan scan;
+  scan.id = "1";
+  scan.check_overdue = check_overdue;
+  return scan;
+}
+
 class ApplianceTest : public ::testing::Test {
  protected:
   ApplianceTest() {
@@ -277,8 +284,8 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
           tess, appliance_->WebStatus().sensor.serial,
           CheckJson({.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}, {}));
       EXPECT_EQ(appliance_->WebStatus().reference_block, "");
-      EXPECT_EQ(appliance_->WhyNoReference(web::Scan{.id = "1"}), "");
-      EXPECT_THAT(appliance_->WhyNoReference(web::Scan{.id = "1", .check_overdue = true}),
+      EXPECT_EQ(appliance_->WhyNoReference(ScanOf(false)), "");
+      EXPECT_THAT(appliance_->WhyNoReference(ScanOf(true)),
                   ::testing::HasSubstr("scan the reference again"))
           << "of a scan from before the check";
       (void)appliance_->CloseSession(tess);
@@ -295,7 +302,7 @@ TEST_F(ApplianceTest, TheDemoNeedsNoCheckForItsReference) {
     On([&] {
       EXPECT_TRUE(appliance_->WebStatus().check_overdue);
       EXPECT_EQ(appliance_->WebStatus().reference_block, "");
-      EXPECT_EQ(appliance_->WhyNoReference(web::Scan{.id = "1", .check_overdue = true}), "");
+      EXPECT_EQ(appliance_->WhyNoReference(ScanOf(true)), "");
     });
   });
 }
