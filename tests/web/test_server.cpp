@@ -317,7 +317,9 @@ int Serve(const fs::path& root) {
   service.status.is_room_known = true;
   service.sweep = std::chrono::milliseconds(1500);
   service.profiles = KnownSensor();
-  service.update = {true, "", "A", false, 0.0, {"plumb-0.2.0.raucb"}};
+  service.update.supported = true;
+  service.update.slot = "A";
+  service.update.bundles = {"plumb-0.2.0.raucb"};
   web::HttpServerOptions options;
   options.password_memory_bytes = 1 << 20;
   options.password_operations = 1;
