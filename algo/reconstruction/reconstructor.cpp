@@ -12,16 +12,16 @@
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
-#include "algo/geometry/back_projection.hpp"
 #include "algo/markers/sweep_tone.hpp"
+#include "algo/reconstruction/corrected_views.hpp"
 #include "algo/reconstruction/height_map_builder.hpp"
 #include "algo/reconstruction/joint_registration.hpp"
 #include "algo/reconstruction/paper_reconstruction.hpp"
+#include "algo/reconstruction/scene_assembly.hpp"
 #include "algo/reconstruction/surface_cloud.hpp"
 #include "algo/reconstruction/surface_mesh.hpp"
 #include "algo/reconstruction/trajectory.hpp"
 #include "algo/reconstruction/view_surface.hpp"
-#include "algo/sensor_model/depth_correction.hpp"
 #include "algo/tracking/tracker.hpp"
 #include "algo/types/marker_dictionary.hpp"
 
@@ -29,14 +29,9 @@ namespace plumb {
 namespace {
 
 constexpr std::size_t kMaxPaperKeyframes = 20;  // The paper had about 15 a sweep.
-// Of the reference marker, before the scene's frame is built on it. A sensor that hardly moves has
-// one keyframe, so frames count too.
-constexpr int kMinReferenceViews = 3;
-constexpr int kMinReferenceFrames = 5;
 // Edges of markers once the tone curve and the edge shift are measured: what changes with blur and
 // exposure is left.
 constexpr double kMeasuredEdgeSigma_px = 0.01;
-constexpr double kGapWorthTelling_s = 0.5;  // A comparison refuses above 1 s.
 
 TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
   TrackerOptions tracking;
@@ -46,41 +41,6 @@ TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
   tracking.keyframe_angle_rad *= options.keyframe_spacing;
   tracking.min_tracked_share = 1.0 - options.keyframe_spacing * (1.0 - tracking.min_tracked_share);
   return tracking;
-}
-
-// Depth as the calibration corrects it, as a camera at the stamp would have measured it in one
-// instant: each pixel takes its value from where the moving camera's row saw that point.
-cv::Mat CorrectedDepth(const cv::Mat& depth_m, const DepthCorrection& correction, double readout_s,
-                       const Intrinsics& intrinsics, const RayTable& rays,
-                       const Vector6d& velocity_per_s) {
-  cv::Mat corrected = cv::Mat::zeros(depth_m.size(), CV_32FC1);
-  const Eigen::Vector3f w = velocity_per_s.head<3>().cast<float>();
-  const Eigen::Vector3f v = velocity_per_s.tail<3>().cast<float>();
-  const auto fx = static_cast<float>(intrinsics.fx);
-  const auto fy = static_cast<float>(intrinsics.fy);
-  for (int r = 0; r < depth_m.rows; ++r) {
-    const float* here = depth_m.ptr<float>(r);
-    float* out = corrected.ptr<float>(r);
-    const Eigen::Vector2f* ray = rays.row(r);
-    const auto late_s = static_cast<float>(readout_s * ((r + 0.5) / depth_m.rows - 0.5));
-    for (int c = 0; c < depth_m.cols; ++c) {
-      if (here[c] <= 0) continue;
-      const Eigen::Vector3f p(ray[c].x() * here[c], ray[c].y() * here[c], here[c]);
-      const Eigen::Vector3f moved = late_s * (w.cross(p) + v);
-      // Where this row saw the point that the instant camera sees in this pixel.
-      const int x =
-          c - static_cast<int>(std::lround(fx * (moved.x() - ray[c].x() * moved.z()) / here[c]));
-      const int y =
-          r - static_cast<int>(std::lround(fy * (moved.y() - ray[c].y() * moved.z()) / here[c]));
-      if (x < 0 || y < 0 || x >= depth_m.cols || y >= depth_m.rows) continue;
-      const float z = depth_m.at<float>(y, x);
-      if (z <= 0) continue;
-      const double metric =
-          correction.Correct(static_cast<std::size_t>(y * depth_m.cols + x), z) + moved.z();
-      if (metric > 0) out[c] = static_cast<float>(metric);
-    }
-  }
-  return corrected;
 }
 
 double Median(std::vector<double> values) {
@@ -290,8 +250,9 @@ struct Reconstructor::Impl {
     if (options.on_learned && joint.accepted)
       options.on_learned(Learn(options.profile.value_or(ProfileOfAnyUnit(info.intrinsics)),
                                joint_options.prior, joint.evidence));
-    scene = MakeScene(frames, map, joint.calibration, SceneFromWorld(map));
-    WarnOfFrame(map, scene);
+    scene = MakeScene(info, options.preset, dropped, frames, map, joint.calibration,
+                      SceneFromWorld(info, map));
+    WarnOfFrame(info, map, scene);
     if (options.profile)
       scene.sensor_profile =
           fmt::format("{}, {} sweep{}", options.profile->name, options.profile->num_sweeps,
@@ -319,7 +280,9 @@ struct Reconstructor::Impl {
     ViewSurfaceOptions view_options;
     view_options.stop = stop;
     const std::vector<ViewSurface> surfaces =
-        PrepareViews(Views(map, joint.calibration, SceneFromWorld(map)), view_options);
+        PrepareViews(CorrectedViews(map, info.intrinsics, joint.calibration,
+                                    SceneFromWorld(info, map), options.keep_color),
+                     view_options);
     SurfaceCloudOptions cloud_options;
     cloud_options.with_colors = options.keep_color;
     cloud_options.stop = stop;
@@ -370,13 +333,13 @@ struct Reconstructor::Impl {
     const Pose T_scene_world =
         paper.T_marker_world.value_or(map.keyframes.front().T_world_color.inverse());
     timings.merge(scene.timings_s);
-    scene = MakeScene(frames, map, stated, T_scene_world);
+    scene = MakeScene(info, options.preset, dropped, frames, map, stated, T_scene_world);
     scene.timings_s = timings;
     scene.frame = paper.T_marker_world ? SceneFrame::kReferenceMarker : SceneFrame::kFirstKeyframe;
     scene.markers = paper.markers_in_world;
     for (auto& [id, marker] : scene.markers)
       for (Eigen::Vector3d& corner : marker.corners) corner = T_scene_world * corner;
-    WarnOfFrame(map, scene);
+    WarnOfFrame(info, map, scene);
     scene.keyframes.clear();
     std::vector<DepthView> views;
     for (std::size_t j = 0; j < keyframes.size(); ++j) {
@@ -390,20 +353,6 @@ struct Reconstructor::Impl {
     if (scene.cloud.empty())
       throw DataError(WhyNoSurface(PrepareViews(views), Median(median_depths_m)));
     if (paper.height_map) KeepHeightMap(*paper.height_map, scene);
-  }
-
-  // Only a map that shows something: one without cells cannot even be stored, and an empty one
-  // compares with nothing.
-  static void KeepHeightMap(HeightMap map, Scene& scene) {
-    if (std::any_of(map.z.begin(), map.z.end(), [](float z) { return std::isfinite(z); })) {
-      scene.height_map = std::move(map);
-      return;
-    }
-    scene.warnings.push_back(fmt::format(
-        "no surface was measured around reference marker {}, up to some decimetres below and above "
-        "it: the scene has no height "
-        "map and cannot be a reference; lay the marker flat beside the body and sweep over both",
-        scene.reference_marker.value_or(-1)));
   }
 
   // Evenly spread over the sweep; of each stretch the keyframe that sees the most markers, because
@@ -424,120 +373,6 @@ struct Reconstructor::Impl {
       keyframes.back().view.T_world_camera = DepthPose(*best, stated);
     }
     return keyframes;
-  }
-
-  [[nodiscard]] bool HasReferenceMarker(const TrackingMap& map) const {
-    if (!info.reference_marker) return false;
-    const auto found = map.markers.find(*info.reference_marker);
-    return found != map.markers.end() && (found->second.num_views >= kMinReferenceViews ||
-                                          found->second.num_frames >= kMinReferenceFrames);
-  }
-
-  [[nodiscard]] Pose SceneFromWorld(const TrackingMap& map) const {
-    if (HasReferenceMarker(map))
-      return map.markers.at(*info.reference_marker).T_world_marker.inverse();
-    return map.keyframes.front().T_world_color.inverse();
-  }
-
-  Scene MakeScene(const std::vector<TrackedFrame>& frames, const TrackingMap& map,
-                  const CalibrationModel& calibration, const Pose& T_scene_world) const {
-    Scene scene;
-    scene.preset = options.preset;
-    scene.frame =
-        HasReferenceMarker(map) ? SceneFrame::kReferenceMarker : SceneFrame::kFirstKeyframe;
-    scene.marker_dictionary = info.marker_dictionary;
-    scene.marker_length_m = info.marker_length_m;
-    scene.reference_marker = info.reference_marker;
-    scene.warnings = info.warnings;
-    for (const MapKeyframe& keyframe : map.keyframes)
-      scene.keyframes.push_back(
-          {keyframe.data.depth_time_s, T_scene_world * DepthPose(keyframe, calibration)});
-    scene.trajectory = DepthTrajectory(frames, map, calibration, T_scene_world);
-    scene.frames_total = static_cast<std::int64_t>(frames.size()) + dropped;
-    scene.frames_tracked = static_cast<std::int64_t>(scene.trajectory.size());
-    scene.frames_dropped = dropped;
-    scene.longest_lost_s = LongestLost(frames);
-    for (const auto& [id, marker] : map.markers)
-      scene.markers[id] = ToSceneMarker(marker, T_scene_world);
-    if (scene.frames_tracked < scene.frames_total - dropped) {
-      scene.warnings.push_back(fmt::format("{} of {} frames were not tracked, {:.2f} s at longest",
-                                           scene.frames_total - dropped - scene.frames_tracked,
-                                           scene.frames_total - dropped, scene.longest_lost_s));
-    } else if (scene.longest_lost_s > kGapWorthTelling_s) {
-      scene.warnings.push_back(fmt::format(
-          "no image came for {:.2f} s in the sweep; what the sensor passed meanwhile is missing",
-          scene.longest_lost_s));
-    }
-    return scene;
-  }
-
-  // On the frame that was decided in the end, which the presets do differently.
-  void WarnOfFrame(const TrackingMap& map, Scene& scene) const {
-    if (scene.markers.empty()) {
-      scene.warnings.push_back(
-          "no marker was seen: the scene lies in the first keyframe's frame and cannot be "
-          "compared");
-    } else if (!info.reference_marker) {
-      scene.warnings.push_back(
-          "no reference marker is configured: the scene lies in the first keyframe's frame, "
-          "without a height map");
-    } else if (scene.frame == SceneFrame::kFirstKeyframe && options.preset == Preset::kPaper) {
-      scene.warnings.push_back(
-          fmt::format("no keyframe measured reference marker {} in depth at all its corners: the "
-                      "scene lies in the first keyframe's frame, "
-                      "without a height map; keep the marker in view",
-                      *info.reference_marker));
-    } else if (scene.frame == SceneFrame::kFirstKeyframe) {
-      const auto found = map.markers.find(*info.reference_marker);
-      const MapMarker seen = found == map.markers.end() ? MapMarker{} : found->second;
-      scene.warnings.push_back(
-          fmt::format("reference marker {} was seen in {} keyframes and {} tracked frames, {} or "
-                      "{} are needed: the scene lies in the first "
-                      "keyframe's frame, without a height map; keep the marker in view",
-                      *info.reference_marker, seen.num_views, seen.num_frames, kMinReferenceViews,
-                      kMinReferenceFrames));
-    } else if (const int views = scene.markers.at(*info.reference_marker).num_views;
-               views < kMinReferenceViews) {
-      scene.warnings.push_back(
-          fmt::format("reference marker {} was seen from {} place{} only: the scene's frame is "
-                      "less certain than that of a sweep",
-                      *info.reference_marker, views, views == 1 ? "" : "s"));
-    }
-  }
-
-  [[nodiscard]] SceneMarker ToSceneMarker(const MapMarker& marker,
-                                          const Pose& T_scene_world) const {
-    SceneMarker result;
-    const MarkerCorners corners = CornersInMarkerFrame(info.marker_length_m);
-    for (std::size_t i = 0; i < 4; ++i)
-      result.corners[i] = T_scene_world * (marker.T_world_marker * corners[i]);
-    result.num_views = marker.num_views;
-    // One view: a quarter of a pixel at arm's length, mostly in depth; more views average down to
-    // the map's own error.
-    result.sigma_m = std::hypot(0.001, 0.004 / std::sqrt(std::max(1, marker.num_views)));
-    return result;
-  }
-
-  std::vector<DepthView> Views(TrackingMap& map, const CalibrationModel& calibration,
-                               const Pose& T_scene_world) const {
-    std::vector<DepthView> views(map.keyframes.size());
-    Intrinsics corrected = calibration.Corrected(info.intrinsics);
-    const double scale = info.intrinsics.width / 640.0;
-    corrected.cx += calibration.depth[kDepthShiftX] * scale;
-    corrected.cy += calibration.depth[kDepthShiftY] * scale;
-    const RayTable rays(corrected);
-    const DepthCorrection correction(calibration, corrected.width, corrected.height, 1);
-    tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t k) {
-      MapKeyframe& keyframe = map.keyframes[k];
-      views[k].intrinsics = corrected;
-      views[k].depth_m =
-          CorrectedDepth(keyframe.data.view.depth_m, correction, calibration.depth[kDepthReadout],
-                         corrected, rays, keyframe.velocity_per_s);
-      keyframe.data.view.depth_m.release();
-      if (options.keep_color) views[k].color_rgb = keyframe.data.view.color_rgb;
-      views[k].T_world_camera = T_scene_world * DepthPose(keyframe, calibration);
-    });
-    return views;
   }
 };
 

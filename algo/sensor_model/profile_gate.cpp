@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kDaysOfDrift = 30.0;
 constexpr double kMaxDays = 3650.0;  // a clock that was never set must not make it meaningless
-// A direction in which a sweep takes away less of the variance than this tells nothing, and its
+// A direction in which a sweep takes away less of the variance than this says nothing, and its
 // share would be a quotient of rounding errors.
 constexpr double kMinTold = 0.01;
 

@@ -149,7 +149,7 @@ DriftBound LargestDrift(const TrackingMap& map, int older_keyframe) {
   return BoundOf(WayToNewest(map).at(static_cast<std::size_t>(older_keyframe)));
 }
 
-void BendMap(const std::vector<KeyframeLink>& links, TrackingMap& map) {
+void DistributeLoopError(const std::vector<KeyframeLink>& links, TrackingMap& map) {
   std::vector<KeyframeLink> all = LinksOf(map);
   all.insert(all.end(), links.begin(), links.end());
   std::vector<Pose> T_world;

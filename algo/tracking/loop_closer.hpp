@@ -1,5 +1,5 @@
-// A place seen again after a long way: which keyframes to compare with, and how to bend the map so
-// that both visits agree.
+// A place seen again after a long way: which keyframes to compare with, and how to correct the map
+// so that both visits agree.
 #pragma once
 
 #include <vector>
@@ -27,6 +27,6 @@ struct DriftBound {
 /// they stand to those that they share landmarks with or follow, and meet the links (pose graph,
 /// least squares; keyframe 0 stays). Landmarks and markers move with the keyframe that saw them
 /// first. One thread, deterministic.
-void BendMap(const std::vector<KeyframeLink>& links, TrackingMap& map);
+void DistributeLoopError(const std::vector<KeyframeLink>& links, TrackingMap& map);
 
 }  // namespace plumb

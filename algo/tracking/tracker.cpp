@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -10,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "algo/markers/marker_detector.hpp"
+#include "algo/tracking/followed_points.hpp"
 #include "algo/tracking/keypoints.hpp"
 #include "algo/tracking/local_bundle.hpp"
 #include "algo/tracking/loop_closer.hpp"
@@ -23,22 +23,15 @@ constexpr double kMaxSpeed = 2.5;  // Metres a second that a hand moves a sensor
 constexpr double kMaxTurn = 4.0;   // Radians a second.
 constexpr std::size_t kReassociated =
     3;  // Older keyframes whose landmarks are looked for in a new keyframe.
-constexpr double kSameBrightness = 0.08;    // Of the exposure: what KLT follows without help.
 constexpr double kDriftFollowed_m = 0.003;  // A drift that bundle adjustment takes out by itself,
                                             // once the old landmarks are seen again.
 constexpr double kDriftFollowed_rad = 0.001;
 constexpr int kLoopInliers =
     30;  // Features, and keypoints after them, that must agree on a place seen before.
 
-struct ActivePoint {
-  int landmark = 0;
-  Eigen::Vector2f pixel;
-};
-
 // What is made of one frame's images before its pose is known.
 struct Prepared {
-  cv::Mat gray;
-  Pyramid pyramid;
+  GrayImage image;
   DenseView dense;
   std::vector<MarkerObservation> markers;
 };
@@ -58,7 +51,6 @@ double MedianDepth(const DenseView& view) {
 struct Tracker::Impl {
   StreamInfo info;
   TrackerOptions options;
-  KeypointOptions keypoint_options;
   DenseViewMaker dense_maker;
   std::optional<MarkerDetector> detector;
 
@@ -66,7 +58,7 @@ struct Tracker::Impl {
   std::vector<TrackedFrame> frames;
 
   Pyramid last_pyramid;
-  std::vector<ActivePoint> active;
+  FollowedPoints followed_points;
   int reference = -1;               // Keyframe that frames are tracked against.
   std::size_t reference_count = 0;  // Active points when that keyframe was made.
   Pose T_world_last = Pose::Identity();
@@ -77,7 +69,10 @@ struct Tracker::Impl {
   std::vector<KeyframeLink> loops;
 
   Impl(const StreamInfo& stream, const TrackerOptions& tracker_options)
-      : info(stream), options(tracker_options), dense_maker(stream.intrinsics) {
+      : info(stream),
+        options(tracker_options),
+        dense_maker(stream.intrinsics),
+        followed_points(stream.intrinsics, map) {
     if (options.use_markers) detector.emplace(MarkerDictionary::ByName(info.marker_dictionary));
   }
 
@@ -92,10 +87,10 @@ struct Tracker::Impl {
             fmt::format("frame {}: image is {}x{}, the intrinsics are for {}x{}", frame.index,
                         image->cols, image->rows, k.width, k.height));
     Prepared prepared;
-    cv::cvtColor(frame.color_rgb, prepared.gray, cv::COLOR_RGB2GRAY);
-    prepared.pyramid = MakePyramid(prepared.gray, keypoint_options);
+    cv::cvtColor(frame.color_rgb, prepared.image.gray, cv::COLOR_RGB2GRAY);
+    prepared.image.pyramid = followed_points.PyramidOf(prepared.image.gray);
     prepared.dense = dense_maker.Make(frame.depth_m);
-    if (detector) prepared.markers = detector->Detect(prepared.gray).markers;
+    if (detector) prepared.markers = detector->Detect(prepared.image.gray).markers;
     return prepared;
   }
 
@@ -119,10 +114,10 @@ struct Tracker::Impl {
         Accept(frame, prepared, *estimate, result);
       } else {
         lost = true;
-        active.clear();
+        followed_points.SetPoints({});
       }
     }
-    last_pyramid = std::move(prepared.pyramid);
+    last_pyramid = std::move(prepared.image.pyramid);
     frames.push_back(result);
     return result;
   }
@@ -153,52 +148,6 @@ struct Tracker::Impl {
         points.push_back(point);
       }
     }
-  }
-
-  void AddKeypoints(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_guess,
-                    std::vector<ActivePoint>& followed, std::vector<PosePoint>& points) const {
-    std::vector<Eigen::Vector2f> from;
-    std::vector<Eigen::Vector2f> guesses;
-    const Pose T_camera_world = T_world_guess.inverse();
-    for (const ActivePoint& a : active) {
-      from.push_back(a.pixel);
-      const Eigen::Vector3d p =
-          T_camera_world * map.landmarks[static_cast<std::size_t>(a.landmark)].p_world;
-      guesses.push_back(p.z() > 0.05 ? Eigen::Vector2f(Project(info.intrinsics, p).cast<float>())
-                                     : a.pixel);
-    }
-    const KltResult klt = Follow(last_pyramid, prepared, from, guesses, keypoint_options.levels);
-    for (std::size_t i = 0; i < active.size(); ++i) {
-      if (!klt.found[i]) continue;
-      PosePoint point;
-      point.p_world = map.landmarks[static_cast<std::size_t>(active[i].landmark)].p_world;
-      const Eigen::Vector2d pixel = klt.points[i].cast<double>();
-      point.ideal = Undistort(info.intrinsics, pixel);
-      point.sigma = 1.2 * SigmaPx() / info.intrinsics.fx;
-      if (const double z = DepthAt(depth_m, pixel); z > 0) {
-        point.inverse_z = 1.0 / z;
-        point.inverse_z_sigma = (2.0 * DepthSigma(z, 0.8) + 0.003) / (z * z);
-      }
-      points.push_back(point);
-      followed.push_back({active[i].landmark, klt.points[i]});
-    }
-  }
-
-  // KLT; where it loses most points, once more at the new image's brightness: the exposure may have
-  // changed.
-  [[nodiscard]] KltResult Follow(const Pyramid& before, const Prepared& prepared,
-                                 const std::vector<Eigen::Vector2f>& from,
-                                 const std::vector<Eigen::Vector2f>& guesses, int max_level) const {
-    const auto num_found = [](const KltResult& klt) {
-      return std::count(klt.found.begin(), klt.found.end(), true);
-    };
-    KltResult klt = TrackKlt(before, prepared.pyramid, from, guesses, max_level, keypoint_options);
-    if (2 * num_found(klt) >= static_cast<std::ptrdiff_t>(from.size())) return klt;
-    const double ratio = BrightnessRatio(before[0], prepared.gray, from, guesses);
-    if (std::abs(ratio - 1.0) < kSameBrightness) return klt;
-    KltResult again = TrackKlt(MakePyramid(before[0] * ratio, keypoint_options), prepared.pyramid,
-                               from, guesses, max_level, keypoint_options);
-    return num_found(again) > num_found(klt) ? again : klt;
   }
 
   PoseProblem MakeProblem(const Prepared& prepared, double dt_depth_s) const {
@@ -257,19 +206,21 @@ struct Tracker::Impl {
       const std::size_t num_corners = problem.points.size();
       std::vector<ActivePoint> followed;
       if (options.use_keypoints)
-        AddKeypoints(prepared, frame.depth_m, T_guess, followed, problem.points);
+        followed_points.Follow(last_pyramid, prepared.image, frame.depth_m, T_guess, followed,
+                               problem.points);
       PoseEstimate estimate = OptimizePose(problem, T_guess);
       if (!Plausible(estimate, problem.points.size(), dt)) continue;
-      active.clear();
+      std::vector<ActivePoint> agreeing;
       for (std::size_t i = 0; i < followed.size(); ++i) {
         Landmark& landmark = map.landmarks[static_cast<std::size_t>(followed[i].landmark)];
         if (estimate.inlier[num_corners + i]) {
-          active.push_back(followed[i]);
+          agreeing.push_back(followed[i]);
         } else if (++landmark.num_rejections > 3 && landmark.num_observations < 3) {
           landmark.usable = false;
         }
       }
-      result.num_keypoints = static_cast<int>(active.size());
+      followed_points.SetPoints(std::move(agreeing));
+      result.num_keypoints = static_cast<int>(followed_points.points().size());
       result.num_markers = CountMarkers(prepared.markers, estimate);
       return estimate;
     }
@@ -303,26 +254,27 @@ struct Tracker::Impl {
     std::optional<DescribedFeatures> features;
     for (int attempt = 0; attempt < 2; ++attempt) {
       if (!found && options.use_keypoints && !features) {
-        features = DescribeFeatures(prepared.gray, frame.depth_m, info.intrinsics);
+        features = DescribeFeatures(prepared.image.gray, frame.depth_m, info.intrinsics);
         found = RelocalizeByFeatures(map, info.intrinsics, *features);
       }
       if (!found) return std::nullopt;
       reference = found->keyframe;
       PoseProblem problem = MakeProblem(prepared, 0.0);
       AddMarkerPoints(prepared.markers, problem.points);
-      active.clear();
-      Reassociate(prepared, frame.depth_m, found->T_world_color,
-                  KeyframesNear(found->T_world_color, map.keyframes.size()), problem.points);
+      followed_points.SetPoints({});
+      followed_points.Reassociate(prepared.image, frame.depth_m, found->T_world_color,
+                                  KeyframesNear(found->T_world_color, map.keyframes.size()),
+                                  problem.points);
       PoseEstimate estimate = OptimizePose(problem, found->T_world_color);
       if (Plausible(estimate, problem.points.size(), 1.0)) {
         result.num_markers = CountMarkers(prepared.markers, estimate);
-        result.num_keypoints = static_cast<int>(active.size());
+        result.num_keypoints = static_cast<int>(followed_points.points().size());
         keyframe_wanted = true;
         return estimate;
       }
       found.reset();
     }
-    active.clear();
+    followed_points.SetPoints({});
     return std::nullopt;
   }
 
@@ -370,56 +322,10 @@ struct Tracker::Impl {
       return true;
     if (RotationAngle(T_keyframe_now) > options.keyframe_angle_rad) return true;
     return options.use_keypoints &&
-           static_cast<double>(active.size()) <
+           static_cast<double>(followed_points.points().size()) <
                options.min_tracked_share * static_cast<double>(reference_count) &&
            (T_keyframe_now.translation().norm() > 0.01 || RotationAngle(T_keyframe_now) > 0.01 ||
-            active.size() < 30);
-  }
-
-  // Looks for landmarks of near older keyframes that are not being followed; adds those found to
-  // `active` and `points`.
-  void Reassociate(const Prepared& prepared, const cv::Mat& depth_m, const Pose& T_world_color,
-                   const std::vector<std::size_t>& keyframes, std::vector<PosePoint>& points) {
-    std::set<int> followed;
-    for (const ActivePoint& a : active) followed.insert(a.landmark);
-    const Pose T_camera_world = T_world_color.inverse();
-    for (const std::size_t k : keyframes) {
-      const MapKeyframe& keyframe = map.keyframes[k];
-      std::vector<int> landmarks;
-      std::vector<Eigen::Vector2f> from;
-      std::vector<Eigen::Vector2f> guesses;
-      for (const KeypointObservation& o : keyframe.keypoints) {
-        const Landmark& landmark = map.landmarks[static_cast<std::size_t>(o.landmark)];
-        if (!landmark.usable || followed.contains(o.landmark)) continue;
-        const Eigen::Vector3d p = T_camera_world * landmark.p_world;
-        if (p.z() < 0.1) continue;
-        const Eigen::Vector2d pixel = Project(info.intrinsics, p);
-        if (pixel.x() < 8 || pixel.y() < 8 || pixel.x() > info.intrinsics.width - 9 ||
-            pixel.y() > info.intrinsics.height - 9)
-          continue;
-        const double z = DepthAt(depth_m, pixel);
-        if (z > 0 && std::abs(z - p.z()) > 0.03 * z + 0.01)
-          continue;  // Hidden, or another surface.
-        landmarks.push_back(o.landmark);
-        from.push_back(o.pixel.cast<float>());
-        guesses.push_back(pixel.cast<float>());
-      }
-      if (landmarks.empty()) continue;
-      const KltResult klt =
-          Follow(MakePyramid(keyframe.gray, keypoint_options), prepared, from, guesses, 1);
-      for (std::size_t i = 0; i < landmarks.size(); ++i) {
-        if (!klt.found[i] ||
-            (klt.points[i] - guesses[i]).norm() > 6.0F * static_cast<float>(SigmaPx()))
-          continue;
-        followed.insert(landmarks[i]);
-        active.push_back({landmarks[i], klt.points[i]});
-        PosePoint point;
-        point.p_world = map.landmarks[static_cast<std::size_t>(landmarks[i])].p_world;
-        point.ideal = Undistort(info.intrinsics, klt.points[i].cast<double>());
-        point.sigma = 2.0 * SigmaPx() / info.intrinsics.fx;
-        points.push_back(point);
-      }
-    }
+            followed_points.points().size() < 30);
   }
 
   // Nearest by pose of the first `count` keyframes that see about the same, the reference itself
@@ -456,12 +362,13 @@ struct Tracker::Impl {
     keyframe.velocity_per_s = velocity;
     keyframe.dense = prepared.dense;
     keyframe.median_depth_m = MedianDepth(prepared.dense);
-    keyframe.gray = prepared.gray;
+    keyframe.gray = prepared.image.gray;
     const int index = static_cast<int>(map.keyframes.size());
     if (options.use_keypoints) {
       AssociateKeyframe(prepared, frame.depth_m, T_world_color, keyframe);
-      AddCorners(prepared, frame.depth_m, index, keyframe);
-      DescribedFeatures features = DescribeFeatures(prepared.gray, frame.depth_m, info.intrinsics);
+      followed_points.AddCorners(prepared.image, frame.depth_m, index, keyframe);
+      DescribedFeatures features =
+          DescribeFeatures(prepared.image.gray, frame.depth_m, info.intrinsics);
       keyframe.features_px = std::move(features.pixels);
       keyframe.features_camera = std::move(features.in_camera);
       keyframe.descriptors = features.descriptors;
@@ -481,7 +388,7 @@ struct Tracker::Impl {
     lost = false;
     AdjustLocally(index);
     if (options.use_keypoints) CloseLoop(prepared, index);
-    reference_count = active.size();
+    reference_count = followed_points.points().size();
     const Pose T_adjusted = map.keyframes.back().T_world_color;
     T_world_last = T_adjusted;
     last_time_s = frame.color_time_s;
@@ -513,15 +420,16 @@ struct Tracker::Impl {
       const Pose& T_world_old =
           map.keyframes[static_cast<std::size_t>(found->keyframe)].T_world_color;
       loops.push_back({found->keyframe, index, T_world_old.inverse() * *T_world_seen});
-      BendMap(loops, map);
+      DistributeLoopError(loops, map);
     }
 
     MapKeyframe& keyframe = map.keyframes.back();
-    const std::size_t known = active.size();
+    const std::size_t known = followed_points.points().size();
     std::vector<PosePoint> points;
-    Reassociate(prepared, keyframe.data.view.depth_m, keyframe.T_world_color,
-                KeyframesNear(keyframe.T_world_color, map.keyframes.size()), points);
-    Observe(points, known, keyframe);
+    followed_points.Reassociate(prepared.image, keyframe.data.view.depth_m, keyframe.T_world_color,
+                                KeyframesNear(keyframe.T_world_color, map.keyframes.size()),
+                                points);
+    followed_points.Observe(points, known, keyframe);
     AdjustLocally(index);
   }
 
@@ -529,15 +437,17 @@ struct Tracker::Impl {
   // depth. Nothing if they do not agree well.
   std::optional<Pose> SeenFrom(int older, const Pose& T_world_guess, const Prepared& prepared,
                                const MapKeyframe& newest) {
-    const std::vector<ActivePoint> followed = std::exchange(active, {});
+    const std::vector<ActivePoint> followed = followed_points.points();
+    followed_points.SetPoints({});
     const int followed_reference = std::exchange(reference, older);
     PoseProblem problem =
         MakeProblem(prepared, newest.data.depth_time_s - newest.data.color_time_s);
     reference = -1;  // None is left out.
-    Reassociate(prepared, newest.data.view.depth_m, T_world_guess,
-                KeyframesNear(T_world_guess, static_cast<std::size_t>(older) + 4), problem.points);
+    followed_points.Reassociate(prepared.image, newest.data.view.depth_m, T_world_guess,
+                                KeyframesNear(T_world_guess, static_cast<std::size_t>(older) + 4),
+                                problem.points);
     const PoseEstimate estimate = OptimizePose(problem, T_world_guess);
-    active = followed;
+    followed_points.SetPoints(followed);
     reference = followed_reference;
     const bool by_depth =
         !options.use_dense || (estimate.num_dense > 300 && estimate.dense_rms_m < 0.015);
@@ -550,59 +460,13 @@ struct Tracker::Impl {
   // Landmarks seen in a new keyframe: those followed, and those of older keyframes found again.
   void AssociateKeyframe(const Prepared& prepared, const cv::Mat& depth_m,
                          const Pose& T_world_color, MapKeyframe& keyframe) {
-    const std::size_t followed = active.size();
+    const std::size_t followed = followed_points.points().size();
     std::vector<PosePoint> found;
-    Reassociate(prepared, depth_m, T_world_color,
-                KeyframesNear(T_world_color, map.keyframes.size()), found);
-    for (std::size_t i = 0; i < followed; ++i) AddObservation(active[i], keyframe);
-    Observe(found, followed, keyframe);
-  }
-
-  void AddObservation(const ActivePoint& a, MapKeyframe& keyframe) {
-    const Eigen::Vector2d pixel = a.pixel.cast<double>();
-    keyframe.keypoints.push_back(
-        {a.landmark, pixel, SurfaceDepthAt(keyframe.data.view.depth_m, pixel)});
-    ++map.landmarks[static_cast<std::size_t>(a.landmark)].num_observations;
-  }
-
-  // Of the active points, those from `first` on were found again, at `found`: the ones that fit the
-  // pose are seen in the keyframe.
-  void Observe(const std::vector<PosePoint>& found, std::size_t first, MapKeyframe& keyframe) {
-    std::vector<ActivePoint> kept(active.begin(),
-                                  active.begin() + static_cast<std::ptrdiff_t>(first));
-    const Pose T_camera_world = keyframe.T_world_color.inverse();
-    for (std::size_t i = first; i < active.size(); ++i) {
-      const PosePoint& point = found[i - first];
-      const Eigen::Vector3d p = T_camera_world * point.p_world;
-      if ((p.head<2>() / p.z() - point.ideal).norm() * info.intrinsics.fx >= 4.0 * SigmaPx())
-        continue;
-      kept.push_back(active[i]);
-      AddObservation(active[i], keyframe);
-    }
-    active = std::move(kept);
-  }
-
-  void AddCorners(const Prepared& prepared, const cv::Mat& depth_m, int index,
-                  MapKeyframe& keyframe) {
-    std::vector<Eigen::Vector2f> occupied;
-    for (const ActivePoint& a : active) occupied.push_back(a.pixel);
-    const Pose T_color_depth = PoseFromTwist(
-        keyframe.velocity_per_s * (keyframe.data.depth_time_s - keyframe.data.color_time_s));
-    for (const Eigen::Vector2f& corner : DetectCorners(prepared.gray, occupied, keypoint_options)) {
-      const Eigen::Vector2d pixel = corner.cast<double>();
-      const double z = DepthAt(depth_m, pixel);
-      if (z <= 0) continue;
-      const Eigen::Vector3d p = z * Undistort(info.intrinsics, pixel).homogeneous();
-      Landmark landmark;
-      landmark.p_world =
-          keyframe.T_world_color * Eigen::Vector3d(p.x(), p.y(), (T_color_depth * p).z());
-      landmark.first_keyframe = index;
-      landmark.num_observations = 1;
-      const int id = static_cast<int>(map.landmarks.size());
-      map.landmarks.push_back(landmark);
-      keyframe.keypoints.push_back({id, pixel, SurfaceDepthAt(depth_m, pixel)});
-      active.push_back({id, corner});
-    }
+    followed_points.Reassociate(prepared.image, depth_m, T_world_color,
+                                KeyframesNear(T_world_color, map.keyframes.size()), found);
+    for (std::size_t i = 0; i < followed; ++i)
+      followed_points.AddObservation(followed_points.points()[i], keyframe);
+    followed_points.Observe(found, followed, keyframe);
   }
 
   void AddNewMarkers(const cv::Mat& depth_m, const MapKeyframe& keyframe) {

@@ -92,12 +92,13 @@ TEST(LargestDrift, GrowsWithTheWay) {
   EXPECT_LT(far.translation_m, 1.0);
 }
 
-TEST(BendMap, SpreadsTheDriftOverTheWay) {
+TEST(DistributeLoopError, SpreadsTheDriftOverTheWay) {
   TrackingMap map = DriftedCircle(kDrift);
   const double before = WorstError(map);
   ASSERT_GT(before, 0.08);
   const Pose T_first = map.keyframes[0].T_world_color;
-  BendMap({{0, kNumKeyframes - 1, TrueCamera(0).inverse() * TrueCamera(kNumKeyframes - 1)}}, map);
+  DistributeLoopError(
+      {{0, kNumKeyframes - 1, TrueCamera(0).inverse() * TrueCamera(kNumKeyframes - 1)}}, map);
   const Pose T_ends =
       map.keyframes.front().T_world_color.inverse() * map.keyframes.back().T_world_color;
   EXPECT_LT(T_ends.translation().norm(), 0.1 * before);
@@ -117,14 +118,15 @@ TEST(BendMap, SpreadsTheDriftOverTheWay) {
   }
 }
 
-TEST(BendMap, MovesMarkersWithTheKeyframeThatSawThemFirst) {
+TEST(DistributeLoopError, MovesMarkersWithTheKeyframeThatSawThemFirst) {
   TrackingMap map = DriftedCircle(kDrift);
   MarkerObservation seen;
   seen.id = 7;
   map.keyframes[20].data.markers.push_back(seen);
   map.keyframes[35].data.markers.push_back(seen);
   map.markers[7] = {map.keyframes[20].T_world_color * Pose(Eigen::Translation3d(0, 0, 1)), 2};
-  BendMap({{0, kNumKeyframes - 1, TrueCamera(0).inverse() * TrueCamera(kNumKeyframes - 1)}}, map);
+  DistributeLoopError(
+      {{0, kNumKeyframes - 1, TrueCamera(0).inverse() * TrueCamera(kNumKeyframes - 1)}}, map);
   EXPECT_NEAR(
       (map.keyframes[20].T_world_color.inverse() * map.markers[7].T_world_marker.translation() -
        Vector3d(0, 0, 1))
@@ -132,9 +134,10 @@ TEST(BendMap, MovesMarkersWithTheKeyframeThatSawThemFirst) {
       0, 1e-9);
 }
 
-TEST(BendMap, LeavesAMapThatAgreesWithItsLinks) {
+TEST(DistributeLoopError, LeavesAMapThatAgreesWithItsLinks) {
   TrackingMap map = DriftedCircle(Vector6d::Zero());
-  BendMap({{0, kNumKeyframes - 1, TrueCamera(0).inverse() * TrueCamera(kNumKeyframes - 1)}}, map);
+  DistributeLoopError(
+      {{0, kNumKeyframes - 1, TrueCamera(0).inverse() * TrueCamera(kNumKeyframes - 1)}}, map);
   EXPECT_LT(WorstError(map), 1e-9);
 }
 

@@ -1,0 +1,74 @@
+#include "algo/reconstruction/corrected_views.hpp"
+
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+#include "algo/geometry/back_projection.hpp"
+#include "algo/reconstruction/joint_registration.hpp"
+#include "algo/sensor_model/depth_correction.hpp"
+
+namespace plumb {
+namespace {
+
+// Depth as the calibration corrects it, as a camera at the stamp would have measured it in one
+// instant: each pixel takes its value from where the moving camera's row saw that point.
+cv::Mat CorrectedDepth(const cv::Mat& depth_m, const DepthCorrection& correction, double readout_s,
+                       const Intrinsics& intrinsics, const RayTable& rays,
+                       const Vector6d& velocity_per_s) {
+  cv::Mat corrected = cv::Mat::zeros(depth_m.size(), CV_32FC1);
+  const Eigen::Vector3f w = velocity_per_s.head<3>().cast<float>();
+  const Eigen::Vector3f v = velocity_per_s.tail<3>().cast<float>();
+  const auto fx = static_cast<float>(intrinsics.fx);
+  const auto fy = static_cast<float>(intrinsics.fy);
+  for (int r = 0; r < depth_m.rows; ++r) {
+    const float* here = depth_m.ptr<float>(r);
+    float* out = corrected.ptr<float>(r);
+    const Eigen::Vector2f* ray = rays.row(r);
+    const auto late_s = static_cast<float>(readout_s * ((r + 0.5) / depth_m.rows - 0.5));
+    for (int c = 0; c < depth_m.cols; ++c) {
+      if (here[c] <= 0) continue;
+      const Eigen::Vector3f p(ray[c].x() * here[c], ray[c].y() * here[c], here[c]);
+      const Eigen::Vector3f moved = late_s * (w.cross(p) + v);
+      // Where this row saw the point that the instant camera sees in this pixel.
+      const int x =
+          c - static_cast<int>(std::lround(fx * (moved.x() - ray[c].x() * moved.z()) / here[c]));
+      const int y =
+          r - static_cast<int>(std::lround(fy * (moved.y() - ray[c].y() * moved.z()) / here[c]));
+      if (x < 0 || y < 0 || x >= depth_m.cols || y >= depth_m.rows) continue;
+      const float z = depth_m.at<float>(y, x);
+      if (z <= 0) continue;
+      const double metric =
+          correction.Correct(static_cast<std::size_t>(y * depth_m.cols + x), z) + moved.z();
+      if (metric > 0) out[c] = static_cast<float>(metric);
+    }
+  }
+  return corrected;
+}
+
+}  // namespace
+
+std::vector<DepthView> CorrectedViews(TrackingMap& map, const Intrinsics& stated,
+                                      const CalibrationModel& calibration,
+                                      const Pose& T_scene_world, bool keep_color) {
+  std::vector<DepthView> views(map.keyframes.size());
+  Intrinsics corrected = calibration.Corrected(stated);
+  const double scale = stated.width / 640.0;
+  corrected.cx += calibration.depth[kDepthShiftX] * scale;
+  corrected.cy += calibration.depth[kDepthShiftY] * scale;
+  const RayTable rays(corrected);
+  const DepthCorrection correction(calibration, corrected.width, corrected.height, 1);
+  tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t k) {
+    MapKeyframe& keyframe = map.keyframes[k];
+    views[k].intrinsics = corrected;
+    views[k].depth_m =
+        CorrectedDepth(keyframe.data.view.depth_m, correction, calibration.depth[kDepthReadout],
+                       corrected, rays, keyframe.velocity_per_s);
+    keyframe.data.view.depth_m.release();
+    if (keep_color) views[k].color_rgb = keyframe.data.view.color_rgb;
+    views[k].T_world_camera = T_scene_world * DepthPose(keyframe, calibration);
+  });
+  return views;
+}
+
+}  // namespace plumb

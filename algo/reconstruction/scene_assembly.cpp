@@ -1,0 +1,127 @@
+#include "algo/reconstruction/scene_assembly.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "algo/reconstruction/joint_registration.hpp"
+#include "algo/reconstruction/trajectory.hpp"
+
+namespace plumb {
+namespace {
+
+// Of the reference marker, before the scene's frame is built on it. A sensor that hardly moves has
+// one keyframe, so frames count too.
+constexpr int kMinReferenceViews = 3;
+constexpr int kMinReferenceFrames = 5;
+constexpr double kGapToReport_s = 0.5;  // A comparison refuses above 1 s.
+
+bool HasReferenceMarker(const StreamInfo& info, const TrackingMap& map) {
+  if (!info.reference_marker) return false;
+  const auto found = map.markers.find(*info.reference_marker);
+  return found != map.markers.end() && (found->second.num_views >= kMinReferenceViews ||
+                                        found->second.num_frames >= kMinReferenceFrames);
+}
+
+SceneMarker ToSceneMarker(const StreamInfo& info, const MapMarker& marker,
+                          const Pose& T_scene_world) {
+  SceneMarker result;
+  const MarkerCorners corners = CornersInMarkerFrame(info.marker_length_m);
+  for (std::size_t i = 0; i < 4; ++i)
+    result.corners[i] = T_scene_world * (marker.T_world_marker * corners[i]);
+  result.num_views = marker.num_views;
+  // One view: a quarter of a pixel at arm's length, mostly in depth; more views average down to
+  // the map's own error.
+  result.sigma_m = std::hypot(0.001, 0.004 / std::sqrt(std::max(1, marker.num_views)));
+  return result;
+}
+
+}  // namespace
+
+Pose SceneFromWorld(const StreamInfo& info, const TrackingMap& map) {
+  if (HasReferenceMarker(info, map))
+    return map.markers.at(*info.reference_marker).T_world_marker.inverse();
+  return map.keyframes.front().T_world_color.inverse();
+}
+
+Scene MakeScene(const StreamInfo& info, Preset preset, std::int64_t dropped,
+                const std::vector<TrackedFrame>& frames, const TrackingMap& map,
+                const CalibrationModel& calibration, const Pose& T_scene_world) {
+  Scene scene;
+  scene.preset = preset;
+  scene.frame =
+      HasReferenceMarker(info, map) ? SceneFrame::kReferenceMarker : SceneFrame::kFirstKeyframe;
+  scene.marker_dictionary = info.marker_dictionary;
+  scene.marker_length_m = info.marker_length_m;
+  scene.reference_marker = info.reference_marker;
+  scene.warnings = info.warnings;
+  for (const MapKeyframe& keyframe : map.keyframes)
+    scene.keyframes.push_back(
+        {keyframe.data.depth_time_s, T_scene_world * DepthPose(keyframe, calibration)});
+  scene.trajectory = DepthTrajectory(frames, map, calibration, T_scene_world);
+  scene.frames_total = static_cast<std::int64_t>(frames.size()) + dropped;
+  scene.frames_tracked = static_cast<std::int64_t>(scene.trajectory.size());
+  scene.frames_dropped = dropped;
+  scene.longest_lost_s = LongestLost(frames);
+  for (const auto& [id, marker] : map.markers)
+    scene.markers[id] = ToSceneMarker(info, marker, T_scene_world);
+  if (scene.frames_tracked < scene.frames_total - dropped) {
+    scene.warnings.push_back(fmt::format("{} of {} frames were not tracked, {:.2f} s at longest",
+                                         scene.frames_total - dropped - scene.frames_tracked,
+                                         scene.frames_total - dropped, scene.longest_lost_s));
+  } else if (scene.longest_lost_s > kGapToReport_s) {
+    scene.warnings.push_back(fmt::format(
+        "no image came for {:.2f} s in the sweep; what the sensor passed meanwhile is missing",
+        scene.longest_lost_s));
+  }
+  return scene;
+}
+
+void WarnOfFrame(const StreamInfo& info, const TrackingMap& map, Scene& scene) {
+  if (scene.markers.empty()) {
+    scene.warnings.push_back(
+        "no marker was seen: the scene lies in the first keyframe's frame and cannot be "
+        "compared");
+  } else if (!info.reference_marker) {
+    scene.warnings.push_back(
+        "no reference marker is configured: the scene lies in the first keyframe's frame, "
+        "without a height map");
+  } else if (scene.frame == SceneFrame::kFirstKeyframe && scene.preset == Preset::kPaper) {
+    scene.warnings.push_back(
+        fmt::format("no keyframe measured reference marker {} in depth at all its corners: the "
+                    "scene lies in the first keyframe's frame, "
+                    "without a height map; keep the marker in view",
+                    *info.reference_marker));
+  } else if (scene.frame == SceneFrame::kFirstKeyframe) {
+    const auto found = map.markers.find(*info.reference_marker);
+    const MapMarker seen = found == map.markers.end() ? MapMarker{} : found->second;
+    scene.warnings.push_back(
+        fmt::format("reference marker {} was seen in {} keyframes and {} tracked frames, {} or "
+                    "{} are needed: the scene lies in the first "
+                    "keyframe's frame, without a height map; keep the marker in view",
+                    *info.reference_marker, seen.num_views, seen.num_frames, kMinReferenceViews,
+                    kMinReferenceFrames));
+  } else if (const int views = scene.markers.at(*info.reference_marker).num_views;
+             views < kMinReferenceViews) {
+    scene.warnings.push_back(
+        fmt::format("reference marker {} was seen from {} place{} only: the scene's frame is "
+                    "less certain than that of a sweep",
+                    *info.reference_marker, views, views == 1 ? "" : "s"));
+  }
+}
+
+void KeepHeightMap(HeightMap map, Scene& scene) {
+  if (std::any_of(map.z.begin(), map.z.end(), [](float z) { return std::isfinite(z); })) {
+    scene.height_map = std::move(map);
+    return;
+  }
+  scene.warnings.push_back(fmt::format(
+      "no surface was measured around reference marker {}, up to some decimetres below and above "
+      "it: the scene has no height "
+      "map and cannot be a reference; lay the marker flat beside the body and sweep over both",
+      scene.reference_marker.value_or(-1)));
+}
+
+}  // namespace plumb

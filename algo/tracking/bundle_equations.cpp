@@ -1,0 +1,182 @@
+#include "algo/tracking/bundle_equations.hpp"
+
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+namespace plumb::bundle {
+namespace {
+
+using Matrix2x6d = Eigen::Matrix<double, 2, 6>;
+constexpr int kSeenByCorners = kEdgeBiasAt + 1;  // Unknowns of the calibration that corners see.
+using CameraVector = Eigen::Matrix<double, kCamera, 1>;
+using CameraMatrix = Eigen::Matrix<double, kCamera, kCamera>;
+using CameraRows2 = Eigen::Matrix<double, 2, kCamera>;
+using CalibrationCamera = Eigen::Matrix<double, kCalibrationSize, kCamera>;
+
+}  // namespace
+
+Equations::Equations(const Problem& problem) : problem_(problem) {}
+
+void Equations::Linearise(const State& state) {
+  rows_.resize(problem_.views().size());
+  H_ = Eigen::MatrixXd::Zero(problem_.size(), problem_.size());
+  g_ = Eigen::VectorXd::Zero(problem_.size());
+  std::vector<CalibrationMatrix> H_calibration(problem_.num_keyframes(), CalibrationMatrix::Zero());
+  std::vector<CalibrationVector> g_calibration(problem_.num_keyframes(), CalibrationVector::Zero());
+  tbb::parallel_for(std::size_t{0}, problem_.num_keyframes(), [&](std::size_t k) {
+    LineariseKeyframe(state, k, H_calibration[k], g_calibration[k]);
+  });
+  if (problem_.options().calibrate) {
+    for (std::size_t k = 0; k < problem_.num_keyframes(); ++k) {
+      H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += H_calibration[k];
+      g_.tail<kCalibrationSize>() += g_calibration[k];
+    }
+    const CalibrationMatrix& prior = problem_.options().prior.information;
+    H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += prior;
+    g_.tail<kCalibrationSize>() +=
+        prior * (ToVector(state.calibration) - problem_.options().prior.mean);
+  }
+  for (const CornerView& view : problem_.corners()) AddCorner(state, view);
+  for (const QuadraticTerm& term : problem_.terms()) AddTerm(state, term);
+}
+
+void Equations::LineariseKeyframe(const State& state, std::size_t k,
+                                  CalibrationMatrix& H_calibration,
+                                  CalibrationVector& g_calibration) {
+  const int slot = problem_.PoseSlot(static_cast<int>(k));
+  CameraMatrix H = CameraMatrix::Zero();
+  CameraVector g = CameraVector::Zero();
+  CalibrationCamera H_coupled = CalibrationCamera::Zero();
+  for (const std::uint32_t i : problem_.ViewsOfKeyframe(k)) {
+    rows_[i] = RowsOf(state, problem_.views()[i]);
+    const PointRows& rows = rows_[i];
+    if (slot >= 0) {
+      H.noalias() += rows.J_camera.transpose() * rows.J_camera;
+      g.noalias() += rows.J_camera.transpose() * rows.r;
+    }
+    if (!problem_.options().calibrate) continue;
+    if (slot >= 0) H_coupled += rows.CalibrationTimes<kCamera>(rows.J_camera);
+    H_calibration.topLeftCorner<kLensAndReadout, kLensAndReadout>().noalias() +=
+        rows.J_lens.transpose() * rows.J_lens;
+    H_calibration.bottomRightCorner<CalibrationModel::kDepthSize, CalibrationModel::kDepthSize>()
+        .noalias() += rows.J_depth.transpose() * rows.J_depth;
+    g_calibration += rows.CalibrationTimes<1>(rows.r);
+  }
+  if (slot < 0) return;
+  H_.block<kCamera, kCamera>(kCamera * slot, kCamera * slot) += H;
+  g_.segment<kCamera>(kCamera * slot) += g;
+  if (problem_.options().calibrate)
+    H_.block<kCalibrationSize, kCamera>(problem_.calibration_at(), kCamera * slot) += H_coupled;
+}
+
+PointRows Equations::RowsOf(const State& state, const PointView& view) const {
+  PointRows rows;
+  const CameraState& camera = state.cameras[static_cast<std::size_t>(view.keyframe)];
+  const Eigen::Vector3d& p_world = state.landmarks[static_cast<std::size_t>(view.landmark)];
+  const double row_s = state.calibration.readout_s[0] * view.place.row_share;
+  const SeenPoint point = See(camera, p_world, row_s);
+  const SeenPixel seen = ProjectCorrected(problem_.stated(), state.calibration.lens, point.p);
+  const Eigen::Vector2d r = (seen.pixel - view.pixel) * problem_.PixelWeight();
+  const double w =
+      problem_.PixelWeight() * std::sqrt(CauchyWeight(r.squaredNorm(), kKeypointLossScale));
+  const Eigen::Matrix<double, 2, 3> J = w * seen.J_point;
+  rows.r.head<2>() = w * (seen.pixel - view.pixel);
+  rows.J_point.topRows<2>().noalias() = J * point.J_world;
+  rows.J_camera.topRows<2>() = J * point.J_pose;
+  rows.J_lens.leftCols<CalibrationModel::kLensSize>() = w * seen.J_lens;
+  rows.J_lens.col(kReadoutAt) = view.place.row_share * (J * point.J_time);
+  if (!(view.z_m > 0)) return rows;
+  const double late_s = problem_.DepthDelay(state, view.keyframe, view.place.row_share);
+  const SeenPoint late = See(camera, p_world, late_s);
+  const PredictedDepth predicted = PredictDepth(state.calibration, late, view.place);
+  const double rz = (predicted.z_m - view.z_m) * view.weight_z;
+  const double wz = view.weight_z * std::sqrt(CauchyWeight(rz * rz, kKeypointLossScale));
+  rows.r[2] = wz * (predicted.z_m - view.z_m);
+  rows.J_point.row(2) = wz * predicted.J_z * late.J_world.row(2);
+  rows.J_camera.row(2) = wz * predicted.J_z * late.J_pose.row(2);
+  rows.J_depth = wz * predicted.J_depth;
+  return rows;
+}
+
+void Equations::AddCorner(const State& state, const CornerView& view) {
+  const Vector6d& twist = state.markers[static_cast<std::size_t>(view.marker)];
+  CameraState marker_side;  // Only for the right Jacobian of the twist.
+  marker_side.twist = twist;
+  marker_side.Prepare();
+  const Pose T_world_marker = problem_.MarkerPose(view.marker) * PoseFromTwist(twist);
+  const double share = RowShare(view.pixel.y(), problem_.stated().height);
+  const Eigen::Vector3d p_world =
+      problem_.MarkerPose(view.marker) * (PoseFromTwist(twist) * view.in_marker);
+  const double row_s = state.calibration.readout_s[0] * share;
+  const SeenPoint point =
+      See(state.cameras[static_cast<std::size_t>(view.keyframe)], p_world, row_s);
+  const SeenPixel seen = ProjectCorrected(problem_.stated(), state.calibration.lens, point.p);
+  Eigen::Vector2d r = problem_.CornerResidual(state, view, point.p);
+  const double robust = std::sqrt(CauchyWeight(r.squaredNorm(), kCornerLossScale));
+  const double w = robust * view.weight;
+  r *= robust;
+  const Eigen::Matrix<double, 2, 3> J = w * seen.J_point;
+  Matrix3x6d J_in_world;
+  J_in_world.leftCols<3>() = -T_world_marker.linear() * Skew(view.in_marker) * marker_side.J_right;
+  J_in_world.rightCols<3>() = problem_.MarkerPose(view.marker).linear();
+  const Matrix2x6d J_marker = J * point.J_world * J_in_world;
+  const CameraRows2 J_camera = J * point.J_pose;
+  const Eigen::Index m = problem_.MarkerAt(view.marker);
+  const Eigen::Index a = problem_.CameraAt(view.keyframe);
+  H_.block<6, 6>(m, m).noalias() += J_marker.transpose() * J_marker;
+  g_.segment<6>(m).noalias() += J_marker.transpose() * r;
+  if (a >= 0) {
+    H_.block<kCamera, kCamera>(a, a).noalias() += J_camera.transpose() * J_camera;
+    H_.block<6, kCamera>(m, a).noalias() += J_marker.transpose() * J_camera;
+    g_.segment<kCamera>(a).noalias() += J_camera.transpose() * r;
+  }
+  if (!problem_.options().calibrate) return;
+  Eigen::Matrix<double, 2, kSeenByCorners> J_calibration;
+  J_calibration << w * seen.J_lens, share * (J * point.J_time), w * view.inward;
+  H_.block<kSeenByCorners, kSeenByCorners>(problem_.calibration_at(), problem_.calibration_at())
+      .noalias() += J_calibration.transpose() * J_calibration;
+  H_.block<kSeenByCorners, 6>(problem_.calibration_at(), m).noalias() +=
+      J_calibration.transpose() * J_marker;
+  if (a >= 0)
+    H_.block<kSeenByCorners, kCamera>(problem_.calibration_at(), a).noalias() +=
+        J_calibration.transpose() * J_camera;
+  g_.segment<kSeenByCorners>(problem_.calibration_at()).noalias() += J_calibration.transpose() * r;
+}
+
+void Equations::AddTerm(const State& state, const QuadraticTerm& term) {
+  const Problem::TermVector slope = term.H * problem_.TermState(state, term) + term.g;
+  constexpr int kFocal = QuadraticTerm::kFocal;
+  constexpr int kFocalAt = QuadraticTerm::kFocalAt;
+  constexpr int kDepthSize = CalibrationModel::kDepthSize;
+  constexpr int kDepth = QuadraticTerm::kDepthCalibrationAt;
+  const Eigen::Index a = problem_.CameraAt(term.keyframe_a);
+  const Eigen::Index b = term.keyframe_b >= 0 ? problem_.CameraAt(term.keyframe_b)
+                                              : problem_.MarkerAt(problem_.MarkerSlot(term.marker));
+  const Eigen::Index f = problem_.calibration_at() + kLensAt;
+  const Eigen::Index d = problem_.calibration_at() + kDepthAt;
+  const auto add_pose = [&](Eigen::Index at, Eigen::Index in_term) {
+    H_.block<6, 6>(at, at) += term.H.block<6, 6>(in_term, in_term);
+    g_.segment<6>(at) += slope.segment<6>(in_term);
+    if (!problem_.options().calibrate) return;
+    H_.block<kFocal, 6>(f, at) += term.H.block<kFocal, 6>(kFocalAt, in_term);
+    H_.block<kDepthSize, 6>(d, at) += term.H.block<kDepthSize, 6>(kDepth, in_term);
+  };
+  if (a >= 0) add_pose(a, 0);
+  if (b >= 0) add_pose(b, 6);
+  if (a >= 0 && b >= 0) {
+    if (b > a) {
+      H_.block<6, 6>(b, a) += term.H.block<6, 6>(6, 0);
+    } else {
+      H_.block<6, 6>(a, b) += term.H.block<6, 6>(0, 6);
+    }
+  }
+  if (!problem_.options().calibrate) return;
+  H_.block<kFocal, kFocal>(f, f) += term.H.block<kFocal, kFocal>(kFocalAt, kFocalAt);
+  H_.block<kDepthSize, kFocal>(d, f) += term.H.block<kDepthSize, kFocal>(kDepth, kFocalAt);
+  H_.block<kDepthSize, kDepthSize>(d, d) += term.H.bottomRightCorner<kDepthSize, kDepthSize>();
+  g_.segment<kFocal>(f) += slope.segment<kFocal>(kFocalAt);
+  g_.segment<kDepthSize>(d) += slope.tail<kDepthSize>();
+}
+
+}  // namespace plumb::bundle

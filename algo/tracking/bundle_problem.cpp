@@ -1,0 +1,242 @@
+#include "algo/tracking/bundle_problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <tbb/parallel_for.h>
+
+namespace plumb::bundle {
+namespace {
+
+// Sum of the unit directions from corner i to its two neighbours.
+Eigen::Vector2d Inward(const ImageCorners& corners, std::size_t i) {
+  const Eigen::Vector2d next = (corners[(i + 1) % 4] - corners[i]).normalized();
+  const Eigen::Vector2d previous = (corners[(i + 3) % 4] - corners[i]).normalized();
+  return next + previous;
+}
+
+Eigen::Vector3d PointInCamera(const State& state, const PointView& view) {
+  return state.cameras[static_cast<std::size_t>(view.keyframe)].T_camera_world *
+         state.landmarks[static_cast<std::size_t>(view.landmark)];
+}
+
+}  // namespace
+
+Problem::Problem(const Intrinsics& stated, const BundleOptions& options,
+                 const std::vector<QuadraticTerm>& terms, TrackingMap& map,
+                 CalibrationModel& calibration)
+    : stated_(stated),
+      options_(options),
+      terms_(terms),
+      map_(map),
+      calibration_(calibration),
+      pose_slot_(map.keyframes.size(), -1) {
+  for (const int k : options.free_keyframes) {
+    int& slot = pose_slot_[static_cast<std::size_t>(k)];
+    if (slot >= 0) continue;
+    slot = static_cast<int>(free_.size());
+    free_.push_back(k);
+  }
+  CollectMarkers();
+  CollectPoints();
+  markers_at_ = kCamera * static_cast<Eigen::Index>(free_.size());
+  calibration_at_ = markers_at_ + 6 * static_cast<Eigen::Index>(markers_.size());
+  size_ = calibration_at_ + (options.calibrate ? kCalibrationSize : 0);
+}
+
+int Problem::NumResiduals() const {
+  auto count = static_cast<int>(2 * (views_.size() + corners_.size()));
+  for (const PointView& view : views_) count += view.z_m > 0 ? 1 : 0;
+  return count;
+}
+
+const Pose& Problem::MarkerPose(int slot) const {
+  return T_world_marker0_[static_cast<std::size_t>(slot)];
+}
+
+Eigen::Index Problem::CameraAt(int keyframe) const {
+  return kCamera * static_cast<Eigen::Index>(PoseSlot(keyframe));
+}
+
+double Problem::PixelWeight() const {
+  return 1.0 / (options_.keypoint_sigma_px * stated_.width / 640.0);
+}
+
+void Problem::CollectMarkers() {
+  for (const int k : free_)
+    for (const MarkerObservation& m : map_.keyframes[static_cast<std::size_t>(k)].data.markers)
+      if (map_.markers.contains(m.id)) markers_.try_emplace(m.id, 0);
+  for (const QuadraticTerm& term : terms_)
+    if (term.keyframe_b < 0) markers_.try_emplace(term.marker, 0);
+  int slot = 0;
+  for (auto& [id, index] : markers_) {
+    index = slot++;
+    T_world_marker0_.push_back(map_.markers.at(id).T_world_marker);
+  }
+  const MarkerCorners in_marker = CornersInMarkerFrame(options_.marker_length_m);
+  const double scale = stated_.width / 640.0;
+  for (std::size_t k = 0; k < map_.keyframes.size(); ++k) {
+    for (const MarkerObservation& m : map_.keyframes[k].data.markers) {
+      const auto found = markers_.find(m.id);
+      if (found == markers_.end()) continue;
+      for (std::size_t i = 0; i < 4; ++i)
+        corners_.push_back({static_cast<int>(k), found->second, in_marker[i], m.corners[i],
+                            scale * Inward(m.corners, i),
+                            1.0 / std::max(options_.min_corner_sigma_px * scale, m.sigma_px[i])});
+    }
+  }
+}
+
+void Problem::CollectPoints() {
+  // Landmarks that a free keyframe sees, then every observation of those. One seen only once
+  // constrains nothing.
+  std::vector<int> slot(map_.landmarks.size(), -1);
+  for (const int k : free_) {
+    for (const KeypointObservation& o : map_.keyframes[static_cast<std::size_t>(k)].keypoints) {
+      const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
+      int& s = slot[static_cast<std::size_t>(o.landmark)];
+      if (s >= 0 || !landmark.usable || landmark.num_observations < 2) continue;
+      s = static_cast<int>(landmarks_.size());
+      landmarks_.push_back(o.landmark);
+    }
+  }
+  for (std::size_t k = 0; k < map_.keyframes.size(); ++k) {
+    for (const KeypointObservation& o : map_.keyframes[k].keypoints) {
+      const int s = slot[static_cast<std::size_t>(o.landmark)];
+      if (s < 0) continue;
+      PointView view{static_cast<int>(k), s, o.pixel, DepthPlace(o.pixel, stated_), o.z_m};
+      if (o.z_m > 0)
+        view.weight_z = 1.0 / (options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8));
+      views_.push_back(view);
+    }
+  }
+}
+
+State Problem::Start() const {
+  State state;
+  for (const MapKeyframe& keyframe : map_.keyframes) {
+    CameraState camera;
+    camera.T_camera0_world = keyframe.T_world_color.inverse();
+    camera.velocity_per_s = keyframe.velocity_per_s;
+    camera.Prepare();
+    state.cameras.push_back(camera);
+  }
+  state.markers.assign(markers_.size(), Vector6d::Zero());
+  for (const int id : landmarks_)
+    state.landmarks.push_back(map_.landmarks[static_cast<std::size_t>(id)].p_world);
+  state.calibration = calibration_;
+  return state;
+}
+
+void Problem::DropViewsBehindCameras(const State& state) {
+  std::erase_if(views_, [&](const PointView& view) {
+    return PointInCamera(state, view).z() < kNearestPoint_m;
+  });
+  std::erase_if(corners_, [&](const CornerView& view) {
+    return (state.cameras[static_cast<std::size_t>(view.keyframe)].T_camera_world *
+            CornerInWorld(state, view))
+               .z() < kNearestPoint_m;
+  });
+  views_of_landmark_.assign(landmarks_.size(), {});
+  views_of_keyframe_.assign(map_.keyframes.size(), {});
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    views_of_landmark_[static_cast<std::size_t>(views_[i].landmark)].push_back(
+        static_cast<std::uint32_t>(i));
+    views_of_keyframe_[static_cast<std::size_t>(views_[i].keyframe)].push_back(
+        static_cast<std::uint32_t>(i));
+  }
+}
+
+Eigen::Vector3d Problem::CornerInWorld(const State& state, const CornerView& view) const {
+  return MarkerPose(view.marker) *
+         (PoseFromTwist(state.markers[static_cast<std::size_t>(view.marker)]) * view.in_marker);
+}
+
+double Problem::DepthDelay(const State& state, int keyframe, double row_share) const {
+  const Keyframe& data = map_.keyframes[static_cast<std::size_t>(keyframe)].data;
+  return data.depth_time_s - data.color_time_s + state.calibration.depth[kDepthDelay] +
+         row_share * state.calibration.depth[kDepthReadout];
+}
+
+double Problem::Cost(const State& state) const {
+  std::vector<double> parts(map_.keyframes.size(), 0.0);
+  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t k) {
+    for (const std::uint32_t i : views_of_keyframe_[k]) parts[k] += PointCost(state, views_[i]);
+  });
+  double cost = 0;
+  for (const double part : parts) cost += part;
+  for (const CornerView& view : corners_) {
+    const double share = RowShare(view.pixel.y(), stated_.height);
+    const SeenPoint point = See(state.cameras[static_cast<std::size_t>(view.keyframe)],
+                                CornerInWorld(state, view), state.calibration.readout_s[0] * share);
+    if (point.p.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
+    cost += 0.5 * CauchyLoss(CornerResidual(state, view, point.p).squaredNorm(), kCornerLossScale);
+  }
+  for (const QuadraticTerm& term : terms_) {
+    const TermVector x = TermState(state, term);
+    cost += x.dot(0.5 * (term.H * x) + term.g);
+  }
+  if (options_.calibrate) cost += options_.prior.Cost(ToVector(state.calibration));
+  return cost;
+}
+
+double Problem::PointCost(const State& state, const PointView& view) const {
+  const CameraState& camera = state.cameras[static_cast<std::size_t>(view.keyframe)];
+  const Eigen::Vector3d p = PointInCamera(state, view);
+  const Eigen::Vector3d motion =
+      -(camera.velocity_per_s.head<3>().cross(p) + camera.velocity_per_s.tail<3>());
+  const Eigen::Vector3d at_row = p + state.calibration.readout_s[0] * view.place.row_share * motion;
+  if (at_row.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
+  const Eigen::Vector2d r =
+      (ProjectCorrected(stated_, state.calibration.lens, at_row).pixel - view.pixel) *
+      PixelWeight();
+  double cost = 0.5 * CauchyLoss(r.squaredNorm(), kKeypointLossScale);
+  if (view.z_m > 0) {
+    const double z = p.z() + DepthDelay(state, view.keyframe, view.place.row_share) * motion.z();
+    const double rz =
+        (PredictDepthOnly(state.calibration, z, view.place) - view.z_m) * view.weight_z;
+    cost += 0.5 * CauchyLoss(rz * rz, kKeypointLossScale);
+  }
+  return cost;
+}
+
+Eigen::Vector2d Problem::CornerResidual(const State& state, const CornerView& view,
+                                        const Eigen::Vector3d& p) const {
+  const Eigen::Vector2d pixel = ProjectCorrected(stated_, state.calibration.lens, p).pixel;
+  return (pixel + state.calibration.edge_bias_px[0] * view.inward - view.pixel) * view.weight;
+}
+
+Problem::TermVector Problem::TermState(const State& state, const QuadraticTerm& term) const {
+  TermVector x;
+  x.head<6>() = state.cameras[static_cast<std::size_t>(term.keyframe_a)].twist;
+  x.segment<6>(6) = term.keyframe_b >= 0
+                        ? state.cameras[static_cast<std::size_t>(term.keyframe_b)].twist
+                        : state.markers[static_cast<std::size_t>(markers_.at(term.marker))];
+  for (int i = 0; i < QuadraticTerm::kFocal; ++i)
+    x[QuadraticTerm::kFocalAt + i] = state.calibration.lens[static_cast<std::size_t>(i)] -
+                                     calibration_.lens[static_cast<std::size_t>(i)];
+  for (int i = 0; i < CalibrationModel::kDepthSize; ++i)
+    x[QuadraticTerm::kDepthCalibrationAt + i] =
+        state.calibration.depth[static_cast<std::size_t>(i)] -
+        calibration_.depth[static_cast<std::size_t>(i)];
+  return x;
+}
+
+void Problem::Write(const State& state) {
+  for (const int k : free_) {
+    MapKeyframe& keyframe = map_.keyframes[static_cast<std::size_t>(k)];
+    keyframe.T_world_color = Orthonormalised(
+        keyframe.T_world_color * PoseFromTwist(state.cameras[static_cast<std::size_t>(k)].twist));
+  }
+  for (const auto& [id, slot] : markers_) {
+    MapMarker& marker = map_.markers.at(id);
+    marker.T_world_marker = Orthonormalised(
+        marker.T_world_marker * PoseFromTwist(state.markers[static_cast<std::size_t>(slot)]));
+  }
+  for (std::size_t s = 0; s < landmarks_.size(); ++s)
+    map_.landmarks[static_cast<std::size_t>(landmarks_[s])].p_world = state.landmarks[s];
+  calibration_ = state.calibration;
+}
+
+}  // namespace plumb::bundle

@@ -1,0 +1,153 @@
+#include "algo/tracking/followed_points.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+namespace plumb {
+namespace {
+
+constexpr double kSameBrightness = 0.08;  // Of the exposure: what KLT follows without help.
+
+}  // namespace
+
+void FollowedPoints::Follow(const Pyramid& last, const GrayImage& image, const cv::Mat& depth_m,
+                            const Pose& T_world_guess, std::vector<ActivePoint>& followed,
+                            std::vector<PosePoint>& points) const {
+  std::vector<Eigen::Vector2f> from;
+  std::vector<Eigen::Vector2f> guesses;
+  const Pose T_camera_world = T_world_guess.inverse();
+  for (const ActivePoint& a : active_) {
+    from.push_back(a.pixel);
+    const Eigen::Vector3d p =
+        T_camera_world * map_.landmarks[static_cast<std::size_t>(a.landmark)].p_world;
+    guesses.push_back(p.z() > 0.05 ? Eigen::Vector2f(Project(intrinsics_, p).cast<float>())
+                                   : a.pixel);
+  }
+  const KltResult klt = FollowAtAnyBrightness(last, image, from, guesses, options_.levels);
+  for (std::size_t i = 0; i < active_.size(); ++i) {
+    if (!klt.found[i]) continue;
+    PosePoint point;
+    point.p_world = map_.landmarks[static_cast<std::size_t>(active_[i].landmark)].p_world;
+    const Eigen::Vector2d pixel = klt.points[i].cast<double>();
+    point.ideal = Undistort(intrinsics_, pixel);
+    point.sigma = 1.2 * SigmaPx() / intrinsics_.fx;
+    if (const double z = DepthAt(depth_m, pixel); z > 0) {
+      point.inverse_z = 1.0 / z;
+      point.inverse_z_sigma = (2.0 * DepthSigma(z, 0.8) + 0.003) / (z * z);
+    }
+    points.push_back(point);
+    followed.push_back({active_[i].landmark, klt.points[i]});
+  }
+}
+
+// KLT; where it loses most points, once more at the new image's brightness: the exposure may have
+// changed.
+KltResult FollowedPoints::FollowAtAnyBrightness(const Pyramid& before, const GrayImage& image,
+                                                const std::vector<Eigen::Vector2f>& from,
+                                                const std::vector<Eigen::Vector2f>& guesses,
+                                                int max_level) const {
+  const auto num_found = [](const KltResult& klt) {
+    return std::count(klt.found.begin(), klt.found.end(), true);
+  };
+  KltResult klt = TrackKlt(before, image.pyramid, from, guesses, max_level, options_);
+  if (2 * num_found(klt) >= static_cast<std::ptrdiff_t>(from.size())) return klt;
+  const double ratio = BrightnessRatio(before[0], image.gray, from, guesses);
+  if (std::abs(ratio - 1.0) < kSameBrightness) return klt;
+  KltResult again = TrackKlt(MakePyramid(before[0] * ratio, options_), image.pyramid, from, guesses,
+                             max_level, options_);
+  return num_found(again) > num_found(klt) ? again : klt;
+}
+
+void FollowedPoints::Reassociate(const GrayImage& image, const cv::Mat& depth_m,
+                                 const Pose& T_world_color,
+                                 const std::vector<std::size_t>& keyframes,
+                                 std::vector<PosePoint>& points) {
+  std::set<int> followed;
+  for (const ActivePoint& a : active_) followed.insert(a.landmark);
+  const Pose T_camera_world = T_world_color.inverse();
+  for (const std::size_t k : keyframes) {
+    const MapKeyframe& keyframe = map_.keyframes[k];
+    std::vector<int> landmarks;
+    std::vector<Eigen::Vector2f> from;
+    std::vector<Eigen::Vector2f> guesses;
+    for (const KeypointObservation& o : keyframe.keypoints) {
+      const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
+      if (!landmark.usable || followed.contains(o.landmark)) continue;
+      const Eigen::Vector3d p = T_camera_world * landmark.p_world;
+      if (p.z() < 0.1) continue;
+      const Eigen::Vector2d pixel = Project(intrinsics_, p);
+      if (pixel.x() < 8 || pixel.y() < 8 || pixel.x() > intrinsics_.width - 9 ||
+          pixel.y() > intrinsics_.height - 9)
+        continue;
+      const double z = DepthAt(depth_m, pixel);
+      if (z > 0 && std::abs(z - p.z()) > 0.03 * z + 0.01) continue;  // Hidden, or another surface.
+      landmarks.push_back(o.landmark);
+      from.push_back(o.pixel.cast<float>());
+      guesses.push_back(pixel.cast<float>());
+    }
+    if (landmarks.empty()) continue;
+    const KltResult klt =
+        FollowAtAnyBrightness(MakePyramid(keyframe.gray, options_), image, from, guesses, 1);
+    for (std::size_t i = 0; i < landmarks.size(); ++i) {
+      if (!klt.found[i] ||
+          (klt.points[i] - guesses[i]).norm() > 6.0F * static_cast<float>(SigmaPx()))
+        continue;
+      followed.insert(landmarks[i]);
+      active_.push_back({landmarks[i], klt.points[i]});
+      PosePoint point;
+      point.p_world = map_.landmarks[static_cast<std::size_t>(landmarks[i])].p_world;
+      point.ideal = Undistort(intrinsics_, klt.points[i].cast<double>());
+      point.sigma = 2.0 * SigmaPx() / intrinsics_.fx;
+      points.push_back(point);
+    }
+  }
+}
+
+void FollowedPoints::AddObservation(const ActivePoint& point, MapKeyframe& keyframe) {
+  const Eigen::Vector2d pixel = point.pixel.cast<double>();
+  keyframe.keypoints.push_back(
+      {point.landmark, pixel, SurfaceDepthAt(keyframe.data.view.depth_m, pixel)});
+  ++map_.landmarks[static_cast<std::size_t>(point.landmark)].num_observations;
+}
+
+void FollowedPoints::Observe(const std::vector<PosePoint>& found, std::size_t first,
+                             MapKeyframe& keyframe) {
+  std::vector<ActivePoint> kept(active_.begin(),
+                                active_.begin() + static_cast<std::ptrdiff_t>(first));
+  const Pose T_camera_world = keyframe.T_world_color.inverse();
+  for (std::size_t i = first; i < active_.size(); ++i) {
+    const PosePoint& point = found[i - first];
+    const Eigen::Vector3d p = T_camera_world * point.p_world;
+    if ((p.head<2>() / p.z() - point.ideal).norm() * intrinsics_.fx >= 4.0 * SigmaPx()) continue;
+    kept.push_back(active_[i]);
+    AddObservation(active_[i], keyframe);
+  }
+  active_ = std::move(kept);
+}
+
+void FollowedPoints::AddCorners(const GrayImage& image, const cv::Mat& depth_m, int index,
+                                MapKeyframe& keyframe) {
+  std::vector<Eigen::Vector2f> occupied;
+  for (const ActivePoint& a : active_) occupied.push_back(a.pixel);
+  const Pose T_color_depth = PoseFromTwist(
+      keyframe.velocity_per_s * (keyframe.data.depth_time_s - keyframe.data.color_time_s));
+  for (const Eigen::Vector2f& corner : DetectCorners(image.gray, occupied, options_)) {
+    const Eigen::Vector2d pixel = corner.cast<double>();
+    const double z = DepthAt(depth_m, pixel);
+    if (z <= 0) continue;
+    const Eigen::Vector3d p = z * Undistort(intrinsics_, pixel).homogeneous();
+    Landmark landmark;
+    landmark.p_world =
+        keyframe.T_world_color * Eigen::Vector3d(p.x(), p.y(), (T_color_depth * p).z());
+    landmark.first_keyframe = index;
+    landmark.num_observations = 1;
+    const int id = static_cast<int>(map_.landmarks.size());
+    map_.landmarks.push_back(landmark);
+    keyframe.keypoints.push_back({id, pixel, SurfaceDepthAt(depth_m, pixel)});
+    active_.push_back({id, corner});
+  }
+}
+
+}  // namespace plumb
