@@ -64,7 +64,7 @@ int Main(int argc, char** argv) {
       ->capture_default_str();
   app.get_formatter()->column_width(34);
   app.footer(
-      fmt::format("\nplumb COMMAND --help tells more.\n"
+      fmt::format("\nplumb COMMAND --help explains its options.\n"
                   "Exit codes: 0 done, 1 internal or I/O error, 2 usage, 3 bad input, 4 no answer, "
                   "5 device, 130 interrupted.\n\n{}",
                   kResearchNotice));
@@ -95,7 +95,8 @@ int Main(int argc, char** argv) {
       AddEvaluate);
   add("record", "Record from the attached sensor, or from a virtual one", AddRecord);
   add("markers", "Draw printable sheets of markers at true size", AddMarkers);
-  add("doctor", "Tell what is attached, permitted and configured, and what to do about what is not",
+  add("doctor",
+      "Report what is attached, permitted and configured, and what to do about what is not",
       AddDoctor);
   add("status", "What a running plumbd does: state, sensor, scan, last result", AddStatus);
   add("press", "Press the button of a running plumbd", AddPress);

@@ -18,7 +18,7 @@ enum class IndicatorPattern {
   kResultMove,
   kNoAnswer,
   kFault,
-  kReadyRolledBack,  ///< Ready, but the machine has gone back to the system before an update.
+  kReadyRolledBack,  ///< Ready, but the machine has gone back to the system from before an update.
 };
 
 /// A light. One thread (the event loop's) calls; no call blocks or throws: a broken light must not

@@ -45,8 +45,8 @@ struct Side {
 };
 
 struct Stage {
-  double radius_m;        // of the search for mates
-  double max_sideways_m;  // mates further apart along the surface are none
+  double radius_m;        // of the search for correspondences
+  double max_sideways_m;  // no correspondence further apart along the surface
   double min_normal_cos;
   double max_scale_m;  // of the residuals: bounds the weights' reach
   int max_iterations;
@@ -60,8 +60,8 @@ constexpr double kFineSpacing_m = 0.005;
 constexpr double kMaxFineSamples =
     20000.0;  // a side; more cost time and add nothing: their errors are not independent
 
-// Mates two spacings away at most: what is further off is not the rigid part, and the search stays
-// short.
+// Correspondences two spacings away at most: what is further off is not the rigid part, and the
+// search stays short.
 Stage FineStage(double spacing_m) { return {2 * spacing_m, 1.2 * spacing_m, 0.8, spacing_m, 25}; }
 
 struct Pair {
@@ -94,7 +94,8 @@ Pair MakePair(const Surface& reference, std::size_t i, const Surface& current, s
   return pair;
 }
 
-// Mates from both sides: the reference's samples first, then the current ones, one slot each.
+// Correspondences from both sides, one slot each: the reference's samples first, then the current
+// ones.
 std::vector<Pair> FindPairs(const Side& reference, const Side& current, const Pose& T,
                             const Eigen::Vector3d& pivot, const Stage& stage) {
   const std::size_t n = reference.surface.size();
@@ -112,11 +113,11 @@ std::vector<Pair> FindPairs(const Side& reference, const Side& current, const Po
           if (from.surface.inner[i] == 0) continue;
           const Eigen::Vector3d p = from.surface.points[i].cast<double>();
           const Eigen::Vector3d moved = forward ? T * p : T_back * p;
-          const std::uint32_t mate = to.nearest.Find(moved.cast<float>());
-          if (mate == NearestSample::kNone || to.surface.inner[mate] == 0) continue;
+          const std::uint32_t match = to.nearest.Find(moved.cast<float>());
+          if (match == NearestSample::kNone || to.surface.inner[match] == 0) continue;
           pairs[k] = forward
-                         ? MakePair(reference.surface, i, current.surface, mate, T, pivot, stage)
-                         : MakePair(reference.surface, mate, current.surface, i, T, pivot, stage);
+                         ? MakePair(reference.surface, i, current.surface, match, T, pivot, stage)
+                         : MakePair(reference.surface, match, current.surface, i, T, pivot, stage);
         }
       });
   return pairs;
@@ -240,7 +241,7 @@ StageResult RunStage(const Side& reference, const Side& current, const Pose& T_s
   return result;
 }
 
-// Two-sided mean of truncated distances, metres; samples without a mate count as `limit`.
+// Two-sided mean of truncated distances, metres; samples without a correspondence count as `limit`.
 double Disagreement(const Side& reference, const Side& current, const Pose& T, const Stage& stage,
                     double limit_m) {
   const std::vector<Pair> pairs = FindPairs(reference, current, T, Eigen::Vector3d::Zero(), stage);

@@ -19,13 +19,13 @@ namespace {
 constexpr double kBin_m = 0.01;           // of the outline's width along the body
 constexpr double kMinPart_m2 = 0.002;     // smaller parts say nothing
 constexpr double kMinMeasured = 1.0 / 3;  // share of a part
-constexpr double kElongated = 1.5;        // from there on an outline tells how it lies
+constexpr double kElongated = 1.5;        // from there on an outline shows how it lies
 constexpr double kNeckShare = 0.62;       // of the widest: narrower is head or neck
 constexpr double kShoulderShare = 0.8;    // of the widest: shoulders have begun
 constexpr double kMinNeck_m = 0.04;       // shorter is the rounded end of a trunk
 constexpr double kMaxHead_m = 0.45;       // head and neck
 constexpr double kTrunk_m = 0.6;          // behind the first end, the widest part is looked for
-constexpr double kMinHead_m = 0.15;       // head and neck, where they alone tell the ends apart
+constexpr double kMinHead_m = 0.15;       // head and neck, where they alone distinguish the ends
 constexpr double kShouldersOfAll = 0.85;  // of the widest of all: knees behind feet are narrower
 
 // Ends of the bands below the shoulder line, in widths of the shoulders (about 0.45 m with arms);

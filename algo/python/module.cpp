@@ -275,7 +275,9 @@ void AddComparison(py::module_& module) {
           "distance_m",
           [](py::object self) { return MapArray(self.cast<Comparison&>().distance, self); },
           "float32 (rows, columns), nearest-surface distance, or None")
-      .def("to_json", &ResultJson, "The text of result.json");
+      .def(
+          "to_json", [](const Comparison& comparison) { return ResultJson(comparison); },
+          "The text of result.json");
 }
 
 }  // namespace

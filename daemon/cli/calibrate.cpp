@@ -40,7 +40,7 @@ int Run(const Options& options, const CommandContext& context) {
     } else {
       left_out.push_back(fmt::format(
           "{}: {}", path.string(),
-          scene.markers.empty() ? "no marker was seen, so nothing tells the true size of what was "
+          scene.markers.empty() ? "no marker was seen, so nothing shows the true size of what was "
                                   "seen"
                                 : "its views did not agree better under any calibration"));
     }

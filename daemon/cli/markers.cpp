@@ -28,7 +28,7 @@ fs::path PageFile(const fs::path& out, int page, int num_pages) {
 
 int Run(const Options& options) {
   SheetOptions sheet_options = options.sheet;
-  sheet_options.ids = ParseIds(options.ids);
+  if (!sheet_options.is_board) sheet_options.ids = ParseIds(options.ids);
   const MarkerSheet sheet(sheet_options);
   std::string text;
   if (options.out.extension() == ".pdf") {
@@ -52,9 +52,9 @@ int Run(const Options& options) {
 
 Command AddMarkers(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("--ids", options->ids, "Ids and ranges")
-      ->capture_default_str()
-      ->type_name("0-15,20");
+  CLI::Option* ids = app.add_option("--ids", options->ids, "Ids and ranges")
+                         ->capture_default_str()
+                         ->type_name("0-15,20");
   app.add_option("--dictionary", options->sheet.dictionary,
                  "OpenCV's name, or DICT_ARUCO_MIP_36h12")
       ->capture_default_str()
@@ -62,10 +62,15 @@ Command AddMarkers(CLI::App& app) {
   app.add_option("--length", options->sheet.length_m, "Side of the black square, metres")
       ->capture_default_str()
       ->type_name("M");
-  app.add_option("--paper", options->sheet.paper, "Of the sheets, upright")
-      ->check(CLI::IsMember({"A4", "A3"}))
-      ->capture_default_str()
-      ->type_name("A4|A3");
+  CLI::Option* paper = app.add_option("--paper", options->sheet.paper, "Of the sheets, upright")
+                           ->check(CLI::IsMember({"A4", "A3"}))
+                           ->capture_default_str()
+                           ->type_name("A4|A3");
+  app.add_flag("--board", options->sheet.is_board,
+               "One sheet for the room's calibration: the dictionary's last four markers around a "
+               "cross for the lasers; on A4 where it fits, else on A3")
+      ->excludes(ids)
+      ->excludes(paper);
   app.add_option("--out", options->out, "File to write; SVG has one file a page")
       ->required()
       ->check([](const std::string& name) {

@@ -14,6 +14,8 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/notice.hpp"
+#include "algo/base/units.hpp"
+#include "algo/comparison/room_board.hpp"
 
 namespace plumb {
 namespace {
@@ -39,6 +41,11 @@ MarkerDictionary Dictionary(const std::string& name) try {
   throw std::invalid_argument(error.what());
 }
 
+cairo_status_t Append(void* bytes, const unsigned char* data, unsigned length) {
+  static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), length);
+  return CAIRO_STATUS_SUCCESS;
+}
+
 /// @throws IoError if the surface was not written whole.
 void Finish(const Surface& surface, const std::filesystem::path& file) {
   cairo_surface_finish(surface.get());
@@ -52,7 +59,7 @@ void Finish(const Surface& surface, const std::filesystem::path& file) {
 
 // Millimetres, y down.
 struct MarkerSheet::Canvas {
-  Canvas(const Surface& surface, double units_per_mm) : cr(cairo_create(surface.get())) {
+  Canvas(cairo_surface_t* surface, double units_per_mm) : cr(cairo_create(surface)) {
     cairo_scale(cr, units_per_mm, units_per_mm);
     cairo_select_font_face(cr, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
   }
@@ -78,6 +85,10 @@ struct MarkerSheet::Canvas {
 
 MarkerSheet::MarkerSheet(const SheetOptions& options)
     : options_(options), dictionary_(Dictionary(options.dictionary)) {
+  if (options.is_board) {
+    LayBoard();
+    return;
+  }
   if (options.paper != "A4" && options.paper != "A3")
     throw std::invalid_argument(
         fmt::format("paper \"{}\" is unknown, expected A4 or A3", options.paper));
@@ -121,6 +132,39 @@ void MarkerSheet::Lay() {
   }
 }
 
+void MarkerSheet::LayBoard() {
+  const RoomBoard board = MakeRoomBoard(dictionary_.size(), options_.length_m);
+  options_.paper = board.is_a3 ? "A3" : "A4";
+  width_mm_ = board.is_a3 ? 297.0 : 210.0;
+  height_mm_ = board.is_a3 ? 420.0 : 297.0;
+  pages_.emplace_back();
+  for (const auto& [id, centre_m] : board.centres_m) {
+    const Eigen::Vector2d centre_mm = centre_m / kMillimetre;
+    const double half_mm = options_.length_m / kMillimetre / 2;
+    pages_.back().push_back(
+        {id, width_mm_ / 2 + centre_mm.x() - half_mm, CrossHeight() - centre_mm.y() - half_mm});
+  }
+}
+
+double MarkerSheet::CrossHeight() const {
+  return kMargin_mm + (height_mm_ - 2 * kMargin_mm - kFooter_mm) / 2;
+}
+
+/// Lines for the lasers between the markers' white margins, and where the gantry is.
+void MarkerSheet::DrawCross(const Canvas& canvas) const {
+  constexpr double kLine_mm = 0.25;
+  const double x = width_mm_ / 2, y = CrossHeight(), bottom = 2 * y - kMargin_mm;
+  canvas.Grey(0);
+  canvas.Line(x, kMargin_mm, x, bottom, kLine_mm);
+  canvas.Line(kMargin_mm, y, width_mm_ - kMargin_mm, y, kLine_mm);
+  cairo_move_to(canvas.cr, x, kMargin_mm);
+  cairo_line_to(canvas.cr, x + 1.5, kMargin_mm + 3.0);
+  cairo_line_to(canvas.cr, x - 1.5, kMargin_mm + 3.0);
+  cairo_close_path(canvas.cr);
+  cairo_fill(canvas.cr);
+  canvas.Text(x + 3.0, kMargin_mm + 2.8, 3.2, "to the gantry");
+}
+
 void MarkerSheet::DrawMarker(const Canvas& canvas, const PlacedMarker& marker) const {
   const double side_mm = options_.length_m * 1000.0;
   const int cells = dictionary_.bits_per_side() + 2;
@@ -159,33 +203,52 @@ void MarkerSheet::DrawRuler(const Canvas& canvas, int page) const {
   canvas.Line(x, y, x + kRuler_mm, y, 0.12);
   canvas.Text(x + kRuler_mm + 3.0, y, 3.2, "must measure 100 mm: print at 100 %, without fitting");
   canvas.Grey(kGrey);
-  canvas.Text(x, y + 5.0, 3.0,
-              fmt::format("Plumb   {}   marker length {:g} mm   page {} of {}", dictionary_.name(),
-                          options_.length_m * 1000.0, page + 1, num_pages()));
+  canvas.Text(
+      x, y + 5.0, 3.0,
+      options_.is_board
+          ? fmt::format("Plumb   {}   board of the room's calibration, {:g} mm: face up, "
+                        "cross at the lasers",
+                        dictionary_.name(), options_.length_m * 1000.0)
+          : fmt::format("Plumb   {}   marker length {:g} mm   page {} of {}", dictionary_.name(),
+                        options_.length_m * 1000.0, page + 1, num_pages()));
   canvas.Text(x, y + 9.5, 2.2, std::string(kResearchNotice));
 }
 
 void MarkerSheet::Draw(const Canvas& canvas, int page) const {
   for (const PlacedMarker& marker : markers(page)) DrawMarker(canvas, marker);
+  if (options_.is_board) DrawCross(canvas);
   DrawRuler(canvas, page);
 }
 
 void MarkerSheet::WritePdf(const std::filesystem::path& file) const {
   const Surface surface(
       cairo_pdf_surface_create(file.c_str(), width_mm_ * kPointsPerMm, height_mm_ * kPointsPerMm));
+  DrawPages(surface.get());
+  Finish(surface, file);
+}
+
+std::string MarkerSheet::Pdf() const {
+  std::string bytes;
+  const Surface surface(cairo_pdf_surface_create_for_stream(
+      &Append, &bytes, width_mm_ * kPointsPerMm, height_mm_ * kPointsPerMm));
+  DrawPages(surface.get());
+  Finish(surface, "the sheet");
+  return bytes;
+}
+
+void MarkerSheet::DrawPages(cairo_surface_t* surface) const {
   for (int page = 0; page < num_pages(); ++page) {
     const Canvas canvas(surface, kPointsPerMm);
     Draw(canvas, page);
     cairo_show_page(canvas.cr);
   }
-  Finish(surface, file);
 }
 
 void MarkerSheet::WriteSvg(const std::filesystem::path& file, int page) const {
   const Surface surface(cairo_svg_surface_create(file.c_str(), width_mm_, height_mm_));
   cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_MM);
   {
-    const Canvas canvas(surface, 1.0);
+    const Canvas canvas(surface.get(), 1.0);
     Draw(canvas, page);
   }
   Finish(surface, file);
@@ -197,7 +260,7 @@ cv::Mat MarkerSheet::Rasterise(int page, double dots_per_inch) const {
             height = static_cast<int>(std::lround(height_mm_ * dots_per_mm));
   const Surface surface(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height));
   {
-    const Canvas canvas(surface, dots_per_mm);
+    const Canvas canvas(surface.get(), dots_per_mm);
     canvas.Grey(1);
     cairo_paint(canvas.cr);
     Draw(canvas, page);

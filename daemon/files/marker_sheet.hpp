@@ -10,6 +10,8 @@
 
 #include "algo/types/marker_dictionary.hpp"
 
+using cairo_surface_t = struct _cairo_surface;
+
 namespace plumb {
 
 struct SheetOptions {
@@ -17,6 +19,9 @@ struct SheetOptions {
   std::vector<int> ids;      ///< In the order in which they are drawn.
   double length_m = 0.104;   ///< Side of the black square.
   std::string paper = "A4";  ///< A4 or A3, upright.
+  /// The board of the room's calibration (algo/comparison/room_board.hpp): its ids and the paper
+  /// that it fits on instead of the two above.
+  bool is_board = false;
 };
 
 /// Where one marker lies on its page: millimetres from the page's top left corner, y down.
@@ -27,7 +32,8 @@ struct PlacedMarker {
 };
 
 /// Pages of markers, each with its id, an arrow that points up in the print, a white margin of at
-/// least one cell, and on each page a ruler of 100 mm to check the printer's scale. Immutable.
+/// least one cell, and on each page a ruler of 100 mm to check the printer's scale. The board has
+/// lines for the room's lasers and an arrow to the gantry as well. Immutable.
 class MarkerSheet {
  public:
   /// @throws std::invalid_argument for an unknown dictionary or paper, ids that it has not, no ids
@@ -44,6 +50,8 @@ class MarkerSheet {
 
   /// All pages as one PDF. @throws IoError
   void WritePdf(const std::filesystem::path& file) const;
+  /// The same as bytes. @throws IoError
+  [[nodiscard]] std::string Pdf() const;
   /// One page as SVG. @throws IoError
   void WriteSvg(const std::filesystem::path& file, int page) const;
   /// One page as picture, CV_8UC3.
@@ -51,9 +59,13 @@ class MarkerSheet {
 
  private:
   struct Canvas;
+  void DrawPages(cairo_surface_t* surface) const;
   void Lay();
+  void LayBoard();
+  [[nodiscard]] double CrossHeight() const;  ///< Millimetres from the page's top.
   void Draw(const Canvas& canvas, int page) const;
   void DrawMarker(const Canvas& canvas, const PlacedMarker& marker) const;
+  void DrawCross(const Canvas& canvas) const;
   void DrawRuler(const Canvas& canvas, int page) const;
 
   SheetOptions options_;

@@ -144,7 +144,7 @@ OutputKind ResultOutput() {
            "error_map.png", "overlay.png", "region.png"}};
 }
 
-std::string ResultJson(const Comparison& comparison) {
+std::string ResultJson(const Comparison& comparison, const std::optional<ResultRoom>& room) {
   Json json;
   json["format"] = kFormat;
   json["version"] = PLUMB_VERSION;
@@ -157,6 +157,11 @@ std::string ResultJson(const Comparison& comparison) {
       comparison.correction ? CorrectionJson(*comparison.correction) : Json(nullptr);
   json["region"] = comparison.region ? RegionJson(*comparison.region) : Json(nullptr);
   json["body"] = comparison.body_parts ? BodyPartsJson(*comparison.body_parts) : Json(nullptr);
+  if (room) {
+    json["room_calibration"] = {{"version", room->version},
+                                {"used", room->why_not_used.empty()},
+                                {"why_not_used", room->why_not_used}};
+  }
   json["warnings"] = comparison.warnings;
   json["timings_s"] = Json::object();
   for (const auto& [key, value] : comparison.timings_s) json["timings_s"][key] = value;
@@ -201,7 +206,7 @@ ResultPictures DrawResult(const Comparison& comparison, const HeightMap* referen
 }
 
 void WriteResult(const Comparison& comparison, const ResultPictures& pictures,
-                 const fs::path& folder) {
+                 const fs::path& folder, const std::optional<ResultRoom>& room) {
   AtomicFolder output(folder, ResultOutput());
   WriteMap(output.path() / "deviation.tiff", comparison.deviation);
   WriteMap(output.path() / "distance.tiff", comparison.distance);
@@ -209,7 +214,7 @@ void WriteResult(const Comparison& comparison, const ResultPictures& pictures,
   WriteRegion(output.path() / "region.png", comparison);
   if (!pictures.error_map.empty()) WritePng(output.path() / "error_map.png", pictures.error_map);
   if (!pictures.overlay.empty()) WritePng(output.path() / "overlay.png", pictures.overlay);
-  WriteWholeFile(output.path() / "result.json", ResultJson(comparison));
+  WriteWholeFile(output.path() / "result.json", ResultJson(comparison, room));
   output.Commit();
 }
 

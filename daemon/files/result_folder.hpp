@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include <opencv2/core/mat.hpp>
@@ -16,9 +17,17 @@ namespace plumb {
 /// region.png (the region that was compared, where there is one).
 [[nodiscard]] OutputKind ResultOutput();
 
+/// Which signed calibration of the room gave the numbers their axes.
+struct ResultRoom {
+  int version = 0;
+  std::string why_not_used;  ///< Empty: it was. Else the axes are those of the reference marker.
+};
+
 /// The text of result.json, also what `compare --json` prints. Absent results are null; numbers
 /// read back bit for bit.
-[[nodiscard]] std::string ResultJson(const Comparison& comparison);
+/// @param room  None: no calibration was signed; the configuration's axes, if any.
+[[nodiscard]] std::string ResultJson(const Comparison& comparison,
+                                     const std::optional<ResultRoom>& room = {});
 
 struct PictureOptions {
   double tolerance_m = 3 * kMillimetre;  ///< That the colour scale is tied to.
@@ -41,7 +50,7 @@ struct ResultPictures {
 /// that do not exist are left out. Same comparison, same bytes.
 /// @throws IoError
 void WriteResult(const Comparison& comparison, const ResultPictures& pictures,
-                 const std::filesystem::path& folder);
+                 const std::filesystem::path& folder, const std::optional<ResultRoom>& room = {});
 
 /// The text of a result's result.json, checked to be JSON of a format that this version knows.
 /// @throws DataError

@@ -30,7 +30,7 @@ std::string NumberRow(const char* name, const std::optional<double>& value,
                       const std::optional<double>& u95, double tolerance, const char* unit,
                       const std::string& words) {
   if (!value)
-    return fmt::format("  {:<14}   refused: couch-fixed markers tell posture only\n", name);
+    return fmt::format("  {:<14}   refused: couch-fixed markers show posture only\n", name);
   const bool is_outside = !(std::abs(*value) <= tolerance);
   const bool is_in = u95 && std::abs(*value) + *u95 <= tolerance;
   const int digits = std::string_view(unit) == "mm" ? 1 : 2;

@@ -68,7 +68,7 @@ struct GpioButton::Impl {
   std::function<void(ButtonPress)> pressed;
   Clock::time_point last;  ///< The debouncer's time.
 
-  void Tell(std::optional<ButtonPress> press) const {
+  void Notify(std::optional<ButtonPress> press) const {
     if (press && pressed) pressed(*press);
   }
 
@@ -125,15 +125,15 @@ void GpioButton::Dispatch(Clock::time_point now) {
     if ((wait.revents & POLLIN) == 0 || gpiod_line_event_read(impl_->line, &event) != 0)
       throw DeviceError(fmt::format("{} is gone", impl_->name));
     impl_->last = impl_->TimeOf(event, now);
-    impl_->Tell(
+    impl_->Notify(
         impl_->debouncer->OnEdge(event.event_type == GPIOD_LINE_EVENT_RISING_EDGE, impl_->last));
   }
   impl_->last = now;
   // The kernel keeps 16 edges and drops those that come after: where the line is in the end only it
   // can decide.
   const int value = gpiod_line_get_value(impl_->line);
-  impl_->Tell(value < 0 ? impl_->debouncer->OnTime(now)
-                        : impl_->debouncer->OnLevel(value == 1, now));
+  impl_->Notify(value < 0 ? impl_->debouncer->OnTime(now)
+                          : impl_->debouncer->OnLevel(value == 1, now));
 }
 
 struct GpioIndicator::Impl {

@@ -4,12 +4,15 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "drivers/replay/tum_recording.hpp"
 #include "drivers/sensor.hpp"
@@ -39,6 +42,9 @@ struct SimulatedSweeps {
   int width = 640, height = 480;
   std::size_t max_scenes = 0;  ///< Only so many of the suite's scenes; 0: all.
   bool plugged = true;         ///< Whether the unit is attached at the start.
+  /// Of the markers of the board of the room's calibration, on its sheet, by id: three scenes of it
+  /// come first. Empty: none does.
+  std::map<int, Eigen::Vector2d> board_centres_m = {};
 };
 
 /// Called while a driver prepares itself, with the fraction done and what it works on.

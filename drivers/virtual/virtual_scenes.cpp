@@ -14,12 +14,15 @@
 
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/simulated/board_scenes.hpp"
 #include "drivers/simulated/suite_plan.hpp"
 #include "drivers/virtual/frame_cache.hpp"
 #include "drivers/virtual/raw_frame.hpp"
 
 namespace plumb {
 namespace {
+
+constexpr int kBoardScenes = 3;  // as many as a calibration of the room needs
 
 namespace fs = std::filesystem;
 using simulated::FrameCacheReader;
@@ -67,6 +70,8 @@ class Renderer {
                static_cast<std::uint32_t>(std::lround(1e6 / options.rate_hz)),
                PLUMB_SIMULATOR_VERSION},
         folder_(options.cache_folder.empty() ? DefaultVirtualSensorCache() : options.cache_folder) {
+    if (!options_.board_centres_m.empty())
+      simulated::AddBoardScenes(plan_, options_.board_centres_m, kBoardScenes);
     std::error_code error;
     fs::create_directories(folder_, error);
     if (error) throw IoError(DescribeWriteError(folder_, error.value()));
@@ -147,6 +152,7 @@ VirtualSensorOptions VirtualOptionsOf(const SimulatedSweeps& sweeps) {
   options.width = sweeps.width;
   options.height = sweeps.height;
   options.max_scenes = sweeps.max_scenes;
+  options.board_centres_m = sweeps.board_centres_m;
   options.plugged = sweeps.plugged;
   return options;
 }

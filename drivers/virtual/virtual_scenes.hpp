@@ -4,10 +4,13 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "algo/types/frame.hpp"
 #include "drivers/live/sensor_driver.hpp"
@@ -24,6 +27,7 @@ struct VirtualSensorOptions {
   double rate_hz = 30.0;
   int width = 640;  ///< 640 x 480 or 320 x 240.
   int height = 480;
+  std::map<int, Eigen::Vector2d> board_centres_m = {};  ///< As in SimulatedSweeps.
   std::size_t max_scenes = 0;  ///< Only so many of the suite's scenes; 0: all.
   std::filesystem::path cache_folder =
       {};  ///< Of the rendered frames, 1.5 MB each; empty: DefaultVirtualSensorCache().

@@ -7,6 +7,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "algo/comparison/room_board.hpp"
 #include "algo/markers/marker_detector.hpp"
 #include "drivers/files/file_io.hpp"
 #include "tests/support/message_of.hpp"
@@ -19,6 +20,38 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::MessageOf;
 using testing::TempFolder;
+
+// What is printed is where the method believes the board's markers, and the cross is in the middle.
+TEST(MarkerSheetTest, TheBoardHasItsMarkersWhereTheMethodExpectsThem) {
+  constexpr double kDotsPerInch = 150.0, kDotsPerMm = kDotsPerInch / 25.4;
+  for (const double length_m : {0.104, 0.06}) {
+    SCOPED_TRACE(length_m);
+    const MarkerSheet sheet(
+        {.dictionary = "DICT_6X6_250", .ids = {}, .length_m = length_m, .is_board = true});
+    const RoomBoard board = MakeRoomBoard(250, length_m);
+    EXPECT_EQ(sheet.num_pages(), 1);
+    EXPECT_EQ(sheet.width_mm(), board.is_a3 ? 297 : 210);
+    const cv::Mat picture = sheet.Rasterise(0, kDotsPerInch);
+    const MarkerDetection detection =
+        MarkerDetector(MarkerDictionary::ByName("DICT_6X6_250")).Detect(picture);
+    ASSERT_EQ(detection.markers.size(), board.centres_m.size());
+    // On the page y points down.
+    const Eigen::Vector2d cross_mm(sheet.width_mm() / 2, 6 + (sheet.height_mm() - 12 - 22) / 2);
+    for (const MarkerObservation& marker : detection.markers) {
+      Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+      for (const Eigen::Vector2d& corner : marker.corners) centre += corner / 4;
+      const Eigen::Vector2d known_mm = 1000 * board.centres_m.at(marker.id);
+      EXPECT_NEAR((centre.x() + 0.5) / kDotsPerMm, cross_mm.x() + known_mm.x(), 0.2);
+      EXPECT_NEAR((centre.y() + 0.5) / kDotsPerMm, cross_mm.y() - known_mm.y(), 0.2);
+    }
+    const Eigen::Vector2i dot = (cross_mm * kDotsPerMm).cast<int>();
+    double darkest = 255;
+    for (int x = dot.x() - 2; x <= dot.x() + 2; ++x)
+      darkest = std::min<double>(darkest, picture.at<cv::Vec3b>(dot.y() + 20, x)[0]);
+    EXPECT_LT(darkest, 128) << "no line for the laser";
+    EXPECT_EQ(sheet.Pdf().substr(0, 5), "%PDF-");
+  }
+}
 
 // The detector of the method reads the sheet as a camera would: every marker, with its id, upright
 // and of true size.

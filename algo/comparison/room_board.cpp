@@ -1,0 +1,214 @@
+#include "algo/comparison/room_board.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+
+#include "algo/comparison/scene_alignment.hpp"
+#include "algo/geometry/rigid_fit.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr double kCover95 = 1.96;
+constexpr double kMinSigma_m = 1e-5;  // of synthetic markers that fit exactly
+
+// What is left on a sheet for markers, after the margin of 6 mm and the ruler's 22 mm.
+const Eigen::Vector2d kRoomA4_m(0.198, 0.263);
+const Eigen::Vector2d kRoomA3_m(0.285, 0.386);
+// A marker with white around it that is one cell wide: the coarsest dictionary has 4 + 2 cells.
+constexpr double kWhiteShare = 4.0 / 3.0;
+constexpr double kGap_m = 4 * kMillimetre;  // for the cross
+
+MarkerCorners CornersOnBoard(const Eigen::Vector2d& centre_m, double length_m) {
+  MarkerCorners corners = CornersInMarkerFrame(length_m);
+  for (Eigen::Vector3d& corner : corners) corner.head<2>() += centre_m;
+  return corners;
+}
+
+Eigen::Vector3d MeanOf(std::span<const Eigen::Vector3d> points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : points) sum += p;
+  return sum / static_cast<double>(points.size());
+}
+
+double SpreadOf(std::span<const Eigen::Vector3d> points) {
+  const Eigen::Vector3d mean = MeanOf(points);
+  double sum = 0.0;
+  for (const Eigen::Vector3d& p : points) sum += (p - mean).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(points.size()));
+}
+
+Eigen::Vector3d CentreOf(const MarkerCorners& corners) { return MeanOf(corners); }
+
+// Half-widths of the position at the cross and of the worst turn, from the scatter of the markers.
+void AddUncertainty(BoardFit& fit, std::span<const Eigen::Vector3d> centres_board, double sigma_m) {
+  const auto num = static_cast<double>(centres_board.size());
+  // Of 3 coordinates a marker, 6 are spent on the fit.
+  const double from_fit = fit.rms_m / std::sqrt(3.0) * std::sqrt(3 * num / (3 * num - 6));
+  const double sigma = std::max({from_fit, sigma_m, kMinSigma_m});
+  const Eigen::Vector3d mean = MeanOf(centres_board);
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& p : centres_board) {
+    const Eigen::Vector3d d = p - mean;
+    inertia += d.squaredNorm() * Eigen::Matrix3d::Identity() - d * d.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertia);
+  const double turn = sigma / std::sqrt(solver.eigenvalues()(0));
+  fit.turn_uncertainty_rad = kCover95 * turn;
+  fit.shift_uncertainty_m = kCover95 * std::hypot(sigma / std::sqrt(num), turn * mean.norm());
+}
+
+}  // namespace
+
+std::array<int, 4> RoomBoardIds(int dictionary_size) {
+  const int first = dictionary_size - 4;
+  if (first < 0) {
+    throw std::invalid_argument(
+        fmt::format("the room's board needs 4 markers, this dictionary has {}", dictionary_size));
+  }
+  return {first, first + 1, first + 2, first + 3};
+}
+
+RoomBoard MakeRoomBoard(int dictionary_size, double marker_length_m) {
+  const std::array<int, 4> ids = RoomBoardIds(dictionary_size);
+  const double cell_m = kWhiteShare * marker_length_m;
+  const auto fits = [&](const Eigen::Vector2d& room) {
+    return marker_length_m >= 0.01 && 2 * cell_m + kGap_m <= room.x();
+  };
+  if (!fits(kRoomA3_m)) {
+    throw std::invalid_argument(fmt::format(
+        "four markers of {:g} m do not fit on an A3 sheet, expected 0.01 to {:.3f} m",
+        marker_length_m, std::floor(1000 * (kRoomA3_m.x() - kGap_m) / 2 / kWhiteShare) / 1000));
+  }
+  RoomBoard board{.is_a3 = !fits(kRoomA4_m), .centres_m = {}, .marker_length_m = marker_length_m};
+  const Eigen::Vector2d room = board.is_a3 ? kRoomA3_m : kRoomA4_m;
+  // Whole millimetres: they can be measured on the sheet.
+  const double x = std::floor((room.x() - cell_m) / 2 * 1000) / 1000;
+  const double y = std::floor((room.y() - cell_m) / 2 * 1000) / 1000;
+  board.centres_m = {{ids[0], {-x, y}}, {ids[1], {x, y}}, {ids[2], {-x, -y}}, {ids[3], {x, -y}}};
+  return board;
+}
+
+std::pair<MarkerMap, MarkerMap> SplitRoomBoard(const MarkerMap& seen, int dictionary_size) {
+  const std::array<int, 4> ids = RoomBoardIds(dictionary_size);
+  std::pair<MarkerMap, MarkerMap> parts;
+  for (const auto& [id, marker] : seen) {
+    const bool is_board = std::find(ids.begin(), ids.end(), id) != ids.end();
+    (is_board ? parts.first : parts.second).emplace(id, marker);
+  }
+  return parts;
+}
+
+std::variant<BoardFit, std::string> FitRoomBoard(const RoomBoard& board, const MarkerMap& seen,
+                                                 const RoomCalibrationLimits& limits) {
+  std::vector<Eigen::Vector3d> on_board, in_scene, centres_board, centres_scene;
+  double variance = 0.0;
+  for (const auto& [id, centre_m] : board.centres_m) {
+    const auto found = seen.find(id);
+    if (found == seen.end()) continue;
+    const MarkerCorners known = CornersOnBoard(centre_m, board.marker_length_m);
+    const MarkerCorners& corners = found->second.corners;
+    on_board.insert(on_board.end(), known.begin(), known.end());
+    in_scene.insert(in_scene.end(), corners.begin(), corners.end());
+    centres_board.push_back(CentreOf(known));
+    centres_scene.push_back(CentreOf(corners));
+    variance += found->second.sigma_m * found->second.sigma_m;
+  }
+  const std::size_t num = centres_board.size();
+  if (num < limits.min_markers) {
+    return fmt::format(
+        "{} of the board's {} markers were seen well, at least {} are needed: look whether they "
+        "are "
+        "clean and uncovered, and sweep slowly over the board",
+        num, board.centres_m.size(), limits.min_markers);
+  }
+  BoardFit fit{.scale = SpreadOf(centres_scene) / SpreadOf(centres_board), .num_markers = num};
+  if (!(std::abs(fit.scale - 1) <= limits.max_scale_share)) {
+    return fmt::format(
+        "the board measures {:.1f} % of its size, {:g} % off are allowed: print it at 100 %, "
+        "without fitting to the page, and check its ruler",
+        100 * fit.scale, 100 * limits.max_scale_share);
+  }
+  const RigidFit rigid = FitRigid(in_scene, on_board);
+  fit.T_scene_board = rigid.T_a_b;
+  fit.rms_m = rigid.rms_m;
+  if (!rigid.valid || !(fit.rms_m <= limits.max_rms_m)) {
+    return fmt::format(
+        "the board's markers lie {:.1f} mm (RMS) off their places on the sheet, at most {:g} mm "
+        "are "
+        "allowed: lay the sheet flat on a rigid plate and sweep slowly over it",
+        fit.rms_m / kMillimetre, limits.max_rms_m / kMillimetre);
+  }
+  AddUncertainty(fit, centres_board, std::sqrt(variance / static_cast<double>(num)));
+  return fit;
+}
+
+std::variant<RoomFit, std::string> FitRoom(std::span<const RoomScan> scans) {
+  if (scans.empty()) throw std::invalid_argument("FitRoom() needs a scan");
+  std::vector<Pose> boards;  // in the first scan's frame
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    Pose T_first_scan = Pose::Identity();
+    if (i > 0) {
+      const AlignmentOutcome outcome = AlignScenes(scans[0].room, scans[i].room);
+      if (!outcome.alignment) {
+        return std::string(
+            "fewer than 3 of the room's markers lie the same in all scans: sweep over the room's "
+            "markers too, and leave them alone");
+      }
+      T_first_scan = outcome.alignment->T_reference_current;
+    }
+    boards.push_back(T_first_scan * scans[i].board.T_scene_board);
+  }
+  RoomFit fit;
+  Eigen::Vector3d cross = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
+  for (const Pose& board : boards) {
+    cross += board.translation() / static_cast<double>(boards.size());
+    turns += board.linear();
+    for (const Pose& other : boards) {
+      const Pose T = board.inverse() * other;
+      fit.shift_m = std::max(fit.shift_m, T.translation().norm());
+      fit.turn_rad = std::max(fit.turn_rad, Eigen::AngleAxisd(T.linear()).angle());
+    }
+  }
+  // The rotation next to the sum of them (chordal mean).
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(turns, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d mirror = Eigen::Matrix3d::Identity();
+  mirror(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+  Pose T_scan_board = Pose::Identity();
+  T_scan_board.linear() = svd.matrixU() * mirror * svd.matrixV().transpose();
+  T_scan_board.translation() = cross;
+  fit.T_iec_reference = T_scan_board.inverse();
+  for (const auto& [id, marker] : scans[0].room) {
+    SceneMarker placed = marker;
+    for (Eigen::Vector3d& corner : placed.corners) corner = fit.T_iec_reference * corner;
+    fit.markers_iec.emplace(id, placed);
+  }
+  return fit;
+}
+
+std::string WhyNotSign(const RoomFit& fit, std::size_t num_scans,
+                       const RoomCalibrationLimits& limits) {
+  if (num_scans < limits.num_scans) {
+    return fmt::format("{} of {} scans of the board are there: scan again, without touching it",
+                       num_scans, limits.num_scans);
+  }
+  if (fit.shift_m <= limits.max_shift_m && fit.turn_rad <= limits.max_turn_rad) return {};
+  return fmt::format(
+      "the scans differ by {:.2f} mm and {:.2f} deg, at most {:g} mm and {:g} deg are allowed: let "
+      "the sensor warm up, do not touch the board, and scan again",
+      fit.shift_m / kMillimetre, fit.turn_rad / kDegree, limits.max_shift_m / kMillimetre,
+      limits.max_turn_rad / kDegree);
+}
+
+std::optional<Pose> RoomOf(const MarkerMap& markers_iec, const MarkerMap& scene) {
+  const AlignmentOutcome outcome = AlignScenes(markers_iec, scene);
+  return outcome.alignment ? std::optional(outcome.alignment->T_reference_current) : std::nullopt;
+}
+
+}  // namespace plumb
