@@ -3,18 +3,13 @@
 #include <sys/epoll.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include "algo/base/errors.hpp"
-#include "daemon/appliance/plan_options.hpp"
-#include "daemon/files/scene_json.hpp"
 #include "daemon/loop/log.hpp"
-#include "daemon/records/check_json.hpp"
 
 namespace plumb {
 namespace {
@@ -25,13 +20,7 @@ using std::chrono::seconds;
 
 constexpr seconds kTick{1};
 constexpr std::chrono::minutes kSessionIdle{30};
-constexpr double kDroppedSmoothing_s = 1.0;
 const web::Actor kSelf{.user = "plumbd", .address = ""};
-const web::Actor kAuto{.user = "auto", .address = ""};
-
-double Milliseconds(Clock::duration duration) {
-  return std::chrono::duration<double, std::milli>(duration).count();
-}
 
 }  // namespace
 
@@ -41,6 +30,7 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
       profiles_(std::make_shared<ProfileShelf>(parts_.config.appliance.state / "sensor-profiles")),
       profiles_off_(ProfilesOff(parts_.config)) {
   OpenStore();
+  LookAtRoom();
   result_timer_ =
       loop_.MakeTimer("result expired", [this] { (void)Handle(ScanEvent::kResultExpired); });
   limit_timer_ = loop_.MakeTimer("longest sweep", [this] {
@@ -149,14 +139,15 @@ Appliance::Answer Appliance::Handle(ScanEvent event) {
   if (!answer.empty()) {
     Log(LogLevel::kNotice,
         fmt::format("{} ignored in state {}: {}", Name(event), Name(before.phase), answer));
-    TellEvent("ignored",
-              Json{{"what", Name(event)}, {"state", Name(before.phase)}, {"reason", answer}}.dump(
-                  -1, ' ', false, Json::error_handler_t::replace));
+    PublishEvent(
+        "ignored",
+        Json{{"what", Name(event)}, {"state", Name(before.phase)}, {"reason", answer}}.dump(
+            -1, ' ', false, Json::error_handler_t::replace));
   }
   state_ = transition.state;
   if (state_.phase != ScanPhase::kResult) result_timer_.Disarm();
   for (const ScanAction action : transition.actions) Act(action);
-  if (state_ != before) TellState();
+  if (state_ != before) PublishState();
   return answer;
 }
 
@@ -181,149 +172,9 @@ void Appliance::Act(ScanAction action) {
   }
 }
 
-void Appliance::StartScan() {
-  try {
-    BeginSession();
-  } catch (const std::exception& error) {
-    scan_fault_ = fmt::format("the scan could not begin: {}", error.what());
-    Log(LogLevel::kError, scan_fault_);
-    loop_.Post("scan failed", [this] { (void)Handle(ScanEvent::kScanFailed); });
-  }
-}
-
-void Appliance::BeginSession() {
-  const web::Settings settings = store_->GetSettings();
-  session_.reset();  // the last one has ended
-  scan_ = {};
-  scan_.patient_id = check_ ? std::string() : open_patient_;
-  scan_.purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
-  scan_.started = Clock::now();
-  ScanJob job = MakeJob(settings);
-  if (job.is_reference) {
-    if (const std::string why = WhyNoReference(); !why.empty()) throw DataError(why);
-  }
-  const NewScan record{.patient_id = scan_.patient_id,
-                       .reference_id = scan_.reference_id,
-                       .purpose = scan_.purpose,
-                       .sensor_serial = sensors_->snapshot().sensor.serial,
-                       .reason = reference_reason_,
-                       .session_id = check_ ? std::string() : session_id_,
-                       .sensor_on_s = SecondsSinceSensor(),
-                       .check_overdue = IsCheckOverdue()};
-  scan_.sensor_before = sensors_->snapshot().statistics;
-  ArmSessionTimer();
-  session_ = std::make_unique<ScanSession>(
-      std::move(job), check_ ? MakeCheckCallbacks(record) : MakeCallbacks(record));
-  sensors_->BeginScan(session_->feed());
-  limit_timer_.ArmAfter(std::chrono::microseconds(static_cast<std::int64_t>(
-      parts_.config.appliance.scan_limit_s.value_or(settings.scan_limit_s) * 1e6)));
-}
-
-ScanJob Appliance::MakeJob(const web::Settings& settings) {
-  ScanJob job;
-  job.info = sensors_->snapshot().info;
-  job.reconstructor = parts_.config.reconstruct;
-  job.reconstructor.keep_color = false;  // of a patient only the shape is kept
-  job.keep_recording = parts_.config.appliance.keep_recordings || settings.keep_recordings;
-  job.unit_profile = MakeUnitProfile();
-  job.stop_after_s = parts_.config.appliance.auto_stop_s.value_or(settings.auto_stop_s);
-  if (check_) {
-    job.keep_recording = false;
-    const std::string baseline = store_->CheckBaselineJson();
-    job.check = CheckJob{BaselineIn(baseline), parts_.config.check};
-    if (!baseline.empty() && !job.check->baseline)
-      throw DataError("the stored baseline of the daily check cannot be read: set another one");
-    return job;
-  }
-  if (scan_.patient_id.empty()) return job;  // no session is open: compared with nothing
-  const std::optional<web::Reference> reference = store_->ApprovedReference(scan_.patient_id);
-  if (reference) scan_.reference_area_m2 = store_->SweptArea(reference->scan_id);
-  if (!reference && scan_.purpose == web::ScanPurpose::kFraction)
-    scan_.purpose = web::ScanPurpose::kReference;
-  job.is_reference = scan_.purpose == web::ScanPurpose::kReference;
-  if (reference && scan_.purpose == web::ScanPurpose::kFraction) {
-    scan_.reference_id = reference->id;
-    job.reference_scene = store_->ScanFolder(reference->scan_id) / "scene";
-    job.check_reference = [this, scan = reference->scan_id](const std::stop_token& stop) {
-      return store_->CheckFiles(scan, /*scene_only=*/true, stop);
-    };
-    job.compare = CompareOptionsFor(reference->plan, parts_.config.compare);
-    job.compare.now_s = SteadySeconds;
-  }
-  return job;
-}
-
-web::ReferencePlan Appliance::DefaultPlan() {
-  const web::Settings settings = store_ ? store_->GetSettings() : web::Settings{};
-  return {.region_m = {},
-          .isocentre_m = {},
-          .tolerance = settings.tolerance,
-          .posture = settings.posture,
-          .couch_markers = settings.couch_markers};
-}
-
 /// They run on the scan's thread: they use the store, which is thread-safe, and copies; everything
 /// else is posted.
-ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
-  ScanCallbacks callbacks;
-  auto id = std::make_shared<std::string>();
-  callbacks.begin = [this, record, id] {
-    *id = store_->BeginScan(record);
-    loop_.Post("scan begun", [this, id] { scan_.id = *id; });
-    return store_->StagingFolder(*id);
-  };
-  const bool is_demo =
-      !parts_.demo_patient.empty() && record.purpose == web::ScanPurpose::kReference;
-  const web::ReferencePlan plan = DefaultPlan();
-  const bool is_reference = record.purpose == web::ScanPurpose::kReference;
-  callbacks.save = [this, id, plan, is_demo, is_reference, reason = record.reason,
-                    actor = opened_by_, patient = record.patient_id](const ScanOutcome& outcome) {
-    if (id->empty()) return;  // it never began
-    using Kind = ScanOutcome::Kind;
-    FinishedScan finished{.failure = outcome.reason,
-                          .result_json = outcome.result_json,
-                          .swept_area_m2 = outcome.swept_area_m2};
-    if (outcome.kind == Kind::kDone) finished.outcome = web::ScanOutcome::kDone;
-    if (outcome.kind == Kind::kCancelled) finished.outcome = web::ScanOutcome::kCancelled;
-    store_->FinishScan(*id, finished);
-    const auto demo = store_->FindPatientByCode(parts_.demo_patient);
-    if (!is_reference || outcome.kind != Kind::kDone) return;
-    if (!is_demo || !demo || demo->id != patient || !demo->approved_reference_id.empty()) {
-      (void)store_->AddReference(actor, *id, reason, plan);  // a draft, for a physicist to plan
-      return;
-    }
-    store_->ApproveReference(kAuto,
-                             store_->AddReference(kAuto, *id, "first scan of the demo", plan),
-                             /*revision=*/1, /*digest=*/{}, /*two_users=*/false);
-  };
-  AddListeners(callbacks);
-  return callbacks;
-}
-
-void Appliance::AddListeners(ScanCallbacks& callbacks) {
-  callbacks.update = [this](const ScanUpdate& update) {
-    loop_.Post("scan progress", [this, update] { OnUpdate(update); });
-  };
-  callbacks.sweep_complete = [this] {
-    loop_.Post("sweep complete", [this] { (void)Handle(ScanEvent::kSweepComplete); });
-  };
-  callbacks.ended = [this](const ScanOutcome& outcome) {
-    loop_.Post("scan ended", [this, outcome] { OnEnded(outcome); });
-  };
-}
-
 /// Nothing of a check is kept but its numbers.
-ScanCallbacks Appliance::MakeCheckCallbacks(const NewScan& record) {
-  ScanCallbacks callbacks;
-  callbacks.begin = [] { return std::filesystem::path(); };
-  callbacks.save = [this, actor = *check_,
-                    serial = record.sensor_serial](const ScanOutcome& outcome) {
-    if (!outcome.check_json.empty()) (void)store_->AddCheck(actor, serial, outcome.check_json);
-  };
-  AddListeners(callbacks);
-  return callbacks;
-}
-
 Appliance::Answer Appliance::OpenCheck(const web::Actor& actor) {
   if (IsRunning()) {
     return fmt::format(
@@ -331,19 +182,19 @@ Appliance::Answer Appliance::OpenCheck(const web::Actor& actor) {
         Name(state_.phase));
   }
   check_ = actor;
-  TellWeb(web::EventKind::kStatus);
+  NotifyWeb(web::EventKind::kStatus);
   return {};
 }
 
 void Appliance::OnSensor(const SensorEvent& event) {
   LogSensor(event);
   const char* kNames[] = {"ready", "lost", "failed", "others", "stalled"};
-  TellEvent("sensor", Json{{"what", kNames[static_cast<int>(event.kind)]},
-                           {"serial", event.sensor.serial},
-                           {"reason", event.reason},
-                           {"others", event.others}}
-                          .dump(-1, ' ', false, Json::error_handler_t::replace));
-  TellWeb(web::EventKind::kStatus);
+  PublishEvent("sensor", Json{{"what", kNames[static_cast<int>(event.kind)]},
+                              {"serial", event.sensor.serial},
+                              {"reason", event.reason},
+                              {"others", event.others}}
+                             .dump(-1, ' ', false, Json::error_handler_t::replace));
+  NotifyWeb(web::EventKind::kStatus);
   if (event.kind == SensorEvent::Kind::kOthers || event.kind == SensorEvent::Kind::kStalled) return;
   sensor_fault_ = event.reason;
   (void)Handle(event.kind == SensorEvent::Kind::kReady  ? ScanEvent::kSensorReady
@@ -385,86 +236,7 @@ void Appliance::LogSensor(const SensorEvent& event) {
                 event.others.size() + 1, serial, fmt::join(event.others, ", ")));
 }
 
-void Appliance::OnUpdate(const ScanUpdate& update) {
-  if (scan_.has_ended) return;
-  if (update.frames > 0 && scan_.update.frames == 0)
-    scan_.first_frame_ms = Milliseconds(Clock::now() - scan_.started);
-  NoteDropped(update);
-  scan_.update = update;
-  Show();
-  TellProgress();
-  TellWeb(web::EventKind::kProgress);
-}
-
 /// Updates come at most ten times a second.
-void Appliance::NoteDropped(const ScanUpdate& update) {
-  const double lost = static_cast<double>(update.frames_dropped - scan_.update.frames_dropped);
-  const double seen = static_cast<double>(update.frames - scan_.update.frames);
-  if (lost + seen <= 0) return;
-  const double weight = 1.0 - std::exp(-(lost + seen) / (30.0 * kDroppedSmoothing_s));
-  scan_.dropped_share += weight * (lost / (lost + seen) - scan_.dropped_share);
-}
-
-void Appliance::OnEnded(const ScanOutcome& outcome) {
-  using Kind = ScanOutcome::Kind;
-  limit_timer_.Disarm();
-  sensors_->EndScan();
-  // Its thread has nothing left to do, but its end may wait for a processor.
-  (void)store_thread_.Post(
-      [ended = std::shared_ptr<ScanSession>(std::move(session_))]() mutable { ended.reset(); });
-  ArmSessionTimer();
-  scan_.has_ended = true;
-  scan_.ended = Clock::now();
-  scan_.outcome = outcome;
-  if (outcome.kind == Kind::kCancelled) {
-    scan_.cancel_ms = Milliseconds(Clock::now() - scan_.cancelled_at);
-    Log(LogLevel::kNotice, fmt::format("the scan was discarded within {:.0f} ms", scan_.cancel_ms),
-        {{"SCAN", scan_.id}});
-    (void)Handle(ScanEvent::kScanCancelled);
-  } else if (outcome.kind == Kind::kFailed) {
-    scan_fault_ = fmt::format("the scan failed: {}", outcome.reason);
-    Log(LogLevel::kError, scan_fault_, {{"SCAN", scan_.id}});
-    (void)Handle(ScanEvent::kScanFailed);
-    CheckDisk();
-  } else {
-    if (state_.cancelling)
-      Log(LogLevel::kNotice, "the scan was stored before it could be discarded: its result stands",
-          {{"SCAN", scan_.id}});
-    const bool is_check = scan_.purpose == web::ScanPurpose::kDailyCheck;
-    if (!is_check) last_result_ = scan_;
-    if (scan_.purpose == web::ScanPurpose::kReference &&
-        outcome.kind == Kind::kDone) {  // the next one is compared with it, once it is approved
-      purpose_ = web::ScanPurpose::kFraction;
-      reference_reason_.clear();
-    }
-    const std::string answer = is_check ? "daily check " + CheckIn(outcome.check_json).status
-                               : outcome.verdict                ? Name(*outcome.verdict)
-                               : outcome.kind == Kind::kNoScene ? outcome.reason
-                                                                : "no comparison";
-    Log(LogLevel::kInfo,
-        fmt::format("the scan is done {:.2f} s after its last frame, {} frames, {} dropped: {}",
-                    outcome.after_last_frame_s, outcome.frames, outcome.frames_dropped, answer),
-        {{"SCAN", scan_.id}});
-    const SensorStatistics& images = scan_.images;
-    if (images.num_lost + images.num_unpaired + images.num_discarded > 0) {
-      Log(LogLevel::kWarning,
-          fmt::format("of the sensor's images {} were lost, {} without a partner, {} of a wrong "
-                      "size, twice or out of order",
-                      images.num_lost, images.num_unpaired, images.num_discarded),
-          {{"SCAN", scan_.id}});
-    }
-    (void)Handle(ScanEvent::kScanDone);
-    TellEvent("result", Json{{"scan", scan_.id}, {"answer", answer}}.dump(
-                            -1, ' ', false, Json::error_handler_t::replace));
-  }
-  if (outcome.kind == Kind::kDone) profile_fault_ = outcome.drift;
-  check_.reset();
-  TellWeb(web::EventKind::kResult);
-  TellWeb(web::EventKind::kData);
-  Care();
-  if (stopped_) std::exchange(stopped_, nullptr)();
-}
-
 void Appliance::OpenSession(const std::string& session_id, const std::string& patient_id,
                             web::ScanPurpose purpose, const std::string& reason,
                             const web::Actor& actor) {
@@ -475,7 +247,7 @@ void Appliance::OpenSession(const std::string& session_id, const std::string& pa
   purpose_ = purpose;
   reference_reason_ = reason;
   ArmSessionTimer();
-  TellWeb(web::EventKind::kStatus);
+  NotifyWeb(web::EventKind::kStatus);
 }
 
 void Appliance::ForgetSession() {
@@ -484,7 +256,7 @@ void Appliance::ForgetSession() {
   reference_reason_.clear();
   purpose_ = web::ScanPurpose::kFraction;
   session_timer_.Disarm();
-  TellWeb(web::EventKind::kStatus);
+  NotifyWeb(web::EventKind::kStatus);
 }
 
 Appliance::Answer Appliance::CloseSession(const web::Actor& actor) {
@@ -500,7 +272,7 @@ Appliance::Answer Appliance::CloseSession(const web::Actor& actor) {
     } catch (const std::exception& error) {
       Log(LogLevel::kError, fmt::format("cannot note the end of the session: {}", error.what()));
     }
-    loop_.Post("session closed", [this] { TellWeb(web::EventKind::kData); });
+    loop_.Post("session closed", [this] { NotifyWeb(web::EventKind::kData); });
   });
   return {};
 }
@@ -526,6 +298,7 @@ void Appliance::Reload(const Config& config) {
   const std::vector<std::string> kept = KeepUntilRestart(parts_.config, next);
   parts_.config = std::move(next);
   profiles_off_ = ProfilesOff(parts_.config);
+  LookAtRoom();
   Log(LogLevel::kInfo, "the configuration was read again");
   if (!kept.empty())
     Log(LogLevel::kWarning,

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -24,6 +25,8 @@
 #include "daemon/records/store.hpp"
 #include "drivers/button.hpp"
 #include "drivers/indicator.hpp"
+#include "web/service/appliance_service.hpp"
+#include "web/service/room_calibration_service.hpp"
 
 namespace plumb {
 
@@ -74,12 +77,12 @@ class Appliance {
   [[nodiscard]] std::filesystem::path BackupTarget() const;
   /// Asked before each scan: a reason why none may begin now, or nothing.
   void SetHindrance(std::function<std::string()> hindrance) { hindrance_ = std::move(hindrance); }
-  /// The session that the store has opened: scans belong to it until it is closed.
   /// Why no reference may be scanned or approved now, with the next step: no daily check has passed
   /// today. Empty: it may, as always in the demo. @param scan  That is to be the reference: one
   /// that was taken while the check was overdue is confirmed by a check of the same day
   /// (Store::IsConfirmedByLaterCheck), or has to be repeated.
   [[nodiscard]] std::string WhyNoReference(const std::optional<web::Scan>& scan = {});
+  /// The session that the store has opened: scans belong to it until it is closed.
   void OpenSession(const std::string& session_id, const std::string& patient_id,
                    web::ScanPurpose purpose, const std::string& reason, const web::Actor& actor);
   /// The session is over, in the store too. Not while a scan runs.
@@ -90,7 +93,7 @@ class Appliance {
   /// Why the machine may not be restarted now: a scan runs, or a patient's session is open (the
   /// demo's counts as none). Empty: it may.
   [[nodiscard]] Answer WhyNotRestart() const;
-  /// Told by status and light until it is empty: the machine has gone back to the system before.
+  /// Told by status and light until it is empty: the machine has gone back to the previous system.
   void SetRolledBack(const std::string& text);
   [[nodiscard]] const std::string& session_id() const { return session_id_; }
   /// If this one is open, none is any more. A daily check that is open stays so.
@@ -99,6 +102,14 @@ class Appliance {
   /// patient again.
   Answer OpenCheck(const web::Actor& actor);
   [[nodiscard]] web::CheckStatus Checks();
+  /// Reads anew which calibration of the room holds, and whether a marker moved since.
+  void LookAtRoom();
+  /// From any thread.
+  [[nodiscard]] web::RoomCalibrationStatus RoomCalibration();
+  /// Which board belongs to the room's markers; from any thread.
+  [[nodiscard]] std::string RoomBoardPdf() const;
+  /// Whose scans of the board, and since when, count for the next calibration.
+  [[nodiscard]] std::pair<std::string, web::WallClock::time_point> RoomScansWanted() const;
   /// Of the connected sensor unit; from any thread.
   [[nodiscard]] web::SensorProfiles SensorProfiles() const;
   [[nodiscard]] std::optional<std::string> SensorProfileFile(int version) const;
@@ -142,7 +153,7 @@ class Appliance {
   [[nodiscard]] EventLoop& loop() { return loop_; }
   /// Of a new reference, from settings and configuration.
   [[nodiscard]] web::ReferencePlan DefaultPlan();
-  void TellData() { TellWeb(web::EventKind::kData); }
+  void NotifyDataChanged() { NotifyWeb(web::EventKind::kData); }
 
  private:
   /// The scan that runs, or the last one.
@@ -184,6 +195,8 @@ class Appliance {
   void StartScan();
   void BeginSession();
   [[nodiscard]] ScanJob MakeJob(const web::Settings& settings);
+  [[nodiscard]] std::optional<RoomAxes> RoomOfJob() const;
+  void ReportRoom(web::Status& status) const;
   [[nodiscard]] std::shared_ptr<UnitProfile> MakeUnitProfile();
   [[nodiscard]] std::string WhyNoProfile(const SensorDescription& sensor) const;
   [[nodiscard]] static bool ProfilesOff(const Config& config);
@@ -209,15 +222,24 @@ class Appliance {
   void ReadStored(web::Status& status);
   void Show();
   [[nodiscard]] IndicatorPattern Pattern() const;
-  void TellEvent(const char* event, const std::string& fields_json);
-  void TellState();
-  void TellProgress();
-  void TellWeb(web::EventKind kind);
+  void PublishEvent(const char* event, const std::string& fields_json);
+  void PublishState();
+  void PublishProgress();
+  void NotifyWeb(web::EventKind kind);
   [[nodiscard]] std::optional<double> Coverage() const;
   [[nodiscard]] std::string FaultReason() const;
 
+  /// The calibration that holds, as LookAtRoom() found it.
+  struct Room {
+    std::optional<SignedRoom> calibration;
+    std::string due;  ///< Set without a calibration: one is stored, but cannot be read.
+    bool is_configured = false;
+  };
+
   EventLoop& loop_;
   ApplianceParts parts_;
+  mutable std::mutex room_mutex_;  ///< Changed on the loop, read from any thread.
+  Room room_;
   std::unique_ptr<Store> store_;
   std::string storage_fault_, backup_fault_;
   std::shared_ptr<ProfileShelf> profiles_;
@@ -254,6 +276,9 @@ class Appliance {
   std::unique_ptr<SensorThread> sensors_;
   std::unique_ptr<ScanSession> session_;  // last: its thread uses what is above
 };
+
+/// Midnight, local time.
+[[nodiscard]] web::WallClock::time_point StartOfDay();
 
 /// "off", "no_sensor", "ready", ...
 [[nodiscard]] const char* Name(IndicatorPattern pattern);

@@ -80,7 +80,7 @@ Appliance::Answer Appliance::WhyNotChangeProfile(const std::string& serial) cons
 
 void Appliance::ForgetDrift() {
   profile_fault_.clear();
-  TellWeb(web::EventKind::kStatus);
+  NotifyWeb(web::EventKind::kStatus);
 }
 
 }  // namespace plumb

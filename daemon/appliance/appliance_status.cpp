@@ -1,4 +1,4 @@
-// What the appliance tells about itself: status, events, light.
+// what the appliance reports about itself: status, events, light.
 #include <sys/statvfs.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::json;
 
-/// What both the status and an event tell of a scan.
+/// What both the status and an event say about a scan.
 Json ProgressFields(const ScanUpdate& update, std::optional<double> coverage) {
   return {{"step", update.step},
           {"fraction", update.fraction},
@@ -82,6 +82,8 @@ web::StorageStatus StorageOf(const std::filesystem::path& folder, bool is_open) 
           .writable = is_open && (status.f_flag & ST_RDONLY) == 0};
 }
 
+}  // namespace
+
 web::WallClock::time_point StartOfDay() {
   const std::time_t now = std::time(nullptr);
   std::tm local{};
@@ -89,8 +91,6 @@ web::WallClock::time_point StartOfDay() {
   local.tm_hour = local.tm_min = local.tm_sec = 0;
   return web::WallClock::from_time_t(std::mktime(&local));
 }
-
-}  // namespace
 
 const char* Name(IndicatorPattern pattern) {
   static constexpr const char* kNames[] = {
@@ -141,33 +141,33 @@ void Appliance::Show() {
   if (pattern == shown_) return;
   shown_ = pattern;
   if (parts_.indicator != nullptr) parts_.indicator->Show(pattern);
-  TellEvent("light",
-            Json{{"pattern", Name(pattern)}}.dump(-1, ' ', false, Json::error_handler_t::replace));
+  PublishEvent("light", Json{{"pattern", Name(pattern)}}.dump(-1, ' ', false,
+                                                              Json::error_handler_t::replace));
 }
 
 void Appliance::SetRolledBack(const std::string& text) {
   rolled_back_ = text;
   Show();
-  TellWeb(web::EventKind::kStatus);
+  NotifyWeb(web::EventKind::kStatus);
 }
 
-void Appliance::TellEvent(const char* event, const std::string& fields_json) {
+void Appliance::PublishEvent(const char* event, const std::string& fields_json) {
   if (!tell_watchers_) return;
   Json line = {{"event", event}, {"time", WallSeconds()}};
   line.update(Json::parse(fields_json));
   tell_watchers_(line.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-void Appliance::TellState() {
+void Appliance::PublishState() {
   Show();
-  TellEvent("state", Json{{"state", Name(state_.phase)},
-                          {"reason", FaultReason()},
-                          {"cancelling", state_.cancelling}}
-                         .dump(-1, ' ', false, Json::error_handler_t::replace));
-  TellWeb(web::EventKind::kStatus);
+  PublishEvent("state", Json{{"state", Name(state_.phase)},
+                             {"reason", FaultReason()},
+                             {"cancelling", state_.cancelling}}
+                            .dump(-1, ' ', false, Json::error_handler_t::replace));
+  NotifyWeb(web::EventKind::kStatus);
 }
 
-void Appliance::TellWeb(web::EventKind kind) {
+void Appliance::NotifyWeb(web::EventKind kind) {
   if (tell_web_) tell_web_(kind);
 }
 
@@ -199,10 +199,10 @@ std::string Appliance::StatusLine() const {
   return line;
 }
 
-void Appliance::TellProgress() {
+void Appliance::PublishProgress() {
   Json progress = ProgressFields(scan_.update, Coverage());
   progress["scan"] = scan_.id;
-  TellEvent("progress", progress.dump(-1, ' ', false, Json::error_handler_t::replace));
+  PublishEvent("progress", progress.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
 std::string Appliance::StatusJson() {
@@ -312,11 +312,7 @@ web::Status Appliance::WebStatus() {
   status.warnings = page_.warnings;
   if (!profile_fault_.empty()) status.warnings.push_back(profile_fault_);
   status.rolled_back = rolled_back_;
-  const std::optional<Pose>& T_iec_reference = parts_.config.compare.T_iec_reference;
-  const Eigen::Matrix3d R_iec_reference = T_iec_reference.value_or(Pose::Identity()).linear();
-  status.right_xy = {R_iec_reference(0, 0), R_iec_reference(0, 1)};
-  status.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)};
-  status.is_room_known = T_iec_reference.has_value();
+  ReportRoom(status);
   ReadStored(status);
   return status;
 }

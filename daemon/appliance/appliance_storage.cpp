@@ -159,7 +159,7 @@ std::uint64_t Appliance::QuotaBytes() const {
   return static_cast<std::uint64_t>(kShare * static_cast<double>(space.capacity));
 }
 
-/// A disk that has become read-only must be known before a patient is scanned in vain. Off the
+/// A disk that has become read-only must be known before a patient is scanned for nothing. Off the
 /// loop.
 void Appliance::CheckDisk() {
   ticks_to_disk_check_ = kDiskCheckTicks;
@@ -178,7 +178,7 @@ void Appliance::FailStorage(const std::string& what) {
   storage_fault_ = what;
   Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", what));
   (void)Handle(ScanEvent::kStorageFailed);
-  TellState();
+  PublishState();
 }
 
 /// Retention and quota, off the loop.
@@ -223,7 +223,7 @@ void Appliance::CheckStoredFiles() {
         if (checked->fault.empty()) return;
         Log(LogLevel::kError, fmt::format("the stored scan is not as it was: {}", checked->fault),
             {{"SCAN", checked->id}});
-        TellWeb(web::EventKind::kData);
+        NotifyWeb(web::EventKind::kData);
       });
     }
   });

@@ -77,9 +77,9 @@ void ControlDesk::Answer(const ControlRequest& request, const ControlServer::Rep
     case Kind::kUpdate:
       return updates_.InstallFile(kSocket, request.file, request.name, ReplyWith(reply));
     case Kind::kUpdateStatus:
-      return reply(UpdateLine(updates_.GetStatus()));
+      return reply(UpdateLine(updates_.GetUpdate()));
     case Kind::kRestart:
-      return updates_.Restart(kSocket, ReplyWith(reply));
+      return updates_.RestartSystem(kSocket, ReplyWith(reply));
     case Kind::kSim:
       return Simulate(request, reply);
   }

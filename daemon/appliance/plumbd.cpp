@@ -24,10 +24,13 @@
 #include "algo/base/errors.hpp"
 #include "algo/base/notice.hpp"
 #include "algo/base/pose.hpp"
+#include "algo/comparison/room_board.hpp"
+#include "algo/types/frame.hpp"
+#include "algo/types/marker_dictionary.hpp"
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/control_desk.hpp"
 #include "daemon/appliance/panel.hpp"
-#include "daemon/appliance/web_service.hpp"
+#include "daemon/appliance/web_services.hpp"
 #include "daemon/config/sensor_settings.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/control/control_server.hpp"
@@ -57,7 +60,7 @@ struct Options {
   int sim_frames = 300, sim_scenes = 0;
   unsigned sim_seed = 1;
   std::string sim_size = "640x480";
-  bool sim_unplugged = false;
+  bool sim_unplugged = false, sim_board = false;
 };
 
 constexpr const char* kDefaultConfig = "/etc/plumb/plumb.toml";
@@ -88,6 +91,9 @@ void AddOptions(CLI::App& app, Options& options) {
       ->group("Virtual sensor");
   app.add_option("--sim-scenes", options.sim_scenes, "Only so many of the suite's scenes; 0: all")
       ->check(CLI::Range(0, 1000))
+      ->group("Virtual sensor");
+  app.add_flag("--sim-board", options.sim_board,
+               "Three scenes of the board of the room's calibration come first")
       ->group("Virtual sensor");
   app.add_flag("--sim-unplugged", options.sim_unplugged, "It is not attached at the start")
       ->group("Virtual sensor");
@@ -174,13 +180,19 @@ std::unique_ptr<const SensorSetup> SetUpSensors(const Options& options, const Co
   SensorSettings settings = SensorSettingsOf(config);
   settings.markers_are_the_rooms = !driver.is_simulated;
   const bool is_small = options.sim_size == "320x240";
-  const SimulatedSweeps sweeps{.suite = options.simulated.empty() ? "demo" : options.simulated,
-                               .seed = options.sim_seed,
-                               .frames = options.sim_frames,
-                               .width = is_small ? 320 : 640,
-                               .height = is_small ? 240 : 480,
-                               .max_scenes = static_cast<std::size_t>(options.sim_scenes),
-                               .plugged = !options.sim_unplugged};
+  SimulatedSweeps sweeps{.suite = options.simulated.empty() ? "demo" : options.simulated,
+                         .seed = options.sim_seed,
+                         .frames = options.sim_frames,
+                         .width = is_small ? 320 : 640,
+                         .height = is_small ? 240 : 480,
+                         .max_scenes = static_cast<std::size_t>(options.sim_scenes),
+                         .plugged = !options.sim_unplugged};
+  if (options.sim_board) {
+    const StreamInfo usual;
+    sweeps.board_centres_m = MakeRoomBoard(MarkerDictionary::ByName(usual.marker_dictionary).size(),
+                                           usual.marker_length_m)
+                                 .centres_m;
+  }
   const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
   std::stop_source rendering;
   return driver.set_up(
@@ -224,9 +236,9 @@ class Plumbd {
                            .button = panel_.button(),
                            .indicator = panel_.light(),
                            .demo_patient = options.simulated.empty() ? "" : "demo"}),
-        service_(appliance_, config.update, MakeLogindRestart(loop_, {})),
-        http_(service_, HttpOptions(config)),
-        desk_(appliance_, service_.updates(),
+        services_(appliance_, config.update, MakeLogindRestart(loop_, {})),
+        http_(services_.services(), HttpOptions(config)),
+        desk_(appliance_, services_.updates(),
               [this](const std::string& command) { (void)sensors_->Command(command); }),
         control_(loop_, ControlSocket(config),
                  [this](const ControlRequest& request, const ControlServer::Reply& reply) {
@@ -380,7 +392,7 @@ class Plumbd {
   std::string certificate_pem_;  ///< Empty: no TLS.
   std::vector<std::string> certificate_warnings_;
   fs::path own_socket_;  ///< The control socket where this process made it.
-  WebService service_;
+  WebServices services_;
   web::HttpServer http_;
   ControlDesk desk_;
   ControlServer control_;

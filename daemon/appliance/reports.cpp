@@ -11,6 +11,7 @@
 #include "daemon/appliance/report_words.hpp"
 #include "daemon/config/version.hpp"
 #include "drivers/files/file_io.hpp"
+#include "web/service/limits.hpp"
 
 namespace plumb {
 namespace {
@@ -181,13 +182,11 @@ std::vector<std::string> CautionsOf(const web::Scan& scan, const Json& scene,
 }
 
 std::string PlanText(const web::ReferencePlan& plan, const ReportWords& words) {
-  constexpr std::array<std::string_view, 4> kNames = {"HFS", "HFP", "FFS", "FFP"};
-  const auto name = std::find(kNames.begin(), kNames.end(), plan.posture);
-  const std::string posture =
-      name == kNames.end()
-          ? plan.posture
-          : std::string(
-                words.postures[static_cast<std::size_t>(std::distance(kNames.begin(), name))]);
+  const auto name = std::find(web::kPostures.begin(), web::kPostures.end(), plan.posture);
+  const std::string posture = name == web::kPostures.end()
+                                  ? plan.posture
+                                  : std::string(words.postures[static_cast<std::size_t>(
+                                        std::distance(web::kPostures.begin(), name))]);
   return fmt::format("{}, {}", posture,
                      plan.couch_markers ? words.couch_markers : words.room_markers);
 }

@@ -5,6 +5,7 @@
 
 #include "daemon/files/pdf_report.hpp"
 #include "daemon/records/store.hpp"
+#include "web/service/scan_service.hpp"
 
 namespace plumb {
 

@@ -1,11 +1,14 @@
 #include "daemon/appliance/scan_session.hpp"
 
 #include <future>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "algo/comparison/room_board.hpp"
+#include "algo/types/marker_dictionary.hpp"
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/files/text_report.hpp"
@@ -36,6 +39,19 @@ Scene ReadReference(const ScanJob& job, const std::stop_token& stop) {
     throw std::runtime_error(
         fmt::format("the patient's reference cannot be read: {}; {}", error.what(), kRemedy));
   }
+}
+
+/// Puts the room's axes in the reference scene's frame, by the room's markers that it saw.
+std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room, const Scene& reference,
+                                   CompareOptions& compare) {
+  if (!room) return std::nullopt;
+  compare.T_iec_reference.reset();
+  if (!room->why_not.empty()) return ResultRoom{room->version, room->why_not};
+  compare.T_iec_reference = RoomOf(room->markers_iec, reference.markers);
+  if (compare.T_iec_reference) return ResultRoom{room->version, {}};
+  return ResultRoom{room->version,
+                    "fewer than 3 of the room's markers lie in the reference as they lay when the "
+                    "room was calibrated"};
 }
 
 void ThrowIfStopped(const std::stop_token& stop) {
@@ -154,7 +170,7 @@ Scene ScanSession::Track(const std::stop_token& stop) {
 }
 
 void ScanSession::OnProgress(const ScanProgress& progress) {
-  // Nobody shall sweep in vain.
+  // Fail before the sweep where the reference cannot be read.
   if (reference_.valid() &&
       reference_.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
     (void)reference_.get();
@@ -170,11 +186,11 @@ void ScanSession::OnProgress(const ScanProgress& progress) {
         !std::exchange(told_complete_, true))
       callbacks_.sweep_complete();
   }
-  Tell(std::string(progress.step), progress.fraction);
+  ReportProgress(std::string(progress.step), progress.fraction);
 }
 
-/// Tells at most ten times a second, but each new step and the first frame at once.
-void ScanSession::Tell(std::string step, double fraction) {
+/// Reports at most ten times a second, but each new step and the first frame at once.
+void ScanSession::ReportProgress(std::string step, double fraction) {
   const double now_s = SteadySeconds();
   heartbeat_s_ = now_s;
   if (step == update_.step && now_s - told_s_ < kUpdateEvery_s) return;
@@ -185,13 +201,22 @@ void ScanSession::Tell(std::string step, double fraction) {
 }
 
 void ScanSession::Check(const Scene& scene) {
-  Tell("checking", 0.0);
-  MarkerCheck check = CheckMarkers(scene, job_.check->baseline, job_.check->limits);
+  ReportProgress("checking", 0.0);
+  // The board of the room's calibration is there for this scan only: it is no marker of the room.
+  Scene room, board;
+  room.marker_dictionary = board.marker_dictionary = scene.marker_dictionary;
+  room.marker_length_m = board.marker_length_m = scene.marker_length_m;
+  room.calibration = scene.calibration;
+  std::tie(board.markers, room.markers) =
+      SplitRoomBoard(scene.markers, MarkerDictionary::ByName(scene.marker_dictionary).size());
+  MarkerCheck check = CheckMarkers(room, job_.check->baseline, job_.check->limits);
   if (!outcome_.drift.empty()) {
     check.status = MarkerCheckStatus::kFailed;
     check.reasons.push_back(outcome_.drift);
   }
-  outcome_.check_json = CheckJson(check, BaselineOf(scene, job_.check->limits));
+  outcome_.check_json = CheckJson(
+      check, BaselineOf(room, job_.check->limits), BaselineOf(board, job_.check->limits).markers,
+      scene.frame == SceneFrame::kReferenceMarker ? scene.reference_marker : std::nullopt);
   outcome_.verdict =
       check.status == MarkerCheckStatus::kPassed ? Verdict::kInTolerance : Verdict::kNoAnswer;
 }
@@ -203,18 +228,20 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
         "this scan cannot become a reference: the reference marker was not seen; keep it in view "
         "during a part of the sweep");
   }
-  Tell("saving", 0.0);
+  ReportProgress("saving", 0.0);
   // The scene goes to the disk while it is compared.
   std::future<void> writing =
       std::async(std::launch::async, [&] { WriteScene(scene, folder_ / "scene", stop); });
   std::optional<Comparison> comparison;
+  std::optional<ResultRoom> room;
   ResultPictures pictures;
   if (reference_.valid()) {
-    Tell("comparing", 0.0);
+    ReportProgress("comparing", 0.0);
     const Scene& reference = reference_.get();
     ThrowIfStopped(stop);
     CompareOptions compare = job_.compare;
     compare.stop = stop;
+    room = TakeRoom(job_.room, reference, compare);
     try {
       comparison = Compare(reference, scene, compare);
     } catch (const DataError& error) {  // not the sweep's fault: another one would end the same
@@ -222,16 +249,21 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
           fmt::format("the scan does not fit its reference: {}", error.what()));
     }
     ThrowIfStopped(stop);
+    if (room && !room->why_not_used.empty()) {
+      comparison->warnings.push_back(
+          fmt::format("the calibration of the room, version {}, is not used: {}", room->version,
+                      room->why_not_used));
+    }
     pictures = DrawResult(*comparison, reference.height_map ? &*reference.height_map : nullptr,
                           {.tolerance_m = job_.compare.limits.shift_tolerance_m,
                            .subtitle = PictureSubtitle(*comparison)});
-    Tell("saving", 0.5);
+    ReportProgress("saving", 0.5);
   }
   writing.get();
   if (!comparison) return;
   ThrowIfStopped(stop);
-  WriteResult(*comparison, pictures, folder_ / "result");
-  outcome_.result_json = ResultJson(*comparison);
+  WriteResult(*comparison, pictures, folder_ / "result", room);
+  outcome_.result_json = ResultJson(*comparison, room);
   outcome_.verdict = comparison->verdict;
 }
 

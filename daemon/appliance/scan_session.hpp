@@ -1,4 +1,4 @@
-// One scan, from its first live frame to what is stored: the tracking thread and what it tells.
+// One scan, from its first live frame to what is stored: the tracking thread and what it reports.
 #pragma once
 
 #include <atomic>
@@ -27,11 +27,19 @@ struct CheckJob {
   MarkerCheckLimits limits;
 };
 
+/// The signed calibration of the room. Where one is, no other axes are taken.
+struct RoomAxes {
+  int version = 0;
+  MarkerMap markers_iec;
+  std::string why_not;  ///< Why it is not to be used now; empty: it is.
+};
+
 /// What a scan is made for.
 struct ScanJob {
   StreamInfo info;  ///< Of the sensor.
   ReconstructorOptions reconstructor;
   CompareOptions compare;
+  std::optional<RoomAxes> room;  ///< None: `compare` says where the room lies, or nobody knows.
   GuidanceOptions guidance;
   std::filesystem::path reference_scene;  ///< SCENE to compare with; empty: none.
   /// Why the reference is not what was approved; empty: it is. Asked before it is read.
@@ -109,7 +117,7 @@ class ScanSession {
   void Check(const Scene& scene);
   void Evaluate(const Scene& scene, const std::stop_token& stop);
   void OnProgress(const struct ScanProgress& progress);
-  void Tell(std::string step, double fraction);
+  void ReportProgress(std::string step, double fraction);
 
   ScanJob job_;
   ScanCallbacks callbacks_;

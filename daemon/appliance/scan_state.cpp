@@ -38,7 +38,7 @@ ScanTransition Start(ScanState state) {
   return {.state = state, .actions = {ScanAction::kStartScan}, .refusal = {}};
 }
 
-/// Tells a running scan to stop, once. The state settles when it has.
+/// Asks a running scan to stop, once. The state settles when it has.
 ScanTransition Cancel(ScanState state) {
   if (state.cancelling) return Stay(state);
   state.cancelling = true;

@@ -24,10 +24,10 @@ constexpr std::chrono::seconds kListAgain{2};
 /// Everything in it belongs to the sensor thread, but what the mutex guards and the atomics.
 struct SensorThread::Impl {
   Impl(std::function<std::unique_ptr<SensorProvider>()> make, SensorThreadOptions its_options,
-       std::function<void(const SensorEvent&)> tell)
+       std::function<void(const SensorEvent&)> listener)
       : make_provider(std::move(make)),
         options(std::move(its_options)),
-        notify(std::move(tell)),
+        notify(std::move(listener)),
         retry(options.first_retry) {
     thread = std::jthread([this](const std::stop_token& stop) { Run(stop); });
   }
@@ -82,10 +82,10 @@ struct SensorThread::Impl {
           const std::lock_guard lock(mutex);
           bus_changed = true;  // another one may be there already
         }
-        Tell(SensorEvent::Kind::kLost, {});
+        NotifyOnce(SensorEvent::Kind::kLost, {});
       } catch (const std::exception& error) {
         Drop();
-        Tell(SensorEvent::Kind::kFailed, Explain(error));
+        NotifyOnce(SensorEvent::Kind::kFailed, Explain(error));
         retry_at = Clock::now() + retry;
         retry = std::min(2 * retry, options.last_retry);
       }
@@ -104,7 +104,7 @@ struct SensorThread::Impl {
     });
   }
 
-  /// Opens a sensor if one is there and the time has come; tells that there is none.
+  /// Opens a sensor if one is there and the time has come; reports that there is none.
   void Find() {
     if (!provider) return;
     {
@@ -125,13 +125,14 @@ struct SensorThread::Impl {
       retry_at.reset();
       retry = options.first_retry;
       if (attached.empty() || options.serial.empty()) {
-        Tell(SensorEvent::Kind::kLost, {});
+        NotifyOnce(SensorEvent::Kind::kLost, {});
       } else {
-        Tell(SensorEvent::Kind::kFailed,
-             fmt::format(
-                 "the sensor {} is not attached, but {} is: attach the configured one or change "
-                 "appliance.sensor_serial",
-                 options.serial, attached.front().serial));
+        NotifyOnce(
+            SensorEvent::Kind::kFailed,
+            fmt::format(
+                "the sensor {} is not attached, but {} is: attach the configured one or change "
+                "appliance.sensor_serial",
+                options.serial, attached.front().serial));
       }
       return;
     }
@@ -210,7 +211,7 @@ struct SensorThread::Impl {
     if (feed) feed->Push(std::move(*frame));
     if (is_new) {
       retry = options.first_retry;
-      Tell(SensorEvent::Kind::kReady, {});
+      NotifyOnce(SensorEvent::Kind::kReady, {});
     }
   }
 
@@ -253,7 +254,7 @@ struct SensorThread::Impl {
     newest.reset();
   }
 
-  void Tell(SensorEvent::Kind kind, const std::string& reason) {
+  void NotifyOnce(SensorEvent::Kind kind, const std::string& reason) {
     if (told == kind && told_reason == reason && kind != SensorEvent::Kind::kReady) return;
     told = kind;
     told_reason = reason;

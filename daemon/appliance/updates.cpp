@@ -75,25 +75,26 @@ std::string Updates::WhyNotRestart() const {
   return appliance_.WhyNotRestart();
 }
 
-void Updates::Add(const web::Actor& actor, const std::filesystem::path& file,
-                  const std::string& name, const web::Done& done) {
+void Updates::AddBundle(const web::Actor& actor, const std::filesystem::path& file,
+                        const std::string& name, web::Done done) {
   const web::Change change = updater_.Add(file, name);
   options_.log(actor, change.result == ChangeResult::kDone ? "update.upload" : "update.refuse",
                name, change.message);
   done(change);
 }
 
-void Updates::Remove(const web::Actor& actor, const std::string& name, const web::Done& done) {
+void Updates::RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) {
   const web::Change change = updater_.Remove(name);
   if (change.result == ChangeResult::kDone) options_.log(actor, "update.remove", name, "");
   done(change);
 }
 
-void Updates::Install(const web::Actor& actor, const std::string& name, web::Done done) {
+void Updates::InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) {
   if (const std::string why = WhyNotInstall(); !why.empty()) return done(Conflict(why));
-  updater_.Install(name, [this, actor, name, done = std::move(done)](const web::Change& change) {
+  updater_.Install(bundle, [this, actor, bundle,
+                            done = std::move(done)](const web::Change& change) {
     options_.log(actor, change.result == ChangeResult::kDone ? "update.install" : "update.refuse",
-                 name, change.message);
+                 bundle, change.message);
     done(change);
   });
 }
@@ -113,8 +114,8 @@ void Updates::InstallFile(const web::Actor& actor, std::shared_ptr<const Attache
       options_.log(actor, "update.refuse", name, failure.message);
       return done(failure);
     }
-    Add(actor, copy, name, [this, actor, name, copy, done](const web::Change& added) {
-      if (added.result == ChangeResult::kDone) return Install(actor, name, done);
+    AddBundle(actor, copy, name, [this, actor, name, copy, done](const web::Change& added) {
+      if (added.result == ChangeResult::kDone) return InstallUpdate(actor, name, done);
       std::error_code ignored;
       std::filesystem::remove(copy, ignored);
       done(added);
@@ -141,7 +142,7 @@ void Updates::InstallFile(const web::Actor& actor, std::shared_ptr<const Attache
   done(Conflict("the disk is busy: try again"));
 }
 
-void Updates::Restart(const web::Actor& actor, web::Done done) {
+void Updates::RestartSystem(const web::Actor& actor, web::Done done) {
   if (const std::string why = WhyNotRestart(); !why.empty()) return done(Conflict(why));
   restarting_ = true;  // No scan, session or update may begin before the machine goes down.
   options_.log(actor, "system.restart", "", "");
@@ -157,7 +158,7 @@ void Updates::Restart(const web::Actor& actor, web::Done done) {
       });
 }
 
-void Updates::ForgetRollBack(const web::Actor& actor, const web::Done& done) {
+void Updates::ForgetRollBack(const web::Actor& actor, web::Done done) {
   if (updater_.status().rolled_back.empty())
     return done(Conflict("the machine has not gone back to another system"));
   updater_.ForgetRollBack();

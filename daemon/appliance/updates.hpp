@@ -9,6 +9,7 @@
 #include "daemon/control/attached_file.hpp"
 #include "daemon/update/system_restart.hpp"
 #include "daemon/update/updater.hpp"
+#include "web/service/update_service.hpp"
 
 namespace plumb {
 
@@ -17,7 +18,7 @@ struct UpdatesOptions {
   std::string bus_address = {};  ///< Empty: the system bus.
   std::string boot = {};         ///< Another text at each start of the machine; empty: not known.
   std::function<bool(std::function<void()>)> aside;  ///< See UpdaterOptions.
-  std::function<void()> changed;                     ///< GetStatus() has changed.
+  std::function<void()> changed;                     ///< GetUpdate() has changed.
   std::function<void(const web::Actor& actor, const char* action, const std::string& subject,
                      const std::string& detail)>
       log;  ///< To the audit log.
@@ -25,25 +26,24 @@ struct UpdatesOptions {
 
 /// Belongs to the loop's thread. Nothing is installed, and nothing restarted, while somebody is
 /// scanned; no scan begins while it goes on.
-class Updates {
+class Updates : public web::UpdateService {
  public:
   /// @param restart  How the machine is restarted.
   Updates(Appliance& appliance, std::unique_ptr<SystemRestart> restart, UpdatesOptions options);
-  ~Updates();
+  ~Updates() override;
   Updates(const Updates&) = delete;
   Updates& operator=(const Updates&) = delete;
 
-  [[nodiscard]] web::UpdateStatus GetStatus() { return updater_.status(); }
-  /// As web::ScanService has them.
-  void Add(const web::Actor& actor, const std::filesystem::path& file, const std::string& name,
-           const web::Done& done);
-  void Remove(const web::Actor& actor, const std::string& name, const web::Done& done);
-  void Install(const web::Actor& actor, const std::string& name, web::Done done);
+  [[nodiscard]] web::UpdateStatus GetUpdate() override { return updater_.status(); }
+  void AddBundle(const web::Actor& actor, const std::filesystem::path& file,
+                 const std::string& name, web::Done done) override;
+  void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override;
+  void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
   /// Copies the open file among the bundles, off the loop, then installs it.
   void InstallFile(const web::Actor& actor, std::shared_ptr<const AttachedFile> file,
                    const std::string& name, web::Done done);
-  void Restart(const web::Actor& actor, web::Done done);
-  void ForgetRollBack(const web::Actor& actor, const web::Done& done);
+  void RestartSystem(const web::Actor& actor, web::Done done) override;
+  void ForgetRollBack(const web::Actor& actor, web::Done done) override;
 
  private:
   /// Why no update may begin now; empty: it may.

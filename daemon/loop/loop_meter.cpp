@@ -117,12 +117,12 @@ void LoopMeter::End() {
     const LoopTurn turn = Describe(wall, cpu);
     if (is_longest) longest_ = turn;
     if (is_longest_cpu) longest_cpu_ = turn;
-    if (is_slow) TellSlow(turn, wall_now);
+    if (is_slow) ReportSlow(turn, wall_now);
   }
   turn_.clear();
 }
 
-void LoopMeter::TellSlow(const LoopTurn& turn, nanoseconds now) {
+void LoopMeter::ReportSlow(const LoopTurn& turn, nanoseconds now) {
   if (!slow_ || (told_at_ && now - *told_at_ < kTellEvery)) {
     ++unsaid_;
     return;

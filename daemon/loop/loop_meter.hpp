@@ -78,7 +78,7 @@ class LoopMeter {
   void Count(std::string_view name, std::chrono::nanoseconds wall, std::chrono::nanoseconds cpu);
   [[nodiscard]] LoopTurn Describe(std::chrono::nanoseconds wall,
                                   std::chrono::nanoseconds cpu) const;
-  void TellSlow(const LoopTurn& turn, std::chrono::nanoseconds now);
+  void ReportSlow(const LoopTurn& turn, std::chrono::nanoseconds now);
 
   LoopClocks clocks_;
   SlowListener slow_;

@@ -134,20 +134,20 @@ class Writing {
       if (file.path == kRecordingFolder) continue;  // its own check tells
       const auto copy = found.find(file.path);
       if (copy == found.end()) {
-        output_.Tell(fmt::format("scan {}: {} is missing", scan, file.path));
+        output_.Report(fmt::format("scan {}: {} is missing", scan, file.path));
       } else if (copy->second != file.sha256) {
-        output_.Tell(fmt::format("scan {}: {} is not what was stored", scan, file.path));
+        output_.Report(fmt::format("scan {}: {} is not what was stored", scan, file.path));
       }
     }
     if (found.empty() && stored.empty())
-      output_.Tell(fmt::format("scan {}: it has no files", scan));
+      output_.Report(fmt::format("scan {}: it has no files", scan));
   }
 
   std::vector<std::string> ListedOrTold(const fs::path& folder) {
     try {
       return FilesBelow(state_, folder);
     } catch (const IoError& error) {
-      output_.Tell(error.what());
+      output_.Report(error.what());
       return {};
     }
   }

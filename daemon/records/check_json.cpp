@@ -5,6 +5,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/records/markers_json.hpp"
+
 namespace plumb {
 namespace {
 
@@ -28,7 +30,33 @@ std::optional<SceneMarker> MarkerIn(const Json& json) {
 
 }  // namespace
 
-std::string CheckJson(const MarkerCheck& check, const MarkerBaseline& seen) {
+Json MarkersJson(const MarkerMap& markers) {
+  Json json = Json::object();
+  for (const auto& [id, marker] : markers) {
+    Json corners = Json::array();
+    for (const Eigen::Vector3d& p : marker.corners) corners.push_back({p.x(), p.y(), p.z()});
+    json[std::to_string(id)] = {
+        {"corners_m", corners}, {"views", marker.num_views}, {"sigma_m", marker.sigma_m}};
+  }
+  return json;
+}
+
+std::optional<MarkerMap> MarkersIn(const Json& json) {
+  if (!json.is_object()) return std::nullopt;
+  MarkerMap markers;
+  for (const auto& [name, value] : json.items()) {
+    int id = -1;
+    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), id);
+    const auto marker = MarkerIn(value);
+    if (error != std::errc() || end != name.data() + name.size() || id < 0 || !marker)
+      return std::nullopt;
+    markers.emplace(id, *marker);
+  }
+  return markers;
+}
+
+std::string CheckJson(const MarkerCheck& check, const MarkerBaseline& seen, const MarkerMap& board,
+                      std::optional<int> reference_marker) {
   Json json = {
       {"status", Name(check.status)}, {"reasons", check.reasons}, {"items", Json::array()}};
   for (const MarkerCheckItem& item : check.items) {
@@ -42,13 +70,9 @@ std::string CheckJson(const MarkerCheck& check, const MarkerBaseline& seen) {
   }
   json["dictionary"] = seen.dictionary;
   json["marker_length_m"] = seen.marker_length_m;
-  json["markers"] = Json::object();
-  for (const auto& [id, marker] : seen.markers) {
-    Json corners = Json::array();
-    for (const Eigen::Vector3d& p : marker.corners) corners.push_back({p.x(), p.y(), p.z()});
-    json["markers"][std::to_string(id)] = {
-        {"corners_m", corners}, {"views", marker.num_views}, {"sigma_m", marker.sigma_m}};
-  }
+  json["markers"] = MarkersJson(seen.markers);
+  if (!board.empty()) json["board"] = MarkersJson(board);
+  json["reference_marker"] = reference_marker ? Json(*reference_marker) : Json(nullptr);
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -56,17 +80,10 @@ std::optional<MarkerBaseline> BaselineIn(const std::string& check_json) {
   const Json json = Json::parse(check_json, nullptr, /*allow_exceptions=*/false);
   if (!json.is_object() || !json.value("markers", Json()).is_object() || json["markers"].empty())
     return std::nullopt;
-  MarkerBaseline baseline{
-      {}, json.value("dictionary", std::string()), json.value("marker_length_m", 0.0)};
-  for (const auto& [name, value] : json["markers"].items()) {
-    int id = -1;
-    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), id);
-    const auto marker = MarkerIn(value);
-    if (error != std::errc() || end != name.data() + name.size() || id < 0 || !marker)
-      return std::nullopt;
-    baseline.markers.emplace(id, *marker);
-  }
-  return baseline;
+  auto markers = MarkersIn(json["markers"]);
+  if (!markers) return std::nullopt;
+  return MarkerBaseline{std::move(*markers), json.value("dictionary", std::string()),
+                        json.value("marker_length_m", 0.0)};
 }
 
 web::CheckRecord CheckIn(const std::string& check_json) {

@@ -10,7 +10,11 @@
 namespace plumb {
 
 /// A check with the markers that it saw: the next baseline may be made of them.
-[[nodiscard]] std::string CheckJson(const MarkerCheck& check, const MarkerBaseline& seen);
+/// @param board             Those of the room's board, which are no markers of the room.
+/// @param reference_marker  Whose frame it is all in; none: of no marker.
+[[nodiscard]] std::string CheckJson(const MarkerCheck& check, const MarkerBaseline& seen,
+                                    const MarkerMap& board = {},
+                                    std::optional<int> reference_marker = {});
 
 /// The markers in such a text; nothing if it is none.
 [[nodiscard]] std::optional<MarkerBaseline> BaselineIn(const std::string& check_json);

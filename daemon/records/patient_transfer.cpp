@@ -147,7 +147,7 @@ PatientReport ExportPatient(const fs::path& state, const std::string& code, cons
         fmt::format("{}/{}/{}", kScans, ScanId(file["scan_id"]), file["path"].get<std::string>());
     if (file["path"] == kRecordingFolder) continue;  // its own check tells
     if (const auto copy = found.find(path); copy == found.end() || copy->second != file["sha256"])
-      output.Tell(path + (copy == found.end() ? " is missing" : " is not what was stored"));
+      output.Report(path + (copy == found.end() ? " is missing" : " is not what was stored"));
   }
   output.Commit({{"scans", rows["scans"].size()}, {"references", rows["refs"].size()}});
   return {.code = rows["patients"][0]["code"],

@@ -165,8 +165,23 @@ CREATE TABLE templates (
 ) STRICT;
 )sql";
 
-constexpr std::array<const char*, kSchemaVersion> kSteps = {kVersion1, kVersion2, kVersion3,
-                                                            kVersion4, kVersion5, kVersion6};
+// Where the room's axes lie, as somebody signed it. The newest one holds; none is ever changed.
+constexpr const char* kVersion7 = R"sql(
+CREATE TABLE room_calibrations (
+  version INTEGER PRIMARY KEY AUTOINCREMENT,
+  signed_at INTEGER NOT NULL,
+  signed_by TEXT NOT NULL,
+  digest TEXT NOT NULL,
+  json TEXT NOT NULL
+) STRICT;
+CREATE TRIGGER room_calibrations_no_update BEFORE UPDATE ON room_calibrations
+  BEGIN SELECT RAISE(ABORT, 'a signed calibration of the room is never changed'); END;
+CREATE TRIGGER room_calibrations_no_delete BEFORE DELETE ON room_calibrations
+  BEGIN SELECT RAISE(ABORT, 'a signed calibration of the room is never removed'); END;
+)sql";
+
+constexpr std::array<const char*, kSchemaVersion> kSteps = {
+    kVersion1, kVersion2, kVersion3, kVersion4, kVersion5, kVersion6, kVersion7};
 
 }  // namespace
 

@@ -1,5 +1,7 @@
 #include "daemon/records/store.hpp"
 
+#include <array>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -7,6 +9,7 @@
 #include "daemon/records/schema.hpp"
 #include "daemon/records/store_internal.hpp"
 #include "daemon/records/store_json.hpp"
+#include "web/service/names.hpp"
 
 namespace plumb {
 
@@ -21,29 +24,40 @@ namespace store {
 std::string ScanId(std::int64_t id) { return fmt::format("{:06}", id); }
 
 const char* Name(web::ScanPurpose purpose) {
-  static constexpr const char* kNames[] = {"fraction", "reference", "daily_check"};
-  return kNames[static_cast<int>(purpose)];
+  return web::kPurposeNames.at(static_cast<std::size_t>(purpose)).data();
 }
 const char* Name(web::ScanOutcome outcome) {
-  static constexpr const char* kNames[] = {"running", "done", "cancelled", "failed"};
-  return kNames[static_cast<int>(outcome)];
+  return web::kOutcomeNames.at(static_cast<std::size_t>(outcome)).data();
 }
 const char* Name(web::Role role) {
-  static constexpr const char* kNames[] = {"technician", "physicist", "engineer", "display"};
-  return kNames[static_cast<int>(role)];
+  return web::kRoleNames.at(static_cast<std::size_t>(role)).data();
 }
+
+namespace {
+
+/// The value of that name. @throws DataError where there is none.
+template <typename Value, std::size_t kSize>
+Value Parse(const char* what, std::string_view name,
+            const std::array<std::string_view, kSize>& names) {
+  for (std::size_t i = 0; i < kSize; ++i) {
+    if (name == names[i]) return static_cast<Value>(i);
+  }
+  throw DataError(
+      fmt::format("the stored {} '{}' is none that this version knows: the database was changed "
+                  "from outside, or its disk failed. Put a backup of it in its place",
+                  what, name.substr(0, 32)));
+}
+
+}  // namespace
+
 web::ScanPurpose ParsePurpose(std::string_view name) {
-  if (name == "reference") return web::ScanPurpose::kReference;
-  return name == "daily_check" ? web::ScanPurpose::kDailyCheck : web::ScanPurpose::kFraction;
+  return Parse<web::ScanPurpose>("purpose", name, web::kPurposeNames);
 }
 web::ScanOutcome ParseOutcome(std::string_view name) {
-  if (name == "running") return web::ScanOutcome::kRunning;
-  if (name == "done") return web::ScanOutcome::kDone;
-  return name == "cancelled" ? web::ScanOutcome::kCancelled : web::ScanOutcome::kFailed;
+  return Parse<web::ScanOutcome>("outcome", name, web::kOutcomeNames);
 }
 web::Role ParseRole(std::string_view name) {
-  if (name == "engineer") return web::Role::kEngineer;
-  return name == "physicist" ? web::Role::kPhysicist : web::Role::kTechnician;
+  return Parse<web::Role>("role", name, web::kRoleNames);
 }
 
 }  // namespace store

@@ -16,8 +16,10 @@
 
 #include "daemon/records/backup.hpp"
 #include "daemon/records/database.hpp"
+#include "daemon/records/room_calibration.hpp"
 #include "daemon/records/scan_files.hpp"
-#include "web/service/scan_service.hpp"
+#include "web/service/change.hpp"
+#include "web/service/service_types.hpp"
 
 namespace plumb {
 
@@ -226,6 +228,22 @@ class Store {
   [[nodiscard]] std::string
   CheckBaselineJson();  ///< Of the check that is the baseline; empty: none.
   void SetCheckBaseline(const web::Actor& actor, const std::string& check_id);
+
+  // --- room calibration
+  /// Of the check scans with this sensor since then and since the last signature.
+  [[nodiscard]] RoomCandidate CandidateOfRoom(const std::string& sensor_serial,
+                                              web::WallClock::time_point since);
+  /// The newest one; one that cannot be read is told by DataError. @throws DataError
+  [[nodiscard]] std::optional<SignedRoom> RoomCalibration();
+  /// Newest first, those that cannot be read left out.
+  [[nodiscard]] std::vector<SignedRoom> RoomCalibrations(int limit);
+  /// @param digest  Of the candidate that was read; kConflict where it is not what would be stored.
+  /// Gives the version.
+  std::string SignRoom(const web::Actor& actor, const std::string& sensor_serial,
+                       web::WallClock::time_point since, const std::string& digest);
+  /// By the newest check since it was signed that saw enough of the room; empty: it is not.
+  [[nodiscard]] std::string WhyRoomIsDueNow(const SignedRoom& room,
+                                            const MarkerCheckLimits& limits);
 
   // --- accounts, log, settings
   [[nodiscard]] std::vector<web::User> Users();

@@ -1,6 +1,7 @@
 // Accounts, the audit log, settings.
 #include <fmt/format.h>
 
+#include "algo/base/errors.hpp"
 #include "daemon/records/store.hpp"
 #include "daemon/records/store_internal.hpp"
 #include "daemon/records/store_json.hpp"
@@ -13,12 +14,20 @@ using web::ChangeResult;
 
 namespace {
 
+/// An account whose role cannot be read is closed, not left out: where no account is seen at all,
+/// the page offers to make the first one.
 web::User ReadUser(const Statement& row) {
-  return {.name = row.Text(0),
-          .role = store::ParseRole(row.Text(1)),
-          .password_hash = row.Text(2),
-          .disabled = row.Integer(3) != 0,
-          .created_at = FromStored(row.Integer(4))};
+  web::User user{.name = row.Text(0),
+                 .role = web::Role::kTechnician,
+                 .password_hash = row.Text(2),
+                 .disabled = row.Integer(3) != 0,
+                 .created_at = FromStored(row.Integer(4))};
+  try {
+    user.role = store::ParseRole(row.Text(1));
+  } catch (const DataError&) {
+    user.disabled = true;
+  }
+  return user;
 }
 
 }  // namespace

@@ -42,6 +42,7 @@ inline constexpr std::string_view kInterrupted =
 [[nodiscard]] const char* Name(web::ScanPurpose purpose);
 [[nodiscard]] const char* Name(web::ScanOutcome outcome);
 [[nodiscard]] const char* Name(web::Role role);
+/// @throws DataError for a name that this version does not know.
 [[nodiscard]] web::ScanPurpose ParsePurpose(std::string_view name);
 [[nodiscard]] web::ScanOutcome ParseOutcome(std::string_view name);
 [[nodiscard]] web::Role ParseRole(std::string_view name);

@@ -1,28 +1,64 @@
 #include "daemon/records/store_json.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/acceptance/verdict.hpp"
 #include "algo/base/errors.hpp"
+#include "web/service/limits.hpp"
 
 namespace plumb {
 namespace {
 
 using Json = nlohmann::json;
 
-std::optional<double> Number(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  return found != json.end() && found->is_number() ? std::optional<double>(found->get<double>())
-                                                   : std::nullopt;
+[[noreturn]] void RefuseResult(const std::string& why) {
+  throw DataError(fmt::format(
+      "a stored result cannot be read: {}; the database was changed from outside, or its disk "
+      "failed. Put a backup of the database in its place, or scan again",
+      why));
 }
 
+/// Nothing where markers on the couch show no shift.
+std::optional<double> Shift(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  if (found == json.end() || found->is_null()) return std::nullopt;
+  if (!found->is_number()) RefuseResult(fmt::format("{} is no number", key));
+  return found->get<double>();
+}
+
+double Angle(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  if (found == json.end() || !found->is_number()) RefuseResult(fmt::format("{} is no number", key));
+  return found->get<double>();
+}
+
+/// A missing angle is never taken for none.
 web::SixNumbers NumbersOf(const Json& json) {
-  return {.vertical_mm = Number(json, "vertical_mm"),
-          .longitudinal_mm = Number(json, "longitudinal_mm"),
-          .lateral_mm = Number(json, "lateral_mm"),
-          .pitch_deg = Number(json, "pitch_deg").value_or(0.0),
-          .roll_deg = Number(json, "roll_deg").value_or(0.0),
-          .yaw_deg = Number(json, "yaw_deg").value_or(0.0)};
+  return {.vertical_mm = Shift(json, "vertical_mm"),
+          .longitudinal_mm = Shift(json, "longitudinal_mm"),
+          .lateral_mm = Shift(json, "lateral_mm"),
+          .pitch_deg = Angle(json, "pitch_deg"),
+          .roll_deg = Angle(json, "roll_deg"),
+          .yaw_deg = Angle(json, "yaw_deg")};
+}
+
+/// An object, or nothing where it is missing or null.
+const Json* ObjectIn(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  if (found == json.end() || found->is_null()) return nullptr;
+  if (!found->is_object()) RefuseResult(fmt::format("{} is no object", key));
+  return &*found;
+}
+
+std::string VerdictIn(const Json& json) {
+  const auto found = json.find("verdict");
+  for (const Verdict verdict :
+       {Verdict::kInTolerance, Verdict::kUnsure, Verdict::kMove, Verdict::kNoAnswer}) {
+    if (found != json.end() && *found == Name(verdict)) return Name(verdict);
+  }
+  RefuseResult("it has no verdict that this version knows");
 }
 
 void ReadWords(const Json& result, web::ResultSummary& summary) {
@@ -75,10 +111,10 @@ class Stored {
   }
   [[nodiscard]] std::string Posture(const char* key) const {
     const Json* value = Find(key);
-    for (const char* posture : {"HFS", "HFP", "FFS", "FFP"}) {
-      if (value != nullptr && *value == posture) return posture;
+    for (const std::string_view posture : web::kPostures) {
+      if (value != nullptr && *value == posture) return std::string(posture);
     }
-    Fail(fmt::format("{} is none of HFS, HFP, FFS, FFP", key));
+    Fail(fmt::format("{} is none of {}", key, fmt::join(web::kPostures, ", ")));
   }
   /// A point of finite numbers.
   template <std::size_t kSize>
@@ -176,10 +212,8 @@ web::Settings ParseSettings(const std::string& text) {
 
 web::ResultSummary SummaryOf(const std::string& result_json) {
   const Json json = Json::parse(result_json, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object() || !json.contains("verdict") || !json["verdict"].is_string()) {
-    throw DataError("a stored result has no verdict: the database was changed from outside");
-  }
-  web::ResultSummary summary{.verdict = json["verdict"].get<std::string>(),
+  if (!json.is_object()) RefuseResult("expected a JSON object, found none");
+  web::ResultSummary summary{.verdict = VerdictIn(json),
                              .reasons = {},
                              .correction = {},
                              .u95 = {},
@@ -187,16 +221,14 @@ web::ResultSummary SummaryOf(const std::string& result_json) {
                              .body_now = {},
                              .body_after = {}};
   ReadWords(json, summary);
-  if (const auto reasons = json.find("reasons"); reasons != json.end() && reasons->is_array()) {
+  if (const auto reasons = json.find("reasons"); reasons != json.end()) {
+    if (!reasons->is_array()) RefuseResult("its reasons are no list");
     for (const Json& reason : *reasons)
       summary.reasons.push_back(reason.is_string() ? reason.get<std::string>() : reason.dump());
   }
-  if (const auto correction = json.find("correction");
-      correction != json.end() && correction->is_object()) {
+  if (const Json* correction = ObjectIn(json, "correction")) {
     summary.correction = NumbersOf(*correction);
-    if (const auto u95 = correction->find("uncertainty");
-        u95 != correction->end() && u95->is_object())
-      summary.u95 = NumbersOf(*u95);
+    if (const Json* u95 = ObjectIn(*correction, "uncertainty")) summary.u95 = NumbersOf(*u95);
   }
   return summary;
 }

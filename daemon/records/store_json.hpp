@@ -17,7 +17,8 @@ namespace plumb {
 /// @throws DataError saying what is wrong with it.
 [[nodiscard]] web::Settings ParseSettings(const std::string& text);
 
-/// The list entry of a result.json. @throws DataError if it is none.
+/// The list entry of a result.json. Numbers that are missing are never taken for zero.
+/// @throws DataError saying what is wrong with it.
 [[nodiscard]] web::ResultSummary SummaryOf(const std::string& result_json);
 
 }  // namespace plumb

@@ -80,13 +80,13 @@ std::string SummedWriter::Copied(const fs::path& from, const std::string& path) 
 std::string SummedWriter::Add(const fs::path& from, const std::string& path) {
   CheckStop(stop_);
   if (!IsPlainPath(path)) {
-    Tell(fmt::format("a file is left out, its name has control characters: {:?}", path));
+    Report(fmt::format("a file is left out, its name has control characters: {:?}", path));
     return {};
   }
   try {
     return Copied(from, path);
   } catch (const SourceUnreadable& error) {
-    Tell(error.what());
+    Report(error.what());
     return {};
   }
 }
@@ -95,7 +95,7 @@ void SummedWriter::AddOwn(const fs::path& from, const std::string& path) {
   (void)Copied(from, path);
 }
 
-void SummedWriter::Tell(std::string problem) {
+void SummedWriter::Report(std::string problem) {
   if (problems_.size() < kMaxProblems) problems_.push_back(std::move(problem));
 }
 

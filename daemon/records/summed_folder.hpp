@@ -43,7 +43,7 @@ class SummedWriter {
   std::string Add(const std::filesystem::path& from, const std::string& path);
   /// Copies one that must be there. @throws IoError
   void AddOwn(const std::filesystem::path& from, const std::string& path);
-  void Tell(std::string problem);
+  void Report(std::string problem);
   /// Writes the sums and, with what it says itself, `about`. @throws IoError
   void Commit(nlohmann::ordered_json about);
 

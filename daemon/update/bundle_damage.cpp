@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/update/updater.hpp"
+#include "daemon/update/bundle_check.hpp"
 
 namespace plumb {
 namespace {

@@ -54,7 +54,7 @@ std::string WhyRolledBack(const LastUpdate& update, const std::string& slot,
   if (slot.empty() || boot.empty() || update.boot.empty()) return {};
   if (update.boot == boot || update.from_slot != slot) return {};
   return fmt::format(
-      "version {} was installed, but the machine has gone back to the system before it, {}: the "
+      "version {} was installed, but the machine has gone back to the previous system, {}: the "
       "new one did not start or was not fit for work",
       update.version, version);
 }

@@ -1,14 +1,7 @@
 #include "daemon/update/updater.hpp"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cstring>
-#include <ctime>
 #include <map>
 #include <optional>
 #include <utility>
@@ -16,11 +9,11 @@
 
 #include <fmt/format.h>
 
-#include "algo/base/errors.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/update/bundle_check.hpp"
+#include "daemon/update/bundle_folder.hpp"
 #include "daemon/update/bus.hpp"
 #include "daemon/update/last_update.hpp"
-#include "drivers/files/file_io.hpp"
 
 namespace plumb {
 
@@ -34,37 +27,7 @@ constexpr const char* kInstaller = "de.pengutronix.rauc.Installer";
 constexpr const char* kProperties = "org.freedesktop.DBus.Properties";
 constexpr auto kLookAgain = std::chrono::seconds(5);
 constexpr std::chrono::seconds kCallTimeout{60};  // RAUC reads the whole bundle before it answers
-constexpr std::size_t kMaxListed = 32;
-constexpr std::size_t kMaxKept = 4;
-constexpr std::string_view kEnding = ".raucb";
 constexpr std::size_t kMaxText = 500;
-
-/// A bundle ends with its signature and, in eight bytes, that one's size; it begins as a squashfs.
-constexpr std::string_view kSquashfs = "hsqs";
-constexpr std::uint64_t kMaxSignature = 64 << 10;
-constexpr std::uint64_t kLeastBundle = 4096;
-
-web::Change Refused(ChangeResult result, std::string message) {
-  return {.result = result, .message = std::move(message), .id = {}, .file = {}};
-}
-
-/// Keeps a file's contents until its destruction, so that taking its name away is quick.
-class Keep {
- public:
-  using Aside = std::function<bool(std::function<void()>)>;
-  Keep(const std::filesystem::path& file, const Aside& aside)
-      : aside_(aside), fd_(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK)) {}
-  ~Keep() {
-    if (fd_ < 0) return;
-    if (!aside_ || !aside_([fd = fd_] { ::close(fd); })) ::close(fd_);
-  }
-  Keep(const Keep&) = delete;
-  Keep& operator=(const Keep&) = delete;
-
- private:
-  const Aside& aside_;
-  int fd_;
-};
 
 /// What a service says is shown to people: bounded, and without what is no text.
 std::string Shown(const char* text) {
@@ -79,10 +42,13 @@ std::string Shown(const char* text) {
 
 struct Updater::Impl {
   Impl(EventLoop& on, UpdaterOptions given)
-      : loop(on), options(std::move(given)), bus(on, "bus", [this] { OnBroken(); }) {
+      : loop(on),
+        options(std::move(given)),
+        folder(options.folder, options.max_bytes, options.aside),
+        bus(on, "bus", [this] { OnBroken(); }) {
     if (!options.now) options.now = [] { return std::chrono::steady_clock::now(); };
     watch = loop.MakeTimer("update progress", [this] { LookAtProgress(); });
-    RemoveBroken();
+    folder.RemoveUnfinished();
     last = ReadLastUpdate(options.folder);
     Connect();
   }
@@ -95,6 +61,7 @@ struct Updater::Impl {
 
   EventLoop& loop;
   UpdaterOptions options;
+  BundleFolder folder;
   Bus bus;
   std::optional<LastUpdate> last;  ///< That the machine was not restarted after, or did not keep.
   bool told_of_roll_back = false;
@@ -114,18 +81,6 @@ struct Updater::Impl {
   std::string bundle;
   web::Done done;
 
-  /// What was being sent when the power went.
-  void RemoveBroken() const {
-    std::error_code error;
-    std::vector<std::filesystem::path> broken;
-    for (std::filesystem::directory_iterator entry(options.folder, error), end;
-         !error && entry != end; entry.increment(error)) {
-      if (entry->path().filename().string().starts_with(".upload-"))
-        broken.push_back(entry->path());
-    }
-    for (const std::filesystem::path& file : broken) std::filesystem::remove(file, error);
-  }
-
   void Disconnect() {
     is_there = false;
     bus.Close();
@@ -135,7 +90,7 @@ struct Updater::Impl {
     if (is_installing)
       End("the connection to the installer broke: look at its log, then try again");
     is_there = false;
-    Tell();
+    Notify();
   }
 
   void Connect() {
@@ -160,8 +115,14 @@ struct Updater::Impl {
                              &Impl::OnProperties, this, "s", kInstaller);
   }
 
-  void Tell() const {
+  void Notify() const {
     if (options.changed) options.changed();
+  }
+
+  /// Another file has this name by now, or none.
+  void ForgetBundle(const std::string& name) {
+    states.erase(name);
+    Notify();
   }
 
   void Answer(web::Change change) {
@@ -192,7 +153,7 @@ struct Updater::Impl {
                   : fmt::format("{} was not installed: {}", bundle, failure);
     Log(failure.empty() ? LogLevel::kNotice : LogLevel::kError, outcome);
     if (options.ended) options.ended(bundle, failure);
-    Tell();
+    Notify();
   }
 
   /// The next start must know what was installed, and from where.
@@ -260,7 +221,7 @@ struct Updater::Impl {
     impl->is_there = sd_bus_message_is_method_error(message, nullptr) == 0;
     if (impl->is_there) impl->ReadProperties(message);
     impl->NoteRollBack();
-    if (impl->is_there != was_there) impl->Tell();
+    if (impl->is_there != was_there) impl->Notify();
     return 0;
   }
 
@@ -272,7 +233,7 @@ struct Updater::Impl {
       return 0;
     impl->is_there = true;
     impl->ReadProperties(message);
-    impl->Tell();
+    impl->Notify();
     return 0;
   }
 
@@ -299,7 +260,7 @@ struct Updater::Impl {
     if (impl->is_installing && !impl->done) {
       impl->End("the installer ended before it was done: look at its log, then try again");
     } else {
-      impl->Tell();
+      impl->Notify();
     }
     return 0;
   }
@@ -368,7 +329,7 @@ struct Updater::Impl {
     is_installing = false;
     outcome = last_failure = message;
     Answer(Refused(result, message));
-    Tell();
+    Notify();
   }
 
   void Call() {
@@ -388,7 +349,7 @@ struct Updater::Impl {
     impl->moved_at = impl->options.now();
     impl->watch.ArmAfter(impl->options.look_every);
     impl->Answer({});
-    impl->Tell();
+    impl->Notify();
     return 0;
   }
 
@@ -399,8 +360,7 @@ struct Updater::Impl {
     if (is_installing)
       return asked(Refused(ChangeResult::kConflict,
                            fmt::format("{} is being installed: wait until it is done", bundle)));
-    const std::vector<std::string> known = Bundles();
-    if (std::find(known.begin(), known.end(), name) == known.end())
+    if (!folder.Has(name))
       return asked(Refused(ChangeResult::kNotFound, "there is no such bundle"));
     const std::filesystem::path file = options.folder / name;
     if (const std::string why = WhyNoBundle(file, options.max_bytes); !why.empty())
@@ -415,7 +375,7 @@ struct Updater::Impl {
     last_failure.clear();
     done = std::move(asked);
     state = BundleState::kUnknown;
-    Tell();
+    Notify();
     const auto look = [this, file, is_alive = alive, &on = loop] {
       const BundleState found = LookForDamage(file);
       on.Post("bundle", [this, file, found, is_alive] {
@@ -441,19 +401,6 @@ struct Updater::Impl {
                                                   "Info", &Impl::OnInfo, this, "s", file.c_str());
     if (result < 0) return Refuse(ChangeResult::kFailed, "the installer cannot be asked");
     bus.Process();
-  }
-
-  [[nodiscard]] std::vector<std::string> Bundles() const {
-    std::vector<std::string> names;
-    std::error_code error;
-    for (std::filesystem::directory_iterator entry(options.folder, error), end;
-         !error && entry != end; entry.increment(error)) {
-      const std::string name = entry->path().filename().string();
-      if (name.ends_with(kEnding) && !name.starts_with('.') && names.size() < kMaxListed)
-        names.push_back(name);
-    }
-    std::sort(names.begin(), names.end());
-    return names;
   }
 };
 
@@ -489,7 +436,7 @@ web::UpdateStatus Updater::status() {
   status.slot = impl_->slot;
   status.installing = impl_->is_installing;
   status.fraction = impl_->fraction;
-  status.bundles = impl_->Bundles();
+  status.bundles = impl_->folder.List();
   return status;
 }
 
@@ -498,113 +445,28 @@ web::Change Updater::Add(const std::filesystem::path& file, const std::string& n
     return Refused(ChangeResult::kConflict, "there is no installer (RAUC) on this machine");
   if (impl_->is_installing)
     return Refused(ChangeResult::kConflict, "a bundle is being installed: wait until it is done");
-  if (const std::string why = WhyNoBundle(file, impl_->options.max_bytes); !why.empty()) {
-    return Refused(ChangeResult::kInvalid,
-                   name + why.substr(std::min(why.size(), file.filename().string().size())));
-  }
-  const std::vector<std::string> known = impl_->Bundles();
-  const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
-  if (!is_known && known.size() >= kMaxKept)
-    return Refused(ChangeResult::kConflict, "there are too many bundles: remove one first");
-  const Keep replaced(impl_->options.folder / name, impl_->options.aside);
-  // A power cut soon after would else leave the name with nothing behind it.
-  try {
-    SyncToDisk(file);
-    if (::rename(file.c_str(), (impl_->options.folder / name).c_str()) != 0)
-      throw IoError(DescribeWriteError(name, errno));
-    SyncToDisk(impl_->options.folder);
-  } catch (const std::exception& error) {
-    return Refused(ChangeResult::kNoSpace, error.what());
-  }
-  impl_->states.erase(name);
-  impl_->Tell();
-  return {};
+  web::Change change = impl_->folder.Add(file, name);
+  if (change.result == ChangeResult::kDone) impl_->ForgetBundle(name);
+  return change;
 }
 
 web::Change Updater::Remove(const std::string& name) {
   if (impl_->is_installing)
     return Refused(ChangeResult::kConflict, "a bundle is being installed: wait until it is done");
-  const std::vector<std::string> known = impl_->Bundles();
-  if (std::find(known.begin(), known.end(), name) == known.end())
-    return Refused(ChangeResult::kNotFound, "there is no such bundle");
-  std::error_code error;
-  const Keep removed(impl_->options.folder / name, impl_->options.aside);
-  std::filesystem::remove(impl_->options.folder / name, error);
-  if (error)
-    return Refused(ChangeResult::kFailed,
-                   fmt::format("{} cannot be removed: {}", name, error.message()));
-  impl_->states.erase(name);
-  impl_->Tell();
-  return {};
+  web::Change change = impl_->folder.Remove(name);
+  if (change.result == ChangeResult::kDone) impl_->ForgetBundle(name);
+  return change;
 }
 
 void Updater::ForgetRollBack() {
   if (impl_->RolledBack().empty()) return;
   impl_->last.reset();
   RemoveLastUpdate(impl_->options.folder);
-  impl_->Tell();
+  impl_->Notify();
 }
 
 void Updater::Install(const std::string& name, web::Done done) {
   impl_->Install(name, std::move(done));
-}
-
-std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_bytes) {
-  const std::string name = file.filename().string();
-  const int fd = ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) {
-    const int why = errno;
-    struct stat info {};
-    if (why == EACCES && ::lstat(file.c_str(), &info) == 0 && S_ISREG(info.st_mode) &&
-        info.st_uid == 0 && (info.st_mode & 077) == 0)
-      return {};
-    return fmt::format("{} cannot be read: {}", name, std::strerror(why));
-  }
-  const auto check = [&]() -> std::string {
-    struct stat info {};
-    if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) return name + " is no plain file";
-    const auto size = static_cast<std::uint64_t>(info.st_size);
-    if (size < kLeastBundle)
-      return fmt::format("{} is too short for a bundle: {} bytes; copy it again", name, size);
-    if (size > max_bytes)
-      return fmt::format("{} is too large: {} MB, at most {} MB", name, size >> 20,
-                         max_bytes >> 20);
-    std::array<char, 4> magic{};
-    std::array<unsigned char, 8> tail{};
-    if (::pread(fd, magic.data(), magic.size(), 0) != static_cast<ssize_t>(magic.size()) ||
-        ::pread(fd, tail.data(), tail.size(), static_cast<off_t>(size - tail.size())) !=
-            static_cast<ssize_t>(tail.size())) {
-      return fmt::format("{} cannot be read: {}", name, std::strerror(errno));
-    }
-    std::uint64_t signature = 0;
-    for (const unsigned char byte : tail) signature = signature << 8 | byte;
-    if (std::string_view(magic.data(), magic.size()) != kSquashfs)
-      return name + " is no bundle: expected a squashfs image";
-    if (signature == 0 || signature > kMaxSignature || signature + tail.size() >= size) {
-      return name + " is no whole bundle: no signature at its end; copy it again";
-    }
-    return {};
-  };
-  std::string why = check();
-  ::close(fd);
-  return why;
-}
-
-bool IsOlder(const std::string& a, const std::string& b) {
-  const auto next = [](std::string_view& rest) {
-    const auto dot = rest.find('.');
-    const std::string_view part = rest.substr(0, dot);
-    rest = dot == std::string_view::npos ? std::string_view() : rest.substr(dot + 1);
-    long number = 0;
-    std::from_chars(part.data(), part.data() + part.size(), number);
-    return number;
-  };
-  std::string_view left = a, right = b;
-  while (!left.empty() || !right.empty()) {
-    const long x = next(left), y = next(right);
-    if (x != y) return x < y;
-  }
-  return false;
 }
 
 }  // namespace plumb

@@ -9,7 +9,8 @@
 #include <string>
 
 #include "daemon/loop/event_loop.hpp"
-#include "web/service/scan_service.hpp"
+#include "web/service/change.hpp"
+#include "web/service/service_types.hpp"
 
 namespace plumb {
 
@@ -32,8 +33,8 @@ struct UpdaterOptions {
   std::function<bool(std::function<void()>)> aside;
   /// Called on the loop when an installation that had begun has ended; empty text: it worked.
   std::function<void(const std::string& bundle, const std::string& failure)> ended;
-  /// Called on the loop, once: the machine has started the system before the last update, and why
-  /// that is known.
+  /// Called on the loop, once: the machine has started the system from before the last update, and
+  /// why that is known.
   std::function<void(const std::string& text)> rolled_back = {};
   std::chrono::milliseconds look_every{10'000};  ///< How often to look whether progress stands.
   /// For tests; empty: the steady clock.
@@ -62,28 +63,12 @@ class Updater {
   /// Has RAUC check and install NAME of the folder. `done` comes once it has begun, or with the
   /// reason why not.
   void Install(const std::string& name, web::Done done);
-  /// Somebody has taken note of the roll-back: nothing tells of it any more.
+  /// Somebody has taken note of the roll-back: nothing reports it any more.
   void ForgetRollBack();
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/// Empty, or why the file can be no bundle: not a plain file, empty, too large, not a squashfs with
-/// a signature behind it. RAUC takes over what it looks at (owner root, readable by root alone): of
-/// such a file nothing is said here, nobody can have changed it since.
-[[nodiscard]] std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_bytes);
-
-enum class BundleState { kUnknown, kWhole, kDamaged };
-
-/// Whether a bundle still is what was signed: a digest of its contents must be in the signature.
-/// Says nothing about who signed it: that is RAUC's to judge, and this only words its refusal.
-/// Verity bundles carry their manifest in the signature: there it alone is looked at.
-[[nodiscard]] BundleState LookForDamage(const std::filesystem::path& file);
-
-/// True where `a` is an older version than `b`: numbers between dots, compared one by one; what is
-/// no number counts as 0.
-[[nodiscard]] bool IsOlder(const std::string& a, const std::string& b);
 
 }  // namespace plumb

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # `plumb update` with the real plumbd and RAUC itself, on a bus and a machine made of files: a good bundle, each bad one with its own sentence, the
-# restart, and a machine that starts the system before.
+# restart, and a machine that starts the previous system.
 #   command_line.sh BUILD_FOLDER
 set -euo pipefail
 missing() { # PROGRAM: toolchain/install brings it, so continuous integration fails without it
@@ -79,6 +79,6 @@ kill -TERM $daemon
 wait $daemon || true
 start two # the same system, though the other was installed
 for _ in $(seq 50); do told=$("$plumb" --control control status --get rolled_back); [ -z "$told" ] || break; sleep 0.1; done
-check "a machine that starts the system before says so" 'version 9.1.0 was installed, but the machine has gone back' "$told"
-check "in the journal too" 'gone back to the system before' "$(cat log)"
+check "a machine that starts the previous system says so" 'version 9.1.0 was installed, but the machine has gone back' "$told"
+check "in the journal too" 'gone back to the previous system' "$(cat log)"
 exit $failed

@@ -16,6 +16,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/update/bundle_check.hpp"
 #include "daemon/update/updater.hpp"
 #include "tests/support/temp_folder.hpp"
 

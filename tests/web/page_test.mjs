@@ -119,7 +119,7 @@ await h.step('a physicist plans, a second one approves', async () => {
   // The site's template: made of what is here, used again after it was cleared.
   await bob.getByText('There is no template for this site yet.').waitFor();
   await bob.getByLabel('Shifts (mm)').fill('4');
-  await bob.getByRole('button', { name: 'Keep this size and tolerance as the template' }).click();
+  await bob.getByRole('button', { name: 'Save this size and tolerance as the template' }).click();
   await bob.getByText(/^Region \d+(\.\d+)? × \d+(\.\d+)? cm \(x × y\) about the isocentre, ±4 mm, ±1°/).waitFor();
   const size = (await h.api(bob, 'templates')).body.templates[0];
   equal(size.site, 'thorax', 'of the site of the patient');
@@ -447,7 +447,7 @@ await h.step('patients, log, settings and update look finished', async () => {
   equal(csv.length, 2, 'a head and one entry');
   check(csv[1].includes('"Reference approved"'), csv[1]);
   await engineer.goto(`${h.url}#/settings`);
-  await engineer.getByLabel('Log out after … min without use').fill('20');
+  await engineer.getByLabel('Log out after … min of inactivity').fill('20');
   await engineer.getByRole('button', { name: 'Save' }).click();
   await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
   await engineer.getByText('No backup has been made yet.').waitFor();
@@ -468,14 +468,14 @@ await h.step('patients, log, settings and update look finished', async () => {
     await profile.getByLabel('Your password').fill(password);
     await profile.getByRole('button', { name: 'Change the profile' }).click();
   };
-  await change('Take version 3 back', 'wrong horse battery');
+  await change('Restore version 3', 'wrong horse battery');
   await engineer.getByRole('alert').getByText('the password is wrong').waitFor();
   equal(await rows.count(), 3, 'a wrong password changes nothing');
-  await change('Take version 3 back', h.password);
+  await change('Restore version 3', h.password);
   await engineer.getByRole('status').getByText('The earlier version is in use.').waitFor({ state: 'attached' });
   equal((await rows.first().innerText()).split(/\s+/)[0], '5', 'the newest version');
-  await change('Begin again without a profile', h.password);
-  await engineer.getByRole('status').getByText('The next scan begins without a profile.').waitFor({ state: 'attached' });
+  await change('Start again without a profile', h.password);
+  await engineer.getByRole('status').getByText('The next scan starts without a profile.').waitFor({ state: 'attached' });
   check((await rows.first().innerText()).includes('reset'), await rows.first().innerText());
   await h.look(engineer, 'settings-profile');
   // The same smaller, in Spanish, on a phone: nothing lies out of view to the side.
@@ -536,13 +536,13 @@ await h.step('the restart into an update: with the password, never beside a sess
   await restart(h.password);
   await engineer.getByRole('status').getByText('The appliance restarts').waitFor({ state: 'attached' });
   h.tell('rolledback');
-  await engineer.getByText('went back to the system before').waitFor();
+  await engineer.getByText('went back to the previous system').waitFor();
   equal(await engineer.getByRole('button', { name: 'Restart now' }).count(), 0, 'nothing waits for a restart');
   await h.look(engineer, 'update-rolled-back');
   await bob.goto(`${h.url}#/status`);
-  await bob.getByText('went back to the system before').waitFor();
+  await bob.getByText('went back to the previous system').waitFor();
   await engineer.getByRole('button', { name: 'I have seen it' }).click();
-  await engineer.getByText('went back to the system before').waitFor({ state: 'detached' });
+  await engineer.getByText('went back to the previous system').waitFor({ state: 'detached' });
 });
 
 await h.step('a scan is deleted with a reason and its number; one that a reference is made of is not', async () => {

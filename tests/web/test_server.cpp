@@ -28,7 +28,7 @@
 #include "daemon/files/result_folder.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/records/store_json.hpp"
-#include "tests/support/fake_scan_service.hpp"
+#include "tests/support/fake_appliance.hpp"
 #include "tests/support/synthetic_scene.hpp"
 #include "web/api/http_server.hpp"
 
@@ -93,7 +93,7 @@ class Recorder {
   explicit Recorder(fs::path root) : root_(std::move(root)) {}
 
   /// The first one is the reference of all others.
-  FakeScanService::Recorded Record(const SyntheticOptions& options) {
+  FakeAppliance::Recorded Record(const SyntheticOptions& options) {
     Scene scene = MakeSyntheticScene(options);
     if (scene.height_map) scene.mesh = MeshOfHeightMap(*scene.height_map, {}, {.decimation = 3});
     const fs::path folder = NewFolder();
@@ -107,7 +107,7 @@ class Recorder {
 
   /// A moved body, in a room whose axes are turned by 90 degrees: the plan's posture is not its
   /// own.
-  FakeScanService::Recorded RecordAcross() {
+  FakeAppliance::Recorded RecordAcross() {
     Scene scene = MakeSyntheticScene(Sweeps()[1]);
     if (scene.height_map) scene.mesh = MeshOfHeightMap(*scene.height_map, {}, {.decimation = 3});
     CompareOptions across = Options();
@@ -119,8 +119,8 @@ class Recorder {
 
   /// A result of which the body's motion in the room is known: `along` the axis (mm), or about it
   /// (degrees).
-  FakeScanService::Recorded RecordMotion(const Eigen::Vector3d& axis, bool is_turn, double amount,
-                                         PatientPosture posture, bool is_room_known) {
+  FakeAppliance::Recorded RecordMotion(const Eigen::Vector3d& axis, bool is_turn, double amount,
+                                       PatientPosture posture, bool is_room_known) {
     if (!still_)
       still_ = Compare(*reference_, MakeSyntheticScene(At(Pose::Identity(), 6, 0.0)), Options());
     const Eigen::Vector3d isocentre = kT_iec_reference * still_->motion->centroid_m;
@@ -150,7 +150,7 @@ class Recorder {
     return folder;
   }
 
-  FakeScanService::Recorded Write(const fs::path& folder, const Comparison& comparison) {
+  FakeAppliance::Recorded Write(const fs::path& folder, const Comparison& comparison) {
     WriteResult(comparison, DrawResult(comparison, &*reference_->height_map), folder / "result");
     return {folder, SummaryOf(ResultJson(comparison))};
   }
@@ -163,8 +163,8 @@ class Recorder {
 
 /// "x" is to the right of who faces the gantry, "y" to the gantry, "z" up; "pitch", "roll", "yaw"
 /// are turns about them.
-FakeScanService::Recorded Moved(Recorder& recorder, const std::string& axis, double amount,
-                                const std::string& posture, bool is_room_known = true) {
+FakeAppliance::Recorded Moved(Recorder& recorder, const std::string& axis, double amount,
+                              const std::string& posture, bool is_room_known = true) {
   const std::string names[] = {"x", "y", "z", "pitch", "roll", "yaw"};
   const auto which = std::find(std::begin(names), std::end(names), axis) - std::begin(names);
   PatientPosture lies = PatientPosture::kHeadFirstSupine;
@@ -177,7 +177,7 @@ FakeScanService::Recorded Moved(Recorder& recorder, const std::string& axis, dou
                                is_room_known);
 }
 
-void Obey(FakeScanService& service, Recorder& recorder, const std::string& command) {
+void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command) {
   std::istringstream words(command);
   std::string name;
   words >> name;
@@ -210,7 +210,7 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
   }
   if (name == "rolledback") {
     service.update.restart_needed = false;
-    service.update.rolled_back = "The machine went back to the system before, version 0.2.0.";
+    service.update.rolled_back = "The machine went back to the previous system, version 0.2.0.";
     service.status.rolled_back = service.update.rolled_back;
     service.Tell(web::EventKind::kUpdate);
     service.Tell(web::EventKind::kStatus);
@@ -234,6 +234,11 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
     service.status.is_room_known = what == "known";
     service.Tell(web::EventKind::kStatus);
   }
+  if (name == "board") service.is_board_there = true;
+  if (name == "roomdue") {
+    service.room.due = "marker 4 moved 8 mm since the room was calibrated";
+    service.Tell(web::EventKind::kData);
+  }
   if (name == "overdue")
     service.SetOverdue(
         "the daily check is overdue, and references need one that has passed today: "
@@ -249,7 +254,7 @@ void Obey(FakeScanService& service, Recorder& recorder, const std::string& comma
     service.next_recorded = Moved(recorder, axis, amount, posture, room != "bare");
   }
   if (name == "tolerated" || name == "unsure") {
-    FakeScanService::Recorded shown = Moved(recorder, "z", 0, "HFS");
+    FakeAppliance::Recorded shown = Moved(recorder, "z", 0, "HFS");
     web::ResultSummary& result = *shown.result;
     result.verdict = name == "unsure" ? "unsure" : "in_tolerance";
     if (name == "unsure") {
@@ -300,7 +305,7 @@ web::SensorProfiles KnownSensor() {
 }
 
 int Serve(const fs::path& root) {
-  FakeScanService service;
+  FakeAppliance service;
   Recorder recorder(root);
   for (const SyntheticOptions& options : Sweeps())
     service.recorded.push_back(recorder.Record(options));
@@ -325,7 +330,7 @@ int Serve(const fs::path& root) {
   options.password_operations = 1;
   options.upload_folder = root / "updates";
   options.max_upload_bytes = 4 << 20;
-  web::HttpServer server(service, options);
+  web::HttpServer server(service.services(), options);
   fmt::print("http://127.0.0.1:{}/\nsetup code: {}\n", server.port(),
              server.setup_code().value_or(""));
   std::fflush(stdout);

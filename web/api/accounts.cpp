@@ -111,13 +111,20 @@ Response ChangeResponse(const Change& change) {
   return response;
 }
 
-Accounts::Accounts(ScanService& service, AccountOptions options)
-    : service_(service),
+Accounts::Accounts(const Services& services, AccountOptions options)
+    : users_(services.accounts),
+      audit_(services.audit),
+      settings_(services.settings),
+      scans_(services.scans),
+      room_(services.room),
+      profiles_(services.profiles),
+      updates_(services.updates),
+      background_(services.background),
       options_(std::move(options)),
-      displays_(service, options_.certificate.has_value(), options_.now),
+      displays_(services.displays, options_.certificate.has_value(), options_.now),
       devices_(options_.device_key, options_.certificate.has_value()),
       worker_(options_.password_operations, options_.password_memory_bytes) {
-  if (service_.Users().empty()) setup_code_ = MakeSetupCode();
+  if (users_.Users().empty()) setup_code_ = MakeSetupCode();
   Expire();
 }
 
@@ -126,7 +133,7 @@ std::optional<std::string> Accounts::setup_code() const {
 }
 
 void Accounts::Expire() {
-  sessions_.SetLimits(std::chrono::minutes(service_.GetSettings().idle_logout_min),
+  sessions_.SetLimits(std::chrono::minutes(settings_.GetSettings().idle_logout_min),
                       options_.session_limit);
   sessions_.Expire(options_.now());
 }
@@ -178,13 +185,15 @@ void Accounts::AddRoutes(Router& router) {
   router.Add({"GET", "/api/v1/session", Permission::kLogin, BodyKind::kNone,
               bind(&Accounts::DescribeSession)});
   router.Add({"GET", "/api/v1/session/last-login", Permission::kLogin, BodyKind::kNone,
-              bind(&Accounts::TellLastLogin)});
+              bind(&Accounts::ShowLastLogin)});
   router.Add({"POST", "/api/v1/session/password", Permission::kLogin, BodyKind::kJson,
               bind(&Accounts::ChangeOwnPassword)});
   router.Add({"POST", "/api/v1/scans/{id}/accept-outside", Permission::kAccept, BodyKind::kJson,
               bind(&Accounts::AcceptOutside)});
   router.Add({"POST", "/api/v1/update/restart", Permission::kUpdate, BodyKind::kJson,
               bind(&Accounts::RestartSystem)});
+  router.Add({"POST", "/api/v1/room-calibration/sign", Permission::kCalibrate, BodyKind::kJson,
+              bind(&Accounts::SignRoomCalibration)});
   router.Add({"POST", "/api/v1/sensor-profile/reset", Permission::kSettings, BodyKind::kJson,
               bind(&Accounts::ResetSensorProfile)});
   router.Add({"POST", "/api/v1/sensor-profile/roll-back", Permission::kSettings, BodyKind::kJson,
@@ -198,7 +207,7 @@ void Accounts::AddRoutes(Router& router) {
   router.Add({"GET", "/api/v1/users", Permission::kUsers, BodyKind::kNone,
               [this](const Request&, const Respond& respond) {
                 Json users = Json::array();
-                for (const User& user : service_.Users()) users.push_back(ToJson(user));
+                for (const User& user : users_.Users()) users.push_back(ToJson(user));
                 Response response;
                 response.body = Dump({{"users", users}});
                 respond(std::move(response));
@@ -247,7 +256,7 @@ void Accounts::SetUp(const Request& request, const Respond& respond) {
   if (const auto wait = limiter_.Wait(key, now); wait.count() > 0) return respond(TooMany(wait));
   if (!SameText(code, setup_code_)) {
     limiter_.Failed(key, now);
-    service_.Log(request.actor(), "setup.failed", "", "wrong code");
+    audit_.Log(request.actor(), "setup.failed", "", "wrong code");
     return respond(ErrorResponse(
         403, "the setup code is wrong; it is printed on the console and in the journal"));
   }
@@ -259,12 +268,12 @@ void Accounts::SetUp(const Request& request, const Respond& respond) {
   };
   HashThen(std::move(password), finish, [this, name, actor, finish](const std::string& hash) {
     const User user{name, Role::kEngineer, hash, false, WallClock::now()};
-    service_.AddUser(actor, user, WhileAlive([this, user, finish](const Change& change) {
-                       if (change.result != ChangeResult::kDone)
-                         return finish(ChangeResponse(change));
-                       setup_code_.clear();
-                       finish(Welcome(user, /*form=*/false));
-                     }));
+    users_.AddUser(actor, user, WhileAlive([this, user, finish](const Change& change) {
+                     if (change.result != ChangeResult::kDone)
+                       return finish(ChangeResponse(change));
+                     setup_code_.clear();
+                     finish(Welcome(user, /*form=*/false));
+                   }));
   });
 }
 
@@ -295,7 +304,7 @@ std::optional<Response> Accounts::CountGuess(const std::vector<std::string>& cou
 
 void Accounts::LogIn(const Request& request, const std::string& name, std::string password,
                      bool form, const Respond& respond) {
-  const auto user = service_.FindUser(name);
+  const auto user = users_.FindUser(name);
   const std::string stored = user && !user->disabled ? user->password_hash : std::string();
   const std::vector<std::string> counters = CountersOf(request, name, stored);
   if (auto refusal = CountGuess(counters)) return respond(std::move(*refusal));
@@ -310,21 +319,21 @@ void Accounts::LogIn(const Request& request, const std::string& name, std::strin
 
 void Accounts::FinishLogIn(const Actor& actor, const std::string& stored, bool matches, bool form,
                            const std::vector<std::string>& counters, const Respond& respond) {
-  const auto still = service_.FindUser(actor.user);
+  const auto still = users_.FindUser(actor.user);
   if (!matches || !still || still->disabled || still->password_hash != stored) {
     // Whatever was typed as a name stays out of the log: people type passwords there.
-    service_.Log({still ? actor.user : std::string(), actor.address}, "login.failed", "", "");
+    audit_.Log({still ? actor.user : std::string(), actor.address}, "login.failed", "", "");
     if (form) return respond(Redirect("/result?failed=1"));
     return respond(ErrorResponse(403, "name or password is wrong"));
   }
   for (const std::string& counter : counters) limiter_.Succeeded(counter);
-  service_.Log(actor, "login", "", "");
+  audit_.Log(actor, "login", "", "");
   respond(Welcome(*still, form));
 }
 
 void Accounts::LogOut(const Request& request, const Respond& respond) {
   sessions_.End(request.session);
-  service_.Log(request.actor(), "logout", "", "");
+  audit_.Log(request.actor(), "logout", "", "");
   Response response;
   response.headers.emplace_back("Set-Cookie", Cookie("", /*end=*/true));
   response.body = "{}";
@@ -341,20 +350,20 @@ void Accounts::DescribeSession(const Request& request, const Respond& respond) {
                         {"permissions", permissions},
                         {"csrf_token", request.session->csrf_token},
                         {"password_change_required", request.session->must_change_password},
-                        {"idle_logout_min", service_.GetSettings().idle_logout_min}});
+                        {"idle_logout_min", settings_.GetSettings().idle_logout_min}});
   respond(std::move(response));
 }
 
-void Accounts::TellLastLogin(const Request& request, const Respond& respond) {
+void Accounts::ShowLastLogin(const Request& request, const Respond& respond) {
   // The entry of this log-in itself may bear a stamp shortly before or after the session's begin.
   constexpr std::chrono::seconds kOwnEntry{2};
   const auto age =
       std::chrono::duration_cast<WallClock::duration>(options_.now() - request.session->begun);
   const WallClock::time_point begun = WallClock::now() - age - kOwnEntry;
   RespondAside(
-      service_, "last login",
+      background_, "last login",
       [this, user = request.session->user, begun] {
-        const LoginHistory history = LoginsBefore(service_, user, begun);
+        const LoginHistory history = LoginsBefore(audit_, user, begun);
         Response response;
         response.body = Dump({{"last", history.last ? Json{{"time", TimeText(history.last->time)},
                                                            {"address", history.last->address}}
@@ -367,7 +376,7 @@ void Accounts::TellLastLogin(const Request& request, const Respond& respond) {
 
 void Accounts::VerifyOwn(const Request& request, std::string password, const char* wrong,
                          const Respond& respond, std::function<void(const User&)> then) {
-  const auto user = service_.FindUser(request.session->user);
+  const auto user = users_.FindUser(request.session->user);
   if (!user) return respond(ErrorResponse(409, "the account is gone"));
   // A counter of its own: guesses at the login do not keep who is logged in from signing.
   const std::vector<std::string> counters = {"own " + user->name};
@@ -401,7 +410,7 @@ void Accounts::ChangeOwnPassword(const Request& request, const Respond& respond)
                                   .disabled = {},
                                   .password_hash = hash,
                                   .expected_hash = user.password_hash};
-          service_.ChangeUser(
+          users_.ChangeUser(
               actor, wanted,
               WhileAlive([this, name = user.name, hash, session, respond](const Change& change) {
                 Response response = ChangeResponse(change);
@@ -428,7 +437,7 @@ void Accounts::AddUser(const Request& request, const Respond& respond) {
            [this, user, actor = request.actor(), respond](const std::string& hash) {
              User added = user;
              added.password_hash = std::string(kFirst) + hash;
-             service_.AddUser(actor, added, [respond](const Change& change) {
+             users_.AddUser(actor, added, [respond](const Change& change) {
                Response response = ChangeResponse(change);
                if (change.result == ChangeResult::kDone) response.status = 201;
                respond(std::move(response));
@@ -438,7 +447,7 @@ void Accounts::AddUser(const Request& request, const Respond& respond) {
 
 void Accounts::ChangeUser(const Request& request, const Respond& respond) {
   Fields fields(request.body);
-  if (!service_.FindUser(request.arguments.at(0)))
+  if (!users_.FindUser(request.arguments.at(0)))
     return respond(ErrorResponse(404, "no account of that name"));
   UserChange change{.name = request.arguments.at(0),
                     .role = {},
@@ -454,13 +463,13 @@ void Accounts::ChangeUser(const Request& request, const Respond& respond) {
     throw DataError(why);
   fields.Finish();
   const auto save = [this, actor = request.actor(), respond](const UserChange& what) {
-    service_.ChangeUser(actor, what,
-                        WhileAlive([this, name = what.name, respond](const Change& done) {
-                          // What an account may do is fixed at login: its sessions end, its own
-                          // too.
-                          if (done.result == ChangeResult::kDone) sessions_.EndAllOf(name, nullptr);
-                          respond(ChangeResponse(done));
-                        }));
+    users_.ChangeUser(actor, what,
+                      WhileAlive([this, name = what.name, respond](const Change& done) {
+                        // What an account may do is fixed at login: its sessions end, its own
+                        // too.
+                        if (done.result == ChangeResult::kDone) sessions_.EndAllOf(name, nullptr);
+                        respond(ChangeResponse(done));
+                      }));
   };
   if (password.empty()) return save(change);
   const bool is_own = change.name == request.session->user;

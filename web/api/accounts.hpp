@@ -16,7 +16,7 @@
 #include "web/security/password_worker.hpp"
 #include "web/security/sessions.hpp"
 #include "web/security/tls_identity.hpp"
-#include "web/service/scan_service.hpp"
+#include "web/service/services.hpp"
 
 namespace plumb::web {
 
@@ -36,7 +36,7 @@ struct AccountOptions {
 /// Belongs to the loop thread.
 class Accounts : public SessionLookup {
  public:
-  Accounts(ScanService& service, AccountOptions options);
+  Accounts(const Services& services, AccountOptions options);
 
   void AddRoutes(Router& router);
 
@@ -72,13 +72,15 @@ class Accounts : public SessionLookup {
   void LogOut(const Request& request, const Respond& respond);
   void DescribeSession(const Request& request, const Respond& respond);
   /// The log-in before this one, and what was tried since.
-  void TellLastLogin(const Request& request, const Respond& respond);
+  void ShowLastLogin(const Request& request, const Respond& respond);
   void ChangeOwnPassword(const Request& request, const Respond& respond);
   /// Accepts a result that is not in tolerance: with a reason and the person's own password.
   void AcceptOutside(const Request& request, const Respond& respond);
   /// Calls `act` if the password is the person's own, and answers with what became of it.
   void Signed(const Request& request, std::string password, const Respond& respond,
               std::function<void(const Actor&, Done)> act);
+  /// The room's calibration that was read, by its digest.
+  void SignRoomCalibration(const Request& request, const Respond& respond);
   void ResetSensorProfile(const Request& request, const Respond& respond);
   void RollBackSensorProfile(const Request& request, const Respond& respond);
   /// Restarts the machine: with the person's own password.
@@ -106,7 +108,14 @@ class Accounts : public SessionLookup {
     return options_.certificate ? "__Host-plumb_session" : "plumb_session";
   }
 
-  ScanService& service_;
+  AccountService& users_;
+  AuditLog& audit_;
+  SettingsService& settings_;
+  ScanService& scans_;
+  RoomCalibrationService& room_;
+  SensorProfileService& profiles_;
+  UpdateService& updates_;
+  BackgroundWork& background_;
   AccountOptions options_;
   Sessions sessions_;
   Displays displays_;

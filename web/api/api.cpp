@@ -5,6 +5,8 @@
 #include <array>
 #include <charconv>
 #include <filesystem>
+#include <functional>
+#include <utility>
 
 #include "algo/base/errors.hpp"
 #include "web/api/accounts.hpp"
@@ -91,9 +93,9 @@ Response FileResponse(const fs::path& file, std::string_view type,
   return response;
 }
 
-Response ScanFileResponse(ScanService& service, const std::string& scan_id, std::string_view name,
+Response ScanFileResponse(ScanService& scans, const std::string& scan_id, std::string_view name,
                           bool download) {
-  const auto scan = service.FindScan(scan_id);
+  const auto scan = scans.FindScan(scan_id);
   if (!scan) return ErrorResponse(404, "no such scan");
   for (const ScanFile& file : kScanFiles) {
     if (file.name != name) continue;
@@ -107,55 +109,43 @@ Response ScanFileResponse(ScanService& service, const std::string& scan_id, std:
 /// Adds routes with less to write.
 class Table {
  public:
-  Table(Router& router, ScanService& service) : router_(router), service_(service) {}
+  Table(Router& router, BackgroundWork& background) : router_(router), background_(background) {}
 
-  using Get = Response (*)(ScanService&, const Request&);
-  using Change = void (*)(ScanService&, const Request&, const Respond&);
+  using Get = std::function<Response(const Request&)>;
 
   void Read(const char* pattern, Permission permission, Get get) {
     router_.Add({"GET", pattern, permission, BodyKind::kNone,
-                 [this_service = &service_, get](const Request& request, const Respond& respond) {
-                   respond(get(*this_service, request));
+                 [get = std::move(get)](const Request& request, const Respond& respond) {
+                   respond(get(request));
                  }});
   }
   /// Of lists and files: not on the loop.
   void ReadAside(const char* pattern, Permission permission, Get get) {
-    const std::string name = std::string("GET ") + pattern;
-    router_.Add(
-        {"GET", pattern, permission, BodyKind::kNone,
-         [this_service = &service_, name, get](const Request& request, const Respond& respond) {
-           RespondAside(
-               *this_service, name,
-               [this_service, get, request] { return get(*this_service, request); }, respond);
-         }});
+    AddAside(router_, background_, pattern, permission, std::move(get));
   }
   void Write(const char* method, const char* pattern, Permission permission, BodyKind body,
-             Change change) {
-    router_.Add(
-        {method, pattern, permission, body,
-         [this_service = &service_, change](const Request& request, const Respond& respond) {
-           change(*this_service, request, respond);
-         }});
+             Handler change) {
+    router_.Add({method, pattern, permission, body, std::move(change)});
   }
 
  private:
   Router& router_;
-  ScanService& service_;
+  BackgroundWork& background_;
 };
 
-void AddApplianceRoutes(Table& table) {
-  table.Read("/health", Permission::kNone, [](ScanService& service, const Request&) {
-    const Health health = service.GetHealth();
+void AddApplianceRoutes(Table& table, ApplianceService& appliance) {
+  table.Read("/health", Permission::kNone, [&appliance](const Request&) {
+    const Health health = appliance.GetHealth();
     Response response = JsonResponse(
         health.ok ? Json{{"status", "ok"}} : Json{{"status", "failed"}, {"reason", health.reason}});
     if (!health.ok) response.status = 503;
     return response;
   });
-  table.Read("/api/v1/status", Permission::kRoom, [](ScanService& service, const Request&) {
-    return JsonResponse(ToJson(service.GetStatus(), WallClock::now()));
+  table.Read("/api/v1/status", Permission::kRoom, [&appliance](const Request&) {
+    return JsonResponse(ToJson(appliance.GetStatus(), WallClock::now()));
   });
-  table.Read("/api/v1/preview", Permission::kRoom, [](ScanService& service, const Request&) {
-    const auto picture = service.Preview();
+  table.Read("/api/v1/preview", Permission::kRoom, [&appliance](const Request&) {
+    const auto picture = appliance.Preview();
     if (!picture) return ErrorResponse(404, "the camera shows nothing now");
     Response response;
     response.type = "image/jpeg";
@@ -163,263 +153,263 @@ void AddApplianceRoutes(Table& table) {
     return response;
   });
   table.Write("POST", "/api/v1/press", Permission::kScan, BodyKind::kNone,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.Press(request.actor(), Answer(respond));
+              [&appliance](const Request& request, const Respond& respond) {
+                appliance.Press(request.actor(), Answer(respond));
               });
   table.Write("POST", "/api/v1/scan/start", Permission::kScan, BodyKind::kNone,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.StartSweep(request.actor(), Answer(respond));
+              [&appliance](const Request& request, const Respond& respond) {
+                appliance.StartSweep(request.actor(), Answer(respond));
               });
   table.Write("POST", "/api/v1/scan/end", Permission::kScan, BodyKind::kNone,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.EndSweep(request.actor(), Answer(respond));
+              [&appliance](const Request& request, const Respond& respond) {
+                appliance.EndSweep(request.actor(), Answer(respond));
               });
   table.Write("POST", "/api/v1/cancel", Permission::kScan, BodyKind::kNone,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.Cancel(request.actor(), Answer(respond));
+              [&appliance](const Request& request, const Respond& respond) {
+                appliance.Cancel(request.actor(), Answer(respond));
               });
 }
 
-void AddPatientRoutes(Table& table) {
-  table.ReadAside("/api/v1/patients", Permission::kView, [](ScanService& service, const Request&) {
-    return JsonResponse({{"patients", ListJson(service.Patients())}});
+void AddPatientRoutes(Table& table, PatientService& patients, ReferenceService& references,
+                      ScanService& scans) {
+  table.ReadAside("/api/v1/patients", Permission::kView, [&patients](const Request&) {
+    return JsonResponse({{"patients", ListJson(patients.Patients())}});
   });
   table.Write(
       "POST", "/api/v1/patients", Permission::kPatients, BodyKind::kJson,
-      [](ScanService& service, const Request& request, const Respond& respond) {
+      [&patients](const Request& request, const Respond& respond) {
         Fields fields(request.body);
         const std::string code = fields.Text("code", 1, 32),
                           site = fields.Text("site", 0, kMaxSite);
         fields.Finish();
         if (!IsName(code))
           throw DataError("code must be letters, digits, '.', '-' or '_': a pseudonym, no name");
-        service.AddPatient(request.actor(), code, site, Answer(respond));
+        patients.AddPatient(request.actor(), code, site, Answer(respond));
       });
-  table.Read(
-      "/api/v1/patients/{id}", Permission::kRoom, [](ScanService& service, const Request& request) {
-        const auto patient = service.FindPatient(request.arguments[0]);
-        return patient ? JsonResponse(ToJson(*patient)) : ErrorResponse(404, "no such patient");
-      });
+  table.Read("/api/v1/patients/{id}", Permission::kRoom, [&patients](const Request& request) {
+    const auto patient = patients.FindPatient(request.arguments[0]);
+    return patient ? JsonResponse(ToJson(*patient)) : ErrorResponse(404, "no such patient");
+  });
   table.Write("PUT", "/api/v1/patients/{id}", Permission::kPatients, BodyKind::kJson,
-              [](ScanService& service, const Request& request, const Respond& respond) {
+              [&patients](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
                 const std::string site = fields.Text("site", 0, kMaxSite),
                                   note = fields.Text("note", 0, kMaxNote);
                 fields.Finish();
-                service.ChangePatient(request.actor(), request.arguments[0], site, note,
-                                      Answer(respond));
+                patients.ChangePatient(request.actor(), request.arguments[0], site, note,
+                                       Answer(respond));
               });
   table.Write("POST", "/api/v1/patients/{id}/archive", Permission::kPlan, BodyKind::kJson,
-              [](ScanService& service, const Request& request, const Respond& respond) {
+              [&patients](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
                 const bool archived = fields.Flag("archived");
                 fields.Finish();
-                service.ArchivePatient(request.actor(), request.arguments[0], archived,
-                                       Answer(respond));
+                patients.ArchivePatient(request.actor(), request.arguments[0], archived,
+                                        Answer(respond));
               });
   table.Write("DELETE", "/api/v1/patients/{id}", Permission::kWipe, BodyKind::kNone,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.WipePatient(request.actor(), request.arguments[0], Answer(respond));
+              [&patients](const Request& request, const Respond& respond) {
+                patients.WipePatient(request.actor(), request.arguments[0], Answer(respond));
               });
   table.Write("POST", "/api/v1/patients/{id}/open", Permission::kScan, BodyKind::kJson,
-              [](ScanService& service, const Request& request, const Respond& respond) {
+              [&patients](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
                 const ScanPurpose purpose = ParsePurpose(fields.Text("purpose", 1, 32));
                 const std::string reason = fields.Text("reason", 0, 200);
                 const std::string replaces =
                     fields.Has("replaces") ? fields.Text("replaces", 0, 64) : std::string();
                 fields.Finish();
-                service.OpenPatient(request.actor(), request.arguments[0], purpose, reason,
-                                    replaces, [respond](Change change) {
-                                      change.id.clear();  // the status says which session is open
-                                      respond(ChangeResponse(change));
-                                    });
+                patients.OpenPatient(request.actor(), request.arguments[0], purpose, reason,
+                                     replaces, [respond](Change change) {
+                                       change.id.clear();  // the status says which session is open
+                                       respond(ChangeResponse(change));
+                                     });
               });
   table.Write("POST", "/api/v1/treatment/close", Permission::kScan, BodyKind::kJson,
-              [](ScanService& service, const Request& request, const Respond& respond) {
+              [&patients](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
                 const std::string session = fields.Text("session_id", 0, 64);
                 fields.Finish();
-                service.CloseSession(request.actor(), session, Answer(respond));
+                patients.CloseSession(request.actor(), session, Answer(respond));
               });
-  table.ReadAside(
-      "/api/v1/patients/{id}/references", Permission::kView,
-      [](ScanService& service, const Request& request) {
-        if (!service.FindPatient(request.arguments[0]))
-          return ErrorResponse(404, "no such patient");
-        return JsonResponse({{"references", ListJson(service.References(request.arguments[0]))}});
-      });
+  table.ReadAside("/api/v1/patients/{id}/references", Permission::kView,
+                  [&patients, &references](const Request& request) {
+                    if (!patients.FindPatient(request.arguments[0]))
+                      return ErrorResponse(404, "no such patient");
+                    return JsonResponse(
+                        {{"references", ListJson(references.References(request.arguments[0]))}});
+                  });
   table.ReadAside(
       "/api/v1/patients/{id}/scans", Permission::kView,
-      [](ScanService& service, const Request& request) {
-        if (!service.FindPatient(request.arguments[0]))
+      [&patients, &scans](const Request& request) {
+        if (!patients.FindPatient(request.arguments[0]))
           return ErrorResponse(404, "no such patient");
-        return JsonResponse({{"scans", ListJson(service.Scans(request.arguments[0], kMaxListed))}});
+        return JsonResponse({{"scans", ListJson(scans.Scans(request.arguments[0], kMaxListed))}});
       });
 }
 
-void AddReferenceRoutes(Table& table) {
-  table.Read("/api/v1/templates", Permission::kView, [](ScanService& service, const Request&) {
-    return JsonResponse({{"templates", ListJson(service.Templates())}});
+void AddTemplateRoutes(Table& table, SettingsService& settings) {
+  table.Read("/api/v1/templates", Permission::kView, [&settings](const Request&) {
+    return JsonResponse({{"templates", ListJson(settings.Templates())}});
   });
   table.Write("PUT", "/api/v1/templates", Permission::kPlan, BodyKind::kJson,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.SetTemplate(request.actor(), ParseTemplate(request.body), Answer(respond));
+              [&settings](const Request& request, const Respond& respond) {
+                settings.SetTemplate(request.actor(), ParseTemplate(request.body), Answer(respond));
               });
   table.Write("POST", "/api/v1/templates/remove", Permission::kPlan, BodyKind::kJson,
-              [](ScanService& service, const Request& request, const Respond& respond) {
+              [&settings](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
                 const std::string site = fields.Text("site", 1, kMaxSite);
                 fields.Finish();
-                service.RemoveTemplate(request.actor(), site, Answer(respond));
+                settings.RemoveTemplate(request.actor(), site, Answer(respond));
               });
+}
+
+void AddReferenceRoutes(Table& table, ReferenceService& references) {
   table.Write("POST", "/api/v1/references", Permission::kPlan, BodyKind::kJson,
-              [](ScanService& service, const Request& request, const Respond& respond) {
+              [&references](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
                 const std::string scan_id = fields.Text("scan_id", 1, 64),
                                   reason = fields.Text("reason", 0, 200);
                 fields.Finish();
-                service.AddReference(request.actor(), scan_id, reason, Answer(respond));
+                references.AddReference(request.actor(), scan_id, reason, Answer(respond));
               });
-  table.Read("/api/v1/references/{id}", Permission::kRoom,
-             [](ScanService& service, const Request& request) {
-               const auto reference = service.FindReference(request.arguments[0]);
-               return reference ? JsonResponse(ToJson(*reference))
-                                : ErrorResponse(404, "no such reference");
-             });
+  table.Read("/api/v1/references/{id}", Permission::kRoom, [&references](const Request& request) {
+    const auto reference = references.FindReference(request.arguments[0]);
+    return reference ? JsonResponse(ToJson(*reference)) : ErrorResponse(404, "no such reference");
+  });
   table.Write("PUT", "/api/v1/references/{id}/plan", Permission::kPlan, BodyKind::kJson,
-              [](ScanService& service, const Request& request, const Respond& respond) {
+              [&references](const Request& request, const Respond& respond) {
                 const auto [plan, revision] = ParsePlan(request.body);
-                service.PlanReference(request.actor(), request.arguments[0], revision, plan,
-                                      Answer(respond));
+                references.PlanReference(request.actor(), request.arguments[0], revision, plan,
+                                         Answer(respond));
               });
   table.Write("POST", "/api/v1/references/{id}/approve", Permission::kApprove, BodyKind::kJson,
-              [](ScanService& service, const Request& request, const Respond& respond) {
+              [&references](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
                 const int revision = fields.Integer("revision", 1, kMaxRevision);
                 const std::string digest =
                     fields.Has("digest") ? fields.Text("digest", 0, 64) : std::string();
                 fields.Finish();
-                service.ApproveReference(request.actor(), request.arguments[0], revision, digest,
-                                         Answer(respond));
+                references.ApproveReference(request.actor(), request.arguments[0], revision, digest,
+                                            Answer(respond));
               });
 }
 
-void AddScanRoutes(Table& table) {
-  table.ReadAside(
-      "/api/v1/scans", Permission::kView, [](ScanService& service, const Request& request) {
-        const auto limit = static_cast<int>(QueryNumber(request, "limit", kMaxListed, kMaxListed));
-        return JsonResponse({{"scans", ListJson(service.Scans("", limit))}});
-      });
-  table.Read("/api/v1/scans/{id}", Permission::kRoom,
-             [](ScanService& service, const Request& request) {
-               const auto scan = service.FindScan(request.arguments[0]);
-               return scan ? JsonResponse(ToJson(*scan, WallClock::now()))
-                           : ErrorResponse(404, "no such scan");
-             });
+void AddScanRoutes(Table& table, ScanService& scans) {
+  table.ReadAside("/api/v1/scans", Permission::kView, [&scans](const Request& request) {
+    const auto limit = static_cast<int>(QueryNumber(request, "limit", kMaxListed, kMaxListed));
+    return JsonResponse({{"scans", ListJson(scans.Scans("", limit))}});
+  });
+  table.Read("/api/v1/scans/{id}", Permission::kRoom, [&scans](const Request& request) {
+    const auto scan = scans.FindScan(request.arguments[0]);
+    return scan ? JsonResponse(ToJson(*scan, WallClock::now()))
+                : ErrorResponse(404, "no such scan");
+  });
   table.Write("DELETE", "/api/v1/scans/{id}", Permission::kWipe, BodyKind::kJson,
-              [](ScanService& service, const Request& request, const Respond& respond) {
+              [&scans](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
                 const std::string reason = fields.Text("reason", 3, 200);
                 fields.Finish();
-                service.RemoveScan(request.actor(), request.arguments[0], reason, Answer(respond));
+                scans.RemoveScan(request.actor(), request.arguments[0], reason, Answer(respond));
               });
   table.Write("POST", "/api/v1/scans/{id}/accept", Permission::kAccept, BodyKind::kNone,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.AcceptScan(request.actor(), request.arguments[0], /*reason=*/{},
-                                   Answer(respond));
+              [&scans](const Request& request, const Respond& respond) {
+                scans.AcceptScan(request.actor(), request.arguments[0], /*reason=*/{},
+                                 Answer(respond));
               });
   table.ReadAside("/api/v1/scans/{id}/files/{name}", Permission::kRoom,
-                  [](ScanService& service, const Request& request) {
-                    return ScanFileResponse(service, request.arguments[0], request.arguments[1],
+                  [&scans](const Request& request) {
+                    return ScanFileResponse(scans, request.arguments[0], request.arguments[1],
                                             request.query.contains("download"));
                   });
   table.ReadAside("/api/v1/scans/{id}/maps/{name}", Permission::kRoom,
-                  [](ScanService& service, const Request& request) {
-                    auto map = service.CompactMap(request.arguments[0], request.arguments[1]);
+                  [&scans](const Request& request) {
+                    auto map = scans.CompactMap(request.arguments[0], request.arguments[1]);
                     if (!map) return ErrorResponse(404, "this scan has no such map");
                     Response response;
                     response.type = "application/octet-stream";
                     response.body = std::move(*map);
                     return response;
                   });
-  table.ReadAside(
-      "/api/v1/results/{id}", Permission::kRoom, [](ScanService& service, const Request& request) {
-        return ScanFileResponse(service, request.arguments[0], "result.json", /*download=*/false);
-      });
+  table.ReadAside("/api/v1/results/{id}", Permission::kRoom, [&scans](const Request& request) {
+    return ScanFileResponse(scans, request.arguments[0], "result.json", /*download=*/false);
+  });
 }
 
-void AddCheckRoutes(Table& table) {
-  table.ReadAside("/api/v1/checks", Permission::kView, [](ScanService& service, const Request&) {
-    return JsonResponse(ToJson(service.GetChecks(), WallClock::now()));
+void AddCheckRoutes(Table& table, CheckService& checks) {
+  table.ReadAside("/api/v1/checks", Permission::kView, [&checks](const Request&) {
+    return JsonResponse(ToJson(checks.GetChecks(), WallClock::now()));
   });
   table.Write("POST", "/api/v1/checks/open", Permission::kScan, BodyKind::kNone,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.OpenCheck(request.actor(), Answer(respond));
+              [&checks](const Request& request, const Respond& respond) {
+                checks.OpenCheck(request.actor(), Answer(respond));
               });
   table.Write("POST", "/api/v1/checks/{id}/baseline", Permission::kPlan, BodyKind::kNone,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.SetCheckBaseline(request.actor(), request.arguments[0], Answer(respond));
+              [&checks](const Request& request, const Respond& respond) {
+                checks.SetCheckBaseline(request.actor(), request.arguments[0], Answer(respond));
               });
 }
 
-void AddCareRoutes(Table& table) {
-  table.ReadAside(
-      "/api/v1/audit", Permission::kAudit, [](ScanService& service, const Request& request) {
-        const auto before = QueryNumber(request, "before", 0, std::int64_t{1} << 53);
-        const auto limit = static_cast<int>(QueryNumber(request, "limit", 100, kMaxListed));
-        return JsonResponse({{"entries", ListJson(service.Audit(before, limit))}});
-      });
-  table.Read("/api/v1/settings", Permission::kView, [](ScanService& service, const Request&) {
-    return JsonResponse(ToJson(service.GetSettings()));
+void AddSettingsRoutes(Table& table, SettingsService& settings, AuditLog& audit) {
+  table.ReadAside("/api/v1/audit", Permission::kAudit, [&audit](const Request& request) {
+    const auto before = QueryNumber(request, "before", 0, std::int64_t{1} << 53);
+    const auto limit = static_cast<int>(QueryNumber(request, "limit", 100, kMaxListed));
+    return JsonResponse({{"entries", ListJson(audit.Audit(before, limit))}});
   });
+  table.Read("/api/v1/settings", Permission::kView,
+             [&settings](const Request&) { return JsonResponse(ToJson(settings.GetSettings())); });
   table.Write("PUT", "/api/v1/settings", Permission::kSettings, BodyKind::kJson,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.ChangeSettings(request.actor(), ParseSettings(request.body),
-                                       Answer(respond));
+              [&settings](const Request& request, const Respond& respond) {
+                settings.ChangeSettings(request.actor(), ParseSettings(request.body),
+                                        Answer(respond));
               });
-  table.Read("/api/v1/update", Permission::kView, [](ScanService& service, const Request&) {
-    return JsonResponse(ToJson(service.GetUpdate()));
-  });
+}
+
+void AddUpdateRoutes(Table& table, UpdateService& updates) {
+  table.Read("/api/v1/update", Permission::kView,
+             [&updates](const Request&) { return JsonResponse(ToJson(updates.GetUpdate())); });
   table.Write("POST", "/api/v1/update", Permission::kUpdate, BodyKind::kJson,
-              [](ScanService& service, const Request& request, const Respond& respond) {
+              [&updates](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
                 const std::string bundle = fields.Text("bundle", 1, 64);
                 fields.Finish();
                 if (!IsName(bundle)) throw DataError("bundle must be one of the names listed");
-                service.InstallUpdate(request.actor(), bundle, Answer(respond));
+                updates.InstallUpdate(request.actor(), bundle, Answer(respond));
               });
   table.Write("POST", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kFile,
-              [](ScanService& service, const Request& request, const Respond& respond) {
+              [&updates](const Request& request, const Respond& respond) {
                 const std::string& name = request.arguments[0];
                 if (!name.ends_with(".raucb"))
                   throw DataError("a bundle's name must end with .raucb");
-                service.AddBundle(
+                updates.AddBundle(
                     request.actor(), request.upload->path(), name,
                     [respond, kept = request.upload](const plumb::web::Change& change) {
                       respond(ChangeResponse(change));
                     });
               });
   table.Write("POST", "/api/v1/update/seen", Permission::kUpdate, BodyKind::kNone,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.ForgetRollBack(request.actor(), Answer(respond));
+              [&updates](const Request& request, const Respond& respond) {
+                updates.ForgetRollBack(request.actor(), Answer(respond));
               });
   table.Write("DELETE", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kNone,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.RemoveBundle(request.actor(), request.arguments[0], Answer(respond));
+              [&updates](const Request& request, const Respond& respond) {
+                updates.RemoveBundle(request.actor(), request.arguments[0], Answer(respond));
               });
-  table.ReadAside("/api/v1/backup", Permission::kSettings,
-                  [](ScanService& service, const Request&) {
-                    const std::optional<AuditEntry> last = LastBackup(service);
-                    return JsonResponse({{"last", last ? ToJson(*last) : Json(nullptr)}});
-                  });
+}
+
+void AddMaintenanceRoutes(Table& table, MaintenanceService& maintenance, AuditLog& audit) {
+  table.ReadAside("/api/v1/backup", Permission::kSettings, [&audit](const Request&) {
+    const std::optional<AuditEntry> last = LastBackup(audit);
+    return JsonResponse({{"last", last ? ToJson(*last) : Json(nullptr)}});
+  });
   table.Write("POST", "/api/v1/backup", Permission::kSettings, BodyKind::kNone,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.MakeBackup(request.actor(), Answer(respond));
+              [&maintenance](const Request& request, const Respond& respond) {
+                maintenance.MakeBackup(request.actor(), Answer(respond));
               });
   table.Write("POST", "/api/v1/diagnostics", Permission::kDiagnostics, BodyKind::kNone,
-              [](ScanService& service, const Request& request, const Respond& respond) {
-                service.WriteDiagnostics(request.actor(), [respond](const Change& change) {
+              [&maintenance](const Request& request, const Respond& respond) {
+                maintenance.WriteDiagnostics(request.actor(), [respond](const Change& change) {
                   if (change.result != ChangeResult::kDone) return respond(ChangeResponse(change));
                   Response response =
                       FileResponse(change.file, "application/octet-stream",
@@ -433,14 +423,17 @@ void AddCareRoutes(Table& table) {
 
 }  // namespace
 
-void AddApiRoutes(Router& router, ScanService& service) {
-  Table table(router, service);
-  AddApplianceRoutes(table);
-  AddPatientRoutes(table);
-  AddReferenceRoutes(table);
-  AddScanRoutes(table);
-  AddCheckRoutes(table);
-  AddCareRoutes(table);
+void AddApiRoutes(Router& router, const Services& services) {
+  Table table(router, services.background);
+  AddApplianceRoutes(table, services.appliance);
+  AddPatientRoutes(table, services.patients, services.references, services.scans);
+  AddTemplateRoutes(table, services.settings);
+  AddReferenceRoutes(table, services.references);
+  AddScanRoutes(table, services.scans);
+  AddCheckRoutes(table, services.checks);
+  AddSettingsRoutes(table, services.settings, services.audit);
+  AddUpdateRoutes(table, services.updates);
+  AddMaintenanceRoutes(table, services.maintenance, services.audit);
 }
 
 }  // namespace plumb::web

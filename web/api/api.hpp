@@ -3,18 +3,22 @@
 
 #include "web/http/event_hub.hpp"
 #include "web/http/router.hpp"
-#include "web/service/scan_service.hpp"
+#include "web/service/services.hpp"
 
 namespace plumb::web {
 
 /// Adds the routes of the appliance's own things: status, patients, references, scans, audit,
-/// settings, care. Both must outlive the router.
-void AddApiRoutes(Router& router, ScanService& service);
+/// settings, updates, maintenance. The services must outlive the router.
+void AddApiRoutes(Router& router, const Services& services);
 
 /// Adds GET /result: the last result as a page that needs no script.
-void AddResultPage(Router& router, ScanService& service);
+void AddResultPage(Router& router, const Services& services);
 
 /// Adds the reports as PDF files, and the numbers of a patient as CSV and JSON.
-void AddExportRoutes(Router& router, ScanService& service);
+void AddExportRoutes(Router& router, const Services& services);
+
+/// Adds what is known of the room's calibration, and its board as a PDF. Signing needs a password:
+/// see Accounts.
+void AddRoomCalibrationRoutes(Router& router, const Services& services);
 
 }  // namespace plumb::web

@@ -42,7 +42,7 @@ std::string HashOf(const std::string& token) {
 
 }  // namespace
 
-Displays::Displays(ScanService& service, bool tls, std::function<TimePoint()> now)
+Displays::Displays(DisplayService& service, bool tls, std::function<TimePoint()> now)
     : service_(service), tls_(tls), now_(std::move(now)) {
   Load();
 }

@@ -12,6 +12,7 @@
 #include "web/http/message.hpp"
 #include "web/http/router.hpp"
 #include "web/security/sessions.hpp"
+#include "web/service/display_service.hpp"
 
 namespace plumb::web {
 
@@ -22,7 +23,7 @@ class Displays {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  Displays(ScanService& service, bool tls, std::function<TimePoint()> now);
+  Displays(DisplayService& service, bool tls, std::function<TimePoint()> now);
 
   void AddRoutes(Router& router);
   /// Of a request with a paired screen's cookie; null for all others.
@@ -46,7 +47,7 @@ class Displays {
     return tls_ ? "__Host-plumb_display" : "plumb_display";
   }
 
-  ScanService& service_;
+  DisplayService& service_;
   bool tls_;
   std::function<TimePoint()> now_;
   std::vector<Pairing> pairings_;

@@ -60,18 +60,19 @@ std::string_view Name(EventKind kind) {
 
 class HttpServer::Impl {
  public:
-  Impl(ScanService& service, HttpServerOptions options)
-      : service_(service),
+  Impl(const Services& services, HttpServerOptions options)
+      : appliance_(services.appliance),
         options_(Completed(std::move(options))),
-        accounts_(service, AccountsOptions(options_, CertificateReplacer())),
+        accounts_(services, AccountsOptions(options_, CertificateReplacer())),
         hub_(options_.max_event_streams, options_.max_streams_per_session,
              options_.event_buffer_bytes),
-        transport_(options_, service_, router_, accounts_, hub_,
+        transport_(options_, services.background, router_, accounts_, hub_,
                    [this](EventStream& stream) { stream.Send(StatusEvent()); }) {
     accounts_.AddRoutes(router_);
-    AddApiRoutes(router_, service_);
-    AddResultPage(router_, service_);
-    AddExportRoutes(router_, service_);
+    AddApiRoutes(router_, services);
+    AddResultPage(router_, services);
+    AddExportRoutes(router_, services);
+    AddRoomCalibrationRoutes(router_, services);
     AddPageRoutes();
     epoll_fd_ = epoll_create1(EPOLL_CLOEXEC);
     if (epoll_fd_ < 0)
@@ -80,11 +81,11 @@ class HttpServer::Impl {
     Watch(transport_.wake_fd());
     Watch(accounts_.fd());
     next_beat_ = SteadyClock::now() + kBeat;
-    service_.SetListener([this](EventKind kind) { OnEvent(kind); });
+    appliance_.SetListener([this](EventKind kind) { OnEvent(kind); });
   }
 
   ~Impl() {
-    service_.SetListener({});
+    appliance_.SetListener({});
     hub_.CloseAll();
     close(epoll_fd_);
   }
@@ -183,7 +184,7 @@ class HttpServer::Impl {
   }
 
   [[nodiscard]] std::string StatusEvent() {
-    return FormatEvent("status", Dump(ToJson(service_.GetStatus(), WallClock::now())));
+    return FormatEvent("status", Dump(ToJson(appliance_.GetStatus(), WallClock::now())));
   }
 
   void SendStatus(SteadyClock::time_point now) {
@@ -191,7 +192,7 @@ class HttpServer::Impl {
     last_status_ = now;
     const Doing doing(options_, "status to viewers");
     if (hub_.size() > 0)
-      hub_.Broadcast("status", Dump(ToJson(service_.GetStatus(), WallClock::now())));
+      hub_.Broadcast("status", Dump(ToJson(appliance_.GetStatus(), WallClock::now())));
   }
 
   /// The state goes out at once but at most ten times a second; the rest are hints to ask again.
@@ -203,7 +204,7 @@ class HttpServer::Impl {
     transport_.Wake();
   }
 
-  ScanService& service_;
+  ApplianceService& appliance_;
   HttpServerOptions options_;
   Router router_;
   Accounts accounts_;
@@ -217,8 +218,8 @@ class HttpServer::Impl {
   std::optional<SteadyClock::time_point> status_due_;
 };
 
-HttpServer::HttpServer(ScanService& service, HttpServerOptions options)
-    : impl_(std::make_unique<Impl>(service, std::move(options))) {}
+HttpServer::HttpServer(const Services& services, HttpServerOptions options)
+    : impl_(std::make_unique<Impl>(services, std::move(options))) {}
 HttpServer::~HttpServer() = default;
 int HttpServer::fd() const { return impl_->fd(); }
 void HttpServer::Run() { impl_->Run(); }

@@ -12,20 +12,20 @@
 #include <vector>
 
 #include "web/http/server_options.hpp"
-#include "web/service/scan_service.hpp"
+#include "web/service/services.hpp"
 
 namespace plumb::web {
 
 /// Serves the page, the API under /api/v1 (web/openapi.yaml), the event stream and GET /health.
 ///
-/// Belongs to the loop thread: everything is called there and calls the service there. Passwords
+/// Belongs to the loop thread: everything is called there and calls the services there. Passwords
 /// are hashed on a thread of its own. Signals must be blocked before it is made. Destroying it
 /// closes every connection; completions that come later find nobody.
 class HttpServer {
  public:
   /// Listens at once; nothing is answered before the first Run(). @throws IoError with address and
   /// reason, DataError for the TLS files.
-  HttpServer(ScanService& service, HttpServerOptions options);
+  HttpServer(const Services& services, HttpServerOptions options);
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;

@@ -5,26 +5,18 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
-#include "algo/base/errors.hpp"
-#include "web/http/checks.hpp"
 #include "web/security/permissions.hpp"
+#include "web/service/names.hpp"
 
 namespace plumb::web {
 namespace {
 
-constexpr int kMaxDepth = 8;
-constexpr double kMaxCoordinate_m = 100.0;
-constexpr std::size_t kMaxRegionCorners = 500;
 constexpr std::array<std::string_view, 6> kStates = {"no_sensor", "ready",  "scanning",
                                                      "working",   "result", "fault"};
 constexpr std::array<std::string_view, 7> kGuidance = {
     "none", "slower", "closer", "farther", "tracking_lost", "no_markers", "computer_too_slow"};
 constexpr std::array<std::string_view, 4> kFaultKinds = {"none", "sensor", "scan", "storage"};
-constexpr std::array<std::string_view, 3> kPurposes = {"fraction", "reference", "daily_check"};
-constexpr std::array<std::string_view, 4> kOutcomes = {"running", "done", "cancelled", "failed"};
-constexpr std::array<std::string_view, 4> kPostures = {"HFS", "HFP", "FFS", "FFP"};
 
 template <std::size_t n, typename Enum>
 std::string_view NameIn(const std::array<std::string_view, n>& names, Enum value) {
@@ -55,7 +47,7 @@ Json ToleranceJson(const Tolerance& tolerance) {
 Json LiveScanJson(const LiveScan& scan) {
   return {{"id", scan.id},
           {"patient_id", TextOrNull(scan.patient_id)},
-          {"purpose", NameIn(kPurposes, scan.purpose)},
+          {"purpose", NameIn(kPurposeNames, scan.purpose)},
           {"elapsed_s", scan.elapsed_s},
           {"coverage", OrNull(scan.coverage)},
           {"guidance", NameIn(kGuidance, scan.guidance)},
@@ -65,36 +57,6 @@ Json LiveScanJson(const LiveScan& scan) {
           {"frames_dropped", scan.frames_dropped},
           {"step", scan.step},
           {"step_fraction", scan.step_fraction}};
-}
-
-bool DeeperThan(const nlohmann::json& json, int depth) {
-  if (!json.is_structured()) return false;
-  if (depth == 0) return true;
-  return std::any_of(json.begin(), json.end(),
-                     [&](const nlohmann::json& child) { return DeeperThan(child, depth - 1); });
-}
-
-nlohmann::json ParseShallow(const std::string& body) {
-  // Counted before parsing: the parser's own tree must not become deep.
-  int depth = 0, deepest = 0;
-  for (const char c : body) {
-    depth += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
-    deepest = std::max(deepest, depth);
-  }
-  if (deepest > 64) return nlohmann::json::value_t::discarded;
-  return nlohmann::json::parse(body, nullptr, /*allow_exceptions=*/false);
-}
-
-std::vector<double> ReadPoint(const nlohmann::json& item, const char* name, std::size_t width) {
-  const bool valid =
-      item.is_array() && item.size() == width &&
-      std::all_of(item.begin(), item.end(), [](const nlohmann::json& value) {
-        return value.is_number() && std::abs(value.get<double>()) <= kMaxCoordinate_m;
-      });
-  if (!valid)
-    throw DataError(
-        fmt::format("a point of {} must be {} numbers within {} m", name, width, kMaxCoordinate_m));
-  return item.get<std::vector<double>>();
 }
 
 }  // namespace
@@ -110,7 +72,7 @@ std::string TimeText(WallClock::time_point time) {
 }
 
 std::string_view Name(ApplianceState state) { return NameIn(kStates, state); }
-std::string_view Name(ScanPurpose purpose) { return NameIn(kPurposes, purpose); }
+std::string_view Name(ScanPurpose purpose) { return NameIn(kPurposeNames, purpose); }
 
 namespace {
 
@@ -128,8 +90,8 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
   Json json = {{"id", scan.id},
                {"patient_id", TextOrNull(scan.patient_id)},
                {"reference_id", TextOrNull(scan.reference_id)},
-               {"purpose", NameIn(kPurposes, scan.purpose)},
-               {"outcome", NameIn(kOutcomes, scan.outcome)},
+               {"purpose", NameIn(kPurposeNames, scan.purpose)},
+               {"outcome", NameIn(kOutcomeNames, scan.outcome)},
                {"failure", TextOrNull(scan.failure)},
                {"started_at", TimeText(scan.started_at)},
                {"finished_at", nullptr},
@@ -207,7 +169,7 @@ Json SessionJson(const TreatmentSession& session) {
   return {{"id", session.id},
           {"patient_id", session.patient_id},
           {"patient_code", session.patient_code},
-          {"purpose", NameIn(kPurposes, session.purpose)},
+          {"purpose", NameIn(kPurposeNames, session.purpose)},
           {"fraction", session.fraction > 0 ? Json(session.fraction) : Json(nullptr)},
           {"num_scans", session.num_scans},
           {"opened_by", session.opened_by},
@@ -244,7 +206,7 @@ Json ToJson(const Status& status, WallClock::time_point now) {
             {"warnings", status.storage.warnings}}},
           {"light", status.light},
           {"patient_id", TextOrNull(status.patient_id)},
-          {"next_purpose", NameIn(kPurposes, status.next_purpose)},
+          {"next_purpose", NameIn(kPurposeNames, status.next_purpose)},
           {"scans_today", status.scans_today},
           {"session", status.session ? SessionJson(*status.session) : Json(nullptr)},
           {"room",
@@ -350,151 +312,6 @@ Json ToJson(const UpdateStatus& update) {
           {"restart_needed", update.restart_needed},
           {"failure", TextOrNull(update.failure)},
           {"rolled_back", TextOrNull(update.rolled_back)}};
-}
-
-Fields::Fields(const std::string& body) : json_(ParseShallow(body)) {
-  if (!json_.is_object() || DeeperThan(json_, kMaxDepth))
-    throw DataError("expected a JSON object as the body");
-}
-
-const nlohmann::json& Fields::Get(const char* name) {
-  known_.insert(name);
-  const auto found = json_.find(name);
-  if (found == json_.end()) throw DataError(fmt::format("{} is missing", name));
-  return *found;
-}
-
-bool Fields::Has(const char* name) {
-  known_.insert(name);
-  return json_.contains(name);
-}
-
-std::string Fields::Text(const char* name, std::size_t min, std::size_t max, bool allow_lines) {
-  const nlohmann::json& value = Get(name);
-  if (!value.is_string())
-    throw DataError(fmt::format("{} must be text, found {}", name, value.type_name()));
-  const auto& text = value.get_ref<const std::string&>();
-  if (text.size() < min || text.size() > max) {
-    throw DataError(
-        fmt::format("{} must have {} to {} bytes, found {}", name, min, max, text.size()));
-  }
-  if (!IsPlainText(text, allow_lines))
-    throw DataError(fmt::format("{} must be plain text without control characters", name));
-  return text;
-}
-
-double Fields::Number(const char* name, double min, double max) {
-  const nlohmann::json& value = Get(name);
-  if (!value.is_number())
-    throw DataError(fmt::format("{} must be a number, found {}", name, value.type_name()));
-  const double number = value.get<double>();
-  if (!(number >= min && number <= max))
-    throw DataError(fmt::format("{} must be from {} to {}, found {}", name, min, max, number));
-  return number;
-}
-
-int Fields::Integer(const char* name, int min, int max) {
-  const double number = Number(name, min, max);
-  if (number != std::floor(number))
-    throw DataError(fmt::format("{} must be a whole number, found {}", name, number));
-  return static_cast<int>(number);
-}
-
-bool Fields::Flag(const char* name) {
-  const nlohmann::json& value = Get(name);
-  if (!value.is_boolean())
-    throw DataError(fmt::format("{} must be true or false, found {}", name, value.type_name()));
-  return value.get<bool>();
-}
-
-std::vector<std::vector<double>> Fields::Points(const char* name, std::size_t width,
-                                                std::size_t max) {
-  const nlohmann::json& list = Get(name);
-  if (!list.is_array() || list.size() > max)
-    throw DataError(fmt::format("{} must be a list of at most {} points", name, max));
-  std::vector<std::vector<double>> points;
-  for (const nlohmann::json& item : list) points.push_back(ReadPoint(item, name, width));
-  return points;
-}
-
-std::optional<std::vector<double>> Fields::Point(const char* name, std::size_t width) {
-  const nlohmann::json& value = Get(name);
-  if (value.is_null()) return std::nullopt;
-  return ReadPoint(value, name, width);
-}
-
-void Fields::Finish() const {
-  for (const auto& item : json_.items()) {
-    if (!known_.contains(item.key()))
-      throw DataError(
-          fmt::format("unknown field in the body; known are: {}", fmt::join(known_, ", ")));
-  }
-}
-
-PlanTemplate ParseTemplate(const std::string& body) {
-  constexpr double kMin_mm = 20, kMax_mm = 3000;
-  Fields fields(body);
-  PlanTemplate wanted;
-  wanted.site = fields.Text("site", 1, kMaxSite);
-  wanted.width_mm = fields.Number("width_mm", kMin_mm, kMax_mm);
-  wanted.height_mm = fields.Number("height_mm", kMin_mm, kMax_mm);
-  wanted.tolerance.shift_mm = fields.Number("shift_tolerance_mm", 0.1, 50);
-  wanted.tolerance.rotation_deg = fields.Number("rotation_tolerance_deg", 0.1, 20);
-  fields.Finish();
-  return wanted;
-}
-
-ScanPurpose ParsePurpose(const std::string& name) {
-  for (std::size_t i = 0; i < kPurposes.size(); ++i) {
-    if (kPurposes[i] == name) return static_cast<ScanPurpose>(i);
-  }
-  throw DataError(fmt::format("purpose must be one of {}", fmt::join(kPurposes, ", ")));
-}
-
-namespace {
-
-std::string ParsePosture(Fields& fields) {
-  std::string posture = fields.Text("posture", 3, 3);
-  if (std::find(kPostures.begin(), kPostures.end(), posture) == kPostures.end()) {
-    throw DataError(fmt::format("posture must be one of {}", fmt::join(kPostures, ", ")));
-  }
-  return posture;
-}
-
-}  // namespace
-
-std::pair<ReferencePlan, int> ParsePlan(const std::string& body) {
-  Fields fields(body);
-  ReferencePlan plan;
-  const int revision = fields.Integer("revision", 1, kMaxRevision);
-  for (const auto& point : fields.Points("region_m", 2, kMaxRegionCorners))
-    plan.region_m.push_back({point[0], point[1]});
-  if (!plan.region_m.empty() && plan.region_m.size() < 3)
-    throw DataError("region_m must have no corner or at least 3");
-  if (const auto point = fields.Point("isocentre_m", 3))
-    plan.isocentre_m = {(*point)[0], (*point)[1], (*point)[2]};
-  plan.tolerance.shift_mm = fields.Number("shift_tolerance_mm", 0.1, 50);
-  plan.tolerance.rotation_deg = fields.Number("rotation_tolerance_deg", 0.1, 20);
-  plan.posture = ParsePosture(fields);
-  plan.couch_markers = fields.Flag("couch_markers");
-  fields.Finish();
-  return {plan, revision};
-}
-
-Settings ParseSettings(const std::string& body) {
-  Fields fields(body);
-  Settings settings;
-  settings.tolerance.shift_mm = fields.Number("shift_tolerance_mm", 0.1, 50);
-  settings.tolerance.rotation_deg = fields.Number("rotation_tolerance_deg", 0.1, 20);
-  settings.posture = ParsePosture(fields);
-  settings.couch_markers = fields.Flag("couch_markers");
-  settings.auto_stop_s = fields.Number("auto_stop_s", 1, 120);
-  settings.scan_limit_s = fields.Number("scan_limit_s", 5, 600);
-  settings.keep_recordings = fields.Flag("keep_recordings");
-  settings.retention_days = fields.Integer("retention_days", 0, 36500);
-  settings.idle_logout_min = fields.Integer("idle_logout_min", 1, 240);
-  fields.Finish();
-  return settings;
 }
 
 }  // namespace plumb::web

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "web/security/sessions.hpp"
-#include "web/service/scan_service.hpp"
+#include "web/service/service_types.hpp"
 
 namespace plumb::web {
 

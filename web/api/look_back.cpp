@@ -9,10 +9,10 @@ constexpr int kPage = 200;
 constexpr int kPages = 25;
 
 /// From the newest entry to older ones, until `look` has seen enough.
-void Walk(ScanService& service, const std::function<bool(const AuditEntry&)>& look) {
+void Walk(AuditLog& log, const std::function<bool(const AuditEntry&)>& look) {
   std::int64_t before = 0;
   for (int page = 0; page < kPages; ++page) {
-    const std::vector<AuditEntry> entries = service.Audit(before, kPage);
+    const std::vector<AuditEntry> entries = log.Audit(before, kPage);
     for (const AuditEntry& entry : entries) {
       if (look(entry)) return;
       before = entry.number;
@@ -23,10 +23,9 @@ void Walk(ScanService& service, const std::function<bool(const AuditEntry&)>& lo
 
 }  // namespace
 
-LoginHistory LoginsBefore(ScanService& service, const std::string& user,
-                          WallClock::time_point before) {
+LoginHistory LoginsBefore(AuditLog& log, const std::string& user, WallClock::time_point before) {
   LoginHistory history;
-  Walk(service, [&](const AuditEntry& entry) {
+  Walk(log, [&](const AuditEntry& entry) {
     if (entry.user != user) return false;
     if (entry.action == "login.failed") ++history.failed;
     if (entry.action != "login" || entry.time >= before) return false;
@@ -36,9 +35,9 @@ LoginHistory LoginsBefore(ScanService& service, const std::string& user,
   return history;
 }
 
-std::optional<AuditEntry> LastBackup(ScanService& service) {
+std::optional<AuditEntry> LastBackup(AuditLog& log) {
   std::optional<AuditEntry> last;
-  Walk(service, [&](const AuditEntry& entry) {
+  Walk(log, [&](const AuditEntry& entry) {
     if (entry.action != "backup.make") return false;
     last = entry;
     return true;

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "web/service/scan_service.hpp"
+#include "web/service/audit_log.hpp"
 
 namespace plumb::web {
 
@@ -13,10 +13,11 @@ struct LoginHistory {
   int failed = 0;                  ///< Wrong passwords for this name since then.
 };
 
-/// To be called within Later(): both read at most the newest 5000 entries of the log.
+/// To be called within BackgroundWork::Later(): both read at most the newest 5000 entries of the
+/// log.
 /// @param before  When the present session began.
-[[nodiscard]] LoginHistory LoginsBefore(ScanService& service, const std::string& user,
+[[nodiscard]] LoginHistory LoginsBefore(AuditLog& log, const std::string& user,
                                         WallClock::time_point before);
-[[nodiscard]] std::optional<AuditEntry> LastBackup(ScanService& service);
+[[nodiscard]] std::optional<AuditEntry> LastBackup(AuditLog& log);
 
 }  // namespace plumb::web

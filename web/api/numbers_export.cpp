@@ -47,8 +47,9 @@ std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
                     scan->fraction > 0 ? std::to_string(scan->fraction) : "", Name(scan->purpose),
                     TimeText(scan->started_at), scan->result ? Cell(scan->result->verdict) : "");
     if (is_advice) {
-      for (const auto& value : Values(scan->result->correction)) text += "," + Number(value);
-      for (const auto& value : Values(scan->result->u95)) text += "," + Number(value);
+      for (const auto& value : Values(scan->result->correction))
+        text.append(1, ',').append(Number(value));
+      for (const auto& value : Values(scan->result->u95)) text.append(1, ',').append(Number(value));
     } else {
       text.append(12, ',');
     }
@@ -75,15 +76,47 @@ Response File(std::string body, std::string type, const std::string& name) {
   return response;
 }
 
-void Add(Router& router, ScanService& service, const char* pattern,
-         Response (*make)(ScanService&, const Request&)) {
-  router.Add({"GET", pattern, Permission::kView, BodyKind::kNone,
-              [&service, name = std::string("GET ") + pattern, make](const Request& request,
-                                                                     const Respond& respond) {
-                RespondAside(
-                    service, name, [&service, make, request] { return make(service, request); },
-                    respond);
-              }});
+void AddReports(Router& router, BackgroundWork& background, ScanService& scans) {
+  AddAside(router, background, "/api/v1/scans/{id}/report.pdf", Permission::kView,
+           [&scans](const Request& request) {
+             const std::optional<Language> language = LanguageOf(request);
+             if (!language) return NoSuchLanguage();
+             auto pdf = scans.ScanReport(request.arguments[0], *language);
+             if (!pdf) return ErrorResponse(404, "there is no such scan");
+             return File(std::move(*pdf), "application/pdf",
+                         fmt::format("plumb_scan_{}.pdf", request.arguments[0]));
+           });
+  AddAside(router, background, "/api/v1/patients/{id}/report.pdf", Permission::kView,
+           [&scans](const Request& request) {
+             const std::optional<Language> language = LanguageOf(request);
+             if (!language) return NoSuchLanguage();
+             auto pdf = scans.CourseReport(request.arguments[0], *language);
+             if (!pdf) return ErrorResponse(404, "there is no such patient");
+             return File(std::move(*pdf), "application/pdf",
+                         fmt::format("plumb_course_{}.pdf", request.arguments[0]));
+           });
+}
+
+void AddNumbers(Router& router, BackgroundWork& background, PatientService& patients,
+                ScanService& scans) {
+  AddAside(router, background, "/api/v1/patients/{id}/numbers.csv", Permission::kView,
+           [&patients, &scans](const Request& request) {
+             const auto patient = patients.FindPatient(request.arguments[0]);
+             if (!patient) return ErrorResponse(404, "there is no such patient");
+             return File(Csv(*patient, scans.Scans(patient->id, kMaxScans)),
+                         "text/csv; charset=utf-8",
+                         fmt::format("plumb_numbers_{}.csv", patient->code));
+           });
+  AddAside(router, background, "/api/v1/patients/{id}/numbers.json", Permission::kView,
+           [&patients, &scans](const Request& request) {
+             const auto patient = patients.FindPatient(request.arguments[0]);
+             if (!patient) return ErrorResponse(404, "there is no such patient");
+             Json list = Json::array();
+             for (const Scan& scan : scans.Scans(patient->id, kMaxScans))
+               list.push_back(ToJson(scan, WallClock::now()));
+             return File(Dump({{"patient", ToJson(*patient)}, {"scans", list}}), "application/json",
+                         fmt::format("plumb_numbers_{}.json", patient->code));
+           });
 }
 
 Json ProfilesJson(const SensorProfiles& profiles) {
@@ -104,56 +137,28 @@ int VersionIn(const std::string& text) {
   return error == std::errc() && end == text.data() + text.size() ? version : 0;
 }
 
+void AddProfiles(Router& router, BackgroundWork& background, SensorProfileService& profiles) {
+  AddAside(router, background, "/api/v1/sensor-profile", Permission::kView,
+           [&profiles](const Request&) {
+             Response response;
+             response.body = Dump(ProfilesJson(profiles.GetSensorProfiles()));
+             return response;
+           });
+  AddAside(router, background, "/api/v1/sensor-profile/{version}/file", Permission::kView,
+           [&profiles](const Request& request) {
+             auto text = profiles.SensorProfileFile(VersionIn(request.arguments[0]));
+             if (!text) return ErrorResponse(404, "there is no such profile");
+             return File(std::move(*text), "application/json",
+                         fmt::format("plumb_sensor_profile_{}.json", request.arguments[0]));
+           });
+}
+
 }  // namespace
 
-void AddExportRoutes(Router& router, ScanService& service) {
-  Add(router, service, "/api/v1/scans/{id}/report.pdf",
-      [](ScanService& from, const Request& request) {
-        const std::optional<Language> language = LanguageOf(request);
-        if (!language) return NoSuchLanguage();
-        auto pdf = from.ScanReport(request.arguments[0], *language);
-        if (!pdf) return ErrorResponse(404, "there is no such scan");
-        return File(std::move(*pdf), "application/pdf",
-                    fmt::format("plumb_scan_{}.pdf", request.arguments[0]));
-      });
-  Add(router, service, "/api/v1/patients/{id}/report.pdf",
-      [](ScanService& from, const Request& request) {
-        const std::optional<Language> language = LanguageOf(request);
-        if (!language) return NoSuchLanguage();
-        auto pdf = from.CourseReport(request.arguments[0], *language);
-        if (!pdf) return ErrorResponse(404, "there is no such patient");
-        return File(std::move(*pdf), "application/pdf",
-                    fmt::format("plumb_course_{}.pdf", request.arguments[0]));
-      });
-  Add(router, service, "/api/v1/patients/{id}/numbers.csv",
-      [](ScanService& from, const Request& request) {
-        const auto patient = from.FindPatient(request.arguments[0]);
-        if (!patient) return ErrorResponse(404, "there is no such patient");
-        return File(Csv(*patient, from.Scans(patient->id, kMaxScans)), "text/csv; charset=utf-8",
-                    fmt::format("plumb_numbers_{}.csv", patient->code));
-      });
-  Add(router, service, "/api/v1/patients/{id}/numbers.json",
-      [](ScanService& from, const Request& request) {
-        const auto patient = from.FindPatient(request.arguments[0]);
-        if (!patient) return ErrorResponse(404, "there is no such patient");
-        Json list = Json::array();
-        for (const Scan& scan : from.Scans(patient->id, kMaxScans))
-          list.push_back(ToJson(scan, WallClock::now()));
-        return File(Dump({{"patient", ToJson(*patient)}, {"scans", list}}), "application/json",
-                    fmt::format("plumb_numbers_{}.json", patient->code));
-      });
-  Add(router, service, "/api/v1/sensor-profile", [](ScanService& from, const Request&) {
-    Response response;
-    response.body = Dump(ProfilesJson(from.GetSensorProfiles()));
-    return response;
-  });
-  Add(router, service, "/api/v1/sensor-profile/{version}/file",
-      [](ScanService& from, const Request& request) {
-        auto text = from.SensorProfileFile(VersionIn(request.arguments[0]));
-        if (!text) return ErrorResponse(404, "there is no such profile");
-        return File(std::move(*text), "application/json",
-                    fmt::format("plumb_sensor_profile_{}.json", request.arguments[0]));
-      });
+void AddExportRoutes(Router& router, const Services& services) {
+  AddReports(router, services.background, services.scans);
+  AddNumbers(router, services.background, services.patients, services.scans);
+  AddProfiles(router, services.background, services.profiles);
 }
 
 }  // namespace plumb::web

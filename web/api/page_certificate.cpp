@@ -73,8 +73,8 @@ void Accounts::ServeCertificate(const Actor& actor, const TlsIdentity& identity,
         ErrorResponse(500, fmt::format("the certificate was not replaced: {}", error.what())));
   }
   options_.certificate = identity;
-  service_.Log(actor, is_self_made ? "certificate.new" : "certificate.replace", "",
-               fmt::format("{} -> {}", before, identity.fingerprint));
+  audit_.Log(actor, is_self_made ? "certificate.new" : "certificate.replace", "",
+             fmt::format("{} -> {}", before, identity.fingerprint));
   Response response;
   response.body = Dump({{"fingerprint", identity.fingerprint}});
   respond(std::move(response));

@@ -156,13 +156,20 @@ std::string VerdictText(const std::string& verdict, bool review) {
   return "NO ANSWER";
 }
 
+/// What the page shows.
+struct Records {
+  PatientService& patients;
+  ReferenceService& references;
+  ScanService& scans;
+};
+
 /// @param newer  A later scan that gave no result; null: none.
 /// @param runs   A new scan runs or is computed.
 /// @param named  Asked for by its number, to be read or printed.
-std::string ResultBody(ScanService& service, const Scan& scan, const Scan* newer, bool runs,
+std::string ResultBody(const Records& records, const Scan& scan, const Scan* newer, bool runs,
                        bool named) {
-  const auto patient = service.FindPatient(scan.patient_id);
-  const auto reference = service.FindReference(scan.reference_id);
+  const auto patient = records.patients.FindPatient(scan.patient_id);
+  const auto reference = records.references.FindReference(scan.reference_id);
   const auto age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
   const bool is_known = age >= age.zero();  // else the clock has stepped
   const bool old = !is_known || age > kOldAfter || newer != nullptr || runs;
@@ -211,12 +218,12 @@ std::string ResultBody(ScanService& service, const Scan& scan, const Scan* newer
 }
 
 /// Of the newest scan that was done, where none is named; one after it that failed is told.
-Response ResultPage(ScanService& service, const std::optional<std::string>& wanted, bool runs) {
+Response ResultPage(const Records& records, const std::optional<std::string>& wanted, bool runs) {
   std::optional<Scan> scan, failed;
   if (wanted) {
-    scan = service.FindScan(*wanted);
+    scan = records.scans.FindScan(*wanted);
   } else {
-    for (Scan& candidate : service.Scans("", 20)) {
+    for (Scan& candidate : records.scans.Scans("", 20)) {
       if (candidate.outcome == ScanOutcome::kFailed && !failed) failed = candidate;
       if (candidate.outcome != ScanOutcome::kDone) continue;
       scan = std::move(candidate);
@@ -228,7 +235,7 @@ Response ResultPage(ScanService& service, const std::optional<std::string>& want
   response.type = "text/html; charset=utf-8";
   // What is asked for by name is read or printed: it does not load itself again.
   response.body = Document(
-      scan ? ResultBody(service, *scan, failed ? &*failed : nullptr, runs, wanted.has_value())
+      scan ? ResultBody(records, *scan, failed ? &*failed : nullptr, runs, wanted.has_value())
            : "<h1>No result yet</h1>",
       wanted ? "" : "/result?again");
   return response;
@@ -236,10 +243,12 @@ Response ResultPage(ScanService& service, const std::optional<std::string>& want
 
 }  // namespace
 
-void AddResultPage(Router& router, ScanService& service) {
+void AddResultPage(Router& router, const Services& services) {
+  const Records records{services.patients, services.references, services.scans};
   router.Add(
       {"GET", "/result", Permission::kNone, BodyKind::kNone,
-       [&service](const Request& request, const Respond& respond) {
+       [records, &appliance = services.appliance, &background = services.background](
+           const Request& request, const Respond& respond) {
          if (!request.session) {
            Response response;
            response.type = "text/html; charset=utf-8";
@@ -253,11 +262,11 @@ void AddResultPage(Router& router, ScanService& service) {
          const auto named = request.query.find("scan");
          const auto wanted =
              named == request.query.end() ? std::nullopt : std::optional(named->second);
-         const ApplianceState state = service.GetStatus().state;
+         const ApplianceState state = appliance.GetStatus().state;
          const bool runs = state == ApplianceState::kScanning || state == ApplianceState::kWorking;
          RespondAside(
-             service, "GET /result",
-             [&service, wanted, runs] { return ResultPage(service, wanted, runs); }, respond);
+             background, "GET /result",
+             [records, wanted, runs] { return ResultPage(records, wanted, runs); }, respond);
        }});
 }
 

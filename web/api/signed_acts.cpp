@@ -14,7 +14,7 @@ void Accounts::AcceptOutside(const Request& request, const Respond& respond) {
   fields.Finish();
   Signed(request, std::move(password), respond,
          [this, reason, scan = request.arguments.at(0)](const Actor& actor, Done done) {
-           service_.AcceptScan(actor, scan, reason, std::move(done));
+           scans_.AcceptScan(actor, scan, reason, std::move(done));
          });
 }
 
@@ -32,7 +32,17 @@ void Accounts::RestartSystem(const Request& request, const Respond& respond) {
   std::string password = fields.Text("password", 1, kMaxPassword);
   fields.Finish();
   Signed(request, std::move(password), respond,
-         [this](const Actor& actor, Done done) { service_.RestartSystem(actor, std::move(done)); });
+         [this](const Actor& actor, Done done) { updates_.RestartSystem(actor, std::move(done)); });
+}
+
+void Accounts::SignRoomCalibration(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  const std::string digest = fields.Text("digest", 64, 64);
+  std::string password = fields.Text("password", 1, kMaxPassword);
+  fields.Finish();
+  Signed(request, std::move(password), respond, [this, digest](const Actor& actor, Done done) {
+    room_.SignRoomCalibration(actor, digest, std::move(done));
+  });
 }
 
 void Accounts::ResetSensorProfile(const Request& request, const Respond& respond) {
@@ -41,7 +51,7 @@ void Accounts::ResetSensorProfile(const Request& request, const Respond& respond
   std::string password = fields.Text("password", 1, kMaxPassword);
   fields.Finish();
   Signed(request, std::move(password), respond, [this, serial](const Actor& actor, Done done) {
-    service_.ResetSensorProfile(actor, serial, std::move(done));
+    profiles_.ResetSensorProfile(actor, serial, std::move(done));
   });
 }
 
@@ -53,7 +63,7 @@ void Accounts::RollBackSensorProfile(const Request& request, const Respond& resp
   fields.Finish();
   Signed(request, std::move(password), respond,
          [this, serial, version](const Actor& actor, Done done) {
-           service_.RollBackSensorProfile(actor, serial, version, std::move(done));
+           profiles_.RollBackSensorProfile(actor, serial, version, std::move(done));
          });
 }
 

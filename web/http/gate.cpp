@@ -110,8 +110,8 @@ void Gate::Handle(const Route& route, const Request& request, const Respond& res
   }
 }
 
-void RespondAside(ScanService& service, const std::string& name, std::function<Response()> make,
-                  const Respond& respond) {
+void RespondAside(BackgroundWork& background, const std::string& name,
+                  std::function<Response()> make, const Respond& respond) {
   auto made = std::make_shared<Response>();
   const auto work = [made, name, make = std::move(make)] {
     try {
@@ -122,10 +122,20 @@ void RespondAside(ScanService& service, const std::string& name, std::function<R
       *made = InternalError(name, error);
     }
   };
-  if (service.Later(Aside::kReads, work, [made, respond] { respond(std::move(*made)); })) return;
+  if (background.Later(Aside::kReads, work, [made, respond] { respond(std::move(*made)); })) return;
   Response busy = ErrorResponse(503, "too much is asked at once; try again in a few seconds");
   busy.headers.emplace_back("Retry-After", "2");
   respond(std::move(busy));
+}
+
+void AddAside(Router& router, BackgroundWork& background, const char* pattern,
+              Permission permission, std::function<Response(const Request&)> make) {
+  router.Add({"GET", pattern, permission, BodyKind::kNone,
+              [&background, name = std::string("GET ") + pattern, make = std::move(make)](
+                  const Request& request, const Respond& respond) {
+                RespondAside(
+                    background, name, [make, request] { return make(request); }, respond);
+              }});
 }
 
 void AddSecurityHeaders(Response& response, bool tls) {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "web/http/router.hpp"
-#include "web/service/scan_service.hpp"
+#include "web/service/background_work.hpp"
 
 namespace plumb::web {
 
@@ -45,11 +45,16 @@ class Gate {
   bool tls_;
 };
 
-/// An answer that takes its time: made by `make` on the service's thread for reads; what it throws
+/// An answer that takes its time: made by `make` on the background thread for reads; what it throws
 /// becomes an answer as in Gate::Handle().
 /// @param name  Of the route.
-void RespondAside(ScanService& service, const std::string& name, std::function<Response()> make,
-                  const Respond& respond);
+void RespondAside(BackgroundWork& background, const std::string& name,
+                  std::function<Response()> make, const Respond& respond);
+
+/// Adds a GET route of lists or files, which are not read on the loop. `background` must outlive
+/// the router.
+void AddAside(Router& router, BackgroundWork& background, const char* pattern,
+              Permission permission, std::function<Response(const Request&)> make);
 
 /// The headers of every answer, from one place. @param tls  The answer goes over TLS: the browser
 /// is to come back by TLS only.

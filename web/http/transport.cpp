@@ -15,6 +15,7 @@
 
 #include "algo/base/errors.hpp"
 #include "web/http/checks.hpp"
+#include "web/http/exchange.hpp"
 #include "web/http/listen_socket.hpp"
 #include "web/http/served_certificate.hpp"
 
@@ -25,8 +26,6 @@ constexpr std::size_t kMaxPath = 256;
 constexpr std::size_t kMaxQueryFields = 8;
 constexpr std::size_t kMaxHeaders = 64;
 constexpr std::size_t kStreamBlock = 4096;
-constexpr std::size_t kUploadBlock =
-    1 << 20;  // a file that is sent is written in such pieces; one is written while the next comes
 
 std::string AddressOf(MHD_Connection* connection) {
   const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
@@ -56,40 +55,6 @@ void CutSocket(MHD_Connection* connection) {
 thread_local Transport* serving = nullptr;
 
 }  // namespace
-
-/// One request and its answer.
-struct Transport::Exchange : std::enable_shared_from_this<Transport::Exchange> {
-  Transport* owner = nullptr;
-  MHD_Connection* connection = nullptr;
-  Request request;
-  const Route* route = nullptr;
-  bool head_only = false;
-  bool malformed = false;
-  int num_hosts = 0;
-  bool started = false;
-  bool suspended = false;
-  std::optional<Response> response;
-  std::shared_ptr<EventStream> stream;
-  std::uint64_t uploaded = 0;  ///< Bytes of a file that came.
-  std::string unwritten;       ///< Of them, what is still to be given to the disk.
-  bool writing = false;        ///< A piece is on its way there.
-
-  void Suspend() {
-    suspended = true;
-    MHD_suspend_connection(connection);
-  }
-  void Resume() {
-    if (!suspended) return;
-    suspended = false;
-    MHD_resume_connection(connection);
-    owner->Wake();
-  }
-  void Answer(Response given) {
-    if (response) return;
-    response = std::move(given);
-    Resume();
-  }
-};
 
 struct Transport::Callbacks {
   static int OnHandshake(gnutls_session_t, const gnutls_datum_t*, int, const gnutls_pk_algorithm_t*,
@@ -211,12 +176,13 @@ struct Transport::Callbacks {
     constexpr std::uintmax_t kSpare = 64U << 20;
     try {
       // Its removal takes as long as it is large.
-      exchange.request.upload = std::shared_ptr<UploadFile>(
-          new UploadFile(options.upload_folder), [&service = transport.service_](UploadFile* file) {
-            if (!service.Later(
-                    Aside::kFiles, [file] { delete file; }, [] {}))
-              delete file;
-          });
+      exchange.request.upload =
+          std::shared_ptr<UploadFile>(new UploadFile(options.upload_folder),
+                                      [&background = transport.background_](UploadFile* file) {
+                                        if (!background.Later(
+                                                Aside::kFiles, [file] { delete file; }, [] {}))
+                                          delete file;
+                                      });
     } catch (const IoError& error) {
       return ErrorResponse(507, error.what());
     }
@@ -230,63 +196,6 @@ struct Transport::Callbacks {
     transport.upload_ = exchange.request.upload;
     if (Connection* known = ConnectionOf(exchange.connection)) known->uploading = true;
     return std::nullopt;
-  }
-
-  /// A part of a body. @return  False: too long, the connection ends.
-  static bool TakeBody(Exchange& exchange, std::string_view bytes) {
-    const HttpServerOptions& options = exchange.owner->options_;
-    if (exchange.response)
-      return true;  // refused in the middle of a file: the rest is read, and dropped
-    if (!exchange.request.upload) {
-      if (exchange.request.body.size() + bytes.size() > options.max_body_bytes) return false;
-      exchange.request.body.append(bytes);
-      return true;
-    }
-    exchange.uploaded += bytes.size();
-    if (exchange.uploaded > options.max_upload_bytes) return false;
-    exchange.unwritten.append(bytes);
-    if (exchange.unwritten.size() >= kUploadBlock) WriteUpload(exchange);
-    return true;
-  }
-
-  /// Gives what is unwritten to the disk, or makes the connection wait for the piece before.
-  static void WriteUpload(Exchange& exchange) {
-    if (exchange.writing) return exchange.Suspend();
-    const auto failure = std::make_shared<std::string>();
-    const auto work = [file = exchange.request.upload,
-                       bytes = std::exchange(exchange.unwritten, {}), failure] {
-      try {
-        file->Append(bytes);
-      } catch (const IoError& error) {
-        *failure = error.what();
-      }
-    };
-    exchange.writing = true;
-    const bool accepted = exchange.owner->service_.Later(
-        Aside::kFiles, work, [weak = exchange.weak_from_this(), failure] {
-          if (const auto alive = weak.lock()) HaveWritten(*alive, *failure);
-        });
-    if (!accepted) HaveWritten(exchange, "the disk is too busy; send the file again later");
-  }
-
-  static void HaveWritten(Exchange& exchange, const std::string& failure) {
-    exchange.writing = false;
-    if (!failure.empty() && !exchange.response) {
-      exchange.request.upload.reset();
-      exchange.unwritten = {};
-      exchange.started = true;
-      exchange.response = ErrorResponse(507, failure);
-    }
-    exchange.Resume();
-  }
-
-  /// True once the whole file is with the disk; else the connection waits for that.
-  static bool HasWholeUpload(Exchange& exchange) {
-    if (!exchange.request.upload) return true;
-    if (!exchange.writing && !exchange.unwritten.empty()) WriteUpload(exchange);
-    if (!exchange.writing) return true;
-    exchange.Suspend();
-    return false;
   }
 
   static MHD_Result Begin(Transport& transport, MHD_Connection* connection, const char* url,
@@ -329,12 +238,12 @@ struct Transport::Callbacks {
       const std::shared_ptr<Exchange> exchange = *static_cast<std::shared_ptr<Exchange>*>(*context);
       if (*upload_size > 0) {
         // Too long without having said so: there is no way to answer in the middle of an upload.
-        if (!TakeBody(*exchange, {upload, *upload_size})) return MHD_NO;
+        if (!exchange->TakeBody({upload, *upload_size})) return MHD_NO;
         *upload_size = 0;
         return MHD_YES;
       }
       if (Connection* known = ConnectionOf(connection)) known->receiving = false;
-      if (!exchange->started && !HasWholeUpload(*exchange)) return MHD_YES;
+      if (!exchange->started && !exchange->HasWholeUpload()) return MHD_YES;
       if (!exchange->started) {
         exchange->started = true;
         const Doing doing(transport.options_,
@@ -419,11 +328,11 @@ struct Transport::Callbacks {
   }
 };
 
-Transport::Transport(const HttpServerOptions& options, ScanService& service, const Router& router,
-                     SessionLookup& sessions, EventHub& hub,
+Transport::Transport(const HttpServerOptions& options, BackgroundWork& background,
+                     const Router& router, SessionLookup& sessions, EventHub& hub,
                      std::function<void(EventStream&)> greet)
     : options_(options),
-      service_(service),
+      background_(background),
       gate_(router, sessions, options.host_names, options.tls.has_value()),
       hub_(hub),
       greet_(std::move(greet)),

@@ -13,7 +13,7 @@
 #include "web/http/event_hub.hpp"
 #include "web/http/gate.hpp"
 #include "web/http/server_options.hpp"
-#include "web/service/scan_service.hpp"
+#include "web/service/background_work.hpp"
 
 struct MHD_Daemon;
 
@@ -40,9 +40,9 @@ class Doing {
 /// Carries requests to the gate and answers back. Belongs to the loop thread.
 class Transport {
  public:
-  /// @param service  Writes files on its background thread.
+  /// @param background  Writes files.
   /// @param greet  Writes the first events into a new stream.
-  Transport(const HttpServerOptions& options, ScanService& service, const Router& router,
+  Transport(const HttpServerOptions& options, BackgroundWork& background, const Router& router,
             SessionLookup& sessions, EventHub& hub, std::function<void(EventStream&)> greet);
   ~Transport();
   Transport(const Transport&) = delete;
@@ -71,7 +71,7 @@ class Transport {
   void RunLibrary();
 
   HttpServerOptions options_;
-  ScanService& service_;
+  BackgroundWork& background_;
   Gate gate_;
   EventHub& hub_;
   std::function<void(EventStream&)> greet_;

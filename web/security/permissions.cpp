@@ -2,6 +2,8 @@
 
 #include <array>
 
+#include "web/service/names.hpp"
+
 namespace plumb::web {
 namespace {
 
@@ -20,6 +22,7 @@ constexpr std::array kTable = {
     Row{Permission::kPatients, "patients", true, true, false, false},
     Row{Permission::kPlan, "plan", false, true, false, false},
     Row{Permission::kApprove, "approve", false, true, false, false},
+    Row{Permission::kCalibrate, "calibrate", false, true, true, false},
     Row{Permission::kAccept, "accept", true, true, false, false},
     Row{Permission::kWipe, "wipe", false, true, false, false},
     Row{Permission::kUsers, "users", false, false, true, false},
@@ -28,9 +31,6 @@ constexpr std::array kTable = {
     Row{Permission::kUpdate, "update", false, false, true, false},
     Row{Permission::kDiagnostics, "diagnostics", false, false, true, false},
 };
-
-constexpr std::array<std::string_view, 4> kRoles = {"technician", "physicist", "engineer",
-                                                    "display"};
 
 }  // namespace
 
@@ -66,12 +66,12 @@ std::string_view Name(Permission permission) {
   return {};
 }
 
-std::string_view Name(Role role) { return kRoles[static_cast<std::size_t>(role)]; }
+std::string_view Name(Role role) { return kRoleNames[static_cast<std::size_t>(role)]; }
 
 std::optional<Role> ParseRole(std::string_view name) {
   // A display is paired, not an account.
   for (std::size_t i = 0; i < static_cast<std::size_t>(Role::kDisplay); ++i) {
-    if (kRoles[i] == name) return static_cast<Role>(i);
+    if (kRoleNames[i] == name) return static_cast<Role>(i);
   }
   return std::nullopt;
 }

@@ -18,6 +18,7 @@ enum class Permission {
   kPatients,
   kPlan,
   kApprove,
+  kCalibrate,  ///< The room.
   kAccept,
   kWipe,
   kUsers,

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "web/service/scan_service.hpp"
+#include "web/service/service_types.hpp"
 
 namespace plumb::web {
 

@@ -332,7 +332,7 @@ struct UpdateStatus {
   std::vector<std::string> bundles;  ///< Names of bundles on attached media.
   bool restart_needed = false;       ///< One is installed and starts at the next restart.
   std::string failure;      ///< Why the last attempt was refused or failed; empty: it was not.
-  std::string rolled_back;  ///< A sentence, where the machine has gone back to the system before.
+  std::string rolled_back;  ///< A sentence, where the machine has gone back to the previous system.
 };
 
 struct Health {

@@ -6,12 +6,14 @@
 #include <thread>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "daemon/appliance/unit_profile.hpp"
-#include "daemon/appliance/web_service.hpp"
+#include "daemon/appliance/web_services.hpp"
 #include "daemon/records/profile_shelf.hpp"
+#include "tests/support/board_checks.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -68,14 +70,15 @@ class ApplianceTest : public ::testing::Test {
     appliance_ = std::make_unique<Appliance>(loop_, parts_);
     auto restart = std::make_unique<FakeRestart>();
     restart_ = restart.get();
-    service_ = std::make_unique<WebService>(*appliance_, parts_.config.update, std::move(restart));
+    services_ =
+        std::make_unique<WebServices>(*appliance_, parts_.config.update, std::move(restart));
     std::jthread player([&] {
       test();
       if (!opens_) LetOpen();
       loop_.Quit(0);
     });
     loop_.Run();
-    service_.reset();
+    services_.reset();
     appliance_.reset();
   }
 
@@ -120,7 +123,7 @@ class ApplianceTest : public ::testing::Test {
   FakeBus bus_;
   ApplianceParts parts_;
   std::unique_ptr<Appliance> appliance_;
-  std::unique_ptr<WebService> service_;
+  std::unique_ptr<WebServices> services_;
   FakeRestart* restart_ = nullptr;
   std::promise<void> opener_;
   std::shared_future<void> may_open_ = opener_.get_future().share();
@@ -165,8 +168,8 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
     MakeReady();
     std::promise<web::Change> added, wiped;
     On([&] {
-      service_->AddPatient(actor, "P1", "",
-                           [&](const web::Change& change) { added.set_value(change); });
+      services_->services().patients.AddPatient(
+          actor, "P1", "", [&](const web::Change& change) { added.set_value(change); });
     });
     const std::string id = added.get_future().get().id;
     std::promise<web::Change> opened;
@@ -174,14 +177,16 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
       (void)appliance_->store()->AddCheck(
           actor, appliance_->WebStatus().sensor.serial,
           CheckJson({.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}, {}));
-      service_->OpenPatient(actor, id, web::ScanPurpose::kReference, "", "",
-                            [&](const web::Change& change) { opened.set_value(change); });
+      services_->services().patients.OpenPatient(
+          actor, id, web::ScanPurpose::kReference, "", "",
+          [&](const web::Change& change) { opened.set_value(change); });
     });
     EXPECT_EQ(opened.get_future().get().result, web::ChangeResult::kDone);
     On([&] {
       EXPECT_EQ(appliance_->WebStatus().patient_id, id);
       EXPECT_EQ(appliance_->OpenCheck(actor), "");
-      service_->WipePatient(actor, id, [&](const web::Change& change) { wiped.set_value(change); });
+      services_->services().patients.WipePatient(
+          actor, id, [&](const web::Change& change) { wiped.set_value(change); });
       EXPECT_EQ(appliance_->WebStatus().next_purpose, web::ScanPurpose::kDailyCheck)
           << "the check stays open";
     });
@@ -198,10 +203,10 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
 }
 
 /// What RestartSystem() answers, on the loop.
-web::Change Restarted(WebService& service) {
+web::Change Restarted(WebServices& services) {
   web::Change answer{.result = web::ChangeResult::kFailed, .message = "none", .id = {}, .file = {}};
-  service.RestartSystem({.user = "erik", .address = {}},
-                        [&](const web::Change& change) { answer = change; });
+  services.updates().RestartSystem({.user = "erik", .address = {}},
+                                   [&](const web::Change& change) { answer = change; });
   return answer;
 }
 
@@ -211,20 +216,20 @@ TEST_F(ApplianceTest, TheMachineIsNotRestartedUnderAScan) {
     On([&] {
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
       ASSERT_EQ(appliance_->state().phase, ScanPhase::kScanning);
-      EXPECT_EQ(Restarted(*service_).result, web::ChangeResult::kConflict);
+      EXPECT_EQ(Restarted(*services_).result, web::ChangeResult::kConflict);
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
       ASSERT_EQ(appliance_->state().phase, ScanPhase::kWorking);
-      const web::Change answer = Restarted(*service_);
+      const web::Change answer = Restarted(*services_);
       EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
       EXPECT_THAT(answer.message, ::testing::HasSubstr("wait for its result"));
       EXPECT_EQ(restart_->num_asked, 0);
     });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     On([&] {
-      EXPECT_EQ(Restarted(*service_).result, web::ChangeResult::kDone);
+      EXPECT_EQ(Restarted(*services_).result, web::ChangeResult::kDone);
       EXPECT_EQ(restart_->num_asked, 1);
       EXPECT_THAT(appliance_->Press(ButtonPress::kShort), ::testing::HasSubstr("being restarted"));
-      EXPECT_THAT(Restarted(*service_).message, ::testing::HasSubstr("being restarted"));
+      EXPECT_THAT(Restarted(*services_).message, ::testing::HasSubstr("being restarted"));
       EXPECT_EQ(restart_->num_asked, 1);
     });
   });
@@ -237,17 +242,17 @@ TEST_F(ApplianceTest, TheMachineIsNotRestartedInASessionAndAFailedRestartLeavesI
     On([&] {
       appliance_->OpenSession("1", "p", web::ScanPurpose::kReference, "",
                               {.user = "tess", .address = {}});
-      const web::Change answer = Restarted(*service_);
+      const web::Change answer = Restarted(*services_);
       EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
       EXPECT_THAT(answer.message, ::testing::HasSubstr("session of a patient is open"));
       EXPECT_EQ(restart_->num_asked, 0);
       EXPECT_EQ(appliance_->CloseSession({.user = "tess", .address = {}}), "");
       restart_->failure = "the machine cannot be restarted from here: no";
-      const web::Change failed = Restarted(*service_);
+      const web::Change failed = Restarted(*services_);
       EXPECT_EQ(failed.result, web::ChangeResult::kFailed);
       EXPECT_EQ(failed.message, restart_->failure);
       restart_->failure.clear();
-      EXPECT_EQ(Restarted(*service_).result, web::ChangeResult::kDone) << "asked again";
+      EXPECT_EQ(Restarted(*services_).result, web::ChangeResult::kDone) << "asked again";
       EXPECT_EQ(restart_->num_asked, 2);
     });
   });
@@ -264,12 +269,13 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
     On([&] {
       patient = appliance_->store()->AddPatient(tess, "P-1", "");
       EXPECT_THAT(appliance_->WebStatus().reference_block, ::testing::HasSubstr("daily check"));
-      service_->OpenPatient(tess, patient, web::ScanPurpose::kReference, "", "", keep);
+      services_->services().patients.OpenPatient(tess, patient, web::ScanPurpose::kReference, "",
+                                                 "", keep);
       EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
       EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
-      service_->ApproveReference(tess, "1", 1, "", keep);
+      services_->services().references.ApproveReference(tess, "1", 1, "", keep);
       EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
-      service_->AddReference(tess, "1", "", keep);
+      services_->services().references.AddReference(tess, "1", "", keep);
       EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
       // A session that was open since yesterday.
       appliance_->OpenSession("1", patient, web::ScanPurpose::kReference, "", tess);
@@ -290,7 +296,8 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
           << "of a scan from before the check";
       (void)appliance_->CloseSession(tess);
       (void)appliance_->Press(ButtonPress::kShort);  // acknowledges the fault
-      service_->OpenPatient(tess, patient, web::ScanPurpose::kReference, "", "", keep);
+      services_->services().patients.OpenPatient(tess, patient, web::ScanPurpose::kReference, "",
+                                                 "", keep);
     });
     EXPECT_TRUE(Becomes([&] { return appliance_->WebStatus().session.has_value(); }));
   });
@@ -337,11 +344,14 @@ class ApplianceProfileTest : public ApplianceTest {
     return answer->get_future().get();
   }
   web::Change Reset(const std::string& serial) {
-    return Asked([&](web::Done done) { service_->ResetSensorProfile(erik_, serial, done); });
+    return Asked([&](web::Done done) {
+      services_->services().profiles.ResetSensorProfile(erik_, serial, done);
+    });
   }
   web::Change RollBack(int version) {
-    return Asked(
-        [&](web::Done done) { service_->RollBackSensorProfile(erik_, "A", version, done); });
+    return Asked([&](web::Done done) {
+      services_->services().profiles.RollBackSensorProfile(erik_, "A", version, done);
+    });
   }
   /// The profile that a scan of now begins from: read as each scan reads it, from the same shelf.
   [[nodiscard]] std::string NextScanBeginsFrom() const {
@@ -360,10 +370,10 @@ TEST_F(ApplianceProfileTest, WhatThePageAsksIsWhatTheNextScanBeginsFrom) {
   ProfileShelf shelf(folder_ / "state" / "sensor-profiles");
   for (known.num_sweeps = 4; known.num_sweeps <= 5; ++known.num_sweeps) (void)shelf.Add("A", known);
   Play([&] {
-    EXPECT_EQ(service_->GetSensorProfiles().why_none, "no sensor is attached");
+    EXPECT_EQ(services_->services().profiles.GetSensorProfiles().why_none, "no sensor is attached");
     EXPECT_EQ(Reset("A").result, web::ChangeResult::kConflict);
     MakeReady();
-    const web::SensorProfiles shown = service_->GetSensorProfiles();
+    const web::SensorProfiles shown = services_->services().profiles.GetSensorProfiles();
     EXPECT_EQ(shown.serial, "A");
     EXPECT_EQ(shown.why_none, "");
     ASSERT_EQ(shown.versions.size(), 2U);
@@ -379,8 +389,9 @@ TEST_F(ApplianceProfileTest, WhatThePageAsksIsWhatTheNextScanBeginsFrom) {
     EXPECT_EQ(NextScanBeginsFrom(), "none");
     EXPECT_EQ(RollBack(1).result, web::ChangeResult::kDone);
     EXPECT_EQ(NextScanBeginsFrom(), "A version 4, 4 sweeps");
-    EXPECT_FALSE(service_->SensorProfileFile(3)) << "the reset";
-    EXPECT_THAT(service_->SensorProfileFile(4).value_or(""), ::testing::HasSubstr("calibration"));
+    EXPECT_FALSE(services_->services().profiles.SensorProfileFile(3)) << "the reset";
+    EXPECT_THAT(services_->services().profiles.SensorProfileFile(4).value_or(""),
+                ::testing::HasSubstr("calibration"));
   });
 }
 
@@ -391,11 +402,11 @@ TEST_F(ApplianceProfileTest, NothingChangesUnderAScan) {
     const web::Change answer = Reset("A");
     EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
     EXPECT_THAT(answer.message, ::testing::HasSubstr("wait for its result"));
-    EXPECT_TRUE(service_->GetSensorProfiles().versions.empty());
+    EXPECT_TRUE(services_->services().profiles.GetSensorProfiles().versions.empty());
     On([&] { EXPECT_EQ(appliance_->Cancel(), ""); });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     EXPECT_EQ(Reset("A").result, web::ChangeResult::kDone);
-    EXPECT_EQ(service_->GetSensorProfiles().versions.size(), 1U);
+    EXPECT_EQ(services_->services().profiles.GetSensorProfiles().versions.size(), 1U);
   });
 }
 
@@ -403,8 +414,82 @@ TEST_F(ApplianceProfileTest, SwitchedOffItSaysSo) {
   parts_.config.appliance.sensor_profiles = false;
   Play([&] {
     MakeReady();
-    EXPECT_THAT(service_->GetSensorProfiles().why_none, ::testing::HasSubstr("switched off"));
+    EXPECT_THAT(services_->services().profiles.GetSensorProfiles().why_none,
+                ::testing::HasSubstr("switched off"));
     EXPECT_EQ(Reset("A").result, web::ChangeResult::kConflict);
+  });
+}
+
+class ApplianceRoomTest : public ApplianceProfileTest {
+ protected:
+  void ScanBoard() {
+    On([&] { (void)appliance_->store()->AddCheck(erik_, "A", testing::CheckOver()); });
+  }
+  web::ChangeResult Sign() {
+    const std::string digest = services_->services().room.GetRoomCalibration().digest;
+    return Asked([&](web::Done done) {
+             services_->services().room.SignRoomCalibration(erik_, digest, done);
+           })
+        .result;
+  }
+  /// Where the gantry is on a map, as the page is told; nothing: nobody knows.
+  std::optional<Eigen::Vector2d> Gantry() {
+    std::optional<Eigen::Vector2d> gantry;
+    On([&] {
+      const web::Status status = appliance_->WebStatus();
+      if (status.is_room_known) gantry = Eigen::Vector2d(status.gantry_xy.data());
+      warnings_ = fmt::format("{}", fmt::join(status.warnings, "; "));
+    });
+    return gantry;
+  }
+  std::string warnings_;
+};
+
+TEST_F(ApplianceRoomTest, ASignedCalibrationHoldsInPlaceOfTheConfigurationUntilAMarkerMoves) {
+  const Eigen::Vector2d configured(0, 1);
+  const Eigen::Vector2d calibrated =
+      testing::SceneFromRoom().inverse().linear().block<1, 2>(1, 0).transpose();
+  parts_.config.compare.T_iec_reference = Pose::Identity();
+  Play([&] {
+    MakeReady();
+    EXPECT_EQ(Gantry(), configured);
+    EXPECT_TRUE(services_->services().room.GetRoomCalibration().is_configured);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NE(Sign(), web::ChangeResult::kDone) << i << " scans";
+      ScanBoard();
+    }
+    EXPECT_EQ(Gantry(), configured) << "not signed yet";
+    EXPECT_EQ(Sign(), web::ChangeResult::kDone);
+    ASSERT_TRUE(Gantry());
+    EXPECT_LT((*Gantry() - calibrated).norm(), 1e-6);
+    EXPECT_THAT(warnings_,
+                ::testing::HasSubstr("T_iec_reference of the configuration is not used"));
+
+    MarkerMap moved = testing::MarkersOfRoom();
+    for (Eigen::Vector3d& corner : moved.at(4).corners) corner.x() += 0.008;
+    On([&] {
+      (void)appliance_->store()->AddCheck(erik_, "A", testing::CheckOver(0, 0, moved));
+      appliance_->LookAtRoom();
+    });
+    EXPECT_FALSE(Gantry()) << "neither the calibration nor the configuration";
+    EXPECT_THAT(warnings_, ::testing::HasSubstr("marker 4 moved 8 mm"));
+    EXPECT_THAT(services_->services().room.GetRoomCalibration().due,
+                ::testing::HasSubstr("marker 4"));
+    for (int i = 0; i < 3; ++i) ScanBoard();
+    EXPECT_EQ(Sign(), web::ChangeResult::kDone);
+    EXPECT_TRUE(Gantry());
+    EXPECT_EQ(services_->services().room.GetRoomCalibration().versions.front().version, 2);
+  });
+}
+
+TEST_F(ApplianceRoomTest, WithoutAnyNobodyKnowsTheRoom) {
+  Play([&] {
+    MakeReady();
+    EXPECT_FALSE(Gantry());
+    EXPECT_EQ(warnings_, "");
+    std::string why_not;
+    EXPECT_EQ(services_->services().room.RoomBoardPdf(why_not).value_or("").substr(0, 5), "%PDF-")
+        << why_not;
   });
 }
 

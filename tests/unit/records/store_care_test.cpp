@@ -227,6 +227,48 @@ TEST_F(StoreCareTest, StoredSettingsThatCannotBeReadAreAnErrorAndOlderOnesAreNot
   EXPECT_EQ(store_->GetSettings().retention_days, 7);
 }
 
+TEST_F(StoreCareTest, AStoredResultThatCannotBeReadIsAnErrorAndMissingNumbersAreNoZeros) {
+  const std::string angles = R"("pitch_deg":1,"roll_deg":2,"yaw_deg":3)";
+  const auto with = [](const std::string& correction) {
+    return R"({"verdict":"move","correction":)" + correction + "}";
+  };
+  const web::ResultSummary couch = SummaryOf(with("{\"vertical_mm\":null," + angles + "}"));
+  EXPECT_EQ(couch.correction->vertical_mm, std::nullopt) << "markers on the couch show no shift";
+  EXPECT_EQ(couch.correction->yaw_deg, 3.0);
+  EXPECT_FALSE(couch.u95);
+  EXPECT_EQ(SummaryOf(R"({"verdict":"no_answer","correction":null})").verdict, "no_answer");
+  for (const std::string& bad :
+       {std::string(), std::string("[]"), std::string("{}"), std::string(R"({"verdict":1})"),
+        std::string(R"({"verdict":"fine"})"), std::string(R"({"verdict":"move","reasons":"one"})"),
+        with("7"), with("{}"), with(R"({"pitch_deg":1,"roll_deg":2})"),
+        with(R"({"pitch_deg":1,"roll_deg":2,"yaw_deg":null})"),
+        with("{\"lateral_mm\":\"4\"," + angles + "}"),
+        with("{" + angles + R"(,"uncertainty":{"vertical_mm":1}})"),
+        with("{" + angles + R"(,"uncertainty":[]})")}) {
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)SummaryOf(bad); }), HasSubstr("stored result"))
+        << bad;
+  }
+}
+
+TEST_F(StoreCareTest, AStoredNameThatIsNoneOfOursIsAnErrorAndAnAccountOfSuchARoleIsClosed) {
+  store_->AddUser(kAnna, {.name = "erik",
+                          .role = web::Role::kEngineer,
+                          .password_hash = "x",
+                          .disabled = false,
+                          .created_at = {}});
+  const std::string scan = StoreScan(*store_, patient_);
+  EXPECT_FALSE(store_->FindUser("erik")->disabled);
+  const auto change = [&](const std::string& column, const std::string& row) {
+    Execute("PRAGMA ignore_check_constraints = ON; UPDATE " + column + " = 'other' WHERE " + row);
+  };
+  change("users SET role", "name = 'erik'");
+  change("scans SET purpose", "id = " + std::to_string(std::stoi(scan)));
+  EXPECT_TRUE(store_->FindUser("erik")->disabled);
+  ASSERT_EQ(store_->Users().size(), 1U) << "an appliance without accounts offers to make one";
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)store_->FindScan(scan); }),
+              HasSubstr("purpose 'other'"));
+}
+
 TEST_F(StoreCareTest, APlanThatCannotBeReadHidesNoOtherOfThePatient) {
   const std::string first = store_->AddReference(kAnna, StoreScan(*store_, patient_), "", {});
   const std::string second = store_->AddReference(kAnna, StoreScan(*store_, patient_), "", {});

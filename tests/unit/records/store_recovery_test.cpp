@@ -310,8 +310,9 @@ TEST_F(StoreRecoveryTest, AStoreOfVersion4KeepsScansThatItHadGivenUp) {
   {
     Database direct(state() / "plumb.db", Database::Access::kReadWrite);
     direct.Execute(
-        "ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients DROP COLUMN archived; DROP "
-        "TABLE templates; DROP TABLE scan_files; DROP TABLE removed_scans; ALTER TABLE scans DROP "
+        "DROP TABLE room_calibrations; ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients "
+        "DROP COLUMN archived; DROP TABLE templates; DROP TABLE scan_files; DROP TABLE "
+        "removed_scans; ALTER TABLE scans DROP "
         "COLUMN "
         "unavailable; ALTER TABLE scans DROP COLUMN checked_at; ALTER TABLE audit DROP COLUMN "
         "chain; UPDATE scans SET has_folder = 0, failure = 'its files are gone' WHERE id = 2; "

@@ -26,7 +26,8 @@ const web::Actor kAnna{.user = "anna", .address = "::1"};
 const web::Actor kBert{.user = "bert", .address = "::1"};
 const char* const kResult =
     R"({"verdict":"move","reasons":["vertical is off"],"correction":{"vertical_mm":6.5,"longitudinal_mm":null,)"
-    R"("lateral_mm":-1,"pitch_deg":0.5,"roll_deg":0,"yaw_deg":2,"uncertainty":{"vertical_mm":1.2}}})";
+    R"("lateral_mm":-1,"pitch_deg":0.5,"roll_deg":0,"yaw_deg":2,)"
+    R"("uncertainty":{"vertical_mm":1.2,"pitch_deg":0.2,"roll_deg":0.3,"yaw_deg":0.1}}})";
 
 class StoreTest : public ::testing::Test {
  protected:
@@ -652,7 +653,8 @@ TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
   {
     Database direct(database(), Database::Access::kReadWrite);
     direct.Execute(
-        "DROP TABLE check_baselines; DROP TABLE checks; ALTER TABLE refs DROP COLUMN revision; "
+        "DROP TABLE room_calibrations; DROP TABLE check_baselines; DROP TABLE checks; ALTER TABLE "
+        "refs DROP COLUMN revision; "
         "DROP INDEX scans_of_session; ALTER TABLE scans DROP COLUMN session_id; ALTER TABLE scans "
         "DROP COLUMN accepted_reason; ALTER TABLE scans DROP COLUMN sensor_on_s; ALTER TABLE scans "
         "DROP COLUMN check_overdue; ALTER TABLE scans DROP COLUMN unavailable; ALTER TABLE scans "
@@ -709,9 +711,8 @@ TEST_F(StoreTest, PatientsOfTheSchemaBeforeArchivesKeepWhatTheyHad) {
   {
     Database direct(database(), Database::Access::kReadWrite);
     direct.Execute(
-        "ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients DROP COLUMN archived; DROP "
-        "TABLE templates; PRAGMA "
-        "user_version = 5");
+        "DROP TABLE room_calibrations; ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients "
+        "DROP COLUMN archived; DROP TABLE templates; PRAGMA user_version = 5");
   }
   const auto store = Open();
   ASSERT_THAT(store->Patients(), SizeIs(1));

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "daemon/update/bundle_check.hpp"
 #include "daemon/update/updater.hpp"
 #include "tests/support/temp_folder.hpp"
 

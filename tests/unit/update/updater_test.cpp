@@ -1,5 +1,6 @@
 // Updates through a RAUC of our own making on a bus of our own.
 #include "daemon/update/updater.hpp"
+#include "daemon/update/bundle_check.hpp"
 
 #include <systemd/sd-bus.h>
 #include <unistd.h>

@@ -130,6 +130,46 @@ TEST_F(LockoutTest, TheMachineIsRestartedForAnEngineerWithThePassword) {
   EXPECT_EQ(service_.num_restarts, 1);
 }
 
+TEST_F(LockoutTest, TheRoomsCalibrationIsSignedByAPhysicistOrAnEngineerWithThePassword) {
+  service_.is_board_there = true;
+  service_.status.sensor.present = true;
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
+  const auto room = [&] { return technician.Get("/api/v1/room-calibration").json(); };
+  const auto sign = [&](HttpClient& client, const std::string& digest, const char* password) {
+    return client
+        .Post("/api/v1/room-calibration/sign", {{"digest", digest}, {"password", password}})
+        .status;
+  };
+  EXPECT_EQ(room()["versions"].size(), 0U);
+  EXPECT_TRUE(room()["shift_mm"].is_null());
+  web::CheckRecord check;
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(sign(physicist, std::string(64, 'a'), kPassword), 409) << i << " scans";
+    service_.SeeBoard(check);
+  }
+  const std::string digest = room()["digest"];
+  EXPECT_EQ(room()["scans"].size(), 3U);
+  EXPECT_EQ(room()["scans"][0]["num_markers"], 4);
+  EXPECT_EQ(room()["why_not_sign"], "");
+  EXPECT_EQ(sign(technician, digest, kPassword), 403);
+  EXPECT_EQ(sign(physicist, digest, kWrong), 403);
+  EXPECT_EQ(sign(physicist, digest + "0", kPassword), 400) << "no digest";
+  EXPECT_EQ(sign(physicist, std::string(64, 'b'), kPassword), 409) << "another one than was read";
+  EXPECT_EQ(physicist.Post("/api/v1/room-calibration/sign", {{"digest", digest}}).status, 400);
+  EXPECT_EQ(room()["versions"].size(), 0U);
+  EXPECT_EQ(sign(physicist, digest, kPassword), 201);
+  EXPECT_EQ(room()["versions"][0]["signed_by"], "physicist");
+  EXPECT_EQ(room()["versions"][0]["digest"], digest);
+  EXPECT_EQ(sign(physicist, digest, kPassword), 409) << "its scans are used up";
+  EXPECT_EQ(service_.audit.back().action, "room.calibrate");
+
+  const auto board = technician.Get("/api/v1/room-calibration/board.pdf");
+  EXPECT_EQ(board.status, 200);
+  EXPECT_EQ(board.body.substr(0, 5), "%PDF-");
+  service_.status.sensor.present = false;
+  EXPECT_EQ(technician.Get("/api/v1/room-calibration/board.pdf").status, 409);
+}
+
 TEST_F(LockoutTest, ASensorProfileIsSeenByAllAndChangedByAnEngineerWithThePassword) {
   const auto version = [](int number, int sweeps) {
     web::SensorProfileVersion one;

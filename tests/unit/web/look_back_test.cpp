@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/fake_scan_service.hpp"
+#include "tests/support/fake_appliance.hpp"
 
 namespace plumb::test {
 namespace {
@@ -23,7 +23,7 @@ class LookBackTest : public testing::Test {
   }
 
   const web::WallClock::time_point begun_ = web::WallClock::now();
-  FakeScanService service_;
+  FakeAppliance service_;
 };
 
 TEST_F(LookBackTest, TellsTheLogInBeforeThisOneAndWhatFailedSince) {

@@ -311,14 +311,14 @@ TEST_F(ServerTest, AnAddressInUseIsSaid) {
   web::HttpServerOptions options;
   options.port = port_;
   try {
-    const web::HttpServer second(service_, options);
+    const web::HttpServer second(service_.services(), options);
     FAIL() << "two servers on one port";
   } catch (const IoError& error) {
     EXPECT_THAT(error.what(), HasSubstr(std::to_string(port_)));
   }
   options.port = 0;
   options.address = "not an address";
-  EXPECT_THROW(web::HttpServer(service_, options), IoError);
+  EXPECT_THROW(web::HttpServer(service_.services(), options), IoError);
 }
 
 /// The server over TLS with a certificate of its own, as openssl sees it.

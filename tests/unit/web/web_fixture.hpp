@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "tests/support/fake_scan_service.hpp"
+#include "tests/support/fake_appliance.hpp"
 #include "tests/support/http_client.hpp"
 #include "web/api/http_server.hpp"
 
@@ -24,7 +24,7 @@ class WebTest : public ::testing::Test {
       return std::chrono::steady_clock::now() + std::chrono::seconds(skipped_s_.load());
     };
     if (change) change(options);
-    server_ = std::make_unique<web::HttpServer>(service_, options);
+    server_ = std::make_unique<web::HttpServer>(service_.services(), options);
     port_ = server_->port();
     setup_code_ = server_->setup_code().value_or("");
     loop_ = std::make_unique<ServingLoop>(*server_);
@@ -57,7 +57,7 @@ class WebTest : public ::testing::Test {
     return client;
   }
 
-  FakeScanService service_;
+  FakeAppliance service_;
   std::atomic<int> skipped_s_ = 0;  ///< Seconds that the server's clock is ahead.
   std::unique_ptr<web::HttpServer> server_;
   std::unique_ptr<ServingLoop> loop_;

@@ -4,6 +4,7 @@ import { action, done, fixed, h, localDay, localTime, redraw, svg, table } from 
 import { signed } from '../numbers.js';
 import { S, translated } from '../strings.js';
 import { sentence } from './common.js';
+import { roomCard } from './room_calibration.js';
 
 const kIcons = { passed: '✓', failed: '▲', no_baseline: '?' };
 const kTones = { passed: 'in_tolerance', failed: 'move', no_baseline: 'no_answer' };
@@ -132,6 +133,7 @@ function earlier(checks) {
 
 export async function showCheck(place) {
   const text = S.check;
+  const room = roomCard();
   const load = async () => {
     const { checks, baseline, overdue } = await get('checks', true);
     const of = baseline
@@ -144,11 +146,15 @@ export async function showCheck(place) {
           await post('checks/open');
           location.hash = '#/scan';
         }, { class: 'primary' })),
-      checks.length > 0 && newest(checks[0], load), trends(checks),
+      checks.length > 0 && newest(checks[0], load), room.place, trends(checks),
       checks.length > 1 && earlier(checks.slice(1)));
   };
   await load();
-  return live.listen((kind) => {
+  const end = live.listen((kind) => {
     if (kind === 'data' || kind === 'result') load().catch(() => {});
   });
+  return () => {
+    end();
+    room.end();
+  };
 }

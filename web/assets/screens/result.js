@@ -67,6 +67,9 @@ function trust({ scan, details, scene }) {
     && `${fixed(100 * (scene.calibration.depth_scale - 1), 2)} %`);
   add(text.sensorOn, scan.sensor_on_s !== null && scan.sensor_on_s !== undefined
     ? text.minutes(Math.floor(scan.sensor_on_s / 60)) : null);
+  const { room_calibration: room } = details ?? {};
+  add(text.roomCalibration, room && (room.used ? text.roomVersion(room.version)
+    : text.roomNotUsed), room && !room.used ? 'caution' : '');
   const rejected = Object.entries(alignment?.markers_rejected ?? {})
     .map(([id, residual]) => text.rejectedItem(id, mm(residual, 0)));
   add(text.rejected, rejected.length ? rejected.join(', ') : null, 'caution');

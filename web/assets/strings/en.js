@@ -33,7 +33,7 @@ export const en = {
   leavingOffline: 'No connection to the appliance. You will be logged out as soon as it answers. '
     + 'Trying again…',
   loggedOff: 'You were logged out. Please log in again.',
-  logOffSoon: (seconds) => `You will be logged out in ${seconds} s because nothing was used.`,
+  logOffSoon: (seconds) => `You will be logged out in ${seconds} s because of inactivity.`,
   stay: 'Stay logged in',
   notAllowed: 'Your role cannot open this page.',
   save: 'Save',
@@ -77,15 +77,15 @@ export const en = {
     firstOld: 'Password that you were given', firstNew: 'Your own password',
     firstSubmit: 'Change password',
     last: (when, address) => `Last log-in: ${when}, from ${address}.`,
-    first: 'This is the first log-in of this account that the log knows of.',
+    first: 'This is the first log-in of this account on record.',
     failedSince: (n) => `${n} failed ${plural(n, 'attempt', 'attempts')} since. If that was not `
       + 'you, change your password.',
   },
   removeScan: {
     open: 'Delete this scan', reason: 'Reason', submit: 'Delete permanently',
-    goes: 'This deletes the scan with its surface, maps, result and recording, permanently.',
+    goes: 'This permanently deletes the scan with its surface, maps, result and recording.',
     stays: 'The log keeps the number of the scan, who deleted it, when, and your reason. Backups '
-      + 'that were made before still hold the scan.',
+      + 'made earlier still contain the scan.',
     type: (id) => `Type ${id} to confirm`, differs: (id) => `Type the number ${id} to confirm.`,
     gone: (id) => `Scan ${id} is deleted.`,
     isReference: (version) => `Reference version ${version} is made of this scan. It is deleted `
@@ -116,7 +116,7 @@ export const en = {
     warming: 'Warming up: measurements drift during the first 15 minutes.',
     free: (free, total) => `${free} GB free of ${total} GB`, readOnly: 'read-only',
     lastScans: 'Recent scans', noScans: 'No scans yet.', goScan: 'Go to scan', preview: 'Camera',
-    previewAlt: 'Camera image', noPreview: 'The camera shows nothing at the moment.',
+    previewAlt: 'Camera image', noPreview: 'There is no camera image at the moment.',
     waiting: 'Waiting for', nothingWaits: 'nothing',
     waitingApproval: 'Waiting for approval', waitingVersion: (version) => `version ${version}`,
   },
@@ -139,7 +139,7 @@ export const en = {
     version: 'Version', made: 'Created', state: 'State', draft: 'draft', plan: 'Plan',
     planView: 'View plan', approvedBy: (who, when) => `approved by ${who}, ${when}`,
     wipe: 'Delete patient data',
-    wipeText: 'This deletes the patient with all scans, references and files, permanently. '
+    wipeText: 'This permanently deletes the patient with all scans, references and files. '
       + 'Type the code to confirm.',
     wipeSubmit: 'Delete permanently', history: 'Scans', when: 'When', purpose: 'Purpose',
     outcome: 'Outcome', accepted: 'Accepted', fraction: 'Fraction',
@@ -250,8 +250,8 @@ export const en = {
     tolerance: (value, unit) => `tolerance ±${value} ${unit}`,
     couch: 'Couch readings: what to set',
     couchHint: 'Type what the couch reads now. Shifts only, on scales as in IEC 61217: up, toward '
-      + 'the gantry, and to the right of a person who faces it count up. Where your couch counts '
-      + 'otherwise, do not use this.',
+      + 'the gantry, and to the right of a person who faces it count up. If your couch counts '
+      + 'differently, do not use this.',
     couchSet: (axis, cm) => `${axis}: set to ${cm} cm`,
     couchBad: 'a number in cm, with at most two digits after the point',
     refused: 'not known with couch markers', still: 'no change',
@@ -286,6 +286,8 @@ export const en = {
       + 'or not as planned.',
     bodyByAxes: 'Parts and directions are named by the axes of the reference marker: the room has '
       + 'not been calibrated, and the surface does not show where the head lies.',
+    roomCalibration: 'Room calibration', roomVersion: (version) => `version ${version}`,
+    roomNotUsed: 'not used, see the warnings',
     roomUnknown: 'The room has not been calibrated (T_iec_reference): the numbers run along and '
       + 'about the axes of the reference marker, not of the couch.',
     higher: 'Patient is higher than reference', lower: 'Patient is lower than reference',
@@ -366,7 +368,7 @@ export const en = {
       + 'compared with it.',
     secondPerson: 'Another physicist than the one who took this check sets it as the baseline.',
     baselineTaken: 'This check is the baseline now.', number: 'Number', value: 'Value',
-    limit: 'Limit', judged: 'Judgement', within: 'within the limit', outside: 'outside the limit',
+    limit: 'Limit', judged: 'Assessment', within: 'within the limit', outside: 'outside the limit',
     notKnown: 'not known', history: 'Earlier checks', by: 'By', sensor: 'Sensor',
     markers: 'Markers', last: (when, who) => `${when}, by ${who}`, trend: 'Trend of the checks',
     items: {
@@ -377,9 +379,33 @@ export const en = {
     atLeast: (value) => `at least ${value}`,
     atMost: (sign, value, unit) => `at most ${sign}${value} ${unit}`, tile: 'Daily check',
   },
+  room_calibration: {
+    title: 'Room calibration',
+    none: 'The room has not been calibrated yet: directions are the patient’s, never the '
+      + 'couch’s. Calibrate the room with a printed board at the lasers.',
+    configured: 'The axes of the room come from the configuration (T_iec_reference). A signed '
+      + 'calibration replaces them.',
+    holds: (version, who, when) => `Version ${version}, signed by ${who}, ${when}, gives every `
+      + 'comparison the axes of the room.',
+    notTheConfigurations: 'T_iec_reference of the configuration is not used.',
+    due: 'The room has to be calibrated again; until then directions are the patient’s.',
+    print: 'Print the board (PDF)',
+    printHint: 'at 100 %, without fitting to the page: its ruler must measure 100 mm.',
+    place: 'Lay it flat on a rigid plate on the couch, face up, with the cross exactly at the '
+      + 'lasers, the arrow to the gantry, and its lines along the lasers.',
+    scan: 'Sweep three times over the board and the markers of the room, without touching either.',
+    start: 'Start a scan of the board', scans: 'Scans of the board', when: 'When',
+    markers: 'Markers', misfit: 'Misfit (RMS)', size: 'Size of the sheet',
+    uncertainty: 'Uncertainty (95 %)',
+    differ: (count, mm, degrees, maxMm, maxDegrees) => `The newest ${count} scans differ by `
+      + `${mm} mm and ${degrees}°; at most ${maxMm} mm and ${maxDegrees}° are allowed.`,
+    sign: 'Sign the calibration', signed: 'The calibration is signed and used from now on.',
+    versions: 'Signed calibrations', version: 'Version', signedAt: 'Signed', signedBy: 'By',
+    shift: 'Scans differ by', turn: 'and by', digest: 'SHA-256',
+  },
   plan: {
     template: (site) => `Template for ${site}`, templateUse: 'Use the template',
-    templateKeep: 'Keep this size and tolerance as the template',
+    templateKeep: 'Save this size and tolerance as the template',
     templateRemove: 'Remove the template', templateNone: 'There is no template for this site yet.',
     templateIs: (width, height, mm, degrees) => `Region ${width} × ${height} cm (x × y) about the `
       + `isocentre, ±${mm} mm, ±${degrees}°.`,
@@ -444,7 +470,7 @@ export const en = {
   audit: {
     title: 'Log', time: 'Time', user: 'Who', address: 'From', action: 'What', subject: 'On',
     detail: 'Detail', more: 'Older entries', empty: 'No entry.', filter: 'Filter',
-    filterHint: 'Finds in the entries that are shown below; load older ones to find in them too.',
+    filterHint: 'Searches the entries shown below; load older ones to search them too.',
     shown: (found, all) => `${found} of ${all} ${plural(all, 'entry', 'entries')}`,
     csv: 'Download as CSV',
     actions: {
@@ -452,7 +478,7 @@ export const en = {
       'login.failed': 'Log-in failed',
       logout: 'Logged out',
       'setup.failed': 'Set-up failed',
-      'template.set': 'Template kept',
+      'template.set': 'Template saved',
       'template.remove': 'Template removed',
       'patient.add': 'Patient added',
       'patient.change': 'Site and note changed',
@@ -481,6 +507,7 @@ export const en = {
       'check.open': 'Daily check opened',
       'check.done': 'Daily check done',
       'check.baseline': 'Baseline set',
+      'room.calibrate': 'Room calibration signed',
       'user.add': 'Account created',
       'user.change': 'Account changed',
       'display.pair': 'Screen paired',
@@ -488,18 +515,18 @@ export const en = {
       'settings.change': 'Settings changed',
       'backup.make': 'Backup made',
       'certificate.replace': 'Certificate of the page replaced',
-      'certificate.new': 'New self-made certificate of the page',
+      'certificate.new': 'New self-signed certificate of the page',
       'diagnostics.write': 'Diagnostics downloaded',
       'update.upload': 'Update file uploaded',
       'update.remove': 'Update file removed',
-      'update.install': 'Update begun',
+      'update.install': 'Update started',
       'update.done': 'Update installed',
       'update.fail': 'Update failed',
       'update.refuse': 'Update refused',
-      'update.rolled_back': 'Went back to the system before',
-      'update.seen': 'Roll-back seen',
+      'update.rolled_back': 'Went back to the previous system',
+      'update.seen': 'Roll-back acknowledged',
       'profile.reset': 'Sensor profile reset',
-      'profile.roll_back': 'Sensor profile taken back',
+      'profile.roll_back': 'Earlier sensor profile restored',
       'system.restart': 'Machine restarted',
       'system.restart_failed': 'Restart failed',
     },
@@ -511,7 +538,7 @@ export const en = {
     auto_stop_s: 'Stop a sweep after … s without new surface',
     scan_limit_s: 'Longest sweep (s)', keep_recordings: 'Keep raw recordings (with colour)',
     retention_days: 'Delete scans after … days (0: never)',
-    idle_logout_min: 'Log out after … min without use',
+    idle_logout_min: 'Log out after … min of inactivity',
     readOnly: 'Only an engineer can change the settings.',
     backup: 'Backup',
     backupHint: 'Copies the database and all scans into the folder that is set as backup_folder. '
@@ -524,31 +551,32 @@ export const en = {
     title: 'Certificate of the page',
     hint: 'Browsers know this appliance by its certificate. Another one is used for every new '
       + 'connection at once; compare its fingerprint with the one that your browser then shows.',
-    fingerprint: 'SHA-256 fingerprint', subject: 'Made out to', validUntil: 'Valid until',
+    fingerprint: 'SHA-256 fingerprint', subject: 'Issued to', validUntil: 'Valid until',
     fixed: 'It cannot be replaced here: the page is served without TLS, or the configuration '
       + 'names its certificate (web.tls_certificate).',
     which: 'What to do',
-    choices: { given: 'Use a certificate of your own', own: 'Make a new self-made certificate' },
-    chain: 'Certificate, then those that lead from it to an authority (PEM file)',
-    key: 'Its key, without a password (PEM file)', tooLarge: (name) => `${name} is too large.`,
+    choices: { given: 'Use a certificate of your own', own: 'Make a new self-signed certificate' },
+    chain: 'Certificate, followed by its intermediate certificates (PEM file)',
+    key: 'Private key, without a password (PEM file)', tooLarge: (name) => `${name} is too large.`,
     submit: 'Replace the certificate',
     replaced: 'The certificate is replaced. Your browser may ask about the new one.',
   },
   profile: {
     title: 'Sensor profile',
-    hint: 'What good scans have taught of this sensor. The next scan begins from the newest '
+    hint: 'What good scans have shown about this sensor. The next scan starts from the newest '
       + 'version.',
-    none: 'No profile yet: the next good scan makes one.', noneKept: 'No profile is kept here: ',
+    none: 'No profile yet: the next good scan creates one.',
+    noneKept: 'No profile is stored here: ',
     serial: 'Serial number', version: 'Version', made: 'Made', sweeps: 'Scans', cause: 'How',
     causes: {
-      learned: 'learned', rolled_back: 'taken back', reset: 'reset', unreadable: 'was unreadable',
+      learned: 'learned', rolled_back: 'restored', reset: 'reset', unreadable: 'was unreadable',
     },
     focal: 'Focal length', depthScale: 'Depth scale', depthOffset: 'Depth offset',
-    readout: 'Colour image read in', download: 'Download',
-    resetDone: 'The next scan begins without a profile.',
+    readout: 'Readout of the colour image', download: 'Download',
+    resetDone: 'The next scan starts without a profile.',
     takenBack: 'The earlier version is in use.', which: 'What to do',
-    resetChoice: 'Begin again without a profile',
-    takeBackChoice: (version) => `Take version ${version} back`,
+    resetChoice: 'Start again without a profile',
+    takeBackChoice: (version) => `Restore version ${version}`,
     submit: 'Change the profile',
   },
   update: {
@@ -560,12 +588,12 @@ export const en = {
       + 'signature and version when it is installed.',
     bundle: 'Update file', send: 'Upload', uploading: 'Uploading…',
     uploaded: 'Update file uploaded.',
-    uploadFailed: 'The update file did not arrive: too large, or the connection broke.',
+    uploadFailed: 'The update file did not arrive: it is too large, or the connection was lost.',
     runs: (slot) => `${slot} (running)`, seen: 'I have seen it', restart: 'Restart',
     restartNeeded: 'An update is installed. It runs after a restart.',
     restartHint: 'The appliance goes down for some minutes and cannot scan meanwhile. This is '
-      + 'refused while a scan runs or a session is open. The page comes back by itself. A system '
-      + 'that does not start well is left for the one before, and this page says so.',
+      + 'refused while a scan runs or a session is open. The page comes back by itself. If the '
+      + 'new system does not start properly, the previous one is used, and this page says so.',
     restartSubmit: 'Restart now',
     restarting: 'The appliance restarts. This page comes back by itself.',
     install: 'Install', installing: 'Installing…', diagnostics: 'Diagnostics',

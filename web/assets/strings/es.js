@@ -320,6 +320,8 @@ export const es = {
       + 'paciente no se conoce o no es la planificada.',
     bodyByAxes: 'Las partes y direcciones se nombran por los ejes del marcador de referencia: la '
       + 'sala no está calibrada y la superficie no muestra dónde está la cabeza.',
+    roomCalibration: 'Calibración de la sala', roomVersion: (version) => `versión ${version}`,
+    roomNotUsed: 'no se usa, vea los avisos',
     roomUnknown: 'La sala no está calibrada (T_iec_reference): los números siguen los ejes del '
       + 'marcador de referencia, no los de la camilla.',
     higher: 'El paciente está más alto que la referencia',
@@ -417,6 +419,32 @@ export const es = {
     },
     atLeast: (value) => `al menos ${value}`,
     atMost: (sign, value, unit) => `como máximo ${sign}${value} ${unit}`, tile: 'Control diario',
+  },
+  room_calibration: {
+    title: 'Calibración de la sala',
+    none: 'Nadie ha indicado aún cómo está orientada la sala: las direcciones son las del '
+      + 'paciente, nunca las de la mesa. Calibre la sala con una lámina impresa en los láseres.',
+    configured: 'Los ejes de la sala proceden de la configuración (T_iec_reference). Una '
+      + 'calibración firmada los sustituye.',
+    holds: (version, who, when) => `La versión ${version}, firmada por ${who}, ${when}, da a cada `
+      + 'comparación los ejes de la sala.',
+    notTheConfigurations: 'T_iec_reference de la configuración no se usa.',
+    due: 'Hay que calibrar la sala de nuevo; hasta entonces las direcciones son las del paciente.',
+    print: 'Imprimir la lámina (PDF)',
+    printHint: 'al 100 %, sin ajustar a la página: su regla debe medir 100 mm.',
+    place: 'Colóquela plana sobre una placa rígida en la mesa, cara arriba, con la cruz '
+      + 'exactamente en los láseres, la flecha hacia el gantry y sus líneas a lo largo de los '
+      + 'láseres.',
+    scan: 'Barra tres veces la lámina y los marcadores de la sala, sin tocarlos.',
+    start: 'Empezar un escaneo de la lámina', scans: 'Escaneos de la lámina', when: 'Cuándo',
+    markers: 'Marcadores', misfit: 'Desajuste (RMS)', size: 'Tamaño de la lámina',
+    uncertainty: 'Incertidumbre (95 %)',
+    differ: (count, mm, degrees, maxMm, maxDegrees) => `Los ${count} escaneos más recientes `
+      + `difieren en ${mm} mm y ${degrees}°; se permiten como máximo ${maxMm} mm y `
+      + `${maxDegrees}°.`,
+    sign: 'Firmar la calibración', signed: 'La calibración está firmada y se usa desde ahora.',
+    versions: 'Calibraciones firmadas', version: 'Versión', signedAt: 'Firmada', signedBy: 'Por',
+    shift: 'Los escaneos difieren en', turn: 'y en', digest: 'SHA-256',
   },
   plan: {
     template: (site) => `Plantilla para ${site}`, templateUse: 'Usar la plantilla',
@@ -528,6 +556,7 @@ export const es = {
       'check.open': 'Control diario abierto',
       'check.done': 'Control diario hecho',
       'check.baseline': 'Línea de base fijada',
+      'room.calibrate': 'Calibración de la sala firmada',
       'user.add': 'Cuenta creada',
       'user.change': 'Cuenta cambiada',
       'display.pair': 'Pantalla emparejada',

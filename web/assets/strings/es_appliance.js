@@ -32,6 +32,25 @@ export const kWords = {
   'the session of a patient is open: close it first':
     'hay una sesión de un paciente abierta: ciérrela primero',
   'a scan is running: wait for its result': 'hay un escaneo en curso: espere su resultado',
+  'the board has not been scanned yet': 'la lámina aún no se ha escaneado',
+  ['fewer than 3 of the room\'s markers lie the same in all scans: sweep over the room\'s markers '
+    + 'too, and leave them alone']:
+    'menos de 3 marcadores de la sala están igual en todos los escaneos: barra también los '
+    + 'marcadores de la sala y no los toque',
+  ['none of the room\'s markers was seen well: sweep over them too, the room is described by '
+    + 'them']:
+    'no se vio bien ningún marcador de la sala: bárralos también, la sala se describe con ellos',
+  'the reference marker was not seen: keep it in view during a part of the sweep':
+    'no se vio el marcador de referencia: manténgalo a la vista durante parte del barrido',
+  'the board has been scanned again since this was read: read it again':
+    'la lámina se ha escaneado de nuevo desde que se leyó esto: léalo otra vez',
+  'the room has other markers than when it was calibrated':
+    'la sala tiene otros marcadores que cuando se calibró',
+  ['The signed calibration of the room holds: T_iec_reference of the configuration is not used']:
+    'Vale la calibración firmada de la sala: T_iec_reference de la configuración no se usa',
+  ['fewer than 3 of the room\'s markers lie in the reference as they lay when the room was '
+    + 'calibrated']:
+    'menos de 3 marcadores de la sala están en la referencia como estaban cuando se calibró',
   '+X side': 'lado +X', '-X side': 'lado −X',
   'left side': 'lado izquierdo', 'right side': 'lado derecho', middle: 'centro',
   'a scan is running: wait for its result, then open the patient':
@@ -202,6 +221,34 @@ export const kPatterns = [
   ['^The disk is (\\d+) % full: back up and remove scans.$',
     'El disco está lleno al $1 %: haga una copia de seguridad y borre escaneos.'],
   ['^The last backup failed: (.+)$', 'La última copia de seguridad falló: $1'],
+  // The room's calibration.
+  ['^(\\d+) of (\\d+) scans of the board are there: scan again, without touching it$',
+    'hay $1 de $2 escaneos de la lámina: escanee otra vez, sin tocarla'],
+  ['^no scan of the board can be used: (.+)$', 'ningún escaneo de la lámina sirve: $1'],
+  ['^the scans differ by ([\\d.]+) mm and ([\\d.]+) deg, at most ([\\d.]+) mm and ([\\d.]+) deg '
+    + 'are allowed: let the sensor warm up, do not touch the board, and scan again$',
+  'los escaneos difieren en $1 mm y $2°; se permiten $3 mm y $4° como máximo: deje calentar el '
+    + 'sensor, no toque la lámina y escanee otra vez'],
+  ['^(\\d+) of the board\'s (\\d+) markers were seen well, at least (\\d+) are needed: look '
+    + 'whether they are clean and uncovered, and sweep slowly over the board$',
+  'se vieron bien $1 de los $2 marcadores de la lámina y se necesitan al menos $3: mire si están '
+    + 'limpios y descubiertos, y barra la lámina despacio'],
+  ['^the board measures ([\\d.]+) % of its size, ([\\d.]+) % off are allowed: print it at 100 %, '
+    + 'without fitting to the page, and check its ruler$',
+  'la lámina mide el $1 % de su tamaño; se admite un $2 % de diferencia: imprímala al 100 %, '
+    + 'sin ajustar a la página, y compruebe su regla'],
+  ['^the board\'s markers lie ([\\d.]+) mm \\(RMS\\) off their places on the sheet, at most '
+    + '([\\d.]+) mm are allowed: lay the sheet flat on a rigid plate and sweep slowly over it$',
+  'los marcadores de la lámina están a $1 mm (RMS) de su sitio; se admiten $2 mm como máximo: '
+    + 'coloque la lámina plana sobre una placa rígida y bárrala despacio'],
+  ['^marker (\\d+) moved ([\\d.]+) mm since the room was calibrated$',
+    'el marcador $1 se movió $2 mm desde que se calibró la sala'],
+  ['^the markers lie ([\\d.]+) mm \\(RMS\\) off where they lay when the room was calibrated$',
+    'los marcadores están a $1 mm (RMS) de donde estaban cuando se calibró la sala'],
+  ['^The room has to be calibrated again, until then directions are the patient\'s: (.+)$',
+    'Hay que calibrar la sala de nuevo; hasta entonces las direcciones son las del paciente: $1'],
+  ['^the calibration of the room, version (\\d+), is not used: (.+)$',
+    'la calibración de la sala, versión $1, no se usa: $2'],
   // The daily check.
   ['^(\\d+) markers were seen, at least (\\d+) are needed; sweep over all of them$',
     'se vieron $1 marcadores y se necesitan al menos $2; bárralos todos'],

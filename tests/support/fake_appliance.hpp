@@ -9,14 +9,33 @@
 #include <string>
 #include <vector>
 
-#include "web/service/scan_service.hpp"
+#include "web/service/services.hpp"
 
 namespace plumb::test {
 
-/// Follows the rules that scan_service.hpp states. One thread.
-class FakeScanService : public web::ScanService {
+/// Follows the rules that the services state. One thread.
+class FakeAppliance : public web::BackgroundWork,
+                      public web::ApplianceService,
+                      public web::PatientService,
+                      public web::ReferenceService,
+                      public web::ScanService,
+                      public web::CheckService,
+                      public web::RoomCalibrationService,
+                      public web::SensorProfileService,
+                      public web::DisplayService,
+                      public web::AccountService,
+                      public web::AuditLog,
+                      public web::SettingsService,
+                      public web::UpdateService,
+                      public web::MaintenanceService {
  public:
-  FakeScanService();
+  FakeAppliance();
+
+  /// All of them are this object.
+  [[nodiscard]] web::Services services() {
+    return {*this, *this, *this, *this, *this, *this, *this,
+            *this, *this, *this, *this, *this, *this, *this};
+  }
 
   // --- what tests turn
   web::Status status;
@@ -28,6 +47,8 @@ class FakeScanService : public web::ScanService {
   std::vector<web::Scan> scans;  ///< Oldest first.
   web::CheckStatus checks;
   web::SensorProfiles profiles;
+  web::RoomCalibrationStatus room;
+  bool is_board_there = false;  ///< Check scans see the board of the room's calibration.
   std::optional<web::CheckRecord>
       next_check;  ///< What the next check scan finds; nothing: it passes.
   /// Reads a map of a scan's folder; none: there are no maps.
@@ -67,10 +88,12 @@ class FakeScanService : public web::ScanService {
   void Tell(web::EventKind kind) const;
   /// The running scan, or none, fails as one of plumbd does: a press acknowledges.
   void Fail(const std::string& reason);
+  /// A check scan that saw the board of the room's calibration.
+  void SeeBoard(const web::CheckRecord& check);
   void Unplug();
   void Plug();
 
-  // --- ScanService
+  // --- the services
   bool Later(web::Aside where, std::function<void()> work, std::function<void()> done) override;
   web::Status GetStatus() override { return status; }
   web::Health GetHealth() override { return health; }
@@ -141,6 +164,10 @@ class FakeScanService : public web::ScanService {
   void OpenCheck(const web::Actor& actor, web::Done done) override;
   void SetCheckBaseline(const web::Actor& actor, const std::string& check_id,
                         web::Done done) override;
+  web::RoomCalibrationStatus GetRoomCalibration() override { return room; }
+  void SignRoomCalibration(const web::Actor& actor, const std::string& digest,
+                           web::Done done) override;
+  std::optional<std::string> RoomBoardPdf(std::string& why_not) override;
   web::SensorProfiles GetSensorProfiles() override { return profiles; }
   std::optional<std::string> SensorProfileFile(int version) override;
   void ResetSensorProfile(const web::Actor& actor, const std::string& serial,
@@ -174,6 +201,7 @@ class FakeScanService : public web::ScanService {
                                 const std::string& reason);
 
  private:
+  [[nodiscard]] static web::Change Refusal(web::ChangeResult result, std::string message);
   void Finish(const web::Done& done, web::Change change);
   void Did(const web::Actor& actor, const std::string& action, const std::string& subject,
            const web::Done& done, const std::string& id = "");

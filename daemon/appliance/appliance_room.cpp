@@ -1,0 +1,127 @@
+// Where the room's axes lie: the signed calibration.
+#include <fmt/format.h>
+
+#include "algo/base/units.hpp"
+#include "daemon/appliance/appliance.hpp"
+#include "daemon/files/marker_sheet.hpp"
+#include "daemon/loop/log.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr int kVersionsShown = 20;
+
+web::RoomBoardScan ForPage(const BoardScan& scan) {
+  web::RoomBoardScan shown{
+      .check_id = scan.check_id, .time = scan.time, .user = scan.user, .fault = scan.fault};
+  if (!scan.scan) return shown;
+  const BoardFit& board = scan.scan->board;
+  shown.num_markers = board.num_markers;
+  shown.rms_mm = board.rms_m / kMillimetre;
+  shown.scale_percent = 100 * board.scale;
+  shown.shift_uncertainty_mm = board.shift_uncertainty_m / kMillimetre;
+  shown.turn_uncertainty_deg = board.turn_uncertainty_rad / kDegree;
+  return shown;
+}
+
+web::RoomCalibrationVersion ForPage(const SignedRoom& room) {
+  return {.version = room.version,
+          .signed_at = room.signed_at,
+          .signed_by = room.signed_by,
+          .digest = room.digest,
+          .shift_mm = room.fit.shift_m / kMillimetre,
+          .turn_deg = room.fit.turn_rad / kDegree,
+          .check_ids = room.check_ids};
+}
+
+}  // namespace
+
+void Appliance::LookAtRoom() {
+  Room room;
+  room.is_configured = parts_.config.compare.T_iec_reference.has_value();
+  if (store_ != nullptr) {
+    try {
+      room.calibration = store_->RoomCalibration();
+      if (room.calibration)
+        room.due = store_->WhyRoomIsDueNow(*room.calibration, parts_.config.check);
+    } catch (const std::exception& error) {  // then nobody knows where the room lies
+      room.calibration.reset();
+      room.due = error.what();
+    }
+  }
+  const std::lock_guard lock(room_mutex_);
+  if (!room.due.empty() && room.due != room_.due)
+    Log(LogLevel::kWarning, fmt::format("the room has to be calibrated again: {}", room.due));
+  room_ = std::move(room);
+}
+
+std::optional<RoomAxes> Appliance::RoomOfJob() const {
+  if (room_.calibration)
+    return RoomAxes{room_.calibration->version, room_.calibration->fit.markers_iec, room_.due};
+  if (!room_.due.empty()) return RoomAxes{0, {}, room_.due};
+  return std::nullopt;
+}
+
+/// One owner: a signed calibration holds, even while it is due, and then nobody knows the axes; the
+/// configuration counts only where nothing was ever signed.
+void Appliance::ReportRoom(web::Status& status) const {
+  std::optional<Pose> T_iec_reference = parts_.config.compare.T_iec_reference;
+  if (room_.calibration || !room_.due.empty()) {
+    T_iec_reference.reset();
+    if (room_.due.empty())
+      T_iec_reference = room_.calibration->fit.T_iec_reference;
+    else
+      status.warnings.push_back(fmt::format(
+          "The room has to be calibrated again, until then directions are the patient's: {}",
+          room_.due));
+    if (room_.is_configured) {
+      status.warnings.push_back(
+          "The signed calibration of the room holds: T_iec_reference of the configuration is not "
+          "used");
+    }
+  }
+  const Eigen::Matrix3d R_iec_reference = T_iec_reference.value_or(Pose::Identity()).linear();
+  status.right_xy = {R_iec_reference(0, 0), R_iec_reference(0, 1)};
+  status.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)};
+  status.is_room_known = T_iec_reference.has_value();
+}
+
+std::pair<std::string, web::WallClock::time_point> Appliance::RoomScansWanted() const {
+  return {sensors_->snapshot().sensor.serial, StartOfDay()};
+}
+
+web::RoomCalibrationStatus Appliance::RoomCalibration() {
+  const RoomCalibrationLimits limits;
+  web::RoomCalibrationStatus status;
+  status.num_wanted = limits.num_scans;
+  status.max_shift_mm = limits.max_shift_m / kMillimetre;
+  status.max_turn_deg = limits.max_turn_rad / kDegree;
+  {
+    const std::lock_guard lock(room_mutex_);
+    status.due = room_.due;
+    status.is_configured = room_.is_configured;
+  }
+  for (const SignedRoom& room : store_->RoomCalibrations(kVersionsShown))
+    status.versions.push_back(ForPage(room));
+  const auto [serial, since] = RoomScansWanted();
+  const RoomCandidate candidate = store_->CandidateOfRoom(serial, since);
+  for (const BoardScan& scan : candidate.scans) status.scans.push_back(ForPage(scan));
+  if (candidate.fit) {
+    status.shift_mm = candidate.fit->shift_m / kMillimetre;
+    status.turn_deg = candidate.fit->turn_rad / kDegree;
+  }
+  status.why_not_sign = candidate.why_not;
+  status.digest = candidate.digest;
+  return status;
+}
+
+std::string Appliance::RoomBoardPdf() const {
+  const StreamInfo info = sensors_->snapshot().info;
+  const MarkerSheet sheet({.dictionary = info.marker_dictionary,
+                           .ids = {},
+                           .length_m = info.marker_length_m,
+                           .is_board = true});
+  return sheet.Pdf();
+}
+
+}  // namespace plumb

@@ -1,0 +1,50 @@
+#include "daemon/appliance/store_access.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "daemon/loop/log.hpp"
+
+namespace plumb {
+
+using web::ChangeResult;
+
+web::Change Refusal(ChangeResult result, std::string message) {
+  return {.result = result, .message = std::move(message), .id = {}, .file = {}};
+}
+
+web::Change AnswerOf(const std::string& why_not) {
+  return Refusal(why_not.empty() ? ChangeResult::kDone : ChangeResult::kConflict, why_not);
+}
+
+void StoreAccess::LogUnreadable(const std::exception& error) {
+  Log(LogLevel::kError, fmt::format("cannot read the store: {}", error.what()));
+}
+
+void StoreAccess::Change(web::Done done, std::function<std::string(Store&)> change) {
+  Store* store = appliance_.store();
+  if (store == nullptr) return done(Refusal(ChangeResult::kFailed, appliance_.storage_fault()));
+  // The store's thread outlives this object: it must not be used there.
+  const bool posted = appliance_.store_thread().Post(
+      [store, done, appliance = &appliance_, change = std::move(change), alive = alive_] {
+        web::Change answer;
+        try {
+          answer.id = change(*store);
+        } catch (const StoreRefusal& refusal) {
+          answer = Refusal(refusal.result(), refusal.what());
+        } catch (const DiskRefused& error) {
+          answer = Refusal(ChangeResult::kNoSpace, error.what());
+        } catch (const std::exception& error) {
+          answer = Refusal(ChangeResult::kFailed, error.what());
+        }
+        appliance->loop().Post("store changed", [appliance, done, answer, alive] {
+          if (!*alive) return;
+          done(answer);
+          if (answer.result == ChangeResult::kDone) appliance->NotifyDataChanged();
+        });
+      });
+  if (!posted) done(Refusal(ChangeResult::kFailed, "the store is busy: try again"));
+}
+
+}  // namespace plumb

@@ -1,0 +1,56 @@
+// Reads and changes of the store for the services of the page.
+#pragma once
+
+#include <exception>
+#include <functional>
+#include <memory>
+#include <string>
+#include <type_traits>
+
+#include "daemon/appliance/appliance.hpp"
+#include "web/service/change.hpp"
+
+namespace plumb {
+
+/// An answer with a message, most often of a change that was not made.
+[[nodiscard]] web::Change Refusal(web::ChangeResult result, std::string message);
+/// Done where `why_not` is empty, else a conflict with the state of the appliance.
+[[nodiscard]] web::Change AnswerOf(const std::string& why_not);
+
+/// Changes run on the store's thread and call `done` on the loop; reads answer at once. Belongs to
+/// the loop's thread, Read() to any. In safe mode reads give nothing and changes fail with the
+/// reason.
+class StoreAccess {
+ public:
+  /// The appliance is borrowed; lives longer.
+  explicit StoreAccess(Appliance& appliance) : appliance_(appliance) {}
+  /// No `done` is called from then on.
+  ~StoreAccess() { *alive_ = false; }
+  StoreAccess(const StoreAccess&) = delete;
+  StoreAccess& operator=(const StoreAccess&) = delete;
+
+  /// Runs `change` on the store's thread; what it returns is the id of what was made, what it
+  /// throws becomes the answer.
+  void Change(web::Done done, std::function<std::string(Store&)> change);
+
+  /// What `read` makes of the store. A read that fails (a damaged database) is logged and gives an
+  /// empty value.
+  template <typename Function>
+  [[nodiscard]] std::invoke_result_t<Function, Store&> Read(const Function& read) const {
+    if (appliance_.store() == nullptr) return {};
+    try {
+      return read(*appliance_.store());
+    } catch (const std::exception& error) {
+      LogUnreadable(error);
+      return {};
+    }
+  }
+
+ private:
+  static void LogUnreadable(const std::exception& error);
+
+  Appliance& appliance_;
+  std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+};
+
+}  // namespace plumb

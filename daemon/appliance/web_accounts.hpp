@@ -1,0 +1,51 @@
+// Accounts, screens in the room and the audit log as the page asks for them.
+#pragma once
+
+#include "daemon/appliance/store_access.hpp"
+#include "web/service/account_service.hpp"
+#include "web/service/audit_log.hpp"
+#include "web/service/display_service.hpp"
+
+namespace plumb {
+
+/// Borrows what it is given.
+class WebAccounts : public web::AccountService {
+ public:
+  explicit WebAccounts(StoreAccess& store) : store_(store) {}
+
+  [[nodiscard]] std::vector<web::User> Users() override;
+  [[nodiscard]] std::optional<web::User> FindUser(const std::string& name) override;
+  void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;
+  void ChangeUser(const web::Actor& actor, const web::UserChange& change, web::Done done) override;
+
+ private:
+  StoreAccess& store_;
+};
+
+/// Borrows what it is given.
+class WebDisplays : public web::DisplayService {
+ public:
+  explicit WebDisplays(StoreAccess& store) : store_(store) {}
+
+  [[nodiscard]] std::vector<web::Display> Displays() override;
+  void AddDisplay(const web::Actor& actor, const web::Display& display, web::Done done) override;
+  void RemoveDisplay(const web::Actor& actor, const std::string& id, web::Done done) override;
+
+ private:
+  StoreAccess& store_;
+};
+
+/// Borrows what it is given.
+class WebAuditLog : public web::AuditLog {
+ public:
+  explicit WebAuditLog(StoreAccess& store) : store_(store) {}
+
+  void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
+           const std::string& detail) override;
+  [[nodiscard]] std::vector<web::AuditEntry> Audit(std::int64_t before, int limit) override;
+
+ private:
+  StoreAccess& store_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,74 @@
+#include "daemon/appliance/web_appliance.hpp"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include <opencv2/imgproc.hpp>
+
+#include "drivers/files/image_file.hpp"
+
+namespace plumb {
+
+namespace {
+
+constexpr auto kPreviewEvery = std::chrono::milliseconds(200);
+constexpr int kPreviewWidth = 320;
+constexpr int kPreviewQuality = 70;
+
+}  // namespace
+
+std::shared_ptr<const std::string> WebAppliance::Preview() {
+  const auto now = std::chrono::steady_clock::now();
+  const std::optional<Frame> frame = appliance_.LatestFrame();
+  if (!frame) {
+    preview_.reset();
+    return nullptr;
+  }
+  if (preview_ && (now - preview_at_ < kPreviewEvery || frame->index == preview_index_))
+    return preview_;
+  cv::Mat small;
+  const int width = std::min(kPreviewWidth, frame->color_rgb.cols);
+  cv::resize(frame->color_rgb, small,
+             {width, frame->color_rgb.rows * width / frame->color_rgb.cols}, 0, 0, cv::INTER_AREA);
+  const std::vector<std::uint8_t> jpeg = EncodeJpeg(small, kPreviewQuality);
+  preview_ = std::make_shared<const std::string>(jpeg.begin(), jpeg.end());
+  preview_at_ = now;
+  preview_index_ = frame->index;
+  return preview_;
+}
+
+void WebAppliance::Press(const web::Actor& actor, web::Done done) {
+  const std::string refusal = appliance_.Press(ButtonPress::kShort);
+  if (refusal.empty()) audit_.Log(actor, "press", "", Name(appliance_.state().phase));
+  done(AnswerOf(refusal));
+}
+
+void WebAppliance::StartSweep(const web::Actor& actor, web::Done done) {
+  const std::string refusal = appliance_.StartSweep();
+  if (refusal.empty()) audit_.Log(actor, "scan.start", "", "");
+  done(AnswerOf(refusal));
+}
+
+void WebAppliance::EndSweep(const web::Actor& actor, web::Done done) {
+  const std::string refusal = appliance_.EndSweep();
+  if (refusal.empty()) audit_.Log(actor, "scan.end", "", "");
+  done(AnswerOf(refusal));
+}
+
+void WebAppliance::Cancel(const web::Actor& actor, web::Done done) {
+  const std::string refusal = appliance_.Cancel();
+  if (refusal.empty()) audit_.Log(actor, "cancel", "", "");
+  done(AnswerOf(refusal));
+}
+
+void WebAppliance::SetListener(std::function<void(web::EventKind)> listener) {
+  listener_ = listener;
+  appliance_.SetWebListener(std::move(listener));
+}
+
+void WebAppliance::Notify(web::EventKind kind) const {
+  if (listener_) listener_(kind);
+}
+
+}  // namespace plumb

@@ -1,0 +1,36 @@
+// The state of the appliance and its button, as the page asks for them.
+#pragma once
+
+#include "daemon/appliance/store_access.hpp"
+#include "web/service/appliance_service.hpp"
+#include "web/service/audit_log.hpp"
+
+namespace plumb {
+
+/// Borrows what it is given.
+class WebAppliance : public web::ApplianceService {
+ public:
+  WebAppliance(Appliance& appliance, web::AuditLog& audit) : appliance_(appliance), audit_(audit) {}
+
+  [[nodiscard]] web::Status GetStatus() override { return appliance_.WebStatus(); }
+  [[nodiscard]] web::Health GetHealth() override { return appliance_.Health(); }
+  [[nodiscard]] std::shared_ptr<const std::string> Preview() override;
+  void Press(const web::Actor& actor, web::Done done) override;
+  void StartSweep(const web::Actor& actor, web::Done done) override;
+  void EndSweep(const web::Actor& actor, web::Done done) override;
+  void Cancel(const web::Actor& actor, web::Done done) override;
+  void SetListener(std::function<void(web::EventKind)> listener) override;
+
+  /// To the listener, if there is one.
+  void Notify(web::EventKind kind) const;
+
+ private:
+  Appliance& appliance_;
+  web::AuditLog& audit_;
+  std::function<void(web::EventKind)> listener_;
+  std::shared_ptr<const std::string> preview_;
+  std::int64_t preview_index_ = -1;
+  std::chrono::steady_clock::time_point preview_at_;
+};
+
+}  // namespace plumb

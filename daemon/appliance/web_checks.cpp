@@ -1,0 +1,26 @@
+#include "daemon/appliance/web_checks.hpp"
+
+#include <utility>
+
+namespace plumb {
+
+web::CheckStatus WebChecks::GetChecks() {
+  return store_.Read([this](Store&) { return appliance_.Checks(); });
+}
+
+void WebChecks::OpenCheck(const web::Actor& actor, web::Done done) {
+  if (const std::string refusal = appliance_.OpenCheck(actor); !refusal.empty())
+    return done(AnswerOf(refusal));
+  store_.Change(std::move(done), [=](Store& store) {
+    return store.Log(actor, "check.open", "", ""), std::string();
+  });
+}
+
+void WebChecks::SetCheckBaseline(const web::Actor& actor, const std::string& check_id,
+                                 web::Done done) {
+  store_.Change(std::move(done), [=](Store& store) {
+    return store.SetCheckBaseline(actor, check_id), std::string();
+  });
+}
+
+}  // namespace plumb

@@ -1,0 +1,32 @@
+// The sensor's profile as the page asks for it.
+#pragma once
+
+#include "daemon/appliance/store_access.hpp"
+#include "web/service/sensor_profile_service.hpp"
+
+namespace plumb {
+
+/// Borrows what it is given.
+class WebSensorProfiles : public web::SensorProfileService {
+ public:
+  WebSensorProfiles(Appliance& appliance, StoreAccess& store)
+      : appliance_(appliance), store_(store) {}
+
+  [[nodiscard]] web::SensorProfiles GetSensorProfiles() override;
+  [[nodiscard]] std::optional<std::string> SensorProfileFile(int version) override;
+  void ResetSensorProfile(const web::Actor& actor, const std::string& serial,
+                          web::Done done) override;
+  void RollBackSensorProfile(const web::Actor& actor, const std::string& serial, int version,
+                             web::Done done) override;
+
+ private:
+  /// As StoreAccess::Change(); once it is done, what the last scan said against the profile is
+  /// forgotten.
+  void ChangeProfile(const std::string& serial, const web::Done& done,
+                     std::function<std::string(Store&)> change);
+
+  Appliance& appliance_;
+  StoreAccess& store_;
+};
+
+}  // namespace plumb

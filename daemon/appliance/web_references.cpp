@@ -1,0 +1,49 @@
+#include "daemon/appliance/web_references.hpp"
+
+#include <utility>
+
+namespace plumb {
+
+std::vector<web::Reference> WebReferences::References(const std::string& patient_id) {
+  return store_.Read([&](Store& store) { return store.References(patient_id); });
+}
+
+std::optional<web::Reference> WebReferences::FindReference(const std::string& id) {
+  return store_.Read([&](Store& store) { return store.FindReference(id); });
+}
+
+std::optional<web::Scan> WebReferences::ScanOf(const std::string& scan_id) {
+  return store_.Read([&](Store& store) { return store.FindScan(scan_id); });
+}
+
+void WebReferences::AddReference(const web::Actor& actor, const std::string& scan_id,
+                                 const std::string& reason, web::Done done) {
+  const std::optional<web::Scan> scan = ScanOf(scan_id);
+  if (const std::string why = appliance_.WhyNoReference(scan); !why.empty())
+    return done(AnswerOf(why));
+  store_.Change(std::move(done), [=, appliance = &appliance_](Store& store) {
+    return store.AddReference(actor, scan_id, reason, appliance->DefaultPlan());
+  });
+}
+
+void WebReferences::PlanReference(const web::Actor& actor, const std::string& id, int revision,
+                                  const web::ReferencePlan& plan, web::Done done) {
+  store_.Change(std::move(done), [=](Store& store) {
+    const std::string planned = store.PlanReference(actor, id, revision, plan);
+    return planned == id ? std::string() : planned;  // only a new version was made
+  });
+}
+
+void WebReferences::ApproveReference(const web::Actor& actor, const std::string& id, int revision,
+                                     const std::string& digest, web::Done done) {
+  const std::optional<web::Reference> reference = FindReference(id);
+  const std::optional<web::Scan> scan =
+      reference ? ScanOf(reference->scan_id) : std::optional<web::Scan>();
+  if (const std::string why = appliance_.WhyNoReference(scan); !why.empty())
+    return done(AnswerOf(why));
+  store_.Change(std::move(done), [=](Store& store) {
+    return store.ApproveReference(actor, id, revision, digest), std::string();
+  });
+}
+
+}  // namespace plumb

@@ -1,0 +1,25 @@
+// The room's calibration as the page asks for it.
+#pragma once
+
+#include "daemon/appliance/store_access.hpp"
+#include "web/service/room_calibration_service.hpp"
+
+namespace plumb {
+
+/// Borrows what it is given.
+class WebRoomCalibration : public web::RoomCalibrationService {
+ public:
+  WebRoomCalibration(Appliance& appliance, StoreAccess& store)
+      : appliance_(appliance), store_(store) {}
+
+  [[nodiscard]] web::RoomCalibrationStatus GetRoomCalibration() override;
+  void SignRoomCalibration(const web::Actor& actor, const std::string& digest,
+                           web::Done done) override;
+  [[nodiscard]] std::optional<std::string> RoomBoardPdf(std::string& why_not) override;
+
+ private:
+  Appliance& appliance_;
+  StoreAccess& store_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,76 @@
+#include "daemon/appliance/web_scans.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "daemon/appliance/reports.hpp"
+#include "daemon/files/compact_map.hpp"
+#include "daemon/loop/log.hpp"
+
+namespace plumb {
+
+using web::ChangeResult;
+
+std::vector<web::Scan> WebScans::Scans(const std::string& patient_id, int limit) {
+  return store_.Read([&](Store& store) { return store.Scans(patient_id, limit); });
+}
+
+std::optional<web::Scan> WebScans::FindScan(const std::string& id) {
+  return store_.Read([&](Store& store) { return store.FindScan(id); });
+}
+
+void WebScans::AcceptScan(const web::Actor& actor, const std::string& id, const std::string& reason,
+                          web::Done done) {
+  const ScanPhase phase = appliance_.state().phase;
+  if (phase == ScanPhase::kScanning || phase == ScanPhase::kWorking)
+    return done(AnswerOf("a scan is running: accept its result, not an older one"));
+  const std::optional<web::Scan> scan = FindScan(id);
+  if (!scan) return done(Refusal(ChangeResult::kNotFound, "there is no such scan"));
+  // A scan of an earlier run of the appliance is older than any that can be acted on.
+  if (scan->result && appliance_.AgeOf(id).value_or(web::kResultValid_s + 1) > web::kResultValid_s)
+    return done(AnswerOf("this result is older than 2 minutes: scan again, then accept"));
+  // Somebody else may lie on the couch by now.
+  const auto open = appliance_.WebStatus().session;
+  if (!scan->patient_id.empty() && (!open || open->patient_id != scan->patient_id))
+    return done(AnswerOf("the session of this patient is not open: a result is accepted in it"));
+  store_.Change(std::move(done),
+                [=](Store& store) { return store.AcceptScan(actor, id, reason), std::string(); });
+}
+
+void WebScans::RemoveScan(const web::Actor& actor, const std::string& id, const std::string& reason,
+                          web::Done done) {
+  store_.Change(std::move(done),
+                [=](Store& store) { return store.RemoveScan(actor, id, reason), std::string(); });
+}
+
+std::optional<std::string> WebScans::CompactMap(const std::string& scan_id,
+                                                const std::string& name) {
+  const std::optional<web::Scan> scan = FindScan(scan_id);
+  if (!scan || scan->folder.empty()) return std::nullopt;
+  try {
+    return plumb::CompactMap(scan->folder, name);
+  } catch (const std::exception& error) {
+    plumb::Log(LogLevel::kNotice,
+               fmt::format("no map {} of scan {}: {}", name, scan_id, error.what()));
+    return std::nullopt;
+  }
+}
+
+std::optional<std::string> WebScans::ScanReport(const std::string& scan_id,
+                                                web::Language language) {
+  return store_.Read([&](Store& store) -> std::optional<std::string> {
+    const std::optional<web::Scan> scan = store.FindScan(scan_id);
+    return scan ? std::optional(ScanReportPdf(store, *scan, language)) : std::nullopt;
+  });
+}
+
+std::optional<std::string> WebScans::CourseReport(const std::string& patient_id,
+                                                  web::Language language) {
+  return store_.Read([&](Store& store) -> std::optional<std::string> {
+    const std::optional<web::Patient> patient = store.FindPatient(patient_id);
+    return patient ? std::optional(CourseReportPdf(store, *patient, language)) : std::nullopt;
+  });
+}
+
+}  // namespace plumb

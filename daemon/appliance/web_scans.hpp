@@ -1,0 +1,32 @@
+// The scans as the page asks for them.
+#pragma once
+
+#include "daemon/appliance/store_access.hpp"
+#include "web/service/scan_service.hpp"
+
+namespace plumb {
+
+/// Borrows what it is given.
+class WebScans : public web::ScanService {
+ public:
+  WebScans(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}
+
+  [[nodiscard]] std::vector<web::Scan> Scans(const std::string& patient_id, int limit) override;
+  [[nodiscard]] std::optional<web::Scan> FindScan(const std::string& id) override;
+  void AcceptScan(const web::Actor& actor, const std::string& id, const std::string& reason,
+                  web::Done done) override;
+  void RemoveScan(const web::Actor& actor, const std::string& id, const std::string& reason,
+                  web::Done done) override;
+  [[nodiscard]] std::optional<std::string> CompactMap(const std::string& scan_id,
+                                                      const std::string& name) override;
+  [[nodiscard]] std::optional<std::string> ScanReport(const std::string& scan_id,
+                                                      web::Language language) override;
+  [[nodiscard]] std::optional<std::string> CourseReport(const std::string& patient_id,
+                                                        web::Language language) override;
+
+ private:
+  Appliance& appliance_;
+  StoreAccess& store_;
+};
+
+}  // namespace plumb

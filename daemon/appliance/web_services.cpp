@@ -1,0 +1,53 @@
+#include "daemon/appliance/web_services.hpp"
+
+#include <systemd/sd-id128.h>
+
+#include <array>
+#include <cstdlib>
+#include <string>
+#include <utility>
+
+namespace plumb {
+
+namespace {
+
+/// Of this start of the machine. The unit passes it on, because its sandbox hides where it stands.
+std::string BootId() {
+  if (const char* given = std::getenv("PLUMB_BOOT_ID"); given != nullptr) return given;
+  sd_id128_t id{};
+  std::array<char, SD_ID128_STRING_MAX> text{};
+  return sd_id128_get_boot(&id) < 0 ? std::string() : sd_id128_to_string(id, text.data());
+}
+
+}  // namespace
+
+WebServices::WebServices(Appliance& appliance, const UpdateConfig& update,
+                         std::unique_ptr<SystemRestart> restart)
+    : store_(appliance),
+      audit_(store_),
+      button_(appliance, audit_),
+      patients_(appliance, store_),
+      references_(appliance, store_),
+      scans_(appliance, store_),
+      checks_(appliance, store_),
+      room_(appliance, store_),
+      profiles_(appliance, store_),
+      displays_(store_),
+      accounts_(store_),
+      settings_(store_),
+      maintenance_(appliance, store_),
+      updates_(
+          appliance, std::move(restart),
+          {.config = update,
+           .boot = BootId(),
+           .aside =
+               [this](std::function<void()> work) {
+                 return background_.PostToFiles(std::move(work));
+               },
+           .changed = [this] { button_.Notify(web::EventKind::kUpdate); },
+           .log = [this](
+                      const web::Actor& actor, const char* action, const std::string& subject,
+                      const std::string& detail) { audit_.Log(actor, action, subject, detail); }}),
+      background_(appliance.loop()) {}
+
+}  // namespace plumb

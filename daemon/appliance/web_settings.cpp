@@ -1,0 +1,67 @@
+#include "daemon/appliance/web_settings.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "web/service/limits.hpp"
+
+namespace plumb {
+
+using web::ChangeResult;
+
+namespace {
+
+std::string CheckSettings(const web::Settings& s) {
+  struct Field {
+    const char* name;
+    double value;
+    web::Range range;
+  };
+  for (const Field& field :
+       {Field{"tolerance.shift_mm", s.tolerance.shift_mm, web::kShiftTolerance_mm},
+        Field{"tolerance.rotation_deg", s.tolerance.rotation_deg, web::kRotationTolerance_deg},
+        Field{"auto_stop_s", s.auto_stop_s, web::kAutoStop_s},
+        Field{"scan_limit_s", s.scan_limit_s, web::kScanLimit_s},
+        Field{"retention_days", static_cast<double>(s.retention_days), web::kRetention_days},
+        Field{"idle_logout_min", static_cast<double>(s.idle_logout_min), web::kIdleLogout_min}}) {
+    if (!field.range.Holds(field.value))
+      return fmt::format("{}: expected {} to {}", field.name, field.range.least, field.range.most);
+  }
+  if (!web::IsPosture(s.posture))
+    return fmt::format("posture: expected one of {}", fmt::join(web::kPostures, ", "));
+  return {};
+}
+
+}  // namespace
+
+web::Settings WebSettings::GetSettings() {
+  return store_.Read([](Store& store) { return store.GetSettings(); });
+}
+
+void WebSettings::ChangeSettings(const web::Actor& actor, const web::Settings& settings,
+                                 web::Done done) {
+  if (const std::string wrong = CheckSettings(settings); !wrong.empty()) {
+    return done(Refusal(ChangeResult::kInvalid, wrong));
+  }
+  store_.Change(std::move(done),
+                [=](Store& store) { return store.ChangeSettings(actor, settings), std::string(); });
+}
+
+std::vector<web::PlanTemplate> WebSettings::Templates() {
+  return store_.Read([](Store& store) { return store.Templates(); });
+}
+
+void WebSettings::SetTemplate(const web::Actor& actor, const web::PlanTemplate& wanted,
+                              web::Done done) {
+  store_.Change(std::move(done),
+                [=](Store& store) { return store.SetTemplate(actor, wanted), std::string(); });
+}
+
+void WebSettings::RemoveTemplate(const web::Actor& actor, const std::string& site, web::Done done) {
+  store_.Change(std::move(done),
+                [=](Store& store) { return store.RemoveTemplate(actor, site), std::string(); });
+}
+
+}  // namespace plumb

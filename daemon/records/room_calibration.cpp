@@ -1,0 +1,197 @@
+#include "daemon/records/room_calibration.hpp"
+
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/base/errors.hpp"
+#include "algo/types/marker_dictionary.hpp"
+#include "daemon/records/check_json.hpp"
+#include "daemon/records/markers_json.hpp"
+#include "daemon/records/scan_files.hpp"
+
+namespace plumb {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kFormat = 1;
+
+Json PoseJson(const Pose& T) {
+  Json rows = Json::array();
+  for (int row = 0; row < 4; ++row) {
+    const Eigen::RowVector4d line = T.matrix().row(row);
+    rows.push_back({line(0), line(1), line(2), line(3)});
+  }
+  return rows;
+}
+
+Pose PoseIn(const Json& rows) {
+  Pose T = Pose::Identity();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column)
+      T.matrix()(row, column) =
+          rows.at(static_cast<std::size_t>(row)).at(static_cast<std::size_t>(column)).get<double>();
+  }
+  const Eigen::Matrix3d R = T.linear();
+  if (!(R.transpose() * R).isApprox(Eigen::Matrix3d::Identity(), 1e-6) || R.determinant() < 0 ||
+      !T.translation().allFinite())
+    throw DataError("T_iec_reference is no rigid transform");
+  return T;
+}
+
+std::string Digest(const std::string& text) {
+  Sha256 sum;
+  sum.Add(text.data(), text.size());
+  return sum.Hex();
+}
+
+std::string JsonOf(const RoomFit& fit, std::span<const BoardScan> scans) {
+  Json json = {{"format", kFormat},
+               {"dictionary", scans[0].dictionary},
+               {"marker_length_m", scans[0].marker_length_m},
+               {"reference_marker", scans[0].reference_marker},
+               {"T_iec_reference", PoseJson(fit.T_iec_reference)},
+               {"shift_m", fit.shift_m},
+               {"turn_rad", fit.turn_rad},
+               {"scans", Json::array()}};
+  for (const BoardScan& scan : scans) {
+    const BoardFit& board = scan.scan->board;
+    json["scans"].push_back({{"check", scan.check_id},
+                             {"rms_m", board.rms_m},
+                             {"scale", board.scale},
+                             {"markers", board.num_markers},
+                             {"shift_uncertainty_m", board.shift_uncertainty_m},
+                             {"turn_uncertainty_rad", board.turn_uncertainty_rad}});
+  }
+  json["markers_iec"] = MarkersJson(fit.markers_iec);
+  return json.dump();
+}
+
+}  // namespace
+
+std::optional<BoardScan> BoardScanIn(const std::string& check_json) {
+  const Json json = Json::parse(check_json, nullptr, /*allow_exceptions=*/false);
+  if (!json.is_object() || !json.contains("board")) return std::nullopt;
+  const auto board = MarkersIn(json["board"]);
+  if (!board || board->empty()) return std::nullopt;
+  BoardScan seen;
+  const auto room = BaselineIn(check_json);
+  if (!room) {
+    seen.fault =
+        "none of the room's markers was seen well: sweep over them too, the room is described by "
+        "them";
+    return seen;
+  }
+  seen.dictionary = room->dictionary;
+  seen.marker_length_m = room->marker_length_m;
+  const Json reference = json.value("reference_marker", Json());
+  if (!reference.is_number_integer()) {
+    seen.fault = "the reference marker was not seen: keep it in view during a part of the sweep";
+    return seen;
+  }
+  seen.reference_marker = reference.get<int>();
+  try {
+    const int size = MarkerDictionary::ByName(seen.dictionary).size();
+    auto fit = FitRoomBoard(MakeRoomBoard(size, seen.marker_length_m), *board);
+    if (auto* why = std::get_if<std::string>(&fit))
+      seen.fault = std::move(*why);
+    else
+      seen.scan = RoomScan{room->markers, std::get<BoardFit>(fit)};
+  } catch (const std::exception& error) {  // no such dictionary, or no board of such markers
+    seen.fault = error.what();
+  }
+  return seen;
+}
+
+RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans, const RoomCalibrationLimits& limits) {
+  RoomCandidate candidate{
+      .scans = std::move(scans), .fit = {}, .why_not = {}, .json = {}, .digest = {}};
+  std::vector<BoardScan> used;
+  std::vector<RoomScan> seen;
+  for (const BoardScan& scan : candidate.scans) {
+    if (!scan.scan || used.size() == limits.num_scans) continue;
+    if (!used.empty() &&
+        (scan.dictionary != used[0].dictionary || scan.marker_length_m != used[0].marker_length_m ||
+         scan.reference_marker != used[0].reference_marker))
+      break;  // the markers were set up anew
+    used.push_back(scan);
+    seen.push_back(*scan.scan);
+  }
+  if (used.empty()) {
+    candidate.why_not = candidate.scans.empty()
+                            ? "the board has not been scanned yet"
+                            : "no scan of the board can be used: " + candidate.scans[0].fault;
+    return candidate;
+  }
+  auto fit = FitRoom(seen);
+  if (auto* why = std::get_if<std::string>(&fit)) {
+    candidate.why_not = std::move(*why);
+    return candidate;
+  }
+  candidate.fit = std::get<RoomFit>(std::move(fit));
+  candidate.why_not = WhyNotSign(*candidate.fit, used.size(), limits);
+  candidate.json = JsonOf(*candidate.fit, used);
+  candidate.digest = Digest(candidate.json);
+  return candidate;
+}
+
+SignedRoom SignedRoomIn(const std::string& text) {
+  try {
+    const Json json = Json::parse(text);
+    if (json.at("format").get<int>() != kFormat)
+      throw DataError(fmt::format("expected format {}, found {}", kFormat, json["format"].dump()));
+    SignedRoom room;
+    room.digest = Digest(text);
+    room.dictionary = json.at("dictionary").get<std::string>();
+    room.marker_length_m = json.at("marker_length_m").get<double>();
+    room.reference_marker = json.at("reference_marker").get<int>();
+    room.fit.T_iec_reference = PoseIn(json.at("T_iec_reference"));
+    room.fit.shift_m = json.at("shift_m").get<double>();
+    room.fit.turn_rad = json.at("turn_rad").get<double>();
+    for (const Json& scan : json.at("scans"))
+      room.check_ids.push_back(scan.at("check").get<std::string>());
+    auto markers = MarkersIn(json.at("markers_iec"));
+    if (!markers || markers->empty()) throw DataError("its markers cannot be read");
+    room.fit.markers_iec = std::move(*markers);
+    return room;
+  } catch (const std::exception& error) {
+    throw DataError(fmt::format(
+        "the stored calibration of the room cannot be used: {}; calibrate the room again",
+        error.what()));
+  }
+}
+
+std::optional<std::string> WhyRoomIsDue(const SignedRoom& room, const std::string& check_json,
+                                        const MarkerCheckLimits& limits) {
+  const auto seen = BaselineIn(check_json);
+  if (!seen) return std::nullopt;
+  if (seen->dictionary != room.dictionary ||
+      std::abs(seen->marker_length_m - room.marker_length_m) > 1e-6)
+    return "the room has other markers than when it was calibrated";
+  Scene scene;
+  scene.markers = seen->markers;
+  scene.marker_dictionary = seen->dictionary;
+  scene.marker_length_m = seen->marker_length_m;
+  const MarkerCheck check = CheckMarkers(
+      scene, MarkerBaseline{room.fit.markers_iec, room.dictionary, room.marker_length_m}, limits);
+  std::optional<std::string> answer;
+  for (const MarkerCheckItem& item : check.items) {
+    if (item.name != "misfit" && item.name != "moved") continue;
+    if (!answer) answer.emplace();
+    if (item.passed || !answer->empty()) continue;
+    *answer =
+        item.name == "moved"
+            ? fmt::format("{} moved {:.0f} mm since the room was calibrated", item.note, item.value)
+            : fmt::format(
+                  "the markers lie {:.1f} mm (RMS) off where they lay when the room "
+                  "was calibrated",
+                  item.value);
+  }
+  return answer;
+}
+
+}  // namespace plumb

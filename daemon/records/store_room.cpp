@@ -1,0 +1,124 @@
+// The room's calibrations.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "algo/base/units.hpp"
+#include "daemon/records/store.hpp"
+#include "daemon/records/store_internal.hpp"
+
+namespace plumb {
+
+using store::FromStored;
+using store::ToStored;
+using web::ChangeResult;
+
+namespace {
+
+constexpr int kScansShown = 6;       // with the board, of one calibration
+constexpr int kChecksSearched = 20;  // since it was signed, until one saw enough
+
+constexpr const char* kNewestRooms =
+    "SELECT version, signed_at, signed_by, digest, json FROM room_calibrations ORDER BY version "
+    "DESC LIMIT ?";
+
+/// @throws DataError
+SignedRoom ReadRoom(const Statement& row) {
+  SignedRoom room = SignedRoomIn(row.Text(4));
+  room.version = static_cast<int>(row.Integer(0));
+  if (room.digest != row.Text(3)) {
+    throw DataError(fmt::format(
+        "the stored calibration of the room, version {}, is not the one that was signed: calibrate "
+        "the room again",
+        room.version));
+  }
+  room.signed_at = FromStored(row.Integer(1));
+  room.signed_by = row.Text(2);
+  return room;
+}
+
+RoomCandidate ReadCandidate(Database& database, const std::string& serial, std::int64_t since) {
+  Statement query = database.Prepare(
+      "SELECT id, time, user, json FROM checks WHERE sensor_serial = ? AND time >= ? AND time > "
+      "(SELECT COALESCE(MAX(signed_at), 0) FROM room_calibrations) ORDER BY id DESC LIMIT ?");
+  query.Bind(serial).Bind(since).Bind(std::int64_t{kScansShown});
+  std::vector<BoardScan> scans;
+  while (query.Step()) {
+    std::optional<BoardScan> scan = BoardScanIn(query.Text(3));
+    if (!scan) continue;
+    scan->check_id = query.Text(0);
+    scan->time = FromStored(query.Integer(1));
+    scan->user = query.Text(2);
+    scans.push_back(std::move(*scan));
+  }
+  return RoomCandidateOf(std::move(scans));
+}
+
+}  // namespace
+
+RoomCandidate Store::CandidateOfRoom(const std::string& sensor_serial,
+                                     web::WallClock::time_point since) {
+  const std::lock_guard lock(list_mutex_);
+  return ReadCandidate(*list_, sensor_serial, ToStored(since));
+}
+
+std::optional<SignedRoom> Store::RoomCalibration() {
+  const std::lock_guard lock(read_mutex_);
+  Statement query = read_->Prepare(kNewestRooms);
+  return query.Bind(std::int64_t{1}).Step() ? std::optional(ReadRoom(query)) : std::nullopt;
+}
+
+std::vector<SignedRoom> Store::RoomCalibrations(int limit) {
+  const std::lock_guard lock(list_mutex_);
+  Statement query = list_->Prepare(kNewestRooms);
+  query.Bind(std::int64_t{limit});
+  std::vector<SignedRoom> rooms;
+  while (query.Step()) {
+    try {
+      rooms.push_back(ReadRoom(query));
+    } catch (const DataError&) {  // told where it would be used
+    }
+  }
+  return rooms;
+}
+
+std::string Store::SignRoom(const web::Actor& actor, const std::string& sensor_serial,
+                            web::WallClock::time_point since, const std::string& digest) {
+  const std::lock_guard lock(write_mutex_);
+  Transaction transaction(*write_);
+  const RoomCandidate candidate = ReadCandidate(*write_, sensor_serial, ToStored(since));
+  if (!candidate.why_not.empty()) throw StoreRefusal(ChangeResult::kConflict, candidate.why_not);
+  if (candidate.digest != digest) {
+    throw StoreRefusal(ChangeResult::kConflict,
+                       "the board has been scanned again since this was read: read it again");
+  }
+  write_
+      ->Prepare(
+          "INSERT INTO room_calibrations (signed_at, signed_by, digest, json) VALUES (?, ?, ?, ?)")
+      .Bind(ToStored(web::WallClock::now()))
+      .Bind(actor.user)
+      .Bind(candidate.digest)
+      .Bind(candidate.json)
+      .Run();
+  const std::string version = std::to_string(write_->last_id());
+  Write(actor, "room.calibrate", version,
+        fmt::format("scans differ by {:.2f} mm and {:.2f} deg, sha256 {}",
+                    candidate.fit->shift_m / kMillimetre, candidate.fit->turn_rad / kDegree,
+                    candidate.digest));
+  transaction.Commit();
+  return version;
+}
+
+std::string Store::WhyRoomIsDueNow(const SignedRoom& room, const MarkerCheckLimits& limits) {
+  const std::lock_guard lock(read_mutex_);
+  Statement query =
+      read_->Prepare("SELECT json FROM checks WHERE time > ? ORDER BY id DESC LIMIT ?");
+  query.Bind(ToStored(room.signed_at)).Bind(std::int64_t{kChecksSearched});
+  while (query.Step()) {
+    if (const auto why = WhyRoomIsDue(room, query.Text(0), limits)) return *why;
+  }
+  return {};
+}
+
+}  // namespace plumb

@@ -1,0 +1,83 @@
+#include "daemon/update/bundle_check.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace plumb {
+namespace {
+
+/// A bundle ends with its signature and, in eight bytes, that one's size; it begins as a squashfs.
+constexpr std::string_view kSquashfs = "hsqs";
+constexpr std::uint64_t kMaxSignature = 64 << 10;
+constexpr std::uint64_t kLeastBundle = 4096;
+
+}  // namespace
+
+std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_bytes) {
+  const std::string name = file.filename().string();
+  const int fd = ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK);
+  if (fd < 0) {
+    const int why = errno;
+    struct stat info {};
+    if (why == EACCES && ::lstat(file.c_str(), &info) == 0 && S_ISREG(info.st_mode) &&
+        info.st_uid == 0 && (info.st_mode & 077) == 0)
+      return {};
+    return fmt::format("{} cannot be read: {}", name, std::strerror(why));
+  }
+  const auto check = [&]() -> std::string {
+    struct stat info {};
+    if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) return name + " is no plain file";
+    const auto size = static_cast<std::uint64_t>(info.st_size);
+    if (size < kLeastBundle)
+      return fmt::format("{} is too short for a bundle: {} bytes; copy it again", name, size);
+    if (size > max_bytes)
+      return fmt::format("{} is too large: {} MB, at most {} MB", name, size >> 20,
+                         max_bytes >> 20);
+    std::array<char, 4> magic{};
+    std::array<unsigned char, 8> tail{};
+    if (::pread(fd, magic.data(), magic.size(), 0) != static_cast<ssize_t>(magic.size()) ||
+        ::pread(fd, tail.data(), tail.size(), static_cast<off_t>(size - tail.size())) !=
+            static_cast<ssize_t>(tail.size())) {
+      return fmt::format("{} cannot be read: {}", name, std::strerror(errno));
+    }
+    std::uint64_t signature = 0;
+    for (const unsigned char byte : tail) signature = signature << 8 | byte;
+    if (std::string_view(magic.data(), magic.size()) != kSquashfs)
+      return name + " is no bundle: expected a squashfs image";
+    if (signature == 0 || signature > kMaxSignature || signature + tail.size() >= size) {
+      return name + " is no whole bundle: no signature at its end; copy it again";
+    }
+    return {};
+  };
+  std::string why = check();
+  ::close(fd);
+  return why;
+}
+
+bool IsOlder(const std::string& a, const std::string& b) {
+  const auto next = [](std::string_view& rest) {
+    const auto dot = rest.find('.');
+    const std::string_view part = rest.substr(0, dot);
+    rest = dot == std::string_view::npos ? std::string_view() : rest.substr(dot + 1);
+    long number = 0;
+    std::from_chars(part.data(), part.data() + part.size(), number);
+    return number;
+  };
+  std::string_view left = a, right = b;
+  while (!left.empty() || !right.empty()) {
+    const long x = next(left), y = next(right);
+    if (x != y) return x < y;
+  }
+  return false;
+}
+
+}  // namespace plumb

@@ -1,0 +1,115 @@
+#include "daemon/update/bundle_folder.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <exception>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/update/bundle_check.hpp"
+#include "drivers/files/file_io.hpp"
+
+namespace plumb {
+
+using web::ChangeResult;
+
+namespace {
+
+constexpr std::size_t kMaxListed = 32;
+constexpr std::size_t kMaxKept = 4;
+constexpr std::string_view kEnding = ".raucb";
+
+/// Keeps a file open, and closes it on another thread where there is one: to free a large file
+/// takes its time.
+class DeferredClose {
+ public:
+  DeferredClose(const std::filesystem::path& file, const BundleFolder::Aside& aside)
+      : aside_(aside), fd_(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK)) {}
+  ~DeferredClose() {
+    if (fd_ < 0) return;
+    if (!aside_ || !aside_([fd = fd_] { ::close(fd); })) ::close(fd_);
+  }
+  DeferredClose(const DeferredClose&) = delete;
+  DeferredClose& operator=(const DeferredClose&) = delete;
+
+ private:
+  const BundleFolder::Aside& aside_;
+  int fd_;
+};
+
+}  // namespace
+
+web::Change Refused(ChangeResult result, std::string message) {
+  return {.result = result, .message = std::move(message), .id = {}, .file = {}};
+}
+
+std::vector<std::string> BundleFolder::List() const {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder_, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (name.ends_with(kEnding) && !name.starts_with('.') && names.size() < kMaxListed)
+      names.push_back(name);
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+bool BundleFolder::Has(const std::string& name) const {
+  const std::vector<std::string> known = List();
+  return std::find(known.begin(), known.end(), name) != known.end();
+}
+
+web::Change BundleFolder::Add(const std::filesystem::path& file, const std::string& name) const {
+  if (const std::string why = WhyNoBundle(file, max_bytes_); !why.empty()) {
+    return Refused(ChangeResult::kInvalid,
+                   name + why.substr(std::min(why.size(), file.filename().string().size())));
+  }
+  const std::vector<std::string> known = List();
+  const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
+  if (!is_known && known.size() >= kMaxKept)
+    return Refused(ChangeResult::kConflict, "there are too many bundles: remove one first");
+  const DeferredClose replaced(folder_ / name, aside_);
+  // A power cut soon after would else leave the name with nothing behind it.
+  try {
+    SyncToDisk(file);
+    if (::rename(file.c_str(), (folder_ / name).c_str()) != 0)
+      throw IoError(DescribeWriteError(name, errno));
+    SyncToDisk(folder_);
+  } catch (const std::exception& error) {
+    return Refused(ChangeResult::kNoSpace, error.what());
+  }
+  return {};
+}
+
+web::Change BundleFolder::Remove(const std::string& name) const {
+  if (!Has(name)) return Refused(ChangeResult::kNotFound, "there is no such bundle");
+  std::error_code error;
+  const DeferredClose removed(folder_ / name, aside_);
+  std::filesystem::remove(folder_ / name, error);
+  if (error)
+    return Refused(ChangeResult::kFailed,
+                   fmt::format("{} cannot be removed: {}", name, error.message()));
+  return {};
+}
+
+void BundleFolder::RemoveUnfinished() const {
+  std::error_code error;
+  std::vector<std::filesystem::path> broken;
+  for (std::filesystem::directory_iterator entry(folder_, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().filename().string().starts_with(".upload-")) broken.push_back(entry->path());
+  }
+  for (const std::filesystem::path& file : broken) std::filesystem::remove(file, error);
+}
+
+}  // namespace plumb

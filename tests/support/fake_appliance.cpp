@@ -1,0 +1,535 @@
+#include "tests/support/fake_appliance.hpp"
+
+#include <fmt/format.h>
+#include <strings.h>
+
+#include <algorithm>
+#include <fstream>
+
+namespace plumb::test {
+
+using namespace web;  // NOLINT: a test's own names are none of these
+
+FakeAppliance::FakeAppliance() {
+  status.state = ApplianceState::kReady;
+  status.sensor = {true, "1503150045", "Virtual Xtion", 30.0, 1800.0};
+  status.storage = {std::int64_t{182} << 30, std::int64_t{238} << 30, true};
+  status.light = "ready";
+  status.version = "0.1.0-test";
+  update.message = "updates need the appliance image";
+}
+
+Change FakeAppliance::Refusal(ChangeResult result, std::string message) {
+  return {result, std::move(message), "", ""};
+}
+
+void FakeAppliance::Tell(EventKind kind) const {
+  if (listener_) listener_(kind);
+}
+
+void FakeAppliance::Finish(const Done& done, Change change) {
+  if (hold_completions) {
+    held.push_back([done, change] { done(change); });
+  } else {
+    done(change);
+  }
+}
+
+void FakeAppliance::Did(const Actor& actor, const std::string& action, const std::string& subject,
+                        const Done& done, const std::string& id) {
+  Log(actor, action, subject, "");
+  Tell(EventKind::kData);
+  Finish(done, {ChangeResult::kDone, "", id, ""});
+}
+
+void FakeAppliance::StartSweep(const Actor& actor, Done done) {
+  if (status.state == ApplianceState::kReady || status.state == ApplianceState::kResult)
+    return Press(actor, std::move(done));
+  Finish(done,
+         Refusal(ChangeResult::kConflict, "a scan is running already: end or cancel it first"));
+}
+
+void FakeAppliance::EndSweep(const Actor& actor, Done done) {
+  if (status.state == ApplianceState::kScanning) return Press(actor, std::move(done));
+  Finish(done, Refusal(ChangeResult::kConflict, "no scan is running"));
+}
+
+void FakeAppliance::Fail(const std::string& reason) {
+  if (status.scan && !is_check_) {
+    scans.back().outcome = ScanOutcome::kFailed;
+    scans.back().failure = reason;
+  }
+  status.scan.reset();
+  status.state = ApplianceState::kFault;
+  status.fault = reason;
+  status.fault_kind = FaultKind::kScan;
+  status.light = "fault";
+  Tell(EventKind::kResult);
+}
+
+void FakeAppliance::Press(const Actor& actor, Done done) {
+  if (status.fault_kind == FaultKind::kScan) {
+    status.fault.clear();
+    status.fault_kind = FaultKind::kNone;
+    status.state = ApplianceState::kReady;
+    status.light = "ready";
+    Tell(EventKind::kStatus);
+    return Did(actor, "press", "", done);
+  }
+  if (status.state == ApplianceState::kScanning) {
+    phase_begun_.reset();
+    status.state = ApplianceState::kWorking;
+    status.light = "working";
+    status.scan->step = "surfaces";
+    Tell(EventKind::kStatus);
+    return Did(actor, "press", status.scan->id, done);
+  }
+  if (status.state != ApplianceState::kReady && status.state != ApplianceState::kResult) {
+    return Finish(
+        done, Refusal(ChangeResult::kConflict,
+                      "in this state a press is ignored; it requires ready, scanning or result"));
+  }
+  Scan scan;
+  scan.id = fmt::format("s{:04}", next_id_++);
+  scan.patient_id = status.patient_id;
+  scan.purpose = status.next_purpose;
+  if (const Patient* patient = PatientOf(status.patient_id);
+      patient != nullptr && scan.purpose == ScanPurpose::kFraction) {
+    scan.reference_id = patient->approved_reference_id;
+  }
+  scan.started_at = WallClock::now();
+  if (status.session) {
+    scan.session_id = status.session->id;
+    scan.fraction = status.session->fraction;
+  }
+  scan.sensor_on_s = status.sensor.powered_s;
+  scan.check_overdue = status.check_overdue;
+  if (!is_check_) scans.push_back(scan);
+  status.scan = LiveScan{.id = scan.id,
+                         .patient_id = scan.patient_id,
+                         .purpose = scan.purpose,
+                         .coverage = 0.0,
+                         .step = "tracking"};
+  status.state = ApplianceState::kScanning;
+  status.light = "scanning";
+  phase_begun_.reset();
+  Tell(EventKind::kStatus);
+  Did(actor, "press", scan.id, done);
+}
+
+void FakeAppliance::Cancel(const Actor& actor, Done done) {
+  if (!status.scan)
+    return Finish(
+        done, Refusal(ChangeResult::kConflict,
+                      "in this state there is nothing to cancel; it requires scanning or working"));
+  if (!is_check_) scans.back().outcome = ScanOutcome::kCancelled;
+  if (!is_check_) scans.back().failure = "cancelled";
+  CloseCheck();
+  const std::string id = status.scan->id;
+  status.scan.reset();
+  status.state = ApplianceState::kReady;
+  status.light = "ready";
+  Tell(EventKind::kStatus);
+  Did(actor, "cancel", id, done);
+}
+
+void FakeAppliance::Tick(std::chrono::steady_clock::time_point now) {
+  if (!status.scan) return;
+  if (!phase_begun_) phase_begun_ = now;
+  const auto elapsed = std::chrono::duration_cast<std::chrono::milliseconds>(now - *phase_begun_);
+  LiveScan& scan = *status.scan;
+  if (status.state == ApplianceState::kScanning) {
+    const double fraction =
+        std::min(1.0, static_cast<double>(elapsed.count()) / static_cast<double>(sweep.count()));
+    scan.elapsed_s = static_cast<double>(elapsed.count()) / 1000.0;
+    scan.coverage = fraction;
+    scan.guidance = fraction > 0.3 && fraction < 0.6 ? Guidance::kSlower : Guidance::kNone;
+    if (guidance) scan.guidance = *guidance;
+    status.light = scan.guidance == Guidance::kSlower ? "too_fast" : "scanning";
+    scan.frames = static_cast<std::int64_t>(scan.elapsed_s * 30);
+    scan.frames_tracked = scan.frames;
+    scan.keyframes = scan.frames / 4;
+    if (fraction >= 1.0) {
+      phase_begun_ = now;
+      status.state = ApplianceState::kWorking;
+      status.light = "working";
+      scan.step = "surfaces";
+      scan.guidance = Guidance::kNone;
+    }
+    Tell(EventKind::kProgress);
+  } else {
+    scan.step_fraction =
+        std::min(1.0, static_cast<double>(elapsed.count()) / static_cast<double>(work.count()));
+    Tell(EventKind::kProgress);
+    if (elapsed >= work) EndScan();
+  }
+}
+
+void FakeAppliance::CloseCheck() {
+  if (!is_check_) return;
+  is_check_ = false;
+  status.next_purpose = ScanPurpose::kFraction;
+  status.patient_id = patient_before_check_;
+}
+
+void FakeAppliance::EndCheck() {
+  CheckRecord check;
+  check.id = fmt::format("{}", next_id_++);
+  check.status = checks.baseline ? "passed" : "no_baseline";
+  check.num_markers = 12;
+  check.items = {
+      {"markers_seen", 12, 12, "", true, ""},    {"misfit", 0.84, 3, "mm", true, ""},
+      {"moved", 1.6, 5, "mm", true, "marker 4"}, {"scale", 0.08, 0.5, "%", true, ""},
+      {"side", -0.4, 3, "%", true, "marker 9"},  {"depth_scale", 0.62, 3, "%", true, ""}};
+  if (!checks.baseline)
+    check.reasons = {
+        "there is no baseline yet: somebody who knows that the markers lie right takes this check "
+        "as the baseline"};
+  if (next_check) {
+    const std::string id = check.id;
+    check = *next_check;
+    check.id = id;
+    next_check.reset();
+  }
+  check.time = WallClock::now();
+  check.user = checker_;
+  check.sensor_serial = status.sensor.serial;
+  checks.checks.insert(checks.checks.begin(), check);
+  if (check.status == "passed") {
+    checks.overdue = false;
+    status.reference_block.clear();
+  }
+  status.last_check = check;
+  status.check_overdue = checks.overdue;
+  status.scan.reset();
+  status.state = ApplianceState::kResult;
+  status.light = check.status == "passed" ? "result_in_tolerance" : "no_answer";
+  if (is_board_there) SeeBoard(check);
+  CloseCheck();
+  Tell(EventKind::kResult);
+}
+
+/// The third scan may be signed, as in the appliance.
+void FakeAppliance::SeeBoard(const CheckRecord& check) {
+  room.scans.insert(room.scans.begin(), {.check_id = check.id,
+                                         .time = check.time,
+                                         .user = check.user,
+                                         .fault = {},
+                                         .num_markers = 4,
+                                         .rms_mm = 0.42,
+                                         .scale_percent = 99.8,
+                                         .shift_uncertainty_mm = 0.31,
+                                         .turn_uncertainty_deg = 0.14});
+  room.shift_mm = room.scans.size() == 1 ? 0 : 0.37;
+  room.turn_deg = room.scans.size() == 1 ? 0 : 0.06;
+  room.max_shift_mm = 1;
+  room.max_turn_deg = 0.2;
+  room.digest = std::string(63, 'a') + std::to_string(room.scans.size() % 10);
+  room.why_not_sign = room.scans.size() < room.num_wanted
+                          ? fmt::format(
+                                "{} of {} scans of the board are there: scan again, without "
+                                "touching it",
+                                room.scans.size(), room.num_wanted)
+                          : "";
+}
+
+void FakeAppliance::SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) {
+  if (room.scans.size() < room.num_wanted || !room.why_not_sign.empty())
+    return Finish(done, Refusal(ChangeResult::kConflict, room.why_not_sign));
+  if (digest != room.digest) {
+    return Finish(done, Refusal(ChangeResult::kConflict,
+                                "the board has been scanned again since this was read: read it "
+                                "again"));
+  }
+  const int version = room.versions.empty() ? 1 : room.versions.front().version + 1;
+  RoomCalibrationVersion made{.version = version,
+                              .signed_at = WallClock::now(),
+                              .signed_by = actor.user,
+                              .digest = digest,
+                              .shift_mm = *room.shift_mm,
+                              .turn_deg = *room.turn_deg,
+                              .check_ids = {}};
+  for (const RoomBoardScan& scan : room.scans) made.check_ids.push_back(scan.check_id);
+  room.versions.insert(room.versions.begin(), made);
+  room.scans.clear();
+  room.shift_mm.reset();
+  room.turn_deg.reset();
+  room.digest.clear();
+  room.due.clear();
+  room.why_not_sign = "the board has not been scanned yet";
+  status.is_room_known = true;
+  Did(actor, "room.calibrate", std::to_string(version), done, std::to_string(version));
+}
+
+std::optional<std::string> FakeAppliance::RoomBoardPdf(std::string& why_not) {
+  if (!status.sensor.present) {
+    why_not = "no sensor is attached";
+    return std::nullopt;
+  }
+  return "%PDF-1.5 of a test";
+}
+
+void FakeAppliance::OpenCheck(const Actor& actor, Done done) {
+  if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running"));
+  if (!is_check_) patient_before_check_ = status.patient_id;
+  is_check_ = true;
+  checker_ = actor.user;
+  status.patient_id.clear();
+  status.next_purpose = ScanPurpose::kDailyCheck;
+  Tell(EventKind::kStatus);
+  Did(actor, "check.open", "", done);
+}
+
+void FakeAppliance::SetCheckBaseline(const Actor& actor, const std::string& check_id, Done done) {
+  const auto found = std::find_if(checks.checks.begin(), checks.checks.end(),
+                                  [&](const CheckRecord& check) { return check.id == check_id; });
+  if (found == checks.checks.end())
+    return Finish(done, Refusal(ChangeResult::kNotFound, "there is no such check"));
+  if (found->user == actor.user)
+    return Finish(done, Refusal(ChangeResult::kRefused, "another person sets it as the baseline"));
+  checks.baseline = CheckBaseline{check_id, WallClock::now(), actor.user, found->num_markers};
+  Did(actor, "check.baseline", check_id, done);
+}
+
+std::optional<std::string> FakeAppliance::SensorProfileFile(int version) {
+  for (const SensorProfileVersion& one : profiles.versions)
+    if (one.version == version && one.num_sweeps > 0) return "{}";
+  return std::nullopt;
+}
+
+void FakeAppliance::ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) {
+  if (serial != profiles.serial)
+    return Finish(done, Refusal(ChangeResult::kConflict, "the sensor is not connected"));
+  SensorProfileVersion reset;
+  reset.version = profiles.versions.empty() ? 1 : profiles.versions.front().version + 1;
+  reset.made_at = WallClock::now();
+  reset.cause = "reset";
+  profiles.versions.insert(profiles.versions.begin(), reset);
+  Did(actor, "profile.reset", serial, done);
+}
+
+void FakeAppliance::RollBackSensorProfile(const Actor& actor, const std::string& serial,
+                                          int version, Done done) {
+  if (serial != profiles.serial)
+    return Finish(done, Refusal(ChangeResult::kConflict, "the sensor is not connected"));
+  for (SensorProfileVersion one : profiles.versions) {
+    if (one.version != version || one.num_sweeps == 0) continue;
+    one.version = profiles.versions.front().version + 1;
+    one.cause = "rolled_back";
+    profiles.versions.insert(profiles.versions.begin(), one);
+    return Did(actor, "profile.roll_back", serial, done);
+  }
+  Finish(done, Refusal(ChangeResult::kNotFound, "there is no such version"));
+}
+
+void FakeAppliance::EndScan() {
+  if (is_check_) return EndCheck();
+  Scan& scan = scans.back();
+  scan.outcome = ScanOutcome::kDone;
+  scan.finished_at = WallClock::now();
+  if (!recorded.empty()) {
+    const Recorded data =
+        next_recorded ? *next_recorded : recorded[std::min(num_finished_, recorded.size() - 1)];
+    if (!next_recorded) ++num_finished_;
+    next_recorded.reset();
+    scan.folder = data.folder;
+    if (!scan.reference_id.empty()) scan.result = data.result;
+  }
+  status.scan.reset();
+  status.state = ApplianceState::kResult;
+  status.light = !scan.result                             ? "done"
+                 : scan.result->verdict == "move"         ? "result_move"
+                 : scan.result->verdict == "in_tolerance" ? "result_in_tolerance"
+                 : scan.result->verdict == "unsure"       ? "result_unsure"
+                                                          : "no_answer";
+  status.last_result = scan;
+  if (status.session) ++status.session->num_scans;
+  ++status.scans_today;
+  if (Patient* patient = PatientOf(scan.patient_id)) {
+    ++patient->num_scans;
+    if (scan.purpose == ScanPurpose::kReference) MakeReference(scan, "technician", "");
+  }
+  Tell(EventKind::kResult);
+}
+
+void FakeAppliance::Unplug() {
+  status.sensor.present = false;
+  status.state = ApplianceState::kNoSensor;
+  status.light = "no_sensor";
+  if (status.scan) {
+    if (!is_check_) {
+      scans.back().outcome = ScanOutcome::kFailed;
+      scans.back().failure = "the sensor was unplugged; the scan is discarded";
+    }
+    CloseCheck();
+    status.scan.reset();
+    Tell(EventKind::kResult);
+  }
+  Tell(EventKind::kStatus);
+}
+
+void FakeAppliance::Plug() {
+  status.sensor.present = true;
+  status.state = ApplianceState::kReady;
+  status.light = "ready";
+  Tell(EventKind::kStatus);
+}
+
+void FakeAppliance::SetTemplate(const Actor& actor, const PlanTemplate& wanted, Done done) {
+  std::erase_if(templates, [&](const PlanTemplate& old) {
+    return strcasecmp(old.site.c_str(), wanted.site.c_str()) == 0;
+  });
+  templates.push_back(wanted);
+  templates.back().changed_by = actor.user;
+  Did(actor, "template.set", "", done);
+}
+
+void FakeAppliance::RemoveTemplate(const Actor& actor, const std::string& site, Done done) {
+  if (std::erase_if(templates, [&](const PlanTemplate& old) {
+        return strcasecmp(old.site.c_str(), site.c_str()) == 0;
+      }) == 0)
+    return Finish(done, Refusal(ChangeResult::kNotFound, "there is no template of this site"));
+  Did(actor, "template.remove", "", done);
+}
+
+void FakeAppliance::AddDisplay(const Actor& actor, const Display& display, Done done) {
+  displays.push_back(display);
+  displays.back().id = fmt::format("d{:04}", next_id_++);
+  const std::string id = displays.back().id;
+  Did(actor, "display.pair", id, done, id);
+}
+
+void FakeAppliance::RemoveDisplay(const Actor& actor, const std::string& id, Done done) {
+  if (std::erase_if(displays, [&](const Display& display) { return display.id == id; }) == 0)
+    return Finish(done, Refusal(ChangeResult::kNotFound, "no such display"));
+  Did(actor, "display.remove", id, done);
+}
+
+void FakeAppliance::MakeBackup(const Actor& actor, Done done) {
+  if (!backup_fault.empty()) return Finish(done, Refusal(ChangeResult::kInvalid, backup_fault));
+  Did(actor, "backup.make", "", done);
+}
+
+std::optional<User> FakeAppliance::FindUser(const std::string& name) {
+  const auto found =
+      std::find_if(users.begin(), users.end(), [&](const User& user) { return user.name == name; });
+  return found == users.end() ? std::nullopt : std::optional(*found);
+}
+
+void FakeAppliance::AddUser(const Actor& actor, const User& user, Done done) {
+  if (FindUser(user.name))
+    return Finish(done, Refusal(ChangeResult::kConflict, "this name is taken"));
+  users.push_back(user);
+  Did(actor, "user.add", user.name, done);
+}
+
+void FakeAppliance::ChangeUser(const Actor& actor, const UserChange& change, Done done) {
+  const auto found = std::find_if(users.begin(), users.end(),
+                                  [&](const User& other) { return other.name == change.name; });
+  if (found == users.end()) return Finish(done, Refusal(ChangeResult::kNotFound, "no such user"));
+  if (change.expected_hash && (found->disabled || found->password_hash != *change.expected_hash))
+    return Finish(done, Refusal(ChangeResult::kConflict,
+                                "the account has been changed by somebody else meanwhile"));
+  User user = *found;
+  user.role = change.role.value_or(user.role);
+  user.disabled = change.disabled.value_or(user.disabled);
+  user.password_hash = change.password_hash.value_or(user.password_hash);
+  const bool engineer_left = std::any_of(users.begin(), users.end(), [&](const User& other) {
+    const User& after = other.name == user.name ? user : other;
+    return after.role == Role::kEngineer && !after.disabled;
+  });
+  if (!engineer_left)
+    return Finish(done, Refusal(ChangeResult::kConflict, "one engineer must remain"));
+  *found = user;
+  Did(actor, "user.change", user.name, done);
+}
+
+void FakeAppliance::Log(const Actor& actor, const std::string& action, const std::string& subject,
+                        const std::string& detail) {
+  audit.push_back({static_cast<std::int64_t>(audit.size()) + 1, WallClock::now(), actor.user,
+                   actor.address, action, subject, detail});
+}
+
+std::vector<AuditEntry> FakeAppliance::Audit(std::int64_t before, int limit) {
+  std::vector<AuditEntry> found;
+  for (auto entry = audit.rbegin();
+       entry != audit.rend() && found.size() < static_cast<std::size_t>(limit); ++entry) {
+    if (before == 0 || entry->number < before) found.push_back(*entry);
+  }
+  return found;
+}
+
+void FakeAppliance::ChangeSettings(const Actor& actor, const Settings& changed, Done done) {
+  settings = changed;
+  Did(actor, "settings.change", "", done);
+}
+
+bool FakeAppliance::Later(web::Aside, std::function<void()> aside, std::function<void()> done) {
+  if (refuse_aside) return false;
+  const auto both = [aside = std::move(aside), done = std::move(done)] {
+    aside();
+    done();
+  };
+  if (hold_aside) {
+    held_aside.push_back(both);
+  } else {
+    both();
+  }
+  return true;
+}
+
+void FakeAppliance::AddBundle(const Actor& actor, const std::filesystem::path& file,
+                              const std::string& name, Done done) {
+  std::ifstream in(file, std::ios::binary);
+  std::string magic(4, ' ');
+  in.read(magic.data(), 4);
+  if (magic != "hsqs")
+    return Finish(
+        done, Refusal(ChangeResult::kInvalid, name + " is no bundle: expected a squashfs image"));
+  uploaded_bytes = std::filesystem::file_size(file);
+  update.bundles.push_back(name);
+  Tell(EventKind::kUpdate);
+  Did(actor, "update.upload", name, done);
+}
+
+void FakeAppliance::RemoveBundle(const Actor& actor, const std::string& name, Done done) {
+  if (std::erase(update.bundles, name) == 0)
+    return Finish(done, Refusal(ChangeResult::kNotFound, "there is no such bundle"));
+  Tell(EventKind::kUpdate);
+  Did(actor, "update.remove", name, done);
+}
+
+void FakeAppliance::InstallUpdate(const Actor& actor, const std::string& bundle, Done done) {
+  if (status.scan)
+    return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running; update after it"));
+  if (!update.supported) return Finish(done, Refusal(ChangeResult::kConflict, update.message));
+  update.installing = true;
+  update.fraction = 0.4;
+  update.message = "Copying image to rootfs.1";
+  Tell(EventKind::kUpdate);
+  Did(actor, "update.install", bundle, done);
+}
+
+void FakeAppliance::RestartSystem(const Actor& actor, Done done) {
+  const auto refuse = [&](const char* why) { Finish(done, Refusal(ChangeResult::kConflict, why)); };
+  if (update.installing) return refuse("a system update is being installed: wait until it is done");
+  if (status.scan) return refuse("a scan is running: wait for its result");
+  if (status.session) return refuse("the session of a patient is open: close it first");
+  ++num_restarts;
+  Did(actor, "system.restart", "", done);
+}
+
+void FakeAppliance::ForgetRollBack(const Actor& actor, Done done) {
+  status.rolled_back.clear();
+  update.rolled_back.clear();
+  Tell(EventKind::kUpdate);
+  Tell(EventKind::kStatus);
+  Did(actor, "update.seen", "", done);
+}
+
+void FakeAppliance::WriteDiagnostics(const Actor& actor, Done done) {
+  Log(actor, "diagnostics", "", "");
+  Finish(done, {ChangeResult::kDone, "", "", diagnostics_file});
+}
+
+}  // namespace plumb::test

@@ -1,0 +1,294 @@
+// The patients, references and scans of the appliance without a sensor.
+#include "tests/support/fake_appliance.hpp"
+
+#include <fmt/format.h>
+#include <strings.h>
+
+#include <algorithm>
+
+namespace plumb::test {
+
+using namespace web;  // NOLINT: a test's own names are none of these
+
+namespace {
+
+template <typename T>
+std::optional<T> FindById(const std::vector<T>& items, const std::string& id) {
+  const auto found =
+      std::find_if(items.begin(), items.end(), [&](const T& item) { return item.id == id; });
+  return found == items.end() ? std::nullopt : std::optional(*found);
+}
+
+}  // namespace
+
+Patient* FakeAppliance::PatientOf(const std::string& id) {
+  const auto found = std::find_if(patients.begin(), patients.end(),
+                                  [&](const Patient& patient) { return patient.id == id; });
+  return found == patients.end() ? nullptr : &*found;
+}
+
+Reference& FakeAppliance::MakeReference(const Scan& scan, const std::string& by,
+                                        const std::string& reason) {
+  Reference reference;
+  reference.id = fmt::format("r{:04}", next_id_++);
+  reference.patient_id = scan.patient_id;
+  reference.version = static_cast<int>(References(scan.patient_id).size()) + 1;
+  reference.scan_id = scan.id;
+  reference.created_at = WallClock::now();
+  reference.created_by = by;
+  reference.reason = reason;
+  reference.plan.tolerance = settings.tolerance;
+  reference.planned_by = by;
+  reference.digest = "digest of " + reference.id + " 1";
+  references.push_back(reference);
+  TellWaiting();
+  return references.back();
+}
+
+std::optional<Patient> FakeAppliance::FindPatient(const std::string& id) {
+  return FindById(patients, id);
+}
+
+void FakeAppliance::AddPatient(const Actor& actor, const std::string& code, const std::string& site,
+                               Done done) {
+  if (std::any_of(patients.begin(), patients.end(), [&](const Patient& patient) {
+        return strcasecmp(patient.code.c_str(), code.c_str()) == 0;
+      })) {
+    return Finish(done, Refusal(ChangeResult::kConflict, "there is a patient of this code"));
+  }
+  patients.push_back({fmt::format("p{:04}", next_id_++), code, site, WallClock::now(), "", 0, ""});
+  Did(actor, "patient.add", patients.back().id, done, patients.back().id);
+}
+
+void FakeAppliance::ChangePatient(const Actor& actor, const std::string& id,
+                                  const std::string& site, const std::string& note, Done done) {
+  for (Patient& patient : patients) {
+    if (patient.id != id) continue;
+    patient.site = site;
+    patient.note = note;
+    return Did(actor, "patient.change", id, done);
+  }
+  Finish(done, Refusal(ChangeResult::kNotFound, "there is no such patient"));
+}
+
+void FakeAppliance::ArchivePatient(const Actor& actor, const std::string& id, bool archived,
+                                   Done done) {
+  for (Patient& patient : patients) {
+    if (patient.id != id) continue;
+    if (archived && status.session && status.session->patient_id == id)
+      return Finish(done, Refusal(ChangeResult::kConflict,
+                                  "the session of this patient is open: close it first"));
+    patient.archived = archived;
+    return Did(actor, archived ? "patient.archive" : "patient.unarchive", id, done);
+  }
+  Finish(done, Refusal(ChangeResult::kNotFound, "there is no such patient"));
+}
+
+void FakeAppliance::WipePatient(const Actor& actor, const std::string& id, Done done) {
+  if (std::erase_if(patients, [&](const Patient& patient) { return patient.id == id; }) == 0) {
+    return Finish(done, Refusal(ChangeResult::kNotFound, "no such patient"));
+  }
+  std::erase_if(references, [&](const Reference& reference) { return reference.patient_id == id; });
+  std::erase_if(scans, [&](const Scan& scan) { return scan.patient_id == id; });
+  if (status.patient_id == id) {
+    status.patient_id.clear();
+    status.session.reset();
+  }
+  if (status.last_result && status.last_result->patient_id == id) status.last_result.reset();
+  Tell(EventKind::kStatus);
+  Did(actor, "patient.wipe", id, done);
+}
+
+void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanPurpose purpose,
+                                const std::string&, const std::string& replaces, Done done) {
+  const Patient* patient = PatientOf(id);
+  if (patient == nullptr) return Finish(done, Refusal(ChangeResult::kNotFound, "no such patient"));
+  if (purpose == ScanPurpose::kFraction && patient->approved_reference_id.empty()) {
+    return Finish(done, Refusal(ChangeResult::kConflict,
+                                "this patient has no approved reference; take one first"));
+  }
+  if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running"));
+  if (patient->archived)
+    return Finish(done, Refusal(ChangeResult::kConflict,
+                                "this patient is archived: take it out of the archive first"));
+  if (purpose == ScanPurpose::kReference && !status.reference_block.empty())
+    return Finish(done, Refusal(ChangeResult::kConflict, status.reference_block));
+  CloseCheck();
+  if (status.session && status.session->patient_id == id && status.session->purpose == purpose) {
+    const std::string same = status.session->id;
+    return Did(actor, "patient.open", id, done, same);
+  }
+  if (status.session && status.session->patient_id != id && status.session->id != replaces) {
+    return Finish(done,
+                  Refusal(ChangeResult::kConflict,
+                          fmt::format("the session of {} is open (opened by {}): close it "
+                                      "first",
+                                      status.session->patient_code, status.session->opened_by)));
+  }
+  status.patient_id = id;
+  status.next_purpose = purpose;
+  status.scans_today = 0;
+  const int fraction = purpose == ScanPurpose::kFraction ? ++num_fractions_[id] : 0;
+  status.session = TreatmentSession{.id = fmt::format("t{:04}", next_id_++),
+                                    .patient_id = id,
+                                    .patient_code = patient->code,
+                                    .purpose = purpose,
+                                    .fraction = fraction,
+                                    .num_scans = 0,
+                                    .opened_by = actor.user,
+                                    .opened_at = WallClock::now()};
+  Tell(EventKind::kStatus);
+  Did(actor, "patient.open", id, done, status.session->id);
+}
+
+void FakeAppliance::CloseSession(const Actor& actor, const std::string& session_id, Done done) {
+  if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running"));
+  if (!status.session || (!session_id.empty() && status.session->id != session_id))
+    return Finish(done, Refusal(ChangeResult::kConflict, "this session is closed already"));
+  status.session.reset();
+  status.patient_id.clear();
+  status.next_purpose = ScanPurpose::kFraction;
+  Tell(EventKind::kStatus);
+  Did(actor, "session.close", "", done);
+}
+
+void FakeAppliance::TellWaiting() {
+  status.waiting.clear();
+  for (Patient& patient : patients) {
+    const auto found = References(patient.id);
+    patient.draft_reference_id =
+        !found.empty() && found.front().approved_by.empty() ? found.front().id : "";
+    if (!patient.draft_reference_id.empty())
+      status.waiting.push_back(
+          {patient.draft_reference_id, patient.id, patient.code, found.front().version});
+  }
+}
+
+bool FakeAppliance::IsOld(const Scan& scan) const {
+  return !scan.finished_at || WallClock::now() - *scan.finished_at >
+                                  std::chrono::seconds(static_cast<int>(kResultValid_s));
+}
+
+std::vector<Reference> FakeAppliance::References(const std::string& patient_id) {
+  std::vector<Reference> found;
+  std::copy_if(references.rbegin(), references.rend(), std::back_inserter(found),
+               [&](const Reference& reference) { return reference.patient_id == patient_id; });
+  return found;
+}
+
+std::optional<Reference> FakeAppliance::FindReference(const std::string& id) {
+  return FindById(references, id);
+}
+
+void FakeAppliance::AddReference(const Actor& actor, const std::string& scan_id,
+                                 const std::string& reason, Done done) {
+  const auto scan = FindScan(scan_id);
+  if (!scan || scan->outcome != ScanOutcome::kDone)
+    return Finish(done, Refusal(ChangeResult::kNotFound, "no finished scan of this id"));
+  const std::string id = MakeReference(*scan, actor.user, reason).id;
+  Did(actor, "reference.add", id, done, id);
+}
+
+void FakeAppliance::PlanReference(const Actor& actor, const std::string& id, int revision,
+                                  const ReferencePlan& plan, Done done) {
+  const auto found = std::find_if(references.begin(), references.end(),
+                                  [&](const Reference& reference) { return reference.id == id; });
+  if (found == references.end())
+    return Finish(done, Refusal(ChangeResult::kNotFound, "no such reference"));
+  if (found->revision != revision)
+    return Finish(done,
+                  Refusal(ChangeResult::kConflict, "this plan has been changed by somebody else"));
+  if (found->approved_by.empty()) {
+    found->plan = plan;
+    ++found->revision;
+    found->digest = fmt::format("digest of {} {}", id, found->revision);
+    found->planned_by = actor.user;
+    return Did(actor, "reference.plan", id, done);
+  }
+  Reference next = *found;
+  next.id = fmt::format("r{:04}", next_id_++);
+  next.version = static_cast<int>(References(next.patient_id).size()) + 1;
+  next.plan = plan;
+  next.revision = 1;
+  next.created_by = next.planned_by = actor.user;
+  next.digest = "digest of " + next.id + " 1";
+  next.approved_by.clear();
+  next.approved_at.reset();
+  references.push_back(next);
+  TellWaiting();
+  Did(actor, "reference.plan", next.id, done, next.id);
+}
+
+void FakeAppliance::ApproveReference(const Actor& actor, const std::string& id, int revision,
+                                     const std::string& digest, Done done) {
+  const auto found = std::find_if(references.begin(), references.end(),
+                                  [&](const Reference& reference) { return reference.id == id; });
+  if (found == references.end())
+    return Finish(done, Refusal(ChangeResult::kNotFound, "no such reference"));
+  if (!status.reference_block.empty())
+    return Finish(done, Refusal(ChangeResult::kConflict, status.reference_block));
+  if (!found->approved_by.empty())
+    return Finish(done, Refusal(ChangeResult::kConflict, "this reference is approved already"));
+  if (found->revision != revision)
+    return Finish(done,
+                  Refusal(ChangeResult::kConflict, "this plan has been changed by somebody else"));
+  if (!digest.empty() && digest != found->digest)
+    return Finish(done, Refusal(ChangeResult::kConflict, "what is stored is not what was shown"));
+  if (found->created_by == actor.user || found->planned_by == actor.user) {
+    return Finish(done,
+                  Refusal(ChangeResult::kRefused,
+                          "a second person must approve: you made or planned this reference"));
+  }
+  found->approved_by = actor.user;
+  found->approved_at = WallClock::now();
+  if (Patient* patient = PatientOf(found->patient_id)) patient->approved_reference_id = id;
+  TellWaiting();
+  Did(actor, "reference.approve", id, done);
+}
+
+std::vector<Scan> FakeAppliance::Scans(const std::string& patient_id, int limit) {
+  std::vector<Scan> found;
+  for (auto scan = scans.rbegin();
+       scan != scans.rend() && found.size() < static_cast<std::size_t>(limit); ++scan) {
+    if (patient_id.empty() || scan->patient_id == patient_id) found.push_back(*scan);
+  }
+  return found;
+}
+
+std::optional<Scan> FakeAppliance::FindScan(const std::string& id) { return FindById(scans, id); }
+
+void FakeAppliance::RemoveScan(const Actor& actor, const std::string& id, const std::string&,
+                               Done done) {
+  for (const Reference& reference : references) {
+    if (reference.scan_id == id)
+      return Finish(done, Refusal(ChangeResult::kConflict, "a reference is made of this scan"));
+  }
+  if (std::erase_if(scans, [&](const Scan& scan) { return scan.id == id; }) == 0)
+    return Finish(done, Refusal(ChangeResult::kNotFound, "there is no such scan"));
+  Tell(EventKind::kData);
+  Did(actor, "scan.remove", id, done);
+}
+
+void FakeAppliance::AcceptScan(const Actor& actor, const std::string& id, const std::string& reason,
+                               Done done) {
+  const auto found =
+      std::find_if(scans.begin(), scans.end(), [&](const Scan& scan) { return scan.id == id; });
+  if (found == scans.end()) return Finish(done, Refusal(ChangeResult::kNotFound, "no such scan"));
+  const auto refuse = [&](const char* why) { Finish(done, Refusal(ChangeResult::kConflict, why)); };
+  if (status.scan) return refuse("a scan is running: accept its result, not an older one");
+  if (!found->result || found->result->verdict == "no_answer")
+    return refuse("there is nothing to accept");
+  if (IsOld(*found)) return refuse("this result is older than 2 minutes: scan again");
+  if (std::any_of(found + 1, scans.end(), [&](const Scan& scan) {
+        return scan.patient_id == found->patient_id && scan.outcome == ScanOutcome::kDone;
+      }))
+    return refuse("there is a newer scan of this patient: accept that one");
+  if (found->result->verdict != "in_tolerance" && reason.empty())
+    return refuse("this result is not in tolerance: accepting it requires a reason");
+  found->accepted_by = actor.user;
+  found->accepted_reason = reason;
+  if (status.last_result && status.last_result->id == id) status.last_result = *found;
+  Did(actor, reason.empty() ? "scan.accept" : "scan.accept_outside", id, done);
+}
+
+}  // namespace plumb::test

@@ -1,0 +1,137 @@
+// The room's calibration in the store: from check scans over the board to a signed version.
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/records/store.hpp"
+#include "tests/support/board_checks.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+using testing::CheckOver;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::MarkersOfRoom;
+using testing::SceneFromRoom;
+using ::testing::SizeIs;
+using web::ChangeResult;
+
+const web::Actor kEve{.user = "eve", .address = "::1"};
+class StoreRoomTest : public ::testing::Test {
+ protected:
+  void Scan(double off_m = 0, const std::string& serial = "S1") {
+    store_->AddCheck(kEve, serial, CheckOver(off_m));
+  }
+  [[nodiscard]] RoomCandidate Candidate() { return store_->CandidateOfRoom("S1", since_); }
+  std::pair<ChangeResult, std::string> Sign(const std::string& digest) {
+    try {
+      return {ChangeResult::kDone, store_->SignRoom(kEve, "S1", since_, digest)};
+    } catch (const StoreRefusal& refusal) {
+      return {refusal.result(), refusal.what()};
+    }
+  }
+
+  testing::TempFolder folder_;
+  web::WallClock::time_point since_ = web::WallClock::now() - std::chrono::hours(1);
+  std::unique_ptr<Store> store_ = std::make_unique<Store>(folder_ / "state");
+};
+
+TEST_F(StoreRoomTest, ThreeScansAreSignedAndHoldFromThenOn) {
+  EXPECT_FALSE(store_->RoomCalibration());
+  EXPECT_THAT(Candidate().why_not, HasSubstr("not been scanned"));
+  Scan(), Scan();
+  EXPECT_THAT(Candidate().why_not, HasSubstr("2 of 3"));
+  EXPECT_EQ(Sign(Candidate().digest).first, ChangeResult::kConflict);
+  Scan(0.0006);
+  const RoomCandidate candidate = Candidate();
+  EXPECT_THAT(candidate.why_not, IsEmpty());
+  EXPECT_NEAR(candidate.fit->shift_m, 0.0006, 1e-6);
+  EXPECT_EQ(Sign("something else").first, ChangeResult::kConflict);
+  EXPECT_FALSE(store_->RoomCalibration());
+  EXPECT_EQ(Sign(candidate.digest), std::pair(ChangeResult::kDone, std::string("1")));
+
+  store_ = nullptr;
+  store_ = std::make_unique<Store>(folder_ / "state");
+  const auto room = store_->RoomCalibration();
+  ASSERT_TRUE(room);
+  EXPECT_EQ(room->version, 1);
+  EXPECT_EQ(room->signed_by, "eve");
+  EXPECT_EQ(room->digest, candidate.digest);
+  EXPECT_EQ(room->reference_marker, 0);
+  EXPECT_EQ(room->check_ids, (std::vector<std::string>{"3", "2", "1"}));
+  // The mean of boards at 0, 0 and 0.6 mm along x.
+  EXPECT_TRUE(room->fit.T_iec_reference.isApprox(
+      Pose(Eigen::Translation3d(-0.0002, 0, 0)) * SceneFromRoom().inverse(), 1e-6));
+  std::vector<std::string> lines;
+  for (const web::AuditEntry& entry : store_->Audit(0, 10))
+    lines.push_back(entry.user + " " + entry.action + " " + entry.subject + " " + entry.detail);
+  EXPECT_THAT(lines, Contains("eve room.calibrate 1 scans differ by 0.60 mm and 0.00 deg, sha256 " +
+                              candidate.digest));
+  EXPECT_THAT(Candidate().scans, IsEmpty()) << "scans of before the signature are used up";
+}
+
+TEST_F(StoreRoomTest, ScansThatDifferAreNotSigned) {
+  Scan(), Scan(0.00101), Scan();
+  EXPECT_THAT(Candidate().why_not, HasSubstr("1.01 mm"));
+  EXPECT_EQ(Sign(Candidate().digest).first, ChangeResult::kConflict);
+  Scan(), Scan();
+  EXPECT_THAT(Candidate().why_not, IsEmpty()) << "the newest three count";
+}
+
+TEST_F(StoreRoomTest, OnlyScansOfThisSensorAndTimeCount) {
+  Scan(), Scan(), Scan(0, "S2");
+  EXPECT_THAT(Candidate().scans, SizeIs(2));
+  EXPECT_THAT(store_->CandidateOfRoom("S1", web::WallClock::now() + std::chrono::hours(1)).scans,
+              IsEmpty());
+}
+
+TEST_F(StoreRoomTest, AScanThatCannotBeUsedSaysWhy) {
+  const auto fault = [](const std::string& json) { return BoardScanIn(json)->fault; };
+  EXPECT_FALSE(BoardScanIn(CheckOver(0, 0))) << "no board: an ordinary check";
+  EXPECT_FALSE(BoardScanIn("no json"));
+  EXPECT_THAT(fault(CheckOver(0, 2)), HasSubstr("2 of the board's 4"));
+  EXPECT_THAT(fault(CheckOver(0, 4, {})), HasSubstr("none of the room's markers"));
+  EXPECT_THAT(fault(CheckOver(0, 4, MarkersOfRoom(), std::nullopt)), HasSubstr("reference marker"));
+  EXPECT_THAT(fault(CheckOver()), IsEmpty());
+}
+
+TEST_F(StoreRoomTest, AMarkerThatMovedMakesItDue) {
+  Scan(), Scan(), Scan();
+  (void)Sign(Candidate().digest);
+  const SignedRoom room = *store_->RoomCalibration();
+  const auto after = [&](double moved_m, int num_seen = 6) {
+    MarkerMap markers = MarkersOfRoom();
+    for (Eigen::Vector3d& corner : markers.at(4).corners) corner.x() += moved_m;
+    for (int id = num_seen; id < 6; ++id) markers.erase(id);
+    store_->AddCheck(kEve, "S1", CheckOver(0, 0, markers));
+    return store_->WhyRoomIsDueNow(room, {});
+  };
+  EXPECT_EQ(store_->WhyRoomIsDueNow(room, {}), "");
+  EXPECT_EQ(after(0.0049), "");
+  EXPECT_EQ(after(0.0081), "marker 4 moved 8 mm since the room was calibrated");
+  EXPECT_THAT(after(0, 2), HasSubstr("marker 4")) << "a check that saw too little says nothing";
+  EXPECT_EQ(after(0), "") << "it was put back";
+}
+
+TEST_F(StoreRoomTest, OneThatWasTamperedWithIsNotUsed) {
+  Scan(), Scan(), Scan();
+  (void)Sign(Candidate().digest);
+  store_ = nullptr;
+  Database direct(folder_ / "state" / "plumb.db", Database::Access::kReadWrite);
+  EXPECT_ANY_THROW(direct.Execute("UPDATE room_calibrations SET signed_by = 'x'"));
+  EXPECT_ANY_THROW(direct.Execute("DELETE FROM room_calibrations"));
+  direct.Execute(
+      "DROP TRIGGER room_calibrations_no_update; UPDATE room_calibrations SET json = "
+      "replace(json, '\"shift_m\":', '\"shift_m\":1')");
+  store_ = std::make_unique<Store>(folder_ / "state");
+  EXPECT_THROW((void)store_->RoomCalibration(), DataError);
+  EXPECT_THAT(store_->RoomCalibrations(10), IsEmpty());
+}
+
+}  // namespace
+}  // namespace plumb

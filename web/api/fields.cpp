@@ -1,0 +1,204 @@
+// What browsers send, read field by field.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "algo/base/errors.hpp"
+#include "web/api/json.hpp"
+#include "web/http/checks.hpp"
+#include "web/service/limits.hpp"
+#include "web/service/names.hpp"
+
+namespace plumb::web {
+namespace {
+
+constexpr int kMaxDepth = 8;
+constexpr double kMaxCoordinate_m = 100.0;
+constexpr std::size_t kMaxRegionCorners = 500;
+
+bool DeeperThan(const nlohmann::json& json, int depth) {
+  if (!json.is_structured()) return false;
+  if (depth == 0) return true;
+  return std::any_of(json.begin(), json.end(),
+                     [&](const nlohmann::json& child) { return DeeperThan(child, depth - 1); });
+}
+
+nlohmann::json ParseShallow(const std::string& body) {
+  // Counted before parsing: the parser's own tree must not become deep.
+  int depth = 0, deepest = 0;
+  for (const char c : body) {
+    depth += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
+    deepest = std::max(deepest, depth);
+  }
+  if (deepest > 64) return nlohmann::json::value_t::discarded;
+  return nlohmann::json::parse(body, nullptr, /*allow_exceptions=*/false);
+}
+
+std::vector<double> ReadPoint(const nlohmann::json& item, const char* name, std::size_t width) {
+  const bool valid =
+      item.is_array() && item.size() == width &&
+      std::all_of(item.begin(), item.end(), [](const nlohmann::json& value) {
+        return value.is_number() && std::abs(value.get<double>()) <= kMaxCoordinate_m;
+      });
+  if (!valid)
+    throw DataError(
+        fmt::format("a point of {} must be {} numbers within {} m", name, width, kMaxCoordinate_m));
+  return item.get<std::vector<double>>();
+}
+
+}  // namespace
+
+Fields::Fields(const std::string& body) : json_(ParseShallow(body)) {
+  if (!json_.is_object() || DeeperThan(json_, kMaxDepth))
+    throw DataError("expected a JSON object as the body");
+}
+
+const nlohmann::json& Fields::Get(const char* name) {
+  known_.insert(name);
+  const auto found = json_.find(name);
+  if (found == json_.end()) throw DataError(fmt::format("{} is missing", name));
+  return *found;
+}
+
+bool Fields::Has(const char* name) {
+  known_.insert(name);
+  return json_.contains(name);
+}
+
+std::string Fields::Text(const char* name, std::size_t min, std::size_t max, bool allow_lines) {
+  const nlohmann::json& value = Get(name);
+  if (!value.is_string())
+    throw DataError(fmt::format("{} must be text, found {}", name, value.type_name()));
+  const auto& text = value.get_ref<const std::string&>();
+  if (text.size() < min || text.size() > max) {
+    throw DataError(
+        fmt::format("{} must have {} to {} bytes, found {}", name, min, max, text.size()));
+  }
+  if (!IsPlainText(text, allow_lines))
+    throw DataError(fmt::format("{} must be plain text without control characters", name));
+  return text;
+}
+
+double Fields::Number(const char* name, double min, double max) {
+  const nlohmann::json& value = Get(name);
+  if (!value.is_number())
+    throw DataError(fmt::format("{} must be a number, found {}", name, value.type_name()));
+  const double number = value.get<double>();
+  if (!(number >= min && number <= max))
+    throw DataError(fmt::format("{} must be from {} to {}, found {}", name, min, max, number));
+  return number;
+}
+
+int Fields::Integer(const char* name, int min, int max) {
+  const double number = Number(name, min, max);
+  if (number != std::floor(number))
+    throw DataError(fmt::format("{} must be a whole number, found {}", name, number));
+  return static_cast<int>(number);
+}
+
+bool Fields::Flag(const char* name) {
+  const nlohmann::json& value = Get(name);
+  if (!value.is_boolean())
+    throw DataError(fmt::format("{} must be true or false, found {}", name, value.type_name()));
+  return value.get<bool>();
+}
+
+std::vector<std::vector<double>> Fields::Points(const char* name, std::size_t width,
+                                                std::size_t max) {
+  const nlohmann::json& list = Get(name);
+  if (!list.is_array() || list.size() > max)
+    throw DataError(fmt::format("{} must be a list of at most {} points", name, max));
+  std::vector<std::vector<double>> points;
+  for (const nlohmann::json& item : list) points.push_back(ReadPoint(item, name, width));
+  return points;
+}
+
+std::optional<std::vector<double>> Fields::Point(const char* name, std::size_t width) {
+  const nlohmann::json& value = Get(name);
+  if (value.is_null()) return std::nullopt;
+  return ReadPoint(value, name, width);
+}
+
+void Fields::Finish() const {
+  for (const auto& item : json_.items()) {
+    if (!known_.contains(item.key()))
+      throw DataError(
+          fmt::format("unknown field in the body; known are: {}", fmt::join(known_, ", ")));
+  }
+}
+
+namespace {
+
+double NumberIn(Fields& fields, const char* name, Range range) {
+  return fields.Number(name, range.least, range.most);
+}
+int IntegerIn(Fields& fields, const char* name, Range range) {
+  return fields.Integer(name, static_cast<int>(range.least), static_cast<int>(range.most));
+}
+Tolerance ToleranceIn(Fields& fields) {
+  return {.shift_mm = NumberIn(fields, "shift_tolerance_mm", kShiftTolerance_mm),
+          .rotation_deg = NumberIn(fields, "rotation_tolerance_deg", kRotationTolerance_deg)};
+}
+std::string PostureIn(Fields& fields) {
+  std::string posture = fields.Text("posture", 3, 3);
+  if (!IsPosture(posture))
+    throw DataError(fmt::format("posture must be one of {}", fmt::join(kPostures, ", ")));
+  return posture;
+}
+
+}  // namespace
+
+PlanTemplate ParseTemplate(const std::string& body) {
+  constexpr double kMin_mm = 20, kMax_mm = 3000;
+  Fields fields(body);
+  PlanTemplate wanted;
+  wanted.site = fields.Text("site", 1, kMaxSite);
+  wanted.width_mm = fields.Number("width_mm", kMin_mm, kMax_mm);
+  wanted.height_mm = fields.Number("height_mm", kMin_mm, kMax_mm);
+  wanted.tolerance = ToleranceIn(fields);
+  fields.Finish();
+  return wanted;
+}
+
+ScanPurpose ParsePurpose(const std::string& name) {
+  for (std::size_t i = 0; i < kPurposeNames.size(); ++i) {
+    if (kPurposeNames[i] == name) return static_cast<ScanPurpose>(i);
+  }
+  throw DataError(fmt::format("purpose must be one of {}", fmt::join(kPurposeNames, ", ")));
+}
+
+std::pair<ReferencePlan, int> ParsePlan(const std::string& body) {
+  Fields fields(body);
+  ReferencePlan plan;
+  const int revision = fields.Integer("revision", 1, kMaxRevision);
+  for (const auto& point : fields.Points("region_m", 2, kMaxRegionCorners))
+    plan.region_m.push_back({point[0], point[1]});
+  if (!plan.region_m.empty() && plan.region_m.size() < 3)
+    throw DataError("region_m must have no corner or at least 3");
+  if (const auto point = fields.Point("isocentre_m", 3))
+    plan.isocentre_m = {(*point)[0], (*point)[1], (*point)[2]};
+  plan.tolerance = ToleranceIn(fields);
+  plan.posture = PostureIn(fields);
+  plan.couch_markers = fields.Flag("couch_markers");
+  fields.Finish();
+  return {plan, revision};
+}
+
+Settings ParseSettings(const std::string& body) {
+  Fields fields(body);
+  Settings settings;
+  settings.tolerance = ToleranceIn(fields);
+  settings.posture = PostureIn(fields);
+  settings.couch_markers = fields.Flag("couch_markers");
+  settings.auto_stop_s = NumberIn(fields, "auto_stop_s", kAutoStop_s);
+  settings.scan_limit_s = NumberIn(fields, "scan_limit_s", kScanLimit_s);
+  settings.keep_recordings = fields.Flag("keep_recordings");
+  settings.retention_days = IntegerIn(fields, "retention_days", kRetention_days);
+  settings.idle_logout_min = IntegerIn(fields, "idle_logout_min", kIdleLogout_min);
+  fields.Finish();
+  return settings;
+}
+
+}  // namespace plumb::web

@@ -1,0 +1,88 @@
+#include "web/http/exchange.hpp"
+
+#include <microhttpd.h>
+
+#include <utility>
+
+#include "algo/base/errors.hpp"
+
+namespace plumb::web {
+namespace {
+
+/// A file that is sent is written in such pieces; one is written while the next comes.
+constexpr std::size_t kUploadBlock = 1 << 20;
+
+}  // namespace
+
+void Transport::Exchange::Suspend() {
+  suspended = true;
+  MHD_suspend_connection(connection);
+}
+
+void Transport::Exchange::Resume() {
+  if (!suspended) return;
+  suspended = false;
+  MHD_resume_connection(connection);
+  owner->Wake();
+}
+
+void Transport::Exchange::Answer(Response given) {
+  if (response) return;
+  response = std::move(given);
+  Resume();
+}
+
+bool Transport::Exchange::TakeBody(std::string_view bytes) {
+  const HttpServerOptions& options = owner->options_;
+  if (response) return true;  // refused in the middle of a file: the rest is read, and dropped
+  if (!request.upload) {
+    if (request.body.size() + bytes.size() > options.max_body_bytes) return false;
+    request.body.append(bytes);
+    return true;
+  }
+  uploaded += bytes.size();
+  if (uploaded > options.max_upload_bytes) return false;
+  unwritten.append(bytes);
+  if (unwritten.size() >= kUploadBlock) WriteUpload();
+  return true;
+}
+
+/// Gives what is unwritten to the disk, or makes the connection wait for the piece before.
+void Transport::Exchange::WriteUpload() {
+  if (writing) return Suspend();
+  const auto failure = std::make_shared<std::string>();
+  const auto work = [file = request.upload, bytes = std::exchange(unwritten, {}), failure] {
+    try {
+      file->Append(bytes);
+    } catch (const IoError& error) {
+      *failure = error.what();
+    }
+  };
+  writing = true;
+  const bool accepted =
+      owner->background_.Later(Aside::kFiles, work, [weak = weak_from_this(), failure] {
+        if (const auto alive = weak.lock()) alive->HaveWritten(*failure);
+      });
+  if (!accepted) HaveWritten("the disk is too busy; send the file again later");
+}
+
+void Transport::Exchange::HaveWritten(const std::string& failure) {
+  writing = false;
+  if (!failure.empty() && !response) {
+    request.upload.reset();
+    unwritten = {};
+    started = true;
+    response = ErrorResponse(507, failure);
+  }
+  Resume();
+}
+
+bool Transport::Exchange::HasWholeUpload() {
+  if (!request.upload) return true;
+  if (!writing && !unwritten.empty()) WriteUpload();
+  if (!writing) return true;
+  Suspend();
+  return false;
+}
+
+}  // namespace plumb::web

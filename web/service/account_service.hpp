@@ -1,0 +1,26 @@
+// Accounts of people.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "web/service/change.hpp"
+#include "web/service/service_types.hpp"
+
+namespace plumb::web {
+
+/// The rules of services.hpp hold.
+class AccountService {
+ public:
+  virtual ~AccountService() = default;
+
+  [[nodiscard]] virtual std::vector<User> Users() = 0;  ///< By name.
+  [[nodiscard]] virtual std::optional<User> FindUser(const std::string& name) = 0;
+  virtual void AddUser(const Actor& actor, const User& user,
+                       Done done) = 0;  ///< kConflict if the name is taken.
+  /// kConflict if no enabled engineer would be left, or the account is not as expected.
+  virtual void ChangeUser(const Actor& actor, const UserChange& change, Done done) = 0;
+};
+
+}  // namespace plumb::web

@@ -1,0 +1,44 @@
+// The state of the appliance, and what its button does.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "web/service/change.hpp"
+#include "web/service/service_types.hpp"
+
+namespace plumb::web {
+
+enum class EventKind {
+  kStatus,    ///< State, sensor, light, storage: ask GetStatus().
+  kProgress,  ///< Of a scan: ask GetStatus().
+  kResult,    ///< A scan ended: ask GetStatus().
+  kData,      ///< Patients, references, scans, users or settings changed.
+  kUpdate,    ///< Ask GetUpdate().
+};
+
+/// The rules of services.hpp hold.
+class ApplianceService {
+ public:
+  virtual ~ApplianceService() = default;
+
+  [[nodiscard]] virtual Status GetStatus() = 0;
+  [[nodiscard]] virtual Health GetHealth() = 0;
+  /// The newest camera picture as a small JPEG (at most 320 pixels wide, at most 5 a second); null
+  /// when the sensor shows none.
+  [[nodiscard]] virtual std::shared_ptr<const std::string> Preview() = 0;
+  /// As a short press of the button: starts a scan, ends the sweep, leaves a result. kConflict
+  /// where it is ignored.
+  virtual void Press(const Actor& actor, Done done) = 0;
+  /// The same for one purpose each, so that asked twice it does not do the other: kConflict in
+  /// other states.
+  virtual void StartSweep(const Actor& actor, Done done) = 0;
+  virtual void EndSweep(const Actor& actor, Done done) = 0;
+  /// As a long press: the scan is thrown away.
+  virtual void Cancel(const Actor& actor, Done done) = 0;
+  /// Called on the loop thread. One listener; an empty function ends it.
+  virtual void SetListener(std::function<void(EventKind)> listener) = 0;
+};
+
+}  // namespace plumb::web

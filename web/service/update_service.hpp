@@ -1,0 +1,31 @@
+// System updates, and the restart after them.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "web/service/change.hpp"
+#include "web/service/service_types.hpp"
+
+namespace plumb::web {
+
+/// The rules of services.hpp hold.
+class UpdateService {
+ public:
+  virtual ~UpdateService() = default;
+
+  [[nodiscard]] virtual UpdateStatus GetUpdate() = 0;
+  /// Checks a file's form and takes it among the bundles under that name (NAME.raucb). Moves the
+  /// file. kInvalid: no bundle.
+  virtual void AddBundle(const Actor& actor, const std::filesystem::path& file,
+                         const std::string& name, Done done) = 0;
+  virtual void RemoveBundle(const Actor& actor, const std::string& name, Done done) = 0;
+  virtual void InstallUpdate(const Actor& actor, const std::string& bundle,
+                             Done done) = 0;  ///< kConflict during a scan.
+  /// Restarts the machine. kConflict during a treatment session, a scan and an installation.
+  virtual void RestartSystem(const Actor& actor, Done done) = 0;
+  /// A roll-back is not told of any more.
+  virtual void ForgetRollBack(const Actor& actor, Done done) = 0;
+};
+
+}  // namespace plumb::web
