@@ -54,8 +54,8 @@ void WebAuditLog::Log(const web::Actor& actor, const std::string& action,
   });
 }
 
-std::vector<web::AuditEntry> WebAuditLog::Audit(std::int64_t before, int limit) {
-  return store_.Read([&](Store& store) { return store.Audit(before, limit); });
+std::vector<web::AuditEntry> WebAuditLog::Audit(const web::AuditQuery& query) {
+  return store_.Read([&](Store& store) { return store.Audit(query); });
 }
 
 }  // namespace plumb

@@ -42,7 +42,7 @@ class WebAuditLog : public web::AuditLog {
 
   void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
            const std::string& detail) override;
-  [[nodiscard]] std::vector<web::AuditEntry> Audit(std::int64_t before, int limit) override;
+  [[nodiscard]] std::vector<web::AuditEntry> Audit(const web::AuditQuery& query) override;
 
  private:
   StoreAccess& store_;

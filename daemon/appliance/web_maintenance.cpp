@@ -39,7 +39,8 @@ void WebMaintenance::WriteDiagnostics(const web::Actor& actor, web::Done done) {
     done(answer);
   };
   store_.Change(report, [=](Store& store) {
-    const std::string text = DiagnosticsText(status, health, loop, store.Audit(0, 500));
+    const std::string text =
+        DiagnosticsText(status, health, loop, store.Audit({0, 500, "", /*views=*/false}));
     std::string name =
         (std::filesystem::temp_directory_path() / "plumb-diagnostics-XXXXXX").string();
     const int fd = ::mkstemp(name.data());

@@ -18,6 +18,7 @@
 #include "daemon/records/database.hpp"
 #include "daemon/records/room_calibration.hpp"
 #include "daemon/records/scan_files.hpp"
+#include "web/service/audit_log.hpp"
 #include "web/service/change.hpp"
 #include "web/service/service_types.hpp"
 
@@ -252,7 +253,7 @@ class Store {
   void ChangeUser(const web::Actor& actor, const web::UserChange& change);
   void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
            const std::string& detail);
-  [[nodiscard]] std::vector<web::AuditEntry> Audit(std::int64_t before, int limit);
+  [[nodiscard]] std::vector<web::AuditEntry> Audit(const web::AuditQuery& wanted);
   /// Each entry carries the SHA-256 of the one before and of itself. Gives the number of the first
   /// that does not fit; nothing: the log is as it was written. Entries of before schema 5 are
   /// covered together.

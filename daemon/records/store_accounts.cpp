@@ -116,12 +116,14 @@ void Store::Log(const web::Actor& actor, const std::string& action, const std::s
   transaction.Commit();
 }
 
-std::vector<web::AuditEntry> Store::Audit(std::int64_t before, int limit) {
+std::vector<web::AuditEntry> Store::Audit(const web::AuditQuery& wanted) {
   const std::lock_guard lock(list_mutex_);
   Statement query = list_->Prepare(
-      "SELECT number, time, user, address, action, subject, detail FROM audit WHERE ?1 <= 0 OR "
-      "number < ?1 ORDER BY number DESC LIMIT ?2");
-  query.Bind(before).Bind(std::int64_t{limit});
+      "SELECT number, time, user, address, action, subject, detail FROM audit WHERE (?1 <= 0 OR "
+      "number < ?1) AND substr(action, 1, length(?2)) = ?2 AND (?3 OR substr(action, 1, 5) <> "
+      "'view.') ORDER BY number DESC LIMIT ?4");
+  query.Bind(wanted.before).Bind(wanted.actions).Bind(std::int64_t{wanted.views});
+  query.Bind(std::int64_t{wanted.limit});
   std::vector<web::AuditEntry> entries;
   while (query.Step()) {
     entries.push_back({.number = query.Integer(0),

@@ -450,11 +450,14 @@ void FakeAppliance::Log(const Actor& actor, const std::string& action, const std
                    actor.address, action, subject, detail});
 }
 
-std::vector<AuditEntry> FakeAppliance::Audit(std::int64_t before, int limit) {
+std::vector<AuditEntry> FakeAppliance::Audit(const web::AuditQuery& query) {
   std::vector<AuditEntry> found;
   for (auto entry = audit.rbegin();
-       entry != audit.rend() && found.size() < static_cast<std::size_t>(limit); ++entry) {
-    if (before == 0 || entry->number < before) found.push_back(*entry);
+       entry != audit.rend() && found.size() < static_cast<std::size_t>(query.limit); ++entry) {
+    const bool is_view = entry->action.starts_with("view.");
+    if ((query.before == 0 || entry->number < query.before) && (query.views || !is_view) &&
+        entry->action.starts_with(query.actions))
+      found.push_back(*entry);
   }
   return found;
 }

@@ -183,7 +183,7 @@ class FakeAppliance : public web::BackgroundWork,
   void ChangeUser(const web::Actor& actor, const web::UserChange& change, web::Done done) override;
   void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
            const std::string& detail) override;
-  std::vector<web::AuditEntry> Audit(std::int64_t before, int limit) override;
+  std::vector<web::AuditEntry> Audit(const web::AuditQuery& query) override;
   web::Settings GetSettings() override { return settings; }
   void ChangeSettings(const web::Actor& actor, const web::Settings& changed,
                       web::Done done) override;

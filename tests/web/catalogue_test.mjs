@@ -40,7 +40,7 @@ function compare(a, b, path) {
 compare(en, es, '');
 
 /// The actions of one source file: the second argument of every call that writes an audit entry,
-/// which is a literal or a choice of literals. A definition is told by its typed parameter; the
+/// which is a literal or a choice of literals. A definition is recognised by its typed parameter; the
 /// journal's Log() begins with a level.
 function actionsOf(text, file) {
   const actions = new Set();
@@ -63,6 +63,8 @@ function actionsOf(text, file) {
     if (!found.length) failures.push(`${file}: the action in "${what}" cannot be read`);
     for (const literal of found) actions.add(literal.slice(1, -1));
   }
+  // A table holds the actions of who saw or took what.
+  for (const [, action] of text.matchAll(/"((?:view|download)\.\w+)"/g)) actions.add(action);
   return actions;
 }
 const written = new Set();

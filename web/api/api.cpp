@@ -355,7 +355,8 @@ void AddSettingsRoutes(Table& table, SettingsService& settings, AuditLog& audit)
   table.ReadAside("/api/v1/audit", Permission::kAudit, [&audit](const Request& request) {
     const auto before = QueryNumber(request, "before", 0, std::int64_t{1} << 53);
     const auto limit = static_cast<int>(QueryNumber(request, "limit", 100, kMaxListed));
-    return JsonResponse({{"entries", ListJson(audit.Audit(before, limit))}});
+    const bool views = QueryNumber(request, "views", 1, 1) == 1;
+    return JsonResponse({{"entries", ListJson(audit.Audit({before, limit, "", views}))}});
   });
   table.Read("/api/v1/settings", Permission::kView,
              [&settings](const Request&) { return JsonResponse(ToJson(settings.GetSettings())); });

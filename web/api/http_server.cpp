@@ -10,6 +10,7 @@
 #include "algo/base/errors.hpp"
 #include "web/api/accounts.hpp"
 #include "web/api/api.hpp"
+#include "web/api/disclosures.hpp"
 #include "web/api/json.hpp"
 #include "web/assets/assets.hpp"
 #include "web/http/checks.hpp"
@@ -73,6 +74,7 @@ class HttpServer::Impl {
     AddResultPage(router_, services);
     AddExportRoutes(router_, services);
     AddRoomCalibrationRoutes(router_, services);
+    LogDisclosures(router_, services.audit, options_.now);
     AddPageRoutes();
     epoll_fd_ = epoll_create1(EPOLL_CLOEXEC);
     if (epoll_fd_ < 0)

@@ -8,11 +8,12 @@ namespace {
 constexpr int kPage = 200;
 constexpr int kPages = 25;
 
-/// From the newest entry to older ones, until `look` has seen enough.
-void Walk(AuditLog& log, const std::function<bool(const AuditEntry&)>& look) {
+/// From the newest entry whose action begins like this to older ones, until `look` has seen enough.
+void Walk(AuditLog& log, const std::string& actions,
+          const std::function<bool(const AuditEntry&)>& look) {
   std::int64_t before = 0;
   for (int page = 0; page < kPages; ++page) {
-    const std::vector<AuditEntry> entries = log.Audit(before, kPage);
+    const std::vector<AuditEntry> entries = log.Audit({before, kPage, actions});
     for (const AuditEntry& entry : entries) {
       if (look(entry)) return;
       before = entry.number;
@@ -25,7 +26,7 @@ void Walk(AuditLog& log, const std::function<bool(const AuditEntry&)>& look) {
 
 LoginHistory LoginsBefore(AuditLog& log, const std::string& user, WallClock::time_point before) {
   LoginHistory history;
-  Walk(log, [&](const AuditEntry& entry) {
+  Walk(log, "login", [&](const AuditEntry& entry) {
     if (entry.user != user) return false;
     if (entry.action == "login.failed") ++history.failed;
     if (entry.action != "login" || entry.time >= before) return false;
@@ -36,13 +37,8 @@ LoginHistory LoginsBefore(AuditLog& log, const std::string& user, WallClock::tim
 }
 
 std::optional<AuditEntry> LastBackup(AuditLog& log) {
-  std::optional<AuditEntry> last;
-  Walk(log, [&](const AuditEntry& entry) {
-    if (entry.action != "backup.make") return false;
-    last = entry;
-    return true;
-  });
-  return last;
+  const std::vector<AuditEntry> newest = log.Audit({0, 1, "backup.make"});
+  return newest.empty() ? std::nullopt : std::optional(newest.front());
 }
 
 }  // namespace plumb::web

@@ -13,8 +13,7 @@ struct LoginHistory {
   int failed = 0;                  ///< Wrong passwords for this name since then.
 };
 
-/// To be called within BackgroundWork::Later(): both read at most the newest 5000 entries of the
-/// log.
+/// To be called within BackgroundWork::Later(). Of log-ins the newest 5000 entries are read.
 /// @param before  When the present session began.
 [[nodiscard]] LoginHistory LoginsBefore(AuditLog& log, const std::string& user,
                                         WallClock::time_point before);

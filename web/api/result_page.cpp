@@ -238,6 +238,7 @@ Response ResultPage(const Records& records, const std::optional<std::string>& wa
       scan ? ResultBody(records, *scan, failed ? &*failed : nullptr, runs, wanted.has_value())
            : "<h1>No result yet</h1>",
       wanted ? "" : "/result?again");
+  if (scan) response.about = scan->id;
   return response;
 }
 

@@ -80,6 +80,7 @@ struct Response {
   std::vector<std::pair<std::string, std::string>> headers;
   bool cache_for_ever = false;  ///< Else nothing is cached.
   bool event_stream = false;    ///< Stays open; the event hub writes it.
+  std::string about = {};       ///< What it shows, where the path does not say: a scan's id.
 };
 
 /// {"error": message}

@@ -1,6 +1,7 @@
 // Which handler answers what, and who may ask.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -31,6 +32,10 @@ struct Route {
 class Router {
  public:
   void Add(Route route) { routes_.push_back(std::move(route)); }
+  /// Gives each route that is there the handler that `wrap` makes of it.
+  void Wrap(const std::function<Handler(const Route&)>& wrap) {
+    for (Route& route : routes_) route.handler = wrap(route);
+  }
 
   struct Match {
     const Route* route = nullptr;  ///< Null: nothing there, or not with this method.

@@ -99,7 +99,7 @@ TEST_F(BackupTest, IsMadeWhileScansGoOnAndHoldsOneMoment) {
   }
   scanning.request_stop();
   scanning.join();
-  EXPECT_EQ(store.Audit(0, 1000).back().action, "patient.add");
+  EXPECT_EQ(store.Audit({0, 1000}).back().action, "patient.add");
 }
 
 TEST_F(BackupTest, NothingIsRemovedWhileItIsMade) {

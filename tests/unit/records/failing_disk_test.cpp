@@ -241,7 +241,7 @@ TEST(DamagedDatabaseTest, IsOpenedOrRefusedAndNoScanIsDeleted) {
           (void)store.ApprovedReference(patient.id);
         }
         (void)store.GetSettings();
-        (void)store.Audit(0, 100);
+        (void)store.Audit({0, 100});
         (void)store.FirstBrokenAuditEntry();
       } catch (const std::exception&) {  // of one record, said so
         ++unreadable;

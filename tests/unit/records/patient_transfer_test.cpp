@@ -93,7 +93,7 @@ class PatientTransferTest : public ::testing::Test {
     EXPECT_EQ(store.FindPatientByCode("P-7"), std::nullopt);
     EXPECT_EQ(store.Scans("", 100).size(), 5U);
     EXPECT_EQ(store.recovery().foreign_folders, 0);
-    EXPECT_EQ(store.Audit(0, 1)[0].action, "patient.add");
+    EXPECT_EQ(store.Audit({0, 1})[0].action, "patient.add");
   }
 
   testing::TempFolder folder_;
@@ -143,8 +143,8 @@ TEST_F(PatientTransferTest, ComesWithEverythingAndByteIdenticalFiles) {
   EXPECT_EQ(to.recovery().foreign_folders + to.recovery().lost_scans, 0);
   EXPECT_EQ(to.OpenedSession(), std::nullopt);
   EXPECT_EQ(to.FirstBrokenAuditEntry(), std::nullopt);
-  EXPECT_THAT(to.Audit(0, 2)[1].action, "patient.import");
-  EXPECT_THAT(to.Audit(0, 2)[1].detail, AllOf(HasSubstr("P-7"), HasSubstr("3 scans")));
+  EXPECT_THAT(to.Audit({0, 2})[1].action, "patient.import");
+  EXPECT_THAT(to.Audit({0, 2})[1].detail, AllOf(HasSubstr("P-7"), HasSubstr("3 scans")));
   const Json kept = Json::parse(FilesBelow(there()).at("imports/" + patient->id + ".json"));
   EXPECT_THAT(kept["evidence"]["audit"].dump(),
               AllOf(HasSubstr("reference.approve"), HasSubstr("scan.accept"),

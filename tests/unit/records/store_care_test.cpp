@@ -59,7 +59,7 @@ TEST_F(StoreCareTest, AScanIsRemovedForAReasonAndAReferenceIsNot) {
   EXPECT_EQ(RefusalOfRemoving(scan), ChangeResult::kDone);
   EXPECT_FALSE(store_->FindScan(scan));
   EXPECT_FALSE(fs::exists(store_->ScanFolder(scan)));
-  const web::AuditEntry logged = store_->Audit(0, 1).at(0);
+  const web::AuditEntry logged = store_->Audit({0, 1}).at(0);
   EXPECT_EQ(logged.user + " " + logged.action + " " + logged.subject + ": " + logged.detail,
             "bert scan.remove " + scan + ": blurred");
   EXPECT_EQ(RefusalOfRemoving(scan), ChangeResult::kNotFound);

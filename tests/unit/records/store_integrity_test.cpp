@@ -54,13 +54,13 @@ TEST_F(StoreIntegrityTest, OneFlippedBitInAnyFileIsFoundAndNamed) {
     EXPECT_THAT(store_.CheckFiles(scan_, false), AllOf(HasSubstr(file), HasSubstr("changed")));
     EXPECT_TRUE(store_.FindScan(scan_)->folder.empty());
     EXPECT_THAT(store_.FindScan(scan_)->failure, HasSubstr(file));
-    EXPECT_EQ(store_.Audit(0, 1).at(0).action, "scan.unavailable");
+    EXPECT_EQ(store_.Audit({0, 1}).at(0).action, "scan.unavailable");
     EXPECT_EQ(store_.CheckFiles(scan_, true).empty(), file.starts_with("result/"))
         << "a comparison reads the scene alone";
     Flip(file);
     EXPECT_EQ(store_.CheckFiles(scan_, false), "");
     EXPECT_FALSE(store_.FindScan(scan_)->folder.empty());
-    EXPECT_EQ(store_.Audit(0, 1).at(0).action, "scan.available");
+    EXPECT_EQ(store_.Audit({0, 1}).at(0).action, "scan.available");
   }
 }
 
@@ -121,7 +121,7 @@ TEST_F(StoreIntegrityTest, TheAuditLogShowsWhatWasChangedInItOrTakenFromIt) {
   ASSERT_EQ(store_.FirstBrokenAuditEntry(), std::nullopt);
   Database direct(folder_ / "state" / "plumb.db", Database::Access::kReadWrite);
   direct.Execute("DROP TRIGGER audit_no_update; DROP TRIGGER audit_no_delete");
-  const auto number = store_.Audit(0, 3).at(2).number;
+  const auto number = store_.Audit({0, 3}).at(2).number;
   const auto restore = [&](const std::string& detail) {
     direct.Execute(fmt::format("UPDATE audit SET detail = '{}' WHERE number = {}", detail, number));
   };

@@ -68,7 +68,7 @@ TEST_F(StoreRoomTest, ThreeScansAreSignedAndHoldFromThenOn) {
   EXPECT_TRUE(room->fit.T_iec_reference.isApprox(
       Pose(Eigen::Translation3d(-0.0002, 0, 0)) * SceneFromRoom().inverse(), 1e-6));
   std::vector<std::string> lines;
-  for (const web::AuditEntry& entry : store_->Audit(0, 10))
+  for (const web::AuditEntry& entry : store_->Audit({0, 10}))
     lines.push_back(entry.user + " " + entry.action + " " + entry.subject + " " + entry.detail);
   EXPECT_THAT(lines, Contains("eve room.calibrate 1 scans differ by 0.60 mm and 0.00 deg, sha256 " +
                               candidate.digest));

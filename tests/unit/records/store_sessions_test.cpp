@@ -115,7 +115,7 @@ TEST_F(StoreSessionsTest, SiteAndNoteAreChangedAndTheirTextIsNotInTheLog) {
   Store store(folder_ / "state");
   EXPECT_EQ(store.FindPatient(patient)->site, "thorax");
   EXPECT_EQ(store.FindPatient(patient)->note, "arms up, knee rest");
-  const web::AuditEntry entry = store.Audit(0, 1).at(0);
+  const web::AuditEntry entry = store.Audit({0, 1}).at(0);
   EXPECT_EQ(entry.action, "patient.change");
   EXPECT_EQ(entry.user, "bert");
   EXPECT_EQ((entry.subject + entry.detail).find("knee"), std::string::npos);
@@ -132,7 +132,7 @@ TEST_F(StoreSessionsTest, AnArchivedPatientKeepsEverythingAndIsNotOpened) {
       << "while the session is open";
   store.CloseSessions(kAnna);
   store.ArchivePatient(kBert, patient, true);
-  EXPECT_EQ(store.Audit(0, 1).at(0).action, "patient.archive");
+  EXPECT_EQ(store.Audit({0, 1}).at(0).action, "patient.archive");
   EXPECT_TRUE(store.FindPatient(patient)->archived);
   EXPECT_THAT(store.Patients(), SizeIs(1)) << "still there for who asks";
   EXPECT_THAT(store.Scans(patient, 10), SizeIs(1));
@@ -141,7 +141,7 @@ TEST_F(StoreSessionsTest, AnArchivedPatientKeepsEverythingAndIsNotOpened) {
   EXPECT_EQ(RefusalOf([&] { (void)store.OpenSession(kAnna, patient, ScanPurpose::kReference); }),
             ChangeResult::kConflict);
   store.ArchivePatient(kBert, patient, false);
-  EXPECT_EQ(store.Audit(0, 1).at(0).action, "patient.unarchive");
+  EXPECT_EQ(store.Audit({0, 1}).at(0).action, "patient.unarchive");
   EXPECT_FALSE(store.FindPatient(patient)->archived);
   EXPECT_THAT(store.WaitingReferences(), SizeIs(1));
   EXPECT_FALSE(store.OpenSession(kAnna, patient, ScanPurpose::kReference).empty());
@@ -172,7 +172,7 @@ TEST_F(StoreSessionsTest, WhatIsSignedIsWhatIsStored) {
             ChangeResult::kConflict);
   const std::string signed_digest = store.FindReference(reference)->digest;
   store.ApproveReference(kBert, reference, 2, signed_digest);
-  EXPECT_EQ(store.Audit(0, 1).at(0).detail, "sha256 " + signed_digest);
+  EXPECT_EQ(store.Audit({0, 1}).at(0).detail, "sha256 " + signed_digest);
   EXPECT_THAT(store.WaitingReferences(), SizeIs(0));
   EXPECT_EQ(store.FindPatient(patient)->draft_reference_id, "");
 }

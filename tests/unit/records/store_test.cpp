@@ -269,8 +269,8 @@ TEST_F(StoreTest, WipingAPatientLeavesNothingButTheAuditEntry) {
   EXPECT_EQ(store->ApprovedReference(patient), std::nullopt);
   EXPECT_FALSE(fs::exists(store->ScanFolder(scan)));
   EXPECT_EQ(store->ApprovedReference(keep)->id, kept);
-  EXPECT_EQ(store->Audit(0, 1).at(0).action, "patient.wipe");
-  EXPECT_EQ(store->Audit(0, 1).at(0).user, "bert");
+  EXPECT_EQ(store->Audit({0, 1}).at(0).action, "patient.wipe");
+  EXPECT_EQ(store->Audit({0, 1}).at(0).user, "bert");
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_ / "state")) {
     if (!entry.is_regular_file()) continue;
     const auto bytes = ReadWholeFile(entry.path(), 1 << 26);
@@ -283,9 +283,9 @@ TEST_F(StoreTest, TheAuditLogOnlyGrows) {
   const auto store = Open();
   (void)store->AddPatient(kAnna, "A", "");
   store->Log(kBert, "login", "bert", "");
-  EXPECT_THAT(store->Audit(0, 10), SizeIs(2));
-  EXPECT_EQ(store->Audit(0, 10).front().action, "login");
-  EXPECT_EQ(store->Audit(2, 10).front().action, "patient.add");
+  EXPECT_THAT(store->Audit({0, 10}), SizeIs(2));
+  EXPECT_EQ(store->Audit({0, 10}).front().action, "login");
+  EXPECT_EQ(store->Audit({2, 10}).front().action, "patient.add");
   Database direct(database(), Database::Access::kReadWrite);
   EXPECT_THROW(direct.Execute("DELETE FROM audit"), ConstraintBroken);
   EXPECT_THROW(direct.Execute("UPDATE audit SET user = 'nobody'"), ConstraintBroken);
@@ -365,7 +365,7 @@ TEST_F(StoreTest, OnlyAScanWithAnAnswerIsAccepted) {
   EXPECT_EQ(RefusalOf([&] { store->AcceptScan(kAnna, moved, "why"); }), ChangeResult::kConflict)
       << "there is a newer one";
   store->AcceptScan(kAnna, newer, "why");
-  const web::AuditEntry logged = store->Audit(0, 1).at(0);
+  const web::AuditEntry logged = store->Audit({0, 1}).at(0);
   EXPECT_EQ(logged.action, "scan.accept_outside");
   EXPECT_THAT(logged.detail, HasSubstr("move, vertical +6.50 mm, lateral -1.00 mm"));
   EXPECT_THAT(logged.detail, HasSubstr("reason: why"));
@@ -621,7 +621,7 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   EXPECT_NEAR(markers->markers.at(3).corners[0].x(), 0.9 - 0.052, 1e-12);
   EXPECT_EQ(markers->markers.at(3).num_views, 9);
   std::vector<std::string> actions;
-  for (const web::AuditEntry& entry : store->Audit(0, 10))
+  for (const web::AuditEntry& entry : store->Audit({0, 10}))
     actions.push_back(entry.user + " " + entry.action + " " + entry.detail);
   EXPECT_THAT(actions,
               ::testing::IsSupersetOf({"anna check.done passed", "anna check.done no_baseline",
@@ -693,7 +693,7 @@ TEST_F(StoreTest, ATemplateIsOfOneSiteWhateverItsCaseAndIsLogged) {
   EXPECT_EQ(stored.tolerance.shift_mm, 4);
   EXPECT_EQ(stored.tolerance.rotation_deg, 1.5);
   EXPECT_EQ(stored.changed_by, "bert");
-  EXPECT_THAT(store->Audit(0, 1).at(0).detail, HasSubstr("320 x 410 mm"));
+  EXPECT_THAT(store->Audit({0, 1}).at(0).detail, HasSubstr("320 x 410 mm"));
   EXPECT_EQ(RefusalOf([&] { store->RemoveTemplate(kAnna, "pelvis"); }), ChangeResult::kNotFound);
   store->RemoveTemplate(kAnna, "THORAX");
   EXPECT_THAT(store->Templates(), SizeIs(0));

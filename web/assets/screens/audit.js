@@ -1,6 +1,6 @@
 // The audit log: what was done, by whom, from where; filtered and taken away as CSV.
 import { get } from '../api.js';
-import { action, clear, field, h, redraw, table } from '../dom.js';
+import { action, checkbox, clear, field, h, redraw, table } from '../dom.js';
 import { S } from '../strings.js';
 
 const kPage = 100;
@@ -21,6 +21,7 @@ export async function showAudit(place) {
   const list = h('div', {});
   const count = h('p', { class: 'hint', role: 'status' });
   const filter = h('input', { type: 'search', autocomplete: 'off' });
+  const views = checkbox(text.views, false, { onchange: () => startAgain() });
   const heads = [`${text.time} (UTC)`, text.user, text.action, text.subject, text.detail,
     text.address];
   let oldest = 0;
@@ -35,7 +36,8 @@ export async function showAudit(place) {
       h('td', {}, cell || S.none)))), text.title) : h('p', { class: 'hint' }, text.empty));
   };
   const load = async () => {
-    const { entries } = await get(`audit?before=${oldest}&limit=${kPage}`);
+    const { entries } = await get(
+      `audit?before=${oldest}&limit=${kPage}&views=${views.box.checked ? 1 : 0}`);
     for (const entry of entries) {
       rows.push([entry.time.replace('T', ' ').replace('Z', ''), entry.user,
         text.actions[entry.action] ?? entry.action, entry.subject, entry.detail, entry.address]);
@@ -43,6 +45,11 @@ export async function showAudit(place) {
     }
     draw();
     more.hidden = entries.length < kPage;
+  };
+  const startAgain = () => {
+    rows.length = 0;
+    oldest = 0;
+    load();
   };
   const more = action(text.more, load, {});
   const take = action(text.csv, async () => {
@@ -52,7 +59,8 @@ export async function showAudit(place) {
   }, {});
   filter.addEventListener('input', draw);
   clear(place, h('h1', {}, text.title), h('section', { class: 'card' },
-    field(text.filter, filter, text.filterHint), count, list,
+    field(text.filter, filter, text.filterHint),
+    views.element, count, list,
     h('div', { class: 'row' }, more, take)));
   await load();
 }
