@@ -40,7 +40,7 @@ export class Harness {
       for (const input of [h.server.stdout, h.server.stderr]) {
         createInterface({ input }).on('line', (line) => {
           h.log.push(line);
-          h.url ??= /http:\/\/127\.0\.0\.1:\d+\//.exec(line)?.[0];
+          h.url ??= /https?:\/\/127\.0\.0\.1:\d+\//.exec(line)?.[0];
           h.setupCode ??= /setup code: (\S+)/.exec(line)?.[1];
           if (h.url && h.setupCode) ready();
         });
@@ -58,7 +58,7 @@ export class Harness {
 
   /// A browser of one's own; complaints of its console are failures.
   async person(name, viewport = kSize, options = {}) {
-    const context = await this.browser.newContext({ viewport, reducedMotion: 'reduce', ...options });
+    const context = await this.browser.newContext({ viewport, reducedMotion: 'reduce', ignoreHTTPSErrors: this.url.startsWith('https'), ...options });
     const page = await context.newPage();
     page.setDefaultTimeout(kPatience_ms);
     page.on('pageerror', (error) => this.failures.push(`${name}: script error: ${error.message}`));

@@ -304,7 +304,7 @@ web::SensorProfiles KnownSensor() {
           .versions = {learned(4, 0.981), learned(3, 1.0046), learned(2, 1.0045)}};
 }
 
-int Serve(const fs::path& root) {
+int Serve(const fs::path& root, bool tls) {
   FakeAppliance service;
   Recorder recorder(root);
   for (const SyntheticOptions& options : Sweeps())
@@ -330,8 +330,12 @@ int Serve(const fs::path& root) {
   options.password_operations = 1;
   options.upload_folder = root / "updates";
   options.max_upload_bytes = 4 << 20;
+  if (tls) {
+    options.tls = web::MakeTlsIdentity({});
+    options.keep_certificate = [](const web::TlsIdentity&) {};
+  }
   web::HttpServer server(service.services(), options);
-  fmt::print("http://127.0.0.1:{}/\nsetup code: {}\n", server.port(),
+  fmt::print("{}://127.0.0.1:{}/\nsetup code: {}\n", tls ? "https" : "http", server.port(),
              server.setup_code().value_or(""));
   std::fflush(stdout);
   std::string rest;
@@ -356,9 +360,10 @@ int Serve(const fs::path& root) {
 }  // namespace plumb::test
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fprintf(stderr, "usage: plumb_web_test_server FOLDER\n");
+  const bool tls = argc == 3 && std::string_view(argv[2]) == "tls";
+  if (argc != 2 && !tls) {
+    std::fprintf(stderr, "usage: plumb_web_test_server FOLDER [tls]\n");
     return 2;
   }
-  return plumb::test::Serve(argv[1]);
+  return plumb::test::Serve(argv[1], tls);
 }

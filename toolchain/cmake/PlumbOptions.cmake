@@ -8,7 +8,9 @@ if(NOT CMAKE_BUILD_TYPE)
 endif()
 find_program(PLUMB_CCACHE ccache)
 if(PLUMB_CCACHE)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${PLUMB_CCACHE})
+  # Paths below the checkout are taken relative to it, so that all checkouts share the objects.
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env
+    CCACHE_BASEDIR=${PROJECT_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${PLUMB_CCACHE})
 endif()
 
 add_library(plumb_options INTERFACE)
