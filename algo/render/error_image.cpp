@@ -1,5 +1,6 @@
 #include "algo/render/error_image.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
@@ -59,16 +60,23 @@ cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& optio
   return picture;
 }
 
-void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, bool has_region) {
+std::string LabelOf(const ColorScale::Tick& tick, bool is_tolerance, const PictureWords& words) {
+  std::string label = tick.label;
+  std::replace(label.begin(), label.end(), '.', words.decimal);
+  return is_tolerance ? fmt::format("{}  {}", label, words.tolerance) : label;
+}
+
+void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, bool has_region,
+                const PictureWords& words) {
   const double x = area.x, bar_width = 44;
   double y = area.y;
   const TextStyle head{.size_px = 18, .color = kInk, .bold = true};
-  figure.Text(x, y + 14, scale.is_signed() ? "height error" : "|height error|", head);
-  figure.Text(x, y + 38, "in " + std::string(scale.is_signed() ? "millimetres" : "centimetres"),
+  figure.Text(x, y + 14, scale.is_signed() ? words.error : words.absolute_error, head);
+  figure.Text(x, y + 38, scale.is_signed() ? words.millimetres : words.centimetres,
               {.size_px = 16, .color = kFaint});
   y += scale.is_signed() ? 84 : 60;
   const TextStyle small{.size_px = 15, .color = kFaint};
-  if (scale.is_signed()) figure.Text(x, y - 15, "current is higher", small);
+  if (scale.is_signed()) figure.Text(x, y - 15, words.higher, small);
   const double below = (scale.is_signed() ? 24 : 0) + 150 + (has_region ? 46 : 0);
   const double height = std::max(180.0, area.y + area.height - y - below);
   for (int i = 0; i < static_cast<int>(height); ++i) {
@@ -84,14 +92,13 @@ void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, b
     const bool is_tolerance =
         scale.is_signed() && std::abs(std::abs(tick.difference_m) - scale.tolerance_m()) < 1e-12;
     figure.Line(x + bar_width, at, x + bar_width + 8, at, kInk, is_tolerance ? 2.5 : 1.2);
-    figure.Text(x + bar_width + 14, at + 6, tick.label + (is_tolerance ? "  tolerance" : ""),
+    figure.Text(x + bar_width + 14, at + 6, LabelOf(tick, is_tolerance, words),
                 {.size_px = 17, .color = kInk, .bold = is_tolerance});
   }
   y += height;
-  if (scale.is_signed()) figure.Text(x, y + 22, "current is lower", small), y += 24;
-  y = DrawSwatch(figure, x, y + 18, area.width, kHoleColor, "not measured in both scans");
-  if (has_region)
-    DrawSwatch(figure, x, y, area.width, {255, 255, 255}, "outlined: the region; paler outside");
+  if (scale.is_signed()) figure.Text(x, y + 22, words.lower, small), y += 24;
+  y = DrawSwatch(figure, x, y + 18, area.width, kHoleColor, words.not_in_both);
+  if (has_region) DrawSwatch(figure, x, y, area.width, {255, 255, 255}, words.outlined);
 }
 
 }  // namespace
@@ -107,22 +114,18 @@ cv::Mat DrawErrorImage(const HeightMap& difference, const ErrorImageOptions& opt
       options.paper_colors ? ColorScale::Paper() : ColorScale::Signed(options.tolerance_m);
   const cv::Rect cells = CellsAroundRegion(
       difference.grid, CellsWithData(difference.grid, {difference.z}), options.region_mask);
-  std::vector<std::uint8_t> outline;
-  if (!options.region_mask.empty()) {
-    for (int row = cells.y; row < cells.y + cells.height; ++row) {
-      const auto first = options.region_mask.begin() +
-                         static_cast<std::ptrdiff_t>(row) * difference.grid.width + cells.x;
-      outline.insert(outline.end(), first, first + cells.width);
-    }
-  }
-  return DrawPage({.title = options.title,
+  const std::vector<std::uint8_t> outline = PartOfMask(difference.grid, cells, options.region_mask);
+  return DrawPage({.title = std::string(options.words.error_title),
                    .subtitle = options.subtitle,
                    .grid = Part(difference.grid, cells),
                    .cells_rgb = ColoredCells(difference, options, scale, cells),
                    .outline = outline,
-                   .draw_legend = [&](Figure& figure, const cv::Rect& area) {
-                     DrawLegend(figure, area, scale, !outline.empty());
-                   }});
+                   .draw_legend =
+                       [&](Figure& figure, const cv::Rect& area) {
+                         DrawLegend(figure, area, scale, !outline.empty(), options.words);
+                       },
+                   .marks = options.marks,
+                   .words = options.words});
 }
 
 }  // namespace plumb

@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <opencv2/core/mat.hpp>
 
 #include "algo/base/units.hpp"
 #include "algo/render/color_scale.hpp"
+#include "algo/render/picture_words.hpp"
 #include "algo/types/height_map.hpp"
 
 namespace plumb {
@@ -16,12 +18,13 @@ namespace plumb {
 struct ErrorImageOptions {
   double tolerance_m = 3 * kMillimetre;  ///< The signed scale is tied to it; > 0.
   bool paper_colors = false;  ///< The paper's scale instead: |e|, blue at 0, red at 10 cm.
-  std::string title = "Height error: current \u2212 reference";
   std::string subtitle = {};
   const HeightMap* relief =
       nullptr;  ///< Heights on the same grid, whose shape shades the colours a little.
   std::span<const std::uint8_t> region_mask =
       {};  ///< Cells inside the region (1), as the grid; outlined, the rest paler; or empty.
+  std::vector<MapMark> marks = {};
+  PictureWords words = {};
 };
 
 /// Draws a map of differences (metres) with y up, holes grey, axes, scale bar, legend with units,

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
-#include "algo/base/notice.hpp"
 #include "algo/base/units.hpp"
 
 namespace plumb {
@@ -16,6 +16,7 @@ namespace {
 constexpr Color kInk = {33, 37, 41};
 constexpr Color kFaint = {92, 99, 106};
 constexpr Color kNoticeInk = {122, 28, 10};
+constexpr Color kMarkInk = {20, 60, 90};
 constexpr Color kNoticePaper = {253, 240, 222};
 
 constexpr int kMapWidth_px = 1240, kMapHeight_px = 940;  // the map fits into this
@@ -31,9 +32,15 @@ double RoundLength(double length_m) {
   return power;
 }
 
-std::string LengthLabel(double length_m) {
-  return length_m < 0.995 ? fmt::format("{:.3g} cm", length_m / kCentimetre)
-                          : fmt::format("{:.3g} m", length_m);
+std::string InLanguage(std::string number, const PictureWords& words) {
+  std::replace(number.begin(), number.end(), '.', words.decimal);
+  return number;
+}
+
+std::string LengthLabel(double length_m, const PictureWords& words) {
+  return InLanguage(length_m < 0.995 ? fmt::format("{:.3g} cm", length_m / kCentimetre)
+                                     : fmt::format("{:.3g} m", length_m),
+                    words);
 }
 
 /// Where the map lies on the page and how cells map to pixels.
@@ -65,7 +72,7 @@ cv::Mat ScaledMap(const MapPage& page, const cv::Size& size) {
   return scaled;
 }
 
-void DrawAxes(Figure& figure, const MapArea& area) {
+void DrawAxes(Figure& figure, const MapArea& area, const PictureWords& words) {
   const GridShape& grid = area.grid;
   const double step_m = RoundLength(std::max(0.02, 190.0 / area.px_per_m()));
   const TextStyle label{.size_px = 16, .color = kFaint, .align = HorizontalAlign::kCentre};
@@ -76,7 +83,9 @@ void DrawAxes(Figure& figure, const MapArea& area) {
   const auto fine = [](double value) {
     return fmt::format("{:.2f}", std::abs(value) < 1e-9 ? 0.0 : value);
   };
-  const auto format = [&](double value) { return step_m < 0.095 ? fine(value) : text(value); };
+  const auto format = [&](double value) {
+    return InLanguage(step_m < 0.095 ? fine(value) : text(value), words);
+  };
   for (double i = std::ceil(grid.x_min / step_m); i * step_m <= grid.x_min + grid.width * grid.step;
        ++i) {
     const double x = area.PixelX(i * step_m);
@@ -95,22 +104,57 @@ void DrawAxes(Figure& figure, const MapArea& area) {
   }
   figure.FrameRectangle(area.box.x - 0.5, area.box.y - 0.5, area.box.width + 1, area.box.height + 1,
                         kFaint);
-  figure.Text(area.box.x + area.box.width / 2.0, bottom + 49, "x (m), reference marker's frame",
-              label);
+  figure.Text(area.box.x + area.box.width / 2.0, bottom + 49, words.x_axis, label);
   // Above the axis, where no tick's number can be.
-  figure.Text(area.box.x - 11, area.box.y - 15, "y (m)", left);
+  figure.Text(area.box.x - 11, area.box.y - 15, words.y_axis, left);
 }
 
-void DrawScaleBar(Figure& figure, const MapArea& area) {
+void DrawScaleBar(Figure& figure, const MapArea& area, const PictureWords& words) {
   const double length_m = RoundLength(0.22 * area.box.width / area.px_per_m());
   const double length_px = length_m * area.px_per_m();
   const double x = area.box.x + 20, y = area.box.y + area.box.height - 62;
   figure.FillRectangle(x - 6, y - 6, length_px + 36, 56, {255, 255, 255}, 0.86);
-  figure.Text(x + 12 + length_px / 2, y + 17, LengthLabel(length_m),
+  figure.Text(x + 12 + length_px / 2, y + 17, LengthLabel(length_m, words),
               {.size_px = 17, .color = kInk, .bold = true, .align = HorizontalAlign::kCentre});
   figure.FillRectangle(x + 12, y + 28, length_px, 7, kInk);
   for (const double end : {x + 12, x + 12 + length_px})
     figure.Line(end, y + 23, end, y + 40, kInk, 2.5);
+}
+
+/// Where the line from the middle of the map in that direction meets its edge.
+void DrawMark(Figure& figure, const MapArea& area, const MapMark& mark) {
+  const Eigen::Vector2d half(area.box.width / 2.0, area.box.height / 2.0);
+  const Eigen::Vector2d way(mark.toward.x(), -mark.toward.y());
+  double reach = std::numeric_limits<double>::infinity();
+  for (const int axis : {0, 1}) {
+    if (std::abs(way[axis]) > 0.3) reach = std::min(reach, half[axis] / std::abs(way[axis]));
+  }
+  const TextStyle style{
+      .size_px = 19, .color = kMarkInk, .bold = true, .align = HorizontalAlign::kCentre};
+  const double width = figure.TextWidth(mark.name, style) + 18, height = 30;
+  if (!std::isfinite(reach) || width > area.box.width || height > area.box.height) return;
+  const double x = std::clamp(area.box.x + half.x() + reach * way.x(), area.box.x + width / 2 + 3,
+                              area.box.x + area.box.width - width / 2 - 3);
+  const double y = std::clamp(area.box.y + half.y() + reach * way.y(), area.box.y + height / 2 + 3,
+                              area.box.y + area.box.height - height / 2 - 3);
+  figure.FillRectangle(x - width / 2, y - height / 2, width, height, {255, 255, 255}, 0.88);
+  figure.FrameRectangle(x - width / 2, y - height / 2, width, height, kMarkInk, 1.5);
+  figure.Text(x, y + 7, mark.name, style);
+}
+
+void DrawCross(Figure& figure, const MapArea& area, const Eigen::Vector2d& at_m,
+               const PictureWords& words) {
+  const double x = area.PixelX(at_m.x()), y = area.PixelY(at_m.y());
+  if (!area.box.contains(cv::Point(static_cast<int>(x), static_cast<int>(y)))) return;
+  for (const auto& [color, line_width] : {std::pair{Color{255, 255, 255}, 5.0}, {kInk, 2.0}}) {
+    figure.Line(x - 16, y, x + 16, y, color, line_width);
+    figure.Line(x, y - 16, x, y + 16, color, line_width);
+  }
+  const TextStyle style{.size_px = 16, .color = kInk, .bold = true};
+  const double width = figure.TextWidth(words.isocentre, style) + 12;
+  const double left = x + 20 + width > area.box.x + area.box.width ? x - 20 - width : x + 20;
+  figure.FillRectangle(left, y - 13, width, 26, {255, 255, 255}, 0.86);
+  figure.Text(left + 6, y + 6, words.isocentre, style);
 }
 
 void DrawTitle(Figure& figure, const MapPage& page) {
@@ -193,6 +237,17 @@ cv::Mat Relief(const HeightMap& heights, const cv::Rect& cells) {
   return relief;
 }
 
+std::vector<std::uint8_t> PartOfMask(const GridShape& grid, const cv::Rect& cells,
+                                     std::span<const std::uint8_t> mask) {
+  std::vector<std::uint8_t> part;
+  if (mask.empty()) return part;
+  for (int row = cells.y; row < cells.y + cells.height; ++row) {
+    const auto first = mask.begin() + static_cast<std::ptrdiff_t>(row) * grid.width + cells.x;
+    part.insert(part.end(), first, first + cells.width);
+  }
+  return part;
+}
+
 double DrawSwatch(Figure& figure, double x, double y, double width, const Color& color,
                   std::string_view meaning) {
   constexpr double kSize = 24;
@@ -221,7 +276,7 @@ cv::Mat DrawPage(const MapPage& page) {
   const TextStyle notice_style{
       .size_px = 19, .color = kNoticeInk, .bold = true, .align = HorizontalAlign::kCentre};
   const std::vector<std::string> notice =
-      Figure(8, 8).Wrap(kResearchNotice, notice_style, width - 48);
+      Figure(8, 8).Wrap(page.words.notice, notice_style, width - 48);
   const int notice_height = 20 + 27 * static_cast<int>(notice.size());
   Figure figure(width, kTop_px + body_height + kAxis_px + notice_height);
 
@@ -230,8 +285,10 @@ cv::Mat DrawPage(const MapPage& page) {
                                      map_size.height),
                      .grid = page.grid};
   figure.Picture(area.box.x, area.box.y, ScaledMap(page, map_size));
-  DrawAxes(figure, area);
-  DrawScaleBar(figure, area);
+  DrawAxes(figure, area, page.words);
+  DrawScaleBar(figure, area, page.words);
+  if (page.cross_m) DrawCross(figure, area, *page.cross_m, page.words);
+  for (const MapMark& mark : page.marks) DrawMark(figure, area, mark);
   DrawTitle(figure, page);
   if (page.draw_legend)
     page.draw_legend(

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include <opencv2/core/types.hpp>
 
 #include "algo/render/figure.hpp"
+#include "algo/render/picture_words.hpp"
 #include "algo/types/height_map.hpp"
 
 namespace plumb {
@@ -25,6 +27,9 @@ struct MapPage {
       outline;  ///< Cells inside an outlined region (1) or not (0), as the grid; may be empty.
   /// Draws the legend into the column at the right of the map.
   std::function<void(Figure&, const cv::Rect&)> draw_legend;
+  std::vector<MapMark> marks = {};              ///< At the edges of the map.
+  std::optional<Eigen::Vector2d> cross_m = {};  ///< The isocentre, in the grid's frame.
+  PictureWords words = {};
 };
 
 /// Cells to show: all that hold a value in one of the maps, and a margin; the whole grid if none
@@ -39,6 +44,10 @@ struct MapPage {
 
 /// That part of a grid.
 [[nodiscard]] GridShape Part(const GridShape& grid, const cv::Rect& cells);
+
+/// The same of a mask of the whole grid; empty where the mask is.
+[[nodiscard]] std::vector<std::uint8_t> PartOfMask(const GridShape& grid, const cv::Rect& cells,
+                                                   std::span<const std::uint8_t> mask);
 
 /// Draws the page: CV_8UC3 RGB, at most about 1600 x 1200 pixels whatever the grid.
 [[nodiscard]] cv::Mat DrawPage(const MapPage& page);

@@ -33,15 +33,18 @@ Color BothColor(double current_minus_reference_m, double tolerance_m) {
              excess * (2.0 - excess));
 }
 
-void DrawLegend(Figure& figure, const cv::Rect& area, double tolerance_m) {
+void DrawLegend(Figure& figure, const cv::Rect& area, double tolerance_m,
+                const PictureWords& words) {
   const double x = area.x;
-  figure.Text(x, area.y + 14, "surface on top", {.size_px = 18, .color = kInk, .bold = true});
+  std::string tolerance = fmt::format("{:.3g}", tolerance_m / kMillimetre);
+  std::replace(tolerance.begin(), tolerance.end(), '.', words.decimal);
+  figure.Text(x, area.y + 14, words.surface_on_top, {.size_px = 18, .color = kInk, .bold = true});
   double y = area.y + 34;
-  y = DrawSwatch(figure, x, y, area.width, kReference, "reference");
-  y = DrawSwatch(figure, x, y, area.width, kCurrent, "current");
+  y = DrawSwatch(figure, x, y, area.width, kReference, words.reference);
+  y = DrawSwatch(figure, x, y, area.width, kCurrent, words.current);
   y = DrawSwatch(figure, x, y, area.width, kAgree,
-                 fmt::format("both, within {:.3g} mm", tolerance_m / kMillimetre));
-  DrawSwatch(figure, x, y, area.width, kHoleColor, "not measured in either scan");
+                 fmt::format(fmt::runtime(words.both_within), tolerance));
+  DrawSwatch(figure, x, y, area.width, kHoleColor, words.not_in_either);
 }
 
 }  // namespace
@@ -79,14 +82,17 @@ cv::Mat DrawOverlayImage(const HeightMap& reference, const HeightMap& current,
       }
     }
   }
-  return DrawPage({.title = options.title,
+  return DrawPage({.title = std::string(options.words.overlay_title),
                    .subtitle = options.subtitle,
                    .grid = Part(reference.grid, cells),
                    .cells_rgb = picture,
                    .outline = {},
-                   .draw_legend = [&](Figure& figure, const cv::Rect& area) {
-                     DrawLegend(figure, area, options.tolerance_m);
-                   }});
+                   .draw_legend =
+                       [&](Figure& figure, const cv::Rect& area) {
+                         DrawLegend(figure, area, options.tolerance_m, options.words);
+                       },
+                   .marks = options.marks,
+                   .words = options.words});
 }
 
 }  // namespace plumb

@@ -4,20 +4,23 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <opencv2/core/mat.hpp>
 
 #include "algo/base/units.hpp"
+#include "algo/render/picture_words.hpp"
 #include "algo/types/height_map.hpp"
 
 namespace plumb {
 
 struct OverlayImageOptions {
   double tolerance_m = 3 * kMillimetre;  ///< Surfaces closer than this look like one (violet); > 0.
-  std::string title = "Overlay: reference blue, current red";
   std::string subtitle = {};
   std::span<const std::uint8_t> region_mask = {};  ///< Cells inside the region (1), as the grid:
                                                    ///< with 10 cm around it they fill the picture.
+  std::vector<MapMark> marks = {};
+  PictureWords words = {};
 };
 
 /// Draws two height maps of one grid as shaded surfaces: reference blue, current red, where both

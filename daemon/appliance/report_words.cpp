@@ -83,6 +83,8 @@ constexpr ReportWords kEnglish = {
     .verdict = "Verdict",
     .digits_note =
         "Each number with its uncertainty of 95 %, in the digits that it lets them have.",
+    .sides = {"HEAD", "FEET", "LEFT", "RIGHT"},
+    .pictures = {},
     .decimal = '.'};
 
 constexpr ReportWords kSpanish = {
@@ -159,6 +161,33 @@ constexpr ReportWords kSpanish = {
     .when = "Cuándo",
     .verdict = "Veredicto",
     .digits_note = "Cada número con su incertidumbre del 95 %, con las cifras que ella permite.",
+    .sides = {"CABEZA", "PIES", "IZQUIERDA", "DERECHA"},
+    .pictures = {.notice = "Solo para investigación. No es un producto sanitario. No lo use para "
+                           "posicionar pacientes para un tratamiento ni para sustituir la guía por "
+                           "imagen.",
+                 .x_axis = "x (m), sistema del marcador de referencia",
+                 .y_axis = "y (m)",
+                 .error_title = "Error de altura: actual \u2212 referencia",
+                 .overlay_title = "Superposición: referencia en azul, actual en rojo",
+                 .height_title = "Alturas de la referencia",
+                 .error = "error de altura",
+                 .absolute_error = "|error de altura|",
+                 .millimetres = "en milímetros",
+                 .centimetres = "en centímetros",
+                 .higher = "el actual está más alto",
+                 .lower = "el actual está más bajo",
+                 .tolerance = "tolerancia",
+                 .not_in_both = "no medido en ambos escaneos",
+                 .not_in_either = "no medido en ninguno de los escaneos",
+                 .not_measured = "no medido",
+                 .outlined = "delimitada: la región; más pálido fuera",
+                 .surface_on_top = "superficie superior",
+                 .reference = "referencia",
+                 .current = "actual",
+                 .both_within = "ambas, a menos de {} mm",
+                 .height = "altura",
+                 .isocentre = "isocentro",
+                 .decimal = ','},
     .decimal = ','};
 
 /// A reason is a sentence: what is longer is shown as it is, since the library's search recurses.

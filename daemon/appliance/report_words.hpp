@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "daemon/appliance/report_pictures.hpp"
 #include "web/service/scan_service.hpp"
 
 namespace plumb {
@@ -27,6 +28,8 @@ struct ReportWords {
       tracked_of, lost, keyframes, sensor_on;
   std::string_view frames_lost, warming, overdue, overdue_mark, overdue_words;
   std::string_view when, verdict, digits_note;
+  SideWords sides;
+  PictureWords pictures;
   char decimal = '.';
 };
 

@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/units.hpp"
+#include "daemon/appliance/report_pictures.hpp"
 #include "daemon/appliance/report_words.hpp"
 #include "daemon/config/version.hpp"
 #include "drivers/files/file_io.hpp"
@@ -230,9 +232,11 @@ void AddReferenceTo(ReportFacts& facts, const web::Reference& reference, const R
 
 std::string AcceptedText(const web::Scan& scan, const ReportWords& words) {
   if (scan.accepted_by.empty()) return {};
-  return scan.accepted_reason.empty()
-             ? Filled(words.accepted_by, scan.accepted_by)
-             : Filled(words.accepted_outside, scan.accepted_by, scan.accepted_reason);
+  const std::string who = scan.accepted_at
+                              ? fmt::format("{}, {}", scan.accepted_by, TimeOf(*scan.accepted_at))
+                              : scan.accepted_by;
+  return scan.accepted_reason.empty() ? Filled(words.accepted_by, who)
+                                      : Filled(words.accepted_outside, who, scan.accepted_reason);
 }
 
 ReportFacts IdentityOf(const web::Scan& scan, const std::optional<web::Patient>& patient,
@@ -263,6 +267,19 @@ std::optional<web::Reference> ReferenceFor(Store& store, const web::Scan& scan) 
   return found == references.end() ? std::nullopt : std::optional(*found);
 }
 
+std::vector<cv::Mat> PicturesOf(Store& store, const web::Scan& scan,
+                                const std::optional<web::Reference>& reference, const Json& result,
+                                const ReportWords& words) {
+  if (!reference || scan.folder.empty()) return {};
+  if (scan.purpose == web::ScanPurpose::kReference)
+    return ReferencePictures(scan.folder, reference->plan, words.pictures);
+  const std::optional<web::Scan> of_reference = store.FindScan(reference->scan_id);
+  if (!scan.result || !of_reference || of_reference->folder.empty()) return {};
+  return ComparisonPictures(scan.folder, of_reference->folder, result,
+                            reference->plan.tolerance.shift_mm * kMillimetre, words.pictures,
+                            words.sides);
+}
+
 }  // namespace
 
 ScanReport DescribeScan(Store& store, const web::Scan& scan, Language language) {
@@ -272,18 +289,17 @@ ScanReport DescribeScan(Store& store, const web::Scan& scan, Language language) 
   const Json scene = JsonIn(scan.folder / "scene/scene.json");
   const Json result = JsonIn(scan.folder / "result/result.json");
   const web::Tolerance tolerance = reference ? reference->plan.tolerance : web::Tolerance{};
-  ScanReport report{
-      .texts = TextsOf(words),
-      .title = std::string(words.scan_title),
-      .verdict = std::string(VerdictOf(scan, words)),
-      .why = WhyOf(scan, language),
-      .identity = IdentityOf(scan, patient, reference, words),
-      .numbers = NumbersOf(scan, tolerance, language),
-      .cautions = CautionsOf(scan, scene, words),
-      .quality = QualityOf(scan, scene, result, words),
-      .body = {},
-      .pictures = {scan.folder / "result/error_map.png", scan.folder / "result/overlay.png"},
-      .footer = Footer(words)};
+  ScanReport report{.texts = TextsOf(words),
+                    .title = std::string(words.scan_title),
+                    .verdict = std::string(VerdictOf(scan, words)),
+                    .why = WhyOf(scan, language),
+                    .identity = IdentityOf(scan, patient, reference, words),
+                    .numbers = NumbersOf(scan, tolerance, language),
+                    .cautions = CautionsOf(scan, scene, words),
+                    .quality = QualityOf(scan, scene, result, words),
+                    .body = {},
+                    .pictures = PicturesOf(store, scan, reference, result, words),
+                    .footer = Footer(words)};
   if (report.numbers.empty()) return report;
   for (const std::string& part : scan.result->body_after)
     report.body.push_back(Translated(part, language));

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 
 #include <fmt/format.h>
@@ -74,22 +75,21 @@ class Pages {
     cairo_line_to(context_.get(), kWidth - kMargin, at);
     cairo_stroke(context_.get());
   }
-  /// As large as fits; nothing where the file is missing.
-  bool Picture(const std::filesystem::path& file, double x, double top, double width,
-               double height) {
+  /// CV_8UC3 RGB, as large as fits.
+  void Picture(const cv::Mat& rgb, double x, double top, double width, double height) {
     const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> image(
-        cairo_image_surface_create_from_png(file.c_str()), &cairo_surface_destroy);
-    if (cairo_surface_status(image.get()) != CAIRO_STATUS_SUCCESS) return false;
-    const double w = cairo_image_surface_get_width(image.get());
-    const double h = cairo_image_surface_get_height(image.get());
-    const double scale = std::min(width / w, height / h);
+        cairo_image_surface_create(CAIRO_FORMAT_RGB24, rgb.cols, rgb.rows), &cairo_surface_destroy);
+    if (cairo_surface_status(image.get()) != CAIRO_STATUS_SUCCESS)
+      throw IoError("cannot draw the report: not enough memory for a picture");
+    FillSurface(image.get(), rgb);
+    const double scale = std::min(width / rgb.cols, height / rgb.rows);
+    const double w = rgb.cols;
     cairo_save(context_.get());
     cairo_translate(context_.get(), x + (width - w * scale) / 2, top);
     cairo_scale(context_.get(), scale, scale);
     cairo_set_source_surface(context_.get(), image.get(), 0, 0);
     cairo_paint(context_.get());
     cairo_restore(context_.get());
-    return true;
   }
   void Next() {
     Foot();
@@ -107,6 +107,20 @@ class Pages {
   }
 
  private:
+  static void FillSurface(cairo_surface_t* image, const cv::Mat& rgb) {
+    cairo_surface_flush(image);
+    unsigned char* const data = cairo_image_surface_get_data(image);
+    const int stride = cairo_image_surface_get_stride(image);
+    for (int row = 0; row < rgb.rows; ++row) {
+      const auto* in = rgb.ptr<cv::Vec3b>(row);
+      auto* out =
+          reinterpret_cast<std::uint32_t*>(data + static_cast<std::ptrdiff_t>(row) * stride);
+      for (int column = 0; column < rgb.cols; ++column)
+        out[column] = std::uint32_t{in[column][0]} << 16U | std::uint32_t{in[column][1]} << 8U |
+                      std::uint32_t{in[column][2]};
+    }
+    cairo_surface_mark_dirty(image);
+  }
   static cairo_status_t Append(void* bytes, const unsigned char* data, unsigned int size) {
     static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), size);
     return CAIRO_STATUS_SUCCESS;
@@ -212,15 +226,16 @@ void NumberLine(Pages& pages, const ReportNumber& number, const ReportTexts& tex
   pages.y = std::max(pages.y, line);
 }
 
-/// Below each other, each as large as the room lets them all be; what is missing leaves no gap.
-void Pictures(Pages& pages, const std::vector<std::filesystem::path>& files) {
+/// Below each other, each as large as the room lets them all be.
+void Pictures(Pages& pages, const std::vector<cv::Mat>& pictures) {
   constexpr double kLeast = 60, kGap = 8;
-  auto left = static_cast<double>(files.size());
-  for (const std::filesystem::path& file : files) {
+  auto left = static_cast<double>(pictures.size());
+  for (const cv::Mat& picture : pictures) {
     const double height = (kBottom - pages.y - 6) / left - kGap;
     left -= 1;
     if (height < kLeast) return;
-    if (pages.Picture(file, kMargin, pages.y + 6, kInner, height)) pages.y += height + kGap;
+    pages.Picture(picture, kMargin, pages.y + 6, kInner, height);
+    pages.y += height + kGap;
   }
 }
 

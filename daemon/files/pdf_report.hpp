@@ -2,11 +2,12 @@
 #pragma once
 
 #include <array>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <opencv2/core/mat.hpp>
 
 namespace plumb {
 
@@ -39,9 +40,9 @@ struct ScanReport {
   std::vector<ReportNumber> numbers;
   std::vector<std::string> cautions;
   ReportFacts quality;
-  std::vector<std::string> body;                ///< Where on the body, in words.
-  std::vector<std::filesystem::path> pictures;  ///< PNG; those that are missing are left out.
-  std::string footer;                           ///< Version and time of the report.
+  std::vector<std::string> body;  ///< Where on the body, in words.
+  std::vector<cv::Mat> pictures;  ///< CV_8UC3 RGB.
+  std::string footer;             ///< Version and time of the report.
 };
 
 /// A value and its uncertainty, in the units of its column.

@@ -183,6 +183,20 @@ void WriteRegion(const fs::path& file, const Comparison& comparison) {
 
 }  // namespace
 
+namespace {
+
+/// The patient's sides where the comparison found them; else the pictures have no marks.
+std::vector<MapMark> SidesOf(const Comparison& comparison) {
+  if (!comparison.body_parts || !comparison.body_parts->by_posture ||
+      !comparison.body_parts->patient)
+    return {};
+  const Eigen::Vector2d head = comparison.body_parts->patient->head.normalized(),
+                        left = comparison.body_parts->patient->left.normalized();
+  return {{"HEAD", head}, {"FEET", -head}, {"LEFT", left}, {"RIGHT", -left}};
+}
+
+}  // namespace
+
 ResultPictures DrawResult(const Comparison& comparison, const HeightMap* reference_height,
                           const PictureOptions& options) {
   ResultPictures pictures;
@@ -193,6 +207,7 @@ ResultPictures DrawResult(const Comparison& comparison, const HeightMap* referen
     error.subtitle = options.subtitle;
     error.relief = reference_height;
     error.region_mask = comparison.region_mask;
+    error.marks = SidesOf(comparison);
     pictures.error_map = DrawErrorImage(*comparison.deviation, error);
   }
   if (reference_height != nullptr && comparison.current_height) {
@@ -200,6 +215,7 @@ ResultPictures DrawResult(const Comparison& comparison, const HeightMap* referen
     overlay.tolerance_m = options.tolerance_m;
     overlay.subtitle = options.subtitle;
     overlay.region_mask = comparison.region_mask;
+    overlay.marks = SidesOf(comparison);
     pictures.overlay = DrawOverlayImage(*reference_height, *comparison.current_height, overlay);
   }
   return pictures;

@@ -180,8 +180,15 @@ CREATE TRIGGER room_calibrations_no_delete BEFORE DELETE ON room_calibrations
   BEGIN SELECT RAISE(ABORT, 'a signed calibration of the room is never removed'); END;
 )sql";
 
+// When a result was accepted; of earlier ones the log knows.
+constexpr const char* kVersion8 = R"sql(
+ALTER TABLE scans ADD COLUMN accepted_at INTEGER;
+UPDATE scans SET accepted_at = (SELECT MAX(time) FROM audit WHERE subject = printf('%06d', scans.id)
+  AND action IN ('scan.accept', 'scan.accept_outside')) WHERE accepted_by <> '';
+)sql";
+
 constexpr std::array<const char*, kSchemaVersion> kSteps = {
-    kVersion1, kVersion2, kVersion3, kVersion4, kVersion5, kVersion6, kVersion7};
+    kVersion1, kVersion2, kVersion3, kVersion4, kVersion5, kVersion6, kVersion7, kVersion8};
 
 }  // namespace
 

@@ -5,7 +5,7 @@
 
 namespace plumb {
 
-inline constexpr int kSchemaVersion = 7;
+inline constexpr int kSchemaVersion = 8;
 
 /// Brings the database to kSchemaVersion, step by step, each in a transaction.
 /// @throws DatabaseCorrupt if it was written by a newer Plumb, saying so.

@@ -26,7 +26,7 @@ constexpr const char* kScanColumns =
     "SELECT scans.id, patient_id, reference_id, purpose, outcome, failure, started_at, "
     "finished_at, accepted_by, has_folder, results.json, accepted_reason, session_id, "
     "(SELECT fraction FROM sessions WHERE sessions.id = session_id), sensor_on_s, check_overdue, "
-    "unavailable FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
+    "unavailable, accepted_at FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
 
 web::Scan ReadScan(const Statement& row, const Store& store) {
   web::Scan scan{.id = ScanId(row.Integer(0)),
@@ -40,12 +40,14 @@ web::Scan ReadScan(const Statement& row, const Store& store) {
                  .result = {},
                  .accepted_by = row.Text(8),
                  .accepted_reason = row.Text(11),
+                 .accepted_at = {},
                  .session_id = row.Text(12),
                  .fraction = static_cast<int>(row.Integer(13)),
                  .sensor_on_s = {},
                  .check_overdue = row.Integer(15) != 0,
                  .folder = {}};
   if (!row.IsNull(14)) scan.sensor_on_s = row.Real(14);
+  if (!row.IsNull(17)) scan.accepted_at = FromStored(row.Integer(17));
   if (!row.IsNull(7)) scan.finished_at = FromStored(row.Integer(7));
   if (const std::string unavailable = row.Text(16); !unavailable.empty()) {
     scan.failure = "its files cannot be used now: " + unavailable;
@@ -275,9 +277,12 @@ void Store::AcceptScan(const web::Actor& actor, const std::string& id, const std
                          "your password");
     described = Described(result);
   }
-  write_->Prepare("UPDATE scans SET accepted_by = ?, accepted_reason = ? WHERE id = ?")
+  write_
+      ->Prepare(
+          "UPDATE scans SET accepted_by = ?, accepted_reason = ?, accepted_at = ? WHERE id = ?")
       .Bind(actor.user)
       .Bind(reason)
+      .Bind(ToStored(web::WallClock::now()))
       .Bind(*number)
       .Run();
   Write(actor, reason.empty() ? "scan.accept" : "scan.accept_outside", id,

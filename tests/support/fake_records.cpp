@@ -287,6 +287,7 @@ void FakeAppliance::AcceptScan(const Actor& actor, const std::string& id, const 
     return refuse("this result is not in tolerance: accepting it requires a reason");
   found->accepted_by = actor.user;
   found->accepted_reason = reason;
+  found->accepted_at = WallClock::now();
   if (status.last_result && status.last_result->id == id) status.last_result = *found;
   Did(actor, reason.empty() ? "scan.accept" : "scan.accept_outside", id, done);
 }

@@ -98,11 +98,13 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
                {"age_s", nullptr},
                {"accepted_by", TextOrNull(scan.accepted_by)},
                {"accepted_reason", TextOrNull(scan.accepted_reason)},
+               {"accepted_at", nullptr},
                {"session_id", TextOrNull(scan.session_id)},
                {"fraction", scan.fraction > 0 ? Json(scan.fraction) : Json(nullptr)},
                {"sensor_on_s", OrNull(scan.sensor_on_s)},
                {"check_overdue", scan.check_overdue},
                {"result", nullptr}};
+  if (scan.accepted_at) json["accepted_at"] = TimeText(*scan.accepted_at);
   if (scan.finished_at) {
     json["finished_at"] = TimeText(*scan.finished_at);
     // An end in the future: the clock has stepped, and nobody knows the age.

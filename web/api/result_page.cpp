@@ -192,7 +192,8 @@ std::string ResultBody(const Records& records, const Scan& scan, const Scan* new
                       TimeText(scan.started_at), when,
                       old ? " <strong>OLD: do not act on it.</strong>" : "");
   if (!scan.accepted_by.empty())
-    body += fmt::format("<p>Accepted by {}{}.</p>", EscapeHtml(scan.accepted_by),
+    body += fmt::format("<p>Accepted by {}{}{}.</p>", EscapeHtml(scan.accepted_by),
+                        scan.accepted_at ? ", " + TimeText(*scan.accepted_at) : "",
                         scan.accepted_reason.empty()
                             ? ""
                             : " outside tolerance: " + EscapeHtml(scan.accepted_reason));

@@ -109,8 +109,9 @@ struct Scan {
   WallClock::time_point started_at;
   std::optional<WallClock::time_point> finished_at;
   std::optional<ResultSummary> result;
-  std::string accepted_by;            ///< Empty: not accepted.
-  std::string accepted_reason;        ///< Why, where it was accepted outside tolerance.
+  std::string accepted_by;      ///< Empty: not accepted.
+  std::string accepted_reason;  ///< Why, where it was accepted outside tolerance.
+  std::optional<WallClock::time_point> accepted_at;
   std::string session_id;             ///< Treatment session in which it was made; empty: none.
   int fraction = 0;                   ///< Number of that session's fraction; 0: none.
   std::optional<double> sensor_on_s;  ///< Of the sensor when the scan began; warm-up.

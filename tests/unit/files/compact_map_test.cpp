@@ -96,19 +96,20 @@ TEST(CompactMap, TellsAHoleOfTheRegionFromWhatLiesOutside) {
 }
 
 TEST(PdfReport, IsAWholeFileWhateverIsMissing) {
-  ScanReport report{.texts = {},
-                    .title = "Scan report",
-                    .verdict = "MOVE",
-                    .why = "The correction below was to be applied.",
-                    .identity = {{"Patient", "P-0042"}, {"Approved by", "clara"}},
-                    .numbers = {{"vertical", "mm", -8.04, 0.6, 3.0, "down"},
-                                {"pitch", "\xC2\xB0", 0.01, 0.14, 1.0, "below its uncertainty"},
-                                {"lateral", "mm", std::nullopt, 0.0, 3.0, ""}},
-                    .cautions = {"The daily check was overdue at this scan."},
-                    .quality = {{"Markers matched", "8"}},
-                    .body = {},
-                    .pictures = {"/nowhere/error_map.png"},
-                    .footer = "Plumb"};
+  ScanReport report{
+      .texts = {},
+      .title = "Scan report",
+      .verdict = "MOVE",
+      .why = "The correction below was to be applied.",
+      .identity = {{"Patient", "P-0042"}, {"Approved by", "clara"}},
+      .numbers = {{"vertical", "mm", -8.04, 0.6, 3.0, "down"},
+                  {"pitch", "\xC2\xB0", 0.01, 0.14, 1.0, "below its uncertainty"},
+                  {"lateral", "mm", std::nullopt, 0.0, 3.0, ""}},
+      .cautions = {"The daily check was overdue at this scan."},
+      .quality = {{"Markers matched", "8"}},
+      .body = {},
+      .pictures = {cv::Mat(30, 40, CV_8UC3, cv::Scalar(200, 0, 0)), cv::Mat(1, 1, CV_8UC3)},
+      .footer = "Plumb"};
   const std::string pdf = PdfOf(report);
   EXPECT_EQ(pdf.substr(0, 5), "%PDF-");
   EXPECT_NE(pdf.find("%%EOF"), std::string::npos);

@@ -127,6 +127,7 @@ TEST_F(PatientTransferTest, ComesWithEverythingAndByteIdenticalFiles) {
     EXPECT_EQ(now[i].failure, before[i].failure);
     EXPECT_EQ(now[i].started_at, before[i].started_at);
     EXPECT_EQ(now[i].accepted_by, before[i].accepted_by);
+    EXPECT_EQ(now[i].accepted_at, before[i].accepted_at);
     EXPECT_EQ(now[i].fraction, before[i].fraction);
     EXPECT_EQ(now[i].result.has_value(), before[i].result.has_value());
     EXPECT_EQ(FilesBelow(now[i].folder), FilesBelow(before[i].folder));

@@ -319,7 +319,8 @@ TEST_F(StoreRecoveryTest, AStoreOfVersion4KeepsScansThatItHadGivenUp) {
   {
     Database direct(state() / "plumb.db", Database::Access::kReadWrite);
     direct.Execute(
-        "DROP TABLE room_calibrations; ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients "
+        "ALTER TABLE scans DROP COLUMN accepted_at; DROP TABLE room_calibrations; ALTER TABLE "
+        "patients DROP COLUMN note; ALTER TABLE patients "
         "DROP COLUMN archived; DROP TABLE templates; DROP TABLE scan_files; DROP TABLE "
         "removed_scans; ALTER TABLE scans DROP "
         "COLUMN "

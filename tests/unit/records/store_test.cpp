@@ -90,6 +90,8 @@ TEST_F(StoreTest, KeepsEverythingOverARestart) {
   EXPECT_EQ(found->patient_id, patient);
   EXPECT_EQ(found->accepted_by, "anna");
   EXPECT_EQ(found->accepted_reason, "the swelling is known");
+  ASSERT_TRUE(found->accepted_at);
+  EXPECT_LT(web::WallClock::now() - *found->accepted_at, std::chrono::minutes(1));
   EXPECT_EQ(found->result->verdict, "move");
   EXPECT_EQ(found->result->correction->vertical_mm, 6.5);
   EXPECT_EQ(found->result->correction->longitudinal_mm, std::nullopt);
@@ -656,7 +658,8 @@ TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
         "DROP TABLE room_calibrations; DROP TABLE check_baselines; DROP TABLE checks; ALTER TABLE "
         "refs DROP COLUMN revision; "
         "DROP INDEX scans_of_session; ALTER TABLE scans DROP COLUMN session_id; ALTER TABLE scans "
-        "DROP COLUMN accepted_reason; ALTER TABLE scans DROP COLUMN sensor_on_s; ALTER TABLE scans "
+        "DROP COLUMN accepted_reason; ALTER TABLE scans DROP COLUMN accepted_at; ALTER TABLE scans "
+        "DROP COLUMN sensor_on_s; ALTER TABLE scans "
         "DROP COLUMN check_overdue; ALTER TABLE scans DROP COLUMN unavailable; ALTER TABLE scans "
         "DROP COLUMN checked_at; ALTER TABLE audit DROP COLUMN chain; DROP TABLE scan_files; DROP "
         "TABLE removed_scans; ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients DROP "
@@ -706,12 +709,33 @@ TEST_F(StoreTest, ATemplateIsOfOneSiteWhateverItsCaseAndIsLogged) {
   store->SetTemplate(kAnna, {.site = "99", .tolerance = {}, .changed_by = {}});
 }
 
+TEST_F(StoreTest, WhenAResultOfTheSchemaBeforeWasAcceptedIsTakenFromTheLog) {
+  std::string accepted, other;
+  {
+    const auto store = Open();
+    const std::string patient = store->AddPatient(kAnna, "P-1", "thorax");
+    const std::string reference = ApprovedReference(*store, patient);
+    other = Scan(*store, patient, reference, kResult);
+    accepted = Scan(*store, patient, reference, kResult);
+    store->AcceptScan(kAnna, accepted, "the swelling is known");
+  }
+  const web::AuditEntry logged = Open()->Audit({0, 1, "scan.accept"}).at(0);
+  {
+    Database direct(database(), Database::Access::kReadWrite);
+    direct.Execute("ALTER TABLE scans DROP COLUMN accepted_at; PRAGMA user_version = 7");
+  }
+  const auto store = Open();
+  EXPECT_EQ(store->FindScan(accepted)->accepted_at, logged.time);
+  EXPECT_FALSE(store->FindScan(other)->accepted_at);
+}
+
 TEST_F(StoreTest, PatientsOfTheSchemaBeforeArchivesKeepWhatTheyHad) {
   const std::string patient = Open()->AddPatient(kAnna, "P-1", "thorax");
   {
     Database direct(database(), Database::Access::kReadWrite);
     direct.Execute(
-        "DROP TABLE room_calibrations; ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients "
+        "ALTER TABLE scans DROP COLUMN accepted_at; DROP TABLE room_calibrations; ALTER TABLE "
+        "patients DROP COLUMN note; ALTER TABLE patients "
         "DROP COLUMN archived; DROP TABLE templates; PRAGMA user_version = 5");
   }
   const auto store = Open();

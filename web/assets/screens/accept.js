@@ -1,6 +1,6 @@
 // What people do with a result: scan again, accept it, make a reference of it, take it away.
 import { fileUrl, live, may, post } from '../api.js';
-import { action, clear, done, field, form, h } from '../dom.js';
+import { action, clear, done, field, form, h, localTime } from '../dom.js';
 import { S } from '../strings.js';
 import { openPatient } from '../treatment.js';
 import { removeScan } from './remove_scan.js';
@@ -40,7 +40,8 @@ function acceptance({ scan, received }, reload) {
   const text = S.result;
   if (scan.accepted_by) {
     const { accepted_by: who, accepted_reason: why } = scan;
-    const words = why ? text.acceptedOutside(who, why) : text.acceptedBy(who);
+    const signed = scan.accepted_at ? `${who}, ${localTime(scan.accepted_at)}` : who;
+    const words = why ? text.acceptedOutside(signed, why) : text.acceptedBy(signed);
     return {
       element: h('p', { class: `badge wide ${scan.accepted_reason ? 'move' : 'in_tolerance'}` },
         `✓ ${words}`),

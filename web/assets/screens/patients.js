@@ -157,8 +157,10 @@ function referenceTable(references) {
 function scanTable(scans) {
   const text = S.patients;
   if (!scans.length) return h('p', { class: 'hint' }, S.status.noScans);
+  const signed = (scan) => (scan.accepted_at
+    ? `${scan.accepted_by}, ${localTime(scan.accepted_at)}` : scan.accepted_by);
   const accepted = (scan) => (!scan.accepted_by ? S.none : scan.accepted_reason
-    ? `▲ ${scan.accepted_by}: ${scan.accepted_reason}` : `✓ ${scan.accepted_by}`);
+    ? `▲ ${signed(scan)}: ${scan.accepted_reason}` : `✓ ${signed(scan)}`);
   const rows = scans.map((scan) => h('tr', {},
     h('td', {}, h('a', { href: `#/result/${scan.id}` }, localTime(scan.started_at))),
     h('td', {}, scan.fraction ?? S.none),

@@ -1,0 +1,129 @@
+#include "algo/render/height_image.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "algo/base/units.hpp"
+#include "algo/render/map_page.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr Color kInk = {33, 37, 41};
+constexpr Color kFaint = {92, 99, 106};
+// Lightness grows with height: readable in grey and with every kind of colour vision.
+constexpr Color kLow = {34, 74, 120}, kHigh = {240, 226, 168};
+constexpr double kPaleOutside = 0.45;    // share of white outside the region
+constexpr double kReliefStrength = 0.6;  // of the shading
+
+struct Range {
+  double low_m = 0.0, high_m = 1e-3;
+};
+
+/// Of the region, where there is one: the floor beside it would take most of the colours. Without
+/// the few values at either end, which are stray.
+Range RangeOf(const HeightMap& heights, std::span<const std::uint8_t> region) {
+  std::vector<float> known;
+  for (std::size_t cell = 0; cell < heights.z.size(); ++cell) {
+    if (std::isfinite(heights.z[cell]) && (region.empty() || region[cell] != 0))
+      known.push_back(heights.z[cell]);
+  }
+  if (known.empty()) return {};
+  const auto at = [&](double share) {
+    const auto place =
+        known.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(known.size() - 1));
+    std::nth_element(known.begin(), place, known.end());
+    return static_cast<double>(*place);
+  };
+  const double low = at(0.005), high = at(0.995);
+  return {low, std::max(high, low + 1e-3)};
+}
+
+Color HeightColor(double share) {
+  Color color;
+  for (std::size_t i = 0; i < color.size(); ++i)
+    color[i] = static_cast<std::uint8_t>(std::lround(kLow[i] + share * (kHigh[i] - kLow[i])));
+  return color;
+}
+
+cv::Mat ColoredCells(const HeightMap& heights, std::span<const std::uint8_t> region,
+                     const Range& range, const cv::Rect& cells) {
+  const cv::Mat relief = Relief(heights, cells);
+  cv::Mat picture(cells.height, cells.width, CV_8UC3);
+  for (int row = 0; row < cells.height; ++row) {
+    auto* out = picture.ptr<cv::Vec3b>(row);
+    for (int column = 0; column < cells.width; ++column) {
+      const float z = heights.at(cells.y + row, cells.x + column);
+      if (!std::isfinite(z)) {
+        out[column] = cv::Vec3b(kHoleColor[0], kHoleColor[1], kHoleColor[2]);
+        continue;
+      }
+      const Color color =
+          HeightColor(std::clamp((z - range.low_m) / (range.high_m - range.low_m), 0.0, 1.0));
+      const double shade =
+          1.0 - kReliefStrength * (1.0 - std::min(1.0F, relief.at<float>(row, column)));
+      const std::size_t cell =
+          static_cast<std::size_t>(cells.y + row) * static_cast<std::size_t>(heights.grid.width) +
+          static_cast<std::size_t>(cells.x + column);
+      const double pale = region.empty() || region[cell] != 0 ? 0.0 : kPaleOutside;
+      for (int channel = 0; channel < 3; ++channel) {
+        const double value = color[static_cast<std::size_t>(channel)] * shade;
+        out[column][channel] =
+            static_cast<std::uint8_t>(std::lround(value + pale * (255.0 - value)));
+      }
+    }
+  }
+  return picture;
+}
+
+void DrawLegend(Figure& figure, const cv::Rect& area, const Range& range,
+                const HeightImageOptions& options) {
+  const PictureWords& words = options.words;
+  const double x = area.x, bar_width = 44;
+  figure.Text(x, area.y + 14, words.height, {.size_px = 18, .color = kInk, .bold = true});
+  figure.Text(x, area.y + 38, words.centimetres, {.size_px = 16, .color = kFaint});
+  const double top = area.y + 60, height = std::max(180.0, area.height - 60.0 - 170.0);
+  for (int i = 0; i < static_cast<int>(height); ++i)
+    figure.FillRectangle(x, top + i, bar_width, 1.02, HeightColor(1.0 - (i + 0.5) / height));
+  figure.FrameRectangle(x, top, bar_width, height, kFaint);
+  constexpr int kTicks = 5;
+  for (int i = 0; i < kTicks; ++i) {
+    const double share = static_cast<double>(i) / (kTicks - 1), y = top + (1.0 - share) * height;
+    std::string label =
+        fmt::format("{:.1f}", (range.low_m + share * (range.high_m - range.low_m)) / kCentimetre);
+    std::replace(label.begin(), label.end(), '.', words.decimal);
+    figure.Line(x + bar_width, y, x + bar_width + 8, y, kInk, 1.2);
+    figure.Text(x + bar_width + 14, y + 6, label, {.size_px = 17, .color = kInk});
+  }
+  double y = DrawSwatch(figure, x, top + height + 18, area.width, kHoleColor, words.not_measured);
+  if (!options.region_mask.empty())
+    DrawSwatch(figure, x, y, area.width, {255, 255, 255}, words.outlined);
+}
+
+}  // namespace
+
+cv::Mat DrawHeightImage(const HeightMap& heights, const HeightImageOptions& options) {
+  if (!options.region_mask.empty() && options.region_mask.size() != heights.grid.num_cells())
+    throw std::invalid_argument("the region of a height image lies on another grid");
+  const Range range = RangeOf(heights, options.region_mask);
+  const cv::Rect cells = CellsAroundRegion(heights.grid, CellsWithData(heights.grid, {heights.z}),
+                                           options.region_mask);
+  const std::vector<std::uint8_t> outline = PartOfMask(heights.grid, cells, options.region_mask);
+  return DrawPage(
+      {.title = std::string(options.words.height_title),
+       .subtitle = std::string(options.subtitle),
+       .grid = Part(heights.grid, cells),
+       .cells_rgb = ColoredCells(heights, options.region_mask, range, cells),
+       .outline = outline,
+       .draw_legend = [&](Figure& figure,
+                          const cv::Rect& area) { DrawLegend(figure, area, range, options); },
+       .marks = options.marks,
+       .cross_m = options.isocentre_m,
+       .words = options.words});
+}
+
+}  // namespace plumb

@@ -1,0 +1,135 @@
+#include "daemon/appliance/report_pictures.hpp"
+
+#include <cmath>
+#include <functional>
+#include <optional>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "algo/base/errors.hpp"
+#include "algo/render/error_image.hpp"
+#include "algo/render/height_image.hpp"
+#include "algo/render/overlay_image.hpp"
+#include "daemon/files/scene_folder.hpp"
+#include "daemon/loop/log.hpp"
+#include "drivers/files/image_file.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+/// What `draw` draws; where it cannot, the journal says why.
+std::vector<cv::Mat> Drawn(const fs::path& folder,
+                           const std::function<std::vector<cv::Mat>()>& draw) {
+  try {
+    return draw();
+  } catch (const std::exception& error) {
+    Log(LogLevel::kWarning, fmt::format("the report of scan {} is without pictures: {}",
+                                        folder.filename().string(), error.what()));
+    return {};
+  }
+}
+
+std::optional<Eigen::Vector2d> WayIn(const Json& body, const char* name) {
+  const auto found = body.find(name);
+  if (found == body.end() || !found->is_array() || found->size() != 2) return std::nullopt;
+  const Eigen::Vector2d way((*found)[0].get<double>(), (*found)[1].get<double>());
+  if (!way.allFinite() || way.norm() < 1e-6) return std::nullopt;
+  return way.normalized();
+}
+
+std::vector<MapMark> SidesIn(const Json& result, const SideWords& words) {
+  const Json body = result.is_object() ? result.value("body", Json()) : Json();
+  if (!body.is_object() || body.value("named_by", "") != "posture") return {};
+  const auto head = WayIn(body, "head_xy"), left = WayIn(body, "left_xy");
+  if (!head || !left) return {};
+  return {{std::string(words.head), *head},
+          {std::string(words.feet), -*head},
+          {std::string(words.left), *left},
+          {std::string(words.right), -*left}};
+}
+
+HeightMap HeightsOf(const fs::path& scan_folder) {
+  Scene scene =
+      ReadScene(scan_folder / "scene", {.cloud = false, .height_map = true, .mesh = false});
+  if (!scene.height_map) throw DataError("its scene has no height map");
+  return std::move(*scene.height_map);
+}
+
+HeightMap MapLike(const HeightMap& heights, const fs::path& file) {
+  const cv::Mat values = ReadFloatTiff(file);
+  if (values.cols != heights.grid.width || values.rows != heights.grid.height)
+    throw DataError(fmt::format("{} has another size than its reference", file.string()));
+  HeightMap map(heights.grid);
+  map.z.assign(values.begin<float>(), values.end<float>());
+  return map;
+}
+
+/// Cells inside the region; empty where the result has no picture of it.
+std::vector<std::uint8_t> RegionLike(const HeightMap& heights, const fs::path& file) {
+  std::error_code ignored;
+  if (!fs::exists(file, ignored)) return {};
+  const cv::Mat picture = ReadColorImage(file);
+  if (picture.cols != heights.grid.width || picture.rows != heights.grid.height)
+    throw DataError(fmt::format("{} has another size than its reference", file.string()));
+  std::vector<std::uint8_t> region;
+  region.reserve(heights.grid.num_cells());
+  for (const cv::Vec3b& cell : cv::Mat_<cv::Vec3b>(picture)) region.push_back(cell[0] != 0 ? 1 : 0);
+  return region;
+}
+
+std::vector<std::uint8_t> PlannedRegion(const GridShape& grid, const web::ReferencePlan& plan) {
+  if (plan.region_m.size() < 3) return {};
+  std::vector<cv::Point> corners;
+  for (const auto& [x, y] : plan.region_m)
+    corners.emplace_back(static_cast<int>(std::lround((x - grid.x_min) / grid.step)),
+                         static_cast<int>(std::lround((y - grid.y_min) / grid.step)));
+  std::vector<std::uint8_t> region(grid.num_cells(), 0);
+  cv::Mat mask(grid.height, grid.width, CV_8UC1, region.data());
+  cv::fillPoly(mask, std::vector<std::vector<cv::Point>>{corners}, cv::Scalar(1));
+  return region;
+}
+
+}  // namespace
+
+std::vector<cv::Mat> ComparisonPictures(const fs::path& scan_folder,
+                                        const fs::path& reference_folder, const Json& result,
+                                        double tolerance_m, const PictureWords& words,
+                                        const SideWords& sides) {
+  return Drawn(scan_folder, [&]() -> std::vector<cv::Mat> {
+    const HeightMap reference = HeightsOf(reference_folder);
+    const HeightMap deviation = MapLike(reference, scan_folder / "result/deviation.tiff");
+    HeightMap current = deviation;
+    for (std::size_t i = 0; i < current.z.size(); ++i) current.z[i] += reference.z[i];
+    const std::vector<std::uint8_t> region =
+        RegionLike(reference, scan_folder / "result/region.png");
+    const std::vector<MapMark> marks = SidesIn(result, sides);
+    return {
+        DrawErrorImage(deviation, {.tolerance_m = tolerance_m,
+                                   .relief = &reference,
+                                   .region_mask = region,
+                                   .marks = marks,
+                                   .words = words}),
+        DrawOverlayImage(
+            reference, current,
+            {.tolerance_m = tolerance_m, .region_mask = region, .marks = marks, .words = words})};
+  });
+}
+
+std::vector<cv::Mat> ReferencePictures(const fs::path& scan_folder, const web::ReferencePlan& plan,
+                                       const PictureWords& words) {
+  return Drawn(scan_folder, [&]() -> std::vector<cv::Mat> {
+    const HeightMap heights = HeightsOf(scan_folder);
+    const std::vector<std::uint8_t> region = PlannedRegion(heights.grid, plan);
+    HeightImageOptions options{.region_mask = region, .words = words};
+    if (plan.isocentre_m)
+      options.isocentre_m = Eigen::Vector2d((*plan.isocentre_m)[0], (*plan.isocentre_m)[1]);
+    return {DrawHeightImage(heights, options)};
+  });
+}
+
+}  // namespace plumb

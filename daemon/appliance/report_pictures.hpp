@@ -1,0 +1,37 @@
+// The pictures of a report, drawn from the stored maps in the report's language.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+#include <opencv2/core/mat.hpp>
+
+#include "algo/render/picture_words.hpp"
+#include "web/service/service_types.hpp"
+
+namespace plumb {
+
+/// What the marks at the edges of a map say.
+struct SideWords {
+  std::string_view head, feet, left, right;
+};
+
+/// Error map and overlay of a comparison, CV_8UC3 RGB. The marks are the patient's sides where the
+/// result found them, else there are none. A picture whose files are missing or damaged is left
+/// out: a report says what it can.
+/// @param reference_folder  Of the reference's scan.
+/// @param result  Of result.json.
+[[nodiscard]] std::vector<cv::Mat> ComparisonPictures(const std::filesystem::path& scan_folder,
+                                                      const std::filesystem::path& reference_folder,
+                                                      const nlohmann::json& result,
+                                                      double tolerance_m, const PictureWords& words,
+                                                      const SideWords& sides);
+
+/// The heights of a reference with the planned region outlined and the isocentre marked; nothing
+/// where the files are missing or damaged.
+[[nodiscard]] std::vector<cv::Mat> ReferencePictures(const std::filesystem::path& scan_folder,
+                                                     const web::ReferencePlan& plan,
+                                                     const PictureWords& words);
+
+}  // namespace plumb

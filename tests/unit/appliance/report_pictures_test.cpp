@@ -1,0 +1,118 @@
+// Pictures of reports over a synthetic body. PLUMB_KEEP_PICTURES=FOLDER keeps them to be looked at.
+#include "daemon/appliance/report_pictures.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+
+#include "algo/base/units.hpp"
+#include "daemon/appliance/report_words.hpp"
+#include "daemon/files/scene_folder.hpp"
+#include "drivers/files/image_file.hpp"
+#include "tests/support/synthetic_scene.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::SizeIs;
+using web::Language;
+
+class ReportPicturesTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    test::SyntheticOptions on_couch;
+    on_couch.couch = true;
+    Scene scene = test::MakeSyntheticScene(on_couch);
+    WriteScene(scene, reference_ / "scene");
+    heights_ = *scene.height_map;
+    fs::create_directories(scan_ / "result");
+    cv::Mat deviation(heights_.grid.height, heights_.grid.width, CV_32FC1);
+    cv::Mat region(deviation.size(), CV_8UC1, cv::Scalar(0));
+    for (int row = 0; row < deviation.rows; ++row) {
+      for (int column = 0; column < deviation.cols; ++column) {
+        const float z = heights_.at(row, column);
+        deviation.at<float>(row, column) =
+            static_cast<float>(z * 0 + 0.008 * (column - deviation.cols / 2) / deviation.cols);
+        if (z > 0.05) region.at<std::uint8_t>(row, column) = 255;
+      }
+    }
+    WriteFloatTiff(scan_ / "result/deviation.tiff", deviation);
+    WritePng(scan_ / "result/region.png", region);
+  }
+
+  [[nodiscard]] std::vector<cv::Mat> Pictures(Language language, double head_y = 1.0,
+                                              const char* named_by = "posture") const {
+    const ReportWords& words = WordsOf(language);
+    const nlohmann::json result = {
+        {"body",
+         {{"named_by", named_by}, {"head_xy", {0.0, head_y}}, {"left_xy", {-head_y, 0.0}}}}};
+    return ComparisonPictures(scan_, reference_, result, 3 * kMillimetre, words.pictures,
+                              words.sides);
+  }
+
+  static void Keep(const cv::Mat& picture, const std::string& name) {
+    if (const char* folder = std::getenv("PLUMB_KEEP_PICTURES"))
+      WritePng(fs::path(folder) / (name + ".png"), picture);
+  }
+  static bool Same(const cv::Mat& a, const cv::Mat& b) {
+    return a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0.0;
+  }
+
+  testing::TempFolder folder_;
+  fs::path reference_ = folder_ / "000001", scan_ = folder_ / "000002";
+  HeightMap heights_;
+};
+
+TEST_F(ReportPicturesTest, NameThePatientsSidesInTheReportsLanguage) {
+  const std::vector<cv::Mat> english = Pictures(Language::kEnglish);
+  const std::vector<cv::Mat> spanish = Pictures(Language::kSpanish);
+  ASSERT_THAT(english, SizeIs(2));
+  ASSERT_THAT(spanish, SizeIs(2));
+  const std::vector<cv::Mat> turned = Pictures(Language::kEnglish, -1.0);
+  const std::vector<cv::Mat> unknown = Pictures(Language::kEnglish, 1.0, "axes");
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_FALSE(Same(english[i], spanish[i]));
+    EXPECT_FALSE(Same(english[i], turned[i])) << "head and feet change places";
+    EXPECT_FALSE(Same(english[i], unknown[i])) << "without an answer no side is named";
+    Keep(english[i], fmt::format("comparison_{}_en", i));
+    Keep(spanish[i], fmt::format("comparison_{}_es", i));
+  }
+  EXPECT_TRUE(Same(english[0], Pictures(Language::kEnglish)[0])) << "the same every time";
+}
+
+TEST_F(ReportPicturesTest, AreLeftOutWhereAFileIsMissingOrOfAnotherSize) {
+  WritePng(scan_ / "result/region.png", cv::Mat(3, 4, CV_8UC1, cv::Scalar(255)));
+  EXPECT_THAT(Pictures(Language::kEnglish), SizeIs(0));
+  fs::remove(scan_ / "result/region.png");
+  EXPECT_THAT(Pictures(Language::kEnglish), SizeIs(2)) << "older results have no such file";
+  WriteFloatTiff(scan_ / "result/deviation.tiff", cv::Mat(3, 4, CV_32FC1, cv::Scalar(0.0)));
+  EXPECT_THAT(Pictures(Language::kEnglish), SizeIs(0));
+  fs::remove(scan_ / "result/deviation.tiff");
+  EXPECT_THAT(Pictures(Language::kEnglish), SizeIs(0));
+}
+
+TEST_F(ReportPicturesTest, OfAReferenceShowTheRegionAndTheIsocentre) {
+  const PictureWords& words = WordsOf(Language::kSpanish).pictures;
+  web::ReferencePlan plan;
+  const std::vector<cv::Mat> whole = ReferencePictures(reference_, plan, words);
+  ASSERT_THAT(whole, SizeIs(1));
+  plan.region_m = {{-0.2, -0.1}, {0.2, -0.1}, {0.2, 0.15}, {-0.2, 0.15}};
+  const std::vector<cv::Mat> region = ReferencePictures(reference_, plan, words);
+  ASSERT_THAT(region, SizeIs(1));
+  EXPECT_FALSE(Same(whole[0], region[0]));
+  plan.isocentre_m = {{0.05, 0.02, 0.1}};
+  const std::vector<cv::Mat> isocentre = ReferencePictures(reference_, plan, words);
+  ASSERT_THAT(isocentre, SizeIs(1));
+  EXPECT_FALSE(Same(region[0], isocentre[0]));
+  Keep(isocentre[0], "reference_es");
+  EXPECT_THAT(ReferencePictures(scan_, plan, words), SizeIs(0)) << "no scene";
+}
+
+}  // namespace
+}  // namespace plumb
