@@ -4,6 +4,8 @@
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
+#include <random>
+#include <set>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -18,6 +20,7 @@
 #include "tests/support/plumbd.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/skip.hpp"
+#include "tests/unit/records/scan_folder.hpp"
 
 namespace plumb {
 namespace {
@@ -64,7 +67,7 @@ class DaemonDiskTest : public ::testing::Test {
     const fs::path image = folder_ / "disk.img";
     if (!fs::exists(image)) {
       std::ofstream(image) << "";
-      fs::resize_file(image, 200 << 20);
+      fs::resize_file(image, 600 << 20);
       if (plumb::Run({"/sbin/mke2fs", "-q", "-F", "-t", "ext4", image}).exit_code != 0)
         return false;
     }
@@ -79,6 +82,17 @@ class DaemonDiskTest : public ::testing::Test {
   void Unmount() {
     ASSERT_EQ(::umount2(state().c_str(), 0), 0) << std::strerror(errno);
     mounted_ = false;
+  }
+  /// Of the image's bytes as they are at one moment: copied until nothing is written meanwhile.
+  void CopyDisk(const fs::path& copy) const {
+    const fs::path again = copy.string() + ".again";
+    for (int i = 0; i < 20; ++i) {
+      for (const fs::path& to : {copy, again})
+        ASSERT_EQ(plumb::Run({"/bin/cp", "--sparse=always", folder_ / "disk.img", to}).exit_code,
+                  0);
+      if (plumb::Run({"/usr/bin/cmp", "-s", copy, again}).exit_code == 0) return;
+    }
+    FAIL() << "the disk is never at rest";
   }
   void BreakDisk() const { std::ofstream(trigger_) << 1; }
 
@@ -221,6 +235,56 @@ TEST_F(DaemonDiskTest,
   ASSERT_EQ(scans.size(), 2U);
   EXPECT_EQ(scans[0].outcome, web::ScanOutcome::kFailed);
   EXPECT_TRUE(store.ApprovedReference(scans[0].patient_id).has_value());
+}
+
+/// What a power cut leaves: the disk's own bytes at a moment, with the process stopped and without
+/// what the kernel has not written yet. Scans that were announced by then are all there, bit for
+/// bit.
+TEST_F(DaemonDiskTest, ACopyOfTheDiskAtAnyMomentStartsWithEveryScanThatWasAnnounced) {
+  if (!MountImage()) GTEST_SKIP() << ("no loop device with ext4 here");
+  const char* wanted = std::getenv("PLUMB_CRASH_IMAGES");
+  const int num_images = wanted != nullptr ? std::atoi(wanted) : 8;
+  std::mt19937 random(11);
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  Fill(plumbd);
+  const fs::path copy = folder_ / "copy.img", mounted = folder_ / "copy";
+  fs::create_directory(mounted);
+  std::set<std::string> announced;
+  int num_compared = 0;
+  for (int round = 0; round < num_images; ++round) {
+    ASSERT_EQ(plumbd.Press()["ok"], true);
+    plumbd.WaitForFrames(40);
+    ASSERT_EQ(plumbd.Press()["ok"], true);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(random() % 2500);
+    while (std::chrono::steady_clock::now() < end && plumbd.Status()["state"] != "result")
+      std::this_thread::yield();
+    announced.insert(plumbd.Status()["last_result"]["scan"].get<std::string>());
+    plumbd.Signal(SIGSTOP);
+    CopyDisk(copy);
+    plumbd.Signal(SIGCONT);
+    ASSERT_EQ(plumb::Run({"/bin/mount", "-o", "loop", copy, mounted}).exit_code, 0);
+    {
+      Store store(mounted);
+      EXPECT_EQ(store.recovery().lost_scans, 0);
+      EXPECT_EQ(store.recovery().broken_references, 0);
+      for (const std::string& scan : announced) {
+        EXPECT_EQ(store.FindScan(scan)->outcome, web::ScanOutcome::kDone) << scan;
+        const auto files = testing::FilesBelow(mounted / "scans" / scan);
+        EXPECT_GT(files.size(), 3U) << scan;
+        EXPECT_TRUE(files == testing::FilesBelow(state() / "scans" / scan)) << scan;
+        ++num_compared;
+      }
+    }
+    ASSERT_EQ(::umount2(mounted.c_str(), 0), 0) << std::strerror(errno);
+    const json after = plumbd.WaitFor("the end of the scan", [](const json& status) {
+      return status["state"] == "result" || status["state"] == "fault";
+    });
+    EXPECT_EQ(after["state"], "result") << after.dump();
+  }
+  std::printf("%d copies of the disk, %zu scans announced, %d times looked for: all there\n",
+              num_images, announced.size(), num_compared);
+  EXPECT_EQ(plumbd.Stop(), 0);
 }
 
 /// A kill keeps what the kernel has not written yet; a power cut does not. So the order is checked

@@ -1,4 +1,6 @@
 // Interruptions, full disks, foreign folders, damaged scenes, and the same bytes every time.
+#include <sys/stat.h>
+
 #include <csignal>
 
 #include <gmock/gmock.h>
@@ -117,6 +119,30 @@ TEST_F(RobustnessTest, AnInterruptedEvaluationLeavesNoHalfScene) {
   EXPECT_EQ(process.Wait(), 130) << process.err();
   for (const auto& entry : fs::recursive_directory_iterator(folder_))
     EXPECT_FALSE(entry.is_regular_file()) << entry.path();
+}
+
+/// Of markers.pdf and its folder: first the bytes, then the name, then the folder that holds it.
+TEST_F(RobustnessTest, ASingleFileIsOnTheDiskBeforeItHasItsName) {
+  const fs::path file = folder_ / "markers.pdf", log = folder_ / "synced";
+  const RunResult result =
+      plumb::Run({"/usr/bin/env", "LD_PRELOAD=" PLUMB_SYNC_LOG, "PLUMB_SYNC_LOG=" + log.string(),
+                  PLUMB_BINARY, "markers", "--ids", "0-1", "--out", file});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto inode_of = [](const fs::path& path) {
+    struct stat status {};
+    EXPECT_EQ(::stat(path.c_str(), &status), 0) << path;
+    return std::to_string(status.st_ino);
+  };
+  const std::string written = ReadText(log);
+  const std::size_t bytes =
+      written.find("fsync " + inode_of(file) + " " + std::to_string(fs::file_size(file)) + "\n");
+  const std::size_t named = written.find(" " + file.string() + "\n", written.find("rename "));
+  const std::size_t listed = written.rfind("fsync " + inode_of(folder_) + " ");
+  ASSERT_NE(bytes, std::string::npos) << written;
+  ASSERT_NE(named, std::string::npos) << written;
+  ASSERT_NE(listed, std::string::npos) << written;
+  EXPECT_LT(bytes, named) << written;
+  EXPECT_LT(named, listed) << written;
 }
 
 TEST_F(RobustnessTest, AFullDiskIsExitOneAndLeavesNothing) {
