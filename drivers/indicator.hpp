@@ -19,6 +19,7 @@ enum class IndicatorPattern {
   kNoAnswer,
   kFault,
   kReadyRolledBack,  ///< Ready, but the machine has gone back to the system from before an update.
+  kStopped,          ///< Nobody scans: the service is not running.
 };
 
 /// A light. One thread (the event loop's) calls; no call blocks or throws: a broken light must not

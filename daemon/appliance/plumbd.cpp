@@ -53,7 +53,7 @@ constexpr std::chrono::seconds kLongestEnd{10};  // less than the unit's Timeout
 struct Options {
   std::optional<fs::path> config_file;
   bool use_default_config = true;  ///< Where it exists and no file is named.
-  bool check_config = false;
+  bool check_config = false, show_stopped = false;
   std::string simulated;  ///< Suite; empty: real sensors.
   std::optional<fs::path> state, control;
   std::optional<std::string> listen;
@@ -73,6 +73,9 @@ void AddOptions(CLI::App& app, Options& options) {
       ->type_name("FILE");
   app.add_flag("--check-config", options.check_config,
                "Check the configuration, say what is wrong with it, and exit");
+  app.add_flag("--show-stopped", options.show_stopped,
+               "Only drive the light, with the pattern for a service that is not running, until "
+               "SIGTERM");
   app.add_option("--simulated", options.simulated,
                  "With a virtual sensor that plays the scenes of a simulated suite")
       ->check(CLI::IsMember({"demo", "nine", "patient"}))
@@ -404,7 +407,22 @@ class Plumbd {
   std::string status_line_;
 };
 
+/// A configuration that cannot be used has no light that could be shown.
+int ShowStopped(const Options& options, const SensorRegistry& registry) {
+  PanelConfig config = ReadConfiguration(options, registry).panel;
+  config.button_line.clear();
+  EventLoop loop;
+  std::vector<EventLoop::Source> signals;
+  for (const int signal : {SIGTERM, SIGINT})
+    signals.push_back(loop.WatchSignal(signal, [&loop] { loop.Quit(0); }));
+  Panel panel(loop, config);
+  if (panel.light() == nullptr) return 0;
+  panel.light()->Show(IndicatorPattern::kStopped);
+  return loop.Run();
+}
+
 int RunChecked(const Options& options, const SensorRegistry& registry) {
+  if (options.show_stopped) return ShowStopped(options, registry);
   if (options.check_config) {
     (void)ReadConfiguration(options, registry);
     fmt::print("the configuration is good\n");

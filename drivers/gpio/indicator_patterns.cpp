@@ -48,6 +48,10 @@ constexpr std::array kFaultSteps{IndicatorStep{kRed, milliseconds(80)},
 constexpr std::array kReadyRolledBackSteps{IndicatorStep{kGreen, milliseconds(1500)},
                                            IndicatorStep{kRed, milliseconds(300)}};
 
+// Slow, so that nobody takes it for the fault of a running service.
+constexpr std::array kStoppedSteps{IndicatorStep{kRed, milliseconds(1000)},
+                                   IndicatorStep{0, milliseconds(1000)}};
+
 constexpr int kMaxCatchUp = 64;  // steps; the loop slept longer than any rhythm, so it starts again
 
 }  // namespace
@@ -84,6 +88,8 @@ IndicatorProgram ProgramOf(IndicatorPattern pattern) {
       return {kFaultSteps};
     case IndicatorPattern::kReadyRolledBack:
       return {kReadyRolledBackSteps};
+    case IndicatorPattern::kStopped:
+      return {kStoppedSteps};
   }
   return {kFaultSteps};
 }

@@ -108,7 +108,9 @@ json WorkflowFigures() {
     EXPECT_EQ(physicist.Get("/api/v1/audit").status, 200);
     plumbd.Signal(SIGHUP);
     plumbd.WaitForLog("the configuration was read again");
-    EXPECT_EQ(physicist.Ask("DELETE", "/api/v1/patients/1", "").status, 200);
+    EXPECT_EQ(
+        physicist.Ask("DELETE", "/api/v1/patients/1", json{{"password", kPassword}}.dump()).status,
+        200);
     plumbd.Sim("unplug");
     plumbd.WaitForState("no_sensor");
   }

@@ -227,6 +227,18 @@ TEST_F(DaemonPanelTest, TheLightShowsNoSensorReadyAndFault) {
   EXPECT_EQ(Phases().back().on, Lamps{}) << "dark when nobody watches";
 }
 
+TEST_F(DaemonPanelTest, WhileTheServiceDoesNotRunTheLightSaysSo) {
+  Plumbd light(folder_.path(), Options({"--show-stopped"}));  // answers at no socket
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (NumPhases({"red"}) < 3 && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(milliseconds(50));
+  EXPECT_EQ(Seen(), Lamps{"red"});
+  ExpectLength({"red"}, 1000);
+  EXPECT_EQ(light.Stop(), 0);
+  EXPECT_EQ(Phases().back().on, Lamps{});
+  EXPECT_FALSE(fs::exists(light.state())) << "nothing stored is touched";
+}
+
 TEST_F(DaemonPanelTest, TheLightShowsScanningWorkingAndResults) {
   testing::PlumbdOptions options = Options();
   options.scenes = 2;

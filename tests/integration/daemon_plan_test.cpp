@@ -67,8 +67,9 @@ class DaemonPlanTest : public ::testing::Test {
     reference_ = planned.json().value("id", reference_);  // of an approved one: the next version
     const json draft = approver_->Get(path + reference_).json();
     EXPECT_EQ(approver_
-                  ->Post(path + reference_ + "/approve",
-                         {{"revision", draft["revision"]}, {"digest", draft["digest"]}})
+                  ->Post(path + reference_ + "/approve", {{"revision", draft["revision"]},
+                                                          {"digest", draft["digest"]},
+                                                          {"password", kPassword}})
                   .status,
               200);
     Open("fraction");

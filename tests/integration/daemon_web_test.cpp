@@ -126,10 +126,16 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
   plan.erase("tolerance");
   plan["revision"] = 1;
   ASSERT_EQ(physicist.Put("/api/v1/references/" + reference + "/plan", plan).status, 200);
-  EXPECT_EQ(
-      physicist.Post("/api/v1/references/" + reference + "/approve", {{"revision", 2}}).status, 403)
+  EXPECT_EQ(physicist
+                .Post("/api/v1/references/" + reference + "/approve",
+                      {{"revision", 2}, {"password", kPassword}})
+                .status,
+            403)
       << "not by the person who planned it";
-  ASSERT_EQ(second.Post("/api/v1/references/" + reference + "/approve", {{"revision", 2}}).status,
+  ASSERT_EQ(second
+                .Post("/api/v1/references/" + reference + "/approve",
+                      {{"revision", 2}, {"password", kPassword}})
+                .status,
             200);
 
   ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
@@ -188,7 +194,10 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
                     "technician scan.end", "technician reference.add", "second reference.approve",
                     "technician scan.accept_outside", "technician session.close"}));
   EXPECT_EQ(plumbd.log().find("PX-17"), std::string::npos) << "no patient's code in the log";
-  EXPECT_EQ(physicist.Ask("DELETE", "/api/v1/patients/" + patient, "").status, 200);
+  EXPECT_EQ(
+      physicist.Ask("DELETE", "/api/v1/patients/" + patient, json{{"password", kPassword}}.dump())
+          .status,
+      200);
   EXPECT_FALSE(fs::exists(plumbd.state() / "scans" / fraction));
   EXPECT_EQ(plumbd.Stop(), 0);
 }

@@ -116,7 +116,7 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
   CloseCheck();
   if (status.session && status.session->patient_id == id && status.session->purpose == purpose) {
     const std::string same = status.session->id;
-    return Did(actor, "patient.open", id, done, same);
+    return Did(actor, "session.open", same, done, same);
   }
   if (status.session && status.session->patient_id != id && status.session->id != replaces) {
     return Finish(done,
@@ -138,7 +138,7 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
                                     .opened_by = actor.user,
                                     .opened_at = WallClock::now()};
   Tell(EventKind::kStatus);
-  Did(actor, "patient.open", id, done, status.session->id);
+  Did(actor, "session.open", status.session->id, done, status.session->id);
 }
 
 void FakeAppliance::CloseSession(const Actor& actor, const std::string& session_id, Done done) {
@@ -185,6 +185,8 @@ void FakeAppliance::AddReference(const Actor& actor, const std::string& scan_id,
   const auto scan = FindScan(scan_id);
   if (!scan || scan->outcome != ScanOutcome::kDone)
     return Finish(done, Refusal(ChangeResult::kNotFound, "no finished scan of this id"));
+  if (!status.reference_block.empty())
+    return Finish(done, Refusal(ChangeResult::kConflict, status.reference_block));
   const std::string id = MakeReference(*scan, actor.user, reason).id;
   Did(actor, "reference.add", id, done, id);
 }

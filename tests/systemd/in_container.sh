@@ -65,6 +65,8 @@ await "ready again" ready 20 plumb status --get state
 check "both scans are still there" "000001 000002" "$(ls /var/lib/plumb/scans | xargs)"
 
 systemctl stop plumbd.service
+await "the light's service is run, which has no light here" "*inactive*success*" 10 sh -c 'echo $(systemctl show plumb-light -p ActiveState --value) $(systemctl show plumb-light -p Result --value)'
+check "and was started by plumbd's end" "*plumb-light.service*" "$(journalctl -u plumb-light -o short | tr '\n' ' ')"
 check "stops cleanly" "inactive success 0" "$(show ActiveState) $(show Result) $(show ExecMainStatus)"
 await "the socket starts it" "*ready*" 20 plumb status
 check "refused calls" "" "$(journalctl -u plumbd -o cat | grep -iE 'SIGSYS|status=31|not permitted')"

@@ -112,13 +112,13 @@ await h.step('a physicist plans a new version, a second one approves', async () 
   await bob.getByRole('button', { name: 'Save plan' }).click();
   await bob.getByText('draft').waitFor();
   await bob.getByRole('button', { name: 'Review and approve' }).click();
-  await bob.getByRole('button', { name: 'Sign and approve' }).click();
+  await h.sign(bob);
   await bob.getByRole('alert').getByText(/second|planned|made/).waitFor();
   const clara = await h.person('clara');
   await h.logIn(clara, 'clara');
   await clara.goto(bob.url());
   await clara.getByRole('button', { name: 'Review and approve' }).click();
-  await clara.getByRole('button', { name: 'Sign and approve' }).click();
+  await h.sign(clara);
   await clara.getByText('approved by clara').waitFor();
   await clara.goto(`${h.url}#/patients`);
   await clara.getByRole('link', { name: 'demo' }).click();

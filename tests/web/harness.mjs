@@ -80,6 +80,12 @@ export class Harness {
     await page.getByRole('navigation').waitFor();
   }
 
+  /// Below what is to be approved.
+  async sign(page, password = kPassword) {
+    await page.getByRole('region', { name: 'You sign exactly this' }).getByLabel('Your password').fill(password);
+    await page.getByRole('button', { name: 'Sign and approve' }).click();
+  }
+
   async logIn(page, name) {
     await page.goto(this.url);
     await page.getByLabel('Name').fill(name);

@@ -26,8 +26,11 @@ await h.step('set-up makes the first account and refuses a wrong code', async ()
   };
   await fill('AAAA-AAAA');
   await engineer.getByRole('alert').getByText('setup code is wrong').waitFor();
+  await engineer.getByLabel('Delete old scans automatically').selectOption('After 2 years');
   await fill(h.setupCode);
   await engineer.getByRole('navigation').waitFor();
+  await engineer.goto(`${h.url}#/settings`);
+  equal(await engineer.getByLabel('Delete scans after').inputValue(), '730', 'what was chosen at the set-up');
 });
 
 await h.step('the engineer adds accounts', async () => {
@@ -136,7 +139,7 @@ await h.step('a physicist plans, a second one approves', async () => {
   await bob.getByRole('button', { name: 'Save plan' }).click();
   await bob.getByRole('status').getByText('Plan saved.').waitFor({ state: 'attached' });
   await bob.getByRole('button', { name: 'Review and approve' }).click();
-  await bob.getByRole('button', { name: 'Sign and approve' }).click();
+  await h.sign(bob);
   await bob.getByRole('alert').getByText('a second person must approve').waitFor();
   await h.logIn(clara, 'clara');
   await clara.goto(`${h.url}${new URL(bob.url()).hash}`);
@@ -159,13 +162,15 @@ await h.step('a physicist plans, a second one approves', async () => {
   await review.click();
   const signed = clara.getByRole('region', { name: 'You sign exactly this' });
   await signed.getByText('4 corners').waitFor();
-  equal(await signed.locator('input').count(), 0, 'the summary is read-only');
+  equal(await signed.locator('input:not([type=password])').count(), 0, 'the summary is read-only');
   await h.look(clara, 'plan-summary');
   await clara.getByLabel('Shifts (mm)').fill('5');
   await signed.waitFor({ state: 'detached' });
   await clara.getByLabel('Shifts (mm)').fill('3');
   await review.click();
-  await clara.getByRole('button', { name: 'Sign and approve' }).click();
+  await h.sign(clara, 'not this one');
+  await clara.getByRole('alert').getByText('password is wrong').waitFor();
+  await h.sign(clara);
   await clara.getByText('approved by clara').waitFor();
   await h.look(clara, 'plan-approved');
 });
@@ -543,6 +548,27 @@ await h.step('the restart into an update: with the password, never beside a sess
   await bob.getByText('went back to the previous system').waitFor();
   await engineer.getByRole('button', { name: 'I have seen it' }).click();
   await engineer.getByText('went back to the previous system').waitFor({ state: 'detached' });
+});
+
+await h.step('a patient is deleted with the code and the password', async () => {
+  const { id } = (await h.api(anna, 'patients', 'POST', { code: 'PX-GONE', site: '' })).body;
+  await bob.goto(`${h.url}#/patient/${id}`);
+  await bob.getByText('Delete patient data').click();
+  const submit = async (code, password) => {
+    await bob.getByLabel('Code', { exact: true }).fill(code);
+    await bob.getByLabel('Your password').fill(password);
+    await bob.getByRole('button', { name: 'Delete permanently' }).click();
+  };
+  await submit('PX-0001', h.password);
+  await bob.getByRole('alert').getByText('Type the code to confirm').waitFor();
+  await submit('PX-GONE', 'not this one');
+  await bob.getByRole('alert').getByText('password is wrong').waitFor();
+  equal((await h.api(bob, `patients/${id}`)).status, 200, 'still there');
+  await bob.getByLabel('Your password').scrollIntoViewIfNeeded();
+  await h.look(bob, 'patient-delete');
+  await submit('PX-GONE', h.password);
+  await bob.waitForURL(/#\/patients$/);
+  equal((await h.api(bob, `patients/${id}`)).status, 404, 'gone');
 });
 
 await h.step('a scan is deleted with a reason and its number; one that a reference is made of is not', async () => {

@@ -49,7 +49,7 @@ await h.step('accounts of three roles, a patient, an approved reference', async 
     if (page === bob) await page.getByRole('button', { name: 'Save plan' }).click();
     else {
       await page.getByRole('button', { name: 'Review and approve' }).click();
-      await page.getByRole('button', { name: 'Sign and approve' }).click();
+      await h.sign(page);
     }
     await page.getByText(page === bob ? 'Plan saved.' : 'approved by clara').waitFor();
   }
@@ -387,7 +387,7 @@ await h.step('two at one plan: nobody saves over or approves what was not seen',
     await route.continue();
   });
   await clara.getByRole('button', { name: 'Review and approve' }).click();
-  await clara.getByRole('button', { name: 'Sign and approve' }).click();
+  await h.sign(clara);
   await clara.getByRole('alert').getByText('Someone else has changed the plan').waitFor();
   equal(await shift(clara).inputValue(), '7', 'what would have been approved unseen');
   await clara.getByText('draft').waitFor();

@@ -115,6 +115,8 @@ Accounts::Accounts(const Services& services, AccountOptions options)
     : users_(services.accounts),
       audit_(services.audit),
       settings_(services.settings),
+      patients_(services.patients),
+      references_(services.references),
       scans_(services.scans),
       room_(services.room),
       profiles_(services.profiles),
@@ -188,6 +190,10 @@ void Accounts::AddRoutes(Router& router) {
               bind(&Accounts::ShowLastLogin)});
   router.Add({"POST", "/api/v1/session/password", Permission::kLogin, BodyKind::kJson,
               bind(&Accounts::ChangeOwnPassword)});
+  router.Add({"POST", "/api/v1/references/{id}/approve", Permission::kApprove, BodyKind::kJson,
+              bind(&Accounts::ApproveReference)});
+  router.Add({"DELETE", "/api/v1/patients/{id}", Permission::kWipe, BodyKind::kJson,
+              bind(&Accounts::WipePatient)});
   router.Add({"POST", "/api/v1/scans/{id}/accept-outside", Permission::kAccept, BodyKind::kJson,
               bind(&Accounts::AcceptOutside)});
   router.Add({"POST", "/api/v1/update/restart", Permission::kUpdate, BodyKind::kJson,

@@ -76,6 +76,9 @@ class Accounts : public SessionLookup {
   void ChangeOwnPassword(const Request& request, const Respond& respond);
   /// Accepts a result that is not in tolerance: with a reason and the person's own password.
   void AcceptOutside(const Request& request, const Respond& respond);
+  /// The plan that was read, by its revision and digest.
+  void ApproveReference(const Request& request, const Respond& respond);
+  void WipePatient(const Request& request, const Respond& respond);
   /// Calls `act` if the password is the person's own, and answers with what became of it.
   void Signed(const Request& request, std::string password, const Respond& respond,
               std::function<void(const Actor&, Done)> act);
@@ -111,6 +114,8 @@ class Accounts : public SessionLookup {
   AccountService& users_;
   AuditLog& audit_;
   SettingsService& settings_;
+  PatientService& patients_;
+  ReferenceService& references_;
   ScanService& scans_;
   RoomCalibrationService& room_;
   SensorProfileService& profiles_;

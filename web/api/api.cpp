@@ -207,10 +207,6 @@ void AddPatientRoutes(Table& table, PatientService& patients, ReferenceService& 
                 patients.ArchivePatient(request.actor(), request.arguments[0], archived,
                                         Answer(respond));
               });
-  table.Write("DELETE", "/api/v1/patients/{id}", Permission::kWipe, BodyKind::kNone,
-              [&patients](const Request& request, const Respond& respond) {
-                patients.WipePatient(request.actor(), request.arguments[0], Answer(respond));
-              });
   table.Write("POST", "/api/v1/patients/{id}/open", Permission::kScan, BodyKind::kJson,
               [&patients](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
@@ -283,16 +279,6 @@ void AddReferenceRoutes(Table& table, ReferenceService& references) {
                 const auto [plan, revision] = ParsePlan(request.body);
                 references.PlanReference(request.actor(), request.arguments[0], revision, plan,
                                          Answer(respond));
-              });
-  table.Write("POST", "/api/v1/references/{id}/approve", Permission::kApprove, BodyKind::kJson,
-              [&references](const Request& request, const Respond& respond) {
-                Fields fields(request.body);
-                const int revision = fields.Integer("revision", 1, kMaxRevision);
-                const std::string digest =
-                    fields.Has("digest") ? fields.Text("digest", 0, 64) : std::string();
-                fields.Finish();
-                references.ApproveReference(request.actor(), request.arguments[0], revision, digest,
-                                            Answer(respond));
               });
 }
 

@@ -18,6 +18,28 @@ void Accounts::AcceptOutside(const Request& request, const Respond& respond) {
          });
 }
 
+void Accounts::ApproveReference(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  const int revision = fields.Integer("revision", 1, kMaxRevision);
+  const std::string digest = fields.Has("digest") ? fields.Text("digest", 0, 64) : std::string();
+  std::string password = fields.Text("password", 1, kMaxPassword);
+  fields.Finish();
+  Signed(request, std::move(password), respond,
+         [this, revision, digest, id = request.arguments.at(0)](const Actor& actor, Done done) {
+           references_.ApproveReference(actor, id, revision, digest, std::move(done));
+         });
+}
+
+void Accounts::WipePatient(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  std::string password = fields.Text("password", 1, kMaxPassword);
+  fields.Finish();
+  Signed(request, std::move(password), respond,
+         [this, id = request.arguments.at(0)](const Actor& actor, Done done) {
+           patients_.WipePatient(actor, id, std::move(done));
+         });
+}
+
 void Accounts::Signed(const Request& request, std::string password, const Respond& respond,
                       std::function<void(const Actor&, Done)> act) {
   VerifyOwn(request, std::move(password), "the password is wrong", respond,

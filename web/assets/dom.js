@@ -116,6 +116,11 @@ async function work(button, task) {
   }
 }
 
+/// For what is signed: the person types the own password again.
+export const signingPassword = () => h('input', {
+  type: 'password', required: true, maxlength: 128, autocomplete: 'current-password',
+});
+
 export function action(label, task, properties) {
   const button = h('button', { type: 'button', ...properties }, label);
   button.addEventListener('click', () => work(button, task));

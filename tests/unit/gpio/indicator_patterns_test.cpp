@@ -26,7 +26,8 @@ const std::vector<IndicatorPattern>& AllPatterns() {
                                                       IndicatorPattern::kNoAnswer,
                                                       IndicatorPattern::kDone,
                                                       IndicatorPattern::kFault,
-                                                      IndicatorPattern::kReadyRolledBack};
+                                                      IndicatorPattern::kReadyRolledBack,
+                                                      IndicatorPattern::kStopped};
   return patterns;
 }
 

@@ -206,7 +206,10 @@ TEST_F(AccountsTest, RolesReachOnlyWhatIsTheirs) {
   EXPECT_EQ(physicist.Get("/api/v1/audit").status, 200);
   EXPECT_EQ(technician.Post("/api/v1/references/x/approve", {{"revision", 1}}).status, 403);
   EXPECT_EQ(engineer.Post("/api/v1/references/x/approve", {{"revision", 1}}).status, 403);
-  EXPECT_EQ(physicist.Post("/api/v1/references/x/approve", {{"revision", 1}}).status, 404);
+  EXPECT_EQ(
+      physicist.Post("/api/v1/references/x/approve", {{"revision", 1}, {"password", kPassword}})
+          .status,
+      404);
   EXPECT_EQ(service_.users.size(), 4U);
 }
 

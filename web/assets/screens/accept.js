@@ -1,6 +1,6 @@
 // What people do with a result: scan again, accept it, make a reference of it, take it away.
 import { fileUrl, live, may, post } from '../api.js';
-import { action, clear, done, field, form, h, localTime } from '../dom.js';
+import { action, clear, done, field, form, h, localTime, signingPassword } from '../dom.js';
 import { S } from '../strings.js';
 import { openPatient } from '../treatment.js';
 import { removeScan } from './remove_scan.js';
@@ -20,9 +20,7 @@ function rescanButton({ scan, patient }) {
 function outsideForm(scan, reload) {
   const text = S.result;
   const reason = h('input', { required: true, minlength: 3, maxlength: 200, autocomplete: 'off' });
-  const password = h('input', {
-    type: 'password', required: true, maxlength: 128, autocomplete: 'current-password',
-  });
+  const password = signingPassword();
   return h('details', { class: 'accept-outside' }, h('summary', {}, `${text.acceptOutside}…`),
     h('p', { class: 'hint' }, text.acceptOutsideHint),
     form({ class: 'form inline' }, async () => {

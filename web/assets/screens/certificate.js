@@ -1,6 +1,6 @@
 // The certificate by which browsers know the appliance, and another one in its place.
 import { get, post, put } from '../api.js';
-import { clear, done, field, form, h, localTime, select } from '../dom.js';
+import { clear, done, field, form, h, localTime, signingPassword, select } from '../dom.js';
 import { S } from '../strings.js';
 
 const kMaxChain = 32 * 1024;
@@ -30,9 +30,7 @@ function change(load) {
       for (const input of [chain, key]) input.disabled = !given;
     },
   });
-  const password = h('input', {
-    type: 'password', required: true, maxlength: 128, autocomplete: 'current-password',
-  });
+  const password = signingPassword();
   return form({ class: 'form' }, async () => {
     const body = { password: password.value };
     password.value = '';

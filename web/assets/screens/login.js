@@ -1,5 +1,5 @@
-import { loadSession, post } from '../api.js';
-import { clear, field, form, h } from '../dom.js';
+import { get, loadSession, post, put } from '../api.js';
+import { clear, field, form, h, select } from '../dom.js';
 import { S } from '../strings.js';
 
 export function showLogin(main, setupRequired, certificate, done) {
@@ -35,6 +35,7 @@ export function showLogin(main, setupRequired, certificate, done) {
   const repeat = h('input', {
     type: 'password', required: true, maxlength: 128, autocomplete: 'new-password',
   });
+  const retention = select(text.retentions, '0');
   clear(main, h('section', { class: 'login card' }, h('h1', {}, text.setupTitle),
     h('p', {}, text.setupText),
     certificate && h('p', { class: 'hint' }, text.certificate, ' ',
@@ -42,9 +43,16 @@ export function showLogin(main, setupRequired, certificate, done) {
     form({ class: 'form' }, async () => {
       if (password.value !== repeat.value) throw new Error(text.differ);
       await post('setup', { code: code.value.trim(), name: name.value, password: password.value });
-      await finish();
+      await loadSession();
+      if (retention.value !== '0') {
+        await put('settings', {
+          ...await get('settings'), retention_days: Number(retention.value),
+        });
+      }
+      await done();
     }, field(text.code, code), field(text.name, name, S.users.nameHint),
     field(text.password, password, text.passwordHint), field(text.repeat, repeat),
+    field(text.retention, retention, text.retentionHint),
     h('button', { class: 'primary' }, text.setupSubmit))));
   code.focus();
 }

@@ -1,7 +1,7 @@
 // Patients, their references and scans, and the treatment session that people open here.
-import { get, live, may, post, put, remove } from '../api.js';
+import { get, live, may, post, put, removeFor } from '../api.js';
 import {
-  action, clear, done, enable, field, form, h, localTime, redraw, table, warn,
+  action, clear, done, enable, field, form, h, localTime, redraw, signingPassword, table, warn,
 } from '../dom.js';
 import { numbersLine } from '../numbers.js';
 import { S } from '../strings.js';
@@ -177,12 +177,16 @@ function scanTable(scans) {
 function wipe(patient) {
   const text = S.patients;
   const code = h('input', { required: true, autocomplete: 'off', spellcheck: 'false' });
+  const password = signingPassword();
   return h('details', { class: 'card' }, h('summary', {}, text.wipe), h('p', {}, text.wipeText),
     form({ class: 'form inline' }, async () => {
       if (code.value !== patient.code) throw new Error(text.wipeText);
-      await remove(`patients/${patient.id}`);
+      const body = { password: password.value };
+      password.value = '';
+      await removeFor(`patients/${patient.id}`, body);
       location.hash = '#/patients';
-    }, field(text.code, code), h('button', { class: 'danger' }, text.wipeSubmit)));
+    }, field(text.code, code), field(S.result.acceptPassword, password),
+    h('button', { class: 'danger' }, text.wipeSubmit)));
 }
 
 function openNow(patient) {

@@ -2,7 +2,8 @@
 // what is stored.
 import { get, live, may, post, put } from '../api.js';
 import {
-  action, checkbox, clear, done, enable, field, fixed, h, keepFocus, localTime, say, select, warn,
+  action, checkbox, clear, done, enable, field, fixed, form, h, keepFocus, localTime, say, select,
+  signingPassword, warn,
 } from '../dom.js';
 import { guardLeaving } from '../leave.js';
 import { compassOf, marksNote } from '../map_frame.js';
@@ -99,7 +100,13 @@ function summary(reference, patient, scene, picture, approve) {
   const number = (value) => `${value}`.replace('.', S.decimal);
   const size = measure(plan.region_m);
   const frames = scene?.frames;
-  const button = action(text.summarySubmit, approve, { class: 'primary' });
+  const password = signingPassword();
+  const signature = form({ class: 'form inline below' }, async () => {
+    const written = password.value;
+    password.value = '';
+    await approve(written);
+  }, field(S.result.acceptPassword, password),
+  h('button', { class: 'primary' }, text.summarySubmit));
   const element = h('section', { class: 'card summary', 'aria-label': text.summary },
     h('h2', {}, text.summary), h('div', { class: 'summary-grid' },
       picture, h('dl', { class: 'facts' },
@@ -119,8 +126,8 @@ function summary(reference, patient, scene, picture, approve) {
         `${S.result.frames} ${frames.tracked} / ${frames.total}, `
           + `${S.result.views} ${scene.keyframes}`),
       row(text.signature, h('code', {}, reference.digest)))),
-    h('p', { class: 'hint' }, text.approveHint), button);
-  return { element, button };
+    h('p', { class: 'hint' }, text.approveHint), signature);
+  return { element, password };
 }
 
 /// One stored plan and what is edited of it. `store(request)` sends a change.
@@ -188,13 +195,13 @@ async function draft(place, reference, store) {
     return editor(loaded.grid, loaded.map, shown, false, () => {}, compass).element;
   };
   const showSummary = () => {
-    const { element, button } = summary(reference, patient, loaded?.scene, picture(), () => store(
-      () => post(`references/${reference.id}/approve`, {
-        revision: reference.revision, digest: reference.digest,
-      }), text.approved));
+    const approve = (written) => store(() => post(`references/${reference.id}/approve`, {
+      revision: reference.revision, digest: reference.digest, password: written,
+    }), text.approved);
+    const { element, password } = summary(reference, patient, loaded?.scene, picture(), approve);
     clear(signPlace, element);
     element.scrollIntoView({ block: 'nearest' });
-    button.focus();
+    password.focus();
   };
   inputs.axes.forEach((input) => input.addEventListener('input', () => {
     model.isocentre = inputs.isocentre();

@@ -1,7 +1,9 @@
 // Where the room's axes lie: the board to print, its three scans, by how much they differ, and who
 // signed.
 import { get, live, may, post } from '../api.js';
-import { action, clear, done, field, fixed, form, h, localTime, table } from '../dom.js';
+import {
+  action, clear, done, field, fixed, form, h, localTime, signingPassword, table,
+} from '../dom.js';
 import { S } from '../strings.js';
 import { sentence } from './common.js';
 
@@ -48,9 +50,7 @@ function spread(room) {
 /// With the password again: from then on it gives every comparison its directions.
 function signature(room, load) {
   const text = S.room_calibration;
-  const password = h('input', {
-    type: 'password', required: true, maxlength: 128, autocomplete: 'current-password',
-  });
+  const password = signingPassword();
   return form({ class: 'form inline below' }, async () => {
     const body = { digest: room.digest, password: password.value };
     password.value = '';

@@ -1,6 +1,6 @@
 // What good scans have taught of the connected sensor unit, with its earlier versions.
 import { get, may, post } from '../api.js';
-import { clear, done, field, form, h, localTime, select, table } from '../dom.js';
+import { clear, done, field, form, h, localTime, signingPassword, select, table } from '../dom.js';
 import { S, translated } from '../strings.js';
 
 const number = (value, digits) =>
@@ -31,9 +31,7 @@ function change({ serial, versions }, load) {
   const choices = { reset: text.resetChoice };
   for (const { version } of earlier) choices[`v${version}`] = text.takeBackChoice(version);
   const choice = select(choices, 'reset', {});
-  const password = h('input', {
-    type: 'password', required: true, maxlength: 128, autocomplete: 'current-password',
-  });
+  const password = signingPassword();
   return form({ class: 'form inline below' }, async () => {
     const body = { serial, password: password.value };
     password.value = '';

@@ -1,6 +1,6 @@
 // Which system runs, updates of it, the restart into them, and the diagnostics.
 import { currentSession, get, live, may, post, postForFile, remove } from '../api.js';
-import { action, clear, done, field, form, h } from '../dom.js';
+import { action, clear, done, field, form, h, signingPassword } from '../dom.js';
 import { S, translated } from '../strings.js';
 
 /// Sends a bundle with a bar; fetch tells nothing of what has left.
@@ -38,9 +38,7 @@ function upload() {
 /// Only for who may, and with the password again: the machine goes down.
 function restart() {
   const text = S.update;
-  const password = h('input', {
-    type: 'password', required: true, maxlength: 128, autocomplete: 'current-password',
-  });
+  const password = signingPassword();
   return h('section', { class: 'card restart', hidden: true }, h('h2', {}, text.restart),
     h('p', { class: 'lead' }, text.restartNeeded), h('p', { class: 'hint' }, text.restartHint),
     form({ class: 'form inline' }, async () => {

@@ -70,6 +70,11 @@ export const en = {
       + 'console and in its journal, and create the first account: an engineer.',
     code: 'Setup code', codeHint: 'XXXX-XXXX', passwordHint: 'At least 10 characters.',
     repeat: 'Password again', differ: 'The two passwords differ.', setupSubmit: 'Create account',
+    retention: 'Delete old scans automatically',
+    retentions: {
+      0: 'Never: keep them all', 365: 'After 1 year', 730: 'After 2 years', 3650: 'After 10 years',
+    },
+    retentionHint: 'Approved references stay. It can be changed on the settings page.',
     certificate: 'Certificate of this appliance (SHA-256). Compare it with the one in its journal '
       + 'and the one that the browser shows:',
     firstTitle: 'Choose your password',

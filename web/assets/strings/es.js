@@ -93,6 +93,13 @@ export const es = {
     code: 'Código de instalación', codeHint: 'XXXX-XXXX', passwordHint: 'Al menos 10 caracteres.',
     repeat: 'Repetir la contraseña', differ: 'Las dos contraseñas son distintas.',
     setupSubmit: 'Crear cuenta',
+    retention: 'Borrar los escaneos antiguos automáticamente',
+    retentions: {
+      0: 'Nunca: conservarlos todos', 365: 'Después de 1 año', 730: 'Después de 2 años',
+      3650: 'Después de 10 años',
+    },
+    retentionHint: 'Las referencias aprobadas se conservan. Puede cambiarse en la página de '
+      + 'ajustes.',
     certificate: 'Certificado de este equipo (SHA-256). Compárelo con el de su registro y con el '
       + 'que muestra el navegador:',
     firstTitle: 'Elija su contraseña',

@@ -1,0 +1,377 @@
+#include "tests/support/api_rules.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "tests/support/http_client.hpp"
+
+namespace plumb::test {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+class ApiRules : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    HttpClient engineer(appliance_->port());
+    ASSERT_EQ(engineer
+                  .Post("/api/v1/setup", {{"code", appliance_->setup_code()},
+                                          {"name", "engineer"},
+                                          {"password", kPassword}})
+                  .status,
+              200);
+    engineer.FetchToken();
+    for (const auto& [name, role] : {std::pair{"technician", "technician"},
+                                     {"physicist", "physicist"},
+                                     {"second", "physicist"}})
+      ASSERT_TRUE(AddAccount(appliance_->port(), engineer, name, role)) << name;
+  }
+
+  [[nodiscard]] HttpClient LoggedIn(const std::string& name) const {
+    HttpClient client(appliance_->port());
+    EXPECT_EQ(client.LogIn(name, kPassword), 200) << name;
+    return client;
+  }
+  static std::string AddPatient(HttpClient& client, const std::string& code) {
+    return client.Post("/api/v1/patients", {{"code", code}, {"site", "thorax"}})
+        .json()
+        .value("id", "");
+  }
+  static HttpAnswer Open(HttpClient& client, const std::string& patient, const std::string& purpose,
+                         const std::string& replaces = "") {
+    return client.Post("/api/v1/patients/" + patient + "/open",
+                       {{"purpose", purpose}, {"reason", ""}, {"replaces", replaces}});
+  }
+  static json Plan(int revision = 1) {
+    return {{"revision", revision},
+            {"region_m", {{0.0, 0.0}, {0.5, 0.0}, {0.5, 0.4}}},
+            {"isocentre_m", {0.2, 0.1, 0.05}},
+            {"shift_tolerance_mm", 2.5},
+            {"rotation_tolerance_deg", 1.5},
+            {"posture", "FFP"},
+            {"couch_markers", true}};
+  }
+  /// Made of a scan just now by the first physicist, not yet planned.
+  std::string Draft(HttpClient& physicist, const std::string& patient) const {
+    return physicist
+        .Post("/api/v1/references",
+              {{"scan_id", appliance_->StoreScan(patient)}, {"reason", "planning"}})
+        .json()
+        .value("id", "");
+  }
+
+  std::unique_ptr<RuledAppliance> appliance_ = MakeRuledAppliance();
+};
+
+TEST_F(ApiRules, CodesDifferByMoreThanCase) {
+  HttpClient technician = LoggedIn("technician");
+  EXPECT_NE(AddPatient(technician, "PX-17"), "");
+  EXPECT_EQ(technician.Post("/api/v1/patients", {{"code", "px-17"}, {"site", ""}}).status, 409);
+  EXPECT_EQ(technician.Post("/api/v1/patients", {{"code", "PX-18"}, {"site", ""}}).status, 201);
+  EXPECT_EQ(technician.Get("/api/v1/patients").json()["patients"].size(), 2U);
+}
+
+TEST_F(ApiRules, SiteAndNoteAreBoundedAndArchivingIsThePhysicists) {
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
+  const std::string id =
+      technician.Post("/api/v1/patients", {{"code", "P-77"}, {"site", ""}}).json()["id"];
+  const std::string path = "/api/v1/patients/" + id;
+  EXPECT_EQ(technician.Put(path, {{"site", "pelvis"}, {"note", std::string(500, 'n')}}).status,
+            200);
+  EXPECT_EQ(technician.Put(path, {{"site", "pelvis"}, {"note", std::string(501, 'n')}}).status,
+            400);
+  EXPECT_EQ(technician.Put(path, {{"site", std::string(65, 's')}, {"note", ""}}).status, 400);
+  EXPECT_EQ(technician.Put(path, {{"site", "pelvis"}}).status, 400) << "both, or neither is known";
+  const nlohmann::json patient = technician.Get(path).json();
+  EXPECT_EQ(patient["site"], "pelvis");
+  EXPECT_EQ(patient["note"], std::string(500, 'n'));
+  EXPECT_EQ(patient["archived"], false);
+  EXPECT_EQ(technician.Post(path + "/archive", {{"archived", true}}).status, 403);
+  EXPECT_EQ(physicist.Post(path + "/archive", {{"archived", "yes"}}).status, 400);
+  EXPECT_EQ(physicist.Post(path + "/archive", {{"archived", true}}).status, 200);
+  EXPECT_EQ(technician.Get(path).json()["archived"], true);
+  EXPECT_EQ(technician.Post(path + "/open", {{"purpose", "reference"}, {"reason", ""}}).status,
+            409);
+  EXPECT_EQ(physicist.Post(path + "/archive", {{"archived", false}}).status, 200);
+}
+
+TEST_F(ApiRules, TemplatesArePhysicistsAndBounded) {
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
+  nlohmann::json wanted = {{"site", "thorax"},
+                           {"width_mm", 300},
+                           {"height_mm", 400},
+                           {"shift_tolerance_mm", 5},
+                           {"rotation_tolerance_deg", 2}};
+  EXPECT_EQ(technician.Put("/api/v1/templates", wanted).status, 403);
+  EXPECT_EQ(physicist.Put("/api/v1/templates", wanted).status, 200);
+  const nlohmann::json kept = technician.Get("/api/v1/templates").json()["templates"];
+  ASSERT_EQ(kept.size(), 1U);
+  EXPECT_EQ(kept[0]["height_mm"], 400);
+  EXPECT_EQ(kept[0]["tolerance"]["shift_mm"], 5);
+  EXPECT_EQ(kept[0]["changed_by"], "physicist");
+  for (const auto& [field, value] :
+       std::map<std::string, nlohmann::json>{{"width_mm", 19.9},
+                                             {"height_mm", 3001},
+                                             {"shift_tolerance_mm", 0},
+                                             {"rotation_tolerance_deg", 21},
+                                             {"site", ""}}) {
+    nlohmann::json wrong = wanted;
+    wrong[field] = value;
+    EXPECT_EQ(physicist.Put("/api/v1/templates", wrong).status, 400) << field;
+  }
+  EXPECT_EQ(physicist.Post("/api/v1/templates/remove", {{"site", "pelvis"}}).status, 404);
+  EXPECT_EQ(physicist.Post("/api/v1/templates/remove", {{"site", "thorax"}}).status, 200);
+  EXPECT_TRUE(technician.Get("/api/v1/templates").json()["templates"].empty());
+}
+
+TEST_F(ApiRules, OneSessionIsOpenAtATimeAndIsNamed) {
+  appliance_->PassDailyCheck("technician");
+  HttpClient technician = LoggedIn("technician");
+  const std::string a = AddPatient(technician, "A"), b = AddPatient(technician, "B");
+  EXPECT_EQ(Open(technician, "none", "reference").status, 404);
+  EXPECT_EQ(Open(technician, a, "fraction").status, 409) << "no approved reference";
+  EXPECT_EQ(Open(technician, a, "reference").status, 200);
+  const std::string session =
+      technician.Get("/api/v1/status").json()["session"].value("id", std::string());
+  ASSERT_NE(session, "");
+  const HttpAnswer other = Open(technician, b, "reference");
+  EXPECT_EQ(other.status, 409);
+  EXPECT_THAT(other.body, HasSubstr("session of A is open (opened by technician)"));
+  EXPECT_EQ(Open(technician, b, "reference", "another").status, 409);
+  EXPECT_EQ(technician.Post("/api/v1/treatment/close", {{"session_id", "another"}}).status, 409);
+  EXPECT_EQ(Open(technician, b, "reference", session).status, 200) << "seen, and replaced";
+  const json status = technician.Get("/api/v1/status").json();
+  EXPECT_EQ(status["session"]["patient_code"], "B");
+  EXPECT_EQ(technician.Post("/api/v1/treatment/close", {{"session_id", session}}).status, 409)
+      << "closed already";
+  EXPECT_EQ(
+      technician.Post("/api/v1/treatment/close", {{"session_id", status["session"]["id"]}}).status,
+      200);
+  EXPECT_TRUE(technician.Get("/api/v1/status").json()["session"].is_null());
+}
+
+TEST_F(ApiRules, WithoutTodaysCheckNothingBecomesAReference) {
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist"),
+             second = LoggedIn("second");
+  const std::string patient = AddPatient(technician, "PX-17");
+  const json wanted = {{"scan_id", appliance_->StoreScan(patient)}, {"reason", "planning"}};
+  EXPECT_THAT(Open(technician, patient, "reference").body, HasSubstr("aily check"));
+  const HttpAnswer refused = physicist.Post("/api/v1/references", wanted);
+  EXPECT_EQ(refused.status, 409);
+  EXPECT_THAT(refused.body, HasSubstr("aily check"));
+  appliance_->PassDailyCheck("technician");
+  const HttpAnswer made = physicist.Post("/api/v1/references", wanted);
+  EXPECT_EQ(made.status, 201) << made.body;
+  EXPECT_EQ(second
+                .Post("/api/v1/references/" + made.json().value("id", "") + "/approve",
+                      {{"revision", 1}, {"password", kPassword}})
+                .status,
+            200);
+}
+
+TEST_F(ApiRules, AReferenceIsApprovedByASecondPersonAsItWasPlanned) {
+  appliance_->PassDailyCheck("technician");
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist"),
+             second = LoggedIn("second");
+  const std::string patient = AddPatient(technician, "PX-17");
+  const std::string id = Draft(physicist, patient), path = "/api/v1/references/" + id;
+  EXPECT_EQ(physicist.Put(path + "/plan", Plan()).status, 200);
+  EXPECT_EQ(technician.Put(path + "/plan", Plan()).status, 403);
+  EXPECT_EQ(physicist.Put(path + "/plan", Plan()).status, 409) << "another one was saved since";
+  EXPECT_EQ(second.Post(path + "/approve", {{"revision", 1}, {"password", kPassword}}).status, 409);
+  EXPECT_EQ(second.Get(path).json()["revision"], 2);
+  EXPECT_EQ(second.Post(path + "/approve", {{"revision", 2}}).status, 400) << "not signed";
+  EXPECT_EQ(second.Post(path + "/approve", {{"revision", 2}, {"password", "not this one"}}).status,
+            403);
+  EXPECT_EQ(technician.Post(path + "/approve", {{"revision", 2}, {"password", kPassword}}).status,
+            403);
+  EXPECT_EQ(physicist.Post(path + "/approve", {{"revision", 2}, {"password", kPassword}}).status,
+            403)
+      << "planned it";
+  EXPECT_EQ(second
+                .Post(path + "/approve",
+                      {{"revision", 2}, {"password", kPassword}, {"digest", "of another"}})
+                .status,
+            409);
+  EXPECT_TRUE(
+      technician.Get("/api/v1/patients/" + patient).json()["approved_reference_id"].is_null());
+  const std::string digest = second.Get(path).json()["digest"];
+  EXPECT_EQ(
+      second.Post(path + "/approve", {{"revision", 2}, {"password", kPassword}, {"digest", digest}})
+          .status,
+      200);
+  EXPECT_EQ(second.Post(path + "/approve", {{"revision", 2}, {"password", kPassword}}).status, 409);
+  const json reference = technician.Get(path).json();
+  EXPECT_EQ(reference["approved_by"], "second");
+  EXPECT_EQ(reference["planned_by"], "physicist");
+  const json& plan = reference["plan"];
+  EXPECT_EQ(plan["isocentre_m"], json({0.2, 0.1, 0.05}));
+  EXPECT_EQ(plan["region_m"], Plan()["region_m"]);
+  EXPECT_EQ(plan["tolerance"]["shift_mm"], 2.5);
+  EXPECT_EQ(plan["tolerance"]["rotation_deg"], 1.5);
+  EXPECT_EQ(plan["posture"], "FFP");
+  EXPECT_EQ(plan["couch_markers"], true);
+  EXPECT_EQ(technician.Get("/api/v1/patients/" + patient).json()["approved_reference_id"], id);
+  EXPECT_EQ(Open(technician, patient, "fraction").status, 200);
+
+  // What is approved stays as it is: another plan is a draft of its own.
+  json other = Plan(2);
+  other["posture"] = "HFS";
+  const HttpAnswer anew = physicist.Put(path + "/plan", other);
+  EXPECT_THAT(anew.status, ::testing::AnyOf(200, 201)) << anew.body;
+  EXPECT_NE(anew.json().value("id", id), id);
+  EXPECT_EQ(technician.Get(path).json()["plan"]["posture"], "FFP");
+  EXPECT_EQ(technician.Get("/api/v1/patients/" + patient).json()["approved_reference_id"], id);
+}
+
+TEST_F(ApiRules, AScanIsRemovedForAReasonByWhoMayAndAReferenceIsNot) {
+  appliance_->PassDailyCheck("technician");
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
+  const std::string patient = AddPatient(technician, "PX-17");
+  const std::string scan = "/api/v1/scans/" + appliance_->StoreScan(patient);
+  const std::string reference = Draft(physicist, patient);
+  const std::string of_reference =
+      "/api/v1/scans/" +
+      physicist.Get("/api/v1/references/" + reference).json().value("scan_id", "");
+  const std::string reason = R"({"reason":"blurred"})";
+  for (const char* role : {"technician", "engineer"})
+    EXPECT_EQ(LoggedIn(role).Ask("DELETE", scan, reason).status, 403) << role;
+  EXPECT_EQ(physicist.Ask("DELETE", scan, "{}").status, 400);
+  EXPECT_EQ(physicist.Ask("DELETE", scan, R"({"reason":"x"})").status, 400);
+  EXPECT_EQ(physicist.Ask("DELETE", of_reference, reason).status, 409);
+  EXPECT_EQ(physicist.Ask("DELETE", scan, reason).status, 200);
+  EXPECT_EQ(physicist.Ask("DELETE", scan, reason).status, 404);
+  EXPECT_EQ(technician.Get(scan + "/files/mesh.ply").status, 404);
+  EXPECT_EQ(technician.Get(of_reference).status, 200);
+}
+
+TEST_F(ApiRules, WhatGivesNothingToActOnIsNotAccepted) {
+  appliance_->PassDailyCheck("technician");
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
+  const std::string patient = AddPatient(technician, "PX-17");
+  const std::string scan = "/api/v1/scans/" + appliance_->StoreScan(patient);
+  ASSERT_EQ(Open(technician, patient, "reference").status, 200);
+  EXPECT_EQ(technician.Post(scan + "/accept").status, 409) << "compared with nothing";
+  EXPECT_EQ(technician
+                .Post(scan + "/accept-outside",
+                      {{"reason", "the arm cannot be moved"}, {"password", "not this one"}})
+                .status,
+            403);
+  EXPECT_EQ(technician
+                .Post(scan + "/accept-outside",
+                      {{"reason", "the arm cannot be moved"}, {"password", kPassword}})
+                .status,
+            409);
+  EXPECT_EQ(LoggedIn("engineer").Post(scan + "/accept").status, 403);
+  EXPECT_EQ(technician.Post("/api/v1/scans/none/accept").status, 404);
+}
+
+TEST_F(ApiRules, ABaselineIsSetByAnotherPersonThanTheOneWhoTookTheCheck) {
+  const std::string own = appliance_->PassDailyCheck("physicist");
+  HttpClient physicist = LoggedIn("physicist"), second = LoggedIn("second");
+  const std::string path = "/api/v1/checks/" + own + "/baseline";
+  EXPECT_EQ(LoggedIn("technician").Post(path).status, 403);
+  EXPECT_EQ(physicist.Post(path).status, 403);
+  EXPECT_TRUE(physicist.Get("/api/v1/checks").json()["baseline"].is_null());
+  EXPECT_EQ(second.Post(path).status, 200);
+  EXPECT_EQ(physicist.Get("/api/v1/checks").json()["baseline"]["set_by"], "second");
+  EXPECT_EQ(second.Post("/api/v1/checks/none/baseline").status, 404);
+}
+
+TEST_F(ApiRules, SettingsAreKeptAsTheyWereWrittenAndBounded) {
+  HttpClient engineer = LoggedIn("engineer");
+  const json wanted = {{"shift_tolerance_mm", 2.5}, {"rotation_tolerance_deg", 0.7},
+                       {"posture", "HFP"},          {"couch_markers", true},
+                       {"auto_stop_s", 7.0},        {"scan_limit_s", 33.0},
+                       {"keep_recordings", true},   {"retention_days", 730},
+                       {"idle_logout_min", 11}};
+  ASSERT_NE(engineer.Get("/api/v1/settings").json(), wanted);
+  for (const char* role : {"technician", "physicist"})
+    EXPECT_EQ(LoggedIn(role).Put("/api/v1/settings", wanted).status, 403) << role;
+  EXPECT_EQ(engineer.Put("/api/v1/settings", wanted).status, 200);
+  EXPECT_EQ(engineer.Get("/api/v1/settings").json(), wanted);
+  for (const auto& [field, value] : std::map<std::string, json>{{"shift_tolerance_mm", 0},
+                                                                {"rotation_tolerance_deg", 90.1},
+                                                                {"posture", "UPSIDE"},
+                                                                {"couch_markers", 1},
+                                                                {"auto_stop_s", 0.5},
+                                                                {"scan_limit_s", 601},
+                                                                {"retention_days", -1},
+                                                                {"idle_logout_min", 0}}) {
+    json wrong = wanted;
+    wrong[field] = value;
+    const HttpAnswer answer = engineer.Put("/api/v1/settings", wrong);
+    EXPECT_EQ(answer.status, 400) << field;
+    EXPECT_THAT(answer.body, HasSubstr(field));
+    wrong.erase(field);
+    EXPECT_EQ(engineer.Put("/api/v1/settings", wrong).status, 400) << "without " << field;
+  }
+  EXPECT_EQ(engineer.Get("/api/v1/settings").json(), wanted);
+}
+
+TEST_F(ApiRules, AWipedPatientIsGoneWithEverythingThatBelongsToThem) {
+  appliance_->PassDailyCheck("technician");
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
+  const std::string patient = AddPatient(technician, "PX-17"),
+                    other = AddPatient(technician, "PX-18");
+  const std::string reference = Draft(physicist, patient), kept = appliance_->StoreScan(other);
+  const std::string scan =
+      physicist.Get("/api/v1/references/" + reference).json().value("scan_id", "");
+  const std::string path = "/api/v1/patients/" + patient;
+  const auto wipe = [&](HttpClient& client, const char* password) {
+    return client.Ask("DELETE", path, json{{"password", password}}.dump()).status;
+  };
+  EXPECT_EQ(wipe(technician, kPassword), 403);
+  EXPECT_EQ(wipe(physicist, "not this one"), 403);
+  EXPECT_EQ(physicist.Get(path).status, 200);
+  EXPECT_EQ(wipe(physicist, kPassword), 200);
+  EXPECT_EQ(physicist.Get(path).status, 404);
+  EXPECT_EQ(physicist.Get("/api/v1/references/" + reference).status, 404);
+  EXPECT_EQ(physicist.Get("/api/v1/scans/" + scan).status, 404);
+  EXPECT_EQ(physicist.Get("/api/v1/scans/" + kept).status, 200);
+}
+
+TEST_F(ApiRules, AccountsAreOfOneNameAndTheLastEngineerStays) {
+  HttpClient engineer = LoggedIn("engineer"), technician = LoggedIn("technician");
+  const json anew = {{"name", "technician"}, {"role", "physicist"}, {"password", kFirstPassword}};
+  EXPECT_EQ(technician.Post("/api/v1/users", anew).status, 403);
+  EXPECT_EQ(engineer.Post("/api/v1/users", anew).status, 409);
+  EXPECT_EQ(engineer.Put("/api/v1/users/engineer", {{"disabled", true}}).status, 409);
+  EXPECT_EQ(engineer.Put("/api/v1/users/engineer", {{"role", "technician"}}).status, 409);
+  EXPECT_EQ(engineer.Put("/api/v1/users/none", {{"disabled", true}}).status, 404);
+  EXPECT_EQ(engineer.Put("/api/v1/users/technician", {{"disabled", true}}).status, 200);
+  EXPECT_EQ(technician.Get("/api/v1/status").status, 401) << "its sessions have ended";
+  EXPECT_EQ(technician.LogIn("technician", kPassword), 403);
+}
+
+TEST_F(ApiRules, WhatWasDoneIsInTheLogWithWhoDidIt) {
+  appliance_->PassDailyCheck("technician");
+  HttpClient technician = LoggedIn("technician"), physicist = LoggedIn("physicist");
+  const std::string patient = AddPatient(technician, "PX-17");
+  ASSERT_EQ(Open(technician, patient, "reference").status, 200);
+  const std::string session = technician.Get("/api/v1/status").json()["session"].value("id", "");
+  const std::string reference = Draft(physicist, patient);
+  ASSERT_EQ(physicist.Put("/api/v1/references/" + reference + "/plan", Plan()).status, 200);
+  ASSERT_EQ(LoggedIn("second")
+                .Post("/api/v1/references/" + reference + "/approve",
+                      {{"revision", 2}, {"password", kPassword}})
+                .status,
+            200);
+  std::set<std::string> seen;
+  const json log = physicist.Get("/api/v1/audit").json();
+  for (const json& entry : log["entries"])
+    seen.insert(entry.value("user", "") + " " + entry.value("action", "") + " " +
+                entry.value("subject", ""));
+  EXPECT_THAT(seen,
+              ::testing::IsSupersetOf(
+                  {"technician patient.add " + patient, "technician session.open " + session,
+                   "physicist reference.add " + reference, "physicist reference.plan " + reference,
+                   "second reference.approve " + reference}));
+}
+
+}  // namespace
+}  // namespace plumb::test

@@ -1,0 +1,62 @@
+// The rules on the fake appliance.
+#include <fmt/format.h>
+
+#include "tests/support/api_rules.hpp"
+#include "tests/support/fake_appliance.hpp"
+#include "tests/support/http_client.hpp"
+
+namespace plumb::test {
+namespace {
+
+class FakeRuledAppliance : public RuledAppliance {
+ public:
+  FakeRuledAppliance() {
+    service_.SetOverdue("No daily check has passed today: open Daily check.");
+    web::HttpServerOptions options;
+    options.password_memory_bytes = 1 << 20;
+    options.password_operations = 1;
+    server_ = std::make_unique<web::HttpServer>(service_.services(), options);
+    loop_ = std::make_unique<ServingLoop>(*server_);
+  }
+  [[nodiscard]] std::uint16_t port() const override { return server_->port(); }
+  [[nodiscard]] std::string setup_code() const override {
+    return server_->setup_code().value_or("");
+  }
+  std::string StoreScan(const std::string& patient_id) override {
+    web::Scan scan;
+    scan.patient_id = patient_id;
+    scan.outcome = web::ScanOutcome::kDone;
+    scan.finished_at = web::WallClock::now();
+    loop_->Do([&] {
+      scan.id = fmt::format("s{}", ++num_scans_);
+      service_.scans.push_back(scan);
+    });
+    return scan.id;
+  }
+  std::string PassDailyCheck(const std::string& user) override {
+    web::CheckRecord check;
+    check.user = user;
+    check.status = "passed";
+    check.num_markers = 6;
+    loop_->Do([&] {
+      check.id = fmt::format("c{}", ++num_checks_);
+      service_.checks.checks.push_back(check);
+      service_.SetOverdue("");
+    });
+    return check.id;
+  }
+
+ private:
+  FakeAppliance service_;
+  std::unique_ptr<web::HttpServer> server_;
+  std::unique_ptr<ServingLoop> loop_;  // ends first
+  int num_scans_ = 0, num_checks_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<RuledAppliance> MakeRuledAppliance() {
+  return std::make_unique<FakeRuledAppliance>();
+}
+
+}  // namespace plumb::test
