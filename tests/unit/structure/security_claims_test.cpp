@@ -27,13 +27,15 @@ std::vector<std::vector<std::string>> Matches(const std::string& text, const std
   return found;
 }
 
-/// "Suite.Name" of every test that is written in C++.
+/// "Suite.Name" of every test that is written in C++, and of the scripts that ctest runs.
 std::set<std::string> ExistingTests() {
   static const std::regex kTest(R"(TEST(?:_F|_P)?\(\s*(\w+),\s*(\w+)\))");
+  static const std::regex kScript(R"(add_test\(NAME (\w+)\.(\w+))");
   std::set<std::string> names;
   for (const auto& entry : fs::recursive_directory_iterator(PLUMB_SOURCE_DIR "/tests")) {
-    if (entry.path().extension() != ".cpp") continue;
-    for (const auto& match : Matches(TextOf(entry.path()), kTest))
+    const bool is_script = entry.path().filename() == "CMakeLists.txt";
+    if (!is_script && entry.path().extension() != ".cpp") continue;
+    for (const auto& match : Matches(TextOf(entry.path()), is_script ? kScript : kTest))
       names.insert(match[0] + "." + match[1]);
   }
   return names;
