@@ -300,6 +300,7 @@ web::Status Appliance::WebStatus() {
                       .purpose = scan_.purpose,
                       .elapsed_s = SecondsSince(scan_.started),
                       .coverage = Coverage(),
+                      .without_new_surface_s = scan_.update.guidance.without_new_area_s,
                       .guidance = GuidanceOf(scan_.update.guidance.advice, scan_.dropped_share),
                       .keyframes = scan_.update.keyframes,
                       .frames = scan_.update.frames,

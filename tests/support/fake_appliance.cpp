@@ -105,11 +105,12 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
   scan.sensor_on_s = status.sensor.powered_s;
   scan.check_overdue = status.check_overdue;
   if (!is_check_) scans.push_back(scan);
-  status.scan = LiveScan{.id = scan.id,
-                         .patient_id = scan.patient_id,
-                         .purpose = scan.purpose,
-                         .coverage = 0.0,
-                         .step = "tracking"};
+  status.scan = LiveScan{
+      .id = scan.id,
+      .patient_id = scan.patient_id,
+      .purpose = scan.purpose,
+      .coverage = scan.purpose == ScanPurpose::kFraction ? std::optional(0.0) : std::nullopt,
+      .step = "tracking"};
   status.state = ApplianceState::kScanning;
   status.light = "scanning";
   phase_begun_.reset();
@@ -142,7 +143,8 @@ void FakeAppliance::Tick(std::chrono::steady_clock::time_point now) {
     const double fraction =
         std::min(1.0, static_cast<double>(elapsed.count()) / static_cast<double>(sweep.count()));
     scan.elapsed_s = static_cast<double>(elapsed.count()) / 1000.0;
-    scan.coverage = fraction;
+    if (scan.coverage) scan.coverage = fraction;
+    scan.without_new_surface_s = fraction > 0.8 ? 3.4 : 0.2;
     scan.guidance = fraction > 0.3 && fraction < 0.6 ? Guidance::kSlower : Guidance::kNone;
     if (guidance) scan.guidance = *guidance;
     status.light = scan.guidance == Guidance::kSlower ? "too_fast" : "scanning";

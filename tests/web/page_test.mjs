@@ -113,6 +113,17 @@ await h.step('a physicist plans, a second one approves', async () => {
   equal(moved[2], picked[2], 'at the same height');
   await map.press('Delete');
   equal(await bob.getByLabel('Isocentre x').inputValue(), '', 'no isocentre');
+  // A marker that was laid at the lasers.
+  await bob.getByLabel('Marker at the lasers').selectOption('Marker 1');
+  await bob.getByRole('button', { name: 'Take its centre' }).click();
+  const { markers } = await bob.evaluate(async () => {
+    const get = async (path) => (await fetch(`/api/v1/${path}`)).json();
+    return get(`scans/${(await get(`references/${location.hash.split('/')[2]}`)).scan_id}/files/scene.json`);
+  });
+  const centre = [0, 1, 2].map((axis) => markers[1].reduce((sum, corner) => sum + corner[axis] / 4, 0));
+  (await typed()).forEach((value, axis) => check(Math.abs(value - centre[axis]) < 1e-4, `the marker's centre: ${value} for ${centre[axis]}`));
+  await bob.getByRole('button', { name: 'Undo' }).click();
+  equal(await bob.getByLabel('Isocentre x').inputValue(), '', 'the marker is undone');
   await map.press('i');
   check((await typed())[2] > 0.02, 'a new one lies on the skin in the middle of the region');
   await map.press('Shift+ArrowLeft');

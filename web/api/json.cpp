@@ -50,6 +50,7 @@ Json LiveScanJson(const LiveScan& scan) {
           {"purpose", NameIn(kPurposeNames, scan.purpose)},
           {"elapsed_s", scan.elapsed_s},
           {"coverage", OrNull(scan.coverage)},
+          {"without_new_surface_s", scan.without_new_surface_s},
           {"guidance", NameIn(kGuidance, scan.guidance)},
           {"keyframes", scan.keyframes},
           {"frames", scan.frames},

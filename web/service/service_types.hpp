@@ -56,6 +56,7 @@ struct LiveScan {
   double elapsed_s = 0.0;
   std::optional<double> coverage;  ///< 0..1 of the region of the reference (else of what was seen
                                    ///< lately); unknown: nothing.
+  double without_new_surface_s = 0.0;  ///< Since surface was last seen for the first time.
   Guidance guidance = Guidance::kNone;
   std::int64_t keyframes = 0;
   std::int64_t frames = 0;

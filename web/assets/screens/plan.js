@@ -20,6 +20,22 @@ async function loadHeights(reference) {
   return { grid: scene.heightmap, map, scene };
 }
 
+/// Where a marker of the scan was laid at the lasers, its middle is the isocentre.
+function markerChoice(scene, take) {
+  const text = S.plan;
+  const found = Object.entries(scene?.markers ?? {});
+  if (!found.length) return null;
+  const names = Object.fromEntries(found.map(([id]) => [id, text.marker(id)]));
+  const marker = select(names, found[0][0]);
+  return h('div', { class: 'row' }, field(text.markerAtLasers, marker),
+    action(text.takeMarker, async () => {
+      const corners = scene.markers[marker.value];
+      const mean = (axis) => corners.reduce((sum, corner) => sum + corner[axis], 0)
+        / corners.length;
+      take([0, 1, 2].map((axis) => Number(mean(axis).toFixed(4))));
+    }, {}));
+}
+
 function isInside(region, [x, y]) {
   let inside = false;
   region.forEach(([ax, ay], i) => {
@@ -239,7 +255,11 @@ async function draft(place, reference, store) {
           editable && h('p', { class: 'hint' }, text.pickHint),
           h('div', { class: 'triple' }, inputs.axes.map((input, i) =>
             field(`${'xyz'[i]} (m)`, input))), inputs.bad, outside,
-          editable && drawing && action(text.pick, async () => drawing.pick(), {})),
+          editable && drawing && action(text.pick, async () => drawing.pick(), {}),
+          editable && drawing && markerChoice(loaded.scene, (point) => {
+            inputs.bad.textContent = '';
+            drawing.setIsocentre(point);
+          })),
         h('fieldset', {}, h('legend', {}, text.tolerance), field(text.shift, inputs.shift),
           field(text.rotation, inputs.rotation)),
         templatePlace, field(text.posture, inputs.posture), inputs.couch.element,

@@ -196,6 +196,11 @@ export function editor(grid, map, model, editable, changed, compass) {
       state.chosen = -1;
       update();
     },
+    setIsocentre: (point) => {
+      remember();
+      model.isocentre = point;
+      update();
+    },
     clear: () => {
       remember();
       model.region.length = 0;

@@ -82,7 +82,8 @@ function sweep(status, camera) {
     word(text.words[guidance], guidance === 'none' ? 'good' : 'bad'),
     text.hints[guidance] && h('p', { class: 'room-hint' }, text.hints[guidance]),
     h('div', { class: 'room-sweep' }, camera, h('div', { class: 'room-cover' },
-      h('p', { class: 'room-percent' }, known ? text.covered(percent) : text.notCovered),
+      h('p', { class: 'room-percent' }, known ? text.covered(percent)
+        : S.scan.surface(status.scan?.without_new_surface_s ?? 0)),
       known && h('progress', { max: 1, value: coverage, 'aria-label': text.covered(percent) })))];
 }
 

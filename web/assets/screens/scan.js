@@ -132,7 +132,7 @@ export async function showScan(place) {
     const percent = `${Math.round((fraction ?? 0) * 100)} %`;
     barText.textContent = state === 'working'
       ? `${text.step[scan?.step] ?? scan?.step ?? ''} ${percent}`
-      : isKnown ? `${text.coverage} ${percent}` : text.unknownCoverage;
+      : isKnown ? `${text.coverage} ${percent}` : text.surface(scan?.without_new_surface_s ?? 0);
     const advice = adviceOf(status);
     guidance.textContent = advice.words;
     guidance.dataset.tone = advice.tone;

@@ -167,7 +167,9 @@ export const en = {
       tracking_lost: 'LOST: go back to where you were', no_markers: 'NO MARKERS IN VIEW',
       computer_too_slow: 'COMPUTER TOO SLOW: frames are lost, sweep slower',
     },
-    unknownCoverage: 'Coverage is not measured for this scan',
+    // Without a reference nobody knows how much is still to be seen.
+    surface: (still_s) => (still_s < 2 ? 'New surface is still coming in'
+      : `No new surface for ${Math.floor(still_s)} s`),
     discarded: 'The scan was discarded.',
     lost: 'The sensor was unplugged: the scan was discarded.',
     step: {
@@ -193,7 +195,7 @@ export const en = {
     openOne: 'Open a patient on the page. A scan now would be unassigned.',
     checkDone: 'Daily check passed', checkOverdue: 'Daily check overdue',
     warm: 'Sensor warm', warming: (minutes) => `Sensor warming up: ${minutes} of 15 min`,
-    covered: (percent) => `${percent} % covered`, notCovered: 'Coverage is not measured',
+    covered: (percent) => `${percent} % covered`,
     offline: 'NO CONNECTION', pairTitle: 'Pair this screen',
     pairText: 'An engineer types this code on the page, under Accounts, Displays.',
     pairWaiting: 'Waiting…',
@@ -428,6 +430,8 @@ export const en = {
     shiftSigned: 'Tolerance of shifts', rotationSigned: 'Tolerance of rotations',
     isocentre: 'Isocentre',
     isocentreHint: 'Metres in the reference marker’s frame. Empty: the middle of the region.',
+    markerAtLasers: 'Marker at the lasers', takeMarker: 'Take its centre',
+    marker: (id) => `Marker ${id}`,
     pick: 'Pick on the map', picking: 'Click the map where the isocentre is.',
     pickHint: 'A picked point lies on the skin: type z for an isocentre inside the body. By keys: '
       + 'I on the map, then the arrows.',

@@ -195,7 +195,8 @@ export const es = {
       tracking_lost: 'PERDIDO: vuelva donde estaba', no_markers: 'NO SE VEN MARCADORES',
       computer_too_slow: 'EQUIPO DEMASIADO LENTO: se pierden imágenes, barra más despacio',
     },
-    unknownCoverage: 'La cobertura no se mide en este escaneo',
+    surface: (still_s) => (still_s < 2 ? 'Sigue apareciendo superficie nueva'
+      : `Sin superficie nueva desde hace ${Math.floor(still_s)} s`),
     discarded: 'El escaneo se ha descartado.',
     lost: 'El sensor se desconectó: el escaneo se ha descartado.',
     step: {
@@ -221,7 +222,7 @@ export const es = {
     openOne: 'Abra un paciente en la página. Un escaneo ahora quedaría sin asignar.',
     checkDone: 'Control diario superado', checkOverdue: 'Control diario pendiente',
     warm: 'Sensor a temperatura', warming: (minutes) => `Sensor calentando: ${minutes} de 15 min`,
-    covered: (percent) => `${percent} % cubierto`, notCovered: 'La cobertura no se mide',
+    covered: (percent) => `${percent} % cubierto`,
     offline: 'SIN CONEXIÓN', pairTitle: 'Vincular esta pantalla',
     pairText: 'Un ingeniero escribe este código en la página, en Cuentas, Pantallas.',
     pairWaiting: 'Esperando…', unassigned: 'ESCANEO SIN ASIGNAR',
@@ -475,6 +476,8 @@ export const es = {
     isocentre: 'Isocentro',
     isocentreHint: 'Metros en el sistema del marcador de referencia. Vacío: el centro de la '
       + 'región.',
+    markerAtLasers: 'Marcador en los láseres', takeMarker: 'Tomar su centro',
+    marker: (id) => `Marcador ${id}`,
     pick: 'Elegir en el mapa', picking: 'Pulse en el mapa donde está el isocentro.',
     pickHint: 'Un punto elegido está en la piel: escriba z para un isocentro dentro del cuerpo. '
       + 'Con teclas: I en el mapa y después las flechas.',
