@@ -54,8 +54,12 @@ TEST_F(DaemonScanTest, TwoPressesAndTwoMoreGiveTheSixNumbersOfTheBodysTrueMotion
   // A quarter of the pixels at twice the usual speed; the motion itself is 50 mm and 3.4 deg. A
   // wrong sign or frame misses by that much.
   const testing::MotionError error = testing::ErrorOfMotion(result);
-  EXPECT_LT(error.translation_m, 12 * kMillimetre);
-  EXPECT_LT(error.rotation_rad, 1.0 * kDegree);
+  std::printf("the motion is off by %.2f mm, %.3f deg\n", error.translation_m / kMillimetre,
+              error.rotation_rad / kDegree);
+  // Measured: 2.18 mm, 0.065 deg with every frame; with frames lost up to twice that.
+  const bool is_whole = last["frames_dropped"] == 0 && first["last_result"]["frames_dropped"] == 0;
+  EXPECT_LT(error.translation_m, (is_whole ? 2.7 : 6.0) * kMillimetre);
+  EXPECT_LT(error.rotation_rad, (is_whole ? 0.08 : 0.3) * kDegree);
   ::testing::Test::RecordProperty("after_last_frame_s", last["after_last_frame_s"].dump());
   std::printf(
       "result %.2f s after the last frame, first frame used %.0f ms after the press, %d frames "

@@ -200,8 +200,11 @@ TEST_F(DaemonSensorTest,
   EXPECT_EQ(scene["frames"]["dropped"], last["frames_dropped"]);
   const testing::MotionError error =
       testing::ErrorOfMotion(json::parse(ReadTextFile(scan / "result" / "result.json", 1 << 24)));
-  EXPECT_LT(error.translation_m, 12 * kMillimetre) << "as with all frames";
-  EXPECT_LT(error.rotation_rad, 1.0 * kDegree);
+  std::printf("the motion is off by %.2f mm, %.3f deg\n", error.translation_m / kMillimetre,
+              error.rotation_rad / kDegree);
+  // Measured: 1.0 to 4.4 mm, 0.06 to 0.12 deg.
+  EXPECT_LT(error.translation_m, 6 * kMillimetre) << "as with all frames";
+  EXPECT_LT(error.rotation_rad, 0.3 * kDegree);
 }
 
 TEST_F(DaemonSensorTest, UnpluggedWhileItIsClosedPlumbdEndsOrGoesOn) {
@@ -299,6 +302,7 @@ TEST_P(DaemonGlitchTest, AreCountedAndTheResultIsRightOrSaidToBeNone) {
   if (glitch != "late") plumbd.WaitForLog("of the sensor's images");
   EXPECT_EQ(first["last_result"]["is_reference"], true);
   if (last["verdict"] == "no_answer") {
+    EXPECT_GT(last["frames_dropped"].get<int>(), 0) << "a few glitches alone are no reason";
     EXPECT_FALSE(last["reasons"].empty());
     EXPECT_TRUE(last["correction"].is_null());
     EXPECT_TRUE(last.value("vertical_mm", json()).is_null());
@@ -308,8 +312,11 @@ TEST_P(DaemonGlitchTest, AreCountedAndTheResultIsRightOrSaidToBeNone) {
       plumbd.state() / "scans" / last["scan"].get<std::string>() / "result" / "result.json";
   const testing::MotionError error =
       testing::ErrorOfMotion(json::parse(ReadTextFile(file, 1 << 24)));
-  EXPECT_LT(error.translation_m, 12 * kMillimetre) << "as without glitches";
-  EXPECT_LT(error.rotation_rad, 1.0 * kDegree);
+  std::printf("the motion is off by %.2f mm, %.3f deg\n", error.translation_m / kMillimetre,
+              error.rotation_rad / kDegree);
+  // Measured: 1.0 to 4.4 mm, 0.06 to 0.12 deg.
+  EXPECT_LT(error.translation_m, 6 * kMillimetre) << "as without glitches";
+  EXPECT_LT(error.rotation_rad, 0.3 * kDegree);
   EXPECT_EQ(plumbd.Stop(), 0);
 }
 

@@ -318,10 +318,9 @@ TEST_F(ScenesTest, EvaluateMeasuresAgainstTheTruth) {
   EXPECT_EQ(figures.at("total").at("without_motion"), 0);
   const double error_mm = figures.at("total").at("translation_mm").at("max"),
                error_deg = figures.at("total").at("rotation_deg").at("max");
-  // 320 x 240 and a fifth of a real sweep's frames, nominal noise. Measured over two seeds: 1.0
-  // and 1.8 mm, 0.03 and 0.01 deg.
-  EXPECT_LT(error_mm, 5.0);
-  EXPECT_LT(error_deg, 0.5);
+  // 320 x 240 and a tenth of a real sweep's frames, nominal noise. Measured: 0.77 mm, 0.016 deg.
+  EXPECT_LT(error_mm, 0.93);
+  EXPECT_LT(error_deg, 0.02);
   const RunResult again = Plumb({"evaluate", SmallSuite(), "--out", folder_ / "out", "--reuse"});
   EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_THAT(again.err, Not(HasSubstr("tracking")));

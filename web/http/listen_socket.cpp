@@ -48,10 +48,11 @@ int OpenListenSocket(const std::string& address, std::uint16_t port) {
   const socklen_t length = is_v4 ? sizeof v4 : sizeof v6;
   if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0 ||
       bind(fd, bound, length) != 0 || listen(fd, kBacklog) != 0) {
-    const std::string reason = std::strerror(errno);
+    const int error = errno;
     if (fd >= 0) close(fd);
-    throw IoError(fmt::format("cannot listen on {} port {}: {}; is another server running there?",
-                              address, port, reason));
+    throw IoError(fmt::format("cannot listen on {} port {}: {}{}", address, port,
+                              std::strerror(error),
+                              error == EADDRINUSE ? "; is another server running there?" : ""));
   }
   return fd;
 }
