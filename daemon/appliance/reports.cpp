@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/units.hpp"
 #include "daemon/appliance/report_pictures.hpp"
 #include "daemon/appliance/report_words.hpp"
@@ -80,7 +81,7 @@ ReportTexts TextsOf(const ReportWords& words) {
 /// Nothing where the file is missing or no JSON: the report then leaves out what it says.
 Json JsonIn(const std::filesystem::path& file) {
   try {
-    return Json::parse(ReadTextFile(file, kMaxJsonBytes), nullptr, /*allow_exceptions=*/false);
+    return ParseBoundedJsonOrNothing(ReadTextFile(file, kMaxJsonBytes));
   } catch (const std::exception&) {
     return Json::value_t::discarded;
   }

@@ -11,13 +11,15 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <toml++/toml.h>
+
 #include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "daemon/config/config_section.hpp"
+#include "daemon/config/toml.hpp"
 
 namespace plumb {
 namespace {
@@ -292,7 +294,29 @@ PageTransport TransportOf(const WebConfig& web, bool is_loopback) {
   return web.plain_http ? PageTransport::kPlainOnNetwork : PageTransport::kOwnTls;
 }
 
+namespace {
+
+/// TOML has no control characters but tab and line ends. A file that lost its content in a power
+/// cut is often full of zero bytes.
+bool IsControl(char c) {
+  return (static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\n' && c != '\r') || c == 0x7f;
+}
+
+void RefuseControlCharacters(const std::string& text, const std::string& name) {
+  std::size_t line = 1;
+  for (const char c : text) {
+    line += c == '\n' ? 1 : 0;
+    if (IsControl(c))
+      throw DataError(fmt::format(
+          "{}:{}: not valid TOML: expected text, found a byte {}; the file may be damaged", name,
+          line, static_cast<unsigned char>(c)));
+  }
+}
+
+}  // namespace
+
 Config ParseConfig(const std::string& text, const std::string& name, ConfigUse use) {
+  RefuseControlCharacters(text, name);
   toml::table root;
   try {
     root = toml::parse(text, name);
@@ -378,15 +402,18 @@ std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next) {
 }
 
 std::vector<Eigen::Vector2d> ReadRegion(const std::filesystem::path& file) {
-  const std::string text = ReadText(file, "region file");
+  return ParseRegion(ReadText(file, "region file"), file.string());
+}
+
+std::vector<Eigen::Vector2d> ParseRegion(const std::string& text, const std::string& name) {
   const auto fail = [&](std::string_view what) {
-    throw DataError(fmt::format("region file '{}': {}", file.string(), what));
+    throw DataError(fmt::format("region file '{}': {}", name, what));
   };
   nlohmann::json json;
   try {
-    json = nlohmann::json::parse(text);
-  } catch (const nlohmann::json::exception& error) {
-    fail(fmt::format("not valid JSON ({})", error.what()));
+    json = ParseBoundedJson(text);
+  } catch (const DataError& error) {
+    fail(error.what());
   }
   if (!json.is_object()) fail("expected an object with \"format\", \"frame\" and \"polygon_m\"");
   if (json.value("format", nlohmann::json()) != 1)

@@ -152,5 +152,8 @@ void RefuseResearchPresets(const Config& config);
 /// ...]}; metres.
 /// @throws DataError naming the file and what is wrong with it.
 [[nodiscard]] std::vector<Eigen::Vector2d> ReadRegion(const std::filesystem::path& file);
+/// As ReadRegion(), of a text; `name` stands for the file in messages.
+[[nodiscard]] std::vector<Eigen::Vector2d> ParseRegion(const std::string& text,
+                                                       const std::string& name);
 
 }  // namespace plumb

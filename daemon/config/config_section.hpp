@@ -15,9 +15,9 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <toml++/toml.h>
 
 #include "algo/base/errors.hpp"
+#include "daemon/config/toml.hpp"
 
 namespace plumb {
 

@@ -8,9 +8,11 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
 #include "algo/geometry/rigid_fit.hpp"
+#include "drivers/files/file_io.hpp"
 
 namespace plumb {
 namespace {
@@ -31,9 +33,9 @@ std::string CheckedName(const json& value, const fs::path& file) {
 }
 
 void ReadSuiteFile(const fs::path& file, Suite& suite) {
-  std::ifstream in(file);
+  constexpr std::size_t kMaxBytes = 1 << 20;
   try {
-    const json content = json::parse(in);
+    const json content = ParseBoundedJson(ReadTextFile(file, kMaxBytes));
     suite.name = content.value("name", suite.name);
     for (const auto& scene : content.at("scenes")) suite.scenes.push_back(CheckedName(scene, file));
     for (const auto& pair : content.at("pairs"))

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 
 namespace plumb {
@@ -42,9 +43,9 @@ std::string ReadWhole(const fs::path& file) {
 
 json ReadJson(const fs::path& file) {
   try {
-    return json::parse(ReadWhole(file));
-  } catch (const json::exception& error) {
-    Fail(file, fmt::format("not valid JSON ({})", error.what()));
+    return ParseBoundedJson(ReadWhole(file));
+  } catch (const DataError& error) {
+    Fail(file, error.what());
   }
 }
 

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
 #include "algo/render/error_image.hpp"
@@ -237,7 +238,7 @@ void WriteResult(const Comparison& comparison, const ResultPictures& pictures,
 std::string ReadResultJson(const fs::path& folder) {
   const fs::path file = folder / "result.json";
   std::string text = ReadTextFile(file, kMaxJsonBytes);
-  const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
+  const Json json = ParseBoundedJsonOrNothing<Json>(text);
   if (!json.is_object() || !json.contains("format") || !json["format"].is_number_integer()) {
     throw DataError(fmt::format(
         "{} is no result of plumb compare: expected a JSON object with a format; compare again",

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "drivers/files/image_file.hpp"
@@ -158,9 +159,9 @@ std::optional<GridShape> ReadGrid(const Value& heightmap) {
 
 Json ParseText(std::string_view text, const std::string& name) {
   try {
-    return Json::parse(text.begin(), text.end());
-  } catch (const Json::exception& error) {
-    throw DataError(fmt::format("{} is no JSON: {}; make the scene again", name,
+    return ParseBoundedJson<Json>(text);
+  } catch (const DataError& error) {
+    throw DataError(fmt::format("{}: {}; make the scene again", name,
                                 std::string_view(error.what()).substr(0, 200)));
   }
 }

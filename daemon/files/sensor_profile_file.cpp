@@ -7,6 +7,7 @@
 #include <Eigen/Cholesky>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "drivers/files/file_io.hpp"
@@ -60,7 +61,7 @@ Intrinsics ParseIntrinsics(const Json& json) {
 }
 
 SensorProfile Parse(const std::string& text) {
-  const Json json = Json::parse(text);
+  const Json json = ParseBoundedJson<Json>(text);
   if (json.at("format") != kFormat) throw DataError("it is no sensor profile");
   if (json.at("version") != kVersion)
     throw DataError(

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
 #include "daemon/records/markers_json.hpp"
 
 namespace plumb {
@@ -77,7 +78,7 @@ std::string CheckJson(const MarkerCheck& check, const MarkerBaseline& seen, cons
 }
 
 std::optional<MarkerBaseline> BaselineIn(const std::string& check_json) {
-  const Json json = Json::parse(check_json, nullptr, /*allow_exceptions=*/false);
+  const Json json = ParseBoundedJsonOrNothing<Json>(check_json);
   if (!json.is_object() || !json.value("markers", Json()).is_object() || json["markers"].empty())
     return std::nullopt;
   auto markers = MarkersIn(json["markers"]);
@@ -88,7 +89,7 @@ std::optional<MarkerBaseline> BaselineIn(const std::string& check_json) {
 
 web::CheckRecord CheckIn(const std::string& check_json) {
   web::CheckRecord record;
-  const Json json = Json::parse(check_json, nullptr, /*allow_exceptions=*/false);
+  const Json json = ParseBoundedJsonOrNothing<Json>(check_json);
   const auto unreadable = [&record](const char* why) {
     record = {};
     record.reasons = {std::string("this check cannot be read: ") + why};

@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/records/file_copy.hpp"
@@ -111,7 +112,7 @@ Json EarlierEvidence(const fs::path& state, std::int64_t patient) {
   std::error_code error;
   const fs::path file = ImportedFile(state, patient);
   if (!fs::exists(file, error)) return nullptr;
-  Json earlier = Json::parse(ReadTextFile(file, kMaxRecord), nullptr, false);
+  Json earlier = ParseBoundedJsonOrNothing<Json>(ReadTextFile(file, kMaxRecord));
   if (earlier.is_discarded())
     throw DataError(fmt::format("{} is damaged: put a backup of it in its place, or move it away",
                                 file.string()));
@@ -193,7 +194,7 @@ class PatientImport {
 
   void ReadRecord() {
     (void)reader_.CopyTo(Made(), reader_.files().front(), stop_);
-    record_ = Json::parse(ReadTextFile(Made() / kRecord, kMaxRecord), nullptr, false);
+    record_ = ParseBoundedJsonOrNothing<Json>(ReadTextFile(Made() / kRecord, kMaxRecord));
     try {
       if (!record_.is_object()) throw DataError(fmt::format("its {} cannot be read", kRecord));
       CheckPatientRows(*store_.write_, record_.value("rows", Json()));

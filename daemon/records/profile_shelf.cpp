@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/files/sensor_profile_file.hpp"
@@ -55,7 +56,7 @@ ProfileVersion Parse(const std::string& text, const std::string& serial, int ver
   const std::string body = text.substr(line + 1);
   if (text.substr(head.size(), line - head.size()) != SumOf(body))
     throw DataError("its checksum is wrong: it was damaged or changed");
-  const Json json = Json::parse(body);
+  const Json json = ParseBoundedJson<Json>(body);
   if (json.at("serial") != serial)
     throw DataError(fmt::format("it belongs to the unit {}", json.at("serial").dump()));
   ProfileVersion found;

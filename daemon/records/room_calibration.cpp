@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "daemon/records/check_json.hpp"
@@ -74,7 +75,7 @@ std::string JsonOf(const RoomFit& fit, std::span<const BoardScan> scans) {
 }  // namespace
 
 std::optional<BoardScan> BoardScanIn(const std::string& check_json) {
-  const Json json = Json::parse(check_json, nullptr, /*allow_exceptions=*/false);
+  const Json json = ParseBoundedJsonOrNothing<Json>(check_json);
   if (!json.is_object() || !json.contains("board")) return std::nullopt;
   const auto board = MarkersIn(json["board"]);
   if (!board || board->empty()) return std::nullopt;
@@ -141,7 +142,7 @@ RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans, const RoomCalibratio
 
 SignedRoom SignedRoomIn(const std::string& text) {
   try {
-    const Json json = Json::parse(text);
+    const Json json = ParseBoundedJson<Json>(text);
     if (json.at("format").get<int>() != kFormat)
       throw DataError(fmt::format("expected format {}, found {}", kFormat, json["format"].dump()));
     SignedRoom room;

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/acceptance/verdict.hpp"
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "web/service/limits.hpp"
 
@@ -85,7 +86,7 @@ void ReadWords(const Json& result, web::ResultSummary& summary) {
 class Stored {
  public:
   Stored(const std::string& text, const char* what)
-      : json_(Json::parse(text, nullptr, /*allow_exceptions=*/false)), what_(what) {
+      : json_(ParseBoundedJsonOrNothing(text)), what_(what) {
     if (!json_.is_object()) Fail("expected a JSON object, found none");
   }
 
@@ -211,7 +212,7 @@ web::Settings ParseSettings(const std::string& text) {
 }
 
 web::ResultSummary SummaryOf(const std::string& result_json) {
-  const Json json = Json::parse(result_json, nullptr, /*allow_exceptions=*/false);
+  const Json json = ParseBoundedJsonOrNothing(result_json);
   if (!json.is_object()) RefuseResult("expected a JSON object, found none");
   web::ResultSummary summary{.verdict = VerdictIn(json),
                              .reasons = {},

@@ -8,6 +8,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/records/file_copy.hpp"
@@ -122,7 +123,7 @@ SummedReader::SummedReader(fs::path folder, SummedKind kind, const BackupSecret*
   Json about;
   std::string text;
   try {
-    about = Json::parse(ReadTextFile(folder_ / kind_.about_file, kMaxAbout), nullptr, false);
+    about = ParseBoundedJsonOrNothing<Json>(ReadTextFile(folder_ / kind_.about_file, kMaxAbout));
     text = ReadTextFile(folder_ / kSums, kMaxSums);
   } catch (const DataError& error) {
     Fail(error.what());

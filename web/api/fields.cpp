@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 #include "web/api/json.hpp"
 #include "web/http/checks.hpp"
@@ -25,17 +26,6 @@ bool DeeperThan(const nlohmann::json& json, int depth) {
                      [&](const nlohmann::json& child) { return DeeperThan(child, depth - 1); });
 }
 
-nlohmann::json ParseShallow(const std::string& body) {
-  // Counted before parsing: the parser's own tree must not become deep.
-  int depth = 0, deepest = 0;
-  for (const char c : body) {
-    depth += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
-    deepest = std::max(deepest, depth);
-  }
-  if (deepest > 64) return nlohmann::json::value_t::discarded;
-  return nlohmann::json::parse(body, nullptr, /*allow_exceptions=*/false);
-}
-
 std::vector<double> ReadPoint(const nlohmann::json& item, const char* name, std::size_t width) {
   const bool valid =
       item.is_array() && item.size() == width &&
@@ -50,7 +40,7 @@ std::vector<double> ReadPoint(const nlohmann::json& item, const char* name, std:
 
 }  // namespace
 
-Fields::Fields(const std::string& body) : json_(ParseShallow(body)) {
+Fields::Fields(const std::string& body) : json_(ParseBoundedJsonOrNothing(body)) {
   if (!json_.is_object() || DeeperThan(json_, kMaxDepth))
     throw DataError("expected a JSON object as the body");
 }

@@ -15,6 +15,7 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using namespace std::string_literals;
 
 std::string ErrorOf(const std::string& text) {
   try {
@@ -130,6 +131,21 @@ TEST(ConfigTest, NamesLineKeyExpectedAndFound) {
               HasSubstr("rigid transform"));
   EXPECT_THAT(ErrorOf("compare = 3\n"), HasSubstr("a table"));
   EXPECT_THAT(ErrorOf("[compare\n"), AllOf(HasSubstr("test.toml:1:"), HasSubstr("not valid TOML")));
+  EXPECT_THAT(ErrorOf("[web]\n[\0]\n"s), AllOf(HasSubstr("test.toml:2:"), HasSubstr("a byte 0")));
+  EXPECT_THAT(ErrorOf("[%"), HasSubstr("not valid TOML"));
+  EXPECT_THAT(ErrorOf(std::string(4096, '\0')), HasSubstr("test.toml:1:"));
+  EXPECT_THAT(ErrorOf("# \x7f"), HasSubstr("a byte 127"));
+}
+
+// toml++ 3.3 has undefined behaviour for some of them.
+TEST(ConfigTest, CharactersBeyondAsciiAreForStringsAndComments) {
+  EXPECT_THAT(ErrorOf("\xc3\xa9 = 1"), HasSubstr("not valid TOML"));
+  EXPECT_THAT(ErrorOf("~[\xef\xb3\xbfpa"), HasSubstr("not valid TOML"));
+  EXPECT_THAT(ErrorOf("[web]\nlisten \xd0\x8d= 3"), HasSubstr("not valid TOML"));
+  for (const char* accepted :
+       {"[web]\r\n\t# ~ \xc3\xa9\r\n", "[appliance]\nstate = \"/\xc3\xa9\"\n",
+        "[appliance]\nstate = '/\xc3\xa9'\n", "[appliance]\nstate = \"/\\\"\xc3\xa9\"\n"})
+    EXPECT_EQ(ErrorOf(accepted), "no error") << accepted;
 }
 
 // What a patient's plan holds must not come from a file of the room.
