@@ -3,6 +3,8 @@
 
 #include <signal.h>
 #include <spawn.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -31,7 +33,7 @@ class PrivateBus {
     std::string program = "dbus-daemon", nofork = "--nofork", argument = file;
     char* arguments[] = {program.data(), nofork.data(), argument.data(), nullptr};
     if (::posix_spawnp(&pid_, "dbus-daemon", nullptr, nullptr, arguments, environ) != 0) pid_ = -1;
-    for (int i = 0; pid_ > 0 && i < 2000 && !fs::exists(folder / "bus"); ++i) ::usleep(5000);
+    for (int i = 0; pid_ > 0 && i < 2000 && !Answers(folder / "bus"); ++i) ::usleep(5000);
   }
   ~PrivateBus() { Stop(); }
   void Stop() {
@@ -43,6 +45,18 @@ class PrivateBus {
   [[nodiscard]] const std::string& address() const { return address_; }
 
  private:
+  /// The socket's file is there a moment before anybody listens.
+  static bool Answers(const fs::path& socket_file) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    socket_file.string().copy(address.sun_path, sizeof address.sun_path - 1);
+    const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const bool answers =
+        ::connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+    ::close(socket);
+    return answers;
+  }
+
   std::string address_;
   pid_t pid_ = -1;
 };
