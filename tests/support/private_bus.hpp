@@ -44,9 +44,8 @@ class PrivateBus {
   }
   [[nodiscard]] const std::string& address() const { return address_; }
 
- private:
   /// The socket's file is there a moment before anybody listens.
-  static bool Answers(const fs::path& socket_file) {
+  [[nodiscard]] static bool Answers(const fs::path& socket_file) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     socket_file.string().copy(address.sun_path, sizeof address.sun_path - 1);
@@ -57,6 +56,7 @@ class PrivateBus {
     return answers;
   }
 
+ private:
   std::string address_;
   pid_t pid_ = -1;
 };

@@ -18,6 +18,7 @@
 
 #include "daemon/update/bundle_check.hpp"
 #include "daemon/update/updater.hpp"
+#include "tests/support/private_bus.hpp"
 #include "tests/support/temp_folder.hpp"
 
 extern char** environ;
@@ -110,7 +111,7 @@ class RaucTest : public ::testing::Test {
 <allow send_destination="*" eavesdrop="true"/><allow eavesdrop="true"/><allow own="*"/></policy></busconfig>)";
     bus_ = std::make_unique<Child>(std::vector<std::string>{
         "dbus-daemon", "--nofork", "--config-file=" + (folder_ / "bus.conf").string()});
-    for (int i = 0; i < 2000 && !fs::exists(folder_ / "bus"); ++i) ::usleep(5000);
+    for (int i = 0; i < 2000 && !testing::PrivateBus::Answers(folder_ / "bus"); ++i) ::usleep(5000);
     ::setenv("DBUS_SYSTEM_BUS_ADDRESS", address_.c_str(), 1);
     ::setenv("DBUS_STARTER_BUS_TYPE", "system", 1);
     StartRauc();
