@@ -7,13 +7,12 @@
 namespace plumb {
 
 template <class Json>
-Json ParseBoundedJson(std::string_view text) {
+Json ParseBoundedJson(std::string_view text, int max_depth) {
   using Event = typename Json::parse_event_t;
-  const auto refuse_depth = [](int depth, Event event, Json&) {
+  const auto refuse_depth = [max_depth](int depth, Event event, Json&) {
     const bool opens = event == Event::array_start || event == Event::object_start;
-    if (opens && depth >= kMaxJsonDepth)
-      throw DataError(
-          fmt::format("expected JSON nested at most {} deep, found more", kMaxJsonDepth));
+    if (opens && depth >= max_depth)
+      throw DataError(fmt::format("expected JSON nested at most {} deep, found more", max_depth));
     return true;
   };
   try {
@@ -24,17 +23,17 @@ Json ParseBoundedJson(std::string_view text) {
 }
 
 template <class Json>
-Json ParseBoundedJsonOrNothing(std::string_view text) {
+Json ParseBoundedJsonOrNothing(std::string_view text, int max_depth) {
   try {
-    return ParseBoundedJson<Json>(text);
+    return ParseBoundedJson<Json>(text, max_depth);
   } catch (const DataError&) {
     return Json(Json::value_t::discarded);
   }
 }
 
-template nlohmann::json ParseBoundedJson(std::string_view);
-template nlohmann::json ParseBoundedJsonOrNothing(std::string_view);
-template nlohmann::ordered_json ParseBoundedJson(std::string_view);
-template nlohmann::ordered_json ParseBoundedJsonOrNothing(std::string_view);
+template nlohmann::json ParseBoundedJson(std::string_view, int);
+template nlohmann::json ParseBoundedJsonOrNothing(std::string_view, int);
+template nlohmann::ordered_json ParseBoundedJson(std::string_view, int);
+template nlohmann::ordered_json ParseBoundedJsonOrNothing(std::string_view, int);
 
 }  // namespace plumb

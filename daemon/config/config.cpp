@@ -11,7 +11,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
@@ -39,6 +38,23 @@ std::string ReadText(const std::filesystem::path& file, std::string_view what) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw DataError(fmt::format("cannot open the {} '{}' for reading", what, file.string()));
   return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// TOML has no control characters but tab and line ends. A file that lost its content in a power
+/// cut is often full of zero bytes.
+bool IsControl(char c) {
+  return (static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\n' && c != '\r') || c == 0x7f;
+}
+
+void RefuseControlCharacters(const std::string& text, const std::string& name) {
+  std::size_t line = 1;
+  for (const char c : text) {
+    line += c == '\n' ? 1 : 0;
+    if (IsControl(c))
+      throw DataError(fmt::format(
+          "{}:{}: not valid TOML: expected text, found a byte {}; the file may be damaged", name,
+          line, static_cast<unsigned char>(c)));
+  }
 }
 
 const auto kAny = [](const auto&) { return true; };
@@ -293,27 +309,6 @@ PageTransport TransportOf(const WebConfig& web, bool is_loopback) {
   if (is_loopback) return PageTransport::kPlain;
   return web.plain_http ? PageTransport::kPlainOnNetwork : PageTransport::kOwnTls;
 }
-
-namespace {
-
-/// TOML has no control characters but tab and line ends. A file that lost its content in a power
-/// cut is often full of zero bytes.
-bool IsControl(char c) {
-  return (static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\n' && c != '\r') || c == 0x7f;
-}
-
-void RefuseControlCharacters(const std::string& text, const std::string& name) {
-  std::size_t line = 1;
-  for (const char c : text) {
-    line += c == '\n' ? 1 : 0;
-    if (IsControl(c))
-      throw DataError(fmt::format(
-          "{}:{}: not valid TOML: expected text, found a byte {}; the file may be damaged", name,
-          line, static_cast<unsigned char>(c)));
-  }
-}
-
-}  // namespace
 
 Config ParseConfig(const std::string& text, const std::string& name, ConfigUse use) {
   RefuseControlCharacters(text, name);

@@ -9,6 +9,7 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
 
 namespace plumb {
@@ -34,11 +35,6 @@ bool IsBundleName(const std::string& text) {
          text.find(' ') == std::string::npos;
 }
 
-bool IsFlat(const Json& json) {
-  return std::all_of(json.begin(), json.end(),
-                     [](const Json& value) { return !value.is_structured(); });
-}
-
 bool IsAbsolute(const std::string& path) {
   return path.starts_with('/') && path.size() <= kMaxFolder && path.find('\0') == std::string::npos;
 }
@@ -49,12 +45,8 @@ ControlRequest ParseControlRequest(std::string_view line) {
   if (line.size() > kMaxControlLine)
     throw DataError(
         fmt::format("a request has at most {} bytes, found {}", kMaxControlLine, line.size()));
-  const auto refuse_nesting = [](int depth, Json::parse_event_t, Json&) {
-    if (depth > 2) throw DataError("a request is a flat JSON object, found a nested one");
-    return true;
-  };
-  const Json json = Json::parse(line, refuse_nesting, /*allow_exceptions=*/false);
-  if (!json.is_object() || !IsFlat(json))
+  const Json json = ParseBoundedJsonOrNothing(line, /*max_depth=*/1);
+  if (!json.is_object())
     throw DataError(
         "expected a request such as {\"command\": \"status\"}, found no flat JSON object");
   const auto text = [&](const char* key) {

@@ -323,7 +323,7 @@ TEST_F(ScenesTest, EvaluateMeasuresAgainstTheTruth) {
   // 320 x 240 and a tenth of a real sweep's frames, nominal noise. Measured: 0.77 mm, 0.016 to
   // 0.017 deg with and without the wider vector instructions.
   EXPECT_LT(error_mm, 0.93);
-  EXPECT_LT(error_deg, 0.03);
+  EXPECT_LT(error_deg, 0.02);
   const RunResult again = Plumb({"evaluate", SmallSuite(), "--out", folder_ / "out", "--reuse"});
   EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_THAT(again.err, Not(HasSubstr("tracking")));

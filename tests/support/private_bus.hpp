@@ -21,19 +21,25 @@ namespace fs = std::filesystem;
 /// A dbus-daemon that only this test knows. Ends with it.
 class PrivateBus {
  public:
+  /// @throws std::runtime_error if the bus does not answer within ten seconds.
   explicit PrivateBus(const fs::path& folder) : address_("unix:path=" + (folder / "bus").string()) {
     const fs::path config = folder / "bus.conf";
     std::ofstream(config)
         << R"(<!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-BUS Bus Configuration 1.0//EN"
  "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd"><busconfig><type>session</type><listen>)"
-        << address_
-        << R"(</listen><policy context="default"><allow send_destination="*" eavesdrop="true"/>
-<allow eavesdrop="true"/><allow own="*"/></policy></busconfig>)";
-    const std::string file = "--config-file=" + config.string();
-    std::string program = "dbus-daemon", nofork = "--nofork", argument = file;
-    char* arguments[] = {program.data(), nofork.data(), argument.data(), nullptr};
-    if (::posix_spawnp(&pid_, "dbus-daemon", nullptr, nullptr, arguments, environ) != 0) pid_ = -1;
-    for (int i = 0; pid_ > 0 && i < 2000 && !Answers(folder / "bus"); ++i) ::usleep(5000);
+        << address_ << R"(</listen><auth>EXTERNAL</auth><policy context="default"><allow user="*"/>
+<allow send_destination="*" eavesdrop="true"/><allow eavesdrop="true"/><allow own="*"/></policy></busconfig>)";
+    std::string file = "--config-file=" + config.string();
+    std::string program = "dbus-daemon", nofork = "--nofork";
+    char* arguments[] = {program.data(), nofork.data(), file.data(), nullptr};
+    if (::posix_spawnp(&pid_, "dbus-daemon", nullptr, nullptr, arguments, environ) != 0)
+      throw std::runtime_error("dbus-daemon cannot be started");
+    for (int i = 0; i < 2000; ++i) {
+      if (Answers(folder / "bus")) return;
+      ::usleep(5000);
+    }
+    Stop();
+    throw std::runtime_error("dbus-daemon does not answer at " + address_);
   }
   ~PrivateBus() { Stop(); }
   void Stop() {
@@ -44,19 +50,20 @@ class PrivateBus {
   }
   [[nodiscard]] const std::string& address() const { return address_; }
 
-  /// The socket's file is there a moment before anybody listens.
+ private:
+  /// The socket's file exists a moment before anybody listens.
   [[nodiscard]] static bool Answers(const fs::path& socket_file) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     socket_file.string().copy(address.sun_path, sizeof address.sun_path - 1);
     const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (socket < 0) return false;
     const bool answers =
         ::connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
     ::close(socket);
     return answers;
   }
 
- private:
   std::string address_;
   pid_t pid_ = -1;
 };

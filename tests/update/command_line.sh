@@ -28,7 +28,8 @@ cat >bus.conf <<CONF
 CONF
 export DBUS_SYSTEM_BUS_ADDRESS=unix:path=$work/bus DBUS_STARTER_BUS_TYPE=system
 dbus-daemon --nofork --config-file=bus.conf >bus.log 2>&1 & pids="$pids $!"
-for _ in $(seq 100); do [ -S bus ] && break; sleep 0.05; done
+# The socket exists a moment before the bus listens: wait until it answers.
+for _ in $(seq 100); do dbus-send --bus="unix:path=$work/bus" / org.freedesktop.DBus.Peer.Ping 2>/dev/null && break; sleep 0.05; done
 rauc --conf=machine/system.conf service --override-boot-slot=A >rauc.log 2>&1 & pids="$pids $!"
 
 start() { # BOOT

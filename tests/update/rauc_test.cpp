@@ -103,16 +103,8 @@ class RaucTest : public ::testing::Test {
       std::ofstream(*made_ / "slots" / name, std::ios::binary) << std::string(2'000'000, '\0');
     for (const char* name : {"primary", "state.A", "state.B", "status"})
       fs::remove(*made_ / "state" / name);
-    address_ = "unix:path=" + (folder_ / "bus").string();
-    std::ofstream(folder_ / "bus.conf")
-        << R"(<!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-BUS Bus Configuration 1.0//EN"
- "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd"><busconfig><type>session</type><listen>)"
-        << address_ << R"(</listen><auth>EXTERNAL</auth><policy context="default"><allow user="*"/>
-<allow send_destination="*" eavesdrop="true"/><allow eavesdrop="true"/><allow own="*"/></policy></busconfig>)";
-    bus_ = std::make_unique<Child>(std::vector<std::string>{
-        "dbus-daemon", "--nofork", "--config-file=" + (folder_ / "bus.conf").string()});
-    for (int i = 0; i < 2000 && !testing::PrivateBus::Answers(folder_ / "bus"); ++i) ::usleep(5000);
-    ::setenv("DBUS_SYSTEM_BUS_ADDRESS", address_.c_str(), 1);
+    bus_ = std::make_unique<testing::PrivateBus>(folder_.path());
+    ::setenv("DBUS_SYSTEM_BUS_ADDRESS", bus_->address().c_str(), 1);
     ::setenv("DBUS_STARTER_BUS_TYPE", "system", 1);
     StartRauc();
     ASSERT_EQ(::seteuid(kNobody), 0);
@@ -146,7 +138,7 @@ class RaucTest : public ::testing::Test {
         updater_ = std::make_unique<Updater>(
             loop_, UpdaterOptions{.folder = folder_ / "updates",
                                   .max_bytes = 100 << 20,
-                                  .bus_address = address_,
+                                  .bus_address = bus_->address(),
                                   .version = "1.0.0",
                                   .hindrance = {},
                                   .changed = {},
@@ -225,8 +217,8 @@ class RaucTest : public ::testing::Test {
   static inline std::unique_ptr<TempFolder> made_;
   EventLoop loop_;  // first: blocks signals before any thread starts
   TempFolder folder_;
-  std::string address_;
-  std::unique_ptr<Child> bus_, rauc_;
+  std::unique_ptr<testing::PrivateBus> bus_;
+  std::unique_ptr<Child> rauc_;
   std::unique_ptr<Updater> updater_;
   std::atomic<int> num_ended_{0};
   std::string failure_;

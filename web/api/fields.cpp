@@ -19,13 +19,6 @@ constexpr int kMaxDepth = 8;
 constexpr double kMaxCoordinate_m = 100.0;
 constexpr std::size_t kMaxRegionCorners = 500;
 
-bool DeeperThan(const nlohmann::json& json, int depth) {
-  if (!json.is_structured()) return false;
-  if (depth == 0) return true;
-  return std::any_of(json.begin(), json.end(),
-                     [&](const nlohmann::json& child) { return DeeperThan(child, depth - 1); });
-}
-
 std::vector<double> ReadPoint(const nlohmann::json& item, const char* name, std::size_t width) {
   const bool valid =
       item.is_array() && item.size() == width &&
@@ -40,9 +33,8 @@ std::vector<double> ReadPoint(const nlohmann::json& item, const char* name, std:
 
 }  // namespace
 
-Fields::Fields(const std::string& body) : json_(ParseBoundedJsonOrNothing(body)) {
-  if (!json_.is_object() || DeeperThan(json_, kMaxDepth))
-    throw DataError("expected a JSON object as the body");
+Fields::Fields(const std::string& body) : json_(ParseBoundedJsonOrNothing(body, kMaxDepth)) {
+  if (!json_.is_object()) throw DataError("expected a JSON object as the body");
 }
 
 const nlohmann::json& Fields::Get(const char* name) {

@@ -24,6 +24,14 @@ TEST(BoundedJsonTest, DepthIsBoundedOnBothSidesOfTheLimit) {
   EXPECT_TRUE(ParseBoundedJsonOrNothing(Nested(kMaxJsonDepth + 1)).is_discarded());
 }
 
+TEST(BoundedJsonTest, AReaderMayAskForLessDepth) {
+  EXPECT_TRUE(ParseBoundedJson(R"({"a":1})", 1).is_object());
+  EXPECT_TRUE(ParseBoundedJsonOrNothing(R"({"a":{}})", 1).is_discarded());
+  EXPECT_TRUE(ParseBoundedJsonOrNothing(Nested(8), 8).is_array());
+  EXPECT_THAT(plumb::testing::MessageOf<DataError>([] { (void)ParseBoundedJson(Nested(9), 8); }),
+              HasSubstr("at most 8 deep"));
+}
+
 TEST(BoundedJsonTest, WhatWouldOverflowTheStackIsAnError) {
   constexpr int kDeep = 400'000;
   EXPECT_THROW((void)ParseBoundedJson(Nested(kDeep)), DataError);

@@ -75,6 +75,7 @@ TEST(ControlProtocolTest, RefusesEverythingElse) {
                            "{\"command\":\"update\",\"name\":\"a.deb\"}",
                            "{\"command\":\"restart\",\"name\":\"a.raucb\"}",
                            "{\"command\":\"status\",\"folder\":\"/a\"}",
+                           "{\"command\":\"status\",\"a\":{}}",
                            "{\"command\":{\"a\":{\"b\":{}}}}",
                            "{\"command\":\"status\"} {}",
                            "{\"command\":\"status\"",

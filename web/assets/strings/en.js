@@ -167,7 +167,7 @@ export const en = {
       tracking_lost: 'LOST: go back to where you were', no_markers: 'NO MARKERS IN VIEW',
       computer_too_slow: 'COMPUTER TOO SLOW: frames are lost, sweep slower',
     },
-    // Without a reference nobody knows how much is still to be seen.
+    // Without a reference, the total area to scan is not known.
     surface: (still_s) => (still_s < 2 ? 'New surface is still coming in'
       : `No new surface for ${Math.floor(still_s)} s`),
     discarded: 'The scan was discarded.',

@@ -1,0 +1,151 @@
+// The daily checks of the markers and their baseline.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/records/check_json.hpp"
+#include "daemon/records/schema.hpp"
+#include "tests/unit/records/store_fixture.hpp"
+
+namespace plumb {
+namespace {
+
+using testing::kAnna;
+using testing::kBert;
+using ::testing::SizeIs;
+using testing::StoreTest;
+using web::ChangeResult;
+
+/// What a check that ended in `status` stores after seeing the markers 1 to n in a row.
+std::string CheckWith(int n, MarkerCheckStatus status) {
+  MarkerBaseline seen{{}, "DICT_6X6_250", 0.104};
+  for (int id = 1; id <= n; ++id) {
+    SceneMarker marker{.corners = CornersInMarkerFrame(0.104), .num_views = 9, .sigma_m = 0.0005};
+    for (Eigen::Vector3d& corner : marker.corners) corner.x() += 0.3 * id;
+    seen.markers[id] = marker;
+  }
+  return CheckJson({.status = status,
+                    .items = {{"moved", 1.25, 5.0, "mm", true, "marker 2"}},
+                    .reasons = {"because"}},
+                   seen);
+}
+
+TEST_F(StoreTest, ACheckWithAStampOfTheFutureCountsForNoDay) {
+  const auto store = Open();
+  Database(database(), Database::Access::kReadWrite)
+      .Execute(
+          "INSERT INTO checks (time, user, sensor_serial, status, json) VALUES (9000000000000000, "
+          "'anna', 'S1', 'passed', '{}')");
+  EXPECT_FALSE(store->HasPassedCheckSince(web::WallClock::now()));
+}
+
+TEST_F(StoreTest, ACheckOfTheSameDaySensorAndBaselineConfirmsAScanFromBeforeIt) {
+  const auto store = Open();
+  const std::string patient = store->AddPatient(kAnna, "P-1", "");
+  const auto scan = [&](const char* serial) {
+    const std::string id = store->BeginScan({.patient_id = patient,
+                                             .reference_id = "",
+                                             .sensor_serial = serial,
+                                             .reason = "",
+                                             .check_overdue = true});
+    store->FinishScan(
+        id, {.outcome = web::ScanOutcome::kFailed, .failure = "of this test", .result_json = ""});
+    return id;
+  };
+  const std::string early = scan("S1");
+  const std::string first =
+      store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
+  store->SetCheckBaseline(kBert, first);
+  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck(early)) << "the baseline is younger than the scan";
+
+  const std::string good = scan("S1"), other = scan("S2"), unnamed = scan("");
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck(good)) << "the check that passed is older";
+  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_TRUE(store->IsConfirmedByLaterCheck(good));
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck(other)) << "another unit";
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck(unnamed));
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck("none"));
+
+  const std::string doubtful = scan("S1");
+  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kFailed));
+  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck(doubtful)) << "a check failed in between";
+
+  const std::string yesterday = scan("S1");
+  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_TRUE(store->IsConfirmedByLaterCheck(yesterday)) << "still of today";
+  Database(database(), Database::Access::kReadWrite)
+      .Execute(
+          "UPDATE check_baselines SET set_at = 0; UPDATE scans SET started_at = started_at - "
+          "86400000000, finished_at = finished_at - 86400000000 WHERE id = " +
+          yesterday);
+  EXPECT_FALSE(store->IsConfirmedByLaterCheck(yesterday)) << "a check of another day";
+}
+
+TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
+  const auto before = web::WallClock::now() - std::chrono::seconds(1);
+  {
+    const auto store = Open();
+    EXPECT_FALSE(store->CheckBaseline());
+    EXPECT_FALSE(BaselineIn(store->CheckBaselineJson()));
+    const std::string first =
+        store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
+    EXPECT_FALSE(store->HasPassedCheckSince(before)) << "without a baseline nothing has passed";
+    store->SetCheckBaseline(kBert, first);
+    store->AddCheck(kAnna, "S1", CheckWith(5, MarkerCheckStatus::kPassed));
+  }
+  const auto store = Open();
+  const std::vector<web::CheckRecord> checks = store->Checks(10);
+  ASSERT_THAT(checks, SizeIs(2));
+  EXPECT_EQ(checks[0].status, "passed");
+  EXPECT_EQ(checks[0].user, "anna");
+  EXPECT_EQ(checks[0].sensor_serial, "S1");
+  EXPECT_EQ(checks[0].num_markers, 5U);
+  ASSERT_THAT(checks[0].items, SizeIs(1));
+  EXPECT_EQ(checks[0].items[0].value, 1.25);
+  EXPECT_EQ(checks[0].items[0].note, "marker 2");
+  EXPECT_EQ(checks[1].reasons, std::vector<std::string>{"because"});
+  EXPECT_TRUE(store->HasPassedCheckSince(before));
+  EXPECT_FALSE(store->HasPassedCheckSince(web::WallClock::now() + std::chrono::hours(1)));
+  EXPECT_TRUE(store->HasPassedCheckSince(before, "S1"));
+  EXPECT_FALSE(store->HasPassedCheckSince(before, "S2")) << "another unit was not checked";
+  const auto baseline = store->CheckBaseline();
+  ASSERT_TRUE(baseline);
+  EXPECT_EQ(baseline->check_id, checks[1].id);
+  EXPECT_EQ(baseline->set_by, "bert");
+  EXPECT_EQ(baseline->num_markers, 4U);
+  const auto markers = BaselineIn(store->CheckBaselineJson());
+  ASSERT_TRUE(markers);
+  EXPECT_EQ(markers->dictionary, "DICT_6X6_250");
+  EXPECT_NEAR(markers->markers.at(3).corners[0].x(), 0.9 - 0.052, 1e-12);
+  EXPECT_EQ(markers->markers.at(3).num_views, 9);
+  std::vector<std::string> actions;
+  for (const web::AuditEntry& entry : store->Audit({0, 10}))
+    actions.push_back(entry.user + " " + entry.action + " " + entry.detail);
+  EXPECT_THAT(actions,
+              ::testing::IsSupersetOf({"anna check.done passed", "anna check.done no_baseline",
+                                       "bert check.baseline "}));
+}
+
+TEST_F(StoreTest, ABaselineNeedsACheckThatSawMarkers) {
+  const auto store = Open();
+  EXPECT_EQ(RefusalOf([&] { store->SetCheckBaseline(kAnna, "77"); }), ChangeResult::kNotFound);
+  EXPECT_EQ(RefusalOf([&] { store->SetCheckBaseline(kAnna, "x"); }), ChangeResult::kNotFound);
+  const std::string blind = store->AddCheck(kAnna, "S1", CheckWith(2, MarkerCheckStatus::kFailed));
+  EXPECT_EQ(RefusalOf([&] { store->SetCheckBaseline(kBert, blind); }), ChangeResult::kConflict);
+  const std::string good =
+      store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
+  EXPECT_EQ(RefusalOf([&] { store->SetCheckBaseline(kAnna, good); }), ChangeResult::kRefused)
+      << "not by the person who took it";
+  EXPECT_FALSE(store->CheckBaseline());
+}
+
+TEST_F(StoreTest, ChecksAreNeverChanged) {
+  (void)Open()->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kFailed));
+  Database direct(database(), Database::Access::kReadWrite);
+  EXPECT_THROW(direct.Execute("UPDATE checks SET status = 'passed'"), ConstraintBroken);
+  EXPECT_THROW(direct.Execute("DELETE FROM checks"), ConstraintBroken);
+}
+
+}  // namespace
+}  // namespace plumb

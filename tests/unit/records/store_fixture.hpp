@@ -1,0 +1,66 @@
+// A store in a folder of its own, and the calls that most tests of the store begin with.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include <gtest/gtest.h>
+
+#include "daemon/records/store.hpp"
+#include "drivers/files/file_io.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/records/scan_folder.hpp"
+
+namespace plumb::testing {
+
+/// The result of a comparison as plumbd stores it.
+inline constexpr const char* kResult =
+    R"({"verdict":"move","reasons":["vertical is off"],"correction":{"vertical_mm":6.5,"longitudinal_mm":null,)"
+    R"("lateral_mm":-1,"pitch_deg":0.5,"roll_deg":0,"yaw_deg":2,)"
+    R"("uncertainty":{"vertical_mm":1.2,"pitch_deg":0.2,"roll_deg":0.3,"yaw_deg":0.1}}})";
+
+class StoreTest : public ::testing::Test {
+ protected:
+  std::unique_ptr<Store> Open() const { return std::make_unique<Store>(folder_ / "state"); }
+
+  static void FillStaging(const Store& store, const std::string& id) {
+    std::filesystem::create_directories(store.StagingFolder(id) / "scene");
+    WriteWholeFile(store.StagingFolder(id) / "scene" / "scene.json", std::string_view("{}"));
+  }
+  static std::string Scan(Store& store, const std::string& patient,
+                          const std::string& reference = "", const std::string& result = "") {
+    const std::string id = store.BeginScan({.patient_id = patient,
+                                            .reference_id = reference,
+                                            .purpose = {},
+                                            .sensor_serial = "S1",
+                                            .reason = {}});
+    FillStaging(store, id);
+    store.FinishScan(id, {.outcome = web::ScanOutcome::kDone,
+                          .failure = {},
+                          .result_json = result,
+                          .swept_area_m2 = 2.5});
+    return id;
+  }
+  static std::string ApprovedReference(Store& store, const std::string& patient) {
+    const std::string id = store.AddReference(kAnna, Scan(store, patient), "first", {});
+    store.ApproveReference(kBert, id, 1);
+    return id;
+  }
+  template <typename Call>
+  static web::ChangeResult RefusalOf(const Call& call) {
+    try {
+      call();
+    } catch (const StoreRefusal& refusal) {
+      EXPECT_STRNE(refusal.what(), "");
+      return refusal.result();
+    }
+    return web::ChangeResult::kDone;
+  }
+  [[nodiscard]] std::filesystem::path database() const { return folder_ / "state" / "plumb.db"; }
+
+  TempFolder folder_;
+};
+
+}  // namespace plumb::testing

@@ -1,0 +1,118 @@
+// Databases of older and newer versions, and damaged ones.
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/records/check_json.hpp"
+#include "daemon/records/schema.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/unit/records/store_fixture.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using testing::kAnna;
+using testing::kResult;
+using testing::MessageOf;
+using ::testing::SizeIs;
+using testing::StoreTest;
+
+TEST_F(StoreTest, ADamagedDatabaseIsToldWithWhatToDo) {
+  (void)Open();
+  WriteWholeFile(database(), std::string(20000, 'x'));
+  EXPECT_THAT(MessageOf<DatabaseCorrupt>([&] { (void)Open(); }),
+              ::testing::AllOf(HasSubstr("plumb.db"), HasSubstr("backup")));
+}
+
+TEST_F(StoreTest, ADamagedPageIsFoundAtTheStart) {
+  {
+    const auto store = Open();
+    for (int i = 0; i < 500; ++i)
+      store->Log(kAnna, "note", std::to_string(i), std::string(100, 'n'));
+  }
+  const auto size = fs::file_size(database());
+  ASSERT_GT(size, 40000U);
+  std::fstream file(database(), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(static_cast<std::streamoff>(size / 2));
+  file << std::string(8192, '\x55');
+  file.close();
+  EXPECT_THROW((void)Open(), DatabaseCorrupt);
+}
+
+TEST_F(StoreTest, ADatabaseOfANewerVersionIsRefused) {
+  (void)Open();
+  {
+    Database direct(database(), Database::Access::kReadWrite);
+    direct.Execute("PRAGMA user_version = 99");
+  }
+  EXPECT_THAT(MessageOf<DatabaseCorrupt>([&] { (void)Open(); }), HasSubstr("newer"));
+}
+
+TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
+  (void)Open()->AddPatient(kAnna, "P-1", "");
+  {
+    Database direct(database(), Database::Access::kReadWrite);
+    direct.Execute(
+        "DROP TABLE room_calibrations; DROP TABLE check_baselines; DROP TABLE checks; ALTER TABLE "
+        "refs DROP COLUMN revision; "
+        "DROP INDEX scans_of_session; ALTER TABLE scans DROP COLUMN session_id; ALTER TABLE scans "
+        "DROP COLUMN accepted_reason; ALTER TABLE scans DROP COLUMN accepted_at; ALTER TABLE scans "
+        "DROP COLUMN sensor_on_s; ALTER TABLE scans "
+        "DROP COLUMN check_overdue; ALTER TABLE scans DROP COLUMN unavailable; ALTER TABLE scans "
+        "DROP COLUMN checked_at; ALTER TABLE audit DROP COLUMN chain; DROP TABLE scan_files; DROP "
+        "TABLE removed_scans; ALTER TABLE patients DROP COLUMN note; ALTER TABLE patients DROP "
+        "COLUMN archived; DROP TABLE templates; DROP TABLE sessions; DROP TABLE displays; DELETE "
+        "FROM patients "
+        "WHERE id = 0; PRAGMA user_version = 1");
+  }
+  const auto store = Open();
+  EXPECT_THAT(store->Patients(), SizeIs(1));
+  EXPECT_THAT(store->Checks(10), SizeIs(0));
+  const MarkerCheck failed{
+      .status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {"no marker was seen"}};
+  EXPECT_EQ(store->AddCheck(kAnna, "S1", CheckJson(failed, {})), "1");
+}
+
+TEST_F(StoreTest, WhenAResultOfTheSchemaBeforeWasAcceptedIsTakenFromTheLog) {
+  std::string accepted, other;
+  {
+    const auto store = Open();
+    const std::string patient = store->AddPatient(kAnna, "P-1", "thorax");
+    const std::string reference = ApprovedReference(*store, patient);
+    other = Scan(*store, patient, reference, kResult);
+    accepted = Scan(*store, patient, reference, kResult);
+    store->AcceptScan(kAnna, accepted, "the swelling is known");
+  }
+  const web::AuditEntry logged = Open()->Audit({0, 1, "scan.accept"}).at(0);
+  {
+    Database direct(database(), Database::Access::kReadWrite);
+    direct.Execute("ALTER TABLE scans DROP COLUMN accepted_at; PRAGMA user_version = 7");
+  }
+  const auto store = Open();
+  EXPECT_EQ(store->FindScan(accepted)->accepted_at, logged.time);
+  EXPECT_FALSE(store->FindScan(other)->accepted_at);
+}
+
+TEST_F(StoreTest, PatientsOfTheSchemaBeforeArchivesKeepWhatTheyHad) {
+  const std::string patient = Open()->AddPatient(kAnna, "P-1", "thorax");
+  {
+    Database direct(database(), Database::Access::kReadWrite);
+    direct.Execute(
+        "ALTER TABLE scans DROP COLUMN accepted_at; DROP TABLE room_calibrations; ALTER TABLE "
+        "patients DROP COLUMN note; ALTER TABLE patients "
+        "DROP COLUMN archived; DROP TABLE templates; PRAGMA user_version = 5");
+  }
+  const auto store = Open();
+  ASSERT_THAT(store->Patients(), SizeIs(1));
+  EXPECT_EQ(store->FindPatient(patient)->site, "thorax");
+  EXPECT_EQ(store->FindPatient(patient)->note, "");
+  EXPECT_FALSE(store->FindPatient(patient)->archived);
+  store->ChangePatient(kAnna, patient, "thorax", "note");
+  EXPECT_EQ(store->FindPatient(patient)->note, "note");
+}
+
+}  // namespace
+}  // namespace plumb
