@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -251,7 +252,27 @@ struct Collected {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   std::size_t cells = 0;
   std::vector<float> after;
+  std::vector<Eigen::Vector3d> shifts_m;
 };
+
+constexpr double kMostDisplaced =
+    0.05;  // of a part's samples of the field, one a square centimetre
+constexpr std::size_t kMinDisplaced = 20;
+
+// Mean of the shifts that are largest along the couch.
+std::optional<Eigen::Vector3d> LargestShift(std::vector<Eigen::Vector3d>& shifts_m) {
+  if (shifts_m.size() < kMinDisplaced) return std::nullopt;
+  const auto share =
+      static_cast<std::size_t>(kMostDisplaced * static_cast<double>(shifts_m.size()));
+  const auto end = shifts_m.begin() + static_cast<std::ptrdiff_t>(std::max(kMinDisplaced, share));
+  std::partial_sort(shifts_m.begin(), end, shifts_m.end(),
+                    [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+                      return a.head<2>().squaredNorm() > b.head<2>().squaredNorm();
+                    });
+  const Eigen::Vector3d sum =
+      std::accumulate(shifts_m.begin(), end, Eigen::Vector3d::Zero().eval());
+  return sum / static_cast<double>(end - shifts_m.begin());
+}
 
 void CheckSizes(const BodyView& view) {
   const std::size_t cells = view.reference.grid.num_cells();
@@ -290,6 +311,16 @@ BodyParts DescribeBody(const BodyView& view) {
     ++part.cells;
     if (std::isfinite(view.deviation_after.z[i])) part.after.push_back(view.deviation_after.z[i]);
   }
+  if (view.deformation != nullptr) {
+    const Deformation& field = *view.deformation;
+    for (std::size_t i = 0; i < field.points.size(); ++i) {
+      const Eigen::Vector2d p = field.points[i].head<2>().cast<double>();
+      const auto cell = grid.cell(p.x(), p.y());
+      if (field.observed[i] == 0 || !cell || view.region_mask[*cell] == 0) continue;
+      collected[naming.RankOf(p.dot(axes.along), p.dot(axes.side))].shifts_m.push_back(
+          field.shifts_m[i].cast<double>());
+    }
+  }
   for (auto& [rank, part] : collected) {
     const auto cells = static_cast<double>(part.cells);
     if (cells * grid.step * grid.step < kMinPart_m2 ||
@@ -300,12 +331,24 @@ BodyParts DescribeBody(const BodyView& view) {
     BodyPart made{.name = naming.NameOf(rank),
                   .centre_m = part.sum / cells,
                   .now_m = std::nullopt,
-                  .after_m = *middle};
+                  .after_m = *middle,
+                  .largest_shift_m = LargestShift(part.shifts_m)};
     if (view.marker_kind == MarkerKind::kRoom)
       made.now_m = (view.T_motion * made.centre_m - made.centre_m).z() + made.after_m;
     result.parts.push_back(std::move(made));
   }
   return result;
+}
+
+std::string ShiftWords(const BodyPart& part, const PatientAxes& patient, double limit_m) {
+  if (!part.largest_shift_m) return {};
+  const Eigen::Vector2d shift = part.largest_shift_m->head<2>();
+  if (!(shift.norm() > limit_m)) return {};
+  const double to_head = shift.dot(patient.head), to_left = shift.dot(patient.left);
+  const char* side = to_left > 0 ? "to the left" : "to the right";
+  const char* end = to_head > 0 ? "towards the head" : "towards the feet";
+  return fmt::format("{} up to {:.0f} mm {}", part.name, shift.norm() / kMillimetre,
+                     std::abs(to_left) > std::abs(to_head) ? side : end);
 }
 
 std::string HeightWords(const BodyPart& part, double height_m, double limit_m) {

@@ -10,6 +10,7 @@
 
 #include "algo/base/pose.hpp"
 #include "algo/comparison/correction.hpp"
+#include "algo/comparison/deformation.hpp"
 #include "algo/types/height_map.hpp"
 
 namespace plumb {
@@ -24,6 +25,9 @@ struct BodyPart {
   std::optional<double>
       now_m;  ///< How far it lies too high before any correction; absent with couch-fixed markers.
   double after_m = 0.0;  ///< What the rigid correction leaves: its posture.
+  /// How far the part of it that moved most lies from its place once the correction is applied
+  /// (mean over the most displaced 5 %, at least 20 cm2); reference frame. Absent without a field.
+  std::optional<Eigen::Vector3d> largest_shift_m;
 };
 
 struct BodyParts {
@@ -45,7 +49,8 @@ struct BodyView {
   Pose T_motion = Pose::Identity();  ///< p_current = T_motion * p_reference, reference frame.
   std::optional<Pose> T_iec_reference = Pose::Identity();  ///< None: never set.
   MarkerKind marker_kind = MarkerKind::kRoom;
-  std::optional<PatientPosture> posture;  ///< None: unknown.
+  std::optional<PatientPosture> posture;     ///< None: unknown.
+  const Deformation* deformation = nullptr;  ///< None: no shifts of parts.
 };
 
 /// Splits the region into parts and measures each.
@@ -60,6 +65,11 @@ struct BodyView {
 /// which less than a third was measured, are left out.
 /// @throws std::invalid_argument if grids or masks differ in size.
 [[nodiscard]] BodyParts DescribeBody(const BodyView& view);
+
+/// "right thigh up to 40 mm to the right": the direction along the couch in which the part has
+/// moved most. Empty where the patient's sides are unknown or the shift is within limit_m.
+[[nodiscard]] std::string ShiftWords(const BodyPart& part, const PatientAxes& patient,
+                                     double limit_m);
 
 /// "left shoulder 9 mm high", "left shoulder 9 mm low"; empty within +-limit_m.
 [[nodiscard]] std::string HeightWords(const BodyPart& part, double height_m, double limit_m);

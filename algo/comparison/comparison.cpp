@@ -10,6 +10,7 @@
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/comparison/body_motion.hpp"
+#include "algo/comparison/deformation.hpp"
 #include "algo/comparison/deviation.hpp"
 #include "algo/comparison/surface.hpp"
 
@@ -95,6 +96,8 @@ class Comparer {
       Heights();
       CheckStop(options_.stop);
       if (Move()) {
+        CheckStop(options_.stop);
+        Deform();
         CheckStop(options_.stop);
         Judge();
       }
@@ -248,7 +251,8 @@ class Comparer {
                       .T_motion = motion.T,
                       .T_iec_reference = options_.T_iec_reference,
                       .marker_kind = options_.marker_kind,
-                      .posture = options_.posture});
+                      .posture = options_.posture,
+                      .deformation = result_.deformation ? &*result_.deformation : nullptr});
     const std::optional<PatientPosture> posture =
         result_.body_parts->by_posture ? std::optional(options_.posture) : std::nullopt;
     result_.correction =
@@ -264,6 +268,17 @@ class Comparer {
           "the markers are fixed to the couch: posture only, shifts are refused");
     }
     Lap("trust", since_s);
+  }
+
+  void Deform() {
+    const double since_s = Now();
+    result_.deformation = EstimateDeformation({.reference_cloud = reference_cloud_,
+                                               .reference_body = reference_body_,
+                                               .current_cloud = current_cloud_,
+                                               .current_body = current_body_,
+                                               .T_motion = result_.motion->T,
+                                               .stop = options_.stop});
+    Lap("deformation", since_s);
   }
 
   void TakeNumbers() {

@@ -16,6 +16,7 @@
 #include "algo/base/units.hpp"
 #include "algo/comparison/body_parts.hpp"
 #include "algo/comparison/correction.hpp"
+#include "algo/comparison/deformation.hpp"
 #include "algo/comparison/motion_uncertainty.hpp"
 #include "algo/comparison/region.hpp"
 #include "algo/comparison/scene_alignment.hpp"
@@ -76,7 +77,8 @@ struct Comparison {
   std::optional<BodyMotion> motion;
   std::optional<Correction> correction;
   std::optional<RegionCoverage> region;
-  std::optional<BodyParts> body_parts;  ///< Where on the body, in words.
+  std::optional<BodyParts> body_parts;     ///< Where on the body, in words.
+  std::optional<Deformation> deformation;  ///< What the rigid motion leaves, as a field.
 
   /// On the reference scene's grid; absent where the reference scene has no height map or nothing
   /// could be aligned.

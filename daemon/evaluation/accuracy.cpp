@@ -190,6 +190,45 @@ HeightError ErrorOfHeights(const HeightMap& estimate, const HeightMap& truth) {
   return SummariseHeights(std::move(differences_m), num_true);
 }
 
+namespace {
+
+/// Distance of a point from a map's surface, across it; nothing where the map says nothing.
+std::optional<double> DistanceAcross(const HeightMap& map, const Eigen::Vector3d& p) {
+  const GridShape& grid = map.grid;
+  const auto cell = grid.cell(p.x(), p.y());
+  if (!cell) return std::nullopt;
+  const auto width = static_cast<std::size_t>(grid.width);
+  if (*cell < width || *cell + width >= map.z.size()) return std::nullopt;
+  const auto slope = [&](std::size_t step) {
+    return (static_cast<double>(map.z[*cell + step]) - map.z[*cell - step]) / (2 * grid.step);
+  };
+  const double along_x = slope(1), along_y = slope(width);
+  const int column = static_cast<int>(*cell % width), row = static_cast<int>(*cell / width);
+  const double height = map.z[*cell] + along_x * (p.x() - grid.x_centre(column)) +
+                        along_y * (p.y() - grid.y_centre(row));
+  const double distance = (p.z() - height) / std::sqrt(1 + along_x * along_x + along_y * along_y);
+  return std::isfinite(distance) ? std::optional(distance) : std::nullopt;
+}
+
+}  // namespace
+
+DeformationError ErrorOfDeformation(const Deformation& deformation, const Pose& T_motion,
+                                    const HeightMap& true_heights) {
+  std::vector<double> rigid_mm, deformed_mm;
+  for (std::size_t i = 0; i < deformation.points.size(); ++i) {
+    if (deformation.observed[i] == 0) continue;
+    const Eigen::Vector3d p = deformation.points[i].cast<double>();
+    const Eigen::Vector3d shift = deformation.shifts_m[i].cast<double>();
+    const auto rigid = DistanceAcross(true_heights, T_motion * p);
+    const auto deformed = DistanceAcross(true_heights, T_motion * (p + shift));
+    if (!rigid || !deformed) continue;
+    rigid_mm.push_back(std::abs(*rigid) / kMillimetre);
+    deformed_mm.push_back(std::abs(*deformed) / kMillimetre);
+  }
+  return {.rigid_mm = Summarise(std::move(rigid_mm)),
+          .deformed_mm = Summarise(std::move(deformed_mm))};
+}
+
 std::optional<ShapeError> ErrorOfShape(const HeightMap& estimate, const HeightMap& truth) {
   using Row = Eigen::Matrix<double, 7, 1>;
   const GridShape& grid = truth.grid;

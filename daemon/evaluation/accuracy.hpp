@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "algo/base/pose.hpp"
+#include "algo/comparison/deformation.hpp"
 #include "algo/types/height_map.hpp"
 #include "algo/types/scene.hpp"
 #include "daemon/evaluation/truth.hpp"
@@ -87,6 +88,18 @@ struct HeightError {
 };
 
 [[nodiscard]] HeightError ErrorOfHeights(const HeightMap& estimate, const HeightMap& truth);
+
+/// How far the reference body's surface, moved to the current scan, lies from the true surface
+/// there: with the rigid motion alone, and with the deformation field too. Millimetres, across the
+/// surface; both over the same samples.
+struct DeformationError {
+  ErrorSummary rigid_mm, deformed_mm;
+};
+
+/// @param true_heights  TrueHeights() of the current scene in the reference marker's frame.
+[[nodiscard]] DeformationError ErrorOfDeformation(const Deformation& deformation,
+                                                  const Pose& T_motion,
+                                                  const HeightMap& true_heights);
 
 /// Which small similarity transform of the true surface explains a height map best, and what it
 /// leaves: tells a misplaced frame from a wrong shape or scale. Robust linear least squares on the

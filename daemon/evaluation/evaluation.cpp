@@ -147,6 +147,9 @@ PairEvaluation MeasurePair(const std::string& reference_name, const std::string&
     const Pose& T_world_marker = reference.truth.T_world_reference_marker;
     const double min_seen = options.min_frames_seen;
     HeightMap true_deviation = TrueHeights(current.truth, grid, T_world_marker, min_seen);
+    if (comparison.deformation && comparison.motion)
+      result.deformation =
+          ErrorOfDeformation(*comparison.deformation, comparison.motion->T, true_deviation);
     const HeightMap before = TrueHeights(reference.truth, grid, T_world_marker, min_seen);
     for (std::size_t cell = 0; cell < before.z.size(); ++cell)
       true_deviation.z[cell] -= before.z[cell];

@@ -59,6 +59,7 @@ struct PairEvaluation {
   std::optional<AlignmentError> alignment;
   std::optional<HeightError>
       deviation;  ///< Height deviation against the true one where both bodies are visible.
+  std::optional<DeformationError> deformation;
   std::map<std::string, double> timings_s;
 };
 

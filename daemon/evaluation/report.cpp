@@ -160,7 +160,8 @@ std::string SceneTable(const Evaluation& evaluation) {
 }
 
 std::string AlignmentTable(const Evaluation& evaluation) {
-  std::vector<double> corners, body, own_corners, own_body, deviation_median, deviation_p95;
+  std::vector<double> corners, body, own_corners, own_body, deviation_median, deviation_p95, rigid,
+      deformed;
   for (const PairEvaluation& pair : evaluation.pairs) {
     if (pair.alignment) {
       corners.push_back(pair.alignment->in_true_frames.corners_mm);
@@ -171,6 +172,10 @@ std::string AlignmentTable(const Evaluation& evaluation) {
     if (pair.deviation) {
       deviation_median.push_back(pair.deviation->median_abs_mm);
       deviation_p95.push_back(pair.deviation->p95_mm);
+    }
+    if (pair.deformation) {
+      rigid.push_back(pair.deformation->rigid_mm.p95);
+      deformed.push_back(pair.deformation->deformed_mm.p95);
     }
   }
   std::string text =
@@ -191,6 +196,8 @@ std::string AlignmentTable(const Evaluation& evaluation) {
   row("alignment at the body's centroid, each scene where it lies", own_body);
   row("deviation map against the true one, median |e|", deviation_median);
   row("deviation map against the true one, 95th |e|", deviation_p95);
+  row("reference moved rigidly against the true surface, 95th |e|", rigid);
+  row("reference moved and deformed, the same samples, 95th |e|", deformed);
   return text;
 }
 
@@ -311,6 +318,10 @@ ordered_json ToJson(const PairEvaluation& p) {
     json["alignment"] = {{"in_true_frames", ToJson(p.alignment->in_true_frames)},
                          {"in_own_frames", ToJson(p.alignment->in_own_frames)}};
   json["deviation"] = ToJson(p.deviation);
+  json["deformation"] = nullptr;
+  if (p.deformation)
+    json["deformation"] = {{"rigid_mm", ToJson(p.deformation->rigid_mm)},
+                           {"deformed_mm", ToJson(p.deformation->deformed_mm)}};
   json["timings_s"] = p.timings_s;
   return json;
 }

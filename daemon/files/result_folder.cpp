@@ -1,7 +1,8 @@
 #include "daemon/files/result_folder.hpp"
 
-#include <fmt/format.h>
+#include <numeric>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -11,6 +12,7 @@
 #include "algo/base/units.hpp"
 #include "algo/render/error_image.hpp"
 #include "algo/render/overlay_image.hpp"
+#include "daemon/files/deformation_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
 
@@ -23,6 +25,9 @@ using Json = nlohmann::ordered_json;
 constexpr int kFormat = 1;
 constexpr double kSpokenHeight_m =
     3 * kMillimetre;  // smaller differences of a part are not put into words
+// Along the surface the field is inferred from the parts around: small shifts are not put into
+// words.
+constexpr double kSpokenShift_m = 8 * kMillimetre;
 constexpr std::size_t kMaxJsonBytes = std::size_t{16} << 20;
 
 template <typename Derived>
@@ -110,13 +115,20 @@ Json BodyPartsJson(const BodyParts& body) {
     const std::string text = height_m ? HeightWords(part, *height_m, kSpokenHeight_m) : "";
     return text.empty() ? Json(nullptr) : Json(text);
   };
+  const bool has_sides = body.by_posture && body.patient;
   for (const BodyPart& part : body.parts) {
-    parts.push_back(Json{{"name", part.name},
-                         {"centre_m", VectorJson(part.centre_m)},
-                         {"now_mm", part.now_m ? Json(*part.now_m / kMillimetre) : Json(nullptr)},
-                         {"after_mm", part.after_m / kMillimetre},
-                         {"words_now", words(part, part.now_m)},
-                         {"words_after", words(part, part.after_m)}});
+    const std::string shift =
+        has_sides ? ShiftWords(part, *body.patient, kSpokenShift_m) : std::string();
+    parts.push_back(Json{
+        {"name", part.name},
+        {"centre_m", VectorJson(part.centre_m)},
+        {"now_mm", part.now_m ? Json(*part.now_m / kMillimetre) : Json(nullptr)},
+        {"after_mm", part.after_m / kMillimetre},
+        {"words_now", words(part, part.now_m)},
+        {"words_after", words(part, part.after_m)},
+        {"largest_shift_mm",
+         part.largest_shift_m ? VectorJson(*part.largest_shift_m / kMillimetre) : Json(nullptr)},
+        {"words_shift", shift.empty() ? Json(nullptr) : Json(shift)}});
   }
   const char* named_by = body.is_room_known ? "room" : "axes";
   Json json = {{"named_by", body.by_posture ? "posture" : named_by},
@@ -127,6 +139,19 @@ Json BodyPartsJson(const BodyParts& body) {
     json["left_xy"] = {body.patient->left.x(), body.patient->left.y()};
   }
   return json;
+}
+
+Json DeformationJson(const Deformation& deformation) {
+  const auto observed =
+      std::accumulate(deformation.observed.begin(), deformation.observed.end(), std::size_t{0});
+  return {{"samples", deformation.points.size()},
+          {"observed", observed},
+          {"shift_mm",
+           {{"median", deformation.shift_median_m / kMillimetre},
+            {"p95", deformation.shift_p95_m / kMillimetre}}},
+          {"residual_mm",
+           {{"median", deformation.residual_median_m / kMillimetre},
+            {"p95", deformation.residual_p95_m / kMillimetre}}}};
 }
 
 void WriteMap(const fs::path& file, const std::optional<HeightMap>& map) {
@@ -142,7 +167,7 @@ OutputKind ResultOutput() {
   return {"result",
           "result.json",
           {"result.json", "deviation.tiff", "distance.tiff", "deviation_after.tiff",
-           "error_map.png", "overlay.png", "region.png"}};
+           "error_map.png", "overlay.png", "region.png", "deformation.ply"}};
 }
 
 std::string ResultJson(const Comparison& comparison, const std::optional<ResultRoom>& room) {
@@ -158,6 +183,8 @@ std::string ResultJson(const Comparison& comparison, const std::optional<ResultR
       comparison.correction ? CorrectionJson(*comparison.correction) : Json(nullptr);
   json["region"] = comparison.region ? RegionJson(*comparison.region) : Json(nullptr);
   json["body"] = comparison.body_parts ? BodyPartsJson(*comparison.body_parts) : Json(nullptr);
+  json["deformation"] =
+      comparison.deformation ? DeformationJson(*comparison.deformation) : Json(nullptr);
   if (room) {
     json["room_calibration"] = {{"version", room->version},
                                 {"used", room->why_not_used.empty()},
@@ -229,6 +256,8 @@ void WriteResult(const Comparison& comparison, const ResultPictures& pictures,
   WriteMap(output.path() / "distance.tiff", comparison.distance);
   WriteMap(output.path() / "deviation_after.tiff", comparison.deviation_after);
   WriteRegion(output.path() / "region.png", comparison);
+  if (comparison.deformation)
+    WriteDeformationPly(output.path() / "deformation.ply", *comparison.deformation);
   if (!pictures.error_map.empty()) WritePng(output.path() / "error_map.png", pictures.error_map);
   if (!pictures.overlay.empty()) WritePng(output.path() / "overlay.png", pictures.overlay);
   WriteWholeFile(output.path() / "result.json", ResultJson(comparison, room));

@@ -13,8 +13,8 @@
 
 namespace plumb {
 
-/// result.json, deviation.tiff, distance.tiff, deviation_after.tiff, error_map.png, overlay.png,
-/// region.png (the region that was compared, where there is one).
+/// result.json, deviation.tiff, distance.tiff, deviation_after.tiff, deformation.ply,
+/// error_map.png, overlay.png, region.png (the region that was compared, where there is one).
 [[nodiscard]] OutputKind ResultOutput();
 
 /// Which signed calibration of the room gave the numbers their axes.

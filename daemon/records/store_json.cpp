@@ -79,6 +79,8 @@ void ReadWords(const Json& result, web::ResultSummary& summary) {
       summary.body_now.push_back(std::move(words));
     if (std::string words = text(part, "words_after"); !words.empty())
       summary.body_after.push_back(std::move(words));
+    if (std::string words = text(part, "words_shift"); !words.empty())
+      summary.body_after.push_back(std::move(words));
   }
 }
 

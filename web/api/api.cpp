@@ -35,6 +35,7 @@ constexpr std::array kScanFiles = {
     ScanFile{"deviation.tiff", "result/deviation.tiff", "image/tiff"},
     ScanFile{"deviation_after.tiff", "result/deviation_after.tiff", "image/tiff"},
     ScanFile{"distance.tiff", "result/distance.tiff", "image/tiff"},
+    ScanFile{"deformation.ply", "result/deformation.ply", "application/octet-stream"},
     ScanFile{"scene.json", "scene/scene.json", "application/json"},
     ScanFile{"heightmap.tiff", "scene/heightmap.tiff", "image/tiff"},
     ScanFile{"mesh.ply", "scene/mesh.ply", "application/octet-stream"},

@@ -52,7 +52,8 @@ using Height = std::function<double(double down, double left)>;
 class Lying {
  public:
   Lying(const Case& how, double turn_rad, const Shape& shape, const Height& deviation)
-      : T_iec_reference_(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ())),
+      : how_(how),
+        T_iec_reference_(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ())),
         reference_(kGrid),
         deviation_(kGrid) {
     mask_.assign(kGrid.num_cells(), 0);
@@ -79,6 +80,32 @@ class Lying {
         {reference_, deviation_, mask_, mask_, T_motion, extra * T_iec_reference_, kind, posture});
   }
 
+  /// With a field of displacements, each (down, left) metres at a place (down, left).
+  [[nodiscard]] BodyParts DescribeDeformed(
+      const std::function<Eigen::Vector2d(double down, double left)>& shift,
+      bool is_observed = true) const {
+    Deformation field;
+    const Pose T_reference_iec = T_iec_reference_.inverse();
+    const auto in_room = [&](const Eigen::Vector2d& at) -> Eigen::Vector3d {
+      const Eigen::Vector2d room = at.y() * how_.left - at.x() * how_.head;
+      return {room.x(), room.y(), 0.0};
+    };
+    for (double down = 0.005; down < 1.6; down += 0.01) {
+      for (double left = -0.225; left < 0.23; left += 0.01) {
+        if (!IsPerson(down, left)) continue;
+        const Eigen::Vector3d p = T_reference_iec * in_room({down - 0.8, left});
+        const Eigen::Vector3d d = T_reference_iec.linear() * in_room(shift(down, left));
+        field.points.emplace_back(p.cast<float>());
+        field.shifts_m.emplace_back(d.cast<float>());
+        field.observed.push_back(is_observed ? 1 : 0);
+      }
+    }
+    BodyView view{reference_,       deviation_,        mask_,       mask_, Pose::Identity(),
+                  T_iec_reference_, MarkerKind::kRoom, how_.posture};
+    view.deformation = &field;
+    return DescribeBody(view);
+  }
+
   /// As where nobody ever said how the room lies.
   [[nodiscard]] BodyParts DescribeWithoutRoom(std::optional<PatientPosture> posture) const {
     return DescribeBody({reference_, deviation_, mask_, mask_, Pose::Identity(), std::nullopt,
@@ -86,6 +113,7 @@ class Lying {
   }
 
  private:
+  Case how_;
   static constexpr GridShape kGrid = {-1.2, -1.2, 0.005, 480, 480};
   Pose T_iec_reference_;
   HeightMap reference_, deviation_;
@@ -97,6 +125,15 @@ std::vector<std::string> Said(const BodyParts& body) {
   std::vector<std::string> said;
   for (const BodyPart& part : body.parts) {
     if (const std::string words = HeightWords(part, part.after_m, 3 * kMillimetre); !words.empty())
+      said.push_back(words);
+  }
+  return said;
+}
+
+std::vector<std::string> SaidOfShifts(const BodyParts& body) {
+  std::vector<std::string> said;
+  for (const BodyPart& part : body.parts) {
+    if (std::string words = ShiftWords(part, *body.patient, 8 * kMillimetre); !words.empty())
       said.push_back(words);
   }
   return said;
@@ -119,6 +156,29 @@ TEST(BodyPartsTest, AHighLeftShoulderIsSaidInEveryPostureAndHoweverTheMarkerLies
       EXPECT_THAT(Said(person.Describe(how.posture)),
                   testing::ElementsAre("left shoulder 9 mm high"))
           << Name(how.posture) << turn_rad;
+    }
+  }
+}
+
+TEST(BodyPartsTest, AHandMovedAsideIsNamedByThePartItLiesBeside) {
+  const auto hand = [](double down, double left) -> Eigen::Vector2d {
+    const bool is_hand = down > 1.1 && down < 1.2 && left < -0.1;
+    return is_hand ? Eigen::Vector2d(0.002, -0.04) : Eigen::Vector2d(0.001, 0.007);
+  };
+  const auto slid = [](double down, double left) -> Eigen::Vector2d {
+    return down > 0.3 && down < 0.41 && left > 0.02 ? Eigen::Vector2d(-0.012, 0.0)
+                                                    : Eigen::Vector2d(0.0, 0.0);
+  };
+  for (const Case& how : kCases) {
+    for (const double turn_rad : {0.0, 0.4, -1.3}) {
+      const Lying person(how, turn_rad, IsPerson, [](double, double) { return 0.0; });
+      EXPECT_THAT(SaidOfShifts(person.DescribeDeformed(hand)),
+                  testing::ElementsAre("right thigh up to 40 mm to the right"))
+          << Name(how.posture) << turn_rad;
+      EXPECT_THAT(SaidOfShifts(person.DescribeDeformed(slid)),
+                  testing::ElementsAre("left shoulder up to 12 mm towards the head"));
+      EXPECT_THAT(SaidOfShifts(person.DescribeDeformed(hand, /*is_observed=*/false)),
+                  testing::IsEmpty());
     }
   }
 }

@@ -461,6 +461,8 @@ TEST(ComparisonTest, OneThreadAndTwoGiveTheSameBits) {
   EXPECT_TRUE(one.motion->T.matrix() == two.motion->T.matrix());
   EXPECT_TRUE(one.motion->covariance == two.motion->covariance);
   EXPECT_EQ(one.motion->residual_p95_m, two.motion->residual_p95_m);
+  ASSERT_TRUE(one.deformation && two.deformation);
+  EXPECT_EQ(one.deformation->shifts_m, two.deformation->shifts_m);
 }
 
 }  // namespace

@@ -160,6 +160,32 @@ TEST(HeightErrorTest, CountsBiasAndCompleteness) {
   EXPECT_NEAR(error.rmse_mm, 2.0, 1e-4);
 }
 
+TEST(DeformationErrorTest, MeasuresAcrossTheSurfaceWithAndWithoutTheField) {
+  // A plane that rises by one along x: across it a height difference counts for 1/sqrt(2).
+  HeightMap truth(kGrid);
+  for (int row = 0; row < kGrid.height; ++row) {
+    for (int column = 0; column < kGrid.width; ++column)
+      truth.z[static_cast<std::size_t>(row * kGrid.width + column)] =
+          static_cast<float>(kGrid.x_centre(column));
+  }
+  const Pose T_motion(Eigen::Translation3d(0, 0, 0.1));
+  Deformation field;
+  const Eigen::Vector3f above = Eigen::Vector3f::UnitZ();
+  for (const float x : {-0.03F, 0.002F, 0.041F}) {
+    field.points.emplace_back(x, 0.01F, x - 0.1F);
+    field.shifts_m.emplace_back(-0.003F * above);  // where it should stay
+    field.observed.push_back(1);
+  }
+  field.points.emplace_back(0.0F, 0.0F, 0.5F);  // far off, but nobody saw it
+  field.shifts_m.emplace_back(Eigen::Vector3f::Zero());
+  field.observed.push_back(0);
+  const DeformationError error = ErrorOfDeformation(field, T_motion, truth);
+  EXPECT_EQ(error.rigid_mm.count, 3U);
+  EXPECT_NEAR(error.rigid_mm.max, 0.0, 1e-3);
+  EXPECT_NEAR(error.deformed_mm.median, 3.0 / std::sqrt(2.0), 1e-3);
+  EXPECT_EQ(error.deformed_mm.count, 3U);
+}
+
 /// A wavy surface whose shape fixes all six degrees of freedom, moved by T before it is sampled.
 HeightMap Waves(const Pose& T_frame_body, double scale) {
   HeightMap map({.x_min = 0, .y_min = 0, .step = 0.002, .width = 200, .height = 150});

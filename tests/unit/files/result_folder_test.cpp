@@ -3,13 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <set>
 
 #include "algo/base/errors.hpp"
+#include "daemon/files/ply_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
 #include "tests/support/message_of.hpp"
@@ -71,8 +74,29 @@ Comparison Answer() {
   comparison.deviation = Slope(0.009);
   comparison.distance = Slope(0.008);
   comparison.current_height = Slope(0.109);
+  Deformation deformation;
+  deformation.points = {{0.1F, 0.2F, 0.3F}, {0.4F, 0.5F, 0.6F}};
+  deformation.shifts_m = {{0.01F, 0.02F, 0.03F}, {0.0F, 0.0F, 0.0F}};
+  deformation.observed = {1, 0};
+  deformation.shift_p95_m = 0.037;
+  comparison.deformation = deformation;
   comparison.timings_s["alignment"] = 0.25;
   return comparison;
+}
+
+TEST(ResultFolderTest, TheFieldIsAPlyThatOtherReadersTake) {
+  const TempFolder folder;
+  WriteResult(Answer(), {}, folder / "result");
+  const PointCloud cloud = ReadCloudPly(folder / "result" / "deformation.ply");
+  EXPECT_EQ(cloud.points, Answer().deformation->points);
+  const auto bytes = ReadWholeFile(folder / "result" / "deformation.ply", 10'000);
+  const std::size_t row = 6 * sizeof(float) + 1;
+  ASSERT_GT(bytes.size(), 2 * row);
+  std::array<float, 3> shift{};
+  std::memcpy(shift.data(), bytes.data() + bytes.size() - 2 * row + 12, sizeof shift);
+  EXPECT_EQ(shift, (std::array{0.01F, 0.02F, 0.03F}));
+  EXPECT_EQ(bytes[bytes.size() - row - 1], 1);
+  EXPECT_EQ(bytes.back(), 0);
 }
 
 TEST(ResultFolderTest, HoldsTheKeysOfTheContract) {
@@ -108,6 +132,9 @@ TEST(ResultFolderTest, HoldsTheKeysOfTheContract) {
   EXPECT_EQ(correction.at("uncertainty").at("lateral_mm"), 0.7);
   EXPECT_EQ(json.at("region").at("coverage"), 0.97);
   EXPECT_EQ(json.at("region").at("largest_hole_m"), 0.012);
+  EXPECT_EQ(json.at("deformation").at("samples"), 2);
+  EXPECT_EQ(json.at("deformation").at("observed"), 1);
+  EXPECT_NEAR(json.at("deformation").at("shift_mm").at("p95").get<double>(), 37.0, 1e-9);
   EXPECT_EQ(json.at("timings_s").at("alignment"), 0.25);
 }
 
@@ -116,7 +143,7 @@ TEST(ResultFolderTest, AbsentResultsAreNull) {
   comparison.reasons = {"scan needs at least 3 markers shared with the reference, found 1"};
   auto json = nlohmann::json::parse(ResultJson(comparison));
   EXPECT_EQ(json.at("verdict"), "no_answer");
-  for (const char* key : {"alignment", "motion", "correction", "region"})
+  for (const char* key : {"alignment", "motion", "correction", "region", "deformation"})
     EXPECT_TRUE(json.at(key).is_null()) << key;
 
   comparison = Answer();
@@ -129,8 +156,9 @@ TEST(ResultFolderTest, WritesMapsAndPictures) {
   const TempFolder folder;
   const HeightMap reference = Slope(0.1);
   WriteResult(Answer(), DrawResult(Answer(), &reference), folder / "result");
-  EXPECT_THAT(Names(folder / "result"), ElementsAre("deviation.tiff", "distance.tiff",
-                                                    "error_map.png", "overlay.png", "result.json"));
+  EXPECT_THAT(Names(folder / "result"),
+              ElementsAre("deformation.ply", "deviation.tiff", "distance.tiff", "error_map.png",
+                          "overlay.png", "result.json"));
   const cv::Mat deviation = ReadFloatTiff(folder / "result/deviation.tiff");
   ASSERT_EQ(deviation.size(), cv::Size(120, 80));
   EXPECT_EQ(deviation.at<float>(0, 7), Slope(0.009).z[7]);  // row 0 is y_min

@@ -67,7 +67,7 @@ function acceptance({ scan, received }, reload) {
 }
 
 function files(scan) {
-  const ofResult = /result|map\.png|overlay|deviation|distance/;
+  const ofResult = /result|map\.png|overlay|deviation|deformation|distance/;
   const rows = Object.entries(S.result.files)
     .filter(([name]) => scan.result || !ofResult.test(name))
     .map(([name, label]) => h('li', {},

@@ -99,6 +99,8 @@ export const kWords = {
   'right side of the abdomen': 'lado derecho del abdomen',
   'left side of the pelvis': 'lado izquierdo de la pelvis',
   'right side of the pelvis': 'lado derecho de la pelvis',
+  'to the left': 'hacia la izquierda', 'to the right': 'hacia la derecha',
+  'towards the head': 'hacia la cabeza', 'towards the feet': 'hacia los pies',
   'left thigh': 'muslo izquierdo', 'right thigh': 'muslo derecho',
   'left lower leg': 'pierna izquierda', 'right lower leg': 'pierna derecha',
   'at the head end': 'en el extremo de la cabeza', 'at the feet end': 'en el extremo de los pies',
@@ -158,6 +160,8 @@ export const kWords = {
 };
 export const kPatterns = [
   ['^(.+) (\\d+) mm (?:too )?(high|low)$', '$1: $2 mm $3'],
+  ['^(.+) up to (\\d+) mm (to the left|to the right|towards the head|towards the feet)$',
+    '$1: hasta $2 mm $3'],
   ['^(left side|right side|[+-]X side) (at the .+|in the middle)$', '$1 $2'],
   ['^along ([+-][XY]) of the reference marker$', 'según $1 del marcador de referencia'],
   ['^([+-][XY]) side of the reference marker (up|down)$',
