@@ -30,7 +30,9 @@ Eigen::Vector2d Undistort(const Intrinsics& intrinsics, const Eigen::Vector2d& p
     const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
     const Eigen::Vector2d tangential(2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
                                      p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y);
-    ideal = (distorted - tangential) / radial;
+    const Eigen::Vector2d next = (distorted - tangential) / radial;
+    if (next == ideal) break;  // Further rounds would not change a bit.
+    ideal = next;
   }
   return ideal;
 }

@@ -72,6 +72,45 @@ MarkerDetection WithoutDuplicates(std::vector<MarkerObservation> found) {
   return result;
 }
 
+constexpr double kExpectedWithin = 0.03;  // of the image's width
+constexpr double kMostOfImage = 0.7;      // parts that sum up to more cost as much as all of it
+
+/// The parts of the image to search for markers at expected places; those that overlap are joined.
+std::vector<cv::Rect> PartsAround(const std::vector<ImageCorners>& expected, const cv::Size& size) {
+  const cv::Rect image({0, 0}, size);
+  const int margin =
+      static_cast<int>(kExpectedWithin * size.width) + QuadFinderOptions().window_px / 2 + 1;
+  std::vector<cv::Rect> parts;
+  for (const ImageCorners& corners : expected) {
+    Eigen::Vector2d low = corners[0], high = corners[0];
+    for (const Eigen::Vector2d& corner : corners) {
+      low = low.cwiseMin(corner);
+      high = high.cwiseMax(corner);
+    }
+    // Far outside of the image a corner may be any number.
+    low = low.cwiseMax(-size.width).cwiseMin(2 * size.width);
+    high = high.cwiseMax(-size.width).cwiseMin(2 * size.width);
+    const cv::Point first(static_cast<int>(low.x()) - margin, static_cast<int>(low.y()) - margin);
+    const cv::Point end(static_cast<int>(high.x()) + margin, static_cast<int>(high.y()) + margin);
+    cv::Rect part = cv::Rect(first, end) & image;
+    if (part.empty()) continue;
+    for (auto other = parts.begin(); other != parts.end();) {
+      if ((*other & part).empty()) {
+        ++other;
+      } else {
+        part |= *other;
+        parts.erase(other);
+        other = parts.begin();
+      }
+    }
+    parts.push_back(part);
+  }
+  int area = 0;
+  for (const cv::Rect& part : parts) area += part.area();
+  if (area > kMostOfImage * image.area()) return {image};
+  return parts;
+}
+
 }  // namespace
 
 struct MarkerDetector::Impl {
@@ -95,6 +134,21 @@ struct MarkerDetector::Impl {
     }
     return observation;
   }
+
+  [[nodiscard]] MarkerDetection DetectIn(const cv::Mat& gray,
+                                         const std::vector<cv::Rect>& parts) const {
+    std::vector<DecodedMarker> decoded;
+    for (const cv::Rect& part : parts) {
+      for (const ImageCorners& quad : FindDarkQuads(
+               gray, part, {.min_side_px = options.min_side_px, .border_px = options.border_px})) {
+        if (const std::optional<DecodedMarker> marker = decoder.Decode(gray, quad))
+          AddDistinct(*marker, decoded);
+      }
+    }
+    std::vector<MarkerObservation> found;
+    for (const DecodedMarker& marker : decoded) found.push_back(Refined(gray, marker));
+    return WithoutDuplicates(std::move(found));
+  }
 };
 
 MarkerDetector::MarkerDetector(const MarkerDictionary& dictionary,
@@ -116,16 +170,13 @@ MarkerDetector& MarkerDetector::operator=(MarkerDetector&&) noexcept = default;
 
 MarkerDetection MarkerDetector::Detect(const cv::Mat& gray_or_rgb) const {
   const cv::Mat gray = ToGray(gray_or_rgb);
-  const MarkerDetectorOptions& options = impl_->options;
-  std::vector<DecodedMarker> decoded;
-  for (const ImageCorners& quad :
-       FindDarkQuads(gray, {.min_side_px = options.min_side_px, .border_px = options.border_px})) {
-    if (const std::optional<DecodedMarker> marker = impl_->decoder.Decode(gray, quad))
-      AddDistinct(*marker, decoded);
-  }
-  std::vector<MarkerObservation> found;
-  for (const DecodedMarker& marker : decoded) found.push_back(impl_->Refined(gray, marker));
-  return WithoutDuplicates(std::move(found));
+  return impl_->DetectIn(gray, {{0, 0, gray.cols, gray.rows}});
+}
+
+MarkerDetection MarkerDetector::DetectNear(const cv::Mat& gray,
+                                           const std::vector<ImageCorners>& expected) const {
+  if (gray.empty() || gray.type() != CV_8UC1) return Detect(gray);  // which says what is wrong
+  return impl_->DetectIn(gray, PartsAround(expected, gray.size()));
 }
 
 }  // namespace plumb

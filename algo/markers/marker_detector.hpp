@@ -49,6 +49,13 @@ class MarkerDetector {
   /// @throws std::invalid_argument for an empty image or another type.
   [[nodiscard]] MarkerDetection Detect(const cv::Mat& gray_or_rgb) const;
 
+  /// Only what lies around expected places, bit for bit as Detect() finds it there, for less time.
+  /// An id that is seen once more elsewhere is not noticed.
+  /// @param gray      CV_8UC1.
+  /// @param expected  Corners; markers up to 3 % of the image's width away are found.
+  [[nodiscard]] MarkerDetection DetectNear(const cv::Mat& gray,
+                                           const std::vector<ImageCorners>& expected) const;
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -127,11 +127,16 @@ bool Plausible(const ImageCorners& corners, const cv::Size& size,
 }  // namespace
 
 std::vector<ImageCorners> FindDarkQuads(const cv::Mat& gray, const QuadFinderOptions& options) {
+  return FindDarkQuads(gray, {0, 0, gray.cols, gray.rows}, options);
+}
+
+std::vector<ImageCorners> FindDarkQuads(const cv::Mat& gray, const cv::Rect& part,
+                                        const QuadFinderOptions& options) {
   cv::Mat dark;
-  cv::adaptiveThreshold(gray, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV,
+  cv::adaptiveThreshold(gray(part), dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV,
                         options.window_px, options.min_darkness);
   std::vector<Outline> outlines;
-  cv::findContours(dark, outlines, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
+  cv::findContours(dark, outlines, cv::RETR_LIST, cv::CHAIN_APPROX_NONE, part.tl());
 
   std::vector<ImageCorners> quads;
   // The shortest outline of a square seen at a slant: two sides along the image's diagonal steps.

@@ -25,5 +25,10 @@ struct QuadFinderOptions {
 /// Thread-safe and deterministic.
 [[nodiscard]] std::vector<ImageCorners> FindDarkQuads(const cv::Mat& gray,
                                                       const QuadFinderOptions& options);
+/// The same within a part of the image: what lies deeper in it than half a window is found as in
+/// the whole. Corners are those of the whole image.
+/// @param part  Inside the image, not empty.
+[[nodiscard]] std::vector<ImageCorners> FindDarkQuads(const cv::Mat& gray, const cv::Rect& part,
+                                                      const QuadFinderOptions& options);
 
 }  // namespace plumb

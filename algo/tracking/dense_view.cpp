@@ -38,11 +38,18 @@ float WindowDepth(const cv::Mat& depth_m, int row0, int column0, int side) {
 
 }  // namespace
 
-double DepthSigma(double z_m, double cos_incidence) {
+double Grazing(double cos_incidence) {
   const double theta = std::acos(std::clamp(cos_incidence, 0.17, 1.0));
-  const double grazing = theta / (std::numbers::pi / 2 - theta);
+  return theta / (std::numbers::pi / 2 - theta);
+}
+
+double DepthSigmaAt(double z_m, double grazing) {
   return 0.0012 + 0.0019 * (z_m - 0.4) * (z_m - 0.4) +
          0.0001 / std::sqrt(std::max(z_m, 0.1)) * grazing * grazing;
+}
+
+double DepthSigma(double z_m, double cos_incidence) {
+  return DepthSigmaAt(z_m, Grazing(cos_incidence));
 }
 
 DenseViewMaker::DenseViewMaker(const Intrinsics& intrinsics)
@@ -59,18 +66,27 @@ DenseViewMaker::DenseViewMaker(const Intrinsics& intrinsics)
   rays_ = std::move(rays);
 }
 
-DenseView DenseViewMaker::Make(const cv::Mat& depth_m) const {
+DenseView DenseViewMaker::Measured(const cv::Mat& depth_m, int stride) const {
   DenseView view;
   view.window_px = window_px_;
   view.width = width_;
   view.height = height_;
   view.rays = rays_;
   view.z_m.assign(rays_->size(), 0.0F);
-  view.normals.assign(rays_->size(), Eigen::Vector3f::Zero());
-  for (int r = 0; r < height_; ++r)
-    for (int c = 0; c < width_; ++c)
+  for (int r = 0; r < height_; r += stride)
+    for (int c = 0; c < width_; c += stride)
       view.z_m[static_cast<std::size_t>(r * width_ + c)] =
           WindowDepth(depth_m, r * window_px_, c * window_px_, window_px_);
+  return view;
+}
+
+DenseView DenseViewMaker::MakeForPose(const cv::Mat& depth_m) const {
+  return Measured(depth_m, kPoseStride);
+}
+
+DenseView DenseViewMaker::Make(const cv::Mat& depth_m) const {
+  DenseView view = Measured(depth_m, 1);
+  view.normals.assign(rays_->size(), Eigen::Vector3f::Zero());
   for (int r = 1; r + 1 < view.height; ++r) {
     for (int c = 1; c + 1 < view.width; ++c) {
       const auto i = static_cast<std::size_t>(r * view.width + c);

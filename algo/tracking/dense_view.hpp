@@ -30,6 +30,9 @@ struct DenseView {
   }
 };
 
+/// Of the cells that a frame's pose is computed of, each way.
+inline constexpr int kPoseStride = 2;
+
 /// Makes dense views of one camera's depth images; keeps the rays, which cost more than the view
 /// itself. Cells per image side follow the resolution, so that 640x480 and 320x240 give the same
 /// 160x120 cells.
@@ -38,8 +41,13 @@ class DenseViewMaker {
   explicit DenseViewMaker(const Intrinsics& intrinsics);
   /// @param depth_m  CV_32FC1 of the intrinsics' size, 0 = nothing measured.
   [[nodiscard]] DenseView Make(const cv::Mat& depth_m) const;
+  /// What a pose needs of the frame that it is computed for, a quarter of the work: depth in every
+  /// kPoseStride-th cell each way, as Make() has it there, and no normals.
+  [[nodiscard]] DenseView MakeForPose(const cv::Mat& depth_m) const;
 
  private:
+  [[nodiscard]] DenseView Measured(const cv::Mat& depth_m, int stride) const;
+
   int window_px_;
   int width_;
   int height_;
@@ -49,5 +57,8 @@ class DenseViewMaker {
 /// Standard deviation of one depth measurement (Nguyen et al. 2012, axial), metres; cos_incidence
 /// in (0, 1].
 [[nodiscard]] double DepthSigma(double z_m, double cos_incidence);
+/// The same in two steps, where one surface is measured many times: the first one takes longest.
+[[nodiscard]] double Grazing(double cos_incidence);
+[[nodiscard]] double DepthSigmaAt(double z_m, double grazing);
 
 }  // namespace plumb

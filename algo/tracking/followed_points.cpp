@@ -8,6 +8,7 @@
 namespace plumb {
 namespace {
 
+constexpr std::size_t kKeptPyramids = 6;  // Of keyframes; 2.3 MB each.
 constexpr double kSameBrightness = 0.08;  // Of the exposure: what KLT follows without help.
 
 }  // namespace
@@ -88,8 +89,7 @@ void FollowedPoints::Reassociate(const GrayImage& image, const cv::Mat& depth_m,
       guesses.push_back(pixel.cast<float>());
     }
     if (landmarks.empty()) continue;
-    const KltResult klt =
-        FollowAtAnyBrightness(MakePyramid(keyframe.gray, options_), image, from, guesses, 1);
+    const KltResult klt = FollowAtAnyBrightness(PyramidOfKeyframe(k), image, from, guesses, 1);
     for (std::size_t i = 0; i < landmarks.size(); ++i) {
       if (!klt.found[i] ||
           (klt.points[i] - guesses[i]).norm() > 6.0F * static_cast<float>(SigmaPx()))
@@ -103,6 +103,22 @@ void FollowedPoints::Reassociate(const GrayImage& image, const cv::Mat& depth_m,
       points.push_back(point);
     }
   }
+}
+
+void FollowedPoints::KeepPyramid(std::size_t keyframe, const Pyramid& pyramid) {
+  pyramids_.emplace_front(keyframe, pyramid);
+  if (pyramids_.size() > kKeptPyramids) pyramids_.pop_back();
+}
+
+Pyramid FollowedPoints::PyramidOfKeyframe(std::size_t keyframe) {
+  const auto kept = std::find_if(pyramids_.begin(), pyramids_.end(),
+                                 [&](const auto& one) { return one.first == keyframe; });
+  if (kept != pyramids_.end()) {
+    std::rotate(pyramids_.begin(), kept, kept + 1);
+  } else {
+    KeepPyramid(keyframe, MakePyramid(map_.keyframes[keyframe].gray, options_));
+  }
+  return pyramids_.front().second;
 }
 
 void FollowedPoints::AddObservation(const ActivePoint& point, MapKeyframe& keyframe) {

@@ -1,6 +1,9 @@
 // The landmarks that are followed from frame to frame, and where the last frame saw them.
 #pragma once
 
+#include <cstddef>
+#include <deque>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -47,6 +50,9 @@ class FollowedPoints {
   void Reassociate(const GrayImage& image, const cv::Mat& depth_m, const Pose& T_world_color,
                    const std::vector<std::size_t>& keyframes, std::vector<PosePoint>& points);
 
+  /// A new keyframe's pyramid: Reassociate() will ask for it soon.
+  void KeepPyramid(std::size_t keyframe, const Pyramid& pyramid);
+
   /// Notes a point as seen in a keyframe.
   void AddObservation(const ActivePoint& point, MapKeyframe& keyframe);
 
@@ -65,10 +71,13 @@ class FollowedPoints {
                                                 const std::vector<Eigen::Vector2f>& guesses,
                                                 int max_level) const;
 
+  [[nodiscard]] Pyramid PyramidOfKeyframe(std::size_t keyframe);
+
   const Intrinsics intrinsics_;
   const KeypointOptions options_;
   TrackingMap& map_;
   std::vector<ActivePoint> active_;
+  std::deque<std::pair<std::size_t, Pyramid>> pyramids_;  // Of keyframes, used last first.
 };
 
 }  // namespace plumb

@@ -25,6 +25,41 @@ float PeakOffset(float before, float at, float after) {
   return curvature < 0 ? std::clamp(0.5F * (before - after) / curvature, -0.5F, 0.5F) : 0.0F;
 }
 
+// The best corner of each cell of a run of cells in a row, if it is good enough.
+void AddBestOfCells(const cv::Mat& gray, const cv::Rect& run, int cell,
+                    const KeypointOptions& options, std::vector<Eigen::Vector2f>& corners) {
+  constexpr int kBlock = 5;
+  constexpr int kAround = kBlock / 2 + 2;  // Pixels that the score of a pixel and its neighbours'
+                                           // need beside gradients.
+  const cv::Rect seen(run.x - kAround, run.y - kAround, run.width + 2 * kAround,
+                      run.height + 2 * kAround);
+  cv::Mat score;
+  cv::cornerMinEigenVal(gray(seen), score, kBlock, 3);
+  // It sums, over its 5x5 block, squares of Sobel gradients (8 times the gradient) scaled by
+  // 1 / (255 * 4 * 5).
+  const auto threshold = static_cast<float>(options.min_quality * 25.0 * 64.0 / (5100.0 * 5100.0));
+  const auto at = [&](int y, int x) { return score.at<float>(y - seen.y, x - seen.x); };
+  for (int first = run.x; first < run.br().x;) {
+    const int end = std::min((first / cell + 1) * cell, run.br().x);
+    float best = threshold;
+    cv::Point peak(-1, -1);
+    for (int y = run.y; y < run.br().y; ++y) {
+      for (int x = first; x < end; ++x) {
+        if (at(y, x) > best) {
+          best = at(y, x);
+          peak = {x, y};
+        }
+      }
+    }
+    first = end;
+    if (peak.x < 0) continue;
+    corners.emplace_back(static_cast<float>(peak.x) +
+                             PeakOffset(at(peak.y, peak.x - 1), best, at(peak.y, peak.x + 1)),
+                         static_cast<float>(peak.y) +
+                             PeakOffset(at(peak.y - 1, peak.x), best, at(peak.y + 1, peak.x)));
+  }
+}
+
 }  // namespace
 
 Pyramid MakePyramid(const cv::Mat& gray, const KeypointOptions& options) {
@@ -37,12 +72,6 @@ Pyramid MakePyramid(const cv::Mat& gray, const KeypointOptions& options) {
 std::vector<Eigen::Vector2f> DetectCorners(const cv::Mat& gray,
                                            const std::vector<Eigen::Vector2f>& occupied,
                                            const KeypointOptions& options) {
-  cv::Mat score;
-  cv::cornerMinEigenVal(gray, score, 5, 3);
-  // cornerMinEigenVal sums, over its 5x5 block, squares of Sobel gradients (8 times the gradient)
-  // scaled by 1 / (255 * 4 * 5).
-
-  const float threshold = static_cast<float>(options.min_quality * 25.0 * 64.0 / (5100.0 * 5100.0));
   const int cell = std::max(8, options.cell_px * gray.cols / 640);
   const int columns = (gray.cols + cell - 1) / cell;
   const int rows = (gray.rows + cell - 1) / cell;
@@ -53,30 +82,18 @@ std::vector<Eigen::Vector2f> DetectCorners(const cv::Mat& gray,
     if (c >= 0 && r >= 0 && c < columns && r < rows)
       taken[static_cast<std::size_t>(r * columns + c)] = true;
   }
-  const int margin = 8;
+  constexpr int kMargin = 8;
+  const cv::Rect inner(kMargin, kMargin, gray.cols - 2 * kMargin, gray.rows - 2 * kMargin);
   std::vector<Eigen::Vector2f> corners;
   for (int r = 0; r < rows; ++r) {
+    const auto is_free = [&](int c) { return !taken[static_cast<std::size_t>(r * columns + c)]; };
     for (int c = 0; c < columns; ++c) {
-      if (taken[static_cast<std::size_t>(r * columns + c)]) continue;
-      float best = threshold;
-      cv::Point at(-1, -1);
-      for (int y = std::max(margin, r * cell); y < std::min(gray.rows - margin, (r + 1) * cell);
-           ++y) {
-        const float* line = score.ptr<float>(y);
-        for (int x = std::max(margin, c * cell); x < std::min(gray.cols - margin, (c + 1) * cell);
-             ++x) {
-          if (line[x] > best) {
-            best = line[x];
-            at = {x, y};
-          }
-        }
-      }
-      if (at.x < 0) continue;
-      const float dx =
-          PeakOffset(score.at<float>(at.y, at.x - 1), best, score.at<float>(at.y, at.x + 1));
-      const float dy =
-          PeakOffset(score.at<float>(at.y - 1, at.x), best, score.at<float>(at.y + 1, at.x));
-      corners.emplace_back(static_cast<float>(at.x) + dx, static_cast<float>(at.y) + dy);
+      if (!is_free(c)) continue;
+      int end = c + 1;
+      while (end < columns && is_free(end)) ++end;
+      const cv::Rect run = cv::Rect(c * cell, r * cell, (end - c) * cell, cell) & inner;
+      if (!run.empty()) AddBestOfCells(gray, run, cell, options, corners);
+      c = end;
     }
   }
   return corners;

@@ -125,7 +125,8 @@ std::vector<int> LoopCandidates(const TrackingMap& map) {
   std::vector<std::pair<double, int>> near;
   for (int k = 0; k + kLoopMinGap <= newest; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    if (shared[i] >= kSharedEnough || map.keyframes[i].descriptors.empty()) continue;
+    const MapKeyframe& older = map.keyframes[i];
+    if (shared[i] >= kSharedEnough || (older.descriptors.empty() && older.gray.empty())) continue;
     const Pose T = map.keyframes[i].T_world_color.inverse() * map.keyframes.back().T_world_color;
     const DriftBound drift = BoundOf(way[i]);
     const double depth = std::clamp(map.keyframes[i].median_depth_m, 0.4, 3.0);

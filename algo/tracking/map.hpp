@@ -43,8 +43,8 @@ struct MapKeyframe {
   DenseView dense;
   double median_depth_m = 1.0;  ///< Of the dense view.
   cv::Mat gray;  ///< CV_8UC1; released once the keyframe is out of reach of re-association.
-  std::vector<Eigen::Vector2f>
-      features_px;  ///< For relocalisation: keypoints with a descriptor and depth.
+  std::vector<Eigen::Vector2f> features_px;      ///< For relocalisation, once it is asked for:
+                                                 ///< keypoints with a descriptor and depth.
   std::vector<Eigen::Vector3f> features_camera;  ///< The same in the camera frame, metres.
   cv::Mat descriptors;  ///< One ORB descriptor a row, for each of the features.
 };

@@ -15,8 +15,10 @@ struct NormalEquations {
   Matrix6d H = Matrix6d::Zero();
   Vector6d g = Vector6d::Zero();
 
+  // Only the lower half of H: no more is read of it.
   void Add(const Vector6d& J, double residual, double weight) {
-    H.noalias() += weight * J * J.transpose();
+    for (int column = 0; column < 6; ++column)
+      for (int row = column; row < 6; ++row) H(row, column) += weight * J[row] * J[column];
     g.noalias() += weight * residual * J;
   }
 };
@@ -54,7 +56,18 @@ struct DenseSum {
   int valid = 0;
 };
 
-DenseSum AddDense(const PoseProblem& problem, const Pose& T_world_camera, double gate_m) {
+// How steeply the target's cells are looked at, found when first needed: < 0 before.
+using GrazingOfCells = std::vector<double>;
+
+double GrazingOf(const DenseView& target, std::size_t cell, GrazingOfCells& known) {
+  double& grazing = known[cell];
+  if (grazing < 0)
+    grazing = Grazing(std::abs(target.normals[cell].dot(target.point(cell).normalized())));
+  return grazing;
+}
+
+DenseSum AddDense(const PoseProblem& problem, const Pose& T_world_camera, double gate_m,
+                  GrazingOfCells& grazing_of_cells) {
   DenseSum sum;
   const DenseView& frame = *problem.dense_frame;
   const DenseView& target = *problem.dense_target;
@@ -65,8 +78,8 @@ DenseSum AddDense(const PoseProblem& problem, const Pose& T_world_camera, double
   const Eigen::Vector3f t = T_target_depth.translation().cast<float>();
   const Eigen::Matrix3d R_target_color = (T_target_depth * T_depth_color).linear();
   const double window = frame.window_px;
-  for (int r = 0; r < frame.height; r += 2) {
-    for (int c = 0; c < frame.width; c += 2) {
+  for (int r = 0; r < frame.height; r += kPoseStride) {
+    for (int c = 0; c < frame.width; c += kPoseStride) {
       const auto i = static_cast<std::size_t>(r * frame.width + c);
       if (frame.z_m[i] <= 0) continue;
       ++sum.valid;
@@ -81,8 +94,8 @@ DenseSum AddDense(const PoseProblem& problem, const Pose& T_world_camera, double
       const Eigen::Vector3f n = target.normals[j];
       const double residual = n.dot(q - target.point(j));
       if (std::abs(residual) > gate_m) continue;
-      const double cosine = std::abs(n.dot(target.point(j).normalized()));
-      const double sigma = std::sqrt(2.0) * DepthSigma(q.z(), cosine) + 0.002;
+      const double sigma =
+          std::sqrt(2.0) * DepthSigmaAt(q.z(), GrazingOf(target, j, grazing_of_cells)) + 0.002;
       // The motion is on the colour camera's side: q = T_target_color * exp(x) * p_color.
       const Eigen::Vector3d p_color = problem.T_color_depth * frame.point(i).cast<double>();
       const Eigen::Vector3d n_color = R_target_color.transpose() * n.cast<double>();
@@ -102,6 +115,7 @@ PoseEstimate OptimizePose(const PoseProblem& problem, const Pose& T_world_camera
   PoseEstimate estimate;
   estimate.T_world_camera = T_world_camera_start;
   const bool dense = problem.dense_frame != nullptr && problem.dense_target != nullptr;
+  GrazingOfCells grazing_of_cells(dense ? problem.dense_target->size() : 0, -1.0);
   double gate_m = 0.08;
   for (int iteration = 0; iteration < problem.num_iterations; ++iteration) {
     NormalEquations equations;
@@ -109,7 +123,7 @@ PoseEstimate OptimizePose(const PoseProblem& problem, const Pose& T_world_camera
     for (const PosePoint& point : problem.points)
       AddPoint(point, T_camera_world * point.p_world, equations);
     if (dense) {
-      const DenseSum sum = AddDense(problem, estimate.T_world_camera, gate_m);
+      const DenseSum sum = AddDense(problem, estimate.T_world_camera, gate_m, grazing_of_cells);
       equations.H += sum.equations.H;
       equations.g += sum.equations.g;
       estimate.num_dense = sum.associated;
@@ -118,7 +132,7 @@ PoseEstimate OptimizePose(const PoseProblem& problem, const Pose& T_world_camera
       estimate.dense_rms_m = sum.associated > 0 ? std::sqrt(sum.squares / sum.associated) : 0.0;
       gate_m = std::max(0.02, gate_m * 0.7);
     }
-    estimate.information = equations.H;
+    estimate.information = equations.H.selfadjointView<Eigen::Lower>();
     // A whisper of damping keeps directions that nothing constrains where the prediction put them.
     Matrix6d damped = equations.H;
     damped.diagonal().array() += 1e-3 + 1e-6 * equations.H.diagonal().array();

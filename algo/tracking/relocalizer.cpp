@@ -222,7 +222,7 @@ std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map,
     if (!candidate || (best && candidate->num_inliers <= best->num_inliers)) continue;
     candidate->keyframe = k;
     best = candidate;
-    if (best->num_inliers >= 60) break;  // Beyond doubt.
+    if (best->num_inliers >= kBeyondDoubt) break;
   }
   return best;
 }

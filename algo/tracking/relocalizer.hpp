@@ -9,6 +9,8 @@
 
 namespace plumb {
 
+inline constexpr int kBeyondDoubt = 60;  ///< So many features that agree end a search.
+
 struct Relocalization {
   Pose T_world_color = Pose::Identity();
   int keyframe = 0;     ///< The nearest keyframe, for tracking against.

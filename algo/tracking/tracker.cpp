@@ -26,14 +26,18 @@ constexpr std::size_t kReassociated =
 constexpr double kDriftFollowed_m = 0.003;  // A drift that bundle adjustment takes out by itself,
                                             // once the old landmarks are seen again.
 constexpr double kDriftFollowed_rad = 0.001;
+// Keyframes after one that looked like no older one which are not compared: what comes into view
+// stays for more, and a comparison costs as much as tracking a frame.
+constexpr int kLongestLoopPause = 2;
 constexpr int kLoopInliers =
     30;  // Features, and keypoints after them, that must agree on a place seen before.
 
 // What is made of one frame's images before its pose is known.
 struct Prepared {
   GrayImage image;
-  DenseView dense;
+  DenseView dense;  // For the pose only.
   std::vector<MarkerObservation> markers;
+  bool has_all_markers = false;  // Else only those about where the map's were expected.
 };
 
 // Of a view's usable cells, metres; 1 where there is none.
@@ -67,6 +71,8 @@ struct Tracker::Impl {
   bool lost = true;
   bool keyframe_wanted = false;  // After a relocalisation.
   std::vector<KeyframeLink> loops;
+  int num_unlike = 0;  // Keyframes in a row that looked like no older one.
+  int loop_pause = 0;  // Keyframes that are not compared with older ones.
 
   Impl(const StreamInfo& stream, const TrackerOptions& tracker_options)
       : info(stream),
@@ -89,9 +95,45 @@ struct Tracker::Impl {
     Prepared prepared;
     cv::cvtColor(frame.color_rgb, prepared.image.gray, cv::COLOR_RGB2GRAY);
     prepared.image.pyramid = followed_points.PyramidOf(prepared.image.gray);
-    prepared.dense = dense_maker.Make(frame.depth_m);
-    if (detector) prepared.markers = detector->Detect(prepared.image.gray).markers;
+    prepared.dense = dense_maker.MakeForPose(frame.depth_m);
+    FindMarkers(frame, prepared);
     return prepared;
+  }
+
+  // While the camera is followed only markers of the map take part in its pose, and about where
+  // they are is known. New ones are looked for in keyframes.
+  void FindMarkers(const Frame& frame, Prepared& prepared) const {
+    if (!detector) return;
+    if (lost || map.keyframes.empty() || NeedsKeyframe(PredictedPose(frame))) {
+      FindAllMarkers(prepared);
+      return;
+    }
+    const Pose T_camera_world = PredictedPose(frame).inverse();
+    const MarkerCorners in_marker = CornersInMarkerFrame(info.marker_length_m);
+    std::vector<ImageCorners> expected;
+    for (const auto& [id, marker] : map.markers) {
+      const Pose T_camera_marker = T_camera_world * marker.T_world_marker;
+      ImageCorners corners;
+      bool in_front = true;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const Eigen::Vector3d p = T_camera_marker * in_marker[i];
+        in_front = in_front && p.z() > 0.1;
+        if (in_front) corners[i] = Project(info.intrinsics, p);
+      }
+      if (in_front) expected.push_back(corners);
+    }
+    prepared.markers = detector->DetectNear(prepared.image.gray, expected).markers;
+  }
+
+  void FindAllMarkers(Prepared& prepared) const {
+    if (!detector || prepared.has_all_markers) return;
+    prepared.markers = detector->Detect(prepared.image.gray).markers;
+    prepared.has_all_markers = true;
+  }
+
+  // By the velocity of the last frame.
+  [[nodiscard]] Pose PredictedPose(const Frame& frame) const {
+    return PoseAfter(T_world_last, velocity, std::min(frame.color_time_s - last_time_s, 0.3));
   }
 
   TrackedFrame Track(const Frame& frame) {
@@ -198,8 +240,7 @@ struct Tracker::Impl {
     const double dt = frame.color_time_s - last_time_s;
     const double dt_depth = frame.depth_time_s - frame.color_time_s;
     // The constant-velocity guess first; if that fails (a jerk), the last pose.
-    const std::array<Pose, 2> guesses = {PoseAfter(T_world_last, velocity, std::min(dt, 0.3)),
-                                         T_world_last};
+    const std::array<Pose, 2> guesses = {PredictedPose(frame), T_world_last};
     for (const Pose& T_guess : guesses) {
       PoseProblem problem = MakeProblem(prepared, dt_depth);
       AddMarkerPoints(prepared.markers, problem.points);
@@ -245,17 +286,18 @@ struct Tracker::Impl {
     return count;
   }
 
-  std::optional<PoseEstimate> Relocalize(const Frame& frame, const Prepared& prepared,
+  std::optional<PoseEstimate> Relocalize(const Frame& frame, Prepared& prepared,
                                          TrackedFrame& result) {
     lost = true;
     velocity.setZero();
+    FindAllMarkers(prepared);
     std::optional<Relocalization> found = RelocalizeByMarkers(
         map, info.intrinsics, info.marker_length_m, prepared.markers, frame.depth_m);
     std::optional<DescribedFeatures> features;
     for (int attempt = 0; attempt < 2; ++attempt) {
       if (!found && options.use_keypoints && !features) {
         features = DescribeFeatures(prepared.image.gray, frame.depth_m, info.intrinsics);
-        found = RelocalizeByFeatures(map, info.intrinsics, *features);
+        found = FindAmongKeyframes(*features);
       }
       if (!found) return std::nullopt;
       reference = found->keyframe;
@@ -278,7 +320,7 @@ struct Tracker::Impl {
     return std::nullopt;
   }
 
-  void Accept(const Frame& frame, const Prepared& prepared, const PoseEstimate& estimate,
+  void Accept(const Frame& frame, Prepared& prepared, const PoseEstimate& estimate,
               TrackedFrame& result) {
     const double dt = frame.color_time_s - last_time_s;
     if (!lost && dt > 0)
@@ -348,8 +390,9 @@ struct Tracker::Impl {
     return result;
   }
 
-  void MakeKeyframe(const Frame& frame, const Prepared& prepared, const Pose& T_world_color,
+  void MakeKeyframe(const Frame& frame, Prepared& prepared, const Pose& T_world_color,
                     TrackedFrame& result) {
+    FindAllMarkers(prepared);
     MapKeyframe keyframe;
     keyframe.data.frame_index = frame.index;
     keyframe.data.color_time_s = frame.color_time_s;
@@ -360,18 +403,14 @@ struct Tracker::Impl {
     keyframe.data.markers = prepared.markers;
     keyframe.T_world_color = T_world_color;
     keyframe.velocity_per_s = velocity;
-    keyframe.dense = prepared.dense;
-    keyframe.median_depth_m = MedianDepth(prepared.dense);
+    keyframe.dense = dense_maker.Make(frame.depth_m);
+    keyframe.median_depth_m = MedianDepth(keyframe.dense);
     keyframe.gray = prepared.image.gray;
     const int index = static_cast<int>(map.keyframes.size());
     if (options.use_keypoints) {
       AssociateKeyframe(prepared, frame.depth_m, T_world_color, keyframe);
       followed_points.AddCorners(prepared.image, frame.depth_m, index, keyframe);
-      DescribedFeatures features =
-          DescribeFeatures(prepared.image.gray, frame.depth_m, info.intrinsics);
-      keyframe.features_px = std::move(features.pixels);
-      keyframe.features_camera = std::move(features.in_camera);
-      keyframe.descriptors = features.descriptors;
+      followed_points.KeepPyramid(static_cast<std::size_t>(index), prepared.image.pyramid);
     }
     AddNewMarkers(frame.depth_m, keyframe);
     if (reference >= 0) {
@@ -397,15 +436,47 @@ struct Tracker::Impl {
     result.T_reference_color = Pose::Identity();
   }
 
+  // Features cost as much as tracking a frame, and most keyframes are never compared by them.
+  void Describe(int index) {
+    MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(index)];
+    if (!keyframe.descriptors.empty() || keyframe.gray.empty()) return;
+    DescribedFeatures features =
+        DescribeFeatures(keyframe.gray, keyframe.data.view.depth_m, info.intrinsics);
+    keyframe.features_px = std::move(features.pixels);
+    keyframe.features_camera = std::move(features.in_camera);
+    keyframe.descriptors = features.descriptors;
+  }
+
+  // By the features of all keyframes, the newest first, which are described as far as needed.
+  std::optional<Relocalization> FindAmongKeyframes(const DescribedFeatures& features) {
+    std::optional<Relocalization> best;
+    for (int k = static_cast<int>(map.keyframes.size()) - 1; k >= 0; --k) {
+      Describe(k);
+      const auto found = RelocalizeByFeatures(map, info.intrinsics, features, {k});
+      if (!found || (best && found->num_inliers <= best->num_inliers)) continue;
+      best = found;
+      if (best->num_inliers >= kBeyondDoubt) break;
+    }
+    return best;
+  }
+
   // A place seen long ago: where the map has drifted since, it is bent until both visits agree, and
   // the old landmarks are followed again.
   void CloseLoop(const Prepared& prepared, int index) {
+    if (loop_pause > 0) {
+      --loop_pause;
+      return;
+    }
     const std::vector<int> candidates = LoopCandidates(map);
     if (candidates.empty()) return;
+    for (const int k : candidates) Describe(k);
+    Describe(index);
     const MapKeyframe& newest = map.keyframes.back();
     const auto found = RelocalizeByFeatures(
         map, info.intrinsics, {newest.features_px, newest.features_camera, newest.descriptors},
         candidates);
+    num_unlike = found ? 0 : num_unlike + 1;
+    loop_pause = std::min(num_unlike, kLongestLoopPause);
     if (!found || found->num_inliers < kLoopInliers) return;
     const std::optional<Pose> T_world_seen =
         SeenFrom(found->keyframe, found->T_world_color, prepared, newest);

@@ -55,6 +55,43 @@ TEST(MarkerDetectorTest, RefusesImagesThatAreNoneAndOptionsOutOfRange) {
   EXPECT_THROW(MarkerDetector(dictionary, {.border_px = -1}), std::invalid_argument);
 }
 
+TEST(MarkerDetectorTest, NearExpectedPlacesItFindsTheSameToTheLastBit) {
+  const MarkerDictionary dictionary = MarkerDictionary::ByName("DICT_6X6_250");
+  const MarkerDetector detector(dictionary);
+  std::mt19937 random(3);
+  const std::vector<PlacedMarker> placed = {
+      FacingAt(4, -0.4, -0.25, 1.2), FacingAt(9, 0.3, 0.2, 1.1), FacingAt(17, 0.0, 0.0, 1.0)};
+  const cv::Mat image = Render(dictionary, placed, Camera(), SceneLook(), random);
+  const MarkerDetection all = detector.Detect(image);
+  ASSERT_THAT(Ids(all), ElementsAre(4, 9, 17));
+
+  // 19 of 640 pixels are 3 %.
+  const auto expected_off_by = [&](double pixels) {
+    std::vector<ImageCorners> expected;
+    for (const PlacedMarker& marker : {placed[1], placed[0]}) {
+      expected.push_back(TrueCorners(marker, kLength_m, Camera()));
+      for (Eigen::Vector2d& corner : expected.back()) corner.x() += pixels;
+    }
+    return expected;
+  };
+  const MarkerDetection near = detector.DetectNear(image, expected_off_by(18));
+  ASSERT_THAT(Ids(near), ElementsAre(4, 9)) << "nobody asked for 17";
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(near.markers[i].corners, all.markers[i].corners);
+    EXPECT_EQ(near.markers[i].sigma_px, all.markers[i].sigma_px);
+  }
+  EXPECT_THAT(Ids(detector.DetectNear(image, expected_off_by(70))), IsEmpty()) << "too far away";
+  EXPECT_THAT(Ids(detector.DetectNear(image, {})), IsEmpty());
+  const double nowhere = 1e300;
+  EXPECT_THAT(
+      Ids(detector.DetectNear(
+          image, {{Eigen::Vector2d(-nowhere, -nowhere), Eigen::Vector2d(nowhere, -nowhere),
+                   Eigen::Vector2d(nowhere, nowhere), Eigen::Vector2d(-nowhere, nowhere)}})),
+      ElementsAre(4, 9, 17))
+      << "all of the image";
+  EXPECT_THROW((void)detector.DetectNear(cv::Mat(), {}), std::invalid_argument);
+}
+
 TEST(MarkerDetectorTest, FindsNothingInBlankOrNoisyImages) {
   const MarkerDetector detector(
       MarkerDictionary::ByName("DICT_4X4_1000"));  // the family with the least protection

@@ -185,6 +185,26 @@ TEST(DenseView, PlaneHasItsNormalAndDepth) {
   EXPECT_EQ(view.z_m[55 * 160 + 55], 0.0F) << "the hole";
 }
 
+TEST(DenseView, OfAFrameHasTheSameDepthInTheCellsOfItsPose) {
+  Intrinsics k;
+  cv::Mat depth(480, 640, CV_32FC1);
+  for (int r = 0; r < 480; ++r)
+    for (int c = 0; c < 640; ++c)
+      depth.at<float>(r, c) =
+          0.5F + 0.001F * static_cast<float>(c) + 0.0003F * static_cast<float>(r);
+  depth(cv::Rect(322, 0, 10, 480)).setTo(0);
+  const DenseViewMaker maker(k);
+  const DenseView whole = maker.Make(depth);
+  const DenseView of_frame = maker.MakeForPose(depth);
+  ASSERT_EQ(of_frame.size(), whole.size());
+  for (int r = 0; r < whole.height; r += kPoseStride) {
+    for (int c = 0; c < whole.width; c += kPoseStride) {
+      const auto i = static_cast<std::size_t>(r * whole.width + c);
+      EXPECT_EQ(of_frame.z_m[i], whole.z_m[i]) << r << ", " << c;
+    }
+  }
+}
+
 TEST(DenseView, EdgesAreLeftOut) {
   Intrinsics k;
   cv::Mat depth(480, 640, CV_32FC1, cv::Scalar(0.7));
