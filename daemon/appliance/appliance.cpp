@@ -268,7 +268,7 @@ Appliance::Answer Appliance::CloseSession(const web::Actor& actor) {
   ForgetSession();
   (void)store_thread_.Post([this, actor] {
     try {
-      store_->CloseSessions(actor);
+      store_->treatments.CloseAll(actor);
     } catch (const std::exception& error) {
       Log(LogLevel::kError, fmt::format("cannot note the end of the session: {}", error.what()));
     }

@@ -80,7 +80,7 @@ class Appliance {
   /// Why no reference may be scanned or approved now, with the next step: no daily check has passed
   /// today. Empty: it may, as always in the demo. @param scan  That is to be the reference: one
   /// that was taken while the check was overdue is confirmed by a check of the same day
-  /// (Store::IsConfirmedByLaterCheck), or has to be repeated.
+  /// (CheckStore::ConfirmsScan), or has to be repeated.
   [[nodiscard]] std::string WhyNoReference(const std::optional<web::Scan>& scan = {});
   /// The session that the store has opened: scans belong to it until it is closed.
   void OpenSession(const std::string& session_id, const std::string& patient_id,

@@ -41,9 +41,8 @@ void Appliance::LookAtRoom() {
   room.is_configured = parts_.config.compare.T_iec_reference.has_value();
   if (store_ != nullptr) {
     try {
-      room.calibration = store_->RoomCalibration();
-      if (room.calibration)
-        room.due = store_->WhyRoomIsDueNow(*room.calibration, parts_.config.check);
+      room.calibration = store_->room.Newest();
+      if (room.calibration) room.due = store_->room.WhyDue(*room.calibration, parts_.config.check);
     } catch (const std::exception& error) {  // then nobody knows where the room lies
       room.calibration.reset();
       room.due = error.what();
@@ -101,10 +100,10 @@ web::RoomCalibrationStatus Appliance::RoomCalibration() {
     status.due = room_.due;
     status.is_configured = room_.is_configured;
   }
-  for (const SignedRoom& room : store_->RoomCalibrations(kVersionsShown))
+  for (const SignedRoom& room : store_->room.List(kVersionsShown))
     status.versions.push_back(ForPage(room));
   const auto [serial, since] = RoomScansWanted();
-  const RoomCandidate candidate = store_->CandidateOfRoom(serial, since);
+  const RoomCandidate candidate = store_->room.Candidate(serial, since);
   for (const BoardScan& scan : candidate.scans) status.scans.push_back(ForPage(scan));
   if (candidate.fit) {
     status.shift_mm = candidate.fit->shift_m / kMillimetre;

@@ -38,7 +38,7 @@ void Appliance::StartScan() {
 }
 
 void Appliance::BeginSession() {
-  const web::Settings settings = store_->GetSettings();
+  const web::Settings settings = store_->settings.Get();
   session_.reset();  // the last one has ended
   scan_ = {};
   scan_.patient_id = check_ ? std::string() : open_patient_;
@@ -75,23 +75,23 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
   job.stop_after_s = parts_.config.appliance.auto_stop_s.value_or(settings.auto_stop_s);
   if (check_) {
     job.keep_recording = false;
-    const std::string baseline = store_->CheckBaselineJson();
+    const std::string baseline = store_->checks.BaselineJson();
     job.check = CheckJob{BaselineIn(baseline), parts_.config.check};
     if (!baseline.empty() && !job.check->baseline)
       throw DataError("the stored baseline of the daily check cannot be read: set another one");
     return job;
   }
   if (scan_.patient_id.empty()) return job;  // no session is open: compared with nothing
-  const std::optional<web::Reference> reference = store_->ApprovedReference(scan_.patient_id);
-  if (reference) scan_.reference_area_m2 = store_->SweptArea(reference->scan_id);
+  const std::optional<web::Reference> reference = store_->references.Approved(scan_.patient_id);
+  if (reference) scan_.reference_area_m2 = store_->scans.SweptArea(reference->scan_id);
   if (!reference && scan_.purpose == web::ScanPurpose::kFraction)
     scan_.purpose = web::ScanPurpose::kReference;
   job.is_reference = scan_.purpose == web::ScanPurpose::kReference;
   if (reference && scan_.purpose == web::ScanPurpose::kFraction) {
     scan_.reference_id = reference->id;
-    job.reference_scene = store_->ScanFolder(reference->scan_id) / "scene";
+    job.reference_scene = store_->folders.Scan(reference->scan_id) / "scene";
     job.check_reference = [this, scan = reference->scan_id](const std::stop_token& stop) {
-      return store_->CheckFiles(scan, /*scene_only=*/true, stop);
+      return store_->integrity.Check(scan, /*scene_only=*/true, stop);
     };
     job.compare = CompareOptionsFor(reference->plan, parts_.config.compare);
     job.compare.now_s = SteadySeconds;
@@ -101,7 +101,7 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
 }
 
 web::ReferencePlan Appliance::DefaultPlan() {
-  const web::Settings settings = store_ ? store_->GetSettings() : web::Settings{};
+  const web::Settings settings = store_ ? store_->settings.Get() : web::Settings{};
   return {.region_m = {},
           .isocentre_m = {},
           .tolerance = settings.tolerance,
@@ -113,9 +113,9 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
   ScanCallbacks callbacks;
   auto id = std::make_shared<std::string>();
   callbacks.begin = [this, record, id] {
-    *id = store_->BeginScan(record);
+    *id = store_->scans.Begin(record);
     loop_.Post("scan begun", [this, id] { scan_.id = *id; });
-    return store_->StagingFolder(*id);
+    return store_->folders.Staging(*id);
   };
   const bool is_demo =
       !parts_.demo_patient.empty() && record.purpose == web::ScanPurpose::kReference;
@@ -130,16 +130,16 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
                           .swept_area_m2 = outcome.swept_area_m2};
     if (outcome.kind == Kind::kDone) finished.outcome = web::ScanOutcome::kDone;
     if (outcome.kind == Kind::kCancelled) finished.outcome = web::ScanOutcome::kCancelled;
-    store_->FinishScan(*id, finished);
-    const auto demo = store_->FindPatientByCode(parts_.demo_patient);
+    store_->scans.Finish(*id, finished);
+    const auto demo = store_->patients.FindByCode(parts_.demo_patient);
     if (!is_reference || outcome.kind != Kind::kDone) return;
     if (!is_demo || !demo || demo->id != patient || !demo->approved_reference_id.empty()) {
-      (void)store_->AddReference(actor, *id, reason, plan);  // a draft, for a physicist to plan
+      (void)store_->references.Add(actor, *id, reason, plan);  // a draft, for a physicist to plan
       return;
     }
-    store_->ApproveReference(kAuto,
-                             store_->AddReference(kAuto, *id, "first scan of the demo", plan),
-                             /*revision=*/1, /*digest=*/{}, /*two_users=*/false);
+    store_->references.Approve(kAuto,
+                               store_->references.Add(kAuto, *id, "first scan of the demo", plan),
+                               /*revision=*/1, /*digest=*/{}, /*two_users=*/false);
   };
   AddListeners(callbacks);
   return callbacks;
@@ -162,7 +162,7 @@ ScanCallbacks Appliance::MakeCheckCallbacks(const NewScan& record) {
   callbacks.begin = [] { return std::filesystem::path(); };
   callbacks.save = [this, actor = *check_,
                     serial = record.sensor_serial](const ScanOutcome& outcome) {
-    if (!outcome.check_json.empty()) (void)store_->AddCheck(actor, serial, outcome.check_json);
+    if (!outcome.check_json.empty()) (void)store_->checks.Add(actor, serial, outcome.check_json);
   };
   AddListeners(callbacks);
   return callbacks;

@@ -329,7 +329,7 @@ std::optional<double> Appliance::SecondsSinceSensor() const {
 }
 
 bool Appliance::IsCheckOverdue() {
-  return !store_->HasPassedCheckSince(StartOfDay(), sensors_->snapshot().sensor.serial);
+  return !store_->checks.HasPassedSince(StartOfDay(), sensors_->snapshot().sensor.serial);
 }
 
 std::string Appliance::WhyNoReference(const std::optional<web::Scan>& scan) {
@@ -338,7 +338,7 @@ std::string Appliance::WhyNoReference(const std::optional<web::Scan>& scan) {
     return "the daily check is overdue, and references need one that has passed today: open Daily "
            "check, sweep over all markers of the room, then go on here";
   }
-  if (scan && scan->check_overdue && !store_->IsConfirmedByLaterCheck(scan->id)) {
+  if (scan && scan->check_overdue && !store_->checks.ConfirmsScan(scan->id)) {
     return "this scan was taken while the daily check was overdue, and no check of the same day "
            "and "
            "sensor has confirmed it: scan the reference again";
@@ -351,13 +351,13 @@ void Appliance::ReadStored(web::Status& status) {
   try {
     status.check_overdue = IsCheckOverdue();
     status.reference_block = WhyNoReference();
-    status.session = store_->OpenedSession();
+    status.session = store_->treatments.Opened();
     if (status.session && status.session->id != session_id_) status.session.reset();
-    status.waiting = store_->WaitingReferences();
-    status.last_check = store_->LastCheck();
+    status.waiting = store_->references.Waiting();
+    status.last_check = store_->checks.Last();
     if (!open_patient_.empty())
-      status.scans_today = store_->ScansSince(open_patient_, StartOfDay());
-    if (last_result_) status.last_result = store_->FindScan(last_result_->id);
+      status.scans_today = store_->scans.CountSince(open_patient_, StartOfDay());
+    if (last_result_) status.last_result = store_->scans.Find(last_result_->id);
     if (status.last_result) status.last_result->age_s = AgeOf(status.last_result->id);
   } catch (const std::exception& error) {
     // Whoever asks for the status must not end the appliance. Posted: this may be a part of telling
@@ -368,8 +368,8 @@ void Appliance::ReadStored(web::Status& status) {
 
 web::CheckStatus Appliance::Checks() {
   constexpr int kShown = 60;
-  return {.checks = store_->Checks(kShown),
-          .baseline = store_->CheckBaseline(),
+  return {.checks = store_->checks.List(kShown),
+          .baseline = store_->checks.Baseline(),
           .overdue = IsCheckOverdue()};
 }
 

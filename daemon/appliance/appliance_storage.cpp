@@ -47,11 +47,11 @@ void Appliance::OpenStore() {
     store_ = std::make_unique<Store>(parts_.config.appliance.state, options);
     LogRecovery(store_->recovery());
     // Sessions end with the process: who is on the couch has to be confirmed again.
-    store_->CloseSessions(kSelf);
+    store_->treatments.CloseAll(kSelf);
     if (!parts_.demo_patient.empty()) {
-      const auto patient = store_->FindPatientByCode(parts_.demo_patient);
-      open_patient_ = patient ? patient->id : store_->AddPatient(kSelf, parts_.demo_patient, "");
-      session_id_ = store_->OpenSession(kSelf, open_patient_, web::ScanPurpose::kFraction);
+      const auto patient = store_->patients.FindByCode(parts_.demo_patient);
+      open_patient_ = patient ? patient->id : store_->patients.Add(kSelf, parts_.demo_patient, "");
+      session_id_ = store_->treatments.Open(kSelf, open_patient_, web::ScanPurpose::kFraction);
       opened_by_ = kSelf;
     }
   } catch (const std::exception& error) {  // whatever a damaged store holds, the page must say so
@@ -104,7 +104,7 @@ std::uint64_t Appliance::NeededBytes() const {
   constexpr double kScene = 16e6, kSceneOfPixel = 110.0, kFrameOfPixel = 2.6, kFramesPerSecond = 30;
   const Intrinsics camera = sensors_->snapshot().info.intrinsics;
   const double pixels = std::max(320.0 * 240.0, static_cast<double>(camera.width) * camera.height);
-  const web::Settings settings = store_ ? store_->GetSettings() : web::Settings{};
+  const web::Settings settings = store_ ? store_->settings.Get() : web::Settings{};
   double bytes = kScene + kSceneOfPixel * pixels;
   if (!check_ && (parts_.config.appliance.keep_recordings || settings.keep_recordings)) {
     const double sweep_s = parts_.config.appliance.scan_limit_s.value_or(settings.scan_limit_s);
@@ -191,8 +191,9 @@ void Appliance::Care() {
   const bool posted = store_thread_.Post([this, quota, has_clock, stop = care_.get_token()] {
     try {
       const int old =
-          has_clock ? store_->RemoveOldScans(store_->GetSettings().retention_days, stop) : 0;
-      const int over = store_->KeepWithinQuota(quota, stop);
+          has_clock ? store_->removal.RemoveOldScans(store_->settings.Get().retention_days, stop)
+                    : 0;
+      const int over = store_->removal.KeepWithinQuota(quota, stop);
       if (old + over > 0)
         Log(LogLevel::kNotice,
             fmt::format("removed {} scans for their age, {} for the quota", old, over));
@@ -209,9 +210,9 @@ void Appliance::CheckStoredFiles() {
   ticks_to_file_check_ = kNoFileCheckTicks;  // until this one has ended
   if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
   (void)check_thread_.Post([this, stop = care_.get_token()] {
-    std::optional<Store::CheckedScan> checked;
+    std::optional<CheckedScan> checked;
     try {
-      checked = store_->CheckNextScan(kFileCheckEvery, stop);
+      checked = store_->integrity.CheckNext(kFileCheckEvery, stop);
     } catch (const Interrupted&) {
       return;
     } catch (const std::exception& error) {
@@ -257,7 +258,7 @@ void Appliance::BackUp(
         try {
           std::optional<BackupSecret> secret;
           if (!key.empty()) secret.emplace(key);
-          report = store_->Backup(actor, folder, stop, secret ? &*secret : nullptr);
+          report = store_->backup.Make(actor, folder, stop, secret ? &*secret : nullptr);
         } catch (const std::exception& failure) {
           error = failure.what();
         }

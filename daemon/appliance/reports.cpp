@@ -258,23 +258,23 @@ ReportFacts IdentityOf(const web::Scan& scan, const std::optional<web::Patient>&
 
 /// What the scan was compared with; of a scan for a reference, the reference that was made of it,
 /// with its plan and who approved it.
-std::optional<web::Reference> ReferenceFor(Store& store, const web::Scan& scan) {
+std::optional<web::Reference> ReferenceFor(const ReportSources& stored, const web::Scan& scan) {
   if (!scan.reference_id.empty() || scan.purpose != web::ScanPurpose::kReference)
-    return store.FindReference(scan.reference_id);
-  const std::vector<web::Reference> references = store.References(scan.patient_id);
+    return stored.references.Find(scan.reference_id);
+  const std::vector<web::Reference> references = stored.references.List(scan.patient_id);
   const auto found =
       std::find_if(references.begin(), references.end(),
                    [&](const web::Reference& one) { return one.scan_id == scan.id; });
   return found == references.end() ? std::nullopt : std::optional(*found);
 }
 
-std::vector<cv::Mat> PicturesOf(Store& store, const web::Scan& scan,
+std::vector<cv::Mat> PicturesOf(const ReportSources& stored, const web::Scan& scan,
                                 const std::optional<web::Reference>& reference, const Json& result,
                                 const ReportWords& words) {
   if (!reference || scan.folder.empty()) return {};
   if (scan.purpose == web::ScanPurpose::kReference)
     return ReferencePictures(scan.folder, reference->plan, words.pictures);
-  const std::optional<web::Scan> of_reference = store.FindScan(reference->scan_id);
+  const std::optional<web::Scan> of_reference = stored.scans.Find(reference->scan_id);
   if (!scan.result || !of_reference || of_reference->folder.empty()) return {};
   return ComparisonPictures(scan.folder, of_reference->folder, result,
                             reference->plan.tolerance.shift_mm * kMillimetre, words.pictures,
@@ -283,10 +283,10 @@ std::vector<cv::Mat> PicturesOf(Store& store, const web::Scan& scan,
 
 }  // namespace
 
-ScanReport DescribeScan(Store& store, const web::Scan& scan, Language language) {
+ScanReport DescribeScan(const ReportSources& stored, const web::Scan& scan, Language language) {
   const ReportWords& words = WordsOf(language);
-  const std::optional<web::Patient> patient = store.FindPatient(scan.patient_id);
-  const std::optional<web::Reference> reference = ReferenceFor(store, scan);
+  const std::optional<web::Patient> patient = stored.patients.Find(scan.patient_id);
+  const std::optional<web::Reference> reference = ReferenceFor(stored, scan);
   const Json scene = JsonIn(scan.folder / "scene/scene.json");
   const Json result = JsonIn(scan.folder / "result/result.json");
   const web::Tolerance tolerance = reference ? reference->plan.tolerance : web::Tolerance{};
@@ -299,7 +299,7 @@ ScanReport DescribeScan(Store& store, const web::Scan& scan, Language language) 
                     .cautions = CautionsOf(scan, scene, words),
                     .quality = QualityOf(scan, scene, result, words),
                     .body = {},
-                    .pictures = PicturesOf(store, scan, reference, result, words),
+                    .pictures = PicturesOf(stored, scan, reference, result, words),
                     .footer = Footer(words)};
   if (report.numbers.empty()) return report;
   for (const std::string& part : scan.result->body_after)
@@ -308,7 +308,8 @@ ScanReport DescribeScan(Store& store, const web::Scan& scan, Language language) 
   return report;
 }
 
-CourseReport DescribeCourse(Store& store, const web::Patient& patient, Language language) {
+CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& patient,
+                            Language language) {
   const ReportWords& words = WordsOf(language);
   CourseReport report{
       .texts = TextsOf(words),
@@ -318,9 +319,9 @@ CourseReport DescribeCourse(Store& store, const web::Patient& patient, Language 
       .rows = {},
       .note = std::string(words.digits_note),
       .footer = Footer(words)};
-  if (const auto reference = store.FindReference(patient.approved_reference_id))
+  if (const auto reference = stored.references.Find(patient.approved_reference_id))
     AddReferenceTo(report.identity, *reference, words);
-  std::vector<web::Scan> scans = store.Scans(patient.id, kMaxScans);
+  std::vector<web::Scan> scans = stored.scans.List(patient.id, kMaxScans);
   bool is_any_overdue = false;
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != web::ScanOutcome::kDone) continue;
@@ -346,12 +347,13 @@ CourseReport DescribeCourse(Store& store, const web::Patient& patient, Language 
   return report;
 }
 
-std::string ScanReportPdf(Store& store, const web::Scan& scan, Language language) {
-  return PdfOf(DescribeScan(store, scan, language));
+std::string ScanReportPdf(const ReportSources& stored, const web::Scan& scan, Language language) {
+  return PdfOf(DescribeScan(stored, scan, language));
 }
 
-std::string CourseReportPdf(Store& store, const web::Patient& patient, Language language) {
-  return PdfOf(DescribeCourse(store, patient, language));
+std::string CourseReportPdf(const ReportSources& stored, const web::Patient& patient,
+                            Language language) {
+  return PdfOf(DescribeCourse(stored, patient, language));
 }
 
 }  // namespace plumb

@@ -4,22 +4,32 @@
 #include <string>
 
 #include "daemon/files/pdf_report.hpp"
-#include "daemon/records/store.hpp"
+#include "daemon/records/patient_store.hpp"
+#include "daemon/records/reference_store.hpp"
+#include "daemon/records/scan_store.hpp"
 #include "web/service/scan_service.hpp"
 
 namespace plumb {
 
+/// The records that a report is made of; borrowed.
+struct ReportSources {
+  PatientStore& patients;
+  ReferenceStore& references;
+  ScanStore& scans;
+};
+
 /// One page: identity, plan and approval, verdict, the six numbers with uncertainty and tolerance,
 /// quality, pictures, acceptance.
-[[nodiscard]] ScanReport DescribeScan(Store& store, const web::Scan& scan, web::Language language);
+[[nodiscard]] ScanReport DescribeScan(const ReportSources& stored, const web::Scan& scan,
+                                      web::Language language);
 /// All compared scans of a patient, oldest first.
-[[nodiscard]] CourseReport DescribeCourse(Store& store, const web::Patient& patient,
+[[nodiscard]] CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& patient,
                                           web::Language language);
 
 /// The same as files. @throws IoError
-[[nodiscard]] std::string ScanReportPdf(Store& store, const web::Scan& scan,
+[[nodiscard]] std::string ScanReportPdf(const ReportSources& stored, const web::Scan& scan,
                                         web::Language language);
-[[nodiscard]] std::string CourseReportPdf(Store& store, const web::Patient& patient,
+[[nodiscard]] std::string CourseReportPdf(const ReportSources& stored, const web::Patient& patient,
                                           web::Language language);
 
 }  // namespace plumb

@@ -22,7 +22,7 @@ void StoreAccess::LogUnreadable(const std::exception& error) {
   Log(LogLevel::kError, fmt::format("cannot read the store: {}", error.what()));
 }
 
-void StoreAccess::Change(web::Done done, std::function<std::string(Store&)> change) {
+void StoreAccess::RunOnStoreThread(web::Done done, std::function<std::string(Store&)> change) {
   Store* store = appliance_.store();
   if (store == nullptr) return done(Refusal(ChangeResult::kFailed, appliance_.storage_fault()));
   // The store's thread outlives this object: it must not be used there.

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include "daemon/appliance/appliance.hpp"
 #include "web/service/change.hpp"
@@ -29,12 +30,30 @@ class StoreAccess {
   StoreAccess(const StoreAccess&) = delete;
   StoreAccess& operator=(const StoreAccess&) = delete;
 
-  /// Runs `change` on the store's thread; what it returns is the id of what was made, what it
-  /// throws becomes the answer.
-  void Change(web::Done done, std::function<std::string(Store&)> change);
+  /// Runs `change` with one service of the store on the store's thread. What it returns is the id
+  /// of what was made, if anything; what it throws becomes the answer.
+  template <typename Service, typename Function>
+  void Change(Service Store::*service, web::Done done, Function change) {
+    RunOnStoreThread(std::move(done),
+                     [service, change = std::move(change)](Store& store) -> std::string {
+                       using Result = std::invoke_result_t<const Function&, Service&>;
+                       if constexpr (std::is_void_v<Result>) {
+                         change(store.*service);
+                         return {};
+                       } else {
+                         return change(store.*service);
+                       }
+                     });
+  }
 
-  /// What `read` makes of the store. A read that fails (a damaged database) is logged and gives an
-  /// empty value.
+  /// What `read` makes of one service of the store. A read that fails (a damaged database) is
+  /// logged and gives an empty value.
+  template <typename Service, typename Function>
+  [[nodiscard]] std::invoke_result_t<Function, Service&> Read(Service Store::*service,
+                                                              const Function& read) const {
+    return Read([&](Store& store) { return read(store.*service); });
+  }
+  /// The same for what needs several of them.
   template <typename Function>
   [[nodiscard]] std::invoke_result_t<Function, Store&> Read(const Function& read) const {
     if (appliance_.store() == nullptr) return {};
@@ -47,6 +66,7 @@ class StoreAccess {
   }
 
  private:
+  void RunOnStoreThread(web::Done done, std::function<std::string(Store&)> change);
   static void LogUnreadable(const std::exception& error);
 
   Appliance& appliance_;

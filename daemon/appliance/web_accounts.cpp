@@ -11,35 +11,35 @@ namespace plumb {
 using web::ChangeResult;
 
 std::vector<web::User> WebAccounts::Users() {
-  return store_.Read([](Store& store) { return store.Users(); });
+  return store_.Read(&Store::users, [](UserStore& users) { return users.List(); });
 }
 
 std::optional<web::User> WebAccounts::FindUser(const std::string& name) {
-  return store_.Read([&](Store& store) { return store.FindUser(name); });
+  return store_.Read(&Store::users, [&](UserStore& users) { return users.Find(name); });
 }
 
 void WebAccounts::AddUser(const web::Actor& actor, const web::User& user, web::Done done) {
-  store_.Change(std::move(done),
-                [=](Store& store) { return store.AddUser(actor, user), std::string(); });
+  store_.Change(&Store::users, std::move(done), [=](UserStore& users) { users.Add(actor, user); });
 }
 
 void WebAccounts::ChangeUser(const web::Actor& actor, const web::UserChange& change,
                              web::Done done) {
-  store_.Change(std::move(done),
-                [=](Store& store) { return store.ChangeUser(actor, change), std::string(); });
+  store_.Change(&Store::users, std::move(done),
+                [=](UserStore& users) { users.Change(actor, change); });
 }
 
 std::vector<web::Display> WebDisplays::Displays() {
-  return store_.Read([](Store& store) { return store.Displays(); });
+  return store_.Read(&Store::displays, [](DisplayStore& displays) { return displays.List(); });
 }
 
 void WebDisplays::AddDisplay(const web::Actor& actor, const web::Display& display, web::Done done) {
-  store_.Change(std::move(done), [=](Store& store) { return store.AddDisplay(actor, display); });
+  store_.Change(&Store::displays, std::move(done),
+                [=](DisplayStore& displays) { return displays.Add(actor, display); });
 }
 
 void WebDisplays::RemoveDisplay(const web::Actor& actor, const std::string& id, web::Done done) {
-  store_.Change(std::move(done),
-                [=](Store& store) { return store.RemoveDisplay(actor, id), std::string(); });
+  store_.Change(&Store::displays, std::move(done),
+                [=](DisplayStore& displays) { displays.Remove(actor, id); });
 }
 
 void WebAuditLog::Log(const web::Actor& actor, const std::string& action,
@@ -49,13 +49,12 @@ void WebAuditLog::Log(const web::Actor& actor, const std::string& action,
     plumb::Log(LogLevel::kError,
                fmt::format("the audit log does not take '{}': {}", action, answer.message));
   };
-  store_.Change(report, [=](Store& store) {
-    return store.Log(actor, action, subject, detail), std::string();
-  });
+  store_.Change(&Store::audit, report,
+                [=](AuditStore& audit) { audit.Log(actor, action, subject, detail); });
 }
 
 std::vector<web::AuditEntry> WebAuditLog::Audit(const web::AuditQuery& query) {
-  return store_.Read([&](Store& store) { return store.Audit(query); });
+  return store_.Read(&Store::audit, [&](AuditStore& audit) { return audit.Find(query); });
 }
 
 }  // namespace plumb

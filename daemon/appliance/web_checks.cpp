@@ -11,16 +11,14 @@ web::CheckStatus WebChecks::GetChecks() {
 void WebChecks::OpenCheck(const web::Actor& actor, web::Done done) {
   if (const std::string refusal = appliance_.OpenCheck(actor); !refusal.empty())
     return done(AnswerOf(refusal));
-  store_.Change(std::move(done), [=](Store& store) {
-    return store.Log(actor, "check.open", "", ""), std::string();
-  });
+  store_.Change(&Store::audit, std::move(done),
+                [=](AuditStore& audit) { audit.Log(actor, "check.open", "", ""); });
 }
 
 void WebChecks::SetCheckBaseline(const web::Actor& actor, const std::string& check_id,
                                  web::Done done) {
-  store_.Change(std::move(done), [=](Store& store) {
-    return store.SetCheckBaseline(actor, check_id), std::string();
-  });
+  store_.Change(&Store::checks, std::move(done),
+                [=](CheckStore& checks) { checks.SetBaseline(actor, check_id); });
 }
 
 }  // namespace plumb

@@ -38,16 +38,16 @@ void WebMaintenance::WriteDiagnostics(const web::Actor& actor, web::Done done) {
     answer.file = std::exchange(answer.id, {});
     done(answer);
   };
-  store_.Change(report, [=](Store& store) {
+  store_.Change(&Store::audit, report, [=](AuditStore& audit) {
     const std::string text =
-        DiagnosticsText(status, health, loop, store.Audit({0, 500, "", /*views=*/false}));
+        DiagnosticsText(status, health, loop, audit.Find({0, 500, "", /*views=*/false}));
     std::string name =
         (std::filesystem::temp_directory_path() / "plumb-diagnostics-XXXXXX").string();
     const int fd = ::mkstemp(name.data());
     if (fd < 0) throw DiskRefused(DescribeWriteError(name, errno));
     ::close(fd);
     WriteWholeFile(name, text);
-    store.Log(actor, "diagnostics.write", "", "");
+    audit.Log(actor, "diagnostics.write", "", "");
     return name;
   });
 }

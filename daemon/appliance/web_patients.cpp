@@ -22,30 +22,29 @@ std::string WhyNotOpen(ScanPhase phase, const web::Patient& patient, web::ScanPu
 }  // namespace
 
 std::vector<web::Patient> WebPatients::Patients() {
-  return store_.Read([](Store& store) { return store.Patients(); });
+  return store_.Read(&Store::patients, [](PatientStore& patients) { return patients.List(); });
 }
 
 std::optional<web::Patient> WebPatients::FindPatient(const std::string& id) {
-  return store_.Read([&](Store& store) { return store.FindPatient(id); });
+  return store_.Read(&Store::patients, [&](PatientStore& patients) { return patients.Find(id); });
 }
 
 void WebPatients::AddPatient(const web::Actor& actor, const std::string& code,
                              const std::string& site, web::Done done) {
-  store_.Change(std::move(done), [=](Store& store) { return store.AddPatient(actor, code, site); });
+  store_.Change(&Store::patients, std::move(done),
+                [=](PatientStore& patients) { return patients.Add(actor, code, site); });
 }
 
 void WebPatients::ChangePatient(const web::Actor& actor, const std::string& id,
                                 const std::string& site, const std::string& note, web::Done done) {
-  store_.Change(std::move(done), [=](Store& store) {
-    return store.ChangePatient(actor, id, site, note), std::string();
-  });
+  store_.Change(&Store::patients, std::move(done),
+                [=](PatientStore& patients) { patients.Change(actor, id, site, note); });
 }
 
 void WebPatients::ArchivePatient(const web::Actor& actor, const std::string& id, bool archived,
                                  web::Done done) {
-  store_.Change(std::move(done), [=](Store& store) {
-    return store.ArchivePatient(actor, id, archived), std::string();
-  });
+  store_.Change(&Store::patients, std::move(done),
+                [=](PatientStore& patients) { patients.Archive(actor, id, archived); });
 }
 
 void WebPatients::WipePatient(const web::Actor& actor, const std::string& id, web::Done done) {
@@ -54,8 +53,8 @@ void WebPatients::WipePatient(const web::Actor& actor, const std::string& id, we
     return done(AnswerOf("a scan of this patient is running: end or cancel it first"));
   }
   appliance_.ClosePatient(id);
-  store_.Change(std::move(done),
-                [=](Store& store) { return store.WipePatient(actor, id), std::string(); });
+  store_.Change(&Store::removal, std::move(done),
+                [=](StoreRemoval& removal) { removal.WipePatient(actor, id); });
 }
 
 void WebPatients::OpenPatient(const web::Actor& actor, const std::string& id,
@@ -91,7 +90,8 @@ void WebPatients::OpenPatient(const web::Actor& actor, const std::string& id,
       appliance_.OpenSession(change.id, id, purpose, reason, actor);
     done(change);
   };
-  store_.Change(opened, [=](Store& store) { return store.OpenSession(actor, id, purpose); });
+  store_.Change(&Store::treatments, opened,
+                [=](TreatmentStore& treatments) { return treatments.Open(actor, id, purpose); });
 }
 
 void WebPatients::CloseSession(const web::Actor& actor, const std::string& session_id,

@@ -17,10 +17,11 @@ std::optional<std::string> WebSensorProfiles::SensorProfileFile(int version) {
 }
 
 void WebSensorProfiles::ChangeProfile(const std::string& serial, const web::Done& done,
-                                      std::function<std::string(Store&)> change) {
+                                      std::function<void(AuditStore&)> change) {
   if (const std::string why = appliance_.WhyNotChangeProfile(serial); !why.empty())
     return done(AnswerOf(why));
   store_.Change(
+      &Store::audit,
       [this, done](const web::Change& answer) {
         if (answer.result == ChangeResult::kDone) appliance_.ForgetDrift();
         done(answer);
@@ -30,24 +31,22 @@ void WebSensorProfiles::ChangeProfile(const std::string& serial, const web::Done
 
 void WebSensorProfiles::ResetSensorProfile(const web::Actor& actor, const std::string& serial,
                                            web::Done done) {
-  ChangeProfile(serial, done, [=, shelf = appliance_.profiles()](Store& store) {
+  ChangeProfile(serial, done, [=, shelf = appliance_.profiles()](AuditStore& audit) {
     const int version = shelf->Reset(serial);
-    store.Log(actor, "profile.reset", serial, fmt::format("version {}", version));
-    return std::string();
+    audit.Log(actor, "profile.reset", serial, fmt::format("version {}", version));
   });
 }
 
 void WebSensorProfiles::RollBackSensorProfile(const web::Actor& actor, const std::string& serial,
                                               int version, web::Done done) {
-  ChangeProfile(serial, done, [=, shelf = appliance_.profiles()](Store& store) {
+  ChangeProfile(serial, done, [=, shelf = appliance_.profiles()](AuditStore& audit) {
     try {
       const int made = shelf->RollBack(serial, version);
-      store.Log(actor, "profile.roll_back", serial,
+      audit.Log(actor, "profile.roll_back", serial,
                 fmt::format("to version {}, which is version {} now", version, made));
     } catch (const DataError& error) {
       throw StoreRefusal(ChangeResult::kNotFound, error.what());
     }
-    return std::string();
   });
 }
 

@@ -23,7 +23,7 @@ class WebSensorProfiles : public web::SensorProfileService {
   /// As StoreAccess::Change(); once it is done, what the last scan said against the profile is
   /// forgotten.
   void ChangeProfile(const std::string& serial, const web::Done& done,
-                     std::function<std::string(Store&)> change);
+                     std::function<void(AuditStore&)> change);
 
   Appliance& appliance_;
   StoreAccess& store_;

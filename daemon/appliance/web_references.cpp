@@ -5,15 +5,17 @@
 namespace plumb {
 
 std::vector<web::Reference> WebReferences::References(const std::string& patient_id) {
-  return store_.Read([&](Store& store) { return store.References(patient_id); });
+  return store_.Read(&Store::references,
+                     [&](ReferenceStore& references) { return references.List(patient_id); });
 }
 
 std::optional<web::Reference> WebReferences::FindReference(const std::string& id) {
-  return store_.Read([&](Store& store) { return store.FindReference(id); });
+  return store_.Read(&Store::references,
+                     [&](ReferenceStore& references) { return references.Find(id); });
 }
 
 std::optional<web::Scan> WebReferences::ScanOf(const std::string& scan_id) {
-  return store_.Read([&](Store& store) { return store.FindScan(scan_id); });
+  return store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(scan_id); });
 }
 
 void WebReferences::AddReference(const web::Actor& actor, const std::string& scan_id,
@@ -21,15 +23,16 @@ void WebReferences::AddReference(const web::Actor& actor, const std::string& sca
   const std::optional<web::Scan> scan = ScanOf(scan_id);
   if (const std::string why = appliance_.WhyNoReference(scan); !why.empty())
     return done(AnswerOf(why));
-  store_.Change(std::move(done), [=, appliance = &appliance_](Store& store) {
-    return store.AddReference(actor, scan_id, reason, appliance->DefaultPlan());
-  });
+  store_.Change(&Store::references, std::move(done),
+                [=, appliance = &appliance_](ReferenceStore& references) {
+                  return references.Add(actor, scan_id, reason, appliance->DefaultPlan());
+                });
 }
 
 void WebReferences::PlanReference(const web::Actor& actor, const std::string& id, int revision,
                                   const web::ReferencePlan& plan, web::Done done) {
-  store_.Change(std::move(done), [=](Store& store) {
-    const std::string planned = store.PlanReference(actor, id, revision, plan);
+  store_.Change(&Store::references, std::move(done), [=](ReferenceStore& references) {
+    const std::string planned = references.Plan(actor, id, revision, plan);
     return planned == id ? std::string() : planned;  // only a new version was made
   });
 }
@@ -41,8 +44,8 @@ void WebReferences::ApproveReference(const web::Actor& actor, const std::string&
       reference ? ScanOf(reference->scan_id) : std::optional<web::Scan>();
   if (const std::string why = appliance_.WhyNoReference(scan); !why.empty())
     return done(AnswerOf(why));
-  store_.Change(std::move(done), [=](Store& store) {
-    return store.ApproveReference(actor, id, revision, digest), std::string();
+  store_.Change(&Store::references, std::move(done), [=](ReferenceStore& references) {
+    references.Approve(actor, id, revision, digest);
   });
 }
 

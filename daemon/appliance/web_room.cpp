@@ -26,12 +26,13 @@ void WebRoomCalibration::SignRoomCalibration(const web::Actor& actor, const std:
   const auto [serial, since] = appliance_.RoomScansWanted();
   // StoreAccess calls nothing once the services are gone, and the appliance outlives them.
   store_.Change(
+      &Store::room,
       [&appliance = appliance_, done = std::move(done)](const web::Change& answer) {
         if (answer.result == web::ChangeResult::kDone) appliance.LookAtRoom();
         done(answer);
       },
-      [=, serial = serial, since = since](Store& store) {
-        return store.SignRoom(actor, serial, since, digest);
+      [=, serial = serial, since = since](RoomStore& room) {
+        return room.Sign(actor, serial, since, digest);
       });
 }
 

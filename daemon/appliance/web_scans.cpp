@@ -12,12 +12,19 @@ namespace plumb {
 
 using web::ChangeResult;
 
+namespace {
+
+ReportSources SourcesIn(Store& store) { return {store.patients, store.references, store.scans}; }
+
+}  // namespace
+
 std::vector<web::Scan> WebScans::Scans(const std::string& patient_id, int limit) {
-  return store_.Read([&](Store& store) { return store.Scans(patient_id, limit); });
+  return store_.Read(&Store::scans,
+                     [&](ScanStore& scans) { return scans.List(patient_id, limit); });
 }
 
 std::optional<web::Scan> WebScans::FindScan(const std::string& id) {
-  return store_.Read([&](Store& store) { return store.FindScan(id); });
+  return store_.Read(&Store::scans, [&](ScanStore& scans) { return scans.Find(id); });
 }
 
 void WebScans::AcceptScan(const web::Actor& actor, const std::string& id, const std::string& reason,
@@ -34,14 +41,14 @@ void WebScans::AcceptScan(const web::Actor& actor, const std::string& id, const 
   const auto open = appliance_.WebStatus().session;
   if (!scan->patient_id.empty() && (!open || open->patient_id != scan->patient_id))
     return done(AnswerOf("the session of this patient is not open: a result is accepted in it"));
-  store_.Change(std::move(done),
-                [=](Store& store) { return store.AcceptScan(actor, id, reason), std::string(); });
+  store_.Change(&Store::scans, std::move(done),
+                [=](ScanStore& scans) { scans.Accept(actor, id, reason); });
 }
 
 void WebScans::RemoveScan(const web::Actor& actor, const std::string& id, const std::string& reason,
                           web::Done done) {
-  store_.Change(std::move(done),
-                [=](Store& store) { return store.RemoveScan(actor, id, reason), std::string(); });
+  store_.Change(&Store::removal, std::move(done),
+                [=](StoreRemoval& removal) { removal.RemoveScan(actor, id, reason); });
 }
 
 std::optional<std::string> WebScans::CompactMap(const std::string& scan_id,
@@ -60,16 +67,17 @@ std::optional<std::string> WebScans::CompactMap(const std::string& scan_id,
 std::optional<std::string> WebScans::ScanReport(const std::string& scan_id,
                                                 web::Language language) {
   return store_.Read([&](Store& store) -> std::optional<std::string> {
-    const std::optional<web::Scan> scan = store.FindScan(scan_id);
-    return scan ? std::optional(ScanReportPdf(store, *scan, language)) : std::nullopt;
+    const std::optional<web::Scan> scan = store.scans.Find(scan_id);
+    return scan ? std::optional(ScanReportPdf(SourcesIn(store), *scan, language)) : std::nullopt;
   });
 }
 
 std::optional<std::string> WebScans::CourseReport(const std::string& patient_id,
                                                   web::Language language) {
   return store_.Read([&](Store& store) -> std::optional<std::string> {
-    const std::optional<web::Patient> patient = store.FindPatient(patient_id);
-    return patient ? std::optional(CourseReportPdf(store, *patient, language)) : std::nullopt;
+    const std::optional<web::Patient> patient = store.patients.Find(patient_id);
+    return patient ? std::optional(CourseReportPdf(SourcesIn(store), *patient, language))
+                   : std::nullopt;
   });
 }
 

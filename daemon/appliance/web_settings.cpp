@@ -37,7 +37,7 @@ std::string CheckSettings(const web::Settings& s) {
 }  // namespace
 
 web::Settings WebSettings::GetSettings() {
-  return store_.Read([](Store& store) { return store.GetSettings(); });
+  return store_.Read(&Store::settings, [](SettingsStore& settings) { return settings.Get(); });
 }
 
 void WebSettings::ChangeSettings(const web::Actor& actor, const web::Settings& settings,
@@ -45,23 +45,23 @@ void WebSettings::ChangeSettings(const web::Actor& actor, const web::Settings& s
   if (const std::string wrong = CheckSettings(settings); !wrong.empty()) {
     return done(Refusal(ChangeResult::kInvalid, wrong));
   }
-  store_.Change(std::move(done),
-                [=](Store& store) { return store.ChangeSettings(actor, settings), std::string(); });
+  store_.Change(&Store::settings, std::move(done),
+                [=](SettingsStore& stored) { stored.Change(actor, settings); });
 }
 
 std::vector<web::PlanTemplate> WebSettings::Templates() {
-  return store_.Read([](Store& store) { return store.Templates(); });
+  return store_.Read(&Store::templates, [](TemplateStore& templates) { return templates.List(); });
 }
 
 void WebSettings::SetTemplate(const web::Actor& actor, const web::PlanTemplate& wanted,
                               web::Done done) {
-  store_.Change(std::move(done),
-                [=](Store& store) { return store.SetTemplate(actor, wanted), std::string(); });
+  store_.Change(&Store::templates, std::move(done),
+                [=](TemplateStore& templates) { templates.Set(actor, wanted); });
 }
 
 void WebSettings::RemoveTemplate(const web::Actor& actor, const std::string& site, web::Done done) {
-  store_.Change(std::move(done),
-                [=](Store& store) { return store.RemoveTemplate(actor, site), std::string(); });
+  store_.Change(&Store::templates, std::move(done),
+                [=](TemplateStore& templates) { templates.Remove(actor, site); });
 }
 
 }  // namespace plumb

@@ -16,7 +16,7 @@
 #include "daemon/records/file_copy.hpp"
 #include "daemon/records/scan_files.hpp"
 #include "daemon/records/schema.hpp"
-#include "daemon/records/store_internal.hpp"
+#include "daemon/records/stored_values.hpp"
 #include "daemon/records/summed_folder.hpp"
 #include "drivers/files/file_io.hpp"
 

@@ -19,7 +19,7 @@
 #include "daemon/records/patient_record.hpp"
 #include "daemon/records/schema.hpp"
 #include "daemon/records/store.hpp"
-#include "daemon/records/store_internal.hpp"
+#include "daemon/records/stored_values.hpp"
 #include "daemon/records/summed_folder.hpp"
 #include "drivers/files/file_io.hpp"
 
@@ -164,7 +164,10 @@ class PatientImport {
  public:
   PatientImport(const fs::path& folder, const fs::path& state, const BackupSecret* secret,
                 std::stop_token stop)
-      : reader_(folder, kKind, secret), store_(state), stop_(std::move(stop)) {}
+      : reader_(folder, kKind, secret),
+        store_(state),
+        database_(store_.database().ForChanges()),
+        stop_(std::move(stop)) {}
   ~PatientImport() {
     std::error_code ignored;
     fs::remove_all(Made(), ignored);
@@ -190,14 +193,14 @@ class PatientImport {
   }
 
  private:
-  [[nodiscard]] fs::path Made() const { return store_.folder_ / kImporting; }
+  [[nodiscard]] fs::path Made() const { return store_.folders.state() / kImporting; }
 
   void ReadRecord() {
     (void)reader_.CopyTo(Made(), reader_.files().front(), stop_);
     record_ = ParseBoundedJsonOrNothing<Json>(ReadTextFile(Made() / kRecord, kMaxRecord));
     try {
       if (!record_.is_object()) throw DataError(fmt::format("its {} cannot be read", kRecord));
-      CheckPatientRows(*store_.write_, record_.value("rows", Json()));
+      CheckPatientRows(*database_, record_.value("rows", Json()));
     } catch (const DataError& error) {
       reader_.Fail(error.what());
     }
@@ -217,10 +220,10 @@ class PatientImport {
 
   /// @throws std::invalid_argument if somebody else, or other data, is.
   bool IsThere() {
-    const std::optional<std::int64_t> patient = FindCode(*store_.write_, report_.code);
+    const std::optional<std::int64_t> patient = FindCode(*database_, report_.code);
     if (!patient) return false;
-    if (PatientRows(*store_.write_, *patient) == rows()) return true;  // where it was exported
-    const Json earlier = EarlierEvidence(store_.folder_, *patient);
+    if (PatientRows(*database_, *patient) == rows()) return true;  // where it was exported
+    const Json earlier = EarlierEvidence(store_.folders.state(), *patient);
     if (earlier.is_object() && earlier.value("rows", Json()) == rows()) return true;
     throw std::invalid_argument(fmt::format(
         "there is a patient with the code {} already, and not with the same data: nothing was "
@@ -240,37 +243,37 @@ class PatientImport {
       report_.bytes += scan ? reader_.CopyTo(Made(), file, stop_).bytes : 0;
       ++report_.files;
     }
-    SyncDisk(store_.folder_);
+    SyncDisk(store_.folders.state());
   }
 
   void Insert() {
-    const std::lock_guard lock(store_.write_mutex_);
     std::vector<fs::path> moved;
     try {
-      Transaction transaction(*store_.write_);
+      Transaction transaction(*database_);
       InsertRows();
       const std::int64_t patient = new_ids_["patients"].begin()->second;
       for (const auto& [before, now] : new_ids_["scans"]) {
-        const fs::path from = Made() / kScans / ScanId(before), to = store_.ScanFolder(ScanId(now));
+        const fs::path from = Made() / kScans / ScanId(before),
+                       to = store_.folders.Scan(ScanId(now));
         if (!fs::exists(from)) continue;
         if (::rename(from.c_str(), to.c_str()) != 0) throw IoError(DescribeWriteError(to, errno));
         moved.push_back(to);
       }
-      fs::create_directories(store_.folder_ / kImports);
-      moved.push_back(ImportedFile(store_.folder_, patient));
+      fs::create_directories(store_.folders.state() / kImports);
+      moved.push_back(ImportedFile(store_.folders.state(), patient));
       WriteWholeFile(moved.back(), record_.dump(1, ' ', false, Json::error_handler_t::replace));
       GiveToOwner(moved);
-      SyncDisk(store_.folder_);
-      store_.Write(kCommand, "patient.import", std::to_string(patient),
-                   fmt::format("{}: {} scans, {} references as drafts, sha256 {}", report_.code,
-                               report_.scans, report_.references, reader_.digest()));
+      SyncDisk(store_.folders.state());
+      AppendAuditEntry(*database_, kCommand, "patient.import", std::to_string(patient),
+                       fmt::format("{}: {} scans, {} references as drafts, sha256 {}", report_.code,
+                                   report_.scans, report_.references, reader_.digest()));
       transaction.Commit();
     } catch (const ConstraintBroken& error) {
       Remove(moved);
       reader_.Fail(fmt::format("its record breaks a rule of the database: {}", error.what()));
     } catch (const fs::filesystem_error& error) {
       Remove(moved);
-      throw IoError(DescribeWriteError(store_.folder_, error.code().value()));
+      throw IoError(DescribeWriteError(store_.folders.state(), error.code().value()));
     } catch (...) {
       Remove(moved);
       throw;
@@ -285,13 +288,14 @@ class PatientImport {
   /// Who imports as root imports for the account that runs plumbd.
   void GiveToOwner(const std::vector<fs::path>& moved) const {
     struct stat owner {};
-    if (::geteuid() != 0 || ::stat(store_.folder_.c_str(), &owner) != 0 || owner.st_uid == 0)
+    if (::geteuid() != 0 || ::stat(store_.folders.state().c_str(), &owner) != 0 ||
+        owner.st_uid == 0)
       return;
     const auto give = [&owner](const fs::path& path) {
       if (::lchown(path.c_str(), owner.st_uid, owner.st_gid) != 0)
         throw IoError(DescribeWriteError(path, errno));
     };
-    give(store_.folder_ / kImports);
+    give(store_.folders.state() / kImports);
     for (const fs::path& path : moved) {
       give(path);
       if (!fs::is_directory(path)) continue;
@@ -302,13 +306,13 @@ class PatientImport {
 
   void InsertRows() {
     for (const char* table : kPatientTables) {
-      const std::vector<ColumnOf> columns = ColumnsOf(*store_.write_, table);
+      const std::vector<ColumnOf> columns = ColumnsOf(*database_, table);
       for (const Json& row : rows().at(table)) InsertRow(table, columns, row);
     }
     // A scan and the reference that it was compared with name each other.
     for (const Json& scan : rows().at("scans")) {
       if (!scan.contains("reference_id") || scan["reference_id"].is_null()) continue;
-      store_.write_->Prepare("UPDATE scans SET reference_id = ? WHERE id = ?")
+      database_->Prepare("UPDATE scans SET reference_id = ? WHERE id = ?")
           .Bind(new_ids_["refs"].at(scan["reference_id"]))
           .Bind(new_ids_["scans"].at(scan["id"]))
           .Run();
@@ -326,7 +330,7 @@ class PatientImport {
     }
     // The database keeps a statement by the address of its text.
     const std::string sql = fmt::format("INSERT INTO {} ({}) VALUES ({})", table, names, marks);
-    Statement insert = store_.write_->Prepare(statements_.insert(sql).first->c_str());
+    Statement insert = database_->Prepare(statements_.insert(sql).first->c_str());
     for (const Json& value : values) {
       if (value.is_null()) {
         insert.BindNull();
@@ -339,7 +343,7 @@ class PatientImport {
       }
     }
     insert.Run();
-    if (row.contains("id")) new_ids_[table][row["id"]] = store_.write_->last_id();
+    if (row.contains("id")) new_ids_[table][row["id"]] = database_->last_id();
   }
 
   /// A value as it is in this store: with its numbers, and with nothing that was decided elsewhere.
@@ -359,6 +363,7 @@ class PatientImport {
   SummedReader reader_;
   std::set<std::string> statements_;  // outlives the store, which keeps the compiled ones
   Store store_;
+  StoreDatabase::Held database_;  ///< Held for the whole import.
   std::stop_token stop_;
   Json record_;
   PatientReport report_;

@@ -32,16 +32,16 @@ TEST(DaemonBackupTest, ABackupOf200ScansDisturbsNoSweepAndIsRestoredByteIdentica
   const fs::path state = folder / "state", backup = folder / "backup";
   {
     Store store(state);
-    const std::string patient = store.AddPatient(testing::kAnna, "P", "thorax");
+    const std::string patient = store.patients.Add(testing::kAnna, "P", "thorax");
     for (int i = 0; i < kScans; ++i) {
-      const std::string id = store.BeginScan(testing::Begun(patient));
-      testing::FillScan(store.StagingFolder(id));
-      WriteWholeFile(store.StagingFolder(id) / "scene" / "cloud.ply",
+      const std::string id = store.scans.Begin(testing::Begun(patient));
+      testing::FillScan(store.folders.Staging(id));
+      WriteWholeFile(store.folders.Staging(id) / "scene" / "cloud.ply",
                      std::string(std::size_t{200} << 10, static_cast<char>('a' + i % 26)) + id);
-      store.FinishScan(id, {.outcome = web::ScanOutcome::kDone,
-                            .failure = {},
-                            .result_json = R"({"verdict":"in_tolerance"})",
-                            .swept_area_m2 = 1.0});
+      store.scans.Finish(id, {.outcome = web::ScanOutcome::kDone,
+                              .failure = {},
+                              .result_json = R"({"verdict":"in_tolerance"})",
+                              .swept_area_m2 = 1.0});
     }
   }
   const auto stored = testing::FilesBelow(state / "scans");

@@ -249,7 +249,7 @@ TEST_F(DaemonFaultTest, SigtermWhileScanningAndWhileWorkingEndsCleanly) {
     Store store(folder_ / "state");
     EXPECT_EQ(store.recovery().interrupted_scans + store.recovery().orphaned_folders, 0)
         << "there was nothing left to put right";
-    EXPECT_EQ(store.Scans("", 1).at(0).outcome, web::ScanOutcome::kCancelled);
+    EXPECT_EQ(store.scans.List("", 1).at(0).outcome, web::ScanOutcome::kCancelled);
   }
 }
 
@@ -259,7 +259,7 @@ void ExpectConsistent(const fs::path& state) {
   EXPECT_EQ(store.recovery().lost_scans, 0);
   EXPECT_EQ(store.recovery().broken_references, 0) << "the approved reference must survive";
   std::vector<std::string> with_folder;
-  for (const web::Scan& scan : store.Scans("", 10000)) {
+  for (const web::Scan& scan : store.scans.List("", 10000)) {
     EXPECT_NE(scan.outcome, web::ScanOutcome::kRunning);
     EXPECT_EQ(scan.outcome == web::ScanOutcome::kDone, !scan.folder.empty()) << scan.id;
     if (!scan.folder.empty()) with_folder.push_back(scan.id);
@@ -307,7 +307,7 @@ TEST_F(DaemonFaultTest, KilledAtAnyMomentNothingIsHalf) {
     ExpectConsistent(folder_ / "state");
   }
   Store store(folder_ / "state");
-  const std::vector<web::Scan> scans = store.Scans("", 10000);
+  const std::vector<web::Scan> scans = store.scans.List("", 10000);
   const auto num_done = std::count_if(scans.begin(), scans.end(), [](const web::Scan& s) {
     return s.outcome == web::ScanOutcome::kDone;
   });
@@ -513,7 +513,7 @@ TEST_F(DaemonFaultTest, AClockThatStepsDisturbsNoTimer) {
   plumbd.ScanOnce();
   EXPECT_EQ(plumbd.Stop(), 0);
   Store store(folder_ / "state");
-  const std::vector<web::Scan> scans = store.Scans("", 10);
+  const std::vector<web::Scan> scans = store.scans.List("", 10);
   ASSERT_EQ(scans.size(), 2U);
   EXPECT_LT(scans[0].started_at, scans[1].finished_at) << "the clock did step";
   EXPECT_EQ(scans[0].id, "000002") << "and the order is that of the scans all the same";

@@ -95,21 +95,22 @@ class RealRuledAppliance : public RuledAppliance {
     std::string id;
     On([&] {
       Store& store = *served_->appliance.store();
-      id = store.BeginScan({.patient_id = patient_id,
-                            .reference_id = {},
-                            .purpose = web::ScanPurpose::kReference,
-                            .sensor_serial = "A",
-                            .reason = {}});
-      testing::FillScan(store.StagingFolder(id));
-      store.FinishScan(id, {.outcome = web::ScanOutcome::kDone, .failure = {}, .result_json = {}});
+      id = store.scans.Begin({.patient_id = patient_id,
+                              .reference_id = {},
+                              .purpose = web::ScanPurpose::kReference,
+                              .sensor_serial = "A",
+                              .reason = {}});
+      testing::FillScan(store.folders.Staging(id));
+      store.scans.Finish(id,
+                         {.outcome = web::ScanOutcome::kDone, .failure = {}, .result_json = {}});
     });
     return id;
   }
   std::string PassDailyCheck(const std::string& user) override {
     std::string id;
     On([&] {
-      id = served_->appliance.store()->AddCheck({.user = user, .address = {}}, "A",
-                                                testing::CheckOver());
+      id = served_->appliance.store()->checks.Add({.user = user, .address = {}}, "A",
+                                                  testing::CheckOver());
     });
     return id;
   }

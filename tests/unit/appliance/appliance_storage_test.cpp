@@ -24,7 +24,7 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
   config.appliance.state = folder / "state";
   {
     Store store(config.appliance.state);  // and closed again: nothing of it is in anybody's memory
-    (void)store.AddPatient({.user = "anna", .address = {}}, "A", "");
+    (void)store.patients.Add({.user = "anna", .address = {}}, "A", "");
   }
   Appliance appliance(
       loop, {.config = config,

@@ -174,7 +174,7 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
     const std::string id = added.get_future().get().id;
     std::promise<web::Change> opened;
     On([&] {
-      (void)appliance_->store()->AddCheck(
+      (void)appliance_->store()->checks.Add(
           actor, appliance_->WebStatus().sensor.serial,
           CheckJson({.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}, {}));
       services_->services().patients.OpenPatient(
@@ -267,7 +267,7 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
     const web::Done keep = [&](const web::Change& change) { answer = change; };
     std::string patient;
     On([&] {
-      patient = appliance_->store()->AddPatient(tess, "P-1", "");
+      patient = appliance_->store()->patients.Add(tess, "P-1", "");
       EXPECT_THAT(appliance_->WebStatus().reference_block, ::testing::HasSubstr("daily check"));
       services_->services().patients.OpenPatient(tess, patient, web::ScanPurpose::kReference, "",
                                                  "", keep);
@@ -285,8 +285,8 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
       return appliance_->WebStatus().fault.find("open Daily check") != std::string::npos;
     }));
     On([&] {
-      EXPECT_TRUE(appliance_->store()->Scans("", 10).empty()) << "nothing was scanned";
-      (void)appliance_->store()->AddCheck(
+      EXPECT_TRUE(appliance_->store()->scans.List("", 10).empty()) << "nothing was scanned";
+      (void)appliance_->store()->checks.Add(
           tess, appliance_->WebStatus().sensor.serial,
           CheckJson({.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}, {}));
       EXPECT_EQ(appliance_->WebStatus().reference_block, "");
@@ -423,7 +423,7 @@ TEST_F(ApplianceProfileTest, SwitchedOffItSaysSo) {
 class ApplianceRoomTest : public ApplianceProfileTest {
  protected:
   void ScanBoard() {
-    On([&] { (void)appliance_->store()->AddCheck(erik_, "A", testing::CheckOver()); });
+    On([&] { (void)appliance_->store()->checks.Add(erik_, "A", testing::CheckOver()); });
   }
   web::ChangeResult Sign() {
     const std::string digest = services_->services().room.GetRoomCalibration().digest;
@@ -468,7 +468,7 @@ TEST_F(ApplianceRoomTest, ASignedCalibrationHoldsInPlaceOfTheConfigurationUntilA
     MarkerMap moved = testing::MarkersOfRoom();
     for (Eigen::Vector3d& corner : moved.at(4).corners) corner.x() += 0.008;
     On([&] {
-      (void)appliance_->store()->AddCheck(erik_, "A", testing::CheckOver(0, 0, moved));
+      (void)appliance_->store()->checks.Add(erik_, "A", testing::CheckOver(0, 0, moved));
       appliance_->LookAtRoom();
     });
     EXPECT_FALSE(Gantry()) << "neither the calibration nor the configuration";

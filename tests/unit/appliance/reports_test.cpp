@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "daemon/appliance/report_words.hpp"
+#include "daemon/records/store.hpp"
 #include "drivers/files/file_io.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -22,35 +23,36 @@ const web::Actor kClara{.user = "clara", .address = {}};
 class ReportsTest : public ::testing::Test {
  protected:
   std::string Scan(const std::string& reference, const std::string& result, bool overdue = false) {
-    const std::string id = store_.BeginScan(
+    const std::string id = store_.scans.Begin(
         {.patient_id = patient_,
          .reference_id = reference,
          .purpose = reference.empty() ? web::ScanPurpose::kReference : web::ScanPurpose::kFraction,
          .sensor_serial = "S1",
          .reason = "",
          .check_overdue = overdue});
-    std::filesystem::create_directories(store_.StagingFolder(id) / "scene");
-    WriteWholeFile(store_.StagingFolder(id) / "scene/scene.json",
+    std::filesystem::create_directories(store_.folders.Staging(id) / "scene");
+    WriteWholeFile(store_.folders.Staging(id) / "scene/scene.json",
                    R"({"frames":{"total":300,"tracked":270,"dropped":30},"keyframes":40})");
-    store_.FinishScan(id,
-                      {.outcome = web::ScanOutcome::kDone, .failure = "", .result_json = result});
+    store_.scans.Finish(id,
+                        {.outcome = web::ScanOutcome::kDone, .failure = "", .result_json = result});
     return id;
   }
   std::string Approved() {
-    const std::string id = store_.AddReference(kAnna, Scan("", ""), "first", {});
+    const std::string id = store_.references.Add(kAnna, Scan("", ""), "first", {});
     web::ReferencePlan plan;
     plan.region_m = {{0, 0}, {0.5, 0}, {0.5, 0.4}, {0, 0.4}};
     plan.isocentre_m = {{0.45, 0.35, 0.12}};
     plan.tolerance = {.shift_mm = 2.5, .rotation_deg = 1};
-    store_.PlanReference(kBob, id, 1, plan);
-    const auto planned = store_.FindReference(id);
-    store_.ApproveReference(kClara, id, planned->revision, planned->digest);
+    store_.references.Plan(kBob, id, 1, plan);
+    const auto planned = store_.references.Find(id);
+    store_.references.Approve(kClara, id, planned->revision, planned->digest);
     return id;
   }
 
   testing::TempFolder folder_;
   Store store_{folder_.path()};
-  std::string patient_ = store_.AddPatient(kAnna, "P-0042", "thorax");
+  ReportSources sources_{store_.patients, store_.references, store_.scans};
+  std::string patient_ = store_.patients.Add(kAnna, "P-0042", "thorax");
 };
 
 constexpr const char* kMove =
@@ -73,9 +75,9 @@ std::string ValueOf(const ReportFacts& facts, std::string_view name) {
 
 TEST_F(ReportsTest, AScanIsToldInTheLanguageThatIsAskedFor) {
   const std::string id = Scan(Approved(), kMove, /*overdue=*/true);
-  const web::Scan scan = *store_.FindScan(id);
-  const ScanReport english = DescribeScan(store_, scan, Language::kEnglish);
-  const ScanReport spanish = DescribeScan(store_, scan, Language::kSpanish);
+  const web::Scan scan = *store_.scans.Find(id);
+  const ScanReport english = DescribeScan(sources_, scan, Language::kEnglish);
+  const ScanReport spanish = DescribeScan(sources_, scan, Language::kSpanish);
   EXPECT_EQ(english.verdict, "MOVE");
   EXPECT_EQ(spanish.verdict, "MOVER");
   EXPECT_THAT(spanish.texts.notice, HasSubstr("Solo para investigación"));
@@ -105,7 +107,7 @@ TEST_F(ReportsTest, NoAnswerGivesItsReasonAndNoNumbers) {
       Approved(),
       R"({"verdict":"no_answer","reasons":["the current scan covers 81.5 % of the region, at least 90 % are needed; sweep all of it"],
           "correction":{"vertical_mm":-8.04,"longitudinal_mm":0.4,"lateral_mm":0.0,"pitch_deg":0.0,"roll_deg":0.0,"yaw_deg":0.0}})");
-  const ScanReport report = DescribeScan(store_, *store_.FindScan(id), Language::kSpanish);
+  const ScanReport report = DescribeScan(sources_, *store_.scans.Find(id), Language::kSpanish);
   EXPECT_EQ(report.verdict, "SIN RESPUESTA");
   EXPECT_EQ(report.why,
             "el escaneo actual cubre el 81,5 % de la región y se necesita al menos el 90 %; "
@@ -116,21 +118,22 @@ TEST_F(ReportsTest, NoAnswerGivesItsReasonAndNoNumbers) {
 
 TEST_F(ReportsTest, AScanForAReferenceNamesThePlanThatWasMadeOfItAndWhoApprovedIt) {
   const std::string loose = Scan("", "");
-  EXPECT_EQ(ValueOf(DescribeScan(store_, *store_.FindScan(loose), Language::kEnglish).identity,
+  EXPECT_EQ(ValueOf(DescribeScan(sources_, *store_.scans.Find(loose), Language::kEnglish).identity,
                     "Approved by"),
             "nothing");
-  const std::string draft = store_.AddReference(kAnna, loose, "first", {});
-  const std::string before = ValueOf(
-      DescribeScan(store_, *store_.FindScan(loose), Language::kEnglish).identity, "Approved by");
+  const std::string draft = store_.references.Add(kAnna, loose, "first", {});
+  const std::string before =
+      ValueOf(DescribeScan(sources_, *store_.scans.Find(loose), Language::kEnglish).identity,
+              "Approved by");
   EXPECT_THAT(before, Not(HasSubstr("clara")));
   EXPECT_NE(before, "nothing");
   const std::string approved = Approved();
-  const web::Scan scan = *store_.FindScan(store_.FindReference(approved)->scan_id);
-  const ScanReport report = DescribeScan(store_, scan, Language::kEnglish);
+  const web::Scan scan = *store_.scans.Find(store_.references.Find(approved)->scan_id);
+  const ScanReport report = DescribeScan(sources_, scan, Language::kEnglish);
   EXPECT_THAT(ValueOf(report.identity, "Approved by"), HasSubstr("clara, 20"));
   EXPECT_EQ(ValueOf(report.identity, "Plan"), "head first, supine, markers fixed to the room");
   // Each scan its own: the other one's draft is still not approved.
-  EXPECT_EQ(ValueOf(DescribeScan(store_, *store_.FindScan(loose), Language::kEnglish).identity,
+  EXPECT_EQ(ValueOf(DescribeScan(sources_, *store_.scans.Find(loose), Language::kEnglish).identity,
                     "Approved by"),
             before);
   EXPECT_TRUE(PdfOf(report).starts_with("%PDF-"));
@@ -138,9 +141,9 @@ TEST_F(ReportsTest, AScanForAReferenceNamesThePlanThatWasMadeOfItAndWhoApprovedI
 
 TEST_F(ReportsTest, ACourseNamesItsReferenceAndWhoAcceptedWhat) {
   const std::string id = Scan(Approved(), kMove);
-  store_.AcceptScan(kAnna, id, "the arm cannot be moved");
+  store_.scans.Accept(kAnna, id, "the arm cannot be moved");
   const CourseReport course =
-      DescribeCourse(store_, *store_.FindPatient(patient_), Language::kSpanish);
+      DescribeCourse(sources_, *store_.patients.Find(patient_), Language::kSpanish);
   ASSERT_THAT(course.rows, SizeIs(2));
   EXPECT_EQ(course.rows[0].verdict, "REFERENCIA");
   EXPECT_THAT(course.rows[1].accepted,

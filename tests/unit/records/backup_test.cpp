@@ -34,9 +34,9 @@ class BackupTest : public ::testing::Test {
  protected:
   BackupTest() {
     Store store(state());
-    patient_ = store.AddPatient(kAnna, "P", "thorax");
+    patient_ = store.patients.Add(kAnna, "P", "thorax");
     reference_ = StoreScan(store, patient_);
-    store.ApproveReference(kBert, store.AddReference(kAnna, reference_, "", {}), 1);
+    store.references.Approve(kBert, store.references.Add(kAnna, reference_, "", {}), 1);
     for (int i = 0; i < 3; ++i) scan_ = StoreScan(store, patient_);
     fs::create_directories(state() / "calibration");
     WriteWholeFile(state() / "calibration" / "S1.yaml", std::string_view("fx: 1"));
@@ -74,10 +74,10 @@ TEST_F(BackupTest, WhatIsRestoredIsByteIdentical) {
   EXPECT_EQ(FilesBelow(restored()).at("plumb.db"), FilesBelow(backup()).at("plumb.db"));
   Store store(restored());
   EXPECT_EQ(store.recovery().lost_scans + store.recovery().foreign_folders, 0);
-  EXPECT_EQ(store.ApprovedReference(patient_)->scan_id, reference_);
-  for (const web::Scan& scan : store.Scans(patient_, 100))
-    EXPECT_EQ(store.CheckFiles(scan.id, false), "");
-  EXPECT_EQ(store.FirstBrokenAuditEntry(), std::nullopt);
+  EXPECT_EQ(store.references.Approved(patient_)->scan_id, reference_);
+  for (const web::Scan& scan : store.scans.List(patient_, 100))
+    EXPECT_EQ(store.integrity.Check(scan.id, false), "");
+  EXPECT_EQ(store.audit.FirstBroken(), std::nullopt);
 }
 
 TEST_F(BackupTest, IsMadeWhileScansGoOnAndHoldsOneMoment) {
@@ -86,20 +86,20 @@ TEST_F(BackupTest, IsMadeWhileScansGoOnAndHoldsOneMoment) {
     while (!stop.stop_requested()) (void)StoreScan(store, patient_);
   });
   for (int round = 0; round < 5; ++round) {
-    const BackupReport made = store.Backup(kAnna, backup());  // replaces the one before
+    const BackupReport made = store.backup.Make(kAnna, backup());  // replaces the one before
     EXPECT_THAT(made.problems, IsEmpty());
     const fs::path target = folder_ / fmt::format("restored-{}", round);
     EXPECT_EQ(RestoreBackup(backup(), target).scans, made.scans);
     Store copy(target);
     EXPECT_EQ(copy.recovery().lost_scans + copy.recovery().foreign_folders, 0);
-    for (const web::Scan& scan : copy.Scans(patient_, 1000)) {
+    for (const web::Scan& scan : copy.scans.List(patient_, 1000)) {
       if (scan.outcome != web::ScanOutcome::kDone) continue;
-      EXPECT_EQ(copy.CheckFiles(scan.id, false), "") << scan.id;
+      EXPECT_EQ(copy.integrity.Check(scan.id, false), "") << scan.id;
     }
   }
   scanning.request_stop();
   scanning.join();
-  EXPECT_EQ(store.Audit({0, 1000}).back().action, "patient.add");
+  EXPECT_EQ(store.audit.Find({0, 1000}).back().action, "patient.add");
 }
 
 TEST_F(BackupTest, NothingIsRemovedWhileItIsMade) {
@@ -107,7 +107,7 @@ TEST_F(BackupTest, NothingIsRemovedWhileItIsMade) {
   std::atomic<int> made = 0;
   std::jthread backing_up([&](const std::stop_token& stop) {
     while (!stop.stop_requested()) {
-      EXPECT_THAT(store.Backup(kAnna, backup()).problems, IsEmpty());
+      EXPECT_THAT(store.backup.Make(kAnna, backup()).problems, IsEmpty());
       ++made;
       std::this_thread::sleep_for(std::chrono::milliseconds(5));  // removals have their turn
     }
@@ -118,7 +118,7 @@ TEST_F(BackupTest, NothingIsRemovedWhileItIsMade) {
   while ((refused_in.size() < 5 || removed < 3) && std::chrono::steady_clock::now() < end) {
     const int during = made;
     try {
-      (void)store.KeepWithinQuota(0);
+      (void)store.removal.KeepWithinQuota(0);
       ++removed;
       // Something for the next one to take, and no more: backups take the longer, the more there
       // is.
@@ -134,7 +134,7 @@ TEST_F(BackupTest, NothingIsRemovedWhileItIsMade) {
   EXPECT_GE(refused_in.size(), 5U);
   EXPECT_GE(removed, 3) << "nothing could be removed between two backups either";
   const fs::path target = restored();
-  (void)store.Backup(kAnna, backup());
+  (void)store.backup.Make(kAnna, backup());
   (void)RestoreBackup(backup(), target);
   EXPECT_EQ(Store(target).recovery().lost_scans, 0);
 }
@@ -149,7 +149,7 @@ TEST_F(BackupTest, TellsWhatIsNotAsItWasStoredAndKeepsTheRest) {
   EXPECT_EQ(made.files, 1U + 4 * 7 - 1 + 3);
   (void)RestoreBackup(backup(), restored());
   Store store(restored());
-  EXPECT_FALSE(store.FindScan(scan_)->failure.empty()) << "restored as damaged as it was";
+  EXPECT_FALSE(store.scans.Find(scan_)->failure.empty()) << "restored as damaged as it was";
 }
 
 TEST_F(BackupTest, WhatDamagesTheOriginalLeavesTheBackupWhole) {
@@ -164,8 +164,8 @@ TEST_F(BackupTest, WhatDamagesTheOriginalLeavesTheBackupWhole) {
   const BackupReport report = RestoreBackup(backup(), restored());
   EXPECT_EQ(report.scans, 4U);
   Store store(restored());
-  EXPECT_EQ(store.CheckFiles(scan_, false), "");
-  EXPECT_NE(Store(state()).CheckFiles(scan_, false), "") << "the original is what was damaged";
+  EXPECT_EQ(store.integrity.Check(scan_, false), "");
+  EXPECT_NE(Store(state()).integrity.Check(scan_, false), "") << "the original is what was damaged";
 }
 
 TEST_F(BackupTest, ADamagedBackupRestoresNothingAndSaysWhich) {
@@ -285,7 +285,7 @@ TEST_F(EncryptedBackupTest, WhatIsRestoredIsByteIdenticalAndNothingIsReadableMea
   EXPECT_EQ(report.bytes, made.bytes);
   EXPECT_EQ(FilesOf(restored()), FilesOf(state()));
   Store store(restored());
-  EXPECT_EQ(store.ApprovedReference(patient_)->scan_id, reference_);
+  EXPECT_EQ(store.references.Approved(patient_)->scan_id, reference_);
   EXPECT_EQ(store.recovery().lost_scans, 0);
 }
 

@@ -35,12 +35,12 @@ class FailingDiskTest : public ::testing::Test {
  protected:
   FailingDiskTest() {
     Store store(prepared());
-    patient_ = store.AddPatient(kAnna, "P", "");
+    patient_ = store.patients.Add(kAnna, "P", "");
     reference_ = StoreScan(store, patient_);
-    store.ApproveReference(kBert, store.AddReference(kAnna, reference_, "", {}), 1);
+    store.references.Approve(kBert, store.references.Add(kAnna, reference_, "", {}), 1);
     for (int i = 0; i < 2; ++i) (void)StoreScan(store, patient_);
-    const std::string interrupted = store.BeginScan(testing::Begun(patient_));
-    testing::FillScan(store.StagingFolder(interrupted));
+    const std::string interrupted = store.scans.Begin(testing::Begun(patient_));
+    testing::FillScan(store.folders.Staging(interrupted));
   }
   void SetUp() override {
     if (!Arm({})) GTEST_SKIP() << "the library of failing calls is not loaded (see CMakeLists.txt)";
@@ -61,14 +61,14 @@ class FailingDiskTest : public ::testing::Test {
       EXPECT_EQ(testing::FilesBelow(state() / "scans" / scan).size(), 7U) << scan;
     Store store(state());
     for (const std::string& scan : finished) {
-      const auto found = store.FindScan(scan);
+      const auto found = store.scans.Find(scan);
       ASSERT_TRUE(found) << scan;
       EXPECT_EQ(found->outcome, web::ScanOutcome::kDone);
       EXPECT_EQ(found->failure, "");
-      EXPECT_EQ(store.CheckFiles(scan, false), "");
+      EXPECT_EQ(store.integrity.Check(scan, false), "");
     }
-    EXPECT_EQ(store.FirstBrokenAuditEntry(), std::nullopt);
-    EXPECT_EQ(store.ApprovedReference(patient_)->scan_id, reference_);
+    EXPECT_EQ(store.audit.FirstBroken(), std::nullopt);
+    EXPECT_EQ(store.references.Approved(patient_)->scan_id, reference_);
     (void)StoreScan(store, patient_);  // and it goes on
   }
 
@@ -150,7 +150,7 @@ TEST_F(FailingDiskTest, WhileABackupIsMade) {
       (void)Arm(fault);
       bool is_made = false;
       try {
-        is_made = store.Backup(kAnna, backup()).problems.empty();
+        is_made = store.backup.Make(kAnna, backup()).problems.empty();
       } catch (const IoError&) {
       }
       failed = Disarm();
@@ -215,12 +215,12 @@ TEST(DamagedDatabaseTest, IsOpenedOrRefusedAndNoScanIsDeleted) {
   const fs::path state = folder / "state";
   {
     Store store(state);
-    const std::string patient = store.AddPatient(kAnna, "P", "thorax");
+    const std::string patient = store.patients.Add(kAnna, "P", "thorax");
     const std::string scan = StoreScan(store, patient);
-    store.ApproveReference(kBert, store.AddReference(kAnna, scan, "", {}), 1);
+    store.references.Approve(kBert, store.references.Add(kAnna, scan, "", {}), 1);
     (void)StoreScan(store, patient);
-    store.ChangeSettings(kAnna, {});
-    for (int i = 0; i < 50; ++i) store.Log(kAnna, "note", "", std::string(100, 'n'));
+    store.settings.Change(kAnna, {});
+    for (int i = 0; i < 50; ++i) store.audit.Log(kAnna, "note", "", std::string(100, 'n'));
   }
   const auto bytes = ReadWholeFile(state / "plumb.db", std::size_t{1} << 26);
   const std::string whole(bytes.begin(), bytes.end());
@@ -235,14 +235,14 @@ TEST(DamagedDatabaseTest, IsOpenedOrRefusedAndNoScanIsDeleted) {
       Store store(state);
       ++opened;
       try {
-        for (const web::Patient& patient : store.Patients()) {
-          (void)store.References(patient.id);
-          (void)store.Scans(patient.id, 100);
-          (void)store.ApprovedReference(patient.id);
+        for (const web::Patient& patient : store.patients.List()) {
+          (void)store.references.List(patient.id);
+          (void)store.scans.List(patient.id, 100);
+          (void)store.references.Approved(patient.id);
         }
-        (void)store.GetSettings();
-        (void)store.Audit({0, 100});
-        (void)store.FirstBrokenAuditEntry();
+        (void)store.settings.Get();
+        (void)store.audit.Find({0, 100});
+        (void)store.audit.FirstBroken();
       } catch (const std::exception&) {  // of one record, said so
         ++unreadable;
       }

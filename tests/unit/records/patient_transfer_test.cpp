@@ -33,30 +33,30 @@ class PatientTransferTest : public ::testing::Test {
   /// Somebody else before and after, so that numbers differ between the stores.
   PatientTransferTest() {
     Store store(here());
-    const std::string other = store.AddPatient(kAnna, "OTHER", "");
+    const std::string other = store.patients.Add(kAnna, "OTHER", "");
     (void)StoreScan(store, other);
-    patient_ = store.AddPatient(kAnna, "P-7", "thorax");
-    const std::string session = store.OpenSession(kAnna, patient_, web::ScanPurpose::kFraction);
+    patient_ = store.patients.Add(kAnna, "P-7", "thorax");
+    const std::string session = store.treatments.Open(kAnna, patient_, web::ScanPurpose::kFraction);
     reference_ = StoreScan(store, patient_);
-    const std::string draft = store.AddReference(kAnna, reference_, "first", plan_);
-    store.ApproveReference(kBert, draft, 1);
+    const std::string draft = store.references.Add(kAnna, reference_, "first", plan_);
+    store.references.Approve(kBert, draft, 1);
     NewScan begun = testing::Begun(patient_);
     begun.reference_id = draft;
     begun.session_id = session;
     begun.purpose = web::ScanPurpose::kFraction;
-    scan_ = store.BeginScan(begun);
-    testing::FillScan(store.StagingFolder(scan_));
-    store.FinishScan(scan_, {.outcome = web::ScanOutcome::kDone,
-                             .failure = {},
-                             .result_json = R"({"verdict":"in_tolerance"})",
-                             .swept_area_m2 = 0.5});
-    store.AcceptScan(kAnna, scan_);
-    const std::string failed = store.BeginScan(testing::Begun(patient_));
-    store.FinishScan(
+    scan_ = store.scans.Begin(begun);
+    testing::FillScan(store.folders.Staging(scan_));
+    store.scans.Finish(scan_, {.outcome = web::ScanOutcome::kDone,
+                               .failure = {},
+                               .result_json = R"({"verdict":"in_tolerance"})",
+                               .swept_area_m2 = 0.5});
+    store.scans.Accept(kAnna, scan_);
+    const std::string failed = store.scans.Begin(testing::Begun(patient_));
+    store.scans.Finish(
         failed, {.outcome = web::ScanOutcome::kFailed, .failure = "no marker", .result_json = {}});
-    store.CloseSessions(kAnna);
+    store.treatments.CloseAll(kAnna);
     Store there(this->there());
-    for (const char* code : {"A", "B", "C"}) (void)there.AddPatient(kAnna, code, "");
+    for (const char* code : {"A", "B", "C"}) (void)there.patients.Add(kAnna, code, "");
     for (int i = 0; i < 5; ++i) (void)StoreScan(there, "1");
   }
   [[nodiscard]] fs::path here() const { return folder_ / "here"; }
@@ -90,10 +90,10 @@ class PatientTransferTest : public ::testing::Test {
   void ExpectNothingCame() const {
     EXPECT_FALSE(fs::exists(there() / ".import"));
     Store store(there());
-    EXPECT_EQ(store.FindPatientByCode("P-7"), std::nullopt);
-    EXPECT_EQ(store.Scans("", 100).size(), 5U);
+    EXPECT_EQ(store.patients.FindByCode("P-7"), std::nullopt);
+    EXPECT_EQ(store.scans.List("", 100).size(), 5U);
     EXPECT_EQ(store.recovery().foreign_folders, 0);
-    EXPECT_EQ(store.Audit({0, 1})[0].action, "patient.add");
+    EXPECT_EQ(store.audit.Find({0, 1})[0].action, "patient.add");
   }
 
   testing::TempFolder folder_;
@@ -116,10 +116,10 @@ TEST_F(PatientTransferTest, ComesWithEverythingAndByteIdenticalFiles) {
   EXPECT_FALSE(imported.was_there);
   EXPECT_EQ(imported.files, exported.files);
   Store from(here()), to(there());
-  const auto patient = to.FindPatientByCode("P-7");
+  const auto patient = to.patients.FindByCode("P-7");
   ASSERT_TRUE(patient);
   EXPECT_EQ(patient->site, "thorax");
-  const auto before = from.Scans(patient_, 10), now = to.Scans(patient->id, 10);
+  const auto before = from.scans.List(patient_, 10), now = to.scans.List(patient->id, 10);
   ASSERT_EQ(now.size(), 3U);
   for (std::size_t i = 0; i < now.size(); ++i) {
     EXPECT_NE(now[i].id, before[i].id);
@@ -131,26 +131,26 @@ TEST_F(PatientTransferTest, ComesWithEverythingAndByteIdenticalFiles) {
     EXPECT_EQ(now[i].fraction, before[i].fraction);
     EXPECT_EQ(now[i].result.has_value(), before[i].result.has_value());
     EXPECT_EQ(FilesBelow(now[i].folder), FilesBelow(before[i].folder));
-    EXPECT_EQ(now[i].folder.empty() ? "" : to.CheckFiles(now[i].id, false), "");
+    EXPECT_EQ(now[i].folder.empty() ? "" : to.integrity.Check(now[i].id, false), "");
   }
-  const auto references = to.References(patient->id);
+  const auto references = to.references.List(patient->id);
   ASSERT_EQ(references.size(), 1U);
   EXPECT_EQ(PlanJson(references[0].plan), PlanJson(plan_));
   EXPECT_EQ(references[0].created_by, "anna");
   EXPECT_EQ(references[0].approved_by, "") << "approved in another room";
   EXPECT_EQ(references[0].scan_id, now[2].id);
   EXPECT_EQ(now[1].reference_id, references[0].id);
-  to.ApproveReference(kBert, references[0].id, references[0].revision);
+  to.references.Approve(kBert, references[0].id, references[0].revision);
   EXPECT_EQ(to.recovery().foreign_folders + to.recovery().lost_scans, 0);
-  EXPECT_EQ(to.OpenedSession(), std::nullopt);
-  EXPECT_EQ(to.FirstBrokenAuditEntry(), std::nullopt);
-  EXPECT_THAT(to.Audit({0, 2})[1].action, "patient.import");
-  EXPECT_THAT(to.Audit({0, 2})[1].detail, AllOf(HasSubstr("P-7"), HasSubstr("3 scans")));
+  EXPECT_EQ(to.treatments.Opened(), std::nullopt);
+  EXPECT_EQ(to.audit.FirstBroken(), std::nullopt);
+  EXPECT_THAT(to.audit.Find({0, 2})[1].action, "patient.import");
+  EXPECT_THAT(to.audit.Find({0, 2})[1].detail, AllOf(HasSubstr("P-7"), HasSubstr("3 scans")));
   const Json kept = Json::parse(FilesBelow(there()).at("imports/" + patient->id + ".json"));
   EXPECT_THAT(kept["evidence"]["audit"].dump(),
               AllOf(HasSubstr("reference.approve"), HasSubstr("scan.accept"),
                     HasSubstr("session.open"), HasSubstr("patient.add")));
-  to.WipePatient(kAnna, patient->id);
+  to.removal.WipePatient(kAnna, patient->id);
   EXPECT_THAT(FilesBelow(there() / "imports"), IsEmpty()) << "wiped with the patient";
 }
 
@@ -168,12 +168,12 @@ TEST_F(PatientTransferTest, GoesRoundAndIsTheSame) {
   { Store store(third); }
   (void)ImportPatient(folder_ / "out2", third);
   Store store(third);
-  const auto patient = store.FindPatientByCode("P-7");
+  const auto patient = store.patients.FindByCode("P-7");
   ASSERT_TRUE(patient);
   EXPECT_THAT(FilesBelow(third).at("imports/" + patient->id + ".json"),
               HasSubstr("reference.approve"));
   Store first(here());
-  const auto before = first.Scans(patient_, 10), now = store.Scans(patient->id, 10);
+  const auto before = first.scans.List(patient_, 10), now = store.scans.List(patient->id, 10);
   for (std::size_t i = 0; i < now.size(); ++i)
     EXPECT_EQ(FilesBelow(now[i].folder), FilesBelow(before[i].folder));
 }
@@ -182,7 +182,7 @@ TEST_F(PatientTransferTest, ACodeWithOtherDataIsRefused) {
   (void)ExportPatient(here(), "P-7", out());
   {
     Store store(there());
-    (void)store.AddPatient(kAnna, "p-7", "");
+    (void)store.patients.Add(kAnna, "p-7", "");
   }
   EXPECT_THAT(
       MessageOf<std::invalid_argument>([&] { (void)ImportPatient(out(), there()); }),

@@ -37,12 +37,12 @@ inline NewScan Begun(const std::string& patient) {
 }
 
 inline std::string StoreScan(Store& store, const std::string& patient) {
-  const std::string id = store.BeginScan(Begun(patient));
-  FillScan(store.StagingFolder(id));
-  store.FinishScan(id, {.outcome = web::ScanOutcome::kDone,
-                        .failure = {},
-                        .result_json = R"({"verdict":"in_tolerance"})",
-                        .swept_area_m2 = 1.0});
+  const std::string id = store.scans.Begin(Begun(patient));
+  FillScan(store.folders.Staging(id));
+  store.scans.Finish(id, {.outcome = web::ScanOutcome::kDone,
+                          .failure = {},
+                          .result_json = R"({"verdict":"in_tolerance"})",
+                          .swept_area_m2 = 1.0});
   return id;
 }
 

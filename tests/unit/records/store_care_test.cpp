@@ -26,12 +26,12 @@ using web::ChangeResult;
 class StoreCareTest : public ::testing::Test {
  protected:
   StoreCareTest() : store_(std::make_unique<Store>(state())) {
-    patient_ = store_->AddPatient(kAnna, "P", "");
+    patient_ = store_->patients.Add(kAnna, "P", "");
   }
   [[nodiscard]] fs::path state() const { return folder_ / "state"; }
   ChangeResult RefusalOfRemoving(const std::string& scan, const std::string& reason = "blurred") {
     try {
-      store_->RemoveScan(kBert, scan, reason);
+      store_->removal.RemoveScan(kBert, scan, reason);
     } catch (const StoreRefusal& refusal) {
       return refusal.result();
     }
@@ -48,18 +48,18 @@ class StoreCareTest : public ::testing::Test {
 
 TEST_F(StoreCareTest, AScanIsRemovedForAReasonAndAReferenceIsNot) {
   const std::string reference = StoreScan(*store_, patient_), scan = StoreScan(*store_, patient_);
-  (void)store_->AddReference(kAnna, reference, "", {});
-  const std::string running = store_->BeginScan(testing::Begun(patient_));
+  (void)store_->references.Add(kAnna, reference, "", {});
+  const std::string running = store_->scans.Begin(testing::Begun(patient_));
   EXPECT_EQ(RefusalOfRemoving(scan, ""), ChangeResult::kInvalid);
   EXPECT_EQ(RefusalOfRemoving(reference), ChangeResult::kConflict) << "a draft is made of it";
   EXPECT_EQ(RefusalOfRemoving(running), ChangeResult::kConflict);
   for (const char* id : {"", "99", "../1"})
     EXPECT_EQ(RefusalOfRemoving(id), ChangeResult::kNotFound) << id;
-  EXPECT_EQ(testing::FilesBelow(store_->ScanFolder(scan)).size(), 7U);
+  EXPECT_EQ(testing::FilesBelow(store_->folders.Scan(scan)).size(), 7U);
   EXPECT_EQ(RefusalOfRemoving(scan), ChangeResult::kDone);
-  EXPECT_FALSE(store_->FindScan(scan));
-  EXPECT_FALSE(fs::exists(store_->ScanFolder(scan)));
-  const web::AuditEntry logged = store_->Audit({0, 1}).at(0);
+  EXPECT_FALSE(store_->scans.Find(scan));
+  EXPECT_FALSE(fs::exists(store_->folders.Scan(scan)));
+  const web::AuditEntry logged = store_->audit.Find({0, 1}).at(0);
   EXPECT_EQ(logged.user + " " + logged.action + " " + logged.subject + ": " + logged.detail,
             "bert scan.remove " + scan + ": blurred");
   EXPECT_EQ(RefusalOfRemoving(scan), ChangeResult::kNotFound);
@@ -71,26 +71,27 @@ class FailedSweepTest : public StoreCareTest,
 TEST_P(FailedSweepTest, KeepsACompleteRecordingOfOneThatFailed) {
   const bool is_kept = GetParam() == web::ScanOutcome::kFailed;
   for (const bool is_complete : {true, false}) {
-    const std::string id = store_->BeginScan(testing::Begun(patient_));
-    testing::FillScan(store_->StagingFolder(id));
-    const fs::path recording = store_->StagingFolder(id) / "recording";
+    const std::string id = store_->scans.Begin(testing::Begun(patient_));
+    testing::FillScan(store_->folders.Staging(id));
+    const fs::path recording = store_->folders.Staging(id) / "recording";
     fs::create_directories(recording / "rgb");
     WriteWholeFile(recording / "rgb" / "1.png", std::string_view("image"));
     if (is_complete) WriteWholeFile(recording / "rgb.txt", std::string_view("1 rgb/1.png"));
-    store_->FinishScan(id,
-                       {.outcome = GetParam(), .failure = "marker not seen", .result_json = {}});
-    EXPECT_FALSE(fs::exists(store_->StagingFolder(id)));
-    EXPECT_EQ(testing::FilesBelow(store_->ScanFolder(id)).size(), is_kept && is_complete ? 2U : 0U);
-    EXPECT_EQ(store_->FindScan(id)->failure, "marker not seen");
+    store_->scans.Finish(id,
+                         {.outcome = GetParam(), .failure = "marker not seen", .result_json = {}});
+    EXPECT_FALSE(fs::exists(store_->folders.Staging(id)));
+    EXPECT_EQ(testing::FilesBelow(store_->folders.Scan(id)).size(),
+              is_kept && is_complete ? 2U : 0U);
+    EXPECT_EQ(store_->scans.Find(id)->failure, "marker not seen");
     store_.reset();
     store_ = std::make_unique<Store>(state());
     EXPECT_EQ(store_->recovery().orphaned_folders + store_->recovery().lost_scans, 0);
-    EXPECT_EQ(fs::exists(store_->ScanFolder(id)), is_kept && is_complete);
+    EXPECT_EQ(fs::exists(store_->folders.Scan(id)), is_kept && is_complete);
     if (!is_kept || !is_complete) continue;
-    EXPECT_EQ(store_->CheckFiles(id, false), "");
-    EXPECT_THROW((void)store_->AddReference(kAnna, id, "", {}), StoreRefusal);
-    EXPECT_EQ(store_->KeepWithinQuota(0) > 0, true);
-    EXPECT_FALSE(fs::exists(store_->ScanFolder(id) / "recording"));
+    EXPECT_EQ(store_->integrity.Check(id, false), "");
+    EXPECT_THROW((void)store_->references.Add(kAnna, id, "", {}), StoreRefusal);
+    EXPECT_EQ(store_->removal.KeepWithinQuota(0) > 0, true);
+    EXPECT_FALSE(fs::exists(store_->folders.Scan(id) / "recording"));
   }
 }
 
@@ -163,8 +164,8 @@ TEST_F(StoreCareTest, EveryFieldOfAPlanComesBackAsItWasStored) {
                                     .tolerance = {.shift_mm = 7.5, .rotation_deg = 2.25},
                                     .posture = posture,
                                     .couch_markers = couch_markers};
-      const std::string id = store_->AddReference(kAnna, scan, "", plan);
-      const web::ReferencePlan stored = store_->FindReference(id)->plan;
+      const std::string id = store_->references.Add(kAnna, scan, "", plan);
+      const web::ReferencePlan stored = store_->references.Find(id)->plan;
       EXPECT_EQ(stored.region_m, plan.region_m);
       EXPECT_EQ(stored.isocentre_m, plan.isocentre_m);
       EXPECT_EQ(stored.tolerance.shift_mm, 7.5);
@@ -177,7 +178,7 @@ TEST_F(StoreCareTest, EveryFieldOfAPlanComesBackAsItWasStored) {
 
 TEST_F(StoreCareTest, AStoredPlanThatCannotBeReadIsAnErrorAndNoDefault) {
   const std::string scan = StoreScan(*store_, patient_);
-  const std::string id = store_->AddReference(kAnna, scan, "", {});
+  const std::string id = store_->references.Add(kAnna, scan, "", {});
   const std::string good = PlanJson({});
   EXPECT_EQ(ParsePlan(good).tolerance.shift_mm, web::ReferencePlan{}.tolerance.shift_mm);
   for (
@@ -194,18 +195,18 @@ TEST_F(StoreCareTest, AStoredPlanThatCannotBeReadIsAnErrorAndNoDefault) {
        R"({"region_m":[[0,0],[1,1],[1,null]],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false})",
        R"({"region_m":[],"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false,"isocentre_m":[0,1]})"}) {
     Execute(fmt::format("UPDATE refs SET plan = '{}' WHERE id = {}", bad, id));
-    EXPECT_THAT(MessageOf<DataError>([&] { (void)store_->FindReference(id); }),
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)store_->references.Find(id); }),
                 HasSubstr("version 1 of the reference"))
         << bad;
   }
   Execute(fmt::format("UPDATE refs SET plan = '{}' WHERE id = {}", good, id));
-  EXPECT_TRUE(store_->FindReference(id));
+  EXPECT_TRUE(store_->references.Find(id));
 }
 
 TEST_F(StoreCareTest, StoredSettingsThatCannotBeReadAreAnErrorAndOlderOnesAreNot) {
   web::Settings settings;
   settings.retention_days = 7;
-  store_->ChangeSettings(kAnna, settings);
+  store_->settings.Change(kAnna, settings);
   const std::string good = SettingsJson(settings);
   const auto store = [&](const std::string& text) {
     Execute(fmt::format("UPDATE settings SET value = '{}'", text));
@@ -216,15 +217,15 @@ TEST_F(StoreCareTest, StoredSettingsThatCannotBeReadAreAnErrorAndOlderOnesAreNot
        R"({"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false,"retention_days":"7"})",
        R"({"shift_tolerance_mm":3,"rotation_tolerance_deg":1,"posture":"HFS","couch_markers":false,"retention_days":-7})"}) {
     store(bad);
-    EXPECT_THAT(MessageOf<DataError>([&] { (void)store_->GetSettings(); }), HasSubstr("settings"))
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)store_->settings.Get(); }), HasSubstr("settings"))
         << bad;
   }
   store(
       R"({"shift_tolerance_mm":4,"rotation_tolerance_deg":1,"posture":"FFS","couch_markers":true})");
-  EXPECT_EQ(store_->GetSettings().tolerance.shift_mm, 4);
-  EXPECT_EQ(store_->GetSettings().idle_logout_min, web::Settings{}.idle_logout_min);
+  EXPECT_EQ(store_->settings.Get().tolerance.shift_mm, 4);
+  EXPECT_EQ(store_->settings.Get().idle_logout_min, web::Settings{}.idle_logout_min);
   store(good);
-  EXPECT_EQ(store_->GetSettings().retention_days, 7);
+  EXPECT_EQ(store_->settings.Get().retention_days, 7);
 }
 
 TEST_F(StoreCareTest, AStoredResultThatCannotBeReadIsAnErrorAndMissingNumbersAreNoZeros) {
@@ -251,37 +252,37 @@ TEST_F(StoreCareTest, AStoredResultThatCannotBeReadIsAnErrorAndMissingNumbersAre
 }
 
 TEST_F(StoreCareTest, AStoredNameThatIsNoneOfOursIsAnErrorAndAnAccountOfSuchARoleIsClosed) {
-  store_->AddUser(kAnna, {.name = "erik",
-                          .role = web::Role::kEngineer,
-                          .password_hash = "x",
-                          .disabled = false,
-                          .created_at = {}});
+  store_->users.Add(kAnna, {.name = "erik",
+                            .role = web::Role::kEngineer,
+                            .password_hash = "x",
+                            .disabled = false,
+                            .created_at = {}});
   const std::string scan = StoreScan(*store_, patient_);
-  EXPECT_FALSE(store_->FindUser("erik")->disabled);
+  EXPECT_FALSE(store_->users.Find("erik")->disabled);
   const auto change = [&](const std::string& column, const std::string& row) {
     Execute("PRAGMA ignore_check_constraints = ON; UPDATE " + column + " = 'other' WHERE " + row);
   };
   change("users SET role", "name = 'erik'");
   change("scans SET purpose", "id = " + std::to_string(std::stoi(scan)));
-  EXPECT_TRUE(store_->FindUser("erik")->disabled);
-  ASSERT_EQ(store_->Users().size(), 1U) << "an appliance without accounts offers to make one";
-  EXPECT_THAT(MessageOf<DataError>([&] { (void)store_->FindScan(scan); }),
+  EXPECT_TRUE(store_->users.Find("erik")->disabled);
+  ASSERT_EQ(store_->users.List().size(), 1U) << "an appliance without accounts offers to make one";
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)store_->scans.Find(scan); }),
               HasSubstr("purpose 'other'"));
 }
 
 TEST_F(StoreCareTest, APlanThatCannotBeReadHidesNoOtherOfThePatient) {
-  const std::string first = store_->AddReference(kAnna, StoreScan(*store_, patient_), "", {});
-  const std::string second = store_->AddReference(kAnna, StoreScan(*store_, patient_), "", {});
+  const std::string first = store_->references.Add(kAnna, StoreScan(*store_, patient_), "", {});
+  const std::string second = store_->references.Add(kAnna, StoreScan(*store_, patient_), "", {});
   store_.reset();
   Execute("UPDATE refs SET plan = '{' WHERE id = " + second);
   store_ = std::make_unique<Store>(state());
-  const std::vector<web::Reference> references = store_->References(patient_);
+  const std::vector<web::Reference> references = store_->references.List(patient_);
   ASSERT_EQ(references.size(), 2U);
   EXPECT_EQ(references[0].id, second);
   EXPECT_THAT(references[0].unreadable, HasSubstr("cannot be read"));
   EXPECT_EQ(references[1].unreadable, "");
-  EXPECT_THROW((void)store_->FindReference(second), DataError) << "never used as a default";
-  EXPECT_EQ(store_->FindReference(first)->id, first);
+  EXPECT_THROW((void)store_->references.Find(second), DataError) << "never used as a default";
+  EXPECT_EQ(store_->references.Find(first)->id, first);
 }
 
 TEST_F(StoreCareTest, ACheckThatCannotBeReadHasNotPassed) {
@@ -294,7 +295,7 @@ TEST_F(StoreCareTest, ACheckThatCannotBeReadHasNotPassed) {
 }
 
 TEST_F(StoreCareTest, TheCheckOfTheDatabaseEndsInTime) {
-  for (int i = 0; i < 300; ++i) store_->Log(kAnna, "note", "", std::string(1000, 'n'));
+  for (int i = 0; i < 300; ++i) store_->audit.Log(kAnna, "note", "", std::string(1000, 'n'));
   Database database(state() / "plumb.db", Database::Access::kReadOnly);
   EXPECT_TRUE(database.CheckIntegrity());
   EXPECT_FALSE(database.CheckIntegrity(std::chrono::milliseconds(-1)));

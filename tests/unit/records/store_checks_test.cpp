@@ -35,67 +35,67 @@ TEST_F(StoreTest, ACheckWithAStampOfTheFutureCountsForNoDay) {
       .Execute(
           "INSERT INTO checks (time, user, sensor_serial, status, json) VALUES (9000000000000000, "
           "'anna', 'S1', 'passed', '{}')");
-  EXPECT_FALSE(store->HasPassedCheckSince(web::WallClock::now()));
+  EXPECT_FALSE(store->checks.HasPassedSince(web::WallClock::now()));
 }
 
 TEST_F(StoreTest, ACheckOfTheSameDaySensorAndBaselineConfirmsAScanFromBeforeIt) {
   const auto store = Open();
-  const std::string patient = store->AddPatient(kAnna, "P-1", "");
+  const std::string patient = store->patients.Add(kAnna, "P-1", "");
   const auto scan = [&](const char* serial) {
-    const std::string id = store->BeginScan({.patient_id = patient,
-                                             .reference_id = "",
-                                             .sensor_serial = serial,
-                                             .reason = "",
-                                             .check_overdue = true});
-    store->FinishScan(
+    const std::string id = store->scans.Begin({.patient_id = patient,
+                                               .reference_id = "",
+                                               .sensor_serial = serial,
+                                               .reason = "",
+                                               .check_overdue = true});
+    store->scans.Finish(
         id, {.outcome = web::ScanOutcome::kFailed, .failure = "of this test", .result_json = ""});
     return id;
   };
   const std::string early = scan("S1");
   const std::string first =
-      store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
-  store->SetCheckBaseline(kBert, first);
-  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
-  EXPECT_FALSE(store->IsConfirmedByLaterCheck(early)) << "the baseline is younger than the scan";
+      store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
+  store->checks.SetBaseline(kBert, first);
+  store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_FALSE(store->checks.ConfirmsScan(early)) << "the baseline is younger than the scan";
 
   const std::string good = scan("S1"), other = scan("S2"), unnamed = scan("");
-  EXPECT_FALSE(store->IsConfirmedByLaterCheck(good)) << "the check that passed is older";
-  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
-  EXPECT_TRUE(store->IsConfirmedByLaterCheck(good));
-  EXPECT_FALSE(store->IsConfirmedByLaterCheck(other)) << "another unit";
-  EXPECT_FALSE(store->IsConfirmedByLaterCheck(unnamed));
-  EXPECT_FALSE(store->IsConfirmedByLaterCheck("none"));
+  EXPECT_FALSE(store->checks.ConfirmsScan(good)) << "the check that passed is older";
+  store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_TRUE(store->checks.ConfirmsScan(good));
+  EXPECT_FALSE(store->checks.ConfirmsScan(other)) << "another unit";
+  EXPECT_FALSE(store->checks.ConfirmsScan(unnamed));
+  EXPECT_FALSE(store->checks.ConfirmsScan("none"));
 
   const std::string doubtful = scan("S1");
-  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kFailed));
-  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
-  EXPECT_FALSE(store->IsConfirmedByLaterCheck(doubtful)) << "a check failed in between";
+  store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kFailed));
+  store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_FALSE(store->checks.ConfirmsScan(doubtful)) << "a check failed in between";
 
   const std::string yesterday = scan("S1");
-  store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
-  EXPECT_TRUE(store->IsConfirmedByLaterCheck(yesterday)) << "still of today";
+  store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kPassed));
+  EXPECT_TRUE(store->checks.ConfirmsScan(yesterday)) << "still of today";
   Database(database(), Database::Access::kReadWrite)
       .Execute(
           "UPDATE check_baselines SET set_at = 0; UPDATE scans SET started_at = started_at - "
           "86400000000, finished_at = finished_at - 86400000000 WHERE id = " +
           yesterday);
-  EXPECT_FALSE(store->IsConfirmedByLaterCheck(yesterday)) << "a check of another day";
+  EXPECT_FALSE(store->checks.ConfirmsScan(yesterday)) << "a check of another day";
 }
 
 TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   const auto before = web::WallClock::now() - std::chrono::seconds(1);
   {
     const auto store = Open();
-    EXPECT_FALSE(store->CheckBaseline());
-    EXPECT_FALSE(BaselineIn(store->CheckBaselineJson()));
+    EXPECT_FALSE(store->checks.Baseline());
+    EXPECT_FALSE(BaselineIn(store->checks.BaselineJson()));
     const std::string first =
-        store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
-    EXPECT_FALSE(store->HasPassedCheckSince(before)) << "without a baseline nothing has passed";
-    store->SetCheckBaseline(kBert, first);
-    store->AddCheck(kAnna, "S1", CheckWith(5, MarkerCheckStatus::kPassed));
+        store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
+    EXPECT_FALSE(store->checks.HasPassedSince(before)) << "without a baseline nothing has passed";
+    store->checks.SetBaseline(kBert, first);
+    store->checks.Add(kAnna, "S1", CheckWith(5, MarkerCheckStatus::kPassed));
   }
   const auto store = Open();
-  const std::vector<web::CheckRecord> checks = store->Checks(10);
+  const std::vector<web::CheckRecord> checks = store->checks.List(10);
   ASSERT_THAT(checks, SizeIs(2));
   EXPECT_EQ(checks[0].status, "passed");
   EXPECT_EQ(checks[0].user, "anna");
@@ -105,22 +105,22 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   EXPECT_EQ(checks[0].items[0].value, 1.25);
   EXPECT_EQ(checks[0].items[0].note, "marker 2");
   EXPECT_EQ(checks[1].reasons, std::vector<std::string>{"because"});
-  EXPECT_TRUE(store->HasPassedCheckSince(before));
-  EXPECT_FALSE(store->HasPassedCheckSince(web::WallClock::now() + std::chrono::hours(1)));
-  EXPECT_TRUE(store->HasPassedCheckSince(before, "S1"));
-  EXPECT_FALSE(store->HasPassedCheckSince(before, "S2")) << "another unit was not checked";
-  const auto baseline = store->CheckBaseline();
+  EXPECT_TRUE(store->checks.HasPassedSince(before));
+  EXPECT_FALSE(store->checks.HasPassedSince(web::WallClock::now() + std::chrono::hours(1)));
+  EXPECT_TRUE(store->checks.HasPassedSince(before, "S1"));
+  EXPECT_FALSE(store->checks.HasPassedSince(before, "S2")) << "another unit was not checked";
+  const auto baseline = store->checks.Baseline();
   ASSERT_TRUE(baseline);
   EXPECT_EQ(baseline->check_id, checks[1].id);
   EXPECT_EQ(baseline->set_by, "bert");
   EXPECT_EQ(baseline->num_markers, 4U);
-  const auto markers = BaselineIn(store->CheckBaselineJson());
+  const auto markers = BaselineIn(store->checks.BaselineJson());
   ASSERT_TRUE(markers);
   EXPECT_EQ(markers->dictionary, "DICT_6X6_250");
   EXPECT_NEAR(markers->markers.at(3).corners[0].x(), 0.9 - 0.052, 1e-12);
   EXPECT_EQ(markers->markers.at(3).num_views, 9);
   std::vector<std::string> actions;
-  for (const web::AuditEntry& entry : store->Audit({0, 10}))
+  for (const web::AuditEntry& entry : store->audit.Find({0, 10}))
     actions.push_back(entry.user + " " + entry.action + " " + entry.detail);
   EXPECT_THAT(actions,
               ::testing::IsSupersetOf({"anna check.done passed", "anna check.done no_baseline",
@@ -129,19 +129,20 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
 
 TEST_F(StoreTest, ABaselineNeedsACheckThatSawMarkers) {
   const auto store = Open();
-  EXPECT_EQ(RefusalOf([&] { store->SetCheckBaseline(kAnna, "77"); }), ChangeResult::kNotFound);
-  EXPECT_EQ(RefusalOf([&] { store->SetCheckBaseline(kAnna, "x"); }), ChangeResult::kNotFound);
-  const std::string blind = store->AddCheck(kAnna, "S1", CheckWith(2, MarkerCheckStatus::kFailed));
-  EXPECT_EQ(RefusalOf([&] { store->SetCheckBaseline(kBert, blind); }), ChangeResult::kConflict);
+  EXPECT_EQ(RefusalOf([&] { store->checks.SetBaseline(kAnna, "77"); }), ChangeResult::kNotFound);
+  EXPECT_EQ(RefusalOf([&] { store->checks.SetBaseline(kAnna, "x"); }), ChangeResult::kNotFound);
+  const std::string blind =
+      store->checks.Add(kAnna, "S1", CheckWith(2, MarkerCheckStatus::kFailed));
+  EXPECT_EQ(RefusalOf([&] { store->checks.SetBaseline(kBert, blind); }), ChangeResult::kConflict);
   const std::string good =
-      store->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
-  EXPECT_EQ(RefusalOf([&] { store->SetCheckBaseline(kAnna, good); }), ChangeResult::kRefused)
+      store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
+  EXPECT_EQ(RefusalOf([&] { store->checks.SetBaseline(kAnna, good); }), ChangeResult::kRefused)
       << "not by the person who took it";
-  EXPECT_FALSE(store->CheckBaseline());
+  EXPECT_FALSE(store->checks.Baseline());
 }
 
 TEST_F(StoreTest, ChecksAreNeverChanged) {
-  (void)Open()->AddCheck(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kFailed));
+  (void)Open()->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kFailed));
   Database direct(database(), Database::Access::kReadWrite);
   EXPECT_THROW(direct.Execute("UPDATE checks SET status = 'passed'"), ConstraintBroken);
   EXPECT_THROW(direct.Execute("DELETE FROM checks"), ConstraintBroken);

@@ -26,26 +26,26 @@ class StoreTest : public ::testing::Test {
   std::unique_ptr<Store> Open() const { return std::make_unique<Store>(folder_ / "state"); }
 
   static void FillStaging(const Store& store, const std::string& id) {
-    std::filesystem::create_directories(store.StagingFolder(id) / "scene");
-    WriteWholeFile(store.StagingFolder(id) / "scene" / "scene.json", std::string_view("{}"));
+    std::filesystem::create_directories(store.folders.Staging(id) / "scene");
+    WriteWholeFile(store.folders.Staging(id) / "scene" / "scene.json", std::string_view("{}"));
   }
   static std::string Scan(Store& store, const std::string& patient,
                           const std::string& reference = "", const std::string& result = "") {
-    const std::string id = store.BeginScan({.patient_id = patient,
-                                            .reference_id = reference,
-                                            .purpose = {},
-                                            .sensor_serial = "S1",
-                                            .reason = {}});
+    const std::string id = store.scans.Begin({.patient_id = patient,
+                                              .reference_id = reference,
+                                              .purpose = {},
+                                              .sensor_serial = "S1",
+                                              .reason = {}});
     FillStaging(store, id);
-    store.FinishScan(id, {.outcome = web::ScanOutcome::kDone,
-                          .failure = {},
-                          .result_json = result,
-                          .swept_area_m2 = 2.5});
+    store.scans.Finish(id, {.outcome = web::ScanOutcome::kDone,
+                            .failure = {},
+                            .result_json = result,
+                            .swept_area_m2 = 2.5});
     return id;
   }
   static std::string ApprovedReference(Store& store, const std::string& patient) {
-    const std::string id = store.AddReference(kAnna, Scan(store, patient), "first", {});
-    store.ApproveReference(kBert, id, 1);
+    const std::string id = store.references.Add(kAnna, Scan(store, patient), "first", {});
+    store.references.Approve(kBert, id, 1);
     return id;
   }
   template <typename Call>

@@ -19,11 +19,11 @@ using testing::StoreScan;
 class StoreIntegrityTest : public ::testing::Test {
  protected:
   StoreIntegrityTest() : store_(folder_ / "state") {
-    patient_ = store_.AddPatient(kAnna, "P", "");
+    patient_ = store_.patients.Add(kAnna, "P", "");
     scan_ = StoreScan(store_, patient_);
   }
   [[nodiscard]] fs::path File(const std::string& name) const {
-    return store_.ScanFolder(scan_) / name;
+    return store_.folders.Scan(scan_) / name;
   }
   /// One byte becomes another; size and all else stay.
   void Flip(const std::string& name) const {
@@ -48,67 +48,67 @@ TEST_F(StoreIntegrityTest, TheDigestIsSha256) {
 }
 
 TEST_F(StoreIntegrityTest, OneFlippedBitInAnyFileIsFoundAndNamed) {
-  EXPECT_EQ(store_.CheckFiles(scan_, false), "");
+  EXPECT_EQ(store_.integrity.Check(scan_, false), "");
   for (const std::string file : testing::kScanFiles) {
     Flip(file);
-    EXPECT_THAT(store_.CheckFiles(scan_, false), AllOf(HasSubstr(file), HasSubstr("changed")));
-    EXPECT_TRUE(store_.FindScan(scan_)->folder.empty());
-    EXPECT_THAT(store_.FindScan(scan_)->failure, HasSubstr(file));
-    EXPECT_EQ(store_.Audit({0, 1}).at(0).action, "scan.unavailable");
-    EXPECT_EQ(store_.CheckFiles(scan_, true).empty(), file.starts_with("result/"))
+    EXPECT_THAT(store_.integrity.Check(scan_, false), AllOf(HasSubstr(file), HasSubstr("changed")));
+    EXPECT_TRUE(store_.scans.Find(scan_)->folder.empty());
+    EXPECT_THAT(store_.scans.Find(scan_)->failure, HasSubstr(file));
+    EXPECT_EQ(store_.audit.Find({0, 1}).at(0).action, "scan.unavailable");
+    EXPECT_EQ(store_.integrity.Check(scan_, true).empty(), file.starts_with("result/"))
         << "a comparison reads the scene alone";
     Flip(file);
-    EXPECT_EQ(store_.CheckFiles(scan_, false), "");
-    EXPECT_FALSE(store_.FindScan(scan_)->folder.empty());
-    EXPECT_EQ(store_.Audit({0, 1}).at(0).action, "scan.available");
+    EXPECT_EQ(store_.integrity.Check(scan_, false), "");
+    EXPECT_FALSE(store_.scans.Find(scan_)->folder.empty());
+    EXPECT_EQ(store_.audit.Find({0, 1}).at(0).action, "scan.available");
   }
 }
 
 TEST_F(StoreIntegrityTest, AFileThatCameLaterIsNotTakenForAStoredOne) {
   WriteWholeFile(File("scene/extra.ply"), std::string_view("x"));
-  EXPECT_EQ(store_.CheckFiles(scan_, false), "");
+  EXPECT_EQ(store_.integrity.Check(scan_, false), "");
   fs::remove(File("scene/extra.ply"));
-  EXPECT_EQ(store_.CheckFiles(scan_, false), "");
+  EXPECT_EQ(store_.integrity.Check(scan_, false), "");
 }
 
 TEST_F(StoreIntegrityTest, ARecordingIsNotedWhenFirstSeenAndMayGoForTheQuota) {
   fs::create_directory(File("recording"));
   for (const char* name : {"rgb.txt", "depth.txt"})
     WriteWholeFile(File("recording") / name, std::string(1000, name[0]));
-  EXPECT_EQ(store_.CheckFiles(scan_, false), "");
+  EXPECT_EQ(store_.integrity.Check(scan_, false), "");
   Flip("recording/depth.txt");
-  EXPECT_THAT(store_.CheckFiles(scan_, false), HasSubstr("recording"));
-  EXPECT_EQ(store_.CheckFiles(scan_, true), "") << "no comparison reads it";
+  EXPECT_THAT(store_.integrity.Check(scan_, false), HasSubstr("recording"));
+  EXPECT_EQ(store_.integrity.Check(scan_, true), "") << "no comparison reads it";
   Flip("recording/depth.txt");
-  EXPECT_EQ(store_.CheckFiles(scan_, false), "");
-  EXPECT_EQ(store_.KeepWithinQuota(1000), 1);
+  EXPECT_EQ(store_.integrity.Check(scan_, false), "");
+  EXPECT_EQ(store_.removal.KeepWithinQuota(1000), 1);
   EXPECT_FALSE(fs::exists(File("recording")));
-  EXPECT_EQ(store_.CheckFiles(scan_, false), "") << "it was removed on purpose";
+  EXPECT_EQ(store_.integrity.Check(scan_, false), "") << "it was removed on purpose";
 }
 
 TEST_F(StoreIntegrityTest, ScansAreCheckedInTurnAndNotTooOften) {
   const std::string second = StoreScan(store_, patient_);
   using std::chrono::hours;
-  EXPECT_EQ(store_.CheckNextScan(hours(24))->id, scan_);
+  EXPECT_EQ(store_.integrity.CheckNext(hours(24))->id, scan_);
   Flip("scene/cloud.ply");
-  EXPECT_EQ(store_.CheckNextScan(hours(24))->id, second);
-  EXPECT_FALSE(store_.CheckNextScan(hours(24)));
-  const auto checked = store_.CheckNextScan(hours(0));
+  EXPECT_EQ(store_.integrity.CheckNext(hours(24))->id, second);
+  EXPECT_FALSE(store_.integrity.CheckNext(hours(24)));
+  const auto checked = store_.integrity.CheckNext(hours(0));
   ASSERT_TRUE(checked);
   EXPECT_EQ(checked->id, scan_);
   EXPECT_THAT(checked->fault, HasSubstr("scene/cloud.ply"));
 }
 
 TEST_F(StoreIntegrityTest, AReferenceIsApprovedOnlyAsItWasStored) {
-  const std::string reference = store_.AddReference(kAnna, scan_, "", {});
+  const std::string reference = store_.references.Add(kAnna, scan_, "", {});
   Flip("scene/heightmap.tiff");
   EXPECT_THAT(
-      testing::MessageOf<StoreRefusal>([&] { store_.ApproveReference(kBert, reference, 1); }),
+      testing::MessageOf<StoreRefusal>([&] { store_.references.Approve(kBert, reference, 1); }),
       HasSubstr("scene/heightmap.tiff"));
-  EXPECT_FALSE(store_.ApprovedReference(patient_));
+  EXPECT_FALSE(store_.references.Approved(patient_));
   Flip("scene/heightmap.tiff");
-  store_.ApproveReference(kBert, reference, 1);
-  EXPECT_TRUE(store_.ApprovedReference(patient_));
+  store_.references.Approve(kBert, reference, 1);
+  EXPECT_TRUE(store_.references.Approved(patient_));
 }
 
 TEST_F(StoreIntegrityTest, TheDigestOfAStoredFileCannotBeChanged) {
@@ -117,22 +117,22 @@ TEST_F(StoreIntegrityTest, TheDigestOfAStoredFileCannotBeChanged) {
 }
 
 TEST_F(StoreIntegrityTest, TheAuditLogShowsWhatWasChangedInItOrTakenFromIt) {
-  for (int i = 0; i < 5; ++i) store_.Log(kAnna, "note", std::to_string(i), "text");
-  ASSERT_EQ(store_.FirstBrokenAuditEntry(), std::nullopt);
+  for (int i = 0; i < 5; ++i) store_.audit.Log(kAnna, "note", std::to_string(i), "text");
+  ASSERT_EQ(store_.audit.FirstBroken(), std::nullopt);
   Database direct(folder_ / "state" / "plumb.db", Database::Access::kReadWrite);
   direct.Execute("DROP TRIGGER audit_no_update; DROP TRIGGER audit_no_delete");
-  const auto number = store_.Audit({0, 3}).at(2).number;
+  const auto number = store_.audit.Find({0, 3}).at(2).number;
   const auto restore = [&](const std::string& detail) {
     direct.Execute(fmt::format("UPDATE audit SET detail = '{}' WHERE number = {}", detail, number));
   };
   restore("texT");
-  EXPECT_EQ(store_.FirstBrokenAuditEntry(), number);
+  EXPECT_EQ(store_.audit.FirstBroken(), number);
   restore("text");
-  EXPECT_EQ(store_.FirstBrokenAuditEntry(), std::nullopt);
+  EXPECT_EQ(store_.audit.FirstBroken(), std::nullopt);
   direct.Execute(fmt::format("DELETE FROM audit WHERE number > {}", number));
-  EXPECT_EQ(store_.FirstBrokenAuditEntry(), number + 1) << "the newest entries are gone";
+  EXPECT_EQ(store_.audit.FirstBroken(), number + 1) << "the newest entries are gone";
   direct.Execute(fmt::format("DELETE FROM audit WHERE number = {}", number - 1));
-  EXPECT_EQ(store_.FirstBrokenAuditEntry(), number - 1);
+  EXPECT_EQ(store_.audit.FirstBroken(), number - 1);
 }
 
 }  // namespace

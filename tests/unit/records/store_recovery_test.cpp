@@ -41,7 +41,7 @@ class StoreRecoveryTest : public ::testing::Test {
   }
   static std::vector<std::string> Actions(Store& store) {
     std::vector<std::string> actions;
-    for (const web::AuditEntry& entry : store.Audit({0, 1000}))
+    for (const web::AuditEntry& entry : store.audit.Find({0, 1000}))
       actions.push_back(entry.action + " " + entry.subject + ": " + entry.detail);
     return actions;
   }
@@ -55,13 +55,13 @@ class OneDamagedFile {
   OneDamagedFile(const fs::path& state, const std::string& file, bool of_reference, Damage damage)
       : state_(state), damage_(damage) {
     Store store(state);
-    const std::string patient = store.AddPatient(kAnna, "P", "");
+    const std::string patient = store.patients.Add(kAnna, "P", "");
     reference = StoreScan(store, patient);
-    store.ApproveReference(kBert, store.AddReference(kAnna, reference, "", {}), 1);
+    store.references.Approve(kBert, store.references.Add(kAnna, reference, "", {}), 1);
     for (int i = 0; i < 5; ++i) scans.push_back(StoreScan(store, patient));
     hit = of_reference ? reference : scans[2];
-    FillScan(store.StagingFolder(store.BeginScan(testing::Begun(patient))));
-    path_ = store.ScanFolder(hit) / file;
+    FillScan(store.folders.Staging(store.scans.Begin(testing::Begun(patient))));
+    path_ = store.folders.Scan(hit) / file;
     before = testing::FilesBelow(state / "scans");
     std::erase_if(before, [](const auto& entry) { return entry.first.starts_with(".staging"); });
   }
@@ -119,7 +119,7 @@ TEST_F(StoreRecoveryTest, NoDamageToAFileOfAScanMakesAStartDeleteAnything) {
           EXPECT_EQ(store.recovery().foreign_folders, 0);
           EXPECT_EQ(store.recovery().broken_references, of_reference ? 1 : 0);
           EXPECT_EQ(testing::FilesBelow(state / "scans"), expected);
-          const auto scan = store.FindScan(damaged.hit);
+          const auto scan = store.scans.Find(damaged.hit);
           ASSERT_TRUE(scan);
           EXPECT_TRUE(scan->folder.empty()) << "what cannot be seen whole is not shown";
           EXPECT_THAT(scan->failure, HasSubstr(file));
@@ -131,8 +131,8 @@ TEST_F(StoreRecoveryTest, NoDamageToAFileOfAScanMakesAStartDeleteAnything) {
         damaged.Mend();
         Store store(state);
         EXPECT_EQ(store.recovery().attached_scans, 1);
-        EXPECT_EQ(store.FindScan(damaged.hit)->folder, store.ScanFolder(damaged.hit));
-        EXPECT_EQ(store.FindScan(damaged.hit)->failure, "");
+        EXPECT_EQ(store.scans.Find(damaged.hit)->folder, store.folders.Scan(damaged.hit));
+        EXPECT_EQ(store.scans.Find(damaged.hit)->failure, "");
         EXPECT_EQ(testing::FilesBelow(state / "scans"), damaged.before);
         EXPECT_THAT(Actions(store), Contains(StartsWith("scan.available " + damaged.hit)));
         ++rounds;
@@ -155,11 +155,11 @@ TEST_F(StoreRecoveryTest, NoDamageToAFileOfAStagingFolderHoldsItBack) {
       std::string id, done;
       {
         Store store(folder / "state");
-        const std::string patient = store.AddPatient(kAnna, "P", "");
+        const std::string patient = store.patients.Add(kAnna, "P", "");
         done = StoreScan(store, patient);
-        id = store.BeginScan(testing::Begun(patient));
-        FillScan(store.StagingFolder(id));
-        const fs::path path = store.StagingFolder(id) / file;
+        id = store.scans.Begin(testing::Begun(patient));
+        FillScan(store.folders.Staging(id));
+        const fs::path path = store.folders.Staging(id) / file;
         fs::remove(path);
         if (damage == Damage::kTruncated) WriteWholeFile(path, std::string_view("x"));
         if (damage == Damage::kDanglingLink) fs::create_symlink("nowhere", path);
@@ -169,12 +169,12 @@ TEST_F(StoreRecoveryTest, NoDamageToAFileOfAStagingFolderHoldsItBack) {
       EXPECT_EQ(store.recovery().interrupted_scans, 1);
       EXPECT_EQ(store.recovery().orphaned_folders, 1);
       EXPECT_EQ(store.recovery().lost_scans, 0);
-      EXPECT_FALSE(fs::exists(store.StagingFolder(id)));
-      EXPECT_EQ(store.FindScan(id)->outcome, web::ScanOutcome::kFailed);
-      EXPECT_FALSE(store.FindScan(done)->folder.empty());
+      EXPECT_FALSE(fs::exists(store.folders.Staging(id)));
+      EXPECT_EQ(store.scans.Find(id)->outcome, web::ScanOutcome::kFailed);
+      EXPECT_FALSE(store.scans.Find(done)->folder.empty());
       EXPECT_THAT(Actions(store), Contains(StartsWith("folder.remove .staging-" + id)));
       ++rounds;
-      if (fs::exists(store.ScanFolder(done))) ++survived;
+      if (fs::exists(store.folders.Scan(done))) ++survived;
     }
   }
   fmt::print("damaged files of staging folders: {} rounds, {} with the finished scan, {} lost\n",
@@ -187,9 +187,9 @@ TEST_F(StoreRecoveryTest, WithoutTheFolderOfScansItIsSafeModeAndNothingIsChanged
   std::size_t entries = 0;
   {
     const auto store = Open();
-    const std::string patient = store->AddPatient(kAnna, "P", "");
+    const std::string patient = store->patients.Add(kAnna, "P", "");
     for (int i = 0; i < 4; ++i) scans.push_back(StoreScan(*store, patient));
-    (void)store->BeginScan(testing::Begun(patient));  // and the power goes
+    (void)store->scans.Begin(testing::Begun(patient));  // and the power goes
     entries = Actions(*store).size();
   }
   const auto before = testing::FilesBelow(state() / "scans");
@@ -200,12 +200,12 @@ TEST_F(StoreRecoveryTest, WithoutTheFolderOfScansItIsSafeModeAndNothingIsChanged
     EXPECT_FALSE(fs::exists(state() / "scans"));
     const auto readable = Store::OpenReadable(state());
     EXPECT_EQ(Actions(*readable).size(), entries);
-    EXPECT_EQ(readable->FindScan("5")->outcome, web::ScanOutcome::kRunning);
+    EXPECT_EQ(readable->scans.Find("5")->outcome, web::ScanOutcome::kRunning);
   }
   fs::rename(folder_ / "disk", state() / "scans");
   const auto store = Open();
   EXPECT_EQ(store->recovery().lost_scans, 0);
-  for (const std::string& scan : scans) EXPECT_FALSE(store->FindScan(scan)->folder.empty());
+  for (const std::string& scan : scans) EXPECT_FALSE(store->scans.Find(scan)->folder.empty());
   EXPECT_EQ(testing::FilesBelow(state() / "scans"), before);
 }
 
@@ -213,7 +213,7 @@ TEST_F(StoreRecoveryTest, HalfOfTheScansIsSafeModeAndLessIsNot) {
   std::vector<std::string> scans;
   {
     const auto store = Open();
-    const std::string patient = store->AddPatient(kAnna, "P", "");
+    const std::string patient = store->patients.Add(kAnna, "P", "");
     for (int i = 0; i < 5; ++i) scans.push_back(StoreScan(*store, patient));
   }
   const auto hide = [&](std::size_t n) {
@@ -236,8 +236,8 @@ TEST_F(StoreRecoveryTest, HalfOfTheScansIsSafeModeAndLessIsNot) {
 TEST_F(StoreRecoveryTest, APersonSaysThatTheFilesAreGoneForGood) {
   {
     const auto store = Open();
-    const std::string patient = store->AddPatient(kAnna, "P", "");
-    for (int i = 0; i < 3; ++i) fs::remove_all(store->ScanFolder(StoreScan(*store, patient)));
+    const std::string patient = store->patients.Add(kAnna, "P", "");
+    for (int i = 0; i < 3; ++i) fs::remove_all(store->folders.Scan(StoreScan(*store, patient)));
   }
   EXPECT_THAT(MessageOf<ScansMissing>([&] { (void)Open(); }), HasSubstr("scans-are-lost"));
   WriteWholeFile(state() / "scans-are-lost", std::string_view());
@@ -250,31 +250,31 @@ TEST_F(StoreRecoveryTest, TheOnlyScanMayBeMissingAndComesBack) {
   std::string scan;
   {
     const auto store = Open();
-    scan = StoreScan(*store, store->AddPatient(kAnna, "P", ""));
+    scan = StoreScan(*store, store->patients.Add(kAnna, "P", ""));
   }
   fs::rename(state() / "scans", folder_ / "disk");
   EXPECT_EQ(Open()->recovery().lost_scans, 1);
   fs::remove_all(state() / "scans");
   fs::rename(folder_ / "disk", state() / "scans");
   EXPECT_EQ(Open()->recovery().attached_scans, 1);
-  EXPECT_EQ(Open()->FindScan(scan)->folder, state() / "scans" / scan);
+  EXPECT_EQ(Open()->scans.Find(scan)->folder, state() / "scans" / scan);
 }
 
 TEST_F(StoreRecoveryTest, ACompleteFolderOfAScanThatNoRowKnowsToHaveEndedIsSetAside) {
   std::string id;
   {
     const auto store = Open();
-    id = store->BeginScan(testing::Begun(store->AddPatient(kAnna, "A", "")));
-    FillScan(store->StagingFolder(id));
-    fs::rename(store->StagingFolder(id), store->ScanFolder(id));  // and here the power goes
+    id = store->scans.Begin(testing::Begun(store->patients.Add(kAnna, "A", "")));
+    FillScan(store->folders.Staging(id));
+    fs::rename(store->folders.Staging(id), store->folders.Scan(id));  // and here the power goes
   }
   const auto store = Open();
   EXPECT_EQ(store->recovery().orphaned_folders, 0);
   EXPECT_EQ(store->recovery().foreign_folders, 1);
-  EXPECT_FALSE(fs::exists(store->ScanFolder(id)));
+  EXPECT_FALSE(fs::exists(store->folders.Scan(id)));
   EXPECT_TRUE(fs::exists(state() / "set-aside" / (id + "-interrupted") / "scene" / "scene.json"));
-  EXPECT_EQ(store->FindScan(id)->outcome, web::ScanOutcome::kFailed);
-  store->WipePatient(kAnna, store->FindPatientByCode("A")->id);
+  EXPECT_EQ(store->scans.Find(id)->outcome, web::ScanOutcome::kFailed);
+  store->removal.WipePatient(kAnna, store->patients.FindByCode("A")->id);
   EXPECT_THAT(testing::FilesBelow(state() / "set-aside"), IsEmpty()) << "the patient's too";
 }
 
@@ -282,15 +282,15 @@ TEST_F(StoreRecoveryTest, WhatWasRemovedOnPurposeAndCameBackGoesAtTheNextStart) 
   std::string scan;
   {
     const auto store = Open();
-    const std::string patient = store->AddPatient(kAnna, "A", "");
+    const std::string patient = store->patients.Add(kAnna, "A", "");
     scan = StoreScan(*store, patient);
-    fs::copy(store->ScanFolder(scan), folder_ / "copy", fs::copy_options::recursive);
-    store->WipePatient(kAnna, patient);
-    fs::rename(folder_ / "copy", store->ScanFolder(scan));  // as if the power had gone before
+    fs::copy(store->folders.Scan(scan), folder_ / "copy", fs::copy_options::recursive);
+    store->removal.WipePatient(kAnna, patient);
+    fs::rename(folder_ / "copy", store->folders.Scan(scan));  // as if the power had gone before
   }
   const auto store = Open();
   EXPECT_EQ(store->recovery().orphaned_folders, 1);
-  EXPECT_FALSE(fs::exists(store->ScanFolder(scan)));
+  EXPECT_FALSE(fs::exists(store->folders.Scan(scan)));
   EXPECT_THAT(Actions(*store), Contains(StartsWith("folder.remove " + scan)));
 }
 
@@ -298,7 +298,7 @@ TEST_F(StoreRecoveryTest, AFolderOfANumberThatWasGivenOutAndHasNoRowIsSetAside) 
   const std::string scan = "000001";
   {
     const auto store = Open();
-    ASSERT_EQ(StoreScan(*store, store->AddPatient(kAnna, "A", "")), scan);
+    ASSERT_EQ(StoreScan(*store, store->patients.Add(kAnna, "A", "")), scan);
   }
   {
     Database direct(state() / "plumb.db", Database::Access::kReadWrite);
@@ -312,7 +312,7 @@ TEST_F(StoreRecoveryTest, AStoreOfVersion4KeepsScansThatItHadGivenUp) {
   std::string kept, given_up;
   {
     const auto store = Open();
-    const std::string patient = store->AddPatient(kAnna, "A", "");
+    const std::string patient = store->patients.Add(kAnna, "A", "");
     kept = StoreScan(*store, patient);
     given_up = StoreScan(*store, patient);
   }
@@ -332,13 +332,13 @@ TEST_F(StoreRecoveryTest, AStoreOfVersion4KeepsScansThatItHadGivenUp) {
   EXPECT_EQ(store->recovery().orphaned_folders, 0);
   EXPECT_EQ(store->recovery().attached_scans, 1);
   for (const std::string& scan : {kept, given_up}) {
-    EXPECT_EQ(store->FindScan(scan)->folder, store->ScanFolder(scan));
-    EXPECT_EQ(store->FindScan(scan)->failure, "");
-    EXPECT_EQ(store->CheckFiles(scan, false), "") << "first seen";
-    WriteWholeFile(store->ScanFolder(scan) / "scene" / "mesh.ply", std::string_view("another"));
-    EXPECT_THAT(store->CheckFiles(scan, false), HasSubstr("scene/mesh.ply"));
+    EXPECT_EQ(store->scans.Find(scan)->folder, store->folders.Scan(scan));
+    EXPECT_EQ(store->scans.Find(scan)->failure, "");
+    EXPECT_EQ(store->integrity.Check(scan, false), "") << "first seen";
+    WriteWholeFile(store->folders.Scan(scan) / "scene" / "mesh.ply", std::string_view("another"));
+    EXPECT_THAT(store->integrity.Check(scan, false), HasSubstr("scene/mesh.ply"));
   }
-  EXPECT_EQ(store->FirstBrokenAuditEntry(), std::nullopt) << "older entries have no chain";
+  EXPECT_EQ(store->audit.FirstBroken(), std::nullopt) << "older entries have no chain";
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ using testing::StoreTest;
 
 TEST_F(StoreTest, OldScansGoAndReferencesStay) {
   const auto store = Open();
-  const std::string patient = store->AddPatient(kAnna, "A", "");
+  const std::string patient = store->patients.Add(kAnna, "A", "");
   const std::string reference = ApprovedReference(*store, patient);
   const std::string old = Scan(*store, patient, reference, kResult);
   {
@@ -24,17 +24,17 @@ TEST_F(StoreTest, OldScansGoAndReferencesStay) {
     direct.Execute("UPDATE scans SET started_at = 0");
   }
   const std::string fresh = Scan(*store, patient, reference, kResult);
-  EXPECT_EQ(store->RemoveOldScans(0), 0) << "0: never";
-  EXPECT_EQ(store->RemoveOldScans(30), 1);
-  EXPECT_EQ(store->FindScan(old), std::nullopt);
-  EXPECT_FALSE(fs::exists(store->ScanFolder(old)));
-  EXPECT_TRUE(store->FindScan(fresh));
-  EXPECT_TRUE(fs::exists(store->ScanFolder(store->FindReference(reference)->scan_id)));
+  EXPECT_EQ(store->removal.RemoveOldScans(0), 0) << "0: never";
+  EXPECT_EQ(store->removal.RemoveOldScans(30), 1);
+  EXPECT_EQ(store->scans.Find(old), std::nullopt);
+  EXPECT_FALSE(fs::exists(store->folders.Scan(old)));
+  EXPECT_TRUE(store->scans.Find(fresh));
+  EXPECT_TRUE(fs::exists(store->folders.Scan(store->references.Find(reference)->scan_id)));
 }
 
 TEST_F(StoreTest, AWrongClockMakesNoScanOld) {
   const auto store = Open();
-  const std::string patient = store->AddPatient(kAnna, "A", "");
+  const std::string patient = store->patients.Add(kAnna, "A", "");
   const std::string first = Scan(*store, patient), with_early_clock = Scan(*store, patient),
                     with_late_clock = Scan(*store, patient);
   const std::string last = Scan(*store, patient);
@@ -44,85 +44,85 @@ TEST_F(StoreTest, AWrongClockMakesNoScanOld) {
   };
   stamp(with_early_clock, "0");
   stamp(with_late_clock, "9000000000000000");
-  EXPECT_EQ(store->RemoveOldScans(30), 0);
+  EXPECT_EQ(store->removal.RemoveOldScans(30), 0);
   for (const std::string& scan : {first, last}) stamp(scan, "1000000");
-  EXPECT_EQ(store->RemoveOldScans(30), 4) << "a stamp of the future keeps nothing for ever";
+  EXPECT_EQ(store->removal.RemoveOldScans(30), 4) << "a stamp of the future keeps nothing for ever";
 }
 
 TEST_F(StoreTest, CareEndsSoonWhenItIsTold) {
   const auto store = Open();
-  (void)Scan(*store, store->AddPatient(kAnna, "A", ""));
+  (void)Scan(*store, store->patients.Add(kAnna, "A", ""));
   Database(database(), Database::Access::kReadWrite).Execute("UPDATE scans SET started_at = 0");
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_EQ(store->RemoveOldScans(30, stop.get_token()), 0);
-  EXPECT_EQ(store->KeepWithinQuota(0, stop.get_token()), 0);
-  EXPECT_EQ(store->KeepWithinQuota(0), 1);
+  EXPECT_EQ(store->removal.RemoveOldScans(30, stop.get_token()), 0);
+  EXPECT_EQ(store->removal.KeepWithinQuota(0, stop.get_token()), 0);
+  EXPECT_EQ(store->removal.KeepWithinQuota(0), 1);
 }
 
 TEST_F(StoreTest, AScanWhoseRowTheDiskRefusesIsNoneAndLeavesNothing) {
   std::string patient, id;
   {
     const auto store = Open();
-    patient = store->AddPatient(kAnna, "A", "");
+    patient = store->patients.Add(kAnna, "A", "");
   }
   EXPECT_EQ(testing::WriteOnFullDisk(
                 200'000,
                 [&] {
                   const auto store = Open();
-                  const std::string scan = store->BeginScan({.patient_id = patient,
-                                                             .reference_id = {},
-                                                             .purpose = {},
-                                                             .sensor_serial = {},
-                                                             .reason = {}});
+                  const std::string scan = store->scans.Begin({.patient_id = patient,
+                                                               .reference_id = {},
+                                                               .purpose = {},
+                                                               .sensor_serial = {},
+                                                               .reason = {}});
                   FillStaging(*store, scan);
                   const std::string large(400'000, ' ');  // does not fit
-                  EXPECT_THROW(store->FinishScan(scan, {.outcome = web::ScanOutcome::kDone,
-                                                        .failure = {},
-                                                        .result_json = "{}" + large,
-                                                        .swept_area_m2 = 0}),
+                  EXPECT_THROW(store->scans.Finish(scan, {.outcome = web::ScanOutcome::kDone,
+                                                          .failure = {},
+                                                          .result_json = "{}" + large,
+                                                          .swept_area_m2 = 0}),
                                IoError);
-                  EXPECT_FALSE(fs::exists(store->ScanFolder(scan)));
-                  EXPECT_TRUE(fs::exists(store->StagingFolder(scan)));
+                  EXPECT_FALSE(fs::exists(store->folders.Scan(scan)));
+                  EXPECT_TRUE(fs::exists(store->folders.Staging(scan)));
                   if (::testing::Test::HasFailure()) throw std::logic_error("see above");
-                  store->WipePatient(kAnna, patient);  // it does not run any more
+                  store->removal.WipePatient(kAnna, patient);  // it does not run any more
                 }),
             testing::WriteOutcome::kDone);
-  EXPECT_EQ(Open()->Patients().size(), 0U);
+  EXPECT_EQ(Open()->patients.List().size(), 0U);
   EXPECT_TRUE(fs::is_empty(folder_ / "state" / "scans"));
 }
 
 TEST_F(StoreTest, AScanThatCouldNotBeEndedHasFailedWhenTheNextBegins) {
   const auto store = Open();
-  const std::string patient = store->AddPatient(kAnna, "A", "");
+  const std::string patient = store->patients.Add(kAnna, "A", "");
   const NewScan scan{
       .patient_id = patient, .reference_id = {}, .purpose = {}, .sensor_serial = {}, .reason = {}};
-  const std::string lost = store->BeginScan(scan);
-  (void)store->BeginScan(scan);
-  EXPECT_EQ(store->FindScan(lost)->outcome, web::ScanOutcome::kFailed);
+  const std::string lost = store->scans.Begin(scan);
+  (void)store->scans.Begin(scan);
+  EXPECT_EQ(store->scans.Find(lost)->outcome, web::ScanOutcome::kFailed);
 }
 
 TEST_F(StoreTest, TheQuotaTakesRecordingsFirstThenOldScansAndNeverReferences) {
   const auto store = Open();
-  const std::string patient = store->AddPatient(kAnna, "A", "");
+  const std::string patient = store->patients.Add(kAnna, "A", "");
   const std::string reference = ApprovedReference(*store, patient);
-  const std::string reference_scan = store->FindReference(reference)->scan_id;
+  const std::string reference_scan = store->references.Find(reference)->scan_id;
   const std::string old = Scan(*store, patient, reference, kResult),
                     fresh = Scan(*store, patient, reference, kResult);
   for (const std::string& scan : {reference_scan, old, fresh}) {
-    fs::create_directory(store->ScanFolder(scan) / "recording");
-    WriteWholeFile(store->ScanFolder(scan) / "recording" / "rgb.txt", std::string(1000, 'r'));
-    WriteWholeFile(store->ScanFolder(scan) / "scene" / "cloud.ply", std::string(1000, 'c'));
+    fs::create_directory(store->folders.Scan(scan) / "recording");
+    WriteWholeFile(store->folders.Scan(scan) / "recording" / "rgb.txt", std::string(1000, 'r'));
+    WriteWholeFile(store->folders.Scan(scan) / "scene" / "cloud.ply", std::string(1000, 'c'));
   }
-  EXPECT_EQ(store->KeepWithinQuota(7000), 0);
-  EXPECT_GT(store->KeepWithinQuota(5100), 0);
-  EXPECT_FALSE(fs::exists(store->ScanFolder(reference_scan) / "recording"));
-  EXPECT_TRUE(store->FindScan(old));
-  (void)store->KeepWithinQuota(2100);
-  EXPECT_EQ(store->FindScan(old), std::nullopt);
-  EXPECT_TRUE(store->FindScan(fresh));
-  (void)store->KeepWithinQuota(0);
-  EXPECT_TRUE(fs::exists(store->ScanFolder(reference_scan) / "scene"));
+  EXPECT_EQ(store->removal.KeepWithinQuota(7000), 0);
+  EXPECT_GT(store->removal.KeepWithinQuota(5100), 0);
+  EXPECT_FALSE(fs::exists(store->folders.Scan(reference_scan) / "recording"));
+  EXPECT_TRUE(store->scans.Find(old));
+  (void)store->removal.KeepWithinQuota(2100);
+  EXPECT_EQ(store->scans.Find(old), std::nullopt);
+  EXPECT_TRUE(store->scans.Find(fresh));
+  (void)store->removal.KeepWithinQuota(0);
+  EXPECT_TRUE(fs::exists(store->folders.Scan(reference_scan) / "scene"));
 }
 
 }  // namespace

@@ -25,12 +25,12 @@ const web::Actor kEve{.user = "eve", .address = "::1"};
 class StoreRoomTest : public ::testing::Test {
  protected:
   void Scan(double off_m = 0, const std::string& serial = "S1") {
-    store_->AddCheck(kEve, serial, CheckOver(off_m));
+    store_->checks.Add(kEve, serial, CheckOver(off_m));
   }
-  [[nodiscard]] RoomCandidate Candidate() { return store_->CandidateOfRoom("S1", since_); }
+  [[nodiscard]] RoomCandidate Candidate() { return store_->room.Candidate("S1", since_); }
   std::pair<ChangeResult, std::string> Sign(const std::string& digest) {
     try {
-      return {ChangeResult::kDone, store_->SignRoom(kEve, "S1", since_, digest)};
+      return {ChangeResult::kDone, store_->room.Sign(kEve, "S1", since_, digest)};
     } catch (const StoreRefusal& refusal) {
       return {refusal.result(), refusal.what()};
     }
@@ -42,7 +42,7 @@ class StoreRoomTest : public ::testing::Test {
 };
 
 TEST_F(StoreRoomTest, ThreeScansAreSignedAndHoldFromThenOn) {
-  EXPECT_FALSE(store_->RoomCalibration());
+  EXPECT_FALSE(store_->room.Newest());
   EXPECT_THAT(Candidate().why_not, HasSubstr("not been scanned"));
   Scan(), Scan();
   EXPECT_THAT(Candidate().why_not, HasSubstr("2 of 3"));
@@ -52,12 +52,12 @@ TEST_F(StoreRoomTest, ThreeScansAreSignedAndHoldFromThenOn) {
   EXPECT_THAT(candidate.why_not, IsEmpty());
   EXPECT_NEAR(candidate.fit->shift_m, 0.0006, 1e-6);
   EXPECT_EQ(Sign("something else").first, ChangeResult::kConflict);
-  EXPECT_FALSE(store_->RoomCalibration());
+  EXPECT_FALSE(store_->room.Newest());
   EXPECT_EQ(Sign(candidate.digest), std::pair(ChangeResult::kDone, std::string("1")));
 
   store_ = nullptr;
   store_ = std::make_unique<Store>(folder_ / "state");
-  const auto room = store_->RoomCalibration();
+  const auto room = store_->room.Newest();
   ASSERT_TRUE(room);
   EXPECT_EQ(room->version, 1);
   EXPECT_EQ(room->signed_by, "eve");
@@ -68,7 +68,7 @@ TEST_F(StoreRoomTest, ThreeScansAreSignedAndHoldFromThenOn) {
   EXPECT_TRUE(room->fit.T_iec_reference.isApprox(
       Pose(Eigen::Translation3d(-0.0002, 0, 0)) * SceneFromRoom().inverse(), 1e-6));
   std::vector<std::string> lines;
-  for (const web::AuditEntry& entry : store_->Audit({0, 10}))
+  for (const web::AuditEntry& entry : store_->audit.Find({0, 10}))
     lines.push_back(entry.user + " " + entry.action + " " + entry.subject + " " + entry.detail);
   EXPECT_THAT(lines, Contains("eve room.calibrate 1 scans differ by 0.60 mm and 0.00 deg, sha256 " +
                               candidate.digest));
@@ -86,7 +86,7 @@ TEST_F(StoreRoomTest, ScansThatDifferAreNotSigned) {
 TEST_F(StoreRoomTest, OnlyScansOfThisSensorAndTimeCount) {
   Scan(), Scan(), Scan(0, "S2");
   EXPECT_THAT(Candidate().scans, SizeIs(2));
-  EXPECT_THAT(store_->CandidateOfRoom("S1", web::WallClock::now() + std::chrono::hours(1)).scans,
+  EXPECT_THAT(store_->room.Candidate("S1", web::WallClock::now() + std::chrono::hours(1)).scans,
               IsEmpty());
 }
 
@@ -103,15 +103,15 @@ TEST_F(StoreRoomTest, AScanThatCannotBeUsedSaysWhy) {
 TEST_F(StoreRoomTest, AMarkerThatMovedMakesItDue) {
   Scan(), Scan(), Scan();
   (void)Sign(Candidate().digest);
-  const SignedRoom room = *store_->RoomCalibration();
+  const SignedRoom room = *store_->room.Newest();
   const auto after = [&](double moved_m, int num_seen = 6) {
     MarkerMap markers = MarkersOfRoom();
     for (Eigen::Vector3d& corner : markers.at(4).corners) corner.x() += moved_m;
     for (int id = num_seen; id < 6; ++id) markers.erase(id);
-    store_->AddCheck(kEve, "S1", CheckOver(0, 0, markers));
-    return store_->WhyRoomIsDueNow(room, {});
+    store_->checks.Add(kEve, "S1", CheckOver(0, 0, markers));
+    return store_->room.WhyDue(room, {});
   };
-  EXPECT_EQ(store_->WhyRoomIsDueNow(room, {}), "");
+  EXPECT_EQ(store_->room.WhyDue(room, {}), "");
   EXPECT_EQ(after(0.0049), "");
   EXPECT_EQ(after(0.0081), "marker 4 moved 8 mm since the room was calibrated");
   EXPECT_THAT(after(0, 2), HasSubstr("marker 4")) << "a check that saw too little says nothing";
@@ -129,8 +129,8 @@ TEST_F(StoreRoomTest, OneThatWasTamperedWithIsNotUsed) {
       "DROP TRIGGER room_calibrations_no_update; UPDATE room_calibrations SET json = "
       "replace(json, '\"shift_m\":', '\"shift_m\":1')");
   store_ = std::make_unique<Store>(folder_ / "state");
-  EXPECT_THROW((void)store_->RoomCalibration(), DataError);
-  EXPECT_THAT(store_->RoomCalibrations(10), IsEmpty());
+  EXPECT_THROW((void)store_->room.Newest(), DataError);
+  EXPECT_THAT(store_->room.List(10), IsEmpty());
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ TEST_F(StoreTest, ADamagedPageIsFoundAtTheStart) {
   {
     const auto store = Open();
     for (int i = 0; i < 500; ++i)
-      store->Log(kAnna, "note", std::to_string(i), std::string(100, 'n'));
+      store->audit.Log(kAnna, "note", std::to_string(i), std::string(100, 'n'));
   }
   const auto size = fs::file_size(database());
   ASSERT_GT(size, 40000U);
@@ -52,7 +52,7 @@ TEST_F(StoreTest, ADatabaseOfANewerVersionIsRefused) {
 }
 
 TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
-  (void)Open()->AddPatient(kAnna, "P-1", "");
+  (void)Open()->patients.Add(kAnna, "P-1", "");
   {
     Database direct(database(), Database::Access::kReadWrite);
     direct.Execute(
@@ -69,35 +69,35 @@ TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
         "WHERE id = 0; PRAGMA user_version = 1");
   }
   const auto store = Open();
-  EXPECT_THAT(store->Patients(), SizeIs(1));
-  EXPECT_THAT(store->Checks(10), SizeIs(0));
+  EXPECT_THAT(store->patients.List(), SizeIs(1));
+  EXPECT_THAT(store->checks.List(10), SizeIs(0));
   const MarkerCheck failed{
       .status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {"no marker was seen"}};
-  EXPECT_EQ(store->AddCheck(kAnna, "S1", CheckJson(failed, {})), "1");
+  EXPECT_EQ(store->checks.Add(kAnna, "S1", CheckJson(failed, {})), "1");
 }
 
 TEST_F(StoreTest, WhenAResultOfTheSchemaBeforeWasAcceptedIsTakenFromTheLog) {
   std::string accepted, other;
   {
     const auto store = Open();
-    const std::string patient = store->AddPatient(kAnna, "P-1", "thorax");
+    const std::string patient = store->patients.Add(kAnna, "P-1", "thorax");
     const std::string reference = ApprovedReference(*store, patient);
     other = Scan(*store, patient, reference, kResult);
     accepted = Scan(*store, patient, reference, kResult);
-    store->AcceptScan(kAnna, accepted, "the swelling is known");
+    store->scans.Accept(kAnna, accepted, "the swelling is known");
   }
-  const web::AuditEntry logged = Open()->Audit({0, 1, "scan.accept"}).at(0);
+  const web::AuditEntry logged = Open()->audit.Find({0, 1, "scan.accept"}).at(0);
   {
     Database direct(database(), Database::Access::kReadWrite);
     direct.Execute("ALTER TABLE scans DROP COLUMN accepted_at; PRAGMA user_version = 7");
   }
   const auto store = Open();
-  EXPECT_EQ(store->FindScan(accepted)->accepted_at, logged.time);
-  EXPECT_FALSE(store->FindScan(other)->accepted_at);
+  EXPECT_EQ(store->scans.Find(accepted)->accepted_at, logged.time);
+  EXPECT_FALSE(store->scans.Find(other)->accepted_at);
 }
 
 TEST_F(StoreTest, PatientsOfTheSchemaBeforeArchivesKeepWhatTheyHad) {
-  const std::string patient = Open()->AddPatient(kAnna, "P-1", "thorax");
+  const std::string patient = Open()->patients.Add(kAnna, "P-1", "thorax");
   {
     Database direct(database(), Database::Access::kReadWrite);
     direct.Execute(
@@ -106,12 +106,12 @@ TEST_F(StoreTest, PatientsOfTheSchemaBeforeArchivesKeepWhatTheyHad) {
         "DROP COLUMN archived; DROP TABLE templates; PRAGMA user_version = 5");
   }
   const auto store = Open();
-  ASSERT_THAT(store->Patients(), SizeIs(1));
-  EXPECT_EQ(store->FindPatient(patient)->site, "thorax");
-  EXPECT_EQ(store->FindPatient(patient)->note, "");
-  EXPECT_FALSE(store->FindPatient(patient)->archived);
-  store->ChangePatient(kAnna, patient, "thorax", "note");
-  EXPECT_EQ(store->FindPatient(patient)->note, "note");
+  ASSERT_THAT(store->patients.List(), SizeIs(1));
+  EXPECT_EQ(store->patients.Find(patient)->site, "thorax");
+  EXPECT_EQ(store->patients.Find(patient)->note, "");
+  EXPECT_FALSE(store->patients.Find(patient)->archived);
+  store->patients.Change(kAnna, patient, "thorax", "note");
+  EXPECT_EQ(store->patients.Find(patient)->note, "note");
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
-// Daily checks and the baseline that they are compared with.
+#include "daemon/records/check_store.hpp"
+
 #include "daemon/records/check_json.hpp"
-#include "daemon/records/store.hpp"
-#include "daemon/records/store_internal.hpp"
+#include "daemon/records/store_refusal.hpp"
+#include "daemon/records/stored_values.hpp"
 
 namespace plumb {
 
 using store::FromStored;
+using store::Now;
 using store::ParseId;
 using store::ToStored;
 using web::ChangeResult;
@@ -26,59 +28,54 @@ web::CheckRecord ReadCheck(const Statement& row) {
 
 }  // namespace
 
-std::string Store::AddCheck(const web::Actor& actor, const std::string& sensor_serial,
+std::string CheckStore::Add(const web::Actor& actor, const std::string& sensor_serial,
                             const std::string& check_json) {
   const std::string status = CheckIn(check_json).status;
-  const std::lock_guard lock(write_mutex_);
-  Transaction transaction(*write_);
-  write_
-      ->Prepare(
+  StoreChange change(database_);
+  change
+      .Prepare(
           "INSERT INTO checks (time, user, sensor_serial, status, json) VALUES (?, ?, ?, ?, ?)")
-      .Bind(ToStored(web::WallClock::now()))
+      .Bind(Now())
       .Bind(actor.user)
       .Bind(sensor_serial)
       .Bind(status)
       .Bind(check_json)
       .Run();
-  const std::string id = std::to_string(write_->last_id());
-  Write(actor, "check.done", id, status);
-  transaction.Commit();
+  const std::string id = std::to_string(change.last_id());
+  change.Log(actor, "check.done", id, status);
+  change.Commit();
   return id;
 }
 
-std::vector<web::CheckRecord> Store::Checks(int limit) {
-  const std::lock_guard lock(list_mutex_);
-  Statement query = list_->Prepare(kNewestChecks);
+std::vector<web::CheckRecord> CheckStore::List(int limit) {
+  const StoreDatabase::Held lists = database_.ForLists();
+  Statement query = lists->Prepare(kNewestChecks);
   query.Bind(std::int64_t{limit});
   std::vector<web::CheckRecord> checks;
   while (query.Step()) checks.push_back(ReadCheck(query));
   return checks;
 }
 
-std::optional<web::CheckRecord> Store::LastCheck() {
-  const std::lock_guard lock(read_mutex_);
-  Statement query = read_->Prepare(kNewestChecks);
+std::optional<web::CheckRecord> CheckStore::Last() {
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(kNewestChecks);
   return query.Bind(std::int64_t{1}).Step() ? std::optional(ReadCheck(query)) : std::nullopt;
 }
 
-bool Store::HasPassedCheckSince(web::WallClock::time_point since,
+bool CheckStore::HasPassedSince(web::WallClock::time_point since,
                                 const std::string& sensor_serial) {
-  const std::lock_guard lock(read_mutex_);
-  Statement query = read_->Prepare(
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(
       "SELECT 1 FROM checks WHERE status = 'passed' AND time >= ? AND time <= ? AND (? = '' OR "
       "sensor_serial = ?) LIMIT 1");
-  return query.Bind(ToStored(since))
-      .Bind(ToStored(web::WallClock::now()))
-      .Bind(sensor_serial)
-      .Bind(sensor_serial)
-      .Step();
+  return query.Bind(ToStored(since)).Bind(Now()).Bind(sensor_serial).Bind(sensor_serial).Step();
 }
 
-bool Store::IsConfirmedByLaterCheck(const std::string& scan_id) {
+bool CheckStore::ConfirmsScan(const std::string& scan_id) {
   const std::optional<std::int64_t> number = ParseId(scan_id);
   if (!number) return false;
-  const std::lock_guard lock(read_mutex_);
-  Statement query = read_->Prepare(
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(
       "SELECT 1 FROM scans JOIN checks ON checks.status = 'passed' AND checks.sensor_serial = "
       "scans.sensor_serial AND checks.time >= scans.finished_at AND checks.time <= ?2 AND "
       "date(checks.time / 1000000, 'unixepoch', 'localtime') = "
@@ -90,12 +87,12 @@ bool Store::IsConfirmedByLaterCheck(const std::string& scan_id) {
       "AND EXISTS (SELECT 1 FROM check_baselines WHERE set_at <= scans.started_at) "
       "AND NOT EXISTS (SELECT 1 FROM check_baselines WHERE set_at > scans.started_at AND "
       "set_at <= checks.time) LIMIT 1");
-  return query.Bind(*number).Bind(ToStored(web::WallClock::now())).Step();
+  return query.Bind(*number).Bind(Now()).Step();
 }
 
-std::optional<web::CheckBaseline> Store::CheckBaseline() {
-  const std::lock_guard lock(read_mutex_);
-  Statement query = read_->Prepare(
+std::optional<web::CheckBaseline> CheckStore::Baseline() {
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(
       "SELECT check_id, set_at, set_by, json FROM check_baselines JOIN checks ON checks.id = "
       "check_id ORDER BY check_baselines.id DESC "
       "LIMIT 1");
@@ -106,20 +103,19 @@ std::optional<web::CheckBaseline> Store::CheckBaseline() {
                             .num_markers = CheckIn(query.Text(3)).num_markers};
 }
 
-std::string Store::CheckBaselineJson() {
-  const std::lock_guard lock(read_mutex_);
-  Statement query = read_->Prepare(
+std::string CheckStore::BaselineJson() {
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(
       "SELECT json FROM check_baselines JOIN checks ON checks.id = check_id ORDER BY "
       "check_baselines.id DESC LIMIT 1");
   return query.Step() ? query.Text(0) : std::string();
 }
 
-void Store::SetCheckBaseline(const web::Actor& actor, const std::string& check_id) {
+void CheckStore::SetBaseline(const web::Actor& actor, const std::string& check_id) {
   const std::optional<std::int64_t> number = ParseId(check_id);
-  const std::lock_guard lock(write_mutex_);
-  Transaction transaction(*write_);
+  StoreChange change(database_);
   {
-    Statement query = write_->Prepare("SELECT json, user FROM checks WHERE id = ?");
+    Statement query = change.Prepare("SELECT json, user FROM checks WHERE id = ?");
     if (!number || !query.Bind(*number).Step())
       throw StoreRefusal(ChangeResult::kNotFound, "there is no such check");
     const auto baseline = BaselineIn(query.Text(0));
@@ -133,13 +129,13 @@ void Store::SetCheckBaseline(const web::Actor& actor, const std::string& check_i
                          "another person than the one who took this check sets it as the baseline");
     }
   }
-  write_->Prepare("INSERT INTO check_baselines (check_id, set_at, set_by) VALUES (?, ?, ?)")
+  change.Prepare("INSERT INTO check_baselines (check_id, set_at, set_by) VALUES (?, ?, ?)")
       .Bind(*number)
-      .Bind(ToStored(web::WallClock::now()))
+      .Bind(Now())
       .Bind(actor.user)
       .Run();
-  Write(actor, "check.baseline", check_id, "");
-  transaction.Commit();
+  change.Log(actor, "check.baseline", check_id, "");
+  change.Commit();
 }
 
 }  // namespace plumb

@@ -1,16 +1,16 @@
-// The room's calibrations.
-#include <algorithm>
+#include "daemon/records/room_store.hpp"
 
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
-#include "daemon/records/store.hpp"
-#include "daemon/records/store_internal.hpp"
+#include "daemon/records/store_refusal.hpp"
+#include "daemon/records/stored_values.hpp"
 
 namespace plumb {
 
 using store::FromStored;
+using store::Now;
 using store::ToStored;
 using web::ChangeResult;
 
@@ -57,21 +57,21 @@ RoomCandidate ReadCandidate(Database& database, const std::string& serial, std::
 
 }  // namespace
 
-RoomCandidate Store::CandidateOfRoom(const std::string& sensor_serial,
-                                     web::WallClock::time_point since) {
-  const std::lock_guard lock(list_mutex_);
-  return ReadCandidate(*list_, sensor_serial, ToStored(since));
+RoomCandidate RoomStore::Candidate(const std::string& sensor_serial,
+                                   web::WallClock::time_point since) {
+  const StoreDatabase::Held lists = database_.ForLists();
+  return ReadCandidate(*lists, sensor_serial, ToStored(since));
 }
 
-std::optional<SignedRoom> Store::RoomCalibration() {
-  const std::lock_guard lock(read_mutex_);
-  Statement query = read_->Prepare(kNewestRooms);
+std::optional<SignedRoom> RoomStore::Newest() {
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(kNewestRooms);
   return query.Bind(std::int64_t{1}).Step() ? std::optional(ReadRoom(query)) : std::nullopt;
 }
 
-std::vector<SignedRoom> Store::RoomCalibrations(int limit) {
-  const std::lock_guard lock(list_mutex_);
-  Statement query = list_->Prepare(kNewestRooms);
+std::vector<SignedRoom> RoomStore::List(int limit) {
+  const StoreDatabase::Held lists = database_.ForLists();
+  Statement query = lists->Prepare(kNewestRooms);
   query.Bind(std::int64_t{limit});
   std::vector<SignedRoom> rooms;
   while (query.Step()) {
@@ -83,37 +83,36 @@ std::vector<SignedRoom> Store::RoomCalibrations(int limit) {
   return rooms;
 }
 
-std::string Store::SignRoom(const web::Actor& actor, const std::string& sensor_serial,
+std::string RoomStore::Sign(const web::Actor& actor, const std::string& sensor_serial,
                             web::WallClock::time_point since, const std::string& digest) {
-  const std::lock_guard lock(write_mutex_);
-  Transaction transaction(*write_);
-  const RoomCandidate candidate = ReadCandidate(*write_, sensor_serial, ToStored(since));
+  StoreChange change(database_);
+  const RoomCandidate candidate = ReadCandidate(change.database(), sensor_serial, ToStored(since));
   if (!candidate.why_not.empty()) throw StoreRefusal(ChangeResult::kConflict, candidate.why_not);
   if (candidate.digest != digest) {
     throw StoreRefusal(ChangeResult::kConflict,
                        "the board has been scanned again since this was read: read it again");
   }
-  write_
-      ->Prepare(
+  change
+      .Prepare(
           "INSERT INTO room_calibrations (signed_at, signed_by, digest, json) VALUES (?, ?, ?, ?)")
-      .Bind(ToStored(web::WallClock::now()))
+      .Bind(Now())
       .Bind(actor.user)
       .Bind(candidate.digest)
       .Bind(candidate.json)
       .Run();
-  const std::string version = std::to_string(write_->last_id());
-  Write(actor, "room.calibrate", version,
-        fmt::format("scans differ by {:.2f} mm and {:.2f} deg, sha256 {}",
-                    candidate.fit->shift_m / kMillimetre, candidate.fit->turn_rad / kDegree,
-                    candidate.digest));
-  transaction.Commit();
+  const std::string version = std::to_string(change.last_id());
+  change.Log(actor, "room.calibrate", version,
+             fmt::format("scans differ by {:.2f} mm and {:.2f} deg, sha256 {}",
+                         candidate.fit->shift_m / kMillimetre, candidate.fit->turn_rad / kDegree,
+                         candidate.digest));
+  change.Commit();
   return version;
 }
 
-std::string Store::WhyRoomIsDueNow(const SignedRoom& room, const MarkerCheckLimits& limits) {
-  const std::lock_guard lock(read_mutex_);
+std::string RoomStore::WhyDue(const SignedRoom& room, const MarkerCheckLimits& limits) {
+  const StoreDatabase::Held rows = database_.ForRows();
   Statement query =
-      read_->Prepare("SELECT json FROM checks WHERE time > ? ORDER BY id DESC LIMIT ?");
+      rows->Prepare("SELECT json FROM checks WHERE time > ? ORDER BY id DESC LIMIT ?");
   query.Bind(ToStored(room.signed_at)).Bind(std::int64_t{kChecksSearched});
   while (query.Step()) {
     if (const auto why = WhyRoomIsDue(room, query.Text(0), limits)) return *why;

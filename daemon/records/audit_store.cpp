@@ -1,0 +1,126 @@
+#include "daemon/records/audit_store.hpp"
+
+#include <array>
+
+#include <fmt/format.h>
+
+#include "daemon/records/scan_files.hpp"
+#include "daemon/records/stored_values.hpp"
+
+namespace plumb {
+
+using store::FromStored;
+using store::Now;
+
+namespace {
+
+std::string Sha256Of(const std::string& text) {
+  Sha256 hash;
+  hash.Add(text.data(), text.size());
+  return hash.Hex();
+}
+
+/// One entry of the log as the chain covers it: lengths keep the fields apart.
+std::string ChainText(const std::string& before, std::int64_t number, std::int64_t time,
+                      const std::array<std::string, 5>& fields) {
+  std::string text = fmt::format("{}\n{}\n{}\n", before, number, time);
+  for (const std::string& field : fields) text += fmt::format("{}:{}\n", field.size(), field);
+  return text;
+}
+
+constexpr const char* kAuditRows =
+    "SELECT number, time, user, address, action, subject, detail, chain FROM audit ORDER BY number";
+
+std::string ChainOf(const Statement& row, const std::string& before) {
+  return Sha256Of(ChainText(before, row.Integer(0), row.Integer(1),
+                            {row.Text(2), row.Text(3), row.Text(4), row.Text(5), row.Text(6)}));
+}
+
+/// Of everything before the first entry that carries a chain.
+std::string ChainOfUnchained(Database& database) {
+  std::string chain;
+  Statement query = database.Prepare(kAuditRows);
+  while (query.Step() && query.Text(7).empty()) chain = ChainOf(query, chain);
+  return chain;
+}
+
+}  // namespace
+
+void AppendAuditEntry(Database& database, const web::Actor& actor, const std::string& action,
+                      const std::string& subject, const std::string& detail) {
+  std::int64_t number = 1;
+  {
+    Statement query = database.Prepare("SELECT seq FROM sqlite_sequence WHERE name = 'audit'");
+    if (query.Step()) number = query.Integer(0) + 1;
+  }
+  std::string before;
+  {
+    Statement query = database.Prepare("SELECT chain FROM audit ORDER BY number DESC LIMIT 1");
+    if (query.Step()) before = query.Text(0);
+  }
+  if (before.empty()) before = ChainOfUnchained(database);
+  const std::int64_t time = Now();
+  database
+      .Prepare(
+          "INSERT INTO audit (number, time, user, address, action, subject, detail, chain) VALUES "
+          "(?, ?, ?, ?, ?, ?, ?, ?)")
+      .Bind(number)
+      .Bind(time)
+      .Bind(actor.user)
+      .Bind(actor.address)
+      .Bind(action)
+      .Bind(subject)
+      .Bind(detail)
+      .Bind(Sha256Of(
+          ChainText(before, number, time, {actor.user, actor.address, action, subject, detail})))
+      .Run();
+}
+
+void AuditStore::Log(const web::Actor& actor, const std::string& action, const std::string& subject,
+                     const std::string& detail) {
+  StoreChange change(database_);
+  change.Log(actor, action, subject, detail);
+  change.Commit();
+}
+
+std::vector<web::AuditEntry> AuditStore::Find(const web::AuditQuery& wanted) {
+  const StoreDatabase::Held lists = database_.ForLists();
+  Statement query = lists->Prepare(
+      "SELECT number, time, user, address, action, subject, detail FROM audit WHERE (?1 <= 0 OR "
+      "number < ?1) AND substr(action, 1, length(?2)) = ?2 AND (?3 OR substr(action, 1, 5) <> "
+      "'view.') ORDER BY number DESC LIMIT ?4");
+  query.Bind(wanted.before).Bind(wanted.actions).Bind(std::int64_t{wanted.views});
+  query.Bind(std::int64_t{wanted.limit});
+  std::vector<web::AuditEntry> entries;
+  while (query.Step()) {
+    entries.push_back({.number = query.Integer(0),
+                       .time = FromStored(query.Integer(1)),
+                       .user = query.Text(2),
+                       .address = query.Text(3),
+                       .action = query.Text(4),
+                       .subject = query.Text(5),
+                       .detail = query.Text(6)});
+  }
+  return entries;
+}
+
+std::optional<std::int64_t> AuditStore::FirstBroken() {
+  const StoreDatabase::Held lists = database_.ForLists();
+  std::string chain;
+  std::int64_t last = 0;
+  bool has_begun = false;
+  {
+    Statement query = lists->Prepare(kAuditRows);
+    while (query.Step()) {
+      chain = ChainOf(query, chain);
+      has_begun = has_begun || !query.Text(7).empty();
+      if (query.Integer(0) != last + 1 || (has_begun && query.Text(7) != chain)) return last + 1;
+      last = query.Integer(0);
+    }
+  }
+  Statement query = lists->Prepare("SELECT seq FROM sqlite_sequence WHERE name = 'audit'");
+  const std::int64_t given = query.Step() ? query.Integer(0) : 0;
+  return given == last ? std::nullopt : std::optional(last + 1);  // entries at the end are gone
+}
+
+}  // namespace plumb

@@ -1,0 +1,52 @@
+#include "daemon/records/display_store.hpp"
+
+#include "daemon/records/store_refusal.hpp"
+#include "daemon/records/stored_values.hpp"
+
+namespace plumb {
+
+using store::FromStored;
+using store::Now;
+using store::ParseId;
+using web::ChangeResult;
+
+std::vector<web::Display> DisplayStore::List() {
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(
+      "SELECT id, name, token_hash, paired_at, paired_by FROM displays ORDER BY id LIMIT 100");
+  std::vector<web::Display> displays;
+  while (query.Step()) {
+    displays.push_back({.id = query.Text(0),
+                        .name = query.Text(1),
+                        .token_hash = query.Text(2),
+                        .paired_at = FromStored(query.Integer(3)),
+                        .paired_by = query.Text(4)});
+  }
+  return displays;
+}
+
+std::string DisplayStore::Add(const web::Actor& actor, const web::Display& display) {
+  StoreChange change(database_);
+  change
+      .Prepare("INSERT INTO displays (name, token_hash, paired_at, paired_by) VALUES (?, ?, ?, ?)")
+      .Bind(display.name)
+      .Bind(display.token_hash)
+      .Bind(Now())
+      .Bind(actor.user)
+      .Run();
+  const std::string id = std::to_string(change.last_id());
+  change.Log(actor, "display.pair", id, display.name);
+  change.Commit();
+  return id;
+}
+
+void DisplayStore::Remove(const web::Actor& actor, const std::string& id) {
+  StoreChange change(database_);
+  change.Prepare("DELETE FROM displays WHERE id = ?").Bind(ParseId(id)).Run();
+  if (change.num_changed() == 0)
+    throw StoreRefusal(ChangeResult::kNotFound, "there is no such display");
+  change.Log(actor, "display.remove", id, "");
+  change.Commit();
+}
+
+}  // namespace plumb

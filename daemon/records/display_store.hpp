@@ -1,0 +1,25 @@
+// The screens in the room that may follow the appliance.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "daemon/records/store_database.hpp"
+#include "web/service/service_types.hpp"
+
+namespace plumb {
+
+/// Thread-safe. Changes throw StoreRefusal; everything throws IoError and its kinds.
+class DisplayStore {
+ public:
+  explicit DisplayStore(StoreDatabase& database) : database_(database) {}
+
+  [[nodiscard]] std::vector<web::Display> List();
+  std::string Add(const web::Actor& actor, const web::Display& display);  ///< Gives the id.
+  void Remove(const web::Actor& actor, const std::string& id);
+
+ private:
+  StoreDatabase& database_;
+};
+
+}  // namespace plumb

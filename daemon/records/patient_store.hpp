@@ -1,0 +1,33 @@
+// The patients. StoreRemoval removes one.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/records/store_database.hpp"
+#include "web/service/service_types.hpp"
+
+namespace plumb {
+
+/// Thread-safe. Changes throw StoreRefusal; everything throws IoError and its kinds.
+class PatientStore {
+ public:
+  explicit PatientStore(StoreDatabase& database) : database_(database) {}
+
+  [[nodiscard]] std::vector<web::Patient> List();  ///< By code.
+  [[nodiscard]] std::optional<web::Patient> Find(const std::string& id);
+  /// Capital and small letters count as the same.
+  [[nodiscard]] std::optional<web::Patient> FindByCode(const std::string& code);
+  /// Gives the id. kConflict for a code that another patient has.
+  std::string Add(const web::Actor& actor, const std::string& code, const std::string& site);
+  void Change(const web::Actor& actor, const std::string& id, const std::string& site,
+              const std::string& note);
+  /// kConflict while a session of the patient is open.
+  void Archive(const web::Actor& actor, const std::string& id, bool archived);
+
+ private:
+  StoreDatabase& database_;
+};
+
+}  // namespace plumb

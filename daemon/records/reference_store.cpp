@@ -1,0 +1,260 @@
+#include "daemon/records/reference_store.hpp"
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/records/store_json.hpp"
+#include "daemon/records/store_refusal.hpp"
+#include "daemon/records/stored_values.hpp"
+
+namespace plumb {
+
+using store::FromStored;
+using store::Now;
+using store::ParseId;
+using store::RequireId;
+using store::ScanId;
+using web::ChangeResult;
+
+namespace {
+
+constexpr const char* kReferenceColumns =
+    "SELECT id, patient_id, version, scan_id, created_at, created_by, reason, approved_by, "
+    "approved_at, plan, revision, planned_by FROM refs ";
+
+/// SHA-256 of what an approval signs.
+std::string DigestOf(const std::string& patient_id, int version, const std::string& scan_id,
+                     const std::string& plan_json) {
+  const std::string text =
+      fmt::format("patient {}\nversion {}\nscan {}\n{}", patient_id, version, scan_id, plan_json);
+  Sha256 hash;
+  hash.Add(text.data(), text.size());
+  return hash.Hex();
+}
+
+/// @throws DataError naming the version whose plan cannot be read: nothing is compared with it.
+web::ReferencePlan PlanIn(const Statement& row) {
+  try {
+    return ParsePlan(row.Text(9));
+  } catch (const DataError& error) {
+    throw DataError(fmt::format("version {} of the reference: {}", row.Integer(2), error.what()));
+  }
+}
+
+/// Without its plan.
+web::Reference ReadReferenceRow(const Statement& row) {
+  web::Reference reference{.id = row.Text(0),
+                           .patient_id = row.Text(1),
+                           .version = static_cast<int>(row.Integer(2)),
+                           .scan_id = ScanId(row.Integer(3)),
+                           .created_at = FromStored(row.Integer(4)),
+                           .created_by = row.Text(5),
+                           .reason = row.Text(6),
+                           .revision = static_cast<int>(row.Integer(10)),
+                           .digest = {},
+                           .planned_by = row.Text(11),
+                           .approved_by = row.Text(7),
+                           .approved_at = {},
+                           .plan = {}};
+  if (!row.IsNull(8)) reference.approved_at = FromStored(row.Integer(8));
+  reference.digest = DigestOf(row.Text(1), reference.version, reference.scan_id, row.Text(9));
+  return reference;
+}
+
+/// @throws DataError where the plan cannot be read: it is never a default.
+web::Reference ReadReference(const Statement& row) {
+  web::Reference reference = ReadReferenceRow(row);
+  reference.plan = PlanIn(row);
+  return reference;
+}
+
+/// For lists: one that cannot be read does not hide the others.
+web::Reference ListReference(const Statement& row) {
+  web::Reference reference = ReadReferenceRow(row);
+  try {
+    reference.plan = PlanIn(row);
+  } catch (const DataError& error) {
+    reference.unreadable = error.what();
+  }
+  return reference;
+}
+
+void RequireRevision(std::int64_t stored, int read) {
+  if (stored != read)
+    throw StoreRefusal(ChangeResult::kConflict,
+                       "this plan has been changed by somebody else meanwhile: look at it again");
+}
+
+}  // namespace
+
+std::vector<web::WaitingReference> ReferenceStore::Waiting() {
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(
+      "SELECT refs.id, patient_id, code, version FROM refs JOIN patients ON patients.id = "
+      "patient_id WHERE archived = 0 AND approved_by = '' AND version > (SELECT "
+      "ifnull(max(version), 0) FROM refs "
+      "AS r WHERE r.patient_id = refs.patient_id AND r.approved_by <> '') AND NOT EXISTS (SELECT 1 "
+      "FROM refs AS newer WHERE newer.patient_id = refs.patient_id AND newer.version > "
+      "refs.version) ORDER BY refs.id DESC LIMIT 20");
+  std::vector<web::WaitingReference> waiting;
+  while (query.Step()) {
+    waiting.push_back({.reference_id = query.Text(0),
+                       .patient_id = query.Text(1),
+                       .patient_code = query.Text(2),
+                       .version = static_cast<int>(query.Integer(3))});
+  }
+  return waiting;
+}
+
+std::vector<web::Reference> ReferenceStore::List(const std::string& patient_id) {
+  std::vector<web::Reference> references;
+  const std::optional<std::int64_t> number = ParseId(patient_id);
+  if (!number) return references;
+  const StoreDatabase::Held lists = database_.ForLists();
+  static const std::string kSql =
+      std::string(kReferenceColumns) + "WHERE patient_id = ? ORDER BY version DESC LIMIT 1000";
+  Statement query = lists->Prepare(kSql.c_str());
+  query.Bind(*number);
+  while (query.Step()) references.push_back(ListReference(query));
+  return references;
+}
+
+std::optional<web::Reference> ReferenceStore::Find(const std::string& id) {
+  const std::optional<std::int64_t> number = ParseId(id);
+  if (!number) return std::nullopt;
+  const StoreDatabase::Held rows = database_.ForRows();
+  static const std::string kSql = std::string(kReferenceColumns) + "WHERE id = ?";
+  Statement query = rows->Prepare(kSql.c_str());
+  return query.Bind(*number).Step() ? std::optional(ReadReference(query)) : std::nullopt;
+}
+
+std::optional<web::Reference> ReferenceStore::Approved(const std::string& patient_id) {
+  const std::optional<std::int64_t> number = ParseId(patient_id);
+  if (!number) return std::nullopt;
+  const StoreDatabase::Held rows = database_.ForRows();
+  static const std::string kSql =
+      std::string(kReferenceColumns) +
+      "WHERE patient_id = ? AND approved_by <> '' ORDER BY version DESC LIMIT 1";
+  Statement query = rows->Prepare(kSql.c_str());
+  return query.Bind(*number).Step() ? std::optional(ReadReference(query)) : std::nullopt;
+}
+
+std::string ReferenceStore::Add(const web::Actor& actor, const std::string& scan_id,
+                                const std::string& reason, const web::ReferencePlan& plan) {
+  const std::int64_t scan = RequireId(scan_id, "scan");
+  StoreChange change(database_);
+  std::int64_t patient = 0;
+  {
+    Statement query =
+        change.Prepare("SELECT patient_id, outcome, has_folder FROM scans WHERE id = ?");
+    if (!query.Bind(scan).Step())
+      throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
+    if (query.Text(1) != "done" || query.Integer(2) == 0) {
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "this scan has no scene: only a finished scan can become a reference");
+    }
+    patient = query.Integer(0);
+  }
+  change
+      .Prepare(
+          "INSERT INTO refs (patient_id, version, scan_id, created_at, created_by, planned_by, "
+          "reason, plan) VALUES (?,"
+          " 1 + (SELECT ifnull(max(version), 0) FROM refs WHERE patient_id = ?), ?, ?, ?, ?, ?, ?)")
+      .Bind(patient)
+      .Bind(patient)
+      .Bind(scan)
+      .Bind(Now())
+      .Bind(actor.user)
+      .Bind(actor.user)
+      .Bind(reason)
+      .Bind(PlanJson(plan))
+      .Run();
+  const std::string id = std::to_string(change.last_id());
+  change.Log(actor, "reference.add", id, "scan " + scan_id);
+  change.Commit();
+  return id;
+}
+
+std::string ReferenceStore::Plan(const web::Actor& actor, const std::string& id, int revision,
+                                 const web::ReferencePlan& plan) {
+  const std::int64_t number = RequireId(id, "reference");
+  StoreChange change(database_);
+  bool is_approved = false;
+  {
+    Statement query = change.Prepare("SELECT approved_by, revision FROM refs WHERE id = ?");
+    if (!query.Bind(number).Step())
+      throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
+    is_approved = !query.Text(0).empty();
+    RequireRevision(query.Integer(1), revision);
+  }
+  std::string changed = id;
+  if (is_approved) {
+    change
+        .Prepare(
+            "INSERT INTO refs (patient_id, version, scan_id, created_at, created_by, planned_by, "
+            "reason, plan)"
+            " SELECT patient_id, 1 + (SELECT max(version) FROM refs AS r WHERE r.patient_id = "
+            "refs.patient_id), scan_id, ?, ?, ?,"
+            " 'new plan of version ' || version, ? FROM refs WHERE id = ?")
+        .Bind(Now())
+        .Bind(actor.user)
+        .Bind(actor.user)
+        .Bind(PlanJson(plan))
+        .Bind(number)
+        .Run();
+    changed = std::to_string(change.last_id());
+  } else {
+    change.Prepare("UPDATE refs SET plan = ?, planned_by = ?, revision = revision + 1 WHERE id = ?")
+        .Bind(PlanJson(plan))
+        .Bind(actor.user)
+        .Bind(number)
+        .Run();
+  }
+  change.Log(actor, "reference.plan", changed, PlanJson(plan));
+  change.Commit();
+  return changed;
+}
+
+void ReferenceStore::Approve(const web::Actor& actor, const std::string& id, int revision,
+                             const std::string& digest, bool two_users) {
+  const std::int64_t number = RequireId(id, "reference");
+  if (const std::optional<web::Reference> reference = Find(id)) {  // before the lock
+    const std::string fault = integrity_.Check(reference->scan_id, /*scene_only=*/true);
+    if (!fault.empty())
+      throw StoreRefusal(ChangeResult::kConflict,
+                         fmt::format("the scan of this reference is not as it was stored: {}; put "
+                                     "a backup of its files in their place, or scan again",
+                                     fault));
+  }
+  std::string signed_digest;
+  StoreChange change(database_);
+  {
+    Statement query = change.Prepare(
+        "SELECT approved_by, created_by, planned_by, revision, patient_id, version, scan_id, plan "
+        "FROM refs WHERE id = ?");
+    if (!query.Bind(number).Step())
+      throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
+    if (!query.Text(0).empty())
+      throw StoreRefusal(ChangeResult::kConflict, "this reference is approved already");
+    RequireRevision(query.Integer(3), revision);
+    signed_digest = DigestOf(query.Text(4), static_cast<int>(query.Integer(5)),
+                             ScanId(query.Integer(6)), query.Text(7));
+    if (!digest.empty() && digest != signed_digest)
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "what is stored is not what was shown: look at the reference again");
+    if (two_users && (query.Text(1) == actor.user || query.Text(2) == actor.user)) {
+      throw StoreRefusal(
+          ChangeResult::kRefused,
+          "who made or planned a reference does not approve it: ask a second person");
+    }
+  }
+  change.Prepare("UPDATE refs SET approved_by = ?, approved_at = ? WHERE id = ?")
+      .Bind(actor.user)
+      .Bind(Now())
+      .Bind(number)
+      .Run();
+  change.Log(actor, "reference.approve", id, "sha256 " + signed_digest);
+  change.Commit();
+}
+
+}  // namespace plumb

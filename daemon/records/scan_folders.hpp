@@ -1,0 +1,42 @@
+// Where the files of scans lie in a state folder.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace plumb {
+
+/// STATE/scans/ID/, and STATE/scans/.staging-ID/ until the scan has ended.
+class ScanFolders {
+ public:
+  /// @param state  An absolute path.
+  explicit ScanFolders(std::filesystem::path state) : state_(std::move(state)) {}
+
+  [[nodiscard]] const std::filesystem::path& state() const { return state_; }
+  [[nodiscard]] std::filesystem::path scans() const { return state_ / "scans"; }
+  [[nodiscard]] std::filesystem::path Scan(const std::string& scan_id) const {
+    return scans() / scan_id;
+  }
+  [[nodiscard]] std::filesystem::path Staging(const std::string& scan_id) const {
+    return scans() / (std::string(kStagingPrefix) + scan_id);
+  }
+  /// A complete folder of a scan that was interrupted, after the next start.
+  [[nodiscard]] std::filesystem::path Interrupted(const std::string& scan_id) const {
+    return state_ / "set-aside" / (scan_id + kInterruptedSuffix);
+  }
+  [[nodiscard]] static bool IsStaging(const std::filesystem::path& folder) {
+    return folder.filename().string().starts_with(kStagingPrefix);
+  }
+  /// Those of scans and those of staging, by name. @throws DiskRefused
+  [[nodiscard]] std::vector<std::filesystem::path> All() const;
+
+  static constexpr const char* kInterruptedSuffix = "-interrupted";
+
+ private:
+  static constexpr const char* kStagingPrefix = ".staging-";
+
+  std::filesystem::path state_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,276 @@
+#include "daemon/records/scan_store.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+
+#include <fmt/format.h>
+
+#include "daemon/records/scan_digests.hpp"
+#include "daemon/records/store_json.hpp"
+#include "daemon/records/store_refusal.hpp"
+#include "daemon/records/stored_values.hpp"
+#include "drivers/files/file_io.hpp"
+
+namespace plumb {
+
+namespace fs = std::filesystem;
+
+using store::FromStored;
+using store::Now;
+using store::ParseId;
+using store::ScanId;
+using store::ToStored;
+using web::ChangeResult;
+
+namespace {
+
+constexpr const char* kScanColumns =
+    "SELECT scans.id, patient_id, reference_id, purpose, outcome, failure, started_at, "
+    "finished_at, accepted_by, has_folder, results.json, accepted_reason, session_id, "
+    "(SELECT fraction FROM sessions WHERE sessions.id = session_id), sensor_on_s, check_overdue, "
+    "unavailable, accepted_at FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
+
+/// Of a folder, or with ::syncfs of everything on its disk.
+void Sync(const fs::path& folder, int (*sync)(int) = ::fsync) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) throw DiskRefused(DescribeWriteError(folder, errno));
+  const int result = sync(descriptor);
+  const int error = errno;
+  ::close(descriptor);
+  if (result != 0 && error != EINVAL) throw DiskRefused(DescribeWriteError(folder, error));
+}
+
+/// Verdict and numbers, for the log: "move: vertical +1.2, ..., yaw -0.10".
+std::string Described(const web::ResultSummary& result) {
+  std::string text = result.verdict;
+  if (!result.correction) return text;
+  const web::SixNumbers& c = *result.correction;
+  const auto add = [&](const char* name, const std::optional<double>& value, const char* unit) {
+    if (value) text += fmt::format(", {} {:+.2f} {}", name, *value, unit);
+  };
+  add("vertical", c.vertical_mm, "mm");
+  add("longitudinal", c.longitudinal_mm, "mm");
+  add("lateral", c.lateral_mm, "mm");
+  add("pitch", c.pitch_deg, "deg");
+  add("roll", c.roll_deg, "deg");
+  add("yaw", c.yaw_deg, "deg");
+  return text;
+}
+
+}  // namespace
+
+web::Scan ScanStore::ReadScan(const Statement& row) const {
+  web::Scan scan{.id = ScanId(row.Integer(0)),
+                 .patient_id = row.Integer(1) == 0 ? std::string() : row.Text(1),
+                 .reference_id = row.Text(2),
+                 .purpose = store::ParsePurpose(row.Text(3)),
+                 .outcome = store::ParseOutcome(row.Text(4)),
+                 .failure = row.Text(5),
+                 .started_at = FromStored(row.Integer(6)),
+                 .finished_at = {},
+                 .result = {},
+                 .accepted_by = row.Text(8),
+                 .accepted_reason = row.Text(11),
+                 .accepted_at = {},
+                 .session_id = row.Text(12),
+                 .fraction = static_cast<int>(row.Integer(13)),
+                 .sensor_on_s = {},
+                 .check_overdue = row.Integer(15) != 0,
+                 .folder = {}};
+  if (!row.IsNull(14)) scan.sensor_on_s = row.Real(14);
+  if (!row.IsNull(17)) scan.accepted_at = FromStored(row.Integer(17));
+  if (!row.IsNull(7)) scan.finished_at = FromStored(row.Integer(7));
+  if (const std::string unavailable = row.Text(16); !unavailable.empty()) {
+    scan.failure = "its files cannot be used now: " + unavailable;
+  } else if (row.Integer(9) != 0) {
+    scan.folder = folders_.Scan(scan.id);
+  }
+  if (!row.IsNull(10)) scan.result = SummaryOf(row.Text(10));
+  return scan;
+}
+
+void FailInterruptedScans(Database& database) {
+  database
+      .Prepare(
+          "UPDATE scans SET outcome = 'failed', failure = ?, has_folder = 0 WHERE outcome = "
+          "'running'")
+      .Bind(kInterrupted)
+      .Run();
+}
+
+std::vector<web::Scan> ScanStore::List(const std::string& patient_id, int limit) {
+  std::vector<web::Scan> scans;
+  const std::optional<std::int64_t> number = ParseId(patient_id);
+  if (!number && !patient_id.empty()) return scans;
+  const StoreDatabase::Held lists = database_.ForLists();
+  static const std::string kAll = std::string(kScanColumns) + "ORDER BY scans.id DESC LIMIT ?";
+  static const std::string kOfPatient =
+      std::string(kScanColumns) + "WHERE patient_id = ? ORDER BY scans.id DESC LIMIT ?";
+  Statement query = lists->Prepare(number ? kOfPatient.c_str() : kAll.c_str());
+  if (number) query.Bind(*number);
+  query.Bind(std::int64_t{limit});
+  while (query.Step()) scans.push_back(ReadScan(query));
+  return scans;
+}
+
+std::optional<web::Scan> ScanStore::Find(const std::string& id) {
+  const std::optional<std::int64_t> number = ParseId(id);
+  if (!number) return std::nullopt;
+  const StoreDatabase::Held rows = database_.ForRows();
+  static const std::string kSql = std::string(kScanColumns) + "WHERE scans.id = ?";
+  Statement query = rows->Prepare(kSql.c_str());
+  return query.Bind(*number).Step() ? std::optional(ReadScan(query)) : std::nullopt;
+}
+
+int ScanStore::CountSince(const std::string& patient_id, web::WallClock::time_point since) {
+  const std::optional<std::int64_t> number = ParseId(patient_id);
+  if (!number) return 0;
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(
+      "SELECT count(*) FROM scans WHERE patient_id = ? AND outcome = 'done' AND started_at >= ?");
+  return query.Bind(*number).Bind(ToStored(since)).Step() ? static_cast<int>(query.Integer(0)) : 0;
+}
+
+double ScanStore::SweptArea(const std::string& scan_id) {
+  const std::optional<std::int64_t> number = ParseId(scan_id);
+  if (!number) return 0.0;
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare("SELECT swept_area_m2 FROM scans WHERE id = ?");
+  return query.Bind(*number).Step() ? query.Real(0) : 0.0;
+}
+
+std::string ScanStore::Begin(const NewScan& scan) {
+  StoreChange change(database_);
+  FailInterruptedScans(change.database());  // one whose end the disk refused to note
+  change
+      .Prepare(
+          "INSERT INTO scans (patient_id, reference_id, purpose, outcome, started_at, "
+          "sensor_serial, reason, session_id, sensor_on_s, check_overdue)"
+          " VALUES (?, ?, ?, 'running', ?, ?, ?, ?, ?, ?)")
+      .Bind(ParseId(scan.patient_id).value_or(0))  // 0: of no patient
+      .Bind(ParseId(scan.reference_id))
+      .Bind(store::Name(scan.purpose))
+      .Bind(Now())
+      .Bind(scan.sensor_serial)
+      .Bind(scan.reason)
+      .Bind(ParseId(scan.session_id))
+      .Bind(scan.sensor_on_s)
+      .Bind(std::int64_t{scan.check_overdue})
+      .Run();
+  const std::int64_t number = change.last_id();
+  const std::string id = ScanId(number);
+  std::error_code error;
+  fs::remove_all(folders_.Staging(id), error);
+  fs::create_directory(folders_.Staging(id), error);
+  if (error) throw DiskRefused(DescribeWriteError(folders_.Staging(id), error.value()));
+  change.Commit();
+  running_ = number;
+  return id;
+}
+
+void ScanStore::Finish(const std::string& scan_id, const FinishedScan& finished) {
+  const bool is_done = finished.outcome == web::ScanOutcome::kDone;
+  const fs::path staging = folders_.Staging(scan_id);
+  std::error_code ignored;
+  // The sweep that failed is the one to be looked at. Its images count where all of them are there.
+  const bool has_recording = fs::exists(staging / kRecordingFolder / "rgb.txt", ignored);
+  const bool is_kept = is_done || (finished.outcome == web::ScanOutcome::kFailed && has_recording);
+  // Read before the lock is taken: nobody else waits for it.
+  const std::vector<FileDigest> files =
+      is_done ? DigestsOfScan(staging) : std::vector<FileDigest>();
+  const StoreDatabase::Held writer = database_.ForChanges();
+  running_.reset();
+  if (!is_kept) {
+    fs::remove_all(staging, ignored);
+    return NoteEnd(*writer, scan_id, finished, is_kept, {});
+  }
+  if (!is_done) {
+    for (const char* part : {"scene", "result"}) fs::remove_all(staging / part, ignored);
+  }
+  // Scene and result are on the disk; the images of a recording are too many to be synced one by
+  // one.
+  if (fs::exists(staging / kRecordingFolder, ignored)) Sync(folders_.scans(), ::syncfs);
+  if (::rename(staging.c_str(), folders_.Scan(scan_id).c_str()) != 0) {
+    throw DiskRefused(DescribeWriteError(folders_.Scan(scan_id), errno));
+  }
+  try {
+    Sync(folders_.scans());
+    NoteEnd(*writer, scan_id, finished, is_kept, files);
+  } catch (...) {  // without its row it is none
+    ::rename(folders_.Scan(scan_id).c_str(), staging.c_str());
+    throw;
+  }
+}
+
+void ScanStore::NoteEnd(Database& database, const std::string& scan_id,
+                        const FinishedScan& finished, bool has_folder,
+                        const std::vector<FileDigest>& files) {
+  const std::int64_t number = ParseId(scan_id).value_or(0);
+  Transaction transaction(database);
+  database
+      .Prepare(
+          "UPDATE scans SET outcome = ?, failure = ?, finished_at = ?, swept_area_m2 = ?, "
+          "has_folder = ? WHERE id = ?")
+      .Bind(store::Name(finished.outcome))
+      .Bind(finished.failure)
+      .Bind(Now())
+      .Bind(finished.swept_area_m2)
+      .Bind(std::int64_t{has_folder})
+      .Bind(number)
+      .Run();
+  if (!finished.result_json.empty()) {
+    database.Prepare("INSERT INTO results (scan_id, json) VALUES (?, ?)")
+        .Bind(number)
+        .Bind(finished.result_json)
+        .Run();
+  }
+  StoreDigests(database, number, files);
+  transaction.Commit();
+}
+
+void ScanStore::Accept(const web::Actor& actor, const std::string& id, const std::string& reason) {
+  const std::optional<std::int64_t> number = ParseId(id);
+  StoreChange change(database_);
+  std::string described;
+  {
+    Statement query = change.Prepare(
+        "SELECT outcome, accepted_by, (SELECT json FROM results WHERE scan_id = scans.id), "
+        "EXISTS (SELECT 1 FROM scans AS newer WHERE newer.patient_id = scans.patient_id AND "
+        "newer.id > scans.id AND newer.outcome IN ('done', 'running')) FROM scans WHERE id = ?");
+    if (!number || !query.Bind(*number).Step())
+      throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
+    if (query.Text(0) != "done" || query.IsNull(2)) {
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "this scan has no result: only a compared scan is accepted");
+    }
+    const web::ResultSummary result = SummaryOf(query.Text(2));
+    if (result.verdict == "no_answer")
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "this scan gave no answer: there is nothing to accept");
+    if (!query.Text(1).empty())
+      throw StoreRefusal(ChangeResult::kConflict, "this scan is accepted already");
+    if (query.Integer(3) != 0)
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "there is a newer scan of this patient: accept that one");
+    if (result.verdict != "in_tolerance" && reason.empty())
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "this result is not in tolerance: accepting it requires a reason and "
+                         "your password");
+    described = Described(result);
+  }
+  change
+      .Prepare(
+          "UPDATE scans SET accepted_by = ?, accepted_reason = ?, accepted_at = ? WHERE id = ?")
+      .Bind(actor.user)
+      .Bind(reason)
+      .Bind(Now())
+      .Bind(*number)
+      .Run();
+  change.Log(actor, reason.empty() ? "scan.accept" : "scan.accept_outside", id,
+             reason.empty() ? described : described + "; reason: " + reason);
+  change.Commit();
+}
+
+}  // namespace plumb

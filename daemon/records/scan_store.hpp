@@ -1,0 +1,83 @@
+// The scans: how one begins, ends and is accepted. StoreRemoval removes them.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/records/scan_files.hpp"
+#include "daemon/records/scan_folders.hpp"
+#include "daemon/records/store_database.hpp"
+#include "web/service/service_types.hpp"
+
+namespace plumb {
+
+/// What a scan begins with.
+struct NewScan {
+  std::string patient_id;
+  std::string reference_id;  ///< Empty: none.
+  web::ScanPurpose purpose = web::ScanPurpose::kFraction;
+  std::string sensor_serial;
+  std::string reason;           ///< Why a new reference is taken.
+  std::string session_id = {};  ///< Empty: none is open.
+  std::optional<double> sensor_on_s = {};
+  bool check_overdue = false;
+};
+
+/// How it ended.
+struct FinishedScan {
+  web::ScanOutcome outcome = web::ScanOutcome::kFailed;
+  std::string failure;
+  std::string result_json;  ///< Empty: nothing was compared.
+  double swept_area_m2 = 0.0;
+};
+
+/// Why a scan failed whose end was never stored.
+inline constexpr std::string_view kInterrupted =
+    "interrupted: the appliance was switched off or its disk refused the scan";
+/// Ends the scans that have begun and not ended. Within a transaction.
+void FailInterruptedScans(Database& database);
+
+/// A scan's files are made in a hidden staging folder and appear under their id in one step; its
+/// row says `done` only after that, so a crash at any point leaves either a whole scan or none.
+///
+/// Thread-safe. Changes throw StoreRefusal; everything throws IoError and its kinds.
+class ScanStore {
+ public:
+  /// Both are borrowed; live longer.
+  ScanStore(StoreDatabase& database, const ScanFolders& folders)
+      : database_(database), folders_(folders) {}
+
+  /// Newest first. @param patient_id  Empty: of all.
+  [[nodiscard]] std::vector<web::Scan> List(const std::string& patient_id, int limit);
+  [[nodiscard]] std::optional<web::Scan> Find(const std::string& id);
+  /// Those of a patient that are done.
+  [[nodiscard]] int CountSince(const std::string& patient_id, web::WallClock::time_point since);
+  /// Surface seen by a scan's sweep; 0: unknown.
+  [[nodiscard]] double SweptArea(const std::string& scan_id);
+
+  /// Stores a row that says `running`, and makes an empty staging folder. Gives the id.
+  std::string Begin(const NewScan& scan);
+  /// kDone: the staging folder becomes the scan's. kFailed: only the recording in it, where it is
+  /// complete. Else it is removed.
+  void Finish(const std::string& scan_id, const FinishedScan& finished);
+  /// Verdict, numbers and reason go into the log. kConflict where a newer scan of the patient is
+  /// done or runs, and for a result that is not in tolerance without a reason.
+  void Accept(const web::Actor& actor, const std::string& id, const std::string& reason = {});
+
+  /// The scan that has begun and not ended. Stable while the caller holds the connection for
+  /// changes.
+  [[nodiscard]] std::optional<std::int64_t> running() const { return running_; }
+
+ private:
+  web::Scan ReadScan(const Statement& row) const;
+  static void NoteEnd(Database& database, const std::string& scan_id, const FinishedScan& finished,
+                      bool has_folder, const std::vector<FileDigest>& files);
+
+  StoreDatabase& database_;
+  const ScanFolders& folders_;
+  std::optional<std::int64_t> running_;  ///< Guarded by the connection for changes.
+};
+
+}  // namespace plumb

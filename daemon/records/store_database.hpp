@@ -1,0 +1,73 @@
+// The one database of a store, as its services share it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "daemon/records/database.hpp"
+#include "web/service/service_types.hpp"
+
+namespace plumb {
+
+/// Three connections to one file: one makes all changes, one reads single rows, one reads lists.
+/// Reading never waits for the disk writes of a change, nor a row for a list. Thread-safe: a
+/// connection is held by one thread at a time.
+class StoreDatabase {
+ public:
+  /// A connection, held by the calling thread until this object ends.
+  class Held {
+   public:
+    Database* operator->() const { return database_; }
+    Database& operator*() const { return *database_; }
+
+   private:
+    friend class StoreDatabase;
+    Held(std::mutex& mutex, Database& database) : lock_(mutex), database_(&database) {}
+    std::unique_lock<std::mutex> lock_;
+    Database* database_;
+  };
+
+  /// @param write    The connection for changes; its tables are those of this version.
+  /// @param readers  How the two others open the same file.
+  /// @throws IoError and its kinds
+  StoreDatabase(std::unique_ptr<Database> write, const std::filesystem::path& file,
+                Database::Access readers);
+
+  [[nodiscard]] Held ForChanges() { return {write_mutex_, *write_}; }
+  [[nodiscard]] Held ForRows() { return {row_mutex_, row_}; }  ///< For the event loop too.
+  [[nodiscard]] Held ForLists() { return {list_mutex_, list_}; }
+
+ private:
+  std::mutex write_mutex_;
+  std::unique_ptr<Database> write_;
+  std::mutex row_mutex_;
+  Database row_;
+  std::mutex list_mutex_;
+  Database list_;
+};
+
+/// One change and its entries in the audit log, as one transaction. Undone unless Commit() is
+/// called. Other changes wait until it ends.
+class StoreChange {
+ public:
+  explicit StoreChange(StoreDatabase& database)
+      : held_(database.ForChanges()), transaction_(*held_) {}
+
+  [[nodiscard]] Statement Prepare(const char* sql) { return held_->Prepare(sql); }
+  [[nodiscard]] std::int64_t last_id() const { return held_->last_id(); }
+  [[nodiscard]] int num_changed() const { return held_->num_changed(); }
+  /// Adds an entry to the audit log.
+  void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
+           const std::string& detail);
+  void Commit() { transaction_.Commit(); }
+  [[nodiscard]] Database& database() { return *held_; }
+
+ private:
+  StoreDatabase::Held held_;
+  Transaction transaction_;
+};
+
+}  // namespace plumb

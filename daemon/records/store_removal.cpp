@@ -1,0 +1,223 @@
+#include "daemon/records/store_removal.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "daemon/records/store_refusal.hpp"
+#include "daemon/records/stored_values.hpp"
+
+namespace plumb {
+
+namespace fs = std::filesystem;
+
+using store::Now;
+using store::ParseId;
+using store::RequireId;
+using store::ScanId;
+using store::ToStored;
+using web::ChangeResult;
+
+namespace {
+
+std::uint64_t BytesOf(const fs::path& folder, const std::stop_token& stop) {
+  std::uint64_t bytes = 0;
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(folder, error), end;
+       !error && entry != end && !stop.stop_requested(); entry.increment(error)) {
+    std::error_code ignored;
+    if (entry->is_regular_file(ignored)) bytes += entry->file_size(ignored);
+  }
+  return bytes;
+}
+
+/// So that a start tells what was removed from what it cannot explain.
+void NoteRemoved(StoreChange& change, const std::string& scan_id) {
+  change.Prepare("INSERT OR IGNORE INTO removed_scans (id) VALUES (?)")
+      .Bind(ParseId(scan_id))
+      .Run();
+}
+
+std::vector<std::string> ScansOf(Statement query) {
+  std::vector<std::string> scans;
+  while (query.Step()) scans.push_back(ScanId(query.Integer(0)));
+  return scans;
+}
+
+}  // namespace
+
+std::unique_lock<std::mutex> RemovalGate::LockRemovals() {
+  std::unique_lock lock(mutex_);
+  if (backing_up_)
+    throw StoreRefusal(web::ChangeResult::kConflict,
+                       "a backup is being made, and nothing is removed meanwhile: try again when "
+                       "it is done");
+  return lock;
+}
+
+RemovalGate::Backup::Backup(RemovalGate& gate) : gate_(gate) {
+  const std::lock_guard lock(gate_.mutex_);  // a removal that has begun ends first
+  if (gate_.backing_up_.exchange(true))
+    throw StoreRefusal(web::ChangeResult::kConflict, "a backup is being made already");
+}
+
+void StoreRemoval::RemoveFiles(const std::string& scan_id) {
+  std::error_code ignored;  // what stays goes at the next start
+  fs::remove_all(folders_.Scan(scan_id), ignored);
+  fs::remove_all(folders_.Staging(scan_id), ignored);
+  fs::remove_all(folders_.Interrupted(scan_id), ignored);
+}
+
+void StoreRemoval::WipePatient(const web::Actor& actor, const std::string& id) {
+  const std::int64_t number = RequireId(id, "patient");
+  std::vector<std::string> scans;
+  const std::unique_lock removals = gate_.LockRemovals();
+  {
+    StoreChange change(database_);
+    {
+      Statement query = change.Prepare("SELECT id FROM scans WHERE patient_id = ?");
+      query.Bind(number);
+      scans = ScansOf(std::move(query));
+    }
+    if (const auto running_scan = scans_.running()) {
+      Statement running = change.Prepare("SELECT 1 FROM scans WHERE patient_id = ? AND id = ?");
+      if (running.Bind(number).Bind(*running_scan).Step())
+        throw StoreRefusal(ChangeResult::kConflict,
+                           "a scan of this patient is running: end or cancel it first");
+    }
+    change.Prepare("UPDATE patients SET wiping = 1 WHERE id = ?").Bind(number).Run();
+    if (change.num_changed() == 0)
+      throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
+    for (const std::string& scan : scans) NoteRemoved(change, scan);
+    change.Prepare("DELETE FROM refs WHERE patient_id = ?").Bind(number).Run();
+    change.Prepare("DELETE FROM patients WHERE id = ?").Bind(number).Run();
+    change.Log(actor, "patient.wipe", id, fmt::format("{} scans", scans.size()));
+    change.Commit();
+  }
+  for (const std::string& scan : scans)
+    RemoveFiles(scan);  // what a crash leaves here goes at the next start
+  std::error_code ignored;
+  fs::remove(folders_.state() / "imports" / (std::to_string(number) + ".json"), ignored);
+  // Nor does the write-ahead log keep what was wiped.
+  database_.ForChanges()->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Run();
+}
+
+void StoreRemoval::RemoveScan(const web::Actor& actor, const std::string& id,
+                              const std::string& reason) {
+  const std::optional<std::int64_t> number = ParseId(id);
+  if (reason.empty())
+    throw StoreRefusal(ChangeResult::kInvalid, "a scan is removed for a reason: state it");
+  const std::unique_lock removals = gate_.LockRemovals();
+  {
+    StoreChange change(database_);
+    Statement query = change.Prepare(
+        "SELECT outcome, EXISTS (SELECT 1 FROM refs WHERE scan_id = scans.id) FROM scans WHERE id "
+        "= ?");
+    if (!number || !query.Bind(*number).Step())
+      throw StoreRefusal(ChangeResult::kNotFound, "there is no such scan");
+    if (query.Text(0) == "running")
+      throw StoreRefusal(ChangeResult::kConflict, "this scan is running: discard it instead");
+    if (query.Integer(1) != 0)
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "a reference is made of this scan: it goes only with its patient");
+    NoteRemoved(change, ScanId(*number));
+    change.Prepare("DELETE FROM scans WHERE id = ?").Bind(*number).Run();
+    change.Log(actor, "scan.remove", ScanId(*number), reason);
+    change.Commit();
+  }
+  RemoveFiles(ScanId(*number));
+}
+
+/// Its files go after the lock is free: a scan that begins meanwhile must not wait for a slow disk.
+bool StoreRemoval::ForgetScan(const std::string& scan_id) {
+  const std::unique_lock removals = gate_.LockRemovals();
+  {
+    StoreChange change(database_);
+    change
+        .Prepare(
+            "DELETE FROM scans WHERE id = ? AND outcome <> 'running' AND id NOT IN (SELECT scan_id "
+            "FROM refs)")
+        .Bind(ParseId(scan_id))
+        .Run();
+    if (change.num_changed() == 0) return false;
+    NoteRemoved(change, scan_id);
+    change.Log(store::kSelf, "scan.remove", scan_id, "retention");
+    change.Commit();
+  }
+  RemoveFiles(scan_id);
+  return true;
+}
+
+int StoreRemoval::RemoveOldScans(int retention_days, const std::stop_token& stop) {
+  if (retention_days <= 0) return 0;
+  const web::WallClock::time_point now = web::WallClock::now();
+  std::vector<std::string> old;
+  {
+    const StoreDatabase::Held writer = database_.ForChanges();
+    // Numbers only count up while clocks step: no scan is older than one before it, and stamps of
+    // the future are wrong.
+    Statement query = writer->Prepare(
+        "SELECT id FROM (SELECT id, outcome, max(CASE WHEN started_at <= ? THEN started_at ELSE 0 "
+        "END) OVER (ORDER BY id) AS since"
+        " FROM scans) WHERE outcome <> 'running' AND since < ? AND id NOT IN (SELECT scan_id FROM "
+        "refs) ORDER BY id");
+    query.Bind(ToStored(now)).Bind(ToStored(now - std::chrono::hours(24) * retention_days));
+    old = ScansOf(std::move(query));
+  }
+  int num_removed = 0;
+  for (const std::string& scan : old) {
+    if (stop.stop_requested()) break;
+    num_removed += ForgetScan(scan) ? 1 : 0;
+  }
+  return num_removed;
+}
+
+/// Its digest goes first: what is removed on purpose is not missed.
+void StoreRemoval::ForgetRecording(const std::string& scan_id) {
+  const std::unique_lock removals = gate_.LockRemovals();
+  {
+    StoreChange change(database_);
+    change.Prepare("DELETE FROM scan_files WHERE scan_id = ? AND path = 'recording'")
+        .Bind(ParseId(scan_id))
+        .Run();
+    change.Log(store::kSelf, "recording.remove", scan_id, "quota");
+    change.Commit();
+  }
+  std::error_code ignored;
+  fs::remove_all(folders_.Scan(scan_id) / kRecordingFolder, ignored);
+}
+
+int StoreRemoval::KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop) {
+  std::uint64_t bytes = BytesOf(folders_.scans(), stop);
+  if (bytes <= max_bytes) return 0;
+  int num_touched = 0;
+  std::vector<std::string> all, removable;
+  {
+    const StoreDatabase::Held writer = database_.ForChanges();
+    all = ScansOf(writer->Prepare("SELECT id FROM scans WHERE has_folder = 1 ORDER BY id"));
+    removable =
+        ScansOf(writer->Prepare("SELECT id FROM scans WHERE has_folder = 1 "
+                                "AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id"));
+  }
+  for (const std::string& scan : all) {  // raw recordings are large, and nothing hangs on them
+    const fs::path recording = folders_.Scan(scan) / kRecordingFolder;
+    std::error_code ignored;
+    if (bytes <= max_bytes || stop.stop_requested() || !fs::exists(recording, ignored)) continue;
+    bytes -= std::min(bytes, BytesOf(recording, stop));
+    ForgetRecording(scan);
+    ++num_touched;
+  }
+  for (const std::string& scan : removable) {
+    if (bytes <= max_bytes || stop.stop_requested()) break;
+    const std::uint64_t its_bytes = BytesOf(folders_.Scan(scan), stop);
+    if (!ForgetScan(scan)) continue;  // a reference by now
+    bytes -= std::min(bytes, its_bytes);
+    ++num_touched;
+  }
+  return num_touched;
+}
+
+}  // namespace plumb

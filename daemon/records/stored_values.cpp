@@ -1,0 +1,80 @@
+#include "daemon/records/stored_values.hpp"
+
+#include <array>
+#include <charconv>
+#include <chrono>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/records/store_refusal.hpp"
+#include "web/service/names.hpp"
+
+namespace plumb::store {
+
+std::int64_t ToStored(web::WallClock::time_point time) {
+  return std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count();
+}
+
+web::WallClock::time_point FromStored(std::int64_t us) {
+  return web::WallClock::time_point(
+      std::chrono::duration_cast<web::WallClock::duration>(std::chrono::microseconds(us)));
+}
+
+std::int64_t Now() { return ToStored(web::WallClock::now()); }
+
+std::optional<std::int64_t> ParseId(std::string_view text) {
+  constexpr std::size_t kMaxDigits = 15;
+  std::int64_t id = 0;
+  if (text.empty() || text.size() > kMaxDigits) return std::nullopt;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
+  if (error != std::errc() || end != text.data() + text.size() || id <= 0) return std::nullopt;
+  return id;
+}
+
+std::int64_t RequireId(const std::string& text, const char* what) {
+  if (const std::optional<std::int64_t> id = ParseId(text)) return *id;
+  throw StoreRefusal(web::ChangeResult::kNotFound,
+                     fmt::format("there is no {} '{}'", what, text.substr(0, 32)));
+}
+
+std::string ScanId(std::int64_t id) { return fmt::format("{:06}", id); }
+
+const char* Name(web::ScanPurpose purpose) {
+  return web::kPurposeNames.at(static_cast<std::size_t>(purpose)).data();
+}
+const char* Name(web::ScanOutcome outcome) {
+  return web::kOutcomeNames.at(static_cast<std::size_t>(outcome)).data();
+}
+const char* Name(web::Role role) {
+  return web::kRoleNames.at(static_cast<std::size_t>(role)).data();
+}
+
+namespace {
+
+/// The value of that name. @throws DataError where there is none.
+template <typename Value, std::size_t kSize>
+Value Parse(const char* what, std::string_view name,
+            const std::array<std::string_view, kSize>& names) {
+  for (std::size_t i = 0; i < kSize; ++i) {
+    if (name == names[i]) return static_cast<Value>(i);
+  }
+  throw DataError(
+      fmt::format("this version knows no {} '{}', which is stored: the database was changed from "
+                  "outside, or its disk failed. Put a backup of it in its place",
+                  what, name.substr(0, 32)));
+}
+
+}  // namespace
+
+web::ScanPurpose ParsePurpose(std::string_view name) {
+  return Parse<web::ScanPurpose>("purpose", name, web::kPurposeNames);
+}
+web::ScanOutcome ParseOutcome(std::string_view name) {
+  return Parse<web::ScanOutcome>("outcome", name, web::kOutcomeNames);
+}
+web::Role ParseRole(std::string_view name) {
+  return Parse<web::Role>("role", name, web::kRoleNames);
+}
+
+}  // namespace plumb::store

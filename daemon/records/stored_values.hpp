@@ -1,0 +1,38 @@
+// Times, numbers and names as the columns of the database hold them.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "web/service/service_types.hpp"
+
+namespace plumb::store {
+
+/// The appliance itself, as the audit log names it.
+inline const web::Actor kSelf{.user = "plumbd", .address = ""};
+
+/// Microseconds since 1970.
+[[nodiscard]] std::int64_t ToStored(web::WallClock::time_point time);
+[[nodiscard]] web::WallClock::time_point FromStored(std::int64_t us);
+/// The time now, as it is stored.
+[[nodiscard]] std::int64_t Now();
+
+/// A number as it comes from outside; nothing if no record can have it.
+[[nodiscard]] std::optional<std::int64_t> ParseId(std::string_view text);
+/// The same. @throws StoreRefusal (kNotFound) naming what does not exist.
+[[nodiscard]] std::int64_t RequireId(const std::string& text, const char* what);
+
+/// "000042": the name of a scan's folder, and its id.
+[[nodiscard]] std::string ScanId(std::int64_t id);
+
+[[nodiscard]] const char* Name(web::ScanPurpose purpose);
+[[nodiscard]] const char* Name(web::ScanOutcome outcome);
+[[nodiscard]] const char* Name(web::Role role);
+/// @throws DataError for a name that this version does not know.
+[[nodiscard]] web::ScanPurpose ParsePurpose(std::string_view name);
+[[nodiscard]] web::ScanOutcome ParseOutcome(std::string_view name);
+[[nodiscard]] web::Role ParseRole(std::string_view name);
+
+}  // namespace plumb::store

@@ -1,0 +1,109 @@
+#include "daemon/records/user_store.hpp"
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/records/store_refusal.hpp"
+#include "daemon/records/stored_values.hpp"
+
+namespace plumb {
+
+using store::FromStored;
+using store::Now;
+using web::ChangeResult;
+
+namespace {
+
+/// An account whose role cannot be read is closed, not left out: where no account is seen at all,
+/// the page offers to make the first one.
+web::User ReadUser(const Statement& row) {
+  web::User user{.name = row.Text(0),
+                 .role = web::Role::kTechnician,
+                 .password_hash = row.Text(2),
+                 .disabled = row.Integer(3) != 0,
+                 .created_at = FromStored(row.Integer(4))};
+  try {
+    user.role = store::ParseRole(row.Text(1));
+  } catch (const DataError&) {
+    user.disabled = true;
+  }
+  return user;
+}
+
+}  // namespace
+
+std::vector<web::User> UserStore::List() {
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(
+      "SELECT name, role, password_hash, disabled, created_at FROM users ORDER BY name LIMIT 1000");
+  std::vector<web::User> users;
+  while (query.Step()) users.push_back(ReadUser(query));
+  return users;
+}
+
+std::optional<web::User> UserStore::Find(const std::string& name) {
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(
+      "SELECT name, role, password_hash, disabled, created_at FROM users WHERE name = ?");
+  return query.Bind(name).Step() ? std::optional(ReadUser(query)) : std::nullopt;
+}
+
+void UserStore::Add(const web::Actor& actor, const web::User& user) {
+  StoreChange change(database_);
+  try {
+    change
+        .Prepare(
+            "INSERT INTO users (name, role, password_hash, disabled, created_at) VALUES (?, ?, ?, "
+            "?, ?)")
+        .Bind(user.name)
+        .Bind(store::Name(user.role))
+        .Bind(user.password_hash)
+        .Bind(std::int64_t{user.disabled})
+        .Bind(Now())
+        .Run();
+  } catch (const ConstraintBroken&) {
+    throw StoreRefusal(ChangeResult::kConflict,
+                       "there is an account of this name already: choose another name");
+  }
+  change.Log(actor, "user.add", user.name, store::Name(user.role));
+  change.Commit();
+}
+
+void UserStore::Change(const web::Actor& actor, const web::UserChange& wanted) {
+  StoreChange change(database_);
+  web::User user;
+  {
+    Statement query = change.Prepare(
+        "SELECT name, role, password_hash, disabled, created_at FROM users WHERE name = ?");
+    if (!query.Bind(wanted.name).Step())
+      throw StoreRefusal(ChangeResult::kNotFound, "there is no such account");
+    user = ReadUser(query);
+  }
+  if (wanted.expected_hash && (user.disabled || user.password_hash != *wanted.expected_hash))
+    throw StoreRefusal(ChangeResult::kConflict,
+                       "the account has been changed by somebody else meanwhile: log in again");
+  std::string changes;
+  if (wanted.role && *wanted.role != user.role)
+    changes += fmt::format("role {} ", store::Name(*wanted.role));
+  if (wanted.password_hash && *wanted.password_hash != user.password_hash) changes += "password ";
+  if (wanted.disabled && *wanted.disabled != user.disabled)
+    changes += *wanted.disabled ? "disabled " : "enabled ";
+  change.Prepare("UPDATE users SET role = ?, password_hash = ?, disabled = ? WHERE name = ?")
+      .Bind(store::Name(wanted.role.value_or(user.role)))
+      .Bind(wanted.password_hash.value_or(user.password_hash))
+      .Bind(std::int64_t{wanted.disabled.value_or(user.disabled)})
+      .Bind(wanted.name)
+      .Run();
+  {
+    Statement query =
+        change.Prepare("SELECT 1 FROM users WHERE role = 'engineer' AND disabled = 0 LIMIT 1");
+    if (!query.Step())
+      throw StoreRefusal(ChangeResult::kConflict,
+                         "no enabled engineer would be left: make another one first");
+  }
+  if (!changes.empty()) changes.pop_back();
+  change.Log(actor, "user.change", wanted.name, changes);
+  change.Commit();
+}
+
+}  // namespace plumb

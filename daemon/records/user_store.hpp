@@ -1,0 +1,29 @@
+// The accounts of those who use the page.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/records/store_database.hpp"
+#include "web/service/service_types.hpp"
+
+namespace plumb {
+
+/// Thread-safe. Changes throw StoreRefusal; everything throws IoError and its kinds.
+class UserStore {
+ public:
+  explicit UserStore(StoreDatabase& database) : database_(database) {}
+
+  [[nodiscard]] std::vector<web::User> List();  ///< By name.
+  [[nodiscard]] std::optional<web::User> Find(const std::string& name);
+  /// kConflict for a name that another account has.
+  void Add(const web::Actor& actor, const web::User& user);
+  /// kConflict where no enabled engineer would be left.
+  void Change(const web::Actor& actor, const web::UserChange& wanted);
+
+ private:
+  StoreDatabase& database_;
+};
+
+}  // namespace plumb
