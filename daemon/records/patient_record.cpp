@@ -117,19 +117,20 @@ void CheckValue(const std::string& table, const ColumnOf& column, const Json& va
 
 void CheckRow(const std::string& table, const std::vector<ColumnOf>& columns, const Json& row) {
   if (!row.is_object()) throw DataError(fmt::format("its record has in {} no row", table));
-  for (const auto& [name, value] : row.items()) {
+  for (const auto& item : row.items()) {
+    const std::string& name = item.key();
     const auto column = std::find_if(columns.begin(), columns.end(),
                                      [&name](const ColumnOf& c) { return c.name == name; });
     if (column == columns.end())
       Refuse(table, name.substr(0, 40), "what this Plumb does not know: install the newer one");
-    CheckValue(table, *column, value);
+    CheckValue(table, *column, item.value());
   }
   for (const ColumnOf& column : columns) {
     if (column.is_required && !row.contains(column.name)) Refuse(table, column.name, "nothing");
   }
 }
 
-/// The numbers of a table's rows.
+/// The ids of a table's rows.
 std::set<std::int64_t> NumbersIn(const Json& rows, const char* table) {
   std::set<std::int64_t> ids;
   for (const Json& row : rows.at(table)) {
