@@ -1,9 +1,12 @@
 #include "algo/reconstruction/corrected_views.hpp"
 
 #include <cmath>
+#include <memory>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
+#include "algo/base/check_stop.hpp"
 #include "algo/geometry/back_projection.hpp"
 #include "algo/reconstruction/joint_registration.hpp"
 #include "algo/sensor_model/depth_correction.hpp"
@@ -48,27 +51,37 @@ cv::Mat CorrectedDepth(const cv::Mat& depth_m, const DepthCorrection& correction
 
 }  // namespace
 
-std::vector<DepthView> CorrectedViews(TrackingMap& map, const Intrinsics& stated,
-                                      const CalibrationModel& calibration,
-                                      const Pose& T_scene_world, bool keep_color) {
-  std::vector<DepthView> views(map.keyframes.size());
+std::vector<ViewSurface> PrepareCorrectedViews(TrackingMap& map, const Intrinsics& stated,
+                                               const CalibrationModel& calibration,
+                                               const Pose& T_scene_world,
+                                               const ViewSurfaceOptions& options) {
   Intrinsics corrected = calibration.Corrected(stated);
   const double scale = stated.width / 640.0;
   corrected.cx += calibration.depth[kDepthShiftX] * scale;
   corrected.cy += calibration.depth[kDepthShiftY] * scale;
   const RayTable rays(corrected);
+  const auto working_rays = std::make_shared<const RayTable>(WorkingIntrinsics(corrected));
   const DepthCorrection correction(calibration, corrected.width, corrected.height, 1);
-  tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t k) {
-    MapKeyframe& keyframe = map.keyframes[k];
-    views[k].intrinsics = corrected;
-    views[k].depth_m =
+  std::vector<MapKeyframe*> keyframes;
+  for (MapKeyframe& keyframe : map.keyframes) {
+    keyframe.dense = {};
+    if (!keyframe.is_bare) keyframes.push_back(&keyframe);
+  }
+  std::vector<ViewSurface> surfaces(keyframes.size());
+  tbb::parallel_for(std::size_t{0}, surfaces.size(), [&](std::size_t k) {
+    CheckStop(options.stop);
+    MapKeyframe& keyframe = *keyframes[k];
+    DepthView view;
+    view.intrinsics = corrected;
+    view.depth_m =
         CorrectedDepth(keyframe.data.view.depth_m, correction, calibration.depth[kDepthReadout],
                        corrected, rays, keyframe.velocity_per_s);
+    view.color_rgb = std::exchange(keyframe.data.view.color_rgb, {});
+    view.T_world_camera = T_scene_world * DepthPose(keyframe, calibration);
     keyframe.data.view.depth_m.release();
-    if (keep_color) views[k].color_rgb = keyframe.data.view.color_rgb;
-    views[k].T_world_camera = T_scene_world * DepthPose(keyframe, calibration);
+    surfaces[k] = PrepareView(view, working_rays, options);
   });
-  return views;
+  return surfaces;
 }
 
 }  // namespace plumb

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
@@ -37,6 +36,7 @@ TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
   TrackerOptions tracking;
   tracking.use_markers = options.use_markers;
   tracking.use_keypoints = options.use_keypoints;
+  tracking.keep_color = options.keep_color;
   tracking.keyframe_distance *= options.keyframe_spacing;
   tracking.keyframe_angle_rad *= options.keyframe_spacing;
   tracking.min_tracked_share = 1.0 - options.keyframe_spacing * (1.0 - tracking.min_tracked_share);
@@ -197,12 +197,10 @@ struct Reconstructor::Impl {
     std::vector<MarkerSighting> sightings;
     std::vector<MarkerObservation*> observations;
     for (MapKeyframe& keyframe : map.keyframes) {
-      if (keyframe.data.markers.empty() || keyframe.data.view.color_rgb.empty()) continue;
-      cv::Mat gray;
-      cv::cvtColor(keyframe.data.view.color_rgb, gray, cv::COLOR_RGB2GRAY);
+      if (keyframe.gray.empty()) continue;
       for (MarkerObservation& observation : keyframe.data.markers) {
         observations.push_back(&observation);
-        sightings.push_back({gray,
+        sightings.push_back({keyframe.gray,
                              observation.corners,
                              {dictionary.Code(observation.id), dictionary.bits_per_side()}});
       }
@@ -229,6 +227,11 @@ struct Reconstructor::Impl {
     const std::optional<SweepTone> tone =
         options.use_tone_curve ? RefineMarkers(map, stop) : std::nullopt;
     const double tone_s = Now() - stage;
+    // The joint solve takes as much memory as the images: what it does not need goes before.
+    for (MapKeyframe& keyframe : map.keyframes) {
+      keyframe.gray.release();
+      keyframe.descriptors.release();
+    }
     report(0.05, "registration");
     stage = Now();
     JointRegistrationOptions joint_options;
@@ -279,10 +282,8 @@ struct Reconstructor::Impl {
     stage = Now();
     ViewSurfaceOptions view_options;
     view_options.stop = stop;
-    const std::vector<ViewSurface> surfaces =
-        PrepareViews(CorrectedViews(map, info.intrinsics, joint.calibration,
-                                    SceneFromWorld(info, map), options.keep_color),
-                     view_options);
+    const std::vector<ViewSurface> surfaces = PrepareCorrectedViews(
+        map, info.intrinsics, joint.calibration, SceneFromWorld(info, map), view_options);
     SurfaceCloudOptions cloud_options;
     cloud_options.with_colors = options.keep_color;
     cloud_options.stop = stop;
@@ -365,6 +366,7 @@ struct Reconstructor::Impl {
       const MapKeyframe* best = nullptr;
       for (std::size_t k = first; k < std::min(first + step, map.keyframes.size()); ++k) {
         const MapKeyframe& keyframe = map.keyframes[k];
+        if (keyframe.is_bare) continue;
         if (best != nullptr && keyframe.data.markers.size() <= best->data.markers.size()) continue;
         if (cv::countNonZero(keyframe.data.view.depth_m) > 0) best = &keyframe;
       }

@@ -41,8 +41,9 @@ struct MapKeyframe {
   Pose T_previous_color = Pose::Identity();  ///< Its camera in that one's, as tracked.
   std::vector<KeypointObservation> keypoints;
   DenseView dense;
-  double median_depth_m = 1.0;  ///< Of the dense view.
-  cv::Mat gray;  ///< CV_8UC1; released once the keyframe is out of reach of re-association.
+  double median_depth_m = 1.0;                   ///< Of the dense view.
+  cv::Mat gray;                                  ///< CV_8UC1.
+  bool is_bare = false;                          ///< Its images were given up, see BoundImages().
   std::vector<Eigen::Vector2f> features_px;      ///< For relocalisation, once it is asked for:
                                                  ///< keypoints with a descriptor and depth.
   std::vector<Eigen::Vector3f> features_camera;  ///< The same in the camera frame, metres.

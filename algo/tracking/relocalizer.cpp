@@ -103,6 +103,7 @@ int NearestKeyframe(const TrackingMap& map, const Pose& T_world_color) {
   int best = 0;
   double best_distance = 1e300;
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
+    if (map.keyframes[k].is_bare) continue;  // Nothing to be tracked against.
     const double d = Distance(map.keyframes[k].T_world_color, T_world_color);
     if (d < best_distance) {
       best_distance = d;

@@ -10,6 +10,7 @@
 
 #include "algo/markers/marker_detector.hpp"
 #include "algo/tracking/followed_points.hpp"
+#include "algo/tracking/image_budget.hpp"
 #include "algo/tracking/keypoints.hpp"
 #include "algo/tracking/local_bundle.hpp"
 #include "algo/tracking/loop_closer.hpp"
@@ -399,7 +400,7 @@ struct Tracker::Impl {
     keyframe.data.depth_time_s = frame.depth_time_s;
     keyframe.data.view.intrinsics = info.intrinsics;
     keyframe.data.view.depth_m = frame.depth_m;
-    keyframe.data.view.color_rgb = frame.color_rgb;
+    if (options.keep_color) keyframe.data.view.color_rgb = frame.color_rgb;
     keyframe.data.markers = prepared.markers;
     keyframe.T_world_color = T_world_color;
     keyframe.velocity_per_s = velocity;
@@ -427,6 +428,7 @@ struct Tracker::Impl {
     lost = false;
     AdjustLocally(index);
     if (options.use_keypoints) CloseLoop(prepared, index);
+    BoundImages(options.max_images, map);
     reference_count = followed_points.points().size();
     const Pose T_adjusted = map.keyframes.back().T_world_color;
     T_world_last = T_adjusted;

@@ -2,6 +2,7 @@
 // and recovery after loss.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -22,6 +23,9 @@ struct TrackerOptions {
   double keyframe_angle_rad = 0.09;
   double min_tracked_share = 0.6;  ///< Of the keyframe's keypoints; fewer make a new keyframe.
   int local_keyframes = 6;         ///< Keyframes that local bundle adjustment moves.
+  bool keep_color = true;          ///< Keyframes keep their colour images.
+  std::size_t max_images = 96;     ///< Keyframes that keep images at most, see BoundImages(); a
+                                   ///< sweep of 300 frames has about 50.
 };
 
 /// A frame's outcome.
