@@ -13,6 +13,7 @@
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/files/text_report.hpp"
 #include "daemon/loop/explain.hpp"
+#include "daemon/pipeline/frame_thinning.hpp"
 #include "daemon/pipeline/recording_feed.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
 #include "daemon/records/check_json.hpp"
@@ -155,13 +156,16 @@ void KeepFailed(RecordingFeed& recording, const std::stop_token& stop) {
 }  // namespace
 
 Scene ScanSession::Track(const std::stop_token& stop) {
+  ThinnedFeed thinned(*feed_);
   std::optional<RecordingFeed> recording;
-  if (job_.keep_recording) recording.emplace(*feed_, job_.info, folder_ / "recording");
-  FrameFeed& feed = recording ? static_cast<FrameFeed&>(*recording) : *feed_;
+  if (job_.keep_recording) recording.emplace(thinned, job_.info, folder_ / "recording");
+  FrameFeed& feed = recording ? static_cast<FrameFeed&>(*recording) : thinned;
   try {
     Scene scene = RunScan(feed, job_.info, job_.reconstructor, stop,
                           [this](const ScanProgress& progress) { OnProgress(progress); });
     if (recording) recording->Complete(stop);
+    if (const std::string warning = thinned.Warning(); !warning.empty())
+      scene.warnings.push_back(warning);
     return scene;
   } catch (...) {
     if (recording && !stop.stop_requested()) KeepFailed(*recording, stop);

@@ -12,6 +12,7 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/loop/bounded_queue.hpp"
+#include "daemon/pipeline/frame_thinning.hpp"
 
 namespace plumb {
 namespace {
@@ -144,7 +145,13 @@ Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOption
 Scene RunScan(FrameSource& source, const ScanRunnerOptions& options, const std::stop_token& stop,
               const std::function<void(const ScanProgress&)>& progress) {
   FrameReader reader(source, options.realtime, options.queue_capacity);
-  return RunScan(reader, source.info(), options.reconstructor, stop, progress);
+  if (!options.realtime)
+    return RunScan(reader, source.info(), options.reconstructor, stop, progress);
+  ThinnedFeed thinned(reader);
+  Scene scene = RunScan(thinned, source.info(), options.reconstructor, stop, progress);
+  if (const std::string warning = thinned.Warning(); !warning.empty())
+    scene.warnings.push_back(warning);
+  return scene;
 }
 
 }  // namespace plumb

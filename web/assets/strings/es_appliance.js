@@ -215,6 +215,10 @@ export const kPatterns = [
   // Warnings of a scan.
   ['^(\\d+) of (\\d+) frames were not tracked, ([\\d.]+) s at longest$',
     '$1 de $2 imágenes sin seguimiento, $3 s como máximo'],
+  ['^the computer was too slow: (\\d+) of (\\d+) frames were left out evenly; sweep more slowly, and '
+    + 'close what else runs on it$',
+  'el equipo fue demasiado lento: se omitieron $1 de $2 imágenes de forma regular; barra más '
+    + 'despacio y cierre lo demás que se ejecute en él'],
   ['^no image came for ([\\d.]+) s in the sweep; what the sensor passed meanwhile is missing$',
     'no llegó ninguna imagen durante $1 s del barrido; falta lo que el sensor recorrió entretanto'],
   ['^reference marker (\\d+) was seen from (\\d+) places? only: the scene\'s frame is less certain '

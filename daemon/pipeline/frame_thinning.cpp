@@ -1,0 +1,104 @@
+#include "daemon/pipeline/frame_thinning.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace plumb {
+namespace {
+
+// Weights of the newest value. A keyframe takes several times as long as other frames, so tracking
+// is averaged over about a second.
+constexpr double kPeriodWeight = 0.2;
+constexpr double kTrackingWeight = 0.05;
+
+constexpr int kFewFrames = 15;  // Say little: the first ones are all keyframes. So many may wait.
+
+double Smoothed(double before, double value, double weight) {
+  return before > 0 ? before + weight * (value - before) : value;
+}
+
+}  // namespace
+
+int NextStride(int stride, const TrackingLoad& load, const ThinningOptions& options) {
+  if (!(load.frame_period_s > 0) || !(load.tracking_s > 0)) return stride;
+  const double load_of_all = load.tracking_s / load.frame_period_s;
+  if (load.late_s >= options.raise_late_s) {
+    if (load.since_change_s < options.raise_hold_s || load_of_all <= options.aimed_load * stride)
+      return stride;
+    const double needed = std::ceil(load_of_all / options.aimed_load);
+    return static_cast<int>(
+        std::min<double>(std::max<double>(stride + 1, needed), options.max_stride));
+  }
+  const bool is_idle =
+      load.late_s <= options.low_late_s && load.since_change_s >= options.lower_hold_s;
+  if (stride > 1 && is_idle && load_of_all <= options.low_load * (stride - 1)) return stride - 1;
+  return stride;
+}
+
+ThinnedFeed::ThinnedFeed(FrameFeed& feed, std::function<double()> now_s,
+                         const ThinningOptions& options)
+    : feed_(feed), now_s_(std::move(now_s)), options_(options) {}
+
+std::optional<Frame> ThinnedFeed::Next(const std::stop_token& stop) {
+  if (handed_out_s_) {
+    // At first the mean of all: the first frame is a keyframe and takes longest.
+    const double weight = std::max(kTrackingWeight, 1.0 / num_taken_);
+    tracking_s_ = Smoothed(tracking_s_, now_s_() - *handed_out_s_, weight);
+  }
+  handed_out_s_.reset();
+  while (std::optional<Frame> frame = feed_.Next(stop)) {
+    const double arrived_s = now_s_();
+    if (Takes(frame->depth_time_s, arrived_s)) {
+      ++num_taken_;
+      handed_out_s_ = arrived_s;
+      return frame;
+    }
+    ++num_left_out_;
+    ++num_untold_;
+  }
+  return std::nullopt;
+}
+
+bool ThinnedFeed::Takes(double stamp_s, double arrived_s) {
+  if (!last_stamp_s_) changed_s_ = stamp_s;
+  // A gap in the frames is no slower sensor.
+  if (const double elapsed_s = stamp_s - last_stamp_s_.value_or(stamp_s);
+      elapsed_s > 0 && (frame_period_s_ == 0 || elapsed_s < 3 * frame_period_s_))
+    frame_period_s_ = Smoothed(frame_period_s_, elapsed_s, kPeriodWeight);
+  last_stamp_s_ = stamp_s;
+  // The stamps' clock has another zero: the least lag seen is that of a frame that did not wait.
+  const double lag_s = arrived_s - stamp_s;
+  least_lag_s_ = std::min(lag_s, least_lag_s_.value_or(lag_s));
+  const int next = NextStride(stride_,
+                              {.frame_period_s = frame_period_s_,
+                               .tracking_s = num_taken_ < kFewFrames ? 0.0 : tracking_s_,
+                               .late_s = lag_s - *least_lag_s_,
+                               .since_change_s = stamp_s - changed_s_},
+                              options_);
+  if (next != stride_) {
+    stride_ = next;
+    changed_s_ = stamp_s;
+    left_to_skip_ = std::min(left_to_skip_, stride_ - 1);
+  }
+  if (left_to_skip_ > 0) {
+    --left_to_skip_;
+    return false;
+  }
+  left_to_skip_ = stride_ - 1;
+  return true;
+}
+
+int ThinnedFeed::TakeDropped() { return feed_.TakeDropped() + std::exchange(num_untold_, 0); }
+
+std::string ThinnedFeed::Warning() const {
+  if (num_left_out_ == 0) return {};
+  return fmt::format(
+      "the computer was too slow: {} of {} frames were left out evenly; sweep more slowly, and "
+      "close what else runs on it",
+      num_left_out_, num_left_out_ + num_taken_);
+}
+
+}  // namespace plumb

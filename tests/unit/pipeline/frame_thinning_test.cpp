@@ -1,0 +1,152 @@
+// Which live frames are left out: the decision on both sides of each limit, and a whole sweep under
+// a clock of the test.
+#include "daemon/pipeline/frame_thinning.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace plumb {
+namespace {
+
+constexpr double kPeriod_s = 1.0 / 30;
+
+// Load is what all frames would need of the time.
+TrackingLoad Load(double load, double late_s, double since_change_s) {
+  return {.frame_period_s = kPeriod_s,
+          .tracking_s = load * kPeriod_s,
+          .late_s = late_s,
+          .since_change_s = since_change_s};
+}
+
+TEST(NextStride, LeavesMoreOutOnceTrackingIsLateAndCannotCatchUp) {
+  EXPECT_EQ(NextStride(1, Load(1.2, 0.149, 5)), 1) << "not late yet";
+  EXPECT_EQ(NextStride(1, Load(1.2, 0.150, 5)), 2);
+  EXPECT_EQ(NextStride(1, Load(0.84, 0.3, 5)), 1) << "catches up by itself";
+  EXPECT_EQ(NextStride(1, Load(0.86, 0.3, 5)), 2);
+  EXPECT_EQ(NextStride(2, Load(1.69, 0.3, 5)), 2) << "the same at every second frame";
+  EXPECT_EQ(NextStride(2, Load(1.71, 0.3, 5)), 3);
+}
+
+TEST(NextStride, LeavesSoManyOutThatTheRestIsInTime) {
+  EXPECT_EQ(NextStride(1, Load(1.69, 0.2, 5)), 2) << "two times 0.85";
+  EXPECT_EQ(NextStride(1, Load(1.71, 0.2, 5)), 3);
+  EXPECT_EQ(NextStride(1, Load(9.0, 0.2, 5)), 4) << "at least a quarter is tracked";
+  EXPECT_EQ(NextStride(4, Load(9.0, 0.4, 5)), 4);
+}
+
+TEST(NextStride, WaitsAfterAChange) {
+  EXPECT_EQ(NextStride(2, Load(3.0, 0.3, 0.24)), 2);
+  EXPECT_EQ(NextStride(2, Load(3.0, 0.3, 0.25)), 4);
+  EXPECT_EQ(NextStride(2, Load(0.3, 0.0, 1.99)), 2);
+  EXPECT_EQ(NextStride(2, Load(0.3, 0.0, 2.0)), 1);
+}
+
+TEST(NextStride, TakesMoreAgainOnlyWhereThatStaysInTime) {
+  EXPECT_EQ(NextStride(2, Load(0.69, 0.0, 5)), 1);
+  EXPECT_EQ(NextStride(2, Load(0.71, 0.0, 5)), 2);
+  EXPECT_EQ(NextStride(4, Load(2.09, 0.0, 5)), 3) << "one step at a time";
+  EXPECT_EQ(NextStride(4, Load(2.11, 0.0, 5)), 4);
+  EXPECT_EQ(NextStride(2, Load(0.3, 0.070, 5)), 1);
+  EXPECT_EQ(NextStride(2, Load(0.3, 0.071, 5)), 2) << "not in time yet";
+  EXPECT_EQ(NextStride(1, Load(0.3, 0.0, 5)), 1);
+}
+
+TEST(NextStride, StaysWhileNothingIsKnown) {
+  EXPECT_EQ(NextStride(3, {.late_s = 9, .since_change_s = 9}), 3);
+  EXPECT_EQ(NextStride(1, {.frame_period_s = kPeriod_s, .late_s = 9, .since_change_s = 9}), 1);
+}
+
+/// A sensor of 30 frames a second and tracking that takes its time, both under one clock. Fifteen
+/// frames may wait; the oldest are lost then.
+class Sensor : public FrameFeed {
+ public:
+  explicit Sensor(int num_frames) : num_frames_(num_frames) {}
+  double now_s = 0.0;
+
+  std::optional<Frame> Next(const std::stop_token&) override {
+    if (next_ == num_frames_) return std::nullopt;
+    now_s = std::max(now_s, ArrivalOf(next_));
+    while (ArrivalOf(next_ + 15) <= now_s && next_ + 1 < num_frames_) {
+      ++next_;
+      ++lost_;
+      ++lost_in_all;
+    }
+    Frame frame;
+    frame.index = next_++;
+    frame.depth_time_s = 77.0 + static_cast<double>(frame.index) * kPeriod_s;
+    return frame;
+  }
+  int TakeDropped() override { return std::exchange(lost_, 0); }
+  void Finish() override {}
+  std::optional<double> last_frame_s() const override { return std::nullopt; }
+
+  int lost_in_all = 0;
+
+ private:
+  static double ArrivalOf(int frame) { return frame * kPeriod_s + 0.01; }
+  const int num_frames_;
+  int next_ = 0, lost_ = 0;
+};
+
+struct Sweep {
+  std::vector<std::int64_t> taken;
+  int lost = 0, dropped = 0;
+  std::string warning;
+};
+
+/// @param tracking_s  That a frame takes, by its index.
+Sweep Track(int num_frames, const std::function<double(std::int64_t)>& tracking_s) {
+  Sensor sensor(num_frames);
+  ThinnedFeed feed(sensor, [&] { return sensor.now_s; });
+  Sweep sweep;
+  while (const std::optional<Frame> frame = feed.Next({})) {
+    sweep.taken.push_back(frame->index);
+    sensor.now_s += tracking_s(frame->index);
+    sweep.dropped += feed.TakeDropped();
+  }
+  sweep.dropped += feed.TakeDropped();
+  sweep.lost = sensor.lost_in_all;
+  sweep.warning = feed.Warning();
+  return sweep;
+}
+
+TEST(ThinnedFeed, TakesEveryFrameOfASweepThatIsTrackedInTime) {
+  // Every fifth is a keyframe and late by itself.
+  const Sweep sweep = Track(300, [](std::int64_t i) { return i % 5 == 0 ? 0.06 : 0.02; });
+  EXPECT_EQ(sweep.taken.size(), 300U);
+  EXPECT_EQ(sweep.dropped, 0);
+  EXPECT_EQ(sweep.warning, "");
+}
+
+TEST(ThinnedFeed, LeavesOutEvenlyAndLosesNoneWhereTrackingTakesTooLong) {
+  const Sweep sweep = Track(300, [](std::int64_t i) { return i % 5 == 0 ? 0.09 : 0.04; });
+  EXPECT_EQ(sweep.lost, 0) << "none in a row";
+  EXPECT_EQ(sweep.taken.size() + static_cast<std::size_t>(sweep.dropped), 300U);
+  EXPECT_NEAR(static_cast<double>(sweep.taken.size()), 155, 15);
+  for (std::size_t i = 61; i < sweep.taken.size(); ++i)
+    EXPECT_EQ(sweep.taken[i] - sweep.taken[i - 1], 2) << "before " << sweep.taken[i];
+  EXPECT_THAT(sweep.warning, testing::HasSubstr("of 300 frames were left out evenly"));
+}
+
+TEST(ThinnedFeed, TakesAllAgainWhenTheLoadIsOver) {
+  const Sweep sweep = Track(600, [](std::int64_t i) { return i < 150 ? 0.05 : 0.01; });
+  EXPECT_EQ(sweep.lost, 0);
+  EXPECT_EQ(sweep.taken.back(), 599);
+  EXPECT_EQ(sweep.taken[sweep.taken.size() - 100], 500) << "the last ones without a gap";
+}
+
+TEST(ThinnedFeed, BeyondWhatItMayLeaveOutTheQueueLosesFramesAndTheyAreCounted) {
+  const Sweep sweep = Track(300, [](std::int64_t) { return 0.4; });
+  EXPECT_GT(sweep.lost, 50);
+  EXPECT_EQ(sweep.taken.size() + static_cast<std::size_t>(sweep.dropped), 300U);
+}
+
+}  // namespace
+}  // namespace plumb
