@@ -1,6 +1,8 @@
 #include "daemon/records/schema.hpp"
 
 #include <array>
+#include <charconv>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -190,6 +192,26 @@ UPDATE scans SET accepted_at = (SELECT MAX(time) FROM audit WHERE subject = prin
 constexpr std::array<const char*, kSchemaVersion> kSteps = {
     kVersion1, kVersion2, kVersion3, kVersion4, kVersion5, kVersion6, kVersion7, kVersion8};
 
+/// Whether a newer database says that programs of this schema can work with it.
+bool IsUsable(Database& database) {
+  Statement tables = database.Prepare("SELECT 1 FROM sqlite_master WHERE name = 'settings'");
+  if (!tables.Step()) return false;
+  Statement query = database.Prepare("SELECT value FROM settings WHERE name = ?");
+  if (!query.Bind(std::string(kUsableFromName)).Step()) return false;
+  const std::string text = query.Text(0);
+  int oldest = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), oldest);
+  return error == std::errc() && end == text.data() + text.size() && oldest > 0 &&
+         oldest <= kSchemaVersion;
+}
+
+void NoteUsableFrom(Database& database) {
+  database.Prepare("INSERT OR REPLACE INTO settings (name, value) VALUES (?, ?)")
+      .Bind(std::string(kUsableFromName))
+      .Bind(std::to_string(kUsableFromSchema))
+      .Run();
+}
+
 }  // namespace
 
 void Migrate(Database& database) {
@@ -198,6 +220,7 @@ void Migrate(Database& database) {
     Statement query = database.Prepare("PRAGMA user_version");
     if (query.Step()) version = static_cast<int>(query.Integer(0));
   }
+  if (version > kSchemaVersion && IsUsable(database)) return;
   if (version < 0 || version > kSchemaVersion) {
     throw DatabaseCorrupt(fmt::format(
         "the database has version {}, this Plumb knows up to {}: install the newer Plumb again",
@@ -206,6 +229,7 @@ void Migrate(Database& database) {
   for (; version < kSchemaVersion; ++version) {
     Transaction transaction(database);
     database.Execute(kSteps[static_cast<std::size_t>(version)]);
+    if (version + 1 == kSchemaVersion) NoteUsableFrom(database);
     database.Execute(fmt::format("PRAGMA user_version = {}", version + 1));
     transaction.Commit();
   }

@@ -1,6 +1,8 @@
 // Databases of older and newer versions, and damaged ones.
 #include <fstream>
+#include <string>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -46,9 +48,55 @@ TEST_F(StoreTest, ADatabaseOfANewerVersionIsRefused) {
   (void)Open();
   {
     Database direct(database(), Database::Access::kReadWrite);
-    direct.Execute("PRAGMA user_version = 99");
+    direct.Execute("DELETE FROM settings; PRAGMA user_version = 99");  // it says nothing of us
   }
   EXPECT_THAT(MessageOf<DatabaseCorrupt>([&] { (void)Open(); }), HasSubstr("newer"));
+}
+
+/// As a later version leaves it: more tables and columns, and whether this version can go on.
+void MakeNewer(const fs::path& database, const std::string& usable_from) {
+  Database direct(database, Database::Access::kReadWrite);
+  direct.Execute(
+      "ALTER TABLE patients ADD COLUMN colour TEXT NOT NULL DEFAULT 'none'; ALTER TABLE scans ADD "
+      "COLUMN mood TEXT; CREATE TABLE rooms (id INTEGER PRIMARY KEY, name TEXT NOT NULL) STRICT;");
+  direct.Execute(fmt::format("PRAGMA user_version = {}", kSchemaVersion + 1));
+  direct.Prepare("UPDATE settings SET value = ? WHERE name = ?")
+      .Bind(usable_from)
+      .Bind(std::string(kUsableFromName))
+      .Run();
+}
+
+TEST_F(StoreTest, AfterARollBackTheOldVersionWorksWithTheNewerDatabase) {
+  const std::string patient = Open()->patients.Add(kAnna, "P-1", "thorax");
+  MakeNewer(database(), std::to_string(kSchemaVersion));
+  std::string scan;
+  {
+    const auto store = Open();
+    EXPECT_EQ(store->patients.Find(patient)->site, "thorax");
+    scan = Scan(*store, patient, ApprovedReference(*store, patient), kResult);
+    (void)store->patients.Add(kAnna, "P-2", "");
+    EXPECT_FALSE(store->audit.FirstBroken());
+  }
+  const auto again = Open();
+  EXPECT_THAT(again->patients.List(), SizeIs(2));
+  EXPECT_TRUE(again->scans.Find(scan));
+  Database direct(database(), Database::Access::kReadOnly);
+  Statement version = direct.Prepare("PRAGMA user_version");
+  ASSERT_TRUE(version.Step());
+  EXPECT_EQ(version.Integer(0), kSchemaVersion + 1);  // the newer version finds it migrated
+}
+
+TEST_F(StoreTest, ANewerDatabaseThatThisVersionCannotUseIsRefused) {
+  (void)Open();
+  for (const std::string& usable_from :
+       {std::to_string(kSchemaVersion + 1), std::string("99"), std::string(), std::string("x"),
+        std::string("8x"), std::string("0"), std::string("-1")}) {
+    fs::remove(database());
+    (void)Open();
+    MakeNewer(database(), usable_from);
+    EXPECT_THAT(MessageOf<DatabaseCorrupt>([&] { (void)Open(); }), HasSubstr("newer"))
+        << usable_from;
+  }
 }
 
 TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
