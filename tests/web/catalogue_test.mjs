@@ -44,7 +44,7 @@ compare(en, es, '');
 /// journal's Log() begins with a level.
 function actionsOf(text, file) {
   const actions = new Set();
-  for (const call of text.matchAll(/(\b(?:Write|Log)|\blog_?)\(/g)) {
+  for (const call of text.matchAll(/(\b(?:Write|Log|AppendAuditEntry)|\blog_?)\(/g)) {
     const parts = [''];
     let [depth, quoted] = [0, false];
     for (let i = call.index + call[0].length; i < text.length; ++i) {
@@ -56,6 +56,7 @@ function actionsOf(text, file) {
       if (!quoted && c === ',' && depth === 0) parts.push('');
       else parts[parts.length - 1] += c;
     }
+    if (call[1] === 'AppendAuditEntry') parts.shift();  // the database that it goes to
     const [who, what] = parts.map((part) => part.trim());
     if (parts.length !== 4 || /^LogLevel::|&\s*\w+$/.test(who)) continue;
     if (what === 'action') continue;  // is handed on: the caller's literal is looked at
