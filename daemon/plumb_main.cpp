@@ -109,6 +109,7 @@ int Main(int argc, char** argv) {
   add("restore", "Make a state folder of a backup, after checking every file of it", AddRestore);
   add("export-patient", "Copy one patient out of a state folder or a backup", AddExportPatient);
   add("import-patient", "Add an exported patient to a state folder", AddImportPatient);
+  add("factory-reset", "Reset plumbd's stored data to the state of delivery", AddFactoryReset);
 #endif
 
   try {
@@ -125,12 +126,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-
-void PrintOut(const std::string& text) {
-  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
-    throw IoError("cannot write to the standard output: it is closed or its disk is full");
-  }
-}
 
 }  // namespace plumb
 

@@ -145,6 +145,9 @@ class Appliance {
 
   /// In safe mode one that can only be read, or null.
   [[nodiscard]] Store* store() { return store_.get(); }
+  [[nodiscard]] const std::filesystem::path& state_folder() const {
+    return parts_.config.appliance.state;
+  }
   [[nodiscard]] const std::string& storage_fault() const { return storage_fault_; }
   [[nodiscard]] std::optional<Frame> LatestFrame() const { return sensors_->latest(); }
   [[nodiscard]] const ScanState& state() const { return state_; }

@@ -118,6 +118,15 @@ std::string ReadOrMakeSecret(const fs::path& file, const std::function<std::stri
   return ReadTextFile(file, kMaxBytes);
 }
 
+void KeepPageIdentity(const fs::path& state, const web::TlsIdentity& identity) {
+  const fs::path file = state / kKeyFile;
+  WriteSecret(file, fmt::format("{}\n{}", identity.certificate_pem, identity.key_pem));
+  struct stat folder {};
+  if (::geteuid() == 0 && (::stat(state.c_str(), &folder) != 0 ||
+                           ::chown(file.c_str(), folder.st_uid, folder.st_gid) != 0))
+    throw IoError(DescribeWriteError(file, errno));
+}
+
 void CheckPageIdentity(const WebConfig& web) {
   if (TransportOf(web, /*is_loopback=*/false) == PageTransport::kGivenTls) (void)GivenTls(web);
 }
@@ -130,8 +139,8 @@ PageNotes IdentifyPage(const Config& config, web::HttpServerOptions& options) {
   if (transport == PageTransport::kGivenTls) options.tls = GivenTls(config.web);
   if (transport == PageTransport::kOwnTls) {
     options.tls = OwnTls(config, notes.warnings);
-    options.keep_certificate = [file = config.appliance.state / kKeyFile](const auto& identity) {
-      WriteSecret(file, identity.certificate_pem + "\n" + identity.key_pem);
+    options.keep_certificate = [state = config.appliance.state](const auto& identity) {
+      KeepPageIdentity(state, identity);
     };
   }
   if (transport == PageTransport::kPlainOnNetwork)

@@ -31,6 +31,10 @@ struct PageNotes {
 ///         be used.
 void CheckPageIdentity(const WebConfig& web);
 
+/// Keeps what the page is served with from the next start on, for whom the folder belongs to.
+/// @throws IoError
+void KeepPageIdentity(const std::filesystem::path& state, const web::TlsIdentity& identity);
+
 /// Fills in `tls`, `keep_certificate` (not for a certificate that the configuration names) and
 /// `device_key` of the options by the configuration, and gives what there is to
 /// tell. A secret of the appliance's own that cannot be kept is made for this run, with a warning.

@@ -30,6 +30,7 @@
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/control_desk.hpp"
 #include "daemon/appliance/panel.hpp"
+#include "daemon/appliance/provisioning.hpp"
 #include "daemon/appliance/web_services.hpp"
 #include "daemon/config/sensor_settings.hpp"
 #include "daemon/config/version.hpp"
@@ -38,6 +39,7 @@
 #include "daemon/loop/end_guard.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/loop/loop_report.hpp"
+#include "daemon/records/factory_reset.hpp"
 #include "drivers/live/sensor_driver.hpp"
 #include "web/api/http_server.hpp"
 #include "web/security/certificate_care.hpp"
@@ -55,7 +57,8 @@ struct Options {
   bool use_default_config = true;  ///< Where it exists and no file is named.
   bool check_config = false, show_stopped = false;
   std::string simulated;  ///< Suite; empty: real sensors.
-  std::optional<fs::path> state, control;
+  std::optional<fs::path> state, control, provision;
+  fs::path unit = "/data/unit";  ///< Where an image keeps what it was provisioned with.
   std::optional<std::string> listen;
   int sim_frames = 300, sim_scenes = 0;
   unsigned sim_seed = 1;
@@ -76,6 +79,13 @@ void AddOptions(CLI::App& app, Options& options) {
   app.add_flag("--show-stopped", options.show_stopped,
                "Only drive the light, with the pattern for a service that is not running, until "
                "SIGTERM");
+  app.add_option("--provision", options.provision,
+                 "Take serial number, name, network and certificate of this unit from a file, and "
+                 "exit")
+      ->type_name("FILE");
+  app.add_option("--unit", options.unit, "Where --provision keeps them")
+      ->type_name("DIR")
+      ->capture_default_str();
   app.add_option("--simulated", options.simulated,
                  "With a virtual sensor that plays the scenes of a simulated suite")
       ->check(CLI::IsMember({"demo", "nine", "patient"}))
@@ -421,6 +431,26 @@ int ShowStopped(const Options& options, const SensorRegistry& registry) {
   return loop.Run();
 }
 
+/// Before anything opens the state folder. @returns why that could not be done: nothing stored may
+/// be opened then, since the next start goes on.
+std::string ResetIfAsked(const fs::path& state) {
+  std::error_code ignored;
+  if (!fs::exists(state / kFactoryResetFile, ignored)) return {};
+  constexpr std::chrono::minutes kLongestWipe{15};  // of a large disk; longer than a start may take
+  sd_notifyf(0, "EXTEND_TIMEOUT_USEC=%lld",
+             static_cast<long long>(std::chrono::microseconds(kLongestWipe).count()));
+  try {
+    if (const std::optional<std::string> done = CarryOutFactoryReset(state))
+      Log(LogLevel::kNotice, "factory reset: " + *done);
+  } catch (const DataError& error) {
+    Log(LogLevel::kError, error.what());  // nothing was reset
+  } catch (const std::exception& error) {
+    Log(LogLevel::kError, error.what());
+    return error.what();
+  }
+  return {};
+}
+
 int RunChecked(const Options& options, const SensorRegistry& registry) {
   if (options.show_stopped) return ShowStopped(options, registry);
   if (options.check_config) {
@@ -428,15 +458,22 @@ int RunChecked(const Options& options, const SensorRegistry& registry) {
     fmt::print("the configuration is good\n");
     return 0;
   }
+  if (options.provision) {
+    const Config config = ReadConfiguration(options, registry);
+    ApplyProvisioning(ReadProvisioning(*options.provision), options.unit, config.appliance.state);
+    fmt::print("{} is taken over\n", options.provision->string());
+    return 0;
+  }
   if (options.simulated.empty() == false && !options.state)
     throw std::invalid_argument("--simulated needs --state DIR, a folder of its own");
-  const Configured configured = ReadOrExplain(options, registry);
+  Configured configured = ReadOrExplain(options, registry);
   // What is stored is for this account and at most its group.
   ::umask(::umask(0077) | 0027);
   std::error_code ignored;
   fs::create_directories(configured.config.appliance.state,
                          ignored);  // what cannot be made is told when the store opens
-  std::optional<EndGuard> guard;    // outlives the threads that it waits for
+  if (configured.fault.empty()) configured.fault = ResetIfAsked(configured.config.appliance.state);
+  std::optional<EndGuard> guard;  // outlives the threads that it waits for
   Plumbd plumbd(options, configured.config, configured.fault, registry);
   const int code = plumbd.Run();
   guard.emplace(kLongestEnd, [] {

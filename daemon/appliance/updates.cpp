@@ -7,6 +7,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/records/factory_reset.hpp"
 #include "daemon/update/bundle_copy.hpp"
 
 namespace plumb {
@@ -28,6 +29,7 @@ Updates::Updates(Appliance& appliance, std::unique_ptr<SystemRestart> restart,
     : appliance_(appliance),
       restart_(std::move(restart)),
       options_(std::move(options)),
+      sticks_(options_.sticks),
       updater_(appliance.loop(),
                UpdaterOptions{
                    .folder = options_.config.folder,
@@ -142,9 +144,56 @@ void Updates::InstallFile(const web::Actor& actor, std::shared_ptr<const Attache
   done(Conflict("the disk is busy: try again"));
 }
 
+void Updates::InstallFromStick(const web::Actor& actor, const std::string& bundle, web::Done done) {
+  auto file = std::make_shared<const AttachedFile>(sticks_.Open(bundle));
+  if (file->fd() < 0) {
+    return done({.result = ChangeResult::kNotFound,
+                 .message = fmt::format("no USB stick with {} is plugged in", bundle),
+                 .id = {},
+                 .file = {}});
+  }
+  InstallFile(actor, std::move(file), bundle, std::move(done));
+}
+
 void Updates::RestartSystem(const web::Actor& actor, web::Done done) {
   if (const std::string why = WhyNotRestart(); !why.empty()) return done(Conflict(why));
   restarting_ = true;  // No scan, session or update may begin before the machine goes down.
+  GoDown(actor, std::move(done));
+}
+
+void Updates::ResetToFactory(const web::Actor& actor, web::FactoryReset kind, web::Done done) {
+  if (const std::string why = WhyNotRestart(); !why.empty()) return done(Conflict(why));
+  restarting_ = true;
+  const auto noted = [this, actor, kind, done](const std::string& failure) {
+    if (!failure.empty()) {
+      restarting_ = false;
+      return done({.result = ChangeResult::kFailed, .message = failure, .id = {}, .file = {}});
+    }
+    options_.log(actor, "system.factory_reset_request", "",
+                 kind == web::FactoryReset::kWipe ? "everything is removed" : "records are kept");
+    GoDown(actor, [this, done](const web::Change& change) {
+      if (change.result != ChangeResult::kDone) CancelFactoryReset(options_.state);
+      done(change);
+    });
+  };
+  const auto work = [state = options_.state, actor, kind, noted, &loop = appliance_.loop(),
+                     alive = alive_] {
+    std::string failure;
+    try {
+      RequestFactoryReset(state, kind, actor);
+    } catch (const std::exception& error) {
+      failure = error.what();
+    }
+    loop.Post("factory reset noted", [noted, failure, alive] {
+      if (*alive) noted(failure);
+    });
+  };
+  if (options_.aside(work)) return;
+  restarting_ = false;
+  done(Conflict("the disk is busy: try again"));
+}
+
+void Updates::GoDown(const web::Actor& actor, web::Done done) {
   options_.log(actor, "system.restart", "", "");
   Log(LogLevel::kNotice, fmt::format("{} restarts the machine", actor.user));
   restart_->Restart(

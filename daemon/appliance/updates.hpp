@@ -1,6 +1,7 @@
-// System updates, and the restart after them, for the page and for the control socket.
+// System updates, the restart after them and the factory reset, for page and control socket.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -9,14 +10,17 @@
 #include "daemon/control/attached_file.hpp"
 #include "daemon/update/system_restart.hpp"
 #include "daemon/update/updater.hpp"
+#include "daemon/update/usb_sticks.hpp"
 #include "web/service/update_service.hpp"
 
 namespace plumb {
 
 struct UpdatesOptions {
   UpdateConfig config;
-  std::string bus_address = {};  ///< Empty: the system bus.
-  std::string boot = {};         ///< Another text at each start of the machine; empty: not known.
+  std::filesystem::path state;                        ///< What a factory reset is about.
+  std::filesystem::path sticks = "/run/plumb-stick";  ///< See UsbSticks.
+  std::string bus_address = {};                       ///< Empty: the system bus.
+  std::string boot = {};  ///< Another text at each start of the machine; empty: not known.
   std::function<bool(std::function<void()>)> aside;  ///< See UpdaterOptions.
   std::function<void()> changed;                     ///< GetUpdate() has changed.
   std::function<void(const web::Actor& actor, const char* action, const std::string& subject,
@@ -42,7 +46,11 @@ class Updates : public web::UpdateService {
   /// Copies the open file among the bundles, off the loop, then installs it.
   void InstallFile(const web::Actor& actor, std::shared_ptr<const AttachedFile> file,
                    const std::string& name, web::Done done);
+  [[nodiscard]] std::vector<std::string> StickBundles() override { return sticks_.Bundles(); }
+  void InstallFromStick(const web::Actor& actor, const std::string& bundle,
+                        web::Done done) override;
   void RestartSystem(const web::Actor& actor, web::Done done) override;
+  void ResetToFactory(const web::Actor& actor, web::FactoryReset kind, web::Done done) override;
   void ForgetRollBack(const web::Actor& actor, web::Done done) override;
 
  private:
@@ -51,10 +59,13 @@ class Updates : public web::UpdateService {
   [[nodiscard]] std::string WhyNotRestart() const;
   /// Why no scan may begin now.
   [[nodiscard]] std::string WhyNotScan() const;
+  /// Asks for the restart; `restarting_` is set.
+  void GoDown(const web::Actor& actor, web::Done done);
 
   Appliance& appliance_;
   std::unique_ptr<SystemRestart> restart_;
   UpdatesOptions options_;
+  UsbSticks sticks_;
   bool restarting_ = false, copying_ = false;
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
   Updater updater_;  // Declared last, so destroyed first: its callbacks use the members above.

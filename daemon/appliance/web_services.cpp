@@ -39,6 +39,7 @@ WebServices::WebServices(Appliance& appliance, const UpdateConfig& update,
       updates_(
           appliance, std::move(restart),
           {.config = update,
+           .state = appliance.state_folder(),
            .boot = BootId(),
            .aside =
                [this](std::function<void()> work) {

@@ -53,6 +53,7 @@ using Command = std::function<int(const CommandContext&)>;
 [[nodiscard]] Command AddRestore(CLI::App& app);
 [[nodiscard]] Command AddExportPatient(CLI::App& app);
 [[nodiscard]] Command AddImportPatient(CLI::App& app);
+[[nodiscard]] Command AddFactoryReset(CLI::App& app);
 
 /// Writes to stdout.
 /// @throws IoError if stdout does not take it (closed pipe, full disk).

@@ -1,5 +1,6 @@
-// `plumb doctor`: what is attached, permitted and configured, and what to do about what is not. It
-// changes nothing. Its exit code says whether something necessary is missing.
+// `plumb doctor`: what is attached, permitted and configured, and what to do about what is not; on
+// request a burn-in. It changes nothing that is stored. Its exit code says whether something
+// necessary is missing.
 #include <unistd.h>
 
 #include <filesystem>
@@ -12,10 +13,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
+#include "daemon/cli/burn_in.hpp"
 #include "daemon/cli/commands.hpp"
+#include "daemon/cli/doctor_report.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/config/sensor_settings.hpp"
 #include "daemon/control/unix_socket.hpp"
@@ -29,75 +31,10 @@ namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::ordered_json;
 
 constexpr char kDefaultConfig[] = "/etc/plumb/plumb.toml";
 
-enum class State { kGood, kNote, kBad };
-
-/// One finding. A note keeps nothing from working.
-struct Finding {
-  State state = State::kGood;
-  std::string what;
-  std::string found;
-  std::string remedy;
-  int exit_code = kDone;  ///< kBad: what a command that needs it would end with.
-};
-
-class Report {
- public:
-  void Good(std::string what, std::string found) {
-    findings_.push_back({State::kGood, std::move(what), std::move(found), {}, kDone});
-  }
-  void Note(std::string what, std::string found, std::string remedy) {
-    findings_.push_back(
-        {State::kNote, std::move(what), std::move(found), std::move(remedy), kDone});
-  }
-  void Bad(std::string what, std::string found, std::string remedy, int exit_code = kDeviceFailed) {
-    findings_.push_back(
-        {State::kBad, std::move(what), std::move(found), std::move(remedy), exit_code});
-  }
-
-  /// kDone if nothing necessary is missing, else that of the first thing that is.
-  [[nodiscard]] int exit_code() const {
-    for (const Finding& finding : findings_) {
-      if (finding.state == State::kBad) return finding.exit_code;
-    }
-    return kDone;
-  }
-  [[nodiscard]] bool ready() const { return exit_code() == kDone; }
-
-  [[nodiscard]] std::string Text() const {
-    std::string text;
-    for (const Finding& finding : findings_) {
-      const char* mark = finding.state == State::kGood   ? "ok  "
-                         : finding.state == State::kNote ? "note"
-                                                         : "BAD ";
-      text += fmt::format("{}  {:<14} {}\n", mark, finding.what, finding.found);
-      if (!finding.remedy.empty()) text += fmt::format("{:21}-> {}\n", "", finding.remedy);
-    }
-    return text + (ready() ? "Ready to scan.\n" : "Not ready to scan: see BAD above.\n");
-  }
-
-  [[nodiscard]] ordered_json Json() const {
-    ordered_json list = ordered_json::array();
-    for (const Finding& finding : findings_) {
-      const char* state = finding.state == State::kGood   ? "ok"
-                          : finding.state == State::kNote ? "note"
-                                                          : "bad";
-      list.push_back({{"state", state},
-                      {"what", finding.what},
-                      {"found", finding.found},
-                      {"remedy", finding.remedy}});
-    }
-    return {{"ready", ready()}, {"findings", list}};
-  }
-
- private:
-  std::vector<Finding> findings_;
-};
-
-Config CheckConfig(Report& report, const std::optional<fs::path>& wanted) {
+Config CheckConfig(DoctorReport& report, const std::optional<fs::path>& wanted) {
   const fs::path file = wanted.value_or(kDefaultConfig);
   std::error_code error;
   if (!wanted && !fs::exists(file, error)) {
@@ -117,7 +54,8 @@ Config CheckConfig(Report& report, const std::optional<fs::path>& wanted) {
 }
 
 /// The calibration of one attached sensor.
-void CheckCalibration(Report& report, const SensorSettings& settings, const std::string& serial) {
+void CheckCalibration(DoctorReport& report, const SensorSettings& settings,
+                      const std::string& serial) {
   const fs::path file = CalibrationFile(settings.calibration_folder, serial);
   std::error_code error;
   if (!fs::exists(file, error)) {
@@ -134,7 +72,7 @@ void CheckCalibration(Report& report, const SensorSettings& settings, const std:
   }
 }
 
-void CheckAttached(Report& report, const SensorDriver& driver, const SensorSettings& settings,
+void CheckAttached(DoctorReport& report, const SensorDriver& driver, const SensorSettings& settings,
                    const std::string& wanted) {
   const auto setup = driver.set_up(settings, {}, {}, {});
   const auto provider = setup->MakeProvider();
@@ -154,7 +92,7 @@ void CheckAttached(Report& report, const SensorDriver& driver, const SensorSetti
                "plug that one in, or change sensor_serial");
 }
 
-void CheckSensor(Report& report, const Config& config) try {
+void CheckSensor(DoctorReport& report, const Config& config) try {
   const SensorDriver& driver = BuiltInSensors().Choose(config.appliance.sensor_driver, false);
   if (driver.examine) {
     for (const SensorFinding& finding : driver.examine()) {
@@ -177,7 +115,7 @@ void CheckSensor(Report& report, const Config& config) try {
   report.Bad("configuration", problem.what(), "", kBadInput);
 }
 
-void CheckGpio(Report& report) {
+void CheckGpio(DoctorReport& report) {
 #ifdef PLUMB_WITH_GPIO
   const std::vector<GpioChipDescription> chips = ListGpioChips();
   if (chips.empty())
@@ -195,7 +133,7 @@ void CheckGpio(Report& report) {
 #endif
 }
 
-void CheckFolder(Report& report, const char* what, const fs::path& folder) {
+void CheckFolder(DoctorReport& report, const char* what, const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
     report.Note(what, fmt::format("{} does not exist", folder.string()),
@@ -215,7 +153,7 @@ void CheckFolder(Report& report, const char* what, const fs::path& folder) {
   }
 }
 
-void CheckDaemon(Report& report, const fs::path& control) {
+void CheckDaemon(DoctorReport& report, const fs::path& control) {
   try {
     ::close(ConnectUnix(control));
     report.Good("plumbd", fmt::format("answers at {}; while it runs it alone has the sensor",
@@ -232,19 +170,35 @@ Command AddDoctor(CLI::App& app) {
   struct Options {
     std::optional<fs::path> config;
     bool json = false;
+    double burn_in_min = 0.0;
+    std::optional<fs::path> burn_in_folder;
   };
   auto options = std::make_shared<Options>();
   app.add_option("--config", options->config,
                  fmt::format("Of the appliance; default {}", kDefaultConfig))
       ->type_name("FILE");
   app.add_flag("--json", options->json, "Print JSON on the standard output");
+  app.add_option("--burn-in", options->burn_in_min,
+                 "Then work the machine for so long: scans of a simulated body again and again, "
+                 "memory and disk; each round must give the same bits")
+      ->check(CLI::Range(0.01, 10080.0))
+      ->type_name("MINUTES");
+  app.add_option("--burn-in-folder", options->burn_in_folder,
+                 "On the disk that the burn-in writes to; default: the state folder")
+      ->type_name("DIR");
   return [options](const CommandContext& context) {
-    Report report;
+    DoctorReport report;
     const Config config = CheckConfig(report, options->config);
     CheckSensor(report, config);
     CheckGpio(report);
     CheckFolder(report, "state", config.appliance.state);
     CheckDaemon(report, context.control);
+    if (options->burn_in_min > 0.0) {
+      BurnIn({.minutes = options->burn_in_min,
+              .folder = options->burn_in_folder.value_or(config.appliance.state),
+              .control = context.control},
+             context.stop, report);
+    }
     PrintOut(options->json ? report.Json().dump(2) + "\n" : report.Text());
     return report.exit_code();
   };

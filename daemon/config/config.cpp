@@ -310,15 +310,16 @@ PageTransport TransportOf(const WebConfig& web, bool is_loopback) {
   return web.plain_http ? PageTransport::kPlainOnNetwork : PageTransport::kOwnTls;
 }
 
-Config ParseConfig(const std::string& text, const std::string& name, ConfigUse use) {
+toml::table ParseToml(const std::string& text, const std::string& name) try {
   RefuseControlCharacters(text, name);
-  toml::table root;
-  try {
-    root = toml::parse(text, name);
-  } catch (const toml::parse_error& error) {
-    throw DataError(fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line,
-                                error.description()));
-  }
+  return toml::parse(text, name);
+} catch (const toml::parse_error& error) {
+  throw DataError(fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line,
+                              error.description()));
+}
+
+Config ParseConfig(const std::string& text, const std::string& name, ConfigUse use) {
+  const toml::table root = ParseToml(text, name);
   static constexpr std::array<std::string_view, 12> kSections = {
       "markers", "reconstruct", "compare", "check", "iec", "appliance",
       "storage", "sensor",      "button",  "light", "web", "update"};

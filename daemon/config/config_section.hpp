@@ -21,6 +21,9 @@
 
 namespace plumb {
 
+/// @param name  Of the file, for messages. @throws DataError naming file and line.
+[[nodiscard]] toml::table ParseToml(const std::string& text, const std::string& name);
+
 /// Keys that were not consumed are unknown, and refused. All functions throw DataError.
 class Section {
  public:

@@ -1,10 +1,15 @@
 // The commands around sensors and prints, through the real binary: record, .oni files, markers,
 // doctor.
+#include <fstream>
+#include <map>
+
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/cli/burn_in.hpp"
 #include "tests/integration/command_line.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace plumb {
 namespace {
@@ -125,6 +130,64 @@ TEST_F(DevicesTest, RecordsAVirtualSensorToAFolderAndToAnOniFile) {
 }
 
 #endif
+
+TEST_F(DevicesTest, ABurnInWorksTheMachineAndSaysWhatItFound) {
+  const RunResult doctor = Plumb({"--control", (folder_ / "none").string(), "doctor", "--json",
+                                  "--burn-in", "0.01", "--burn-in-folder", folder_.string()});
+  const json findings = json::parse(doctor.out).at("findings");
+  std::map<std::string, json> of;
+  for (const json& finding : findings) of[finding.at("what")] = finding;  // the last of each
+  for (const char* what : {"processor", "memory", "disk"})
+    EXPECT_EQ(of[what].value("state", "missing"), "ok") << of[what];
+  EXPECT_THAT(of["processor"].value("found", ""), HasSubstr("2 rounds"));
+  EXPECT_THAT(of["sensor"].value("found", ""), HasSubstr("not part of this burn-in"));
+  EXPECT_THAT(LeftBehind({}), IsEmpty());
+}
+
+TEST_F(DevicesTest, ABurnInWithoutADiskToWriteToIsAFault) {
+  const RunResult doctor = Plumb(
+      {"doctor", "--json", "--burn-in", "0.01", "--burn-in-folder", (folder_ / "none").string()});
+  EXPECT_NE(doctor.exit_code, 0);
+  EXPECT_THAT(doctor.out, HasSubstr("cannot write"));
+  EXPECT_EQ(Plumb({"doctor", "--burn-in", "0"}).exit_code, 2);
+}
+
+TEST(BurnInTest, AResultThatDiffersIsFound) {
+  EXPECT_EQ(FirstDifference("same", "same"), "");
+  EXPECT_THAT(FirstDifference("same", "samy"), HasSubstr("byte 3"));
+  EXPECT_THAT(FirstDifference("same", "sam"), HasSubstr("3 bytes instead of 4"));
+}
+
+TEST(BurnInTest, AFlippedBitInMemoryIsFound) {
+  constexpr std::size_t kBytes = 1 << 16;
+  EXPECT_EQ(TestMemory(kBytes, 1), "");
+  for (const int bit : {0, 63}) {
+    EXPECT_THAT(TestMemory(kBytes, 1,
+                           [bit](std::uint64_t* words, std::size_t count) {
+                             words[count - 1] ^= std::uint64_t{1} << bit;
+                           }),
+                HasSubstr("wrote"));
+  }
+}
+
+TEST(BurnInTest, AByteThatTheDiskChangesOrLosesIsFound) {
+  const testing::TempFolder folder;
+  constexpr std::size_t kBytes = 1 << 16;
+  EXPECT_EQ(TestDisk(folder.path(), kBytes, 1), "");
+  EXPECT_THAT(TestDisk(folder.path(), kBytes, 1,
+                       [](const std::filesystem::path& file) {
+                         std::fstream out(file, std::ios::in | std::ios::out | std::ios::binary);
+                         out.seekp(kBytes - 1);
+                         out.put('\0').put('\1');
+                       }),
+              ::testing::Not(IsEmpty()));
+  EXPECT_THAT(TestDisk(folder.path(), kBytes, 1,
+                       [](const std::filesystem::path& file) {
+                         std::filesystem::resize_file(file, kBytes - 1);
+                       }),
+              HasSubstr("does not hold what was written"));
+  EXPECT_THAT(TestDisk(folder / "none", kBytes, 1), HasSubstr("cannot write"));
+}
 
 }  // namespace
 }  // namespace plumb

@@ -13,12 +13,12 @@ for program in systemd-nspawn mmdebstrap dh; do
   command -v $program >/dev/null || skip "$program is missing: run toolchain/install"
 done
 
-# A Debian with systemd and curl, and nothing that Plumb needs.
+# A Debian with systemd, curl and polkit, which plumbd recommends, and nothing that Plumb needs.
 sources=$(cat /etc/apt/sources.list /etc/apt/sources.list.d/debian.sources 2>/dev/null || true)
-wanted=$(echo "1 $sources" | sha256sum)
+wanted=$(echo "2 $sources" | sha256sum)
 if [ "$(cat "$work/wanted" 2>/dev/null)" != "$wanted" ]; then
   rm -rf "$root" "$work/wanted" "$work/cache"
-  mmdebstrap --variant=minbase --include=systemd,systemd-sysv,udev,dbus,curl --aptopt='APT::Install-Recommends "false"' \
+  mmdebstrap --variant=minbase --include=systemd,systemd-sysv,udev,dbus,curl,polkitd --aptopt='APT::Install-Recommends "false"' \
     --skip=cleanup/apt "$(. /etc/os-release && echo "$VERSION_CODENAME")" "$root" - <<<"$sources" || skip "no Debian could be made: see above"
   echo "$wanted" >"$work/wanted"
 fi
@@ -42,10 +42,17 @@ ExecStart=/debs/checks
 UNIT
 mkdir -p "$root/etc/systemd/system/multi-user.target.wants"
 ln -sf ../plumb-checks.service "$root/etc/systemd/system/multi-user.target.wants/plumb-checks.service"
+ended=0
 timeout -k 5 240 systemd-nspawn --directory="$root" --volatile=overlay --bind="$work/out:/checks" --bind-ro="$work/debs:/debs" \
   --bind="$work/cache/archives:/var/cache/apt/archives" \
-  --register=no --keep-unit --boot --quiet --private-network </dev/null >"$work/console" 2>&1 || true
+  --register=no --keep-unit --boot --quiet --private-network </dev/null >"$work/console" 2>&1 || ended=$?
 [ -e "$work/out/log" ] || { tail -5 "$work/console"; skip "systemd does not boot in a container here: see above"; }
+# With --keep-unit systemd-nspawn ends with this code when its machine restarts.
+if [ "$ended" = 133 ]; then
+  echo "CHECK ok      logind restarts the machine for plumbd: systemd-nspawn ended with 133" >>"$work/out/log"
+else
+  echo "CHECK FAILED  logind restarts the machine for plumbd: expected systemd-nspawn to end with 133, it ended with $ended" >>"$work/out/log"
+fi
 cat "$work/out/log"
 if grep -q '^CHECK FAILED' "$work/out/log" || ! grep -q '^CHECKS DONE' "$work/out/log"; then
   tail -n 60 "$work/out/apt" "$work/out/journal" 2>/dev/null || true

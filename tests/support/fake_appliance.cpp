@@ -515,6 +515,14 @@ void FakeAppliance::InstallUpdate(const Actor& actor, const std::string& bundle,
   Did(actor, "update.install", bundle, done);
 }
 
+void FakeAppliance::InstallFromStick(const Actor& actor, const std::string& bundle, Done done) {
+  if (std::find(stick.begin(), stick.end(), bundle) == stick.end())
+    return Finish(done, Refusal(ChangeResult::kNotFound, "no USB stick with it is plugged in"));
+  if (std::find(update.bundles.begin(), update.bundles.end(), bundle) == update.bundles.end())
+    update.bundles.push_back(bundle);
+  InstallUpdate(actor, bundle, done);
+}
+
 void FakeAppliance::RestartSystem(const Actor& actor, Done done) {
   const auto refuse = [&](const char* why) { Finish(done, Refusal(ChangeResult::kConflict, why)); };
   if (update.installing) return refuse("a system update is being installed: wait until it is done");
@@ -522,6 +530,14 @@ void FakeAppliance::RestartSystem(const Actor& actor, Done done) {
   if (status.session) return refuse("the session of a patient is open: close it first");
   ++num_restarts;
   Did(actor, "system.restart", "", done);
+}
+
+void FakeAppliance::ResetToFactory(const Actor& actor, FactoryReset kind, Done done) {
+  if (status.session)
+    return Finish(done, Refusal(ChangeResult::kConflict,
+                                "the session of a patient is open: close it first, then restart"));
+  factory_reset = kind;
+  Did(actor, "system.factory_reset_request", "", done);
 }
 
 void FakeAppliance::ForgetRollBack(const Actor& actor, Done done) {

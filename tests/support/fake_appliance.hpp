@@ -60,6 +60,8 @@ class FakeAppliance : public web::BackgroundWork,
   std::shared_ptr<const std::string> preview;
   std::filesystem::path diagnostics_file;
   std::uint64_t uploaded_bytes = 0;
+  std::optional<web::FactoryReset> factory_reset;  ///< Asked for.
+  std::vector<std::string> stick = {"plumb-0.4.0.raucb"};
   int num_restarts = 0;  ///< Asked for and done; a fake machine stays on.
   /// Folder of the n-th finished scan (0, 1, ...) with its result; a scan beyond the list uses the
   /// last.
@@ -192,7 +194,11 @@ class FakeAppliance : public web::BackgroundWork,
                  const std::string& name, web::Done done) override;
   void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override;
   void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
+  [[nodiscard]] std::vector<std::string> StickBundles() override { return stick; }
+  void InstallFromStick(const web::Actor& actor, const std::string& bundle,
+                        web::Done done) override;
   void RestartSystem(const web::Actor& actor, web::Done done) override;
+  void ResetToFactory(const web::Actor& actor, web::FactoryReset kind, web::Done done) override;
   void ForgetRollBack(const web::Actor& actor, web::Done done) override;
   void WriteDiagnostics(const web::Actor& actor, web::Done done) override;
 

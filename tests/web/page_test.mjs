@@ -527,6 +527,7 @@ await h.step('patients, log, settings and update look finished', async () => {
   await engineer.getByText('Copying image to rootfs.1').waitFor();
   equal(await engineer.locator('progress[value="0.4"]').count(), 1, 'the progress');
   equal(await engineer.getByRole('button', { name: 'Install plumb-0.2.0.raucb' }).isDisabled(), true, 'one installation at a time');
+  equal(await engineer.getByRole('button', { name: 'Install plumb-0.4.0.raucb from the USB stick' }).isDisabled(), true, 'nor the one on the stick beside it');
   await h.look(engineer, 'update-installing');
   h.tell('installed');
   await engineer.getByText('restart the appliance to use it').waitFor();
@@ -537,7 +538,7 @@ await h.step('patients, log, settings and update look finished', async () => {
 
 await h.step('the restart into an update: with the password, never beside a session; a roll-back is told until it is seen', async () => {
   const restart = async (password) => {
-    await engineer.getByLabel('Your password').fill(password);
+    await engineer.locator('.restart').getByLabel('Your password').fill(password);
     await engineer.getByRole('button', { name: 'Restart now' }).click();
   };
   const alert = engineer.getByRole('alert');
@@ -559,6 +560,36 @@ await h.step('the restart into an update: with the password, never beside a sess
   await bob.getByText('went back to the previous system').waitFor();
   await engineer.getByRole('button', { name: 'I have seen it' }).click();
   await engineer.getByText('went back to the previous system').waitFor({ state: 'detached' });
+});
+
+await h.step('a factory reset: its kind chosen, wiping with its word typed, the password again', async () => {
+  await engineer.goto(`${h.url}#/update`);
+  const submit = engineer.getByRole('button', { name: 'Reset the appliance' });
+  const word = engineer.getByLabel('Type WIPE to confirm');
+  const password = engineer.getByLabel('Your password').last();
+  await submit.waitFor();
+  equal(await word.isVisible(), false, 'no word to type yet');
+  await engineer.getByLabel('What to reset').selectOption('wipe');
+  await engineer.getByText('Only a backup elsewhere brings them back').waitFor();
+  await word.fill('wipe');
+  await password.fill(h.password);
+  await submit.click();
+  check(await word.evaluate((input) => input.validity.patternMismatch), 'another word is not sent');
+  const resets = async () => (await h.api(engineer, 'audit')).body.entries
+    .filter(({ action }) => action.startsWith('system.factory')).length;
+  equal(await resets(), 0, 'nothing was asked for');
+  await word.fill('WIPE');
+  await password.fill('not the password');
+  await submit.click();
+  await engineer.getByRole('alert').getByText('the password is wrong').waitFor();
+  equal(await resets(), 0, 'nor with another password');
+  await engineer.getByLabel('What to reset').selectOption('keep_records');
+  equal(await word.isVisible(), false, 'keeping the records asks for no word');
+  await h.look(engineer, 'factory-reset');
+  await password.fill(h.password);
+  await submit.click();
+  await engineer.getByRole('status').getByText('resets itself').waitFor({ state: 'attached' });
+  equal(await resets(), 1, 'it was asked for once');
 });
 
 await h.step('a patient is deleted with the code and the password', async () => {

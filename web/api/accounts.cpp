@@ -198,6 +198,8 @@ void Accounts::AddRoutes(Router& router) {
               bind(&Accounts::AcceptOutside)});
   router.Add({"POST", "/api/v1/update/restart", Permission::kUpdate, BodyKind::kJson,
               bind(&Accounts::RestartSystem)});
+  router.Add({"POST", "/api/v1/system/factory-reset", Permission::kUpdate, BodyKind::kJson,
+              bind(&Accounts::ResetToFactory)});
   router.Add({"POST", "/api/v1/room-calibration/sign", Permission::kCalibrate, BodyKind::kJson,
               bind(&Accounts::SignRoomCalibration)});
   router.Add({"POST", "/api/v1/sensor-profile/reset", Permission::kSettings, BodyKind::kJson,

@@ -88,6 +88,8 @@ class Accounts : public SessionLookup {
   void RollBackSensorProfile(const Request& request, const Respond& respond);
   /// Restarts the machine: with the person's own password.
   void RestartSystem(const Request& request, const Respond& respond);
+  /// Resets the appliance to the state of delivery: with the person's own password.
+  void ResetToFactory(const Request& request, const Respond& respond);
   /// The certificate that the page is served with.
   void DescribeCertificate(const Request& request, const Respond& respond);
   /// One that is handed in, or a new one that signs itself: with the person's own password.

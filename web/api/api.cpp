@@ -355,14 +355,20 @@ void AddSettingsRoutes(Table& table, SettingsService& settings, AuditLog& audit)
 }
 
 void AddUpdateRoutes(Table& table, UpdateService& updates) {
-  table.Read("/api/v1/update", Permission::kView,
-             [&updates](const Request&) { return JsonResponse(ToJson(updates.GetUpdate())); });
+  table.Read("/api/v1/update", Permission::kView, [&updates](const Request&) {
+    Json answer = ToJson(updates.GetUpdate());
+    answer["stick"] = updates.StickBundles();
+    return JsonResponse(answer);
+  });
   table.Write("POST", "/api/v1/update", Permission::kUpdate, BodyKind::kJson,
               [&updates](const Request& request, const Respond& respond) {
                 Fields fields(request.body);
                 const std::string bundle = fields.Text("bundle", 1, 64);
+                const bool from_stick = fields.Has("from_stick") && fields.Flag("from_stick");
                 fields.Finish();
                 if (!IsName(bundle)) throw DataError("bundle must be one of the names listed");
+                if (from_stick)
+                  return updates.InstallFromStick(request.actor(), bundle, Answer(respond));
                 updates.InstallUpdate(request.actor(), bundle, Answer(respond));
               });
   table.Write("POST", "/api/v1/update/bundles/{name}", Permission::kUpdate, BodyKind::kFile,

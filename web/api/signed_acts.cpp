@@ -1,6 +1,7 @@
 // What a person signs with the own password, although logged in.
 #include <utility>
 
+#include "algo/base/errors.hpp"
 #include "web/api/accounts.hpp"
 #include "web/api/json.hpp"
 #include "web/security/password_rules.hpp"
@@ -55,6 +56,20 @@ void Accounts::RestartSystem(const Request& request, const Respond& respond) {
   fields.Finish();
   Signed(request, std::move(password), respond,
          [this](const Actor& actor, Done done) { updates_.RestartSystem(actor, std::move(done)); });
+}
+
+void Accounts::ResetToFactory(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  const std::string kind = fields.Text("kind", 1, 32);
+  if (kind != "keep_records" && kind != "wipe")
+    throw DataError("kind: expected keep_records or wipe");
+  std::string password = fields.Text("password", 1, kMaxPassword);
+  fields.Finish();
+  Signed(request, std::move(password), respond,
+         [this, reset = kind == "wipe" ? FactoryReset::kWipe : FactoryReset::kKeepRecords](
+             const Actor& actor, Done done) {
+           updates_.ResetToFactory(actor, reset, std::move(done));
+         });
 }
 
 void Accounts::SignRoomCalibration(const Request& request, const Respond& respond) {

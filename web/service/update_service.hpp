@@ -1,10 +1,12 @@
-// System updates, and the restart after them.
+// System updates, the restart after them, and the reset to the state of delivery.
 #pragma once
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "web/service/change.hpp"
+#include "web/service/factory_reset.hpp"
 #include "web/service/service_types.hpp"
 
 namespace plumb::web {
@@ -19,11 +21,18 @@ class UpdateService {
   /// file. kInvalid: no bundle.
   virtual void AddBundle(const Actor& actor, const std::filesystem::path& file,
                          const std::string& name, Done done) = 0;
+  /// Names of bundles on USB sticks that are plugged in.
+  [[nodiscard]] virtual std::vector<std::string> StickBundles() = 0;
+  /// Copies one of them among the bundles, then as InstallUpdate().
+  virtual void InstallFromStick(const Actor& actor, const std::string& bundle, Done done) = 0;
   virtual void RemoveBundle(const Actor& actor, const std::string& name, Done done) = 0;
   virtual void InstallUpdate(const Actor& actor, const std::string& bundle,
                              Done done) = 0;  ///< kConflict during a scan.
   /// Restarts the machine. kConflict during a treatment session, a scan and an installation.
   virtual void RestartSystem(const Actor& actor, Done done) = 0;
+  /// Back to the state of delivery, at the restart of the machine that follows at once. kConflict
+  /// as for RestartSystem(); where the machine does not restart, nothing is reset.
+  virtual void ResetToFactory(const Actor& actor, FactoryReset kind, Done done) = 0;
   /// A roll-back is not told of any more.
   virtual void ForgetRollBack(const Actor& actor, Done done) = 0;
 };

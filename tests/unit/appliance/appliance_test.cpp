@@ -12,6 +12,7 @@
 
 #include "daemon/appliance/unit_profile.hpp"
 #include "daemon/appliance/web_services.hpp"
+#include "daemon/records/factory_reset.hpp"
 #include "daemon/records/profile_shelf.hpp"
 #include "tests/support/board_checks.hpp"
 #include "tests/support/fake_sensor.hpp"
@@ -231,6 +232,43 @@ TEST_F(ApplianceTest, TheMachineIsNotRestartedUnderAScan) {
       EXPECT_THAT(appliance_->Press(ButtonPress::kShort), ::testing::HasSubstr("being restarted"));
       EXPECT_THAT(Restarted(*services_).message, ::testing::HasSubstr("being restarted"));
       EXPECT_EQ(restart_->num_asked, 1);
+    });
+  });
+}
+
+/// What ResetToFactory() answers in the end. Not on the loop: it writes aside.
+web::Change AskedToReset(WebServices& services, EventLoop& loop, web::FactoryReset kind) {
+  auto answered = std::make_shared<std::promise<web::Change>>();
+  loop.Post("test", [&services, answered, kind] {
+    services.updates().ResetToFactory(
+        {.user = "erik", .address = {}}, kind,
+        [answered](const web::Change& change) { answered->set_value(change); });
+  });
+  return answered->get_future().get();
+}
+
+TEST_F(ApplianceTest, AFactoryResetIsNotedBeforeTheMachineRestarts) {
+  Play([&] {
+    MakeReady();
+    const auto is_noted = [&] {
+      return std::filesystem::exists(folder_ / "state" / kFactoryResetFile);
+    };
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort), ""); });
+    EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).result,
+              web::ChangeResult::kConflict)
+        << "a scan runs";
+    EXPECT_FALSE(is_noted());
+    On([&] { EXPECT_EQ(appliance_->Cancel(), ""); });
+    EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
+    restart_->failure = "the machine cannot be restarted from here: no";
+    EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).message, restart_->failure);
+    EXPECT_FALSE(is_noted()) << "nothing is reset where the machine does not restart";
+    restart_->failure.clear();
+    EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).result,
+              web::ChangeResult::kDone);
+    EXPECT_TRUE(is_noted());
+    On([&] {
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort), ::testing::HasSubstr("being restarted"));
     });
   });
 }

@@ -130,6 +130,26 @@ TEST_F(LockoutTest, TheMachineIsRestartedForAnEngineerWithThePassword) {
   EXPECT_EQ(service_.num_restarts, 1);
 }
 
+TEST_F(LockoutTest, AFactoryResetIsForAnEngineerWithThePassword) {
+  HttpClient engineer = LoggedIn("engineer");
+  const auto reset = [](HttpClient& client, const char* kind, const std::string& password) {
+    return client.Post("/api/v1/system/factory-reset", {{"kind", kind}, {"password", password}})
+        .status;
+  };
+  EXPECT_EQ(reset(engineer, "wipe", kWrong), 403);
+  EXPECT_EQ(reset(engineer, "everything", kPassword), 400);
+  HttpClient physicist = LoggedIn("physicist");
+  EXPECT_EQ(reset(physicist, "wipe", kPassword), 403);
+  service_.status.session = web::TreatmentSession{};
+  EXPECT_EQ(reset(engineer, "wipe", kPassword), 409);
+  EXPECT_FALSE(service_.factory_reset);
+  service_.status.session.reset();
+  EXPECT_EQ(reset(engineer, "keep_records", kPassword), 200);
+  EXPECT_EQ(service_.factory_reset, web::FactoryReset::kKeepRecords);
+  EXPECT_EQ(reset(engineer, "wipe", kPassword), 200);
+  EXPECT_EQ(service_.factory_reset, web::FactoryReset::kWipe);
+}
+
 TEST_F(LockoutTest, TheRoomsCalibrationIsSignedByAPhysicistOrAnEngineerWithThePassword) {
   service_.is_board_there = true;
   service_.status.sensor.present = true;

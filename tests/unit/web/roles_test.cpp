@@ -83,6 +83,7 @@ const std::map<std::string, std::string> kWhoMay = {
     {"POST /api/v1/update", "E"},
     {"POST /api/v1/update/bundles/{name}", "E"},
     {"POST /api/v1/update/restart", "E"},
+    {"POST /api/v1/system/factory-reset", "E"},
     {"POST /api/v1/update/seen", "E"},
     {"DELETE /api/v1/update/bundles/{name}", "E"},
     {"GET /api/v1/backup", "E"},

@@ -50,6 +50,35 @@ function restart() {
     h('button', { class: 'danger' }, text.restartSubmit)));
 }
 
+/// Either kind with the password again; wiping also with its word typed: nothing brings it back.
+function factoryReset() {
+  const text = S.update;
+  const password = signingPassword();
+  const kind = h('select', { required: true }, h('option', { value: '' }, text.resetChoose),
+    h('option', { value: 'keep_records' }, text.resetKeep),
+    h('option', { value: 'wipe' }, text.resetWipe));
+  const word = h('input', { autocomplete: 'off', pattern: text.resetWord, required: true });
+  const typed = field(text.resetType, word);
+  const effect = h('p', { class: 'hint' });
+  const show = () => {
+    const wipe = kind.value === 'wipe';
+    typed.hidden = !wipe;
+    word.disabled = !wipe;
+    const hints = { keep_records: text.resetKeepHint, wipe: text.resetWipeHint };
+    effect.textContent = hints[kind.value] ?? '';
+  };
+  kind.addEventListener('change', show);
+  show();
+  return h('section', { class: 'card' }, h('h2', {}, text.reset),
+    h('p', { class: 'hint' }, text.resetHint), form({ class: 'form' }, async () => {
+      const body = { kind: kind.value, password: password.value };
+      password.value = '';
+      await post('system/factory-reset', body);
+      done(text.resetting);
+    }, field(text.resetKind, kind), effect, typed, field(S.result.acceptPassword, password),
+    h('button', { class: 'danger' }, text.resetSubmit)));
+}
+
 function diagnostics() {
   const text = S.update;
   return h('section', { class: 'card' }, h('h2', {}, text.diagnostics),
@@ -75,6 +104,17 @@ function bundles(update) {
     rows.length ? h('ul', { class: 'files' }, rows) : h('p', { class: 'hint' }, text.noBundles)];
 }
 
+/// Offered only: somebody has to want it.
+function onStick(update) {
+  const text = S.update;
+  if (!update.stick.length || !may('update')) return null;
+  return [h('h2', {}, text.stick), h('ul', { class: 'files' }, update.stick.map((name) => h('li',
+    { class: 'row' }, h('span', { class: 'bundle' }, name), action(text.install,
+      () => post('update', { bundle: name, from_stick: true }), {
+        'aria-label': `${text.install} ${name} ${text.fromStick}`, disabled: update.installing,
+      }))))];
+}
+
 export async function showUpdate(place) {
   const text = S.update;
   const body = h('div', {});
@@ -94,6 +134,7 @@ export async function showUpdate(place) {
         max: 1, value: update.fraction, 'aria-label': text.installing,
       })],
       failure && !installing && h('p', { class: 'caution' }, translated(failure)),
+      supported && onStick(update),
       supported ? bundles(update)
         : h('p', { class: 'caution' }, `${text.unsupported}: ${translated(message)}`),
       supported && !installing && message && message !== failure
@@ -102,9 +143,11 @@ export async function showUpdate(place) {
     starter.hidden = !update.restart_needed || installing || !may('update');
   };
   clear(place, h('h1', {}, text.title), h('section', { class: 'card' }, body), starter, sender,
-    may('diagnostics') && diagnostics());
+    may('diagnostics') && diagnostics(), may('update') && factoryReset());
   await draw();
-  return live.listen((kind) => {
+  const looking = setInterval(() => draw().catch(() => {}), 5000);  // a stick tells nothing
+  const stop = live.listen((kind) => {
     if (kind === 'update' || kind === 'connection') draw().catch(() => {});
   });
+  return () => { clearInterval(looking); stop(); };
 }

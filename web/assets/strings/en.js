@@ -549,6 +549,8 @@ export const en = {
       'profile.reset': 'Sensor profile reset',
       'profile.roll_back': 'Earlier sensor profile restored',
       'system.restart': 'Machine restarted',
+      'system.factory_reset': 'Factory reset carried out',
+      'system.factory_reset_request': 'Factory reset requested',
       'system.restart_failed': 'Restart failed',
     },
   },
@@ -603,6 +605,7 @@ export const en = {
   update: {
     title: 'Update', installed: 'Installed version', slot: 'System',
     unsupported: 'Updates are not available here', bundles: 'Update files on this machine',
+    stick: 'On the USB stick', fromStick: 'from the USB stick',
     noBundles: 'No update file yet: upload one below.', remove: 'Remove',
     upload: 'Upload update file',
     uploadHint: 'A signed system image (NAME.raucb). Its size and form are checked at once, its '
@@ -617,6 +620,17 @@ export const en = {
       + 'new system does not start properly, the previous one is used, and this page says so.',
     restartSubmit: 'Restart now',
     restarting: 'The appliance restarts. This page comes back by itself.',
+    reset: 'Factory reset', resetKind: 'What to reset', resetChoose: 'Choose…',
+    resetHint: 'The appliance restarts and sets itself back. This is refused while a scan runs or '
+      + 'a session is open. Afterwards a new setup code makes the first account.',
+    resetKeep: 'Accounts and settings; keep patients and scans',
+    resetKeepHint: 'Removes all accounts, paired displays, settings, the configuration, update '
+      + 'files and the page’s certificate. Patients, references, scans and the log stay.',
+    resetWipe: 'Everything', resetWord: 'WIPE', resetType: 'Type WIPE to confirm',
+    resetWipeHint: 'Removes every patient, reference, scan, account and setting, and the log. Only '
+      + 'a backup elsewhere brings them back.',
+    resetSubmit: 'Reset the appliance',
+    resetting: 'The appliance restarts and resets itself. Its setup code is on its console.',
     install: 'Install', installing: 'Installing…', diagnostics: 'Diagnostics',
     diagnosticsText: 'A file for the manufacturer: versions, logs, settings. No patient data.',
     download: 'Download diagnostics',

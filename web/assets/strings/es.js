@@ -599,6 +599,8 @@ export const es = {
       'profile.reset': 'Perfil del sensor borrado',
       'profile.roll_back': 'Perfil del sensor recuperado',
       'system.restart': 'Equipo reiniciado',
+      'system.factory_reset': 'Restablecimiento de fábrica realizado',
+      'system.factory_reset_request': 'Restablecimiento de fábrica solicitado',
       'system.restart_failed': 'Reinicio fallido',
     },
   },
@@ -662,6 +664,7 @@ export const es = {
     title: 'Actualización', installed: 'Versión instalada', slot: 'Sistema',
     unsupported: 'Aquí no hay actualizaciones disponibles',
     bundles: 'Archivos de actualización en este equipo',
+    stick: 'En la memoria USB', fromStick: 'desde la memoria USB',
     noBundles: 'Aún no hay archivo de actualización: cargue uno abajo.', remove: 'Quitar',
     upload: 'Cargar un archivo de actualización',
     uploadHint: 'Una imagen de sistema firmada (NAME.raucb). Su tamaño y su forma se comprueban '
@@ -676,6 +679,20 @@ export const es = {
       + 'no arranca bien, vuelve el anterior, y esta página lo dice.',
     restartSubmit: 'Reiniciar ahora',
     restarting: 'El equipo se reinicia. Esta página vuelve sola.',
+    reset: 'Restablecimiento de fábrica', resetKind: 'Qué restablecer', resetChoose: 'Elija…',
+    resetHint: 'El equipo se reinicia y vuelve al estado de entrega. Se rechaza durante un escaneo '
+      + 'o con una sesión abierta. Después, un nuevo código de instalación crea la primera '
+      + 'cuenta.',
+    resetKeep: 'Cuentas y ajustes; conservar pacientes y escaneos',
+    resetKeepHint: 'Elimina todas las cuentas, las pantallas vinculadas, los ajustes, la '
+      + 'configuración, los archivos de actualización y el certificado de la página. Se conservan '
+      + 'pacientes, referencias, escaneos y el registro.',
+    resetWipe: 'Todo', resetWord: 'BORRAR', resetType: 'Escriba BORRAR para confirmar',
+    resetWipeHint: 'Elimina todos los pacientes, referencias, escaneos, cuentas y ajustes, y el '
+      + 'registro. Solo una copia de seguridad externa los recupera.',
+    resetSubmit: 'Restablecer el equipo',
+    resetting: 'El equipo se reinicia y se restablece. Su código de instalación sale en su '
+      + 'consola.',
     install: 'Instalar', installing: 'Instalando…', diagnostics: 'Diagnóstico',
     diagnosticsText: 'Un archivo para el fabricante: versiones, registros, ajustes. Sin datos de '
       + 'pacientes.',

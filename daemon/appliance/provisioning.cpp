@@ -1,0 +1,166 @@
+#include "daemon/appliance/provisioning.hpp"
+
+#include <arpa/inet.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/appliance/page_identity.hpp"
+#include "daemon/config/config_section.hpp"
+#include "daemon/files/atomic_folder.hpp"
+#include "drivers/files/file_io.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxBytes = 64 << 10;
+constexpr std::size_t kMaxServers = 8;
+
+bool IsWord(std::string_view text, std::string_view also, std::size_t longest) {
+  return !text.empty() && text.size() <= longest &&
+         std::all_of(text.begin(), text.end(), [&](unsigned char c) {
+           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                  also.find(static_cast<char>(c)) != std::string_view::npos;
+         });
+}
+
+/// 32 or 128 bits, or nothing.
+std::optional<int> BitsOfAddress(const std::string& text) {
+  std::array<unsigned char, 16> bytes{};
+  if (::inet_pton(AF_INET, text.c_str(), bytes.data()) == 1) return 32;
+  if (::inet_pton(AF_INET6, text.c_str(), bytes.data()) == 1) return 128;
+  return std::nullopt;
+}
+
+bool IsAddress(const std::string& text) { return BitsOfAddress(text).has_value(); }
+
+bool IsAddressWithPrefix(const std::string& text) {
+  const std::size_t slash = text.find('/');
+  if (slash == std::string::npos) return false;
+  const std::optional<int> bits = BitsOfAddress(text.substr(0, slash));
+  int prefix = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data() + slash + 1, end, prefix);
+  return bits && error == std::errc() && stop == end && prefix >= 1 && prefix <= *bits;
+}
+
+bool IsHostName(const std::string& text) {
+  return IsWord(text, "-", 63) && text.front() != '-' && text.back() != '-';
+}
+
+bool IsServer(const std::string& text) { return IsAddress(text) || IsWord(text, ".-", 253); }
+
+void TakeServers(Section& section, const char* key, std::vector<std::string>& servers,
+                 bool (*is_valid)(const std::string&), const char* expected,
+                 const std::string& name) {
+  section.TakeNames(key, servers, expected, kMaxServers);
+  for (const std::string& server : servers) {
+    if (!is_valid(server))
+      throw DataError(fmt::format("{}: network.{}: expected {}, found '{}'", name, key, expected,
+                                  server.substr(0, 64)));
+  }
+}
+
+void ReadNetwork(Section section, const std::string& name, Provisioning& given) {
+  const auto text = [](auto is_valid) {
+    return [is_valid](const std::string& value) { return is_valid(value); };
+  };
+  section.Take("address", given.address, "an address with its prefix such as \"192.168.10.5/24\"",
+               text(IsAddressWithPrefix));
+  section.Take("gateway", given.gateway, "an address", text(IsAddress));
+  TakeServers(section, "dns", given.dns, IsAddress, "a list of at most 8 addresses", name);
+  TakeServers(section, "time_servers", given.time_servers, IsServer,
+              "a list of at most 8 addresses or names", name);
+  section.RefuseTheRest();
+  if (given.address.empty() && (!given.gateway.empty() || !given.dns.empty()))
+    throw DataError(
+        fmt::format("{}: network: gateway and dns belong to an address; without one the "
+                    "network gives them (DHCP)",
+                    name));
+}
+
+void ReadPage(Section section, const fs::path& file, Provisioning& given) {
+  std::string certificate, key;
+  const auto is_plain = [](const std::string& name) {  // nothing outside of the file's folder
+    return IsWord(name, "._-", 128) && name.front() != '.';
+  };
+  section.Take("certificate", certificate, "the name of a PEM file in the same folder", is_plain);
+  section.Take("key", key, "the name of a PEM file in the same folder", is_plain);
+  section.RefuseTheRest();
+  if (certificate.empty() != key.empty())
+    throw DataError(fmt::format("{}: page: certificate and key are given together", file.string()));
+  if (certificate.empty()) return;
+  const fs::path folder = file.parent_path();
+  given.page = web::CheckedTlsIdentity(ReadTextFile(folder / certificate, kMaxBytes),
+                                       ReadTextFile(folder / key, kMaxBytes),
+                                       (folder / certificate).string());
+}
+
+void Put(const fs::path& file, const std::string& text) {
+  if (text.empty()) {
+    if (::unlink(file.c_str()) != 0 && errno != ENOENT)
+      throw IoError(DescribeWriteError(file, errno));
+    return;
+  }
+  WriteFileAtomically(file, [&](const fs::path& hidden) { WriteWholeFile(hidden, text); });
+}
+
+}  // namespace
+
+Provisioning ReadProvisioning(const fs::path& file) {
+  const std::string name = file.string();
+  const toml::table root = ParseToml(ReadTextFile(file, kMaxBytes), name);
+  for (const auto& [key, node] : root) {
+    if (key.str() != "unit" && key.str() != "network" && key.str() != "page")
+      throw DataError(
+          fmt::format("{}:{}: unknown table or key '{}'; known are [unit], [network], [page]", name,
+                      node.source().begin.line, key.str()));
+  }
+  Provisioning given;
+  Section unit(root, "unit", name);
+  unit.Take("serial", given.serial, "1 to 32 letters, digits, '.', '_' and '-'",
+            [](const std::string& value) { return IsWord(value, "._-", 32); });
+  unit.Take("host_name", given.host_name, "one name of at most 63 letters, digits and '-'",
+            IsHostName);
+  unit.RefuseTheRest();
+  ReadNetwork(Section(root, "network", name), name, given);
+  ReadPage(Section(root, "page", name), file, given);
+  return given;
+}
+
+std::string NetworkFile(const Provisioning& given) {
+  std::string text = "[Match]\nName=en* eth*\n[Network]\nMulticastDNS=yes\n";
+  if (given.address.empty()) return text + "DHCP=yes\n";
+  text += fmt::format("Address={}\n", given.address);
+  if (!given.gateway.empty()) text += fmt::format("Gateway={}\n", given.gateway);
+  for (const std::string& server : given.dns) text += fmt::format("DNS={}\n", server);
+  return text;
+}
+
+void ApplyProvisioning(const Provisioning& given, const fs::path& unit, const fs::path& state) {
+  std::error_code ignored;
+  fs::create_directories(unit, ignored);
+  const auto line = [](const std::string& text) { return text.empty() ? "" : text + "\n"; };
+  Put(unit / "serial", line(given.serial));
+  Put(unit / "host-name", line(given.host_name));
+  Put(unit / "network", NetworkFile(given));
+  Put(unit / "time-servers",
+      given.time_servers.empty()
+          ? ""
+          : fmt::format("[Time]\nNTP={}\n", fmt::join(given.time_servers, " ")));
+  if (!given.page) return;
+  KeepPageIdentity(state, *given.page);
+}
+
+}  // namespace plumb

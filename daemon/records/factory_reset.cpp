@@ -1,0 +1,147 @@
+#include "daemon/records/factory_reset.hpp"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "algo/base/bounded_json.hpp"
+#include "algo/base/errors.hpp"
+#include "daemon/records/store.hpp"
+#include "drivers/files/file_io.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using web::FactoryReset;
+
+constexpr std::size_t kMaxBytes = 4096;
+constexpr const char* kKeep = "keep_records";
+constexpr const char* kWipe = "wipe";
+/// Beside the database: what is neither a record nor of the sensor.
+constexpr std::array kOfPageAndUpdates = {"page-key.pem", "device.key", "updates"};
+
+struct Request {
+  FactoryReset kind = FactoryReset::kKeepRecords;
+  web::Actor actor;
+};
+
+/// @throws DataError
+Request ReadRequest(const fs::path& file) {
+  const Json json = ParseBoundedJsonOrNothing(ReadTextFile(file, kMaxBytes));
+  try {
+    const std::string kind = json.at("kind").get<std::string>();
+    if (kind != kKeep && kind != kWipe)
+      throw DataError(
+          fmt::format("expected the kind {} or {}, found '{}'", kKeep, kWipe, kind.substr(0, 32)));
+    return {.kind = kind == kWipe ? FactoryReset::kWipe : FactoryReset::kKeepRecords,
+            .actor = {.user = json.at("user").get<std::string>(),
+                      .address = json.at("address").get<std::string>()}};
+  } catch (const std::exception& error) {
+    throw DataError(
+        fmt::format("the request of a factory reset, {}, cannot be read: {}. Nothing was reset; "
+                    "remove the file, or ask for the reset again",
+                    file.string(), error.what()));
+  }
+}
+
+void Remove(const fs::path& path) {
+  std::error_code error;
+  fs::remove_all(path, error);
+  // The root of a mounted disk stays; what is in it goes.
+  if (error && !(fs::is_directory(path) && fs::is_empty(path)))
+    throw DiskRefused(
+        fmt::format("the factory reset cannot remove {}: {}; it goes on at the next "
+                    "start",
+                    path.string(), error.message()));
+}
+
+std::vector<fs::path> EntriesOf(const fs::path& folder) {
+  std::vector<fs::path> entries;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    entries.push_back(entry.path());
+  return entries;
+}
+
+/// The files of scans go before the database, so that an interrupted wipe never looks like a lost
+/// database.
+void Wipe(const fs::path& state) {
+  FolderLock lock;
+  lock.Take(state);
+  Remove(state / "scans");
+  for (const fs::path& entry : EntriesOf(state)) {
+    if (entry.filename() != kFactoryResetFile && entry.filename() != "lost+found") Remove(entry);
+  }
+  SyncToDisk(state);
+}
+
+/// With its entry in the log; a store that cannot be opened is not changed.
+std::string KeepRecords(const fs::path& state, const web::Actor& actor) {
+  std::string done;
+  {
+    Store store(state);
+    StoreChange change(store.database());
+    change.Prepare("DELETE FROM users").Run();
+    done = fmt::format(
+        "records kept; {} accounts, all paired displays, the settings and the page's keys removed",
+        change.num_changed());
+    change.Prepare("DELETE FROM displays").Run();
+    change.Prepare("DELETE FROM settings WHERE name = 'settings'").Run();
+    change.Log(actor, "system.factory_reset", "", done);
+    change.Commit();
+  }
+  for (const char* name : kOfPageAndUpdates) Remove(state / name);
+  return done;
+}
+
+}  // namespace
+
+void RequestFactoryReset(const fs::path& state, FactoryReset kind, const web::Actor& actor) {
+  const fs::path file = state / kFactoryResetFile;
+  const fs::path temporary = state / ".factory-reset.new";
+  const Json json = {{"kind", kind == FactoryReset::kWipe ? kWipe : kKeep},
+                     {"user", actor.user},
+                     {"address", actor.address}};
+  WriteWholeFile(temporary, json.dump(-1, ' ', false, Json::error_handler_t::replace));
+  struct stat folder {};
+  if (::stat(state.c_str(), &folder) != 0 ||
+      (::geteuid() == 0 && ::chown(temporary.c_str(), folder.st_uid, folder.st_gid) != 0))
+    throw IoError(DescribeWriteError(temporary, errno));
+  SyncToDisk(temporary);
+  if (::rename(temporary.c_str(), file.c_str()) != 0)
+    throw IoError(DescribeWriteError(file, errno));
+  SyncToDisk(state);
+}
+
+void CancelFactoryReset(const fs::path& state) {
+  if (::unlink((state / kFactoryResetFile).c_str()) != 0 && errno != ENOENT)
+    throw IoError(DescribeWriteError(state / kFactoryResetFile, errno));
+  SyncToDisk(state);
+}
+
+std::optional<std::string> CarryOutFactoryReset(const fs::path& state) {
+  const fs::path file = state / kFactoryResetFile;
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(file, error))) return std::nullopt;
+  const Request request = ReadRequest(file);
+  std::string done = "everything that was stored has been removed";
+  if (request.kind == FactoryReset::kWipe) {
+    Wipe(state);
+    Store(state).audit.Log(request.actor, "system.factory_reset", "", done);
+  } else {
+    done = KeepRecords(state, request.actor);
+  }
+  CancelFactoryReset(state);
+  return done;
+}
+
+}  // namespace plumb

@@ -1,0 +1,67 @@
+#include "daemon/update/usb_sticks.hpp"
+
+#include <fcntl.h>
+
+#include <algorithm>
+#include <string_view>
+#include <system_error>
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr std::size_t kMaxListed = 32;
+constexpr std::size_t kMaxLookedAt = 4096;  // files of a stick: it may hold anything
+
+/// A stick's other names have no place in a request.
+bool IsBundleName(std::string_view name) {
+  constexpr std::string_view kAlso = "._-";
+  return name.ends_with(".raucb") && name.size() <= 64 && !name.starts_with('.') &&
+         std::all_of(name.begin(), name.end(), [&](unsigned char c) {
+           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                  kAlso.find(static_cast<char>(c)) != std::string_view::npos;
+         });
+}
+
+template <typename See>
+void ForEachEntry(const fs::path& folder, const See& see) {
+  std::error_code error;
+  std::size_t left = kMaxLookedAt;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end && left > 0;
+       entry.increment(error), --left)
+    see(entry->path());
+}
+
+}  // namespace
+
+std::vector<fs::path> UsbSticks::Files() const {
+  std::vector<fs::path> files;
+  ForEachEntry(root_, [&](const fs::path& stick) {
+    ForEachEntry(stick, [&](const fs::path& file) {
+      std::error_code error;
+      if (files.size() < kMaxListed && IsBundleName(file.filename().string()) &&
+          fs::is_regular_file(fs::symlink_status(file, error)))
+        files.push_back(file);
+    });
+  });
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::vector<std::string> UsbSticks::Bundles() const {
+  std::vector<std::string> names;
+  for (const fs::path& file : Files()) names.push_back(file.filename().string());
+  std::sort(names.begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  return names;
+}
+
+int UsbSticks::Open(const std::string& name) const {
+  for (const fs::path& file : Files()) {
+    if (file.filename() == name)
+      return ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  }
+  return -1;
+}
+
+}  // namespace plumb

@@ -1,0 +1,27 @@
+// Bundles on USB sticks, which an image mounts read-only (systemd/usb-stick). They are offered, and
+// never installed by themselves.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace plumb {
+
+class UsbSticks {
+ public:
+  /// @param root  Holds one folder a stick.
+  explicit UsbSticks(std::filesystem::path root = "/run/plumb-stick") : root_(std::move(root)) {}
+
+  /// Names of files NAME.raucb in the top folders of the sticks, sorted, each once; at most 32.
+  [[nodiscard]] std::vector<std::string> Bundles() const;
+  /// A descriptor to read that bundle by, for the caller to close; -1: it is not there (any more).
+  [[nodiscard]] int Open(const std::string& name) const;
+
+ private:
+  [[nodiscard]] std::vector<std::filesystem::path> Files() const;
+
+  std::filesystem::path root_;
+};
+
+}  // namespace plumb

@@ -1,0 +1,70 @@
+#!/usr/bin/env bash
+# A unit's provisioning file, from the data partition and from a stick, through plumbd --provision to what systemd reads; and the appliance's screen.
+#   unit_settings.sh BUILD_FOLDER
+set -euo pipefail
+plumbd=$(realpath "$1/daemon/plumbd") source=$(cd "$(dirname "$0")/../.." && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+failed=0
+check() { # NAME EXPECTED-REGEX FOUND
+  if [[ $3 =~ $2 ]]; then echo "ok      $1"; else failed=1; printf 'FAILED  %s: expected %s, found %s\n' "$1" "$2" "$3"; fi
+}
+mkdir -p data/provision state stick bin
+printf '#!/bin/sh\nexec %q --state %q "$@"\n' "$plumbd" "$work/state" >bin/plumbd
+printf '#!/bin/sh\necho "$@" >>%q\n' "$work/asked" >bin/systemctl
+chmod +x bin/*
+export PLUMB_DATA=$work/data PLUMB_RUN=$work/run PLUMB_HOST_NAME=$work/host-name PLUMB_PLUMBD=$work/bin/plumbd PATH=$work/bin:$PATH
+run() { "$source/systemd/unit-settings" "$@" >out 2>&1 && code=0 || code=$?; }
+
+echo plumb >host-name
+run
+check "a unit without a file keeps its name" '^0 plumb$' "$code $(cat host-name)"
+printf '[unit]\nserial = "PL-1"\nhost_name = "first"\n[network]\naddress = "10.1.1.5/8"\ntime_servers = ["10.1.1.1"]\n' >data/provision/plumb-provision.toml
+run
+check "name" '^0 first$' "$code $(cat host-name)"
+check "network" 'Address=10.1.1.5/8' "$(cat run/systemd/network/10-plumb.network)"
+check "time servers" 'NTP=10.1.1.1' "$(cat run/systemd/timesyncd.conf.d/10-plumb.conf)"
+check "serial number" '^PL-1$' "$(cat data/unit/serial)"
+rm -r run
+run
+check "the next start: not taken over again, but applied" '^0  Address=10.1.1.5/8' "$code $(cat out) $(grep Address run/systemd/network/10-plumb.network)"
+printf '[network]\naddress = "10.1.1.5"\n' >data/provision/plumb-provision.toml
+run
+check "a mistake is told with its line" 'plumb-provision.toml:2: network.address: expected an address with its prefix' "$(cat out)"
+check "and the unit keeps what it had" 'Address=10.1.1.5/8' "$(cat run/systemd/network/10-plumb.network)"
+
+printf '[unit]\nhost_name = "stranger"\n' >stick/plumb-provision.toml
+run stick "$work/stick"
+check "a stick changes nothing on a unit that has been provisioned" '^0 .*left alone.* first$' "$code $(cat out) $(cat host-name)"
+rm -r data
+mkdir data
+run stick "$work/stick"
+check "but a new unit takes it over" '^0 stranger$' "$code $(cat host-name)"
+check "and uses it at once" 'restart systemd-networkd.service.*try-restart plumbd.service' "$(tr '\n' ' ' <asked)"
+rm -r data stick/plumb-provision.toml
+mkdir data
+run stick "$work/stick"
+check "a stick without a file is no matter" '^0 $' "$code $(cat out)"
+
+cat >bin/plumb <<'SCRIPT'
+#!/bin/sh
+case "$3" in state) echo ready ;; page.url) echo https://0.0.0.0:8080 ;; page.certificate) echo AB:CD ;; esac
+SCRIPT
+printf '#!/bin/sh\necho "2: eth0 inet 10.1.1.5/8 scope global eth0"\necho "2: eth0 inet6 fd00::5/64 scope global"\n' >bin/ip
+printf '#!/bin/sh\necho "setup code: ABCD-EFGH"\n' >bin/journalctl
+printf '#!/bin/sh\ncat %q\n' "$work/session" >bin/curl
+chmod +x bin/*
+mkdir -p data/unit
+echo PL-7 >data/unit/serial
+echo "0.2.0 abc" >release
+export PLUMB_RELEASE=$work/release
+echo '{"setup_required":true}' >session
+screen=$("$source/systemd/console-screen" once)
+for line in 'Page         https://10.1.1.5:8080/' 'Page         https://\[fd00::5\]:8080/' 'Certificate  AB:CD' 'Serial       PL-7' 'Version      0.2.0' \
+  'State        ready' 'enter the setup code: ABCD-EFGH'; do
+  check "the screen shows: $line" "$line" "$screen"
+done
+echo '{"setup_required":false}' >session
+check "with an account no setup code" '^none$' "$("$source/systemd/console-screen" once | grep -q 'setup code' || echo none)"
+exit $failed

@@ -1,0 +1,67 @@
+#include "daemon/update/usb_sticks.hpp"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "drivers/files/file_io.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+class UsbSticksTest : public ::testing::Test {
+ protected:
+  void Put(const char* path, const std::string& text = "x") {
+    fs::create_directories((folder_ / path).parent_path());
+    WriteWholeFile(folder_ / path, text);
+  }
+  testing::TempFolder folder_;
+  const UsbSticks sticks_{folder_.path()};
+};
+
+TEST_F(UsbSticksTest, WithoutAStickNothingIsOffered) {
+  EXPECT_THAT(sticks_.Bundles(), IsEmpty());
+  EXPECT_THAT(UsbSticks(folder_ / "none").Bundles(), IsEmpty());
+  EXPECT_EQ(sticks_.Open("v2.raucb"), -1);
+}
+
+TEST_F(UsbSticksTest, BundlesOfAllSticksAreOfferedAndNothingElse) {
+  for (const char* path : {"sdb1/v3.raucb", "sda1/v2.raucb", "sda1/v3.raucb", "sda1/.hidden.raucb",
+                           "sda1/photo.jpg", "sda1/a b.raucb", "sda1/folder/v9.raucb", "v8.raucb"})
+    Put(path);
+  fs::create_directory(folder_ / "sda1" / "v7.raucb");
+  fs::create_symlink("/etc/shadow", folder_ / "sda1" / "v6.raucb");
+  ASSERT_EQ(::mkfifo((folder_ / "sda1" / "v5.raucb").c_str(), 0600), 0);
+  EXPECT_THAT(sticks_.Bundles(), ElementsAre("v2.raucb", "v3.raucb"));
+  for (const char* name :
+       {"v5.raucb", "v6.raucb", "v7.raucb", "v8.raucb", "photo.jpg", "../sda1/v2.raucb", ""})
+    EXPECT_EQ(sticks_.Open(name), -1) << name;
+}
+
+TEST_F(UsbSticksTest, OneIsReadByItsName) {
+  Put("sda1/v2.raucb", "contents");
+  const int fd = sticks_.Open("v2.raucb");
+  ASSERT_GE(fd, 0);
+  char text[16] = {};
+  EXPECT_EQ(::read(fd, text, sizeof(text)), 8);
+  EXPECT_STREQ(text, "contents");
+  ::close(fd);
+  fs::remove_all(folder_ / "sda1");
+  EXPECT_THAT(sticks_.Bundles(), IsEmpty());
+  EXPECT_EQ(sticks_.Open("v2.raucb"), -1);
+}
+
+TEST_F(UsbSticksTest, AStickFullOfFilesIsNotLookedThroughForEver) {
+  for (int i = 0; i < 40; ++i) Put(("sda1/v" + std::to_string(i) + ".raucb").c_str());
+  EXPECT_EQ(sticks_.Bundles().size(), 32U);
+}
+
+}  // namespace
+}  // namespace plumb

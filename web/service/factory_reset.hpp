@@ -1,0 +1,9 @@
+// A reset to the state of delivery.
+#pragma once
+
+namespace plumb::web {
+
+/// What it leaves.
+enum class FactoryReset { kKeepRecords, kWipe };
+
+}  // namespace plumb::web
