@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
 
+#include "algo/base/statistics.hpp"
+
 namespace plumb {
 namespace {
 
@@ -18,7 +20,6 @@ constexpr int kMaxSamples = 4000;     // a plane needs no more; larger faces are
 constexpr int kNumRounds = 6;         // of reweighting
 constexpr double kTukeyScales = 4.0;  // cut, in robust standard deviations
 constexpr double kMinSigma = 5e-4;    // 1/m: half a millimetre at 1 m, below any sensor's noise
-constexpr double kMadToSigma = 1.4826;
 
 void CheckSize(const DepthView& view, const RayTable& rays) {
   if (view.depth_m.type() != CV_32FC1 || view.depth_m.cols != rays.width() ||
@@ -84,12 +85,6 @@ bool IsConvexClockwise(const ImageCorners& outline) {
     if (!(a.x() * b.y() - a.y() * b.x() > 1.0)) return false;  // px^2; false for NaN
   }
   return true;
-}
-
-double Median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Weighted least squares of 1/z = a x + b y + c about the pixels' mean; false if the rays do not
@@ -182,9 +177,9 @@ std::optional<MarkerFace> FitMarkerFace(const MarkerObservation& marker, const D
   std::vector<double> values;
   values.reserve(pixels.size());
   for (const FacePixel& pixel : pixels) values.push_back(pixel.inverse);
-  const double median = Median(values);
+  const double median = TakeMedian(values);
   for (std::size_t i = 0; i < pixels.size(); ++i) values[i] = std::abs(pixels[i].inverse - median);
-  const double spread = Median(values);
+  const double spread = TakeMedian(values);
   std::vector<double> weights(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i)
     weights[i] =
@@ -196,7 +191,7 @@ std::optional<MarkerFace> FitMarkerFace(const MarkerObservation& marker, const D
     if (!SolvePlane(pixels, weights, face.plane)) return std::nullopt;
     for (std::size_t i = 0; i < pixels.size(); ++i)
       values[i] = std::abs(Residual(pixels[i], face.plane));
-    sigma = std::max(kMinSigma, kMadToSigma * Median(values));
+    sigma = std::max(kMinSigma, kMadToSigma * TakeMedian(values));
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       const double ratio = Residual(pixels[i], face.plane) / (kTukeyScales * sigma);
       const double inside = std::max(0.0, 1.0 - ratio * ratio);

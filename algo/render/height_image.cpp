@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/statistics.hpp"
 #include "algo/base/units.hpp"
 #include "algo/render/map_page.hpp"
 
@@ -33,13 +34,7 @@ Range RangeOf(const HeightMap& heights, std::span<const std::uint8_t> region) {
       known.push_back(heights.z[cell]);
   }
   if (known.empty()) return {};
-  const auto at = [&](double share) {
-    const auto place =
-        known.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(known.size() - 1));
-    std::nth_element(known.begin(), place, known.end());
-    return static_cast<double>(*place);
-  };
-  const double low = at(0.005), high = at(0.995);
+  const double low = TakeQuantile(known, 0.005), high = TakeQuantile(known, 0.995);
   return {low, std::max(high, low + 1e-3)};
 }
 

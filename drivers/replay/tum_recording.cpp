@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "algo/base/errors.hpp"
+#include "algo/base/statistics.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
@@ -68,9 +69,7 @@ double MedianPeriod(const std::vector<IndexEntry>& entries) {
   for (std::size_t i = 1; i < entries.size(); ++i)
     periods_s.push_back(entries[i].time_s - entries[i - 1].time_s);
   if (periods_s.empty()) return 0.0;
-  const auto middle = periods_s.begin() + static_cast<std::ptrdiff_t>(periods_s.size() / 2);
-  std::nth_element(periods_s.begin(), middle, periods_s.end());
-  return *middle;
+  return TakeMedian(periods_s);
 }
 
 /// The real place of an image, which must lie in the recording's folder even where links lead.
