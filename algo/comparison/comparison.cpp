@@ -17,8 +17,6 @@
 namespace plumb {
 namespace {
 
-constexpr double kSegmentationSpacing_m = 0.01;
-constexpr double kSegmentationSmoothing_m = 0.03;
 constexpr double kCloudReach_m = 0.004;  // of the discs of a cloud with points every 3 mm
 constexpr double kCloudSpacing_m = 0.003;
 constexpr double kWeakShare = 0.5;  // of the tolerance: from there on a direction is named as weak
@@ -70,14 +68,6 @@ void CheckScenesMatch(const Scene& reference, const Scene& current) {
 }
 
 // The scene's surface as a cloud with normals, in the reference frame.
-PointCloud SceneCloud(const Scene& scene, const Eigen::Affine3d& T_reference_scene) {
-  const bool has_cloud = !scene.cloud.empty() && scene.cloud.normals.size() == scene.cloud.size();
-  if (has_cloud) return TransformedCloud(T_reference_scene, scene.cloud);
-  if (scene.height_map)
-    return TransformedCloud(T_reference_scene, CloudOfHeightMap(*scene.height_map));
-  return {};
-}
-
 // One comparison in progress: Compare() runs its steps in order.
 class Comparer {
  public:
@@ -160,11 +150,9 @@ class Comparer {
     reference_cloud_ = SceneCloud(reference_, Eigen::Affine3d::Identity());
     current_cloud_ = SceneCloud(current_, StretchedAlignment());
     CheckStop(options_.stop);
-    reference_body_ =
-        FindBody(MakeSurface(reference_cloud_, kSegmentationSpacing_m, kSegmentationSmoothing_m));
+    reference_body_ = FindBody(reference_cloud_);
     CheckStop(options_.stop);
-    current_body_ =
-        FindBody(MakeSurface(current_cloud_, kSegmentationSpacing_m, kSegmentationSmoothing_m));
+    current_body_ = FindBody(current_cloud_);
     if (!reference_body_.support)
       result_.warnings.push_back(
           "no flat support was found in the reference scan: all of it counts as body");

@@ -9,6 +9,9 @@
 namespace plumb {
 namespace {
 
+constexpr double kSegmentationSpacing_m = 0.01;
+constexpr double kSegmentationSmoothing_m = 0.03;
+
 constexpr int kMaxPlanes = 6;
 constexpr double kHistogramBin_m = 0.01;
 constexpr double kCoarsePlaneBand_m =
@@ -253,6 +256,25 @@ Body FindBody(const Surface& scene, const BodyOptions& options) {
   }
   KeepLargestComponent(body);
   return body;
+}
+
+Body FindBody(const PointCloud& scene_cloud) {
+  return FindBody(MakeSurface(scene_cloud, kSegmentationSpacing_m, kSegmentationSmoothing_m));
+}
+
+PointCloud SceneCloud(const Scene& scene, const Eigen::Affine3d& T_reference_scene) {
+  const bool has_cloud = !scene.cloud.empty() && scene.cloud.normals.size() == scene.cloud.size();
+  if (has_cloud) return TransformedCloud(T_reference_scene, scene.cloud);
+  if (scene.height_map)
+    return TransformedCloud(T_reference_scene, CloudOfHeightMap(*scene.height_map));
+  return {};
+}
+
+std::vector<std::uint8_t> ReferenceRegion(const Scene& reference,
+                                          const std::vector<Eigen::Vector2d>& polygon_m) {
+  if (!reference.height_map) return {};
+  return RegionMask(*reference.height_map,
+                    FindBody(SceneCloud(reference, Eigen::Affine3d::Identity())), polygon_m);
 }
 
 std::vector<std::uint8_t> RegionMask(const HeightMap& map, const Body& body,

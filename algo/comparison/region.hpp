@@ -11,6 +11,7 @@
 #include "algo/comparison/surface.hpp"
 #include "algo/types/height_map.hpp"
 #include "algo/types/point_cloud.hpp"
+#include "algo/types/scene.hpp"
 
 namespace plumb {
 
@@ -52,10 +53,22 @@ struct Body {
 /// @param scene  The whole scene, about 1 cm spacing.
 [[nodiscard]] Body FindBody(const Surface& scene, const BodyOptions& options = {});
 
+/// The same of a whole scene's cloud with normals, as every comparison takes it.
+[[nodiscard]] Body FindBody(const PointCloud& scene_cloud);
+
+/// All points of a scene with their normals, in the reference's frame: its cloud, else one of its
+/// height map.
+[[nodiscard]] PointCloud SceneCloud(const Scene& scene, const Eigen::Affine3d& T_reference_scene);
+
 /// Cells of the map that belong to the region: valid, and part of the body, or inside the polygon
 /// and above the support.
 [[nodiscard]] std::vector<std::uint8_t> RegionMask(const HeightMap& map, const Body& body,
                                                    const std::vector<Eigen::Vector2d>& polygon_m);
+
+/// The same of a reference scene's height map, as a comparison with it takes them; empty without
+/// one. Takes some 100 ms.
+[[nodiscard]] std::vector<std::uint8_t> ReferenceRegion(
+    const Scene& reference, const std::vector<Eigen::Vector2d>& polygon_m);
 
 /// Mean of the region's surface points; nothing where the mask is empty.
 [[nodiscard]] std::optional<Eigen::Vector3d> RegionCentroid(const HeightMap& map,

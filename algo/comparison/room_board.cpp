@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
@@ -15,6 +16,7 @@ namespace plumb {
 namespace {
 
 constexpr double kCover95 = 1.96;
+constexpr std::size_t kLeastOfBoard = 2;
 constexpr double kMinSigma_m = 1e-5;  // of synthetic markers that fit exactly
 
 // What is left on a sheet for markers, after the margin of 6 mm and the ruler's 22 mm.
@@ -101,6 +103,8 @@ std::pair<MarkerMap, MarkerMap> SplitRoomBoard(const MarkerMap& seen, int dictio
     const bool is_board = std::find(ids.begin(), ids.end(), id) != ids.end();
     (is_board ? parts.first : parts.second).emplace(id, marker);
   }
+  // A single marker of such a number belongs to the room rather than to a sheet of four.
+  if (parts.first.size() < kLeastOfBoard) parts.second.merge(std::exchange(parts.first, {}));
   return parts;
 }
 

@@ -46,7 +46,8 @@ struct RoomBoard {
 /// fewer than 4 markers.
 [[nodiscard]] RoomBoard MakeRoomBoard(int dictionary_size, double marker_length_m);
 
-/// Splits what a sweep saw into the board's markers (first) and the room's.
+/// Splits what a sweep saw into the board's markers (first) and the room's. A single one of the
+/// board's is taken for a marker of the room that has its number.
 [[nodiscard]] std::pair<MarkerMap, MarkerMap> SplitRoomBoard(const MarkerMap& seen,
                                                              int dictionary_size);
 

@@ -115,6 +115,8 @@ struct Reconstructor::Impl {
       const double dt = tracked.depth_time_s - tracked.color_time_s;
       report.T_world_camera = PoseAfter(tracker.T_world_color(tracked), tracked.velocity_per_s, dt);
     }
+    if (HasReferenceMarker(info, tracker.map()))
+      report.T_scene_world = SceneFromWorld(info, tracker.map());
     return report;
   }
 

@@ -45,7 +45,10 @@ struct TrackingReport {
   int num_keypoints = 0;  ///< Inlier landmarks.
   int num_markers = 0;    ///< Markers that took part.
   Pose T_world_camera =
-      Pose::Identity();       ///< At the depth stamp; live estimate in the tracker's own world.
+      Pose::Identity();  ///< At the depth stamp; live estimate in the tracker's own world.
+  /// From that world to the reference marker's frame, by the marker as the map has it now; nothing
+  /// while it has not been seen.
+  std::optional<Pose> T_scene_world = {};
   double median_depth_m = 0;  ///< 0: no valid depth.
   double valid_depth = 0;     ///< Share of pixels with depth.
 };

@@ -18,13 +18,6 @@ constexpr int kMinReferenceViews = 3;
 constexpr int kMinReferenceFrames = 5;
 constexpr double kGapToReport_s = 0.5;  // A comparison refuses above 1 s.
 
-bool HasReferenceMarker(const StreamInfo& info, const TrackingMap& map) {
-  if (!info.reference_marker) return false;
-  const auto found = map.markers.find(*info.reference_marker);
-  return found != map.markers.end() && (found->second.num_views >= kMinReferenceViews ||
-                                        found->second.num_frames >= kMinReferenceFrames);
-}
-
 SceneMarker ToSceneMarker(const StreamInfo& info, const MapMarker& marker,
                           const Pose& T_scene_world) {
   SceneMarker result;
@@ -39,6 +32,13 @@ SceneMarker ToSceneMarker(const StreamInfo& info, const MapMarker& marker,
 }
 
 }  // namespace
+
+bool HasReferenceMarker(const StreamInfo& info, const TrackingMap& map) {
+  if (!info.reference_marker) return false;
+  const auto found = map.markers.find(*info.reference_marker);
+  return found != map.markers.end() && (found->second.num_views >= kMinReferenceViews ||
+                                        found->second.num_frames >= kMinReferenceFrames);
+}
 
 Pose SceneFromWorld(const StreamInfo& info, const TrackingMap& map) {
   if (HasReferenceMarker(info, map))

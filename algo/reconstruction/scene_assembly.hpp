@@ -12,6 +12,8 @@
 
 namespace plumb {
 
+/// Whether the reference marker was seen often enough to build the scene's frame on it.
+[[nodiscard]] bool HasReferenceMarker(const StreamInfo& info, const TrackingMap& map);
 /// The reference marker's frame where it was seen often enough, else the first keyframe's.
 [[nodiscard]] Pose SceneFromWorld(const StreamInfo& info, const TrackingMap& map);
 

@@ -150,6 +150,10 @@ class Appliance {
   }
   [[nodiscard]] const std::string& storage_fault() const { return storage_fault_; }
   [[nodiscard]] std::optional<Frame> LatestFrame() const { return sensors_->latest(); }
+  /// Of the sweep that goes on; null: none does, or it has shown nothing yet.
+  [[nodiscard]] std::shared_ptr<const LiveSurfaceView> SurfaceSoFar() const {
+    return state_.phase == ScanPhase::kScanning ? scan_.update.surface : nullptr;
+  }
   [[nodiscard]] const ScanState& state() const { return state_; }
   /// Changes of the store, one after the other, off the loop.
   [[nodiscard]] WorkThread& store_thread() { return store_thread_; }

@@ -187,6 +187,8 @@ std::string Appliance::FaultReason() const {
 }
 
 std::optional<double> Appliance::Coverage() const {
+  // Of the region itself once it is known: what the picture of the sweep shows as missing.
+  if (scan_.update.surface && scan_.update.surface->coverage) return scan_.update.surface->coverage;
   if (scan_.reference_area_m2 <= 0) return std::nullopt;
   return std::min(1.0, scan_.update.guidance.area_m2 / scan_.reference_area_m2);
 }

@@ -22,6 +22,7 @@ namespace plumb {
 namespace {
 
 constexpr double kUpdateEvery_s = 0.1;
+constexpr double kShowEvery_s = 0.4;  // the surface from above, as pages ask for it
 
 /// A reference that is not what was approved gives no verdict.
 Scene ReadReference(const ScanJob& job, const std::stop_token& stop) {
@@ -66,6 +67,7 @@ ScanSession::ScanSession(ScanJob job, ScanCallbacks callbacks)
       callbacks_(std::move(callbacks)),
       feed_(std::make_shared<LiveFeed>(job_.queue_capacity)),
       guide_(job_.info.intrinsics, job_.guidance),
+      surface_(job_.info.intrinsics),
       heartbeat_s_(SteadySeconds()),
       thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
@@ -109,8 +111,15 @@ void ScanSession::Scan(const std::stop_token& stop) {
   folder_ = callbacks_.begin();
   // Read while the sweep goes on: it is wanted as soon as the new scene is there.
   if (!job_.reference_scene.empty()) {
-    reference_ =
-        std::async(std::launch::async, [this, stop] { return ReadReference(job_, stop); }).share();
+    reference_ = std::async(std::launch::async, [this, stop, grid = surface_.grid()] {
+                   Reference reference{ReadReference(job_, stop), {}};
+                   try {
+                     reference.region =
+                         RegionToSee(reference.scene, job_.compare.region_polygon_m, grid);
+                   } catch (const std::exception&) {  // guidance only: the comparison will tell
+                   }
+                   return reference;
+                 }).share();
   }
   if (job_.unit_profile) job_.unit_profile->Begin(job_.reconstructor);
   const Scene scene = Track(stop);
@@ -176,8 +185,10 @@ Scene ScanSession::Track(const std::stop_token& stop) {
 void ScanSession::OnProgress(const ScanProgress& progress) {
   // Fail before the sweep where the reference cannot be read.
   if (reference_.valid() &&
-      reference_.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
-    (void)reference_.get();
+      reference_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+    const Reference& reference = reference_.get();
+    if (!surface_.has_region()) surface_.SetRegion(reference.region);
+  }
   heartbeat_s_ = SteadySeconds();
   update_.frames = outcome_.frames = progress.frames;
   update_.frames_tracked = outcome_.frames_tracked = progress.frames_tracked;
@@ -185,12 +196,21 @@ void ScanSession::OnProgress(const ScanProgress& progress) {
   if (progress.tracking != nullptr && progress.frame != nullptr) {
     update_.keyframes += progress.tracking->is_keyframe ? 1 : 0;
     update_.guidance = guide_.Add(*progress.frame, *progress.tracking);
+    Show(*progress.frame, *progress.tracking);
     outcome_.swept_area_m2 = update_.guidance.area_m2;
     if (update_.guidance.without_new_area_s >= job_.stop_after_s &&
         !std::exchange(told_complete_, true))
       callbacks_.sweep_complete();
   }
   ReportProgress(std::string(progress.step), progress.fraction);
+}
+
+void ScanSession::Show(const Frame& frame, const TrackingReport& report) {
+  surface_.Add(frame, report);
+  const double now_s = SteadySeconds();
+  if (now_s - shown_s_ < kShowEvery_s) return;
+  shown_s_ = now_s;
+  update_.surface = surface_.View();
 }
 
 /// Reports at most ten times a second, but each new step and the first frame at once.
@@ -241,7 +261,7 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
   ResultPictures pictures;
   if (reference_.valid()) {
     ReportProgress("comparing", 0.0);
-    const Scene& reference = reference_.get();
+    const Scene& reference = reference_.get().scene;
     ThrowIfStopped(stop);
     CompareOptions compare = job_.compare;
     compare.stop = stop;

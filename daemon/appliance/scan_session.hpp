@@ -15,6 +15,7 @@
 #include "algo/comparison/comparison.hpp"
 #include "algo/comparison/marker_check.hpp"
 #include "algo/reconstruction/reconstructor.hpp"
+#include "daemon/appliance/live_surface.hpp"
 #include "daemon/appliance/sweep_guidance.hpp"
 #include "daemon/appliance/unit_profile.hpp"
 #include "daemon/pipeline/live_feed.hpp"
@@ -62,6 +63,7 @@ struct ScanUpdate {
   std::int64_t frames_dropped = 0;
   std::int64_t keyframes = 0;
   SweepGuidance guidance;
+  std::shared_ptr<const LiveSurfaceView> surface;  ///< Null: nothing can be shown yet.
 };
 
 /// How it ended.
@@ -117,19 +119,27 @@ class ScanSession {
   void Check(const Scene& scene);
   void Evaluate(const Scene& scene, const std::stop_token& stop);
   void OnProgress(const struct ScanProgress& progress);
+  void Show(const Frame& frame, const TrackingReport& report);
   void ReportProgress(std::string step, double fraction);
 
   ScanJob job_;
   ScanCallbacks callbacks_;
   std::filesystem::path folder_;
   std::shared_ptr<LiveFeed> feed_;
-  std::shared_future<Scene>
+  /// What the sweep is compared with, and which cells of the live surface it has to see.
+  struct Reference {
+    Scene scene;
+    std::vector<std::uint8_t> region;
+  };
+
+  std::shared_future<Reference>
       reference_;  ///< Belongs to the thread; valid if there is one to compare with.
   SweepGuide guide_;
+  LiveSurface surface_;
   ScanUpdate update_;
   ScanOutcome outcome_;
   bool told_complete_ = false;
-  double told_s_ = 0.0;
+  double told_s_ = 0.0, shown_s_ = 0.0;
   std::atomic<double> heartbeat_s_;
   std::jthread thread_;  // last: starts when everything above is there
 };

@@ -6,6 +6,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "daemon/files/compact_map.hpp"
 #include "drivers/files/image_file.hpp"
 
 namespace plumb {
@@ -36,6 +37,15 @@ std::shared_ptr<const std::string> WebAppliance::Preview() {
   preview_at_ = now;
   preview_index_ = frame->index;
   return preview_;
+}
+
+std::shared_ptr<const std::string> WebAppliance::SweptSurface() {
+  const auto view = appliance_.SurfaceSoFar();
+  if (view == packed_view_) return packed_;
+  packed_view_ = view;
+  packed_ = view ? std::make_shared<const std::string>(CompactHeights(view->heights, view->missing))
+                 : nullptr;
+  return packed_;
 }
 
 void WebAppliance::Press(const web::Actor& actor, web::Done done) {

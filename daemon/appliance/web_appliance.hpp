@@ -15,6 +15,7 @@ class WebAppliance : public web::ApplianceService {
   [[nodiscard]] web::Status GetStatus() override { return appliance_.WebStatus(); }
   [[nodiscard]] web::Health GetHealth() override { return appliance_.Health(); }
   [[nodiscard]] std::shared_ptr<const std::string> Preview() override;
+  [[nodiscard]] std::shared_ptr<const std::string> SweptSurface() override;
   void Press(const web::Actor& actor, web::Done done) override;
   void StartSweep(const web::Actor& actor, web::Done done) override;
   void EndSweep(const web::Actor& actor, web::Done done) override;
@@ -31,6 +32,8 @@ class WebAppliance : public web::ApplianceService {
   std::shared_ptr<const std::string> preview_;
   std::int64_t preview_index_ = -1;
   std::chrono::steady_clock::time_point preview_at_;
+  std::shared_ptr<const LiveSurfaceView> packed_view_;  ///< What `packed_` was made of.
+  std::shared_ptr<const std::string> packed_;
 };
 
 }  // namespace plumb

@@ -12,6 +12,8 @@
 #include <opencv2/core.hpp>
 
 #include "algo/base/errors.hpp"
+#include "algo/comparison/region.hpp"
+#include "daemon/files/scene_folder.hpp"
 #include "drivers/files/image_file.hpp"
 
 namespace plumb {
@@ -20,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::int16_t kNone = std::numeric_limits<std::int16_t>::min();
+constexpr std::int16_t kMissing = std::numeric_limits<std::int16_t>::max();
 constexpr float kSteps_per_m = 10000.0F;
 constexpr float kMost = 32767.0F;
 
@@ -56,6 +59,17 @@ cv::Mat Region(const fs::path& result) {
       region.at<std::int16_t>(row, column) = std::isnan(deviation.at<float>(row, column)) ? 2 : 1;
     }
   }
+  return region;
+}
+
+cv::Mat BodyRegion(const fs::path& scene_folder) {
+  const Scene scene = ReadScene(scene_folder);
+  if (!scene.height_map) throw DataError("its scene has no height map");
+  const std::vector<std::uint8_t> body = ReferenceRegion(scene, {});
+  const GridShape& grid = scene.height_map->grid;
+  cv::Mat region(grid.height, grid.width, CV_16SC1, cv::Scalar(kNone));
+  for (std::size_t i = 0; i < body.size(); ++i)
+    if (body[i] != 0) region.begin<std::int16_t>()[static_cast<std::ptrdiff_t>(i)] = 1;
   return region;
 }
 
@@ -109,11 +123,20 @@ std::string Packed(const cv::Mat& map) {
 
 std::string CompactMap(const fs::path& scan_folder, std::string_view name) {
   if (name == "region") return Packed(Region(scan_folder / "result"));
+  if (name == "body") return Packed(BodyRegion(scan_folder / "scene"));
   if (name == "heightmap")
     return Packed(Tenths(ReadFloatTiff(scan_folder / "scene/heightmap.tiff")));
   if (name == "deviation" || name == "deviation_after")
     return Packed(Tenths(ReadFloatTiff(scan_folder / fmt::format("result/{}.tiff", name))));
   throw DataError(fmt::format("there is no map of that name: {}", name));
+}
+
+std::string CompactHeights(const HeightMap& heights, const std::vector<std::uint8_t>& missing) {
+  cv::Mat tenths = Tenths(cv::Mat(heights.z).reshape(1, heights.grid.height));
+  cv::min(tenths, kMissing - 1, tenths);
+  for (std::size_t i = 0; i < missing.size(); ++i)
+    if (missing[i] != 0) tenths.begin<std::int16_t>()[static_cast<std::ptrdiff_t>(i)] = kMissing;
+  return Packed(tenths);
 }
 
 }  // namespace plumb

@@ -203,18 +203,18 @@ void NumberLine(Pages& pages, const ReportNumber& number, const ReportTexts& tex
     pages.Text(kMargin + 85, line, texts.not_known, 9.5, kGrey);
     return;
   }
+  const std::string unit = number.unit == "mm" ? " mm" : number.unit;
   const double size = std::abs(*number.value);
   const bool in = size + number.u95 <= number.tolerance, unsure = !in && size <= number.tolerance;
-  pages.Text(kMargin + 85, line,
-             fmt::format("{} {}",
-                         ValueWithUncertainty(*number.value, number.u95,
-                                              number.unit == "mm" ? 1 : 2, texts.decimal),
-                         number.unit),
-             9.5, kBlack, true);
-  pages.Text(kMargin + 180, line,
-             fmt::format(fmt::runtime(texts.tolerance), Plain(number.tolerance, texts.decimal),
-                         number.unit),
-             8.5, kGrey);
+  pages.Text(
+      kMargin + 85, line,
+      ValueWithUncertainty(*number.value, number.u95, number.unit == "mm" ? 1 : 2, texts.decimal) +
+          unit,
+      9.5, kBlack, true);
+  pages.Text(
+      kMargin + 180, line,
+      fmt::format(fmt::runtime(texts.tolerance), Plain(number.tolerance, texts.decimal), unit), 8.5,
+      kGrey);
   pages.Text(kMargin + 265, line,
              in       ? texts.within
              : unsure ? texts.unsure

@@ -16,10 +16,10 @@ using ReportFacts = std::vector<std::pair<std::string, std::string>>;
 
 /// Texts that a report has besides its facts; with {}: patterns of fmt.
 struct ReportTexts {
-  std::string notice, page = "{}";                   ///< "Page {}".
-  std::string posture, quality;                      ///< Headings.
-  std::string within, unsure, outside;               ///< Judgements.
-  std::string not_known, tolerance = "\u00b1{} {}";  ///< Of value and unit.
+  std::string notice, page = "{}";                  ///< "Page {}".
+  std::string posture, quality;                     ///< Headings.
+  std::string within, unsure, outside;              ///< Judgements.
+  std::string not_known, tolerance = "\u00b1{}{}";  ///< Of value and unit (" mm").
   std::array<std::string, 10> heads;  ///< Of the course's columns: fraction, when, verdict, six
                                       ///< numbers, accepted.
   char decimal = '.';

@@ -13,13 +13,17 @@ web::Settings SettingsStore::Get() {
 void SettingsStore::Change(const web::Actor& actor, const web::Settings& settings) {
   StoreChange change(database_);
   const std::string text = SettingsJson(settings);
+  std::string stored;
+  if (Statement query = change.Prepare("SELECT value FROM settings WHERE name = 'settings'");
+      query.Step())
+    stored = query.Text(0);
   change
       .Prepare(
           "INSERT INTO settings (name, value) VALUES ('settings', ?1) ON CONFLICT (name) DO UPDATE "
           "SET value = ?1")
       .Bind(text)
       .Run();
-  change.Log(actor, "settings.change", "", text);
+  change.Log(actor, "settings.change", "", SettingsChanges(stored, settings));
   change.Commit();
 }
 

@@ -190,6 +190,20 @@ std::string SettingsJson(const web::Settings& s) {
       .dump();
 }
 
+std::string SettingsChanges(const std::string& stored, const web::Settings& settings) {
+  const Json before = ParseBoundedJsonOrNothing(stored);
+  const Json wanted = Json::parse(SettingsJson(settings));
+  Json changes = Json::object();
+  for (const auto& [name, after] : wanted.items()) {
+    if (!before.is_object() || !before.contains(name)) {
+      changes[name] = Json::array({after});
+    } else if (before[name] != after) {
+      changes[name] = Json::array({before[name], after});
+    }
+  }
+  return changes.dump();
+}
+
 web::Settings ParseSettings(const std::string& text) {
   const Stored stored(text, "the stored settings");
   web::Settings s;

@@ -143,6 +143,7 @@ void FakeAppliance::Tick(std::chrono::steady_clock::time_point now) {
     const double fraction =
         std::min(1.0, static_cast<double>(elapsed.count()) / static_cast<double>(sweep.count()));
     scan.elapsed_s = static_cast<double>(elapsed.count()) / 1000.0;
+    swept = fraction;
     if (scan.coverage) scan.coverage = fraction;
     scan.without_new_surface_s = fraction > 0.8 ? 3.4 : 0.2;
     scan.guidance = fraction > 0.3 && fraction < 0.6 ? Guidance::kSlower : Guidance::kNone;

@@ -57,7 +57,7 @@ class FakeAppliance : public web::BackgroundWork,
   std::vector<web::Display> displays;
   std::vector<web::User> users;
   std::vector<web::AuditEntry> audit;  ///< Oldest first.
-  std::shared_ptr<const std::string> preview;
+  std::shared_ptr<const std::string> preview, surface;
   std::filesystem::path diagnostics_file;
   std::uint64_t uploaded_bytes = 0;
   std::optional<web::FactoryReset> factory_reset;  ///< Asked for.
@@ -74,6 +74,7 @@ class FakeAppliance : public web::BackgroundWork,
   std::optional<Recorded> next_recorded;  ///< Set: what the next finished scan shows, out of turn.
   std::chrono::milliseconds sweep{3000};
   std::chrono::milliseconds work{600};
+  double swept = 0.0;                     ///< Share of the running sweep.
   std::optional<web::Guidance> guidance;  ///< Set: what every sweep advises.
   /// Set: completions wait here until the test calls them.
   bool hold_completions = false;
@@ -100,6 +101,9 @@ class FakeAppliance : public web::BackgroundWork,
   web::Status GetStatus() override { return status; }
   web::Health GetHealth() override { return health; }
   std::shared_ptr<const std::string> Preview() override { return preview; }
+  std::shared_ptr<const std::string> SweptSurface() override {
+    return status.state == web::ApplianceState::kScanning ? surface : nullptr;
+  }
   void Press(const web::Actor& actor, web::Done done) override;
   void StartSweep(const web::Actor& actor, web::Done done) override;
   void EndSweep(const web::Actor& actor, web::Done done) override;

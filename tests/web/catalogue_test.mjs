@@ -11,7 +11,7 @@ const [source] = process.argv.slice(2);
 const folder = mkdtempSync(join(tmpdir(), 'plumb-catalogue-'));
 writeFileSync(join(folder, 'package.json'), '{"type": "module"}');
 const load = async (name) => (await import(pathToFileURL(join(folder, `${name}.js`)).href));
-for (const name of ['en', 'es', 'es_appliance']) {
+for (const name of ['en', 'es', 'es_appliance', 'es_faults']) {
   copyFileSync(join(source, 'web/assets/strings', `${name}.js`), join(folder, `${name}.js`));
 }
 const [{ en }, { es }] = [await load('en'), await load('es')];
@@ -44,7 +44,7 @@ compare(en, es, '');
 /// journal's Log() begins with a level.
 function actionsOf(text, file) {
   const actions = new Set();
-  for (const call of text.matchAll(/(\b(?:Write|Log|AppendAuditEntry)|\blog_?)\(/g)) {
+  for (const call of text.matchAll(/(\b(?:AppendAuditEntry|Write|Log)|\blog_?)\(/g)) {
     const parts = [''];
     let [depth, quoted] = [0, false];
     for (let i = call.index + call[0].length; i < text.length; ++i) {
@@ -56,7 +56,7 @@ function actionsOf(text, file) {
       if (!quoted && c === ',' && depth === 0) parts.push('');
       else parts[parts.length - 1] += c;
     }
-    if (call[1] === 'AppendAuditEntry') parts.shift();  // the database that it goes to
+    if (call[1] === 'AppendAuditEntry') parts.shift();  // the database
     const [who, what] = parts.map((part) => part.trim());
     if (parts.length !== 4 || /^LogLevel::|&\s*\w+$/.test(who)) continue;
     if (what === 'action') continue;  // is handed on: the caller's literal is looked at
@@ -102,6 +102,16 @@ for (const [text, expected] of [
     'el escaneo actual cubre el 81,5 % de la región y se necesita al menos el 90 %; bárrala toda'],
   ['pitch is not well determined: ±1.4 deg at 95 %, the tolerance is 1 deg',
     'cabeceo: no está bien determinado, ±1,4 ° al 95 %; la tolerancia es 1 °'],
+  ['the scan failed: out of memory: sweep a shorter way, or close what else runs',
+    'el escaneo falló: falta memoria: barra un trayecto más corto o cierre lo que esté en marcha'],
+  ['move, vertical +1.20 mm, pitch -0.10 deg; reason: swelling',
+    'mover, vertical +1,20 mm, cabeceo -0,10 °; motivo: swelling'],
+  ['role engineer disabled', 'función ingeniero desactivada'],
+  ['/backups/plumb-1: 12 scans, 90 files, 1000 bytes, 0 problems, encrypted',
+    '/backups/plumb-1: 12 escaneos, 90 archivos, 1000 bytes, 0 problemas, cifrada'],
+  ['plumb-2.raucb was not installed: this bundle holds version 0.1.0, older than 0.2.0 which runs',
+    'plumb-2.raucb no se instaló: este archivo contiene la versión 0.1.0, anterior a la 0.2.0, que '
+    + 'está en uso'],
   ['scan needs at least 3 markers shared with the reference, found 1 (id 7); keep the markers in '
     + 'view', 'el escaneo necesita al menos 3 marcadores comunes con la referencia y tiene 1; '
     + 'mantenga los marcadores a la vista']]) {
@@ -109,7 +119,7 @@ for (const [text, expected] of [
 }
 // The phrases are those that the method writes: one that was reworded there loses its Spanish.
 const sources = [];
-for (const top of ['algo', 'daemon', 'web']) {
+for (const top of ['algo', 'daemon', 'drivers', 'web']) {
   for (const file of readdirSync(join(source, top), { recursive: true })) {
     if (file.endsWith('.cpp') && !file.includes('node_modules')) {
       sources.push(readFileSync(join(source, top, file), 'utf8').replace(/"\s*\n\s*"/g, ''));

@@ -186,6 +186,58 @@ await h.step('a physicist plans, a second one approves', async () => {
   await h.look(clara, 'plan-approved');
 });
 
+await h.step('unsaved work: asked before it is left, kept where the session ends', async () => {
+  const shift = bob.getByLabel('Shifts (mm)');
+  await bob.reload();
+  await shift.fill('4.5');
+  const asked = [];
+  bob.on('dialog', (dialog) => { asked.push(dialog.message()); dialog.dismiss(); });
+  await bob.getByRole('link', { name: 'Patients', exact: true }).click();
+  await bob.waitForTimeout(300);
+  equal(asked.join(), 'There are unsaved changes. Leave without saving?', 'the question');
+  check(/#\/plan\//.test(bob.url()), 'whoever says no stays');
+  equal(await shift.inputValue(), '4.5', 'with what was typed');
+  equal((await h.api(bob, 'logout', 'POST')).status, 200, 'the session ends elsewhere');
+  await bob.getByRole('heading', { name: 'Log in' }).waitFor();
+  await bob.getByLabel('Name').fill('bob');
+  await bob.getByLabel('Password').fill(h.password);
+  await bob.getByRole('button', { name: 'Log in' }).click();
+  await bob.getByText('Your unsaved changes from before were kept.').waitFor();
+  equal(await shift.inputValue(), '4.5', 'kept');
+  await h.look(bob, 'plan-kept');
+  await shift.fill('3');  // as it is stored: nothing is unsaved
+  await bob.getByRole('link', { name: 'Patients', exact: true }).click();
+  await bob.waitForURL(/#\/patients/);
+  equal(asked.length, 1, 'nothing more to ask');
+  bob.removeAllListeners('dialog');
+});
+
+await h.step('two minutes before the log-out the page warns; keys and pointer count as use', async () => {
+  const idle = await h.person('idle');
+  await h.logIn(idle, 'anna');
+  await idle.locator('.tile').first().waitFor();
+  const warning = idle.getByText(/^You will be logged out in \d+ s because of inactivity\.$/);
+  await h.setClockOn(idle, 12 * 60);  // of 15 min
+  await idle.waitForTimeout(1500);
+  equal(await warning.count(), 0, 'three minutes before there is none');
+  await h.setClockOn(idle, 65);
+  await warning.waitFor();
+  await h.look(idle, 'idle-warning', { fullPage: false });
+  await idle.getByRole('button', { name: 'Stay logged in' }).click();
+  await warning.waitFor({ state: 'detached' });
+  for (const use of [() => idle.keyboard.press('Shift'), () => idle.mouse.click(5, 300)]) {
+    await h.setClockOn(idle, 10 * 60);
+    const told = idle.waitForResponse(/\/api\/v1\/session$/);
+    await use();
+    await told;
+    await h.setClockOn(idle, 10 * 60);
+    await idle.waitForTimeout(1500);
+    equal(await warning.count(), 0, 'used 10 minutes ago');
+    await Promise.all([idle.waitForResponse(/\/api\/v1\/session$/), use()]);
+  }
+  await idle.context().close();
+});
+
 await h.step('a fraction shows MOVE with the signs in words', async () => {
   await anna.goto(`${h.url}#/patients`);
   await anna.getByRole('link', { name: 'PX-0417' }).click();

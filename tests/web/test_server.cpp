@@ -14,10 +14,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <sstream>
 #include <string>
 
@@ -105,6 +107,8 @@ class Recorder {
     return Write(folder, Compare(*reference_, scene, Options()));
   }
 
+  [[nodiscard]] const Scene& reference() const { return *reference_; }
+
   /// A moved body, in a room whose axes are turned by 90 degrees: the plan's posture is not its
   /// own.
   FakeAppliance::Recorded RecordAcross() {
@@ -160,6 +164,25 @@ class Recorder {
   std::optional<Scene> reference_;
   std::optional<Comparison> still_;
 };
+
+/// What a sweep from low to high x has seen of the body after that share of it, as plumbd packs it.
+std::string SurfaceAt(const Scene& scene, double share, bool has_region) {
+  const HeightMap& seen = *scene.height_map;
+  HeightMap shown({.x_min = -1.6, .y_min = -1.6, .step = 0.02, .width = 160, .height = 160});
+  std::vector<std::uint8_t> missing(shown.z.size(), 0);
+  for (int row = 0; row < seen.grid.height; ++row) {
+    for (int column = 0; column < seen.grid.width; ++column) {
+      const float z = seen.at(row, column);
+      const auto cell = shown.grid.cell(seen.grid.x_centre(column), seen.grid.y_centre(row));
+      if (std::isnan(z) || !cell) continue;
+      if (column < share * seen.grid.width)
+        shown.z[*cell] = z;
+      else if (has_region && z > 0.03F)
+        missing[*cell] = 1;
+    }
+  }
+  return CompactHeights(shown, missing);
+}
 
 /// "x" is to the right of who faces the gantry, "y" to the gantry, "z" up; "pitch", "roll", "yaw"
 /// are turns about them.
@@ -352,6 +375,10 @@ int Serve(const fs::path& root, bool tls) {
       }
     }
     service.Tick(std::chrono::steady_clock::now());
+    if (service.status.state == web::ApplianceState::kScanning)
+      service.surface = std::make_shared<const std::string>(
+          SurfaceAt(recorder.reference(), std::min(1.0, service.swept),
+                    service.status.scan->purpose == web::ScanPurpose::kFraction));
     server.Run();
   }
 }

@@ -206,7 +206,7 @@ await h.step('a lifted shoulder is said in words, on the page and in print', asy
   equal(body.body.named_by, 'posture', 'what names the parts');
   await anna.goto(`${h.url}result?scan=${shown.id}`);
   await anna.getByText(/left side at the head end \d+ mm high/).first().waitFor();
-  await anna.screenshot({ path: h.file('print.png'), fullPage: true });
+  await h.look(anna, 'print');
 });
 
 const kPatients = ['feet', 'head', 'left', 'right'];
@@ -350,6 +350,11 @@ await h.step('who logs out without a connection sees no patient any more, and is
 await h.step('scan again at a fraction takes a fraction, whatever the patient was opened for since', async () => {
   await anna.goto(`${h.url}#/patients`);
   await anna.getByRole('link', { name: 'PX-0001' }).click();
+  // In place of an approved one it takes a reason.
+  await anna.getByRole('button', { name: 'Scan a new reference' }).click();
+  await anna.getByRole('alert').getByText('Type why a new reference is taken').waitFor();
+  equal((await h.api(anna, 'status')).body.session.purpose, 'fraction', 'nothing was opened');
+  await anna.getByLabel('Reason for the new reference').fill('weight loss');
   await anna.getByRole('button', { name: 'Scan a new reference' }).click();
   await anna.locator('.who-line', { hasText: 'New reference' }).waitFor();
   await anna.goto(`${h.url}#/result`);

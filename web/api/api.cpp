@@ -153,6 +153,14 @@ void AddApplianceRoutes(Table& table, ApplianceService& appliance) {
     response.body = *picture;
     return response;
   });
+  table.Read("/api/v1/scan/surface", Permission::kRoom, [&appliance](const Request&) {
+    const auto map = appliance.SweptSurface();
+    if (!map) return ErrorResponse(404, "no sweep shows a surface now");
+    Response response;
+    response.type = "application/octet-stream";
+    response.body = *map;
+    return response;
+  });
   table.Write("POST", "/api/v1/press", Permission::kScan, BodyKind::kNone,
               [&appliance](const Request& request, const Respond& respond) {
                 appliance.Press(request.actor(), Answer(respond));

@@ -26,6 +26,7 @@ constexpr std::array kDisclosures = {
     Disclosure{"/api/v1/patients/{id}/references", "view.patient", ""},
     Disclosure{"/api/v1/patients/{id}/scans", "view.patient", ""},
     Disclosure{"/api/v1/patients/{id}/report.pdf", "", "download.report"},
+    Disclosure{"/api/v1/patients/{id}/course.zip", "", "download.course"},
     Disclosure{"/api/v1/patients/{id}/numbers.csv", "", "download.numbers"},
     Disclosure{"/api/v1/patients/{id}/numbers.json", "", "download.numbers"},
     Disclosure{"/api/v1/references/{id}", "view.reference", ""},
@@ -37,6 +38,7 @@ constexpr std::array kDisclosures = {
     Disclosure{"/api/v1/results/{id}", "view.scan", ""},
     Disclosure{"/api/v1/audit", "view.log", ""},
     Disclosure{"/api/v1/preview", "view.camera", ""},
+    Disclosure{"/api/v1/scan/surface", "view.camera", ""},
 };
 
 const Disclosure* FindDisclosure(std::string_view pattern) {

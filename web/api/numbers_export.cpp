@@ -1,11 +1,16 @@
-// What other programs read: the numbers of a patient as CSV and JSON, reports, sensor profiles.
+// What other programs read: the numbers of a patient as CSV and JSON, reports, a whole course as
+// one archive, sensor profiles.
 #include <fmt/format.h>
 
 #include <array>
 #include <charconv>
+#include <filesystem>
+#include <fstream>
+#include <utility>
 
 #include "web/api/api.hpp"
 #include "web/api/json.hpp"
+#include "web/api/zip_archive.hpp"
 #include "web/http/gate.hpp"
 
 namespace plumb::web {
@@ -60,6 +65,12 @@ std::string Csv(const Patient& patient, const std::vector<Scan>& scans) {
   return text;
 }
 
+std::string NumbersJson(const Patient& patient, const std::vector<Scan>& scans) {
+  Json list = Json::array();
+  for (const Scan& scan : scans) list.push_back(ToJson(scan, WallClock::now()));
+  return Dump({{"patient", ToJson(patient)}, {"scans", list}});
+}
+
 /// Which the page asks for: "?language=es"; nothing for one that there is not.
 std::optional<Language> LanguageOf(const Request& request) {
   const auto found = request.query.find("language");
@@ -112,11 +123,64 @@ void AddNumbers(Router& router, BackgroundWork& background, PatientService& pati
            [&patients, &scans](const Request& request) {
              const auto patient = patients.FindPatient(request.arguments[0]);
              if (!patient) return ErrorResponse(404, "there is no such patient");
-             Json list = Json::array();
-             for (const Scan& scan : scans.Scans(patient->id, kMaxScans))
-               list.push_back(ToJson(scan, WallClock::now()));
-             return File(Dump({{"patient", ToJson(*patient)}, {"scans", list}}), "application/json",
-                         fmt::format("plumb_numbers_{}.json", patient->code));
+             return File(NumbersJson(*patient, scans.Scans(patient->id, kMaxScans)),
+                         "application/json", fmt::format("plumb_numbers_{}.json", patient->code));
+           });
+}
+
+constexpr std::size_t kMostBytes = std::size_t{64} << 20;
+
+/// At most `most` bytes of a file; nothing where it is missing or larger.
+std::optional<std::string> BytesOf(const std::filesystem::path& file, std::size_t most) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  if (error || size > most) return std::nullopt;
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes(static_cast<std::size_t>(size), '\0');
+  if (!in.read(bytes.data(), static_cast<std::streamsize>(size))) return std::nullopt;
+  return bytes;
+}
+
+/// Result and pictures of every compared scan, the newest first, as far as there is room; what is
+/// left out is named in a file of its own.
+void AddResults(const std::vector<Scan>& scans, std::vector<ArchivedFile>& files) {
+  std::size_t room = kMostBytes;
+  std::string left_out;
+  for (const Scan& scan : scans) {
+    if (!scan.result || scan.folder.empty()) continue;
+    for (const char* name : {"result.json", "error_map.png", "overlay.png"}) {
+      auto bytes = BytesOf(scan.folder / "result" / name, room);
+      if (!bytes) {
+        left_out += fmt::format("{}/{}\r\n", scan.id, name);
+        continue;
+      }
+      room -= bytes->size();
+      files.push_back({.name = fmt::format("scans/{}/{}", scan.id, name),
+                       .bytes = std::move(*bytes),
+                       .is_compressed = std::string_view(name).ends_with(".png")});
+    }
+  }
+  if (!left_out.empty()) files.push_back({.name = "left_out.txt", .bytes = std::move(left_out)});
+}
+
+/// All that there is of a course, in one file.
+void AddCourse(Router& router, BackgroundWork& background, PatientService& patients,
+               ScanService& scans) {
+  AddAside(router, background, "/api/v1/patients/{id}/course.zip", Permission::kView,
+           [&patients, &scans](const Request& request) {
+             const std::optional<Language> language = LanguageOf(request);
+             if (!language) return NoSuchLanguage();
+             const auto patient = patients.FindPatient(request.arguments[0]);
+             if (!patient) return ErrorResponse(404, "there is no such patient");
+             const std::vector<Scan> list = scans.Scans(patient->id, kMaxScans);
+             std::vector<ArchivedFile> files = {
+                 {.name = "numbers.csv", .bytes = Csv(*patient, list)},
+                 {.name = "numbers.json", .bytes = NumbersJson(*patient, list)}};
+             if (auto pdf = scans.CourseReport(patient->id, *language))
+               files.push_back({.name = "course.pdf", .bytes = std::move(*pdf)});
+             AddResults(list, files);
+             return File(ZipOf(files), "application/zip",
+                         fmt::format("plumb_course_{}.zip", patient->code));
            });
 }
 
@@ -159,6 +223,7 @@ void AddProfiles(Router& router, BackgroundWork& background, SensorProfileServic
 void AddExportRoutes(Router& router, const Services& services) {
   AddReports(router, services.background, services.scans);
   AddNumbers(router, services.background, services.patients, services.scans);
+  AddCourse(router, services.background, services.patients, services.scans);
   AddProfiles(router, services.background, services.profiles);
 }
 

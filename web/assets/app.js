@@ -17,7 +17,7 @@ import { showSettings } from './screens/settings.js';
 import { showStatus } from './screens/status.js';
 import { showUpdate } from './screens/update.js';
 import { showUsers } from './screens/users.js';
-import { languageOf, S, useLanguage } from './strings.js';
+import { languageOf, S, translated, useLanguage } from './strings.js';
 import { followSession, forgetSession } from './treatment.js';
 
 const kScreens = {
@@ -217,7 +217,9 @@ async function followScan() {
     return;
   }
   const { scans } = await get('scans?limit=1', true);
-  if (scans[0]?.outcome === 'failed') warn(`${S.result.failed}: ${scans[0].failure}`);
+  if (scans[0]?.outcome === 'failed') {
+    warn(`${S.result.failed}: ${translated(scans[0].failure)}`);
+  };
 }
 
 /// Pointer and keys count as use: who draws a plan is not logged out at Save. Two minutes before

@@ -1,6 +1,6 @@
 // Bundles the page and writes it as a C++ source: build.mjs NODE_MODULES WORK_FOLDER OUT.cpp
 import { createHash } from 'node:crypto';
-import { copyFileSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import { dirname, extname, join } from 'node:path';
 import { fileURLToPath, pathToFileURL } from 'node:url';
@@ -64,7 +64,12 @@ const rows = assets.map((asset) => {
 
 // The appliance's words, for the reports that the server makes.
 const module = join(work, '..', 'es_appliance.mjs');
-copyFileSync(join(here, 'strings', 'es_appliance.js'), module);
+await esbuild.build({
+  entryPoints: [join(here, 'strings', 'es_appliance.js')],
+  bundle: true,
+  format: 'esm',
+  outfile: module,
+});
 const { kWords, kPatterns } = await import(pathToFileURL(module).href);
 const phrases = (list) => list.map(([text, words]) =>
   `    {${literal(Buffer.from(text))}, ${literal(Buffer.from(words))}},`).join('\n');

@@ -30,7 +30,7 @@ export async function readPacked(buffer, scale = 1e-4) {
 /// @param onPart  Called with the bytes received and their number, while they come.
 export const loadMap = (scanId, name, onPart) =>
   getBytes(`scans/${scanId}/maps/${name}`, onPart)
-    .then((bytes) => readPacked(bytes, name === 'region' ? 1 : 1e-4));
+    .then((bytes) => readPacked(bytes, ['region', 'body'].includes(name) ? 1 : 1e-4));
 
 export const kOutside = 0.28;  // light of what lies outside the region
 // Stops of the signed scale, in units of the tolerance: blue where the current surface is lower,
@@ -76,6 +76,7 @@ export function paint(canvas, { width, height }, colour) {
 
 const kUnmeasured = [46, 53, 60];
 const kHole = [176, 86, 196];
+const kHoleDark = [88, 43, 98];
 
 /// Whether a cell lies where most cells of the region around it were not measured.
 function holesOf({ width, height, values }) {
@@ -107,7 +108,7 @@ export function paintErrors(canvas, map, tolerance_m, region = null) {
       if (inside === 2 && !isHole(i)) return;  // a single cell: as the one beside it
       // A hole is hatched: it is told from what is not measured by more than its colour.
       const hatched = inside === 2 && (i % width + Math.floor(i / width)) % 12 < 6;
-      set(out, inside === 2 ? hatched ? kHole : [88, 43, 98] : kUnmeasured);
+      set(out, inside === 2 ? hatched ? kHole : kHoleDark : kUnmeasured);
       return;
     }
     const at = 3 * errorIndex(value / tolerance_m);
@@ -213,7 +214,8 @@ export function paintOverlay(canvas, base, deviation, tolerance_m, step) {
 
 const kReach = 4;  // cells; less shows the noise, not the body
 /// Heights as a lit surface: brightness by slope, tint by height.
-export function paintHeights(canvas, map, step) {
+/// @param reach  Cells on either side that a slope is taken over.
+export function paintHeights(canvas, map, step, reach = kReach) {
   const { width, values } = map;
   let top = 0.05;
   for (let i = 0; i < values.length; i += 97) if (values[i] > top) top = values[i];
@@ -223,16 +225,28 @@ export function paintHeights(canvas, map, step) {
       out[0] = 24; out[1] = 30; out[2] = 36; out[3] = 255;
       return;
     }
-    const dx = values[i + kReach] - values[i - kReach];
-    const dy = values[i + kReach * width] - values[i - kReach * width];
+    const dx = values[i + reach] - values[i - reach];
+    const dy = values[i + reach * width] - values[i - reach * width];
     // Undefined and NaN count as flat.
-    const slope = ((dx || 0) * -1 + (dy || 0)) / (2 * kReach * step);
+    const slope = ((dx || 0) * -1 + (dy || 0)) / (2 * reach * step);
     const light = Math.max(0.25, Math.min(1, 0.66 + 0.3 * Math.max(-1.2, Math.min(1.2, slope))));
     const level = Math.max(0, Math.min(1, z / top));
     out[0] = (95 + 130 * level) * light;
     out[1] = (120 + 85 * level) * light;
     out[2] = (140 + 20 * level) * light;
     out[3] = 255;
+  });
+}
+
+/// Over a painted map of the same size: hatches the cells that hold 1.
+export function paintMissing(canvas, { width, height, values }) {
+  const context = canvas.getContext('2d');
+  values.forEach((value, i) => {
+    if (value !== 1) return;
+    const [column, row] = [i % width, Math.floor(i / width)];
+    const [r, g, b] = (column + row) % 4 < 2 ? kHole : kHoleDark;
+    context.fillStyle = `rgb(${r} ${g} ${b})`;
+    context.fillRect(column, height - 1 - row, 1, 1);
   });
 }
 

@@ -54,14 +54,19 @@ function chart(axis, fractions, limit) {
   const mark = (p, i, filled) => {
     const kind = judge(p.value, p.u95, limit);
     const tone = kind === 'in' ? 'within' : kind === 'out' ? 'outside' : 'unsure';
-    return svg('circle', {
-      cx: x(i) + (filled ? 3 : -3), cy: y(p.value), r: filled ? 5 : 3.5,
-      class: `mark ${tone}${filled ? '' : ' open'}`,
+    const [cx, cy, r] = [x(i) + (filled ? 3 : -3), y(p.value), filled ? 5 : 3.5];
+    // Told apart by their shape too: outside a triangle, not surely within a diamond.
+    const shape = tone === 'within' ? svg('circle', { cx, cy, r }) : svg('path', {
+      d: tone === 'outside' ? `M${cx} ${cy - 1.2 * r}l${1.2 * r} ${2.2 * r}h${-2.4 * r}z`
+        : `M${cx} ${cy - 1.3 * r}l${1.3 * r} ${1.3 * r} ${-1.3 * r} ${1.3 * r} `
+          + `${-1.3 * r} ${-1.3 * r}z`,
     });
+    shape.setAttribute('class', `mark ${tone}${filled ? '' : ' open'}`);
+    return shape;
   };
   return h('figure', { class: 'trend' },
     h('figcaption', {}, S.result.axes[axis.name], ' ',
-      h('strong', {}, `${written(newest)} ${axis.unit}`)),
+      h('strong', {}, `${written(newest)}${axis.unit === '°' ? '' : ' '}${axis.unit}`)),
     svg('svg', {
       viewBox: `0 0 ${kWidth} ${kHeight}`, role: 'img',
       'aria-label': `${S.result.trendLabel(S.result.axes[axis.name])}: ${said}`,

@@ -28,6 +28,10 @@ class ApplianceService {
   /// The newest camera picture as a small JPEG (at most 320 pixels wide, at most 5 a second); null
   /// when the sensor shows none.
   [[nodiscard]] virtual std::shared_ptr<const std::string> Preview() = 0;
+  /// What the sweep has seen so far, from above, as daemon/files/compact_map.hpp packs it: cells of
+  /// 2 cm around the reference marker, 32767 where the region was not seen yet. Null when no sweep
+  /// goes on, and until that marker has been seen.
+  [[nodiscard]] virtual std::shared_ptr<const std::string> SweptSurface() = 0;
   /// As a short press of the button: starts a scan, ends the sweep, leaves a result. kConflict
   /// where it is ignored.
   virtual void Press(const Actor& actor, Done done) = 0;

@@ -32,7 +32,7 @@ class ScanService {
   virtual void RemoveScan(const Actor& actor, const std::string& id, const std::string& reason,
                           Done done) = 0;
   /// A map of a scan in few bytes (daemon/files/compact_map.hpp); nothing where there is none
-  /// (aside). @param name  "heightmap", "deviation", "deviation_after" or "region".
+  /// (aside). @param name  "heightmap", "deviation", "deviation_after", "region" or "body".
   [[nodiscard]] virtual std::optional<std::string> CompactMap(const std::string& scan_id,
                                                               const std::string& name) = 0;
   /// One page about a scan, or the course of a patient, as a PDF file; nothing where there is no

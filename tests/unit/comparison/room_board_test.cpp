@@ -204,5 +204,16 @@ TEST(RoomBoardTest, TellsTheBoardFromTheRoom) {
   EXPECT_EQ(room.begin()->first, 245);
 }
 
+TEST(RoomBoardTest, ASingleMarkerOfSuchANumberIsOneOfTheRoom) {
+  MarkerMap seen;
+  const auto ids = RoomBoardIds(kSize);
+  seen.emplace(ids[2], MarkerAt({0, 0, 0}, PoseOfScan()));
+  EXPECT_EQ(SplitRoomBoard(seen, kSize).first.size(), 0U);
+  EXPECT_EQ(SplitRoomBoard(seen, kSize).second.size(), 1U);
+  seen.emplace(ids[0], MarkerAt({0.2, 0, 0}, PoseOfScan()));
+  EXPECT_EQ(SplitRoomBoard(seen, kSize).first.size(), 2U);
+  EXPECT_EQ(SplitRoomBoard(seen, kSize).second.size(), 0U);
+}
+
 }  // namespace
 }  // namespace plumb

@@ -78,6 +78,21 @@ TEST(CompactMap, KeepsTenthsOfAMillimetreAndWhatIsEmpty) {
   }
 }
 
+TEST(CompactMap, OfHeightsInMemoryTellsWhatIsMissingFromEveryHeight) {
+  HeightMap heights({.x_min = -0.1, .y_min = 0, .step = 0.02, .width = 5, .height = 4});
+  heights.z[7] = 0.1234F;
+  heights.z[8] = 9.0F;  // clamped below the mark of what is missing
+  std::vector<std::uint8_t> missing(heights.z.size(), 0);
+  missing[13] = 1;
+  const cv::Mat map = Unpacked(CompactHeights(heights, missing));
+  ASSERT_EQ(map.size(), cv::Size(5, 4));
+  EXPECT_EQ(map.at<std::int16_t>(1, 2), 1234);
+  EXPECT_EQ(map.at<std::int16_t>(1, 3), 32766);
+  EXPECT_EQ(map.at<std::int16_t>(2, 3), 32767);
+  EXPECT_EQ(map.at<std::int16_t>(0, 0), -32768);
+  EXPECT_EQ(Unpacked(CompactHeights(heights, {})).at<std::int16_t>(1, 2), 1234);
+}
+
 TEST(CompactMap, TellsAHoleOfTheRegionFromWhatLiesOutside) {
   const testing::TempFolder folder;
   fs::create_directories(folder / "result");

@@ -228,6 +228,21 @@ TEST_F(StoreCareTest, StoredSettingsThatCannotBeReadAreAnErrorAndOlderOnesAreNot
   EXPECT_EQ(store_->settings.Get().retention_days, 7);
 }
 
+TEST_F(StoreCareTest, TheLogTellsWhichSettingsWereChangedBeforeAndAfter) {
+  web::Settings settings;
+  store_->settings.Change(kAnna, settings);
+  settings.retention_days = 7;
+  settings.posture = "FFS";
+  store_->settings.Change(kAnna, settings);
+  const auto detail = [&] { return store_->audit.Find({.before = 0, .limit = 1}).front().detail; };
+  EXPECT_EQ(detail(), R"({"posture":["HFS","FFS"],"retention_days":[0,7]})");
+  store_->settings.Change(kAnna, settings);
+  EXPECT_EQ(detail(), "{}");
+  Execute("UPDATE settings SET value = 'damaged'");
+  store_->settings.Change(kAnna, settings);  // what cannot be read is put right, and told whole
+  EXPECT_THAT(detail(), HasSubstr(R"("retention_days":[7])"));
+}
+
 TEST_F(StoreCareTest, AStoredResultThatCannotBeReadIsAnErrorAndMissingNumbersAreNoZeros) {
   const std::string angles = R"("pitch_deg":1,"roll_deg":2,"yaw_deg":3)";
   const auto with = [](const std::string& correction) {

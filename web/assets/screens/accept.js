@@ -88,7 +88,7 @@ function nextStep({ scan, draft }) {
 export function actions(data, reload) {
   const text = S.result;
   const { scan, patient } = data;
-  const reason = h('input', { maxlength: 200, autocomplete: 'off' });
+  const reason = h('input', { required: true, minlength: 3, maxlength: 200, autocomplete: 'off' });
   const accept = acceptance(data, reload);
   const newReference = may('plan') && scan.outcome === 'done' && patient
     && scan.purpose !== 'reference'

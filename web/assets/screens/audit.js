@@ -1,7 +1,7 @@
 // The audit log: what was done, by whom, from where; filtered and taken away as CSV.
 import { get } from '../api.js';
 import { action, checkbox, clear, field, h, redraw, table } from '../dom.js';
-import { S } from '../strings.js';
+import { S, translated } from '../strings.js';
 
 const kPage = 100;
 
@@ -14,6 +14,34 @@ export function csvField(value) {
 
 const csvOf = (heads, rows) => [heads, ...rows]
   .map((row) => `${row.map(csvField).join(',')}\r\n`).join('');
+
+const plain = (value) => (value === true ? S.audit.yes : value === false ? S.audit.no
+  : `${value}`.replace('.', S.decimal));
+
+function planWords(plan) {
+  const text = S.plan;
+  const point = plan.isocentre_m?.map((value) => plain(Number(value.toFixed(3)))).join('; ');
+  return [text.corners(plan.region_m.length),
+    `${text.isocentre}: ${point ? `${point} m` : text.middle}`,
+    `±${plain(plan.shift_tolerance_mm)} mm, ±${plain(plan.rotation_tolerance_deg)}°`,
+    text.postures[plan.posture] ?? plan.posture,
+    plan.couch_markers ? text.couchMarkers : text.roomMarkers].join('; ');
+}
+
+/// Each setting that was changed, before and after.
+const settingsWords = (changes) => Object.entries(changes).map(([name, values]) =>
+  `${S.settings[name] ?? name}: ${[values].flat().map(plain).join(' → ')}`).join('; ');
+
+/// What an entry says beside its action, in words: plans and settings are stored as JSON.
+export function detailWords({ action: what, detail }) {
+  if (!detail.startsWith('{')) return translated(detail);
+  try {
+    const stored = JSON.parse(detail);
+    return what === 'reference.plan' ? planWords(stored) : settingsWords(stored);
+  } catch {
+    return detail;
+  }
+}
 
 export async function showAudit(place) {
   const text = S.audit;
@@ -40,7 +68,8 @@ export async function showAudit(place) {
       `audit?before=${oldest}&limit=${kPage}&views=${views.box.checked ? 1 : 0}`);
     for (const entry of entries) {
       rows.push([entry.time.replace('T', ' ').replace('Z', ''), entry.user,
-        text.actions[entry.action] ?? entry.action, entry.subject, entry.detail, entry.address]);
+        text.actions[entry.action] ?? entry.action, entry.subject, detailWords(entry),
+        entry.address]);
       oldest = entry.number;
     }
     draw();

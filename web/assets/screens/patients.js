@@ -83,6 +83,12 @@ function openButtons(patient) {
   const reason = h('input', { maxlength: 200, autocomplete: 'off' });
   const question = h('div', {});
   const open = (purpose) => async () => {
+    // What an approved reference is replaced for is told with the new one.
+    const replacesOne = purpose === 'reference' && patient.approved_reference_id;
+    if (replacesOne && reason.value.trim().length < 3) {
+      reason.focus();
+      throw new Error(text.reasonNeeded);
+    }
     const session = live.status?.session;
     const begin = async (replaces) => {
       await openPatient(patient, purpose, purpose === 'reference' ? reason.value.trim() : '',
@@ -241,7 +247,8 @@ export async function showPatient(place, id) {
     h('section', { class: 'card' }, h('h2', {}, text.history), scans,
       h('div', { class: 'row below' },
         file(`report.pdf?language=${document.documentElement.lang}`, text.report),
-        file('numbers.csv', text.csv), file('numbers.json', text.json))),
+        file('numbers.csv', text.csv), file('numbers.json', text.json),
+        file(`course.zip?language=${document.documentElement.lang}`, text.course))),
     about, may('wipe') && wipe(patient));
   let shownSession = null;
   const drawSession = () => {

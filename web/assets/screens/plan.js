@@ -15,9 +15,10 @@ import { templateOf } from './plan_template.js';
 
 async function loadHeights(reference) {
   const scene = await get(`scans/${reference.scan_id}/files/scene.json`);
-  const map = await loadMap(reference.scan_id, 'heightmap');
+  const [map, body] = await Promise.all([loadMap(reference.scan_id, 'heightmap'),
+    loadMap(reference.scan_id, 'body').catch(() => null)]);
   if (!scene.heightmap || scene.heightmap.width !== map.width) throw new Error(S.plan.noMap);
-  return { grid: scene.heightmap, map, scene };
+  return { grid: scene.heightmap, map, body, scene };
 }
 
 /// Where a marker of the scan was laid at the lasers, its middle is the isocentre.
@@ -200,7 +201,7 @@ async function draft(place, reference, store) {
   const unsaved = h('p', { class: 'caution', role: 'status' });
   try {
     loaded = await loadHeights(reference);
-    drawing = editor(loaded.grid, loaded.map, model, editable, changed, compass);
+    drawing = editor({ ...loaded, compass }, model, editable, changed);
     clear(mapPlace, drawing.element, marksNote(compass));
   } catch (error) {
     clear(mapPlace, h('p', { class: 'hint' }, error.message));
@@ -208,7 +209,7 @@ async function draft(place, reference, store) {
   const picture = () => {
     if (!loaded) return null;
     const shown = { region: reference.plan.region_m, isocentre: reference.plan.isocentre_m };
-    return editor(loaded.grid, loaded.map, shown, false, () => {}, compass).element;
+    return editor({ ...loaded, compass }, shown, false, () => {}).element;
   };
   const showSummary = () => {
     const approve = (written) => store(() => post(`references/${reference.id}/approve`, {

@@ -1,7 +1,7 @@
 // The map of a plan on which region and isocentre are drawn, by pointer or by keys.
 import { clear, h, say, svg } from '../dom.js';
 import { mapFrame, viewOf } from '../map_frame.js';
-import { cellAt, paintHeights } from '../maps.js';
+import { cellAt, outlineOf, paintHeights } from '../maps.js';
 import { S } from '../strings.js';
 
 const kStep_m = 0.005;
@@ -23,7 +23,8 @@ export function measure(region) {
 
 /// Height map with a polygon and a point that people draw, by pointer or keys. `model` is {region,
 /// isocentre}; `changed` is called after each change.
-export function editor(grid, map, model, editable, changed, compass) {
+/// @param body  The region where no corner is drawn; null: it is not known.
+export function editor({ grid, map, body, compass }, model, editable, changed) {
   const text = S.plan;
   const canvas = h('canvas', { class: 'map', 'aria-hidden': 'true' });
   paintHeights(canvas, map, grid.step);
@@ -64,10 +65,12 @@ export function editor(grid, map, model, editable, changed, compass) {
       x: (ax + bx) / 2, y: (ay + by) / 2, class: 'length', 'font-size': 1.6 * size,
     }, `${cm.toFixed(0)} cm`);
   });
+  const whole = body && outlineOf(body, grid);
   const draw = () => {
     const points = model.region.map(toMap);
     const size = width / 110;
     clear(overlay,
+      points.length < 3 && whole && svg('path', { d: whole, class: 'outline whole-body' }),
       points.length > 1 && svg(points.length > 2 ? 'polygon' : 'polyline', {
         points: points.map((point) => point.join(',')).join(' '), class: 'region',
       }),

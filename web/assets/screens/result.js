@@ -2,12 +2,13 @@
 import { fileUrl, get, live, now } from '../api.js';
 import { clear, fixed, h, keepFocus, warn } from '../dom.js';
 import { errorMap } from '../error_map.js';
+import { compassOf, mapFrame, marksNote, viewOf } from '../map_frame.js';
 import { loadMap, paintHeights } from '../maps.js';
 import { sixNumbers, toleranceOf } from '../numbers.js';
 import { S, translated } from '../strings.js';
 import { trend } from '../trend.js';
 import { actions } from './accept.js';
-import { isAdvice } from './common.js';
+import { isAdvice, sentence } from './common.js';
 import { couchReadings } from './couch.js';
 import { meshView } from './mesh_view.js';
 import { identity, validityNote, verdictStrip } from './verdict.js';
@@ -75,8 +76,8 @@ function trust({ scan, details, scene }) {
   add(text.rejected, rejected.length ? rejected.join(', ') : null, 'caution');
   const weak = (motion?.weak_directions ?? []).map(({ name }) => text.axes[name] ?? name);
   add(text.weak, weak.length ? weak.join(', ') : null, 'caution');
-  const warnings = [...(details?.warnings ?? []), ...(scene?.warnings ?? [])].map(translated);
-  add(text.warnings, warnings.length ? warnings.join('; ') : null, 'caution');
+  const warnings = [...(details?.warnings ?? []), ...(scene?.warnings ?? [])].map(sentence);
+  add(text.warnings, warnings.length ? warnings.join(' ') : null, 'caution whole-row');
   return h('dl', { class: 'trust' }, rows);
 }
 
@@ -117,10 +118,15 @@ function bodyWords({ scan, details }) {
 /// What the sweep saw, where there is nothing to compare it with.
 function seen({ scan, scene }) {
   const canvas = h('canvas', { class: 'map', role: 'img', 'aria-label': S.result.heights });
-  const box = h('div', { class: 'map-box' }, canvas);
-  loadMap(scan.id, 'heightmap').then(
-    (map) => paintHeights(canvas, map, scene.heightmap.step), () => clear(box));
-  return box;
+  const grid = scene.heightmap;
+  const compass = compassOf(live.status?.room, null);
+  const place = h('div', {}, h('p', { class: 'hint' }, S.loading));
+  loadMap(scan.id, 'heightmap').then((map) => {
+    paintHeights(canvas, map, grid.step);
+    clear(place, mapFrame({ grid, view: viewOf(grid, null), canvas, compass }),
+      marksNote(compass));
+  }, (error) => clear(place, h('p', { class: 'hint' }, error.message)));
+  return place;
 }
 
 function numbersTitle({ result }, valid) {

@@ -6,14 +6,17 @@ import { clear, h, say } from '../dom.js';
 import { compassOf, drawCropped, mapFrame, marksNote, viewOf } from '../map_frame.js';
 import { loadMap, paintErrors } from '../maps.js';
 import { sixNumbers, toleranceOf } from '../numbers.js';
-import { chooseLanguage, kLanguages, languageOf, S } from '../strings.js';
-import { faultWords, flagList, isAdvice, kWarmUp_s, sidesOf, sentence } from './common.js';
+import { chooseLanguage, kLanguages, languageOf, S, translated } from '../strings.js';
+import {
+  ageText, faultWords, flagList, isAdvice, kWarmUp_s, sidesOf, sentence,
+} from './common.js';
 import { showLogin } from './login.js';
-import { preview } from './scan.js';
-import { validityNote, verdictStrip } from './verdict.js';
+import { preview, surfaceIn } from './scan.js';
+import { ageOf, validityNote, verdictStrip } from './verdict.js';
 
 const kAsk_ms = 2000;
 const kWho = 'room';
+const kPartsShown = 3;
 const optional = (path) => get(path, true).catch(() => null);
 const wait = (ms) => new Promise((ready) => { setTimeout(ready, ms); });
 
@@ -73,7 +76,14 @@ function top(status, said) {
 const word = (text, tone) =>
   h('p', { class: `room-word ${tone}${text.length > 9 ? ' long' : ''}` }, text);
 
-function sweep(status, camera) {
+/// How much of the region was seen; where that cannot be known, whether new surface comes in.
+function coverageWords(scan) {
+  const { coverage = null, without_new_surface_s: still_s = 0 } = scan ?? {};
+  return coverage === null ? S.scan.surface(still_s)
+    : S.room.covered(Math.round(100 * coverage));
+}
+
+function sweep(status, camera, seen) {
   const text = S.room;
   const { guidance, coverage } = status.scan ?? { guidance: 'none' };
   const percent = Math.round(100 * (coverage ?? 0));
@@ -81,10 +91,10 @@ function sweep(status, camera) {
   return [
     word(text.words[guidance], guidance === 'none' ? 'good' : 'bad'),
     text.hints[guidance] && h('p', { class: 'room-hint' }, text.hints[guidance]),
-    h('div', { class: 'room-sweep' }, camera, h('div', { class: 'room-cover' },
-      h('p', { class: 'room-percent' }, known ? text.covered(percent)
-        : S.scan.surface(status.scan?.without_new_surface_s ?? 0)),
-      known && h('progress', { max: 1, value: coverage, 'aria-label': text.covered(percent) })))];
+    h('div', { class: 'room-sweep' }, seen, h('div', { class: 'room-cover' },
+      h('p', { class: 'room-percent' }, coverageWords(status.scan)),
+      known && h('progress', { max: 1, value: coverage, 'aria-label': text.covered(percent) }),
+      camera))];
 }
 
 const computing = (status) => [word(S.room.computing, 'info'),
@@ -112,12 +122,24 @@ function resting(status) {
     h('p', { class: 'room-hint' }, closed ? text.openOne : text.press)];
 }
 
+/// Posture comes first: what no move of the couch puts right.
+function posture(scan) {
+  const parts = isAdvice(scan) ? scan.result.body?.after : null;
+  if (!parts) return null;
+  return h('section', { class: 'room-posture' }, h('h2', {}, S.result.bodyAfter),
+    parts.length > 0 && h('p', {}, S.result.bodyAfterHint),
+    h('ul', { class: 'findings' }, parts.length
+      ? parts.slice(0, kPartsShown).map((part) => h('li', {}, translated(part)))
+      : h('li', { class: 'fine-part' }, `✓ ${S.result.asReference}`)));
+}
+
 /// The result of the scan that has just ended, as large as it can be read.
 function result() {
   const place = h('div', { class: 'room-result' });
   let shown = null;
   let note = null;
   let judge = () => {};
+  let age = () => {};
   const map = async (data, box) => {
     const { scan, reference } = data;
     if (!data.details?.alignment || !reference) return;
@@ -159,8 +181,15 @@ function result() {
       }
     };
     judge(note.tick());
+    const ago = h('p', { class: 'room-age' });
+    age = () => {
+      const seconds = ageOf(scan, received);
+      ago.textContent = Number.isFinite(seconds) ? S.room.scanned(ageText(seconds)) : '';
+    };
+    age();
     clear(place, note.element, strip, !scan.result && flagList(scan, scene),
-      reasons.length > 1 && h('p', {}, reasons[1]), h('div', { class: 'room-answer' }, six, box));
+      reasons.length > 1 && h('p', {}, reasons[1]), h('div', { class: 'room-answer' }, six,
+      h('div', { class: 'room-side' }, box, posture(scan), ago)));
     await map(data, box).catch(() => {});
     if (scan.result) say(S.result.verdicts[scan.result.verdict] ?? '');
   };
@@ -172,6 +201,7 @@ function result() {
         shown = key;
         note = null;
         judge = () => {};
+        age = () => {};
         clear(place);
         if (scan) load(scan);
       }
@@ -179,6 +209,7 @@ function result() {
     tick() {
       const why = note?.tick();
       if (note) judge(why);
+      age();
       place.classList.toggle('is-old', Boolean(why));
     },
   };
@@ -206,6 +237,8 @@ function display(main) {
   const offline = h('p', { class: 'room-offline', role: 'alert', hidden: true });
   const body = h('div', { class: 'room-body' });
   const answer = result();
+  const seen = h('div', { class: 'seen-so-far' });
+  const showSurface = surfaceIn(seen);
   let camera = null;
   let lastPurpose = null;
   let drawn = '';
@@ -231,6 +264,7 @@ function display(main) {
     }
     main.dataset.state = status.state;
     withCamera(status.state === 'scanning');
+    showSurface(status.state === 'scanning');
     const last = status.last_result;
     const isCheck = status.state === 'result' && lastPurpose === 'daily_check';
     // An answer is shown only in its own state: never during a sweep, nor for another patient.
@@ -261,7 +295,7 @@ function display(main) {
       return;
     }
     drawn = key;
-    const parts = status.state === 'scanning' ? sweep(status, camera?.element)
+    const parts = status.state === 'scanning' ? sweep(status, camera?.element, seen)
       : status.state === 'working' ? computing(status)
         : isCheck ? [checkResult(status.last_check)] : resting(status);
     clear(body, parts);
@@ -272,9 +306,7 @@ function display(main) {
     const bar = body.querySelector('progress');
     if (bar && fraction !== null && fraction !== undefined) bar.value = fraction;
     const percent = body.querySelector('.room-percent');
-    if (percent && fraction !== null && fraction !== undefined) {
-      percent.textContent = S.room.covered(Math.round(100 * fraction));
-    }
+    if (percent) percent.textContent = coverageWords(live.status.scan);
   };
   live.listen(draw);
   setInterval(draw, 1000);

@@ -1,6 +1,7 @@
 // The sweep: guidance, coverage, the camera, and the button.
 import { currentSession, get, live, may, now, post, since_s } from '../api.js';
 import { action, clear, done, enable, h, redraw, say } from '../dom.js';
+import { liveSurface } from '../live_surface.js';
 import { S } from '../strings.js';
 import { isAcknowledged, sessionLine } from '../treatment.js';
 import { faultWords } from './common.js';
@@ -41,6 +42,17 @@ export function preview() {
   next();
   return {
     element: h('figure', { class: 'preview' }, picture, none), stop: () => { stopped = true; },
+  };
+}
+
+/// In `place` while a sweep goes on: the surface that grows. `follow(wanted)` with every status.
+export function surfaceIn(place) {
+  let surface = null;
+  return (wanted) => {
+    if (wanted === Boolean(surface)) return;
+    surface?.stop();
+    surface = wanted ? liveSurface() : null;
+    clear(place, surface?.element);
   };
 }
 
@@ -102,6 +114,8 @@ export async function showScan(place) {
   const bar = h('progress', { max: 1, 'aria-label': text.coverage });
   const barText = h('p', { class: 'bar-text' });
   const facts = h('dl', { class: 'facts' });
+  const seen = h('div', { class: 'seen-so-far' });
+  const showSurface = surfaceIn(seen);
   const control = buttons();
   const drawSession = sessionLine(who, { mayClose: may('scan') });
   const shown = {};
@@ -110,7 +124,7 @@ export async function showScan(place) {
     h('div', { class: 'scan-grid' },
       h('section', { class: 'card sweep' }, who, known, headline, guidance, caution,
         h('div', { class: 'bar' }, bar, barText), control.element),
-      h('section', { class: 'card' }, h('h2', {}, S.status.preview), camera.element, facts)));
+      h('section', { class: 'card' }, h('h2', {}, S.status.preview), camera.element, seen, facts)));
 
   const drawWho = (status) => {
     const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
@@ -155,6 +169,7 @@ export async function showScan(place) {
     headline.textContent = S.states[status.state];
     headline.dataset.state = status.state;
     control.draw(status);
+    showSurface(status.state === 'scanning');
     drawProgress(status);
     if (status.fault) guidance.textContent = faultWords(status);
     const overdue = status.check_overdue && status.next_purpose === 'reference'
@@ -169,6 +184,7 @@ export async function showScan(place) {
   return () => {
     clearInterval(timer);
     stop();
+    showSurface(false);
     camera.stop();
   };
 }

@@ -27,7 +27,8 @@ function waitingTile({ waiting = [] }, tile) {
     h('a', { href: `#/plan/${one.reference_id}` }, one.patient_code), ' ',
     text.waitingVersion(one.version)));
   return tile(text.waitingApproval, waiting.length ? `${waiting.length}` : text.nothingWaits,
-    waiting.length ? 'waits' : '', rows.length > 0 && h('ul', {}, rows));
+    waiting.length ? 'waits' : '',
+    rows.length > 0 && [h('ul', {}, rows), h('p', {}, text.waitingHint)]);
 }
 
 function tiles(status) {

@@ -3,6 +3,10 @@ import { currentSession, get, live, may, post, postForFile, remove } from '../ap
 import { action, clear, done, field, form, h, signingPassword } from '../dom.js';
 import { S, translated } from '../strings.js';
 
+function refusalIn(answer) {
+  try { return JSON.parse(answer).error; } catch { return undefined; }
+}
+
 /// Sends a bundle with a bar; fetch tells nothing of what has left.
 function upload() {
   const text = S.update;
@@ -16,7 +20,7 @@ function upload() {
     request.upload.onprogress = (event) => { bar.value = event.loaded / event.total; };
     request.onload = () => {
       if (request.status < 300) resolve();
-      else reject(new Error(JSON.parse(request.responseText || '{}').error ?? text.uploadFailed));
+      else reject(new Error(translated(refusalIn(request.responseText)) ?? text.uploadFailed));
     };
     request.onerror = () => reject(new Error(text.uploadFailed));
     request.send(file);
@@ -130,15 +134,14 @@ export async function showUpdate(place) {
       h('dl', { class: 'facts' },
         h('dt', {}, text.installed), h('dd', {}, live.status?.version ?? S.none),
         update.slot && [h('dt', {}, text.slot), h('dd', {}, text.runs(update.slot))]),
-      installing && [h('p', { class: 'lead' }, text.installing, ' ', message), h('progress', {
-        max: 1, value: update.fraction, 'aria-label': text.installing,
-      })],
+      installing && [h('p', { class: 'lead' }, text.installing, ' ', translated(message)),
+        h('progress', { max: 1, value: update.fraction, 'aria-label': text.installing })],
       failure && !installing && h('p', { class: 'caution' }, translated(failure)),
       supported && onStick(update),
       supported ? bundles(update)
         : h('p', { class: 'caution' }, `${text.unsupported}: ${translated(message)}`),
       supported && !installing && message && message !== failure
-        && h('p', { class: 'lead' }, message));
+        && h('p', { class: 'lead' }, translated(message)));
     sender.hidden = !supported || !may('update');
     starter.hidden = !update.restart_needed || installing || !may('update');
   };

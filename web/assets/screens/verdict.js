@@ -1,7 +1,7 @@
 // What a result says first: whose it is, how old, the verdict, and whether it can be acted on.
 import { live, since_s } from '../api.js';
 import { clear, h, localTime } from '../dom.js';
-import { S } from '../strings.js';
+import { S, translated } from '../strings.js';
 import { ageText, flagList, kOldAfter_s, sentence, verdictIcon } from './common.js';
 
 /// Seconds since the scan ended; Infinity where that is not known: such a result is old.
@@ -76,9 +76,10 @@ function withoutResult({ scan, patient }) {
   const words = { failed: text.failed, cancelled: text.cancelled }[scan.outcome]
     ?? (unassigned ? `${text.unassigned} ${text.noReference}` : text.noReference);
   const draft = scan.purpose === 'reference' && scan.outcome === 'done' && patient;
+  const why = scan.outcome !== 'cancelled' && scan.failure ? translated(scan.failure) : '';
   return h('section', { class: 'verdict none' },
     h('p', { class: 'word' }, unassigned ? S.room.unassigned : S.purposes[scan.purpose]),
-    h('p', { class: 'why' }, scan.failure ? `${words}: ${scan.failure}` : draft ? '' : words));
+    h('p', { class: 'why' }, why ? `${words.replace(/\.$/, '')}: ${why}` : draft ? '' : words));
 }
 
 /// @param valid  Whether it can be acted on; else it says what was found, and asks for nothing.

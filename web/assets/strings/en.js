@@ -1,5 +1,7 @@
 // Every text of the page in English. es.js holds the same keys; a test compares them.
 const plural = (n, one, many) => (n === 1 ? one : many);
+/// No space before the sign of degrees.
+const withUnit = (value, unit) => (unit === '°' ? `${value}°` : `${value} ${unit}`);
 
 export const en = {
   product: 'Plumb',
@@ -100,7 +102,7 @@ export const en = {
     label: 'Treatment session',
     fraction: (n) => `Fraction ${n}`,
     none: 'No session open',
-    noneHint: 'A scan without a session is unassigned: it is compared with nothing.',
+    noneHint: 'A scan without a session is unassigned and is not compared.',
     openedBy: (who) => `opened by ${who}`,
     scans: (n) => `${n} ${plural(n, 'scan', 'scans')}`,
     close: 'Close session',
@@ -123,6 +125,7 @@ export const en = {
     lastScans: 'Recent scans', noScans: 'No scans yet.', goScan: 'Go to scan', preview: 'Camera',
     previewAlt: 'Camera image', noPreview: 'There is no camera image at the moment.',
     waiting: 'Waiting for', nothingWaits: 'nothing',
+    waitingHint: 'A physicist plans each draft, another physicist approves it.',
     waitingApproval: 'Waiting for approval', waitingVersion: (version) => `version ${version}`,
   },
   patients: {
@@ -140,6 +143,7 @@ export const en = {
     siteHint: 'For example thorax', empty: 'No patients yet.',
     search: 'Find a code, or scan the wristband', isOpen: 'session open',
     openFraction: 'Start treatment session', openReference: 'Scan a new reference',
+    reasonNeeded: 'Type why a new reference is taken in place of the approved one.',
     reason: 'Reason for the new reference', reasonShort: 'Reason', references: 'References',
     version: 'Version', made: 'Created', state: 'State', draft: 'draft', plan: 'Plan',
     planView: 'View plan', approvedBy: (who, when) => `approved by ${who}, ${when}`,
@@ -154,6 +158,7 @@ export const en = {
     noReferences: 'No reference yet: scan a new reference.',
     confirmWho: (code) => `Confirm: ${code} is on the couch`,
     report: 'Course summary (PDF)', csv: 'Numbers (CSV)', json: 'Numbers (JSON)',
+    course: 'Everything (zip)',
     exports: 'Export',
   },
   scan: {
@@ -170,6 +175,9 @@ export const en = {
     // Without a reference, the total area to scan is not known.
     surface: (still_s) => (still_s < 2 ? 'New surface is still coming in'
       : `No new surface for ${Math.floor(still_s)} s`),
+    surfaceMap: 'Surface seen in this sweep, from above', surfaceSeen: 'seen',
+    surfaceMissing: 'still missing',
+    surfaceWaits: 'The surface appears as soon as the reference marker has been seen.',
     discarded: 'The scan was discarded.',
     lost: 'The sensor was unplugged: the scan was discarded.',
     step: {
@@ -201,6 +209,7 @@ export const en = {
     pairWaiting: 'Waiting…',
     unassigned: 'UNASSIGNED SCAN', reference: 'REFERENCE SCANNED',
     referenceHint: 'Saved as a draft. It waits for a plan and an approval.',
+    scanned: (age) => `Scanned ${age} ago`,
     checkDoneTitle: 'DAILY CHECK', nothing: 'No change',
   },
   displays: {
@@ -254,7 +263,7 @@ export const en = {
     remainingThen: 'Difference that remained then',
     measured: 'Measured difference', atIsocentre: 'at the isocentre',
     within: 'in tolerance', unsure: 'not surely within', outside: 'outside tolerance',
-    tolerance: (value, unit) => `tolerance ±${value} ${unit}`,
+    tolerance: (value, unit) => `tolerance ±${withUnit(value, unit)}`,
     couch: 'Couch readings: what to set',
     couchHint: 'Type what the couch reads now. Shifts only, on scales as in IEC 61217: up, toward '
       + 'the gantry, and to the right of a person who faces it count up. If your couch counts '
@@ -264,7 +273,8 @@ export const en = {
     refused: 'not known with couch markers', still: 'no change',
     insignificant: 'below its uncertainty', noMove: 'no move needed',
     notSeen: 'uncertain direction',
-    uncertainty: (value, unit) => `±${value} ${unit}`, uncertaintyLong: '95 % uncertainty',
+    uncertainty: (value, unit) => `±${withUnit(value, unit)}`,
+    uncertaintyLong: '95 % uncertainty',
     axes: {
       vertical: 'Vertical', longitudinal: 'Longitudinal', lateral: 'Lateral', pitch: 'Pitch',
       roll: 'Roll', yaw: 'Yaw',
@@ -279,7 +289,8 @@ export const en = {
     medianAnd95: (median, p95) => `median ${median} mm, 95 % below ${p95} mm`,
     flags: {
       framesLost: (percent) => `${percent} % of the frames were lost: the values are less certain.`,
-      warming: (minutes) => `The sensor was on for only ${minutes} min: it was still warming up.`,
+      warming: (minutes) => `The sensor had been on for ${minutes < 1 ? 'less than 1'
+        : `only ${minutes}`} min and was still warming up.`,
       overdue: 'The daily check was overdue at this scan.',
     },
     where: 'Where on the body', before: 'Before', after: 'After the correction',
@@ -483,7 +494,7 @@ export const en = {
     filterHint: 'Searches the entries shown below; load older ones to search them too.',
     shown: (found, all) => `${found} of ${all} ${plural(all, 'entry', 'entries')}`,
     csv: 'Download as CSV',
-    views: 'Also show who looked at what',
+    views: 'Also show who looked at what', yes: 'yes', no: 'no',
     actions: {
       'view.patients': 'List of patients viewed',
       'view.patient': 'Patient viewed',
@@ -494,6 +505,7 @@ export const en = {
       'view.log': 'Log viewed',
       'download.report': 'Report downloaded',
       'download.numbers': 'Numbers downloaded',
+      'download.course': 'Whole course downloaded',
       'download.file': 'File of a scan downloaded',
       login: 'Logged in',
       'login.failed': 'Log-in failed',

@@ -2,6 +2,8 @@
 import { kPatterns, kWords } from './es_appliance.js';
 
 const plural = (n, one, many) => (n === 1 ? one : many);
+/// No space before the sign of degrees.
+const withUnit = (value, unit) => (unit === '°' ? `${value}°` : `${value} ${unit}`);
 
 const compiled = kPatterns.map(([pattern, words]) => [new RegExp(pattern), words]);
 
@@ -150,7 +152,9 @@ export const es = {
     lastScans: 'Escaneos recientes', noScans: 'Aún no hay escaneos.', goScan: 'Ir a escanear',
     preview: 'Cámara', previewAlt: 'Imagen de la cámara',
     noPreview: 'La cámara no muestra nada en este momento.',
-    waiting: 'Pendiente de', nothingWaits: 'nada', waitingApproval: 'Pendiente de aprobación',
+    waiting: 'Pendiente de', nothingWaits: 'nada',
+    waitingHint: 'Un físico planifica cada borrador y otro físico lo aprueba.',
+    waitingApproval: 'Pendiente de aprobación',
     waitingVersion: (version) => `versión ${version}`,
   },
   patients: {
@@ -167,6 +171,7 @@ export const es = {
     siteHint: 'Por ejemplo, tórax', empty: 'Aún no hay pacientes.',
     search: 'Buscar un código o leer la pulsera', isOpen: 'sesión abierta',
     openFraction: 'Iniciar sesión de tratamiento', openReference: 'Escanear una nueva referencia',
+    reasonNeeded: 'Escriba por qué se toma una referencia nueva en lugar de la aprobada.',
     reason: 'Motivo de la nueva referencia', reasonShort: 'Motivo', references: 'Referencias',
     version: 'Versión', made: 'Creada', state: 'Estado', draft: 'borrador', plan: 'Planificar',
     planView: 'Ver el plan', approvedBy: (who, when) => `aprobada por ${who}, ${when}`,
@@ -181,6 +186,7 @@ export const es = {
     noReferences: 'Aún no hay referencia: escanee una nueva referencia.',
     confirmWho: (code) => `Confirme: ${code} está en la camilla`,
     report: 'Resumen del tratamiento (PDF)', csv: 'Valores (CSV)', json: 'Valores (JSON)',
+    course: 'Todo (zip)',
     exports: 'Exportar',
   },
   scan: {
@@ -197,6 +203,9 @@ export const es = {
     },
     surface: (still_s) => (still_s < 2 ? 'Sigue apareciendo superficie nueva'
       : `Sin superficie nueva desde hace ${Math.floor(still_s)} s`),
+    surfaceMap: 'Superficie vista en este barrido, desde arriba', surfaceSeen: 'visto',
+    surfaceMissing: 'falta por barrer',
+    surfaceWaits: 'La superficie aparece en cuanto se ha visto el marcador de referencia.',
     discarded: 'El escaneo se ha descartado.',
     lost: 'El sensor se desconectó: el escaneo se ha descartado.',
     step: {
@@ -228,6 +237,7 @@ export const es = {
     pairWaiting: 'Esperando…', unassigned: 'ESCANEO SIN ASIGNAR',
     reference: 'REFERENCIA ESCANEADA',
     referenceHint: 'Guardada como borrador. Espera un plan y una aprobación.',
+    scanned: (age) => `Escaneado hace ${age}`,
     checkDoneTitle: 'CONTROL DIARIO', nothing: 'Sin cambio',
   },
   displays: {
@@ -285,7 +295,7 @@ export const es = {
     remaining: 'Diferencia restante: no hay que mover',
     measured: 'Diferencia medida', atIsocentre: 'en el isocentro',
     within: 'en tolerancia', unsure: 'no concluyente', outside: 'fuera de tolerancia',
-    tolerance: (value, unit) => `tolerancia ±${value} ${unit}`,
+    tolerance: (value, unit) => `tolerancia ±${withUnit(value, unit)}`,
     couch: 'Lecturas de la camilla: qué ajustar',
     couchHint: 'Escriba lo que indica la camilla ahora. Solo desplazamientos, en escalas como en '
       + 'IEC 61217: crecen hacia arriba, hacia el gantry y hacia la derecha de quien lo mira. Si '
@@ -295,7 +305,8 @@ export const es = {
     refused: 'no se conoce con marcadores en la camilla', still: 'sin cambio',
     insignificant: 'menor que su incertidumbre', noMove: 'no hay que mover',
     notSeen: 'dirección incierta',
-    uncertainty: (value, unit) => `±${value} ${unit}`, uncertaintyLong: 'incertidumbre del 95 %',
+    uncertainty: (value, unit) => `±${withUnit(value, unit)}`,
+    uncertaintyLong: 'incertidumbre del 95 %',
     axes: {
       vertical: 'Vertical', longitudinal: 'Longitudinal', lateral: 'Lateral', pitch: 'Cabeceo',
       roll: 'Balanceo', yaw: 'Guiñada',
@@ -313,7 +324,8 @@ export const es = {
     flags: {
       framesLost: (percent) => `Se perdió el ${percent} % de las imágenes: los valores son menos `
         + 'seguros.',
-      warming: (minutes) => `El sensor llevaba solo ${minutes} min encendido: aún se calentaba.`,
+      warming: (minutes) => `El sensor llevaba ${minutes < 1
+        ? 'menos de 1' : `solo ${minutes}`} min encendido y aún se calentaba.`,
       overdue: 'El control diario estaba pendiente en este escaneo.',
     },
     where: 'Dónde en el cuerpo', before: 'Antes', after: 'Después de la corrección',
@@ -533,7 +545,7 @@ export const es = {
     filterHint: 'Busca en las entradas de abajo; cargue las anteriores para buscarlas también.',
     shown: (found, all) => `${found} de ${all} ${plural(all, 'entrada', 'entradas')}`,
     csv: 'Descargar como CSV',
-    views: 'Mostrar también quién consultó qué',
+    views: 'Mostrar también quién consultó qué', yes: 'sí', no: 'no',
     actions: {
       'view.patients': 'Lista de pacientes consultada',
       'view.patient': 'Paciente consultado',
@@ -544,6 +556,7 @@ export const es = {
       'view.log': 'Registro consultado',
       'download.report': 'Informe descargado',
       'download.numbers': 'Valores descargados',
+      'download.course': 'Tratamiento entero descargado',
       'download.file': 'Archivo de un escaneo descargado',
       login: 'Acceso',
       'login.failed': 'Acceso fallido',

@@ -1,7 +1,10 @@
 // The appliance's words in Spanish, as data: the page and the server's reports read them. Whole
 // phrases first, then patterns, whose groups ($1, $2, ...) are translated by themselves; numbers
 // get the decimal comma.
+import { kFaultPatterns, kFaultWords } from './es_faults.js';
+
 export const kWords = {
+  ...kFaultWords,
   up: 'arriba', down: 'abajo', 'toward gantry': 'hacia el gantry',
   'away from gantry': 'alejándose del gantry', 'to patient left': 'hacia la izquierda del paciente',
   'to patient right': 'hacia la derecha del paciente', 'head up': 'cabeza arriba',
@@ -159,6 +162,7 @@ export const kWords = {
     'no se vio ningún marcador y no se pudo medir ninguno',
 };
 export const kPatterns = [
+  ...kFaultPatterns,
   ['^(.+) (\\d+) mm (?:too )?(high|low)$', '$1: $2 mm $3'],
   ['^(.+) up to (\\d+) mm (to the left|to the right|towards the head|towards the feet)$',
     '$1: hasta $2 mm $3'],
@@ -215,8 +219,8 @@ export const kPatterns = [
   // Warnings of a scan.
   ['^(\\d+) of (\\d+) frames were not tracked, ([\\d.]+) s at longest$',
     '$1 de $2 imágenes sin seguimiento, $3 s como máximo'],
-  ['^the computer was too slow: (\\d+) of (\\d+) frames were left out evenly; sweep more slowly, and '
-    + 'close what else runs on it$',
+  ['^the computer was too slow: (\\d+) of (\\d+) frames were left out evenly; sweep more slowly, '
+    + 'and close what else runs on it$',
   'el equipo fue demasiado lento: se omitieron $1 de $2 imágenes de forma regular; barra más '
     + 'despacio y cierre lo demás que se ejecute en él'],
   ['^no image came for ([\\d.]+) s in the sweep; what the sensor passed meanwhile is missing$',

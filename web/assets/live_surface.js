@@ -1,0 +1,71 @@
+// The surface that a sweep has seen so far, from above, and what of the region is still missing.
+import { live } from './api.js';
+import { clear, h } from './dom.js';
+import { compassOf, drawCropped, mapFrame, viewOf } from './map_frame.js';
+import { paintHeights, paintMissing, readPacked } from './maps.js';
+import { S } from './strings.js';
+
+const kEvery_ms = 500;
+const kAnswer_ms = 5000;
+const kStep_m = 0.02;
+const kMissing = 32767;
+
+/// Heights in metres, and where the region was not seen yet: 1, else NaN.
+async function fetchSurface() {
+  const response = await fetch('/api/v1/scan/surface', {
+    headers: { 'X-Plumb-Background': '1' }, cache: 'no-store',
+    signal: AbortSignal.timeout(kAnswer_ms),
+  });
+  if (!response.ok) return null;
+  const { width, height, values } = await readPacked(await response.arrayBuffer(), 1);
+  const missing = values.map((value) => (value === kMissing ? 1 : NaN));
+  return {
+    heights: {
+      width, height, values: values.map((value) => (value === kMissing ? NaN : value * 1e-4)),
+    },
+    missing: { width, height, values: missing },
+    grid: {
+      width, height, step: kStep_m, x_min: -width * kStep_m / 2, y_min: -height * kStep_m / 2,
+    },
+  };
+}
+
+/// Grows while a sweep goes on; until the reference marker has been seen it says that this is what
+/// it waits for.
+export function liveSurface() {
+  const text = S.scan;
+  const canvas = h('canvas', { class: 'still-map', role: 'img', 'aria-label': text.surfaceMap });
+  const box = h('div', { class: 'live-box' });
+  const note = h('p', { class: 'hint' }, text.surfaceWaits);
+  const keys = h('p', { class: 'keys', hidden: true },
+    h('span', { class: 'key seen' }, text.surfaceSeen),
+    h('span', { class: 'key hole' }, text.surfaceMissing));
+  let stopped = false;
+  const draw = ({ heights, missing, grid }) => {
+    // All that is seen or wanted, so that the picture's scale does not change with every step.
+    const shown = { ...heights, values: heights.values.map((z, i) =>
+      (Number.isNaN(z) ? missing.values[i] : z)) };
+    const view = viewOf(grid, shown);
+    drawCropped(canvas, view, (whole) => {
+      paintHeights(whole, heights, grid.step, 1);
+      paintMissing(whole, missing);
+    });
+    clear(box, mapFrame({ grid, view, canvas, compass: compassOf(live.status?.room, null) }));
+    box.style.setProperty('--aspect', `${view.width / view.height}`);
+    note.hidden = true;
+    keys.hidden = false;
+    keys.lastElementChild.hidden = !missing.values.some((value) => value === 1);
+  };
+  const next = async () => {
+    if (stopped) return;
+    const surface = await fetchSurface().catch(() => null);
+    if (stopped) return;
+    if (surface) draw(surface);
+    setTimeout(next, kEvery_ms);
+  };
+  next();
+  return {
+    element: h('figure', { class: 'live-surface' }, box, note, keys),
+    stop: () => { stopped = true; },
+  };
+}
