@@ -86,16 +86,27 @@ PointRows Equations::RowsOf(const State& state, const PointView& view) const {
   rows.J_camera.topRows<2>() = J * point.J_pose;
   rows.J_lens.leftCols<CalibrationModel::kLensSize>() = w * seen.J_lens;
   rows.J_lens.col(kReadoutAt) = view.place.row_share * (J * point.J_time);
-  if (!(view.z_m > 0)) return rows;
+  if (!(view.depth.z_m > 0)) return rows;
   const double late_s = problem_.DepthDelay(state, view.keyframe, view.place.row_share);
   const SeenPoint late = See(camera, p_world, late_s);
   const PredictedDepth predicted = PredictDepth(state.calibration, late, view.place);
-  const double rz = (predicted.z_m - view.z_m) * view.weight_z;
+  const Eigen::Vector2d pixel_velocity = seen.J_point * point.J_time;
+  const DepthBeside measured(view.depth,
+                             problem_.DepthOffset(state, pixel_velocity, late_s - row_s));
+  const double rz = (predicted.z_m - measured.z_m) * view.weight_z;
   const double wz = view.weight_z * std::sqrt(CauchyWeight(rz * rz, kKeypointLossScale));
-  rows.r[2] = wz * (predicted.z_m - view.z_m);
+  rows.r[2] = wz * (predicted.z_m - measured.z_m);
   rows.J_point.row(2) = wz * predicted.J_z * late.J_world.row(2);
   rows.J_camera.row(2) = wz * predicted.J_z * late.J_pose.row(2);
-  rows.J_depth = wz * predicted.J_depth;
+  // How the offset changes with poses and the colour image's readout would be of second order.
+  rows.J_depth = predicted.J_depth;
+  const double scale = problem_.stated().width / 640.0;
+  rows.J_depth[kDepthShiftX] -= scale * measured.J_offset.x();
+  rows.J_depth[kDepthShiftY] -= scale * measured.J_offset.y();
+  const double by_time = measured.J_offset * pixel_velocity;
+  rows.J_depth[kDepthDelay] -= by_time;
+  rows.J_depth[kDepthReadout] -= by_time * view.place.row_share;
+  rows.J_depth *= wz;
   return rows;
 }
 

@@ -1,5 +1,6 @@
 #include "algo/tracking/bundle_model.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace plumb::bundle {
@@ -129,6 +130,13 @@ PredictedDepth PredictDepth(const CalibrationModel& calibration, const SeenPoint
       -z * FieldGrowth(seen.p.z()) *
       place.products.tail<kNumGrowthTerms>().cast<double>().transpose();
   return predicted;
+}
+
+DepthBeside::DepthBeside(const DepthReading& reading, const Eigen::Vector2d& offset_px) {
+  constexpr double kFarthest = 0.5;  // No plane goes on to twice the depth within an image's error.
+  const double inverse = 1.0 / reading.z_m;
+  z_m = 1.0 / std::max(inverse + reading.inverse_slope_per_px.dot(offset_px), kFarthest * inverse);
+  J_offset = -z_m * z_m * reading.inverse_slope_per_px.transpose();
 }
 
 double CauchyLoss(double squared, double scale) {

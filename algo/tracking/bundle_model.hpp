@@ -80,6 +80,19 @@ struct DepthPlace {
 [[nodiscard]] double PredictDepthOnly(const CalibrationModel& calibration, double z_true_m,
                                       const DepthPlace& place);
 
+/// A keypoint's depth reading.
+struct DepthReading {
+  double z_m = 0;                       ///< At the keypoint's pixel; 0: none.
+  Eigen::Vector2d inverse_slope_per_px; ///< Of the inverse depth about it.
+};
+/// The reading where the depth image shows the keypoint: beside its pixel, as depth is registered
+/// slightly wrong and taken at another time. The plane about the pixel is continued to there.
+struct DepthBeside {
+  DepthBeside(const DepthReading& reading, const Eigen::Vector2d& offset_px);
+  double z_m;
+  Eigen::RowVector2d J_offset;  ///< Metres per pixel.
+};
+
 /// Cauchy's loss of a squared residual, and the weight of its reweighted square.
 [[nodiscard]] double CauchyLoss(double squared, double scale);
 [[nodiscard]] inline double CauchyWeight(double squared, double scale) {

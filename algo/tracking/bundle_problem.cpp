@@ -47,7 +47,7 @@ Problem::Problem(const Intrinsics& stated, const BundleOptions& options,
 
 int Problem::NumResiduals() const {
   auto count = static_cast<int>(2 * (views_.size() + corners_.size()));
-  for (const PointView& view : views_) count += view.z_m > 0 ? 1 : 0;
+  for (const PointView& view : views_) count += view.depth.z_m > 0 ? 1 : 0;
   return count;
 }
 
@@ -105,7 +105,11 @@ void Problem::CollectPoints() {
     for (const KeypointObservation& o : map_.keyframes[k].keypoints) {
       const int s = slot[static_cast<std::size_t>(o.landmark)];
       if (s < 0) continue;
-      PointView view{static_cast<int>(k), s, o.pixel, DepthPlace(o.pixel, stated_), o.z_m};
+      PointView view{static_cast<int>(k),
+                     s,
+                     o.pixel,
+                     DepthPlace(o.pixel, stated_),
+                     {o.z_m, o.inverse_depth_slope}};
       if (o.z_m > 0)
         view.weight_z = 1.0 / (options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8));
       views_.push_back(view);
@@ -188,17 +192,28 @@ double Problem::PointCost(const State& state, const PointView& view) const {
       -(camera.velocity_per_s.head<3>().cross(p) + camera.velocity_per_s.tail<3>());
   const Eigen::Vector3d at_row = p + state.calibration.readout_s[0] * view.place.row_share * motion;
   if (at_row.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
-  const Eigen::Vector2d r =
-      (ProjectCorrected(stated_, state.calibration.lens, at_row).pixel - view.pixel) *
-      PixelWeight();
+  const SeenPixel seen = ProjectCorrected(stated_, state.calibration.lens, at_row);
+  const Eigen::Vector2d r = (seen.pixel - view.pixel) * PixelWeight();
   double cost = 0.5 * CauchyLoss(r.squaredNorm(), kKeypointLossScale);
-  if (view.z_m > 0) {
-    const double z = p.z() + DepthDelay(state, view.keyframe, view.place.row_share) * motion.z();
+  if (view.depth.z_m > 0) {
+    const double late_s = DepthDelay(state, view.keyframe, view.place.row_share);
+    const double row_s = state.calibration.readout_s[0] * view.place.row_share;
+    const DepthBeside measured(view.depth,
+                               DepthOffset(state, seen.J_point * motion, late_s - row_s));
     const double rz =
-        (PredictDepthOnly(state.calibration, z, view.place) - view.z_m) * view.weight_z;
+        (PredictDepthOnly(state.calibration, p.z() + late_s * motion.z(), view.place) -
+         measured.z_m) *
+        view.weight_z;
     cost += 0.5 * CauchyLoss(rz * rz, kKeypointLossScale);
   }
   return cost;
+}
+
+Eigen::Vector2d Problem::DepthOffset(const State& state, const Eigen::Vector2d& pixel_velocity,
+                                     double later_s) const {
+  const auto& depth = state.calibration.depth;
+  const Eigen::Vector2d shift_px(depth[kDepthShiftX], depth[kDepthShiftY]);
+  return stated_.width / 640.0 * shift_px + later_s * pixel_velocity;
 }
 
 Eigen::Vector2d Problem::CornerResidual(const State& state, const CornerView& view,

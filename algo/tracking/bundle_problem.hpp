@@ -20,7 +20,7 @@ struct PointView {
   int landmark = 0;  ///< Slot.
   Eigen::Vector2d pixel;
   DepthPlace place;
-  double z_m = 0;  ///< 0: none.
+  DepthReading depth;
   double weight_z = 0;
 };
 
@@ -66,6 +66,11 @@ class Problem {
   [[nodiscard]] double PixelWeight() const;
   /// From the colour image's stamp to the depth reading at a row.
   [[nodiscard]] double DepthDelay(const State& state, int keyframe, double row_share) const;
+  /// From a keypoint's pixel to where the depth image shows it. @param pixel_velocity  Of the point
+  /// in the image, pixels a second. @param later_s  By how much the depth is read later.
+  [[nodiscard]] Eigen::Vector2d DepthOffset(const State& state,
+                                            const Eigen::Vector2d& pixel_velocity,
+                                            double later_s) const;
   [[nodiscard]] Eigen::Vector2d CornerResidual(const State& state, const CornerView& view,
                                                const Eigen::Vector3d& p) const;
   [[nodiscard]] TermVector TermState(const State& state, const QuadraticTerm& term) const;

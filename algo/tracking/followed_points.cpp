@@ -123,8 +123,8 @@ Pyramid FollowedPoints::PyramidOfKeyframe(std::size_t keyframe) {
 
 void FollowedPoints::AddObservation(const ActivePoint& point, MapKeyframe& keyframe) {
   const Eigen::Vector2d pixel = point.pixel.cast<double>();
-  keyframe.keypoints.push_back(
-      {point.landmark, pixel, SurfaceDepthAt(keyframe.data.view.depth_m, pixel)});
+  const auto [z_m, slope] = SurfaceDepthAt(keyframe.data.view.depth_m, pixel);
+  keyframe.keypoints.push_back({point.landmark, pixel, z_m, slope});
   ++map_.landmarks[static_cast<std::size_t>(point.landmark)].num_observations;
 }
 
@@ -161,7 +161,8 @@ void FollowedPoints::AddCorners(const GrayImage& image, const cv::Mat& depth_m, 
     landmark.num_observations = 1;
     const int id = static_cast<int>(map_.landmarks.size());
     map_.landmarks.push_back(landmark);
-    keyframe.keypoints.push_back({id, pixel, SurfaceDepthAt(depth_m, pixel)});
+    const auto [z_m, slope] = SurfaceDepthAt(depth_m, pixel);
+    keyframe.keypoints.push_back({id, pixel, z_m, slope});
     active_.push_back({id, corner});
   }
 }

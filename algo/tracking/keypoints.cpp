@@ -169,7 +169,7 @@ double DepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel) {
   return values[static_cast<std::size_t>(n / 2)];
 }
 
-double SurfaceDepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel) {
+SurfaceDepth SurfaceDepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel) {
   constexpr int kReach = 2;            // Pixels each way that the plane is fitted to.
   constexpr int kEdgeReach = 6;        // That must lie on it: most of what a track's window covers.
   constexpr double kTolerance = 0.01;  // Of inverse depth: relief and one part of the noise,
@@ -178,7 +178,7 @@ double SurfaceDepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel) {
   const int y = static_cast<int>(std::lround(pixel.y()));
   if (x < kEdgeReach || y < kEdgeReach || x + kEdgeReach >= depth_m.cols ||
       y + kEdgeReach >= depth_m.rows)
-    return 0.0;
+    return {};
   // Inverse depth is linear in the pixel on a plane.
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
@@ -194,17 +194,22 @@ double SurfaceDepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel) {
     }
   }
   constexpr int kWindow = (2 * kReach + 1) * (2 * kReach + 1);
-  if (3 * n < 2 * kWindow) return 0.0;
+  if (3 * n < 2 * kWindow) return {};
   const Eigen::Vector3d plane = H.ldlt().solve(g);
-  if (!(plane[0] > 0)) return 0.0;
+  if (!(plane[0] > 0)) return {};
+  H.setZero();
+  g.setZero();
   for (int r = y - kEdgeReach; r <= y + kEdgeReach; r += 2) {
     for (int c = x - kEdgeReach; c <= x + kEdgeReach; c += 2) {
       const float z = depth_m.at<float>(r, c);
-      const double on_plane = plane.dot(Eigen::Vector3d(1.0, c - pixel.x(), r - pixel.y()));
-      if (z > 0 && std::abs(on_plane * z - 1.0) > kTolerance + kTolerancePerM * z) return 0.0;
+      if (!(z > 0)) continue;
+      const Eigen::Vector3d row(1.0, c - pixel.x(), r - pixel.y());
+      if (std::abs(plane.dot(row) * z - 1.0) > kTolerance + kTolerancePerM * z) return {};
+      H += row * row.transpose();
+      g += row / z;
     }
   }
-  return 1.0 / plane[0];
+  return {1.0 / plane[0], H.ldlt().solve(g).tail<2>()};
 }
 
 DescribedFeatures DescribeFeatures(const cv::Mat& gray, const cv::Mat& depth_m,

@@ -52,9 +52,16 @@ struct KltResult {
 /// Depth at a pixel: the median of its 3x3 neighbours, 0 at edges and holes.
 [[nodiscard]] double DepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel);
 
+/// Depth at a pixel, and the plane about it.
+struct SurfaceDepth {
+  double z_m = 0.0;
+  /// Of the inverse depth, which is linear in the pixel on a plane: 1/m per pixel right and down.
+  Eigen::Vector2d inverse_slope = Eigen::Vector2d::Zero();
+};
 /// The same to be measured with: that of the plane through the 5x5 neighbours, and 0 too where the
 /// surface about them is no plane, since a track whose window covers an edge follows neither side.
-[[nodiscard]] double SurfaceDepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel);
+/// The slope is that of the plane through all 13x13 pixels that must agree with it.
+[[nodiscard]] SurfaceDepth SurfaceDepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel);
 
 /// ORB features with depth, for relocalisation.
 struct DescribedFeatures {

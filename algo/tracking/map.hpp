@@ -28,6 +28,8 @@ struct KeypointObservation {
   int landmark = 0;
   Eigen::Vector2d pixel;  ///< As seen (distorted).
   double z_m = 0.0;       ///< Depth there; 0: none, or an edge.
+  /// Slope of the inverse depth about it, 1/m per pixel to the right and down.
+  Eigen::Vector2d inverse_depth_slope = Eigen::Vector2d::Zero();
 };
 
 /// A keyframe of the map. `data.view.T_world_camera` (depth time) follows T_world_color: see

@@ -129,5 +129,19 @@ TEST(BundleModel, DerivativesOfAPredictedDepth) {
   EXPECT_DOUBLE_EQ(PredictDepthOnly(calibration, seen.p.z(), place), raw_m);
 }
 
+TEST(BundleModel, ADepthReadingBesideThePixelLiesOnThePlane) {
+  // 1/z = 1.25 + 0.02 dx - 0.01 dy.
+  const DepthReading reading{0.8, {0.02, -0.01}};
+  EXPECT_DOUBLE_EQ(DepthBeside(reading, {0.0, 0.0}).z_m, 0.8);
+  const DepthBeside beside(reading, {1.5, -2.0});
+  EXPECT_DOUBLE_EQ(beside.z_m, 1.0 / 1.30);
+  const double worst = Mismatch<1, 2>(beside.J_offset, [&](const Eigen::Vector2d& step) {
+    return Eigen::Matrix<double, 1, 1>(DepthBeside(reading, Eigen::Vector2d(1.5, -2.0) + step).z_m);
+  });
+  EXPECT_LT(worst, 1e-6);
+  // A plane that would reach infinity is not followed that far.
+  EXPECT_DOUBLE_EQ(DepthBeside(reading, {-60.0, 40.0}).z_m, 1.6);
+}
+
 }  // namespace
 }  // namespace plumb::bundle

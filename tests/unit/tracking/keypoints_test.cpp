@@ -136,29 +136,32 @@ TEST(Keypoints, SurfaceDepthIsThatOfThePlaneAtTheVeryPixel) {
   };
   for (int r = 0; r < 40; ++r)
     for (int c = 0; c < 40; ++c) depth.at<float>(r, c) = static_cast<float>(z_at(c, r));
-  EXPECT_NEAR(SurfaceDepthAt(depth, {20.4, 18.7}), z_at(20.4, 18.7), 1e-6);
+  const SurfaceDepth found = SurfaceDepthAt(depth, {20.4, 18.7});
+  EXPECT_NEAR(found.z_m, z_at(20.4, 18.7), 1e-6);
+  EXPECT_NEAR(found.inverse_slope.x(), 0.02, 1e-6);
+  EXPECT_NEAR(found.inverse_slope.y(), -0.01, 1e-6);
   EXPECT_GT(std::abs(DepthAt(depth, {20.4, 18.7}) - z_at(20.4, 18.7)), 0.001);
 }
 
 TEST(Keypoints, SurfaceDepthIsNothingWhereAWindowCoversAnEdge) {
   cv::Mat depth(60, 60, CV_32FC1, cv::Scalar(0.8));
   depth(cv::Rect(40, 0, 20, 60)).setTo(0.9);
-  EXPECT_NEAR(SurfaceDepthAt(depth, {33, 30}), 0.8, 1e-6);
-  EXPECT_EQ(SurfaceDepthAt(depth, {34, 30}), 0.0) << "the edge is 6 pixels away";
+  EXPECT_NEAR(SurfaceDepthAt(depth, {33, 30}).z_m, 0.8, 1e-6);
+  EXPECT_EQ(SurfaceDepthAt(depth, {34, 30}).z_m, 0.0) << "the edge is 6 pixels away";
   EXPECT_GT(DepthAt(depth, {34, 30}), 0.0);
   // 1.4 % of inverse depth are the limit at 0.8 m.
   depth(cv::Rect(40, 0, 20, 60)).setTo(0.8 * 1.013);
-  EXPECT_GT(SurfaceDepthAt(depth, {34, 30}), 0.0) << "relief and noise";
+  EXPECT_GT(SurfaceDepthAt(depth, {34, 30}).z_m, 0.0) << "relief and noise";
   depth(cv::Rect(40, 0, 20, 60)).setTo(0.8 * 1.015);
-  EXPECT_EQ(SurfaceDepthAt(depth, {34, 30}), 0.0);
+  EXPECT_EQ(SurfaceDepthAt(depth, {34, 30}).z_m, 0.0);
   for (const Vector2d& outside :
        {Vector2d(-3, 5), Vector2d(5, 30), Vector2d(55, 30), Vector2d(1e9, -1e9)})
-    EXPECT_EQ(SurfaceDepthAt(depth, outside), 0.0);
+    EXPECT_EQ(SurfaceDepthAt(depth, outside).z_m, 0.0);
   cv::Mat holes = cv::Mat::zeros(60, 60, CV_32FC1);
   holes(cv::Rect(28, 28, 5, 3)).setTo(0.9);
-  EXPECT_EQ(SurfaceDepthAt(holes, {30, 30}), 0.0) << "15 of 25 neighbours";
+  EXPECT_EQ(SurfaceDepthAt(holes, {30, 30}).z_m, 0.0) << "15 of 25 neighbours";
   holes(cv::Rect(28, 28, 5, 4)).setTo(0.9);
-  EXPECT_NEAR(SurfaceDepthAt(holes, {30, 30}), 0.9, 1e-6) << "20 of 25";
+  EXPECT_NEAR(SurfaceDepthAt(holes, {30, 30}).z_m, 0.9, 1e-6) << "20 of 25";
 }
 
 TEST(DenseView, PlaneHasItsNormalAndDepth) {

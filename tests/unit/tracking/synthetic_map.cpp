@@ -84,6 +84,16 @@ double DepthTime(const Camera& camera, double row) {
   return kColorToDepth_s + camera.sensor.depth[5] + camera.sensor.depth[8] * camera.Share(row);
 }
 
+// Ideal coordinates of a pixel.
+Vector3d RayOf(const Camera& camera, const Vector2d& px) {
+  Vector3d ray(0, 0, 1);
+  for (int i = 0; i < 8; ++i) {
+    const Vector2d off = px - camera.ToPixel(ray);
+    ray += Vector3d(off.x() / camera.stated.fx, off.y() / camera.stated.fy, 0);
+  }
+  return ray;
+}
+
 // Depth along a ray: of the landscape by bisection from above, or of a board before it.
 double CastDepth(const Pose& T_world_camera, const Vector3d& ray,
                  const std::map<int, MapMarker>& boards) {
@@ -128,6 +138,23 @@ cv::Mat RenderDepth(const Camera& camera, const MapKeyframe& keyframe,
     }
   }
   return depth;
+}
+
+// What the depth image shows at a pixel of the colour image, and the slope of its inverse.
+KeypointObservation ReadDepth(const Camera& camera, const MapKeyframe& keyframe, int landmark,
+                              const Vector2d& px) {
+  const Vector2d shift(camera.sensor.depth[kDepthShiftX], camera.sensor.depth[kDepthShiftY]);
+  const auto reading = [&](const Vector2d& at) {
+    const Vector3d ray = RayOf(camera, at - camera.scale() * shift);
+    const Pose T = Moved(keyframe, DepthTime(camera, at.y()));
+    return camera.Measured(CastDepth(T, ray, {}), camera.Centred(at));
+  };
+  KeypointObservation observation{landmark, px, reading(px)};
+  const auto slope = [&](const Vector2d& step) {
+    return (1.0 / reading(px + step) - 1.0 / reading(px - step)) / 2.0;
+  };
+  observation.inverse_depth_slope = {slope({1, 0}), slope({0, 1})};
+  return observation;
 }
 
 Pose LookDown(const Vector3d& position, const Vector3d& tilt) {
@@ -201,11 +228,16 @@ void AddLandmarks(const Camera& camera, const MapOptions& options, std::mt19937&
       if (!landmark.usable) break;
       auto px = Seen(camera, keyframe, landmark.p_world);
       if (!px) continue;
+      if (options.read_depth_at_pixels) {
+        keyframe.keypoints.push_back(ReadDepth(camera, keyframe, i, *px));
+        ++landmark.num_observations;
+        continue;
+      }
       const Vector3d p = Moved(keyframe, DepthTime(camera, px->y())).inverse() * landmark.p_world;
       double z = camera.Measured(p.z(), camera.Centred(*px));
       z += options.depth_noise_sigmas * normal(random) * (0.0012 + 0.0019 * (z - 0.4) * (z - 0.4));
       *px += options.pixel_noise * Vector2d(normal(random), normal(random));
-      keyframe.keypoints.push_back({i, *px, z});
+      keyframe.keypoints.push_back({i, *px, z, Vector2d::Zero()});
       ++landmark.num_observations;
     }
     map.landmarks.push_back(landmark);

@@ -20,6 +20,9 @@ struct MapOptions {
   double depth_noise_sigmas =
       0.0;  ///< Of the keypoints' depth, in standard deviations of the noise model.
   double image_noise_m = 0.0;  ///< Of the depth images, white.
+  /// Keypoints get what the depth image shows at their pixels, and its slope: that is another place
+  /// than their own where depth is shifted or comes later. Else their own depth, and no slope.
+  bool read_depth_at_pixels = false;
 };
 
 struct TrueMap {
