@@ -3,6 +3,7 @@
 #include <sys/epoll.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -139,10 +140,8 @@ Appliance::Answer Appliance::Handle(ScanEvent event) {
   if (!answer.empty()) {
     Log(LogLevel::kNotice,
         fmt::format("{} ignored in state {}: {}", Name(event), Name(before.phase), answer));
-    PublishEvent(
-        "ignored",
-        Json{{"what", Name(event)}, {"state", Name(before.phase)}, {"reason", answer}}.dump(
-            -1, ' ', false, Json::error_handler_t::replace));
+    PublishEvent("ignored",
+                 {{"what", Name(event)}, {"state", Name(before.phase)}, {"reason", answer}});
   }
   state_ = transition.state;
   if (state_.phase != ScanPhase::kResult) result_timer_.Disarm();
@@ -188,12 +187,12 @@ Appliance::Answer Appliance::OpenCheck(const web::Actor& actor) {
 
 void Appliance::OnSensor(const SensorEvent& event) {
   LogSensor(event);
-  const char* kNames[] = {"ready", "lost", "failed", "others", "stalled"};
-  PublishEvent("sensor", Json{{"what", kNames[static_cast<int>(event.kind)]},
-                              {"serial", event.sensor.serial},
-                              {"reason", event.reason},
-                              {"others", event.others}}
-                             .dump(-1, ' ', false, Json::error_handler_t::replace));
+  static constexpr const char* kNames[] = {"ready", "lost", "failed", "others", "stalled"};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(SensorEvent::Kind::kStalled) + 1);
+  PublishEvent("sensor", {{"what", kNames[static_cast<int>(event.kind)]},
+                          {"serial", event.sensor.serial},
+                          {"reason", event.reason},
+                          {"others", event.others}});
   NotifyWeb(web::EventKind::kStatus);
   if (event.kind == SensorEvent::Kind::kOthers || event.kind == SensorEvent::Kind::kStalled) return;
   sensor_fault_ = event.reason;

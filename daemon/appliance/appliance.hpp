@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "daemon/appliance/page_identity.hpp"
 #include "daemon/appliance/scan_session.hpp"
 #include "daemon/appliance/scan_state.hpp"
@@ -50,8 +52,8 @@ struct ApplianceParts {
   double worker_silence_s = 30.0;
 };
 
-/// Everything belongs to the loop's thread but what its own threads do; see ARCHITECTURE in the
-/// README. Functions return at once.
+/// Not thread-safe: call it on the loop's thread, but for functions that say "from any thread".
+/// They return at once. Its own threads are in daemon/README.md.
 class Appliance {
  public:
   Appliance(EventLoop& loop, ApplianceParts parts);
@@ -135,7 +137,8 @@ class Appliance {
 
   /// What the status says of the page.
   void SetPage(PageNotes page) { page_ = std::move(page); }
-  [[nodiscard]] std::string StatusJson();
+  /// What the control socket answers to "status".
+  [[nodiscard]] nlohmann::json StatusJson();
   [[nodiscard]] web::Status WebStatus();
   [[nodiscard]] web::Health Health();
   /// One line for systemd.
@@ -229,7 +232,7 @@ class Appliance {
   void ReadStored(web::Status& status);
   void Show();
   [[nodiscard]] IndicatorPattern Pattern() const;
-  void PublishEvent(const char* event, const std::string& fields_json);
+  void PublishEvent(const char* event, const nlohmann::json& fields);
   void PublishState();
   void PublishProgress();
   void NotifyWeb(web::EventKind kind);

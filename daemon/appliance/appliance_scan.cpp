@@ -69,7 +69,7 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
   ScanJob job;
   job.info = sensors_->snapshot().info;
   job.reconstructor = parts_.config.reconstruct;
-  job.reconstructor.keep_color = false;  // of a patient only the shape is kept
+  job.reconstructor.keep_color = false;  // only the shape of a patient is kept
   job.keep_recording = parts_.config.appliance.keep_recordings || settings.keep_recordings;
   job.unit_profile = MakeUnitProfile();
   job.stop_after_s = parts_.config.appliance.auto_stop_s.value_or(settings.auto_stop_s);
@@ -236,8 +236,7 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
           {{"SCAN", scan_.id}});
     }
     (void)Handle(ScanEvent::kScanDone);
-    PublishEvent("result", Json{{"scan", scan_.id}, {"answer", answer}}.dump(
-                               -1, ' ', false, Json::error_handler_t::replace));
+    PublishEvent("result", {{"scan", scan_.id}, {"answer", answer}});
   }
   if (outcome.kind == Kind::kDone) profile_fault_ = outcome.drift;
   if (scan_.purpose == web::ScanPurpose::kDailyCheck) LookAtRoom();

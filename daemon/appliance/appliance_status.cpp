@@ -1,8 +1,9 @@
-// what the appliance reports about itself: status, events, light.
+// The appliance's reports about itself: status, events, light.
 #include <sys/statvfs.h>
 
 #include <algorithm>
 #include <exception>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -19,7 +20,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::json;
 
-/// What both the status and an event say about a scan.
+/// The fields of a scan in the status and in its events.
 Json ProgressFields(const ScanUpdate& update, std::optional<double> coverage) {
   return {{"step", update.step},
           {"fraction", update.fraction},
@@ -96,7 +97,9 @@ const char* Name(IndicatorPattern pattern) {
   static constexpr const char* kNames[] = {
       "off",           "no_sensor",   "ready",     "scanning", "too_fast",
       "too_near",      "too_far",     "working",   "done",     "result_in_tolerance",
-      "result_unsure", "result_move", "no_answer", "fault",    "ready_rolled_back"};
+      "result_unsure", "result_move", "no_answer", "fault",    "ready_rolled_back",
+      "stopped"};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(IndicatorPattern::kStopped) + 1);
   return kNames[static_cast<int>(pattern)];
 }
 
@@ -141,8 +144,7 @@ void Appliance::Show() {
   if (pattern == shown_) return;
   shown_ = pattern;
   if (parts_.indicator != nullptr) parts_.indicator->Show(pattern);
-  PublishEvent("light", Json{{"pattern", Name(pattern)}}.dump(-1, ' ', false,
-                                                              Json::error_handler_t::replace));
+  PublishEvent("light", {{"pattern", Name(pattern)}});
 }
 
 void Appliance::SetRolledBack(const std::string& text) {
@@ -151,19 +153,18 @@ void Appliance::SetRolledBack(const std::string& text) {
   NotifyWeb(web::EventKind::kStatus);
 }
 
-void Appliance::PublishEvent(const char* event, const std::string& fields_json) {
+void Appliance::PublishEvent(const char* event, const Json& fields) {
   if (!tell_watchers_) return;
   Json line = {{"event", event}, {"time", WallSeconds()}};
-  line.update(Json::parse(fields_json));
+  line.update(fields);
   tell_watchers_(line.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
 void Appliance::PublishState() {
   Show();
-  PublishEvent("state", Json{{"state", Name(state_.phase)},
-                             {"reason", FaultReason()},
-                             {"cancelling", state_.cancelling}}
-                            .dump(-1, ' ', false, Json::error_handler_t::replace));
+  PublishEvent("state", {{"state", Name(state_.phase)},
+                         {"reason", FaultReason()},
+                         {"cancelling", state_.cancelling}});
   NotifyWeb(web::EventKind::kStatus);
 }
 
@@ -204,10 +205,10 @@ std::string Appliance::StatusLine() const {
 void Appliance::PublishProgress() {
   Json progress = ProgressFields(scan_.update, Coverage());
   progress["scan"] = scan_.id;
-  PublishEvent("progress", progress.dump(-1, ' ', false, Json::error_handler_t::replace));
+  PublishEvent("progress", progress);
 }
 
-std::string Appliance::StatusJson() {
+Json Appliance::StatusJson() {
   const SensorSnapshot sensor = sensors_->snapshot();
   const ScanUpdate& update = scan_.update;
   const bool is_running =
@@ -250,32 +251,30 @@ std::string Appliance::StatusJson() {
       }
     }
   }
-  const Json status = {
-      {"state", Name(state_.phase)},
-      {"reason", FaultReason()},
-      {"sensor",
-       {{"present", sensor.present},
-        {"serial", sensor.sensor.serial},
-        {"name", sensor.sensor.name},
-        {"fps", sensor.present ? sensor.statistics.frames_per_second : 0.0},
-        {"pairs", sensor.statistics.num_pairs},
-        {"unpaired", sensor.statistics.num_unpaired},
-        {"discarded", sensor.statistics.num_discarded},
-        {"lost", sensor.statistics.num_lost},
-        {"calibrated", sensor.present && !sensor.info.intrinsics_assumed},
-        {"warnings", sensor.info.warnings},
-        {"profile_fault", profile_fault_},
-        {"others", sensor.others}}},
-      {"scan", scan},
-      {"last_result", last},
-      {"light", Name(shown_)},
-      {"rolled_back", rolled_back_},
-      {"warnings", StorageWarnings()},
-      {"page",
-       {{"url", page_.url}, {"certificate", page_.certificate}, {"warnings", page_.warnings}}},
-      {"loop", LoopJson(loop_.meter())},
-      {"version", Version()}};
-  return status.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return {{"state", Name(state_.phase)},
+          {"reason", FaultReason()},
+          {"sensor",
+           {{"present", sensor.present},
+            {"serial", sensor.sensor.serial},
+            {"name", sensor.sensor.name},
+            {"fps", sensor.present ? sensor.statistics.frames_per_second : 0.0},
+            {"pairs", sensor.statistics.num_pairs},
+            {"unpaired", sensor.statistics.num_unpaired},
+            {"discarded", sensor.statistics.num_discarded},
+            {"lost", sensor.statistics.num_lost},
+            {"calibrated", sensor.present && !sensor.info.intrinsics_assumed},
+            {"warnings", sensor.info.warnings},
+            {"profile_fault", profile_fault_},
+            {"others", sensor.others}}},
+          {"scan", scan},
+          {"last_result", last},
+          {"light", Name(shown_)},
+          {"rolled_back", rolled_back_},
+          {"warnings", StorageWarnings()},
+          {"page",
+           {{"url", page_.url}, {"certificate", page_.certificate}, {"warnings", page_.warnings}}},
+          {"loop", LoopJson(loop_.meter())},
+          {"version", Version()}};
 }
 
 web::Status Appliance::WebStatus() {

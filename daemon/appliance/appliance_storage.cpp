@@ -1,4 +1,4 @@
-// The appliance's care for what is stored: opening, space, retention, and the check of its files.
+// Maintenance of stored data: opening, space, retention, backups, and the check of its files.
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -46,7 +46,7 @@ void Appliance::OpenStore() {
     };
     store_ = std::make_unique<Store>(parts_.config.appliance.state, options);
     LogRecovery(store_->recovery());
-    // Sessions end with the process: who is on the couch has to be confirmed again.
+    // Sessions end with the process: the patient on the couch has to be confirmed again.
     store_->treatments.CloseAll(kSelf);
     if (!parts_.demo_patient.empty()) {
       const auto patient = store_->patients.FindByCode(parts_.demo_patient);
@@ -54,7 +54,7 @@ void Appliance::OpenStore() {
       session_id_ = store_->treatments.Open(kSelf, open_patient_, web::ScanPurpose::kFraction);
       opened_by_ = kSelf;
     }
-  } catch (const std::exception& error) {  // whatever a damaged store holds, the page must say so
+  } catch (const std::exception& error) {  // whatever is wrong, the page must show it
     store_.reset();
     storage_fault_ = error.what();
     Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", storage_fault_));
@@ -63,9 +63,9 @@ void Appliance::OpenStore() {
   if (store_) return;
   try {
     store_ = Store::OpenReadable(parts_.config.appliance.state);
-    Log(LogLevel::kNotice, "what is stored can be read");
+    Log(LogLevel::kNotice, "stored data can be read, but not changed");
   } catch (const std::exception& error) {
-    Log(LogLevel::kError, fmt::format("nor can anything be read: {}", error.what()));
+    Log(LogLevel::kError, fmt::format("read-only access failed too: {}", error.what()));
   }
 }
 
@@ -73,9 +73,10 @@ void Appliance::LogRecovery(const RecoveryReport& found) const {
   const std::filesystem::path& state = parts_.config.appliance.state;
   if (found.interrupted_scans + found.orphaned_folders > 0) {
     Log(LogLevel::kWarning,
-        fmt::format("put right after an interruption: {} scans had not ended, {} folders of scans "
-                    "that had not ended, failed or were removed were deleted",
-                    found.interrupted_scans, found.orphaned_folders));
+        fmt::format(
+            "recovered after an interruption: {} unfinished scans marked as failed, {} folders "
+            "of unfinished, failed or removed scans deleted",
+            found.interrupted_scans, found.orphaned_folders));
   }
   if (found.lost_scans > 0) {
     Log(LogLevel::kError,
@@ -118,7 +119,7 @@ Appliance::Answer Appliance::WhyNoSpace() const {
   std::error_code error;
   const std::filesystem::space_info space =
       std::filesystem::space(parts_.config.appliance.state, error);
-  if (error) return {};  // a disk that cannot be looked at is another fault
+  if (error) return {};  // a disk that cannot be examined is reported elsewhere
   try {
     const std::uint64_t needed = NeededBytes();
     if (space.available >= needed) return {};
@@ -159,7 +160,7 @@ std::uint64_t Appliance::QuotaBytes() const {
   return static_cast<std::uint64_t>(kShare * static_cast<double>(space.capacity));
 }
 
-/// A disk that has become read-only must be known before a patient is scanned for nothing. Off the
+/// Notices a disk that has become read-only before a patient is scanned in vain. Off the
 /// loop.
 void Appliance::CheckDisk() {
   ticks_to_disk_check_ = kDiskCheckTicks;
@@ -185,7 +186,7 @@ void Appliance::FailStorage(const std::string& what) {
 void Appliance::Care() {
   ticks_to_care_ = kCareTicks;
   if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
-  constexpr std::chrono::hours kTrusted{1};  // until then a time server may set it right
+  constexpr std::chrono::hours kTrusted{1};  // until then a time server may correct it
   const bool has_clock = clock_.held() >= kTrusted;
   const std::uint64_t quota = QuotaBytes();
   const bool posted = store_thread_.Post([this, quota, has_clock, stop = care_.get_token()] {
@@ -204,8 +205,8 @@ void Appliance::Care() {
   if (!posted) Log(LogLevel::kWarning, "the store is too busy to remove old scans now");
 }
 
-/// One scan at a time, off the loop, and none while a scan runs: what was changed or has become
-/// unreadable is known before it is wanted.
+/// One scan at a time, off the loop, and none while a scan runs: damaged files are noticed before
+/// they are needed.
 void Appliance::CheckStoredFiles() {
   ticks_to_file_check_ = kNoFileCheckTicks;  // until this one has ended
   if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
@@ -222,7 +223,8 @@ void Appliance::CheckStoredFiles() {
       loop_.Post("file check", [this, checked] {
         ticks_to_file_check_ = kFileCheckTicks;
         if (checked->fault.empty()) return;
-        Log(LogLevel::kError, fmt::format("the stored scan is not as it was: {}", checked->fault),
+        Log(LogLevel::kError,
+            fmt::format("a stored scan has changed or is missing: {}", checked->fault),
             {{"SCAN", checked->id}});
         NotifyWeb(web::EventKind::kData);
       });
@@ -232,8 +234,8 @@ void Appliance::CheckStoredFiles() {
 
 namespace {
 
-/// The calling thread, for good, gets a processor and the disk when nobody else wants them: a
-/// backup of many scans is no reason to lose frames. Where the system refuses it goes on as it is.
+/// From now on the calling thread gets a processor and the disk only when they are idle, so that a
+/// backup costs no frames of a scan. Where the system refuses, the thread goes on as it was.
 void GiveWayToScans() {
   constexpr int kLeastPriority = 19, kOfThread = 1, kBestEffort = 2, kLowestOfIts = 7;
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLeastPriority);
@@ -268,7 +270,7 @@ void Appliance::BackUp(
                           : fmt::format("no backup was made in {}: {}", folder.string(), error));
         loop_.Post("backup", [done, error, report] { done(error, report); });
       });
-  if (!posted) done("too much waits already: try again", {});
+  if (!posted) done("too many tasks are waiting: try again", {});
 }
 
 /// One folder for each day of the week: the eighth backup replaces the first.
@@ -291,7 +293,8 @@ bool IsBackupDue(const std::filesystem::path& folder, std::chrono::duration<doub
     const auto made = std::filesystem::last_write_time(
         folder / fmt::format("plumb-{}", day) / "backup.json", error);
     const std::chrono::duration<double> age = FileClock::now() - made;
-    if (!error && age.count() >= 0 && age < every) return false;  // a stamp of the future is none
+    if (!error && age.count() >= 0 && age < every)
+      return false;  // a time in the future does not count
   }
   return true;
 }
@@ -308,7 +311,7 @@ void Appliance::BackUpIfDue() {
   (void)check_thread_.Post([this, folder, every] {
     if (!IsBackupDue(folder, every)) return;
     loop_.Post("backup due", [this] {
-      constexpr int kAgainTicks = 3600;  // one that fails is not tried again at once
+      constexpr int kAgainTicks = 3600;  // a failed backup is not repeated at once
       ticks_to_backup_ = kAgainTicks;
       BackUp(kSelf, BackupTarget(), [this](const std::string& error, const BackupReport&) {
         backup_fault_ = error;

@@ -58,10 +58,10 @@ void ControlDesk::Answer(const ControlRequest& request, const ControlServer::Rep
   using Kind = ControlRequest::Kind;
   switch (request.kind) {
     case Kind::kStatus:
-      return reply(appliance_.StatusJson());
+      return reply(Line(appliance_.StatusJson()));
     case Kind::kWatch:  // what is, then what happens
-      return reply(R"({"event":"status","time":)" + fmt::format("{:.6f}", SystemSeconds()) +
-                   R"(,"status":)" + appliance_.StatusJson() + "}");
+      return reply(Line(
+          {{"event", "status"}, {"time", SystemSeconds()}, {"status", appliance_.StatusJson()}}));
     case Kind::kPress: {
       const std::string refusal =
           appliance_.Press(request.is_long ? ButtonPress::kLong : ButtonPress::kShort);

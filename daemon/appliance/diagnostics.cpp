@@ -22,15 +22,14 @@ Json Only(const Json& json, const auto& names) {
 
 }  // namespace
 
-std::string DiagnosticsText(const std::string& status, const web::Health& health,
-                            const std::string& loop, const std::vector<web::AuditEntry>& audit) {
+std::string DiagnosticsText(const Json& status, const web::Health& health, const std::string& loop,
+                            const std::vector<web::AuditEntry>& audit) {
   constexpr std::array kStatus = {"state",       "reason", "sensor",   "light",
                                   "rolled_back", "page",   "warnings", "version"};
   constexpr std::array kLast = {"frames",          "frames_dropped",   "images_lost",
                                 "images_unpaired", "images_discarded", "after_last_frame_s"};
-  const Json all = Json::parse(status);
-  Json shown = Only(all, kStatus);
-  if (all.contains("last_result")) shown["last_result"] = Only(all["last_result"], kLast);
+  Json shown = Only(status, kStatus);
+  if (status.contains("last_result")) shown["last_result"] = Only(status["last_result"], kLast);
   std::string text =
       fmt::format("plumbd {}\nhealth: {}\nstatus: {}\n\nthe event loop:\n{}\nlast actions:\n",
                   Version(), health.ok ? "ok" : health.reason,

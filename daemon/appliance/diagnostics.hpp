@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "web/service/service_types.hpp"
 
 namespace plumb {
@@ -12,7 +14,7 @@ namespace plumb {
 /// scan, verdict or number of a patient, no account: what is not named here stays out.
 /// @param status  Appliance::StatusJson().
 /// @param loop  LoopTable().
-[[nodiscard]] std::string DiagnosticsText(const std::string& status, const web::Health& health,
+[[nodiscard]] std::string DiagnosticsText(const nlohmann::json& status, const web::Health& health,
                                           const std::string& loop,
                                           const std::vector<web::AuditEntry>& audit);
 

@@ -471,7 +471,7 @@ int RunChecked(const Options& options, const SensorRegistry& registry) {
   ::umask(::umask(0077) | 0027);
   std::error_code ignored;
   fs::create_directories(configured.config.appliance.state,
-                         ignored);  // what cannot be made is told when the store opens
+                         ignored);  // an error surfaces when the store opens
   if (configured.fault.empty()) configured.fault = ResetIfAsked(configured.config.appliance.state);
   std::optional<EndGuard> guard;  // outlives the threads that it waits for
   Plumbd plumbd(options, configured.config, configured.fault, registry);
@@ -480,7 +480,7 @@ int RunChecked(const Options& options, const SensorRegistry& registry) {
     Log(LogLevel::kError,
         fmt::format("{} s after the end began a thread still runs, supposedly in the sensor's "
                     "driver: plumbd ends without it. "
-                    "What was scanned is stored; unplug the sensor if this comes again",
+                    "Finished scans are stored; unplug the sensor if this comes again",
                     kLongestEnd.count()));
     std::_Exit(kDeviceFailed);
   });

@@ -82,7 +82,7 @@ void ReadNetwork(Section section, const std::string& name, Provisioning& given) 
   TakeServers(section, "dns", given.dns, IsAddress, "a list of at most 8 addresses", name);
   TakeServers(section, "time_servers", given.time_servers, IsServer,
               "a list of at most 8 addresses or names", name);
-  section.RefuseTheRest();
+  section.RejectUnknownKeys();
   if (given.address.empty() && (!given.gateway.empty() || !given.dns.empty()))
     throw DataError(
         fmt::format("{}: network: gateway and dns belong to an address; without one the "
@@ -97,7 +97,7 @@ void ReadPage(Section section, const fs::path& file, Provisioning& given) {
   };
   section.Take("certificate", certificate, "the name of a PEM file in the same folder", is_plain);
   section.Take("key", key, "the name of a PEM file in the same folder", is_plain);
-  section.RefuseTheRest();
+  section.RejectUnknownKeys();
   if (certificate.empty() != key.empty())
     throw DataError(fmt::format("{}: page: certificate and key are given together", file.string()));
   if (certificate.empty()) return;
@@ -133,7 +133,7 @@ Provisioning ReadProvisioning(const fs::path& file) {
             [](const std::string& value) { return IsWord(value, "._-", 32); });
   unit.Take("host_name", given.host_name, "one name of at most 63 letters, digits and '-'",
             IsHostName);
-  unit.RefuseTheRest();
+  unit.RejectUnknownKeys();
   ReadNetwork(Section(root, "network", name), name, given);
   ReadPage(Section(root, "page", name), file, given);
   return given;

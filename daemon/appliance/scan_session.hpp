@@ -81,8 +81,8 @@ struct ScanOutcome {
   double after_last_frame_s = 0.0;  ///< Until everything was written.
 };
 
-/// Called on the tracking thread; they post to the loop, but for the first two, which use the
-/// store. These may throw: the scan has then failed.
+/// Called on the tracking thread. `begin` and `save` use the store and may throw, which fails the
+/// scan; the others post to the loop.
 struct ScanCallbacks {
   /// First: gives the folder in which `scene`, `result` and `recording` are written.
   std::function<std::filesystem::path()> begin;

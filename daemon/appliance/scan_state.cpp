@@ -1,5 +1,7 @@
 #include "daemon/appliance/scan_state.hpp"
 
+#include <iterator>
+
 namespace plumb {
 namespace {
 
@@ -17,9 +19,9 @@ FaultKind SensorFault(const ScanState& state) {
 }
 
 std::string_view WhyNoSensor(const ScanState& state) {
-  return state.sensor_fails
-             ? "the sensor does not work: see the reason in the status; plug it out and in again"
-             : "no sensor is attached: plug it in and wait for the ready light";
+  return state.sensor_fails ? "the sensor does not work: see the reason in the status; unplug it "
+                              "and plug it in again"
+                            : "no sensor is attached: plug it in and wait for the ready light";
 }
 
 /// Where the appliance rests when no scan runs and no result is shown.
@@ -231,6 +233,7 @@ const char* Name(ScanEvent event) {
       "sensor_ready", "sensor_lost",    "sensor_failed",  "short_press",    "long_press",
       "start",        "end_sweep",      "cancel",         "sweep_complete", "scan_done",
       "scan_failed",  "scan_cancelled", "result_expired", "storage_failed"};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(ScanEvent::kStorageFailed) + 1);
   return kNames[static_cast<int>(event)];
 }
 

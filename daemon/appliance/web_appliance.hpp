@@ -30,7 +30,7 @@ class WebAppliance : public web::ApplianceService {
   web::AuditLog& audit_;
   std::function<void(web::EventKind)> listener_;
   std::shared_ptr<const std::string> preview_;
-  std::int64_t preview_index_ = -1;
+  std::optional<std::int64_t> preview_index_;  ///< Of the frame that it shows.
   std::chrono::steady_clock::time_point preview_at_;
   std::shared_ptr<const LiveSurfaceView> packed_view_;  ///< What `packed_` was made of.
   std::shared_ptr<const std::string> packed_;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "daemon/appliance/diagnostics.hpp"
 #include "daemon/loop/loop_report.hpp"
@@ -30,7 +31,7 @@ void WebMaintenance::MakeBackup(const web::Actor& actor, web::Done done) {
 }
 
 void WebMaintenance::WriteDiagnostics(const web::Actor& actor, web::Done done) {
-  const std::string status = appliance_.StatusJson();
+  const nlohmann::json status = appliance_.StatusJson();
   const std::string loop = LoopTable(appliance_.loop().meter());
   const web::Health health = appliance_.Health();
   const auto report = [done = std::move(done)](const web::Change& change) {

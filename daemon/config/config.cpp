@@ -62,19 +62,14 @@ const std::vector<std::pair<std::string, Preset>> kPresets = {{"best", Preset::k
                                                               {"paper", Preset::kPaper}};
 
 void ReadMarkers(Section section, MarkerConfig& markers) {
-  std::string dictionary;
-  section.Take("dictionary", dictionary,
+  section.Take("dictionary", markers.dictionary,
                fmt::format("one of {}", fmt::join(MarkerDictionary::KnownNames(), ", ")),
                [](const std::string& s) { return MarkerDictionary::Find(s).has_value(); });
-  if (!dictionary.empty()) markers.dictionary = dictionary;
-  double length_m = 0;
-  section.Take("length_m", length_m, "a marker's side in metres, above 0 and at most 2",
+  section.Take("length_m", markers.length_m, "a marker's side in metres, above 0 and at most 2",
                [](double v) { return v > 0 && v <= 2; });
-  if (length_m > 0) markers.length_m = length_m;
-  int reference = -1;
-  section.Take("reference", reference, "a marker's id, 0 or more", [](int id) { return id >= 0; });
-  if (reference >= 0) markers.reference = reference;
-  section.RefuseTheRest();
+  section.Take("reference", markers.reference, "a marker's id, 0 or more",
+               [](int id) { return id >= 0; });
+  section.RejectUnknownKeys();
 }
 
 void ReadReconstruct(Section section, ReconstructorOptions& options) {
@@ -92,7 +87,7 @@ void ReadReconstruct(Section section, ReconstructorOptions& options) {
   section.Take("num_icp_iterations", options.num_icp_iterations, "a whole number from 1 to 1000",
                [](int n) { return n >= 1 && n <= 1000; });
   section.Take("seed", options.seed, "a whole number, 0 or more", kAny);
-  section.RefuseTheRest();
+  section.RejectUnknownKeys();
 }
 
 // Keys of [compare] that are a patient's: plumbd takes them from the approved plan of the
@@ -143,7 +138,7 @@ void ReadCompare(Section section, ConfigUse use, Config& config) {
   section.TakeScaled("max_residual_p95_mm", options.limits.max_residual_p95_m, kMillimetre,
                      "millimetres above 0");
   section.TakeScaled("max_lost_s", options.limits.max_lost_s, 1.0, "seconds above 0");
-  section.RefuseTheRest();
+  section.RejectUnknownKeys();
 }
 
 void ReadCheck(Section section, MarkerCheckLimits& limits) {
@@ -155,7 +150,7 @@ void ReadCheck(Section section, MarkerCheckLimits& limits) {
   section.TakeScaled("depth_percent", limits.max_depth_share, kPercent, "percent above 0");
   section.Take("min_views", limits.min_views, "a whole number from 1 to 1000",
                [](int n) { return n >= 1 && n <= 1000; });
-  section.RefuseTheRest();
+  section.RejectUnknownKeys();
 }
 
 void ReadIec(Section section, const toml::table& root, std::optional<Pose>& T_iec_reference) {
@@ -176,7 +171,7 @@ void ReadIec(Section section, const toml::table& root, std::optional<Pose>& T_ie
       section.Fail(*root["iec"]["T_iec_reference"].node(), "T_iec_reference", expected);
     T_iec_reference = Orthonormalised(T);
   }
-  section.RefuseTheRest();
+  section.RejectUnknownKeys();
 }
 
 void ReadAppliance(Section section, ApplianceConfig& appliance) {
@@ -188,10 +183,8 @@ void ReadAppliance(Section section, ApplianceConfig& appliance) {
   };
   const auto take_seconds = [&](std::string_view key, std::optional<double>& value, double least,
                                 double most) {
-    double seconds = -1;
-    section.Take(key, seconds, fmt::format("seconds from {} to {}", least, most),
+    section.Take(key, value, fmt::format("seconds from {} to {}", least, most),
                  [&](double v) { return v >= least && v <= most; });
-    if (seconds >= 0) value = seconds;
   };
   take_path("state", appliance.state);
   take_path("control", appliance.control);
@@ -200,23 +193,21 @@ void ReadAppliance(Section section, ApplianceConfig& appliance) {
                [](const std::string& s) { return s.size() <= 64; });
   section.Take("sensor_profiles", appliance.sensor_profiles, "true or false", kAny);
   section.Take("keep_recordings", appliance.keep_recordings, "true or false", kAny);
-  double quota_gb = -1;
-  section.Take("quota_gb", quota_gb, "gigabytes from 1 to 100000",
+  section.Take("quota_gb", appliance.quota_gb, "gigabytes from 1 to 100000",
                [](double v) { return v >= 1 && v <= 100000; });
-  if (quota_gb >= 0) appliance.quota_gb = quota_gb;
   take_seconds("auto_stop_s", appliance.auto_stop_s, 1, 120);
   take_seconds("scan_limit_s", appliance.scan_limit_s, 1, 600);
   std::optional<double> result_s;
   take_seconds("result_s", result_s, 1, 3600);
   appliance.result_s = result_s.value_or(appliance.result_s);
-  section.RefuseTheRest();
+  section.RejectUnknownKeys();
 }
 
 void ReadSensor(Section section, ApplianceConfig& appliance) {
   // Which names are known is the drivers' business, and checked by the program.
   section.Take("driver", appliance.sensor_driver, "the name of a sensor driver",
                [](const std::string& s) { return !s.empty() && s.size() <= 64; });
-  section.RefuseTheRest();
+  section.RejectUnknownKeys();
 }
 
 void ReadStorage(Section section, ApplianceConfig& appliance) {
@@ -230,7 +221,7 @@ void ReadStorage(Section section, ApplianceConfig& appliance) {
   section.Take("backup_key_file", key_file, "an absolute path",
                [](const std::string& s) { return s.starts_with('/') && s.size() < 1024; });
   appliance.backup_key_file = key_file;
-  section.RefuseTheRest();
+  section.RejectUnknownKeys();
 }
 
 void ReadPanel(Section button, Section light, PanelConfig& panel) {
@@ -241,14 +232,14 @@ void ReadPanel(Section button, Section light, PanelConfig& panel) {
   take(button, "chip", panel.button_chip);
   take(button, "line", panel.button_line);
   button.Take("active_low", panel.button_active_low, "true or false", kAny);
-  button.RefuseTheRest();
+  button.RejectUnknownKeys();
   take(light, "chip", panel.light_chip);
   take(light, "red", panel.red_line);
   take(light, "green", panel.green_line);
   take(light, "blue", panel.blue_line);
   take(light, "beeper", panel.beeper_line);
   light.Take("active_low", panel.light_active_low, "true or false", kAny);
-  light.RefuseTheRest();
+  light.RejectUnknownKeys();
 }
 
 void ReadUpdate(Section section, UpdateConfig& update) {
@@ -258,7 +249,7 @@ void ReadUpdate(Section section, UpdateConfig& update) {
   if (!folder.empty()) update.folder = folder;
   section.Take("max_bundle_mb", update.max_bundle_mb, "a whole number from 1 to 65536",
                [](int n) { return n >= 1 && n <= 65536; });
-  section.RefuseTheRest();
+  section.RejectUnknownKeys();
 }
 
 void ReadWeb(Section section, WebConfig& web) {
@@ -275,7 +266,7 @@ void ReadWeb(Section section, WebConfig& web) {
   take_path("tls_key", web.tls_key);
   section.Take("plain_http", web.plain_http, "true or false", kAny);
   section.TakeNames("host_names", web.host_names, "a list of at most 16 host names", 16);
-  section.RefuseTheRest();
+  section.RejectUnknownKeys();
 }
 
 }  // namespace

@@ -53,6 +53,16 @@ class Section {
     value = *found;
   }
 
+  /// The same for a key that need not be there: without it the value stays as it is.
+  template <typename T, typename Check>
+  void Take(std::string_view key, std::optional<T>& value, std::string_view expected,
+            Check is_valid) {
+    T found{};
+    if (Find(key) == nullptr) return;
+    Take(key, found, expected, is_valid);
+    value = found;
+  }
+
   /// A positive number in another unit than inside.
   void TakeScaled(std::string_view key, double& value, double unit, std::string_view expected) {
     double number = value / unit;
@@ -130,7 +140,7 @@ class Section {
                                 file_, node->source().begin.line, name_, key, where));
   }
 
-  void RefuseTheRest() const {
+  void RejectUnknownKeys() const {
     if (table_ == nullptr) return;
     for (const auto& [key, node] : *table_) {
       if (std::find(taken_.begin(), taken_.end(), key.str()) != taken_.end()) continue;

@@ -54,7 +54,7 @@ std::string JsonOf(const RoomFit& fit, std::span<const BoardScan> scans) {
   Json json = {{"format", kFormat},
                {"dictionary", scans[0].dictionary},
                {"marker_length_m", scans[0].marker_length_m},
-               {"reference_marker", scans[0].reference_marker},
+               {"reference_marker", scans[0].reference_marker.value()},
                {"T_iec_reference", PoseJson(fit.T_iec_reference)},
                {"shift_m", fit.shift_m},
                {"turn_rad", fit.turn_rad},
@@ -118,7 +118,7 @@ RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans, const RoomCalibratio
     if (!used.empty() &&
         (scan.dictionary != used[0].dictionary || scan.marker_length_m != used[0].marker_length_m ||
          scan.reference_marker != used[0].reference_marker))
-      break;  // the markers were set up anew
+      break;  // the markers were set up differently then
     used.push_back(scan);
     seen.push_back(*scan.scan);
   }

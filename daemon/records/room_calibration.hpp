@@ -18,8 +18,8 @@ struct BoardScan {
   std::string user;
   std::string dictionary;
   double marker_length_m = 0.0;
-  int reference_marker = -1;
-  std::optional<RoomScan> scan;  ///< None: `fault` says why.
+  std::optional<int> reference_marker;  ///< Whose frame it is all in.
+  std::optional<RoomScan> scan;         ///< None: `fault` says why.
   std::string fault;
 };
 
@@ -48,7 +48,7 @@ struct SignedRoom {
   std::vector<std::string> check_ids;
   std::string dictionary;
   double marker_length_m = 0.0;
-  int reference_marker = -1;
+  int reference_marker = 0;  ///< Id.
 };
 /// Of a candidate's text; version and signature are left to the caller.
 /// @throws DataError saying what is wrong with it.

@@ -17,6 +17,9 @@ constexpr std::array<std::string_view, 6> kStates = {"no_sensor", "ready",  "sca
 constexpr std::array<std::string_view, 7> kGuidance = {
     "none", "slower", "closer", "farther", "tracking_lost", "no_markers", "computer_too_slow"};
 constexpr std::array<std::string_view, 4> kFaultKinds = {"none", "sensor", "scan", "storage"};
+static_assert(kStates.size() == static_cast<std::size_t>(ApplianceState::kFault) + 1);
+static_assert(kGuidance.size() == static_cast<std::size_t>(Guidance::kComputerTooSlow) + 1);
+static_assert(kFaultKinds.size() == static_cast<std::size_t>(FaultKind::kStorage) + 1);
 
 template <std::size_t n, typename Enum>
 std::string_view NameIn(const std::array<std::string_view, n>& names, Enum value) {

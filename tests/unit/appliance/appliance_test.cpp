@@ -9,6 +9,7 @@
 #include <fmt/ranges.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "daemon/appliance/unit_profile.hpp"
 #include "daemon/appliance/web_services.hpp"
@@ -360,7 +361,8 @@ TEST_F(ApplianceTest, ARollBackIsToldByStatusAndLightUntilItIsSeen) {
       appliance_->SetRolledBack("the machine has gone back");
       EXPECT_EQ(appliance_->WebStatus().light, "ready_rolled_back");
       EXPECT_EQ(appliance_->WebStatus().rolled_back, "the machine has gone back");
-      EXPECT_THAT(appliance_->StatusJson(), ::testing::HasSubstr("the machine has gone back"));
+      EXPECT_THAT(appliance_->StatusJson().dump(),
+                  ::testing::HasSubstr("the machine has gone back"));
       EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "") << "scans go on";
       EXPECT_EQ(appliance_->WebStatus().light, "scanning");
       EXPECT_EQ(appliance_->Cancel(), "");

@@ -31,14 +31,14 @@ TEST(DiagnosticsTest, HoldHowTheApplianceDoesAndNothingOfPatientsOrAccounts) {
   web::Health health;
   health.ok = false;
   health.reason = "the disk is full";
-  const std::string text = DiagnosticsText(status.dump(), health, "turns 5", {entry});
+  const std::string text = DiagnosticsText(status, health, "turns 5", {entry});
   for (const char* held : {"the disk is full", "ABC123", "\"frames\":301", "turns 5",
                            "12 patient.add", "\"state\":\"result\""})
     EXPECT_THAT(text, HasSubstr(held));
   for (const char* not_held : {"000777", "\"move\"", "8.57", "left arm", "anna", "PAT-0042",
                                "left breast", "nobody thought of"})
     EXPECT_THAT(text, Not(HasSubstr(not_held)));
-  EXPECT_THAT(DiagnosticsText(R"({"last_result": null})", health, "", {}),
+  EXPECT_THAT(DiagnosticsText({{"last_result", nullptr}}, health, "", {}),
               HasSubstr("\"last_result\":{}"));
 }
 

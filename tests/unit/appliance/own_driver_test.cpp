@@ -189,12 +189,12 @@ TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReference) {
     EXPECT_TRUE(becomes([&] { return appliance.state().phase == ScanPhase::kReady; }));
     on_loop([&] { EXPECT_EQ(appliance.StartSweep(), ""); });
     EXPECT_TRUE(becomes([&] {
-      status = nlohmann::json::parse(appliance.StatusJson());
+      status = appliance.StatusJson();
       return status["scan"].is_object() && status["scan"].value("frames", 0) >= kFrames;
     }));
     on_loop([&] { EXPECT_EQ(appliance.EndSweep(), ""); });
     EXPECT_TRUE(becomes([&] { return appliance.state().phase == ScanPhase::kResult; }));
-    on_loop([&] { status = nlohmann::json::parse(appliance.StatusJson()); });
+    on_loop([&] { status = appliance.StatusJson(); });
     loop.Quit(0);
   });
   loop.Run();
