@@ -53,7 +53,8 @@ class ControlConnection {
         received_.erase(0, end + 1);
         return line;
       }
-      if (received_.size() > kMaxAnswer) throw DeviceError("plumbd answers without end");
+      if (received_.size() > kMaxAnswer)
+        throw DeviceError(fmt::format("the reply of plumbd exceeds {} bytes", kMaxAnswer));
       constexpr int kStep_ms = 100;
       pollfd ready{.fd = fd_, .events = POLLIN, .revents = 0};
       if (::poll(&ready, 1, kStep_ms) == 0) waited_ms += kStep_ms;

@@ -38,7 +38,7 @@ Config CheckConfig(DoctorReport& report, const std::optional<fs::path>& wanted) 
   const fs::path file = wanted.value_or(kDefaultConfig);
   std::error_code error;
   if (!wanted && !fs::exists(file, error)) {
-    report.Note("configuration", fmt::format("no {}: defaults hold", file.string()),
+    report.Note("configuration", fmt::format("no {}: using defaults", file.string()),
                 "write one where the defaults do not fit");
     return {};
   }
@@ -156,8 +156,9 @@ void CheckFolder(DoctorReport& report, const char* what, const fs::path& folder)
 void CheckDaemon(DoctorReport& report, const fs::path& control) {
   try {
     ::close(ConnectUnix(control));
-    report.Good("plumbd", fmt::format("answers at {}; while it runs it alone has the sensor",
-                                      control.string()));
+    report.Good("plumbd",
+                fmt::format("answers at {}; while it runs no other program can use the sensor",
+                            control.string()));
   } catch (const std::exception& error) {
     report.Note("plumbd", error.what(),
                 "start it with systemctl start plumbd, or name its socket with --control");

@@ -30,13 +30,13 @@ constexpr const char* kAbout = "backup.json";
 constexpr const char* kSums = "SHA256SUMS";
 constexpr const char* kDatabase = "plumb.db";
 constexpr const char* kScans = "scans";
-/// What else of a state folder is kept; each where it exists.
+/// The other parts of a state folder that are kept, where they exist.
 constexpr std::array<const char*, 4> kOtherFolders = {"set-aside", "calibration", "imports",
                                                       "sensor-profiles"};
 constexpr const char* kRestoring = ".restore";
 constexpr const char* kBackingUp = ".backup";
 
-/// Only what a backup can hold: nothing outside, nothing unknown.
+/// True for the paths that a backup can hold: nothing outside of it, nothing unknown.
 bool MayHold(const std::string& path) {
   const std::string first = fs::path(path).begin()->string();
   return path == kDatabase ||
@@ -52,7 +52,7 @@ class DatabaseCopy {
  public:
   DatabaseCopy(const fs::path& state, Database& database) : folder_(state / kBackingUp) {
     std::error_code error;
-    fs::remove_all(folder_, error);  // of a backup that was interrupted
+    fs::remove_all(folder_, error);  // left by an interrupted backup
     fs::create_directory(folder_, error);
     if (error) throw IoError(DescribeWriteError(folder_, error.value()));
     ::chmod(folder_.c_str(), 0700);
@@ -131,7 +131,7 @@ class Writing {
         found[file.substr(folder.size() + 1)] = digest;
     }
     for (const FileDigest& file : stored) {
-      if (file.path == kRecordingFolder) continue;  // its own check tells
+      if (file.path == kRecordingFolder) continue;  // has a check of its own
       const auto copy = found.find(file.path);
       if (copy == found.end()) {
         output_.Report(fmt::format("scan {}: {} is missing", scan, file.path));
@@ -171,7 +171,7 @@ void RequireEmpty(const fs::path& state) {
     throw IoError(fmt::format("cannot list {}: {}", state.string(), error.message()));
 }
 
-/// Who restores as root restores for the account that runs plumbd.
+/// Files that root restores belong to the account that runs plumbd.
 void GiveToOwnerOf(const fs::path& state, const fs::path& tree) {
   struct stat owner {};
   if (::geteuid() != 0 || ::stat(state.c_str(), &owner) != 0 || owner.st_uid == 0) return;
@@ -189,7 +189,7 @@ void MoveIn(const fs::path& made, const fs::path& state) {
   names.insert(names.end(), kOtherFolders.begin(), kOtherFolders.end());
   names.emplace_back(kDatabase);
   for (const std::string& name :
-       names) {  // the database last: without it nothing is taken for whole
+       names) {  // the database last: a folder without it does not count as whole
     std::error_code error;
     if (!fs::exists(made / name, error)) continue;
     if (::rename((made / name).c_str(), (state / name).c_str()) != 0)
@@ -236,7 +236,7 @@ BackupReport RestoreBackup(const fs::path& backup, const fs::path& state,
   const fs::path made = state / kRestoring;
   const bool is_new = !fs::exists(state);
   try {
-    fs::remove_all(made);  // of a restore that was interrupted
+    fs::remove_all(made);  // left by an interrupted restore
     fs::create_directories(made / kScans);
     ::chmod(state.c_str(), 0750);
     for (const FileDigest& file : reader.files()) {
@@ -256,7 +256,7 @@ BackupReport RestoreBackup(const fs::path& backup, const fs::path& state,
     MoveIn(made, state);
   } catch (const fs::filesystem_error& error) {
     throw IoError(DescribeWriteError(state, error.code().value()));
-  } catch (const DataError&) {  // nothing is left of what was not what it seemed
+  } catch (const DataError&) {  // nothing stays of a backup that was not whole
     std::error_code ignored;
     fs::remove_all(is_new ? state : made, ignored);
     throw;

@@ -9,7 +9,7 @@
 namespace plumb {
 namespace {
 
-/// The name as an address, with what SQLite must know of the disk.
+/// The file's name as a URI, with the options that SQLite needs for such a disk.
 std::string UriOf(const std::filesystem::path& file, Database::Access access) {
   std::string uri = "file:";
   for (const char c : file.string()) {
@@ -19,7 +19,7 @@ std::string UriOf(const std::filesystem::path& file, Database::Access access) {
       uri += c;
     }
   }
-  // A database that was closed well has no log, and none can be made.
+  // A database that was closed cleanly has no write-ahead log, and none can be made.
   std::error_code error;
   if (access == Database::Access::kFrozen &&
       !std::filesystem::exists(file.string() + "-wal", error))
@@ -36,7 +36,7 @@ Statement::~Statement() {
   if (sqlite3_stmt*& idle = database_->idle_[key_]; idle == nullptr) {
     idle = statement_;
   } else {
-    sqlite3_finalize(statement_);  // the same text was used twice at once
+    sqlite3_finalize(statement_);  // the same statement was in use twice
   }
 }
 
@@ -116,8 +116,9 @@ Database::Database(const std::filesystem::path& file, Access access,
     sqlite3_extended_result_codes(handle_, 1);
     sqlite3_busy_timeout(handle_, static_cast<int>(busy_wait.count()));
     if (access == Access::kFrozen)
-      Execute("PRAGMA locking_mode = EXCLUSIVE");  // the log's index is kept in memory
-    // A file from elsewhere shall not be able to run anything.
+      Execute(
+          "PRAGMA locking_mode = EXCLUSIVE");  // keeps the index of the write-ahead log in memory
+    // A database file from elsewhere must not be able to run code.
     sqlite3_db_config(handle_, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
     sqlite3_db_config(handle_, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
     Execute("PRAGMA foreign_keys = ON; PRAGMA synchronous = FULL; PRAGMA secure_delete = ON;");
@@ -179,7 +180,7 @@ bool Database::CheckIntegrity(std::chrono::milliseconds limit) {
     throw DatabaseCorrupt(
         fmt::format("the database {} is damaged ({}): put a backup in its place, or move it and "
                     "the folder scans away to "
-                    "begin anew",
+                    "start over",
                     file_.string(), found));
   }
   return !is_cut_short;
@@ -192,7 +193,7 @@ void Database::CopyTo(const std::filesystem::path& file) {
                       SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
   if (code == SQLITE_OK) {
     // In one step: a writer in between would make it begin again, and in this mode of the log
-    // readers hold nobody up.
+    // readers block no other connection.
     sqlite3_backup* backup = sqlite3_backup_init(copy, "main", handle_, "main");
     code = backup == nullptr ? sqlite3_errcode(copy) : sqlite3_backup_step(backup, -1);
     const int end = backup == nullptr ? code : sqlite3_backup_finish(backup);
@@ -216,7 +217,7 @@ void Database::Fail(int code, const char* doing) const {
     case SQLITE_NOTADB:
       throw DatabaseCorrupt(
           fmt::format("the database {} is damaged ({}): put a backup in its place, or move it and "
-                      "the folder scans away to begin anew",
+                      "the folder scans away to start over",
                       file_.string(), what));
     case SQLITE_FULL:
       throw DiskRefused(message + "; free space on that disk");
@@ -243,7 +244,7 @@ Transaction::~Transaction() {
   if (!open_) return;
   try {
     database_.Prepare("ROLLBACK").Run();
-  } catch (const IoError&) {  // SQLite has rolled back by itself after some errors
+  } catch (const IoError&) {  // SQLite rolls back by itself after some errors
   }
 }
 

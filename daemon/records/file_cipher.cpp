@@ -244,7 +244,7 @@ FileCipher::Written FileCipher::Seal(const fs::path& from, const fs::path& to,
 FileCipher::Written FileCipher::Open(const fs::path& from, const fs::path& to,
                                      const std::string& path, const std::stop_token& stop) const {
   const auto fail = [&path] {
-    throw DataError(path + " is not what was encrypted there: it was changed or put together anew");
+    throw DataError(path + " is not what was encrypted there: it was changed or reassembled");
   };
   const std::string& place = PlaceOf(path);
   Pieces pieces(from / path, kPiece + kOverhead);

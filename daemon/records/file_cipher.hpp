@@ -2,7 +2,7 @@
 //
 // The key comes of a secret, in a file of its own, and of what lies open beside the files: a random
 // salt and what the derivation cost (argon2id). Each file is a stream of pieces, bound to its path:
-// a file that was cut short, put together anew or put in another's place is not taken.
+// a file that was cut short, reassembled or put in another's place is refused.
 #pragma once
 
 #include <array>
@@ -57,7 +57,7 @@ class FileCipher {
   [[nodiscard]] Written Open(const std::filesystem::path& from, const std::filesystem::path& to,
                              const std::string& path, const std::stop_token& stop) const;
 
-  /// In hexadecimal; nobody without the key can make another text's.
+  /// In hexadecimal; it cannot be forged without the key.
   [[nodiscard]] std::string Signature(const std::string& text) const;
 
  private:

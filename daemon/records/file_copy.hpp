@@ -10,7 +10,7 @@
 
 namespace plumb {
 
-/// The file to be copied, not the copy, is at fault.
+/// The original cannot be read; the copy is not at fault.
 class SourceUnreadable : public IoError {
  public:
   using IoError::IoError;

@@ -24,15 +24,15 @@ struct ColumnOf {
 };
 [[nodiscard]] std::vector<ColumnOf> ColumnsOf(Database& database, const std::string& table);
 
-/// {"patients": [{"id": 3, "code": "P", ...}], ...}: without what the appliance notes of its own
-/// care for files (`checked_at`), and without a scan that runs.
+/// {"patients": [{"id": 3, "code": "P", ...}], ...}: without the
+/// appliance's own notes on the files (`checked_at`), and without a scan that runs.
 [[nodiscard]] nlohmann::ordered_json PatientRows(Database& database, std::int64_t patient);
 /// The log's entries on the patient, its sessions, scans and references, and the last daily check
 /// before each scan.
 [[nodiscard]] nlohmann::ordered_json PatientEvidence(Database& database, std::int64_t patient);
 
-/// Holds rows from outside against the tables: known columns of the right type, bounded numbers and
-/// texts, plans and results that can be read, numbers that refer to rows of the same record.
+/// Checks rows from outside against the tables: known columns of the right type, bounded numbers
+/// and texts, plans and results that can be read, numbers that refer to rows of the same record.
 /// @throws DataError naming table and column
 void CheckPatientRows(Database& database, const nlohmann::ordered_json& rows);
 

@@ -70,7 +70,7 @@ std::optional<web::Patient> PatientStore::FindByCode(const std::string& code) {
 std::string PatientStore::Add(const web::Actor& actor, const std::string& code,
                               const std::string& site) {
   StoreChange change(database_);
-  {  // nobody tells PX-1 and px-1 apart at the couch
+  {  // PX-1 and px-1 would be confused at the couch
     Statement query = change.Prepare("SELECT code FROM patients WHERE code = ? COLLATE NOCASE");
     if (query.Bind(code).Step())
       throw StoreRefusal(ChangeResult::kConflict,
@@ -105,7 +105,7 @@ void PatientStore::Change(const web::Actor& actor, const std::string& id, const 
       .Run();
   if (change.num_changed() == 0)
     throw StoreRefusal(ChangeResult::kNotFound, "there is no such patient");
-  change.Log(actor, "patient.change", id, "site and note");  // never their text
+  change.Log(actor, "patient.change", id, "site and note");  // never the text itself
   change.Commit();
 }
 

@@ -53,7 +53,7 @@ bool MayHold(const std::string& path) { return path == kRecord || ScanOf(path).h
 
 const SummedKind kKind{.name = "export", .about_file = kAbout, .format = 1, .may_hold = MayHold};
 
-/// A folder of this process alone, gone with it.
+/// A temporary folder that only this process can read; removed at the end.
 class PrivateFolder {
  public:
   PrivateFolder() {
@@ -107,7 +107,7 @@ fs::path ImportedFile(const fs::path& state, std::int64_t patient) {
   return state / kImports / fmt::format("{}.json", patient);
 }
 
-/// What an earlier import said; empty: the patient was made here.
+/// The record of an earlier import; null: the patient was made here.
 Json EarlierEvidence(const fs::path& state, std::int64_t patient) {
   std::error_code error;
   const fs::path file = ImportedFile(state, patient);
@@ -146,7 +146,7 @@ PatientReport ExportPatient(const fs::path& state, const std::string& code, cons
   for (const Json& file : rows["scan_files"]) {
     const std::string path =
         fmt::format("{}/{}/{}", kScans, ScanId(file["scan_id"]), file["path"].get<std::string>());
-    if (file["path"] == kRecordingFolder) continue;  // its own check tells
+    if (file["path"] == kRecordingFolder) continue;  // has a check of its own
     if (const auto copy = found.find(path); copy == found.end() || copy->second != file["sha256"])
       output.Report(path + (copy == found.end() ? " is missing" : " is not what was stored"));
   }
@@ -179,7 +179,7 @@ class PatientImport {
     if (reader_.files().empty() || reader_.files().front().path != kRecord)
       reader_.Fail(fmt::format("it holds no {}", kRecord));
     reader_.Verify(stop_);
-    fs::remove_all(Made());  // of an import that was interrupted
+    fs::remove_all(Made());  // left by an interrupted import
     fs::create_directory(Made());
     ::chmod(Made().c_str(), 0700);
     ReadRecord();
@@ -218,7 +218,7 @@ class PatientImport {
 
   [[nodiscard]] const Json& rows() const { return record_.at("rows"); }
 
-  /// @throws std::invalid_argument if somebody else, or other data, is.
+  /// @throws std::invalid_argument if another patient has the code, or this one other data.
   bool IsThere() {
     const std::optional<std::int64_t> patient = FindCode(*database_, report_.code);
     if (!patient) return false;
@@ -285,7 +285,7 @@ class PatientImport {
     for (const fs::path& path : moved) fs::remove_all(path, ignored);
   }
 
-  /// Who imports as root imports for the account that runs plumbd.
+  /// Files that root imports belong to the account that runs plumbd.
   void GiveToOwner(const std::vector<fs::path>& moved) const {
     struct stat owner {};
     if (::geteuid() != 0 || ::stat(store_.folders.state().c_str(), &owner) != 0 ||
@@ -309,7 +309,7 @@ class PatientImport {
       const std::vector<ColumnOf> columns = ColumnsOf(*database_, table);
       for (const Json& row : rows().at(table)) InsertRow(table, columns, row);
     }
-    // A scan and the reference that it was compared with name each other.
+    // A scan and the reference that it was compared with refer to each other.
     for (const Json& scan : rows().at("scans")) {
       if (!scan.contains("reference_id") || scan["reference_id"].is_null()) continue;
       database_->Prepare("UPDATE scans SET reference_id = ? WHERE id = ?")
@@ -328,7 +328,7 @@ class PatientImport {
       marks += marks.empty() ? "?" : ", ?";
       values.push_back(ValueHere(table, column.name, row));
     }
-    // The database keeps a statement by the address of its text.
+    // The database caches a statement by the address of its text.
     const std::string sql = fmt::format("INSERT INTO {} ({}) VALUES ({})", table, names, marks);
     Statement insert = database_->Prepare(statements_.insert(sql).first->c_str());
     for (const Json& value : values) {
@@ -346,13 +346,13 @@ class PatientImport {
     if (row.contains("id")) new_ids_[table][row["id"]] = database_->last_id();
   }
 
-  /// A value as it is in this store: with its numbers, and with nothing that was decided elsewhere.
+  /// A value as this store has it: with its own numbers, and without decisions made elsewhere.
   Json ValueHere(const std::string& table, const std::string& column, const Json& row) {
     const Json& value = row[column];
     if (column == "patient_id") return new_ids_["patients"].at(value);
     if (column == "scan_id") return new_ids_["scans"].at(value);
     if (column == "session_id" && !value.is_null()) return new_ids_["sessions"].at(value);
-    if (column == "reference_id") return nullptr;  // put in once the references are there
+    if (column == "reference_id") return nullptr;  // set once the references are there
     if (table == "refs" && column == "approved_by") return "";
     if (table == "refs" && column == "approved_at") return nullptr;
     if (table == "patients" && column == "wiping") return 0;

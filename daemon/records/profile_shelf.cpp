@@ -138,7 +138,7 @@ std::vector<ProfileVersion> ProfileShelf::Versions(const std::string& serial) co
   for (const Entry& entry : Entries(serial)) {
     try {
       versions.push_back(ReadVersion(entry.file, serial, entry.version));
-    } catch (const DataError&) {  // the newest one is told of by Read()
+    } catch (const DataError&) {  // Read() reports the newest one
     }
   }
   return versions;

@@ -77,7 +77,7 @@ std::vector<SignedRoom> RoomStore::List(int limit) {
   while (query.Step()) {
     try {
       rooms.push_back(ReadRoom(query));
-    } catch (const DataError&) {  // told where it would be used
+    } catch (const DataError&) {  // reported where it would be used
     }
   }
   return rooms;

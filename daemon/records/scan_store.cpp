@@ -174,10 +174,10 @@ void ScanStore::Finish(const std::string& scan_id, const FinishedScan& finished)
   const bool is_done = finished.outcome == web::ScanOutcome::kDone;
   const fs::path staging = folders_.Staging(scan_id);
   std::error_code ignored;
-  // The sweep that failed is the one to be looked at. Its images count where all of them are there.
+  // A failed sweep is kept for inspection, if its recording is complete.
   const bool has_recording = fs::exists(staging / kRecordingFolder / "rgb.txt", ignored);
   const bool is_kept = is_done || (finished.outcome == web::ScanOutcome::kFailed && has_recording);
-  // Read before the lock is taken: nobody else waits for it.
+  // Read before the lock is taken, so that nothing else waits for it.
   const std::vector<FileDigest> files =
       is_done ? DigestsOfScan(staging) : std::vector<FileDigest>();
   const StoreDatabase::Held writer = database_.ForChanges();
@@ -198,7 +198,7 @@ void ScanStore::Finish(const std::string& scan_id, const FinishedScan& finished)
   try {
     Sync(folders_.scans());
     NoteEnd(*writer, scan_id, finished, is_kept, files);
-  } catch (...) {  // without its row it is none
+  } catch (...) {  // a scan without its row does not exist
     ::rename(folders_.Scan(scan_id).c_str(), staging.c_str());
     throw;
   }

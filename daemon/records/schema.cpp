@@ -99,7 +99,7 @@ CREATE TRIGGER checks_no_update BEFORE UPDATE ON checks BEGIN SELECT RAISE(ABORT
 CREATE TRIGGER checks_no_delete BEFORE DELETE ON checks BEGIN SELECT RAISE(ABORT, 'checks are append-only'); END;
 )sql";
 
-// Who approves a plan says which one was read.
+// An approval names the plan that was read, by its revision.
 constexpr const char* kVersion3 =
     "ALTER TABLE refs ADD COLUMN revision INTEGER NOT NULL DEFAULT 1;";
 
@@ -132,9 +132,9 @@ CREATE TABLE displays (
 ) STRICT;
 )sql";
 
-// What was stored can be held against what is there; what was removed on purpose is told from what
-// is only out of sight; and each line of the log carries the digest of the one before. A scan whose
-// files an older Plumb did not see keeps its folder from now on.
+// Digests of stored files; the numbers of scans that were removed on purpose, so that others count
+// as missing; a digest chain in the audit log. A scan whose files an older Plumb did not see keeps
+// its folder from now on.
 constexpr const char* kVersion5 = R"sql(
 CREATE TABLE scan_files (
   scan_id INTEGER NOT NULL REFERENCES scans(id) ON DELETE CASCADE,
@@ -153,7 +153,7 @@ UPDATE scans SET has_folder = 1, unavailable = failure, failure = ''
   WHERE outcome = 'done' AND has_folder = 0;
 )sql";
 
-// What people note of a course, patients that are out of the list, and what plans begin with.
+// Notes on patients, the archive, and templates of plans.
 constexpr const char* kVersion6 = R"sql(
 ALTER TABLE patients ADD COLUMN note TEXT NOT NULL DEFAULT '';
 ALTER TABLE patients ADD COLUMN archived INTEGER NOT NULL DEFAULT 0;
@@ -167,7 +167,7 @@ CREATE TABLE templates (
 ) STRICT;
 )sql";
 
-// Where the room's axes lie, as somebody signed it. The newest one holds; none is ever changed.
+// The room's axes, as they were signed. The newest calibration is used; none is ever changed.
 constexpr const char* kVersion7 = R"sql(
 CREATE TABLE room_calibrations (
   version INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -182,7 +182,7 @@ CREATE TRIGGER room_calibrations_no_delete BEFORE DELETE ON room_calibrations
   BEGIN SELECT RAISE(ABORT, 'a signed calibration of the room is never removed'); END;
 )sql";
 
-// When a result was accepted; of earlier ones the log knows.
+// When a result was accepted; for earlier ones the time comes from the audit log.
 constexpr const char* kVersion8 = R"sql(
 ALTER TABLE scans ADD COLUMN accepted_at INTEGER;
 UPDATE scans SET accepted_at = (SELECT MAX(time) FROM audit WHERE subject = printf('%06d', scans.id)

@@ -95,7 +95,7 @@ class Stored {
   [[noreturn]] void Fail(const std::string& why) const {
     throw DataError(
         fmt::format("{} cannot be read: {}; it was changed from outside, or its disk "
-                    "failed. Put a backup of the database in its place, or save it anew",
+                    "failed. Put a backup of the database in its place, or save it again",
                     what_, why));
   }
   [[nodiscard]] const Json* Find(const char* key) const {

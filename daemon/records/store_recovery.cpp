@@ -191,12 +191,12 @@ void RefuseScansOfAnother(Database& database, const ScanFolders& scans) {
   std::vector<fs::path> folders = scans.All();
   std::erase_if(folders, [](const fs::path& folder) {
     return ScanFolders::IsStaging(folder);
-  });  // what had not become a scan is nobody's loss
+  });  // unfinished scans need not be kept
   if (folders.empty()) return;
   throw DatabaseCorrupt(
       fmt::format("the database {} is empty or missing, but there are scans of another one ({} and "
                   "{} more): put a backup of the database in "
-                  "its place, or move the folder {} away too to begin anew",
+                  "its place, or move the folder {} away too to start over",
                   (scans.state() / "plumb.db").string(), folders.front().string(),
                   folders.size() - 1, (scans.scans()).string()));
 }

@@ -34,7 +34,7 @@ std::uint64_t BytesOf(const fs::path& folder, const std::stop_token& stop) {
   return bytes;
 }
 
-/// So that a start tells what was removed from what it cannot explain.
+/// So that a start can distinguish removed scans from unknown ones.
 void NoteRemoved(StoreChange& change, const std::string& scan_id) {
   change.Prepare("INSERT OR IGNORE INTO removed_scans (id) VALUES (?)")
       .Bind(ParseId(scan_id))

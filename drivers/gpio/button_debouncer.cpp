@@ -28,7 +28,7 @@ std::optional<ButtonPress> ButtonDebouncer::OnLevel(bool pressed, Clock::time_po
 void ButtonDebouncer::Set(bool pressed, Clock::time_point then) {
   if (pressed == level_) return;
   if (pressed && !stable_ && then - changed_ >= options_.debounce)
-    begin_ = then;  // first contact after a rest
+    begin_ = then;  // the first contact after a stable level
   level_ = pressed;
   changed_ = then;
 }

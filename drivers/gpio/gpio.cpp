@@ -19,7 +19,7 @@ namespace {
 
 constexpr char kConsumer[] = "plumb";
 constexpr int kMaxEvents =
-    64;  // of one dispatch; a line that never stops chattering must not block the loop
+    64;  // per dispatch; a line that never stops bouncing must not block the loop
 
 struct ChipCloser {
   void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }  // releases its lines too
@@ -66,14 +66,14 @@ struct GpioButton::Impl {
   std::string name;
   std::optional<ButtonDebouncer> debouncer;
   std::function<void(ButtonPress)> pressed;
-  Clock::time_point last;  ///< The debouncer's time.
+  Clock::time_point last;  ///< The last time that the debouncer saw.
 
   void Notify(std::optional<ButtonPress> press) const {
     if (press && pressed) pressed(*press);
   }
 
-  /// When it happened by its stamp, so that a loop that comes late still sees how long the button
-  /// was held. Stamps are of the monotonic clock since Linux 5.7; one of another clock does not fit
+  /// The time of an event by its stamp, so that a late loop still sees how long the button was
+  /// held. Since Linux 5.7 stamps are of the monotonic clock; one of another clock does not lie
   /// between the last time and now.
   [[nodiscard]] Clock::time_point TimeOf(const gpiod_line_event& event,
                                          Clock::time_point now) const {
@@ -96,7 +96,7 @@ GpioButton::GpioButton(const GpioButtonOptions& options) : impl_(std::make_uniqu
                      : GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_DOWN;
   if (gpiod_line_request(impl_->line, &config, 0) != 0) {
     config.flags = options.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW
-                                      : 0;  // a chip without pull resistors inside
+                                      : 0;  // a chip without internal pull resistors
     if (gpiod_line_request(impl_->line, &config, 0) != 0)
       throw DeviceError(fmt::format("{}: {}", impl_->name, Reason(errno)));
   }
@@ -129,8 +129,8 @@ void GpioButton::Dispatch(Clock::time_point now) {
         impl_->debouncer->OnEdge(event.event_type == GPIOD_LINE_EVENT_RISING_EDGE, impl_->last));
   }
   impl_->last = now;
-  // The kernel keeps 16 edges and drops those that come after: where the line is in the end only it
-  // can decide.
+  // The kernel keeps 16 edges and drops later ones, so the final level has to be read from the
+  // line.
   const int value = gpiod_line_get_value(impl_->line);
   impl_->Notify(value < 0 ? impl_->debouncer->OnTime(now)
                           : impl_->debouncer->OnLevel(value == 1, now));
@@ -138,7 +138,7 @@ void GpioButton::Dispatch(Clock::time_point now) {
 
 struct GpioIndicator::Impl {
   Chip chip;
-  std::array<gpiod_line*, 4> lines{};  ///< By bit of IndicatorOutput.
+  std::array<gpiod_line*, 4> lines{};  ///< In the order of the bits of IndicatorOutput.
   int num_lights = 0;
   IndicatorPlayer player;
   int written = -1;

@@ -24,7 +24,7 @@ struct GpioLineName {
 struct GpioButtonOptions {
   GpioLineName where;
   bool active_low =
-      true;  ///< Pressed pulls the line to ground; the pull-up inside the chip is switched on.
+      true;  ///< A press pulls the line to ground; the chip's own pull-up is switched on.
   ButtonDebouncer::Options timing = {};
 };
 
@@ -46,13 +46,13 @@ class GpioButton : public Button {
 
 struct GpioIndicatorOptions {
   std::string chip = "gpiochip0";
-  /// Red, green, blue; empty: no such light. With one light alone, it shows all colours.
+  /// Red, green, blue; empty: no such light. A single light shows all colours.
   std::array<std::string, 3> lights;
   std::string beeper;  ///< Empty: none.
   bool active_low = false;
 };
 
-/// A line that fails later is given up silently: a broken light must not stop a scan.
+/// A line that fails later is ignored from then on: a broken light must not stop a scan.
 class GpioIndicator : public Indicator {
  public:
   using Clock = IndicatorPlayer::Clock;
@@ -61,7 +61,7 @@ class GpioIndicator : public Indicator {
   ~GpioIndicator() override;  ///< Switches everything off.
 
   void Show(IndicatorPattern pattern) noexcept override;
-  /// When Dispatch() wants to be called next; nothing while the light stands still.
+  /// When Dispatch() must be called next; nothing while the light is steady.
   [[nodiscard]] std::optional<Clock::time_point> deadline() const;
   void Dispatch(Clock::time_point now) noexcept;
 
@@ -73,8 +73,8 @@ class GpioIndicator : public Indicator {
 /// The lines and chips that exist, for diagnosis.
 struct GpioChipDescription {
   std::string name, label;
-  std::vector<std::string> lines;  ///< Names, of those that have one.
-  std::string problem;             ///< Why it cannot be opened; empty if it can.
+  std::vector<std::string> lines;  ///< The names of those that have one.
+  std::string problem;             ///< Why the chip cannot be opened; empty if it can.
 };
 [[nodiscard]] std::vector<GpioChipDescription> ListGpioChips();
 

@@ -30,7 +30,7 @@ constexpr std::array kDoneSteps{
 constexpr std::array kInToleranceSteps{
     IndicatorStep{kGreen | kBeeper, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(1800)},
     IndicatorStep{0, milliseconds(200)}, IndicatorStep{kGreen, milliseconds(1800)}};
-// Green for the values, yellow for what is not sure of them; never green alone.
+// Green for the values, yellow for their uncertainty; never green alone.
 constexpr std::array kUnsureSteps{
     IndicatorStep{kYellow | kBeeper, milliseconds(200)}, IndicatorStep{kYellow, milliseconds(600)},
     IndicatorStep{kGreen, milliseconds(600)}, IndicatorStep{kYellow, milliseconds(600)}};
@@ -44,11 +44,11 @@ constexpr std::array kNoAnswerSteps{
 constexpr std::array kFaultSteps{IndicatorStep{kRed, milliseconds(80)},
                                  IndicatorStep{0, milliseconds(80)}};
 
-// Mostly what ready is: scans can be made.
+// Almost as when ready: scans are possible.
 constexpr std::array kReadyRolledBackSteps{IndicatorStep{kGreen, milliseconds(1500)},
                                            IndicatorStep{kRed, milliseconds(300)}};
 
-// Slow, so that nobody takes it for the fault of a running service.
+// Slow, so that it is not mistaken for a fault of a running service.
 constexpr std::array kStoppedSteps{IndicatorStep{kRed, milliseconds(1000)},
                                    IndicatorStep{0, milliseconds(1000)}};
 

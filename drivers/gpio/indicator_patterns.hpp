@@ -15,10 +15,10 @@ enum IndicatorOutput : std::uint8_t { kRed = 1, kGreen = 2, kBlue = 4, kBeeper =
 
 struct IndicatorStep {
   std::uint8_t outputs = 0;             ///< Bits of IndicatorOutput.
-  std::chrono::milliseconds length{0};  ///< 0: for good.
+  std::chrono::milliseconds length{0};  ///< 0: for ever.
 };
 
-/// Steps are played in turn; from `repeat_from` on again and again.
+/// Steps are played in order; those from `repeat_from` on are repeated.
 struct IndicatorProgram {
   std::span<const IndicatorStep> steps;
   std::size_t repeat_from = 0;
@@ -27,11 +27,11 @@ struct IndicatorProgram {
 /// Patterns differ in rhythm too, so that a lamp of one colour can show them all.
 [[nodiscard]] IndicatorProgram ProgramOf(IndicatorPattern pattern);
 
-/// Plays the program of one pattern. Pure: the caller brings the time.
+/// Plays the program of one pattern. Pure: the caller passes the time.
 class IndicatorPlayer {
  public:
   using Clock = std::chrono::steady_clock;
-  /// Begins a pattern; the same one again goes on as it was.
+  /// Begins a pattern; the current pattern continues undisturbed.
   void Show(IndicatorPattern pattern, Clock::time_point now);
   /// Steps forward to `now`.
   void OnTime(Clock::time_point now);

@@ -118,7 +118,7 @@ struct UsbWatcher::Impl {
     return 0;
   }
 
-  // May hear of a device twice: registering enumerates while events are on their way.
+  // A device may be reported twice: registering enumerates while events are pending.
   void OnDevice(libusb_device* device, bool arrived) {
     libusb_device_descriptor descriptor{};
     if (libusb_get_device_descriptor(device, &descriptor) != 0) return;
@@ -155,7 +155,7 @@ UsbWatcher::UsbWatcher() : impl_(std::make_unique<Impl>()) {
     libusb_exit(impl_->context);
     throw DeviceError(fmt::format("libusb cannot watch the bus: {}", libusb_error_name(status)));
   }
-  impl_->changed = false;  // what was there at the start is no news
+  impl_->changed = false;  // sensors that were attached at the start are not reported as new
 }
 
 UsbWatcher::~UsbWatcher() {

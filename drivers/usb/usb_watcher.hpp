@@ -1,5 +1,5 @@
-// Sensors of the Xtion class on the USB bus: who comes and goes, and whether we may use them. Knows
-// nothing of images.
+// Sensors of the Xtion class on the USB bus: when they come and go, and whether this user may open
+// them. Their images are not its business.
 #pragma once
 
 #include <poll.h>
@@ -22,7 +22,7 @@ struct UsbSensor {
   std::string model;                  ///< "Xtion Pro Live" and the like.
   std::string speed;                  ///< "480 Mbit/s"; empty: unknown.
   bool permitted = true;              ///< This user may open it.
-  std::vector<std::string> problems;  ///< What stands in the way or may, each with what to do.
+  std::vector<std::string> problems;  ///< Actual and possible obstacles, each with a remedy.
   bool operator==(const UsbSensor&) const = default;
 };
 
