@@ -82,8 +82,8 @@ struct DepthPlace {
 
 /// A keypoint's depth reading.
 struct DepthReading {
-  double z_m = 0;                       ///< At the keypoint's pixel; 0: none.
-  Eigen::Vector2d inverse_slope_per_px; ///< Of the inverse depth about it.
+  double z_m = 0;                        ///< At the keypoint's pixel; 0: none.
+  Eigen::Vector2d inverse_slope_per_px;  ///< Of the inverse depth about it.
 };
 /// The reading where the depth image shows the keypoint: beside its pixel, as depth is registered
 /// slightly wrong and taken at another time. The plane about the pixel is continued to there.
