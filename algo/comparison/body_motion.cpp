@@ -176,7 +176,7 @@ NormalEquations SumPairs(const std::vector<Pair>& pairs, double scale_m) {
 // Gauss-Newton step within the directions that the surfaces show; along a direction that they do
 // not (roll of a bar) the noise of the normals would drive the pose away. `unit` scales the
 // unknowns to one importance.
-Vector6d SeenStep(const NormalEquations& equations, const Vector6d& unit) {
+Vector6d StepInObservableSubspace(const NormalEquations& equations, const Vector6d& unit) {
   const Matrix6d A = unit.asDiagonal() * equations.A * unit.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(unit.asDiagonal() * equations.crossed *
                                                       unit.asDiagonal());
@@ -229,7 +229,7 @@ StageResult RunStage(const Side& reference, const Side& current, const Pose& T_s
     // In units of the lever arm rotation and translation weigh alike.
     Vector6d unit;
     unit << Eigen::Vector3d::Constant(1.0 / lever), Eigen::Vector3d::Ones();
-    const Vector6d twist = SeenStep(SumPairs(pairs, *scale), unit);
+    const Vector6d twist = StepInObservableSubspace(SumPairs(pairs, *scale), unit);
     if (!twist.allFinite()) {
       result.valid = false;
       return result;

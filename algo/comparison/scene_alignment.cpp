@@ -185,7 +185,7 @@ std::vector<Consensus> ConsensusSets(std::span<const SharedMarker> shared,
 
 struct LeaveOneOut {
   double residual_m = 0.0;
-  double excess = 0.0;  // residual over what would accuse the marker; > 1: it moved
+  double excess = 0.0;  // Residual over the limit; above 1 the marker has moved.
 };
 
 // Judges a marker by the fit of the others in `good`.
@@ -206,7 +206,8 @@ LeaveOneOut JudgeMarker(std::span<const SharedMarker> shared, const Subset& good
   return judged;
 }
 
-// Drops the most suspicious marker while one is accused, then takes back whoever the rest acquits.
+// Rejects the marker that disagrees most while one is beyond its limit, then takes back those that
+// agree with the rest.
 Subset GoodMarkers(std::span<const SharedMarker> shared, Subset good,
                    const MarkerConsensusOptions& options) {
   while (good.size() > 2) {
@@ -223,13 +224,13 @@ Subset GoodMarkers(std::span<const SharedMarker> shared, Subset good,
     good.erase(good.begin() + static_cast<std::ptrdiff_t>(worst));
   }
   if (good.size() < 3) return good;
-  Subset acquitted = good;
+  Subset agreeing = good;
   for (std::size_t i = 0; i < shared.size(); ++i) {
     if (std::binary_search(good.begin(), good.end(), i)) continue;
-    if (JudgeMarker(shared, good, i, options).excess <= 1.0) acquitted.push_back(i);
+    if (JudgeMarker(shared, good, i, options).excess <= 1.0) agreeing.push_back(i);
   }
-  std::sort(acquitted.begin(), acquitted.end());
-  return acquitted;
+  std::sort(agreeing.begin(), agreeing.end());
+  return agreeing;
 }
 
 Alignment MakeAlignment(std::span<const SharedMarker> shared, const Subset& subset,

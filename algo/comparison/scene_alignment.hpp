@@ -17,7 +17,7 @@
 namespace plumb {
 
 /// When a marker counts as moved: by more than `moved_m` and by more than `moved_sigmas` of its own
-/// standard deviation, so that noisy depth accuses no marker.
+/// standard deviation, so that noise alone names no marker.
 struct MarkerConsensusOptions {
   double moved_m = 5 * kMillimetre;
   double moved_sigmas = 3.0;

@@ -26,7 +26,7 @@ void AddTrackedLinks(const TrackingMap& map, std::vector<QuadraticTerm>& terms) 
     const MapKeyframe& keyframe = map.keyframes[k];
     if (keyframe.previous < 0) continue;
     const MapKeyframe& previous = map.keyframes[static_cast<std::size_t>(keyframe.previous)];
-    if (IsHeld(map, keyframe) && IsHeld(map, previous)) continue;
+    if (IsConstrained(map, keyframe) && IsConstrained(map, previous)) continue;
     const LinkEquations link =
         Linearise({keyframe.previous, static_cast<int>(k), keyframe.T_previous_color},
                   previous.T_world_color, keyframe.T_world_color, kSigma_rad, kSigma_m);

@@ -77,7 +77,7 @@ std::vector<KeyframeLink> LinksOf(const TrackingMap& map) {
 
 // Gauss-Newton; the first pose stays. False if the system cannot be solved; the poses are as they
 // were then.
-bool MeetLinks(const std::vector<KeyframeLink>& links, std::vector<Pose>& T_world) {
+bool SolvePoseGraph(const std::vector<KeyframeLink>& links, std::vector<Pose>& T_world) {
   const auto size = static_cast<Eigen::Index>(6 * T_world.size());
   std::vector<Pose> T = T_world;
   for (int round = 0; round < kMaxRounds; ++round) {
@@ -155,7 +155,7 @@ void DistributeLoopError(const std::vector<KeyframeLink>& links, TrackingMap& ma
   all.insert(all.end(), links.begin(), links.end());
   std::vector<Pose> T_world;
   for (const MapKeyframe& keyframe : map.keyframes) T_world.push_back(keyframe.T_world_color);
-  if (!MeetLinks(all, T_world)) return;
+  if (!SolvePoseGraph(all, T_world)) return;
 
   std::vector<Pose> T_new_old;  // World.
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {

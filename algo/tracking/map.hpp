@@ -74,7 +74,7 @@ struct TrackingMap {
 
 /// Whether enough landmarks that others see too, or a marker, hold the keyframe: if not (a blank
 /// wall), bundle adjustment would let it slide, and tracking's word counts.
-[[nodiscard]] inline bool IsHeld(const TrackingMap& map, const MapKeyframe& keyframe) {
+[[nodiscard]] inline bool IsConstrained(const TrackingMap& map, const MapKeyframe& keyframe) {
   constexpr int kEnough = 30;
   int shared = 0;
   for (const KeypointObservation& o : keyframe.keypoints) {

@@ -34,7 +34,7 @@ constexpr int kLoopInliers =
     30;  // Features, and keypoints after them, that must agree on a place seen before.
 
 // What is made of one frame's images before its pose is known.
-struct Prepared {
+struct FrameData {
   GrayImage image;
   DenseView dense;  // For the pose only.
   std::vector<MarkerObservation> markers;
@@ -86,14 +86,14 @@ struct Tracker::Impl {
   // ---- one frame
   // -------------------------------------------------------------------------------------------------
 
-  Prepared Prepare(const Frame& frame) const {
+  FrameData Prepare(const Frame& frame) const {
     const Intrinsics& k = info.intrinsics;
     for (const cv::Mat* image : {&frame.color_rgb, &frame.depth_m})
       if (image->cols != k.width || image->rows != k.height)
         throw std::invalid_argument(
             fmt::format("frame {}: image is {}x{}, the intrinsics are for {}x{}", frame.index,
                         image->cols, image->rows, k.width, k.height));
-    Prepared prepared;
+    FrameData prepared;
     cv::cvtColor(frame.color_rgb, prepared.image.gray, cv::COLOR_RGB2GRAY);
     prepared.image.pyramid = followed_points.PyramidOf(prepared.image.gray);
     prepared.dense = dense_maker.MakeForPose(frame.depth_m);
@@ -103,7 +103,7 @@ struct Tracker::Impl {
 
   // While the camera is followed only markers of the map take part in its pose, and about where
   // they are is known. New ones are looked for in keyframes.
-  void FindMarkers(const Frame& frame, Prepared& prepared) const {
+  void FindMarkers(const Frame& frame, FrameData& prepared) const {
     if (!detector) return;
     if (lost || map.keyframes.empty() || NeedsKeyframe(PredictedPose(frame))) {
       FindAllMarkers(prepared);
@@ -126,7 +126,7 @@ struct Tracker::Impl {
     prepared.markers = detector->DetectNear(prepared.image.gray, expected).markers;
   }
 
-  void FindAllMarkers(Prepared& prepared) const {
+  void FindAllMarkers(FrameData& prepared) const {
     if (!detector || prepared.has_all_markers) return;
     prepared.markers = detector->Detect(prepared.image.gray).markers;
     prepared.has_all_markers = true;
@@ -138,7 +138,7 @@ struct Tracker::Impl {
   }
 
   TrackedFrame Track(const Frame& frame) {
-    Prepared prepared = Prepare(frame);
+    FrameData prepared = Prepare(frame);
     TrackedFrame result;
     result.frame_index = frame.index;
     result.color_time_s = frame.color_time_s;
@@ -165,7 +165,7 @@ struct Tracker::Impl {
     return result;
   }
 
-  static bool ShowsSomething(const Prepared& prepared) {
+  static bool ShowsSomething(const FrameData& prepared) {
     return !prepared.markers.empty() ||
            std::any_of(prepared.dense.z_m.begin(), prepared.dense.z_m.end(),
                        [](float z) { return z > 0; });
@@ -193,7 +193,7 @@ struct Tracker::Impl {
     }
   }
 
-  PoseProblem MakeProblem(const Prepared& prepared, double dt_depth_s) const {
+  PoseProblem MakeProblem(const FrameData& prepared, double dt_depth_s) const {
     PoseProblem problem;
     problem.intrinsics = info.intrinsics;
     problem.T_color_depth = PoseFromTwist(velocity * dt_depth_s);
@@ -236,7 +236,7 @@ struct Tracker::Impl {
                     RotationAngle(T_last_now) < kMaxTurn * dt + 0.03);
   }
 
-  std::optional<PoseEstimate> FollowFrame(const Frame& frame, const Prepared& prepared,
+  std::optional<PoseEstimate> FollowFrame(const Frame& frame, const FrameData& prepared,
                                           TrackedFrame& result) {
     const double dt = frame.color_time_s - last_time_s;
     const double dt_depth = frame.depth_time_s - frame.color_time_s;
@@ -287,7 +287,7 @@ struct Tracker::Impl {
     return count;
   }
 
-  std::optional<PoseEstimate> Relocalize(const Frame& frame, Prepared& prepared,
+  std::optional<PoseEstimate> Relocalize(const Frame& frame, FrameData& prepared,
                                          TrackedFrame& result) {
     lost = true;
     velocity.setZero();
@@ -321,7 +321,7 @@ struct Tracker::Impl {
     return std::nullopt;
   }
 
-  void Accept(const Frame& frame, Prepared& prepared, const PoseEstimate& estimate,
+  void Accept(const Frame& frame, FrameData& prepared, const PoseEstimate& estimate,
               TrackedFrame& result) {
     const double dt = frame.color_time_s - last_time_s;
     if (!lost && dt > 0)
@@ -391,7 +391,7 @@ struct Tracker::Impl {
     return result;
   }
 
-  void MakeKeyframe(const Frame& frame, Prepared& prepared, const Pose& T_world_color,
+  void MakeKeyframe(const Frame& frame, FrameData& prepared, const Pose& T_world_color,
                     TrackedFrame& result) {
     FindAllMarkers(prepared);
     MapKeyframe keyframe;
@@ -464,7 +464,7 @@ struct Tracker::Impl {
 
   // A place seen long ago: where the map has drifted since, it is bent until both visits agree, and
   // the old landmarks are followed again.
-  void CloseLoop(const Prepared& prepared, int index) {
+  void CloseLoop(const FrameData& prepared, int index) {
     if (loop_pause > 0) {
       --loop_pause;
       return;
@@ -481,7 +481,7 @@ struct Tracker::Impl {
     loop_pause = std::min(num_unlike, kLongestLoopPause);
     if (!found || found->num_inliers < kLoopInliers) return;
     const std::optional<Pose> T_world_seen =
-        SeenFrom(found->keyframe, found->T_world_color, prepared, newest);
+        EstimatePoseFromKeyframe(found->keyframe, found->T_world_color, prepared, newest);
     if (!T_world_seen) return;
     const Pose T_drift = newest.T_world_color.inverse() * *T_world_seen;
     const DriftBound bound = LargestDrift(map, found->keyframe);
@@ -508,8 +508,9 @@ struct Tracker::Impl {
 
   // Pose of the newest keyframe from an older one's surroundings alone: landmarks of then and
   // depth. Nothing if they do not agree well.
-  std::optional<Pose> SeenFrom(int older, const Pose& T_world_guess, const Prepared& prepared,
-                               const MapKeyframe& newest) {
+  std::optional<Pose> EstimatePoseFromKeyframe(int older, const Pose& T_world_guess,
+                                               const FrameData& prepared,
+                                               const MapKeyframe& newest) {
     const std::vector<ActivePoint> followed = followed_points.points();
     followed_points.SetPoints({});
     const int followed_reference = std::exchange(reference, older);
@@ -531,7 +532,7 @@ struct Tracker::Impl {
   }
 
   // Landmarks seen in a new keyframe: those followed, and those of older keyframes found again.
-  void AssociateKeyframe(const Prepared& prepared, const cv::Mat& depth_m,
+  void AssociateKeyframe(const FrameData& prepared, const cv::Mat& depth_m,
                          const Pose& T_world_color, MapKeyframe& keyframe) {
     const std::size_t followed = followed_points.points().size();
     std::vector<PosePoint> found;
@@ -562,7 +563,7 @@ struct Tracker::Impl {
     LocalBundleOptions bundle;
     bundle.marker_length_m = info.marker_length_m;
     for (int k = std::max(1, index + 1 - options.local_keyframes); k <= index; ++k)
-      if (IsHeld(map, map.keyframes[static_cast<std::size_t>(k)]))
+      if (IsConstrained(map, map.keyframes[static_cast<std::size_t>(k)]))
         bundle.free_keyframes.push_back(k);
     AdjustLocalMap(info.intrinsics, bundle, map);
   }

@@ -44,7 +44,7 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
   if (!storage_fault_.empty()) (void)Handle(ScanEvent::kStorageFailed);
   WatchButton();
   Show();
-  Care();
+  RunMaintenance();
   sensors_ = std::make_unique<SensorThread>(
       parts_.make_provider,
       SensorThreadOptions{.serial = parts_.config.appliance.sensor_serial,
@@ -119,8 +119,9 @@ Appliance::Answer Appliance::Cancel() { return Handle(ScanEvent::kCancel); }
 /// What only the appliance knows; the state has said yes already.
 Appliance::Answer Appliance::WhyNotScan() const {
   if (stopped_) return "the appliance is being switched off";
-  if (std::string hindrance = hindrance_ ? hindrance_() : std::string(); !hindrance.empty())
-    return hindrance;
+  if (std::string blocking_reason = blocking_reason_ ? blocking_reason_() : std::string();
+      !blocking_reason.empty())
+    return blocking_reason;
   if (store_ == nullptr || !storage_fault_.empty()) return "nothing can be stored";
   if (opening_) return "a patient is being opened: press again in a moment";
   return WhyNoSpace();
@@ -320,7 +321,7 @@ void Appliance::OnTick() {
   const bool is_running = IsRunning();
   clock_.Look(std::chrono::system_clock::now(), Clock::now());
   if (!is_running && --ticks_to_disk_check_ <= 0) CheckDisk();
-  if (!is_running && --ticks_to_care_ <= 0) Care();
+  if (!is_running && --ticks_to_maintenance_ <= 0) RunMaintenance();
   if (!is_running && --ticks_to_file_check_ <= 0) CheckStoredFiles();
   if (!is_running && --ticks_to_backup_ <= 0) BackUpIfDue();
   if (parts_.button != nullptr && button_source_.is_armed()) ArmButtonTimer();

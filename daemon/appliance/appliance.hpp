@@ -78,7 +78,9 @@ class Appliance {
   /// Where a backup of today belongs; empty: no folder is configured.
   [[nodiscard]] std::filesystem::path BackupTarget() const;
   /// Asked before each scan: a reason why none may begin now, or nothing.
-  void SetHindrance(std::function<std::string()> hindrance) { hindrance_ = std::move(hindrance); }
+  void SetBlockingReason(std::function<std::string()> blocking_reason) {
+    blocking_reason_ = std::move(blocking_reason);
+  }
   /// Why no reference may be scanned or approved now, with the next step: no daily check has passed
   /// today. Empty: it may, as always in the demo. @param scan  That is to be the reference: one
   /// that was taken while the check was overdue is confirmed by a check of the same day
@@ -185,8 +187,8 @@ class Appliance {
     bool has_ended = false;
   };
 
-  static constexpr int kDiskCheckTicks = 10;  ///< Seconds, while no scan runs.
-  static constexpr int kCareTicks = 3600;     ///< Likewise.
+  static constexpr int kDiskCheckTicks = 10;      ///< Seconds, while no scan runs.
+  static constexpr int kMaintenanceTicks = 3600;  ///< Likewise.
   static constexpr int kFirstFileCheckTicks = 30;
   static constexpr int kBackupTicks = 60;  ///< Until it is looked at whether one is due.
 
@@ -220,7 +222,7 @@ class Appliance {
   void OnTick();
   void WatchButton();
   void ArmButtonTimer();
-  void Care();
+  void RunMaintenance();
   void CheckDisk();
   void CheckStoredFiles();
   void BackUpIfDue();
@@ -255,9 +257,9 @@ class Appliance {
   std::shared_ptr<ProfileShelf> profiles_;
   std::atomic<bool> profiles_off_;
   std::string profile_fault_;  ///< That the sensor contradicted its profile in the last scan.
-  std::function<std::string()> hindrance_;
+  std::function<std::string()> blocking_reason_;
   int ticks_to_disk_check_ = kDiskCheckTicks;
-  int ticks_to_care_ = kCareTicks;
+  int ticks_to_maintenance_ = kMaintenanceTicks;
   int ticks_to_file_check_ = kFirstFileCheckTicks;
   int ticks_to_backup_ = kBackupTicks;
   ClockWatch clock_{std::chrono::system_clock::now(), std::chrono::steady_clock::now()};

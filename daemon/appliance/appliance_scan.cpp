@@ -243,7 +243,7 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
   check_.reset();
   NotifyWeb(web::EventKind::kResult);
   NotifyWeb(web::EventKind::kData);
-  Care();
+  RunMaintenance();
   if (stopped_) std::exchange(stopped_, nullptr)();
 }
 

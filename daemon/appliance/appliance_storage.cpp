@@ -160,8 +160,8 @@ std::uint64_t Appliance::QuotaBytes() const {
   return static_cast<std::uint64_t>(kShare * static_cast<double>(space.capacity));
 }
 
-/// Notices a disk that has become read-only before a patient is scanned in vain. Off the
-/// loop.
+/// Notices a disk that has become read-only before a patient is scanned and nothing can be kept.
+/// Runs off the loop.
 void Appliance::CheckDisk() {
   ticks_to_disk_check_ = kDiskCheckTicks;
   if (store_ == nullptr || !storage_fault_.empty()) return;
@@ -183,8 +183,8 @@ void Appliance::FailStorage(const std::string& what) {
 }
 
 /// Retention and quota, off the loop.
-void Appliance::Care() {
-  ticks_to_care_ = kCareTicks;
+void Appliance::RunMaintenance() {
+  ticks_to_maintenance_ = kMaintenanceTicks;
   if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
   constexpr std::chrono::hours kTrusted{1};  // until then a time server may correct it
   const bool has_clock = clock_.held() >= kTrusted;

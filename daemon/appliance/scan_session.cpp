@@ -116,7 +116,8 @@ void ScanSession::Scan(const std::stop_token& stop) {
                    try {
                      reference.region =
                          RegionToSee(reference.scene, job_.compare.region_polygon_m, grid);
-                   } catch (const std::exception&) {  // guidance only: the comparison will tell
+                   } catch (const std::exception&) {
+                     // It serves the guidance only; the comparison reports what is wrong.
                    }
                    return reference;
                  }).share();

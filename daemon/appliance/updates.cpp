@@ -37,7 +37,7 @@ Updates::Updates(Appliance& appliance, std::unique_ptr<SystemRestart> restart,
                    .bus_address = options_.bus_address,
                    .version = std::string(Version()),
                    .boot = options_.boot,
-                   .hindrance = [this] { return WhyNotInstall(); },
+                   .blocking_reason = [this] { return WhyNotInstall(); },
                    .changed = [this] { options_.changed(); },
                    .aside = options_.aside,
                    .ended =
@@ -50,12 +50,12 @@ Updates::Updates(Appliance& appliance, std::unique_ptr<SystemRestart> restart,
                          options_.log(kInstaller, "update.rolled_back", "", text);
                          appliance_.SetRolledBack(text);
                        }}) {
-  appliance_.SetHindrance([this] { return WhyNotScan(); });
+  appliance_.SetBlockingReason([this] { return WhyNotScan(); });
 }
 
 Updates::~Updates() {
   *alive_ = false;
-  appliance_.SetHindrance({});
+  appliance_.SetBlockingReason({});
 }
 
 std::string Updates::WhyNotScan() const {

@@ -81,7 +81,7 @@ std::string ScanOnce(const fs::path& suite, const std::stop_token& stop) {
   return bytes;
 }
 
-/// Of the hottest zone that the kernel tells of, in degrees Celsius.
+/// Of the hottest zone that the kernel lists, in degrees Celsius.
 std::optional<double> Temperature() {
   std::optional<double> hottest;
   std::error_code error;

@@ -14,7 +14,8 @@ namespace {
 constexpr double kPeriodWeight = 0.2;
 constexpr double kTrackingWeight = 0.05;
 
-constexpr int kFewFrames = 15;  // Say little: the first ones are all keyframes. So many may wait.
+// The first frames are all keyframes and say little of the load; the queue holds as many.
+constexpr int kFewFrames = 15;
 
 double Smoothed(double before, double value, double weight) {
   return before > 0 ? before + weight * (value - before) : value;
@@ -57,7 +58,7 @@ std::optional<Frame> ThinnedFeed::Next(const std::stop_token& stop) {
       return frame;
     }
     ++num_left_out_;
-    ++num_untold_;
+    ++num_unreported_;
   }
   return std::nullopt;
 }
@@ -91,7 +92,7 @@ bool ThinnedFeed::Takes(double stamp_s, double arrived_s) {
   return true;
 }
 
-int ThinnedFeed::TakeDropped() { return feed_.TakeDropped() + std::exchange(num_untold_, 0); }
+int ThinnedFeed::TakeDropped() { return feed_.TakeDropped() + std::exchange(num_unreported_, 0); }
 
 std::string ThinnedFeed::Warning() const {
   if (num_left_out_ == 0) return {};

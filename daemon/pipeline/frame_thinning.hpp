@@ -31,8 +31,9 @@ struct TrackingLoad {
   double since_change_s = 0.0;  ///< Since the stride last changed, or the sweep began.
 };
 
-/// Every how manieth frame is tracked from now on, 1 to `max_stride`. Frames are left out evenly,
-/// so that the sweep has no gap, and before the queue overflows, which loses frames in a row.
+/// The stride from now on, 1 to `max_stride`: one frame in so many is tracked. Frames are left out
+/// evenly, so that the sweep has no gap, and before the queue overflows, which loses frames in a
+/// row.
 ///
 /// More are left out once tracking falls behind and has no time to catch up, so many that the rest
 /// can be tracked in time; fewer only when it is in time and the load has been low for a while.
@@ -66,7 +67,7 @@ class ThinnedFeed : public FrameFeed {
   const std::function<double()> now_s_;
   const ThinningOptions options_;
   int stride_ = 1, left_to_skip_ = 0;
-  int num_taken_ = 0, num_left_out_ = 0, num_untold_ = 0;
+  int num_taken_ = 0, num_left_out_ = 0, num_unreported_ = 0;
   std::optional<double> last_stamp_s_, handed_out_s_, least_lag_s_;
   double changed_s_ = 0.0;
   double frame_period_s_ = 0.0, tracking_s_ = 0.0;

@@ -14,7 +14,7 @@ namespace plumb {
 
 [[nodiscard]] std::string SettingsJson(const web::Settings& settings);
 /// For the log: {"NAME": [before, after]} of every setting that differs; a setting that `stored`
-/// does not tell is [after] alone.
+/// does not hold is [after] alone.
 /// @param stored  As SettingsJson() wrote it, or anything else.
 [[nodiscard]] std::string SettingsChanges(const std::string& stored, const web::Settings& settings);
 /// What an older Plumb did not know may be missing and has its default; nothing else.

@@ -316,7 +316,8 @@ struct Updater::Impl {
       return 0;
     }
     // To look at a large bundle takes its time.
-    if (const std::string why = impl->options.hindrance ? impl->options.hindrance() : std::string();
+    if (const std::string why =
+            impl->options.blocking_reason ? impl->options.blocking_reason() : std::string();
         !why.empty()) {
       impl->Refuse(ChangeResult::kConflict, why);
       return 0;

@@ -26,7 +26,7 @@ struct UpdaterOptions {
   std::string version;    ///< Of what runs: an older bundle is refused.
   std::string boot = {};  ///< Another text at each start of the machine.
   std::function<std::string()>
-      hindrance;  ///< Asked before RAUC is told to begin: why it may not now, or nothing.
+      blocking_reason;  ///< Asked before RAUC is told to begin: why it may not now, or nothing.
   std::function<void()> changed;  ///< Called on the loop when status() has changed.
   /// Does what takes its time on another thread: reading a whole bundle, closing a large file whose
   /// name is gone. False: it has too much to do. Empty: all is done at once, on the loop.

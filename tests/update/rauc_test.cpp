@@ -140,7 +140,7 @@ class RaucTest : public ::testing::Test {
                                   .max_bytes = 100 << 20,
                                   .bus_address = bus_->address(),
                                   .version = "1.0.0",
-                                  .hindrance = {},
+                                  .blocking_reason = {},
                                   .changed = {},
                                   .aside = {},
                                   .ended = [this](const std::string&, const std::string& failure) {

@@ -102,7 +102,7 @@ class HttpServer::Impl {
 
   void Run() {
     {
-      const Doing doing(options_, "passwords");
+      const ScopedLoopLabel label(options_, "passwords");
       accounts_.Dispatch();
     }
     const auto now = SteadyClock::now();
@@ -192,7 +192,7 @@ class HttpServer::Impl {
   void SendStatus(SteadyClock::time_point now) {
     status_due_.reset();
     last_status_ = now;
-    const Doing doing(options_, "status to viewers");
+    const ScopedLoopLabel label(options_, "status to viewers");
     if (hub_.size() > 0)
       hub_.Broadcast("status", Dump(ToJson(appliance_.GetStatus(), WallClock::now())));
   }

@@ -92,7 +92,7 @@ struct Transport::Callbacks {
   static void OnCompleted(void* self, MHD_Connection* connection, void** context,
                           MHD_RequestTerminationCode) {
     auto* transport = static_cast<Transport*>(self);
-    const Doing doing(transport->options_, "the end of a request");
+    const ScopedLoopLabel label(transport->options_, "the end of a request");
     if (Connection* known = ConnectionOf(connection)) {
       known->since = transport->options_.now();
       known->receiving = true;
@@ -232,7 +232,7 @@ struct Transport::Callbacks {
     auto& transport = *static_cast<Transport*>(self);
     try {
       if (*context == nullptr) {
-        const Doing doing(transport.options_, "the head of a request");
+        const ScopedLoopLabel label(transport.options_, "the head of a request");
         return Begin(transport, connection, url, method, context);
       }
       const std::shared_ptr<Exchange> exchange = *static_cast<std::shared_ptr<Exchange>*>(*context);
@@ -246,8 +246,8 @@ struct Transport::Callbacks {
       if (!exchange->started && !exchange->HasWholeUpload()) return MHD_YES;
       if (!exchange->started) {
         exchange->started = true;
-        const Doing doing(transport.options_,
-                          transport.options_.doing ? exchange->route->Name() : std::string());
+        const ScopedLoopLabel label(
+            transport.options_, transport.options_.doing ? exchange->route->Name() : std::string());
         Gate::Handle(*exchange->route, exchange->request,
                      [weak = std::weak_ptr(exchange)](Response response) {
                        if (const auto alive = weak.lock()) alive->Answer(std::move(response));
@@ -289,7 +289,7 @@ struct Transport::Callbacks {
       CutSocket(exchange.connection);
       exchange.Resume();
     };
-    exchange.owner->greet_(*exchange.stream);
+    exchange.owner->send_initial_events_(*exchange.stream);
     auto held = std::make_unique<std::shared_ptr<Exchange>>(exchange.shared_from_this());
     return MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, kStreamBlock, ReadStream,
                                              held.release(), FreeStream);
@@ -330,12 +330,12 @@ struct Transport::Callbacks {
 
 Transport::Transport(const HttpServerOptions& options, BackgroundWork& background,
                      const Router& router, SessionLookup& sessions, EventHub& hub,
-                     std::function<void(EventStream&)> greet)
+                     std::function<void(EventStream&)> send_initial_events)
     : options_(options),
       background_(background),
       gate_(router, sessions, options.host_names, options.tls.has_value()),
       hub_(hub),
-      greet_(std::move(greet)),
+      send_initial_events_(std::move(send_initial_events)),
       connections_(options_),
       wake_fd_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   if (wake_fd_ < 0) throw IoError(fmt::format("cannot make an eventfd: {}", std::strerror(errno)));

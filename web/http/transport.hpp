@@ -22,16 +22,16 @@ namespace plumb::web {
 class ServedCertificate;
 
 /// Tells HttpServerOptions::doing what runs while it lives.
-class Doing {
+class ScopedLoopLabel {
  public:
-  Doing(const HttpServerOptions& options, std::string_view what) : tell_(options.doing) {
+  ScopedLoopLabel(const HttpServerOptions& options, std::string_view what) : tell_(options.doing) {
     if (tell_) tell_(what);
   }
-  ~Doing() {
+  ~ScopedLoopLabel() {
     if (tell_) tell_({});
   }
-  Doing(const Doing&) = delete;
-  Doing& operator=(const Doing&) = delete;
+  ScopedLoopLabel(const ScopedLoopLabel&) = delete;
+  ScopedLoopLabel& operator=(const ScopedLoopLabel&) = delete;
 
  private:
   const std::function<void(std::string_view)>& tell_;
@@ -41,9 +41,10 @@ class Doing {
 class Transport {
  public:
   /// @param background  Writes files.
-  /// @param greet  Writes the first events into a new stream.
+  /// @param send_initial_events  Writes the first events into a new stream.
   Transport(const HttpServerOptions& options, BackgroundWork& background, const Router& router,
-            SessionLookup& sessions, EventHub& hub, std::function<void(EventStream&)> greet);
+            SessionLookup& sessions, EventHub& hub,
+            std::function<void(EventStream&)> send_initial_events);
   ~Transport();
   Transport(const Transport&) = delete;
   Transport& operator=(const Transport&) = delete;
@@ -74,7 +75,7 @@ class Transport {
   BackgroundWork& background_;
   Gate gate_;
   EventHub& hub_;
-  std::function<void(EventStream&)> greet_;
+  std::function<void(EventStream&)> send_initial_events_;
   ConnectionTable connections_;
   std::list<Exchange*> exchanges_;
   std::weak_ptr<UploadFile> upload_;  ///< One at a time.

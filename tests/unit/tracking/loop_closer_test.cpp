@@ -168,17 +168,17 @@ TEST(LinkEquations, AgreeWithFiniteDifferences) {
   }
 }
 
-TEST(IsHeld, ByLandmarksThatOthersSeeOrByAMarker) {
+TEST(IsConstrained, ByLandmarksThatOthersSeeOrByAMarker) {
   TrackingMap map = DriftedCircle(Vector6d::Zero());
-  EXPECT_TRUE(IsHeld(map, map.keyframes[5]));
+  EXPECT_TRUE(IsConstrained(map, map.keyframes[5]));
   for (Landmark& landmark : map.landmarks) landmark.num_observations = 1;
-  EXPECT_FALSE(IsHeld(map, map.keyframes[5]));
+  EXPECT_FALSE(IsConstrained(map, map.keyframes[5]));
   MarkerObservation seen;
   seen.id = 3;
   map.keyframes[5].data.markers.push_back(seen);
-  EXPECT_FALSE(IsHeld(map, map.keyframes[5])) << "a marker that the map does not know";
+  EXPECT_FALSE(IsConstrained(map, map.keyframes[5])) << "a marker that the map does not know";
   map.markers[3] = {};
-  EXPECT_TRUE(IsHeld(map, map.keyframes[5]));
+  EXPECT_TRUE(IsConstrained(map, map.keyframes[5]));
 }
 
 }  // namespace

@@ -186,7 +186,7 @@ class UpdaterTest : public ::testing::Test {
                                 .bus_address = bus_.address(),
                                 .version = "0.1.0",
                                 .boot = boot_,
-                                .hindrance = [this] { return hindrance_; },
+                                .blocking_reason = [this] { return blocking_reason_; },
                                 .changed = [this] { ++num_changes_; },
                                 .aside = {},
                                 .ended =
@@ -245,7 +245,7 @@ class UpdaterTest : public ::testing::Test {
   PrivateBus bus_{folder_.path()};
   std::unique_ptr<Updater> updater_;
   int num_changes_ = 0;
-  std::string hindrance_;
+  std::string blocking_reason_;
   std::string ended_, told_;
   std::string boot_ = "first";
   std::atomic<std::chrono::seconds> passed_{std::chrono::seconds(0)};
@@ -389,14 +389,14 @@ TEST_F(UpdaterTest, AnOlderVersionIsRefused) {
 }
 
 TEST_F(UpdaterTest, AScanThatBeganWhileTheBundleWasLookedAtGoesFirst) {
-  hindrance_ = "a scan is running";
+  blocking_reason_ = "a scan is running";
   Play([&] {
     FakeRauc rauc(bus_.address());
     Start();
     WaitForRauc();
     const web::Change answer = Install("plumb-9.0.raucb");
     EXPECT_EQ(answer.result, ChangeResult::kConflict);
-    EXPECT_EQ(answer.message, hindrance_);
+    EXPECT_EQ(answer.message, blocking_reason_);
     EXPECT_EQ(rauc.installed(), "");
     EXPECT_FALSE(StatusNow().installing);
   });
