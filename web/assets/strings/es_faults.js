@@ -12,7 +12,7 @@ export const kFaultWords = {
     'el último escaneo falló: pulse el botón para darse por enterado',
   'the storage has failed: see the reason in the status; nothing can be scanned':
     'ha fallado el almacenamiento: vea el motivo en el estado; no se puede escanear',
-  'the sensor does not work: see the reason in the status; plug it out and in again':
+  'the sensor does not work: see the reason in the status; unplug it and plug it in again':
     'el sensor no funciona: vea el motivo en el estado; desconéctelo y vuelva a conectarlo',
   'no sensor is attached: plug it in and wait for the ready light':
     'no hay ningún sensor conectado: conéctelo y espere la luz de listo',
