@@ -1,4 +1,5 @@
-// `plumb factory-reset`: for somebody with a shell, where nobody can log in to the page any more.
+// `plumb factory-reset`: for an engineer with a shell on a unit whose page no longer lets anybody
+// log in.
 #include "daemon/records/factory_reset.hpp"
 
 #include <filesystem>

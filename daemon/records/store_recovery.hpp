@@ -20,7 +20,7 @@ class ScansMissing : public DiskRefused {
 struct RecoveryReport {
   int interrupted_scans = 0;     ///< Had begun and not ended: failed now.
   int orphaned_folders = 0;      ///< Staging, or of scans that failed or were removed: removed.
-  int foreign_folders = 0;       ///< Of scans that no row knows to have ended: moved to set-aside.
+  int foreign_folders = 0;       ///< Of scans that no row records as ended; moved to set-aside.
   int lost_scans = 0;            ///< Finished, but their files cannot be seen now: unavailable.
   int attached_scans = 0;        ///< Were unavailable, and their files are there again.
   int broken_references = 0;     ///< Approved, but their scene cannot be seen: to be shown loudly.
@@ -32,7 +32,8 @@ struct RecoveryReport {
 void RefuseScansOfAnother(Database& database, const ScanFolders& folders);
 
 /// Fails scans that were interrupted, notes which files are there, removes what a crash or a
-/// removal left, and sets aside what no row explains. The caller holds the connection for changes.
+/// removal left, and moves folders that belong to no row to set-aside. The caller holds the
+/// connection for changes.
 /// @throws ScansMissing; IoError and its kinds
 void RecoverStore(Database& database, const ScanFolders& folders, const LookAtPath& look,
                   RecoveryReport& report);

@@ -23,11 +23,11 @@ struct UpdaterOptions {
   std::filesystem::path folder = "/var/lib/plumb/updates";  ///< Bundles lie here: NAME.raucb.
   std::uint64_t max_bytes = std::uint64_t{2} << 30;         ///< Of one bundle.
   std::string bus_address;                                  ///< Empty: the system bus.
-  std::string version;    ///< Of what runs: an older bundle is refused.
-  std::string boot = {};  ///< Another text at each start of the machine.
-  std::function<std::string()>
-      blocking_reason;  ///< Asked before RAUC is told to begin: why it may not now, or nothing.
-  std::function<void()> changed;  ///< Called on the loop when status() has changed.
+  std::string version;                           ///< Of what runs: an older bundle is refused.
+  std::string boot = {};                         ///< Another text at each start of the machine.
+  std::function<std::string()> blocking_reason;  ///< Asked before an installation begins: why it
+                                                 ///< may not begin now; empty if it may.
+  std::function<void()> changed;                 ///< Called on the loop when status() has changed.
   /// Does what takes its time on another thread: reading a whole bundle, closing a large file whose
   /// name is gone. False: it has too much to do. Empty: all is done at once, on the loop.
   std::function<bool(std::function<void()>)> aside;
