@@ -14,6 +14,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "algo/base/check_stop.hpp"
+#include "algo/base/robust_weights.hpp"
 #include "algo/comparison/motion_start.hpp"
 #include "algo/comparison/surface.hpp"
 
@@ -23,8 +24,7 @@ namespace {
 constexpr std::size_t kMinSamples = 50;
 constexpr int kMinPairs = 30;
 constexpr std::size_t kChunk =
-    1024;                         // pairs summed together: fixed, so sums do not depend on threads
-constexpr double kTukey = 4.685;  // 95 % efficiency on Gaussian residuals
+    1024;  // pairs summed together: fixed, so sums do not depend on threads
 constexpr double kMadToSigma = 1.4826;
 constexpr double kMinScale_m =
     0.2e-3;  // below what any sensor leaves; keeps perfect data from a zero scale
@@ -135,9 +135,8 @@ std::optional<double> ResidualScale(const std::vector<Pair>& pairs, double max_s
   return std::clamp(kMadToSigma * *middle, kMinScale_m, max_scale_m);
 }
 
-double TukeyWeight(double residual_m, double scale_m) {
-  const double u = residual_m / (kTukey * scale_m);
-  return std::abs(u) < 1.0 ? (1 - u * u) * (1 - u * u) : 0.0;
+double WeightOf(double residual_m, double scale_m) {
+  return TukeyWeight(residual_m / (kTukeyCut * scale_m));
 }
 
 struct NormalEquations {
@@ -154,7 +153,7 @@ NormalEquations SumPairs(const std::vector<Pair>& pairs, double scale_m) {
     NormalEquations& sum = sums[c];
     for (std::size_t k = c * kChunk; k < std::min(pairs.size(), (c + 1) * kChunk); ++k) {
       const Pair& pair = pairs[k];
-      const double w = pair.valid ? TukeyWeight(pair.residual_m, scale_m) : 0.0;
+      const double w = pair.valid ? WeightOf(pair.residual_m, scale_m) : 0.0;
       if (w == 0.0) continue;
       const Vector6d gradient =
           Gradient(pair.arm, (pair.normal_reference + pair.normal_current).normalized());
@@ -322,7 +321,7 @@ Matrix6d FitCovariance(const std::vector<Pair>& pairs, double scale_m, double sp
   Vector6d unit;
   unit << Eigen::Vector3d::Constant(1.0 / lever), Eigen::Vector3d::Ones();
   for (const Pair& pair : pairs) {
-    const double u = pair.residual_m / (kTukey * scale_m);
+    const double u = pair.residual_m / (kTukeyCut * scale_m);
     if (!pair.valid || std::abs(u) >= 1.0) continue;
     const Vector6d a = unit.asDiagonal() * Gradient(pair.arm, pair.normal_reference);
     const Vector6d b = unit.asDiagonal() * Gradient(pair.arm, pair.normal_current);
@@ -330,7 +329,7 @@ Matrix6d FitCovariance(const std::vector<Pair>& pairs, double scale_m, double sp
     information += 0.5 * slope * (a * b.transpose() + b * a.transpose());
     const Eigen::Array3i block = (pair.arm.array() / kBlock_m).floor().cast<int>();
     const auto slot = blocks.try_emplace({block[0], block[1], block[2]}, Vector6d::Zero()).first;
-    slot->second += TukeyWeight(pair.residual_m, scale_m) * pair.residual_m * 0.5 * (a + b);
+    slot->second += WeightOf(pair.residual_m, scale_m) * pair.residual_m * 0.5 * (a + b);
   }
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
   const double largest = std::max(eigen.eigenvalues()[5], 1e-12);
@@ -391,7 +390,7 @@ std::optional<SurfaceMotion> EstimateBodyMotion(const BodyMotionInput& input) {
   for (std::size_t i = 0; i < side_reference.surface.size(); ++i) {
     if (side_reference.surface.inner[i] == 0) continue;
     ++inner;
-    explained += pairs[i].valid && TukeyWeight(pairs[i].residual_m, fitted.scale_m) > 0 ? 1 : 0;
+    explained += pairs[i].valid && WeightOf(pairs[i].residual_m, fitted.scale_m) > 0 ? 1 : 0;
   }
   motion.inlier_share =
       inner > 0 ? static_cast<double>(explained) / static_cast<double>(inner) : 0.0;

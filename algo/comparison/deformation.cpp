@@ -13,6 +13,7 @@
 #include <Eigen/SparseCholesky>
 
 #include "algo/base/check_stop.hpp"
+#include "algo/base/robust_weights.hpp"
 #include "algo/comparison/surface.hpp"
 
 namespace plumb {
@@ -26,7 +27,6 @@ constexpr double kNodeSpacing_m =
 constexpr std::size_t kMaxNodes = 600;  // of a body 1.9 m long; above, the nodes are further apart
 constexpr std::size_t kNodesOfSample = 4;
 constexpr double kSigmaOfSample_m = 1.5e-3;  // noise of a fused surface at one sample
-constexpr double kTukey = 4.685;             // 95 % efficiency on Gaussian residuals
 constexpr double kSigmaOfTurn_rad = 0.3;     // weak prior: holds nodes that nothing else holds
 // A part that fits where the rigid motion took it stays there: nothing else keeps a smooth surface
 // from sliding along itself. Cauchy weights let go of what has clearly moved.
@@ -282,8 +282,7 @@ class Registration {
     Match match;
     match.normal = normal;
     match.residual_m = normal.dot(p - current_.points[j].cast<double>());
-    const double u = match.residual_m / (kTukey * stage.scale_m);
-    match.weight = std::abs(u) < 1 ? (1 - u * u) * (1 - u * u) : 0.0;
+    match.weight = TukeyWeight(match.residual_m / (kTukeyCut * stage.scale_m));
     return match;
   }
 

@@ -6,6 +6,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "algo/base/robust_weights.hpp"
+
 namespace plumb {
 namespace {
 
@@ -36,7 +38,7 @@ bool RefitPlane(const Surface& scene, const std::vector<std::size_t>& candidates
     const Eigen::Vector3d p = scene.points[i].cast<double>();
     const double u = plane.Height(p) / band_m;
     if (std::abs(u) >= 1.0 || scene.normals[i].cast<double>().dot(plane.normal) < min_cos) continue;
-    const double w = (1 - u * u) * (1 - u * u);
+    const double w = TukeyWeight(u);
     mean += w * p;
     second += w * p * p.transpose();
     total += w;

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
 
+#include "algo/base/robust_weights.hpp"
 #include "algo/base/statistics.hpp"
 
 namespace plumb {
@@ -192,11 +193,8 @@ std::optional<MarkerFace> FitMarkerFace(const MarkerObservation& marker, const D
     for (std::size_t i = 0; i < pixels.size(); ++i)
       values[i] = std::abs(Residual(pixels[i], face.plane));
     sigma = std::max(kMinSigma, kMadToSigma * TakeMedian(values));
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      const double ratio = Residual(pixels[i], face.plane) / (kTukeyScales * sigma);
-      const double inside = std::max(0.0, 1.0 - ratio * ratio);
-      weights[i] = inside * inside;
-    }
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      weights[i] = TukeyWeight(Residual(pixels[i], face.plane) / (kTukeyScales * sigma));
   }
   double sum_squared = 0.0;
   int num_inliers = 0;

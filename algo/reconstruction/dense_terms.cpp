@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "algo/base/check_stop.hpp"
+#include "algo/base/robust_weights.hpp"
 #include "algo/sensor_model/depth_correction.hpp"
 
 namespace plumb::dense {
@@ -156,9 +157,7 @@ class TermSum {
   Eigen::MatrixXd block_ = Eigen::MatrixXd::Zero(QuadraticTerm::kSize, QuadraticTerm::kSize);
 };
 
-double CauchyWeight(double residual_in_sigmas) {
-  return 1.0 / (1.0 + residual_in_sigmas * residual_in_sigmas / 4.0);
-}
+constexpr double kLossScale = 2.0;  // Cauchy, in standard deviations.
 
 // Every fourth cell each way, another sixteenth for each pair. Neighbouring cells share most of
 // their error: the others would cost time and add nothing.
@@ -196,8 +195,9 @@ QuadraticTerm DenseTerm(const Sensor& sensor, const View& a, const View& b,
             PositionJacobian(sensor, a, i, J_depth, n_a) -
             PositionJacobian(sensor, b, j, DepthJacobian(b, j), n_b);
         const double residual = InRawUnits(a, i, J_depth, match->residual, J);
-        const double w =
-            weight * CauchyWeight(residual / match->sigma) / (match->sigma * match->sigma);
+        const double in_sigmas = residual / match->sigma;
+        const double w = weight * CauchyWeight(in_sigmas * in_sigmas, kLossScale) /
+                         (match->sigma * match->sigma);
         sum.Add(J, residual, w);
       });
   sum.Finish();
@@ -250,7 +250,8 @@ std::optional<QuadraticTerm> MarkerFaceTerm(const Sensor& sensor, const View& vi
       const double sigma = std::hypot(DepthSigma(p.z(), cosine) * cosine, 0.001);
       // Neighbouring cells share their noise: four cells count as one.
       const double residual = InRawUnits(view, i, J_depth, in_marker.z(), J);
-      const double w = 0.25 * CauchyWeight(residual / sigma) / (sigma * sigma);
+      const double in_sigmas = residual / sigma;
+      const double w = 0.25 * CauchyWeight(in_sigmas * in_sigmas, kLossScale) / (sigma * sigma);
       sum.Add(J, residual, w);
       ++count;
     }

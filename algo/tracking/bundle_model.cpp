@@ -1,7 +1,6 @@
 #include "algo/tracking/bundle_model.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace plumb::bundle {
 namespace {
@@ -137,10 +136,6 @@ DepthBeside::DepthBeside(const DepthReading& reading, const Eigen::Vector2d& off
   const double inverse = 1.0 / reading.z_m;
   z_m = 1.0 / std::max(inverse + reading.inverse_slope_per_px.dot(offset_px), kFarthest * inverse);
   J_offset = -z_m * z_m * reading.inverse_slope_per_px.transpose();
-}
-
-double CauchyLoss(double squared, double scale) {
-  return scale * scale * std::log1p(squared / (scale * scale));
 }
 
 }  // namespace plumb::bundle

@@ -93,13 +93,7 @@ struct DepthBeside {
   Eigen::RowVector2d J_offset;  ///< Metres per pixel.
 };
 
-/// Cauchy's loss of a squared residual, and the weight of its reweighted square.
-[[nodiscard]] double CauchyLoss(double squared, double scale);
-[[nodiscard]] inline double CauchyWeight(double squared, double scale) {
-  return 1.0 / (1.0 + squared / (scale * scale));
-}
-
-inline constexpr double kKeypointLossScale = 2.0;  ///< In standard deviations.
+inline constexpr double kKeypointLossScale = 2.0;  ///< Cauchy, in standard deviations.
 inline constexpr double kCornerLossScale = 3.0;
 
 }  // namespace plumb::bundle

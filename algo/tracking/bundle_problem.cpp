@@ -6,6 +6,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "algo/base/robust_weights.hpp"
+
 namespace plumb::bundle {
 namespace {
 

@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "algo/base/pose.hpp"
+#include "algo/base/robust_weights.hpp"
 
 namespace plumb {
 namespace {
@@ -35,13 +36,6 @@ struct CornerView {
   Eigen::Vector2d ideal;
   double weight = 0;
 };
-
-double Cauchy(double squared, double scale) {
-  return scale * scale * std::log1p(squared / (scale * scale));
-}
-double CauchyWeight(double squared, double scale) {
-  return 1.0 / (1.0 + squared / (scale * scale));
-}
 
 // d(R(x)^-1 (p - v)) / dx at 0 for the twist x on the camera's side.
 Matrix3x6d PoseDerivative(const Eigen::Vector3d& p) {
@@ -201,12 +195,12 @@ class LocalBundle {
             state.T_camera_world[static_cast<std::size_t>(view.keyframe)] * state.landmarks[s];
         if (p.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
         const Eigen::Vector2d r = (p.head<2>() / p.z() - view.ideal) * weight_px_;
-        cost += Cauchy(r.squaredNorm(), kKeypointLossScale);
+        cost += CauchyLoss(r.squaredNorm(), kKeypointLossScale);
         if (view.weight_z == 0) continue;
         const double rz =
             (DepthAtStamp(map_.keyframes[static_cast<std::size_t>(view.keyframe)], p) - view.z_m) *
             view.weight_z;
-        cost += Cauchy(rz * rz, kKeypointLossScale);
+        cost += CauchyLoss(rz * rz, kKeypointLossScale);
       }
     }
     for (const CornerView& view : corners_) {
@@ -215,7 +209,7 @@ class LocalBundle {
           (state.T_world_marker[static_cast<std::size_t>(view.marker)] * view.in_marker);
       if (p.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
       const Eigen::Vector2d r = (p.head<2>() / p.z() - view.ideal) * view.weight;
-      cost += Cauchy(r.squaredNorm(), kCornerLossScale);
+      cost += CauchyLoss(r.squaredNorm(), kCornerLossScale);
     }
     return cost;
   }

@@ -5,6 +5,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "algo/base/robust_weights.hpp"
+
 namespace plumb {
 namespace {
 
@@ -23,9 +25,10 @@ struct NormalEquations {
   }
 };
 
-// Weight of a residual in sigmas under the Cauchy loss.
-double CauchyWeight(double residual, double scale) {
-  return 1.0 / (1.0 + (residual / scale) * (residual / scale));
+constexpr double kLossScale = 2.0;  // Cauchy, in standard deviations.
+
+double WeightOf(double residual_in_sigmas) {
+  return CauchyWeight(residual_in_sigmas * residual_in_sigmas, kLossScale);
 }
 
 // With p_camera = T^-1 p_world and T <- T exp(x): d p_camera / d x = [ [p]x , -I ].
@@ -33,7 +36,7 @@ void AddPoint(const PosePoint& point, const Eigen::Vector3d& p, NormalEquations&
   if (p.z() < 0.05) return;
   const double iz = 1.0 / p.z();
   const Eigen::Vector2d residual = (p.head<2>() * iz - point.ideal) / point.sigma;
-  const double weight = CauchyWeight(residual.norm(), 2.0);
+  const double weight = WeightOf(residual.norm());
   Eigen::Matrix<double, 3, 6> J_point;
   J_point << Skew(p), -Eigen::Matrix3d::Identity();
   const Vector6d Jx =
@@ -45,7 +48,7 @@ void AddPoint(const PosePoint& point, const Eigen::Vector3d& p, NormalEquations&
   if (point.inverse_z > 0) {
     const double depth_residual = (iz - point.inverse_z) / point.inverse_z_sigma;
     const Vector6d Jz = -iz * iz / point.inverse_z_sigma * J_point.row(2).transpose();
-    equations.Add(Jz, depth_residual, weight * CauchyWeight(depth_residual, 2.0));
+    equations.Add(Jz, depth_residual, weight * WeightOf(depth_residual));
   }
 }
 
@@ -101,7 +104,7 @@ DenseSum AddDense(const PoseProblem& problem, const Pose& T_world_camera, double
       const Eigen::Vector3d n_color = R_target_color.transpose() * n.cast<double>();
       Vector6d J;
       J << p_color.cross(n_color), n_color;
-      sum.equations.Add(J / sigma, residual / sigma, CauchyWeight(residual / sigma, 2.0));
+      sum.equations.Add(J / sigma, residual / sigma, WeightOf(residual / sigma));
       sum.squares += residual * residual;
       ++sum.associated;
     }

@@ -6,6 +6,7 @@
 #include <tbb/parallel_for.h>
 #include <Eigen/Cholesky>
 
+#include "algo/base/robust_weights.hpp"
 #include "algo/tracking/bundle_model.hpp"
 
 namespace plumb {
