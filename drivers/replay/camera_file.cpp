@@ -240,8 +240,9 @@ void ReadDepthCamera(const Keys& keys, CameraFile& camera) {
     camera.warnings.push_back(
         fmt::format("{}: depth_registered is 0 but depth_camera_matrix, "
                     "depth_distortion_coefficients and T_color_depth are not all given; "
-                    "depth is taken as registered to colour",
+                    "depth is taken as registered to colour, unless the images show otherwise",
                     keys.name()));
+    camera.depth_camera_unknown = true;
     return;
   }
   DepthCamera depth;

@@ -22,6 +22,8 @@ struct CameraFile {
   Intrinsics color;
   double depth_scale = 5000.0;  ///< Units of a depth image per metre; TUM's 5000 when absent.
   std::optional<DepthCamera> depth_camera;  ///< Set only if the depth is not registered.
+  bool depth_camera_unknown =
+      false;  ///< Depth is not registered, and the file has no depth_camera.
   std::optional<std::string> marker_dictionary;
   std::optional<double> marker_length_m;
   std::optional<int> reference_marker;
@@ -32,8 +34,8 @@ struct CameraFile {
 /// distortion_coefficients, depth_scale, depth_registered, marker_dictionary, marker_length
 /// (metres), reference_marker; for depth_registered 0 also depth_camera_matrix,
 /// depth_distortion_coefficients, T_color_depth (4x4) and, if they differ from the colour image's,
-/// depth_image_width and depth_image_height. Without these three the depth is taken as registered,
-/// with a warning.
+/// depth_image_width and depth_image_height. Without these three the depth camera is unknown, with
+/// a warning.
 /// @param name  Of the file, for messages.
 /// @throws DataError naming file, key, what was found and what is expected.
 [[nodiscard]] CameraFile ParseCameraFile(std::string_view text, const std::string& name);

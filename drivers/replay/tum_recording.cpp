@@ -20,6 +20,7 @@
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
 #include "drivers/replay/camera_file.hpp"
+#include "drivers/replay/depth_camera_search.hpp"
 #include "drivers/replay/registration.hpp"
 #include "drivers/replay/tum_index.hpp"
 
@@ -34,6 +35,7 @@ constexpr std::size_t kMaxCameraBytes = std::size_t{1} << 16;
 constexpr std::size_t kReadAhead = 3;
 constexpr std::size_t kMinFrames = 2;
 constexpr std::uint16_t kSaturated = 65535;
+constexpr std::size_t kSearchedPairs = 24;  // For a depth camera that the recording does not state.
 
 double ThreadCpuSeconds() {
   timespec now{};
@@ -154,6 +156,7 @@ struct TumRecording::Impl {
 
   void FindFrames(const fs::path& folder, double least_max_gap_s);
   void ReadCamera(const fs::path& folder, const RecordingDefaults& defaults);
+  void SearchDepthCamera();
   [[nodiscard]] Decoded Decode(std::size_t i) const;
   void DecodeAll(const std::stop_token& stop);
 };
@@ -217,6 +220,26 @@ void TumRecording::Impl::ReadCamera(const fs::path& folder, const RecordingDefau
   depth_intrinsics = camera.depth_camera ? camera.depth_camera->intrinsics : camera.color;
   if (camera.depth_camera)
     registration.emplace(depth_intrinsics, camera.color, camera.depth_camera->T_color_depth);
+  if (camera.depth_camera_unknown) SearchDepthCamera();
+}
+
+void TumRecording::Impl::SearchDepthCamera() {
+  std::vector<ImagePair> pairs;
+  const std::size_t every = plans.size() / kSearchedPairs + 1;
+  for (std::size_t i = 0; i < plans.size(); i += every) {
+    const Frame frame = Decode(i).frame;
+    pairs.push_back({frame.color_rgb, frame.depth_m});
+  }
+  const std::optional<FoundDepthCamera> found = FindDepthCamera(pairs, info.intrinsics);
+  if (!found) return;
+  const DepthCamera& depth = found->camera;
+  registration.emplace(depth.intrinsics, info.intrinsics, depth.T_color_depth);
+  info.warnings.push_back(fmt::format(
+      "edges of the depth images lie on those of the colour images if they are from a camera of "
+      "focal length {:.0f} px, {:.0f} mm beside the colour camera: depth is registered with that "
+      "estimate; state depth_camera_matrix, depth_distortion_coefficients and T_color_depth in "
+      "camera.yaml to be exact",
+      depth.intrinsics.fx, 1e3 * depth.T_color_depth.translation().x()));
 }
 
 Decoded TumRecording::Impl::Decode(std::size_t i) const {

@@ -1,0 +1,218 @@
+#include "drivers/replay/depth_camera_search.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace plumb {
+namespace {
+
+constexpr float kMinDepth_m = 0.3F;
+constexpr float kStep = 0.08F;         // Relative difference of depths on both sides of an edge.
+constexpr int kStepWidth = 2;          // Pixels across which a step is looked for.
+constexpr int kBorder = 8;             // Pixels at the images' rims that show no edges.
+constexpr float kMaxGradient = 20.0F;  // Grey levels a pixel: one bright edge is one edge.
+constexpr int kSurroundings = 41;      // Pixels: an edge stands out from what is about it.
+constexpr std::size_t kMaxPointsOfPair = 1000;  // In each of the two directions.
+constexpr std::size_t kMinPoints = 500;         // Of all pairs that search, and that judge.
+constexpr double kMinGain = 2.0;
+constexpr double kWidthOfSteps_px = 640.0;  // The image width that steps of the search are for.
+
+/// Where a depth pixel lies in the colour image: zoom about the centre, a shift, and a parallax
+/// that falls with the distance.
+using Placement = Eigen::Vector4d;  // zoom, shift x and y in px, parallax in px m
+const Placement kRegistered(1.0, 0.0, 0.0, 0.0);
+
+struct EdgePoint {
+  float x, y;
+  float inverse_depth_per_m;  ///< Of the nearer side, which the edge belongs to.
+};
+
+/// One direction of one pair: steps of the depth image along it, and how strong edges of the colour
+/// image are in it.
+struct Edges {
+  cv::Mat contrast;  ///< CV_32FC1, mean about 0 everywhere.
+  std::vector<EdgePoint> steps;
+};
+
+cv::Mat EdgeContrast(const cv::Mat& grey, bool along_x) {
+  cv::Mat gradient;
+  cv::Sobel(grey, gradient, CV_32F, along_x ? 1 : 0, along_x ? 0 : 1, 1, 0.5);
+  gradient = cv::min(cv::abs(gradient), kMaxGradient);
+  cv::Mat surroundings;
+  cv::boxFilter(gradient, surroundings, CV_32F, {kSurroundings, kSurroundings});
+  cv::Mat contrast;
+  cv::boxFilter(gradient - surroundings, contrast, CV_32F, {3, 3});
+  return contrast;
+}
+
+std::vector<EdgePoint> DepthSteps(const cv::Mat& depth_m, bool along_x) {
+  const cv::Point back = along_x ? cv::Point(-kStepWidth, 0) : cv::Point(0, -kStepWidth);
+  const cv::Point2f middle = cv::Point2f(back) * 0.5F;
+  std::vector<EdgePoint> steps;
+  for (int y = kBorder; y < depth_m.rows - kBorder; ++y) {
+    for (int x = kBorder; x < depth_m.cols - kBorder; ++x) {
+      const float here = depth_m.at<float>(y, x);
+      const float before = depth_m.at<float>(y + back.y, x + back.x);
+      const float nearer = std::min(here, before);
+      if (!(nearer > kMinDepth_m && std::abs(here - before) > kStep * nearer)) continue;
+      steps.push_back(
+          {static_cast<float>(x) + middle.x, static_cast<float>(y) + middle.y, 1.0F / nearer});
+    }
+  }
+  const std::size_t every = steps.size() / kMaxPointsOfPair + 1;
+  std::vector<EdgePoint> thinned;
+  for (std::size_t i = 0; i < steps.size(); i += every) thinned.push_back(steps[i]);
+  return thinned;
+}
+
+float Interpolated(const cv::Mat& image, float x, float y) {
+  const int left = static_cast<int>(x), top = static_cast<int>(y);
+  const float fx = x - static_cast<float>(left), fy = y - static_cast<float>(top);
+  const auto* row = image.ptr<float>(top) + left;
+  const auto* below = image.ptr<float>(top + 1) + left;
+  return (row[0] * (1 - fx) + row[1] * fx) * (1 - fy) + (below[0] * (1 - fx) + below[1] * fx) * fy;
+}
+
+/// Mean contrast of the colour images where the placement puts the steps in depth; steps that
+/// leave the image count as 0, so that nothing is gained by moving them out.
+double Agreement(std::span<const Edges> edges, const Placement& placement) {
+  double sum = 0.0;
+  std::size_t count = 0;
+  const auto zoom = static_cast<float>(placement[0]);
+  for (const Edges& of : edges) {
+    const float centre_x = 0.5F * static_cast<float>(of.contrast.cols - 1);
+    const float centre_y = 0.5F * static_cast<float>(of.contrast.rows - 1);
+    const float to_x = centre_x + static_cast<float>(placement[1]);
+    const float to_y = centre_y + static_cast<float>(placement[2]);
+    const auto parallax = static_cast<float>(placement[3]);
+    for (const EdgePoint& p : of.steps) {
+      const float x = to_x + zoom * (p.x - centre_x) + parallax * p.inverse_depth_per_m;
+      const float y = to_y + zoom * (p.y - centre_y);
+      if (x >= 0 && y >= 0 && x < static_cast<float>(of.contrast.cols - 1) &&
+          y < static_cast<float>(of.contrast.rows - 1))
+        sum += Interpolated(of.contrast, x, y);
+    }
+    count += of.steps.size();
+  }
+  return count > 0 ? sum / static_cast<double>(count) : 0.0;
+}
+
+/// The best placement of a grid: `counts` steps each way about `centre`.
+Placement BestOfGrid(std::span<const Edges> edges, const Placement& centre, const Placement& step,
+                     const std::array<int, 4>& counts) {
+  Placement best = centre;
+  double best_agreement = Agreement(edges, centre);
+  for (int i = -counts[0]; i <= counts[0]; ++i) {
+    for (int j = -counts[1]; j <= counts[1]; ++j) {
+      for (int k = -counts[2]; k <= counts[2]; ++k) {
+        for (int l = -counts[3]; l <= counts[3]; ++l) {
+          const Placement tried = centre + step.cwiseProduct(Placement(i, j, k, l));
+          const double agreement = Agreement(edges, tried);
+          if (agreement > best_agreement) {
+            best = tried;
+            best_agreement = agreement;
+          }
+        }
+      }
+    }
+  }
+  return best;
+}
+
+/// Steps to a neighbour until none is better, then with half the step, four times. The agreement
+/// rises with each move, so it ends; the bound is for numbers that do not.
+Placement Refined(std::span<const Edges> edges, Placement placement, Placement step) {
+  constexpr int kMaxMoves = 40;
+  for (int level = 0; level < 4; ++level, step *= 0.5) {
+    for (int move = 0; move < kMaxMoves; ++move) {
+      const Placement next = BestOfGrid(edges, placement, step, {1, 1, 1, 1});
+      if (next == placement) break;
+      placement = next;
+    }
+  }
+  return placement;
+}
+
+/// From a start for each sign of the parallax and none: the shift along x nearly makes up for it,
+/// so one start may end beside the best.
+Placement Search(std::span<const Edges> edges, double px) {
+  Placement best = kRegistered;
+  double best_agreement = -1.0;
+  for (const double parallax : {-13.0, 0.0, 13.0}) {
+    const Placement middle(0.95, 0.0, 0.0, parallax * px);
+    const Placement coarse = BestOfGrid(edges, middle, {0.015, 4 * px, 4 * px, 0.0}, {6, 6, 6, 0});
+    const Placement found = Refined(edges, coarse, {0.01, 2 * px, 2 * px, 6.5 * px});
+    if (const double agreement = Agreement(edges, found); agreement > best_agreement) {
+      best = found;
+      best_agreement = agreement;
+    }
+  }
+  return best;
+}
+
+void CheckPair(const ImagePair& pair, const Intrinsics& color) {
+  const cv::Size size(color.width, color.height);
+  if (pair.color_rgb.type() != CV_8UC3 || pair.depth_m.type() != CV_32FC1 ||
+      pair.color_rgb.size() != size || pair.depth_m.size() != size)
+    throw std::invalid_argument(fmt::format(
+        "FindDepthCamera needs CV_8UC3 and CV_32FC1 images of {}x{}", color.width, color.height));
+}
+
+std::size_t NumSteps(std::span<const Edges> edges) {
+  std::size_t count = 0;
+  for (const Edges& of : edges) count += of.steps.size();
+  return count;
+}
+
+/// x_color = centre + zoom (x - centre) + shift + parallax / z, solved for a pinhole camera.
+DepthCamera CameraOf(const Placement& placement, const Intrinsics& color) {
+  const double zoom = placement[0];
+  const double centre_x = 0.5 * (color.width - 1), centre_y = 0.5 * (color.height - 1);
+  DepthCamera depth;
+  depth.intrinsics = {.width = color.width,
+                      .height = color.height,
+                      .fx = color.fx / zoom,
+                      .fy = color.fy / zoom,
+                      .cx = centre_x + (color.cx - centre_x - placement[1]) / zoom,
+                      .cy = centre_y + (color.cy - centre_y - placement[2]) / zoom,
+                      .distortion = {}};
+  depth.T_color_depth.translation().x() = placement[3] / color.fx;
+  return depth;
+}
+
+}  // namespace
+
+std::optional<FoundDepthCamera> FindDepthCamera(std::span<const ImagePair> pairs,
+                                                const Intrinsics& color) {
+  std::array<std::vector<Edges>, 2> halves;  // The first searches, the second judges.
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    CheckPair(pairs[i], color);
+    cv::Mat grey;
+    cv::cvtColor(pairs[i].color_rgb, grey, cv::COLOR_RGB2GRAY);
+    for (const bool along_x : {true, false})
+      halves[i % 2].push_back({EdgeContrast(grey, along_x), DepthSteps(pairs[i].depth_m, along_x)});
+  }
+  if (NumSteps(halves[0]) < kMinPoints || NumSteps(halves[1]) < kMinPoints) return std::nullopt;
+
+  const double px = color.width / kWidthOfSteps_px;
+  const Placement found = Search(halves[0], px);
+  const Placement registered =
+      BestOfGrid(halves[0], kRegistered, {0.0, 2 * px, 2 * px, 0.0}, {0, 3, 3, 0});
+  const double agreement = Agreement(halves[1], found);
+  // Contrast of one grey level in a hundred pixels is what chance gives.
+  constexpr double kChance = 0.01;
+  const double gain = agreement / std::max(Agreement(halves[1], registered), kChance);
+  if (!(agreement > 0.0 && gain >= kMinGain)) return std::nullopt;
+  return FoundDepthCamera{CameraOf(found, color), gain};
+}
+
+}  // namespace plumb
