@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# A machine for RAUC made of files, two certificate authorities, and bundles good and bad. Keys live in FOLDER alone.
+# A machine for RAUC made of files, its certificate authority, the one that takes over from it and a stranger's, and bundles good and bad. Keys live in
+# FOLDER alone.
 #   make_bundles.sh FOLDER
 set -euo pipefail
 cd "$1"
@@ -11,12 +12,17 @@ authority() { # NAME: certificate authority and a certificate that may sign code
     -extfile <(printf 'basicConstraints=CA:FALSE\nkeyUsage=digitalSignature\nextendedKeyUsage=codeSigning\nsubjectKeyIdentifier=hash\nauthorityKeyIdentifier=keyid\n')
 }
 authority own
+authority next
 authority stranger
 
-bundle() { # NAME VERSION COMPATIBLE SIGNER FORMAT
+bundle() { # NAME VERSION COMPATIBLE SIGNER FORMAT [IMAGE]: noise where no image is given
   rm -rf content
   mkdir content
-  head -c 1500000 /dev/zero | openssl enc -aes-128-ctr -K "$(printf '%032x' "${2//[^0-9]/}")" -iv "$(printf '%032x' 1)" >content/rootfs.img
+  if [ $# -gt 5 ]; then
+    cp "$6" content/rootfs.img
+  else
+    head -c 1500000 /dev/zero | openssl enc -aes-128-ctr -K "$(printf '%032x' "${2//[^0-9]/}")" -iv "$(printf '%032x' 1)" >content/rootfs.img
+  fi
   printf '[update]\ncompatible=%s\nversion=%s\n\n[bundle]\nformat=%s\n\n[image.rootfs]\nfilename=rootfs.img\n' "$3" "$2" "$5" >content/manifest.raucm
   rm -f "$1.raucb"
   rauc --cert="pki/$4.pem" --key="pki/$4.key" bundle content "$1.raucb"
@@ -28,6 +34,18 @@ bundle other 9.1.0 plumb-other-machine own plain
 bundle stranger 9.1.0 plumb-test stranger plain
 bundle verity 9.1.0 plumb-test own verity
 bundle strangers-verity 9.1.0 plumb-test stranger verity
+# Systems that bring a keyring, where toolchain/image puts it.
+system() { # NAME AUTHORITY...
+  rm -rf root "$1.ext2"
+  mkdir -p root/etc/rauc
+  for name in "${@:2}"; do cat "pki/$name-ca.pem"; done >root/etc/rauc/ca.pem
+  /sbin/mke2fs -q -t ext2 -d root "$1.ext2" 1400k
+}
+system both own next
+system new next
+bundle next 9.4.0 plumb-test next plain
+bundle both-keys 9.2.0 plumb-test own plain both.ext2
+bundle new-key 9.3.0 plumb-test next plain new.ext2
 # One bit of what was signed; half of the file; one letter of the manifest inside the signature.
 python3 - <<'PYTHON'
 whole = bytearray(open("good.raucb", "rb").read())
@@ -68,7 +86,7 @@ max-bundle-download-size=100000000
 bootloader-custom-backend=$PWD/boot-backend
 
 [keyring]
-path=$PWD/pki/own-ca.pem
+path=$PWD/keyring.pem
 check-purpose=codesign
 
 [slot.rootfs.0]
@@ -82,3 +100,4 @@ type=raw
 bootname=B
 CONF
 mkdir -p mount
+cp pki/own-ca.pem keyring.pem

@@ -103,10 +103,12 @@ class RaucTest : public ::testing::Test {
       std::ofstream(*made_ / "slots" / name, std::ios::binary) << std::string(2'000'000, '\0');
     for (const char* name : {"primary", "state.A", "state.B", "status"})
       fs::remove(*made_ / "state" / name);
+    fs::copy_file(*made_ / "pki" / "own-ca.pem", *made_ / "keyring.pem",
+                  fs::copy_options::overwrite_existing);
     bus_ = std::make_unique<testing::PrivateBus>(folder_.path());
     ::setenv("DBUS_SYSTEM_BUS_ADDRESS", bus_->address().c_str(), 1);
     ::setenv("DBUS_STARTER_BUS_TYPE", "system", 1);
-    StartRauc();
+    StartRauc("A");
     ASSERT_EQ(::seteuid(kNobody), 0);
   }
   void TearDown() override {
@@ -115,10 +117,28 @@ class RaucTest : public ::testing::Test {
     }
   }
 
-  void StartRauc() {
+  void StartRauc(const std::string& slot) {
     rauc_ = std::make_unique<Child>(
         std::vector<std::string>{"rauc", "--conf=" + (*made_ / "system.conf").string(), "service",
-                                 "--override-boot-slot=A"});
+                                 "--override-boot-slot=" + slot});
+  }
+
+  /// As the machine's start does: plumbd and RAUC are those of this slot, and so is the keyring.
+  void RestartFrom(const std::string& slot, const std::string& image) {
+    On([this] { updater_.reset(); });
+    ASSERT_EQ(::seteuid(0), 0);
+    rauc_.reset();
+    const fs::path keyring = *made_ / "keyring.pem";
+    fs::remove(keyring);
+    Child dump({"/sbin/debugfs", "-R", "dump /etc/rauc/ca.pem " + keyring.string(),
+                (*made_ / "slots" / image).string()});
+    ASSERT_EQ(dump.Wait(), 0);
+    ASSERT_TRUE(fs::exists(keyring)) << "the slot holds no system with a keyring";
+    StartRauc(slot);
+    ASSERT_EQ(::seteuid(kNobody), 0);
+    MakeUpdater();
+    ASSERT_TRUE(Becomes([&] { return StatusNow().supported; })) << "RAUC does not answer";
+    ASSERT_EQ(StatusNow().slot, slot);
   }
 
   /// Puts a bundle where an upload would.
@@ -131,23 +151,26 @@ class RaucTest : public ::testing::Test {
     ASSERT_EQ(::seteuid(kNobody), 0);
   }
 
+  void MakeUpdater() {
+    On([this] {
+      updater_ = std::make_unique<Updater>(
+          loop_, UpdaterOptions{.folder = folder_ / "updates",
+                                .max_bytes = 100 << 20,
+                                .bus_address = bus_->address(),
+                                .version = "1.0.0",
+                                .blocking_reason = {},
+                                .changed = {},
+                                .aside = {},
+                                .ended = [this](const std::string&, const std::string& failure) {
+                                  ++num_ended_;
+                                  failure_ = failure;
+                                }});
+    });
+  }
   /// The loop has the main thread.
   void Play(const std::function<void()>& test) {
     std::jthread player([&] {
-      On([this] {
-        updater_ = std::make_unique<Updater>(
-            loop_, UpdaterOptions{.folder = folder_ / "updates",
-                                  .max_bytes = 100 << 20,
-                                  .bus_address = bus_->address(),
-                                  .version = "1.0.0",
-                                  .blocking_reason = {},
-                                  .changed = {},
-                                  .aside = {},
-                                  .ended = [this](const std::string&, const std::string& failure) {
-                                    ++num_ended_;
-                                    failure_ = failure;
-                                  }});
-      });
+      MakeUpdater();
       if (Becomes([&] { return StatusNow().supported; })) {
         test();
       } else {
@@ -290,6 +313,36 @@ TEST_F(RaucTest, ABundleCanBeRemovedAfterRaucHasTakenItOver) {
     On([&] { change = updater_->Remove("good.raucb"); });
     EXPECT_EQ(change.result, ChangeResult::kDone) << change.message;
     EXPECT_TRUE(StatusNow().bundles.empty());
+  });
+}
+
+/// The new authority comes with an update that the old one signed, and for a time both may sign;
+/// the update that ends this time is signed by the new one already.
+TEST_F(RaucTest, AnotherAuthorityTakesOverByWayOfAnUpdate) {
+  const auto stranger = HasSubstr("not signed by a key that this machine trusts");
+  Play([&] {
+    ExpectRefusal("next", stranger);
+    Take("both-keys");
+    ASSERT_EQ(InstallToTheEnd("both-keys"), "");
+    RestartFrom("B", "b.img");
+
+    for (const char* name : {"good", "next"}) {
+      Take(name);
+      EXPECT_EQ(InstallToTheEnd(name), "") << "while both may sign";
+      EXPECT_TRUE(SlotHolds("a", name));
+    }
+    Take("stranger");
+    EXPECT_THAT(InstallToTheEnd("stranger"), stranger);
+    Take("new-key");
+    ASSERT_EQ(InstallToTheEnd("new-key"), "");
+    RestartFrom("A", "a.img");
+
+    Take("good");
+    EXPECT_THAT(InstallToTheEnd("good"), stranger) << "the old authority's time is over";
+    EXPECT_TRUE(SlotHolds("b", "both-keys"));
+    Take("next");
+    EXPECT_EQ(InstallToTheEnd("next"), "");
+    EXPECT_TRUE(SlotHolds("b", "next"));
   });
 }
 
