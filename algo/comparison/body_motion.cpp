@@ -23,18 +23,19 @@ namespace {
 
 constexpr std::size_t kMinSamples = 50;
 constexpr int kMinPairs = 30;
-constexpr std::size_t kChunk =
-    1024;  // pairs summed together: fixed, so sums do not depend on threads
+// pairs summed together; a fixed number, so that sums do not depend on the number of threads
+constexpr std::size_t kChunk = 1024;
 constexpr double kMadToSigma = 1.4826;
 constexpr double kMinScale_m =
-    0.2e-3;  // below what any sensor leaves; keeps perfect data from a zero scale
-constexpr double kCorrelationArea_m2 = 1e-4;  // residuals within about 1 cm are one measurement
-constexpr double kBlock_m = 0.08;             // of the empirical covariance
+    0.2e-3;  // below the noise of any sensor; keeps the scale of perfect data above zero
+// area within which residuals are strongly correlated and count as one measurement
+constexpr double kCorrelationArea_m2 = 1e-4;
+constexpr double kBlock_m = 0.08;  // block size for the empirical covariance
 constexpr double kMinInformation =
-    1e-6;  // of the best direction's; below it a direction counts as unseen
+    1e-6;  // eigenvalue relative to the largest; a direction below it counts as unobserved
 constexpr double kStepTolerance_m = 5e-6;
 constexpr double kSeenInformation =
-    3e-4;  // of the best direction's; below it a direction stays where it starts
+    3e-4;  // eigenvalue relative to the largest; a direction below it keeps its start value
 
 // One side of the registration.
 struct Side {
@@ -45,10 +46,10 @@ struct Side {
 };
 
 struct Stage {
-  double radius_m;        // of the search for correspondences
-  double max_sideways_m;  // no correspondence further apart along the surface
+  double radius_m;        // search radius for correspondences
+  double max_sideways_m;  // largest distance of a correspondence along the surface
   double min_normal_cos;
-  double max_scale_m;  // of the residuals: bounds the weights' reach
+  double max_scale_m;  // upper limit of the residuals' scale, which bounds the reach of the weights
   int max_iterations;
 };
 
@@ -58,10 +59,10 @@ constexpr double kCoarseSpacing_m = 0.02;
 constexpr double kMiddleSpacing_m = 0.01;
 constexpr double kFineSpacing_m = 0.005;
 constexpr double kMaxFineSamples =
-    20000.0;  // a side; more cost time and add nothing: their errors are not independent
+    20000.0;  // samples of one body; more would cost time without adding independent information
 
-// Correspondences two spacings away at most: what is further off is not the rigid part, and the
-// search stays short.
+// A correspondence is at most two sample spacings away: surfaces that are farther apart do not
+// belong to the rigid part, and the search stays short.
 Stage FineStage(double spacing_m) { return {2 * spacing_m, 1.2 * spacing_m, 0.8, spacing_m, 25}; }
 
 struct Pair {
@@ -141,8 +142,8 @@ double WeightOf(double residual_m, double scale_m) {
 
 struct NormalEquations {
   Matrix6d A = Matrix6d::Zero();
-  Matrix6d crossed = Matrix6d::Zero();  // A from one normal of each side: free of the bias that
-                                        // their noise puts into A
+  // A computed with one normal from each side, so that the noise of the normals does not bias it
+  Matrix6d crossed = Matrix6d::Zero();
   Vector6d b = Vector6d::Zero();
 };
 
@@ -172,9 +173,9 @@ NormalEquations SumPairs(const std::vector<Pair>& pairs, double scale_m) {
   return total;
 }
 
-// Gauss-Newton step within the directions that the surfaces show; along a direction that they do
-// not (roll of a bar) the noise of the normals would drive the pose away. `unit` scales the
-// unknowns to one importance.
+// Gauss-Newton step within the directions that the surfaces determine. Along a direction that they
+// do not determine (the roll of a cylinder), the noise of the normals would drive the pose away.
+// `unit` scales the unknowns to comparable size.
 Vector6d StepInObservableSubspace(const NormalEquations& equations, const Vector6d& unit) {
   const Matrix6d A = unit.asDiagonal() * equations.A * unit.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(unit.asDiagonal() * equations.crossed *
@@ -202,7 +203,7 @@ Eigen::Vector3d MeanPoint(const Surface& surface) {
   return sum / static_cast<double>(std::max<std::size_t>(surface.size(), 1));
 }
 
-// Root mean square distance from the centroid: turns radians into metres of the same importance.
+// Root mean square distance from the centroid: converts radians into metres of comparable size.
 double LeverArm(const Surface& surface, const Eigen::Vector3d& centroid) {
   double sum = 0.0;
   for (const Eigen::Vector3f& p : surface.points)
@@ -225,7 +226,7 @@ StageResult RunStage(const Side& reference, const Side& current, const Pose& T_s
     result.valid = scale.has_value();
     if (!scale) return result;
     result.scale_m = *scale;
-    // In units of the lever arm rotation and translation weigh alike.
+    // In units of the lever arm, rotation and translation have equal weight.
     Vector6d unit;
     unit << Eigen::Vector3d::Constant(1.0 / lever), Eigen::Vector3d::Ones();
     const Vector6d twist = StepInObservableSubspace(SumPairs(pairs, *scale), unit);
@@ -312,8 +313,8 @@ std::optional<Pose> GlobalMotion(const BodyMotionInput& input, const PointCloud&
   return std::min_element(distinct.begin(), distinct.end(), by_score)->T;
 }
 
-// Covariance of the fit at its end: A^-1 B A^-1 with B from blocks, plus the share of independent
-// small patches.
+// Covariance of the converged fit: A^-1 B A^-1 with B from blocks, plus the contribution of
+// independent small patches.
 Matrix6d FitCovariance(const std::vector<Pair>& pairs, double scale_m, double spacing_m,
                        double lever) {
   Matrix6d information = Matrix6d::Zero();
@@ -341,8 +342,8 @@ Matrix6d FitCovariance(const std::vector<Pair>& pairs, double scale_m, double sp
   for (const auto& [block, sum] : blocks) scatter += sum * sum.transpose();
   const double k = static_cast<double>(blocks.size());
   scatter *= k / std::max(k - 6.0, 1.0);
-  // Two pairs a sample (one from each side), and one independent measurement for every
-  // kCorrelationArea_m2.
+  // Each sample gives two correspondences (one from each side), and each kCorrelationArea_m2 gives
+  // one independent measurement.
   const double pairs_per_measurement =
       2.0 * std::max(kCorrelationArea_m2 / (spacing_m * spacing_m), 1.0);
   const Matrix6d small_patches = scale_m * scale_m * pairs_per_measurement * inverse;

@@ -1,4 +1,4 @@
-// Rigid motion of a body between two scans, from its surface.
+// Estimates the rigid motion of a body between two scans from its surface.
 #pragma once
 
 #include <functional>
@@ -17,34 +17,38 @@ struct BodyMotionInput {
   const Body& reference_body;
   const PointCloud& current_cloud;
   const Body& current_body;
-  /// Accepts the points of the reference body that lie in the region of interest; none: all of the
-  /// body.
+  /// Accepts the points of the reference body that lie in the region of interest. If not set, the
+  /// whole body is used.
   std::function<bool(const Eigen::Vector3d&)> in_region;
   Eigen::Vector3d region_centroid_m = Eigen::Vector3d::Zero();
-  std::stop_token stop = {};  ///< Polled in each iteration; Interrupted follows.
+  std::stop_token stop = {};  ///< Polled in each iteration; a stop request throws Interrupted.
 };
 
-/// What the surfaces alone say of the motion; the alignment's uncertainty is not in it.
+/// The motion as the surfaces determine it, without the alignment's uncertainty.
 struct SurfaceMotion {
   Pose T = Pose::Identity();               ///< p_current = T * p_reference
   Matrix6d covariance = Matrix6d::Zero();  ///< Left perturbation about T * region_centroid_m.
   double scale_m = 0.0;                    ///< Robust standard deviation of the residuals.
-  double inlier_share = 0.0;               ///< Of the region's samples that have a weighted match.
+  /// Fraction of the region's samples that have a weighted correspondence.
+  double inlier_share = 0.0;
   int iterations = 0;
 };
 
 /// Registers the reference body onto the current one.
 ///
-/// Starts come from MotionStarts() (yaw and shift of the heights over the support), each is refined
-/// on coarse samples and the best by a two-sided robust score goes on. Refinement: symmetric
-/// point-to-plane distances (normal of both sides), matches in both directions, Tukey weights whose
-/// scale follows the residuals, no matches on rims and none off the body. The covariance comes from
-/// the scatter of the residuals' sums over 8 cm blocks, so errors that are alike over some
-/// centimetres count as they should; information is measured with the two sides' normals crossed,
-/// so noise of normals does not pretend to any (a cylinder shows no roll).
+/// Starting poses come from MotionStarts() (yaw and shift of the heights above the support). Each
+/// is refined on coarse samples, and the one with the best robust two-sided score is refined
+/// further. Refinement uses symmetric point-to-plane distances (normals of both sides),
+/// correspondences in both directions, and Tukey weights whose scale follows the residuals. Rims
+/// and points off the body take no part.
 ///
-/// Nothing if either body has fewer than 50 samples or too few find a match. Deterministic,
-/// thread-safe.
+/// The covariance comes from the scatter of the residuals summed over 8 cm blocks, so that errors
+/// which are correlated over some centimetres are counted correctly. The information matrix uses
+/// one normal from each side, so that noise of the normals does not appear as information (a
+/// cylinder does not determine its roll).
+///
+/// Returns nothing if either body has fewer than 50 samples or too few find a correspondence.
+/// Deterministic and thread-safe.
 [[nodiscard]] std::optional<SurfaceMotion> EstimateBodyMotion(const BodyMotionInput& input);
 
 }  // namespace plumb

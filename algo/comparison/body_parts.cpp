@@ -17,20 +17,26 @@
 namespace plumb {
 namespace {
 
-constexpr double kBin_m = 0.01;           // of the outline's width along the body
-constexpr double kMinPart_m2 = 0.002;     // smaller parts say nothing
-constexpr double kMinMeasured = 1.0 / 3;  // share of a part
-constexpr double kElongated = 1.5;        // from there on an outline shows how it lies
-constexpr double kNeckShare = 0.62;       // of the widest: narrower is head or neck
-constexpr double kShoulderShare = 0.8;    // of the widest: shoulders have begun
-constexpr double kMinNeck_m = 0.04;       // shorter is the rounded end of a trunk
-constexpr double kMaxHead_m = 0.45;       // head and neck
-constexpr double kTrunk_m = 0.6;          // behind the first end, the widest part is looked for
-constexpr double kMinHead_m = 0.15;       // head and neck, where they alone distinguish the ends
-constexpr double kShouldersOfAll = 0.85;  // of the widest of all: knees behind feet are narrower
+constexpr double kBin_m = 0.01;           // bin of the outline's width along the body
+constexpr double kMinPart_m2 = 0.002;     // smaller parts are not reported
+constexpr double kMinMeasured = 1.0 / 3;  // measured fraction below which a part is not reported
+// length over width above which an outline shows the body's direction
+constexpr double kElongated = 1.5;
+// fraction of the largest width; narrower bins are head or neck
+constexpr double kNeckShare = 0.62;
+// fraction of the largest width at which the shoulders begin
+constexpr double kShoulderShare = 0.8;
+constexpr double kMinNeck_m = 0.04;  // anything shorter is the rounded end of a trunk
+constexpr double kMaxHead_m = 0.45;  // length of head and neck
+// length behind the first end in which the widest part is searched
+constexpr double kTrunk_m = 0.6;
+// length of head and neck where they alone distinguish the ends
+constexpr double kMinHead_m = 0.15;
+// fraction of the largest width of the whole body; knees behind feet are narrower
+constexpr double kShouldersOfAll = 0.85;
 
-// Ends of the bands below the shoulder line, in widths of the shoulders (about 0.45 m with arms);
-// then the lower legs.
+// Ends of the bands below the shoulder line, in shoulder widths (about 0.45 m including the arms);
+// the lower legs follow.
 struct Band {
   const char* name;
   double end;
@@ -42,14 +48,14 @@ constexpr std::array<Band, 6> kBands = {{{"shoulder", 0.3},
                                          {"thigh", 2.6},
                                          {"lower leg", 9.0}}};
 
-// Directions in the reference frame's plane: along runs from the gantry (head) end away, side to +X
-// (the left).
+// Directions in the plane of the reference frame: `along` points away from the gantry (head) end,
+// `side` to +X (the left).
 struct Axes {
   Eigen::Vector2d along, side;
   bool by_posture = false;
 };
 
-// Whose words name the parts.
+// Whether parts are named by the patient, the room or the marker.
 enum class Words { kPatient, kRoom, kMarker };
 
 struct Outline {
@@ -98,14 +104,15 @@ Axes AxesByRoom(const BodyView& view, const Outline& outline) {
   if (outline.elongation < kElongated) return axes;
   const double cosine = outline.principal.dot(axes.along);
   if (std::abs(cosine) < std::sqrt(0.5))
-    return room;  // it lies across: posture or T_iec_reference is not this patient's
+    // the body lies across: posture or T_iec_reference does not belong to this patient
+    return room;
   axes.along = cosine > 0 ? outline.principal : Eigen::Vector2d(-outline.principal);
   const Eigen::Vector2d across(axes.along.y(), -axes.along.x());
   axes.side = across.dot(axes.side) > 0 ? across : Eigen::Vector2d(-across);
   return axes;
 }
 
-// The body's outline along its axis: per bin the extent to either side.
+// The body's outline along its axis: for each bin the extent to either side.
 struct Profile {
   double begin_m = 0.0;
   std::vector<double> low, high;
@@ -133,7 +140,7 @@ struct Profile {
   [[nodiscard]] double length_m() const { return static_cast<double>(size()) * kBin_m; }
 };
 
-// Where the shoulders begin, and how wide they are; nothing without a neck.
+// Start and width of the shoulders; nothing if no neck is visible.
 struct Shoulders {
   double line_m = 0.0;
   double width_m = 0.0;
@@ -165,7 +172,7 @@ bool ShowsHead(const Profile& profile) {
   return shoulders->width_m >= kShouldersOfAll * widest;
 }
 
-// The room is not known, and which end lies where neither: only the body itself can tell.
+// Neither the room nor the head end is known, so that only the shape of the body can decide.
 Axes AxesByBody(const BodyView& view, const Outline& outline) {
   const Axes marker = {-Eigen::Vector2d::UnitY(), Eigen::Vector2d::UnitX(), false};
   if (!view.posture || outline.elongation < kElongated) return marker;
@@ -184,8 +191,8 @@ Axes AxesByBody(const BodyView& view, const Outline& outline) {
   return one_shows ? one : other;
 }
 
-// The middle of the outline along the body, as a line: limbs and slant must not move it from bin to
-// bin.
+// Fits a line to the middle of the outline along the body, so that limbs and slant do not move the
+// middle from bin to bin.
 struct Midline {
   double offset = 0.0, slope = 0.0;
 
@@ -204,7 +211,7 @@ struct Midline {
   [[nodiscard]] double at(double along) const { return offset + slope * along; }
 };
 
-// Names of parts in the order head to feet; two sides each but for the head.
+// Names of the parts from head to feet. All but the head have two sides.
 class Naming {
  public:
   Naming(const Profile& profile, Words words)
@@ -212,7 +219,7 @@ class Naming {
     if (words == Words::kPatient) shoulders_ = FindShoulders(profile);
   }
 
-  /// Number of the part that holds a place; parts are listed in this order.
+  /// Rank of the part that holds a place; parts are listed in this order.
   [[nodiscard]] int RankOf(double along, double side) const {
     const int of_side = side > midline_.at(along) ? 0 : 1;
     if (!shoulders_)
@@ -256,10 +263,10 @@ struct Collected {
 };
 
 constexpr double kMostDisplaced =
-    0.05;  // of a part's samples of the field, one a square centimetre
+    0.05;  // fraction of a part's displacement samples, one per square centimetre
 constexpr std::size_t kMinDisplaced = 20;
 
-// Mean of the shifts that are largest along the couch.
+// Mean of the largest displacements along the couch.
 std::optional<Eigen::Vector3d> LargestShift(std::vector<Eigen::Vector3d>& shifts_m) {
   if (shifts_m.size() < kMinDisplaced) return std::nullopt;
   const auto share =

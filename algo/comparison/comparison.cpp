@@ -17,11 +17,12 @@
 namespace plumb {
 namespace {
 
-constexpr double kCloudReach_m = 0.004;  // of the discs of a cloud with points every 3 mm
+constexpr double kCloudReach_m = 0.004;  // disc radius of one point; cloud points are 3 mm apart
 constexpr double kCloudSpacing_m = 0.003;
-constexpr double kWeakShare = 0.5;  // of the tolerance: from there on a direction is named as weak
+// fraction of the tolerance from which a direction is reported as weak
+constexpr double kWeakShare = 0.5;
 
-// The six numbers in the order of kNumberNames; absent where refused.
+// The six numbers in the order of kNumberNames; absent where they are not reported.
 std::array<std::optional<double>, 6> Values(const CouchNumbers& numbers) {
   return {numbers.vertical_mm, numbers.longitudinal_mm, numbers.lateral_mm,
           numbers.pitch_deg,   numbers.roll_deg,        numbers.yaw_deg};
@@ -68,7 +69,7 @@ void CheckScenesMatch(const Scene& reference, const Scene& current) {
 }
 
 // The scene's surface as a cloud with normals, in the reference frame.
-// One comparison in progress: Compare() runs its steps in order.
+// One comparison in progress. Compare() runs its steps in order.
 class Comparer {
  public:
   Comparer(const Scene& reference, const Scene& current, const CompareOptions& options)
@@ -138,7 +139,8 @@ class Comparer {
     return true;
   }
 
-  // From the current scene to the reference frame, its length and width corrected.
+  // From the current scene to the reference frame, including the correction of its scale in the
+  // marker plane.
   [[nodiscard]] Eigen::Affine3d StretchedAlignment() const {
     const Alignment& alignment = *result_.alignment;
     return Eigen::Translation3d(alignment.centre_m) * Eigen::Affine3d(alignment.stretch) *
@@ -286,7 +288,7 @@ class Comparer {
         SignedDistance(corrected, *reference_.height_map, result_.region_mask);
     std::vector<float> magnitudes;
     for (std::size_t i = 0; i < distance.z.size(); ++i) {
-      // What moved with the room and not with the body says nothing about the correction.
+      // Whatever moved with the room and not with the body does not belong to the correction.
       if (result_.region_mask[i] == 0)
         result_.deviation_after->z[i] = std::numeric_limits<float>::quiet_NaN();
       if (std::isfinite(distance.z[i])) magnitudes.push_back(std::abs(distance.z[i]));

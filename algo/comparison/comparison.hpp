@@ -1,4 +1,4 @@
-// Two scenes of one patient become a correction, maps and a verdict.
+// Compares two scenes of one patient: correction, maps and verdict.
 #pragma once
 
 #include <cstdint>
@@ -25,70 +25,73 @@
 
 namespace plumb {
 
-/// What Compare() is asked for. "Reference frame" is the reference marker's frame of the reference
-/// scene.
+/// Input of Compare(). "Reference frame" means the reference marker's frame of the reference scene.
 struct CompareOptions {
   Preset preset = Preset::kBest;
   std::vector<Eigen::Vector2d>
       region_polygon_m;  ///< x, y in the reference frame; empty: the segmented body.
   std::optional<Eigen::Vector3d>
-      isocentre_m;  ///< Reference frame; none: centroid of the reference region.
-  /// Reference frame to the IEC fixed frame; none: nobody has said how the room lies. The numbers
-  /// are then along the reference marker's axes, and no word speaks of couch or gantry.
+      isocentre_m;  ///< In the reference frame; not set: centroid of the reference region.
+  /// From the reference frame to the IEC fixed frame; not set: the orientation of the room is
+  /// unknown. The numbers then refer to the reference marker's axes, and the direction words do not
+  /// mention couch or gantry.
   std::optional<Pose> T_iec_reference;
-  MarkerKind marker_kind = MarkerKind::kRoom;  ///< kCouch: shifts are refused, posture only.
-  PatientPosture posture = PatientPosture::kHeadFirstSupine;  ///< For the words left and right.
-  MarkerConsensusOptions markers;                             ///< When a marker counts as moved.
-  AcceptanceLimits limits;  ///< Of the gates and the verdict; the same for every preset.
+  /// With kCouch only the posture is reported, no shifts.
+  MarkerKind marker_kind = MarkerKind::kRoom;
+  PatientPosture posture = PatientPosture::kHeadFirstSupine;  ///< Decides the words left and right.
+  MarkerConsensusOptions markers;  ///< Decides when a marker counts as moved.
+  AcceptanceLimits limits;  ///< Limits of the gates and the verdict; the same for every preset.
 
-  std::function<double()> now_s;  ///< Wall clock for `Comparison::timings_s`; none: no timings.
-  std::stop_token stop = {};      ///< Polled every few hundredths of a second.
+  std::function<double()> now_s;  ///< Wall clock for `Comparison::timings_s`; may be empty.
+  /// Polled every few hundredths of a second; a stop request throws Interrupted.
+  std::stop_token stop = {};
 };
 
-/// A direction in which the surfaces say little, e.g. roll of a cylinder.
+/// A direction that the surfaces hardly determine, such as the roll of a cylinder.
 struct WeakDirection {
-  std::string name;  ///< One of the six numbers: vertical, longitudinal, lateral, pitch, roll, yaw.
-  double u95 = 0.0;  ///< 95 % half-width.
+  std::string name;  ///< One of vertical, longitudinal, lateral, pitch, roll and yaw.
+  double u95 = 0.0;  ///< Half-width of the 95 % interval.
   std::string unit;  ///< "mm" or "deg"
 };
 
 /// Rigid motion of the body: p_current = T * p_reference, both in the reference frame.
 struct BodyMotion {
   Pose T = Pose::Identity();
-  /// Rotation vector (rad), translation (m); left perturbation about the centroid where the motion
-  /// took it, T * centroid_m.
+  /// Rotation vector (rad), then translation (m); left perturbation about the moved centroid, T *
+  /// centroid_m.
   Matrix6d covariance = Matrix6d::Zero();
-  MotionUncertainty uncertainty;  ///< Whose total `covariance` is.
+  MotionUncertainty uncertainty;  ///< The causes that add up to `covariance`.
   Eigen::Vector3d centroid_m =
-      Eigen::Vector3d::Zero();  ///< Of the reference region, reference frame.
+      Eigen::Vector3d::Zero();  ///< Centroid of the reference region in the reference frame.
   std::vector<WeakDirection> weak_directions;
   double residual_median_m = 0.0;  ///< Nearest-surface distance in the region after the fit.
   double residual_p95_m = 0.0;
   double inlier_share =
-      0.0;  ///< Share of the region's points that the rigid motion explains, 0..1.
+      0.0;  ///< Fraction of the region's points that the rigid motion explains, 0 to 1.
 };
 
-/// Everything of a RESULT. What could not be computed is absent, and `reasons` say why.
+/// Content of a result. What could not be computed is absent, and `reasons` states why.
 struct Comparison {
   Preset preset = Preset::kBest;  ///< How the numbers were made.
   Verdict verdict = Verdict::kNoAnswer;
-  std::vector<std::string> reasons;  ///< Sentences; the first decides.
+  std::vector<std::string> reasons;  ///< Complete sentences; the first one decides.
   std::optional<Alignment> alignment;
   std::optional<BodyMotion> motion;
   std::optional<Correction> correction;
   std::optional<RegionCoverage> region;
-  std::optional<BodyParts> body_parts;     ///< Where on the body, in words.
-  std::optional<Deformation> deformation;  ///< What the rigid motion leaves, as a field.
+  std::optional<BodyParts> body_parts;  ///< Differences by part of the body.
+  /// Non-rigid displacement that remains after the rigid motion.
+  std::optional<Deformation> deformation;
 
-  /// On the reference scene's grid; absent where the reference scene has no height map or nothing
-  /// could be aligned.
-  std::optional<HeightMap> deviation;  ///< Current - reference height after alignment, metres.
-  std::optional<HeightMap>
-      distance;  ///< Nearest-surface distance, > 0 where current lies outside (above).
+  /// On the reference scene's grid; absent where the reference scene has no height map or the
+  /// scenes could not be aligned.
+  std::optional<HeightMap> deviation;  ///< Current minus reference height after alignment, metres.
+  /// Nearest-surface distance; positive where the current surface lies outside (above).
+  std::optional<HeightMap> distance;
   std::optional<HeightMap> current_height;   ///< The current surface in the reference frame.
-  std::optional<HeightMap> deviation_after;  ///< As `deviation`, once the correction is applied.
+  std::optional<HeightMap> deviation_after;  ///< As `deviation`, after the correction.
   std::vector<std::uint8_t>
-      region_mask;  ///< 1 where a cell of the reference grid belongs to the region; or empty.
+      region_mask;  ///< 1 for the cells of the reference grid in the region; may be empty.
 
   std::vector<std::string> warnings;
   std::map<std::string, double> timings_s;
@@ -96,16 +99,16 @@ struct Comparison {
 
 /// Compares a current scan with its reference.
 ///
-/// The current scene may lie in any frame (it need not have seen the reference marker): the shared
-/// markers align it. The reference scene must be in its reference marker's frame and have a height
-/// map, else the verdict is no_answer.
+/// The current scene may be in any frame (it need not have seen the reference marker), because the
+/// shared markers align it. The reference scene must be in its reference marker's frame and have a
+/// height map; otherwise the verdict is no_answer.
 ///
-/// @throws DataError if the scenes used another marker dictionary or marker length.
+/// @throws DataError if the scenes used different marker dictionaries or marker lengths.
 /// @throws std::invalid_argument if an option is out of range (tolerances <= 0, a polygon of fewer
-/// than 3 points,
-///         values that are not finite). Interrupted on a stop request.
+///         than 3 points, values that are not finite).
+/// @throws Interrupted on a stop request.
 ///
-/// Thread-safe and deterministic: same input, same result, whatever the number of threads.
+/// Thread-safe and deterministic: the same input gives the same result on any number of threads.
 [[nodiscard]] Comparison Compare(const Scene& reference, const Scene& current,
                                  const CompareOptions& options = {});
 

@@ -10,12 +10,12 @@ namespace {
 
 constexpr double kNormal95 = 1.959964;  // half-width of a 95 % interval in standard deviations
 
-// Standard deviations of the couch vector, to first order by central differences: the covariance is
-// a left perturbation (w, t) about the moved centroid m, p -> m + R(w)(p - m) + t.
+// Standard deviations of the couch vector, to first order by central differences. The covariance is
+// a left perturbation (w, t) about the moved centroid m: p -> m + R(w)(p - m) + t.
 Vector6d CouchSigmas(const Pose& T_motion, const Matrix6d& covariance,
                      const Eigen::Vector3d& moved_centroid,
                      const Eigen::Vector3d& isocentre_reference, const Pose& T_iec_reference) {
-  constexpr double kStep = 1e-6;  // rad or m: rounding 1e-10, curvature 1e-12 of the value
+  constexpr double kStep = 1e-6;  // rad or m; relative error by rounding 1e-10, by curvature 1e-12
   Matrix6d jacobian;
   for (int i = 0; i < 6; ++i) {
     std::array<Vector6d, 2> side;
@@ -49,8 +49,8 @@ bool IsSupine(PatientPosture posture) {
   return posture == PatientPosture::kHeadFirstSupine || posture == PatientPosture::kFeetFirstSupine;
 }
 
-// Which of the patient's eight directions a way in the plane is nearest to: -1 feet, 0, +1 head;
-// -1 right, 0, +1 left.
+// The nearest of the patient's eight directions to a direction in the plane: -1 feet, 0, +1 head,
+// and -1 right, 0, +1 left.
 struct PatientWay {
   int head = 0, left = 0;
 };
@@ -76,8 +76,9 @@ std::string TiltWords(const PatientWay& rising) {
          (rising.left > 0 ? "left" : "right") + " side up";
 }
 
-// Words where nobody has said how the room lies: the patient's, by where head and left point, else
-// the axes of the reference marker, along which the numbers are. Never the couch's or gantry's.
+// Direction words where the orientation of the room is unknown. They refer to the patient if the
+// directions of head and left are known, otherwise to the reference marker's axes, and never to
+// couch or gantry.
 std::array<std::string, 6> WordsWithoutRoom(const Vector6d& couch, MarkerKind kind,
                                             const std::optional<PatientPosture>& posture,
                                             const std::optional<PatientAxes>& patient) {
@@ -92,7 +93,7 @@ std::array<std::string, 6> WordsWithoutRoom(const Vector6d& couch, MarkerKind ki
       words[1] = ShiftWords(WayOf(*patient, sign(1) * Eigen::Vector2d::UnitY()));
       words[2] = ShiftWords(WayOf(*patient, sign(0) * Eigen::Vector2d::UnitX()));
     }
-    // A turn about an axis lifts what lies along z cross that axis.
+    // A rotation about an axis lifts the side that lies along z cross that axis.
     words[3] = TiltWords(WayOf(*patient, sign(3) * Eigen::Vector2d::UnitY()));
     words[4] = TiltWords(WayOf(*patient, -sign(4) * Eigen::Vector2d::UnitX()));
     const Eigen::Vector2d turned(-patient->head.y(), patient->head.x());
@@ -111,8 +112,8 @@ std::array<std::string, 6> WordsWithoutRoom(const Vector6d& couch, MarkerKind ki
   return words;
 }
 
-// Words for the signs. The patient's left is +X (viewer's right) head first supine; each of prone
-// and feet first turns it over.
+// Words for the signs. With head first supine the patient's left is +X (the viewer's right); prone
+// and feet first each exchange the sides.
 std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind,
                                    std::optional<PatientPosture> posture) {
   std::array<std::string, 6> words;
@@ -134,7 +135,8 @@ std::array<std::string, 6> WordsOf(const Vector6d& couch, MarkerKind kind,
   if (kind == MarkerKind::kRoom) words[2] = std::string("to patient ") + side(couch[0] >= 0);
   words[3] = (couch[3] >= 0) == head_first ? "head up" : "head down";
   words[4] = std::string("patient ") + side(couch[4] >= 0) + " side down";
-  // Counter-clockwise from above carries the gantry end to -X, the other end to +X.
+  // A counter-clockwise rotation (seen from above) moves the gantry end to -X and the other end to
+  // +X.
   words[5] = std::string("head to patient ") + side((couch[5] >= 0) != head_first);
   return words;
 }

@@ -1,4 +1,4 @@
-// The six numbers for the couch (IEC 61217).
+// Converts a body motion into the six couch numbers (IEC 61217).
 #pragma once
 
 #include <array>
@@ -11,39 +11,38 @@
 
 namespace plumb {
 
-/// Whether the markers stay in the room or travel with the couch; stored with the reference.
+/// Whether the markers are fixed to the room or to the couch; stored with the reference.
 enum class MarkerKind { kRoom, kCouch };
 [[nodiscard]] const char* Name(MarkerKind kind);  ///< "room", "couch"
 
-/// How the patient lies: which end points to the gantry, which side is up.
+/// Patient orientation: which end points to the gantry and which side is up.
 enum class PatientPosture { kHeadFirstSupine, kHeadFirstProne, kFeetFirstSupine, kFeetFirstProne };
 [[nodiscard]] const char* Name(PatientPosture posture);  ///< "HFS", "HFP", "FFS", "FFP"
 
-/// Where the patient's head and left side point, unit vectors in the plane (x, y) of the reference
-/// marker.
+/// Directions of the patient's head and left side, unit vectors in the plane (x, y) of the
+/// reference marker.
 struct PatientAxes {
   Eigen::Vector2d head = Eigen::Vector2d::UnitY();
   Eigen::Vector2d left = Eigen::Vector2d::UnitX();
 };
 
-/// Six values or their uncertainties. Shifts are absent where they are refused (couch-fixed
-/// markers).
+/// Six values or their uncertainties. Shifts are absent with couch-fixed markers.
 struct CouchNumbers {
   std::optional<double> vertical_mm;      ///< +Z, up.
   std::optional<double> longitudinal_mm;  ///< +Y, toward the gantry.
   std::optional<double> lateral_mm;       ///< +X, to the right of a viewer who faces the gantry.
-  double pitch_deg = 0.0;                 ///< About X; > 0 lifts the end at the gantry.
-  double roll_deg = 0.0;                  ///< About Y; > 0 lowers the viewer's right side.
-  double yaw_deg = 0.0;                   ///< About Z; > 0 is counter-clockwise from above.
+  double pitch_deg = 0.0;                 ///< About X; positive lifts the gantry end.
+  double roll_deg = 0.0;                  ///< About Y; positive lowers the viewer's right side.
+  double yaw_deg = 0.0;                   ///< About Z; positive is counter-clockwise from above.
 };
 
-/// What to APPLY to the patient so that the body lies as in the reference.
+/// The motion to APPLY to the patient so that the body lies as in the reference.
 struct Correction {
-  Eigen::Vector3d isocentre_m = Eigen::Vector3d::Zero();  ///< Reference-marker frame.
+  Eigen::Vector3d isocentre_m = Eigen::Vector3d::Zero();  ///< In the reference marker's frame.
   CouchNumbers value;
-  CouchNumbers u95;  ///< 95 % half-widths.
-  std::array<std::string, 6>
-      words;  ///< Which way: vertical, longitudinal, lateral, pitch, roll, yaw; "" where refused.
+  CouchNumbers u95;  ///< Half-widths of the 95 % intervals.
+  /// Directions of vertical, longitudinal, lateral, pitch, roll, yaw; "" where not reported.
+  std::array<std::string, 6> words;
 };
 
 /// The six numbers as a vector, in the order lateral, longitudinal, vertical (metres), pitch, roll,
@@ -59,16 +58,16 @@ struct Correction {
 
 /// The correction of a body motion with its uncertainty, propagated to first order.
 ///
-/// @param T_motion    p_current = T_motion * p_reference, reference-marker frame.
-/// @param covariance  Of T_motion: rotation vector, translation; left perturbation about the moved
-/// centroid, T_motion * centroid,
-///                    so that its translation part is the uncertainty of where the centroid went.
-/// @param centroid    Of the region in the reference scene, reference-marker frame.
-/// @param T_iec_reference  None: nobody has said where the room lies. The numbers are along and
-/// about the reference marker's axes, and no word speaks of couch or gantry.
-/// @param posture     Turns the words into the patient's left, right and head; none: it is not to
-/// be believed, the words are the room's, or the marker's where the room is not known.
-/// @param patient     Needed for the patient's words where the room is not known; else not looked
+/// @param T_motion    p_current = T_motion * p_reference, in the reference marker's frame.
+/// @param covariance  Covariance of T_motion: rotation vector, translation; left perturbation about
+///         the moved centroid, T_motion * centroid, so that its translation part is the uncertainty
+///         of the centroid's new position.
+/// @param centroid    Centroid of the region in the reference scene, reference marker's frame.
+/// @param T_iec_reference  Not set: the orientation of the room is unknown. The numbers then refer
+///         to the reference marker's axes, and the words do not mention couch or gantry.
+/// @param posture     Selects the patient's left, right and head for the words. Not set: the words
+///         refer to the room, or to the marker where the room is unknown.
+/// @param patient     Used for the words only where the room is unknown.
 /// at.
 [[nodiscard]] Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance,
                                       const Eigen::Vector3d& centroid,

@@ -23,21 +23,22 @@ constexpr std::size_t kMinSamples = 50;
 constexpr double kSampleSpacing_m = 0.01;
 constexpr double kSmoothing_m = 0.02;
 constexpr double kNodeSpacing_m =
-    0.06;                               // about a wrist's width: the smallest part that moves alone
-constexpr std::size_t kMaxNodes = 600;  // of a body 1.9 m long; above, the nodes are further apart
+    0.06;  // about the width of a wrist, the smallest part that moves by itself
+// enough for a body of 1.9 m; nodes of larger bodies are spaced more widely
+constexpr std::size_t kMaxNodes = 600;
 constexpr std::size_t kNodesOfSample = 4;
 constexpr double kSigmaOfSample_m = 1.5e-3;  // noise of a fused surface at one sample
-constexpr double kSigmaOfTurn_rad = 0.3;     // weak prior: holds nodes that nothing else holds
-// A part that fits where the rigid motion took it stays there: nothing else keeps a smooth surface
-// from sliding along itself. Cauchy weights let go of what has clearly moved.
+constexpr double kSigmaOfTurn_rad = 0.3;  // weak prior for nodes that are not constrained otherwise
+// Prior that a node stays where the rigid motion placed it; without it a smooth surface could slide
+// along itself. Cauchy weights release what has clearly moved.
 constexpr double kSigmaOfShift_m = 2e-3;
 
-// Search radius and weights of one part of the descent.
+// Search radius and weights of one stage of the optimisation.
 struct Stage {
-  double radius_m;        // of the search for counterparts
-  double min_normal_cos;  // of the two surfaces
-  double scale_m;         // of the Tukey weights
-  double edge_sigma_m;    // how far neighbouring nodes may disagree: the stiffness
+  double radius_m;        // search radius for correspondences
+  double min_normal_cos;  // cosine between the normals of the two surfaces
+  double scale_m;         // scale of the Tukey weights
+  double edge_sigma_m;    // allowed disagreement of neighbouring nodes (stiffness)
   int iterations;
 };
 constexpr std::array<Stage, 3> kStages = {
@@ -61,7 +62,7 @@ struct Follower {
 struct Match {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   double residual_m = 0.0;
-  double weight = 0.0;  // 0: no counterpart
+  double weight = 0.0;  // 0: no correspondence
 };
 
 Surface BodySurface(const PointCloud& cloud, const Body& body) {
@@ -94,7 +95,7 @@ std::vector<Node> NodesOn(const Surface& surface) {
   }
 }
 
-// Its nearest nodes, weighted by how much nearer each is than the next one after them.
+// The nearest nodes, each weighted by how much nearer it is than the next node after them.
 Follower FollowerOf(const Eigen::Vector3d& p, const std::vector<Node>& nodes) {
   std::array<std::pair<double, std::uint32_t>, kNodesOfSample + 1> nearest;
   nearest.fill({1e9, 0});
@@ -107,7 +108,7 @@ Follower FollowerOf(const Eigen::Vector3d& p, const std::vector<Node>& nodes) {
   Follower follower;
   double sum = 0.0;
   for (std::size_t k = 0; k < kNodesOfSample; ++k) {
-    if (nearest[k].first >= 1e9) break;  // a body of fewer nodes
+    if (nearest[k].first >= 1e9) break;  // the body has fewer nodes
     follower.node[k] = nearest[k].second;
     const double near = 1.0 - nearest[k].first / nearest.back().first;
     follower.weight[k] = near * near + 1e-9;
@@ -125,7 +126,7 @@ std::vector<Follower> FollowersOf(const Surface& surface, const std::vector<Node
   return followers;
 }
 
-// The normal equations, block by block: one 6 x 6 block for each pair of nodes that share a sample.
+// The normal equations by blocks: one 6 x 6 block for each pair of nodes that share a sample.
 class NormalEquations {
  public:
   NormalEquations(std::size_t num_nodes, const std::vector<Follower>& followers)
@@ -152,7 +153,7 @@ class NormalEquations {
   void AddRight(std::size_t row, const Vector6d& values) {
     right_side_.segment<6>(static_cast<Eigen::Index>(6 * row)) += values;
   }
-  /// Pairs of different nodes that share a sample, each once.
+  /// Pairs of different nodes that share a sample, each listed once.
   [[nodiscard]] std::vector<std::pair<std::size_t, std::size_t>> Edges() const {
     std::vector<std::pair<std::size_t, std::size_t>> edges;
     for (const auto& [pair, block] : index_) {
@@ -328,7 +329,7 @@ class Registration {
     }
   }
 
-  // Where node a expects its neighbour b, against where b is.
+  // Expected position of neighbour b according to node a, minus its actual position.
   void AddEdge(std::size_t a, std::size_t b, double sigma_m) {
     const Node &from = nodes_[a], &to = nodes_[b];
     const Eigen::Vector3d arm = from.R * (to.place_m - from.place_m);

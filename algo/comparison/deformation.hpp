@@ -1,4 +1,4 @@
-// How the body has changed its shape between two scans: a moved arm, a filled belly.
+// Estimates how the shape of the body has changed between two scans, such as a moved arm.
 #pragma once
 
 #include <cstdint>
@@ -21,34 +21,34 @@ struct DeformationInput {
   const PointCloud& current_cloud;
   const Body& current_body;
   Pose T_motion = Pose::Identity();  ///< Rigid motion of the body: p_current = T_motion * p.
-  std::stop_token stop = {};         ///< Polled in each iteration; Interrupted follows.
+  std::stop_token stop = {};  ///< Polled in each iteration; a stop request throws Interrupted.
 };
 
-/// A displacement for each sample of the reference body's surface, about one a square centimetre.
-/// It is what the rigid correction leaves: where the sample lies in the current scan once that is
-/// moved back by T_motion, minus where it lies in the reference scan. Reference frame, metres.
+/// One displacement for each sample of the reference body's surface, about one per square
+/// centimetre. It is what remains after the rigid correction: the sample's position in the current
+/// scan, moved back by T_motion, minus its position in the reference scan. Reference frame, metres.
 ///
-/// Only the part across the surface is measured; along the surface the field is as smooth as its
-/// neighbourhood allows. Samples without a counterpart follow the observed ones around them.
+/// Only the component across the surface is measured. Along the surface the field is interpolated
+/// smoothly, and samples without a correspondence follow the observed samples around them.
 struct Deformation {
   std::vector<Eigen::Vector3f> points;
   std::vector<Eigen::Vector3f> shifts_m;
-  std::vector<std::uint8_t> observed;  ///< 1: the current scan shows this part of the surface.
-  double residual_median_m = 0.0;      ///< Of the observed samples, across the surface.
+  std::vector<std::uint8_t> observed;  ///< 1 if the current scan shows this part of the surface.
+  double residual_median_m = 0.0;      ///< Median of the observed samples, across the surface.
   double residual_p95_m = 0.0;
-  double shift_median_m = 0.0;  ///< Length of the observed samples' displacements.
+  double shift_median_m = 0.0;  ///< Median length of the observed samples' displacements.
   double shift_p95_m = 0.0;
 };
 
 /// Smooth non-rigid registration of the reference body to the current one.
 ///
 /// An embedded deformation graph (Sumner, Schmid, Pauly: Embedded deformation for shape
-/// manipulation, 2007): nodes every 6 cm on the surface, each with a rotation and a shift; a sample
-/// follows its four nearest nodes. Gauss-Newton on point-to-plane distances with Tukey weights,
-/// and on the nodes' disagreement about each other's place with Cauchy weights, so that an arm may
-/// part from the trunk. Three stages with falling search radius and stiffness.
+/// manipulation, 2007): nodes every 6 cm on the surface, each with a rotation and a translation; a
+/// sample follows its four nearest nodes. Gauss-Newton minimises point-to-plane distances with
+/// Tukey weights and the disagreement of neighbouring nodes with Cauchy weights, so that an arm may
+/// move independently of the trunk. Three stages with decreasing search radius and stiffness.
 ///
-/// Nothing if either body has fewer than 50 samples. Deterministic, thread-safe.
+/// Returns nothing if either body has fewer than 50 samples. Deterministic and thread-safe.
 [[nodiscard]] std::optional<Deformation> EstimateDeformation(const DeformationInput& input);
 
 }  // namespace plumb

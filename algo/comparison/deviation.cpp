@@ -10,11 +10,11 @@ namespace plumb {
 namespace {
 
 constexpr float kMaxJump_m =
-    0.01F;  // between neighbouring cells: more is another surface, not a slope
-constexpr float kSheet_m = 0.01F;  // of a cloud's top surface
+    0.01F;  // height step between neighbouring cells; a larger one separates two surfaces
+constexpr float kSheet_m = 0.01F;  // thickness of a cloud's top surface
 constexpr float kMaxRimShare =
-    0.5F;  // sideways over along: a pinhole's rim with a noisy normal is still the surface
-constexpr int kMaxDescent = 200;  // steps of the local search; each is one cell
+    0.5F;  // lateral over axial distance; allows for a noisy normal at the rim of a pinhole
+constexpr int kMaxDescent = 200;  // steps of the local search, one cell each
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 void CheckGrids(const HeightMap& current, const HeightMap& reference) {
@@ -24,12 +24,13 @@ void CheckGrids(const HeightMap& current, const HeightMap& reference) {
   throw std::invalid_argument("height maps must share one grid");
 }
 
-// Draws triangles onto a height map in its own cell coordinates (column, row), keeping the highest.
+// Draws triangles into a height map in its own cell coordinates (column, row) and keeps the
+// highest.
 class TriangleCanvas {
  public:
   explicit TriangleCanvas(const GridShape& grid) : map_(grid) {}
 
-  // Vertices: x and y in cells (centre of cell 0 at 0), z in metres.
+  // Vertices: x and y in cells (the centre of cell 0 is at 0), z in metres.
   void Draw(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
     const double area = (b.x() - a.x()) * (c.y() - a.y()) - (c.x() - a.x()) * (b.y() - a.y());
     if (!(std::abs(area) > 1e-12)) return;
@@ -43,7 +44,8 @@ class TriangleCanvas {
             ((column - a.x()) * (c.y() - a.y()) - (c.x() - a.x()) * (row - a.y())) / area;
         const double w =
             ((b.x() - a.x()) * (row - a.y()) - (column - a.x()) * (b.y() - a.y())) / area;
-        constexpr double kEdge = -1e-9;  // cells on a shared edge belong to both: no pinholes
+        // cells on a shared edge belong to both triangles, so that no pinholes appear
+        constexpr double kEdge = -1e-9;
         if (v < kEdge || w < kEdge || v + w > 1.0 - kEdge) continue;
         const float z = static_cast<float>(a.z() + v * (b.z() - a.z()) + w * (c.z() - a.z()));
         float& cell =
@@ -64,7 +66,7 @@ bool Connected(float a, float b, float c) {
   return std::max({a, b, c}) - std::min({a, b, c}) < kMaxJump_m;
 }
 
-// The current surface as the distance search needs it: position and normal of a cell.
+// Position and normal of a cell of the current surface, for the distance search.
 class GridSurface {
  public:
   explicit GridSurface(const HeightMap& map)
@@ -73,7 +75,7 @@ class GridSurface {
   [[nodiscard]] Eigen::Vector3f Normal(int row, int column) const {
     return Eigen::Vector3f(-Slope(row, column, 0, 1), -Slope(row, column, 1, 0), 1.0F).normalized();
   }
-  // At the end of the surface: a neighbour is unknown or outside the grid.
+  // True at the end of the surface: a neighbour is unknown or outside the grid.
   [[nodiscard]] bool OnRim(int row, int column) const {
     for (int r = row - 1; r <= row + 1; ++r) {
       for (int c = column - 1; c <= column + 1; ++c) {
@@ -91,7 +93,7 @@ class GridSurface {
       return std::numeric_limits<float>::quiet_NaN();
     return map_.at(row, column);
   }
-  // Rise over run in one direction: central, or one-sided at an end or beside a jump.
+  // Slope in one direction: central difference, or one-sided at an end or beside a jump.
   [[nodiscard]] float Slope(int row, int column, int dr, int dc) const {
     const float here = map_.at(row, column);
     const float ahead = Value(row + dr, column + dc) - here;
@@ -107,8 +109,8 @@ class GridSurface {
   float step_;
 };
 
-// Nearest cell of the current surface for every reference cell, by passing candidates on between
-// neighbours.
+// Nearest cell of the current surface for every reference cell, found by propagating candidates
+// between neighbours.
 class NearestCells {
  public:
   NearestCells(const HeightMap& current, const HeightMap& reference,
@@ -128,8 +130,8 @@ class NearestCells {
         const float dz = current.z[i] - reference.z[i];
         best_[i] = static_cast<std::uint32_t>(i);
         squared_[i] = dz * dz;
-        // Nearer than a cell: no other column can hold a point that matters, the tangent plane here
-        // is exact enough.
+        // Closer than one cell: no other column can hold a nearer point, and the tangent plane here
+        // is accurate enough.
         settled_[i] = std::abs(dz) < step_ ? 1 : 0;
       }
     }
@@ -237,8 +239,8 @@ HeightMap ResampledHeightMap(const HeightMap& source, const Eigen::Affine3d& T_t
       const float z01 = source.at(row - 1, column + 1);
       const float z10 = source.at(row, column);
       const float z11 = source.at(row, column + 1);
-      // Two triangles over the diagonal 00-11; where a corner is missing, the one triangle over the
-      // other three. NaN connects nothing.
+      // Two triangles along the diagonal 00-11; where a corner is missing, one triangle of the
+      // other three. Edges to NaN are never drawn.
       const bool upper = Connected(z00, z01, z11) && std::isfinite(z00 + z01 + z11);
       const bool lower = Connected(z00, z11, z10) && std::isfinite(z00 + z11 + z10);
       if (upper) canvas.Draw(above[c], above[c + 1], below[c + 1]);
@@ -255,7 +257,7 @@ HeightMap ResampledHeightMap(const HeightMap& source, const Eigen::Affine3d& T_t
 
 HeightMap HeightMapOfCloud(const PointCloud& cloud_in_target, double reach_m,
                            const GridShape& target) {
-  constexpr float kMinUp = 0.2F;  // steeper discs are no part of a view from above
+  constexpr float kMinUp = 0.2F;  // steeper discs are not visible from above
   HeightMap top(target);
   std::vector<float> sum(target.num_cells(), 0.0F);
   std::vector<float> weight(target.num_cells(), 0.0F);
@@ -330,8 +332,8 @@ HeightMap SignedDistance(const HeightMap& current, const HeightMap& reference,
     const Eigen::Vector3f normal = surface.Normal(row, column);
     const float along = normal.dot(offset);
     const float sideways = (offset - along * normal).norm();
-    // Within a cell's own patch of surface the tangent plane is the surface; beyond it the nearest
-    // point is a crease or an end.
+    // Within a cell's own patch of surface the tangent plane represents the surface; beyond it the
+    // nearest point lies on a crease or an end.
     if (sideways < 1.5F * step / std::max(normal.z(), 0.1F)) {
       distance.z[cell] = -along;
     } else if (sideways < kMaxRimShare * std::abs(along) || !surface.OnRim(row, column)) {

@@ -27,7 +27,8 @@ double SideOf(const SceneMarker& marker) {
   return sum / 4.0;
 }
 
-// Size of the second map against the first: spread of the shared centres about their mean.
+// Size of the second map relative to the first, from the spread of the shared centres about their
+// mean.
 double ScaleOf(const std::vector<std::pair<const SceneMarker*, const SceneMarker*>>& shared) {
   if (shared.size() < 2) return kNotKnown;
   Eigen::Vector3d before = Eigen::Vector3d::Zero(), now = Eigen::Vector3d::Zero();
@@ -114,8 +115,8 @@ class Checker {
     return false;
   }
 
-  // Baseline from sweep by the agreeing markers other than `id`: a marker must not pull the fit
-  // that it is judged by. Nothing if those determine no pose.
+  // Baseline from sweep, fitted to the agreeing markers other than `id`, so that a marker does not
+  // influence the fit that judges it. Nothing if they do not determine a pose.
   [[nodiscard]] std::optional<Pose> FitWithout(int id, const std::vector<int>& agreeing) const {
     std::vector<Eigen::Vector3d> before, now;
     for (const int other : agreeing) {
@@ -173,8 +174,8 @@ class Checker {
       const double off = 100 * (SideOf(marker) / scene_.marker_length_m - 1);
       if (id_of_worst < 0 || std::abs(off) > std::abs(worst)) worst = off, id_of_worst = id;
     }
-    // Preset `best` takes every marker for as large as it should be: then its sides were not
-    // measured, and say nothing.
+    // Preset `best` assumes that every marker has its nominal size, so that its sides were not
+    // measured and cannot be checked.
     if (std::abs(worst) < kAssumed_percent) return;
     AtMost("side", worst, 100 * limits_.max_side_share, "%",
            id_of_worst < 0 ? "" : fmt::format("marker {}", id_of_worst),

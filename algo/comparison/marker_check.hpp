@@ -1,5 +1,5 @@
-// The daily check: do the markers lie as they lay when they were last accepted, and does the sensor
-// still measure their true size?
+// The daily check: whether the markers are where they were when the baseline was accepted, and
+// whether the sensor still measures their true size.
 #pragma once
 
 #include <optional>
@@ -11,43 +11,43 @@
 
 namespace plumb {
 
-/// Limits of CheckMarkers(): starting values; a room may ask for less.
+/// Limits of CheckMarkers(). These are starting values; a room may set tighter ones.
 struct MarkerCheckLimits {
-  double max_misfit_m = 3 * kMillimetre;  ///< RMS over corners after the rigid fit.
-  double max_moved_m = 5 * kMillimetre;   ///< Of one marker's centre against all others.
-  double max_side_share =
-      0.03;  ///< A marker's side against its true length; where sides are measured at all.
-  double max_scale_share = 0.005;  ///< Size of the whole marker map against the baseline's.
-  double max_depth_share =
-      0.03;             ///< Depth scale as the sweep's own calibration found it, against 1.
-  int min_views = 3;    ///< Fewer: a marker counts as not seen.
-  int min_markers = 3;  ///< Without a baseline.
+  double max_misfit_m = 3 * kMillimetre;  ///< RMS over the corners after the rigid fit.
+  /// Distance of one marker's centre from where all others place it.
+  double max_moved_m = 5 * kMillimetre;
+  /// Measured side of a marker over its nominal length, minus 1; only where sides are measured.
+  double max_side_share = 0.03;
+  double max_scale_share = 0.005;  ///< Size of the marker map relative to the baseline's, minus 1.
+  double max_depth_share = 0.03;   ///< Depth scale from the sweep's own calibration, minus 1.
+  int min_views = 3;               ///< With fewer views a marker counts as not seen.
+  int min_markers = 3;             ///< Fewest markers without a baseline.
 };
 
-/// One number of a check.
+/// One quantity of a check.
 struct MarkerCheckItem {
-  std::string name;    ///< markers_seen, misfit, moved, side, scale, depth_scale
-  double value = 0.0;  ///< In `unit`; NaN: could not be computed.
-  double limit = 0.0;  ///< `value` may reach it; markers_seen: must reach it.
+  std::string name;    ///< markers_seen, misfit, moved, side, scale or depth_scale.
+  double value = 0.0;  ///< In `unit`; NaN if it could not be computed.
+  double limit = 0.0;  ///< Largest allowed `value`; for markers_seen the smallest.
   std::string unit;    ///< "", "mm" or "%"
   bool passed = false;
-  std::string note;  ///< "marker 7", "missing: 3, 9"; may be empty.
+  std::string note;  ///< For example "marker 7" or "missing: 3, 9"; may be empty.
 };
 
 enum class MarkerCheckStatus {
   kPassed,
   kFailed,
-  kNoBaseline,  ///< Everything else passed, but there is nothing yet to compare with.
+  kNoBaseline,  ///< Everything else passed, but there is no baseline to compare with.
 };
 [[nodiscard]] const char* Name(MarkerCheckStatus status);  ///< "passed", "failed", "no_baseline"
 
 struct MarkerCheck {
   MarkerCheckStatus status = MarkerCheckStatus::kFailed;
   std::vector<MarkerCheckItem> items;
-  std::vector<std::string> reasons;  ///< Sentences: why it did not pass.
+  std::vector<std::string> reasons;  ///< Complete sentences that state why the check did not pass.
 };
 
-/// Markers that count as known, with what they were.
+/// The markers that a check accepted, with their dictionary and length.
 struct MarkerBaseline {
   MarkerMap markers;
   std::string dictionary;
@@ -55,9 +55,9 @@ struct MarkerBaseline {
 };
 [[nodiscard]] MarkerBaseline BaselineOf(const Scene& scene, const MarkerCheckLimits& limits = {});
 
-/// Compares the markers of a sweep with a baseline. A rigid motion of the whole (another reference
-/// marker, another start) is no fault. Never throws for what a sweep holds; absence is a failed
-/// item.
+/// Compares the markers of a sweep with a baseline. A rigid motion of all markers together (another
+/// reference marker or starting position) is not an error. Never throws because of what a sweep
+/// contains; missing data is a failed item.
 [[nodiscard]] MarkerCheck CheckMarkers(const Scene& scene,
                                        const std::optional<MarkerBaseline>& baseline,
                                        const MarkerCheckLimits& limits = {});

@@ -9,8 +9,8 @@
 namespace plumb {
 namespace {
 
-constexpr float kUnknownShare =
-    0.7F;  // what an unmeasured place costs, of the limit: missing data is weak evidence
+// cost of an unmeasured cell as a fraction of the limit, because missing data is weak evidence
+constexpr float kUnknownShare = 0.7F;
 constexpr double kDistinctYaw_rad = 0.21;  // 12 deg
 constexpr double kDistinctShift_m = 0.05;
 
@@ -36,8 +36,8 @@ Eigen::Vector2d Centroid(const std::vector<BodyCell>& cells) {
   return sum / static_cast<double>(cells.size());
 }
 
-// Heights of the body, 0 where something else was measured, NaN where nothing was; single gaps
-// filled.
+// Heights of the body: 0 where something else was measured, NaN where nothing was measured. Single
+// gaps are filled.
 std::vector<float> SearchMap(const Body& body) {
   std::vector<float> map(body.cells.size(), std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < map.size(); ++i) {

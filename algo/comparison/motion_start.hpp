@@ -1,4 +1,4 @@
-// Where a registration of two bodies may start: no assumption that they lie close together.
+// Finds starting poses for the registration of two bodies that may lie far apart.
 #pragma once
 
 #include <vector>
@@ -10,19 +10,21 @@ namespace plumb {
 
 struct MotionStartOptions {
   double max_yaw_rad =
-      1.6;  ///< Half range of the search about the support's normal: 60 deg are asked for.
-  double yaw_step_rad =
-      0.0873;  ///< 5 deg: 26 mm at the end of a torso, well inside the reach of what follows.
-  double max_offset_m = 0.165;  ///< Of the centroids, which missing parts pull apart.
+      1.6;  ///< Half range of the search about the support's normal; 60 deg are required.
+  /// 5 deg, or 26 mm at the end of a torso, which is well within reach of the refinement.
+  double yaw_step_rad = 0.0873;
+  /// Largest distance of the centroids, which missing parts move apart.
+  double max_offset_m = 0.165;
   double offset_step_m = 0.03;
-  double height_limit_m = 0.04;    ///< Differences count up to this; body on floor counts as much.
+  /// Upper limit of one difference; body against floor costs as much.
+  double height_limit_m = 0.04;
   std::size_t max_samples = 1500;  ///< Cells of the reference body that are compared.
   std::size_t num_starts = 6;
 };
 
 /// Candidate motions (p_current = T * p_reference), best first, mutually different: yaw and shift
-/// under which the heights over the two supports agree best, both ways round (a small body inside a
-/// large one is no match). Deterministic. Empty if either body is empty.
+/// for which the heights above the two supports agree best, evaluated in both directions (a small
+/// body inside a large one is not a match). Deterministic. Empty if either body is empty.
 [[nodiscard]] std::vector<Pose> MotionStarts(const Body& reference, const Body& current,
                                              const MotionStartOptions& options = {});
 

@@ -7,22 +7,23 @@
 namespace plumb {
 namespace {
 
-// By how much a marker map is too long or short: 0.0 to 0.8 permille over 23 sweeps of four units,
-// their tone curves estimated. Prints of a wrong size are not allowed for: two units at hard noise,
-// which has such prints, gave maps 3.0 to 4.7 permille too long. The markers of both maps share it,
-// so no comparison of maps shows it.
+// Scale error of a marker map: 0.0 to 0.8 permille over 23 sweeps of four units with estimated tone
+// curves. Wrong print sizes are not covered: two units with hard noise, which includes them, gave
+// maps 3.0 to 4.7 permille too long. The markers of both maps share this error, so comparing the
+// maps does not show it.
 constexpr double kScaleSigma = 0.001;
 
-// Two sweeps may agree at the markers and still place the body differently against them: depth is
-// registered to colour by terms that each sweep estimates again. Over 144 pairs of two simulated
-// units the numbers miss by 0.4 to 0.7 mm and 0.04 to 0.07 deg (RMS); the other parts already
-// explain 0.6 mm and 0.07 deg of a body that moved little.
+// Two sweeps may agree at the markers and still place the body differently relative to them,
+// because depth is registered to colour by terms that each sweep estimates separately. Over 144
+// pairs of two simulated units the numbers are off by 0.4 to 0.7 mm and 0.04 to 0.07 deg (RMS); the
+// other causes already explain 0.6 mm and 0.07 deg for a body that moved little.
 constexpr double kSweepShift_m = 0.15 * kMillimetre;
 constexpr double kSweepAngle_rad = 0.015 * kDegree;
 
-// A marker's own plane is off by the maps' distortion over the first length, its direction within
-// the plane over the second. Measured on 13 sweeps of three units, where the distortion was 0.3 to
-// 3 mm: tilts of 0.09 to 0.3 deg about an axis (RMS), turns of 0.01 to 0.05 deg.
+// The plane of a marker is off by the maps' distortion over the first length, its direction within
+// the plane by the distortion over the second. Measured on 13 sweeps of three units, where the
+// distortion was 0.3 to 3 mm: tilts of 0.09 to 0.3 deg about an axis (RMS), rotations of 0.01 to
+// 0.05 deg.
 constexpr double kTiltLength_m = 0.3;
 constexpr double kTurnLength_m = 2.0;
 
@@ -33,10 +34,11 @@ Matrix6d Isotropic(double angle_rad, double shift_m) {
   return variance.asDiagonal();
 }
 
-// The maps disagree between the markers as they do at them: the body is one more place of that
-// field, and however many markers the fit averages, the field at the body stays. The stretch that
-// makes maps equally long is counted too, as its cause need not act on the body alike. A field that
-// changes over the spread of the markers turns the body by its size over that length.
+// The maps disagree between the markers as much as at the markers. The body is one more place in
+// that field of distortion, and the field at the body is not reduced by averaging over many
+// markers. The stretch that makes the maps equally long is included, because its cause need not
+// affect the body in the same way. A field that changes over the spread of the markers rotates the
+// body by its size over that length.
 Matrix6d DistortionAt(const Alignment& alignment) {
   Matrix6d covariance = Matrix6d::Zero();
   covariance.bottomRightCorner<3, 3>() = alignment.distortion;
@@ -48,8 +50,9 @@ Matrix6d DistortionAt(const Alignment& alignment) {
   return covariance;
 }
 
-// Both bodies lie where the maps' common scale puts them: the way between them is off by as much.
-// On top, the relative stretch is known only so well, which counts from the markers' centre.
+// Both body positions contain the common scale error of the maps, so their distance is off in
+// proportion. In addition, the uncertainty of the relative stretch grows with the distance from the
+// markers' centre.
 Matrix6d ScaleOver(const Alignment& alignment, const Eigen::Vector3d& from,
                    const Eigen::Vector3d& to) {
   const Eigen::Vector3d way = kScaleSigma * (to - from);
@@ -59,15 +62,16 @@ Matrix6d ScaleOver(const Alignment& alignment, const Eigen::Vector3d& from,
   return covariance;
 }
 
-// A frame that is turned by a small twist f turns the motion into F M F^-1: the motion is off by
-// f - Ad(M) f, which vanishes where the body did not move. The frame is the pose of one marker, so
-// it shares the maps' distortion where that marker lies.
+// A frame that is rotated by a small twist f changes the motion into F M F^-1, so the motion is off
+// by f - Ad(M) f, which vanishes where the body did not move. The frame is the pose of one marker,
+// which has the maps' distortion at its place.
 Matrix6d FrameOf(const Alignment& alignment, const Pose& T_motion, const Eigen::Vector3d& moved) {
-  const double variance = alignment.distortion.trace() / 3.0 / 2.0;  // of one of the two maps
+  // variance of one of the two maps
+  const double variance = alignment.distortion.trace() / 3.0 / 2.0;
   Matrix6d at_origin = Isotropic(std::sqrt(variance) / kTiltLength_m, std::sqrt(variance));
   at_origin(2, 2) = variance / (kTurnLength_m * kTurnLength_m);
   const Matrix6d frame = CovarianceAbout(at_origin, Eigen::Vector3d::Zero(), moved);
-  // Adjoint of the motion, about the moved centroid.
+  // Adjoint of the motion about the moved centroid.
   const Pose T = Eigen::Translation3d(-moved) * T_motion * Eigen::Translation3d(moved);
   Matrix6d adjoint = Matrix6d::Zero();
   adjoint.topLeftCorner<3, 3>() = T.linear();
@@ -104,7 +108,7 @@ MotionUncertainty Uncertainty(const UncertaintyInput& input) {
   parts.distortion = DistortionAt(alignment);
   parts.scale = ScaleOver(alignment, input.centroid_m, moved);
   parts.frame = FrameOf(alignment, input.T_motion, moved);
-  parts.sweep = 2.0 * Isotropic(kSweepAngle_rad, kSweepShift_m);  // of either sweep
+  parts.sweep = 2.0 * Isotropic(kSweepAngle_rad, kSweepShift_m);  // both sweeps contribute
   return parts;
 }
 

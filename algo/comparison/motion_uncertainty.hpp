@@ -1,4 +1,4 @@
-// How well a body motion is known: one covariance for each of its causes, and their sum.
+// Uncertainty of a body motion: one covariance for each cause, and their sum.
 #pragma once
 
 #include <array>
@@ -11,15 +11,19 @@
 
 namespace plumb {
 
-/// Covariances of a body motion by cause. Each: rotation vector (rad), translation (m), reference
-/// frame, left perturbation about the moved centroid of the region. The causes are independent.
+/// Covariances of a body motion by cause. Each holds the rotation vector (rad), then the
+/// translation (m), in the reference frame, as a left perturbation about the moved centroid of the
+/// region. The causes are independent.
 struct MotionUncertainty {
-  Matrix6d surface = Matrix6d::Zero();     ///< Registration of the two surfaces onto each other.
-  Matrix6d markers = Matrix6d::Zero();     ///< Fit of the two marker maps onto each other.
-  Matrix6d distortion = Matrix6d::Zero();  ///< What a place between the markers may be off by.
-  Matrix6d scale = Matrix6d::Zero();       ///< Length of the maps over the way that the body moved.
-  Matrix6d frame = Matrix6d::Zero();       ///< Pose of the reference marker in its own map.
-  Matrix6d sweep = Matrix6d::Zero();       ///< What neither markers nor surfaces of a sweep show.
+  Matrix6d surface = Matrix6d::Zero();  ///< Registration of the two surfaces to each other.
+  Matrix6d markers = Matrix6d::Zero();  ///< Fit of the two marker maps to each other.
+  /// Distortion of the marker maps at a place between the markers.
+  Matrix6d distortion = Matrix6d::Zero();
+  /// Scale error of the maps over the distance that the body moved.
+  Matrix6d scale = Matrix6d::Zero();
+  Matrix6d frame = Matrix6d::Zero();  ///< Pose of the reference marker in its own map.
+  /// Errors of a sweep that neither its markers nor its surfaces show.
+  Matrix6d sweep = Matrix6d::Zero();
 
   [[nodiscard]] Matrix6d Total() const {
     return surface + markers + distortion + scale + frame + sweep;
@@ -28,17 +32,18 @@ struct MotionUncertainty {
   [[nodiscard]] std::array<std::pair<const char*, const Matrix6d*>, 6> Parts() const;
 };
 
-/// What Uncertainty() joins. Borrowed for the call.
+/// Input of Uncertainty(). Borrowed for the call.
 struct UncertaintyInput {
   const Alignment& alignment;
   const Matrix6d& surface;           ///< SurfaceMotion::covariance, about the moved centroid.
   Pose T_motion = Pose::Identity();  ///< p_current = T_motion * p_reference
-  Eigen::Vector3d centroid_m = Eigen::Vector3d::Zero();  ///< Of the region, reference frame.
+  /// Centroid of the region in the reference frame.
+  Eigen::Vector3d centroid_m = Eigen::Vector3d::Zero();
 };
 
 [[nodiscard]] MotionUncertainty Uncertainty(const UncertaintyInput& input);
 
-/// A covariance (left perturbation) about another point.
+/// Moves a covariance (left perturbation) to another reference point.
 [[nodiscard]] Matrix6d CovarianceAbout(const Matrix6d& covariance, const Eigen::Vector3d& from_m,
                                        const Eigen::Vector3d& to_m);
 

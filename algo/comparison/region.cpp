@@ -17,10 +17,10 @@ constexpr double kSegmentationSmoothing_m = 0.03;
 constexpr int kMaxPlanes = 6;
 constexpr double kHistogramBin_m = 0.01;
 constexpr double kCoarsePlaneBand_m =
-    0.04;  // first guess is level: 2 deg over 2 m is 35 mm at the ends
-constexpr double kFinePlaneBand_m = 0.010;  // surfaces wave by some millimetres over a room
+    0.04;  // the first guess is level; 2 deg over 2 m are 35 mm at the ends
+constexpr double kFinePlaneBand_m = 0.010;  // surfaces are uneven by some millimetres over a room
 constexpr double kPlaneNormalCos = 0.985;   // 10 deg
-constexpr double kCarriedShare = 0.5;       // of the most that any plane carries
+constexpr double kCarriedShare = 0.5;       // fraction of the largest carried area
 
 struct FoundPlane {
   SupportPlane plane;
@@ -55,7 +55,7 @@ bool RefitPlane(const Surface& scene, const std::vector<std::size_t>& candidates
   return true;
 }
 
-// Height (along z) at which most of the candidates lie.
+// Height (along z) with the most candidates.
 double ModeHeight(const Surface& scene, const std::vector<std::size_t>& candidates) {
   float low = std::numeric_limits<float>::max();
   float high = std::numeric_limits<float>::lowest();
@@ -97,7 +97,8 @@ std::vector<FoundPlane> HorizontalPlanes(const Surface& scene, const BodyOptions
     }
     for (int i = 0; i < 3 && fitted; ++i)
       fitted = RefitPlane(scene, left, kFinePlaneBand_m, kPlaneNormalCos, found.plane);
-    // What lies in the band leaves the pool, member or not, so that every round makes progress.
+    // Everything in the band is removed from the pool, member or not, so that every round makes
+    // progress.
     std::vector<std::size_t> rest;
     for (const std::size_t i : left) {
       const double height = found.plane.Height(scene.points[i].cast<double>());
@@ -116,7 +117,7 @@ std::vector<FoundPlane> HorizontalPlanes(const Surface& scene, const BodyOptions
   return planes;
 }
 
-// The highest plane that carries nearly as much as any: the couch rather than the floor below it.
+// The highest plane that carries nearly as much as any other: the couch rather than the floor.
 std::optional<SupportPlane> ChooseSupport(const Surface& scene,
                                           const std::vector<FoundPlane>& planes,
                                           const BodyOptions& options) {
@@ -291,7 +292,7 @@ std::vector<std::uint8_t> RegionMask(const HeightMap& map, const Body& body,
     any = any || inside;
   });
   if (any || polygon_m.empty()) return mask;
-  // Nothing rises in the polygon: whoever drew it meant the flat surface itself.
+  // Nothing rises above the support in the polygon, so the flat surface itself was meant.
   ForEachCell(map, [&](std::size_t cell, const Eigen::Vector3d& p) {
     mask[cell] = InsidePolygon(polygon_m, p.x(), p.y()) ? 1 : 0;
   });
@@ -313,12 +314,12 @@ std::optional<Eigen::Vector3d> RegionCentroid(const HeightMap& map,
 
 RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uint8_t>& mask,
                           const PointCloud& current, double current_step_m, const Pose& T_motion) {
-  // Brought back by the inverse motion, so that cells compare in place.
+  // Moved back by the inverse motion, so that cells correspond.
   const Pose T_back = T_motion.inverse();
   const GridShape& fine = reference.grid;
   GridShape grid = fine;
   grid.step = 2 * std::max(fine.step,
-                           current_step_m);  // so that no cell within a measured part stays empty
+                           current_step_m);  // so that no cell within a measured part remains empty
   grid.width = static_cast<int>(std::ceil(fine.width * fine.step / grid.step));
   grid.height = static_cast<int>(std::ceil(fine.height * fine.step / grid.step));
   std::vector<std::uint8_t> measured(grid.num_cells(), 0);
@@ -330,7 +331,8 @@ RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uin
   std::size_t region_cells = 0;
   std::size_t covered_cells = 0;
   std::vector<float> distance(grid.num_cells(),
-                              0.0F);  // of uncovered region cells to anything else, cells
+                              // distance from uncovered region cells to any other cell, in cells
+                              0.0F);
   ForEachCell(reference, [&](std::size_t cell, const Eigen::Vector3d& p) {
     if (mask[cell] == 0) return;
     ++region_cells;
@@ -344,7 +346,7 @@ RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uin
   if (region_cells == 0) return result;
   result.coverage = static_cast<double>(covered_cells) / static_cast<double>(region_cells);
 
-  // Chamfer distance (1, sqrt 2), two passes: within 8 % of the Euclidean one.
+  // Chamfer distance (1, sqrt 2) in two passes: within 8 % of the Euclidean distance.
   const auto relax = [&](int row, int column, int dr, int dc) {
     const int r = row + dr;
     const int c = column + dc;
@@ -378,8 +380,8 @@ RegionCoverage CoverageOf(const HeightMap& reference, const std::vector<std::uin
       result.hole_centre_m = {grid.x_centre(column), grid.y_centre(row)};
     }
   }
-  // Half a cell to the centre of the next measured one on each side, and half a cell that is only
-  // partly measured.
+  // Half a cell to the centre of the next measured cell on each side, and half a cell for cells
+  // that are only partly measured.
   if (largest > 0) result.largest_hole_m = 2.0 * largest * grid.step;
   return result;
 }

@@ -17,14 +17,14 @@ namespace {
 
 constexpr double kCover95 = 1.96;
 constexpr std::size_t kLeastOfBoard = 2;
-constexpr double kMinSigma_m = 1e-5;  // of synthetic markers that fit exactly
+constexpr double kMinSigma_m = 1e-5;  // lower limit for synthetic markers that fit exactly
 
-// What is left on a sheet for markers, after the margin of 6 mm and the ruler's 22 mm.
+// Printable area for markers: the sheet without its margin of 6 mm and the ruler's 22 mm.
 const Eigen::Vector2d kRoomA4_m(0.198, 0.263);
 const Eigen::Vector2d kRoomA3_m(0.285, 0.386);
-// A marker with white around it that is one cell wide: the coarsest dictionary has 4 + 2 cells.
+// A marker needs a white border of one cell. The coarsest dictionary has 4 + 2 cells per side.
 constexpr double kWhiteShare = 4.0 / 3.0;
-constexpr double kGap_m = 4 * kMillimetre;  // for the cross
+constexpr double kGap_m = 4 * kMillimetre;  // space for the cross
 
 MarkerCorners CornersOnBoard(const Eigen::Vector2d& centre_m, double length_m) {
   MarkerCorners corners = CornersInMarkerFrame(length_m);
@@ -47,10 +47,11 @@ double SpreadOf(std::span<const Eigen::Vector3d> points) {
 
 Eigen::Vector3d CentreOf(const MarkerCorners& corners) { return MeanOf(corners); }
 
-// Half-widths of the position at the cross and of the worst turn, from the scatter of the markers.
+// Half-widths for the position of the cross and for the least certain rotation, from the scatter of
+// the markers.
 void AddUncertainty(BoardFit& fit, std::span<const Eigen::Vector3d> centres_board, double sigma_m) {
   const auto num = static_cast<double>(centres_board.size());
-  // Of 3 coordinates a marker, 6 are spent on the fit.
+  // Each marker contributes 3 coordinates, and the fit uses 6 degrees of freedom.
   const double from_fit = fit.rms_m / std::sqrt(3.0) * std::sqrt(3 * num / (3 * num - 6));
   const double sigma = std::max({from_fit, sigma_m, kMinSigma_m});
   const Eigen::Vector3d mean = MeanOf(centres_board);
@@ -89,7 +90,7 @@ RoomBoard MakeRoomBoard(int dictionary_size, double marker_length_m) {
   }
   RoomBoard board{.is_a3 = !fits(kRoomA4_m), .centres_m = {}, .marker_length_m = marker_length_m};
   const Eigen::Vector2d room = board.is_a3 ? kRoomA3_m : kRoomA4_m;
-  // Whole millimetres: they can be measured on the sheet.
+  // Whole millimetres, so that the distances can be checked on the sheet with a ruler.
   const double x = std::floor((room.x() - cell_m) / 2 * 1000) / 1000;
   const double y = std::floor((room.y() - cell_m) / 2 * 1000) / 1000;
   board.centres_m = {{ids[0], {-x, y}}, {ids[1], {x, y}}, {ids[2], {-x, -y}}, {ids[3], {x, -y}}};
@@ -103,7 +104,7 @@ std::pair<MarkerMap, MarkerMap> SplitRoomBoard(const MarkerMap& seen, int dictio
     const bool is_board = std::find(ids.begin(), ids.end(), id) != ids.end();
     (is_board ? parts.first : parts.second).emplace(id, marker);
   }
-  // A single marker of such a number belongs to the room rather than to a sheet of four.
+  // A single marker with such an id belongs to the room rather than to a sheet of four.
   if (parts.first.size() < kLeastOfBoard) parts.second.merge(std::exchange(parts.first, {}));
   return parts;
 }
@@ -180,7 +181,7 @@ std::variant<RoomFit, std::string> FitRoom(std::span<const RoomScan> scans) {
       fit.turn_rad = std::max(fit.turn_rad, Eigen::AngleAxisd(T.linear()).angle());
     }
   }
-  // The rotation next to the sum of them (chordal mean).
+  // The rotation nearest to the sum of the rotations (chordal mean).
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(turns, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d mirror = Eigen::Matrix3d::Identity();
   mirror(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();

@@ -14,27 +14,28 @@
 namespace plumb {
 namespace {
 
-// No map knows a corner better than this, whatever it claims: prints are not flat and cut to some
-// tenths of a millimetre.
+// No map knows a corner better than this, whatever its stated uncertainty: prints are flat and cut
+// only to some tenths of a millimetre.
 constexpr double kMinCornerSigma_m = 0.2 * kMillimetre;
-// The four corners of a marker share the error of the views that placed it: together they say as
-// much as two.
+// The four corners of a marker share the error of the views that placed it, so together they count
+// as two independent points.
 constexpr double kIndependentShare = 0.5;
-// How much two scans of one room differ in length or width: measured 0.03 to 0.25 % on simulated
-// sweeps.
+// Difference of scale between two scans of one room: 0.03 to 0.25 % measured on simulated sweeps.
 constexpr double kStretchSigma = 0.002;
-constexpr double kMaxStretch = 0.02;               // more is no error of scale but another room
-constexpr std::size_t kMaxHypothesisMarkers = 60;  // pairs of them are tried: 1770 fits of 8 points
+// a larger difference is not a scale error but a different room
+constexpr double kMaxStretch = 0.02;
+// limits the pairs that are tried: 1770 fits of 8 points
+constexpr std::size_t kMaxHypothesisMarkers = 60;
 
-// A marker that both scenes saw.
+// A marker that both scenes contain.
 struct SharedMarker {
   int id = 0;
   MarkerCorners reference;
   MarkerCorners current;
-  double sigma_m = 0.0;  // of one coordinate of the difference
+  double sigma_m = 0.0;  // standard deviation of one coordinate of the difference
 };
 
-using Subset = std::vector<std::size_t>;  // ascending indices of shared markers
+using Subset = std::vector<std::size_t>;  // indices of shared markers, ascending
 
 bool AllFinite(const MarkerCorners& corners) {
   return std::all_of(corners.begin(), corners.end(),
@@ -86,7 +87,7 @@ Eigen::Vector3d Centre(const SharedMarker& marker) {
          (marker.reference[0] + marker.reference[1] + marker.reference[2] + marker.reference[3]);
 }
 
-// Weighted as the fit is: the point about which its rotation and translation do not correlate.
+// Weighted as in the fit: the point about which its rotation and translation are uncorrelated.
 Eigen::Vector3d CentreOf(std::span<const SharedMarker> shared, const Subset& subset) {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double total = 0.0;
@@ -113,7 +114,7 @@ Matrix6d FitCovariance(std::span<const SharedMarker> shared, const Subset& subse
   return information.ldlt().solve(Matrix6d::Identity());
 }
 
-// Standard deviation of MarkerResidual() of a marker that did not move and took no part in the fit.
+// Standard deviation of MarkerResidual() for a marker that did not move and was not in the fit.
 double ExpectedResidual(const SharedMarker& marker, const Matrix6d& fit_covariance,
                         const Eigen::Vector3d& centre) {
   double variance = 0.0;
@@ -125,7 +126,7 @@ double ExpectedResidual(const SharedMarker& marker, const Matrix6d& fit_covarian
   return std::sqrt(variance + 3.0 * marker.sigma_m * marker.sigma_m);
 }
 
-// The markers that agree with a hypothesis, judged by their own noise only.
+// The markers that agree with a hypothesis, judged only by their own noise.
 Subset Supporters(std::span<const SharedMarker> shared, const Pose& T,
                   const MarkerConsensusOptions& options) {
   Subset subset;
@@ -147,15 +148,15 @@ bool Disjoint(const Subset& a, const Subset& b) {
                       [&](std::size_t i) { return std::binary_search(b.begin(), b.end(), i); });
 }
 
-// Largest set of markers that one rigid transform explains: tried from all markers and from every
-// pair of them (one marker alone extrapolates too badly). Sets are returned best first.
+// Largest sets of markers that one rigid transform explains, best first. Hypotheses come from all
+// markers together and from every pair of them, because one marker alone extrapolates too badly.
 std::vector<Consensus> ConsensusSets(std::span<const SharedMarker> shared,
                                      const MarkerConsensusOptions& options) {
   std::vector<Consensus> sets;
   const auto consider = [&](const Subset& seed) {
     RigidFit fit = FitSubset(shared, seed, true);
     Subset subset = seed;
-    bool settled = false;  // the set supports itself: else it is no consensus
+    bool settled = false;  // the set reproduces itself; otherwise it is not a consensus
     for (int round = 0; round < 10 && fit.valid && !settled; ++round) {
       Subset next = Supporters(shared, fit.T_a_b, options);
       settled = next == subset;
@@ -188,7 +189,7 @@ struct LeaveOneOut {
   double excess = 0.0;  // Residual over the limit; above 1 the marker has moved.
 };
 
-// Judges a marker by the fit of the others in `good`.
+// Judges a marker by the fit of the other markers in `good`.
 LeaveOneOut JudgeMarker(std::span<const SharedMarker> shared, const Subset& good, std::size_t index,
                         const MarkerConsensusOptions& options) {
   Subset others;
@@ -206,8 +207,8 @@ LeaveOneOut JudgeMarker(std::span<const SharedMarker> shared, const Subset& good
   return judged;
 }
 
-// Rejects the marker that disagrees most while one is beyond its limit, then takes back those that
-// agree with the rest.
+// Rejects the marker with the largest excess while any is above its limit, then readmits the
+// markers that agree with the rest.
 Subset GoodMarkers(std::span<const SharedMarker> shared, Subset good,
                    const MarkerConsensusOptions& options) {
   while (good.size() > 2) {
@@ -255,19 +256,20 @@ Alignment MakeAlignment(std::span<const SharedMarker> shared, const Subset& subs
   }
   alignment.rms_m = std::sqrt(sum / count);
   alignment.spread_m = std::sqrt(spread / count);
-  // Six values of the pose were fitted to three of each marker.
+  // The fit has six degrees of freedom; each marker contributes three coordinates.
   alignment.distortion *= 3.0 / std::max(3.0 * count - 6.0, 3.0);
-  // The maps' sigmas may be too small: the corners' disagreement counts where it is larger.
+  // The maps' sigmas may be too small, so the observed disagreement of the corners is used where it
+  // is larger.
   const double degrees_of_freedom = 12.0 * count - 6.0;
   const double variance_factor = std::max(1.0, chi2 / degrees_of_freedom);
   alignment.covariance = variance_factor * FitCovariance(shared, subset, alignment.centre_m);
   return alignment;
 }
 
-// The pairs of corners of a set of markers, from its centre, in the axes of the plane in which they
-// lie.
+// Corner pairs of a set of markers relative to its centre, in the axes of their common plane.
 struct PlanarCorners {
-  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  // columns; the last one across the plane
+  // columns; the last one is normal to the plane
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   std::vector<Eigen::Vector3d> reference;
   std::vector<Eigen::Vector3d> current;  // after the rigid fit
   std::vector<double> weights;
@@ -294,8 +296,8 @@ PlanarCorners InTheirPlane(std::span<const SharedMarker> shared, const Subset& s
   return corners;
 }
 
-// Alignment::stretch and its sigma: least squares over three values (long, wide, shear), each drawn
-// towards none as far as the markers leave it uncertain.
+// Alignment::stretch and its sigma: least squares over three values (length, width, shear), each
+// with a prior of zero.
 void FitStretch(std::span<const SharedMarker> shared, const Subset& subset, Alignment& alignment) {
   const PlanarCorners corners = InTheirPlane(shared, subset, alignment);
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
@@ -325,7 +327,7 @@ void FitStretch(std::span<const SharedMarker> shared, const Subset& subset, Alig
   alignment.stretch = corners.axes * planar * corners.axes.transpose();
 }
 
-// The markers that agree and how the others contradict them.
+// The agreeing markers and the residuals of the others.
 struct MarkerConsensus {
   Subset good;
   MarkerEvidence evidence;

@@ -1,4 +1,4 @@
-// Where the current scene lies in the reference scene, from the markers that both saw.
+// Aligns the current scene to the reference scene by the markers that both contain.
 #pragma once
 
 #include <map>
@@ -16,50 +16,51 @@
 
 namespace plumb {
 
-/// When a marker counts as moved: by more than `moved_m` and by more than `moved_sigmas` of its own
-/// standard deviation, so that noise alone names no marker.
+/// A marker counts as moved if its residual exceeds both `moved_m` and `moved_sigmas` of its own
+/// standard deviation, so that noise alone does not flag a marker.
 struct MarkerConsensusOptions {
   double moved_m = 5 * kMillimetre;
   double moved_sigmas = 3.0;
 };
 
-/// Current scene onto reference scene, from the shared markers.
+/// Alignment of the current scene to the reference scene by the shared markers.
 struct Alignment {
   Pose T_reference_current = Pose::Identity();
-  /// Preset `best`: how the current marker map must be stretched within its plane to become as long
-  /// and as wide as the reference's (a hand-held scan is some tenths of a percent too long or
-  /// short, rooms are not); symmetric, 1 across the plane, where depth itself gives the scale.
-  /// Applied about `centre_m` after T_reference_current, which is the rigid fit.
+  /// Preset `best`: the stretch of the current marker map within its plane that gives it the
+  /// reference's length and width (a hand-held scan is some tenths of a percent too long or too
+  /// short, while rooms do not change). Symmetric, and 1 normal to the plane, where depth itself
+  /// determines the scale. Applied about `centre_m` after T_reference_current, which is the rigid
+  /// fit.
   Eigen::Matrix3d stretch = Eigen::Matrix3d::Identity();
-  double rms_m = 0.0;                      ///< Over the corners used, rigid.
+  double rms_m = 0.0;                      ///< Over the corners used, after the rigid fit.
   std::vector<int> markers_used;           ///< Ids, ascending.
-  std::map<int, double> markers_rejected;  ///< Id to its residual against the others, metres.
+  std::map<int, double> markers_rejected;  ///< Residual against the other markers by id, metres.
   /// Rotation vector, translation; left perturbation about `centre_m`.
   Matrix6d covariance = Matrix6d::Zero();
   /// Weighted centroid of the corners used, reference frame.
   Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();
-  double spread_m = 0.0;       ///< RMS distance of the markers used from `centre_m`.
+  double spread_m = 0.0;       ///< RMS distance of the used markers from `centre_m`.
   double stretch_sigma = 0.0;  ///< Standard deviation of an element of `stretch`.
-  /// Scatter of the markers' centres about the rigidly aligned ones, m^2: by how much the two maps
-  /// disagree at a place.
+  /// Scatter of the markers' centres about the rigidly aligned ones, m^2: the disagreement of the
+  /// two maps at one place.
   Eigen::Matrix3d distortion = Eigen::Matrix3d::Zero();
 };
 
-/// Alignment of two marker maps, and what the gates need to know of the markers.
+/// Alignment of two marker maps, and the evidence that the gates need.
 struct AlignmentOutcome {
-  std::optional<Alignment> alignment;  ///< None where no pose is determined.
+  std::optional<Alignment> alignment;  ///< Not set where the markers do not determine a pose.
   MarkerEvidence markers;              ///< For RefusalsOfMarkers().
-  std::vector<std::string> warnings;   ///< E.g. markers that moved.
+  std::vector<std::string> warnings;   ///< For example markers that moved.
 };
 
 /// Rigid transform between the corners of the markers (ids) in both maps (paper, eq. of the scene
 /// alignment; Horn).
 ///
-/// Both presets look for the largest set of markers that agree, then judge each of the others
-/// against it by `options`. Preset `best` aligns by that set, weighted by the markers' sigmas, and
-/// gives no alignment from fewer than `min_markers` or where two groups of equal size disagree.
-/// Preset `paper` aligns by every corner with equal weight wherever that determines a pose; what
-/// `best` would have left out is then in `markers`, so that the gates see it.
+/// Both presets search the largest set of markers that agree and judge each of the others against
+/// it by `options`. Preset `best` aligns by that set, weighted by the markers' sigmas, and gives no
+/// alignment from fewer than `min_markers` or where two groups of equal size disagree. Preset
+/// `paper` aligns by every corner with equal weight wherever that determines a pose. What `best`
+/// would have left out is then reported in `markers`, so that the gates see it.
 [[nodiscard]] AlignmentOutcome AlignScenes(const MarkerMap& reference, const MarkerMap& current,
                                            Preset preset = Preset::kBest,
                                            const MarkerConsensusOptions& options = {},

@@ -9,11 +9,12 @@
 namespace plumb {
 namespace {
 
-constexpr float kMaxExtent_m = 20.0F;  // a scan is a room at most; what lies beyond is damage
-constexpr std::size_t kMaxCubes = 16'000'000;  // bounds the memory of one search structure: 64 MB
+// points farther away are treated as damaged data, since a scan covers one room at most
+constexpr float kMaxExtent_m = 20.0F;
+constexpr std::size_t kMaxCubes = 16'000'000;  // limits the memory of one search structure to 64 MB
 constexpr float kRimOffset =
-    0.25F;  // centroid of the neighbours off the sample, in radii: half a disc gives 0.42
-constexpr int kMinNeighbours = 6;  // a full neighbourhood has pi (3 spacings)^2 = 28
+    0.25F;  // distance of the neighbours' centroid from the sample in radii; half a disc gives 0.42
+constexpr int kMinNeighbours = 6;  // a full neighbourhood has pi (3 spacings)^2 = 28 samples
 
 struct VoxelEntry {
   std::uint64_t voxel;
@@ -39,14 +40,15 @@ std::vector<VoxelEntry> SortedByVoxel(const PointCloud& cloud, double spacing_m)
   return entries;
 }
 
-// Smooths the normal of one sample and decides whether it lies inside its surface.
+// Smooths the normal of one sample and decides whether it lies in the interior of its surface.
 void Smooth(const Surface& raw, const NearestSample& neighbours, float radius, std::size_t i,
             Surface& out) {
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   Eigen::Vector3f offset = Eigen::Vector3f::Zero();
   int count = 0;
   neighbours.ForEach(raw.points[i], [&](std::uint32_t k, float squared) {
-    if (raw.normals[k].dot(raw.normals[i]) < 0.3F) return;  // the other side of a thin part
+    // belongs to the opposite side of a thin part
+    if (raw.normals[k].dot(raw.normals[i]) < 0.3F) return;
     const float w = 1.0F - squared / (radius * radius);
     normal += w * raw.normals[k];
     offset += raw.points[k] - raw.points[i];
@@ -66,8 +68,7 @@ PointCloud TransformedCloud(const Eigen::Affine3d& T_a_b, const PointCloud& clou
   const Eigen::Matrix3f R = T_a_b.rotation().cast<float>();
   cloud_in_a.points.reserve(cloud_in_b.size());
   cloud_in_a.normals.reserve(cloud_in_b.normals.size());
-  // Through double: a scene frame far from the reference must not cost the points their last
-  // digits.
+  // Computed in double, because float would lose digits in a scene frame far from the reference.
   for (const Eigen::Vector3f& p : cloud_in_b.points)
     cloud_in_a.points.emplace_back((T_a_b * p.cast<double>()).cast<float>());
   for (const Eigen::Vector3f& n : cloud_in_b.normals) cloud_in_a.normals.emplace_back(R * n);
@@ -149,8 +150,8 @@ NearestSample::NearestSample(const std::vector<Eigen::Vector3f>& points, double 
   while (cubes_at(size).prod() > static_cast<double>(kMaxCubes)) size *= 1.5;
   origin_ = low;
   inverse_size_ = static_cast<float>(1.0 / size);
-  cubes_ =
-      cubes_at(size).cast<int>() + 1;  // one more: float and double may disagree on the last cube
+  // one spare cube, because float and double may round to different cubes at the end
+  cubes_ = cubes_at(size).cast<int>() + 1;
 
   const auto slot = [&](const Eigen::Vector3f& p) {
     const Eigen::Array3i c = CubeOf(p).max(0).min(cubes_ - 1);

@@ -1,4 +1,4 @@
-// Evenly thinned surface samples, and the nearest of them.
+// Evenly thinned surface samples and the search for the nearest of them.
 #pragma once
 
 #include <cstdint>
@@ -13,35 +13,35 @@
 
 namespace plumb {
 
-/// Samples of a surface, one a voxel, with normals smoothed over a neighbourhood. Metres; the frame
-/// is the owner's.
+/// Samples of a surface, one per voxel, with normals smoothed over a neighbourhood. Metres; the
+/// frame is stated by the owner.
 struct Surface {
   std::vector<Eigen::Vector3f> points;
-  std::vector<Eigen::Vector3f> normals;  ///< Unit length, outward.
+  std::vector<Eigen::Vector3f> normals;  ///< Unit length, pointing outward.
   std::vector<std::uint8_t>
-      inner;               ///< 0 on rims (of the scanned part, of holes) and on stray samples.
-  double spacing_m = 0.0;  ///< Edge of the voxels.
+      inner;               ///< 0 at rims (of the scanned part, of holes) and for isolated samples.
+  double spacing_m = 0.0;  ///< Voxel edge length.
 
   [[nodiscard]] std::size_t size() const { return points.size(); }
 };
 
-/// The cloud in another frame: p_a = T_a_b * p_b, normals turned, colours dropped. T_a_b is rigid
-/// but for a small stretch.
+/// Transforms the cloud: p_a = T_a_b * p_b. Normals are rotated, colours dropped. T_a_b is rigid
+/// apart from a small stretch.
 [[nodiscard]] PointCloud TransformedCloud(const Eigen::Affine3d& T_a_b,
                                           const PointCloud& cloud_in_b);
 
-/// One point a cell, with normals by central differences; for scenes that carry no cloud.
+/// One point per cell with normals by central differences, for scenes without a cloud.
 [[nodiscard]] PointCloud CloudOfHeightMap(const HeightMap& map);
 
-/// Thins to the mean of each voxel, smooths normals over `smoothing_m` and marks rims. Order: by
-/// voxel.
+/// Thins to the mean of each voxel, smooths normals over `smoothing_m` and marks rims. Samples are
+/// ordered by voxel.
 [[nodiscard]] Surface MakeSurface(const PointCloud& cloud, double spacing_m, double smoothing_m);
 
-/// The samples of a surface that `keep` accepts (by index), attributes included.
+/// The samples of a surface whose index `keep` accepts, with their attributes.
 [[nodiscard]] Surface Subset(const Surface& surface, const std::function<bool(std::size_t)>& keep);
 
-/// Finds nearest samples within a fixed radius: samples sorted into cubes of that size. Copies the
-/// points.
+/// Finds the nearest samples within a fixed radius, with the samples sorted into cubes of that
+/// size. Copies the points.
 class NearestSample {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -79,7 +79,7 @@ class NearestSample {
   float inverse_size_ = 1.0F;
   float squared_radius_ = 0.0F;
   Eigen::Array3i cubes_ = Eigen::Array3i::Zero();
-  std::vector<std::uint32_t> first_;     ///< Of each cube in sorted_; one more at the end.
+  std::vector<std::uint32_t> first_;     ///< Start of each cube in sorted_, plus one final entry.
   std::vector<Eigen::Vector3f> sorted_;  ///< Points by cube, x fastest.
   std::vector<std::uint32_t> index_;     ///< Their indices in the caller's order.
 };
@@ -87,7 +87,7 @@ class NearestSample {
 template <typename Visit>
 void NearestSample::Scan(const Eigen::Vector3f& p, Visit&& visit) const {
   if (sorted_.empty() || !p.allFinite()) return;
-  // Compared before the cast to int: far queries must not overflow.
+  // Compared before the cast to int, which would overflow for distant queries.
   const Eigen::Array3f relative = (p - origin_).array() * inverse_size_;
   if ((relative < -1.0F).any() || (relative > cubes_.cast<float>() + 1.0F).any()) return;
   const Eigen::Array3i low = (CubeOf(p) - 1).max(0);
