@@ -14,7 +14,7 @@
 namespace plumb {
 namespace {
 
-// Depth as the calibration corrects it, as a camera at the stamp would have measured it in one
+// Depth after correction by the calibration, as a camera at the stamp would have measured it in one
 // instant: each pixel takes its value from where the moving camera's row saw that point.
 cv::Mat CorrectedDepth(const cv::Mat& depth_m, const DepthCorrection& correction, double readout_s,
                        const Intrinsics& intrinsics, const RayTable& rays,
@@ -33,7 +33,7 @@ cv::Mat CorrectedDepth(const cv::Mat& depth_m, const DepthCorrection& correction
       if (here[c] <= 0) continue;
       const Eigen::Vector3f p(ray[c].x() * here[c], ray[c].y() * here[c], here[c]);
       const Eigen::Vector3f moved = late_s * (w.cross(p) + v);
-      // Where this row saw the point that the instant camera sees in this pixel.
+      // Where this row saw the point that the instantaneous camera sees in this pixel.
       const int x =
           c - static_cast<int>(std::lround(fx * (moved.x() - ray[c].x() * moved.z()) / here[c]));
       const int y =

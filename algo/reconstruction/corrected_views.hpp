@@ -1,4 +1,4 @@
-// Surfaces of the keyframes, from their depth images as the calibration corrects them.
+// Surfaces of the keyframes, from their depth images corrected by the calibration.
 #pragma once
 
 #include <vector>
@@ -10,9 +10,10 @@
 
 namespace plumb {
 
-/// One surface a keyframe that has images: depth corrected, as a camera at the stamp would have
-/// measured it in one instant, in the lens as corrected, seen from the scene's frame. Releases the
-/// map's images on the way, so that both are never there at once. Spread over TBB's threads.
+/// One surface for each keyframe that has images: depth corrected, converted to what a camera at
+/// the stamp would have measured in one instant, with the corrected lens, seen from the scene's
+/// frame. Releases the map's images during the conversion, so that the two copies never coexist in
+/// memory. Runs in parallel on TBB's threads.
 [[nodiscard]] std::vector<ViewSurface> PrepareCorrectedViews(TrackingMap& map,
                                                              const Intrinsics& stated,
                                                              const CalibrationModel& calibration,

@@ -17,8 +17,8 @@ namespace {
 using TermVector = Eigen::Matrix<double, QuadraticTerm::kSize, 1>;
 using DepthVector = Eigen::Matrix<double, CalibrationModel::kDepthSize, 1>;
 
-// Projects cells of one view into another. Calls visit(cell in a, cell in b, q: the point in b's
-// depth camera).
+// Projects cells of one view into another. Calls visit(cell in a, cell in b, q), where q is the
+// point in b's depth camera.
 template <typename Visit>
 void ForEachProjected(const Sensor& sensor, const View& a, const View& b, int phase, int stride,
                       const Visit& visit) {
@@ -47,7 +47,7 @@ constexpr float kMinIncidence = 0.35F;       // Cosine of the steepest incidence
 struct Correspondence {
   double residual = 0;
   double sigma = 0;
-  Eigen::Vector3f normal;  // b's depth camera.
+  Eigen::Vector3f normal;  // In b's depth camera.
 };
 
 std::optional<Correspondence> Correspond(const View& a, const View& b, std::size_t i, std::size_t j,
@@ -63,7 +63,7 @@ std::optional<Correspondence> Correspond(const View& a, const View& b, std::size
   const float cos_b = -n.dot(p_b.normalized());
   const float cos_a = -a.keyframe->dense.normals[i].dot(a.points[i].normalized());
   if (cos_b < kMinIncidence || cos_a < kMinIncidence) return std::nullopt;
-  // Point-to-plane: depth noise acts along the ray.
+  // Point-to-plane distance, with depth noise along the ray.
   const double sigma_a = DepthSigma(a.points[i].z(), cos_a) * cos_a;
   const double sigma_b = DepthSigma(p_b.z(), cos_b) * cos_b;
   match.sigma = std::sqrt(sigma_a * sigma_a + sigma_b * sigma_b + 0.001 * 0.001);
@@ -71,8 +71,8 @@ std::optional<Correspondence> Correspond(const View& a, const View& b, std::size
   return match;
 }
 
-// Derivative of a cell's corrected depth to the depth calibration, but for its times and shifts,
-// which move the point sideways too.
+// Derivative of a cell's corrected depth with respect to the depth calibration, except for its
+// times and shifts, which also move the point sideways.
 DepthVector DepthJacobian(const View& view, std::size_t i) {
   const double z_raw = view.keyframe->dense.z_m[i];
   const Eigen::Vector2f& centred = view.cells->centred[i];
@@ -89,8 +89,8 @@ DepthVector DepthJacobian(const View& view, std::size_t i) {
   return J;
 }
 
-// Derivative of a corrected point's position with the depth calibration, dotted with a direction m
-// of its own camera.
+// Derivative of a corrected point's position with respect to the depth calibration, projected onto
+// a direction m of its own camera.
 DepthVector PositionJacobian(const Sensor& sensor, const View& view, std::size_t i,
                              const DepthVector& J_depth, const Eigen::Vector3d& m) {
   const Eigen::Vector3d p = view.points[i].cast<double>();
@@ -105,15 +105,15 @@ DepthVector PositionJacobian(const Sensor& sensor, const View& view, std::size_t
   return J;
 }
 
-// The same to the two focal lengths: a longer one moves the point towards the axis. The lens's
-// distortion changes this by a few per cent, which only costs a round.
+// The same with respect to the two focal lengths: a longer one moves the point towards the axis.
+// The lens's distortion changes this by a few percent, which only costs a round.
 Eigen::Vector2d FocalJacobian(const View& view, std::size_t i, const Eigen::Vector3d& m) {
   return -m.head<2>().cwiseProduct(view.points[i].head<2>().cast<double>());
 }
 
-// A residual in metres of the scene shrinks with the scene, so the solver would shrink it: the
-// residual is taken back to the units of the measurement, r z_raw / z_corrected, and J follows.
-// Returns that factor times the residual.
+// A residual in metres of the scene shrinks with the scene, so the solver would shrink the scene.
+// The residual is therefore converted back to the units of the measurement, r z_raw / z_corrected,
+// and so is J. Returns that factor times the residual.
 double InRawUnits(const View& view, std::size_t i, const DepthVector& J_depth, double residual,
                   TermVector& J) {
   const double z = view.points[i].z();
@@ -123,9 +123,9 @@ double InRawUnits(const View& view, std::size_t i, const DepthVector& J_depth, d
   return residual * factor;
 }
 
-// Sums residuals' squares into a term. Rows are gathered and multiplied in blocks, several times
-// faster than one by one. Not in single precision: what a stamp's last bit changes would show in
-// the poses, and a recording would not repeat what was seen live.
+// Accumulates squared residuals into a term. Rows are collected and multiplied in blocks, which is
+// several times faster than one by one. Single precision is not sufficient: the last bit of a stamp
+// would change the poses, and a recording would not reproduce the live result.
 class TermSum {
  public:
   explicit TermSum(QuadraticTerm& term) : term_(term) {}
@@ -157,13 +157,14 @@ class TermSum {
   Eigen::MatrixXd block_ = Eigen::MatrixXd::Zero(QuadraticTerm::kSize, QuadraticTerm::kSize);
 };
 
-constexpr double kLossScale = 2.0;  // Cauchy, in standard deviations.
+constexpr double kLossScale = 2.0;  // Cauchy scale in standard deviations.
 
-// Every fourth cell each way, another sixteenth for each pair. Neighbouring cells share most of
-// their error: the others would cost time and add nothing.
+// Every fourth cell in each direction; each pair uses another of the sixteen lattices. Neighbouring
+// cells share most of their error, so the others would cost time without adding information.
 constexpr int kLattice = 4;
-constexpr double kCellsForOne = 4.0;  // Cells that one stands for, against a lattice of two.
-constexpr int kHeldOut = 5;           // The sixteenth that only Consistency() looks at.
+// Number of cells that one cell stands for, relative to a lattice of two.
+constexpr double kCellsForOne = 4.0;
+constexpr int kHeldOut = 5;  // The lattice that is held out for Consistency().
 
 QuadraticTerm DenseTerm(const Sensor& sensor, const View& a, const View& b,
                         const KeyframePair& pair, int phase, double gate_m, double weight) {
@@ -204,8 +205,8 @@ QuadraticTerm DenseTerm(const Sensor& sensor, const View& a, const View& b,
   return term;
 }
 
-// Depth measured on a marker's face lies on the marker's plane: what ties depth's scale to the
-// markers' side.
+// Depth measured on a marker's face lies in the marker's plane, which ties the scale of the depth
+// to the markers' side length.
 std::optional<QuadraticTerm> MarkerFaceTerm(const Sensor& sensor, const View& view, int keyframe,
                                             const MarkerObservation& observation,
                                             const MapMarker& marker, double half_side_m,
@@ -303,8 +304,8 @@ std::vector<View> MakeViews(const Sensor& sensor, const CalibrationModel& calibr
       rays[i] = Undistort(sensor.depth, {x, y}).cast<float>();
     }
   }
-  // Rows are read one after the other: each cell is moved to where the camera at the stamp would
-  // have it.
+  // Rows are read out one after the other: each cell is moved to where the camera at the stamp
+  // would see it.
   const auto readout_s = static_cast<float>(calibration.depth[kDepthReadout]);
   std::vector<float> row_share;
   for (int r = 0; r < first.height; ++r)
@@ -360,7 +361,8 @@ std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistratio
       if (overlap >= options.min_overlap)
         candidates[a].push_back({static_cast<int>(a), static_cast<int>(b), overlap});
     }
-    // Spread over the overlap range instead of the nearest only: far pairs are what stops drift.
+    // Spread over the overlap range instead of the nearest only, because distant pairs prevent
+    // drift.
     std::stable_sort(candidates[a].begin(), candidates[a].end(),
                      [](const auto& x, const auto& y) { return x.overlap > y.overlap; });
     const auto wanted = static_cast<std::size_t>(options.max_pairs);
@@ -390,7 +392,8 @@ std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrati
     CheckStop(stop);
     const auto a = static_cast<std::size_t>(pairs[p].a);
     const auto b = static_cast<std::size_t>(pairs[p].b);
-    // A keyframe's noise enters all its pairs: together they weigh as much as its cells once.
+    // A keyframe's noise affects all its pairs, so together they have the weight of its cells used
+    // once.
     const double weight = options.dense_weight * kCellsForOne * 2.0 /
                           std::sqrt(static_cast<double>(uses[a]) * uses[b]);
     auto phase = static_cast<int>(p % (kLattice * kLattice - 1));

@@ -1,5 +1,5 @@
-// What overlapping depth images and markers' faces say of the poses and of the sensor's
-// calibration: the dense part of RegisterJointly().
+// Constraints on the poses and the sensor's calibration from overlapping depth images and markers'
+// faces: the dense part of RegisterJointly().
 #pragma once
 
 #include <stop_token>
@@ -10,7 +10,7 @@
 
 namespace plumb::dense {
 
-/// Where the cells of every keyframe lie in the depth model.
+/// Positions of the cells of every keyframe in the depth model.
 struct Cells {
   std::vector<Eigen::Vector2f> centred;  ///< Centred image coordinates, row by row.
   std::vector<FieldRow> products;
@@ -20,24 +20,25 @@ struct Cells {
 struct Sensor {
   Intrinsics stated;
   Intrinsics corrected;  ///< Of the colour camera.
-  Intrinsics depth;      ///< The same with the depth image's shift.
-  double scale = 1;      ///< Pixels here for one pixel at 640 columns.
+  Intrinsics depth;      ///< The same with the shift of the depth image.
+  double scale = 1;      ///< Pixels of this image per pixel of an image of 640 columns.
 };
 
-/// A keyframe as this round's calibration sees it.
+/// A keyframe under the calibration of the current round.
 struct View {
   const MapKeyframe* keyframe = nullptr;
   Pose T_world_depth;
   Pose T_color_depth;
-  std::vector<Eigen::Vector3f> points;  ///< Corrected, depth camera frame; z 0 where nothing.
+  /// Corrected, in the depth camera's frame; z is 0 where nothing was measured.
+  std::vector<Eigen::Vector3f> points;
   const Cells* cells = nullptr;
   int width = 0;
   int height = 0;
 };
 
 struct KeyframePair {
-  int a = 0;  ///< Whose cells are projected.
-  int b = 0;  ///< Into whose view.
+  int a = 0;  ///< View whose cells are projected.
+  int b = 0;  ///< View into which they are projected.
   double overlap = 0;
 };
 
@@ -55,15 +56,15 @@ std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistratio
                                     const std::vector<View>& views, const std::stop_token& stop);
 
 /// Point-to-plane residuals of each pair, and of the depth on each marker's face, linearised.
-/// @param gate_m  Residuals beyond are no correspondences.
+/// @param gate_m  Larger residuals are not correspondences.
 /// @throws Interrupted on a stop request
 std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
                                      const TrackingMap& map, const std::vector<View>& views,
                                      const std::vector<KeyframePair>& pairs, double gate_m,
                                      const std::stop_token& stop);
 
-/// Median absolute point-to-plane distance of cells that MakeTerms() never uses, metres; 0 without
-/// any.
+/// Median absolute point-to-plane distance of the cells that MakeTerms() never uses, metres; 0
+/// without any.
 double Consistency(const Sensor& sensor, const std::vector<View>& views,
                    const std::vector<KeyframePair>& pairs, double gate_m);
 

@@ -15,7 +15,7 @@ namespace plumb {
 namespace {
 
 constexpr double kCellsPerSpacing =
-    1.5;  // cell side over spacing: measured fastest of 0.5, 1 and 1.5
+    1.5;  // cell side over spacing; the fastest of 0.5, 1 and 1.5 as measured
 
 using Points = std::vector<Eigen::Vector3f>;
 
@@ -52,8 +52,8 @@ std::vector<Points> Subsample(std::span<const PointCloud> clouds, const GlobalIc
   return subsampled;
 }
 
-/// Cells for the neighbour search: several clouds overlap, so other clouds' points are nearer than
-/// a cloud's own.
+/// Cell size of the neighbour search. Several clouds overlap, so the points of other clouds are
+/// nearer than those of the cloud itself.
 double CellSize(const GlobalIcpOptions& options) {
   return options.subsample_spacing > 0.0 ? kCellsPerSpacing * options.subsample_spacing
                                          : options.min_radius;
@@ -66,7 +66,7 @@ struct CloudStep {
   int num_pairs = 0;
 };
 
-/// Pairs of one cloud and the rigid fit onto them.
+/// Correspondences of one cloud and the rigid fit to them.
 class CloudMatcher {
  public:
   explicit CloudMatcher(std::size_t num_points) : memory_(num_points) {}
@@ -85,7 +85,8 @@ class CloudMatcher {
     step.num_pairs = static_cast<int>(from_.size());
     for (std::size_t k = 0; k < from_.size(); ++k)
       step.sum_squared += (from_[k] - to_[k]).squaredNorm();
-    step.T_new_old = FitRigid(to_, from_).T_a_b;  // identity where the pairs determine none
+    // identity where the pairs do not determine a transform
+    step.T_new_old = FitRigid(to_, from_).T_a_b;
     return step;
   }
 

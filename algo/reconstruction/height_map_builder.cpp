@@ -10,12 +10,12 @@ namespace plumb {
 namespace {
 
 constexpr double kMaxCells = 64e6;
-constexpr int kMaxRowsPerBand = 64;  // rows of cells that one task works on
+constexpr int kMaxRowsPerBand = 64;  // rows of cells in one task
 
-/// Highest point and band of one cloud in one cell.
+/// Highest point of one cloud in one cell, and the band below it.
 struct CellTop {
   float highest = 0.0F;
-  float sum = 0.0F;  // of z - highest at the time of summing
+  float sum = 0.0F;  // sum of z - highest, with the highest at the time of summing
   int count = 0;
 };
 
@@ -56,8 +56,8 @@ HeightMap PaperHeightMap(std::span<const PointCloud> clouds, std::span<const Pos
     throw std::invalid_argument("height map: the top surface band is not positive");
   const float band = static_cast<float>(options.top_surface_band);
 
-  // Each cloud's points sorted by bands of rows, so that bands can be worked on apart and in cloud
-  // order.
+  // Each cloud's points sorted by bands of rows, so that bands can be processed independently and
+  // in the order of the clouds.
   const std::size_t num_bands =
       static_cast<std::size_t>((grid.height + kMaxRowsPerBand - 1) / kMaxRowsPerBand);
   const std::size_t cells_per_band =
@@ -95,7 +95,7 @@ HeightMap PaperHeightMap(std::span<const PointCloud> clouds, std::span<const Pos
         CellTop& top = tops[p.cell];
         if (!(top.highest - p.z < band)) continue;
         top.sum += p.z - top.highest;
-        ++top.count;  // one more than the points: 1 meant "touched"
+        ++top.count;  // one more than the number of points; 1 marks a touched cell
       }
       for (const CellPoint& p : in_band) {
         CellTop& top = tops[p.cell];

@@ -1,4 +1,4 @@
-// Height maps on the reference marker's plane: as published, and a robust one.
+// Height maps on the reference marker's plane: the published method and a robust one.
 #pragma once
 
 #include <optional>
@@ -30,19 +30,19 @@ struct HeightMapOptions {
   [[nodiscard]] GridShape Grid() const;
 };
 
-/// The height map as published (paper, Eqs. height_map and heightmap_h): per cloud and cell the
-/// mean z of the points within the band below the cloud's highest point there; then the mean over
-/// the clouds that hold the cell. Points outside the crop and points that are not finite are
-/// ignored.
-/// @param clouds_in_marker  One a keyframe, in the reference marker's frame (z out of the print).
+/// The height map as published (paper, Eqs. height_map and heightmap_h): for each cloud and cell
+/// the mean z of the points within the band below the cloud's highest point there, then the mean
+/// over the clouds that contain the cell. Points outside the crop and points that are not finite
+/// are ignored.
+/// @param clouds_in_marker  One per keyframe, in the reference marker's frame (z out of the print).
 /// @throws std::invalid_argument as HeightMapOptions::Grid(), or if the band is not positive.
-/// Deterministic, whatever the number of threads.
+/// Deterministic on any number of threads.
 [[nodiscard]] HeightMap PaperHeightMap(std::span<const PointCloud> clouds_in_marker,
                                        const HeightMapOptions& options = {});
 
-/// The same for clouds that are moved on the way: p_marker = T_marker_cloud[j] * p. Saves a copy of
-/// the clouds.
-/// @throws std::invalid_argument also if there is not one pose a cloud.
+/// The same for clouds that are transformed during the calculation: p_marker = T_marker_cloud[j] *
+/// p. Avoids a copy of the clouds.
+/// @throws std::invalid_argument also if the number of poses differs from the number of clouds.
 [[nodiscard]] HeightMap PaperHeightMap(std::span<const PointCloud> clouds,
                                        std::span<const Pose> T_marker_cloud,
                                        const HeightMapOptions& options = {});
@@ -50,35 +50,37 @@ struct HeightMapOptions {
 /// Parameters of RobustHeightMap(). Lengths in metres, reference marker's frame.
 struct RobustHeightMapOptions {
   double cell_size = 1.5 * kMillimetre;
-  std::optional<GridShape> grid =
-      std::nullopt;  ///< Fixed grid; none: around the data, cell borders at multiples of cell_size.
-  double max_extent = 4.0;  ///< Of a grid found from the data, each way.
+  /// Fixed grid; not set: around the data, with cell borders at multiples of cell_size.
+  std::optional<GridShape> grid = std::nullopt;
+  double max_extent = 4.0;  ///< Largest extent of a grid found from the data, in each direction.
   double z_min = -0.3;      ///< Height crop: floor under a couch, ...
   double z_max = 0.8;       ///< ... hands, cables, lamps above the body.
   double top_surface_band = 3 * kCentimetre;
-  int min_views = 2;             ///< Views that must agree on a cell (no more than there are).
-  double min_patch_area = 4e-4;  ///< Square metres; smaller separate patches are speckles.
+  int min_views = 2;  ///< Number of views that must agree on a cell (at most the number available).
+  /// Square metres; smaller isolated patches are removed as speckles.
+  double min_patch_area = 4e-4;
   bool with_colors = true;
   std::stop_token stop = {};  ///< Polled; see CheckStop().
 };
 
-/// A height map with a colour for each cell (black where the map is empty), or no colours.
+/// A height map, with an optional colour for each cell (black where the map is empty).
 struct ColoredHeightMap {
   HeightMap map;
-  std::vector<Color> colors;  ///< Empty or map.grid.num_cells().
+  std::vector<Color> colors;  ///< Empty, or one per cell of the map's grid.
 };
 
-/// The top surface over all views together.
+/// The top surface as all views together show it.
 ///
 /// Coarse cells (4 x 4 fine ones) find the top: the highest band that several measurements support,
-/// not the highest point. Small separate patches are dropped. Then every fine cell is a seed on the
+/// not the highest point. Small isolated patches are removed. Every fine cell is then a seed on the
 /// coarse cell's plane that is moved to the robust, noise-weighted mean of what the views measured
 /// there (ViewFusion), so that a cell's height is sampled at its centre and a keyframe that saw
-/// something lower has no say. Nothing is filled: cells outside measured coarse cells stay NaN.
+/// something lower has no influence. Nothing is filled: cells outside measured coarse cells remain
+/// NaN.
 ///
 /// @param views_in_marker  Prepared views whose "world" is the reference marker's frame.
 /// @throws std::invalid_argument if an option is out of range.
-/// Deterministic, whatever the number of threads.
+/// Deterministic on any number of threads.
 [[nodiscard]] ColoredHeightMap RobustHeightMap(std::span<const ViewSurface> views_in_marker,
                                                const RobustHeightMapOptions& options = {});
 [[nodiscard]] ColoredHeightMap RobustHeightMap(std::span<const DepthView> views_in_marker,

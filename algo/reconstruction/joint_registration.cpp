@@ -13,13 +13,13 @@ namespace plumb {
 namespace {
 
 // Relative decrease of the cost below which a solution is left to the next round, which changes the
-// velocities or the dense terms and with them the minimum.
+// velocities or the dense terms and therefore the minimum.
 constexpr double kPreliminaryTolerance = 1e-3;
 
-// Tracking's word for the keyframes that too little else holds, appended to the terms.
+// Appends terms that hold weakly constrained keyframes at their tracked poses.
 void AddTrackedLinks(const TrackingMap& map, std::vector<QuadraticTerm>& terms) {
-  // What a hand's next few centimetres are followed to by depth alone; against the hundreds of
-  // observations elsewhere it weighs nothing.
+  // Standard deviations of depth-only tracking over the next few centimetres of motion. Negligible
+  // against the hundreds of observations elsewhere.
   constexpr double kSigma_rad = 0.004;
   constexpr double kSigma_m = 0.006;
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
@@ -40,10 +40,10 @@ void AddTrackedLinks(const TrackingMap& map, std::vector<QuadraticTerm>& terms) 
 }
 
 // Errors of a keyframe's motion model are common to all its keypoints. Beyond the number that
-// covers the image more keypoints therefore add no information, and the standard deviation of each
-// grows by this factor.
+// covers the image, more keypoints add no information, and the standard deviation of each grows by
+// this factor.
 double KeypointSigmaFactor(const TrackingMap& map) {
-  constexpr double kEnough = 150.0;  // In a keyframe.
+  constexpr double kEnough = 150.0;  // Keypoints in a keyframe.
   std::size_t count = 0;
   for (const MapKeyframe& keyframe : map.keyframes)
     for (const KeypointObservation& o : keyframe.keypoints) {
@@ -92,7 +92,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
     velocity.keypoint_sigma_px = bundle.keypoint_sigma_px;
     RefineVelocities(stated, result.calibration, velocity, map);
   };
-  // The lens is found here, so the velocities must be right here already.
+  // The lens is estimated here, so the velocities must already be correct.
   for (int round = 0; options.refresh_velocities && round < options.num_velocity_rounds; ++round) {
     refresh_velocities();
     BundleAdjust(stated, bundle, links, map, result.calibration);
@@ -107,8 +107,8 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   BundleSummary last;
   bundle.max_iterations = 4;
   bundle.function_tolerance = BundleOptions().function_tolerance;
-  // Overlapping surfaces show the focal length; the rest of the lens, left free here, would follow
-  // what the model of the depth image leaves out.
+  // Overlapping surfaces determine the focal length. The rest of the lens, if free here, would
+  // follow the errors of the depth model.
   bundle.fix_centre_and_distortion = true;
   for (int round = 0; round < options.num_rounds; ++round) {
     CheckStop(stop);

@@ -17,7 +17,7 @@
 namespace plumb {
 namespace {
 
-constexpr double kSingleViewSigma = 0.01;  // metres: what a lone window mean may be off
+constexpr double kSingleViewSigma = 0.01;  // metres; error of the mean of a single window
 constexpr double kMinSigma = 5e-4;
 
 /// Sums over the views of one corner.

@@ -28,8 +28,8 @@ namespace plumb {
 namespace {
 
 constexpr std::size_t kMaxPaperKeyframes = 20;  // The paper had about 15 a sweep.
-// Edges of markers once the tone curve and the edge shift are measured: what changes with blur and
-// exposure is left.
+// Errors of marker edges once the tone curve and the edge shift have been measured: what remains is
+// the variation with blur and exposure.
 constexpr double kMeasuredEdgeSigma_px = 0.01;
 
 TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
@@ -49,7 +49,7 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// Why no point of the scene is left. The depth is the median over the frames' own.
+// States why the scene contains no points. The depth is the median over the frames' medians.
 std::string WhyNoSurface(std::span<const ViewSurface> surfaces, double median_depth_m) {
   const ViewSurfaceOptions range;
   const bool measured =
@@ -70,7 +70,8 @@ std::string WhyNoSurface(std::span<const ViewSurface> surfaces, double median_de
       surfaces.size(), median_depth_m, range.min_depth_m, range.max_depth_m);
 }
 
-// How far markers' edges may be off once the sweep's tone curve has been taken into account.
+// Standard deviation of the markers' edges after the sweep's tone curve has been taken into
+// account.
 double EdgeSigma(const std::optional<SweepTone>& tone) {
   if (!tone.has_value()) return CalibrationModel::kEdgeBiasSigma;
   return std::hypot(kMeasuredEdgeSigma_px, tone.value().sigma_edge_shift_px);
@@ -83,7 +84,7 @@ struct Reconstructor::Impl {
   ReconstructorOptions options;
   Tracker tracker;
   std::int64_t dropped = 0;
-  std::vector<double> median_depths_m;  // Of the frames that have any.
+  std::vector<double> median_depths_m;  // One per frame that has valid depth.
   std::vector<double> tracking_times_s;
   double finish_start_s = 0;
 
@@ -120,7 +121,7 @@ struct Reconstructor::Impl {
     return report;
   }
 
-  // On every eighth pixel each way: enough for guidance.
+  // Every eighth pixel in each direction is enough for guidance.
   void DepthStatistics(const cv::Mat& depth_m, TrackingReport& report) {
     std::vector<float> z;
     int total = 0;
@@ -190,8 +191,8 @@ struct Reconstructor::Impl {
 
   using Report = std::function<void(double, std::string_view)>;
 
-  // Finds the camera's tone curve and measures the keyframes' markers again under it: tracking took
-  // the sRGB curve.
+  // Estimates the camera's tone curve and measures the keyframes' markers again with it; tracking
+  // assumed the sRGB curve.
   [[nodiscard]] std::optional<SweepTone> RefineMarkers(TrackingMap& map,
                                                        const std::stop_token& stop) const {
     if (!options.use_markers) return std::nullopt;
@@ -229,7 +230,8 @@ struct Reconstructor::Impl {
     const std::optional<SweepTone> tone =
         options.use_tone_curve ? RefineMarkers(map, stop) : std::nullopt;
     const double tone_s = Now() - stage;
-    // The joint solve takes as much memory as the images: what it does not need goes before.
+    // The joint solve needs as much memory as the images, so what it does not use is released
+    // first.
     for (MapKeyframe& keyframe : map.keyframes) {
       keyframe.gray.release();
       keyframe.descriptors.release();
@@ -278,7 +280,8 @@ struct Reconstructor::Impl {
     scene.timings_s["global_registration"] = solved - stage;
     scene.timings_s["markers"] =
         Now() -
-        solved;  // The joint solve has done their work: this puts them into the scene's frame.
+        // The joint solve has used these; they now place the keyframes in the scene's frame.
+        solved;
 
     report(0.5, "surface");
     stage = Now();
@@ -304,7 +307,8 @@ struct Reconstructor::Impl {
   }
 
   // The published chain: tracking with its own bundle adjustment, then Algorithm 1 on a few
-  // keyframes, single-pixel corners, means of means. The sensor is taken at its word.
+  // keyframes, single-pixel corners, means of means. The stated calibration of the sensor is used
+  // unchanged.
   void ReconstructPaper(const std::vector<TrackedFrame>& frames, TrackingMap& map, Scene& scene,
                         const std::stop_token& stop, const Report& report) const {
     report(0.0, "registration");
@@ -358,8 +362,8 @@ struct Reconstructor::Impl {
     if (paper.height_map) KeepHeightMap(*paper.height_map, scene);
   }
 
-  // Evenly spread over the sweep; of each stretch the keyframe that sees the most markers, because
-  // a marker is known from these few keyframes alone.
+  // Spread evenly over the sweep. Each section contributes the keyframe that sees the most markers,
+  // because markers are measured from these few keyframes alone.
   static std::vector<Keyframe> PaperKeyframes(const TrackingMap& map,
                                               const CalibrationModel& stated) {
     std::vector<Keyframe> keyframes;

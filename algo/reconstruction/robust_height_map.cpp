@@ -14,33 +14,34 @@ namespace plumb {
 namespace {
 
 constexpr int kCoarse =
-    4;  // fine cells per coarse cell, each way: 6 mm, about 1.7 working pixels at 1 m
-constexpr int kTile = 8;  // coarse cells per tile, each way: a tile's cells share one list of views
-constexpr double kExtentCell = 0.05;  // metres: raster on which the extent of the data is found
+    4;  // fine cells per coarse cell in each direction: 6 mm, about 1.7 working pixels at 1 m
+// coarse cells per tile in each direction; the cells of a tile share one list of views
+constexpr int kTile = 8;
+constexpr double kExtentCell = 0.05;  // metres; raster cell for finding the extent of the data
 constexpr int kMinExtentCount =
-    30;  // samples that make a raster cell count (a surface at 1 m gives 200 a view)
+    30;  // samples for a raster cell to count (a surface at 1 m gives 200 per view)
 constexpr std::size_t kMaxSamples =
-    1'500'000;  // for the coarse tops; views are thinned evenly to this
+    1'500'000;  // limit for the coarse tops; views are thinned evenly to it
 constexpr float kMinTopShare =
-    0.2F;  // of a coarse cell's samples: what fewer support is not the top
+    0.2F;  // fraction of a coarse cell's samples that must support the top
 constexpr std::size_t kMinTopCount = 2;
-constexpr float kMinNormalZ = 0.17F;  // flanks steeper than 80 deg have no height
+constexpr float kMinNormalZ = 0.17F;  // flanks steeper than 80 deg are given no height
 constexpr double kMaxCells = 64e6;
-constexpr int kMaxViews = 12;  // that are asked for one cell
+constexpr int kMaxViews = 12;  // views used for one cell
 constexpr float kMaxMeanSlope =
-    2.0F;  // tan of 63 deg: over steeper squares means of corners are not trusted
+    2.0F;  // tan of 63 deg; means of the corners are not used over steeper squares
 constexpr int kMinNeighbours =
-    5;  // of 8 measured coarse cells around an empty one: worth a try there
+    5;  // of the 8 neighbours of an empty coarse cell; enough to try to measure it
 
 /// A measured working pixel in a coarse cell.
 struct Sample {
-  std::uint32_t cell;  ///< within its row of tiles
+  std::uint32_t cell;  ///< Index within its row of tiles.
   float z;
   std::uint32_t view;
   std::uint32_t pixel;
 };
 
-/// The top surface in a coarse cell as a plane through its mean point; count 0: nothing there.
+/// The top surface in a coarse cell as a plane through its mean point; count 0 means empty.
 struct TopPlane {
   Eigen::Vector3f point = Eigen::Vector3f::Zero();
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();
@@ -57,8 +58,8 @@ struct Window {
   double last;
 };
 
-/// The stretch of the histogram that holds data, no longer than `max_extent` and around the origin
-/// where it must be cut.
+/// The section of the histogram that contains data, not longer than `max_extent`; if it must be
+/// cut, around the origin.
 std::optional<Window> DataWindow(const std::vector<std::int64_t>& counts, double start,
                                  double max_extent) {
   const auto filled = [](std::int64_t count) { return count > 0; };
@@ -69,7 +70,7 @@ std::optional<Window> DataWindow(const std::vector<std::int64_t>& counts, double
   const std::ptrdiff_t longest =
       std::max<std::ptrdiff_t>(1, static_cast<std::ptrdiff_t>(max_extent / kExtentCell));
   if (b - a > longest) {
-    // The window with most data among those that hold the marker.
+    // The window with the most data among those that contain the marker.
     const std::ptrdiff_t origin = static_cast<std::ptrdiff_t>(-start / kExtentCell);
     std::int64_t best = -1;
     std::ptrdiff_t best_start = a;
@@ -128,7 +129,7 @@ std::optional<GridShape> GridAroundData(std::span<const ViewSurface> views,
   const auto x = DataWindow(columns, raster.x_min, options.max_extent);
   const auto y = DataWindow(rows, raster.y_min, options.max_extent);
   if (!x || !y) return std::nullopt;
-  // Borders on multiples of the cell size, so that the grids of two scenes are the same lattice.
+  // Borders at multiples of the cell size, so that the grids of two scenes coincide.
   const double step = options.cell_size;
   const double first_column = std::floor(x->first / step);
   const double first_row = std::floor(y->first / step);
@@ -156,11 +157,13 @@ void SortIntoRows(const ViewSurface& view, std::uint32_t index, std::size_t stri
   const Eigen::Matrix3f R = RotationOf(view);
   const Eigen::Vector3f t = TranslationOf(view);
   const std::size_t cells_per_row = static_cast<std::size_t>(coarse.width) * kTile;
-  // A stride that shares no factor with the image's width scatters the kept pixels over the
+  // A stride that has no common factor with the image's width distributes the kept pixels over the
   // columns.
   for (std::size_t i = index % stride; i < view.size(); i += stride) {
     if (view.pixels[i].inverse_depth <= 0.0F)
-      continue;  // rims and grazing views too: they show where something is, if not where exactly
+      // rims and grazing views are included: they show that something is there, if not exactly
+      // where
+      continue;
     const Eigen::Vector3f p = R * view.PointInCamera(i) + t;
     if (p.z() < options.z_min || p.z() > options.z_max) continue;
     if (const auto cell = coarse.cell(p.x(), p.y()))
@@ -169,20 +172,20 @@ void SortIntoRows(const ViewSurface& view, std::uint32_t index, std::size_t stri
   }
 }
 
-/// Different views among the samples; views 64 apart count as one, which only asks for more
-/// support.
+/// Number of different views among the samples. Views whose indices differ by 64 count as one,
+/// which only makes the test stricter.
 int NumViews(std::span<const Sample> samples) {
   std::uint64_t seen = 0;
   for (const Sample& sample : samples) seen |= std::uint64_t{1} << (sample.view % 64);
   return std::popcount(seen);
 }
 
-/// The highest band of samples that has support, as a plane. `samples` are those of one cell; they
-/// get reordered.
+/// The highest band of samples that has support, as a plane. `samples` are those of one cell and
+/// are reordered.
 TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, float band,
                  int min_views) {
   TopPlane top;
-  // Highest first; equal heights in input order, so that the order never depends on the sorting
+  // Highest first, equal heights in input order, so that the order does not depend on the sorting
   // algorithm.
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
     return a.z != b.z ? a.z > b.z : (a.view != b.view ? a.view < b.view : a.pixel < b.pixel);
@@ -207,7 +210,8 @@ TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, 
       normal += weight * (R * view.normals[i]);
       weight_sum += weight;
     }
-    // The top is only seen by rims, or too steep: no height, and none of what lies below either.
+    // The top is seen only at rims or is too steep: no height is given, and nothing below it
+    // either.
     const float length = normal.norm();
     if (!(weight_sum > 0.0F && normal.z() > kMinNormalZ * length)) return {};
     top.point /= weight_sum;
@@ -225,7 +229,7 @@ CoarseMap FindTops(std::span<const ViewSurface> views, const GridShape& fine,
   std::size_t total = 0;
   for (const ViewSurface& view : views) total += view.size();
   std::size_t stride = (total + kMaxSamples - 1) / kMaxSamples;
-  if (stride > 1) stride |= 1U;  // odd: no factor in common with the usual widths
+  if (stride > 1) stride |= 1U;  // odd, so that it has no factor in common with the usual widths
   const std::size_t num_rows = static_cast<std::size_t>((map.grid.height + kTile - 1) / kTile);
   std::vector<std::vector<std::vector<Sample>>> samples(views.size(),
                                                         std::vector<std::vector<Sample>>(num_rows));
@@ -256,8 +260,8 @@ CoarseMap FindTops(std::span<const ViewSurface> views, const GridShape& fine,
   return map;
 }
 
-/// Empty cells that are nearly surrounded get the plane of their neighbours, as a seed only: a
-/// height is still measured there or not.
+/// Empty cells that are nearly surrounded get the plane of their neighbours as a seed only; their
+/// height is still measured or stays empty.
 void SeedGaps(CoarseMap& map) {
   const int width = map.grid.width;
   const std::vector<TopPlane> before = map.cells;
@@ -285,7 +289,7 @@ void SeedGaps(CoarseMap& map) {
   }
 }
 
-/// Drops patches smaller than `min_cells` that no continuous surface joins to others.
+/// Removes patches smaller than `min_cells` that no continuous surface connects to others.
 void DropSpeckles(CoarseMap& map, float max_step, std::size_t min_cells) {
   const int width = map.grid.width;
   std::vector<std::uint8_t> seen(map.cells.size(), 0);
@@ -315,9 +319,9 @@ void DropSpeckles(CoarseMap& map, float max_step, std::size_t min_cells) {
   }
 }
 
-/// Measures the fine cells, tile by tile: every second one each way by fusion (3 mm, which is as
-/// fine as the sensor samples), the others by their neighbours' mean where those lie on one
-/// surface, else by fusion too.
+/// Measures the fine cells tile by tile: every second one in each direction by fusion (3 mm, the
+/// resolution of the sensor), the others by the mean of their neighbours where these lie on one
+/// surface, otherwise also by fusion.
 class MapFiller {
  public:
   MapFiller(std::span<const ViewSurface> views, const CoarseMap& coarse,
@@ -338,8 +342,8 @@ class MapFiller {
       CheckStop(options_.stop);
       for (int column = 0; column < tile_columns; ++column) FillTile(row, column, true);
     });
-    // Into another array: what a cell becomes must not depend on which of its neighbours came
-    // first.
+    // Written to another array, so that a cell does not depend on which of its neighbours was
+    // processed first.
     nodes_ = result_.map.z;
     tbb::parallel_for(0, tile_rows, [&](int row) {
       CheckStop(options_.stop);
@@ -395,7 +399,7 @@ class MapFiller {
     }
   }
 
-  /// Sets a cell between nodes to their mean; false if one is missing or they lie on different
+  /// Sets a cell between nodes to their mean; false if a node is missing or they lie on different
   /// surfaces.
   bool MeanOfNodes(int row, int column) {
     const int row_before = row - row % 2;

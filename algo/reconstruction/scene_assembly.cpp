@@ -12,11 +12,11 @@
 namespace plumb {
 namespace {
 
-// Of the reference marker, before the scene's frame is built on it. A sensor that hardly moves has
-// one keyframe, so frames count too.
+// Observations of the reference marker before the scene's frame is based on it. A sensor that
+// hardly moves gives only one keyframe, so frames count too.
 constexpr int kMinReferenceViews = 3;
 constexpr int kMinReferenceFrames = 5;
-constexpr double kGapToReport_s = 0.5;  // A comparison refuses above 1 s.
+constexpr double kGapToReport_s = 0.5;  // The comparison gives no answer above 1 s.
 
 SceneMarker ToSceneMarker(const StreamInfo& info, const MapMarker& marker,
                           const Pose& T_scene_world) {
@@ -25,8 +25,8 @@ SceneMarker ToSceneMarker(const StreamInfo& info, const MapMarker& marker,
   for (std::size_t i = 0; i < 4; ++i)
     result.corners[i] = T_scene_world * (marker.T_world_marker * corners[i]);
   result.num_views = marker.num_views;
-  // One view: a quarter of a pixel at arm's length, mostly in depth; more views average down to
-  // the map's own error.
+  // Standard deviation with one view: a quarter of a pixel at arm's length, mostly in depth. More
+  // views average down to the map's own error.
   result.sigma_m = std::hypot(0.001, 0.004 / std::sqrt(std::max(1, marker.num_views)));
   return result;
 }

@@ -1,4 +1,4 @@
-// From the solved map to the scene: its frame, its markers, its trajectory, and what to warn of.
+// Builds the scene from the solved map: its frame, its markers, its trajectory and its warnings.
 #pragma once
 
 #include <cstdint>
@@ -12,23 +12,23 @@
 
 namespace plumb {
 
-/// Whether the reference marker was seen often enough to build the scene's frame on it.
+/// Whether the reference marker was seen often enough to base the scene's frame on it.
 [[nodiscard]] bool HasReferenceMarker(const StreamInfo& info, const TrackingMap& map);
-/// The reference marker's frame where it was seen often enough, else the first keyframe's.
+/// The reference marker's frame if it was seen often enough, otherwise the first keyframe's.
 [[nodiscard]] Pose SceneFromWorld(const StreamInfo& info, const TrackingMap& map);
 
-/// All of a scene but its surfaces.
+/// All of a scene except its surfaces.
 /// @param dropped  Frames that never reached the tracker.
 [[nodiscard]] Scene MakeScene(const StreamInfo& info, Preset preset, std::int64_t dropped,
                               const std::vector<TrackedFrame>& frames, const TrackingMap& map,
                               const CalibrationModel& calibration, const Pose& T_scene_world);
 
-/// Warns where the scene does not lie in the reference marker's frame, or not surely. To be called
-/// once its frame is decided, which the presets do differently.
+/// Adds a warning if the scene does not lie in the reference marker's frame, or not reliably. Call
+/// it once the frame is decided, which each preset does in its own way.
 void WarnOfFrame(const StreamInfo& info, const TrackingMap& map, Scene& scene);
 
-/// Keeps a map that shows something, and warns of any other: one without cells cannot even be
-/// stored, and an empty one compares with nothing.
+/// Keeps a map that contains cells and warns about any other: a map without cells cannot be stored,
+/// and an empty one compares with nothing.
 void KeepHeightMap(HeightMap map, Scene& scene);
 
 }  // namespace plumb

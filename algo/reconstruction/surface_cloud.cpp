@@ -15,11 +15,12 @@
 namespace plumb {
 namespace {
 
-constexpr std::size_t kNumShards = 32;  // parts of space that threads work on apart; fixed, so that
-                                        // results do not depend on threads
-constexpr std::size_t kViewsAtOnce = 16;  // bounds the memory of samples that wait for their shard
+// parts of space processed in parallel; fixed, so that results do not depend on the number of
+// threads
+constexpr std::size_t kNumShards = 32;
+constexpr std::size_t kViewsAtOnce = 16;  // limits the memory of samples that wait for their shard
 constexpr int kBlockBits =
-    4;  // voxels per block and axis, as a power of two: a block shares its list of views
+    4;  // voxels per block and axis, as a power of two; a block shares its list of views
 constexpr int kKeyBits = 21;  // per axis: +-3 km at 3 mm
 constexpr int kKeyOffset = 1 << (kKeyBits - 1);
 constexpr double kMaxDistance = 1000.0;
@@ -87,7 +88,7 @@ class VoxelIndex {
     std::uint32_t index = kNone;
   };
 
-  /// Voxels of a block lie close together, five slots apart so that filled planes make no long
+  /// Voxels of a block lie close together, five slots apart, so that filled planes do not form long
   /// runs.
   [[nodiscard]] std::size_t Start(Key key) const {
     constexpr Key kWithin = (Key{1} << (3 * kBlockBits)) - 1;
@@ -109,7 +110,7 @@ class VoxelIndex {
   std::size_t size_ = 0;
 };
 
-/// A measured working pixel on its way into a voxel.
+/// A measured working pixel to be entered into a voxel.
 struct Sample {
   Key key;
   float weight;
@@ -155,8 +156,8 @@ void SortIntoShards(const ViewSurface& view, float inverse_size, Shards<Sample>&
 
 using VoxelShards = std::array<VoxelIndex, kNumShards>;
 
-/// The seeds whose voxel holds at least as many measurements as the two next to it along the
-/// surface's normal. Noise spreads a surface over several layers of voxels; all their seeds would
+/// The seeds whose voxel holds at least as many measurements as its two neighbours along the
+/// surface's normal. Noise spreads a surface over several layers of voxels, whose seeds would all
 /// move to the same place.
 std::vector<Seed> FullestLayers(std::span<const ViewSurface> views, const Shards<Seed>& seeds,
                                 const VoxelShards& voxels, std::size_t shard) {
@@ -172,7 +173,7 @@ std::vector<Seed> FullestLayers(std::span<const ViewSurface> views, const Shards
       const std::uint32_t index = voxels[other].Find(key);
       return index == VoxelIndex::kNone ? 0U : seeds[other][index].count;
     };
-    // Of two equally full layers the lower one stays.
+    // Of two equally filled layers the lower one is kept.
     if (seed.count >= count_beside(1) && seed.count > count_beside(-1)) kept.push_back(seed);
   }
   std::sort(kept.begin(), kept.end(), [](const Seed& a, const Seed& b) { return a.key < b.key; });
@@ -219,8 +220,8 @@ Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size,
   return layer;
 }
 
-/// Moves the seeds of one shard; those that too few views support are left out. By the shard where
-/// they arrive.
+/// Moves the seeds of one shard and drops those that too few views support. Sorted by the shard of
+/// their new position.
 Shards<Merged> MoveSeeds(std::span<const ViewSurface> views, const ViewFusion& fusion,
                          const std::vector<Seed>& seeds, const SurfaceCloudOptions& options,
                          float voxel_size, int min_views) {
@@ -236,7 +237,7 @@ Shards<Merged> MoveSeeds(std::span<const ViewSurface> views, const ViewFusion& f
     if (k == 0 || BlockOf(seed.key) != block) {
       CheckStop(options.stop);
       block = BlockOf(seed.key);
-      // Twice the radius: the ball about any of the block's points covers the block.
+      // Twice the radius: the ball about any point of the block covers the block.
       fusion.ViewsNear(p, 2.0F * radius, n, near);
     }
     const FusedPoint fused = fusion.Fuse(p, n, near);
@@ -283,7 +284,7 @@ PointCloud MergeVoxels(const std::array<Shards<Merged>, kNumShards>& moved, bool
   for (const auto& shard : voxels) {
     for (const Merged& voxel : shard) {
       const float length = voxel.normal.norm();
-      if (!(length > 0.0F)) continue;  // views from opposite sides: no surface
+      if (!(length > 0.0F)) continue;  // views from opposite sides do not form a surface
       cloud.points.push_back(voxel.point / voxel.weight);
       cloud.normals.push_back(voxel.normal / length);
       if (with_colors) cloud.colors.push_back(voxel.color);

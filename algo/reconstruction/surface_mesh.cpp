@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::uint32_t kNoVertex = 0xFFFFFFFFU;
 
-/// Builds the mesh row by row; a vertex exists from the first triangle that needs it.
+/// Builds the mesh row by row; a vertex is created by the first triangle that uses it.
 class GridMesher {
  public:
   GridMesher(const HeightMap& map, std::span<const Color> colors, const SurfaceMeshOptions& options)
@@ -50,7 +50,7 @@ class GridMesher {
     return map_.at(node.row * decimation_, node.column * decimation_);
   }
 
-  /// NaN fails every comparison, so missing corners need no test of their own.
+  /// NaN fails every comparison, so missing corners need no separate test.
   [[nodiscard]] bool IsSurface(const Node& a, const Node& b, const Node& c) const {
     const auto joined = [&](const Node& p, const Node& q) {
       const bool is_diagonal = p.row != q.row && p.column != q.column;
@@ -62,8 +62,8 @@ class GridMesher {
   void AddSquare(int row, int column) {
     const Node p00{row, column}, p01{row, column + 1}, p10{row + 1, column},
         p11{row + 1, column + 1};
-    // The diagonal with the smaller step follows ridges better; where it misses a corner, the other
-    // one is taken.
+    // The diagonal with the smaller step follows ridges better. If it lacks a corner, the other one
+    // is used.
     const float falling = std::abs(Z(p00) - Z(p11));
     const float rising = std::abs(Z(p01) - Z(p10));
     if (falling <= rising || std::isnan(rising)) {
@@ -143,8 +143,8 @@ std::vector<Color> ColorsFromCloud(const HeightMap& map, const PointCloud& cloud
         const std::size_t k = static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.width) +
                               static_cast<std::size_t>(c);
         if (std::isnan(map.z[k])) continue;
-        // A cell's own points win by the whole cells between; among those of one cell the nearest
-        // in height.
+        // A cell's own points take precedence over those of its neighbours; among the points of one
+        // cell the nearest in height is used.
         const float cells_away =
             static_cast<float>(std::max(std::abs(r - row), std::abs(c - column)));
         const float d = cells_away + std::min(std::abs(map.z[k] - p.z()), 0.999F);

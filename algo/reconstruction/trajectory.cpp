@@ -5,12 +5,12 @@
 namespace plumb {
 namespace {
 
-constexpr double kMaxGap_s = 0.3;  // Neighbours farther apart say nothing about a velocity.
+constexpr double kMaxGap_s = 0.3;  // Frames farther apart do not determine a velocity.
 
 constexpr double kUsualSpacings =
-    3.0;  // A live stream on a busy machine skips one or two images at a time.
+    3.0;  // A live stream on a busy machine may skip one or two images in a row.
 
-// Median, so that gaps do not count as usual, and a recording of any rate has its own.
+// The median is not affected by gaps and adapts to any frame rate.
 double UsualSpacing(const std::vector<TrackedFrame>& frames) {
   std::vector<double> spacings_s;
   for (std::size_t i = 1; i < frames.size(); ++i)
@@ -24,7 +24,7 @@ const Pose& KeyframePose(const TrackingMap& map, int keyframe) {
   return map.keyframes.at(static_cast<std::size_t>(keyframe)).T_world_color;
 }
 
-// First derivatives at its knots of the natural cubic spline whose chords have these mean
+// First derivatives at the knots of the natural cubic spline whose chords have these mean
 // derivatives: the usual tridiagonal system, solved by elimination.
 std::vector<Vector6d> SplineDerivatives(const std::vector<double>& spacings_s,
                                         const std::vector<Vector6d>& chords_per_s) {
@@ -50,10 +50,11 @@ std::vector<Vector6d> SplineDerivatives(const std::vector<double>& spacings_s,
   return v;
 }
 
-// Of the frames [begin, end), which follow each other without a gap, in the world's axes. A hand
-// trembles at 4 to 12 Hz: at 30 images a second the difference of the two neighbours' poses shows
-// half of that, a spline through all poses nine tenths, but the spline shows twice the poses' noise
-// too. Their mean is the compromise that served simulated and real recordings.
+// Velocities of the frames [begin, end), which follow each other without a gap, in the world's
+// axes. Hand tremor is at 4 to 12 Hz: at 30 images per second the central difference of the
+// neighbouring poses shows half of it and a spline through all poses nine tenths, but with twice
+// the noise of the poses. The mean of both was the best compromise on simulated and real
+// recordings.
 void RefreshStretch(std::size_t begin, std::size_t end, const std::vector<Pose>& poses,
                     std::vector<TrackedFrame>& frames) {
   std::vector<double> spacings_s;

@@ -9,8 +9,8 @@ namespace {
 
 constexpr float kBandSigmas = 4.0F;
 constexpr float kMinCosIncidence =
-    0.15F;  // a view steeper than 81 deg to the seed's normal says nothing about it
-constexpr int kMaxSamples = 64;  // views that take part in one mean; more add nothing
+    0.15F;                       // a view steeper than 81 deg to the seed's normal is not used
+constexpr int kMaxSamples = 64;  // views averaged in one mean; more would not improve it
 
 /// One view's measurement of the seed.
 struct Sample {
@@ -18,8 +18,7 @@ struct Sample {
   float weight;
 };
 
-/// Weighted mean with Tukey's weights about `centre`: smooth, and blind to what lies beyond the
-/// cut.
+/// Weighted mean with Tukey's weights about `centre`: smooth, with zero weight beyond the cut-off.
 float TukeyMean(std::span<const Sample> samples, float centre, float cut, float& weight_sum) {
   float sum = 0.0F;
   weight_sum = 0.0F;
@@ -88,7 +87,7 @@ void ViewFusion::ViewsNear(const Eigen::Vector3f& centre_world, float radius_m,
         std::any_of(camera.inward_sides.begin(), camera.inward_sides.end(),
                     [&](const Eigen::Vector3f& side) { return side.dot(p) < -radius_m; });
     if (outside) continue;
-    // Views that hold the ball's centre come before those that only touch the ball.
+    // Views that contain the ball's centre come before those that only touch the ball.
     const bool holds_centre =
         std::all_of(camera.inward_sides.begin(), camera.inward_sides.end(),
                     [&](const Eigen::Vector3f& side) { return side.dot(p) >= 0.0F; });
@@ -148,7 +147,7 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
         bottom[1].weight <= 0.0F)
       continue;
     const Eigen::Vector3f n = camera.R_camera_world * n_world;
-    const float along = -n.dot(p);  // |p| times the cosine of incidence
+    const float along = -n.dot(p);  // |p| times the cosine of the angle of incidence
     if (along * along < kMinCosIncidence * kMinCosIncidence * p.squaredNorm() || along < 0.0F)
       continue;
     const float fu = u - static_cast<float>(column);
@@ -157,7 +156,7 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
     const float below =
         bottom[0].inverse_depth + fu * (bottom[1].inverse_depth - bottom[0].inverse_depth);
     const float measured = 1.0F / (above + fv * (below - above));
-    // The measured point lies on the seed's own ray, at this share of its length beyond it.
+    // The measured point lies on the seed's own ray, beyond it by this fraction of its length.
     const float beyond = measured * inverse_z - 1.0F;
     const float distance = -beyond * along;
     const float band = std::max(options_.min_band_m, kBandSigmas * AxialSigma(p.z(), 1.0F));
@@ -181,8 +180,8 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
   fused.num_agreeing = static_cast<int>(num_samples);
   if (num_samples == 0) return fused;
   const std::span<const Sample> used(samples.data(), num_samples);
-  // From the seed with the whole band, then from there: a stray view near the band's end loses its
-  // say.
+  // First with the whole band about the seed, then about the result, so that an outlier near the
+  // end of the band loses its influence.
   fused.offset_m = TukeyMean(used, 0.0F, 1.5F * widest_band, fused.weight);
   fused.offset_m = TukeyMean(used, fused.offset_m, widest_band, fused.weight);
   const float length = fused.normal.norm();

@@ -1,4 +1,4 @@
-// One surface point against all views: where do they agree that the surface lies?
+// Compares one surface point with all views and finds where they agree that the surface lies.
 #pragma once
 
 #include <array>
@@ -13,12 +13,13 @@
 namespace plumb {
 
 struct FusionOptions {
-  float min_band_m =
-      0.010F;  ///< A view within this of the seed (or 4 sigma, if more) measured the same surface.
+  /// Views within this distance of the seed (or 4 sigma, if larger) measured the same surface.
+  float min_band_m = 0.010F;
   float see_through_m =
-      0.03F;  ///< A view that looks this far past the seed says that nothing is there.
-  bool with_normals = true;  ///< false: FusedPoint::normal is the seed's.
-  int max_views = 16;  ///< ViewsNear() keeps the best so many; noise falls with the root only.
+      0.03F;                 ///< Views that see this far past the seed show that nothing is there.
+  bool with_normals = true;  ///< False: FusedPoint::normal is the seed's.
+  /// Number of views that ViewsNear() keeps; noise falls only with the square root.
+  int max_views = 16;
 };
 
 /// The evidence of all views for one seed point.
@@ -27,26 +28,26 @@ struct FusedPoint {
       0.0F;  ///< Robust weighted mean of the surface's signed distance along the seed's normal.
   float weight = 0.0F;           ///< Sum of the views' weights, 1/m^2.
   int num_agreeing = 0;          ///< Views that measured the surface within the band.
-  int num_through = 0;           ///< Views that look through the seed.
+  int num_through = 0;           ///< Views that see through the seed.
   int best_view = -1;            ///< Index of the agreeing view with the largest weight, or -1.
-  std::uint32_t best_pixel = 0;  ///< Its working pixel.
+  std::uint32_t best_pixel = 0;  ///< Working pixel of the best view.
   Eigen::Vector3f normal =
-      Eigen::Vector3f::Zero();  ///< Weighted mean of the agreeing views, world frame, unit.
+      Eigen::Vector3f::Zero();  ///< Weighted mean of the agreeing views; world frame, unit length.
 };
 
-/// Projects points into prepared views (projective association) and averages what was measured
-/// there. Borrows the views. Const members are thread-safe and deterministic.
+/// Projects points into prepared views (projective association) and averages their measurements.
+/// Borrows the views. Const members are thread-safe and deterministic.
 class ViewFusion {
  public:
   ViewFusion(std::span<const ViewSurface> views, const FusionOptions& options);
 
-  /// @param p_world, n_world  Seed point (metres) and unit normal towards the sensor side.
-  /// @param candidates  Indices of the views to ask, in the order that decides ties.
+  /// @param p_world, n_world  Seed point (metres) and unit normal towards the sensor.
+  /// @param candidates  Indices of the views to use, in the order that resolves ties.
   [[nodiscard]] FusedPoint Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3f& n_world,
                                 std::span<const std::uint16_t> candidates) const;
 
-  /// Views whose frustum meets the ball and that look at the side where the normal points, the
-  /// least noisy ones; ascending.
+  /// Views whose frustum intersects the ball and that see the side to which the normal points; the
+  /// least noisy ones, ascending.
   void ViewsNear(const Eigen::Vector3f& centre_world, float radius_m,
                  const Eigen::Vector3f& n_world, std::vector<std::uint16_t>& found) const;
 
@@ -59,9 +60,9 @@ class ViewFusion {
     Eigen::Vector3f t_camera_world;
     float fx, fy, cx, cy, k1, k2, p1, p2, k3;
     bool has_lens = false;
-    Eigen::Vector2f ray_min, ray_max;  ///< Of the whole image.
+    Eigen::Vector2f ray_min, ray_max;  ///< Extent of the whole image.
     std::array<Eigen::Vector3f, 4>
-        inward_sides;  ///< Unit normals of the frustum's sides, camera frame.
+        inward_sides;  ///< Unit normals of the frustum's sides in the camera frame.
     float max_depth_m = 0.0F;
   };
 

@@ -14,17 +14,17 @@
 namespace plumb {
 namespace {
 
-constexpr int kWorkingWidth = 320;  // columns that the block size aims at
+constexpr int kWorkingWidth = 320;  // number of columns from which the block size is chosen
 constexpr int kNormalRadius =
-    3;  // working pixels: half a window of about 25 mm at 1 m, past the noise's correlation
-constexpr int kRimRadius = 2;  // working pixels kept away from depth edges and holes
+    3;  // working pixels; half a window of about 25 mm at 1 m, longer than the noise's correlation
+constexpr int kRimRadius = 2;  // working pixels excluded around depth edges and holes
 constexpr int kMinRimCount =
-    20;  // of the 25 of a rim window: single drop-outs do not cost a whole window
+    20;  // of the 25 pixels of a rim window; single drop-outs do not reject a window
 constexpr float kEdgeSlope =
-    6.0F;  // tan of 80 deg: steeper steps between neighbours are edges, not surfaces
-constexpr float kEdgeSigmas = 4.0F;  // noise allowed on top
+    6.0F;  // tan of 80 deg; steeper steps between neighbours are edges, not surfaces
+constexpr float kEdgeSigmas = 4.0F;  // additional margin for noise
 
-/// Sums over any rectangle of the image in four look-ups.
+/// Sums over any rectangle of the image by four look-ups.
 class BoxSums {
  public:
   BoxSums(int width, int height)
@@ -71,12 +71,12 @@ class BoxSums {
   std::vector<double> sum_;
 };
 
-/// Step in depth between neighbouring working pixels that no plausible surface makes.
+/// Step in depth between neighbouring working pixels that is too large for any plausible surface.
 float EdgeStep(float depth_m, float pixel_angle) {
   return kEdgeSlope * depth_m * pixel_angle + kEdgeSigmas * AxialSigma(depth_m, 1.0F);
 }
 
-/// Fills the inverse depth of the working image.
+/// Computes the inverse depth of the working image.
 void Bin(const DepthView& view, const ViewSurfaceOptions& options, ViewSurface& surface) {
   const int block = surface.block;
   const int min_count = (3 * block * block + 3) / 4;
@@ -131,8 +131,8 @@ std::vector<std::uint8_t> WithoutEdges(const ViewSurface& surface) {
   return good;
 }
 
-/// Difference of the mean inverse depth between two rectangles that lie side by side, or false if
-/// one is too empty.
+/// Difference of the mean inverse depth between two rectangles side by side; false if one of them
+/// has too few values.
 struct Rectangle {
   int r0, r1, c0, c1;
 };

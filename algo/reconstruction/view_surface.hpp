@@ -1,5 +1,5 @@
-// One depth image made ready for surfaces: normals, noise weights, and what is not to be trusted
-// left out.
+// Prepares one depth image for surface reconstruction: normals, noise weights, and removal of
+// unreliable pixels.
 #pragma once
 
 #include <cstdint>
@@ -19,38 +19,39 @@ namespace plumb {
 
 /// Axial noise of a structured-light depth camera, one standard deviation in metres (Nguyen et al.
 /// 2012).
-/// @param depth_m along the optical axis; @param cos_incidence between surface normal and viewing
-/// ray, in (0, 1].
+/// @param depth_m  Along the optical axis.
+/// @param cos_incidence  Between surface normal and viewing ray, in (0, 1].
 [[nodiscard]] float AxialSigma(float depth_m, float cos_incidence);
 
 struct ViewSurfaceOptions {
   float min_depth_m = 0.3F;
   float max_depth_m = 4.0F;
   float max_incidence_deg = 75.0F;  ///< Steeper views of a surface are left out; in (0, 89].
-  std::stop_token stop = {};        ///< Of PrepareViews(); polled, see CheckStop().
+  std::stop_token stop = {};        ///< Polled by PrepareViews(); see CheckStop().
 };
 
-/// A depth image at working resolution (about 320 columns, whatever the sensor's): each working
-/// pixel is the mean INVERSE depth of a block of image pixels. Planes are linear in inverse depth,
-/// so the mean is exact on them, and the quantisation of structured light is uniform in it. All
-/// vectors have width * height values, row by row.
+/// A depth image at working resolution (about 320 columns for any sensor). Each working pixel is
+/// the mean INVERSE depth of a block of image pixels: planes are linear in inverse depth, so the
+/// mean is exact on them, and the quantisation of structured light is uniform in it. All vectors
+/// have width * height values, row by row.
 struct ViewSurface {
-  /// Inverse depth and weight lie together because searches need both.
+  /// Inverse depth and weight are stored together because searches need both.
   struct Pixel {
     float inverse_depth = 0.0F;  ///< 1/m; 0 where nothing was measured.
-    float weight = 0.0F;  ///< 1 / variance (1/m^2) times the cosine of incidence; 0: not to be used
-                          ///< (depth edge, rim, grazing view, out of range).
+    /// 1 / variance (1/m^2) times the cosine of incidence; 0 if the pixel must not be used (depth
+    /// edge, rim, grazing view, out of range).
+    float weight = 0.0F;
   };
 
-  Intrinsics intrinsics;  ///< Of the working image.
-  int block = 1;          ///< Image pixels per working pixel, each way.
-  cv::Mat color_rgb;      ///< As in the view: image resolution, or empty.
+  Intrinsics intrinsics;  ///< Camera of the working image.
+  int block = 1;          ///< Image pixels per working pixel in each direction.
+  cv::Mat color_rgb;      ///< As in the view: at image resolution, or empty.
   Pose T_world_camera = Pose::Identity();
   std::shared_ptr<const RayTable>
       rays;  ///< Of the working pixels; shared by the views of one camera.
   std::vector<Pixel> pixels;
   std::vector<Eigen::Vector3f>
-      normals;  ///< Camera frame, unit, towards the camera; where weight > 0.
+      normals;  ///< Camera frame, unit length, towards the camera; valid where weight > 0.
 
   [[nodiscard]] int width() const { return intrinsics.width; }
   [[nodiscard]] int height() const { return intrinsics.height; }
@@ -65,7 +66,7 @@ struct ViewSurface {
   [[nodiscard]] Color ColorAt(std::size_t i) const;
 };
 
-/// The camera of the working images that belong to images of this camera.
+/// The camera of the working images for images of this camera.
 [[nodiscard]] Intrinsics WorkingIntrinsics(const Intrinsics& image);
 
 /// Prepares one view.
@@ -75,8 +76,8 @@ struct ViewSurface {
                                       const std::shared_ptr<const RayTable>& working_rays,
                                       const ViewSurfaceOptions& options = {});
 
-/// Prepares all views, in parallel. Deterministic. @throws std::invalid_argument naming the view
-/// that does not fit.
+/// Prepares all views in parallel. Deterministic.
+/// @throws std::invalid_argument naming the view that does not fit.
 [[nodiscard]] std::vector<ViewSurface> PrepareViews(std::span<const DepthView> views,
                                                     const ViewSurfaceOptions& options = {});
 
