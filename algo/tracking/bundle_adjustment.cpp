@@ -14,23 +14,24 @@
 namespace plumb {
 namespace {
 
-using namespace bundle;  // NOLINT: the model is this file's own vocabulary
+using namespace bundle;  // NOLINT: the model's names are this file's vocabulary
 using CalibrationPoint = Eigen::Matrix<double, kCalibrationSize, 3>;
 
-// Unknowns; beyond, a sparse factorisation is faster.
+// Number of unknowns above which a sparse factorisation is faster.
 constexpr Eigen::Index kLargestDenseSystem = 1200;
-constexpr double kLargestDamping = 1e8;  // Steps so short that improve nothing: at the minimum.
+// Steps this short that do not improve the cost: the minimum is reached.
+constexpr double kLargestDamping = 1e8;
 
 // A landmark's own 3x3 system, inverted, and its coupling to the free keyframes and the
 // calibration.
 struct PointSystem {
   Eigen::Matrix3d V_inverse;
   Eigen::Vector3d g;
-  std::vector<std::pair<int, CameraPoint>> W;  // Camera slot, ascending.
+  std::vector<std::pair<int, CameraPoint>> W;  // Camera slots, ascending.
   CalibrationPoint W_calibration;
 };
 
-// Levenberg-Marquardt over one problem.
+// Levenberg-Marquardt on one problem.
 class Solver {
  public:
   explicit Solver(Problem& problem)
@@ -45,10 +46,10 @@ class Solver {
   void MakePoint(std::size_t s, double damping);
   // One damped Gauss-Newton step; false if the system cannot be solved.
   bool Step(const State& state, double damping, State& next);
-  // What the residuals say of the calibration once everything else has been eliminated.
+  // Information about the calibration once everything else has been eliminated.
   [[nodiscard]] CalibrationMatrix Information(const State& state);
-  // S -= W V^-1 W', right -= W V^-1 g over all landmarks. Each free keyframe's rows are one task,
-  // so every block has one writer.
+  // S -= W V^-1 W', right -= W V^-1 g over all landmarks. The rows of each free keyframe are one
+  // task, so every block has exactly one writer.
   void Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const;
 
   Problem& problem_;
@@ -57,7 +58,7 @@ class Solver {
   std::vector<PointSystem> points_;
 };
 
-// Makes `count` unknowns stay where they are.
+// Fixes `count` unknowns at their present values.
 void Pin(Eigen::Index first, Eigen::Index count, Eigen::MatrixXd& S, Eigen::VectorXd& right) {
   S.middleRows(first, count).setZero();
   S.middleCols(first, count).setZero();

@@ -10,7 +10,8 @@ namespace plumb::bundle {
 namespace {
 
 using Matrix2x6d = Eigen::Matrix<double, 2, 6>;
-constexpr int kSeenByCorners = kEdgeBiasAt + 1;  // Unknowns of the calibration that corners see.
+// Unknowns of the calibration that affect marker corners.
+constexpr int kSeenByCorners = kEdgeBiasAt + 1;
 using CameraVector = Eigen::Matrix<double, kCamera, 1>;
 using CameraMatrix = Eigen::Matrix<double, kCamera, kCamera>;
 using CameraRows2 = Eigen::Matrix<double, 2, kCamera>;
@@ -100,7 +101,7 @@ PointRows Equations::RowsOf(const State& state, const PointView& view) const {
   rows.r[2] = wz * (predicted.z_m - measured.z_m);
   rows.J_point.row(2) = wz * predicted.J_z * late.J_world.row(2);
   rows.J_camera.row(2) = wz * predicted.J_z * late.J_pose.row(2);
-  // How the offset changes with poses and the colour image's readout would be of second order.
+  // The change of the offset with poses and the colour image's readout is of second order.
   rows.J_depth = predicted.J_depth;
   const double scale = problem_.stated().width / 640.0;
   rows.J_depth[kDepthShiftX] -= scale * measured.J_offset.x();
@@ -114,7 +115,7 @@ PointRows Equations::RowsOf(const State& state, const PointView& view) const {
 
 void Equations::AddCorner(const State& state, const CornerView& view) {
   const Vector6d& twist = state.markers[static_cast<std::size_t>(view.marker)];
-  CameraState marker_side;  // Only for the right Jacobian of the twist.
+  CameraState marker_side;  // Used only for the right Jacobian of the twist.
   marker_side.twist = twist;
   marker_side.Prepare();
   const Pose T_world_marker = problem_.MarkerPose(view.marker) * PoseFromTwist(twist);

@@ -12,18 +12,17 @@ namespace plumb::bundle {
 inline constexpr int kLensAndReadout = kReadoutAt + 1;
 using CameraPoint = Eigen::Matrix<double, kCamera, 3>;
 
-/// What the last linearisation made of a keypoint's observation: rows pixel x, pixel y, depth,
-/// weighted.
+/// Linearised observation of a keypoint, with weighted rows pixel x, pixel y and depth.
 struct PointRows {
   Eigen::Vector3d r = Eigen::Vector3d::Zero();
   Eigen::Matrix3d J_point = Eigen::Matrix3d::Zero();
   Eigen::Matrix<double, 3, kCamera> J_camera = Eigen::Matrix<double, 3, kCamera>::Zero();
-  /// Lens and readout.
+  /// Derivatives to lens and readout.
   Eigen::Matrix<double, 2, kLensAndReadout> J_lens =
       Eigen::Matrix<double, 2, kLensAndReadout>::Zero();
   DepthRow J_depth = DepthRow::Zero();
 
-  /// J' M for this observation's derivatives J to the whole calibration.
+  /// J' M for this observation's derivatives J with respect to the whole calibration.
   template <int kColumns>
   [[nodiscard]] Eigen::Matrix<double, kCalibrationSize, kColumns> CalibrationTimes(
       const Eigen::Matrix<double, 3, kColumns>& M) const {
@@ -37,19 +36,20 @@ struct PointRows {
   }
 };
 
-/// Parallel loops write to their own slots, and every sum has one order: the same bits on any
+/// Parallel loops write to their own slots and every sum has a fixed order: the same bits on any
 /// number of threads.
 class Equations {
  public:
-  /// @param problem  Must outlive this.
+  /// @param problem  Must outlive this object.
   explicit Equations(const Problem& problem);
 
-  /// Fills all of the below.
+  /// Computes all of the members below.
   void Linearise(const State& state);
 
   /// One for each of Problem::views().
   [[nodiscard]] const std::vector<PointRows>& rows() const { return rows_; }
-  /// Of poses, markers and calibration, undamped, lower half; landmarks are not yet eliminated.
+  /// Normal equations of poses, markers and calibration, undamped, lower half; landmarks are not
+  /// yet eliminated.
   [[nodiscard]] const Eigen::MatrixXd& H() const { return H_; }
   [[nodiscard]] const Eigen::VectorXd& g() const { return g_; }
 

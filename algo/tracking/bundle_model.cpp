@@ -5,7 +5,7 @@
 namespace plumb::bundle {
 namespace {
 
-// To second order: the twists stay small because each call linearises again.
+// To second order; the twists stay small because each call linearises again.
 Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& w) {
   const Eigen::Matrix3d W = Skew(w);
   return Eigen::Matrix3d::Identity() - 0.5 * W + W * W / 6.0;
@@ -24,7 +24,7 @@ SeenPoint See(const CameraState& camera, const Eigen::Vector3d& p_world, double 
   const auto w = camera.velocity_per_s.head<3>();
   SeenPoint seen;
   seen.J_time = -(w.cross(p) + camera.velocity_per_s.tail<3>());
-  // Later camera, to first order: p - dt (w x p + v).
+  // The camera at a later time, to first order: p - dt (w x p + v).
   seen.p = p + dt_s * seen.J_time;
   const Eigen::Matrix3d later = Eigen::Matrix3d::Identity() - dt_s * Skew(w);
   seen.J_pose.leftCols<3>() = later * Skew(p) * camera.J_right;
@@ -72,8 +72,8 @@ DepthPlace::DepthPlace(const Eigen::Vector2d& pixel, const Intrinsics& stated)
 
 namespace {
 
-// By which a raw depth is multiplied, and its change with depth. Growth follows the true depth
-// instead of the raw one: they differ by one percent of a term that is itself below one percent.
+// Factor of a raw depth and its derivative with depth. Growth uses the true depth instead of the
+// raw one; they differ by one percent of a term that is itself below one percent.
 struct DepthFactor {
   DepthFactor(const CalibrationModel& calibration, double z_true_m, const DepthPlace& place) {
     const auto& d = calibration.depth;
@@ -132,7 +132,8 @@ PredictedDepth PredictDepth(const CalibrationModel& calibration, const SeenPoint
 }
 
 DepthBeside::DepthBeside(const DepthReading& reading, const Eigen::Vector2d& offset_px) {
-  constexpr double kFarthest = 0.5;  // No plane goes on to twice the depth within an image's error.
+  // A plane is not extrapolated to twice the depth within the error of an image.
+  constexpr double kFarthest = 0.5;
   const double inverse = 1.0 / reading.z_m;
   z_m = 1.0 / std::max(inverse + reading.inverse_slope_per_px.dot(offset_px), kFarthest * inverse);
   J_offset = -z_m * z_m * reading.inverse_slope_per_px.transpose();

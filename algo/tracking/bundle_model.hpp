@@ -1,5 +1,5 @@
-// The residuals of bundle adjustment with their derivatives: what a camera under a calibration sees
-// of a point.
+// The residuals of bundle adjustment with their derivatives: projections of points into a
+// calibrated camera.
 #pragma once
 
 #include <array>
@@ -16,21 +16,21 @@ using Matrix3x6d = Eigen::Matrix<double, 3, 6>;
 
 using DepthRow = Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>;
 
-/// In front of the camera; nearer, projections mean nothing.
+/// Smallest depth in front of the camera for which projections are computed.
 inline constexpr double kNearestPoint_m = 0.02;
 
-/// Where a keyframe's camera is: T_world_camera = T_world_camera0 * PoseFromTwist(twist), moving
+/// Pose of a keyframe's camera: T_world_camera = T_world_camera0 * PoseFromTwist(twist), moving
 /// with `velocity_per_s`.
 struct CameraState {
   Pose T_camera0_world = Pose::Identity();
   Vector6d velocity_per_s = Vector6d::Zero();
   Vector6d twist = Vector6d::Zero();
 
-  /// Of `twist`; made once, because every residual of the camera wants it.
+  /// Quantities of `twist`, computed once because every residual of the camera uses them.
   void Prepare();
   Pose T_camera_world = Pose::Identity();
-  Eigen::Matrix3d R_inverse = Eigen::Matrix3d::Identity();  ///< Of the twist's rotation.
-  Eigen::Matrix3d J_right = Eigen::Matrix3d::Identity();    ///< Its right Jacobian.
+  Eigen::Matrix3d R_inverse = Eigen::Matrix3d::Identity();  ///< Rotation of the twist, inverted.
+  Eigen::Matrix3d J_right = Eigen::Matrix3d::Identity();    ///< Right Jacobian of that rotation.
 };
 
 /// A point in the camera frame some time after the stamp, with derivatives.
@@ -42,7 +42,7 @@ struct SeenPoint {
 };
 [[nodiscard]] SeenPoint See(const CameraState& camera, const Eigen::Vector3d& p_world, double dt_s);
 
-/// Its pixel through the corrected lens, with derivatives to the point and to
+/// Its pixel through the corrected lens, with derivatives with respect to the point and to
 /// CalibrationModel::lens.
 struct SeenPixel {
   Eigen::Vector2d pixel;
@@ -53,20 +53,21 @@ struct SeenPixel {
                                          const CalibrationModel::Lens& lens,
                                          const Eigen::Vector3d& p);
 
-/// Share of the readout before or after the stamp at an image row: -0.5 at the top, 0.5 at the
+/// Fraction of the readout before or after the stamp at an image row: -0.5 at the top, 0.5 at the
 /// bottom.
 [[nodiscard]] inline double RowShare(double y_px, int height) {
   return (y_px + 0.5) / height - 0.5;
 }
 
-/// A depth reading's prediction, in the units of the measurement (in metres of the scene, a smaller
-/// scene would look better).
+/// Prediction of a depth reading in the units of the measurement (in metres of the scene, a smaller
+/// scene would give a lower cost).
 struct PredictedDepth {
   double z_m = 0;
-  double J_z = 0;                       ///< To the true depth.
-  DepthRow J_depth = DepthRow::Zero();  ///< To CalibrationModel::depth, times included.
+  double J_z = 0;  ///< With respect to the true depth.
+  /// With respect to CalibrationModel::depth, including its times.
+  DepthRow J_depth = DepthRow::Zero();
 };
-/// Where a depth reading lies in its image.
+/// Position of a depth reading in its image.
 struct DepthPlace {
   DepthPlace(const Eigen::Vector2d& pixel, const Intrinsics& stated);
   Eigen::Vector2d centred;  ///< CentredCoordinates()
@@ -82,18 +83,19 @@ struct DepthPlace {
 
 /// A keypoint's depth reading.
 struct DepthReading {
-  double z_m = 0;                        ///< At the keypoint's pixel; 0: none.
-  Eigen::Vector2d inverse_slope_per_px;  ///< Of the inverse depth about it.
+  double z_m = 0;                        ///< At the keypoint's pixel; 0 without depth.
+  Eigen::Vector2d inverse_slope_per_px;  ///< Slope of the inverse depth around the pixel.
 };
-/// The reading where the depth image shows the keypoint: beside its pixel, as depth is registered
-/// slightly wrong and taken at another time. The plane about the pixel is continued to there.
+/// The reading at the place where the depth image shows the keypoint. That is beside the keypoint's
+/// pixel, because depth is registered with an error and taken at another time; the plane around the
+/// pixel is extrapolated to it.
 struct DepthBeside {
   DepthBeside(const DepthReading& reading, const Eigen::Vector2d& offset_px);
   double z_m;
   Eigen::RowVector2d J_offset;  ///< Metres per pixel.
 };
 
-inline constexpr double kKeypointLossScale = 2.0;  ///< Cauchy, in standard deviations.
+inline constexpr double kKeypointLossScale = 2.0;  ///< Cauchy scale in standard deviations.
 inline constexpr double kCornerLossScale = 3.0;
 
 }  // namespace plumb::bundle

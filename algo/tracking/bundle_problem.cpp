@@ -91,8 +91,8 @@ void Problem::CollectMarkers() {
 }
 
 void Problem::CollectPoints() {
-  // Landmarks that a free keyframe sees, then every observation of those. One seen only once
-  // constrains nothing.
+  // The landmarks that a free keyframe observes, and all observations of them. A landmark with only
+  // one observation constrains nothing.
   std::vector<int> slot(map_.landmarks.size(), -1);
   for (const int k : free_) {
     for (const KeypointObservation& o : map_.keyframes[static_cast<std::size_t>(k)].keypoints) {

@@ -1,4 +1,4 @@
-// What one bundle adjustment observes, where its unknowns stand, and its cost.
+// The observations, the unknowns and the cost of one bundle adjustment.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +14,10 @@ namespace plumb::bundle {
 
 inline constexpr int kCamera = 6;  ///< Unknowns of a keyframe: its twist.
 
-/// A keypoint's observation.
+/// An observation of a keypoint.
 struct PointView {
   int keyframe = 0;
-  int landmark = 0;  ///< Slot.
+  int landmark = 0;  ///< Slot of the landmark.
   Eigen::Vector2d pixel;
   DepthPlace place;
   DepthReading depth;
@@ -26,25 +26,27 @@ struct PointView {
 
 struct CornerView {
   int keyframe = 0;
-  int marker = 0;  ///< Slot.
+  int marker = 0;  ///< Slot of the marker.
   Eigen::Vector3d in_marker;
   Eigen::Vector2d pixel;
-  /// Sum of the unit directions along the two sides that meet here, times the pixel scale.
+  /// Sum of the unit directions along the two sides that meet at this corner, times the pixel
+  /// scale.
   Eigen::Vector2d inward;
   double weight = 0;
 };
 
-/// Everything that moves.
+/// Values of all unknowns.
 struct State {
-  std::vector<CameraState> cameras;  ///< One a keyframe of the map; those that stay never change.
+  std::vector<CameraState> cameras;  ///< One per keyframe of the map; fixed ones never change.
   std::vector<Vector6d> markers;     ///< Twists on the markers' side.
   std::vector<Eigen::Vector3d> landmarks;
   CalibrationModel calibration;
 };
 
-/// One problem; lives for one call of BundleAdjust(). Unknowns in this order: free poses, markers,
-/// calibration; landmarks are eliminated. Holds on to what it is made of. Only
-/// DropViewsBehindCameras() and Write() change anything; the rest may be called from any thread.
+/// One problem, which lives for one call of BundleAdjust(). Order of the unknowns: free poses,
+/// markers, calibration; landmarks are eliminated. Keeps references to its inputs. Only
+/// DropViewsBehindCameras() and Write() modify anything; the other members may be called from any
+/// thread.
 class Problem {
  public:
   using TermVector = Eigen::Matrix<double, QuadraticTerm::kSize, 1>;
@@ -53,31 +55,32 @@ class Problem {
           const std::vector<QuadraticTerm>& terms, TrackingMap& map, CalibrationModel& calibration);
 
   [[nodiscard]] State Start() const;
-  /// A landmark that starts behind a camera has no projection there; later it cannot get there, see
-  /// Cost().
+  /// Drops observations of landmarks that start behind a camera, where they have no projection.
+  /// Cost() keeps the others in front.
   void DropViewsBehindCameras(const State& state);
-  /// 1/2 sum of losses, and the quadratic terms (up to their constant); infinite where a point is
+  /// 1/2 sum of losses plus the quadratic terms (up to their constant); infinite where a point is
   /// behind its camera.
   [[nodiscard]] double Cost(const State& state) const;
-  /// Into the map and the calibration.
+  /// Writes the state into the map and the calibration.
   void Write(const State& state);
 
   [[nodiscard]] int NumResiduals() const;
   [[nodiscard]] double PixelWeight() const;
-  /// From the colour image's stamp to the depth reading at a row.
+  /// Time from the colour image's stamp to the depth reading at a row.
   [[nodiscard]] double DepthDelay(const State& state, int keyframe, double row_share) const;
-  /// From a keypoint's pixel to where the depth image shows it. @param pixel_velocity  Of the point
-  /// in the image, pixels a second. @param later_s  By how much the depth is read later.
+  /// Offset from a keypoint's pixel to where the depth image shows it.
+  /// @param pixel_velocity  Of the point in the image, pixels per second.
+  /// @param later_s  Time by which the depth is read later.
   [[nodiscard]] Eigen::Vector2d DepthOffset(const State& state,
                                             const Eigen::Vector2d& pixel_velocity,
                                             double later_s) const;
   [[nodiscard]] Eigen::Vector2d CornerResidual(const State& state, const CornerView& view,
                                                const Eigen::Vector3d& p) const;
   [[nodiscard]] TermVector TermState(const State& state, const QuadraticTerm& term) const;
-  /// As it was at the beginning.
+  /// The state at the beginning.
   [[nodiscard]] const Pose& MarkerPose(int slot) const;
   [[nodiscard]] int MarkerSlot(int id) const { return markers_.at(id); }
-  /// First unknown of a keyframe; negative if it stays.
+  /// First unknown of a keyframe; negative if it is fixed.
   [[nodiscard]] Eigen::Index CameraAt(int keyframe) const;
   [[nodiscard]] Eigen::Index MarkerAt(int slot) const { return markers_at_ + 6 * slot; }
   [[nodiscard]] Eigen::Index calibration_at() const { return calibration_at_; }
@@ -116,10 +119,10 @@ class Problem {
   TrackingMap& map_;
   CalibrationModel& calibration_;
   std::vector<int> free_;
-  std::vector<int> pose_slot_;  // Of each keyframe; -1: stays.
-  std::map<int, int> markers_;  // Id to slot.
+  std::vector<int> pose_slot_;  // Per keyframe; -1 if it is fixed.
+  std::map<int, int> markers_;  // From id to slot.
   std::vector<Pose> T_world_marker0_;
-  std::vector<int> landmarks_;  // Ids, by slot.
+  std::vector<int> landmarks_;  // Ids by slot.
   std::vector<PointView> views_;
   std::vector<CornerView> corners_;
   std::vector<std::vector<std::uint32_t>> views_of_landmark_;

@@ -11,10 +11,10 @@ namespace {
 
 constexpr int kColumns = 160;
 constexpr float kMaxRelativeSpread =
-    0.03F;  // Of depth within a window: more is an edge, not a slope.
+    0.03F;  // Relative depth range within a window; a larger one is an edge, not a slope.
 constexpr float kMinFill = 0.6F;
 
-// Mean inverse depth of one window; 0 if it is too empty or holds an edge.
+// Mean inverse depth of one window; 0 if it has too few values or contains an edge.
 float WindowDepth(const cv::Mat& depth_m, int row0, int column0, int side) {
   float sum = 0;
   float nearest = 1e9F;

@@ -11,16 +11,16 @@
 
 namespace plumb {
 
-/// A depth image at a fraction of its resolution: every cell is the mean inverse depth of its
-/// window, kept only where the window is filled and smooth, with the surface normal there.
-/// Row-major, camera frame.
+/// A depth image at a fraction of its resolution. Every cell is the mean inverse depth of its
+/// window, kept only if the window is filled and smooth, with the surface normal. Row-major, camera
+/// frame.
 struct DenseView {
   int width = 0;
   int height = 0;
-  int window_px = 4;       ///< Side of the full-resolution window behind a cell.
-  std::vector<float> z_m;  ///< 0 where nothing usable.
+  int window_px = 4;       ///< Side length of a cell's window at full resolution.
+  std::vector<float> z_m;  ///< 0 where the depth is not usable.
   std::vector<Eigen::Vector3f>
-      normals;  ///< Unit, towards the camera; zero where none could be had.
+      normals;  ///< Unit length, towards the camera; zero where it could not be computed.
   std::shared_ptr<const std::vector<Eigen::Vector2f>>
       rays;  ///< Ideal normalised coordinates of the cell centres; shared.
 
@@ -30,19 +30,18 @@ struct DenseView {
   }
 };
 
-/// Of the cells that a frame's pose is computed of, each way.
+/// Spacing in each direction of the cells from which a frame's pose is computed.
 inline constexpr int kPoseStride = 2;
 
-/// Makes dense views of one camera's depth images; keeps the rays, which cost more than the view
-/// itself. Cells per image side follow the resolution, so that 640x480 and 320x240 give the same
-/// 160x120 cells.
+/// Makes dense views of one camera's depth images. Keeps the rays, which cost more than the view
+/// itself. The window follows the resolution, so that 640x480 and 320x240 both give 160x120 cells.
 class DenseViewMaker {
  public:
   explicit DenseViewMaker(const Intrinsics& intrinsics);
-  /// @param depth_m  CV_32FC1 of the intrinsics' size, 0 = nothing measured.
+  /// @param depth_m  CV_32FC1 of the intrinsics' size; 0 where nothing was measured.
   [[nodiscard]] DenseView Make(const cv::Mat& depth_m) const;
-  /// What a pose needs of the frame that it is computed for, a quarter of the work: depth in every
-  /// kPoseStride-th cell each way, as Make() has it there, and no normals.
+  /// The part of Make() that the pose of a frame uses, at a quarter of the cost: depth in every
+  /// kPoseStride-th cell in each direction, and no normals.
   [[nodiscard]] DenseView MakeForPose(const cv::Mat& depth_m) const;
 
  private:
@@ -57,7 +56,7 @@ class DenseViewMaker {
 /// Standard deviation of one depth measurement (Nguyen et al. 2012, axial), metres; cos_incidence
 /// in (0, 1].
 [[nodiscard]] double DepthSigma(double z_m, double cos_incidence);
-/// The same in two steps, where one surface is measured many times: the first one takes longest.
+/// The same in two steps for repeated measurements of one surface; the first step is the slow one.
 [[nodiscard]] double Grazing(double cos_incidence);
 [[nodiscard]] double DepthSigmaAt(double z_m, double grazing);
 

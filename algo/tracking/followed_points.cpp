@@ -8,8 +8,9 @@
 namespace plumb {
 namespace {
 
-constexpr std::size_t kKeptPyramids = 6;  // Of keyframes; 2.3 MB each.
-constexpr double kSameBrightness = 0.08;  // Of the exposure: what KLT follows without help.
+constexpr std::size_t kKeptPyramids = 6;  // Pyramids of keyframes, 2.3 MB each.
+// Relative change of exposure that KLT tolerates without correction.
+constexpr double kSameBrightness = 0.08;
 
 }  // namespace
 
@@ -43,8 +44,8 @@ void FollowedPoints::Follow(const Pyramid& last, const GrayImage& image, const c
   }
 }
 
-// KLT; where it loses most points, once more at the new image's brightness: the exposure may have
-// changed.
+// KLT. If it loses most points, it is repeated at the new image's brightness, because the exposure
+// may have changed.
 KltResult FollowedPoints::FollowAtAnyBrightness(const Pyramid& before, const GrayImage& image,
                                                 const std::vector<Eigen::Vector2f>& from,
                                                 const std::vector<Eigen::Vector2f>& guesses,
@@ -83,7 +84,8 @@ void FollowedPoints::Reassociate(const GrayImage& image, const cv::Mat& depth_m,
           pixel.y() > intrinsics_.height - 9)
         continue;
       const double z = DepthAt(depth_m, pixel);
-      if (z > 0 && std::abs(z - p.z()) > 0.03 * z + 0.01) continue;  // Hidden, or another surface.
+      // Occluded, or another surface.
+      if (z > 0 && std::abs(z - p.z()) > 0.03 * z + 0.01) continue;
       landmarks.push_back(o.landmark);
       from.push_back(o.pixel.cast<float>());
       guesses.push_back(pixel.cast<float>());

@@ -1,4 +1,4 @@
-// The landmarks that are followed from frame to frame, and where the last frame saw them.
+// The landmarks that are tracked from frame to frame, and their pixels in the last frame.
 #pragma once
 
 #include <cstddef>
@@ -22,16 +22,16 @@ struct ActivePoint {
   Eigen::Vector2f pixel;
 };
 
-/// One image in grey levels, with its pyramid.
+/// One grey-level image with its pyramid.
 struct GrayImage {
   cv::Mat gray;
   Pyramid pyramid;
 };
 
-/// Keypoints of one tracker over its map. One thread.
+/// Tracks keypoints over the map of one tracker. Not thread-safe.
 class FollowedPoints {
  public:
-  /// @param map  Must outlive this.
+  /// @param map  Must outlive this object.
   FollowedPoints(const Intrinsics& intrinsics, TrackingMap& map)
       : intrinsics_(intrinsics), map_(map) {}
 
@@ -39,29 +39,30 @@ class FollowedPoints {
   void SetPoints(std::vector<ActivePoint> points) { active_ = std::move(points); }
   [[nodiscard]] Pyramid PyramidOf(const cv::Mat& gray) const { return MakePyramid(gray, options_); }
 
-  /// Those that KLT finds in a new image, near where the guessed pose sees them.
-  /// @param followed  Gets them, and `points` what the pose is computed of, in the same order.
+  /// Tracks the points into a new image by KLT, starting from the guessed pose.
+  /// @param followed  Receives the tracked points, and `points` the input of the pose in the same
+  ///         order.
   void Follow(const Pyramid& last, const GrayImage& image, const cv::Mat& depth_m,
               const Pose& T_world_guess, std::vector<ActivePoint>& followed,
               std::vector<PosePoint>& points) const;
 
-  /// Looks for landmarks of older keyframes that are not being followed; adds those found to
+  /// Searches for landmarks of older keyframes that are not being tracked; appends those found to
   /// points() and to `points`.
   void Reassociate(const GrayImage& image, const cv::Mat& depth_m, const Pose& T_world_color,
                    const std::vector<std::size_t>& keyframes, std::vector<PosePoint>& points);
 
-  /// A new keyframe's pyramid: Reassociate() will ask for it soon.
+  /// Stores a new keyframe's pyramid, which Reassociate() will soon use.
   void KeepPyramid(std::size_t keyframe, const Pyramid& pyramid);
 
-  /// Notes a point as seen in a keyframe.
+  /// Records the observation of a point in a keyframe.
   void AddObservation(const ActivePoint& point, MapKeyframe& keyframe);
 
-  /// Of points(), those from `first` on were found again, at `found`: the ones that fit the
-  /// keyframe's pose are seen in it, the others are dropped.
+  /// The points() from `first` on were found again at `found`: those that fit the keyframe's pose
+  /// are recorded as observed in it, the others are dropped.
   void Observe(const std::vector<PosePoint>& found, std::size_t first, MapKeyframe& keyframe);
 
-  /// Begins new landmarks at corners of a keyframe's image where none is followed.
-  /// @param index  Of the keyframe.
+  /// Creates new landmarks at corners of a keyframe's image where no landmark is tracked.
+  /// @param index  Index of the keyframe.
   void AddCorners(const GrayImage& image, const cv::Mat& depth_m, int index, MapKeyframe& keyframe);
 
  private:
@@ -77,7 +78,8 @@ class FollowedPoints {
   const KeypointOptions options_;
   TrackingMap& map_;
   std::vector<ActivePoint> active_;
-  std::deque<std::pair<std::size_t, Pyramid>> pyramids_;  // Of keyframes, used last first.
+  // Pyramids of keyframes, the last used first.
+  std::deque<std::pair<std::size_t, Pyramid>> pyramids_;
 };
 
 }  // namespace plumb

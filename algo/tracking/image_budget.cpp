@@ -7,15 +7,15 @@
 namespace plumb {
 namespace {
 
-// How unlike two views are: shares of the depth plus radians.
+// Dissimilarity of two views: distance as a fraction of the depth, plus radians.
 double Apart(const MapKeyframe& a, const MapKeyframe& b) {
   const double depth = std::clamp(a.median_depth_m, 0.4, 3.0);
   const Pose T = a.T_world_color.inverse() * b.T_world_color;
   return T.translation().norm() / depth + RotationAngle(T);
 }
 
-// The keyframe that may lose its images and whose neighbours on the way, before and after, are most
-// alike: the way stays covered without it. 0: there is none.
+// The keyframe whose images may be released and whose neighbours before and after are most alike,
+// so that the path stays covered without it. 0: there is none.
 std::size_t LeastMissed(const TrackingMap& map, const std::vector<std::size_t>& with_images) {
   std::size_t chosen = 0;
   double least = std::numeric_limits<double>::infinity();
@@ -40,8 +40,8 @@ void ReleaseImages(MapKeyframe& keyframe) {
   keyframe.features_px = {};
   keyframe.features_camera = {};
   keyframe.dense = {};
-  // Corners are measured again in the images once the tone curve is known: those that cannot be
-  // would contradict the others.
+  // Corners are measured again in the images once the tone curve is known. Corners that cannot be
+  // measured again would contradict the others.
   keyframe.data.markers = {};
 }
 

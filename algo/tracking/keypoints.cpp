@@ -19,23 +19,23 @@ std::vector<cv::Point2f> ToCv(const std::vector<Eigen::Vector2f>& points) {
   return result;
 }
 
-// Offset of the peak of a parabola through three samples around it, in [-0.5, 0.5].
+// Offset of the peak of a parabola through three samples, in [-0.5, 0.5].
 float PeakOffset(float before, float at, float after) {
   const float curvature = before - 2 * at + after;
   return curvature < 0 ? std::clamp(0.5F * (before - after) / curvature, -0.5F, 0.5F) : 0.0F;
 }
 
-// The best corner of each cell of a run of cells in a row, if it is good enough.
+// The best corner in each cell of a run of cells in a row, if it is good enough.
 void AddBestOfCells(const cv::Mat& gray, const cv::Rect& run, int cell,
                     const KeypointOptions& options, std::vector<Eigen::Vector2f>& corners) {
   constexpr int kBlock = 5;
-  constexpr int kAround = kBlock / 2 + 2;  // Pixels that the score of a pixel and its neighbours'
-                                           // need beside gradients.
+  // Margin in pixels around a pixel for its score and its neighbours' scores.
+  constexpr int kAround = kBlock / 2 + 2;
   const cv::Rect seen(run.x - kAround, run.y - kAround, run.width + 2 * kAround,
                       run.height + 2 * kAround);
   cv::Mat score;
   cv::cornerMinEigenVal(gray(seen), score, kBlock, 3);
-  // It sums, over its 5x5 block, squares of Sobel gradients (8 times the gradient) scaled by
+  // The score sums, over its 5x5 block, squares of Sobel gradients (8 times the gradient) scaled by
   // 1 / (255 * 4 * 5).
   const auto threshold = static_cast<float>(options.min_quality * 25.0 * 64.0 / (5100.0 * 5100.0));
   const auto at = [&](int y, int x) { return score.at<float>(y - seen.y, x - seen.x); };
@@ -147,7 +147,7 @@ KltResult TrackKlt(const Pyramid& from, const Pyramid& to,
   const float height = static_cast<float>(to[0].rows);
   for (std::size_t i = 0; i < points.size(); ++i) {
     result.points[i] = {end[i].x, end[i].y};
-    // The error is the mean absolute difference of the patches, grey levels.
+    // The error is the mean absolute difference of the patches in grey levels.
     result.found[i] = status[i] != 0 && error[i] < 20.0F && end[i].x > 3 && end[i].y > 3 &&
                       end[i].x < width - 4 && end[i].y < height - 4;
   }
@@ -170,9 +170,11 @@ double DepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel) {
 }
 
 SurfaceDepth SurfaceDepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel) {
-  constexpr int kReach = 2;            // Pixels each way that the plane is fitted to.
-  constexpr int kEdgeReach = 6;        // That must lie on it: most of what a track's window covers.
-  constexpr double kTolerance = 0.01;  // Of inverse depth: relief and one part of the noise,
+  constexpr int kReach = 2;  // Half-width in pixels of the window for the plane fit.
+  // Half-width in which the depth must lie on the plane; most of a track's window.
+  constexpr int kEdgeReach = 6;
+  // Tolerance of inverse depth for relief and one part of the noise,
+  constexpr double kTolerance = 0.01;
   constexpr double kTolerancePerM = 0.005;  // which grows with depth.
   const int x = static_cast<int>(std::lround(pixel.x()));
   const int y = static_cast<int>(std::lround(pixel.y()));

@@ -1,4 +1,4 @@
-// Natural keypoints: where to start them, how to follow them, how to recognise them again.
+// Natural keypoints: detection, tracking and recognition.
 #pragma once
 
 #include <array>
@@ -11,34 +11,34 @@
 
 namespace plumb {
 
-/// Image pyramid for KLT, as OpenCV lays it out.
+/// Image pyramid for KLT in OpenCV's layout.
 using Pyramid = std::vector<cv::Mat>;
 
 struct KeypointOptions {
-  int cell_px = 32;  ///< At 640 pixels image width: one corner a cell at most, so that they spread
-                     ///< over the image.
+  /// At 640 pixels image width; at most one corner per cell, so that corners spread over the image.
+  int cell_px = 32;
   int window_px = 15;  ///< KLT window.
   int levels = 3;      ///< KLT pyramid levels above the base.
-  double min_quality =
-      4.0;  ///< Smaller eigenvalue of the structure tensor, (grey levels a pixel)^2.
+  /// Minimum of the smaller eigenvalue of the structure tensor, (grey levels per pixel)^2.
+  double min_quality = 4.0;
 };
 
 [[nodiscard]] Pyramid MakePyramid(const cv::Mat& gray, const KeypointOptions& options);
 
-/// New corners (Shi-Tomasi, sub-pixel by the peak of the score) in cells that hold none of
-/// `occupied`, best first in each cell.
+/// New corners (Shi-Tomasi, sub-pixel by the peak of the score) in cells that contain none of
+/// `occupied`, the best first in each cell.
 [[nodiscard]] std::vector<Eigen::Vector2f> DetectCorners(
     const cv::Mat& gray, const std::vector<Eigen::Vector2f>& occupied,
     const KeypointOptions& options);
 
-/// How much brighter an image shows the same places than another: the median over the points of the
-/// ratio of the mean grey levels around them; 1 with too few points to decide. Automatic exposure
-/// changes it.
+/// Brightness of an image relative to another at the same places: the median over the points of the
+/// ratio of the mean grey levels around them, or 1 with too few points. Automatic exposure changes
+/// it.
 [[nodiscard]] double BrightnessRatio(const cv::Mat& from, const cv::Mat& to,
                                      const std::vector<Eigen::Vector2f>& points,
                                      const std::vector<Eigen::Vector2f>& guesses);
 
-/// Follows points from one image to another; `found[i]` false where the patch was lost or looks
+/// Tracks points from one image to another; `found[i]` is false where the patch was lost or looks
 /// different.
 struct KltResult {
   std::vector<Eigen::Vector2f> points;
@@ -49,25 +49,26 @@ struct KltResult {
                                  const std::vector<Eigen::Vector2f>& guesses, int max_level,
                                  const KeypointOptions& options);
 
-/// Depth at a pixel: the median of its 3x3 neighbours, 0 at edges and holes.
+/// Depth at a pixel: the median of its 3x3 neighbours; 0 at edges and holes.
 [[nodiscard]] double DepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel);
 
-/// Depth at a pixel, and the plane about it.
+/// Depth at a pixel with the slope of the plane around it.
 struct SurfaceDepth {
   double z_m = 0.0;
-  /// Of the inverse depth, which is linear in the pixel on a plane: 1/m per pixel right and down.
+  /// Slope of the inverse depth, which is linear in the pixel on a plane: 1/m per pixel right and
+  /// down.
   Eigen::Vector2d inverse_slope = Eigen::Vector2d::Zero();
 };
-/// The same to be measured with: that of the plane through the 5x5 neighbours, and 0 too where the
-/// surface about them is no plane, since a track whose window covers an edge follows neither side.
-/// The slope is that of the plane through all 13x13 pixels that must agree with it.
+/// The same for measurements: the depth of the plane through the 5x5 neighbours, and 0 also where
+/// the surface around them is not a plane, because a track whose window covers an edge follows
+/// neither side. The slope is that of the plane through all 13x13 pixels, which must agree with it.
 [[nodiscard]] SurfaceDepth SurfaceDepthAt(const cv::Mat& depth_m, const Eigen::Vector2d& pixel);
 
 /// ORB features with depth, for relocalisation.
 struct DescribedFeatures {
   std::vector<Eigen::Vector2f> pixels;
   std::vector<Eigen::Vector3f> in_camera;  ///< Metres.
-  cv::Mat descriptors;                     ///< CV_8UC1, 32 columns, a row a feature.
+  cv::Mat descriptors;                     ///< CV_8UC1, 32 columns, one row per feature.
 };
 [[nodiscard]] DescribedFeatures DescribeFeatures(const cv::Mat& gray, const cv::Mat& depth_m,
                                                  const Intrinsics& intrinsics);

@@ -17,21 +17,21 @@ using Matrix3x6d = Eigen::Matrix<double, 3, 6>;
 using Matrix6x3d = Eigen::Matrix<double, 6, 3>;
 
 constexpr double kNearestPoint_m =
-    0.02;  // In front of the camera; nearer, projections mean nothing.
-constexpr double kKeypointLossScale = 2.0;  // Cauchy, in standard deviations.
+    0.02;  // Smallest depth in front of the camera for which projections are computed.
+constexpr double kKeypointLossScale = 2.0;  // Cauchy scale in standard deviations.
 constexpr double kCornerLossScale = 3.0;
 
-// A keypoint's observation, in what the residuals need. Grouped by landmark.
+// A keypoint's observation with what the residuals use. Grouped by landmark.
 struct PointView {
   int keyframe = 0;       // Index in the map.
   Eigen::Vector2d ideal;  // Undistorted.
-  double z_m = 0;         // 0: none.
+  double z_m = 0;         // 0 without depth.
   double weight_z = 0;    // 1 / standard deviation.
 };
 
 struct CornerView {
   int keyframe = 0;
-  int marker = 0;  // Slot.
+  int marker = 0;  // Slot of the marker.
   Eigen::Vector3d in_marker;
   Eigen::Vector2d ideal;
   double weight = 0;
@@ -98,8 +98,8 @@ class LocalBundle {
 
  private:
   struct State {
-    std::vector<Pose> T_camera_world;  // Of every keyframe; those that stay never change.
-    std::vector<Pose> T_world_marker;  // One a slot.
+    std::vector<Pose> T_camera_world;  // One per keyframe; fixed ones never change.
+    std::vector<Pose> T_world_marker;  // One per slot.
     std::vector<Eigen::Vector3d> landmarks;
   };
 
@@ -109,7 +109,7 @@ class LocalBundle {
       for (const KeypointObservation& o : map_.keyframes[static_cast<std::size_t>(k)].keypoints) {
         const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
         int& s = slot[static_cast<std::size_t>(o.landmark)];
-        // One seen only once constrains nothing.
+        // A landmark with only one observation constrains nothing.
         if (s >= 0 || !landmark.usable || landmark.num_observations < 2) continue;
         s = static_cast<int>(landmarks_.size());
         landmarks_.push_back(o.landmark);
@@ -178,7 +178,7 @@ class LocalBundle {
       map_.landmarks[static_cast<std::size_t>(landmarks_[s])].p_world = state.landmarks[s];
   }
 
-  // Depth of a point of the camera at its depth stamp, `dt` after the colour stamp: row 2 of p - dt
+  // Depth of a point in the camera at its depth stamp, `dt` after the colour stamp: row 2 of p - dt
   // (w x p + v).
   [[nodiscard]] double DepthAtStamp(const MapKeyframe& keyframe, const Eigen::Vector3d& p) const {
     const double dt_s = keyframe.data.depth_time_s - keyframe.data.color_time_s;
@@ -214,12 +214,12 @@ class LocalBundle {
     return cost;
   }
 
-  // What one landmark adds: its own 3x3 system, and its coupling to each free keyframe that sees
-  // it.
+  // Contribution of one landmark: its own 3x3 system and its coupling to each free keyframe that
+  // observes it.
   struct PointSystem {
     Eigen::Matrix3d V = Eigen::Matrix3d::Zero();
     Eigen::Vector3d g = Eigen::Vector3d::Zero();
-    std::vector<std::pair<int, Matrix6x3d>> W;  // Pose slot.
+    std::vector<std::pair<int, Matrix6x3d>> W;  // By pose slot.
   };
 
   // Normal equations of the poses and markers (H, g) and of one landmark.
@@ -284,8 +284,8 @@ class LocalBundle {
     g.segment<6>(6 * slot).noalias() += J_pose.transpose() * r;
   }
 
-  // One damped Gauss-Newton step from `state` to `next`; only the lower half of H is kept. False if
-  // it cannot be solved.
+  // One damped Gauss-Newton step from `state` to `next`; only the lower half of H is used. False if
+  // the system cannot be solved.
   bool Step(const State& state, double damping, State& next) const {
     const int size = 6 * (num_poses_ + static_cast<int>(markers_.size()));
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(size, size);
@@ -333,11 +333,11 @@ class LocalBundle {
   const LocalBundleOptions& options_;
   TrackingMap& map_;
   int num_poses_ = 0;
-  std::vector<int> slot_of_keyframe_;  // -1: stays.
-  double weight_px_ = 0;               // Focal length / standard deviation of a keypoint.
+  std::vector<int> slot_of_keyframe_;  // -1 if the keyframe is fixed.
+  double weight_px_ = 0;               // Focal length over the standard deviation of a keypoint.
   std::vector<int> landmarks_;         // Ids in the map.
   std::vector<int> markers_;
-  std::vector<std::size_t> first_view_;  // Of each landmark in `views_`, and the end.
+  std::vector<std::size_t> first_view_;  // First entry of each landmark in `views_`, plus the end.
   std::vector<PointView> views_;
   std::vector<CornerView> corners_;
 };

@@ -1,4 +1,5 @@
-// Bundle adjustment of the newest keyframes while sweeping: small, dense, at the sensor's word.
+// Bundle adjustment of the newest keyframes during the sweep: small, dense, with the stated
+// calibration.
 #pragma once
 
 #include <vector>
@@ -9,14 +10,16 @@
 namespace plumb {
 
 struct LocalBundleOptions {
-  std::vector<int> free_keyframes;  ///< To move, ascending; every other keyframe that shares their
-                                    ///< landmarks or markers stays.
+  /// Keyframes to move, ascending; every other keyframe that shares their landmarks or markers is
+  /// fixed.
+  std::vector<int> free_keyframes;
   int max_iterations = 4;
-  double min_relative_decrease = 1e-3;  ///< Of the cost; an iteration that gains less is the last.
-  double keypoint_sigma_px = 0.6;       ///< At 640 columns.
+  /// Relative decrease of the cost below which an iteration is the last one.
+  double min_relative_decrease = 1e-3;
+  double keypoint_sigma_px = 0.6;  ///< In pixels at 640 columns.
   double keypoint_depth_sigmas =
-      1.5;  ///< Standard deviation of a keypoint's depth, in those of the noise model.
-  double min_corner_sigma_px = 0.3;  ///< At 640 columns.
+      1.5;  ///< Standard deviation of a keypoint's depth relative to the noise model.
+  double min_corner_sigma_px = 0.3;  ///< In pixels at 640 columns.
   double marker_length_m = 0.104;
 };
 
@@ -27,13 +30,13 @@ struct LocalBundleSummary {
   double final_cost = 0;
 };
 
-/// Moves the free keyframes, the landmarks and the markers that they see, in place, to a smaller
-/// robust cost: keypoints' pixels and depths, marker corners' pixels. The calibration stays as
+/// Moves the free keyframes and the landmarks and markers that they observe, in place, to a smaller
+/// robust cost of keypoint pixels and depths and marker corner pixels. The calibration stays as
 /// stated; BundleAdjust() is for the whole map and the calibration.
 ///
-/// Levenberg-Marquardt with the landmarks eliminated (Schur complement) and Cauchy weights. One
-/// thread, deterministic. A map in which the free keyframes see nothing, or a system that cannot be
-/// solved, is left as it is.
+/// Levenberg-Marquardt with eliminated landmarks (Schur complement) and Cauchy weights.
+/// Single-threaded and deterministic. The map is left unchanged if the free keyframes observe
+/// nothing or the system cannot be solved.
 LocalBundleSummary AdjustLocalMap(const Intrinsics& intrinsics, const LocalBundleOptions& options,
                                   TrackingMap& map);
 

@@ -11,19 +11,22 @@ namespace plumb {
 namespace {
 
 constexpr int kMaxCandidates = 4;
-constexpr int kSharedEnough = 10;  // Landmarks in common: the keyframes know of each other.
-constexpr int kCovisible = 15;     // Landmarks in common: a constraint.
+// Common landmarks above which keyframes count as already covisible.
+constexpr int kSharedEnough = 10;
+constexpr int kCovisible = 15;  // Common landmarks that form a constraint.
 constexpr double kViewReach =
-    0.7;  // As far apart as two views may be: shares of the depth plus radians.
-constexpr double kDrift_m = 0.30;  // Believed on any way, and on each metre of it.
+    0.7;  // Largest distance of two views: fraction of the depth plus radians.
+// Largest plausible drift: a constant, and the same per metre travelled.
+constexpr double kDrift_m = 0.30;
 constexpr double kDriftPerMetre = 0.05;
 constexpr double kTurn_rad = 0.30;
 constexpr double kTurnPerMetre = 0.03;  // Radians.
 constexpr int kMaxRounds = 15;
-constexpr double kLinkSigma_m = 0.002;  // All links alike: only the ratio of these two counts.
+// The same for all links; only the ratio of these two matters.
+constexpr double kLinkSigma_m = 0.002;
 constexpr double kLinkSigma_rad = 0.001;
 
-// Length of the way of the camera from each keyframe to the newest.
+// Length of the camera path from each keyframe to the newest.
 std::vector<double> WayToNewest(const TrackingMap& map) {
   std::vector<double> way(map.keyframes.size(), 0.0);
   for (std::size_t k = map.keyframes.size() - 1; k-- > 0;)
@@ -37,7 +40,7 @@ DriftBound BoundOf(double way_m) {
   return {kDrift_m + kDriftPerMetre * way_m, kTurn_rad + kTurnPerMetre * way_m};
 }
 
-// Landmarks that the newest keyframe shares with each.
+// Number of landmarks that the newest keyframe shares with each other keyframe.
 std::vector<int> SharedWithNewest(const TrackingMap& map) {
   std::vector<bool> seen(map.landmarks.size(), false);
   for (const KeypointObservation& o : map.keyframes.back().keypoints)
@@ -51,8 +54,8 @@ std::vector<int> SharedWithNewest(const TrackingMap& map) {
   return shared;
 }
 
-// What holds the map together now: each keyframe's link to the one it followed and to those with
-// landmarks in common.
+// The present constraints of the map: each keyframe's link to its predecessor and to the keyframes
+// with common landmarks.
 std::vector<KeyframeLink> LinksOf(const TrackingMap& map) {
   std::vector<std::vector<int>> seen_by(map.landmarks.size());
   for (std::size_t k = 0; k < map.keyframes.size(); ++k)
@@ -75,8 +78,8 @@ std::vector<KeyframeLink> LinksOf(const TrackingMap& map) {
   return links;
 }
 
-// Gauss-Newton; the first pose stays. False if the system cannot be solved; the poses are as they
-// were then.
+// Gauss-Newton with the first pose fixed. False if the system cannot be solved; the poses are then
+// unchanged.
 bool SolvePoseGraph(const std::vector<KeyframeLink>& links, std::vector<Pose>& T_world) {
   const auto size = static_cast<Eigen::Index>(6 * T_world.size());
   std::vector<Pose> T = T_world;
@@ -98,7 +101,7 @@ bool SolvePoseGraph(const std::vector<KeyframeLink>& links, std::vector<Pose>& T
       gradient.segment<6>(6 * link.a) += equations.g.head<6>();
       gradient.segment<6>(6 * link.b) += equations.g.tail<6>();
     }
-    // Holds the first pose, and those that nothing links.
+    // Fixes the first pose and all poses without a link.
     for (int i = 0; i < size; ++i) entries.emplace_back(i, i, i < 6 ? 1e12 : 1.0);
     Eigen::SparseMatrix<double> H(size, size);
     H.setFromTriplets(entries.begin(), entries.end());
@@ -132,7 +135,7 @@ std::vector<int> LoopCandidates(const TrackingMap& map) {
     const double depth = std::clamp(map.keyframes[i].median_depth_m, 0.4, 3.0);
     const double apart = std::max(0.0, T.translation().norm() - drift.translation_m) / depth +
                          std::max(0.0, RotationAngle(T) - drift.rotation_rad);
-    // Among those within reach, the ones that would see most alike without any drift.
+    // Among those within reach, the ones whose views would overlap most without drift.
     if (apart < kViewReach) near.emplace_back(T.translation().norm() / depth + RotationAngle(T), k);
   }
   std::sort(near.begin(), near.end());
@@ -157,7 +160,7 @@ void DistributeLoopError(const std::vector<KeyframeLink>& links, TrackingMap& ma
   for (const MapKeyframe& keyframe : map.keyframes) T_world.push_back(keyframe.T_world_color);
   if (!SolvePoseGraph(all, T_world)) return;
 
-  std::vector<Pose> T_new_old;  // World.
+  std::vector<Pose> T_new_old;  // In the world frame.
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
     T_new_old.push_back(T_world[k] * map.keyframes[k].T_world_color.inverse());
     map.keyframes[k].T_world_color = T_world[k];

@@ -1,4 +1,4 @@
-// The tracker's map: keyframes, landmarks, markers. Its world is the first keyframe's colour
+// The tracker's map: keyframes, landmarks, markers. Its world frame is the first keyframe's colour
 // camera.
 #pragma once
 
@@ -18,38 +18,39 @@ namespace plumb {
 struct Landmark {
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
   int first_keyframe = 0;
-  int num_observations = 0;  ///< In keyframes.
-  int num_rejections = 0;    ///< Times that a pose found it off.
+  int num_observations = 0;  ///< Observations in keyframes.
+  int num_rejections = 0;    ///< Number of poses for which it was an outlier.
   bool usable = true;
 };
 
-/// A landmark seen in a keyframe.
+/// Observation of a landmark in a keyframe.
 struct KeypointObservation {
   int landmark = 0;
-  Eigen::Vector2d pixel;  ///< As seen (distorted).
-  double z_m = 0.0;       ///< Depth there; 0: none, or an edge.
-  /// Slope of the inverse depth about it, 1/m per pixel to the right and down.
+  Eigen::Vector2d pixel;  ///< As observed (distorted).
+  double z_m = 0.0;       ///< Depth at the pixel; 0 without depth or at an edge.
+  /// Slope of the inverse depth around it, 1/m per pixel right and down.
   Eigen::Vector2d inverse_depth_slope = Eigen::Vector2d::Zero();
 };
 
-/// A keyframe of the map. `data.view.T_world_camera` (depth time) follows T_world_color: see
+/// A keyframe of the map. `data.view.T_world_camera` (at depth time) follows T_world_color: see
 /// DepthPose().
 struct MapKeyframe {
   Keyframe data;
   Pose T_world_color = Pose::Identity();  ///< At the colour stamp.
   Vector6d velocity_per_s =
       Vector6d::Zero();  ///< Twist in the camera frame: T(t0 + dt) = T(t0) * PoseFromTwist(v dt).
-  int previous = -1;     ///< The keyframe that it was tracked against, or -1.
-  Pose T_previous_color = Pose::Identity();  ///< Its camera in that one's, as tracked.
+  int previous = -1;     ///< The keyframe against which it was tracked, or -1.
+  /// Its camera in the camera of `previous`, as tracked.
+  Pose T_previous_color = Pose::Identity();
   std::vector<KeypointObservation> keypoints;
   DenseView dense;
-  double median_depth_m = 1.0;                   ///< Of the dense view.
-  cv::Mat gray;                                  ///< CV_8UC1.
-  bool is_bare = false;                          ///< Its images were given up, see BoundImages().
-  std::vector<Eigen::Vector2f> features_px;      ///< For relocalisation, once it is asked for:
-                                                 ///< keypoints with a descriptor and depth.
+  double median_depth_m = 1.0;  ///< Median of the dense view.
+  cv::Mat gray;                 ///< CV_8UC1.
+  bool is_bare = false;         ///< Its images were released, see BoundImages().
+  /// For relocalisation, computed on demand: keypoints with a descriptor and depth.
+  std::vector<Eigen::Vector2f> features_px;
   std::vector<Eigen::Vector3f> features_camera;  ///< The same in the camera frame, metres.
-  cv::Mat descriptors;  ///< One ORB descriptor a row, for each of the features.
+  cv::Mat descriptors;  ///< One ORB descriptor per row, for each of the features.
 };
 
 /// Camera pose `dt_s` after the colour stamp under the keyframe's velocity.
@@ -58,12 +59,13 @@ struct MapKeyframe {
   return T_world_color * PoseFromTwist(velocity_per_s * dt_s);
 }
 
-/// A marker of the map, as a rigid square of known side.
+/// A marker of the map as a rigid square with a known side.
 struct MapMarker {
   Pose T_world_marker = Pose::Identity();
-  int num_views = 0;   ///< Keyframes that show it.
-  int num_frames = 0;  ///< Tracked frames, keyframes or not, that agree on all its corners; the one
-                       ///< that began the map counts.
+  int num_views = 0;  ///< Keyframes that show it.
+  /// Tracked frames, keyframes or not, that agree on all its corners, including the frame that
+  /// started the map.
+  int num_frames = 0;
 };
 
 struct TrackingMap {
@@ -72,8 +74,8 @@ struct TrackingMap {
   std::map<int, MapMarker> markers;
 };
 
-/// Whether enough landmarks that others see too, or a marker, hold the keyframe: if not (a blank
-/// wall), bundle adjustment would let it slide, and tracking's word counts.
+/// Whether enough shared landmarks or a marker constrain the keyframe. If not (a blank wall),
+/// bundle adjustment would let it slide, and its tracked pose is used as a constraint.
 [[nodiscard]] inline bool IsConstrained(const TrackingMap& map, const MapKeyframe& keyframe) {
   constexpr int kEnough = 30;
   int shared = 0;

@@ -10,14 +10,14 @@
 namespace plumb {
 namespace {
 
-constexpr double kPointGate = 3.0;  // Residuals in sigmas: beyond, a point is an outlier.
+constexpr double kPointGate = 3.0;  // Residual in sigmas above which a point is an outlier.
 
 // Normal equations of a twist applied on the camera's side: T <- T * PoseFromTwist(x).
 struct NormalEquations {
   Matrix6d H = Matrix6d::Zero();
   Vector6d g = Vector6d::Zero();
 
-  // Only the lower half of H: no more is read of it.
+  // Only the lower half of H is filled and used.
   void Add(const Vector6d& J, double residual, double weight) {
     for (int column = 0; column < 6; ++column)
       for (int row = column; row < 6; ++row) H(row, column) += weight * J[row] * J[column];
@@ -25,7 +25,7 @@ struct NormalEquations {
   }
 };
 
-constexpr double kLossScale = 2.0;  // Cauchy, in standard deviations.
+constexpr double kLossScale = 2.0;  // Cauchy scale in standard deviations.
 
 double WeightOf(double residual_in_sigmas) {
   return CauchyWeight(residual_in_sigmas * residual_in_sigmas, kLossScale);
@@ -59,7 +59,7 @@ struct DenseSum {
   int valid = 0;
 };
 
-// How steeply the target's cells are looked at, found when first needed: < 0 before.
+// Cosine of incidence for the target's cells, computed on first use; < 0 before.
 using GrazingOfCells = std::vector<double>;
 
 double GrazingOf(const DenseView& target, std::size_t cell, GrazingOfCells& known) {
@@ -136,7 +136,7 @@ PoseEstimate OptimizePose(const PoseProblem& problem, const Pose& T_world_camera
       gate_m = std::max(0.02, gate_m * 0.7);
     }
     estimate.information = equations.H.selfadjointView<Eigen::Lower>();
-    // A whisper of damping keeps directions that nothing constrains where the prediction put them.
+    // Slight damping keeps unconstrained directions at the prediction.
     Matrix6d damped = equations.H;
     damped.diagonal().array() += 1e-3 + 1e-6 * equations.H.diagonal().array();
     const Vector6d step = -damped.ldlt().solve(equations.g);

@@ -35,7 +35,7 @@ double ReprojectionRms(const Pose& T_camera_points, const std::vector<cv::Point3
   return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-// Mean distance between a marker's plane and the depth measured inside it; nothing without enough
+// Mean distance between a marker's plane and the depth measured on it; nothing with too little
 // depth.
 std::optional<double> DepthMisfit(const Intrinsics& intrinsics, const Pose& T_camera_marker,
                                   double length_m, const cv::Mat& depth_m) {
@@ -93,7 +93,7 @@ std::optional<Pose> MarkerPoseInCamera(const Intrinsics& intrinsics, double mark
   if ((error[0] + floor) > 3.0 * (error[1] + floor)) return candidates[1];
   if (misfit0 && misfit1 && std::max(*misfit0, *misfit1) > 1.5 * std::min(*misfit0, *misfit1))
     return *misfit0 < *misfit1 ? candidates[0] : candidates[1];
-  // Two poses that differ by little are no ambiguity.
+  // Two poses that differ little are not ambiguous.
   if (RotationAngle(candidates[0].inverse() * candidates[1]) < 0.15)
     return error[0] <= error[1] ? candidates[0] : candidates[1];
   return std::nullopt;
@@ -103,7 +103,7 @@ int NearestKeyframe(const TrackingMap& map, const Pose& T_world_color) {
   int best = 0;
   double best_distance = 1e300;
   for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
-    if (map.keyframes[k].is_bare) continue;  // Nothing to be tracked against.
+    if (map.keyframes[k].is_bare) continue;  // It has no images to track against.
     const double d = Distance(map.keyframes[k].T_world_color, T_world_color);
     if (d < best_distance) {
       best_distance = d;

@@ -1,4 +1,4 @@
-// Finds the camera again after loss, by known markers or by descriptors.
+// Finds the camera again after tracking was lost, by known markers or by descriptors.
 #pragma once
 
 #include <optional>
@@ -9,24 +9,23 @@
 
 namespace plumb {
 
-inline constexpr int kBeyondDoubt = 60;  ///< So many features that agree end a search.
+inline constexpr int kBeyondDoubt = 60;  ///< Number of agreeing features that ends a search.
 
 struct Relocalization {
   Pose T_world_color = Pose::Identity();
-  int keyframe = 0;     ///< The nearest keyframe, for tracking against.
+  int keyframe = 0;     ///< The nearest keyframe, to track against.
   int num_inliers = 0;  ///< Corners or features that agree.
 };
 
-/// By the markers that the map knows: all their corners together; a lone marker only when depth
-/// settles its two poses.
+/// Uses all corners of the markers in the map together. A single marker is used only if depth
+/// resolves its two possible poses.
 [[nodiscard]] std::optional<Relocalization> RelocalizeByMarkers(
     const TrackingMap& map, const Intrinsics& intrinsics, double marker_length_m,
     const std::vector<MarkerObservation>& markers, const cv::Mat& depth_m);
 
-/// By ORB features with depth: nearest in Hamming distance in each keyframe, three-point rigid
-/// fits, best consensus.
-/// @param keyframes  Those to compare with, in this order; one that leaves no doubt ends the
-/// search.
+/// Uses ORB features with depth: nearest neighbours in Hamming distance in each keyframe,
+/// three-point rigid fits, best consensus.
+/// @param keyframes  Keyframes to compare with, in this order; an unambiguous one ends the search.
 [[nodiscard]] std::optional<Relocalization> RelocalizeByFeatures(const TrackingMap& map,
                                                                  const Intrinsics& intrinsics,
                                                                  const DescribedFeatures& features,
@@ -37,14 +36,14 @@ struct Relocalization {
                                                                  const DescribedFeatures& features);
 
 /// Pose of one marker in the camera frame from its four corners. A square has two candidate poses;
-/// the depth inside it decides between them, or else a clear difference in reprojection error.
-/// Returns nothing if neither decides.
+/// the depth on it decides between them, or a clear difference in reprojection error. Returns
+/// nothing if neither decides.
 [[nodiscard]] std::optional<Pose> MarkerPoseInCamera(const Intrinsics& intrinsics,
                                                      double marker_length_m,
                                                      const MarkerObservation& marker,
                                                      const cv::Mat& depth_m);
 
-/// Index of the keyframe whose camera is nearest to a pose (metres plus 0.5 m a radian).
+/// Index of the keyframe whose camera is nearest to a pose (metres plus 0.5 m per radian).
 [[nodiscard]] int NearestKeyframe(const TrackingMap& map, const Pose& T_world_color);
 
 }  // namespace plumb

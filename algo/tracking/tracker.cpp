@@ -20,28 +20,30 @@
 namespace plumb {
 namespace {
 
-constexpr double kMaxSpeed = 2.5;  // Metres a second that a hand moves a sensor at the very most.
-constexpr double kMaxTurn = 4.0;   // Radians a second.
+// Largest plausible speed of a hand-held sensor, metres per second.
+constexpr double kMaxSpeed = 2.5;
+constexpr double kMaxTurn = 4.0;  // Radians per second.
 constexpr std::size_t kReassociated =
-    3;  // Older keyframes whose landmarks are looked for in a new keyframe.
-constexpr double kDriftFollowed_m = 0.003;  // A drift that bundle adjustment takes out by itself,
-                                            // once the old landmarks are seen again.
+    3;  // Older keyframes whose landmarks are searched in a new keyframe.
+// Drift up to which bundle adjustment corrects the map without loop closure, once the old landmarks
+// are observed again.
+constexpr double kDriftFollowed_m = 0.003;
 constexpr double kDriftFollowed_rad = 0.001;
-// Keyframes after one that looked like no older one which are not compared: what comes into view
-// stays for more, and a comparison costs as much as tracking a frame.
+// Keyframes not compared after one that matched no older keyframe: a scene in view stays for
+// several keyframes, and a comparison costs as much as tracking a frame.
 constexpr int kLongestLoopPause = 2;
 constexpr int kLoopInliers =
-    30;  // Features, and keypoints after them, that must agree on a place seen before.
+    30;  // Features, and keypoints after them, that must agree to recognise a place.
 
-// What is made of one frame's images before its pose is known.
+// Data computed from one frame's images before its pose is known.
 struct FrameData {
   GrayImage image;
-  DenseView dense;  // For the pose only.
+  DenseView dense;  // Used for the pose only.
   std::vector<MarkerObservation> markers;
-  bool has_all_markers = false;  // Else only those about where the map's were expected.
+  bool has_all_markers = false;  // False: only markers near their expected positions were searched.
 };
 
-// Of a view's usable cells, metres; 1 where there is none.
+// Median of a view's usable cells, metres; 1 without any.
 double MedianDepth(const DenseView& view) {
   std::vector<float> z;
   for (const float value : view.z_m)
@@ -64,16 +66,16 @@ struct Tracker::Impl {
 
   Pyramid last_pyramid;
   FollowedPoints followed_points;
-  int reference = -1;               // Keyframe that frames are tracked against.
-  std::size_t reference_count = 0;  // Active points when that keyframe was made.
+  int reference = -1;               // Keyframe against which frames are tracked.
+  std::size_t reference_count = 0;  // Active points when that keyframe was created.
   Pose T_world_last = Pose::Identity();
   double last_time_s = 0;
   Vector6d velocity = Vector6d::Zero();
   bool lost = true;
-  bool keyframe_wanted = false;  // After a relocalisation.
+  bool keyframe_wanted = false;  // Set after a relocalisation.
   std::vector<KeyframeLink> loops;
-  int num_unlike = 0;  // Keyframes in a row that looked like no older one.
-  int loop_pause = 0;  // Keyframes that are not compared with older ones.
+  int num_unlike = 0;  // Consecutive keyframes that matched no older one.
+  int loop_pause = 0;  // Keyframes left to skip before the next comparison with older ones.
 
   Impl(const StreamInfo& stream, const TrackerOptions& tracker_options)
       : info(stream),
@@ -101,8 +103,8 @@ struct Tracker::Impl {
     return prepared;
   }
 
-  // While the camera is followed only markers of the map take part in its pose, and about where
-  // they are is known. New ones are looked for in keyframes.
+  // While tracking, only markers of the map take part in the pose, and their approximate positions
+  // are known. New ones are searched in keyframes.
   void FindMarkers(const Frame& frame, FrameData& prepared) const {
     if (!detector) return;
     if (lost || map.keyframes.empty() || NeedsKeyframe(PredictedPose(frame))) {
@@ -132,7 +134,7 @@ struct Tracker::Impl {
     prepared.has_all_markers = true;
   }
 
-  // By the velocity of the last frame.
+  // Predicted with the velocity of the last frame.
   [[nodiscard]] Pose PredictedPose(const Frame& frame) const {
     return PoseAfter(T_world_last, velocity, std::min(frame.color_time_s - last_time_s, 0.3));
   }
@@ -144,7 +146,7 @@ struct Tracker::Impl {
     result.color_time_s = frame.color_time_s;
     result.depth_time_s = frame.depth_time_s;
     if (map.keyframes.empty()) {
-      // A world that began with an empty image would never be found again.
+      // A map that starts with an empty image could never be found again.
       if (ShowsSomething(prepared)) {
         MakeKeyframe(frame, prepared, Pose::Identity(), result);
         result.tracked = true;
@@ -186,7 +188,8 @@ struct Tracker::Impl {
         PosePoint point;
         point.p_world = known->second.T_world_marker * in_marker[i];
         point.ideal = Undistort(info.intrinsics, m.corners[i]);
-        // Half a pixel: the map's own error and the rolling shutter, beside the detector's.
+        // Half a pixel for the error of the map and the rolling shutter, in addition to the
+        // detector's.
         point.sigma = std::hypot(m.sigma_px[i], 0.5 * SigmaPx()) / info.intrinsics.fx;
         points.push_back(point);
       }
@@ -211,8 +214,8 @@ struct Tracker::Impl {
                      keyframe.data.depth_time_s - keyframe.data.color_time_s);
   }
 
-  // True if the estimate is one to build on: enough agrees, all six directions are held, and no
-  // hand moves so fast.
+  // True if the estimate is reliable: enough inliers, all six directions constrained, and a
+  // plausible speed for a hand.
   [[nodiscard]] bool Plausible(const PoseEstimate& estimate, std::size_t num_points,
                                double dt_s) const {
     const double share =
@@ -223,7 +226,7 @@ struct Tracker::Impl {
     const bool by_depth =
         estimate.num_dense > 600 && estimate.dense_overlap > 0.4 && estimate.dense_rms_m < 0.012;
     if (!by_points && !by_markers && !by_depth) return false;
-    // Depth that contradicts what few points say: a pose on a wrong start.
+    // Depth that contradicts a pose from few points: the start was wrong.
     if (!by_points && estimate.num_dense > 0 && estimate.dense_overlap < 0.25) return false;
     const Matrix6d covariance = estimate.information.ldlt().solve(Matrix6d::Identity());
     const double rotation_rad = std::sqrt(std::max(0.0, covariance.topLeftCorner<3, 3>().trace()));
@@ -240,7 +243,7 @@ struct Tracker::Impl {
                                           TrackedFrame& result) {
     const double dt = frame.color_time_s - last_time_s;
     const double dt_depth = frame.depth_time_s - frame.color_time_s;
-    // The constant-velocity guess first; if that fails (a jerk), the last pose.
+    // Starts from constant velocity; if that fails (a jerk), from the last pose.
     const std::array<Pose, 2> guesses = {PredictedPose(frame), T_world_last};
     for (const Pose& T_guess : guesses) {
       PoseProblem problem = MakeProblem(prepared, dt_depth);
@@ -269,8 +272,8 @@ struct Tracker::Impl {
     return std::nullopt;
   }
 
-  // Those whose corners all agree with the pose; their points are the estimate's first, as
-  // AddMarkerPoints() adds them.
+  // Marks the markers whose corners all agree with the pose. Their points come first in the
+  // estimate, as AddMarkerPoints() adds them.
   int CountMarkers(const std::vector<MarkerObservation>& markers, const PoseEstimate& estimate) {
     int count = 0;
     std::size_t i = 0;
@@ -342,7 +345,7 @@ struct Tracker::Impl {
     }
   }
 
-  // The frame after a keyframe gives that keyframe a central difference.
+  // The frame after a keyframe gives that keyframe a velocity by central differences.
   void RefreshKeyframeVelocity(const Frame& frame, const Pose& T_world_now) {
     if (frames.empty() || frames.back().keyframe < 0 || lost) return;
     MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(frames.back().keyframe)];
@@ -371,8 +374,8 @@ struct Tracker::Impl {
             followed_points.points().size() < 30);
   }
 
-  // Nearest by pose of the first `count` keyframes that see about the same, the reference itself
-  // left out while it is being followed.
+  // The nearest by pose of the first `count` keyframes with a similar view. The reference is
+  // excluded while it is being tracked.
   [[nodiscard]] std::vector<std::size_t> KeyframesNear(const Pose& T_world_color,
                                                        std::size_t count) const {
     std::vector<std::pair<double, std::size_t>> near;
@@ -449,7 +452,8 @@ struct Tracker::Impl {
     keyframe.descriptors = features.descriptors;
   }
 
-  // By the features of all keyframes, the newest first, which are described as far as needed.
+  // Compares the features of all keyframes, the newest first, and describes them only as far as
+  // needed.
   std::optional<Relocalization> FindAmongKeyframes(const DescribedFeatures& features) {
     std::optional<Relocalization> best;
     for (int k = static_cast<int>(map.keyframes.size()) - 1; k >= 0; --k) {
@@ -462,8 +466,8 @@ struct Tracker::Impl {
     return best;
   }
 
-  // A place seen long ago: where the map has drifted since, it is bent until both visits agree, and
-  // the old landmarks are followed again.
+  // Loop closure at a place seen long ago: if the map has drifted since, the loop error is
+  // distributed, and the old landmarks are tracked again.
   void CloseLoop(const FrameData& prepared, int index) {
     if (loop_pause > 0) {
       --loop_pause;
@@ -506,8 +510,8 @@ struct Tracker::Impl {
     AdjustLocally(index);
   }
 
-  // Pose of the newest keyframe from an older one's surroundings alone: landmarks of then and
-  // depth. Nothing if they do not agree well.
+  // Pose of the newest keyframe from an older keyframe's neighbourhood alone (landmarks and depth).
+  // Nothing if they do not agree well.
   std::optional<Pose> EstimatePoseFromKeyframe(int older, const Pose& T_world_guess,
                                                const FrameData& prepared,
                                                const MapKeyframe& newest) {
@@ -516,7 +520,7 @@ struct Tracker::Impl {
     const int followed_reference = std::exchange(reference, older);
     PoseProblem problem =
         MakeProblem(prepared, newest.data.depth_time_s - newest.data.color_time_s);
-    reference = -1;  // None is left out.
+    reference = -1;  // No landmark is left.
     followed_points.Reassociate(prepared.image, newest.data.view.depth_m, T_world_guess,
                                 KeyframesNear(T_world_guess, static_cast<std::size_t>(older) + 4),
                                 problem.points);
@@ -531,7 +535,8 @@ struct Tracker::Impl {
     return estimate.T_world_camera;
   }
 
-  // Landmarks seen in a new keyframe: those followed, and those of older keyframes found again.
+  // Observations in a new keyframe: tracked landmarks and rediscovered landmarks of older
+  // keyframes.
   void AssociateKeyframe(const FrameData& prepared, const cv::Mat& depth_m,
                          const Pose& T_world_color, MapKeyframe& keyframe) {
     const std::size_t followed = followed_points.points().size();

@@ -1,5 +1,5 @@
-// Follows the camera: keypoints, marker corners and depth in one robust pose a frame, keyframes,
-// and recovery after loss.
+// Tracks the camera: one robust pose per frame from keypoints, marker corners and depth; keyframes,
+// and relocalisation after loss.
 #pragma once
 
 #include <cstddef>
@@ -17,50 +17,54 @@ struct TrackerOptions {
   bool use_markers = true;
   bool use_keypoints = true;
   bool use_dense =
-      true;  ///< Depth against the last keyframe, so that few keypoints do not lose the pose.
-  double keyframe_distance =
-      0.06;  ///< Of the median depth: translation since the last keyframe that makes a new one.
+      true;  ///< Use depth against the last keyframe, so that few keypoints do not lose the pose.
+  /// Translation since the last keyframe, as a fraction of the median depth, that creates a new
+  /// one.
+  double keyframe_distance = 0.06;
   double keyframe_angle_rad = 0.09;
-  double min_tracked_share = 0.6;  ///< Of the keyframe's keypoints; fewer make a new keyframe.
-  int local_keyframes = 6;         ///< Keyframes that local bundle adjustment moves.
-  bool keep_color = true;          ///< Keyframes keep their colour images.
-  std::size_t max_images = 96;     ///< Keyframes that keep images at most, see BoundImages(); a
-                                   ///< sweep of 300 frames has about 50.
+  /// Fraction of the keyframe's keypoints below which a new keyframe is created.
+  double min_tracked_share = 0.6;
+  int local_keyframes = 6;  ///< Keyframes that local bundle adjustment moves.
+  bool keep_color = true;   ///< Keyframes keep their colour images.
+  /// Largest number of keyframes that keep images, see BoundImages(); a sweep of 300 frames has
+  /// about 50.
+  std::size_t max_images = 96;
 };
 
-/// A frame's outcome.
+/// Outcome of one frame.
 struct TrackedFrame {
   std::int64_t frame_index = 0;
   double color_time_s = 0.0;
   double depth_time_s = 0.0;
   bool tracked = false;
-  int keyframe = -1;                          ///< Index in the map if it became one, else -1.
-  int reference_keyframe = -1;                ///< The keyframe that it was tracked against.
-  Pose T_reference_color = Pose::Identity();  ///< Colour camera at the colour stamp, in the
-                                              ///< reference keyframe's colour camera.
-  int previous_keyframe = -1;  ///< Of a keyframe: the one that it was tracked against, or -1.
+  int keyframe = -1;            ///< Index in the map if it became a keyframe, otherwise -1.
+  int reference_keyframe = -1;  ///< The keyframe against which it was tracked.
+  /// Colour camera at the colour stamp, in the reference keyframe's colour camera.
+  Pose T_reference_color = Pose::Identity();
+  /// If it became a keyframe: the one against which it was tracked, or -1.
+  int previous_keyframe = -1;
   Pose T_previous_color =
-      Pose::Identity();  ///< Of a keyframe: its camera in that one's, as tracked.
+      Pose::Identity();  ///< If it became a keyframe: its camera in that one's, as tracked.
   Vector6d velocity_per_s = Vector6d::Zero();  ///< In the camera frame.
   int num_keypoints = 0;
   int num_markers = 0;
 };
 
-/// One thread calls. Deterministic.
+/// Not thread-safe: call from one thread. Deterministic.
 class Tracker {
  public:
-  /// @param info  Intrinsics, marker dictionary (DataError if unknown) and length.
+  /// @param info  Intrinsics, marker dictionary (DataError if unknown) and marker length.
   Tracker(const StreamInfo& info, const TrackerOptions& options);
   ~Tracker();
 
-  /// The frame's images are borrowed by reference count and kept for keyframes.
+  /// The frame's images are shared by reference count and kept for keyframes.
   TrackedFrame Track(const Frame& frame);
 
   [[nodiscard]] const TrackingMap& map() const;
-  /// The map, to be refined after the last frame.
+  /// The map, for refinement after the last frame.
   [[nodiscard]] TrackingMap TakeMap();
   [[nodiscard]] const std::vector<TrackedFrame>& frames() const;
-  /// Live estimate, world = first keyframe's colour camera.
+  /// Live estimate; the world is the first keyframe's colour camera.
   [[nodiscard]] Pose T_world_color(const TrackedFrame& frame) const;
 
  private:

@@ -18,9 +18,10 @@ using Matrix12d = Eigen::Matrix<double, 12, 12>;
 using Rows = Eigen::Matrix<double, 2, 12>;
 
 constexpr int kIterations = 4;
-constexpr int kMinPoints = 12;  // Fewer hold a pose and a velocity only by the prior.
+// With fewer points, pose and velocity would depend on the prior only.
+constexpr int kMinPoints = 12;
 
-// One keyframe's equations: its twist and the change of its velocity.
+// One keyframe's equations for its twist and the change of its velocity.
 class ImageMotion {
  public:
   ImageMotion(const Intrinsics& stated, const CalibrationModel& calibration,
