@@ -11,10 +11,10 @@ namespace {
 
 using Reasons = std::vector<std::string>;
 
-// Each gate passes only on a comparison that is true, so that a NaN refuses.
+// Each gate passes only on a comparison that is true, so that NaN is refused.
 
 void JudgeRegion(const Evidence& evidence, const AcceptanceLimits& limits, Reasons& reasons) {
-  // Without a support the region would be all that was measured, and a couch that stands still
+  // Without a support the region would be everything that was measured, and a stationary couch
   // would hide that the body moved.
   if (!evidence.reference_has_support && !evidence.region_is_drawn) {
     reasons.emplace_back(

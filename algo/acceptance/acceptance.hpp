@@ -1,4 +1,5 @@
-// When the numbers of a comparison may be acted on: all gates, their limits, and the verdict.
+// Decides whether the numbers of a comparison may be acted on: all gates, their limits, and the
+// verdict.
 #pragma once
 
 #include <array>
@@ -15,24 +16,24 @@
 
 namespace plumb {
 
-/// Limits of the gates. They hold for every preset: a preset chooses how numbers are made, never
+/// Limits of the gates. They apply to every preset: a preset chooses how numbers are made, never
 /// whether they may be shown as an answer.
 struct AcceptanceLimits {
-  double shift_tolerance_m = 3 * kMillimetre;   ///< Of each of the three shifts.
-  double rotation_tolerance_rad = 1 * kDegree;  ///< Of each of the three rotations.
+  double shift_tolerance_m = 3 * kMillimetre;   ///< For each of the three shifts.
+  double rotation_tolerance_rad = 1 * kDegree;  ///< For each of the three rotations.
 
-  int min_shared_markers = 3;                    ///< Fewer that stayed in place: no answer.
-  double min_coverage = 0.9;                     ///< Fraction of the region measured by the scan.
+  int min_shared_markers = 3;  ///< With fewer markers that did not move there is no answer.
+  double min_coverage = 0.9;   ///< Fraction of the region measured by the scan.
   double max_hole_m = 5 * kCentimetre;           ///< Largest hole in the region, as a diameter.
   double max_residual_p95_m = 25 * kMillimetre;  ///< 95th percentile after the best motion.
-  double max_lost_s = 1.0;                       ///< Longest time without tracking, each scan.
+  double max_lost_s = 1.0;                       ///< Longest time without tracking in each scan.
 };
 
 /// @throws std::invalid_argument naming a limit that is not positive and finite, or a coverage
 ///         outside 0..1.
 void CheckLimits(const AcceptanceLimits& limits);
 
-/// The six numbers in the order of results: vertical, longitudinal, lateral, pitch, roll, yaw.
+/// The six numbers in the order used by results: vertical, longitudinal, lateral, pitch, roll, yaw.
 inline constexpr std::array<const char*, 6> kNumberNames = {"vertical", "longitudinal", "lateral",
                                                             "pitch",    "roll",         "yaw"};
 [[nodiscard]] constexpr bool IsShift(std::size_t number) { return number < 3; }
@@ -47,36 +48,36 @@ inline constexpr std::array<const char*, 6> kNumberNames = {"vertical", "longitu
 struct MeasuredNumber {
   double value = 0.0;
   double u95 = 0.0;   ///< 95 % half-width.
-  std::string words;  ///< Which way, e.g. "up"; for the reason.
+  std::string words;  ///< Direction in words, such as "up"; used in the reason.
 };
 
-/// What the markers that both scans saw say about each other.
+/// Agreement of the markers that both scans saw.
 struct MarkerEvidence {
-  std::vector<int> shared_ids;  ///< Of all markers that both scans saw, ascending.
-  int good = 0;                 ///< How many of them agree with each other.
-  std::vector<int> moved_used;  ///< Markers that moved, yet the alignment uses them (`paper`).
-  bool two_groups = false;      ///< They fall into two groups of equal size that disagree.
+  std::vector<int> shared_ids;  ///< Ids of all markers that both scans saw, ascending.
+  int good = 0;                 ///< Number of markers that agree with each other.
+  std::vector<int> moved_used;  ///< Markers that moved but are used by the alignment (`paper`).
+  bool two_groups = false;      ///< Two groups of equal size disagree.
 };
 
-/// Everything that the gates look at. A quantity that could not be computed stays NaN or absent,
-/// and the gate that needs it refuses.
+/// Input of all gates. A quantity that could not be computed stays NaN or absent, and the gate that
+/// needs it refuses.
 struct Evidence {
-  /// Why the comparison ended before there was anything to judge, as a sentence; empty: it ran
-  /// through. It is a refusal of its own and comes first.
+  /// A sentence that states why the comparison ended before there was anything to judge; empty if
+  /// it was completed. This refusal comes first.
   std::string failure;
 
   MarkerEvidence markers;
   bool reference_has_support = false;  ///< A couch or floor was found beneath the body.
-  bool region_is_drawn = false;        ///< By a person; else it is the segmented body.
+  bool region_is_drawn = false;  ///< True if a person drew it, false if the body was segmented.
 
   double coverage = kNotMeasured;
   double largest_hole_m = kNotMeasured;
-  Eigen::Vector2d hole_centre_m = Eigen::Vector2d::Zero();  ///< Reference-marker frame.
+  Eigen::Vector2d hole_centre_m = Eigen::Vector2d::Zero();  ///< In the reference marker's frame.
   double residual_p95_m = kNotMeasured;
   double reference_lost_s = kNotMeasured;
   double current_lost_s = kNotMeasured;
 
-  /// Absent: refused, as shifts are where the markers are fixed to the couch.
+  /// Absent where not reported, as shifts with couch-fixed markers.
   std::array<std::optional<MeasuredNumber>, 6> numbers;
 
   static constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
@@ -84,19 +85,18 @@ struct Evidence {
 
 struct Decision {
   Verdict verdict = Verdict::kNoAnswer;
-  std::vector<std::string>
-      reasons;  ///< Whole sentences' content, most important first; never empty.
+  std::vector<std::string> reasons;  ///< Complete sentences, the most important first; never empty.
 };
 
-/// What the gates of the markers refuse; empty: they pass.
+/// Refusals of the marker gates; empty if they pass.
 [[nodiscard]] std::vector<std::string> RefusalsOfMarkers(const MarkerEvidence& markers,
                                                          int min_shared_markers);
 
 /// The verdict: no_answer if any gate refuses, in the order markers, support, coverage, hole,
 /// residual, tracking, uncertainty; move if a value lies outside its tolerance; unsure if a value
-/// plus its uncertainty does; else in_tolerance. A value at a limit is within it.
+/// plus its uncertainty does; otherwise in_tolerance. A value at a limit is within it.
 ///
-/// Pure: numbers in, verdict out. Rotations are always needed; shifts only where they are present.
+/// A pure function of its input. Rotations are always needed, shifts only where they are present.
 [[nodiscard]] Decision Decide(const Evidence& evidence, const AcceptanceLimits& limits);
 
 }  // namespace plumb

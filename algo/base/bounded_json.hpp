@@ -1,4 +1,4 @@
-// JSON from outside.
+// Parses JSON from untrusted sources.
 #pragma once
 
 #include <string_view>
@@ -7,18 +7,18 @@
 
 namespace plumb {
 
-/// No file of Plumb's is nested half as deep. What is nested some ten thousand deep overflows the
-/// stack where it is copied or printed.
+/// Plumb's own files are nested less than half as deep. JSON that is nested ten thousand levels
+/// deep overflows the stack when it is copied or printed.
 inline constexpr int kMaxJsonDepth = 32;
 
-/// One value, with nothing after it.
-/// @tparam Json nlohmann::json, or nlohmann::ordered_json, which keeps the keys' order.
-/// @param max_depth levels of objects and arrays; 1 is an object of plain values.
-/// @throws DataError saying what is wrong: not JSON, or nested too deep.
+/// Parses one value with nothing after it.
+/// @tparam Json nlohmann::json, or nlohmann::ordered_json, which keeps the order of the keys.
+/// @param max_depth  Levels of objects and arrays; 1 is an object of plain values.
+/// @throws DataError stating what is wrong: not JSON, or nested too deep.
 template <class Json = nlohmann::json>
 [[nodiscard]] Json ParseBoundedJson(std::string_view text, int max_depth = kMaxJsonDepth);
 
-/// As ParseBoundedJson(), but a discarded value in place of the error.
+/// As ParseBoundedJson(), but returns a discarded value instead of throwing.
 template <class Json = nlohmann::json>
 [[nodiscard]] Json ParseBoundedJsonOrNothing(std::string_view text, int max_depth = kMaxJsonDepth);
 

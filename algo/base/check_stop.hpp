@@ -1,4 +1,4 @@
-// Long work asks now and then whether it is still wanted.
+// Cancellation points for long work.
 #pragma once
 
 #include <stop_token>

@@ -1,5 +1,5 @@
-// The exceptions that cross module boundaries. Poor quality is never one: it is a field of a
-// result.
+// The exceptions that cross module boundaries. Poor quality is never an exception; it is a field of
+// a result.
 #pragma once
 
 #include <stdexcept>
@@ -14,7 +14,7 @@ class DataError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The system refused a write or a read of our own (disk full, permission). Exit code 1.
+/// The system refused one of our writes or reads (disk full, permission). Exit code 1.
 class IoError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -26,13 +26,13 @@ class DeviceError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The device went away while in use.
+/// The device was unplugged while in use.
 class DeviceLost : public DeviceError {
  public:
   using DeviceError::DeviceError;
 };
 
-/// Work was stopped on request (Ctrl-C, cancel). Exit code 130.
+/// Work was stopped on request (Ctrl-C or cancel). Exit code 130.
 class Interrupted : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -31,7 +31,7 @@ Eigen::Vector2d Undistort(const Intrinsics& intrinsics, const Eigen::Vector2d& p
     const Eigen::Vector2d tangential(2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
                                      p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y);
     const Eigen::Vector2d next = (distorted - tangential) / radial;
-    if (next == ideal) break;  // Further rounds would not change a bit.
+    if (next == ideal) break;  // Further iterations would give identical bits.
     ideal = next;
   }
   return ideal;

@@ -21,19 +21,20 @@ struct Intrinsics {
   bool operator==(const Intrinsics&) const = default;
 };
 
-/// Distorted normalised coordinates (x/z, y/z after the lens) of ideal ones.
+/// Distorted from ideal normalised coordinates (x/z, y/z).
 [[nodiscard]] Eigen::Vector2d DistortNormalised(const Intrinsics& intrinsics,
                                                 const Eigen::Vector2d& ideal);
 
-/// Pixel of a point in the camera frame (z > 0), through the lens.
+/// Pixel of a point in the camera frame (z > 0), including the lens.
 [[nodiscard]] Eigen::Vector2d Project(const Intrinsics& intrinsics,
                                       const Eigen::Vector3d& p_camera);
 
-/// Ideal normalised coordinates (x/z, y/z) of a pixel: the lens undone by fixed-point iteration (20
-/// rounds, exact to 1e-9 for lenses of consumer sensors).
+/// Ideal normalised coordinates (x/z, y/z) of a pixel. The lens is inverted by fixed-point
+/// iteration (20 rounds, accurate to 1e-9 for lenses of consumer sensors).
 [[nodiscard]] Eigen::Vector2d Undistort(const Intrinsics& intrinsics, const Eigen::Vector2d& pixel);
 
-/// The same camera at another image size: pixel centres at integers, so cx' = (cx + 0.5) s - 0.5.
+/// The same camera at another image size. Pixel centres are at integers, so cx' = (cx + 0.5) s -
+/// 0.5.
 [[nodiscard]] Intrinsics Resized(const Intrinsics& intrinsics, int width, int height);
 
 }  // namespace plumb

@@ -4,7 +4,7 @@
 
 namespace plumb {
 
-/// The notice that every picture, page and report carries; never cut, never dismissed.
+/// The notice on every picture, page and report. It is never cut and cannot be dismissed.
 inline constexpr std::string_view kResearchNotice =
     "Research use only. Not a medical device. Do not use to position patients for treatment or to "
     "replace image guidance.";

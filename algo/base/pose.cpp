@@ -20,7 +20,7 @@ Eigen::Matrix3d RotationFromVector(const Eigen::Vector3d& rotation_vector) {
 }
 
 Eigen::Vector3d VectorFromRotation(const Eigen::Matrix3d& rotation) {
-  // Through the quaternion: AngleAxis directly from a matrix loses digits near 0 and pi.
+  // Via the quaternion: AngleAxis directly from a matrix loses precision near 0 and pi.
   Eigen::Quaterniond q(rotation);
   if (q.w() < 0) q.coeffs() = -q.coeffs();
   const double sine = q.vec().norm();

@@ -1,4 +1,4 @@
-// Rigid poses and the few operations on them that Eigen does not name.
+// Rigid poses and the few operations on them that Eigen does not provide.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -6,7 +6,7 @@
 namespace plumb {
 
 /// A rigid transform. A variable `T_a_b` maps coordinates in b to coordinates in a: p_a = T_a_b *
-/// p_b. Composition is Eigen's own product only (the paper's "T.T' = (RR', t+t')" is no rigid
+/// p_b. Composition is always Eigen's product (the paper's "T.T' = (RR', t+t')" is not a rigid
 /// composition).
 using Pose = Eigen::Isometry3d;
 
@@ -22,8 +22,8 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 /// Inverse of RotationFromVector(), length in [0, pi].
 [[nodiscard]] Eigen::Vector3d VectorFromRotation(const Eigen::Matrix3d& rotation);
 
-/// Pose of the twist (rotation vector, translation): rotation and translation apart, not the SE(3)
-/// exponential.
+/// Pose of the twist (rotation vector, translation), with independent rotation and translation; not
+/// the SE(3) exponential.
 [[nodiscard]] Pose PoseFromTwist(const Vector6d& rotation_then_translation);
 
 /// Inverse of PoseFromTwist().
@@ -32,8 +32,8 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 /// Nearest rigid transform to T: its rotation part made orthonormal, determinant +1.
 [[nodiscard]] Pose Orthonormalised(const Pose& T);
 
-/// Between T_a (fraction 0) and T_b (fraction 1): slerp of the rotation, straight line of the
-/// translation. Fractions outside [0, 1] extrapolate with the same constant velocity.
+/// Pose between T_a (fraction 0) and T_b (fraction 1): slerp of the rotation, linear interpolation
+/// of the translation. Fractions outside [0, 1] extrapolate with the same constant velocity.
 [[nodiscard]] Pose Interpolate(const Pose& T_a, const Pose& T_b, double fraction);
 
 /// Angle of the rotation part, radians in [0, pi].

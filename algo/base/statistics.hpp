@@ -1,4 +1,4 @@
-// Medians and quantiles of what was measured: one definition of each for all.
+// Medians and quantiles of measured values, defined once for all modules.
 #pragma once
 
 #include <algorithm>
@@ -8,10 +8,10 @@
 
 namespace plumb {
 
-/// Standard deviations in one median absolute deviation of normally distributed values.
+/// Standard deviations per median absolute deviation of normally distributed values.
 inline constexpr double kMadToSigma = 1.4826;
 
-/// The value of that rank, counted from 0. Reorders the values.
+/// The value of the given rank, counted from 0. Reorders the values.
 /// @throws std::invalid_argument if there is no value of that rank.
 template <typename T>
 [[nodiscard]] T TakeRank(std::vector<T>& values, std::size_t rank) {
@@ -21,17 +21,17 @@ template <typename T>
   return *nth;
 }
 
-/// The value in the middle; of an even number the upper one of the two. Reorders the values.
-/// @throws std::invalid_argument for no values.
+/// The middle value, or the upper of the two middle values. Reorders the values.
+/// @throws std::invalid_argument without values.
 template <typename T>
 [[nodiscard]] T TakeMedian(std::vector<T>& values) {
   return TakeRank(values, values.size() / 2);
 }
 
-/// The value of rank `fraction` * (number - 1), rounded down: never one that was not measured.
-/// Reorders the values.
-/// @param fraction  0: the least, 1: the largest.
-/// @throws std::invalid_argument for no values, or another fraction.
+/// The value of rank `fraction` * (number - 1), rounded down, so that the result is always one of
+/// the values. Reorders the values.
+/// @param fraction  0: the smallest, 1: the largest.
+/// @throws std::invalid_argument without values, or for another fraction.
 template <typename T>
 [[nodiscard]] T TakeQuantile(std::vector<T>& values, double fraction) {
   if (values.empty() || !(fraction >= 0.0 && fraction <= 1.0))

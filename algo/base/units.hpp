@@ -1,4 +1,4 @@
-// Named units: everything inside Plumb is SI (metres, seconds, radians).
+// Named units. All quantities inside Plumb are SI (metres, seconds, radians).
 #pragma once
 
 #include <numbers>

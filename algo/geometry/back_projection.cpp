@@ -12,9 +12,9 @@ namespace {
 
 constexpr int kMaxSide = 16384;
 
-/// Undistort() for neighbouring pixels: starting at the neighbour's offset a few rounds reach
-/// single precision. The residual of a round shrinks by the lens's local gradient (below 0.2 for
-/// consumer lenses).
+/// Undistort() for neighbouring pixels: starting from the neighbour's offset, a few iterations
+/// reach single precision. Each one reduces the residual by the lens's local gradient (below 0.2
+/// for consumer lenses).
 Eigen::Vector2d UndistortFrom(const Intrinsics& intrinsics, const Eigen::Vector2d& distorted,
                               const Eigen::Vector2d& start) {
   Eigen::Vector2d ideal = start;
@@ -43,7 +43,7 @@ RayTable::RayTable(const Intrinsics& intrinsics) : intrinsics_(intrinsics) {
                                     [](double k) { return k != 0.0; });
   tbb::parallel_for(0, intrinsics.height, [&](int row) {
     Eigen::Vector2d offset =
-        Eigen::Vector2d::Zero();  // ideal minus distorted, of the pixel to the left
+        Eigen::Vector2d::Zero();  // ideal minus distorted, for the pixel to the left
     for (int column = 0; column < intrinsics.width; ++column) {
       const Eigen::Vector2d distorted((column - intrinsics.cx) / intrinsics.fx,
                                       (row - intrinsics.cy) / intrinsics.fy);

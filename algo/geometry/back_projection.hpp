@@ -1,4 +1,4 @@
-// From depth images to points: the viewing rays of a camera, the lens undone once for all pixels.
+// Converts depth images to points with precomputed viewing rays of the camera.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,8 @@
 
 namespace plumb {
 
-/// Ideal normalised coordinates (x/z, y/z) of every pixel centre: the point of a pixel is z * (x,
-/// y, 1). Immutable after construction, so threads may share one.
+/// Ideal normalised coordinates (x/z, y/z) of every pixel centre; the point of a pixel is z * (x,
+/// y, 1). Immutable after construction, so threads may share it.
 class RayTable {
  public:
   /// @throws std::invalid_argument if the size is not in [1, 16384] or a focal length is not
@@ -38,8 +38,8 @@ class RayTable {
   std::vector<Eigen::Vector2f> ideal_;
 };
 
-/// Keeps one table per camera, for callers with many images of few cameras. Not thread-safe: ask
-/// for the tables first, then share them among threads.
+/// Keeps one table per camera, for callers with many images from few cameras. Not thread-safe: get
+/// the tables first, then share them among threads.
 class RayTables {
  public:
   /// @throws std::invalid_argument as RayTable's constructor.
@@ -50,13 +50,13 @@ class RayTables {
 };
 
 /// All valid pixels of a depth image as points in the camera frame (paper: C_i^{j,0}, function Psi;
-/// here the lens is undone too), row by row. Colours come along where the view has a colour image.
+/// here with the lens corrected), row by row. Colours are added where the view has a colour image.
 /// No normals.
 /// @throws std::invalid_argument if the depth image is not CV_32FC1 or the images do not have the
-/// table's size.
+///         table's size.
 [[nodiscard]] PointCloud BackProject(const DepthView& view, const RayTable& rays);
 
-/// `cloud` moved: p_a = T_a_b * p_b, normals turned along (paper: Theta).
+/// Transforms `cloud`: p_a = T_a_b * p_b, with normals rotated (paper: Theta).
 [[nodiscard]] PointCloud Transformed(const Pose& T_a_b, const PointCloud& cloud_in_b);
 
 }  // namespace plumb

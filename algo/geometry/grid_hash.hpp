@@ -1,5 +1,4 @@
-// Integer cells of space and an open-addressing map from them; shared by the searches in this
-// folder.
+// Integer cells of space and an open-addressing map from them, used by the searches in this folder.
 #pragma once
 
 #include <array>
@@ -13,7 +12,7 @@
 
 namespace plumb {
 
-/// A cell of a cubic lattice, packed: 21 bits an axis, so within +-2^20 cells of the origin.
+/// A cell of a cubic lattice, packed into 21 bits per axis, so within +-2^20 cells of the origin.
 class LatticeCell {
  public:
   static constexpr int kLimit = 1 << 20;
@@ -30,13 +29,13 @@ class LatticeCell {
   int x_, y_, z_;
 };
 
-/// Map from packed cells to small integers. Grows; never shrinks; iteration is not offered, so
-/// order cannot leak.
+/// Map from packed cells to small integers. It grows and never shrinks. Iteration is not offered,
+/// so that results cannot depend on its order.
 class CellMap {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
-  /// Forgets all cells and makes room for about `expected` of them.
+  /// Removes all cells and reserves space for about `expected` of them.
   void Reset(std::size_t expected) {
     const std::size_t capacity = std::bit_ceil(std::max<std::size_t>(64, 2 * expected));
     slots_.assign(capacity, Slot{});
@@ -52,7 +51,7 @@ class CellMap {
     return kNone;
   }
 
-  /// The cell's value; a new cell gets `value_if_new`.
+  /// The value of the cell; a new cell gets `value_if_new`.
   [[nodiscard]] std::uint32_t& FindOrAdd(std::uint64_t key, std::uint32_t value_if_new) {
     if (2 * (size_ + 1) > slots_.size()) Grow();
     std::size_t at = Start(key);

@@ -9,11 +9,12 @@
 namespace plumb {
 namespace {
 
-// Distances are compared in single precision: reach a little further than the exact bound. Relative
-// and absolute.
+// Distances are compared in single precision, so searches extend slightly beyond the exact bound.
+// Relative and absolute margins.
 constexpr float kReachFactor = 1.0F + 1e-5F;
 constexpr float kReachMargin = 1e-6F;
-constexpr float kStepsAhead = 8.0F;  // moves of the last size that an answer should outlast
+// number of moves of the last size for which an answer should stay valid
+constexpr float kStepsAhead = 8.0F;
 
 }  // namespace
 
@@ -108,8 +109,9 @@ void CloudNeighbours::SearchBox(const Eigen::Vector3f& p, float reach, std::uint
   const Eigen::Vector3i hi(LatticeCell::Index(p.x() + out, inverse_size_),
                            LatticeCell::Index(p.y() + out, inverse_size_),
                            LatticeCell::Index(p.z() + out, inverse_size_));
-  // Squared distance along one axis to what a slab of cells can hold, points' drift since binning
-  // included. Rounding of the slab's borders is below a millionth of the coordinate.
+  // Squared distance along one axis to the possible contents of a slab of cells, including the
+  // drift of points since binning. Rounding of the slab's borders is below a millionth of the
+  // coordinate.
   const auto squared_gap = [&](float coordinate, int index) {
     const float low = static_cast<float>(index) * cell_size_;
     const float gap = std::max(low - coordinate, coordinate - low - cell_size_) - slack -
@@ -150,11 +152,11 @@ std::uint32_t CloudNeighbours::Nearest(std::size_t cloud, std::size_t index, flo
   const float squared_radius = radius * radius;
   const auto reach_of = [](float distance) { return distance * kReachFactor + kReachMargin; };
 
-  // Since the last search any two points can have come nearer by the travel of both.
+  // Since the last search, two points may have approached each other by the travel of both.
   const float nearer_by = 2.0F * (travel_ - memory.travel_then);
   if (memory.none_within - nearer_by > reach_of(radius)) return kNone;
 
-  // Past the radius by one cell, so that the next searches can know that nothing is near.
+  // One cell beyond the radius, so that the next searches can know that nothing is near.
   const float farthest = radius + cell_size_;
   Best best = {farthest * farthest, kNone, farthest * farthest};
   float reach = std::min(cell_size_, farthest);
@@ -163,8 +165,8 @@ std::uint32_t CloudNeighbours::Nearest(std::size_t cloud, std::size_t index, flo
     const float distance = std::sqrt(squared);
     if (reach_of(distance) < memory.no_other_within - nearer_by)
       return squared < squared_radius ? memory.neighbour : kNone;
-    // The old partner bounds the search; a little further, the next candidate decides how long the
-    // answer will hold.
+    // The old partner bounds the search. It extends slightly farther, because the next candidate
+    // decides how long the answer stays valid.
     if (squared < best.squared_distance) {
       reach = std::min(
           distance + std::clamp(kStepsAhead * last_step_, 0.02F * cell_size_, 0.2F * cell_size_),

@@ -1,4 +1,4 @@
-// Nearest points among several clouds that move: one shared spatial hash for all of them.
+// Finds nearest points among several moving clouds with one shared spatial hash.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,15 @@
 
 namespace plumb {
 
-/// Finds, for a point of one cloud, the nearest point of any OTHER cloud. Exact, whatever the
-/// hints.
+/// Finds, for a point of one cloud, the nearest point of any OTHER cloud. Exact for any hints.
 ///
-/// Two things make repeated searches cheap while the clouds move little between them. Points stay
-/// in the cell where they were binned until one has moved by a quarter of a cell; searches reach
-/// out by that much more. And what the last search knew holds for a while: its partner is still the
-/// nearest, or none is near, until the clouds have moved by the distance to the next candidate;
-/// after that the old partner bounds the search.
+/// Repeated searches are fast while the clouds move little between them, for two reasons. Points
+/// stay in the cell where they were binned until one has moved by a quarter of a cell, and searches
+/// extend by that distance. The result of the last search also stays valid for a while: its partner
+/// is still the nearest, or there is none, until the clouds have moved by the distance to the next
+/// candidate. After that the old partner bounds the search.
 ///
-/// Nearest() is const and thread-safe for different points; Move() is not. Deterministic: of
+/// Nearest() is const and thread-safe for different points; Move() is not. Deterministic: among
 /// equally near points the one with the smaller (cloud, index) is found.
 class CloudNeighbours {
  public:
@@ -28,30 +27,30 @@ class CloudNeighbours {
 
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
-  /// Remembers a point's last search; starts empty.
+  /// A point's last search; starts empty.
   struct Memory {
     std::uint32_t neighbour =
-        kNone;  ///< Global index of the nearest point found last, within the radius or not.
+        kNone;  ///< Global index of the nearest point of the last search, within the radius or not.
     float none_within = 0.0F;      ///< Nothing was nearer than this ...
-    float no_other_within = 0.0F;  ///< ... and nothing but `neighbour` nearer than this ...
-    float travel_then = 0.0F;      ///< ... when the clouds had moved so far.
+    float no_other_within = 0.0F;  ///< ... and nothing except `neighbour` was nearer than this ...
+    float travel_then = 0.0F;      ///< ... when the clouds had travelled this far.
   };
 
-  /// @param cell_size  Metres, > 0: about the distance between neighbours within a cloud.
-  /// @throws std::invalid_argument on a bad cell size, or points that are not finite or a million
-  /// cells away.
+  /// @param cell_size  Metres, > 0; about the distance between neighbours within a cloud.
+  /// @throws std::invalid_argument for a bad cell size, or points that are not finite or are a
+  ///         million cells away.
   CloudNeighbours(Clouds clouds, double cell_size);
 
-  /// The same points at new places. @throws std::invalid_argument if their numbers differ, and as
-  /// the constructor.
+  /// The same points at new positions.
+  /// @throws std::invalid_argument if the numbers of points differ, and as the constructor.
   void Move(Clouds clouds);
 
   /// Nearest point of another cloud with distance < radius.
-  /// @return its global index or kNone; `memory` is used and brought up to date.
+  /// @return its global index or kNone; `memory` is used and updated.
   [[nodiscard]] std::uint32_t Nearest(std::size_t cloud, std::size_t index, float radius,
                                       Memory& memory) const;
 
-  /// Place of a point by its global index (clouds one after the other).
+  /// Position of a point by its global index (clouds in order).
   [[nodiscard]] const Eigen::Vector3f& point(std::uint32_t global_index) const {
     return points_[global_index];
   }
@@ -77,11 +76,11 @@ class CloudNeighbours {
 
   float inverse_size_;
   float cell_size_;
-  float slack_;          ///< Bound on how far any point is from where it was binned.
-  float travel_ = 0.0F;  ///< Sum over moves of the largest displacement.
+  float slack_;          ///< Upper bound of the distance of any point from where it was binned.
+  float travel_ = 0.0F;  ///< Sum over all moves of the largest displacement.
   float travel_when_binned_ = 0.0F;
   float last_step_ = 0.0F;               ///< Largest displacement of the last move.
-  std::vector<std::uint32_t> starts_;    ///< First global index of each cloud, and the total.
+  std::vector<std::uint32_t> starts_;    ///< First global index of each cloud, then the total.
   std::vector<Eigen::Vector3f> points_;  ///< By global index.
   std::vector<std::uint32_t> entry_of_;  ///< By global index.
   std::vector<Entry> entries_;           ///< By cell.

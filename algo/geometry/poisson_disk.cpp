@@ -15,10 +15,10 @@ namespace plumb {
 namespace {
 
 constexpr std::size_t kFirstShare =
-    16;  // a sixteenth of a depth image already keeps nearly all points that will be kept at 2 cm
+    16;  // one sixteenth of a depth image already yields nearly all points kept at 2 cm
 
 /// Kept points by cell. A point is entered into every cell that its disk touches, so that a visit
-/// asks one cell only: visits outnumber kept points by a hundred to one.
+/// checks one cell only; there are about a hundred visits per kept point.
 class KeptPoints {
  public:
   static constexpr std::uint32_t kNobody = CellMap::kNone;
@@ -28,7 +28,7 @@ class KeptPoints {
     first_.Reset(std::min<std::size_t>(num_points, 1U << 16));
   }
 
-  /// @param blocker  A kept point to try first, or kNobody; becomes the one that is too near.
+  /// @param blocker  A kept point to try first, or kNobody; receives the point that is too near.
   [[nodiscard]] bool IsFree(const Eigen::Vector3f& p, std::uint32_t& blocker) const {
     const float limit = spacing_ * spacing_;
     if (blocker != kNobody && (nodes_[blocker].point - p).squaredNorm() < limit) return false;
@@ -102,7 +102,8 @@ std::vector<std::uint32_t> PoissonDiskSubset(std::span<const Eigen::Vector3f> po
   KeptPoints kept(static_cast<float>(spacing), points.size());
   std::vector<std::uint32_t> kept_indices;
   std::mt19937 random(seed);
-  // Bounded draws by hand: the standard distributions and std::shuffle differ between libraries.
+  // Random draws are implemented here because the standard distributions and std::shuffle differ
+  // between libraries.
   const auto draw = [&](std::size_t count) {
     return static_cast<std::uint32_t>((random() * static_cast<std::uint64_t>(count)) >> 32);
   };
@@ -112,9 +113,9 @@ std::vector<std::uint32_t> PoissonDiskSubset(std::span<const Eigen::Vector3f> po
     kept.Add(points[i]);
     kept_indices.push_back(i);
   };
-  // A uniformly random order, walked cheaply: its beginning by draws with repetition (a repeated
-  // visit changes nothing); then everything that what was kept so far already excludes is crossed
-  // out, in memory order; the rest is shuffled.
+  // A uniformly random order at low cost: it begins with draws with repetition (a repeated visit
+  // changes nothing); then all points excluded by those kept so far are removed in memory order;
+  // the rest is shuffled.
   for (std::size_t k = 0; k < points.size() / kFirstShare; ++k) visit(draw(points.size()));
   std::vector<std::uint32_t> free;
   std::uint32_t blocker = KeptPoints::kNobody;

@@ -10,9 +10,9 @@
 namespace plumb {
 namespace {
 
-// Spread below this share of the largest spread counts as none. Singular values of a scatter are
-// squared lengths, so 1e-9 asks for a set about 30 000 times longer than wide: far below what any
-// measured line of points reaches.
+// A spread below this fraction of the largest spread counts as zero. Singular values of a scatter
+// are squared lengths, so 1e-9 requires a set about 30 000 times longer than wide, far beyond any
+// measured line of points.
 constexpr double kRelativeRankTolerance = 1e-9;
 
 struct WeightedMean {
@@ -31,7 +31,7 @@ WeightedMean MeanOf(std::span<const Eigen::Vector3d> points, std::span<const dou
   return result;
 }
 
-// Rank of a centred scatter; `scale` is the squared distance from the origin, which bounds the
+// Rank of a centred scatter. `scale` is the squared distance from the origin, which bounds the
 // rounding error.
 int ScatterRank(const Eigen::Matrix3d& scatter, double scale) {
   const Eigen::Vector3d spread = scatter.jacobiSvd().singularValues();
@@ -85,8 +85,8 @@ RigidFit FitRigid(std::span<const Eigen::Vector3d> points_a,
                       ScatterRank(scatter_b, b.total * b.mean.squaredNorm()));
 
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  // Two sets of rank 2 can still pair up into a cross scatter of rank 1 (points paired wrongly),
-  // which leaves a rotation free.
+  // Two sets of rank 2 can still form a cross scatter of rank 1 (wrong correspondences), which
+  // leaves a rotation undetermined.
   const Eigen::Vector3d shared = svd.singularValues();
   const bool determined = shared[1] > std::max(shared[0] * kRelativeRankTolerance, 0.0);
   if (num_weighted < 3 || fit.rank < 2 || !determined) return fit;

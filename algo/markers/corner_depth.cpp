@@ -17,10 +17,10 @@ namespace {
 constexpr int kMinPixels = 12;
 constexpr double kMinValidShare = 0.4;
 constexpr double kMinInlierShare = 0.6;
-constexpr int kMaxSamples = 4000;     // a plane needs no more; larger faces are thinned
-constexpr int kNumRounds = 6;         // of reweighting
-constexpr double kTukeyScales = 4.0;  // cut, in robust standard deviations
-constexpr double kMinSigma = 5e-4;    // 1/m: half a millimetre at 1 m, below any sensor's noise
+constexpr int kMaxSamples = 4000;     // enough for a plane; larger faces are thinned
+constexpr int kNumRounds = 6;         // rounds of reweighting
+constexpr double kTukeyScales = 4.0;  // cut-off in robust standard deviations
+constexpr double kMinSigma = 5e-4;  // 1/m; half a millimetre at 1 m, below the noise of any sensor
 
 void CheckSize(const DepthView& view, const RayTable& rays) {
   if (view.depth_m.type() != CV_32FC1 || view.depth_m.cols != rays.width() ||
@@ -41,7 +41,7 @@ struct FacePixel {
   double inverse;  ///< 1/z
 };
 
-/// Depth pixels inside a clockwise convex outline, thinned; `num_inside` counts all pixels on the
+/// Depth pixels inside a clockwise convex outline, thinned. `num_inside` counts all pixels on the
 /// same raster, valid or not.
 std::vector<FacePixel> PixelsInside(const ImageCorners& outline, const DepthView& view,
                                     const RayTable& rays, int& num_inside) {
@@ -77,8 +77,8 @@ std::vector<FacePixel> PixelsInside(const ImageCorners& outline, const DepthView
   return pixels;
 }
 
-/// Corners go clockwise on the print, so clockwise in an image with y down: every turn is to the
-/// same side.
+/// Corners are clockwise on the print, and so in an image with y down: every turn is to the same
+/// side.
 bool IsConvexClockwise(const ImageCorners& outline) {
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector2d a = outline[(k + 1) % 4] - outline[k];
@@ -173,8 +173,8 @@ std::optional<MarkerFace> FitMarkerFace(const MarkerObservation& marker, const D
   const int num_pixels = static_cast<int>(pixels.size());
   if (num_pixels < kMinPixels || num_pixels < kMinValidShare * num_inside) return std::nullopt;
 
-  // Start: only pixels near the median depth, so that a hand or a gap beside the marker does not
-  // tilt the first plane.
+  // Starts from the pixels near the median depth, so that a hand or a gap beside the marker does
+  // not tilt the first plane.
   std::vector<double> values;
   values.reserve(pixels.size());
   for (const FacePixel& pixel : pixels) values.push_back(pixel.inverse);
@@ -212,7 +212,7 @@ std::optional<MarkerFace> FitMarkerFace(const MarkerObservation& marker, const D
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector3d ray = Undistort(rays.intrinsics(), marker.corners[k]).homogeneous();
     const double inverse = face.plane.dot(ray);
-    if (!(inverse > 0.05)) return std::nullopt;  // behind the camera or further than 20 m
+    if (!(inverse > 0.05)) return std::nullopt;  // behind the camera or farther than 20 m
     face.corners[k] = ray / inverse;
   }
   return face;

@@ -1,4 +1,4 @@
-// Where a marker's corners are in space, from the depth image.
+// Computes the positions of a marker's corners from the depth image.
 #pragma once
 
 #include <array>
@@ -17,32 +17,32 @@ namespace plumb {
 [[nodiscard]] int DepthWindow(int window_px_at_640, int image_width);
 
 /// Corners in the camera frame as published (paper, Eq. markercornerposition): the depth at the
-/// corner's pixel, else the mean of the back-projected valid pixels of the window around it.
-/// Nothing where the window is empty or the corner is outside the image. The mean pulls x and y
-/// towards the side that has depth (5-7 mm at a gap): preset `paper` only.
+/// corner's pixel, otherwise the mean of the back-projected valid pixels of the window around it.
+/// Nothing where the window is empty or the corner is outside the image. The mean moves x and y
+/// towards the side that has depth (5-7 mm at a gap): for preset `paper` only.
 /// @param rays  Of the view's camera.
 /// @throws std::invalid_argument if depth image and rays do not fit together.
 [[nodiscard]] std::array<std::optional<Eigen::Vector3d>, 4> PaperCornerPositions(
     const MarkerObservation& marker, const DepthView& view, const RayTable& rays,
     int window_px_at_640 = 11);
 
-/// The plane of a marker's own face, and its corners on it.
+/// The plane of a marker's own face and the corners in it.
 struct MarkerFace {
   MarkerCorners corners;  ///< Camera frame, metres, detector order.
   Eigen::Vector3d
       plane;  ///< (a, b, c): 1/z = a x + b y + c on the ray (x, y, 1); so a X + b Y + c Z = 1.
   double rms_m = 0.0;         ///< Depth residual of the inliers.
   int num_pixels = 0;         ///< Valid depth pixels inside the marker's outline.
-  double inlier_share = 0.0;  ///< Of these, in (0, 1].
+  double inlier_share = 0.0;  ///< Fraction of these pixels that fit the plane, in (0, 1].
 };
 
-/// Fits a plane robustly to the depth inside the marker's outline and intersects each corner's own
-/// undistorted sub-pixel ray with it. Paper: depth at single pixels or window means; here the
-/// face's plane, because depth is missing or wrong just at print edges, and single pixels tilt the
+/// Fits a plane robustly to the depth inside the marker's outline and intersects it with each
+/// corner's undistorted sub-pixel ray. Paper: depth at single pixels or window means; here the
+/// plane of the face, because depth is missing or wrong at print edges, and single pixels tilt the
 /// marker by 0.7 deg.
 /// @return nothing if the outline is degenerate or leaves the image, fewer than 40 % of its pixels
-/// have depth (or fewer than 12),
-///         or fewer than 60 % of those agree on a plane in front of the camera.
+///         have depth (or fewer than 12), or fewer than 60 % of those agree on a plane in front of
+///         the camera.
 /// @throws std::invalid_argument if depth image and rays do not fit together.
 [[nodiscard]] std::optional<MarkerFace> FitMarkerFace(const MarkerObservation& marker,
                                                       const DepthView& view, const RayTable& rays);

@@ -16,18 +16,19 @@
 namespace plumb {
 namespace {
 
-constexpr int kOuterRounds = 4;         // geometry (homography, pixel set) is renewed in each
-constexpr int kFirstSteps = 2;          // Gauss-Newton steps in the first round; one in the others
-constexpr double kConverged_px = 0.03;  // largest corner movement of a round that ends the search
-constexpr double kMinContrast = 0.02;   // of full scale
-constexpr int kFirstSideSamples = 90;   // pixels used per side, about: in the first round
-constexpr int kSideSamples = 180;       // and later
-constexpr double kMinBlur_px = 0.35;    // a pixel's own area is 0.29 px wide (sigma)
+constexpr int kOuterRounds = 4;  // geometry (homography, pixel set) is recomputed in each
+constexpr int kFirstSteps = 2;   // Gauss-Newton steps in the first round; later rounds have one
+// largest corner movement of a round that ends the iteration
+constexpr double kConverged_px = 0.03;
+constexpr double kMinContrast = 0.02;  // fraction of full scale
+constexpr int kFirstSideSamples = 90;  // approximate number of pixels per side in the first round
+constexpr int kSideSamples = 180;      // and in later rounds
+constexpr double kMinBlur_px = 0.35;   // a pixel's own area has a sigma of 0.29 px
 constexpr double kModelError_px =
-    0.03;                         // sharpening cameras and real paper; rendered images leave 0.01
+    0.03;  // covers sharpening cameras and real paper; rendered images leave 0.01
 constexpr int kTablePerCell = 4;  // resolution of the blurred cell rows
 
-/// The normal distribution function and density by table: error below 1e-5, exact zero / one
+/// The normal distribution function and density from a table: error below 1e-5, exactly zero or one
 /// outside +-4.
 class NormalTable {
  public:
@@ -72,7 +73,7 @@ const ToneTable& EncodedValues() {
 /// A tone curve and its inverse's slope.
 struct Tone {
   explicit Tone(const ToneTable& table) : light(table) {
-    constexpr float kLeastLight = 1e-4F;  // Per level: some curves are flat at black.
+    constexpr float kLeastLight = 1e-4F;  // Per level; some curves are flat at black.
     for (std::size_t i = 0; i < 256; ++i) {
       const std::size_t below = i > 0 ? i - 1 : i;
       const std::size_t above = i < 255 ? i + 1 : i;
@@ -86,7 +87,7 @@ struct Tone {
 };
 
 /// A side of the square in its own coordinates: `along` from its first corner, `depth` towards the
-/// marker's inside, pixels.
+/// inside of the marker, pixels.
 struct Side {
   Eigen::Vector2d origin, direction, normal;
   double length_px = 0;
@@ -95,7 +96,7 @@ struct Side {
   std::array<double, 2> depth_one{},
       depth_two{};     ///< Depth of the lines one and two cells inside, at both ends.
   double cell_px = 0;  ///< Mean depth of one cell.
-  double outside_px = 0, inside_px = 0;  ///< Extent of the band of pixels used.
+  double outside_px = 0, inside_px = 0;  ///< Extent of the band of pixels that is used.
   double bow_px = 0;                     ///< Depth of the curved side at its middle.
   /// Darkness (0 paper, 1 ink) of the border and the first two code rows along the side, blurred
   /// along it.
@@ -118,7 +119,7 @@ struct SideFit {
 struct Sample {
   float depth, along, value;      ///< along: 0..1
   float levels_per_light;         ///< Of the tone curve at this value.
-  std::array<float, 3> darkness;  ///< of border, first and second code row at this place
+  std::array<float, 3> darkness;  ///< Of border, first and second code row at this place.
 };
 
 /// Cell (row, column) counted with side `side` on top.
@@ -136,8 +137,8 @@ bool WhiteFromSide(const MarkerPattern& pattern, int side, int row, int column) 
   }
 }
 
-/// Darkness along the side of depth row `row` (0 border), blurred by a Gaussian of `blur_cells`.
-/// White is wider than black by `shift_cells` at each end.
+/// Darkness along the side of depth row `row` (0 is the border), blurred by a Gaussian of
+/// `blur_cells`. White is wider than black by `shift_cells` at each end.
 void FillDarkness(const MarkerPattern& pattern, int side, int row, double blur_cells,
                   double shift_cells, std::vector<float>& table) {
   const int cells = pattern.bits_per_side + 2;
@@ -170,7 +171,7 @@ float Lookup(const std::vector<float>& table, float cells) {
   return table[index] + part * (table[index + 1] - table[index]);
 }
 
-/// How far the lens bends the straight segment a..b at its middle, along `normal`.
+/// Deflection by the lens of the straight segment a..b at its middle, along `normal`.
 double Bow(const Intrinsics& intrinsics, const Eigen::Vector2d& a, const Eigen::Vector2d& b,
            const Eigen::Vector2d& normal) {
   const Eigen::Vector2d middle = 0.5 * (Undistort(intrinsics, a) + Undistort(intrinsics, b));
@@ -204,7 +205,7 @@ std::optional<Side> MakeSide(const ImageCorners& corners, int index, const Marke
   side.depth_two = {depth_of(0, 2), depth_of(cells, 2)};
   side.cell_px = 0.5 * (side.depth_one[0] + side.depth_one[1]);
   if (!(side.depth_one[0] > 0.5 && side.depth_one[1] > 0.5)) return std::nullopt;
-  // Not the whole cell outside: sheets are often cut close to the square.
+  // Less than a whole cell outside, because sheets are often cut close to the square.
   side.outside_px = std::clamp(0.6 * side.cell_px, 1.5, 8.0);
   side.inside_px = std::clamp(1.25 * side.cell_px, 2.5, 8.0);
   if (intrinsics) side.bow_px = Bow(*intrinsics, at(0), at(1), side.normal);
@@ -216,8 +217,8 @@ std::optional<Side> MakeSide(const ImageCorners& corners, int index, const Marke
   return side;
 }
 
-/// The pixels of the image in a band along the side, as many as are useful. No interpolation: each
-/// is itself a measurement.
+/// The image pixels in a band along the side, as many as are useful. Without interpolation, because
+/// each pixel is itself a measurement.
 void CollectSamples(const cv::Mat& gray, const Tone& tone, const Side& side, int wanted,
                     std::vector<Sample>& samples) {
   samples.clear();
@@ -248,7 +249,7 @@ void CollectSamples(const cv::Mat& gray, const Tone& tone, const Side& side, int
       const Eigen::Vector2d offset = Eigen::Vector2d(x, y) - side.origin;
       const double along = side.direction.dot(offset) / side.length_px;
       const Eigen::Vector3d cell = side.pixel_to_cells * Eigen::Vector3d(x, y, 1);
-      if (!(cell.z() > 0)) continue;  // behind the plane's horizon: not a square seen by a camera
+      if (!(cell.z() > 0)) continue;  // beyond the plane's horizon: not a square seen by a camera
       const auto column = static_cast<float>(cell.x() / cell.z());
       samples.push_back(
           {static_cast<float>(side.normal.dot(offset) - 4 * side.bow_px * along * (1 - along)),
@@ -261,8 +262,8 @@ void CollectSamples(const cv::Mat& gray, const Tone& tone, const Side& side, int
   }
 }
 
-/// Darkness of the model at a sample, and its derivatives by depth, by the logarithm of the blur
-/// and by the edge shift.
+/// Darkness of the model at a sample, and its derivatives with respect to depth, the logarithm of
+/// the blur and the edge shift.
 struct Modelled {
   float darkness = 0, by_depth = 0, by_log_blur = 0, by_shift = 0;
 };
@@ -282,7 +283,7 @@ Modelled Model(const Side& side, const Sample& sample, float line_depth, float i
   for (std::size_t k = 0; k < 3; ++k) {
     const float towards_black = change[k] >= 0 ? 1.0F : -1.0F;
     const float z = (sample.depth - edges[k] - towards_black * edge_shift) * inverse_blur;
-    if (z <= -4.0F) break;  // deeper edges are farther still
+    if (z <= -4.0F) break;  // deeper edges are even farther away
     const auto [cdf, pdf] = Normal().At(z);
     result.darkness += change[k] * cdf;
     result.by_depth += change[k] * pdf * inverse_blur;
@@ -292,7 +293,7 @@ Modelled Model(const Side& side, const Sample& sample, float line_depth, float i
   return result;
 }
 
-/// Black and white levels by plain means of the outer and the border pixels: a start for the fit.
+/// Starting values for black and white from plain means of the outer and the border pixels.
 bool StartLevels(const Side& side, const std::vector<Sample>& samples, SideFit& fit) {
   const double black_px = std::min(0.8 * side.cell_px, side.inside_px);
   double white = 0, black = 0;
@@ -319,7 +320,7 @@ using Matrix8 = Eigen::Matrix<double, 8, 8>;
 /// One robust Gauss-Newton step on a side's samples. False if the system is singular.
 bool Step(const Side& side, const std::vector<Sample>& samples, bool find_edge_shift,
           SideFit& fit) {
-  // In single precision and by hand: this loop is most of the cost of a frame.
+  // In single precision and unrolled by hand, because this loop dominates the cost of a frame.
   std::array<std::array<float, 9>, 9> sums{};  // J^T W J, the residual as the ninth column of J
   double weighted_square = 0, weights = 0, levels_square = 0;
   const auto inverse_blur = static_cast<float>(1.0 / fit.blur_px);
@@ -337,7 +338,7 @@ bool Step(const Side& side, const std::vector<Sample>& samples, bool find_edge_s
         static_cast<float>(fit.white) + static_cast<float>(fit.white_slope) * from_middle;
     const float residual = sample.value - (white - step * model.darkness);
     const float weight = std::abs(residual) <= limit ? 1.0F : limit / std::abs(residual);
-    const float by_line = step * model.by_depth;  // value grows when the line moves inward
+    const float by_line = step * model.by_depth;  // value increases when the line moves inward
     const std::array<float, 9> jacobian = {by_line * (1 - along),
                                            by_line * along,
                                            -step * model.by_log_blur,
@@ -363,7 +364,7 @@ bool Step(const Side& side, const std::vector<Sample>& samples, bool find_edge_s
       normal(i, j) = sums[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
     right[i] = sums[static_cast<std::size_t>(i)][8];
   }
-  // A weak prior on blur and slopes keeps the system regular on faint or tiny sides.
+  // A weak prior on blur and slopes keeps the system regular for faint or tiny sides.
   const double scale = fit.step * fit.step;
   normal(2, 2) += 2 * scale;
   normal(4, 4) += 2;
@@ -399,7 +400,8 @@ bool Step(const Side& side, const std::vector<Sample>& samples, bool find_edge_s
   return fit.step > kMinContrast;
 }
 
-/// Fits a side from scratch (`fit` invalid, only its blur is used) or from the round before.
+/// Fits a side from scratch (`fit` is invalid and only its blur is used) or from the previous
+/// round.
 void FitSide(const cv::Mat& gray, const Tone& tone, const Side& side, bool find_edge_shift,
              std::vector<Sample>& samples, SideFit& fit) {
   const bool first = !fit.valid;
@@ -435,8 +437,8 @@ std::optional<Eigen::Vector2d> Intersection(const Line& a, const Line& b) {
   return m.inverse() * Eigen::Vector2d(a.offset, b.offset);
 }
 
-/// Root mean square of the corner's two coordinates' standard deviations, from the lines that meet
-/// there.
+/// Root mean square of the standard deviations of the corner's two coordinates, from the lines that
+/// meet there.
 double CornerSigma(const std::array<Side, 4>& sides, const std::array<SideFit, 4>& fits,
                    std::size_t corner) {
   const std::size_t before = (corner + 3) % 4;
@@ -446,9 +448,9 @@ double CornerSigma(const std::array<Side, 4>& sides, const std::array<SideFit, 4
   const Eigen::Vector2d variance(fits[before].ends_covariance(1, 1),
                                  fits[corner].ends_covariance(0, 0));
   const double random = (inverse * variance.asDiagonal() * inverse.transpose()).trace() / 2;
-  // Neighbouring pixels err together (compression, interpolation in the camera), and the model is
-  // not the whole truth: on rendered images the errors are 1.0 to 1.3 times what independent noise
-  // would leave.
+  // Errors of neighbouring pixels are correlated (compression, interpolation in the camera), and
+  // the model is not exact: on rendered images the errors are 1.0 to 1.3 times those of independent
+  // noise.
   return std::hypot(1.25 * std::sqrt(random), kModelError_px);
 }
 
@@ -498,7 +500,7 @@ std::optional<CornerRefinement> RefineCorners(const cv::Mat& gray, const ImageCo
       const auto i = static_cast<std::size_t>(k);
       const double along =
           0.5 * (fits[(i + 1) % 4].blur_px +
-                 fits[(i + 3) % 4].blur_px);  // the neighbours' blur runs along this side
+                 fits[(i + 3) % 4].blur_px);  // the neighbours' blur acts along this side
       std::optional<Side> side =
           MakeSide(result.corners, k, pattern, along, fits[i].edge_shift_px, options.intrinsics);
       if (!side) return std::nullopt;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kMaxCells = 10;            // 8 x 8 bits and the border
 constexpr double kMinContrast = 12;      // grey levels between black and white cells
-constexpr double kMaxWrongBorder = 0.1;  // share of border cells that may look white
+constexpr double kMaxWrongBorder = 0.1;  // fraction of border cells that may look white
 
 /// The code after one quarter turn clockwise of the print.
 std::uint64_t TurnedClockwise(std::uint64_t code, int side) {
@@ -25,7 +25,7 @@ std::uint64_t TurnedClockwise(std::uint64_t code, int side) {
   return turned;
 }
 
-/// Bilinear value; the place must lie inside the image by a pixel.
+/// Bilinear interpolation; the position must be at least a pixel inside the image.
 double ValueAt(const cv::Mat& gray, double x, double y) {
   const int x0 = static_cast<int>(x);
   const int y0 = static_cast<int>(y);
@@ -37,7 +37,7 @@ double ValueAt(const cv::Mat& gray, double x, double y) {
          fy * ((1 - fx) * lower[0] + fx * lower[1]);
 }
 
-/// Mean grey of every cell's middle, row-major. False if the square leaves the image.
+/// Mean grey value at every cell's middle, row-major. False if the square leaves the image.
 bool SampleCells(const cv::Mat& gray, const Eigen::Matrix3d& cells_to_pixel, int cells,
                  std::array<float, kMaxCells * kMaxCells>& values) {
   constexpr std::array<double, 2> kPlaces[] = {
@@ -135,7 +135,7 @@ std::optional<DecodedMarker> MarkerDecoder::Decode(const cv::Mat& gray,
   DecodedMarker marker;
   marker.id = best->id;
   marker.wrong_bits = best_distance;
-  // A print turned clockwise k times has its top-left corner k places further on, clockwise.
+  // A print turned clockwise k times has its top-left corner k places later, clockwise.
   for (std::size_t k = 0; k < 4; ++k)
     marker.corners[k] = corners[(k + static_cast<std::size_t>(best->turns)) % 4];
   return marker;

@@ -13,7 +13,7 @@
 namespace plumb {
 namespace {
 
-constexpr double kUnrefinedSigma_px = 0.7;  // an outline's corner on a blurred image
+constexpr double kUnrefinedSigma_px = 0.7;  // corner of an outline on a blurred image
 
 cv::Mat ToGray(const cv::Mat& image) {
   if (image.empty())
@@ -35,8 +35,8 @@ double MeanSide(const ImageCorners& corners) {
   return sum / 4;
 }
 
-/// Adds a marker unless the same square is there already (an outline and its inner rim may both
-/// decode): the one with fewer wrong bits, then the larger one, stays.
+/// Adds a marker unless the same square is present (an outline and its inner rim may both decode).
+/// Of two, the one with fewer wrong bits, then the larger one, is kept.
 void AddDistinct(const DecodedMarker& marker, std::vector<DecodedMarker>& markers) {
   for (DecodedMarker& other : markers) {
     if (other.id != marker.id) continue;
@@ -53,7 +53,7 @@ void AddDistinct(const DecodedMarker& marker, std::vector<DecodedMarker>& marker
   markers.push_back(marker);
 }
 
-/// Sorts by id and takes out ids that occur more than once.
+/// Sorts by id and removes ids that occur more than once.
 MarkerDetection WithoutDuplicates(std::vector<MarkerObservation> found) {
   std::stable_sort(
       found.begin(), found.end(),
@@ -72,10 +72,11 @@ MarkerDetection WithoutDuplicates(std::vector<MarkerObservation> found) {
   return result;
 }
 
-constexpr double kExpectedWithin = 0.03;  // of the image's width
-constexpr double kMostOfImage = 0.7;      // parts that sum up to more cost as much as all of it
+constexpr double kExpectedWithin = 0.03;  // fraction of the image's width
+// fraction of the image above which searching parts costs as much as searching all of it
+constexpr double kMostOfImage = 0.7;
 
-/// The parts of the image to search for markers at expected places; those that overlap are joined.
+/// The parts of the image in which expected markers are searched; overlapping parts are merged.
 std::vector<cv::Rect> PartsAround(const std::vector<ImageCorners>& expected, const cv::Size& size) {
   const cv::Rect image({0, 0}, size);
   const int margin =
@@ -87,7 +88,7 @@ std::vector<cv::Rect> PartsAround(const std::vector<ImageCorners>& expected, con
       low = low.cwiseMin(corner);
       high = high.cwiseMax(corner);
     }
-    // Far outside of the image a corner may be any number.
+    // Far outside the image a corner may have any value.
     low = low.cwiseMax(-size.width).cwiseMin(2 * size.width);
     high = high.cwiseMax(-size.width).cwiseMin(2 * size.width);
     const cv::Point first(static_cast<int>(low.x()) - margin, static_cast<int>(low.y()) - margin);
@@ -159,7 +160,7 @@ MarkerDetector::MarkerDetector(const MarkerDictionary& dictionary,
   if (!(options.border_px >= 0))
     throw std::invalid_argument(
         fmt::format("border_px must not be negative, got {}", options.border_px));
-  // Not the whole of the dictionary's distance: fewer wrong bits, fewer false markers.
+  // Less than the dictionary's whole distance: allowing fewer wrong bits gives fewer false markers.
   const int max_wrong_bits = static_cast<int>(0.6 * dictionary.max_correction_bits());
   impl_.reset(new Impl{options, dictionary, MarkerDecoder(dictionary, max_wrong_bits)});
 }
@@ -175,7 +176,8 @@ MarkerDetection MarkerDetector::Detect(const cv::Mat& gray_or_rgb) const {
 
 MarkerDetection MarkerDetector::DetectNear(const cv::Mat& gray,
                                            const std::vector<ImageCorners>& expected) const {
-  if (gray.empty() || gray.type() != CV_8UC1) return Detect(gray);  // which says what is wrong
+  // Detect() reports what is wrong.
+  if (gray.empty() || gray.type() != CV_8UC1) return Detect(gray);
   return impl_->DetectIn(gray, PartsAround(expected, gray.size()));
 }
 

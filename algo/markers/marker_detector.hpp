@@ -13,26 +13,26 @@
 
 namespace plumb {
 
-/// Parameters of MarkerDetector. Lengths in pixels of the image that is searched.
+/// Parameters of MarkerDetector. Lengths are in pixels of the searched image.
 struct MarkerDetectorOptions {
   double min_side_px = 14.0;  ///< Markers with a shorter mean side are not reported; >= 8.
   double border_px =
-      1.0;  ///< A marker with a corner nearer than this to the image border is not reported; >= 0.
-  bool refine_corners = true;  ///< False: the corners as detected, to about half a pixel.
+      1.0;  ///< A marker with a corner nearer than this to the border is left out; >= 0.
+  bool refine_corners = true;  ///< False: the corners as detected, accurate to about half a pixel.
   bool linear_light =
-      true;  ///< Undo the sRGB tone curve for the refinement; see CornerRefinementOptions.
+      true;  ///< Invert the sRGB tone curve for the refinement; see CornerRefinementOptions.
   std::optional<Intrinsics> intrinsics = std::nullopt;  ///< If given, the refinement allows for the
                                                         ///< bow that the lens puts on the sides.
 };
 
-/// What one image showed.
+/// Detections in one image.
 struct MarkerDetection {
   std::vector<MarkerObservation> markers;  ///< Ascending by id, each id once.
   std::vector<int> duplicate_ids;  ///< Ids seen more than once in this image, ascending: none of
                                    ///< them is reported.
 };
 
-/// Detects the markers of one dictionary. Stateless between images: Detect() may run on several
+/// Detects the markers of one dictionary. Stateless between images: Detect() may run in several
 /// threads at once and gives the same bits for the same image.
 class MarkerDetector {
  public:
@@ -44,15 +44,15 @@ class MarkerDetector {
   MarkerDetector& operator=(MarkerDetector&&) noexcept;
 
   /// Markers in an image, CV_8UC1 or CV_8UC3 (red, green, blue). Corners are in pixels, centres at
-  /// integers, in detector order, as seen (distorted); markers that are partly covered or cut by
+  /// integers, in detector order, as seen (distorted). Markers that are partly covered or cut by
   /// the border are not reported.
   /// @throws std::invalid_argument for an empty image or another type.
   [[nodiscard]] MarkerDetection Detect(const cv::Mat& gray_or_rgb) const;
 
-  /// Only what lies around expected places, bit for bit as Detect() finds it there, for less time.
-  /// An id that is seen once more elsewhere is not noticed.
+  /// Only the markers around expected places, bit for bit as Detect() finds them there but faster.
+  /// Another marker with the same id elsewhere is not noticed.
   /// @param gray      CV_8UC1.
-  /// @param expected  Corners; markers up to 3 % of the image's width away are found.
+  /// @param expected  Corners; markers within 3 % of the image's width are found.
   [[nodiscard]] MarkerDetection DetectNear(const cv::Mat& gray,
                                            const std::vector<ImageCorners>& expected) const;
 

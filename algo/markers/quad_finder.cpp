@@ -17,8 +17,8 @@ constexpr double kOutlineToEdge_px = 0.5;
 
 Eigen::Vector2d ToVector(const cv::Point& p) { return {p.x, p.y}; }
 
-/// Indices of the four vertices of an outline in its own order, or nothing if it has another
-/// number.
+/// Indices of the four vertices of an outline in its own order, or nothing if it has another number
+/// of vertices.
 std::optional<std::array<std::size_t, 4>> FourVertices(const Outline& outline,
                                                        double tolerance_px) {
   std::vector<cv::Point> vertices;
@@ -33,8 +33,7 @@ std::optional<std::array<std::size_t, 4>> FourVertices(const Outline& outline,
   return indices;
 }
 
-/// Total least squares line n . p = c through the middle part of the outline from one vertex to the
-/// next.
+/// Total least squares line n . p = c through the middle part of the outline between two vertices.
 struct Line {
   Eigen::Vector2d normal;
   double offset = 0;
@@ -42,7 +41,7 @@ struct Line {
 
 std::optional<Line> FitSide(const Outline& outline, std::size_t from, std::size_t to) {
   const std::size_t count = (to + outline.size() - from) % outline.size();
-  const std::size_t skip = std::max<std::size_t>(1, count / 8);  // the rounded corners
+  const std::size_t skip = std::max<std::size_t>(1, count / 8);  // excludes the rounded corners
   if (count < 2 * skip + 4) return std::nullopt;
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
@@ -60,7 +59,7 @@ std::optional<Line> FitSide(const Outline& outline, std::size_t from, std::size_
   return Line{normal, normal.dot(base + mean)};
 }
 
-/// True for the outer outline of a dark region, false for the rim of a hole in one: OpenCV traces
+/// True for the outer outline of a dark region, false for the rim of a hole in one; OpenCV traces
 /// them in opposite directions.
 bool IsOuter(const Outline& outline, const std::array<std::size_t, 4>& vertices) {
   double area = 0;  // positive: clockwise as seen
@@ -72,9 +71,9 @@ bool IsOuter(const Outline& outline, const std::array<std::size_t, 4>& vertices)
   return area < 0;
 }
 
-/// Corners from lines along the four runs of the outline, clockwise as seen.
+/// Corners from lines along the four sections of the outline, clockwise as seen.
 std::optional<ImageCorners> FitQuad(const Outline& outline, std::array<std::size_t, 4> vertices) {
-  // approxPolyDP keeps the outline's direction, so vertex k and k+1 bound one run of points.
+  // approxPolyDP keeps the outline's direction, so vertices k and k+1 bound one section.
   const Eigen::Vector2d centre =
       0.25 * (ToVector(outline[vertices[0]]) + ToVector(outline[vertices[1]]) +
               ToVector(outline[vertices[2]]) + ToVector(outline[vertices[3]]));
@@ -82,7 +81,7 @@ std::optional<ImageCorners> FitQuad(const Outline& outline, std::array<std::size
   for (std::size_t k = 0; k < 4; ++k) {
     const std::optional<Line> line = FitSide(outline, vertices[k], vertices[(k + 1) % 4]);
     if (!line) return std::nullopt;
-    // Outline pixels are the last dark ones: the edge runs half a pixel outside them.
+    // Outline pixels are the last dark ones; the edge is half a pixel outside them.
     const double outside =
         line->normal.dot(centre) < line->offset ? kOutlineToEdge_px : -kOutlineToEdge_px;
     lines[k] = {line->normal, line->offset + outside};
@@ -102,7 +101,7 @@ std::optional<ImageCorners> FitQuad(const Outline& outline, std::array<std::size
       if ((meet - vertex).norm() < 6) corners[k] = meet;
     }
   }
-  std::swap(corners[1], corners[3]);  // the outline ran counter-clockwise
+  std::swap(corners[1], corners[3]);  // the outline was counter-clockwise
   return corners;
 }
 
@@ -139,7 +138,7 @@ std::vector<ImageCorners> FindDarkQuads(const cv::Mat& gray, const cv::Rect& par
   cv::findContours(dark, outlines, cv::RETR_LIST, cv::CHAIN_APPROX_NONE, part.tl());
 
   std::vector<ImageCorners> quads;
-  // The shortest outline of a square seen at a slant: two sides along the image's diagonal steps.
+  // The shortest outline of a square seen at a slant: two sides in diagonal steps of the image.
   const auto min_points = static_cast<std::size_t>(2.4 * options.min_side_px);
   for (const Outline& outline : outlines) {
     if (outline.size() < min_points) continue;

@@ -1,4 +1,4 @@
-// The projective map from a square to a quadrilateral, in closed form.
+// The projective map from a square to a quadrilateral in closed form.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@
 
 namespace plumb {
 
-/// Maps the square with corners (0,0), (side,0), (side,side), (0,side) onto the quadrilateral's
+/// Maps the square with corners (0,0), (side,0), (side,side), (0,side) to the quadrilateral's
 /// corners in this order. Nothing if the quadrilateral is degenerate (three corners on a line).
 [[nodiscard]] inline std::optional<Eigen::Matrix3d> SquareToQuad(double side,
                                                                  const ImageCorners& quad) {

@@ -13,12 +13,12 @@
 namespace plumb {
 namespace {
 
-constexpr double kMinSide_px = 28.0;       // Smaller markers' edges lie too close to each other.
-constexpr std::size_t kMaxSightings = 96;  // Beyond, time is better spent elsewhere.
+constexpr double kMinSide_px = 28.0;       // Edges of smaller markers are too close to each other.
+constexpr std::size_t kMaxSightings = 96;  // Limits the time that is spent.
 constexpr std::size_t kMinSightings = 8;
 constexpr double kFirstGamma = 0.8;
 constexpr double kGammaStep = 0.2;
-constexpr std::size_t kNumGammas = 13;  // To 3.2.
+constexpr std::size_t kNumGammas = 13;  // Up to 3.2.
 constexpr std::size_t kNumGroups = 4;
 
 double ShortestSide(const ImageCorners& corners) {
@@ -28,7 +28,7 @@ double ShortestSide(const ImageCorners& corners) {
   return shortest;
 }
 
-// Evenly spread over those that are large enough.
+// Evenly spread over the sightings that are large enough.
 std::vector<const MarkerSighting*> Chosen(const std::vector<MarkerSighting>& sightings) {
   std::vector<const MarkerSighting*> large;
   for (const MarkerSighting& sighting : sightings)
@@ -42,8 +42,8 @@ std::vector<const MarkerSighting*> Chosen(const std::vector<MarkerSighting>& sig
 
 using Losses = std::array<double, kNumGammas>;
 
-// Logarithm of the residual under each curve: a sighting counts by how much a curve betters it, not
-// by how badly it fits. Nothing if one of the fits fails.
+// Logarithm of the residual for each curve, so that a sighting counts by how much a curve improves
+// it, not by how badly it fits. Nothing if one of the fits fails.
 std::optional<Losses> LossesOf(const MarkerSighting& sighting,
                                const std::array<ToneTable, kNumGammas>& tables) {
   Losses losses{};
@@ -57,7 +57,7 @@ std::optional<Losses> LossesOf(const MarkerSighting& sighting,
   return losses;
 }
 
-// Of the smallest mean, by a parabola through it and its neighbours.
+// Position of the smallest mean, by a parabola through it and its neighbours.
 double BestGamma(const std::vector<Losses>& losses, std::size_t first, std::size_t stride) {
   Losses sum{};
   for (std::size_t i = first; i < losses.size(); i += stride)
@@ -88,7 +88,8 @@ void FindEdgeShift(const std::vector<const MarkerSighting*>& sightings, SweepTon
     if (one) shifts.push_back(*one);
   if (shifts.size() < kMinSightings) return;
   tone.edge_shift_px = TakeQuantile(shifts, 0.5);
-  // A median of n has 1.25 times a mean's standard deviation; quartiles lie 1.35 sigma apart.
+  // The standard deviation of a median is 1.25 times that of a mean; quartiles are 1.35 sigma
+  // apart.
   const double quartiles = TakeQuantile(shifts, 0.75) - TakeQuantile(shifts, 0.25);
   tone.sigma_edge_shift_px =
       1.25 * quartiles / 1.35 / std::sqrt(static_cast<double>(shifts.size()));

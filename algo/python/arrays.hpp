@@ -1,4 +1,4 @@
-// Views of Plumb's values as numpy arrays. Where an array shares memory, it keeps the owner alive.
+// Exposes Plumb's values as numpy arrays. An array that shares memory keeps its owner alive.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -24,7 +24,7 @@ Array ReadOnly(Array array) {
 /// An image as (height, width) or (height, width, channels).
 template <typename Value, int kChannels>
 pybind11::array ImageArray(const cv::Mat& image) {
-  auto* shared = new cv::Mat(image);  // counts a reference to the pixels
+  auto* shared = new cv::Mat(image);  // adds a reference to the pixels
   const pybind11::capsule owner(shared, [](void* mat) { delete static_cast<cv::Mat*>(mat); });
   std::vector<pybind11::ssize_t> shape = {image.rows, image.cols};
   std::vector<pybind11::ssize_t> strides = {static_cast<pybind11::ssize_t>(image.step[0]),
@@ -52,7 +52,7 @@ inline pybind11::array TriangleArray(const TriangleMesh& mesh, const pybind11::o
       reinterpret_cast<const std::uint32_t*>(mesh.triangles.data()), owner));
 }
 
-/// A map as (rows, columns), sharing its memory; None where there is none.
+/// A map as (rows, columns), sharing its memory; None without a map.
 inline pybind11::object MapArray(const std::optional<HeightMap>& map,
                                  const pybind11::object& owner) {
   if (!map) return pybind11::none();
@@ -69,7 +69,7 @@ inline pybind11::object GridDict(const std::optional<HeightMap>& map) {
   return grid;
 }
 
-/// (n, 4, 4), copied: poses are stored with their times between them.
+/// (n, 4, 4), copied, because poses are stored together with their times.
 inline pybind11::array_t<double> PoseArray(const std::vector<StampedPose>& poses) {
   pybind11::array_t<double> array(
       std::vector<pybind11::ssize_t>{static_cast<pybind11::ssize_t>(poses.size()), 4, 4});

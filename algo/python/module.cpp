@@ -32,7 +32,7 @@ Preset ParsePreset(const std::string& name) {
 
 using ProgressCall = std::function<void(const std::string& step, double fraction)>;
 
-// Forwards to Python, and turns Ctrl-C into a stop.
+// Forwards progress to Python and turns Ctrl-C into a stop request.
 std::function<void(double, std::string_view)> Forwarded(const ProgressCall& call,
                                                         std::stop_source& stop) {
   return [&call, &stop](double fraction, std::string_view step) {
@@ -103,7 +103,7 @@ py::object Evaluate(const std::filesystem::path& folder, const std::string& pres
   return py::module_::import("json").attr("loads")(json);
 }
 
-// Python's own iteration over a recording's frames.
+// Python iterator over a recording's frames.
 class RecordingIterator {
  public:
   explicit RecordingIterator(const std::filesystem::path& folder)
@@ -124,7 +124,7 @@ class RecordingIterator {
 };
 
 void AddErrors(py::module_& module) {
-  // ValueError and OSError are what a Python programmer expects of bad input and of a full disk.
+  // Python programmers expect ValueError for bad input and OSError for a full disk.
   static py::exception<DataError> data_error(module, "DataError", PyExc_ValueError);
   static py::exception<IoError> io_error(module, "IoError", PyExc_OSError);
   py::register_exception_translator([](std::exception_ptr thrown) {

@@ -21,8 +21,9 @@ struct Stop {
   Color color;
 };
 
-// Lightness falls alike on both sides, so that size reads without hue and sign without lightness.
-// `at` is |position| from the middle of the legend; log(2)/log(21) = 0.228 is the tolerance.
+// Lightness decreases equally on both sides, so that size can be read without hue and sign without
+// lightness. `at` is |position| from the middle of the legend; log(2)/log(21) = 0.228 is the
+// tolerance.
 constexpr double kAtTolerance = 0.2277;
 constexpr std::array<Stop, 7> kBelow = {{{0.0, {250, 250, 248}},
                                          {kAtTolerance - 1e-4, {226, 236, 243}},

@@ -14,16 +14,17 @@ inline constexpr Color kHoleColor = {150, 152, 156};
 /// Maps a difference in metres to a colour.
 ///
 /// Signed (the default of Plumb): blue below, orange above, nearly white within the tolerance, with
-/// a step at the tolerance; safe for colour-blind eyes (blue and orange, lightness falls with
-/// size). The axis is logarithmic in |e| / tolerance so that 1, 2, 5, 10 and 20 tolerances stay
-/// apart. Paper: blue at 0 to red at 10 cm of |e|, linear.
+/// a step at the tolerance; safe for colour-blind users (blue and orange, lightness decreases with
+/// size). The axis is logarithmic in |e| / tolerance so that 1, 2, 5, 10 and 20 tolerances can be
+/// distinguished. Paper: blue at 0 to red at 10 cm of |e|, linear.
 class ColorScale {
  public:
   /// @throws std::invalid_argument unless tolerance_m > 0.
   [[nodiscard]] static ColorScale Signed(double tolerance_m);
   [[nodiscard]] static ColorScale Paper();
 
-  /// Colour of a difference; beyond the range the colour of its end, NaN the colour of holes.
+  /// Colour of a difference. Beyond the range it is the colour of the end; NaN has the colour of
+  /// holes.
   [[nodiscard]] Color operator()(double difference_m) const;
 
   /// Position on the legend, 0 at the lower end and 1 at the upper, clamped.
@@ -33,7 +34,7 @@ class ColorScale {
 
   struct Tick {
     double difference_m;
-    std::string label;  ///< Millimetres or centimetres, signed where the scale is.
+    std::string label;  ///< In millimetres or centimetres, with a sign where the scale has one.
   };
   [[nodiscard]] std::vector<Tick> Ticks() const;
   [[nodiscard]] std::string unit() const { return is_signed_ ? "mm" : "cm"; }
@@ -45,7 +46,7 @@ class ColorScale {
   ColorScale(bool is_signed, double tolerance_m)
       : is_signed_(is_signed), tolerance_m_(tolerance_m) {}
   bool is_signed_;
-  double tolerance_m_;  // signed scale only
+  double tolerance_m_;  // used by the signed scale only
 };
 
 }  // namespace plumb

@@ -15,13 +15,14 @@ namespace {
 constexpr Color kInk = {33, 37, 41};
 constexpr Color kFaint = {92, 99, 106};
 
-/// Shading light enough to leave the legend readable: at most 14 % darker.
+/// Weak shading keeps the legend readable: at most 14 % darker.
 constexpr double kReliefStrength = 0.30;
-constexpr double kPaleOutside = 0.45;  // share of white outside the region
+constexpr double kPaleOutside = 0.45;  // fraction of white outside the region
 
 cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& options,
                      const ColorScale& scale, const cv::Rect& cells) {
-  // A table over the legend: one logarithm a cell is cheap, a search among colours is not needed.
+  // A table over the legend: one logarithm per cell is cheap, and no search among colours is
+  // needed.
   constexpr int kTableSize = 4096;
   std::vector<Color> table(kTableSize + 1);
   for (int i = 0; i <= kTableSize; ++i)

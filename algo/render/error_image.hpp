@@ -1,4 +1,4 @@
-// The error map as a picture.
+// Draws the error map.
 #pragma once
 
 #include <cstdint>
@@ -16,20 +16,21 @@
 namespace plumb {
 
 struct ErrorImageOptions {
-  double tolerance_m = 3 * kMillimetre;  ///< The signed scale is tied to it; > 0.
-  bool paper_colors = false;  ///< The paper's scale instead: |e|, blue at 0, red at 10 cm.
+  double tolerance_m = 3 * kMillimetre;  ///< Tolerance of the signed scale; > 0.
+  bool paper_colors = false;             ///< The paper's scale: |e|, blue at 0, red at 10 cm.
   std::string subtitle = {};
   const HeightMap* relief =
-      nullptr;  ///< Heights on the same grid, whose shape shades the colours a little.
-  std::span<const std::uint8_t> region_mask =
-      {};  ///< Cells inside the region (1), as the grid; outlined, the rest paler; or empty.
+      nullptr;  ///< Heights on the same grid, whose shape shades the colours slightly.
+  /// 1 for cells inside the region, on the same grid; outlined, with paler colours outside. May be
+  /// empty.
+  std::span<const std::uint8_t> region_mask = {};
   std::vector<MapMark> marks = {};
   PictureWords words = {};
 };
 
 /// Draws a map of differences (metres) with y up, holes grey, axes, scale bar, legend with units,
-/// and the research notice. The picture shows the part of the grid that holds data, of that the
-/// region and 10 cm around it. CV_8UC3, channels red, green, blue.
+/// and the research notice. The picture shows the part of the grid with data, cropped to the region
+/// and 10 cm around it. CV_8UC3, channels red, green, blue.
 /// @throws std::invalid_argument if the grid is empty, or relief or region have another grid.
 [[nodiscard]] cv::Mat DrawErrorImage(const HeightMap& difference,
                                      const ErrorImageOptions& options = {});

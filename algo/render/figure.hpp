@@ -1,4 +1,4 @@
-// A page to draw on: text, lines and pictures with smooth edges.
+// A page for drawing antialiased text, lines and pictures.
 #pragma once
 
 #include <memory>
@@ -33,7 +33,7 @@ class Figure {
   /// Text with its baseline at y.
   void Text(double x, double y, std::string_view text, const TextStyle& style);
   [[nodiscard]] double TextWidth(std::string_view text, const TextStyle& style);
-  /// Splits a text into lines that fit.
+  /// Splits a text into lines that fit the width.
   [[nodiscard]] std::vector<std::string> Wrap(std::string_view text, const TextStyle& style,
                                               double width);
 
@@ -45,7 +45,7 @@ class Figure {
             double opacity = 1.0);
   void FillTriangle(const std::array<Eigen::Vector2d, 3>& corners, const Color& color);
 
-  /// Puts an RGB picture with its top left corner at (x, y), pixel for pixel.
+  /// Draws an RGB picture with its top left corner at (x, y), pixel for pixel.
   void Picture(int x, int y, const cv::Mat& picture_rgb);
 
   [[nodiscard]] int width() const;

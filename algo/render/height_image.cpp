@@ -16,17 +16,17 @@ namespace {
 
 constexpr Color kInk = {33, 37, 41};
 constexpr Color kFaint = {92, 99, 106};
-// Lightness grows with height: readable in grey and with every kind of colour vision.
+// Lightness increases with height, readable in grey and with any colour vision.
 constexpr Color kLow = {34, 74, 120}, kHigh = {240, 226, 168};
-constexpr double kPaleOutside = 0.45;    // share of white outside the region
-constexpr double kReliefStrength = 0.6;  // of the shading
+constexpr double kPaleOutside = 0.45;    // fraction of white outside the region
+constexpr double kReliefStrength = 0.6;  // strength of the shading
 
 struct Range {
   double low_m = 0.0, high_m = 1e-3;
 };
 
-/// Of the region, where there is one: the floor beside it would take most of the colours. Without
-/// the few values at either end, which are stray.
+/// Range of heights in the region, if there is one, because the floor beside it would use most of
+/// the colours. The few outliers at either end are excluded.
 Range RangeOf(const HeightMap& heights, std::span<const std::uint8_t> region) {
   std::vector<float> known;
   for (std::size_t cell = 0; cell < heights.z.size(); ++cell) {

@@ -1,4 +1,4 @@
-// The heights of one surface as a picture.
+// Draws the heights of one surface.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +16,10 @@ namespace plumb {
 
 struct HeightImageOptions {
   std::string_view subtitle = {};
-  std::span<const std::uint8_t> region_mask =
-      {};  ///< Cells inside the region (1), as the grid; outlined, the rest paler; or empty.
-  std::optional<Eigen::Vector2d> isocentre_m = {};  ///< Marked by a cross; of the grid's frame.
+  /// 1 for cells inside the region, on the same grid; outlined, with paler colours outside. May be
+  /// empty.
+  std::span<const std::uint8_t> region_mask = {};
+  std::optional<Eigen::Vector2d> isocentre_m = {};  ///< Marked by a cross; in the grid's frame.
   std::vector<MapMark> marks = {};
   PictureWords words = {};
 };

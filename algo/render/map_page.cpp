@@ -19,11 +19,11 @@ constexpr Color kNoticeInk = {122, 28, 10};
 constexpr Color kMarkInk = {20, 60, 90};
 constexpr Color kNoticePaper = {253, 240, 222};
 
-constexpr int kMapWidth_px = 1240, kMapHeight_px = 940;  // the map fits into this
-constexpr int kMinMapHeight_px = 520;                    // room for the legend beside it
+constexpr int kMapWidth_px = 1240, kMapHeight_px = 940;  // space for the map
+constexpr int kMinMapHeight_px = 520;                    // leaves space for the legend beside it
 constexpr int kLeft_px = 84, kTop_px = 108, kLegend_px = 236, kAxis_px = 62, kGap_px = 28;
 
-/// Rounded length of 1, 2 or 5 times a power of ten, the largest that is not above `length_m`.
+/// The largest length of 1, 2 or 5 times a power of ten that is not above `length_m`.
 double RoundLength(double length_m) {
   const double power = std::pow(10.0, std::floor(std::log10(length_m) + 1e-9));
   for (const double step : {5.0, 2.0}) {
@@ -43,7 +43,7 @@ std::string LengthLabel(double length_m, const PictureWords& words) {
                     words);
 }
 
-/// Where the map lies on the page and how cells map to pixels.
+/// Position of the map on the page and mapping from cells to pixels.
 struct MapArea {
   cv::Rect box;
   GridShape grid;
@@ -105,7 +105,7 @@ void DrawAxes(Figure& figure, const MapArea& area, const PictureWords& words) {
   figure.FrameRectangle(area.box.x - 0.5, area.box.y - 0.5, area.box.width + 1, area.box.height + 1,
                         kFaint);
   figure.Text(area.box.x + area.box.width / 2.0, bottom + 49, words.x_axis, label);
-  // Above the axis, where no tick's number can be.
+  // Above the axis, where it cannot collide with a tick label.
   figure.Text(area.box.x - 11, area.box.y - 15, words.y_axis, left);
 }
 
@@ -214,7 +214,7 @@ GridShape Part(const GridShape& grid, const cv::Rect& cells) {
 }
 
 cv::Mat Relief(const HeightMap& heights, const cv::Rect& cells) {
-  // Light from the upper left of the picture, 45 degrees high.
+  // Light from the upper left of the picture at an elevation of 45 degrees.
   const Eigen::Vector3f light = Eigen::Vector3f(-1.0F, 1.0F, 1.4F).normalized();
   constexpr float kAmbient = 0.40F;
   cv::Mat relief(cells.height, cells.width, CV_32FC1, cv::Scalar(1.0));

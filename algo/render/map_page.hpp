@@ -1,5 +1,5 @@
-// The page around a map: title, axes, scale bar, legend column and the research notice. Shared by
-// all pictures.
+// Draws the page around a map: title, axes, scale bar, legend column and the research notice. Used
+// by all pictures.
 #pragma once
 
 #include <cstdint>
@@ -21,42 +21,43 @@ namespace plumb {
 struct MapPage {
   std::string title;
   std::string subtitle;  ///< One line under the title, shrunk to fit; may be empty.
-  GridShape grid;        ///< Of `cells_rgb`.
-  cv::Mat cells_rgb;     ///< CV_8UC3, one cell a pixel, row 0 at y_min (the page turns y up).
+  GridShape grid;        ///< Grid of `cells_rgb`.
+  cv::Mat cells_rgb;     ///< CV_8UC3, one pixel per cell, row 0 at y_min (the page turns y up).
   std::span<const std::uint8_t>
-      outline;  ///< Cells inside an outlined region (1) or not (0), as the grid; may be empty.
-  /// Draws the legend into the column at the right of the map.
+      outline;  ///< 1 for cells inside an outlined region, on the same grid; may be empty.
+  /// Draws the legend in the column to the right of the map.
   std::function<void(Figure&, const cv::Rect&)> draw_legend;
   std::vector<MapMark> marks = {};              ///< At the edges of the map.
-  std::optional<Eigen::Vector2d> cross_m = {};  ///< The isocentre, in the grid's frame.
+  std::optional<Eigen::Vector2d> cross_m = {};  ///< The isocentre in the grid's frame.
   PictureWords words = {};
 };
 
-/// Cells to show: all that hold a value in one of the maps, and a margin; the whole grid if none
+/// Cells to show: all that hold a value in one of the maps plus a margin, or the whole grid if none
 /// does. Columns and rows, row 0 at y_min.
 [[nodiscard]] cv::Rect CellsWithData(const GridShape& grid,
                                      std::initializer_list<std::span<const float>> maps);
 
-/// Of those, the region and 10 cm around it, where there is a region: the body fills the picture.
-/// @param region  Cells inside (1) or not (0), as the grid; may be empty.
+/// The same, cropped to the region and 10 cm around it if there is one, so that the body fills the
+/// picture.
+/// @param region  1 for cells inside, on the same grid; may be empty.
 [[nodiscard]] cv::Rect CellsAroundRegion(const GridShape& grid, const cv::Rect& with_data,
                                          std::span<const std::uint8_t> region);
 
 /// That part of a grid.
 [[nodiscard]] GridShape Part(const GridShape& grid, const cv::Rect& cells);
 
-/// The same of a mask of the whole grid; empty where the mask is.
+/// That part of a mask of the whole grid; empty if the mask is empty.
 [[nodiscard]] std::vector<std::uint8_t> PartOfMask(const GridShape& grid, const cv::Rect& cells,
                                                    std::span<const std::uint8_t> mask);
 
 /// Draws the page: CV_8UC3 RGB, at most about 1600 x 1200 pixels whatever the grid.
 [[nodiscard]] cv::Mat DrawPage(const MapPage& page);
 
-/// A legend line: a swatch and its meaning (wrapped); returns the y below it.
+/// Draws a legend line: a swatch and its meaning (wrapped). Returns the y below it.
 double DrawSwatch(Figure& figure, double x, double y, double width, const Color& color,
                   std::string_view meaning);
 
-/// How light a surface looks at a cell, about 0.55..1, lit from the upper left; 1 where a neighbour
+/// Brightness of a surface at a cell, about 0.55..1, lit from the upper left; 1 where a neighbour
 /// is missing. Row 0 at y_min; CV_32FC1.
 [[nodiscard]] cv::Mat Relief(const HeightMap& heights, const cv::Rect& cells);
 

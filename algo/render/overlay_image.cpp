@@ -11,8 +11,7 @@
 namespace plumb {
 namespace {
 
-// Lightness differs as well as hue, and violet lies between: readable with every kind of colour
-// vision.
+// Lightness differs as well as hue, and violet is between them: readable with any colour vision.
 constexpr Color kReference = {40, 104, 214};
 constexpr Color kCurrent = {226, 62, 46};
 constexpr Color kAgree = {176, 160, 190};
@@ -25,7 +24,8 @@ Color Mix(const Color& a, const Color& b, double share_of_b) {
   return mixed;
 }
 
-/// Colour where both surfaces are: from "agree" to the one on top within four tolerances.
+/// Colour where both surfaces are present: from "agree" to the upper surface's colour within four
+/// tolerances.
 Color BothColor(double current_minus_reference_m, double tolerance_m) {
   const double excess =
       std::clamp((std::abs(current_minus_reference_m) - tolerance_m) / (3 * tolerance_m), 0.0, 1.0);

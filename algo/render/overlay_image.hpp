@@ -1,4 +1,4 @@
-// Both surfaces in one picture.
+// Draws both surfaces in one picture.
 #pragma once
 
 #include <cstdint>
@@ -15,20 +15,22 @@
 namespace plumb {
 
 struct OverlayImageOptions {
-  double tolerance_m = 3 * kMillimetre;  ///< Surfaces closer than this look like one (violet); > 0.
+  /// Surfaces closer than this are drawn as one (violet); > 0.
+  double tolerance_m = 3 * kMillimetre;
   std::string subtitle = {};
-  std::span<const std::uint8_t> region_mask = {};  ///< Cells inside the region (1), as the grid:
-                                                   ///< with 10 cm around it they fill the picture.
+  /// 1 for cells inside the region, on the same grid; the picture is cropped to it and 10 cm around
+  /// it.
+  std::span<const std::uint8_t> region_mask = {};
   std::vector<MapMark> marks = {};
   PictureWords words = {};
 };
 
-/// Draws two height maps of one grid as shaded surfaces: reference blue, current red, where both
-/// are: the colour of the one on top, blending to violet where they agree within the tolerance;
-/// holes grey; y up, axes, scale bar, legend and the research notice. CV_8UC3, channels red, green,
-/// blue.
+/// Draws two height maps of one grid as shaded surfaces: reference blue, current red. Where both
+/// are present, the colour of the upper one is used, blended to violet where they agree within the
+/// tolerance. Holes are grey; y points up; with axes, scale bar, legend and the research notice.
+/// CV_8UC3, channels red, green, blue.
 /// @throws std::invalid_argument if the grids differ or are empty, the region has another grid, or
-/// the tolerance is not above 0.
+///         the tolerance is not above 0.
 [[nodiscard]] cv::Mat DrawOverlayImage(const HeightMap& reference, const HeightMap& current,
                                        const OverlayImageOptions& options = {});
 

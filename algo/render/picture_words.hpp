@@ -1,5 +1,5 @@
-// What pictures say, so that a report in another language draws them in it, and the marks at their
-// edges.
+// Texts in pictures, replaceable so that a report in another language can translate them, and the
+// marks at the edges of maps.
 #pragma once
 
 #include <string>
@@ -11,8 +11,7 @@
 
 namespace plumb {
 
-/// English where nothing else is given. With {}: patterns of fmt. The texts must outlive the
-/// drawing.
+/// English by default. Texts with {} are fmt patterns. The texts must outlive the drawing.
 struct PictureWords {
   std::string_view notice = kResearchNotice;
   std::string_view x_axis = "x (m), reference marker's frame", y_axis = "y (m)";

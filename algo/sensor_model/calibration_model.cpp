@@ -4,9 +4,9 @@ namespace plumb {
 
 namespace {
 
-// Falls with the order: a field is smooth.
+// Decreases with the order, because the field is smooth.
 constexpr double kFieldSigma = 0.006;
-constexpr double kGrowthSigma = 0.002;  // Of the share of the depth, per metre.
+constexpr double kGrowthSigma = 0.002;  // Fraction of the depth, per metre.
 
 std::array<double, CalibrationModel::kDepthSize> DepthSigmas() {
   std::array<double, CalibrationModel::kDepthSize> sigma = {0.01,  0.003, 0.004, 2.0, 2.0,

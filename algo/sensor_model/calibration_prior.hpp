@@ -1,4 +1,4 @@
-// A calibration as one vector, and what is known of it before a sweep.
+// A calibration as one vector, and its prior distribution before a sweep.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// Places of CalibrationModel's blocks in the vector.
+/// Positions of CalibrationModel's blocks in the vector.
 inline constexpr int kLensAt = 0;
 inline constexpr int kReadoutAt = kLensAt + CalibrationModel::kLensSize;
 inline constexpr int kEdgeBiasAt = kReadoutAt + 1;
@@ -19,8 +19,8 @@ using CalibrationMatrix = Eigen::Matrix<double, kCalibrationSize, kCalibrationSi
 [[nodiscard]] CalibrationVector ToVector(const CalibrationModel& calibration);
 void MoveCalibration(const CalibrationVector& by, CalibrationModel& calibration);
 
-/// Normal distribution of a sensor's calibration: 1/2 (x - mean)' information (x - mean) is what it
-/// adds to a least-squares problem.
+/// Normal distribution of a sensor's calibration; adds 1/2 (x - mean)' information (x - mean) to a
+/// least-squares problem.
 struct CalibrationPrior {
   CalibrationVector mean = CalibrationVector::Zero();
   CalibrationMatrix information = CalibrationMatrix::Zero();
@@ -30,7 +30,7 @@ struct CalibrationPrior {
   }
 };
 
-/// Of a unit that nothing is known of but its stated calibration.
+/// Prior of a unit of which only the stated calibration is known.
 [[nodiscard]] CalibrationPrior PriorOfAnyUnit(
     double edge_bias_sigma_px = CalibrationModel::kEdgeBiasSigma);
 

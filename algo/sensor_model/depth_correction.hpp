@@ -1,4 +1,4 @@
-// A calibration's correction of depth, laid out over an image.
+// A calibration's correction of depth, evaluated over an image.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@ namespace plumb {
 
 /// z' = z (1 + scale + slope_x x + slope_y y + field(x, y) + growth(x, y) FieldGrowth(z)) + offset
 /// + bow (x^2 + y^2), with x, y the CentredCoordinates() of a cell's centre. Cells are windows of
-/// `window_px` pixels, row-major; 1 for an image itself. Immutable; threads may share it.
+/// `window_px` pixels, row-major; 1 for the image itself. Immutable; threads may share it.
 class DepthCorrection {
  public:
   DepthCorrection(const CalibrationModel& calibration, int image_width, int image_height,
@@ -33,7 +33,7 @@ class DepthCorrection {
   std::vector<Cell> cells_;
 };
 
-/// FieldProducts() of each cell's centre, laid out as DepthCorrection's cells.
+/// FieldProducts() of each cell's centre, in the order of DepthCorrection's cells.
 [[nodiscard]] std::vector<FieldRow> FieldProductsOfCells(int image_width, int image_height,
                                                          int window_px);
 

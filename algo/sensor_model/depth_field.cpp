@@ -20,7 +20,7 @@ constexpr std::array<FieldOrder, kNumFieldTerms> AllFieldOrders() {
   return orders;
 }
 
-// T_0 to T_n at x, outside of [-1, 1] as at its end.
+// T_0 to T_n at x, clamped to [-1, 1].
 template <std::size_t kSize>
 std::array<double, kSize> Chebyshev(double x) {
   x = std::clamp(x, -1.0, 1.0);

@@ -12,9 +12,9 @@ namespace plumb {
 namespace {
 
 constexpr double kDaysOfDrift = 30.0;
-constexpr double kMaxDays = 3650.0;  // a clock that was never set must not make it meaningless
-// A direction in which a sweep takes away less of the variance than this says nothing, and its
-// share would be a quotient of rounding errors.
+constexpr double kMaxDays = 3650.0;  // limits the effect of a clock that was never set
+// A direction in which a sweep reduces the variance by a smaller fraction carries no information;
+// its contribution would be a quotient of rounding errors.
 constexpr double kMinTold = 0.01;
 
 // Without the shift of marker edges.
@@ -47,7 +47,7 @@ double ChiSquareLimit(int degrees_of_freedom) {
 }
 
 ProfileAgreement Agreement(const SensorProfile& before, const SensorProfile& after) {
-  // What the sweep was solved under: see PriorOfNextSweep().
+  // The prior of the sweep's solution: see PriorOfNextSweep().
   CalibrationMatrix prior = before.covariance;
   prior.diagonal() += DriftBetweenSweeps().cwiseAbs2();
   const Eigen::LLT<Reduced> root(WithoutEdges(prior));

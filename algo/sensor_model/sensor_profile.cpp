@@ -8,9 +8,9 @@
 namespace plumb {
 namespace {
 
-// By how much wider than its residuals promise the scatter of a sweep's solution is taken to be:
-// residuals share the errors that the model leaves out. Measured on three sweeps of one simulated
-// unit with known truth: all lens terms then lie within 1.5 standard deviations.
+// Factor by which the scatter of a sweep's solution exceeds what its residuals indicate, because
+// residuals share errors outside the model. Measured on three sweeps of one simulated unit with
+// known truth: with it all lens terms are within 1.5 standard deviations.
 constexpr double kSharedErrors = 3.0;
 
 CalibrationMatrix Inverse(const CalibrationMatrix& m, const char* of) {

@@ -1,4 +1,4 @@
-// What several sweeps have taught about one sensor unit, for the next sweep to begin from.
+// The calibration of one sensor unit as learned from several sweeps, used as the prior of the next.
 #pragma once
 
 #include <string>
@@ -8,36 +8,36 @@
 
 namespace plumb {
 
-/// A unit's calibration as a normal distribution. Units keep their lens and their depth image's
-/// distortion for months; the shift of marker edges belongs to the light and is never part of it.
+/// A unit's calibration as a normal distribution. The lens and the distortion of the depth image
+/// stay the same for months. The shift of marker edges depends on the light and is never included.
 struct SensorProfile {
-  std::string name;  ///< For reports.
-  Intrinsics
-      stated;  ///< Which the corrections add to; a recording with other ones is another unit.
+  std::string name;  ///< Name for reports.
+  /// Intrinsics to which the corrections apply; a recording with others is from another unit.
+  Intrinsics stated;
   int num_sweeps = 0;
   CalibrationVector mean = CalibrationVector::Zero();
   CalibrationMatrix covariance = CalibrationMatrix::Zero();
 };
 
-/// Before the first sweep.
+/// State before the first sweep.
 [[nodiscard]] SensorProfile ProfileOfAnyUnit(const Intrinsics& stated);
 
-/// What the profile says of the next sweep: its covariance and what changes from sweep to sweep,
-/// mostly with warmth.
-/// @throws DataError if the profile is of a sensor with other stated intrinsics, or its covariance
-/// is none.
+/// Prior for the next sweep: the profile's covariance plus the variation from sweep to sweep,
+/// mostly thermal.
+/// @throws DataError if the profile belongs to a sensor with other stated intrinsics, or its
+///         covariance is not positive definite.
 [[nodiscard]] CalibrationPrior PriorOfNextSweep(const SensorProfile& profile,
                                                 const Intrinsics& stated,
                                                 double edge_bias_sigma_px);
 
-/// What one sweep showed: the solution under a prior, and the information that the sweep's own
-/// residuals hold of each term.
+/// Result of one sweep: the solution under a prior, and the information in the sweep's own
+/// residuals.
 struct SweepEvidence {
   CalibrationVector solution = CalibrationVector::Zero();
   CalibrationMatrix information = CalibrationMatrix::Zero();
 };
 
-/// The profile after a sweep that was solved under `prior`, which PriorOfNextSweep() made of it.
+/// The profile after a sweep that was solved under `prior`, as returned by PriorOfNextSweep().
 [[nodiscard]] SensorProfile Learn(const SensorProfile& profile, const CalibrationPrior& prior,
                                   const SweepEvidence& evidence);
 

@@ -1,4 +1,4 @@
-// One RGB-D image pair, and where a stream of them comes from.
+// One RGB-D image pair, and the interface of its sources.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@
 
 namespace plumb {
 
-/// One colour image and the depth image that belongs to it.
-/// The images are reference counted: clone one before changing it.
+/// One colour image and its depth image. The images are reference counted: clone one before
+/// changing it.
 struct Frame {
   std::int64_t index = 0;     ///< Position of the pair in the recording, from 0.
   double color_time_s = 0.0;  ///< Stamp of the colour image: mid-exposure of its middle row.
@@ -24,24 +24,24 @@ struct Frame {
                       ///< Registered to the colour image, same size.
 };
 
-/// Everything that is known of a stream before its first frame.
+/// Properties of a stream that are known before its first frame.
 struct StreamInfo {
-  Intrinsics intrinsics;            ///< Of the colour camera (and so of the registered depth).
-  bool intrinsics_assumed = false;  ///< No calibration came with the recording: nominal values.
+  Intrinsics intrinsics;  ///< Of the colour camera (and therefore of the registered depth).
+  bool intrinsics_assumed = false;  ///< The recording has no calibration; nominal values are used.
   std::string marker_dictionary = "DICT_6X6_250";  ///< OpenCV's name, or DICT_ARUCO_MIP_36h12.
   double marker_length_m = 0.104;                  ///< Side of the black square.
   std::optional<int> reference_marker;     ///< Id of the marker whose frame is the scene's frame.
-  std::optional<std::int64_t> num_frames;  ///< Image pairs, where known beforehand.
-  std::vector<std::string> warnings;       ///< What the source assumed or left out.
+  std::optional<std::int64_t> num_frames;  ///< Number of image pairs, if known beforehand.
+  std::vector<std::string> warnings;       ///< Assumptions and omissions of the source.
 };
 
-/// A stream of frames, in order. Not thread-safe: one thread reads.
+/// A stream of frames in order. Not thread-safe: read from one thread.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
   [[nodiscard]] virtual const StreamInfo& info() const = 0;
-  /// Next frame, or nothing at the end. Blocks while a device is slow.
-  /// @throws DataError on damaged data, DeviceError on a failing device.
+  /// The next frame, or nothing at the end. Blocks while a device is slow.
+  /// @throws DataError for damaged data, DeviceError for a failing device.
   [[nodiscard]] virtual std::optional<Frame> Next() = 0;
 };
 

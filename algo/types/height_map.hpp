@@ -1,4 +1,4 @@
-// The height map: z over the reference marker's plane on a regular grid.
+// The height map: z above the reference marker's plane on a regular grid.
 #pragma once
 
 #include <cmath>
@@ -25,8 +25,8 @@ struct GridShape {
   [[nodiscard]] double x_centre(int column) const { return x_min + (column + 0.5) * step; }
   [[nodiscard]] double y_centre(int row) const { return y_min + (row + 0.5) * step; }
 
-  /// Index of the cell that holds (x, y), row-major; nothing outside the grid. The one cell
-  /// function of Plumb.
+  /// Index of the cell that contains (x, y), row-major; nothing outside the grid. All of Plumb uses
+  /// this function.
   [[nodiscard]] std::optional<std::size_t> cell(double x, double y) const {
     const double column = std::floor((x - x_min) / step);
     const double row = std::floor((y - y_min) / step);
@@ -36,7 +36,7 @@ struct GridShape {
   }
 };
 
-/// Values on a grid, row-major, row 0 at y_min; NaN where nothing is known.
+/// Values on a grid, row-major, row 0 at y_min; NaN where unknown.
 struct HeightMap {
   GridShape grid;
   std::vector<float> z;  ///< Metres; grid.num_cells() values.

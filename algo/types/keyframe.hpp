@@ -12,15 +12,15 @@
 
 namespace plumb {
 
-/// A depth image with its pose: the input of surfaces. The images are borrowed by reference count.
+/// A depth image with its pose, the input of surfaces. The images are shared by reference count.
 struct DepthView {
   Intrinsics intrinsics;  ///< Of the depth image (colour camera's grid when registered).
-  cv::Mat depth_m;        ///< CV_32FC1, metres, 0 = nothing measured.
+  cv::Mat depth_m;        ///< CV_32FC1, metres, 0 where nothing was measured.
   cv::Mat color_rgb;      ///< CV_8UC3 of the same size, or empty.
   Pose T_world_camera = Pose::Identity();  ///< At the depth image's time.
 };
 
-/// A frame kept for reconstruction: its view, its stamps and the markers seen in its colour image.
+/// A frame kept for reconstruction, with its view, its stamps and the markers in its colour image.
 struct Keyframe {
   std::int64_t frame_index = 0;
   double color_time_s = 0.0;

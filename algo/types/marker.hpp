@@ -1,4 +1,4 @@
-// Fiducial markers: what is seen in an image, and where they are in a scene.
+// Fiducial markers in images and in scenes.
 #pragma once
 
 #include <array>
@@ -21,19 +21,19 @@ struct MarkerObservation {
   int id = 0;
   ImageCorners corners;
   std::array<double, 4> sigma_px = {
-      0.3, 0.3, 0.3, 0.3};  ///< Standard deviation of each corner, per coordinate, pixels.
+      0.3, 0.3, 0.3, 0.3};  ///< Standard deviation of each corner per coordinate, pixels.
 };
 
-/// Corners of a marker of the given side in its own frame, in detector order.
+/// Corners of a marker of the given side length in its own frame, in detector order.
 [[nodiscard]] inline MarkerCorners CornersInMarkerFrame(double length_m) {
   const double h = length_m / 2.0;
   return {Eigen::Vector3d(-h, h, 0), Eigen::Vector3d(h, h, 0), Eigen::Vector3d(h, -h, 0),
           Eigen::Vector3d(-h, -h, 0)};
 }
 
-/// A marker's corners in a scene, with how well they are known.
+/// A marker's corners in a scene, with their uncertainty.
 struct SceneMarker {
-  MarkerCorners corners;   ///< Scene frame.
+  MarkerCorners corners;   ///< In the scene frame.
   int num_views = 0;       ///< Keyframes (or frames) that contributed.
   double sigma_m = 0.001;  ///< Standard deviation of one corner coordinate, metres.
 };

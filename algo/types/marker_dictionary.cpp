@@ -18,15 +18,15 @@
 namespace plumb {
 namespace {
 
-/// A family of markers. The smaller sets of one size are the first codes of the largest.
+/// A family of markers. The smaller sets of one size are the first codes of the largest set.
 struct Family {
   std::string_view name;
   int bits_per_side;
-  int max_correction_bits;  ///< OpenCV's; MIP: distance 12 leaves one code nearest.
+  int max_correction_bits;  ///< As in OpenCV; MIP: distance 12 leaves one nearest code.
   std::span<const std::uint64_t> codes;
 };
 
-/// The original ArUco family has no table: each row of five cells is one of four words, chosen by
+/// The original ArUco family has no table: each row of five cells is one of four words, selected by
 /// two bits of the id, the highest first.
 constexpr std::array<std::uint64_t, 1024> OriginalCodes() {
   constexpr std::array<std::uint64_t, 4> kRows = {0b10000, 0b10111, 0b01001, 0b01110};

@@ -1,4 +1,4 @@
-// The families of square fiducial markers that Plumb knows: names, code words, patterns.
+// The supported families of square fiducial markers: names, code words, patterns.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,15 @@ namespace plumb {
 /// of one cell. Immutable and cheap to move; safe to share between threads.
 class MarkerDictionary {
  public:
-  /// The dictionary of that name, or nothing when it is unknown. Names are OpenCV's (DICT_4X4_50 ..
-  /// DICT_APRILTAG_36h11) and DICT_ARUCO_MIP_36h12, which OpenCV 4.6 lacks. Letter case does not
-  /// matter; name() has the usual spelling.
+  /// The dictionary of that name, or nothing if it is unknown. Names are OpenCV's (DICT_4X4_50 ..
+  /// DICT_APRILTAG_36h11) and DICT_ARUCO_MIP_36h12, which OpenCV 4.6 does not have. Letter case
+  /// does not matter; name() has the usual spelling.
   [[nodiscard]] static std::optional<MarkerDictionary> Find(std::string_view name);
 
   /// As Find(). @throws DataError for an unknown name; the message lists the known ones.
   [[nodiscard]] static MarkerDictionary ByName(std::string_view name);
 
-  /// Names that Find() accepts, in OpenCV's order, our own last.
+  /// Names that Find() accepts, in OpenCV's order, then Plumb's own.
   [[nodiscard]] static const std::vector<std::string>& KnownNames();
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -35,9 +35,8 @@ class MarkerDictionary {
     return max_correction_bits_;
   }  ///< Wrong bits that stay unambiguous.
 
-  /// True if the cell is white. Row 0 is the upper one and column 0 the left one on the upright
-  /// print, so that the first corner of the marker (detector order) lies at the outer corner of
-  /// cell (0, 0).
+  /// True if the cell is white. Row 0 is the top and column 0 the left one on the upright print, so
+  /// that the first corner of the marker (detector order) is the outer corner of cell (0, 0).
   /// @throws std::invalid_argument outside the dictionary or the pattern.
   [[nodiscard]] bool Bit(int id, int row, int column) const;
 

@@ -13,7 +13,7 @@ using Color = std::array<std::uint8_t, 3>;  ///< red, green, blue
 
 /// Points with optional attributes: an attribute vector is either empty or as long as `points`.
 struct PointCloud {
-  std::vector<Eigen::Vector3f> points;   ///< Metres, in the frame the owner's name states.
+  std::vector<Eigen::Vector3f> points;   ///< Metres, in the frame stated by the owner's name.
   std::vector<Eigen::Vector3f> normals;  ///< Unit length, towards the sensor.
   std::vector<Color> colors;
 
@@ -21,7 +21,8 @@ struct PointCloud {
   [[nodiscard]] bool empty() const { return points.empty(); }
 };
 
-/// Triangle mesh, counter-clockwise seen from outside; colours optional (empty or one a vertex).
+/// Triangle mesh, counter-clockwise seen from outside; colours are optional (empty or one per
+/// vertex).
 struct TriangleMesh {
   std::vector<Eigen::Vector3f> vertices;
   std::vector<Eigen::Vector3f> normals;

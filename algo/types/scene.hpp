@@ -1,4 +1,4 @@
-// A reconstructed scene: what `plumb reconstruct` makes and `plumb compare` reads.
+// A reconstructed scene, which `plumb reconstruct` writes and `plumb compare` reads.
 #pragma once
 
 #include <cstdint>
@@ -24,13 +24,13 @@ enum class SceneFrame { kReferenceMarker, kFirstKeyframe };
   return frame == SceneFrame::kReferenceMarker ? "reference_marker" : "first_keyframe";
 }
 
-/// A camera pose with the time it belongs to (the depth image's stamp).
+/// A camera pose with its time (the depth image's stamp).
 struct StampedPose {
   double time_s = 0.0;
   Pose T_world_camera = Pose::Identity();  ///< world = the scene's own frame
 };
 
-/// All of one scan. Lengths in metres, everything in the scene's own frame.
+/// Content of one scan. Lengths in metres, everything in the scene's own frame.
 struct Scene {
   Preset preset = Preset::kBest;
   SceneFrame frame = SceneFrame::kFirstKeyframe;
@@ -46,12 +46,12 @@ struct Scene {
   std::int64_t frames_dropped = 0;
   double longest_lost_s = 0.0;  ///< Longest time without a pose between two tracked frames.
 
-  PointCloud cloud;  ///< Merged surface: normals always, colours unless left out.
+  PointCloud cloud;  ///< Merged surface; always with normals, with colours unless disabled.
   std::optional<HeightMap> height_map;  ///< Only in the reference marker's frame.
-  TriangleMesh mesh;                    ///< Of the height map, or empty.
+  TriangleMesh mesh;                    ///< Mesh of the height map; may be empty.
 
-  std::optional<std::string> sensor_profile;  ///< Name of what was known of the sensor unit.
-  std::map<std::string, double> calibration;  ///< What was estimated; keys carry their units.
+  std::optional<std::string> sensor_profile;  ///< Name of the sensor unit's profile.
+  std::map<std::string, double> calibration;  ///< Estimated calibration; the keys state the units.
   std::map<std::string, double> timings_s;
   std::vector<std::string> warnings;
 };
