@@ -1,4 +1,4 @@
-// The light (and beeper) that shows the technician what the appliance is doing.
+// The light (and beeper) that shows the technician the appliance's state.
 #pragma once
 
 namespace plumb {
@@ -12,18 +12,18 @@ enum class IndicatorPattern {
   kTooNear,
   kTooFar,
   kWorking,
-  kDone,  ///< A scan that was compared with nothing.
+  kDone,  ///< A scan without comparison.
   kResultInTolerance,
-  kResultUnsure,  ///< Every value within its tolerance, but not with its uncertainty.
+  kResultUnsure,  ///< Every value is within its tolerance, but not with its uncertainty.
   kResultMove,
   kNoAnswer,
   kFault,
-  kReadyRolledBack,  ///< Ready, but the machine has gone back to the system from before an update.
-  kStopped,          ///< Nobody scans: the service is not running.
+  kReadyRolledBack,  ///< Ready, but the system before the last update was restored.
+  kStopped,          ///< The service is not running, and no scan is possible.
 };
 
-/// A light. One thread (the event loop's) calls; no call blocks or throws: a broken light must not
-/// stop a scan.
+/// A light. Called on the event loop's thread only. No call blocks or throws: a broken light must
+/// not stop a scan.
 class Indicator {
  public:
   virtual ~Indicator() = default;

@@ -1,4 +1,4 @@
-// Where the files lie that came with the running program.
+// Finds files that are installed with the running program.
 #pragma once
 
 #include <filesystem>
@@ -6,9 +6,9 @@
 
 namespace plumb {
 
-/// Looks for `relative` in the folders above the running program, nearest first: an installed
-/// /usr/bin/plumb finds /usr/lib/plumb/..., and programs of a build tree find what lies in the
-/// build folder.
+/// Searches for `relative` in the folders above the running program, nearest first: an installed
+/// /usr/bin/plumb finds /usr/lib/plumb/..., and programs of a build tree find files in the build
+/// folder.
 [[nodiscard]] std::optional<std::filesystem::path> FindBesideProgram(
     const std::filesystem::path& relative);
 

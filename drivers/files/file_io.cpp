@@ -42,7 +42,8 @@ Container ReadInto(const std::filesystem::path& path, std::size_t max_bytes) {
     const int error = errno;
     if (error == ENOENT || error == ENOTDIR)
       throw DataError(fmt::format("file {} is missing", path.string()));
-    if (error == EMFILE || error == ENFILE)  // not the file's fault: nobody should correct it
+    // not an error of the file, so the message must not ask to correct it
+    if (error == EMFILE || error == ENFILE)
       throw IoError(fmt::format(
           "cannot open {}: {}; close what else is open, or raise the limit (LimitNOFILE)",
           path.string(), ErrorText(error)));

@@ -1,4 +1,4 @@
-// Whole files in and out, with the errors that the rest of Plumb expects.
+// Reads and writes whole files, with Plumb's exceptions.
 #pragma once
 
 #include <cstddef>
@@ -11,18 +11,17 @@
 
 namespace plumb {
 
-/// The bytes of a regular file. Never blocks on a pipe or device that stands where a file should.
-/// @throws DataError if the file is missing, unreadable, no regular file or longer than
-/// `max_bytes`.
+/// The bytes of a regular file. Never blocks on a pipe or device in place of a file.
+/// @throws DataError if the file is missing, unreadable, not a regular file or longer than
+///         `max_bytes`.
 [[nodiscard]] std::vector<std::uint8_t> ReadWholeFile(const std::filesystem::path& path,
                                                       std::size_t max_bytes);
 
 /// The same as text.
 [[nodiscard]] std::string ReadTextFile(const std::filesystem::path& path, std::size_t max_bytes);
 
-/// A new file, written through one buffer. The owner calls Close(); a writer that goes away without
-/// it (an exception passed by) removes its file, unless what stands there is a device or a pipe.
-/// Not thread-safe.
+/// A new file, written through one buffer. The owner calls Close(); destroyed without it (by an
+/// exception), a writer removes its file, unless the file is a device or a pipe. Not thread-safe.
 class FileWriter {
  public:
   /// Creates or truncates the file. @throws IoError
@@ -31,11 +30,11 @@ class FileWriter {
   FileWriter(const FileWriter&) = delete;
   FileWriter& operator=(const FileWriter&) = delete;
 
-  /// @throws IoError, with the hint to free space when the disk is full.
+  /// @throws IoError, with the advice to free space when the disk is full.
   void Write(std::span<const std::uint8_t> bytes);
   void Write(std::string_view text);
 
-  /// Writes what is buffered and closes. @throws IoError
+  /// Writes the buffer and closes. @throws IoError
   void Close();
 
  private:
@@ -58,7 +57,7 @@ void WriteWholeFile(const std::filesystem::path& path, std::string_view text);
 /// Forces a file's or a folder's contents to the disk. @throws IoError
 void SyncToDisk(const std::filesystem::path& path);
 
-/// "cannot write FILE: REASON", with what to do where that is known (ENOSPC, EDQUOT, EFBIG, EACCES,
+/// "cannot write FILE: REASON", with advice where it is known (ENOSPC, EDQUOT, EFBIG, EACCES,
 /// EROFS).
 [[nodiscard]] std::string DescribeWriteError(const std::filesystem::path& path, int error_number);
 

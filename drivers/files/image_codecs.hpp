@@ -1,8 +1,7 @@
-// The decoders behind image_file.hpp, one file a library. Only image_file.cpp includes this.
+// The decoders behind image_file.hpp, one file per library. Included by image_file.cpp only.
 //
-// libpng and libjpeg report errors by longjmp. Every function that calls setjmp here holds nothing
-// with a destructor and calls nothing of C++ that could; memory belongs to its caller, who then
-// throws.
+// libpng and libjpeg report errors by longjmp. A function that calls setjmp here holds no object
+// with a destructor and calls no C++ function that could; its caller owns the memory and throws.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
-// Image files through libpng, libjpeg and libtiff directly: strict (a damaged image is never half
-// accepted) and bounded.
+// Image files through libpng, libjpeg and libtiff directly: strict (a damaged image is never partly
+// accepted) and with limited sizes.
 //
-// Decoders take bytes and a name for messages; all functions are thread-safe and deterministic.
+// Decoders take bytes and a name for messages. All functions are thread-safe and deterministic.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,8 @@
 
 namespace plumb {
 
-/// Largest width and height that any reader accepts; checked in the header, before memory is taken.
+/// Largest width and height that a reader accepts; checked in the header, before memory is
+/// allocated.
 inline constexpr int kMaxImageSide = 4096;
 /// Largest side of a TIFF grid (a height map of 4 m at 1 mm has 4000 cells a side).
 inline constexpr int kMaxGridSide = 16384;
@@ -28,9 +29,9 @@ inline constexpr int kMaxGridSide = 16384;
 [[nodiscard]] cv::Mat DecodeColorImage(std::span<const std::uint8_t> bytes,
                                        const std::string& name);
 
-/// A depth image: PNG with one 16-bit channel, nothing else.
+/// A depth image: a PNG with one 16-bit channel and nothing else.
 /// @return CV_16UC1, units as stored.
-/// @throws DataError as above, and if the PNG has 8 bits or other than one channel.
+/// @throws DataError as above, and if the PNG has 8 bits or another number of channels.
 [[nodiscard]] cv::Mat ReadDepthImage(const std::filesystem::path& path);
 [[nodiscard]] cv::Mat DecodeDepthImage(std::span<const std::uint8_t> bytes,
                                        const std::string& name);
@@ -46,7 +47,7 @@ void WritePng(const std::filesystem::path& path, const cv::Mat& image);
 void WriteJpeg(const std::filesystem::path& path, const cv::Mat& rgb, int quality);
 [[nodiscard]] std::vector<std::uint8_t> EncodeJpeg(const cv::Mat& rgb, int quality);
 
-/// CV_32FC1 as an uncompressed single-channel IEEE float TIFF; NaN is kept.
+/// CV_32FC1 as an uncompressed single-channel IEEE float TIFF; NaN is preserved.
 /// @throws std::invalid_argument, IoError as WritePng().
 void WriteFloatTiff(const std::filesystem::path& path, const cv::Mat& values);
 [[nodiscard]] std::vector<std::uint8_t> EncodeFloatTiff(const cv::Mat& values);

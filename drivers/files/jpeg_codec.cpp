@@ -1,4 +1,4 @@
-// jpeglib.h needs FILE and size_t declared before it.
+// jpeglib.h needs FILE and size_t to be declared before it.
 #include <cstddef>
 #include <cstdio>
 // clang-format off
@@ -23,7 +23,7 @@ namespace {
 constexpr int kMaxScans = 64;
 
 struct ErrorManager {
-  jpeg_error_mgr base;  ///< First: libjpeg hands back a pointer to it.
+  jpeg_error_mgr base;  ///< Must be first: libjpeg returns a pointer to it.
   std::jmp_buf target;
   char text[JMSG_LENGTH_MAX];
 };
@@ -34,8 +34,8 @@ void OnFatal(j_common_ptr info) {
   std::longjmp(error->target, 1);
 }
 
-/// libjpeg goes on after damage (level -1) and fills the rest with grey. Here only notes that cost
-/// no pixels pass.
+/// libjpeg continues after damage (level -1) and fills the rest with grey. Here only warnings that
+/// cost no pixels are accepted.
 void OnMessage(j_common_ptr info, int level) {
   if (level >= 0) return;
   const int code = info->err->msg_code;
@@ -105,7 +105,7 @@ bool ReadRows(Reader& reader, std::uint8_t* pixels, std::size_t stride) {
 struct Writer {
   ErrorManager error{};
   jpeg_compress_struct info{};
-  unsigned char* bytes = nullptr;  ///< malloc'ed by libjpeg
+  unsigned char* bytes = nullptr;  ///< Allocated by libjpeg with malloc.
   unsigned long size = 0;
 
   Writer() { info.err = Prepare(error); }

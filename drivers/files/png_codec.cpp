@@ -14,8 +14,9 @@
 namespace plumb {
 namespace {
 
-constexpr png_alloc_size_t kMaxChunkBytes = std::size_t{8}
-                                            << 20;  // of text and profiles, which are not used here
+constexpr png_alloc_size_t kMaxChunkBytes =
+    std::size_t{8}  // for text and profiles, which are not used here
+    << 20;
 constexpr int kCompressionLevel = 1;
 
 struct ErrorText {
@@ -32,7 +33,7 @@ void OnWarning(png_structp, png_const_charp) {}
 
 // ---- reading
 
-/// Bytes to decode, and libpng's own structs; freed at the end.
+/// Bytes to decode and libpng's own structs, which are freed at the end.
 struct Reader {
   std::span<const std::uint8_t> bytes;
   std::size_t offset = 0;
@@ -53,7 +54,7 @@ void ReadBytes(png_structp png, png_bytep out, png_size_t count) {
   reader->offset += count;
 }
 
-/// All chunks before the pixels. False: reader.error says why.
+/// Reads all chunks before the pixels. False: reader.error states why.
 bool ReadHeader(Reader& reader) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_set_chunk_malloc_max(reader.png, kMaxChunkBytes);
@@ -62,7 +63,7 @@ bool ReadHeader(Reader& reader) {
   return true;
 }
 
-/// Asks for 8-bit RGB, or for 16-bit values in the machine's byte order. False: reader.error says
+/// Requests 8-bit RGB, or 16-bit values in the machine's byte order. False: reader.error states
 /// why.
 bool SetTransforms(Reader& reader, codec::PngKind kind) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
@@ -79,8 +80,8 @@ bool SetTransforms(Reader& reader, codec::PngKind kind) {
   return true;
 }
 
-/// All rows and the chunks after them, so that a file cut short anywhere is found. False:
-/// reader.error says why.
+/// Reads all rows and the chunks after them, so that truncation anywhere is found. False:
+/// reader.error states why.
 bool ReadRows(Reader& reader, png_bytepp rows) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_read_image(reader.png, rows);
@@ -124,7 +125,7 @@ void WriteBytes(png_structp png, png_bytep data, png_size_t count) {
   try {
     writer->bytes.insert(writer->bytes.end(), data, data + count);
   } catch (const std::bad_alloc&) {
-    out_of_memory = true;  // no exception may cross libpng's frames
+    out_of_memory = true;  // no exception may pass through libpng's frames
   }
   if (out_of_memory) png_error(png, "out of memory");
 }

@@ -18,10 +18,10 @@ constexpr std::size_t kMaxCells = std::size_t{1} << 25;  // 128 MiB of floats
 constexpr tmsize_t kMaxSingleAllocation = tmsize_t{256} << 20;
 constexpr std::uint32_t kRowsPerStrip = 64;
 
-/// A TIFF in memory, as libtiff's client sees it.
+/// A TIFF in memory, as seen by libtiff's client functions.
 struct Stream {
-  std::span<const std::uint8_t> in;          ///< When reading.
-  std::vector<std::uint8_t>* out = nullptr;  ///< When writing.
+  std::span<const std::uint8_t> in;          ///< Used for reading.
+  std::vector<std::uint8_t>* out = nullptr;  ///< Used for writing.
   std::uint64_t position = 0;
   char error[200] = "unknown error";
 
@@ -46,7 +46,7 @@ tmsize_t StreamWrite(thandle_t handle, void* data, tmsize_t count) {
   try {
     if (end > stream->out->size()) stream->out->resize(end);
   } catch (const std::bad_alloc&) {
-    return 0;  // no exception may cross libtiff's frames; it reports a short write
+    return 0;  // no exception may pass through libtiff's frames; it reports a short write
   }
   std::memcpy(stream->out->data() + stream->position, data, static_cast<std::size_t>(count));
   stream->position = end;
@@ -72,7 +72,7 @@ int OnError(TIFF*, void* user, const char* module, const char* format, va_list a
     std::vsnprintf(stream->error + used, sizeof stream->error - static_cast<std::size_t>(used),
                    format, arguments);
   }
-  return 1;  // handled: nothing on stderr
+  return 1;  // handled, so that nothing is printed on stderr
 }
 
 int OnWarning(TIFF*, void*, const char*, const char*, va_list) { return 1; }
@@ -126,8 +126,8 @@ cv::Mat DecodeFloatTiff(std::span<const std::uint8_t> bytes, const std::string& 
                     name, channels, channels == 1 ? "" : "s", bits, format,
                     TIFFIsTiled(tiff.get()) != 0 ? ", tiled" : ""));
   }
-  // Uncompressed pixels cannot be more than the file: a header that promises too much is found
-  // before memory is taken.
+  // Uncompressed pixels cannot be larger than the file, so a header with wrong sizes is found
+  // before memory is allocated.
   std::uint16_t compression = COMPRESSION_NONE;
   TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_COMPRESSION, &compression);
   const std::size_t num_cells = static_cast<std::size_t>(width) * height;

@@ -1,4 +1,4 @@
-// The only file that knows libgpiod (its version 1; version 2 has another interface).
+// The only file that uses libgpiod (version 1; version 2 has another interface).
 #include "drivers/gpio/gpio.hpp"
 
 #include <gpiod.h>
@@ -66,14 +66,14 @@ struct GpioButton::Impl {
   std::string name;
   std::optional<ButtonDebouncer> debouncer;
   std::function<void(ButtonPress)> pressed;
-  Clock::time_point last;  ///< The last time that the debouncer saw.
+  Clock::time_point last;  ///< Last time passed to the debouncer.
 
   void Notify(std::optional<ButtonPress> press) const {
     if (press && pressed) pressed(*press);
   }
 
-  /// The time of an event by its stamp, so that a late loop still sees how long the button was
-  /// held. Since Linux 5.7 stamps are of the monotonic clock; one of another clock does not lie
+  /// The time of an event from its stamp, so that a late loop still knows how long the button was
+  /// held. Since Linux 5.7 stamps are of the monotonic clock; a stamp of another clock is not
   /// between the last time and now.
   [[nodiscard]] Clock::time_point TimeOf(const gpiod_line_event& event,
                                          Clock::time_point now) const {
@@ -129,7 +129,7 @@ void GpioButton::Dispatch(Clock::time_point now) {
         impl_->debouncer->OnEdge(event.event_type == GPIOD_LINE_EVENT_RISING_EDGE, impl_->last));
   }
   impl_->last = now;
-  // The kernel keeps 16 edges and drops later ones, so the final level has to be read from the
+  // The kernel buffers 16 edges and drops later ones, so the final level has to be read from the
   // line.
   const int value = gpiod_line_get_value(impl_->line);
   impl_->Notify(value < 0 ? impl_->debouncer->OnTime(now)

@@ -1,5 +1,5 @@
-// Button and light on GPIO lines, by the names of chip and line. One thread, the event loop's, uses
-// everything here.
+// Button and light on GPIO lines, identified by the names of chip and line. Everything here is used
+// on the event loop's thread only.
 #pragma once
 
 #include <array>
@@ -18,13 +18,13 @@ namespace plumb {
 /// A line of a chip.
 struct GpioLineName {
   std::string chip = "gpiochip0";  ///< Name, label, number or path of the chip.
-  std::string line;  ///< Name of the line, as the device tree has it, or its number as `#17`.
+  std::string line;  ///< Name of the line as in the device tree, or its number as `#17`.
 };
 
 struct GpioButtonOptions {
   GpioLineName where;
   bool active_low =
-      true;  ///< A press pulls the line to ground; the chip's own pull-up is switched on.
+      true;  ///< A press pulls the line to ground; the chip's internal pull-up is switched on.
   ButtonDebouncer::Options timing = {};
 };
 
@@ -46,9 +46,9 @@ class GpioButton : public Button {
 
 struct GpioIndicatorOptions {
   std::string chip = "gpiochip0";
-  /// Red, green, blue; empty: no such light. A single light shows all colours.
+  /// Red, green, blue; empty if there is no such light. A single light shows all colours.
   std::array<std::string, 3> lights;
-  std::string beeper;  ///< Empty: none.
+  std::string beeper;  ///< Empty if there is none.
   bool active_low = false;
 };
 
@@ -61,7 +61,7 @@ class GpioIndicator : public Indicator {
   ~GpioIndicator() override;  ///< Switches everything off.
 
   void Show(IndicatorPattern pattern) noexcept override;
-  /// When Dispatch() must be called next; nothing while the light is steady.
+  /// Time of the next Dispatch(); nothing while the light is steady.
   [[nodiscard]] std::optional<Clock::time_point> deadline() const;
   void Dispatch(Clock::time_point now) noexcept;
 
@@ -73,7 +73,7 @@ class GpioIndicator : public Indicator {
 /// The lines and chips that exist, for diagnosis.
 struct GpioChipDescription {
   std::string name, label;
-  std::vector<std::string> lines;  ///< The names of those that have one.
+  std::vector<std::string> lines;  ///< Names of the lines that have one.
   std::string problem;             ///< Why the chip cannot be opened; empty if it can.
 };
 [[nodiscard]] std::vector<GpioChipDescription> ListGpioChips();

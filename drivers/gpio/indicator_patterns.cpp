@@ -44,15 +44,15 @@ constexpr std::array kNoAnswerSteps{
 constexpr std::array kFaultSteps{IndicatorStep{kRed, milliseconds(80)},
                                  IndicatorStep{0, milliseconds(80)}};
 
-// Almost as when ready: scans are possible.
+// Similar to ready, because scans are possible.
 constexpr std::array kReadyRolledBackSteps{IndicatorStep{kGreen, milliseconds(1500)},
                                            IndicatorStep{kRed, milliseconds(300)}};
 
-// Slow, so that it is not mistaken for a fault of a running service.
+// Slow, so that it is not mistaken for an error of a running service.
 constexpr std::array kStoppedSteps{IndicatorStep{kRed, milliseconds(1000)},
                                    IndicatorStep{0, milliseconds(1000)}};
 
-constexpr int kMaxCatchUp = 64;  // steps; the loop slept longer than any rhythm, so it starts again
+constexpr int kMaxCatchUp = 64;  // steps; after a longer delay of the loop the rhythm starts again
 
 }  // namespace
 

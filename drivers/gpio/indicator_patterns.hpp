@@ -10,12 +10,12 @@
 
 namespace plumb {
 
-/// Outputs as bits. A device with fewer lights shows any colour with those that it has.
+/// Outputs as bits. A device with fewer lights shows every colour with those that it has.
 enum IndicatorOutput : std::uint8_t { kRed = 1, kGreen = 2, kBlue = 4, kBeeper = 8 };
 
 struct IndicatorStep {
   std::uint8_t outputs = 0;             ///< Bits of IndicatorOutput.
-  std::chrono::milliseconds length{0};  ///< 0: for ever.
+  std::chrono::milliseconds length{0};  ///< 0: without end.
 };
 
 /// Steps are played in order; those from `repeat_from` on are repeated.
@@ -24,16 +24,16 @@ struct IndicatorProgram {
   std::size_t repeat_from = 0;
 };
 
-/// Patterns differ in rhythm too, so that a lamp of one colour can show them all.
+/// Patterns also differ in rhythm, so that a lamp of one colour can show them all.
 [[nodiscard]] IndicatorProgram ProgramOf(IndicatorPattern pattern);
 
-/// Plays the program of one pattern. Pure: the caller passes the time.
+/// Plays the steps of one pattern. Pure: the caller passes the time.
 class IndicatorPlayer {
  public:
   using Clock = std::chrono::steady_clock;
-  /// Begins a pattern; the current pattern continues undisturbed.
+  /// Starts a pattern; if it is the current one, it continues undisturbed.
   void Show(IndicatorPattern pattern, Clock::time_point now);
-  /// Steps forward to `now`.
+  /// Advances to `now`.
   void OnTime(Clock::time_point now);
   [[nodiscard]] std::uint8_t outputs() const { return program_.steps[step_].outputs; }
   [[nodiscard]] std::optional<Clock::time_point> deadline() const;

@@ -1,4 +1,4 @@
-// The part of a live sensor that is the same for all drivers: pairs come out of a FrameBox.
+// The part of a live sensor that all drivers share: pairs come from a FrameBox.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace plumb {
 
-/// The driver's thread puts images into the box, CV_8UC3 as RGB and CV_16UC1 in millimetres.
+/// The driver's thread puts images into the box: CV_8UC3 as RGB and CV_16UC1 in millimetres.
 class BoxedSensor : public LiveSensor {
  public:
   [[nodiscard]] const SensorDescription& description() const override { return description_; }

@@ -10,7 +10,8 @@ namespace plumb {
 namespace {
 
 constexpr std::chrono::seconds kRateWindow{1};
-constexpr std::chrono::milliseconds kLook{100};  // Take() looks at the clock at least so often
+// longest time between two checks of the clock in Take()
+constexpr std::chrono::milliseconds kLook{100};
 constexpr std::size_t kMaxStamps = 100'000;
 
 std::size_t Side(StreamKind kind) { return kind == StreamKind::kColor ? 0 : 1; }
@@ -54,7 +55,7 @@ void FrameBox::CountDiscarded() {
 void FrameBox::CountGaps(StreamKind kind, std::int64_t number) {
   const std::lock_guard lock(mutex_);
   std::optional<std::int64_t>& last = last_number_[Side(kind)];
-  if (last && number <= *last) return;  // doubled or out of order: counted as such
+  if (last && number <= *last) return;  // a duplicate or out of order; counted as such
   if (last) num_lost_ += number - *last - 1;
   last = number;
 }
@@ -110,9 +111,9 @@ void FrameBox::Begin(int pairs_to_skip) {
   absent_ = longest_gap_ = {};
 }
 
-/// A process that is stopped, or gets no processor, comes late to where it waits. The driver's
-/// threads belong to it, so that no pairs come then says nothing about the sensor. Where pairs came
-/// all the same, only the caller was busy.
+/// A process that was stopped, or got no processor time, wakes up late. The driver's threads belong
+/// to it, so that missing pairs then say nothing about the sensor. If pairs arrived nevertheless,
+/// only the caller was busy.
 void FrameBox::NoteAbsence() {
   const Clock::time_point now = Clock::now();
   absent_ += std::max(Clock::duration::zero(), now - listened_ - kLook);

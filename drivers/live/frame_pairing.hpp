@@ -1,4 +1,4 @@
-// Which colour image belongs to which depth image, by their stamps as they come.
+// Pairs colour and depth images by their stamps as they arrive.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@ namespace plumb {
 
 enum class StreamKind { kColor, kDepth };
 
-/// Pairs two streams of images whose stamps are of one clock. Because the gap allowed is under half
-/// of the frame period, an image has at most one partner, so it does not matter which stream
-/// delivers first. Pure: no clock, no thread.
+/// Pairs two streams of images with stamps of one clock. The allowed gap is less than half of the
+/// frame period, so an image has at most one partner and it does not matter which stream delivers
+/// first. Pure: no clock, no thread.
 template <typename Image>
 class FramePairing {
  public:
@@ -39,7 +39,7 @@ class FramePairing {
     return Match();
   }
 
-  /// Forgets what waits for a partner, without counting it.
+  /// Drops the images that wait for a partner, without counting them.
   void Clear() {
     color_.waiting.clear();
     depth_.waiting.clear();

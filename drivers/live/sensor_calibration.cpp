@@ -30,8 +30,8 @@ CameraFile ParseCalibration(const std::string& text, const std::string& name, in
   return camera;
 }
 
-/// Where the room says which markers it has, a sensor's file cannot say otherwise: the side of a
-/// marker is the scale of everything, and the reference marker is the frame of every plan.
+/// The room's markers take precedence over a sensor's file: the side length of a marker is the
+/// scale of everything, and the reference marker is the frame of every plan.
 void RefuseOtherMarkers(const SensorSettings& room, const CameraFile& camera,
                         const std::string& file) {
   const auto refuse = [&](const char* key, const char* setting, const std::string& found,
@@ -54,7 +54,7 @@ void RefuseOtherMarkers(const SensorSettings& room, const CameraFile& camera,
            room.reference_marker ? fmt::format("{}", *room.reference_marker) : "none configured");
 }
 
-/// What `read` gives; its DataError becomes the sensor's, with what to do about it.
+/// Result of `read`; a DataError becomes a DeviceError of the sensor, with advice.
 template <typename Read>
 auto ForSensor(const std::string& serial, Read&& read) try {
   return read();

@@ -1,4 +1,4 @@
-// The calibration of a live sensor's camera before its first frame.
+// Finds the calibration of a live sensor's camera before its first frame.
 #pragma once
 
 #include <filesystem>
@@ -9,22 +9,21 @@
 
 namespace plumb {
 
-/// `FOLDER/SERIAL.yaml`; what a file name should not hold is replaced by `_`, since the serial
-/// comes from the device.
+/// `FOLDER/SERIAL.yaml`. Characters that do not belong in a file name are replaced by `_`, because
+/// the serial comes from the device.
 [[nodiscard]] std::filesystem::path CalibrationFile(const std::filesystem::path& folder,
                                                     const std::string& serial);
 
-/// The calibration file of the unit, scaled to the image size, or nominal intrinsics with a
-/// warning.
-/// @param horizontal_fov_rad  Of the colour camera as the driver states it; out of (0.2, 2.5):
-/// TUM's published 525 pixels.
-/// @throws DeviceError if the unit's file is there but damaged, of another shape of image, or names
-/// other markers than the room's (SensorSettings::markers_are_the_rooms).
+/// The unit's calibration file, scaled to the image size, or nominal intrinsics with a warning.
+/// @param horizontal_fov_rad  Of the colour camera as stated by the driver; outside (0.2, 2.5):
+///         TUM's published 525 pixels.
+/// @throws DeviceError if the unit's file exists but is damaged, is for images of another shape, or
+///         names other markers than the room's (SensorSettings::markers_are_the_rooms).
 [[nodiscard]] StreamInfo LiveStreamInfo(const SensorSettings& settings, const std::string& serial,
                                         int width, int height, double horizontal_fov_rad);
 
-/// As LiveStreamInfo() of a unit whose calibration file has this text.
-/// @param name  Of the file, for messages.
+/// As LiveStreamInfo() for a unit whose calibration file has this text.
+/// @param name  Name of the file for messages.
 [[nodiscard]] StreamInfo CalibratedStreamInfo(const SensorSettings& settings,
                                               const std::string& text, const std::string& name,
                                               const std::string& serial, int width, int height);

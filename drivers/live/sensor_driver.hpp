@@ -1,4 +1,4 @@
-// What a driver of live sensors gives the programs, and the list of the drivers in this build.
+// The interface between sensor drivers and the programs, and the list of the drivers in this build.
 #pragma once
 
 #include <cstddef>
@@ -19,35 +19,36 @@
 
 namespace plumb {
 
-/// Settings of the installation that every driver of sensors obeys.
+/// Installation settings that every sensor driver uses.
 struct SensorSettings {
-  /// Holds `SERIAL.yaml` for each calibrated unit, as camera.yaml; its depth_scale is ignored, live
-  /// depth is in millimetres. A unit without one gets nominal intrinsics from its field of view,
-  /// and a warning.
+  /// Contains `SERIAL.yaml` for each calibrated unit, in the format of camera.yaml. Its depth_scale
+  /// is ignored, because live depth is in millimetres. A unit without a file gets nominal
+  /// intrinsics from its field of view, and a warning.
   std::filesystem::path calibration_folder = "/var/lib/plumb/calibration";
   std::string marker_dictionary =
-      "DICT_6X6_250";  ///< Used where the calibration file does not state it; so are the next two.
+      "DICT_6X6_250";  ///< Used if the calibration file does not state it, like the next two.
   double marker_length_m = 0.104;
   std::optional<int> reference_marker = {};
-  /// The three above are the room's: a calibration file that states other markers is refused. Off
-  /// for recordings and the virtual sensor, whose file is all that is known of their markers.
+  /// The three values above describe the room: a calibration file that states other markers is
+  /// refused. Off for recordings and the virtual sensor, whose file is the only source for their
+  /// markers.
   bool markers_are_the_rooms = false;
 };
 
-/// What a simulated sensor shows; drivers of real ones ignore it.
+/// Sweeps shown by a simulated sensor; drivers of real sensors ignore them.
 struct SimulatedSweeps {
   std::string suite = "demo";  ///< demo, nine or patient, as `plumb simulate` has them.
   unsigned seed = 1;
-  int frames = 300;  ///< A sweep, 30 a second.
+  int frames = 300;  ///< Frames per sweep, at 30 per second.
   int width = 640, height = 480;
-  std::size_t max_scenes = 0;  ///< Only so many of the suite's scenes; 0: all.
+  std::size_t max_scenes = 0;  ///< Limit of the number of scenes; 0: all.
   bool plugged = true;         ///< Whether the unit is attached at the start.
-  /// Of the markers of the board of the room's calibration, on its sheet, by id: three scenes of it
-  /// come first. Empty: none does.
+  /// Centres of the room calibration board's markers on its sheet, by id. If set, three scenes of
+  /// the board come first.
   std::map<int, Eigen::Vector2d> board_centres_m = {};
 };
 
-/// Called while a driver prepares itself, with the fraction done and what it works on.
+/// Called during the set-up of a driver with the completed fraction and the current step.
 using SetUpProgress = std::function<void(double fraction, std::string_view what)>;
 
 /// A driver that is ready for use in this process. It outlives its providers.
@@ -55,20 +56,22 @@ class SensorSetup {
  public:
   virtual ~SensorSetup() = default;
 
-  /// Called on the thread that will use the provider; again after the earlier one was destroyed.
+  /// Called on the thread that will use the provider; called again after the previous provider was
+  /// destroyed.
   /// @throws DeviceError if the driver's library cannot be used.
   [[nodiscard]] virtual std::unique_ptr<SensorProvider> MakeProvider() const = 0;
 
-  /// A scan is about to start. Only a simulated sensor has something to do then.
+  /// Called before a scan starts. Only simulated sensors use it.
   virtual void BeforeScan() const {}
 
-  /// Changes what a simulated sensor does, as drivers/virtual/README.md lists it, and returns its
-  /// answer. Any thread. @throws DeviceError if the command is refused.
+  /// Controls a simulated sensor by the commands in drivers/virtual/README.md, and returns its
+  /// answer. Callable from any thread.
+  /// @throws DeviceError if the command is refused.
   // NOLINTNEXTLINE(modernize-use-nodiscard)
   virtual std::string Command(const std::string& command) const;
 };
 
-/// Something `plumb doctor` reports of a driver, beside its sensors.
+/// A line of `plumb doctor` about a driver, in addition to its sensors.
 struct SensorFinding {
   enum class State { kGood, kNote, kBad } state = State::kGood;
   std::string what, found, remedy;
@@ -76,11 +79,11 @@ struct SensorFinding {
 
 /// A driver of live sensors. To add one: drivers/README.md.
 struct SensorDriver {
-  std::string name;           ///< As `driver` in the [sensor] table names it.
-  std::string title;          ///< For people, such as "OpenNI2".
-  bool is_simulated = false;  ///< Its images are invented: refused where patients are scanned.
-  /// Called once, before other threads start. The sweeps matter to simulated sensors only.
-  /// @throws DeviceError, IoError, std::invalid_argument; Interrupted on a stop.
+  std::string name;           ///< Name for `driver` in the [sensor] table.
+  std::string title;          ///< Name for people, such as "OpenNI2".
+  bool is_simulated = false;  ///< Its images are rendered: refused where patients are scanned.
+  /// Called once, before other threads start. Only simulated sensors use the sweeps.
+  /// @throws DeviceError, IoError, std::invalid_argument; Interrupted on a stop request.
   std::function<std::unique_ptr<SensorSetup>(const SensorSettings&, const SimulatedSweeps&,
                                              const std::stop_token&, const SetUpProgress&)>
       set_up;
@@ -88,61 +91,64 @@ struct SensorDriver {
   std::function<std::vector<SensorFinding>()> examine = {};
 };
 
-/// Writes what an open sensor sees into a file, from its making until Finish().
+/// Records an open sensor into a file, from construction until Finish().
 class FileRecorder {
  public:
   struct Summary {
     std::size_t num_color = 0, num_depth = 0;  ///< Images in the file.
   };
   virtual ~FileRecorder() = default;
-  /// Waits for what is held back. @throws IoError
+  /// Waits until buffered images are written. @throws IoError
   virtual Summary Finish() = 0;
 };
 
-/// A kind of recording file that a driver brings along. The folder of images (TUM RGB-D layout) is
-/// there for every sensor and is not listed here.
+/// A recording file format that a driver provides. The folder of images (TUM RGB-D layout) is
+/// available for every sensor and not listed here.
 class RecordingKind {
  public:
   virtual ~RecordingKind() = default;
-  [[nodiscard]] virtual std::string extension() const = 0;  ///< With its dot.
-  /// The drivers whose sensors it can record.
+  [[nodiscard]] virtual std::string extension() const = 0;  ///< Including the dot.
+  /// Drivers whose sensors it can record.
   [[nodiscard]] virtual std::vector<std::string> drivers() const = 0;
   [[nodiscard]] virtual bool IsOne(const std::filesystem::path& file) const = 0;
   /// @throws DataError, IoError
   [[nodiscard]] virtual std::unique_ptr<FrameSource> Open(
       const std::filesystem::path& file, const RecordingDefaults& defaults) const = 0;
-  /// Stamps of the depth images in seconds, found without decoding any. @throws DataError
+  /// Stamps of the depth images in seconds, without decoding any image. @throws DataError
   [[nodiscard]] virtual std::vector<double> DepthStamps(
       const std::filesystem::path& file) const = 0;
   /// @param file  A new file, in a folder that exists. @throws DeviceError, IoError
   [[nodiscard]] virtual std::unique_ptr<FileRecorder> Record(LiveSensor& sensor,
                                                              const std::filesystem::path& file,
                                                              bool jpeg) const = 0;
-  /// What belongs to a recording and lies beside it; moved with it.
+  /// Files beside a recording that belong to it and are moved with it.
   [[nodiscard]] virtual std::filesystem::path SideCar(const std::filesystem::path& file) const = 0;
-  /// Writes frames from anywhere into a new file. @param each  Called after each frame.
+  /// Writes frames from any source into a new file.
+  /// @param each  Called after each frame.
   /// @throws DataError, IoError, Interrupted
   virtual void Write(const std::filesystem::path& file, FrameSource& source,
                      const std::stop_token& stop, const std::function<void()>& each) const = 0;
 };
 
-/// The drivers that a program knows, in the order of preference.
+/// The drivers known to a program, in order of preference.
 class SensorRegistry {
  public:
-  /// @throws std::invalid_argument if the name is empty or taken, or the driver cannot be set up.
+  /// @throws std::invalid_argument if the name is empty or taken, or the driver has no set-up
+  ///         function.
   void Add(SensorDriver driver);
   void Add(std::unique_ptr<const RecordingKind> kind);
 
-  /// The driver of that name; for an empty name the first of the kind that is wanted. If the build
-  /// has none of that kind, a driver whose provider cannot be made, so that everything else works.
-  /// @param simulated  Whether a simulated sensor is wanted.
-  /// @throws DataError if the name is unknown or of the other kind; the message names what is
-  /// known.
+  /// The driver with that name; for an empty name the first of the requested kind. If the build has
+  /// no driver of that kind, returns one whose provider cannot be created, so that everything else
+  /// works.
+  /// @param simulated  Whether a simulated sensor is requested.
+  /// @throws DataError if the name is unknown or of the other kind; the message lists the known
+  ///         names.
   [[nodiscard]] const SensorDriver& Choose(const std::string& name, bool simulated) const;
 
-  /// The kind whose files end so; null: none.
+  /// The format with this file extension; null if there is none.
   [[nodiscard]] const RecordingKind* KindWithExtension(std::string_view extension) const;
-  /// The kind of a file that exists, by its contents; null: none of these.
+  /// The format of an existing file, from its contents; null if there is none.
   [[nodiscard]] const RecordingKind* KindOf(const std::filesystem::path& file) const;
 
   [[nodiscard]] const std::vector<SensorDriver>& drivers() const { return drivers_; }
@@ -152,7 +158,7 @@ class SensorRegistry {
   std::vector<std::unique_ptr<const RecordingKind>> kinds_;
 };
 
-/// What this build has, collected from the folders below drivers/ when it is configured.
+/// The drivers of this build, collected from the folders in drivers/ when it is configured.
 [[nodiscard]] const SensorRegistry& BuiltInSensors();
 
 }  // namespace plumb

@@ -71,7 +71,7 @@ bool ReadAt(int descriptor, std::uint64_t offset, std::span<std::uint8_t> bytes)
   return true;
 }
 
-/// 0: unknown.
+/// 0 if unknown.
 std::uint32_t NodeKind(const ReadBytes& read, std::uint64_t fields) {
   std::array<std::uint8_t, 4> bytes{};
   if (!read(fields, bytes)) return 0;
@@ -88,7 +88,7 @@ std::optional<OniFileSummary> SummariseOniFile(const ReadBytes& read) {
     return std::nullopt;
   OniFileSummary found;
   found.end = kFileHeader;
-  std::map<std::uint32_t, std::uint32_t> kinds;  // of the nodes
+  std::map<std::uint32_t, std::uint32_t> kinds;  // kinds of the nodes
   for (std::uint64_t record = 0; record < kMaxRecords; ++record) {
     if (!read(found.end, bytes) ||
         !std::equal(kRecordMagic.begin(), kRecordMagic.end(), bytes.begin()))
@@ -169,7 +169,7 @@ std::optional<std::int64_t> FindOniBegin(std::span<const std::int64_t> recorded_
   const auto recorded = recorded_us.first(std::min(recorded_us.size(), kMaxCompared));
   std::size_t best = 0;
   std::optional<std::int64_t> begin;
-  // The first image seen may be any of the first recorded, and the other way round.
+  // The first image seen may be any of the first recorded, and vice versa.
   const auto try_begin = [&](std::int64_t candidate) {
     std::size_t matches = 0;
     for (const std::int64_t stamp : recorded) {

@@ -1,6 +1,6 @@
-// The protocol of plumb-oni-reader, the only process that opens .oni files, on its standard
-// output. Same machine, same build: numbers as they lie in memory. The parent trusts nothing of it
-// all the same.
+// The protocol on the standard output of plumb-oni-reader, the only process that opens .oni files.
+// Both ends are on the same machine and from the same build, so numbers are in memory
+// representation. The parent nevertheless validates everything.
 #pragma once
 
 #include <cstdint>
@@ -10,20 +10,22 @@ namespace plumb::oni {
 inline constexpr std::uint32_t kMagic = 0x31494e4f;
 inline constexpr std::uint32_t kMaxText = 1024;
 
-/// First of all.
+/// The first bytes.
 struct Header {
   std::uint32_t magic = kMagic;
   std::int32_t width = 0;
   std::int32_t height = 0;
-  std::int32_t num_frames = 0;      ///< Of the depth stream, as the file states it.
-  float horizontal_fov_rad = 0.0F;  ///< Of the colour stream; 0: unknown.
+  std::int32_t num_frames = 0;      ///< Of the depth stream, as stated by the file.
+  float horizontal_fov_rad = 0.0F;  ///< Of the colour stream; 0 if unknown.
 };
 
 enum class Kind : std::uint32_t {
-  kFrame = 1,  ///< A FrameStamps, RGB (3 bytes a pixel), depth in mm (2 bytes a pixel) follow.
-  kEnd = 2,    ///< An End follows, then nothing.
-  kError = 3,  ///< A length (4 bytes) and a text follow, then nothing. May come instead of the
-               ///< header, after its magic.
+  /// Followed by a FrameStamps, RGB (3 bytes per pixel), depth in mm (2 bytes per pixel).
+  kFrame = 1,
+  kEnd = 2,  ///< Followed by an End, then nothing.
+  /// Followed by a length (4 bytes) and a text, then nothing. May replace the header after its
+  /// magic.
+  kError = 3,
 };
 
 struct FrameStamps {

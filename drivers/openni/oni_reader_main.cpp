@@ -1,8 +1,8 @@
 // plumb-oni-reader FILE COLOR_BEGIN_US DEPTH_BEGIN_US: plays an .oni file with the system's OpenNI2
 // and writes its pairs of images to the standard output.
 //
-// A process of its own because the library crashes on damaged files. It has no rights that its
-// parent has not, little memory, and ends with its parent.
+// A separate process, because the library crashes on damaged files. It has no rights beyond those
+// of its parent, little memory, and ends with its parent.
 #include <poll.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -33,8 +33,8 @@ namespace {
 
 constexpr rlim_t kMaxMemory = rlim_t{4} << 30;
 constexpr int kWait_ms = 200;
-constexpr int kMaxWaits = 50;         // without an image, before the file is given up
-constexpr int kMaxWaitsAfterEnd = 3;  // after the player has reported the end
+constexpr int kMaxWaits = 50;         // waits without an image before the file is given up
+constexpr int kMaxWaitsAfterEnd = 3;  // waits after the player has reported the end
 constexpr std::int64_t kMaxGap_us = 16000;
 constexpr int kMaxSide = 4096;
 constexpr std::uint64_t kMaxStamp_us = std::uint64_t{1} << 53;
@@ -75,7 +75,7 @@ class Player {
                     library_->DeviceCreateStream(device_, ONI_SENSOR_DEPTH, &streams_[0]));
     library_->Check("it holds no colour",
                     library_->DeviceCreateStream(device_, ONI_SENSOR_COLOR, &streams_[1]));
-    const float manual = -1.0F;  // every image, in order, as fast as they are taken
+    const float manual = -1.0F;  // every image, in order, as fast as it is read
     const OniBool once = FALSE;
     library_->Check("it cannot be played",
                     library_->DeviceSetProperty(device_, ONI_DEVICE_PROPERTY_PLAYBACK_SPEED,
@@ -207,8 +207,8 @@ void WriteError(const char* what, bool header_written) {
   WriteAll(what, length);
 }
 
-/// The parent holds the other end of the pipe; once that is closed no one waits for us, wherever
-/// the library hangs.
+/// The parent holds the other end of the pipe. Once that is closed, nobody needs this process,
+/// wherever the library hangs.
 void EndWithParent() {
   ::signal(SIGPIPE, SIG_IGN);
   std::thread([] {
@@ -222,7 +222,7 @@ void EndWithParent() {
 int Main(const std::string& file, const std::array<std::int64_t, 2>& begin_us) {
   bool header_written = false;
   try {
-    auto* player = new Player(file, begin_us);  // never destroyed, see there
+    auto* player = new Player(file, begin_us);  // never destroyed, see the class
     player->WriteHeader();
     header_written = true;
     player->Play();

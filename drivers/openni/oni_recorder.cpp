@@ -19,7 +19,7 @@ namespace plumb {
 namespace {
 
 constexpr std::chrono::seconds kStartTime{
-    20};  // it starts on a thread of its own, mostly within 1 ms
+    20};  // OpenNI2 starts on its own thread, mostly within 1 ms
 constexpr std::chrono::milliseconds kPoll{1};
 
 }  // namespace
@@ -57,7 +57,8 @@ OniRecorder::OniRecorder(LiveSensor& sensor, std::filesystem::path file, const O
   impl_->side_car = CameraFileText(sensor.info(), 1000.0) +
                     fmt::format("sensor_serial: \"{}\"\n",
                                 CalibrationFile({}, sensor.description().serial).stem().string());
-  WriteWholeFile(impl_->file, std::string_view());  // says what is wrong where OpenNI2 only fails
+  // reports the cause, where OpenNI2 would only fail
+  WriteWholeFile(impl_->file, std::string_view());
   const OpenNiLibrary& library = *impl_->library;
   openni->box().KeepStamps(true);
   const std::string what = fmt::format("cannot record to {}", impl_->file.string());

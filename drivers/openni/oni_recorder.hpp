@@ -1,4 +1,4 @@
-// Writes what an open sensor sees into an .oni file.
+// Records an open sensor into an .oni file.
 #pragma once
 
 #include <filesystem>
@@ -10,15 +10,15 @@
 
 namespace plumb {
 
-/// Records from its making until Finish(): once it is made, no image is missed. Images go from the
-/// driver to the file through a thread of OpenNI2 that holds back what the disk does not take at
-/// once, so none is lost. The sensor must outlive it and may be read at the same time. One thread
-/// calls.
+/// Records from construction until Finish(): once it is constructed, no image is missed. Images
+/// pass through a thread of OpenNI2 that buffers what the disk does not accept at once, so that
+/// none is lost. The sensor must outlive it and may be read at the same time. Not thread-safe.
 class OniRecorder {
  public:
   struct Options {
-    bool jpeg = false;  ///< Colour as JPEG: a quarter of the size, but errors of up to a hundred
-                        ///< grey levels at edges.
+    /// Colour as JPEG: a quarter of the size, but with errors of up to a hundred grey levels at
+    /// edges.
+    bool jpeg = false;
   };
   /// @param sensor  Of an OpenNiProvider.  @param file  A new file, in a folder that exists.
   /// @throws DeviceError, IoError; std::invalid_argument if the sensor is of another kind.
@@ -28,9 +28,10 @@ class OniRecorder {
   OniRecorder(const OniRecorder&) = delete;
   OniRecorder& operator=(const OniRecorder&) = delete;
 
-  /// Waits for what is held back, trims the file and writes its side-car. @throws IoError
-  /// @param begin  Stamps of the first images, where they are known; otherwise they are found by
-  /// what the sensor gave meanwhile.
+  /// Waits until buffered images are written, trims the file and writes its side-car.
+  /// @throws IoError
+  /// @param begin  Stamps of the first images, if known; otherwise they are found from the sensor's
+  ///         stamps.
   OniFileSummary Finish(const std::optional<OniBegin>& begin = {});
 
  private:

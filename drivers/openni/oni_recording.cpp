@@ -32,7 +32,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::seconds kPatience{30};  // with a silent child
+constexpr std::chrono::seconds kPatience{30};  // timeout for a silent child
 constexpr int kPipeBytes = 1 << 20;
 constexpr std::size_t kMaxCameraBytes = std::size_t{1} << 16;
 
@@ -65,7 +65,8 @@ class Reader {
     ::sigaddset(&defaults, SIGPIPE);
     ::posix_spawnattr_setsigmask(&attributes, &none);
     ::posix_spawnattr_setsigdefault(&attributes, &defaults);
-    // A group of its own: Ctrl-C at the terminal reaches the parent, which ends the child.
+    // In its own process group: Ctrl-C at the terminal reaches the parent only, which ends the
+    // child.
     ::posix_spawnattr_setflags(
         &attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
     std::string name = program.string(), argument = file.string();
@@ -111,7 +112,7 @@ class Reader {
     return Got::kAll;
   }
 
-  /// How the child ended, once its pipe has.
+  /// How the child ended, once its pipe is closed.
   std::string Reap() {
     int status = 0;
     while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
@@ -136,7 +137,7 @@ struct OniRecording::Impl {
         reader(program, file, ParseOniBegin(side_car.value_or(""))) {}
 
   fs::path file;
-  std::optional<std::string> side_car;  ///< Its text.
+  std::optional<std::string> side_car;  ///< Text of the side-car.
   Reader reader;
   StreamInfo info;
   std::int64_t next_index = 0;

@@ -11,15 +11,15 @@
 
 namespace plumb {
 
-/// Streams an .oni file, every pair, in order, as fast as it is read. The file is opened by a child
-/// process (plumb-oni-reader), because OpenNI2 crashes or hangs on damaged files: that is a
-/// DataError here. Depth is taken as registered to colour. One thread calls.
+/// Streams an .oni file: every pair, in order, as fast as it is read. The file is opened by a child
+/// process (plumb-oni-reader), because OpenNI2 crashes or hangs on damaged files, which is a
+/// DataError here. Depth is assumed to be registered to colour. Not thread-safe.
 class OniRecording : public FrameSource {
  public:
-  /// Calibration and markers come from the side-car (see oni_file.hpp); without one: nominal
-  /// intrinsics, the defaults and warnings.
-  /// @throws DataError if the file is missing, damaged or holds no pairs that Plumb can use;
-  /// IoError if the child cannot be started.
+  /// Calibration and markers are read from the side-car (see oni_file.hpp). Without one, nominal
+  /// intrinsics and the defaults are used, with warnings.
+  /// @throws DataError if the file is missing, damaged or has no usable pairs; IoError if the child
+  ///         cannot be started.
   [[nodiscard]] static std::unique_ptr<OniRecording> Open(const std::filesystem::path& file,
                                                           const RecordingDefaults& defaults = {});
   ~OniRecording() override;

@@ -33,8 +33,8 @@ const char* StatusName(OniStatus status) {
 
 }  // namespace
 
-// The library is never unloaded: its drivers leave threads and static objects behind that do not
-// survive that.
+// The library is never unloaded, because its drivers leave threads and static objects that do not
+// survive it.
 void OpenNiLibrary::Resolve(void* handle, const std::string& name) {
 #define PLUMB_ONI_RESOLVE(function)                                                  \
   function = reinterpret_cast<decltype(function)>(::dlsym(handle, "oni" #function)); \

@@ -1,4 +1,4 @@
-// OpenNI2, loaded at run time: the system's, or the private copy of the virtual sensor.
+// OpenNI2, loaded at run time: the system's library, or the private copy of the virtual sensor.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@
 namespace plumb {
 
 /// The functions of one loaded and started library; its drivers are those in `OpenNI2/Drivers`
-/// beside it. Stops it when the last owner goes away. The functions may be called from any thread.
+/// beside it. Stops the library when the last owner is destroyed. Thread-safe.
 class OpenNiLibrary {
  public:
   /// @param file  Empty: libOpenNI2.so.0 of the system.
@@ -24,7 +24,7 @@ class OpenNiLibrary {
   OpenNiLibrary(const OpenNiLibrary&) = delete;
   OpenNiLibrary& operator=(const OpenNiLibrary&) = delete;
 
-  /// "what: status, and what the library says of the last error of this thread".
+  /// "what: status" with the library's last error of this thread.
   [[nodiscard]] std::string Describe(const std::string& what, OniStatus status) const;
   /// @throws DeviceError with Describe() unless the status is ok.
   void Check(const std::string& what, OniStatus status) const;

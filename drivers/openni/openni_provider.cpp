@@ -15,8 +15,8 @@
 
 namespace plumb {
 
-// No lock of ours is held while OpenNI2 is called: it calls back from the driver's thread under
-// locks of its own.
+// OpenNI2 is never called with a lock of this class held, because it calls back from the driver's
+// thread under its own locks.
 struct OpenNiProvider::Impl {
   explicit Impl(const OpenNiOptions& wanted)
       : options(wanted), library(OpenNiLibrary::Load(wanted.library)) {
@@ -48,13 +48,13 @@ struct OpenNiProvider::Impl {
   }
 
   void OnState(const OniDeviceInfo& info, OniDeviceState state) {
-    // "Not ready" comes with unplugging too, which has a callback of its own.
+    // "Not ready" is also reported on unplugging, which has its own callback.
     if (state == ONI_DEVICE_STATE_ERROR || state == ONI_DEVICE_STATE_OK)
       events.SetFailed(info.uri, state == ONI_DEVICE_STATE_ERROR);
     events.Notify();
   }
 
-  /// Asks the unit; empty if it cannot be opened or has none.
+  /// Reads the serial from the unit; empty if it cannot be opened or has none.
   std::string AskSerial(const OniDeviceInfo& info) const {
     OniDeviceHandle device = nullptr;
     if (library->DeviceOpen(info.uri, &device) != ONI_STATUS_OK) return {};
@@ -108,7 +108,7 @@ struct OpenNiProvider::Impl {
   SensorEvents events;
 
   std::mutex mutex;
-  std::map<std::string, std::string> serials;  ///< By URI, of the units that are attached.
+  std::map<std::string, std::string> serials;  ///< By URI, for the attached units.
 };
 
 OpenNiProvider::OpenNiProvider(const OpenNiOptions& options)
@@ -132,8 +132,8 @@ std::unique_ptr<LiveSensor> OpenNiProvider::Open(const std::string& serial) {
       std::make_shared<FrameBox>(found.serial, impl_->options.max_gap, impl_->options.stall_time);
   impl_->events.Watch(found.uri, box);
   auto streams = std::make_unique<OpenNiStreams>(impl_->library, found);
-  // The box knows of an unplug from here on, so none is missed between the listing and the first
-  // image.
+  // The box is notified about unplugging from here on, so no event is missed between the listing
+  // and the first image.
   if (box->lost())
     throw DeviceLost(fmt::format("sensor {} was unplugged while it was opened", found.serial));
   return std::make_unique<OpenNiSensor>(std::move(streams), std::move(box), impl_, found,

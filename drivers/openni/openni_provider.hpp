@@ -16,20 +16,20 @@ struct OpenNiOptions : SensorSettings {
   /// libOpenNI2.so.0 to load; its drivers are those in `OpenNI2/Drivers` beside it. Empty: the
   /// system's.
   std::filesystem::path library = {};
-  std::chrono::milliseconds stall_time{2000};  ///< Next() fails after so long without a pair.
+  std::chrono::milliseconds stall_time{2000};  ///< Next() fails after this time without a pair.
   std::chrono::microseconds max_gap{
-      16000};  ///< Between the stamps of a pair; under half of the frame period.
+      16000};  ///< Between the stamps of a pair; less than half of the frame period.
   /// Called before the library is stopped, which waits for its drivers' threads under a lock that
-  /// their callbacks want: anything that makes a driver call back must stop. Must not throw.
+  /// their callbacks need: everything that makes a driver call back must stop. Must not throw.
   std::function<void()> before_stop = {};
 };
 
-/// May take long; call it off the event loop: List() opens each unit that it has not seen before to
-/// ask its serial (about a second on real hardware), Open() starts streams. Call both from a worker
-/// thread, not from the event loop.
+/// Slow operations: List() opens each unit that it has not seen before to read its serial (about a
+/// second on real hardware), and Open() starts streams. Call both from a worker thread, not from
+/// the event loop.
 class OpenNiProvider : public SensorProvider {
  public:
-  /// Starts OpenNI2 and its drivers. Block signals before: they start threads.
+  /// Starts OpenNI2 and its drivers. Block signals before, because they start threads.
   /// @throws DeviceError if the library cannot be loaded or started.
   explicit OpenNiProvider(const OpenNiOptions& options);
   ~OpenNiProvider() override;

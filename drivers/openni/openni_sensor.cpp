@@ -10,11 +10,11 @@ namespace plumb {
 namespace {
 
 constexpr int kFps = 30;
-// Registration and exposure need a moment after the start; until then depth may still lie on its
-// own grid.
+// Registration and exposure take a moment after the start; until then depth may still be on its own
+// grid.
 constexpr int kPairsToSettle = 2;
 
-/// @return False where the stream has no such setting.
+/// @return False if the stream does not have this setting.
 template <typename Value>
 bool Set(const OpenNiLibrary& library, OniStreamHandle stream, int property, const Value& value) {
   return library.StreamIsPropertySupported(stream, property) != FALSE &&
@@ -89,7 +89,8 @@ void OpenNiStreams::Start() {
                  library->StreamStart(depth));
   library->Check(fmt::format("sensor {} does not start its colour", name_),
                  library->StreamStart(color));
-  const int mode = ONI_IMAGE_REGISTRATION_DEPTH_TO_COLOR;  // set before the start, units forget it
+  // must be set after the start, because units forget it
+  const int mode = ONI_IMAGE_REGISTRATION_DEPTH_TO_COLOR;
   library->Check(fmt::format("sensor {} does not register depth to colour", name_),
                  library->DeviceSetProperty(device, ONI_DEVICE_PROPERTY_IMAGE_REGISTRATION, &mode,
                                             sizeof mode));

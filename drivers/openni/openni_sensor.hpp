@@ -1,4 +1,4 @@
-// One open sensor of OpenNI2. OpenNiProvider makes it.
+// One open sensor of OpenNI2, created by OpenNiProvider.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,12 @@
 
 namespace plumb {
 
-/// Frees the handles of one device with its depth and colour stream, in the order that OpenNI2
-/// needs.
+/// Releases the handles of one device and its depth and colour streams in the order that OpenNI2
+/// requires.
 class OpenNiStreams {
  public:
-  /// Opens and creates, sets both to 640x480 at 30 Hz (320x240 where that is refused), not
-  /// mirrored, in step. Starts nothing.
+  /// Opens the device and creates both streams with 640x480 at 30 Hz (320x240 if that is refused),
+  /// not mirrored and synchronised. Does not start them.
   /// @throws DeviceError
   OpenNiStreams(std::shared_ptr<const OpenNiLibrary> library, const SensorDescription& description);
   ~OpenNiStreams();
@@ -43,11 +43,11 @@ class OpenNiStreams {
   bool started_ = false;
 };
 
-/// The StreamWaiter reads both streams all the time, so the newest images are at hand when a scan
-/// starts and the rate is known.
+/// The StreamWaiter reads both streams all the time, so that the newest images are available when a
+/// scan starts and the rate is known.
 class OpenNiSensor : public BoxedSensor {
  public:
-  /// @param box       The provider reports an unplug or a failure there.
+  /// @param box       Receives unplug events and failures from the provider.
   /// @param provider  Kept alive as long as this sensor.
   OpenNiSensor(std::unique_ptr<OpenNiStreams> streams, std::shared_ptr<FrameBox> box,
                std::shared_ptr<const void> provider, const SensorDescription& description,
@@ -56,7 +56,7 @@ class OpenNiSensor : public BoxedSensor {
 
   void LockExposure(bool locked) override;
 
-  /// For the recorder, which attaches to the streams and wants the stamps.
+  /// For the recorder, which attaches to the streams and needs the stamps.
   [[nodiscard]] const OpenNiStreams& streams() const { return *streams_; }
 
  private:
@@ -64,7 +64,7 @@ class OpenNiSensor : public BoxedSensor {
 
   std::shared_ptr<const void> provider_;
   std::unique_ptr<OpenNiStreams> streams_;
-  std::int64_t waiting_ = 0;  ///< At the StreamWaiter.
+  std::int64_t waiting_ = 0;  ///< Token of the StreamWaiter.
 };
 
 }  // namespace plumb

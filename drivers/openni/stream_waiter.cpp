@@ -7,14 +7,15 @@
 namespace plumb {
 namespace {
 
-constexpr int kWait_ms = 100;  // of one look for images; the longest that Remove() takes
+// timeout of one wait for images, and the longest duration of Remove()
+constexpr int kWait_ms = 100;
 constexpr std::chrono::milliseconds kAfterError{
-    20};  // OpenNI2 may answer at once, and always the same, after an unplug
+    20};  // OpenNI2 may return at once, always with the same result, after an unplug
 
 }  // namespace
 
 StreamWaiter& StreamWaiter::Of(const OpenNiLibrary& library) {
-  // Neither is ever destroyed: the threads live to the end of the process.
+  // Neither is ever destroyed: the threads live until the end of the process.
   static auto& mutex = *new std::mutex;
   static auto& waiters = *new std::map<decltype(library.WaitForAnyStream), StreamWaiter*>;
   const std::lock_guard lock(mutex);
@@ -38,7 +39,7 @@ std::int64_t StreamWaiter::Add(const OpenNiLibrary& library,
 void StreamWaiter::Remove(std::int64_t id) {
   std::unique_lock lock(mutex_);
   std::erase_if(entries_, [&](const Entry& entry) { return entry.id == id; });
-  // The copy of the entries that the thread uses now may hold this one, the next will not.
+  // The copy that the thread is using may still contain this entry; the next one will not.
   const std::int64_t round = round_;
   changed_.wait(lock, [&] { return !waiting_ || round_ != round; });
 }
@@ -69,7 +70,7 @@ void StreamWaiter::WaitOnce(const std::vector<Entry>& entries) {
       library.WaitForAnyStream(streams.data(), static_cast<int>(streams.size()), &index, kWait_ms);
   if (status == ONI_STATUS_TIME_OUT) return;
   OniFrame* frame = nullptr;
-  // Only a stream that has an image is read: reading one that was unplugged never returns.
+  // Only a stream with an image is read, because reading an unplugged one never returns.
   const bool read =
       status == ONI_STATUS_OK && index >= 0 && index < static_cast<int>(streams.size()) &&
       library.StreamReadFrame(streams[static_cast<std::size_t>(index)], &frame) == ONI_STATUS_OK &&

@@ -1,4 +1,4 @@
-// The one thread of a process that waits for images of OpenNI2.
+// The one thread of a process that waits for images from OpenNI2.
 #pragma once
 
 #include <array>
@@ -12,25 +12,25 @@
 
 namespace plumb {
 
-/// OpenNI2 remembers every thread that ever waited for a stream, and when a new one comes it asks
-/// the system about the old ones: once such a thread has ended, that crashes. So one thread, which
-/// never ends, waits for the streams of all open sensors. Add() and Remove() may be called from any
-/// thread but that one.
+/// OpenNI2 remembers every thread that ever waited for a stream and, when a new one arrives, asks
+/// the system about the old ones; once such a thread has ended, that crashes. Therefore one thread,
+/// which never ends, waits for the streams of all open sensors. Add() and Remove() may be called
+/// from any other thread.
 class StreamWaiter {
  public:
-  /// @param stream  0 or 1, of the two that were added. Called on the waiting thread; the frame is
-  /// borrowed for the call.
+  /// @param stream  0 or 1, for the two streams that were added. Called on the waiting thread; the
+  ///         frame is borrowed for the call.
   using OnImage = std::function<void(int stream, const OniFrame& frame)>;
 
   /// The waiter of a loaded library.
   [[nodiscard]] static StreamWaiter& Of(const OpenNiLibrary& library);
 
-  /// Begins to wait for two started streams. The library must live until Remove().
+  /// Starts to wait for two started streams. The library must live until Remove().
   [[nodiscard]] std::int64_t Add(const OpenNiLibrary& library,
                                  const std::array<OniStreamHandle, 2>& streams, OnImage on_image);
 
-  /// Returns once the streams are not waited for any more and the function is not running; at most
-  /// a tenth of a second.
+  /// Returns once the streams are no longer waited for and the function is not running; takes at
+  /// most a tenth of a second.
   void Remove(std::int64_t id);
 
  private:

@@ -19,12 +19,12 @@ constexpr std::size_t kMaxText = std::size_t{1} << 16;
 constexpr int kMaxNesting = 8;  // a calibration needs two levels
 constexpr double kMaxMarkerLength_m = 2.0;
 constexpr double kMaxDistortion = 100.0;
-constexpr double kMinDepthScale = 10.0;  // below, somebody wrote metres per unit
+constexpr double kMinDepthScale = 10.0;  // a smaller value means that metres per unit were entered
 constexpr double kMaxDepthScale = 1e6;
 constexpr double kMaxBaseline_m = 1.0;
 constexpr int kMaxMarkerId = 65535;
 
-/// Refuses texts whose nesting would take the parser's stack.
+/// Refuses texts whose nesting would exhaust the parser's stack.
 void CheckText(std::string_view text, const std::string& name) {
   if (text.size() > kMaxText)
     throw DataError(
@@ -46,7 +46,7 @@ void CheckText(std::string_view text, const std::string& name) {
   }
 }
 
-/// The text as plain YAML: OpenCV's header `%YAML:1.0` is none of YAML's directives.
+/// The text as plain YAML: OpenCV's header `%YAML:1.0` is not a YAML directive.
 std::string WithoutHeader(std::string_view text) {
   while (text.starts_with('%'))
     text.remove_prefix(
@@ -54,8 +54,8 @@ std::string WithoutHeader(std::string_view text) {
   return std::string(text);
 }
 
-/// The keys of one file, typed and with messages. Read by yaml-cpp: OpenCV's own reader never
-/// returns from some broken texts.
+/// The keys of one file, typed and with messages. Read by yaml-cpp, because OpenCV's own reader
+/// never returns on some broken texts.
 class Keys {
  public:
   Keys(std::string_view text, std::string name) : name_(std::move(name)) {
@@ -151,8 +151,8 @@ void ReadCameraMatrix(const Keys& keys, const char* key, Intrinsics& intrinsics)
   intrinsics.fy = k[4];
   intrinsics.cx = k[2];
   intrinsics.cy = k[5];
-  // A principal point off the image, or a view narrower than 5 deg or wider than 150 deg, belongs
-  // to another image size.
+  // A principal point outside the image, or a view narrower than 5 deg or wider than 150 deg,
+  // belongs to another image size.
   const auto fits = [](double f, double c, int size) {
     return c > 0 && c < size && f > size * 0.13 && f < size * 12.0;
   };
@@ -179,7 +179,7 @@ void ReadDistortion(const Keys& keys, const char* key, Intrinsics& intrinsics) {
       throw DataError(fmt::format("{} holds {}, which is no lens", keys.Where(key), d[i]));
     intrinsics.distortion[i] = d[i];
   }
-  // A lens model must be one to one over the whole image, or pixels cannot become rays.
+  // A lens model must be one-to-one over the whole image, or pixels cannot be converted to rays.
   for (const double x : {0.0, 0.25, 0.75, 1.0}) {
     for (const double y : {0.0, 0.25, 0.75, 1.0}) {
       const Eigen::Vector2d pixel(x * (intrinsics.width - 1), y * (intrinsics.height - 1));

@@ -1,4 +1,4 @@
-// camera.yaml of a recording: what the camera is and which markers lie in the scene.
+// camera.yaml of a recording: the camera and the markers of the scene.
 #pragma once
 
 #include <optional>
@@ -11,19 +11,19 @@
 
 namespace plumb {
 
-/// Depth images that are not registered to the colour images: where their camera is.
+/// The depth camera of depth images that are not registered to the colour images.
 struct DepthCamera {
   Intrinsics intrinsics;
-  Pose T_color_depth = Pose::Identity();  ///< Depth camera's frame to colour camera's.
+  Pose T_color_depth = Pose::Identity();  ///< From the depth camera's frame to the colour camera's.
 };
 
-/// The contents of camera.yaml; everything is checked.
+/// The validated contents of camera.yaml.
 struct CameraFile {
   Intrinsics color;
-  double depth_scale = 5000.0;  ///< Units of a depth image per metre; TUM's 5000 when absent.
+  double depth_scale = 5000.0;  ///< Units of a depth image per metre; TUM's 5000 by default.
   std::optional<DepthCamera> depth_camera;  ///< Set only if the depth is not registered.
   bool depth_camera_unknown =
-      false;  ///< Depth is not registered, and the file has no depth_camera.
+      false;  ///< Depth is not registered, and the file does not state the depth camera.
   std::optional<std::string> marker_dictionary;
   std::optional<double> marker_length_m;
   std::optional<int> reference_marker;
@@ -34,9 +34,9 @@ struct CameraFile {
 /// distortion_coefficients, depth_scale, depth_registered, marker_dictionary, marker_length
 /// (metres), reference_marker; for depth_registered 0 also depth_camera_matrix,
 /// depth_distortion_coefficients, T_color_depth (4x4) and, if they differ from the colour image's,
-/// depth_image_width and depth_image_height. Without these three the depth camera is unknown, with
-/// a warning.
-/// @param name  Of the file, for messages.
+/// depth_image_width and depth_image_height. Without the first three of these the depth camera is
+/// unknown, with a warning.
+/// @param name  Name of the file for messages.
 /// @throws DataError naming file, key, what was found and what is expected.
 [[nodiscard]] CameraFile ParseCameraFile(std::string_view text, const std::string& name);
 

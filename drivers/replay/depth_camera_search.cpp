@@ -16,30 +16,32 @@ namespace plumb {
 namespace {
 
 constexpr float kMinDepth_m = 0.3F;
-constexpr float kStep = 0.08F;         // Relative difference of depths on both sides of an edge.
-constexpr int kStepWidth = 2;          // Pixels across which a step is looked for.
-constexpr int kBorder = 8;             // Pixels at the images' rims that show no edges.
-constexpr float kMaxGradient = 20.0F;  // Grey levels a pixel: one bright edge is one edge.
-constexpr int kSurroundings = 41;      // Pixels: an edge stands out from what is about it.
+constexpr float kStep = 0.08F;  // Relative difference of depths on both sides of an edge.
+constexpr int kStepWidth = 2;   // Pixels over which a step is searched.
+constexpr int kBorder = 8;      // Pixels at the borders of the images in which no edges are used.
+// Grey levels per pixel; limits the weight of a single bright edge.
+constexpr float kMaxGradient = 20.0F;
+constexpr int kSurroundings = 41;  // Pixels of the neighbourhood with which an edge is compared.
 constexpr std::size_t kMaxPointsOfPair = 1000;  // In each of the two directions.
-constexpr std::size_t kMinPoints = 500;         // Of all pairs that search, and that judge.
+constexpr std::size_t kMinPoints = 500;         // Over all pairs of the search, and of the check.
 constexpr double kMinGain = 2.0;
-constexpr double kWidthOfSteps_px = 640.0;  // The image width that steps of the search are for.
+// Image width for which the steps of the search are stated.
+constexpr double kWidthOfSteps_px = 640.0;
 
-/// Where a depth pixel lies in the colour image: zoom about the centre, a shift, and a parallax
-/// that falls with the distance.
+/// Position of a depth pixel in the colour image: zoom about the centre, a shift, and a parallax
+/// that decreases with distance.
 using Placement = Eigen::Vector4d;  // zoom, shift x and y in px, parallax in px m
 const Placement kRegistered(1.0, 0.0, 0.0, 0.0);
 
 struct EdgePoint {
   float x, y;
-  float inverse_depth_per_m;  ///< Of the nearer side, which the edge belongs to.
+  float inverse_depth_per_m;  ///< Of the nearer side, to which the edge belongs.
 };
 
-/// One direction of one pair: steps of the depth image along it, and how strong edges of the colour
-/// image are in it.
+/// One direction of one pair: depth steps along it, and the strength of the colour image's edges in
+/// it.
 struct Edges {
-  cv::Mat contrast;  ///< CV_32FC1, mean about 0 everywhere.
+  cv::Mat contrast;  ///< CV_32FC1 with a local mean of about 0.
   std::vector<EdgePoint> steps;
 };
 
@@ -82,8 +84,8 @@ float Interpolated(const cv::Mat& image, float x, float y) {
   return (row[0] * (1 - fx) + row[1] * fx) * (1 - fy) + (below[0] * (1 - fx) + below[1] * fx) * fy;
 }
 
-/// Mean contrast of the colour images where the placement puts the steps in depth; steps that
-/// leave the image count as 0, so that nothing is gained by moving them out.
+/// Mean contrast of the colour images at the depth steps under this placement. Steps outside the
+/// image count as 0, so that moving them out gains nothing.
 double Agreement(std::span<const Edges> edges, const Placement& placement) {
   double sum = 0.0;
   std::size_t count = 0;
@@ -106,7 +108,7 @@ double Agreement(std::span<const Edges> edges, const Placement& placement) {
   return count > 0 ? sum / static_cast<double>(count) : 0.0;
 }
 
-/// The best placement of a grid: `counts` steps each way about `centre`.
+/// The best placement of a grid: `counts` steps in each direction about `centre`.
 Placement BestOfGrid(std::span<const Edges> edges, const Placement& centre, const Placement& step,
                      const std::array<int, 4>& counts) {
   Placement best = centre;
@@ -128,8 +130,8 @@ Placement BestOfGrid(std::span<const Edges> edges, const Placement& centre, cons
   return best;
 }
 
-/// Steps to a neighbour until none is better, then with half the step, four times. The agreement
-/// rises with each move, so it ends; the bound is for numbers that do not.
+/// Moves to a better neighbour until there is none, then halves the step, four times. The agreement
+/// increases with each move, so it terminates; the bound guards against NaN.
 Placement Refined(std::span<const Edges> edges, Placement placement, Placement step) {
   constexpr int kMaxMoves = 40;
   for (int level = 0; level < 4; ++level, step *= 0.5) {
@@ -142,8 +144,8 @@ Placement Refined(std::span<const Edges> edges, Placement placement, Placement s
   return placement;
 }
 
-/// From a start for each sign of the parallax and none: the shift along x nearly makes up for it,
-/// so one start may end beside the best.
+/// One start for each sign of the parallax and for none. The shift along x nearly compensates it,
+/// so that a single start could miss the best.
 Placement Search(std::span<const Edges> edges, double px) {
   Placement best = kRegistered;
   double best_agreement = -1.0;
@@ -193,7 +195,7 @@ DepthCamera CameraOf(const Placement& placement, const Intrinsics& color) {
 
 std::optional<FoundDepthCamera> FindDepthCamera(std::span<const ImagePair> pairs,
                                                 const Intrinsics& color) {
-  std::array<std::vector<Edges>, 2> halves;  // The first searches, the second judges.
+  std::array<std::vector<Edges>, 2> halves;  // The first half searches, the second checks.
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     CheckPair(pairs[i], color);
     cv::Mat grey;
@@ -208,7 +210,7 @@ std::optional<FoundDepthCamera> FindDepthCamera(std::span<const ImagePair> pairs
   const Placement registered =
       BestOfGrid(halves[0], kRegistered, {0.0, 2 * px, 2 * px, 0.0}, {0, 3, 3, 0});
   const double agreement = Agreement(halves[1], found);
-  // Contrast of one grey level in a hundred pixels is what chance gives.
+  // Contrast of one grey level in a hundred pixels can be due to chance.
   constexpr double kChance = 0.01;
   const double gain = agreement / std::max(Agreement(halves[1], registered), kChance);
   if (!(agreement > 0.0 && gain >= kMinGain)) return std::nullopt;

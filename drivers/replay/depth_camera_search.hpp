@@ -1,5 +1,5 @@
-// Where the depth camera is, found from the images themselves, for recordings whose depth is not
-// registered to colour and that do not say how it would be.
+// Estimates the depth camera from the images, for recordings whose depth is not registered to
+// colour and that do not state the depth camera.
 #pragma once
 
 #include <optional>
@@ -15,30 +15,33 @@ namespace plumb {
 /// Colour and depth image of one moment.
 struct ImagePair {
   cv::Mat color_rgb;  ///< CV_8UC3.
-  cv::Mat depth_m;    ///< CV_32FC1, same size, metres along the depth camera's axis, 0 = nothing.
+  /// CV_32FC1, same size, metres along the depth camera's axis, 0 where nothing was measured.
+  cv::Mat depth_m;
 };
 
-/// A depth camera, and how well the images bear it out.
+/// A depth camera and how well the images support it.
 struct FoundDepthCamera {
-  DepthCamera camera;  ///< Without a lens of its own, its axes parallel to the colour camera's.
-  double gain = 0.0;   ///< How many times better edges agree with it than with registered depth,
-                       ///< on pairs that the search did not use.
+  DepthCamera camera;  ///< Without lens distortion, with axes parallel to the colour camera's.
+  /// Factor by which edges agree better with it than with registered depth, on pairs that the
+  /// search did not use.
+  double gain = 0.0;
 };
 
-/// Steps in depth mostly lie on edges of the colour image. The search takes the focal length,
-/// the principal point and the sideways distance of the depth camera under which they do: zoom
-/// 0.86 to 1.04 of the colour image, 24 px (of 640) each way, 0.05 px m of parallax and less
-/// (25 mm in sensors of the Kinect's class). A sensor of that class has its infrared camera 25 mm
-/// beside the colour camera and magnifies by a tenth more, so that unregistered depth lies up to
-/// 40 px off.
+/// Depth steps mostly lie on edges of the colour image. The search finds the focal length, the
+/// principal point and the lateral offset of the depth camera for which they do: zoom 0.86 to 1.04
+/// of the colour image, 24 px (of 640) in each direction, 0.05 px m of parallax and less (25 mm in
+/// sensors of the Kinect class). Such a sensor has its infrared camera 25 mm beside the colour
+/// camera and a magnification larger by a tenth, so that unregistered depth is displaced by up to
+/// 40 px.
 ///
-/// Every second pair is searched, the others judge: nothing is found unless edges agree there at
-/// least twice as well as with depth taken as registered, shifted by up to 6 px. Deterministic.
+/// Every second pair is used for the search, the others for the check: a camera is returned only if
+/// edges agree there at least twice as well as with registered depth that is shifted by up to 6 px.
+/// Deterministic.
 ///
 /// @param pairs  Spread over the recording; 8 to 24 are enough.
-/// @return nothing if the pairs show too few steps in depth or do not clearly contradict
-///         registered depth.
-/// @throws std::invalid_argument if an image has another type or size than `color` says.
+/// @return nothing if the pairs show too few depth steps or do not clearly contradict registered
+///         depth.
+/// @throws std::invalid_argument if an image has another type or size than `color` states.
 [[nodiscard]] std::optional<FoundDepthCamera> FindDepthCamera(std::span<const ImagePair> pairs,
                                                               const Intrinsics& color);
 

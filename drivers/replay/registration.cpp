@@ -11,12 +11,12 @@ namespace plumb {
 namespace {
 
 constexpr double kSameSurface =
-    0.02;  // relative difference of depths within which samples are taken as one surface
+    0.02;  // relative depth difference within which samples belong to one surface
 constexpr double kOverlap =
-    1.1;  // samples cover a little more than their own area: no seams on slopes
+    1.1;  // samples cover slightly more than their own area, so that slopes have no seams
 constexpr double kMinDepth_m = 0.05;
 constexpr double kMaxReach_px =
-    8.0;  // of one sample; a colour image is at most a few times finer than its depth image
+    8.0;  // of one sample; a colour image has at most a few times the resolution of its depth image
 
 }  // namespace
 
@@ -57,7 +57,7 @@ cv::Mat DepthRegistration::Register(const cv::Mat& depth_m) const {
   cv::Mat registered = cv::Mat::zeros(color_.height, color_.width, CV_32FC1);
   cv::Mat offset(
       color_.height, color_.width,
-      CV_32FC1);  // squared distance of a pixel from the centre of its sample, set with it
+      CV_32FC1);  // squared distance of a pixel from the centre of its sample, set together with it
   const double magnification_x = 0.5 * kOverlap * color_.fx / depth_.fx;
   const double magnification_y = 0.5 * kOverlap * color_.fy / depth_.fy;
   const Eigen::Vector3d* ray = ray_in_color_.data();

@@ -15,9 +15,9 @@ namespace {
 constexpr std::size_t kMaxEntries = 1'000'000;
 constexpr std::size_t kMaxLine = 4096;
 constexpr double kMaxTime_s =
-    1e11;  // the year 5138; milliseconds and nanoseconds since 1970 lie above
+    1e11;  // the year 5138; milliseconds and nanoseconds since 1970 are larger
 constexpr std::ptrdiff_t kNeighbours =
-    4;  // candidates on either side of a stamp: bounds the work on absurdly dense stamps
+    4;  // candidates on either side of a stamp; limits the work for extremely dense stamps
 
 bool IsBlank(char c) { return c == ' ' || c == '\t' || c == ',' || c == '\r'; }
 
@@ -63,12 +63,12 @@ void CheckFileName(std::string_view file, const std::string& where) {
   }
 }
 
-/// A pair that may be chosen, and the best chain of pairs that ends with it.
+/// A possible pair, with the best chain of pairs that ends with it.
 struct Candidate {
   IndexPair pair;
   double sum_s = 0.0;
   std::ptrdiff_t previous =
-      -1;  ///< Position of the candidate before it in the chain; -1 at its start.
+      -1;  ///< Position of the previous candidate in the chain; -1 at its start.
 };
 
 /// The best chain among those that end before a depth image: a Fenwick tree of maxima.
@@ -156,7 +156,7 @@ std::vector<IndexPair> AssociateByTime(std::span<const IndexEntry> color,
       const BestChain::End before = best.Before(position);
       candidates.push_back({{c, position}, before.sum_s + 2 * max_gap_s - gap_s, before.candidate});
     }
-    // Only now, so that no chain uses one colour image twice.
+    // Entered only now, so that no chain uses one colour image twice.
     for (std::size_t i = first_of_color; i < candidates.size(); ++i) {
       best.Add(candidates[i].pair.depth, {candidates[i].sum_s, static_cast<std::ptrdiff_t>(i)});
     }

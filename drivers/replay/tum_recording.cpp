@@ -43,7 +43,7 @@ double ThreadCpuSeconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// Names and stamps of one pair, everything that decoding needs.
+/// Names and stamps of one pair, as needed for decoding.
 struct FramePlan {
   fs::path color_file;
   fs::path depth_file;
@@ -51,7 +51,7 @@ struct FramePlan {
   double depth_time_s = 0.0;
 };
 
-/// A frame as the decoding thread hands it over, or why there is none.
+/// A decoded frame, or the error that prevented it.
 struct Decoded {
   Frame frame;
   bool has_depth = false;
@@ -74,7 +74,7 @@ double MedianPeriod(const std::vector<IndexEntry>& entries) {
   return TakeMedian(periods_s);
 }
 
-/// The real place of an image, which must lie in the recording's folder even where links lead.
+/// The real path of an image, which must be inside the recording's folder even through links.
 fs::path Resolve(const fs::path& canonical_folder, const fs::path& index, const IndexEntry& entry) {
   std::error_code error;
   fs::path file = fs::canonical(canonical_folder / entry.file, error);
@@ -93,7 +93,7 @@ fs::path Resolve(const fs::path& canonical_folder, const fs::path& index, const 
   return file;
 }
 
-/// TUM's published nominal camera, for recordings that bring none.
+/// TUM's published nominal camera, for recordings without calibration.
 CameraFile AssumedCamera(const fs::path& first_image) {
   const cv::Mat image = ReadColorImage(first_image);
   if (image.cols * 3 != image.rows * 4) {
@@ -111,7 +111,7 @@ CameraFile AssumedCamera(const fs::path& first_image) {
   return camera;
 }
 
-/// Metres from units; true if any pixel holds a measurement.
+/// Converts units to metres; true if any pixel holds a measurement.
 bool ToMetres(const cv::Mat& depth_units, double units_per_metre, cv::Mat& depth_m) {
   depth_m.create(depth_units.size(), CV_32FC1);
   const auto metres_per_unit = static_cast<float>(1.0 / units_per_metre);
@@ -151,8 +151,8 @@ struct TumRecording::Impl {
   std::mutex mutex;
   std::condition_variable_any changed;
   std::deque<Decoded> queue;
-  bool finished = false;  ///< The thread will add nothing more.
-  std::jthread thread;    ///< Last member: joined before the others go.
+  bool finished = false;  ///< The thread will not add more frames.
+  std::jthread thread;    ///< Last member: joined before the others are destroyed.
 
   void FindFrames(const fs::path& folder, double least_max_gap_s);
   void ReadCamera(const fs::path& folder, const RecordingDefaults& defaults);
@@ -166,7 +166,7 @@ void TumRecording::Impl::FindFrames(const fs::path& folder, double least_max_gap
   const fs::path depth_index = folder / "depth.txt";
   const std::vector<IndexEntry> color = ReadIndex(color_index);
   const std::vector<IndexEntry> depth = ReadIndex(depth_index);
-  // The nearest partner is never more than half a period off; a tenth of that for jitter.
+  // The nearest partner is at most half a period away; a tenth of that is added for jitter.
   const double max_gap_s = std::max(
       least_max_gap_s, kMaxGapPeriods * std::max(MedianPeriod(color), MedianPeriod(depth)));
   const std::vector<IndexPair> pairs = AssociateByTime(color, depth, max_gap_s);

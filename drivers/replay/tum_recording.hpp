@@ -1,5 +1,5 @@
-// A recording in the TUM RGB-D layout, streamed: a folder with rgb.txt, depth.txt, their images
-// and, mostly, camera.yaml.
+// Streams a recording in the TUM RGB-D layout: a folder with rgb.txt, depth.txt, their images and
+// usually camera.yaml.
 #pragma once
 
 #include <cstdint>
@@ -18,43 +18,44 @@ struct RecordingDefaults {
   double marker_length_m = 0.104;
   std::optional<int> reference_marker;
   /// Largest difference between the stamps of a colour image and its depth image; 0.55 periods of
-  /// the slower stream, if that is more: streams of a low rate that run half a period apart still
-  /// pair.
+  /// the slower stream, if that is more, so that streams of a low rate that are half a period apart
+  /// still pair.
   double max_stamp_gap_s = 0.020;
 };
 
 /// Statistics of reading so far; complete once Next() has returned nothing.
 struct RecordingStatistics {
-  std::int64_t num_frames = 0;             ///< Handed out by Next().
-  std::int64_t num_frames_with_depth = 0;  ///< Of these, with at least one valid depth pixel.
-  double decode_cpu_s = 0.0;  ///< CPU time of reading, decoding and registering these frames.
+  std::int64_t num_frames = 0;  ///< Returned by Next().
+  /// Frames among these with at least one valid depth pixel.
+  std::int64_t num_frames_with_depth = 0;
+  double decode_cpu_s = 0.0;  ///< CPU time for reading, decoding and registering these frames.
   std::int64_t num_unmatched_color =
-      0;  ///< Colour images without a depth image close in time: left out.
+      0;  ///< Colour images without a depth image close in time, which are left out.
   std::int64_t num_unmatched_depth = 0;
 };
 
-/// Streams a recording. One thread of its own decodes up to three frames ahead, in order, so that
-/// decoding overlaps the work on the frames; what comes out does not depend on timing. Next(),
-/// info() and statistics() belong to one thread.
+/// Streams a recording. A separate thread decodes up to three frames ahead, in order, so that
+/// decoding overlaps the work on the frames; the result does not depend on timing. Next(), info()
+/// and statistics() must be called from one thread.
 ///
-/// Depth of 65535 units means "nothing" too (saturated). Depth that is not registered is registered
-/// here, see DepthRegistration.
+/// Depth of 65535 units also means "nothing measured" (saturated). Depth that is not registered is
+/// registered here, see DepthRegistration.
 class TumRecording : public FrameSource {
  public:
-  /// Reads the index and camera.yaml and finds every image, decoding none (but the first colour
-  /// image when camera.yaml is missing: TUM's published intrinsics are assumed, scaled to its
-  /// size).
-  /// @throws DataError if anything is missing, damaged or contradictory, or fewer than two frames
-  /// are there.
-  /// @throws std::invalid_argument if the defaults make no sense.
+  /// Reads the index and camera.yaml and finds every image, without decoding any (except the first
+  /// colour image if camera.yaml is missing; TUM's published intrinsics are then assumed, scaled to
+  /// its size).
+  /// @throws DataError if anything is missing, damaged or contradictory, or there are fewer than
+  ///         two frames.
+  /// @throws std::invalid_argument if the defaults are invalid.
   [[nodiscard]] static std::unique_ptr<TumRecording> Open(const std::filesystem::path& folder,
                                                           const RecordingDefaults& defaults = {});
 
   ~TumRecording() override;
   [[nodiscard]] const StreamInfo& info() const override;
 
-  /// @throws DataError on an image that is damaged or has another size than the camera; after that,
-  /// nothing more comes.
+  /// @throws DataError for an image that is damaged or of another size than the camera; no frames
+  ///         follow.
   [[nodiscard]] std::optional<Frame> Next() override;
 
   [[nodiscard]] const RecordingStatistics& statistics() const;
@@ -65,7 +66,7 @@ class TumRecording : public FrameSource {
   std::unique_ptr<Impl> impl_;
 };
 
-/// True if the folder looks like one: it holds rgb.txt or depth.txt.
+/// True if the folder looks like a recording: it contains rgb.txt or depth.txt.
 [[nodiscard]] bool IsTumRecording(const std::filesystem::path& folder);
 
 }  // namespace plumb

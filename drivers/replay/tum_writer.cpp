@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMaxUnits = 65534.0;  // 65535 reads as "nothing"
+constexpr double kMaxUnits = 65534.0;  // 65535 is read as "nothing measured"
 constexpr double kStampStep_s = 1e-6;
 
 void MakeFolder(const fs::path& folder) {
@@ -24,8 +24,8 @@ void MakeFolder(const fs::path& folder) {
   if (error) throw IoError(DescribeWriteError(folder, error.value()));
 }
 
-/// Shortest text that reads back as the same number, always with a point or an exponent:
-/// FileStorage distinguishes types by it.
+/// Shortest text that is read back as the same number, always with a point or an exponent, by which
+/// FileStorage distinguishes types.
 std::string Real(double value) {
   std::string text = fmt::format("{}", value);
   if (text.find_first_of(".en") == std::string::npos) text += '.';

@@ -11,12 +11,12 @@
 namespace plumb {
 
 struct TumWriterOptions {
-  double depth_scale = 5000.0;  ///< Units per metre of the depth images; farther than 65534 units
-                                ///< is written as nothing.
-  int jpeg_quality = 92;        ///< Of the colour images; 0 writes PNG instead.
+  /// Units per metre of the depth images; distances above 65534 units are written as not measured.
+  double depth_scale = 5000.0;
+  int jpeg_quality = 92;  ///< For the colour images; 0 writes PNG instead.
 };
 
-/// One image pair, ready for the disk.
+/// One image pair, encoded for the disk.
 struct EncodedFrame {
   double color_time_s = 0.0;
   double depth_time_s = 0.0;
@@ -31,8 +31,8 @@ struct EncodedFrame {
 /// The text of camera.yaml; ParseCameraFile() gives the same camera back, bit for bit.
 [[nodiscard]] std::string CameraFileText(const StreamInfo& info, double depth_scale);
 
-/// Writes one recording. Images go to the disk as they come; the indices and camera.yaml come last,
-/// with Finish(). Without it the folder is no recording: remove it when stopping early (see
+/// Writes one recording. Images are written immediately; the indices and camera.yaml are written by
+/// Finish(). Without it the folder is not a recording: remove it when stopping early (see
 /// daemon/files/atomic_folder.hpp). Not thread-safe.
 class TumWriter {
  public:

@@ -18,7 +18,7 @@ using Eigen::Vector3d;
 constexpr int kViewsPerSweep = 16;
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
-// A board on the support, its lowest corner two millimetres above it.
+// A board on the support, with its lowest corner two millimetres above it.
 Pose BoardPose(double x, double y, double yaw, double tilt, double tilt_direction) {
   Pose T = Pose::Identity();
   const Vector3d axis(std::cos(tilt_direction), std::sin(tilt_direction), 0.0);
@@ -43,7 +43,7 @@ bool FreeOfBodies(const Pose& T_world_board, const std::vector<LayoutScene>& sce
   return true;
 }
 
-// Moments spread over all sweeps, and which boards each of them sees.
+// Moments spread over all sweeps, with the boards that each of them sees.
 class Views {
  public:
   Views(const std::vector<LayoutScene>& scenes, const Intrinsics& camera)
@@ -80,7 +80,7 @@ class Views {
     return true;
   }
 
-  // How much a board would help: sights count for more where few boards are seen yet.
+  // Benefit of another board: views count for more where few boards are seen so far.
   [[nodiscard]] double Worth(const Pose& T_world_board) const {
     double worth = 0;
     for (std::size_t view = 0; view < seen_.size(); ++view) {
@@ -89,7 +89,7 @@ class Views {
     return worth;
   }
 
-  // The smallest share of its sweep that any scene sees the board in.
+  // The smallest fraction of its sweep in which any scene sees the board.
   [[nodiscard]] double LeastShare(const Pose& T_world_board) const {
     double least = 1.0;
     for (std::size_t scene = 0; scene < scenes_.size(); ++scene) {

@@ -1,4 +1,4 @@
-// Where the markers of a suite lie.
+// Places the markers of a suite.
 #pragma once
 
 #include <cstddef>
@@ -13,25 +13,23 @@
 
 namespace plumb::simulated {
 
-/// One scene as far as the markers are concerned: what they must not lie under, and from where they
-/// are looked at.
+/// One scene as far as markers are concerned: the area to keep free and the viewpoints.
 struct LayoutScene {
   std::shared_ptr<const DistanceGrid> body;
   Pose T_world_body = Pose::Identity();
   SweepOptions sweep;
 };
 
-/// The rectangle around the origin that holds the boards' centres, metres, and how many boards lie
-/// in it.
+/// The rectangle around the origin for the boards' centres, metres, and the number of boards in it.
 struct LayoutRegion {
   double half_length = 0.9;
   double half_width = 0.6;
   std::size_t num_boards = 24;
 };
 
-/// Lays boards around the bodies of all scenes, none under any of them, where a person would put
-/// them: so that every part of every sweep sees several. The first board is the reference marker:
-/// at the head, right of the body (-x, -y), its x axis along the sweep, seen in every scene.
+/// Places boards around the bodies of all scenes, with none under any of them, as a person would:
+/// every part of every sweep sees several. The first board is the reference marker: at the head,
+/// right of the body (-x, -y), with its x axis along the sweep, seen in every scene.
 /// @throws std::invalid_argument if no place for the reference marker is seen in all scenes.
 [[nodiscard]] std::vector<Board> LayBoards(const LayoutRegion& region,
                                            const std::vector<LayoutScene>& scenes,

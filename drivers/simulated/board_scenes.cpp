@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kTurn = 12 * kDegree;
 constexpr double kAboveSupport_m = 2 * kMillimetre;
-constexpr double kFarBelow_m = 3.0;        // where the support hides a body
-constexpr double kBoardDiagonal_m = 0.19;  // of one marker with its white margin
+constexpr double kFarBelow_m = 3.0;        // depth at which the support hides a body
+constexpr double kBoardDiagonal_m = 0.19;  // diagonal of one marker with its white margin
 constexpr std::uint64_t kOtherNoise = 7919;
 
 }  // namespace

@@ -39,13 +39,13 @@ double Trunk(const BodyShape& shape, const Vector3d& p) {
   d = SmoothMin(d, Ellipsoid(p, {0.06, 0.004, 0.090 + belly / 2}, {0.20, 0.136, 0.088 + belly / 2}),
                 0.06);
   d = SmoothMin(d, Ellipsoid(p, {0.235, -0.003, 0.094}, {0.150, 0.170, 0.098}), 0.06);
-  // Shoulder girdle and the slope to the neck; the left shoulder sits a little higher and further
+  // Shoulder girdle and the slope to the neck; the left shoulder is slightly higher and farther
   // back.
   d = SmoothMin(d, TaperedCapsule(p, {-0.270, -0.155, 0.097}, {-0.283, 0.155, 0.104}, 0.058, 0.061),
                 0.05);
   d = SmoothMin(d, TaperedCapsule(p, {-0.290, 0.0, 0.105}, {-0.430, 0.010, 0.118}, 0.066, 0.050),
                 0.05);
-  // Chest relief, unequal on the two sides.
+  // Chest relief, different on the two sides.
   d = SmoothMin(d, Ellipsoid(p, {-0.165, -0.076, 0.172 + chest}, {0.078, 0.070, 0.044}), 0.04);
   d = SmoothMin(d, Ellipsoid(p, {-0.172, 0.080, 0.167 + chest}, {0.074, 0.066, 0.042}), 0.04);
   // Lower belly, and the hip bones.

@@ -16,14 +16,14 @@ using Eigen::Vector3f;
 
 constexpr int kInkSide = 6;               // 36 samples in a pixel on an edge of a marker's print,
 constexpr int kOutlineSide = 4;           // 16 on the outline of a body or board,
-constexpr int kSmoothSide = 2;            // 4 elsewhere.
-constexpr std::uint8_t kInkEdge = 1;      // Within reach two materials of one object meet,
+constexpr int kSmoothSide = 2;            // and 4 elsewhere.
+constexpr std::uint8_t kInkEdge = 1;      // Two materials of one object meet within reach,
 constexpr std::uint8_t kOutlineEdge = 2;  // or two objects.
-constexpr float kGain = 0.80F;            // Linear exposure: white boards stay below saturation.
+constexpr float kGain = 0.80F;            // Linear exposure; white boards stay below saturation.
 constexpr int kLightLevels = 4096;
 
-// Share of light within the distance x of the centre's left, of a unit pixel seen through a
-// Gaussian blur: by integration, once.
+// Fraction of the light up to the distance x from the centre of a unit pixel seen through a
+// Gaussian blur; integrated once.
 class PixelKernel {
  public:
   explicit PixelKernel(double blur_px) {
@@ -39,7 +39,7 @@ class PixelKernel {
     }
     for (double& share : shares_) share /= shares_.back();
   }
-  /// Place below which the given share of the light falls.
+  /// Position below which the given fraction of the light falls.
   [[nodiscard]] double Inverse(double share) const {
     const auto above = std::upper_bound(shares_.begin() + 1, shares_.end() - 1, share);
     const auto i = static_cast<std::size_t>(above - shares_.begin());
@@ -63,7 +63,7 @@ std::vector<int> Permutation(RandomStream& random, int size) {
   return order;
 }
 
-// Four almost normal numbers of unit variance in one go: sums of four bytes of a hash.
+// Four approximately normal numbers of unit variance at once: sums of the four bytes of a hash.
 float NearlyNormal(std::uint64_t hash) {
   const auto sum = static_cast<float>((hash & 0xff) + ((hash >> 8) & 0xff) + ((hash >> 16) & 0xff) +
                                       ((hash >> 24) & 0xff));
@@ -75,7 +75,7 @@ float NearlyNormal(std::uint64_t hash) {
 struct ColorCamera::Shot {
   const World& world;
   std::vector<MovingPose> rows;        // Pose of each row at its mid-exposure.
-  std::vector<Candidates> candidates;  // By tile.
+  std::vector<Candidates> candidates;  // One per tile.
   cv::Mat material;                    // CV_16UC1, at each pixel's centre.
   cv::Mat depth;                       // CV_32FC1, metres along the optical axis.
   cv::Mat edge;                        // CV_8UC1
@@ -98,8 +98,8 @@ void ColorCamera::BuildSamples() {
   const PixelKernel kernel(unit_.lens_blur_px);
   RandomStream random(Hash(unit_.seed, 91));
   const auto pattern = [&](int side) {
-    // Multi-jittered (Chiu, Shirley, Wang 1994): one sample a cell of the side x side grid, and one
-    // in each of the side^2 columns and rows.
+    // Multi-jittered (Chiu, Shirley, Wang 1994): one sample per cell of the side x side grid, and
+    // one in each of the side^2 columns and rows.
     const int count = side * side;
     std::vector<Eigen::Vector3f> samples;  // du, dv, dt
     std::vector<std::vector<int>> columns;
@@ -121,7 +121,7 @@ void ColorCamera::BuildSamples() {
                              static_cast<float>(unit_.exposure_s * time));
       }
     }
-    // The corners of the grid first: see GatherOutline().
+    // The corners of the grid come first: see GatherOutline().
     const auto n = static_cast<std::size_t>(side);
     std::swap(samples[1], samples[n - 1]);
     std::swap(samples[2], samples[n * (n - 1)]);
@@ -144,7 +144,8 @@ void ColorCamera::BuildSamples() {
 void ColorCamera::Cast(Shot& shot, int tile_row) const {
   const int y_end = std::min(rays_.height(), (tile_row + 1) * kTileSize);
   const int y_mid = std::min(rays_.height() - 1, tile_row * kTileSize + kTileSize / 2);
-  // A tile's half diagonal, the lens's blur, and some room for the motion within the exposure.
+  // Half the diagonal of a tile, plus the lens's blur and a margin for the motion during the
+  // exposure.
   const float spread = (0.75F * kTileSize + 4.0F * static_cast<float>(unit_.lens_blur_px) + 2.0F) /
                            rays_.focal_px() +
                        0.6F * static_cast<float>(unit_.exposure_s);
@@ -172,7 +173,7 @@ void ColorCamera::Cast(Shot& shot, int tile_row) const {
 }
 
 cv::Mat ColorCamera::EdgeMask(const Shot& shot) const {
-  // How far an edge can smear: pixel and lens, and the motion during the exposure.
+  // Distance by which an edge is blurred: pixel and lens, and the motion during the exposure.
   const MovingPose& middle = shot.rows[shot.rows.size() / 2];
   const float motion_px = static_cast<float>(unit_.exposure_s) * rays_.focal_px() *
                           (middle.angular_velocity.norm() + middle.velocity.norm() / 0.75F);
@@ -214,7 +215,7 @@ cv::Mat ColorCamera::EdgeMask(const Shot& shot) const {
 Vector3f ColorCamera::GatherInk(const Shot& shot, int x, int y) const {
   const auto material = shot.material.at<std::uint16_t>(y, x);
   const MovingPose& pose = shot.rows[static_cast<std::size_t>(y)];
-  // Everything in the board's frame, where a sample's place is linear in du, dv and dt before the
+  // All in the board's frame, where a sample's position is linear in du, dv and dt before the
   // division.
   const World::BoardPlane& plane = shot.world.PlaneOf(BoardOf(material));
   const Vector3f origin = plane.R_board_world * (pose.p_world - plane.p_world);
@@ -251,8 +252,8 @@ Vector3f ColorCamera::GatherOutline(const Shot& shot, int x, int y,
   bool mixed = false;
   const auto& samples = PatternOf(outline_samples_, x, y);
   for (const Samples& four : samples) {
-    // The first four lie at the corners of the pattern: where they see nothing else, nothing else
-    // is in sight.
+    // The first four are at the corners of the pattern: if they see nothing else, nothing else is
+    // visible.
     if (&four == &samples[1] && !mixed)
       return centre < kFirstBoard ? Vector3f(sum / 4.0F) : GatherSmooth(shot, x, y);
     const Ray4 rays = pose.RayOf(rays_.At(x, y, four.du, four.dv), four.dt);
@@ -278,7 +279,7 @@ Vector3f ColorCamera::GatherSmooth(const Shot& shot, int x, int y) const {
   if (material >= kFirstBoard)
     return shading.light.cwiseProduct(
         shot.world.Albedo(shot.world.PaintOf(material, shading.normal), p));
-  // The surface is its tangent plane over one pixel.
+  // The surface is approximated by its tangent plane over one pixel.
   static_assert(kSmoothSide * kSmoothSide == 4);
   const Samples& four = PatternOf(smooth_samples_, x, y).front();
   const Vector3x4 origin = four.dt * pose.velocity + pose.p_world;
@@ -315,7 +316,7 @@ void ColorCamera::Develop(const Shot& shot, int tile_row, cv::Mat& rgb) const {
   const auto read_variance = static_cast<float>(unit_.read_noise * unit_.read_noise);
   const bool noisy = unit_.shot_noise > 0 || unit_.read_noise > 0;
   const int y_end = std::min(height, (tile_row + 1) * kTileSize);
-  // Tile by tile, so that neighbours find each other's texels in the cache.
+  // Processed by tiles, so that neighbours find each other's texels in the cache.
   for (int tile = 0; tile < shot.tiles_across; ++tile) {
     const Candidates& candidates =
         shot.candidates[static_cast<std::size_t>(tile_row * shot.tiles_across + tile)];

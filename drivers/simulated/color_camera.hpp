@@ -1,4 +1,4 @@
-// What the simulated colour camera records.
+// Renders the images of the simulated colour camera.
 #pragma once
 
 #include <cstdint>
@@ -11,17 +11,17 @@
 
 namespace plumb::simulated {
 
-/// Renders colour images: light is gathered linearly over each pixel's area, the lens's blur and
-/// the exposure; then vignetting, noise, tone curve. Pixels on an edge of a marker's print take 36
-/// samples, stratified so that a straight edge's coverage is true to about 1 %; others fewer.
-/// Immutable: any number of threads may render; parallel inside, the result does not depend on the
-/// number of threads.
+/// Renders colour images: light is integrated linearly over each pixel's area, the lens's blur and
+/// the exposure; then vignetting, noise and tone curve are applied. Pixels on an edge of a marker's
+/// print take 36 samples, stratified so that the coverage of a straight edge is accurate to about 1
+/// %; others take fewer. Immutable: may be used from any number of threads. Parallel inside; the
+/// result does not depend on the number of threads.
 class ColorCamera {
  public:
   explicit ColorCamera(const SensorUnit& unit);
-  /// @param time_s  Mid-exposure of the middle row, trajectory time.  @param noise_seed  Of this
-  /// image.
-  /// @param gain  Of the linear red, green and blue: what automatic exposure and white balance did.
+  /// @param time_s  Mid-exposure of the middle row, trajectory time.
+  /// @param noise_seed  Seed for this image.
+  /// @param gain  Gain of the linear red, green and blue by automatic exposure and white balance.
   /// @return CV_8UC3, red, green, blue.
   [[nodiscard]] cv::Mat Render(const World& world, const Trajectory& trajectory, double time_s,
                                std::uint64_t noise_seed,
@@ -29,9 +29,9 @@ class ColorCamera {
 
  private:
   struct Samples {
-    Float4 du, dv, dt;  ///< Four: pixels from the centre; seconds from mid-exposure.
+    Float4 du, dv, dt;  ///< Four samples each: pixels from the centre; seconds from mid-exposure.
   };
-  struct Shot;  ///< One image in the making.
+  struct Shot;  ///< Working data of one image.
   void BuildSamples();
   void Cast(Shot& shot, int tile_row) const;
   [[nodiscard]] cv::Mat EdgeMask(const Shot& shot) const;

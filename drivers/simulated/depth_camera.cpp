@@ -19,20 +19,20 @@ namespace {
 using Eigen::Vector3f;
 
 constexpr double kJitterFilterPx =
-    1.5;  // Of a 640-pixel image: the jitter of neighbours agrees a little.
-constexpr float kEdgeStep =
-    0.02F;  // Neighbours further apart in depth than this are an edge, metres.
-constexpr float kFlyingShare = 0.15F;    // Edge pixels that get a depth in between.
-constexpr float kEdgeLossShare = 0.45F;  // Edge pixels without depth.
-constexpr float kGrazingBegin = static_cast<float>(74.0 * kDegree);  // Losses begin here,
+    1.5;  // At 640 pixels width; the jitter of neighbours is slightly correlated.
+constexpr float kEdgeStep = 0.02F;     // Depth difference of neighbours that forms an edge, metres.
+constexpr float kFlyingShare = 0.15F;  // Fraction of edge pixels with a depth in between.
+constexpr float kEdgeLossShare = 0.45F;  // Fraction of edge pixels without depth.
+constexpr float kGrazingBegin = static_cast<float>(74.0 * kDegree);  // Losses begin here
 constexpr float kGrazingEnd = static_cast<float>(82.0 * kDegree);    // and are complete here.
-constexpr float kSteepest = 1.3F;  // Radians; steeper surfaces still count as edges.
+constexpr float kSteepest = 1.3F;  // Radians; even steeper surfaces count as edges.
 constexpr int kSlantSteps = 2048;
 constexpr double kProjectorBaseline_m = 0.075;
-constexpr double kBendMiddle_m = 0.9;  // Of the depths of a sweep,
-constexpr double kBendReach_m = 0.4;   // and how far from it the field changes by half.
+constexpr double kBendMiddle_m = 0.9;  // Middle of the depths of a sweep,
+// and the distance from it over which half of the change happens.
+constexpr double kBendReach_m = 0.4;
 
-// Share of the beams that a surface of this incidence loses, by its cosine.
+// Fraction of the beams that a surface with this incidence loses, by the cosine.
 float GrazingLoss(float cosine) {
   static const float kBegin = std::cos(kGrazingBegin);
   if (cosine >= kBegin) return 0.0F;
@@ -45,9 +45,9 @@ float TangentOf(float cosine) {
   return std::sqrt(1.0F - c * c) / c;
 }
 
-// Cosines of the angles between rays and the normals of what they met.
+// Cosines of the angles between rays and the normals where they hit.
 Float4 IncidenceCosine(const World& world, const Ray4& rays, const Hit4& hits) {
-  Float4 cosine = -rays.direction.z;  // The support's.
+  Float4 cosine = -rays.direction.z;  // Of the support.
   if (Any(hits.material > kSupport)) {
     const Vector3x4 places = hits.t * rays.direction + rays.origin;
     for (int i = 0; i < 4; ++i) {
@@ -63,7 +63,7 @@ Float4 IncidenceCosine(const World& world, const Ray4& rays, const Hit4& hits) {
 
 struct DepthCamera::Layers {
   std::vector<float> jitter_x, jitter_y, axial;  // Unit variance; empty when the effect is off.
-  double warm_up = 0.0;                          // Scale error of the moment.
+  double warm_up = 0.0;                          // Scale error at this moment.
 };
 
 // Radial error and field of every pixel; empty if the unit has neither.
@@ -121,7 +121,8 @@ void DepthCamera::Cast(const World& world, std::span<const MovingPose> rows, int
   const float spread = (0.75F * kTileSize + 6.0F * static_cast<float>(unit_.lateral_noise) + 1.0F) /
                        rays_.focal_px();
   const float margin = 0.002F + 0.6F * static_cast<float>(unit_.depth_readout_s * kTileSize /
-                                                          rays_.height());  // A hand's 0.6 m/s.
+                                                          // Speed of a hand, 0.6 m/s.
+                                                          rays_.height());
   for (int x_begin = 0; x_begin < width; x_begin += kTileSize) {
     const Ray centre = rows[static_cast<std::size_t>(y_mid)].RayOf(
         rays_.At(std::min(width - 1, x_begin + kTileSize / 2), y_mid, -0.5F, -0.5F), 0.0F);
@@ -173,7 +174,7 @@ inline double DepthCamera::BendAt(std::size_t pixel, double z) const {
 }
 
 inline double DepthCamera::SpeckleAt(int x, int y, double z) const {
-  // Where in the projector's row the beam comes from that is seen here; the pattern repeats.
+  // Column of the projector from which the beam seen here comes; the pattern repeats.
   const int width = rays_.width();
   double place = std::fmod(x - kProjectorBaseline_m * unit_.depth_true.fx / z, width);
   if (place < 0) place += width;
@@ -243,8 +244,8 @@ void DepthCamera::Measure(int y, const Layers& layers, const cv::Mat& true_m,
 }
 
 void DepthCamera::CastShadow(int y, const cv::Mat& true_m, cv::Mat& measured_m) const {
-  // The projector looks from the right: a pixel is dark if something further right in the row is
-  // hit by a beam further left, so near edges throw shadows of b f (1/z_f - 1/z_b) pixels to their
+  // The projector is on the right: a pixel is in shadow if something farther right in the row is
+  // hit by a beam farther left, so near edges cast shadows of b f (1/z_f - 1/z_b) pixels to their
   // left.
   const double baseline_px = unit_.projector_baseline_m * unit_.depth_true.fx;
   const auto* truth = true_m.ptr<float>(y);

@@ -150,7 +150,7 @@ Eigen::Vector3f DistanceGrid::GradientAtNode(int x, int y, int z) const {
 }
 
 void DistanceGrid::BuildShades() {
-  // Nodes of the cells that the surface crosses, and one cell further.
+  // Nodes of the cells that the surface crosses, plus one layer of cells.
   const float near = 3.0F * spacing_;
   shade_of_node_.assign(values_.size(), 0);
   std::vector<Eigen::Vector3i> nodes;

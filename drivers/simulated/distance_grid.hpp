@@ -1,5 +1,5 @@
-// A closed smooth surface as signed distances on a regular grid: fast ray casting, normals, and its
-// mesh.
+// A closed smooth surface as signed distances on a regular grid, with fast ray casting, normals and
+// a mesh.
 #pragma once
 
 #include <cstdint>
@@ -14,46 +14,46 @@
 
 namespace plumb::simulated {
 
-/// Signed distance to a surface, sampled at grid nodes, trilinear between them; negative inside.
-/// Metres, the surface's own frame. The surface *is* the zero set of the interpolated values: rays,
-/// normals and mesh all agree on it. Immutable after construction, so any number of threads may
-/// read.
+/// Signed distance to a surface, sampled at grid nodes with trilinear interpolation, negative
+/// inside. Metres, in the surface's own frame. The surface *is* the zero set of the interpolated
+/// values, so that rays, normals and mesh agree. Immutable after construction, so it may be read
+/// from any number of threads.
 class DistanceGrid {
  public:
   /// @param implicit  Negative inside, positive outside, smooth near its zero set; need not be a
-  /// distance. Called from several threads.
-  /// @param box       Holds the whole surface with at least two cells of room on every side.
+  ///         distance. Called from several threads.
+  /// @param box       Contains the whole surface with a margin of at least two cells on every side.
   /// @param spacing   Grid step, metres, > 0.
   DistanceGrid(const std::function<double(const Eigen::Vector3d&)>& implicit,
                const Eigen::AlignedBox3d& box, double spacing);
 
-  /// Signed distance; outside the box, the value at the nearest point of the box plus the way
-  /// there.
+  /// Signed distance; outside the box, the value at the nearest point of the box plus the distance
+  /// to it.
   [[nodiscard]] float Distance(const Eigen::Vector3f& p) const;
 
-  /// Outward unit normal (x, y, z) and openness (w) near the surface: both interpolated between the
-  /// nodes, so they vary smoothly. Openness is 1 where nothing of the body is near in front of the
+  /// Outward unit normal (x, y, z) and openness (w) near the surface, both interpolated between the
+  /// nodes, so they vary smoothly. Openness is 1 where no part of the body is close in front of the
   /// surface and falls towards 0 in creases.
   [[nodiscard]] Eigen::Vector4f Shade(const Eigen::Vector3f& p) const;
   [[nodiscard]] Eigen::Vector3f Normal(const Eigen::Vector3f& p) const {
     return Shade(p).head<3>();
   }
 
-  /// Distance along the ray to the surface, at or after t_begin and before t_end; infinity if there
-  /// is none.
+  /// Distance along the ray to the surface, at or after t_begin and before t_end; infinity if it is
+  /// not hit.
   /// @param direction  Unit length.
   [[nodiscard]] float Intersect(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
                                 float t_begin, float t_end) const;
 
-  /// The same for four rays, which costs little more than one.
-  /// @param origin, direction  The surface's own frame.
+  /// The same for four rays, at little more than the cost of one.
+  /// @param origin, direction  In the surface's own frame.
   [[nodiscard]] Float4 Intersect(const Vector3x4& origin, const Vector3x4& direction,
                                  Float4 t_begin, Float4 t_end) const;
 
-  /// How far a cone around the ray may advance before it can touch the surface; infinity if it
-  /// never does.
-  /// @param spread  Radius of the cone per metre of way.  @param margin  Its radius at the origin,
-  /// metres.
+  /// Distance by which a cone around the ray may advance before it can touch the surface; infinity
+  /// if it never does.
+  /// @param spread  Radius of the cone per metre.
+  /// @param margin  Radius at the origin, metres.
   [[nodiscard]] float ConeStart(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
                                 float spread, float margin, float t_end) const;
 
@@ -69,7 +69,7 @@ class DistanceGrid {
                static_cast<std::size_t>(size_.x()) +
            static_cast<std::size_t>(x);
   }
-  /// A cell and the place in it.
+  /// A cell and the position in it.
   struct Place {
     std::size_t index;
     float x, y, z;  ///< In [0, 1].
@@ -81,13 +81,13 @@ class DistanceGrid {
   void BuildShades();
   [[nodiscard]] std::vector<char> NormaliseNearSurface();
   void PropagateDistances(const std::vector<char>& fixed);
-  /// Values at four places, given in cells.
+  /// Values at four positions, given in cells.
   [[nodiscard]] Float4 ValuesAt(Float4 gx, Float4 gy, Float4 gz) const;
 
   Eigen::AlignedBox3f box_;
   Eigen::Vector3i size_;
   Eigen::Vector3f last_;  ///< Largest coordinates in cells that still have a neighbour.
-  std::size_t row_ = 0;   ///< Nodes from one row, and from one slice, to the next.
+  std::size_t row_ = 0;  ///< Offsets between nodes of neighbouring rows and of neighbouring slices.
   std::size_t slice_ = 0;
   float spacing_;
   float inverse_spacing_;

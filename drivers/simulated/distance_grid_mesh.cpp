@@ -24,7 +24,7 @@ TriangleMesh DistanceGrid::Surface() const {
         for (int corner = 0; corner < 8; ++corner)
           inside += negative(x + (corner & 1), y + ((corner >> 1) & 1), z + (corner >> 2)) ? 1 : 0;
         if (inside == 0 || inside == 8) continue;
-        // From the cell's centre down (or up) the gradient onto the zero set.
+        // From the cell's centre along the gradient onto the zero set.
         Eigen::Vector3f p =
             box_.min() + (Eigen::Vector3f(x, y, z) + Eigen::Vector3f::Constant(0.5F)) * spacing_;
         for (int step = 0; step < 6; ++step) p -= Interpolate(p) * Normal(p);
@@ -35,7 +35,7 @@ TriangleMesh DistanceGrid::Surface() const {
     }
   }
 
-  // Each grid edge that the surface crosses is shared by four cells: one quadrilateral, two
+  // Each grid edge that the surface crosses belongs to four cells: one quadrilateral, two
   // triangles.
   for (int z = 1; z + 1 < size_.z(); ++z) {
     for (int y = 1; y + 1 < size_.y(); ++y) {

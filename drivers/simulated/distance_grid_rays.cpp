@@ -1,4 +1,4 @@
-// Rays against the distance grid, four at a time.
+// Casts rays against the distance grid, four at a time.
 #include <array>
 #include <cstring>
 #include <limits>
@@ -10,15 +10,17 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kTolerance = 2e-5F;
-constexpr float kFree = 0.9F;  // Below 1: the interpolated distance may be a little too large.
-constexpr float kLeastStep = 0.25F;  // Of a cell: what a ray grazes less deep than one micrometre
-                                     // (on a radius of 0.1 m) it may miss.
-constexpr int kMaxRounds = 4;        // Of false position.
+// Below 1, because the interpolated distance may be slightly too large.
+constexpr float kFree = 0.9F;
+// Of a cell. A ray that grazes the surface less deeply than one micrometre (for a radius of 0.1 m)
+// may miss it.
+constexpr float kLeastStep = 0.25F;
+constexpr int kMaxRounds = 4;  // Rounds of false position.
 constexpr int kMaxSteps = 200;
 
 // Clips [begin, end] to where the rays are between low and high along one axis.
 void Clip(float low, float high, Float4 origin, Float4 direction, Float4& begin, Float4& end) {
-  const Float4 inverse = 1.0F / direction;  // An infinity here takes the right branch below.
+  const Float4 inverse = 1.0F / direction;  // An infinity here selects the correct branch below.
   const Float4 a = (low - origin) * inverse;
   const Float4 b = (high - origin) * inverse;
   begin = Larger(Smaller(a, b), begin);
@@ -84,26 +86,26 @@ Float4 DistanceGrid::Intersect(const Vector3x4& origin, const Vector3x4& directi
     return ValuesAt(o.x + at * way.x, o.y + at * way.y, o.z + at * way.z);
   };
 
-  // The surface lies after t (outside, d away from it), and once `bracketed` before t + width,
-  // where the distance is d_far <= tolerance.
+  // The surface is after t (outside, at distance d) and, once `bracketed`, before t + width, where
+  // the distance is d_far <= tolerance.
   Float4 d = distances(t);
   const Int4 at_once = active & (d <= kTolerance);
   found = at_once ? t : found;
   active &= ~at_once;
-  Float4 slope = Splat(0.5F);  // Fall of the distance per way in the last step.
+  Float4 slope = Splat(0.5F);  // Decrease of the distance per length of the last step.
   const float least_step = kLeastStep * spacing_;
-  Int4 careful{0, 0, 0, 0};  // The last step was too bold.
+  Int4 careful{0, 0, 0, 0};  // The last step was too long.
   Float4 width = Splat(0.0F);
   Float4 d_far = Splat(0.0F);
   Int4 bracketed{0, 0, 0, 0};
   Int4 rounds{0, 0, 0, 0};
   for (int step = 0; step < kMaxSteps && Any(active); ++step) {
-    // Over-relaxed (Keinert et al. 2014): as far as the free balls around both ends still overlap,
-    // if the distance goes on falling so.
+    // Over-relaxed (Keinert et al. 2014): the step is as long as the free balls around both ends
+    // still overlap, if the distance continues to decrease as before.
     const Float4 safe = Larger(kFree * d, Splat(least_step));
     Float4 advance =
         careful ? safe : Larger(1.9F * kFree * d / Larger(1.0F + slope, Splat(0.5F)), safe);
-    // Near the surface the distance falls linearly along the ray: try to step across it.
+    // Near the surface the distance decreases linearly along the ray: try to step across it.
     const Float4 across = 1.2F * d / Larger(slope, Splat(0.05F)) + kTolerance;
     const Int4 tries = (d <= spacing_) & (slope >= 0.05F) & (across <= spacing_) &
                        (t + across < t_end) & ~bracketed & ~careful;

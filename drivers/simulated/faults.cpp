@@ -5,7 +5,7 @@
 namespace plumb::simulated {
 namespace {
 
-// The first level that has a fault; kOnRequest: none has.
+// The lowest level that has a fault; kOnRequest: no level has it.
 enum class Since : std::uint8_t { kMild, kNominal, kHard, kOnRequest };
 
 struct Row {

@@ -1,4 +1,4 @@
-// What can be wrong with a simulated sensor, its hand and its room: named, and switched one by one.
+// Faults of a simulated sensor, its operator and its room, each with a name and a switch.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ enum class NoiseLevel { kIdeal, kNominal, kHard };
 /// "ideal", "nominal" or "hard".
 [[nodiscard]] std::string_view ToString(NoiseLevel noise);
 
-/// Every fault. `drivers/simulated/README.md` has the ranges and where they come from.
+/// Every fault. `drivers/simulated/README.md` has the ranges and their sources.
 enum class Fault : std::uint8_t {
   kCalibration,
   kDepthScale,
@@ -56,18 +56,18 @@ enum class Fault : std::uint8_t {
 };
 inline constexpr std::size_t kNumFaults = 33;
 
-/// One of them, for people.
+/// Description of one fault.
 struct FaultEntry {
   Fault fault;
-  std::string_view name;   ///< As the command line has it.
-  std::string_view about;  ///< One line.
+  std::string_view name;   ///< Name on the command line.
+  std::string_view about;  ///< One line of description.
 };
 
 /// All of them, in the order of the enumeration.
 [[nodiscard]] std::span<const FaultEntry, kNumFaults> AllFaults();
 [[nodiscard]] std::optional<Fault> ParseFault(std::string_view name);
 
-/// Which faults are on.
+/// The set of active faults.
 class FaultSet {
  public:
   [[nodiscard]] bool Has(Fault fault) const { return bits_.test(static_cast<std::size_t>(fault)); }
@@ -84,11 +84,11 @@ class FaultSet {
   std::bitset<kNumFaults> bits_;
 };
 
-/// What is wrong with every real unit in a real hand (nominal), and more of it (hard). Ideal: none.
+/// The faults of every real unit and operator (nominal), and additional ones (hard). Ideal: none.
 [[nodiscard]] FaultSet FaultsOf(NoiseLevel level);
 
-/// Only the faults whose shape the method's own sensor model has: the unit that the virtual sensor
-/// plays. Ideal: none.
+/// Only faults that the method's own sensor model can represent, as used by the virtual sensor.
+/// Ideal: none.
 [[nodiscard]] FaultSet MildFaults(NoiseLevel level);
 
 }  // namespace plumb::simulated

@@ -1,5 +1,5 @@
-// Four numbers at a time, for neighbouring rays. The vector types of g++ and clang: each
-// processor's own instructions, the same bits on all.
+// Four numbers at a time, for neighbouring rays. Uses the vector types of g++ and clang: the
+// processor's own instructions with the same bits everywhere.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace plumb::simulated {
 
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 =
-    std::int32_t __attribute__((vector_size(16)));  ///< As a mask: -1 where true, 0 where not.
+    std::int32_t __attribute__((vector_size(16)));  ///< As a mask: -1 where true, 0 where false.
 
 inline Float4 Splat(float a) { return Float4{a, a, a, a}; }
 inline Int4 Splat(std::int32_t a) { return Int4{a, a, a, a}; }

@@ -10,8 +10,8 @@
 namespace plumb::simulated {
 namespace {
 
-// Sum of the four 16-bit parts of a hash: variance 1, mean 0, nearly normal, and normal after the
-// filter.
+// Sum of the four 16-bit parts of a hash: variance 1, mean 0, approximately normal, and normal
+// after the filter.
 float White(std::uint64_t hash) {
   constexpr float kMean = 2.0F * 65535.0F;
   constexpr float kInverseSigma = 1.0F / 37837.2F;  // sqrt(4/12) 65536

@@ -1,4 +1,5 @@
-// Noise whose neighbouring pixels agree, as a sensor that matches windows of pixels makes it.
+// Noise with correlated neighbouring pixels, as produced by a sensor that matches windows of
+// pixels.
 #pragma once
 
 #include <cstdint>
@@ -6,14 +7,14 @@
 
 namespace plumb::simulated {
 
-/// Standard deviation of the Gaussian filter after which white noise has lost 90 % of its
-/// correlation at the given lag.
+/// Standard deviation of the Gaussian filter that reduces the correlation of white noise by 90 % at
+/// the given lag.
 [[nodiscard]] double FilterSigmaOfLag(double lag_px);
 
-/// Gaussian-filtered white noise of mean 0 and variance 1 at every pixel, row-major; the image
+/// Gaussian-filtered white noise with mean 0 and variance 1 at every pixel, row-major; the image
 /// wraps around at its borders. Its correlation at a distance d is exp(-d^2 / (4 sigma_px^2)).
 /// Parallel inside; a pure function of its arguments.
-/// @param sigma_px  Of the filter; 0: white noise.
+/// @param sigma_px  Sigma of the filter; 0: white noise.
 [[nodiscard]] std::vector<float> CorrelatedNoise(std::uint64_t seed, int width, int height,
                                                  double sigma_px);
 

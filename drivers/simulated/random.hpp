@@ -1,6 +1,6 @@
-// Random numbers that are the same on every machine and in any order of evaluation: everything
-// comes from a hash of (seed, what for, index), so parallel loops draw the same values whatever the
-// number of threads.
+// Random numbers that are the same on every machine and in any order of evaluation: each comes from
+// a hash of (seed, purpose, index), so that parallel loops draw the same values on any number of
+// threads.
 #pragma once
 
 #include <cmath>
@@ -9,8 +9,7 @@
 
 namespace plumb::simulated {
 
-/// The finalizer of SplitMix64 (Steele, Lea, Flood 2014): every bit of the input reaches every bit
-/// of the output.
+/// The finalizer of SplitMix64 (Steele, Lea, Flood 2014): every input bit affects every output bit.
 [[nodiscard]] constexpr std::uint64_t Hash(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
@@ -30,7 +29,7 @@ namespace plumb::simulated {
   return static_cast<double>(hash >> 11) * 0x1.0p-53;
 }
 
-/// A sequence of random numbers. Not thread-safe; one per purpose.
+/// A sequence of random numbers. Not thread-safe; use one per purpose.
 class RandomStream {
  public:
   explicit RandomStream(std::uint64_t seed) : seed_(Hash(seed)) {}

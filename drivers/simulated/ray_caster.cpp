@@ -8,7 +8,7 @@ Eigen::Vector2d Undistort(const Intrinsics& camera, const LensRest& rest,
                           const Eigen::Vector2d& pixel) {
   Eigen::Vector2d ideal = plumb::Undistort(camera, pixel);
   if (rest == LensRest{}) return ideal;
-  // The rest is a fraction of a pixel: what it adds hardly changes over that.
+  // The rest is a fraction of a pixel, over which the correction hardly changes.
   for (int i = 0; i < 4; ++i) {
     const double r2 = ideal.squaredNorm();
     const Eigen::Vector2d prism(r2 * (rest.prism[0] + rest.prism[1] * r2),
@@ -22,7 +22,7 @@ Eigen::Vector2d Undistort(const Intrinsics& camera, const LensRest& rest,
 
 PixelRays::PixelRays(const Intrinsics& camera, const LensRest& rest)
     : width_(camera.width), height_(camera.height), focal_px_(static_cast<float>(camera.fx)) {
-  // One pixel more on every side, for the differences.
+  // One additional pixel on every side, for the differences.
   const auto across = static_cast<std::size_t>(width_ + 2);
   std::vector<Eigen::Vector2d> ideal(across * static_cast<std::size_t>(height_ + 2));
   tbb::parallel_for(-1, height_ + 1, [&](int y) {

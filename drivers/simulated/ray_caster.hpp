@@ -1,4 +1,4 @@
-// Rays of one moving camera: which way each pixel looks, and from where, at any time.
+// Rays of one moving camera: direction and origin of each pixel at any time.
 #pragma once
 
 #include <cstdint>
@@ -15,32 +15,32 @@ namespace plumb::simulated {
 
 inline constexpr int kTileSize = 8;  ///< Pixels; the rays of one tile share their candidates.
 
-/// Ideal normalised coordinates of a pixel, through the whole lens.
+/// Ideal normalised coordinates of a pixel, through the complete lens model.
 [[nodiscard]] Eigen::Vector2d Undistort(const Intrinsics& camera, const LensRest& rest,
                                         const Eigen::Vector2d& pixel);
 
-/// The direction that each pixel looks in, camera frame. Made once per camera.
+/// Direction of each pixel in the camera frame. Created once per camera.
 class PixelRays {
  public:
   explicit PixelRays(const Intrinsics& camera, const LensRest& rest = {});
-  /// Ray through a place near the centre of pixel (x, y), du and dv pixels away; z = 1. Linear in
-  /// du, dv over a few pixels.
+  /// Ray through a position near the centre of pixel (x, y), du and dv pixels away; z = 1. Linear
+  /// in du, dv over a few pixels.
   [[nodiscard]] Eigen::Vector3f At(int x, int y, float du, float dv) const {
     const std::size_t i = Index(x, y);
     return {x_[i] + du * x_du_[i] + dv * x_dv_[i], y_[i] + du * y_du_[i] + dv * y_dv_[i], 1.0F};
   }
-  /// Through four places near the centre of one pixel.
+  /// Rays through four positions near the centre of one pixel.
   [[nodiscard]] Vector3x4 At(int x, int y, Float4 du, Float4 dv) const {
     const std::size_t i = Index(x, y);
     return {x_[i] + du * x_du_[i] + dv * x_dv_[i], y_[i] + du * y_du_[i] + dv * y_dv_[i],
             Splat(1.0F)};
   }
-  /// Through the centres of the pixels x to x + 3 of a row.
+  /// Rays through the centres of the pixels x to x + 3 of a row.
   [[nodiscard]] Vector3x4 FourFrom(int x, int y) const {
     const std::size_t i = Index(x, y);
     return {Load(&x_[i]), Load(&y_[i]), Splat(1.0F)};
   }
-  /// Through a place near each of them.
+  /// Rays through a position near each of them.
   [[nodiscard]] Vector3x4 FourFrom(int x, int y, Float4 du, Float4 dv) const {
     const std::size_t i = Index(x, y);
     return {Load(&x_[i]) + du * Load(&x_du_[i]) + dv * Load(&x_dv_[i]),
@@ -58,15 +58,16 @@ class PixelRays {
   int width_;
   int height_;
   float focal_px_;
-  std::vector<float> x_, y_, x_du_, x_dv_, y_du_, y_dv_;  ///< By pixel.
+  std::vector<float> x_, y_, x_du_, x_dv_, y_du_, y_dv_;  ///< Per pixel.
 };
 
-/// A camera's place with its motion, so that the poses of a few milliseconds around come cheaply.
+/// A camera's pose with its velocity, from which poses within a few milliseconds are computed
+/// cheaply.
 struct MovingPose {
   Eigen::Matrix3f R_world_camera = Eigen::Matrix3f::Identity();
   Eigen::Vector3f p_world = Eigen::Vector3f::Zero();
-  Eigen::Vector3f velocity = Eigen::Vector3f::Zero();          ///< World, m/s.
-  Eigen::Vector3f angular_velocity = Eigen::Vector3f::Zero();  ///< World, rad/s.
+  Eigen::Vector3f velocity = Eigen::Vector3f::Zero();          ///< World frame, m/s.
+  Eigen::Vector3f angular_velocity = Eigen::Vector3f::Zero();  ///< World frame, rad/s.
 
   /// World direction of a camera-frame direction, not normalised.
   [[nodiscard]] Eigen::Vector3f DirectionOf(const Eigen::Vector3f& direction_camera,
@@ -74,8 +75,8 @@ struct MovingPose {
     const Eigen::Vector3f direction = R_world_camera * direction_camera;
     return direction + dt * angular_velocity.cross(direction);
   }
-  /// Ray of a camera-frame direction, dt seconds after the pose's own time. Exact to second order
-  /// in the turn (below 0.01 pixel).
+  /// Ray of a camera-frame direction, dt seconds after the time of the pose. Exact to second order
+  /// in the rotation (below 0.01 pixel).
   [[nodiscard]] Ray RayOf(const Eigen::Vector3f& direction_camera, float dt) const {
     return {p_world + dt * velocity, DirectionOf(direction_camera, dt).normalized()};
   }
@@ -86,14 +87,14 @@ struct MovingPose {
   [[nodiscard]] Ray4 RayOf(const Vector3x4& direction_camera, Float4 dt) const {
     return Ray4(dt * velocity + p_world, DirectionOf(direction_camera, dt));
   }
-  /// At the pose's own time.
+  /// At the time of the pose.
   [[nodiscard]] Ray4 RayOf(const Vector3x4& direction_camera) const {
     return Ray4(Splat(p_world), R_world_camera * direction_camera);
   }
 };
 
-/// @param T_carrier_camera  Where this camera sits on what the trajectory moves (the colour
-/// camera).
+/// @param T_carrier_camera  Pose of this camera relative to the camera that the trajectory moves
+///         (the colour camera).
 [[nodiscard]] MovingPose PoseAt(const Trajectory& trajectory, double time_s,
                                 const Pose& T_carrier_camera);
 

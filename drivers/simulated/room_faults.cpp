@@ -13,14 +13,16 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
-constexpr double kPrintScale = 0.005;     // A printer that fits the page to its margins; guess.
-constexpr double kPrintStretch = 0.0015;  // Along the paper's way against across; guess.
+// An estimate for a printer that fits the page to its margins.
+constexpr double kPrintScale = 0.005;
+// An estimate, along against across the paper's direction of travel.
+constexpr double kPrintStretch = 0.0015;
 constexpr double kBulge = 2.5 * kMillimetre;
 constexpr int kBreathLevels = 9;
 
 double Sign(RandomStream& random) { return random.Uniform() < 0.5 ? -1.0 : 1.0; }
 
-// One printer made all prints.
+// All prints are from one printer.
 void ScalePrints(std::vector<Board>& boards, std::uint64_t seed) {
   RandomStream random(seed);
   const double scale = Sign(random) * random.Uniform(0.5, 1.0) * kPrintScale;
@@ -29,14 +31,14 @@ void ScalePrints(std::vector<Board>& boards, std::uint64_t seed) {
     board.print_scale = {1.0 + scale + 0.5 * stretch, 1.0 + scale - 0.5 * stretch};
 }
 
-// All but the reference marker: that one was looked after.
+// All except the reference marker, which is assumed to be well kept.
 void CurlPrints(std::vector<Board>& boards, std::uint64_t seed) {
   RandomStream random(seed);
   for (std::size_t i = 1; i < boards.size(); ++i)
     boards[i].bulge_m = Sign(random) * random.Uniform(0.2, 1.0) * kBulge;
 }
 
-// A marker that lies on its board as before, elsewhere and turned a little, away from the body.
+// A marker displaced on its board, slightly rotated, away from the body.
 Pose Shifted(const Pose& T_world_marker, double distance_m, RandomStream& random) {
   const Vector3d place = T_world_marker.translation();
   const double outwards = std::atan2(place.y(), place.x()) + random.Within(1.0);
@@ -76,7 +78,7 @@ HandVisit PlanHand(const ScenePlan& scene, std::uint64_t seed) {
   visit.begin_s = scene.sweep.motion.duration_s * random.Uniform(0.25, 0.65);
   visit.end_s = visit.begin_s + random.Uniform(0.8, 1.5);
   visit.side = Sign(random);
-  // Where the sensor looks at that moment, above the body.
+  // Point above the body at which the sensor looks at that moment.
   const Pose T_world_camera =
       Trajectory(scene.sweep.motion).T_world_camera(0.5 * (visit.begin_s + visit.end_s));
   const Vector3d way = T_world_camera.linear().col(2);
@@ -87,7 +89,7 @@ HandVisit PlanHand(const ScenePlan& scene, std::uint64_t seed) {
   return visit;
 }
 
-// The body's own shape is in the middle of the breath.
+// The body's own shape is in the middle of the breathing cycle.
 class Breaths {
  public:
   explicit Breaths(std::uint64_t seed) : random_(seed) {
@@ -108,7 +110,7 @@ class Breaths {
 
  private:
   RandomStream random_;
-  double chest_m_, belly_m_;  // From breathed out to breathed in.
+  double chest_m_, belly_m_;  // From exhaled to inhaled.
   std::map<const BodyModel*, std::vector<std::shared_ptr<const DistanceGrid>>> levels_;
 };
 

@@ -1,4 +1,4 @@
-// What is wrong in the room of a suite: prints, markers that move, cables, hands, breath.
+// Faults in the room of a suite: prints, moved markers, cables, hands, breathing.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace plumb::simulated {
 
-/// Changes the planned room and scenes as the unit's faults say. Every fault has its own random
+/// Applies the unit's faults to the planned room and scenes. Every fault has its own random
 /// numbers. Boards and sweeps must be planned already; ScenePlan::boards is set here.
 void ApplyRoomFaults(SuitePlan& plan, std::uint64_t seed);
 

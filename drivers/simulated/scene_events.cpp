@@ -16,7 +16,7 @@ using Eigen::Vector3f;
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 const Vector3f kSleeve(0.20F, 0.33F, 0.36F);
 
-// From 0 to 1, standing still at both ends.
+// From 0 to 1 with zero velocity at both ends.
 double Ease(double s) {
   s = std::clamp(s, 0.0, 1.0);
   return s * s * (3.0 - 2.0 * s);
@@ -26,7 +26,7 @@ Rod MakeRod(const Vector3d& a, const Vector3d& b, double radius) {
   return {a.cast<float>(), b.cast<float>(), static_cast<float>(radius)};
 }
 
-// The cable leaves the sensor's right end, hangs through a corner of the view and sways.
+// The cable leaves the right end of the sensor, hangs through a corner of the view and sways.
 void AddCable(std::vector<Rod>& rods, const Pose& T_world_camera, double time_s,
               std::uint64_t seed) {
   RandomStream random(seed);

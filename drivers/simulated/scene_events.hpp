@@ -1,4 +1,4 @@
-// What moves in the room while a sweep goes on: a pushed marker, a cable, a hand, a breath.
+// Objects that move in the room during a sweep: a pushed marker, a cable, a hand, breathing.
 #pragma once
 
 #include <cstddef>
@@ -11,28 +11,28 @@
 
 namespace plumb::simulated {
 
-/// A marker that is pushed over the support. Times since the sweep's start.
+/// A marker that is pushed across the support. Times since the sweep's start.
 struct PushedBoard {
   std::size_t board = 0;
-  Pose T_world_after = Pose::Identity();  ///< Of the marker.
+  Pose T_world_after = Pose::Identity();  ///< Pose of the marker afterwards.
   double begin_s = 0.0;
   double end_s = 0.0;
 };
 
-/// An arm that comes from one side of the room, stays over a place, and goes back the same way.
+/// An arm that reaches into the room from one side, stays over a place, and leaves the same way.
 struct HandVisit {
-  Eigen::Vector3d over = Eigen::Vector3d::Zero();  ///< Where the fingers' tips get, world.
-  double side = 1.0;                               ///< Comes from +y or -y.
+  Eigen::Vector3d over = Eigen::Vector3d::Zero();  ///< Position reached by the fingertips, world.
+  double side = 1.0;                               ///< Side from which it comes, +y or -y.
   double begin_s = 0.0;
   double end_s = 0.0;
 };
 
-/// Chest and belly, from breathed out to breathed in.
+/// Chest and belly, from exhaled to inhaled.
 struct Breath {
   std::vector<std::shared_ptr<const DistanceGrid>> levels;
   double period_s = 4.0;
   double phase = 0.0;
-  /// 0: breathed out, 1: breathed in.
+  /// 0: exhaled, 1: inhaled.
   [[nodiscard]] double DepthAt(double time_s) const;
 };
 
@@ -45,7 +45,7 @@ struct SceneEvents {
   [[nodiscard]] bool Any() const { return pushed || hand || breath || cable; }
 };
 
-/// The room at a moment. What moves stands still during an image.
+/// The room at one moment. Moving objects are static during an image.
 /// @param T_world_camera  Carries the cable.
 [[nodiscard]] World WorldAt(const World& world, const SceneEvents& events, double time_s,
                             const Pose& T_world_camera);

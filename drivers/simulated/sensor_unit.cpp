@@ -11,7 +11,7 @@
 namespace plumb::simulated {
 namespace {
 
-constexpr double kMaxIncidence = 85.0 * kDegree;  // The model has a pole at 90 degrees.
+constexpr double kMaxIncidence = 85.0 * kDegree;  // the model has a pole at 90 degrees
 
 // Errors of the calibration, uniform within these limits; nominal size.
 void DrawOptics(SensorUnit& unit, RandomStream& random, double size) {
@@ -46,7 +46,7 @@ void DrawOptics(SensorUnit& unit, RandomStream& random, double size) {
   unit.depth_true.cx += random.Within(1.0 * size);
   unit.depth_true.cy += random.Within(1.0 * size);
 
-  // The infrared camera sits 25 mm beside the colour camera.
+  // The infrared camera is 25 mm beside the colour camera.
   const auto turn = [&](double limit) {
     return Eigen::Vector3d(random.Within(limit), random.Within(limit), random.Within(limit));
   };
@@ -92,7 +92,8 @@ void SetRandomErrors(SensorUnit& unit, NoiseLevel level, double size) {
   unit.jpeg_quality = hard ? 90 : 95;
 }
 
-// Takes back what is switched off; all of it was drawn, so that the rest stays as it is.
+// Resets faults that are switched off. All random values were drawn, so that the others do not
+// change.
 void SwitchOff(SensorUnit& unit) {
   const auto off = [&](Fault fault) { return !unit.faults.Has(fault); };
   if (unit.one_camera) {
@@ -123,7 +124,7 @@ void SwitchOff(SensorUnit& unit) {
 void BendDepth(SensorUnit& unit, double size) {
   DepthBend& bend = unit.depth_bend;
   RandomStream random(Hash(unit.seed, 112));
-  // Half of its limit at least, or a unit would have none.
+  // At least half of its limit; otherwise some units would hardly have any.
   const double radial = random.Uniform(0.002, 0.004) * (random.Uniform() < 0.5 ? -1.0 : 1.0);
   const double quartic = random.Uniform(0.2, 0.8);
   const double field = random.Uniform(0.0010, 0.0020);

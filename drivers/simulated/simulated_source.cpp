@@ -12,7 +12,7 @@ namespace {
 constexpr double kFirstFrame_s = 0.05;
 constexpr double kWarmUpTime_s = 600.0;
 
-// A value that steps at random times: the index of the step that holds at a time.
+// A value that steps at random times: the index of the step at a given time.
 std::uint64_t StepAt(std::uint64_t seed, double shortest_s, double longest_s, double time_s) {
   simulated::RandomStream random(seed);
   std::uint64_t step = 0;
@@ -22,7 +22,7 @@ std::uint64_t StepAt(std::uint64_t seed, double shortest_s, double longest_s, do
   return step;
 }
 
-// What automatic exposure and white balance do to red, green and blue.
+// Gain of red, green and blue by automatic exposure and white balance.
 Eigen::Vector3f GainAt(const simulated::SensorUnit& unit, std::uint64_t seed, double time_s) {
   Eigen::Vector3f gain = Eigen::Vector3f::Ones();
   if (unit.steps_exposure) {

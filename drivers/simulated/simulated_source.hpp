@@ -1,4 +1,4 @@
-// A simulated sweep as a stream of frames, with its truth.
+// A simulated sweep as a stream of frames, with its true values.
 #pragma once
 
 #include <cstdint>
@@ -16,26 +16,25 @@
 
 namespace plumb {
 
-/// What one sweep is made of, beside the world and the unit.
+/// Parameters of one sweep, in addition to the world and the unit.
 struct SimulatedSweep {
   simulated::SweepOptions motion;
   int num_frames = 150;
   double rate_hz = 15.0;
-  double start_time_s = 0.0;  ///< Stamp of the trajectory's time 0.
+  double start_time_s = 0.0;  ///< Stamp at the trajectory's time 0.
   int reference_marker = 0;
-  double on_before_s = 0.0;  ///< How long the sensor had been on at the trajectory's time 0.
-  std::uint64_t seed = 1;    ///< Of the noise of its images and stamps.
+  double on_before_s = 0.0;  ///< Time that the sensor had been on at the trajectory's time 0.
+  std::uint64_t seed = 1;    ///< Seed for the noise of its images and stamps.
   simulated::SceneEvents events = {};
 };
 
-/// What really happened while a frame was taken. Times on the scale of the stamps, but without
-/// their errors.
+/// True values for one frame. Times on the scale of the stamps, without their errors.
 struct FrameTruth {
   double color_time_s = 0.0;  ///< Mid-exposure of the colour image's middle row.
   double depth_time_s = 0.0;
-  Pose T_world_camera_at_color = Pose::Identity();  ///< Of the true colour camera.
+  Pose T_world_camera_at_color = Pose::Identity();  ///< Pose of the true colour camera.
   Pose T_world_camera_at_depth = Pose::Identity();
-  simulated::DepthShot depth;  ///< With the depth before registration.
+  simulated::DepthShot depth;  ///< Includes the depth before registration.
 };
 
 /// Renders one sweep frame by frame; the same bits for the same arguments. Not thread-safe,
@@ -48,7 +47,7 @@ class SimulatedSource : public FrameSource {
   [[nodiscard]] const StreamInfo& info() const override { return info_; }
   [[nodiscard]] std::optional<Frame> Next() override;
 
-  /// Truth of the frame that Next() gave last.
+  /// True values of the frame that Next() returned last.
   [[nodiscard]] const FrameTruth& truth() const { return truth_; }
   /// True pose of the colour camera at a time on the scale of the stamps.
   [[nodiscard]] Pose T_world_camera(double time_s) const {
@@ -58,7 +57,7 @@ class SimulatedSource : public FrameSource {
   [[nodiscard]] const SimulatedSweep& sweep() const { return sweep_; }
 
  private:
-  /// What the driver does with a pair of images.
+  /// Treatment of a pair of images by the driver.
   enum class Fate { kGiven, kLost, kDoubled };
   [[nodiscard]] Fate FateOf(int index) const;
   void Take(Frame& frame, double color_time, double depth_time);
@@ -73,7 +72,7 @@ class SimulatedSource : public FrameSource {
   FrameTruth truth_;
   int next_ = 0;
   std::int64_t given_ = 0;
-  Frame last_;  ///< Kept only where the driver may give it again.
+  Frame last_;  ///< Kept only if the driver may repeat it.
 };
 
 }  // namespace plumb

@@ -9,7 +9,7 @@ namespace plumb::simulated {
 namespace {
 
 constexpr int kBumps = 24;
-constexpr double kNarrowest = 0.08;  // Of the image's width.
+constexpr double kNarrowest = 0.08;  // Fraction of the image's width.
 constexpr double kWidest = 0.35;
 
 struct Bump {

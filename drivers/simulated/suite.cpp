@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A folder beside the final one, gone again unless it was renamed.
+// A folder beside the final one, which is removed unless it was renamed.
 class FolderBeside {
  public:
   explicit FolderBeside(const fs::path& out) : out_(out) {

@@ -19,14 +19,14 @@ using Eigen::Vector3d;
 constexpr double kFirstStamp_s = 1.7e9;
 constexpr double kSceneInterval_s = 100.0;
 
-// How a body lies: its centroid's place over the support and its attitude.
+// Placement of a body: the position of its centroid above the support, and its attitude.
 struct Placement {
   double x = 0.0, y = 0.0;
   double yaw_deg = 0.0, pitch_deg = 0.0, roll_deg = 0.0;
-  double lift = 0.0;  // A pad under the body, metres.
+  double lift = 0.0;  // Height of a pad under the body, metres.
 };
 
-// The body rests on the support: its lowest point presses one millimetre into it, or lies on a pad.
+// The body rests on the support: its lowest point presses one millimetre into it or lies on a pad.
 Pose Placed(const BodyModel& body, const Placement& placement) {
   Pose T = Pose::Identity();
   T.linear() = (Eigen::AngleAxisd(placement.yaw_deg * kDegree, Vector3d::UnitZ()) *
@@ -68,8 +68,7 @@ void PlanNine(SuitePlan& plan, const SimulateOptions& options) {
   const auto body = MakeBody({.kind = BodyKind::kTorso});
   RandomStream random(Hash(options.seed, 63));
   for (int i = 0; i < 9; ++i) {
-    // A 3 x 3 pattern of places, each with some freedom, so that the whole area is used for every
-    // seed.
+    // A 3 x 3 pattern of places with random offsets, so that the whole area is used for every seed.
     Placement placement;
     placement.x = 0.17 * (i % 3 - 1) + random.Within(0.08);
     placement.y = 0.12 * (i / 3 - 1) + random.Within(0.05);
@@ -81,9 +80,9 @@ void PlanNine(SuitePlan& plan, const SimulateOptions& options) {
   plan.pairs = OrderedPairs(plan.scenes);
 }
 
-// What verdicts are about: moves of 0 to 10 mm and 0 to 2 deg. The first four placements are so
-// close to each other that every pair of them is in tolerance (3 mm, 1 deg) by half of it; the
-// others are not.
+// Moves of 0 to 10 mm and 0 to 2 deg, the range that verdicts distinguish. The first four
+// placements are so close to each other that every pair of them uses at most half of the tolerance
+// (3 mm, 1 deg); the others are farther apart.
 void PlanSmall(SuitePlan& plan, const SimulateOptions& options) {
   constexpr int kClose = 4;
   constexpr int kPlacements = 10;
@@ -111,7 +110,8 @@ void PlanPatient(SuitePlan& plan, const SimulateOptions& options) {
   const auto add = [&](const std::string& name, const BodyShape& shape,
                        const Placement& placement) {
     const auto body = MakeBody(shape);
-    // The trunk's place must not depend on the deformation: placed by the relaxed body's centroid.
+    // The trunk's position must not depend on the deformation, so it is placed by the relaxed
+    // body's centroid.
     BodyModel anchor = *body;
     if (!plan.scenes.empty()) anchor.centroid = plan.scenes.front().body->centroid;
     plan.scenes.push_back({name, body, Placed(anchor, placement), {}});
@@ -144,7 +144,7 @@ void PlanSweeps(SuitePlan& plan, const SimulateOptions& options, double half_way
   for (std::size_t i = 0; i < plan.scenes.size(); ++i) {
     ScenePlan& scene = plan.scenes[i];
     RandomStream random(Hash(options.seed, 65, i));
-    // Who sweeps follows the body, but not exactly.
+    // The operator follows the body, but not exactly.
     const Vector3d centre = scene.T_world_body * scene.body->centroid;
     const Vector3d forward = scene.T_world_body.linear().col(0);
     Pose T_world_sweep = Pose::Identity();

@@ -1,4 +1,4 @@
-// Which scenes a suite has: bodies, placements, room and sweeps, drawn from a seed.
+// Plans the scenes of a suite: bodies, placements, room and sweeps, drawn from a seed.
 #pragma once
 
 #include <memory>
@@ -14,7 +14,7 @@
 
 namespace plumb::simulated {
 
-/// A body, ready to be seen: its distances, its surface, and the area centroid of that surface
+/// A body ready for rendering: its distances, its surface, and the area centroid of that surface
 /// (body frame).
 struct BodyModel {
   BodyShape shape;
@@ -28,7 +28,7 @@ struct ScenePlan {
   std::shared_ptr<const BodyModel> body;
   Pose T_world_body = Pose::Identity();
   SimulatedSweep sweep;
-  std::vector<Board> boards = {};  ///< Those of the room, as they lie at the sweep's start.
+  std::vector<Board> boards = {};  ///< Boards of the room as they lie at the start of the sweep.
 };
 
 /// World frame of all scenes: z up from the supporting plane, x from head to feet, origin in the
@@ -38,7 +38,7 @@ struct SuitePlan {
   SensorUnit unit;
   Room room;
   int reference_marker =
-      0;  ///< Lies at the head, right of the body (-x, -y); its x axis along the sweep.
+      0;  ///< At the head, right of the body (-x, -y), with its x axis along the sweep.
   std::vector<ScenePlan> scenes;
   std::vector<std::pair<std::string, std::string>> pairs;  ///< Reference scene, current scene.
 };

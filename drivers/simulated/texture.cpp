@@ -16,10 +16,10 @@ namespace {
 using Byte8 = std::uint8_t __attribute__((vector_size(8)));
 using Short4 = std::uint16_t __attribute__((vector_size(8)));
 using Short8 = std::uint16_t __attribute__((vector_size(16)));
-// Far away from zero, so that the conversion to an integer rounds down for all places of a room.
+// Far from zero, so that the conversion to an integer rounds down everywhere in a room.
 constexpr int kOffset = 1 << 14;
 constexpr int kFractions =
-    16;  // Of a texel: fine enough, and the sums of 8-bit values stay in 16 bits.
+    16;  // Subdivisions of a texel; fine enough, and the sums of 8-bit values fit into 16 bits.
 constexpr float kScale = 1.0F / (255.0F * kFractions * kFractions);
 
 using Eigen::Vector2f;
@@ -57,7 +57,7 @@ Vector2f PointIn(RandomStream& random, const Texture& texture) {
   return {x, static_cast<float>(random.Uniform(low.y(), high.y()))};
 }
 
-// Short strokes of random place, direction and shade.
+// Short strokes of random position, direction and shade.
 void Scatter(Texture& texture, RandomStream& random, int count, float shortest, float longest,
              float width, float darkest, float brightest, float opacity) {
   for (int i = 0; i < count; ++i) {
@@ -88,8 +88,7 @@ inline Int4 Texture::Between(int x0, int y0, int wu, int wv) const {
     y0 = Mirror(y0, height_);
     y1 = Mirror(y1, height_);
   }
-  // Interpolated before the square is taken, in whole numbers; all channels of two texels at a
-  // time.
+  // Interpolated before squaring, in integers; all channels of two texels at a time.
   const auto right = static_cast<std::uint16_t>(wu);
   const auto left = static_cast<std::uint16_t>(kFractions - wu);
   const Short8 across{left, left, left, left, right, right, right, right};

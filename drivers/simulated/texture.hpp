@@ -1,4 +1,4 @@
-// Procedural textures with corners at every scale, as natural floors, blankets and mannequins have.
+// Procedural textures with corners at every scale, like natural floors, blankets and mannequins.
 #pragma once
 
 #include <cstdint>
@@ -10,22 +10,22 @@
 
 namespace plumb::simulated {
 
-/// Linear-light albedo over a rectangle of a plane; mirrored outside of it. Immutable once painted.
+/// Linear-light albedo over a rectangle of a plane; mirrored outside it. Immutable once painted.
 class Texture {
  public:
   /// @param low   Corner of the rectangle, metres.  @param step  Texel size, metres.
   Texture(const Eigen::Vector2f& low, float step, int width, int height,
           const Eigen::Vector3f& albedo);
 
-  /// Albedo (red, green, blue) at a place, bilinear between texels.
+  /// Albedo (red, green, blue) at a position, bilinear between texels.
   [[nodiscard]] Eigen::Vector3f At(float x, float y) const;
 
-  /// Mean albedo over four places.
+  /// Mean albedo over four positions.
   [[nodiscard]] Eigen::Vector3f At(Float4 x, Float4 y) const;
 
   // Painting. Colours are linear-light albedo in [0, 1]; lengths in metres.
 
-  /// Multiplies by a smooth noise of the given cell size: 1 +- amplitude.
+  /// Multiplies by smooth noise with the given cell size: 1 +- amplitude.
   void Mottle(std::uint64_t seed, float cell, float amplitude);
   /// Blends a colour over a thick straight stroke.
   void Stroke(const Eigen::Vector2f& from, const Eigen::Vector2f& to, float width,
@@ -41,14 +41,14 @@ class Texture {
   }
 
  private:
-  using Texel = std::uint32_t;  ///< Square roots of red, green and blue albedo times 255, a byte
-                                ///< each from the lowest.
+  /// Square roots of red, green and blue albedo times 255, one byte each from the lowest.
+  using Texel = std::uint32_t;
   [[nodiscard]] std::size_t Index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
            static_cast<std::size_t>(x);
   }
-  /// Roots of red, green and blue times 255 * 256, between four texels; wu, wv in sixteenths of the
-  /// way.
+  /// Square roots of red, green and blue times 255 * 256, interpolated between four texels; wu, wv
+  /// in sixteenths.
   [[nodiscard]] Int4 Between(int x0, int y0, int wu, int wv) const;
   void Blend(int x, int y, const Eigen::Vector3f& color, float opacity);
 

@@ -7,7 +7,7 @@
 namespace plumb::simulated {
 namespace {
 
-// IEC 61966-2-1. In floats, as the first simulator had it: the images stay the same to the bit.
+// IEC 61966-2-1, in float precision so that images stay the same bit for bit.
 float EncodeSrgb(float light) {
   return light <= 0.0031308F ? 12.92F * light : 1.055F * std::pow(light, 1.0F / 2.4F) - 0.055F;
 }

@@ -17,7 +17,7 @@ double SoftRamp(double s) {
   constexpr double kEase = 0.125;
   const auto eased = [](double u) {
     return u - std::sin(kTwoPi / 2.0 * u / kEase) * kEase / (kTwoPi / 2.0);
-  };  // Integral of 1 - cos.
+  };  // integral of 1 - cos
   s = std::clamp(s, 0.0, 1.0);
   const double whole = 1.0 - kEase;
   if (s < kEase) return 0.5 * eased(s) / whole;
@@ -40,7 +40,8 @@ double Trajectory::Sum(const Waves& waves, double time_s) {
 Trajectory::Trajectory(const SweepOptions& options) : options_(options) {
   RandomStream random(Hash(options.seed, 71));
   swing_phase_ = random.Uniform(0.0, kTwoPi);
-  // Two slow drifts of the arm, then tremor at 2 to 9 Hz that gets smaller as it gets faster.
+  // Two slow drifts of the arm, then tremor at 2 to 9 Hz with an amplitude that decreases with
+  // frequency.
   constexpr std::array<double, 5> kLowest = {0.12, 0.45, 1.8, 3.5, 6.5};
   constexpr std::array<double, 5> kHighest = {0.25, 0.90, 3.0, 5.5, 9.0};
   constexpr std::array<double, 5> kPosition = {0.020, 0.006, 0.0012, 0.0005, 0.0002};

@@ -1,4 +1,4 @@
-// How the sensor is carried over the body: a head to feet sweep by hand.
+// Motion of the sensor over the body: a hand-held sweep from head to feet.
 #pragma once
 
 #include <array>
@@ -10,17 +10,17 @@
 namespace plumb::simulated {
 
 /// A sweep in its own frame: x from head to feet, z up from the support, origin under the middle of
-/// the way.
+/// the path.
 struct SweepOptions {
   Pose T_world_sweep = Pose::Identity();
-  double half_way_m = 0.6;  ///< The sensor goes from x = -half_way_m to +half_way_m.
+  double half_way_m = 0.6;  ///< The sensor moves from x = -half_way_m to +half_way_m.
   double height_m = 0.95;   ///< Above the support.
   double swing_m = 0.22;    ///< Amplitude of the left-right swings.
   double swing_period_s = 3.6;
   double duration_s = 10.0;
-  double tremor = 1.0;  ///< Multiplies the hand's tremor; 0: none.
-  /// A trembling hand beside that: RMS over 1 to 10 Hz, all axes together. Amplitudes fall with the
-  /// frequency, so every band moves equally fast.
+  double tremor = 1.0;  ///< Factor of the hand's tremor; 0: none.
+  /// Additional trembling of the hand: RMS over 1 to 10 Hz, all axes together. Amplitudes decrease
+  /// with frequency, so that every band has the same speed.
   double tremble_m = 0.0;
   double tremble_rad = 0.0;
   std::uint64_t seed = 1;
@@ -30,8 +30,8 @@ struct SweepOptions {
 class Trajectory {
  public:
   explicit Trajectory(const SweepOptions& options);
-  /// @param time_s  From 0 to the sweep's duration; the sensor stands still (but for its tremor)
-  /// before and after.
+  /// @param time_s  From 0 to the sweep's duration; the sensor is static (apart from tremor) before
+  ///         and after.
   [[nodiscard]] Pose T_world_camera(double time_s) const;
 
  private:

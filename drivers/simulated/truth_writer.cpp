@@ -16,7 +16,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double kTruthRate_hz = 500.0;
-constexpr double kMargin_s = 0.15;  // Beyond the last frame, for its delays.
+constexpr double kMargin_s = 0.15;  // after the last frame, for its delays
 
 json ToJson(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -142,7 +142,7 @@ VertexSightings::VertexSightings(const SuitePlan& plan, std::size_t scene)
 
 void VertexSightings::Add(const FrameTruth& truth) {
   constexpr double kSame =
-      0.010;  // The true depth at the pixel is the vertex's own within this much, metres.
+      0.010;  // Tolerance in metres between the true depth at the pixel and that of the vertex.
   const Pose T_depth_world =
       (truth.T_world_camera_at_depth * plan_.unit.T_color_depth_true).inverse();
   const Eigen::Vector3d centre = T_depth_world.inverse().translation();

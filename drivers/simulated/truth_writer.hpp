@@ -1,4 +1,4 @@
-// The truth beside a simulated recording.
+// Writes the true values beside a simulated recording.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 namespace plumb::simulated {
 
-/// Counts in how many frames each vertex of the body was measured.
+/// Counts the frames in which each vertex of the body was measured.
 class VertexSightings {
  public:
   VertexSightings(const SuitePlan& plan, std::size_t scene);
@@ -29,8 +29,8 @@ class VertexSightings {
 void WriteTruth(const std::filesystem::path& folder, const SuitePlan& plan, std::size_t scene,
                 const SimulatedSource& source, const std::vector<int>& vertex_sightings);
 
-/// Writes what is true of the sensor: its optics, depth errors, times and tone curve. @throws
-/// IoError
+/// Writes the true values of the sensor: its optics, depth errors, times and tone curve.
+/// @throws IoError
 void WriteUnit(const std::filesystem::path& file, const SensorUnit& unit);
 
 }  // namespace plumb::simulated

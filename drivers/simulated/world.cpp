@@ -15,7 +15,7 @@ using Eigen::Vector3f;
 
 constexpr float kBoardHalf = static_cast<float>(kBoardSide / 2);
 constexpr float kMarkerHalf = static_cast<float>(kMarkerLength / 2);
-constexpr float kBoardDepth = 0.12F;  // Into the support.
+constexpr float kBoardDepth = 0.12F;  // Below the surface of the support.
 constexpr float kCouchThickness = 0.08F;
 
 // Two ceiling panels.
@@ -96,8 +96,8 @@ void World::BakeSupportLight() {
         return std::isfinite(
             body_->Intersect(ToBody(p), R_body_world_ * way / length, 0.0F, length));
       };
-      // Cosine-weighted directions on a fixed spiral: the same for every cell, so the light varies
-      // smoothly.
+      // Cosine-weighted directions on a fixed spiral, the same for every cell, so that the light
+      // varies smoothly.
       constexpr int kDirections = 24;
       int open = 0;
       for (int i = 0; i < kDirections; ++i) {
@@ -128,7 +128,7 @@ void World::BakeSupportLight() {
 Candidates World::FindCandidates(const Ray& centre, float spread, float margin) const {
   Candidates found;
   for (std::size_t i = 0; i < boards_.size(); ++i) {
-    // Sphere around the board's top and the part of its side above the support.
+    // Sphere around the top of the board and the part of its side above the support.
     const Vector3f to_board = boards_[i].p_world - centre.origin;
     const float along = to_board.dot(centre.direction);
     const float beside = (to_board - along * centre.direction).norm();
@@ -164,8 +164,8 @@ void World::TraceSupport(const Ray4& rays, Hit4& hits) const {
   if (Any(beside)) TraceCouchSides(rays, beside, hits);
 }
 
-// Of the rays that pass beside the couch's top: the floor, or a vertical side of the couch seen
-// from outside.
+// For rays that pass beside the couch top: the floor, or a vertical side of the couch seen from
+// outside.
 void World::TraceCouchSides(const Ray4& rays, Int4 beside, Hit4& hits) const {
   hits.t = beside ? hits.t - room_.floor_below_couch_m / rays.direction.z : hits.t;
   hits.material = beside ? Splat(std::int32_t{kLowerFloor}) : hits.material;
@@ -215,7 +215,7 @@ void World::TraceBoard(int index, const Ray4& rays, Hit4& hits) const {
 
 Float4 World::BoardPlane::MeetTop(const Vector3x4& origin, const Vector3x4& direction,
                                   Float4 t) const {
-  // The slope is below 1/8: each round leaves less than a fifth of the error.
+  // The slope is below 1/8, so each iteration leaves less than a fifth of the error.
   const float inverse_half = 1.0F / print_half[0];
   for (int i = 0; i < 4; ++i) {
     const Float4 x = (origin.x + t * direction.x) * inverse_half;
@@ -274,7 +274,7 @@ Vector3f World::Normal(Material material, const Vector3f& p_world) const {
   return Vector3f::UnitZ();
 }
 
-// The first of the rods' surfaces that each ray meets, if it is nearer than what it met so far.
+// The first rod hit by each ray, if it is nearer than the previous hit.
 void World::TraceRods(const Ray4& rays, Hit4& hits) const {
   for (const Rod& rod : rods_.rods) {
     const Vector3f axis = rod.b - rod.a;
@@ -285,7 +285,7 @@ void World::TraceRods(const Ray4& rays, Hit4& hits) const {
     const Float4 from_direction =
         from.x * rays.direction.x + from.y * rays.direction.y + from.z * rays.direction.z;
     const Float4 radius_squared = Splat(rod.radius * rod.radius);
-    // The cylinder: both sides are multiplied by the axis's square.
+    // The cylinder: both sides are multiplied by the square of the axis.
     const Float4 a = axis_squared - across * across;
     const Float4 b = axis_squared * from_direction - from_axis * across;
     const Float4 c = axis_squared * (SquaredNorm(from) - radius_squared) - from_axis * from_axis;
@@ -327,7 +327,7 @@ Vector3f World::RodNormal(const Vector3f& p_world) const {
 float World::GlareAt(Material material, const Vector3f& p_world, const Vector3f& from) const {
   if (room_.gloss <= 0.0F || !IsBoardTop(material)) return 0.0F;
   constexpr float kWidth =
-      0.12F;  // Radians: half of a panel's own size, and a coat that is not quite flat.
+      0.12F;  // Radians: half of a panel's own size, plus a coating that is not quite flat.
   const Vector3f normal = Normal(material, p_world);
   const Vector3f view = (p_world - from).normalized();
   const Vector3f mirrored = view - 2.0F * view.dot(normal) * normal;
@@ -341,7 +341,7 @@ float World::GlareAt(Material material, const Vector3f& p_world, const Vector3f&
 
 World::Paint World::PaintOf(Material material, const Vector3f& normal) const {
   if (material != kBody) return {material};
-  // The paint is projected along the three axes and blended by how squarely each one meets the
+  // The paint is projected along the three axes and blended by how directly each one faces the
   // skin.
   const Vector3f n = (R_body_world_ * normal).cwiseAbs2();
   Vector3f weight = n.cwiseProduct(n);
@@ -407,7 +407,7 @@ Shading World::ShadingAt(Material material, const Vector3f& p_world) const {
   if (material != kBody) return {Normal(material, p_world), SupportLight(p_world)};
   const Eigen::Vector4f shade = body_->Shade(ToBody(p_world));
   const Vector3f normal = R_body_world_.transpose() * shade.head<3>();
-  // The support darkens what is close above it and does not look up.
+  // The support darkens what is close above it and is not itself shaded from below.
   const float above = std::clamp(p_world.z() / 0.12F, 0.0F, 1.0F);
   const float open = shade.w() * (0.45F + 0.55F * std::max(above, normal.z()));
   float light = kAmbient * (0.5F + 0.5F * normal.z()) * open;

@@ -50,7 +50,7 @@ std::string SpeedText(int speed) {
   }
 }
 
-/// True if a hub above the device, or its controller, is of USB 3.
+/// True if a hub above the device, or its controller, is USB 3.
 bool BehindUsb3(libusb_device* device) {
   for (libusb_device* hub = libusb_get_parent(device); hub != nullptr;
        hub = libusb_get_parent(hub)) {
@@ -155,7 +155,7 @@ UsbWatcher::UsbWatcher() : impl_(std::make_unique<Impl>()) {
     libusb_exit(impl_->context);
     throw DeviceError(fmt::format("libusb cannot watch the bus: {}", libusb_error_name(status)));
   }
-  impl_->changed = false;  // sensors that were attached at the start are not reported as new
+  impl_->changed = false;  // sensors attached at the start are not reported as new
 }
 
 UsbWatcher::~UsbWatcher() {

@@ -1,5 +1,5 @@
-// Sensors of the Xtion class on the USB bus: when they come and go, and whether this user may open
-// them. Their images are not its business.
+// Sensors of the Xtion class on the USB bus: plugging and unplugging, and whether this user may
+// open them. Does not read their images.
 #pragma once
 
 #include <poll.h>
@@ -19,8 +19,8 @@ struct UsbSensor {
   int address = 0;
   std::uint16_t vendor = 0;
   std::uint16_t product = 0;
-  std::string model;                  ///< "Xtion Pro Live" and the like.
-  std::string speed;                  ///< "480 Mbit/s"; empty: unknown.
+  std::string model;                  ///< For example "Xtion Pro Live".
+  std::string speed;                  ///< For example "480 Mbit/s"; empty if unknown.
   bool permitted = true;              ///< This user may open it.
   std::vector<std::string> problems;  ///< Actual and possible obstacles, each with a remedy.
   bool operator==(const UsbSensor&) const = default;
@@ -30,8 +30,8 @@ struct UsbSensor {
 [[nodiscard]] std::optional<std::string> UsbSensorModel(std::uint16_t vendor,
                                                         std::uint16_t product);
 
-/// Watches the bus. One thread, the event loop's, uses everything; nothing blocks. Block signals
-/// before: libusb starts a thread.
+/// Watches the bus. Everything is used on the event loop's thread, and nothing blocks. Block
+/// signals before, because libusb starts a thread.
 class UsbWatcher {
  public:
   using Clock = std::chrono::steady_clock;
@@ -42,18 +42,18 @@ class UsbWatcher {
   UsbWatcher(const UsbWatcher&) = delete;
   UsbWatcher& operator=(const UsbWatcher&) = delete;
 
-  /// Sensors that are attached, by bus and address.
+  /// Attached sensors by bus and address.
   [[nodiscard]] const std::vector<UsbSensor>& sensors() const;
 
   /// The descriptors to wait for. The set may change; then `changed` is called, from within a call
   /// of this object.
   [[nodiscard]] std::vector<pollfd> fds() const;
   void SetFdListener(std::function<void()> changed);
-  /// To be called when one of them is ready, or at the deadline. @throws DeviceError
+  /// Call it when one of them is ready, or at the deadline. @throws DeviceError
   void Dispatch();
   [[nodiscard]] std::optional<Clock::time_point> deadline() const;
 
-  /// Called from Dispatch() after a sensor came or went.
+  /// Called from Dispatch() after a sensor was plugged in or unplugged.
   void SetListener(std::function<void()> changed);
 
  private:

@@ -1,5 +1,5 @@
-// Frames rendered beforehand, raw on the disk: what the virtual sensor plays. Knows nothing of
-// images, so that the plug-in stays small.
+// Pre-rendered raw frames on the disk, which the virtual sensor plays. Independent of image
+// libraries, so that the plug-in stays small.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +21,7 @@ struct FrameCacheShape {
   std::uint32_t height = 0;
   std::uint32_t num_frames = 0;
   std::uint32_t period_us = 0;  ///< Nominal, between frames.
-  std::uint32_t version = 0;    ///< Of the simulator that rendered them.
+  std::uint32_t version = 0;    ///< Version of the simulator that rendered them.
   bool operator==(const FrameCacheShape&) const = default;
   [[nodiscard]] std::size_t color_bytes() const { return std::size_t{3} * width * height; }
   [[nodiscard]] std::size_t depth_bytes() const { return std::size_t{2} * width * height; }
@@ -30,18 +30,18 @@ struct FrameCacheShape {
   }
 };
 
-/// Reads frames in any order, straight from the file (the kernel keeps hot ones), so it takes no
-/// memory of its own. Immutable after opening: any number of threads may read.
+/// Reads frames in any order, directly from the file (the kernel caches them), so it needs no
+/// memory of its own. Immutable after opening: may be read from any number of threads.
 class FrameCacheReader {
  public:
-  /// @throws std::runtime_error if the file is missing, no cache or not whole.
+  /// @throws std::runtime_error if the file is missing, not a cache or incomplete.
   explicit FrameCacheReader(const std::filesystem::path& file);
   ~FrameCacheReader();
   FrameCacheReader(const FrameCacheReader&) = delete;
   FrameCacheReader& operator=(const FrameCacheReader&) = delete;
 
   [[nodiscard]] const FrameCacheShape& shape() const { return shape_; }
-  /// @param rgb    Of color_bytes().  @param depth_mm  Of width x height.
+  /// @param rgb    Of size color_bytes(). @param depth_mm  Of size width x height.
   /// @throws std::runtime_error if the disk fails; std::out_of_range.
   [[nodiscard]] CachedStamps Read(std::uint32_t frame, std::span<std::uint8_t> rgb,
                                   std::span<std::uint16_t> depth_mm) const;
@@ -51,7 +51,7 @@ class FrameCacheReader {
   FrameCacheShape shape_;
 };
 
-/// The header before the first frame.
+/// Header before the first frame.
 [[nodiscard]] std::string FrameCacheHeader(const FrameCacheShape& shape);
 
 }  // namespace plumb::simulated

@@ -1,4 +1,4 @@
-// Frames as a sensor of the Xtion class gives them: RGB and depth in whole millimetres.
+// Frames in the format of a sensor of the Xtion class: RGB and depth in whole millimetres.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +13,13 @@ namespace plumb::simulated {
 struct RawFrame {
   CachedStamps stamps;
   std::vector<std::uint8_t> rgb;
-  std::vector<std::uint16_t> depth_mm;  ///< Below 10000, where the recorder of OpenNI2 damages
-                                        ///< depth; farther is 0, nothing.
+  /// Below 10000, because the recorder of OpenNI2 damages larger values; larger depth is 0 (not
+  /// measured).
+  std::vector<std::uint16_t> depth_mm;
   [[nodiscard]] bool operator==(const RawFrame& other) const;
 };
 
-/// @param start_time_s  Where the cached stamps begin to count.
+/// @param start_time_s  Origin of the cached stamps.
 [[nodiscard]] RawFrame MakeRaw(const Frame& frame, double start_time_s);
 
 /// The next record of a frame cache. @throws IoError

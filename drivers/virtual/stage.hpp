@@ -1,5 +1,5 @@
-// The frames that the virtual units show, and the commands to them. Shared by the command thread
-// and the units' own.
+// The frames shown by the virtual units, and the commands to them. Shared by the command thread and
+// the units' own.
 #pragma once
 
 #include <atomic>
@@ -13,25 +13,26 @@
 
 namespace plumb::simulated {
 
-/// The scenes, which of them is shown and how.
+/// The scenes, the current one and the mode of playing.
 class Stage {
  public:
   enum class Motion {
-    kStill,      ///< Holds the first frame.
-    kSweep,      ///< Plays from the first frame, then holds the last one.
-    kSweepOnce,  ///< Plays from the first frame, then gives nothing: for recordings of exactly one
-                 ///< sweep.
+    kStill,  ///< Holds the first frame.
+    kSweep,  ///< Plays from the first frame and then holds the last one.
+    /// Plays from the first frame and then delivers nothing, for recordings of exactly one sweep.
+    kSweepOnce,
   };
   struct View {
     std::shared_ptr<const FrameCacheReader> scene;
     std::size_t index = 0;
     Motion motion = Motion::kStill;
-    std::uint64_t epoch = 0;      ///< Changes whenever something changed: start again.
-    double speed = 1.0;           ///< 0: as fast as it goes.
-    std::int64_t origin_us = -1;  ///< Stamp of the sweep's time 0; negative: whenever it starts.
+    std::uint64_t epoch = 0;  ///< Changes with every command: playing restarts.
+    double speed = 1.0;       ///< 0: as fast as possible.
+    /// Stamp at the sweep's time 0; negative: the time at which it starts.
+    std::int64_t origin_us = -1;
   };
 
-  /// @throws std::runtime_error unless there are scenes, all of one shape.
+  /// @throws std::runtime_error unless there are scenes, all of the same size and rate.
   explicit Stage(const std::vector<std::string>& files);
 
   [[nodiscard]] const FrameCacheShape& shape() const { return scenes_.front()->shape(); }
@@ -58,7 +59,7 @@ struct Unit {
   std::atomic<bool> failed{false};
   std::atomic<Glitch> glitch{Glitch::kNone};
   std::atomic<int> glitches_left{0};
-  std::atomic<int> position{-1};  ///< Frame that was given last; -1: none since the stage changed.
+  std::atomic<int> position{-1};  ///< Last delivered frame; -1: none since the last command.
 
   [[nodiscard]] bool silent() const { return gone || stalled || failed; }
 };

@@ -46,16 +46,16 @@ void SweepPlayer::Run(const std::stop_token& stop) {
     try {
       Tick(stop);
     } catch (const std::exception&) {
-      unit_->failed = true;  // the cache cannot be read any more: the unit has failed, and its user
-                             // sees a stall
+      // the cache cannot be read any more: the unit has failed, and its user sees a stall
+      unit_->failed = true;
     }
     const std::int64_t period_us = stage_->shape().period_us;
     device_us_ += period_us;
     if (view_.speed > 0) {
       const std::chrono::microseconds period(
           static_cast<std::int64_t>(static_cast<double>(period_us) / view_.speed));
-      // Time lost is made up slowly: OpenNI2 keeps only the newest image of a stream, so a burst
-      // would be lost in part.
+      // Delays are made up slowly, because OpenNI2 keeps only the newest image of a stream and a
+      // burst would be lost in part.
       due_ = std::max(due_ + period, Clock::now() + period / 2);
       SleepUntil(due_, stop);
     } else {

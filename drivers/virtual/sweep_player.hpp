@@ -16,17 +16,17 @@
 
 namespace plumb::simulated {
 
-/// One pair as the unit gives it.
+/// One pair as delivered by the unit.
 struct PlayedPair {
-  CachedStamps stamps;  ///< Of the unit's own clock.
+  CachedStamps stamps;  ///< From the unit's own clock.
   int frame_index = 0;
   std::span<const std::uint8_t> rgb;
   std::span<const std::uint16_t> depth_mm;
-  bool small = false;       ///< Claims to be, and is, of half the size.
-  bool depth_only = false;  ///< Its colour image never comes.
+  bool small = false;       ///< Has half the size, and states it.
+  bool depth_only = false;  ///< Its colour image never arrives.
 };
 
-/// A thread of its own gives a pair each period while somebody wants them.
+/// Its thread delivers one pair per period while there is a user.
 class SweepPlayer {
  public:
   /// @param wanted, emit  Called on the player's thread until it is destroyed.
@@ -49,22 +49,23 @@ class SweepPlayer {
   const std::function<bool()> wanted_;
   const std::function<void(const PlayedPair&)> emit_;
 
-  std::mutex mutex_;  ///< For waiting alone.
+  std::mutex mutex_;  ///< Used only for waiting.
   std::condition_variable_any wake_;
 
-  // Of the thread.
+  // Members of the thread.
   Stage::View view_;
   std::vector<std::uint8_t> rgb_;
   std::vector<std::uint16_t> depth_mm_;
   CachedStamps loaded_stamps_;
   std::int64_t loaded_frame_ = -1;
   std::uint32_t next_ = 0;  ///< Position in the scene.
-  int wait_ticks_ = 0;  ///< Before a sweep, so that what was on its way is not taken for its begin.
-  std::int64_t device_us_ = 1000000;  ///< The unit's own clock.
+  /// Before a sweep, so that earlier frames in transit are not taken for its beginning.
+  int wait_ticks_ = 0;
+  std::int64_t device_us_ = 1000000;  ///< Clock of the unit.
   std::int64_t sweep_begin_us_ = 0;
   int frame_index_ = 0;
   Clock::time_point due_;
-  std::jthread thread_;  ///< Last: joined before the others go.
+  std::jthread thread_;  ///< Last member: joined before the others are destroyed.
 };
 
 }  // namespace plumb::simulated

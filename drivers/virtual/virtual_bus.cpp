@@ -137,7 +137,7 @@ std::string VirtualBus::OnUnit(const std::string& serial,
   return "ok";
 }
 
-// Needs the lock. Empty: the unit that was plugged first.
+// Requires the lock. Empty: the unit that was plugged in first.
 std::shared_ptr<Unit> VirtualBus::Find(const std::string& serial) const {
   const auto found = std::find_if(units_.begin(), units_.end(), [&](const auto& unit) {
     return serial.empty() || unit->serial == serial;

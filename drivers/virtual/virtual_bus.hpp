@@ -1,5 +1,5 @@
-// The virtual units and the commands to them, whoever shows the units to a program: the in-process
-// provider or the plug-in of OpenNI2.
+// The virtual units and their commands, for both ways of showing them to a program: the in-process
+// provider and the plug-in of OpenNI2.
 #pragma once
 
 #include <atomic>
@@ -18,14 +18,14 @@ namespace plumb::simulated {
 inline constexpr std::uint16_t kVirtualUsbVendor = 0x1d27;
 inline constexpr std::uint16_t kVirtualUsbProduct = 0x0601;  // Xtion Pro Live
 
-/// Units that come and go by command. Thread-safe.
+/// Units that are plugged in and unplugged by command. Thread-safe.
 class VirtualBus {
  public:
   enum class Event { kPlugged, kUnplugged, kFailed, kWorksAgain };
-  /// Called on the thread that gave the command, without a lock: it may open or close a unit.
+  /// Called on the thread that gave the command, without a lock held: it may open or close a unit.
   using Listener = std::function<void(const Unit& unit, Event event)>;
 
-  /// @param serial  Of the unit that `plug` without a serial means.
+  /// @param serial  Used by `plug` without a serial.
   VirtualBus(std::shared_ptr<Stage> stage, std::string serial);
 
   void SetListener(Listener listener);
@@ -34,10 +34,10 @@ class VirtualBus {
   std::string Obey(const std::string& line);
 
   [[nodiscard]] std::vector<std::shared_ptr<Unit>> units() const;
-  /// Null if no unit with that address is plugged.
+  /// Null if no unit with that address is plugged in.
   [[nodiscard]] std::shared_ptr<Unit> At(const std::string& uri) const;
   [[nodiscard]] const std::shared_ptr<Stage>& stage() const { return stage_; }
-  /// Whether the driver was told never to come back when it is stopped.
+  /// Whether the driver was ordered not to return when it is stopped.
   [[nodiscard]] bool hangs() const { return hangs_; }
 
  private:

@@ -24,7 +24,7 @@ using simulated::Unit;
 using simulated::VirtualBus;
 
 constexpr std::chrono::microseconds kMaxGap{16000};  // between the stamps of a pair
-constexpr double kNominalFov_rad = 1.0226;           // as the plug-in of OpenNI2 states it
+constexpr double kNominalFov_rad = 1.0226;           // as stated by the plug-in of OpenNI2
 
 /// One open unit.
 class VirtualLiveSensor : public BoxedSensor {
@@ -43,7 +43,7 @@ class VirtualLiveSensor : public BoxedSensor {
         [this](const PlayedPair& pair) { Accept(pair); });
   }
 
-  void LockExposure(bool) override {}  // the simulated camera's stands still
+  void LockExposure(bool) override {}  // the simulated camera has a fixed exposure
 
  private:
   void Accept(const PlayedPair& pair) {
@@ -66,16 +66,17 @@ class VirtualLiveSensor : public BoxedSensor {
   }
 
   const simulated::FrameCacheShape shape_;
-  std::unique_ptr<simulated::SweepPlayer> player_;  ///< Last: its thread ends before the box goes.
+  /// Last member: its thread ends before the box is destroyed.
+  std::unique_ptr<simulated::SweepPlayer> player_;
 };
 
-/// The scenes rendered and the units plugged in, for one run of a program.
+/// The rendered scenes and the plugged-in units, for one run of a program.
 class VirtualSetup : public SensorSetup {
  public:
   VirtualSetup(SensorSettings settings, const VirtualSensorOptions& options,
                const std::stop_token& stop, const SetUpProgress& progress) {
     const RenderedScenes scenes = RenderScenes(options, stop, progress);
-    settings.calibration_folder.clear();  // of real sensors
+    settings.calibration_folder.clear();  // it belongs to real sensors
     std::vector<std::string> caches;
     for (const std::filesystem::path& cache : scenes.caches) caches.push_back(cache.string());
     units_ = {.bus = std::make_shared<VirtualBus>(std::make_shared<Stage>(caches), options.serial),
@@ -134,8 +135,8 @@ std::unique_ptr<LiveSensor> VirtualProvider::Open(const std::string& serial) {
   const SensorDescription& found = ChooseSensor(sensors, serial);
   auto box = std::make_shared<FrameBox>(found.serial, kMaxGap, units_.stall_time);
   events_->Watch(found.uri, box);
-  // The box knows of an unplug from here on, so none is missed between the listing and the first
-  // image.
+  // The box is notified about unplugging from here on, so no event is missed between the listing
+  // and the first image.
   const std::shared_ptr<Unit> unit = units_.bus->At(found.uri);
   if (!unit)
     throw DeviceLost(fmt::format("sensor {} was unplugged while it was opened", found.serial));

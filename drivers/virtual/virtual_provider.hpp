@@ -1,4 +1,4 @@
-// The virtual sensor in this process, without a driver library.
+// The virtual sensor within this process, without a driver library.
 #pragma once
 
 #include <chrono>
@@ -13,16 +13,16 @@
 
 namespace plumb {
 
-/// What the units of a bus are and how their sensors behave.
+/// Properties of the units of a bus.
 struct VirtualUnits {
   std::shared_ptr<simulated::VirtualBus> bus;
   SensorSettings settings;
-  std::string serial;       ///< Of the calibrated unit; others get nominal intrinsics.
+  std::string serial;       ///< Serial of the calibrated unit; others get nominal intrinsics.
   std::string calibration;  ///< Text of its calibration file, as recordings have it.
-  std::chrono::milliseconds stall_time{2000};  ///< Next() fails after so long without a pair.
+  std::chrono::milliseconds stall_time{2000};  ///< Next() fails after this time without a pair.
 };
 
-/// Sees the units of a bus. At most one lives for a bus at a time; its sensors may outlive it.
+/// Shows the units of a bus. At most one exists per bus at a time; its sensors may outlive it.
 class VirtualProvider : public SensorProvider {
  public:
   explicit VirtualProvider(VirtualUnits units);

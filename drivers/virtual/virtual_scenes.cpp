@@ -22,7 +22,7 @@
 namespace plumb {
 namespace {
 
-constexpr int kBoardScenes = 3;  // as many as a calibration of the room needs
+constexpr int kBoardScenes = 3;  // number of scenes that a room calibration needs
 
 namespace fs = std::filesystem;
 using simulated::FrameCacheReader;
@@ -31,8 +31,8 @@ using simulated::MakeRaw;
 using simulated::RawFrame;
 using simulated::WriteRaw;
 
-/// True if the file holds the scene as the simulator renders it today: of this version, and its
-/// first frame is the same to the bit.
+/// True if the file holds the scene as the present simulator renders it: same version, and an
+/// identical first frame.
 bool IsCurrent(const fs::path& file, const FrameCacheShape& shape, const RawFrame& first) try {
   const FrameCacheReader cache(file);
   if (cache.shape() != shape) return false;
@@ -45,7 +45,7 @@ bool IsCurrent(const fs::path& file, const FrameCacheShape& shape, const RawFram
   return false;
 }
 
-/// Removes what killed processes have left half-written; it may be half a gigabyte each.
+/// Removes incomplete files of killed processes, which may be half a gigabyte each.
 void RemoveStale(const fs::path& folder) {
   constexpr std::string_view kMark = ".partial-";
   std::error_code error;
@@ -58,7 +58,7 @@ void RemoveStale(const fs::path& folder) {
   }
 }
 
-/// Renders scenes into the cache, those that are missing.
+/// Renders the missing scenes into the cache.
 class Renderer {
  public:
   Renderer(const VirtualSensorOptions& options, const SimulateOptions& simulate)

@@ -1,4 +1,4 @@
-// The sweeps that a virtual sensor shows: rendered beforehand into a cache on the disk.
+// The sweeps that a virtual sensor shows, rendered in advance into a cache on the disk.
 #pragma once
 
 #include <cstddef>
@@ -23,49 +23,49 @@ struct VirtualSensorOptions {
   std::string suite = "demo";  ///< demo, nine or patient, as `plumb simulate` has them.
   unsigned seed = 1;
   simulated::NoiseLevel noise = simulated::NoiseLevel::kNominal;
-  int frames = 300;  ///< A scene; a sweep lasts frames / rate_hz.
+  int frames = 300;  ///< Per scene; a sweep lasts frames / rate_hz.
   double rate_hz = 30.0;
   int width = 640;  ///< 640 x 480 or 320 x 240.
   int height = 480;
   std::map<int, Eigen::Vector2d> board_centres_m = {};  ///< As in SimulatedSweeps.
-  std::size_t max_scenes = 0;  ///< Only so many of the suite's scenes; 0: all.
+  std::size_t max_scenes = 0;                           ///< Limit of the number of scenes; 0: all.
   std::filesystem::path cache_folder =
-      {};  ///< Of the rendered frames, 1.5 MB each; empty: DefaultVirtualSensorCache().
-  std::string serial = "VIRTUAL-0001";  ///< Of the unit that is there at the start.
-  bool plugged = true;                  ///< Whether it is attached then.
-  std::filesystem::path runtime =
-      {};  ///< Library of the private driver tree, where OpenNI2 shows the sensor; empty: the one
-           ///< beside the program, see FindVirtualSensorRuntime().
+      {};  ///< Cache of the rendered frames, 1.5 MB each; empty: DefaultVirtualSensorCache().
+  std::string serial = "VIRTUAL-0001";  ///< Serial of the unit that exists at the start.
+  bool plugged = true;                  ///< Whether it is attached at the start.
+  /// Library of the private driver tree if OpenNI2 shows the sensor; empty: the one installed with
+  /// the program, see FindVirtualSensorRuntime().
+  std::filesystem::path runtime = {};
 };
 
 /// The suite that the virtual sensor plays, as `plumb simulate` renders it. @throws
 /// std::invalid_argument for another image size.
 [[nodiscard]] SimulateOptions ScenesOf(const VirtualSensorOptions& options);
 
-/// $XDG_CACHE_HOME/plumb/virtual-sensor, else ~/.cache/plumb/virtual-sensor, else a folder of the
-/// system's temporary one.
+/// $XDG_CACHE_HOME/plumb/virtual-sensor, otherwise ~/.cache/plumb/virtual-sensor, otherwise a
+/// folder in the system's temporary folder.
 [[nodiscard]] std::filesystem::path DefaultVirtualSensorCache();
 
-/// What a program asked for, as options of the virtual sensor.
+/// Converts a program's settings to options of the virtual sensor.
 [[nodiscard]] VirtualSensorOptions VirtualOptionsOf(const SimulatedSweeps& sweeps);
 
-/// The scenes of a suite, ready to be played.
+/// The rendered scenes of a suite.
 struct RenderedScenes {
   std::vector<std::string> names;             ///< In the order in which they are shown.
-  std::vector<std::filesystem::path> caches;  ///< As frame_cache.hpp describes them.
-  StreamInfo camera;                          ///< Of the unit that shows them.
+  std::vector<std::filesystem::path> caches;  ///< Files as frame_cache.hpp describes them.
+  StreamInfo camera;                          ///< Camera of the unit that shows them.
 };
 
 /// Renders what is not in the cache yet.
-/// @param progress  If set, called on the calling thread with the fraction rendered and the scene's
-/// name.
+/// @param progress  If set, called on the calling thread with the rendered fraction and the scene's
+///         name.
 /// @throws std::invalid_argument for an unknown suite or numbers out of range, IoError if the cache
-/// cannot be used, Interrupted on a stop.
+///         cannot be used, Interrupted on a stop request.
 [[nodiscard]] RenderedScenes RenderScenes(const VirtualSensorOptions& options,
                                           const std::stop_token& stop = {},
                                           const SetUpProgress& progress = {});
 
-/// Takes the leading "ok" from the answer to a command. @throws DeviceError if it was refused.
+/// Removes the leading "ok" from the answer to a command. @throws DeviceError if it was refused.
 [[nodiscard]] std::string AcceptedAnswer(std::string_view command, std::string answer);
 
 }  // namespace plumb

@@ -37,7 +37,7 @@ struct Remover {
 
 struct Spooled {
   std::uint32_t num_frames = 0;
-  std::int64_t begin_us = 0;  ///< Stamp at which the spooled stamps count from 0.
+  std::int64_t begin_us = 0;  ///< Stamp that is 0 in the spooled stamps.
   OniBegin first;             ///< Stamps of the first frame.
 };
 
@@ -50,7 +50,8 @@ Spooled Spool(const fs::path& file, FrameSource& source, const std::stop_token& 
   shape.height = static_cast<std::uint32_t>(camera.height);
   shape.period_us = kPeriod_us;
   FileWriter writer(file);
-  writer.Write(simulated::FrameCacheHeader(shape));  // again below, with the number of frames
+  // written again below with the number of frames
+  writer.Write(simulated::FrameCacheHeader(shape));
   double begin_s = 0;
   OniBegin first;
   while (const std::optional<Frame> frame = source.Next()) {
@@ -71,7 +72,7 @@ Spooled Spool(const fs::path& file, FrameSource& source, const std::stop_token& 
   return {shape.num_frames, begin_us, {begin_us + first.color_us, begin_us + first.depth_us}};
 }
 
-/// Waits until the virtual sensor has given its last frame.
+/// Waits until the virtual sensor has delivered its last frame.
 void WaitForLast(const VirtualSession& session, std::uint32_t num_frames,
                  const std::stop_token& stop) {
   const std::string last = fmt::format(" position={}", num_frames - 1);
@@ -105,13 +106,13 @@ void WriteOni(const fs::path& file, FrameSource& source, const std::stop_token& 
   OpenNiProvider provider(options);
   OniFileSummary written;
   {
-    // Still frames of the opening must not get into the file, so nothing comes until the recorder
-    // runs.
+    // Static frames from before the sweep must not be recorded, so none are delivered until the
+    // recorder runs.
     const std::unique_ptr<LiveSensor> sensor = provider.Open("");
     (void)session.Command("stall");
     OniRecorder recorder(*sensor, file, {});
     (void)session.Command(
-        "speed 4");  // the disk keeps up with that; what it does not take is held in memory
+        "speed 4");  // the disk keeps up with that; the rest is buffered in memory
     (void)session.Command(fmt::format("rewind once {}", spooled.begin_us));
     (void)session.Command("resume");
     WaitForLast(session, spooled.num_frames, stop);

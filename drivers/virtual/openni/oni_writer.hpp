@@ -1,4 +1,4 @@
-// Frames from anywhere into an .oni file.
+// Writes frames from any source into an .oni file.
 #pragma once
 
 #include <filesystem>
@@ -10,12 +10,12 @@
 namespace plumb {
 
 /// Plays a source to an .oni file and its side-car, lossless, through the virtual sensor: depth in
-/// whole millimetres, stamps in whole microseconds. Needs room for the raw frames beside the file
-/// while it works. Nothing else may use the virtual sensor in this process meanwhile, and the
+/// whole millimetres, stamps in whole microseconds. Temporarily needs space for the raw frames
+/// beside the file. Nothing else in this process may use the virtual sensor meanwhile, and the
 /// process should have no other threads that read the environment.
-/// @param file      A new file, in a folder that exists; half-written ones are removed.
+/// @param file      A new file in an existing folder; incomplete ones are removed.
 /// @param each      If set, called after each frame taken from the source.
-/// @throws IoError, DeviceError, Interrupted; what the source throws.
+/// @throws IoError, DeviceError, Interrupted; the exceptions of the source.
 void WriteOni(const std::filesystem::path& file, FrameSource& source,
               const std::stop_token& stop = {}, const std::function<void()>& each = {});
 

@@ -4,8 +4,9 @@
 
 namespace plumb {
 
-/// The driver "virtual-openni": the virtual sensor seen through OpenNI2, as real ones are. Also the
-/// recording format .oni, whose files from simulated frames are written through that sensor.
+/// The driver "virtual-openni": the virtual sensor accessed through OpenNI2 like a real one. Also
+/// provides the recording format .oni; simulated frames are written to such files through that
+/// sensor.
 void AddVirtualOpenNiDriver(SensorRegistry& registry);
 
 }  // namespace plumb

@@ -36,7 +36,7 @@ void VirtualSensor::Quit() const noexcept {
   try {
     (void)Command("quit");
   } catch (const std::exception&) {
-    // It does not listen as it is.
+    // It is not listening any more.
   }
 }
 

@@ -1,5 +1,4 @@
-// A virtual sensor for demos and tests: a driver plug-in of OpenNI2 that plays sweeps rendered
-// beforehand.
+// A virtual sensor for demos and tests: an OpenNI2 driver plug-in that plays pre-rendered sweeps.
 #pragma once
 
 #include <filesystem>
@@ -14,25 +13,25 @@
 
 namespace plumb {
 
-/// The private copy of libOpenNI2.so.0 whose drivers are the plug-in and the file player, and
-/// nothing else: `lib/plumb/virtual-sensor` in a parent folder of the running program, in the build
-/// tree as after an installation.
-/// @throws IoError saying what is missing.
+/// The private copy of libOpenNI2.so.0 whose only drivers are the plug-in and the file player:
+/// `lib/plumb/virtual-sensor` in a folder above the running program, in the build tree as after an
+/// installation.
+/// @throws IoError stating what is missing.
 [[nodiscard]] std::filesystem::path FindVirtualSensorRuntime();
 
-/// Renders what is not in the cache yet and sets the stage for the plug-in. The sensor itself
-/// appears in an OpenNiProvider that is made with runtime_library() and calibration_folder() while
-/// this object lives; then Command() works too.
+/// Renders what is not in the cache yet and prepares the session of the plug-in. The sensor itself
+/// appears in an OpenNiProvider that is created with runtime_library() and calibration_folder()
+/// while this object lives; then Command() works too.
 ///
-/// Only one lives in a process at a time. The constructor sets an environment variable that the
-/// plug-in reads: make it before other threads start, and destroy it after the provider and its
+/// Only one may exist in a process at a time. The constructor sets an environment variable that the
+/// plug-in reads: create it before other threads start, and destroy it after the provider and its
 /// sensors. Command() and its shorthands may be called from any thread, wait for the plug-in's
 /// answer for at most a second, and throw DeviceError if there is none or the command is refused.
 ///
-/// The frames of the virtual camera: it holds still at the beginning of the current scene; Rewind()
-/// plays the sweep once from its start, then holds its last view. NextScene() goes to the next
-/// scene (after the last comes the first) and holds still at its beginning. Stamps always run on,
-/// and within a sweep they are those of the simulator.
+/// Frames of the virtual camera: it is static at the beginning of the current scene; Rewind() plays
+/// the sweep once from its start and then holds the last view. NextScene() goes to the next scene
+/// (after the last comes the first) and is static at its beginning. Stamps always increase, and
+/// within a sweep they are those of the simulator.
 class VirtualSensor {
  public:
   /// Parameters and exceptions are those of RenderScenes(); IoError too if the driver tree cannot
@@ -44,14 +43,14 @@ class VirtualSensor {
   VirtualSensor& operator=(const VirtualSensor&) = delete;
 
   [[nodiscard]] const std::filesystem::path& runtime_library() const { return runtime_library_; }
-  /// Holds `SERIAL.yaml` of the virtual unit; other serials have none.
+  /// Contains `SERIAL.yaml` of the virtual unit; other serials have no file.
   [[nodiscard]] const std::filesystem::path& calibration_folder() const {
     return session_->calibration_folder();
   }
   /// Names of the scenes in the order in which NextScene() shows them.
   [[nodiscard]] const std::vector<std::string>& scenes() const { return scenes_; }
   [[nodiscard]] int frames() const { return frames_; }
-  /// Where the plug-in listens; datagrams with one command each, the answer goes to the sender.
+  /// Socket of the plug-in; each datagram holds one command, and the answer goes to the sender.
   [[nodiscard]] const std::filesystem::path& socket() const { return session_->socket(); }
 
   /// Sends one line as listed in drivers/virtual/README.md and returns the answer without its
@@ -60,7 +59,7 @@ class VirtualSensor {
 
   void Plug() const { (void)Command("plug"); }
   void Unplug() const { (void)Command("unplug"); }
-  void Stall() const { (void)Command("stall"); }    ///< No frames come, nothing is reported.
+  void Stall() const { (void)Command("stall"); }    ///< No frames arrive, and nothing is reported.
   void Resume() const { (void)Command("resume"); }  ///< Ends a stall and an error.
   void Error() const { (void)Command("error"); }  ///< The driver reports a failure and frames stop.
   void NextScene() const { (void)Command("next-scene"); }

@@ -29,12 +29,12 @@ namespace fs = std::filesystem;
 constexpr char kEnvironment[] = "PLUMB_VIRTUAL_SENSOR";
 constexpr std::chrono::seconds kAnswerTime{1};
 
-/// A socket of our own to which answers come.
+/// A socket for the answers.
 class AnswerSocket {
  public:
   AnswerSocket() : descriptor_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
     sockaddr_un address{};
-    address.sun_family = AF_UNIX;  // No name: the kernel chooses one.
+    address.sun_family = AF_UNIX;  // Without a name, so that the kernel chooses one.
     if (descriptor_ < 0 ||
         ::bind(descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof(sa_family_t)) != 0)
       throw DeviceError(

@@ -1,4 +1,4 @@
-// The session that the virtual sensor's plug-in plays, and the line to command it.
+// The session that the virtual sensor's plug-in plays, and the connection for commands.
 #pragma once
 
 #include <filesystem>
@@ -10,16 +10,16 @@
 
 namespace plumb {
 
-/// The folder that the plug-in reads when an OpenNI2 library with it starts. Only one lives in a
-/// process at a time: the constructor sets an environment variable, so it is made before other
-/// threads start, and destroyed after the library was stopped.
+/// The folder that the plug-in reads when an OpenNI2 library with it starts. Only one may exist in
+/// a process at a time. The constructor sets an environment variable, so create it before other
+/// threads start, and destroy it after the library was stopped.
 class VirtualSession {
  public:
   struct Contents {
     std::string serial = "VIRTUAL-0001";  ///< 1 to 64 letters, digits, - and _.
     bool plugged = true;
     std::vector<std::filesystem::path> scenes;  ///< Files as frame_cache.hpp describes them.
-    StreamInfo camera;                          ///< Becomes the calibration file of the unit.
+    StreamInfo camera;                          ///< Written to the calibration file of the unit.
   };
   /// @throws IoError; std::invalid_argument for a bad serial.
   explicit VirtualSession(const Contents& contents);
@@ -33,8 +33,8 @@ class VirtualSession {
   [[nodiscard]] const std::filesystem::path& socket() const { return socket_; }
 
   /// Sends one line as listed in drivers/virtual/README.md and returns the answer without its
-  /// leading "ok". Any thread; waits for at most a second. @throws DeviceError if there is no
-  /// answer or the command is refused.
+  /// leading "ok". Callable from any thread; waits for at most a second.
+  /// @throws DeviceError if there is no answer or the command is refused.
   std::string Command(std::string_view command) const;
 
  private:

@@ -1,5 +1,5 @@
-// OpenNI2's interface for drivers, which leaves two macros of a library that is not packaged to its
-// user.
+// OpenNI2's interface for drivers, with two macros that it takes from a library that is not
+// packaged.
 #pragma once
 
 #define XN_NEW(type, ...) new type(__VA_ARGS__)
@@ -13,7 +13,7 @@
 
 namespace plumb::simulated {
 
-/// Answers a property query. OpenNI2 hands in how much memory there is.
+/// Answers a property query. OpenNI2 passes the size of the buffer.
 template <typename Value>
 OniStatus Answer(const Value& value, void* data, int* size) {
   if (*size != static_cast<int>(sizeof value)) return ONI_STATUS_BAD_PARAMETER;
@@ -21,7 +21,7 @@ OniStatus Answer(const Value& value, void* data, int* size) {
   return ONI_STATUS_OK;
 }
 
-/// Takes a property's new value.
+/// Sets a property.
 template <typename Value>
 OniStatus Accept(const void* data, int size, Value& value) {
   if (size != static_cast<int>(sizeof value)) return ONI_STATUS_BAD_PARAMETER;

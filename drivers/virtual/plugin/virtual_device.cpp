@@ -71,7 +71,7 @@ OniStatus VirtualDevice::setProperty(int id, const void* data, int size) {
   if (id != ONI_DEVICE_PROPERTY_IMAGE_REGISTRATION) return ONI_STATUS_NOT_SUPPORTED;
   int mode = 0;
   if (Accept(data, size, mode) != ONI_STATUS_OK) return ONI_STATUS_BAD_PARAMETER;
-  if (StreamsRun()) registration_ = mode;  // before, real units answer "ok" and forget it
+  if (StreamsRun()) registration_ = mode;  // before that, real units answer "ok" and forget it
   return ONI_STATUS_OK;
 }
 

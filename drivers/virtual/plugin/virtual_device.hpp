@@ -1,4 +1,4 @@
-// One open virtual unit: plays the stage to its two streams.
+// One open virtual unit, which plays the stage to its two streams.
 #pragma once
 
 #include <atomic>
@@ -13,8 +13,8 @@
 
 namespace plumb::simulated {
 
-/// Both streams get a frame each period while both run. Registration holds only if it is set after
-/// the streams started, as with real units; without it depth is off by some columns.
+/// Both streams get a frame per period while both run. Registration is effective only if it is set
+/// after the streams started, as with real units; without it depth is displaced by some columns.
 class VirtualDevice : public oni::driver::DeviceBase {
  public:
   VirtualDevice(std::shared_ptr<Unit> unit, const std::shared_ptr<const Stage>& stage);
@@ -37,9 +37,10 @@ class VirtualDevice : public oni::driver::DeviceBase {
   OniSensorInfo sensors_[2];
   std::atomic<int> registration_{ONI_IMAGE_REGISTRATION_OFF};
 
-  std::mutex mutex_;  ///< Of the list of streams.
+  std::mutex mutex_;  ///< Guards the list of streams.
   std::vector<VirtualStream*> streams_;
-  std::unique_ptr<SweepPlayer> player_;  ///< Last: its thread ends before the others go.
+  /// Last member: its thread ends before the others are destroyed.
+  std::unique_ptr<SweepPlayer> player_;
 };
 
 }  // namespace plumb::simulated

@@ -1,6 +1,6 @@
-// The driver that OpenNI2 loads: virtual units that come and go by command. What it plays stands in
-// the file `session` of the folder that $PLUMB_VIRTUAL_SENSOR names (lines `serial S`, `plugged
-// 0|1`, `scene FILE`); it listens on `sensor.sock` there.
+// The driver that OpenNI2 loads: virtual units that are plugged in and unplugged by command. Its
+// session is described in the file `session` of the folder named by $PLUMB_VIRTUAL_SENSOR (lines
+// `serial S`, `plugged 0|1`, `scene FILE`); it listens on `sensor.sock` there.
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
@@ -98,7 +98,7 @@ class VirtualDriver : public oni::driver::DriverBase {
   }
   void deviceClose(oni::driver::DeviceBase* device) override { delete device; }
 
-  // The streams of a unit are in step anyway.
+  // The streams of a unit are always synchronous.
   void* enableFrameSync(oni::driver::StreamBase**, int) override { return this; }
   void disableFrameSync(void*) override {}
 

@@ -7,7 +7,7 @@ namespace plumb::simulated {
 namespace {
 
 constexpr float kHorizontalFov_rad =
-    1.0226F;  // what the PS1080 driver states: 570.3 pixels at 640 x 480
+    1.0226F;  // as stated by the PS1080 driver: 570.3 pixels at 640 x 480
 constexpr float kVerticalFov_rad = 0.79661566F;
 
 }  // namespace

@@ -11,12 +11,12 @@
 
 namespace plumb::simulated {
 
-/// Behaves as the real driver does where programs have stumbled: mirrored by default,
-/// cropping answered (the player of recordings needs it). OpenNI2 calls the properties from the
-/// application's threads, Emit() comes from the unit's.
+/// Behaves like the real driver in the details that have caused errors in programs: mirrored by
+/// default, with cropping answered (the player of recordings needs it). OpenNI2 calls the
+/// properties from the application's threads; Emit() is called from the unit's.
 class VirtualStream : public oni::driver::StreamBase {
  public:
-  static constexpr int kMaxDepth = 10000;  ///< mm; the recorder damages what is not below.
+  static constexpr int kMaxDepth = 10000;  ///< Mm; the recorder damages larger values.
   [[nodiscard]] static OniVideoMode Mode(bool depth, const FrameCacheShape& shape);
 
   VirtualStream(bool depth, const FrameCacheShape& shape)
@@ -32,11 +32,11 @@ class VirtualStream : public oni::driver::StreamBase {
   [[nodiscard]] bool is_depth() const { return depth_; }
 
   struct Picture {
-    std::span<const std::uint8_t> bytes;  ///< RGB or 16-bit depth, of the whole image.
+    std::span<const std::uint8_t> bytes;  ///< RGB or 16-bit depth of the whole image.
     int frame_index = 0;
     std::uint64_t stamp_us = 0;
-    int shift = 0;       ///< Columns to the left that depth is off, as without registration.
-    bool small = false;  ///< Claims to be, and is, of half the size.
+    int shift = 0;  ///< Columns by which depth is displaced to the left, as without registration.
+    bool small = false;  ///< Has half the size, and states it.
   };
   void Emit(const Picture& picture);
 
@@ -45,7 +45,7 @@ class VirtualStream : public oni::driver::StreamBase {
 
   const bool depth_;
   const FrameCacheShape shape_;
-  std::mutex mutex_;  ///< Held while a frame is handed over: stop() returns only after that.
+  std::mutex mutex_;  ///< Held while a frame is delivered, so that stop() returns only afterwards.
   std::atomic<bool> running_{false};
   std::atomic<OniBool> mirror_;
   OniBool auto_exposure_ = TRUE;
