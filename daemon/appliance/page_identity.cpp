@@ -112,7 +112,7 @@ std::string ReadOrMakeSecret(const fs::path& file, const std::function<std::stri
   }
   if (status.type() != fs::file_type::regular)
     throw DataError(
-        fmt::format("{} is no plain file: {}", file.string(),
+        fmt::format("{} is not a regular file: {}", file.string(),
                     error ? error.message() : "expected a file of the appliance's own"));
   ::chmod(file.c_str(), 0600);  // a copy of the folder may have lost it
   return ReadTextFile(file, kMaxBytes);

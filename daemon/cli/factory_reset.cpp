@@ -26,7 +26,7 @@ int Reset(const Options& options) {
   if (options.keep_records == options.wipe)
     throw std::invalid_argument("give one of --keep-records and --wipe");
   if (!fs::is_directory(options.state))
-    throw DataError(fmt::format("{} is no folder: name the state folder of plumbd with --state",
+    throw DataError(fmt::format("{} is not a folder: name the state folder of plumbd with --state",
                                 options.state.string()));
   const char* what = options.wipe
                          ? "every patient, reference, scan, account and setting, and the log"

@@ -103,8 +103,8 @@ int Run(const Options& options) {
     facts = RecordingFacts(options.path);
   } else {
     throw DataError(
-        fmt::format("'{}' is no recording (rgb.txt, depth.txt, or an .oni file), no scene "
-                    "(scene.json) and no result (result.json){}",
+        fmt::format("'{}' is neither a recording (rgb.txt, depth.txt, or an .oni file) nor a scene "
+                    "(scene.json) nor a result (result.json){}",
                     options.path.string(), fs::exists(options.path) ? "" : "; it does not exist"));
   }
   PrintOut(options.json ? facts.dump(2) + "\n" : Lines(facts));

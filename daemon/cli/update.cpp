@@ -38,7 +38,8 @@ std::shared_ptr<const AttachedFile> OpenBundle(const fs::path& path) {
   if (file->fd() < 0 || ::fstat(file->fd(), &status) != 0)
     throw DataError(fmt::format("{} cannot be read: {}", path.string(), std::strerror(errno)));
   if (!S_ISREG(status.st_mode))
-    throw DataError(fmt::format("{} is no plain file: name a bundle, NAME.raucb", path.string()));
+    throw DataError(
+        fmt::format("{} is not a regular file: name a bundle, NAME.raucb", path.string()));
   return file;
 }
 

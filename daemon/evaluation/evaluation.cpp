@@ -184,10 +184,10 @@ MotionStatistics StatisticsOf(const Evaluation& evaluation,
 
 Suite OpenSuite(const fs::path& folder) {
   if (!fs::is_directory(folder / "truth")) {
-    throw DataError(
-        fmt::format("'{}' is no suite: expected folders 'truth' and 'recordings' in it, as `plumb "
-                    "simulate` writes",
-                    folder.string()));
+    throw DataError(fmt::format(
+        "'{}' is not a suite: expected folders 'truth' and 'recordings' in it, as `plumb "
+        "simulate` writes",
+        folder.string()));
   }
   Suite suite;
   suite.name = (folder.filename().empty() ? folder.parent_path() : folder).filename().string();

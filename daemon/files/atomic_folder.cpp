@@ -79,7 +79,7 @@ void CheckReplaceable(const fs::path& target, const OutputKind& kind) {
     if (std::find(kind.known_entries.begin(), kind.known_entries.end(), name) ==
         kind.known_entries.end()) {
       throw IoError(
-          fmt::format("cannot write {} {}: the folder holds {}, which is no part of a {}; choose "
+          fmt::format("cannot write {} {}: the folder holds {}, which is not part of a {}; choose "
                       "an empty or new folder",
                       kind.name, target.string(), name, kind.name));
     }

@@ -189,7 +189,7 @@ class PlyReader {
       Fail("it has no faces after its vertices");
     const Element& face = elements_[1];
     if (face.properties.size() != 1 || !face.properties[0].list_count)
-      Fail("its faces are no plain list of vertex indices");
+      Fail("its faces are not a plain list of vertex indices");
     const Scalar count_type = *face.properties[0].list_count;
     const Scalar index_type = face.properties[0].type;
     const std::size_t row_bytes = SizeOf(count_type) + 3 * SizeOf(index_type);

@@ -270,7 +270,7 @@ std::string ReadResultJson(const fs::path& folder) {
   const Json json = ParseBoundedJsonOrNothing<Json>(text);
   if (!json.is_object() || !json.contains("format") || !json["format"].is_number_integer()) {
     throw DataError(fmt::format(
-        "{} is no result of plumb compare: expected a JSON object with a format; compare again",
+        "{} is not a result of plumb compare: expected a JSON object with a format; compare again",
         file.string()));
   }
   const auto format = json["format"].get<std::int64_t>();

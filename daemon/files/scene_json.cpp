@@ -34,7 +34,7 @@ class Value {
   [[nodiscard]] const Json& json() const { return json_; }
 
   [[nodiscard]] Value operator[](const char* key) const {
-    if (!json_.is_object()) Fail("is no object");
+    if (!json_.is_object()) Fail("is not an object");
     if (!json_.contains(key))
       throw DataError(fmt::format("{}.{} is missing; make the scene again", where_, key));
     return {json_[key], fmt::format("{}.{}", where_, key)};
@@ -45,12 +45,12 @@ class Value {
   }
 
   [[nodiscard]] std::string Text() const {
-    if (!json_.is_string()) Fail("is no text");
+    if (!json_.is_string()) Fail("is not text");
     return json_.get<std::string>();
   }
 
   [[nodiscard]] double Number(double min, double max) const {
-    if (!json_.is_number()) Fail("is no number");
+    if (!json_.is_number()) Fail("is not a number");
     const double value = json_.get<double>();
     if (!(value >= min && value <= max))
       Fail(fmt::format("is {}, expected {} to {}", value, min, max));
@@ -58,18 +58,18 @@ class Value {
   }
 
   [[nodiscard]] std::int64_t Integer(double min, double max) const {
-    if (!json_.is_number_integer()) Fail("is no whole number");
+    if (!json_.is_number_integer()) Fail("is not a whole number");
     return static_cast<std::int64_t>(Number(min, max));
   }
 
   void RequireArray(std::size_t size) const {
-    if (!json_.is_array() || json_.size() != size) Fail(fmt::format("is no list of {}", size));
+    if (!json_.is_array() || json_.size() != size) Fail(fmt::format("is not a list of {}", size));
   }
 
   /// Calls `visit(key, value)` for each entry of an object.
   template <typename Visit>
   void ForEach(const Visit& visit) const {
-    if (!json_.is_object()) Fail("is no object");
+    if (!json_.is_object()) Fail("is not an object");
     for (const auto& [key, value] : json_.items())
       visit(key, Value(value, fmt::format("{}.{}", where_, key.substr(0, 40))));
   }
@@ -94,7 +94,7 @@ int MarkerId(const std::string& key, const Value& value) {
   int id = -1;
   const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), id);
   if (error != std::errc{} || end != key.data() + key.size() || id < 0 || id > kMaxMarkerId) {
-    value.Fail(fmt::format("is no marker id from 0 to {}", kMaxMarkerId));
+    value.Fail(fmt::format("is not a marker id from 0 to {}", kMaxMarkerId));
   }
   return id;
 }
@@ -137,7 +137,7 @@ void ReadMarkerKind(const Value& root, Scene& scene) {
     const Value value = root["marker_dictionary"];
     const std::string name = value.Text();
     if (!name.empty() && !MarkerDictionary::Find(name))
-      value.Fail(fmt::format("is \"{}\", which is no known dictionary", name.substr(0, 60)));
+      value.Fail(fmt::format("is \"{}\", which is not a known dictionary", name.substr(0, 60)));
     scene.marker_dictionary = name;
   }
   if (root.has("marker_length_m")) scene.marker_length_m = root["marker_length_m"].Number(0, 10);
@@ -258,7 +258,7 @@ SceneHeader ParseSceneJson(std::string_view text, const std::string& name) {
   }
   if (root.has("warnings")) {
     const Value warnings = root["warnings"];
-    if (!warnings.json().is_array()) warnings.Fail("is no list");
+    if (!warnings.json().is_array()) warnings.Fail("is not a list");
     for (std::size_t i = 0; i < warnings.json().size(); ++i)
       scene.warnings.push_back(warnings.At(i).Text());
   }

@@ -62,7 +62,7 @@ Intrinsics ParseIntrinsics(const Json& json) {
 
 SensorProfile Parse(const std::string& text) {
   const Json json = ParseBoundedJson<Json>(text);
-  if (json.at("format") != kFormat) throw DataError("it is no sensor profile");
+  if (json.at("format") != kFormat) throw DataError("it is not a sensor profile");
   if (json.at("version") != kVersion)
     throw DataError(
         fmt::format("its version is {}, expected {}", json.at("version").dump(), kVersion));

@@ -40,7 +40,7 @@ Pose PoseIn(const Json& rows) {
   const Eigen::Matrix3d R = T.linear();
   if (!(R.transpose() * R).isApprox(Eigen::Matrix3d::Identity(), 1e-6) || R.determinant() < 0 ||
       !T.translation().allFinite())
-    throw DataError("T_iec_reference is no rigid transform");
+    throw DataError("T_iec_reference is not a rigid transform");
   return T;
 }
 

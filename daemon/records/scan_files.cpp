@@ -62,7 +62,7 @@ std::string Difference(const FileLook& look, const FileDigest& file) {
   if (look.error == ENOENT && look.is_link) return "is a link that leads nowhere";
   if (look.error == ENOENT) return "is missing";
   if (look.error != 0) return fmt::format("cannot be read: {}", std::strerror(look.error));
-  if (is_recording) return look.is_folder ? "" : "is no folder";
+  if (is_recording) return look.is_folder ? "" : "is not a folder";
   if (!look.is_file) return look.is_folder ? "is a folder, not a file" : "is not a regular file";
   if (!file.sha256.empty() && look.bytes != file.bytes)
     return fmt::format("has {} bytes, {} were stored", look.bytes, file.bytes);
@@ -150,7 +150,7 @@ std::string WhyNotThere(const fs::path& folder, const std::vector<FileDigest>& f
                         const LookAtPath& look) {
   // Without its folder a scan has lost every file: that is said, and not the first file's name.
   if (const FileLook found = look(folder); found.error != 0 || !found.is_folder) {
-    return "its folder " + (found.error == 0 ? std::string("is no folder")
+    return "its folder " + (found.error == 0 ? std::string("is not a folder")
                                              : Difference(found, {.path = {}, .sha256 = {}}));
   }
   for (const FileDigest& file : files) {

@@ -25,13 +25,14 @@ using Json = nlohmann::json;
 std::optional<double> Shift(const Json& json, const char* key) {
   const auto found = json.find(key);
   if (found == json.end() || found->is_null()) return std::nullopt;
-  if (!found->is_number()) RefuseResult(fmt::format("{} is no number", key));
+  if (!found->is_number()) RefuseResult(fmt::format("{} is not a number", key));
   return found->get<double>();
 }
 
 double Angle(const Json& json, const char* key) {
   const auto found = json.find(key);
-  if (found == json.end() || !found->is_number()) RefuseResult(fmt::format("{} is no number", key));
+  if (found == json.end() || !found->is_number())
+    RefuseResult(fmt::format("{} is not a number", key));
   return found->get<double>();
 }
 
@@ -49,7 +50,7 @@ web::SixNumbers NumbersOf(const Json& json) {
 const Json* ObjectIn(const Json& json, const char* key) {
   const auto found = json.find(key);
   if (found == json.end() || found->is_null()) return nullptr;
-  if (!found->is_object()) RefuseResult(fmt::format("{} is no object", key));
+  if (!found->is_object()) RefuseResult(fmt::format("{} is not an object", key));
   return &*found;
 }
 
@@ -104,7 +105,7 @@ class Stored {
   }
   [[nodiscard]] double Number(const char* key, double least, double most) const {
     const Json* value = Find(key);
-    if (value == nullptr || !value->is_number()) Fail(fmt::format("{} is no number", key));
+    if (value == nullptr || !value->is_number()) Fail(fmt::format("{} is not a number", key));
     return InRange(key, value->get<double>(), least, most);
   }
   [[nodiscard]] bool Flag(const char* key) const {
@@ -124,9 +125,9 @@ class Stored {
   [[nodiscard]] std::array<double, kSize> Point(const char* key, const Json& json) const {
     std::array<double, kSize> point{};
     if (!json.is_array() || json.size() != kSize)
-      Fail(fmt::format("{} is no point of {} numbers", key, kSize));
+      Fail(fmt::format("{} is not a point of {} numbers", key, kSize));
     for (std::size_t i = 0; i < kSize; ++i) {
-      if (!json[i].is_number()) Fail(fmt::format("{} holds what is no number", key));
+      if (!json[i].is_number()) Fail(fmt::format("{} contains a value that is not a number", key));
       point[i] = InRange(key, json[i].get<double>(), -kMaxCoordinate_m, kMaxCoordinate_m);
     }
     return point;
@@ -163,7 +164,7 @@ web::ReferencePlan ParsePlan(const std::string& text) {
   const Stored stored(text, "a stored plan");
   web::ReferencePlan plan;
   const Json* region = stored.Find("region_m");
-  if (region == nullptr || !region->is_array()) stored.Fail("region_m is no list of points");
+  if (region == nullptr || !region->is_array()) stored.Fail("region_m is not a list of points");
   for (const Json& point : *region) plan.region_m.push_back(stored.Point<2>("region_m", point));
   if (plan.region_m.size() == 1 || plan.region_m.size() == 2)
     stored.Fail("region_m has fewer than 3 points");
@@ -239,7 +240,7 @@ web::ResultSummary SummaryOf(const std::string& result_json) {
                              .body_after = {}};
   ReadWords(json, summary);
   if (const auto reasons = json.find("reasons"); reasons != json.end()) {
-    if (!reasons->is_array()) RefuseResult("its reasons are no list");
+    if (!reasons->is_array()) RefuseResult("its reasons are not a list");
     for (const Json& reason : *reasons)
       summary.reasons.push_back(reason.is_string() ? reason.get<std::string>() : reason.dump());
   }

@@ -35,7 +35,7 @@ std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_byt
   }
   const auto check = [&]() -> std::string {
     struct stat info {};
-    if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) return name + " is no plain file";
+    if (::fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) return name + " is not a regular file";
     const auto size = static_cast<std::uint64_t>(info.st_size);
     if (size < kLeastBundle)
       return fmt::format("{} is too short for a bundle: {} bytes; copy it again", name, size);
@@ -52,9 +52,9 @@ std::string WhyNoBundle(const std::filesystem::path& file, std::uint64_t max_byt
     std::uint64_t signature = 0;
     for (const unsigned char byte : tail) signature = signature << 8 | byte;
     if (std::string_view(magic.data(), magic.size()) != kSquashfs)
-      return name + " is no bundle: expected a squashfs image";
+      return name + " is not a bundle: expected a squashfs image";
     if (signature == 0 || signature > kMaxSignature || signature + tail.size() >= size) {
-      return name + " is no whole bundle: no signature at its end; copy it again";
+      return name + " is not a complete bundle: no signature at its end; copy it again";
     }
     return {};
   };

@@ -54,7 +54,7 @@ std::filesystem::path CopyBundle(int fd, const std::filesystem::path& folder,
                                  std::uint64_t max_bytes) {
   struct stat status {};
   if (::fstat(fd, &status) != 0 || !S_ISREG(status.st_mode))
-    throw DataError("the bundle is no plain file");
+    throw DataError("the bundle is not a regular file");
   const auto bytes = static_cast<std::uint64_t>(status.st_size);
   if (bytes > max_bytes)
     throw DataError(

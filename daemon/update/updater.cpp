@@ -29,7 +29,7 @@ constexpr auto kLookAgain = std::chrono::seconds(5);
 constexpr std::chrono::seconds kCallTimeout{60};  // RAUC reads the whole bundle before it answers
 constexpr std::size_t kMaxText = 500;
 
-/// What a service says is shown to people: bounded, and without what is no text.
+/// What a service says is shown to people: bounded, and without anything that is not text.
 std::string Shown(const char* text) {
   std::string shown(text != nullptr ? text : "");
   if (shown.size() > kMaxText) shown.resize(kMaxText);

@@ -44,16 +44,16 @@ Container ReadInto(const std::filesystem::path& path, std::size_t max_bytes) {
       throw DataError(fmt::format("file {} is missing", path.string()));
     // not an error of the file, so the message must not ask to correct it
     if (error == EMFILE || error == ENFILE)
-      throw IoError(fmt::format(
-          "cannot open {}: {}; close what else is open, or raise the limit (LimitNOFILE)",
-          path.string(), ErrorText(error)));
+      throw IoError(
+          fmt::format("cannot open {}: {}; close other files, or raise the limit (LimitNOFILE)",
+                      path.string(), ErrorText(error)));
     throw DataError(fmt::format("cannot open {}: {}", path.string(), ErrorText(error)));
   }
   struct stat status {};
   if (::fstat(file.get(), &status) != 0)
     throw DataError(fmt::format("cannot stat {}: {}", path.string(), ErrorText(errno)));
   if (!S_ISREG(status.st_mode))
-    throw DataError(fmt::format("{} is no regular file", path.string()));
+    throw DataError(fmt::format("{} is not a regular file", path.string()));
   const auto size = static_cast<std::size_t>(status.st_size);
   if (size > max_bytes) {
     throw DataError(

@@ -30,7 +30,8 @@ bool StartsWith(std::span<const std::uint8_t> bytes, const std::array<std::uint8
   std::string found;
   for (const std::uint8_t byte : bytes.first(std::min<std::size_t>(bytes.size(), 4)))
     found += fmt::format(" {:02x}", byte);
-  throw DataError(fmt::format("image {} is no {}: its first bytes are{}", name, expected, found));
+  throw DataError(
+      fmt::format("image {} is not a {}: its first bytes are{}", name, expected, found));
 }
 
 }  // namespace

@@ -145,9 +145,10 @@ cv::Mat codec::DecodeJpeg(std::span<const std::uint8_t> bytes, const std::string
                  static_cast<long>(reader.info.image_height), kMaxImageSide);
   const J_COLOR_SPACE space = reader.info.jpeg_color_space;
   if (space != JCS_GRAYSCALE && space != JCS_RGB && space != JCS_YCbCr) {
-    throw DataError(fmt::format(
-        "image {} is a JPEG of {} colour components in no RGB, YCbCr or grey space; save it as RGB",
-        name, reader.info.num_components));
+    throw DataError(
+        fmt::format("image {} is a JPEG of {} colour components that are not RGB, YCbCr or grey; "
+                    "save it as RGB",
+                    name, reader.info.num_components));
   }
   cv::Mat image(static_cast<int>(reader.info.image_height),
                 static_cast<int>(reader.info.image_width), CV_8UC3);

@@ -135,15 +135,15 @@ std::optional<FrameBox::Pair> FrameBox::Take() {
       last_arrival_ = listened_;
       longest_gap_ = {};
       throw ProcessStalled(
-          fmt::format("this program did not get to read sensor {} for {:.1f} s: it was stopped, or "
-                      "the machine has too much else to do; the sensor is not at fault",
+          fmt::format("this program could not read sensor {} for {:.1f} s: it was stopped, or "
+                      "the machine is overloaded; the sensor is not at fault",
                       name_, 1e-3 * static_cast<double>(absent.count())));
     }
     if (!pairs_.empty()) break;
     const Clock::time_point limit = last_arrival_ + stall_time_ + absent_;
     if (listened_ >= limit) {
       throw DeviceError(
-          fmt::format("sensor {} has given no pair of images for {} ms ({} unpaired, {} discarded "
+          fmt::format("sensor {} delivered no pair of images for {} ms ({} unpaired, {} discarded "
                       "so far); unplug it and plug it in again",
                       name_, stall_time_.count(), pairing_.num_unpaired(),
                       pairing_.num_discarded() + num_discarded_));

@@ -64,7 +64,7 @@ const SensorDriver& SensorRegistry::Choose(const std::string& name, bool simulat
                                              : fmt::format("{}", fmt::join(known, ", "));
   if (is_other_kind && simulated) {
     throw DataError(
-        fmt::format("[sensor] driver: \"{}\" reads real sensors, but a simulated one is asked for; "
+        fmt::format("[sensor] driver: \"{}\" reads real sensors, but a simulated one is requested; "
                     "expected one of {}; remove the key or --simulated",
                     name, expected));
   }

@@ -45,10 +45,11 @@ const SensorDescription& ChooseSensor(const std::vector<SensorDescription>& sens
     return serial.empty() || sensor.serial == serial;
   });
   if (found != sensors.end()) return *found;
-  throw DeviceError(serial.empty()
-                        ? "no sensor is attached; plug one in, `plumb doctor` lists what is seen"
-                        : fmt::format("sensor {} is not attached, found {}; plug it in", serial,
-                                      sensors.empty() ? "none" : sensors.front().serial));
+  throw DeviceError(
+      serial.empty()
+          ? "no sensor is attached; plug one in; `plumb doctor` lists the sensors that are seen"
+          : fmt::format("sensor {} is not attached, found {}; plug it in", serial,
+                        sensors.empty() ? "none" : sensors.front().serial));
 }
 
 }  // namespace plumb

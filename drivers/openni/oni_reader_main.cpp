@@ -71,9 +71,9 @@ class Player {
     library_->Check("OpenNI2 does not report",
                     library_->RegisterDeviceCallbacks(&callbacks_, this, &handle_));
     library_->Check("OpenNI2 cannot open it", library_->DeviceOpen(file.c_str(), &device_));
-    library_->Check("it holds no depth",
+    library_->Check("it has no depth stream",
                     library_->DeviceCreateStream(device_, ONI_SENSOR_DEPTH, &streams_[0]));
-    library_->Check("it holds no colour",
+    library_->Check("it has no colour stream",
                     library_->DeviceCreateStream(device_, ONI_SENSOR_COLOR, &streams_[1]));
     const float manual = -1.0F;  // every image, in order, as fast as it is read
     const OniBool once = FALSE;

@@ -147,8 +147,9 @@ struct OniRecording::Impl {
 
   [[noreturn]] void Fail(const std::string& why) {
     finished = true;
-    throw DataError(fmt::format(
-        "recording {} is damaged or no .oni recording that Plumb can use: {}", file.string(), why));
+    throw DataError(
+        fmt::format("recording {} is damaged or not an .oni recording that Plumb can use: {}",
+                    file.string(), why));
   }
 
   void Read(void* data, std::size_t size) {
@@ -158,7 +159,7 @@ struct OniRecording::Impl {
       case Reader::Got::kEnd:
         Fail(reader.Reap());
       case Reader::Got::kSilence:
-        Fail(fmt::format("OpenNI2 has given nothing for {} s", kPatience.count()));
+        Fail(fmt::format("OpenNI2 delivered nothing for {} s", kPatience.count()));
     }
   }
   template <typename Value>
@@ -177,7 +178,7 @@ struct OniRecording::Impl {
   oni::Header ReadHeader() {
     oni::Header header;
     header.magic = Read<std::uint32_t>();
-    if (header.magic != oni::kMagic) Fail("its reader is of another version");
+    if (header.magic != oni::kMagic) Fail("its reader has another version");
     header.width = Read<std::int32_t>();
     if (header.width == static_cast<std::int32_t>(oni::Kind::kError))
       FailAsTold();  // no image is 3 pixels wide
@@ -258,8 +259,8 @@ std::unique_ptr<OniRecording> OniRecording::Open(const fs::path& file,
     throw DataError(
         fmt::format("no recording at '{}': expected an .oni file, found nothing", file.string()));
   if (!IsOniFile(file))
-    throw DataError(fmt::format("{} is no .oni recording of OpenNI2: it does not begin with NI10",
-                                file.string()));
+    throw DataError(fmt::format(
+        "{} is not an .oni recording of OpenNI2: it does not begin with NI10", file.string()));
   if (!(defaults.marker_length_m > 0 && MarkerDictionary::Find(defaults.marker_dictionary)))
     throw std::invalid_argument("RecordingDefaults: marker length or dictionary out of range");
   std::optional<std::string> side_car;
@@ -284,7 +285,7 @@ std::optional<Frame> OniRecording::Next() {
     case oni::Kind::kError:
       impl_->FailAsTold();
   }
-  impl_->Fail("its reader is of another version");
+  impl_->Fail("its reader has another version");
 }
 
 }  // namespace plumb

@@ -46,9 +46,9 @@ OpenNiStreams::OpenNiStreams(std::shared_ptr<const OpenNiLibrary> loaded,
 OpenNiStreams::~OpenNiStreams() { Close(); }
 
 void OpenNiStreams::Create() {
-  library->Check(fmt::format("sensor {} gives no depth", name_),
+  library->Check(fmt::format("cannot use the depth stream of sensor {}", name_),
                  library->DeviceCreateStream(device, ONI_SENSOR_DEPTH, &depth));
-  library->Check(fmt::format("sensor {} gives no colour", name_),
+  library->Check(fmt::format("cannot use the colour stream of sensor {}", name_),
                  library->DeviceCreateStream(device, ONI_SENSOR_COLOR, &color));
 }
 
@@ -68,15 +68,14 @@ void OpenNiStreams::SetModes() {
     height = h;
     break;
   }
-  library->Check(
-      fmt::format(
-          "sensor {} takes neither 640x480 nor 320x240 at {} Hz with depth in mm and colour as RGB",
-          name_, kFps),
-      status);
+  library->Check(fmt::format("sensor {} supports neither 640x480 nor 320x240 at {} Hz with depth "
+                             "in mm and colour as RGB",
+                             name_, kFps),
+                 status);
   for (OniStreamHandle stream : {depth, color}) {
     const OniBool off = FALSE;
     library->Check(
-        fmt::format("sensor {} keeps its images mirrored", name_),
+        fmt::format("cannot switch off the mirroring of sensor {}", name_),
         library->StreamSetProperty(stream, ONI_STREAM_PROPERTY_MIRRORING, &off, sizeof off));
   }
   (void)library->DeviceEnableDepthColorSync(
@@ -85,13 +84,13 @@ void OpenNiStreams::SetModes() {
 
 void OpenNiStreams::Start() {
   started_ = true;
-  library->Check(fmt::format("sensor {} does not start its depth", name_),
+  library->Check(fmt::format("cannot start the depth stream of sensor {}", name_),
                  library->StreamStart(depth));
-  library->Check(fmt::format("sensor {} does not start its colour", name_),
+  library->Check(fmt::format("cannot start the colour stream of sensor {}", name_),
                  library->StreamStart(color));
   // must be set after the start, because units forget it
   const int mode = ONI_IMAGE_REGISTRATION_DEPTH_TO_COLOR;
-  library->Check(fmt::format("sensor {} does not register depth to colour", name_),
+  library->Check(fmt::format("cannot register depth to colour on sensor {}", name_),
                  library->DeviceSetProperty(device, ONI_DEVICE_PROPERTY_IMAGE_REGISTRATION, &mode,
                                             sizeof mode));
 }

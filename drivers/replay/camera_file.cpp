@@ -30,7 +30,7 @@ void CheckText(std::string_view text, const std::string& name) {
     throw DataError(
         fmt::format("{} has {} bytes, at most {} are read", name, text.size(), kMaxText));
   if (text.find('\0') != std::string_view::npos)
-    throw DataError(fmt::format("{} holds zero bytes: it is no text", name));
+    throw DataError(fmt::format("{} holds zero bytes: it is not text", name));
   int depth = 0;
   int dashes = 0;
   for (const char c : text) {
@@ -91,7 +91,7 @@ class Keys {
 
   [[nodiscard]] std::string Text(const char* key) const {
     const YAML::Node node = Required(key);
-    if (!node.IsScalar()) throw DataError(fmt::format("{} is no text", Where(key)));
+    if (!node.IsScalar()) throw DataError(fmt::format("{} is not text", Where(key)));
     return node.Scalar();
   }
 
@@ -100,7 +100,7 @@ class Keys {
     const YAML::Node node = Required(key);
     const YAML::Node data = node.IsMap() ? node["data"] : node;
     if (!data.IsDefined() || !data.IsSequence() || data.size() > 64)
-      throw DataError(fmt::format("{} is no matrix of numbers", Where(key)));
+      throw DataError(fmt::format("{} is not a matrix of numbers", Where(key)));
     std::vector<double> values;
     for (const YAML::Node& element : data) values.push_back(Number(element, key));
     return values;
@@ -176,7 +176,8 @@ void ReadDistortion(const Keys& keys, const char* key, Intrinsics& intrinsics) {
   }
   for (std::size_t i = 0; i < std::min<std::size_t>(5, d.size()); ++i) {
     if (std::abs(d[i]) > kMaxDistortion)
-      throw DataError(fmt::format("{} holds {}, which is no lens", keys.Where(key), d[i]));
+      throw DataError(fmt::format("{} holds {}, which is not a plausible lens coefficient",
+                                  keys.Where(key), d[i]));
     intrinsics.distortion[i] = d[i];
   }
   // A lens model must be one-to-one over the whole image, or pixels cannot be converted to rays.
@@ -217,9 +218,9 @@ Pose ReadRigid(const Keys& keys, const char* key) {
       matrix.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1), kTolerance);
   const Eigen::Vector3d translation_m = matrix.topRightCorner<3, 1>();
   if (!rigid || translation_m.norm() > kMaxBaseline_m) {
-    throw DataError(
-        fmt::format("{} is no rigid transform of less than {} m; expected [R t; 0 0 0 1] in metres",
-                    keys.Where(key), kMaxBaseline_m));
+    throw DataError(fmt::format(
+        "{} is not a rigid transform of less than {} m; expected [R t; 0 0 0 1] in metres",
+        keys.Where(key), kMaxBaseline_m));
   }
   Pose T = Pose::Identity();
   T.linear() = rotation;
@@ -299,7 +300,7 @@ CameraFile ParseCameraFile(std::string_view text, const std::string& name) try {
     ReadDistortion(keys, "distortion_coefficients", camera.color);
   } else {
     camera.warnings.push_back(fmt::format(
-        "{} has no distortion_coefficients: the lens is taken as free of distortion", name));
+        "{} has no distortion_coefficients: the lens is assumed to be free of distortion", name));
   }
   if (keys.has("depth_scale")) {
     camera.depth_scale = keys.Number("depth_scale");

@@ -40,7 +40,8 @@ double ParseStamp(std::string_view token, const std::string& where) {
   const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), time_s);
   if (error != std::errc{} || end != token.data() + token.size() || !std::isfinite(time_s) ||
       time_s < 0) {
-    throw DataError(fmt::format("{}: {} is no time stamp, expected seconds", where, Quoted(token)));
+    throw DataError(
+        fmt::format("{}: {} is not a time stamp, expected seconds", where, Quoted(token)));
   }
   if (time_s > kMaxTime_s) {
     throw DataError(fmt::format(
@@ -52,7 +53,7 @@ double ParseStamp(std::string_view token, const std::string& where) {
 
 void CheckFileName(std::string_view file, const std::string& where) {
   if (file.find('\0') != std::string_view::npos)
-    throw DataError(fmt::format("{}: the file name holds a zero byte", where));
+    throw DataError(fmt::format("{}: the file name contains a zero byte", where));
   const std::filesystem::path path(file);
   const bool climbs = std::any_of(path.begin(), path.end(),
                                   [](const std::filesystem::path& part) { return part == ".."; });
@@ -127,7 +128,7 @@ std::vector<IndexEntry> ParseIndex(std::string_view text, const std::string& nam
     if (!entries.empty() && !(time_s > entries.back().time_s)) {
       throw DataError(fmt::format(
           "{}: time stamp {:.6f} {} the one before ({:.6f}); the list must rise strictly: sort it "
-          "and remove doubles",
+          "and remove duplicates",
           where, time_s, time_s == entries.back().time_s ? "repeats" : "is earlier than",
           entries.back().time_s));
     }

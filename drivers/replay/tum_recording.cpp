@@ -87,7 +87,7 @@ fs::path Resolve(const fs::path& canonical_folder, const fs::path& index, const 
   if (std::mismatch(canonical_folder.begin(), canonical_folder.end(), file.begin(), file.end())
           .first != canonical_folder.end()) {
     throw DataError(fmt::format(
-        "image {} of {} leads out of the recording's folder, to {}; copy it into the folder",
+        "image {} of {} is outside the recording's folder, at {}; copy it into the folder",
         entry.file, index.string(), file.string()));
   }
   return file;

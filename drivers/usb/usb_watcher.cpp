@@ -187,7 +187,8 @@ void UsbWatcher::Dispatch() {
   timeval now{0, 0};
   const int status = libusb_handle_events_timeout_completed(impl_->context, &now, nullptr);
   if (status != 0 && status != LIBUSB_ERROR_INTERRUPTED && status != LIBUSB_ERROR_TIMEOUT)
-    throw DeviceError(fmt::format("libusb lost the bus: {}", libusb_error_name(status)));
+    throw DeviceError(
+        fmt::format("libusb cannot watch the USB bus any more: {}", libusb_error_name(status)));
   if (!std::exchange(impl_->changed, false)) return;
   if (impl_->listener) impl_->listener();
 }

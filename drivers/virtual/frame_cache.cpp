@@ -50,7 +50,7 @@ FrameCacheReader::FrameCacheReader(const std::filesystem::path& file) {
         sane ? kHeaderBytes + shape_.num_frames * shape_.record_bytes() : 0;
     if (!sane || ::fstat(descriptor_, &status) != 0 ||
         static_cast<std::size_t>(status.st_size) != expected)
-      throw std::runtime_error(file.string() + " holds no whole cache of frames; remove it");
+      throw std::runtime_error(file.string() + " is not a complete cache of frames; remove it");
   } catch (...) {
     ::close(descriptor_);
     throw;

@@ -127,7 +127,7 @@ TEST_F(DaemonFaultTest, AProcessThatWasStoppedFailsTheSweepWithoutBlamingTheSens
   plumbd.WaitForFrames(10);
   stop_for(std::chrono::milliseconds(3000));
   const std::string reason = plumbd.WaitForState("fault")["reason"];
-  EXPECT_THAT(reason, HasSubstr("this program did not get to read sensor VIRTUAL-0001"));
+  EXPECT_THAT(reason, HasSubstr("this program could not read sensor VIRTUAL-0001"));
   EXPECT_THAT(reason, HasSubstr("Scan again"));
   EXPECT_THAT(reason, Not(HasSubstr("unplug")));
   EXPECT_EQ(plumbd.Status()["sensor"]["present"], true);

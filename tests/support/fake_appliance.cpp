@@ -490,8 +490,8 @@ void FakeAppliance::AddBundle(const Actor& actor, const std::filesystem::path& f
   std::string magic(4, ' ');
   in.read(magic.data(), 4);
   if (magic != "hsqs")
-    return Finish(
-        done, Refusal(ChangeResult::kInvalid, name + " is no bundle: expected a squashfs image"));
+    return Finish(done, Refusal(ChangeResult::kInvalid,
+                                name + " is not a bundle: expected a squashfs image"));
   uploaded_bytes = std::filesystem::file_size(file);
   update.bundles.push_back(name);
   Tell(EventKind::kUpdate);

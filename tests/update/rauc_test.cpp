@@ -269,7 +269,7 @@ TEST_F(RaucTest, EachBadBundleIsRefusedWithItsOwnSentence) {
     ExpectRefusal("strangers-verity", HasSubstr("not signed by a key that this machine trusts"));
     ExpectRefusal("damaged", HasSubstr("was damaged on its way"));
     ExpectRefusal("damaged-verity", HasSubstr("was damaged on its way"));
-    ExpectRefusal("truncated", HasSubstr("is no whole bundle"));
+    ExpectRefusal("truncated", HasSubstr("is not a complete bundle"));
   });
 }
 

@@ -573,7 +573,7 @@ await h.step('patients, log, settings and update look finished', async () => {
     await engineer.getByRole('button', { name: 'Upload' }).click();
   };
   await send('photo.raucb', 'GIF89a');
-  await engineer.getByRole('alert').getByText('photo.raucb is no bundle').waitFor();
+  await engineer.getByRole('alert').getByText('photo.raucb is not a bundle').waitFor();
   await send('plumb-0.3.0.raucb', 'hsqs');
   await engineer.getByRole('button', { name: 'Install plumb-0.3.0.raucb' }).click();
   await engineer.getByText('Copying image to rootfs.1').waitFor();

@@ -411,7 +411,7 @@ await h.step('half an isocentre is refused at its field', async () => {
   await clara.getByLabel('Isocentre z').pressSequentially('1e');
   await clara.getByRole('button', { name: 'Save plan' }).click();
   await clara.getByText('Three numbers in metres, or all three empty.').waitFor();
-  equal(await clara.getByLabel('Isocentre z').getAttribute('aria-invalid'), 'true', 'what is no number');
+  equal(await clara.getByLabel('Isocentre z').getAttribute('aria-invalid'), 'true', 'what is not a number');
   for (const axis of ['x', 'y', 'z']) await clara.getByLabel(`Isocentre ${axis}`).fill('');
   await clara.getByRole('button', { name: 'Save plan' }).click();
   await clara.getByRole('status').getByText('Plan saved.').waitFor();

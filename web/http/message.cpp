@@ -59,7 +59,7 @@ OpenFile::OpenFile(const std::filesystem::path& file)
   struct stat info {};
   if (fstat(fd_, &info) != 0 || !S_ISREG(info.st_mode)) {
     close(fd_);
-    throw IoError(fmt::format("{} is no plain file", file.filename().string()));
+    throw IoError(fmt::format("{} is not a regular file", file.filename().string()));
   }
   size_ = static_cast<std::uint64_t>(info.st_size);
   // Sending happens on the loop in small pieces; ask for the file now so that they come from

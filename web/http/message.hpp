@@ -56,7 +56,7 @@ struct Request {
 /// An open file that is sent as the body.
 class OpenFile {
  public:
-  /// @throws IoError where it cannot be opened or is no plain file.
+  /// @throws IoError where it cannot be opened or is not a regular file.
   explicit OpenFile(const std::filesystem::path& file);
   ~OpenFile();
   OpenFile(const OpenFile&) = delete;

@@ -10,7 +10,7 @@ namespace plumb::web {
 struct Range {
   double least = 0.0, most = 0.0;
 
-  /// False for a value that is no number, too.
+  /// False for a value that is not a number, too.
   [[nodiscard]] constexpr bool Holds(double value) const { return value >= least && value <= most; }
 };
 

@@ -299,7 +299,7 @@ TEST_F(SceneFolderTest, NanPosesAreNamed) {
 
 TEST_F(SceneFolderTest, CornersThatAreNoNumbersAreNamed) {
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"][1][2] = nullptr; }),
-              HasSubstr("scene.json.markers.11[1][2] is no number"));
+              HasSubstr("scene.json.markers.11[1][2] is not a number"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"][1][2] = 1e30; }),
               HasSubstr("1e+30"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"].erase(0); }),
@@ -309,7 +309,7 @@ TEST_F(SceneFolderTest, CornersThatAreNoNumbersAreNamed) {
   EXPECT_THAT(RefusalWith([](auto& json) { json["marker_views"]["12"] = 3; }),
               HasSubstr("belongs to no marker"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"] = nlohmann::json::array(); }),
-              HasSubstr("markers is no object"));
+              HasSubstr("markers is not an object"));
 }
 
 TEST_F(SceneFolderTest, SizesThatDisagreeAreNamed) {

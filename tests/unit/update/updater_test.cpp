@@ -549,7 +549,7 @@ TEST_F(UpdaterTest, SentFilesBecomeBundlesOrAreRefused) {
     WriteBundle(".upload-2", "GIF8");
     const web::Change picture = add(".upload-2", "picture.raucb");
     EXPECT_EQ(picture.result, ChangeResult::kInvalid);
-    EXPECT_EQ(picture.message, "picture.raucb is no bundle: expected a squashfs image");
+    EXPECT_EQ(picture.message, "picture.raucb is not a bundle: expected a squashfs image");
     for (const char* name : {"c.raucb", "d.raucb", "e.raucb"}) {
       WriteBundle(".upload-3");
       EXPECT_EQ(add(".upload-3", name).result,

@@ -6,7 +6,7 @@ import { S } from '../strings.js';
 
 const kMax_cm = 300;
 
-/// A reading as people type it: nothing where it is no number that a couch could show.
+/// A reading as people type it: nothing where it is not a number that a couch could show.
 export function readingOf(text) {
   const words = text.trim().replace(',', '.').replace('−', '-');
   if (!/^[+-]?\d{1,3}(\.\d{1,2})?$/.test(words)) return null;

@@ -190,7 +190,7 @@ export const kFaultPatterns = [
   ['^the patient\'s reference cannot be (?:read|used): (.+); (put a backup .+)$',
     'la referencia del paciente no se puede usar: $1; $2'],
   ['^its files cannot be used now: (.+)$', 'sus archivos no se pueden usar ahora: $1'],
-  ['^sensor (\\S+) has given no pair of images for (\\d+) ms \\(.+\\); unplug it and plug it in '
+  ['^sensor (\\S+) delivered no pair of images for (\\d+) ms \\(.+\\); unplug it and plug it in '
     + 'again$',
   'el sensor $1 no ha dado ningún par de imágenes en $2 ms; desconéctelo y vuelva a conectarlo'],
   ['^the driver of sensor (\\S+) reports an error; unplug it and plug it in again$',
@@ -221,9 +221,9 @@ export const kFaultPatterns = [
     '$1 es demasiado corto para ser una actualización: $2 bytes; cópielo de nuevo'],
   ['^(.+) is too large: (\\d+) MB, at most (\\d+) MB$',
     '$1 es demasiado grande: $2 MB; como máximo $3 MB'],
-  ['^(.+) is no bundle: expected a squashfs image$',
+  ['^(.+) is not a bundle: expected a squashfs image$',
     '$1 no es una actualización: se esperaba una imagen squashfs'],
-  ['^(.+) is no whole bundle: no signature at its end; copy it again$',
+  ['^(.+) is not a complete bundle: no signature at its end; copy it again$',
     '$1 no está entero: le falta la firma del final; cópielo de nuevo'],
   ['^the disk is too full for a bundle of (\\d+) MB: (\\d+) MB are free$',
     'el disco está demasiado lleno para un archivo de $1 MB: quedan $2 MB'],
