@@ -90,7 +90,7 @@ bool Appliance::IsRunning() const {
   return state_.phase == ScanPhase::kScanning || state_.phase == ScanPhase::kWorking;
 }
 
-/// The demo's, which is open from the start and stays.
+/// The demo's patient, which is open from the start and stays open.
 bool Appliance::IsOwnSession() const { return opened_by_.user == kSelf.user; }
 
 Appliance::Answer Appliance::WhyNotRestart() const {
@@ -104,7 +104,7 @@ Appliance::Answer Appliance::WhyNotRestart() const {
   return {};
 }
 
-/// A long press when nothing runs and no result is shown ends the treatment session.
+/// Without a running scan and a shown result, a long press ends the treatment session.
 Appliance::Answer Appliance::Press(ButtonPress press) {
   if (press == ButtonPress::kLong && state_.phase == ScanPhase::kReady && !session_id_.empty() &&
       !IsOwnSession())
@@ -116,7 +116,7 @@ Appliance::Answer Appliance::StartSweep() { return Handle(ScanEvent::kStart); }
 Appliance::Answer Appliance::EndSweep() { return Handle(ScanEvent::kEndSweep); }
 Appliance::Answer Appliance::Cancel() { return Handle(ScanEvent::kCancel); }
 
-/// What only the appliance knows; the state has said yes already.
+/// Checks beyond the state, which has accepted the event already.
 Appliance::Answer Appliance::WhyNotScan() const {
   if (stopped_) return "the appliance is being switched off";
   if (std::string blocking_reason = blocking_reason_ ? blocking_reason_() : std::string();
@@ -172,9 +172,8 @@ void Appliance::Act(ScanAction action) {
   }
 }
 
-/// They run on the scan's thread: they use the store, which is thread-safe, and copies; everything
-/// else is posted.
-/// Nothing of a check is kept but its numbers.
+/// These run on the scan's thread: they use the store, which is thread-safe, and copies; everything
+/// else is posted. Of a check only its numbers are kept.
 Appliance::Answer Appliance::OpenCheck(const web::Actor& actor) {
   if (IsRunning()) {
     return fmt::format(
@@ -236,7 +235,7 @@ void Appliance::LogSensor(const SensorEvent& event) {
                 event.others.size() + 1, serial, fmt::join(event.others, ", ")));
 }
 
-/// Updates come at most ten times a second.
+/// Updates arrive at most ten times a second.
 void Appliance::OpenSession(const std::string& session_id, const std::string& patient_id,
                             web::ScanPurpose purpose, const std::string& reason,
                             const web::Actor& actor) {
@@ -277,7 +276,7 @@ Appliance::Answer Appliance::CloseSession(const web::Actor& actor) {
   return {};
 }
 
-/// The demo's session does not expire: there is no user who could open it again.
+/// The demo's session does not expire, because no user could open it again.
 void Appliance::ArmSessionTimer() {
   if (session_id_.empty() || opened_by_.user == kSelf.user) return session_timer_.Disarm();
   session_timer_.ArmAfter(kSessionIdle);
@@ -330,8 +329,8 @@ void Appliance::OnTick() {
 bool Appliance::WorkersAreAlive() const {
   const double now_s = SteadySeconds();
   if (now_s - sensors_->heartbeat_s() > parts_.sensor_silence_s) return false;
-  // While sweeping the scan's thread waits for frames; that frames come is the sensor thread's
-  // matter.
+  // During the sweep the scan's thread waits for frames; their arrival is monitored by the sensor
+  // thread.
   const bool is_working = state_.phase == ScanPhase::kWorking && session_ != nullptr;
   return !is_working || now_s - session_->heartbeat_s() < parts_.worker_silence_s;
 }

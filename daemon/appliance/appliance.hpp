@@ -32,28 +32,27 @@
 
 namespace plumb {
 
-/// What an appliance is made of. Borrowed objects live longer than it.
+/// Dependencies of an appliance. Borrowed objects live longer than it.
 struct ApplianceParts {
   Config config;
-  /// Why the configuration cannot be used; empty: it can. If not, the appliance is in safe mode and
-  /// touches nothing that is stored, because the folder may be another than the one that was meant.
+  /// Why the configuration cannot be used; empty if it can. If it cannot, the appliance is in safe
+  /// mode and does not touch stored data, because the configured folder may be another.
   std::string configuration_fault;
   std::function<std::unique_ptr<SensorProvider>()> make_provider;  ///< Called on the sensor thread.
   std::function<void()> before_scan;                               ///< See SensorThreadOptions.
-  Button* button = nullptr;                                        ///< None: only others press.
+  Button* button = nullptr;  ///< Null: presses come from elsewhere only.
   Indicator* indicator = nullptr;
   /// The patient of the session that is open from the start; its first scan becomes its reference,
-  /// approved by "auto". Empty: scans are of no patient until a session is opened.
+  /// approved by "auto". Empty: scans belong to no patient until a session is opened.
   std::string demo_patient;
-  /// Of a thread that works: after so long without progress it counts as dead. Opening a sensor on
-  /// a slow bus takes some seconds, the longest single step, a comparison of two large scenes, a
-  /// few.
+  /// Time without progress after which a working thread counts as hung. The longest single steps
+  /// take a few seconds: opening a sensor on a slow bus, and comparing two large scenes.
   double sensor_silence_s = 30.0;
   double worker_silence_s = 30.0;
 };
 
-/// Not thread-safe: call it on the loop's thread, but for functions that say "from any thread".
-/// They return at once. Its own threads are in daemon/README.md.
+/// Not thread-safe: call it on the loop's thread, except for functions marked "from any thread".
+/// They return at once. Its own threads are described in daemon/README.md.
 class Appliance {
  public:
   Appliance(EventLoop& loop, ApplianceParts parts);
@@ -61,75 +60,76 @@ class Appliance {
   Appliance(const Appliance&) = delete;
   Appliance& operator=(const Appliance&) = delete;
 
-  /// Empty when the appliance does it, else one sentence why not.
+  /// Empty if the appliance does it, otherwise one sentence why not.
   using Answer = std::string;
   Answer Press(ButtonPress press);
-  /// As a press, for one purpose each.
+  /// Like a press, but for one purpose each.
   Answer StartSweep();
   Answer EndSweep();
   /// Discards the running scan.
   Answer Cancel();
-  /// Off the loop, while scans go on. Calls `done` on the loop, with why none was made (empty: it
-  /// was) and what it holds.
-  /// @param key_file  Whose key encrypts it; empty: the configured one, if any.
+  /// Makes a backup off the loop, while scans continue. Calls `done` on the loop with an error
+  /// (empty if it was made) and the contents.
+  /// @param key_file  Key for encryption; empty: the configured one, if any.
   void BackUp(const web::Actor& actor, const std::filesystem::path& folder,
               std::function<void(const std::string& error, const BackupReport& report)> done,
               const std::filesystem::path& key_file = {});
-  /// Where a backup of today belongs; empty: no folder is configured.
+  /// Target of today's backup; empty if no folder is configured.
   [[nodiscard]] std::filesystem::path BackupTarget() const;
-  /// Asked before each scan: a reason why none may begin now, or nothing.
+  /// Called before each scan; returns a reason why none may begin now, or nothing.
   void SetBlockingReason(std::function<std::string()> blocking_reason) {
     blocking_reason_ = std::move(blocking_reason);
   }
   /// Why no reference may be scanned or approved now, with the next step: no daily check has passed
-  /// today. Empty: it may, as always in the demo. @param scan  That is to be the reference: one
-  /// that was taken while the check was overdue is confirmed by a check of the same day
-  /// (CheckStore::ConfirmsScan), or has to be repeated.
+  /// today. Empty if it may, as always in the demo.
+  /// @param scan  The scan that is to be the reference. One taken while the check was overdue is
+  ///         confirmed by a check of the same day (CheckStore::ConfirmsScan), or has to be
+  ///         repeated.
   [[nodiscard]] std::string WhyNoReference(const std::optional<web::Scan>& scan = {});
   /// The session that the store has opened: scans belong to it until it is closed.
   void OpenSession(const std::string& session_id, const std::string& patient_id,
                    web::ScanPurpose purpose, const std::string& reason, const web::Actor& actor);
-  /// The session is over, in the store too. Not while a scan runs.
+  /// Ends the session, also in the store. Not while a scan runs.
   Answer CloseSession(const web::Actor& actor);
-  /// Until the store has opened a session no scan begins.
+  /// Until the store has opened a session, no scan begins.
   void SetOpening(bool opening) { opening_ = opening; }
   [[nodiscard]] bool IsRunning() const;
   /// Why the machine may not be restarted now: a scan runs, or a patient's session is open (the
-  /// demo's counts as none). Empty: it may.
+  /// demo's does not count). Empty if it may.
   [[nodiscard]] Answer WhyNotRestart() const;
-  /// Told by status and light until it is empty: the machine has gone back to the previous system.
+  /// Shown by status and light until it is empty: the machine has gone back to the previous system.
   void SetRolledBack(const std::string& text);
   [[nodiscard]] const std::string& session_id() const { return session_id_; }
-  /// If this one is open, none is any more. A daily check that is open stays so.
+  /// Closes this patient if it is open. An open daily check stays open.
   void ClosePatient(const std::string& patient_id);
-  /// The next scan is the daily check of the room's markers; after it, scans are of the open
+  /// The next scan is the daily check of the room's markers; scans after it belong to the open
   /// patient again.
   Answer OpenCheck(const web::Actor& actor);
   [[nodiscard]] web::CheckStatus Checks();
-  /// Reads anew which calibration of the room holds, and whether a marker moved since.
+  /// Reloads the calibration of the room, and whether a marker has moved since.
   void LookAtRoom();
   /// From any thread.
   [[nodiscard]] web::RoomCalibrationStatus RoomCalibration();
-  /// Which board belongs to the room's markers; from any thread.
+  /// The board for the room's markers; from any thread.
   [[nodiscard]] std::string RoomBoardPdf() const;
-  /// Whose scans of the board, and since when, count for the next calibration.
+  /// Whose scans of the board count for the next calibration, and since when; from any thread.
   [[nodiscard]] std::pair<std::string, web::WallClock::time_point> RoomScansWanted() const;
-  /// Of the connected sensor unit; from any thread.
+  /// Profile of the connected sensor unit; from any thread.
   [[nodiscard]] web::SensorProfiles SensorProfiles() const;
   [[nodiscard]] std::optional<std::string> SensorProfileFile(int version) const;
-  /// Why the profile of that unit may not be changed now; empty: it may.
+  /// Why the profile of that unit may not be changed now; empty if it may.
   [[nodiscard]] Answer WhyNotChangeProfile(const std::string& serial) const;
   [[nodiscard]] const std::shared_ptr<ProfileShelf>& profiles() const { return profiles_; }
-  /// What the last scan said against the profile is of the past.
+  /// Discards the last scan's objection to the profile.
   void ForgetDrift();
-  /// Of the last result of this run, by a clock that does not step; nothing for another scan.
+  /// Age of the last result of this run, by a monotonic clock; nothing for another scan.
   [[nodiscard]] std::optional<double> AgeOf(const std::string& scan_id) const;
-  /// Takes over what may change while running; what may not is logged. For SIGHUP.
+  /// Applies changes that are possible while running and logs those that are not. For SIGHUP.
   void Reload(const Config& config);
   /// Calls `stopped` once no scan runs any more; a running one is discarded.
   void Stop(std::function<void()> stopped);
 
-  /// Each event as one JSON object ({"event", "time", ...}); to the control socket's watchers.
+  /// Sends each event as one JSON object ({"event", "time", ...}) to the control socket's watchers.
   void SetEventListener(std::function<void(const std::string& line)> listener) {
     tell_watchers_ = std::move(listener);
   }
@@ -137,25 +137,25 @@ class Appliance {
     tell_web_ = std::move(listener);
   }
 
-  /// What the status says of the page.
+  /// The status of the page.
   void SetPage(PageNotes page) { page_ = std::move(page); }
-  /// What the control socket answers to "status".
+  /// The answer of the control socket to "status".
   [[nodiscard]] nlohmann::json StatusJson();
   [[nodiscard]] web::Status WebStatus();
   [[nodiscard]] web::Health Health();
   /// One line for systemd.
   [[nodiscard]] std::string StatusLine() const;
-  /// False while a busy worker shows no progress: systemd's watchdog must then not be fed.
+  /// False if a busy worker shows no progress: systemd's watchdog must then not be fed.
   [[nodiscard]] bool WorkersAreAlive() const;
 
-  /// In safe mode one that can only be read, or null.
+  /// In safe mode a read-only store, or null.
   [[nodiscard]] Store* store() { return store_.get(); }
   [[nodiscard]] const std::filesystem::path& state_folder() const {
     return parts_.config.appliance.state;
   }
   [[nodiscard]] const std::string& storage_fault() const { return storage_fault_; }
   [[nodiscard]] std::optional<Frame> LatestFrame() const { return sensors_->latest(); }
-  /// Of the sweep that goes on; null: none does, or it has shown nothing yet.
+  /// Surface of the running sweep; null if there is none or nothing has been seen yet.
   [[nodiscard]] std::shared_ptr<const LiveSurfaceView> SurfaceSoFar() const {
     return state_.phase == ScanPhase::kScanning ? scan_.update.surface : nullptr;
   }
@@ -163,34 +163,34 @@ class Appliance {
   /// Changes of the store, one after the other, off the loop.
   [[nodiscard]] WorkThread& store_thread() { return store_thread_; }
   [[nodiscard]] EventLoop& loop() { return loop_; }
-  /// Of a new reference, from settings and configuration.
+  /// Plan of a new reference, from settings and configuration.
   [[nodiscard]] web::ReferencePlan DefaultPlan();
   void NotifyDataChanged() { NotifyWeb(web::EventKind::kData); }
 
  private:
-  /// The scan that runs, or the last one.
+  /// The running or last scan.
   struct CurrentScan {
-    std::string id;  ///< Empty until the store gave one.
+    std::string id;  ///< Empty until the store has assigned one.
     std::string patient_id;
     std::string reference_id;
     web::ScanPurpose purpose = web::ScanPurpose::kFraction;
     double reference_area_m2 = 0.0;
     std::chrono::steady_clock::time_point started, ended;
     double first_frame_ms = 0.0;  ///< From the press to the first frame used.
-    double cancel_ms = 0.0;       ///< From the cancellation to its end.
+    double cancel_ms = 0.0;       ///< From the cancellation to the end.
     std::chrono::steady_clock::time_point cancelled_at;
-    SensorStatistics sensor_before;  ///< Its counters when the scan began.
-    SensorStatistics images;         ///< What it counted during the sweep.
+    SensorStatistics sensor_before;  ///< Counters of the sensor when the scan began.
+    SensorStatistics images;         ///< Counters of the sensor for the sweep.
     ScanUpdate update;
-    double dropped_share = 0.0;  ///< Of the images of the last two seconds, smoothed.
+    double dropped_share = 0.0;  ///< Fraction of images lost in the last two seconds, smoothed.
     ScanOutcome outcome;
     bool has_ended = false;
   };
 
-  static constexpr int kDiskCheckTicks = 10;      ///< Seconds, while no scan runs.
-  static constexpr int kMaintenanceTicks = 3600;  ///< Likewise.
+  static constexpr int kDiskCheckTicks = 10;      ///< In seconds, while no scan runs.
+  static constexpr int kMaintenanceTicks = 3600;  ///< In seconds, while no scan runs.
   static constexpr int kFirstFileCheckTicks = 30;
-  static constexpr int kBackupTicks = 60;  ///< Until it is looked at whether one is due.
+  static constexpr int kBackupTicks = 60;  ///< Interval at which a due backup is checked for.
 
   void OpenStore();
   void LogRecovery(const RecoveryReport& found) const;
@@ -241,10 +241,10 @@ class Appliance {
   [[nodiscard]] std::optional<double> Coverage() const;
   [[nodiscard]] std::string FaultReason() const;
 
-  /// The calibration that holds, as LookAtRoom() found it.
+  /// The calibration in use, as found by LookAtRoom().
   struct Room {
     std::optional<SignedRoom> calibration;
-    std::string due;  ///< Set without a calibration: one is stored, but cannot be read.
+    std::string due;  ///< Set without a calibration: one is stored but cannot be read.
     bool is_configured = false;
   };
 
@@ -256,26 +256,26 @@ class Appliance {
   std::string storage_fault_, backup_fault_;
   std::shared_ptr<ProfileShelf> profiles_;
   std::atomic<bool> profiles_off_;
-  std::string profile_fault_;  ///< That the sensor contradicted its profile in the last scan.
+  std::string profile_fault_;  ///< The sensor's contradiction of its profile in the last scan.
   std::function<std::string()> blocking_reason_;
   int ticks_to_disk_check_ = kDiskCheckTicks;
   int ticks_to_maintenance_ = kMaintenanceTicks;
   int ticks_to_file_check_ = kFirstFileCheckTicks;
   int ticks_to_backup_ = kBackupTicks;
   ClockWatch clock_{std::chrono::system_clock::now(), std::chrono::steady_clock::now()};
-  std::stop_source care_;  ///< Stopped when the appliance ends.
+  std::stop_source care_;  ///< Stopped when the appliance is destroyed.
   ScanState state_;
   std::string sensor_fault_, scan_fault_, rolled_back_;
   std::string session_id_, open_patient_, reference_reason_;
-  web::Actor opened_by_;  ///< The session.
+  web::Actor opened_by_;  ///< The user who opened the session.
   web::ScanPurpose purpose_ = web::ScanPurpose::kFraction;
   bool opening_ = false;
   std::optional<web::Actor>
-      check_;  ///< Set: the next or running scan is the daily check that this person asked for.
+      check_;  ///< If set, the next or running scan is the daily check requested by this user.
   CurrentScan scan_;
   std::optional<CurrentScan> last_result_;
   std::chrono::steady_clock::time_point sensor_since_;
-  std::string last_serial_;  ///< Of the sensor that was used last.
+  std::string last_serial_;  ///< Serial of the last used sensor.
   PageNotes page_;
   IndicatorPattern shown_ = IndicatorPattern::kOff;
   std::function<void(const std::string&)> tell_watchers_;
@@ -286,7 +286,7 @@ class Appliance {
   WorkThread store_thread_{256};
   WorkThread check_thread_{4};  ///< Reads stored files; changes do not wait for it.
   std::unique_ptr<SensorThread> sensors_;
-  std::unique_ptr<ScanSession> session_;  // last: its thread uses what is above
+  std::unique_ptr<ScanSession> session_;  // last: its thread uses the members above
 };
 
 /// Midnight, local time.

@@ -1,4 +1,5 @@
-// The appliance's sensor profiles: who has one, and what people see and change of it.
+// Sensor profiles of the appliance: for which units they are kept, and what the page shows and
+// changes.
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
@@ -28,7 +29,7 @@ bool Appliance::ProfilesOff(const Config& config) {
   return !config.appliance.sensor_profiles || config.reconstruct.preset != Preset::kBest;
 }
 
-/// Empty: one is kept.
+/// Empty if a profile is kept.
 std::string Appliance::WhyNoProfile(const SensorDescription& sensor) const {
   if (profiles_off_) return "profiles are switched off in the configuration";
   if (sensor.serial.empty() || sensor.serial == sensor.uri)
@@ -36,7 +37,7 @@ std::string Appliance::WhyNoProfile(const SensorDescription& sensor) const {
   return {};
 }
 
-/// Null where none is kept.
+/// Null if no profile is kept.
 std::shared_ptr<UnitProfile> Appliance::MakeUnitProfile() {
   const SensorSnapshot sensor = sensors_->snapshot();
   if (!WhyNoProfile(sensor.sensor).empty()) return nullptr;

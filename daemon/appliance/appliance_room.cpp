@@ -1,4 +1,4 @@
-// Where the room's axes lie: the signed calibration.
+// The axes of the room: the signed calibration.
 #include <fmt/format.h>
 
 #include "algo/base/units.hpp"
@@ -43,7 +43,7 @@ void Appliance::LookAtRoom() {
     try {
       room.calibration = store_->room.Newest();
       if (room.calibration) room.due = store_->room.WhyDue(*room.calibration, parts_.config.check);
-    } catch (const std::exception& error) {  // then nobody knows where the room lies
+    } catch (const std::exception& error) {  // the orientation of the room is then unknown
       room.calibration.reset();
       room.due = error.what();
     }
@@ -61,8 +61,8 @@ std::optional<RoomAxes> Appliance::RoomOfJob() const {
   return std::nullopt;
 }
 
-/// One owner: a signed calibration holds, even while it is due, and then nobody knows the axes; the
-/// configuration counts only where nothing was ever signed.
+/// A signed calibration takes precedence even while it is due, and the axes are then unknown. The
+/// configuration counts only where no calibration was ever signed.
 void Appliance::ReportRoom(web::Status& status) const {
   std::optional<Pose> T_iec_reference = parts_.config.compare.T_iec_reference;
   if (room_.calibration || !room_.due.empty()) {

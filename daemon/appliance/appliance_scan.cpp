@@ -39,7 +39,7 @@ void Appliance::StartScan() {
 
 void Appliance::BeginSession() {
   const web::Settings settings = store_->settings.Get();
-  session_.reset();  // the last one has ended
+  session_.reset();  // the previous one has ended
   scan_ = {};
   scan_.patient_id = check_ ? std::string() : open_patient_;
   scan_.purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
@@ -69,7 +69,7 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
   ScanJob job;
   job.info = sensors_->snapshot().info;
   job.reconstructor = parts_.config.reconstruct;
-  job.reconstructor.keep_color = false;  // only the shape of a patient is kept
+  job.reconstructor.keep_color = false;  // only the shape of a patient is stored
   job.keep_recording = parts_.config.appliance.keep_recordings || settings.keep_recordings;
   job.unit_profile = MakeUnitProfile();
   job.stop_after_s = parts_.config.appliance.auto_stop_s.value_or(settings.auto_stop_s);
@@ -81,7 +81,7 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
       throw DataError("the stored baseline of the daily check cannot be read: set another one");
     return job;
   }
-  if (scan_.patient_id.empty()) return job;  // no session is open: compared with nothing
+  if (scan_.patient_id.empty()) return job;  // no session is open, so there is no comparison
   const std::optional<web::Reference> reference = store_->references.Approved(scan_.patient_id);
   if (reference) scan_.reference_area_m2 = store_->scans.SweptArea(reference->scan_id);
   if (!reference && scan_.purpose == web::ScanPurpose::kFraction)
@@ -134,7 +134,7 @@ ScanCallbacks Appliance::MakeCallbacks(const NewScan& record) {
     const auto demo = store_->patients.FindByCode(parts_.demo_patient);
     if (!is_reference || outcome.kind != Kind::kDone) return;
     if (!is_demo || !demo || demo->id != patient || !demo->approved_reference_id.empty()) {
-      (void)store_->references.Add(actor, *id, reason, plan);  // a draft, for a physicist to plan
+      (void)store_->references.Add(actor, *id, reason, plan);  // a draft that a physicist will plan
       return;
     }
     store_->references.Approve(kAuto,
@@ -191,7 +191,7 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
   using Kind = ScanOutcome::Kind;
   limit_timer_.Disarm();
   sensors_->EndScan();
-  // Its thread has nothing left to do, but its end may wait for a processor.
+  // Its thread has nothing left to do, but may still wait for a processor to end.
   (void)store_thread_.Post(
       [ended = std::shared_ptr<ScanSession>(std::move(session_))]() mutable { ended.reset(); });
   ArmSessionTimer();
@@ -215,7 +215,7 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
     const bool is_check = scan_.purpose == web::ScanPurpose::kDailyCheck;
     if (!is_check) last_result_ = scan_;
     if (scan_.purpose == web::ScanPurpose::kReference &&
-        outcome.kind == Kind::kDone) {  // the next one is compared with it, once it is approved
+        outcome.kind == Kind::kDone) {  // the next scan is compared with it, once it is approved
       purpose_ = web::ScanPurpose::kFraction;
       reference_reason_.clear();
     }

@@ -67,7 +67,7 @@ web::Guidance WebGuidance(SweepAdvice advice) {
 
 constexpr double kTooManyDropped = 0.2;
 
-/// Of a sweep. Lost images make every other advice worthless but that tracking is lost.
+/// Advice for the sweep. Lost images override all other advice except lost tracking.
 web::Guidance GuidanceOf(SweepAdvice advice, double dropped_share) {
   if (advice != SweepAdvice::kLost && dropped_share > kTooManyDropped)
     return web::Guidance::kComputerTooSlow;
@@ -120,7 +120,7 @@ IndicatorPattern Appliance::Pattern() const {
           scan_.outcome.verdict == Verdict::kNoAnswer)
         return IndicatorPattern::kNoAnswer;
       if (!scan_.outcome.verdict)
-        return IndicatorPattern::kDone;  // compared with nothing: nothing is known of tolerance
+        return IndicatorPattern::kDone;  // without a comparison nothing is known about tolerance
       if (scan_.outcome.verdict == Verdict::kUnsure) return IndicatorPattern::kResultUnsure;
       return scan_.outcome.verdict == Verdict::kMove ? IndicatorPattern::kResultMove
                                                      : IndicatorPattern::kResultInTolerance;
@@ -188,7 +188,8 @@ std::string Appliance::FaultReason() const {
 }
 
 std::optional<double> Appliance::Coverage() const {
-  // Of the region itself once it is known: what the picture of the sweep shows as missing.
+  // Area of the region itself once it is known: the part that the picture of the sweep shows as
+  // missing.
   if (scan_.update.surface && scan_.update.surface->coverage) return scan_.update.surface->coverage;
   if (scan_.reference_area_m2 <= 0) return std::nullopt;
   return std::min(1.0, scan_.update.guidance.area_m2 / scan_.reference_area_m2);
@@ -361,8 +362,8 @@ void Appliance::ReadStored(web::Status& status) {
     if (last_result_) status.last_result = store_->scans.Find(last_result_->id);
     if (status.last_result) status.last_result->age_s = AgeOf(status.last_result->id);
   } catch (const std::exception& error) {
-    // Whoever asks for the status must not end the appliance. Posted: this may be a part of telling
-    // it.
+    // A request for the status must not end the appliance. The failure is posted, because this call
+    // may be part of reporting it.
     loop_.Post("store failed", [this, what = std::string(error.what())] { FailStorage(what); });
   }
 }

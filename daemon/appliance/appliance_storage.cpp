@@ -1,4 +1,4 @@
-// Maintenance of stored data: opening, space, retention, backups, and the check of its files.
+// Maintenance of stored data: opening, disk space, retention, backups, and the check of its files.
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -24,7 +24,7 @@ namespace {
 
 const web::Actor kSelf{.user = "plumbd", .address = ""};
 
-/// Seconds between the checks of two stored scans, and until it is asked again whether one is due.
+/// Seconds between the checks of two stored scans, and until the next search for one that is due.
 constexpr int kFileCheckTicks = 5, kNoFileCheckTicks = 600;
 constexpr std::chrono::hours kFileCheckEvery{24};
 
@@ -41,7 +41,7 @@ void Appliance::OpenStore() {
     options.sleep = [told = false](std::chrono::milliseconds pause) mutable {
       if (!std::exchange(told, true))
         Log(LogLevel::kWarning, "another program holds the database: waiting for it");
-      sd_notify(0, "EXTEND_TIMEOUT_USEC=20000000");  // the start is not over
+      sd_notify(0, "EXTEND_TIMEOUT_USEC=20000000");  // the start is still in progress
       std::this_thread::sleep_for(pause);
     };
     store_ = std::make_unique<Store>(parts_.config.appliance.state, options);
@@ -54,7 +54,7 @@ void Appliance::OpenStore() {
       session_id_ = store_->treatments.Open(kSelf, open_patient_, web::ScanPurpose::kFraction);
       opened_by_ = kSelf;
     }
-  } catch (const std::exception& error) {  // whatever is wrong, the page must show it
+  } catch (const std::exception& error) {  // the page must show any error
     store_.reset();
     storage_fault_ = error.what();
     Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", storage_fault_));
@@ -99,9 +99,10 @@ void Appliance::LogRecovery(const RecoveryReport& found) const {
   }
 }
 
-/// What the next scan may take at most.
+/// Upper limit for the space of the next scan.
 std::uint64_t Appliance::NeededBytes() const {
-  // Measured: a compared scan of 640x480 has 40 MB; a recording 2.35 bytes a pixel and frame.
+  // Measured: a compared scan of 640x480 takes 40 MB; a recording takes 2.35 bytes per pixel and
+  // frame.
   constexpr double kScene = 16e6, kSceneOfPixel = 110.0, kFrameOfPixel = 2.6, kFramesPerSecond = 30;
   const Intrinsics camera = sensors_->snapshot().info.intrinsics;
   const double pixels = std::max(320.0 * 240.0, static_cast<double>(camera.width) * camera.height);
@@ -114,7 +115,7 @@ std::uint64_t Appliance::NeededBytes() const {
   return static_cast<std::uint64_t>(bytes);
 }
 
-/// Why no scan can be stored now; empty: one can.
+/// Why no scan can be stored now; empty if one can.
 Appliance::Answer Appliance::WhyNoSpace() const {
   std::error_code error;
   const std::filesystem::space_info space =
@@ -148,7 +149,7 @@ std::vector<std::string> Appliance::StorageWarnings() const {
   return warnings;
 }
 
-/// As configured, else a share of the disk on which the scans are.
+/// As configured, otherwise a fraction of the disk that holds the scans.
 std::uint64_t Appliance::QuotaBytes() const {
   constexpr double kShare = 0.9;
   if (parts_.config.appliance.quota_gb)
@@ -160,8 +161,7 @@ std::uint64_t Appliance::QuotaBytes() const {
   return static_cast<std::uint64_t>(kShare * static_cast<double>(space.capacity));
 }
 
-/// Notices a disk that has become read-only before a patient is scanned and nothing can be kept.
-/// Runs off the loop.
+/// Detects a disk that has become read-only before a patient is scanned in vain. Runs off the loop.
 void Appliance::CheckDisk() {
   ticks_to_disk_check_ = kDiskCheckTicks;
   if (store_ == nullptr || !storage_fault_.empty()) return;
@@ -186,7 +186,8 @@ void Appliance::FailStorage(const std::string& what) {
 void Appliance::RunMaintenance() {
   ticks_to_maintenance_ = kMaintenanceTicks;
   if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
-  constexpr std::chrono::hours kTrusted{1};  // until then a time server may correct it
+  // within this time a time server may still correct the clock
+  constexpr std::chrono::hours kTrusted{1};
   const bool has_clock = clock_.held() >= kTrusted;
   const std::uint64_t quota = QuotaBytes();
   const bool posted = store_thread_.Post([this, quota, has_clock, stop = care_.get_token()] {
@@ -205,10 +206,10 @@ void Appliance::RunMaintenance() {
   if (!posted) Log(LogLevel::kWarning, "the store is too busy to remove old scans now");
 }
 
-/// One scan at a time, off the loop, and none while a scan runs: damaged files are noticed before
+/// One scan at a time, off the loop, and never while a scan runs: damaged files are noticed before
 /// they are needed.
 void Appliance::CheckStoredFiles() {
-  ticks_to_file_check_ = kNoFileCheckTicks;  // until this one has ended
+  ticks_to_file_check_ = kNoFileCheckTicks;  // until this check has ended
   if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
   (void)check_thread_.Post([this, stop = care_.get_token()] {
     std::optional<CheckedScan> checked;
@@ -234,8 +235,8 @@ void Appliance::CheckStoredFiles() {
 
 namespace {
 
-/// From now on the calling thread gets a processor and the disk only when they are idle, so that a
-/// backup costs no frames of a scan. Where the system refuses, the thread goes on as it was.
+/// From now on the calling thread gets processor and disk time only when they are idle, so that a
+/// backup costs no frames of a scan. If the system refuses, the priority stays unchanged.
 void GiveWayToScans() {
   constexpr int kLeastPriority = 19, kOfThread = 1, kBestEffort = 2, kLowestOfIts = 7;
   (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLeastPriority);
@@ -285,7 +286,7 @@ std::filesystem::path Appliance::BackupTarget() const {
 
 namespace {
 
-/// True if no backup in the folder is younger than that.
+/// True if the folder has no backup younger than that.
 bool IsBackupDue(const std::filesystem::path& folder, std::chrono::duration<double> every) {
   using FileClock = std::filesystem::file_time_type::clock;
   for (int day = 1; day <= 7; ++day) {
@@ -301,7 +302,7 @@ bool IsBackupDue(const std::filesystem::path& folder, std::chrono::duration<doub
 
 }  // namespace
 
-/// The disk of the backups may be slow or gone: the loop does not look at it.
+/// The disk for backups may be slow or missing, so the loop does not access it.
 void Appliance::BackUpIfDue() {
   ticks_to_backup_ = kBackupTicks;
   const std::filesystem::path folder = parts_.config.appliance.backup_folder;

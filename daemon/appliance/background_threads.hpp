@@ -9,10 +9,10 @@
 
 namespace plumb {
 
-/// Belongs to the loop's thread. Destroyed before what its work uses.
+/// Used on the loop's thread. Destroyed before the objects that its work uses.
 class BackgroundThreads : public web::BackgroundWork {
  public:
-  /// The loop is borrowed; lives longer.
+  /// The loop is borrowed and outlives this object.
   explicit BackgroundThreads(EventLoop& loop) : loop_(loop) {}
   ~BackgroundThreads() override { *alive_ = false; }
   BackgroundThreads(const BackgroundThreads&) = delete;
@@ -20,7 +20,7 @@ class BackgroundThreads : public web::BackgroundWork {
 
   [[nodiscard]] bool Later(web::Aside where, std::function<void()> work,
                            std::function<void()> done) override;
-  /// For work on files that reports in its own way. False where too much waits already.
+  /// For work on files that reports in its own way. False if too much work is queued already.
   [[nodiscard]] bool PostToFiles(std::function<void()> work) {
     return files_.Post(std::move(work));
   }

@@ -59,7 +59,7 @@ void ControlDesk::Answer(const ControlRequest& request, const ControlServer::Rep
   switch (request.kind) {
     case Kind::kStatus:
       return reply(Line(appliance_.StatusJson()));
-    case Kind::kWatch:  // what is, then what happens
+    case Kind::kWatch:  // the present state first, then the events
       return reply(Line(
           {{"event", "status"}, {"time", SystemSeconds()}, {"status", appliance_.StatusJson()}}));
     case Kind::kPress: {

@@ -1,4 +1,4 @@
-// What the control socket asks, and what it is answered.
+// Answers the requests of the control socket.
 #pragma once
 
 #include <functional>
@@ -11,11 +11,10 @@
 
 namespace plumb {
 
-/// Belongs to the loop's thread.
+/// Used on the loop's thread.
 class ControlDesk {
  public:
-  /// @param simulate  Does what `sim ACTION ARGUMENT` asks, on a thread of its own; throws
-  ///                  DeviceError.
+  /// @param simulate  Executes `sim ACTION ARGUMENT` on a separate thread; throws DeviceError.
   ControlDesk(Appliance& appliance, Updates& updates,
               std::function<void(const std::string& command)> simulate);
 

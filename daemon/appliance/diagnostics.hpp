@@ -1,4 +1,5 @@
-// What the maker is sent: how the appliance does, and nothing of the people it serves.
+// The diagnostics for the manufacturer: the state of the appliance, without data of patients or
+// users.
 #pragma once
 
 #include <string>
@@ -11,7 +12,8 @@
 namespace plumb {
 
 /// Version, health, state, sensor, counts of frames, the event loop and the audit log's actions. No
-/// scan, verdict or number of a patient, no account: what is not named here stays out.
+/// scan, verdict or number of a patient, and no account: everything that is not named here is left
+/// out.
 /// @param status  Appliance::StatusJson().
 /// @param loop  LoopTable().
 [[nodiscard]] std::string DiagnosticsText(const nlohmann::json& status, const web::Health& health,

@@ -9,8 +9,9 @@
 namespace plumb {
 namespace {
 
-constexpr double kFarthest_m = 2.5;           // what lies beyond is the room, measured badly
-constexpr std::uint32_t kMostPoints = 1'000;  // a cell's mean hardly changes any more
+// surfaces farther away are the room, measured with low accuracy
+constexpr double kFarthest_m = 2.5;
+constexpr std::uint32_t kMostPoints = 1'000;  // more points hardly change the mean of a cell
 
 GridShape SquareGrid(const LiveSurfaceOptions& options) {
   if (!(options.cell_m > 0) || !(options.half_width_m > options.cell_m) ||

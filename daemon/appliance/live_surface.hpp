@@ -1,5 +1,5 @@
-// The surface that a sweep has seen so far, from above: it grows on the page while somebody sweeps,
-// beside what of the region is still missing.
+// The surface seen so far by a sweep, from above: it grows on the page during the sweep, together
+// with the missing part of the region.
 #pragma once
 
 #include <cstdint>
@@ -17,29 +17,33 @@ namespace plumb {
 struct LiveSurfaceOptions {
   double half_width_m = 1.6;  ///< Of the square map around the reference marker.
   double cell_m = 0.02;
-  double z_min_m = -0.3;  ///< Over the marker's plane; what lies outside is the room.
+  /// Height above the marker's plane; points outside the limits belong to the room.
+  double z_min_m = -0.3;
   double z_max_m = 0.8;
-  double distance_m = 1.3;  ///< Up to here points are taken so densely that no cell is left out.
-  int min_points = 3;       ///< Fewer in a cell are noise at an edge.
+  /// Up to this distance points are dense enough that no cell is left out.
+  double distance_m = 1.3;
+  int min_points = 3;                 ///< Cells with fewer points are noise at an edge.
   std::size_t max_waiting = 300'000;  ///< Points kept until the reference marker has been seen.
 };
 
-/// What there is to see at one moment of a sweep. Reference marker's frame.
+/// Snapshot of a sweep, in the reference marker's frame.
 struct LiveSurfaceView {
-  HeightMap heights;                  ///< NaN where nothing was seen.
-  std::vector<std::uint8_t> missing;  ///< 1: a cell of the region that was not seen yet; empty:
-                                      ///< there is no region.
-  std::optional<double> coverage;     ///< Share of the region that was seen; nothing: no region.
+  HeightMap heights;  ///< NaN where nothing was seen.
+  /// 1 for cells of the region that have not been seen yet; empty without a region.
+  std::vector<std::uint8_t> missing;
+  /// Fraction of the region that was seen; not set without a region.
+  std::optional<double> coverage;
 };
 
-/// Follows one sweep on the tracking thread; well under a millisecond a frame. Not thread-safe.
+/// Follows one sweep on the tracking thread; takes well under a millisecond per frame. Not
+/// thread-safe.
 class LiveSurface {
  public:
   explicit LiveSurface(const Intrinsics& intrinsics, const LiveSurfaceOptions& options = {});
 
-  /// @param report  What tracking made of the frame.
+  /// @param report  Outcome of tracking the frame.
   void Add(const Frame& frame, const TrackingReport& report);
-  /// Cells of `grid()` that have to be seen; as many as it has.
+  /// Cells of `grid()` that have to be seen, one value per cell.
   void SetRegion(std::vector<std::uint8_t> region) { region_ = std::move(region); }
   [[nodiscard]] bool has_region() const { return !region_.empty(); }
   [[nodiscard]] const GridShape& grid() const { return grid_; }
@@ -52,7 +56,7 @@ class LiveSurface {
   Intrinsics intrinsics_;
   LiveSurfaceOptions options_;
   GridShape grid_;
-  int pixel_step_;  ///< Every so many pixels a point is taken.
+  int pixel_step_;  ///< Pixels between points.
   std::vector<float> sum_m_;
   std::vector<std::uint32_t> count_;
   std::vector<std::uint8_t> region_;
@@ -61,8 +65,8 @@ class LiveSurface {
 };
 
 /// The cells of `grid` that the region of interest covers, for LiveSurface::SetRegion().
-/// @param polygon_m  Of the plan; fewer than three corners: the body found in the reference.
-/// Empty where the reference shows no such region. Takes some 100 ms.
+/// @param polygon_m  Of the plan; with fewer than three corners the body found in the reference.
+/// Empty if the reference shows no such region. Takes about 100 ms.
 [[nodiscard]] std::vector<std::uint8_t> RegionToSee(const Scene& reference,
                                                     const std::vector<Eigen::Vector2d>& polygon_m,
                                                     const GridShape& grid);

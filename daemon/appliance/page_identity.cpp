@@ -21,10 +21,11 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr std::size_t kMaxBytes = 64 << 10;
-constexpr const char* kKeyFile = "page-key.pem";  // certificate and key, so that they stay together
+// certificate and key together, so that they always match
+constexpr const char* kKeyFile = "page-key.pem";
 constexpr const char* kDeviceFile = "device.key";
 
-/// Closes a descriptor when it goes.
+/// Closes a descriptor when it is destroyed.
 struct Descriptor {
   explicit Descriptor(int opened) : fd(opened) {}
   ~Descriptor() {
@@ -42,7 +43,7 @@ void Sync(const fs::path& path, int flags) {
 
 void WriteSecret(const fs::path& file, const std::string& contents) {
   const fs::path hidden = file.parent_path() / ("." + file.filename().string() + ".new");
-  ::unlink(hidden.c_str());  // of a start that was interrupted
+  ::unlink(hidden.c_str());  // left by an interrupted start
   {
     const Descriptor opened(
         ::open(hidden.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600));
@@ -114,7 +115,7 @@ std::string ReadOrMakeSecret(const fs::path& file, const std::function<std::stri
     throw DataError(
         fmt::format("{} is not a regular file: {}", file.string(),
                     error ? error.message() : "expected a file of the appliance's own"));
-  ::chmod(file.c_str(), 0600);  // a copy of the folder may have lost it
+  ::chmod(file.c_str(), 0600);  // a copy of the folder may have lost the mode
   return ReadTextFile(file, kMaxBytes);
 }
 

@@ -35,7 +35,7 @@ class BlinkingLight : public Indicator {
       } else {
         timer_.Disarm();
       }
-    } catch (const std::exception&) {  // the light stands still: it must not stop a scan
+    } catch (const std::exception&) {  // the light freezes, which must not stop a scan
     }
   }
 

@@ -1,5 +1,5 @@
-// The hardware panel of the appliance: start button and light on GPIO lines, where they are
-// configured and there.
+// The hardware panel of the appliance: start button and light on GPIO lines, if they are configured
+// and present.
 #pragma once
 
 #include <memory>
@@ -11,8 +11,8 @@
 
 namespace plumb {
 
-/// Belongs to the loop's thread. What is configured and cannot be opened is logged with its remedy
-/// and left out: the page's button stays.
+/// Used on the loop's thread. A configured line that cannot be opened is logged with a remedy and
+/// left out; the page's button still works.
 class Panel {
  public:
   Panel(EventLoop& loop, const PanelConfig& config);
@@ -20,7 +20,7 @@ class Panel {
   Panel(const Panel&) = delete;
   Panel& operator=(const Panel&) = delete;
 
-  /// Null where there is none.
+  /// Null if there is none.
   [[nodiscard]] Button* button() { return button_.get(); }
   [[nodiscard]] Indicator* light() { return light_.get(); }
 

@@ -49,16 +49,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kDeviceFailed = 5;                 // exit code, as the command line's
+constexpr int kDeviceFailed = 5;                 // exit code, the same as the command line's
 constexpr std::chrono::seconds kLongestEnd{10};  // less than the unit's TimeoutStopSec
 
 struct Options {
   std::optional<fs::path> config_file;
-  bool use_default_config = true;  ///< Where it exists and no file is named.
+  bool use_default_config = true;  ///< If it exists and no file is named.
   bool check_config = false, show_stopped = false;
-  std::string simulated;  ///< Suite; empty: real sensors.
+  std::string simulated;  ///< Name of the suite; empty: real sensors.
   std::optional<fs::path> state, control, provision;
-  fs::path unit = "/data/unit";  ///< Where an image keeps what it was provisioned with.
+  fs::path unit = "/data/unit";  ///< Where an image stores its provisioning data.
   std::optional<std::string> listen;
   int sim_frames = 300, sim_scenes = 0;
   unsigned sim_seed = 1;
@@ -113,8 +113,8 @@ void AddOptions(CLI::App& app, Options& options) {
   app.footer(fmt::format("\n{}", kResearchNotice));
 }
 
-/// The simulated room: the reference marker's x axis runs from head to feet of a body that lies on
-/// its back, its z axis is up, and the head points to the gantry.
+/// The simulated room: the reference marker's x axis runs from the head to the feet of a body that
+/// lies on its back, its z axis is up, and the head points to the gantry.
 Pose SimulatedRoom() {
   Pose T_iec_reference = Pose::Identity();
   T_iec_reference.linear() << 0, 1, 0, -1, 0, 0, 0, 0, 1;
@@ -153,7 +153,7 @@ Config ReadConfiguration(const Options& options, const SensorRegistry& registry)
   return config;
 }
 
-/// True if a signal waits for the loop, which does not run yet.
+/// True if a signal is pending while the loop does not run yet.
 bool IsToldToEnd() {
   sigset_t pending;
   sigemptyset(&pending);
@@ -161,19 +161,19 @@ bool IsToldToEnd() {
   return sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1;
 }
 
-/// A configuration, and why the one that was meant cannot be used.
+/// The configuration in use, and why the requested one cannot be used.
 struct Configured {
   Config config;
   std::string fault;
 };
 
-/// As ReadConfiguration(). A file that cannot be used is no reason to be gone: page, light and
-/// socket say what is wrong with it, at the places that the defaults and the command line name.
+/// As ReadConfiguration(). If the file cannot be used, the program still starts: page, light and
+/// socket report the error, at the places that the defaults and the command line name.
 Configured ReadOrExplain(const Options& options, const SensorRegistry& registry) {
   try {
     return {.config = ReadConfiguration(options, registry), .fault = {}};
   } catch (const std::invalid_argument&) {
-    throw;  // of the command line
+    throw;  // from the command line
   } catch (const std::exception& error) {
     Options without_file = options;
     without_file.config_file.reset();
@@ -221,7 +221,7 @@ std::unique_ptr<const SensorSetup> SetUpSensors(const Options& options, const Co
       });
 }
 
-/// Sockets that systemd opened for us, by their names.
+/// Sockets opened by systemd, by name.
 std::optional<int> InheritedSocket(const std::string& name) {
   char** names = nullptr;
   const int count = sd_listen_fds_with_names(0, &names);
@@ -275,7 +275,7 @@ class Plumbd {
   }
 
   ~Plumbd() {
-    // systemd's own stays: it is what starts plumbd again.
+    // The socket opened by systemd stays, because it starts plumbd again.
     if (!own_socket_.empty()) ::unlink(own_socket_.c_str());
   }
   Plumbd(const Plumbd&) = delete;
@@ -292,7 +292,8 @@ class Plumbd {
     LookAtCertificate();
     if (const std::optional<std::string> code = http_.setup_code();
         code && appliance_.storage_fault().empty()) {
-      fmt::print("setup code: {}\n", *code);  // under systemd the standard output is the journal
+      // under systemd the standard output goes to the journal
+      fmt::print("setup code: {}\n", *code);
       std::fflush(stdout);
     }
     sd_notify(0, "READY=1");
@@ -345,7 +346,7 @@ class Plumbd {
     }
   }
 
-  /// The end of a certificate comes while the service runs.
+  /// The certificate may expire while the service runs.
   void LookAtCertificate() {
     PageNotes page = page_;
     if (!certificate_pem_.empty()) {
@@ -402,9 +403,9 @@ class Plumbd {
   Panel panel_;
   Appliance appliance_;
   PageNotes page_;
-  std::string certificate_pem_;  ///< Empty: no TLS.
+  std::string certificate_pem_;  ///< Empty without TLS.
   std::vector<std::string> certificate_warnings_;
-  fs::path own_socket_;  ///< The control socket where this process made it.
+  fs::path own_socket_;  ///< Path of the control socket if this process created it.
   WebServices services_;
   web::HttpServer http_;
   ControlDesk desk_;
@@ -417,7 +418,7 @@ class Plumbd {
   std::string status_line_;
 };
 
-/// A configuration that cannot be used has no light that could be shown.
+/// Without a usable configuration no light can be shown.
 int ShowStopped(const Options& options, const SensorRegistry& registry) {
   PanelConfig config = ReadConfiguration(options, registry).panel;
   config.button_line.clear();
@@ -431,12 +432,13 @@ int ShowStopped(const Options& options, const SensorRegistry& registry) {
   return loop.Run();
 }
 
-/// Before anything opens the state folder. @returns why that could not be done: nothing stored may
-/// be opened then, since the next start goes on.
+/// Called before anything opens the state folder. @returns why that could not be done: nothing
+/// stored may be opened then, because the next start continues it.
 std::string ResetIfAsked(const fs::path& state) {
   std::error_code ignored;
   if (!fs::exists(state / kFactoryResetFile, ignored)) return {};
-  constexpr std::chrono::minutes kLongestWipe{15};  // of a large disk; longer than a start may take
+  // for a large disk; longer than a start may take
+  constexpr std::chrono::minutes kLongestWipe{15};
   sd_notifyf(0, "EXTEND_TIMEOUT_USEC=%lld",
              static_cast<long long>(std::chrono::microseconds(kLongestWipe).count()));
   try {
@@ -467,7 +469,7 @@ int RunChecked(const Options& options, const SensorRegistry& registry) {
   if (options.simulated.empty() == false && !options.state)
     throw std::invalid_argument("--simulated needs --state DIR, a folder of its own");
   Configured configured = ReadOrExplain(options, registry);
-  // What is stored is for this account and at most its group.
+  // Stored data is for this account and at most its group.
   ::umask(::umask(0077) | 0027);
   std::error_code ignored;
   fs::create_directories(configured.config.appliance.state,

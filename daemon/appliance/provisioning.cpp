@@ -92,7 +92,7 @@ void ReadNetwork(Section section, const std::string& name, Provisioning& given) 
 
 void ReadPage(Section section, const fs::path& file, Provisioning& given) {
   std::string certificate, key;
-  const auto is_plain = [](const std::string& name) {  // nothing outside of the file's folder
+  const auto is_plain = [](const std::string& name) {  // nothing outside the file's folder
     return IsWord(name, "._-", 128) && name.front() != '.';
   };
   section.Take("certificate", certificate, "the name of a PEM file in the same folder", is_plain);

@@ -1,5 +1,5 @@
-// What a factory or a hospital's network gives to one unit before anybody can log in: its serial
-// number, name, network and certificate, in one file.
+// Settings of one unit by the factory or a hospital's network administrator, before anybody can log
+// in: serial number, name, network and certificate, in one file.
 #pragma once
 
 #include <filesystem>
@@ -12,24 +12,25 @@
 namespace plumb {
 
 struct Provisioning {
-  std::string serial;     ///< Of the unit; empty: not given, as with each of the others.
-  std::string host_name;  ///< One label; the appliance answers to NAME.local too.
-  std::string address;    ///< With its prefix, "192.168.10.5/24"; empty: DHCP.
+  std::string serial;     ///< Serial number of the unit; empty if not given, like the others.
+  std::string host_name;  ///< One label; the appliance also answers to NAME.local.
+  std::string address;    ///< With its prefix, such as "192.168.10.5/24"; empty: DHCP.
   std::string gateway;
   std::vector<std::string> dns, time_servers;
   std::optional<web::TlsIdentity> page;  ///< Certificate and key of the page.
 };
 
-/// Reads and checks all of a file; the PEM files that it names lie in its folder.
+/// Reads and checks the whole file; the PEM files that it names are in its folder.
 /// @throws DataError naming file, line, what was expected and found.
 [[nodiscard]] Provisioning ReadProvisioning(const std::filesystem::path& file);
 
 /// For systemd-networkd: every wired interface, with the address or by DHCP.
 [[nodiscard]] std::string NetworkFile(const Provisioning& given);
 
-/// Writes what was given, each file in one step: `serial`, `host-name`, `network`, `time-servers`
-/// to `unit`, the page's key to `state`, for whom that folder belongs to. What is not given goes
-/// from `unit`. @throws IoError
+/// Writes the given settings, each file in one step: `serial`, `host-name`, `network`,
+/// `time-servers` to `unit`, the page's key to `state` with that folder's owner. Settings that are
+/// not given are removed from `unit`.
+/// @throws IoError
 void ApplyProvisioning(const Provisioning& given, const std::filesystem::path& unit,
                        const std::filesystem::path& state);
 

@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-/// What `draw` draws; where it cannot, the journal says why.
+/// Result of `draw`; if it fails, the journal states why.
 std::vector<cv::Mat> Drawn(const fs::path& folder,
                            const std::function<std::vector<cv::Mat>()>& draw) {
   try {
@@ -69,7 +69,7 @@ HeightMap MapLike(const HeightMap& heights, const fs::path& file) {
   return map;
 }
 
-/// Cells inside the region; empty where the result has no picture of it.
+/// Cells inside the region; empty if the result has no picture of it.
 std::vector<std::uint8_t> RegionLike(const HeightMap& heights, const fs::path& file) {
   std::error_code ignored;
   if (!fs::exists(file, ignored)) return {};

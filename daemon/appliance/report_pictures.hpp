@@ -12,24 +12,24 @@
 
 namespace plumb {
 
-/// What the marks at the edges of a map say.
+/// Texts of the marks at the edges of a map.
 struct SideWords {
   std::string_view head, feet, left, right;
 };
 
-/// Error map and overlay of a comparison, CV_8UC3 RGB. The marks are the patient's sides where the
-/// result found them, else there are none. A picture whose files are missing or damaged is left
-/// out: a report says what it can.
-/// @param reference_folder  Of the reference's scan.
-/// @param result  Of result.json.
+/// Error map and overlay of a comparison, CV_8UC3 RGB. The marks name the patient's sides if the
+/// result found them; otherwise there are none. A picture whose files are missing or damaged is
+/// left out.
+/// @param reference_folder  Folder of the reference's scan.
+/// @param result  Contents of result.json.
 [[nodiscard]] std::vector<cv::Mat> ComparisonPictures(const std::filesystem::path& scan_folder,
                                                       const std::filesystem::path& reference_folder,
                                                       const nlohmann::json& result,
                                                       double tolerance_m, const PictureWords& words,
                                                       const SideWords& sides);
 
-/// The heights of a reference with the planned region outlined and the isocentre marked; nothing
-/// where the files are missing or damaged.
+/// The heights of a reference with the planned region outlined and the isocentre marked; nothing if
+/// the files are missing or damaged.
 [[nodiscard]] std::vector<cv::Mat> ReferencePictures(const std::filesystem::path& scan_folder,
                                                      const web::ReferencePlan& plan,
                                                      const PictureWords& words);

@@ -190,7 +190,8 @@ constexpr ReportWords kSpanish = {
                  .decimal = ','},
     .decimal = ','};
 
-/// A reason is a sentence: what is longer is shown as it is, since the library's search recurses.
+/// A reason is one sentence; longer texts are not translated, because the library's search
+/// recurses.
 constexpr std::size_t kMaxText = 400;
 
 using Patterns = std::vector<std::pair<std::regex, std::string_view>>;

@@ -1,4 +1,4 @@
-// What the reports say, in each language.
+// The texts of the reports in each language.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace plumb {
 
-/// The texts of one language. With {}: patterns of fmt.
+/// The texts of one language. Texts with {} are fmt patterns.
 struct ReportWords {
   std::string_view notice, page, scan_title, course_title;
   std::string_view patient, unassigned, site, fraction, scan, scans, reference, version, plan,
@@ -19,7 +19,7 @@ struct ReportWords {
   std::string_view room_markers, couch_markers, tolerance, tolerance_fact;
   std::array<std::string_view, 4> postures;  ///< HFS, HFP, FFS, FFP.
   std::array<std::string_view, 6> axes;
-  std::array<std::string_view, 6> short_axes;  ///< With their units, as heads of columns.
+  std::array<std::string_view, 6> short_axes;  ///< With units, as column heads.
   std::string_view within, unsure, outside, not_known, no_move, insignificant;
   std::string_view verdict_reference, verdict_none, verdict_in, verdict_unsure, verdict_move,
       verdict_no_answer;
@@ -35,8 +35,8 @@ struct ReportWords {
 
 [[nodiscard]] const ReportWords& WordsOf(web::Language language);
 
-/// A direction, part of the body or reason of the appliance in that language; as it is where there
-/// are no words for it.
+/// A direction, part of the body or reason of the appliance in that language; unchanged if there is
+/// no translation.
 [[nodiscard]] std::string Translated(const std::string& text, web::Language language);
 
 }  // namespace plumb

@@ -27,13 +27,13 @@ constexpr double kManyLost = 0.05;
 constexpr int kMaxScans = 1000;
 constexpr std::size_t kMaxJsonBytes = std::size_t{16} << 20;
 
-/// A pattern of the words, filled in.
+/// A pattern of the words with its values.
 template <typename... Values>
 std::string Filled(std::string_view pattern, const Values&... values) {
   return fmt::format(fmt::runtime(pattern), values...);
 }
 
-/// A number in the language.
+/// A number in the format of the language.
 std::string Said(double value, int digits, const ReportWords& words) {
   std::string text = fmt::format("{:.{}f}", value, digits);
   std::replace(text.begin(), text.end(), '.', words.decimal);
@@ -78,7 +78,7 @@ ReportTexts TextsOf(const ReportWords& words) {
   return texts;
 }
 
-/// Nothing where the file is missing or no JSON: the report then leaves out what it says.
+/// Nothing if the file is missing or not JSON: the report then leaves out its contents.
 Json JsonIn(const std::filesystem::path& file) {
   try {
     return ParseBoundedJsonOrNothing(ReadTextFile(file, kMaxJsonBytes));
@@ -115,7 +115,7 @@ std::array<std::optional<double>, 6> ValuesOf(const std::optional<web::SixNumber
           numbers->pitch_deg,   numbers->roll_deg,        numbers->yaw_deg};
 }
 
-/// A correction that is no answer is no advice: it is left out.
+/// A correction without an answer must not be applied, so it is left out.
 bool IsAdvice(const web::Scan& scan) {
   return scan.result && scan.result->correction && scan.result->verdict != "no_answer";
 }
@@ -256,8 +256,8 @@ ReportFacts IdentityOf(const web::Scan& scan, const std::optional<web::Patient>&
   return facts;
 }
 
-/// What the scan was compared with; of a scan for a reference, the reference that was made of it,
-/// with its plan and who approved it.
+/// The reference of the comparison; for a scan of a reference, the reference made from it, with its
+/// plan and approver.
 std::optional<web::Reference> ReferenceFor(const ReportSources& stored, const web::Scan& scan) {
   if (!scan.reference_id.empty() || scan.purpose != web::ScanPurpose::kReference)
     return stored.references.Find(scan.reference_id);

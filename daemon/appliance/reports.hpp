@@ -1,4 +1,4 @@
-// What the reports say, from what is stored. Called on a thread for reads.
+// Assembles the reports from stored records. Called on a thread for reads.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace plumb {
 
-/// The records that a report is made of; borrowed.
+/// The records that a report uses; borrowed.
 struct ReportSources {
   PatientStore& patients;
   ReferenceStore& references;
@@ -26,7 +26,7 @@ struct ReportSources {
 [[nodiscard]] CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& patient,
                                           web::Language language);
 
-/// The same as files. @throws IoError
+/// The reports as files. @throws IoError
 [[nodiscard]] std::string ScanReportPdf(const ReportSources& stored, const web::Scan& scan,
                                         web::Language language);
 [[nodiscard]] std::string CourseReportPdf(const ReportSources& stored, const web::Patient& patient,

@@ -22,9 +22,9 @@ namespace plumb {
 namespace {
 
 constexpr double kUpdateEvery_s = 0.1;
-constexpr double kShowEvery_s = 0.4;  // the surface from above, as pages ask for it
+constexpr double kShowEvery_s = 0.4;  // interval at which pages ask for the surface from above
 
-/// A reference that is not what was approved gives no verdict.
+/// A reference that differs from the approved one gives no verdict.
 Scene ReadReference(const ScanJob& job, const std::stop_token& stop) {
   constexpr const char* kRemedy =
       "put a backup of the scan's files in their place, or take a new reference";
@@ -43,7 +43,7 @@ Scene ReadReference(const ScanJob& job, const std::stop_token& stop) {
   }
 }
 
-/// Puts the room's axes in the reference scene's frame, by the room's markers that it saw.
+/// Puts the room's axes in the reference scene's frame, by the room's markers that it contains.
 std::optional<ResultRoom> TakeRoom(const std::optional<RoomAxes>& room, const Scene& reference,
                                    CompareOptions& compare) {
   if (!room) return std::nullopt;
@@ -100,7 +100,7 @@ void ScanSession::Run(const std::stop_token& stop) {
   if (outcome_.kind != ScanOutcome::Kind::kDone && stop.stop_requested())
     outcome_.kind = ScanOutcome::Kind::kCancelled;
   Save();
-  // What is stored was good, and only now.
+  // The stored reference was good, and only now differs.
   if (outcome_.kind == ScanOutcome::Kind::kDone && job_.unit_profile &&
       outcome_.teaches_nothing.empty())
     job_.unit_profile->Teach();
@@ -109,7 +109,7 @@ void ScanSession::Run(const std::stop_token& stop) {
 
 void ScanSession::Scan(const std::stop_token& stop) {
   folder_ = callbacks_.begin();
-  // Read while the sweep goes on: it is wanted as soon as the new scene is there.
+  // Read during the sweep, because it is needed as soon as the new scene is available.
   if (!job_.reference_scene.empty()) {
     reference_ = std::async(std::launch::async, [this, stop, grid = surface_.grid()] {
                    Reference reference{ReadReference(job_, stop), {}};
@@ -117,7 +117,7 @@ void ScanSession::Scan(const std::stop_token& stop) {
                      reference.region =
                          RegionToSee(reference.scene, job_.compare.region_polygon_m, grid);
                    } catch (const std::exception&) {
-                     // It serves the guidance only; the comparison reports what is wrong.
+                     // It is used for guidance only; the comparison reports errors.
                    }
                    return reference;
                  }).share();
@@ -148,13 +148,13 @@ void ScanSession::Save() {
   }
   try {
     callbacks_.save(outcome_);
-  } catch (const std::exception&) {  // said already; the next start puts the store right
+  } catch (const std::exception&) {  // reported already; the next start repairs the store
   }
 }
 
 namespace {
 
-/// What made the scan fail is told; that its images cannot be written either is not.
+/// The error that made the scan fail is reported, not that its images cannot be written either.
 void KeepFailed(RecordingFeed& recording, const std::stop_token& stop) {
   try {
     recording.Finish();
@@ -184,7 +184,7 @@ Scene ScanSession::Track(const std::stop_token& stop) {
 }
 
 void ScanSession::OnProgress(const ScanProgress& progress) {
-  // Fail before the sweep where the reference cannot be read.
+  // Fail before the sweep if the reference cannot be read.
   if (reference_.valid() &&
       reference_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
     const Reference& reference = reference_.get();
@@ -227,7 +227,8 @@ void ScanSession::ReportProgress(std::string step, double fraction) {
 
 void ScanSession::Check(const Scene& scene) {
   ReportProgress("checking", 0.0);
-  // The board of the room's calibration is there for this scan only: it is no marker of the room.
+  // The board of the room calibration is present in this scan only: its markers do not belong to
+  // the room.
   Scene room, board;
   room.marker_dictionary = board.marker_dictionary = scene.marker_dictionary;
   room.marker_length_m = board.marker_length_m = scene.marker_length_m;
@@ -254,7 +255,7 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
         "during a part of the sweep");
   }
   ReportProgress("saving", 0.0);
-  // The scene goes to the disk while it is compared.
+  // The scene is written to the disk while it is compared.
   std::future<void> writing =
       std::async(std::launch::async, [&] { WriteScene(scene, folder_ / "scene", stop); });
   std::optional<Comparison> comparison;
@@ -269,7 +270,8 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
     room = TakeRoom(job_.room, reference, compare);
     try {
       comparison = Compare(reference, scene, compare);
-    } catch (const DataError& error) {  // not the sweep's fault: another one would end the same
+      // not an error of the sweep: another one would end the same way
+    } catch (const DataError& error) {
       throw std::runtime_error(
           fmt::format("the scan does not fit its reference: {}", error.what()));
     }

@@ -1,4 +1,4 @@
-// One scan, from its first live frame to what is stored: the tracking thread and what it reports.
+// One scan from its first live frame to the stored result: the tracking thread and its reports.
 #pragma once
 
 #include <atomic>
@@ -28,36 +28,39 @@ struct CheckJob {
   MarkerCheckLimits limits;
 };
 
-/// The signed calibration of the room. Where one is, no other axes are taken.
+/// The signed calibration of the room. If there is one, no other axes are used.
 struct RoomAxes {
   int version = 0;
   MarkerMap markers_iec;
-  std::string why_not;  ///< Why it is not to be used now; empty: it is.
+  std::string why_not;  ///< Why it is not used at present; empty if it is.
 };
 
-/// What a scan is made for.
+/// Purpose and input of a scan.
 struct ScanJob {
-  StreamInfo info;  ///< Of the sensor.
+  StreamInfo info;  ///< From the sensor.
   ReconstructorOptions reconstructor;
   CompareOptions compare;
-  std::optional<RoomAxes> room;  ///< None: `compare` says where the room lies, or nobody knows.
+  /// Not set: `compare` states the orientation of the room, or it is unknown.
+  std::optional<RoomAxes> room;
   GuidanceOptions guidance;
-  std::filesystem::path reference_scene;  ///< SCENE to compare with; empty: none.
-  /// Why the reference is not what was approved; empty: it is. Asked before it is read.
+  std::filesystem::path reference_scene;  ///< Scene folder to compare with; empty if there is none.
+  /// Why the reference differs from the approved one; empty if it does not. Called before it is
+  /// read.
   std::function<std::string(const std::stop_token&)> check_reference;
   bool is_reference =
-      false;  ///< The scene must be one that others can be compared with, else there is no answer.
-  std::optional<CheckJob> check;  ///< Set: the daily check; nothing but its numbers is kept.
-  std::shared_ptr<UnitProfile> unit_profile;  ///< Null: nothing is known of the sensor, nor kept.
+      false;  ///< The scene must be usable as a reference; otherwise there is no answer.
+  /// If set, the scan is a daily check, of which only the numbers are kept.
+  std::optional<CheckJob> check;
+  std::shared_ptr<UnitProfile> unit_profile;  ///< Null: no profile of the sensor is used or kept.
   bool keep_recording = false;
   std::size_t queue_capacity = 15;  ///< Frames that may wait for tracking: half a second.
-  double stop_after_s = 10.0;       ///< Without new coverage: the sweep is complete.
+  double stop_after_s = 10.0;  ///< Time without new coverage after which the sweep is complete.
 };
 
-/// How far it is; for the light, the page and `watch`.
+/// Progress of the scan for the light, the page and `watch`.
 struct ScanUpdate {
-  std::string step;  ///< "tracking", then what the reconstruction names, "comparing", "saving".
-  double fraction = 0.0;  ///< Of this step.
+  std::string step;  ///< "tracking", then the steps of the reconstruction, "comparing", "saving".
+  double fraction = 0.0;  ///< Completed fraction of this step.
   std::int64_t frames = 0;
   std::int64_t frames_tracked = 0;
   std::int64_t frames_dropped = 0;
@@ -66,37 +69,39 @@ struct ScanUpdate {
   std::shared_ptr<const LiveSurfaceView> surface;  ///< Null: nothing can be shown yet.
 };
 
-/// How it ended.
+/// Outcome of the scan.
 struct ScanOutcome {
   enum class Kind { kDone, kNoScene, kCancelled, kFailed };
   Kind kind = Kind::kFailed;
-  std::string reason;              ///< kNoScene: why the frames make no scene. kFailed: what broke.
-  std::string result_json;         ///< kDone with a reference: as result.json.
+  std::string reason;              ///< kNoScene: why the frames give no scene. kFailed: the error.
+  std::string result_json;         ///< kDone with a reference: the text of result.json.
   std::string check_json;          ///< kDone or kNoScene of a check: as CheckJson().
-  std::optional<Verdict> verdict;  ///< Of a check: in tolerance where it passed, else no answer.
+  std::optional<Verdict> verdict;  ///< For a check: in tolerance if it passed, otherwise no answer.
   std::int64_t frames = 0, frames_tracked = 0, frames_dropped = 0;
   double swept_area_m2 = 0.0;
-  std::string drift;                ///< That the sensor contradicts its profile; empty: no.
-  std::string teaches_nothing;      ///< Why nothing was learned of the sensor; empty: it may be.
-  double after_last_frame_s = 0.0;  ///< Until everything was written.
+  std::string drift;  ///< That the sensor contradicts its profile; empty if it does not.
+  /// Why the profile does not learn from this scan; empty if it does.
+  std::string teaches_nothing;
+  double after_last_frame_s = 0.0;  ///< Time until everything was written.
 };
 
 /// Called on the tracking thread. `begin` and `save` use the store and may throw, which fails the
 /// scan; the others post to the loop.
 struct ScanCallbacks {
-  /// First: gives the folder in which `scene`, `result` and `recording` are written.
+  /// Called first: returns the folder for `scene`, `result` and `recording`.
   std::function<std::filesystem::path()> begin;
-  /// Stores the outcome, whatever it is, and what the folder holds. If that of a scan that is done
-  /// fails, it is called again for the failed one.
+  /// Stores any outcome, and the contents of the folder. If it fails for a completed scan, it is
+  /// called again for the failed one.
   std::function<void(const ScanOutcome&)> save;
   std::function<void(const ScanUpdate&)> update;
-  std::function<void()> sweep_complete;           ///< No new coverage for long enough; once.
-  std::function<void(const ScanOutcome&)> ended;  ///< Last; exactly once.
+  /// Called once, when there was no new coverage for long enough.
+  std::function<void()> sweep_complete;
+  std::function<void(const ScanOutcome&)> ended;  ///< Called last, exactly once.
 };
 
-/// Starts with its construction. The sensor thread pushes into feed(); closing the feed ends the
-/// sweep. The owner's functions are called from one thread (the loop's); the destructor cancels and
-/// waits.
+/// The scan starts with construction. The sensor thread pushes into feed(); closing the feed ends
+/// the sweep. The owner's functions must be called from one thread (the loop's). The destructor
+/// cancels and waits.
 class ScanSession {
  public:
   ScanSession(ScanJob job, ScanCallbacks callbacks);
@@ -105,10 +110,10 @@ class ScanSession {
   ScanSession& operator=(const ScanSession&) = delete;
 
   [[nodiscard]] const std::shared_ptr<LiveFeed>& feed() const { return feed_; }
-  /// Discards the scan; `ended` follows with kCancelled, mostly within 100 ms. Does not wait.
+  /// Discards the scan; `ended` follows with kCancelled, mostly within 100 ms. Does not block.
   void Cancel();
-  /// Steady seconds at which the tracking thread last got on. While it waits for a frame that is
-  /// the last one's arrival.
+  /// Steady time in seconds of the tracking thread's last progress. While it waits for a frame,
+  /// that is the arrival of the last one.
   [[nodiscard]] double heartbeat_s() const { return heartbeat_s_; }
 
  private:
@@ -126,14 +131,13 @@ class ScanSession {
   ScanCallbacks callbacks_;
   std::filesystem::path folder_;
   std::shared_ptr<LiveFeed> feed_;
-  /// What the sweep is compared with, and which cells of the live surface it has to see.
+  /// The reference of the comparison, and the cells of the live surface that have to be seen.
   struct Reference {
     Scene scene;
     std::vector<std::uint8_t> region;
   };
 
-  std::shared_future<Reference>
-      reference_;  ///< Belongs to the thread; valid if there is one to compare with.
+  std::shared_future<Reference> reference_;  ///< Used by the thread; valid if there is a reference.
   SweepGuide guide_;
   LiveSurface surface_;
   ScanUpdate update_;
@@ -141,7 +145,7 @@ class ScanSession {
   bool told_complete_ = false;
   double told_s_ = 0.0, shown_s_ = 0.0;
   std::atomic<double> heartbeat_s_;
-  std::jthread thread_;  // last: starts when everything above is there
+  std::jthread thread_;  // last: starts when the members above are initialised
 };
 
 }  // namespace plumb

@@ -13,7 +13,7 @@ ScanTransition Refuse(const ScanState& state, std::string_view why) {
   return {.state = state, .actions = {ScanAction::kRefuse}, .refusal = why};
 }
 
-/// What is wrong while no scan has failed and storage works.
+/// The fault while no scan has failed and storage works.
 FaultKind SensorFault(const ScanState& state) {
   return state.sensor_fails ? FaultKind::kSensor : FaultKind::kNone;
 }
@@ -24,7 +24,7 @@ std::string_view WhyNoSensor(const ScanState& state) {
                             : "no sensor is attached: plug it in and wait for the ready light";
 }
 
-/// Where the appliance rests when no scan runs and no result is shown.
+/// Resting state when no scan runs and no result is shown.
 ScanTransition Settle(ScanState state) {
   state.cancelling = false;
   if (state.fault != FaultKind::kNone) {
@@ -40,7 +40,7 @@ ScanTransition Start(ScanState state) {
   return {.state = state, .actions = {ScanAction::kStartScan}, .refusal = {}};
 }
 
-/// Asks a running scan to stop, once. The state settles when it has.
+/// Requests a running scan to stop, once. The state changes when it has stopped.
 ScanTransition Cancel(ScanState state) {
   if (state.cancelling) return Stay(state);
   state.cancelling = true;
@@ -52,7 +52,7 @@ ScanTransition Fail(ScanState state, FaultKind fault) {
   return Settle(state);
 }
 
-/// What the sensor and the store report is noted in any phase; what follows from it depends on the
+/// Reports of the sensor and the store are recorded in any phase; their consequences depend on the
 /// phase.
 void Note(ScanState& state, ScanEvent event) {
   if (event == ScanEvent::kSensorReady || event == ScanEvent::kSensorLost ||
@@ -110,8 +110,8 @@ ScanTransition InScanning(ScanState state, ScanEvent event) {
       return Refuse(state, "a scan is running already: end or cancel it first");
     case ScanEvent::kLongPress:
     case ScanEvent::kCancel:
-    case ScanEvent::kSensorLost:  // a partial scan is discarded, never mixed with what a re-plugged
-                                  // sensor sees
+    // a partial scan is discarded and never mixed with frames of a re-plugged sensor
+    case ScanEvent::kSensorLost:
     case ScanEvent::kSensorFailed:
     case ScanEvent::kStorageFailed:
       return Cancel(state);
@@ -133,11 +133,11 @@ ScanTransition InWorking(const ScanState& state, ScanEvent event) {
     case ScanEvent::kStorageFailed:
       return Cancel(state);
     default:
-      return Stay(state);  // the frames are all there: a sensor that goes now spoils nothing
+      return Stay(state);  // all frames have arrived: losing the sensor now does no harm
   }
 }
 
-/// What ends a scan, in either of its phases.
+/// Events that end a scan, in either of its phases.
 ScanTransition AfterScan(ScanState state, ScanEvent event) {
   state.cancelling = false;
   if (event == ScanEvent::kScanCancelled) return Settle(state);
@@ -173,7 +173,7 @@ ScanTransition InFault(ScanState state, ScanEvent event) {
                           event == ScanEvent::kCancel;
   if (!is_command) return Settle(state);
   if (state.fault == FaultKind::kScan && is_press) {
-    state.fault = SensorFault(state);  // it may have failed meanwhile, and says so only once
+    state.fault = SensorFault(state);  // it may have failed meanwhile, and reports so only once
     return Settle(state);
   }
   if (state.fault == FaultKind::kStorage)

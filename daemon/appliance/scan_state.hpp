@@ -1,4 +1,4 @@
-// What the appliance does next: a pure function of what it does now and what happened.
+// The state machine of the appliance: a pure function of the present state and an event.
 #pragma once
 
 #include <string_view>
@@ -6,14 +6,15 @@
 
 namespace plumb {
 
-/// As the contract names them; see Name().
+/// Names in the interface; see Name().
 enum class ScanPhase { kNoSensor, kReady, kScanning, kWorking, kResult, kFault };
 
-/// What keeps the appliance from scanning, or will once the running scan has ended.
+/// The reason why the appliance cannot scan, or will not be able to once the running scan has
+/// ended.
 enum class FaultKind {
   kNone,
-  kSensor,   ///< The sensor is attached and does not work; over as soon as it works or is gone.
-  kScan,     ///< The last scan failed; over once somebody acknowledged it by a press.
+  kSensor,   ///< The sensor is attached and does not work; ends when it works or is unplugged.
+  kScan,     ///< The last scan failed; ends when somebody acknowledges it by a press.
   kStorage,  ///< Nothing can be stored: safe mode until the next start.
 };
 
@@ -21,11 +22,11 @@ struct ScanState {
   ScanPhase phase = ScanPhase::kNoSensor;
   bool has_sensor = false;  ///< Attached, open and streaming.
   bool sensor_fails =
-      false;  ///< Attached and does not work, whatever else is wrong; never with has_sensor.
-  FaultKind fault = FaultKind::kNone;  ///< Not kNone in phase kFault only, or in a scan that is
-                                       ///< being cancelled because of it.
-  bool cancelling =
-      false;  ///< The running scan was told to stop and has not yet; kScanning and kWorking only.
+      false;  ///< Attached but not working, whatever else is wrong; never together with has_sensor.
+  /// Not kNone only in phase kFault, or in a scan that is being cancelled because of it.
+  FaultKind fault = FaultKind::kNone;
+  /// The running scan was requested to stop and has not stopped yet; kScanning and kWorking only.
+  bool cancelling = false;
   bool operator==(const ScanState&) const = default;
 };
 
@@ -33,16 +34,16 @@ enum class ScanEvent {
   kSensorReady,   ///< Frames arrive.
   kSensorLost,    ///< Unplugged.
   kSensorFailed,  ///< Attached, but cannot be opened, reports an error or delivers nothing.
-  kShortPress,    ///< The button, or what stands for it: starts a scan, ends a sweep, acknowledges.
-  kLongPress,     ///< Discards the running scan; puts a result away.
+  kShortPress,    ///< The button or its equivalent: starts a scan, ends a sweep, acknowledges.
+  kLongPress,     ///< Discards the running scan, or dismisses a result.
   kStart,         ///< The page's buttons, each for one purpose only.
   kEndSweep,
   kCancel,
   kSweepComplete,  ///< No new coverage for long enough, or the longest sweep is over.
-  kScanDone,       ///< There is a result; it may say that there is no answer.
+  kScanDone,       ///< There is a result, possibly without an answer.
   kScanFailed,
-  kScanCancelled,  ///< The cancelled scan's threads are through.
-  kResultExpired,  ///< Old enough to be put away.
+  kScanCancelled,  ///< The threads of the cancelled scan have ended.
+  kResultExpired,  ///< Old enough to be dismissed.
   kStorageFailed,
 };
 
@@ -54,7 +55,7 @@ struct ScanTransition {
   std::string_view refusal;  ///< With kRefuse: one sentence why, and what to do.
 };
 
-/// Total: every event is defined in every state. What makes no sense changes nothing.
+/// Total: every event is defined in every state. Invalid events change nothing.
 [[nodiscard]] ScanTransition Next(const ScanState& state, ScanEvent event);
 
 /// "no_sensor", "ready", "scanning", "working", "result", "fault"

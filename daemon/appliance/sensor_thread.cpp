@@ -21,7 +21,7 @@ namespace {
 constexpr std::chrono::seconds kListAgain{2};
 }
 
-/// Everything in it belongs to the sensor thread, but what the mutex guards and the atomics.
+/// All members are used by the sensor thread only, except atomics and those guarded by the mutex.
 struct SensorThread::Impl {
   Impl(std::function<std::unique_ptr<SensorProvider>()> make, SensorThreadOptions its_options,
        std::function<void(const SensorEvent&)> listener)
@@ -46,24 +46,24 @@ struct SensorThread::Impl {
 
   mutable std::mutex mutex;
   std::condition_variable_any changed;
-  bool bus_changed = true;             // guarded: the provider's listener spoke
-  std::shared_ptr<LiveFeed> wanted;    // guarded: where the frames shall go
+  bool bus_changed = true;             // guarded: set by the provider's listener
+  std::shared_ptr<LiveFeed> wanted;    // guarded: destination requested for the frames
   std::shared_ptr<LiveSensor> sensor;  // guarded for others: written by the sensor thread only
   SensorSnapshot current;              // guarded
   std::optional<Frame> newest;         // guarded
   std::atomic<double> heartbeat = SteadySeconds();
 
   std::unique_ptr<SensorProvider> provider;
-  std::shared_ptr<LiveFeed> feed;  // where the frames go
+  std::shared_ptr<LiveFeed> feed;  // destination of the frames
   std::weak_ptr<LiveFeed>
-      spoiled;         // its sensor went: what comes from the next one does not belong to it
-  bool ready = false;  // kReady was told for this sensor
+      spoiled;         // its sensor was unplugged: frames of the next one do not belong to it
+  bool ready = false;  // kReady was reported for this sensor
   std::optional<SensorEvent::Kind> told;
   std::string told_reason;
   std::chrono::milliseconds retry;
   std::optional<Clock::time_point> retry_at;
   Clock::time_point listed_at;
-  std::jthread thread;  // last: starts when everything above is there
+  std::jthread thread;  // last: starts when the members above are initialised
 
   void Run(const std::stop_token& stop) {
     while (!stop.stop_requested()) {
@@ -80,7 +80,7 @@ struct SensorThread::Impl {
         Drop();
         {
           const std::lock_guard lock(mutex);
-          bus_changed = true;  // another one may be there already
+          bus_changed = true;  // another one may be attached already
         }
         NotifyOnce(SensorEvent::Kind::kLost, {});
       } catch (const std::exception& error) {
@@ -104,13 +104,13 @@ struct SensorThread::Impl {
     });
   }
 
-  /// Opens a sensor if one is there and the time has come; reports that there is none.
+  /// Opens a sensor if one is attached and it is time; reports if there is none.
   void Find() {
     if (!provider) return;
     {
       const std::lock_guard lock(mutex);
-      // Looked for even if nothing was said: a plug that the driver did not report must not wait
-      // for a restart.
+      // The bus is also checked without a notification: a plug event that the driver missed must
+      // not require a restart.
       const bool due = Clock::now() >= (retry_at ? *retry_at : listed_at + kListAgain);
       if (!bus_changed && !due) return;
       bus_changed = false;
@@ -157,8 +157,7 @@ struct SensorThread::Impl {
     return others;
   }
 
-  /// Who else is there now? Asking a new unit for its serial takes its time, so not while a scan
-  /// runs.
+  /// Lists other units. Asking a new unit for its serial takes time, so not while a scan runs.
   void LookForOthers() {
     {
       const std::lock_guard lock(mutex);
@@ -166,7 +165,8 @@ struct SensorThread::Impl {
     }
     const std::vector<SensorDescription> attached = provider->List();
     std::vector<std::string> others = Others(attached, sensor->description());
-    if (others.size() == attached.size()) return;  // the one in use is gone: Next() will say so
+    // the one in use was unplugged: Next() will report it
+    if (others.size() == attached.size()) return;
     {
       const std::lock_guard lock(mutex);
       if (others == current.others) return;
@@ -179,7 +179,7 @@ struct SensorThread::Impl {
     std::unique_lock lock(mutex);
     const Clock::time_point heartbeat_due = Clock::now() + std::chrono::milliseconds(500);
     const Clock::time_point until = retry_at ? std::min(*retry_at, heartbeat_due) : heartbeat_due;
-    // Without a provider nobody looks at the bus, so what it said would not be done with: only the
+    // Without a provider nothing watches the bus, so notifications would never be handled: only the
     // next attempt is waited for.
     changed.wait_until(lock, stop, until, [this] { return provider != nullptr && bus_changed; });
   }
@@ -205,7 +205,7 @@ struct SensorThread::Impl {
       current.present = true;
       current.statistics = sensor->statistics();
       newest = *frame;
-      if (WantedFeed() != feed) return;  // a scan began or ended while this frame was on its way
+      if (WantedFeed() != feed) return;  // a scan began or ended while this frame was in transit
       is_new = !std::exchange(ready, true);
     }
     if (feed) feed->Push(std::move(*frame));
@@ -215,7 +215,7 @@ struct SensorThread::Impl {
     }
   }
 
-  /// Needs the lock.
+  /// Requires the lock.
   [[nodiscard]] std::shared_ptr<LiveFeed> WantedFeed() const {
     return wanted && wanted == spoiled.lock() ? nullptr : wanted;
   }
@@ -234,7 +234,7 @@ struct SensorThread::Impl {
     sensor->Flush();
   }
 
-  /// The sweep has a gap; the sensor is read on.
+  /// The sweep has a gap, but the sensor can still be read.
   void FailFeed(const std::string& why) {
     if (feed) {
       feed->Fail(why + ". Scan again");

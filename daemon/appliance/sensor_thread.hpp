@@ -1,5 +1,5 @@
-// The thread that owns the sensor: finds it, opens it, reads it, and finds it again after it was
-// gone.
+// The thread that owns the sensor: finds, opens and reads it, and finds it again after it was
+// unplugged.
 #pragma once
 
 #include <chrono>
@@ -15,52 +15,52 @@
 namespace plumb {
 
 struct SensorThreadOptions {
-  std::string serial;  ///< Only this unit; empty: the first one.
-  /// Called on the sensor thread when a scan begins, just before its first frame is waited for. May
+  std::string serial;  ///< Use only this unit; empty: the first one.
+  /// Called on the sensor thread when a scan begins, just before waiting for its first frame. May
   /// throw DeviceError.
   std::function<void()> before_scan;
   std::chrono::milliseconds first_retry{500};  ///< After a failure; doubles up to `last_retry`.
   std::chrono::milliseconds last_retry{4000};
 };
 
-/// What happened to the sensor.
+/// An event of the sensor.
 struct SensorEvent {
   enum class Kind { kReady, kLost, kFailed, kOthers, kStalled };
   Kind kind = Kind::kLost;
-  SensorDescription sensor;  ///< kReady, kOthers, and kFailed where known.
+  SensorDescription sensor;  ///< kReady, kOthers, and kFailed if known.
   std::string reason;        ///< kFailed: a sentence with a remedy. kStalled: a sentence.
   std::vector<std::string>
-      others;  ///< kReady, kOthers: serials of the units that are attached and not used.
+      others;  ///< kReady, kOthers: serials of units that are attached and not used.
 };
 
-/// What is known of the sensor now.
+/// Present state of the sensor.
 struct SensorSnapshot {
   bool present = false;  ///< Frames arrive.
   SensorDescription sensor;
   SensorStatistics statistics;
   StreamInfo info;
-  std::vector<std::string> others;  ///< Serials of the units that are attached and not used; not
-                                    ///< looked for while a scan runs.
+  /// Serials of units that are attached and not used; not updated while a scan runs.
+  std::vector<std::string> others;
 };
 
-/// Reads all the time, so that an unplugged or stalled sensor is noticed while nobody scans, too.
-/// While a scan runs the frames go to its feed, otherwise only the newest is kept, for a preview.
-/// All functions are thread-safe; none waits for the sensor but the destructor.
+/// Reads continuously, so that an unplugged or stalled sensor is also noticed between scans. During
+/// a scan the frames go to its feed; otherwise only the newest is kept, for a preview. All
+/// functions are thread-safe; only the destructor waits for the sensor.
 class SensorThread {
  public:
   /// @param make_provider  Called on the sensor thread, again after it threw DeviceError.
   /// @param notify  Called on the sensor thread for each event; it posts to the loop. kReady comes
-  /// with the first frame, kOthers when the units that are not used became others, kStalled when
-  /// the process did not get to run: the sensor stays, but a running scan's feed fails.
+  ///         with the first frame, kOthers when the set of unused units has changed, kStalled when
+  ///         the process did not run: the sensor stays, but a running scan's feed fails.
   SensorThread(std::function<std::unique_ptr<SensorProvider>()> make_provider,
                SensorThreadOptions options, std::function<void(const SensorEvent&)> notify);
   ~SensorThread();
   SensorThread(const SensorThread&) = delete;
   SensorThread& operator=(const SensorThread&) = delete;
 
-  /// From now on frames go to the feed; those that arrived before do not. Exposure stands still
-  /// until EndScan(). Of a sensor that comes back meanwhile, or of another one, the feed gets
-  /// nothing.
+  /// From now on frames go to the feed, but not those that arrived earlier. Exposure is fixed until
+  /// EndScan(). A sensor that was unplugged meanwhile, or another one, delivers nothing to the
+  /// feed.
   void BeginScan(std::shared_ptr<LiveFeed> feed);
   /// Closes the feed.
   void EndScan();
@@ -68,9 +68,8 @@ class SensorThread {
   [[nodiscard]] SensorSnapshot snapshot() const;
   /// The newest frame; none without a sensor.
   [[nodiscard]] std::optional<Frame> latest() const;
-  /// Steady seconds at which the thread last showed that it lives. It does so several times a
-  /// second, sensor or not, except while the driver lists, opens and closes (seconds on real
-  /// hardware).
+  /// Steady time in seconds of the thread's last sign of life, several times a second with or
+  /// without a sensor, except while the driver lists, opens and closes (seconds on real hardware).
   [[nodiscard]] double heartbeat_s() const;
 
  private:

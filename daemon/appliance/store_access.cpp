@@ -25,7 +25,7 @@ void StoreAccess::LogUnreadable(const std::exception& error) {
 void StoreAccess::RunOnStoreThread(web::Done done, std::function<std::string(Store&)> change) {
   Store* store = appliance_.store();
   if (store == nullptr) return done(Refusal(ChangeResult::kFailed, appliance_.storage_fault()));
-  // The store's thread outlives this object: it must not be used there.
+  // The store's thread outlives this object, which must not be used there.
   const bool posted = appliance_.store_thread().Post(
       [store, done, appliance = &appliance_, change = std::move(change), alive = alive_] {
         web::Change answer;

@@ -13,25 +13,25 @@
 
 namespace plumb {
 
-/// An answer with a message, most often of a change that was not made.
+/// An answer with a message, mostly for a change that was not made.
 [[nodiscard]] web::Change Refusal(web::ChangeResult result, std::string message);
-/// Done where `why_not` is empty, else a conflict with the state of the appliance.
+/// Done if `why_not` is empty, otherwise a conflict with the state of the appliance.
 [[nodiscard]] web::Change AnswerOf(const std::string& why_not);
 
-/// Changes run on the store's thread and call `done` on the loop; reads answer at once. Belongs to
-/// the loop's thread, Read() to any. In safe mode reads give nothing and changes fail with the
+/// Changes run on the store's thread and call `done` on the loop; reads answer at once. Used on the
+/// loop's thread, Read() on any. In safe mode reads return nothing and changes fail with the
 /// reason.
 class StoreAccess {
  public:
-  /// The appliance is borrowed; lives longer.
+  /// The appliance is borrowed and outlives this object.
   explicit StoreAccess(Appliance& appliance) : appliance_(appliance) {}
-  /// No `done` is called from then on.
+  /// No `done` is called afterwards.
   ~StoreAccess() { *alive_ = false; }
   StoreAccess(const StoreAccess&) = delete;
   StoreAccess& operator=(const StoreAccess&) = delete;
 
-  /// Runs `change` with one service of the store on the store's thread. What it returns is the id
-  /// of what was made, if anything; what it throws becomes the answer.
+  /// Runs `change` with one service of the store on the store's thread. Its return value is the id
+  /// of a new record, if any; its exceptions become the answer.
   template <typename Service, typename Function>
   void Change(Service Store::*service, web::Done done, Function change) {
     RunOnStoreThread(std::move(done),
@@ -46,14 +46,14 @@ class StoreAccess {
                      });
   }
 
-  /// What `read` makes of one service of the store. A read that fails (a damaged database) is
-  /// logged and gives an empty value.
+  /// Result of `read` with one service of the store. A read that fails (a damaged database) is
+  /// logged and returns an empty value.
   template <typename Service, typename Function>
   [[nodiscard]] std::invoke_result_t<Function, Service&> Read(Service Store::*service,
                                                               const Function& read) const {
     return Read([&](Store& store) { return read(store.*service); });
   }
-  /// The same for what needs several of them.
+  /// The same for reads that need several services.
   template <typename Function>
   [[nodiscard]] std::invoke_result_t<Function, Store&> Read(const Function& read) const {
     if (appliance_.store() == nullptr) return {};

@@ -7,9 +7,10 @@
 namespace plumb {
 namespace {
 
-constexpr double kFarthest_m = 2.5;  // what lies beyond is the room, measured badly
+// surfaces farther away are the room, measured with low accuracy
+constexpr double kFarthest_m = 2.5;
 
-/// One number for a cell of the coarse grid; cells within 50 km of the first camera are told apart.
+/// Key of a cell of the coarse grid; unique within 50 km of the first camera.
 std::uint64_t CellKey(const Eigen::Vector3d& p_world, double cell_m) {
   const auto part = [&](double v) {
     return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(v / cell_m)) +

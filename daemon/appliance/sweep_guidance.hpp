@@ -1,5 +1,4 @@
-// What a technician needs to know while sweeping: how much was seen, and whether to go slower,
-// closer or farther.
+// Guidance during a sweep: how much was seen, and whether to go slower, closer or farther.
 #pragma once
 
 #include <cstdint>
@@ -15,40 +14,42 @@ enum class SweepAdvice { kNone, kSlower, kCloser, kFarther, kLost };
 /// "none", "slower", "closer", "farther", "lost"
 [[nodiscard]] const char* Name(SweepAdvice advice);
 
-/// Starting values; distances in metres, times in seconds of the frames' stamps.
+/// Starting values; distances in metres, times in seconds by the frames' stamps.
 struct GuidanceOptions {
-  double max_speed_m_s = 0.7;   ///< Of the camera; beyond, images blur and rows shear.
-  double max_turn_rad_s = 1.4;  ///< Of the camera.
+  double max_speed_m_s = 0.7;   ///< Speed of the camera above which images blur and rows shear.
+  double max_turn_rad_s = 1.4;  ///< Rotation rate of the camera.
   double min_distance_m = 0.5;  ///< Median depth.
   double max_distance_m = 1.3;
   double min_valid_depth =
-      0.2;  ///< Share of pixels with depth; less means too near where the sensor sees nothing.
-  double lost_after_s = 0.3;  ///< Without a pose.
-  double cell_m = 0.05;       ///< Of the coarse grid on which seen surface is counted.
-  int pixel_step = 16;        ///< Every so many pixels a point is taken.
+      0.2;  ///< Fraction of pixels with depth; less means that the sensor is too close to measure.
+  double lost_after_s = 0.3;  ///< Time without a pose.
+  double cell_m = 0.05;       ///< Cell of the coarse grid on which seen surface is counted.
+  int pixel_step = 16;        ///< Pixels between points.
   double min_growth_m2 =
-      0.03;  ///< Less is noise at the edges of what was seen before, and no new coverage.
+      0.03;  ///< Smaller areas are noise at the edges of what was seen before, not new coverage.
   double smoothing_s = 0.25;  ///< Time constant of the speed.
 };
 
-/// Of the sweep up to now.
+/// State of the sweep up to now.
 struct SweepGuidance {
   SweepAdvice advice = SweepAdvice::kNone;
   double speed_m_s = 0.0;
   double turn_rad_s = 0.0;
   double median_depth_m = 0.0;
   double valid_depth = 0.0;
-  double area_m2 = 0.0;  ///< Of all surface seen, floor and markers too; counted in coarse cells,
-                         ///< so only to compare with.
-  double without_new_area_s = 0.0;  ///< Since new surface was last seen; 0 until there was some.
+  /// All surface seen, including floor and markers; counted in coarse cells, so only for
+  /// comparison.
+  double area_m2 = 0.0;
+  /// Time since new surface was last seen; 0 until there was some.
+  double without_new_area_s = 0.0;
 };
 
-/// Follows one sweep on the tracking thread; under a millisecond a frame. Not thread-safe.
+/// Follows one sweep on the tracking thread; takes under a millisecond per frame. Not thread-safe.
 class SweepGuide {
  public:
   explicit SweepGuide(const Intrinsics& intrinsics, const GuidanceOptions& options = {});
 
-  /// @param report  What tracking made of the frame.
+  /// @param report  Outcome of tracking the frame.
   const SweepGuidance& Add(const Frame& frame, const TrackingReport& report);
 
   [[nodiscard]] const SweepGuidance& guidance() const { return guidance_; }

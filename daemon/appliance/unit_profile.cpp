@@ -27,9 +27,10 @@ void UnitProfile::Begin(ReconstructorOptions& options) {
     } else if (in_use.newest && in_use.newest->profile) {
       using Days = std::chrono::duration<double, std::ratio<86400>>;
       const Days age = std::chrono::system_clock::now() - in_use.newest->made;
-      // In whole days: a recording that is computed again on the same day gives the same scene.
+      // In whole days, so that a recording that is processed again on the same day gives the same
+      // scene.
       before_ = Aged(*in_use.newest->profile, std::floor(age.count()));
-      // That its covariance is a proper one is checked here, where a scan can still do without it.
+      // The covariance is checked here, where a scan can still proceed without the profile.
       (void)PriorOfNextSweep(*before_, stated_, CalibrationModel::kEdgeBiasSigma);
     }
   } catch (const std::exception& error) {
@@ -46,7 +47,7 @@ std::optional<ProfileAgreement> UnitProfile::Compared() const {
   if (!before_ || !learned_) return std::nullopt;
   try {
     return Agreement(*before_, *learned_);
-  } catch (const std::exception&) {  // Begin() has looked at the covariance
+  } catch (const std::exception&) {  // Begin() has checked the covariance
     return std::nullopt;
   }
 }

@@ -1,4 +1,5 @@
-// One scan's use of what is known of its sensor unit: where it begins, and what it teaches.
+// Use of a sensor unit's profile by one scan: its start values, and what the profile learns from
+// it.
 #pragma once
 
 #include <memory>
@@ -13,21 +14,22 @@
 
 namespace plumb {
 
-/// Used by the scan's thread alone. Nothing here throws: a scan does not fail for its profile.
+/// Used by the scan's thread only. Nothing here throws: a scan does not fail because of its
+/// profile.
 class UnitProfile {
  public:
-  /// @param stated  What the sensor's streams state; a profile of other intrinsics is not used.
+  /// @param stated  Intrinsics stated by the sensor's streams; a profile for others is not used.
   UnitProfile(std::shared_ptr<ProfileShelf> shelf, std::string serial, Intrinsics stated);
 
-  /// Reads the profile, widened by its age, into the options, and asks the reconstruction for what
-  /// the sweep will have learned.
+  /// Reads the profile, widened by its age, into the options, and requests the updated profile from
+  /// the reconstruction.
   void Begin(ReconstructorOptions& options);
 
-  /// After the sweep. Empty: it agrees with the profile, or there is none, or it has learned
-  /// nothing; else that the unit has changed and what to do, as a sentence.
+  /// Called after the sweep. Empty if it agrees with the profile, there is none, or nothing was
+  /// learned; otherwise a sentence that the unit has changed and what to do.
   [[nodiscard]] std::string Drift() const;
 
-  /// Adds what a sweep that passed its checks has learned as a new version, unless Drift().
+  /// Adds a new version from a sweep that passed its checks, unless Drift() reports a change.
   void Teach();
 
  private:
@@ -40,8 +42,8 @@ class UnitProfile {
   int begun_from_ = 0;
 };
 
-/// Why a scan that ended teaches nothing of its sensor; empty: it may. The gates that a scene alone
-/// can be held against are the comparison's.
+/// Why the profile does not learn from a completed scan; empty if it may. Uses the gates of the
+/// comparison that need only one scene.
 /// @param verdict  Of its comparison or check, if there was one.
 [[nodiscard]] std::string WhyItTeachesNothing(const Scene& scene,
                                               const std::optional<Verdict>& verdict,

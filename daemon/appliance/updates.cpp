@@ -157,7 +157,7 @@ void Updates::InstallFromStick(const web::Actor& actor, const std::string& bundl
 
 void Updates::RestartSystem(const web::Actor& actor, web::Done done) {
   if (const std::string why = WhyNotRestart(); !why.empty()) return done(Conflict(why));
-  restarting_ = true;  // No scan, session or update may begin before the machine goes down.
+  restarting_ = true;  // no scan, session or update may begin before the machine goes down
   GoDown(actor, std::move(done));
 }
 

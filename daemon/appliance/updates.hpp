@@ -17,22 +17,22 @@ namespace plumb {
 
 struct UpdatesOptions {
   UpdateConfig config;
-  std::filesystem::path state;                        ///< What a factory reset is about.
+  std::filesystem::path state;                        ///< State folder for a factory reset.
   std::filesystem::path sticks = "/run/plumb-stick";  ///< See UsbSticks.
   std::string bus_address = {};                       ///< Empty: the system bus.
-  std::string boot = {};  ///< Another text at each start of the machine; empty: not known.
+  std::string boot = {};  ///< Unique for each start of the machine; empty if unknown.
   std::function<bool(std::function<void()>)> aside;  ///< See UpdaterOptions.
-  std::function<void()> changed;                     ///< GetUpdate() has changed.
+  std::function<void()> changed;                     ///< Called when GetUpdate() has changed.
   std::function<void(const web::Actor& actor, const char* action, const std::string& subject,
                      const std::string& detail)>
-      log;  ///< To the audit log.
+      log;  ///< Writes to the audit log.
 };
 
-/// Belongs to the loop's thread. Nothing is installed, and nothing restarted, while somebody is
-/// scanned; no scan begins while it goes on.
+/// Used on the loop's thread. Nothing is installed or restarted during a scan, and no scan begins
+/// during an update.
 class Updates : public web::UpdateService {
  public:
-  /// @param restart  How the machine is restarted.
+  /// @param restart  Restarts the machine.
   Updates(Appliance& appliance, std::unique_ptr<SystemRestart> restart, UpdatesOptions options);
   ~Updates() override;
   Updates(const Updates&) = delete;
@@ -43,7 +43,7 @@ class Updates : public web::UpdateService {
                  const std::string& name, web::Done done) override;
   void RemoveBundle(const web::Actor& actor, const std::string& name, web::Done done) override;
   void InstallUpdate(const web::Actor& actor, const std::string& bundle, web::Done done) override;
-  /// Copies the open file among the bundles, off the loop, then installs it.
+  /// Copies the open file to the bundles, off the loop, then installs it.
   void InstallFile(const web::Actor& actor, std::shared_ptr<const AttachedFile> file,
                    const std::string& name, web::Done done);
   [[nodiscard]] std::vector<std::string> StickBundles() override { return sticks_.Bundles(); }
@@ -54,12 +54,12 @@ class Updates : public web::UpdateService {
   void ForgetRollBack(const web::Actor& actor, web::Done done) override;
 
  private:
-  /// Why no update may begin now; empty: it may.
+  /// Why no update may begin now; empty if it may.
   [[nodiscard]] std::string WhyNotInstall() const;
   [[nodiscard]] std::string WhyNotRestart() const;
-  /// Why no scan may begin now.
+  /// Why no scan may begin now; empty if it may.
   [[nodiscard]] std::string WhyNotScan() const;
-  /// Asks for the restart; `restarting_` is set.
+  /// Requests the restart; `restarting_` is set.
   void GoDown(const web::Actor& actor, web::Done done);
 
   Appliance& appliance_;

@@ -1,4 +1,4 @@
-// Accounts, screens in the room and the audit log as the page asks for them.
+// The page's services for accounts, displays in the room and the audit log.
 #pragma once
 
 #include "daemon/appliance/store_access.hpp"
@@ -8,7 +8,7 @@
 
 namespace plumb {
 
-/// Borrows what it is given.
+/// Its arguments are borrowed.
 class WebAccounts : public web::AccountService {
  public:
   explicit WebAccounts(StoreAccess& store) : store_(store) {}
@@ -22,7 +22,7 @@ class WebAccounts : public web::AccountService {
   StoreAccess& store_;
 };
 
-/// Borrows what it is given.
+/// Its arguments are borrowed.
 class WebDisplays : public web::DisplayService {
  public:
   explicit WebDisplays(StoreAccess& store) : store_(store) {}
@@ -35,7 +35,7 @@ class WebDisplays : public web::DisplayService {
   StoreAccess& store_;
 };
 
-/// Borrows what it is given.
+/// Its arguments are borrowed.
 class WebAuditLog : public web::AuditLog {
  public:
   explicit WebAuditLog(StoreAccess& store) : store_(store) {}

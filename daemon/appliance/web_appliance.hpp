@@ -1,4 +1,4 @@
-// The state of the appliance and its button, as the page asks for them.
+// The page's service for the state of the appliance and its button.
 #pragma once
 
 #include "daemon/appliance/store_access.hpp"
@@ -7,7 +7,7 @@
 
 namespace plumb {
 
-/// Borrows what it is given.
+/// Its arguments are borrowed.
 class WebAppliance : public web::ApplianceService {
  public:
   WebAppliance(Appliance& appliance, web::AuditLog& audit) : appliance_(appliance), audit_(audit) {}
@@ -22,7 +22,7 @@ class WebAppliance : public web::ApplianceService {
   void Cancel(const web::Actor& actor, web::Done done) override;
   void SetListener(std::function<void(web::EventKind)> listener) override;
 
-  /// To the listener, if there is one.
+  /// Notifies the listener, if there is one.
   void Notify(web::EventKind kind) const;
 
  private:
@@ -30,9 +30,9 @@ class WebAppliance : public web::ApplianceService {
   web::AuditLog& audit_;
   std::function<void(web::EventKind)> listener_;
   std::shared_ptr<const std::string> preview_;
-  std::optional<std::int64_t> preview_index_;  ///< Of the frame that it shows.
+  std::optional<std::int64_t> preview_index_;  ///< Index of the frame that it shows.
   std::chrono::steady_clock::time_point preview_at_;
-  std::shared_ptr<const LiveSurfaceView> packed_view_;  ///< What `packed_` was made of.
+  std::shared_ptr<const LiveSurfaceView> packed_view_;  ///< Source of `packed_`.
   std::shared_ptr<const std::string> packed_;
 };
 

@@ -1,4 +1,4 @@
-// The daily check as the page asks for it.
+// The page's service for the daily check.
 #pragma once
 
 #include "daemon/appliance/store_access.hpp"
@@ -6,7 +6,7 @@
 
 namespace plumb {
 
-/// Borrows what it is given.
+/// Its arguments are borrowed.
 class WebChecks : public web::CheckService {
  public:
   WebChecks(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}

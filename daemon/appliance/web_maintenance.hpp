@@ -1,4 +1,4 @@
-// Backups and diagnostics as the page asks for them.
+// The page's service for backups and diagnostics.
 #pragma once
 
 #include "daemon/appliance/store_access.hpp"
@@ -6,7 +6,7 @@
 
 namespace plumb {
 
-/// Borrows what it is given.
+/// Its arguments are borrowed.
 class WebMaintenance : public web::MaintenanceService {
  public:
   WebMaintenance(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}

@@ -10,7 +10,7 @@ using web::ChangeResult;
 
 namespace {
 
-/// Why this patient cannot be opened for that; empty: it can.
+/// Why this patient cannot be opened for that purpose; empty if it can.
 std::string WhyNotOpen(ScanPhase phase, const web::Patient& patient, web::ScanPurpose purpose) {
   if (phase == ScanPhase::kScanning || phase == ScanPhase::kWorking)
     return "a scan is running: wait for its result, then open the patient";

@@ -1,4 +1,4 @@
-// The patients as the page asks for them.
+// The page's service for patients.
 #pragma once
 
 #include "daemon/appliance/store_access.hpp"
@@ -6,7 +6,7 @@
 
 namespace plumb {
 
-/// Borrows what it is given.
+/// Its arguments are borrowed.
 class WebPatients : public web::PatientService {
  public:
   WebPatients(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}

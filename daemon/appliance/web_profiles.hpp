@@ -1,4 +1,4 @@
-// The sensor's profile as the page asks for it.
+// The page's service for the sensor's profile.
 #pragma once
 
 #include "daemon/appliance/store_access.hpp"
@@ -6,7 +6,7 @@
 
 namespace plumb {
 
-/// Borrows what it is given.
+/// Its arguments are borrowed.
 class WebSensorProfiles : public web::SensorProfileService {
  public:
   WebSensorProfiles(Appliance& appliance, StoreAccess& store)
@@ -20,8 +20,7 @@ class WebSensorProfiles : public web::SensorProfileService {
                              web::Done done) override;
 
  private:
-  /// As StoreAccess::Change(); once it is done, what the last scan said against the profile is
-  /// forgotten.
+  /// As StoreAccess::Change(); afterwards the last scan's objection to the profile is discarded.
   void ChangeProfile(const std::string& serial, const web::Done& done,
                      std::function<void(AuditStore&)> change);
 

@@ -1,4 +1,4 @@
-// The references as the page asks for them.
+// The page's service for references.
 #pragma once
 
 #include "daemon/appliance/store_access.hpp"
@@ -6,7 +6,7 @@
 
 namespace plumb {
 
-/// Borrows what it is given.
+/// Its arguments are borrowed.
 class WebReferences : public web::ReferenceService {
  public:
   WebReferences(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}

@@ -24,7 +24,7 @@ web::RoomCalibrationStatus WebRoomCalibration::GetRoomCalibration() {
 void WebRoomCalibration::SignRoomCalibration(const web::Actor& actor, const std::string& digest,
                                              web::Done done) {
   const auto [serial, since] = appliance_.RoomScansWanted();
-  // StoreAccess calls nothing once the services are gone, and the appliance outlives them.
+  // StoreAccess calls nothing once the services are destroyed, and the appliance outlives them.
   store_.Change(
       &Store::room,
       [&appliance = appliance_, done = std::move(done)](const web::Change& answer) {

@@ -1,4 +1,4 @@
-// The room's calibration as the page asks for it.
+// The page's service for the calibration of the room.
 #pragma once
 
 #include "daemon/appliance/store_access.hpp"
@@ -6,7 +6,7 @@
 
 namespace plumb {
 
-/// Borrows what it is given.
+/// Its arguments are borrowed.
 class WebRoomCalibration : public web::RoomCalibrationService {
  public:
   WebRoomCalibration(Appliance& appliance, StoreAccess& store)

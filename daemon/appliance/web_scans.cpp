@@ -34,10 +34,10 @@ void WebScans::AcceptScan(const web::Actor& actor, const std::string& id, const 
     return done(AnswerOf("a scan is running: accept its result, not an older one"));
   const std::optional<web::Scan> scan = FindScan(id);
   if (!scan) return done(Refusal(ChangeResult::kNotFound, "there is no such scan"));
-  // A scan of an earlier run of the appliance is older than any that can be acted on.
+  // A scan from an earlier run of the appliance is too old to act on.
   if (scan->result && appliance_.AgeOf(id).value_or(web::kResultValid_s + 1) > web::kResultValid_s)
     return done(AnswerOf("this result is older than 2 minutes: scan again, then accept"));
-  // Somebody else may lie on the couch by now.
+  // Another person may be on the couch by now.
   const auto open = appliance_.WebStatus().session;
   if (!scan->patient_id.empty() && (!open || open->patient_id != scan->patient_id))
     return done(AnswerOf("the session of this patient is not open: a result is accepted in it"));

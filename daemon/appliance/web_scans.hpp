@@ -1,4 +1,4 @@
-// The scans as the page asks for them.
+// The page's service for scans.
 #pragma once
 
 #include "daemon/appliance/store_access.hpp"
@@ -6,7 +6,7 @@
 
 namespace plumb {
 
-/// Borrows what it is given.
+/// Its arguments are borrowed.
 class WebScans : public web::ScanService {
  public:
   WebScans(Appliance& appliance, StoreAccess& store) : appliance_(appliance), store_(store) {}

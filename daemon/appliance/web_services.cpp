@@ -11,7 +11,8 @@ namespace plumb {
 
 namespace {
 
-/// Of this start of the machine. The unit passes it on, because its sandbox hides where it stands.
+/// Identifier of this start of the machine. The unit passes it on, because its sandbox hides the
+/// file.
 std::string BootId() {
   if (const char* given = std::getenv("PLUMB_BOOT_ID"); given != nullptr) return given;
   sd_id128_t id{};

@@ -1,4 +1,4 @@
-// The appliance as the page asks for it.
+// The services of the page, implemented by the appliance.
 #pragma once
 
 #include <memory>
@@ -20,14 +20,14 @@
 
 namespace plumb {
 
-/// Owns the services, one class for each subject. Belongs to the loop's thread.
+/// Owns the services, one class for each subject. Used on the loop's thread.
 class WebServices {
  public:
-  /// The appliance is borrowed; lives longer. @param restart  How the machine is restarted.
+  /// The appliance is borrowed and outlives this object. @param restart  Restarts the machine.
   WebServices(Appliance& appliance, const UpdateConfig& update,
               std::unique_ptr<SystemRestart> restart);
 
-  /// References to what this object owns.
+  /// References to members of this object.
   [[nodiscard]] web::Services services() {
     return {.background = background_,
             .appliance = button_,

@@ -1,4 +1,4 @@
-// Settings and templates as the page asks for them.
+// The page's service for settings and templates.
 #pragma once
 
 #include "daemon/appliance/store_access.hpp"
@@ -6,7 +6,7 @@
 
 namespace plumb {
 
-/// Borrows what it is given.
+/// Its arguments are borrowed.
 class WebSettings : public web::SettingsService {
  public:
   explicit WebSettings(StoreAccess& store) : store_(store) {}
