@@ -11,7 +11,8 @@
 
 namespace plumb {
 
-/// The answer, a JSON object. @param timeout_ms  Nothing: as long as it takes.
+/// Returns the answer, a JSON object.
+/// @param timeout_ms  Not set: waits without limit.
 /// @throws DeviceError if no plumbd listens there or none answers; Interrupted
 [[nodiscard]] nlohmann::json AskPlumbd(const std::filesystem::path& socket,
                                        const ControlRequest& request, const std::stop_token& stop,

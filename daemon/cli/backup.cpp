@@ -62,7 +62,7 @@ void AddKeyFile(CLI::App& app, Options& options, const char* what) {
   app.add_option("--key-file", options.key_file, what)->type_name("FILE");
 }
 
-/// plumbd reads the key file itself, so that no key goes through a socket.
+/// plumbd reads the key file itself, so that no key is sent through the socket.
 BackupReport AskForBackup(const fs::path& folder, const Options& options,
                           const CommandContext& context) {
   const nlohmann::json answer = AskPlumbd(
@@ -80,7 +80,7 @@ BackupReport AskForBackup(const fs::path& folder, const Options& options,
           .problems = answer.value("problems", std::vector<std::string>())};
 }
 
-/// A running plumbd makes it; of a state folder that is named, or without plumbd, this program
+/// A running plumbd makes the backup. For a named state folder, or without plumbd, this program
 /// does.
 int Backup(const Options& options, const CommandContext& context) {
   const fs::path folder = fs::absolute(options.folder);

@@ -31,9 +31,9 @@ namespace fs = std::filesystem;
 constexpr std::size_t kDiskBytes = 64 << 20;
 constexpr std::size_t kMemoryBytes = 128 << 20;
 constexpr int kLeastRounds = 2;
-constexpr double kSlowedDown = 2.0;  // slowest over fastest round
+constexpr double kSlowedDown = 2.0;  // ratio of the slowest to the fastest round
 
-/// A folder that goes with its owner.
+/// A folder that is removed with its owner.
 class WorkFolder {
  public:
   /// @throws IoError
@@ -59,7 +59,7 @@ void Append(std::string& bytes, const std::vector<Value>& values) {
   bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Value));
 }
 
-/// Every bit that counts of two sweeps and their comparison.
+/// All deterministic results of two sweeps and their comparison.
 std::string ScanOnce(const fs::path& suite, const std::stop_token& stop) {
   const Config config;
   const auto scene = [&](const char* name) {
@@ -81,7 +81,7 @@ std::string ScanOnce(const fs::path& suite, const std::stop_token& stop) {
   return bytes;
 }
 
-/// Of the hottest zone that the kernel lists, in degrees Celsius.
+/// Temperature of the hottest zone that the kernel lists, in degrees Celsius.
 std::optional<double> Temperature() {
   std::optional<double> hottest;
   std::error_code error;
@@ -93,7 +93,7 @@ std::optional<double> Temperature() {
   return hottest;
 }
 
-/// What plumbd says of its sensor.
+/// The sensor's status as reported by plumbd.
 struct SensorLook {
   bool present = false;
   std::int64_t pairs = 0, lost = 0;
@@ -115,7 +115,7 @@ std::optional<SensorLook> LookAtSensor(const fs::path& control, const std::stop_
   }
 }
 
-/// One burn-in: what its rounds have shown so far.
+/// One burn-in with the results of its rounds so far.
 class Rounds {
  public:
   Rounds(const BurnInOptions& options, const std::stop_token& stop, fs::path folder)
@@ -249,7 +249,8 @@ std::string TestDisk(const fs::path& folder, std::size_t bytes, std::uint64_t se
   WriteWholeFile(file, written);
   SyncToDisk(file);
   if (const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC); fd >= 0) {
-    (void)::posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED);  // else memory is read, not the disk
+    // otherwise memory is read instead of the disk
+    (void)::posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED);
     ::close(fd);
   }
   if (between) between(file);

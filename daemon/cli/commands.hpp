@@ -1,4 +1,4 @@
-// The commands of `plumb`: each adds its own options to the command line and says how it is run.
+// The commands of `plumb`: each adds its own options to the command line and returns how to run it.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@ class App;
 
 namespace plumb {
 
-/// Exit codes of the contract.
+/// Documented exit codes.
 enum ExitCode : int {
   kDone = 0,
   kInternalError = 1,
@@ -29,8 +29,8 @@ struct CommandContext {
   std::filesystem::path control;  ///< Control socket of plumbd.
 };
 
-/// Runs the command; its return value is the exit code, its exceptions become the others (see
-/// main.cpp).
+/// Runs the command. Its return value is the exit code; exceptions are converted to the other codes
+/// (see main.cpp).
 using Command = std::function<int(const CommandContext&)>;
 
 /// Adds the subcommand to `app` and returns how to run it once the line is parsed.
@@ -56,7 +56,7 @@ using Command = std::function<int(const CommandContext&)>;
 [[nodiscard]] Command AddFactoryReset(CLI::App& app);
 
 /// Writes to stdout.
-/// @throws IoError if stdout does not take it (closed pipe, full disk).
+/// @throws IoError if stdout cannot be written (closed pipe, full disk).
 void PrintOut(const std::string& text);
 
 }  // namespace plumb

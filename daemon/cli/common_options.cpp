@@ -52,7 +52,7 @@ std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path,
   if (std::filesystem::is_directory(path, error)) return TumRecording::Open(path, defaults);
   if (const RecordingKind* kind = BuiltInSensors().KindWithExtension(path.extension().string()))
     return kind->Open(path, defaults);
-  // Whatever its name, the contents may be one.
+  // Whatever its name, its contents may be a recording.
   if (const RecordingKind* kind = BuiltInSensors().KindOf(path)) return kind->Open(path, defaults);
   throw DataError(fmt::format(
       "'{}' is neither a folder nor a file of a kind that this build reads; expected a "

@@ -1,4 +1,4 @@
-// Options and little jobs that several commands share.
+// Options and helper functions that several commands share.
 #pragma once
 
 #include <filesystem>
@@ -20,8 +20,8 @@ namespace plumb {
 class Progress;
 struct ScanProgress;
 
-/// --preset, --config and --sensor-profile, and what they say together: the option on the line wins
-/// over the file.
+/// The combined --preset, --config and --sensor-profile; options on the command line take
+/// precedence over the file.
 struct MethodOptions {
   std::optional<std::string> preset;
   std::optional<std::filesystem::path> config_file;
@@ -30,21 +30,21 @@ struct MethodOptions {
   void AddTo(CLI::App& app);
   /// --sensor-profile, for commands that reconstruct.
   void AddSensorTo(CLI::App& app);
-  /// The region file that the configuration names is read too.
+  /// Also reads the region file that the configuration names.
   /// @throws DataError from either file.
   [[nodiscard]] Config Read() const;
 };
 
 /// Opens a recording of any kind that this build reads.
-/// @throws DataError if it is none.
+/// @throws DataError if it is not a recording.
 [[nodiscard]] std::unique_ptr<FrameSource> OpenRecording(const std::filesystem::path& path,
                                                          const MarkerConfig& markers);
 
-/// Makes a folder and its parents where they are missing.
+/// Creates a folder and its missing parents.
 /// @throws IoError
 void EnsureFolder(const std::filesystem::path& folder);
 
-/// Shows a scan's progress; `prefix` goes before the step's name.
+/// Shows a scan's progress; `prefix` is printed before the step's name.
 void Show(Progress& progress, const std::string& prefix, const ScanProgress& scan);
 
 }  // namespace plumb

@@ -38,7 +38,7 @@ CompareOptions MethodOf(const Options& options) {
 
 int Run(const Options& options, const CommandContext& context) {
   const CompareOptions method = MethodOf(options);
-  { const AtomicFolder check(options.out, ResultOutput()); }  // refuses a bad place before the work
+  { const AtomicFolder check(options.out, ResultOutput()); }  // rejects a bad place before the work
   Progress progress;
   const auto stop_if_asked = [&] {
     if (context.stop.stop_requested()) throw Interrupted("nothing was written");

@@ -29,7 +29,7 @@ using Json = nlohmann::json;
 
 constexpr std::size_t kMaxAnswer = 4 << 20;
 
-/// A conversation with plumbd, line by line.
+/// A line-by-line conversation with plumbd.
 class ControlConnection {
  public:
   ControlConnection(const std::filesystem::path& socket, const ControlRequest& request)
@@ -44,8 +44,8 @@ class ControlConnection {
   ControlConnection(const ControlConnection&) = delete;
   ControlConnection& operator=(const ControlConnection&) = delete;
 
-  /// Nothing once plumbd hangs up. @throws Interrupted on a stop request, DeviceError if no answer
-  /// comes in time.
+  /// Nothing once plumbd has closed the connection.
+  /// @throws Interrupted on a stop request, DeviceError if no answer comes in time.
   std::optional<std::string> ReadLine(const std::stop_token& stop, std::optional<int> timeout_ms) {
     for (int waited_ms = 0;;) {
       if (const std::size_t end = received_.find('\n'); end != std::string::npos) {
@@ -71,7 +71,7 @@ class ControlConnection {
   }
 
  private:
-  /// @param attached  An open file that goes along; negative: none.
+  /// @param attached  An open file to send along; negative: none.
   [[nodiscard]] ssize_t Send(const std::string& line, int attached) const {
     if (attached < 0) return ::send(fd_, line.data(), line.size(), MSG_NOSIGNAL);
     iovec part{.iov_base = const_cast<char*>(line.data()), .iov_len = line.size()};
@@ -158,7 +158,7 @@ std::string StatusText(const Json& status) {
   return text + fmt::format("version  {}\n", status.value("version", ""));
 }
 
-/// Presses are ignored in some states: that is no failure, but it is said.
+/// Presses are ignored in some states. That is not an error, but it is reported.
 int Press(bool is_long, const CommandContext& context) {
   const Json answer =
       Ask(context.control,
@@ -177,7 +177,7 @@ int Simulate(const ControlRequest& request, const CommandContext& context) {
   return kDone;
 }
 
-/// "last_result.yaw_deg": what stands there, as text without quotes; empty where nothing does.
+/// Value at a path such as "last_result.yaw_deg", as text without quotes; empty if there is none.
 std::string ValueAt(const Json& status, const std::string& keys) {
   Json value = status;
   for (std::size_t begin = 0; begin <= keys.size();) {

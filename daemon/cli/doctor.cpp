@@ -1,5 +1,5 @@
-// `plumb doctor`: what is attached, permitted and configured, and what to do about what is not; on
-// request a burn-in. It changes nothing that is stored. Its exit code says whether something
+// `plumb doctor`: checks what is attached, permitted and configured, and gives advice for what is
+// not; on request a burn-in. It does not change stored data. Its exit code shows whether something
 // necessary is missing.
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-// What `plumb doctor` has found.
+// The findings of `plumb doctor`.
 #pragma once
 
 #include <string>
@@ -17,18 +17,18 @@ class DoctorReport {
   void Good(std::string what, std::string found) {
     findings_.push_back({State::kGood, std::move(what), std::move(found), {}, kDone});
   }
-  /// Keeps nothing from working.
+  /// Does not prevent anything from working.
   void Note(std::string what, std::string found, std::string remedy) {
     findings_.push_back(
         {State::kNote, std::move(what), std::move(found), std::move(remedy), kDone});
   }
-  /// @param exit_code  What a command that needs it would end with.
+  /// @param exit_code  With which a command that needs it would end.
   void Bad(std::string what, std::string found, std::string remedy, int exit_code = kDeviceFailed) {
     findings_.push_back(
         {State::kBad, std::move(what), std::move(found), std::move(remedy), exit_code});
   }
 
-  /// kDone if nothing necessary is missing, else that of the first thing that is.
+  /// kDone if nothing necessary is missing, otherwise the code of the first missing item.
   [[nodiscard]] int exit_code() const {
     for (const Finding& finding : findings_) {
       if (finding.state == State::kBad) return finding.exit_code;

@@ -1,5 +1,5 @@
-// `plumb factory-reset`: for an engineer with a shell on a unit whose page no longer lets anybody
-// log in.
+// `plumb factory-reset`: for an engineer with a shell on a unit on whose page nobody can log in any
+// more.
 #include "daemon/records/factory_reset.hpp"
 
 #include <filesystem>

@@ -28,7 +28,7 @@ struct Options {
   bool json = false;
 };
 
-/// Stamps of the depth images, seconds; found without decoding any.
+/// Stamps of the depth images in seconds, without decoding any image.
 std::vector<double> DepthStamps(const fs::path& recording) {
   if (const RecordingKind* kind = BuiltInSensors().KindOf(recording))
     return kind->DepthStamps(recording);
@@ -70,7 +70,7 @@ ordered_json RecordingFacts(const fs::path& path) {
   return facts;
 }
 
-/// One line a fact; nested values as short JSON.
+/// One line per fact; nested values as short JSON.
 std::string Lines(const ordered_json& facts) {
   std::string text;
   for (const auto& [key, value] : facts.items()) {

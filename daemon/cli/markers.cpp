@@ -19,7 +19,7 @@ struct Options {
   fs::path out;
 };
 
-/// Where page `page` goes: FILE.svg, or FILE-01.svg and so on where there are several.
+/// File of page `page`: FILE.svg, or FILE-01.svg and so on if there are several.
 fs::path PageFile(const fs::path& out, int page, int num_pages) {
   if (num_pages == 1) return out;
   return out.parent_path() /

@@ -1,4 +1,4 @@
-// How far a command is, on stderr.
+// Shows the progress of a command on stderr.
 #pragma once
 
 #include <string>
@@ -6,18 +6,19 @@
 
 namespace plumb {
 
-/// A bar that is redrawn in place on a terminal, one plain line a step elsewhere. Not thread-safe.
+/// A bar that is redrawn in place on a terminal, or one plain line per step elsewhere. Not
+/// thread-safe.
 class Progress {
  public:
-  /// @param quiet  Prints nothing at all.
+  /// @param quiet  Prints nothing.
   explicit Progress(bool quiet = false);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// @param step      What is being done, such as "tracking reference".
-  /// @param fraction  0..1 of the step.
-  /// @param detail    Shown behind the bar, such as "frame 12 of 100".
+  /// @param step      The current step, such as "tracking reference".
+  /// @param fraction  Completed fraction of the step, 0..1.
+  /// @param detail    Shown after the bar, such as "frame 12 of 100".
   void Update(std::string_view step, double fraction, std::string_view detail = {});
 
   /// Removes the bar, so that other text can follow.

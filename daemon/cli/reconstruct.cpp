@@ -53,7 +53,7 @@ int Run(const Options& options, const CommandContext& context) {
   const Config config = options.method.Read();
   {
     const AtomicFolder check(options.out, SceneOutput());
-  }  // refuses a bad place before the long work
+  }  // rejects a bad place before the long work
   const std::unique_ptr<FrameSource> recording = OpenRecording(options.recording, config.markers);
   Progress progress;
   const Scene scene =

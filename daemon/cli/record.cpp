@@ -1,4 +1,4 @@
-// `plumb record`: a sensor's images into a folder or an .oni file.
+// `plumb record`: records a sensor's images into a folder or an .oni file.
 #include <algorithm>
 #include <chrono>
 #include <exception>
@@ -37,10 +37,10 @@ struct Options {
 };
 
 constexpr std::size_t kQueue = 120;             // frames of 2 MB that wait for the encoder
-constexpr double kDepthUnitsPerMetre = 1000.0;  // as sensors give it
+constexpr double kDepthUnitsPerMetre = 1000.0;  // as sensors deliver it
 constexpr double kSimulatedRate_hz = 30.0;
 
-/// The driver whose sensor a recording of this kind is made from; null: a folder, from any.
+/// The driver whose sensors can be recorded in this format; null: a folder, from any sensor.
 const SensorDriver& DriverFor(const RecordingKind* kind, const Config& config, bool simulated) {
   const SensorRegistry& registry = BuiltInSensors();
   const std::string& wanted = config.appliance.sensor_driver;
@@ -54,7 +54,7 @@ const SensorDriver& DriverFor(const RecordingKind* kind, const Config& config, b
   return registry.Choose("", simulated);
 }
 
-/// The sensor that is recorded, and what it needs.
+/// The sensor that is recorded, and the objects it needs.
 struct Attached {
   std::unique_ptr<SensorSetup> setup;
   std::unique_ptr<SensorProvider> provider;
@@ -84,7 +84,7 @@ struct Attached {
   }
 };
 
-/// Hands on each frame until the time is over. @throws Interrupted on a stop.
+/// Passes on each frame until the time is over. @throws Interrupted on a stop request.
 template <typename Take>
 std::int64_t ReadFor(LiveSensor& sensor, double seconds, const std::stop_token& stop,
                      Progress& progress, Take&& take) {

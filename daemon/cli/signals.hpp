@@ -1,4 +1,4 @@
-// Ctrl-C and SIGTERM as a stop request.
+// Converts Ctrl-C and SIGTERM to a stop request.
 #pragma once
 
 #include <stop_token>
@@ -6,10 +6,9 @@
 
 namespace plumb {
 
-/// While it lives, SIGINT, SIGTERM and SIGHUP ask for a stop instead of ending the process: a
-/// thread of its own waits for them. Create it first in main(), before any other thread: the
-/// signals are blocked in every thread that starts later. SIGPIPE is ignored; writes then report
-/// the error.
+/// During its lifetime, SIGINT, SIGTERM and SIGHUP request a stop instead of ending the process; a
+/// separate thread waits for them. Create it first in main(), before any other thread: the signals
+/// are blocked in every thread that starts later. SIGPIPE is ignored; writes then report the error.
 class SignalStop {
  public:
   SignalStop();

@@ -43,7 +43,7 @@ Switch ParseSwitch(const std::string& text) {
   return {*fault, state == "on"};
 }
 
-// All names, where each is on, and one line about it.
+// All names, the levels at which each is on, and a line of description.
 std::string FaultList() {
   using simulated::NoiseLevel;
   const simulated::FaultSet mild = simulated::MildFaults(NoiseLevel::kNominal);

@@ -1,4 +1,4 @@
-// `plumb update`: hands a bundle to a running plumbd and follows its installation.
+// `plumb update`: sends a bundle to a running plumbd and follows its installation.
 #include <fcntl.h>
 #include <sys/stat.h>
 
@@ -43,7 +43,7 @@ std::shared_ptr<const AttachedFile> OpenBundle(const fs::path& path) {
   return file;
 }
 
-/// A refusal is the bundle's fault (exit code 3) or the moment's (5).
+/// A refusal because of the bundle has exit code 3, one because of the present state 5.
 Json Ask(ControlRequest request, const CommandContext& context) {
   Json answer = AskPlumbd(context.control, request, context.stop, std::nullopt);
   if (answer.value("ok", false)) return answer;
@@ -54,7 +54,7 @@ Json Ask(ControlRequest request, const CommandContext& context) {
 
 ControlRequest RequestOf(Kind kind) { return {.kind = kind, .action = {}, .argument = {}}; }
 
-/// Until the installation has ended; throws if it failed.
+/// Returns when the installation has ended; throws if it failed.
 void Follow(Progress& progress, const CommandContext& context) {
   for (;;) {
     const Json status = Ask(RequestOf(Kind::kUpdateStatus), context);

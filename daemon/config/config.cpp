@@ -40,7 +40,7 @@ std::string ReadText(const std::filesystem::path& file, std::string_view what) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// TOML has no control characters but tab and line ends. A file that lost its content in a power
+/// TOML has no control characters except tab and line ends. A file that lost its content in a power
 /// cut is often full of zero bytes.
 bool IsControl(char c) {
   return (static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\n' && c != '\r') || c == 0x7f;
@@ -90,8 +90,8 @@ void ReadReconstruct(Section section, ReconstructorOptions& options) {
   section.RejectUnknownKeys();
 }
 
-// Keys of [compare] that are a patient's: plumbd takes them from the approved plan of the
-// reference, so that a value in its file would either be hidden data of every patient or have no
+// Keys of [compare] that belong to a patient: plumbd takes them from the approved plan of the
+// reference, so that a value in its file would either silently apply to every patient or have no
 // effect.
 void RefuseKeysOfThePlan(const Section& section) {
   const char* const plan =
@@ -204,7 +204,7 @@ void ReadAppliance(Section section, ApplianceConfig& appliance) {
 }
 
 void ReadSensor(Section section, ApplianceConfig& appliance) {
-  // Which names are known is the drivers' business, and checked by the program.
+  // The known names depend on the drivers and are checked by the program.
   section.Take("driver", appliance.sensor_driver, "the name of a sensor driver",
                [](const std::string& s) { return !s.empty() && s.size() <= 64; });
   section.RejectUnknownKeys();

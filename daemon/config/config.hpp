@@ -1,5 +1,5 @@
-// The configuration file (TOML): options of reconstruct and compare, checked, with line numbers in
-// every complaint.
+// The configuration file (TOML): validated options of reconstruct and compare, with line numbers in
+// every error message.
 #pragma once
 
 #include <cstdint>
@@ -15,37 +15,38 @@
 
 namespace plumb {
 
-/// Markers of the room, for recordings that bring no camera.yaml.
+/// Markers of the room, for recordings without camera.yaml.
 struct MarkerConfig {
   std::optional<std::string> dictionary;  ///< OpenCV's name, or DICT_ARUCO_MIP_36h12.
   std::optional<double> length_m;
-  std::optional<int> reference;  ///< Id whose frame is the scene's frame.
+  std::optional<int> reference;  ///< Id of the marker whose frame is the scene's frame.
 };
 
-/// For the appliance, plumbd; the command line ignores it.
+/// For plumbd; the command line ignores it.
 struct ApplianceConfig {
   std::filesystem::path state = "/var/lib/plumb";
   std::filesystem::path control = "/run/plumb/control.sock";
   std::filesystem::path calibration =
-      "/var/lib/plumb/calibration";  ///< SERIAL.yaml for each calibrated sensor.
-  std::string sensor_serial;         ///< Only this sensor; empty: the first one.
-  std::string sensor_driver;         ///< By which sensors are read; empty: the first of the build.
-  bool sensor_profiles = true;  ///< Scans begin from what earlier ones learned of this sensor unit.
-  bool keep_recordings = false;    ///< Of every scan, whatever the page's settings say.
-  std::optional<double> quota_gb;  ///< Of all scans; beyond, the oldest go. None: a share of the
-                                   ///< disk.
-  std::optional<double>
-      auto_stop_s;  ///< Sweep ends after so long without new coverage; none: the page's setting.
-  std::optional<double> scan_limit_s;   ///< Longest sweep; none: the page's setting.
-  double result_s = 120.0;              ///< A result is shown for so long.
-  std::filesystem::path backup_folder;  ///< Of the backups made by the clock; empty: none are.
+      "/var/lib/plumb/calibration";  ///< Contains SERIAL.yaml for each calibrated sensor.
+  std::string sensor_serial;         ///< Use only this sensor; empty: the first one.
+  std::string sensor_driver;         ///< Driver of the sensors; empty: the first of the build.
+  /// Scans start from what earlier scans learned about this sensor unit.
+  bool sensor_profiles = true;
+  bool keep_recordings = false;  ///< Record every scan, whatever the page's settings are.
+  /// Limit for all scans; the oldest are removed first. Not set: a fraction of the disk.
+  std::optional<double> quota_gb;
+  /// Time without new coverage after which the sweep ends; not set: the page's setting.
+  std::optional<double> auto_stop_s;
+  std::optional<double> scan_limit_s;   ///< Longest sweep; not set: the page's setting.
+  double result_s = 120.0;              ///< Time for which a result is shown.
+  std::filesystem::path backup_folder;  ///< Folder of scheduled backups; empty: none are made.
   double backup_hours = 24.0;
-  std::filesystem::path backup_key_file;  ///< Its key encrypts every backup that plumbd makes;
-                                          ///< empty: they are not encrypted.
+  /// Key that encrypts every backup by plumbd; empty: backups are not encrypted.
+  std::filesystem::path backup_key_file;
 };
 
-/// Start button and light on GPIO lines. A line is its name as the device tree has it, or its
-/// number as "#17"; empty: none.
+/// Start button and light on GPIO lines. A line is its name in the device tree or its number as
+/// "#17"; empty if there is none.
 struct PanelConfig {
   std::string button_chip = "gpiochip0", button_line;
   bool button_active_low = true;
@@ -53,16 +54,18 @@ struct PanelConfig {
   bool light_active_low = false;
 };
 
-/// For the page that plumbd serves.
+/// The page that plumbd serves.
 struct WebConfig {
   std::string listen = "0.0.0.0:8080";
-  /// PEM; both or none. None: off loopback a certificate of the appliance's own is used.
+  /// PEM files; both or none. Without them a self-made certificate is used except on loopback.
   std::filesystem::path tls_certificate, tls_key;
-  bool plain_http = false;  ///< Off loopback without TLS: everything can be read on the way.
-  std::vector<std::string> host_names;  ///< By which browsers reach it, beside addresses.
+  /// Serve without TLS beyond loopback: all data can be read on the network.
+  bool plain_http = false;
+  /// Names by which browsers reach it, in addition to addresses.
+  std::vector<std::string> host_names;
 };
 
-/// System updates, where the machine has an installer.
+/// System updates, if the machine has an installer.
 struct UpdateConfig {
   std::filesystem::path folder = "/var/lib/plumb/updates";  ///< Bundles: NAME.raucb.
   int max_bundle_mb = 2048;
@@ -75,16 +78,16 @@ struct ListenAddress {
 /// How the page is served.
 enum class PageTransport {
   kPlain,           ///< HTTP, on loopback.
-  kPlainOnNetwork,  ///< HTTP where others can read along, because `plain_http` says so.
-  kGivenTls,        ///< HTTPS with the certificate of the configuration.
+  kPlainOnNetwork,  ///< HTTP on a network where others can read it, because `plain_http` is set.
+  kGivenTls,        ///< HTTPS with the configured certificate.
   kOwnTls,          ///< HTTPS with the appliance's own certificate.
 };
-/// @param is_loopback  Of the address that is listened on.
-/// @throws DataError where certificate and key are not both or none, or `plain_http` stands beside
-/// them.
+/// @param is_loopback  Whether the listening address is a loopback address.
+/// @throws DataError if only one of certificate and key is given, or `plain_http` is given together
+///         with them.
 [[nodiscard]] PageTransport TransportOf(const WebConfig& web, bool is_loopback);
 
-/// "127.0.0.1:8080", "[::1]:8080"; nothing if it is neither. Port 0: any free one.
+/// "127.0.0.1:8080" or "[::1]:8080"; nothing if it is neither. Port 0: any free port.
 [[nodiscard]] std::optional<ListenAddress> ParseListenAddress(std::string_view text);
 
 /// The contents of a configuration file; keys that it omits keep these defaults.
@@ -92,7 +95,7 @@ struct Config {
   MarkerConfig markers;
   ReconstructorOptions reconstruct;
   CompareOptions compare;
-  MarkerCheckLimits check;  ///< Of the daily check.
+  MarkerCheckLimits check;  ///< Limits of the daily check.
   ApplianceConfig appliance;
   PanelConfig panel;
   WebConfig web;
@@ -101,9 +104,9 @@ struct Config {
       region_file;  ///< Absolute, or relative to the configuration file's folder.
 };
 
-/// Who reads a file. The keys are the same for both, but plumbd refuses those of [compare] that are
-/// a patient's (region, isocentre_m, marker_kind, posture and the two tolerances): it takes them
-/// from the approved plan of the reference.
+/// The reader of a file. The keys are the same for both, but plumbd refuses those of [compare] that
+/// belong to a patient (region, isocentre_m, marker_kind, posture and the two tolerances) and takes
+/// them from the approved plan of the reference.
 enum class ConfigUse { kCommandLine, kAppliance };
 
 /// Reads and checks a file.
@@ -135,24 +138,24 @@ enum class ConfigUse { kCommandLine, kAppliance };
 [[nodiscard]] Config ReadConfig(const std::filesystem::path& file,
                                 ConfigUse use = ConfigUse::kCommandLine);
 
-/// As ReadConfig(), of a text; `name` stands for the file in messages.
+/// As ReadConfig(), for a text; `name` stands for the file in messages.
 [[nodiscard]] Config ParseConfig(const std::string& text, const std::string& name,
                                  ConfigUse use = ConfigUse::kCommandLine);
 
-/// Refuses what must not decide about a patient: plumbd answers with preset `best` alone, unless
-/// its sensor is simulated.
+/// Refuses settings that must not decide about a patient: plumbd answers with preset `best` only,
+/// unless its sensor is simulated.
 /// @throws DataError naming the key.
 void RefuseResearchPresets(const Config& config);
 
-/// What takes effect only at the start stays in `next` as it is in use. Gives the keys that would
-/// have changed, such as "web.listen".
+/// Settings that take effect only at the start keep their present values in `next`. Returns the
+/// keys that would have changed, such as "web.listen".
 [[nodiscard]] std::vector<std::string> KeepUntilRestart(const Config& in_use, Config& next);
 
 /// Vertices of a region file: {"format": 1, "frame": "reference_marker", "polygon_m": [[x, y],
 /// ...]}; metres.
 /// @throws DataError naming the file and what is wrong with it.
 [[nodiscard]] std::vector<Eigen::Vector2d> ReadRegion(const std::filesystem::path& file);
-/// As ReadRegion(), of a text; `name` stands for the file in messages.
+/// As ReadRegion(), for a text; `name` stands for the file in messages.
 [[nodiscard]] std::vector<Eigen::Vector2d> ParseRegion(const std::string& text,
                                                        const std::string& name);
 

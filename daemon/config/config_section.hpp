@@ -1,5 +1,5 @@
-// One table of a configuration file: values are taken key by key, with line numbers in every
-// complaint.
+// One table of a configuration file: values are taken key by key, with line numbers in every error
+// message.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@
 
 namespace plumb {
 
-/// @param name  Of the file, for messages. @throws DataError naming file and line.
+/// @param name  Name of the file for messages. @throws DataError naming file and line.
 [[nodiscard]] toml::table ParseToml(const std::string& text, const std::string& name);
 
 /// Keys that were not consumed are unknown, and refused. All functions throw DataError.
@@ -53,7 +53,7 @@ class Section {
     value = *found;
   }
 
-  /// The same for a key that need not be there: without it the value stays as it is.
+  /// The same for an optional key, without which the value stays unchanged.
   template <typename T, typename Check>
   void Take(std::string_view key, std::optional<T>& value, std::string_view expected,
             Check is_valid) {
@@ -63,7 +63,7 @@ class Section {
     value = found;
   }
 
-  /// A positive number in another unit than inside.
+  /// A positive number with another unit than inside the program.
   void TakeScaled(std::string_view key, double& value, double unit, std::string_view expected) {
     double number = value / unit;
     bool taken = false;
@@ -101,8 +101,8 @@ class Section {
     }
   }
 
-  /// Rows of finite numbers; nothing if the key is absent. One row may be written without the outer
-  /// brackets.
+  /// Rows of finite numbers; nothing if the key is absent. A single row may be written without the
+  /// outer brackets.
   std::optional<std::vector<std::vector<double>>> TakeRows(std::string_view key,
                                                            std::size_t num_rows,
                                                            std::size_t num_columns,
@@ -131,7 +131,8 @@ class Section {
     return rows;
   }
 
-  /// A key that this program does not take from the file. @param where  Where its value belongs.
+  /// A key that this program does not take from the file.
+  /// @param where  States where the value belongs.
   void Refuse(std::string_view key, std::string_view where) const {
     if (table_ == nullptr) return;
     const toml::node* node = table_->get(key);

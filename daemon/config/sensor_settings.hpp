@@ -5,7 +5,7 @@
 
 namespace plumb {
 
-/// What the configuration says to every driver of sensors.
+/// Converts the configuration to the settings that every sensor driver uses.
 [[nodiscard]] inline SensorSettings SensorSettingsOf(const Config& config) {
   SensorSettings settings;
   settings.calibration_folder = config.appliance.calibration;

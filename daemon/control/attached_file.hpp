@@ -1,4 +1,4 @@
-// An open file that goes along with a request.
+// An open file that is sent along with a request.
 #pragma once
 
 #include <unistd.h>
@@ -7,7 +7,7 @@ namespace plumb {
 
 class AttachedFile {
  public:
-  /// Takes the descriptor over.
+  /// Takes ownership of the descriptor.
   explicit AttachedFile(int fd) : fd_(fd) {}
   ~AttachedFile() {
     if (fd_ >= 0) ::close(fd_);

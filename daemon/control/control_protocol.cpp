@@ -23,7 +23,7 @@ constexpr std::array<std::string_view, 8> kActions = {"plug",  "unplug",     "st
 constexpr std::size_t kMaxArgument = 80;
 constexpr std::size_t kMaxFolder = 1024;
 
-/// The argument goes on to the virtual sensor in one line with the action.
+/// The argument is passed to the virtual sensor in one line with the action.
 bool IsWords(const std::string& text) {
   return text.size() <= kMaxArgument && std::all_of(text.begin(), text.end(), [](unsigned char c) {
            return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.' || c == ' ';

@@ -1,4 +1,4 @@
-// The control socket's language: one JSON object a line, asked and answered.
+// The protocol of the control socket: one JSON object per line for requests and answers.
 #pragma once
 
 #include <cstddef>
@@ -22,25 +22,26 @@ struct ControlRequest {
   bool is_long = false;  ///< kPress
   std::string
       action;  ///< kSim: one of plug, unplug, stall, resume, error, next-scene, glitch, speed.
-  std::string argument;  ///< kSim: a serial, what kind of glitch and how often, or how fast; words
-                         ///< of letters, digits, -, _ and dots.
-  std::string folder = {};                        ///< kBackup: where it is made.
-  std::string key_file = {};                      ///< kBackup: whose key encrypts it.
-  std::string name = {};                          ///< kUpdate: of the bundle.
+  /// kSim: a serial, the kind and number of glitches, or the speed; words of letters, digits, -, _
+  /// and dots.
+  std::string argument;
+  std::string folder = {};                        ///< kBackup: target folder.
+  std::string key_file = {};                      ///< kBackup: file with the key for encryption.
+  std::string name = {};                          ///< kUpdate: name of the bundle.
   std::shared_ptr<const AttachedFile> file = {};  ///< kUpdate: the bundle, open for reading.
   bool operator==(const ControlRequest&) const = default;
 };
 
-/// @throws DataError saying what was expected: no JSON object, unknown command, key or action, a
-/// line too long.
+/// @throws DataError stating what was expected: not a JSON object, unknown command, key or action,
+///         a line too long.
 [[nodiscard]] ControlRequest ParseControlRequest(std::string_view line);
 
-/// The line, without its end.
+/// The line without its end.
 [[nodiscard]] std::string ControlRequestText(const ControlRequest& request);
 
 /// {"ok": true} or {"ok": false, "error": text}
 [[nodiscard]] std::string ControlDone();
-/// @param is_input  What was sent is at fault, not the moment: "input": true.
+/// @param is_input  The error is in the request, not in the present state: adds "input": true.
 [[nodiscard]] std::string ControlRefusal(std::string_view error, bool is_input = false);
 
 }  // namespace plumb

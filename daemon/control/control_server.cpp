@@ -20,9 +20,10 @@ struct ControlServer::Client {
   int fd = -1;
   std::string in, out;
   bool watches = false;
-  bool at_end = false;  ///< It sends no more; it goes once it has read what waits for it.
+  /// The peer has shut down writing; it is dropped once it has read its answers.
+  bool at_end = false;
   int unanswered = 0;
-  std::shared_ptr<const AttachedFile> attached;  ///< For the request that takes one.
+  std::shared_ptr<const AttachedFile> attached;  ///< Open file for the request that uses it.
   EventLoop::Source source;
   ~Client() {
     source = {};
@@ -32,7 +33,7 @@ struct ControlServer::Client {
 
 namespace {
 
-/// As recv(); the last open file that comes along is taken over, others are closed.
+/// As recv(). The last open file received is taken over, others are closed.
 ssize_t Receive(int fd, std::array<char, 4096>& buffer,
                 std::shared_ptr<const AttachedFile>& attached) {
   iovec part{.iov_base = buffer.data(), .iov_len = buffer.size()};
@@ -47,12 +48,12 @@ ssize_t Receive(int fd, std::array<char, 4096>& buffer,
   for (cmsghdr* part_of = CMSG_FIRSTHDR(&message); part_of != nullptr;
        part_of = CMSG_NXTHDR(&message, part_of)) {
     if (part_of->cmsg_level != SOL_SOCKET || part_of->cmsg_type != SCM_RIGHTS) continue;
-    // Room for one is room for two: the space is rounded up.
+    // Space for one is space for two, because the size is rounded up.
     const std::size_t num = (part_of->cmsg_len - CMSG_LEN(0)) / sizeof(int);
     for (std::size_t i = 0; i < num; ++i) {
       int received = -1;
       std::memcpy(&received, CMSG_DATA(part_of) + i * sizeof(int), sizeof(received));
-      attached = std::make_shared<const AttachedFile>(received);  // closes the one before
+      attached = std::make_shared<const AttachedFile>(received);  // closes the previous one
     }
   }
   return count;
@@ -94,14 +95,14 @@ void ControlServer::Accept() {
     if ((events & EPOLLIN) != 0) {
       Read(id);
     } else if ((events & (EPOLLHUP | EPOLLERR)) != 0) {
-      Drop(id);  // disconnected: there is no one left to answer
+      Drop(id);  // disconnected: there is nobody left to answer
     }
   });
   clients_.emplace(id, std::move(client));
 }
 
 bool ControlServer::MakeRoom() {
-  // By number: who came first has been silent for longest, near enough.
+  // By number: the oldest connection is the longest silent one, approximately.
   for (const auto& [id, client] : clients_) {
     if (client->watches || client->unanswered > 0 || !client->out.empty()) continue;
     Drop(id);
@@ -120,8 +121,8 @@ void ControlServer::Read(std::uint64_t id) {
   if (count < 0) return Drop(id);
   if (count == 0) {
     client.at_end = true;
-    // Who shut down only its writing side still gets its answer; a watcher has nothing to wait for
-    // but its own end.
+    // A peer that has shut down only its writing side still gets its answer; a watcher then has
+    // nothing to wait for.
     if (client.out.empty() && client.unanswered == 0) return Drop(id);
     client.source.SetEvents(EPOLLOUT);
     return;

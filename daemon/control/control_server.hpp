@@ -1,4 +1,4 @@
-// The control socket: local clients ask for the status, press the button, watch what happens.
+// The control socket: local clients request the status, press the button and watch events.
 #pragma once
 
 #include <cstdint>
@@ -14,29 +14,29 @@
 namespace plumb {
 
 struct ControlServerOptions {
-  /// One more takes the place of who has waited longest without a question; where all are waited
-  /// for or watch, it is turned away with the reason.
+  /// A further client replaces the one that has been without a request for longest. If all have
+  /// pending requests or watch, it is rejected with the reason.
   std::size_t max_clients = 32;
   std::size_t max_waiting =
-      256 << 10;  ///< Bytes that a client has not read yet; then it is dropped.
+      256 << 10;  ///< Bytes that a client has not read yet, above which it is dropped.
 };
 
-/// Belongs to the loop's thread. A client that never reads, floods or sends nonsense costs at most
+/// Used on the loop's thread. A client that never reads, floods or sends invalid data affects only
 /// its own connection.
 class ControlServer {
  public:
   using Reply = std::function<void(const std::string& line)>;
-  /// Answers by calling `reply` once, then or later on the loop's thread.
+  /// Answers by calling `reply` once, immediately or later on the loop's thread.
   using Handler = std::function<void(const ControlRequest& request, const Reply& reply)>;
 
-  /// @param listening  A listening socket; taken over.
+  /// @param listening  A listening socket; ownership is taken.
   ControlServer(EventLoop& loop, int listening, Handler handler,
                 const ControlServerOptions& options = {});
   ~ControlServer();
   ControlServer(const ControlServer&) = delete;
   ControlServer& operator=(const ControlServer&) = delete;
 
-  /// To all who watch: one JSON object without its line end.
+  /// To all watchers: one JSON object without its line end.
   void Broadcast(const std::string& line);
 
   [[nodiscard]] std::size_t num_clients() const { return clients_.size(); }
@@ -44,7 +44,7 @@ class ControlServer {
  private:
   struct Client;
   void Accept();
-  /// False where nobody can go.
+  /// False if no client can be dropped.
   [[nodiscard]] bool MakeRoom();
   void Read(std::uint64_t id);
   void HandleLine(std::uint64_t id, const std::string& line);
@@ -59,7 +59,7 @@ class ControlServer {
   std::map<std::uint64_t, std::unique_ptr<Client>> clients_;
   std::uint64_t next_id_ = 1;
   std::shared_ptr<bool> alive_ =
-      std::make_shared<bool>(true);  ///< For replies that come after this object is gone.
+      std::make_shared<bool>(true);  ///< For replies that arrive after this object is destroyed.
   EventLoop::Source source_;
 };
 

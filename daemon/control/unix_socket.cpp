@@ -21,7 +21,7 @@ int WithUnixAddress(const std::filesystem::path& path,
   std::string text = path.string();
   int folder = -1;
   if (text.size() >=
-      sizeof(address.sun_path)) {  // 107 characters are soon used up: go through the open folder
+      sizeof(address.sun_path)) {  // paths above 107 characters are opened through their folder
     const std::filesystem::path parent = path.has_parent_path() ? path.parent_path() : ".";
     folder = ::open(parent.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC);
     if (folder < 0) return -1;

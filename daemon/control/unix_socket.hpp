@@ -1,4 +1,4 @@
-// Addresses of Unix stream sockets, also where the path is longer than an address holds.
+// Unix stream sockets, including paths that are too long for a socket address.
 #pragma once
 
 #include <filesystem>
@@ -9,18 +9,18 @@
 
 namespace plumb {
 
-/// Calls `use` with an address of the path; it holds during the call only. Returns what `use`
-/// returns: 0, or -1 with errno. The folder of the path must exist, else -1.
+/// Calls `use` with an address for the path, which is valid during the call only. Returns the
+/// result of `use`: 0, or -1 with errno. The folder of the path must exist, otherwise -1.
 int WithUnixAddress(const std::filesystem::path& path,
                     const std::function<int(const sockaddr*, socklen_t)>& use);
 
-/// A connection to the socket. @throws DeviceError saying that no process listens there, or that
-/// access is denied.
+/// Connects to the socket.
+/// @throws DeviceError stating that no process listens there, or that access is denied.
 [[nodiscard]] int ConnectUnix(const std::filesystem::path& path);
 
-/// A listening socket at the path; one that a dead process left there is replaced. Mode 0660 and
-/// group plumb where there is such a group and this process may give it away, else 0600. @throws
-/// IoError, also if somebody listens there already.
+/// A listening socket at the path; one left by a dead process is replaced. Mode 0660 and group
+/// plumb if that group exists and this process may assign it, otherwise 0600.
+/// @throws IoError, also if another process listens there already.
 [[nodiscard]] int ListenUnix(const std::filesystem::path& path);
 
 }  // namespace plumb

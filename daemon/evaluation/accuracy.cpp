@@ -21,7 +21,7 @@ double Quantile(const std::vector<double>& sorted, double q) {
 
 double InMillimetres(double metres) { return metres / kMillimetre; }
 
-/// Differences estimate - truth and the cells they lie in.
+/// Differences estimate - truth and their cells.
 HeightError SummariseHeights(std::vector<double> differences_m, std::size_t num_true) {
   HeightError error;
   error.count = differences_m.size();
@@ -109,8 +109,8 @@ AlignmentError ErrorOfAlignment(const Pose& T_reference_current, const SceneTrut
                                 const SceneTruth& current, const Pose& T_world_reference_scene,
                                 const Pose& T_world_current_scene) {
   const auto figures = [&](const Pose& T_world_a, const Pose& T_world_b) {
-    // A true point of the current scene, in the current scene's frame, through the alignment, back
-    // into the world.
+    // A true point of the current scene, in the current scene's frame, transformed by the alignment
+    // and back into the world.
     const Pose T_error = T_world_a * T_reference_current * T_world_b.inverse();
     std::vector<double> distances_m;
     for (const auto& [id, corners] : current.markers) {
@@ -136,8 +136,8 @@ HeightMap TrueHeights(const SceneTruth& truth, const GridShape& grid, const Pose
   for (const Eigen::Vector3d& p_world : truth.body.vertices_world)
     vertices.push_back(T_frame_world * p_world);
 
-  // The highest triangle wins a cell, seen or not: a hidden part above must not uncover the part
-  // below it.
+  // The highest triangle determines a cell, seen or not: a hidden part above must not uncover the
+  // part below it.
   HeightMap heights(grid);
   std::vector<char> hidden(grid.num_cells(), 0);
   for (const auto& [i, j, k] : truth.body.triangles) {
@@ -192,7 +192,7 @@ HeightError ErrorOfHeights(const HeightMap& estimate, const HeightMap& truth) {
 
 namespace {
 
-/// Distance of a point from a map's surface, across it; nothing where the map says nothing.
+/// Distance of a point from a map's surface, normal to it; nothing where the map is empty.
 std::optional<double> DistanceAcross(const HeightMap& map, const Eigen::Vector3d& p) {
   const GridShape& grid = map.grid;
   const auto cell = grid.cell(p.x(), p.y());
@@ -248,7 +248,7 @@ std::optional<ShapeError> ErrorOfShape(const HeightMap& estimate, const HeightMa
       const double hy =
           (static_cast<double>(truth.z[cell + width]) - truth.z[cell - width]) / (2 * grid.step);
       const double difference = static_cast<double>(estimate.z[cell]) - truth.z[cell];
-      // A vertical difference says little on a flank steeper than about 63 degrees.
+      // A vertical difference is not meaningful on a flank steeper than about 63 degrees.
       if (!std::isfinite(difference) || !std::isfinite(hx + hy) || std::hypot(hx, hy) > 2) continue;
       points.emplace_back(grid.x_centre(column), grid.y_centre(row), truth.z[cell]);
       centre += points.back();

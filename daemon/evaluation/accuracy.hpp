@@ -1,4 +1,5 @@
-// How far a reconstruction, an alignment or a motion is from the truth. Pure functions: no files.
+// Errors of a reconstruction, an alignment or a motion against the truth. Pure functions without
+// files.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +15,7 @@
 
 namespace plumb {
 
-/// Distribution of errors; units are those of the values.
+/// Distribution of errors, in the units of the values.
 struct ErrorSummary {
   std::size_t count = 0;
   double mean = 0, median = 0, p95 = 0, max = 0, rms = 0;
@@ -23,7 +24,7 @@ struct ErrorSummary {
 /// Quantiles interpolate between ranks. All zero for no values.
 [[nodiscard]] ErrorSummary Summarise(std::vector<double> values);
 
-/// Rotation error, and how far the error displaces a named point.
+/// Rotation error, and the displacement of a given point by the error.
 struct MotionError {
   double rotation_deg = 0;
   double translation_mm = 0;
@@ -34,15 +35,15 @@ struct MotionError {
 /// T_world_body.
 [[nodiscard]] Pose TrueMotion(const SceneTruth& reference, const SceneTruth& current);
 
-/// Error of an estimated motion (reference-marker frame), its displacement taken at the reference
+/// Error of an estimated motion (reference-marker frame), with its displacement at the reference
 /// body's centroid.
 [[nodiscard]] MotionError ErrorOfMotion(const Pose& estimated_motion, const SceneTruth& reference,
                                         const SceneTruth& current);
 
 /// Error of an alignment T_reference_current: at the corners of all true markers (RMS) and at the
-/// current body's centroid. `in_true_frames` takes both scene frames for the true reference-marker
-/// frames, so it holds the errors of both frames; `in_own_frames` places each scene frame where its
-/// own keyframes fit the true trajectory.
+/// current body's centroid. `in_true_frames` assumes the true reference-marker frames for both
+/// scenes, so it contains the errors of both frames; `in_own_frames` places each scene frame by the
+/// fit of its keyframes to the true trajectory.
 struct AlignmentError {
   struct Figures {
     double corners_mm = 0;
@@ -51,7 +52,7 @@ struct AlignmentError {
   Figures in_true_frames, in_own_frames;
 };
 
-/// A trajectory against the truth after the best rigid (SE3, no scale) fit of the positions.
+/// A trajectory against the truth after the best rigid fit of the positions (SE3, without scale).
 struct TrajectoryError {
   std::size_t count = 0;  ///< Poses with a true pose at their stamp.
   double rmse_mm = 0;     ///< ATE.
@@ -59,10 +60,10 @@ struct TrajectoryError {
   double max_mm = 0;
   double rotation_rmse_deg = 0;
   double drift_mm = 0;  ///< Position error of the last pose relative to the first.
-  Pose T_world_scene = Pose::Identity();  ///< Where the fit places the scene's frame.
+  Pose T_world_scene = Pose::Identity();  ///< Pose of the scene's frame by the fit.
 };
 
-/// Nothing if fewer than three poses have a truth or they lie on one line.
+/// Nothing if fewer than three poses have a true pose or they lie on one line.
 [[nodiscard]] std::optional<TrajectoryError> ErrorOfTrajectory(
     std::span<const StampedPose> trajectory, const SceneTruth& truth);
 
@@ -84,14 +85,14 @@ struct HeightError {
   double median_abs_mm = 0;
   double rmse_mm = 0;
   double p95_mm = 0;
-  double completeness = 0;  ///< Measured share of the visible body's cells, 0..1.
+  double completeness = 0;  ///< Measured fraction of the visible body's cells, 0..1.
 };
 
 [[nodiscard]] HeightError ErrorOfHeights(const HeightMap& estimate, const HeightMap& truth);
 
-/// How far the reference body's surface, moved to the current scan, lies from the true surface
-/// there: with the rigid motion alone, and with the deformation field too. Millimetres, across the
-/// surface; both over the same samples.
+/// Distance of the reference body's surface, moved to the current scan, from the true surface: with
+/// the rigid motion alone, and with the deformation field too. Millimetres, normal to the surface,
+/// over the same samples.
 struct DeformationError {
   ErrorSummary rigid_mm, deformed_mm;
 };
@@ -101,15 +102,15 @@ struct DeformationError {
                                                   const Pose& T_motion,
                                                   const HeightMap& true_heights);
 
-/// Which small similarity transform of the true surface explains a height map best, and what it
-/// leaves: tells a misplaced frame from a wrong shape or scale. Robust linear least squares on the
-/// differences.
+/// The small similarity transform of the true surface that explains a height map best, and the
+/// remaining error: distinguishes a misplaced frame from a wrong shape or scale. Robust linear
+/// least squares on the differences.
 struct ShapeError {
   Eigen::Vector3d shift_mm =
-      Eigen::Vector3d::Zero();  ///< Of the body's centroid, reference-marker frame.
+      Eigen::Vector3d::Zero();  ///< Displacement of the body's centroid, reference-marker frame.
   Eigen::Vector3d rotation_deg = Eigen::Vector3d::Zero();  ///< Rotation vector.
   double scale_permille = 0;                               ///< Growth about the frame's origin.
-  HeightError left;                                        ///< After the fit.
+  HeightError left;                                        ///< Remaining error after the fit.
 };
 
 [[nodiscard]] std::optional<ShapeError> ErrorOfShape(const HeightMap& estimate,

@@ -21,7 +21,7 @@ using nlohmann::json;
 
 constexpr std::size_t kMaxScenes = 1000;
 
-/// Names become folder names: nothing that leads elsewhere.
+/// Names become folder names, so they must not lead elsewhere.
 std::string CheckedName(const json& value, const fs::path& file) {
   const std::string name = value.is_string() ? value.get<std::string>() : "";
   if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos) {
@@ -60,8 +60,8 @@ void FindScenes(const fs::path& folder, Suite& suite) {
   }
 }
 
-/// Marker corners against the truth: their own rigid fit, and the scale that would be left to a
-/// similarity fit.
+/// Marker corners against the truth: their own rigid fit, and the scale that a similarity fit would
+/// find.
 void MeasureMarkers(const Scene& scene, const SceneTruth& truth, SceneEvaluation& result) {
   std::vector<Eigen::Vector3d> estimated, in_truth;
   for (const auto& [id, marker] : scene.markers) {
@@ -109,7 +109,7 @@ SceneEvaluation MeasureScene(const std::string& name, const Scene& scene, const 
   return result;
 }
 
-/// What pairs need of a scene that was measured; the surfaces they do not need are dropped.
+/// The parts of an evaluated scene that pairs need; other surfaces are dropped.
 struct KeptScene {
   Scene scene;
   SceneTruth truth;
@@ -244,7 +244,7 @@ Evaluation EvaluateSuite(
   for (const std::string& name : suite.scenes) {
     KeptScene& entry = kept[name];
     entry.truth = ReadSceneTruth(
-        suite.truths.at(name));  // before the long work, so that a bad truth is told at once
+        suite.truths.at(name));  // before the long work, so that a bad truth is reported at once
   }
   for (const std::string& name : suite.scenes) {
     KeptScene& entry = kept[name];
@@ -256,7 +256,7 @@ Evaluation EvaluateSuite(
       entry.T_world_scene = trajectory->T_world_scene;
       entry.has_world = true;
     }
-    entry.scene.mesh = {};  // nine scenes stay in memory: keep what pairs need
+    entry.scene.mesh = {};  // nine scenes stay in memory: keep only what pairs need
   }
   for (const auto& [reference, current] : suite.pairs) {
     if (stop.stop_requested()) throw Interrupted("the evaluation was interrupted");

@@ -1,4 +1,4 @@
-// The accuracy of the whole chain on a suite of recordings with truth.
+// The accuracy of the complete method on a suite of recordings with truth.
 #pragma once
 
 #include <filesystem>
@@ -17,7 +17,7 @@
 
 namespace plumb {
 
-/// Where the recordings and truths of a suite are, and which scenes are compared.
+/// Locations of the recordings and truths of a suite, and the scenes to compare.
 struct Suite {
   std::string name;
   std::vector<std::string> scenes;
@@ -26,35 +26,34 @@ struct Suite {
   std::map<std::string, std::filesystem::path> truths;
 };
 
-/// Reads `suite.json`; where it is missing, every folder of `truth/` is a scene ("reference" first)
-/// and all ordered pairs count. Recordings lie in `recordings/NAME`, `recordings/NAME.oni` or
-/// `NAME`.
-/// @throws DataError if the folder is no suite or a recording or truth is missing.
+/// Reads `suite.json`. Without it, every folder of `truth/` is a scene ("reference" first) and all
+/// ordered pairs are used. Recordings are in `recordings/NAME`, `recordings/NAME.oni` or `NAME`.
+/// @throws DataError if the folder is not a suite or a recording or truth is missing.
 [[nodiscard]] Suite OpenSuite(const std::filesystem::path& folder);
 
-/// What one scene came out as.
+/// Results for one scene.
 struct SceneEvaluation {
   std::string name;
   std::int64_t frames_total = 0, frames_tracked = 0;
   std::size_t num_keyframes = 0, num_markers = 0;
   std::optional<TrajectoryError> keyframes, trajectory;
-  std::optional<double> marker_rms_mm;  ///< Marker corners after their own best rigid fit to the
-                                        ///< true ones; none matched: nothing.
-  std::optional<double> marker_scale_permille;  ///< By how much the marker map is too large.
+  /// Marker corners after their own best rigid fit to the true ones; not set if none matched.
+  std::optional<double> marker_rms_mm;
+  std::optional<double> marker_scale_permille;  ///< Scale error of the marker map.
   std::optional<HeightError>
       heights;  ///< Against the true surface in the true reference marker's frame.
   std::optional<ShapeError> shape;
   std::map<std::string, double> calibration, timings_s;
 };
 
-/// What one ordered pair came out as. Without a motion the pair counts as "no answer", never as an
-/// error of 0.
+/// Results for one ordered pair. A pair without a motion counts as "no answer", never as an error
+/// of 0.
 struct PairEvaluation {
   std::string reference, current;
   Verdict verdict = Verdict::kNoAnswer;
   std::vector<std::string> reasons;
   std::optional<MotionError> motion;
-  TrueNumbers truth = {};  ///< At the isocentre of the correction, else at the true centroid.
+  TrueNumbers truth = {};  ///< At the isocentre of the correction, otherwise at the true centroid.
   std::optional<NumberErrors> numbers;
   std::optional<AlignmentError> alignment;
   std::optional<HeightError>
@@ -74,7 +73,7 @@ struct MotionStatistics {
 struct Evaluation {
   std::string suite;
   Preset preset = Preset::kBest;
-  AcceptanceLimits limits;  ///< Under which the verdicts were given.
+  AcceptanceLimits limits;  ///< Limits for the verdicts.
   std::vector<SceneEvaluation> scenes;
   std::vector<PairEvaluation> pairs;
 
@@ -85,10 +84,10 @@ struct Evaluation {
 struct EvaluateOptions {
   CompareOptions compare;
   double min_frames_seen =
-      3;  ///< A part of the body counts as visible if at least this many frames measured it.
-  /// Makes (or finds) the scene of a name; required.
+      3;  ///< Frames that must have measured a part of the body for it to count as visible.
+  /// Creates (or finds) the scene of a name; required.
   std::function<Scene(const std::string& name)> get_scene = {};
-  /// If set, called with every comparison, for storing.
+  /// If set, called with every comparison, to store it.
   std::function<void(const std::string& reference, const std::string& current,
                      const Scene& reference_scene, const Comparison&)>
       store = {};

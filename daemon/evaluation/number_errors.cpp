@@ -11,7 +11,7 @@ std::array<std::optional<double>, 6> InOrder(const CouchNumbers& n) {
   return {n.vertical_mm, n.longitudinal_mm, n.lateral_mm, n.pitch_deg, n.roll_deg, n.yaw_deg};
 }
 
-// Whether every true value lies within its tolerance by at least the margin.
+// Whether every true value is within its tolerance by at least the margin.
 bool LiesWithin(const TrueNumbers& truth, const AcceptanceLimits& limits, double margin_mm,
                 double margin_deg) {
   for (std::size_t i = 0; i < truth.size(); ++i) {

@@ -1,4 +1,4 @@
-// What is true of a recorded scene: the files that a simulator writes beside its recording.
+// The true values of a recorded scene, from the files that a simulator writes beside its recording.
 #pragma once
 
 #include <array>
@@ -20,14 +20,14 @@ namespace plumb {
 /// The true surface of the body at this scene's placement.
 struct TrueSurface {
   std::vector<Eigen::Vector3d> vertices_world;  ///< Metres.
-  std::vector<float> frames_seen;               ///< One a vertex: how many frames measured it.
+  std::vector<float> frames_seen;  ///< For each vertex the number of frames that measured it.
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-/// Everything that is known of one scene. `world` is the simulator's own frame, shared by all
-/// scenes of a suite.
+/// All true values of one scene. `world` is the simulator's own frame, shared by all scenes of a
+/// suite.
 struct SceneTruth {
-  std::vector<StampedPose> trajectory;   ///< Of the colour camera, rising in time.
+  std::vector<StampedPose> trajectory;   ///< Of the colour camera, increasing in time.
   std::map<int, MarkerCorners> markers;  ///< World, detector order, by id.
   Pose T_world_body = Pose::Identity();  ///< Placement of the body.
   Pose T_world_reference_marker = Pose::Identity();
@@ -43,7 +43,7 @@ struct SceneTruth {
 [[nodiscard]] SceneTruth ReadSceneTruth(const std::filesystem::path& folder);
 
 /// The true camera pose at a time, interpolated between its neighbours; nothing outside the
-/// recorded time or where the neighbours lie more than 0.1 s apart.
+/// recorded time or where the neighbours are more than 0.1 s apart.
 [[nodiscard]] std::optional<Pose> TruePoseAt(std::span<const StampedPose> trajectory,
                                              double time_s);
 

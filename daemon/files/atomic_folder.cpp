@@ -23,10 +23,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::chrono::minutes kStaleAge{
-    1};  // covers the moment between a folder's making and its locking
-constexpr std::size_t kMaxFsyncs = 64;  // beyond, one sync of the file system is cheaper
+    1};                                 // covers the time between creating a folder and locking it
+constexpr std::size_t kMaxFsyncs = 64;  // above this number, one sync of the file system is cheaper
 
-/// Absolute, without trailing slash, links to folders followed.
+/// Absolute, without trailing slash, with links to folders resolved.
 fs::path Normalised(const fs::path& target) {
   fs::path path = fs::absolute(target).lexically_normal();
   if (!path.has_filename()) path = path.parent_path();
@@ -42,7 +42,7 @@ std::string HiddenPrefix(const fs::path& target) {
   return fmt::format(".{}.plumb-", target.filename().string());
 }
 
-/// Forces one file or folder to the disk.
+/// Flushes one file or folder to the disk.
 void Sync(const fs::path& path, bool whole_file_system = false) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) throw IoError(DescribeWriteError(path, errno));
@@ -93,7 +93,8 @@ void CheckReplaceable(const fs::path& target, const OutputKind& kind) {
   }
 }
 
-/// Exchanges the two folders in one step where the file system can; else the old one goes first.
+/// Exchanges the two folders in one step if the file system can; otherwise the old one is removed
+/// first.
 void Replace(const fs::path& hidden, const fs::path& target) {
   if (::rename(hidden.c_str(), target.c_str()) == 0) return;  // nothing there, or an empty folder
   if (errno != ENOTEMPTY && errno != EEXIST) throw IoError(DescribeWriteError(target, errno));
@@ -109,8 +110,8 @@ void Replace(const fs::path& hidden, const fs::path& target) {
     if (::rename(aside.c_str(), hidden.c_str()) != 0)
       throw IoError(DescribeWriteError(aside, errno));
   }
-  std::error_code ignored;  // the new output is in place; a rest of the old one under the hidden
-                            // name is cleaned up later
+  // the new output is in place; remains of the old one under the hidden name are removed later
+  std::error_code ignored;
   fs::remove_all(hidden, ignored);
 }
 
@@ -150,7 +151,8 @@ void AtomicFolder::MakeHidden() {
   if (result != 0) throw IoError(DescribeWriteError(target_, errno));
   lock_ = ::open(hidden_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (lock_ < 0) throw IoError(DescribeWriteError(target_, errno));
-  (void)::flock(lock_, LOCK_EX | LOCK_NB);  // where locks do not work, stale folders stay: no harm
+  // without working locks, stale folders stay, which is harmless
+  (void)::flock(lock_, LOCK_EX | LOCK_NB);
 }
 
 void AtomicFolder::RemoveStale() const {
@@ -181,13 +183,13 @@ void AtomicFolder::Discard() {
   std::error_code ignored;
   if (!hidden_.empty()) fs::remove_all(hidden_, ignored);
   for (auto parent = made_parents_.rbegin(); parent != made_parents_.rend(); ++parent)
-    ::rmdir(parent->c_str());  // only empty ones go
+    ::rmdir(parent->c_str());  // removes only empty folders
 }
 
 void AtomicFolder::Commit() {
   try {
     SyncTree(hidden_);
-    CheckReplaceable(target_, kind_);  // again: time has passed
+    CheckReplaceable(target_, kind_);  // again, because time has passed
     Replace(hidden_, target_);
     committed_ = true;
     Sync(target_.parent_path());

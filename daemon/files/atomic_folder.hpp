@@ -1,4 +1,4 @@
-// Outputs that appear whole or not at all.
+// Outputs that appear complete or not at all.
 #pragma once
 
 #include <filesystem>
@@ -11,31 +11,31 @@ namespace plumb {
 /// The files of one kind of output folder: an existing folder of that kind may be replaced.
 struct OutputKind {
   std::string_view name;         ///< For messages: "scene".
-  std::string_view marker_file;  ///< Always there: "scene.json".
+  std::string_view marker_file;  ///< Always present, such as "scene.json".
   std::vector<std::string_view>
-      known_entries;  ///< Everything at its top level that is ours, the marker file included.
+      known_entries;  ///< All allowed entries at its top level, including the marker file.
 };
 
-/// A folder that is written beside its target, under a hidden name, and takes the target's place
-/// with Commit(). Destroyed without it (an error, a stop request) it leaves nothing behind. A
-/// killed process leaves the hidden folder; the next output of the same name removes it. Not
+/// A folder that is written beside its target under a hidden name and replaces the target with
+/// Commit(). Destroyed without Commit() (by an error or a stop request) it leaves nothing behind. A
+/// killed process leaves the hidden folder, which the next output of the same name removes. Not
 /// thread-safe.
 class AtomicFolder {
  public:
-  /// Makes the hidden folder, and missing parents of the target.
-  /// @throws IoError if the target is there and neither empty nor of this kind, or the system
-  /// refuses.
+  /// Creates the hidden folder, and missing parents of the target.
+  /// @throws IoError if the target exists and is neither empty nor of this kind, or the system
+  ///         refuses.
   AtomicFolder(const std::filesystem::path& target, OutputKind kind);
   ~AtomicFolder();
   AtomicFolder(const AtomicFolder&) = delete;
   AtomicFolder& operator=(const AtomicFolder&) = delete;
 
-  /// Where to write.
+  /// The folder to write to.
   [[nodiscard]] const std::filesystem::path& path() const { return hidden_; }
 
-  /// Forces everything to the disk and puts it in the target's place; an older output there goes
-  /// away. Call once.
-  /// @throws IoError; the target is then as it was.
+  /// Flushes everything to the disk and moves it to the target; an older output there is removed.
+  /// Call once.
+  /// @throws IoError; the target is then unchanged.
   void Commit();
 
  private:
@@ -47,12 +47,13 @@ class AtomicFolder {
   std::filesystem::path target_;
   std::filesystem::path hidden_;
   std::vector<std::filesystem::path> made_parents_;  ///< Outermost first.
-  int lock_ = -1;  ///< Open and locked while this object lives: others see that it is in use.
+  /// Open and locked during the lifetime of this object, so that others see that it is in use.
+  int lock_ = -1;
   bool committed_ = false;
 };
 
-/// The same for one file: `write` gets a hidden path beside the target. @throws IoError, and what
-/// `write` throws.
+/// The same for one file: `write` gets a hidden path beside the target.
+/// @throws IoError, and the exceptions of `write`.
 void WriteFileAtomically(const std::filesystem::path& target,
                          const std::function<void(const std::filesystem::path&)>& write);
 

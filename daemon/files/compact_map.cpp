@@ -41,7 +41,7 @@ cv::Mat Tenths(const cv::Mat& metres) {
   return tenths;
 }
 
-/// Results of older versions have no picture of the region: what was compared in it stands for it.
+/// Results of older versions have no picture of the region; the compared part replaces it.
 cv::Mat Region(const fs::path& result) {
   const cv::Mat deviation = ReadFloatTiff(result / "deviation.tiff");
   cv::Mat region(deviation.size(), CV_16SC1, cv::Scalar(kNone));
@@ -73,7 +73,7 @@ cv::Mat BodyRegion(const fs::path& scene_folder) {
   return region;
 }
 
-/// The smallest part that holds every value; a cell where there is none.
+/// The smallest part that contains every value; one cell if there are none.
 cv::Rect PartWithValues(const cv::Mat& map) {
   int left = map.cols, right = -1, top = map.rows, bottom = -1;
   for (int row = 0; row < map.rows; ++row) {

@@ -1,4 +1,4 @@
-// The field of a deformed body as a binary little-endian PLY.
+// Writes a deformation field as a binary little-endian PLY file.
 #pragma once
 
 #include <filesystem>
@@ -7,9 +7,9 @@
 
 namespace plumb {
 
-/// One vertex a sample: float x y z (reference frame, metres), float dx dy dz (the displacement
-/// that the rigid correction leaves, metres), uchar observed (0: no counterpart in the current
-/// scan).
+/// One vertex per sample: float x y z (reference frame, metres), float dx dy dz (the displacement
+/// that remains after the rigid correction, metres), uchar observed (0: no correspondence in the
+/// current scan).
 /// @throws IoError
 void WriteDeformationPly(const std::filesystem::path& path, const Deformation& deformation);
 

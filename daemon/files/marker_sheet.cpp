@@ -24,8 +24,8 @@ constexpr double kPointsPerMm = 72.0 / 25.4;
 constexpr double kMargin_mm = 6.0;   // printers leave about 5 mm white
 constexpr double kFooter_mm = 22.0;  // ruler and notice
 constexpr double kLabel_mm =
-    5.5;  // below each marker, in the outer part of the white margin where that is wide enough
-constexpr double kLabelBegin = 0.45;  // of the white margin of one cell, from the marker
+    5.5;  // below each marker, in the outer part of the white margin if that is wide enough
+constexpr double kLabelBegin = 0.45;  // fraction of the white margin of one cell, from the marker
 constexpr double kRuler_mm = 100.0;
 constexpr std::size_t kMaxIds = 1000;
 constexpr double kGrey = 0.45;
@@ -150,7 +150,7 @@ double MarkerSheet::CrossHeight() const {
   return kMargin_mm + (height_mm_ - 2 * kMargin_mm - kFooter_mm) / 2;
 }
 
-/// Lines for the lasers between the markers' white margins, and where the gantry is.
+/// Lines for the lasers between the markers' white margins, and the direction of the gantry.
 void MarkerSheet::DrawCross(const Canvas& canvas) const {
   constexpr double kLine_mm = 0.25;
   const double x = width_mm_ / 2, y = CrossHeight(), bottom = 2 * y - kMargin_mm;
@@ -180,7 +180,7 @@ void MarkerSheet::DrawMarker(const Canvas& canvas, const PlacedMarker& marker) c
                       marker.top_mm + (row + 1) * cell_mm, cell_mm, cell_mm);
     }
   }
-  cairo_fill(canvas.cr);  // all cells at once: no seams between neighbours
+  cairo_fill(canvas.cr);  // all cells at once, so that neighbours have no seams
 
   const double y = marker.top_mm + side_mm + kLabelBegin * cell_mm + 4.5, x = marker.left_mm;
   canvas.Grey(kGrey);

@@ -19,26 +19,26 @@ struct SheetOptions {
   std::vector<int> ids;      ///< In the order in which they are drawn.
   double length_m = 0.104;   ///< Side of the black square.
   std::string paper = "A4";  ///< A4 or A3, upright.
-  /// The board of the room's calibration (algo/comparison/room_board.hpp): its ids and the paper
-  /// that it fits on instead of the two above.
+  /// The room calibration board (algo/comparison/room_board.hpp): its ids and paper size replace
+  /// the two values above.
   bool is_board = false;
 };
 
-/// Where one marker lies on its page: millimetres from the page's top left corner, y down.
+/// Position of a marker on its page: millimetres from the page's top left corner, y down.
 struct PlacedMarker {
   int id = 0;
   double left_mm = 0.0;  ///< Of the black square.
   double top_mm = 0.0;
 };
 
-/// Pages of markers, each with its id, an arrow that points up in the print, a white margin of at
-/// least one cell, and on each page a ruler of 100 mm to check the printer's scale. The board has
-/// lines for the room's lasers and an arrow to the gantry as well. Immutable.
+/// Pages of markers, each with its id, an arrow that points up in the print and a white margin of
+/// at least one cell; each page has a ruler of 100 mm to check the printer's scale. The board also
+/// has lines for the room's lasers and an arrow to the gantry. Immutable.
 class MarkerSheet {
  public:
-  /// @throws std::invalid_argument for an unknown dictionary or paper, ids that it has not, no ids
-  /// or more than 1000, or a marker that is
-  ///         larger than the paper; the message says what fits.
+  /// @throws std::invalid_argument for an unknown dictionary or paper, ids that the dictionary does
+  ///         not have, no ids or more than 1000, or a marker that is larger than the paper; the
+  ///         message states what fits.
   explicit MarkerSheet(const SheetOptions& options);
 
   [[nodiscard]] int num_pages() const { return static_cast<int>(pages_.size()); }
@@ -54,7 +54,7 @@ class MarkerSheet {
   [[nodiscard]] std::string Pdf() const;
   /// One page as SVG. @throws IoError
   void WriteSvg(const std::filesystem::path& file, int page) const;
-  /// One page as picture, CV_8UC3.
+  /// One page as a picture, CV_8UC3.
   [[nodiscard]] cv::Mat Rasterise(int page, double dots_per_inch) const;
 
  private:
@@ -75,7 +75,7 @@ class MarkerSheet {
   std::vector<std::vector<PlacedMarker>> pages_;
 };
 
-/// "0-15,20" as numbers. @throws std::invalid_argument saying what is expected.
+/// Parses "0-15,20". @throws std::invalid_argument stating what is expected.
 [[nodiscard]] std::vector<int> ParseIds(std::string_view text);
 
 }  // namespace plumb

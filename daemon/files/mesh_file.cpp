@@ -35,7 +35,7 @@ void WriteMeshStl(const std::filesystem::path& path, const TriangleMesh& mesh) {
   CheckTriangles(mesh);
   FileWriter file(path);
   std::string header =
-      "Plumb mesh in metres";  // must not begin with "solid", the mark of the text form
+      "Plumb mesh in metres";  // must not begin with "solid", the mark of the text format
   header.resize(80, ' ');
   const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
   header.append(reinterpret_cast<const char*>(&count), sizeof count);
@@ -44,7 +44,7 @@ void WriteMeshStl(const std::filesystem::path& path, const TriangleMesh& mesh) {
     const Eigen::Vector3f& a = mesh.vertices[triangle[0]];
     const Eigen::Vector3f& b = mesh.vertices[triangle[1]];
     const Eigen::Vector3f& c = mesh.vertices[triangle[2]];
-    // normalized() leaves a vector of length zero, the format's "unknown", as it is.
+    // normalized() leaves a vector of length zero, which means "unknown" in this format, unchanged.
     const Eigen::Vector3f normal = (b - a).cross(c - a).normalized();
     std::uint8_t row[50] = {};
     std::memcpy(row, normal.data(), 12);

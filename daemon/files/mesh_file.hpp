@@ -7,17 +7,18 @@
 
 namespace plumb {
 
-/// Binary STL, metres: triangles with the normals of their planes; no colours in this format.
-/// @throws std::invalid_argument for a triangle whose vertex is not there; IoError.
+/// Binary STL in metres: triangles with the normals of their planes; this format has no colours.
+/// @throws std::invalid_argument for a triangle with a missing vertex; IoError.
 void WriteMeshStl(const std::filesystem::path& path, const TriangleMesh& mesh);
 
-/// OBJ, metres: vertices (with colours after the coordinates where there are any), vertex normals,
+/// OBJ in metres: vertices (with colours after the coordinates if there are any), vertex normals,
 /// faces.
 /// @throws as WriteMeshStl().
 void WriteMeshObj(const std::filesystem::path& path, const TriangleMesh& mesh);
 
-/// Writes by the name's ending: .ply, .stl or .obj (either case), whole or not at all.
-/// @throws std::invalid_argument for another ending; IoError.
+/// Writes the format of the name's extension: .ply, .stl or .obj (either case), completely or not
+/// at all.
+/// @throws std::invalid_argument for another extension; IoError.
 void WriteMeshFile(const std::filesystem::path& path, const TriangleMesh& mesh);
 
 }  // namespace plumb

@@ -51,7 +51,7 @@ class Pages {
     cairo_move_to(context_.get(), x, baseline);
     cairo_show_text(context_.get(), text.c_str());
   }
-  /// Breaks the text into lines of that width; y goes below it.
+  /// Breaks the text into lines of that width and moves y below it.
   void Paragraph(double x, double width, const std::string& text, double size, Ink ink = kBlack,
                  bool bold = false) {
     std::string line;
@@ -152,7 +152,7 @@ class Pages {
   std::unique_ptr<cairo_t, decltype(&cairo_destroy)> context_{nullptr, &cairo_destroy};
 };
 
-/// In two columns of name and text.
+/// In two columns, name and text.
 void Facts(Pages& pages, const ReportFacts& facts) {
   const double column = kInner / 2, name_width = 92;
   const double top = pages.y;
@@ -175,13 +175,13 @@ void Heading(Pages& pages, const std::string& text) {
   pages.Paragraph(kMargin, kInner, text, 11, kBlack, true);
 }
 
-/// Digits that the uncertainty lets a value have, as on the page.
+/// Decimals of a value that its uncertainty justifies, as on the page.
 int DigitsOf(double u95, int most) {
   if (!(u95 > 0)) return most;
   return std::clamp(static_cast<int>(-std::floor(std::log10(u95) + 1e-9)), 0, most);
 }
 
-/// With a minus that is one, no sign before zero, and the decimal sign of the language.
+/// With a proper minus sign, no sign for zero, and the decimal sign of the language.
 std::string Number(double value, int digits, bool is_signed, char decimal) {
   std::string text = fmt::format("{:.{}f}", std::abs(value), digits);
   const bool is_zero = text.find_first_not_of("0.") == std::string::npos;
@@ -221,12 +221,12 @@ void NumberLine(Pages& pages, const ReportNumber& number, const ReportTexts& tex
                       : texts.outside,
              8.5, in ? kGood : kMove, true);
   constexpr double kWordsAt = 372, kWordsSize = 8;
-  pages.y = line - 1.3 * kWordsSize;  // the first line of the words stands on this one
+  pages.y = line - 1.3 * kWordsSize;  // the first line of the words is on this line
   pages.Paragraph(kMargin + kWordsAt, kInner - kWordsAt, number.words, kWordsSize);
   pages.y = std::max(pages.y, line);
 }
 
-/// Below each other, each as large as the room lets them all be.
+/// One below the other, each as large as the space for all of them permits.
 void Pictures(Pages& pages, const std::vector<cv::Mat>& pictures) {
   constexpr double kLeast = 60, kGap = 8;
   auto left = static_cast<double>(pictures.size());
@@ -245,7 +245,7 @@ std::string ValueWithUncertainty(double value, double u95, int most, char decima
   const int digits = DigitsOf(u95, most);
   const std::string said = Number(value, digits, /*is_signed=*/true, decimal);
   if (!(u95 > 0)) return said;
-  // One digit more of an uncertainty that begins with 1, as on the page.
+  // One more decimal for an uncertainty that begins with 1, as on the page.
   const std::string half = fmt::format("{:.3f}", u95);
   const std::size_t first = half.find_first_not_of("0.");
   const bool begins_with_1 = first != std::string::npos && half[first] == '1';
@@ -308,7 +308,7 @@ std::string PdfOf(const CourseReport& report) {
       pages.Text(kMargin + kColumns[3 + i], line,
                  ValueWithUncertainty(value, u95, i < 3 ? 1 : 2, texts.decimal), kSmall);
     }
-    // Below, over the whole width: who accepted, and why it was outside tolerance.
+    // Below, over the full width: who accepted, and why it was outside tolerance.
     if (!row.accepted.empty()) {
       pages.y += 1;
       pages.Paragraph(kMargin + kColumns[1], kInner - kColumns[1],

@@ -1,4 +1,4 @@
-// Reports for paper and files: one page a scan, and the course of a patient.
+// Reports for printing and filing: one page per scan, and the course of a patient.
 #pragma once
 
 #include <array>
@@ -11,36 +11,36 @@
 
 namespace plumb {
 
-/// Texts are shown as they are; numbers are formatted by the report.
+/// Texts are printed unchanged; numbers are formatted by the report.
 using ReportFacts = std::vector<std::pair<std::string, std::string>>;
 
-/// Texts that a report has besides its facts; with {}: patterns of fmt.
+/// Fixed texts of a report; with {} they are fmt patterns.
 struct ReportTexts {
   std::string notice, page = "{}";                  ///< "Page {}".
   std::string posture, quality;                     ///< Headings.
   std::string within, unsure, outside;              ///< Judgements.
-  std::string not_known, tolerance = "\u00b1{}{}";  ///< Of value and unit (" mm").
-  std::array<std::string, 10> heads;  ///< Of the course's columns: fraction, when, verdict, six
-                                      ///< numbers, accepted.
+  std::string not_known, tolerance = "\u00b1{}{}";  ///< Patterns for value and unit (" mm").
+  /// Heads of the course's columns: fraction, when, verdict, six numbers, accepted.
+  std::array<std::string, 10> heads;
   char decimal = '.';
 };
 
 struct ReportNumber {
   std::string name, unit;       ///< "Vertical", "mm".
-  std::optional<double> value;  ///< Nothing: not known.
+  std::optional<double> value;  ///< Not set: unknown.
   double u95 = 0.0, tolerance = 0.0;
-  std::string words;  ///< Of the direction, or why there is none.
+  std::string words;  ///< Direction, or why there is none.
 };
 
 /// A page for one scan.
 struct ScanReport {
   ReportTexts texts;
   std::string title, verdict, why;
-  ReportFacts identity;  ///< Whose, when with zone, versions, who planned, approved and accepted.
+  ReportFacts identity;  ///< Patient, time with zone, versions, planner, approver and accepter.
   std::vector<ReportNumber> numbers;
   std::vector<std::string> cautions;
   ReportFacts quality;
-  std::vector<std::string> body;  ///< Where on the body, in words.
+  std::vector<std::string> body;  ///< Differences by part of the body.
   std::vector<cv::Mat> pictures;  ///< CV_8UC3 RGB.
   std::string footer;             ///< Version and time of the report.
 };
@@ -50,7 +50,7 @@ struct CourseValue {
   double value = 0.0, u95 = 0.0;
 };
 
-/// A line of the course: a scan.
+/// A line of the course: one scan.
 struct CourseRow {
   std::string fraction, when, verdict, accepted;
   std::array<std::optional<CourseValue>, 6> values;
@@ -65,11 +65,11 @@ struct CourseReport {
   std::string footer;
 };
 
-/// A value in the digits that its uncertainty lets it have, as on the page: "\u22123 \u00b11.1".
-/// @param most  Digits behind the point at most.
+/// A value with the decimals that its uncertainty justifies, as on the page: "\u22123 \u00b11.1".
+/// @param most  Largest number of decimals.
 [[nodiscard]] std::string ValueWithUncertainty(double value, double u95, int most, char decimal);
 
-/// A4, as the bytes of a PDF file; every page carries the notice and its number.
+/// A4, as the bytes of a PDF file; every page has the notice and its number.
 /// @throws IoError if the drawing library fails.
 [[nodiscard]] std::string PdfOf(const ScanReport& report);
 [[nodiscard]] std::string PdfOf(const CourseReport& report);

@@ -126,8 +126,8 @@ double Value(Scalar type, const std::uint8_t* at) {
 struct Property {
   std::string name;
   Scalar type = Scalar::kFloat;
-  std::size_t offset = 0;            ///< In its row.
-  std::optional<Scalar> list_count;  ///< Of a list: type of its length.
+  std::size_t offset = 0;            ///< Offset in its row.
+  std::optional<Scalar> list_count;  ///< Type of the length of a list.
 };
 
 struct Element {

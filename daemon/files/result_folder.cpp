@@ -24,9 +24,9 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kFormat = 1;
 constexpr double kSpokenHeight_m =
-    3 * kMillimetre;  // smaller differences of a part are not put into words
-// Along the surface the field is inferred from the parts around: small shifts are not put into
-// words.
+    3 * kMillimetre;  // smaller differences of a part are not reported in words
+// Along the surface the field is interpolated from its surroundings, so small displacements are not
+// reported.
 constexpr double kSpokenShift_m = 8 * kMillimetre;
 constexpr std::size_t kMaxJsonBytes = std::size_t{16} << 20;
 
@@ -156,7 +156,7 @@ Json DeformationJson(const Deformation& deformation) {
 
 void WriteMap(const fs::path& file, const std::optional<HeightMap>& map) {
   if (!map || map->z.empty()) return;
-  // The image borrows the values; it is only read.
+  // The image borrows the values and is only read.
   WriteFloatTiff(file, cv::Mat(map->grid.height, map->grid.width, CV_32FC1,
                                const_cast<float*>(map->z.data())));
 }
@@ -198,7 +198,7 @@ std::string ResultJson(const Comparison& comparison, const std::optional<ResultR
 
 namespace {
 
-/// White where a cell of the reference's grid belongs to the region of interest.
+/// White for cells of the reference's grid in the region of interest.
 void WriteRegion(const fs::path& file, const Comparison& comparison) {
   if (!comparison.deviation || comparison.region_mask.empty()) return;
   const GridShape& grid = comparison.deviation->grid;
@@ -213,7 +213,7 @@ void WriteRegion(const fs::path& file, const Comparison& comparison) {
 
 namespace {
 
-/// The patient's sides where the comparison found them; else the pictures have no marks.
+/// The patient's sides if the comparison found them; otherwise the pictures have no marks.
 std::vector<MapMark> SidesOf(const Comparison& comparison) {
   if (!comparison.body_parts || !comparison.body_parts->by_posture ||
       !comparison.body_parts->patient)

@@ -1,4 +1,4 @@
-// RESULT folders: what `plumb compare` leaves.
+// RESULT folders, which `plumb compare` writes.
 #pragma once
 
 #include <filesystem>
@@ -14,49 +14,51 @@
 namespace plumb {
 
 /// result.json, deviation.tiff, distance.tiff, deviation_after.tiff, deformation.ply,
-/// error_map.png, overlay.png, region.png (the region that was compared, where there is one).
+/// error_map.png, overlay.png, region.png (the compared region, if there is one).
 [[nodiscard]] OutputKind ResultOutput();
 
-/// Which signed calibration of the room gave the numbers their axes.
+/// The signed calibration of the room that determined the axes of the numbers.
 struct ResultRoom {
   int version = 0;
-  std::string why_not_used;  ///< Empty: it was. Else the axes are those of the reference marker.
+  /// Empty if it was used; otherwise the axes are those of the reference marker.
+  std::string why_not_used;
 };
 
-/// The text of result.json, also what `compare --json` prints. Absent results are null; numbers
-/// read back bit for bit.
-/// @param room  None: no calibration was signed; the configuration's axes, if any.
+/// The text of result.json, which `compare --json` also prints. Absent results are null; numbers
+/// are read back bit for bit.
+/// @param room  Not set: no calibration was signed, and the axes are those of the configuration, if
+///         any.
 [[nodiscard]] std::string ResultJson(const Comparison& comparison,
                                      const std::optional<ResultRoom>& room = {});
 
 struct PictureOptions {
-  double tolerance_m = 3 * kMillimetre;  ///< That the colour scale is tied to.
-  bool paper_colors = false;             ///< The paper's scale, blue at 0 to red at 10 cm.
+  double tolerance_m = 3 * kMillimetre;  ///< Tolerance of the colour scale.
+  bool paper_colors = false;             ///< Use the paper's scale, blue at 0 to red at 10 cm.
   std::string subtitle;
 };
 
-/// CV_8UC3 RGB, or empty where there is nothing to draw.
+/// CV_8UC3 RGB; empty if there is nothing to draw.
 struct ResultPictures {
   cv::Mat error_map;
   cv::Mat overlay;
 };
 
-/// @param reference_height  Of the reference scene; null where it has none.
+/// @param reference_height  Of the reference scene; null if it has none.
 [[nodiscard]] ResultPictures DrawResult(const Comparison& comparison,
                                         const HeightMap* reference_height,
                                         const PictureOptions& options = {});
 
-/// Writes a result, whole or not at all; replaces an older result at that place. Maps and pictures
-/// that do not exist are left out. Same comparison, same bytes.
+/// Writes a result, completely or not at all, and replaces an older result at that place. Maps and
+/// pictures that do not exist are left out. The same comparison gives the same bytes.
 /// @throws IoError
 void WriteResult(const Comparison& comparison, const ResultPictures& pictures,
                  const std::filesystem::path& folder, const std::optional<ResultRoom>& room = {});
 
-/// The text of a result's result.json, checked to be JSON of a format that this version knows.
+/// The text of a result's result.json, checked to be JSON in a format that this version knows.
 /// @throws DataError
 [[nodiscard]] std::string ReadResultJson(const std::filesystem::path& folder);
 
-/// True if the folder looks like one: it holds result.json.
+/// True if the folder looks like a result: it contains result.json.
 [[nodiscard]] bool IsResultFolder(const std::filesystem::path& folder);
 
 }  // namespace plumb

@@ -50,7 +50,7 @@ HeightMap ReadHeightMap(const fs::path& file, const GridShape& grid) {
   return map;
 }
 
-/// JSON cannot hold NaN, and a pose that is none must not reach a patient: better no scene.
+/// JSON cannot represent NaN, and an invalid pose must not be used for a patient: better no scene.
 void CheckFinite(const Scene& scene) {
   for (const auto* poses : {&scene.keyframes, &scene.trajectory}) {
     for (const StampedPose& pose : *poses) {
@@ -85,7 +85,7 @@ void WriteScene(const Scene& scene, const fs::path& folder, const std::stop_toke
   CheckStop(stop);
   if (scene.height_map) {
     const HeightMap& map = *scene.height_map;
-    // The image borrows the values; it is only read.
+    // The image borrows the values and is only read.
     const cv::Mat values(map.grid.height, map.grid.width, CV_32FC1,
                          const_cast<float*>(map.z.data()));
     WriteFloatTiff(output.path() / "heightmap.tiff", values);

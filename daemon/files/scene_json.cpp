@@ -24,7 +24,7 @@ constexpr std::size_t kMaxMarkers = 4096;
 constexpr double kMinStep_m = 1e-5;
 constexpr double kMaxStep_m = 1.0;
 
-/// One value of the document with its place, for messages.
+/// One value of the document with its path, for messages.
 class Value {
  public:
   Value(const Json& json, std::string where) : json_(json), where_(std::move(where)) {}
@@ -131,7 +131,7 @@ void ReadMarkers(const Value& root, Scene& scene) {
   }
 }
 
-/// Keys that Plumb writes and other programs may leave out.
+/// Keys that Plumb writes but other programs may leave out.
 void ReadMarkerKind(const Value& root, Scene& scene) {
   if (root.has("marker_dictionary")) {
     const Value value = root["marker_dictionary"];
@@ -206,7 +206,7 @@ std::string SceneJson(const Scene& scene) {
   json["calibration"] = MapJson(scene.calibration);
   json["timings_s"] = MapJson(scene.timings_s);
   json["warnings"] = scene.warnings;
-  // Warnings can quote file names in any encoding; what is no UTF-8 is replaced.
+  // Warnings can quote file names in any encoding; invalid UTF-8 is replaced.
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

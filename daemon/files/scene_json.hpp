@@ -1,4 +1,4 @@
-// scene.json: the small facts of a scene.
+// scene.json: the small values of a scene.
 #pragma once
 
 #include <cstddef>
@@ -11,12 +11,12 @@
 
 namespace plumb {
 
-/// The text of scene.json, also what `reconstruct --json` prints. Numbers read back bit for bit;
-/// keys in a fixed order.
+/// The text of scene.json, which `reconstruct --json` also prints. Numbers are read back bit for
+/// bit; the keys have a fixed order.
 [[nodiscard]] std::string SceneJson(const Scene& scene);
 
-/// The contents of scene.json: a scene without its poses, cloud, heights and mesh, and how many or
-/// large those must be.
+/// The contents of scene.json: a scene without its poses, cloud, heights and mesh, and the sizes
+/// that those must have.
 struct SceneHeader {
   Scene scene;
   std::size_t num_keyframes = 0;
@@ -24,9 +24,9 @@ struct SceneHeader {
 };
 
 /// Reads and checks scene.json of format 1.
-/// @param name  Of the file, for messages.
+/// @param name  Name of the file for messages.
 /// @throws DataError naming file and key: a newer format, a missing key, a number that is not
-/// finite or absurdly large.
+///         finite or implausibly large.
 [[nodiscard]] SceneHeader ParseSceneJson(std::string_view text, const std::string& name);
 
 }  // namespace plumb

@@ -117,7 +117,7 @@ std::string SensorProfileJson(const SensorProfile& profile) {
   json["version"] = kVersion;
   json["sweeps"] = profile.num_sweeps;
   json["stated_intrinsics"] = IntrinsicsJson(profile.stated);
-  json["calibration"] = model.Named();  // For people; the vector below is what is read.
+  json["calibration"] = model.Named();  // for people; the vector below is what is read
   json["mean"] = Flat(profile.mean);
   json["covariance"] = Flat(profile.covariance);
   return json.dump(1) + "\n";

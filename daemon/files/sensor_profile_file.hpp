@@ -9,14 +9,14 @@
 namespace plumb {
 
 /// Names the profile after the file.
-/// @throws DataError if the file is missing, too large, no profile, of another version, or its
-/// covariance is not positive definite.
+/// @throws DataError if the file is missing, too large, not a profile or of another version, or its
+///         covariance is not positive definite.
 [[nodiscard]] SensorProfile ReadSensorProfile(const std::filesystem::path& file);
 
-/// As ReadSensorProfile() of a text; the name is left empty. @throws DataError
+/// As ReadSensorProfile(), for a text; the name is left empty. @throws DataError
 [[nodiscard]] SensorProfile ParseSensorProfile(const std::string& text);
 
-/// Replaces the file at once, or leaves it as it was. @throws IoError
+/// Replaces the file atomically, or leaves it unchanged. @throws IoError
 void WriteSensorProfile(const SensorProfile& profile, const std::filesystem::path& file);
 
 [[nodiscard]] std::string SensorProfileJson(const SensorProfile& profile);

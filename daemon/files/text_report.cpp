@@ -34,8 +34,8 @@ std::string NumberRow(const char* name, const std::optional<double>& value,
   const bool is_outside = !(std::abs(*value) <= tolerance);
   const bool is_in = u95 && std::abs(*value) + *u95 <= tolerance;
   const int digits = std::string_view(unit) == "mm" ? 1 : 2;
-  const bool is_zero =
-      std::abs(*value) < (digits == 1 ? 0.05 : 0.005);  // prints as zero: no sign, no direction
+  // printed as zero, without sign and direction
+  const bool is_zero = std::abs(*value) < (digits == 1 ? 0.05 : 0.005);
   return fmt::format("  {:<14} {:>+9.{}f} {:<4}  ±{:>5.{}f}   {:>5.3g} {:<4} {}  {}\n", name,
                      is_zero ? 0.0 : *value, digits, unit, u95.value_or(NAN), digits, tolerance,
                      unit,

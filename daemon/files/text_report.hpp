@@ -1,4 +1,4 @@
-// A comparison as a table for people.
+// A comparison as a table of text.
 #pragma once
 
 #include <filesystem>
@@ -8,12 +8,12 @@
 
 namespace plumb {
 
-/// Verdict with its reasons, the six numbers by name with words, uncertainty and tolerance, and why
-/// to trust them.
+/// Verdict with its reasons, the six numbers by name with direction, uncertainty and tolerance, and
+/// the scan quality.
 [[nodiscard]] std::string ComparisonText(const Comparison& comparison,
                                          const CompareOptions& options);
 
-/// One line for a picture: when nothing else is known, the verdict and the residual.
+/// One line for a picture: the verdict and the residual if nothing else is known.
 [[nodiscard]] std::string PictureSubtitle(const Comparison& comparison);
 
 }  // namespace plumb

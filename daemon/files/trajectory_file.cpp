@@ -14,7 +14,7 @@ namespace {
 constexpr double kMaxCoordinate_m = 1e4;
 constexpr double kQuaternionTolerance = 1e-3;
 
-/// The next number of a line, which it is taken from; false if there is none.
+/// Removes the next number from the line; false if there is none.
 bool TakeNumber(std::string_view& line, double& value) {
   const std::size_t begin = line.find_first_not_of(" \t");
   if (begin == std::string_view::npos) return false;

@@ -1,4 +1,4 @@
-// Trajectories in the TUM format: "time tx ty tz qx qy qz qw", one pose a line.
+// Trajectories in the TUM format: "time tx ty tz qx qy qz qw", one pose per line.
 #pragma once
 
 #include <span>
@@ -14,8 +14,8 @@ namespace plumb {
 [[nodiscard]] std::string TrajectoryText(std::span<const StampedPose> poses);
 
 /// Reads what TrajectoryText() writes; comments (#) and empty lines are skipped.
-/// @throws DataError naming file and line: a number that is missing or not finite, no unit
-/// quaternion, stamps that do not rise.
+/// @throws DataError naming file and line: a number that is missing or not finite, a quaternion
+///         without unit length, stamps that do not increase.
 [[nodiscard]] std::vector<StampedPose> ParseTrajectory(std::string_view text,
                                                        const std::string& name);
 

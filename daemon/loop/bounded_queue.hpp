@@ -1,4 +1,4 @@
-// A queue between two threads that never holds more than it may.
+// A queue of limited length between two threads.
 #pragma once
 
 #include <condition_variable>
@@ -19,7 +19,7 @@ class BoundedQueue {
  public:
   explicit BoundedQueue(std::size_t capacity) : capacity_(capacity == 0 ? 1 : capacity) {}
 
-  /// Waits for room. False (and the element is gone) once the queue is closed or a stop is
+  /// Waits for space. False (and the element is dropped) once the queue is closed or a stop is
   /// requested.
   bool Push(T element, const std::stop_token& stop = {}) {
     std::unique_lock lock(mutex_);
@@ -30,7 +30,7 @@ class BoundedQueue {
     return true;
   }
 
-  /// Makes room by dropping the oldest elements; returns how many were dropped. A closed queue
+  /// Makes space by dropping the oldest elements; returns how many were dropped. A closed queue
   /// drops the new one.
   int PushDroppingOldest(T element) {
     const std::lock_guard lock(mutex_);
@@ -42,7 +42,7 @@ class BoundedQueue {
     return num_dropped;
   }
 
-  /// False (and the element is gone) if there is no room or the queue is closed. Never waits.
+  /// False (and the element is dropped) if there is no space or the queue is closed. Never waits.
   bool TryPush(T element) {
     const std::lock_guard lock(mutex_);
     if (closed_ || elements_.size() >= capacity_) return false;
@@ -62,7 +62,7 @@ class BoundedQueue {
     return element;
   }
 
-  /// No further elements: Push() returns, Pop() hands out what is left and then nothing.
+  /// No further elements: Push() returns; Pop() returns the remaining elements and then nothing.
   void Close() {
     const std::lock_guard lock(mutex_);
     closed_ = true;

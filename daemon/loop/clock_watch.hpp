@@ -1,12 +1,12 @@
-// Whether the wall clock can be trusted for what is done by dates: boards without a battery start
-// in the past, and time servers set them right.
+// Whether the wall clock can be trusted for actions by date: boards without a battery start in the
+// past until a time server corrects them.
 #pragma once
 
 #include <chrono>
 
 namespace plumb {
 
-/// Watches the wall clock against the monotonic one. Belongs to one thread.
+/// Compares the wall clock with the monotonic one. Not thread-safe.
 class ClockWatch {
  public:
   using Wall = std::chrono::system_clock::time_point;
@@ -14,7 +14,7 @@ class ClockWatch {
 
   ClockWatch(Wall wall, Steady steady) : wall_(wall), steady_(steady) {}
 
-  /// A clock that has stepped since the last look is trusted from now on.
+  /// A clock that has stepped since the last call is trusted from now on.
   void Look(Wall wall, Steady steady) {
     const auto gone =
         std::chrono::duration_cast<std::chrono::milliseconds>((wall - wall_) - (steady - steady_));
@@ -22,7 +22,7 @@ class ClockWatch {
     last_ = steady;
   }
 
-  /// For how long it has not stepped, as of the last look.
+  /// Time since the last step, as of the last call.
   [[nodiscard]] std::chrono::steady_clock::duration held() const { return last_ - steady_; }
 
  private:

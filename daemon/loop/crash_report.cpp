@@ -28,13 +28,13 @@ constexpr unsigned kLongest_s = 5;
 constexpr std::size_t kStackBytes = 64 << 10;
 constexpr std::array kSignals{SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT};
 
-// Made beforehand: a crashed program must not allocate.
+// Prepared in advance, because a crashed program must not allocate.
 std::array<char, 512> headline_end{};
 alignas(16) std::array<char, kStackBytes> stack_for_crashes{};
 std::atomic_flag is_reporting = ATOMIC_FLAG_INIT;
 
 void WriteText(const char* text) {
-  // There is nobody left to tell that it cannot be written.
+  // A failed write cannot be reported anywhere.
   if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) return;
 }
 
@@ -53,11 +53,11 @@ const char* NameOf(int signal) {
   }
 }
 
-/// Calls only what may be called in a signal's handler. backtrace() may once it has loaded what it
-/// needs, which ReportCrashes() sees to; backtrace_symbols_fd() asks the loader for names, so that
-/// a crash inside the loader could wait for itself: the alarm ends that.
+/// Calls only functions that are allowed in a signal handler. backtrace() is allowed once its
+/// libraries are loaded, which ReportCrashes() ensures. backtrace_symbols_fd() asks the loader for
+/// names, so that a crash inside the loader could deadlock: the alarm ends that.
 void OnCrash(int signal) {
-  if (is_reporting.test_and_set()) {  // another thread reports: it ends all of them
+  if (is_reporting.test_and_set()) {  // another thread is reporting and will end the process
     ::pause();
     return;
   }
@@ -75,10 +75,10 @@ void OnCrash(int signal) {
   const int count = ::backtrace(calls, kMaxCalls);
   ::backtrace_symbols_fd(calls, count, STDERR_FILENO);
   ::signal(signal, SIG_DFL);
-  ::raise(signal);  // comes when the handler returns, and ends the process as the fault would have
+  ::raise(signal);  // delivered when the handler returns; ends the process as the fault would have
 }
 
-/// Of the program itself, as hexadecimal digits.
+/// Build id of the program itself, as hexadecimal digits.
 int FindBuildId(dl_phdr_info* info, std::size_t, void* found) {
   auto* text = static_cast<std::array<char, 65>*>(found);
   for (int i = 0; i < info->dlpi_phnum; ++i) {
@@ -100,7 +100,7 @@ int FindBuildId(dl_phdr_info* info, std::size_t, void* found) {
       at = id + ((note.n_descsz + 3U) & ~3U);
     }
   }
-  return 1;  // the first object is the program: the others do not matter
+  return 1;  // the first object is the program; the others do not matter
 }
 
 }  // namespace
@@ -113,7 +113,7 @@ void ReportCrashes(const char* program, const char* version) {
   std::snprintf(headline_end.data(), headline_end.size(), ", %s %s, build id %s; the calls:\n",
                 program, version, build_id[0] != '\0' ? build_id.data() : "unknown");
   void* here[1];
-  (void)::backtrace(here, 1);  // loads what it needs
+  (void)::backtrace(here, 1);  // loads the libraries that it needs
 
   stack_t stack{};
   stack.ss_sp = stack_for_crashes.data();

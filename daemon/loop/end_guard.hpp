@@ -1,5 +1,5 @@
-// The end of the process must not wait forever for a thread that does not come back: a driver of a
-// sensor may hang in its own code.
+// The end of the process must not wait forever for a thread that does not return, such as a sensor
+// driver that hangs.
 #pragma once
 
 #include <chrono>
@@ -12,7 +12,7 @@
 
 namespace plumb {
 
-/// Calls `give_up`, once and on a thread of its own, if it is not destroyed in time.
+/// Calls `give_up` once, on its own thread, if it is not destroyed in time.
 class EndGuard {
  public:
   EndGuard(std::chrono::milliseconds longest, std::function<void()> give_up)
@@ -31,7 +31,7 @@ class EndGuard {
   const std::function<void()> give_up_;
   std::mutex mutex_;
   std::condition_variable_any destroyed_;
-  std::jthread thread_;  // last: starts when everything above is there
+  std::jthread thread_;  // last: starts when the members above are initialised
 };
 
 }  // namespace plumb

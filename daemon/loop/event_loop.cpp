@@ -52,7 +52,7 @@ struct EventLoop::Impl {
   std::exception_ptr error;
   LoopMeter meter;
 
-  /// Runs a callback inside sd-event's C code: what it throws must not pass through there.
+  /// Runs a callback inside sd-event's C code, through which exceptions must not pass.
   void Guard(const char* name, const std::function<void()>& call) noexcept {
     meter.Begin(name);
     try {
@@ -89,7 +89,7 @@ struct EventLoop::Source::Impl {
   const char* name = "";
   sd_event_source* source = nullptr;
   std::shared_ptr<std::function<void(std::uint32_t)>>
-      callback;  // shared: the source may be destroyed by its own callback
+      callback;  // shared, because the source may be destroyed by its own callback
 
   ~Impl() {
     if (source != nullptr) sd_event_source_disable_unref(source);

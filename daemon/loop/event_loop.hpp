@@ -11,10 +11,10 @@
 
 namespace plumb {
 
-/// Everything but Post() and Quit() belongs to the thread that made the loop, and all callbacks run
-/// on it. A callback that throws ends Run(), which throws it on. Construct it before any other
-/// thread starts: it blocks the signals that it watches, and threads inherit that. What watches or
-/// is posted has a name, for the meter: a text of the program.
+/// Everything except Post() and Quit() must be called on the thread that created the loop, and all
+/// callbacks run on it. A callback that throws ends Run(), which rethrows. Construct it before any
+/// other thread starts: it blocks the signals that it watches, and threads inherit that. Each watch
+/// and each posted call has a name for the meter, a string literal.
 class EventLoop {
  public:
   using Clock = std::chrono::steady_clock;
@@ -29,15 +29,15 @@ class EventLoop {
   /// Runs until Quit(); returns its code.
   int Run();
 
-  /// Ends Run() after the callback that runs now. Thread-safe.
+  /// Ends Run() after the current callback. Thread-safe.
   void Quit(int exit_code);
 
-  /// Has the loop call `work`, in the order of posting. Thread-safe, never waits. What is posted
-  /// after Run() ended is dropped.
+  /// Posts `work` to the loop, in the order of the calls. Thread-safe, never waits. Calls posted
+  /// after Run() has ended are dropped.
   void Post(const char* name, std::function<void()> work);
 
-  /// Calls `ready` with the epoll events that came, for as long as the source lives. The descriptor
-  /// stays the caller's.
+  /// Calls `ready` with the epoll events, during the lifetime of the source. The caller keeps the
+  /// descriptor.
   [[nodiscard]] Source WatchDescriptor(const char* name, int fd, std::uint32_t epoll_events,
                                        std::function<void(std::uint32_t)> ready);
 
@@ -47,7 +47,7 @@ class EventLoop {
   /// A timer on the monotonic clock, not armed yet.
   [[nodiscard]] Source MakeTimer(const char* name, std::function<void()> expired);
 
-  /// The cost of the callbacks so far: each callback and each posted call is a turn.
+  /// Cost of the callbacks so far; each callback and each posted call is a turn.
   [[nodiscard]] LoopMeter& meter();
 
  private:
@@ -64,9 +64,9 @@ class EventLoop::Source {
   Source(Source&&) noexcept;
   Source& operator=(Source&&) noexcept;
 
-  /// For a descriptor: which epoll events to wait for.
+  /// For a descriptor: the epoll events to wait for.
   void SetEvents(std::uint32_t epoll_events);
-  /// For a timer: expire once, at this time or after this long; an older arming is replaced.
+  /// For a timer: expires once, at this time or after this duration; replaces an earlier arming.
   void ArmAt(Clock::time_point time);
   void ArmAfter(std::chrono::microseconds delay);
   void Disarm();

@@ -1,4 +1,4 @@
-// What an exception of the system says, with its subject.
+// Explains system exceptions with their subject.
 #pragma once
 
 #include <exception>
@@ -8,8 +8,8 @@
 
 namespace plumb {
 
-/// A thread that cannot be started says "Resource temporarily unavailable" and memory that is used
-/// up "std::bad_alloc"; people need to read of what.
+/// Without this, a thread that cannot be started is reported as "Resource temporarily unavailable"
+/// and exhausted memory as "std::bad_alloc", without naming the resource.
 inline std::string Explain(const std::exception& error) {
   if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr)
     return "memory is used up: close what else runs, or raise the limit (MemoryMax)";

@@ -64,7 +64,7 @@ void Log(LogLevel level, std::string_view message, LogFields fields) noexcept {
   static const bool is_journal = StderrIsJournal();
   try {
     is_journal ? ToJournal(level, message, fields) : ToStderr(level, message, fields);
-  } catch (const std::exception&) {  // out of memory: a lost line is all that this may cost
+  } catch (const std::exception&) {  // out of memory: at most a line is lost
   }
 }
 

@@ -1,5 +1,5 @@
-// Messages to the journal, or to stderr where there is none. Never a patient's code,
-// nor anything that people typed.
+// Messages to the journal, or to stderr without a journal. They never contain a patient's code or
+// anything typed by a person.
 #pragma once
 
 #include <initializer_list>
@@ -15,13 +15,13 @@ enum class LogLevel {
   kNotice = 5,
   kInfo = 6,
   kDebug = 7
-};  ///< syslog's numbers
+};  ///< Numbers of syslog.
 
-/// Field names in capitals, as the journal has them; "SCAN" becomes PLUMB_SCAN.
+/// Field names in capitals, as in the journal; "SCAN" becomes PLUMB_SCAN.
 using LogFields = std::initializer_list<std::pair<std::string_view, std::string>>;
 
-/// One line. Thread-safe, does not throw. Under systemd it goes to the journal with its fields,
-/// else to stderr.
+/// Logs one line. Thread-safe, does not throw. Under systemd it goes to the journal with its
+/// fields, otherwise to stderr.
 void Log(LogLevel level, std::string_view message, LogFields fields = {}) noexcept;
 
 }  // namespace plumb

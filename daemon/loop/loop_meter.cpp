@@ -20,7 +20,7 @@ nanoseconds Read(clockid_t clock) {
   return std::chrono::seconds(now.tv_sec) + nanoseconds(now.tv_nsec);
 }
 
-/// The kernel's count of how long a thread waited for a processor: the second number of its
+/// Time that a thread waited for a processor as counted by the kernel: the second number of its
 /// schedstat.
 class QueuedTime {
  public:

@@ -1,4 +1,4 @@
-// How long the event loop's callbacks take, and what they spend it on.
+// Measures how long the event loop's callbacks take, and on what they spend the time.
 #pragma once
 
 #include <chrono>
@@ -12,52 +12,51 @@
 
 namespace plumb {
 
-/// Resources that a thread has used so far; only differences are meaningful.
+/// Resources used by a thread so far; only differences are meaningful.
 struct LoopClocks {
   using Nanoseconds = std::chrono::nanoseconds;
   std::function<Nanoseconds()> wall;
-  std::function<Nanoseconds()> cpu;     ///< Of the thread alone.
-  std::function<Nanoseconds()> queued;  ///< Ready to run, but without a processor.
+  std::function<Nanoseconds()> cpu;     ///< Processor time of the thread alone.
+  std::function<Nanoseconds()> queued;  ///< Time ready to run, but without a processor.
 };
 
-/// For the calling thread; they belong to it. `queued` stands still where the kernel does not
-/// count it.
+/// For the calling thread only. `queued` is constant where the kernel does not count it.
 [[nodiscard]] LoopClocks ClocksOfThisThread();
 
 /// One turn of the loop: a callback of a source, or one posted call.
 struct LoopTurn {
-  std::string what;  ///< "tick", or of a turn with parts also the one that took longest: "http: GET
-                     ///< /api/v1/scans".
+  /// Name such as "tick"; for a turn with parts also the longest one: "http: GET /api/v1/scans".
+  std::string what;
   std::chrono::nanoseconds wall{}, cpu{};
-  std::chrono::nanoseconds queued{};  ///< Of wall: waiting for a processor.
+  std::chrono::nanoseconds queued{};  ///< Part of wall: waiting for a processor.
   std::chrono::nanoseconds
-      blocked{};  ///< Of wall: what is left, that is waiting for a disk, a lock, a pipe.
+      blocked{};  ///< Part of wall: the rest, waiting for a disk, a lock or a pipe.
 };
 
 /// All turns of one kind, or all parts of one name.
 struct LoopFigures {
   std::int64_t count = 0;
-  std::int64_t over_limit = 0;  ///< In wall time.
+  std::int64_t over_limit = 0;  ///< By wall time.
   std::int64_t cpu_over_limit =
-      0;  ///< In the thread's own processor time: our fault, however busy the machine is.
+      0;  ///< By the thread's own processor time, which does not depend on other load.
   std::chrono::nanoseconds longest{}, longest_cpu{};
 };
 
-/// Measures each turn, in about a microsecond. Belongs to the loop's thread.
+/// Measures each turn, at a cost of about a microsecond. Used on the loop's thread.
 class LoopMeter {
  public:
-  static constexpr std::chrono::milliseconds kLimit{10};  ///< What no turn should take.
+  static constexpr std::chrono::milliseconds kLimit{10};  ///< No turn should take longer.
   static constexpr std::chrono::minutes kTellEvery{1};
   /// @param unsaid  Turns over the limit since the last call that were not logged.
   using SlowListener = std::function<void(const LoopTurn& turn, std::int64_t unsaid)>;
 
   explicit LoopMeter(LoopClocks clocks = ClocksOfThisThread()) : clocks_(std::move(clocks)) {}
 
-  /// A turn begins. @param what  A name from the program's text, never anything from outside: names
-  /// are kept.
+  /// Starts a turn.
+  /// @param what  A string literal, never anything from outside, because names are kept.
   void Begin(std::string_view what);
-  /// From now on the turn does this; empty: the rest of it. For turns that serve many; outside a
-  /// turn nothing happens.
+  /// Attributes the turn from now on to this part; empty: to the rest. For turns that serve several
+  /// requests; no effect outside a turn.
   void Part(std::string_view what);
   void End();
 
@@ -65,10 +64,10 @@ class LoopMeter {
   void SetSlowListener(SlowListener listener) { slow_ = std::move(listener); }
 
   [[nodiscard]] const LoopFigures& all() const { return all_; }
-  /// The turn that took longest, by wall time and by processor time. Nothing before the first turn.
+  /// The longest turns, by wall time and by processor time. Nothing before the first turn.
   [[nodiscard]] const std::optional<LoopTurn>& longest() const { return longest_; }
   [[nodiscard]] const std::optional<LoopTurn>& longest_cpu() const { return longest_cpu_; }
-  /// By name of source or part; those of a turn with parts count what is between its parts.
+  /// By name of source or part; the entry of a turn with parts counts the time between its parts.
   [[nodiscard]] const std::map<std::string, LoopFigures, std::less<>>& by_name() const {
     return by_name_;
   }
@@ -82,9 +81,9 @@ class LoopMeter {
 
   LoopClocks clocks_;
   SlowListener slow_;
-  std::string turn_;  ///< Empty: none runs.
+  std::string turn_;  ///< Empty outside a turn.
   std::chrono::nanoseconds wall_at_begin_{}, cpu_at_begin_{}, queued_at_begin_{};
-  std::string part_;  ///< Empty: between the parts.
+  std::string part_;  ///< Empty between the parts.
   std::chrono::nanoseconds wall_at_part_{}, cpu_at_part_{};
   std::string longest_part_;
   std::chrono::nanoseconds longest_part_wall_{};

@@ -1,4 +1,4 @@
-// The loop meter's findings, for people and for the status.
+// The loop meter's results as text and for the status.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// A thread that does one thing after the other: what may wait for a disk or a device and so does
-// not belong on the loop.
+// A thread for work that may wait for a disk or a device and therefore does not belong on the loop.
+// Executes it in order.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,7 @@
 
 namespace plumb {
 
-/// Destroyed, it finishes what was posted. Work must not throw.
+/// On destruction, it finishes the posted work. Work must not throw.
 class WorkThread {
  public:
   explicit WorkThread(std::size_t capacity) : queue_(capacity), thread_([this] { Run(); }) {}
@@ -19,7 +19,7 @@ class WorkThread {
   WorkThread(const WorkThread&) = delete;
   WorkThread& operator=(const WorkThread&) = delete;
 
-  /// False if too much is waiting already: the work is then not done. Thread-safe, does not wait.
+  /// False, without doing the work, if too much is queued already. Thread-safe, does not wait.
   [[nodiscard]] bool Post(std::function<void()> work) { return queue_.TryPush(std::move(work)); }
 
  private:

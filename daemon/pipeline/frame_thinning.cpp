@@ -10,11 +10,11 @@ namespace plumb {
 namespace {
 
 // Weights of the newest value. A keyframe takes several times as long as other frames, so tracking
-// is averaged over about a second.
+// time is averaged over about a second.
 constexpr double kPeriodWeight = 0.2;
 constexpr double kTrackingWeight = 0.05;
 
-// The first frames are all keyframes and say little of the load; the queue holds as many.
+// The first frames are all keyframes and not representative of the load; the queue can hold them.
 constexpr int kFewFrames = 15;
 
 double Smoothed(double before, double value, double weight) {
@@ -45,7 +45,7 @@ ThinnedFeed::ThinnedFeed(FrameFeed& feed, std::function<double()> now_s,
 
 std::optional<Frame> ThinnedFeed::Next(const std::stop_token& stop) {
   if (handed_out_s_) {
-    // At first the mean of all: the first frame is a keyframe and takes longest.
+    // Initially the mean of all, because the first frame is a keyframe and takes longest.
     const double weight = std::max(kTrackingWeight, 1.0 / num_taken_);
     tracking_s_ = Smoothed(tracking_s_, now_s_() - *handed_out_s_, weight);
   }
@@ -65,12 +65,13 @@ std::optional<Frame> ThinnedFeed::Next(const std::stop_token& stop) {
 
 bool ThinnedFeed::Takes(double stamp_s, double arrived_s) {
   if (!last_stamp_s_) changed_s_ = stamp_s;
-  // A gap in the frames is no slower sensor.
+  // A gap in the frames does not mean a slower sensor.
   if (const double elapsed_s = stamp_s - last_stamp_s_.value_or(stamp_s);
       elapsed_s > 0 && (frame_period_s_ == 0 || elapsed_s < 3 * frame_period_s_))
     frame_period_s_ = Smoothed(frame_period_s_, elapsed_s, kPeriodWeight);
   last_stamp_s_ = stamp_s;
-  // The stamps' clock has another zero: the least lag seen is that of a frame that did not wait.
+  // The stamps' clock has another zero: the smallest observed lag is that of a frame that did not
+  // wait.
   const double lag_s = arrived_s - stamp_s;
   least_lag_s_ = std::min(lag_s, least_lag_s_.value_or(lag_s));
   const int next = NextStride(stride_,

@@ -1,4 +1,4 @@
-// Live frames on their way from the sensor thread to the tracking thread.
+// Passes live frames from the sensor thread to the tracking thread.
 #pragma once
 
 #include <atomic>
@@ -21,22 +21,24 @@ class LiveFeed : public FrameFeed {
  public:
   explicit LiveFeed(std::size_t capacity) : queue_(capacity) {}
 
-  /// Sensor thread: hands a frame over, never waits.
+  /// Called on the sensor thread; never waits.
   void Push(Frame frame) {
     const std::lock_guard lock(mutex_);
-    if (closed_) return;  // came after the sweep's end: no part of it, and no loss
+    // arrived after the end of the sweep, so it does not belong to it and is not lost
+    if (closed_) return;
     last_frame_s_ = SteadySeconds();
     dropped_ += queue_.PushDroppingOldest(std::move(frame));
     ++num_pushed_;
   }
-  /// No frames come any more; what waits is still handed out.
+  /// No more frames follow; waiting ones are still delivered.
   void Close() {
     const std::lock_guard lock(mutex_);
     closed_ = true;
     queue_.Close();
   }
 
-  /// What came is no whole sweep, and why: Next() throws that. Too late once closed.
+  /// The frames are not a complete sweep, for this reason; Next() throws it. Without effect once
+  /// closed.
   void Fail(std::string why) {
     const std::lock_guard lock(mutex_);
     if (closed_) return;
@@ -64,7 +66,7 @@ class LiveFeed : public FrameFeed {
   }
 
   BoundedQueue<Frame> queue_;
-  std::mutex mutex_;  // of pushing and closing
+  std::mutex mutex_;  // guards pushing and closing
   bool closed_ = false;
   std::string failure_;
   std::atomic<int> dropped_ = 0;

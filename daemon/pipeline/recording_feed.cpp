@@ -17,13 +17,13 @@ RecordingFeed::RecordingFeed(FrameFeed& feed, const StreamInfo& info,
       queue_(kWaiting),
       thread_([this](const std::stop_token& stop) { Write(stop); }) {}
 
-// An unfinished recording is discarded: what waits is not written.
+// An unfinished recording is discarded; waiting frames are not written.
 RecordingFeed::~RecordingFeed() = default;
 
 std::optional<Frame> RecordingFeed::Next(const std::stop_token& stop) {
   std::optional<Frame> frame = feed_.Next(stop);
   if (frame && !queue_.Push(*frame, stop) && !stop.stop_requested())
-    Complete(stop);  // closed by an error: no use in going on
+    Complete(stop);  // closed by an error, so continuing is useless
   return frame;
 }
 

@@ -1,5 +1,5 @@
-// Keeps the frames that tracking takes as a recording, so that a scan can be computed again from
-// exactly what it saw.
+// Records the frames that tracking takes, so that a scan can be computed again from exactly the
+// same data.
 #pragma once
 
 #include <exception>
@@ -14,9 +14,9 @@
 
 namespace plumb {
 
-/// Hands on another feed's frames and writes each to the disk on a thread of its own, without loss
-/// (PNG, depth in millimetres as live sensors measure it). When the disk is late Next() waits, and
-/// the live feed behind it drops and counts.
+/// Passes on another feed's frames and writes each to the disk on its own thread, without loss
+/// (PNG, depth in millimetres as live sensors measure it). If the disk is late, Next() waits, and
+/// the live feed before it drops and counts.
 class RecordingFeed : public FrameFeed {
  public:
   /// Both borrowed. @throws IoError
@@ -26,10 +26,10 @@ class RecordingFeed : public FrameFeed {
   /// @throws IoError if the recording cannot be written.
   std::optional<Frame> Next(const std::stop_token& stop) override;
   int TakeDropped() override { return feed_.TakeDropped(); }
-  /// No more frames come; those that wait are written on while the scan is computed.
+  /// No more frames follow; waiting ones are written while the scan is computed.
   void Finish() override;
-  /// Waits for the last of them, once, after Finish(). A stop leaves an incomplete recording, as
-  /// the destructor does.
+  /// Waits for the last of them, once, after Finish(). A stop request leaves an incomplete
+  /// recording, as the destructor does.
   /// @throws IoError if the recording could not be written.
   void Complete(const std::stop_token& stop);
   [[nodiscard]] std::optional<double> last_frame_s() const override { return feed_.last_frame_s(); }
@@ -42,7 +42,7 @@ class RecordingFeed : public FrameFeed {
   TumWriter writer_;
   BoundedQueue<Frame> queue_;
   std::exception_ptr error_;
-  std::jthread thread_;  // last: starts when everything above is there
+  std::jthread thread_;  // last: starts when the members above are initialised
 };
 
 }  // namespace plumb

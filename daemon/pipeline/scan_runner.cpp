@@ -17,8 +17,8 @@
 namespace plumb {
 namespace {
 
-/// Reads the source on its own thread and hands its frames to the queue until the end, an error or
-/// a stop.
+/// Reads the source on its own thread and passes its frames to the queue until the end, an error or
+/// a stop request.
 class FrameReader : public FrameFeed {
  public:
   FrameReader(FrameSource& source, bool realtime, std::size_t capacity)
@@ -86,7 +86,7 @@ class FrameReader : public FrameFeed {
   std::mutex wait_mutex_;
   std::condition_variable_any waiting_;
   std::exception_ptr error_;
-  std::jthread thread_;  // last: starts when everything above is there
+  std::jthread thread_;  // last: starts when the members above are initialised
 };
 
 }  // namespace
@@ -130,8 +130,8 @@ Scene RunScan(FrameFeed& feed, const StreamInfo& info, const ReconstructorOption
     state.fraction = fraction;
     if (progress) progress(state);
   });
-  // Live, frames may still have been waiting when the last one came: that wait belongs to the time
-  // to the result.
+  // Live, frames may still have been waiting when the last one arrived; that wait belongs to the
+  // time to the result.
   if (last_frame_s) scene.timings_s["after_last_frame"] = SteadySeconds() - *last_frame_s;
   std::vector<std::string> warnings = info.warnings;
   for (const std::string& warning : scene.warnings) {

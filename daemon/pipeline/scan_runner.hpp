@@ -15,11 +15,11 @@
 
 namespace plumb {
 
-/// How far a scan is; for a bar, a light or a page.
+/// Progress of a scan for a bar, a light or a page.
 struct ScanProgress {
-  std::string_view step;  ///< "tracking", then what the reconstructor names.
-  double fraction =
-      0.0;  ///< Of this step, 0..1; of tracking 0 where the number of frames is unknown.
+  std::string_view step;  ///< "tracking", then the steps of the reconstructor.
+  /// Completed fraction of this step, 0..1; 0 for tracking if the number of frames is unknown.
+  double fraction = 0.0;
   std::int64_t frames = 0;
   std::int64_t frames_tracked = 0;
   std::int64_t frames_dropped = 0;
@@ -28,7 +28,7 @@ struct ScanProgress {
   const Frame* frame = nullptr;  ///< The newest frame while tracking; valid during the call.
 };
 
-/// Frames that somebody else reads, as the tracking thread takes them.
+/// Frames that another thread reads, as the tracking thread takes them.
 class FrameFeed {
  public:
   virtual ~FrameFeed() = default;
@@ -36,19 +36,18 @@ class FrameFeed {
   virtual std::optional<Frame> Next(const std::stop_token& stop) = 0;
   /// Frames that were dropped since the last call, because tracking was late.
   virtual int TakeDropped() = 0;
-  /// Called once, after Next() returned nothing without a stop: throws what ended the reading, if
-  /// an error did.
+  /// Called once, after Next() returned nothing without a stop request: throws the error that ended
+  /// the reading, if any.
   virtual void Finish() = 0;
-  /// Steady time at which the last frame arrived; none where time has no meaning.
+  /// Steady time at which the last frame arrived; not set where time has no meaning.
   [[nodiscard]] virtual std::optional<double> last_frame_s() const = 0;
 };
 
 struct ScanRunnerOptions {
-  ReconstructorOptions
-      reconstructor;  ///< `now_s` is filled in with the steady clock where it is empty.
-  /// Frames come at the pace of their stamps and the oldest waiting frame is dropped when tracking
-  /// is late, as live. Otherwise every frame counts, and the scene is the same bit for bit each
-  /// time.
+  ReconstructorOptions reconstructor;  ///< `now_s` is set to the steady clock if it is empty.
+  /// Frames arrive at the pace of their stamps, and the oldest waiting frame is dropped when
+  /// tracking is late, as live. Otherwise every frame is used, and the scene is the same bit for
+  /// bit each time.
   bool realtime = false;
   std::size_t queue_capacity = 4;  ///< Decoded frames that wait for tracking; >= 1.
 };
@@ -57,18 +56,18 @@ struct ScanRunnerOptions {
 ///
 /// @param progress  If set, called on the calling thread.
 /// @throws DataError, DeviceError from the source or the reconstructor; Interrupted on a stop
-/// request.
+///         request.
 [[nodiscard]] Scene RunScan(FrameSource& source, const ScanRunnerOptions& options,
                             const std::stop_token& stop = {},
                             const std::function<void(const ScanProgress&)>& progress = {});
 
-/// The same with frames that another thread reads. `options.realtime` and `queue_capacity` are the
-/// feed's matter.
+/// The same with frames that another thread reads. The feed replaces `options.realtime` and
+/// `queue_capacity`.
 [[nodiscard]] Scene RunScan(FrameFeed& feed, const StreamInfo& info,
                             const ReconstructorOptions& options, const std::stop_token& stop = {},
                             const std::function<void(const ScanProgress&)>& progress = {});
 
-/// Seconds of the steady clock.
+/// Steady clock in seconds.
 [[nodiscard]] double SteadySeconds();
 
 }  // namespace plumb
