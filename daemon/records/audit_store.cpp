@@ -20,7 +20,7 @@ std::string Sha256Of(const std::string& text) {
   return hash.Hex();
 }
 
-/// One entry of the log as the chain covers it: lengths keep the fields apart.
+/// One entry of the log as the chain covers it; lengths separate the fields.
 std::string ChainText(const std::string& before, std::int64_t number, std::int64_t time,
                       const std::array<std::string, 5>& fields) {
   std::string text = fmt::format("{}\n{}\n{}\n", before, number, time);
@@ -36,7 +36,7 @@ std::string ChainOf(const Statement& row, const std::string& before) {
                             {row.Text(2), row.Text(3), row.Text(4), row.Text(5), row.Text(6)}));
 }
 
-/// Of everything before the first entry that carries a chain.
+/// Digest of everything before the first entry that carries a chain.
 std::string ChainOfUnchained(Database& database) {
   std::string chain;
   Statement query = database.Prepare(kAuditRows);
@@ -120,7 +120,7 @@ std::optional<std::int64_t> AuditStore::FirstBroken() {
   }
   Statement query = lists->Prepare("SELECT seq FROM sqlite_sequence WHERE name = 'audit'");
   const std::int64_t given = query.Step() ? query.Integer(0) : 0;
-  return given == last ? std::nullopt : std::optional(last + 1);  // entries at the end are gone
+  return given == last ? std::nullopt : std::optional(last + 1);  // entries at the end are missing
 }
 
 }  // namespace plumb

@@ -11,8 +11,8 @@
 
 namespace plumb {
 
-/// Adds an entry as part of the transaction that is open. Each entry carries the SHA-256 of the one
-/// before and of itself.
+/// Adds an entry as part of the open transaction. Each entry carries the SHA-256 of the previous
+/// entry and itself.
 void AppendAuditEntry(Database& database, const web::Actor& actor, const std::string& action,
                       const std::string& subject, const std::string& detail);
 
@@ -25,8 +25,8 @@ class AuditStore {
            const std::string& detail);
   /// Newest first.
   [[nodiscard]] std::vector<web::AuditEntry> Find(const web::AuditQuery& wanted);
-  /// The number of the first entry that does not fit the one before it; nothing: the log is as it
-  /// was written. Entries from before schema 5 are covered together.
+  /// The number of the first entry that does not match the previous one; nothing if the log is as
+  /// it was written. Entries from before schema 5 are covered together.
   [[nodiscard]] std::optional<std::int64_t> FirstBroken();
 
  private:

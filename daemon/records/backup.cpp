@@ -30,13 +30,13 @@ constexpr const char* kAbout = "backup.json";
 constexpr const char* kSums = "SHA256SUMS";
 constexpr const char* kDatabase = "plumb.db";
 constexpr const char* kScans = "scans";
-/// The other parts of a state folder that are kept, where they exist.
+/// The other parts of a state folder that are copied if they exist.
 constexpr std::array<const char*, 4> kOtherFolders = {"set-aside", "calibration", "imports",
                                                       "sensor-profiles"};
 constexpr const char* kRestoring = ".restore";
 constexpr const char* kBackingUp = ".backup";
 
-/// True for the paths that a backup can hold: nothing outside of it, nothing unknown.
+/// True for the paths that a backup can contain: nothing outside it, nothing unknown.
 bool MayHold(const std::string& path) {
   const std::string first = fs::path(path).begin()->string();
   return path == kDatabase ||
@@ -47,7 +47,8 @@ bool MayHold(const std::string& path) {
 const SummedKind kKind{
     .name = "backup", .about_file = kAbout, .format = kFormat, .may_hold = MayHold};
 
-/// A copy of the database, beside the store: an encrypted backup's folder never has a plain one.
+/// A copy of the database beside the store, because the folder of an encrypted backup must never
+/// contain a plain one.
 class DatabaseCopy {
  public:
   DatabaseCopy(const fs::path& state, Database& database) : folder_(state / kBackingUp) {
@@ -103,7 +104,7 @@ class Writing {
  private:
   using Stored = std::map<std::string, std::vector<FileDigest>>;
 
-  /// As the copy of the database knows them, not as they have become meanwhile.
+  /// As stored in the copy of the database, not as they have changed since.
   static Stored ScansIn(const fs::path& copy) {
     Database database(copy, Database::Access::kFrozen);
     Stored scans;
@@ -131,7 +132,7 @@ class Writing {
         found[file.substr(folder.size() + 1)] = digest;
     }
     for (const FileDigest& file : stored) {
-      if (file.path == kRecordingFolder) continue;  // has a check of its own
+      if (file.path == kRecordingFolder) continue;  // checked separately
       const auto copy = found.find(file.path);
       if (copy == found.end()) {
         output_.Report(fmt::format("scan {}: {} is missing", scan, file.path));
@@ -171,7 +172,7 @@ void RequireEmpty(const fs::path& state) {
     throw IoError(fmt::format("cannot list {}: {}", state.string(), error.message()));
 }
 
-/// Files that root restores belong to the account that runs plumbd.
+/// Files restored by root get the account that runs plumbd as their owner.
 void GiveToOwnerOf(const fs::path& state, const fs::path& tree) {
   struct stat owner {};
   if (::geteuid() != 0 || ::stat(state.c_str(), &owner) != 0 || owner.st_uid == 0) return;
@@ -189,7 +190,7 @@ void MoveIn(const fs::path& made, const fs::path& state) {
   names.insert(names.end(), kOtherFolders.begin(), kOtherFolders.end());
   names.emplace_back(kDatabase);
   for (const std::string& name :
-       names) {  // the database last: a folder without it does not count as whole
+       names) {  // the database last, because a folder without it does not count as complete
     std::error_code error;
     if (!fs::exists(made / name, error)) continue;
     if (::rename((made / name).c_str(), (state / name).c_str()) != 0)
@@ -256,7 +257,7 @@ BackupReport RestoreBackup(const fs::path& backup, const fs::path& state,
     MoveIn(made, state);
   } catch (const fs::filesystem_error& error) {
     throw IoError(DescribeWriteError(state, error.code().value()));
-  } catch (const DataError&) {  // nothing stays of a backup that was not whole
+  } catch (const DataError&) {  // nothing remains of a backup that was not complete
     std::error_code ignored;
     fs::remove_all(is_new ? state : made, ignored);
     throw;

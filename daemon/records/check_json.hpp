@@ -1,4 +1,4 @@
-// The daily check as the store keeps it.
+// Storage format of the daily check.
 #pragma once
 
 #include <optional>
@@ -9,18 +9,18 @@
 
 namespace plumb {
 
-/// A check with the markers that it saw: the next baseline may be made of them.
-/// @param board             Those of the room's board, which are no markers of the room.
-/// @param reference_marker  Whose frame it is all in; none: of no marker.
+/// A check with the markers that it saw, from which the next baseline may be made.
+/// @param board             Markers of the room's board, which do not belong to the room.
+/// @param reference_marker  Marker whose frame is used; not set: another frame.
 [[nodiscard]] std::string CheckJson(const MarkerCheck& check, const MarkerBaseline& seen,
                                     const MarkerMap& board = {},
                                     std::optional<int> reference_marker = {});
 
-/// The markers in such a text; nothing if it is none.
+/// The markers in such a text; nothing if it is not one.
 [[nodiscard]] std::optional<MarkerBaseline> BaselineIn(const std::string& check_json);
 
-/// What the page shows of it; id, time, user and sensor are left to the caller. One that cannot be
-/// read is a failed check whose reason says so.
+/// The page's record of it; the caller adds id, time, user and sensor. One that cannot be read is a
+/// failed check whose reason says so.
 [[nodiscard]] web::CheckRecord CheckIn(const std::string& check_json);
 
 }  // namespace plumb

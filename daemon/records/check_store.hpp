@@ -15,21 +15,22 @@ class CheckStore {
  public:
   explicit CheckStore(StoreDatabase& database) : database_(database) {}
 
-  /// @param check_json  Of CheckJson(). Gives the id.
+  /// @param check_json  From CheckJson(). Returns the id.
   std::string Add(const web::Actor& actor, const std::string& sensor_serial,
                   const std::string& check_json);
   [[nodiscard]] std::vector<web::CheckRecord> List(int limit);  ///< Newest first.
   [[nodiscard]] std::optional<web::CheckRecord> Last();
-  /// Not in the future. @param sensor_serial  Of the unit that is to be checked; empty: any.
+  /// Not in the future. @param sensor_serial  Unit that was to be checked; empty: any.
   [[nodiscard]] bool HasPassedSince(web::WallClock::time_point since,
                                     const std::string& sensor_serial = {});
-  /// Whether a check shows after the fact that sensor and markers were right at this scan: of the
-  /// same unit, passed on the day of the scan and after it, with no failed check in between and
-  /// against a baseline from before the scan.
+  /// Whether a later check confirms that sensor and markers were correct at this scan: of the same
+  /// unit, passed on the day of the scan and after it, with no failed check in between and against
+  /// a baseline from before the scan.
   [[nodiscard]] bool ConfirmsScan(const std::string& scan_id);
 
   [[nodiscard]] std::optional<web::CheckBaseline> Baseline();
-  [[nodiscard]] std::string BaselineJson();  ///< Of the check that is the baseline; empty: none.
+  /// Of the check that is the baseline; empty if there is none.
+  [[nodiscard]] std::string BaselineJson();
   void SetBaseline(const web::Actor& actor, const std::string& check_id);
 
  private:

@@ -19,7 +19,7 @@ std::string UriOf(const std::filesystem::path& file, Database::Access access) {
       uri += c;
     }
   }
-  // A database that was closed cleanly has no write-ahead log, and none can be made.
+  // A database that was closed cleanly has no write-ahead log, and none can be created.
   std::error_code error;
   if (access == Database::Access::kFrozen &&
       !std::filesystem::exists(file.string() + "-wal", error))
@@ -105,8 +105,8 @@ Database::Database(const std::filesystem::path& file, Access access,
     : file_(file) {
   const int flags = access == Access::kReadWrite ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE
                                                  : SQLITE_OPEN_READONLY;
-  const char* const system =
-      access == Access::kFrozen ? "unix-none" : "unix-excl";  // no locks; of this process only
+  // no locks; locks for this process only
+  const char* const system = access == Access::kFrozen ? "unix-none" : "unix-excl";
   try {
     if (const int code = sqlite3_open_v2(UriOf(file, access).c_str(), &handle_,
                                          flags | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_URI, system);
@@ -192,8 +192,8 @@ void Database::CopyTo(const std::filesystem::path& file) {
       sqlite3_open_v2(file.c_str(), &copy,
                       SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
   if (code == SQLITE_OK) {
-    // In one step: a writer in between would make it begin again, and in this mode of the log
-    // readers block no other connection.
+    // In one step, because a write in between would restart it; in this mode of the log, readers do
+    // not block other connections.
     sqlite3_backup* backup = sqlite3_backup_init(copy, "main", handle_, "main");
     code = backup == nullptr ? sqlite3_errcode(copy) : sqlite3_backup_step(backup, -1);
     const int end = backup == nullptr ? code : sqlite3_backup_finish(backup);

@@ -1,4 +1,5 @@
-// SQLite, as far as the store needs it: statements, transactions, and errors that say what to do.
+// The parts of SQLite that the store needs: statements, transactions, and errors that state what to
+// do.
 #pragma once
 
 #include <chrono>
@@ -17,7 +18,7 @@ struct sqlite3_stmt;
 
 namespace plumb {
 
-/// The file is no database, or a damaged one.
+/// The file is not a database, or a damaged one.
 class DatabaseCorrupt : public IoError {
  public:
   using IoError::IoError;
@@ -29,13 +30,13 @@ class DiskRefused : public IoError {
   using IoError::IoError;
 };
 
-/// Another process, or connection, holds it.
+/// Another process or connection holds it.
 class DatabaseBusy : public IoError {
  public:
   using IoError::IoError;
 };
 
-/// A rule of the tables was broken: a name taken, an approved row changed.
+/// A rule of the tables was violated: a name taken, an approved row changed.
 class ConstraintBroken : public IoError {
  public:
   using IoError::IoError;
@@ -43,8 +44,8 @@ class ConstraintBroken : public IoError {
 
 class Database;
 
-/// One statement, bound and stepped; returned to the database's cache when it goes. Parameters and
-/// columns count from 0.
+/// One statement, to be bound and stepped; returned to the database's cache on destruction.
+/// Parameters and columns count from 0.
 class Statement {
  public:
   ~Statement();
@@ -80,17 +81,18 @@ class Statement {
   int next_ = 1;
 };
 
-/// One connection; belongs to one thread at a time. Write-ahead log, foreign keys on, commits are
-/// on the disk when they return. The file belongs to one process at a time: what connections share
+/// One connection, used by one thread at a time. Write-ahead log, foreign keys on; commits are on
+/// the disk when they return. The file belongs to one process at a time: data shared by connections
 /// is in its memory and not in a mapped file, whose disk may become read-only.
 class Database {
  public:
   enum class Access {
     kReadWrite,
-    kReadOnly,  ///< Beside one that writes.
-    kFrozen,    ///< On a disk that cannot be written by anybody.
+    kReadOnly,  ///< In addition to a connection that writes.
+    kFrozen,    ///< On a disk that cannot be written at all.
   };
-  /// @param busy_wait  For another connection that holds the file, before DatabaseBusy.
+  /// @param busy_wait  Time to wait for another connection that holds the file, before
+  ///         DatabaseBusy.
   /// @throws IoError and its kinds.
   Database(const std::filesystem::path& file, Access access,
            std::chrono::milliseconds busy_wait = std::chrono::seconds(5));
@@ -100,12 +102,13 @@ class Database {
 
   /// Runs one or more statements without parameters.
   void Execute(const std::string& sql);
-  /// Prepared once, kept for the next call. The text must be a literal: the cache only grows.
+  /// Prepared once and kept for the next call. The text must be a literal, because the cache only
+  /// grows.
   [[nodiscard]] Statement Prepare(const char* sql);
   [[nodiscard]] std::int64_t last_id() const;
   [[nodiscard]] int num_changed() const;
-  /// Looks at everything, for at most so long. False: not all was looked at in that time.
-  /// @throws DatabaseCorrupt naming what SQLite found.
+  /// Checks everything within a time limit. False: not everything could be checked in that time.
+  /// @throws DatabaseCorrupt naming SQLite's finding.
   bool CheckIntegrity(std::chrono::milliseconds limit = std::chrono::hours(1));
   /// A copy as of one moment; others may write meanwhile. The file must not exist.
   /// @throws IoError and its kinds
@@ -120,7 +123,7 @@ class Database {
   std::map<const char*, sqlite3_stmt*> idle_;
 };
 
-/// Rolled back unless Commit() was called. Takes the write lock at once.
+/// Rolled back unless Commit() was called. Takes the write lock immediately.
 class Transaction {
  public:
   explicit Transaction(Database& database);

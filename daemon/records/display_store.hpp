@@ -1,4 +1,4 @@
-// The screens in the room that may follow the appliance.
+// The displays in the room that may follow the appliance.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ class DisplayStore {
   explicit DisplayStore(StoreDatabase& database) : database_(database) {}
 
   [[nodiscard]] std::vector<web::Display> List();
-  std::string Add(const web::Actor& actor, const web::Display& display);  ///< Gives the id.
+  std::string Add(const web::Actor& actor, const web::Display& display);  ///< Returns the id.
   void Remove(const web::Actor& actor, const std::string& id);
 
  private:

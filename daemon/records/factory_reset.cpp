@@ -27,7 +27,7 @@ using web::FactoryReset;
 constexpr std::size_t kMaxBytes = 4096;
 constexpr const char* kKeep = "keep_records";
 constexpr const char* kWipe = "wipe";
-/// Beside the database: what is neither a record nor of the sensor.
+/// Items beside the database that are neither records nor belong to the sensor.
 constexpr std::array kOfPageAndUpdates = {"page-key.pem", "device.key", "updates"};
 
 struct Request {
@@ -57,7 +57,7 @@ Request ReadRequest(const fs::path& file) {
 void Remove(const fs::path& path) {
   std::error_code error;
   fs::remove_all(path, error);
-  // The root of a mounted disk stays; what is in it goes.
+  // The root of a mounted disk stays; its contents are removed.
   if (error && !(fs::is_directory(path) && fs::is_empty(path)))
     throw DiskRefused(
         fmt::format("the factory reset cannot remove {}: {}; it goes on at the next "
@@ -72,8 +72,8 @@ std::vector<fs::path> EntriesOf(const fs::path& folder) {
   return entries;
 }
 
-/// The files of scans go before the database, so that an interrupted wipe never looks like a lost
-/// database.
+/// The files of scans are removed before the database, so that an interrupted wipe never looks like
+/// a lost database.
 void Wipe(const fs::path& state) {
   FolderLock lock;
   lock.Take(state);

@@ -1,5 +1,5 @@
-// Back to the state of delivery: asked for on the page or the command line, carried out at the next
-// start, before anything else opens the state folder.
+// Reset to the state of delivery: requested on the page or the command line, carried out at the
+// next start, before anything else opens the state folder.
 #pragma once
 
 #include <filesystem>
@@ -14,20 +14,20 @@ namespace plumb {
 /// In the state folder; systemd/factory-reset reads its kind too.
 inline constexpr const char* kFactoryResetFile = "factory-reset.json";
 
-/// Notes who asked for what; durable. The file belongs to whom the folder belongs to.
+/// Records the request and who made it, durably. The file gets the folder's owner.
 /// @throws IoError
 void RequestFactoryReset(const std::filesystem::path& state, web::FactoryReset kind,
                          const web::Actor& actor);
 
-/// Takes back a request that has not been carried out.
+/// Withdraws a request that has not been carried out.
 void CancelFactoryReset(const std::filesystem::path& state);
 
-/// Carries out a request; one that was interrupted begins again. Keeping the records removes
-/// accounts, paired displays, settings, uploaded bundles, and the keys of page and browsers; wiping
-/// removes everything in the folder. The (new) audit log says who asked for it.
-/// @returns what was done, as a sentence; nothing: no request.
+/// Carries out a request; an interrupted one starts again. Keeping the records removes accounts,
+/// paired displays, settings, uploaded bundles, and the keys of page and browsers; wiping removes
+/// everything in the folder. The (new) audit log records who requested it.
+/// @returns what was done, as a sentence; nothing without a request.
 /// @throws DataError for a request that cannot be read, which changes nothing; IoError and its
-/// kinds, and then the next start goes on.
+///         kinds, after which the next start continues.
 std::optional<std::string> CarryOutFactoryReset(const std::filesystem::path& state);
 
 }  // namespace plumb

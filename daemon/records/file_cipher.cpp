@@ -30,7 +30,7 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t kMinSecret = 16, kMaxSecret = 1024;
 constexpr std::size_t kPiece = std::size_t{64} << 10;
 constexpr std::size_t kOverhead = crypto_secretstream_xchacha20poly1305_ABYTES;
-// What a backup may ask of the machine that restores it.
+// Limits for the work that a backup may demand of the machine that restores it.
 constexpr std::uint64_t kMaxOperations = 16, kMaxMemory = std::uint64_t{512} << 20;
 constexpr const char* kAlgorithm = "argon2id, xchacha20poly1305";
 
@@ -38,7 +38,7 @@ void StartSodium() {
   if (::sodium_init() < 0) throw IoError("libsodium does not start: it finds no random numbers");
 }
 
-/// Reads the pieces of a file, each with whether it is the last.
+/// Reads a file in pieces and knows which is the last.
 class Pieces {
  public:
   Pieces(const fs::path& path, std::size_t size)
@@ -55,7 +55,7 @@ class Pieces {
   Pieces(const Pieces&) = delete;
   Pieces& operator=(const Pieces&) = delete;
 
-  /// At most so many bytes; fewer at the end of the file only.
+  /// At most the given number of bytes; fewer only at the end of the file.
   std::vector<std::uint8_t> Exactly(std::size_t count) {
     std::vector<std::uint8_t> bytes(count);
     std::size_t filled = 0;
@@ -69,14 +69,15 @@ class Pieces {
     bytes.resize(filled);
     return bytes;
   }
-  /// Begins the pieces after what Exactly() gave.
+  /// Starts the pieces after the result of Exactly().
   void Begin() { ahead_ = Exactly(next_); }
   std::vector<std::uint8_t> Take() {
     std::vector<std::uint8_t> piece = std::move(ahead_);
     ahead_ = piece.size() < next_ ? std::vector<std::uint8_t>() : Exactly(next_);
     return piece;
   }
-  [[nodiscard]] bool is_last() const { return ahead_.empty(); }  ///< What Take() gave last.
+  /// About the last result of Take().
+  [[nodiscard]] bool is_last() const { return ahead_.empty(); }
 
  private:
   [[noreturn]] void Fail(int error) const {
@@ -88,7 +89,7 @@ class Pieces {
   std::vector<std::uint8_t> ahead_;
 };
 
-/// The copy, and what it is and was made of.
+/// The copy, with the digests of the result and of the original.
 class Target {
  public:
   Target(const fs::path& to, const std::string& path) : path_(path), file_(Made(to / path)) {}
@@ -120,7 +121,7 @@ const unsigned char* Bytes(const std::string& text) {
   return reinterpret_cast<const unsigned char*>(text.data());
 }
 
-/// Sealed into each piece of a file, so that files of one backup cannot change places.
+/// Sealed into each piece of a file, so that files of one backup cannot be exchanged.
 const std::string& PlaceOf(const std::string& path) { return path; }
 
 std::string Hex(const unsigned char* bytes, std::size_t count) {

@@ -1,8 +1,8 @@
-// Files that only who has the key can read: XChaCha20-Poly1305 in libsodium's secret streams.
+// Files that can be read only with the key: XChaCha20-Poly1305 in libsodium's secret streams.
 //
-// The key comes of a secret, in a file of its own, and of what lies open beside the files: a random
-// salt and what the derivation cost (argon2id). Each file is a stream of pieces, bound to its path:
-// a file that was cut short, reassembled or put in another's place is refused.
+// The key is derived from a secret, in a file of its own, and from public values beside the files:
+// a random salt and the cost of the derivation (argon2id). Each file is a stream of pieces, bound
+// to its path: a file that was truncated, reassembled or put in another's place is rejected.
 #pragma once
 
 #include <array>
@@ -18,11 +18,11 @@
 
 namespace plumb {
 
-/// What is in a key file: a line of text, a passphrase of at least 16 bytes or 32 random bytes in
-/// hexadecimal. Forgotten when it goes.
+/// Contents of a key file: a line of text, which is a passphrase of at least 16 bytes or 32 random
+/// bytes in hexadecimal. Erased on destruction.
 class BackupSecret {
  public:
-  /// @throws DataError if the file holds no such line, or everybody may read it; IoError
+  /// @throws DataError if the file has no such line, or everybody may read it; IoError
   explicit BackupSecret(const std::filesystem::path& file);
   ~BackupSecret();
   BackupSecret(const BackupSecret&) = delete;
@@ -35,23 +35,23 @@ class BackupSecret {
 
 class FileCipher {
  public:
-  /// A new key of the secret. Takes a second and 64 MB.
+  /// A new key from the secret. Takes a second and 64 MB.
   explicit FileCipher(const BackupSecret& secret);
-  /// The key that `header` belongs to. @throws DataError if it is none of the secret's, or the
-  /// header none of Header()
+  /// The key to which `header` belongs.
+  /// @throws DataError if it is not a key of the secret, or the header is not from Header()
   FileCipher(const BackupSecret& secret, const nlohmann::ordered_json& header);
   ~FileCipher();
   FileCipher(const FileCipher&) = delete;
   FileCipher& operator=(const FileCipher&) = delete;
 
-  /// What must be known beside the secret: salt, cost, and by what the key is recognised.
+  /// Public values needed in addition to the secret: salt, cost, and a check value for the key.
   [[nodiscard]] nlohmann::ordered_json Header() const;
 
   struct Written {
     FileDigest plain, sealed;
   };
-  /// As Copy() of file_copy.hpp, in the direction named. @throws as that; DataError if the file
-  /// is none that this key sealed under this path
+  /// As Copy() of file_copy.hpp, in the named direction.
+  /// @throws as Copy(); DataError if the file was not sealed with this key under this path
   [[nodiscard]] Written Seal(const std::filesystem::path& from, const std::filesystem::path& to,
                              const std::string& path, const std::stop_token& stop) const;
   [[nodiscard]] Written Open(const std::filesystem::path& from, const std::filesystem::path& to,

@@ -79,7 +79,7 @@ FileDigest Copy(const fs::path& from, const fs::path& to, const std::string& pat
 
 namespace {
 
-/// False where the file system cannot share them. Other errors are left to the copy to report.
+/// False if the file system cannot share them. Other errors are left to the copy to report.
 bool Clone(const fs::path& from, const fs::path& to) {
   const int source = ::open(from.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (source < 0) return false;

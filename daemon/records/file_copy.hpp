@@ -1,4 +1,4 @@
-// Copies of files for backups, with their digests.
+// Copies files for backups and computes their digests.
 #pragma once
 
 #include <filesystem>
@@ -10,26 +10,26 @@
 
 namespace plumb {
 
-/// The original cannot be read; the copy is not at fault.
+/// The original cannot be read; there was no error of the copy.
 class SourceUnreadable : public IoError {
  public:
   using IoError::IoError;
 };
 
-/// Copies `from`/`path` to `to`/`path` and makes the folders that it needs. Gives the digest of
-/// what was copied. The copy has the mode 0640, its folders 0750. Not forced to the disk.
+/// Copies `from`/`path` to `to`/`path` and creates the necessary folders. Returns the digest of the
+/// copied data. The copy has the mode 0640, its folders 0750. Not flushed to the disk.
 /// @throws SourceUnreadable; IoError if the copy cannot be written; Interrupted
 [[nodiscard]] FileDigest Copy(const std::filesystem::path& from, const std::filesystem::path& to,
                               const std::string& path, const std::stop_token& stop);
 
-/// The same, but where the file system can (btrfs, XFS) the copy shares the blocks of the original
-/// until one of them is written to. Never a second name of the same file: what damages one would
-/// damage the other.
+/// The same, but if the file system can (btrfs, XFS), the copy shares the blocks of the original
+/// until one of them is written to. Never a hard link, because damage to one would damage the
+/// other.
 [[nodiscard]] FileDigest CloneOrCopy(const std::filesystem::path& from,
                                      const std::filesystem::path& to, const std::string& path,
                                      const std::stop_token& stop);
 
-/// Forces everything on a folder's disk to it. @throws IoError
+/// Flushes everything on a folder's disk. @throws IoError
 void SyncDisk(const std::filesystem::path& folder);
 
 }  // namespace plumb

@@ -55,7 +55,7 @@ std::string FileIntegrity::Check(const std::string& scan_id, bool scene_only,
     before = query.Text(0);
   }
   StoreDigests(change.database(), scan, first_seen);
-  // A scene that is whole says nothing of the other files.
+  // An intact scene says nothing about the other files.
   if (!scene_only || !fault.empty()) SetUnavailable(change.database(), scan, before, fault);
   if (!scene_only) {
     change.Prepare("UPDATE scans SET checked_at = ? WHERE id = ?").Bind(Now()).Bind(scan).Run();
@@ -70,7 +70,7 @@ std::optional<CheckedScan> FileIntegrity::CheckNext(std::chrono::hours at_least,
   {
     const StoreDatabase::Held writer = database_.ForChanges();
     const web::WallClock::time_point now = web::WallClock::now();
-    // A stamp of the future says nothing, and what was out of sight may be back.
+    // A time in the future is ignored, and files that were unavailable may be back.
     Statement query = writer->Prepare(
         "SELECT id FROM scans WHERE has_folder = 1 AND (checked_at <= ?1 OR checked_at > ?2 OR "
         "(unavailable <> '' AND checked_at <= ?3)) ORDER BY checked_at, id LIMIT 1");

@@ -1,4 +1,4 @@
-// Whether the files of the scans are still what was stored.
+// Checks that the files of the scans are still as they were stored.
 #pragma once
 
 #include <chrono>
@@ -14,24 +14,24 @@ namespace plumb {
 
 struct CheckedScan {
   std::string id;
-  std::string fault;  ///< Empty: its files are what was stored.
+  std::string fault;  ///< Empty if its files are as they were stored.
 };
 
 /// Thread-safe. @throws IoError and its kinds; Interrupted
 class FileIntegrity {
  public:
-  /// Database and folders are borrowed; live longer.
+  /// Database and folders are borrowed and outlive this object.
   FileIntegrity(StoreDatabase& database, const ScanFolders& folders, LookAtPath look)
       : database_(database), folders_(folders), look_(std::move(look)) {}
 
   /// Why the files of a scan cannot be used, by their SHA-256: "scene/cloud.ply has been changed
-  /// ...". Empty: they are what was stored. Files that have no digest yet get one ("first seen").
-  /// Changes the scan's row and the log where that is news.
-  /// @param scene_only  Only what a comparison reads.
+  /// ...". Empty if they are as they were stored. Files without a digest get one ("first seen").
+  /// Updates the scan's row and the log if the result has changed.
+  /// @param scene_only  Only the files that a comparison reads.
   [[nodiscard]] std::string Check(const std::string& scan_id, bool scene_only,
                                   const std::stop_token& stop = {});
-  /// Checks the scan that was not checked for longest, if that is longer ago than `at_least`.
-  /// Nothing if none is due.
+  /// Checks the scan whose last check is the oldest, if it is longer ago than `at_least`. Nothing
+  /// if none is due.
   std::optional<CheckedScan> CheckNext(std::chrono::hours at_least,
                                        const std::stop_token& stop = {});
 

@@ -1,4 +1,4 @@
-// Maps of markers as the store's JSON.
+// Storage format of marker maps.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@
 namespace plumb {
 
 [[nodiscard]] nlohmann::ordered_json MarkersJson(const MarkerMap& markers);
-/// Nothing where it is no such map, or one of its markers is none.
+/// Nothing if it is not such a map, or one of its markers is invalid.
 [[nodiscard]] std::optional<MarkerMap> MarkersIn(const nlohmann::ordered_json& json);
 
 }  // namespace plumb

@@ -18,7 +18,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMaxRows = 200'000, kMaxText = std::size_t{64} << 10,
                       kMaxJson = std::size_t{4} << 20;
-constexpr std::int64_t kMaxInteger = std::int64_t{1} << 53;  // as times in nanoseconds, too
+constexpr std::int64_t kMaxInteger = std::int64_t{1} << 53;  // sufficient for times in nanoseconds
 
 struct Query {
   const char *table, *columns, *rows;

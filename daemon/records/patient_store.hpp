@@ -1,4 +1,4 @@
-// The patients. StoreRemoval removes one.
+// The patients. StoreRemoval removes them.
 #pragma once
 
 #include <optional>
@@ -17,9 +17,9 @@ class PatientStore {
 
   [[nodiscard]] std::vector<web::Patient> List();  ///< By code.
   [[nodiscard]] std::optional<web::Patient> Find(const std::string& id);
-  /// Capital and small letters count as the same.
+  /// Letter case is ignored.
   [[nodiscard]] std::optional<web::Patient> FindByCode(const std::string& code);
-  /// Gives the id. kConflict for a code that another patient has.
+  /// Returns the id. kConflict for a code that another patient has.
   std::string Add(const web::Actor& actor, const std::string& code, const std::string& site);
   void Change(const web::Actor& actor, const std::string& id, const std::string& site,
               const std::string& note);

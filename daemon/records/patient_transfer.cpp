@@ -39,7 +39,7 @@ constexpr const char* kImporting = ".import";
 constexpr std::size_t kMaxRecord = std::size_t{256} << 20, kMaxCode = 32;
 const web::Actor kCommand{.user = "command line", .address = ""};
 
-/// "scans/000004/..." gives 4.
+/// Converts "scans/000004/..." to 4.
 std::optional<std::int64_t> ScanOf(const std::string& path) {
   const fs::path parts(path);
   auto part = parts.begin();
@@ -73,7 +73,7 @@ class PrivateFolder {
   fs::path path_;
 };
 
-/// Opens what an export is made of: a backup is not changed.
+/// Opens the source of an export; a backup is not changed.
 std::unique_ptr<Database> OpenSource(const fs::path& state) {
   std::error_code error;
   const bool is_backup = fs::exists(state / "backup.json", error);
@@ -107,7 +107,7 @@ fs::path ImportedFile(const fs::path& state, std::int64_t patient) {
   return state / kImports / fmt::format("{}.json", patient);
 }
 
-/// The record of an earlier import; null: the patient was made here.
+/// The record of an earlier import; null if the patient was created here.
 Json EarlierEvidence(const fs::path& state, std::int64_t patient) {
   std::error_code error;
   const fs::path file = ImportedFile(state, patient);
@@ -146,7 +146,7 @@ PatientReport ExportPatient(const fs::path& state, const std::string& code, cons
   for (const Json& file : rows["scan_files"]) {
     const std::string path =
         fmt::format("{}/{}/{}", kScans, ScanId(file["scan_id"]), file["path"].get<std::string>());
-    if (file["path"] == kRecordingFolder) continue;  // has a check of its own
+    if (file["path"] == kRecordingFolder) continue;  // checked separately
     if (const auto copy = found.find(path); copy == found.end() || copy->second != file["sha256"])
       output.Report(path + (copy == found.end() ? " is missing" : " is not what was stored"));
   }
@@ -159,7 +159,7 @@ PatientReport ExportPatient(const fs::path& state, const std::string& code, cons
           .problems = output.problems()};
 }
 
-/// One export that is being put into a store.
+/// One export that is being imported into a store.
 class PatientImport {
  public:
   PatientImport(const fs::path& folder, const fs::path& state, const BackupSecret* secret,
@@ -218,11 +218,11 @@ class PatientImport {
 
   [[nodiscard]] const Json& rows() const { return record_.at("rows"); }
 
-  /// @throws std::invalid_argument if another patient has the code, or this one other data.
+  /// @throws std::invalid_argument if another patient has the code, or this patient has other data.
   bool IsThere() {
     const std::optional<std::int64_t> patient = FindCode(*database_, report_.code);
     if (!patient) return false;
-    if (PatientRows(*database_, *patient) == rows()) return true;  // where it was exported
+    if (PatientRows(*database_, *patient) == rows()) return true;  // the store of the export
     const Json earlier = EarlierEvidence(store_.folders.state(), *patient);
     if (earlier.is_object() && earlier.value("rows", Json()) == rows()) return true;
     throw std::invalid_argument(fmt::format(
@@ -285,7 +285,7 @@ class PatientImport {
     for (const fs::path& path : moved) fs::remove_all(path, ignored);
   }
 
-  /// Files that root imports belong to the account that runs plumbd.
+  /// Files imported by root get the account that runs plumbd as their owner.
   void GiveToOwner(const std::vector<fs::path>& moved) const {
     struct stat owner {};
     if (::geteuid() != 0 || ::stat(store_.folders.state().c_str(), &owner) != 0 ||
@@ -309,7 +309,7 @@ class PatientImport {
       const std::vector<ColumnOf> columns = ColumnsOf(*database_, table);
       for (const Json& row : rows().at(table)) InsertRow(table, columns, row);
     }
-    // A scan and the reference that it was compared with refer to each other.
+    // A scan and the reference of its comparison refer to each other.
     for (const Json& scan : rows().at("scans")) {
       if (!scan.contains("reference_id") || scan["reference_id"].is_null()) continue;
       database_->Prepare("UPDATE scans SET reference_id = ? WHERE id = ?")
@@ -346,13 +346,13 @@ class PatientImport {
     if (row.contains("id")) new_ids_[table][row["id"]] = database_->last_id();
   }
 
-  /// A value as this store has it: with its own numbers, and without decisions made elsewhere.
+  /// A value converted for this store: with its own numbers, and without decisions made elsewhere.
   Json ValueHere(const std::string& table, const std::string& column, const Json& row) {
     const Json& value = row[column];
     if (column == "patient_id") return new_ids_["patients"].at(value);
     if (column == "scan_id") return new_ids_["scans"].at(value);
     if (column == "session_id" && !value.is_null()) return new_ids_["sessions"].at(value);
-    if (column == "reference_id") return nullptr;  // set once the references are there
+    if (column == "reference_id") return nullptr;  // set once the references exist
     if (table == "refs" && column == "approved_by") return "";
     if (table == "refs" && column == "approved_at") return nullptr;
     if (table == "patients" && column == "wiping") return 0;
@@ -361,13 +361,13 @@ class PatientImport {
   }
 
   SummedReader reader_;
-  std::set<std::string> statements_;  // outlives the store, which keeps the compiled ones
+  std::set<std::string> statements_;  // outlives the store, which keeps the compiled statements
   Store store_;
   StoreDatabase::Held database_;  ///< Held for the whole import.
   std::stop_token stop_;
   Json record_;
   PatientReport report_;
-  std::map<std::string, std::map<std::int64_t, std::int64_t>> new_ids_;  ///< Of each table.
+  std::map<std::string, std::map<std::int64_t, std::int64_t>> new_ids_;  ///< For each table.
 };
 
 PatientReport ImportPatient(const fs::path& folder, const fs::path& state,

@@ -1,9 +1,9 @@
-// One patient out of a store, and into another one.
+// Exports one patient from a store and imports it into another.
 //
 // An export is a folder: record.json (the rows of the patient, sessions, scans, results, references
-// and digests; with them, for reading only, the patient's part of the audit log and the daily
-// checks before the scans), the files of the scans, SHA256SUMS and patient.json about the whole.
-// Encrypted where a secret is given.
+// and digests; for information also the patient's part of the audit log and the daily checks before
+// the scans), the files of the scans, SHA256SUMS and patient.json about the whole. Encrypted if a
+// secret is given.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +20,8 @@ struct PatientReport {
   std::string code;
   std::size_t scans = 0, references = 0, files = 0;
   std::uint64_t bytes = 0;
-  std::vector<std::string> problems;  ///< As of a backup.
-  bool was_there = false;             ///< Import: the same data is there already; nothing was done.
+  std::vector<std::string> problems;  ///< As for a backup.
+  bool was_there = false;  ///< Import: the same data exists already, and nothing was done.
 };
 
 /// @param state  A state folder that no plumbd uses, or a backup that is not encrypted.
@@ -32,13 +32,13 @@ struct PatientReport {
                                           const std::stop_token& stop = {},
                                           const BackupSecret* secret = nullptr);
 
-/// Adds the patient with new numbers. Every reference comes as a draft: it was approved in a room
-/// with its own markers, and a physicist of this one approves it again. What the export says of
-/// the log and of the checks is kept as imports/ID.json; that it was imported is in the audit log.
-/// @param state  That no plumbd uses.
-/// @throws DataError if the export is not whole or says what none can say; std::invalid_argument
-/// if another patient has the code, or this one other data; IoError; Interrupted. Nothing is
-/// changed then.
+/// Adds the patient with new numbers. Every reference becomes a draft, because it was approved in a
+/// room with its own markers; a physicist here has to approve it again. The export's part of the
+/// log and the checks are stored as imports/ID.json; the import itself is in the audit log.
+/// @param state  A state folder that no plumbd uses.
+/// @throws DataError if the export is not complete or is invalid; std::invalid_argument if another
+///         patient has the code, or this patient has other data; IoError; Interrupted. Nothing is
+///         changed then.
 PatientReport ImportPatient(const std::filesystem::path& folder, const std::filesystem::path& state,
                             const std::stop_token& stop = {}, const BackupSecret* secret = nullptr);
 

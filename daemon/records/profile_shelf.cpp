@@ -34,7 +34,7 @@ std::string SumOf(std::string_view text) {
   return hash.Hex();
 }
 
-// Of a plain serial itself; two serials never share a folder.
+// Includes a plain serial itself, so that two serials never share a folder.
 std::string FolderName(const std::string& serial) {
   constexpr std::size_t kLongest = 64;
   const auto is_plain = [](char c) {
@@ -86,7 +86,7 @@ fs::path ProfileShelf::FolderOf(const std::string& serial) const {
   return folder_ / FolderName(serial);
 }
 
-// Newest first. What is not named as a version is not ours.
+// Newest first. Files that are not named as versions are ignored.
 std::vector<ProfileShelf::Entry> ProfileShelf::Entries(const std::string& serial) const {
   std::vector<Entry> entries;
   std::error_code error;
@@ -117,7 +117,7 @@ ProfileShelf::InUse ProfileShelf::Read(const std::string& serial) {
     in_use.fault = fmt::format("the profile of sensor {} cannot be read: {}", serial, error.what());
   }
   try {
-    // First, so that no earlier version takes its place unnoticed at the next scan.
+    // Comes first, so that no earlier version replaces it unnoticed at the next scan.
     in_use.version = Write(serial, "unreadable", std::nullopt);
     const fs::path aside =
         folder_ / kSetAside / fmt::format("{}-{}", FolderName(serial), file.filename().string());

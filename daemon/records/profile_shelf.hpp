@@ -1,4 +1,4 @@
-// The profiles of the sensor units that the appliance has used, each with its earlier versions.
+// Stores the profiles of the sensor units that the appliance has used, with their earlier versions.
 #pragma once
 
 #include <chrono>
@@ -18,12 +18,12 @@ struct ProfileVersion {
   int version = 0;
   std::chrono::system_clock::time_point made;
   std::string cause;  ///< "learned", "rolled_back", "reset", "unreadable".
-  /// None: from here on the unit begins again from its stated calibration.
+  /// Not set: the unit starts again from its stated calibration.
   std::optional<SensorProfile> profile;
 };
 
 /// `FOLDER/SERIAL/VERSION.profile`: a line with the format and the SHA-256 of the rest, then JSON
-/// with the profile as `plumb calibrate` writes it. A version is never changed; the highest one is
+/// with the profile as written by `plumb calibrate`. A version is never changed; the highest one is
 /// in use. Thread-safe within one process.
 class ProfileShelf {
  public:
@@ -31,29 +31,31 @@ class ProfileShelf {
 
   explicit ProfileShelf(std::filesystem::path folder);
 
-  /// What the unit's next scan begins from. The profile is named "SERIAL version N".
+  /// Profile for the unit's next scan. Its name is "SERIAL version N".
   struct InUse {
-    std::optional<ProfileVersion> newest;  ///< None: the unit has no version at all.
-    int version = 0;                       ///< The newest after this call; 0: none.
-    /// Set: the newest version could not be read and was moved to FOLDER/set-aside; the sentence
-    /// says where it is. Scans go on without a profile.
+    std::optional<ProfileVersion> newest;  ///< Not set if the unit has no version.
+    int version = 0;  ///< The newest version after this call; 0 if there is none.
+    /// If set, the newest version could not be read and was moved to FOLDER/set-aside; the sentence
+    /// states where it is. Scans continue without a profile.
     std::string fault;
   };
-  /// Never throws for what the disk holds or refuses. @param serial  Not empty.
+  /// Never throws because of the contents or errors of the disk. @param serial  Not empty.
   [[nodiscard]] InUse Read(const std::string& serial);
 
-  /// Newest first; those that cannot be read are left out.
+  /// Newest first; unreadable ones are left out.
   [[nodiscard]] std::vector<ProfileVersion> Versions(const std::string& serial) const;
 
-  /// Adds a version that a sweep has taught; gives its number.
-  /// @param begun_from  InUse::version when the sweep began; none: whatever it is.
-  /// @throws DataError if another one was made meanwhile: what was reset stays reset; IoError
+  /// Adds a version learned from a sweep and returns its number.
+  /// @param begun_from  InUse::version when the sweep began; not set: any.
+  /// @throws DataError if another version was added meanwhile, so that a reset stays effective;
+  ///         IoError
   int Add(const std::string& serial, const SensorProfile& profile,
           std::optional<int> begun_from = std::nullopt);
-  /// The unit begins again; earlier versions stay. Gives the number. @throws IoError
+  /// The unit starts again from its stated calibration; earlier versions are kept. Returns the
+  /// number. @throws IoError
   int Reset(const std::string& serial);
-  /// Adds an earlier version again, as the newest. Gives the number.
-  /// @throws DataError if there is none of that number that holds a profile; IoError
+  /// Adds an earlier version again as the newest. Returns the number.
+  /// @throws DataError if there is no version of that number with a profile; IoError
   int RollBack(const std::string& serial, int version);
 
  private:

@@ -22,7 +22,7 @@ constexpr const char* kReferenceColumns =
     "SELECT id, patient_id, version, scan_id, created_at, created_by, reason, approved_by, "
     "approved_at, plan, revision, planned_by FROM refs ";
 
-/// SHA-256 of what an approval signs.
+/// SHA-256 of the data that an approval signs.
 std::string DigestOf(const std::string& patient_id, int version, const std::string& scan_id,
                      const std::string& plan_json) {
   const std::string text =
@@ -32,7 +32,7 @@ std::string DigestOf(const std::string& patient_id, int version, const std::stri
   return hash.Hex();
 }
 
-/// @throws DataError naming the version whose plan cannot be read: nothing is compared with it.
+/// @throws DataError naming the version whose plan cannot be read: it must not be used.
 web::ReferencePlan PlanIn(const Statement& row) {
   try {
     return ParsePlan(row.Text(9));
@@ -61,14 +61,14 @@ web::Reference ReadReferenceRow(const Statement& row) {
   return reference;
 }
 
-/// @throws DataError where the plan cannot be read: it is never a default.
+/// @throws DataError if the plan cannot be read; it is never replaced by a default.
 web::Reference ReadReference(const Statement& row) {
   web::Reference reference = ReadReferenceRow(row);
   reference.plan = PlanIn(row);
   return reference;
 }
 
-/// For lists: one that cannot be read does not hide the others.
+/// For lists: an unreadable one does not hide the others.
 web::Reference ListReference(const Statement& row) {
   web::Reference reference = ReadReferenceRow(row);
   try {
@@ -218,7 +218,7 @@ std::string ReferenceStore::Plan(const web::Actor& actor, const std::string& id,
 void ReferenceStore::Approve(const web::Actor& actor, const std::string& id, int revision,
                              const std::string& digest, bool two_users) {
   const std::int64_t number = RequireId(id, "reference");
-  if (const std::optional<web::Reference> reference = Find(id)) {  // before the lock
+  if (const std::optional<web::Reference> reference = Find(id)) {  // before the lock is taken
     const std::string fault = integrity_.Check(reference->scan_id, /*scene_only=*/true);
     if (!fault.empty())
       throw StoreRefusal(ChangeResult::kConflict,

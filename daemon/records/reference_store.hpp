@@ -1,4 +1,4 @@
-// References: the scans that later ones are compared with, each with its plan.
+// References: the scans with which later ones are compared, each with its plan.
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@
 namespace plumb {
 
 /// Thread-safe. Changes throw StoreRefusal; everything throws IoError and its kinds, and DataError
-/// for a plan that cannot be read: it is never replaced by a default.
+/// for a plan that cannot be read, which is never replaced by a default.
 class ReferenceStore {
  public:
   ReferenceStore(StoreDatabase& database, FileIntegrity& integrity)
@@ -20,22 +20,22 @@ class ReferenceStore {
 
   /// Drafts that are newer than the approved version of their patient; at most 20.
   [[nodiscard]] std::vector<web::WaitingReference> Waiting();
-  /// Newest first. One whose plan cannot be read says so, and hides no other.
+  /// Newest first. An unreadable one is marked and does not hide others.
   [[nodiscard]] std::vector<web::Reference> List(const std::string& patient_id);
   [[nodiscard]] std::optional<web::Reference> Find(const std::string& id);
   [[nodiscard]] std::optional<web::Reference> Approved(const std::string& patient_id);
 
-  /// A draft. Gives the id.
+  /// Creates a draft. Returns the id.
   std::string Add(const web::Actor& actor, const std::string& scan_id, const std::string& reason,
                   const web::ReferencePlan& plan);
-  /// Changes a draft, or makes a new version of an approved reference. Gives the id.
-  /// @param revision  The one that was read; kConflict if another one has been saved since.
+  /// Changes a draft, or creates a new version of an approved reference. Returns the id.
+  /// @param revision  The revision that was read; kConflict if another one has been saved since.
   std::string Plan(const web::Actor& actor, const std::string& id, int revision,
                    const web::ReferencePlan& plan);
-  /// @param digest  Of what was read and is signed; kConflict if another one is stored. Empty: not
-  /// compared.
-  /// @param two_users  The approver must be another person than the one who made or planned it;
-  /// false only for the demo's "auto".
+  /// @param digest  Digest of the data that was read and is signed; kConflict if another one is
+  ///         stored. Empty: not compared.
+  /// @param two_users  The approver must be another person than the one who created or planned it;
+  ///         false only for the demo's "auto".
   void Approve(const web::Actor& actor, const std::string& id, int revision,
                const std::string& digest = {}, bool two_users = true);
 

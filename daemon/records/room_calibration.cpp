@@ -102,7 +102,7 @@ std::optional<BoardScan> BoardScanIn(const std::string& check_json) {
       seen.fault = std::move(*why);
     else
       seen.scan = RoomScan{room->markers, std::get<BoardFit>(fit)};
-  } catch (const std::exception& error) {  // no such dictionary, or no board of such markers
+  } catch (const std::exception& error) {  // unknown dictionary, or no board of such markers
     seen.fault = error.what();
   }
   return seen;
@@ -118,7 +118,7 @@ RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans, const RoomCalibratio
     if (!used.empty() &&
         (scan.dictionary != used[0].dictionary || scan.marker_length_m != used[0].marker_length_m ||
          scan.reference_marker != used[0].reference_marker))
-      break;  // the markers were set up differently then
+      break;  // the markers were configured differently then
     used.push_back(scan);
     seen.push_back(*scan.scan);
   }

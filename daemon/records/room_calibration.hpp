@@ -1,4 +1,4 @@
-// The room's calibration as the store keeps it: made of check scans that saw the board.
+// Storage format of the room's calibration, which is made from check scans of the board.
 #pragma once
 
 #include <optional>
@@ -18,27 +18,28 @@ struct BoardScan {
   std::string user;
   std::string dictionary;
   double marker_length_m = 0.0;
-  std::optional<int> reference_marker;  ///< Whose frame it is all in.
-  std::optional<RoomScan> scan;         ///< None: `fault` says why.
+  std::optional<int> reference_marker;  ///< Marker whose frame is used.
+  std::optional<RoomScan> scan;         ///< Not set: `fault` states why.
   std::string fault;
 };
 
-/// What CheckJson() wrote of a sweep over the board; nothing where no marker of it was seen.
+/// Reads a text of CheckJson() for a sweep over the board; nothing if no marker of the board was
+/// seen.
 [[nodiscard]] std::optional<BoardScan> BoardScanIn(const std::string& check_json);
 
-/// What would be signed now.
+/// The calibration that would be signed now.
 struct RoomCandidate {
   std::vector<BoardScan> scans;  ///< Newest first; the newest usable ones count.
   std::optional<RoomFit> fit;
-  std::string why_not;  ///< Why it may not be signed; empty: it may.
-  std::string json;     ///< That is stored; empty without a fit.
-  std::string digest;   ///< SHA-256 of it, in hexadecimal: what a person signs.
+  std::string why_not;  ///< Why it may not be signed; empty if it may.
+  std::string json;     ///< Text to be stored; empty without a fit.
+  std::string digest;   ///< SHA-256 of it in hexadecimal: the data that a person signs.
 };
 /// @param scans  Newest first.
 [[nodiscard]] RoomCandidate RoomCandidateOf(std::vector<BoardScan> scans,
                                             const RoomCalibrationLimits& limits = {});
 
-/// One that was signed.
+/// A signed calibration.
 struct SignedRoom {
   int version = 0;
   web::WallClock::time_point signed_at;
@@ -50,12 +51,12 @@ struct SignedRoom {
   double marker_length_m = 0.0;
   int reference_marker = 0;  ///< Id.
 };
-/// Of a candidate's text; version and signature are left to the caller.
-/// @throws DataError saying what is wrong with it.
+/// Parses a candidate's text; the caller adds version and signature.
+/// @throws DataError stating what is wrong with it.
 [[nodiscard]] SignedRoom SignedRoomIn(const std::string& json);
 
-/// Why this check shows that the room is no longer as it was calibrated: one sentence; empty: it
-/// is. Nothing where the check saw too little to say.
+/// Why this check shows that the room has changed since it was calibrated, as one sentence; empty
+/// if it has not. Nothing if the check saw too little to decide.
 [[nodiscard]] std::optional<std::string> WhyRoomIsDue(const SignedRoom& room,
                                                       const std::string& check_json,
                                                       const MarkerCheckLimits& limits);

@@ -16,8 +16,9 @@ using web::ChangeResult;
 
 namespace {
 
-constexpr int kScansShown = 6;       // with the board, of one calibration
-constexpr int kChecksSearched = 20;  // since it was signed, until one saw enough
+constexpr int kScansShown = 6;  // scans of the board shown for one calibration
+// checks since the signature that are searched for one that saw enough
+constexpr int kChecksSearched = 20;
 
 constexpr const char* kNewestRooms =
     "SELECT version, signed_at, signed_by, digest, json FROM room_calibrations ORDER BY version "

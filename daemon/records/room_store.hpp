@@ -1,4 +1,4 @@
-// The room's calibrations that were signed, and the next one.
+// The signed calibrations of the room, and the next one.
 #pragma once
 
 #include <optional>
@@ -15,18 +15,19 @@ class RoomStore {
  public:
   explicit RoomStore(StoreDatabase& database) : database_(database) {}
 
-  /// Of the check scans with this sensor since then and since the last signature.
+  /// Uses the check scans with this sensor since the given time and since the last signature.
   [[nodiscard]] RoomCandidate Candidate(const std::string& sensor_serial,
                                         web::WallClock::time_point since);
   /// @throws DataError for one that cannot be read.
   [[nodiscard]] std::optional<SignedRoom> Newest();
-  /// Newest first, those that cannot be read left out.
+  /// Newest first, without unreadable ones.
   [[nodiscard]] std::vector<SignedRoom> List(int limit);
-  /// @param digest  Of the candidate that was read; kConflict where it is not what would be stored.
-  /// Gives the version.
+  /// @param digest  Digest of the candidate that was read; kConflict if another one would be
+  ///         stored. Returns the version.
   std::string Sign(const web::Actor& actor, const std::string& sensor_serial,
                    web::WallClock::time_point since, const std::string& digest);
-  /// By the newest check since it was signed that saw enough of the room; empty: it is not due.
+  /// Why a new calibration is due, by the newest check since the signature that saw enough of the
+  /// room; empty if it is not due.
   [[nodiscard]] std::string WhyDue(const SignedRoom& room, const MarkerCheckLimits& limits);
 
  private:

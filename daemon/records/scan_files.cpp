@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Closes what it holds.
+/// Closes its descriptor.
 class Descriptor {
  public:
   explicit Descriptor(const fs::path& path)
@@ -41,7 +41,7 @@ class Descriptor {
   throw IoError(fmt::format("cannot read {}: {}", path.string(), std::strerror(error)));
 }
 
-/// The files below a folder of the scan, by path; none where it does not exist.
+/// The files in a folder of the scan, by path; empty if it does not exist.
 std::vector<std::string> FilesIn(const fs::path& folder, const char* name) {
   std::vector<std::string> files;
   std::error_code error;
@@ -148,7 +148,8 @@ std::optional<FileDigest> DigestOfRecording(const fs::path& folder, const std::s
 
 std::string WhyNotThere(const fs::path& folder, const std::vector<FileDigest>& files,
                         const LookAtPath& look) {
-  // Without its folder a scan has lost every file: that is said, and not the first file's name.
+  // Without its folder a scan has lost every file, so that is reported instead of the first file's
+  // name.
   if (const FileLook found = look(folder); found.error != 0 || !found.is_folder) {
     return "its folder " + (found.error == 0 ? std::string("is not a folder")
                                              : Difference(found, {.path = {}, .sha256 = {}}));

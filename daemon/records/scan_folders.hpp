@@ -1,4 +1,4 @@
-// Where the files of scans lie in a state folder.
+// Locations of the files of scans in a state folder.
 #pragma once
 
 #include <filesystem>
@@ -21,14 +21,14 @@ class ScanFolders {
   [[nodiscard]] std::filesystem::path Staging(const std::string& scan_id) const {
     return scans() / (std::string(kStagingPrefix) + scan_id);
   }
-  /// A complete folder of a scan that was interrupted, after the next start.
+  /// A complete folder of an interrupted scan, as found at the next start.
   [[nodiscard]] std::filesystem::path Interrupted(const std::string& scan_id) const {
     return state_ / "set-aside" / (scan_id + kInterruptedSuffix);
   }
   [[nodiscard]] static bool IsStaging(const std::filesystem::path& folder) {
     return folder.filename().string().starts_with(kStagingPrefix);
   }
-  /// Those of scans and those of staging, by name. @throws DiskRefused
+  /// The folders of scans and of staging, by name. @throws DiskRefused
   [[nodiscard]] std::vector<std::filesystem::path> All() const;
 
   static constexpr const char* kInterruptedSuffix = "-interrupted";

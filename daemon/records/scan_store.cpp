@@ -32,7 +32,7 @@ constexpr const char* kScanColumns =
     "(SELECT fraction FROM sessions WHERE sessions.id = session_id), sensor_on_s, check_overdue, "
     "unavailable, accepted_at FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
 
-/// Of a folder, or with ::syncfs of everything on its disk.
+/// Flushes a folder, or with ::syncfs everything on its disk.
 void Sync(const fs::path& folder, int (*sync)(int) = ::fsync) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) throw DiskRefused(DescribeWriteError(folder, errno));
@@ -42,7 +42,7 @@ void Sync(const fs::path& folder, int (*sync)(int) = ::fsync) {
   if (result != 0 && error != EINVAL) throw DiskRefused(DescribeWriteError(folder, error));
 }
 
-/// Verdict and numbers, for the log: "move: vertical +1.2, ..., yaw -0.10".
+/// Verdict and numbers for the log: "move: vertical +1.2, ..., yaw -0.10".
 std::string Described(const web::ResultSummary& result) {
   std::string text = result.verdict;
   if (!result.correction) return text;
@@ -143,7 +143,8 @@ double ScanStore::SweptArea(const std::string& scan_id) {
 
 std::string ScanStore::Begin(const NewScan& scan) {
   StoreChange change(database_);
-  FailInterruptedScans(change.database());  // one whose end the disk refused to note
+  // a scan whose end could not be recorded because of the disk
+  FailInterruptedScans(change.database());
   change
       .Prepare(
           "INSERT INTO scans (patient_id, reference_id, purpose, outcome, started_at, "
@@ -174,7 +175,7 @@ void ScanStore::Finish(const std::string& scan_id, const FinishedScan& finished)
   const bool is_done = finished.outcome == web::ScanOutcome::kDone;
   const fs::path staging = folders_.Staging(scan_id);
   std::error_code ignored;
-  // A failed sweep is kept for inspection, if its recording is complete.
+  // A failed sweep is kept for inspection if its recording is complete.
   const bool has_recording = fs::exists(staging / kRecordingFolder / "rgb.txt", ignored);
   const bool is_kept = is_done || (finished.outcome == web::ScanOutcome::kFailed && has_recording);
   // Read before the lock is taken, so that nothing else waits for it.
@@ -189,8 +190,7 @@ void ScanStore::Finish(const std::string& scan_id, const FinishedScan& finished)
   if (!is_done) {
     for (const char* part : {"scene", "result"}) fs::remove_all(staging / part, ignored);
   }
-  // Scene and result are on the disk; the images of a recording are too many to be synced one by
-  // one.
+  // Scene and result are on the disk; a recording has too many images to flush them one by one.
   if (fs::exists(staging / kRecordingFolder, ignored)) Sync(folders_.scans(), ::syncfs);
   if (::rename(staging.c_str(), folders_.Scan(scan_id).c_str()) != 0) {
     throw DiskRefused(DescribeWriteError(folders_.Scan(scan_id), errno));
@@ -198,7 +198,7 @@ void ScanStore::Finish(const std::string& scan_id, const FinishedScan& finished)
   try {
     Sync(folders_.scans());
     NoteEnd(*writer, scan_id, finished, is_kept, files);
-  } catch (...) {  // a scan without its row does not exist
+  } catch (...) {  // without its row a scan does not exist
     ::rename(folders_.Scan(scan_id).c_str(), staging.c_str());
     throw;
   }

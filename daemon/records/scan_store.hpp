@@ -1,4 +1,4 @@
-// The scans: how one begins, ends and is accepted. StoreRemoval removes them.
+// The scans: how they begin, end and are accepted. StoreRemoval removes them.
 #pragma once
 
 #include <cstdint>
@@ -13,57 +13,58 @@
 
 namespace plumb {
 
-/// What a scan begins with.
+/// Data at the beginning of a scan.
 struct NewScan {
   std::string patient_id;
-  std::string reference_id;  ///< Empty: none.
+  std::string reference_id;  ///< Empty without a reference.
   web::ScanPurpose purpose = web::ScanPurpose::kFraction;
   std::string sensor_serial;
-  std::string reason;           ///< Why a new reference is taken.
-  std::string session_id = {};  ///< Empty: none is open.
+  std::string reason;           ///< Reason for a new reference.
+  std::string session_id = {};  ///< Empty without an open session.
   std::optional<double> sensor_on_s = {};
   bool check_overdue = false;
 };
 
-/// How it ended.
+/// Outcome of a scan.
 struct FinishedScan {
   web::ScanOutcome outcome = web::ScanOutcome::kFailed;
   std::string failure;
-  std::string result_json;  ///< Empty: nothing was compared.
+  std::string result_json;  ///< Empty if nothing was compared.
   double swept_area_m2 = 0.0;
 };
 
-/// Why a scan failed whose end was never stored.
+/// Failure text for a scan whose end was never stored.
 inline constexpr std::string_view kInterrupted =
     "interrupted: the appliance was switched off or its disk refused the scan";
 /// Ends the scans that have begun and not ended. Within a transaction.
 void FailInterruptedScans(Database& database);
 
-/// A scan's files are made in a hidden staging folder and appear under their id in one step; its
-/// row says `done` only after that, so a crash at any point leaves either a whole scan or none.
+/// A scan's files are written to a hidden staging folder and appear under their id in one step; its
+/// row says `done` only afterwards, so that a crash at any point leaves either a complete scan or
+/// none.
 ///
 /// Thread-safe. Changes throw StoreRefusal; everything throws IoError and its kinds.
 class ScanStore {
  public:
-  /// Both are borrowed; live longer.
+  /// Both are borrowed and outlive this object.
   ScanStore(StoreDatabase& database, const ScanFolders& folders)
       : database_(database), folders_(folders) {}
 
-  /// Newest first. @param patient_id  Empty: of all.
+  /// Newest first. @param patient_id  Empty: all patients.
   [[nodiscard]] std::vector<web::Scan> List(const std::string& patient_id, int limit);
   [[nodiscard]] std::optional<web::Scan> Find(const std::string& id);
-  /// Those of a patient that are done.
+  /// Completed scans of a patient.
   [[nodiscard]] int CountSince(const std::string& patient_id, web::WallClock::time_point since);
-  /// Surface seen by a scan's sweep; 0: unknown.
+  /// Surface seen by a scan's sweep; 0 if unknown.
   [[nodiscard]] double SweptArea(const std::string& scan_id);
 
-  /// Stores a row that says `running`, and makes an empty staging folder. Gives the id.
+  /// Stores a row with the outcome `running`, and creates an empty staging folder. Returns the id.
   std::string Begin(const NewScan& scan);
-  /// kDone: the staging folder becomes the scan's. kFailed: only the recording in it, where it is
-  /// complete. Else it is removed.
+  /// kDone: the staging folder becomes the scan's. kFailed: only its recording is kept, if
+  /// complete. Otherwise it is removed.
   void Finish(const std::string& scan_id, const FinishedScan& finished);
-  /// Verdict, numbers and reason go into the log. kConflict where a newer scan of the patient is
-  /// done or runs, and for a result that is not in tolerance without a reason.
+  /// Verdict, numbers and reason are logged. kConflict if a newer scan of the patient is done or
+  /// running, and for a result that is not in tolerance without a reason.
   void Accept(const web::Actor& actor, const std::string& id, const std::string& reason = {});
 
   /// The scan that has begun and not ended. Stable while the caller holds the connection for

@@ -9,7 +9,8 @@
 namespace plumb {
 namespace {
 
-// Times are microseconds since 1970, UTC. Order comes from ids, which only count up: clocks step.
+// Times are microseconds since 1970, UTC. Order is given by ids, which only increase, because
+// clocks may step.
 constexpr const char* kVersion1 = R"sql(
 CREATE TABLE patients (
   id INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -78,7 +79,7 @@ CREATE TRIGGER audit_no_delete BEFORE DELETE ON audit BEGIN SELECT RAISE(ABORT, 
 CREATE TABLE settings (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 )sql";
 
-// The daily check, and which one the others are compared with. Neither is ever changed.
+// The daily checks and the baseline for comparisons. Neither is ever changed.
 constexpr const char* kVersion2 = R"sql(
 CREATE TABLE checks (
   id INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -103,8 +104,9 @@ CREATE TRIGGER checks_no_delete BEFORE DELETE ON checks BEGIN SELECT RAISE(ABORT
 constexpr const char* kVersion3 =
     "ALTER TABLE refs ADD COLUMN revision INTEGER NOT NULL DEFAULT 1;";
 
-// Treatment sessions, what was known when a scan began and why it was accepted, and paired screens.
-// Scans without a session belong to patient 0, whose number and code no request can name.
+// Treatment sessions, known facts at the beginning of a scan, the reason for its acceptance, and
+// paired displays. Scans without a session belong to patient 0, whose number and code no request
+// can name.
 constexpr const char* kVersion4 = R"sql(
 CREATE TABLE sessions (
   id INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -133,7 +135,7 @@ CREATE TABLE displays (
 )sql";
 
 // Digests of stored files; the numbers of scans that were removed on purpose, so that others count
-// as missing; a digest chain in the audit log. A scan whose files an older Plumb did not see keeps
+// as missing; a digest chain in the audit log. A scan whose files an older Plumb did not find keeps
 // its folder from now on.
 constexpr const char* kVersion5 = R"sql(
 CREATE TABLE scan_files (
@@ -167,7 +169,7 @@ CREATE TABLE templates (
 ) STRICT;
 )sql";
 
-// The room's axes, as they were signed. The newest calibration is used; none is ever changed.
+// The room's axes as they were signed. The newest calibration is used; none is ever changed.
 constexpr const char* kVersion7 = R"sql(
 CREATE TABLE room_calibrations (
   version INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -192,7 +194,7 @@ UPDATE scans SET accepted_at = (SELECT MAX(time) FROM audit WHERE subject = prin
 constexpr std::array<const char*, kSchemaVersion> kSteps = {
     kVersion1, kVersion2, kVersion3, kVersion4, kVersion5, kVersion6, kVersion7, kVersion8};
 
-/// Whether a newer database says that programs of this schema can work with it.
+/// Whether a newer database states that programs with this schema can use it.
 bool IsUsable(Database& database) {
   Statement tables = database.Prepare("SELECT 1 FROM sqlite_master WHERE name = 'settings'");
   if (!tables.Step()) return false;

@@ -1,4 +1,4 @@
-// The tables of the store, and how older ones become today's.
+// The tables of the store, and their migration from older versions.
 #pragma once
 
 #include "daemon/records/database.hpp"
@@ -7,17 +7,17 @@ namespace plumb {
 
 inline constexpr int kSchemaVersion = 8;
 
-/// The oldest schema whose programs can work with a database of kSchemaVersion: after an update was
-/// left again, the version before it has to start with the data. A step that only adds tables, and
-/// columns with a default, leaves it as it is; any other step sets it to its own number.
+/// The oldest schema whose programs can use a database of kSchemaVersion: after an update is rolled
+/// back, the previous version has to start with the data. A migration that only adds tables, and
+/// columns with a default, leaves it unchanged; any other migration sets it to its own number.
 inline constexpr int kUsableFromSchema = 8;
 
-/// Where the database itself says so, in the table `settings`.
+/// Location of this statement in the database, in the table `settings`.
 inline constexpr const char* kUsableFromName = "usable_from_schema";
 
-/// Brings the database to kSchemaVersion, step by step, each in a transaction. One of a newer Plumb
-/// stays as it is if it says that this one can work with it.
-/// @throws DatabaseCorrupt if it says nothing of the kind.
+/// Migrates the database to kSchemaVersion step by step, each in a transaction. A database of a
+/// newer Plumb is left unchanged if it states that this version can use it.
+/// @throws DatabaseCorrupt otherwise.
 void Migrate(Database& database);
 
 }  // namespace plumb

@@ -37,7 +37,7 @@ void RequireWritable(const fs::path& state) {
                   state.string(), std::strerror(reason)));
 }
 
-/// A program that copies the database holds it for a while: another plumbd does not let go.
+/// A program that copies the database holds it for a while; another plumbd does not release it.
 std::unique_ptr<Database> OpenChecked(const fs::path& state, const StoreOptions& options,
                                       bool& is_checked) {
   constexpr std::chrono::milliseconds kPause(500);
@@ -104,7 +104,7 @@ Store::Store(const fs::path& folder, ReadOnly)
       database_(std::make_unique<Database>(folders.state() / kDatabase, Database::Access::kFrozen),
                 folders.state() / kDatabase, Database::Access::kFrozen),
       integrity(database_, folders, LookAt) {
-  (void)patients.List();  // the tables are there
+  (void)patients.List();  // fails if the tables do not exist
 }
 
 std::unique_ptr<Store> Store::OpenReadable(const fs::path& folder) {

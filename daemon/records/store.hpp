@@ -1,4 +1,4 @@
-// The store: what the appliance keeps. SQLite beside folders of files.
+// The store of the appliance: SQLite beside folders of files.
 #pragma once
 
 #include <chrono>
@@ -25,14 +25,14 @@
 
 namespace plumb {
 
-/// Held on a folder while one store has it, against another process's.
+/// Locks a folder for one store, against other processes.
 class FolderLock {
  public:
   FolderLock() = default;
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;
   FolderLock& operator=(const FolderLock&) = delete;
-  /// @throws DatabaseBusy if another has it.
+  /// @throws DatabaseBusy if another process has it.
   void Take(const std::filesystem::path& folder);
 
  private:
@@ -41,29 +41,29 @@ class FolderLock {
 
 struct StoreOptions {
   LookAtPath look = LookAt;
-  /// A database that another process holds is asked for again until then; a copying program lets
-  /// go of it.
+  /// Time during which a database held by another process is retried; a copying program releases
+  /// it.
   std::chrono::milliseconds lock_wait = std::chrono::minutes(1);
-  std::chrono::milliseconds busy_wait = std::chrono::seconds(5);  ///< Within each of these.
-  std::function<void(std::chrono::milliseconds)> sleep = {};      ///< Empty: the thread's.
-  /// The database is looked at for so long before the start goes on.
+  std::chrono::milliseconds busy_wait = std::chrono::seconds(5);  ///< For each of the retries.
+  std::function<void(std::chrono::milliseconds)> sleep = {};      ///< Empty: the thread's sleep.
+  /// Time for the database check at the start.
   std::chrono::milliseconds check_limit = std::chrono::seconds(20);
 };
 
-/// Opens DIR/plumb.db and DIR/scans/ID/ and owns the services over them. Whoever needs a record
-/// uses the service for it. Each change and its entry in the audit log are one transaction.
+/// Opens DIR/plumb.db and DIR/scans/ID/ and owns the services over them. Users of a record call its
+/// service. Each change and its entry in the audit log are one transaction.
 class Store {
  public:
-  /// Opens or makes the store, checks and migrates the database, recovers from a crash.
+  /// Opens or creates the store, checks and migrates the database, and recovers from a crash.
   /// @throws IoError and its kinds: DatabaseCorrupt, DiskRefused.
   explicit Store(const std::filesystem::path& folder, const StoreOptions& options = {});
-  /// What can be read of a store on a disk that cannot be written: nothing is checked, put right or
-  /// changed; every change throws DiskRefused.
+  /// Opens what can be read of a store on a disk that cannot be written: nothing is checked,
+  /// repaired or changed, and every change throws DiskRefused.
   /// @throws IoError and its kinds.
   [[nodiscard]] static std::unique_ptr<Store> OpenReadable(const std::filesystem::path& folder);
 
-  /// Tries to write beside the database. @throws DiskRefused saying why that fails, unless the disk
-  /// is only full.
+  /// Tries to write beside the database.
+  /// @throws DiskRefused with the reason if that fails, unless the disk is only full.
   void CheckWritable() const;
   [[nodiscard]] const RecoveryReport& recovery() const { return recovery_; }
   /// For work on the rows of any table, such as the import of a patient.
@@ -81,7 +81,7 @@ class Store {
   RemovalGate gate_;
 
  public:
-  // Declared after what they use.
+  // Declared after the members that they use.
   AuditStore audit{database_};
   SettingsStore settings{database_};
   UserStore users{database_};

@@ -1,4 +1,4 @@
-// Backups of a store that is in use.
+// Backs up a store that is in use.
 #pragma once
 
 #include <filesystem>
@@ -13,12 +13,12 @@ namespace plumb {
 /// Thread-safe.
 class StoreBackup {
  public:
-  /// All are borrowed; live longer.
+  /// All are borrowed and outlive this object.
   StoreBackup(StoreDatabase& database, const ScanFolders& folders, RemovalGate& gate)
       : database_(database), folders_(folders), gate_(gate) {}
 
-  /// While scans go on; nothing is removed meanwhile. See backup.hpp.
-  /// @throws StoreRefusal where one is being made already; IoError; Interrupted
+  /// While scans continue; nothing is removed meanwhile. See backup.hpp.
+  /// @throws StoreRefusal if a backup is being made already; IoError; Interrupted
   BackupReport Make(const web::Actor& actor, const std::filesystem::path& target,
                     const std::stop_token& stop = {}, const BackupSecret* secret = nullptr);
 

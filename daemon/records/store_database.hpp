@@ -1,4 +1,4 @@
-// The one database of a store, as its services share it.
+// The one database of a store, shared by its services.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,11 @@
 namespace plumb {
 
 /// Three connections to one file: one makes all changes, one reads single rows, one reads lists.
-/// Reading never waits for the disk writes of a change, nor a row for a list. Thread-safe: a
+/// Reads never wait for the disk writes of a change, nor a row for a list. Thread-safe: a
 /// connection is held by one thread at a time.
 class StoreDatabase {
  public:
-  /// A connection, held by the calling thread until this object ends.
+  /// A connection, held by the calling thread during the lifetime of this object.
   class Held {
    public:
     Database* operator->() const { return database_; }
@@ -30,14 +30,14 @@ class StoreDatabase {
     Database* database_;
   };
 
-  /// @param write    The connection for changes; its tables are those of this version.
+  /// @param write    The connection for changes, with tables of this version.
   /// @param readers  How the two others open the same file.
   /// @throws IoError and its kinds
   StoreDatabase(std::unique_ptr<Database> write, const std::filesystem::path& file,
                 Database::Access readers);
 
   [[nodiscard]] Held ForChanges() { return {write_mutex_, *write_}; }
-  [[nodiscard]] Held ForRows() { return {row_mutex_, row_}; }  ///< For the event loop too.
+  [[nodiscard]] Held ForRows() { return {row_mutex_, row_}; }  ///< Also for the event loop.
   [[nodiscard]] Held ForLists() { return {list_mutex_, list_}; }
 
  private:
@@ -49,7 +49,7 @@ class StoreDatabase {
   Database list_;
 };
 
-/// One change and its entries in the audit log, as one transaction. Undone unless Commit() is
+/// One change and its entries in the audit log, as one transaction. Rolled back unless Commit() is
 /// called. Other changes wait until it ends.
 class StoreChange {
  public:

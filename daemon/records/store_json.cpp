@@ -21,7 +21,7 @@ using Json = nlohmann::json;
       why));
 }
 
-/// Nothing where markers on the couch show no shift.
+/// Nothing if couch-fixed markers do not determine shifts.
 std::optional<double> Shift(const Json& json, const char* key) {
   const auto found = json.find(key);
   if (found == json.end() || found->is_null()) return std::nullopt;
@@ -36,7 +36,7 @@ double Angle(const Json& json, const char* key) {
   return found->get<double>();
 }
 
-/// A missing angle is never taken for none.
+/// A missing angle is never treated as zero.
 web::SixNumbers NumbersOf(const Json& json) {
   return {.vertical_mm = Shift(json, "vertical_mm"),
           .longitudinal_mm = Shift(json, "longitudinal_mm"),
@@ -46,7 +46,7 @@ web::SixNumbers NumbersOf(const Json& json) {
           .yaw_deg = Angle(json, "yaw_deg")};
 }
 
-/// An object, or nothing where it is missing or null.
+/// An object; nothing if it is missing or null.
 const Json* ObjectIn(const Json& json, const char* key) {
   const auto found = json.find(key);
   if (found == json.end() || found->is_null()) return nullptr;
@@ -85,7 +85,7 @@ void ReadWords(const Json& result, web::ResultSummary& summary) {
   }
 }
 
-/// A stored object whose values are taken one by one and checked.
+/// A stored object whose values are read one by one and checked.
 class Stored {
  public:
   Stored(const std::string& text, const char* what)

@@ -1,4 +1,4 @@
-// Plans, settings and result summaries as the store's JSON.
+// Storage format of plans, settings and result summaries.
 #pragma once
 
 #include <string>
@@ -8,21 +8,22 @@
 namespace plumb {
 
 [[nodiscard]] std::string PlanJson(const web::ReferencePlan& plan);
-/// What decides about a patient is never guessed: all must be there and make sense.
-/// @throws DataError saying what is wrong with it.
+/// Values that decide about a patient are never guessed: all must be present and valid.
+/// @throws DataError stating what is wrong.
 [[nodiscard]] web::ReferencePlan ParsePlan(const std::string& text);
 
 [[nodiscard]] std::string SettingsJson(const web::Settings& settings);
-/// For the log: {"NAME": [before, after]} of every setting that differs; a setting that `stored`
-/// does not hold is [after] alone.
-/// @param stored  As SettingsJson() wrote it, or anything else.
+/// For the log: {"NAME": [before, after]} for every setting that differs; [after] alone for a
+/// setting that `stored` does not contain.
+/// @param stored  As written by SettingsJson(), or anything else.
 [[nodiscard]] std::string SettingsChanges(const std::string& stored, const web::Settings& settings);
-/// What an older Plumb did not know may be missing and has its default; nothing else.
-/// @throws DataError saying what is wrong with it.
+/// Settings that an older Plumb did not know may be missing and get their default; nothing else
+/// may.
+/// @throws DataError stating what is wrong.
 [[nodiscard]] web::Settings ParseSettings(const std::string& text);
 
-/// The list entry of a result.json. Numbers that are missing are never taken for zero.
-/// @throws DataError saying what is wrong with it.
+/// The list entry of a result.json. Missing numbers are never treated as zero.
+/// @throws DataError stating what is wrong.
 [[nodiscard]] web::ResultSummary SummaryOf(const std::string& result_json);
 
 }  // namespace plumb

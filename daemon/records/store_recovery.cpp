@@ -19,17 +19,17 @@ using store::ScanId;
 
 namespace {
 
-/// In the state folder; says that missing scans are gone for good.
+/// In the state folder; states that missing scans are lost for good.
 constexpr const char* kLostFile = "scans-are-lost";
 
-/// A finished scan and what a look at its files gave.
+/// A finished scan and the result of examining its files.
 struct LookedAt {
   std::int64_t id = 0;
-  std::string before, now;  ///< Why its files cannot be used; empty: they can.
+  std::string before, now;  ///< Why its files cannot be used; empty if they can.
   bool is_approved = false;
 };
 
-/// One start of a store. Borrows what it is given.
+/// One start of a store. Borrows its arguments.
 class Recovery {
  public:
   Recovery(Database& database, const ScanFolders& folders, const LookAtPath& look,
@@ -66,10 +66,10 @@ void Recovery::Run() {
   transaction.Commit();
   for (const fs::path& folder : folders_.All()) CollectOrphan(folder);
   std::error_code ignored;
-  fs::remove(folders_.state() / kLostFile, ignored);  // it was for this start
+  fs::remove(folders_.state() / kLostFile, ignored);  // valid for this start only
 }
 
-/// One look at each: whether a file is there and has its size. Its content is checked later.
+/// Examines each file once: whether it exists and has its size. Its content is checked later.
 std::vector<LookedAt> Recovery::LookAtScans() {
   std::vector<LookedAt> scans;
   std::vector<bool> has_scene;
@@ -87,14 +87,15 @@ std::vector<LookedAt> Recovery::LookAtScans() {
   }
   for (std::size_t i = 0; i < scans.size(); ++i) {
     std::vector<FileDigest> files = StoredDigests(database_, scans[i].id);
-    if (files.empty() && has_scene[i])  // of an older Plumb, and not looked at since
+    if (files.empty() && has_scene[i])  // stored by an older Plumb, and not examined since
       files.push_back({.path = kSceneMarker, .sha256 = {}});
     scans[i].now = WhyNotThere(folders_.Scan(ScanId(scans[i].id)), files, look_);
   }
   return scans;
 }
 
-/// One scan that is gone is an accident; half of all at once is a disk that is not mounted.
+/// A single missing scan is an accident; half of all scans missing at once is a disk that is not
+/// mounted.
 void Recovery::RefuseIfMostAreMissing(const std::vector<LookedAt>& scans) {
   std::size_t seen_before = 0, missing = 0;
   const LookedAt* first = nullptr;
@@ -124,7 +125,7 @@ void Recovery::NoteAvailability(const std::vector<LookedAt>& scans) {
   }
 }
 
-/// What a crash or a removal left goes; what no row explains is kept.
+/// Removes the remains of a crash or a removal; keeps folders that no row explains.
 void Recovery::CollectOrphan(const fs::path& folder) {
   if (ScanFolders::IsStaging(folder)) return Discard(folder, "of a scan that had not ended");
   const std::string name = folder.filename().string();
@@ -163,7 +164,7 @@ void Recovery::Discard(const fs::path& folder, const std::string& why) {
   transaction.Commit();
 }
 
-/// Its number may be given to another scan. Where scans/ is a disk of its own it stays on that.
+/// Its number may be assigned to another scan. If scans/ is a separate disk, it stays on that disk.
 void Recovery::SetAside(const fs::path& folder, const std::string& name, const std::string& why) {
   std::error_code error;
   fs::path target;

@@ -1,4 +1,4 @@
-// What a start finds after a crash, and puts right.
+// Recovery of the store at a start after a crash.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,7 @@
 
 namespace plumb {
 
-/// Most of the stored scans cannot be seen: supposedly their disk is not mounted. Nothing was
+/// Most of the stored scans cannot be found; probably their disk is not mounted. Nothing was
 /// changed.
 class ScansMissing : public DiskRefused {
  public:
@@ -18,22 +18,24 @@ class ScansMissing : public DiskRefused {
 
 /// Each step is in the audit log too.
 struct RecoveryReport {
-  int interrupted_scans = 0;     ///< Had begun and not ended: failed now.
-  int orphaned_folders = 0;      ///< Staging, or of scans that failed or were removed: removed.
-  int foreign_folders = 0;       ///< Of scans that no row records as ended; moved to set-aside.
-  int lost_scans = 0;            ///< Finished, but their files cannot be seen now: unavailable.
-  int attached_scans = 0;        ///< Were unavailable, and their files are there again.
-  int broken_references = 0;     ///< Approved, but their scene cannot be seen: to be shown loudly.
-  bool checked_database = true;  ///< False: there was not time to look at all of it.
+  int interrupted_scans = 0;  ///< Had begun and not ended; marked as failed.
+  /// Staging folders, or folders of scans that failed or were removed; deleted.
+  int orphaned_folders = 0;
+  int foreign_folders = 0;  ///< Folders of scans that no row records as ended; moved to set-aside.
+  int lost_scans = 0;       ///< Finished, but their files cannot be found; marked unavailable.
+  int attached_scans = 0;   ///< Were unavailable, and their files are there again.
+  /// Approved, but their scene cannot be found; to be shown prominently.
+  int broken_references = 0;
+  bool checked_database = true;  ///< False: there was not enough time to check all of it.
 };
 
-/// A database that was lost must not pass for a new one: every scan would be an orphan.
-/// @throws DatabaseCorrupt where the database is new and there are scans.
+/// A lost database must not be replaced by a new one, to which every scan would be an orphan.
+/// @throws DatabaseCorrupt if the database is new and there are scans.
 void RefuseScansOfAnother(Database& database, const ScanFolders& folders);
 
-/// Fails scans that were interrupted, notes which files are there, removes what a crash or a
-/// removal left, and moves folders that belong to no row to set-aside. The caller holds the
-/// connection for changes.
+/// Fails scans that were interrupted, records which files exist, removes the remains of a crash or
+/// a removal, and moves folders without a row to set-aside. The caller holds the connection for
+/// changes.
 /// @throws ScansMissing; IoError and its kinds
 void RecoverStore(Database& database, const ScanFolders& folders, const LookAtPath& look,
                   RecoveryReport& report);

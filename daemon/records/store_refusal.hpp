@@ -1,4 +1,4 @@
-// A change that a service of the store does not make.
+// A change that a service of the store refuses.
 #pragma once
 
 #include <stdexcept>
@@ -8,7 +8,7 @@
 
 namespace plumb {
 
-/// A change that is not made, and why; the message is for the person who asked.
+/// A refused change and its reason; the message is for the person who requested it.
 class StoreRefusal : public std::runtime_error {
  public:
   StoreRefusal(web::ChangeResult result, const std::string& message)

@@ -59,13 +59,13 @@ std::unique_lock<std::mutex> RemovalGate::LockRemovals() {
 }
 
 RemovalGate::Backup::Backup(RemovalGate& gate) : gate_(gate) {
-  const std::lock_guard lock(gate_.mutex_);  // a removal that has begun ends first
+  const std::lock_guard lock(gate_.mutex_);  // a removal in progress ends first
   if (gate_.backing_up_.exchange(true))
     throw StoreRefusal(web::ChangeResult::kConflict, "a backup is being made already");
 }
 
 void StoreRemoval::RemoveFiles(const std::string& scan_id) {
-  std::error_code ignored;  // what stays goes at the next start
+  std::error_code ignored;  // remaining files are removed at the next start
   fs::remove_all(folders_.Scan(scan_id), ignored);
   fs::remove_all(folders_.Staging(scan_id), ignored);
   fs::remove_all(folders_.Interrupted(scan_id), ignored);
@@ -98,10 +98,10 @@ void StoreRemoval::WipePatient(const web::Actor& actor, const std::string& id) {
     change.Commit();
   }
   for (const std::string& scan : scans)
-    RemoveFiles(scan);  // what a crash leaves here goes at the next start
+    RemoveFiles(scan);  // remaining files after a crash are removed at the next start
   std::error_code ignored;
   fs::remove(folders_.state() / "imports" / (std::to_string(number) + ".json"), ignored);
-  // Nor does the write-ahead log keep what was wiped.
+  // The write-ahead log must not keep the wiped data either.
   database_.ForChanges()->Prepare("PRAGMA wal_checkpoint(TRUNCATE)").Run();
 }
 
@@ -131,7 +131,8 @@ void StoreRemoval::RemoveScan(const web::Actor& actor, const std::string& id,
   RemoveFiles(ScanId(*number));
 }
 
-/// Its files go after the lock is free: a scan that begins meanwhile must not wait for a slow disk.
+/// Its files are removed after the lock is released: a scan that begins meanwhile must not wait for
+/// a slow disk.
 bool StoreRemoval::ForgetScan(const std::string& scan_id) {
   const std::unique_lock removals = gate_.LockRemovals();
   {
@@ -157,8 +158,8 @@ int StoreRemoval::RemoveOldScans(int retention_days, const std::stop_token& stop
   std::vector<std::string> old;
   {
     const StoreDatabase::Held writer = database_.ForChanges();
-    // Numbers only count up while clocks step: no scan is older than one before it, and stamps of
-    // the future are wrong.
+    // Numbers only increase while clocks may step: no scan is older than its predecessor, and times
+    // in the future are wrong.
     Statement query = writer->Prepare(
         "SELECT id FROM (SELECT id, outcome, max(CASE WHEN started_at <= ? THEN started_at ELSE 0 "
         "END) OVER (ORDER BY id) AS since"
@@ -175,7 +176,7 @@ int StoreRemoval::RemoveOldScans(int retention_days, const std::stop_token& stop
   return num_removed;
 }
 
-/// Its digest goes first: what is removed on purpose is not missed.
+/// Its digest is removed first, so that the recording does not count as missing.
 void StoreRemoval::ForgetRecording(const std::string& scan_id) {
   const std::unique_lock removals = gate_.LockRemovals();
   {
@@ -202,7 +203,7 @@ int StoreRemoval::KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token
         ScansOf(writer->Prepare("SELECT id FROM scans WHERE has_folder = 1 "
                                 "AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id"));
   }
-  for (const std::string& scan : all) {  // raw recordings are large, and nothing hangs on them
+  for (const std::string& scan : all) {  // raw recordings are large, and nothing depends on them
     const fs::path recording = folders_.Scan(scan) / kRecordingFolder;
     std::error_code ignored;
     if (bytes <= max_bytes || stop.stop_requested() || !fs::exists(recording, ignored)) continue;
@@ -213,7 +214,7 @@ int StoreRemoval::KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token
   for (const std::string& scan : removable) {
     if (bytes <= max_bytes || stop.stop_requested()) break;
     const std::uint64_t its_bytes = BytesOf(folders_.Scan(scan), stop);
-    if (!ForgetScan(scan)) continue;  // a reference by now
+    if (!ForgetScan(scan)) continue;  // it has become a reference
     bytes -= std::min(bytes, its_bytes);
     ++num_touched;
   }

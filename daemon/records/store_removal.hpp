@@ -1,4 +1,4 @@
-// Removes scans and patients, on request and for their age or the space that they take.
+// Removes scans and patients, on request or because of their age or the space that they take.
 #pragma once
 
 #include <atomic>
@@ -13,13 +13,13 @@
 
 namespace plumb {
 
-/// Keeps removals and backups apart: nothing is removed while a backup is made.
+/// Excludes removals and backups from each other: nothing is removed while a backup is made.
 class RemovalGate {
  public:
   /// Held while files are removed. @throws StoreRefusal while a backup is made.
   [[nodiscard]] std::unique_lock<std::mutex> LockRemovals();
 
-  /// Exists while a backup is made. @throws StoreRefusal where one is being made already.
+  /// Exists while a backup is made. @throws StoreRefusal if one is being made already.
   class Backup {
    public:
     explicit Backup(RemovalGate& gate);
@@ -36,25 +36,25 @@ class RemovalGate {
   std::atomic<bool> backing_up_ = false;
 };
 
-/// Thread-safe. Files go after the database's lock is free: a scan that begins meanwhile must not
-/// wait for a slow disk. Throws StoreRefusal, and IoError and its kinds.
+/// Thread-safe. Files are removed after the database's lock is released: a scan that begins
+/// meanwhile must not wait for a slow disk. Throws StoreRefusal, and IoError and its kinds.
 class StoreRemoval {
  public:
-  /// All are borrowed; live longer.
+  /// All are borrowed and outlive this object.
   StoreRemoval(StoreDatabase& database, const ScanFolders& folders, const ScanStore& scans,
                RemovalGate& gate)
       : database_(database), folders_(folders), scans_(scans), gate_(gate) {}
 
-  /// Removes all that is stored of a patient but the entries of the log.
+  /// Removes all stored data of a patient except the entries of the log.
   void WipePatient(const web::Actor& actor, const std::string& id);
-  /// kConflict for a scan that references are made of, that runs, and while a backup is made;
-  /// kInvalid without a reason.
+  /// kConflict for a scan that references are made from, for a running scan, and while a backup is
+  /// made; kInvalid without a reason.
   void RemoveScan(const web::Actor& actor, const std::string& id, const std::string& reason);
-  /// Removes scans older than so many days (0: none) but those that references are made of. Gives
-  /// how many. Their age is by the wall clock: call it while that can be trusted.
+  /// Removes scans older than the given number of days (0: none) except those that references are
+  /// made from. Returns how many. Age is by the wall clock: call it only while that can be trusted.
   int RemoveOldScans(int retention_days, const std::stop_token& stop = {});
-  /// Removes the oldest recordings, then the oldest scans as above, until the scans take at most so
-  /// many bytes. Gives how many scans lost something.
+  /// Removes the oldest recordings, then the oldest scans as above, until the scans take at most
+  /// the given number of bytes. Returns how many scans lost something.
   int KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop = {});
 
  private:

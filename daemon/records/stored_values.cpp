@@ -52,7 +52,7 @@ const char* Name(web::Role role) {
 
 namespace {
 
-/// The value of that name. @throws DataError where there is none.
+/// The value with that name. @throws DataError if there is none.
 template <typename Value, std::size_t kSize>
 Value Parse(const char* what, std::string_view name,
             const std::array<std::string_view, kSize>& names) {

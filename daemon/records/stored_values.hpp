@@ -1,4 +1,4 @@
-// Times, numbers and names as the columns of the database hold them.
+// Times, numbers and names as stored in the columns of the database.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace plumb::store {
 
-/// The appliance itself, as the audit log names it.
+/// The appliance itself, as named in the audit log.
 inline const web::Actor kSelf{.user = "plumbd", .address = ""};
 
 /// Microseconds since 1970.
@@ -19,7 +19,7 @@ inline const web::Actor kSelf{.user = "plumbd", .address = ""};
 /// The time now, as it is stored.
 [[nodiscard]] std::int64_t Now();
 
-/// A number as it comes from outside; nothing if no record can have it.
+/// An id from outside; nothing if no record can have it.
 [[nodiscard]] std::optional<std::int64_t> ParseId(std::string_view text);
 /// The same. @throws StoreRefusal (kNotFound) naming what does not exist.
 [[nodiscard]] std::int64_t RequireId(const std::string& text, const char* what);

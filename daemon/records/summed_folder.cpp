@@ -60,7 +60,7 @@ SummedWriter::SummedWriter(const fs::path& target, const SummedKind& kind, Outpu
       output_(target, std::move(output)),
       cipher_(secret != nullptr ? std::make_unique<FileCipher>(*secret) : nullptr),
       stop_(std::move(stop)) {
-  ::chmod(output_.path().c_str(), 0700);  // it holds patients' data
+  ::chmod(output_.path().c_str(), 0700);  // it contains patients' data
 }
 
 std::string SummedWriter::Copied(const fs::path& from, const std::string& path) {

@@ -1,6 +1,6 @@
-// Folders that leave the appliance: files, SHA256SUMS of each as `sha256sum -c` reads it, and a
-// JSON file about the whole. Encrypted where a key is given; the sums are then of what lies on the
-// disk, and signed with the key.
+// Folders that leave the appliance: files, SHA256SUMS of each in the format of `sha256sum -c`, and
+// a JSON file about the whole. Encrypted if a key is given; the sums are then those of the
+// encrypted files, and signed with the key.
 #pragma once
 
 #include <functional>
@@ -16,7 +16,7 @@
 
 namespace plumb {
 
-/// What kind of folder it is. Of a path within it `may_hold` says if it can be one of its files.
+/// A kind of folder. `may_hold` decides whether a path in it can be one of its files.
 struct SummedKind {
   const char* name;        ///< For messages: "backup".
   const char* about_file;  ///< "backup.json"
@@ -24,27 +24,28 @@ struct SummedKind {
   std::function<bool(const std::string& path)> may_hold;
 };
 
-/// Plain path of files in folders, none of it "..", ".", empty or with control characters.
+/// Plain path of a file in folders, without "..", ".", empty parts or control characters.
 [[nodiscard]] bool IsPlainPath(const std::string& path);
 
-/// Regular files below a folder, relative to `top`, by path. @throws IoError
+/// Regular files in a folder, relative to `top`, by path. @throws IoError
 [[nodiscard]] std::vector<std::string> FilesBelow(const std::filesystem::path& top,
                                                   const std::filesystem::path& folder);
 
-/// One that is being written. It appears with Commit(), or not at all.
+/// A folder that is being written. It appears with Commit(), or not at all.
 class SummedWriter {
  public:
   /// @param secret  Null: nothing is encrypted.
   SummedWriter(const std::filesystem::path& target, const SummedKind& kind, OutputKind output,
                const BackupSecret* secret, std::stop_token stop);
 
-  /// Copies a file of another folder. Gives the digest of its content, or nothing where it cannot
-  /// be read or named, which is a problem then. @throws IoError if it cannot be written
+  /// Copies a file of another folder. Returns the digest of its content; nothing if it cannot be
+  /// read or named, which is then reported as a problem.
+  /// @throws IoError if it cannot be written
   std::string Add(const std::filesystem::path& from, const std::string& path);
-  /// Copies one that must be there. @throws IoError
+  /// Copies a file that must exist. @throws IoError
   void AddOwn(const std::filesystem::path& from, const std::string& path);
   void Report(std::string problem);
-  /// Writes the sums and, with what it says itself, `about`. @throws IoError
+  /// Writes the sums and `about`, to which it adds its own facts. @throws IoError
   void Commit(nlohmann::ordered_json about);
 
   [[nodiscard]] std::size_t files() const { return files_; }
@@ -64,20 +65,20 @@ class SummedWriter {
   std::vector<std::string> problems_;
 };
 
-/// One that is read; not to be trusted.
+/// A folder that is being read; it is not trusted.
 class SummedReader {
  public:
-  /// Reads what it says of itself. @throws DataError naming the folder: none of this kind, made by
-  /// a newer Plumb, sums changed, encrypted and no secret or another one, or not encrypted though a
-  /// secret is given
+  /// Reads the facts about it.
+  /// @throws DataError naming the folder: not of this kind, made by a newer Plumb, sums changed,
+  ///         encrypted without or with another secret, or not encrypted though a secret is given
   SummedReader(std::filesystem::path folder, SummedKind kind, const BackupSecret* secret);
 
   [[nodiscard]] const std::vector<FileDigest>& files() const { return files_; }
   [[nodiscard]] const std::string& digest() const { return digest_; }  ///< Of SHA256SUMS.
-  /// Holds every file against its sum. @throws DataError naming the first that is damaged
+  /// Compares every file with its sum. @throws DataError naming the first that is damaged
   void Verify(const std::stop_token& stop) const;
-  /// Copies one, decrypted, and gives what it is then. @throws DataError if it is not what it was;
-  /// IoError if it cannot be written
+  /// Copies one file, decrypted, and returns the facts of the result.
+  /// @throws DataError if it has changed; IoError if it cannot be written
   FileDigest CopyTo(const std::filesystem::path& to, const FileDigest& file,
                     const std::stop_token& stop) const;
   [[noreturn]] void Fail(const std::string& why) const;

@@ -1,4 +1,4 @@
-// Templates of plans: one for each site of treatment.
+// Templates of plans, one for each treatment site.
 #pragma once
 
 #include <string>

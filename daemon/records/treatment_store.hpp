@@ -1,4 +1,4 @@
-// Treatment sessions: the patient who lies on the couch.
+// Treatment sessions: the patient on the couch.
 #pragma once
 
 #include <optional>
@@ -14,7 +14,7 @@ class TreatmentStore {
  public:
   explicit TreatmentStore(StoreDatabase& database) : database_(database) {}
 
-  /// Closes the session that is open, if any, and opens one. Gives the id.
+  /// Closes the open session, if any, and opens one. Returns the id.
   std::string Open(const web::Actor& actor, const std::string& patient_id,
                    web::ScanPurpose purpose);
   void CloseAll(const web::Actor& actor);

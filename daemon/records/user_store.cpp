@@ -14,8 +14,8 @@ using web::ChangeResult;
 
 namespace {
 
-/// An account whose role cannot be read is closed, not left out: where no account is seen at all,
-/// the page offers to make the first one.
+/// An account whose role cannot be read is disabled, not left out: if no account were found, the
+/// page would offer to create the first one.
 web::User ReadUser(const Statement& row) {
   web::User user{.name = row.Text(0),
                  .role = web::Role::kTechnician,

@@ -1,4 +1,4 @@
-// The accounts of those who use the page.
+// The accounts of the users of the page.
 #pragma once
 
 #include <optional>
@@ -19,7 +19,7 @@ class UserStore {
   [[nodiscard]] std::optional<web::User> Find(const std::string& name);
   /// kConflict for a name that another account has.
   void Add(const web::Actor& actor, const web::User& user);
-  /// kConflict where no enabled engineer would be left.
+  /// kConflict if no enabled engineer would be left.
   void Change(const web::Actor& actor, const web::UserChange& wanted);
 
  private:

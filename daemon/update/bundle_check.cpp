@@ -15,7 +15,8 @@
 namespace plumb {
 namespace {
 
-/// A bundle ends with its signature and, in eight bytes, that one's size; it begins as a squashfs.
+/// A bundle ends with its signature and the signature's size in eight bytes; it begins as a
+/// squashfs.
 constexpr std::string_view kSquashfs = "hsqs";
 constexpr std::uint64_t kMaxSignature = 64 << 10;
 constexpr std::uint64_t kLeastBundle = 4096;

@@ -1,4 +1,4 @@
-// A bundle that somebody handed over as an open file.
+// Copies a bundle that was passed as an open file.
 #pragma once
 
 #include <cstdint>
@@ -6,10 +6,10 @@
 
 namespace plumb {
 
-/// Copies a regular file into the folder, under a name that the next start removes if nobody takes
-/// it. What is left of a failed copy is removed.
-/// @throws DataError for no regular file and for a too large one, IoError where it cannot be
-/// written or the disk would be too full for scans then.
+/// Copies a regular file into the folder, under a name that the next start removes if it is not
+/// used. Remains of a failed copy are removed.
+/// @throws DataError if it is not a regular file or is too large, IoError if it cannot be written
+///         or would leave too little space for scans.
 [[nodiscard]] std::filesystem::path CopyBundle(int fd, const std::filesystem::path& folder,
                                                std::uint64_t max_bytes);
 

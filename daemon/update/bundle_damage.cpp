@@ -1,6 +1,6 @@
-// Whether a bundle still is what was signed. A bundle is a squashfs, behind it a signature (CMS,
-// DER) and in eight bytes the signature's size. Signed attributes hold the SHA-256 of what was
-// signed: of the squashfs (plain format), or of the manifest, which then is part of the CMS (verity
+// Whether a bundle is still what was signed. A bundle is a squashfs, followed by a signature (CMS,
+// DER) and the signature's size in eight bytes. Signed attributes contain the SHA-256 of the signed
+// data: of the squashfs (plain format), or of the manifest, which is then part of the CMS (verity
 // format).
 #include <fcntl.h>
 #include <sodium.h>
@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::uint64_t kMaxSignature = 64 << 10;
 constexpr std::string_view kManifestBegin = "[update]";
-/// Object identifier of SHA-256 as DER has it: without it another digest was used.
+/// Object identifier of SHA-256 in DER; without it another digest was used.
 constexpr std::array<unsigned char, 11> kSha256{0x06, 0x09, 0x60, 0x86, 0x48, 0x01,
                                                 0x65, 0x03, 0x04, 0x02, 0x01};
 
@@ -58,7 +58,7 @@ class File {
   int fd_;
 };
 
-/// The content that a CMS carries, from its own beginning on; its length stands in front of it.
+/// The content of a CMS from its own beginning on; its length precedes it.
 std::optional<Bytes> ManifestIn(const Bytes& cms) {
   const auto begin =
       std::search(cms.begin(), cms.end(), kManifestBegin.begin(), kManifestBegin.end());

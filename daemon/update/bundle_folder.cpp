@@ -27,8 +27,8 @@ constexpr std::size_t kMaxListed = 32;
 constexpr std::size_t kMaxKept = 4;
 constexpr std::string_view kEnding = ".raucb";
 
-/// Keeps a file open, and closes it on another thread where there is one: to free a large file
-/// takes its time.
+/// Keeps a file open and closes it on another thread if there is one, because freeing a large file
+/// takes time.
 class DeferredClose {
  public:
   DeferredClose(const std::filesystem::path& file, const BundleFolder::Aside& aside)
@@ -79,7 +79,7 @@ web::Change BundleFolder::Add(const std::filesystem::path& file, const std::stri
   if (!is_known && known.size() >= kMaxKept)
     return Refused(ChangeResult::kConflict, "there are too many bundles: remove one first");
   const DeferredClose replaced(folder_ / name, aside_);
-  // A power cut soon after would else leave the name with nothing behind it.
+  // Otherwise a power cut soon after could leave the name without contents.
   try {
     SyncToDisk(file);
     if (::rename(file.c_str(), (folder_ / name).c_str()) != 0)

@@ -1,4 +1,4 @@
-// The folder in which bundles wait to be installed.
+// The folder of bundles that wait to be installed.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace plumb {
 
 [[nodiscard]] web::Change Refused(web::ChangeResult result, std::string message);
 
-/// Files named NAME.raucb. One thread.
+/// Files named NAME.raucb. Not thread-safe.
 class BundleFolder {
  public:
   using Aside = std::function<bool(std::function<void()>)>;
@@ -25,11 +25,11 @@ class BundleFolder {
   /// Names, sorted; at most 32.
   [[nodiscard]] std::vector<std::string> List() const;
   [[nodiscard]] bool Has(const std::string& name) const;
-  /// Takes a file among the bundles, by moving it: kInvalid where it can be none, kConflict where
-  /// there are too many.
+  /// Moves a file into the folder: kInvalid if it cannot be a bundle, kConflict if there are too
+  /// many.
   [[nodiscard]] web::Change Add(const std::filesystem::path& file, const std::string& name) const;
   [[nodiscard]] web::Change Remove(const std::string& name) const;
-  /// What was being sent when the power went.
+  /// Removes incomplete uploads from before a power cut.
   void RemoveUnfinished() const;
 
  private:

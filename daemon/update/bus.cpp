@@ -59,7 +59,7 @@ void Bus::Process() {
   std::uint64_t until_us = UINT64_MAX;
   if (sd_bus_get_timeout(bus_, &until_us) >= 0 && until_us != UINT64_MAX) {
     timer_.ArmAt(EventLoop::Clock::time_point(
-        std::chrono::microseconds(until_us)));  // both count the monotonic clock
+        std::chrono::microseconds(until_us)));  // both use the monotonic clock
   } else {
     timer_.Disarm();
   }

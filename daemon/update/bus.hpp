@@ -11,20 +11,20 @@
 
 namespace plumb {
 
-/// Belongs to the loop's thread; its calls are answered there.
+/// Used on the loop's thread, where its calls are answered.
 class Bus {
  public:
-  /// @param name    Of what the loop's meter counts.
+  /// @param name    Name for the loop's meter.
   /// @param broken  Called when an open connection has broken; it is closed by then.
   Bus(EventLoop& loop, const char* name, std::function<void()> broken);
   ~Bus();
   Bus(const Bus&) = delete;
   Bus& operator=(const Bus&) = delete;
 
-  /// @param address  Empty: the system bus. @return False where there is none.
+  /// @param address  Empty: the system bus. @return False if there is none.
   bool Open(const std::string& address, std::chrono::microseconds call_timeout);
   void Close();
-  /// Sends and receives what can be without waiting. After each round of calls from outside the
+  /// Sends and receives as much as possible without waiting. Call it after calls from outside the
   /// loop's callbacks.
   void Process();
   [[nodiscard]] sd_bus* get() const { return bus_; }

@@ -29,7 +29,8 @@ constexpr auto kLookAgain = std::chrono::seconds(5);
 constexpr std::chrono::seconds kCallTimeout{60};  // RAUC reads the whole bundle before it answers
 constexpr std::size_t kMaxText = 500;
 
-/// What a service says is shown to people: bounded, and without anything that is not text.
+/// Texts of a service are shown to people, so they are bounded and stripped of anything that is not
+/// text.
 std::string Shown(const char* text) {
   std::string shown(text != nullptr ? text : "");
   if (shown.size() > kMaxText) shown.resize(kMaxText);
@@ -63,20 +64,23 @@ struct Updater::Impl {
   UpdaterOptions options;
   BundleFolder folder;
   Bus bus;
-  std::optional<LastUpdate> last;  ///< That the machine was not restarted after, or did not keep.
+  /// An update after which the machine was not restarted, or that it did not keep.
+  std::optional<LastUpdate> last;
   bool told_of_roll_back = false;
   std::chrono::steady_clock::time_point looked_at;
   bool is_there = false;
   bool is_installing = false;
   std::string slot, compatible, step, last_error, outcome;
-  std::string version;       ///< Of the bundle that is or was installed.
-  std::string last_failure;  ///< Of the last attempt; empty: it went well, or there was none.
-  BundleState state = BundleState::kUnknown;  ///< Of the bundle that is installed or looked at.
-  std::map<std::string, BundleState> states;  ///< Of those looked at before.
-  std::shared_ptr<bool> alive = std::make_shared<bool>(true);  ///< For work that is done aside.
+  std::string version;  ///< Version of the installing or installed bundle.
+  /// Failure of the last attempt; empty if it succeeded or there was none.
+  std::string last_failure;
+  /// State of the bundle that is being installed or examined.
+  BundleState state = BundleState::kUnknown;
+  std::map<std::string, BundleState> states;  ///< States of bundles examined before.
+  std::shared_ptr<bool> alive = std::make_shared<bool>(true);  ///< For work on other threads.
   EventLoop::Source watch;                                     ///< Armed while RAUC installs.
-  std::chrono::steady_clock::time_point moved_at;              ///< When its progress last changed.
-  bool given_up = false;  ///< The last installation stood still; RAUC may still end it.
+  std::chrono::steady_clock::time_point moved_at;  ///< Time of the last change of its progress.
+  bool given_up = false;  ///< The last installation made no progress; RAUC may still end it.
   double fraction = 0.0;
   std::string bundle;
   web::Done done;
@@ -119,7 +123,7 @@ struct Updater::Impl {
     if (options.changed) options.changed();
   }
 
-  /// Another file has this name by now, or none.
+  /// Another file has this name by now, or none has.
   void ForgetBundle(const std::string& name) {
     states.erase(name);
     Notify();
@@ -129,7 +133,7 @@ struct Updater::Impl {
     if (auto asked = std::exchange(done, nullptr)) asked(change);
   }
 
-  /// Whatever RAUC waits for, people are not left waiting with it.
+  /// Whatever RAUC waits for, users must not be left waiting with it.
   void LookAtProgress() {
     if (!is_installing) return;
     const std::chrono::minutes longest =
@@ -156,7 +160,7 @@ struct Updater::Impl {
     Notify();
   }
 
-  /// The next start must know what was installed, and from where.
+  /// The next start must know what was installed, and from which system.
   void Remember() {
     last = LastUpdate{.version = version, .from_slot = slot, .boot = options.boot};
     told_of_roll_back = false;
@@ -182,7 +186,7 @@ struct Updater::Impl {
     if (options.rolled_back) options.rolled_back(text);
   }
 
-  /// Name and value of one property; what is not known is skipped.
+  /// Name and value of one property; unknown ones are skipped.
   void ReadProperty(sd_bus_message* message) {
     const char* name = nullptr;
     if (sd_bus_message_read_basic(message, 's', &name) < 0) return;
@@ -249,8 +253,8 @@ struct Updater::Impl {
     return 0;
   }
 
-  /// RAUC has gone: it will never say that the installation ended. A call that it has not answered
-  /// is answered by the bus.
+  /// RAUC has left the bus and will never report the end of the installation. A call that it has
+  /// not answered is answered by the bus.
   static int OnOwner(sd_bus_message* message, void* self, sd_bus_error*) {
     auto* impl = static_cast<Impl*>(self);
     const char *name = nullptr, *before = nullptr, *now = nullptr;
@@ -271,7 +275,7 @@ struct Updater::Impl {
     return text.empty() ? "the installer does not say why" : text;
   }
 
-  /// RAUC 1.8 gives no reason over the bus: what the bundle itself shows is said as well.
+  /// RAUC 1.8 gives no reason over the bus, so the findings about the bundle itself are added.
   [[nodiscard]] std::string WhyRefused(const std::string& error) const {
     switch (state) {
       case BundleState::kDamaged:
@@ -290,7 +294,7 @@ struct Updater::Impl {
     return "the installer refuses this bundle: " + error;
   }
 
-  /// RAUC has looked at the bundle: its signature is good, and this is what it is.
+  /// RAUC has checked the bundle: its signature is valid, and these are its properties.
   static int OnInfo(sd_bus_message* message, void* self, sd_bus_error*) {
     auto* impl = static_cast<Impl*>(self);
     if (sd_bus_message_is_method_error(message, nullptr) != 0) {
@@ -315,7 +319,7 @@ struct Updater::Impl {
                                impl->version, impl->options.version));
       return 0;
     }
-    // To look at a large bundle takes its time.
+    // Examining a large bundle takes time.
     if (const std::string why =
             impl->options.blocking_reason ? impl->options.blocking_reason() : std::string();
         !why.empty()) {
@@ -386,8 +390,8 @@ struct Updater::Impl {
     if (!options.aside || !options.aside(look)) look();
   }
 
-  /// A file that RAUC has taken over at an earlier attempt cannot be read again: what it was then,
-  /// it still is.
+  /// A file that RAUC took ownership of in an earlier attempt cannot be read again, but it cannot
+  /// have changed since.
   void Ask(const std::filesystem::path& file, BundleState found) {
     if (!is_installing) return;
     if (found != BundleState::kUnknown) {

@@ -11,9 +11,10 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr std::size_t kMaxListed = 32;
-constexpr std::size_t kMaxLookedAt = 4096;  // files of a stick: it may hold anything
+// files of a stick that are examined; it may contain anything
+constexpr std::size_t kMaxLookedAt = 4096;
 
-/// A stick's other names have no place in a request.
+/// Other names on a stick must not appear in a request.
 bool IsBundleName(std::string_view name) {
   constexpr std::string_view kAlso = "._-";
   return name.ends_with(".raucb") && name.size() <= 64 && !name.starts_with('.') &&

@@ -1,5 +1,5 @@
 // Bundles on USB sticks, which an image mounts read-only (systemd/usb-stick). They are offered, and
-// never installed by themselves.
+// never installed automatically.
 #pragma once
 
 #include <filesystem>
@@ -10,12 +10,13 @@ namespace plumb {
 
 class UsbSticks {
  public:
-  /// @param root  Holds one folder a stick.
+  /// @param root  Contains one folder per stick.
   explicit UsbSticks(std::filesystem::path root = "/run/plumb-stick") : root_(std::move(root)) {}
 
   /// Names of files NAME.raucb in the top folders of the sticks, sorted, each once; at most 32.
   [[nodiscard]] std::vector<std::string> Bundles() const;
-  /// A descriptor to read that bundle by, for the caller to close; -1: it is not there (any more).
+  /// A descriptor for reading that bundle, to be closed by the caller; -1 if it does not exist (any
+  /// more).
   [[nodiscard]] int Open(const std::string& name) const;
 
  private:
