@@ -16,11 +16,12 @@ namespace plumb::web {
 namespace {
 
 constexpr std::size_t kMaxName = 32;
-/// Before the hash of a password that somebody else chose: the person changes it at the next login.
+/// Prefix of the hash of a password chosen by somebody else: the person has to change it at the
+/// next login.
 constexpr std::string_view kFirst = "first ";
 
 bool IsFirst(const std::string& stored) { return stored.starts_with(kFirst); }
-/// As libsodium takes it.
+/// In the form that libsodium takes.
 std::string HashIn(const std::string& stored) {
   return IsFirst(stored) ? stored.substr(kFirst.size()) : stored;
 }
@@ -31,7 +32,7 @@ std::string ReadNewPassword(Fields& fields, const std::string& user) {
   return password;
 }
 
-/// "XXXX-XXXX" without letters that are easily mistaken: 40 bits.
+/// "XXXX-XXXX" without letters that are easily confused: 40 bits.
 std::string MakeSetupCode() {
   constexpr std::string_view kLetters = "23456789ABCDEFGHJKLMNPQRSTUVWXYZ";
   std::string code;
@@ -259,7 +260,7 @@ void Accounts::SetUp(const Request& request, const Respond& respond) {
   if (!needs_setup() || setting_up_)
     return respond(ErrorResponse(409, "this appliance is set up already; log in"));
   const auto now = options_.now();
-  // One counter for everybody: the code is short, so guesses are slow from wherever they come.
+  // One counter for everybody: the code is short, so guesses must be slow wherever they come from.
   const std::string key = "setup";
   if (const auto wait = limiter_.Wait(key, now); wait.count() > 0) return respond(TooMany(wait));
   if (!SameText(code, setup_code_)) {
@@ -305,7 +306,7 @@ std::optional<Response> Accounts::CountGuess(const std::vector<std::string>& cou
   std::chrono::seconds wait{0};
   for (const std::string& counter : counters) wait = std::max(wait, limiter_.Wait(counter, now));
   if (wait.count() > 0) return TooMany(wait);
-  // Counted before the hash is done: many guesses sent at once are as slow as one after the other.
+  // Counted before hashing, so that many guesses sent at once are as slow as one after the other.
   for (const std::string& counter : counters) limiter_.Failed(counter, now);
   return std::nullopt;
 }
@@ -329,7 +330,7 @@ void Accounts::FinishLogIn(const Actor& actor, const std::string& stored, bool m
                            const std::vector<std::string>& counters, const Respond& respond) {
   const auto still = users_.FindUser(actor.user);
   if (!matches || !still || still->disabled || still->password_hash != stored) {
-    // Whatever was typed as a name stays out of the log: people type passwords there.
+    // The name as typed is not logged, because people type passwords there.
     audit_.Log({still ? actor.user : std::string(), actor.address}, "login.failed", "", "");
     if (form) return respond(Redirect("/result?failed=1"));
     return respond(ErrorResponse(403, "name or password is wrong"));
@@ -363,7 +364,8 @@ void Accounts::DescribeSession(const Request& request, const Respond& respond) {
 }
 
 void Accounts::ShowLastLogin(const Request& request, const Respond& respond) {
-  // The entry of this log-in itself may bear a stamp shortly before or after the session's begin.
+  // The entry of this login itself may be stamped shortly before or after the beginning of the
+  // session.
   constexpr std::chrono::seconds kOwnEntry{2};
   const auto age =
       std::chrono::duration_cast<WallClock::duration>(options_.now() - request.session->begun);
@@ -386,7 +388,7 @@ void Accounts::VerifyOwn(const Request& request, std::string password, const cha
                          const Respond& respond, std::function<void(const User&)> then) {
   const auto user = users_.FindUser(request.session->user);
   if (!user) return respond(ErrorResponse(409, "the account is gone"));
-  // A counter of its own: guesses at the login do not keep who is logged in from signing.
+  // A separate counter, so that guesses at the login do not keep logged-in users from signing.
   const std::vector<std::string> counters = {"own " + user->name};
   if (auto refusal = CountGuess(counters)) return respond(std::move(*refusal));
   const bool accepted =
@@ -465,7 +467,7 @@ void Accounts::ChangeUser(const Request& request, const Respond& respond) {
   if (fields.Has("role")) change.role = ReadRole(fields);
   if (fields.Has("disabled")) change.disabled = fields.Flag("disabled");
   std::string password = fields.Has("password") ? fields.Text("password", 0, kMaxPassword)
-                                                : std::string();  // empty: stays as it is
+                                                : std::string();  // empty: unchanged
   if (const std::string why = WhyNotPassword(password, change.name);
       !password.empty() && !why.empty())
     throw DataError(why);
@@ -473,8 +475,8 @@ void Accounts::ChangeUser(const Request& request, const Respond& respond) {
   const auto save = [this, actor = request.actor(), respond](const UserChange& what) {
     users_.ChangeUser(actor, what,
                       WhileAlive([this, name = what.name, respond](const Change& done) {
-                        // What an account may do is fixed at login: its sessions end, its own
-                        // too.
+                        // The permissions of an account are fixed at login: its sessions end,
+                        // including the user's own.
                         if (done.result == ChangeResult::kDone) sessions_.EndAllOf(name, nullptr);
                         respond(ChangeResponse(done));
                       }));

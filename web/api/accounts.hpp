@@ -1,4 +1,4 @@
-// Set-up, login, accounts: everything that knows passwords.
+// Set-up, login and accounts: everything that handles passwords.
 #pragma once
 
 #include <chrono>
@@ -27,13 +27,13 @@ struct AccountOptions {
   std::string device_key;                  ///< See DeviceCookies.
   std::optional<TlsIdentity> certificate;  ///< Its fingerprint is shown at the first set-up.
   std::function<std::chrono::steady_clock::time_point()> now;
-  std::vector<std::string> host_names;  ///< Of a new certificate.
-  /// Keeps and serves another one; throws DataError or IoError, and then the one before stays.
-  /// Empty: it cannot be replaced.
+  std::vector<std::string> host_names;  ///< Names for a new certificate.
+  /// Stores and serves another certificate; throws DataError or IoError, after which the previous
+  /// one stays. Empty: it cannot be replaced.
   std::function<void(const TlsIdentity&)> replace_certificate;
 };
 
-/// Belongs to the loop thread.
+/// Used on the loop thread.
 class Accounts : public SessionLookup {
  public:
   Accounts(const Services& services, AccountOptions options);
@@ -48,7 +48,7 @@ class Accounts : public SessionLookup {
   }
   [[nodiscard]] std::optional<std::string> setup_code() const;
 
-  /// Of the password thread: readable when Dispatch() has something to do.
+  /// Descriptor of the password thread: readable when Dispatch() has something to do.
   [[nodiscard]] int fd() const { return worker_.fd(); }
   void Dispatch() { worker_.Dispatch(); }
   /// Ends idle sessions; follows the idle time of the settings.
@@ -60,53 +60,53 @@ class Accounts : public SessionLookup {
              const Respond& respond);
   void FinishLogIn(const Actor& actor, const std::string& stored, bool matches, bool form,
                    const std::vector<std::string>& counters, const Respond& respond);
-  /// The counters that a guess at this name is charged to: its browser's alone where the person
-  /// has logged in from it before, else those of address and name.
+  /// The counters for guesses at this name: only that of its browser if the person has logged in
+  /// from it before, otherwise those of address and name.
   [[nodiscard]] std::vector<std::string> CountersOf(const Request& request, const std::string& name,
                                                     const std::string& stored) const;
-  /// How long until the next guess, or nothing; the guess is then counted.
+  /// Time until the next guess, or nothing; the guess is then counted.
   [[nodiscard]] std::optional<Response> CountGuess(const std::vector<std::string>& counters);
-  /// Checks the password of a person who is logged in; `then` is called if it is right.
+  /// Checks the password of a logged-in user; calls `then` if it is correct.
   void VerifyOwn(const Request& request, std::string password, const char* wrong,
                  const Respond& respond, std::function<void(const User&)> then);
   void LogOut(const Request& request, const Respond& respond);
   void DescribeSession(const Request& request, const Respond& respond);
-  /// The log-in before this one, and what was tried since.
+  /// The login before this one, and failed attempts since.
   void ShowLastLogin(const Request& request, const Respond& respond);
   void ChangeOwnPassword(const Request& request, const Respond& respond);
-  /// Accepts a result that is not in tolerance: with a reason and the person's own password.
+  /// Accepts a result that is not in tolerance: with a reason and the user's own password.
   void AcceptOutside(const Request& request, const Respond& respond);
-  /// The plan that was read, by its revision and digest.
+  /// Approves the plan that was read, identified by its revision and digest.
   void ApproveReference(const Request& request, const Respond& respond);
   void WipePatient(const Request& request, const Respond& respond);
-  /// Calls `act` if the password is the person's own, and answers with what became of it.
+  /// Calls `act` if the password is the user's own, and answers with the outcome.
   void Signed(const Request& request, std::string password, const Respond& respond,
               std::function<void(const Actor&, Done)> act);
-  /// The room's calibration that was read, by its digest.
+  /// Signs the room's calibration that was read, identified by its digest.
   void SignRoomCalibration(const Request& request, const Respond& respond);
   void ResetSensorProfile(const Request& request, const Respond& respond);
   void RollBackSensorProfile(const Request& request, const Respond& respond);
-  /// Restarts the machine: with the person's own password.
+  /// Restarts the machine; requires the user's own password.
   void RestartSystem(const Request& request, const Respond& respond);
-  /// Resets the appliance to the state of delivery: with the person's own password.
+  /// Resets the appliance to the state of delivery; requires the user's own password.
   void ResetToFactory(const Request& request, const Respond& respond);
-  /// The certificate that the page is served with.
+  /// The certificate of the page.
   void DescribeCertificate(const Request& request, const Respond& respond);
-  /// One that is handed in, or a new one that signs itself: with the person's own password.
+  /// Replaces it by an uploaded one or a new self-signed one; requires the user's own password.
   void ReplaceCertificate(const Request& request, const Respond& respond);
   void MakeNewCertificate(const Request& request, const Respond& respond);
   void ServeCertificate(const Actor& actor, const TlsIdentity& identity, bool is_self_made,
                         const Respond& respond);
   void AddUser(const Request& request, const Respond& respond);
   void ChangeUser(const Request& request, const Respond& respond);
-  /// Opens a session and tells the page about it.
+  /// Opens a session and notifies the page.
   [[nodiscard]] Response Welcome(const User& user, bool form);
-  /// The cookie by which this browser is known from now on.
+  /// The cookie by which this browser is recognised from now on.
   [[nodiscard]] std::string DeviceCookie(const std::string& user, const std::string& stored) const;
   /// Calls `then` with the hash, or answers why there is none.
   void HashThen(std::string password, const Respond& respond,
                 std::function<void(const std::string&)> then);
-  /// The same completion, which does nothing once this object is gone.
+  /// The same completion, which does nothing once this object is destroyed.
   [[nodiscard]] Done WhileAlive(Done done) const;
   [[nodiscard]] std::string Cookie(const std::string& token, bool end) const;
   [[nodiscard]] std::string cookie_name() const {
@@ -134,7 +134,7 @@ class Accounts : public SessionLookup {
   PasswordWorker worker_;
 };
 
-/// A change's answer as HTTP: 200, 201 with an id, or the error.
+/// The answer to a change as HTTP: 200, 201 with an id, or the error.
 [[nodiscard]] Response ChangeResponse(const Change& change);
 
 }  // namespace plumb::web

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr int kMaxListed = 200;
 
-/// What can be downloaded of a scan, and from where in its folder.
+/// The files of a scan that can be downloaded, and their places in its folder.
 struct ScanFile {
   std::string_view name;
   std::string_view path;
@@ -107,7 +107,7 @@ Response ScanFileResponse(ScanService& scans, const std::string& scan_id, std::s
   return ErrorResponse(404, "this scan has no such file");
 }
 
-/// Adds routes with less to write.
+/// Shorthands for adding routes.
 class Table {
  public:
   Table(Router& router, BackgroundWork& background) : router_(router), background_(background) {}
@@ -120,7 +120,7 @@ class Table {
                    respond(get(request));
                  }});
   }
-  /// Of lists and files: not on the loop.
+  /// For lists and files, which are not read on the loop.
   void ReadAside(const char* pattern, Permission permission, Get get) {
     AddAside(router_, background_, pattern, permission, std::move(get));
   }
@@ -226,7 +226,8 @@ void AddPatientRoutes(Table& table, PatientService& patients, ReferenceService& 
                 fields.Finish();
                 patients.OpenPatient(request.actor(), request.arguments[0], purpose, reason,
                                      replaces, [respond](Change change) {
-                                       change.id.clear();  // the status says which session is open
+                                       // the status states which session is open
+                                       change.id.clear();
                                        respond(ChangeResponse(change));
                                      });
               });
@@ -417,7 +418,7 @@ void AddMaintenanceRoutes(Table& table, MaintenanceService& maintenance, AuditLo
                       FileResponse(change.file, "application/octet-stream",
                                    "plumb-diagnostics" + change.file.extension().string());
                   std::error_code ignored;
-                  fs::remove(change.file, ignored);  // stays readable through what is open
+                  fs::remove(change.file, ignored);  // stays readable through the open descriptor
                   respond(std::move(response));
                 });
               });

@@ -7,18 +7,17 @@
 
 namespace plumb::web {
 
-/// Adds the routes of the appliance's own things: status, patients, references, scans, audit,
-/// settings, updates, maintenance. The services must outlive the router.
+/// Adds the routes of the appliance: status, patients, references, scans, audit, settings, updates,
+/// maintenance. The services must outlive the router.
 void AddApiRoutes(Router& router, const Services& services);
 
-/// Adds GET /result: the last result as a page that needs no script.
+/// Adds GET /result: the last result as a page without script.
 void AddResultPage(Router& router, const Services& services);
 
 /// Adds the reports as PDF files, and the numbers of a patient as CSV and JSON.
 void AddExportRoutes(Router& router, const Services& services);
 
-/// Adds what is known of the room's calibration, and its board as a PDF. Signing needs a password:
-/// see Accounts.
+/// Adds the room's calibration and its board as a PDF. Signing needs a password: see Accounts.
 void AddRoomCalibrationRoutes(Router& router, const Services& services);
 
 }  // namespace plumb::web

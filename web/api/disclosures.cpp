@@ -15,8 +15,8 @@ using TimePoint = std::chrono::steady_clock::time_point;
 
 struct Disclosure {
   std::string_view pattern;
-  std::string_view view;      ///< Action that is logged once an hour; empty: no view.
-  std::string_view download;  ///< Action that is logged each time; empty: no download.
+  std::string_view view;      ///< Action that is logged once per hour; empty if it is not a view.
+  std::string_view download;  ///< Action that is logged each time; empty if it is not a download.
 };
 
 constexpr std::array kDisclosures = {
@@ -46,7 +46,7 @@ const Disclosure* FindDisclosure(std::string_view pattern) {
   return found == kDisclosures.end() ? nullptr : found;
 }
 
-/// Belongs to the loop thread.
+/// Used on the loop thread.
 class Disclosures {
  public:
   Disclosures(AuditLog& log, std::function<TimePoint()> now) : log_(log), now_(std::move(now)) {}
@@ -73,7 +73,7 @@ class Disclosures {
     const TimePoint now = now_();
     if (views_.size() >= kMaxViews) {
       std::erase_if(views_, [&](const auto& view) { return now - view.second >= kSameView; });
-      // All of them within the hour: logging some twice loses nothing.
+      // Clears all entries of the hour; logging some twice does no harm.
       if (views_.size() >= kMaxViews) views_.clear();
     }
     const auto [view, is_new] = views_.try_emplace(std::move(what), now);
@@ -84,7 +84,8 @@ class Disclosures {
 
   AuditLog& log_;
   std::function<TimePoint()> now_;
-  std::map<View, TimePoint> views_;  // User, address, action, subject: when it was logged.
+  // Time at which user, address, action and subject were last logged.
+  std::map<View, TimePoint> views_;
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Who saw data of patients, and who took some away: entries of the audit log.
+// Audit log entries for viewing and downloading patient data.
 #pragma once
 
 #include <chrono>
@@ -10,19 +10,19 @@
 
 namespace plumb::web {
 
-/// What one person sees of one thing from one address is one entry in this time ("view.scan"): a
-/// page asks for the same thing again and again.
+/// Repeated views of one thing by one person from one address are logged once in this time
+/// ("view.scan"), because a page requests the same thing again and again.
 inline constexpr std::chrono::minutes kSameView{60};
 
-/// True for the routes that answer with data of patients, the camera's picture among them. The
-/// status and its events are none: they name the open session only.
+/// True for routes that answer with patient data, including the camera picture. The status and its
+/// events do not count: they only name the open session.
 [[nodiscard]] bool DisclosesPatientData(std::string_view pattern);
 
-/// Has what these routes of `router` answer logged, for those that are there now. Each download is
-/// an entry of its own ("download.report"). Refusals are not logged, nor a paired display: it shows
-/// what others do.
+/// Logs the answers of these routes of `router`, for the routes that exist at the time of the call.
+/// Each download has an entry of its own ("download.report"). Refusals are not logged, nor are
+/// paired displays, which show the actions of others.
 /// @param log  Outlives the router.
-/// @param now  A clock that does not step.
+/// @param now  A monotonic clock.
 void LogDisclosures(Router& router, AuditLog& log,
                     std::function<std::chrono::steady_clock::time_point()> now);
 

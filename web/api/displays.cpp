@@ -20,9 +20,9 @@ constexpr std::size_t kMaxDisplays = 20;
 constexpr std::chrono::minutes kWaitsFor{10};
 constexpr int kMaxWrongCodes = 20;
 constexpr int kCookieAge_s =
-    400 * 24 * 3600;  // the longest that browsers keep; renewed at each use
+    400 * 24 * 3600;  // the longest that browsers keep a cookie; renewed at each use
 
-/// Six letters that are not easily mistaken for each other: 30 bits, for ten minutes.
+/// Six letters that are not easily confused: 30 bits, for ten minutes.
 std::string MakeCode() {
   constexpr std::string_view kLetters = "23456789ABCDEFGHJKLMNPQRSTUVWXYZ";
   std::string code;
@@ -47,7 +47,7 @@ Displays::Displays(DisplayService& service, bool tls, std::function<TimePoint()>
   Load();
 }
 
-/// Those that were removed are over at once, and so are their streams.
+/// Sessions of removed displays end at once, and so do their streams.
 void Displays::Load() {
   std::map<std::string, std::shared_ptr<Session>> sessions;
   for (const Display& display : service_.Displays()) {

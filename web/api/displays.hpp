@@ -1,4 +1,4 @@
-// Screens in the room: how one is paired, and how it is known again.
+// Displays in the room: pairing and recognising them.
 #pragma once
 
 #include <chrono>
@@ -16,9 +16,8 @@
 
 namespace plumb::web {
 
-/// A screen asks to be paired and shows a code; an engineer types the code on the page; the screen
-/// then holds a cookie that does not expire and gives the role `display`. Belongs to the loop
-/// thread.
+/// A display requests pairing and shows a code; an engineer types the code on the page; the display
+/// then holds a cookie that does not expire and gives the role `display`. Used on the loop thread.
 class Displays {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -26,13 +25,13 @@ class Displays {
   Displays(DisplayService& service, bool tls, std::function<TimePoint()> now);
 
   void AddRoutes(Router& router);
-  /// Of a request with a paired screen's cookie; null for all others.
+  /// Session of a request with a paired display's cookie; null for all others.
   [[nodiscard]] std::shared_ptr<Session> SessionOf(const Request& request);
 
  private:
   struct Pairing {
-    std::string code;        ///< Shown on the screen, typed by an engineer.
-    std::string token_hash;  ///< Of the secret that the screen keeps.
+    std::string code;        ///< Shown on the display, typed by an engineer.
+    std::string token_hash;  ///< Hash of the secret that the display keeps.
     TimePoint begun;
   };
 
@@ -51,8 +50,8 @@ class Displays {
   bool tls_;
   std::function<TimePoint()> now_;
   std::vector<Pairing> pairings_;
-  std::map<std::string, std::shared_ptr<Session>> sessions_;  ///< By the token's hash.
-  int wrong_codes_ = 0;  ///< Since the oldest pairing that waits began.
+  std::map<std::string, std::shared_ptr<Session>> sessions_;  ///< By the hash of the token.
+  int wrong_codes_ = 0;  ///< Since the oldest pending pairing began.
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
 };
 

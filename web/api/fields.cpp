@@ -1,4 +1,4 @@
-// What browsers send, read field by field.
+// Reads the fields of requests from browsers.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 

@@ -23,7 +23,7 @@ using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kBeat{5000};
 constexpr std::chrono::milliseconds kExpireEvery{
-    500};  // while somebody watches: a session's end is seen within a second
+    500};  // while somebody watches, so that the end of a session is shown within a second
 constexpr std::chrono::milliseconds kMinEventGap{100};
 constexpr std::chrono::milliseconds kCutEvery{1000};
 
@@ -116,15 +116,15 @@ class HttpServer::Impl {
       accounts_.Expire();
       hub_.Beat();
     }
-    transport_.Run();  // first: what has come by now is not late
+    transport_.Run();  // first: requests that have arrived by now are not late
     if (now >= next_cut_) {
-      // After a pause of the appliance itself who connects gets the time that it took from them.
+      // After a pause of the appliance itself, clients get the lost time back.
       const bool was_paused = transport_.has_connections() && now > next_cut_ + 2 * kCutEvery;
       next_cut_ = now + kCutEvery;
       if (!was_paused) transport_.CutLate();
     }
     if (hub_.EndOver())
-      transport_.Run();  // a log-out that has just come ends its own streams at once
+      transport_.Run();  // a log-out that has just arrived ends its own streams at once
   }
 
   [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const {
@@ -197,7 +197,8 @@ class HttpServer::Impl {
       hub_.Broadcast("status", Dump(ToJson(appliance_.GetStatus(), WallClock::now())));
   }
 
-  /// The state goes out at once but at most ten times a second; the rest are hints to ask again.
+  /// The state is sent at once but at most ten times a second; the other events only ask the page
+  /// to reload.
   void OnEvent(EventKind kind) {
     if (kind != EventKind::kStatus && kind != EventKind::kProgress)
       hub_.Broadcast(Name(kind), "{}");

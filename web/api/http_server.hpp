@@ -18,13 +18,13 @@ namespace plumb::web {
 
 /// Serves the page, the API under /api/v1 (web/openapi.yaml), the event stream and GET /health.
 ///
-/// Belongs to the loop thread: everything is called there and calls the services there. Passwords
-/// are hashed on a thread of its own. Signals must be blocked before it is made. Destroying it
-/// closes every connection; completions that come later find nobody.
+/// Used on the loop thread: everything is called there and calls the services there. Passwords are
+/// hashed on a separate thread. Signals must be blocked before construction. Destruction closes
+/// every connection; later completions are dropped.
 class HttpServer {
  public:
-  /// Listens at once; nothing is answered before the first Run(). @throws IoError with address and
-  /// reason, DataError for the TLS files.
+  /// Listens at once; nothing is answered before the first Run().
+  /// @throws IoError with address and reason, DataError for the TLS files.
   HttpServer(const Services& services, HttpServerOptions options);
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
@@ -32,18 +32,18 @@ class HttpServer {
 
   /// An epoll descriptor: wait for EPOLLIN on it, then call Run().
   [[nodiscard]] int fd() const;
-  /// Does what is due; never waits.
+  /// Does all pending work; never waits.
   void Run();
-  /// Call Run() after that time even if fd() stays silent; nothing: no need. Ask again after each
-  /// Run().
+  /// Call Run() after that time even if fd() is not readable; nothing: not necessary. Ask again
+  /// after each Run().
   [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const;
 
   [[nodiscard]] std::uint16_t port() const;
-  /// "GET /api/v1/status view" for each route: method, path and permission; for the documentation
+  /// "GET /api/v1/status view" for each route: method, path and permission, for the documentation
   /// and its test.
   [[nodiscard]] std::vector<std::string> RouteNames() const;
-  /// "XXXX-XXXX" while there is no account: whoever types it makes the first one, an engineer.
-  /// Print it where only the owner looks.
+  /// "XXXX-XXXX" while there is no account: it permits creating the first one, an engineer. Print
+  /// it where only the owner can see it.
   [[nodiscard]] std::optional<std::string> setup_code() const;
 
  private:

@@ -111,7 +111,7 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
   if (scan.accepted_at) json["accepted_at"] = TimeText(*scan.accepted_at);
   if (scan.finished_at) {
     json["finished_at"] = TimeText(*scan.finished_at);
-    // An end in the future: the clock has stepped, and nobody knows the age.
+    // An end in the future: the clock has stepped, and the age is unknown.
     if (scan.age_s)
       json["age_s"] = static_cast<std::int64_t>(*scan.age_s);
     else if (now >= *scan.finished_at)

@@ -1,4 +1,4 @@
-// The service's values as JSON, and JSON from browsers as values.
+// Conversion of the services' values to JSON, and of JSON from browsers to values.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,7 +13,7 @@ namespace plumb::web {
 using Json = nlohmann::ordered_json;
 
 [[nodiscard]] Json ToJson(const Status& status, WallClock::time_point now);
-/// @param now  Gives age_s, so that a page does not trust its own clock.
+/// @param now  For age_s, so that a page does not rely on its own clock.
 [[nodiscard]] Json ToJson(const Scan& scan, WallClock::time_point now);
 [[nodiscard]] Json ToJson(const Patient& patient);
 [[nodiscard]] Json ToJson(const PlanTemplate& wanted);
@@ -30,7 +30,7 @@ using Json = nlohmann::ordered_json;
 [[nodiscard]] std::string_view Name(ApplianceState state);
 [[nodiscard]] std::string_view Name(ScanPurpose purpose);
 
-/// The fields of a request's body. Every accessor throws DataError that names the field, what was
+/// The fields of a request's body. Every accessor throws DataError naming the field, what was
 /// expected and what was found.
 class Fields {
  public:
@@ -45,10 +45,10 @@ class Fields {
   /// List of lists of `width` finite numbers, each at most 100 in size; at most `max` of them.
   [[nodiscard]] std::vector<std::vector<double>> Points(const char* name, std::size_t width,
                                                         std::size_t max);
-  /// A list of `width` such numbers; nothing where null.
+  /// A list of `width` such numbers; nothing if null.
   [[nodiscard]] std::optional<std::vector<double>> Point(const char* name, std::size_t width);
   [[nodiscard]] bool Has(const char* name);
-  /// Throws if a field was sent that nobody asked for.
+  /// Throws if the body has a field that no accessor asked for.
   void Finish() const;
 
  private:
@@ -59,7 +59,7 @@ class Fields {
 };
 
 inline constexpr int kMaxRevision = 1'000'000'000;
-/// And the revision that it was made from.
+/// Includes the revision on which it is based.
 [[nodiscard]] std::pair<ReferencePlan, int> ParsePlan(const std::string& body);
 [[nodiscard]] Settings ParseSettings(const std::string& body);
 [[nodiscard]] PlanTemplate ParseTemplate(const std::string& body);

@@ -8,7 +8,7 @@ namespace {
 constexpr int kPage = 200;
 constexpr int kPages = 25;
 
-/// From the newest entry whose action begins like this to older ones, until `look` has seen enough.
+/// From the newest entry whose action has this prefix to older ones, until `look` has seen enough.
 void Walk(AuditLog& log, const std::string& actions,
           const std::function<bool(const AuditEntry&)>& look) {
   std::int64_t before = 0;

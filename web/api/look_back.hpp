@@ -1,4 +1,4 @@
-// What the log knows of earlier times: the last log-in of a person, the last backup.
+// Searches the log for earlier events: the last login of a person, the last backup.
 #pragma once
 
 #include <optional>
@@ -9,12 +9,12 @@
 namespace plumb::web {
 
 struct LoginHistory {
-  std::optional<AuditEntry> last;  ///< The log-in before this one.
+  std::optional<AuditEntry> last;  ///< The login before this one.
   int failed = 0;                  ///< Wrong passwords for this name since then.
 };
 
-/// To be called within BackgroundWork::Later(). Of log-ins the newest 5000 entries are read.
-/// @param before  When the present session began.
+/// To be called within BackgroundWork::Later(). Reads the newest 5000 entries of logins.
+/// @param before  Beginning of the present session.
 [[nodiscard]] LoginHistory LoginsBefore(AuditLog& log, const std::string& user,
                                         WallClock::time_point before);
 [[nodiscard]] std::optional<AuditEntry> LastBackup(AuditLog& log);

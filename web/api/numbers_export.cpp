@@ -1,4 +1,4 @@
-// What other programs read: the numbers of a patient as CSV and JSON, reports, a whole course as
+// Exports for other programs: the numbers of a patient as CSV and JSON, reports, a whole course as
 // one archive, sensor profiles.
 #include <fmt/format.h>
 
@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kMaxScans = 1000;
 
-/// A cell that no spreadsheet takes for a formula, quoted where it must be.
+/// A cell that no spreadsheet interprets as a formula, quoted if necessary.
 std::string Cell(std::string text) {
   if (!text.empty() && std::string_view("=+-@\t\r").find(text[0]) != std::string_view::npos)
     text = "'" + text;
@@ -28,7 +28,7 @@ std::string Cell(std::string text) {
   return quoted + "\"";
 }
 
-/// Numbers are no text that somebody typed: a minus stays a minus.
+/// Numbers were not typed by anybody, so a minus is kept.
 std::string Number(const std::optional<double>& value) {
   return value ? fmt::format("{:.4f}", *value) : std::string();
 }
@@ -71,7 +71,7 @@ std::string NumbersJson(const Patient& patient, const std::vector<Scan>& scans) 
   return Dump({{"patient", ToJson(patient)}, {"scans", list}});
 }
 
-/// Which the page asks for: "?language=es"; nothing for one that there is not.
+/// Language requested by "?language=es"; nothing for an unknown one.
 std::optional<Language> LanguageOf(const Request& request) {
   const auto found = request.query.find("language");
   if (found == request.query.end() || found->second == "en") return Language::kEnglish;
@@ -130,7 +130,7 @@ void AddNumbers(Router& router, BackgroundWork& background, PatientService& pati
 
 constexpr std::size_t kMostBytes = std::size_t{64} << 20;
 
-/// At most `most` bytes of a file; nothing where it is missing or larger.
+/// At most `most` bytes of a file; nothing if it is missing or larger.
 std::optional<std::string> BytesOf(const std::filesystem::path& file, std::size_t most) {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(file, error);
@@ -141,8 +141,8 @@ std::optional<std::string> BytesOf(const std::filesystem::path& file, std::size_
   return bytes;
 }
 
-/// Result and pictures of every compared scan, the newest first, as far as there is room; what is
-/// left out is named in a file of its own.
+/// Result and pictures of every compared scan, the newest first, as long as there is space; a
+/// separate file names what was left out.
 void AddResults(const std::vector<Scan>& scans, std::vector<ArchivedFile>& files) {
   std::size_t room = kMostBytes;
   std::string left_out;
@@ -163,7 +163,7 @@ void AddResults(const std::vector<Scan>& scans, std::vector<ArchivedFile>& files
   if (!left_out.empty()) files.push_back({.name = "left_out.txt", .bytes = std::move(left_out)});
 }
 
-/// All that there is of a course, in one file.
+/// All data of a course in one file.
 void AddCourse(Router& router, BackgroundWork& background, PatientService& patients,
                ScanService& scans) {
   AddAside(router, background, "/api/v1/patients/{id}/course.zip", Permission::kView,

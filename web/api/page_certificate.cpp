@@ -1,4 +1,4 @@
-// The certificate of the page: what it is, another one, a new one of the appliance's own.
+// The certificate of the page: showing it, replacing it, creating a new self-signed one.
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"

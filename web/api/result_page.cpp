@@ -35,8 +35,7 @@ std::array<NumberRow, 6> Rows(const SixNumbers& value, const SixNumbers& u95) {
           NumberRow{"yaw", "\xC2\xB0", value.yaw_deg, u95.yaw_deg}};
 }
 
-/// @param refresh  Asks for itself again, without counting as use: nobody should act on what was
-/// true when the page was opened.
+/// @param refresh  Reloads the page, without counting as use, because its content may be outdated.
 std::string Document(const std::string& body, const std::string& refresh = "") {
   std::string style;
   for (const Asset& asset : Assets()) {
@@ -65,13 +64,13 @@ std::string LoginForm(std::string_view trouble) {
       trouble.empty() ? "" : fmt::format("<p role=\"alert\">{}</p>", trouble));
 }
 
-/// Digits that the uncertainty lets a value have: none below its first digit.
+/// Decimals that the uncertainty justifies: none below its first digit.
 int DigitsOf(double u95, int most) {
   if (!(u95 > 0)) return most;
   return std::clamp(static_cast<int>(-std::floor(std::log10(u95) + 1e-9)), 0, most);
 }
 
-/// A row of the table. Only MOVE commands moves.
+/// A row of the table. Only the verdict MOVE asks for moves.
 std::string NumberCells(const NumberRow& row, const std::string& words, double tolerance,
                         bool moves) {
   if (!row.value)
@@ -101,8 +100,8 @@ std::string NumberCells(const NumberRow& row, const std::string& words, double t
       direction);
 }
 
-/// A correction that is no answer is no advice: it is left out.
-/// @param review  It is read or printed, or can no longer be acted on: it says what was found.
+/// A correction without an answer must not be applied, so it is left out.
+/// @param review  The page is for reading or printing, or the result can no longer be acted on.
 std::string NumbersTable(const ResultSummary& result, const Tolerance& tolerance, bool review) {
   if (!result.correction || result.verdict == "no_answer") return "";
   const bool moves = result.verdict == "move";
@@ -156,22 +155,22 @@ std::string VerdictText(const std::string& verdict, bool review) {
   return "NO ANSWER";
 }
 
-/// What the page shows.
+/// Content of the page.
 struct Records {
   PatientService& patients;
   ReferenceService& references;
   ScanService& scans;
 };
 
-/// @param newer  A later scan that gave no result; null: none.
-/// @param runs   A new scan runs or is computed.
-/// @param named  Asked for by its number, to be read or printed.
+/// @param newer  A later scan without a result; null if there is none.
+/// @param runs   A new scan is running or being computed.
+/// @param named  Requested by its number, for reading or printing.
 std::string ResultBody(const Records& records, const Scan& scan, const Scan* newer, bool runs,
                        bool named) {
   const auto patient = records.patients.FindPatient(scan.patient_id);
   const auto reference = records.references.FindReference(scan.reference_id);
   const auto age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
-  const bool is_known = age >= age.zero();  // else the clock has stepped
+  const bool is_known = age >= age.zero();  // otherwise the clock has stepped
   const bool old = !is_known || age > kOldAfter || newer != nullptr || runs;
   const std::string when =
       is_known ? fmt::format("{} min ago", std::chrono::floor<std::chrono::minutes>(age).count())
@@ -218,7 +217,7 @@ std::string ResultBody(const Records& records, const Scan& scan, const Scan* new
          BodyList(*scan.result) + Pictures(scan) + "</section>";
 }
 
-/// Of the newest scan that was done, where none is named; one after it that failed is told.
+/// The newest completed scan if none is named; a later failed one is mentioned.
 Response ResultPage(const Records& records, const std::optional<std::string>& wanted, bool runs) {
   std::optional<Scan> scan, failed;
   if (wanted) {
@@ -234,7 +233,7 @@ Response ResultPage(const Records& records, const std::optional<std::string>& wa
   }
   Response response;
   response.type = "text/html; charset=utf-8";
-  // What is asked for by name is read or printed: it does not load itself again.
+  // A page for a named scan is read or printed, so it does not reload itself.
   response.body = Document(
       scan ? ResultBody(records, *scan, failed ? &*failed : nullptr, runs, wanted.has_value())
            : "<h1>No result yet</h1>",

@@ -1,4 +1,4 @@
-// The room's calibration: what is known of it, and the board to print.
+// The room's calibration: its state, and the board to print.
 #include "web/api/api.hpp"
 #include "web/api/json.hpp"
 #include "web/http/gate.hpp"

@@ -1,4 +1,4 @@
-// What a person signs with the own password, although logged in.
+// Actions that a logged-in user signs with the own password.
 #include <utility>
 
 #include "algo/base/errors.hpp"

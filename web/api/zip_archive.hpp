@@ -9,10 +9,10 @@ namespace plumb::web {
 struct ArchivedFile {
   std::string name;  ///< With '/' between folders.
   std::string bytes;
-  bool is_compressed = false;  ///< Is stored as it is: a picture.
+  bool is_compressed = false;  ///< Already compressed, such as a picture.
 };
 
-/// The archive's bytes. @throws IoError where memory is used up or a name is there twice.
+/// The archive's bytes. @throws IoError if memory is exhausted or a name occurs twice.
 [[nodiscard]] std::string ZipOf(const std::vector<ArchivedFile>& files);
 
 }  // namespace plumb::web

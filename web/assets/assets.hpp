@@ -1,4 +1,4 @@
-// The page's files as the build put them into the program.
+// The page's files as embedded in the program.
 #pragma once
 
 #include <span>
@@ -11,15 +11,15 @@ struct Asset {
   std::string_view type;
   std::string_view plain;
   std::string_view gzip;  ///< The same, compressed.
-  bool hashed = false;    ///< The name changes with the content: may be cached for ever.
+  bool hashed = false;    ///< The name changes with the content, so it may be cached for ever.
 };
 
 [[nodiscard]] std::span<const Asset> Assets();
 /// Null if there is none.
 [[nodiscard]] const Asset* FindAsset(std::string_view path);
 
-/// Words of the appliance in Spanish, from `assets/strings/es_appliance.js`: phrases, and patterns
-/// (regular expressions of ECMAScript) whose words name their groups "$1" to "$9".
+/// Spanish translations of the appliance's texts, from `assets/strings/es_appliance.js`: phrases,
+/// and patterns (ECMAScript regular expressions) whose translations name their groups "$1" to "$9".
 struct Phrase {
   std::string_view text, words;
 };

@@ -26,7 +26,7 @@ std::string Lower(std::string_view text) {
   return lower;
 }
 
-/// Bytes of the UTF-8 sequence that `text` begins with, 0 where malformed (overlong, surrogate,
+/// Length of the UTF-8 sequence at the beginning of `text`, 0 if malformed (overlong, surrogate,
 /// beyond U+10FFFF, truncated).
 std::size_t SequenceLength(std::string_view text, std::uint32_t& code) {
   const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };

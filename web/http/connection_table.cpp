@@ -10,7 +10,7 @@ namespace {
 
 using Group = std::vector<Connection*>;
 
-/// The connections that fulfil a condition, by a name that each has.
+/// The connections that satisfy a condition, grouped by a name.
 std::map<std::string, Group> Grouped(std::list<Connection>& connections,
                                      const std::function<bool(const Connection&)>& belongs,
                                      std::string Connection::*name) {
@@ -22,7 +22,7 @@ std::map<std::string, Group> Grouped(std::list<Connection>& connections,
   return groups;
 }
 
-/// Of the largest group the connection whose end does the least harm.
+/// The connection of the largest group whose end does the least harm.
 Connection* FromTheLargest(const std::map<std::string, Group>& groups) {
   const auto largest = std::max_element(
       groups.begin(), groups.end(),
@@ -85,7 +85,7 @@ Connection* ConnectionTable::NextOverLimit() {
       [&](const Connection& c) { return is_stranger(c) && !IsLocalAddress(c.address); },
       &Connection::address);
   if (CountOf(from_outside) > options_.max_strangers) return Leave(FromTheLargest(from_outside));
-  // Room stays for strangers and for this machine, so that somebody else can log in.
+  // Space is reserved for strangers and for this machine, so that others can still log in.
   const unsigned others = options_.max_strangers + options_.max_strangers_per_address;
   const auto logged_in = Grouped(
       connections_, [&](const Connection& c) { return !is_stranger(c); }, &Connection::user);

@@ -1,4 +1,5 @@
-// Who is connected, and who has to go when there are too many or a request takes too long.
+// Keeps track of connections and selects those to close when there are too many or a request takes
+// too long.
 #pragma once
 
 #include <chrono>
@@ -14,33 +15,33 @@ struct Connection {
   using TimePoint = std::chrono::steady_clock::time_point;
 
   int fd = -1;
-  std::string address;      ///< Of the other side.
-  TimePoint since;          ///< When its present request could have begun.
-  bool receiving = true;    ///< Its request is not whole yet.
-  bool has_head = false;    ///< Line and headers of its request are there.
+  std::string address;      ///< Address of the peer.
+  TimePoint since;          ///< Time at which its present request could have begun.
+  bool receiving = true;    ///< Its request is not complete yet.
+  bool has_head = false;    ///< Line and headers of its request have arrived.
   bool uploading = false;   ///< Its body is a bundle.
-  std::string user;         ///< Of the session that its last request belonged to; empty: none.
-  bool is_leaving = false;  ///< It has been chosen already.
+  std::string user;         ///< User of the session of its last request; empty if there is none.
+  bool is_leaving = false;  ///< Already selected to be closed.
 };
 
 /// True for this machine itself.
 [[nodiscard]] bool IsLocalAddress(const std::string& address);
 
-/// All connections of a server. Belongs to the loop thread.
+/// All connections of a server. Used on the loop thread.
 class ConnectionTable {
  public:
   explicit ConnectionTable(const HttpServerOptions& options) : options_(options) {}
 
-  /// Lives until Remove().
+  /// Valid until Remove().
   Connection* Add(int fd, const std::string& address, Connection::TimePoint now);
   void Remove(const Connection* connection);
   [[nodiscard]] bool empty() const { return connections_.empty(); }
 
-  /// One connection that has to go so that the limits hold, or null. Marked as leaving: ask until
-  /// there is none. Those of the address, or of the person, with the most go first; of these one
-  /// that waits for a request before one that is being answered, and the oldest first.
+  /// A connection to close so that the limits hold, or null. It is marked as leaving: repeat until
+  /// there is none. Connections of the address or person with the most are closed first; among
+  /// these one that waits for a request before one that is being answered, and the oldest first.
   [[nodiscard]] Connection* NextOverLimit();
-  /// Likewise one whose request is not there in time.
+  /// Likewise a connection whose request has not arrived in time.
   [[nodiscard]] Connection* NextLate(Connection::TimePoint now);
 
  private:

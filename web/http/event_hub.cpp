@@ -19,7 +19,7 @@ void EventStream::Take(std::size_t count) {
 void EventStream::Send(std::string_view text) {
   if (closed_) return;
   if (waiting() + text.size() > capacity_) {
-    // Somebody who does not read gets no more of our memory; a browser reconnects by itself.
+    // A client that does not read gets no more memory; a browser reconnects by itself.
     buffer_ = std::string();
     taken_ = 0;
     closed_ = true;

@@ -19,12 +19,12 @@ class EventStream {
   EventStream(std::shared_ptr<Session> session, std::size_t capacity)
       : session_(std::move(session)), capacity_(capacity) {}
 
-  /// Wakes the connection: called when there is something to take, or when the stream is over.
+  /// Wakes the connection; called when there is data, or when the stream has ended.
   std::function<void()> wake;
-  /// Called when the viewer is too slow: its connection is to be cut.
+  /// Called when the viewer is too slow and its connection must be closed.
   std::function<void()> cut;
 
-  /// At most `max` bytes, taken out of the buffer.
+  /// At most `max` bytes, removed from the buffer.
   [[nodiscard]] std::string_view Peek(std::size_t max) const;
   void Take(std::size_t count);
   [[nodiscard]] bool empty() const { return taken_ == buffer_.size(); }
@@ -33,7 +33,7 @@ class EventStream {
   [[nodiscard]] std::size_t waiting() const { return buffer_.size() - taken_; }
 
   void Send(std::string_view text);
-  /// After what waits, the stream ends.
+  /// Ends the stream after the waiting data.
   void Close();
 
  private:
@@ -44,7 +44,7 @@ class EventStream {
   bool closed_ = false;
 };
 
-/// All streams. Belongs to the loop thread.
+/// All streams. Used on the loop thread.
 class EventHub {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -52,14 +52,14 @@ class EventHub {
   EventHub(std::size_t max_streams, std::size_t max_per_session, std::size_t buffer_bytes)
       : max_streams_(max_streams), max_per_session_(max_per_session), buffer_bytes_(buffer_bytes) {}
 
-  /// Null where there are too many. Where one session has too many its oldest ends.
+  /// Null if there are too many. If one session has too many, its oldest ends.
   [[nodiscard]] std::shared_ptr<EventStream> Open(std::shared_ptr<Session> session);
   void Remove(const std::shared_ptr<EventStream>& stream) { streams_.remove(stream); }
   /// To every stream. @param data  One line.
   void Broadcast(std::string_view event, std::string_view data);
   /// A comment to every stream, so that dead connections are noticed.
   void Beat();
-  /// Ends the streams of sessions that are over, after telling them so. True if there was one.
+  /// Ends the streams of sessions that are over, after notifying them. True if there was one.
   bool EndOver();
   void CloseAll();
   [[nodiscard]] std::size_t size() const { return streams_.size(); }

@@ -9,7 +9,7 @@
 namespace plumb::web {
 namespace {
 
-/// A file that is sent is written in such pieces; one is written while the next comes.
+/// Size of the pieces in which an uploaded file is written; one is written while the next arrives.
 constexpr std::size_t kUploadBlock = 1 << 20;
 
 }  // namespace
@@ -34,7 +34,7 @@ void Transport::Exchange::Answer(Response given) {
 
 bool Transport::Exchange::TakeBody(std::string_view bytes) {
   const HttpServerOptions& options = owner->options_;
-  if (response) return true;  // refused in the middle of a file: the rest is read, and dropped
+  if (response) return true;  // refused in the middle of a file: the rest is read and dropped
   if (!request.upload) {
     if (request.body.size() + bytes.size() > options.max_body_bytes) return false;
     request.body.append(bytes);
@@ -47,7 +47,7 @@ bool Transport::Exchange::TakeBody(std::string_view bytes) {
   return true;
 }
 
-/// Gives what is unwritten to the disk, or makes the connection wait for the piece before.
+/// Passes the buffered data to the disk, or makes the connection wait for the previous piece.
 void Transport::Exchange::WriteUpload() {
   if (writing) return Suspend();
   const auto failure = std::make_shared<std::string>();

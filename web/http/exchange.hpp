@@ -1,4 +1,4 @@
-// One request and its answer; a part of the transport.
+// One request with its answer; a part of the transport.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ struct MHD_Connection;
 
 namespace plumb::web {
 
-/// Belongs to the loop thread.
+/// Used on the loop thread.
 struct Transport::Exchange : std::enable_shared_from_this<Transport::Exchange> {
   Transport* owner = nullptr;
   MHD_Connection* connection = nullptr;
@@ -26,17 +26,17 @@ struct Transport::Exchange : std::enable_shared_from_this<Transport::Exchange> {
   bool suspended = false;
   std::optional<Response> response;
   std::shared_ptr<EventStream> stream;
-  std::uint64_t uploaded = 0;  ///< Bytes of a file that came.
-  std::string unwritten;       ///< Of them, what is still to be given to the disk.
-  bool writing = false;        ///< A piece is on its way there.
+  std::uint64_t uploaded = 0;  ///< Bytes of a file received so far.
+  std::string unwritten;       ///< Those not yet passed to the disk.
+  bool writing = false;        ///< A piece is being written.
 
   void Suspend();
   void Resume();
   void Answer(Response given);
 
-  /// A part of a body. @return  False: too long, the connection ends.
+  /// Appends a part of a body. @return  False: too long, the connection ends.
   [[nodiscard]] bool TakeBody(std::string_view bytes);
-  /// True once the whole file is with the disk; else the connection waits for that.
+  /// True once the whole file is on the disk; otherwise the connection waits.
   [[nodiscard]] bool HasWholeUpload();
 
  private:

@@ -53,7 +53,7 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
   }
   Router::Match match = router_.Find(request.method, request.path);
   const bool api = request.path.starts_with("/api/");
-  // Requests that the page makes by itself, without a user, do not keep a session alive.
+  // Requests that the page makes on its own, without user action, do not keep a session alive.
   const bool touch = request.Header("x-plumb-background").empty() &&
                      request.path != "/api/v1/events" &&
                      !(request.path == "/result" && request.query.contains("again"));
@@ -74,7 +74,7 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
     if (request.session->must_change_password && route.permission != Permission::kLogin)
       return ErrorResponse(403, "choose a password of your own first");
   } else if (request.session && request.session->must_change_password) {
-    request.session.reset();  // pages that show more to who is logged in
+    request.session.reset();  // for pages that show more to logged-in users
   }
   if (request.method != "GET") {
     if (!IsOwnPage(request))
@@ -98,7 +98,7 @@ std::variant<const Route*, Response> Gate::Admit(Request& request) const {
 void Gate::Handle(const Route& route, const Request& request, const Respond& respond) {
   if (route.body == BodyKind::kNone && !request.body.empty())
     return respond(ErrorResponse(400, "expected no body"));
-  // The body may have taken its time, and the account may have been disabled meanwhile.
+  // The body may have taken long, and the account may have been disabled meanwhile.
   if (route.permission != Permission::kNone && request.session->ended)
     return respond(ErrorResponse(401, "the session has ended: log in again"));
   try {

@@ -13,7 +13,7 @@
 
 namespace plumb::web {
 
-/// Which session a request belongs to. Belongs to the loop thread.
+/// Finds the session of a request. Used on the loop thread.
 class SessionLookup {
  public:
   virtual ~SessionLookup() = default;
@@ -21,7 +21,7 @@ class SessionLookup {
   [[nodiscard]] virtual std::shared_ptr<Session> SessionOf(const Request& request, bool touch) = 0;
   /// True while there is no account yet.
   [[nodiscard]] virtual bool needs_setup() const = 0;
-  /// Of the server's certificate; empty without TLS.
+  /// Fingerprint of the server's certificate; empty without TLS.
   [[nodiscard]] virtual std::string tls_fingerprint() const = 0;
 };
 
@@ -30,9 +30,10 @@ class Gate {
   Gate(const Router& router, SessionLookup& sessions, std::vector<std::string> host_names, bool tls)
       : router_(router), sessions_(sessions), host_names_(std::move(host_names)), tls_(tls) {}
 
-  /// Judges a request by its head; fills in its session and arguments. The route, or the refusal.
+  /// Checks the head of a request and fills in its session and arguments. Returns the route or the
+  /// refusal.
   [[nodiscard]] std::variant<const Route*, Response> Admit(Request& request) const;
-  /// Called with the whole body. Runs the handler; what it throws becomes an answer.
+  /// Called with the complete body. Runs the handler; its exceptions become an answer.
   static void Handle(const Route& route, const Request& request, const Respond& respond);
 
  private:
@@ -45,19 +46,19 @@ class Gate {
   bool tls_;
 };
 
-/// An answer that takes its time: made by `make` on the background thread for reads; what it throws
-/// becomes an answer as in Gate::Handle().
+/// A slow answer: made by `make` on the background thread for reads; its exceptions become an
+/// answer as in Gate::Handle().
 /// @param name  Of the route.
 void RespondAside(BackgroundWork& background, const std::string& name,
                   std::function<Response()> make, const Respond& respond);
 
-/// Adds a GET route of lists or files, which are not read on the loop. `background` must outlive
+/// Adds a GET route for lists or files, which are not read on the loop. `background` must outlive
 /// the router.
 void AddAside(Router& router, BackgroundWork& background, const char* pattern,
               Permission permission, std::function<Response(const Request&)> make);
 
-/// The headers of every answer, from one place. @param tls  The answer goes over TLS: the browser
-/// is to come back by TLS only.
+/// The headers of every answer.
+/// @param tls  The answer is sent over TLS, and the browser must use TLS from now on.
 void AddSecurityHeaders(Response& response, bool tls);
 
 }  // namespace plumb::web

@@ -6,14 +6,14 @@
 
 namespace plumb::web {
 
-/// A listening TCP socket, not blocking. @throws IoError with address, port and reason.
+/// A non-blocking listening TCP socket. @throws IoError with address, port and reason.
 [[nodiscard]] int OpenListenSocket(const std::string& address, std::uint16_t port);
-/// @throws IoError if the descriptor is no socket.
+/// @throws IoError if the descriptor is not a socket.
 [[nodiscard]] std::uint16_t PortOf(int socket_fd);
 [[nodiscard]] bool IsIpv6(int socket_fd);
-/// The address that it listens on, in numbers.
+/// The listening address in numeric form.
 [[nodiscard]] std::string AddressTextOf(int socket_fd);
-/// True for an address that only this machine reaches: 127.0.0.0/8, ::1.
+/// True for an address that can be reached from this machine only: 127.0.0.0/8, ::1.
 [[nodiscard]] bool IsLoopback(const std::string& address);
 
 }  // namespace plumb::web

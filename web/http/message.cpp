@@ -39,7 +39,7 @@ void UploadFile::Append(std::string_view bytes) {
     bytes.remove_prefix(static_cast<std::size_t>(count));
     written_ += count;
   }
-  // Written out as it comes, so that who keeps the file does not wait for all of it at the end.
+  // Flushed continuously, so that the user of the file does not wait for all of it at the end.
   constexpr std::int64_t kPiece = 8 << 20;
   if (written_ - started_ < kPiece) return;
   ::sync_file_range(fd_, started_, written_ - started_, SYNC_FILE_RANGE_WRITE);
@@ -62,7 +62,7 @@ OpenFile::OpenFile(const std::filesystem::path& file)
     throw IoError(fmt::format("{} is not a regular file", file.filename().string()));
   }
   size_ = static_cast<std::uint64_t>(info.st_size);
-  // Sending happens on the loop in small pieces; ask for the file now so that they come from
+  // Sending happens on the loop in small pieces; the file is prefetched so that they come from
   // memory.
   posix_fadvise(fd_, 0, 0, POSIX_FADV_WILLNEED);
 }

@@ -1,4 +1,4 @@
-// One request and one answer, free of the library that carries them.
+// One request and one answer, independent of the HTTP library.
 #pragma once
 
 #include <cstdint>
@@ -16,16 +16,16 @@
 
 namespace plumb::web {
 
-/// A body on its way to the disk. Gone with its last owner, unless somebody gave it another name.
-/// One thread at a time; writing takes as long as the disk takes, and so does removing.
+/// A body on its way to the disk. The file is removed with its last owner, unless it was renamed.
+/// Not thread-safe; writing and removing take as long as the disk takes.
 class UploadFile {
  public:
-  /// @throws IoError where nothing can be written.
+  /// @throws IoError if nothing can be written.
   explicit UploadFile(const std::filesystem::path& folder);
   ~UploadFile();
   UploadFile(const UploadFile&) = delete;
   UploadFile& operator=(const UploadFile&) = delete;
-  /// @throws IoError when the disk takes no more.
+  /// @throws IoError when the disk is full.
   void Append(std::string_view bytes);
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
@@ -33,20 +33,20 @@ class UploadFile {
   std::filesystem::path path_;
   int fd_ = -1;
   std::int64_t written_ = 0;  // Bytes.
-  std::int64_t started_ = 0;  // Of them, on their way to the disk.
+  std::int64_t started_ = 0;  // bytes of these being written
 };
 
 struct Request {
   std::string method;  ///< HEAD arrives as GET.
-  std::string path;    ///< As sent, never unescaped.
+  std::string path;    ///< As sent, not unescaped.
   std::map<std::string, std::string> query;
-  std::map<std::string, std::string> headers;  ///< Names in small letters.
+  std::map<std::string, std::string> headers;  ///< Names in lower case.
   std::string body;
-  std::shared_ptr<UploadFile> upload;  ///< Instead of body, of a route that takes a file.
-  std::string address;                 ///< Of the browser.
-  std::vector<std::string> arguments;  ///< What the route's placeholders matched:
-                                       ///< [A-Za-z0-9._-]{1,64}, not beginning with a dot.
-  std::shared_ptr<Session> session;    ///< Set where the route wants a login.
+  std::shared_ptr<UploadFile> upload;  ///< Replaces body in routes that take a file.
+  std::string address;                 ///< Address of the browser.
+  /// Values of the route's placeholders: [A-Za-z0-9._-]{1,64}, not beginning with a dot.
+  std::vector<std::string> arguments;
+  std::shared_ptr<Session> session;  ///< Set if the route requires a login.
 
   /// Empty if absent.
   [[nodiscard]] std::string_view Header(const std::string& name) const;
@@ -56,7 +56,7 @@ struct Request {
 /// An open file that is sent as the body.
 class OpenFile {
  public:
-  /// @throws IoError where it cannot be opened or is not a regular file.
+  /// @throws IoError if it cannot be opened or is not a regular file.
   explicit OpenFile(const std::filesystem::path& file);
   ~OpenFile();
   OpenFile(const OpenFile&) = delete;
@@ -75,18 +75,18 @@ struct Response {
   std::string type = "application/json";
   std::string body;
   std::string_view
-      constant_body;  ///< Sent instead of body where not empty; lives as long as the program.
+      constant_body;  ///< Sent instead of body if not empty; lives as long as the program.
   std::shared_ptr<OpenFile> file;  ///< Sent instead of both.
   std::vector<std::pair<std::string, std::string>> headers;
-  bool cache_for_ever = false;  ///< Else nothing is cached.
-  bool event_stream = false;    ///< Stays open; the event hub writes it.
-  std::string about = {};       ///< What it shows, where the path does not say: a scan's id.
+  bool cache_for_ever = false;  ///< Otherwise nothing is cached.
+  bool event_stream = false;    ///< Stays open and is written by the event hub.
+  std::string about = {};  ///< Subject of the answer if the path does not state it: a scan's id.
 };
 
 /// {"error": message}
 [[nodiscard]] Response ErrorResponse(int status, const std::string& message);
 
-/// Gives the answer, once; ignored when the connection is gone.
+/// Sends the answer, once; ignored if the connection is closed.
 using Respond = std::function<void(Response)>;
 using Handler = std::function<void(const Request&, Respond)>;
 

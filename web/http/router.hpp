@@ -1,4 +1,4 @@
-// Which handler answers what, and who may ask.
+// The table of routes: handler and permission of each.
 #pragma once
 
 #include <functional>
@@ -15,7 +15,7 @@ enum class BodyKind {
   kNone,
   kJson,
   kForm,
-  kFile,  ///< Straight to the disk: Request::upload.
+  kFile,  ///< Written directly to the disk: Request::upload.
 };
 
 struct Route {
@@ -28,17 +28,17 @@ struct Route {
   [[nodiscard]] std::string Name() const { return method + " " + pattern; }
 };
 
-/// The table; filled once, then only read.
+/// The table; filled once and only read afterwards.
 class Router {
  public:
   void Add(Route route) { routes_.push_back(std::move(route)); }
-  /// Gives each route that is there the handler that `wrap` makes of it.
+  /// Replaces the handler of each present route by the one that `wrap` makes from it.
   void Wrap(const std::function<Handler(const Route&)>& wrap) {
     for (Route& route : routes_) route.handler = wrap(route);
   }
 
   struct Match {
-    const Route* route = nullptr;  ///< Null: nothing there, or not with this method.
+    const Route* route = nullptr;  ///< Null if there is none with this path and method.
     std::vector<std::string> arguments;
     std::string allowed;  ///< Methods of that path, "GET, POST"; empty: no such path.
   };

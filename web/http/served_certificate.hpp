@@ -1,4 +1,4 @@
-// A certificate and its key in the form in which GnuTLS asks for them at each handshake.
+// A certificate and its key in the form that GnuTLS needs at each handshake.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace plumb::web {
 
-/// GnuTLS only borrows it: it must live as long as any handshake that was given it.
+/// GnuTLS only borrows it: it must outlive every handshake that uses it.
 class ServedCertificate {
  public:
   /// @throws DataError if GnuTLS cannot serve it.

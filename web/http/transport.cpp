@@ -50,8 +50,8 @@ void CutSocket(MHD_Connection* connection) {
   shutdown(info->connect_fd, SHUT_RDWR);
 }
 
-/// Whose library runs on this thread: it asks for the certificate of a handshake without saying for
-/// which server.
+/// The server whose library runs on this thread, because the library asks for the certificate of a
+/// handshake without stating the server.
 thread_local Transport* serving = nullptr;
 
 }  // namespace
@@ -175,7 +175,7 @@ struct Transport::Callbacks {
           413, fmt::format("the file is too large: at most {} MB", options.max_upload_bytes >> 20));
     constexpr std::uintmax_t kSpare = 64U << 20;
     try {
-      // Its removal takes as long as it is large.
+      // Removing it takes time in proportion to its size.
       exchange.request.upload =
           std::shared_ptr<UploadFile>(new UploadFile(options.upload_folder),
                                       [&background = transport.background_](UploadFile* file) {
@@ -215,8 +215,8 @@ struct Transport::Callbacks {
     if (auto refusal = RefuseByHead(*exchange, transport.options_.max_body_bytes)) {
       exchange->response = std::move(*refusal);
       exchange->started = true;
-      // An answer before the whole request ends the connection: only where a body would have to be
-      // read for nothing.
+      // An answer before the complete request ends the connection, so it is used only if a body
+      // would have to be read for nothing.
       const bool has_body = !exchange->request.Header("transfer-encoding").empty() ||
                             exchange->malformed ||
                             (!exchange->request.Header("content-length").empty() &&
@@ -237,7 +237,7 @@ struct Transport::Callbacks {
       }
       const std::shared_ptr<Exchange> exchange = *static_cast<std::shared_ptr<Exchange>*>(*context);
       if (*upload_size > 0) {
-        // Too long without having said so: there is no way to answer in the middle of an upload.
+        // Too long without a stated length: an upload cannot be answered in the middle.
         if (!exchange->TakeBody({upload, *upload_size})) return MHD_NO;
         *upload_size = 0;
         return MHD_YES;

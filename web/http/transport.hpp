@@ -1,4 +1,4 @@
-// libmicrohttpd as the loop sees it: connections, limits, bodies, files, streams.
+// Connects libmicrohttpd to the loop: connections, limits, bodies, files, streams.
 #pragma once
 
 #include <chrono>
@@ -21,7 +21,7 @@ namespace plumb::web {
 
 class ServedCertificate;
 
-/// Tells HttpServerOptions::doing what runs while it lives.
+/// Reports the current activity to HttpServerOptions::doing during its lifetime.
 class ScopedLoopLabel {
  public:
   ScopedLoopLabel(const HttpServerOptions& options, std::string_view what) : tell_(options.doing) {
@@ -37,7 +37,7 @@ class ScopedLoopLabel {
   const std::function<void(std::string_view)>& tell_;
 };
 
-/// Carries requests to the gate and answers back. Belongs to the loop thread.
+/// Carries requests to the gate and answers back. Used on the loop thread.
 class Transport {
  public:
   /// @param background  Writes files.
@@ -55,16 +55,16 @@ class Transport {
   void Run();
   void Wake() const;
   [[nodiscard]] std::optional<std::chrono::milliseconds> timeout() const;
-  /// Closes connections whose request is not there in time.
+  /// Closes connections whose request has not arrived in time.
   void CutLate();
-  /// For each TLS connection from now on; those that are open stay as they are.
+  /// For new TLS connections; open ones are unchanged.
   /// @param keep  Called once it is known that the identity can be served; may throw.
   void Serve(const TlsIdentity& identity, const std::function<void(const TlsIdentity&)>& keep = {});
   [[nodiscard]] bool has_connections() const { return !connections_.empty(); }
   [[nodiscard]] std::uint16_t port() const { return port_; }
 
   struct Exchange;
-  /// libmicrohttpd's callbacks; only the .cpp knows its types.
+  /// Callbacks of libmicrohttpd, whose types only the .cpp knows.
   struct Callbacks;
 
  private:
@@ -79,8 +79,8 @@ class Transport {
   ConnectionTable connections_;
   std::list<Exchange*> exchanges_;
   std::weak_ptr<UploadFile> upload_;  ///< One at a time.
-  /// The last is served. Handshakes that have begun may still hold those before it, so they stay;
-  /// they are few, as a person replaces them.
+  /// The last one is served. Handshakes in progress may still use earlier ones, so they are kept;
+  /// they are few, because a person replaces them.
   std::vector<std::unique_ptr<ServedCertificate>> certificates_;
   std::uint16_t port_ = 0;
   int wake_fd_ = -1;

@@ -35,7 +35,7 @@ std::vector<Certificate> ChainOf(const std::string& pem) {
   return held;
 }
 
-/// As in the certificate, without control characters: the text comes from outside.
+/// As in the certificate, without control characters, because the text comes from outside.
 std::string SubjectOf(const Certificate& certificate) {
   std::array<char, 512> text{};
   std::size_t size = text.size();
@@ -43,7 +43,7 @@ std::string SubjectOf(const Certificate& certificate) {
     return "(without a name)";
   std::string subject(text.data());
   for (char& c : subject) {
-    if (c < 0x20 || c == 0x7F) c = '?';  // also what is not ASCII
+    if (c < 0x20 || c == 0x7F) c = '?';  // also anything that is not ASCII
   }
   return subject;
 }

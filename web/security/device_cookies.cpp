@@ -21,7 +21,7 @@ std::string Hex(const unsigned char* bytes, std::size_t size) {
 }
 
 void Feed(crypto_auth_hmacsha256_state& state, std::string_view text) {
-  // Its length first: no two lists of texts look the same.
+  // Starts with its length, so that different lists of texts never give the same bytes.
   const std::string size = fmt::format("{}:", text.size());
   for (const std::string_view part : {std::string_view(size), text})
     crypto_auth_hmacsha256_update(&state, reinterpret_cast<const unsigned char*>(part.data()),

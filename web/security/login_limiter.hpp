@@ -1,4 +1,4 @@
-// Slows down who guesses passwords.
+// Slows down password guessing.
 #pragma once
 
 #include <chrono>
@@ -13,7 +13,7 @@ class LoginLimiter {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  /// Seconds to wait; 0: go on.
+  /// Seconds to wait; 0: proceed.
   [[nodiscard]] std::chrono::seconds Wait(const std::string& key, TimePoint now) const;
   void Failed(const std::string& key, TimePoint now);
   void Succeeded(const std::string& key) { failures_.erase(key); }

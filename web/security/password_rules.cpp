@@ -9,7 +9,7 @@
 namespace plumb::web {
 namespace {
 
-/// What people choose again and again, and what is near in a hospital; small letters, sorted.
+/// Common passwords, including those typical of a hospital; lower case, sorted.
 constexpr auto kCommon = std::to_array<std::string_view>({
     // clang-format off
     "0000000000", "0123456789", "01234567890", "0987654321", "1029384756", "1111111111",
@@ -73,7 +73,7 @@ std::string InSmallLetters(std::string_view text) {
   return small;
 }
 
-/// Without the digits and signs that people hang on when they are asked for some. Bytes above 127
+/// Without trailing digits and signs, which people append when they are required. Bytes above 127
 /// belong to letters.
 std::string_view WithoutTail(std::string_view text) {
   while (!text.empty() && !IsLetter(text.back()) && static_cast<unsigned char>(text.back()) < 128)
@@ -81,7 +81,7 @@ std::string_view WithoutTail(std::string_view text) {
   return text;
 }
 
-/// True if it is one piece of at most four bytes, repeated.
+/// True if it repeats one piece of at most four bytes.
 bool IsRepetition(std::string_view text) {
   for (std::size_t period = 1; period <= 4; ++period) {
     bool repeats = true;

@@ -1,4 +1,4 @@
-// Which passwords are taken.
+// The rules for passwords.
 #pragma once
 
 #include <cstddef>
@@ -10,9 +10,9 @@ namespace plumb::web {
 inline constexpr std::size_t kMinPassword = 10;
 inline constexpr std::size_t kMaxPassword = 128;
 
-/// Empty if the password may be used by the person of that name, else one sentence why not: it is
-/// too short or too long, a common one (whatever its case, and with digits or signs behind it), the
-/// name, or one short piece again and again.
+/// Empty if the person with that name may use the password, otherwise one sentence why not: too
+/// short or too long, a common one (in any case, with digits or signs appended), the name, or a
+/// short piece repeated.
 [[nodiscard]] std::string WhyNotPassword(std::string_view password, std::string_view user);
 
 }  // namespace plumb::web

@@ -54,7 +54,7 @@ bool PasswordWorker::Enqueue(std::deque<Job>& jobs, Job job) {
 
 bool PasswordWorker::Hash(std::string password,
                           std::function<void(std::optional<std::string>)> done) {
-  // Only people who are logged in, or hold the setup code, set passwords.
+  // Only users who are logged in, or hold the setup code, set passwords.
   return Enqueue(trusted_jobs_,
                  [this, password = std::move(password),
                   done = std::move(done)]() mutable -> std::function<void()> {
@@ -69,8 +69,8 @@ bool PasswordWorker::Verify(std::string password, std::string hash, bool trusted
   return Enqueue(trusted ? trusted_jobs_ : jobs_,
                  [this, password = std::move(password), hash = std::move(hash),
                   done = std::move(done)]() mutable -> std::function<void()> {
-                   // An unknown name costs the same time as a wrong password, so names cannot be
-                   // probed by a clock.
+                   // An unknown name takes the same time as a wrong password, so that names cannot
+                   // be probed by timing.
                    if (dummy_hash_.empty())
                      dummy_hash_ =
                          HashPassword("no account", operations_, memory_bytes_).value_or("");

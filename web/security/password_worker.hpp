@@ -1,5 +1,5 @@
-// argon2id on a thread of its own: a hash takes tenths of a second and much memory, the event loop
-// must not wait for it.
+// argon2id on a separate thread: a hash takes tenths of a second and much memory, and the event
+// loop must not wait for it.
 #pragma once
 
 #include <condition_variable>
@@ -13,8 +13,8 @@
 
 namespace plumb::web {
 
-/// One hash at a time, few waiting: the memory is bounded. Everything but the thread itself belongs
-/// to the loop thread.
+/// One hash at a time with a short queue, so that memory is bounded. Except for the thread itself,
+/// used on the loop thread.
 class PasswordWorker {
  public:
   PasswordWorker(std::uint64_t operations, std::uint64_t memory_bytes);
@@ -22,13 +22,13 @@ class PasswordWorker {
   PasswordWorker(const PasswordWorker&) = delete;
   PasswordWorker& operator=(const PasswordWorker&) = delete;
 
-  /// False: too many wait already, done is not called. @param done  With the hash; nothing where
-  /// memory ran out. Called by Dispatch().
+  /// False if the queue is full; done is then not called.
+  /// @param done  Called by Dispatch() with the hash, or with nothing if memory was exhausted.
   [[nodiscard]] bool Hash(std::string password,
                           std::function<void(std::optional<std::string>)> done);
-  /// The same for a check. An empty hash is never right but takes as long.
-  /// @param trusted  Of a browser or person that is known: done before what strangers wait for,
-  ///                 and with places of its own, so that guesses do not keep them waiting.
+  /// The same for verification. An empty hash never matches but takes as long.
+  /// @param trusted  Of a known browser or person: handled before strangers, with a queue of its
+  ///         own, so that guesses do not delay it.
   [[nodiscard]] bool Verify(std::string password, std::string hash, bool trusted,
                             std::function<void(bool)> done);
 
@@ -37,8 +37,8 @@ class PasswordWorker {
   void Dispatch();
 
  private:
-  using Job = std::function<std::function<void()>()>;  ///< Runs on the thread, gives what the loop
-                                                       ///< shall run.
+  /// Runs on the thread; returns what the loop then runs.
+  using Job = std::function<std::function<void()>()>;
   [[nodiscard]] bool Enqueue(std::deque<Job>& jobs, Job job);
   void Work(const std::stop_token& stop);
 

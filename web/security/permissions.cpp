@@ -69,7 +69,7 @@ std::string_view Name(Permission permission) {
 std::string_view Name(Role role) { return kRoleNames[static_cast<std::size_t>(role)]; }
 
 std::optional<Role> ParseRole(std::string_view name) {
-  // A display is paired, not an account.
+  // A display is paired and has no account.
   for (std::size_t i = 0; i < static_cast<std::size_t>(Role::kDisplay); ++i) {
     if (kRoleNames[i] == name) return static_cast<Role>(i);
   }

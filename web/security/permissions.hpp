@@ -1,4 +1,4 @@
-// Who may do what.
+// Permissions of the roles.
 #pragma once
 
 #include <optional>
@@ -10,15 +10,15 @@
 namespace plumb::web {
 
 enum class Permission {
-  kNone,  ///< Nobody needs to be logged in.
+  kNone,  ///< No login is required.
   kLogin,
-  kRoom,  ///< What the screen in the room shows.
+  kRoom,  ///< Content of the display in the room.
   kView,
   kScan,
   kPatients,
   kPlan,
   kApprove,
-  kCalibrate,  ///< The room.
+  kCalibrate,  ///< Calibration of the room.
   kAccept,
   kWipe,
   kUsers,

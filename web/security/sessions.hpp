@@ -1,4 +1,4 @@
-// Who is logged in. In memory only: a restart logs everybody off.
+// Sessions of logged-in users. They are kept in memory only, so a restart logs everybody off.
 #pragma once
 
 #include <chrono>
@@ -13,18 +13,19 @@ namespace plumb::web {
 struct Session {
   std::string user;
   Role role = Role::kTechnician;
-  std::string csrf_token;  ///< Every change carries it in a header.
+  std::string csrf_token;  ///< Every change must carry it in a header.
   std::chrono::steady_clock::time_point begun;
   std::chrono::steady_clock::time_point last_used;
-  bool ended = false;  ///< Set once it is over, for who still holds it.
-  /// Somebody else chose the password: until the person has changed it nothing else is allowed.
+  bool ended = false;  ///< Set once it is over, for remaining holders.
+  /// The password was chosen by somebody else: until the user has changed it nothing else is
+  /// allowed.
   bool must_change_password = false;
 };
 
-/// Random text of that many bytes from the system's generator, in letters, digits, '-' and '_'.
+/// Random text from that many bytes of the system's generator, in letters, digits, '-' and '_'.
 [[nodiscard]] std::string RandomToken(std::size_t bytes);
 
-/// That many bytes of the same.
+/// That many bytes from the same generator.
 [[nodiscard]] std::string RandomBytes(std::size_t bytes);
 
 class Sessions {
@@ -35,15 +36,15 @@ class Sessions {
     std::string token;  ///< For the cookie; only its hash is kept.
     std::shared_ptr<Session> session;
   };
-  /// Ends the least recently used one where there are too many.
+  /// Ends the least recently used one if there are too many.
   [[nodiscard]] Opened Open(const User& user, TimePoint now);
-  /// Null where unknown or over. @param touch  Counts as a use: idle time starts again.
+  /// Null if unknown or over. @param touch  Counts as a use, which restarts the idle time.
   [[nodiscard]] std::shared_ptr<Session> Find(const std::string& token, TimePoint now, bool touch);
   void End(const std::shared_ptr<Session>& session);
-  /// Of a user that was disabled, or whose role or password changed. @param but  Goes on; may be
-  /// null.
+  /// Ends the sessions of a user who was disabled, or whose role or password changed.
+  /// @param but  Is kept; may be null.
   void EndAllOf(const std::string& user, const std::shared_ptr<Session>& but);
-  /// Ends those that are over.
+  /// Ends expired sessions.
   void Expire(TimePoint now);
 
   void SetLimits(std::chrono::seconds idle, std::chrono::seconds whole);
@@ -54,7 +55,7 @@ class Sessions {
 
   std::chrono::seconds idle_{15 * 60};
   std::chrono::seconds whole_{12 * 3600};
-  std::map<std::string, std::shared_ptr<Session>> sessions_;  ///< By the token's hash.
+  std::map<std::string, std::shared_ptr<Session>> sessions_;  ///< By the hash of the token.
 };
 
 }  // namespace plumb::web

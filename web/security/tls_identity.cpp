@@ -54,7 +54,7 @@ std::string FingerprintOf(const Certificate& certificate) {
   return fmt::format("{:02X}", fmt::join(digest, ":"));
 }
 
-/// What an export function of GnuTLS writes into a buffer that it makes.
+/// Output of a GnuTLS export function that allocates its own buffer.
 template <typename Export>
 std::string PemOf(Export&& write) {
   gnutls_datum_t pem{};
@@ -83,7 +83,7 @@ void Describe(const Certificate& certificate, const Key& key,
   constexpr const char* kWhat = "cannot make a certificate";
   std::array<unsigned char, 16> serial{};
   Check(gnutls_rnd(GNUTLS_RND_NONCE, serial.data(), serial.size()), kWhat);
-  serial[0] &= 0x7F;  // positive, and not zero
+  serial[0] &= 0x7F;  // positive and not zero
   serial[0] |= 0x40;
   Check(gnutls_x509_crt_set_version(certificate.get(), 3), kWhat);
   Check(gnutls_x509_crt_set_serial(certificate.get(), serial.data(), serial.size()), kWhat);

@@ -19,7 +19,7 @@ class AccountService {
   [[nodiscard]] virtual std::optional<User> FindUser(const std::string& name) = 0;
   virtual void AddUser(const Actor& actor, const User& user,
                        Done done) = 0;  ///< kConflict if the name is taken.
-  /// kConflict if no enabled engineer would be left, or the account is not as expected.
+  /// kConflict if no enabled engineer would be left, or the account has changed.
   virtual void ChangeUser(const Actor& actor, const UserChange& change, Done done) = 0;
 };
 

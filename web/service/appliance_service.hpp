@@ -1,4 +1,4 @@
-// The state of the appliance, and what its button does.
+// The state of the appliance, and the functions of its button.
 #pragma once
 
 #include <functional>
@@ -25,23 +25,23 @@ class ApplianceService {
 
   [[nodiscard]] virtual Status GetStatus() = 0;
   [[nodiscard]] virtual Health GetHealth() = 0;
-  /// The newest camera picture as a small JPEG (at most 320 pixels wide, at most 5 a second); null
-  /// when the sensor shows none.
+  /// The newest camera picture as a small JPEG (at most 320 pixels wide, at most 5 per second);
+  /// null when the sensor delivers none.
   [[nodiscard]] virtual std::shared_ptr<const std::string> Preview() = 0;
-  /// What the sweep has seen so far, from above, as daemon/files/compact_map.hpp packs it: cells of
-  /// 2 cm around the reference marker, 32767 where the region was not seen yet. Null when no sweep
-  /// goes on, and until that marker has been seen.
+  /// The surface seen so far by the sweep, from above, in the encoding of
+  /// daemon/files/compact_map.hpp: cells of 2 cm around the reference marker, 32767 where the
+  /// region was not seen yet. Null without a sweep, and until that marker has been seen.
   [[nodiscard]] virtual std::shared_ptr<const std::string> SweptSurface() = 0;
-  /// As a short press of the button: starts a scan, ends the sweep, leaves a result. kConflict
-  /// where it is ignored.
+  /// Like a short press of the button: starts a scan, ends the sweep, dismisses a result. kConflict
+  /// if it is ignored.
   virtual void Press(const Actor& actor, Done done) = 0;
-  /// The same for one purpose each, so that asked twice it does not do the other: kConflict in
+  /// The same for one purpose each, so that a repeated request does not do the other: kConflict in
   /// other states.
   virtual void StartSweep(const Actor& actor, Done done) = 0;
   virtual void EndSweep(const Actor& actor, Done done) = 0;
-  /// As a long press: the scan is thrown away.
+  /// Like a long press: discards the scan.
   virtual void Cancel(const Actor& actor, Done done) = 0;
-  /// Called on the loop thread. One listener; an empty function ends it.
+  /// Called on the loop thread. One listener; an empty function removes it.
   virtual void SetListener(std::function<void(EventKind)> listener) = 0;
 };
 

@@ -1,4 +1,4 @@
-// Who did what, and when.
+// The record of all actions.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +9,12 @@
 
 namespace plumb::web {
 
-/// Which entries of the log are asked for.
+/// Selection of entries.
 struct AuditQuery {
-  std::int64_t before = 0;  ///< Older than this number; 0: from the newest one on.
+  std::int64_t before = 0;  ///< Only entries older than this number; 0: from the newest one.
   int limit = 100;
-  std::string actions = {};  ///< How their actions begin; empty: all.
-  bool views = true;         ///< Also who saw what.
+  std::string actions = {};  ///< Prefix of their actions; empty: all.
+  bool views = true;         ///< Include views of patient data.
 };
 
 /// The rules of services.hpp hold.
@@ -22,10 +22,10 @@ class AuditLog {
  public:
   virtual ~AuditLog() = default;
 
-  /// Logins and what else is no change of the store. May be written later, in order.
+  /// For logins and other actions that do not change the store. May be written later, in order.
   virtual void Log(const Actor& actor, const std::string& action, const std::string& subject,
                    const std::string& detail) = 0;
-  /// Newest first (aside).
+  /// Newest first (background).
   [[nodiscard]] virtual std::vector<AuditEntry> Audit(const AuditQuery& query) = 0;
 };
 

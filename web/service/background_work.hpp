@@ -5,7 +5,7 @@
 
 namespace plumb::web {
 
-/// Threads beside the loop, for what may take its time.
+/// Threads beside the loop, for work that may take long.
 enum class Aside {
   kReads,  ///< Lists, and files that are opened.
   kFiles,  ///< Writing and removing large files.
@@ -16,10 +16,10 @@ class BackgroundWork {
  public:
   virtual ~BackgroundWork() = default;
 
-  /// Has `work` done beside the loop, one after the other of its kind, then calls `done` on the
-  /// loop. Neither may throw. Within `work` the functions marked (aside), FindPatient(),
-  /// FindReference() and FindScan() may be called.
-  /// @return False where too much waits already: neither is called then.
+  /// Runs `work` beside the loop, in order for each kind, then calls `done` on the loop. Neither
+  /// may throw. `work` may call the functions marked (background), FindPatient(), FindReference()
+  /// and FindScan().
+  /// @return False if the queue is full: neither is called then.
   [[nodiscard]] virtual bool Later(Aside where, std::function<void()> work,
                                    std::function<void()> done) = 0;
 };

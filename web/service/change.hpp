@@ -1,4 +1,4 @@
-// The answer to what the web asks to be changed.
+// The answer to a change requested by the web.
 #pragma once
 
 #include <filesystem>
@@ -9,10 +9,10 @@ namespace plumb::web {
 
 enum class ChangeResult {
   kDone,
-  kInvalid,   ///< The request makes no sense; the message says what was expected and found.
+  kInvalid,   ///< The request is invalid; the message states what was expected and found.
   kNotFound,  ///< No such patient, reference, scan or user.
-  kConflict,  ///< Not in this state: "in state X, trying f(), requires Y".
-  kRefused,   ///< This user may not, here: the one who made a reference does not approve it.
+  kConflict,  ///< Not possible in this state: "in state X, trying f(), requires Y".
+  kRefused,   ///< This user may not do it here: the author of a reference must not approve it.
   kNoSpace,   ///< Disk full or read-only.
   kFailed,
 };
@@ -21,10 +21,10 @@ enum class ChangeResult {
 struct Change {
   ChangeResult result = ChangeResult::kDone;
   std::string message;         ///< For people; empty when done.
-  std::string id;              ///< Of what was made, where something was.
-  std::filesystem::path file;  ///< Of what was written, where something was.
+  std::string id;              ///< Id of a new record, if any.
+  std::filesystem::path file;  ///< Path of a new file, if any.
 };
-/// Called exactly once, on the loop thread: within the call that asked, or later.
+/// Called exactly once, on the loop thread: during the request or later.
 using Done = std::function<void(const Change&)>;
 
 }  // namespace plumb::web

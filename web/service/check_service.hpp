@@ -13,10 +13,10 @@ class CheckService {
  public:
   virtual ~CheckService() = default;
 
-  [[nodiscard]] virtual CheckStatus GetChecks() = 0;  ///< (aside)
-  /// The next scan, from any button, is of the room's markers. kConflict during a scan.
+  [[nodiscard]] virtual CheckStatus GetChecks() = 0;  ///< (background)
+  /// The next scan, from any button, is a check of the room's markers. kConflict during a scan.
   virtual void OpenCheck(const Actor& actor, Done done) = 0;
-  /// From now on checks are compared with this one. kRefused for the person who took it.
+  /// Sets this check as the baseline. kRefused for the user who took it.
   virtual void SetCheckBaseline(const Actor& actor, const std::string& check_id, Done done) = 0;
 };
 

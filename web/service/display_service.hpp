@@ -1,4 +1,4 @@
-// Screens in the room.
+// Displays in the room.
 #pragma once
 
 #include <string>

@@ -3,7 +3,7 @@
 
 namespace plumb::web {
 
-/// What it leaves.
+/// What it keeps.
 enum class FactoryReset { kKeepRecords, kWipe };
 
 }  // namespace plumb::web

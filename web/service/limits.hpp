@@ -1,4 +1,4 @@
-// What settings and plans may hold: one place for requests, for the appliance and for the store.
+// Limits of settings and plans, used by requests, the appliance and the store.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@ namespace plumb::web {
 struct Range {
   double least = 0.0, most = 0.0;
 
-  /// False for a value that is not a number, too.
+  /// Also false for a value that is not a number.
   [[nodiscard]] constexpr bool Holds(double value) const { return value >= least && value <= most; }
 };
 

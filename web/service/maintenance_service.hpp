@@ -11,10 +11,11 @@ class MaintenanceService {
  public:
   virtual ~MaintenanceService() = default;
 
-  /// In the configured folder, while scans go on; answers when it is done. kInvalid where no folder
-  /// is configured. The message names what was not as it was stored.
+  /// Makes a backup in the configured folder, while scans continue; answers when it is done.
+  /// kInvalid if no folder is configured. The message names files that were not as they were
+  /// stored.
   virtual void MakeBackup(const Actor& actor, Done done) = 0;
-  /// Gives a file (no patient data in it) that is downloaded once and then removed.
+  /// Returns a file (without patient data) that is downloaded once and then removed.
   virtual void WriteDiagnostics(const Actor& actor, Done done) = 0;
 };
 

@@ -1,4 +1,4 @@
-// What purposes, outcomes and roles are called: in the interface, in the store and in the log.
+// Names of purposes, outcomes and roles in the interface, in the store and in the log.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// References: what fractions are compared with.
+// References, with which fractions are compared.
 #pragma once
 
 #include <optional>
@@ -16,21 +16,21 @@ class ReferenceService {
   virtual ~ReferenceService() = default;
 
   [[nodiscard]] virtual std::vector<Reference> References(
-      const std::string& patient_id) = 0;  ///< Newest version first (aside).
+      const std::string& patient_id) = 0;  ///< Newest version first (background).
   [[nodiscard]] virtual std::optional<Reference> FindReference(const std::string& id) = 0;
-  /// A draft made of a scan with a scene. Gives the id.
+  /// Creates a draft from a scan with a scene. Returns the id.
   virtual void AddReference(const Actor& actor, const std::string& scan_id,
                             const std::string& reason, Done done) = 0;
-  /// Of a draft: changed in place. Of an approved one: a new draft with the next version; gives its
-  /// id.
-  /// @param revision  That was read: kConflict if another has been saved since.
+  /// A draft is changed in place. For an approved reference, creates a new draft with the next
+  /// version and returns its id.
+  /// @param revision  The revision that was read: kConflict if another has been saved since.
   virtual void PlanReference(const Actor& actor, const std::string& id, int revision,
                              const ReferencePlan& plan, Done done) = 0;
-  /// kRefused for the user who made or last planned it. From then on it is immutable and the one
-  /// that fractions are compared with.
-  /// @param revision  That was read, as above.
-  /// @param digest    Of what was read and is signed; kConflict where it is not what is stored.
-  ///                  Empty: the revision alone.
+  /// kRefused for the user who created or last planned it. After approval it is immutable and used
+  /// for the comparison of fractions.
+  /// @param revision  The revision that was read, as above.
+  /// @param digest    Digest of the data that was read and is signed; kConflict if other data is
+  ///         stored. Empty: only the revision is checked.
   virtual void ApproveReference(const Actor& actor, const std::string& id, int revision,
                                 const std::string& digest, Done done) = 0;
 };

@@ -1,4 +1,4 @@
-// What the page asks of the room's calibration: where the room's axes lie.
+// The room's calibration, which defines the axes of the room.
 #pragma once
 
 #include <optional>
@@ -15,39 +15,40 @@ struct RoomBoardScan {
   std::string check_id;
   WallClock::time_point time;
   std::string user;
-  std::string fault;  ///< Why it cannot be used; empty: the numbers are known.
+  std::string fault;  ///< Why it cannot be used; empty if it can.
   std::size_t num_markers = 0;
   double rms_mm = 0.0;
   double scale_percent = 100.0;
-  /// 95 % half-widths, of this scan alone.
+  /// Half-widths of the 95 % intervals, from this scan alone.
   double shift_uncertainty_mm = 0.0;
   double turn_uncertainty_deg = 0.0;
 };
 
-/// One that was signed.
+/// A signed calibration.
 struct RoomCalibrationVersion {
   int version = 0;
   WallClock::time_point signed_at;
   std::string signed_by;
   std::string digest;     ///< SHA-256, hexadecimal.
-  double shift_mm = 0.0;  ///< By how much its scans differ.
+  double shift_mm = 0.0;  ///< Spread of its scans.
   double turn_deg = 0.0;
   std::vector<std::string> check_ids;
 };
 
 struct RoomCalibrationStatus {
-  std::vector<RoomCalibrationVersion> versions;  ///< Newest first; the first one holds.
-  /// Why comparisons do not use the one that holds: a marker moved since, or it cannot be read.
+  std::vector<RoomCalibrationVersion> versions;  ///< Newest first; the first one is in use.
+  /// Why comparisons do not use it: a marker has moved since, or it cannot be read.
   std::string due;
-  bool is_configured = false;  ///< [iec] T_iec_reference is set; it counts only without a version.
-  std::vector<RoomBoardScan> scans;  ///< Since then, of today and this sensor; newest first.
-  std::size_t num_wanted = 3;        ///< Scans.
-  std::optional<double> shift_mm;    ///< By how much the scans differ so far.
+  bool is_configured = false;  ///< [iec] T_iec_reference is set; it is used only without a version.
+  /// Since the last version, of today and this sensor; newest first.
+  std::vector<RoomBoardScan> scans;
+  std::size_t num_wanted = 3;      ///< Number of scans required.
+  std::optional<double> shift_mm;  ///< Spread of the scans so far.
   std::optional<double> turn_deg;
   double max_shift_mm = 0.0;
   double max_turn_deg = 0.0;
-  std::string why_not_sign;  ///< Empty: it may be signed.
-  std::string digest;        ///< Of what would be signed.
+  std::string why_not_sign;  ///< Empty if it may be signed.
+  std::string digest;        ///< Digest of the calibration that would be signed.
 };
 
 /// The rules of services.hpp hold.
@@ -56,11 +57,11 @@ class RoomCalibrationService {
   virtual ~RoomCalibrationService() = default;
 
   [[nodiscard]] virtual RoomCalibrationStatus GetRoomCalibration() = 0;  ///< Aside.
-  /// @param digest  Of what was read and is signed; kConflict where it is not what would be stored,
-  ///                or where it may not be signed. Gives the version.
+  /// @param digest  Digest of the calibration that was read and is signed; kConflict if another one
+  ///         would be stored, or if it may not be signed. Returns the version.
   virtual void SignRoomCalibration(const Actor& actor, const std::string& digest, Done done) = 0;
-  /// The board as a PDF at true size (aside). Nothing: the room's markers are too large for one,
-  /// and the sentence says so.
+  /// The board as a PDF at true size (background). Nothing if the room's markers are too large for
+  /// one; the sentence then says so.
   [[nodiscard]] virtual std::optional<std::string> RoomBoardPdf(std::string& why_not) = 0;
 };
 

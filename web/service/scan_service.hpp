@@ -1,4 +1,4 @@
-// Scans, their files and the reports about them.
+// Scans, their files and their reports.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@
 
 namespace plumb::web {
 
-/// Of a report; more in `daemon/appliance/report_words.hpp`.
+/// Language of a report; see `daemon/appliance/report_words.hpp`.
 enum class Language { kEnglish, kSpanish };
 
 /// The rules of services.hpp hold.
@@ -18,25 +18,26 @@ class ScanService {
  public:
   virtual ~ScanService() = default;
 
-  /// Newest first; all patients: "" (aside).
+  /// Newest first; all patients: "" (background).
   [[nodiscard]] virtual std::vector<Scan> Scans(const std::string& patient_id, int limit) = 0;
   [[nodiscard]] virtual std::optional<Scan> FindScan(const std::string& id) = 0;
-  /// kConflict for one without an answer, an old one (2 minutes), one with a newer scan of the same
-  /// patient, and while a scan runs.
-  /// @param reason  Empty: only a result in tolerance can be accepted. Else one outside tolerance
-  ///                is accepted, for this reason.
+  /// kConflict for a scan without an answer, an old one (2 minutes), one with a newer scan of the
+  /// same patient, and while a scan runs.
+  /// @param reason  Empty: only a result in tolerance can be accepted. Otherwise the reason for
+  ///         accepting one outside tolerance.
   virtual void AcceptScan(const Actor& actor, const std::string& id, const std::string& reason,
                           Done done) = 0;
-  /// Removes the scan with its files, for a reason that the log keeps. kConflict for one that a
-  /// reference is made of, that runs, and while a backup is made.
+  /// Removes the scan with its files, for a reason that is logged. kConflict if a reference is made
+  /// from it, if it is running, and while a backup is made.
   virtual void RemoveScan(const Actor& actor, const std::string& id, const std::string& reason,
                           Done done) = 0;
-  /// A map of a scan in few bytes (daemon/files/compact_map.hpp); nothing where there is none
-  /// (aside). @param name  "heightmap", "deviation", "deviation_after", "region" or "body".
+  /// A map of a scan in a compact encoding (daemon/files/compact_map.hpp); nothing if there is none
+  /// (background).
+  /// @param name  "heightmap", "deviation", "deviation_after", "region" or "body".
   [[nodiscard]] virtual std::optional<std::string> CompactMap(const std::string& scan_id,
                                                               const std::string& name) = 0;
-  /// One page about a scan, or the course of a patient, as a PDF file; nothing where there is no
-  /// such scan or patient, or the report cannot be drawn (aside).
+  /// One page about a scan, or the course of a patient, as a PDF file; nothing if there is no such
+  /// scan or patient, or the report cannot be drawn (background).
   [[nodiscard]] virtual std::optional<std::string> ScanReport(const std::string& scan_id,
                                                               Language language) = 0;
   [[nodiscard]] virtual std::optional<std::string> CourseReport(const std::string& patient_id,

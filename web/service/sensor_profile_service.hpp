@@ -1,4 +1,4 @@
-// What is known of the sensor unit.
+// The profile of the sensor unit.
 #pragma once
 
 #include <optional>
@@ -14,13 +14,14 @@ class SensorProfileService {
  public:
   virtual ~SensorProfileService() = default;
 
-  [[nodiscard]] virtual SensorProfiles GetSensorProfiles() = 0;  ///< (aside)
-  /// One version as `plumb calibrate` writes it; nothing where there is none (aside).
+  [[nodiscard]] virtual SensorProfiles GetSensorProfiles() = 0;  ///< (background)
+  /// One version as written by `plumb calibrate`; nothing if there is none (background).
   [[nodiscard]] virtual std::optional<std::string> SensorProfileFile(int version) = 0;
-  /// The unit begins again from its stated calibration. @param serial  Of the unit that the person
-  /// has seen; kConflict where another one is connected by now, and during a scan.
+  /// The unit starts again from its stated calibration.
+  /// @param serial  Serial of the unit that the user has seen; kConflict if another one is
+  ///         connected, and during a scan.
   virtual void ResetSensorProfile(const Actor& actor, const std::string& serial, Done done) = 0;
-  /// Takes an earlier version back, as the newest. kNotFound where it holds no profile.
+  /// Restores an earlier version as the newest. kNotFound if it holds no profile.
   virtual void RollBackSensorProfile(const Actor& actor, const std::string& serial, int version,
                                      Done done) = 0;
 };

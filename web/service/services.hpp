@@ -1,5 +1,5 @@
-// What the web asks of the appliance, one interface for each subject. The daemon implements them;
-// the web only calls.
+// The interface of the appliance to the web, one class for each subject. The daemon implements it;
+// the web only calls it.
 #pragma once
 
 #include "web/service/account_service.hpp"
@@ -19,15 +19,15 @@
 
 namespace plumb::web {
 
-/// The appliance as the page sees it. Borrowed: the services live longer than what uses them. Each
-/// handler takes the services that it needs, never all of them.
+/// The services of the appliance. Borrowed: they outlive their users. Each handler takes the
+/// services that it needs, never all of them.
 ///
 /// Every function is called on the loop thread and returns within a few milliseconds: reads answer
-/// from memory or from an index, changes may finish later. Those marked (aside) read lists: they
-/// are called within BackgroundWork::Later(), as the others beside them may be. Each change and its
-/// audit entry are one transaction of the store. Nothing throws but std::bad_alloc: what goes wrong
-/// is a Change. Strings that come in are valid UTF-8, short, and without control characters, but
-/// their meaning is not checked.
+/// from memory or from an index, changes may finish later. Functions marked (background) read
+/// lists: they must be called within BackgroundWork::Later(), and the others beside them may be.
+/// Each change and its audit entry are one transaction of the store. Nothing throws except
+/// std::bad_alloc; errors are reported as a Change. Arguments are valid UTF-8, short, and without
+/// control characters, but their meaning is not checked.
 struct Services {
   BackgroundWork& background;
   ApplianceService& appliance;

@@ -18,7 +18,7 @@ class SettingsService {
   virtual void ChangeSettings(const Actor& actor, const Settings& settings,
                               Done done) = 0;                       ///< kInvalid names the field.
   [[nodiscard]] virtual std::vector<PlanTemplate> Templates() = 0;  ///< By site.
-  /// In place of the one of that site; at most 100 sites.
+  /// Replaces the template of that site; at most 100 sites.
   virtual void SetTemplate(const Actor& actor, const PlanTemplate& wanted, Done done) = 0;
   virtual void RemoveTemplate(const Actor& actor, const std::string& site, Done done) = 0;
 };
