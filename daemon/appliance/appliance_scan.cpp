@@ -10,7 +10,6 @@
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/plan_options.hpp"
 #include "daemon/loop/log.hpp"
-#include "daemon/records/check_json.hpp"
 
 namespace plumb {
 namespace {
@@ -75,10 +74,7 @@ ScanJob Appliance::MakeJob(const web::Settings& settings) {
   job.stop_after_s = parts_.config.appliance.auto_stop_s.value_or(settings.auto_stop_s);
   if (check_) {
     job.keep_recording = false;
-    const std::string baseline = store_->checks.BaselineJson();
-    job.check = CheckJob{BaselineIn(baseline), parts_.config.check};
-    if (!baseline.empty() && !job.check->baseline)
-      throw DataError("the stored baseline of the daily check cannot be read: set another one");
+    job.check = CheckJob{store_->checks.BaselineMarkers(), parts_.config.check};
     return job;
   }
   if (scan_.patient_id.empty()) return job;  // no session is open, so there is no comparison
@@ -162,7 +158,7 @@ ScanCallbacks Appliance::MakeCheckCallbacks(const NewScan& record) {
   callbacks.begin = [] { return std::filesystem::path(); };
   callbacks.save = [this, actor = *check_,
                     serial = record.sensor_serial](const ScanOutcome& outcome) {
-    if (!outcome.check_json.empty()) (void)store_->checks.Add(actor, serial, outcome.check_json);
+    if (outcome.check) (void)store_->checks.Add(actor, serial, *outcome.check);
   };
   AddListeners(callbacks);
   return callbacks;
@@ -219,7 +215,8 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
       purpose_ = web::ScanPurpose::kFraction;
       reference_reason_.clear();
     }
-    const std::string answer = is_check ? "daily check " + CheckIn(outcome.check_json).status
+    const std::string answer = outcome.check
+                                   ? std::string("daily check ") + Name(outcome.check->check.status)
                                : outcome.verdict                ? Name(*outcome.verdict)
                                : outcome.kind == Kind::kNoScene ? outcome.reason
                                                                 : "no comparison";

@@ -11,6 +11,7 @@
 
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/config/version.hpp"
+#include "daemon/files/result_folder.hpp"
 #include "daemon/loop/loop_report.hpp"
 #include "daemon/records/store_json.hpp"
 
@@ -224,27 +225,25 @@ Json Appliance::StatusJson() {
   Json last = nullptr;
   if (last_result_) {
     const ScanOutcome& outcome = last_result_->outcome;
-    last = {
-        {"scan", last_result_->id},
-        {"is_reference", outcome.kind == ScanOutcome::Kind::kDone && outcome.result_json.empty()},
-        {"verdict",
-         outcome.kind == ScanOutcome::Kind::kNoScene ? Json("no_answer") : Json(nullptr)},
-        {"reasons",
-         outcome.kind == ScanOutcome::Kind::kNoScene ? Json{outcome.reason} : Json::array()},
-        {"correction", nullptr},
-        {"frames", outcome.frames},
-        {"frames_dropped", outcome.frames_dropped},
-        {"images_lost", last_result_->images.num_lost},
-        {"images_unpaired", last_result_->images.num_unpaired},
-        {"images_discarded", last_result_->images.num_discarded},
-        {"after_last_frame_s", outcome.after_last_frame_s}};
-    if (!outcome.result_json.empty()) {
-      const Json result = Json::parse(outcome.result_json);
-      last["verdict"] = result["verdict"];
-      last["reasons"] = result["reasons"];
+    last = {{"scan", last_result_->id},
+            {"is_reference", outcome.kind == ScanOutcome::Kind::kDone && !outcome.verdict},
+            {"verdict",
+             outcome.kind == ScanOutcome::Kind::kNoScene ? Json("no_answer") : Json(nullptr)},
+            {"reasons",
+             outcome.kind == ScanOutcome::Kind::kNoScene ? Json{outcome.reason} : Json::array()},
+            {"correction", nullptr},
+            {"frames", outcome.frames},
+            {"frames_dropped", outcome.frames_dropped},
+            {"images_lost", last_result_->images.num_lost},
+            {"images_unpaired", last_result_->images.num_unpaired},
+            {"images_discarded", last_result_->images.num_discarded},
+            {"after_last_frame_s", outcome.after_last_frame_s}};
+    if (outcome.kind == ScanOutcome::Kind::kDone && outcome.verdict) {
+      last["verdict"] = Name(*outcome.verdict);
+      last["reasons"] = outcome.reasons;
       // A result without an answer shows no numbers, so that nobody acts on them.
-      const Json correction =
-          result["verdict"] == "no_answer" ? Json(nullptr) : result["correction"];
+      const bool is_shown = outcome.correction && *outcome.verdict != Verdict::kNoAnswer;
+      const Json correction = is_shown ? Json(CorrectionJson(*outcome.correction)) : Json(nullptr);
       last["correction"] = correction;
       for (const char* name :
            {"vertical_mm", "longitudinal_mm", "lateral_mm", "pitch_deg", "roll_deg", "yaw_deg"}) {

@@ -16,7 +16,6 @@
 #include "daemon/pipeline/frame_thinning.hpp"
 #include "daemon/pipeline/recording_feed.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
-#include "daemon/records/check_json.hpp"
 
 namespace plumb {
 namespace {
@@ -88,8 +87,8 @@ void ScanSession::Run(const std::stop_token& stop) {
     outcome_.kind = ScanOutcome::Kind::kNoScene;
     outcome_.reason = error.what();
     if (job_.check)
-      outcome_.check_json = CheckJson(
-          {.status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {error.what()}}, {});
+      outcome_.check = TakenCheck{
+          {.status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {error.what()}}};
   } catch (const std::bad_alloc&) {
     outcome_.kind = ScanOutcome::Kind::kFailed;
     outcome_.reason = "out of memory: sweep a shorter way, or close what else runs";
@@ -240,11 +239,14 @@ void ScanSession::Check(const Scene& scene) {
     check.status = MarkerCheckStatus::kFailed;
     check.reasons.push_back(outcome_.drift);
   }
-  outcome_.check_json = CheckJson(
-      check, BaselineOf(room, job_.check->limits), BaselineOf(board, job_.check->limits).markers,
-      scene.frame == SceneFrame::kReferenceMarker ? scene.reference_marker : std::nullopt);
   outcome_.verdict =
       check.status == MarkerCheckStatus::kPassed ? Verdict::kInTolerance : Verdict::kNoAnswer;
+  outcome_.check = TakenCheck{.check = std::move(check),
+                              .seen = BaselineOf(room, job_.check->limits),
+                              .board = BaselineOf(board, job_.check->limits).markers,
+                              .reference_marker = scene.frame == SceneFrame::kReferenceMarker
+                                                      ? scene.reference_marker
+                                                      : std::nullopt};
 }
 
 void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
@@ -292,6 +294,8 @@ void ScanSession::Evaluate(const Scene& scene, const std::stop_token& stop) {
   WriteResult(*comparison, pictures, folder_ / "result", room);
   outcome_.result_json = ResultJson(*comparison, room);
   outcome_.verdict = comparison->verdict;
+  outcome_.reasons = comparison->reasons;
+  outcome_.correction = comparison->correction;
 }
 
 }  // namespace plumb

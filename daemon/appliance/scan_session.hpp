@@ -11,6 +11,7 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "algo/comparison/comparison.hpp"
 #include "algo/comparison/marker_check.hpp"
@@ -19,6 +20,7 @@
 #include "daemon/appliance/sweep_guidance.hpp"
 #include "daemon/appliance/unit_profile.hpp"
 #include "daemon/pipeline/live_feed.hpp"
+#include "daemon/records/check_json.hpp"
 
 namespace plumb {
 
@@ -73,9 +75,11 @@ struct ScanUpdate {
 struct ScanOutcome {
   enum class Kind { kDone, kNoScene, kCancelled, kFailed };
   Kind kind = Kind::kFailed;
-  std::string reason;              ///< kNoScene: why the frames give no scene. kFailed: the error.
-  std::string result_json;         ///< kDone with a reference: the text of result.json.
-  std::string check_json;          ///< kDone or kNoScene of a check: as CheckJson().
+  std::string reason;       ///< kNoScene: why the frames give no scene. kFailed: the error.
+  std::string result_json;  ///< kDone with a reference: the text of result.json, for the store.
+  std::vector<std::string> reasons;      ///< kDone with a reference: those of the verdict.
+  std::optional<Correction> correction;  ///< kDone with a reference that gave numbers.
+  std::optional<TakenCheck> check;       ///< kDone or kNoScene of a daily check.
   std::optional<Verdict> verdict;  ///< For a check: in tolerance if it passed, otherwise no answer.
   std::int64_t frames = 0, frames_tracked = 0, frames_dropped = 0;
   double swept_area_m2 = 0.0;

@@ -93,16 +93,6 @@ Json NumbersJson(const CouchNumbers& numbers) {
           {"yaw_deg", numbers.yaw_deg}};
 }
 
-Json CorrectionJson(const Correction& correction) {
-  Json json = {{"isocentre", VectorJson(correction.isocentre_m)}};
-  json.update(NumbersJson(correction.value));
-  json["uncertainty"] = NumbersJson(correction.u95);
-  json["words"] = {{"vertical", correction.words[0]}, {"longitudinal", correction.words[1]},
-                   {"lateral", correction.words[2]},  {"pitch", correction.words[3]},
-                   {"roll", correction.words[4]},     {"yaw", correction.words[5]}};
-  return json;
-}
-
 Json RegionJson(const RegionCoverage& region) {
   return {{"coverage", region.coverage},
           {"largest_hole_m", region.largest_hole_m},
@@ -162,6 +152,16 @@ void WriteMap(const fs::path& file, const std::optional<HeightMap>& map) {
 }
 
 }  // namespace
+
+Json CorrectionJson(const Correction& correction) {
+  Json json = {{"isocentre", VectorJson(correction.isocentre_m)}};
+  json.update(NumbersJson(correction.value));
+  json["uncertainty"] = NumbersJson(correction.u95);
+  json["words"] = {{"vertical", correction.words[0]}, {"longitudinal", correction.words[1]},
+                   {"lateral", correction.words[2]},  {"pitch", correction.words[3]},
+                   {"roll", correction.words[4]},     {"yaw", correction.words[5]}};
+  return json;
+}
 
 OutputKind ResultOutput() {
   return {"result",

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include <nlohmann/json_fwd.hpp>
 #include <opencv2/core/mat.hpp>
 
 #include "algo/comparison/comparison.hpp"
@@ -23,6 +24,9 @@ struct ResultRoom {
   /// Empty if it was used; otherwise the axes are those of the reference marker.
   std::string why_not_used;
 };
+
+/// A correction as in result.json: the six numbers, their 95 % half-widths and their directions.
+[[nodiscard]] nlohmann::ordered_json CorrectionJson(const Correction& correction);
 
 /// The text of result.json, which `compare --json` also prints. Absent results are null; numbers
 /// are read back bit for bit.

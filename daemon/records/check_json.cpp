@@ -56,11 +56,11 @@ std::optional<MarkerMap> MarkersIn(const Json& json) {
   return markers;
 }
 
-std::string CheckJson(const MarkerCheck& check, const MarkerBaseline& seen, const MarkerMap& board,
-                      std::optional<int> reference_marker) {
-  Json json = {
-      {"status", Name(check.status)}, {"reasons", check.reasons}, {"items", Json::array()}};
-  for (const MarkerCheckItem& item : check.items) {
+std::string CheckJson(const TakenCheck& taken) {
+  Json json = {{"status", Name(taken.check.status)},
+               {"reasons", taken.check.reasons},
+               {"items", Json::array()}};
+  for (const MarkerCheckItem& item : taken.check.items) {
     json["items"].push_back(
         Json{{"name", item.name},
              {"value", std::isfinite(item.value) ? Json(item.value) : Json(nullptr)},
@@ -69,11 +69,11 @@ std::string CheckJson(const MarkerCheck& check, const MarkerBaseline& seen, cons
              {"passed", item.passed},
              {"note", item.note}});
   }
-  json["dictionary"] = seen.dictionary;
-  json["marker_length_m"] = seen.marker_length_m;
-  json["markers"] = MarkersJson(seen.markers);
-  if (!board.empty()) json["board"] = MarkersJson(board);
-  json["reference_marker"] = reference_marker ? Json(*reference_marker) : Json(nullptr);
+  json["dictionary"] = taken.seen.dictionary;
+  json["marker_length_m"] = taken.seen.marker_length_m;
+  json["markers"] = MarkersJson(taken.seen.markers);
+  if (!taken.board.empty()) json["board"] = MarkersJson(taken.board);
+  json["reference_marker"] = taken.reference_marker ? Json(*taken.reference_marker) : Json(nullptr);
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -95,7 +95,7 @@ web::CheckRecord CheckIn(const std::string& check_json) {
     record.reasons = {std::string("this check cannot be read: ") + why};
     return record;
   };
-  if (!json.is_object()) return unreadable("it is no JSON object");
+  if (!json.is_object()) return unreadable("it is not a JSON object");
   try {
     record.status = json.at("status").get<std::string>();
     record.reasons = json.value("reasons", record.reasons);

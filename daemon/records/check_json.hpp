@@ -10,11 +10,15 @@
 namespace plumb {
 
 /// A check with the markers that it saw, from which the next baseline may be made.
-/// @param board             Markers of the room's board, which do not belong to the room.
-/// @param reference_marker  Marker whose frame is used; not set: another frame.
-[[nodiscard]] std::string CheckJson(const MarkerCheck& check, const MarkerBaseline& seen,
-                                    const MarkerMap& board = {},
-                                    std::optional<int> reference_marker = {});
+struct TakenCheck {
+  MarkerCheck check;
+  MarkerBaseline seen = {};  ///< Markers of the room.
+  MarkerMap board = {};      ///< Markers of the room's board, which do not belong to the room.
+  std::optional<int> reference_marker =
+      {};  ///< Marker whose frame is used; not set: another frame.
+};
+
+[[nodiscard]] std::string CheckJson(const TakenCheck& taken);
 
 /// The markers in such a text; nothing if it is not one.
 [[nodiscard]] std::optional<MarkerBaseline> BaselineIn(const std::string& check_json);

@@ -1,6 +1,6 @@
 #include "daemon/records/check_store.hpp"
 
-#include "daemon/records/check_json.hpp"
+#include "algo/base/errors.hpp"
 #include "daemon/records/store_refusal.hpp"
 #include "daemon/records/stored_values.hpp"
 
@@ -29,8 +29,8 @@ web::CheckRecord ReadCheck(const Statement& row) {
 }  // namespace
 
 std::string CheckStore::Add(const web::Actor& actor, const std::string& sensor_serial,
-                            const std::string& check_json) {
-  const std::string status = CheckIn(check_json).status;
+                            const TakenCheck& taken) {
+  const char* status = Name(taken.check.status);
   StoreChange change(database_);
   change
       .Prepare(
@@ -39,7 +39,7 @@ std::string CheckStore::Add(const web::Actor& actor, const std::string& sensor_s
       .Bind(actor.user)
       .Bind(sensor_serial)
       .Bind(status)
-      .Bind(check_json)
+      .Bind(CheckJson(taken))
       .Run();
   const std::string id = std::to_string(change.last_id());
   change.Log(actor, "check.done", id, status);
@@ -103,12 +103,16 @@ std::optional<web::CheckBaseline> CheckStore::Baseline() {
                             .num_markers = CheckIn(query.Text(3)).num_markers};
 }
 
-std::string CheckStore::BaselineJson() {
+std::optional<MarkerBaseline> CheckStore::BaselineMarkers() {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare(
       "SELECT json FROM check_baselines JOIN checks ON checks.id = check_id ORDER BY "
       "check_baselines.id DESC LIMIT 1");
-  return query.Step() ? query.Text(0) : std::string();
+  if (!query.Step()) return std::nullopt;
+  std::optional<MarkerBaseline> markers = BaselineIn(query.Text(0));
+  if (!markers)
+    throw DataError("the stored baseline of the daily check cannot be read: set another one");
+  return markers;
 }
 
 void CheckStore::SetBaseline(const web::Actor& actor, const std::string& check_id) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/records/check_json.hpp"
 #include "daemon/records/store_database.hpp"
 #include "web/service/service_types.hpp"
 
@@ -15,9 +16,9 @@ class CheckStore {
  public:
   explicit CheckStore(StoreDatabase& database) : database_(database) {}
 
-  /// @param check_json  From CheckJson(). Returns the id.
+  /// Returns the id.
   std::string Add(const web::Actor& actor, const std::string& sensor_serial,
-                  const std::string& check_json);
+                  const TakenCheck& taken);
   [[nodiscard]] std::vector<web::CheckRecord> List(int limit);  ///< Newest first.
   [[nodiscard]] std::optional<web::CheckRecord> Last();
   /// Not in the future. @param sensor_serial  Unit that was to be checked; empty: any.
@@ -29,8 +30,9 @@ class CheckStore {
   [[nodiscard]] bool ConfirmsScan(const std::string& scan_id);
 
   [[nodiscard]] std::optional<web::CheckBaseline> Baseline();
-  /// Of the check that is the baseline; empty if there is none.
-  [[nodiscard]] std::string BaselineJson();
+  /// The markers of the baseline; nothing without a baseline.
+  /// @throws DataError if they cannot be read.
+  [[nodiscard]] std::optional<MarkerBaseline> BaselineMarkers();
   void SetBaseline(const web::Actor& actor, const std::string& check_id);
 
  private:

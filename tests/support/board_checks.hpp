@@ -36,16 +36,18 @@ inline MarkerMap MarkersOfRoom() {
 }
 
 // A check scan over the board, whose cross lies `off_m` from the lasers.
-inline std::string CheckOver(double off_m = 0, int num_board_markers = 4,
-                             MarkerMap room = MarkersOfRoom(),
-                             std::optional<int> reference_marker = 0) {
+inline TakenCheck CheckOver(double off_m = 0, int num_board_markers = 4,
+                            MarkerMap room = MarkersOfRoom(),
+                            std::optional<int> reference_marker = 0) {
   MarkerMap board;
   for (const auto& [id, centre] : MakeRoomBoard(250, kBoardMarker_m).centres_m) {
     if (board.size() < static_cast<std::size_t>(num_board_markers))
       board.emplace(id, MarkerAt({centre.x() + off_m, centre.y(), 0}, SceneFromRoom()));
   }
-  return CheckJson({.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}},
-                   {std::move(room), "DICT_6X6_250", kBoardMarker_m}, board, reference_marker);
+  return {.check = {.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}},
+          .seen = {std::move(room), "DICT_6X6_250", kBoardMarker_m},
+          .board = std::move(board),
+          .reference_marker = reference_marker};
 }
 
 }  // namespace plumb::testing

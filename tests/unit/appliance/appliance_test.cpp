@@ -178,7 +178,7 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
     On([&] {
       (void)appliance_->store()->checks.Add(
           actor, appliance_->WebStatus().sensor.serial,
-          CheckJson({.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}, {}));
+          TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
       services_->services().patients.OpenPatient(
           actor, id, web::ScanPurpose::kReference, "", "",
           [&](const web::Change& change) { opened.set_value(change); });
@@ -327,7 +327,7 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
       EXPECT_TRUE(appliance_->store()->scans.List("", 10).empty()) << "nothing was scanned";
       (void)appliance_->store()->checks.Add(
           tess, appliance_->WebStatus().sensor.serial,
-          CheckJson({.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}, {}));
+          TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
       EXPECT_EQ(appliance_->WebStatus().reference_block, "");
       EXPECT_EQ(appliance_->WhyNoReference(ScanOf(false)), "");
       EXPECT_THAT(appliance_->WhyNoReference(ScanOf(true)),

@@ -16,17 +16,17 @@ using testing::StoreTest;
 using web::ChangeResult;
 
 /// What a check that ended in `status` stores after seeing the markers 1 to n in a row.
-std::string CheckWith(int n, MarkerCheckStatus status) {
+TakenCheck CheckWith(int n, MarkerCheckStatus status) {
   MarkerBaseline seen{{}, "DICT_6X6_250", 0.104};
   for (int id = 1; id <= n; ++id) {
     SceneMarker marker{.corners = CornersInMarkerFrame(0.104), .num_views = 9, .sigma_m = 0.0005};
     for (Eigen::Vector3d& corner : marker.corners) corner.x() += 0.3 * id;
     seen.markers[id] = marker;
   }
-  return CheckJson({.status = status,
+  return {.check = {.status = status,
                     .items = {{"moved", 1.25, 5.0, "mm", true, "marker 2"}},
                     .reasons = {"because"}},
-                   seen);
+          .seen = std::move(seen)};
 }
 
 TEST_F(StoreTest, ACheckWithAStampOfTheFutureCountsForNoDay) {
@@ -87,7 +87,7 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   {
     const auto store = Open();
     EXPECT_FALSE(store->checks.Baseline());
-    EXPECT_FALSE(BaselineIn(store->checks.BaselineJson()));
+    EXPECT_FALSE(store->checks.BaselineMarkers());
     const std::string first =
         store->checks.Add(kAnna, "S1", CheckWith(4, MarkerCheckStatus::kNoBaseline));
     EXPECT_FALSE(store->checks.HasPassedSince(before)) << "without a baseline nothing has passed";
@@ -114,7 +114,7 @@ TEST_F(StoreTest, KeepsDailyChecksAndTheBaselineOverARestart) {
   EXPECT_EQ(baseline->check_id, checks[1].id);
   EXPECT_EQ(baseline->set_by, "bert");
   EXPECT_EQ(baseline->num_markers, 4U);
-  const auto markers = BaselineIn(store->checks.BaselineJson());
+  const auto markers = store->checks.BaselineMarkers();
   ASSERT_TRUE(markers);
   EXPECT_EQ(markers->dictionary, "DICT_6X6_250");
   EXPECT_NEAR(markers->markers.at(3).corners[0].x(), 0.9 - 0.052, 1e-12);

@@ -91,8 +91,8 @@ TEST_F(StoreRoomTest, OnlyScansOfThisSensorAndTimeCount) {
 }
 
 TEST_F(StoreRoomTest, AScanThatCannotBeUsedSaysWhy) {
-  const auto fault = [](const std::string& json) { return BoardScanIn(json)->fault; };
-  EXPECT_FALSE(BoardScanIn(CheckOver(0, 0))) << "no board: an ordinary check";
+  const auto fault = [](const TakenCheck& check) { return BoardScanIn(CheckJson(check))->fault; };
+  EXPECT_FALSE(BoardScanIn(CheckJson(CheckOver(0, 0)))) << "no board: an ordinary check";
   EXPECT_FALSE(BoardScanIn("no json"));
   EXPECT_THAT(fault(CheckOver(0, 2)), HasSubstr("2 of the board's 4"));
   EXPECT_THAT(fault(CheckOver(0, 4, {})), HasSubstr("none of the room's markers"));

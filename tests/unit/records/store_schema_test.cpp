@@ -121,7 +121,7 @@ TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
   EXPECT_THAT(store->checks.List(10), SizeIs(0));
   const MarkerCheck failed{
       .status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {"no marker was seen"}};
-  EXPECT_EQ(store->checks.Add(kAnna, "S1", CheckJson(failed, {})), "1");
+  EXPECT_EQ(store->checks.Add(kAnna, "S1", {.check = failed}), "1");
 }
 
 TEST_F(StoreTest, WhenAResultOfTheSchemaBeforeWasAcceptedIsTakenFromTheLog) {
