@@ -2,18 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <vector>
 
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
-#include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "algo/markers/square_homography.hpp"
+#include "algo/markers/marker_side.hpp"
 
 namespace plumb {
+
+using namespace marker_side;  // NOLINT: the sides are what this file fits
+
 namespace {
 
 constexpr int kOuterRounds = 4;  // geometry (homography, pixel set) is recomputed in each
@@ -23,85 +24,13 @@ constexpr double kConverged_px = 0.03;
 constexpr double kMinContrast = 0.02;  // fraction of full scale
 constexpr int kFirstSideSamples = 90;  // approximate number of pixels per side in the first round
 constexpr int kSideSamples = 180;      // and in later rounds
-constexpr double kMinBlur_px = 0.35;   // a pixel's own area has a sigma of 0.29 px
 constexpr double kModelError_px =
     0.03;  // covers sharpening cameras and real paper; rendered images leave 0.01
-constexpr int kTablePerCell = 4;  // resolution of the blurred cell rows
-
-/// The normal distribution function and density from a table: error below 1e-5, exactly zero or one
-/// outside +-4.
-class NormalTable {
- public:
-  NormalTable() {
-    for (int i = 0; i <= kSize; ++i) {
-      const double z = -kLimit + i / kScale;
-      cdf_[static_cast<std::size_t>(i)] =
-          static_cast<float>(0.5 * std::erfc(-z / std::numbers::sqrt2));
-      pdf_[static_cast<std::size_t>(i)] =
-          static_cast<float>(std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi));
-    }
-  }
-  /// {distribution, density} at z.
-  [[nodiscard]] std::pair<float, float> At(float z) const {
-    if (!(z > -kLimit)) return {0.0F, 0.0F};
-    if (z >= kLimit) return {1.0F, 0.0F};
-    const float position = (z + kLimit) * kScale;
-    const int index = static_cast<int>(position);
-    const float part = position - static_cast<float>(index);
-    const auto i = static_cast<std::size_t>(index);
-    return {cdf_[i] + part * (cdf_[i + 1] - cdf_[i]), pdf_[i] + part * (pdf_[i + 1] - pdf_[i])};
-  }
-
- private:
-  static constexpr float kLimit = 4.0F;
-  static constexpr float kScale = 64.0F;
-  static constexpr int kSize = 512;
-  std::array<float, kSize + 2> cdf_{};
-  std::array<float, kSize + 2> pdf_{};
-};
-
-const NormalTable& Normal() {
-  static const NormalTable table;
-  return table;
-}
 
 const ToneTable& EncodedValues() {
   static const ToneTable table = PowerTone(1.0);
   return table;
 }
-
-/// A tone curve and its inverse's slope.
-struct Tone {
-  explicit Tone(const ToneTable& table) : light(table) {
-    constexpr float kLeastLight = 1e-4F;  // Per level; some curves are flat at black.
-    for (std::size_t i = 0; i < 256; ++i) {
-      const std::size_t below = i > 0 ? i - 1 : i;
-      const std::size_t above = i < 255 ? i + 1 : i;
-      const float light_per_level =
-          (table[above] - table[below]) / static_cast<float>(above - below);
-      levels_per_light[i] = 1.0F / std::max(light_per_level, kLeastLight);
-    }
-  }
-  const ToneTable& light;
-  std::array<float, 256> levels_per_light{};
-};
-
-/// A side of the square in its own coordinates: `along` from its first corner, `depth` towards the
-/// inside of the marker, pixels.
-struct Side {
-  Eigen::Vector2d origin, direction, normal;
-  double length_px = 0;
-  Eigen::Matrix3d
-      pixel_to_cells;  ///< (column, row) with this side on top: 0..N along, 0..N in depth.
-  std::array<double, 2> depth_one{},
-      depth_two{};     ///< Depth of the lines one and two cells inside, at both ends.
-  double cell_px = 0;  ///< Mean depth of one cell.
-  double outside_px = 0, inside_px = 0;  ///< Extent of the band of pixels that is used.
-  double bow_px = 0;                     ///< Depth of the curved side at its middle.
-  /// Darkness (0 paper, 1 ink) of the border and the first two code rows along the side, blurred
-  /// along it.
-  std::array<std::vector<float>, 3> darkness;
-};
 
 /// Unknowns of one side.
 struct SideFit {
@@ -115,152 +44,6 @@ struct SideFit {
   double residual_levels = 0;
   bool valid = false;
 };
-
-struct Sample {
-  float depth, along, value;      ///< along: 0..1
-  float levels_per_light;         ///< Of the tone curve at this value.
-  std::array<float, 3> darkness;  ///< Of border, first and second code row at this place.
-};
-
-/// Cell (row, column) counted with side `side` on top.
-bool WhiteFromSide(const MarkerPattern& pattern, int side, int row, int column) {
-  const int last = pattern.bits_per_side - 1;
-  switch (side) {
-    case 0:
-      return pattern.White(row, column);
-    case 1:
-      return pattern.White(column, last - row);
-    case 2:
-      return pattern.White(last - row, last - column);
-    default:
-      return pattern.White(last - column, row);
-  }
-}
-
-/// Darkness along the side of depth row `row` (0 is the border), blurred by a Gaussian of
-/// `blur_cells`. White is wider than black by `shift_cells` at each end.
-void FillDarkness(const MarkerPattern& pattern, int side, int row, double blur_cells,
-                  double shift_cells, std::vector<float>& table) {
-  const int cells = pattern.bits_per_side + 2;
-  std::array<float, 12> dark{};  // with paper at both ends
-  for (int i = 0; i < cells; ++i) {
-    const bool border = row == 0 || i == 0 || i == cells - 1;
-    dark[static_cast<std::size_t>(i + 1)] =
-        border || !WhiteFromSide(pattern, side, row - 1, i - 1) ? 1.0F : 0.0F;
-  }
-  table.assign(static_cast<std::size_t>(cells * kTablePerCell + 1), 0.0F);
-  for (int i = 0; i <= cells; ++i) {
-    const float change = dark[static_cast<std::size_t>(i + 1)] - dark[static_cast<std::size_t>(i)];
-    if (change == 0.0F) continue;
-    const double edge = i + (change > 0 ? shift_cells : -shift_cells);
-    const auto reach = static_cast<int>(std::ceil(4 * blur_cells * kTablePerCell));
-    const int size = static_cast<int>(table.size());
-    for (int k = std::max(0, i * kTablePerCell - reach); k < size; ++k) {
-      const double position = static_cast<double>(k) / kTablePerCell;
-      table[static_cast<std::size_t>(k)] +=
-          change * Normal().At(static_cast<float>((position - edge) / blur_cells)).first;
-    }
-  }
-}
-
-float Lookup(const std::vector<float>& table, float cells) {
-  const float position =
-      std::clamp(cells * kTablePerCell, 0.0F, static_cast<float>(table.size() - 1) - 1e-3F);
-  const auto index = static_cast<std::size_t>(position);
-  const float part = position - static_cast<float>(index);
-  return table[index] + part * (table[index + 1] - table[index]);
-}
-
-/// Deflection by the lens of the straight segment a..b at its middle, along `normal`.
-double Bow(const Intrinsics& intrinsics, const Eigen::Vector2d& a, const Eigen::Vector2d& b,
-           const Eigen::Vector2d& normal) {
-  const Eigen::Vector2d middle = 0.5 * (Undistort(intrinsics, a) + Undistort(intrinsics, b));
-  return normal.dot(Project(intrinsics, middle.homogeneous()) - 0.5 * (a + b));
-}
-
-std::optional<Side> MakeSide(const ImageCorners& corners, int index, const MarkerPattern& pattern,
-                             double blur_along_px, double edge_shift_px,
-                             const std::optional<Intrinsics>& intrinsics) {
-  const auto at = [&](int k) -> const Eigen::Vector2d& {
-    return corners[static_cast<std::size_t>((index + k) % 4)];
-  };
-  const int cells = pattern.bits_per_side + 2;
-  Side side;
-  side.origin = at(0);
-  side.direction = at(1) - at(0);
-  side.length_px = side.direction.norm();
-  if (!(side.length_px > 4)) return std::nullopt;
-  side.direction /= side.length_px;
-  side.normal = Eigen::Vector2d(-side.direction.y(), side.direction.x());
-
-  const std::optional<Eigen::Matrix3d> cells_to_pixel =
-      SquareToQuad(cells, {at(0), at(1), at(2), at(3)});
-  if (!cells_to_pixel) return std::nullopt;
-  side.pixel_to_cells = cells_to_pixel->inverse();
-  const auto depth_of = [&](double column, double row) {
-    return side.normal.dot((*cells_to_pixel * Eigen::Vector3d(column, row, 1)).hnormalized() -
-                           side.origin);
-  };
-  side.depth_one = {depth_of(0, 1), depth_of(cells, 1)};
-  side.depth_two = {depth_of(0, 2), depth_of(cells, 2)};
-  side.cell_px = 0.5 * (side.depth_one[0] + side.depth_one[1]);
-  if (!(side.depth_one[0] > 0.5 && side.depth_one[1] > 0.5)) return std::nullopt;
-  // Less than a whole cell outside, because sheets are often cut close to the square.
-  side.outside_px = std::clamp(0.6 * side.cell_px, 1.5, 8.0);
-  side.inside_px = std::clamp(1.25 * side.cell_px, 2.5, 8.0);
-  if (intrinsics) side.bow_px = Bow(*intrinsics, at(0), at(1), side.normal);
-
-  const double blur_cells = std::max(blur_along_px, kMinBlur_px) * cells / side.length_px;
-  for (int row = 0; row < 3; ++row)
-    FillDarkness(pattern, index, row, blur_cells, edge_shift_px * cells / side.length_px,
-                 side.darkness[static_cast<std::size_t>(row)]);
-  return side;
-}
-
-/// The image pixels in a band along the side, as many as are useful. Without interpolation, because
-/// each pixel is itself a measurement.
-void CollectSamples(const cv::Mat& gray, const Tone& tone, const Side& side, int wanted,
-                    std::vector<Sample>& samples) {
-  samples.clear();
-  const double margin_px = std::max(1.0, 0.06 * side.length_px);
-  const bool by_column = std::abs(side.direction.x()) >= std::abs(side.direction.y());
-  const int major = by_column ? 0 : 1;
-  const int minor = 1 - major;
-  const double slope = side.direction[minor] / side.direction[major];
-  const double per_line = (side.outside_px + side.inside_px) / std::abs(side.normal[minor]);
-
-  const double first = side.origin[major] + margin_px * side.direction[major];
-  const double last = side.origin[major] + (side.length_px - margin_px) * side.direction[major];
-  const int begin = static_cast<int>(std::ceil(std::min(first, last)));
-  const int end = static_cast<int>(std::floor(std::max(first, last)));
-  const int stride = std::max(1, static_cast<int>((end - begin + 1) * per_line / wanted));
-  const int major_limit = by_column ? gray.cols : gray.rows;
-  const int minor_limit = by_column ? gray.rows : gray.cols;
-  const double sign = side.normal[minor] > 0 ? 1 : -1;
-  for (int line = std::max(begin, 0); line <= std::min(end, major_limit - 1); line += stride) {
-    const double on_side = side.origin[minor] + slope * (line - side.origin[major]);
-    const double from = on_side - sign * side.outside_px / std::abs(side.normal[minor]);
-    const double to = on_side + sign * side.inside_px / std::abs(side.normal[minor]);
-    const int low = std::max(static_cast<int>(std::ceil(std::min(from, to))), 0);
-    const int high = std::min(static_cast<int>(std::floor(std::max(from, to))), minor_limit - 1);
-    for (int k = low; k <= high; ++k) {
-      const int x = by_column ? line : k;
-      const int y = by_column ? k : line;
-      const Eigen::Vector2d offset = Eigen::Vector2d(x, y) - side.origin;
-      const double along = side.direction.dot(offset) / side.length_px;
-      const Eigen::Vector3d cell = side.pixel_to_cells * Eigen::Vector3d(x, y, 1);
-      if (!(cell.z() > 0)) continue;  // beyond the plane's horizon: not a square seen by a camera
-      const auto column = static_cast<float>(cell.x() / cell.z());
-      samples.push_back(
-          {static_cast<float>(side.normal.dot(offset) - 4 * side.bow_px * along * (1 - along)),
-           static_cast<float>(along),
-           tone.light[gray.ptr<std::uint8_t>(y)[x]],
-           tone.levels_per_light[gray.ptr<std::uint8_t>(y)[x]],
-           {Lookup(side.darkness[0], column), Lookup(side.darkness[1], column),
-            Lookup(side.darkness[2], column)}});
-    }
-  }
-}
 
 /// Darkness of the model at a sample, and its derivatives with respect to depth, the logarithm of
 /// the blur and the edge shift.

@@ -22,14 +22,13 @@
 #include <CLI/CLI.hpp>
 
 #include "algo/base/errors.hpp"
-#include "algo/base/notice.hpp"
-#include "algo/base/pose.hpp"
 #include "algo/comparison/room_board.hpp"
 #include "algo/types/frame.hpp"
 #include "algo/types/marker_dictionary.hpp"
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/control_desk.hpp"
 #include "daemon/appliance/panel.hpp"
+#include "daemon/appliance/plumbd_options.hpp"
 #include "daemon/appliance/provisioning.hpp"
 #include "daemon/appliance/web_services.hpp"
 #include "daemon/config/sensor_settings.hpp"
@@ -52,107 +51,6 @@ namespace fs = std::filesystem;
 constexpr int kDeviceFailed = 5;                 // exit code, the same as the command line's
 constexpr std::chrono::seconds kLongestEnd{10};  // less than the unit's TimeoutStopSec
 
-struct Options {
-  std::optional<fs::path> config_file;
-  bool use_default_config = true;  ///< If it exists and no file is named.
-  bool check_config = false, show_stopped = false;
-  std::string simulated;  ///< Name of the suite; empty: real sensors.
-  std::optional<fs::path> state, control, provision;
-  fs::path unit = "/data/unit";  ///< Where an image stores its provisioning data.
-  std::optional<std::string> listen;
-  int sim_frames = 300, sim_scenes = 0;
-  unsigned sim_seed = 1;
-  std::string sim_size = "640x480";
-  bool sim_unplugged = false, sim_board = false;
-};
-
-constexpr const char* kDefaultConfig = "/etc/plumb/plumb.toml";
-
-void AddOptions(CLI::App& app, Options& options) {
-  app.set_version_flag("--version", fmt::format("plumbd {}", Version()),
-                       "Print the version and exit");
-  app.add_option("--config", options.config_file,
-                 "Configuration, as TOML; default: /etc/plumb/plumb.toml where it exists")
-      ->type_name("FILE");
-  app.add_flag("--check-config", options.check_config,
-               "Check the configuration, say what is wrong with it, and exit");
-  app.add_flag("--show-stopped", options.show_stopped,
-               "Only drive the light, with the pattern for a service that is not running, until "
-               "SIGTERM");
-  app.add_option("--provision", options.provision,
-                 "Take serial number, name, network and certificate of this unit from a file, and "
-                 "exit")
-      ->type_name("FILE");
-  app.add_option("--unit", options.unit, "Where --provision keeps them")
-      ->type_name("DIR")
-      ->capture_default_str();
-  app.add_option("--simulated", options.simulated,
-                 "With a virtual sensor that plays the scenes of a simulated suite")
-      ->check(CLI::IsMember({"demo", "nine", "patient"}))
-      ->type_name("demo|nine|patient");
-  app.add_option("--state", options.state, "Folder of database, scans and results")
-      ->type_name("DIR");
-  app.add_option("--listen", options.listen, "Where the page is served")->type_name("ADDRESS:PORT");
-  app.add_option("--control", options.control, "Control socket")->type_name("SOCK");
-  app.add_option("--sim-frames", options.sim_frames, "Frames of a simulated sweep, 30 a second")
-      ->check(CLI::Range(2, 20000))
-      ->group("Virtual sensor");
-  app.add_option("--sim-size", options.sim_size, "Of its images")
-      ->check(CLI::IsMember({"640x480", "320x240"}))
-      ->group("Virtual sensor");
-  app.add_option("--sim-seed", options.sim_seed, "Of its scenes and noise")
-      ->group("Virtual sensor");
-  app.add_option("--sim-scenes", options.sim_scenes, "Only so many of the suite's scenes; 0: all")
-      ->check(CLI::Range(0, 1000))
-      ->group("Virtual sensor");
-  app.add_flag("--sim-board", options.sim_board,
-               "Three scenes of the board of the room's calibration come first")
-      ->group("Virtual sensor");
-  app.add_flag("--sim-unplugged", options.sim_unplugged, "It is not attached at the start")
-      ->group("Virtual sensor");
-  app.footer(fmt::format("\n{}", kResearchNotice));
-}
-
-/// The simulated room: the reference marker's x axis runs from the head to the feet of a body that
-/// lies on its back, its z axis is up, and the head points to the gantry.
-Pose SimulatedRoom() {
-  Pose T_iec_reference = Pose::Identity();
-  T_iec_reference.linear() << 0, 1, 0, -1, 0, 0, 0, 0, 1;
-  return T_iec_reference;
-}
-
-Config ReadConfiguration(const Options& options, const SensorRegistry& registry) {
-  Config config;
-  std::error_code ignored;
-  if (options.config_file) {
-    config = ReadConfig(*options.config_file, ConfigUse::kAppliance);
-  } else if (options.use_default_config && options.simulated.empty() &&
-             fs::exists(kDefaultConfig, ignored)) {
-    config = ReadConfig(kDefaultConfig, ConfigUse::kAppliance);
-  }
-  if (options.simulated.empty())
-    RefuseResearchPresets(config);
-  else if (!config.compare.T_iec_reference)
-    config.compare.T_iec_reference = SimulatedRoom();
-  if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
-  CheckPageIdentity(config.web);
-  (void)registry.Choose(config.appliance.sensor_driver, !options.simulated.empty());
-  if (options.state) {
-    config.appliance.state = fs::absolute(*options.state);
-    config.update.folder = config.appliance.state / "updates";
-  }
-  if (options.control) config.appliance.control = fs::absolute(*options.control);
-  if (options.listen) {
-    if (!ParseListenAddress(*options.listen)) {
-      throw std::invalid_argument(
-          fmt::format("--listen: expected an address and a port such as 127.0.0.1:8080, found '{}'",
-                      *options.listen));
-    }
-    config.web.listen = *options.listen;
-  }
-  return config;
-}
-
 /// True if a signal is pending while the loop does not run yet.
 bool IsToldToEnd() {
   sigset_t pending;
@@ -161,32 +59,8 @@ bool IsToldToEnd() {
   return sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1;
 }
 
-/// The configuration in use, and why the requested one cannot be used.
-struct Configured {
-  Config config;
-  std::string fault;
-};
-
-/// As ReadConfiguration(). If the file cannot be used, the program still starts: page, light and
-/// socket report the error, at the places that the defaults and the command line name.
-Configured ReadOrExplain(const Options& options, const SensorRegistry& registry) {
-  try {
-    return {.config = ReadConfiguration(options, registry), .fault = {}};
-  } catch (const std::invalid_argument&) {
-    throw;  // from the command line
-  } catch (const std::exception& error) {
-    Options without_file = options;
-    without_file.config_file.reset();
-    without_file.use_default_config = false;
-    return {.config = ReadConfiguration(without_file, registry),
-            .fault = fmt::format("the configuration cannot be used: {}. Correct the file, then "
-                                 "restart: systemctl restart plumbd",
-                                 error.what())};
-  }
-}
-
 /// The driver of this run, ready for use. A simulated one renders its scenes here.
-std::unique_ptr<const SensorSetup> SetUpSensors(const Options& options, const Config& config,
+std::unique_ptr<const SensorSetup> SetUpSensors(const PlumbdOptions& options, const Config& config,
                                                 const SensorRegistry& registry) {
   const SensorDriver& driver =
       registry.Choose(config.appliance.sensor_driver, !options.simulated.empty());
@@ -236,7 +110,7 @@ std::optional<int> InheritedSocket(const std::string& name) {
 
 class Plumbd {
  public:
-  Plumbd(const Options& options, const Config& config, const std::string& fault,
+  Plumbd(const PlumbdOptions& options, const Config& config, const std::string& fault,
          const SensorRegistry& registry)
       : options_(options),
         registry_(registry),
@@ -396,7 +270,7 @@ class Plumbd {
     sd_notify(0, "READY=1");
   }
 
-  const Options options_;
+  const PlumbdOptions options_;
   const SensorRegistry& registry_;
   EventLoop loop_;  // first: blocks signals before any thread starts
   const std::unique_ptr<const SensorSetup> sensors_;
@@ -419,7 +293,7 @@ class Plumbd {
 };
 
 /// Without a usable configuration no light can be shown.
-int ShowStopped(const Options& options, const SensorRegistry& registry) {
+int ShowStopped(const PlumbdOptions& options, const SensorRegistry& registry) {
   PanelConfig config = ReadConfiguration(options, registry).panel;
   config.button_line.clear();
   EventLoop loop;
@@ -453,7 +327,7 @@ std::string ResetIfAsked(const fs::path& state) {
   return {};
 }
 
-int RunChecked(const Options& options, const SensorRegistry& registry) {
+int RunChecked(const PlumbdOptions& options, const SensorRegistry& registry) {
   if (options.show_stopped) return ShowStopped(options, registry);
   if (options.check_config) {
     (void)ReadConfiguration(options, registry);
@@ -494,8 +368,8 @@ int RunChecked(const Options& options, const SensorRegistry& registry) {
 int RunPlumbd(int argc, char** argv, const SensorRegistry& registry) {
   CLI::App app("Plumb's appliance: sensor, button and light, scans, results and the page.",
                "plumbd");
-  Options options;
-  AddOptions(app, options);
+  PlumbdOptions options;
+  AddPlumbdOptions(app, options);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,0 +1,125 @@
+#include "daemon/appliance/plumbd_options.hpp"
+
+#include <exception>
+#include <stdexcept>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "algo/base/notice.hpp"
+#include "algo/base/pose.hpp"
+#include "daemon/appliance/page_identity.hpp"
+#include "daemon/config/version.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kDefaultConfig = "/etc/plumb/plumb.toml";
+
+/// The simulated room: the reference marker's x axis runs from the head to the feet of a body that
+/// lies on its back, its z axis is up, and the head points to the gantry.
+Pose SimulatedRoom() {
+  Pose T_iec_reference = Pose::Identity();
+  T_iec_reference.linear() << 0, 1, 0, -1, 0, 0, 0, 0, 1;
+  return T_iec_reference;
+}
+
+}  // namespace
+
+void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
+  app.set_version_flag("--version", fmt::format("plumbd {}", Version()),
+                       "Print the version and exit");
+  app.add_option("--config", options.config_file,
+                 "Configuration, as TOML; default: /etc/plumb/plumb.toml where it exists")
+      ->type_name("FILE");
+  app.add_flag("--check-config", options.check_config,
+               "Check the configuration, say what is wrong with it, and exit");
+  app.add_flag("--show-stopped", options.show_stopped,
+               "Only drive the light, with the pattern for a service that is not running, until "
+               "SIGTERM");
+  app.add_option("--provision", options.provision,
+                 "Take serial number, name, network and certificate of this unit from a file, and "
+                 "exit")
+      ->type_name("FILE");
+  app.add_option("--unit", options.unit, "Where --provision keeps them")
+      ->type_name("DIR")
+      ->capture_default_str();
+  app.add_option("--simulated", options.simulated,
+                 "With a virtual sensor that plays the scenes of a simulated suite")
+      ->check(CLI::IsMember({"demo", "nine", "patient"}))
+      ->type_name("demo|nine|patient");
+  app.add_option("--state", options.state, "Folder of database, scans and results")
+      ->type_name("DIR");
+  app.add_option("--listen", options.listen, "Where the page is served")->type_name("ADDRESS:PORT");
+  app.add_option("--control", options.control, "Control socket")->type_name("SOCK");
+  app.add_option("--sim-frames", options.sim_frames, "Frames of a simulated sweep, 30 a second")
+      ->check(CLI::Range(2, 20000))
+      ->group("Virtual sensor");
+  app.add_option("--sim-size", options.sim_size, "Of its images")
+      ->check(CLI::IsMember({"640x480", "320x240"}))
+      ->group("Virtual sensor");
+  app.add_option("--sim-seed", options.sim_seed, "Of its scenes and noise")
+      ->group("Virtual sensor");
+  app.add_option("--sim-scenes", options.sim_scenes, "Only so many of the suite's scenes; 0: all")
+      ->check(CLI::Range(0, 1000))
+      ->group("Virtual sensor");
+  app.add_flag("--sim-board", options.sim_board,
+               "Three scenes of the board of the room's calibration come first")
+      ->group("Virtual sensor");
+  app.add_flag("--sim-unplugged", options.sim_unplugged, "It is not attached at the start")
+      ->group("Virtual sensor");
+  app.footer(fmt::format("\n{}", kResearchNotice));
+}
+
+Config ReadConfiguration(const PlumbdOptions& options, const SensorRegistry& registry) {
+  Config config;
+  std::error_code ignored;
+  if (options.config_file) {
+    config = ReadConfig(*options.config_file, ConfigUse::kAppliance);
+  } else if (options.use_default_config && options.simulated.empty() &&
+             fs::exists(kDefaultConfig, ignored)) {
+    config = ReadConfig(kDefaultConfig, ConfigUse::kAppliance);
+  }
+  if (options.simulated.empty())
+    RefuseResearchPresets(config);
+  else if (!config.compare.T_iec_reference)
+    config.compare.T_iec_reference = SimulatedRoom();
+  if (config.region_file) config.compare.region_polygon_m = ReadRegion(*config.region_file);
+  CheckPageIdentity(config.web);
+  (void)registry.Choose(config.appliance.sensor_driver, !options.simulated.empty());
+  if (options.state) {
+    config.appliance.state = fs::absolute(*options.state);
+    config.update.folder = config.appliance.state / "updates";
+  }
+  if (options.control) config.appliance.control = fs::absolute(*options.control);
+  if (options.listen) {
+    if (!ParseListenAddress(*options.listen)) {
+      throw std::invalid_argument(
+          fmt::format("--listen: expected an address and a port such as 127.0.0.1:8080, found '{}'",
+                      *options.listen));
+    }
+    config.web.listen = *options.listen;
+  }
+  return config;
+}
+
+Configured ReadOrExplain(const PlumbdOptions& options, const SensorRegistry& registry) {
+  try {
+    return {.config = ReadConfiguration(options, registry), .fault = {}};
+  } catch (const std::invalid_argument&) {
+    throw;  // from the command line
+  } catch (const std::exception& error) {
+    PlumbdOptions without_file = options;
+    without_file.config_file.reset();
+    without_file.use_default_config = false;
+    return {.config = ReadConfiguration(without_file, registry),
+            .fault = fmt::format("the configuration cannot be used: {}. Correct the file, then "
+                                 "restart: systemctl restart plumbd",
+                                 error.what())};
+  }
+}
+
+}  // namespace plumb

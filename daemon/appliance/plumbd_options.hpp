@@ -1,0 +1,48 @@
+// The command line of plumbd and the configuration that it leads to.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <CLI/App.hpp>
+
+#include "daemon/config/config.hpp"
+#include "drivers/live/sensor_driver.hpp"
+
+namespace plumb {
+
+/// The command line of plumbd.
+struct PlumbdOptions {
+  std::optional<std::filesystem::path> config_file;
+  bool use_default_config = true;  ///< If it exists and no file is named.
+  bool check_config = false, show_stopped = false;
+  std::string simulated;  ///< Name of the suite; empty: real sensors.
+  std::optional<std::filesystem::path> state, control, provision;
+  std::filesystem::path unit = "/data/unit";  ///< Where an image stores its provisioning data.
+  std::optional<std::string> listen;
+  int sim_frames = 300, sim_scenes = 0;
+  unsigned sim_seed = 1;
+  std::string sim_size = "640x480";
+  bool sim_unplugged = false, sim_board = false;
+};
+
+void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options);
+
+/// The configuration from file and command line.
+/// @throws DataError for a file that cannot be used, std::invalid_argument for an option.
+[[nodiscard]] Config ReadConfiguration(const PlumbdOptions& options,
+                                       const SensorRegistry& registry);
+
+/// The configuration in use, and why the requested one cannot be used.
+struct Configured {
+  Config config;
+  std::string fault;
+};
+
+/// As ReadConfiguration(). If the file cannot be used, the program still starts: page, light and
+/// socket report the error, at the places that the defaults and the command line name.
+[[nodiscard]] Configured ReadOrExplain(const PlumbdOptions& options,
+                                       const SensorRegistry& registry);
+
+}  // namespace plumb
