@@ -15,7 +15,7 @@ constexpr double kDaysOfDrift = 30.0;
 constexpr double kMaxDays = 3650.0;  // limits the effect of a clock that was never set
 // A direction in which a sweep reduces the variance by a smaller fraction carries no information;
 // its contribution would be a quotient of rounding errors.
-constexpr double kMinTold = 0.01;
+constexpr double kMinInformation = 0.01;
 
 // Without the shift of marker edges.
 using Reduced = Eigen::Matrix<double, kCalibrationSize - 1, kCalibrationSize - 1>;
@@ -64,10 +64,10 @@ ProfileAgreement Agreement(const SensorProfile& before, const SensorProfile& aft
   const Eigen::SelfAdjointEigenSolver<Reduced> eigen(0.5 * (left + left.transpose()));
   ProfileAgreement agreement;
   for (Eigen::Index i = 0; i < moved.size(); ++i) {
-    const double told = 1.0 - eigen.eigenvalues()[i];
-    if (told < kMinTold) continue;
+    const double information = 1.0 - eigen.eigenvalues()[i];
+    if (information < kMinInformation) continue;
     const double along = eigen.eigenvectors().col(i).dot(moved);
-    agreement.chi_square += along * along / told;
+    agreement.chi_square += along * along / information;
     ++agreement.num_terms;
   }
   agreement.limit = ChiSquareLimit(agreement.num_terms);

@@ -31,7 +31,7 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
       profiles_(std::make_shared<ProfileShelf>(parts_.config.appliance.state / "sensor-profiles")),
       profiles_off_(ProfilesOff(parts_.config)) {
   OpenStore();
-  LookAtRoom();
+  RefreshRoom();
   result_timer_ =
       loop_.MakeTimer("result expired", [this] { (void)Handle(ScanEvent::kResultExpired); });
   limit_timer_ = loop_.MakeTimer("longest sweep", [this] {
@@ -297,7 +297,7 @@ void Appliance::Reload(const Config& config) {
   const std::vector<std::string> kept = KeepUntilRestart(parts_.config, next);
   parts_.config = std::move(next);
   profiles_off_ = ProfilesOff(parts_.config);
-  LookAtRoom();
+  RefreshRoom();
   Log(LogLevel::kInfo, "the configuration was read again");
   if (!kept.empty())
     Log(LogLevel::kWarning,

@@ -107,7 +107,7 @@ class Appliance {
   Answer OpenCheck(const web::Actor& actor);
   [[nodiscard]] web::CheckStatus Checks();
   /// Reloads the calibration of the room, and whether a marker has moved since.
-  void LookAtRoom();
+  void RefreshRoom();
   /// From any thread.
   [[nodiscard]] web::RoomCalibrationStatus RoomCalibration();
   /// The board for the room's markers; from any thread.
@@ -241,7 +241,7 @@ class Appliance {
   [[nodiscard]] std::optional<double> Coverage() const;
   [[nodiscard]] std::string FaultReason() const;
 
-  /// The calibration in use, as found by LookAtRoom().
+  /// The calibration in use, as found by RefreshRoom().
   struct Room {
     std::optional<SignedRoom> calibration;
     std::string due;  ///< Set without a calibration: one is stored but cannot be read.

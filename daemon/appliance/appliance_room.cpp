@@ -36,7 +36,7 @@ web::RoomCalibrationVersion ForPage(const SignedRoom& room) {
 
 }  // namespace
 
-void Appliance::LookAtRoom() {
+void Appliance::RefreshRoom() {
   Room room;
   room.is_configured = parts_.config.compare.T_iec_reference.has_value();
   if (store_ != nullptr) {

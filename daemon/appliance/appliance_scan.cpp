@@ -236,7 +236,7 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
     PublishEvent("result", {{"scan", scan_.id}, {"answer", answer}});
   }
   if (outcome.kind == Kind::kDone) profile_fault_ = outcome.drift;
-  if (scan_.purpose == web::ScanPurpose::kDailyCheck) LookAtRoom();
+  if (scan_.purpose == web::ScanPurpose::kDailyCheck) RefreshRoom();
   check_.reset();
   NotifyWeb(web::EventKind::kResult);
   NotifyWeb(web::EventKind::kData);

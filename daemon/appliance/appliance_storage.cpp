@@ -38,8 +38,8 @@ void Appliance::OpenStore() {
   }
   try {
     StoreOptions options;
-    options.sleep = [told = false](std::chrono::milliseconds pause) mutable {
-      if (!std::exchange(told, true))
+    options.sleep = [has_logged = false](std::chrono::milliseconds pause) mutable {
+      if (!std::exchange(has_logged, true))
         Log(LogLevel::kWarning, "another program holds the database: waiting for it");
       sd_notify(0, "EXTEND_TIMEOUT_USEC=20000000");  // the start is still in progress
       std::this_thread::sleep_for(pause);

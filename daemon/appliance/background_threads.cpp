@@ -4,13 +4,13 @@
 
 namespace plumb {
 
-bool BackgroundThreads::Later(web::Aside where, std::function<void()> work,
-                              std::function<void()> done) {
-  WorkThread& thread = where == web::Aside::kReads ? reads_ : files_;
+bool BackgroundThreads::RunInBackground(web::BackgroundPool where, std::function<void()> work,
+                                        std::function<void()> done) {
+  WorkThread& thread = where == web::BackgroundPool::kReads ? reads_ : files_;
   return thread.Post(
       [loop = &loop_, work = std::move(work), done = std::move(done), alive = alive_] {
         work();
-        loop->Post("done aside", [done, alive] {
+        loop->Post("background work done", [done, alive] {
           if (*alive) done();
         });
       });

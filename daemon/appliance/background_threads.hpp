@@ -18,8 +18,8 @@ class BackgroundThreads : public web::BackgroundWork {
   BackgroundThreads(const BackgroundThreads&) = delete;
   BackgroundThreads& operator=(const BackgroundThreads&) = delete;
 
-  [[nodiscard]] bool Later(web::Aside where, std::function<void()> work,
-                           std::function<void()> done) override;
+  [[nodiscard]] bool RunInBackground(web::BackgroundPool where, std::function<void()> work,
+                                     std::function<void()> done) override;
   /// For work on files that reports in its own way. False if too much work is queued already.
   [[nodiscard]] bool PostToFiles(std::function<void()> work) {
     return files_.Post(std::move(work));

@@ -52,7 +52,7 @@ constexpr int kDeviceFailed = 5;                 // exit code, the same as the c
 constexpr std::chrono::seconds kLongestEnd{10};  // less than the unit's TimeoutStopSec
 
 /// True if a signal is pending while the loop does not run yet.
-bool IsToldToEnd() {
+bool IsEndRequested() {
   sigset_t pending;
   sigemptyset(&pending);
   sigpending(&pending);
@@ -85,7 +85,7 @@ std::unique_ptr<const SensorSetup> SetUpSensors(const PlumbdOptions& options, co
   return driver.set_up(
       settings, sweeps, rendering.get_token(),
       [&, reported = -1](double fraction, std::string_view scene) mutable {
-        if (IsToldToEnd()) rendering.request_stop();
+        if (IsEndRequested()) rendering.request_stop();
         const int percent = static_cast<int>(100 * fraction);
         if (percent == reported || (!is_terminal && percent / 10 == reported / 10 && reported >= 0))
           return;
@@ -145,7 +145,7 @@ class Plumbd {
       Log(LogLevel::kWarning, SlowTurnText(turn, unsaid));
     });
     tick_ = loop_.MakeTimer("watchdog", [this] { Tick(); });
-    certificate_timer_ = loop_.MakeTimer("certificate", [this] { LookAtCertificate(); });
+    certificate_timer_ = loop_.MakeTimer("certificate", [this] { CheckCertificate(); });
   }
 
   ~Plumbd() {
@@ -163,7 +163,7 @@ class Plumbd {
     if (!page_.certificate.empty())
       Log(LogLevel::kNotice, "SHA-256 of the page's certificate: " + page_.certificate);
     for (const std::string& warning : page_.warnings) Log(LogLevel::kWarning, warning);
-    LookAtCertificate();
+    CheckCertificate();
     if (const std::optional<std::string> code = http_.setup_code();
         code && appliance_.storage_fault().empty()) {
       // under systemd the standard output goes to the journal
@@ -202,7 +202,7 @@ class Plumbd {
         certificate_pem_ = identity.certificate_pem;
         Log(LogLevel::kNotice,
             "the page's certificate was replaced; its SHA-256 now: " + page_.certificate);
-        LookAtCertificate();
+        CheckCertificate();
       };
     }
     options.upload_folder = config.update.folder;
@@ -221,7 +221,7 @@ class Plumbd {
   }
 
   /// The certificate may expire while the service runs.
-  void LookAtCertificate() {
+  void CheckCertificate() {
     PageNotes page = page_;
     if (!certificate_pem_.empty()) {
       std::vector<std::string> told =

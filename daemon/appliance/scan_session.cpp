@@ -101,8 +101,8 @@ void ScanSession::Run(const std::stop_token& stop) {
   Save();
   // The stored reference was good, and only now differs.
   if (outcome_.kind == ScanOutcome::Kind::kDone && job_.unit_profile &&
-      outcome_.teaches_nothing.empty())
-    job_.unit_profile->Teach();
+      outcome_.why_not_learned.empty())
+    job_.unit_profile->LearnFromScan();
   callbacks_.ended(outcome_);
 }
 
@@ -126,10 +126,10 @@ void ScanSession::Scan(const std::stop_token& stop) {
   if (job_.unit_profile) outcome_.drift = job_.unit_profile->Drift();
   if (job_.check) {
     Check(scene);
-    outcome_.teaches_nothing = WhyItTeachesNothing(scene, outcome_.verdict, job_.compare.limits);
+    outcome_.why_not_learned = WhyItTeachesNothing(scene, outcome_.verdict, job_.compare.limits);
   } else {
     Evaluate(scene, stop);
-    outcome_.teaches_nothing = WhyItTeachesNothing(scene, outcome_.verdict, job_.compare.limits);
+    outcome_.why_not_learned = WhyItTeachesNothing(scene, outcome_.verdict, job_.compare.limits);
     ThrowIfStopped(stop);  // from here on it is stored
   }
   if (const std::optional<double> last_s = feed_->last_frame_s())
@@ -199,7 +199,7 @@ void ScanSession::OnProgress(const ScanProgress& progress) {
     Show(*progress.frame, *progress.tracking);
     outcome_.swept_area_m2 = update_.guidance.area_m2;
     if (update_.guidance.without_new_area_s >= job_.stop_after_s &&
-        !std::exchange(told_complete_, true))
+        !std::exchange(complete_reported_, true))
       callbacks_.sweep_complete();
   }
   ReportProgress(std::string(progress.step), progress.fraction);
@@ -217,8 +217,8 @@ void ScanSession::Show(const Frame& frame, const TrackingReport& report) {
 void ScanSession::ReportProgress(std::string step, double fraction) {
   const double now_s = SteadySeconds();
   heartbeat_s_ = now_s;
-  if (step == update_.step && now_s - told_s_ < kUpdateEvery_s) return;
-  told_s_ = now_s;
+  if (step == update_.step && now_s - reported_s_ < kUpdateEvery_s) return;
+  reported_s_ = now_s;
   update_.step = std::move(step);
   update_.fraction = fraction;
   if (callbacks_.update) callbacks_.update(update_);

@@ -85,7 +85,7 @@ struct ScanOutcome {
   double swept_area_m2 = 0.0;
   std::string drift;  ///< That the sensor contradicts its profile; empty if it does not.
   /// Why the profile does not learn from this scan; empty if it does.
-  std::string teaches_nothing;
+  std::string why_not_learned;
   double after_last_frame_s = 0.0;  ///< Time until everything was written.
 };
 
@@ -146,8 +146,8 @@ class ScanSession {
   LiveSurface surface_;
   ScanUpdate update_;
   ScanOutcome outcome_;
-  bool told_complete_ = false;
-  double told_s_ = 0.0, shown_s_ = 0.0;
+  bool complete_reported_ = false;
+  double reported_s_ = 0.0, shown_s_ = 0.0;
   std::atomic<double> heartbeat_s_;
   std::jthread thread_;  // last: starts when the members above are initialised
 };

@@ -58,8 +58,8 @@ struct SensorThread::Impl {
   std::weak_ptr<LiveFeed>
       spoiled;         // its sensor was unplugged: frames of the next one do not belong to it
   bool ready = false;  // kReady was reported for this sensor
-  std::optional<SensorEvent::Kind> told;
-  std::string told_reason;
+  std::optional<SensorEvent::Kind> reported;
+  std::string reported_reason;
   std::chrono::milliseconds retry;
   std::optional<Clock::time_point> retry_at;
   Clock::time_point listed_at;
@@ -255,9 +255,9 @@ struct SensorThread::Impl {
   }
 
   void NotifyOnce(SensorEvent::Kind kind, const std::string& reason) {
-    if (told == kind && told_reason == reason && kind != SensorEvent::Kind::kReady) return;
-    told = kind;
-    told_reason = reason;
+    if (reported == kind && reported_reason == reason && kind != SensorEvent::Kind::kReady) return;
+    reported = kind;
+    reported_reason = reason;
     if (kind == SensorEvent::Kind::kLost) {
       const std::lock_guard lock(mutex);
       current = {};

@@ -62,7 +62,7 @@ std::string UnitProfile::Drift() const {
       serial_, compared->chi_square, compared->limit, compared->num_terms);
 }
 
-void UnitProfile::Teach() {
+void UnitProfile::LearnFromScan() {
   if (!learned_) return;
   if (const std::string drift = Drift(); !drift.empty()) {
     Log(LogLevel::kWarning, drift + "; this sweep was not joined with it", {{"SERIAL", serial_}});

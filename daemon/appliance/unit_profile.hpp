@@ -30,7 +30,7 @@ class UnitProfile {
   [[nodiscard]] std::string Drift() const;
 
   /// Adds a new version from a sweep that passed its checks, unless Drift() reports a change.
-  void Teach();
+  void LearnFromScan();
 
  private:
   [[nodiscard]] std::optional<ProfileAgreement> Compared() const;

@@ -39,7 +39,7 @@ Updates::Updates(Appliance& appliance, std::unique_ptr<SystemRestart> restart,
                    .boot = options_.boot,
                    .blocking_reason = [this] { return WhyNotInstall(); },
                    .changed = [this] { options_.changed(); },
-                   .aside = options_.aside,
+                   .run_in_background = options_.run_in_background,
                    .ended =
                        [this](const std::string& bundle, const std::string& failure) {
                          options_.log(kInstaller, failure.empty() ? "update.done" : "update.fail",
@@ -139,7 +139,7 @@ void Updates::InstallFile(const web::Actor& actor, std::shared_ptr<const Attache
       if (*alive) copied(copy, failure);
     });
   };
-  if (options_.aside(work)) return;
+  if (options_.run_in_background(work)) return;
   copying_ = false;
   done(Conflict("the disk is busy: try again"));
 }
@@ -188,7 +188,7 @@ void Updates::ResetToFactory(const web::Actor& actor, web::FactoryReset kind, we
       if (*alive) noted(failure);
     });
   };
-  if (options_.aside(work)) return;
+  if (options_.run_in_background(work)) return;
   restarting_ = false;
   done(Conflict("the disk is busy: try again"));
 }

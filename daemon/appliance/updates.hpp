@@ -21,8 +21,8 @@ struct UpdatesOptions {
   std::filesystem::path sticks = "/run/plumb-stick";  ///< See UsbSticks.
   std::string bus_address = {};                       ///< Empty: the system bus.
   std::string boot = {};  ///< Unique for each start of the machine; empty if unknown.
-  std::function<bool(std::function<void()>)> aside;  ///< See UpdaterOptions.
-  std::function<void()> changed;                     ///< Called when GetUpdate() has changed.
+  std::function<bool(std::function<void()>)> run_in_background;  ///< See UpdaterOptions.
+  std::function<void()> changed;  ///< Called when GetUpdate() has changed.
   std::function<void(const web::Actor& actor, const char* action, const std::string& subject,
                      const std::string& detail)>
       log;  ///< Writes to the audit log.

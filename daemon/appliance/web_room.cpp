@@ -28,7 +28,7 @@ void WebRoomCalibration::SignRoomCalibration(const web::Actor& actor, const std:
   store_.Change(
       &Store::room,
       [&appliance = appliance_, done = std::move(done)](const web::Change& answer) {
-        if (answer.result == web::ChangeResult::kDone) appliance.LookAtRoom();
+        if (answer.result == web::ChangeResult::kDone) appliance.RefreshRoom();
         done(answer);
       },
       [=, serial = serial, since = since](RoomStore& room) {

@@ -42,7 +42,7 @@ WebServices::WebServices(Appliance& appliance, const UpdateConfig& update,
           {.config = update,
            .state = appliance.state_folder(),
            .boot = BootId(),
-           .aside =
+           .run_in_background =
                [this](std::function<void()> work) {
                  return background_.PostToFiles(std::move(work));
                },

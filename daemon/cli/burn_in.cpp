@@ -98,7 +98,7 @@ struct SensorLook {
   bool present = false;
   std::int64_t pairs = 0, lost = 0;
 };
-std::optional<SensorLook> LookAtSensor(const fs::path& control, const std::stop_token& stop) {
+std::optional<SensorLook> CheckSensor(const fs::path& control, const std::stop_token& stop) {
   constexpr int kTimeoutMs = 2000;
   try {
     const nlohmann::json answer =
@@ -122,7 +122,7 @@ class Rounds {
       : options_(options),
         stop_(stop),
         folder_(std::move(folder)),
-        sensor_before_(LookAtSensor(options.control, stop)) {}
+        sensor_before_(CheckSensor(options.control, stop)) {}
 
   void Run(Progress& progress) {
     const auto begin = Clock::now();
@@ -140,17 +140,17 @@ class Rounds {
     }
   }
 
-  void Tell(DoctorReport& report) const {
+  void Report(DoctorReport& report) const {
     const std::string work =
         fmt::format("{} rounds, {:.1f} to {:.1f} s each", count_, fastest_s_, slowest_s_);
-    Tell(report, "processor", scan_fault_, work + "; each gave the same bits",
-         "the processor or its memory computes wrongly: do not use this unit");
+    Report(report, "processor", scan_fault_, work + "; each gave the same bits",
+           "the processor or its memory computes wrongly: do not use this unit");
     if (slowest_s_ > kSlowedDown * fastest_s_)
       report.Note("speed", work, "something slows the processor: heat, or another program");
-    Tell(report, "memory", memory_fault_, fmt::format("{} MB a round", kMemoryBytes >> 20),
-         "replace the memory");
-    Tell(report, "disk", disk_fault_, fmt::format("{} MB a round, read back", kDiskBytes >> 20),
-         "replace the disk, or free space on it");
+    Report(report, "memory", memory_fault_, fmt::format("{} MB a round", kMemoryBytes >> 20),
+           "replace the memory");
+    Report(report, "disk", disk_fault_, fmt::format("{} MB a round, read back", kDiskBytes >> 20),
+           "replace the disk, or free space on it");
     if (hottest_c_)
       report.Good("temperature", fmt::format("{:.0f} degrees Celsius at most", *hottest_c_));
     TellSensor(report);
@@ -170,7 +170,7 @@ class Rounds {
     if (const std::optional<double> now_c = Temperature())
       hottest_c_ = std::max(hottest_c_.value_or(*now_c), *now_c);
     if (sensor_before_ && sensor_before_->present) {
-      const std::optional<SensorLook> now = LookAtSensor(options_.control, stop_);
+      const std::optional<SensorLook> now = CheckSensor(options_.control, stop_);
       if (!now || !now->present) Keep(sensor_fault_, "it was gone");
     }
   }
@@ -179,8 +179,8 @@ class Rounds {
     if (kept.empty() && !fault.empty()) kept = fmt::format("round {}: {}", count_, fault);
   }
 
-  static void Tell(DoctorReport& report, const char* what, const std::string& fault,
-                   const std::string& good, const char* remedy) {
+  static void Report(DoctorReport& report, const char* what, const std::string& fault,
+                     const std::string& good, const char* remedy) {
     if (fault.empty()) {
       report.Good(what, good);
     } else {
@@ -194,7 +194,7 @@ class Rounds {
                          "start plumbd with its sensor to have it watched");
     if (!sensor_fault_.empty())
       return report.Bad("sensor", sensor_fault_, "look at its cable and its power");
-    const SensorLook now = LookAtSensor(options_.control, stop_).value_or(*sensor_before_);
+    const SensorLook now = CheckSensor(options_.control, stop_).value_or(*sensor_before_);
     report.Good("sensor",
                 fmt::format("attached all the time; {} frames, {} lost",
                             now.pairs - sensor_before_->pairs, now.lost - sensor_before_->lost));
@@ -275,7 +275,7 @@ void BurnIn(const BurnInOptions& options, const std::stop_token& stop, DoctorRep
   Rounds rounds(options, stop, work.path());
   rounds.Run(progress);
   progress.Clear();
-  rounds.Tell(report);
+  rounds.Report(report);
 } catch (const IoError& error) {
   report.Bad("burn-in", error.what(), "name a folder with --burn-in-folder", kInternalError);
 }

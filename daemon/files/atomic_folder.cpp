@@ -99,16 +99,15 @@ void Replace(const fs::path& hidden, const fs::path& target) {
   if (::rename(hidden.c_str(), target.c_str()) == 0) return;  // nothing there, or an empty folder
   if (errno != ENOTEMPTY && errno != EEXIST) throw IoError(DescribeWriteError(target, errno));
   if (::renameat2(AT_FDCWD, hidden.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) != 0) {
-    const fs::path aside = hidden.string() + "-old";
-    if (::rename(target.c_str(), aside.c_str()) != 0)
+    const fs::path old = hidden.string() + "-old";
+    if (::rename(target.c_str(), old.c_str()) != 0)
       throw IoError(DescribeWriteError(target, errno));
     if (::rename(hidden.c_str(), target.c_str()) != 0) {
       const int error = errno;
-      (void)::rename(aside.c_str(), target.c_str());
+      (void)::rename(old.c_str(), target.c_str());
       throw IoError(DescribeWriteError(target, error));
     }
-    if (::rename(aside.c_str(), hidden.c_str()) != 0)
-      throw IoError(DescribeWriteError(aside, errno));
+    if (::rename(old.c_str(), hidden.c_str()) != 0) throw IoError(DescribeWriteError(old, errno));
   }
   // the new output is in place; remains of the old one under the hidden name are removed later
   std::error_code ignored;

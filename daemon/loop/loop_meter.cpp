@@ -123,11 +123,11 @@ void LoopMeter::End() {
 }
 
 void LoopMeter::ReportSlow(const LoopTurn& turn, nanoseconds now) {
-  if (!slow_ || (told_at_ && now - *told_at_ < kTellEvery)) {
+  if (!slow_ || (reported_at_ && now - *reported_at_ < kReportInterval)) {
     ++unsaid_;
     return;
   }
-  told_at_ = now;
+  reported_at_ = now;
   slow_(turn, std::exchange(unsaid_, 0));
 }
 

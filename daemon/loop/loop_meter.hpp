@@ -46,7 +46,7 @@ struct LoopFigures {
 class LoopMeter {
  public:
   static constexpr std::chrono::milliseconds kLimit{10};  ///< No turn should take longer.
-  static constexpr std::chrono::minutes kTellEvery{1};
+  static constexpr std::chrono::minutes kReportInterval{1};
   /// @param unsaid  Turns over the limit since the last call that were not logged.
   using SlowListener = std::function<void(const LoopTurn& turn, std::int64_t unsaid)>;
 
@@ -60,7 +60,7 @@ class LoopMeter {
   void Part(std::string_view what);
   void End();
 
-  /// Called at the end of a turn over the limit in wall time, at most once in kTellEvery.
+  /// Called at the end of a turn over the limit in wall time, at most once in kReportInterval.
   void SetSlowListener(SlowListener listener) { slow_ = std::move(listener); }
 
   [[nodiscard]] const LoopFigures& all() const { return all_; }
@@ -90,7 +90,7 @@ class LoopMeter {
   LoopFigures all_;
   std::optional<LoopTurn> longest_, longest_cpu_;
   std::map<std::string, LoopFigures, std::less<>> by_name_;
-  std::optional<std::chrono::nanoseconds> told_at_;
+  std::optional<std::chrono::nanoseconds> reported_at_;
   std::int64_t unsaid_ = 0;
 };
 

@@ -21,7 +21,7 @@ struct CheckedScan {
 class FileIntegrity {
  public:
   /// Database and folders are borrowed and outlive this object.
-  FileIntegrity(StoreDatabase& database, const ScanFolders& folders, LookAtPath look)
+  FileIntegrity(StoreDatabase& database, const ScanFolders& folders, ExaminePath look)
       : database_(database), folders_(folders), look_(std::move(look)) {}
 
   /// Why the files of a scan cannot be used, by their SHA-256: "scene/cloud.ply has been changed
@@ -38,7 +38,7 @@ class FileIntegrity {
  private:
   StoreDatabase& database_;
   const ScanFolders& folders_;
-  LookAtPath look_;
+  ExaminePath look_;
 };
 
 }  // namespace plumb

@@ -119,13 +119,13 @@ ProfileShelf::InUse ProfileShelf::Read(const std::string& serial) {
   try {
     // Comes first, so that no earlier version replaces it unnoticed at the next scan.
     in_use.version = Write(serial, "unreadable", std::nullopt);
-    const fs::path aside =
+    const fs::path set_aside =
         folder_ / kSetAside / fmt::format("{}-{}", FolderName(serial), file.filename().string());
-    fs::create_directories(aside.parent_path());
-    fs::rename(file, aside);
+    fs::create_directories(set_aside.parent_path());
+    fs::rename(file, set_aside);
     in_use.fault += fmt::format(
         "; it was moved to {}, and scans go on without a profile until one is learned again",
-        aside.string());
+        set_aside.string());
   } catch (const std::exception& error) {
     in_use.fault += fmt::format("; it stays where it is ({})", error.what());
   }

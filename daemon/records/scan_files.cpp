@@ -147,7 +147,7 @@ std::optional<FileDigest> DigestOfRecording(const fs::path& folder, const std::s
 }
 
 std::string WhyNotThere(const fs::path& folder, const std::vector<FileDigest>& files,
-                        const LookAtPath& look) {
+                        const ExaminePath& look) {
   // Without its folder a scan has lost every file, so that is reported instead of the first file's
   // name.
   if (const FileLook found = look(folder); found.error != 0 || !found.is_folder) {

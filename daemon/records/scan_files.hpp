@@ -35,7 +35,7 @@ struct FileLook {
 };
 
 /// A function, so that a test can simulate a failing disk.
-using LookAtPath = std::function<FileLook(const std::filesystem::path&)>;
+using ExaminePath = std::function<FileLook(const std::filesystem::path&)>;
 [[nodiscard]] FileLook LookAt(const std::filesystem::path& path);
 
 /// A file as it was stored. A recording, whose images are many, has one entry for all of them.
@@ -63,7 +63,8 @@ inline constexpr const char* kRecordingFolder = "recording";
 /// Why these files of a scan cannot be used, without reading their content: "scene/cloud.ply is
 /// missing". Empty if all exist with their original size.
 [[nodiscard]] std::string WhyNotThere(const std::filesystem::path& folder,
-                                      const std::vector<FileDigest>& files, const LookAtPath& look);
+                                      const std::vector<FileDigest>& files,
+                                      const ExaminePath& look);
 
 /// The same by their content, for files whose path begins with the prefix.
 /// @throws Interrupted

@@ -40,7 +40,7 @@ class FolderLock {
 };
 
 struct StoreOptions {
-  LookAtPath look = LookAt;
+  ExaminePath look = LookAt;
   /// Time during which a database held by another process is retried; a copying program releases
   /// it.
   std::chrono::milliseconds lock_wait = std::chrono::minutes(1);

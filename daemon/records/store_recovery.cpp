@@ -32,14 +32,14 @@ struct LookedAt {
 /// One start of a store. Borrows its arguments.
 class Recovery {
  public:
-  Recovery(Database& database, const ScanFolders& folders, const LookAtPath& look,
+  Recovery(Database& database, const ScanFolders& folders, const ExaminePath& look,
            RecoveryReport& report)
       : database_(database), folders_(folders), look_(look), report_(report) {}
 
   void Run();
 
  private:
-  [[nodiscard]] std::vector<LookedAt> LookAtScans();
+  [[nodiscard]] std::vector<LookedAt> ExamineScans();
   void RefuseIfMostAreMissing(const std::vector<LookedAt>& scans);
   void NoteAvailability(const std::vector<LookedAt>& scans);
   void CollectOrphan(const fs::path& folder);
@@ -48,12 +48,12 @@ class Recovery {
 
   Database& database_;
   const ScanFolders& folders_;
-  const LookAtPath& look_;
+  const ExaminePath& look_;
   RecoveryReport& report_;
 };
 
 void Recovery::Run() {
-  const std::vector<LookedAt> scans = LookAtScans();
+  const std::vector<LookedAt> scans = ExamineScans();
   RefuseIfMostAreMissing(scans);
   Transaction transaction(database_);
   FailInterruptedScans(database_);
@@ -70,7 +70,7 @@ void Recovery::Run() {
 }
 
 /// Examines each file once: whether it exists and has its size. Its content is checked later.
-std::vector<LookedAt> Recovery::LookAtScans() {
+std::vector<LookedAt> Recovery::ExamineScans() {
   std::vector<LookedAt> scans;
   std::vector<bool> has_scene;
   {
@@ -168,10 +168,12 @@ void Recovery::Discard(const fs::path& folder, const std::string& why) {
 void Recovery::SetAside(const fs::path& folder, const std::string& name, const std::string& why) {
   std::error_code error;
   fs::path target;
-  for (const fs::path& aside : {folders_.state() / "set-aside", folders_.scans() / "set-aside"}) {
-    fs::create_directories(aside, error);
-    target = aside / name;
-    for (int i = 2; fs::exists(target, error); ++i) target = aside / fmt::format("{}-{}", name, i);
+  for (const fs::path& set_aside :
+       {folders_.state() / "set-aside", folders_.scans() / "set-aside"}) {
+    fs::create_directories(set_aside, error);
+    target = set_aside / name;
+    for (int i = 2; fs::exists(target, error); ++i)
+      target = set_aside / fmt::format("{}-{}", name, i);
     fs::rename(folder, target, error);
     if (error != std::errc::cross_device_link) break;
   }
@@ -202,7 +204,7 @@ void RefuseScansOfAnother(Database& database, const ScanFolders& scans) {
                   folders.size() - 1, (scans.scans()).string()));
 }
 
-void RecoverStore(Database& database, const ScanFolders& folders, const LookAtPath& look,
+void RecoverStore(Database& database, const ScanFolders& folders, const ExaminePath& look,
                   RecoveryReport& report) {
   Recovery(database, folders, look, report).Run();
 }

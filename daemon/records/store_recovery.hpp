@@ -37,7 +37,7 @@ void RefuseScansOfAnother(Database& database, const ScanFolders& folders);
 /// a removal, and moves folders without a row to set-aside. The caller holds the connection for
 /// changes.
 /// @throws ScansMissing; IoError and its kinds
-void RecoverStore(Database& database, const ScanFolders& folders, const LookAtPath& look,
+void RecoverStore(Database& database, const ScanFolders& folders, const ExaminePath& look,
                   RecoveryReport& report);
 
 }  // namespace plumb

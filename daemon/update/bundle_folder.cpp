@@ -31,17 +31,19 @@ constexpr std::string_view kEnding = ".raucb";
 /// takes time.
 class DeferredClose {
  public:
-  DeferredClose(const std::filesystem::path& file, const BundleFolder::Aside& aside)
-      : aside_(aside), fd_(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK)) {}
+  DeferredClose(const std::filesystem::path& file,
+                const BundleFolder::RunInBackground& run_in_background)
+      : run_in_background_(run_in_background),
+        fd_(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK)) {}
   ~DeferredClose() {
     if (fd_ < 0) return;
-    if (!aside_ || !aside_([fd = fd_] { ::close(fd); })) ::close(fd_);
+    if (!run_in_background_ || !run_in_background_([fd = fd_] { ::close(fd); })) ::close(fd_);
   }
   DeferredClose(const DeferredClose&) = delete;
   DeferredClose& operator=(const DeferredClose&) = delete;
 
  private:
-  const BundleFolder::Aside& aside_;
+  const BundleFolder::RunInBackground& run_in_background_;
   int fd_;
 };
 
@@ -78,7 +80,7 @@ web::Change BundleFolder::Add(const std::filesystem::path& file, const std::stri
   const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
   if (!is_known && known.size() >= kMaxKept)
     return Refused(ChangeResult::kConflict, "there are too many bundles: remove one first");
-  const DeferredClose replaced(folder_ / name, aside_);
+  const DeferredClose replaced(folder_ / name, run_in_background_);
   // Otherwise a power cut soon after could leave the name without contents.
   try {
     SyncToDisk(file);
@@ -94,7 +96,7 @@ web::Change BundleFolder::Add(const std::filesystem::path& file, const std::stri
 web::Change BundleFolder::Remove(const std::string& name) const {
   if (!Has(name)) return Refused(ChangeResult::kNotFound, "there is no such bundle");
   std::error_code error;
-  const DeferredClose removed(folder_ / name, aside_);
+  const DeferredClose removed(folder_ / name, run_in_background_);
   std::filesystem::remove(folder_ / name, error);
   if (error)
     return Refused(ChangeResult::kFailed,

@@ -16,11 +16,14 @@ namespace plumb {
 /// Files named NAME.raucb. Not thread-safe.
 class BundleFolder {
  public:
-  using Aside = std::function<bool(std::function<void()>)>;
+  using RunInBackground = std::function<bool(std::function<void()>)>;
 
-  /// @param aside  See UpdaterOptions.
-  BundleFolder(std::filesystem::path folder, std::uint64_t max_bytes, Aside aside)
-      : folder_(std::move(folder)), max_bytes_(max_bytes), aside_(std::move(aside)) {}
+  /// @param run_in_background  See UpdaterOptions.
+  BundleFolder(std::filesystem::path folder, std::uint64_t max_bytes,
+               RunInBackground run_in_background)
+      : folder_(std::move(folder)),
+        max_bytes_(max_bytes),
+        run_in_background_(std::move(run_in_background)) {}
 
   /// Names, sorted; at most 32.
   [[nodiscard]] std::vector<std::string> List() const;
@@ -35,7 +38,7 @@ class BundleFolder {
  private:
   std::filesystem::path folder_;
   std::uint64_t max_bytes_;
-  Aside aside_;
+  RunInBackground run_in_background_;
 };
 
 }  // namespace plumb

@@ -21,12 +21,12 @@ class LogindRestart : public SystemRestart {
   void Restart(std::function<void(const std::string&)> done) override {
     if (done_) return done("the machine is being asked to restart already");
     done_ = std::move(done);
-    constexpr int kNobodyIsAsked = 0;  // no dialogue: nobody sits at this machine
+    constexpr int kNotInteractive = 0;  // no dialogue: nobody sits at this machine
     if (!bus_.Open(address_, kCallTimeout) ||
         sd_bus_call_method_async(bus_.get(), nullptr, "org.freedesktop.login1",
                                  "/org/freedesktop/login1", "org.freedesktop.login1.Manager",
                                  "Reboot", &LogindRestart::OnAnswer, this, "b",
-                                 kNobodyIsAsked) < 0) {
+                                 kNotInteractive) < 0) {
       bus_.Close();
       return Answer("this machine has no system bus");
     }

@@ -45,10 +45,10 @@ struct Updater::Impl {
   Impl(EventLoop& on, UpdaterOptions given)
       : loop(on),
         options(std::move(given)),
-        folder(options.folder, options.max_bytes, options.aside),
+        folder(options.folder, options.max_bytes, options.run_in_background),
         bus(on, "bus", [this] { OnBroken(); }) {
     if (!options.now) options.now = [] { return std::chrono::steady_clock::now(); };
-    watch = loop.MakeTimer("update progress", [this] { LookAtProgress(); });
+    watch = loop.MakeTimer("update progress", [this] { CheckProgress(); });
     folder.RemoveUnfinished();
     last = ReadLastUpdate(options.folder);
     Connect();
@@ -66,7 +66,7 @@ struct Updater::Impl {
   Bus bus;
   /// An update after which the machine was not restarted, or that it did not keep.
   std::optional<LastUpdate> last;
-  bool told_of_roll_back = false;
+  bool roll_back_reported = false;
   std::chrono::steady_clock::time_point looked_at;
   bool is_there = false;
   bool is_installing = false;
@@ -134,7 +134,7 @@ struct Updater::Impl {
   }
 
   /// Whatever RAUC waits for, users must not be left waiting with it.
-  void LookAtProgress() {
+  void CheckProgress() {
     if (!is_installing) return;
     const std::chrono::minutes longest =
         step.find("Copying") != std::string::npos ? kLongestCopy : kLongestOtherStep;
@@ -163,7 +163,7 @@ struct Updater::Impl {
   /// The next start must know what was installed, and from which system.
   void Remember() {
     last = LastUpdate{.version = version, .from_slot = slot, .boot = options.boot};
-    told_of_roll_back = false;
+    roll_back_reported = false;
     try {
       WriteLastUpdate(options.folder, *last);
     } catch (const std::exception& error) {
@@ -180,8 +180,8 @@ struct Updater::Impl {
 
   void NoteRollBack() {
     const std::string text = RolledBack();
-    if (text.empty() || told_of_roll_back) return;
-    told_of_roll_back = true;
+    if (text.empty() || roll_back_reported) return;
+    roll_back_reported = true;
     Log(LogLevel::kError, text);
     if (options.rolled_back) options.rolled_back(text);
   }
@@ -387,7 +387,7 @@ struct Updater::Impl {
         if (*is_alive) Ask(file, found);
       });
     };
-    if (!options.aside || !options.aside(look)) look();
+    if (!options.run_in_background || !options.run_in_background(look)) look();
   }
 
   /// A file that RAUC took ownership of in an earlier attempt cannot be read again, but it cannot

@@ -30,7 +30,7 @@ struct UpdaterOptions {
   std::function<void()> changed;  ///< Called on the loop when status() has changed.
   /// Runs slow work on another thread: reading a whole bundle, closing a large file without a name.
   /// False: it is too busy. Empty: everything is done immediately on the loop.
-  std::function<bool(std::function<void()>)> aside;
+  std::function<bool(std::function<void()>)> run_in_background;
   /// Called on the loop when an installation has ended; empty text: it succeeded.
   std::function<void(const std::string& bundle, const std::string& failure)> ended;
   /// Called on the loop, once: the machine has started the system from before the last update, with

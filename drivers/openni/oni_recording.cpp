@@ -169,7 +169,7 @@ struct OniRecording::Impl {
     return value;
   }
 
-  [[noreturn]] void FailAsTold() {
+  [[noreturn]] void FailWithReaderError() {
     std::string text(std::min(Read<std::uint32_t>(), oni::kMaxText), ' ');
     Read(text.data(), text.size());
     Fail(text);
@@ -181,7 +181,7 @@ struct OniRecording::Impl {
     if (header.magic != oni::kMagic) Fail("its reader has another version");
     header.width = Read<std::int32_t>();
     if (header.width == static_cast<std::int32_t>(oni::Kind::kError))
-      FailAsTold();  // no image is 3 pixels wide
+      FailWithReaderError();  // no image is 3 pixels wide
     Read(&header.height, sizeof header - offsetof(oni::Header, height));
     if (header.width < 4 || header.width > kMaxImageSide || header.height < 4 ||
         header.height > kMaxImageSide)
@@ -283,7 +283,7 @@ std::optional<Frame> OniRecording::Next() {
       impl_->finished = true;
       return std::nullopt;
     case oni::Kind::kError:
-      impl_->FailAsTold();
+      impl_->FailWithReaderError();
   }
   impl_->Fail("its reader has another version");
 }

@@ -55,7 +55,7 @@ class Viewer {
   std::jthread thread_{[this](const std::stop_token& stop) { Watch(stop); }};
 };
 
-void LookAtEverything(HttpClient& person, const std::vector<std::string>& scans) {
+void ExamineAll(HttpClient& person, const std::vector<std::string>& scans) {
   for (const char* path : {"/api/v1/scans", "/api/v1/patients", "/api/v1/patients/1/scans",
                            "/api/v1/patients/1/references", "/api/v1/checks", "/api/v1/settings",
                            "/api/v1/update", "/result", "/", "/health"}) {
@@ -102,7 +102,7 @@ json WorkflowFigures() {
     scans.push_back(plumbd.ScanOnce()["last_result"]["scan"]);
     EXPECT_EQ(plumbd.Sim("next-scene")["ok"], true);
     scans.push_back(plumbd.ScanOnce()["last_result"]["scan"]);
-    LookAtEverything(engineer, scans);
+    ExamineAll(engineer, scans);
     SendBundle(plumbd.port(), engineer);
     EXPECT_EQ(engineer.Post("/api/v1/diagnostics").status, 200);
     EXPECT_EQ(physicist.Get("/api/v1/audit").status, 200);

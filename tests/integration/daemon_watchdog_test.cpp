@@ -18,10 +18,10 @@ namespace fs = std::filesystem;
 using testing::Plumbd;
 
 int TimesFed(const Plumbd& plumbd) {
-  const std::string told = plumbd.notifications();
+  const std::string reported = plumbd.notifications();
   int count = 0;
-  for (std::size_t at = told.find("WATCHDOG=1"); at != std::string::npos;
-       at = told.find("WATCHDOG=1", at + 1))
+  for (std::size_t at = reported.find("WATCHDOG=1"); at != std::string::npos;
+       at = reported.find("WATCHDOG=1", at + 1))
     ++count;
   return count;
 }

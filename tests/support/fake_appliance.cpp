@@ -23,7 +23,7 @@ Change FakeAppliance::Refusal(ChangeResult result, std::string message) {
   return {result, std::move(message), "", ""};
 }
 
-void FakeAppliance::Tell(EventKind kind) const {
+void FakeAppliance::Notify(EventKind kind) const {
   if (listener_) listener_(kind);
 }
 
@@ -38,7 +38,7 @@ void FakeAppliance::Finish(const Done& done, Change change) {
 void FakeAppliance::Did(const Actor& actor, const std::string& action, const std::string& subject,
                         const Done& done, const std::string& id) {
   Log(actor, action, subject, "");
-  Tell(EventKind::kData);
+  Notify(EventKind::kData);
   Finish(done, {ChangeResult::kDone, "", id, ""});
 }
 
@@ -64,7 +64,7 @@ void FakeAppliance::Fail(const std::string& reason) {
   status.fault = reason;
   status.fault_kind = FaultKind::kScan;
   status.light = "fault";
-  Tell(EventKind::kResult);
+  Notify(EventKind::kResult);
 }
 
 void FakeAppliance::Press(const Actor& actor, Done done) {
@@ -73,7 +73,7 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
     status.fault_kind = FaultKind::kNone;
     status.state = ApplianceState::kReady;
     status.light = "ready";
-    Tell(EventKind::kStatus);
+    Notify(EventKind::kStatus);
     return Did(actor, "press", "", done);
   }
   if (status.state == ApplianceState::kScanning) {
@@ -81,7 +81,7 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
     status.state = ApplianceState::kWorking;
     status.light = "working";
     status.scan->step = "surfaces";
-    Tell(EventKind::kStatus);
+    Notify(EventKind::kStatus);
     return Did(actor, "press", status.scan->id, done);
   }
   if (status.state != ApplianceState::kReady && status.state != ApplianceState::kResult) {
@@ -114,7 +114,7 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
   status.state = ApplianceState::kScanning;
   status.light = "scanning";
   phase_begun_.reset();
-  Tell(EventKind::kStatus);
+  Notify(EventKind::kStatus);
   Did(actor, "press", scan.id, done);
 }
 
@@ -130,7 +130,7 @@ void FakeAppliance::Cancel(const Actor& actor, Done done) {
   status.scan.reset();
   status.state = ApplianceState::kReady;
   status.light = "ready";
-  Tell(EventKind::kStatus);
+  Notify(EventKind::kStatus);
   Did(actor, "cancel", id, done);
 }
 
@@ -159,11 +159,11 @@ void FakeAppliance::Tick(std::chrono::steady_clock::time_point now) {
       scan.step = "surfaces";
       scan.guidance = Guidance::kNone;
     }
-    Tell(EventKind::kProgress);
+    Notify(EventKind::kProgress);
   } else {
     scan.step_fraction =
         std::min(1.0, static_cast<double>(elapsed.count()) / static_cast<double>(work.count()));
-    Tell(EventKind::kProgress);
+    Notify(EventKind::kProgress);
     if (elapsed >= work) EndScan();
   }
 }
@@ -209,7 +209,7 @@ void FakeAppliance::EndCheck() {
   status.light = check.status == "passed" ? "result_in_tolerance" : "no_answer";
   if (is_board_there) SeeBoard(check);
   CloseCheck();
-  Tell(EventKind::kResult);
+  Notify(EventKind::kResult);
 }
 
 /// The third scan may be signed, as in the appliance.
@@ -279,7 +279,7 @@ void FakeAppliance::OpenCheck(const Actor& actor, Done done) {
   checker_ = actor.user;
   status.patient_id.clear();
   status.next_purpose = ScanPurpose::kDailyCheck;
-  Tell(EventKind::kStatus);
+  Notify(EventKind::kStatus);
   Did(actor, "check.open", "", done);
 }
 
@@ -352,7 +352,7 @@ void FakeAppliance::EndScan() {
     ++patient->num_scans;
     if (scan.purpose == ScanPurpose::kReference) MakeReference(scan, "technician", "");
   }
-  Tell(EventKind::kResult);
+  Notify(EventKind::kResult);
 }
 
 void FakeAppliance::Unplug() {
@@ -366,16 +366,16 @@ void FakeAppliance::Unplug() {
     }
     CloseCheck();
     status.scan.reset();
-    Tell(EventKind::kResult);
+    Notify(EventKind::kResult);
   }
-  Tell(EventKind::kStatus);
+  Notify(EventKind::kStatus);
 }
 
 void FakeAppliance::Plug() {
   status.sensor.present = true;
   status.state = ApplianceState::kReady;
   status.light = "ready";
-  Tell(EventKind::kStatus);
+  Notify(EventKind::kStatus);
 }
 
 void FakeAppliance::SetTemplate(const Actor& actor, const PlanTemplate& wanted, Done done) {
@@ -470,10 +470,11 @@ void FakeAppliance::ChangeSettings(const Actor& actor, const Settings& changed, 
   Did(actor, "settings.change", "", done);
 }
 
-bool FakeAppliance::Later(web::Aside, std::function<void()> aside, std::function<void()> done) {
-  if (refuse_aside) return false;
-  const auto both = [aside = std::move(aside), done = std::move(done)] {
-    aside();
+bool FakeAppliance::RunInBackground(web::BackgroundPool, std::function<void()> work,
+                                    std::function<void()> done) {
+  if (refuse_background_work) return false;
+  const auto both = [work = std::move(work), done = std::move(done)] {
+    work();
     done();
   };
   if (hold_aside) {
@@ -494,14 +495,14 @@ void FakeAppliance::AddBundle(const Actor& actor, const std::filesystem::path& f
                                 name + " is not a bundle: expected a squashfs image"));
   uploaded_bytes = std::filesystem::file_size(file);
   update.bundles.push_back(name);
-  Tell(EventKind::kUpdate);
+  Notify(EventKind::kUpdate);
   Did(actor, "update.upload", name, done);
 }
 
 void FakeAppliance::RemoveBundle(const Actor& actor, const std::string& name, Done done) {
   if (std::erase(update.bundles, name) == 0)
     return Finish(done, Refusal(ChangeResult::kNotFound, "there is no such bundle"));
-  Tell(EventKind::kUpdate);
+  Notify(EventKind::kUpdate);
   Did(actor, "update.remove", name, done);
 }
 
@@ -512,7 +513,7 @@ void FakeAppliance::InstallUpdate(const Actor& actor, const std::string& bundle,
   update.installing = true;
   update.fraction = 0.4;
   update.message = "Copying image to rootfs.1";
-  Tell(EventKind::kUpdate);
+  Notify(EventKind::kUpdate);
   Did(actor, "update.install", bundle, done);
 }
 
@@ -544,8 +545,8 @@ void FakeAppliance::ResetToFactory(const Actor& actor, FactoryReset kind, Done d
 void FakeAppliance::ForgetRollBack(const Actor& actor, Done done) {
   status.rolled_back.clear();
   update.rolled_back.clear();
-  Tell(EventKind::kUpdate);
-  Tell(EventKind::kStatus);
+  Notify(EventKind::kUpdate);
+  Notify(EventKind::kStatus);
   Did(actor, "update.seen", "", done);
 }
 

@@ -84,11 +84,11 @@ class FakeAppliance : public web::BackgroundWork,
   /// on the loop.
   bool hold_aside = false;
   std::vector<std::function<void()>> held_aside;
-  bool refuse_aside = false;  ///< Too much waits already.
+  bool refuse_background_work = false;  ///< Too much waits already.
 
   /// Moves a running scan on. @param now  Any clock that grows.
   void Tick(std::chrono::steady_clock::time_point now);
-  void Tell(web::EventKind kind) const;
+  void Notify(web::EventKind kind) const;
   /// The running scan, or none, fails as one of plumbd does: a press acknowledges.
   void Fail(const std::string& reason);
   /// A check scan that saw the board of the room's calibration.
@@ -97,7 +97,8 @@ class FakeAppliance : public web::BackgroundWork,
   void Plug();
 
   // --- the services
-  bool Later(web::Aside where, std::function<void()> work, std::function<void()> done) override;
+  bool RunInBackground(web::BackgroundPool where, std::function<void()> work,
+                       std::function<void()> done) override;
   web::Status GetStatus() override { return status; }
   web::Health GetHealth() override { return health; }
   std::shared_ptr<const std::string> Preview() override { return preview; }
@@ -119,7 +120,7 @@ class FakeAppliance : public web::BackgroundWork,
   void SetOverdue(const std::string& block) {
     checks.overdue = status.check_overdue = !block.empty();
     status.reference_block = block;
-    Tell(web::EventKind::kStatus);
+    Notify(web::EventKind::kStatus);
   }
   std::vector<web::PlanTemplate> templates;
   [[nodiscard]] std::vector<web::PlanTemplate> Templates() override { return templates; }

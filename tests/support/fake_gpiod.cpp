@@ -30,7 +30,7 @@ std::string InFolder(const char* file) {
   return std::string(folder != nullptr ? folder : "/nonexistent") + "/" + file;
 }
 
-void Tell(const gpiod_line& line, int value) {
+void WriteLevel(const gpiod_line& line, int value) {
   timespec now{};
   ::clock_gettime(CLOCK_MONOTONIC, &now);
   char text[128];
@@ -68,14 +68,14 @@ PLUMB_FAKE int gpiod_line_request(gpiod_line* line, const gpiod_line_request_con
 }
 
 PLUMB_FAKE int gpiod_line_request_output_flags(gpiod_line* line, const char*, int, int value) {
-  Tell(*line, value);
+  WriteLevel(*line, value);
   return 0;
 }
 
 PLUMB_FAKE int gpiod_line_get_value(gpiod_line* line) { return line->is_pressed ? 1 : 0; }
 
 PLUMB_FAKE int gpiod_line_set_value(gpiod_line* line, int value) {
-  Tell(*line, value);
+  WriteLevel(*line, value);
   return 0;
 }
 

@@ -95,7 +95,7 @@ void FakeAppliance::WipePatient(const Actor& actor, const std::string& id, Done 
     status.session.reset();
   }
   if (status.last_result && status.last_result->patient_id == id) status.last_result.reset();
-  Tell(EventKind::kStatus);
+  Notify(EventKind::kStatus);
   Did(actor, "patient.wipe", id, done);
 }
 
@@ -137,7 +137,7 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
                                     .num_scans = 0,
                                     .opened_by = actor.user,
                                     .opened_at = WallClock::now()};
-  Tell(EventKind::kStatus);
+  Notify(EventKind::kStatus);
   Did(actor, "session.open", status.session->id, done, status.session->id);
 }
 
@@ -148,7 +148,7 @@ void FakeAppliance::CloseSession(const Actor& actor, const std::string& session_
   status.session.reset();
   status.patient_id.clear();
   status.next_purpose = ScanPurpose::kFraction;
-  Tell(EventKind::kStatus);
+  Notify(EventKind::kStatus);
   Did(actor, "session.close", "", done);
 }
 
@@ -267,7 +267,7 @@ void FakeAppliance::RemoveScan(const Actor& actor, const std::string& id, const 
   }
   if (std::erase_if(scans, [&](const Scan& scan) { return scan.id == id; }) == 0)
     return Finish(done, Refusal(ChangeResult::kNotFound, "there is no such scan"));
-  Tell(EventKind::kData);
+  Notify(EventKind::kData);
   Did(actor, "scan.remove", id, done);
 }
 

@@ -160,7 +160,7 @@ class RaucTest : public ::testing::Test {
                                 .version = "1.0.0",
                                 .blocking_reason = {},
                                 .changed = {},
-                                .aside = {},
+                                .run_in_background = {},
                                 .ended = [this](const std::string&, const std::string& failure) {
                                   ++num_ended_;
                                   failure_ = failure;

@@ -229,14 +229,14 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     service.update.installing = false;
     service.update.message = "plumb-0.3.0.raucb is installed: restart the appliance to use it";
     service.update.restart_needed = true;
-    service.Tell(web::EventKind::kUpdate);
+    service.Notify(web::EventKind::kUpdate);
   }
   if (name == "rolledback") {
     service.update.restart_needed = false;
     service.update.rolled_back = "The machine went back to the previous system, version 0.2.0.";
     service.status.rolled_back = service.update.rolled_back;
-    service.Tell(web::EventKind::kUpdate);
-    service.Tell(web::EventKind::kStatus);
+    service.Notify(web::EventKind::kUpdate);
+    service.Notify(web::EventKind::kStatus);
   }
   if (name == "markermoved") {
     web::CheckRecord check;
@@ -255,12 +255,12 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     std::string what;
     words >> what;
     service.status.is_room_known = what == "known";
-    service.Tell(web::EventKind::kStatus);
+    service.Notify(web::EventKind::kStatus);
   }
   if (name == "board") service.is_board_there = true;
   if (name == "roomdue") {
     service.room.due = "marker 4 moved 8 mm since the room was calibrated";
-    service.Tell(web::EventKind::kData);
+    service.Notify(web::EventKind::kData);
   }
   if (name == "overdue")
     service.SetOverdue(
@@ -291,7 +291,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   if (name == "old" && !service.scans.empty()) {
     service.scans.back().finished_at = web::WallClock::now() - std::chrono::minutes(10);
     service.status.last_result = service.scans.back();
-    service.Tell(web::EventKind::kResult);
+    service.Notify(web::EventKind::kResult);
   }
 }
 

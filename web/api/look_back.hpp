@@ -13,7 +13,7 @@ struct LoginHistory {
   int failed = 0;                  ///< Wrong passwords for this name since then.
 };
 
-/// To be called within BackgroundWork::Later(). Reads the newest 5000 entries of logins.
+/// To be called within BackgroundWork::RunInBackground(). Reads the newest 5000 entries of logins.
 /// @param before  Beginning of the present session.
 [[nodiscard]] LoginHistory LoginsBefore(AuditLog& log, const std::string& user,
                                         WallClock::time_point before);

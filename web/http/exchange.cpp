@@ -59,10 +59,11 @@ void Transport::Exchange::WriteUpload() {
     }
   };
   writing = true;
-  const bool accepted =
-      owner->background_.Later(Aside::kFiles, work, [weak = weak_from_this(), failure] {
-        if (const auto alive = weak.lock()) alive->HaveWritten(*failure);
-      });
+  const bool accepted = owner->background_.RunInBackground(BackgroundPool::kFiles, work,
+                                                           [weak = weak_from_this(), failure] {
+                                                             if (const auto alive = weak.lock())
+                                                               alive->HaveWritten(*failure);
+                                                           });
   if (!accepted) HaveWritten("the disk is too busy; send the file again later");
 }
 

@@ -122,7 +122,9 @@ void RespondAside(BackgroundWork& background, const std::string& name,
       *made = InternalError(name, error);
     }
   };
-  if (background.Later(Aside::kReads, work, [made, respond] { respond(std::move(*made)); })) return;
+  if (background.RunInBackground(BackgroundPool::kReads, work,
+                                 [made, respond] { respond(std::move(*made)); }))
+    return;
   Response busy = ErrorResponse(503, "too much is asked at once; try again in a few seconds");
   busy.headers.emplace_back("Retry-After", "2");
   respond(std::move(busy));

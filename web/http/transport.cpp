@@ -176,13 +176,13 @@ struct Transport::Callbacks {
     constexpr std::uintmax_t kSpare = 64U << 20;
     try {
       // Removing it takes time in proportion to its size.
-      exchange.request.upload =
-          std::shared_ptr<UploadFile>(new UploadFile(options.upload_folder),
-                                      [&background = transport.background_](UploadFile* file) {
-                                        if (!background.Later(
-                                                Aside::kFiles, [file] { delete file; }, [] {}))
-                                          delete file;
-                                      });
+      exchange.request.upload = std::shared_ptr<UploadFile>(
+          new UploadFile(options.upload_folder),
+          [&background = transport.background_](UploadFile* file) {
+            if (!background.RunInBackground(
+                    BackgroundPool::kFiles, [file] { delete file; }, [] {}))
+              delete file;
+          });
     } catch (const IoError& error) {
       return ErrorResponse(507, error.what());
     }

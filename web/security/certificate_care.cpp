@@ -58,21 +58,22 @@ bool HasWeakKey(const Certificate& certificate, unsigned& bits) {
                                                       bits) < GNUTLS_SEC_PARAM_MEDIUM;
 }
 
-void WarnOfDates(const Certificate& certificate, std::time_t now, std::vector<std::string>& told) {
+void WarnOfDates(const Certificate& certificate, std::time_t now,
+                 std::vector<std::string>& warnings) {
   const std::time_t begin = gnutls_x509_crt_get_activation_time(certificate.get());
   const std::time_t end = gnutls_x509_crt_get_expiration_time(certificate.get());
   const std::string subject = SubjectOf(certificate);
   if (now < begin) {
-    told.push_back(fmt::format(
+    warnings.push_back(fmt::format(
         "the page's certificate {} is valid only from {}: browsers refuse it; check the clock",
         subject, Day(begin)));
   }
   if (now >= end) {
-    told.push_back(fmt::format(
+    warnings.push_back(fmt::format(
         "the page's certificate {} ended on {}: browsers refuse it; put a new one in its place",
         subject, Day(end)));
   } else if (end - now <= std::chrono::seconds(kWarnBeforeEnd).count()) {
-    told.push_back(fmt::format(
+    warnings.push_back(fmt::format(
         "the page's certificate {} ends on {}: browsers refuse it from then on; put a new one in "
         "its place before",
         subject, Day(end)));
@@ -83,18 +84,18 @@ void WarnOfDates(const Certificate& certificate, std::time_t now, std::vector<st
 
 std::vector<std::string> CertificateWarnings(const std::string& pem,
                                              std::chrono::system_clock::time_point now) {
-  std::vector<std::string> told;
+  std::vector<std::string> warnings;
   const std::vector<Certificate> chain = ChainOf(pem);
   unsigned bits = 0;
   if (HasWeakKey(chain.front(), bits)) {
-    told.push_back(fmt::format(
+    warnings.push_back(fmt::format(
         "the key of the page's certificate {} is too weak ({} bits): browsers refuse it; make one "
         "of 256 bits on an elliptic curve, or of 2048 with RSA",
         SubjectOf(chain.front()), bits));
   }
   for (const Certificate& certificate : chain)
-    WarnOfDates(certificate, std::chrono::system_clock::to_time_t(now), told);
-  return told;
+    WarnOfDates(certificate, std::chrono::system_clock::to_time_t(now), warnings);
+  return warnings;
 }
 
 CertificateFacts FactsOfCertificate(const std::string& pem) {

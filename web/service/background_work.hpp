@@ -6,7 +6,7 @@
 namespace plumb::web {
 
 /// Threads beside the loop, for work that may take long.
-enum class Aside {
+enum class BackgroundPool {
   kReads,  ///< Lists, and files that are opened.
   kFiles,  ///< Writing and removing large files.
 };
@@ -20,8 +20,8 @@ class BackgroundWork {
   /// may throw. `work` may call the functions marked (background), FindPatient(), FindReference()
   /// and FindScan().
   /// @return False if the queue is full: neither is called then.
-  [[nodiscard]] virtual bool Later(Aside where, std::function<void()> work,
-                                   std::function<void()> done) = 0;
+  [[nodiscard]] virtual bool RunInBackground(BackgroundPool where, std::function<void()> work,
+                                             std::function<void()> done) = 0;
 };
 
 }  // namespace plumb::web

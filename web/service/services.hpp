@@ -24,8 +24,8 @@ namespace plumb::web {
 ///
 /// Every function is called on the loop thread and returns within a few milliseconds: reads answer
 /// from memory or from an index, changes may finish later. Functions marked (background) read
-/// lists: they must be called within BackgroundWork::Later(), and the others beside them may be.
-/// Each change and its audit entry are one transaction of the store. Nothing throws except
+/// lists: they must be called within BackgroundWork::RunInBackground(), and the others beside them
+/// may be. Each change and its audit entry are one transaction of the store. Nothing throws except
 /// std::bad_alloc; errors are reported as a Change. Arguments are valid UTF-8, short, and without
 /// control characters, but their meaning is not checked.
 struct Services {

@@ -509,7 +509,7 @@ TEST_F(ApplianceRoomTest, ASignedCalibrationHoldsInPlaceOfTheConfigurationUntilA
     for (Eigen::Vector3d& corner : moved.at(4).corners) corner.x() += 0.008;
     On([&] {
       (void)appliance_->store()->checks.Add(erik_, "A", testing::CheckOver(0, 0, moved));
-      appliance_->LookAtRoom();
+      appliance_->RefreshRoom();
     });
     EXPECT_FALSE(Gantry()) << "neither the calibration nor the configuration";
     EXPECT_THAT(warnings_, ::testing::HasSubstr("marker 4 moved 8 mm"));

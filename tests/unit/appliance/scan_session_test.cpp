@@ -99,7 +99,7 @@ TEST_F(ScanSessionTest, WhatIsKnownOfTheSensorReachesTheSceneAndAScanWithoutMark
     session_->feed()->Close();
     const ScanOutcome outcome = WaitForEnd();
     EXPECT_EQ(outcome.kind, Kind::kDone) << outcome.reason;
-    EXPECT_THAT(outcome.teaches_nothing, HasSubstr("0 markers"));
+    EXPECT_THAT(outcome.why_not_learned, HasSubstr("0 markers"));
     const Scene scene = ReadScene(folder_ / "scene");
     EXPECT_EQ(scene.sensor_profile.value_or(""),
               serial == std::string("A") ? "A version 1, 4 sweeps" : "");

@@ -16,7 +16,7 @@ using Kind = SensorEvent::Kind;
 using std::chrono::milliseconds;
 
 /// Collects what the sensor thread tells.
-class Told {
+class Events {
  public:
   void operator()(const SensorEvent& event) {
     const std::lock_guard lock(mutex_);
@@ -45,14 +45,14 @@ class SensorThreadTest : public ::testing::Test {
   void Start(SensorThreadOptions options = {}) {
     options.first_retry = milliseconds(5);
     options.last_retry = milliseconds(20);
-    thread_ =
-        std::make_unique<SensorThread>([this] { return std::make_unique<FakeProvider>(bus_); },
-                                       options, [this](const SensorEvent& event) { told_(event); });
-    EXPECT_EQ(told_.At(0).kind, Kind::kLost) << "nothing is attached yet";
+    thread_ = std::make_unique<SensorThread>(
+        [this] { return std::make_unique<FakeProvider>(bus_); }, options,
+        [this](const SensorEvent& event) { events_(event); });
+    EXPECT_EQ(events_.At(0).kind, Kind::kLost) << "nothing is attached yet";
   }
 
   FakeBus bus_;
-  Told told_;
+  Events events_;
   std::unique_ptr<SensorThread> thread_;
 };
 
@@ -62,8 +62,8 @@ TEST_F(SensorThreadTest, IsReadyWithTheFirstFrameAndNotBefore) {
   while (bus_.opened() == 0) std::this_thread::yield();
   EXPECT_FALSE(thread_->snapshot().present) << "open, but it has shown nothing yet";
   bus_.GiveFrame();
-  EXPECT_EQ(told_.At(1).kind, Kind::kReady);
-  EXPECT_EQ(told_.At(1).sensor.serial, "A");
+  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).sensor.serial, "A");
   EXPECT_TRUE(thread_->snapshot().present);
   EXPECT_EQ(thread_->latest()->index, 0);
 }
@@ -73,7 +73,7 @@ TEST_F(SensorThreadTest, FramesGoToTheScanOnceItBeganAndNotAnyMoreOnceItEnded) {
   Start({.serial = {}, .before_scan = [&] { ++prepared; }});
   bus_.Plug("A");
   bus_.GiveFrame();
-  EXPECT_EQ(told_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
   const auto feed = std::make_shared<LiveFeed>(10);
   thread_->BeginScan(feed);
   bus_.GiveFrame();  // may be on its way already: then it belongs to the time before the press
@@ -100,33 +100,33 @@ TEST_F(SensorThreadTest, FramesGoToTheScanOnceItBeganAndNotAnyMoreOnceItEnded) {
 
 TEST_F(SensorThreadTest, ASensorThatTheDriverDidNotReportIsFoundToo) {
   Start();
-  EXPECT_EQ(told_.At(0).kind, Kind::kLost);
+  EXPECT_EQ(events_.At(0).kind, Kind::kLost);
   bus_.PlugUnreported("A");
   while (bus_.opened() == 0) std::this_thread::yield();  // GiveFrame() would wake the listener
   bus_.GiveFrame();
-  EXPECT_EQ(told_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
 }
 
 TEST_F(SensorThreadTest, AnUnpluggedSensorIsLostAndAnotherOneTakesItsPlace) {
   Start();
   bus_.Plug("A");
   bus_.GiveFrame();
-  EXPECT_EQ(told_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
   bus_.Unplug();
-  EXPECT_EQ(told_.At(2).kind, Kind::kLost);
+  EXPECT_EQ(events_.At(2).kind, Kind::kLost);
   EXPECT_FALSE(thread_->snapshot().present);
   EXPECT_EQ(thread_->latest(), std::nullopt);
   bus_.Plug("B");
   bus_.GiveFrame();
-  EXPECT_EQ(told_.At(3).kind, Kind::kReady);
-  EXPECT_EQ(told_.At(3).sensor.serial, "B");
+  EXPECT_EQ(events_.At(3).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(3).sensor.serial, "B");
 }
 
 TEST_F(SensorThreadTest, AScanGetsNoFrameOfTheSensorThatComesAfterItsOwnWasUnplugged) {
   Start();
   bus_.Plug("A");
   bus_.GiveFrame();
-  EXPECT_EQ(told_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
   const auto feed = std::make_shared<LiveFeed>(10);
   thread_->BeginScan(feed);
   bus_.GiveFrame();
@@ -134,11 +134,11 @@ TEST_F(SensorThreadTest, AScanGetsNoFrameOfTheSensorThatComesAfterItsOwnWasUnplu
   bus_.GiveFrame();
   while (feed->num_pushed() == 0) std::this_thread::yield();
   bus_.Unplug();
-  EXPECT_EQ(told_.At(2).kind, Kind::kLost);
+  EXPECT_EQ(events_.At(2).kind, Kind::kLost);
   const std::int64_t pushed = feed->num_pushed();
   bus_.Plug("B");
   bus_.GiveFrame();
-  EXPECT_EQ(told_.At(3).sensor.serial, "B");
+  EXPECT_EQ(events_.At(3).sensor.serial, "B");
   const int taken = bus_.taken();
   for (int i = 0; i < 3; ++i) bus_.GiveFrame();
   while (bus_.taken() < taken + 3) std::this_thread::yield();
@@ -152,12 +152,12 @@ TEST_F(SensorThreadTest, SensorsThatAreNotUsedAreToldWhenTheyComeAndNotWhileASca
   Start();
   bus_.Plug("A");
   bus_.GiveFrame();
-  EXPECT_TRUE(told_.At(1).others.empty());
+  EXPECT_TRUE(events_.At(1).others.empty());
   bus_.Plug("B");
   bus_.GiveFrame();
-  EXPECT_EQ(told_.At(2).kind, Kind::kOthers);
-  EXPECT_EQ(told_.At(2).sensor.serial, "A");
-  EXPECT_EQ(told_.At(2).others, std::vector<std::string>{"B"});
+  EXPECT_EQ(events_.At(2).kind, Kind::kOthers);
+  EXPECT_EQ(events_.At(2).sensor.serial, "A");
+  EXPECT_EQ(events_.At(2).others, std::vector<std::string>{"B"});
   thread_->BeginScan(std::make_shared<LiveFeed>(10));
   while (!bus_.exposure_locked()) bus_.GiveFrame();
   bus_.Plug("C");
@@ -167,32 +167,32 @@ TEST_F(SensorThreadTest, SensorsThatAreNotUsedAreToldWhenTheyComeAndNotWhileASca
   EXPECT_EQ(thread_->snapshot().others.size(), 1U);
   thread_->EndScan();
   while (thread_->snapshot().others.size() < 2) bus_.GiveFrame();
-  EXPECT_EQ(told_.At(3).others, (std::vector<std::string>{"B", "C"}));
+  EXPECT_EQ(events_.At(3).others, (std::vector<std::string>{"B", "C"}));
 }
 
 TEST_F(SensorThreadTest, AFailureIsToldOnceAndTriedAgain) {
   Start();
   bus_.RefuseToOpen("no permission; see plumb doctor");
   bus_.Plug("A");
-  EXPECT_EQ(told_.At(1).kind, Kind::kFailed);
-  EXPECT_EQ(told_.At(1).reason, "no permission; see plumb doctor");
+  EXPECT_EQ(events_.At(1).kind, Kind::kFailed);
+  EXPECT_EQ(events_.At(1).reason, "no permission; see plumb doctor");
   bus_.GiveFrame();
-  EXPECT_EQ(told_.At(2).kind, Kind::kReady) << "by itself, nobody plugged anything";
+  EXPECT_EQ(events_.At(2).kind, Kind::kReady) << "by itself, nobody plugged anything";
   bus_.FailOnce("no pair for 2 s");
-  EXPECT_EQ(told_.At(3).reason, "no pair for 2 s");
+  EXPECT_EQ(events_.At(3).reason, "no pair for 2 s");
   bus_.GiveFrame();
-  EXPECT_EQ(told_.At(4).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(4).kind, Kind::kReady);
 }
 
 TEST_F(SensorThreadTest, OnlyTheConfiguredSensorIsUsed) {
   Start({.serial = "B", .before_scan = {}});
   bus_.Plug("A");
-  EXPECT_EQ(told_.At(1).kind, Kind::kFailed);
-  EXPECT_THAT(told_.At(1).reason,
+  EXPECT_EQ(events_.At(1).kind, Kind::kFailed);
+  EXPECT_THAT(events_.At(1).reason,
               ::testing::AllOf(::testing::HasSubstr("B"), ::testing::HasSubstr("A")));
   bus_.Plug("B");
   bus_.GiveFrame();
-  EXPECT_EQ(told_.At(2).sensor.serial, "B");
+  EXPECT_EQ(events_.At(2).sensor.serial, "B");
 }
 
 TEST_F(SensorThreadTest, ALibraryThatDoesNotStartIsAFailureThatIsTriedAgain) {
@@ -206,9 +206,9 @@ TEST_F(SensorThreadTest, ALibraryThatDoesNotStartIsAFailureThatIsTriedAgain) {
                           .before_scan = {},
                           .first_retry = milliseconds(1),
                           .last_retry = milliseconds(2)},
-      [this](const SensorEvent& event) { told_(event); });
-  EXPECT_EQ(told_.At(0).reason, "the library is missing");
-  EXPECT_EQ(told_.At(1).kind, Kind::kLost) << "and then it works, and sees no sensor";
+      [this](const SensorEvent& event) { events_(event); });
+  EXPECT_EQ(events_.At(0).reason, "the library is missing");
+  EXPECT_EQ(events_.At(1).kind, Kind::kLost) << "and then it works, and sees no sensor";
 }
 
 TEST_F(SensorThreadTest, WaitingForALibraryThatDoesNotStartTakesNoProcessor) {
@@ -232,8 +232,8 @@ TEST_F(SensorThreadTest, WaitingForALibraryThatDoesNotStartTakesNoProcessor) {
                           .before_scan = {},
                           .first_retry = milliseconds(300),
                           .last_retry = milliseconds(300)},
-      [this](const SensorEvent& event) { told_(event); });
-  EXPECT_EQ(told_.At(1).kind, Kind::kLost) << "the second attempt works, and sees no sensor";
+      [this](const SensorEvent& event) { events_(event); });
+  EXPECT_EQ(events_.At(1).kind, Kind::kLost) << "the second attempt works, and sees no sensor";
   EXPECT_LT(waiting_s, 0.01) << "of 0.3 s";
 }
 
@@ -248,13 +248,13 @@ TEST_F(SensorThreadTest, AStalledProcessFailsTheScanAndKeepsTheSensor) {
   Start();
   bus_.Plug("A");
   bus_.GiveFrame();
-  EXPECT_EQ(told_.At(1).kind, Kind::kReady);
+  EXPECT_EQ(events_.At(1).kind, Kind::kReady);
   const auto feed = std::make_shared<LiveFeed>(10);
   thread_->BeginScan(feed);
   bus_.GiveFrame();
   while (bus_.flushed() == 0) std::this_thread::yield();
   bus_.StallOnce("not run for 3 s");
-  EXPECT_EQ(told_.At(2).kind, Kind::kStalled);
+  EXPECT_EQ(events_.At(2).kind, Kind::kStalled);
   try {
     while (feed->Next({})) continue;
     FAIL() << "a sweep with a gap ended as a whole one";

@@ -67,12 +67,12 @@ TEST_F(UnitProfileTest, TheFirstSweepMakesTheFirstVersionAndTheNextJoinsIt) {
   EXPECT_FALSE(options_.profile);
   Sweep(options_, 0.001);
   EXPECT_EQ(first.Drift(), "");
-  first.Teach();
+  first.LearnFromScan();
   UnitProfile second = Of("A");
   second.Begin(options_);
   EXPECT_EQ(options_.profile.value().num_sweeps, 1);
   Sweep(options_, 0.0011);
-  second.Teach();
+  second.LearnFromScan();
   EXPECT_EQ(shelf_->Read("A").newest.value().profile.value().num_sweeps, 2);
   EXPECT_EQ(shelf_->Versions("A").size(), 2U);
 }
@@ -85,7 +85,7 @@ TEST_F(UnitProfileTest, ASweepBeyondTheGateIsNotJoinedAndReported) {
   within.Begin(options_);
   Sweep(options_, 0.001 + 0.00040);
   EXPECT_EQ(within.Drift(), "");
-  within.Teach();
+  within.LearnFromScan();
   EXPECT_EQ(shelf_->Versions("A").size(), 2U);
   (void)shelf_->RollBack("A", 1);
   UnitProfile beyond = Of("A");
@@ -93,7 +93,7 @@ TEST_F(UnitProfileTest, ASweepBeyondTheGateIsNotJoinedAndReported) {
   Sweep(options_, 0.001 + 0.00043);
   EXPECT_THAT(beyond.Drift(), HasSubstr("sensor A no longer measures as its profile says"));
   EXPECT_THAT(beyond.Drift(), HasSubstr("on the settings page"));
-  beyond.Teach();
+  beyond.LearnFromScan();
   EXPECT_EQ(shelf_->Versions("A").size(), 3U) << "nothing was added";
   EXPECT_EQ(shelf_->Read("A").newest.value().profile.value().mean[kFocal], 0.001);
 }
@@ -102,7 +102,7 @@ TEST_F(UnitProfileTest, ASweepThatLearnedNothingTeachesNothing) {
   UnitProfile unit = Of("A");
   unit.Begin(options_);
   EXPECT_EQ(unit.Drift(), "");
-  unit.Teach();
+  unit.LearnFromScan();
   EXPECT_FALSE(shelf_->Read("A").newest);
 }
 
@@ -114,7 +114,7 @@ TEST_F(UnitProfileTest, AProfileOfAnotherCalibrationFileIsNotUsedAndANewOneIsBeg
   unit.Begin(options_);
   EXPECT_FALSE(options_.profile);
   Sweep(options_, 0.002);
-  unit.Teach();
+  unit.LearnFromScan();
   const SensorProfile now = shelf_->Read("A").newest.value().profile.value();
   EXPECT_EQ(now.stated, Stated());
   EXPECT_EQ(now.num_sweeps, 1);
@@ -126,7 +126,7 @@ TEST_F(UnitProfileTest, WhatWasResetDuringTheSweepStaysReset) {
   unit.Begin(options_);
   Sweep(options_, 0.001);
   (void)shelf_->Reset("A");
-  unit.Teach();
+  unit.LearnFromScan();
   EXPECT_FALSE(shelf_->Read("A").newest.value().profile);
 }
 
@@ -144,7 +144,7 @@ TEST_F(UnitProfileTest, ADiskThatCannotBeWrittenDoesNotFailTheScan) {
   UnitProfile unit = Of("A");
   unit.Begin(options_);
   Sweep(options_, 0.001);
-  EXPECT_NO_THROW(unit.Teach());
+  EXPECT_NO_THROW(unit.LearnFromScan());
 }
 
 TEST(WhyItTeachesNothing, NamesEachCheckThatAScanHasToPass) {

@@ -287,16 +287,16 @@ TEST(FileIoTest, TooManyOpenFilesAreNotTheFilesFault) {
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
   const rlimit none{.rlim_cur = 0, .rlim_max = before.rlim_max};
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
-  std::string told;
+  std::string reported;
   try {
     (void)ReadTextFile(folder / "good", 100);
   } catch (const DataError&) {
-    told = "the file is blamed";
+    reported = "the file is blamed";
   } catch (const IoError& error) {
-    told = error.what();
+    reported = error.what();
   }
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
-  EXPECT_THAT(told, ::testing::HasSubstr("LimitNOFILE"));
+  EXPECT_THAT(reported, ::testing::HasSubstr("LimitNOFILE"));
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ using ::testing::Not;
 
 struct End {
   int status = 0;
-  std::string told;  ///< On the standard error.
+  std::string reported;  ///< On the standard error.
 };
 
 /// What becomes of a process that reports its crashes and does `what`.
@@ -45,7 +45,7 @@ End EndOf(const std::function<void()>& what) {
   End end;
   char buffer[4096];
   for (ssize_t count = 0; (count = ::read(ends[0], buffer, sizeof(buffer))) > 0;)
-    end.told.append(buffer, static_cast<std::size_t>(count));
+    end.reported.append(buffer, static_cast<std::size_t>(count));
   ::close(ends[0]);
   ::waitpid(child, &end.status, 0);
   return end;
@@ -66,11 +66,12 @@ TEST(CrashReportTest, TellsSignalBuildAndCallsAndEndsByTheSignal) {
     volatile int* nowhere = nullptr;
     *nowhere = static_cast<int>(patient.size());
   });
-  ASSERT_TRUE(WIFSIGNALED(end.status)) << end.told;
+  ASSERT_TRUE(WIFSIGNALED(end.status)) << end.reported;
   EXPECT_EQ(WTERMSIG(end.status), SIGSEGV);
-  EXPECT_THAT(end.told, ContainsRegex("^crashed: SIGSEGV, tested 1.2.3, build id [0-9a-f]{40}; "));
-  EXPECT_THAT(end.told, ContainsRegex("plumb_test_loop[^\n]*\\(.*\\+0x[0-9a-f]+\\)"));
-  EXPECT_THAT(end.told, Not(HasSubstr(patient)));
+  EXPECT_THAT(end.reported,
+              ContainsRegex("^crashed: SIGSEGV, tested 1.2.3, build id [0-9a-f]{40}; "));
+  EXPECT_THAT(end.reported, ContainsRegex("plumb_test_loop[^\n]*\\(.*\\+0x[0-9a-f]+\\)"));
+  EXPECT_THAT(end.reported, Not(HasSubstr(patient)));
 }
 
 TEST(CrashReportTest, TellsAnAbortAndASignalFromOutside) {
@@ -78,11 +79,11 @@ TEST(CrashReportTest, TellsAnAbortAndASignalFromOutside) {
   const End abort = EndOf([] { std::abort(); });
   ASSERT_TRUE(WIFSIGNALED(abort.status));
   EXPECT_EQ(WTERMSIG(abort.status), SIGABRT);
-  EXPECT_THAT(abort.told, HasSubstr("crashed: SIGABRT, "));
+  EXPECT_THAT(abort.reported, HasSubstr("crashed: SIGABRT, "));
   const End bus = EndOf([] { ::kill(::getpid(), SIGBUS); });
   ASSERT_TRUE(WIFSIGNALED(bus.status));
   EXPECT_EQ(WTERMSIG(bus.status), SIGBUS);
-  EXPECT_THAT(bus.told, HasSubstr("crashed: SIGBUS, "));
+  EXPECT_THAT(bus.reported, HasSubstr("crashed: SIGBUS, "));
 }
 
 /// A stack that has run out leaves no room for a handler but on a stack of its own.
@@ -96,9 +97,9 @@ TEST(CrashReportTest, TellsThatTheStackHasRunOut) {
     }
   };
   const End end = EndOf([] { ::_exit(Deep::Call(1) & 1); });
-  ASSERT_TRUE(WIFSIGNALED(end.status)) << end.told;
+  ASSERT_TRUE(WIFSIGNALED(end.status)) << end.reported;
   EXPECT_EQ(WTERMSIG(end.status), SIGSEGV);
-  EXPECT_THAT(end.told, HasSubstr("crashed: SIGSEGV, "));
+  EXPECT_THAT(end.reported, HasSubstr("crashed: SIGSEGV, "));
 }
 
 TEST(CrashReportTest, AFileThatMayNotGrowIsAnErrorAndNoEnd) {
@@ -112,7 +113,7 @@ TEST(CrashReportTest, AFileThatMayNotGrowIsAnErrorAndNoEnd) {
         std::fwrite(text.data(), 1, text.size(), file) != text.size() || std::fflush(file) != 0;
     ::_exit(is_refused && errno == EFBIG ? 7 : 1);
   });
-  ASSERT_TRUE(WIFEXITED(end.status)) << end.told;
+  ASSERT_TRUE(WIFEXITED(end.status)) << end.reported;
   EXPECT_EQ(WEXITSTATUS(end.status), 7);
 }
 

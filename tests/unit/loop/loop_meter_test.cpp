@@ -102,20 +102,20 @@ TEST_F(LoopMeterTest, NamesThePartThatTookLongestAndCountsEachByItself) {
 }
 
 TEST_F(LoopMeterTest, TellsASlowTurnAtMostOnceAMinuteAndHowManyWereNotTold) {
-  std::vector<std::int64_t> told;
+  std::vector<std::int64_t> reported;
   meter_.SetSlowListener([&](const LoopTurn& turn, std::int64_t unsaid) {
     EXPECT_EQ(turn.what, "slow");
-    told.push_back(unsaid);
+    reported.push_back(unsaid);
   });
   const auto slow = [&] { Turn("slow", [&] { clocks_.Block(11ms); }); };
   Turn("quick", [&] { clocks_.Block(10ms); });
-  EXPECT_THAT(told, ::testing::IsEmpty());
+  EXPECT_THAT(reported, ::testing::IsEmpty());
   for (int i = 0; i < 4; ++i) slow();
-  EXPECT_THAT(told, ::testing::ElementsAre(0));
-  clocks_.wall += LoopMeter::kTellEvery;
+  EXPECT_THAT(reported, ::testing::ElementsAre(0));
+  clocks_.wall += LoopMeter::kReportInterval;
   slow();
   slow();
-  EXPECT_THAT(told, ::testing::ElementsAre(0, 3));
+  EXPECT_THAT(reported, ::testing::ElementsAre(0, 3));
 }
 
 TEST_F(LoopMeterTest, ReportsAreWhatTheStatusAndTheDiagnosticsShow) {

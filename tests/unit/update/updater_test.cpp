@@ -181,25 +181,25 @@ class UpdaterTest : public ::testing::Test {
   void Start() {
     On([this] {
       updater_ = std::make_unique<Updater>(
-          loop_, UpdaterOptions{.folder = folder_ / "updates",
-                                .max_bytes = 1 << 20,
-                                .bus_address = bus_.address(),
-                                .version = "0.1.0",
-                                .boot = boot_,
-                                .blocking_reason = [this] { return blocking_reason_; },
-                                .changed = [this] { ++num_changes_; },
-                                .aside = {},
-                                .ended =
-                                    [this](const std::string& bundle, const std::string& failure) {
-                                      ended_ = bundle + ": " + failure;
-                                    },
-                                .rolled_back = [this](const std::string& text) { told_ += text; },
-                                .look_every = std::chrono::milliseconds(1),
-                                .now =
-                                    [this] {
-                                      ++num_looks_;
-                                      return EventLoop::Clock::time_point() + passed_.load();
-                                    }});
+          loop_,
+          UpdaterOptions{
+              .folder = folder_ / "updates",
+              .max_bytes = 1 << 20,
+              .bus_address = bus_.address(),
+              .version = "0.1.0",
+              .boot = boot_,
+              .blocking_reason = [this] { return blocking_reason_; },
+              .changed = [this] { ++num_changes_; },
+              .run_in_background = {},
+              .ended = [this](const std::string& bundle,
+                              const std::string& failure) { ended_ = bundle + ": " + failure; },
+              .rolled_back = [this](const std::string& text) { roll_backs_ += text; },
+              .look_every = std::chrono::milliseconds(1),
+              .now =
+                  [this] {
+                    ++num_looks_;
+                    return EventLoop::Clock::time_point() + passed_.load();
+                  }});
     });
   }
 
@@ -246,7 +246,7 @@ class UpdaterTest : public ::testing::Test {
   std::unique_ptr<Updater> updater_;
   int num_changes_ = 0;
   std::string blocking_reason_;
-  std::string ended_, told_;
+  std::string ended_, roll_backs_;
   std::string boot_ = "first";
   std::atomic<std::chrono::seconds> passed_{std::chrono::seconds(0)};
   std::atomic<int> num_looks_ = 0;
@@ -320,7 +320,7 @@ TEST_F(RollBackTest, TheSameStartStillNeedsItsRestart) {
     StartAs("first");
     EXPECT_TRUE(StatusNow().restart_needed);
     EXPECT_EQ(StatusNow().rolled_back, "");
-    EXPECT_EQ(told_, "");
+    EXPECT_EQ(roll_backs_, "");
   });
 }
 
@@ -331,7 +331,7 @@ TEST_F(RollBackTest, AMachineThatStartsTheSystemBeforeSaysSoUntilSomebodyHasSeen
     EXPECT_FALSE(StatusNow().restart_needed);
     EXPECT_THAT(StatusNow().rolled_back, HasSubstr("version 9.0 was installed, but"));
     EXPECT_THAT(StatusNow().rolled_back, HasSubstr("0.1.0"));
-    On([&] { EXPECT_EQ(told_, updater_->status().rolled_back) << "once"; });
+    On([&] { EXPECT_EQ(roll_backs_, updater_->status().rolled_back) << "once"; });
     On([&] { updater_.reset(); });
     StartAs("third");
     EXPECT_NE(StatusNow().rolled_back, "") << "a second restart does not hide it";

@@ -78,7 +78,7 @@ TEST_F(AsideTest, AListForSomebodyWhoIsGoneIsForNobody) {
 }
 
 TEST_F(AsideTest, TooManyListsAtOnceAreRefused) {
-  loop_->Do([&] { service_.refuse_aside = true; });
+  loop_->Do([&] { service_.refuse_background_work = true; });
   const HttpAnswer answer = engineer_->Get("/api/v1/scans");
   EXPECT_EQ(answer.status, 503);
   EXPECT_NE(answer.Header("retry-after"), "");
@@ -120,7 +120,7 @@ TEST_F(AsideTest, AnUploadGoesNoFasterThanTheDiskAndKeepsNobodyWaiting) {
 }
 
 TEST_F(AsideTest, AnUploadThatTheDiskDoesNotTakeIsRefused) {
-  loop_->Do([&] { service_.refuse_aside = true; });
+  loop_->Do([&] { service_.refuse_background_work = true; });
   HttpConnection connection(port_);
   connection.Send("POST /api/v1/update/bundles/a.raucb HTTP/1.1\r\nHost: localhost\r\nCookie: " +
                   engineer_->cookie + "\r\nX-CSRF-Token: " + engineer_->csrf_token +

@@ -126,14 +126,14 @@ TEST_F(PageCertificateTest, ANewConnectionIsShownTheNewOneAndTheLogHasBothFinger
     ASSERT_TRUE(kept_);
     EXPECT_EQ(kept_->key_pem, made.key);
     EXPECT_EQ(kept_->fingerprint, made.fingerprint);
-    const std::string told = Ask("GET", "/api/v1/certificate");
-    EXPECT_EQ(JsonOf(told)["fingerprint"], made.fingerprint);
-    EXPECT_EQ(JsonOf(told)["subject"], "CN=room 1");
-    EXPECT_EQ(JsonOf(told)["replaceable"], true);
+    const std::string certificate = Ask("GET", "/api/v1/certificate");
+    EXPECT_EQ(JsonOf(certificate)["fingerprint"], made.fingerprint);
+    EXPECT_EQ(JsonOf(certificate)["subject"], "CN=room 1");
+    EXPECT_EQ(JsonOf(certificate)["replaceable"], true);
     const std::string log = Ask("GET", "/api/v1/audit");
     EXPECT_THAT(log, HasSubstr("certificate.replace"));
     EXPECT_THAT(log, HasSubstr(before + " -> " + made.fingerprint));
-    EXPECT_THAT(told + log, Not(HasSubstr("PRIVATE"))) << "the key never comes back";
+    EXPECT_THAT(certificate + log, Not(HasSubstr("PRIVATE"))) << "the key never comes back";
   }
 }
 

@@ -260,7 +260,7 @@ TEST_F(CrowdTest, AThousandIdleConnectionsShutOutNeitherThisMachineNorTheLoggedI
   EXPECT_EQ(stranger.Read().status, 200) << "somebody who wants to log in";
   EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(5))
       << "at once, not when the idle ones have timed out";
-  loop_->Do([&] { service_.Tell(web::EventKind::kData); });
+  loop_->Do([&] { service_.Notify(web::EventKind::kData); });
   EXPECT_FALSE(stream.ReadUntil("event: data").empty()) << "the stream stays";
 }
 
@@ -383,8 +383,8 @@ TEST_F(TlsTest, TheCertificateHasTheNamesAndTheFingerprintThatAreTold) {
                             .c_str()),
             0);
   std::ifstream in(folder_ / "fingerprint");
-  const std::string told((std::istreambuf_iterator<char>(in)), {});
-  EXPECT_THAT(told, HasSubstr("=" + identity_.fingerprint));
+  const std::string reported((std::istreambuf_iterator<char>(in)), {});
+  EXPECT_THAT(reported, HasSubstr("=" + identity_.fingerprint));
   EXPECT_EQ(identity_.fingerprint.size(), 95U);
   const std::string request =
       "GET /api/v1/session HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";

@@ -38,13 +38,13 @@ TEST_F(StreamTest, ManyChangesInAShortTimeAreSentTogether) {
   HttpConnection stream = OpenStream(client);
   stream.ReadUntil("\n\n");
   loop_->Do([&] {
-    for (int i = 0; i < 1000; ++i) service_.Tell(web::EventKind::kProgress);
-    service_.Tell(web::EventKind::kData);
+    for (int i = 0; i < 1000; ++i) service_.Notify(web::EventKind::kProgress);
+    service_.Notify(web::EventKind::kData);
   });
   const std::string until_data = stream.ReadUntil("event: data");
   loop_->Do([&] {
     service_.status.fault = "end of test";
-    service_.Tell(web::EventKind::kStatus);
+    service_.Notify(web::EventKind::kStatus);
   });
   const std::string text = until_data + stream.ReadUntil("end of test");
   std::size_t count = 0;
@@ -105,14 +105,14 @@ TEST_F(StreamTest, AViewerThatNeverReadsIsDroppedAndCostsNobodyAnything) {
   for (int i = 0; i < 400; ++i) {
     loop_->Do([&] {
       service_.status.fault = std::string(8000, 'x') + std::to_string(i);
-      for (int j = 0; j < 50; ++j) service_.Tell(web::EventKind::kData);
+      for (int j = 0; j < 50; ++j) service_.Notify(web::EventKind::kData);
     });
     reader.ReadUntil("event: data");
   }
   const auto is_dropped = [&] {
     int count = 0;
     loop_->Do([&] {
-      for (int j = 0; j < 2000; ++j) service_.Tell(web::EventKind::kResult);
+      for (int j = 0; j < 2000; ++j) service_.Notify(web::EventKind::kResult);
       ++count;
     });
     return count;
