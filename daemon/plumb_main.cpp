@@ -91,24 +91,23 @@ int Main(int argc, char** argv) {
   add("mesh", "Export the surface of a scene as PLY, STL or OBJ", AddMesh);
   add("info", "Describe a recording, a scene or a result", AddInfo);
   add("evaluate",
-      "Measure the accuracy on a suite of recordings with truth, beside the paper's table",
+      "Measure the accuracy on a suite of recordings with truth, and show the paper's table",
       AddEvaluate);
   add("record", "Record from the attached sensor, or from a virtual one", AddRecord);
   add("markers", "Draw printable sheets of markers at true size", AddMarkers);
-  add("doctor",
-      "Report what is attached, permitted and configured, and what to do about what is not",
-      AddDoctor);
-  add("status", "What a running plumbd does: state, sensor, scan, last result", AddStatus);
+  add("doctor", "Check what is attached, permitted and configured, with advice", AddDoctor);
+  add("status", "Show the status of a running plumbd: state, sensor, scan, last result", AddStatus);
   add("press", "Press the button of a running plumbd", AddPress);
-  add("watch", "Print the events of a running plumbd, one JSON object a line", AddWatch);
-  add("sim", "Plug, unplug, stall or move on the virtual sensor of a running plumbd", AddSim);
+  add("watch", "Print the events of a running plumbd, one JSON object per line", AddWatch);
+  add("sim", "Plug, unplug, stall or advance the virtual sensor of a running plumbd", AddSim);
   add("update", "Install a bundle on the machine of a running plumbd, and restart it", AddUpdate);
 #ifdef PLUMB_WITH_APPLIANCE
-  add("backup", "Copy what plumbd stores: database, scans, calibrations; also while it runs",
+  add("backup", "Back up the data of plumbd: database, scans, calibrations; also while it runs",
       AddBackup);
-  add("restore", "Make a state folder of a backup, after checking every file of it", AddRestore);
-  add("export-patient", "Copy one patient out of a state folder or a backup", AddExportPatient);
-  add("import-patient", "Add an exported patient to a state folder", AddImportPatient);
+  add("restore", "Restore a state folder from a backup, after checking every file of it",
+      AddRestore);
+  add("export-patient", "Export one patient from a state folder or a backup", AddExportPatient);
+  add("import-patient", "Import an exported patient into a state folder", AddImportPatient);
   add("factory-reset", "Reset plumbd's stored data to the state of delivery", AddFactoryReset);
 #endif
 

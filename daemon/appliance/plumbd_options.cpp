@@ -33,43 +33,43 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
   app.set_version_flag("--version", fmt::format("plumbd {}", Version()),
                        "Print the version and exit");
   app.add_option("--config", options.config_file,
-                 "Configuration, as TOML; default: /etc/plumb/plumb.toml where it exists")
+                 "Configuration, as TOML; default: /etc/plumb/plumb.toml if it exists")
       ->type_name("FILE");
   app.add_flag("--check-config", options.check_config,
-               "Check the configuration, say what is wrong with it, and exit");
+               "Check the configuration, report errors, and exit");
   app.add_flag("--show-stopped", options.show_stopped,
                "Only drive the light, with the pattern for a service that is not running, until "
                "SIGTERM");
   app.add_option("--provision", options.provision,
-                 "Take serial number, name, network and certificate of this unit from a file, and "
+                 "Apply serial number, name, network and certificate of this unit from a file, and "
                  "exit")
       ->type_name("FILE");
-  app.add_option("--unit", options.unit, "Where --provision keeps them")
+  app.add_option("--unit", options.unit, "Folder in which --provision stores them")
       ->type_name("DIR")
       ->capture_default_str();
   app.add_option("--simulated", options.simulated,
-                 "With a virtual sensor that plays the scenes of a simulated suite")
+                 "Use a virtual sensor that plays the scenes of a simulated suite")
       ->check(CLI::IsMember({"demo", "nine", "patient"}))
       ->type_name("demo|nine|patient");
   app.add_option("--state", options.state, "Folder of database, scans and results")
       ->type_name("DIR");
-  app.add_option("--listen", options.listen, "Where the page is served")->type_name("ADDRESS:PORT");
+  app.add_option("--listen", options.listen, "Address of the page")->type_name("ADDRESS:PORT");
   app.add_option("--control", options.control, "Control socket")->type_name("SOCK");
-  app.add_option("--sim-frames", options.sim_frames, "Frames of a simulated sweep, 30 a second")
+  app.add_option("--sim-frames", options.sim_frames, "Frames of a simulated sweep, 30 per second")
       ->check(CLI::Range(2, 20000))
       ->group("Virtual sensor");
-  app.add_option("--sim-size", options.sim_size, "Of its images")
+  app.add_option("--sim-size", options.sim_size, "Size of its images")
       ->check(CLI::IsMember({"640x480", "320x240"}))
       ->group("Virtual sensor");
-  app.add_option("--sim-seed", options.sim_seed, "Of its scenes and noise")
+  app.add_option("--sim-seed", options.sim_seed, "Seed of its scenes and noise")
       ->group("Virtual sensor");
-  app.add_option("--sim-scenes", options.sim_scenes, "Only so many of the suite's scenes; 0: all")
+  app.add_option("--sim-scenes", options.sim_scenes, "Number of the suite's scenes; 0: all")
       ->check(CLI::Range(0, 1000))
       ->group("Virtual sensor");
   app.add_flag("--sim-board", options.sim_board,
-               "Three scenes of the board of the room's calibration come first")
+               "Start with three scenes of the room calibration board")
       ->group("Virtual sensor");
-  app.add_flag("--sim-unplugged", options.sim_unplugged, "It is not attached at the start")
+  app.add_flag("--sim-unplugged", options.sim_unplugged, "The sensor is not attached at the start")
       ->group("Virtual sensor");
   app.footer(fmt::format("\n{}", kResearchNotice));
 }

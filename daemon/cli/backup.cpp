@@ -114,11 +114,12 @@ int Restore(const Options& options, const CommandContext& context) {
 Command AddBackup(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("folder", options->folder,
-                 "Where the backup is made; an older backup there is replaced")
+                 "Folder of the backup; an older backup there is replaced")
       ->required()
       ->type_name("FOLDER");
-  app.add_option("--state", options->state,
-                 "State folder that no plumbd uses; without it a running plumbd makes the backup")
+  app.add_option(
+         "--state", options->state,
+         "State folder that no plumbd is using; without it a running plumbd makes the backup")
       ->type_name("DIR");
   AddKeyFile(app, *options,
              "Encrypt with the key in this file: one line, a passphrase or a random key. A running "
@@ -132,7 +133,7 @@ Command AddRestore(CLI::App& app) {
   app.add_option("--state", options->state,
                  "State folder, missing or empty; default: the one of the configuration")
       ->type_name("DIR");
-  AddKeyFile(app, *options, "Of an encrypted backup: the file with its key");
+  AddKeyFile(app, *options, "File with the key of an encrypted backup");
   return [options](const CommandContext& context) { return Restore(*options, context); };
 }
 

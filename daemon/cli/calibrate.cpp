@@ -63,8 +63,9 @@ int Run(const Options& options, const CommandContext& context) {
 
 Command AddCalibrate(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("recordings", options->recordings,
-                 "Ordinary sweeps by one sensor unit over any scenes with markers; better several")
+  app.add_option(
+         "recordings", options->recordings,
+         "Ordinary sweeps by one sensor unit over any scenes with markers; several are better")
       ->required()
       ->type_name("RECORDING");
   app.add_option("--out", options->out, "Profile to write")->required()->type_name("PROFILE");

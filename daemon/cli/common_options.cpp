@@ -14,7 +14,7 @@ namespace plumb {
 
 void MethodOptions::AddTo(CLI::App& app) {
   app.add_option("--preset", preset,
-                 "best: whatever measures best (default); paper: the method as published")
+                 "best: the most accurate method (default); paper: the method as published")
       ->check(CLI::IsMember({"best", "paper"}))
       ->type_name("best|paper");
   app.add_option("--config", config_file, "Options of the method, as TOML")->type_name("FILE");
@@ -22,7 +22,7 @@ void MethodOptions::AddTo(CLI::App& app) {
 
 void MethodOptions::AddSensorTo(CLI::App& app) {
   app.add_option("--sensor-profile", profile_file,
-                 "What plumb calibrate learned of this sensor unit")
+                 "Profile of this sensor unit, from plumb calibrate")
       ->type_name("PROFILE");
 }
 

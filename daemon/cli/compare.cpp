@@ -93,7 +93,7 @@ Command AddCompare(CLI::App& app) {
   app.add_flag("--paper-colours", options->paper_colors,
                "Draw the error map on the paper's scale: |e|, blue at 0 to red at 10 cm");
   app.add_flag("--json", options->json, "Print result.json on the standard output");
-  app.footer("\nExit code 4 with the verdict no_answer: the result is written and says why.");
+  app.footer("\nExit code 4 with the verdict no_answer: the result is written and states why.");
   return [options](const CommandContext& context) { return Run(*options, context); };
 }
 

@@ -250,7 +250,7 @@ Command AddSim(CLI::App& app) {
     std::vector<std::string> words;
   };
   auto options = std::make_shared<Options>();
-  app.add_option("action", options->action, "What happens to the virtual sensor")
+  app.add_option("action", options->action, "Command to the virtual sensor")
       ->required()
       ->check(CLI::IsMember(
           {"plug", "unplug", "stall", "resume", "error", "next-scene", "glitch", "speed"}));

@@ -176,16 +176,16 @@ Command AddDoctor(CLI::App& app) {
   };
   auto options = std::make_shared<Options>();
   app.add_option("--config", options->config,
-                 fmt::format("Of the appliance; default {}", kDefaultConfig))
+                 fmt::format("Configuration of the appliance; default {}", kDefaultConfig))
       ->type_name("FILE");
   app.add_flag("--json", options->json, "Print JSON on the standard output");
   app.add_option("--burn-in", options->burn_in_min,
-                 "Then work the machine for so long: scans of a simulated body again and again, "
-                 "memory and disk; each round must give the same bits")
+                 "Then run a load test of this duration: repeated scans of a simulated body, "
+                 "memory and disk; every round must give the same bits")
       ->check(CLI::Range(0.01, 10080.0))
       ->type_name("MINUTES");
   app.add_option("--burn-in-folder", options->burn_in_folder,
-                 "On the disk that the burn-in writes to; default: the state folder")
+                 "Folder on the disk to be tested; default: the state folder")
       ->type_name("DIR");
   return [options](const CommandContext& context) {
     DoctorReport report;

@@ -83,7 +83,7 @@ int Run(const Options& options, const CommandContext& context) {
 Command AddEvaluate(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("suite", options->suite,
-                 "Suite folder: recordings/, truth/ and, mostly, suite.json")
+                 "Suite folder: recordings/, truth/ and usually suite.json")
       ->required()
       ->type_name("SUITE_DIR");
   app.add_option("--out", options->out,
@@ -92,7 +92,7 @@ Command AddEvaluate(CLI::App& app) {
   options->method.AddTo(app);
   options->method.AddSensorTo(app);
   app.add_flag("--reuse", options->reuse,
-               "Keep the scenes that an earlier run left in the folder instead of reconstructing "
+               "Use the scenes of an earlier run in the folder instead of reconstructing "
                "them again");
   app.add_flag("--results", options->results, "Write the result folder of every pair too");
   app.add_flag("--json", options->json, "Print the figures as JSON on the standard output");

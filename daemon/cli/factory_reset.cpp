@@ -32,8 +32,8 @@ int Reset(const Options& options) {
                          ? "every patient, reference, scan, account and setting, and the log"
                          : "all accounts, paired displays, settings and keys of the page";
   if (!options.yes)
-    throw std::invalid_argument(fmt::format("this removes {} in {}: give --yes if you mean it",
-                                            what, options.state.string()));
+    throw std::invalid_argument(
+        fmt::format("this removes {} in {}: confirm with --yes", what, options.state.string()));
   RequestFactoryReset(options.state,
                       options.wipe ? web::FactoryReset::kWipe : web::FactoryReset::kKeepRecords,
                       {.user = "command line", .address = {}});
@@ -52,7 +52,7 @@ Command AddFactoryReset(CLI::App& app) {
   app.add_option("--state", options->state, "State folder of plumbd")
       ->type_name("DIR")
       ->capture_default_str();
-  app.add_flag("--yes", options->yes, "It is meant so");
+  app.add_flag("--yes", options->yes, "Confirm the reset");
   return [options](const CommandContext&) { return Reset(*options); };
 }
 

@@ -62,16 +62,17 @@ Command AddMarkers(CLI::App& app) {
   app.add_option("--length", options->sheet.length_m, "Side of the black square, metres")
       ->capture_default_str()
       ->type_name("M");
-  CLI::Option* paper = app.add_option("--paper", options->sheet.paper, "Of the sheets, upright")
-                           ->check(CLI::IsMember({"A4", "A3"}))
-                           ->capture_default_str()
-                           ->type_name("A4|A3");
+  CLI::Option* paper =
+      app.add_option("--paper", options->sheet.paper, "Paper size of the sheets, upright")
+          ->check(CLI::IsMember({"A4", "A3"}))
+          ->capture_default_str()
+          ->type_name("A4|A3");
   app.add_flag("--board", options->sheet.is_board,
                "One sheet for the room's calibration: the dictionary's last four markers around a "
-               "cross for the lasers; on A4 where it fits, else on A3")
+               "cross for the lasers; on A4 if it fits, otherwise on A3")
       ->excludes(ids)
       ->excludes(paper);
-  app.add_option("--out", options->out, "File to write; SVG has one file a page")
+  app.add_option("--out", options->out, "File to write; SVG has one file per page")
       ->required()
       ->check([](const std::string& name) {
         const std::string extension = fs::path(name).extension().string();

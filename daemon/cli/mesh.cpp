@@ -34,7 +34,7 @@ int Run(const Options& options) {
 Command AddMesh(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("scene", options->scene, "Scene folder")->required()->type_name("SCENE");
-  app.add_option("--out", options->out, "File to write; its ending says the format")
+  app.add_option("--out", options->out, "File to write; its extension selects the format")
       ->required()
       ->type_name("FILE.ply|.stl|.obj");
   return [options](const CommandContext&) { return Run(*options); };

@@ -53,11 +53,11 @@ int Import(const Options& options, const CommandContext& context) {
 Command AddExportPatient(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("code", options->code, "The patient's code")->required()->type_name("CODE");
-  app.add_option("folder", options->folder, "Where the export is made; an older one is replaced")
+  app.add_option("folder", options->folder, "Folder of the export; an older one is replaced")
       ->required()
       ->type_name("FOLDER");
   app.add_option("--state", options->state,
-                 "State folder that no plumbd uses, or a backup that is not encrypted")
+                 "State folder that no plumbd is using, or a backup that is not encrypted")
       ->required()
       ->type_name("DIR");
   app.add_option("--key-file", options->key_file, "Encrypt with the key in this file")
@@ -68,10 +68,10 @@ Command AddExportPatient(CLI::App& app) {
 Command AddImportPatient(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("folder", options->folder, "The export")->required()->type_name("FOLDER");
-  app.add_option("--state", options->state, "State folder that no plumbd uses")
+  app.add_option("--state", options->state, "State folder that no plumbd is using")
       ->required()
       ->type_name("DIR");
-  app.add_option("--key-file", options->key_file, "Of an encrypted export: the file with its key")
+  app.add_option("--key-file", options->key_file, "File with the key of an encrypted export")
       ->type_name("FILE");
   return [options](const CommandContext& context) { return Import(*options, context); };
 }

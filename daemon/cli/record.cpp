@@ -192,7 +192,8 @@ Command AddRecord(CLI::App& app) {
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str()
       ->type_name("S");
-  app.add_option("--serial", options->serial, "Of the sensor, where several are attached")
+  app.add_option("--serial", options->serial,
+                 "Serial number of the sensor, if several are attached")
       ->type_name("SERIAL");
   app.add_option("--calibration", options->calibration,
                  "Folder of the sensors' calibrations, SERIAL.yaml")

@@ -99,7 +99,7 @@ Command AddSimulate(CLI::App& app) {
   app.add_option("--out", simulate.out, "Suite folder to write: recordings/, truth/, suite.json")
       ->required()
       ->type_name("DIR");
-  app.add_option("--seed", simulate.seed, "Of room, body, placements and hand")
+  app.add_option("--seed", simulate.seed, "Seed of room, body, placements and sweep")
       ->capture_default_str()
       ->type_name("N");
   app.add_option(
@@ -119,23 +119,23 @@ Command AddSimulate(CLI::App& app) {
   app.footer(FaultList());
   app.add_option(
          "--format", options->format,
-         "Of the recordings: folders in the TUM RGB-D layout, or lossless .oni files of OpenNI2")
+         "Format of the recordings: folders in the TUM RGB-D layout, or lossless .oni files")
       ->check(CLI::IsMember({"tum", "oni"}))
       ->capture_default_str()
       ->type_name("tum|oni");
-  app.add_option("--noise", options->noise, "Of sensor, calibration and hand")
+  app.add_option("--noise", options->noise, "Noise level of sensor, calibration and sweep")
       ->check(CLI::IsMember({"ideal", "nominal", "hard"}))
       ->capture_default_str()
       ->type_name("ideal|nominal|hard");
-  app.add_option("--frames", simulate.frames, "Frames a scene")
+  app.add_option("--frames", simulate.frames, "Frames per scene")
       ->check(CLI::Range(2, 10000))
       ->capture_default_str()
       ->type_name("N");
-  app.add_option("--rate", simulate.rate_hz, "Frames a second")
+  app.add_option("--rate", simulate.rate_hz, "Frames per second")
       ->check(CLI::Range(1.0, 120.0))
       ->capture_default_str()
       ->type_name("HZ");
-  app.add_option("--size", options->size, "Of the images")
+  app.add_option("--size", options->size, "Size of the images")
       ->check(CLI::IsMember({"640x480", "320x240"}))
       ->capture_default_str()
       ->type_name("640x480|320x240");
