@@ -9,7 +9,7 @@
 #include "drivers/openni/openni_provider.hpp"
 #include "drivers/program_folders.hpp"
 #ifdef PLUMB_WITH_USB
-#include "drivers/usb/usb_watcher.hpp"
+#include "drivers/usb/usb_sensors.hpp"
 #endif
 
 namespace plumb {
@@ -31,12 +31,12 @@ class OpenNiSetup : public SensorSetup {
 void ExamineUsb(std::vector<SensorFinding>& findings) {
 #ifdef PLUMB_WITH_USB
   try {
-    const UsbWatcher watcher;
-    if (watcher.sensors().empty()) {
+    const std::vector<UsbSensor> sensors = ListUsbSensors();
+    if (sensors.empty()) {
       findings.push_back({State::kNote, "USB", "no sensor of the Xtion or Carmine kind (1d27:*)",
                           "plug one in; its own lamp must light up"});
     }
-    for (const UsbSensor& sensor : watcher.sensors()) {
+    for (const UsbSensor& sensor : sensors) {
       const std::string found = fmt::format(
           "{} {:04x}:{:04x} at bus {} address {}{}{}", sensor.model, sensor.vendor, sensor.product,
           sensor.bus, sensor.address, sensor.speed.empty() ? "" : ", ", sensor.speed);
@@ -49,7 +49,7 @@ void ExamineUsb(std::vector<SensorFinding>& findings) {
         {State::kNote, "USB", error.what(), "sensors are found through OpenNI2 all the same"});
   }
 #else
-  findings.push_back({State::kNote, "USB", "this build does not watch the bus",
+  findings.push_back({State::kNote, "USB", "this build cannot examine the bus",
                       "build with PLUMB_WITH_USB for permissions and speeds"});
 #endif
 }

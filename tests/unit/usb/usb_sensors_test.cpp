@@ -1,10 +1,9 @@
 // libusb itself on an emulated bus (umockdev).
-#include "drivers/usb/usb_watcher.hpp"
+#include "drivers/usb/usb_sensors.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <poll.h>
 #include <umockdev.h>
 
 #include <array>
@@ -20,7 +19,6 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
-using Clock = std::chrono::steady_clock;
 
 constexpr std::array<unsigned char, 18> kHubDescriptor{0x12, 0x01, 0x00, 0x02, 0x09, 0x00,
                                                        0x01, 0x40, 0x6b, 0x1d, 0x02, 0x00,
@@ -36,7 +34,7 @@ std::string SensorDescriptors(unsigned char vendor_low, unsigned char product_lo
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-class UsbWatcherTest : public ::testing::Test {
+class UsbSensorsTest : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!testing::UnderUmockdev())
@@ -80,64 +78,43 @@ class UsbWatcherTest : public ::testing::Test {
     umockdev_testbed_remove_device(testbed_, path.c_str());
   }
 
-  /// Waits as the loop does, on the file descriptors alone.
-  static bool Until(UsbWatcher& watcher, const std::function<bool()>& condition) {
-    const auto limit = Clock::now() + std::chrono::seconds(20);
-    while (!condition()) {
-      std::vector<pollfd> fds = watcher.fds();
-      if (::poll(fds.data(), fds.size(), 1000) > 0) watcher.Dispatch();
-      if (Clock::now() > limit) return false;
-    }
-    return true;
-  }
-
   UMockdevTestbed* testbed_ = nullptr;
   gchar* hub_ = nullptr;
 };
 
-TEST_F(UsbWatcherTest, SeesSensorsComeAndGo) {
-  UsbWatcher watcher;
-  int changes = 0;
-  watcher.SetListener([&] { ++changes; });
-  EXPECT_TRUE(watcher.sensors().empty());
+TEST_F(UsbSensorsTest, ListsWhatIsAttachedNow) {
+  EXPECT_TRUE(ListUsbSensors().empty());
   for (int round = 0; round < 2; ++round) {
     const std::string path = Plug(2 + round);
-    ASSERT_TRUE(Until(watcher, [&] { return watcher.sensors().size() == 1; }));
-    EXPECT_EQ(watcher.sensors()[0].model, "Xtion Pro Live");
-    EXPECT_EQ(watcher.sensors()[0].product, 0x0601);
-    EXPECT_EQ(watcher.sensors()[0].speed, "480 Mbit/s");
-    EXPECT_GT(changes, 2 * round);
+    const std::vector<UsbSensor> sensors = ListUsbSensors();
+    ASSERT_EQ(sensors.size(), 1U);
+    EXPECT_EQ(sensors[0].address, 2 + round);
+    EXPECT_EQ(sensors[0].model, "Xtion Pro Live");
+    EXPECT_EQ(sensors[0].product, 0x0601);
+    EXPECT_EQ(sensors[0].speed, "480 Mbit/s");
     Unplug(path);
-    ASSERT_TRUE(Until(watcher, [&] { return watcher.sensors().empty(); }));
+    EXPECT_TRUE(ListUsbSensors().empty());
   }
 }
 
-TEST_F(UsbWatcherTest, KnowsWhatWasThereBefore) {
-  (void)Plug(2);
-  const UsbWatcher watcher;
-  ASSERT_EQ(watcher.sensors().size(), 1U);
-  EXPECT_EQ(watcher.sensors()[0].address, 2);
+TEST_F(UsbSensorsTest, ADeviceNodeThatCannotBeOpenedIsDiagnosed) {
+  (void)Plug(2);  // its device node does not exist, so it cannot be opened
+  const std::vector<UsbSensor> sensors = ListUsbSensors();
+  ASSERT_EQ(sensors.size(), 1U);
+  EXPECT_EQ(sensors[0].permitted, false);
+  EXPECT_THAT(sensors[0].problems, Contains(HasSubstr("udev rule")));
 }
 
-TEST_F(UsbWatcherTest, ADeviceNodeThatCannotBeOpenedIsDiagnosed) {
-  (void)Plug(2);  // its device node exists only on paper: nobody may open it
-  const UsbWatcher watcher;
-  ASSERT_EQ(watcher.sensors().size(), 1U);
-  EXPECT_EQ(watcher.sensors()[0].permitted, false);
-  EXPECT_THAT(watcher.sensors()[0].problems, Contains(HasSubstr("udev rule")));
-}
-
-TEST_F(UsbWatcherTest, ASlowPortIsDiagnosed) {
+TEST_F(UsbSensorsTest, ASlowPortIsDiagnosed) {
   (void)Plug(2, "12");
-  const UsbWatcher watcher;
-  ASSERT_EQ(watcher.sensors().size(), 1U);
-  EXPECT_THAT(watcher.sensors()[0].problems, Contains(HasSubstr("12 Mbit/s only")));
+  const std::vector<UsbSensor> sensors = ListUsbSensors();
+  ASSERT_EQ(sensors.size(), 1U);
+  EXPECT_THAT(sensors[0].problems, Contains(HasSubstr("12 Mbit/s only")));
 }
 
-TEST_F(UsbWatcherTest, OtherDevicesAreNotSensors) {
+TEST_F(UsbSensorsTest, OtherDevicesAreNotSensors) {
   (void)Plug(2, "480", 0x50);
-  const UsbWatcher watcher;
-  EXPECT_TRUE(watcher.sensors().empty());
+  EXPECT_TRUE(ListUsbSensors().empty());
 }
 
 TEST(UsbModelTest, NamesTheFamily) {

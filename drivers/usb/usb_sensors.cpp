@@ -1,0 +1,128 @@
+#include "drivers/usb/usb_sensors.hpp"
+
+#include <libusb.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <tuple>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+
+namespace plumb {
+namespace {
+
+constexpr std::uint16_t kPrimeSense = 0x1d27;
+
+struct Model {
+  std::uint16_t product;
+  std::string_view name;
+};
+constexpr std::array kModels{Model{0x0200, "PrimeSense device"},
+                             Model{0x0500, "PrimeSense sensor"},
+                             Model{0x0600, "Xtion"},
+                             Model{0x0601, "Xtion Pro Live"},
+                             Model{0x0609, "Carmine"},
+                             Model{0x1250, "PSLink sensor"},
+                             Model{0x1260, "PSLink sensor"},
+                             Model{0x1270, "PSLink sensor"},
+                             Model{0x1280, "PSLink sensor"}};
+
+std::string SpeedText(int speed) {
+  switch (speed) {
+    case LIBUSB_SPEED_LOW:
+      return "1.5 Mbit/s";
+    case LIBUSB_SPEED_FULL:
+      return "12 Mbit/s";
+    case LIBUSB_SPEED_HIGH:
+      return "480 Mbit/s";
+    case LIBUSB_SPEED_SUPER:
+      return "5 Gbit/s";
+    case LIBUSB_SPEED_SUPER_PLUS:
+      return "10 Gbit/s";
+    default:
+      return "";
+  }
+}
+
+/// True if a hub above the device, or its controller, is USB 3.
+bool BehindUsb3(libusb_device* device) {
+  for (libusb_device* hub = libusb_get_parent(device); hub != nullptr;
+       hub = libusb_get_parent(hub)) {
+    libusb_device_descriptor descriptor{};
+    if (libusb_get_device_speed(hub) >= LIBUSB_SPEED_SUPER) return true;
+    if (libusb_get_device_descriptor(hub, &descriptor) == 0 && descriptor.bcdUSB >= 0x0300)
+      return true;
+  }
+  return false;
+}
+
+UsbSensor Describe(libusb_device* device, const libusb_device_descriptor& descriptor) {
+  UsbSensor sensor;
+  sensor.bus = libusb_get_bus_number(device);
+  sensor.address = libusb_get_device_address(device);
+  sensor.vendor = descriptor.idVendor;
+  sensor.product = descriptor.idProduct;
+  sensor.model = UsbSensorModel(sensor.vendor, sensor.product).value_or("");
+  const int speed = libusb_get_device_speed(device);
+  sensor.speed = SpeedText(speed);
+  const std::string node = fmt::format("/dev/bus/usb/{:03}/{:03}", sensor.bus, sensor.address);
+  sensor.permitted = ::access(node.c_str(), R_OK | W_OK) == 0;
+  if (!sensor.permitted) {
+    sensor.problems.push_back(
+        fmt::format("no permission for {}: install Plumb's udev rule (or the package "
+                    "libopenni2-0), put the user into the group plumb, and plug the "
+                    "sensor in again",
+                    node));
+  }
+  if (speed == LIBUSB_SPEED_LOW || speed == LIBUSB_SPEED_FULL) {
+    sensor.problems.push_back(fmt::format(
+        "it runs at {} only, too slow for images: use another port or cable, without a hub",
+        sensor.speed));
+  }
+  if (BehindUsb3(device)) {
+    sensor.problems.push_back(
+        "it is on a USB 3 controller: old Xtion firmware fails there (no device, or set_interface "
+        "errors); if so use a USB 2 port, or update the firmware");
+  }
+  return sensor;
+}
+
+}  // namespace
+
+std::optional<std::string> UsbSensorModel(std::uint16_t vendor, std::uint16_t product) {
+  if (vendor != kPrimeSense) return std::nullopt;
+  const auto found = std::find_if(kModels.begin(), kModels.end(),
+                                  [&](const Model& model) { return model.product == product; });
+  return found == kModels.end() ? "unknown PrimeSense device" : std::string(found->name);
+}
+
+std::vector<UsbSensor> ListUsbSensors() {
+  libusb_context* context = nullptr;
+  if (const int status = libusb_init(&context); status != 0)
+    throw DeviceError(fmt::format("libusb does not start: {}", libusb_error_name(status)));
+  libusb_device** devices = nullptr;
+  const ssize_t count = libusb_get_device_list(context, &devices);
+  std::vector<UsbSensor> sensors;
+  for (ssize_t i = 0; i < count; ++i) {
+    libusb_device_descriptor descriptor{};
+    if (libusb_get_device_descriptor(devices[i], &descriptor) == 0 &&
+        descriptor.idVendor == kPrimeSense)
+      sensors.push_back(Describe(devices[i], descriptor));
+  }
+  if (count >= 0) libusb_free_device_list(devices, /*unref_devices=*/1);
+  libusb_exit(context);
+  if (count < 0) {
+    throw DeviceError(
+        fmt::format("libusb cannot list the bus: {}", libusb_error_name(static_cast<int>(count))));
+  }
+  std::sort(sensors.begin(), sensors.end(), [](const UsbSensor& a, const UsbSensor& b) {
+    return std::tie(a.bus, a.address) < std::tie(b.bus, b.address);
+  });
+  return sensors;
+}
+
+}  // namespace plumb

@@ -1,0 +1,31 @@
+// Lists the sensors of the Xtion class on the USB bus, and whether this user may open them. Their
+// images, plugging and unplugging are handled by the sensor drivers.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace plumb {
+
+struct UsbSensor {
+  int bus = 0;
+  int address = 0;
+  std::uint16_t vendor = 0;
+  std::uint16_t product = 0;
+  std::string model;                  ///< For example "Xtion Pro Live".
+  std::string speed;                  ///< For example "480 Mbit/s"; empty if unknown.
+  bool permitted = true;              ///< This user may open it.
+  std::vector<std::string> problems;  ///< Actual and possible obstacles, each with a remedy.
+  bool operator==(const UsbSensor&) const = default;
+};
+
+/// Models by USB id (1d27:*); nothing for other devices.
+[[nodiscard]] std::optional<std::string> UsbSensorModel(std::uint16_t vendor,
+                                                        std::uint16_t product);
+
+/// Attached sensors by bus and address. @throws DeviceError if libusb cannot list the bus.
+[[nodiscard]] std::vector<UsbSensor> ListUsbSensors();
+
+}  // namespace plumb
