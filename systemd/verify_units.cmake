@@ -4,7 +4,7 @@ string(REGEX MATCHALL "[^\n]*(Unknown|Failed to parse|Invalid|ignoring)[^\n]*" c
 if(complaints)
   message(FATAL_ERROR "${complaints}")
 endif()
-# Nobody with a shell may be near: neither the service nor its socket may ever give up.
+# There may be no administrator nearby: neither the service nor its socket may ever give up.
 file(STRINGS ${UNIT} unlimited REGEX "^StartLimitIntervalSec=0$")
 file(STRINGS ${SOCKET} socket_unlimited REGEX "^TriggerLimitIntervalSec=0$")
 if(NOT unlimited OR NOT socket_unlimited)

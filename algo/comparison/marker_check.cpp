@@ -64,8 +64,9 @@ class Checker {
                                 : MarkerCheckStatus::kNoBaseline;
     if (check_.status == MarkerCheckStatus::kNoBaseline) {
       check_.reasons.push_back(
-          "there is no baseline yet: somebody who knows that the markers lie right takes this "
-          "check as the baseline");
+          "there is no baseline yet: if the markers are known to be in place, set this check as "
+          "the "
+          "baseline");
     }
     return std::move(check_);
   }

@@ -35,7 +35,7 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
   result_timer_ =
       loop_.MakeTimer("result expired", [this] { (void)Handle(ScanEvent::kResultExpired); });
   limit_timer_ = loop_.MakeTimer("longest sweep", [this] {
-    Log(LogLevel::kNotice, "the longest sweep is over", {{"SCAN", scan_.id}});
+    Log(LogLevel::kNotice, "the sweep has reached its longest duration", {{"SCAN", scan_.id}});
     (void)Handle(ScanEvent::kSweepComplete);
   });
   session_timer_ = loop_.MakeTimer("session unused", [this] { OnSessionTimer(); });
@@ -68,7 +68,7 @@ void Appliance::WatchButton() {
       parts_.button->Dispatch(Button::Clock::now());
       ArmButtonTimer();
     } catch (const DeviceError& error) {
-      Log(LogLevel::kError, fmt::format("the button is gone: {}", error.what()));
+      Log(LogLevel::kError, fmt::format("the button does not work any more: {}", error.what()));
       button_source_ = {};
     }
   };

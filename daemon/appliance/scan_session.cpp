@@ -91,7 +91,7 @@ void ScanSession::Run(const std::stop_token& stop) {
           {.status = MarkerCheckStatus::kFailed, .items = {}, .reasons = {error.what()}}};
   } catch (const std::bad_alloc&) {
     outcome_.kind = ScanOutcome::Kind::kFailed;
-    outcome_.reason = "out of memory: sweep a shorter way, or close what else runs";
+    outcome_.reason = "out of memory: make a shorter sweep, or close other programs";
   } catch (const std::exception& error) {
     outcome_.kind = ScanOutcome::Kind::kFailed;
     outcome_.reason = Explain(error);

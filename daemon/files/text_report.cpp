@@ -65,7 +65,7 @@ std::string CorrectionTable(const Correction& correction, const CompareOptions& 
 }
 
 std::string TrustLines(const Comparison& comparison) {
-  std::string text = "\nWhy trust it\n\n";
+  std::string text = "\nScan quality\n\n";
   if (const auto& alignment = comparison.alignment) {
     text += fmt::format("  markers          {} matched ({}), RMS {:.2f} mm\n",
                         alignment->markers_used.size(), fmt::join(alignment->markers_used, ", "),

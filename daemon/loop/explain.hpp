@@ -12,11 +12,10 @@ namespace plumb {
 /// and exhausted memory as "std::bad_alloc", without naming the resource.
 inline std::string Explain(const std::exception& error) {
   if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr)
-    return "memory is used up: close what else runs, or raise the limit (MemoryMax)";
+    return "out of memory: close other programs, or raise the limit (MemoryMax)";
   const auto* system = dynamic_cast<const std::system_error*>(&error);
   if (system != nullptr && system->code() == std::errc::resource_unavailable_try_again)
-    return "the machine gives plumbd no further thread: memory or the number of threads (TasksMax) "
-           "is used up";
+    return "cannot start a thread: memory or the number of threads (TasksMax) is exhausted";
   return error.what();
 }
 

@@ -99,7 +99,7 @@ std::string ThinnedFeed::Warning() const {
   if (num_left_out_ == 0) return {};
   return fmt::format(
       "the computer was too slow: {} of {} frames were left out evenly; sweep more slowly, and "
-      "close what else runs on it",
+      "close other programs on it",
       num_left_out_, num_left_out_ + num_taken_);
 }
 

@@ -123,7 +123,7 @@ void GpioButton::Dispatch(Clock::time_point now) {
     if (::poll(&wait, 1, 0) <= 0) break;
     gpiod_line_event event{};
     if ((wait.revents & POLLIN) == 0 || gpiod_line_event_read(impl_->line, &event) != 0)
-      throw DeviceError(fmt::format("{} is gone", impl_->name));
+      throw DeviceError(fmt::format("{} was removed", impl_->name));
     impl_->last = impl_->TimeOf(event, now);
     impl_->Notify(
         impl_->debouncer->OnEdge(event.event_type == GPIOD_LINE_EVENT_RISING_EDGE, impl_->last));

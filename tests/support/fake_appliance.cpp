@@ -186,8 +186,8 @@ void FakeAppliance::EndCheck() {
       {"side", -0.4, 3, "%", true, "marker 9"},  {"depth_scale", 0.62, 3, "%", true, ""}};
   if (!checks.baseline)
     check.reasons = {
-        "there is no baseline yet: somebody who knows that the markers lie right takes this check "
-        "as the baseline"};
+        "there is no baseline yet: if the markers are known to be in place, set this check as the "
+        "baseline"};
   if (next_check) {
     const std::string id = check.id;
     check = *next_check;

@@ -102,7 +102,7 @@ for (const [text, expected] of [
     'el escaneo actual cubre el 81,5 % de la región y se necesita al menos el 90 %; bárrala toda'],
   ['pitch is not well determined: ±1.4 deg at 95 %, the tolerance is 1 deg',
     'cabeceo: no está bien determinado, ±1,4 ° al 95 %; la tolerancia es 1 °'],
-  ['the scan failed: out of memory: sweep a shorter way, or close what else runs',
+  ['the scan failed: out of memory: make a shorter sweep, or close other programs',
     'el escaneo falló: falta memoria: barra un trayecto más corto o cierre lo que esté en marcha'],
   ['move, vertical +1.20 mm, pitch -0.10 deg; reason: swelling',
     'mover, vertical +1,20 mm, cabeceo -0,10 °; motivo: swelling'],

@@ -387,7 +387,7 @@ void Accounts::ShowLastLogin(const Request& request, const Respond& respond) {
 void Accounts::VerifyOwn(const Request& request, std::string password, const char* wrong,
                          const Respond& respond, std::function<void(const User&)> then) {
   const auto user = users_.FindUser(request.session->user);
-  if (!user) return respond(ErrorResponse(409, "the account is gone"));
+  if (!user) return respond(ErrorResponse(409, "this account no longer exists"));
   // A separate counter, so that guesses at the login do not keep logged-in users from signing.
   const std::vector<std::string> counters = {"own " + user->name};
   if (auto refusal = CountGuess(counters)) return respond(std::move(*refusal));

@@ -155,7 +155,7 @@ export const kWords = {
     'no se vio ningún marcador: la escena está en el sistema de la primera imagen clave y no se '
     + 'puede comparar',
   // The daily check.
-  ['there is no baseline yet: somebody who knows that the markers lie right takes this check as '
+  ['there is no baseline yet: if the markers are known to be in place, set this check as '
     + 'the baseline']:
     'aún no hay base: quien sepa que los marcadores están bien fija este control como base',
   'no marker was seen, so none could be measured':
@@ -220,7 +220,7 @@ export const kPatterns = [
   ['^(\\d+) of (\\d+) frames were not tracked, ([\\d.]+) s at longest$',
     '$1 de $2 imágenes sin seguimiento, $3 s como máximo'],
   ['^the computer was too slow: (\\d+) of (\\d+) frames were left out evenly; sweep more slowly, '
-    + 'and close what else runs on it$',
+    + 'and close other programs on it$',
   'el equipo fue demasiado lento: se omitieron $1 de $2 imágenes de forma regular; barra más '
     + 'despacio y cierre lo demás que se ejecute en él'],
   ['^no image came for ([\\d.]+) s in the sweep; what the sensor passed meanwhile is missing$',

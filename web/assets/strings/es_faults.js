@@ -130,7 +130,7 @@ export const kFaultWords = {
     'el nombre de un archivo de actualización acaba en .raucb',
   'checking the signature': 'comprobando la firma',
   // Why a scan failed.
-  'out of memory: sweep a shorter way, or close what else runs':
+  'out of memory: make a shorter sweep, or close other programs':
     'falta memoria: barra un trayecto más corto o cierre lo que esté en marcha',
   'the sensor\'s stream ended': 'se cortó la señal del sensor',
   'put a backup of the scan\'s files in their place, or take a new reference':
