@@ -64,9 +64,8 @@ class Checker {
                                 : MarkerCheckStatus::kNoBaseline;
     if (check_.status == MarkerCheckStatus::kNoBaseline) {
       check_.reasons.push_back(
-          "there is no baseline yet: if the markers are known to be in place, set this check as "
-          "the "
-          "baseline");
+          "there is no baseline yet: if the markers are known to be in place, set this check "
+          "as the baseline");
     }
     return std::move(check_);
   }
