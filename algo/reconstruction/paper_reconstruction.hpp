@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "algo/reconstruction/global_icp.hpp"
-#include "algo/reconstruction/height_map_builder.hpp"
+#include "algo/reconstruction/height_maps.hpp"
 #include "algo/types/keyframe.hpp"
 #include "algo/types/marker.hpp"
 

@@ -13,7 +13,7 @@
 #include "algo/base/errors.hpp"
 #include "algo/markers/sweep_tone.hpp"
 #include "algo/reconstruction/corrected_views.hpp"
-#include "algo/reconstruction/height_map_builder.hpp"
+#include "algo/reconstruction/height_maps.hpp"
 #include "algo/reconstruction/joint_registration.hpp"
 #include "algo/reconstruction/paper_reconstruction.hpp"
 #include "algo/reconstruction/scene_assembly.hpp"

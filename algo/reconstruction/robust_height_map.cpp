@@ -7,7 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "algo/base/check_stop.hpp"
-#include "algo/reconstruction/height_map_builder.hpp"
+#include "algo/reconstruction/height_maps.hpp"
 #include "algo/reconstruction/view_fusion.hpp"
 
 namespace plumb {
@@ -58,8 +58,7 @@ struct Window {
   double last;
 };
 
-/// The section of the histogram that contains data, not longer than `max_extent`; if it must be
-/// cut, around the origin.
+/// The section of the histogram with data, at most `max_extent` long, cut around the origin.
 std::optional<Window> DataWindow(const std::vector<std::int64_t>& counts, double start,
                                  double max_extent) {
   const auto filled = [](std::int64_t count) { return count > 0; };
@@ -157,12 +156,10 @@ void SortIntoRows(const ViewSurface& view, std::uint32_t index, std::size_t stri
   const Eigen::Matrix3f R = RotationOf(view);
   const Eigen::Vector3f t = TranslationOf(view);
   const std::size_t cells_per_row = static_cast<std::size_t>(coarse.width) * kTile;
-  // A stride that has no common factor with the image's width distributes the kept pixels over the
-  // columns.
+  // A stride coprime to the image's width spreads the kept pixels over the columns.
   for (std::size_t i = index % stride; i < view.size(); i += stride) {
     if (view.pixels[i].inverse_depth <= 0.0F)
-      // rims and grazing views are included: they show that something is there, if not exactly
-      // where
+      // rims and grazing views are included: they show that something is there
       continue;
     const Eigen::Vector3f p = R * view.PointInCamera(i) + t;
     if (p.z() < options.z_min || p.z() > options.z_max) continue;
@@ -185,8 +182,7 @@ int NumViews(std::span<const Sample> samples) {
 TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, float band,
                  int min_views) {
   TopPlane top;
-  // Highest first, equal heights in input order, so that the order does not depend on the sorting
-  // algorithm.
+  // Highest first, equal heights in input order, independent of the sorting algorithm.
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
     return a.z != b.z ? a.z > b.z : (a.view != b.view ? a.view < b.view : a.pixel < b.pixel);
   });
@@ -210,8 +206,7 @@ TopPlane FindTop(std::span<Sample> samples, std::span<const ViewSurface> views, 
       normal += weight * (R * view.normals[i]);
       weight_sum += weight;
     }
-    // The top is seen only at rims or is too steep: no height is given, and nothing below it
-    // either.
+    // The top is seen only at rims or is too steep: no height, and nothing below it either.
     const float length = normal.norm();
     if (!(weight_sum > 0.0F && normal.z() > kMinNormalZ * length)) return {};
     top.point /= weight_sum;
@@ -342,8 +337,7 @@ class MapFiller {
       CheckStop(options_.stop);
       for (int column = 0; column < tile_columns; ++column) FillTile(row, column, true);
     });
-    // Written to another array, so that a cell does not depend on which of its neighbours was
-    // processed first.
+    // Written to another array, so that cells do not depend on the order of processing.
     nodes_ = result_.map.z;
     tbb::parallel_for(0, tile_rows, [&](int row) {
       CheckStop(options_.stop);
@@ -399,8 +393,7 @@ class MapFiller {
     }
   }
 
-  /// Sets a cell between nodes to their mean; false if a node is missing or they lie on different
-  /// surfaces.
+  /// Sets a cell between nodes to their mean; false if one is missing or on another surface.
   bool MeanOfNodes(int row, int column) {
     const int row_before = row - row % 2;
     const int row_after = row + row % 2;

@@ -10,7 +10,7 @@
 #include "algo/geometry/poisson_disk.hpp"
 #include "algo/geometry/rigid_fit.hpp"
 #include "algo/reconstruction/global_icp.hpp"
-#include "algo/reconstruction/height_map_builder.hpp"
+#include "algo/reconstruction/height_maps.hpp"
 #include "algo/reconstruction/paper_reconstruction.hpp"
 #include "algo/reconstruction/surface_cloud.hpp"
 #include "algo/reconstruction/surface_mesh.hpp"

@@ -1,4 +1,4 @@
-#include "algo/reconstruction/height_map_builder.hpp"
+#include "algo/reconstruction/height_maps.hpp"
 
 #include <algorithm>
 #include <cmath>
