@@ -17,6 +17,7 @@
 #include "daemon/cli/signals.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/loop/crash_report.hpp"
+#include "daemon/loop/freed_memory.hpp"
 
 namespace plumb {
 namespace {
@@ -129,6 +130,7 @@ int Main(int argc, char** argv) {
 }  // namespace plumb
 
 int main(int argc, char** argv) {
+  plumb::KeepFreedMemory();
   plumb::ReportCrashes("plumb", plumb::Version().data());
   try {
     return plumb::Main(argc, argv);

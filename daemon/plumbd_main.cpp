@@ -1,8 +1,10 @@
 #include "daemon/appliance/plumbd.hpp"
 #include "daemon/config/version.hpp"
 #include "daemon/loop/crash_report.hpp"
+#include "daemon/loop/freed_memory.hpp"
 
 int main(int argc, char** argv) {
+  plumb::KeepFreedMemory();
   plumb::ReportCrashes("plumbd", plumb::Version().data());
   return plumb::RunPlumbd(argc, argv);
 }

@@ -103,8 +103,10 @@ using Matrix8 = Eigen::Matrix<double, 8, 8>;
 /// One robust Gauss-Newton step on a side's samples. False if the system is singular.
 bool Step(const Side& side, const std::vector<Sample>& samples, bool find_edge_shift,
           SideFit& fit) {
-  // In single precision and unrolled by hand, because this loop dominates the cost of a frame.
-  std::array<std::array<float, 9>, 9> sums{};  // J^T W J, the residual as the ninth column of J
+  // In single precision and four numbers at a time, because this loop dominates the cost of a
+  // frame. Column i holds row i of the lower half of J^T W J, which is symmetric.
+  Eigen::Array<float, 8, 8> sums = Eigen::Array<float, 8, 8>::Zero();
+  Eigen::Array<float, 8, 1> gradient = Eigen::Array<float, 8, 1>::Zero();
   double weighted_square = 0, weights = 0, levels_square = 0;
   const auto inverse_blur = static_cast<float>(1.0 / fit.blur_px);
   const auto limit = static_cast<float>(0.12 * fit.step);
@@ -122,31 +124,20 @@ bool Step(const Side& side, const std::vector<Sample>& samples, bool find_edge_s
     const float residual = sample.value - (white - step * model.darkness);
     const float weight = std::abs(residual) <= limit ? 1.0F : limit / std::abs(residual);
     const float by_line = step * model.by_depth;  // value increases when the line moves inward
-    const std::array<float, 9> jacobian = {by_line * (1 - along),
-                                           by_line * along,
-                                           -step * model.by_log_blur,
-                                           1.0F,
-                                           from_middle,
-                                           -model.darkness,
-                                           -model.darkness * from_middle,
-                                           -step * model.by_shift,
-                                           residual};
-    for (std::size_t i = 0; i < 8; ++i) {
-      const float weighted = weight * jacobian[i];
-      for (std::size_t j = 0; j < 9; ++j) sums[i][j] += weighted * jacobian[j];
-    }
+    Eigen::Array<float, 8, 1> jacobian;
+    jacobian << by_line * (1 - along), by_line * along, -step * model.by_log_blur, 1.0F,
+        from_middle, -model.darkness, -model.darkness * from_middle, -step * model.by_shift;
+    const Eigen::Array<float, 8, 1> weighted = weight * jacobian;
+    for (int i = 0; i < 4; ++i) sums.col(i).head<4>() += weighted[i] * jacobian.head<4>();
+    for (int i = 4; i < 8; ++i) sums.col(i) += weighted[i] * jacobian;
+    gradient += weighted * residual;
     weighted_square += static_cast<double>(weight) * residual * residual;
     weights += weight;
     const float levels = residual * sample.levels_per_light;
     levels_square += static_cast<double>(weight) * levels * levels;
   }
-  Matrix8 normal;
-  Vector8 right;
-  for (int i = 0; i < 8; ++i) {
-    for (int j = 0; j < 8; ++j)
-      normal(i, j) = sums[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
-    right[i] = sums[static_cast<std::size_t>(i)][8];
-  }
+  Matrix8 normal = sums.matrix().transpose().cast<double>();
+  Vector8 right = gradient.matrix().cast<double>();
   // A weak prior on blur and slopes keeps the system regular for faint or tiny sides.
   const double scale = fit.step * fit.step;
   normal(2, 2) += 2 * scale;

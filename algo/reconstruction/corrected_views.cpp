@@ -1,6 +1,6 @@
 #include "algo/reconstruction/corrected_views.hpp"
 
-#include <cmath>
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -13,6 +13,15 @@
 
 namespace plumb {
 namespace {
+
+// std::lround(), which is a call into the library; limited to +-`limit`.
+int Rounded(float value, int limit) {
+  const auto farthest = static_cast<float>(limit);
+  value = std::min(std::max(value, -farthest), farthest);
+  const int whole = static_cast<int>(value);
+  const float rest = value - static_cast<float>(whole);
+  return whole + (rest >= 0.5F ? 1 : 0) - (rest <= -0.5F ? 1 : 0);
+}
 
 // Depth after correction by the calibration, as a camera at the stamp would have measured it in one
 // instant: each pixel takes its value from where the moving camera's row saw that point.
@@ -34,10 +43,8 @@ cv::Mat CorrectedDepth(const cv::Mat& depth_m, const DepthCorrection& correction
       const Eigen::Vector3f p(ray[c].x() * here[c], ray[c].y() * here[c], here[c]);
       const Eigen::Vector3f moved = late_s * (w.cross(p) + v);
       // Where this row saw the point that the instantaneous camera sees in this pixel.
-      const int x =
-          c - static_cast<int>(std::lround(fx * (moved.x() - ray[c].x() * moved.z()) / here[c]));
-      const int y =
-          r - static_cast<int>(std::lround(fy * (moved.y() - ray[c].y() * moved.z()) / here[c]));
+      const int x = c - Rounded(fx * (moved.x() - ray[c].x() * moved.z()) / here[c], depth_m.cols);
+      const int y = r - Rounded(fy * (moved.y() - ray[c].y() * moved.z()) / here[c], depth_m.rows);
       if (x < 0 || y < 0 || x >= depth_m.cols || y >= depth_m.rows) continue;
       const float z = depth_m.at<float>(y, x);
       if (z <= 0) continue;

@@ -296,14 +296,14 @@ std::vector<View> MakeViews(const Sensor& sensor, const CalibrationModel& calibr
   std::vector<Eigen::Vector2f> rays(first.size());
   const DepthCorrection correction(calibration, sensor.stated.width, sensor.stated.height,
                                    first.window_px);
-  for (int r = 0; r < first.height; ++r) {
+  tbb::parallel_for(0, first.height, [&](int r) {
     for (int c = 0; c < first.width; ++c) {
       const auto i = static_cast<std::size_t>(r * first.width + c);
       const double x = (c + 0.5) * first.window_px - 0.5;
       const double y = (r + 0.5) * first.window_px - 0.5;
       rays[i] = Undistort(sensor.depth, {x, y}).cast<float>();
     }
-  }
+  });
   // Rows are read out one after the other: each cell is moved to where the camera at the stamp
   // would see it.
   const auto readout_s = static_cast<float>(calibration.depth[kDepthReadout]);

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <utility>
+#include <vector>
 
 #include "algo/base/check_stop.hpp"
 #include "algo/reconstruction/dense_terms.hpp"
@@ -54,6 +57,32 @@ double KeypointSigmaFactor(const TrackingMap& map) {
   return std::sqrt(std::max(1.0, mean / kEnough));
 }
 
+// What the joint solve changes in a map, without the images.
+class MapState {
+ public:
+  explicit MapState(const TrackingMap& map) : landmarks_(map.landmarks), markers_(map.markers) {
+    for (const MapKeyframe& keyframe : map.keyframes) {
+      T_world_color_.push_back(keyframe.T_world_color);
+      velocity_per_s_.push_back(keyframe.velocity_per_s);
+    }
+  }
+  // The map takes this state, and this becomes the map's.
+  void Exchange(TrackingMap& map) {
+    std::swap(map.landmarks, landmarks_);
+    std::swap(map.markers, markers_);
+    for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
+      std::swap(map.keyframes[k].T_world_color, T_world_color_[k]);
+      std::swap(map.keyframes[k].velocity_per_s, velocity_per_s_[k]);
+    }
+  }
+
+ private:
+  std::vector<Pose> T_world_color_;
+  std::vector<Vector6d> velocity_per_s_;
+  std::vector<Landmark> landmarks_;
+  std::map<int, MapMarker> markers_;
+};
+
 }  // namespace
 
 Pose DepthPose(const MapKeyframe& keyframe, const CalibrationModel& calibration) {
@@ -100,7 +129,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   if (!options.use_dense) return result;
 
   const dense::Cells cells = dense::MakeCells(stated, map);
-  const TrackingMap before = map;
+  MapState before(map);
   const CalibrationModel calibration_before = result.calibration;
   double gate_m = options.max_gate_m;
   std::vector<dense::KeyframePair> pairs;
@@ -133,19 +162,22 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
     gate_m = std::max(options.min_gate_m, 0.6 * gate_m);
   }
   result.num_pairs = static_cast<int>(pairs.size());
-  const auto consistency = [&](const TrackingMap& of, const CalibrationModel& calibration) {
+  const auto consistency = [&](const CalibrationModel& calibration) {
     CheckStop(stop);
     const dense::Sensor sensor = dense::MakeSensor(stated, calibration);
-    return dense::Consistency(sensor, dense::MakeViews(sensor, calibration, cells, of), pairs,
+    return dense::Consistency(sensor, dense::MakeViews(sensor, calibration, cells, map), pairs,
                               options.max_gate_m);
   };
-  result.consistency_before_m = consistency(before, calibration_before);
-  result.consistency_after_m = consistency(map, result.calibration);
+  result.consistency_after_m = consistency(result.calibration);
+  before.Exchange(map);
+  result.consistency_before_m = consistency(calibration_before);
   result.accepted = result.consistency_after_m <= result.consistency_before_m;
   if (!result.accepted) {
-    map = before;
     result.calibration = calibration_before;
-  } else if (options.find_evidence && options.calibrate) {
+    return result;
+  }
+  before.Exchange(map);
+  if (options.find_evidence && options.calibrate) {
     result.evidence.solution = ToVector(result.calibration);
     result.evidence.information = last.information;
   }

@@ -32,11 +32,14 @@ constexpr std::size_t kMaxPaperKeyframes = 20;  // The paper had about 15 a swee
 // the variation with blur and exposure.
 constexpr double kMeasuredEdgeSigma_px = 0.01;
 
-TrackerOptions TrackingOptions(const ReconstructorOptions& options) {
+TrackerOptions TrackingOptions(const StreamInfo& info, const ReconstructorOptions& options) {
   TrackerOptions tracking;
   tracking.use_markers = options.use_markers;
   tracking.use_keypoints = options.use_keypoints;
   tracking.keep_color = options.keep_color;
+  // The surfaces take no other colours.
+  if (options.preset == Preset::kBest)
+    tracking.color_block = info.intrinsics.width / WorkingIntrinsics(info.intrinsics).width;
   tracking.keyframe_distance *= options.keyframe_spacing;
   tracking.keyframe_angle_rad *= options.keyframe_spacing;
   tracking.min_tracked_share = 1.0 - options.keyframe_spacing * (1.0 - tracking.min_tracked_share);
@@ -91,7 +94,7 @@ struct Reconstructor::Impl {
   Impl(const StreamInfo& stream, const ReconstructorOptions& reconstructor_options)
       : info(stream),
         options(reconstructor_options),
-        tracker(stream, TrackingOptions(reconstructor_options)) {}
+        tracker(stream, TrackingOptions(stream, reconstructor_options)) {}
 
   [[nodiscard]] double Now() const { return options.now_s ? options.now_s() : 0.0; }
 
@@ -178,9 +181,11 @@ struct Reconstructor::Impl {
     }
     report(0.9, "mesh");
     double stage = Now();
+    constexpr int kDecimation = 2;
     if (scene.height_map)
-      scene.mesh = MeshOfHeightMap(
-          *scene.height_map, ColorsFromCloud(*scene.height_map, scene.cloud), {.decimation = 2});
+      scene.mesh = MeshOfHeightMap(*scene.height_map,
+                                   ColorsFromCloud(*scene.height_map, scene.cloud, kDecimation),
+                                   {.decimation = kDecimation});
     scene.timings_s["mesh"] = Now() - stage;
     if (!tracking_times_s.empty())
       scene.timings_s["tracking_per_frame_median"] = Median(tracking_times_s);

@@ -66,11 +66,12 @@ class VoxelIndex {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
-  [[nodiscard]] std::uint32_t Find(Key key) const {
-    if (slots_.empty()) return kNone;
+  /// How often the key has been asked for by FindOrAdd().
+  [[nodiscard]] std::uint32_t Count(Key key) const {
+    if (slots_.empty()) return 0;
     std::size_t at = Start(key);
     while (slots_[at].index != kNone && slots_[at].key != key) at = (at + 1) & (slots_.size() - 1);
-    return slots_[at].index;
+    return slots_[at].count;
   }
 
   /// Index of the key's entry; the caller appends an entry when it equals size() before the call.
@@ -78,7 +79,8 @@ class VoxelIndex {
     if (2 * (size_ + 1) > slots_.size()) Grow();
     std::size_t at = Start(key);
     while (slots_[at].index != kNone && slots_[at].key != key) at = (at + 1) & (slots_.size() - 1);
-    if (slots_[at].index == kNone) slots_[at] = {key, static_cast<std::uint32_t>(size_++)};
+    if (slots_[at].index == kNone) slots_[at] = {key, static_cast<std::uint32_t>(size_++), 0};
+    ++slots_[at].count;
     return slots_[at].index;
   }
 
@@ -86,6 +88,7 @@ class VoxelIndex {
   struct Slot {
     Key key = 0;
     std::uint32_t index = kNone;
+    std::uint32_t count = 0;
   };
 
   /// Voxels of a block lie close together, five slots apart, so that filled planes do not form long
@@ -159,22 +162,19 @@ using VoxelShards = std::array<VoxelIndex, kNumShards>;
 /// The seeds whose voxel holds at least as many measurements as its two neighbours along the
 /// surface's normal. Noise spreads a surface over several layers of voxels, whose seeds would all
 /// move to the same place.
-std::vector<Seed> FullestLayers(std::span<const ViewSurface> views, const Shards<Seed>& seeds,
-                                const VoxelShards& voxels, std::size_t shard) {
+std::vector<Seed> FullestLayers(std::span<const ViewSurface> views, const std::vector<Seed>& seeds,
+                                const VoxelShards& voxels) {
   std::vector<Seed> kept;
-  for (const Seed& seed : seeds[shard]) {
+  for (const Seed& seed : seeds) {
     const ViewSurface& view = views[seed.view];
     const Eigen::Vector3f n = view.T_world_camera.linear().cast<float>() * view.normals[seed.pixel];
     int axis = 0;
     n.cwiseAbs().maxCoeff(&axis);
-    const auto count_beside = [&](int step) {
-      const Key key = Beside(seed.key, axis, step);
-      const std::size_t other = ShardOf(key);
-      const std::uint32_t index = voxels[other].Find(key);
-      return index == VoxelIndex::kNone ? 0U : seeds[other][index].count;
-    };
+    const auto count_at = [&](Key key) { return voxels[ShardOf(key)].Count(key); };
     // Of two equally filled layers the lower one is kept.
-    if (seed.count >= count_beside(1) && seed.count > count_beside(-1)) kept.push_back(seed);
+    if (seed.count >= count_at(Beside(seed.key, axis, 1)) &&
+        seed.count > count_at(Beside(seed.key, axis, -1)))
+      kept.push_back(seed);
   }
   std::sort(kept.begin(), kept.end(), [](const Seed& a, const Seed& b) { return a.key < b.key; });
   return kept;
@@ -215,7 +215,7 @@ Shards<Seed> FindSeeds(std::span<const ViewSurface> views, float inverse_size,
   Shards<Seed> layer;
   tbb::parallel_for(std::size_t{0}, kNumShards, [&](std::size_t s) {
     CheckStop(stop);
-    layer[s] = FullestLayers(views, seeds, voxels, s);
+    layer[s] = FullestLayers(views, seeds[s], voxels);
   });
   return layer;
 }

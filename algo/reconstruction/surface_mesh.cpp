@@ -125,21 +125,26 @@ TriangleMesh MeshOfHeightMap(const HeightMap& map, std::span<const Color> colors
   return GridMesher(map, colors, options).Build();
 }
 
-std::vector<Color> ColorsFromCloud(const HeightMap& map, const PointCloud& cloud) {
+std::vector<Color> ColorsFromCloud(const HeightMap& map, const PointCloud& cloud, int decimation) {
+  if (decimation < 1)
+    throw std::invalid_argument("colours of a height map: decimation out of range");
   if (cloud.colors.empty() || cloud.colors.size() != cloud.points.size()) return {};
   const GridShape& grid = map.grid;
   std::vector<std::uint32_t> point_of(grid.num_cells(), kNoVertex);
   std::vector<float> distance(grid.num_cells(), std::numeric_limits<float>::max());
   constexpr int kReach = 2;
+  const auto first_of = [&](int place) {
+    return (std::max(0, place - kReach) + decimation - 1) / decimation * decimation;
+  };
   for (std::size_t i = 0; i < cloud.points.size(); ++i) {
     const Eigen::Vector3f& p = cloud.points[i];
     const auto cell = grid.cell(p.x(), p.y());
     if (!cell) continue;
     const int row = static_cast<int>(*cell / static_cast<std::size_t>(grid.width));
     const int column = static_cast<int>(*cell % static_cast<std::size_t>(grid.width));
-    for (int r = std::max(0, row - kReach); r <= std::min(grid.height - 1, row + kReach); ++r) {
-      for (int c = std::max(0, column - kReach); c <= std::min(grid.width - 1, column + kReach);
-           ++c) {
+    for (int r = first_of(row); r <= std::min(grid.height - 1, row + kReach); r += decimation) {
+      for (int c = first_of(column); c <= std::min(grid.width - 1, column + kReach);
+           c += decimation) {
         const std::size_t k = static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.width) +
                               static_cast<std::size_t>(c);
         if (std::isnan(map.z[k])) continue;

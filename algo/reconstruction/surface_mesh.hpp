@@ -29,6 +29,8 @@ struct SurfaceMeshOptions {
 /// Colours for the cells of a height map from a cloud in the same frame. Each valid cell takes the
 /// colour of the point nearest in height in its own cell, otherwise from the nearest neighbour cell
 /// up to two cells away; black if there is none. Empty if the cloud has no colours.
-[[nodiscard]] std::vector<Color> ColorsFromCloud(const HeightMap& map, const PointCloud& cloud);
+/// @param decimation  As of the mesh: cells of other rows and columns stay black.
+[[nodiscard]] std::vector<Color> ColorsFromCloud(const HeightMap& map, const PointCloud& cloud,
+                                                 int decimation = 1);
 
 }  // namespace plumb

@@ -108,6 +108,38 @@ void ViewFusion::ViewsNear(const Eigen::Vector3f& centre_world, float radius_m,
   std::sort(found.begin(), found.end());
 }
 
+bool ViewFusion::Project(std::uint16_t index, const Eigen::Vector3f& p_world, Seen& seen) const {
+  const Camera& camera = cameras_[index];
+  seen.p = camera.R_camera_world * p_world + camera.t_camera_world;
+  if (seen.p.z() < 0.1F) return false;
+  seen.inverse_z = 1.0F / seen.p.z();
+  float x = seen.p.x() * seen.inverse_z;
+  float y = seen.p.y() * seen.inverse_z;
+  if (x < camera.ray_min.x() || x > camera.ray_max.x() || y < camera.ray_min.y() ||
+      y > camera.ray_max.y())
+    return false;
+  if (camera.has_lens) {
+    const float r2 = x * x + y * y;
+    const float radial = 1.0F + r2 * (camera.k1 + r2 * (camera.k2 + r2 * camera.k3));
+    const float xd = x * radial + 2.0F * camera.p1 * x * y + camera.p2 * (r2 + 2.0F * x * x);
+    y = y * radial + camera.p1 * (r2 + 2.0F * y * y) + 2.0F * camera.p2 * x * y;
+    x = xd;
+  }
+  const float u = camera.fx * x + camera.cx;
+  const float v = camera.fy * y + camera.cy;
+  if (!(u >= 0.0F && v >= 0.0F)) return false;
+  const int column = static_cast<int>(u);
+  const int row = static_cast<int>(v);
+  if (column + 1 >= camera.view->width() || row + 1 >= camera.view->height()) return false;
+  seen.fu = u - static_cast<float>(column);
+  seen.fv = v - static_cast<float>(row);
+  seen.top_left =
+      static_cast<std::uint32_t>(row) * static_cast<std::uint32_t>(camera.view->width()) +
+      static_cast<std::uint32_t>(column);
+  seen.index = index;
+  return true;
+}
+
 FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3f& n_world,
                             std::span<const std::uint16_t> candidates) const {
   FusedPoint fused;
@@ -115,66 +147,57 @@ FusedPoint ViewFusion::Fuse(const Eigen::Vector3f& p_world, const Eigen::Vector3
   std::size_t num_samples = 0;
   float best_weight = 0.0F;
   float widest_band = options_.min_band_m;
-  for (const std::uint16_t index : candidates) {
-    const Camera& camera = cameras_[index];
-    const ViewSurface& view = *camera.view;
-    const Eigen::Vector3f p = camera.R_camera_world * p_world + camera.t_camera_world;
-    if (p.z() < 0.1F) continue;
-    const float inverse_z = 1.0F / p.z();
-    float x = p.x() * inverse_z;
-    float y = p.y() * inverse_z;
-    if (x < camera.ray_min.x() || x > camera.ray_max.x() || y < camera.ray_min.y() ||
-        y > camera.ray_max.y())
-      continue;
-    if (camera.has_lens) {
-      const float r2 = x * x + y * y;
-      const float radial = 1.0F + r2 * (camera.k1 + r2 * (camera.k2 + r2 * camera.k3));
-      const float xd = x * radial + 2.0F * camera.p1 * x * y + camera.p2 * (r2 + 2.0F * x * x);
-      y = y * radial + camera.p1 * (r2 + 2.0F * y * y) + 2.0F * camera.p2 * x * y;
-      x = xd;
+  // In groups: the pixels of a group's views come from memory while the others are projected.
+  constexpr std::size_t kGroup = 16;
+  std::array<Seen, kGroup> group;
+  for (std::size_t first = 0; first < candidates.size(); first += kGroup) {
+    std::size_t num_seen = 0;
+    for (const std::uint16_t candidate :
+         candidates.subspan(first, std::min(kGroup, candidates.size() - first))) {
+      if (!Project(candidate, p_world, group[num_seen])) continue;
+      const ViewSurface& view = *cameras_[candidate].view;
+      const std::size_t i = group[num_seen++].top_left;
+      __builtin_prefetch(view.pixels.data() + i);
+      __builtin_prefetch(view.pixels.data() + i + static_cast<std::size_t>(view.width()));
     }
-    const float u = camera.fx * x + camera.cx;
-    const float v = camera.fy * y + camera.cy;
-    if (!(u >= 0.0F && v >= 0.0F)) continue;
-    const int column = static_cast<int>(u);
-    const int row = static_cast<int>(v);
-    if (column + 1 >= view.width() || row + 1 >= view.height()) continue;
-    const std::size_t width = static_cast<std::size_t>(view.width());
-    const std::size_t i = static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
-    const ViewSurface::Pixel* top = view.pixels.data() + i;
-    const ViewSurface::Pixel* bottom = top + width;
-    if (top[0].weight <= 0.0F || top[1].weight <= 0.0F || bottom[0].weight <= 0.0F ||
-        bottom[1].weight <= 0.0F)
-      continue;
-    const Eigen::Vector3f n = camera.R_camera_world * n_world;
-    const float along = -n.dot(p);  // |p| times the cosine of the angle of incidence
-    if (along * along < kMinCosIncidence * kMinCosIncidence * p.squaredNorm() || along < 0.0F)
-      continue;
-    const float fu = u - static_cast<float>(column);
-    const float fv = v - static_cast<float>(row);
-    const float above = top[0].inverse_depth + fu * (top[1].inverse_depth - top[0].inverse_depth);
-    const float below =
-        bottom[0].inverse_depth + fu * (bottom[1].inverse_depth - bottom[0].inverse_depth);
-    const float measured = 1.0F / (above + fv * (below - above));
-    // The measured point lies on the seed's own ray, beyond it by this fraction of its length.
-    const float beyond = measured * inverse_z - 1.0F;
-    const float distance = -beyond * along;
-    const float band = std::max(options_.min_band_m, kBandSigmas * AxialSigma(p.z(), 1.0F));
-    if (std::abs(distance) > band) {
-      if (beyond * p.z() > options_.see_through_m) ++fused.num_through;
-      continue;
-    }
-    if (num_samples == kMaxSamples) continue;
-    const std::size_t nearest = i + (fu > 0.5F ? 1U : 0U) + (fv > 0.5F ? width : 0U);
-    const float w = view.pixels[nearest].weight;
-    samples[num_samples++] = {distance, w};
-    widest_band = std::max(widest_band, band);
-    if (options_.with_normals)
-      fused.normal += w * (camera.R_camera_world.transpose() * view.normals[nearest]);
-    if (w > best_weight) {
-      best_weight = w;
-      fused.best_view = index;
-      fused.best_pixel = static_cast<std::uint32_t>(nearest);
+    for (std::size_t k = 0; k < num_seen; ++k) {
+      const auto& [p, inverse_z, fu, fv, i, index] = group[k];
+      const Camera& camera = cameras_[index];
+      const ViewSurface& view = *camera.view;
+      const std::size_t width = static_cast<std::size_t>(view.width());
+      const ViewSurface::Pixel* top = view.pixels.data() + i;
+      const ViewSurface::Pixel* bottom = top + width;
+      if (top[0].weight <= 0.0F || top[1].weight <= 0.0F || bottom[0].weight <= 0.0F ||
+          bottom[1].weight <= 0.0F)
+        continue;
+      const Eigen::Vector3f n = camera.R_camera_world * n_world;
+      const float along = -n.dot(p);  // |p| times the cosine of the angle of incidence
+      if (along * along < kMinCosIncidence * kMinCosIncidence * p.squaredNorm() || along < 0.0F)
+        continue;
+      const float above = top[0].inverse_depth + fu * (top[1].inverse_depth - top[0].inverse_depth);
+      const float below =
+          bottom[0].inverse_depth + fu * (bottom[1].inverse_depth - bottom[0].inverse_depth);
+      const float measured = 1.0F / (above + fv * (below - above));
+      // The measured point lies on the seed's own ray, beyond it by this fraction of its length.
+      const float beyond = measured * inverse_z - 1.0F;
+      const float distance = -beyond * along;
+      const float band = std::max(options_.min_band_m, kBandSigmas * AxialSigma(p.z(), 1.0F));
+      if (std::abs(distance) > band) {
+        if (beyond * p.z() > options_.see_through_m) ++fused.num_through;
+        continue;
+      }
+      if (num_samples == kMaxSamples) continue;
+      const std::size_t nearest = i + (fu > 0.5F ? 1U : 0U) + (fv > 0.5F ? width : 0U);
+      const float w = view.pixels[nearest].weight;
+      samples[num_samples++] = {distance, w};
+      widest_band = std::max(widest_band, band);
+      if (options_.with_normals)
+        fused.normal += w * (camera.R_camera_world.transpose() * view.normals[nearest]);
+      if (w > best_weight) {
+        best_weight = w;
+        fused.best_view = index;
+        fused.best_pixel = static_cast<std::uint32_t>(nearest);
+      }
     }
   }
   fused.num_agreeing = static_cast<int>(num_samples);

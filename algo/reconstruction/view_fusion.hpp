@@ -54,6 +54,14 @@ class ViewFusion {
   [[nodiscard]] std::size_t num_views() const { return cameras_.size(); }
 
  private:
+  /// A seed seen in a view, between two working pixels each way.
+  struct Seen {
+    Eigen::Vector3f p;  ///< Camera frame.
+    float inverse_z;
+    float fu, fv;  ///< Shares of the way to the next column and row.
+    std::uint32_t top_left;
+    std::uint16_t index;
+  };
   struct Camera {
     const ViewSurface* view = nullptr;
     Eigen::Matrix3f R_camera_world;
@@ -65,6 +73,8 @@ class ViewFusion {
         inward_sides;  ///< Unit normals of the frustum's sides in the camera frame.
     float max_depth_m = 0.0F;
   };
+
+  [[nodiscard]] bool Project(std::uint16_t index, const Eigen::Vector3f& p_world, Seen& seen) const;
 
   FusionOptions options_;
   std::vector<Camera> cameras_;

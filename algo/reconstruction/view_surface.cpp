@@ -205,8 +205,11 @@ float AxialSigma(float depth_m, float cos_incidence) {
 
 Color ViewSurface::ColorAt(std::size_t i) const {
   if (color_rgb.empty()) return {0, 0, 0};
-  const int row = static_cast<int>(i / static_cast<std::size_t>(width())) * block + block / 2;
-  const int column = static_cast<int>(i % static_cast<std::size_t>(width())) * block + block / 2;
+  const int color_block = color_rgb.cols == width() ? 1 : block;
+  const int row =
+      static_cast<int>(i / static_cast<std::size_t>(width())) * color_block + color_block / 2;
+  const int column =
+      static_cast<int>(i % static_cast<std::size_t>(width())) * color_block + color_block / 2;
   const cv::Vec3b& rgb = color_rgb.at<cv::Vec3b>(row, column);
   return {rgb[0], rgb[1], rgb[2]};
 }
@@ -236,11 +239,15 @@ ViewSurface PrepareView(const DepthView& view, const std::shared_ptr<const RayTa
     throw std::invalid_argument(fmt::format(
         "view surface: depth image {}x{} (type {}) does not fit a camera of {}x{}", depth.cols,
         depth.rows, depth.type(), view.intrinsics.width, view.intrinsics.height));
+  const Intrinsics working = WorkingIntrinsics(view.intrinsics);
   if (!view.color_rgb.empty() &&
-      (view.color_rgb.type() != CV_8UC3 || view.color_rgb.size() != depth.size()))
+      (view.color_rgb.type() != CV_8UC3 ||
+       (view.color_rgb.size() != depth.size() &&
+        view.color_rgb.size() != cv::Size(working.width, working.height))))
     throw std::invalid_argument(
-        "view surface: the colour image is not 8-bit RGB of the depth image's size");
-  if (!working_rays || working_rays->intrinsics() != WorkingIntrinsics(view.intrinsics))
+        "view surface: the colour image is not 8-bit RGB of the depth image's or the working "
+        "image's size");
+  if (!working_rays || working_rays->intrinsics() != working)
     throw std::invalid_argument("view surface: the rays are not those of the view's working image");
   ViewSurface surface;
   surface.rays = working_rays;

@@ -45,7 +45,7 @@ struct ViewSurface {
 
   Intrinsics intrinsics;  ///< Camera of the working image.
   int block = 1;          ///< Image pixels per working pixel in each direction.
-  cv::Mat color_rgb;      ///< As in the view: at image resolution, or empty.
+  cv::Mat color_rgb;      ///< As in the view: at image or working resolution, or empty.
   Pose T_world_camera = Pose::Identity();
   std::shared_ptr<const RayTable>
       rays;  ///< Of the working pixels; shared by the views of one camera.
@@ -69,7 +69,7 @@ struct ViewSurface {
 /// The camera of the working images for images of this camera.
 [[nodiscard]] Intrinsics WorkingIntrinsics(const Intrinsics& image);
 
-/// Prepares one view.
+/// Prepares one view. Its colour image may also be at working resolution.
 /// @param working_rays  RayTable of WorkingIntrinsics(view.intrinsics).
 /// @throws std::invalid_argument if images, intrinsics, rays or options do not fit together.
 [[nodiscard]] ViewSurface PrepareView(const DepthView& view,

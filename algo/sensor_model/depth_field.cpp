@@ -1,15 +1,18 @@
 #include "algo/sensor_model/depth_field.hpp"
 
 #include <algorithm>
+#include <tuple>
+
+#include "algo/sensor_model/field_polynomials.hpp"
 
 namespace plumb {
 namespace {
 
-constexpr int kOrderX = 5;
-constexpr int kOrderY = 4;
-constexpr double kTallestImage = 0.75;  // Half the height of a 4:3 image in half widths.
+constexpr int kOrderX = std::tuple_size_v<FieldAcross> - 1;
+constexpr int kOrderY = std::tuple_size_v<FieldDown> - 1;
 constexpr double kGrowthFrom_m = 1.0;
 constexpr double kGrowthTo_m = 2.0;
+constexpr double kTallestImage = 0.75;  // Half the height of a 4:3 image in half widths.
 
 constexpr std::array<FieldOrder, kNumFieldTerms> AllFieldOrders() {
   std::array<FieldOrder, kNumFieldTerms> orders{};
@@ -37,9 +40,13 @@ constinit const std::array<FieldOrder, kNumFieldTerms> kFieldOrders = AllFieldOr
 constinit const std::array<FieldOrder, kNumGrowthTerms> kGrowthOrders = {
     {{0, 0}, {0, 1}, {0, 2}, {1, 0}, {1, 1}, {2, 0}}};
 
-FieldRow FieldProducts(const Eigen::Vector2d& centred) {
-  const auto across = Chebyshev<kOrderX + 1>(centred.x());
-  const auto down = Chebyshev<kOrderY + 1>(centred.y() / kTallestImage);
+FieldAcross PolynomialsAcross(double centred_x) { return Chebyshev<kOrderX + 1>(centred_x); }
+
+FieldDown PolynomialsDown(double centred_y) {
+  return Chebyshev<kOrderY + 1>(centred_y / kTallestImage);
+}
+
+FieldRow FieldProducts(const FieldAcross& across, const FieldDown& down) {
   const auto product = [&](const FieldOrder& order) {
     return static_cast<float>(across[static_cast<std::size_t>(order.x)] *
                               down[static_cast<std::size_t>(order.y)]);
@@ -49,6 +56,10 @@ FieldRow FieldProducts(const Eigen::Vector2d& centred) {
   for (const FieldOrder& order : kFieldOrders) row[at++] = product(order);
   for (const FieldOrder& order : kGrowthOrders) row[at++] = product(order);
   return row;
+}
+
+FieldRow FieldProducts(const Eigen::Vector2d& centred) {
+  return FieldProducts(PolynomialsAcross(centred.x()), PolynomialsDown(centred.y()));
 }
 
 double FieldGrowth(double z_m) { return std::min(z_m, kGrowthTo_m) - kGrowthFrom_m; }

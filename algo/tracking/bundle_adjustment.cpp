@@ -66,14 +66,27 @@ void Pin(Eigen::Index first, Eigen::Index count, Eigen::MatrixXd& S, Eigen::Vect
   right.segment(first, count).setZero();
 }
 
+// Column by column, without another dense matrix.
+Eigen::SparseMatrix<double> LowerHalf(const Eigen::MatrixXd& S) {
+  Eigen::VectorXi counts(S.cols());
+  for (Eigen::Index c = 0; c < S.cols(); ++c)
+    counts[c] = static_cast<int>((S.col(c).tail(S.rows() - c).array() != 0.0).count());
+  Eigen::SparseMatrix<double> sparse(S.rows(), S.cols());
+  sparse.reserve(counts);
+  for (Eigen::Index c = 0; c < S.cols(); ++c)
+    for (Eigen::Index r = c; r < S.rows(); ++r)
+      if (S(r, c) != 0.0) sparse.insert(r, c) = S(r, c);
+  sparse.makeCompressed();
+  return sparse;
+}
+
 bool Solve(const Eigen::MatrixXd& S, const Eigen::VectorXd& right, Eigen::VectorXd& x) {
   if (S.rows() <= kLargestDenseSystem) {
     const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> solver(S);
     if (solver.info() != Eigen::Success) return false;
     x = solver.solve(right);
   } else {
-    const Eigen::SparseMatrix<double> sparse =
-        S.triangularView<Eigen::Lower>().toDenseMatrix().sparseView();
+    const Eigen::SparseMatrix<double> sparse = LowerHalf(S);
     const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower> solver(sparse);
     if (solver.info() != Eigen::Success) return false;
     x = solver.solve(right);

@@ -69,10 +69,32 @@ double GrazingOf(const DenseView& target, std::size_t cell, GrazingOfCells& know
   return grazing;
 }
 
-DenseSum AddDense(const PoseProblem& problem, const Pose& T_world_camera, double gate_m,
-                  GrazingOfCells& grazing_of_cells) {
-  DenseSum sum;
+// A cell of the frame, in both of its cameras.
+struct DensePoint {
+  Eigen::Vector3f p_depth;
+  Eigen::Vector3d p_color;
+};
+
+// In the order of the cells, which is that of the sums.
+std::vector<DensePoint> DensePoints(const PoseProblem& problem) {
+  std::vector<DensePoint> points;
   const DenseView& frame = *problem.dense_frame;
+  points.reserve(frame.size() / (kPoseStride * kPoseStride));
+  for (int r = 0; r < frame.height; r += kPoseStride) {
+    for (int c = 0; c < frame.width; c += kPoseStride) {
+      const auto i = static_cast<std::size_t>(r * frame.width + c);
+      if (frame.z_m[i] <= 0) continue;
+      const Eigen::Vector3f p = frame.point(i);
+      points.push_back({p, problem.T_color_depth * p.cast<double>()});
+    }
+  }
+  return points;
+}
+
+DenseSum AddDense(const PoseProblem& problem, const std::vector<DensePoint>& points,
+                  const Pose& T_world_camera, double gate_m, GrazingOfCells& grazing_of_cells) {
+  DenseSum sum;
+  sum.valid = static_cast<int>(points.size());
   const DenseView& target = *problem.dense_target;
   const Pose T_target_depth =
       problem.T_world_target.inverse() * T_world_camera * problem.T_color_depth;
@@ -80,34 +102,30 @@ DenseSum AddDense(const PoseProblem& problem, const Pose& T_world_camera, double
   const Eigen::Matrix3f R = T_target_depth.linear().cast<float>();
   const Eigen::Vector3f t = T_target_depth.translation().cast<float>();
   const Eigen::Matrix3d R_target_color = (T_target_depth * T_depth_color).linear();
-  const double window = frame.window_px;
-  for (int r = 0; r < frame.height; r += kPoseStride) {
-    for (int c = 0; c < frame.width; c += kPoseStride) {
-      const auto i = static_cast<std::size_t>(r * frame.width + c);
-      if (frame.z_m[i] <= 0) continue;
-      ++sum.valid;
-      const Eigen::Vector3f q = R * frame.point(i) + t;
-      if (q.z() < 0.1F) continue;
-      const Eigen::Vector2d pixel = Project(problem.intrinsics, q.cast<double>());
-      const int column = static_cast<int>(std::floor((pixel.x() + 0.5) / window));
-      const int row = static_cast<int>(std::floor((pixel.y() + 0.5) / window));
-      if (column < 0 || row < 0 || column >= target.width || row >= target.height) continue;
-      const auto j = static_cast<std::size_t>(row * target.width + column);
-      if (target.normals[j].isZero()) continue;
-      const Eigen::Vector3f n = target.normals[j];
-      const double residual = n.dot(q - target.point(j));
-      if (std::abs(residual) > gate_m) continue;
-      const double sigma =
-          std::sqrt(2.0) * DepthSigmaAt(q.z(), GrazingOf(target, j, grazing_of_cells)) + 0.002;
-      // The motion is on the colour camera's side: q = T_target_color * exp(x) * p_color.
-      const Eigen::Vector3d p_color = problem.T_color_depth * frame.point(i).cast<double>();
-      const Eigen::Vector3d n_color = R_target_color.transpose() * n.cast<double>();
-      Vector6d J;
-      J << p_color.cross(n_color), n_color;
-      sum.equations.Add(J / sigma, residual / sigma, WeightOf(residual / sigma));
-      sum.squares += residual * residual;
-      ++sum.associated;
-    }
+  const double window = target.window_px;
+  for (const DensePoint& point : points) {
+    const Eigen::Vector3f q = R * point.p_depth + t;
+    if (q.z() < 0.1F) continue;
+    const Eigen::Vector2d pixel = Project(problem.intrinsics, q.cast<double>());
+    // Rounded towards zero, so that what lies less than one cell outside is found out here.
+    const double across = (pixel.x() + 0.5) / window;
+    const double down = (pixel.y() + 0.5) / window;
+    if (!(across >= 0 && down >= 0 && across < target.width && down < target.height)) continue;
+    const auto j =
+        static_cast<std::size_t>(static_cast<int>(down) * target.width + static_cast<int>(across));
+    const Eigen::Vector3f& n = target.normals[j];
+    if (n.isZero()) continue;
+    const double residual = n.dot(q - target.point(j));
+    if (std::abs(residual) > gate_m) continue;
+    const double sigma =
+        std::sqrt(2.0) * DepthSigmaAt(q.z(), GrazingOf(target, j, grazing_of_cells)) + 0.002;
+    // The motion is on the colour camera's side: q = T_target_color * exp(x) * p_color.
+    const Eigen::Vector3d n_color = R_target_color.transpose() * n.cast<double>();
+    Vector6d J;
+    J << point.p_color.cross(n_color), n_color;
+    sum.equations.Add(J / sigma, residual / sigma, WeightOf(residual / sigma));
+    sum.squares += residual * residual;
+    ++sum.associated;
   }
   return sum;
 }
@@ -119,6 +137,8 @@ PoseEstimate OptimizePose(const PoseProblem& problem, const Pose& T_world_camera
   estimate.T_world_camera = T_world_camera_start;
   const bool dense = problem.dense_frame != nullptr && problem.dense_target != nullptr;
   GrazingOfCells grazing_of_cells(dense ? problem.dense_target->size() : 0, -1.0);
+  const std::vector<DensePoint> dense_points =
+      dense ? DensePoints(problem) : std::vector<DensePoint>();
   double gate_m = 0.08;
   for (int iteration = 0; iteration < problem.num_iterations; ++iteration) {
     NormalEquations equations;
@@ -126,7 +146,8 @@ PoseEstimate OptimizePose(const PoseProblem& problem, const Pose& T_world_camera
     for (const PosePoint& point : problem.points)
       AddPoint(point, T_camera_world * point.p_world, equations);
     if (dense) {
-      const DenseSum sum = AddDense(problem, estimate.T_world_camera, gate_m, grazing_of_cells);
+      const DenseSum sum =
+          AddDense(problem, dense_points, estimate.T_world_camera, gate_m, grazing_of_cells);
       equations.H += sum.equations.H;
       equations.g += sum.equations.g;
       estimate.num_dense = sum.associated;

@@ -53,6 +53,17 @@ double MedianDepth(const DenseView& view) {
   return z[z.size() / 2];
 }
 
+cv::Mat MiddlesOfBlocks(const cv::Mat& rgb, int block) {
+  if (block == 1) return rgb;
+  cv::Mat middles(rgb.rows / block, rgb.cols / block, CV_8UC3);
+  for (int r = 0; r < middles.rows; ++r) {
+    const auto* from = rgb.ptr<cv::Vec3b>(r * block + block / 2) + block / 2;
+    auto* to = middles.ptr<cv::Vec3b>(r);
+    for (int c = 0; c < middles.cols; ++c) to[c] = from[c * block];
+  }
+  return middles;
+}
+
 }  // namespace
 
 struct Tracker::Impl {
@@ -403,7 +414,8 @@ struct Tracker::Impl {
     keyframe.data.depth_time_s = frame.depth_time_s;
     keyframe.data.view.intrinsics = info.intrinsics;
     keyframe.data.view.depth_m = frame.depth_m;
-    if (options.keep_color) keyframe.data.view.color_rgb = frame.color_rgb;
+    if (options.keep_color)
+      keyframe.data.view.color_rgb = MiddlesOfBlocks(frame.color_rgb, options.color_block);
     keyframe.data.markers = prepared.markers;
     keyframe.T_world_color = T_world_color;
     keyframe.velocity_per_s = velocity;

@@ -25,7 +25,9 @@ struct TrackerOptions {
   /// Fraction of the keyframe's keypoints below which a new keyframe is created.
   double min_tracked_share = 0.6;
   int local_keyframes = 6;  ///< Keyframes that local bundle adjustment moves.
-  bool keep_color = true;   ///< Keyframes keep their colour images.
+  /// Of each block of so many pixels each way, keyframes keep the colour of the middle one.
+  int color_block = 1;
+  bool keep_color = true;  ///< Keyframes keep their colour images.
   /// Largest number of keyframes that keep images, see BoundImages(); a sweep of 300 frames has
   /// about 50.
   std::size_t max_images = 96;

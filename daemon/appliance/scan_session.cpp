@@ -13,6 +13,7 @@
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/files/text_report.hpp"
 #include "daemon/loop/explain.hpp"
+#include "daemon/loop/freed_memory.hpp"
 #include "daemon/pipeline/frame_thinning.hpp"
 #include "daemon/pipeline/recording_feed.hpp"
 #include "daemon/pipeline/scan_runner.hpp"
@@ -104,6 +105,7 @@ void ScanSession::Run(const std::stop_token& stop) {
       outcome_.why_not_learned.empty())
     job_.unit_profile->LearnFromScan();
   callbacks_.ended(outcome_);
+  ReturnFreedMemory();
 }
 
 void ScanSession::Scan(const std::stop_token& stop) {

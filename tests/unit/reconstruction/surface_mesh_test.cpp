@@ -94,5 +94,26 @@ TEST(ColorsFromCloudTest, ACellTakesItsOwnPointNearestInHeightElseItsNeighbours)
   EXPECT_TRUE(ColorsFromCloud(map, cloud).empty());
 }
 
+TEST(ColorsFromCloudTest, AMeshOfEverySecondCellHasTheColoursOfAllCells) {
+  const HeightMap map = Tilted(5, 7, 0.3F);
+  PointCloud cloud;
+  for (int row = 0; row < map.grid.height; ++row) {
+    for (int column = 0; column < map.grid.width; column += 3) {
+      cloud.points.emplace_back(static_cast<float>(map.grid.x_centre(column)),
+                                static_cast<float>(map.grid.y_centre(row)), map.at(row, column));
+      cloud.colors.push_back(
+          {static_cast<std::uint8_t>(10 * row + 1), static_cast<std::uint8_t>(10 * column + 1), 7});
+    }
+  }
+  const SurfaceMeshOptions options{.decimation = 2};
+  const TriangleMesh all = MeshOfHeightMap(map, ColorsFromCloud(map, cloud), options);
+  const TriangleMesh some = MeshOfHeightMap(map, ColorsFromCloud(map, cloud, 2), options);
+  ASSERT_FALSE(all.colors.empty());
+  EXPECT_EQ(some.colors, all.colors);
+  EXPECT_NE(ColorsFromCloud(map, cloud, 2), ColorsFromCloud(map, cloud))
+      << "cells between are left out";
+  EXPECT_THROW((void)ColorsFromCloud(map, cloud, 0), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace plumb

@@ -1,0 +1,21 @@
+// What becomes of memory that a scan frees.
+#pragma once
+
+#include <malloc.h>
+
+namespace plumb {
+
+/// Once, first in a program: memory that was freed stays with the process for what is allocated
+/// next. A scan takes and frees images and matrices of megabytes thousands of times; each time the
+/// system would have to hand out, and clear, their pages again.
+inline void KeepFreedMemory() {
+  constexpr int kLargestKept = 32 << 20;   // The most that glibc allows.
+  constexpr int kKeptInTotal = 512 << 20;  // Of each thread's heap.
+  mallopt(M_MMAP_THRESHOLD, kLargestKept);
+  mallopt(M_TRIM_THRESHOLD, kKeptInTotal);
+}
+
+/// After a scan: hands all freed memory back to the system.
+inline void ReturnFreedMemory() { malloc_trim(0); }
+
+}  // namespace plumb
