@@ -1,4 +1,4 @@
-// Disks that become or are read-only under a real plumbd. Mounts of its own need root; without,
+// Disks that become or are read-only under a real plumbd. Mounting needs root; without it,
 // these tests are skipped.
 #include <algorithm>
 #include <csignal>
@@ -40,7 +40,7 @@ class DaemonDiskTest : public ::testing::Test {
   void SetUp() override {
     if (::geteuid() != 0 || ::unshare(CLONE_NEWNS) != 0 ||
         ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
-      GTEST_SKIP() << ("mounts of its own are not permitted here (root and CAP_SYS_ADMIN)");
+      GTEST_SKIP() << ("mounting is not permitted here (it needs root and CAP_SYS_ADMIN)");
     fs::create_directories(state());
   }
   void TearDown() override {
@@ -109,7 +109,7 @@ class DaemonDiskTest : public ::testing::Test {
     plumbd.ScanOnce();
   }
 
-  /// Nothing can be scanned and everybody is told why, but what is stored can be looked at.
+  /// Nothing can be scanned, every user sees why, and stored data can still be viewed.
   static void ExpectReadable(Plumbd& plumbd) {
     HttpClient client(plumbd.port());
     const HttpAnswer health = client.Get("/health");

@@ -135,7 +135,7 @@ TEST_F(DaemonFaultTest, AProcessThatWasStoppedFailsTheSweepWithoutBlamingTheSens
   EXPECT_EQ(plumbd.Press()["ok"], true) << "a press acknowledges";
   plumbd.WaitForState("ready");
   stop_for(std::chrono::milliseconds(3000));
-  plumbd.ScanOnce();  // nothing was spoiled while nobody scanned
+  plumbd.ScanOnce();  // no frame was lost outside a scan
   EXPECT_THAT(plumbd.log(), Not(HasSubstr("unplug it")));
   EXPECT_THAT(plumbd.log(), Not(HasSubstr("the sensor does not work")));
 }
@@ -248,7 +248,7 @@ TEST_F(DaemonFaultTest, SigtermWhileScanningAndWhileWorkingEndsCleanly) {
     EXPECT_TRUE(ScanFolders(folder_ / "state").empty());
     Store store(folder_ / "state");
     EXPECT_EQ(store.recovery().interrupted_scans + store.recovery().orphaned_folders, 0)
-        << "there was nothing left to put right";
+        << "nothing was left to repair";
     EXPECT_EQ(store.scans.List("", 1).at(0).outcome, web::ScanOutcome::kCancelled);
   }
 }
@@ -342,7 +342,7 @@ TEST_F(DaemonFaultTest, AFullDiskFailsTheScanWithAReasonAndKeepsTheReference) {
 
 TEST_F(DaemonFaultTest, AStateFolderThatCannotBeWrittenIsSafeModeWithAReason) {
   const bool is_root =
-      ::geteuid() == 0;  // for whom modes mean nothing: take a place where nobody can make anything
+      ::geteuid() == 0;  // root ignores file modes: use a folder where even root cannot write
   const fs::path state = is_root ? fs::path("/proc/plumb-state") : folder_ / "locked" / "state";
   if (!is_root) {
     fs::create_directories(state.parent_path());

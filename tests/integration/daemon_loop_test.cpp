@@ -1,5 +1,5 @@
-// Nothing on plumbd's event loop takes over 10 ms: the real process tells by its own meter, after
-// what people do in a day.
+// Nothing on plumbd's event loop takes over 10 ms: the real process measures it itself, over
+// a day's typical use.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -22,8 +22,8 @@ using testing::Plumbd;
 
 constexpr bool kJudges = !testing::kIsSanitized;  // several times slower: only reported
 /// Seen by hand on a busy machine (load 8 to 10): 5 of 470 000 turns, all of them moving bytes
-/// only, with 10 to 14 ms of own time; supposedly interrupts, which the kernel charges to whoever
-/// runs. Work that is too long is too long each time.
+/// only, with 10 to 14 ms of own time; probably interrupts, which the kernel charges to the
+/// running process. Work that takes too long does so every time.
 constexpr int kAttempts = 2;
 constexpr std::size_t kBundleMiB = 320;  // removed on the loop it would cost 17 to 50 ms
 

@@ -150,7 +150,7 @@ TEST_F(DaemonPanelTest, AButtonThatChattersIsPressedOnceForEachPress) {
   EXPECT_EQ(plumbd.WaitForFrames(60)["state"], "scanning") << "a second press would have ended it";
   Press();
   plumbd.WaitForState("result");
-  EXPECT_THAT(plumbd.log(), Not(HasSubstr("ignored"))) << "a third one would have been told";
+  EXPECT_THAT(plumbd.log(), Not(HasSubstr("ignored"))) << "a third one would have been logged";
   Press(milliseconds(1700));
   plumbd.WaitForState("ready");
   EXPECT_EQ(WaitForPairs(plumbd, 15)["state"], "ready") << "the end of a long press is no press";
@@ -186,7 +186,7 @@ TEST_F(DaemonPanelTest, PressedDuringWorkingItIsIgnoredAndHeldDownItDiscardsTheS
   Press();
   plumbd.WaitForFrames(60);
   EdgeWithChatter('1');
-  plumbd.WaitForState("ready");  // once it has been down for long enough, whatever is going on
+  plumbd.WaitForState("ready");  // once held down for long enough, in any state
   EdgeWithChatter('0');
   EXPECT_EQ(WaitForPairs(plumbd, 15)["state"], "ready");
 }
@@ -224,7 +224,7 @@ TEST_F(DaemonPanelTest, TheLightShowsNoSensorReadyAndFault) {
   ExpectLength({"red"}, 80);
   ExpectLength({}, 80);
   EXPECT_EQ(plumbd.Stop(), 0);
-  EXPECT_EQ(Phases().back().on, Lamps{}) << "dark when nobody watches";
+  EXPECT_EQ(Phases().back().on, Lamps{}) << "the lamps are off after plumbd has ended";
 }
 
 TEST_F(DaemonPanelTest, WhileTheServiceDoesNotRunTheLightSaysSo) {

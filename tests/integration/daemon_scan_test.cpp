@@ -163,7 +163,7 @@ TEST_F(DaemonScanTest, AResultIsPutAwayAfterItsTimeAndThePressStartsTheNextScanB
   plumbd.WaitForLog("read again");
   EXPECT_EQ(plumbd.Press()["ok"], true) << "its 600 s are not over";
   const json later = plumbd.WaitForState("ready");
-  EXPECT_TRUE(later["last_result"].is_object()) << "the last result is still told";
+  EXPECT_TRUE(later["last_result"].is_object()) << "the status still has the last result";
   EXPECT_NE(later["last_result"]["scan"], first["last_result"]["scan"])
       << "there was a second scan";
 }
@@ -176,7 +176,7 @@ TEST_F(DaemonScanTest, WatchersSeeStatesAndProgressAndTheSocketIsTheOwnersOnly) 
                 {.num_cpus = 0, .max_file_bytes = 0, .stdout_path = {}});
   struct stat status {};
   ASSERT_EQ(::stat(plumbd.socket().c_str(), &status), 0);
-  EXPECT_EQ(status.st_mode & 0117, 0U) << "nobody but owner and group";
+  EXPECT_EQ(status.st_mode & 0117, 0U) << "only owner and group have access";
   ASSERT_TRUE(watch.WaitForStdout("\"status\""));
   EXPECT_EQ(plumbd.Press()["ok"], true);
   plumbd.WaitForFrames(30);

@@ -35,7 +35,7 @@ class DaemonSensorTest : public ::testing::Test {
   static void SetUpTestSuite() { testing::RenderOnce(); }
 
   /// The virtual sensor is seen through OpenNI2, as real ones are. plumbd keeps its recordings,
-  /// which tell what calibration a scan was made with, and the virtual sensor's files are in our
+  /// which record the calibration that a scan used, and the virtual sensor's files are in our
   /// reach.
   [[nodiscard]] testing::PlumbdOptions Options(const std::string& more = {}, int scenes = 1) const {
     std::ofstream(folder_ / "plumb.toml") << "[sensor]\ndriver = \"virtual-openni\"\n"
@@ -121,7 +121,7 @@ TEST_F(DaemonSensorTest,
   ASSERT_EQ(plumbd.Press()["ok"], true);
   plumbd.WaitForFrames(20);
   plumbd.Sim("unplug");
-  plumbd.Sim("plug", kSecond);  // at once: nobody can be quicker
+  plumbd.Sim("plug", kSecond);  // at once, faster than anyone can do it by hand
   const json status = WaitForSensor(plumbd, kSecond);
   EXPECT_TRUE(status["last_result"].is_null()) << "no scan of two units";
   EXPECT_TRUE(fs::is_empty(plumbd.state() / "scans"));

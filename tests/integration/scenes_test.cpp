@@ -60,7 +60,7 @@ TEST_F(ScenesTest, AProfileLearnedFromASweepServesTheNext) {
   EXPECT_EQ(facts.at("sensor_profile"), "unit.json, 1 sweep");
   const json without = json::parse(ReadText(SmallScene(Current()) / "scene.json"));
   EXPECT_TRUE(without.at("sensor_profile").is_null());
-  // It acts: one that is far surer of itself draws every value to it, but for what a unit may
+  // It has an effect: a far more certain one draws every value to it, except what a unit may
   // change by between two sweeps.
   json sure = json::parse(learned.out);
   for (json& entry : sure.at("covariance")) entry = 1e-6 * entry.get<double>();

@@ -40,13 +40,13 @@ sed 's/~deb12u2/~deb12u1/' tracker.json >mended.json
 run --sbom sbom.spdx --tracker mended.json
 check "nothing waits" '^0 2 source' "$code $(grep -c '^CVE' out) $(grep -o source out | head -1)"
 run --sbom sbom.spdx --tracker tracker.json --suite bullseye
-check "a suite that nobody judged is no all-clear" '^3 .*none is judged for bullseye' "$code $(cat out)"
+check "a suite without an assessment is not an all-clear" '^3 .*none is judged for bullseye' "$code $(cat out)"
 run --sbom tracker.json --tracker tracker.json
 check "no list of packages is no all-clear" '^3 .*expected an SPDX list' "$code $(cat out)"
 echo '[]' >list.json
 run --sbom sbom.spdx --tracker list.json
-check "another file is told" '^3 .*expected an object' "$code $(cat out)"
+check "another file is reported" '^3 .*expected an object' "$code $(cat out)"
 head -c 200 tracker.json >cut.json
 run --sbom sbom.spdx --tracker cut.json
-check "half a file is told" '^3 cves: ' "$code $(cat out)"
+check "half a file is reported" '^3 cves: ' "$code $(cat out)"
 exit $failed

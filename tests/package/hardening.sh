@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Reads back from every ELF file below FOLDER what the build asked for. One line a file; exit code 1 if anything is missing.
 #   hardening.sh FOLDER
-# Copies of Debian's own libraries are Debian's matter: they are listed, and held against nothing.
+# Copies of Debian's own libraries are Debian's responsibility: they are listed but not checked.
 set -euo pipefail
 export LC_ALL=C
 failed=0 files=0

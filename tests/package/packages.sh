@@ -67,7 +67,7 @@ check "the configuration as delivered is good" tree/plumbd/usr/bin/plumbd --conf
 sed -E 's/^# ([a-z_]+ = )/\1/' tree/plumbd/etc/plumb/plumb.toml >examples.toml
 check "its examples are good" tree/plumbd/usr/bin/plumbd --config examples.toml --check-config
 
-# Options in a page as man shows it, and those that --help tells.
+# Options in a page as man shows it, and those that --help prints.
 shown() { MANWIDTH=1000 man -l "$1" 2>/dev/null | col -b; }
 every_option_is_in_the_manual() {
   local command option bad=0 page

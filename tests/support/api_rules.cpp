@@ -218,12 +218,12 @@ TEST_F(ApiRules, AReferenceIsApprovedByASecondPersonAsItWasPlanned) {
   EXPECT_EQ(technician.Get("/api/v1/patients/" + patient).json()["approved_reference_id"], id);
   EXPECT_EQ(Open(technician, patient, "fraction").status, 200);
 
-  // What is approved stays as it is: another plan is a draft of its own.
+  // An approved plan is never changed: another plan becomes a separate draft.
   json other = Plan(2);
   other["posture"] = "HFS";
-  const HttpAnswer anew = physicist.Put(path + "/plan", other);
-  EXPECT_THAT(anew.status, ::testing::AnyOf(200, 201)) << anew.body;
-  EXPECT_NE(anew.json().value("id", id), id);
+  const HttpAnswer replaced = physicist.Put(path + "/plan", other);
+  EXPECT_THAT(replaced.status, ::testing::AnyOf(200, 201)) << replaced.body;
+  EXPECT_NE(replaced.json().value("id", id), id);
   EXPECT_EQ(technician.Get(path).json()["plan"]["posture"], "FFP");
   EXPECT_EQ(technician.Get("/api/v1/patients/" + patient).json()["approved_reference_id"], id);
 }
@@ -337,9 +337,10 @@ TEST_F(ApiRules, AWipedPatientIsGoneWithEverythingThatBelongsToThem) {
 
 TEST_F(ApiRules, AccountsAreOfOneNameAndTheLastEngineerStays) {
   HttpClient engineer = LoggedIn("engineer"), technician = LoggedIn("technician");
-  const json anew = {{"name", "technician"}, {"role", "physicist"}, {"password", kFirstPassword}};
-  EXPECT_EQ(technician.Post("/api/v1/users", anew).status, 403);
-  EXPECT_EQ(engineer.Post("/api/v1/users", anew).status, 409);
+  const json new_account = {
+      {"name", "technician"}, {"role", "physicist"}, {"password", kFirstPassword}};
+  EXPECT_EQ(technician.Post("/api/v1/users", new_account).status, 403);
+  EXPECT_EQ(engineer.Post("/api/v1/users", new_account).status, 409);
   EXPECT_EQ(engineer.Put("/api/v1/users/engineer", {{"disabled", true}}).status, 409);
   EXPECT_EQ(engineer.Put("/api/v1/users/engineer", {{"role", "technician"}}).status, 409);
   EXPECT_EQ(engineer.Put("/api/v1/users/none", {{"disabled", true}}).status, 404);

@@ -31,8 +31,8 @@ extern "C" __attribute__((visibility("default"))) int clock_gettime(clockid_t cl
 }
 
 // OpenNI2 waits for the end of its threads until a time of the wall clock and then cancels them. A
-// clock that really steps takes the kernel's along; ours does not, so that time is told to the
-// kernel in the kernel's own.
+// clock that really steps is also the kernel's clock; this one is not, so the time is converted
+// to the kernel's clock.
 extern "C" __attribute__((visibility("default"))) int pthread_timedjoin_np(
     pthread_t thread, void** result, const timespec* deadline) {
   static const auto kJoin =

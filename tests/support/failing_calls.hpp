@@ -17,7 +17,7 @@ struct CallFault {
   const char* folder = "";  ///< Only of files below it.
 };
 
-/// Counting begins anew. @return False where the library is not loaded.
+/// Restarts the count. @return False where the library is not loaded.
 inline bool Arm(const CallFault& fault) {
   using Function = void(int, long, int, int, const char*);
   auto* const arm = reinterpret_cast<Function*>(::dlsym(RTLD_DEFAULT, "plumb_arm_fault"));

@@ -477,8 +477,8 @@ bool FakeAppliance::RunInBackground(web::BackgroundPool, std::function<void()> w
     work();
     done();
   };
-  if (hold_aside) {
-    held_aside.push_back(both);
+  if (hold_background_work) {
+    held_background_work.push_back(both);
   } else {
     both();
   }

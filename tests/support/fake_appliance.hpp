@@ -80,10 +80,10 @@ class FakeAppliance : public web::BackgroundWork,
   bool hold_completions = false;
   std::vector<std::function<void()>> held;
 
-  /// Set: what is to be done aside waits here until the test does it: the work, then what follows
+  /// If set, background work waits here until the test runs it: the work, then what follows
   /// on the loop.
-  bool hold_aside = false;
-  std::vector<std::function<void()>> held_aside;
+  bool hold_background_work = false;
+  std::vector<std::function<void()>> held_background_work;
   bool refuse_background_work = false;  ///< Too much waits already.
 
   /// Moves a running scan on. @param now  Any clock that grows.

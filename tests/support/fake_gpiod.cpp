@@ -17,7 +17,7 @@
 struct gpiod_line {
   std::string name;
   int button = -1;
-  bool is_pressed = false;  // as the edges told that were read
+  bool is_pressed = false;  // the state after the edges read so far
 };
 struct gpiod_chip {
   std::vector<std::unique_ptr<gpiod_line>> lines;  // the chip's, as in libgpiod: gone with it

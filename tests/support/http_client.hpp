@@ -84,7 +84,7 @@ class HttpClient {
 [[nodiscard]] bool AddAccount(std::uint16_t port, HttpClient& engineer, const std::string& name,
                               const std::string& role);
 
-/// Serves on a thread of its own until destroyed; `each_turn` runs there after each turn.
+/// Serves on a separate thread until destroyed; `each_turn` runs there after each turn.
 class ServingLoop {
  public:
   explicit ServingLoop(web::HttpServer& server, std::function<void()> each_turn = {});

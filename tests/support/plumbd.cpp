@@ -147,7 +147,7 @@ json Plumbd::Sim(const std::string& action, const std::string& argument) const {
 }
 
 json Plumbd::Ask(const json& request) const {
-  (void)notifications();  // a socket that nobody reads makes its sender wait
+  (void)notifications();  // the sender blocks on a socket that is not read
   int fd = -1;
   try {
     fd = ConnectUnix(socket());
@@ -233,7 +233,7 @@ json Plumbd::ScanOnce() {
 void Plumbd::Signal(int signal) const { ::kill(pid_, signal); }
 
 int Plumbd::Wait() {
-  // Its notifications are read meanwhile: it waits for whoever does not.
+  // Its notifications are read meanwhile, because it blocks until they are.
   std::array<pollfd, 2> waits{
       {{static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0)), POLLIN, 0}, {notify_fd_, POLLIN, 0}}};
   while (waits[0].revents == 0 && (::poll(waits.data(), waits.size(), -1) > 0 || errno == EINTR))
@@ -294,7 +294,7 @@ long Plumbd::resident_kb() const {
 }
 
 void RenderOnce() {
-  if (std::getenv("PLUMB_TEST_FRAMES") != nullptr) return;  // whoever set it has
+  if (std::getenv("PLUMB_TEST_FRAMES") != nullptr) return;  // the variable is set
   fs::create_directories(PLUMB_TEST_CACHE);
   const int lock =
       ::open((fs::path(PLUMB_TEST_CACHE) / "lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);

@@ -30,7 +30,7 @@ struct PlumbdOptions {
 };
 
 /// Starts plumbd and speaks to it. Every wait is for a condition, with a generous end. Killed by
-/// its destructor if it still runs; under a sanitizer asked to end, and whatever that had to say is
+/// its destructor if it still runs; under a sanitizer asked to end, and the sanitizer's output is
 /// a failure.
 class Plumbd {
  public:
@@ -62,7 +62,7 @@ class Plumbd {
   /// Waits until the driver listens, which plumbd loads after it has begun to answer; a failure of
   /// the test if it then refuses.
   nlohmann::json Sim(const std::string& action, const std::string& argument = {}) const;
-  /// One request, one answer; an empty object if nobody answers.
+  /// One request, one answer; an empty object if there is no answer.
   [[nodiscard]] nlohmann::json Ask(const nlohmann::json& request) const;
 
   void Signal(int signal) const;
@@ -79,7 +79,7 @@ class Plumbd {
   [[nodiscard]] std::string setup_code() const;
   [[nodiscard]] const std::filesystem::path& state() const { return state_; }
   [[nodiscard]] std::filesystem::path socket() const { return folder_ / "control.sock"; }
-  /// What systemd was told, one message a line.
+  /// The messages sent to systemd, one per line.
   [[nodiscard]] std::string notifications() const;
 
   [[nodiscard]] int num_descriptors() const;

@@ -18,15 +18,15 @@ inline constexpr int kSlowness = 1;
 #endif
 inline constexpr bool kIsSanitized = kSlowness > 1;
 
-/// A figure of time or memory that must stay below a limit. Under a sanitizer it is told, but not
-/// held against the limit.
+/// A figure of time or memory that must stay below a limit. Under a sanitizer it is printed, but
+/// not compared with the limit.
 inline void ExpectBelow(const std::string& what, double figure, double limit) {
   if (!kIsSanitized) {
     EXPECT_LT(figure, limit) << what;
   } else {
     std::printf(
-        "%s: %.0f, not held against its limit of %.0f: a sanitizer takes time and memory of its "
-        "own\n",
+        "%s: %.0f, not compared with its limit of %.0f: a sanitizer itself takes time and "
+        "memory\n",
         what.c_str(), figure, limit);
   }
 }

@@ -7,8 +7,8 @@
 namespace plumb::testing {
 
 /// True if umockdev stands between this process and the system, as ctest arranges it.
-/// (umockdev_in_mock_environment() tells only once there is a test bed, and making one without it
-/// fails.)
+/// (umockdev_in_mock_environment() is valid only once there is a test bed, and making one without
+/// it fails.)
 [[nodiscard]] inline bool UnderUmockdev() {
   const char* preload = std::getenv("LD_PRELOAD");
   return preload != nullptr && std::string_view(preload).find("umockdev") != std::string_view::npos;

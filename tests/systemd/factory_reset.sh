@@ -58,7 +58,7 @@ start
 check "the configuration is the delivered one" '^same # changed secret$' \
   "$(cmp etc/plumb.toml "$PLUMB_DELIVERED" && echo same) $(cat etc/plumb.toml.before-reset etc/backup.key | xargs -d '\n')"
 check "the accounts are gone" 'setup code: ....-....' "$(cat log)"
-check "it is told" 'factory reset: records kept; 1 accounts' "$(cat log)"
+check "it is logged" 'factory reset: records kept; 1 accounts' "$(cat log)"
 check "what belongs to the sensor stays" '^data$' "$(cat state/calibration/S1.yaml)"
 check "the request is done" '^missing$' "$([ -e state/factory-reset.json ] || echo missing)"
 end
@@ -71,8 +71,8 @@ end
 start
 check "wiped: the configuration folder" '^plumb.toml$' "$(ls -A etc)"
 check "wiped: the sensor's files" '^missing$' "$([ -e state/calibration/S1.yaml ] || echo missing)"
-check "wiped: it is told" 'factory reset: everything that was stored has been removed' "$(cat log)"
-check "wiped: it begins anew" 'setup code: ....-....' "$(cat log)"
+check "wiped: it is logged" 'factory reset: everything that was stored has been removed' "$(cat log)"
+check "wiped: a new setup code is made" 'setup code: ....-....' "$(cat log)"
 end
 
 configure

@@ -23,7 +23,7 @@ healthy() {
   echo true >rauc
   export PLUMB_GATE_SELF_TEST=no
 }
-run() { "$gate" "$@" >told 2>&1 && code=0 || code=$?; }
+run() { "$gate" "$@" >log 2>&1 && code=0 || code=$?; }
 is_marked() { grep -c 'rauc status mark-good' calls || true; }
 
 healthy
@@ -42,7 +42,7 @@ check "on a machine where none was good, none is left" '^0 $' "$code $(cat calls
 
 refused() { # NAME SENTENCE
   run
-  check "$1" "^1 0 not marked good: $2" "$code $(is_marked) $(grep 'not marked' told || true)"
+  check "$1" "^1 0 not marked good: $2" "$code $(is_marked) $(grep 'not marked' log || true)"
   check "$1: nothing is remembered" '^none$' "$([ -e gate/good ] || echo none)"
 }
 healthy; echo 'exit 7' >curl
@@ -59,7 +59,7 @@ healthy; printf '#!/bin/sh\nmkdir -p "$5" 2>/dev/null; [ "$1" != compare ] || ec
 PLUMB_GATE_SELF_TEST=yes refused "a self test with a wrong answer" "the self test's body moved"
 healthy; echo 'exit 1' >rauc
 run
-check "RAUC refuses" '^1 .*RAUC cannot mark' "$code $(cat told)"
+check "RAUC refuses" '^1 .*RAUC cannot mark' "$code $(cat log)"
 
 healthy; echo 'echo "{\"status\":\"failed\",\"reason\":\"sensor: unplug it\"}"' >curl
 run

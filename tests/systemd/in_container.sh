@@ -60,7 +60,7 @@ before=$(show MainPID)
 kill -STOP "$before"
 await "restarted by the watchdog" 1 40 show NRestarts
 await "active again" "active running" 30 sh -c 'echo $(systemctl show plumbd -p ActiveState --value) $(systemctl show plumbd -p SubState --value)'
-check "told in the journal" "*Watchdog timeout*" "$(journalctl -u plumbd -o cat)"
+check "reported in the journal" "*Watchdog timeout*" "$(journalctl -u plumbd -o cat)"
 await "ready again" ready 20 plumb status --get state
 check "both scans are still there" "000001 000002" "$(ls /var/lib/plumb/scans | xargs)"
 

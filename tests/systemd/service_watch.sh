@@ -13,11 +13,11 @@ export PATH=$work/bin:$PATH PLUMB_WATCH_BOOT=$work/boot PLUMB_WATCH_KEPT=$work/k
 failed=0
 check() { if [[ $3 =~ $2 ]]; then echo "ok      $1"; else failed=1; printf 'FAILED  %s: expected %s, found %s\n' "$1" "$2" "$3"; fi; }
 called() { grep -c -- "$1" calls || true; }
-life() { # RESULT SECONDS: one life of plumbd; what was told is in `told`
+life() { # RESULT SECONDS: one life of plumbd; the output is in `log`
   : >calls
-  "$watch" before >told 2>&1
+  "$watch" before >log 2>&1
   echo "$(($(cut -d. -f1 uptime) + $2)).25 1" >uptime
-  SERVICE_RESULT=$1 "$watch" after >>told 2>&1
+  SERVICE_RESULT=$1 "$watch" after >>log 2>&1
 }
 
 life success 5
@@ -29,26 +29,26 @@ pauses=
 for i in 4 5 6 7 8 9; do life signal 5; pauses+="$(sed -n 's/^sleep //p' calls) "; check "failure $i restarts nothing" '^0$' "$(called reboot)"; done
 check "then the pauses grow, and stay within the unit's time to start" '^10 20 40 50 50 50 $' "$pauses"
 life watchdog 5
-check "the tenth restarts the machine" '^1 .*10 times in a row: the machine restarts \(1 of 3\)' "$(called 'systemctl --no-block reboot') $(cat told)"
+check "the tenth restarts the machine" '^1 .*10 times in a row: the machine restarts \(1 of 3\)' "$(called 'systemctl --no-block reboot') $(cat log)"
 
 restarted() { # the machine comes up again and plumbd fails ten times
   rm -rf boot
   echo "60.0 1" >uptime
   for _ in 1 2 3 4 5 6 7 8 9 10; do life exit-code 5; done
 }
-restarted; check "so does the next tenth" '\(2 of 3\)' "$(cat told)"
-restarted; check "and the next" '\(3 of 3\)' "$(cat told)"
-restarted; check "but no more" '^0 .*3 restarts of the machine did not help' "$(called reboot) $(cat told)"
+restarted; check "so does the next tenth" '\(2 of 3\)' "$(cat log)"
+restarted; check "and the next" '\(3 of 3\)' "$(cat log)"
+restarted; check "but no more" '^0 .*3 restarts of the machine did not help' "$(called reboot) $(cat log)"
 life exit-code 599
 check "just under ten minutes is no success" '^11$' "$(cat boot/failures)"
 life exit-code 600
-check "who has run for ten minutes starts to count anew" '^1 none$' "$(cat boot/failures) $([ -e kept/restarts ] || echo none)"
+check "a life of ten minutes resets the count" '^1 none$' "$(cat boot/failures) $([ -e kept/restarts ] || echo none)"
 life success 1
 check "an end that was asked for too" '^0$' "$(cat boot/failures)"
 
 rm -rf kept && touch kept
 for _ in 1 2 3 4 5 6 7 8 9 10; do life signal 5; done
-check "what cannot be counted is not done" '^0 .*not restarted, as that could not be counted' "$(called reboot) $(cat told)"
+check "no restart when it cannot be counted" '^0 .*not restarted, as that could not be counted' "$(called reboot) $(cat log)"
 echo "nonsense" >boot/failures
 life signal 5
 check "a damaged count is none" '^1$' "$(cat boot/failures)"

@@ -31,7 +31,7 @@ run
 check "the next start: not taken over again, but applied" '^0  Address=10.1.1.5/8' "$code $(cat out) $(grep Address run/systemd/network/10-plumb.network)"
 printf '[network]\naddress = "10.1.1.5"\n' >data/provision/plumb-provision.toml
 run
-check "a mistake is told with its line" 'plumb-provision.toml:2: network.address: expected an address with its prefix' "$(cat out)"
+check "a mistake is reported with its line" 'plumb-provision.toml:2: network.address: expected an address with its prefix' "$(cat out)"
 check "and the unit keeps what it had" 'Address=10.1.1.5/8' "$(cat run/systemd/network/10-plumb.network)"
 
 printf '[unit]\nhost_name = "stranger"\n' >stick/plumb-provision.toml

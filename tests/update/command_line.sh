@@ -79,7 +79,7 @@ check "a second time" '^0 .*is installed' "$(seen)"
 kill -TERM $daemon
 wait $daemon || true
 start two # the same system, though the other was installed
-for _ in $(seq 50); do told=$("$plumb" --control control status --get rolled_back); [ -z "$told" ] || break; sleep 0.1; done
-check "a machine that starts the previous system says so" 'version 9.1.0 was installed, but the machine has gone back' "$told"
+for _ in $(seq 50); do said=$("$plumb" --control control status --get rolled_back); [ -z "$said" ] || break; sleep 0.1; done
+check "a machine that starts the previous system says so" 'version 9.1.0 was installed, but the machine has gone back' "$said"
 check "in the journal too" 'gone back to the previous system' "$(cat log)"
 exit $failed

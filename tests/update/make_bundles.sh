@@ -62,7 +62,7 @@ head -c 2000000 /dev/zero >slots/a.img
 cp slots/a.img slots/b.img
 cat >boot-backend <<'SCRIPT'
 #!/bin/sh
-# RAUC's custom boot loader: what it is told is kept in files.
+# RAUC's custom boot loader: its state is kept in files.
 state=$(dirname "$0")/state
 echo "$@" >>"$state/calls"
 case "$1" in

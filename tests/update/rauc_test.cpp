@@ -1,5 +1,5 @@
-// Bundles through RAUC itself, on a bus and a machine made of files. plumbd's part runs as nobody,
-// as plumbd does: what RAUC takes over it cannot read any more.
+// Bundles through RAUC itself, on a bus and a machine made of files. plumbd's part runs as the user
+// nobody, without rights, as plumbd does: it cannot read files any more once RAUC owns them.
 #include <signal.h>
 #include <spawn.h>
 #include <sys/stat.h>
@@ -90,7 +90,7 @@ class RaucTest : public ::testing::Test {
                 std::string(PLUMB_SOURCE_DIR) + "/tests/update/make_bundles.sh " +
                     made_->path().string() + " >" + log + " 2>&1"});
     ASSERT_EQ(make.Wait(), 0) << Bytes(log);
-    fs::permissions(made_->path(), fs::perms(0755));  // nobody looks at the slots
+    fs::permissions(made_->path(), fs::perms(0755));  // user "nobody" reads the slots
   }
   static void TearDownTestSuite() { made_.reset(); }
 

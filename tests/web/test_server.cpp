@@ -272,7 +272,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     std::string axis, posture;
     double amount = 0;
     words >> axis >> amount >> posture;
-    std::string room;  // "bare": nobody ever said how the room lies
+    std::string room;  // "bare": the room's directions were never set
     words >> room;
     service.next_recorded = Moved(recorder, axis, amount, posture, room != "bare");
   }

@@ -37,7 +37,7 @@ Verdict VerdictOf(const Evidence& evidence, const AcceptanceLimits& limits = {})
   return decision.verdict;
 }
 
-// One gate at its boundary: `good` must pass, `bad` must refuse with a reason of its own.
+// One gate at its boundary: `good` must pass, `bad` must refuse with its own reason.
 void ExpectGate(const Evidence& good, const Evidence& bad, const char* reason) {
   EXPECT_EQ(VerdictOf(good), Verdict::kInTolerance) << reason;
   const Decision refused = Decide(bad, {});

@@ -237,7 +237,7 @@ TEST_F(ApplianceTest, TheMachineIsNotRestartedUnderAScan) {
   });
 }
 
-/// What ResetToFactory() answers in the end. Not on the loop: it writes aside.
+/// The final answer of ResetToFactory(). It writes in the background, not on the loop.
 web::Change AskedToReset(WebServices& services, EventLoop& loop, web::FactoryReset kind) {
   auto answered = std::make_shared<std::promise<web::Change>>();
   loop.Post("test", [&services, answered, kind] {
@@ -472,7 +472,7 @@ class ApplianceRoomTest : public ApplianceProfileTest {
            })
         .result;
   }
-  /// Where the gantry is on a map, as the page is told; nothing: nobody knows.
+  /// Where the gantry is on a map, as reported to the page; empty when it is not known.
   std::optional<Eigen::Vector2d> Gantry() {
     std::optional<Eigen::Vector2d> gantry;
     On([&] {

@@ -56,7 +56,7 @@ TEST(LiveSurfaceTest, ShowsTheSurfaceWhereItWasSeenAndNowhereElse) {
   EXPECT_NEAR(HeightAt(*view, 0.0, 0.0), 0.1, 1e-3);
   EXPECT_NEAR(HeightAt(*view, kHalf_m - 0.05, 0.0), 0.1, 1e-3);
   EXPECT_TRUE(std::isnan(HeightAt(*view, kHalf_m + 0.15, 0.0)));
-  EXPECT_FALSE(view->coverage) << "without a region nobody knows what is missing";
+  EXPECT_FALSE(view->coverage) << "without a region, coverage is not defined";
   EXPECT_TRUE(view->missing.empty());
 }
 

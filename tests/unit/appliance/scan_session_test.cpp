@@ -1,4 +1,4 @@
-// Scans of a still wall: how they end, and what they tell on the way.
+// Scans of a still wall: how they end, and what they report meanwhile.
 #include "daemon/appliance/scan_session.hpp"
 
 #include <condition_variable>
@@ -43,7 +43,7 @@ class ScanSessionTest : public ::testing::Test {
   void Push(int num_frames) {
     for (int i = 0; i < num_frames; ++i) session_->feed()->Push(FakeBus::Wall(next_++));
   }
-  /// The sweep goes on until it is told: nobody closes the feed.
+  /// The sweep continues until it is stopped; the feed is not closed.
   void PushUntilTheEnd() {
     const auto has_ended = [&] {
       const std::lock_guard lock(mutex_);

@@ -89,8 +89,7 @@ TEST(ScanStateTest, AScanStartsOnlyWithAWorkingSensorAndNoScanUnderWay) {
 }
 
 TEST(ScanStateTest, ARunningScanIsNeverForgotten) {
-  // It leaves its phases only through one of its own ends: nothing else may take the appliance
-  // elsewhere.
+  // Only the scan's own end events may leave its phases; no other event may change the state.
   ForEveryStateAndEvent([](const ScanState& before, E event, const ScanTransition& t) {
     if (!IsRunning(before)) return;
     const bool is_end =
@@ -139,7 +138,8 @@ ScanTransition After(const std::vector<E>& events) {
   return t;
 }
 
-// It is told once only, so nothing else may make the appliance ask for a sensor that is attached.
+// The failure is reported only once, so no other event may make the appliance ask for a sensor that
+// is attached.
 TEST(ScanStateTest, ASensorThatFailsDuringAnotherFaultFailsStillWhenThatIsOver) {
   ScanTransition t = After({E::kSensorReady, E::kStart, E::kScanFailed, E::kSensorFailed});
   EXPECT_EQ(t.state.fault, FaultKind::kScan);

@@ -15,7 +15,7 @@ using testing::FakeProvider;
 using Kind = SensorEvent::Kind;
 using std::chrono::milliseconds;
 
-/// Collects what the sensor thread tells.
+/// Collects the events of the sensor thread.
 class Events {
  public:
   void operator()(const SensorEvent& event) {
@@ -142,7 +142,7 @@ TEST_F(SensorThreadTest, AScanGetsNoFrameOfTheSensorThatComesAfterItsOwnWasUnplu
   const int taken = bus_.taken();
   for (int i = 0; i < 3; ++i) bus_.GiveFrame();
   while (bus_.taken() < taken + 3) std::this_thread::yield();
-  EXPECT_EQ(feed->num_pushed(), pushed) << "nobody has ended the scan yet";
+  EXPECT_EQ(feed->num_pushed(), pushed) << "the scan has not been ended yet";
   const auto next = std::make_shared<LiveFeed>(10);
   thread_->BeginScan(next);
   while (next->num_pushed() == 0) bus_.GiveFrame();
@@ -177,7 +177,7 @@ TEST_F(SensorThreadTest, AFailureIsToldOnceAndTriedAgain) {
   EXPECT_EQ(events_.At(1).kind, Kind::kFailed);
   EXPECT_EQ(events_.At(1).reason, "no permission; see plumb doctor");
   bus_.GiveFrame();
-  EXPECT_EQ(events_.At(2).kind, Kind::kReady) << "by itself, nobody plugged anything";
+  EXPECT_EQ(events_.At(2).kind, Kind::kReady) << "by itself, without anything being plugged in";
   bus_.FailOnce("no pair for 2 s");
   EXPECT_EQ(events_.At(3).reason, "no pair for 2 s");
   bus_.GiveFrame();
@@ -241,7 +241,7 @@ TEST_F(SensorThreadTest, EndsAtOnceWhileItWaitsForAFrame) {
   Start();
   bus_.Plug("A");
   while (bus_.opened() == 0) std::this_thread::yield();
-  thread_.reset();  // would hang if nobody interrupted the sensor
+  thread_.reset();  // would hang if the sensor were not interrupted
 }
 
 TEST_F(SensorThreadTest, AStalledProcessFailsTheScanAndKeepsTheSensor) {

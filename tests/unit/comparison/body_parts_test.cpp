@@ -106,7 +106,7 @@ class Lying {
     return DescribeBody(view);
   }
 
-  /// As where nobody ever said how the room lies.
+  /// As where the room's directions were never set.
   [[nodiscard]] BodyParts DescribeWithoutRoom(std::optional<PatientPosture> posture) const {
     return DescribeBody({reference_, deviation_, mask_, mask_, Pose::Identity(), std::nullopt,
                          MarkerKind::kRoom, posture});

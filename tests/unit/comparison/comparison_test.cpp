@@ -315,7 +315,7 @@ TEST(ComparisonTest, WithoutASupportOnlyADrawnRegionGetsAVerdict) {
       Compare(floorless, MakeSyntheticScene(MovedBy(Pose::Identity(), reference)));
   EXPECT_EQ(all.verdict, Verdict::kNoAnswer);
   EXPECT_THAT(all.reasons.at(0), HasSubstr("no flat support was found in the reference scan"));
-  EXPECT_TRUE(all.motion) << "what was computed is told";
+  EXPECT_TRUE(all.motion) << "the computed motion is reported";
 
   CompareOptions drawn;
   drawn.region_polygon_m = {{0.35, 0.25}, {0.85, 0.25}, {0.85, 0.65}, {0.35, 0.65}};

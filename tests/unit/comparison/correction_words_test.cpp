@@ -73,7 +73,7 @@ TEST(CorrectionWordsTest, EveryPostureNumberAndSignHasItsWords) {
   }
 }
 
-// Where nobody has said how the room lies: `turn_deg` from the marker's y axis to the head,
+// Where the room's directions are not set: `turn_deg` from the marker's y axis to the head,
 // counter- clockwise from above; the plan's "head first" says nothing then, supine and prone do.
 std::array<std::string, 6> WithoutRoom(double turn_deg, PatientPosture posture, double sign,
                                        MarkerKind kind = MarkerKind::kRoom) {

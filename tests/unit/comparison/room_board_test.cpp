@@ -156,7 +156,7 @@ TEST(RoomFitTest, FindsTheRoomFromScansOfDifferentFrames) {
   EXPECT_NEAR(fit.turn_rad, 0, 1e-6);
   EXPECT_THAT(WhyNotSign(fit, scans.size()), IsEmpty());
   EXPECT_THAT(WhyNotSign(fit, 2), HasSubstr("2 of 3 scans"));
-  // The room's markers stand where they stand in the room, whatever frame another scan has.
+  // The room's markers keep their poses in the room, whatever coordinate frame another scan has.
   EXPECT_TRUE(
       fit.markers_iec.at(5).corners[0].isApprox(SeenRoom(Pose::Identity()).at(5).corners[0], 1e-6));
   const auto T = RoomOf(fit.markers_iec, SeenRoom(PoseOfScan(0.1)));

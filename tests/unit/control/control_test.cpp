@@ -108,7 +108,7 @@ TEST(UnixSocketTest, ReplacesTheSocketOfADeadProcessOnly) {
   const int second = ListenUnix(folder / "s");
   struct stat status {};
   ASSERT_EQ(::stat((folder / "s").c_str(), &status), 0);
-  EXPECT_EQ(status.st_mode & 0117, 0U) << "nobody but owner and group";
+  EXPECT_EQ(status.st_mode & 0117, 0U) << "only owner and group have access";
   ::close(second);
   EXPECT_THAT(MessageOf<DeviceError>([&] { ::close(ConnectUnix(folder / "s")); }),
               HasSubstr("running"));

@@ -176,7 +176,7 @@ TEST(DeformationErrorTest, MeasuresAcrossTheSurfaceWithAndWithoutTheField) {
     field.shifts_m.emplace_back(-0.003F * above);  // where it should stay
     field.observed.push_back(1);
   }
-  field.points.emplace_back(0.0F, 0.0F, 0.5F);  // far off, but nobody saw it
+  field.points.emplace_back(0.0F, 0.0F, 0.5F);  // far off, but never seen
   field.shifts_m.emplace_back(Eigen::Vector3f::Zero());
   field.observed.push_back(0);
   const DeformationError error = ErrorOfDeformation(field, T_motion, truth);

@@ -30,8 +30,8 @@ using ::testing::HasSubstr;
 using testing::MessageOf;
 using Clock = Button::Clock;
 
-/// A chip of 8 lines: 3 is the button, 5 to 7 are lights. Its ioctls are answered by libumockdev on
-/// a thread of its own.
+/// A chip of 8 lines: 3 is the button, 5 to 7 are lights. libumockdev answers its ioctls on a
+/// separate thread.
 class FakeChip {
  public:
   FakeChip() : testbed_(umockdev_testbed_new()), handler_(umockdev_ioctl_base_new()) {

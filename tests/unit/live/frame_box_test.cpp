@@ -34,9 +34,9 @@ TEST(FrameBoxTest, TheFirstPairsAreThrownAway) {
   EXPECT_EQ(box.Take()->images.depth_us, 66'000);
 }
 
-// Stopping the whole process looks to Take() as if it was not called: nobody listened, and what
-// comes in that time says nothing of the sensor.
-TEST(FrameBoxTest, WhoDidNotListenDoesNotBlameTheSensor) {
+// To Take(), a stop of the whole process looks as if it was not called: nothing was read, and the
+// frames of that time are no evidence against the sensor.
+TEST(FrameBoxTest, AStoppedProcessDoesNotBlameTheSensor) {
   constexpr milliseconds kStallTime{300};
   FrameBox box("X", milliseconds(20), kStallTime);
   box.Begin(0);
@@ -71,7 +71,7 @@ TEST(FrameBoxTest, WhoWasBusyWhilePairsCameHasMissedThem) {
     box.Add(StreamKind::kColor, 33'000 * i, {});
     std::this_thread::sleep_for(milliseconds(10));
   }
-  EXPECT_TRUE(box.Take()) << "the process ran all the time, only nobody took";
+  EXPECT_TRUE(box.Take()) << "the process ran all the time, but Take() was not called";
   EXPECT_GT(box.statistics().num_lost, 0);
 }
 

@@ -64,7 +64,7 @@ TEST_F(VirtualProviderTest, EveryFrameOfASweepComesAsTheSimulatorMadeIt) {
   EXPECT_NEAR(sensor->info().intrinsics.fx, camera_.intrinsics.fx, 1e-6);
   EXPECT_EQ(sensor->info().reference_marker, camera_.reference_marker);
   const auto truth = simulated::MakeSource(simulated::PlanSuite(ScenesOf(Small())), 0);
-  std::vector<simulated::RawFrame> expected;  // rendered first: the sensor waits for nobody
+  std::vector<simulated::RawFrame> expected;  // rendered first: the sensor does not wait
   while (const std::optional<Frame> frame = truth->Next())
     expected.push_back(simulated::MakeRaw(*frame, truth->sweep().start_time_s));
   ASSERT_THAT(expected, SizeIs(static_cast<std::size_t>(Small().frames)));

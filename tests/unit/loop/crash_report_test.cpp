@@ -86,7 +86,7 @@ TEST(CrashReportTest, TellsAnAbortAndASignalFromOutside) {
   EXPECT_THAT(bus.reported, HasSubstr("crashed: SIGBUS, "));
 }
 
-/// A stack that has run out leaves no room for a handler but on a stack of its own.
+/// A stack that has run out has no room for a handler, which therefore needs a separate stack.
 TEST(CrashReportTest, TellsThatTheStackHasRunOut) {
   if (IsSanitized()) GTEST_SKIP() << "the sanitizer reports crashes itself";
   struct Deep {

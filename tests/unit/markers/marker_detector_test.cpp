@@ -75,7 +75,7 @@ TEST(MarkerDetectorTest, NearExpectedPlacesItFindsTheSameToTheLastBit) {
     return expected;
   };
   const MarkerDetection near = detector.DetectNear(image, expected_off_by(18));
-  ASSERT_THAT(Ids(near), ElementsAre(4, 9)) << "nobody asked for 17";
+  ASSERT_THAT(Ids(near), ElementsAre(4, 9)) << "17 was not asked for";
   for (std::size_t i = 0; i < 2; ++i) {
     EXPECT_EQ(near.markers[i].corners, all.markers[i].corners);
     EXPECT_EQ(near.markers[i].sigma_px, all.markers[i].sigma_px);

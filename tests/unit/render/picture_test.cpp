@@ -69,7 +69,7 @@ TEST(ErrorImageTest, HolesAreGreyAndNeverTheColourOfZero) {
 }
 
 TEST(ErrorImageTest, CarriesTheNoticeInThePicture) {
-  // The strip of the notice in its own ink and paper at the foot of the page, whatever the map.
+  // The strip of the notice has its own colours at the foot of the page, for every map.
   const cv::Mat picture = DrawErrorImage(Flat(0));
   const cv::Mat foot = picture.rowRange(picture.rows - 30, picture.rows);
   EXPECT_GT(Share(foot, {253, 240, 222}), 0.5);

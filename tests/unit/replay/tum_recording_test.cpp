@@ -43,7 +43,7 @@ StreamInfo SmallCamera() {
   return info;
 }
 
-/// Frame i: a grey of its own and a depth of its own, with one column of nothing.
+/// Frame i: its own grey level and its own depth, with one column without depth.
 Frame NumberedFrame(int i, int width = 64, int height = 48) {
   Frame frame;
   frame.index = i;
@@ -147,7 +147,7 @@ TEST_F(TumRecordingTest, UnmatchedImagesAreLeftOutAndCounted) {
   EXPECT_EQ(after_gap->index, 3);
 }
 
-// A recording of its own rate whose depth stamps lie that much later.
+// A recording with a given frame rate whose depth stamps are later by the given time.
 std::unique_ptr<TumRecording> OpenWithOffset(const fs::path& folder, double rate_hz,
                                              double offset_s) {
   TumWriter writer(folder, SmallCamera(), {.jpeg_quality = 0});

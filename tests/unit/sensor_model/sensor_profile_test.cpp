@@ -25,7 +25,7 @@ double Sigma(const SensorProfile& profile, int term) {
   return std::sqrt(profile.covariance(term, term));
 }
 
-// A sweep that sees two terms, each with this standard deviation of its own, at these values; and
+// A sweep that sees two terms, each with this standard deviation, at these values; and
 // what a solver makes of it under the prior.
 SweepEvidence Sweep(const CalibrationPrior& prior, double focal, double scale, double sigma) {
   SweepEvidence evidence;

@@ -243,7 +243,8 @@ TEST(FaultsTest, ATremblingHandHasItsSizeAndSpeed) {
     last = away;
   }
   EXPECT_NEAR(std::sqrt(shift), 0.004, 0.0004);
-  // Who swings the sensor aside turns it back: a shifted sensor is a turned one, so a little more.
+  // An operator who swings the sensor to the side turns it back towards the scene, so a shift is
+  // also a turn, and the limit is a little larger.
   EXPECT_NEAR(std::sqrt(turn), 0.4 * kDegree, 0.1 * kDegree);
   EXPECT_GT(std::sqrt(speed), 0.05);
   EXPECT_LT(std::sqrt(speed), 0.15);

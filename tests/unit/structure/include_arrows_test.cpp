@@ -1,4 +1,4 @@
-// The folders' dependencies, written by hand and held against every #include of the product.
+// The folders' dependencies, written by hand and compared with every #include of the product.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -48,8 +48,8 @@ TEST(BundleAdjust, FindsDisturbedPosesWithTheCalibrationAsStated) {
   EXPECT_LE(summary.num_iterations, 8);
 }
 
-// One parameter of the sensor wrong at a time: the solve must find just that, whatever the sign.
-// A field that waves over the image bends the path of a camera whose model has no field.
+// One parameter of the sensor wrong at a time: the solve must find exactly that one, for either
+// sign. A field that waves over the image bends the path of a camera whose model has no field.
 TEST(BundleAdjust, FindsADepthImagesDistortion) {
   synthetic::MapOptions options;
   options.sensor.depth[kDepthField + 6] = 0.003;
@@ -95,7 +95,7 @@ TEST(BundleAdjust, FindsWhereDepthLiesOnTheColourImage) {
     BundleOptions bundle = FreeAllButTheFirst(map);
     bundle.calibrate = true;
     bundle.fix_depth_field = true;
-    bundle.keypoint_depth_sigmas = 1.0;  // The landscape is no plane between the two places.
+    bundle.keypoint_depth_sigmas = 1.0;  // The landscape is not a plane between the two places.
     for (int i = 0; i < 2; ++i) BundleAdjust(truth.stated, bundle, {}, map, found);
     return Compare(map, truth.map).translation_m;
   };

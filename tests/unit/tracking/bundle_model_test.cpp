@@ -121,7 +121,7 @@ TEST(BundleModel, DerivativesOfAPredictedDepth) {
         return Eigen::Matrix<double, 1, 1>(predict(moved).z_m);
       });
   EXPECT_LT(worst, 1e-7);
-  // What the model corrects, it also predicts, but for the growth's own change between the true and
+  // The model also predicts what it corrects, except for the growth's change between the true and
   // the measured depth: measured -> corrected -> measured.
   const SeenPoint seen = See(SomeCamera(), kPoint, 0.0);
   const double raw_m = PredictDepth(calibration, seen, place).z_m;

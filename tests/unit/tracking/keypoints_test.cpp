@@ -72,7 +72,7 @@ TEST(Keypoints, FollowsThroughAChangeOfTheExposureOnceItsRatioIsKnown) {
   EXPECT_LT(found(from), corners.size() / 2) << "the change does no harm: nothing is tested";
   EXPECT_GT(found(from * ratio), corners.size() * 8 / 10);
   EXPECT_EQ(BrightnessRatio(from, darker, {corners[0]}, {corners[0]}), 1.0)
-      << "one point tells nothing";
+      << "one point is not enough";
 }
 
 TEST(Keypoints, LosesWhatIsNoLongerThere) {

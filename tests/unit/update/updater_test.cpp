@@ -292,7 +292,7 @@ TEST_F(UpdaterTest, AGoodBundleIsInstalledWithProgress) {
   });
 }
 
-/// One installs 9.0 from system A; the test then starts the machine as if anew.
+/// One installs 9.0 from system A; the test then simulates a restart of the machine.
 class RollBackTest : public UpdaterTest {
  protected:
   void InstallAndEnd() {

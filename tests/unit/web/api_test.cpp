@@ -135,7 +135,7 @@ TEST_F(ApiTest, TheDailyCheckIsOpenedScannedAndBecomesABaseline) {
     });
   };
   scan();
-  EXPECT_TRUE(service_.scans.empty()) << "a check is no scan of a patient";
+  EXPECT_TRUE(service_.scans.empty()) << "a check is not a scan of a patient";
   const nlohmann::json first = technician.Get("/api/v1/checks").json();
   ASSERT_EQ(first["checks"].size(), 1U);
   EXPECT_EQ(first["checks"][0]["status"], "no_baseline");
@@ -341,8 +341,8 @@ TEST_F(UploadTest, ABrokenUploadLeavesNothing) {
 TEST_F(UploadTest, OnlyAnEngineerSendsBundles) {
   for (const char* name : {"technician", "physicist"})
     EXPECT_EQ(Send(LoggedIn(name), "a.raucb", "hsqs" + std::string(5000, 'x')).status, 403);
-  HttpClient nobody(port_);
-  EXPECT_EQ(Send(nobody, "a.raucb", "hsqs" + std::string(5000, 'x')).status, 401);
+  HttpClient logged_out(port_);
+  EXPECT_EQ(Send(logged_out, "a.raucb", "hsqs" + std::string(5000, 'x')).status, 401);
   EXPECT_TRUE(BecomesEmpty());
 }
 

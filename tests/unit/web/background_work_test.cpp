@@ -20,20 +20,20 @@ class AsideTest : public WebTest {
     });
     SetUpAccounts();
     engineer_ = std::make_unique<HttpClient>(LoggedIn("engineer"));
-    loop_->Do([&] { service_.hold_aside = true; });
+    loop_->Do([&] { service_.hold_background_work = true; });
   }
 
   /// Does what has been waiting. @return How much that was.
   std::size_t DoHeld() {
     std::size_t count = 0;
     loop_->Do([&] {
-      for (const auto& held : std::exchange(service_.held_aside, {})) held(), ++count;
+      for (const auto& held : std::exchange(service_.held_background_work, {})) held(), ++count;
     });
     return count;
   }
   [[nodiscard]] std::size_t NumHeld() {
     std::size_t count = 0;
-    loop_->Do([&] { count = service_.held_aside.size(); });
+    loop_->Do([&] { count = service_.held_background_work.size(); });
     return count;
   }
   void WaitUntilHeld() {

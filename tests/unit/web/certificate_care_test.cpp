@@ -1,4 +1,4 @@
-// What is told of a certificate, on both sides of each boundary; openssl makes them.
+// What is reported about a certificate, on both sides of each limit; openssl makes them.
 #include "web/security/certificate_care.hpp"
 
 #include <cstdlib>

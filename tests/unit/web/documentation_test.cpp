@@ -9,8 +9,8 @@
 namespace plumb::test {
 namespace {
 
-/// "GET /path permission" of every operation. The file is written so that indentation alone tells:
-/// paths by two, methods by four, the rest deeper.
+/// "GET /path permission" of every operation. The file is parsed by its indentation
+/// alone: paths by two, methods by four, the rest deeper.
 std::set<std::string> DocumentedOperations() {
   std::ifstream in(PLUMB_SOURCE_DIR "/web/openapi.yaml");
   std::set<std::string> operations;

@@ -282,7 +282,7 @@ TEST_F(LockoutTest, WhoWasGivenAPasswordChangesItBeforeAnythingElse) {
   HttpClient again(port_);
   EXPECT_EQ(again.LogIn("dora", kPassword), 200);
   EXPECT_EQ(again.Get("/api/v1/status").status, 200);
-  // An engineer who sets it anew begins the same; who sets their own does not.
+  // A password reset by an engineer starts in the same state; one's own change does not.
   EXPECT_EQ(engineer.Put("/api/v1/users/dora", {{"password", "yet another horse"}}).status, 200);
   EXPECT_EQ(again.LogIn("dora", "yet another horse"), 200);
   EXPECT_EQ(again.Get("/api/v1/status").status, 403);

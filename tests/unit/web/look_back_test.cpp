@@ -27,7 +27,7 @@ class LookBackTest : public testing::Test {
 };
 
 TEST_F(LookBackTest, TellsTheLogInBeforeThisOneAndWhatFailedSince) {
-  Add(begun_ - minutes(90), "anna", "login.failed");  // before the last log-in: told then
+  Add(begun_ - minutes(90), "anna", "login.failed");  // before the last log-in, so already reported
   Add(begun_ - minutes(80), "anna", "login");
   Add(begun_ - minutes(70), "anna", "login.failed");
   Add(begun_ - minutes(60), "bob", "login.failed");

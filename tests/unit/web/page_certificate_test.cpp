@@ -54,7 +54,7 @@ class PageCertificateTest : public WebTest {
     std::ifstream in(folder_ / written);
     return {std::istreambuf_iterator<char>(in), {}};
   }
-  /// The answer's text; each request on a connection of its own.
+  /// The answer's text; each request on a separate connection.
   std::string Ask(const std::string& method, const std::string& path, const json& body = {}) {
     const std::string text = body.is_null() ? "" : body.dump();
     std::ofstream(folder_ / "request")

@@ -119,7 +119,7 @@ class RolesTest : public WebTest {
     return display;
   }
 
-  /// A request that nobody's data answers: what counts is whether it gets past the gate.
+  /// A request for data that does not exist: only whether it is permitted counts.
   static HttpAnswer AskFor(HttpClient client, const std::string& route) {
     const std::size_t space = route.find(' ');
     std::string path = route.substr(space + 1);

@@ -321,7 +321,7 @@ TEST_F(ServerTest, AnAddressInUseIsSaid) {
   EXPECT_THROW(web::HttpServer(service_.services(), options), IoError);
 }
 
-/// The server over TLS with a certificate of its own, as openssl sees it.
+/// The server over TLS with its own certificate, as openssl sees it.
 class TlsTest : public ServerTest {
  protected:
   void SetUp() override {

@@ -1,4 +1,4 @@
-// The real server over a fake appliance, on a thread of its own.
+// The real server over a fake appliance, on a separate thread.
 #pragma once
 
 #include <gtest/gtest.h>
