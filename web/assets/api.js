@@ -112,7 +112,7 @@ export const remove = (path) => ask('DELETE', api(path), undefined, { timeout_ms
 export const fileUrl = (scanId, name, download) =>
   `/api/v1/scans/${scanId}/files/${name}${download ? '?download' : ''}`;
 
-/// The session, or null; `setupRequired` tells whether there is an account at all.
+/// The session, or null; `setupRequired` says whether there is no account yet.
 export async function loadSession() {
   try {
     session = await get('session');
@@ -315,7 +315,7 @@ export const live = {
     this.connected = connected;
     if (this.leads) this.sayPulse();
     this.tell('connection');
-    if (connected) this.tell('data');  // what was told meanwhile is not told again
+    if (connected) this.tell('data');  // messages sent while disconnected are not repeated
   },
   /// Calls listener(kind) until the returned function is called.
   listen(listener) {
@@ -325,7 +325,7 @@ export const live = {
 };
 channel?.addEventListener('message', (event) => live.hear(event.data));
 setInterval(() => live.watch(), 1000 * kPulse_s);
-// A tab that nobody sees needs no stream.
+// A hidden tab needs no stream.
 document.addEventListener('visibilitychange', () => {
   if (!live.wanted) return;
   if (document.hidden) live.stopLeading();

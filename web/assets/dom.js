@@ -71,7 +71,7 @@ export function warn(text) {
     h('span', {}, text[0].toUpperCase() + text.slice(1)), close()) : '');
 }
 
-/// Takes that warning away, if it is the one that is shown: what it told of is over.
+/// Removes that warning if it is the one shown, because its cause is over.
 export function forgetWarning(text) {
   const shown = document.querySelector('#alert .alert span');
   if (shown?.textContent === text) warn('');

@@ -20,7 +20,7 @@ export function compassOf(room, body, posture) {
   // Right of a person who faces the gantry.
   const { gantry_xy: gantry, right_xy: right, known } = room ?? {};
   if (!gantry || !right) return null;
-  // Results before 0.2.0 tell the posture alone: it says something where the room is known.
+  // Results before 0.2.0 have only the posture, which has a meaning where the room is known.
   if (body?.named_by === 'posture' && (body.head_xy || (known && posture))) {
     const head = body.head_xy ?? times(gantry, posture.startsWith('H') ? 1 : -1);
     const left = body.left_xy ?? times(right, posture === 'HFS' || posture === 'FFP' ? 1 : -1);

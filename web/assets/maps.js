@@ -106,7 +106,7 @@ export function paintErrors(canvas, map, tolerance_m, region = null) {
     const inside = region ? region.values[i] : 1;
     if (Number.isNaN(value)) {
       if (inside === 2 && !isHole(i)) return;  // a single cell: as the one beside it
-      // A hole is hatched: it is told from what is not measured by more than its colour.
+      // A hole is hatched, so that more than its colour distinguishes it from unmeasured parts.
       const hatched = inside === 2 && (i % width + Math.floor(i / width)) % 12 < 6;
       set(out, inside === 2 ? hatched ? kHole : kHoleDark : kUnmeasured);
       return;

@@ -88,7 +88,7 @@ function bar(value, u95, tolerance) {
 const kWords = { in: 'within', unsure: 'unsure', out: 'outside' };
 
 /// @param commands  Whether this is a correction to apply, or was one; else a difference that is
-/// only told.
+/// only reported.
 /// @param pictured  Whether an arrow shows the way: only for what is to be applied, and, but for up
 /// and down, only in a room whose axes are known.
 function card(axis, { correction, u95, words }, tolerance, { weak, commands, pictured }) {

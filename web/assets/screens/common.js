@@ -42,7 +42,7 @@ export const isAdvice = (scan) =>
 export const sidesOf = (scan, details) => (isAdvice(scan) ? details?.body : undefined);
 
 /// Why no reference may be scanned or approved now, with the way to what is needed; follows the
-/// status while it is shown. `tell(why)` hears of it first at once.
+/// status while it is shown. `tell(why)` is first called at once.
 export function blockNote(tell) {
   const element = h('p', { class: 'caution reference-block', role: 'status' });
   let shown;

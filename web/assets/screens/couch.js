@@ -1,4 +1,4 @@
-// From what the couch reads now to what it is set to: sums that nobody should do in their head.
+// From the couch's present readings to those to be set: sums not to be left to mental arithmetic.
 import { live } from '../api.js';
 import { clear, field, h } from '../dom.js';
 import { isStill, kAxes } from '../numbers.js';

@@ -83,7 +83,7 @@ function openButtons(patient) {
   const reason = h('input', { maxlength: 200, autocomplete: 'off' });
   const question = h('div', {});
   const open = (purpose) => async () => {
-    // What an approved reference is replaced for is told with the new one.
+    // The reason for replacing an approved reference is recorded with the new one.
     const replacesOne = purpose === 'reference' && patient.approved_reference_id;
     if (replacesOne && reason.value.trim().length < 3) {
       reason.focus();

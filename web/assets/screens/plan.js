@@ -80,7 +80,7 @@ function controls(reference, model, plan, editable) {
     shift_tolerance_mm: Number(shift.value), rotation_tolerance_deg: Number(rotation.value),
     posture: posture.value, couch_markers: couch.box.checked,
   });
-  /// All that a person can change, to tell whether they did.
+  /// Everything that a person can change, to find out whether they did.
   const typed = (axis) => [axis.value, axis.validity.badInput];
   const written = () => JSON.stringify([body(), axes.map(typed)]);
   const all = [...axes, shift, rotation, posture, couch.box];
@@ -165,7 +165,7 @@ async function draft(place, reference, store) {
   let drawing = null;
   let hadIsocentre = Boolean(model.isocentre);
   let loaded = null;
-  // Nothing has been compared: whether the body lies as the plan says, nobody has looked at yet.
+  // Nothing has been compared: nobody has yet confirmed that the body lies as the plan says.
   const compass = compassOf(live.status?.room, null);
   const isEdited = () => stored !== undefined && inputs.written() !== stored;
   const sign = may('approve') && !reference.approved_by
@@ -289,7 +289,7 @@ export async function showPlan(place, id) {
   const text = S.plan;
   let reference;
   let shown;
-  let busy = false;  // with a change of our own, which is told to us too
+  let busy = false;  // with our own change, of which the stream notifies us too
   const load = async () => {
     reference = await get(`references/${id}`);
     shown = await draft(place, reference, store);

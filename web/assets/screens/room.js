@@ -103,7 +103,7 @@ const computing = (status) => [word(S.room.computing, 'info'),
   }),
   h('p', { class: 'room-hint' }, S.scan.step[status.scan?.step] ?? '')];
 
-/// Whether what is shown between scans is that nobody's session is open.
+/// Whether the view between scans says that no session is open.
 const saysNoSession = (status) => (status.state === 'ready' || status.state === 'result')
   && !status.session && status.next_purpose !== 'daily_check';
 

@@ -7,7 +7,7 @@ function refusalIn(answer) {
   try { return JSON.parse(answer).error; } catch { return undefined; }
 }
 
-/// Sends a bundle with a bar; fetch tells nothing of what has left.
+/// Sends a bundle with a progress bar; fetch does not report upload progress.
 function upload() {
   const text = S.update;
   const input = h('input', { type: 'file', accept: '.raucb', required: true });
@@ -148,7 +148,7 @@ export async function showUpdate(place) {
   clear(place, h('h1', {}, text.title), h('section', { class: 'card' }, body), starter, sender,
     may('diagnostics') && diagnostics(), may('update') && factoryReset());
   await draw();
-  const looking = setInterval(() => draw().catch(() => {}), 5000);  // a stick tells nothing
+  const looking = setInterval(() => draw().catch(() => {}), 5000);  // a stick sends no event
   const stop = live.listen((kind) => {
     if (kind === 'update' || kind === 'connection') draw().catch(() => {});
   });

@@ -12,7 +12,7 @@ export function ageOf(scan, received) {
   return (told.age_s ?? Infinity) + since_s(told.at);
 }
 
-/// Why nobody may act on this result: "running", "superseded", "closed" (its patient's session is
+/// Why this result must not be used: "running", "superseded", "closed" (its patient's session is
 /// not the one that is open), "old"; null: it is valid.
 export function whyNotValid(scan, received) {
   if (!scan.result) return null;
@@ -87,7 +87,7 @@ export function verdictStrip({ scan, scene, patient }, valid = true) {
   const text = S.result;
   const { result } = scan;
   if (!result) return withoutResult({ scan, patient });
-  // The first reason decides; nobody reads a wall of text.
+  // The first reason decides; a wall of text is not read.
   const [first, ...others] = result.verdict === 'no_answer' ? result.reasons
     : [(valid ? text.why : text.whyThen)[result.verdict] ?? result.reasons[0]];
   return h('section', { class: `verdict ${result.verdict}` },
