@@ -195,7 +195,7 @@ await h.step('unsaved work: asked before it is left, kept where the session ends
   await bob.getByRole('link', { name: 'Patients', exact: true }).click();
   await bob.waitForTimeout(300);
   equal(asked.join(), 'There are unsaved changes. Leave without saving?', 'the question');
-  check(/#\/plan\//.test(bob.url()), 'whoever says no stays');
+  check(/#\/plan\//.test(bob.url()), 'after a refused prompt the page stays');
   equal(await shift.inputValue(), '4.5', 'with what was typed');
   equal((await h.api(bob, 'logout', 'POST')).status, 200, 'the session ends elsewhere');
   await bob.getByRole('heading', { name: 'Log in' }).waitFor();
@@ -227,9 +227,9 @@ await h.step('two minutes before the log-out the page warns; keys and pointer co
   await warning.waitFor({ state: 'detached' });
   for (const use of [() => idle.keyboard.press('Shift'), () => idle.mouse.click(5, 300)]) {
     await h.setClockOn(idle, 10 * 60);
-    const told = idle.waitForResponse(/\/api\/v1\/session$/);
+    const answered = idle.waitForResponse(/\/api\/v1\/session$/);
     await use();
-    await told;
+    await answered;
     await h.setClockOn(idle, 10 * 60);
     await idle.waitForTimeout(1500);
     equal(await warning.count(), 0, 'used 10 minutes ago');
@@ -488,7 +488,7 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
   await takeCheck();
   await anna.locator('.verdict', { hasText: 'PASSED' }).waitFor();
   const trends = (await anna.locator('.trend figcaption').allInnerTexts()).join('; ');
-  check(!/\d\.\d{3}/.test(trends), `no digits that nobody measured: ${trends}`);
+  check(!/\d\.\d{3}/.test(trends), `no digits beyond those measured: ${trends}`);
   await h.look(anna, 'check-passed');
   h.tell('markermoved');
   await takeCheck();
@@ -588,7 +588,7 @@ await h.step('patients, log, settings and update look finished', async () => {
   equal(await bob.getByRole('button', { name: /Install|Upload|Remove|Restart/ }).count(), 0, 'a physicist updates nothing');
 });
 
-await h.step('the restart into an update: with the password, never beside a session; a roll-back is told until it is seen', async () => {
+await h.step('the restart into an update: with the password, never during a session; a roll-back is reported until it is seen', async () => {
   const restart = async (password) => {
     await engineer.locator('.restart').getByLabel('Your password').fill(password);
     await engineer.getByRole('button', { name: 'Restart now' }).click();
@@ -697,7 +697,7 @@ await h.step('a scan is deleted with a reason and its number; one that a referen
   equal(entries.find((one) => one.action === 'scan.remove').subject, id, 'the log keeps its number');
 });
 
-await h.step('the last log-in and failed attempts are told', async () => {
+await h.step('the last log-in and failed attempts are shown', async () => {
   const again = await h.person('again');
   for (let i = 0; i < 2; ++i) {
     await again.goto(h.url);
@@ -728,7 +728,7 @@ await h.step('a keyboard alone logs in, starts a sweep and ends it', async () =>
   await tile.focus();
   h.tell('unplug');
   await keys.locator('.tile.bad', { hasText: 'missing' }).waitFor();
-  equal(await focused(), 'Daily check', 'a tile that is drawn anew keeps the focus');
+  equal(await focused(), 'Daily check', 'a tile that is drawn again keeps the focus');
   h.tell('plug');
   await keys.locator('.tile.good', { hasText: 'attached' }).waitFor();
   const { body: { patients } } = await h.api(anna, 'patients');
@@ -811,7 +811,7 @@ await h.step('without script the last result is shown, without WebGL the picture
   await flat.getByText('WebGL is missing').waitFor();
 });
 
-await h.step('the first page is small and asks nobody else', async () => {
+await h.step('the first page is small and asks no other server', async () => {
   const page = await h.person('weight');
   const sizes = [];
   const hosts = new Set();

@@ -362,7 +362,7 @@ await h.step('scan again at a fraction takes a fraction, whatever the patient wa
   await anna.locator('.who-line', { hasText: /PX-0001\s*Fraction/ }).waitFor();
 });
 
-await h.step('two at one plan: nobody saves over or approves what was not seen', async () => {
+await h.step('two at one plan: neither saves over or approves what they have not seen', async () => {
   const shift = (page) => page.getByLabel('Shifts (mm)');
   const save = (page) => page.getByRole('button', { name: 'Save plan' }).click();
   await bob.goto(`${h.url}#/plan/${(await h.api(anna, 'scans?limit=1')).body.scans[0].reference_id}`);
@@ -374,7 +374,7 @@ await h.step('two at one plan: nobody saves over or approves what was not seen',
   await shift(bob).fill('5');
   await save(bob);
   await clara.getByRole('status').getByText('this is what is stored now').waitFor();
-  equal(await shift(clara).inputValue(), '5', 'what nobody edited is loaded again');
+  equal(await shift(clara).inputValue(), '5', 'a field that was not edited is loaded again');
   await clara.getByLabel('Rotations (degrees)').fill('2');
   await shift(bob).fill('6');
   await save(bob);

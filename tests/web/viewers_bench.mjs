@@ -1,5 +1,5 @@
 // What watching costs: viewers_bench.mjs NODE_MODULES PLUMBD OUT_FOLDER CHROMIUM
-// A sweep with nobody watching, then one with five viewers and a download without end. Viewers are what plumbd sees of a browser (event
+// A sweep without viewers, then one with five viewers and a download without end. Viewers are what plumbd sees of a browser (event
 // stream, preview four times a second, status after each event); real browsers would take this machine's processors, which on an appliance
 // belong to others. The first page is loaded by a real browser. Prints a table; judges nothing: figures depend on the machine.
 import { readFileSync } from 'node:fs';
@@ -92,7 +92,7 @@ const crowd = await sweep();
 row('load after the sweeps', load());
 watching = false;
 await downloads;
-row('frames dropped, nobody watching', `${alone.dropped} of ${alone.frames}, result after ${alone.after} s`);
+row('frames dropped, no viewer', `${alone.dropped} of ${alone.frames}, result after ${alone.after} s`);
 row(`frames dropped, ${kViewers} viewers and a download`, `${crowd.dropped} of ${crowd.frames}, result after ${crowd.after} s`, '30 Hz undisturbed');
 row('sent meanwhile', `${counts.events} events, ${counts.previews} pictures, ${(counts.downloaded / 1e6).toFixed(0)} MB downloaded`);
 row(`memory of plumbd with ${kViewers} viewers`, `${((watched - before) / 1024).toFixed(1)} MB more (${(before / 1024).toFixed(0)} MB before)`, '<= 10 MB');
