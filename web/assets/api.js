@@ -13,7 +13,7 @@ const kAnswer_ms = 20000;
 const kLongAnswer_ms = 60000;  // files, and what removes or packs many
 const kVeryLongAnswer_ms = 3600000;  // a backup of a full disk
 const kLogOut_ms = 5000;
-const kSilent_s = 25;  // the appliance sends a beat every 10 s
+const kSilent_s = 25;  // the appliance sends a beat every 5 s
 
 /// A moment, for since_s().
 export const now = () => ({ wall: Date.now(), steady: performance.now() });
