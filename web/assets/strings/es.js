@@ -341,7 +341,7 @@ export const es = {
     bodyByAxes: 'Las partes y direcciones se nombran por los ejes del marcador de referencia: la '
       + 'sala no está calibrada y la superficie no muestra dónde está la cabeza.',
     roomCalibration: 'Calibración de la sala', roomVersion: (version) => `versión ${version}`,
-    roomNotUsed: 'no se usa, vea los avisos',
+    roomNotUsed: 'no se usa, vea las advertencias',
     roomUnknown: 'La sala no está calibrada (T_iec_reference): los números siguen los ejes del '
       + 'marcador de referencia, no los de la camilla.',
     higher: 'El paciente está más alto que la referencia',
@@ -429,7 +429,7 @@ export const es = {
       + 'comparan con él.',
     secondPerson: 'Otro físico, distinto de quien hizo este control, lo fija como base.',
     baselineTaken: 'Este control es ahora la base.', number: 'Valor', value: 'Medida',
-    limit: 'Límite', judged: 'Juicio', within: 'dentro del límite', outside: 'fuera del límite',
+    limit: 'Límite', judged: 'Evaluación', within: 'dentro del límite', outside: 'fuera del límite',
     notKnown: 'no se conoce', history: 'Controles anteriores', by: 'Por', sensor: 'Sensor',
     markers: 'Marcadores', last: (when, who) => `${when}, por ${who}`,
     trend: 'Evolución de los controles',
@@ -443,8 +443,8 @@ export const es = {
   },
   room_calibration: {
     title: 'Calibración de la sala',
-    none: 'Nadie ha indicado aún cómo está orientada la sala: las direcciones son las del '
-      + 'paciente, nunca las de la mesa. Calibre la sala con una lámina impresa en los láseres.',
+    none: 'La sala aún no se ha calibrado: las direcciones son las del '
+      + 'paciente, nunca las de la camilla. Calibre la sala con una lámina impresa en los láseres.',
     configured: 'Los ejes de la sala proceden de la configuración (T_iec_reference). Una '
       + 'calibración firmada los sustituye.',
     holds: (version, who, when) => `La versión ${version}, firmada por ${who}, ${when}, da a cada `
@@ -453,7 +453,7 @@ export const es = {
     due: 'Hay que calibrar la sala de nuevo; hasta entonces las direcciones son las del paciente.',
     print: 'Imprimir la lámina (PDF)',
     printHint: 'al 100 %, sin ajustar a la página: su regla debe medir 100 mm.',
-    place: 'Colóquela plana sobre una placa rígida en la mesa, cara arriba, con la cruz '
+    place: 'Colóquela plana sobre una placa rígida en la camilla, cara arriba, con la cruz '
       + 'exactamente en los láseres, la flecha hacia el gantry y sus líneas a lo largo de los '
       + 'láseres.',
     scan: 'Barra tres veces la lámina y los marcadores de la sala, sin tocarlos.',
@@ -474,7 +474,7 @@ export const es = {
     templateNone: 'Aún no hay plantilla para esta localización.',
     templateIs: (width, height, mm, degrees) => `Región de ${width} × ${height} cm (x × y) en `
       + `torno al isocentro, ±${mm} mm, ±${degrees}°.`,
-    templateNeedsRegion: 'Dibuje antes la región: al menos tres esquinas.',
+    templateNeedsRegion: 'Dibuje antes la región: al menos tres vértices.',
     templateNoSite: 'El paciente no tiene localización: escriba una para usar una plantilla.',
     title: 'Plan', reference: 'Referencia', region: 'Región de interés',
     regionHint: 'Pulse en el mapa para añadir vértices; arrastre un vértice para moverlo; Supr '
@@ -590,11 +590,11 @@ export const es = {
       'reference.approve': 'Referencia aprobada',
       'check.open': 'Control diario abierto',
       'check.done': 'Control diario hecho',
-      'check.baseline': 'Línea de base fijada',
+      'check.baseline': 'Base fijada',
       'room.calibrate': 'Calibración de la sala firmada',
       'user.add': 'Cuenta creada',
       'user.change': 'Cuenta cambiada',
-      'display.pair': 'Pantalla emparejada',
+      'display.pair': 'Pantalla vinculada',
       'display.remove': 'Pantalla quitada',
       'settings.change': 'Ajustes cambiados',
       'backup.make': 'Copia hecha',
