@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "algo/base/errors.hpp"
+#include "drivers/openni/openni_driver_files.hpp"
 #include "drivers/openni/openni_provider.hpp"
 #include "drivers/program_folders.hpp"
 #ifdef PLUMB_WITH_USB
@@ -33,14 +34,20 @@ void ExamineUsb(std::vector<SensorFinding>& findings) {
   try {
     const std::vector<UsbSensor> sensors = ListUsbSensors();
     if (sensors.empty()) {
-      findings.push_back({State::kNote, "USB", "no sensor of the Xtion or Carmine kind (1d27:*)",
+      findings.push_back({State::kNote, "USB", "no sensor that OpenNI2 has a driver for",
                           "plug one in; its own lamp must light up"});
     }
     for (const UsbSensor& sensor : sensors) {
       const std::string found = fmt::format(
           "{} {:04x}:{:04x} at bus {} address {}{}{}", sensor.model, sensor.vendor, sensor.product,
           sensor.bus, sensor.address, sensor.speed.empty() ? "" : ", ", sensor.speed);
-      if (sensor.problems.empty()) findings.push_back({State::kGood, "USB", found, {}});
+      if (NeedsForeignDriver(sensor.vendor)) {
+        findings.push_back({State::kNote, "USB", found,
+                            "it needs its maker's driver for OpenNI2, in the folder of the drivers "
+                            "below; not tried with Plumb"});
+      } else if (sensor.problems.empty()) {
+        findings.push_back({State::kGood, "USB", found, {}});
+      }
       for (const std::string& problem : sensor.problems)
         findings.push_back({sensor.permitted ? State::kNote : State::kBad, "USB", found, problem});
     }
@@ -54,9 +61,26 @@ void ExamineUsb(std::vector<SensorFinding>& findings) {
 #endif
 }
 
+void ExamineDrivers(std::vector<SensorFinding>& findings) {
+  const auto folder = OpenNiDriverFolder();
+  if (!folder) return;  // loading OpenNI2 says why
+  for (const OpenNiDriverFile& driver : FindOpenNiDrivers(*folder)) {
+    const std::string found = fmt::format("{}: {}", driver.file.string(), driver.serves);
+    if (!driver.problem.empty())
+      findings.push_back({State::kBad, "OpenNI2 driver", found, driver.problem});
+    else if (driver.is_debians)
+      findings.push_back({State::kGood, "OpenNI2 driver", found, {}});
+    else
+      findings.push_back({State::kNote, "OpenNI2 driver", found,
+                          "not tried with Plumb: calibrate the sensor, and check a known motion "
+                          "before it is used"});
+  }
+}
+
 std::vector<SensorFinding> Examine() {
   std::vector<SensorFinding> findings;
   ExamineUsb(findings);
+  ExamineDrivers(findings);
   if (const auto reader = FindBesideProgram("lib/plumb/plumb-oni-reader")) {
     findings.push_back({State::kGood, ".oni files", reader->string(), {}});
   } else {

@@ -16,20 +16,25 @@ namespace plumb {
 namespace {
 
 constexpr std::uint16_t kPrimeSense = 0x1d27;
+constexpr std::uint16_t kOrbbec = 0x2bc5;
 
 struct Model {
-  std::uint16_t product;
+  std::uint16_t vendor, product;
   std::string_view name;
 };
-constexpr std::array kModels{Model{0x0200, "PrimeSense device"},
-                             Model{0x0500, "PrimeSense sensor"},
-                             Model{0x0600, "Xtion"},
-                             Model{0x0601, "Xtion Pro Live"},
-                             Model{0x0609, "Carmine"},
-                             Model{0x1250, "PSLink sensor"},
-                             Model{0x1260, "PSLink sensor"},
-                             Model{0x1270, "PSLink sensor"},
-                             Model{0x1280, "PSLink sensor"}};
+constexpr std::array kModels{Model{kPrimeSense, 0x0200, "PrimeSense device"},
+                             Model{kPrimeSense, 0x0500, "PrimeSense sensor"},
+                             Model{kPrimeSense, 0x0600, "Xtion"},
+                             Model{kPrimeSense, 0x0601, "Xtion Pro Live"},
+                             Model{kPrimeSense, 0x0609, "Carmine"},
+                             Model{kPrimeSense, 0x1250, "PSLink sensor"},
+                             Model{kPrimeSense, 0x1260, "PSLink sensor"},
+                             Model{kPrimeSense, 0x1270, "PSLink sensor"},
+                             Model{kPrimeSense, 0x1280, "PSLink sensor"},
+                             Model{0x045e, 0x02ae, "Kinect for Xbox 360"},
+                             Model{0x045e, 0x02bf, "Kinect for Windows"},
+                             Model{0x045e, 0x02c4, "Kinect 2"},
+                             Model{0x045e, 0x02d8, "Kinect 2"}};
 
 std::string SpeedText(int speed) {
   switch (speed) {
@@ -94,11 +99,16 @@ UsbSensor Describe(libusb_device* device, const libusb_device_descriptor& descri
 }  // namespace
 
 std::optional<std::string> UsbSensorModel(std::uint16_t vendor, std::uint16_t product) {
-  if (vendor != kPrimeSense) return std::nullopt;
-  const auto found = std::find_if(kModels.begin(), kModels.end(),
-                                  [&](const Model& model) { return model.product == product; });
-  return found == kModels.end() ? "unknown PrimeSense device" : std::string(found->name);
+  const auto found = std::find_if(kModels.begin(), kModels.end(), [&](const Model& model) {
+    return model.vendor == vendor && model.product == product;
+  });
+  if (found != kModels.end()) return std::string(found->name);
+  if (vendor == kPrimeSense) return "unknown PrimeSense device";
+  if (vendor == kOrbbec) return "Orbbec device";
+  return std::nullopt;
 }
+
+bool NeedsForeignDriver(std::uint16_t vendor) { return vendor != kPrimeSense; }
 
 std::vector<UsbSensor> ListUsbSensors() {
   libusb_context* context = nullptr;
@@ -110,7 +120,7 @@ std::vector<UsbSensor> ListUsbSensors() {
   for (ssize_t i = 0; i < count; ++i) {
     libusb_device_descriptor descriptor{};
     if (libusb_get_device_descriptor(devices[i], &descriptor) == 0 &&
-        descriptor.idVendor == kPrimeSense)
+        UsbSensorModel(descriptor.idVendor, descriptor.idProduct))
       sensors.push_back(Describe(devices[i], descriptor));
   }
   if (count >= 0) libusb_free_device_list(devices, /*unref_devices=*/1);

@@ -1,5 +1,5 @@
-// Lists the sensors of the Xtion class on the USB bus, and whether this user may open them. Their
-// images, plugging and unplugging are handled by the sensor drivers.
+// Lists the depth cameras on the USB bus, and whether this user may open them. Their images,
+// plugging and unplugging are handled by the sensor drivers.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +21,11 @@ struct UsbSensor {
   bool operator==(const UsbSensor&) const = default;
 };
 
-/// Models by USB id (1d27:*); nothing for other devices.
+/// Depth cameras that have a driver of OpenNI2, by USB id; nothing for other devices.
 [[nodiscard]] std::optional<std::string> UsbSensorModel(std::uint16_t vendor,
                                                         std::uint16_t product);
+/// Debian's OpenNI2 has no driver for sensors of this vendor: it comes from their maker.
+[[nodiscard]] bool NeedsForeignDriver(std::uint16_t vendor);
 
 /// Attached sensors by bus and address. @throws DeviceError if libusb cannot list the bus.
 [[nodiscard]] std::vector<UsbSensor> ListUsbSensors();

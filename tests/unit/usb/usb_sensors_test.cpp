@@ -120,6 +120,9 @@ TEST_F(UsbSensorsTest, OtherDevicesAreNotSensors) {
 TEST(UsbModelTest, NamesTheFamily) {
   EXPECT_EQ(UsbSensorModel(0x1d27, 0x0609), "Carmine");
   EXPECT_EQ(UsbSensorModel(0x1d27, 0x9999), "unknown PrimeSense device");
+  EXPECT_EQ(UsbSensorModel(0x2bc5, 0x0401), "Orbbec device");
+  EXPECT_EQ(UsbSensorModel(0x045e, 0x02ae), "Kinect for Xbox 360");
+  EXPECT_FALSE(UsbSensorModel(0x045e, 0x0040));  // a mouse of the same maker
   EXPECT_FALSE(UsbSensorModel(0x1d6b, 0x0601));
 }
 
