@@ -470,11 +470,11 @@ void FakeAppliance::ChangeSettings(const Actor& actor, const Settings& changed, 
   Did(actor, "settings.change", "", done);
 }
 
-bool FakeAppliance::RunInBackground(web::BackgroundPool, std::function<void()> work,
+bool FakeAppliance::RunInBackground(web::BackgroundPool, std::function<void()> job,
                                     std::function<void()> done) {
   if (refuse_background_work) return false;
-  const auto both = [work = std::move(work), done = std::move(done)] {
-    work();
+  const auto both = [job = std::move(job), done = std::move(done)] {
+    job();
     done();
   };
   if (hold_background_work) {

@@ -58,7 +58,7 @@ run machine/truncated.raucb
 check "half of one" '^3 .*truncated.raucb' "$(seen)"
 check "none of them has touched a system" '^same$' "$(cmp -s machine/slots/a.img machine/slots/b.img && echo same)"
 run "$work"
-check "a folder" '^3 .*no plain file' "$(seen)"
+check "a folder" '^3 .*not a regular file' "$(seen)"
 run machine/none.raucb
 check "a file that is missing" '^3 .*none.raucb cannot be read' "$(seen)"
 cp machine/good.raucb notes.txt

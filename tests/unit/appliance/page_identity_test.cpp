@@ -92,7 +92,7 @@ TEST_F(PageIdentityTest, WhatCannotBeUsedStaysAsItIsAndIsTold) {
 TEST_F(PageIdentityTest, ALinkInPlaceOfASecretIsNotFollowed) {
   std::ofstream(folder_ / "elsewhere") << std::string(32, 'x');
   fs::create_symlink(folder_ / "elsewhere", folder_ / "device.key");
-  EXPECT_THAT(Identify("127.0.0.1").warnings, ElementsAre(HasSubstr("no plain file")));
+  EXPECT_THAT(Identify("127.0.0.1").warnings, ElementsAre(HasSubstr("not a regular file")));
   EXPECT_EQ(options_.device_key, "");
 }
 

@@ -123,7 +123,7 @@ TEST(AtomicFolderTest, RefusesWhatIsNotItsOwn) {
   WriteThing(folder / "out", "1");
   WriteWholeFile(folder / "out/notes.txt", std::string_view("somebody's work"));
   EXPECT_THAT(MessageOf<IoError>([&] { AtomicFolder(folder / "out", Kind()); }),
-              AllOf(HasSubstr("notes.txt"), HasSubstr("no part of a thing"), HasSubstr("choose")));
+              AllOf(HasSubstr("notes.txt"), HasSubstr("not part of a thing"), HasSubstr("choose")));
   EXPECT_EQ(ReadTextFile(folder / "out/notes.txt", 100), "somebody's work");
 
   fs::create_directory(folder / "other");

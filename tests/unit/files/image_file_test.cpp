@@ -158,10 +158,10 @@ TEST(ImageFileTest, MissingFileFolderAndPipeAreErrors) {
   EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadColorImage(folder / "none.png"); }),
               AllOf(HasSubstr("none.png"), HasSubstr("missing")));
   EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadColorImage(folder.path()); }),
-              HasSubstr("no regular file"));
+              HasSubstr("not a regular file"));
   ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
   EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadColorImage(folder / "pipe"); }),
-              HasSubstr("no regular file"));
+              HasSubstr("not a regular file"));
   WriteWholeFile(folder / "empty.png", std::string_view());
   EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadColorImage(folder / "empty.png"); }),
               HasSubstr("empty"));

@@ -203,7 +203,7 @@ TEST(ResultFolderTest, AnotherFormatAndDamageAreNamed) {
               AllOf(HasSubstr("format 2"), HasSubstr("update")));
   WriteWholeFile(folder / "result.json", std::string_view("{\"format\": 1"));
   EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadResultJson(folder.path()); }),
-              HasSubstr("no result of plumb compare"));
+              HasSubstr("not a result of plumb compare"));
 }
 
 }  // namespace

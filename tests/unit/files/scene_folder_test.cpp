@@ -258,7 +258,8 @@ TEST_F(SceneFolderTest, ANewerFormatIsNamed) {
               AllOf(HasSubstr("scene.json"), HasSubstr("format 2"), HasSubstr("reads format 1"),
                     HasSubstr("update")));
   EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = 0; }), HasSubstr("format is 0"));
-  EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = "1"; }), HasSubstr("no whole number"));
+  EXPECT_THAT(RefusalWith([](auto& json) { json["format"] = "1"; }),
+              HasSubstr("not a whole number"));
   EXPECT_THAT(RefusalWith([](auto& json) { json.erase("format"); }),
               HasSubstr("format is missing"));
 }
@@ -303,9 +304,9 @@ TEST_F(SceneFolderTest, CornersThatAreNoNumbersAreNamed) {
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"][1][2] = 1e30; }),
               HasSubstr("1e+30"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["11"].erase(0); }),
-              HasSubstr("no list of 4"));
+              HasSubstr("not a list of 4"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"]["-3"] = json["markers"]["11"]; }),
-              HasSubstr("no marker id"));
+              HasSubstr("not a marker id"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["marker_views"]["12"] = 3; }),
               HasSubstr("belongs to no marker"));
   EXPECT_THAT(RefusalWith([](auto& json) { json["markers"] = nlohmann::json::array(); }),
@@ -332,7 +333,7 @@ TEST_F(SceneFolderTest, AbsurdNumbersAreNamed) {
   EXPECT_THAT(RefusalWith([](auto& json) { json["marker_dictionary"] = "DICT_9X9"; }),
               HasSubstr("DICT_9X9"));
   EXPECT_THAT(RefusalWith([](auto& json) { json = nlohmann::json::array(); }),
-              HasSubstr("no object"));
+              HasSubstr("not an object"));
   WriteWholeFile(scene_ / "scene.json", std::string(200'000, '['));
   EXPECT_THAT(Refusal(), HasSubstr("nested at most 32 deep"));
 }

@@ -62,7 +62,7 @@ TEST_F(SensorProfileFile, WhatIsNoProfileIsRefused) {
   std::ofstream(file_) << "{";
   ExpectRefused("plumb calibrate");
   Write({{"format", "something else"}});
-  ExpectRefused("no sensor profile");
+  ExpectRefused("not a sensor profile");
   auto json = Good();
   json["version"] = 2;
   Write(json);

@@ -103,7 +103,7 @@ TEST(CameraFileTest, MatricesOfAnotherShapeAreNamed) {
 }
 
 TEST(CameraFileTest, LensesThatCannotBeUndoneAreNamed) {
-  EXPECT_THAT(Refusal(With("0.2624", "1e30")), HasSubstr("no lens"));
+  EXPECT_THAT(Refusal(With("0.2624", "1e30")), HasSubstr("not a plausible lens"));
   EXPECT_THAT(Refusal(With("0.2624, -0.9531", "-2.5, 0.")),
               AllOf(HasSubstr("distortion_coefficients"), HasSubstr("cannot be undone")));
 }

@@ -313,7 +313,7 @@ TEST_F(TumRecordingTest, LinksOutOfTheFolderAreNamed) {
   fs::rename(ColorFile(5), folder_ / "outside.png");
   fs::create_symlink(folder_ / "outside.png", ColorFile(5));
   EXPECT_THAT(Refusal(), AllOf(HasSubstr(ColorFile(5).filename()),
-                               HasSubstr("out of the recording's folder")));
+                               HasSubstr("outside the recording's folder")));
   fs::remove(ColorFile(5));
   fs::copy_file(ColorFile(4), recording_ / "kept.png");
   fs::create_symlink("../kept.png", ColorFile(5));  // a link inside the folder is fine
@@ -324,7 +324,7 @@ TEST_F(TumRecordingTest, AFolderWhoseNameBeginsTheSameIsOutside) {
   fs::create_directory(folder_ / "recording2");
   fs::rename(ColorFile(5), folder_ / "recording2/a.png");
   fs::create_symlink("../../recording2/a.png", ColorFile(5));
-  EXPECT_THAT(Refusal(), HasSubstr("out of the recording's folder"));
+  EXPECT_THAT(Refusal(), HasSubstr("outside the recording's folder"));
 }
 
 TEST_F(TumRecordingTest, ASingleFrameIsNamed) {

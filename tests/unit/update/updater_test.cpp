@@ -578,7 +578,7 @@ TEST_F(UpdaterTest, WhatIsNoBundleIsRefusedBeforeRaucIsAsked) {
   WriteBundle("short.raucb", "hsqs", 0xFF, 10);
   EXPECT_THAT(why("short.raucb"), HasSubstr("too short"));
   fs::create_directory(folder_ / "updates" / "folder.raucb");
-  EXPECT_THAT(why("folder.raucb"), HasSubstr("no plain file"));
+  EXPECT_THAT(why("folder.raucb"), HasSubstr("not a regular file"));
   fs::create_symlink("/etc/passwd", folder_ / "updates" / "link.raucb");
   EXPECT_THAT(why("link.raucb"), HasSubstr("cannot be read"));
 }
