@@ -12,6 +12,7 @@
 #include "algo/comparison/body_motion.hpp"
 #include "algo/comparison/deformation.hpp"
 #include "algo/comparison/deviation.hpp"
+#include "algo/comparison/shared_sensor.hpp"
 #include "algo/comparison/surface.hpp"
 
 namespace plumb {
@@ -84,10 +85,11 @@ class Comparer {
     if (Align()) {
       Segment();
       CheckStop(options_.stop);
+      const bool moved = Move();
+      CheckStop(options_.stop);
       Heights();
       CheckStop(options_.stop);
-      if (Move()) {
-        CheckStop(options_.stop);
+      if (moved) {
         Deform();
         CheckStop(options_.stop);
         Judge();
@@ -214,14 +216,43 @@ class Comparer {
     motion.T = surface->T;
     motion.centroid_m = *centroid;
     motion.inlier_share = surface->inlier_share;
-    motion.uncertainty = Uncertainty({.alignment = *result_.alignment,
-                                      .surface = surface->covariance,
-                                      .T_motion = motion.T,
-                                      .centroid_m = *centroid});
+    const std::optional<SharedSensor> sensor =
+        JoinSensors({.reference = reference_,
+                     .current = current_,
+                     .alignment = *result_.alignment,
+                     .T_motion = motion.T,
+                     .centroid_m = *centroid,
+                     .in_region = [&](const Eigen::Vector3d& p) { return IsOnRegion(p); }});
+    if (sensor) JoinSensor(*sensor, motion);
+    motion.uncertainty =
+        Uncertainty({.alignment = *result_.alignment,
+                     .surface = surface->covariance,
+                     .T_motion = motion.T,
+                     .centroid_m = *centroid,
+                     .sensor = sensor ? std::optional(sensor->covariance) : std::nullopt});
     motion.covariance = motion.uncertainty.Total();
     result_.motion = motion;
     Lap("motion", since_s);
     return true;
+  }
+
+  // Whether a point lies in the region and near the reference surface there.
+  [[nodiscard]] bool IsOnRegion(const Eigen::Vector3d& p) const {
+    constexpr double kNear_m = 0.1;
+    const HeightMap& map = *reference_.height_map;
+    const auto cell = map.grid.cell(p.x(), p.y());
+    return cell && result_.region_mask[*cell] != 0 && std::isfinite(map.z[*cell]) &&
+           std::abs(map.z[*cell] - p.z()) < kNear_m;
+  }
+
+  // Moves the current scan's surface against the reference frame, and the motion with it.
+  void JoinSensor(const SharedSensor& sensor, BodyMotion& motion) {
+    const Eigen::Vector3d moved = motion.T * motion.centroid_m;
+    const Pose by(Eigen::Translation3d(moved) * PoseFromTwist(sensor.correction) *
+                  Eigen::Translation3d(-moved));
+    motion.T = by * motion.T;
+    result_.alignment->T_reference_current = by * result_.alignment->T_reference_current;
+    current_cloud_ = TransformedCloud(by, current_cloud_);
   }
 
   void Judge() {

@@ -13,12 +13,11 @@ namespace {
 // maps does not show it.
 constexpr double kScaleSigma = 0.001;
 
-// Two sweeps may agree at the markers and still place the body differently relative to them,
-// because depth is registered to colour by terms that each sweep estimates separately. Over 144
-// pairs of two simulated units the numbers are off by 0.4 to 0.7 mm and 0.04 to 0.07 deg (RMS); the
-// other causes already explain 0.6 mm and 0.07 deg for a body that moved little.
-constexpr double kSweepShift_m = 0.15 * kMillimetre;
-constexpr double kSweepAngle_rad = 0.015 * kDegree;
+// For scenes that say nothing of their sensor. Depth is registered to colour by terms that each
+// sweep estimates again, so two sweeps may agree at the markers and place the body differently: by
+// 0.3 to 0.4 mm and 0.01 to 0.03 deg for each sweep (RMS, small suite of unit 71).
+constexpr double kSensorShift_m = 0.4 * kMillimetre;
+constexpr double kSensorAngle_rad = 0.03 * kDegree;
 
 // The plane of a marker is off by the maps' distortion over the first length, its direction within
 // the plane by the distortion over the second. Measured on 13 sweeps of three units, where the
@@ -89,7 +88,7 @@ std::array<std::pair<const char*, const Matrix6d*>, 6> MotionUncertainty::Parts(
            {"distortion", &distortion},
            {"scale", &scale},
            {"frame", &frame},
-           {"sweep", &sweep}}};
+           {"sensor", &sensor}}};
 }
 
 Matrix6d CovarianceAbout(const Matrix6d& covariance, const Eigen::Vector3d& from_m,
@@ -108,7 +107,8 @@ MotionUncertainty Uncertainty(const UncertaintyInput& input) {
   parts.distortion = DistortionAt(alignment);
   parts.scale = ScaleOver(alignment, input.centroid_m, moved);
   parts.frame = FrameOf(alignment, input.T_motion, moved);
-  parts.sweep = 2.0 * Isotropic(kSweepAngle_rad, kSweepShift_m);  // both sweeps contribute
+  // Both sweeps contribute.
+  parts.sensor = input.sensor.value_or(2.0 * Isotropic(kSensorAngle_rad, kSensorShift_m));
   return parts;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Core>
@@ -22,11 +23,11 @@ struct MotionUncertainty {
   /// Scale error of the maps over the distance that the body moved.
   Matrix6d scale = Matrix6d::Zero();
   Matrix6d frame = Matrix6d::Zero();  ///< Pose of the reference marker in its own map.
-  /// Errors of a sweep that neither its markers nor its surfaces show.
-  Matrix6d sweep = Matrix6d::Zero();
+  /// Calibrations of the two sensors: see SharedSensor.
+  Matrix6d sensor = Matrix6d::Zero();
 
   [[nodiscard]] Matrix6d Total() const {
-    return surface + markers + distortion + scale + frame + sweep;
+    return surface + markers + distortion + scale + frame + sensor;
   }
   /// The causes with their names, in a fixed order.
   [[nodiscard]] std::array<std::pair<const char*, const Matrix6d*>, 6> Parts() const;
@@ -39,6 +40,8 @@ struct UncertaintyInput {
   Pose T_motion = Pose::Identity();  ///< p_current = T_motion * p_reference
   /// Centroid of the region in the reference frame.
   Eigen::Vector3d centroid_m = Eigen::Vector3d::Zero();
+  /// SharedSensor::covariance; absent where a scene says nothing of its sensor.
+  std::optional<Matrix6d> sensor;
 };
 
 [[nodiscard]] MotionUncertainty Uncertainty(const UncertaintyInput& input);

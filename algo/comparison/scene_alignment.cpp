@@ -20,6 +20,8 @@ constexpr double kMinCornerSigma_m = 0.2 * kMillimetre;
 // The four corners of a marker share the error of the views that placed it, so together they count
 // as two independent points.
 constexpr double kIndependentShare = 0.5;
+// The stated sigmas count as much as so many observed values that agree with them.
+constexpr double kStatedSigmasCount = 12.0;
 // Difference of scale between two scans of one room: 0.03 to 0.25 % measured on simulated sweeps.
 constexpr double kStretchSigma = 0.002;
 // a larger difference is not a scale error but a different room
@@ -258,10 +260,12 @@ Alignment MakeAlignment(std::span<const SharedMarker> shared, const Subset& subs
   alignment.spread_m = std::sqrt(spread / count);
   // The fit has six degrees of freedom; each marker contributes three coordinates.
   alignment.distortion *= 3.0 / std::max(3.0 * count - 6.0, 3.0);
-  // The maps' sigmas may be too small, so the observed disagreement of the corners is used where it
-  // is larger.
+  // The maps' sigmas are rules of thumb. The observed disagreement of the corners replaces them: at
+  // once where it is larger, and where it is smaller as far as there are corners enough to show it.
   const double degrees_of_freedom = 12.0 * count - 6.0;
-  const double variance_factor = std::max(1.0, chi2 / degrees_of_freedom);
+  const double variance_factor =
+      std::max(chi2 / degrees_of_freedom,
+               (kStatedSigmasCount + chi2) / (kStatedSigmasCount + degrees_of_freedom));
   alignment.covariance = variance_factor * FitCovariance(shared, subset, alignment.centre_m);
   return alignment;
 }

@@ -334,6 +334,19 @@ std::vector<View> MakeViews(const Sensor& sensor, const CalibrationModel& calibr
   return views;
 }
 
+Eigen::Matrix<double, 3, kCalibrationSize> CellJacobian(const Sensor& sensor, const View& view,
+                                                        std::size_t cell) {
+  Eigen::Matrix<double, 3, kCalibrationSize> J = Eigen::Matrix<double, 3, kCalibrationSize>::Zero();
+  const DepthVector J_depth = DepthJacobian(view, cell);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d m = Eigen::Vector3d::Unit(axis);
+    J.block<1, QuadraticTerm::kFocal>(axis, kLensAt) = FocalJacobian(view, cell, m).transpose();
+    J.block<1, CalibrationModel::kDepthSize>(axis, kDepthAt) =
+        PositionJacobian(sensor, view, cell, J_depth, m).transpose();
+  }
+  return J;
+}
+
 std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistrationOptions& options,
                                     const std::vector<View>& views, const std::stop_token& stop) {
   const std::size_t n = views.size();

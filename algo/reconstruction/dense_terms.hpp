@@ -50,6 +50,11 @@ Sensor MakeSensor(const Intrinsics& stated, const CalibrationModel& calibration)
 std::vector<View> MakeViews(const Sensor& sensor, const CalibrationModel& calibration,
                             const Cells& cells, const TrackingMap& map);
 
+/// Derivative of a cell's point in its own depth camera with the focal lengths, in the first two
+/// columns of the lens, and the depth calibration.
+Eigen::Matrix<double, 3, kCalibrationSize> CellJacobian(const Sensor& sensor, const View& view,
+                                                        std::size_t cell);
+
 /// Pairs of views that overlap enough, at most JointRegistrationOptions::max_pairs for each view.
 /// @throws Interrupted on a stop request
 std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistrationOptions& options,

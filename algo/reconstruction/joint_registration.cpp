@@ -11,6 +11,7 @@
 #include "algo/reconstruction/dense_terms.hpp"
 #include "algo/tracking/keyframe_link.hpp"
 #include "algo/tracking/velocity_refinement.hpp"
+#include "algo/tracking/witnesses.hpp"
 
 namespace plumb {
 namespace {
@@ -102,6 +103,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   bundle.keypoint_sigma_px = options.keypoint_sigma_px * KeypointSigmaFactor(map);
   bundle.keypoint_depth_sigmas = options.keypoint_depth_sigmas;
   bundle.prior = options.prior;
+  bundle.keep_witnesses_out = options.use_dense;
   if (options.calibrate) MoveCalibration(options.prior.mean, result.calibration);
   bundle.fix_depth_field = !options.use_depth_field;
   bundle.stop = stop;
@@ -119,6 +121,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
     VelocityOptions velocity;
     velocity.marker_length_m = options.marker_length_m;
     velocity.keypoint_sigma_px = bundle.keypoint_sigma_px;
+    velocity.keep_witnesses_out = bundle.keep_witnesses_out;
     RefineVelocities(stated, result.calibration, velocity, map);
   };
   // The lens is estimated here, so the velocities must already be correct.
@@ -133,7 +136,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   const CalibrationModel calibration_before = result.calibration;
   double gate_m = options.max_gate_m;
   std::vector<dense::KeyframePair> pairs;
-  BundleSummary last;
+  std::vector<QuadraticTerm> terms;
   bundle.max_iterations = 4;
   bundle.function_tolerance = BundleOptions().function_tolerance;
   // Overlapping surfaces determine the focal length. The rest of the lens, if free here, would
@@ -146,11 +149,9 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
     const std::vector<dense::View> views = dense::MakeViews(sensor, result.calibration, cells, map);
     CheckStop(stop);
     if (round == 0) pairs = dense::FindPairs(sensor, options, views, stop);
-    std::vector<QuadraticTerm> terms =
-        dense::MakeTerms(sensor, options, map, views, pairs, gate_m, stop);
+    terms = dense::MakeTerms(sensor, options, map, views, pairs, gate_m, stop);
     AddTrackedLinks(map, terms);
-    bundle.find_information = options.find_evidence;
-    last = BundleAdjust(stated, bundle, terms, map, result.calibration);
+    BundleAdjust(stated, bundle, terms, map, result.calibration);
     CheckStop(stop);
     double farthest_m = 0.0;
     for (const dense::View& view : views)
@@ -168,18 +169,28 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
     return dense::Consistency(sensor, dense::MakeViews(sensor, calibration, cells, map), pairs,
                               options.max_gate_m);
   };
+  const auto witnesses = [&](const CalibrationModel& calibration) {
+    return ErrorsOfWitnesses(stated, calibration, options.marker_length_m, map);
+  };
   result.consistency_after_m = consistency(result.calibration);
+  result.witnesses_after = witnesses(result.calibration);
   before.Exchange(map);
   result.consistency_before_m = consistency(calibration_before);
-  result.accepted = result.consistency_after_m <= result.consistency_before_m;
+  result.witnesses_before = witnesses(calibration_before);
+  result.accepted = result.consistency_after_m <= result.consistency_before_m &&
+                    !ContradictsWitnesses(result.witnesses_before, result.witnesses_after);
   if (!result.accepted) {
     result.calibration = calibration_before;
     return result;
   }
   before.Exchange(map);
-  if (options.find_evidence && options.calibrate) {
+  if (options.calibrate) {
+    bundle.max_iterations = 0;  // Only the equations at the solution are wanted.
+    bundle.find_information = true;
     result.evidence.solution = ToVector(result.calibration);
+    BundleSummary last = BundleAdjust(stated, bundle, terms, map, result.calibration);
     result.evidence.information = last.information;
+    result.posterior = std::move(last.posterior);
   }
   return result;
 }

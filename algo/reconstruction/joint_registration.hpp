@@ -7,6 +7,7 @@
 
 #include "algo/sensor_model/sensor_profile.hpp"
 #include "algo/tracking/bundle_adjustment.hpp"
+#include "algo/tracking/witnesses.hpp"
 
 namespace plumb {
 
@@ -32,7 +33,6 @@ struct JointRegistrationOptions {
   /// track has an error that all its views share.
   double keypoint_depth_sigmas = 2.0;
   CalibrationPrior prior = PriorOfAnyUnit();
-  bool find_evidence = false;  ///< Fill JointRegistrationResult::evidence.
   /// Called before each round; updates the keyframes' velocities from their poses.
   std::function<void(TrackingMap&)> refresh_velocities = {};
   /// Whether RefineVelocities() then estimates each keyframe's velocity from the rows of its own
@@ -45,13 +45,17 @@ struct JointRegistrationOptions {
 
 struct JointRegistrationResult {
   CalibrationModel calibration;
-  /// False: held-out points agreed better before, and the map is left as after bundle adjustment.
+  /// False: held-out points or witnesses agreed better before, and the map is left as after bundle
+  /// adjustment.
   bool accepted = false;
   double consistency_before_m =
       0.0;  ///< Median point-to-plane residual of held-out cells between overlapping keyframes.
   double consistency_after_m = 0.0;
+  WitnessErrors witnesses_before;  ///< Of the solution without the dense terms.
+  WitnessErrors witnesses_after;
   int num_pairs = 0;
-  SweepEvidence evidence;  ///< Evidence about the sensor's calibration.
+  BundlePosterior posterior;  ///< Empty unless accepted and calibrated.
+  SweepEvidence evidence;     ///< Evidence about the sensor's calibration.
 };
 
 /// Refines the map in place: bundle adjustment with free calibration, then rounds of projective

@@ -17,6 +17,7 @@
 #include "algo/reconstruction/joint_registration.hpp"
 #include "algo/reconstruction/paper_reconstruction.hpp"
 #include "algo/reconstruction/scene_assembly.hpp"
+#include "algo/reconstruction/sensor_sensitivity.hpp"
 #include "algo/reconstruction/surface_cloud.hpp"
 #include "algo/reconstruction/surface_mesh.hpp"
 #include "algo/reconstruction/trajectory.hpp"
@@ -255,7 +256,6 @@ struct Reconstructor::Impl {
     joint_options.prior = options.profile
                               ? PriorOfNextSweep(*options.profile, info.intrinsics, edge_sigma_px)
                               : PriorOfAnyUnit(edge_sigma_px);
-    joint_options.find_evidence = options.on_learned != nullptr;
     const JointRegistrationResult joint =
         RegisterJointly(info.intrinsics, joint_options, map, stop);
     const double solved = Now();
@@ -265,6 +265,11 @@ struct Reconstructor::Impl {
     scene = MakeScene(info, options.preset, dropped, frames, map, joint.calibration,
                       SceneFromWorld(info, map));
     WarnOfFrame(info, map, scene);
+    if (scene.frame == SceneFrame::kReferenceMarker && !joint.posterior.empty()) {
+      scene.sensitivity = SensitivityOf(info.intrinsics, joint.calibration, joint.posterior, map,
+                                        *info.reference_marker);
+      scene.sensitivity->stated_for_this_unit = !info.intrinsics_assumed;
+    }
     if (options.profile)
       scene.sensor_profile =
           fmt::format("{}, {} sweep{}", options.profile->name, options.profile->num_sweeps,
@@ -279,6 +284,10 @@ struct Reconstructor::Impl {
     scene.timings_s["tone_curve"] = tone_s;
     scene.calibration["consistency_before_m"] = joint.consistency_before_m;
     scene.calibration["consistency_after_m"] = joint.consistency_after_m;
+    scene.calibration["witness_keypoints_before_px"] = joint.witnesses_before.keypoints_px;
+    scene.calibration["witness_keypoints_after_px"] = joint.witnesses_after.keypoints_px;
+    scene.calibration["witness_corners_before_px"] = joint.witnesses_before.corners_px;
+    scene.calibration["witness_corners_after_px"] = joint.witnesses_after.corners_px;
     if (!joint.accepted && joint.num_pairs > 0)
       scene.warnings.push_back(
           "the dense registration did not make the views agree better and was left out");

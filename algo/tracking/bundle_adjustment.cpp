@@ -46,8 +46,11 @@ class Solver {
   void MakePoint(std::size_t s, double damping);
   // One damped Gauss-Newton step; false if the system cannot be solved.
   bool Step(const State& state, double damping, State& next);
-  // Information about the calibration once everything else has been eliminated.
-  [[nodiscard]] CalibrationMatrix Information(const State& state);
+  // Information about the calibration once everything else has been eliminated, and the posterior.
+  void FindInformation(const State& state, BundleSummary& summary);
+  [[nodiscard]] BundlePosterior Posterior(Eigen::MatrixXd S) const;
+  // Keeps in place what the options fix.
+  void PinFixed(Eigen::MatrixXd& S, Eigen::VectorXd& right) const;
   // S -= W V^-1 W', right -= W V^-1 g over all landmarks. The rows of each free keyframe are one
   // task, so every block has exactly one writer.
   void Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const;
@@ -125,7 +128,7 @@ BundleSummary Solver::Run() {
     if (settled) break;
   }
   summary.final_cost = cost;
-  if (options_.find_information && options_.calibrate) summary.information = Information(state);
+  if (options_.find_information && options_.calibrate) FindInformation(state, summary);
   problem_.Write(state);
   return summary;
 }
@@ -156,11 +159,7 @@ bool Solver::Step(const State& state, double damping, State& next) {
   S.diagonal().array() += 1e-9;
   Eigen::VectorXd right = equations_.g();
   Eliminate(S, right);
-  if (options_.calibrate && options_.fix_centre_and_distortion)
-    Pin(problem_.calibration_at() + kLensAt + QuadraticTerm::kFocal,
-        CalibrationModel::kLensSize - QuadraticTerm::kFocal, S, right);
-  if (options_.calibrate && options_.fix_depth_field)
-    Pin(problem_.calibration_at() + kDepthAt + kDepthField, kNumDepthTerms - kDepthField, S, right);
+  PinFixed(S, right);
   Eigen::VectorXd x;
   if (!Solve(S, right, x)) return false;
   next = state;
@@ -184,23 +183,58 @@ bool Solver::Step(const State& state, double damping, State& next) {
   return true;
 }
 
-CalibrationMatrix Solver::Information(const State& state) {
+void Solver::PinFixed(Eigen::MatrixXd& S, Eigen::VectorXd& right) const {
+  if (options_.calibrate && options_.fix_centre_and_distortion)
+    Pin(problem_.calibration_at() + kLensAt + QuadraticTerm::kFocal,
+        CalibrationModel::kLensSize - QuadraticTerm::kFocal, S, right);
+  if (options_.calibrate && options_.fix_depth_field)
+    Pin(problem_.calibration_at() + kDepthAt + kDepthField, kNumDepthTerms - kDepthField, S, right);
+}
+
+void Solver::FindInformation(const State& state, BundleSummary& summary) {
   equations_.Linearise(state);
   tbb::parallel_for(std::size_t{0}, points_.size(), [&](std::size_t s) { MakePoint(s, 0.0); });
   Eigen::MatrixXd S = equations_.H();
   S.diagonal().array() += 1e-9;
   Eigen::VectorXd right = equations_.g();
   Eliminate(S, right);
+  summary.posterior = Posterior(S);
   const Eigen::MatrixXd poses =
       S.topLeftCorner(problem_.calibration_at(), problem_.calibration_at());
   const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> solver(poses);
-  if (solver.info() != Eigen::Success) return CalibrationMatrix::Zero();
+  if (solver.info() != Eigen::Success) return;
   const Eigen::MatrixXd coupling = S.bottomLeftCorner(kCalibrationSize, problem_.calibration_at());
   CalibrationMatrix information =
       S.bottomRightCorner<kCalibrationSize, kCalibrationSize>().selfadjointView<Eigen::Lower>();
   information -= coupling * solver.solve(coupling.transpose());
   information -= options_.prior.information;
-  return 0.5 * (information + information.transpose());
+  summary.information = 0.5 * (information + information.transpose());
+}
+
+BundlePosterior Solver::Posterior(Eigen::MatrixXd S) const {
+  BundlePosterior posterior;
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(S.rows());
+  PinFixed(S, right);
+  const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> solver(S);
+  if (solver.info() != Eigen::Success) return posterior;
+  Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(S.rows(), kCalibrationSize);
+  unit.bottomRows<kCalibrationSize>().setIdentity();
+  if (options_.fix_centre_and_distortion)
+    unit.block(problem_.calibration_at() + kLensAt + QuadraticTerm::kFocal,
+               kLensAt + QuadraticTerm::kFocal, CalibrationModel::kLensSize - QuadraticTerm::kFocal,
+               CalibrationModel::kLensSize - QuadraticTerm::kFocal)
+        .setZero();
+  if (options_.fix_depth_field)
+    unit.bottomRightCorner<kNumDepthTerms - kDepthField, kNumDepthTerms - kDepthField>().setZero();
+  posterior.with_calibration = solver.solve(unit);
+  if (!posterior.with_calibration.allFinite()) return {};
+  for (std::size_t k = 0; k < problem_.num_keyframes(); ++k) {
+    const int slot = problem_.PoseSlot(static_cast<int>(k));
+    posterior.camera_rows.push_back(slot < 0 ? -1 : kCamera * static_cast<Eigen::Index>(slot));
+  }
+  for (const auto& [id, slot] : problem_.marker_slots())
+    posterior.marker_rows[id] = problem_.MarkerAt(slot);
+  return posterior;
 }
 
 void Solver::Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const {

@@ -1,6 +1,7 @@
 // Bundle adjustment over keyframes, landmarks, markers and the sensor's own calibration.
 #pragma once
 
+#include <map>
 #include <stop_token>
 #include <vector>
 
@@ -34,7 +35,8 @@ struct BundleOptions {
   bool fix_centre_and_distortion = false;
   bool fix_depth_field = false;               ///< Keep the depth terms from kDepthField on fixed.
   CalibrationPrior prior = PriorOfAnyUnit();  ///< Prior of the calibration.
-  bool find_information = false;              ///< Fill BundleSummary::information.
+  bool keep_witnesses_out = false;            ///< Leave out what IsWitness() selects.
+  bool find_information = false;              ///< Fill BundleSummary::information and posterior.
   int max_iterations = 8;
   double function_tolerance = 1e-5;  ///< Iteration ends when the relative decrease is smaller.
   double keypoint_sigma_px = 0.6;    ///< In pixels at 640 columns.
@@ -43,6 +45,28 @@ struct BundleOptions {
   double min_corner_sigma_px = 0.05;
   double marker_length_m = 0.104;
   std::stop_token stop = {};  ///< Polled in each iteration.
+};
+
+/// Posterior covariance with the calibration of all that a bundle adjustment moves: twists on the
+/// cameras' and the markers' side (rotation vector, translation), then the calibration itself.
+/// Landmarks are eliminated.
+struct BundlePosterior {
+  Eigen::Matrix<double, Eigen::Dynamic, kCalibrationSize> with_calibration;
+  std::vector<Eigen::Index> camera_rows;    ///< First row of each keyframe; negative: it stayed.
+  std::map<int, Eigen::Index> marker_rows;  ///< By id.
+
+  [[nodiscard]] bool empty() const { return with_calibration.rows() == 0; }
+  [[nodiscard]] Eigen::Index CameraAt(int keyframe) const {
+    return camera_rows[static_cast<std::size_t>(keyframe)];
+  }
+  /// Negative for a marker that took no part.
+  [[nodiscard]] Eigen::Index MarkerAt(int id) const {
+    const auto found = marker_rows.find(id);
+    return found == marker_rows.end() ? -1 : found->second;
+  }
+  [[nodiscard]] CalibrationMatrix calibration() const {
+    return with_calibration.bottomRows<kCalibrationSize>();
+  }
 };
 
 struct BundleSummary {
@@ -54,6 +78,7 @@ struct BundleSummary {
   /// Information of the residuals alone about the calibration, with all other unknowns free and
   /// eliminated; zero if the equations could not be solved.
   CalibrationMatrix information = CalibrationMatrix::Zero();
+  BundlePosterior posterior;  ///< Empty where the equations could not be solved.
 };
 
 /// Optimises what the options leave free, in place, by Levenberg-Marquardt with Cauchy weights;

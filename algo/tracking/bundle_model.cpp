@@ -13,6 +13,12 @@ Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& w) {
 
 }  // namespace
 
+Eigen::Vector2d Inward(const ImageCorners& corners, std::size_t i) {
+  const Eigen::Vector2d next = (corners[(i + 1) % 4] - corners[i]).normalized();
+  const Eigen::Vector2d previous = (corners[(i + 3) % 4] - corners[i]).normalized();
+  return next + previous;
+}
+
 void CameraState::Prepare() {
   T_camera_world = PoseFromTwist(twist).inverse() * T_camera0_world;
   R_inverse = RotationFromVector(-twist.head<3>());

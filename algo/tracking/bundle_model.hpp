@@ -9,10 +9,13 @@
 #include "algo/base/intrinsics.hpp"
 #include "algo/base/pose.hpp"
 #include "algo/sensor_model/calibration_prior.hpp"
+#include "algo/types/marker.hpp"
 
 namespace plumb::bundle {
 
 using Matrix3x6d = Eigen::Matrix<double, 3, 6>;
+
+[[nodiscard]] Eigen::Vector2d Inward(const ImageCorners& corners, std::size_t i);
 
 using DepthRow = Eigen::Matrix<double, 1, CalibrationModel::kDepthSize>;
 

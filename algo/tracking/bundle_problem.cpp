@@ -7,16 +7,10 @@
 #include <tbb/parallel_for.h>
 
 #include "algo/base/robust_weights.hpp"
+#include "algo/tracking/witnesses.hpp"
 
 namespace plumb::bundle {
 namespace {
-
-// Sum of the unit directions from corner i to its two neighbours.
-Eigen::Vector2d Inward(const ImageCorners& corners, std::size_t i) {
-  const Eigen::Vector2d next = (corners[(i + 1) % 4] - corners[i]).normalized();
-  const Eigen::Vector2d previous = (corners[(i + 3) % 4] - corners[i]).normalized();
-  return next + previous;
-}
 
 Eigen::Vector3d PointInCamera(const State& state, const PointView& view) {
   return state.cameras[static_cast<std::size_t>(view.keyframe)].T_camera_world *
@@ -82,6 +76,9 @@ void Problem::CollectMarkers() {
     for (const MarkerObservation& m : map_.keyframes[k].data.markers) {
       const auto found = markers_.find(m.id);
       if (found == markers_.end()) continue;
+      if (options_.keep_witnesses_out &&
+          IsWitness(map_.markers.at(m.id), m.id, static_cast<int>(k)))
+        continue;
       for (std::size_t i = 0; i < 4; ++i)
         corners_.push_back({static_cast<int>(k), found->second, in_marker[i], m.corners[i],
                             scale * Inward(m.corners, i),
@@ -97,6 +94,7 @@ void Problem::CollectPoints() {
   for (const int k : free_) {
     for (const KeypointObservation& o : map_.keyframes[static_cast<std::size_t>(k)].keypoints) {
       const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
+      if (options_.keep_witnesses_out && IsWitness(landmark, o.landmark)) continue;
       int& s = slot[static_cast<std::size_t>(o.landmark)];
       if (s >= 0 || !landmark.usable || landmark.num_observations < 2) continue;
       s = static_cast<int>(landmarks_.size());

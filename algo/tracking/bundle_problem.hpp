@@ -97,6 +97,7 @@ class Problem {
     return pose_slot_[static_cast<std::size_t>(keyframe)];
   }
   [[nodiscard]] std::size_t num_keyframes() const { return pose_slot_.size(); }
+  [[nodiscard]] const std::map<int, int>& marker_slots() const { return markers_; }
   [[nodiscard]] std::size_t num_markers() const { return markers_.size(); }
   [[nodiscard]] std::size_t num_landmarks() const { return landmarks_.size(); }
   /// Indices into views().

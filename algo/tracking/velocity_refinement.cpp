@@ -8,6 +8,7 @@
 
 #include "algo/base/robust_weights.hpp"
 #include "algo/tracking/bundle_model.hpp"
+#include "algo/tracking/witnesses.hpp"
 
 namespace plumb {
 namespace {
@@ -25,14 +26,15 @@ constexpr int kMinPoints = 12;
 class ImageMotion {
  public:
   ImageMotion(const Intrinsics& stated, const CalibrationModel& calibration,
-              const VelocityOptions& options, const TrackingMap& map, const MapKeyframe& keyframe)
+              const VelocityOptions& options, const TrackingMap& map, int keyframe)
       : stated_(stated),
         calibration_(calibration),
         options_(options),
         map_(map),
-        keyframe_(keyframe) {
-    camera_.T_camera0_world = keyframe.T_world_color.inverse();
-    camera_.velocity_per_s = keyframe.velocity_per_s;
+        keyframe_index_(keyframe),
+        keyframe_(map.keyframes[static_cast<std::size_t>(keyframe)]) {
+    camera_.T_camera0_world = keyframe_.T_world_color.inverse();
+    camera_.velocity_per_s = keyframe_.velocity_per_s;
   }
 
   Vector6d Solve() {
@@ -61,6 +63,7 @@ class ImageMotion {
     for (const KeypointObservation& o : keyframe_.keypoints) {
       const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
       if (!landmark.usable || landmark.num_observations < 2) continue;
+      if (options_.keep_witnesses_out && IsWitness(landmark, o.landmark)) continue;
       Add(landmark.p_world, o.pixel, Eigen::Vector2d::Zero(), weight, kKeypointLossScale);
     }
   }
@@ -71,11 +74,10 @@ class ImageMotion {
     for (const MarkerObservation& m : keyframe_.data.markers) {
       const auto found = map_.markers.find(m.id);
       if (found == map_.markers.end()) continue;
+      if (options_.keep_witnesses_out && IsWitness(found->second, m.id, keyframe_index_)) continue;
       for (std::size_t i = 0; i < 4; ++i) {
-        const Eigen::Vector2d edges = (m.corners[(i + 1) % 4] - m.corners[i]).normalized() +
-                                      (m.corners[(i + 3) % 4] - m.corners[i]).normalized();
         Add(found->second.T_world_marker * in_marker[i], m.corners[i],
-            calibration_.edge_bias_px[0] * scale * edges,
+            calibration_.edge_bias_px[0] * scale * Inward(m.corners, i),
             1.0 / std::max(options_.min_corner_sigma_px * scale, m.sigma_px[i]), kCornerLossScale);
       }
     }
@@ -104,6 +106,7 @@ class ImageMotion {
   const CalibrationModel& calibration_;
   const VelocityOptions& options_;
   const TrackingMap& map_;
+  int keyframe_index_;
   const MapKeyframe& keyframe_;
   CameraState camera_;
   Vector12d prior_ = Vector12d::Zero();
@@ -118,8 +121,8 @@ class ImageMotion {
 void RefineVelocities(const Intrinsics& stated, const CalibrationModel& calibration,
                       const VelocityOptions& options, TrackingMap& map) {
   tbb::parallel_for(std::size_t{0}, map.keyframes.size(), [&](std::size_t k) {
-    MapKeyframe& keyframe = map.keyframes[k];
-    keyframe.velocity_per_s = ImageMotion(stated, calibration, options, map, keyframe).Solve();
+    map.keyframes[k].velocity_per_s =
+        ImageMotion(stated, calibration, options, map, static_cast<int>(k)).Solve();
   });
 }
 

@@ -8,7 +8,8 @@ namespace plumb {
 
 struct VelocityOptions {
   double marker_length_m = 0.104;
-  double keypoint_sigma_px = 0.6;  ///< In pixels at 640 columns.
+  double keypoint_sigma_px = 0.6;   ///< In pixels at 640 columns.
+  bool keep_witnesses_out = false;  ///< Leave out what IsWitness() selects.
   double min_corner_sigma_px = 0.05;
   /// Standard deviations of the keyframes' present velocities.
   double turning_sigma_rad_per_s = 0.05;

@@ -11,6 +11,7 @@
 #include "algo/types/height_map.hpp"
 #include "algo/types/marker.hpp"
 #include "algo/types/point_cloud.hpp"
+#include "algo/types/sensor_sensitivity.hpp"
 
 namespace plumb {
 
@@ -50,7 +51,8 @@ struct Scene {
   std::optional<HeightMap> height_map;  ///< Only in the reference marker's frame.
   TriangleMesh mesh;                    ///< Mesh of the height map; may be empty.
 
-  std::optional<std::string> sensor_profile;  ///< Name of the sensor unit's profile.
+  std::optional<SensorSensitivity> sensitivity;  ///< Absent where nothing was calibrated.
+  std::optional<std::string> sensor_profile;     ///< Name of the sensor unit's profile.
   std::map<std::string, double> calibration;  ///< Estimated calibration; the keys state the units.
   std::map<std::string, double> timings_s;
   std::vector<std::string> warnings;

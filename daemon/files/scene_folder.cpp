@@ -11,6 +11,7 @@
 #include "algo/base/errors.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "daemon/files/scene_json.hpp"
+#include "daemon/files/sensitivity_json.hpp"
 #include "daemon/files/trajectory_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
@@ -72,7 +73,7 @@ OutputKind SceneOutput() {
   return {"scene",
           "scene.json",
           {"scene.json", "trajectory.txt", "trajectory_all.txt", "cloud.ply", "heightmap.tiff",
-           "mesh.ply"}};
+           "mesh.ply", "sensitivity.json"}};
 }
 
 void WriteScene(const Scene& scene, const fs::path& folder, const std::stop_token& stop) {
@@ -92,6 +93,8 @@ void WriteScene(const Scene& scene, const fs::path& folder, const std::stop_toke
   }
   CheckStop(stop);
   if (!scene.mesh.vertices.empty()) WriteMeshPly(output.path() / "mesh.ply", scene.mesh);
+  if (scene.sensitivity)
+    WriteWholeFile(output.path() / "sensitivity.json", SensitivityJson(*scene.sensitivity));
   WriteWholeFile(output.path() / "scene.json", SceneJson(scene));
   CheckStop(stop);
   output.Commit();
@@ -114,6 +117,12 @@ Scene ReadScene(const fs::path& folder, const SceneParts& parts) {
         (folder / "trajectory.txt").string(), scene.keyframes.size(), header.num_keyframes));
   }
   scene.trajectory = ReadTrajectory(folder / "trajectory_all.txt");
+  // Scenes of before had none, and those without a calibration have none.
+  const fs::path sensitivity = folder / "sensitivity.json";
+  std::error_code no_error;
+  if (fs::exists(sensitivity, no_error))
+    scene.sensitivity =
+        ParseSensitivityJson(ReadTextFile(sensitivity, kMaxJsonBytes), sensitivity.string());
   if (parts.cloud) scene.cloud = ReadCloudPly(folder / "cloud.ply");
   if (parts.height_map && header.grid)
     scene.height_map = ReadHeightMap(folder / "heightmap.tiff", *header.grid);

@@ -9,7 +9,8 @@
 
 namespace plumb {
 
-/// scene.json, trajectory.txt, trajectory_all.txt, cloud.ply, heightmap.tiff, mesh.ply.
+/// scene.json, trajectory.txt, trajectory_all.txt, cloud.ply, heightmap.tiff, mesh.ply,
+/// sensitivity.json.
 [[nodiscard]] OutputKind SceneOutput();
 
 /// Writes a scene, completely or not at all, and replaces an older scene at that place. The files

@@ -1,9 +1,11 @@
-// Any text as scene.json.
+// Any text as scene.json and as sensitivity.json.
 #include "daemon/files/scene_json.hpp"
+#include "daemon/files/sensitivity_json.hpp"
 
 #include "tests/fuzz/fuzz_one.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  return plumb::fuzz::One(
-      [&] { (void)plumb::ParseSceneJson(plumb::fuzz::Text(data, size), "fuzz"); });
+  const auto text = plumb::fuzz::Text(data, size);
+  plumb::fuzz::One([&] { (void)plumb::ParseSensitivityJson(text, "fuzz"); });
+  return plumb::fuzz::One([&] { (void)plumb::ParseSceneJson(text, "fuzz"); });
 }

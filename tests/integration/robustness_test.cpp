@@ -225,6 +225,7 @@ TEST_F(RobustnessTest, DamagedScenesAreRefused) {
   refused("other-length", edit("marker_length_m", 0.2), "0.2");
   refused("short-map", halve("heightmap.tiff"), "heightmap.tiff");
   refused("short-cloud", halve("cloud.ply"), "cloud.ply");
+  refused("short-sensitivity", halve("sensitivity.json"), "sensitivity.json");
   refused(
       "no-map", [](const fs::path& scene) { fs::remove(scene / "heightmap.tiff"); },
       "heightmap.tiff");

@@ -25,7 +25,7 @@ class ScenesTest : public CommandLineTest {};
 TEST_F(ScenesTest, ReconstructWritesEveryFileOfTheContract) {
   const fs::path scene = SmallScene(Reference());
   for (const char* file : {"scene.json", "trajectory.txt", "trajectory_all.txt", "cloud.ply",
-                           "heightmap.tiff", "mesh.ply"}) {
+                           "heightmap.tiff", "mesh.ply", "sensitivity.json"}) {
     EXPECT_TRUE(fs::is_regular_file(scene / file)) << file;
   }
   const json facts = json::parse(ReadText(scene / "scene.json"));

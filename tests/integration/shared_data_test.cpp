@@ -16,21 +16,57 @@ namespace {
 
 using nlohmann::json;
 
-class SharedDataTest : public CommandLineTest {};
+class SharedDataTest : public CommandLineTest {
+ protected:
+  struct Errors {
+    std::vector<double> translation_mm;
+    std::vector<double> rotation_deg;
+    std::vector<json> figures;  // Of each spacing.
+  };
+  // One spacing of keyframes gives one number, and a part of it is luck: three give the errors of
+  // every pair three times.
+  Errors ErrorsOf(const fs::path& suite, const std::string& out,
+                  const std::vector<std::string>& more = {}) {
+    Errors errors;
+    for (const char* spacing : {"0.75", "1.0", "1.3"}) {
+      const fs::path config = folder_ / (out + spacing + ".toml");
+      WriteText(config, std::string("[reconstruct]\nkeyframe_spacing = ") + spacing + "\n");
+      std::vector<std::string> arguments = {
+          "evaluate", suite, "--out", folder_ / (out + spacing), "--json", "--config", config};
+      arguments.insert(arguments.end(), more.begin(), more.end());
+      const RunResult result = Plumb(arguments);
+      EXPECT_EQ(result.exit_code, 0) << result.err;
+      errors.figures.push_back(json::parse(result.out));
+      for (const auto& pair : errors.figures.back().at("pairs")) {
+        if (!pair.contains("translation_mm") || pair.at("translation_mm").is_null()) continue;
+        errors.translation_mm.push_back(pair.at("translation_mm").get<double>());
+        errors.rotation_deg.push_back(pair.at("rotation_deg").get<double>());
+      }
+    }
+    return errors;
+  }
+};
+
+double Mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+double Largest(const std::vector<double>& values) {
+  return *std::max_element(values.begin(), values.end());
+}
 
 TEST_F(SharedDataTest, AnotherSimulatorsSweepsWithTruth) {
   const fs::path suite = SharedData("sim-a");
   if (suite.empty()) GTEST_SKIP() << "no recordings at ../shared/data/sim-a";
-  const RunResult result = Plumb({"evaluate", suite, "--out", folder_ / "out", "--json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const json figures = json::parse(result.out);
-  for (const auto& pair : figures.at("pairs")) {
-    EXPECT_LE(pair.at("translation_mm").get<double>(), 0.98);  // Measured: 0.82.
-    EXPECT_LE(pair.at("rotation_deg").get<double>(), 0.053);   // Measured: 0.044.
-  }
-  for (const auto& [name, scene] : figures.at("scenes").items()) {
-    EXPECT_EQ(scene.at("frames").at("tracked"), scene.at("frames").at("total")) << name;
-    EXPECT_LE(scene.at("trajectory_all").at("ate_rmse_mm").get<double>(), 2.3) << name;
+  const Errors errors = ErrorsOf(suite, "out");
+  ASSERT_EQ(errors.translation_mm.size(), 6U);
+  EXPECT_LE(Mean(errors.translation_mm), 1.2);      // Measured: 1.11.
+  EXPECT_LE(Largest(errors.translation_mm), 1.58);  // Measured: 1.32.
+  EXPECT_LE(Largest(errors.rotation_deg), 0.064);   // Measured: 0.053.
+  for (const json& figures : errors.figures) {
+    for (const auto& [name, scene] : figures.at("scenes").items()) {
+      EXPECT_EQ(scene.at("frames").at("tracked"), scene.at("frames").at("total")) << name;
+      EXPECT_LE(scene.at("trajectory_all").at("ate_rmse_mm").get<double>(), 2.3) << name;
+    }
   }
 }
 
@@ -40,35 +76,16 @@ TEST_F(SharedDataTest, AUnitWithABentDepthImageAndAToneCurveOfItsOwn) {
   const fs::path profile = folder_ / "unit.json";
   const RunResult learned = Plumb({"calibrate", suite / "other_room", "--out", profile});
   ASSERT_EQ(learned.exit_code, 0) << learned.err;
-  // One spacing of keyframes gives one number, and a part of it is luck: the bounds are for three.
-  const auto errors_mm = [&](const std::string& out, const std::vector<std::string>& more) {
-    std::vector<double> errors;
-    for (const char* spacing : {"0.75", "1.0", "1.3"}) {
-      const fs::path config = folder_ / (out + spacing + ".toml");
-      WriteText(config, std::string("[reconstruct]\nkeyframe_spacing = ") + spacing + "\n");
-      std::vector<std::string> arguments = {
-          "evaluate", suite, "--out", folder_ / (out + spacing), "--json", "--config", config};
-      arguments.insert(arguments.end(), more.begin(), more.end());
-      const RunResult result = Plumb(arguments);
-      EXPECT_EQ(result.exit_code, 0) << result.err;
-      const json figures = json::parse(result.out);
-      for (const auto& pair : figures.at("pairs")) {
-        if (!pair.contains("translation_mm") || pair.at("translation_mm").is_null()) continue;
-        errors.push_back(pair.at("translation_mm").get<double>());
-        EXPECT_LE(pair.at("rotation_deg").get<double>(), 0.155);  // Measured: 0.06 to 0.12.
-      }
-    }
-    EXPECT_EQ(errors.size(), 6U);  // The other room shows another body.
-    return errors;
-  };
-  const auto mean = [](const std::vector<double>& values) {
-    return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-  };
-  const std::vector<double> alone_mm = errors_mm("alone", {});
-  const std::vector<double> with_profile_mm = errors_mm("with", {"--sensor-profile", profile});
-  EXPECT_LE(mean(alone_mm), 1.1);                                       // Measured: 0.92.
-  EXPECT_LE(*std::max_element(alone_mm.begin(), alone_mm.end()), 1.5);  // Measured: 1.25.
-  EXPECT_LE(mean(with_profile_mm), 1.1);
+  const Errors alone = ErrorsOf(suite, "alone");
+  const Errors with_profile = ErrorsOf(suite, "with", {"--sensor-profile", profile});
+  // The other room shows another body.
+  ASSERT_EQ(alone.translation_mm.size(), 6U);
+  ASSERT_EQ(with_profile.translation_mm.size(), 6U);
+  EXPECT_LE(Mean(alone.translation_mm), 0.8);      // Measured: 0.66.
+  EXPECT_LE(Largest(alone.translation_mm), 1.14);  // Measured: 0.95.
+  EXPECT_LE(Largest(alone.rotation_deg), 0.155);
+  EXPECT_LE(Mean(with_profile.translation_mm), 1.1);
+  EXPECT_LE(Largest(with_profile.rotation_deg), 0.155);
 }
 
 TEST_F(SharedDataTest, ARealSensorTracksWithTagsAndWithout) {

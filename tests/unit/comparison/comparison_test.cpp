@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -368,12 +369,32 @@ TEST(ComparisonTest, VagueMarkersMakeTheNumbersVague) {
   Scene precise = PerfectRepeat();
   Scene vague = PerfectRepeat();
   for (auto& [id, marker] : precise.markers) marker.sigma_m = 0.0003;
-  for (auto& [id, marker] : vague.markers) marker.sigma_m = 0.006;
+  std::mt19937 random(7);
+  std::normal_distribution<double> noise(0.0, 0.006);
+  for (auto& [id, marker] : vague.markers) {
+    marker.sigma_m = 0.006;
+    for (Eigen::Vector3d& corner : marker.corners)
+      corner += Eigen::Vector3d(noise(random), noise(random), noise(random));
+  }
   const CouchNumbers u95 = Compare(PerfectReference(), precise).correction->u95;
   const CouchNumbers vague_u95 = Compare(PerfectReference(), vague).correction->u95;
   EXPECT_GT(*vague_u95.vertical_mm, 3 * *u95.vertical_mm);
   EXPECT_GT(*vague_u95.lateral_mm, 3 * *u95.lateral_mm);
   EXPECT_GT(vague_u95.yaw_deg, 2 * u95.yaw_deg);
+}
+
+// Sigmas are rules of thumb: where many corners agree far better, the numbers are less vague, but
+// not as sure as those of markers that were stated to be precise.
+TEST(ComparisonTest, CornersThatAgreeSpeakAgainstVagueSigmas) {
+  Scene precise = PerfectRepeat();
+  Scene vague = PerfectRepeat();
+  for (auto& [id, marker] : precise.markers) marker.sigma_m = 0.0003;
+  for (auto& [id, marker] : vague.markers) marker.sigma_m = 0.006;
+  const auto markers = [](const Scene& scene) {
+    return Compare(PerfectReference(), scene).motion->uncertainty.markers;
+  };
+  EXPECT_GT(markers(vague)(3, 3), 4 * markers(precise)(3, 3));
+  EXPECT_LT(std::sqrt(markers(vague)(3, 3)), 0.001);  // 2 mm if the sigmas alone counted.
 }
 
 // The marker's x axis points to the gantry: a shift along it is longitudinal in the room.

@@ -25,8 +25,11 @@ const Eigen::Vector3d kCentroid(0.6, 0.45, 0.1);
 
 MotionUncertainty Of(const Pose& T_motion, const Alignment& alignment = SomeAlignment()) {
   static const Matrix6d kSurface = 1e-9 * Matrix6d::Identity();
-  return Uncertainty(
-      {.alignment = alignment, .surface = kSurface, .T_motion = T_motion, .centroid_m = kCentroid});
+  return Uncertainty({.alignment = alignment,
+                      .surface = kSurface,
+                      .T_motion = T_motion,
+                      .centroid_m = kCentroid,
+                      .sensor = std::nullopt});
 }
 
 TEST(MotionUncertaintyTest, TheTotalIsTheSumOfItsNamedParts) {
@@ -94,6 +97,20 @@ TEST(MotionUncertaintyTest, ACovarianceAboutAnotherPointMovesThatPointAsTheFirst
   EXPECT_NEAR(moved(4, 4), 4e-6, 1e-15);
   EXPECT_NEAR(moved(3, 3), 0.0, 1e-15);
   EXPECT_NEAR(moved(2, 4), 2e-6, 1e-15);
+}
+
+TEST(MotionUncertaintyTest, TheSensorsCovarianceTakesThePlaceOfTheUsualOne) {
+  const Alignment alignment = SomeAlignment();
+  const Matrix6d surface = 1e-9 * Matrix6d::Identity();
+  const Matrix6d sensor = 3e-7 * Matrix6d::Identity();
+  const MotionUncertainty with = Uncertainty({.alignment = alignment,
+                                              .surface = surface,
+                                              .T_motion = Pose::Identity(),
+                                              .centroid_m = kCentroid,
+                                              .sensor = sensor});
+  EXPECT_EQ(with.sensor, sensor);
+  // 0.4 mm for each of the two sweeps.
+  EXPECT_NEAR(std::sqrt(Of(Pose::Identity()).sensor(3, 3)) / kMillimetre, 0.566, 0.001);
 }
 
 }  // namespace

@@ -90,14 +90,13 @@ TEST(RegisterJointly, BeginsFromWhatIsKnownOfTheSensorAndSaysWhatTheSweepShowed)
   options.sensor.depth[kDepthScale] = 0.008;
   const TrueMap truth = MakeTrueMap(options);
   JointRegistrationOptions known;
-  known.find_evidence = true;
   known.prior.mean[kDepthAt + kDepthScale] = 0.004;
   known.prior.information(kDepthAt + kDepthScale, kDepthAt + kDepthScale) = 1e16;
   TrackingMap map = truth.map;
   const auto held = RegisterJointly(truth.stated, known, map);
   EXPECT_NEAR(held.calibration.depth[kDepthScale], 0.004, 1e-5) << "the prior does not act";
   TrackingMap again = truth.map;
-  const auto free = RegisterJointly(truth.stated, {.find_evidence = true}, again);
+  const auto free = RegisterJointly(truth.stated, {}, again);
   ASSERT_TRUE(free.accepted);
   EXPECT_EQ(free.evidence.solution, ToVector(free.calibration));
   const auto& information = free.evidence.information;

@@ -31,7 +31,8 @@ const Arrows kAllowed = {
      {"algo/base", "algo/types", "algo/geometry", "algo/markers", "algo/sensor_model",
       "algo/tracking"}},
     {"algo/acceptance", {"algo/base", "algo/types"}},
-    {"algo/comparison", {"algo/base", "algo/types", "algo/geometry", "algo/acceptance"}},
+    {"algo/comparison",
+     {"algo/base", "algo/types", "algo/geometry", "algo/sensor_model", "algo/acceptance"}},
     {"algo/render", {"algo/base", "algo/types"}},
 
     // A program on top of everything, though it lies beside the method that it opens to Python.

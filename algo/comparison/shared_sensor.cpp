@@ -1,0 +1,148 @@
+#include "algo/comparison/shared_sensor.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+#include "algo/sensor_model/profile_gate.hpp"
+
+namespace plumb {
+namespace {
+
+using Effect = Eigen::Matrix<double, 6, Eigen::Dynamic>;  // A twist per unit of each term.
+
+constexpr std::size_t kMinPatches = 4;
+constexpr std::size_t kMinMarkers = 3;
+// Sweeps scatter more than their residuals promise: as in Learn().
+constexpr double kSharedErrors = 3.0;
+// The shift of marker edges belongs to the light of each scan. What a sweep finds for the readout
+// time of the colour image hangs on how the hand trembled: ten sweeps of one simulated unit scatter
+// by 1.7 ms, fourteen times what their residuals promise.
+constexpr double kEdgeDrift_px = 1.0;
+constexpr double kReadoutScatter_s = 0.002;
+// Between the reference and a fraction a sensor may have warmed up: its scale of depth then differs
+// by up to 0.6 %, four times what two sweeps in a row differ by.
+constexpr double kWarmth = 4.0;
+
+struct Point {
+  Eigen::Vector3d p;
+  Eigen::MatrixXd moves;  // 3 rows, metres per unit of each term.
+  double weight;
+};
+
+// The rigid motion that points make together, about a centre.
+std::optional<Effect> RigidPart(const std::vector<Point>& points, std::size_t needed,
+                                const Eigen::Vector3d& centre) {
+  if (points.size() < needed) return std::nullopt;
+  Matrix6d H = Matrix6d::Zero();
+  Effect g = Effect::Zero(6, points.front().moves.cols());
+  for (const Point& point : points) {
+    Eigen::Matrix<double, 3, 6> J;
+    J << -Skew(point.p - centre), Eigen::Matrix3d::Identity();
+    H += point.weight * J.transpose() * J;
+    g += point.weight * J.transpose() * point.moves;
+  }
+  const Eigen::LDLT<Matrix6d> solver(H);
+  if (solver.info() != Eigen::Success || !(solver.rcond() > 1e-9)) return std::nullopt;
+  return solver.solve(g);
+}
+
+std::vector<Point> MarkersOf(const Scene& scene, const Alignment& alignment, const Pose& T) {
+  std::vector<Point> points;
+  for (const int id : alignment.markers_used) {
+    const auto moves = scene.sensitivity->markers.find(id);
+    const auto marker = scene.markers.find(id);
+    if (moves == scene.sensitivity->markers.end() || marker == scene.markers.end()) continue;
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& corner : marker->second.corners) centre += 0.25 * corner;
+    const double sigma = std::max(marker->second.sigma_m, 1e-4);
+    points.push_back(
+        {T * centre, T.linear() * moves->second.cast<double>(), 1.0 / (sigma * sigma)});
+  }
+  return points;
+}
+
+// Patches of the body's region. @param T  To the reference frame. @param T_body  From there to
+// where the reference body lies.
+std::vector<Point> SurfaceOf(const Scene& scene, const Pose& T, const Pose& T_body,
+                             const SharedSensorInput& input) {
+  std::vector<Point> points;
+  for (const SensorSensitivity::Patch& patch : scene.sensitivity->surface) {
+    const Eigen::Vector3d p = T * patch.centre_m.cast<double>();
+    if (!input.in_region(T_body * p)) continue;
+    points.push_back({p, T.linear() * patch.derivative.cast<double>(), patch.weight});
+  }
+  return points;
+}
+
+// What both sweeps were free to change.
+std::vector<Eigen::Index> FreeTerms(const SensorSensitivity& a, const SensorSensitivity& b) {
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index i = 0; i < kCalibrationSize; ++i)
+    if (a.covariance(i, i) > 0 && b.covariance(i, i) > 0) free.push_back(i);
+  return free;
+}
+
+Eigen::VectorXd DriftVariance(const std::vector<Eigen::Index>& terms) {
+  CalibrationVector sigma = DriftBetweenSweeps();
+  sigma[kEdgeBiasAt] = kEdgeDrift_px;
+  sigma[kReadoutAt] = kReadoutScatter_s;
+  for (const int term : {kDepthScale, kDepthOffset, kDepthBow}) sigma[kDepthAt + term] *= kWarmth;
+  sigma.segment<kNumGrowthTerms>(kDepthAt + kDepthGrowth) *= kWarmth;
+  return sigma.cwiseAbs2()(terms);
+}
+
+}  // namespace
+
+std::optional<SharedSensor> JoinSensors(const SharedSensorInput& input) {
+  if (!input.reference.sensitivity || !input.current.sensitivity) return std::nullopt;
+  const SensorSensitivity& r = *input.reference.sensitivity;
+  const SensorSensitivity& c = *input.current.sensitivity;
+  if (r.estimate.size() != kCalibrationSize || c.estimate.size() != kCalibrationSize)
+    return std::nullopt;
+  const Pose& T = input.alignment.T_reference_current;
+  const Pose& M = input.T_motion;
+  const Eigen::Vector3d moved = M * input.centroid_m;
+  const auto markers_r =
+      RigidPart(MarkersOf(input.reference, input.alignment, Pose::Identity()), kMinMarkers, moved);
+  const auto markers_c =
+      RigidPart(MarkersOf(input.current, input.alignment, T), kMinMarkers, moved);
+  const auto body_r =
+      RigidPart(SurfaceOf(input.reference, Pose::Identity(), Pose::Identity(), input), kMinPatches,
+                input.centroid_m);
+  const auto body_c =
+      RigidPart(SurfaceOf(input.current, T, M.inverse(), input), kMinPatches, moved);
+  if (!markers_r || !markers_c || !body_r || !body_c) return std::nullopt;
+
+  // M' = exp(a_r) T exp(-a_c) exp(b_c) T^-1 M exp(-b_r), to first order and about the moved
+  // centroid: a are the markers' twists, b the body's.
+  Effect body_moved(6, kCalibrationSize);
+  body_moved.topRows<3>() = M.linear() * body_r->topRows<3>();
+  body_moved.bottomRows<3>() = M.linear() * body_r->bottomRows<3>();
+  const std::vector<Eigen::Index> free = FreeTerms(r, c);
+  const Effect G_r = (*markers_r - body_moved)(Eigen::all, free);
+  const Effect G_c = (*body_c - *markers_c)(Eigen::all, free);
+
+  const Eigen::MatrixXd P_r = kSharedErrors * kSharedErrors * r.covariance(free, free);
+  const Eigen::MatrixXd P_c = kSharedErrors * kSharedErrors * c.covariance(free, free);
+  SharedSensor result;
+  result.covariance = G_r * P_r * G_r.transpose() + G_c * P_c * G_c.transpose();
+  if (!r.stated_for_this_unit || !c.stated_for_this_unit || r.stated != c.stated) return result;
+
+  Eigen::MatrixXd S = P_r + P_c;
+  S.diagonal() += DriftVariance(free);
+  const Eigen::LDLT<Eigen::MatrixXd> solver(S);
+  if (solver.info() != Eigen::Success) return result;
+  const Eigen::VectorXd difference = (c.estimate - r.estimate)(free);
+  const Eigen::VectorXd weighted = solver.solve(difference);
+  if (!(difference.dot(weighted) <= ChiSquareLimit(static_cast<int>(free.size())))) return result;
+  result.one_unit = true;
+  result.correction = G_r * (P_r * weighted) - G_c * (P_c * weighted);
+  // Of both estimates together, before and after.
+  const Effect gain = G_r * P_r - G_c * P_c;
+  result.covariance -= gain * solver.solve(gain.transpose());
+  return result;
+}
+
+}  // namespace plumb

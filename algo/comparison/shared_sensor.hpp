@@ -1,0 +1,39 @@
+// Two sweeps by one sensor unit share its calibration: what each sweep estimated of it is joined.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "algo/comparison/scene_alignment.hpp"
+#include "algo/types/scene.hpp"
+
+namespace plumb {
+
+struct SharedSensorInput {
+  const Scene& reference;
+  const Scene& current;
+  const Alignment& alignment;
+  Pose T_motion = Pose::Identity();                      ///< p_current = T_motion * p_reference
+  Eigen::Vector3d centroid_m = Eigen::Vector3d::Zero();  ///< Of the region, reference frame.
+  /// Whether a point of the reference surface, in the reference frame, belongs to the region.
+  std::function<bool(const Eigen::Vector3d&)> in_region;
+};
+
+/// What the calibrations' estimates do to a body motion. Left perturbations (rotation vector,
+/// translation) about the moved centroid, reference frame.
+struct SharedSensor {
+  bool one_unit = false;  ///< False: the scans may be by two units, and nothing was joined.
+  Vector6d correction = Vector6d::Zero();  ///< Joining the two estimates moves the motion by it.
+  Matrix6d covariance = Matrix6d::Zero();  ///< Of the motion, from what is left uncertain.
+};
+
+/// The scenes differ by what their calibrations were estimated to be, and with them where the body
+/// lies against the markers. Where both were made by one unit its true calibration is one, apart
+/// from DriftBetweenSweeps(): a Kalman update of both estimates by their difference moves each
+/// scene by its own sensitivity. Scans by one unit have the same stated calibration, not a nominal
+/// one, and estimates that agree (chi-square test at 1 in 1,000).
+/// Absent where a scene has no sensitivity, or too little of the region or too few markers take
+/// part.
+[[nodiscard]] std::optional<SharedSensor> JoinSensors(const SharedSensorInput& input);
+
+}  // namespace plumb

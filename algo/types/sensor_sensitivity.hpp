@@ -1,0 +1,37 @@
+// How a scene would change if its sensor's calibration were another one.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "algo/base/intrinsics.hpp"
+
+namespace plumb {
+
+/// A scene rests on an estimate of its sensor's calibration that the sweep itself made. Two sweeps
+/// by one unit make two estimates of the same values, and where these differ the scenes differ:
+/// how, is stated here. Terms are those of the calibration model, in its order and units.
+struct SensorSensitivity {
+  using Derivative = Eigen::Matrix3Xf;  ///< Metres in the scene's frame per unit of each term.
+
+  /// A piece of surface.
+  struct Patch {
+    Eigen::Vector3f centre_m = Eigen::Vector3f::Zero();  ///< In the scene's frame.
+    float weight = 0.0F;                                 ///< Number of depth cells on it.
+    Derivative derivative;
+  };
+
+  Intrinsics stated;  ///< What the estimate corrects.
+  /// False: the stated intrinsics are nominal ones, which many units share.
+  bool stated_for_this_unit = false;
+  Eigen::VectorXd estimate;
+  /// Of the estimate. A term that the sweep was not free to change has none, here and in the
+  /// derivatives.
+  Eigen::MatrixXd covariance;
+  std::vector<Patch> surface;
+  std::map<int, Derivative> markers;  ///< Of the markers' centres, by id.
+};
+
+}  // namespace plumb
