@@ -11,7 +11,8 @@ namespace plumb {
 /// C is the posterior covariance of poses, markers and calibration: the conditional mean of a
 /// normal distribution. Surface patches are what the depth images show under those poses, in cubes
 /// of the scene's frame.
-/// @param map  As the joint solve left it. @param T_scene_world  The reference marker's frame.
+/// @param map  As the joint solve left it.
+/// @param reference_marker  Id of the marker of the map whose frame is the scene's.
 [[nodiscard]] SensorSensitivity SensitivityOf(const Intrinsics& stated,
                                               const CalibrationModel& calibration,
                                               const BundlePosterior& posterior,
