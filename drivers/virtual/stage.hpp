@@ -60,6 +60,8 @@ struct Unit {
   std::atomic<Glitch> glitch{Glitch::kNone};
   std::atomic<int> glitches_left{0};
   std::atomic<int> position{-1};  ///< Last delivered frame; -1: none since the last command.
+  /// Held while a frame is delivered: what changes under it holds from the next frame on.
+  std::mutex delivering;
 
   [[nodiscard]] bool silent() const { return gone || stalled || failed; }
 };

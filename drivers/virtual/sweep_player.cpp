@@ -65,6 +65,7 @@ void SweepPlayer::Run(const std::stop_token& stop) {
 }
 
 void SweepPlayer::Tick(const std::stop_token& stop) {
+  const std::scoped_lock delivering(unit_->delivering);
   if (Stage::View now = stage_->Now(); now.epoch != view_.epoch) {
     view_ = std::move(now);
     next_ = 0;

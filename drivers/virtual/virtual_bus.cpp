@@ -61,7 +61,12 @@ std::string VirtualBus::Obey(const std::string& line) try {
     hangs_ = true;
     return "ok";
   }
-  if (verb == "stall") return OnUnit(argument, [](Unit& unit) { unit.stalled = true; });
+  if (verb == "stall") {
+    return OnUnit(argument, [](Unit& unit) {
+      const std::scoped_lock between_frames(unit.delivering);
+      unit.stalled = true;
+    });
+  }
   if (verb == "error") return SetFailed(argument, true);
   if (verb == "resume") return SetFailed(argument, false);
   return "refused: unknown command " + verb;
@@ -70,8 +75,15 @@ std::string VirtualBus::Obey(const std::string& line) try {
 }
 
 std::string VirtualBus::Rewind(const std::string& how, std::int64_t origin_us) {
-  stage_->Show(stage_->Now().index,
-               how == "once" ? Stage::Motion::kSweepOnce : Stage::Motion::kSweep, origin_us);
+  const bool once = how == "once";
+  const std::vector<std::shared_ptr<Unit>> all = units();
+  // A stall ends with the first frame of the sweep, neither before it nor after it.
+  std::vector<std::unique_lock<std::mutex>> between_frames;
+  for (const auto& unit : all) between_frames.emplace_back(unit->delivering);
+  stage_->Show(stage_->Now().index, once ? Stage::Motion::kSweepOnce : Stage::Motion::kSweep,
+               origin_us);
+  if (once)
+    for (const auto& unit : all) unit->stalled = false;
   return "ok";
 }
 

@@ -470,7 +470,7 @@ TEST_F(DaemonFaultTest, SighupTakesAGoodConfigurationAndKeepsTheOldOneForABadOne
   plumbd.WaitForLog("only after a restart: markers.length_m, web.host_names");
   plumbd.Press();
   plumbd.WaitForState("result");
-  EXPECT_THAT(plumbd.log(), HasSubstr("longest sweep")) << "the new limit holds";
+  EXPECT_THAT(plumbd.log(), HasSubstr("longest duration")) << "the new limit holds";
   EXPECT_THAT(plumbd.notifications(), HasSubstr("RELOADING=1"));
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "algo/base/units.hpp"
+#include "algo/sensor_model/calibration_prior.hpp"
 
 namespace plumb::test {
 namespace {
@@ -400,6 +401,20 @@ Scene MakeSyntheticScene(const SyntheticOptions& options) {
   if (options.with_cloud) scene.cloud = scanner.cloud().Take(options.T_scene_reference);
   if (!own_frame) scene.height_map = scanner.map();
   return scene;
+}
+
+SensorSensitivity KnownCalibration(const Scene& scene) {
+  constexpr std::size_t kPointsPerPatch = 200;
+  SensorSensitivity known;
+  known.stated = {640, 480, 525, 525, 319.5, 239.5, {}};
+  known.estimate = CalibrationVector::Zero();
+  known.covariance = CalibrationMatrix::Zero();
+  const SensorSensitivity::Derivative still =
+      SensorSensitivity::Derivative::Zero(3, kCalibrationSize);
+  for (std::size_t i = 0; i < scene.cloud.size(); i += kPointsPerPatch)
+    known.surface.push_back({scene.cloud.points[i], kPointsPerPatch, still});
+  for (const auto& [id, marker] : scene.markers) known.markers[id] = still;
+  return known;
 }
 
 Pose BodyMotionAbout(const Eigen::Vector3d& centre, const Eigen::Vector3d& shift_m, double yaw_deg,

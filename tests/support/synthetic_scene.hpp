@@ -53,6 +53,10 @@ struct BodySample {
 
 [[nodiscard]] Scene MakeSyntheticScene(const SyntheticOptions& options);
 
+/// For a scene whose sensor's calibration is known exactly: nothing of the body's place hangs on
+/// it.
+[[nodiscard]] SensorSensitivity KnownCalibration(const Scene& scene);
+
 /// p_current = M p_reference of a body carried by a yaw about its own place, tilted and shifted.
 [[nodiscard]] Pose BodyMotionAbout(const Eigen::Vector3d& centre, const Eigen::Vector3d& shift_m,
                                    double yaw_deg, double pitch_deg = 0.0, double roll_deg = 0.0);

@@ -57,6 +57,13 @@ SyntheticOptions At(const Pose& T_motion, unsigned seed, double noise_m) {
   return options;
 }
 
+/// By a sensor that is known well: its numbers have digits behind the point.
+Scene SceneOf(const SyntheticOptions& options) {
+  Scene scene = MakeSyntheticScene(options);
+  scene.sensitivity = KnownCalibration(scene);
+  return scene;
+}
+
 /// What the sweeps show in turn: a body, carried, lying right, with its markers covered.
 std::vector<SyntheticOptions> Sweeps() {
   const SyntheticOptions reference = At(Pose::Identity(), 1, 0.0);
@@ -96,7 +103,7 @@ class Recorder {
 
   /// The first one is the reference of all others.
   FakeAppliance::Recorded Record(const SyntheticOptions& options) {
-    Scene scene = MakeSyntheticScene(options);
+    Scene scene = SceneOf(options);
     if (scene.height_map) scene.mesh = MeshOfHeightMap(*scene.height_map, {}, {.decimation = 3});
     const fs::path folder = NewFolder();
     WriteScene(scene, folder / "scene");
@@ -112,7 +119,7 @@ class Recorder {
   /// A moved body, in a room whose axes are turned by 90 degrees: the plan's posture is not its
   /// own.
   FakeAppliance::Recorded RecordAcross() {
-    Scene scene = MakeSyntheticScene(Sweeps()[1]);
+    Scene scene = SceneOf(Sweeps()[1]);
     if (scene.height_map) scene.mesh = MeshOfHeightMap(*scene.height_map, {}, {.decimation = 3});
     CompareOptions across = Options();
     across.T_iec_reference = Pose::Identity();
@@ -125,8 +132,7 @@ class Recorder {
   /// (degrees).
   FakeAppliance::Recorded RecordMotion(const Eigen::Vector3d& axis, bool is_turn, double amount,
                                        PatientPosture posture, bool is_room_known) {
-    if (!still_)
-      still_ = Compare(*reference_, MakeSyntheticScene(At(Pose::Identity(), 6, 0.0)), Options());
+    if (!still_) still_ = Compare(*reference_, SceneOf(At(Pose::Identity(), 6, 0.0)), Options());
     const Eigen::Vector3d isocentre = kT_iec_reference * still_->motion->centroid_m;
     const Pose T_room = is_turn ? Eigen::Translation3d(isocentre) *
                                       Pose(Eigen::AngleAxisd(amount * kDegree, axis)) *

@@ -114,7 +114,6 @@ void WriteOni(const fs::path& file, FrameSource& source, const std::stop_token& 
     (void)session.Command(
         "speed 4");  // the disk keeps up with that; the rest is buffered in memory
     (void)session.Command(fmt::format("rewind once {}", spooled.begin_us));
-    (void)session.Command("resume");
     WaitForLast(session, spooled.num_frames, stop);
     written = recorder.Finish(spooled.first);
   }
