@@ -12,6 +12,7 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/base/notice.hpp"
+#include "algo/base/utf8.hpp"
 
 namespace plumb {
 namespace {
@@ -41,7 +42,7 @@ class Pages {
   double Width(const std::string& text, double size, bool bold = false) {
     Font(size, bold);
     cairo_text_extents_t extents;
-    cairo_text_extents(context_.get(), text.c_str(), &extents);
+    cairo_text_extents(context_.get(), ValidUtf8(text).c_str(), &extents);
     return extents.x_advance;
   }
   void Text(double x, double baseline, const std::string& text, double size, Ink ink = kBlack,
@@ -49,7 +50,8 @@ class Pages {
     Font(size, bold);
     cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
     cairo_move_to(context_.get(), x, baseline);
-    cairo_show_text(context_.get(), text.c_str());
+    // What is no UTF-8 (a path in a reason) would end all drawing.
+    cairo_show_text(context_.get(), ValidUtf8(text).c_str());
   }
   /// Breaks the text into lines of that width and moves y below it.
   void Paragraph(double x, double width, const std::string& text, double size, Ink ink = kBlack,
@@ -100,9 +102,11 @@ class Pages {
     Foot();
     cairo_show_page(context_.get());
     cairo_surface_finish(surface_.get());
-    if (const cairo_status_t status = cairo_surface_status(surface_.get());
-        status != CAIRO_STATUS_SUCCESS)
-      throw IoError(fmt::format("cannot draw the report: {}", cairo_status_to_string(status)));
+    for (const cairo_status_t status :
+         {cairo_status(context_.get()), cairo_surface_status(surface_.get())}) {
+      if (status != CAIRO_STATUS_SUCCESS)
+        throw IoError(fmt::format("cannot draw the report: {}", cairo_status_to_string(status)));
+    }
     return std::move(bytes_);
   }
 

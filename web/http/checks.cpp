@@ -7,6 +7,8 @@
 #include <cctype>
 #include <cstdint>
 
+#include "algo/base/utf8.hpp"
+
 namespace plumb::web {
 namespace {
 
@@ -24,31 +26,6 @@ std::string Lower(std::string_view text) {
   std::transform(lower.begin(), lower.end(), lower.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return lower;
-}
-
-/// Length of the UTF-8 sequence at the beginning of `text`, 0 if malformed (overlong, surrogate,
-/// beyond U+10FFFF, truncated).
-std::size_t SequenceLength(std::string_view text, std::uint32_t& code) {
-  const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
-  const std::uint8_t lead = byte(0);
-  if (lead < 0x80) {
-    code = lead;
-    return 1;
-  }
-  const std::size_t length = lead >= 0xF0 && lead < 0xF5   ? 4
-                             : lead >= 0xE0 && lead < 0xF0 ? 3
-                             : lead >= 0xC2 && lead < 0xE0 ? 2
-                                                           : 0;
-  if (length == 0 || text.size() < length) return 0;
-  code = lead & (0xFFU >> (length + 1));
-  for (std::size_t i = 1; i < length; ++i) {
-    if ((byte(i) & 0xC0) != 0x80) return 0;
-    code = code << 6 | (byte(i) & 0x3FU);
-  }
-  constexpr std::array<std::uint32_t, 5> kSmallest = {0, 0, 0x80, 0x800, 0x10000};
-  const bool valid =
-      code >= kSmallest[length] && code <= 0x10FFFF && (code < 0xD800 || code > 0xDFFF);
-  return valid ? length : 0;
 }
 
 bool IsNumericAddress(const std::string& host) {
@@ -89,7 +66,7 @@ std::optional<std::string> UnescapeForm(std::string_view text) {
 bool IsPlainText(std::string_view text, bool allow_lines) {
   while (!text.empty()) {
     std::uint32_t code = 0;
-    const std::size_t length = SequenceLength(text, code);
+    const std::size_t length = Utf8Length(text, code);
     if (length == 0) return false;
     const bool line = code == '\n' || code == '\t';
     if ((code < 0x20 && !(line && allow_lines)) || (code >= 0x7F && code < 0xA0)) return false;

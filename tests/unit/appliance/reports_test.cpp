@@ -73,6 +73,21 @@ std::string ValueOf(const ReportFacts& facts, std::string_view name) {
   return "nothing";
 }
 
+TEST_F(ReportsTest, AReasonThatIsNoUtf8EndsNoReport) {
+  const auto report_of_failure = [&](const std::string& reason) {
+    const std::string id = store_.scans.Begin(
+        {.patient_id = patient_, .reference_id = {}, .sensor_serial = "S1", .reason = ""});
+    store_.scans.Finish(
+        id, {.outcome = web::ScanOutcome::kFailed, .failure = reason, .result_json = {}});
+    return ScanReportPdf(sources_, *store_.scans.Find(id), Language::kEnglish).size();
+  };
+  const std::size_t usual = report_of_failure("cannot write /data/senal: no space");
+  // What follows it is drawn too: cairo draws nothing after a text that it cannot read.
+  EXPECT_GT(report_of_failure("cannot write /data/se\xF1"
+                              "al: no space"),
+            usual - usual / 50);
+}
+
 TEST_F(ReportsTest, AScanIsToldInTheLanguageThatIsAskedFor) {
   const std::string id = Scan(Approved(), kMove, /*overdue=*/true);
   const web::Scan scan = *store_.scans.Find(id);
