@@ -33,6 +33,7 @@ constexpr const char* kScans = "scans";
 /// The other parts of a state folder that are copied if they exist.
 constexpr std::array<const char*, 4> kOtherFolders = {"set-aside", "calibration", "imports",
                                                       "sensor-profiles"};
+constexpr const char* kAsideOnScansDisk = "scans/set-aside";
 constexpr const char* kRestoring = ".restore";
 constexpr const char* kBackingUp = ".backup";
 
@@ -94,6 +95,8 @@ class Writing {
     for (const char* folder : kOtherFolders) {
       for (const std::string& file : ListedOrTold(state_ / folder)) (void)output_.Add(state_, file);
     }
+    for (const std::string& file : ListedOrTold(state_ / kAsideOnScansDisk))
+      (void)output_.Add(state_, file);
     output_.Commit({{"scans", scans}});
     return {.scans = scans,
             .files = output_.files(),
@@ -157,6 +160,17 @@ class Writing {
   SummedWriter output_;
 };
 
+/// In there it would be a part of the next one, and go with what it is to replace.
+void RequireOutside(const fs::path& state, const fs::path& target) {
+  const fs::path inner = fs::weakly_canonical(target), outer = fs::weakly_canonical(state);
+  if (std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first != outer.end())
+    return;
+  throw std::invalid_argument(
+      fmt::format("a backup cannot be made at {}: that is inside the state folder {} itself; name "
+                  "a folder on another disk",
+                  target.string(), state.string()));
+}
+
 void RequireEmpty(const fs::path& state) {
   std::error_code error;
   for (fs::directory_iterator entry(state, error), end; !error && entry != end;
@@ -211,6 +225,7 @@ OutputKind BackupOutput() {
 
 BackupReport WriteBackup(const fs::path& state, Database& database, const fs::path& target,
                          const std::stop_token& stop, const BackupSecret* secret) {
+  RequireOutside(state, target);
   return Writing(state, target, secret, stop).Write(database);
 }
 

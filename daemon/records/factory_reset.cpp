@@ -27,6 +27,7 @@ using web::FactoryReset;
 constexpr std::size_t kMaxBytes = 4096;
 constexpr const char* kKeep = "keep_records";
 constexpr const char* kWipe = "wipe";
+constexpr const char* kOfFileSystem = "lost+found";  // root's, on the root of a disk
 /// Items beside the database that are neither records nor belong to the sensor.
 constexpr std::array kOfPageAndUpdates = {"page-key.pem", "device.key", "updates"};
 
@@ -77,9 +78,25 @@ std::vector<fs::path> EntriesOf(const fs::path& folder) {
 void Wipe(const fs::path& state) {
   FolderLock lock;
   lock.Take(state);
-  Remove(state / "scans");
+  const fs::path scans = state / "scans";
+  if (fs::is_directory(scans)) {  // or a link to one, on another disk
+    for (const fs::path& entry : EntriesOf(scans)) {
+      if (entry.filename() != kOfFileSystem) Remove(entry);
+    }
+    std::error_code kept;  // it stays where it is the root of a disk
+    fs::remove(scans, kept);
+  } else if (fs::is_symlink(scans)) {
+    throw DiskRefused(
+        fmt::format("the factory reset cannot see where {} leads: mount that disk; it goes on at "
+                    "the next start",
+                    scans.string()));
+  } else {
+    Remove(scans);
+  }
   for (const fs::path& entry : EntriesOf(state)) {
-    if (entry.filename() != kFactoryResetFile && entry.filename() != "lost+found") Remove(entry);
+    if (entry != scans && entry.filename() != kFactoryResetFile &&
+        entry.filename() != kOfFileSystem)
+      Remove(entry);
   }
   SyncToDisk(state);
 }

@@ -11,6 +11,19 @@ namespace plumb {
 
 namespace fs = std::filesystem;
 
+std::vector<fs::path> ScanFolders::Interrupted(const std::string& scan_id) const {
+  std::vector<fs::path> folders;
+  for (const fs::path& aside : SetAside()) {
+    std::error_code error;
+    fs::directory_iterator entry(aside, error);
+    for (const fs::directory_iterator end; !error && entry != end; entry.increment(error)) {
+      if (entry->path().filename().string().starts_with(scan_id + kInterruptedSuffix))
+        folders.push_back(entry->path());
+    }
+  }
+  return folders;
+}
+
 std::vector<fs::path> ScanFolders::All() const {
   std::vector<fs::path> folders;
   std::error_code error;

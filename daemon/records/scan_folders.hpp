@@ -1,6 +1,7 @@
 // Locations of the files of scans in a state folder.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -21,10 +22,13 @@ class ScanFolders {
   [[nodiscard]] std::filesystem::path Staging(const std::string& scan_id) const {
     return scans() / (std::string(kStagingPrefix) + scan_id);
   }
-  /// A complete folder of an interrupted scan, as found at the next start.
-  [[nodiscard]] std::filesystem::path Interrupted(const std::string& scan_id) const {
-    return state_ / "set-aside" / (scan_id + kInterruptedSuffix);
+  /// Where a start moves folders that no row explains; the second is used if scans/ is a disk of
+  /// its own.
+  [[nodiscard]] std::array<std::filesystem::path, 2> SetAside() const {
+    return {state_ / "set-aside", scans() / "set-aside"};
   }
+  /// Complete folders of an interrupted scan, as found at the next start.
+  [[nodiscard]] std::vector<std::filesystem::path> Interrupted(const std::string& scan_id) const;
   [[nodiscard]] static bool IsStaging(const std::filesystem::path& folder) {
     return folder.filename().string().starts_with(kStagingPrefix);
   }

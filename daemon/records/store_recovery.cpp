@@ -168,12 +168,10 @@ void Recovery::Discard(const fs::path& folder, const std::string& why) {
 void Recovery::SetAside(const fs::path& folder, const std::string& name, const std::string& why) {
   std::error_code error;
   fs::path target;
-  for (const fs::path& set_aside :
-       {folders_.state() / "set-aside", folders_.scans() / "set-aside"}) {
-    fs::create_directories(set_aside, error);
-    target = set_aside / name;
-    for (int i = 2; fs::exists(target, error); ++i)
-      target = set_aside / fmt::format("{}-{}", name, i);
+  for (const fs::path& aside : folders_.SetAside()) {
+    fs::create_directories(aside, error);
+    target = aside / name;
+    for (int i = 2; fs::exists(target, error); ++i) target = aside / fmt::format("{}-{}", name, i);
     fs::rename(folder, target, error);
     if (error != std::errc::cross_device_link) break;
   }

@@ -217,6 +217,18 @@ TEST_F(BackupTest, APathOutsideIsRefused) {
   EXPECT_FALSE(fs::exists(folder_ / "evil"));
 }
 
+TEST_F(BackupTest, IsNotMadeInsideTheFolderThatItIsOf) {
+  Store store(state());
+  fs::create_directory_symlink(state(), folder_ / "link");
+  for (const fs::path& target : {state(), state() / "set-aside" / "backup", state() / "scans" / "9",
+                                 folder_ / "link" / "backup", state() / "x" / ".." / "backup"}) {
+    EXPECT_THAT(MessageOf<std::invalid_argument>([&] { (void)store.backup.Make(kAnna, target); }),
+                HasSubstr("inside the state folder"))
+        << target;
+  }
+  EXPECT_NO_THROW((void)store.backup.Make(kAnna, folder_ / "state-backup"));
+}
+
 TEST_F(BackupTest, IsRestoredIntoAnEmptyFolderOnly) {
   (void)BackUpStopped(state(), backup());
   EXPECT_THAT(MessageOf<std::invalid_argument>([&] { (void)RestoreBackup(backup(), state()); }),

@@ -96,6 +96,23 @@ TEST_F(FactoryResetTest, WipingLeavesAnEmptyStoreThatSaysWhoAskedForIt) {
     EXPECT_FALSE(IsThere(gone)) << gone;
 }
 
+TEST_F(FactoryResetTest, AWipeFollowsTheLinkToTheDiskOfTheScans) {
+  (void)Use();
+  fs::rename(state() / "scans", folder_ / "disk");
+  fs::create_directory_symlink(folder_ / "disk", state() / "scans");
+  fs::create_directories(folder_ / "disk" / "lost+found");
+  ASSERT_TRUE(fs::exists(state() / "scans" / scan_ / "scene" / "scene.json"));
+  RequestFactoryReset(state(), FactoryReset::kWipe, kAnna);
+  fs::rename(folder_ / "disk", folder_ / "not mounted");
+  EXPECT_THROW((void)CarryOutFactoryReset(state()), DiskRefused);
+  EXPECT_TRUE(fs::exists(database())) << "not half of it";
+  fs::rename(folder_ / "not mounted", folder_ / "disk");
+  ASSERT_TRUE(CarryOutFactoryReset(state()));
+  EXPECT_TRUE(fs::exists(folder_ / "disk" / "lost+found"));
+  EXPECT_FALSE(fs::exists(folder_ / "disk" / scan_)) << "it is said that everything was removed";
+  EXPECT_THAT(Open()->patients.List(), SizeIs(0));
+}
+
 /// Power is lost at any point of it: the request is still there, and the folder half empty.
 TEST_F(FactoryResetTest, AnInterruptedWipeGoesOn) {
   (void)Use();

@@ -274,8 +274,16 @@ TEST_F(StoreRecoveryTest, ACompleteFolderOfAScanThatNoRowKnowsToHaveEndedIsSetAs
   EXPECT_FALSE(fs::exists(store->folders.Scan(id)));
   EXPECT_TRUE(fs::exists(state() / "set-aside" / (id + "-interrupted") / "scene" / "scene.json"));
   EXPECT_EQ(store->scans.Find(id)->outcome, web::ScanOutcome::kFailed);
+  // Where scans/ is a disk of its own; or a second one of this number.
+  const fs::path on_disk = store->folders.scans() / "set-aside" / (id + "-interrupted-2");
+  fs::create_directories(on_disk.parent_path());
+  fs::copy(state() / "set-aside" / (id + "-interrupted"), on_disk, fs::copy_options::recursive);
+  (void)store->backup.Make(kAnna, folder_ / "backup");
+  EXPECT_THAT(testing::FilesBelow(folder_ / "backup" / "scans" / "set-aside"),
+              ::testing::SizeIs(7));
   store->removal.WipePatient(kAnna, store->patients.FindByCode("A")->id);
-  EXPECT_THAT(testing::FilesBelow(state() / "set-aside"), IsEmpty()) << "the patient's too";
+  for (const fs::path& aside : store->folders.SetAside())
+    EXPECT_THAT(testing::FilesBelow(aside), IsEmpty()) << "the patient's too";
 }
 
 TEST_F(StoreRecoveryTest, WhatWasRemovedOnPurposeAndCameBackGoesAtTheNextStart) {
