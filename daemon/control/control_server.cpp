@@ -7,6 +7,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -90,14 +91,19 @@ void ControlServer::Accept() {
   const std::uint64_t id = next_id_++;
   auto client = std::make_unique<Client>();
   client->fd = fd;
-  client->source = loop_.WatchDescriptor("control", fd, EPOLLIN, [this, id](std::uint32_t events) {
-    if ((events & EPOLLOUT) != 0) Flush(id);
-    if ((events & EPOLLIN) != 0) {
-      Read(id);
-    } else if ((events & (EPOLLHUP | EPOLLERR)) != 0) {
-      Drop(id);  // disconnected: there is nobody left to answer
-    }
-  });
+  try {
+    client->source =
+        loop_.WatchDescriptor("control", fd, EPOLLIN, [this, id](std::uint32_t events) {
+          if ((events & EPOLLOUT) != 0) Flush(id);
+          if ((events & EPOLLIN) != 0) {
+            Read(id);
+          } else if ((events & (EPOLLHUP | EPOLLERR)) != 0) {
+            Drop(id);  // disconnected: there is nobody left to answer
+          }
+        });
+  } catch (const std::runtime_error&) {  // the kernel watches no more of them: this one goes
+    return;
+  }
   clients_.emplace(id, std::move(client));
 }
 
@@ -158,6 +164,9 @@ void ControlServer::HandleLine(std::uint64_t id, const std::string& line) {
     });
   } catch (const DataError& error) {
     Send(id, ControlRefusal(error.what(), /*is_input=*/true));
+  } catch (const std::exception& error) {  // it costs this connection, and not plumbd
+    Send(id, ControlRefusal(error.what()));
+    Drop(id);
   }
 }
 

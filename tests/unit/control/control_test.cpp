@@ -123,6 +123,7 @@ class ControlServerTest : public ::testing::Test {
                 {.max_clients = 4, .max_waiting = 64 << 10}) {}
 
   void Handle(const ControlRequest& request, const ControlServer::Reply& reply) {
+    if (request.kind == Kind::kRestart) throw std::runtime_error("no answer can be made");
     if (request.kind == Kind::kSim) {  // answered later
       later_ = loop_.MakeTimer("later", [reply] { reply(ControlDone()); });
       later_.ArmAfter(std::chrono::milliseconds(20));
@@ -189,6 +190,19 @@ TEST_F(ControlServerTest, AnswersSeveralRequestsInOnePieceAndOneInSeveral) {
     Send(fd, "and\":\"status\"}\n");
     EXPECT_EQ(ReadLine(fd), ControlDone());
     ::close(fd);
+  });
+}
+
+TEST_F(ControlServerTest, AnAnswerThatFailsEndsItsConnectionAndNotTheLoop) {
+  RunWith([&] {
+    const int fd = ConnectUnix(folder_ / "s"), other = ConnectUnix(folder_ / "s");
+    Send(fd, "{\"command\":\"restart\"}\n");
+    EXPECT_THAT(ReadLine(fd), HasSubstr("no answer can be made"));
+    EXPECT_EQ(ReadLine(fd), "") << "it has ended";
+    Send(other, "{\"command\":\"status\"}\n");
+    EXPECT_EQ(ReadLine(other), ControlDone());
+    ::close(fd);
+    ::close(other);
   });
 }
 
