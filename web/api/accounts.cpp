@@ -298,7 +298,7 @@ std::vector<std::string> Accounts::CountersOf(const Request& request, const std:
   const auto cookie = CookieValue(request.Header("cookie"), devices_.NameFor(name));
   if (const auto device = cookie ? devices_.Identify(*cookie, name, stored) : std::nullopt)
     return {"device " + *device};
-  return {"address " + request.address, "name " + name};
+  return {"address " + NetworkOf(request.address), "name " + name};
 }
 
 std::optional<Response> Accounts::CountGuess(const std::vector<std::string>& counters) {

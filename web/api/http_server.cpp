@@ -65,8 +65,10 @@ class HttpServer::Impl {
       : appliance_(services.appliance),
         options_(Completed(std::move(options))),
         accounts_(services, AccountsOptions(options_, CertificateReplacer())),
-        hub_(options_.max_event_streams, options_.max_streams_per_session,
-             options_.event_buffer_bytes),
+        hub_({.all = options_.max_event_streams,
+              .of_account = options_.max_streams_per_account,
+              .of_session = options_.max_streams_per_session,
+              .buffer_bytes = options_.event_buffer_bytes}),
         transport_(options_, services.background, router_, accounts_, hub_,
                    [this](EventStream& stream) { stream.Send(StatusEvent()); }) {
     accounts_.AddRoutes(router_);

@@ -155,6 +155,17 @@ bool IsName(std::string_view text) {
   });
 }
 
+std::string NetworkOf(const std::string& address) {
+  in6_addr v6{};
+  if (inet_pton(AF_INET6, address.c_str(), &v6) != 1 || IN6_IS_ADDR_V4MAPPED(&v6) ||
+      IN6_IS_ADDR_LOOPBACK(&v6))
+    return address;
+  std::fill(std::begin(v6.s6_addr) + 8, std::end(v6.s6_addr), std::uint8_t{0});
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  inet_ntop(AF_INET6, &v6, text.data(), text.size());
+  return text.data();
+}
+
 std::string EscapeHtml(std::string_view text) {
   std::string escaped;
   for (const char c : text) {

@@ -36,6 +36,10 @@ namespace plumb::web {
 /// Values of placeholders: [A-Za-z0-9._-]{1,64} without a leading dot, which cannot leave a folder.
 [[nodiscard]] bool IsName(std::string_view text);
 
+/// The address that counters use: one machine can have all addresses of an IPv6 network of 64 bits
+/// ("2001:db8:1:2::"), so they count as one; other addresses are returned unchanged.
+[[nodiscard]] std::string NetworkOf(const std::string& address);
+
 /// Escapes text for an HTML element or a quoted attribute.
 [[nodiscard]] std::string EscapeHtml(std::string_view text);
 

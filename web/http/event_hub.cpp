@@ -39,13 +39,19 @@ void EventStream::Close() {
 }
 
 std::shared_ptr<EventStream> EventHub::Open(std::shared_ptr<Session> session) {
-  std::list<std::shared_ptr<EventStream>> own;
+  std::list<std::shared_ptr<EventStream>> own, of_account;
   for (const auto& stream : streams_) {
-    if (&stream->session() == session.get() && !stream->closed()) own.push_back(stream);
+    if (stream->closed()) continue;
+    if (&stream->session() == session.get()) own.push_back(stream);
+    if (stream->session().user == session->user) of_account.push_back(stream);
   }
-  if (own.size() >= max_per_session_) own.front()->Close();
-  if (streams_.size() >= max_streams_) return nullptr;
-  streams_.push_back(std::make_shared<EventStream>(std::move(session), buffer_bytes_));
+  if (own.size() >= limits_.of_session) {
+    own.front()->Close();
+  } else if (of_account.size() >= limits_.of_account) {
+    of_account.front()->Close();
+  }
+  if (streams_.size() >= limits_.all) return nullptr;
+  streams_.push_back(std::make_shared<EventStream>(std::move(session), limits_.buffer_bytes));
   return streams_.back();
 }
 

@@ -49,10 +49,14 @@ class EventHub {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  EventHub(std::size_t max_streams, std::size_t max_per_session, std::size_t buffer_bytes)
-      : max_streams_(max_streams), max_per_session_(max_per_session), buffer_bytes_(buffer_bytes) {}
+  struct Limits {
+    std::size_t all = 32, of_account = 16, of_session = 6;
+    std::size_t buffer_bytes = 64 << 10;  ///< Of one stream.
+  };
 
-  /// Null if there are too many. If one session has too many, its oldest ends.
+  explicit EventHub(Limits limits) : limits_(limits) {}
+
+  /// Null if there are too many. If one session or one account has too many, its oldest ends.
   [[nodiscard]] std::shared_ptr<EventStream> Open(std::shared_ptr<Session> session);
   void Remove(const std::shared_ptr<EventStream>& stream) { streams_.remove(stream); }
   /// To every stream. @param data  One line.
@@ -65,9 +69,7 @@ class EventHub {
   [[nodiscard]] std::size_t size() const { return streams_.size(); }
 
  private:
-  std::size_t max_streams_;
-  std::size_t max_per_session_;
-  std::size_t buffer_bytes_;
+  Limits limits_;
   std::list<std::shared_ptr<EventStream>> streams_;
 };
 

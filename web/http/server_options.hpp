@@ -51,8 +51,8 @@ struct HttpServerOptions {
   std::size_t event_buffer_bytes =
       64 << 10;  ///< Per viewer of the event stream; one that falls behind is dropped.
   unsigned max_event_streams = 32;
-  /// Above this number the oldest stream of the session ends.
-  unsigned max_streams_per_session = 6;
+  /// Above these numbers the oldest stream of the account or of the session ends.
+  unsigned max_streams_per_account = 16, max_streams_per_session = 6;
   std::uint64_t password_memory_bytes = 64 << 20;  ///< For argon2id; one hash runs at a time.
   std::uint64_t password_operations = 3;
   /// A session ends after this time even if it is used.

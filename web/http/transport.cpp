@@ -74,7 +74,7 @@ struct Transport::Callbacks {
     auto* transport = static_cast<Transport*>(self);
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
       const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-      *context = transport->connections_.Add(info->connect_fd, AddressOf(connection),
+      *context = transport->connections_.Add(info->connect_fd, NetworkOf(AddressOf(connection)),
                                              transport->options_.now());
       while (const Connection* leaving = transport->connections_.NextOverLimit())
         shutdown(leaving->fd, SHUT_RDWR);

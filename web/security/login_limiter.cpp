@@ -1,13 +1,14 @@
 #include "web/security/login_limiter.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace plumb::web {
 namespace {
 
 constexpr std::size_t kMaxFailures = 5;
 constexpr std::chrono::seconds kWindow{60};
-constexpr std::size_t kMaxKeys = 1024;
+constexpr std::size_t kMaxKeys = 16384;
 
 }  // namespace
 
@@ -20,12 +21,19 @@ std::chrono::seconds LoginLimiter::Wait(const std::string& key, TimePoint now) c
                         : std::chrono::ceil<std::chrono::seconds>(open_at - now);
 }
 
+void LoginLimiter::MakeRoom(TimePoint now) {
+  if (failures_.size() < kMaxKeys) return;
+  std::erase_if(failures_, [&](const auto& entry) { return now - entry.second.back() >= kWindow; });
+  if (failures_.size() < kMaxKeys) return;
+  failures_.erase(
+      std::min_element(failures_.begin(), failures_.end(), [](const auto& a, const auto& b) {
+        return std::pair(a.second.size(), a.second.back()) <
+               std::pair(b.second.size(), b.second.back());
+      }));
+}
+
 void LoginLimiter::Failed(const std::string& key, TimePoint now) {
-  if (failures_.size() >= kMaxKeys && !failures_.contains(key)) {
-    failures_.erase(std::min_element(
-        failures_.begin(), failures_.end(),
-        [](const auto& a, const auto& b) { return a.second.back() < b.second.back(); }));
-  }
+  if (!failures_.contains(key)) MakeRoom(now);
   std::deque<TimePoint>& times = failures_[key];
   times.push_back(now);
   if (times.size() > kMaxFailures) times.pop_front();

@@ -8,7 +8,9 @@
 
 namespace plumb::web {
 
-/// At most five failures a minute for one key (an address, or an account's name).
+/// At most five failures a minute for one key (an address, or an account's name). The memory is
+/// bounded, and no flood of other keys makes it forget one that is slowed down: what it forgets
+/// first is over, then what failed least.
 class LoginLimiter {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -19,6 +21,8 @@ class LoginLimiter {
   void Succeeded(const std::string& key) { failures_.erase(key); }
 
  private:
+  void MakeRoom(TimePoint now);
+
   std::map<std::string, std::deque<TimePoint>> failures_;
 };
 

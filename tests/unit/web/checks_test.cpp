@@ -59,6 +59,14 @@ TEST(ChecksTest, NamesLeadNowhere) {
   EXPECT_FALSE(IsName(std::string(65, 'a')));
 }
 
+TEST(ChecksTest, AnIpv6NetworkCountsAsOneAddress) {
+  EXPECT_EQ(NetworkOf("2001:db8:1:2:3:4:5:6"), "2001:db8:1:2::");
+  EXPECT_EQ(NetworkOf("2001:db8:1:2:ffff::1"), "2001:db8:1:2::");
+  EXPECT_EQ(NetworkOf("fe80::1"), "fe80::");
+  for (const char* same : {"::1", "::ffff:10.0.0.1", "10.0.0.1", "127.0.0.1", ""})
+    EXPECT_EQ(NetworkOf(same), same);
+}
+
 TEST(ChecksTest, HtmlIsEscaped) {
   EXPECT_EQ(EscapeHtml("<a href=\"x\">&'"), "&lt;a href=&quot;x&quot;&gt;&amp;&#39;");
 }

@@ -1,4 +1,5 @@
 // Who may guess how often, and who is not kept out by others who guess; which passwords are taken.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <numeric>
@@ -340,6 +341,18 @@ TEST(LoginLimiterTest, FiveFailuresAMinuteAndNotOneMore) {
   EXPECT_EQ(limiter.Wait("a", now + seconds(60)), seconds(0));
   limiter.Succeeded("a");
   EXPECT_EQ(limiter.Wait("a", now), seconds(0));
+}
+
+TEST(LoginLimiterTest, NoFloodOfOtherKeysMakesItForgetOneThatIsSlowedDown) {
+  using std::chrono::seconds;
+  web::LoginLimiter limiter;
+  const auto now = std::chrono::steady_clock::now();
+  for (int i = 0; i < 5; ++i) limiter.Failed("name physicist", now);
+  for (int i = 0; i < 17'000; ++i) limiter.Failed(fmt::format("address {}", i), now + seconds(1));
+  EXPECT_EQ(limiter.Wait("name physicist", now + seconds(2)), seconds(58));
+  // What is over makes room for what is new, or a flood of the past would switch it off.
+  for (int i = 0; i < 5; ++i) limiter.Failed("name other", now + seconds(100));
+  EXPECT_EQ(limiter.Wait("name other", now + seconds(100)), seconds(60));
 }
 
 TEST(DeviceCookiesTest, AreBoundToKeyNameAndPassword) {

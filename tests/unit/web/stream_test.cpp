@@ -133,7 +133,7 @@ TEST_F(StreamTest, StreamsAreFew) {
 }
 
 TEST(EventHubTest, AFullBufferClosesTheStreamAndFreesIt) {
-  web::EventHub hub(4, 4, 100);
+  web::EventHub hub({.all = 4, .of_account = 4, .of_session = 4, .buffer_bytes = 100});
   const auto stream = hub.Open(std::make_shared<web::Session>());
   bool cut = false;
   stream->cut = [&] { cut = true; };
@@ -145,8 +145,27 @@ TEST(EventHubTest, AFullBufferClosesTheStreamAndFreesIt) {
   EXPECT_EQ(stream->waiting(), 0U);
 }
 
+TEST(EventHubTest, NoAccountTakesThePlacesOfAnother) {
+  web::EventHub hub({.all = 5, .of_account = 3, .of_session = 2, .buffer_bytes = 100});
+  const auto session = [](const std::string& user) {
+    auto made = std::make_shared<web::Session>();
+    made->user = user;
+    return made;
+  };
+  std::vector<std::shared_ptr<web::EventStream>> anna;
+  for (int browser = 0; browser < 4; ++browser) anna.push_back(hub.Open(session("anna")));
+  EXPECT_TRUE(anna[0]->closed()) << "the oldest of her four browsers";
+  for (int i = 1; i < 4; ++i) EXPECT_FALSE(anna[static_cast<std::size_t>(i)]->closed());
+  hub.Remove(anna[0]);
+  const auto bert = session("bert");
+  const auto first = hub.Open(bert), second = hub.Open(bert);
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(hub.Open(bert), nullptr) << "all places are taken until one has gone";
+  EXPECT_TRUE(first->closed()) << "his browser's third ends its first";
+}
+
 TEST(EventHubTest, WhatIsTakenMakesRoom) {
-  web::EventHub hub(4, 4, 100);
+  web::EventHub hub({.all = 4, .of_account = 4, .of_session = 4, .buffer_bytes = 100});
   const auto stream = hub.Open(std::make_shared<web::Session>());
   for (int i = 0; i < 1000; ++i) {
     hub.Broadcast("status", std::string(40, 'x'));
