@@ -132,6 +132,32 @@ void CheckPageIdentity(const WebConfig& web) {
   if (TransportOf(web, /*is_loopback=*/false) == PageTransport::kGivenTls) (void)GivenTls(web);
 }
 
+PageSocket OpenPageSocket(WebConfig& web, const std::string& otherwise) {
+  PageSocket socket;
+  const auto open = [&] {
+    const ListenAddress listen = ParseListenAddress(web.listen).value_or(ListenAddress{});
+    socket.fd = web::OpenListenSocket(listen.address, listen.port);
+    if (!web::HasAddress(listen.address)) {
+      socket.warning = fmt::format(
+          "{} is no address of this machine now: the page cannot be reached before it is "
+          "(web.listen)",
+          listen.address);
+    }
+  };
+  try {
+    open();
+  } catch (const IoError& error) {
+    if (web.listen == otherwise) throw;
+    socket.fault = fmt::format(
+        "the configuration cannot be used: web.listen: {}; the page is served at {} instead. "
+        "Correct the file, then restart: systemctl restart plumbd",
+        error.what(), otherwise);
+    web.listen = otherwise;
+    open();
+  }
+  return socket;
+}
+
 PageNotes IdentifyPage(const Config& config, web::HttpServerOptions& options) {
   PageNotes notes;
   const std::string address =

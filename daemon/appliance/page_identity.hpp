@@ -35,6 +35,17 @@ void CheckPageIdentity(const WebConfig& web);
 /// @throws IoError
 void KeepPageIdentity(const std::filesystem::path& state, const web::TlsIdentity& identity);
 
+/// The socket that the page is served on.
+struct PageSocket {
+  int fd = -1;
+  std::string fault;    ///< Why it is not where the configuration says; empty: it is there.
+  std::string warning;  ///< That nobody can reach it yet.
+};
+/// Where `web.listen` says; where that cannot be opened at `otherwise`, so that the page can say
+/// what is wrong; `web.listen` is changed with it.
+/// @throws IoError where neither can be opened
+[[nodiscard]] PageSocket OpenPageSocket(WebConfig& web, const std::string& otherwise);
+
 /// Fills in `tls`, `keep_certificate` (not for a certificate that the configuration names) and
 /// `device_key` of the options from the configuration, and returns the facts about the page. A
 /// secret of the appliance's own that cannot be stored is created for this run only, with a

@@ -111,7 +111,7 @@ std::optional<int> InheritedSocket(const std::string& name) {
 class Plumbd {
  public:
   Plumbd(const PlumbdOptions& options, const Config& config, const std::string& fault,
-         const SensorRegistry& registry)
+         const PageSocket& page, const SensorRegistry& registry)
       : options_(options),
         registry_(registry),
         sensors_(SetUpSensors(options, config, registry)),
@@ -124,7 +124,7 @@ class Plumbd {
                            .indicator = panel_.light(),
                            .demo_patient = options.simulated.empty() ? "" : "demo"}),
         services_(appliance_, config.update, MakeLogindRestart(loop_, {})),
-        http_(services_.services(), HttpOptions(config)),
+        http_(services_.services(), HttpOptions(config, page)),
         desk_(appliance_, services_.updates(),
               [this](const std::string& command) { (void)sensors_->Command(command); }),
         control_(loop_, ControlSocket(config),
@@ -186,14 +186,12 @@ class Plumbd {
     return listening;
   }
 
-  web::HttpServerOptions HttpOptions(const Config& config) {
-    const ListenAddress listen = ParseListenAddress(config.web.listen).value_or(ListenAddress{});
+  web::HttpServerOptions HttpOptions(const Config& config, const PageSocket& page) {
     web::HttpServerOptions options;
-    options.address = listen.address;
-    options.port = listen.port;
-    options.listen_fd = InheritedSocket("http");
+    options.listen_fd = page.fd;
     options.host_names = config.web.host_names;
     page_ = IdentifyPage(config, options);
+    if (!page.warning.empty()) page_.warnings.push_back(page.warning);
     if (options.tls) certificate_pem_ = options.tls->certificate_pem;
     if (auto keep = std::exchange(options.keep_certificate, nullptr)) {
       options.keep_certificate = [this, keep = std::move(keep)](const web::TlsIdentity& identity) {
@@ -348,9 +346,15 @@ int RunChecked(const PlumbdOptions& options, const SensorRegistry& registry) {
   std::error_code ignored;
   fs::create_directories(configured.config.appliance.state,
                          ignored);  // an error surfaces when the store opens
+  PageSocket page{.fd = InheritedSocket("http").value_or(-1), .fault = {}, .warning = {}};
+  if (page.fd < 0) {
+    WebConfig& web = configured.config.web;
+    page = OpenPageSocket(web, options.listen ? web.listen : WebConfig{}.listen);
+    if (configured.fault.empty()) configured.fault = page.fault;
+  }
   if (configured.fault.empty()) configured.fault = ResetIfAsked(configured.config.appliance.state);
   std::optional<EndGuard> guard;  // outlives the threads that it waits for
-  Plumbd plumbd(options, configured.config, configured.fault, registry);
+  Plumbd plumbd(options, configured.config, configured.fault, page, registry);
   const int code = plumbd.Run();
   guard.emplace(kLongestEnd, [] {
     Log(LogLevel::kError,

@@ -29,25 +29,42 @@ sockaddr_storage AddressOf(int socket_fd) {
 
 }  // namespace
 
-int OpenListenSocket(const std::string& address, std::uint16_t port) {
+namespace {
+
+/// An address in numbers with a port, as the system calls take it.
+struct Endpoint {
+  Endpoint(const std::string& address, std::uint16_t port) {
+    v4.sin_family = AF_INET;
+    v4.sin_port = htons(port);
+    v6.sin6_family = AF_INET6;
+    v6.sin6_port = htons(port);
+    is_v4 = inet_pton(AF_INET, address.c_str(), &v4.sin_addr) == 1;
+    is_valid = is_v4 || inet_pton(AF_INET6, address.c_str(), &v6.sin6_addr) == 1;
+  }
+  [[nodiscard]] int family() const { return is_v4 ? AF_INET : AF_INET6; }
+  [[nodiscard]] int Bind(int fd) const {
+    return is_v4 ? bind(fd, reinterpret_cast<const sockaddr*>(&v4), sizeof v4)
+                 : bind(fd, reinterpret_cast<const sockaddr*>(&v6), sizeof v6);
+  }
+
   sockaddr_in v4{};
   sockaddr_in6 v6{};
-  v4.sin_family = AF_INET;
-  v4.sin_port = htons(port);
-  v6.sin6_family = AF_INET6;
-  v6.sin6_port = htons(port);
-  const bool is_v4 = inet_pton(AF_INET, address.c_str(), &v4.sin_addr) == 1;
-  if (!is_v4 && inet_pton(AF_INET6, address.c_str(), &v6.sin6_addr) != 1) {
+  bool is_v4 = false, is_valid = false;
+};
+
+}  // namespace
+
+int OpenListenSocket(const std::string& address, std::uint16_t port) {
+  const Endpoint endpoint(address, port);
+  if (!endpoint.is_valid) {
     throw IoError(
         fmt::format("cannot listen on {}: expected an IPv4 or IPv6 address in numbers", address));
   }
-  const int fd = socket(is_v4 ? AF_INET : AF_INET6, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  const int fd = socket(endpoint.family(), SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   const int on = 1;
-  const auto* bound =
-      is_v4 ? reinterpret_cast<const sockaddr*>(&v4) : reinterpret_cast<const sockaddr*>(&v6);
-  const socklen_t length = is_v4 ? sizeof v4 : sizeof v6;
   if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0 ||
-      bind(fd, bound, length) != 0 || listen(fd, kBacklog) != 0) {
+      setsockopt(fd, IPPROTO_IP, IP_FREEBIND, &on, sizeof on) != 0 || endpoint.Bind(fd) != 0 ||
+      listen(fd, kBacklog) != 0) {
     const int error = errno;
     if (fd >= 0) close(fd);
     throw IoError(fmt::format("cannot listen on {} port {}: {}{}", address, port,
@@ -73,6 +90,15 @@ std::string AddressTextOf(int socket_fd) {
           : &reinterpret_cast<const sockaddr_in&>(address).sin_addr;
   inet_ntop(address.ss_family, bytes, text.data(), text.size());
   return text.data();
+}
+
+bool HasAddress(const std::string& address) {
+  const Endpoint endpoint(address, 0);
+  const int fd = endpoint.is_valid ? socket(endpoint.family(), SOCK_DGRAM | SOCK_CLOEXEC, 0) : -1;
+  if (fd < 0) return false;
+  const bool has = endpoint.Bind(fd) == 0;
+  close(fd);
+  return has;
 }
 
 bool IsLoopback(const std::string& address) {

@@ -3,15 +3,19 @@
 
 #include <sys/stat.h>
 
+#include <unistd.h>
+
 #include <fstream>
 #include <iterator>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "algo/base/errors.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "web/http/listen_socket.hpp"
 
 namespace plumb {
 namespace {
@@ -40,6 +44,27 @@ class PageIdentityTest : public ::testing::Test {
   Config config_;
   web::HttpServerOptions options_;
 };
+
+TEST_F(PageIdentityTest, WhereThePageCannotBeServedItIsElsewhereAndSaysWhy) {
+  WebConfig web;
+  web.listen = "127.0.0.1:0";
+  const PageSocket first = OpenPageSocket(web, "127.0.0.1:0");
+  EXPECT_EQ(first.fault + first.warning, "");
+  const std::string taken = fmt::format("127.0.0.1:{}", web::PortOf(first.fd));
+  web.listen = taken;
+  const PageSocket second = OpenPageSocket(web, "127.0.0.2:0");
+  EXPECT_THAT(second.fault, HasSubstr("web.listen: cannot listen on 127.0.0.1 port"));
+  EXPECT_THAT(second.fault, HasSubstr("Address already in use"));
+  EXPECT_EQ(web.listen, "127.0.0.2:0");
+  EXPECT_EQ(web::AddressTextOf(second.fd), "127.0.0.2");
+  web.listen = taken;
+  EXPECT_THROW((void)OpenPageSocket(web, taken), IoError) << "nothing is left";
+  web.listen = "192.0.2.7:0";  // of no machine: RFC 5737
+  const PageSocket early = OpenPageSocket(web, "127.0.0.1:0");
+  EXPECT_EQ(early.fault, "") << "a network that comes up later is no mistake";
+  EXPECT_THAT(early.warning, HasSubstr("192.0.2.7 is no address of this machine now"));
+  for (const int fd : {first.fd, second.fd, early.fd}) ::close(fd);
+}
 
 TEST_F(PageIdentityTest, OnLoopbackThereIsNoTlsAndOffItACertificateThatStays) {
   for (const char* address : {"127.0.0.1", "127.1.2.3", "::1"}) {
