@@ -70,9 +70,11 @@ std::string Dump(const Json& json) {
 }
 
 std::string TimeText(WallClock::time_point time) {
-  return fmt::format(
-      "{:%Y-%m-%dT%H:%M:%SZ}",
-      fmt::gmtime(WallClock::to_time_t(std::chrono::floor<std::chrono::seconds>(time))));
+  return TimeText(WallClock::to_time_t(std::chrono::floor<std::chrono::seconds>(time)));
+}
+
+std::string TimeText(std::time_t time) {
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(time));
 }
 
 std::string_view Name(ApplianceState state) { return NameIn(kStates, state); }

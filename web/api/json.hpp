@@ -27,6 +27,8 @@ using Json = nlohmann::ordered_json;
 
 /// "2026-03-01T09:30:00Z"
 [[nodiscard]] std::string TimeText(WallClock::time_point time);
+/// Of any year: a certificate's end may be past what a time_point holds.
+[[nodiscard]] std::string TimeText(std::time_t time);
 [[nodiscard]] std::string_view Name(ApplianceState state);
 [[nodiscard]] std::string_view Name(ScanPurpose purpose);
 

@@ -147,7 +147,11 @@ void AddResults(const std::vector<Scan>& scans, std::vector<ArchivedFile>& files
   std::size_t room = kMostBytes;
   std::string left_out;
   for (const Scan& scan : scans) {
-    if (!scan.result || scan.folder.empty()) continue;
+    if (!scan.result) continue;
+    if (scan.folder.empty()) {  // compared, but its files are out of sight
+      left_out += fmt::format("{}: {}\r\n", scan.id, scan.failure);
+      continue;
+    }
     for (const char* name : {"result.json", "error_map.png", "overlay.png"}) {
       auto bytes = BytesOf(scan.folder / "result" / name, room);
       if (!bytes) {

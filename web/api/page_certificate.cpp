@@ -26,7 +26,7 @@ void Accounts::DescribeCertificate(const Request&, const Respond& respond) {
   if (options_.certificate) {
     const CertificateFacts facts = FactsOfCertificate(options_.certificate->certificate_pem);
     json["subject"] = facts.subject;
-    json["valid_until"] = TimeText(WallClock::from_time_t(facts.valid_until));
+    json["valid_until"] = TimeText(facts.valid_until);
   }
   Response response;
   response.body = Dump(json);

@@ -137,6 +137,17 @@ TEST_F(PageCertificateTest, ANewConnectionIsShownTheNewOneAndTheLogHasBothFinger
   }
 }
 
+/// A clock that counts nanoseconds ends in the year 2262.
+TEST_F(PageCertificateTest, TheEndOfOneThatIsValidForCenturiesIsShownAsItIs) {
+  const Certificate made = Made("ec -pkeyopt ec_paramgen_curve:P-256", "-days 146097");
+  ASSERT_THAT(Put(made.chain, made.key), HasSubstr("HTTP/1.1 200"));
+  const std::string end =
+      Run("openssl x509 -noout -enddate -dateopt iso_8601 -in certificate.pem > end", "end");
+  EXPECT_THAT(end, HasSubstr("notAfter=24"));  // 146097 days are 400 years
+  const std::string shown = JsonOf(Ask("GET", "/api/v1/certificate")).value("valid_until", "");
+  EXPECT_EQ(shown.substr(0, 10), end.substr(end.find('=') + 1, 10));
+}
+
 TEST_F(PageCertificateTest, ASelfMadeOneIsNewEachTime) {
   EXPECT_THAT(Ask("POST", "/api/v1/certificate/new", {{"password", "another password"}}),
               HasSubstr("HTTP/1.1 403"));

@@ -81,6 +81,12 @@ TEST_F(CourseArchiveTest, HoldsSummaryNumbersAndTheResultsOfComparedScans) {
   scan.result = web::ResultSummary{};
   scan.result->verdict = "move";
   service_.scans.push_back(scan);
+  scan.id = "s6";  // compared, but its files are out of sight
+  scan.folder.clear();
+  scan.failure = "its files cannot be used now: its folder is missing";
+  service_.scans.push_back(scan);
+  scan.folder = folder.path();
+  scan.failure.clear();
   scan.id = "s8";  // a reference has no result
   scan.result.reset();
   service_.scans.push_back(scan);
@@ -93,7 +99,9 @@ TEST_F(CourseArchiveTest, HoldsSummaryNumbersAndTheResultsOfComparedScans) {
   EXPECT_THAT(files, ElementsAre(Key("course.pdf"), Key("left_out.txt"), Key("numbers.csv"),
                                  Key("numbers.json"), Key("scans/s7/error_map.png"),
                                  Key("scans/s7/result.json")));
-  EXPECT_EQ(files.at("left_out.txt"), "s7/overlay.png\r\n");
+  EXPECT_THAT(files.at("left_out.txt"), HasSubstr("s7/overlay.png\r\n"));
+  EXPECT_THAT(files.at("left_out.txt"),
+              HasSubstr("s6: its files cannot be used now: its folder is missing\r\n"));
   EXPECT_THAT(files.at("numbers.csv"), HasSubstr("P-0042,s7"));
   EXPECT_EQ(service_.report_language, web::Language::kSpanish);
   EXPECT_EQ(client.Get("/api/v1/patients/p1/course.zip?language=fr").status, 400);
