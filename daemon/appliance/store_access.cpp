@@ -18,8 +18,20 @@ web::Change AnswerOf(const std::string& why_not) {
   return Refusal(why_not.empty() ? ChangeResult::kDone : ChangeResult::kConflict, why_not);
 }
 
-void StoreAccess::LogUnreadable(const std::exception& error) {
-  Log(LogLevel::kError, fmt::format("cannot read the store: {}", error.what()));
+std::string StoreAccess::Unreadable(const std::exception& error) {
+  std::string text = fmt::format("what is stored cannot be read: {}", error.what());
+  Log(LogLevel::kError, text);
+  return text;
+}
+
+std::string StoreAccess::WhyUnreadable(const std::function<void(Store&)>& read) const {
+  if (appliance_.store() == nullptr) return appliance_.storage_fault();
+  try {
+    read(*appliance_.store());
+  } catch (const std::exception& error) {
+    return Unreadable(error);
+  }
+  return {};
 }
 
 void StoreAccess::RunOnStoreThread(web::Done done, std::function<std::string(Store&)> change) {

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
 #include "web/service/change.hpp"
 
@@ -19,8 +20,8 @@ namespace plumb {
 [[nodiscard]] web::Change AnswerOf(const std::string& why_not);
 
 /// Changes run on the store's thread and call `done` on the loop; reads answer at once. Used on the
-/// loop's thread, Read() on any. In safe mode reads return nothing and changes fail with the
-/// reason.
+/// loop's thread, Read() on any. In safe mode without a store reads return nothing, and changes
+/// fail with the reason.
 class StoreAccess {
  public:
   /// The appliance is borrowed and outlives this object.
@@ -47,7 +48,8 @@ class StoreAccess {
   }
 
   /// Result of `read` with one service of the store. A read that fails (a damaged database) is
-  /// logged and returns an empty value.
+  /// logged and must not look as if there were nothing.
+  /// @throws IoError with the reason
   template <typename Service, typename Function>
   [[nodiscard]] std::invoke_result_t<Function, Service&> Read(Service Store::*service,
                                                               const Function& read) const {
@@ -60,14 +62,26 @@ class StoreAccess {
     try {
       return read(*appliance_.store());
     } catch (const std::exception& error) {
-      LogUnreadable(error);
+      throw IoError(Unreadable(error));
+    }
+  }
+  /// The same where an empty value is the safe answer: no account, no screen.
+  template <typename Service, typename Function>
+  [[nodiscard]] std::invoke_result_t<Function, Service&> ReadOrNothing(Service Store::*service,
+                                                                       const Function& read) const {
+    try {
+      return Read(service, read);
+    } catch (const IoError&) {
       return {};
     }
   }
+  /// Why `read` gives no answer; empty: it does.
+  [[nodiscard]] std::string WhyUnreadable(const std::function<void(Store&)>& read) const;
 
  private:
   void RunOnStoreThread(web::Done done, std::function<std::string(Store&)> change);
-  static void LogUnreadable(const std::exception& error);
+  /// What is said of it, in the log too.
+  static std::string Unreadable(const std::exception& error);
 
   Appliance& appliance_;
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);

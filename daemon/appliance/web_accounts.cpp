@@ -10,12 +10,16 @@ namespace plumb {
 
 using web::ChangeResult;
 
+std::string WebAccounts::WhyUnreadable() {
+  return store_.WhyUnreadable([](Store& store) { (void)store.users.List(); });
+}
+
 std::vector<web::User> WebAccounts::Users() {
   return store_.Read(&Store::users, [](UserStore& users) { return users.List(); });
 }
 
 std::optional<web::User> WebAccounts::FindUser(const std::string& name) {
-  return store_.Read(&Store::users, [&](UserStore& users) { return users.Find(name); });
+  return store_.ReadOrNothing(&Store::users, [&](UserStore& users) { return users.Find(name); });
 }
 
 void WebAccounts::AddUser(const web::Actor& actor, const web::User& user, web::Done done) {
@@ -29,7 +33,8 @@ void WebAccounts::ChangeUser(const web::Actor& actor, const web::UserChange& cha
 }
 
 std::vector<web::Display> WebDisplays::Displays() {
-  return store_.Read(&Store::displays, [](DisplayStore& displays) { return displays.List(); });
+  return store_.ReadOrNothing(&Store::displays,
+                              [](DisplayStore& displays) { return displays.List(); });
 }
 
 void WebDisplays::AddDisplay(const web::Actor& actor, const web::Display& display, web::Done done) {

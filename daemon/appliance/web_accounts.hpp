@@ -13,6 +13,7 @@ class WebAccounts : public web::AccountService {
  public:
   explicit WebAccounts(StoreAccess& store) : store_(store) {}
 
+  [[nodiscard]] std::string WhyUnreadable() override;
   [[nodiscard]] std::vector<web::User> Users() override;
   [[nodiscard]] std::optional<web::User> FindUser(const std::string& name) override;
   void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;

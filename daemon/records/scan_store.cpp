@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/errors.hpp"
 #include "daemon/records/scan_digests.hpp"
 #include "daemon/records/store_json.hpp"
 #include "daemon/records/store_refusal.hpp"
@@ -61,6 +62,7 @@ std::string Described(const web::ResultSummary& result) {
 
 }  // namespace
 
+/// @throws DataError where the row or its result cannot be read: nothing of it is ever a default.
 web::Scan ScanStore::ReadScan(const Statement& row) const {
   web::Scan scan{.id = ScanId(row.Integer(0)),
                  .patient_id = row.Integer(1) == 0 ? std::string() : row.Text(1),
@@ -91,6 +93,21 @@ web::Scan ScanStore::ReadScan(const Statement& row) const {
   return scan;
 }
 
+/// For lists: one that cannot be read does not hide the others. It has no result, and says why.
+web::Scan ScanStore::ListScan(const Statement& row) const {
+  try {
+    return ReadScan(row);
+  } catch (const DataError& error) {
+    web::Scan scan;
+    scan.id = ScanId(row.Integer(0));
+    if (row.Integer(1) != 0) scan.patient_id = row.Text(1);
+    scan.outcome = web::ScanOutcome::kFailed;
+    scan.failure = error.what();
+    scan.started_at = FromStored(row.Integer(6));
+    return scan;
+  }
+}
+
 void FailInterruptedScans(Database& database) {
   database
       .Prepare(
@@ -111,7 +128,7 @@ std::vector<web::Scan> ScanStore::List(const std::string& patient_id, int limit)
   Statement query = lists->Prepare(number ? kOfPatient.c_str() : kAll.c_str());
   if (number) query.Bind(*number);
   query.Bind(std::int64_t{limit});
-  while (query.Step()) scans.push_back(ReadScan(query));
+  while (query.Step()) scans.push_back(ListScan(query));
   return scans;
 }
 

@@ -50,8 +50,10 @@ class ScanStore {
   ScanStore(StoreDatabase& database, const ScanFolders& folders)
       : database_(database), folders_(folders) {}
 
-  /// Newest first. @param patient_id  Empty: all patients.
+  /// Newest first; a scan that cannot be read is listed as failed, with that reason.
+  /// @param patient_id  Empty: all patients.
   [[nodiscard]] std::vector<web::Scan> List(const std::string& patient_id, int limit);
+  /// @throws DataError if it cannot be read
   [[nodiscard]] std::optional<web::Scan> Find(const std::string& id);
   /// Completed scans of a patient.
   [[nodiscard]] int CountSince(const std::string& patient_id, web::WallClock::time_point since);
@@ -73,6 +75,7 @@ class ScanStore {
 
  private:
   web::Scan ReadScan(const Statement& row) const;
+  web::Scan ListScan(const Statement& row) const;
   static void NoteEnd(Database& database, const std::string& scan_id, const FinishedScan& finished,
                       bool has_folder, const std::vector<FileDigest>& files);
 

@@ -1,5 +1,6 @@
 #include "daemon/records/stored_values.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <chrono>
@@ -16,9 +17,13 @@ std::int64_t ToStored(web::WallClock::time_point time) {
   return std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count();
 }
 
+/// A damaged stamp may lie beyond what the clock can hold: then it is the end of that.
 web::WallClock::time_point FromStored(std::int64_t us) {
-  return web::WallClock::time_point(
-      std::chrono::duration_cast<web::WallClock::duration>(std::chrono::microseconds(us)));
+  constexpr std::int64_t kMost_us =
+      std::chrono::duration_cast<std::chrono::microseconds>(web::WallClock::duration::max())
+          .count();
+  return web::WallClock::time_point(std::chrono::duration_cast<web::WallClock::duration>(
+      std::chrono::microseconds(std::clamp(us, -kMost_us, kMost_us))));
 }
 
 std::int64_t Now() { return ToStored(web::WallClock::now()); }

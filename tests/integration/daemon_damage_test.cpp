@@ -141,8 +141,21 @@ TEST_F(DaemonDamageTest, StartsFromEveryDamagedStateSaysWhatIsWrongAndDeletesNot
     EXPECT_THAT(health.status, ::testing::AnyOf(200, 503));
     EXPECT_FALSE(health.json().is_discarded()) << health.body;
     const json status = plumbd.Status();
+    // Who opens the page reads the reason: without logging in where no account can be looked up.
+    const json session = client.Get("/api/v1/session").json();
+    const bool has_accounts = fs::exists(here / "state" / "plumb.db") && damaged != "plumb.db";
+    if (has_accounts) {
+      EXPECT_EQ(session["setup_required"], false) << session.dump();
+    }
     if (health.status == 503) {
       EXPECT_FALSE(status.value("reason", "").empty()) << status.dump();
+      EXPECT_EQ(session["setup_required"], false) << "nobody makes a first account in safe mode";
+      if (session["fault"] == "") {
+        EXPECT_EQ(client.LogIn("engineer", kPassword), 200) << session.dump();
+        EXPECT_NE(client.Get("/api/v1/status").json()["fault"], nullptr);
+      }
+    } else {
+      EXPECT_EQ(session["fault"], "");
     }
     ++outcomes[health.status == 200 ? "works" : "says what is wrong"];
     EXPECT_EQ(plumbd.Stop(), 0) << plumbd.log();

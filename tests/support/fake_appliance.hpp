@@ -56,6 +56,7 @@ class FakeAppliance : public web::BackgroundWork,
       make_map;
   std::vector<web::Display> displays;
   std::vector<web::User> users;
+  std::string accounts_fault;          ///< Why none of them can be looked up; empty: they can.
   std::vector<web::AuditEntry> audit;  ///< Oldest first.
   std::shared_ptr<const std::string> preview, surface;
   std::filesystem::path diagnostics_file;
@@ -184,6 +185,7 @@ class FakeAppliance : public web::BackgroundWork,
   std::vector<web::Display> Displays() override { return displays; }
   void AddDisplay(const web::Actor& actor, const web::Display& display, web::Done done) override;
   void RemoveDisplay(const web::Actor& actor, const std::string& id, web::Done done) override;
+  std::string WhyUnreadable() override { return accounts_fault; }
   std::vector<web::User> Users() override { return users; }
   std::optional<web::User> FindUser(const std::string& name) override;
   void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;

@@ -29,7 +29,10 @@ set -e
 start --config wrong.toml
 check "a wrong configuration is safe mode" '^fault$' "$("$plumb" --control control status --get state)"
 check "the status says why" 'configuration cannot be used.*wrong.toml.*quotas' "$("$plumb" --control control status --get reason)"
-check "so does the page" '"status":"[^"]*".*configuration cannot be used.*quotas' "$(curl -sk "$(page)health")"
+check "so does its health" '"status":"[^"]*".*configuration cannot be used.*quotas' "$(curl -sk "$(page)health")"
+check "the page is told why nobody can log in" '"fault":"[^"]*configuration cannot be used.*quotas' "$(curl -sk "$(page)api/v1/session")"
+check "and offers no first account" '"setup_required":false' "$(curl -sk "$(page)api/v1/session")"
+check "the page without script says it" 'Out of order.*configuration cannot be used.*quotas' "$(curl -sk "$(page)result")"
 check "it is no health" '^503$' "$(curl -sk -o /dev/null -w '%{http_code}' "$(page)health")"
 check "a press scans nothing" 'ignored' "$("$plumb" --control control press)"
 check "nothing that is stored was touched" '^no database$' "$([ -e state/plumb.db ] || echo "no database")"

@@ -534,4 +534,22 @@ await h.step('unplugged in the middle of a sweep: no result, and none of before 
   equal((await h.api(anna, 'scans?limit=1')).body.scans[0].outcome, 'failed', 'the scan');
 });
 
+await h.step('in safe mode everybody reads why nobody can log in, and it ends by itself', async () => {
+  const fault = 'the database /state/plumb.db is damaged (malformed): put a backup in its place, or '
+    + 'move it and the folder scans away to start over';
+  const body = { error: 'log in first', setup_required: false, fault, certificate: '' };
+  for (const [where, after] of [['', 'Password'], ['room', 'Log in']]) {
+    const visitor = await h.person('visitor');
+    await visitor.route('**/api/v1/session', (route) => route.fulfill({ status: 401, json: body }));
+    await visitor.goto(`${h.url}${where}`);
+    await visitor.getByRole('heading', { name: 'Out of order' }).waitFor();
+    await visitor.getByText(fault).waitFor();
+    equal(await visitor.locator('input').count(), 0, 'fields to fill in');
+    await visitor.unroute('**/api/v1/session');
+    await (where === '' ? visitor.getByLabel(after) : visitor.getByRole('button', { name: after }))
+      .waitFor();
+    await visitor.context().close();
+  }
+});
+
 await h.finish();

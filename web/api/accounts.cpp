@@ -127,7 +127,9 @@ Accounts::Accounts(const Services& services, AccountOptions options)
       displays_(services.displays, options_.certificate.has_value(), options_.now),
       devices_(options_.device_key, options_.certificate.has_value()),
       worker_(options_.password_operations, options_.password_memory_bytes) {
-  if (users_.Users().empty()) setup_code_ = MakeSetupCode();
+  // Accounts that cannot be seen are there: nobody is offered to make the first one.
+  accounts_fault_ = users_.WhyUnreadable();
+  if (accounts_fault_.empty() && users_.Users().empty()) setup_code_ = MakeSetupCode();
   Expire();
 }
 
@@ -135,9 +137,17 @@ std::optional<std::string> Accounts::setup_code() const {
   return setup_code_.empty() ? std::nullopt : std::optional(setup_code_);
 }
 
+std::optional<int> Accounts::IdleLogout_min() const {
+  try {
+    return settings_.GetSettings().idle_logout_min;
+  } catch (const IoError&) {
+    return std::nullopt;
+  }
+}
+
 void Accounts::Expire() {
-  sessions_.SetLimits(std::chrono::minutes(settings_.GetSettings().idle_logout_min),
-                      options_.session_limit);
+  idle_logout_min_ = IdleLogout_min().value_or(idle_logout_min_);
+  sessions_.SetLimits(std::chrono::minutes(idle_logout_min_), options_.session_limit);
   sessions_.Expire(options_.now());
 }
 
@@ -317,6 +327,10 @@ void Accounts::LogIn(const Request& request, const std::string& name, std::strin
   const std::string stored = user && !user->disabled ? user->password_hash : std::string();
   const std::vector<std::string> counters = CountersOf(request, name, stored);
   if (auto refusal = CountGuess(counters)) return respond(std::move(*refusal));
+  if (!user) {
+    if (const std::string why = users_.WhyUnreadable(); !why.empty())
+      return respond(ErrorResponse(503, "nobody can log in: " + why));
+  }
   const bool is_known = counters.size() == 1;
   const bool accepted = worker_.Verify(
       std::move(password), HashIn(stored), is_known,
@@ -359,7 +373,7 @@ void Accounts::DescribeSession(const Request& request, const Respond& respond) {
                         {"permissions", permissions},
                         {"csrf_token", request.session->csrf_token},
                         {"password_change_required", request.session->must_change_password},
-                        {"idle_logout_min", settings_.GetSettings().idle_logout_min}});
+                        {"idle_logout_min", IdleLogout_min().value_or(idle_logout_min_)}});
   respond(std::move(response));
 }
 

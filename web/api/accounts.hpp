@@ -43,6 +43,7 @@ class Accounts : public SessionLookup {
   /// The session of a request, by its cookie. @param touch  Counts as a use.
   [[nodiscard]] std::shared_ptr<Session> SessionOf(const Request& request, bool touch) override;
   [[nodiscard]] bool needs_setup() const override { return !setup_code_.empty(); }
+  [[nodiscard]] const std::string& accounts_fault() const override { return accounts_fault_; }
   [[nodiscard]] std::string tls_fingerprint() const override {
     return options_.certificate ? options_.certificate->fingerprint : std::string();
   }
@@ -108,6 +109,8 @@ class Accounts : public SessionLookup {
                 std::function<void(const std::string&)> then);
   /// The same completion, which does nothing once this object is destroyed.
   [[nodiscard]] Done WhileAlive(Done done) const;
+  /// As the settings have it; nothing where they cannot be read.
+  [[nodiscard]] std::optional<int> IdleLogout_min() const;
   [[nodiscard]] std::string Cookie(const std::string& token, bool end) const;
   [[nodiscard]] std::string cookie_name() const {
     return options_.certificate ? "__Host-plumb_session" : "plumb_session";
@@ -128,8 +131,10 @@ class Accounts : public SessionLookup {
   Displays displays_;
   DeviceCookies devices_;
   LoginLimiter limiter_;
-  std::string setup_code_;  ///< Empty once there is an account.
+  std::string accounts_fault_;  ///< Why no account could be seen at the start; empty: they could.
+  std::string setup_code_;      ///< Empty once there is an account.
   bool setting_up_ = false;
+  int idle_logout_min_ = Settings{}.idle_logout_min;  ///< As last read.
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
   PasswordWorker worker_;
 };

@@ -248,11 +248,19 @@ void AddResultPage(Router& router, const Services& services) {
   const Records records{services.patients, services.references, services.scans};
   router.Add(
       {"GET", "/result", Permission::kNone, BodyKind::kNone,
-       [records, &appliance = services.appliance, &background = services.background](
-           const Request& request, const Respond& respond) {
+       [records, &appliance = services.appliance, &accounts = services.accounts,
+        &background = services.background](const Request& request, const Respond& respond) {
          if (!request.session) {
            Response response;
            response.type = "text/html; charset=utf-8";
+           if (const std::string why = accounts.WhyUnreadable(); !why.empty()) {
+             response.status = 503;
+             response.body =
+                 Document(fmt::format("<h1>Out of order</h1><p role=\"alert\">Nobody can log in or "
+                                      "scan until this is put right: {}</p>",
+                                      EscapeHtml(why)));
+             return respond(std::move(response));
+           }
            response.body = Document(LoginForm(
                request.query.contains("failed")  ? "Name or password is wrong."
                : request.query.contains("first") ? "Somebody else chose this password: log in on "

@@ -112,17 +112,19 @@ export const remove = (path) => ask('DELETE', api(path), undefined, { timeout_ms
 export const fileUrl = (scanId, name, download) =>
   `/api/v1/scans/${scanId}/files/${name}${download ? '?download' : ''}`;
 
-/// The session, or null; `setupRequired` says whether there is no account yet.
+/// The session, or null; `setupRequired` says that there is no account yet, `fault` why nobody can
+/// log in.
 export async function loadSession() {
   try {
     session = await get('session');
-    return { session, setupRequired: false, certificate: '' };
+    return { session, setupRequired: false, fault: '', certificate: '' };
   } catch (error) {
     if (error.status !== 401) throw error;
     session = null;
     return {
       session: null,
       setupRequired: error.body?.setup_required ?? false,
+      fault: error.body?.fault ?? '',
       certificate: error.body?.certificate ?? '',
     };
   }

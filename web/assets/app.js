@@ -8,7 +8,7 @@ import { mayLeave } from './leave.js';
 import { applyTheme } from './preferences.js';
 import { showAudit } from './screens/audit.js';
 import { showCheck } from './screens/check.js';
-import { showFirstPassword, showLogin } from './screens/login.js';
+import { showFault, showFirstPassword, showLogin } from './screens/login.js';
 import { showPatient, showPatients } from './screens/patients.js';
 import { showPlan } from './screens/plan.js';
 import { showResult } from './screens/result.js';
@@ -179,12 +179,16 @@ function speak(who) {
 async function begin(message) {
   const found = await ask(loadSession);
   if (!found) return;
-  const { session, setupRequired, certificate } = found;
+  const { session, setupRequired, fault, certificate } = found;
   speak(session?.user ?? 'login');
   applyTheme(session?.user ?? 'login');
   drawTop();
   if (!session || session.role === 'display') {
     document.title = `${S.login.title} · ${S.product}`;
+    if (fault) {
+      showFault(main, fault).then(() => begin());
+      return;
+    }
     showLogin(main, setupRequired, certificate, async () => {
       await begin();
       const answer = currentSession() && await lastLogin();

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
 #include "web/http/checks.hpp"
@@ -23,6 +24,13 @@ Response InternalError(std::string_view name, const std::exception& error) {
   return ErrorResponse(500, "internal error; the journal says more");
 }
 
+/// Of what a handler throws. What the disk refuses is said, as it is in safe mode.
+Response AnswerOf(std::string_view name, const std::exception& error) {
+  if (dynamic_cast<const DataError*>(&error) != nullptr) return ErrorResponse(400, error.what());
+  if (dynamic_cast<const IoError*>(&error) != nullptr) return ErrorResponse(500, error.what());
+  return InternalError(name, error);
+}
+
 bool SameToken(std::string_view a, std::string_view b) {
   return a.size() == b.size() && sodium_memcmp(a.data(), b.data(), a.size()) == 0;
 }
@@ -39,9 +47,13 @@ bool Gate::IsOwnPage(const Request& request) const {
 Response Gate::NotLoggedIn() const {
   Response response;
   response.status = 401;
-  response.body = fmt::format(
-      R"({{"error":"log in first","setup_required":{},"certificate":"{}"}})",
-      sessions_.needs_setup(), sessions_.needs_setup() ? sessions_.tls_fingerprint() : "");
+  response.body =
+      nlohmann::json{
+          {"error", "log in first"},
+          {"setup_required", sessions_.needs_setup()},
+          {"fault", sessions_.accounts_fault()},
+          {"certificate", sessions_.needs_setup() ? sessions_.tls_fingerprint() : std::string()}}
+          .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   return response;
 }
 
@@ -103,10 +115,8 @@ void Gate::Handle(const Route& route, const Request& request, const Respond& res
     return respond(ErrorResponse(401, "the session has ended: log in again"));
   try {
     route.handler(request, respond);
-  } catch (const DataError& error) {
-    respond(ErrorResponse(400, error.what()));
   } catch (const std::exception& error) {
-    respond(InternalError(route.Name(), error));
+    respond(AnswerOf(route.Name(), error));
   }
 }
 
@@ -116,10 +126,8 @@ void RespondAside(BackgroundWork& background, const std::string& name,
   const auto work = [made, name, make = std::move(make)] {
     try {
       *made = make();
-    } catch (const DataError& error) {
-      *made = ErrorResponse(400, error.what());
     } catch (const std::exception& error) {
-      *made = InternalError(name, error);
+      *made = AnswerOf(name, error);
     }
   };
   if (background.RunInBackground(BackgroundPool::kReads, work,

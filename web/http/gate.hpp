@@ -21,6 +21,8 @@ class SessionLookup {
   [[nodiscard]] virtual std::shared_ptr<Session> SessionOf(const Request& request, bool touch) = 0;
   /// True while there is no account yet.
   [[nodiscard]] virtual bool needs_setup() const = 0;
+  /// Why nobody can log in since the start (safe mode); empty if people can.
+  [[nodiscard]] virtual const std::string& accounts_fault() const = 0;
   /// Fingerprint of the server's certificate; empty without TLS.
   [[nodiscard]] virtual std::string tls_fingerprint() const = 0;
 };

@@ -300,6 +300,30 @@ TEST_F(StoreCareTest, APlanThatCannotBeReadHidesNoOtherOfThePatient) {
   EXPECT_EQ(store_->references.Find(first)->id, first);
 }
 
+TEST_F(StoreCareTest, AScanThatCannotBeReadHidesNoOtherOfThePatient) {
+  std::vector<std::string> scans;
+  for (int i = 0; i < 4; ++i) scans.push_back(StoreScan(*store_, patient_));
+  Execute(
+      "PRAGMA ignore_check_constraints = ON; UPDATE results SET json = '{' WHERE scan_id = 2; "
+      "UPDATE scans SET purpose = 'other' WHERE id = 3; UPDATE scans SET outcome = 'other', "
+      "started_at = 9000000000000000000 WHERE id = 4");
+  for (const std::string& of : {patient_, std::string()}) {
+    const std::vector<web::Scan> listed = store_->scans.List(of, 10);
+    ASSERT_EQ(listed.size(), 4U);
+    EXPECT_EQ(listed[3].id, scans[0]);
+    EXPECT_TRUE(listed[3].result);
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(listed[i].id, scans[3 - i]);
+      EXPECT_EQ(listed[i].patient_id, patient_);
+      EXPECT_EQ(listed[i].outcome, web::ScanOutcome::kFailed);
+      EXPECT_FALSE(listed[i].result);
+      EXPECT_THAT(listed[i].failure, HasSubstr("stored"));
+      EXPECT_THROW((void)store_->scans.Find(listed[i].id), DataError) << "never acted on";
+    }
+    EXPECT_GT(listed[0].started_at, listed[1].started_at) << "a stamp beyond the clock's range";
+  }
+}
+
 TEST_F(StoreCareTest, ACheckThatCannotBeReadHasNotPassed) {
   for (const char* bad : {"", "[]", "{}", R"({"status":1})", R"({"status":"passed","items":[1]})",
                           R"({"status":"passed","reasons":7})"}) {

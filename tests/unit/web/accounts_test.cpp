@@ -37,6 +37,28 @@ TEST_F(AccountsTest, FirstStartGivesASetupCodeThatMakesOneEngineer) {
   loop_->Do([&] { EXPECT_FALSE(server_->setup_code().has_value()); });
 }
 
+TEST_F(AccountsTest, WhereNoAccountCanBeSeenTheReasonIsShownAndNobodyMakesTheFirst) {
+  service_.accounts_fault = "the database <plumb.db> is \"damaged\"";
+  Start();
+  EXPECT_EQ(setup_code_, "");
+  HttpClient client(port_);
+  const HttpAnswer session = client.Get("/api/v1/session");
+  EXPECT_EQ(session.status, 401);
+  EXPECT_EQ(session.json().value("setup_required", true), false);
+  EXPECT_EQ(session.json().value("fault", ""), service_.accounts_fault);
+  const HttpAnswer login =
+      client.Post("/api/v1/login", {{"name", "engineer"}, {"password", kPassword}});
+  EXPECT_EQ(login.status, 503) << "it is not said that name or password are wrong";
+  EXPECT_EQ(login.json().value("error", ""), "nobody can log in: " + service_.accounts_fault);
+  const HttpAnswer page = client.Get("/result");
+  EXPECT_EQ(page.status, 503);
+  EXPECT_THAT(page.body, HasSubstr("the database &lt;plumb.db&gt; is &quot;damaged&quot;"));
+  EXPECT_EQ(
+      client.Post("/api/v1/setup", {{"code", "AAAA-AAAA"}, {"name", "e"}, {"password", kPassword}})
+          .status,
+      409);
+}
+
 TEST_F(AccountsTest, SetupCodeCannotBeGuessedQuickly) {
   Start();
   HttpClient client(port_);

@@ -1,6 +1,22 @@
 import { get, loadSession, post, put } from '../api.js';
 import { clear, field, form, h, select } from '../dom.js';
-import { S } from '../strings.js';
+import { S, translated } from '../strings.js';
+
+const kAskAgain_ms = 5000;
+
+/// Safe mode in which no account can be looked up: nobody can log in, and everybody reads why.
+/// Comes back when the appliance is well again.
+export async function showFault(main, fault) {
+  const text = S.login;
+  document.title = `${text.faultTitle} · ${S.product}`;
+  for (let why = fault; why;) {
+    clear(main, h('section', { class: 'login card', role: 'alert' }, h('h1', {}, text.faultTitle),
+      h('p', {}, text.faultText), h('p', { class: 'caution' }, translated(why))));
+    await new Promise((done) => { setTimeout(done, kAskAgain_ms); });
+    // While it restarts nothing answers, and what was said last stays.
+    why = (await loadSession().catch(() => ({ fault: why }))).fault;
+  }
+}
 
 export function showLogin(main, setupRequired, certificate, done) {
   const text = S.login;

@@ -10,7 +10,7 @@ import { chooseLanguage, kLanguages, languageOf, S, translated } from '../string
 import {
   ageText, faultWords, flagList, isAdvice, kWarmUp_s, sidesOf, sentence,
 } from './common.js';
-import { showLogin } from './login.js';
+import { showFault, showLogin } from './login.js';
 import { preview, surfaceIn } from './scan.js';
 import { ageOf, validityNote, verdictStrip } from './verdict.js';
 
@@ -326,8 +326,12 @@ export async function showRoom(main, { speak, applyTheme }) {
   }
   for (;;) {
     try {
-      const { session } = await loadSession();
+      const { session, fault } = await loadSession();
       if (session && may('room')) break;
+      if (fault) {
+        await showFault(main, fault);
+        continue;
+      }
       await pair(main, () => showLogin(main, false, () => location.reload()));
       break;
     } catch {

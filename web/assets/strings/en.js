@@ -67,6 +67,8 @@ export const en = {
   outcomes: { running: 'running', done: 'done', cancelled: 'cancelled', failed: 'failed' },
   login: {
     title: 'Log in', name: 'Name', password: 'Password', submit: 'Log in', wait: 'Checking…',
+    faultTitle: 'Out of order',
+    faultText: 'Nobody can log in or scan until this is put right:',
     setupTitle: 'First start',
     setupText: 'This appliance has no account yet. Type the setup code that was printed on its '
       + 'console and in its journal, and create the first account: an engineer.',

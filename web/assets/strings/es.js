@@ -89,7 +89,9 @@ export const es = {
   outcomes: { running: 'en curso', done: 'hecho', cancelled: 'cancelado', failed: 'fallido' },
   login: {
     title: 'Identificarse', name: 'Nombre', password: 'Contraseña', submit: 'Entrar',
-    wait: 'Comprobando…', setupTitle: 'Primer arranque',
+    wait: 'Comprobando…', faultTitle: 'Fuera de servicio',
+    faultText: 'Nadie puede identificarse ni escanear hasta que se arregle esto:',
+    setupTitle: 'Primer arranque',
     setupText: 'Este equipo aún no tiene cuentas. Escriba el código de instalación impreso en su '
       + 'consola y en su diario, y cree la primera cuenta: un ingeniero.',
     code: 'Código de instalación', codeHint: 'XXXX-XXXX', passwordHint: 'Al menos 10 caracteres.',

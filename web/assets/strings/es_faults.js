@@ -178,6 +178,24 @@ export const kFaultPatterns = [
     'no se puede escribir en $1: $2; revise el disco, permita escribir en él y reinicie plumbd'],
   ['^nothing can be backed up in safe mode: (.+)$',
     'en modo seguro no se puede hacer ninguna copia: $1'],
+  ['^the configuration cannot be used: (.+)\\. Correct the file, then restart: '
+    + 'systemctl restart plumbd$',
+  'no se puede usar la configuración: $1. Corrija el archivo y reinicie: systemctl restart plumbd'],
+  ['^the database (.+) is damaged \\((.+)\\): put a backup in its place, or move it and the folder '
+    + 'scans away to start over$',
+  'la base de datos $1 está dañada ($2): ponga una copia en su lugar, o retire esa base y la '
+    + 'carpeta scans para empezar de nuevo'],
+  ['^The audit log has been changed or shortened from outside: entry (\\d+) is not as it was '
+    + 'written\\. Compare it with a backup$',
+  'El registro de auditoría se ha cambiado o acortado desde fuera: la entrada $1 no está como se '
+    + 'escribió. Compárelo con una copia'],
+  ['^The audit log cannot be checked: (.+)$', 'No se puede comprobar el registro de auditoría: $1'],
+  ['^The last backup lies on the disk of the scans itself and is lost with it: mount the disk for '
+    + 'backups at (.+)$',
+  'La última copia está en el mismo disco que los escaneos y se pierde con él: monte el disco de '
+    + 'copias en $1'],
+  ['^what is stored cannot be read: (.+)$', 'no se puede leer lo guardado: $1'],
+  ['^nobody can log in: (.+)$', 'nadie puede identificarse: $1'],
   ['^no scan can begin: (.+)$', 'no puede empezar ningún escaneo: $1'],
   ['^(\\d+) of (\\d+) stored scans cannot be seen \\(of scan (\\S+), (.+)\\): is the disk mounted '
     + 'at (.+)\\? Nothing was changed\\. .+$',
