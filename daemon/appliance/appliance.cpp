@@ -45,6 +45,7 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
   WatchButton();
   Show();
   RunMaintenance();
+  CheckRecords();
   sensors_ = std::make_unique<SensorThread>(
       parts_.make_provider,
       SensorThreadOptions{.serial = parts_.config.appliance.sensor_serial,
@@ -323,6 +324,7 @@ void Appliance::OnTick() {
   if (!is_running && --ticks_to_maintenance_ <= 0) RunMaintenance();
   if (!is_running && --ticks_to_file_check_ <= 0) CheckStoredFiles();
   if (!is_running && --ticks_to_backup_ <= 0) BackUpIfDue();
+  if (!is_running && --ticks_to_record_check_ <= 0) CheckRecords();
   if (parts_.button != nullptr && button_source_.is_armed()) ArmButtonTimer();
 }
 

@@ -225,7 +225,10 @@ class Appliance {
   void RunMaintenance();
   void CheckDisk();
   void CheckStoredFiles();
+  void CheckRecords();
   void BackUpIfDue();
+  /// Of the state folder's disk, or of the one that scans/ is: the one with less room.
+  [[nodiscard]] std::optional<std::filesystem::space_info> SpaceForScans() const;
   [[nodiscard]] std::uint64_t NeededBytes() const;
   [[nodiscard]] Answer WhyNoSpace() const;
   [[nodiscard]] std::vector<std::string> StorageWarnings() const;
@@ -254,6 +257,9 @@ class Appliance {
   Room room_;
   std::unique_ptr<Store> store_;
   std::string storage_fault_, backup_fault_;
+  std::string record_fault_;             ///< That the audit log is not as it was written.
+  bool is_database_checked_ = false;     ///< Once it is open, the check thread's.
+  bool backup_is_beside_scans_ = false;  ///< The last one to the configured folder.
   std::shared_ptr<ProfileShelf> profiles_;
   std::atomic<bool> profiles_off_;
   std::string profile_fault_;  ///< The sensor's contradiction of its profile in the last scan.
@@ -262,6 +268,7 @@ class Appliance {
   int ticks_to_maintenance_ = kMaintenanceTicks;
   int ticks_to_file_check_ = kFirstFileCheckTicks;
   int ticks_to_backup_ = kBackupTicks;
+  int ticks_to_record_check_ = 0;
   ClockWatch clock_{std::chrono::system_clock::now(), std::chrono::steady_clock::now()};
   std::stop_source care_;  ///< Stopped when the appliance is destroyed.
   ScanState state_;

@@ -1,5 +1,6 @@
 // Maintenance of stored data: opening, disk space, retention, backups, and the check of its files.
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -28,7 +29,26 @@ const web::Actor kSelf{.user = "plumbd", .address = ""};
 constexpr int kFileCheckTicks = 5, kNoFileCheckTicks = 600;
 constexpr std::chrono::hours kFileCheckEvery{24};
 
+bool AreOnOneDisk(const std::filesystem::path& a, const std::filesystem::path& b) {
+  struct stat of_a {};
+  struct stat of_b {};
+  return ::stat(a.c_str(), &of_a) == 0 && ::stat(b.c_str(), &of_b) == 0 &&
+         of_a.st_dev == of_b.st_dev;
+}
+
 }  // namespace
+
+std::optional<std::filesystem::space_info> Appliance::SpaceForScans() const {
+  std::optional<std::filesystem::space_info> least;
+  const std::filesystem::path& state = parts_.config.appliance.state;
+  for (const std::filesystem::path& folder : {state, state / "scans"}) {
+    std::error_code error;
+    const std::filesystem::space_info space = std::filesystem::space(folder, error);
+    if (!error && space.capacity > 0 && (!least || space.available < least->available))
+      least = space;
+  }
+  return least;
+}
 
 void Appliance::OpenStore() {
   if (!parts_.configuration_fault.empty()) {
@@ -46,6 +66,7 @@ void Appliance::OpenStore() {
     };
     store_ = std::make_unique<Store>(parts_.config.appliance.state, options);
     LogRecovery(store_->recovery());
+    is_database_checked_ = store_->recovery().checked_database;
     // Sessions end with the process: the patient on the couch has to be confirmed again.
     store_->treatments.CloseAll(kSelf);
     if (!parts_.demo_patient.empty()) {
@@ -78,6 +99,9 @@ void Appliance::LogRecovery(const RecoveryReport& found) const {
             "of unfinished, failed or removed scans deleted",
             found.interrupted_scans, found.orphaned_folders));
   }
+  if (!found.checked_database)
+    Log(LogLevel::kNotice,
+        "the database is too large to be checked as a whole at the start: that goes on now");
   if (found.lost_scans > 0) {
     Log(LogLevel::kError,
         fmt::format("the files of {} scans cannot be seen: they are marked unavailable until the "
@@ -117,16 +141,14 @@ std::uint64_t Appliance::NeededBytes() const {
 
 /// Why no scan can be stored now; empty if one can.
 Appliance::Answer Appliance::WhyNoSpace() const {
-  std::error_code error;
-  const std::filesystem::space_info space =
-      std::filesystem::space(parts_.config.appliance.state, error);
-  if (error) return {};  // a disk that cannot be examined is reported elsewhere
+  const auto space = SpaceForScans();
+  if (!space) return {};  // a disk that cannot be examined is reported elsewhere
   try {
     const std::uint64_t needed = NeededBytes();
-    if (space.available >= needed) return {};
+    if (space->available >= needed) return {};
     return fmt::format(
         "the disk is full: {} MB are free, a scan may need {}; remove scans that are not wanted",
-        space.available / 1'000'000, needed / 1'000'000);
+        space->available / 1'000'000, needed / 1'000'000);
   } catch (const std::exception& failure) {
     return fmt::format("no scan can begin: {}", failure.what());
   }
@@ -135,17 +157,20 @@ Appliance::Answer Appliance::WhyNoSpace() const {
 std::vector<std::string> Appliance::StorageWarnings() const {
   constexpr double kNearlyFull = 0.8;
   std::vector<std::string> warnings;
-  std::error_code error;
-  const std::filesystem::space_info space =
-      std::filesystem::space(parts_.config.appliance.state, error);
-  if (!error && space.capacity > 0) {
+  if (const auto space = SpaceForScans()) {
     const double used =
-        1.0 - static_cast<double>(space.available) / static_cast<double>(space.capacity);
+        1.0 - static_cast<double>(space->available) / static_cast<double>(space->capacity);
     if (used >= kNearlyFull)
       warnings.push_back(
           fmt::format("The disk is {:.0f} % full: back up and remove scans.", 100 * used));
   }
+  if (!record_fault_.empty()) warnings.push_back(record_fault_);
   if (!backup_fault_.empty()) warnings.push_back("The last backup failed: " + backup_fault_);
+  if (backup_is_beside_scans_)
+    warnings.push_back(fmt::format(
+        "The last backup lies on the disk of the scans itself and is lost with it: mount the disk "
+        "for backups at {}",
+        parts_.config.appliance.backup_folder.string()));
   return warnings;
 }
 
@@ -206,6 +231,37 @@ void Appliance::RunMaintenance() {
   if (!posted) Log(LogLevel::kWarning, "the store is too busy to remove old scans now");
 }
 
+/// Once a day, off the loop: a chain of digests that nobody follows protects nothing.
+void Appliance::CheckRecords() {
+  constexpr int kDayTicks = 24 * 3600, kAgainTicks = 60;
+  ticks_to_record_check_ = kDayTicks;
+  if (store_ == nullptr || !storage_fault_.empty()) return;
+  const bool posted = check_thread_.Post([this] {
+    std::string fault;
+    try {
+      if (!std::exchange(is_database_checked_, true)) {
+        constexpr std::chrono::minutes kLongest{30};
+        Database(parts_.config.appliance.state / "plumb.db", Database::Access::kReadOnly)
+            .CheckIntegrity(kLongest);
+      }
+      if (const std::optional<std::int64_t> broken = store_->audit.FirstBroken())
+        fault = fmt::format(
+            "The audit log has been changed or shortened from outside: entry {} is not as it was "
+            "written. Compare it with a backup",
+            *broken);
+    } catch (const DatabaseCorrupt& error) {
+      loop_.Post("record check", [this, what = std::string(error.what())] { FailStorage(what); });
+    } catch (const std::exception& error) {
+      fault = fmt::format("The audit log cannot be checked: {}", error.what());
+    }
+    loop_.Post("record check", [this, fault] {
+      if (!fault.empty() && fault != record_fault_) Log(LogLevel::kError, fault);
+      record_fault_ = fault;
+    });
+  });
+  if (!posted) ticks_to_record_check_ = kAgainTicks;
+}
+
 /// One scan at a time, off the loop, and never while a scan runs: damaged files are noticed before
 /// they are needed.
 void Appliance::CheckStoredFiles() {
@@ -258,10 +314,12 @@ void Appliance::BackUp(
         GiveWayToScans();
         BackupReport report;
         std::string error;
+        bool is_beside_scans = false;
         try {
           std::optional<BackupSecret> secret;
           if (!key.empty()) secret.emplace(key);
           report = store_->backup.Make(actor, folder, stop, secret ? &*secret : nullptr);
+          is_beside_scans = AreOnOneDisk(folder, store_->folders.scans());
         } catch (const std::exception& failure) {
           error = failure.what();
         }
@@ -269,7 +327,10 @@ void Appliance::BackUp(
             error.empty() ? fmt::format("backup made: {}, {} scans, {} problems", folder.string(),
                                         report.scans, report.problems.size())
                           : fmt::format("no backup was made in {}: {}", folder.string(), error));
-        loop_.Post("backup", [done, error, report] { done(error, report); });
+        loop_.Post("backup", [this, done, error, report, is_beside_scans, folder] {
+          if (error.empty() && folder == BackupTarget()) backup_is_beside_scans_ = is_beside_scans;
+          done(error, report);
+        });
       });
   if (!posted) done("too many tasks are waiting: try again", {});
 }

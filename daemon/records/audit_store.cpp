@@ -106,6 +106,11 @@ std::vector<web::AuditEntry> AuditStore::Find(const web::AuditQuery& wanted) {
 
 std::optional<std::int64_t> AuditStore::FirstBroken() {
   const StoreDatabase::Held lists = database_.ForLists();
+  std::int64_t given = 0;  // read first: more may be written meanwhile
+  {
+    Statement query = lists->Prepare("SELECT seq FROM sqlite_sequence WHERE name = 'audit'");
+    if (query.Step()) given = query.Integer(0);
+  }
   std::string chain;
   std::int64_t last = 0;
   bool has_begun = false;
@@ -118,9 +123,7 @@ std::optional<std::int64_t> AuditStore::FirstBroken() {
       last = query.Integer(0);
     }
   }
-  Statement query = lists->Prepare("SELECT seq FROM sqlite_sequence WHERE name = 'audit'");
-  const std::int64_t given = query.Step() ? query.Integer(0) : 0;
-  return given == last ? std::nullopt : std::optional(last + 1);  // entries at the end are missing
+  return last >= given ? std::nullopt : std::optional(last + 1);  // entries at the end are missing
 }
 
 }  // namespace plumb

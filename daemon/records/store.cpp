@@ -22,8 +22,8 @@ namespace {
 
 constexpr const char* kDatabase = "plumb.db";
 
-void RequireWritable(const fs::path& state) {
-  const fs::path probe = state / ".writable";
+void RequireWritable(const fs::path& folder) {
+  const fs::path probe = folder / ".writable";
   const int fd = ::open(probe.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600);
   const int reason = fd < 0 ? errno : 0;
   if (fd >= 0) {
@@ -34,7 +34,14 @@ void RequireWritable(const fs::path& state) {
     return;
   throw DiskRefused(
       fmt::format("cannot write to {}: {}; check the disk, make it writable and start plumbd again",
-                  state.string(), std::strerror(reason)));
+                  folder.string(), std::strerror(reason)));
+}
+
+/// scans/ may be a disk of its own.
+void RequireWritable(const ScanFolders& folders) {
+  RequireWritable(folders.state());
+  std::error_code ignored;
+  if (fs::is_directory(folders.scans(), ignored)) RequireWritable(folders.scans());
 }
 
 /// A program that copies the database holds it for a while; another plumbd does not release it.
@@ -64,7 +71,7 @@ std::unique_ptr<Database> OpenForChanges(const ScanFolders& folders, const Store
   std::error_code error;
   fs::create_directories(folders.state(), error);
   if (error) throw DiskRefused(DescribeWriteError(folders.state(), error.value()));
-  RequireWritable(folders.state());
+  RequireWritable(folders);
   lock.Take(folders.state());
   std::unique_ptr<Database> database =
       OpenChecked(folders.state(), options, recovery.checked_database);
@@ -111,6 +118,6 @@ std::unique_ptr<Store> Store::OpenReadable(const fs::path& folder) {
   return std::unique_ptr<Store>(new Store(folder, ReadOnly{}));
 }
 
-void Store::CheckWritable() const { RequireWritable(folders.state()); }
+void Store::CheckWritable() const { RequireWritable(folders); }
 
 }  // namespace plumb

@@ -184,6 +184,33 @@ TEST_F(DaemonDiskTest, StartedOnAReadOnlyDiskAfterAPowerCutItReadsTheLogToo) {
   EXPECT_EQ(plumbd.Stop(), 0);
 }
 
+/// scans/ may be a disk of its own: its room counts, and whether it can be written.
+TEST_F(DaemonDiskTest, ADiskOfTheScansAloneIsLookedAtToo) {
+  const fs::path scans = state() / "scans";
+  fs::create_directories(scans);
+  ASSERT_EQ(::mount("none", scans.c_str(), "tmpfs", 0, "size=20m"), 0) << std::strerror(errno);
+  {
+    Plumbd plumbd(folder_.path());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    plumbd.WaitForState("ready");
+    HttpClient client(plumbd.port());
+    const HttpAnswer health = client.Get("/health");
+    EXPECT_EQ(health.status, 503);
+    EXPECT_THAT(health.body, HasSubstr("the disk is full: 20 MB are free"));
+    EXPECT_THAT(plumbd.Press()["error"].get<std::string>(), HasSubstr("the disk is full"));
+    EXPECT_EQ(plumbd.Stop(), 0);
+  }
+  EXPECT_EQ(::mount("none", scans.c_str(), nullptr, MS_REMOUNT | MS_RDONLY, "size=20m"), 0);
+  {
+    Plumbd plumbd(folder_.path());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    EXPECT_THAT(plumbd.WaitForState("fault")["reason"].get<std::string>(),
+                HasSubstr(scans.string() + ": Read-only file system"));
+    EXPECT_EQ(plumbd.Stop(), 0);
+  }
+  EXPECT_EQ(::umount2(scans.c_str(), MNT_DETACH), 0);
+}
+
 TEST_F(DaemonDiskTest, ADiskThatBecomesReadOnlyWhileNobodyScansIsToldBeforeTheNextScan) {
   if (!MountImage()) GTEST_SKIP() << ("no loop device with ext4 here");
   {

@@ -1,13 +1,17 @@
 // An appliance whose database fails under it.
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
+#include "daemon/appliance/web_settings.hpp"
 #include "daemon/records/file_cipher.hpp"
 #include "tests/support/fake_sensor.hpp"
+#include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace plumb {
@@ -49,12 +53,12 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
   EXPECT_FALSE(appliance.Health().ok);
 }
 
-/// Until `done`, or for 20 s.
+/// Until `done`, or for a minute: a backup gives way to all else that the machine does.
 template <typename Done>
 bool RunUntil(EventLoop& loop, const Done& done) {
   bool is_done = false;
   EventLoop::Source end = loop.MakeTimer("end", [&] { loop.Quit(0); });
-  end.ArmAfter(std::chrono::seconds(20));
+  end.ArmAfter(std::chrono::seconds(60));
   EventLoop::Source look = loop.MakeTimer("look", [&] {
     is_done = done();
     if (is_done) return loop.Quit(0);
@@ -73,6 +77,73 @@ ApplianceParts PartsOf(const Config& config, testing::FakeBus& bus) {
           .button = nullptr,
           .indicator = nullptr,
           .demo_patient = {}};
+}
+
+/// A chain that nobody follows protects nothing: the appliance itself looks, and says so.
+TEST(ApplianceStorage, AnAuditLogThatWasChangedFromOutsideIsReported) {
+  for (const char* change : {"", "UPDATE audit SET user = 'bert' WHERE number = 2",
+                             "DELETE FROM audit WHERE number = (SELECT max(number) FROM audit)"}) {
+    SCOPED_TRACE(change);
+    const testing::TempFolder folder;
+    testing::FakeBus bus;
+    EventLoop loop;
+    Config config;
+    config.appliance.state = folder / "state";
+    {
+      Store store(config.appliance.state);
+      for (int i = 0; i < 3; ++i)
+        store.audit.Log({.user = "anna", .address = {}}, "note", "", std::to_string(i));
+    }
+    {
+      Database direct(config.appliance.state / "plumb.db", Database::Access::kReadWrite);
+      direct.Execute(std::string("DROP TRIGGER IF EXISTS audit_no_update; DROP TRIGGER IF EXISTS "
+                                 "audit_no_delete; ") +
+                     change);
+    }
+    Appliance appliance(loop, PartsOf(config, bus));
+    const auto is_told = [&] {
+      const std::vector<std::string> warnings = appliance.WebStatus().storage.warnings;
+      return std::any_of(warnings.begin(), warnings.end(), [](const std::string& warning) {
+        return warning.starts_with("The audit log has been changed");
+      });
+    };
+    if (*change != '\0') {
+      EXPECT_TRUE(RunUntil(loop, is_told));
+      continue;
+    }
+    EventLoop::Source end = loop.MakeTimer("end", [&] { loop.Quit(0); });
+    end.ArmAfter(std::chrono::milliseconds(300));
+    (void)loop.Run();
+    EXPECT_FALSE(is_told());
+  }
+}
+
+TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
+  const testing::TempFolder folder;
+  testing::FakeBus bus;
+  EventLoop loop;
+  Config config;
+  config.appliance.state = folder / "state";
+  {
+    Store store(config.appliance.state);
+    web::Settings settings;
+    settings.idle_logout_min = 7;
+    store.settings.Change({.user = "anna", .address = {}}, settings);
+  }
+  const auto set = [&](const std::string& text) {
+    Database(config.appliance.state / "plumb.db", Database::Access::kReadWrite)
+        .Execute("UPDATE settings SET value = '" + text + "' WHERE name = 'settings'");
+  };
+  {
+    Appliance appliance(loop, PartsOf(config, bus));
+    StoreAccess access(appliance);
+    EXPECT_EQ(WebSettings(access).GetSettings().idle_logout_min, 7);
+  }
+  set("{");
+  Appliance appliance(loop, PartsOf(config, bus));
+  StoreAccess access(appliance);
+  EXPECT_THAT(testing::MessageOf<IoError>([&] { (void)WebSettings(access).GetSettings(); }),
+              HasSubstr("what is stored cannot be read: "));
 }
 
 TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {
