@@ -28,7 +28,7 @@ Json ProgressFields(const ScanUpdate& update, std::optional<double> coverage) {
           {"frames", update.frames},
           {"frames_tracked", update.frames_tracked},
           {"frames_dropped", update.frames_dropped},
-          {"advice", Name(update.guidance.advice)},
+          {"guidance", Name(update.guidance.advice)},
           {"speed_m_s", update.guidance.speed_m_s},
           {"median_depth_m", update.guidance.median_depth_m},
           {"area_m2", update.guidance.area_m2},

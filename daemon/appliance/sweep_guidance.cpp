@@ -35,7 +35,7 @@ const char* Name(SweepAdvice advice) {
     case SweepAdvice::kLost:
       break;
   }
-  return "lost";
+  return "tracking_lost";
 }
 
 SweepGuide::SweepGuide(const Intrinsics& intrinsics, const GuidanceOptions& options)

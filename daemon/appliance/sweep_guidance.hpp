@@ -11,7 +11,7 @@
 namespace plumb {
 
 enum class SweepAdvice { kNone, kSlower, kCloser, kFarther, kLost };
-/// "none", "slower", "closer", "farther", "lost"
+/// "none", "slower", "closer", "farther", "tracking_lost"
 [[nodiscard]] const char* Name(SweepAdvice advice);
 
 /// Starting values; distances in metres, times in seconds by the frames' stamps.

@@ -136,7 +136,7 @@ std::string StatusText(const Json& status) {
     text += fmt::format("scan     {} {}: {} frames, {} tracked, {} dropped; {}\n",
                         scan.value("id", ""), scan.value("step", ""), scan.value("frames", 0),
                         scan.value("frames_tracked", 0), scan.value("frames_dropped", 0),
-                        scan.value("advice", ""));
+                        scan.value("guidance", ""));
   }
   if (const Json last = status.value("last_result", Json()); last.is_object()) {
     const Json verdict = last.value("verdict", Json());

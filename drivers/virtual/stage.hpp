@@ -59,11 +59,24 @@ struct Unit {
   std::atomic<bool> failed{false};
   std::atomic<Glitch> glitch{Glitch::kNone};
   std::atomic<int> glitches_left{0};
-  std::atomic<int> position{-1};  ///< Last delivered frame; -1: none since the last command.
-  /// Held while a frame is delivered: what changes under it holds from the next frame on.
-  std::mutex delivering;
+  std::atomic<int> position{-1};        ///< Last delivered frame; -1: none since the last command.
+  std::mutex delivering;                ///< Held while a frame is delivered.
+  std::atomic<int> changes_waiting{0};  ///< Changes that wait for `delivering`: they go first.
 
   [[nodiscard]] bool silent() const { return gone || stalled || failed; }
+};
+
+/// While it exists no frame is delivered: what is changed holds from the next frame on.
+class BetweenFrames {
+ public:
+  explicit BetweenFrames(Unit& unit) {
+    ++unit.changes_waiting;
+    lock_ = std::unique_lock(unit.delivering);
+    --unit.changes_waiting;
+  }
+
+ private:
+  std::unique_lock<std::mutex> lock_;
 };
 
 }  // namespace plumb::simulated

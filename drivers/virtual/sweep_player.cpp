@@ -10,6 +10,7 @@ namespace {
 constexpr int kTicksBeforeSweep = 2;
 constexpr std::chrono::milliseconds kIdle{5};
 constexpr std::chrono::milliseconds kBetweenDoubles{8};
+constexpr std::chrono::microseconds kYield{100};
 
 }  // namespace
 
@@ -65,6 +66,7 @@ void SweepPlayer::Run(const std::stop_token& stop) {
 }
 
 void SweepPlayer::Tick(const std::stop_token& stop) {
+  while (unit_->changes_waiting > 0 && !stop.stop_requested()) std::this_thread::sleep_for(kYield);
   const std::scoped_lock delivering(unit_->delivering);
   if (Stage::View now = stage_->Now(); now.epoch != view_.epoch) {
     view_ = std::move(now);

@@ -63,7 +63,7 @@ std::string VirtualBus::Obey(const std::string& line) try {
   }
   if (verb == "stall") {
     return OnUnit(argument, [](Unit& unit) {
-      const std::scoped_lock between_frames(unit.delivering);
+      const BetweenFrames between_frames(unit);
       unit.stalled = true;
     });
   }
@@ -78,8 +78,9 @@ std::string VirtualBus::Rewind(const std::string& how, std::int64_t origin_us) {
   const bool once = how == "once";
   const std::vector<std::shared_ptr<Unit>> all = units();
   // A stall ends with the first frame of the sweep, neither before it nor after it.
-  std::vector<std::unique_lock<std::mutex>> between_frames;
-  for (const auto& unit : all) between_frames.emplace_back(unit->delivering);
+  std::vector<BetweenFrames> between_frames;
+  if (once)
+    for (const auto& unit : all) between_frames.emplace_back(*unit);
   stage_->Show(stage_->Now().index, once ? Stage::Motion::kSweepOnce : Stage::Motion::kSweep,
                origin_us);
   if (once)

@@ -89,6 +89,25 @@ TEST_F(VirtualProviderTest, EveryFrameOfASweepComesAsTheSimulatorMadeIt) {
   }
 }
 
+TEST_F(VirtualProviderTest, AfterAStallTheNextFramesAreThoseOfTheSweep) {
+  VirtualProvider provider = Provider(std::chrono::seconds(20));
+  bus_->Obey("speed 20");
+  for (int round = 1; round <= 5; ++round) {
+    bus_->Obey("hold");
+    const auto sensor = provider.Open("");  // each time: stamps that go back are discarded
+    bus_->Obey("glitch late 10000");        // each one is on its way for 0.1 s
+    ASSERT_TRUE(sensor->Next().has_value());
+    std::this_thread::sleep_for(std::chrono::milliseconds(30));
+    bus_->Obey("stall");
+    sensor->Flush();  // a frame after it would be one that the stall has not stopped
+    bus_->Obey("rewind once 900000000");
+    const std::optional<Frame> frame = sensor->Next();
+    ASSERT_TRUE(frame.has_value());
+    EXPECT_GE(frame->color_time_s, 900.0) << "round " << round;
+    bus_->Obey("glitch late 0");
+  }
+}
+
 TEST_F(VirtualProviderTest, UnitsComeAndGoAndTheListenerHearsOfIt) {
   VirtualProvider provider = Provider(std::chrono::seconds(20));
   std::atomic<int> changes = 0;
