@@ -75,13 +75,10 @@ web::Guidance GuidanceOf(SweepAdvice advice, double dropped_share) {
   return WebGuidance(advice);
 }
 
-web::StorageStatus StorageOf(const std::filesystem::path& folder, bool is_open) {
+/// True also where nothing can be said of it.
+bool IsReadOnly(const std::filesystem::path& folder) {
   struct statvfs status {};
-  if (::statvfs(folder.c_str(), &status) != 0) return {.writable = false};
-  const auto block = static_cast<std::int64_t>(status.f_frsize);
-  return {.free_bytes = static_cast<std::int64_t>(status.f_bavail) * block,
-          .total_bytes = static_cast<std::int64_t>(status.f_blocks) * block,
-          .writable = is_open && (status.f_flag & ST_RDONLY) == 0};
+  return ::statvfs(folder.c_str(), &status) != 0 || (status.f_flag & ST_RDONLY) != 0;
 }
 
 }  // namespace
@@ -289,7 +286,11 @@ web::Status Appliance::WebStatus() {
                    .name = sensor.sensor.name,
                    .frames_per_second = sensor.present ? sensor.statistics.frames_per_second : 0.0,
                    .powered_s = sensor.present ? SecondsSince(sensor_since_) : 0.0};
-  status.storage = StorageOf(parts_.config.appliance.state, storage_fault_.empty());
+  if (const auto space = SpaceForScans()) {
+    status.storage = {.free_bytes = static_cast<std::int64_t>(space->available),
+                      .total_bytes = static_cast<std::int64_t>(space->capacity)};
+  }
+  status.storage.writable = storage_fault_.empty() && !IsReadOnly(parts_.config.appliance.state);
   status.storage.warnings = StorageWarnings();
   status.light = Name(shown_);
   status.patient_id = check_ ? std::string() : open_patient_;
@@ -377,7 +378,7 @@ web::CheckStatus Appliance::Checks() {
 web::Health Appliance::Health() {
   if (!parts_.configuration_fault.empty()) return {.ok = false, .reason = storage_fault_};
   if (!storage_fault_.empty()) return {.ok = false, .reason = "storage: " + storage_fault_};
-  if (!StorageOf(parts_.config.appliance.state, true).writable)
+  if (IsReadOnly(parts_.config.appliance.state))
     return {.ok = false, .reason = "storage: the state folder is on a read-only disk"};
   if (const std::string full = WhyNoSpace(); !full.empty())
     return {.ok = false, .reason = "storage: " + full};
