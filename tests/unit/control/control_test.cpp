@@ -196,6 +196,9 @@ TEST_F(ControlServerTest, AnswersSeveralRequestsInOnePieceAndOneInSeveral) {
 TEST_F(ControlServerTest, AnAnswerThatFailsEndsItsConnectionAndNotTheLoop) {
   RunWith([&] {
     const int fd = ConnectUnix(folder_ / "s"), other = ConnectUnix(folder_ / "s");
+    const timeval longest{.tv_sec = 10, .tv_usec = 0};  // a loop that has ended answers nothing
+    for (const int client : {fd, other})
+      ASSERT_EQ(::setsockopt(client, SOL_SOCKET, SO_RCVTIMEO, &longest, sizeof longest), 0);
     Send(fd, "{\"command\":\"restart\"}\n");
     EXPECT_THAT(ReadLine(fd), HasSubstr("no answer can be made"));
     EXPECT_EQ(ReadLine(fd), "") << "it has ended";
