@@ -20,7 +20,6 @@ using Json = nlohmann::json;
 using std::chrono::seconds;
 
 constexpr seconds kTick{1};
-constexpr std::chrono::minutes kSessionIdle{30};
 const web::Actor kSelf{.user = "plumbd", .address = ""};
 
 }  // namespace
@@ -280,12 +279,14 @@ Appliance::Answer Appliance::CloseSession(const web::Actor& actor) {
 /// The demo's session does not expire, because no user could open it again.
 void Appliance::ArmSessionTimer() {
   if (session_id_.empty() || opened_by_.user == kSelf.user) return session_timer_.Disarm();
-  session_timer_.ArmAfter(kSessionIdle);
+  session_timer_.ArmAfter(std::chrono::microseconds(
+      static_cast<std::int64_t>(parts_.config.appliance.session_idle_min * 60e6)));
 }
 
 void Appliance::OnSessionTimer() {
   if (IsRunning()) return ArmSessionTimer();
-  Log(LogLevel::kNotice, "the session was closed: nothing was scanned for 30 minutes");
+  Log(LogLevel::kNotice, fmt::format("the session was closed: nothing was scanned for {:g} minutes",
+                                     parts_.config.appliance.session_idle_min));
   (void)CloseSession(kSelf);
 }
 

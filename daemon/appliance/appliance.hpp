@@ -81,7 +81,7 @@ class Appliance {
     blocking_reason_ = std::move(blocking_reason);
   }
   /// Why no reference may be scanned or approved now, with the next step: no daily check has passed
-  /// today. Empty if it may, as always in the demo.
+  /// today, or the sensor is still warming up. Empty if it may, as always in the demo.
   /// @param scan  The scan that is to be the reference. One taken while the check was overdue is
   ///         confirmed by a check of the same day (CheckStore::ConfirmsScan), or has to be
   ///         repeated.
@@ -200,6 +200,7 @@ class Appliance {
   void ForgetSession();
   [[nodiscard]] bool IsOwnSession() const;
   [[nodiscard]] std::optional<double> SecondsSinceSensor() const;
+  [[nodiscard]] std::string WhySensorIsCold(const std::optional<web::Scan>& scan) const;
   [[nodiscard]] bool IsCheckOverdue();
   void NoteDropped(const ScanUpdate& update);
   void Act(ScanAction action);

@@ -200,6 +200,14 @@ void ReadAppliance(Section section, ApplianceConfig& appliance) {
   std::optional<double> result_s;
   take_seconds("result_s", result_s, 1, 3600);
   appliance.result_s = result_s.value_or(appliance.result_s);
+  const auto take_minutes = [&](std::string_view key, double& value, double least, double most) {
+    std::optional<double> minutes;
+    section.Take(key, minutes, fmt::format("minutes from {} to {}", least, most),
+                 [&](double v) { return v >= least && v <= most; });
+    value = minutes.value_or(value);
+  };
+  take_minutes("warm_up_min", appliance.warm_up_min, 0, 120);
+  take_minutes("session_idle_min", appliance.session_idle_min, 1, 600);
   section.RejectUnknownKeys();
 }
 

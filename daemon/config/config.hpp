@@ -37,8 +37,10 @@ struct ApplianceConfig {
   std::optional<double> quota_gb;
   /// Time without new coverage after which the sweep ends; not set: the page's setting.
   std::optional<double> auto_stop_s;
-  std::optional<double> scan_limit_s;   ///< Longest sweep; not set: the page's setting.
-  double result_s = 120.0;              ///< Time for which a result is shown.
+  std::optional<double> scan_limit_s;  ///< Longest sweep; not set: the page's setting.
+  double result_s = 120.0;             ///< Time for which a result is shown.
+  double warm_up_min = 15.0;  ///< Time that the sensor must have been on before a reference scan.
+  double session_idle_min = 30.0;       ///< Time without a scan after which a session is closed.
   std::filesystem::path backup_folder;  ///< Folder of scheduled backups; empty: none are made.
   double backup_hours = 24.0;
   /// Key that encrypts every backup by plumbd; empty: backups are not encrypted.
@@ -126,7 +128,7 @@ enum class ConfigUse { kCommandLine, kAppliance };
 ///     [storage]      backup_folder, backup_hours, backup_key_file
 ///     [appliance]    state, control, calibration,
 ///     sensor_serial, sensor_profiles, keep_recordings, quota_gb,
-///                    auto_stop_s, scan_limit_s, result_s
+///                    auto_stop_s, scan_limit_s, result_s, warm_up_min, session_idle_min
 ///     [sensor]       driver
 ///     [button]       chip, line, active_low
 ///     [light]        chip, red, green, blue, beeper, active_low

@@ -58,6 +58,7 @@ class RealRuledAppliance : public RuledAppliance {
  public:
   RealRuledAppliance() {
     parts_.config.appliance.state = folder_ / "state";
+    parts_.config.appliance.warm_up_min = 0;
     parts_.config.update.folder = folder_ / "updates";
     parts_.make_provider = [this] { return std::make_unique<testing::FakeProvider>(bus_); };
     bus_.Plug("A");

@@ -26,6 +26,8 @@ quota_gb = 12.5
 auto_stop_s = 4
 scan_limit_s = 30
 result_s = 300
+warm_up_min = 20
+session_idle_min = 45
 [storage]
 backup_folder = "/mnt/backup"
 backup_hours = 12
@@ -58,6 +60,8 @@ host_names = ["plumb.local", "couch"]
   EXPECT_EQ(config.appliance.auto_stop_s, 4.0);
   EXPECT_EQ(config.appliance.scan_limit_s, 30.0);
   EXPECT_EQ(config.appliance.result_s, 300.0);
+  EXPECT_EQ(config.appliance.warm_up_min, 20.0);
+  EXPECT_EQ(config.appliance.session_idle_min, 45.0);
   EXPECT_EQ(config.panel.button_chip, "gpiochip1");
   EXPECT_EQ(config.panel.button_line, "start");
   EXPECT_FALSE(config.panel.button_active_low);

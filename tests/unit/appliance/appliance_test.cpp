@@ -166,6 +166,7 @@ TEST_F(ApplianceTest, AWorkerIsNotAliveWhileAResultIsComputedWithoutProgress) {
 TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) {
   const web::Actor actor{.user = "tester", .address = {}};
   parts_.demo_patient.clear();
+  parts_.config.appliance.warm_up_min = 0;
   Play([&] {
     MakeReady();
     std::promise<web::Change> added, wiped;
@@ -299,6 +300,7 @@ TEST_F(ApplianceTest, TheMachineIsNotRestartedInASessionAndAFailedRestartLeavesI
 
 TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
   parts_.demo_patient.clear();
+  parts_.config.appliance.warm_up_min = 0;
   Play([&] {
     MakeReady();
     const web::Actor tess = {.user = "tess", .address = {}};
@@ -339,6 +341,49 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
                                                  "", keep);
     });
     EXPECT_TRUE(Becomes([&] { return appliance_->WebStatus().session.has_value(); }));
+  });
+}
+
+TEST_F(ApplianceTest, ASessionWithoutScansClosesByItself) {
+  parts_.demo_patient.clear();
+  parts_.config.appliance.session_idle_min = 0.3 / 60;
+  Play([&] {
+    MakeReady();
+    const web::Actor tess = {.user = "tess", .address = {}};
+    On([&] {
+      const std::string patient = appliance_->store()->patients.Add(tess, "P-1", "");
+      const std::string session =
+          appliance_->store()->treatments.Open(tess, patient, web::ScanPurpose::kReference);
+      appliance_->OpenSession(session, patient, web::ScanPurpose::kReference, "", tess);
+      EXPECT_TRUE(appliance_->WebStatus().session.has_value());
+    });
+    EXPECT_TRUE(Becomes([&] { return !appliance_->WebStatus().session.has_value(); }));
+    EXPECT_TRUE(Becomes([&] { return !appliance_->store()->treatments.Opened().has_value(); }));
+  });
+}
+
+TEST_F(ApplianceTest, AColdSensorTakesNoReference) {
+  parts_.demo_patient.clear();
+  ASSERT_EQ(parts_.config.appliance.warm_up_min, 15);
+  Play([&] {
+    MakeReady();
+    On([&] {
+      (void)appliance_->store()->checks.Add(
+          {.user = "tess", .address = {}}, appliance_->WebStatus().sensor.serial,
+          {.check = {.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
+      EXPECT_THAT(appliance_->WebStatus().reference_block,
+                  ::testing::HasSubstr("the sensor is still warming up"));
+      EXPECT_THAT(appliance_->WebStatus().reference_block, ::testing::HasSubstr("15 min"));
+      // What was scanned long ago is judged by how warm the sensor was then.
+      web::Scan scan = ScanOf(false);
+      scan.sensor_on_s = 899;
+      EXPECT_THAT(appliance_->WhyNoReference(scan),
+                  ::testing::HasSubstr("scan the reference again"));
+      scan.sensor_on_s = 900;
+      EXPECT_EQ(appliance_->WhyNoReference(scan), "");
+      scan.sensor_on_s.reset();
+      EXPECT_EQ(appliance_->WhyNoReference(scan), "") << "not known: from an older version";
+    });
   });
 }
 

@@ -50,7 +50,8 @@ export function blockNote(tell) {
     const why = live.status?.reference_block ?? null;
     if (why === shown) return;
     shown = why;
-    clear(element, why && [sentence(why), ' ', h('a', { href: '#/check' }, S.nav.check)]);
+    clear(element, why && [sentence(why), live.status.check_overdue
+      && [' ', h('a', { href: '#/check' }, S.nav.check)]]);
     tell(why);
   };
   draw();

@@ -4,7 +4,7 @@ import { action, clear, done, enable, h, redraw, say } from '../dom.js';
 import { liveSurface } from '../live_surface.js';
 import { S } from '../strings.js';
 import { isAcknowledged, sessionLine } from '../treatment.js';
-import { faultWords } from './common.js';
+import { faultWords, sentence } from './common.js';
 
 const kPreviewEvery_ms = 250;
 const kPreviewAnswer_ms = 5000;
@@ -172,9 +172,8 @@ export async function showScan(place) {
     showSurface(status.state === 'scanning');
     drawProgress(status);
     if (status.fault) guidance.textContent = faultWords(status);
-    const overdue = status.check_overdue && status.next_purpose === 'reference'
-      && status.state === 'ready';
-    caution.textContent = overdue ? text.overdueReference : '';
+    const refused = status.next_purpose === 'reference' && status.state === 'ready';
+    caution.textContent = refused ? sentence(status.reference_block ?? '') : '';
     drawWho(status);
   };
   draw();

@@ -261,6 +261,15 @@ export const kPatterns = [
     'Hay que calibrar la sala de nuevo; hasta entonces las direcciones son las del paciente: $1'],
   ['^the calibration of the room, version (\\d+), is not used: (.+)$',
     'la calibración de la sala, versión $1, no se usa: $2'],
+  // A cold sensor.
+  ['^the sensor is still warming up, and references need one that has been on for ([\\d.]+) min: '
+    + 'wait, then scan$',
+  'el sensor aún se está calentando y las referencias necesitan uno encendido desde hace $1 min: '
+    + 'espere y escanee después'],
+  ['^the sensor was still warming up at this scan, and references need one that has been on for '
+    + '([\\d.]+) min: scan the reference again$',
+  'el sensor aún se estaba calentando en este escaneo y las referencias necesitan uno encendido '
+    + 'desde hace $1 min: escanee otra vez la referencia'],
   // The daily check.
   ['^(\\d+) markers were seen, at least (\\d+) are needed; sweep over all of them$',
     'se vieron $1 marcadores y se necesitan al menos $2; bárralos todos'],
