@@ -1,12 +1,7 @@
 #include "daemon/appliance/report_words.hpp"
 
-#include <algorithm>
-#include <optional>
-#include <regex>
-#include <vector>
-
 #include "algo/base/notice.hpp"
-#include "web/assets/assets.hpp"
+#include "web/assets/spanish.hpp"
 
 namespace plumb {
 namespace {
@@ -52,6 +47,7 @@ constexpr ReportWords kEnglish = {
     .outside = "outside tolerance",
     .not_known = "not known",
     .no_move = "no move needed",
+    .scan_again = "scan again",
     .insignificant = "below its uncertainty",
     .verdict_reference = "REFERENCE",
     .verdict_none = "NO RESULT",
@@ -131,6 +127,7 @@ constexpr ReportWords kSpanish = {
     .outside = "fuera de tolerancia",
     .not_known = "no se conoce",
     .no_move = "no hay que mover",
+    .scan_again = "escanear de nuevo",
     .insignificant = "menor que su incertidumbre",
     .verdict_reference = "REFERENCIA",
     .verdict_none = "SIN RESULTADO",
@@ -190,50 +187,6 @@ constexpr ReportWords kSpanish = {
                  .decimal = ','},
     .decimal = ','};
 
-/// A reason is one sentence; longer texts are not translated, because the library's search
-/// recurses.
-constexpr std::size_t kMaxText = 400;
-
-using Patterns = std::vector<std::pair<std::regex, std::string_view>>;
-const Patterns& Compiled() {
-  static const Patterns patterns = [] {
-    Patterns made;
-    for (const web::Phrase& phrase : web::SpanishPatterns())
-      made.emplace_back(std::regex(std::string(phrase.text)), phrase.words);
-    return made;
-  }();
-  return patterns;
-}
-
-std::optional<std::string> InSpanish(const std::string& text) {
-  if (text.empty() || text.size() > kMaxText) return std::nullopt;
-  const auto phrases = web::SpanishPhrases();
-  const auto found = std::find_if(phrases.begin(), phrases.end(),
-                                  [&](const web::Phrase& phrase) { return phrase.text == text; });
-  if (found != phrases.end()) return std::string(found->words);
-  static const std::regex number(R"(^[+-]?\d+\.\d+$)");
-  if (std::regex_match(text, number)) {
-    std::string comma = text;
-    std::replace(comma.begin(), comma.end(), '.', ',');
-    return comma;
-  }
-  for (const auto& [pattern, words] : Compiled()) {
-    std::smatch match;
-    if (!std::regex_match(text, match, pattern)) continue;
-    std::string said;
-    for (std::size_t i = 0; i < words.size(); ++i) {
-      if (words[i] != '$' || i + 1 == words.size()) {
-        said += words[i];
-        continue;
-      }
-      const std::string part = match.str(static_cast<std::size_t>(words[++i] - '0'));
-      said += InSpanish(part).value_or(part);
-    }
-    return said;
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 const ReportWords& WordsOf(web::Language language) {
@@ -242,7 +195,7 @@ const ReportWords& WordsOf(web::Language language) {
 
 std::string Translated(const std::string& text, web::Language language) {
   if (language == web::Language::kEnglish) return text;
-  return InSpanish(text).value_or(text);
+  return web::InSpanish(text).value_or(text);
 }
 
 }  // namespace plumb

@@ -20,7 +20,7 @@ struct ReportWords {
   std::array<std::string_view, 4> postures;  ///< HFS, HFP, FFS, FFP.
   std::array<std::string_view, 6> axes;
   std::array<std::string_view, 6> short_axes;  ///< With units, as column heads.
-  std::string_view within, unsure, outside, not_known, no_move, insignificant;
+  std::string_view within, unsure, outside, not_known, no_move, scan_again, insignificant;
   std::string_view verdict_reference, verdict_none, verdict_in, verdict_unsure, verdict_move,
       verdict_no_answer;
   std::string_view why_in, why_unsure, why_move;

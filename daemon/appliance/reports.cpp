@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -14,6 +13,7 @@
 #include "daemon/appliance/report_words.hpp"
 #include "daemon/config/version.hpp"
 #include "drivers/files/file_io.hpp"
+#include "web/api/local_time.hpp"
 #include "web/service/limits.hpp"
 
 namespace plumb {
@@ -45,18 +45,8 @@ std::string Said(double value, const ReportWords& words) {
   return text;
 }
 
-/// Local time with its zone.
-std::string TimeOf(web::WallClock::time_point time) {
-  const std::time_t seconds = web::WallClock::to_time_t(time);
-  std::tm local{};
-  ::localtime_r(&seconds, &local);
-  std::array<char, 64> text{};
-  const std::size_t size = std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M %Z", &local);
-  return {text.data(), size};
-}
-
 std::string Footer(const ReportWords& words) {
-  return Filled(words.printed, Version(), TimeOf(web::WallClock::now()));
+  return Filled(words.printed, Version(), web::LocalTimeText(web::WallClock::now()));
 }
 
 ReportTexts TextsOf(const ReportWords& words) {
@@ -130,13 +120,15 @@ std::vector<ReportNumber> NumbersOf(const web::Scan& scan, const web::Tolerance&
   for (std::size_t i = 0; i < words.axes.size(); ++i) {
     const bool is_shift = i < 3;
     const double half = u95[i].value_or(0.0);
+    const double limit = is_shift ? tolerance.shift_mm : tolerance.rotation_deg;
     const bool known = values[i] && std::abs(*values[i]) > half;
+    const bool is_within = values[i] && std::abs(*values[i]) + half <= limit;
     numbers.push_back({.name = std::string(words.axes[i]),
                        .unit = is_shift ? "mm" : "\u00b0",
                        .value = values[i],
                        .u95 = half,
-                       .tolerance = is_shift ? tolerance.shift_mm : tolerance.rotation_deg,
-                       .words = !moves  ? std::string(words.no_move)
+                       .tolerance = limit,
+                       .words = !moves  ? std::string(is_within ? words.no_move : words.scan_again)
                                 : known ? Translated(scan.result->words[i], language)
                                         : std::string(words.insignificant)});
   }
@@ -217,25 +209,25 @@ std::string IsocentreText(const web::ReferencePlan& plan, const ReportWords& wor
 }
 
 void AddReferenceTo(ReportFacts& facts, const web::Reference& reference, const ReportWords& words) {
-  facts.emplace_back(words.reference,
-                     Filled(words.version, reference.version, TimeOf(reference.created_at)));
+  facts.emplace_back(words.reference, Filled(words.version, reference.version,
+                                             web::LocalTimeText(reference.created_at)));
   facts.emplace_back(words.plan, PlanText(reference.plan, words));
   facts.emplace_back(words.tolerance_fact, ToleranceText(reference.plan.tolerance, words));
   facts.emplace_back(words.region, RegionText(reference.plan, words));
   facts.emplace_back(words.isocentre, IsocentreText(reference.plan, words));
   facts.emplace_back(words.planned_by, reference.planned_by);
-  facts.emplace_back(words.approved_by, reference.approved_at
-                                            ? fmt::format("{}, {}", reference.approved_by,
-                                                          TimeOf(*reference.approved_at))
-                                            : std::string(words.not_approved));
+  facts.emplace_back(words.approved_by,
+                     reference.approved_at ? fmt::format("{}, {}", reference.approved_by,
+                                                         web::LocalTimeText(*reference.approved_at))
+                                           : std::string(words.not_approved));
   facts.emplace_back(words.checksum, reference.digest.substr(0, 16));
 }
 
 std::string AcceptedText(const web::Scan& scan, const ReportWords& words) {
   if (scan.accepted_by.empty()) return {};
-  const std::string who = scan.accepted_at
-                              ? fmt::format("{}, {}", scan.accepted_by, TimeOf(*scan.accepted_at))
-                              : scan.accepted_by;
+  const std::string who = scan.accepted_at ? fmt::format("{}, {}", scan.accepted_by,
+                                                         web::LocalTimeText(*scan.accepted_at))
+                                           : scan.accepted_by;
   return scan.accepted_reason.empty() ? Filled(words.accepted_by, who)
                                       : Filled(words.accepted_outside, who, scan.accepted_reason);
 }
@@ -249,7 +241,7 @@ ReportFacts IdentityOf(const web::Scan& scan, const std::optional<web::Patient>&
   add(words.patient, patient ? patient->code : std::string(words.unassigned));
   add(words.site, patient && !patient->site.empty() ? patient->site : "-");
   add(words.fraction, scan.fraction > 0 ? std::to_string(scan.fraction) : "-");
-  add(words.scan, fmt::format("{}, {}", scan.id, TimeOf(scan.started_at)));
+  add(words.scan, fmt::format("{}, {}", scan.id, web::LocalTimeText(scan.started_at)));
   if (reference) AddReferenceTo(facts, *reference, words);
   const std::string accepted = AcceptedText(scan, words);
   add(words.accepted, accepted.empty() ? std::string(words.no) : accepted);
@@ -326,7 +318,7 @@ CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& pat
   for (auto scan = scans.rbegin(); scan != scans.rend(); ++scan) {
     if (scan->outcome != web::ScanOutcome::kDone) continue;
     CourseRow row{.fraction = scan->fraction > 0 ? std::to_string(scan->fraction) : "-",
-                  .when = TimeOf(scan->started_at),
+                  .when = web::LocalTimeText(scan->started_at),
                   .verdict = std::string(VerdictOf(*scan, words)),
                   .accepted = AcceptedText(*scan, words),
                   .values = {}};

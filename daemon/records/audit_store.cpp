@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "daemon/records/audit_subjects.hpp"
 #include "daemon/records/scan_files.hpp"
 #include "daemon/records/stored_values.hpp"
 
@@ -101,6 +102,8 @@ std::vector<web::AuditEntry> AuditStore::Find(const web::AuditQuery& wanted) {
                        .subject = query.Text(5),
                        .detail = query.Text(6)});
   }
+  for (web::AuditEntry& entry : entries)
+    entry.about = DescribeSubject(*lists, entry.action, entry.subject);
   return entries;
 }
 

@@ -35,17 +35,21 @@ std::string DisplayStore::Add(const web::Actor& actor, const web::Display& displ
       .Bind(actor.user)
       .Run();
   const std::string id = std::to_string(change.last_id());
-  change.Log(actor, "display.pair", id, display.name);
+  change.Log(actor, "display.pair", display.name, "");
   change.Commit();
   return id;
 }
 
 void DisplayStore::Remove(const web::Actor& actor, const std::string& id) {
   StoreChange change(database_);
-  change.Prepare("DELETE FROM displays WHERE id = ?").Bind(ParseId(id)).Run();
-  if (change.num_changed() == 0)
-    throw StoreRefusal(ChangeResult::kNotFound, "there is no such display");
-  change.Log(actor, "display.remove", id, "");
+  std::string name;
+  {
+    Statement query = change.Prepare("DELETE FROM displays WHERE id = ? RETURNING name");
+    if (!query.Bind(ParseId(id)).Step())
+      throw StoreRefusal(ChangeResult::kNotFound, "there is no such display");
+    name = query.Text(0);
+  }
+  change.Log(actor, "display.remove", name, "");
   change.Commit();
 }
 

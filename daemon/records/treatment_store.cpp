@@ -60,7 +60,7 @@ std::string TreatmentStore::Open(const web::Actor& actor, const std::string& pat
       .Bind(actor.user)
       .Run();
   const std::string id = std::to_string(change.last_id());
-  change.Log(actor, "session.open", id, "patient " + patient_id + ", " + store::Name(purpose));
+  change.Log(actor, "session.open", id, store::Name(purpose));
   change.Commit();
   return id;
 }

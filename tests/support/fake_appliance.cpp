@@ -398,14 +398,16 @@ void FakeAppliance::RemoveTemplate(const Actor& actor, const std::string& site, 
 void FakeAppliance::AddDisplay(const Actor& actor, const Display& display, Done done) {
   displays.push_back(display);
   displays.back().id = fmt::format("d{:04}", next_id_++);
-  const std::string id = displays.back().id;
-  Did(actor, "display.pair", id, done, id);
+  Did(actor, "display.pair", display.name, done, displays.back().id);
 }
 
 void FakeAppliance::RemoveDisplay(const Actor& actor, const std::string& id, Done done) {
-  if (std::erase_if(displays, [&](const Display& display) { return display.id == id; }) == 0)
+  const auto found = std::ranges::find(displays, id, &Display::id);
+  if (found == displays.end())
     return Finish(done, Refusal(ChangeResult::kNotFound, "no such display"));
-  Did(actor, "display.remove", id, done);
+  const std::string name = found->name;
+  displays.erase(found);
+  Did(actor, "display.remove", name, done);
 }
 
 void FakeAppliance::MakeBackup(const Actor& actor, Done done) {
@@ -459,8 +461,10 @@ std::vector<AuditEntry> FakeAppliance::Audit(const web::AuditQuery& query) {
        entry != audit.rend() && found.size() < static_cast<std::size_t>(query.limit); ++entry) {
     const bool is_view = entry->action.starts_with("view.");
     if ((query.before == 0 || entry->number < query.before) && (query.views || !is_view) &&
-        entry->action.starts_with(query.actions))
+        entry->action.starts_with(query.actions)) {
       found.push_back(*entry);
+      found.back().about = SubjectOf(*entry);
+    }
   }
   return found;
 }

@@ -215,6 +215,8 @@ class FakeAppliance : public web::BackgroundWork,
 
  private:
   [[nodiscard]] static web::Change Refusal(web::ChangeResult result, std::string message);
+  /// As the store describes it; sessions are remembered, all else is looked up.
+  [[nodiscard]] std::optional<web::AuditSubject> SubjectOf(const web::AuditEntry& entry);
   void Finish(const web::Done& done, web::Change change);
   void Did(const web::Actor& actor, const std::string& action, const std::string& subject,
            const web::Done& done, const std::string& id = "");
@@ -232,6 +234,7 @@ class FakeAppliance : public web::BackgroundWork,
   std::string checker_, patient_before_check_;
   int next_id_ = 1;
   std::map<std::string, int> num_fractions_;
+  std::map<std::string, web::TreatmentSession> sessions_;  ///< By id: all that were opened.
 };
 
 }  // namespace plumb::test

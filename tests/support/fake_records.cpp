@@ -137,6 +137,7 @@ void FakeAppliance::OpenPatient(const Actor& actor, const std::string& id, ScanP
                                     .num_scans = 0,
                                     .opened_by = actor.user,
                                     .opened_at = WallClock::now()};
+  sessions_[status.session->id] = *status.session;
   Notify(EventKind::kStatus);
   Did(actor, "session.open", status.session->id, done, status.session->id);
 }
@@ -145,11 +146,43 @@ void FakeAppliance::CloseSession(const Actor& actor, const std::string& session_
   if (status.scan) return Finish(done, Refusal(ChangeResult::kConflict, "a scan is running"));
   if (!status.session || (!session_id.empty() && status.session->id != session_id))
     return Finish(done, Refusal(ChangeResult::kConflict, "this session is closed already"));
+  const std::string id = status.session->id;
   status.session.reset();
   status.patient_id.clear();
   status.next_purpose = ScanPurpose::kFraction;
   Notify(EventKind::kStatus);
-  Did(actor, "session.close", "", done);
+  Did(actor, "session.close", id, done);
+}
+
+std::optional<web::AuditSubject> FakeAppliance::SubjectOf(const web::AuditEntry& entry) {
+  const auto begins = [&](const char* action) { return entry.action.starts_with(action); };
+  const auto about = [&](const char* kind, bool exists, const std::string& patient_id, int number) {
+    web::AuditSubject subject;
+    subject.kind = kind;
+    subject.exists = exists;
+    if (const Patient* patient = PatientOf(patient_id)) subject.patient_code = patient->code;
+    subject.number = number;
+    return subject;
+  };
+  const std::string& id = entry.subject;
+  if (id.empty()) return std::nullopt;
+  if (begins("patient.") || entry.action == "view.patient")
+    return about("patient", PatientOf(id) != nullptr, id, 0);
+  if (begins("session.")) {
+    const auto found = sessions_.find(id);
+    if (found == sessions_.end()) return about("session", false, "", 0);
+    return about("session", true, found->second.patient_id, found->second.fraction);
+  }
+  if (begins("reference.") || entry.action == "view.reference") {
+    const auto reference = FindReference(id);
+    if (!reference) return about("reference", false, "", 0);
+    return about("reference", true, reference->patient_id, reference->version);
+  }
+  if (begins("scan.") || entry.action == "view.scan") {
+    const auto scan = FindScan(id);
+    return scan ? about("scan", true, scan->patient_id, 0) : about("scan", false, "", 0);
+  }
+  return std::nullopt;
 }
 
 void FakeAppliance::TellWaiting() {

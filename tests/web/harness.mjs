@@ -82,7 +82,7 @@ export class Harness {
 
   /// Below what is to be approved.
   async sign(page, password = kPassword) {
-    await page.getByRole('region', { name: 'You sign exactly this' }).getByLabel('Your password').fill(password);
+    await page.getByRole('region', { name: 'You are signing exactly this' }).getByLabel('Your password').fill(password);
     await page.getByRole('button', { name: 'Sign and approve' }).click();
   }
 

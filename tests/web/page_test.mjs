@@ -56,7 +56,7 @@ await h.step('a wrong password is refused in words', async () => {
 });
 
 await h.step('roles see only their own screens', async () => {
-  equal(await anna.getByRole('link', { name: 'Log', exact: true }).count(), 0, 'the technician sees no log');
+  equal(await anna.getByRole('link', { name: 'Audit log', exact: true }).count(), 0, 'the technician sees no log');
   await anna.goto(`${h.url}#/audit`);
   await anna.getByText('Your role cannot open this page.').waitFor();
 });
@@ -171,7 +171,7 @@ await h.step('a physicist plans, a second one approves', async () => {
   await clara.getByText('The daily check is overdue').waitFor({ state: 'detached' });
   equal(await review.getAttribute('aria-disabled'), null, 'it can be approved again');
   await review.click();
-  const signed = clara.getByRole('region', { name: 'You sign exactly this' });
+  const signed = clara.getByRole('region', { name: 'You are signing exactly this' });
   await signed.getByText('4 corners').waitFor();
   equal(await signed.locator('input:not([type=password])').count(), 0, 'the summary is read-only');
   await h.look(clara, 'plan-summary');

@@ -25,7 +25,7 @@ constexpr std::array kDisclosures = {
     Disclosure{"/api/v1/patients/{id}", "view.patient", ""},
     Disclosure{"/api/v1/patients/{id}/references", "view.patient", ""},
     Disclosure{"/api/v1/patients/{id}/scans", "view.patient", ""},
-    Disclosure{"/api/v1/patients/{id}/report.pdf", "", "download.report"},
+    Disclosure{"/api/v1/patients/{id}/report.pdf", "", "download.course_report"},
     Disclosure{"/api/v1/patients/{id}/course.zip", "", "download.course"},
     Disclosure{"/api/v1/patients/{id}/numbers.csv", "", "download.numbers"},
     Disclosure{"/api/v1/patients/{id}/numbers.json", "", "download.numbers"},

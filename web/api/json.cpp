@@ -293,9 +293,18 @@ Json ToJson(const User& user) {
 }
 
 Json ToJson(const AuditEntry& entry) {
-  return {{"number", entry.number},   {"time", TimeText(entry.time)}, {"user", entry.user},
-          {"address", entry.address}, {"action", entry.action},       {"subject", entry.subject},
-          {"detail", entry.detail}};
+  Json json = {{"number", entry.number}, {"time", TimeText(entry.time)},
+               {"user", entry.user},     {"address", entry.address},
+               {"action", entry.action}, {"subject", entry.subject},
+               {"detail", entry.detail}, {"about", nullptr}};
+  if (const auto& about = entry.about) {
+    json["about"] = {{"kind", about->kind},
+                     {"exists", about->exists},
+                     {"patient_code", TextOrNull(about->patient_code)},
+                     {"number", about->number > 0 ? Json(about->number) : Json(nullptr)},
+                     {"time", about->time ? Json(TimeText(*about->time)) : Json(nullptr)}};
+  }
+  return json;
 }
 
 Json ToJson(const Settings& settings) {

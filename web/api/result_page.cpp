@@ -7,61 +7,80 @@
 
 #include "web/api/api.hpp"
 #include "web/api/json.hpp"
+#include "web/api/local_time.hpp"
+#include "web/api/result_words.hpp"
 #include "web/assets/assets.hpp"
+#include "web/assets/spanish.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/gate.hpp"
 
 namespace plumb::web {
 namespace {
 
-constexpr std::string_view kNotice =
-    "Research use only. Not a medical device. Do not use to position patients for treatment or to "
-    "replace image guidance.";
 constexpr std::chrono::minutes kOldAfter{2};
 constexpr std::chrono::seconds kRefreshEvery{10};
 
+/// A pattern of the words, filled in.
+template <typename... Values>
+std::string Filled(std::string_view pattern, const Values&... values) {
+  return fmt::format(fmt::runtime(pattern), values...);
+}
+
+/// Words of the appliance, in the page's language, for HTML.
+std::string Said(const std::string& text, const ResultWords& words) {
+  const bool is_spanish = &words == &ResultWordsOf(Language::kSpanish);
+  return EscapeHtml(is_spanish ? InSpanish(text).value_or(text) : text);
+}
+
 struct NumberRow {
-  const char* name;
   const char* unit;
   std::optional<double> value, u95;
 };
 
 std::array<NumberRow, 6> Rows(const SixNumbers& value, const SixNumbers& u95) {
-  return {NumberRow{"vertical", "mm", value.vertical_mm, u95.vertical_mm},
-          NumberRow{"longitudinal", "mm", value.longitudinal_mm, u95.longitudinal_mm},
-          NumberRow{"lateral", "mm", value.lateral_mm, u95.lateral_mm},
-          NumberRow{"pitch", "\xC2\xB0", value.pitch_deg, u95.pitch_deg},
-          NumberRow{"roll", "\xC2\xB0", value.roll_deg, u95.roll_deg},
-          NumberRow{"yaw", "\xC2\xB0", value.yaw_deg, u95.yaw_deg}};
+  return {NumberRow{"mm", value.vertical_mm, u95.vertical_mm},
+          NumberRow{"mm", value.longitudinal_mm, u95.longitudinal_mm},
+          NumberRow{"mm", value.lateral_mm, u95.lateral_mm},
+          NumberRow{"\xC2\xB0", value.pitch_deg, u95.pitch_deg},
+          NumberRow{"\xC2\xB0", value.roll_deg, u95.roll_deg},
+          NumberRow{"\xC2\xB0", value.yaw_deg, u95.yaw_deg}};
 }
 
-/// @param refresh  Reloads the page, without counting as use, because its content may be outdated.
-std::string Document(const std::string& body, const std::string& refresh = "") {
+/// @param query      Query of this page, for the link to it in the other language.
+/// @param refreshes  Reloads the page, without counting as use, because its content may be
+/// outdated.
+std::string Document(const ResultWords& words, const std::string& body, const std::string& query,
+                     bool refreshes = false) {
   std::string style;
   for (const Asset& asset : Assets()) {
     if (asset.type.starts_with("text/css"))
       style += fmt::format("<link rel=\"stylesheet\" href=\"{}\">", asset.path);
   }
   return fmt::format(
-      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-      "content=\"width=device-width\">"
-      "<title>Plumb result</title>{}{}</head><body class=\"plain\"><aside class=\"notice\" "
-      "aria-label=\"Notice\"><p>{}</p></aside><main>{}</main></body></html>",
-      refresh.empty() ? ""
-                      : fmt::format("<meta http-equiv=\"refresh\" content=\"{};url={}\">",
-                                    kRefreshEvery.count(), refresh),
-      style, kNotice, body);
+      "<!doctype html><html lang=\"{}\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+      "content=\"width=device-width\"><title>{}</title>{}{}</head><body class=\"plain\">"
+      "<aside class=\"notice\" aria-label=\"{}\"><p>{}</p></aside><main>{}"
+      "<p class=\"languages\"><a href=\"/result?{}language={}\" lang=\"{}\" hreflang=\"{}\">{}"
+      "</a></p></main></body></html>",
+      words.code, words.title,
+      refreshes ? fmt::format("<meta http-equiv=\"refresh\" "
+                              "content=\"{};url=/result?again&amp;language={}\">",
+                              kRefreshEvery.count(), words.code)
+                : "",
+      style, words.notice_label, words.notice, body, query, words.other_code, words.other_code,
+      words.other_code, words.other);
 }
 
-std::string LoginForm(std::string_view trouble) {
+std::string LoginForm(const ResultWords& words, std::string_view trouble) {
   return fmt::format(
-      "<h1>Log in</h1>{}<form method=\"post\" action=\"/login\" class=\"card form\">"
-      "<label>Name <input name=\"name\" autocomplete=\"username\" required "
+      "<h1>{}</h1>{}<form method=\"post\" action=\"/login\" class=\"card form\">"
+      "<label>{} <input name=\"name\" autocomplete=\"username\" required "
       "maxlength=\"32\"></label>"
-      "<label>Password <input name=\"password\" type=\"password\" "
+      "<label>{} <input name=\"password\" type=\"password\" "
       "autocomplete=\"current-password\" required maxlength=\"128\"></label>"
-      "<button class=\"primary\">Log in</button></form>",
-      trouble.empty() ? "" : fmt::format("<p role=\"alert\">{}</p>", trouble));
+      "<button class=\"primary\">{}</button></form>",
+      words.log_in, trouble.empty() ? "" : fmt::format("<p role=\"alert\">{}</p>", trouble),
+      words.name, words.password, words.log_in);
 }
 
 /// Decimals that the uncertainty justifies: none below its first digit.
@@ -70,89 +89,95 @@ int DigitsOf(double u95, int most) {
   return std::clamp(static_cast<int>(-std::floor(std::log10(u95) + 1e-9)), 0, most);
 }
 
+/// With the decimal sign of the language.
+std::string Localized(std::string number, const ResultWords& words) {
+  std::replace(number.begin(), number.end(), '.', words.decimal);
+  return number;
+}
+
 /// A row of the table. Only the verdict MOVE asks for moves.
-std::string NumberCells(const NumberRow& row, const std::string& words, double tolerance,
-                        bool moves) {
+std::string NumberCells(const NumberRow& row, std::string_view name, const std::string& direction,
+                        double tolerance, bool moves, const ResultWords& words) {
   if (!row.value)
     return fmt::format(
-        "<tr><th scope=\"row\">{}</th><td>not known</td><td></td><td></td><td></td>"
-        "<td></td></tr>",
-        row.name);
+        "<tr><th scope=\"row\">{}</th><td>{}</td><td></td><td></td><td></td><td></td></tr>", name,
+        words.not_known);
   const double value = *row.value, u95 = row.u95.value_or(0.0), size = std::abs(value);
   const int most = std::string_view(row.unit) == "mm" ? 1 : 2;
   const int digits = DigitsOf(u95, most);
   const bool is_zero = size < 0.5 * std::pow(10.0, -digits);  // no sign, no direction
   const bool in = size + u95 <= tolerance, unsure = !in && size <= tolerance;
-  const std::string direction = !moves        ? "no move needed"
-                                : is_zero     ? "no change"
-                                : size <= u95 ? "below its uncertainty"
-                                              : EscapeHtml(words);
+  const std::string way = !moves        ? std::string(unsure ? words.scan_again : words.no_move)
+                          : is_zero     ? std::string(words.no_change)
+                          : size <= u95 ? std::string(words.insignificant)
+                                        : Said(direction, words);
+  const std::string shown =
+      is_zero ? fmt::format("{:.{}f}", 0.0, digits) : fmt::format("{:+.{}f}", value, digits);
   return fmt::format(
-      "<tr><th scope=\"row\">{}</th><td>{}</td><td>\xC2\xB1 {:.{}f}</td><td>\xC2\xB1 {:g}</td>"
+      "<tr><th scope=\"row\">{}</th><td>{} {}</td><td>\xC2\xB1 {}</td><td>\xC2\xB1 {}</td>"
       "<td>{}</td><td>{}</td></tr>",
-      row.name,
-      is_zero ? fmt::format("{:.{}f} {}", 0.0, digits, row.unit)
-              : fmt::format("{:+.{}f} {}", value, digits, row.unit),
-      u95, most, tolerance,
-      in       ? "in tolerance"
-      : unsure ? "not surely within"
-               : "outside tolerance",
-      direction);
+      name, Localized(shown, words), row.unit, Localized(fmt::format("{:.{}f}", u95, most), words),
+      Localized(fmt::format("{:g}", tolerance), words),
+      in       ? words.within
+      : unsure ? words.not_surely
+               : words.outside,
+      way);
+}
+
+/// @param review  The page is for reading or printing, or the result can no longer be acted on.
+std::string_view TableTitle(const std::string& verdict, bool review, const ResultWords& words) {
+  if (verdict == "move") return review ? words.found_then : words.to_apply;
+  if (verdict == "in_tolerance") return review ? words.remained_then : words.remaining;
+  return review ? words.measured_then : words.measured;
 }
 
 /// A correction without an answer must not be applied, so it is left out.
-/// @param review  The page is for reading or printing, or the result can no longer be acted on.
-std::string NumbersTable(const ResultSummary& result, const Tolerance& tolerance, bool review) {
+std::string NumbersTable(const ResultSummary& result, const Tolerance& tolerance, bool review,
+                         const ResultWords& words) {
   if (!result.correction || result.verdict == "no_answer") return "";
-  const bool moves = result.verdict == "move";
-  std::string rows;
+  std::string rows, heads;
   std::size_t i = 0;
   for (const NumberRow& row : Rows(*result.correction, result.u95.value_or(SixNumbers{}))) {
-    rows += NumberCells(row, result.words[i], i < 3 ? tolerance.shift_mm : tolerance.rotation_deg,
-                        moves);
+    rows += NumberCells(row, words.axes[i], result.words[i],
+                        i < 3 ? tolerance.shift_mm : tolerance.rotation_deg,
+                        result.verdict == "move", words);
     ++i;
   }
+  for (const std::string_view head : words.heads)
+    heads += fmt::format("<th scope=\"col\">{}</th>", head);
   return fmt::format(
-      "<table><caption>{}</caption><thead><tr><th scope=\"col\">axis</th><th "
-      "scope=\"col\">value</th><th scope=\"col\">95 %</th><th scope=\"col\">tolerance</th><th "
-      "scope=\"col\">judgement</th><th scope=\"col\">direction</th></tr></thead><tbody>{}</tbody>"
-      "</table>",
-      moves && review ? "Correction found then, at the isocentre: not to be applied now"
-      : moves         ? "Correction to apply at the isocentre"
-      : review        ? "Difference that remained then, at the isocentre"
-                      : "Remaining difference at the isocentre: no move needed",
-      rows);
+      "<table><caption>{}</caption><thead><tr>{}</tr></thead><tbody>{}</tbody></table>",
+      TableTitle(result.verdict, review, words), heads, rows);
 }
 
-std::string BodyList(const ResultSummary& result) {
+std::string BodyList(const ResultSummary& result, const ResultWords& words) {
   if (!result.correction || result.verdict == "no_answer") return "";
-  const auto list = [](const char* title, const std::vector<std::string>& words) {
+  const auto list = [&](std::string_view title, const std::vector<std::string>& parts) {
     std::string items;
-    for (const std::string& text : words) items += fmt::format("<li>{}</li>", EscapeHtml(text));
-    return fmt::format(
-        "<h3>{}</h3><ul class=\"findings\">{}</ul>", title,
-        items.empty() ? "<li class=\"fine-part\">as in the reference, within 3 mm</li>" : items);
+    for (const std::string& part : parts) items += fmt::format("<li>{}</li>", Said(part, words));
+    if (items.empty()) items = fmt::format("<li class=\"fine-part\">{}</li>", words.as_reference);
+    return fmt::format("<h3>{}</h3><ul class=\"findings\">{}</ul>", title, items);
   };
-  return "<h2>Where on the body</h2>" + list("Now", result.body_now) +
-         list("Posture difference that remains after the shift", result.body_after);
+  return fmt::format("<h2>{}</h2>", words.where) + list(words.after, result.body_after) +
+         list(words.now, result.body_now);
 }
 
-std::string Pictures(const Scan& scan) {
+std::string Pictures(const Scan& scan, const ResultWords& words) {
   std::error_code ignored;
   if (!std::filesystem::exists(scan.folder / "result/error_map.png", ignored)) return "";
   return fmt::format(
-      "<figure><img src=\"/api/v1/scans/{0}/files/error_map.png\" alt=\"Map of height errors, "
-      "current minus reference\"></figure>"
-      "<figure><img src=\"/api/v1/scans/{0}/files/overlay.png\" alt=\"Reference blue, current "
-      "red\"></figure>",
-      scan.id);
+      "<figure><img src=\"/api/v1/scans/{0}/files/error_map.png\" alt=\"{1}\"></figure>"
+      "<figure><img src=\"/api/v1/scans/{0}/files/overlay.png\" alt=\"{2}\"></figure>",
+      scan.id, words.map, words.overlay);
 }
 
-std::string VerdictText(const std::string& verdict, bool review) {
-  if (verdict == "in_tolerance") return review ? "WAS IN TOLERANCE" : "IN TOLERANCE";
-  if (verdict == "unsure") return review ? "WAS NOT SURELY WITHIN" : "NOT SURELY WITHIN";
-  if (verdict == "move") return review ? "WAS OUTSIDE TOLERANCE" : "MOVE";
-  return "NO ANSWER";
+std::string_view VerdictText(const std::string& verdict, bool review, const ResultWords& words) {
+  const VerdictWords* said = verdict == "in_tolerance" ? &words.in_tolerance
+                             : verdict == "unsure"     ? &words.unsure
+                             : verdict == "move"       ? &words.move
+                                                       : nullptr;
+  if (said == nullptr) return words.no_answer;
+  return review ? said->then : said->now;
 }
 
 /// Content of the page.
@@ -162,66 +187,88 @@ struct Records {
   ScanService& scans;
 };
 
+/// What was requested.
+struct Wanted {
+  std::optional<std::string> scan;  ///< Number of the scan to read or print; not set: the newest.
+  bool runs = false;                ///< A new scan is running or being computed.
+  const ResultWords& words;
+};
+
+std::string AcceptedLine(const Scan& scan, const ResultWords& words) {
+  if (scan.accepted_by.empty()) return "";
+  const std::string who =
+      EscapeHtml(scan.accepted_by) +
+      (scan.accepted_at ? ", " + LocalTimeText(*scan.accepted_at) : std::string());
+  return fmt::format("<p>{}</p>",
+                     scan.accepted_reason.empty()
+                         ? Filled(words.accepted_by, who)
+                         : Filled(words.accepted_outside, who, EscapeHtml(scan.accepted_reason)));
+}
+
+/// Patient, number and age of the scan, and who accepted it.
 /// @param newer  A later scan without a result; null if there is none.
-/// @param runs   A new scan is running or being computed.
-/// @param named  Requested by its number, for reading or printing.
-std::string ResultBody(const Records& records, const Scan& scan, const Scan* newer, bool runs,
-                       bool named) {
+std::string Identity(const Records& records, const Scan& scan, const Scan* newer, bool old,
+                     const Wanted& wanted) {
+  const ResultWords& words = wanted.words;
   const auto patient = records.patients.FindPatient(scan.patient_id);
-  const auto reference = records.references.FindReference(scan.reference_id);
+  const auto age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
+  const std::string when =
+      age >= age.zero()
+          ? Filled(words.ago_min, std::chrono::floor<std::chrono::minutes>(age).count())
+          : std::string(words.ago_unknown);
+  std::string text;
+  if (newer != nullptr) {
+    text += fmt::format(
+        "<p role=\"alert\">{}</p>",
+        Filled(words.newer_failed, LocalTimeText(newer->started_at), Said(newer->failure, words)));
+  }
+  if (wanted.runs) text += fmt::format("<p role=\"alert\">{}</p>", words.running);
+  text += fmt::format(
+      "<h1>{}</h1><p>{}{}{}</p>",
+      patient ? Filled(words.patient, EscapeHtml(patient->code)) : std::string(words.no_patient),
+      scan.fraction > 0 ? Filled(words.fraction, scan.fraction) + " " : "",
+      Filled(words.scan_line, EscapeHtml(scan.id), LocalTimeText(scan.started_at), when),
+      old ? fmt::format(" <strong>{}</strong>", words.old) : "");
+  text += AcceptedLine(scan, words);
+  if (scan.check_overdue) text += fmt::format("<p>{}</p>", words.overdue);
+  return text;
+}
+
+std::string ResultBody(const Records& records, const Scan& scan, const Scan* newer,
+                       const Wanted& wanted) {
+  const ResultWords& words = wanted.words;
   const auto age = WallClock::now() - scan.finished_at.value_or(scan.started_at);
   const bool is_known = age >= age.zero();  // otherwise the clock has stepped
-  const bool old = !is_known || age > kOldAfter || newer != nullptr || runs;
-  const std::string when =
-      is_known ? fmt::format("{} min ago", std::chrono::floor<std::chrono::minutes>(age).count())
-               : "at an unknown time: the clock has stepped";
-  std::string body;
-  if (newer != nullptr) {
-    body += fmt::format(
-        "<p role=\"alert\"><strong>NO ANSWER</strong> from the last scan, of {}: {} What follows "
-        "is from before it.</p>",
-        TimeText(newer->started_at), EscapeHtml(newer->failure));
-  }
-  if (runs)
-    body +=
-        "<p role=\"alert\"><strong>A new scan is running.</strong> What follows is no longer "
-        "valid.</p>";
-  body += fmt::format("<h1>Patient {}</h1><p>Scan {} of {}, {}.{}</p>",
-                      patient ? EscapeHtml(patient->code) : "none", EscapeHtml(scan.id),
-                      TimeText(scan.started_at), when,
-                      old ? " <strong>OLD: do not act on it.</strong>" : "");
-  if (!scan.accepted_by.empty())
-    body += fmt::format("<p>Accepted by {}{}{}.</p>", EscapeHtml(scan.accepted_by),
-                        scan.accepted_at ? ", " + TimeText(*scan.accepted_at) : "",
-                        scan.accepted_reason.empty()
-                            ? ""
-                            : " outside tolerance: " + EscapeHtml(scan.accepted_reason));
-  if (scan.check_overdue) body += "<p>The daily check was overdue at this scan.</p>";
+  const bool old = !is_known || age > kOldAfter || newer != nullptr || wanted.runs;
+  std::string body = Identity(records, scan, newer, old, wanted);
   if (scan.outcome != ScanOutcome::kDone)
     return body + fmt::format(
-                      "<section class=\"old\"><p class=\"verdict no_answer\">NO "
-                      "ANSWER</p><p>{}</p></section>",
-                      EscapeHtml(scan.failure));
+                      "<section class=\"old\"><p class=\"verdict no_answer\">{}</p>"
+                      "<p>{}</p></section>",
+                      words.no_answer, Said(scan.failure, words));
+  const auto reference = records.references.FindReference(scan.reference_id);
   if (reference)
-    body += fmt::format("<p>Reference version {} of {}, approved by {}.</p>", reference->version,
-                        TimeText(reference->created_at), EscapeHtml(reference->approved_by));
-  if (!scan.result) return body + "<p>No comparison: this scan has no reference.</p>";
+    body += fmt::format("<p>{}</p>", Filled(words.reference_line, reference->version,
+                                            LocalTimeText(reference->created_at),
+                                            EscapeHtml(reference->approved_by)));
+  if (!scan.result) return body + fmt::format("<p>{}</p>", words.no_reference);
   const std::string& verdict = scan.result->verdict;
-  const bool review = old || named;
+  const bool review = old || wanted.scan.has_value();
   body += fmt::format("<section class=\"{}\"><p class=\"verdict {}\">{}</p>", old ? "old" : "fresh",
-                      EscapeHtml(scan.result->verdict), VerdictText(verdict, review));
+                      EscapeHtml(verdict), VerdictText(verdict, review, words));
   for (const std::string& reason : scan.result->reasons)
-    body += fmt::format("<p>{}</p>", EscapeHtml(reason));
+    body += fmt::format("<p>{}</p>", Said(reason, words));
   return body +
-         NumbersTable(*scan.result, reference ? reference->plan.tolerance : Tolerance{}, review) +
-         BodyList(*scan.result) + Pictures(scan) + "</section>";
+         NumbersTable(*scan.result, reference ? reference->plan.tolerance : Tolerance{}, review,
+                      words) +
+         BodyList(*scan.result, words) + Pictures(scan, words) + "</section>";
 }
 
 /// The newest completed scan if none is named; a later failed one is mentioned.
-Response ResultPage(const Records& records, const std::optional<std::string>& wanted, bool runs) {
+Response ResultPage(const Records& records, const Wanted& wanted) {
   std::optional<Scan> scan, failed;
-  if (wanted) {
-    scan = records.scans.FindScan(*wanted);
+  if (wanted.scan) {
+    scan = records.scans.FindScan(*wanted.scan);
   } else {
     for (Scan& candidate : records.scans.Scans("", 20)) {
       if (candidate.outcome == ScanOutcome::kFailed && !failed) failed = candidate;
@@ -234,11 +281,39 @@ Response ResultPage(const Records& records, const std::optional<std::string>& wa
   Response response;
   response.type = "text/html; charset=utf-8";
   // A page for a named scan is read or printed, so it does not reload itself.
-  response.body = Document(
-      scan ? ResultBody(records, *scan, failed ? &*failed : nullptr, runs, wanted.has_value())
-           : "<h1>No result yet</h1>",
-      wanted ? "" : "/result?again");
+  response.body =
+      Document(wanted.words,
+               scan ? ResultBody(records, *scan, failed ? &*failed : nullptr, wanted)
+                    : fmt::format("<h1>{}</h1>", wanted.words.none),
+               scan && wanted.scan ? fmt::format("scan={}&amp;", scan->id) : "", !wanted.scan);
   if (scan) response.about = scan->id;
+  return response;
+}
+
+/// As the address says ("?language=es"), else as the browser does.
+Language LanguageOf(const Request& request) {
+  const auto found = request.query.find("language");
+  if (found == request.query.end()) return PreferredLanguage(request.Header("accept-language"));
+  return found->second == "es" ? Language::kSpanish : Language::kEnglish;
+}
+
+/// @param why_none  Why nobody can log in; empty: they can.
+Response LoginPage(const Request& request, const ResultWords& words, const std::string& why_none) {
+  Response response;
+  response.type = "text/html; charset=utf-8";
+  if (!why_none.empty()) {
+    response.status = 503;
+    response.body = Document(words,
+                             fmt::format("<h1>{}</h1><p role=\"alert\">{}</p>", words.out_of_order,
+                                         Filled(words.nobody_can, Said(why_none, words))),
+                             "");
+    return response;
+  }
+  response.body = Document(words,
+                           LoginForm(words, request.query.contains("failed")  ? words.wrong_password
+                                            : request.query.contains("first") ? words.first_password
+                                                                              : ""),
+                           "");
   return response;
 }
 
@@ -246,37 +321,23 @@ Response ResultPage(const Records& records, const std::optional<std::string>& wa
 
 void AddResultPage(Router& router, const Services& services) {
   const Records records{services.patients, services.references, services.scans};
-  router.Add(
-      {"GET", "/result", Permission::kNone, BodyKind::kNone,
-       [records, &appliance = services.appliance, &accounts = services.accounts,
-        &background = services.background](const Request& request, const Respond& respond) {
-         if (!request.session) {
-           Response response;
-           response.type = "text/html; charset=utf-8";
-           if (const std::string why = accounts.WhyUnreadable(); !why.empty()) {
-             response.status = 503;
-             response.body =
-                 Document(fmt::format("<h1>Out of order</h1><p role=\"alert\">Nobody can log in or "
-                                      "scan until this is put right: {}</p>",
-                                      EscapeHtml(why)));
-             return respond(std::move(response));
-           }
-           response.body = Document(LoginForm(
-               request.query.contains("failed")  ? "Name or password is wrong."
-               : request.query.contains("first") ? "Somebody else chose this password: log in on "
-                                                   "the page with script once, and change it."
-                                                 : ""));
-           return respond(std::move(response));
-         }
-         const auto named = request.query.find("scan");
-         const auto wanted =
-             named == request.query.end() ? std::nullopt : std::optional(named->second);
-         const ApplianceState state = appliance.GetStatus().state;
-         const bool runs = state == ApplianceState::kScanning || state == ApplianceState::kWorking;
-         RespondAside(
-             background, "GET /result",
-             [records, wanted, runs] { return ResultPage(records, wanted, runs); }, respond);
-       }});
+  router.Add({"GET", "/result", Permission::kNone, BodyKind::kNone,
+              [records, &appliance = services.appliance, &accounts = services.accounts,
+               &background = services.background](const Request& request, const Respond& respond) {
+                const ResultWords& words = ResultWordsOf(LanguageOf(request));
+                if (!request.session)
+                  return respond(LoginPage(request, words, accounts.WhyUnreadable()));
+                const auto named = request.query.find("scan");
+                const ApplianceState state = appliance.GetStatus().state;
+                const Wanted wanted{
+                    .scan =
+                        named == request.query.end() ? std::nullopt : std::optional(named->second),
+                    .runs = state == ApplianceState::kScanning || state == ApplianceState::kWorking,
+                    .words = words};
+                RespondAside(
+                    background, "GET /result",
+                    [records, wanted] { return ResultPage(records, wanted); }, respond);
+              }});
 }
 
 }  // namespace plumb::web

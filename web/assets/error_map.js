@@ -106,6 +106,7 @@ function row(view, ...children) {
   return element;
 }
 
+const kHole_m = 0.05;
 const kAround = 2;  // cells to each side: what is read is the surface, not one cell's noise
 function around({ width, values }, cell) {
   const known = [];
@@ -144,6 +145,12 @@ async function loadAll(scan, reference, place) {
   return { grid, before, region, heights };
 }
 
+/// The middle of the hole for which there is no answer: where to sweep again.
+function holeOf({ result, details }) {
+  const { largest_hole_m: size = 0, hole_centre_m: middle } = details?.region ?? {};
+  return result?.verdict === 'no_answer' && size > kHole_m ? middle : null;
+}
+
 /// Figure with map, reading and profile for a scan with a result; falls back to the picture.
 /// @param place  Shows the progress meanwhile.
 export async function errorMap(scan, reference, tolerance_mm, place) {
@@ -174,7 +181,8 @@ export async function errorMap(scan, reference, tolerance_mm, place) {
   const shown = { map: 'before', along: 0 };
   const y_min = view.y_max - view.height;
   const cursor = { x: view.x_min + view.width / 2, y: y_min + view.height / 2 };
-  if (isocentre) [cursor.x, cursor.y] = isocentre;
+  const hole = holeOf(scan);
+  if (hole ?? isocentre) [cursor.x, cursor.y] = hole ?? isocentre;
 
   const read = () => {
     const cell = cellAt(grid, cursor.x, cursor.y);

@@ -107,7 +107,8 @@ function card(axis, { correction, u95, words }, tolerance, { weak, commands, pic
   const zero = printsAsZero(value, digits);
   const still = isStill(value, half, mostDigits(axis));
   const directed = commands && !still;
-  const word = !commands ? text.noMove : zero ? text.still : still ? text.insignificant
+  const told = judged === 'unsure' ? text.scanAgain : text.noMove;
+  const word = !commands ? told : zero ? text.still : still ? text.insignificant
     : translated(words?.[axis.name]) ?? S.none;
   return h('li', { class: `number ${kWords[judged]}${commands ? '' : ' told'}` },
     h('h3', {}, name), directed && pictured && drawing(axis.name, value),

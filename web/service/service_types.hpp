@@ -310,6 +310,15 @@ struct UserChange {
   std::optional<std::string> expected_hash;
 };
 
+/// What people know of an entry's subject, as the records are now.
+struct AuditSubject {
+  std::string kind;          ///< "patient", "session", "scan", "reference" or "check".
+  bool exists = false;       ///< False: it was deleted since.
+  std::string patient_code;  ///< Empty: none.
+  int number = 0;            ///< Of a session its fraction, of a reference its version; 0: none.
+  std::optional<WallClock::time_point> time = {};  ///< Of a check.
+};
+
 struct AuditEntry {
   std::int64_t number = 0;  ///< Assigned by the store; increases.
   WallClock::time_point time;
@@ -318,6 +327,7 @@ struct AuditEntry {
   std::string action;   ///< "login", "reference.approve".
   std::string subject;  ///< Id of the changed object.
   std::string detail;
+  std::optional<AuditSubject> about = {};  ///< Of the subject; nothing: its id is what people know.
 };
 
 struct Settings {

@@ -2,11 +2,13 @@
 #include <gmock/gmock.h>
 
 #include "tests/unit/web/web_fixture.hpp"
+#include "web/api/result_words.hpp"
 
 namespace plumb::test {
 namespace {
 
 using std::chrono::seconds;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -69,6 +71,69 @@ TEST_F(ResultPageTest, WhileAScanRunsTheOneBeforeItIsOld) {
   EXPECT_EQ(client_->Post("/api/v1/press").status, 200);
   EXPECT_THAT(Page(), HasSubstr("A new scan is running."));
   EXPECT_THAT(Page(), HasSubstr(kOld));
+}
+
+TEST_F(ResultPageTest, ItSpeaksTheBrowsersLanguageOrTheOneThatIsAskedFor) {
+  Add("s1", seconds(90));
+  loop_->Do([&] {
+    web::ResultSummary& result = *service_.scans.back().result;
+    result.verdict = "move";
+    result.correction.emplace().vertical_mm = -8.04;
+    result.u95.emplace().vertical_mm = 0.9;
+    result.u95->pitch_deg = 0.14;
+    result.words[0] = "down";
+    result.body_after = {"left shoulder 9 mm high"};
+  });
+  EXPECT_THAT(Page(), AllOf(HasSubstr("<html lang=\"en\">"), HasSubstr("-8.0 mm"),
+                            HasSubstr("<td>down</td>"), HasSubstr(">MOVE<")));
+  client_->extra_headers["Accept-Language"] = "fr, es-MX;q=0.9, en;q=0.8";
+  const std::string spanish = Page();
+  EXPECT_THAT(spanish,
+              AllOf(HasSubstr("<html lang=\"es\">"), HasSubstr("-8,0 mm"), HasSubstr("0,14"),
+                    HasSubstr("<td>abajo</td>"), HasSubstr(">MOVER<"),
+                    HasSubstr("hombro izquierdo: 9 mm demasiado alto"), HasSubstr("hace 1 min"),
+                    HasSubstr("No es un producto sanitario"), HasSubstr("refresh")));
+  for (const char* english : {"MOVE<", "tolerance<", "Scan ", "Patient", "down", "high"})
+    EXPECT_THAT(spanish, Not(HasSubstr(english)));
+  EXPECT_THAT(client_->Get("/result?language=en").body, HasSubstr(">MOVE<"));
+  // The page that asks for itself again stays in the language that was chosen.
+  EXPECT_THAT(client_->Get("/result?again&language=en").body,
+              HasSubstr("/result?again&amp;language=en"));
+  EXPECT_THAT(client_->Get("/result?scan=s1&language=es").body,
+              AllOf(HasSubstr("no la aplique ahora"), Not(HasSubstr("refresh")),
+                    HasSubstr("/result?scan=s1&amp;language=en")));
+  HttpClient stranger(port_);
+  stranger.extra_headers["Accept-Language"] = "es";
+  EXPECT_THAT(stranger.Get("/result?failed=1").body, HasSubstr("Nombre o contraseña incorrectos"));
+}
+
+TEST_F(ResultPageTest, WhatIsNotSurelyWithinAsksForAnotherScan) {
+  Add("s1", seconds(30));
+  loop_->Do([&] {
+    web::ResultSummary& result = *service_.scans.back().result;
+    result.verdict = "unsure";
+    result.correction.emplace().vertical_mm = 2.8;
+    result.correction->longitudinal_mm = 0.5;
+    result.u95.emplace().vertical_mm = 1.2;
+    result.u95->longitudinal_mm = 0.3;
+  });
+  EXPECT_THAT(Page(), AllOf(HasSubstr("<td>not surely within</td><td>scan again</td>"),
+                            HasSubstr("<td>in tolerance</td><td>no move needed</td>"),
+                            HasSubstr("Measured difference"), Not(HasSubstr("to apply"))));
+}
+
+TEST(PreferredLanguage, TheHigherWeightCounts) {
+  using web::Language;
+  using web::PreferredLanguage;
+  EXPECT_EQ(PreferredLanguage(""), Language::kEnglish);
+  EXPECT_EQ(PreferredLanguage("fr"), Language::kEnglish);
+  EXPECT_EQ(PreferredLanguage("es"), Language::kSpanish);
+  EXPECT_EQ(PreferredLanguage("ES-ar"), Language::kSpanish);
+  EXPECT_EQ(PreferredLanguage("est"), Language::kEnglish) << "Estonian";
+  EXPECT_EQ(PreferredLanguage("en;q=0.5, es;q=0.6"), Language::kSpanish);
+  EXPECT_EQ(PreferredLanguage("en;q=0.6, es;q=0.5"), Language::kEnglish);
+  EXPECT_EQ(PreferredLanguage("es;q=0"), Language::kEnglish);
+  EXPECT_EQ(PreferredLanguage("es;q=x,,;"), Language::kEnglish);
 }
 
 TEST_F(ResultPageTest, AChangeWhoseSessionEndsWhileItsBodyComesIsRefused) {

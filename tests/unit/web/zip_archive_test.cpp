@@ -80,6 +80,9 @@ TEST_F(CourseArchiveTest, HoldsSummaryNumbersAndTheResultsOfComparedScans) {
   scan.folder = folder.path();
   scan.result = web::ResultSummary{};
   scan.result->verdict = "move";
+  scan.result->correction.emplace().vertical_mm = -8.25;
+  scan.accepted_by = "anna";
+  scan.accepted_reason = "=cmd|'/C calc'!A0, \"really\"";
   service_.scans.push_back(scan);
   scan.id = "s6";  // compared, but its files are out of sight
   scan.folder.clear();
@@ -103,6 +106,9 @@ TEST_F(CourseArchiveTest, HoldsSummaryNumbersAndTheResultsOfComparedScans) {
   EXPECT_THAT(files.at("left_out.txt"),
               HasSubstr("s6: its files cannot be used now: its folder is missing\r\n"));
   EXPECT_THAT(files.at("numbers.csv"), HasSubstr("P-0042,s7"));
+  EXPECT_THAT(files.at("numbers.csv"), HasSubstr(",-8.2500,")) << "a number stays one";
+  EXPECT_THAT(files.at("numbers.csv"), HasSubstr(R"("'=cmd|'/C calc'!A0, ""really""")"))
+      << "what a person typed is no formula";
   EXPECT_EQ(service_.report_language, web::Language::kSpanish);
   EXPECT_EQ(client.Get("/api/v1/patients/p1/course.zip?language=fr").status, 400);
   EXPECT_EQ(client.Get("/api/v1/patients/p2/course.zip").status, 404);

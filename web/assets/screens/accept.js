@@ -103,7 +103,10 @@ export function actions(data, reload) {
         class: 'button', download: '',
         href: `/api/v1/scans/${scan.id}/report.pdf?language=${document.documentElement.lang}`,
       }, text.report),
-      scan.result && h('a', { class: 'button', href: `/result?scan=${scan.id}` }, text.print)),
+      scan.result && h('a', {
+        class: 'button',
+        href: `/result?scan=${scan.id}&language=${document.documentElement.lang}`,
+      }, text.print)),
     newReference, files(scan), removeScan(data));
   return { element, tick: accept.tick };
 }

@@ -1,6 +1,6 @@
 // The audit log: what was done, by whom, from where; filtered and taken away as CSV.
 import { get } from '../api.js';
-import { action, checkbox, clear, field, h, redraw, table } from '../dom.js';
+import { action, checkbox, clear, field, h, localTime, redraw, table } from '../dom.js';
 import { S, translated } from '../strings.js';
 
 const kPage = 100;
@@ -43,6 +43,21 @@ export function detailWords({ action: what, detail }) {
   }
 }
 
+/// What an entry is about, as people know it: a code and a number instead of a row of the database.
+export function subjectWords({ subject, about }) {
+  if (!about) return subject;
+  const text = S.audit.about;
+  if (!about.exists) return text.gone(text.kinds[about.kind] ?? about.kind, subject);
+  const words = {
+    patient: () => '',
+    session: () => (about.number ? S.session.fraction(about.number) : S.purposes.reference),
+    scan: () => text.scan(subject),
+    reference: () => text.reference(about.number),
+    check: () => text.check(localTime(about.time)),
+  }[about.kind]?.() ?? subject;
+  return [about.patient_code, words].filter(Boolean).join(', ');
+}
+
 export async function showAudit(place) {
   const text = S.audit;
   const rows = [];  // of words
@@ -68,7 +83,7 @@ export async function showAudit(place) {
       `audit?before=${oldest}&limit=${kPage}&views=${views.box.checked ? 1 : 0}`);
     for (const entry of entries) {
       rows.push([entry.time.replace('T', ' ').replace('Z', ''), entry.user,
-        text.actions[entry.action] ?? entry.action, entry.subject, detailWords(entry),
+        text.actions[entry.action] ?? entry.action, subjectWords(entry), detailWords(entry),
         entry.address]);
       oldest = entry.number;
     }

@@ -17,8 +17,8 @@ export const en = {
   },
   nav: {
     label: 'Sections', menu: 'Menu', status: 'Status', patients: 'Patients', scan: 'Scan',
-    result: 'Result', check: 'Daily check', users: 'Accounts', audit: 'Log', settings: 'Settings',
-    update: 'Update',
+    result: 'Result', check: 'Daily check', users: 'Accounts', audit: 'Audit log',
+    settings: 'Settings', update: 'Update',
   },
   roles: {
     technician: 'Technician', physicist: 'Physicist', engineer: 'Engineer', display: 'Display',
@@ -187,7 +187,6 @@ export const en = {
       saving: 'Saving', checking: 'Checking the markers',
     },
     seconds: (s) => `${s.toFixed(1)} s`,
-    overdueReference: 'The daily check is overdue. Do it before you scan a reference.',
   },
   room: {
     title: 'Room display',
@@ -273,7 +272,7 @@ export const en = {
     couchSet: (axis, cm) => `${axis}: set to ${cm} cm`,
     couchBad: 'a number in cm, with at most two digits after the point',
     refused: 'not known with couch markers', still: 'no change',
-    insignificant: 'below its uncertainty', noMove: 'no move needed',
+    insignificant: 'below its uncertainty', noMove: 'no move needed', scanAgain: 'scan again',
     notSeen: 'uncertain direction',
     uncertainty: (value, unit) => `±${withUnit(value, unit)}`,
     uncertaintyLong: '95 % uncertainty',
@@ -469,7 +468,7 @@ export const en = {
     unsaved: 'There are unsaved changes. Save them before the approval.',
     leave: 'There are unsaved changes. Leave without saving?',
     draftKept: 'Your unsaved changes from before were kept.',
-    summary: 'You sign exactly this', summarySubmit: 'Sign and approve',
+    summary: 'You are signing exactly this', summarySubmit: 'Sign and approve',
     summaryReview: 'Review and approve', signature: 'Checksum', scanQuality: 'Scan quality',
     made: 'Scanned by', planned: 'Planned by', wholeBody: 'the whole body (outlined)',
     middle: 'the middle of the region', roomMarkers: 'fixed to the room',
@@ -491,12 +490,20 @@ export const en = {
     preferences: 'My preferences',
   },
   audit: {
-    title: 'Log', time: 'Time', user: 'Who', address: 'From', action: 'What', subject: 'On',
+    title: 'Audit log', time: 'Time', user: 'Who', address: 'From', action: 'What', subject: 'On',
     detail: 'Detail', more: 'Older entries', empty: 'No entry.', filter: 'Filter',
     filterHint: 'Searches the entries shown below; load older ones to search them too.',
     shown: (found, all) => `${found} of ${all} ${plural(all, 'entry', 'entries')}`,
     csv: 'Download as CSV',
     views: 'Also show who looked at what', yes: 'yes', no: 'no',
+    about: {
+      scan: (id) => `scan ${id}`, reference: (version) => `reference version ${version}`,
+      check: (when) => `check of ${when}`, gone: (kind, id) => `${kind} ${id} (deleted)`,
+      kinds: {
+        patient: 'patient', session: 'session', scan: 'scan', reference: 'reference',
+        check: 'check',
+      },
+    },
     actions: {
       'view.patients': 'List of patients viewed',
       'view.patient': 'Patient viewed',
@@ -506,6 +513,7 @@ export const en = {
       'view.camera': 'Camera picture viewed',
       'view.log': 'Log viewed',
       'download.report': 'Report downloaded',
+      'download.course_report': 'Course summary downloaded',
       'download.numbers': 'Numbers downloaded',
       'download.course': 'Whole course downloaded',
       'download.file': 'File of a scan downloaded',

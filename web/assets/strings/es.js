@@ -8,7 +8,7 @@ const withUnit = (value, unit) => (unit === '°' ? `${value}°` : `${value} ${un
 const compiled = kPatterns.map(([pattern, words]) => [new RegExp(pattern), words]);
 
 /// Words of the appliance in Spanish; nothing where there are none. The server reads the same data:
-/// daemon/appliance/report_words.cpp.
+/// web/assets/spanish.cpp.
 function translate(text) {
   if (typeof text !== 'string' || !text) return undefined;
   if (Object.hasOwn(kWords, text)) return kWords[text];
@@ -37,7 +37,7 @@ export const es = {
   },
   nav: {
     label: 'Secciones', menu: 'Menú', status: 'Estado', patients: 'Pacientes', scan: 'Escanear',
-    result: 'Resultado', check: 'Control diario', users: 'Cuentas', audit: 'Registro',
+    result: 'Resultado', check: 'Control diario', users: 'Cuentas', audit: 'Registro de auditoría',
     settings: 'Ajustes', update: 'Actualización',
   },
   roles: {
@@ -215,7 +215,6 @@ export const es = {
       comparing: 'Comparando', saving: 'Guardando', checking: 'Comprobando los marcadores',
     },
     seconds: (s) => `${s.toFixed(1).replace('.', ',')} s`,
-    overdueReference: 'El control diario está pendiente. Hágalo antes de escanear una referencia.',
   },
   room: {
     title: 'Pantalla de la sala',
@@ -306,6 +305,7 @@ export const es = {
     couchBad: 'un número en cm, con dos cifras decimales como máximo',
     refused: 'no se conoce con marcadores en la camilla', still: 'sin cambio',
     insignificant: 'menor que su incertidumbre', noMove: 'no hay que mover',
+    scanAgain: 'escanear de nuevo',
     notSeen: 'dirección incierta',
     uncertainty: (value, unit) => `±${withUnit(value, unit)}`,
     uncertaintyLong: 'incertidumbre del 95 %',
@@ -541,13 +541,21 @@ export const es = {
     unchanged: 'No se ha cambiado nada.', preferences: 'Mis preferencias',
   },
   audit: {
-    title: 'Registro', time: 'Hora', user: 'Quién', address: 'Desde', action: 'Qué',
+    title: 'Registro de auditoría', time: 'Hora', user: 'Quién', address: 'Desde', action: 'Qué',
     subject: 'Sobre',
     detail: 'Detalle', more: 'Entradas anteriores', empty: 'Ninguna entrada.', filter: 'Filtrar',
     filterHint: 'Busca en las entradas de abajo; cargue las anteriores para buscarlas también.',
     shown: (found, all) => `${found} de ${all} ${plural(all, 'entrada', 'entradas')}`,
     csv: 'Descargar como CSV',
     views: 'Mostrar también quién consultó qué', yes: 'sí', no: 'no',
+    about: {
+      scan: (id) => `escaneo ${id}`, reference: (version) => `referencia, versión ${version}`,
+      check: (when) => `control del ${when}`, gone: (kind, id) => `${kind} ${id} (se borró)`,
+      kinds: {
+        patient: 'paciente', session: 'sesión', scan: 'escaneo', reference: 'referencia',
+        check: 'control',
+      },
+    },
     actions: {
       'view.patients': 'Lista de pacientes consultada',
       'view.patient': 'Paciente consultado',
@@ -557,6 +565,7 @@ export const es = {
       'view.camera': 'Imagen de la cámara consultada',
       'view.log': 'Registro consultado',
       'download.report': 'Informe descargado',
+      'download.course_report': 'Resumen del tratamiento descargado',
       'download.numbers': 'Valores descargados',
       'download.course': 'Tratamiento entero descargado',
       'download.file': 'Archivo de un escaneo descargado',

@@ -1,0 +1,19 @@
+// What an entry of the audit log is about, in the words that people know: a patient's code instead
+// of a row's number.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "daemon/records/database.hpp"
+#include "web/service/service_types.hpp"
+
+namespace plumb {
+
+/// @returns nothing where the subject is what people know already: an account, a file, no subject.
+/// @throws IoError and its kinds
+[[nodiscard]] std::optional<web::AuditSubject> DescribeSubject(Database& database,
+                                                               const std::string& action,
+                                                               const std::string& subject);
+
+}  // namespace plumb
