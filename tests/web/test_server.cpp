@@ -6,8 +6,10 @@
 // result becomes 10 minutes old), quit; of what the next scan shows: markermoved (a check),
 // stranger (another body), shoulder (lifted), across (the body lies across the room's axes), "moved
 // AXIS AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by pitch, roll, yaw by
-// degrees); "room known", "room unknown": what the status says; "moved z 8 HFS bare": as compared
-// where the room is not known.
+// degrees); hole (in the region), shifted (one marker, by 12 mm), weak (roll is not well seen),
+// hurried (a third of the frames lost); "room known", "room unknown": what the status says; "moved
+// z 8 HFS bare": as compared where the room is not known; cold, warm (the sensor); full, emptied
+// (the disk).
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
@@ -18,6 +20,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <sstream>
@@ -97,6 +100,15 @@ SyntheticOptions LiftedShoulder() {
   return lifted;
 }
 
+/// A square of 12 cm on the body was not swept over.
+SyntheticOptions WithHole() {
+  SyntheticOptions hole = At(Pose::Identity(), 7, 0.0008);
+  hole.hidden = [](const Eigen::Vector3d& p) {
+    return (p - kCentre).head<2>().cwiseAbs().maxCoeff() < 0.06;
+  };
+  return hole;
+}
+
 class Recorder {
  public:
   explicit Recorder(fs::path root) : root_(std::move(root)) {}
@@ -115,6 +127,26 @@ class Recorder {
   }
 
   [[nodiscard]] const Scene& reference() const { return *reference_; }
+
+  /// As Record(), of a scene that something was done to.
+  FakeAppliance::Recorded RecordChanged(const SyntheticOptions& options,
+                                        const std::function<void(Scene&)>& change) {
+    Scene scene = SceneOf(options);
+    change(scene);
+    const fs::path folder = NewFolder();
+    WriteScene(scene, folder / "scene");
+    return Write(folder, Compare(*reference_, scene, Options()));
+  }
+
+  /// A motion whose roll the surface hardly determines.
+  FakeAppliance::Recorded RecordWeak() {
+    if (!still_) still_ = Compare(*reference_, SceneOf(At(Pose::Identity(), 6, 0.0)), Options());
+    Comparison comparison = *still_;
+    comparison.motion->weak_directions = {{.name = "roll", .u95 = 0.9, .unit = "deg"}};
+    const fs::path folder = NewFolder();
+    fs::create_directory_symlink(root_ / "sweep_0" / "scene", folder / "scene");
+    return Write(folder, comparison);
+  }
 
   /// A moved body, in a room whose axes are turned by 90 degrees: the plan's posture is not its
   /// own.
@@ -273,6 +305,39 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
         "the daily check is overdue, and references need one that has passed today: "
         "open Daily check, sweep over all markers of the room, then go on here");
   if (name == "checked") service.SetOverdue("");
+  if (name == "cold" || name == "warm") {
+    service.status.sensor.powered_s = name == "cold" ? 120 : 1800;
+    service.status.reference_block =
+        name == "cold" ? "the sensor is still warming up, and references need one that has been on "
+                         "for 15 min: wait, then scan"
+                       : "";
+    service.Notify(web::EventKind::kStatus);
+  }
+  if (name == "full" || name == "emptied") {
+    const bool is_full = name == "full";
+    service.status.state = is_full ? web::ApplianceState::kFault : web::ApplianceState::kReady;
+    service.status.fault_kind = is_full ? web::FaultKind::kStorage : web::FaultKind::kNone;
+    service.status.fault = is_full
+                               ? "the disk is full: 90 MB are free, a scan may need 700; remove "
+                                 "scans that are not wanted"
+                               : "";
+    service.Notify(web::EventKind::kStatus);
+  }
+  if (name == "hole") service.next_recorded = recorder.Record(WithHole());
+  if (name == "shifted")
+    service.next_recorded =
+        recorder.RecordChanged(At(Pose::Identity(), 8, 0.0008), [](Scene& scene) {
+          for (Eigen::Vector3d& corner : scene.markers.at(3).corners)
+            corner.x() += 12 * kMillimetre;
+        });
+  if (name == "weak") service.next_recorded = recorder.RecordWeak();
+  if (name == "hurried")
+    service.next_recorded =
+        recorder.RecordChanged(At(Pose::Identity(), 9, 0.0008), [](Scene& scene) {
+          scene.frames_total = 300;
+          scene.frames_tracked = 200;
+          scene.frames_dropped = 100;
+        });
   if (name == "shoulder") service.next_recorded = recorder.Record(LiftedShoulder());
   if (name == "moved") {
     std::string axis, posture;

@@ -288,6 +288,91 @@ await h.step('a wrong reference is NO ANSWER with its reason, and nothing to app
   equal(await anna.locator('table').count(), 0, 'no numbers in print either');
 });
 
+await h.step('a marker that was moved is named, and not used', async () => {
+  h.tell('shifted');
+  await scan();
+  await anna.locator('.number').first().waitFor();
+  const ignored = anna.locator('.trust > div', { hasText: 'Markers ignored' });
+  equal(await ignored.locator('dd').innerText(), 'marker 3 moved 12 mm', 'which, and how far');
+  await anna.locator('.trust', { hasText: 'Marker 3 moved 12 mm since the reference; ignored.' }).waitFor();
+  await h.look(anna, 'result-marker-moved', { axe: false });
+  h.tell('moved z 8 HFS');
+  await scan();
+  await anna.locator('.trust').waitFor();
+  equal(await ignored.count(), 0, 'where none was moved none is named');
+});
+
+await h.step('a hole in the region is NO ANSWER that says where, and the map is there and marks it', async () => {
+  h.tell('hole');
+  await scan();
+  await anna.locator('.verdict.no_answer').waitFor();
+  check(/hole of 1\d\d mm in the region at x -?[\d.]+ m, y -?[\d.]+ m; at most 50 mm are allowed; sweep over it/
+    .test(await anna.locator('.verdict').innerText()), await anna.locator('.verdict').innerText());
+  equal(await anna.locator('.number').count(), 0, 'no numbers');
+  await anna.locator('.reading', { hasText: 'hole in the region' }).waitFor();
+  await anna.locator('.trust > div.caution', { hasText: 'Largest hole' }).waitFor();
+  await h.look(anna, 'result-hole');
+});
+
+await h.step('a direction that the surface hardly determines says so on its card', async () => {
+  h.tell('weak');
+  await scan();
+  const card = (name) => anna.locator('.number', { has: anna.getByRole('heading', { name, exact: true }) });
+  await card('Roll').getByText('uncertain direction').waitFor();
+  equal(await anna.locator('.number', { hasText: 'uncertain direction' }).count(), 1, 'only that one');
+});
+
+await h.step('a cold sensor and lost frames are said beside the verdict; a cold sensor takes no reference', async () => {
+  const flags = anna.locator('.verdict .flags li');
+  h.tell('checked');
+  h.tell('hurried');
+  await scan();
+  await flags.getByText('33 % of the frames were lost').waitFor();
+  h.tell('cold');
+  await scan();
+  await flags.getByText('The sensor had been on for only 2 min').waitFor();
+  const { body: { session } } = await h.api(anna, 'status');
+  await anna.goto(`${h.url}#/patient/${session.patient_id}`);
+  await anna.getByText('The sensor is still warming up').waitFor();
+  equal(await anna.getByRole('button', { name: 'Scan a new reference' }).getAttribute('aria-disabled'), 'true', 'blocked');
+  equal(await anna.locator('.reference-block a').count(), 0, 'a daily check would not help');
+  equal((await h.api(anna, `patients/${session.patient_id}/open`, 'POST', { purpose: 'reference', reason: 'colder', replaces: session.id })).status, 409,
+    'the interface refuses too');
+  await h.look(anna, 'patient-cold', { axe: false });
+  h.tell('warm');
+  await anna.getByText('The sensor is still warming up').waitFor({ state: 'detached' });
+  await scan();
+  equal(await flags.count(), 0, 'warm, and no frames lost');
+});
+
+await h.step('a full disk is a fault that says what to do; the approved reference is still there', async () => {
+  h.tell('full');
+  await anna.goto(`${h.url}#/scan`);
+  await anna.locator('.headline', { hasText: 'Fault' }).waitFor();
+  equal(await anna.locator('.guidance').innerText(), 'The disk is full: 90 MB are free, a scan may need 700; remove scans that are not wanted. '
+    + 'Nothing can be scanned until this is fixed.', 'what is wrong and what to do');
+  equal(await anna.locator('.giant').getAttribute('aria-disabled'), 'true', 'nothing to start');
+  const { body: { session } } = await h.api(anna, 'status');
+  await anna.goto(`${h.url}#/patient/${session.patient_id}`);
+  await anna.getByText('approved by clara').waitFor();
+  h.tell('emptied');
+  await anna.goto(`${h.url}#/scan`);
+  await anna.locator('.headline', { hasText: 'Ready' }).waitFor();
+});
+
+await h.step('during a sweep no update is installed', async () => {
+  h.tell('slow');
+  await anna.getByRole('button', { name: 'Start sweep' }).click();
+  await anna.getByRole('button', { name: 'End sweep' }).waitFor();
+  await engineer.goto(`${h.url}#/update`);
+  await engineer.getByRole('button', { name: 'Install plumb-0.2.0.raucb' }).click();
+  await engineer.getByRole('alert').getByText('A scan is running').waitFor();
+  equal((await h.api(anna, 'status')).body.state, 'scanning', 'the sweep goes on');
+  await anna.getByRole('button', { name: 'Discard scan' }).click();
+  await anna.locator('.headline', { hasText: 'Ready' }).waitFor();
+  h.tell('swift');
+});
+
 await h.step('a result that grows old on the screen turns grey and says so', async () => {
   h.tell('moved z 8 HFS');
   await scan();
@@ -461,7 +546,7 @@ await h.step('three roles: what a screen hides the interface refuses', async () 
     [engineer, ['POST', 'patients', { code: 'PX-1', site: '' }], plan, ['POST', 'references/r0001/approve'], ['POST', `scans/${scans[0].id}/accept`], ['DELETE', 'patients/p0001']],
   ];
   for (const [page, ...calls] of kRefused) for (const [method, path, body] of calls) equal((await h.api(page, path, method, body)).status, 403, `${method} ${path}`);
-  for (const [page, allowed] of [[anna, ['Status', 'Patients', 'Scan', 'Result']], [bob, ['Log']], [engineer, ['Log', 'Settings', 'Update']]]) {
+  for (const [page, allowed] of [[anna, ['Status', 'Patients', 'Scan', 'Result']], [bob, ['Audit log']], [engineer, ['Audit log', 'Settings', 'Update']]]) {
     for (const name of allowed) equal(await page.getByRole('navigation').getByRole('link', { name, exact: true }).count(), 1, `${name} is offered`);
   }
   for (const [page, hidden] of [[anna, 'Install'], [bob, 'Install'], [anna, 'Download diagnostics']]) {
