@@ -137,6 +137,17 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
       return bottom;
     });
     check(lowest <= height, `all six in view at ${width}x${height}: down to ${lowest}`);
+    const crowded = await room.evaluate(() => [...document.querySelectorAll('.number')].filter((card) => {
+      const text = document.createRange();
+      text.selectNodeContents(card.querySelector('.value'));
+      const arrow = card.querySelector('.arrow');
+      return arrow && text.getBoundingClientRect().right > arrow.getBoundingClientRect().left;
+    }).map((card) => card.querySelector('.value').textContent));
+    equal(crowded.join(), '', `no arrow lies on its number at ${width}x${height}`);
+    for (const part of ['.room-map .legend', '.room-posture', '.room-age']) {
+      const box = await room.locator(part).boundingBox();
+      check(box.y + box.height <= height, `${part} in view at ${width}x${height}: down to ${box.y + box.height}`);
+    }
   }
   await h.look(room, 'room-move', { fullPage: false });
 });

@@ -3,6 +3,7 @@ import {
   currentSession, get, live, loadSession, may, now, setLoggedOffHandler, since_s,
 } from '../api.js';
 import { clear, h, say } from '../dom.js';
+import { legend } from '../error_map.js';
 import { compassOf, drawCropped, mapFrame, marksNote, viewOf } from '../map_frame.js';
 import { loadMap, paintErrors } from '../maps.js';
 import { sixNumbers, toleranceOf } from '../numbers.js';
@@ -150,11 +151,13 @@ function result() {
     const view = viewOf(grid, region);
     const said = S.result.mapPicture;
     const canvas = h('canvas', { class: 'still-map', role: 'img', 'aria-label': said });
+    const tolerance_mm = toleranceOf(reference).shift_mm;
     drawCropped(canvas, view, (whole) =>
-      paintErrors(whole, values, toleranceOf(reference).shift_mm / 1000, region));
+      paintErrors(whole, values, tolerance_mm / 1000, region));
     const compass = compassOf(live.status?.room, sidesOf(scan, data.details),
       reference.plan.posture);
-    clear(box, mapFrame({ grid, view, canvas, region, compass }), marksNote(compass));
+    clear(box, mapFrame({ grid, view, canvas, region, compass }), legend(tolerance_mm),
+      marksNote(compass));
   };
   const load = async (scan) => {
     const received = now();

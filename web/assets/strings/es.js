@@ -37,7 +37,7 @@ export const es = {
   },
   nav: {
     label: 'Secciones', menu: 'Menú', status: 'Estado', patients: 'Pacientes', scan: 'Escanear',
-    result: 'Resultado', check: 'Control diario', users: 'Cuentas', audit: 'Registro de auditoría',
+    result: 'Resultado', check: 'Control diario', users: 'Cuentas', audit: 'Auditoría',
     settings: 'Ajustes', update: 'Actualización',
   },
   roles: {
