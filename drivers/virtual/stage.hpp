@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -61,7 +62,8 @@ struct Unit {
   std::atomic<int> glitches_left{0};
   std::atomic<int> position{-1};        ///< Last delivered frame; -1: none since the last command.
   std::mutex delivering;                ///< Held while a frame is delivered.
-  std::atomic<int> changes_waiting{0};  ///< Changes that wait for `delivering`: they go first.
+  std::atomic<int> changes_pending{0};  ///< Changes that wait for `delivering` or hold it.
+  std::condition_variable_any changes_applied;  ///< None is pending any more.
 
   [[nodiscard]] bool silent() const { return gone || stalled || failed; }
 };
@@ -69,14 +71,20 @@ struct Unit {
 /// While it exists no frame is delivered: what is changed holds from the next frame on.
 class BetweenFrames {
  public:
-  explicit BetweenFrames(Unit& unit) {
-    ++unit.changes_waiting;
-    lock_ = std::unique_lock(unit.delivering);
-    --unit.changes_waiting;
+  explicit BetweenFrames(Unit& unit) : unit_(unit) {
+    ++unit_.changes_pending;  // the player lets it go first, however fast its frames come
+    unit_.delivering.lock();
   }
+  ~BetweenFrames() {
+    --unit_.changes_pending;
+    unit_.delivering.unlock();
+    unit_.changes_applied.notify_all();
+  }
+  BetweenFrames(const BetweenFrames&) = delete;
+  BetweenFrames& operator=(const BetweenFrames&) = delete;
 
  private:
-  std::unique_lock<std::mutex> lock_;
+  Unit& unit_;
 };
 
 }  // namespace plumb::simulated

@@ -10,7 +10,6 @@ namespace {
 constexpr int kTicksBeforeSweep = 2;
 constexpr std::chrono::milliseconds kIdle{5};
 constexpr std::chrono::milliseconds kBetweenDoubles{8};
-constexpr std::chrono::microseconds kYield{100};
 
 }  // namespace
 
@@ -66,8 +65,9 @@ void SweepPlayer::Run(const std::stop_token& stop) {
 }
 
 void SweepPlayer::Tick(const std::stop_token& stop) {
-  while (unit_->changes_waiting > 0 && !stop.stop_requested()) std::this_thread::sleep_for(kYield);
-  const std::scoped_lock delivering(unit_->delivering);
+  std::unique_lock delivering(unit_->delivering);
+  if (!unit_->changes_applied.wait(delivering, stop, [&] { return unit_->changes_pending == 0; }))
+    return;
   if (Stage::View now = stage_->Now(); now.epoch != view_.epoch) {
     view_ = std::move(now);
     next_ = 0;

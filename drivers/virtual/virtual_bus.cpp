@@ -1,6 +1,7 @@
 #include "drivers/virtual/virtual_bus.hpp"
 
 #include <algorithm>
+#include <deque>
 #include <exception>
 #include <sstream>
 #include <stdexcept>
@@ -78,7 +79,7 @@ std::string VirtualBus::Rewind(const std::string& how, std::int64_t origin_us) {
   const bool once = how == "once";
   const std::vector<std::shared_ptr<Unit>> all = units();
   // A stall ends with the first frame of the sweep, neither before it nor after it.
-  std::vector<BetweenFrames> between_frames;
+  std::deque<BetweenFrames> between_frames;  // of elements that cannot move
   if (once)
     for (const auto& unit : all) between_frames.emplace_back(*unit);
   stage_->Show(stage_->Now().index, once ? Stage::Motion::kSweepOnce : Stage::Motion::kSweep,

@@ -3,7 +3,10 @@
 
 #include <atomic>
 #include <chrono>
-#include <thread>
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,6 +15,7 @@
 #include "drivers/replay/tum_writer.hpp"
 #include "drivers/simulated/suite_plan.hpp"
 #include "drivers/virtual/raw_frame.hpp"
+#include "drivers/virtual/sweep_player.hpp"
 #include "drivers/virtual/virtual_scenes.hpp"
 #include "tests/support/message_of.hpp"
 
@@ -89,23 +93,36 @@ TEST_F(VirtualProviderTest, EveryFrameOfASweepComesAsTheSimulatorMadeIt) {
   }
 }
 
-TEST_F(VirtualProviderTest, AfterAStallTheNextFramesAreThoseOfTheSweep) {
-  VirtualProvider provider = Provider(std::chrono::seconds(20));
-  bus_->Obey("speed 20");
-  for (int round = 1; round <= 5; ++round) {
-    bus_->Obey("hold");
-    const auto sensor = provider.Open("");  // each time: stamps that go back are discarded
-    bus_->Obey("glitch late 10000");        // each one is on its way for 0.1 s
-    ASSERT_TRUE(sensor->Next().has_value());
-    std::this_thread::sleep_for(std::chrono::milliseconds(30));
-    bus_->Obey("stall");
-    sensor->Flush();  // a frame after it would be one that the stall has not stopped
-    bus_->Obey("rewind once 900000000");
-    const std::optional<Frame> frame = sensor->Next();
-    ASSERT_TRUE(frame.has_value());
-    EXPECT_GE(frame->color_time_s, 900.0) << "round " << round;
-    bus_->Obey("glitch late 0");
-  }
+TEST_F(VirtualProviderTest, AStallWaitsForTheFrameOnItsWayAndEndsWithTheSweep) {
+  using namespace std::chrono_literals;
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool is_on_its_way = false, has_stalled = false, stalled_too_early = false;
+  std::vector<std::int64_t> stamps_after_us;
+  const simulated::SweepPlayer player(
+      bus_->units().front(), bus_->stage(), [] { return true; },
+      [&](const simulated::PlayedPair& pair) {
+        std::unique_lock lock(mutex);
+        is_on_its_way = true;
+        changed.notify_all();
+        if (has_stalled)
+          stamps_after_us.push_back(pair.stamps.color_us);
+        else  // until the stall is answered, which has to wait for this frame
+          stalled_too_early |= changed.wait_for(lock, 300ms, [&] { return has_stalled; });
+      });
+  std::unique_lock lock(mutex);
+  ASSERT_TRUE(changed.wait_for(lock, 20s, [&] { return is_on_its_way; }));
+  lock.unlock();
+  bus_->Obey("stall");
+  lock.lock();
+  has_stalled = true;
+  changed.notify_all();
+  lock.unlock();
+  bus_->Obey("rewind once 900000000");
+  lock.lock();
+  ASSERT_TRUE(changed.wait_for(lock, 20s, [&] { return stamps_after_us.size() > 2; }));
+  EXPECT_FALSE(stalled_too_early);
+  EXPECT_GE(stamps_after_us.front(), 900000000) << "a frame came between stall and sweep";
 }
 
 TEST_F(VirtualProviderTest, UnitsComeAndGoAndTheListenerHearsOfIt) {
