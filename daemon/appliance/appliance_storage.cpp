@@ -114,7 +114,7 @@ void Appliance::LogRecovery(const RecoveryReport& found) const {
     Log(LogLevel::kError,
         fmt::format("{} scans are unknown to the database and were moved to {}: is it an older "
                     "backup? They can be read with plumb info",
-                    found.foreign_folders, (state / "set-aside").string()));
+                    found.foreign_folders, (state / ScanFolders::kSetAside).string()));
   }
   if (found.broken_references > 0) {
     Log(LogLevel::kError, fmt::format("the files of {} approved references cannot be seen: put a "
@@ -231,7 +231,8 @@ void Appliance::RunMaintenance() {
   if (!posted) Log(LogLevel::kWarning, "the store is too busy to remove old scans now");
 }
 
-/// Once a day, off the loop: a chain of digests that nobody follows protects nothing.
+/// Verifies the audit log once a day, off the loop: its chain of digests protects nothing unless
+/// it is checked.
 void Appliance::CheckRecords() {
   constexpr int kDayTicks = 24 * 3600, kAgainTicks = 60;
   ticks_to_record_check_ = kDayTicks;

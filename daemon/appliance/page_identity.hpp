@@ -39,7 +39,7 @@ void KeepPageIdentity(const std::filesystem::path& state, const web::TlsIdentity
 struct PageSocket {
   int fd = -1;
   std::string fault;    ///< Why it is not where the configuration says; empty: it is there.
-  std::string warning;  ///< That nobody can reach it yet.
+  std::string warning;  ///< Why the page cannot be reached yet; empty: it can be.
 };
 /// Where `web.listen` says; where that cannot be opened at `otherwise`, so that the page can say
 /// what is wrong; `web.listen` is changed with it.

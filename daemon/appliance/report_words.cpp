@@ -1,13 +1,12 @@
 #include "daemon/appliance/report_words.hpp"
 
-#include "algo/base/notice.hpp"
 #include "web/assets/spanish.hpp"
 
 namespace plumb {
 namespace {
 
 constexpr ReportWords kEnglish = {
-    .notice = kResearchNotice,
+    .terms = web::kEnglishTerms,
     .page = "Page {}",
     .scan_title = "Scan report",
     .course_title = "Course of {}",
@@ -40,26 +39,15 @@ constexpr ReportWords kEnglish = {
     .tolerance_fact = "Tolerance",
     .postures = {"head first, supine", "head first, prone", "feet first, supine",
                  "feet first, prone"},
-    .axes = {"Vertical", "Longitudinal", "Lateral", "Pitch", "Roll", "Yaw"},
     .short_axes = {"Vert. mm", "Long. mm", "Lat. mm", "Pitch \u00b0", "Roll \u00b0", "Yaw \u00b0"},
-    .within = "in tolerance",
-    .unsure = "not surely within",
-    .outside = "outside tolerance",
-    .not_known = "not known",
-    .no_move = "no move needed",
-    .scan_again = "scan again",
-    .insignificant = "below its uncertainty",
     .verdict_reference = "REFERENCE",
     .verdict_none = "NO RESULT",
     .verdict_in = "IN TOLERANCE",
     .verdict_unsure = "NOT SURELY WITHIN",
     .verdict_move = "MOVE",
-    .verdict_no_answer = "NO ANSWER",
     .why_in = "Every value, with its uncertainty, is within tolerance.",
     .why_unsure = "Every value is within tolerance, but not with its uncertainty.",
     .why_move = "The correction below was to be applied.",
-    .posture = "Posture difference that remains after the shift",
-    .as_reference = "every part as in the reference, within 3 mm",
     .quality = "Scan quality",
     .markers = "Markers matched",
     .misfit = "Marker misfit",
@@ -72,7 +60,6 @@ constexpr ReportWords kEnglish = {
     .sensor_on = "Sensor on for",
     .frames_lost = "{:.0f} % of the frames were lost.",
     .warming = "The sensor was still warming up.",
-    .overdue = "The daily check was overdue at this scan.",
     .overdue_mark = "* Daily check",
     .overdue_words = "overdue at this scan",
     .when = "When",
@@ -80,13 +67,10 @@ constexpr ReportWords kEnglish = {
     .digits_note =
         "Each number with its uncertainty of 95 %, in the digits that it lets them have.",
     .sides = {"HEAD", "FEET", "LEFT", "RIGHT"},
-    .pictures = {},
-    .decimal = '.'};
+    .pictures = {}};
 
 constexpr ReportWords kSpanish = {
-    .notice =
-        "Solo para investigación. No es un producto sanitario. No lo use para posicionar "
-        "pacientes para un tratamiento ni para sustituir la guía por imagen.",
+    .terms = web::kSpanishTerms,
     .page = "Página {}",
     .scan_title = "Informe del escaneo",
     .course_title = "Tratamiento de {}",
@@ -119,27 +103,16 @@ constexpr ReportWords kSpanish = {
     .tolerance_fact = "Tolerancia",
     .postures = {"cabeza primero, supino", "cabeza primero, prono", "pies primero, supino",
                  "pies primero, prono"},
-    .axes = {"Vertical", "Longitudinal", "Lateral", "Cabeceo", "Balanceo", "Guiñada"},
     .short_axes = {"Vert. mm", "Long. mm", "Lat. mm", "Cabeceo \u00b0", "Balanceo \u00b0",
                    "Guiñada \u00b0"},
-    .within = "en tolerancia",
-    .unsure = "no concluyente",
-    .outside = "fuera de tolerancia",
-    .not_known = "no se conoce",
-    .no_move = "no hay que mover",
-    .scan_again = "escanear de nuevo",
-    .insignificant = "menor que su incertidumbre",
     .verdict_reference = "REFERENCIA",
     .verdict_none = "SIN RESULTADO",
     .verdict_in = "EN TOLERANCIA",
     .verdict_unsure = "NO CONCLUYENTE",
     .verdict_move = "MOVER",
-    .verdict_no_answer = "SIN RESPUESTA",
     .why_in = "Todos los valores, con su incertidumbre, están en tolerancia.",
     .why_unsure = "Todos los valores están en tolerancia, pero no con su incertidumbre.",
     .why_move = "Había que aplicar la corrección siguiente.",
-    .posture = "Diferencia de postura que queda tras el desplazamiento",
-    .as_reference = "todas las partes como en la referencia, dentro de 3 mm",
     .quality = "Calidad del escaneo",
     .markers = "Marcadores",
     .misfit = "Desajuste",
@@ -152,16 +125,13 @@ constexpr ReportWords kSpanish = {
     .sensor_on = "Sensor encendido",
     .frames_lost = "Se perdió el {:.0f} % de las imágenes.",
     .warming = "El sensor aún se calentaba.",
-    .overdue = "El control diario estaba pendiente en este escaneo.",
     .overdue_mark = "* Control diario",
     .overdue_words = "pendiente en este escaneo",
     .when = "Cuándo",
     .verdict = "Veredicto",
     .digits_note = "Cada número con su incertidumbre del 95 %, con las cifras que ella permite.",
     .sides = {"CABEZA", "PIES", "IZQUIERDA", "DERECHA"},
-    .pictures = {.notice = "Solo para investigación. No es un producto sanitario. No lo use para "
-                           "posicionar pacientes para un tratamiento ni para sustituir la guía por "
-                           "imagen.",
+    .pictures = {.notice = web::kSpanishTerms.notice,
                  .x_axis = "x (m), sistema del marcador de referencia",
                  .y_axis = "y (m)",
                  .error_title = "Error de altura: actual \u2212 referencia",
@@ -184,8 +154,7 @@ constexpr ReportWords kSpanish = {
                  .both_within = "ambas, a menos de {} mm",
                  .height = "altura",
                  .isocentre = "isocentro",
-                 .decimal = ','},
-    .decimal = ','};
+                 .decimal = ','}};
 
 }  // namespace
 

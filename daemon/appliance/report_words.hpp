@@ -6,31 +6,29 @@
 #include <string_view>
 
 #include "daemon/appliance/report_pictures.hpp"
+#include "web/service/result_terms.hpp"
 #include "web/service/scan_service.hpp"
 
 namespace plumb {
 
 /// The texts of one language. Texts with {} are fmt patterns.
 struct ReportWords {
-  std::string_view notice, page, scan_title, course_title;
+  web::ResultTerms terms;
+  std::string_view page, scan_title, course_title;
   std::string_view patient, unassigned, site, fraction, scan, scans, reference, version, plan,
       region, corners, whole_body, isocentre, middle, planned_by, approved_by, not_approved,
       checksum, accepted, accepted_by, accepted_outside, no, printed;
   std::string_view room_markers, couch_markers, tolerance, tolerance_fact;
-  std::array<std::string_view, 4> postures;  ///< HFS, HFP, FFS, FFP.
-  std::array<std::string_view, 6> axes;
+  std::array<std::string_view, 4> postures;    ///< HFS, HFP, FFS, FFP.
   std::array<std::string_view, 6> short_axes;  ///< With units, as column heads.
-  std::string_view within, unsure, outside, not_known, no_move, scan_again, insignificant;
-  std::string_view verdict_reference, verdict_none, verdict_in, verdict_unsure, verdict_move,
-      verdict_no_answer;
+  std::string_view verdict_reference, verdict_none, verdict_in, verdict_unsure, verdict_move;
   std::string_view why_in, why_unsure, why_move;
-  std::string_view posture, as_reference, quality, markers, misfit, covered, hole, tracked,
-      tracked_of, lost, keyframes, sensor_on;
-  std::string_view frames_lost, warming, overdue, overdue_mark, overdue_words;
+  std::string_view quality, markers, misfit, covered, hole, tracked, tracked_of, lost, keyframes,
+      sensor_on;
+  std::string_view frames_lost, warming, overdue_mark, overdue_words;
   std::string_view when, verdict, digits_note;
   SideWords sides;
   PictureWords pictures;
-  char decimal = '.';
 };
 
 [[nodiscard]] const ReportWords& WordsOf(web::Language language);

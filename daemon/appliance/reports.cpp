@@ -36,12 +36,12 @@ std::string Filled(std::string_view pattern, const Values&... values) {
 /// A number in the format of the language.
 std::string Said(double value, int digits, const ReportWords& words) {
   std::string text = fmt::format("{:.{}f}", value, digits);
-  std::replace(text.begin(), text.end(), '.', words.decimal);
+  std::replace(text.begin(), text.end(), '.', words.terms.decimal);
   return text;
 }
 std::string Said(double value, const ReportWords& words) {
   std::string text = fmt::format("{:g}", value);
-  std::replace(text.begin(), text.end(), '.', words.decimal);
+  std::replace(text.begin(), text.end(), '.', words.terms.decimal);
   return text;
 }
 
@@ -51,20 +51,20 @@ std::string Footer(const ReportWords& words) {
 
 ReportTexts TextsOf(const ReportWords& words) {
   ReportTexts texts;
-  texts.notice = words.notice;
+  texts.notice = words.terms.notice;
   texts.page = words.page;
-  texts.posture = words.posture;
+  texts.posture = words.terms.posture;
   texts.quality = words.quality;
-  texts.within = words.within;
-  texts.unsure = words.unsure;
-  texts.outside = words.outside;
-  texts.not_known = words.not_known;
+  texts.within = words.terms.within;
+  texts.unsure = words.terms.not_surely;
+  texts.outside = words.terms.outside;
+  texts.not_known = words.terms.not_known;
   texts.tolerance = words.tolerance;
   texts.heads = {std::string(words.fraction), std::string(words.when), std::string(words.verdict)};
   for (std::size_t i = 0; i < words.short_axes.size(); ++i)
     texts.heads[3 + i] = words.short_axes[i];
   texts.heads[9] = words.accepted;
-  texts.decimal = words.decimal;
+  texts.decimal = words.terms.decimal;
   return texts;
 }
 
@@ -86,7 +86,7 @@ std::string_view VerdictOf(const web::Scan& scan, const ReportWords& words) {
   return verdict == "in_tolerance" ? words.verdict_in
          : verdict == "unsure"     ? words.verdict_unsure
          : verdict == "move"       ? words.verdict_move
-                                   : words.verdict_no_answer;
+                                   : words.terms.no_answer;
 }
 
 std::string WhyOf(const web::Scan& scan, Language language) {
@@ -117,20 +117,21 @@ std::vector<ReportNumber> NumbersOf(const web::Scan& scan, const web::Tolerance&
   const ReportWords& words = WordsOf(language);
   const auto values = ValuesOf(scan.result->correction), u95 = ValuesOf(scan.result->u95);
   const bool moves = scan.result->verdict == "move";
-  for (std::size_t i = 0; i < words.axes.size(); ++i) {
+  for (std::size_t i = 0; i < words.terms.axes.size(); ++i) {
     const bool is_shift = i < 3;
     const double half = u95[i].value_or(0.0);
     const double limit = is_shift ? tolerance.shift_mm : tolerance.rotation_deg;
     const bool known = values[i] && std::abs(*values[i]) > half;
     const bool is_within = values[i] && std::abs(*values[i]) + half <= limit;
-    numbers.push_back({.name = std::string(words.axes[i]),
-                       .unit = is_shift ? "mm" : "\u00b0",
-                       .value = values[i],
-                       .u95 = half,
-                       .tolerance = limit,
-                       .words = !moves  ? std::string(is_within ? words.no_move : words.scan_again)
-                                : known ? Translated(scan.result->words[i], language)
-                                        : std::string(words.insignificant)});
+    numbers.push_back(
+        {.name = std::string(words.terms.axes[i]),
+         .unit = is_shift ? "mm" : "\u00b0",
+         .value = values[i],
+         .u95 = half,
+         .tolerance = limit,
+         .words = !moves  ? std::string(is_within ? words.terms.no_move : words.terms.scan_again)
+                  : known ? Translated(scan.result->words[i], language)
+                          : std::string(words.terms.insignificant)});
   }
   return numbers;
 }
@@ -172,7 +173,7 @@ std::vector<std::string> CautionsOf(const web::Scan& scan, const Json& scene,
       cautions.push_back(Filled(words.frames_lost, 100 * lost / total));
   }
   if (scan.sensor_on_s && *scan.sensor_on_s < kWarmUp_s) cautions.emplace_back(words.warming);
-  if (scan.check_overdue) cautions.emplace_back(words.overdue);
+  if (scan.check_overdue) cautions.emplace_back(words.terms.overdue);
   return cautions;
 }
 
@@ -296,7 +297,7 @@ ScanReport DescribeScan(const ReportSources& stored, const web::Scan& scan, Lang
   if (report.numbers.empty()) return report;
   for (const std::string& part : scan.result->body_after)
     report.body.push_back(Translated(part, language));
-  if (report.body.empty()) report.body.emplace_back(words.as_reference);
+  if (report.body.empty()) report.body.emplace_back(words.terms.as_reference);
   return report;
 }
 

@@ -98,7 +98,7 @@ void ControlServer::Accept() {
           if ((events & EPOLLIN) != 0) {
             Read(id);
           } else if ((events & (EPOLLHUP | EPOLLERR)) != 0) {
-            Drop(id);  // disconnected: there is nobody left to answer
+            Drop(id);  // the client has disconnected
           }
         });
   } catch (const std::runtime_error&) {  // the kernel watches no more of them: this one goes

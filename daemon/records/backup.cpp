@@ -15,6 +15,7 @@
 #include "daemon/records/database.hpp"
 #include "daemon/records/file_copy.hpp"
 #include "daemon/records/scan_files.hpp"
+#include "daemon/records/scan_folders.hpp"
 #include "daemon/records/schema.hpp"
 #include "daemon/records/stored_values.hpp"
 #include "daemon/records/summed_folder.hpp"
@@ -31,9 +32,8 @@ constexpr const char* kSums = "SHA256SUMS";
 constexpr const char* kDatabase = "plumb.db";
 constexpr const char* kScans = "scans";
 /// The other parts of a state folder that are copied if they exist.
-constexpr std::array<const char*, 4> kOtherFolders = {"set-aside", "calibration", "imports",
-                                                      "sensor-profiles"};
-constexpr const char* kAsideOnScansDisk = "scans/set-aside";
+constexpr std::array<const char*, 4> kOtherFolders = {ScanFolders::kSetAside, "calibration",
+                                                      "imports", "sensor-profiles"};
 constexpr const char* kRestoring = ".restore";
 constexpr const char* kBackingUp = ".backup";
 
@@ -95,8 +95,8 @@ class Writing {
     for (const char* folder : kOtherFolders) {
       for (const std::string& file : ListedOrTold(state_ / folder)) (void)output_.Add(state_, file);
     }
-    for (const std::string& file : ListedOrTold(state_ / kAsideOnScansDisk))
-      (void)output_.Add(state_, file);
+    const fs::path aside_with_scans = state_ / kScans / ScanFolders::kSetAside;
+    for (const std::string& file : ListedOrTold(aside_with_scans)) (void)output_.Add(state_, file);
     output_.Commit({{"scans", scans}});
     return {.scans = scans,
             .files = output_.files(),

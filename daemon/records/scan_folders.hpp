@@ -22,10 +22,10 @@ class ScanFolders {
   [[nodiscard]] std::filesystem::path Staging(const std::string& scan_id) const {
     return scans() / (std::string(kStagingPrefix) + scan_id);
   }
-  /// Where a start moves folders that no row explains; the second is used if scans/ is a disk of
-  /// its own.
+  /// Where a start moves scan folders that have no row in the database. The second one is used if
+  /// scans/ is on another disk than the rest.
   [[nodiscard]] std::array<std::filesystem::path, 2> SetAside() const {
-    return {state_ / "set-aside", scans() / "set-aside"};
+    return {state_ / kSetAside, scans() / kSetAside};
   }
   /// Complete folders of an interrupted scan, as found at the next start.
   [[nodiscard]] std::vector<std::filesystem::path> Interrupted(const std::string& scan_id) const;
@@ -35,6 +35,7 @@ class ScanFolders {
   /// The folders of scans and of staging, by name. @throws DiskRefused
   [[nodiscard]] std::vector<std::filesystem::path> All() const;
 
+  static constexpr const char* kSetAside = "set-aside";
   static constexpr const char* kInterruptedSuffix = "-interrupted";
 
  private:

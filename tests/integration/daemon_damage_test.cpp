@@ -149,7 +149,7 @@ TEST_F(DaemonDamageTest, StartsFromEveryDamagedStateSaysWhatIsWrongAndDeletesNot
     }
     if (health.status == 503) {
       EXPECT_FALSE(status.value("reason", "").empty()) << status.dump();
-      EXPECT_EQ(session["setup_required"], false) << "nobody makes a first account in safe mode";
+      EXPECT_EQ(session["setup_required"], false) << "no first account can be created in safe mode";
       if (session["fault"] == "") {
         EXPECT_EQ(client.LogIn("engineer", kPassword), 200) << session.dump();
         EXPECT_NE(client.Get("/api/v1/status").json()["fault"], nullptr);

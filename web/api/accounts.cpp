@@ -127,7 +127,7 @@ Accounts::Accounts(const Services& services, AccountOptions options)
       displays_(services.displays, options_.certificate.has_value(), options_.now),
       devices_(options_.device_key, options_.certificate.has_value()),
       worker_(options_.password_operations, options_.password_memory_bytes) {
-  // Accounts that cannot be seen are there: nobody is offered to make the first one.
+  // Accounts may exist even if they cannot be read: no setup code for a first account is issued.
   accounts_fault_ = users_.WhyUnreadable();
   if (accounts_fault_.empty() && users_.Users().empty()) setup_code_ = MakeSetupCode();
   Expire();

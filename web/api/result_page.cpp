@@ -67,8 +67,8 @@ std::string Document(const ResultWords& words, const std::string& body, const st
                               "content=\"{};url=/result?again&amp;language={}\">",
                               kRefreshEvery.count(), words.code)
                 : "",
-      style, words.notice_label, words.notice, body, query, words.other_code, words.other_code,
-      words.other_code, words.other);
+      style, words.notice_label, words.terms.notice, body, query, words.other_code,
+      words.other_code, words.other_code, words.other);
 }
 
 std::string LoginForm(const ResultWords& words, std::string_view trouble) {
@@ -91,7 +91,7 @@ int DigitsOf(double u95, int most) {
 
 /// With the decimal sign of the language.
 std::string Localized(std::string number, const ResultWords& words) {
-  std::replace(number.begin(), number.end(), '.', words.decimal);
+  std::replace(number.begin(), number.end(), '.', words.terms.decimal);
   return number;
 }
 
@@ -101,15 +101,16 @@ std::string NumberCells(const NumberRow& row, std::string_view name, const std::
   if (!row.value)
     return fmt::format(
         "<tr><th scope=\"row\">{}</th><td>{}</td><td></td><td></td><td></td><td></td></tr>", name,
-        words.not_known);
+        words.terms.not_known);
   const double value = *row.value, u95 = row.u95.value_or(0.0), size = std::abs(value);
   const int most = std::string_view(row.unit) == "mm" ? 1 : 2;
   const int digits = DigitsOf(u95, most);
   const bool is_zero = size < 0.5 * std::pow(10.0, -digits);  // no sign, no direction
   const bool in = size + u95 <= tolerance, unsure = !in && size <= tolerance;
-  const std::string way = !moves        ? std::string(unsure ? words.scan_again : words.no_move)
+  const std::string way = !moves
+                              ? std::string(unsure ? words.terms.scan_again : words.terms.no_move)
                           : is_zero     ? std::string(words.no_change)
-                          : size <= u95 ? std::string(words.insignificant)
+                          : size <= u95 ? std::string(words.terms.insignificant)
                                         : Said(direction, words);
   const std::string shown =
       is_zero ? fmt::format("{:.{}f}", 0.0, digits) : fmt::format("{:+.{}f}", value, digits);
@@ -118,9 +119,9 @@ std::string NumberCells(const NumberRow& row, std::string_view name, const std::
       "<td>{}</td><td>{}</td></tr>",
       name, Localized(shown, words), row.unit, Localized(fmt::format("{:.{}f}", u95, most), words),
       Localized(fmt::format("{:g}", tolerance), words),
-      in       ? words.within
-      : unsure ? words.not_surely
-               : words.outside,
+      in       ? words.terms.within
+      : unsure ? words.terms.not_surely
+               : words.terms.outside,
       way);
 }
 
@@ -138,7 +139,7 @@ std::string NumbersTable(const ResultSummary& result, const Tolerance& tolerance
   std::string rows, heads;
   std::size_t i = 0;
   for (const NumberRow& row : Rows(*result.correction, result.u95.value_or(SixNumbers{}))) {
-    rows += NumberCells(row, words.axes[i], result.words[i],
+    rows += NumberCells(row, words.terms.axes[i], result.words[i],
                         i < 3 ? tolerance.shift_mm : tolerance.rotation_deg,
                         result.verdict == "move", words);
     ++i;
@@ -155,10 +156,11 @@ std::string BodyList(const ResultSummary& result, const ResultWords& words) {
   const auto list = [&](std::string_view title, const std::vector<std::string>& parts) {
     std::string items;
     for (const std::string& part : parts) items += fmt::format("<li>{}</li>", Said(part, words));
-    if (items.empty()) items = fmt::format("<li class=\"fine-part\">{}</li>", words.as_reference);
+    if (items.empty())
+      items = fmt::format("<li class=\"fine-part\">{}</li>", words.terms.as_reference);
     return fmt::format("<h3>{}</h3><ul class=\"findings\">{}</ul>", title, items);
   };
-  return fmt::format("<h2>{}</h2>", words.where) + list(words.after, result.body_after) +
+  return fmt::format("<h2>{}</h2>", words.where) + list(words.terms.posture, result.body_after) +
          list(words.now, result.body_now);
 }
 
@@ -176,7 +178,7 @@ std::string_view VerdictText(const std::string& verdict, bool review, const Resu
                              : verdict == "unsure"     ? &words.unsure
                              : verdict == "move"       ? &words.move
                                                        : nullptr;
-  if (said == nullptr) return words.no_answer;
+  if (said == nullptr) return words.terms.no_answer;
   return review ? said->then : said->now;
 }
 
@@ -230,7 +232,7 @@ std::string Identity(const Records& records, const Scan& scan, const Scan* newer
       Filled(words.scan_line, EscapeHtml(scan.id), LocalTimeText(scan.started_at), when),
       old ? fmt::format(" <strong>{}</strong>", words.old) : "");
   text += AcceptedLine(scan, words);
-  if (scan.check_overdue) text += fmt::format("<p>{}</p>", words.overdue);
+  if (scan.check_overdue) text += fmt::format("<p>{}</p>", words.terms.overdue);
   return text;
 }
 
@@ -245,7 +247,7 @@ std::string ResultBody(const Records& records, const Scan& scan, const Scan* new
     return body + fmt::format(
                       "<section class=\"old\"><p class=\"verdict no_answer\">{}</p>"
                       "<p>{}</p></section>",
-                      words.no_answer, Said(scan.failure, words));
+                      words.terms.no_answer, Said(scan.failure, words));
   const auto reference = records.references.FindReference(scan.reference_id);
   if (reference)
     body += fmt::format("<p>{}</p>", Filled(words.reference_line, reference->version,

@@ -4,18 +4,16 @@
 #include <cctype>
 #include <charconv>
 
-#include "algo/base/notice.hpp"
-
 namespace plumb::web {
 namespace {
 
 constexpr ResultWords kEnglish = {
+    .terms = kEnglishTerms,
     .code = "en",
     .other = "Español",
     .other_code = "es",
     .title = "Plumb result",
     .notice_label = "Notice",
-    .notice = kResearchNotice,
     .log_in = "Log in",
     .name = "Name",
     .password = "Password",
@@ -37,23 +35,13 @@ constexpr ResultWords kEnglish = {
         "<strong>NO ANSWER</strong> from the last scan, of {}: {} What follows is from before it.",
     .accepted_by = "Accepted by {}.",
     .accepted_outside = "Accepted outside tolerance by {}: {}",
-    .overdue = "The daily check was overdue at this scan.",
     .reference_line = "Reference version {} of {}, approved by {}.",
     .no_reference = "No comparison: this scan has no reference.",
     .in_tolerance = {"IN TOLERANCE", "WAS IN TOLERANCE"},
     .unsure = {"NOT SURELY WITHIN", "WAS NOT SURELY WITHIN"},
     .move = {"MOVE", "WAS OUTSIDE TOLERANCE"},
-    .no_answer = "NO ANSWER",
-    .axes = {"Vertical", "Longitudinal", "Lateral", "Pitch", "Roll", "Yaw"},
     .heads = {"Axis", "Value", "95 %", "Tolerance", "Assessment", "Direction"},
-    .not_known = "not known",
-    .no_move = "no move needed",
-    .scan_again = "scan again",
     .no_change = "no change",
-    .insignificant = "below its uncertainty",
-    .within = "in tolerance",
-    .not_surely = "not surely within",
-    .outside = "outside tolerance",
     .to_apply = "Correction to apply at the isocentre",
     .found_then = "Correction found then, at the isocentre: not to be applied now",
     .remaining = "Remaining difference at the isocentre: no move needed",
@@ -62,21 +50,16 @@ constexpr ResultWords kEnglish = {
     .measured_then = "Difference measured then, at the isocentre",
     .where = "Where on the body",
     .now = "Before the correction",
-    .after = "Posture difference that remains after the shift",
-    .as_reference = "every part as in the reference, within 3 mm",
     .map = "Map of height errors, current minus reference",
-    .overlay = "Overlay: reference blue, current red",
-    .decimal = '.'};
+    .overlay = "Overlay: reference blue, current red"};
 
 constexpr ResultWords kSpanish = {
+    .terms = kSpanishTerms,
     .code = "es",
     .other = "English",
     .other_code = "en",
     .title = "Resultado de Plumb",
     .notice_label = "Aviso",
-    .notice =
-        "Solo para investigación. No es un producto sanitario. No lo use para posicionar "
-        "pacientes para un tratamiento ni para sustituir la guía por imagen.",
     .log_in = "Iniciar sesión",
     .name = "Nombre",
     .password = "Contraseña",
@@ -100,23 +83,13 @@ constexpr ResultWords kSpanish = {
         "anterior.",
     .accepted_by = "Aceptado por {}.",
     .accepted_outside = "Aceptado fuera de tolerancia por {}: {}",
-    .overdue = "El control diario estaba pendiente en este escaneo.",
     .reference_line = "Referencia, versión {} del {}, aprobada por {}.",
     .no_reference = "Sin comparación: este escaneo no tiene referencia.",
     .in_tolerance = {"EN TOLERANCIA", "ESTABA EN TOLERANCIA"},
     .unsure = {"NO CONCLUYENTE", "NO ERA CONCLUYENTE"},
     .move = {"MOVER", "ESTABA FUERA DE TOLERANCIA"},
-    .no_answer = "SIN RESPUESTA",
-    .axes = {"Vertical", "Longitudinal", "Lateral", "Cabeceo", "Balanceo", "Guiñada"},
     .heads = {"Eje", "Valor", "95 %", "Tolerancia", "Evaluación", "Dirección"},
-    .not_known = "no se conoce",
-    .no_move = "no hay que mover",
-    .scan_again = "escanear de nuevo",
     .no_change = "sin cambio",
-    .insignificant = "menor que su incertidumbre",
-    .within = "en tolerancia",
-    .not_surely = "no concluyente",
-    .outside = "fuera de tolerancia",
     .to_apply = "Corrección que aplicar, en el isocentro",
     .found_then = "Corrección hallada entonces, en el isocentro: no la aplique ahora",
     .remaining = "Diferencia restante en el isocentro: no hay que mover",
@@ -125,11 +98,8 @@ constexpr ResultWords kSpanish = {
     .measured_then = "Diferencia medida entonces, en el isocentro",
     .where = "En qué parte del cuerpo",
     .now = "Antes de la corrección",
-    .after = "Diferencia de postura que queda tras el desplazamiento",
-    .as_reference = "todas las partes como en la referencia, dentro de 3 mm",
     .map = "Mapa de errores de altura: actual menos referencia",
-    .overlay = "Superposición: referencia en azul, actual en rojo",
-    .decimal = ','};
+    .overlay = "Superposición: referencia en azul, actual en rojo"};
 
 std::string_view Trimmed(std::string_view text) {
   const auto is_space = [](char c) { return c == ' ' || c == '\t'; };

@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "web/service/result_terms.hpp"
 #include "web/service/scan_service.hpp"
 
 namespace plumb::web {
@@ -16,24 +17,21 @@ struct VerdictWords {
 
 /// The texts of one language. With {}: patterns of fmt.
 struct ResultWords {
+  ResultTerms terms;
   std::string_view code;               ///< "en", for the document and for links.
   std::string_view other, other_code;  ///< The way to the other language.
-  std::string_view title, notice_label, notice;
+  std::string_view title, notice_label;
   std::string_view log_in, name, password, wrong_password, first_password;
   std::string_view out_of_order, nobody_can;
   std::string_view none, patient, no_patient, scan_line, fraction, ago_min, ago_unknown, old;
-  std::string_view running, newer_failed, accepted_by, accepted_outside, overdue;
+  std::string_view running, newer_failed, accepted_by, accepted_outside;
   std::string_view reference_line, no_reference;
   VerdictWords in_tolerance, unsure, move;
-  std::string_view no_answer;
-  std::array<std::string_view, 6> axes;
   std::array<std::string_view, 6> heads;  ///< Of the table of the numbers.
-  std::string_view not_known, no_move, scan_again, no_change, insignificant;
-  std::string_view within, not_surely, outside;
+  std::string_view no_change;
   std::string_view to_apply, found_then, remaining, remained_then, measured, measured_then;
-  std::string_view where, now, after, as_reference;
+  std::string_view where, now;
   std::string_view map, overlay;
-  char decimal = '.';
 };
 
 [[nodiscard]] const ResultWords& ResultWordsOf(Language language);

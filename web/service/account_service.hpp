@@ -15,8 +15,8 @@ class AccountService {
  public:
   virtual ~AccountService() = default;
 
-  /// Why no account can be looked up (safe mode, a damaged database); empty: they can. Without an
-  /// answer nobody can say that there are none.
+  /// Why no account can be looked up (safe mode, a damaged database); empty if they can. Unless it
+  /// is empty, an empty list of users does not mean that there are none.
   [[nodiscard]] virtual std::string WhyUnreadable() = 0;
   [[nodiscard]] virtual std::vector<User> Users() = 0;  ///< By name.
   [[nodiscard]] virtual std::optional<User> FindUser(const std::string& name) = 0;

@@ -79,7 +79,7 @@ ApplianceParts PartsOf(const Config& config, testing::FakeBus& bus) {
           .demo_patient = {}};
 }
 
-/// A chain that nobody follows protects nothing: the appliance itself looks, and says so.
+/// The appliance itself verifies the chain of digests, and reports what it finds.
 TEST(ApplianceStorage, AnAuditLogThatWasChangedFromOutsideIsReported) {
   for (const char* change : {"", "UPDATE audit SET user = 'bert' WHERE number = 2",
                              "DELETE FROM audit WHERE number = (SELECT max(number) FROM audit)"}) {

@@ -1,0 +1,57 @@
+// What every presentation of a result says in the same words: the page without script, the reports.
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include "algo/base/notice.hpp"
+#include "web/service/scan_service.hpp"
+
+namespace plumb::web {
+
+struct ResultTerms {
+  std::string_view notice;
+  std::array<std::string_view, 6> axes;
+  std::string_view within, not_surely, outside;  ///< The assessment of one number.
+  std::string_view no_answer;                    ///< As a verdict.
+  std::string_view not_known, no_move, scan_again, insignificant;  ///< In place of a direction.
+  std::string_view posture, as_reference;
+  std::string_view overdue;
+  char decimal = '.';
+};
+
+inline constexpr ResultTerms kEnglishTerms = {
+    .notice = kResearchNotice,
+    .axes = {"Vertical", "Longitudinal", "Lateral", "Pitch", "Roll", "Yaw"},
+    .within = "in tolerance",
+    .not_surely = "not surely within",
+    .outside = "outside tolerance",
+    .no_answer = "NO ANSWER",
+    .not_known = "not known",
+    .no_move = "no move needed",
+    .scan_again = "scan again",
+    .insignificant = "below its uncertainty",
+    .posture = "Posture difference that remains after the shift",
+    .as_reference = "every part as in the reference, within 3 mm",
+    .overdue = "The daily check was overdue at this scan.",
+    .decimal = '.'};
+
+inline constexpr ResultTerms kSpanishTerms = {
+    .notice =
+        "Solo para investigación. No es un producto sanitario. No lo use para posicionar "
+        "pacientes para un tratamiento ni para sustituir la guía por imagen.",
+    .axes = {"Vertical", "Longitudinal", "Lateral", "Cabeceo", "Balanceo", "Guiñada"},
+    .within = "en tolerancia",
+    .not_surely = "no concluyente",
+    .outside = "fuera de tolerancia",
+    .no_answer = "SIN RESPUESTA",
+    .not_known = "no se conoce",
+    .no_move = "no hay que mover",
+    .scan_again = "escanear de nuevo",
+    .insignificant = "menor que su incertidumbre",
+    .posture = "Diferencia de postura que queda tras el desplazamiento",
+    .as_reference = "todas las partes como en la referencia, dentro de 3 mm",
+    .overdue = "El control diario estaba pendiente en este escaneo.",
+    .decimal = ','};
+
+}  // namespace plumb::web
