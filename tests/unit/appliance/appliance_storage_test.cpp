@@ -20,34 +20,42 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
+/// What an appliance with an empty state folder runs in.
+struct Surroundings {
   const testing::TempFolder folder;
   testing::FakeBus bus;
   EventLoop loop;
   Config config;
-  config.appliance.state = folder / "state";
+
+  Surroundings() { config.appliance.state = folder / "state"; }
+};
+
+TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
+  Surroundings around;
   {
-    Store store(config.appliance.state);  // and closed again: nothing of it is in anybody's memory
+    Store store(
+        around.config.appliance.state);  // and closed again: nothing of it is in anybody's memory
     (void)store.patients.Add({.user = "anna", .address = {}}, "A", "");
   }
   Appliance appliance(
-      loop, {.config = config,
-             .configuration_fault = {},
-             .make_provider = [&] { return std::make_unique<testing::FakeProvider>(bus); },
-             .before_scan = {},
-             .button = nullptr,
-             .indicator = nullptr,
-             .demo_patient = {}});
-  for (const fs::directory_entry& entry : fs::directory_iterator(config.appliance.state)) {
+      around.loop,
+      {.config = around.config,
+       .configuration_fault = {},
+       .make_provider = [&] { return std::make_unique<testing::FakeProvider>(around.bus); },
+       .before_scan = {},
+       .button = nullptr,
+       .indicator = nullptr,
+       .demo_patient = {}});
+  for (const fs::directory_entry& entry : fs::directory_iterator(around.config.appliance.state)) {
     if (!entry.is_regular_file()) continue;
     std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
     file.seekp(100);  // behind the header
     file << std::string(fs::file_size(entry.path()), 'x');
   }
   EXPECT_EQ(appliance.WebStatus().state, web::ApplianceState::kNoSensor);
-  EventLoop::Source timer = loop.MakeTimer("end", [&] { loop.Quit(0); });
+  EventLoop::Source timer = around.loop.MakeTimer("end", [&] { around.loop.Quit(0); });
   timer.ArmAfter(std::chrono::milliseconds(50));
-  EXPECT_EQ(loop.Run(), 0);
+  EXPECT_EQ(around.loop.Run(), 0);
   EXPECT_THAT(appliance.storage_fault(), HasSubstr("damaged"));
   EXPECT_FALSE(appliance.WebStatus().fault.empty());
   EXPECT_FALSE(appliance.Health().ok);
@@ -84,23 +92,19 @@ TEST(ApplianceStorage, AnAuditLogThatWasChangedFromOutsideIsReported) {
   for (const char* change : {"", "UPDATE audit SET user = 'bert' WHERE number = 2",
                              "DELETE FROM audit WHERE number = (SELECT max(number) FROM audit)"}) {
     SCOPED_TRACE(change);
-    const testing::TempFolder folder;
-    testing::FakeBus bus;
-    EventLoop loop;
-    Config config;
-    config.appliance.state = folder / "state";
+    Surroundings around;
     {
-      Store store(config.appliance.state);
+      Store store(around.config.appliance.state);
       for (int i = 0; i < 3; ++i)
         store.audit.Log({.user = "anna", .address = {}}, "note", "", std::to_string(i));
     }
     {
-      Database direct(config.appliance.state / "plumb.db", Database::Access::kReadWrite);
+      Database direct(around.config.appliance.state / "plumb.db", Database::Access::kReadWrite);
       direct.Execute(std::string("DROP TRIGGER IF EXISTS audit_no_update; DROP TRIGGER IF EXISTS "
                                  "audit_no_delete; ") +
                      change);
     }
-    Appliance appliance(loop, PartsOf(config, bus));
+    Appliance appliance(around.loop, PartsOf(around.config, around.bus));
     const auto is_told = [&] {
       const std::vector<std::string> warnings = appliance.WebStatus().storage.warnings;
       return std::any_of(warnings.begin(), warnings.end(), [](const std::string& warning) {
@@ -108,55 +112,47 @@ TEST(ApplianceStorage, AnAuditLogThatWasChangedFromOutsideIsReported) {
       });
     };
     if (*change != '\0') {
-      EXPECT_TRUE(RunUntil(loop, is_told));
+      EXPECT_TRUE(RunUntil(around.loop, is_told));
       continue;
     }
-    EventLoop::Source end = loop.MakeTimer("end", [&] { loop.Quit(0); });
+    EventLoop::Source end = around.loop.MakeTimer("end", [&] { around.loop.Quit(0); });
     end.ArmAfter(std::chrono::milliseconds(300));
-    (void)loop.Run();
+    (void)around.loop.Run();
     EXPECT_FALSE(is_told());
   }
 }
 
 TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
-  const testing::TempFolder folder;
-  testing::FakeBus bus;
-  EventLoop loop;
-  Config config;
-  config.appliance.state = folder / "state";
+  Surroundings around;
   {
-    Store store(config.appliance.state);
+    Store store(around.config.appliance.state);
     web::Settings settings;
     settings.idle_logout_min = 7;
     store.settings.Change({.user = "anna", .address = {}}, settings);
   }
   const auto set = [&](const std::string& text) {
-    Database(config.appliance.state / "plumb.db", Database::Access::kReadWrite)
+    Database(around.config.appliance.state / "plumb.db", Database::Access::kReadWrite)
         .Execute("UPDATE settings SET value = '" + text + "' WHERE name = 'settings'");
   };
   {
-    Appliance appliance(loop, PartsOf(config, bus));
+    Appliance appliance(around.loop, PartsOf(around.config, around.bus));
     StoreAccess access(appliance);
     EXPECT_EQ(WebSettings(access).GetSettings().idle_logout_min, 7);
   }
   set("{");
-  Appliance appliance(loop, PartsOf(config, bus));
+  Appliance appliance(around.loop, PartsOf(around.config, around.bus));
   StoreAccess access(appliance);
   EXPECT_THAT(testing::MessageOf<IoError>([&] { (void)WebSettings(access).GetSettings(); }),
               HasSubstr("what is stored cannot be read: "));
 }
 
 TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {
-  const testing::TempFolder folder;
-  testing::FakeBus bus;
-  EventLoop loop;
-  Config config;
-  config.appliance.state = folder / "state";
+  Surroundings around;
   {
-    Appliance appliance(loop, PartsOf(config, bus));
+    Appliance appliance(around.loop, PartsOf(around.config, around.bus));
     EXPECT_TRUE(appliance.BackupTarget().empty());
     std::optional<std::string> made, refused;
-    appliance.BackUp({.user = "anna", .address = {}}, folder / "backup",
+    appliance.BackUp({.user = "anna", .address = {}}, around.folder / "backup",
                      [&](const std::string& error, const BackupReport& report) {
                        made = error;
                        EXPECT_EQ(report.files, 1U);
@@ -164,40 +160,41 @@ TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {
     appliance.BackUp({.user = "anna", .address = {}}, "/proc/backup",
                      [&](const std::string& error, const BackupReport&) { refused = error; });
     EXPECT_FALSE(made || refused) << "the loop does not wait";
-    EXPECT_TRUE(RunUntil(loop, [&] { return made && refused; }));
+    EXPECT_TRUE(RunUntil(around.loop, [&] { return made && refused; }));
     EXPECT_EQ(made, "");
     EXPECT_THAT(refused.value_or(""), HasSubstr("/proc"));
   }
-  EXPECT_EQ(RestoreBackup(folder / "backup", folder / "restored").files, 1U);
+  EXPECT_EQ(RestoreBackup(around.folder / "backup", around.folder / "restored").files, 1U);
   // With a key in the configuration every backup is encrypted, the clock's and the page's too.
-  std::ofstream(folder / "key") << "a passphrase of some length\n";
-  fs::permissions(folder / "key", fs::perms::owner_read | fs::perms::owner_write);
+  std::ofstream(around.folder / "key") << "a passphrase of some length\n";
+  fs::permissions(around.folder / "key", fs::perms::owner_read | fs::perms::owner_write);
   {
-    ApplianceConfig& appliance_config = config.appliance;
-    appliance_config.backup_key_file = folder / "key";
+    ApplianceConfig& appliance_config = around.config.appliance;
+    appliance_config.backup_key_file = around.folder / "key";
     EventLoop another;
-    Appliance appliance(another, PartsOf(config, bus));
+    Appliance appliance(another, PartsOf(around.config, around.bus));
     std::optional<std::string> made, refused;
-    appliance.BackUp({.user = "anna", .address = {}}, folder / "sealed",
+    appliance.BackUp({.user = "anna", .address = {}}, around.folder / "sealed",
                      [&](const std::string& error, const BackupReport&) { made = error; });
     appliance.BackUp(
-        {.user = "anna", .address = {}}, folder / "none",
+        {.user = "anna", .address = {}}, around.folder / "none",
         [&](const std::string& error, const BackupReport&) { refused = error; },
-        folder / "no-such-key");
+        around.folder / "no-such-key");
     EXPECT_TRUE(RunUntil(another, [&] { return made && refused; }));
     EXPECT_EQ(made, "");
     EXPECT_THAT(refused.value_or(""), HasSubstr("no-such-key"));
-    EXPECT_FALSE(fs::exists(folder / "none"));
+    EXPECT_FALSE(fs::exists(around.folder / "none"));
   }
-  EXPECT_THROW((void)RestoreBackup(folder / "sealed", folder / "opened"), DataError);
-  const BackupSecret secret(folder / "key");
-  EXPECT_EQ(RestoreBackup(folder / "sealed", folder / "opened", {}, &secret).files, 1U);
+  EXPECT_THROW((void)RestoreBackup(around.folder / "sealed", around.folder / "opened"), DataError);
+  const BackupSecret secret(around.folder / "key");
+  EXPECT_EQ(RestoreBackup(around.folder / "sealed", around.folder / "opened", {}, &secret).files,
+            1U);
   {
-    std::ofstream(config.appliance.state / "plumb.db") << std::string(20000, 'x');
+    std::ofstream(around.config.appliance.state / "plumb.db") << std::string(20000, 'x');
     EventLoop another;
-    Appliance appliance(another, PartsOf(config, bus));
+    Appliance appliance(another, PartsOf(around.config, around.bus));
     std::string answer;
-    appliance.BackUp({.user = "anna", .address = {}}, folder / "other",
+    appliance.BackUp({.user = "anna", .address = {}}, around.folder / "other",
                      [&](const std::string& error, const BackupReport&) { answer = error; });
     EXPECT_THAT(answer, HasSubstr("safe mode"));
   }
