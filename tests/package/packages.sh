@@ -1,9 +1,16 @@
 #!/usr/bin/env bash
 # Makes the packages of a build twice and looks into them.
 #   packages.sh BUILD_FOLDER WORK_FOLDER
-# Exit code 77: it cannot run here, and the last line says why.
+# Packages for another processor are checked too; their programs run in QEMU. Exit code 77: it
+# cannot run here, and the last line says why.
 set -euo pipefail
 build=$(realpath "$1") here=$(cd "$(dirname "$0")" && pwd)
+sysroot=$(sed -n 's/^PLUMB_SYSROOT:PATH=//p' "$build/CMakeCache.txt")
+multiarch=$(dpkg-architecture -qDEB_HOST_MULTIARCH) run=()
+if [ -n "$sysroot" ]; then
+  multiarch=aarch64-linux-gnu
+  run=(qemu-aarch64-static -L "$sysroot" -E "LD_LIBRARY_PATH=/usr/lib/$multiarch/blas:/usr/lib/$multiarch/lapack")
+fi
 source=$(cd "$here/../.." && pwd)
 for program in dh lintian; do
   command -v $program >/dev/null || { echo "skipped: $program is missing: run toolchain/install"; exit 77; }
@@ -36,8 +43,8 @@ every_library_is_depended_upon() {
     while IFS= read -r file; do
       case "$file" in *libOpenNI2.so* | *libOniFile.so*) continue ;; esac
       for library in $(readelf -dW "$file" 2>/dev/null | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p'); do
-        owner=$(for path in {,/usr}/lib/"$(dpkg-architecture -qDEB_HOST_MULTIARCH)"/"$library"; do
-          dpkg -S "$path" 2>/dev/null || true; done | sed 's/:.*//' | sort -u | head -1)
+        owner=$(for path in "$sysroot"{,/usr}/lib/"$multiarch/$library"; do
+          dpkg-query ${sysroot:+--admindir="$sysroot/var/lib/dpkg"} -S "$path" 2>/dev/null || true; done | sed 's/:.*//' | sort -u | head -1)
         [[ $depends =~ [\ ,]"$owner"[\ ,\(] ]] || { echo "$package: $library of '$owner' is not in Depends:$depends"; bad=1; }
       done
     done < <(find "tree/$package" -type f)
@@ -62,25 +69,25 @@ check "manual, licence and units are in" files_are_there
 dpkg-deb -e once/plumbd_*.deb control
 check "the configuration is a conffile" grep -qx /etc/plumb/plumb.toml control/conffiles
 check "no maintainer script removes data" bash -c '! grep -nE "rm .*/var/lib|deluser|userdel" control/postrm control/prerm'
-check "the configuration as delivered is good" tree/plumbd/usr/bin/plumbd --config tree/plumbd/etc/plumb/plumb.toml --check-config
+check "the configuration as delivered is good" "${run[@]}" tree/plumbd/usr/bin/plumbd --config tree/plumbd/etc/plumb/plumb.toml --check-config
 # Every example in it too: a line "# key = ..." becomes one that counts.
 sed -E 's/^# ([a-z_]+ = )/\1/' tree/plumbd/etc/plumb/plumb.toml >examples.toml
-check "its examples are good" tree/plumbd/usr/bin/plumbd --config examples.toml --check-config
+check "its examples are good" "${run[@]}" tree/plumbd/usr/bin/plumbd --config examples.toml --check-config
 
 # Options in a page as man shows it, and those that --help prints.
 shown() { MANWIDTH=1000 man -l "$1" 2>/dev/null | col -b; }
 every_option_is_in_the_manual() {
   local command option bad=0 page
   page=$(shown tree/plumb/usr/share/man/man1/plumb.1.gz)
-  for command in $(tree/plumb/usr/bin/plumb --help | sed -n '/^Subcommands:/,/^$/s/^  \([a-z]\+\) .*/\1/p'); do
+  for command in $("${run[@]}" tree/plumb/usr/bin/plumb --help | sed -n '/^Subcommands:/,/^$/s/^  \([a-z]\+\) .*/\1/p'); do
     grep -q "plumb $command" <<<"$page" || { echo "plumb $command is not in plumb.1"; bad=1; }
-    for option in $(tree/plumb/usr/bin/plumb "$command" --help | grep -oE '^ +(-h,)?--[a-z-]+' | grep -oE '\-\-[a-z-]+'); do
+    for option in $("${run[@]}" tree/plumb/usr/bin/plumb "$command" --help | grep -oE '^ +(-h,)?--[a-z-]+' | grep -oE '\-\-[a-z-]+'); do
       grep -q -- "$option\b" <<<"$page" || { echo "plumb $command $option is not in plumb.1"; bad=1; }
     done
   done
   [ -n "$command" ] || { echo "plumb --help lists no command"; bad=1; }
   page=$(shown tree/plumbd/usr/share/man/man8/plumbd.8.gz)
-  for option in $(tree/plumbd/usr/bin/plumbd --help | grep -oE '^ +(-h,)?--[a-z-]+' | grep -oE '\-\-[a-z-]+'); do
+  for option in $("${run[@]}" tree/plumbd/usr/bin/plumbd --help | grep -oE '^ +(-h,)?--[a-z-]+' | grep -oE '\-\-[a-z-]+'); do
     grep -q -- "$option\b" <<<"$page" || { echo "plumbd $option is not in plumbd.8"; bad=1; }
   done
   return $bad
