@@ -84,6 +84,14 @@ std::vector<Eigen::Index> FreeTerms(const SensorSensitivity& a, const SensorSens
   return free;
 }
 
+// Whether the same unit may have made both scans, by what is known before their estimates are
+// compared.
+bool MayBeOneUnit(const SensorSensitivity& a, const SensorSensitivity& b) {
+  if (a.stated != b.stated) return false;
+  if (!a.serial.empty() && !b.serial.empty()) return a.serial == b.serial;
+  return a.stated_for_this_unit && b.stated_for_this_unit;
+}
+
 Eigen::VectorXd DriftVariance(const std::vector<Eigen::Index>& terms) {
   CalibrationVector sigma = DriftBetweenSweeps();
   sigma[kEdgeBiasAt] = kEdgeDrift_px;
@@ -128,7 +136,7 @@ std::optional<SharedSensor> JoinSensors(const SharedSensorInput& input) {
   const Eigen::MatrixXd P_c = kSharedErrors * kSharedErrors * c.covariance(free, free);
   SharedSensor result;
   result.covariance = G_r * P_r * G_r.transpose() + G_c * P_c * G_c.transpose();
-  if (!r.stated_for_this_unit || !c.stated_for_this_unit || r.stated != c.stated) return result;
+  if (!MayBeOneUnit(r, c)) return result;
 
   Eigen::MatrixXd S = P_r + P_c;
   S.diagonal() += DriftVariance(free);

@@ -269,6 +269,7 @@ struct Reconstructor::Impl {
       scene.sensitivity = SensitivityOf(info.intrinsics, joint.calibration, joint.posterior, map,
                                         *info.reference_marker);
       scene.sensitivity->stated_for_this_unit = !info.intrinsics_assumed;
+      scene.sensitivity->serial = options.sensor_serial;
     }
     if (options.profile)
       scene.sensor_profile =

@@ -28,6 +28,8 @@ struct ReconstructorOptions {
   /// Spacing of the keyframes relative to the default, 0.5 to 2. Accuracy figures should hold for
   /// several spacings.
   double keyframe_spacing = 1.0;
+  /// Serial number of the sensor, for `SensorSensitivity::serial`; empty if unknown.
+  std::string sensor_serial;
   /// Profile of the sensor unit. Without one the sweep starts from the stated calibration.
   std::optional<SensorProfile> profile;
   /// Called by Finish() with the profile updated by this sweep, unless the sweep's own checks

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -26,6 +27,9 @@ struct SensorSensitivity {
   Intrinsics stated;  ///< What the estimate corrects.
   /// False: the stated intrinsics are nominal ones, which many units share.
   bool stated_for_this_unit = false;
+  /// Serial number of the sensor; empty if unknown. Units that share nominal intrinsics differ by
+  /// it.
+  std::string serial;
   Eigen::VectorXd estimate;
   /// Of the estimate. A term that the sweep was not free to change has none, here and in the
   /// derivatives.

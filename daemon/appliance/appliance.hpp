@@ -211,6 +211,8 @@ class Appliance {
   [[nodiscard]] std::optional<RoomAxes> RoomOfJob() const;
   void ReportRoom(web::Status& status) const;
   [[nodiscard]] std::shared_ptr<UnitProfile> MakeUnitProfile();
+  /// Empty if the unit has none of its own: some sensors are known only by their port.
+  [[nodiscard]] static std::string OwnSerial(const SensorDescription& sensor);
   [[nodiscard]] std::string WhyNoProfile(const SensorDescription& sensor) const;
   [[nodiscard]] static bool ProfilesOff(const Config& config);
   [[nodiscard]] ScanCallbacks MakeCheckCallbacks(const NewScan& scan);

@@ -29,11 +29,14 @@ bool Appliance::ProfilesOff(const Config& config) {
   return !config.appliance.sensor_profiles || config.reconstruct.preset != Preset::kBest;
 }
 
+std::string Appliance::OwnSerial(const SensorDescription& sensor) {
+  return sensor.serial == sensor.uri ? std::string() : sensor.serial;
+}
+
 /// Empty if a profile is kept.
 std::string Appliance::WhyNoProfile(const SensorDescription& sensor) const {
   if (profiles_off_) return "profiles are switched off in the configuration";
-  if (sensor.serial.empty() || sensor.serial == sensor.uri)
-    return "it has no serial by which it would be known again";
+  if (OwnSerial(sensor).empty()) return "it has no serial by which it would be known again";
   return {};
 }
 

@@ -66,8 +66,10 @@ void Appliance::BeginSession() {
 
 ScanJob Appliance::MakeJob(const web::Settings& settings) {
   ScanJob job;
-  job.info = sensors_->snapshot().info;
+  const SensorSnapshot sensor = sensors_->snapshot();
+  job.info = sensor.info;
   job.reconstructor = parts_.config.reconstruct;
+  job.reconstructor.sensor_serial = OwnSerial(sensor.sensor);
   job.reconstructor.keep_color = false;  // only the shape of a patient is stored
   job.keep_recording = parts_.config.appliance.keep_recordings || settings.keep_recordings;
   job.unit_profile = MakeUnitProfile();

@@ -16,6 +16,7 @@ using Json = nlohmann::ordered_json;
 constexpr int kFormat = 1;
 constexpr std::size_t kMaxTerms = 256;
 constexpr std::size_t kMaxPatches = 4096;
+constexpr std::size_t kMaxSerialBytes = 256;
 constexpr std::size_t kMaxMarkers = 4096;
 constexpr double kLargest = 1e12;
 
@@ -92,6 +93,7 @@ std::string SensitivityJson(const SensorSensitivity& sensitivity) {
   json["format"] = kFormat;
   json["stated"] = IntrinsicsJson(sensitivity.stated);
   json["stated_for_this_unit"] = sensitivity.stated_for_this_unit;
+  json["serial"] = sensitivity.serial;
   json["estimate"] = Json::array();
   json["covariance"] = Json::array();
   for (Eigen::Index i = 0; i < sensitivity.estimate.size(); ++i) {
@@ -127,6 +129,10 @@ SensorSensitivity ParseSensitivityJson(std::string_view text, const std::string&
   const Json& own = reader.At(json, "stated_for_this_unit");
   if (!own.is_boolean()) reader.Fail("stated_for_this_unit is neither true nor false");
   result.stated_for_this_unit = own.get<bool>();
+  const Json& serial = reader.At(json, "serial");
+  if (!serial.is_string() || serial.get_ref<const std::string&>().size() > kMaxSerialBytes)
+    reader.Fail(fmt::format("serial is no text of at most {} bytes", kMaxSerialBytes));
+  result.serial = serial.get<std::string>();
   const Json& estimate = reader.At(json, "estimate");
   const std::size_t terms = estimate.size();
   if (terms == 0 || terms > kMaxTerms) reader.Fail("estimate has no or too many terms");

@@ -70,6 +70,13 @@ class DaemonSensorTest : public ::testing::Test {
     return ParseCameraFile(ReadTextFile(scan / "recording" / "camera.yaml", 1 << 16), "").color.fx;
   }
 
+  /// Whose estimate of the calibration a stored scan contains.
+  [[nodiscard]] static json SerialOf(const Plumbd& plumbd, const json& result) {
+    const fs::path scan =
+        plumbd.state() / "scans" / result["last_result"]["scan"].get<std::string>();
+    return json::parse(ReadTextFile(scan / "scene" / "sensitivity.json", 1 << 24))["serial"];
+  }
+
   static json WaitForSensor(Plumbd& plumbd, const std::string& serial) {
     return plumbd.WaitFor("ready with " + serial, [&](const json& s) {
       return s["state"] == "ready" && s["sensor"]["serial"] == serial;
@@ -102,7 +109,9 @@ TEST_F(DaemonSensorTest, ReplacedWhileIdleTheOtherUnitIsToldAndUsedWithItsOwnCal
   plumbd.Sim("plug", kSecond);
   EXPECT_EQ(WaitForSensor(plumbd, kSecond)["sensor"]["calibrated"], true);
   plumbd.WaitForLog("VIRTUAL-0002 instead of VIRTUAL-0001");
-  EXPECT_NEAR(FocalLengthOf(plumbd, plumbd.ScanOnce()), focal, 1e-6);
+  const json result = plumbd.ScanOnce();
+  EXPECT_NEAR(FocalLengthOf(plumbd, result), focal, 1e-6);
+  EXPECT_EQ(SerialOf(plumbd, result), kSecond);
   plumbd.Sim("unplug");
   plumbd.WaitForState("no_sensor");
   plumbd.Sim("plug", "UNKNOWN-7");

@@ -122,6 +122,20 @@ TEST(SharedSensorTest, NominalIntrinsicsBelongToNoUnit) {
   EXPECT_FALSE(Join(nominal, SceneWith(1.0, 0.5))->one_unit);
 }
 
+TEST(SharedSensorTest, TheSerialTellsUnitsApart) {
+  const auto unit = [](const std::string& serial, bool calibrated) {
+    Scene scene = SceneWith(1.0, 0.5);
+    scene.sensitivity->serial = serial;
+    scene.sensitivity->stated_for_this_unit = calibrated;
+    return scene;
+  };
+  EXPECT_TRUE(Join(unit("A", false), unit("A", false))->one_unit) << "nominal intrinsics";
+  EXPECT_FALSE(Join(unit("A", false), unit("B", false))->one_unit);
+  EXPECT_FALSE(Join(unit("A", true), unit("B", true))->one_unit) << "a copied calibration file";
+  EXPECT_FALSE(Join(unit("A", false), unit("", false))->one_unit);
+  EXPECT_TRUE(Join(unit("A", true), unit("", true))->one_unit) << "a recording has no serial";
+}
+
 TEST(SharedSensorTest, EstimatesThatContradictEachOtherAreOfTwoUnits) {
   const double sigma = std::sqrt(2 * 0.25 + DriftPx() * DriftPx());
   const double limit = std::sqrt(ChiSquareLimit(1)) * sigma;

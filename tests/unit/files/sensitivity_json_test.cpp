@@ -14,6 +14,7 @@ SensorSensitivity Sample() {
   SensorSensitivity s;
   s.stated = {640, 480, 525.5, 524.25, 319.5, 239.5, {0.1, -0.2, 0.001, 0.002, 0.05}};
   s.stated_for_this_unit = true;
+  s.serial = "1804060024";
   s.estimate = Eigen::Vector3d(0.001, -1.25, 3.0 / 7.0);
   s.covariance = Eigen::Matrix3d::Zero();
   s.covariance << 4, 1, 0.5, 1, 9, 0.25, 0.5, 0.25, 1.0 / 3.0;
@@ -29,6 +30,7 @@ TEST(SensitivityJsonTest, ComesBackAsItWas) {
   const SensorSensitivity read = ParseSensitivityJson(SensitivityJson(s), "sensitivity.json");
   EXPECT_EQ(read.stated, s.stated);
   EXPECT_TRUE(read.stated_for_this_unit);
+  EXPECT_EQ(read.serial, "1804060024");
   EXPECT_EQ(read.estimate, s.estimate);
   EXPECT_EQ(read.covariance, s.covariance);
   ASSERT_EQ(read.surface.size(), 1U);
@@ -52,6 +54,8 @@ TEST(SensitivityJsonTest, WrongFilesAreRefusedByName) {
            message.find(what) != std::string::npos;
   };
   EXPECT_TRUE(contains(refused(good, "\"format\":1", "\"format\":2"), "format"));
+  EXPECT_TRUE(contains(refused(good, "\"serial\":\"1804060024\"", "\"serial\":7"), "serial"));
+  EXPECT_TRUE(contains(refused(good, "1804060024", std::string(257, 'S')), "serial"));
   EXPECT_TRUE(contains(refused(good, "\"weight\":75.0", "\"weight\":0"), "weight"));
   EXPECT_TRUE(contains(refused(good, "\"7\":[", "\"x\":["), "id"));
   EXPECT_TRUE(contains(refused(good, "\"7\":[0.5,", "\"7\":["), "derivative"));
