@@ -109,8 +109,9 @@ function marks(view, compass, size) {
     const y = view.height / 2 - dy * reach;
     const wide = 0.35 * size * text[name].length + 1.2 * size;
     const side = wide + along * Math.abs(dx);
+    const ticks = 2.2 * size;  // the numbers of the axis at the left edge
     return svg('text', {
-      x: Math.max(side, Math.min(view.width - side, x)),
+      x: Math.max(side + ticks, Math.min(view.width - side, x)),
       y: Math.max(1.6 * size + down * Math.abs(dy),
         Math.min(view.height - 2.6 * size - down * Math.abs(dy), y)) + 0.35 * size,
       class: `way ${name}`, 'data-mark': name,

@@ -1,0 +1,274 @@
+// A whole day on the real appliance with its virtual sensor, as people work through it: the room's calibration, the daily check, a reference,
+// its plan, the approval by a second person, three fractions with moves and accepts, and the report.
+// day_test.mjs NODE_MODULES PLUMBD PLUMB OUT_FOLDER CHROMIUM
+import { execFile } from 'node:child_process';
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { promisify } from 'node:util';
+import { Harness } from './harness.mjs';
+
+const [modules, plumbd, plumb, folder, chromium] = process.argv.slice(2);
+const socket = join(folder, 'data', 'control.sock');
+const kReference = 3;  // scenes: three of the board, the body, the body moved
+const kMoved = 4;
+const kScenes = 5;
+// Small and short sweeps: what is tested is the way through the day, not the accuracy.
+const h = await Harness.start({ modules, folder, chromium, command: [plumbd, '--simulated', 'demo', '--sim-board', '--sim-size', '320x240',
+  '--sim-scenes', String(kScenes), '--sim-frames', '120', '--state', 'FOLDER', '--listen', '127.0.0.1:0', '--control', socket] });
+const { check, equal } = h;
+const kSlow = { timeout: 180000 };
+const run = promisify(execFile);
+let shown = 0;
+/// The next scene of the last one is the first.
+async function scene(number) {
+  for (; shown !== number; shown = (shown + 1) % kScenes) await run(plumb, ['--control', socket, 'sim', 'next-scene']);
+}
+const button = () => run(plumb, ['--control', socket, 'press']);
+
+const engineer = await h.person('engineer');
+const anna = await h.person('anna', { width: 1280, height: 800 });
+const bob = await h.person('bob');
+const clara = await h.person('clara');
+const room = await h.person('room');
+
+const state = async () => (await h.api(bob, 'status')).body;
+async function until(what, holds) {
+  for (const begun = Date.now(); !holds(await state());) {
+    check(Date.now() - begun < kSlow.timeout, what);
+    await new Promise((ready) => { setTimeout(ready, 100); });
+  }
+}
+/// A sweep by the page, as the screen says; it ends by itself where nothing new is to be seen.
+async function scanOn(page) {
+  await page.getByRole('button', { name: /Start sweep|Scan again/ }).click(kSlow);
+  await page.getByRole('button', { name: 'End sweep' }).waitFor(kSlow);
+}
+/// The same by the button in the room.
+async function scanByButton() {
+  const before = (await state()).last_result?.id;
+  await button();
+  await until('a result', (status) => status.state === 'result' && status.last_result?.id !== before);
+}
+
+await h.step('first start, three accounts, and the screen in the room', async () => {
+  await h.firstStart(engineer);
+  await engineer.locator('.headline', { hasText: 'Ready' }).waitFor(kSlow);
+  await engineer.goto(`${h.url}#/users`);
+  for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'], ['clara', 'physicist']]) await h.addAccount(engineer, name, role);
+  await room.goto(`${h.url}room`);
+  await engineer.getByLabel('Code on the screen').fill(await room.locator('.pair-code').innerText());
+  await engineer.getByLabel('Name of the screen').fill('couch side');
+  await engineer.getByRole('button', { name: 'Pair the screen' }).click();
+  await room.locator('.room-code').waitFor(kSlow);
+  await engineer.goto(`${h.url}#/settings`);
+  await engineer.getByLabel('Stop a sweep after').fill('3');
+  await engineer.getByRole('button', { name: 'Save', exact: true }).click();
+  await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
+  for (const [page, name] of [[anna, 'anna'], [bob, 'bob'], [clara, 'clara']]) await h.logIn(page, name);
+  // The demo opens a patient of its own; this day has another one.
+  const { session } = await state();
+  if (session) equal((await h.api(anna, 'treatment/close', 'POST', { session_id: session.id })).status, 200, 'closed');
+});
+
+await h.step('the room is calibrated: three scans of the board, signed', async () => {
+  const card = bob.locator('.room-calibration');
+  for (const [number, said] of [[0, '1 of 3 scans of the board are there'], [1, '2 of 3 scans of the board are there'], [2, 'The newest 3 scans differ by']]) {
+    await scene(number);
+    await bob.goto(`${h.url}#/check`);
+    await card.getByRole('button', { name: 'Start a scan of the board' }).click();
+    await scanOn(bob);
+    await bob.waitForURL(/#\/check/, kSlow);
+    await card.getByText(said).waitFor(kSlow);
+  }
+  console.log(`    ${await card.getByText('The newest 3 scans differ').innerText()}`);
+  await card.getByLabel('Your password').fill(h.password);
+  await card.getByRole('button', { name: 'Sign the calibration' }).click();
+  await card.getByText(/Version 1, signed by bob/).waitFor();
+  await h.look(bob, 'calibration');
+});
+
+await h.step('the daily check: another person sets the baseline, the next one passes', async () => {
+  await scene(kReference);
+  const takeCheck = async (verdict) => {
+    await anna.goto(`${h.url}#/check`);
+    await anna.getByRole('button', { name: 'Start a check' }).click();
+    await anna.getByText('sweep over all markers of the room').waitFor();
+    await scanOn(anna);
+    await anna.waitForURL(/#\/check/, kSlow);
+    await anna.locator('.verdict', { hasText: verdict }).waitFor(kSlow);
+  };
+  await takeCheck('NO BASELINE');
+  await room.locator('.verdict', { hasText: 'NO BASELINE' }).waitFor(kSlow);
+  await clara.goto(`${h.url}#/check`);
+  await clara.getByRole('button', { name: 'Set as baseline' }).click();
+  await clara.getByText('set by clara').waitFor();
+  await takeCheck('PASSED');
+  await room.locator('.verdict', { hasText: 'PASSED' }).waitFor(kSlow);
+  await room.locator('.room-marks .good', { hasText: 'Daily check passed' }).waitFor();
+  await h.look(room, 'room-check', { fullPage: false });
+});
+
+await h.step('a new patient is scanned for a reference; it waits as a draft', async () => {
+  await anna.goto(`${h.url}#/patients`);
+  await anna.getByLabel('Code', { exact: true }).fill('PX-0100');
+  await anna.getByLabel('Site').fill('thorax');
+  await anna.getByRole('button', { name: 'Add a patient' }).click();
+  await anna.getByRole('button', { name: 'Scan a new reference' }).click();
+  await scanOn(anna);
+  await anna.getByText('Saved as draft version 1.').waitFor(kSlow);
+  await room.locator('.verdict', { hasText: 'REFERENCE SCANNED' }).waitFor(kSlow);
+  await anna.goto(`${h.url}#/status`);
+  await anna.locator('.tile', { hasText: 'Waiting for approval' }).getByText('PX-0100').waitFor();
+  await h.look(anna, 'waiting');
+});
+
+await h.step('one physicist plans, a second one approves', async () => {
+  await bob.goto(`${h.url}#/status`);
+  await bob.locator('.tile', { hasText: 'Waiting for approval' }).getByRole('link', { name: 'PX-0100' }).click();
+  const map = bob.getByRole('application');
+  await map.scrollIntoViewIfNeeded();
+  const box = await map.boundingBox();
+  for (const [x, y] of [[0.35, 0.35], [0.65, 0.35], [0.65, 0.65], [0.35, 0.65]]) await bob.mouse.click(box.x + x * box.width, box.y + y * box.height);
+  await bob.getByText('4 corners').waitFor();
+  await map.press('i');
+  // Wider than usual: sweeps of this size leave 1 to 2 mm of uncertainty.
+  await bob.getByLabel('Shifts (mm)').fill('6');
+  await bob.getByLabel('Rotations (degrees)').fill('3');
+  await h.look(bob, 'plan');
+  await bob.getByRole('button', { name: 'Save plan' }).click();
+  await bob.getByRole('status').getByText('Plan saved.').waitFor({ state: 'attached' });
+  await clara.goto(`${h.url}${new URL(bob.url()).hash}`);
+  await clara.getByRole('button', { name: 'Review and approve' }).click();
+  await h.look(clara, 'approval');
+  await h.sign(clara);
+  await clara.getByText('approved by clara').waitFor();
+});
+
+async function openSession(fraction) {
+  await anna.goto(`${h.url}#/patients`);
+  await anna.getByRole('link', { name: 'PX-0100', exact: true }).click();
+  await anna.getByRole('button', { name: 'Start treatment session' }).click();
+  await anna.locator('.who-line', { hasText: `Fraction ${fraction}` }).waitFor();
+}
+async function closeSession() {
+  await anna.goto(`${h.url}#/scan`);
+  await anna.getByRole('button', { name: 'Close session' }).click();
+  await anna.getByText('No session open').first().waitFor();
+}
+const verdict = (page, kind) => page.locator(`.verdict.${kind}`).waitFor(kSlow);
+
+await h.step('fraction 1: one tap to six numbers, the couch is moved, the next scan is accepted', async () => {
+  await openSession(1);
+  await scene(kMoved);
+  let taps = 0;
+  await anna.exposeFunction('plumbTapped', () => { ++taps; });
+  await anna.evaluate(() => addEventListener('pointerdown', () => globalThis.plumbTapped(), { capture: true }));
+  await scanOn(anna);
+  await verdict(anna, 'move');
+  equal(await anna.locator('.number').count(), 6, 'six numbers');
+  equal(taps, 1, 'taps from the open session to the numbers');
+  await verdict(room, 'move');
+  equal(await room.locator('.number').count(), 6, 'six numbers in the room');
+  await h.look(anna, 'fraction-1-move');
+  await h.look(room, 'room-move', { fullPage: false });
+  await scene(kReference);  // as if the couch had been moved
+  await scanByButton();
+  await verdict(anna, 'in_tolerance');
+  await verdict(room, 'in_tolerance');
+  await anna.getByRole('button', { name: 'Accept', exact: true }).click();
+  await anna.getByText(/Accepted by anna/).waitFor();
+  await closeSession();
+});
+
+await h.step('fraction 2: accepted outside tolerance, with a reason and the password', async () => {
+  await openSession(2);
+  await scene(kMoved);
+  await scanByButton();
+  await anna.goto(`${h.url}#/result`);
+  await verdict(anna, 'move');
+  await anna.getByText('Accept outside tolerance…').click();
+  await anna.getByLabel('Reason', { exact: true }).fill('the couch is at its end stop');
+  await anna.getByLabel('Your password').fill(h.password);
+  await anna.getByRole('button', { name: 'Accept outside tolerance' }).click();
+  await anna.getByText(/Accepted outside tolerance by anna, .*: the couch is at its end stop/).waitFor();
+  await closeSession();
+});
+
+await h.step('fraction 3: one press of the button, and the sweep ends by itself', async () => {
+  await openSession(3);
+  await scene(kReference);
+  await button();
+  await verdict(anna, 'in_tolerance');
+  await verdict(room, 'in_tolerance');
+  equal(await anna.locator('.number').count(), 6, 'six numbers');
+  await anna.getByRole('button', { name: 'Accept', exact: true }).click();
+  await anna.getByText(/Accepted by anna/).waitFor();
+  await anna.locator('.trend').first().waitFor();
+  await h.look(anna, 'fraction-3');
+  await closeSession();
+});
+
+await h.step('on a slow line: 1.5 MB at most before the map is there, 10 s at 1 Mbit/s', async () => {
+  const slow = await h.person('slow');
+  const line = await slow.context().newCDPSession(slow);
+  await line.send('Network.enable');
+  let bytes = 0;
+  line.on('Network.loadingFinished', ({ encodedDataLength }) => { bytes += encodedDataLength; });
+  await h.logIn(slow, 'bob');
+  await slow.locator('.tile').first().waitFor();
+  const { scans } = (await h.api(slow, 'scans')).body;
+  const moved = scans.filter(({ result }) => result?.verdict === 'move');
+  const seconds = async (one) => {
+    const begun = Date.now();
+    await slow.goto(`${h.url}#/result/${one.id}`);
+    await slow.locator('canvas.map[data-map=before]').waitFor(kSlow);
+    return (Date.now() - begun) / 1000;
+  };
+  // What this machine takes by itself, with whatever else it does, is not the line's.
+  const logIn = bytes;
+  const own = await seconds(moved[1]);
+  await slow.goto(`${h.url}#/status`);
+  await line.send('Network.emulateNetworkConditions', { offline: false, latency: 50, downloadThroughput: 125000, uploadThroughput: 125000 });
+  bytes = logIn;
+  const whole = await seconds(moved[0]);
+  console.log(`    ${bytes} bytes since the login page, ${bytes - logIn} of them for the result; the map after ${whole.toFixed(1)} s, ${own.toFixed(1)} s on a fast line`);
+  check(bytes < 1.5e6, `at most 1.5 MB before the map is there, found ${bytes} bytes`);
+  check(whole < 10 + own, `the map is there within 10 s on a slow line, found ${whole} s, ${own} s on a fast one`);
+  await slow.context().close();
+});
+
+await h.step('the history, the reports and the log tell the day in the words that people know', async () => {
+  await clara.goto(`${h.url}#/patients`);
+  await clara.getByRole('link', { name: 'PX-0100', exact: true }).click();
+  await clara.getByRole('region', { name: 'Scans' }).locator('tbody tr').nth(4).waitFor();
+  const rows = await clara.getByRole('region', { name: 'Scans' }).locator('tbody tr').allInnerTexts();
+  equal(rows.length, 5, 'a reference and four scans');
+  equal(rows.filter((row) => row.includes('anna')).length, 3, 'three were accepted');
+  await h.look(clara, 'patient');
+  const { scans } = (await h.api(clara, `patients/${clara.url().split('/').at(-1)}/scans`)).body;
+  const fetched = (path) => clara.evaluate(async (where) => {
+    const response = await fetch(`/api/v1/${where}`);
+    return { status: response.status, bytes: [...new Uint8Array(await response.arrayBuffer())] };
+  }, path);
+  for (const [name, path] of [['report', `scans/${scans[0].id}/report.pdf`], ['report-outside', `scans/${scans[1].id}/report.pdf`],
+    ['report-es', `scans/${scans[0].id}/report.pdf?language=es`], ['course', `patients/${scans[0].patient_id}/report.pdf`],
+    ['course-es', `patients/${scans[0].patient_id}/report.pdf?language=es`]]) {
+    const { status, bytes } = await fetched(path);
+    equal(status, 200, path);
+    equal(Buffer.from(bytes.slice(0, 5)).toString(), '%PDF-', `${path} is a PDF`);
+    writeFileSync(h.file(`${name}.pdf`), Buffer.from(bytes));
+  }
+  await clara.goto(`${h.url}#/audit`);
+  await clara.getByRole('cell', { name: 'Scan accepted outside tolerance' }).waitFor();
+  const on = async (action) => (await clara.locator('tbody tr', { has: clara.getByRole('cell', { name: action, exact: true }) }).first()
+    .locator('td').nth(3).innerText());
+  equal(await on('Reference approved'), 'PX-0100, reference version 1', 'the approval');
+  equal(await on('Session opened'), 'PX-0100, Fraction 3', 'the newest session');
+  equal(await on('Scan accepted'), `PX-0100, scan ${scans[0].id}`, 'the newest accept');
+  equal(await on('Patient added'), 'PX-0100', 'the patient');
+  equal(await on('Screen paired'), 'couch side', 'the screen');
+  check(/^check of /.test(await on('Baseline set')), `the check: ${await on('Baseline set')}`);
+  await h.look(clara, 'audit');
+});
+
+await h.finish();
