@@ -28,7 +28,8 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
     : loop_(loop),
       parts_(std::move(parts)),
       profiles_(std::make_shared<ProfileShelf>(parts_.config.appliance.state / "sensor-profiles")),
-      profiles_off_(ProfilesOff(parts_.config)) {
+      profiles_off_(ProfilesOff(parts_.config)),
+      warm_up_min_(parts_.config.appliance.warm_up_min) {
   OpenStore();
   RefreshRoom();
   result_timer_ =
@@ -299,6 +300,7 @@ void Appliance::Reload(const Config& config) {
   const std::vector<std::string> kept = KeepUntilRestart(parts_.config, next);
   parts_.config = std::move(next);
   profiles_off_ = ProfilesOff(parts_.config);
+  warm_up_min_ = parts_.config.appliance.warm_up_min;
   RefreshRoom();
   Log(LogLevel::kInfo, "the configuration was read again");
   if (!kept.empty())

@@ -86,6 +86,8 @@ class Appliance {
   ///         confirmed by a check of the same day (CheckStore::ConfirmsScan), or has to be
   ///         repeated.
   [[nodiscard]] std::string WhyNoReference(const std::optional<web::Scan>& scan = {});
+  /// Time that the sensor must have been on before a reference scan; from any thread.
+  [[nodiscard]] double warm_up_min() const { return warm_up_min_; }
   /// The session that the store has opened: scans belong to it until it is closed.
   void OpenSession(const std::string& session_id, const std::string& patient_id,
                    web::ScanPurpose purpose, const std::string& reason, const web::Actor& actor);
@@ -265,6 +267,7 @@ class Appliance {
   bool backup_is_beside_scans_ = false;  ///< The last one to the configured folder.
   std::shared_ptr<ProfileShelf> profiles_;
   std::atomic<bool> profiles_off_;
+  std::atomic<double> warm_up_min_;
   std::string profile_fault_;  ///< The sensor's contradiction of its profile in the last scan.
   std::function<std::string()> blocking_reason_;
   int ticks_to_disk_check_ = kDiskCheckTicks;

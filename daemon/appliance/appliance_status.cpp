@@ -285,7 +285,8 @@ web::Status Appliance::WebStatus() {
                    .serial = sensor.sensor.serial,
                    .name = sensor.sensor.name,
                    .frames_per_second = sensor.present ? sensor.statistics.frames_per_second : 0.0,
-                   .powered_s = sensor.present ? SecondsSince(sensor_since_) : 0.0};
+                   .powered_s = sensor.present ? SecondsSince(sensor_since_) : 0.0,
+                   .warm_up_s = 60 * warm_up_min()};
   if (const auto space = SpaceForScans()) {
     status.storage = {.free_bytes = static_cast<std::int64_t>(space->available),
                       .total_bytes = static_cast<std::int64_t>(space->capacity)};
@@ -350,20 +351,19 @@ std::string Appliance::WhyNoReference(const std::optional<web::Scan>& scan) {
 
 /// Depth drifts while a sensor warms up: a reference would keep that error for a whole course.
 std::string Appliance::WhySensorIsCold(const std::optional<web::Scan>& scan) const {
-  const double warm_up_min = parts_.config.appliance.warm_up_min;
   const std::optional<double> on_s = scan ? scan->sensor_on_s : SecondsSinceSensor();
-  if (!on_s || *on_s >= 60 * warm_up_min) return {};
+  if (!on_s || *on_s >= 60 * warm_up_min()) return {};
   if (scan) {
     return fmt::format(
         "the sensor was still warming up at this scan, and references need one that has been on "
         "for {:g} min: scan the reference again",
-        warm_up_min);
+        warm_up_min());
   }
   return fmt::format(
       "the sensor is still warming up, and references need one that has been on for {:g} min: "
       "wait, "
       "then scan",
-      warm_up_min);
+      warm_up_min());
 }
 
 void Appliance::ReadStored(web::Status& status) {

@@ -22,7 +22,6 @@ namespace {
 using Json = nlohmann::json;
 using web::Language;
 
-constexpr double kWarmUp_s = 15 * 60;
 constexpr double kManyLost = 0.05;
 constexpr int kMaxScans = 1000;
 constexpr std::size_t kMaxJsonBytes = std::size_t{16} << 20;
@@ -163,7 +162,7 @@ ReportFacts QualityOf(const web::Scan& scan, const Json& scene, const Json& resu
   return facts;
 }
 
-std::vector<std::string> CautionsOf(const web::Scan& scan, const Json& scene,
+std::vector<std::string> CautionsOf(const web::Scan& scan, const Json& scene, double warm_up_min,
                                     const ReportWords& words) {
   std::vector<std::string> cautions;
   if (scene.is_object() && scene.contains("frames")) {
@@ -172,7 +171,8 @@ std::vector<std::string> CautionsOf(const web::Scan& scan, const Json& scene,
     if (total > 0 && lost / total >= kManyLost)
       cautions.push_back(Filled(words.frames_lost, 100 * lost / total));
   }
-  if (scan.sensor_on_s && *scan.sensor_on_s < kWarmUp_s) cautions.emplace_back(words.warming);
+  if (scan.sensor_on_s && *scan.sensor_on_s < 60 * warm_up_min)
+    cautions.emplace_back(words.warming);
   if (scan.check_overdue) cautions.emplace_back(words.terms.overdue);
   return cautions;
 }
@@ -289,7 +289,7 @@ ScanReport DescribeScan(const ReportSources& stored, const web::Scan& scan, Lang
                     .why = WhyOf(scan, language),
                     .identity = IdentityOf(scan, patient, reference, words),
                     .numbers = NumbersOf(scan, tolerance, language),
-                    .cautions = CautionsOf(scan, scene, words),
+                    .cautions = CautionsOf(scan, scene, stored.warm_up_min, words),
                     .quality = QualityOf(scan, scene, result, words),
                     .body = {},
                     .pictures = PicturesOf(stored, scan, reference, result, words),

@@ -16,6 +16,7 @@ struct ReportSources {
   PatientStore& patients;
   ReferenceStore& references;
   ScanStore& scans;
+  double warm_up_min;  ///< Time that a sensor must have been on to be warm.
 };
 
 /// One page: identity, plan and approval, verdict, the six numbers with uncertainty and tolerance,

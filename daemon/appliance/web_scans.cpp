@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "daemon/appliance/reports.hpp"
 #include "daemon/files/compact_map.hpp"
 #include "daemon/loop/log.hpp"
 
@@ -12,11 +11,9 @@ namespace plumb {
 
 using web::ChangeResult;
 
-namespace {
-
-ReportSources SourcesIn(Store& store) { return {store.patients, store.references, store.scans}; }
-
-}  // namespace
+ReportSources WebScans::SourcesIn(Store& store) const {
+  return {store.patients, store.references, store.scans, appliance_.warm_up_min()};
+}
 
 std::vector<web::Scan> WebScans::Scans(const std::string& patient_id, int limit) {
   return store_.Read(&Store::scans,

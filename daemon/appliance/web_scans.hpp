@@ -1,6 +1,7 @@
 // The page's service for scans.
 #pragma once
 
+#include "daemon/appliance/reports.hpp"
 #include "daemon/appliance/store_access.hpp"
 #include "web/service/scan_service.hpp"
 
@@ -25,6 +26,8 @@ class WebScans : public web::ScanService {
                                                         web::Language language) override;
 
  private:
+  [[nodiscard]] ReportSources SourcesIn(Store& store) const;
+
   Appliance& appliance_;
   StoreAccess& store_;
 };

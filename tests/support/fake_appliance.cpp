@@ -12,7 +12,7 @@ using namespace web;  // NOLINT: a test's own names are none of these
 
 FakeAppliance::FakeAppliance() {
   status.state = ApplianceState::kReady;
-  status.sensor = {true, "1503150045", "Virtual Xtion", 30.0, 1800.0};
+  status.sensor = {true, "1503150045", "Virtual Xtion", 30.0, 1800.0, 1200.0};
   status.storage = {std::int64_t{182} << 30, std::int64_t{238} << 30, true};
   status.light = "ready";
   status.version = "0.1.0-test";

@@ -306,10 +306,10 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
         "open Daily check, sweep over all markers of the room, then go on here");
   if (name == "checked") service.SetOverdue("");
   if (name == "cold" || name == "warm") {
-    service.status.sensor.powered_s = name == "cold" ? 120 : 1800;
+    service.status.sensor.powered_s = name == "cold" ? 1020 : 1800;
     service.status.reference_block =
         name == "cold" ? "the sensor is still warming up, and references need one that has been on "
-                         "for 15 min: wait, then scan"
+                         "for 20 min: wait, then scan"
                        : "";
     service.Notify(web::EventKind::kStatus);
   }

@@ -330,7 +330,7 @@ await h.step('a cold sensor and lost frames are said beside the verdict; a cold 
   await flags.getByText('33 % of the frames were lost').waitFor();
   h.tell('cold');
   await scan();
-  await flags.getByText('The sensor had been on for only 2 min').waitFor();
+  await flags.getByText('The sensor had been on for only 17 min').waitFor();
   const { body: { session } } = await h.api(anna, 'status');
   await anna.goto(`${h.url}#/patient/${session.patient_id}`);
   await anna.getByText('The sensor is still warming up').waitFor();
@@ -339,6 +339,14 @@ await h.step('a cold sensor and lost frames are said beside the verdict; a cold 
   equal((await h.api(anna, `patients/${session.patient_id}/open`, 'POST', { purpose: 'reference', reason: 'colder', replaces: session.id })).status, 409,
     'the interface refuses too');
   await h.look(anna, 'patient-cold', { axe: false });
+  // The time is the one that is configured: here 20 min.
+  await anna.goto(`${h.url}#/status`);
+  await anna.getByText('during the first 20 min.').waitFor();
+  h.tell('warm');
+  await anna.getByText('during the first 20 min.').waitFor({ state: 'detached' });
+  h.tell('cold');
+  await anna.goBack();
+  await anna.getByText('The sensor is still warming up').waitFor();
   h.tell('warm');
   await anna.getByText('The sensor is still warming up').waitFor({ state: 'detached' });
   await scan();

@@ -158,13 +158,14 @@ export const live = {
   polls: 0,
   connected: true,
 
+  /// Returns a promise that is done once the first state is there, or cannot be had.
   open() {
     this.close();
     this.wanted = true;
-    this.refresh();
+    const first = this.refreshed();
     if (!channel) {
       this.lead();
-      return;
+      return first;
     }
     const before = now();
     this.pulse = before;
@@ -173,6 +174,7 @@ export const live = {
       const answered = this.pulse !== before;
       if (this.wanted && !this.leads && !answered && !document.hidden) this.lead();
     }, kHello_ms);
+    return first;
   },
   close() {
     this.wanted = false;

@@ -203,7 +203,7 @@ async function begin(message) {
     showFirstPassword(main, session.user, () => begin());
     return;
   }
-  live.open();
+  await live.open();  // screens use its settings
   await showFocused();
 }
 

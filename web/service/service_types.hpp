@@ -46,6 +46,7 @@ struct SensorStatus {
   std::string name;
   double frames_per_second = 0.0;
   double powered_s = 0.0;  ///< Time since it was attached, for warm-up.
+  double warm_up_s = 0.0;  ///< Time that it must have been on before a reference scan.
 };
 
 /// The running or processed scan.

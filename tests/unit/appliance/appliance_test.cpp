@@ -18,6 +18,7 @@
 #include "tests/support/board_checks.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "web/api/json.hpp"
 
 namespace plumb {
 namespace {
@@ -383,6 +384,26 @@ TEST_F(ApplianceTest, AColdSensorTakesNoReference) {
       EXPECT_EQ(appliance_->WhyNoReference(scan), "");
       scan.sensor_on_s.reset();
       EXPECT_EQ(appliance_->WhyNoReference(scan), "") << "not known: from an older version";
+    });
+  });
+}
+
+TEST_F(ApplianceTest, TheConfiguredWarmUpIsInThePagesStatus) {
+  parts_.demo_patient.clear();
+  const auto configure = [&](const std::string& text) {
+    parts_.config.appliance.warm_up_min = ParseConfig(text, "test.toml").appliance.warm_up_min;
+  };
+  configure("[appliance]\nwarm_up_min = 20\n");
+  Play([&] {
+    MakeReady();
+    const auto shown_s = [&] {
+      return web::ToJson(appliance_->WebStatus(), web::WallClock::now())["sensor"]["warm_up_s"];
+    };
+    On([&] {
+      EXPECT_EQ(shown_s(), 1200);
+      configure("[appliance]\nwarm_up_min = 7.5\n");
+      appliance_->Reload(parts_.config);
+      EXPECT_EQ(shown_s(), 450) << "read again";
     });
   });
 }

@@ -22,13 +22,15 @@ const web::Actor kClara{.user = "clara", .address = {}};
 
 class ReportsTest : public ::testing::Test {
  protected:
-  std::string Scan(const std::string& reference, const std::string& result, bool overdue = false) {
+  std::string Scan(const std::string& reference, const std::string& result, bool overdue = false,
+                   std::optional<double> sensor_on_s = {}) {
     const std::string id = store_.scans.Begin(
         {.patient_id = patient_,
          .reference_id = reference,
          .purpose = reference.empty() ? web::ScanPurpose::kReference : web::ScanPurpose::kFraction,
          .sensor_serial = "S1",
          .reason = "",
+         .sensor_on_s = sensor_on_s,
          .check_overdue = overdue});
     std::filesystem::create_directories(store_.folders.Staging(id) / "scene");
     WriteWholeFile(store_.folders.Staging(id) / "scene/scene.json",
@@ -51,7 +53,7 @@ class ReportsTest : public ::testing::Test {
 
   testing::TempFolder folder_;
   Store store_{folder_.path()};
-  ReportSources sources_{store_.patients, store_.references, store_.scans};
+  ReportSources sources_{store_.patients, store_.references, store_.scans, /*warm_up_min=*/20};
   std::string patient_ = store_.patients.Add(kAnna, "P-0042", "thorax");
 };
 
@@ -115,6 +117,16 @@ TEST_F(ReportsTest, AScanIsToldInTheLanguageThatIsAskedFor) {
     EXPECT_NE(english.identity[i].first, spanish.identity[i].first);
   }
   EXPECT_TRUE(PdfOf(spanish).starts_with("%PDF-"));
+}
+
+TEST_F(ReportsTest, ASensorThatWasOnForLessThanTheConfiguredTimeIsACaution) {
+  const auto cautions = [&](double sensor_on_s) {
+    const std::string id = Scan("", "", /*overdue=*/false, sensor_on_s);
+    return DescribeScan(sources_, *store_.scans.Find(id), Language::kEnglish).cautions;
+  };
+  // 20 min are configured.
+  EXPECT_THAT(cautions(1199), ::testing::Contains("The sensor was still warming up."));
+  EXPECT_THAT(cautions(1200), Not(::testing::Contains("The sensor was still warming up.")));
 }
 
 TEST_F(ReportsTest, NoAnswerGivesItsReasonAndNoNumbers) {

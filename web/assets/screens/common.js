@@ -3,7 +3,9 @@ import { get, live } from '../api.js';
 import { clear, h } from '../dom.js';
 import { S, translated } from '../strings.js';
 
-export const kWarmUp_s = 15 * 60;
+/// Of a time that the sensor has been on; how long it must be on is a setting of the appliance.
+export const isCold = (on_s) => on_s < live.status?.sensor.warm_up_s;
+export const minutesOf = (seconds) => Math.round(seconds / 6) / 10;
 export const kOldAfter_s = 120;
 
 const capital = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1)}`;
@@ -85,7 +87,7 @@ export function qualityFlags(scan, scene) {
   const { total = 0, dropped = 0 } = scene?.frames ?? {};
   const lost = total > 0 ? Math.round(100 * dropped / total) : 0;
   if (lost >= 5) flags.push(text.framesLost(lost));
-  if (scan.sensor_on_s !== null && scan.sensor_on_s !== undefined && scan.sensor_on_s < kWarmUp_s) {
+  if (scan.sensor_on_s !== null && scan.sensor_on_s !== undefined && isCold(scan.sensor_on_s)) {
     flags.push(text.warming(Math.floor(scan.sensor_on_s / 60)));
   }
   if (scan.check_overdue) flags.push(text.overdue);

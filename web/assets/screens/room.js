@@ -9,7 +9,7 @@ import { loadMap, paintErrors } from '../maps.js';
 import { sixNumbers, toleranceOf } from '../numbers.js';
 import { chooseLanguage, kLanguages, languageOf, S, translated } from '../strings.js';
 import {
-  ageText, faultWords, flagList, isAdvice, kWarmUp_s, sidesOf, sentence,
+  ageText, faultWords, flagList, isAdvice, isCold, minutesOf, sidesOf, sentence,
 } from './common.js';
 import { showFault, showLogin } from './login.js';
 import { preview, surfaceIn } from './scan.js';
@@ -58,7 +58,7 @@ async function pair(main, logIn) {
 function top(status, said) {
   const text = S.room;
   const { session, sensor } = status;
-  const warm = sensor.powered_s >= kWarmUp_s;
+  const warm = !isCold(sensor.powered_s);
   const mark = (good, words) => h('li', { class: good ? 'good' : 'bad' }, words);
   const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
   return h('header', { class: 'room-top' },
@@ -70,7 +70,7 @@ function top(status, said) {
     h('ul', { class: 'room-marks' },
       mark(!status.check_overdue, status.check_overdue ? text.checkOverdue : text.checkDone),
       sensor.present && mark(warm, warm ? text.warm
-        : text.warming(Math.floor(sensor.powered_s / 60)))));
+        : text.warming(Math.floor(sensor.powered_s / 60), minutesOf(sensor.warm_up_s)))));
 }
 
 /// Short words are 10 cm high on a screen of 40 inches; long ones take the width that there is.

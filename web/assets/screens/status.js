@@ -4,7 +4,7 @@ import { clear, h, localTime, redraw, table } from '../dom.js';
 import { lastLogin, lastLoginWords } from '../last_login.js';
 import { S, translated } from '../strings.js';
 import { sessionName } from '../treatment.js';
-import { faultWords, kWarmUp_s, outcomeBadge, patientCodes } from './common.js';
+import { faultWords, isCold, minutesOf, outcomeBadge, patientCodes } from './common.js';
 
 const gigabytes = (bytes) => Math.round(bytes / 2 ** 30);
 
@@ -48,8 +48,8 @@ function tiles(status) {
       sensor.present && h('p', {}, `${sensor.name}, ${text.serial} ${sensor.serial}`),
       sensor.present && h('p', {},
         `${text.rate(sensor.fps)}, ${text.powered(Math.floor(sensor.powered_s / 60))}`),
-      sensor.present && sensor.powered_s < kWarmUp_s
-        && h('p', { class: 'caution' }, text.warming)),
+      sensor.present && isCold(sensor.powered_s)
+        && h('p', { class: 'caution' }, text.warming(minutesOf(sensor.warm_up_s)))),
     tile(text.storage, storage.writable
       ? text.free(gigabytes(storage.free_bytes), gigabytes(storage.total_bytes)) : text.readOnly,
     storage.writable && used < 0.95 ? 'good' : 'bad',
