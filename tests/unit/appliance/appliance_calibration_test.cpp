@@ -1,0 +1,177 @@
+// The profile of the sensor's unit and the calibration of the room, as the page changes them.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/appliance/unit_profile.hpp"
+#include "daemon/records/profile_shelf.hpp"
+#include "tests/support/board_checks.hpp"
+#include "tests/unit/appliance/appliance_fixture.hpp"
+
+namespace plumb {
+namespace {
+
+using testing::ApplianceTest;
+using testing::FakeBus;
+
+class ApplianceProfileTest : public ApplianceTest {
+ protected:
+  /// What the page's last request was answered.
+  web::Change Asked(const std::function<void(web::Done)>& ask) {
+    const auto answer = std::make_shared<std::promise<web::Change>>();
+    On([&] { ask([answer](const web::Change& change) { answer->set_value(change); }); });
+    return answer->get_future().get();
+  }
+  web::Change Reset(const std::string& serial) {
+    return Asked([&](web::Done done) {
+      services_->services().profiles.ResetSensorProfile(erik_, serial, done);
+    });
+  }
+  web::Change RollBack(int version) {
+    return Asked([&](web::Done done) {
+      services_->services().profiles.RollBackSensorProfile(erik_, "A", version, done);
+    });
+  }
+  /// The profile that a scan of now begins from: read as each scan reads it, from the same shelf.
+  [[nodiscard]] std::string NextScanBeginsFrom() const {
+    UnitProfile unit(appliance_->profiles(), "A", FakeBus::Info().intrinsics);
+    ReconstructorOptions options;
+    unit.Begin(options);
+    if (!options.profile) return "none";
+    return fmt::format("{}, {} sweeps", options.profile->name, options.profile->num_sweeps);
+  }
+
+  const web::Actor erik_{.user = "erik", .address = {}};
+};
+
+TEST_F(ApplianceProfileTest, WhatThePageAsksIsWhatTheNextScanBeginsFrom) {
+  SensorProfile known = ProfileOfAnyUnit(FakeBus::Info().intrinsics);
+  ProfileShelf shelf(folder_ / "state" / "sensor-profiles");
+  for (known.num_sweeps = 4; known.num_sweeps <= 5; ++known.num_sweeps) (void)shelf.Add("A", known);
+  Play([&] {
+    EXPECT_EQ(services_->services().profiles.GetSensorProfiles().why_none, "no sensor is attached");
+    EXPECT_EQ(Reset("A").result, web::ChangeResult::kConflict);
+    MakeReady();
+    const web::SensorProfiles shown = services_->services().profiles.GetSensorProfiles();
+    EXPECT_EQ(shown.serial, "A");
+    EXPECT_EQ(shown.why_none, "");
+    ASSERT_EQ(shown.versions.size(), 2U);
+    EXPECT_EQ(shown.versions[0].version, 2);
+    EXPECT_EQ(shown.versions[0].num_sweeps, 5);
+    EXPECT_EQ(shown.versions[0].cause, "learned");
+    EXPECT_EQ(NextScanBeginsFrom(), "A version 2, 5 sweeps");
+
+    EXPECT_EQ(Reset("B").result, web::ChangeResult::kConflict) << "another unit";
+    EXPECT_EQ(RollBack(7).result, web::ChangeResult::kNotFound);
+    EXPECT_EQ(NextScanBeginsFrom(), "A version 2, 5 sweeps") << "refused: nothing has changed";
+    EXPECT_EQ(Reset("A").result, web::ChangeResult::kDone);
+    EXPECT_EQ(NextScanBeginsFrom(), "none");
+    EXPECT_EQ(RollBack(1).result, web::ChangeResult::kDone);
+    EXPECT_EQ(NextScanBeginsFrom(), "A version 4, 4 sweeps");
+    EXPECT_FALSE(services_->services().profiles.SensorProfileFile(3)) << "the reset";
+    EXPECT_THAT(services_->services().profiles.SensorProfileFile(4).value_or(""),
+                ::testing::HasSubstr("calibration"));
+  });
+}
+
+TEST_F(ApplianceProfileTest, NothingChangesUnderAScan) {
+  Play([&] {
+    MakeReady();
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort), ""); });
+    const web::Change answer = Reset("A");
+    EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
+    EXPECT_THAT(answer.message, ::testing::HasSubstr("wait for its result"));
+    EXPECT_TRUE(services_->services().profiles.GetSensorProfiles().versions.empty());
+    On([&] { EXPECT_EQ(appliance_->Cancel(), ""); });
+    EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
+    EXPECT_EQ(Reset("A").result, web::ChangeResult::kDone);
+    EXPECT_EQ(services_->services().profiles.GetSensorProfiles().versions.size(), 1U);
+  });
+}
+
+TEST_F(ApplianceProfileTest, SwitchedOffItSaysSo) {
+  parts_.config.appliance.sensor_profiles = false;
+  Play([&] {
+    MakeReady();
+    EXPECT_THAT(services_->services().profiles.GetSensorProfiles().why_none,
+                ::testing::HasSubstr("switched off"));
+    EXPECT_EQ(Reset("A").result, web::ChangeResult::kConflict);
+  });
+}
+
+class ApplianceRoomTest : public ApplianceProfileTest {
+ protected:
+  void ScanBoard() {
+    On([&] { (void)appliance_->store()->checks.Add(erik_, "A", testing::CheckOver()); });
+  }
+  web::ChangeResult Sign() {
+    const std::string digest = services_->services().room.GetRoomCalibration().digest;
+    return Asked([&](web::Done done) {
+             services_->services().room.SignRoomCalibration(erik_, digest, done);
+           })
+        .result;
+  }
+  /// Where the gantry is on a map, as reported to the page; empty when it is not known.
+  std::optional<Eigen::Vector2d> Gantry() {
+    std::optional<Eigen::Vector2d> gantry;
+    On([&] {
+      const web::Status status = appliance_->WebStatus();
+      if (status.is_room_known) gantry = Eigen::Vector2d(status.gantry_xy.data());
+      warnings_ = fmt::format("{}", fmt::join(status.warnings, "; "));
+    });
+    return gantry;
+  }
+  std::string warnings_;
+};
+
+TEST_F(ApplianceRoomTest, ASignedCalibrationHoldsInPlaceOfTheConfigurationUntilAMarkerMoves) {
+  const Eigen::Vector2d configured(0, 1);
+  const Eigen::Vector2d calibrated =
+      testing::SceneFromRoom().inverse().linear().block<1, 2>(1, 0).transpose();
+  parts_.config.compare.T_iec_reference = Pose::Identity();
+  Play([&] {
+    MakeReady();
+    EXPECT_EQ(Gantry(), configured);
+    EXPECT_TRUE(services_->services().room.GetRoomCalibration().is_configured);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NE(Sign(), web::ChangeResult::kDone) << i << " scans";
+      ScanBoard();
+    }
+    EXPECT_EQ(Gantry(), configured) << "not signed yet";
+    EXPECT_EQ(Sign(), web::ChangeResult::kDone);
+    ASSERT_TRUE(Gantry());
+    EXPECT_LT((*Gantry() - calibrated).norm(), 1e-6);
+    EXPECT_THAT(warnings_,
+                ::testing::HasSubstr("T_iec_reference of the configuration is not used"));
+
+    MarkerMap moved = testing::MarkersOfRoom();
+    for (Eigen::Vector3d& corner : moved.at(4).corners) corner.x() += 0.008;
+    On([&] {
+      (void)appliance_->store()->checks.Add(erik_, "A", testing::CheckOver(0, 0, moved));
+      appliance_->RefreshRoom();
+    });
+    EXPECT_FALSE(Gantry()) << "neither the calibration nor the configuration";
+    EXPECT_THAT(warnings_, ::testing::HasSubstr("marker 4 moved 8 mm"));
+    EXPECT_THAT(services_->services().room.GetRoomCalibration().due,
+                ::testing::HasSubstr("marker 4"));
+    for (int i = 0; i < 3; ++i) ScanBoard();
+    EXPECT_EQ(Sign(), web::ChangeResult::kDone);
+    EXPECT_TRUE(Gantry());
+    EXPECT_EQ(services_->services().room.GetRoomCalibration().versions.front().version, 2);
+  });
+}
+
+TEST_F(ApplianceRoomTest, WithoutAnyNobodyKnowsTheRoom) {
+  Play([&] {
+    MakeReady();
+    EXPECT_FALSE(Gantry());
+    EXPECT_EQ(warnings_, "");
+    std::string why_not;
+    EXPECT_EQ(services_->services().room.RoomBoardPdf(why_not).value_or("").substr(0, 5), "%PDF-")
+        << why_not;
+  });
+}
+
+}  // namespace
+}  // namespace plumb

@@ -1,0 +1,121 @@
+// The appliance on its loop, with a sensor and a machine that do what a test says.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <future>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "daemon/appliance/appliance.hpp"
+#include "daemon/appliance/web_services.hpp"
+#include "tests/support/fake_sensor.hpp"
+#include "tests/support/temp_folder.hpp"
+
+namespace plumb::testing {
+
+/// Its driver takes as long to open a sensor as the test wants.
+class SlowProvider : public FakeProvider {
+ public:
+  SlowProvider(FakeBus& bus, std::shared_future<void> may_open)
+      : FakeProvider(bus), may_open_(std::move(may_open)) {}
+  [[nodiscard]] std::unique_ptr<LiveSensor> Open(const std::string& serial) override {
+    may_open_.wait();
+    return FakeProvider::Open(serial);
+  }
+
+ private:
+  std::shared_future<void> may_open_;
+};
+
+/// A machine that stays on.
+class FakeRestart : public SystemRestart {
+ public:
+  void Restart(std::function<void(const std::string&)> done) override {
+    ++num_asked;
+    done(failure);
+  }
+  int num_asked = 0;
+  std::string failure;
+};
+
+class ApplianceTest : public ::testing::Test {
+ protected:
+  ApplianceTest() {
+    parts_.config.appliance.state = folder_ / "state";
+    parts_.config.update.folder = folder_ / "updates";
+    parts_.demo_patient = "demo";
+    parts_.make_provider = [this] { return std::make_unique<SlowProvider>(bus_, may_open_); };
+  }
+
+  /// Runs the test beside the loop, which has the main thread; a loop that has ended does not begin
+  /// again.
+  void Play(const std::function<void()>& test) {
+    appliance_ = std::make_unique<Appliance>(loop_, parts_);
+    auto restart = std::make_unique<FakeRestart>();
+    restart_ = restart.get();
+    services_ =
+        std::make_unique<WebServices>(*appliance_, parts_.config.update, std::move(restart));
+    std::jthread player([&] {
+      test();
+      if (!opens_) LetOpen();
+      loop_.Quit(0);
+    });
+    loop_.Run();
+    services_.reset();
+    appliance_.reset();
+  }
+
+  /// On the loop's thread; waits for it.
+  void On(const std::function<void()>& work) {
+    const auto done =
+        std::make_shared<std::promise<void>>();  // shared: it wakes us while it is still at it
+    loop_.Post("test", [&work, done] {
+      work();
+      done->set_value();
+    });
+    done->get_future().wait();
+  }
+  /// False if it does not come to that within half a minute. Asked on the loop's thread.
+  [[nodiscard]] bool Becomes(const std::function<bool()>& holds) {
+    const auto until = EventLoop::Clock::now() + std::chrono::seconds(30);
+    while (EventLoop::Clock::now() < until) {
+      bool does = false;
+      On([&] { does = holds(); });
+      if (does) return true;
+      std::this_thread::yield();
+    }
+    return false;
+  }
+  void LetOpen() {
+    opens_ = true;
+    opener_.set_value();
+  }
+  void MakeReady() {
+    LetOpen();
+    bus_.Plug("A");
+    bus_.GiveFrame();
+    ASSERT_TRUE(Becomes([&] { return appliance_->state().phase == ScanPhase::kReady; }));
+  }
+  [[nodiscard]] bool IsRunning() const {
+    const ScanPhase phase = appliance_->state().phase;
+    return phase == ScanPhase::kScanning || phase == ScanPhase::kWorking;
+  }
+
+  EventLoop loop_;  // first: blocks signals before any thread starts
+  TempFolder folder_;
+  FakeBus bus_;
+  ApplianceParts parts_;
+  std::unique_ptr<Appliance> appliance_;
+  std::unique_ptr<WebServices> services_;
+  FakeRestart* restart_ = nullptr;
+  std::promise<void> opener_;
+  std::shared_future<void> may_open_ = opener_.get_future().share();
+  bool opens_ = false;
+};
+
+}  // namespace plumb::testing

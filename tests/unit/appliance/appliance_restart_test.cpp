@@ -1,0 +1,111 @@
+// When the machine may be restarted and reset to its factory state.
+#include <filesystem>
+#include <future>
+#include <memory>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/records/factory_reset.hpp"
+#include "tests/unit/appliance/appliance_fixture.hpp"
+
+namespace plumb {
+namespace {
+
+using ApplianceRestartTest = testing::ApplianceTest;
+
+/// What RestartSystem() answers, on the loop.
+web::Change Restarted(WebServices& services) {
+  web::Change answer{.result = web::ChangeResult::kFailed, .message = "none", .id = {}, .file = {}};
+  services.updates().RestartSystem({.user = "erik", .address = {}},
+                                   [&](const web::Change& change) { answer = change; });
+  return answer;
+}
+
+TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedUnderAScan) {
+  Play([&] {
+    MakeReady();
+    On([&] {
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
+      ASSERT_EQ(appliance_->state().phase, ScanPhase::kScanning);
+      EXPECT_EQ(Restarted(*services_).result, web::ChangeResult::kConflict);
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
+      ASSERT_EQ(appliance_->state().phase, ScanPhase::kWorking);
+      const web::Change answer = Restarted(*services_);
+      EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
+      EXPECT_THAT(answer.message, ::testing::HasSubstr("wait for its result"));
+      EXPECT_EQ(restart_->num_asked, 0);
+    });
+    EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
+    On([&] {
+      EXPECT_EQ(Restarted(*services_).result, web::ChangeResult::kDone);
+      EXPECT_EQ(restart_->num_asked, 1);
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort), ::testing::HasSubstr("being restarted"));
+      EXPECT_THAT(Restarted(*services_).message, ::testing::HasSubstr("being restarted"));
+      EXPECT_EQ(restart_->num_asked, 1);
+    });
+  });
+}
+
+/// The final answer of ResetToFactory(). It writes in the background, not on the loop.
+web::Change AskedToReset(WebServices& services, EventLoop& loop, web::FactoryReset kind) {
+  auto answered = std::make_shared<std::promise<web::Change>>();
+  loop.Post("test", [&services, answered, kind] {
+    services.updates().ResetToFactory(
+        {.user = "erik", .address = {}}, kind,
+        [answered](const web::Change& change) { answered->set_value(change); });
+  });
+  return answered->get_future().get();
+}
+
+TEST_F(ApplianceRestartTest, AFactoryResetIsNotedBeforeTheMachineRestarts) {
+  Play([&] {
+    MakeReady();
+    const auto is_noted = [&] {
+      return std::filesystem::exists(folder_ / "state" / kFactoryResetFile);
+    };
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort), ""); });
+    EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).result,
+              web::ChangeResult::kConflict)
+        << "a scan runs";
+    EXPECT_FALSE(is_noted());
+    On([&] { EXPECT_EQ(appliance_->Cancel(), ""); });
+    EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
+    restart_->failure = "the machine cannot be restarted from here: no";
+    EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).message, restart_->failure);
+    EXPECT_FALSE(is_noted()) << "nothing is reset where the machine does not restart";
+    restart_->failure.clear();
+    EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).result,
+              web::ChangeResult::kDone);
+    EXPECT_TRUE(is_noted());
+    On([&] {
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort), ::testing::HasSubstr("being restarted"));
+    });
+  });
+}
+
+TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedInASessionAndAFailedRestartLeavesItUsable) {
+  parts_.demo_patient.clear();
+  Play([&] {
+    MakeReady();
+    On([&] {
+      appliance_->OpenSession("1", "p", web::ScanPurpose::kReference, "",
+                              {.user = "tess", .address = {}});
+      const web::Change answer = Restarted(*services_);
+      EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
+      EXPECT_THAT(answer.message, ::testing::HasSubstr("session of a patient is open"));
+      EXPECT_EQ(restart_->num_asked, 0);
+      EXPECT_EQ(appliance_->CloseSession({.user = "tess", .address = {}}), "");
+      restart_->failure = "the machine cannot be restarted from here: no";
+      const web::Change failed = Restarted(*services_);
+      EXPECT_EQ(failed.result, web::ChangeResult::kFailed);
+      EXPECT_EQ(failed.message, restart_->failure);
+      restart_->failure.clear();
+      EXPECT_EQ(Restarted(*services_).result, web::ChangeResult::kDone) << "asked again";
+      EXPECT_EQ(restart_->num_asked, 2);
+    });
+  });
+}
+
+}  // namespace
+}  // namespace plumb
