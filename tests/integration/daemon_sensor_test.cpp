@@ -63,18 +63,20 @@ class DaemonSensorTest : public ::testing::Test {
     return other;
   }
 
+  [[nodiscard]] static fs::path FolderOf(const Plumbd& plumbd, const json& result) {
+    return plumbd.state() / "scans" / result["last_result"]["scan"].get<std::string>();
+  }
+
   /// Focal length that a stored scan was made with.
   [[nodiscard]] static double FocalLengthOf(const Plumbd& plumbd, const json& result) {
-    const fs::path scan =
-        plumbd.state() / "scans" / result["last_result"]["scan"].get<std::string>();
-    return ParseCameraFile(ReadTextFile(scan / "recording" / "camera.yaml", 1 << 16), "").color.fx;
+    const fs::path camera = FolderOf(plumbd, result) / "recording" / "camera.yaml";
+    return ParseCameraFile(ReadTextFile(camera, 1 << 16), "").color.fx;
   }
 
   /// Whose estimate of the calibration a stored scan contains.
   [[nodiscard]] static json SerialOf(const Plumbd& plumbd, const json& result) {
-    const fs::path scan =
-        plumbd.state() / "scans" / result["last_result"]["scan"].get<std::string>();
-    return json::parse(ReadTextFile(scan / "scene" / "sensitivity.json", 1 << 24))["serial"];
+    const fs::path scene = FolderOf(plumbd, result) / "scene";
+    return json::parse(ReadTextFile(scene / "sensitivity.json", 1 << 24))["serial"];
   }
 
   static json WaitForSensor(Plumbd& plumbd, const std::string& serial) {

@@ -109,10 +109,7 @@ await h.step('the daily check: another person sets the baseline, the next one pa
 });
 
 await h.step('a new patient is scanned for a reference; it waits as a draft', async () => {
-  await anna.goto(`${h.url}#/patients`);
-  await anna.getByLabel('Code', { exact: true }).fill('PX-0100');
-  await anna.getByLabel('Site').fill('thorax');
-  await anna.getByRole('button', { name: 'Add a patient' }).click();
+  await h.addPatient(anna, 'PX-0100', 'thorax');
   await anna.getByRole('button', { name: 'Scan a new reference' }).click();
   await scanOn(anna);
   await anna.getByText('Saved as draft version 1.').waitFor(kSlow);
@@ -125,11 +122,7 @@ await h.step('a new patient is scanned for a reference; it waits as a draft', as
 await h.step('one physicist plans, a second one approves', async () => {
   await bob.goto(`${h.url}#/status`);
   await bob.locator('.tile', { hasText: 'Waiting for approval' }).getByRole('link', { name: 'PX-0100' }).click();
-  const map = bob.getByRole('application');
-  await map.scrollIntoViewIfNeeded();
-  const box = await map.boundingBox();
-  for (const [x, y] of [[0.35, 0.35], [0.65, 0.35], [0.65, 0.65], [0.35, 0.65]]) await bob.mouse.click(box.x + x * box.width, box.y + y * box.height);
-  await bob.getByText('4 corners').waitFor();
+  const map = await h.drawRegion(bob, [[0.35, 0.35], [0.65, 0.35], [0.65, 0.65], [0.35, 0.65]]);
   await map.press('i');
   // Wider than usual: sweeps of this size leave 1 to 2 mm of uncertainty.
   await bob.getByLabel('Shifts (mm)').fill('6');

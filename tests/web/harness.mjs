@@ -114,7 +114,25 @@ export class Harness {
     this.fresh.add(name);
   }
 
-  /// The same through the interface.
+  /// Fills the form; what comes of it is the caller's to see.
+  async addPatient(page, code, site = '') {
+    await page.goto(`${this.url}#/patients`);
+    await page.getByLabel('Code', { exact: true }).fill(code);
+    await page.getByLabel('Site').fill(site);
+    await page.getByRole('button', { name: 'Add a patient' }).click();
+  }
+
+  /// Clicks the region's corners, in fractions of the map, and returns the map.
+  async drawRegion(page, corners) {
+    const map = page.getByRole('application');
+    await map.scrollIntoViewIfNeeded();
+    const box = await map.boundingBox();
+    for (const [x, y] of corners) await page.mouse.click(box.x + x * box.width, box.y + y * box.height);
+    await page.getByText(`${corners.length} corners`).waitFor();
+    return map;
+  }
+
+  /// Like addAccount(), through the interface.
   async addAccountByApi(page, name, role) {
     const { status } = await this.api(page, 'users', 'POST', { name, role, password: kFirstPassword });
     this.equal(status, 201, `the account ${name}`);

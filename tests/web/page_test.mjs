@@ -62,10 +62,7 @@ await h.step('roles see only their own screens', async () => {
 });
 
 await h.step('a new patient is scanned for a reference', async () => {
-  await anna.goto(`${h.url}#/patients`);
-  await anna.getByLabel('Code', { exact: true }).fill('PX-0417');
-  await anna.getByLabel('Site').fill('thorax');
-  await anna.getByRole('button', { name: 'Add a patient' }).click();
+  await h.addPatient(anna, 'PX-0417', 'thorax');
   await anna.getByRole('heading', { name: 'PX-0417' }).waitFor();
   equal(await anna.getByRole('button', { name: 'Start treatment session' }).isDisabled(), true, 'no fraction without a reference');
   await anna.getByRole('button', { name: 'Scan a new reference' }).click();
@@ -86,11 +83,7 @@ await h.step('a physicist plans, a second one approves', async () => {
   await bob.goto(`${h.url}#/patients`);
   await bob.getByRole('link', { name: 'PX-0417' }).click();
   await bob.getByRole('link', { name: 'Plan, Version 1' }).click();
-  const map = bob.getByRole('application');
-  await map.scrollIntoViewIfNeeded();
-  const box = await map.boundingBox();
-  for (const [x, y] of [[0.3, 0.3], [0.7, 0.3], [0.72, 0.7], [0.28, 0.7]]) await bob.mouse.click(box.x + x * box.width, box.y + y * box.height);
-  await bob.getByText('4 corners').waitFor();
+  const map = await h.drawRegion(bob, [[0.3, 0.3], [0.7, 0.3], [0.72, 0.7], [0.28, 0.7]]);
   await map.press('n');
   await map.press('ArrowUp');
   await bob.getByRole('button', { name: 'Pick on the map' }).click();
@@ -453,9 +446,7 @@ await h.step('a failed scan is acknowledged on the page', async () => {
 });
 
 await h.step('another open patient is pointed out on the result', async () => {
-  await anna.goto(`${h.url}#/patients`);
-  await anna.getByLabel('Code', { exact: true }).fill('PX-0999');
-  await anna.getByRole('button', { name: 'Add a patient' }).click();
+  await h.addPatient(anna, 'PX-0999');
   await anna.getByRole('button', { name: 'Scan a new reference' }).click();
   await anna.getByRole('button', { name: 'Close PX-0417, open PX-0999' }).click();
   await anna.locator('.who-line', { hasText: 'PX-0999' }).waitFor();

@@ -260,9 +260,7 @@ await h.step('a change from elsewhere is an alert to acknowledge', async () => {
 });
 
 await h.step('codes are unique without regard to case, and a wristband opens', async () => {
-  await anna.goto(`${h.url}#/patients`);
-  await anna.getByLabel('Code', { exact: true }).fill('p-0042');
-  await anna.getByRole('button', { name: 'Add a patient' }).click();
+  await h.addPatient(anna, 'p-0042');
   await anna.getByRole('alert').getByText(/there is a patient/i).waitFor();
   await anna.getByLabel('Find a code').fill('p-0050');
   await anna.getByLabel('Find a code').press('Enter');

@@ -13,9 +13,7 @@ const clara = await h.person('clara');
 const kPeople = [[anna, 'anna', 'technician'], [bob, 'bob', 'physicist'], [clara, 'clara', 'physicist']];
 
 async function addPatient(code) {
-  await anna.goto(`${h.url}#/patients`);
-  await anna.getByLabel('Code', { exact: true }).fill(code);
-  await anna.getByRole('button', { name: 'Add a patient' }).click();
+  await h.addPatient(anna, code);
   await anna.getByRole('heading', { name: code }).waitFor();
 }
 
