@@ -1,11 +1,11 @@
 #include "algo/reconstruction/sensor_sensitivity.hpp"
 
-#include <array>
 #include <cmath>
 #include <map>
 #include <tuple>
 #include <utility>
 
+#include <tbb/parallel_for.h>
 #include <Eigen/Cholesky>
 
 namespace plumb {
@@ -31,22 +31,19 @@ struct MarkerFrame {
   Pose T_marker_world;
   TwistColumns twist;
 
-  [[nodiscard]] Columns Seen(const Eigen::Vector3d& p_world, const Columns& in_world) const {
-    const Eigen::Vector3d p = T_marker_world * p_world;
-    return T_marker_world.linear() * in_world + Skew(p) * twist.topRows<3>() -
-           twist.bottomRows<3>();
+  // Of `count` points whose sum in the marker's frame is given.
+  [[nodiscard]] Columns Seen(const Eigen::Vector3d& sum, double count,
+                             const Columns& in_world) const {
+    return T_marker_world.linear() * in_world + Skew(sum) * twist.topRows<3>() -
+           count * twist.bottomRows<3>();
   }
 };
 
-Columns Moved(const Eigen::Matrix3d& R, const Eigen::Vector3d& p, const TwistColumns& twist) {
-  return R * (twist.bottomRows<3>() - Skew(p) * twist.topRows<3>());
+// Of `count` points with this sum.
+Columns Moved(const Eigen::Matrix3d& R, const Eigen::Vector3d& sum, double count,
+              const TwistColumns& twist) {
+  return R * (count * twist.bottomRows<3>() - Skew(sum) * twist.topRows<3>());
 }
-
-struct Sum {
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  Columns covariance = Columns::Zero();
-  double count = 0;
-};
 
 using Key = std::tuple<int, int, int>;
 
@@ -56,33 +53,63 @@ Key CubeOf(const Eigen::Vector3d& p) {
           static_cast<int>(std::floor(p.z() / kPatch_m))};
 }
 
+// What one view shows of a cube. Covariances are linear in the points and in their Jacobians, so
+// sums over the cells are multiplied by the posterior once instead of every cell.
+struct ViewSum {
+  Eigen::Vector3d in_marker = Eigen::Vector3d::Zero();
+  Eigen::Vector3d in_color = Eigen::Vector3d::Zero();
+  Columns J_depth = Columns::Zero();  // In the depth camera's frame.
+  double count = 0;
+};
+
+std::map<Key, ViewSum> SumCells(const dense::Sensor& sensor, const dense::View& view,
+                                const Pose& T_marker_world) {
+  std::map<Key, ViewSum> sums;
+  const Pose T_marker_depth = T_marker_world * view.T_world_depth;
+  for (int r = kCellStride / 2; r < view.height; r += kCellStride) {
+    for (int c = kCellStride / 2; c < view.width; c += kCellStride) {
+      const auto i = static_cast<std::size_t>(r * view.width + c);
+      if (!(view.points[i].z() > 0)) continue;
+      const Eigen::Vector3d p_depth = view.points[i].cast<double>();
+      const Eigen::Vector3d p = T_marker_depth * p_depth;
+      ViewSum& sum = sums[CubeOf(p)];
+      sum.in_marker += p;
+      sum.in_color += view.T_color_depth * p_depth;
+      sum.J_depth += dense::CellJacobian(sensor, view, i);
+      sum.count += 1;
+    }
+  }
+  return sums;
+}
+
+struct Sum {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Columns covariance = Columns::Zero();
+  double count = 0;
+};
+
 std::map<Key, Sum> SumPatches(const Intrinsics& stated, const CalibrationModel& calibration,
                               const BundlePosterior& posterior, const TrackingMap& map,
                               const MarkerFrame& frame) {
   const dense::Cells cells = dense::MakeCells(stated, map);
   const dense::Sensor sensor = dense::MakeSensor(stated, calibration);
   const std::vector<dense::View> views = dense::MakeViews(sensor, calibration, cells, map);
+  std::vector<std::map<Key, ViewSum>> seen(views.size());
+  tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t k) {
+    seen[k] = SumCells(sensor, views[k], frame.T_marker_world);
+  });
   std::map<Key, Sum> sums;
   for (std::size_t k = 0; k < views.size(); ++k) {
-    const dense::View& view = views[k];
     const TwistColumns twist = RowsOf(posterior, posterior.CameraAt(static_cast<int>(k)));
     const Eigen::Matrix3d R_world_color = map.keyframes[k].T_world_color.linear();
-    for (int r = kCellStride / 2; r < view.height; r += kCellStride) {
-      for (int c = kCellStride / 2; c < view.width; c += kCellStride) {
-        const auto i = static_cast<std::size_t>(r * view.width + c);
-        if (!(view.points[i].z() > 0)) continue;
-        const Eigen::Vector3d p_depth = view.points[i].cast<double>();
-        const Eigen::Vector3d p_world = view.T_world_depth * p_depth;
-        const Columns in_world =
-            Moved(R_world_color, view.T_color_depth * p_depth, twist) +
-            view.T_world_depth.linear() *
-                (dense::CellJacobian(sensor, view, i) * posterior.calibration());
-        const Eigen::Vector3d p = frame.T_marker_world * p_world;
-        Sum& sum = sums[CubeOf(p)];
-        sum.centre += p;
-        sum.covariance += frame.Seen(p_world, in_world);
-        sum.count += 1;
-      }
+    for (const auto& [key, view_sum] : seen[k]) {
+      const Columns in_world =
+          Moved(R_world_color, view_sum.in_color, view_sum.count, twist) +
+          views[k].T_world_depth.linear() * (view_sum.J_depth * posterior.calibration());
+      Sum& sum = sums[key];
+      sum.centre += view_sum.in_marker;
+      sum.covariance += frame.Seen(view_sum.in_marker, view_sum.count, in_world);
+      sum.count += view_sum.count;
     }
   }
   return sums;
@@ -112,8 +139,9 @@ SensorSensitivity SensitivityOf(const Intrinsics& stated, const CalibrationModel
     const Eigen::Index first = posterior.MarkerAt(id);
     if (first < 0) continue;
     const Columns in_world =
-        Moved(marker.T_world_marker.linear(), Eigen::Vector3d::Zero(), RowsOf(posterior, first));
-    result.markers[id] = derivative(frame.Seen(marker.T_world_marker.translation(), in_world));
+        Moved(marker.T_world_marker.linear(), Eigen::Vector3d::Zero(), 1, RowsOf(posterior, first));
+    result.markers[id] = derivative(
+        frame.Seen(frame.T_marker_world * marker.T_world_marker.translation(), 1, in_world));
   }
   for (const auto& [key, sum] : SumPatches(stated, calibration, posterior, map, frame)) {
     if (sum.count < kMinCells || result.surface.size() >= kMaxPatches) continue;
