@@ -49,6 +49,9 @@ struct ApplianceParts {
   /// take a few seconds: opening a sensor on a slow bus, and comparing two large scenes.
   double sensor_silence_s = 30.0;
   double worker_silence_s = 30.0;
+  /// Longest check of the whole database at the start. A larger one is checked while the appliance
+  /// already works.
+  std::chrono::milliseconds check_limit = StoreOptions().check_limit;
 };
 
 /// Not thread-safe: call it on the loop's thread, except for functions marked "from any thread".

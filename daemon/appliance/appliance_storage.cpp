@@ -58,6 +58,7 @@ void Appliance::OpenStore() {
   }
   try {
     StoreOptions options;
+    options.check_limit = parts_.check_limit;
     options.sleep = [has_logged = false](std::chrono::milliseconds pause) mutable {
       if (!std::exchange(has_logged, true))
         Log(LogLevel::kWarning, "another program holds the database: waiting for it");

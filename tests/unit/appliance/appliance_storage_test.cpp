@@ -10,6 +10,7 @@
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/web_settings.hpp"
 #include "daemon/records/file_cipher.hpp"
+#include "drivers/files/file_io.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -122,6 +123,56 @@ TEST(ApplianceStorage, AnAuditLogThatWasChangedFromOutsideIsReported) {
   }
 }
 
+/// A database with more rows than are checked before the first look at the time; `is_damaged`: the
+/// last row is not what its index says. No query of the store meets it.
+void MakeLargeDatabase(const fs::path& state, bool is_damaged) {
+  { const Store store(state); }
+  {
+    Database direct(state / "plumb.db", Database::Access::kReadWrite);
+    direct.Execute("CREATE TABLE large (x); CREATE INDEX large_x ON large (x)");
+    direct.Execute(
+        "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 20000) "
+        "INSERT INTO large SELECT 'row ' || i FROM n");
+  }
+  if (!is_damaged) return;
+  std::string bytes = ReadTextFile(state / "plumb.db", 1U << 26U);
+  const std::size_t last = bytes.find("row 20000");
+  ASSERT_NE(last, std::string::npos);
+  bytes[last] = 'R';
+  std::ofstream(state / "plumb.db", std::ios::binary) << bytes;
+}
+
+TEST(ApplianceStorage, ADatabaseTooLargeForTheCheckAtTheStartIsCheckedWhileItWorks) {
+  for (const bool is_damaged : {false, true}) {
+    SCOPED_TRACE(is_damaged);
+    Surroundings around;
+    MakeLargeDatabase(around.config.appliance.state, is_damaged);
+    ApplianceParts parts = PartsOf(around.config, around.bus);
+    parts.check_limit = std::chrono::milliseconds(-1);
+    Appliance appliance(around.loop, std::move(parts));
+    EXPECT_EQ(appliance.storage_fault(), "") << "the start did not wait for the check";
+    const auto is_found = [&] { return !appliance.storage_fault().empty(); };
+    if (is_damaged) {
+      EXPECT_TRUE(RunUntil(around.loop, is_found));
+      EXPECT_THAT(appliance.storage_fault(), HasSubstr("is damaged"));
+      EXPECT_FALSE(appliance.Health().ok);
+      continue;
+    }
+    EventLoop::Source end = around.loop.MakeTimer("end", [&] { around.loop.Quit(0); });
+    end.ArmAfter(std::chrono::milliseconds(1500));
+    (void)around.loop.Run();
+    EXPECT_FALSE(is_found());
+  }
+}
+
+/// With time for the check, the same damage is found before anything begins.
+TEST(ApplianceStorage, ADamagedDatabaseIsFoundAtTheStart) {
+  Surroundings around;
+  MakeLargeDatabase(around.config.appliance.state, true);
+  const Appliance appliance(around.loop, PartsOf(around.config, around.bus));
+  EXPECT_THAT(appliance.storage_fault(), HasSubstr("is damaged"));
+}
+
 TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
   Surroundings around;
   {
@@ -197,6 +248,32 @@ TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {
     appliance.BackUp({.user = "anna", .address = {}}, around.folder / "other",
                      [&](const std::string& error, const BackupReport&) { answer = error; });
     EXPECT_THAT(answer, HasSubstr("safe mode"));
+  }
+}
+
+/// A backup on the disk of the scans is lost with it. Memory is never the disk of the temporary
+/// files unless it is asked for.
+TEST(ApplianceStorage, ABackupBesideTheScansIsWarnedOf) {
+  for (const bool is_beside : {true, false}) {
+    SCOPED_TRACE(is_beside);
+    Surroundings around;
+    const fs::path memory = "/dev/shm" / around.folder.path().filename();
+    const fs::path folder = is_beside ? around.folder / "backup" : memory;
+    around.config.appliance.backup_folder = folder;
+    Appliance appliance(around.loop, PartsOf(around.config, around.bus));
+    std::optional<std::string> made;
+    appliance.BackUp({.user = "anna", .address = {}}, appliance.BackupTarget(),
+                     [&](const std::string& error, const BackupReport&) { made = error; });
+    EXPECT_TRUE(RunUntil(around.loop, [&] { return made.has_value(); }));
+    EXPECT_EQ(made, "");
+    const std::vector<std::string> warnings = appliance.WebStatus().storage.warnings;
+    EXPECT_EQ(std::count_if(warnings.begin(), warnings.end(),
+                            [](const std::string& warning) {
+                              return warning.find("lies on the disk of the scans") !=
+                                     std::string::npos;
+                            }),
+              is_beside ? 1 : 0);
+    fs::remove_all(memory);
   }
 }
 
