@@ -505,7 +505,34 @@ await h.step('patients, log, settings and update look finished', async () => {
   const csv = readFileSync(await download.path(), 'utf8').trim().split('\r\n');
   equal(csv.length, 2, 'a head and one entry');
   check(csv[1].includes('"Reference approved"'), csv[1]);
+  // Settings that cannot be read are replaced on the page; no default looks like one of them.
+  const settingsUrl = '**/api/v1/settings';
+  let refused = 0;
+  await engineer.route(settingsUrl, async (route) => {
+    if (route.request().method() !== 'GET') return route.continue();
+    refused += 1;
+    return route.fulfill({ status: 500, json: { error: 'The stored settings cannot be read.' } });
+  });
   await engineer.goto(`${h.url}#/settings`);
+  await engineer.getByRole('alert').getByText('The stored settings cannot be read.').waitFor();
+  await h.look(engineer, 'settings-unreadable');
+  const inputs = engineer.locator('form.columns');
+  const values = await inputs.locator('input[type=number]').evaluateAll((all) => all.map((one) => one.value));
+  equal(values.join(), ',,,,,', 'nothing is filled in');
+  let sent = null;
+  engineer.on('request', (request) => { if (request.method() === 'PUT') sent = request.postDataJSON(); });
+  await engineer.getByRole('button', { name: 'Save' }).click();
+  equal(sent, null, 'nothing is sent before all is entered');
+  const wanted = ['5', '1', '10', '60', '0', '15'];
+  for (const [k, value] of wanted.entries()) await inputs.locator('input[type=number]').nth(k).fill(value);
+  await engineer.getByLabel('Posture of new references').selectOption('HFS');
+  await engineer.getByRole('button', { name: 'Save' }).click();
+  await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });
+  equal(sent.posture, 'HFS', 'the posture that was chosen');
+  equal(sent.idle_logout_min, 15, 'the number that was entered');
+  check(refused > 0, 'the page asked for them');
+  await engineer.unroute(settingsUrl);
+  await engineer.reload();
   await engineer.getByLabel('Log out after … min of inactivity').fill('20');
   await engineer.getByRole('button', { name: 'Save' }).click();
   await engineer.getByRole('status').getByText('Saved.').waitFor({ state: 'attached' });

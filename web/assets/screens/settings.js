@@ -41,9 +41,22 @@ function backupCard() {
     h('p', { class: 'hint' }, text.backupHint), last, now, running);
 }
 
+const kCannotRead = 500;
+
+/// What is stored, or why it cannot be read: then nothing is filled in, since a default would look
+/// like a value that somebody set.
+async function readSettings() {
+  try {
+    return { settings: await get('settings'), fault: null };
+  } catch (error) {
+    if (error.status !== kCannotRead) throw error;
+    return { settings: {}, fault: error.message };
+  }
+}
+
 export async function showSettings(place) {
   const text = S.settings;
-  const settings = await get('settings');
+  const { settings, fault } = await readSettings();
   const editable = may('settings');
   const inputs = {};
   const numbers = Object.entries(kNumbers).map(([name, [min, max, step]]) => {
@@ -56,7 +69,8 @@ export async function showSettings(place) {
     inputs[name] = checkbox(text[name], settings[name], { disabled: !editable });
     return inputs[name].element;
   });
-  const posture = select(S.plan.postures, settings.posture, { disabled: !editable });
+  const posture = select(S.plan.postures, settings.posture,
+    { required: true, disabled: !editable });
   const save = async () => {
     const changed = { posture: posture.value };
     for (const name of Object.keys(kNumbers)) changed[name] = Number(inputs[name].value);
@@ -65,6 +79,8 @@ export async function showSettings(place) {
     done(S.saved);
   };
   clear(place, h('h1', {}, text.title), !editable && h('p', { class: 'lead' }, text.readOnly),
+    fault && h('p', { class: 'caution', role: 'alert' }, text.enterAll, ' ',
+      h('code', {}, fault)),
     h('section', { class: 'card' }, form({ class: 'form columns' }, save, numbers,
       field(text.posture, posture), flags,
       editable && h('div', { class: 'row' }, h('button', { class: 'primary' }, S.save)))),

@@ -585,6 +585,7 @@ export const en = {
     retention_days: 'Delete scans after … days (0: never)',
     idle_logout_min: 'Log out after … min of inactivity',
     readOnly: 'Only an engineer can change the settings.',
+    enterAll: 'No scan can start until an engineer enters every value here and saves.',
     backup: 'Backup',
     backupHint: 'Copies the database and all scans into the folder that is set as backup_folder. '
       + 'Scans go on meanwhile.',

@@ -641,6 +641,8 @@ export const es = {
     retention_days: 'Borrar los escaneos tras … días (0: nunca)',
     idle_logout_min: 'Cerrar la sesión tras … min sin uso',
     readOnly: 'Solo un ingeniero puede cambiar los ajustes.',
+    enterAll: 'No se puede escanear hasta que un ingeniero introduzca aquí todos los valores y los '
+      + 'guarde.',
     backup: 'Copia de seguridad',
     backupHint: 'Copia la base de datos y todos los escaneos a la carpeta fijada en backup_folder. '
       + 'Entretanto se puede escanear.',
