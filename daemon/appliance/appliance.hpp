@@ -105,6 +105,10 @@ class Appliance {
   /// Shown by status and light until it is empty: the machine has gone back to the previous system.
   void SetRolledBack(const std::string& text);
   [[nodiscard]] const std::string& session_id() const { return session_id_; }
+  /// Session of the running or last scan; empty for a daily check and an unassigned scan.
+  [[nodiscard]] const std::string& scan_session_id() const { return scan_.session_id; }
+  /// Purpose of that scan by its stored name, or "unassigned": what the audit log says of it.
+  [[nodiscard]] const char* ScanKind() const;
   /// Closes this patient if it is open. An open daily check stays open.
   void ClosePatient(const std::string& patient_id);
   /// The next scan is the daily check of the room's markers; scans after it belong to the open
@@ -177,6 +181,7 @@ class Appliance {
   struct CurrentScan {
     std::string id;  ///< Empty until the store has assigned one.
     std::string patient_id;
+    std::string session_id;
     std::string reference_id;
     web::ScanPurpose purpose = web::ScanPurpose::kFraction;
     double reference_area_m2 = 0.0;

@@ -10,6 +10,7 @@
 #include "daemon/appliance/appliance.hpp"
 #include "daemon/appliance/plan_options.hpp"
 #include "daemon/loop/log.hpp"
+#include "daemon/records/stored_values.hpp"
 
 namespace plumb {
 namespace {
@@ -37,12 +38,13 @@ void Appliance::StartScan() {
 }
 
 void Appliance::BeginSession() {
-  const web::Settings settings = store_->settings.Get();
   session_.reset();  // the previous one has ended
   scan_ = {};
   scan_.patient_id = check_ ? std::string() : open_patient_;
+  scan_.session_id = check_ ? std::string() : session_id_;
   scan_.purpose = check_ ? web::ScanPurpose::kDailyCheck : purpose_;
   scan_.started = Clock::now();
+  const web::Settings settings = store_->settings.Get();
   ScanJob job = MakeJob(settings);
   if (job.is_reference) {
     if (const std::string why = WhyNoReference(); !why.empty()) throw DataError(why);
@@ -52,7 +54,7 @@ void Appliance::BeginSession() {
                        .purpose = scan_.purpose,
                        .sensor_serial = sensors_->snapshot().sensor.serial,
                        .reason = reference_reason_,
-                       .session_id = check_ ? std::string() : session_id_,
+                       .session_id = scan_.session_id,
                        .sensor_on_s = SecondsSinceSensor(),
                        .check_overdue = IsCheckOverdue()};
   scan_.sensor_before = sensors_->snapshot().statistics;
@@ -62,6 +64,12 @@ void Appliance::BeginSession() {
   sensors_->BeginScan(session_->feed());
   limit_timer_.ArmAfter(std::chrono::microseconds(static_cast<std::int64_t>(
       parts_.config.appliance.scan_limit_s.value_or(settings.scan_limit_s) * 1e6)));
+}
+
+const char* Appliance::ScanKind() const {
+  const bool is_unassigned =
+      scan_.patient_id.empty() && scan_.purpose != web::ScanPurpose::kDailyCheck;
+  return is_unassigned ? "unassigned" : store::Name(scan_.purpose);
 }
 
 ScanJob Appliance::MakeJob(const web::Settings& settings) {

@@ -56,19 +56,22 @@ void WebAppliance::Press(const web::Actor& actor, web::Done done) {
 
 void WebAppliance::StartSweep(const web::Actor& actor, web::Done done) {
   const std::string refusal = appliance_.StartSweep();
-  if (refusal.empty()) audit_.Log(actor, "scan.start", "", "");
+  if (refusal.empty())
+    audit_.Log(actor, "scan.start", appliance_.scan_session_id(), appliance_.ScanKind());
   done(AnswerOf(refusal));
 }
 
 void WebAppliance::EndSweep(const web::Actor& actor, web::Done done) {
   const std::string refusal = appliance_.EndSweep();
-  if (refusal.empty()) audit_.Log(actor, "scan.end", "", "");
+  if (refusal.empty())
+    audit_.Log(actor, "scan.end", appliance_.scan_session_id(), appliance_.ScanKind());
   done(AnswerOf(refusal));
 }
 
 void WebAppliance::Cancel(const web::Actor& actor, web::Done done) {
   const std::string refusal = appliance_.Cancel();
-  if (refusal.empty()) audit_.Log(actor, "cancel", "", "");
+  if (refusal.empty())
+    audit_.Log(actor, "cancel", appliance_.scan_session_id(), appliance_.ScanKind());
   done(AnswerOf(refusal));
 }
 

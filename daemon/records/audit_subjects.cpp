@@ -42,6 +42,10 @@ constexpr std::array kPrefixes = {
     Prefix{"download.", kScan},
     Prefix{"patient.", kPatient},
     Prefix{"session.", kSession},
+    // A scan that begins has no number yet: its patient is known by the session.
+    Prefix{"scan.start", kSession},
+    Prefix{"scan.end", kSession},
+    Prefix{"cancel", kSession},
     Prefix{"scan.", kScan},
     Prefix{"recording.", kScan},
     Prefix{"reference.", kReference},

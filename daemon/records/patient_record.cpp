@@ -40,9 +40,10 @@ constexpr Query kQueries[] = {
 constexpr Query kLog = {
     "audit", "PRAGMA table_info(audit)",
     "SELECT * FROM audit WHERE (action LIKE 'patient.%' AND subject = CAST(?1 AS TEXT)) OR "
-    "(action LIKE 'session.%' AND subject IN (SELECT CAST(id AS TEXT) FROM sessions WHERE "
-    "patient_id = ?1)) OR (action LIKE 'reference.%' AND subject IN (SELECT CAST(id AS TEXT) FROM "
-    "refs WHERE patient_id = ?1)) OR ((action LIKE 'scan.%' OR action LIKE 'recording.%') AND "
+    "((action LIKE 'session.%' OR action IN ('scan.start', 'scan.end', 'cancel')) AND subject IN "
+    "(SELECT CAST(id AS TEXT) FROM sessions WHERE patient_id = ?1)) OR (action LIKE 'reference.%' "
+    "AND subject IN (SELECT CAST(id AS TEXT) FROM refs WHERE patient_id = ?1)) OR ((action LIKE "
+    "'scan.%' OR action LIKE 'recording.%') AND action NOT IN ('scan.start', 'scan.end') AND "
     "subject IN (SELECT printf('%06d', id) FROM scans WHERE patient_id = ?1)) ORDER BY number"};
 constexpr Query kChecks = {
     "checks", "PRAGMA table_info(checks)",

@@ -141,6 +141,49 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
   });
 }
 
+TEST_F(ApplianceTest, TheLogSaysWhichScanWasStartedEndedAndDiscarded) {
+  parts_.demo_patient.clear();
+  parts_.config.appliance.warm_up_min = 0;
+  const web::Actor tess{.user = "tess", .address = {}};
+  // "code number kind" of an action's newest entry.
+  const auto logged = [&](const std::string& action) {
+    const auto entries = appliance_->store()->audit.Find({0, 1, action});
+    if (entries.empty()) return std::string("nothing");
+    const auto& about = entries[0].about;
+    return (about ? about->patient_code + " " + std::to_string(about->number) : "nobody") + " " +
+           entries[0].detail;
+  };
+  Play([&] {
+    MakeReady();
+    web::ApplianceService& service = services_->services().appliance;
+    const auto scan = [&](const std::string& kind) {
+      On([&] { service.StartSweep(tess, [](const web::Change&) {}); });
+      EXPECT_TRUE(Becomes([&] { return logged("scan.start") == kind; })) << kind;
+      On([&] {  // both before its end can arrive
+        service.EndSweep(tess, [](const web::Change&) {});
+        service.Cancel(tess, [](const web::Change&) {});
+      });
+      EXPECT_TRUE(Becomes([&] { return logged("scan.end") == kind; })) << kind;
+      EXPECT_TRUE(Becomes([&] { return logged("cancel") == kind; })) << kind;
+      EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
+    };
+    scan("nobody unassigned");
+    On([&] { EXPECT_EQ(appliance_->OpenCheck(tess), ""); });
+    scan("nobody daily_check");
+    On([&] {
+      Store& store = *appliance_->store();
+      (void)store.checks.Add(
+          tess, appliance_->WebStatus().sensor.serial,
+          TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
+      const std::string patient = store.patients.Add(tess, "P-1", "");
+      const std::string session =
+          store.treatments.Open(tess, patient, web::ScanPurpose::kReference);
+      appliance_->OpenSession(session, patient, web::ScanPurpose::kReference, "", tess);
+    });
+    scan("P-1 0 reference");
+  });
+}
+
 TEST_F(ApplianceTest, ASessionWithoutScansClosesByItself) {
   parts_.demo_patient.clear();
   parts_.config.appliance.session_idle_min = 0.3 / 60;

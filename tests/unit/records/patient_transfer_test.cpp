@@ -26,6 +26,7 @@ using ::testing::IsEmpty;
 using testing::kAnna;
 using testing::kBert;
 using testing::MessageOf;
+using ::testing::Not;
 using testing::StoreScan;
 
 class PatientTransferTest : public ::testing::Test {
@@ -50,6 +51,8 @@ class PatientTransferTest : public ::testing::Test {
                                .failure = {},
                                .result_json = R"({"verdict":"in_tolerance"})",
                                .swept_area_m2 = 0.5});
+    store.audit.Log(kAnna, "scan.start", session, "fraction");
+    store.audit.Log(kAnna, "scan.start", "", "unassigned");
     store.scans.Accept(kAnna, scan_);
     const std::string failed = store.scans.Begin(testing::Begun(patient_));
     store.scans.Finish(
@@ -147,9 +150,10 @@ TEST_F(PatientTransferTest, ComesWithEverythingAndByteIdenticalFiles) {
   EXPECT_THAT(to.audit.Find({0, 2})[1].action, "patient.import");
   EXPECT_THAT(to.audit.Find({0, 2})[1].detail, AllOf(HasSubstr("P-7"), HasSubstr("3 scans")));
   const Json kept = Json::parse(FilesBelow(there()).at("imports/" + patient->id + ".json"));
-  EXPECT_THAT(kept["evidence"]["audit"].dump(),
-              AllOf(HasSubstr("reference.approve"), HasSubstr("scan.accept"),
-                    HasSubstr("session.open"), HasSubstr("patient.add")));
+  EXPECT_THAT(
+      kept["evidence"]["audit"].dump(),
+      AllOf(HasSubstr("reference.approve"), HasSubstr("scan.accept"), HasSubstr("session.open"),
+            HasSubstr("scan.start"), HasSubstr("patient.add"), Not(HasSubstr("unassigned"))));
   to.removal.WipePatient(kAnna, patient->id);
   EXPECT_THAT(FilesBelow(there() / "imports"), IsEmpty()) << "wiped with the patient";
 }

@@ -25,6 +25,12 @@ TEST_F(StoreTest, TheLogNamesWhatPeopleKnow) {
   EXPECT_EQ(About(*store, "reference.approve"), "reference P-2 1");
   const std::string session = store->treatments.Open(kAnna, patient, web::ScanPurpose::kFraction);
   EXPECT_EQ(About(*store, "session.open"), "session P-2 1");
+  for (const char* action : {"scan.start", "scan.end", "cancel"}) {
+    store->audit.Log(kBert, action, session, "fraction");
+    EXPECT_EQ(About(*store, action), "session P-2 1") << "it had no number yet";
+    store->audit.Log(kBert, action, "", "");
+    EXPECT_EQ(About(*store, action), "its own name: ") << "of an earlier version";
+  }
   const std::string scan = Scan(*store, patient, reference, kResult);
   store->audit.Log(kBert, "view.scan", scan, "");
   EXPECT_EQ(About(*store, "view.scan"), "scan P-2 0");

@@ -1,7 +1,8 @@
 // The audit log: what was done, by whom, from where; filtered and taken away as CSV.
 import { get } from '../api.js';
-import { action, checkbox, clear, field, h, localTime, redraw, table } from '../dom.js';
-import { S, translated } from '../strings.js';
+import { detailWords, subjectWords } from '../audit_words.js';
+import { action, checkbox, clear, field, h, redraw, table } from '../dom.js';
+import { S } from '../strings.js';
 
 const kPage = 100;
 
@@ -14,49 +15,6 @@ export function csvField(value) {
 
 const csvOf = (heads, rows) => [heads, ...rows]
   .map((row) => `${row.map(csvField).join(',')}\r\n`).join('');
-
-const plain = (value) => (value === true ? S.audit.yes : value === false ? S.audit.no
-  : `${value}`.replace('.', S.decimal));
-
-function planWords(plan) {
-  const text = S.plan;
-  const point = plan.isocentre_m?.map((value) => plain(Number(value.toFixed(3)))).join('; ');
-  return [text.corners(plan.region_m.length),
-    `${text.isocentre}: ${point ? `${point} m` : text.middle}`,
-    `±${plain(plan.shift_tolerance_mm)} mm, ±${plain(plan.rotation_tolerance_deg)}°`,
-    text.postures[plan.posture] ?? plan.posture,
-    plan.couch_markers ? text.couchMarkers : text.roomMarkers].join('; ');
-}
-
-/// Each setting that was changed, before and after.
-const settingsWords = (changes) => Object.entries(changes).map(([name, values]) =>
-  `${S.settings[name] ?? name}: ${[values].flat().map(plain).join(' → ')}`).join('; ');
-
-/// What an entry says beside its action, in words: plans and settings are stored as JSON.
-export function detailWords({ action: what, detail }) {
-  if (!detail.startsWith('{')) return translated(detail);
-  try {
-    const stored = JSON.parse(detail);
-    return what === 'reference.plan' ? planWords(stored) : settingsWords(stored);
-  } catch {
-    return detail;
-  }
-}
-
-/// What an entry is about, as people know it: a code and a number instead of a row of the database.
-export function subjectWords({ subject, about }) {
-  if (!about) return subject;
-  const text = S.audit.about;
-  if (!about.exists) return text.gone(text.kinds[about.kind] ?? about.kind, subject);
-  const words = {
-    patient: () => '',
-    session: () => (about.number ? S.session.fraction(about.number) : S.purposes.reference),
-    scan: () => text.scan(subject),
-    reference: () => text.reference(about.number),
-    check: () => text.check(localTime(about.time)),
-  }[about.kind]?.() ?? subject;
-  return [about.patient_code, words].filter(Boolean).join(', ');
-}
 
 export async function showAudit(place) {
   const text = S.audit;

@@ -496,6 +496,9 @@ export const en = {
     shown: (found, all) => `${found} of ${all} ${plural(all, 'entry', 'entries')}`,
     csv: 'Download as CSV',
     views: 'Also show who looked at what', yes: 'yes', no: 'no',
+    reason: (text) => `reason: ${text}`, role: (role) => `role: ${role}`,
+    changes: { password: 'new password', disabled: 'disabled', enabled: 'enabled' },
+    removals: { retention: 'older than scans are kept', quota: 'to free disk space' },
     about: {
       scan: (id) => `scan ${id}`, reference: (version) => `reference version ${version}`,
       check: (when) => `check of ${when}`, gone: (kind, id) => `${kind} ${id} (deleted)`,

@@ -549,6 +549,11 @@ export const es = {
     shown: (found, all) => `${found} de ${all} ${plural(all, 'entrada', 'entradas')}`,
     csv: 'Descargar como CSV',
     views: 'Mostrar también quién consultó qué', yes: 'sí', no: 'no',
+    reason: (text) => `motivo: ${text}`, role: (role) => `función: ${role}`,
+    changes: { password: 'contraseña nueva', disabled: 'desactivada', enabled: 'activada' },
+    removals: {
+      retention: 'más antiguo que el plazo de conservación', quota: 'para liberar espacio en disco',
+    },
     about: {
       scan: (id) => `escaneo ${id}`, reference: (version) => `referencia, versión ${version}`,
       check: (when) => `control del ${when}`, gone: (kind, id) => `${kind} ${id} (se borró)`,

@@ -137,7 +137,7 @@ export const kFaultWords = {
     'ponga una copia de los archivos del escaneo en su lugar o escanee una referencia nueva',
   cancelled: 'descartado',
   // Details of the log.
-  'site and note': 'localización y nota', retention: 'por antigüedad', quota: 'por falta de sitio',
+  'site and note': 'localización y nota',
   'wrong code': 'código incorrecto', 'its files are there again': 'sus archivos han vuelto',
   'of a scan that had not ended': 'de un escaneo que no había terminado',
   'of a scan that was removed': 'de un escaneo que se borró',
@@ -147,12 +147,8 @@ export const kFaultWords = {
     'no se conoce ningún escaneo con este número: ¿es de otra base de datos?',
   'it is complete, but its scan was never noted as done':
     'está completa, pero su escaneo nunca se anotó como terminado',
-  technician: 'técnico', physicist: 'físico', engineer: 'ingeniero', display: 'pantalla',
-  passed: 'superado', no_baseline: 'sin base', failed: 'no superado', fraction: 'fracción',
-  daily_check: 'control diario',
-  in_tolerance: 'en tolerancia', unsure: 'no concluyente', move: 'mover',
-  no_answer: 'sin respuesta', password: 'contraseña', disabled: 'desactivada',
-  enabled: 'activada', ready: 'listo', scanning: 'escaneando', working: 'calculando',
+  // States of the appliance, in refusals.
+  ready: 'listo', scanning: 'escaneando', working: 'calculando',
 };
 
 export const kFaultPatterns = [
@@ -266,16 +262,9 @@ export const kFaultPatterns = [
   ['^the machine cannot be restarted from here: (.+); restart it at its console or its switch$',
     'el equipo no se puede reiniciar desde aquí: $1; reinícielo en su consola o en su interruptor'],
   // Details of the log.
-  ['^(in_tolerance|unsure|move)((?:, \\w+ [+-][\\d.]+ \\w+)+)$', '$1$2'],
-  ['^(in_tolerance|unsure|move)((?:, \\w+ [+-][\\d.]+ \\w+)+); reason: (.+)$', '$1$2; motivo: $3'],
-  ['^((?:, \\w+ [+-][\\d.]+ \\w+)*), (\\w+) ([+-][\\d.]+) (\\w+)$', '$1, $2 $3 $4'],
-  ['^patient (\\S+), (\\w+)$', 'paciente $1, $2'],
   ['^scan (\\S+)$', 'escaneo $1'],
   ['^(\\d+) scans?$', '$1 escaneos'],
   ['^(\\d+) scans had not ended$', '$1 escaneos no habían terminado'],
-  ['^role (\\w+)$', 'función $1'],
-  ['^role (\\w+) (.+)$', 'función $1 $2'],
-  ['^(password|disabled|enabled) (.+)$', '$1 $2'],
   ['^(.+): (\\d+) scans, (\\d+) files, (\\d+) bytes, (\\d+) problems(, encrypted)?$',
     '$1: $2 escaneos, $3 archivos, $4 bytes, $5 problemas$6'],
   ['^, encrypted$', ', cifrada'],

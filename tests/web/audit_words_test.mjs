@@ -1,0 +1,102 @@
+// What the audit log's page says of stored entries, in both languages: audit_words_test.mjs SOURCE_FOLDER
+import { cpSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { pathToFileURL } from 'node:url';
+
+const [source] = process.argv.slice(2);
+const folder = mkdtempSync(join(tmpdir(), 'plumb-audit-words-'));
+cpSync(join(source, 'web/assets'), folder, { recursive: true });
+writeFileSync(join(folder, 'package.json'), '{"type": "module"}');
+globalThis.document = { documentElement: {} };
+const load = async (name) => (await import(pathToFileURL(join(folder, `${name}.js`)).href));
+const { useLanguage } = await load('strings');
+const { detailWords, subjectWords } = await load('audit_words');
+rmSync(folder, { recursive: true });
+
+const failures = [];
+const equal = (found, expected, what) => {
+  if (found !== expected) failures.push(`${what}: "${found}" instead of "${expected}"`);
+};
+
+const kPlan = JSON.stringify({ region_m: [[0, 0], [1, 0], [1, 1]], isocentre_m: null,
+  shift_tolerance_mm: 2.5, rotation_tolerance_deg: 1, posture: 'HFS', couch_markers: false });
+// Action, stored detail, English, Spanish.
+const kDetails = [
+  ['check.done', 'passed', 'PASSED', 'SUPERADO'],
+  ['check.done', 'failed', 'FAILED', 'NO SUPERADO'],
+  ['check.done', 'no_baseline', 'NO BASELINE', 'SIN BASE'],
+  ['scan.accept', 'in_tolerance', 'IN TOLERANCE', 'EN TOLERANCIA'],
+  ['scan.accept', 'in_tolerance, vertical +0.20 mm, lateral -0.31 mm, yaw -0.10 deg',
+    'IN TOLERANCE, Vertical +0.20 mm, Lateral −0.31 mm, Yaw −0.10°',
+    'EN TOLERANCIA, Vertical +0,20 mm, Lateral −0,31 mm, Guiñada −0,10°'],
+  ['scan.accept_outside', 'move, vertical +1.20 mm, pitch -0.10 deg; reason: swelling',
+    'MOVE, Vertical +1.20 mm, Pitch −0.10°; reason: swelling',
+    'MOVER, Vertical +1,20 mm, Cabeceo −0,10°; motivo: swelling'],
+  ['scan.accept_outside', 'unsure; reason: up; reason: move\nfailed',
+    'NOT SURELY WITHIN; reason: up; reason: move\nfailed',
+    'NO CONCLUYENTE; motivo: up; reason: move\nfailed'],
+  ['session.open', 'fraction', 'Fraction', 'Fracción'],
+  ['session.open', 'reference', 'New reference', 'Nueva referencia'],
+  ['scan.start', 'fraction', 'Fraction', 'Fracción'],
+  ['scan.start', 'daily_check', 'Daily check', 'Control diario'],
+  ['scan.start', 'unassigned', 'UNASSIGNED SCAN', 'ESCANEO SIN ASIGNAR'],
+  ['scan.end', 'unassigned', 'UNASSIGNED SCAN', 'ESCANEO SIN ASIGNAR'],
+  ['cancel', 'reference', 'New reference', 'Nueva referencia'],
+  ['scan.start', '', '', ''],  // of an earlier version
+  ['press', 'working', 'Computing', 'Calculando'],
+  ['press', 'no_sensor', 'Sensor missing', 'Falta el sensor'],
+  ['user.add', 'physicist', 'Physicist', 'Físico'],
+  ['user.change', 'role engineer password disabled', 'role: Engineer, new password, disabled',
+    'función: Ingeniero, contraseña nueva, desactivada'],
+  ['user.change', 'role technician', 'role: Technician', 'función: Técnico'],
+  ['user.change', 'enabled', 'enabled', 'activada'],
+  ['user.change', '', '', ''],
+  ['recording.remove', 'quota', 'to free disk space', 'para liberar espacio en disco'],
+  ['settings.change', '{"posture":["HFS","FFP"],"couch_markers":[false,true]}',
+    'Posture of new references: Head first, supine → Feet first, prone; '
+    + 'Markers are fixed to the couch: no → yes',
+    'Postura de las referencias nuevas: Cabeza primero, supino → Pies primero, prono; '
+    + 'Los marcadores están fijos a la camilla: no → sí'],
+  ['settings.change', '{"retention_days":[0,365],"auto_stop_s":[2.5]}',
+    'Delete scans after … days (0: never): 0 → 365; Stop a sweep after … s without new surface: 2.5',
+    'Borrar los escaneos tras … días (0: nunca): 0 → 365; '
+    + 'Detener un barrido tras … s sin superficie nueva: 2,5'],
+  ['patient.change', 'site and note', 'site and note', 'localización y nota'],
+];
+for (const [action, detail, english, spanish] of kDetails) {
+  for (const [language, expected] of [['en', english], ['es', spanish]]) {
+    useLanguage(language);
+    equal(detailWords({ action, user: 'anna', detail }), expected, `${language} ${action}`);
+  }
+}
+for (const language of ['en', 'es']) {
+  useLanguage(language);
+  // What this version does not know is shown as it is stored, also what every object has.
+  for (const action of ['check.done', 'session.open', 'scan.start', 'scan.end', 'cancel', 'press',
+    'scan.accept', 'scan.accept_outside', 'user.add', 'user.change', 'recording.remove',
+    'settings.change', 'reference.plan', 'an.action', 'toString']) {
+    for (const detail of ['later_word', 'toString', 'a, b; c', '{"a']) {
+      equal(detailWords({ action, user: 'plumbd', detail }), detail, `${language} ${action}, unknown`);
+    }
+  }
+  equal(detailWords({ action: 'scan.remove', user: 'anna', detail: 'quota' }), 'quota',
+    `${language}: a person's reason`);
+  if (detailWords({ action: 'reference.plan', user: 'anna', detail: kPlan }).includes('HFS')) {
+    failures.push(`${language}: the plan's posture is raw`);
+  }
+}
+for (const [language, retention, fraction, gone] of [
+  ['en', 'older than scans are kept', 'PX-1, Fraction 3', 'session 7 (deleted)'],
+  ['es', 'más antiguo que el plazo de conservación', 'PX-1, Fracción 3', 'sesión 7 (se borró)']]) {
+  useLanguage(language);
+  equal(detailWords({ action: 'scan.remove', user: 'plumbd', detail: 'retention' }), retention,
+    language);
+  const about = { kind: 'session', exists: true, patient_code: 'PX-1', number: 3, time: null };
+  equal(subjectWords({ subject: '7', about }), fraction, language);
+  equal(subjectWords({ subject: '7', about: { ...about, exists: false } }), gone, language);
+  equal(subjectWords({ subject: '', about: null }), '', language);
+}
+for (const failure of failures) console.log(`  - ${failure}`);
+console.log(failures.length ? `${failures.length} failures` : 'all well');
+process.exit(failures.length ? 1 : 0);

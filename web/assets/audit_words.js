@@ -1,0 +1,96 @@
+// The audit log in people's words. What is stored, identifiers and English, is covered by the log's
+// chain and never changes; only here is it worded. What is not known stays as it is stored.
+import { localTime } from './dom.js';
+import { S, translated } from './strings.js';
+
+/// The appliance itself; what it gives as a reason is one of its words, not a person's text.
+const kSelf = 'plumbd';
+
+const wordOf = (words, stored) => (Object.hasOwn(words, stored) ? words[stored] : stored);
+const plain = (value) => (value === true ? S.audit.yes : value === false ? S.audit.no
+  : `${value}`.replace('.', S.decimal));
+
+function planWords(plan) {
+  const text = S.plan;
+  const point = plan.isocentre_m?.map((value) => plain(Number(value.toFixed(3)))).join('; ');
+  return [text.corners(plan.region_m.length),
+    `${text.isocentre}: ${point ? `${point} m` : text.middle}`,
+    `±${plain(plan.shift_tolerance_mm)} mm, ±${plain(plan.rotation_tolerance_deg)}°`,
+    wordOf(text.postures, plan.posture),
+    plan.couch_markers ? text.couchMarkers : text.roomMarkers].join('; ');
+}
+
+/// Each setting that was changed, before and after.
+const settingsWords = (changes) => Object.entries(changes).map(([name, values]) => {
+  const said = (value) => (name === 'posture' ? wordOf(S.plan.postures, value) : plain(value));
+  return `${wordOf(S.settings, name)}: ${[values].flat().map(said).join(' → ')}`;
+}).join('; ');
+
+/// "move, vertical +1.20 mm, pitch -0.10 deg; reason: swelling"; the reason is a person's text.
+function acceptWords(detail) {
+  const [, result, reason] = /^([^;]*)(?:; reason: ([^]*))?$/.exec(detail) ?? [];
+  const [verdict, ...numbers] = result?.split(', ') ?? [];
+  if (!Object.hasOwn(S.result.verdicts, verdict ?? '')) return detail;
+  const words = numbers.map((number) => {
+    const [, axis, value, unit] = /^(\w+) ([+-][\d.]+) (mm|deg)$/.exec(number) ?? [];
+    if (!axis) return number;
+    const signed = value.replace('-', '−').replace('.', S.decimal);
+    return `${wordOf(S.result.axes, axis)} ${signed}${unit === 'mm' ? ' mm' : '°'}`;
+  });
+  return [S.result.verdicts[verdict], ...words].join(', ')
+    + (reason === undefined ? '' : `; ${S.audit.reason(reason)}`);
+}
+
+/// "role engineer password disabled": any of the three.
+function accountWords(detail) {
+  const found = /^(?:role (\w+) ?)?((?:(?:password|disabled|enabled) ?)*)$/.exec(detail);
+  if (!detail || !found) return detail;
+  const [, role, others] = found;
+  return [role && S.audit.role(wordOf(S.roles, role)),
+    ...others.split(' ').filter(Boolean).map((one) => S.audit.changes[one])]
+    .filter(Boolean).join(', ');
+}
+
+const scanKind = (detail) =>
+  (detail === 'unassigned' ? S.room.unassigned : wordOf(S.purposes, detail));
+const kDetails = {
+  'session.open': (detail) => wordOf(S.purposes, detail),
+  'scan.start': scanKind,
+  'scan.end': scanKind,
+  cancel: scanKind,
+  press: (detail) => wordOf(S.states, detail),
+  'check.done': (detail) => wordOf(S.check.verdicts, detail),
+  'scan.accept': acceptWords,
+  'scan.accept_outside': acceptWords,
+  'scan.remove': (detail, user) => (user === kSelf ? wordOf(S.audit.removals, detail) : detail),
+  'recording.remove': (detail) => wordOf(S.audit.removals, detail),
+  'user.add': (detail) => wordOf(S.roles, detail),
+  'user.change': accountWords,
+  'reference.plan': (detail) => planWords(JSON.parse(detail)),
+  'settings.change': (detail) => settingsWords(JSON.parse(detail)),
+};
+
+/// What an entry says beside its action.
+export function detailWords({ action, user, detail }) {
+  if (!Object.hasOwn(kDetails, action)) return translated(detail);
+  try {
+    return kDetails[action](detail, user);
+  } catch {
+    return detail;  // not in the form that this version writes
+  }
+}
+
+/// What an entry is about, as people know it: a code and a number instead of a row of the database.
+export function subjectWords({ subject, about }) {
+  if (!about) return subject;
+  const text = S.audit.about;
+  if (!about.exists) return text.gone(wordOf(text.kinds, about.kind), subject);
+  const words = {
+    patient: () => '',
+    session: () => (about.number ? S.session.fraction(about.number) : S.purposes.reference),
+    scan: () => text.scan(subject),
+    reference: () => text.reference(about.number),
+    check: () => text.check(localTime(about.time)),
+  }[about.kind]?.() ?? subject;
+  return [about.patient_code, words].filter(Boolean).join(', ');
+}
