@@ -80,7 +80,9 @@ struct Updater::Impl {
   std::shared_ptr<bool> alive = std::make_shared<bool>(true);  ///< For work on other threads.
   EventLoop::Source watch;                                     ///< Armed while RAUC installs.
   std::chrono::steady_clock::time_point moved_at;  ///< Time of the last change of its progress.
-  bool given_up = false;  ///< The last installation made no progress; RAUC may still end it.
+  bool given_up = false;   ///< The last installation made no progress; RAUC may still end it.
+  double last_done = 0.0;  ///< As RAUC gives it.
+  bool has_begun = false;  ///< RAUC has given less than 100 % for this installation.
   double fraction = 0.0;
   std::string bundle;
   web::Done done;
@@ -196,8 +198,11 @@ struct Updater::Impl {
       std::int32_t percent = 0, depth = 0;
       if (sd_bus_message_read(message, "v", "(isi)", &percent, &text, &depth) < 0) return;
       const double now_done = std::clamp(percent, 0, 100) / 100.0;
-      if (now_done != fraction || step != Shown(text)) moved_at = options.now();
-      if (!given_up) fraction = now_done;
+      if (now_done != last_done || step != Shown(text)) moved_at = options.now();
+      // Until RAUC has begun, this is still the end of its last installation.
+      if (now_done < 1.0) has_begun = true;
+      if (!given_up) fraction = has_begun ? now_done : 0.0;
+      last_done = now_done;
       step = Shown(text);
     } else if (key == "BootSlot" || key == "Compatible" || key == "LastError" ||
                key == "Operation") {
@@ -371,7 +376,7 @@ struct Updater::Impl {
     if (const std::string why = WhyNoBundle(file, options.max_bytes); !why.empty())
       return asked(Refused(ChangeResult::kInvalid, why));
     is_installing = true;
-    given_up = false;
+    given_up = has_begun = false;
     bundle = name;
     fraction = 0.0;
     step = "checking the signature";

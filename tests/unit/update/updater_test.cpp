@@ -503,6 +503,21 @@ TEST_F(StandstillTest, ACopyHasLongerAndProgressBeginsTheTimeAnew) {
   });
 }
 
+TEST_F(StandstillTest, TheEndOfTheLastInstallationIsNoProgressOfThisOne) {
+  Play([&] {
+    FakeRauc rauc(bus_.address());
+    Start();
+    WaitForRauc();
+    BeginAt(rauc, "Installing done.", 100);
+    EXPECT_EQ(StatusNow().fraction, 0.0);
+    rauc.Reach(20);
+    EXPECT_TRUE(Becomes([&] { return StatusNow().fraction == 0.2; }));
+    rauc.Reach(100);
+    EXPECT_TRUE(Becomes([&] { return StatusNow().fraction == 1.0; }));
+    EXPECT_TRUE(StatusNow().installing) << "RAUC has not reported its end";
+  });
+}
+
 TEST_F(StandstillTest, AnInstallationThatEndsAfterItWasGivenUpIsStillTold) {
   Play([&] {
     FakeRauc rauc(bus_.address());
