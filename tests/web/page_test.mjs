@@ -786,14 +786,16 @@ await h.step('two taps start a sweep and do not end it', async () => {
 });
 
 await h.step('phone and 4K', async () => {
-  for (const [name, width, height] of [['phone', 360, 740], ['4k', 3840, 2160]]) {
+  for (const [name, width, height, language] of [['phone', 360, 740, 'en'], ['phone-spanish', 360, 740, 'es'], ['4k', 3840, 2160, 'en']]) {
     const page = await h.person(name, { width, height });
     await h.logIn(page, 'anna');
+    await page.evaluate((chosen) => localStorage.setItem('plumb-language-anna', chosen), language);
+    await page.reload();
     const scans = await page.evaluate(() => fetch('/api/v1/scans').then((response) => response.json()));
     const moved = scans.scans.find((one) => one.result?.verdict === 'move');
     for (const [screen, hash] of [['result', `result/${moved.id}`], ['scan', 'scan'], ['status', 'status'], ['patients', 'patients']]) {
       await page.goto(`${h.url}#/${hash}`);
-      await page.getByText('Loading…').first().waitFor({ state: 'detached' });
+      await page.getByText(language === 'es' ? 'Cargando…' : 'Loading…').first().waitFor({ state: 'detached' });
       await page.waitForTimeout(1000);
       const overflow = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
       check(overflow <= 0, `${name} ${screen} does not scroll sideways (${overflow} px too wide)`);
@@ -802,7 +804,8 @@ await h.step('phone and 4K', async () => {
         .filter((cell) => cell.getBoundingClientRect().right > innerWidth).map((cell) => cell.textContent));
       equal(beyond.join(), '', `${name} ${screen}: cells in view`);
       if (screen === 'result') {
-        // Verdict and first numbers are seen without scrolling.
+        // Verdict and first numbers are seen without scrolling, below what forbids to act on them.
+        check(await page.getByText(language === 'es' ? 'No actúe según este resultado.' : 'Do not act on this result.').isVisible(), `${name}: the review says not to act`);
         const value = await page.locator('.number .value').first().boundingBox();
         check(value.y + value.height < 0.65 * height, `${name}: the first number ends at ${value.y + value.height} of ${height} px`);
       }

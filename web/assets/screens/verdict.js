@@ -61,8 +61,10 @@ export function validityNote(scan, received, review) {
     element.dataset.shown = shown;
     if (!shown) clear(element);
     else {
-      const [word, rest] = shown === 'review'
-        ? [text.reviewTitle, text.review(localTime(scan.started_at))] : words[shown];
+      const [word, ...rest] = shown === 'review'
+        // A narrow screen says the time of the scan above only, where it is said in any case.
+        ? [text.reviewTitle, h('span', { class: 'review-of' },
+          text.review(localTime(scan.started_at)), ' '), text.reviewText] : words[shown];
       clear(element, h('strong', {}, word), ' ', rest);
     }
     return why;

@@ -252,7 +252,7 @@ export const es = {
   result: {
     title: 'Resultado', none: 'Aún no hay resultado.', noneHint: 'Abra un paciente y escanee.',
     patient: 'Paciente', reference: 'Referencia', version: (v) => `versión ${v}`,
-    scanned: 'Escaneado', age: 'Antigüedad', fraction: 'Fracción', scanNumber: 'Escaneo',
+    scanned: 'Escaneado', age: 'Hace', fraction: 'Fracción', scanNumber: 'Escaneo',
     old: 'ANTIGUO', oldText: 'Este resultado tiene más de 2 minutos. No actúe según él: escanee de '
       + 'nuevo.',
     running: 'HAY UN NUEVO ESCANEO EN CURSO',
@@ -261,8 +261,8 @@ export const es = {
     supersededText: 'Hay un escaneo más nuevo. No actúe según este resultado.',
     closed: 'SESIÓN NO ABIERTA',
     closedText: 'La sesión de este paciente no está abierta. No actúe según este resultado.',
-    review: (when) => `Resultado del ${when}, para revisión. No actúe según él.`,
-    reviewTitle: 'REVISIÓN',
+    review: (when) => `Resultado del ${when}, para revisión.`,
+    reviewText: 'No actúe según este resultado.', reviewTitle: 'REVISIÓN',
     unassigned: 'Escaneo sin asignar: no había ninguna sesión abierta.',
     seconds: (s) => `${s} s`, minutes: (m) => `${m} min`, hours: (hours) => `${hours} h`,
     days: (days) => `${days} ${plural(days, 'día', 'días')}`,
