@@ -81,8 +81,9 @@ struct Updater::Impl {
   EventLoop::Source watch;                                     ///< Armed while RAUC installs.
   std::chrono::steady_clock::time_point moved_at;  ///< Time of the last change of its progress.
   bool given_up = false;   ///< The last installation made no progress; RAUC may still end it.
-  double last_done = 0.0;  ///< As RAUC gives it.
-  bool has_begun = false;  ///< RAUC has given less than 100 % for this installation.
+  double last_done = 0.0;  ///< As RAUC reports it.
+  bool is_called = false;  ///< RAUC has been asked to install.
+  bool has_begun = false;  ///< It has then reported less than 100 %.
   double fraction = 0.0;
   std::string bundle;
   web::Done done;
@@ -199,8 +200,8 @@ struct Updater::Impl {
       if (sd_bus_message_read(message, "v", "(isi)", &percent, &text, &depth) < 0) return;
       const double now_done = std::clamp(percent, 0, 100) / 100.0;
       if (now_done != last_done || step != Shown(text)) moved_at = options.now();
-      // Until RAUC has begun, this is still the end of its last installation.
-      if (now_done < 1.0) has_begun = true;
+      // Until the installation has begun, this is the progress of RAUC's look at the bundle.
+      if (is_called && now_done < 1.0) has_begun = true;
       if (!given_up) fraction = has_begun ? now_done : 0.0;
       last_done = now_done;
       step = Shown(text);
@@ -343,6 +344,7 @@ struct Updater::Impl {
   }
 
   void Call() {
+    is_called = true;
     const std::string path = (options.folder / bundle).string();
     const int result =
         sd_bus_call_method_async(bus.get(), nullptr, kService, kPath, kInstaller, "InstallBundle",
@@ -376,7 +378,7 @@ struct Updater::Impl {
     if (const std::string why = WhyNoBundle(file, options.max_bytes); !why.empty())
       return asked(Refused(ChangeResult::kInvalid, why));
     is_installing = true;
-    given_up = has_begun = false;
+    given_up = is_called = has_begun = false;
     bundle = name;
     fraction = 0.0;
     step = "checking the signature";

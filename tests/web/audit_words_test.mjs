@@ -40,12 +40,13 @@ const kDetails = [
   ['session.open', 'reference', 'New reference', 'Nueva referencia'],
   ['scan.start', 'fraction', 'Fraction', 'Fracción'],
   ['scan.start', 'daily_check', 'Daily check', 'Control diario'],
-  ['scan.start', 'unassigned', 'UNASSIGNED SCAN', 'ESCANEO SIN ASIGNAR'],
-  ['scan.end', 'unassigned', 'UNASSIGNED SCAN', 'ESCANEO SIN ASIGNAR'],
+  ['scan.start', 'unassigned', 'Unassigned scan', 'Escaneo sin asignar'],
+  ['scan.end', 'unassigned', 'Unassigned scan', 'Escaneo sin asignar'],
   ['cancel', 'reference', 'New reference', 'Nueva referencia'],
   ['scan.start', '', '', ''],  // of an earlier version
   ['press', 'working', 'Computing', 'Calculando'],
   ['press', 'no_sensor', 'Sensor missing', 'Falta el sensor'],
+  ['template.remove', 'head', 'head', 'head'],
   ['user.add', 'physicist', 'Physicist', 'Físico'],
   ['user.change', 'role engineer password disabled', 'role: Engineer, new password, disabled',
     'función: Ingeniero, contraseña nueva, desactivada'],
@@ -80,6 +81,8 @@ for (const language of ['en', 'es']) {
       equal(detailWords({ action, user: 'plumbd', detail }), detail, `${language} ${action}, unknown`);
     }
   }
+  equal(detailWords({ action: 'scan.remove', user: 'plumbd', address: '10.0.0.2', detail: 'quota' }), 'quota',
+    'of an account of that name');
   equal(detailWords({ action: 'scan.remove', user: 'anna', detail: 'quota' }), 'quota',
     `${language}: a person's reason`);
   if (detailWords({ action: 'reference.plan', user: 'anna', detail: kPlan }).includes('HFS')) {
@@ -87,7 +90,7 @@ for (const language of ['en', 'es']) {
   }
 }
 for (const [language, retention, fraction, gone] of [
-  ['en', 'older than scans are kept', 'PX-1, Fraction 3', 'session 7 (deleted)'],
+  ['en', 'past the retention period', 'PX-1, Fraction 3', 'session 7 (deleted)'],
   ['es', 'más antiguo que el plazo de conservación', 'PX-1, Fracción 3', 'sesión 7 (se borró)']]) {
   useLanguage(language);
   equal(detailWords({ action: 'scan.remove', user: 'plumbd', detail: 'retention' }), retention,

@@ -109,6 +109,12 @@ for (const [text, expected] of [
   ['plumb-2.raucb was not installed: this bundle holds version 0.1.0, older than 0.2.0 which runs',
     'plumb-2.raucb no se instaló: este archivo contiene la versión 0.1.0, anterior a la 0.2.0, que '
     + 'está en uso'],
+  ['what is stored cannot be read: the stored settings cannot be read: expected a JSON object, '
+    + 'found none; it was changed from outside, or its disk failed. Put a backup of the database in '
+    + 'its place, or save it again',
+  'no se puede leer lo guardado: no es posible leer los ajustes guardados: expected a JSON object, '
+    + 'found none; se cambió desde fuera o falló el disco. Ponga una copia de la base de datos en su '
+    + 'lugar o guárdelo de nuevo'],
   ['scan needs at least 3 markers shared with the reference, found 1 (id 7); keep the markers in '
     + 'view', 'el escaneo necesita al menos 3 marcadores comunes con la referencia y tiene 1; '
     + 'mantenga los marcadores a la vista']]) {

@@ -3,7 +3,8 @@
 import { localTime } from './dom.js';
 import { S, translated } from './strings.js';
 
-/// The appliance itself; what it gives as a reason is one of its words, not a person's text.
+/// The appliance itself, which has no address; what it gives as a reason is one of its words, not a
+/// person's text.
 const kSelf = 'plumbd';
 
 const wordOf = (words, stored) => (Object.hasOwn(words, stored) ? words[stored] : stored);
@@ -52,7 +53,7 @@ function accountWords(detail) {
 }
 
 const scanKind = (detail) =>
-  (detail === 'unassigned' ? S.room.unassigned : wordOf(S.purposes, detail));
+  (detail === 'unassigned' ? S.audit.unassigned : wordOf(S.purposes, detail));
 const kDetails = {
   'session.open': (detail) => wordOf(S.purposes, detail),
   'scan.start': scanKind,
@@ -62,8 +63,9 @@ const kDetails = {
   'check.done': (detail) => wordOf(S.check.verdicts, detail),
   'scan.accept': acceptWords,
   'scan.accept_outside': acceptWords,
-  'scan.remove': (detail, user) => (user === kSelf ? wordOf(S.audit.removals, detail) : detail),
+  'scan.remove': (detail, bySelf) => (bySelf ? wordOf(S.audit.removals, detail) : detail),
   'recording.remove': (detail) => wordOf(S.audit.removals, detail),
+  'template.remove': (detail) => detail,  // the site, as a person named it
   'user.add': (detail) => wordOf(S.roles, detail),
   'user.change': accountWords,
   'reference.plan': (detail) => planWords(JSON.parse(detail)),
@@ -71,10 +73,10 @@ const kDetails = {
 };
 
 /// What an entry says beside its action.
-export function detailWords({ action, user, detail }) {
+export function detailWords({ action, user, address, detail }) {
   if (!Object.hasOwn(kDetails, action)) return translated(detail);
   try {
-    return kDetails[action](detail, user);
+    return kDetails[action](detail, user === kSelf && !address);
   } catch {
     return detail;  // not in the form that this version writes
   }

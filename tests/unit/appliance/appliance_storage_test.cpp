@@ -194,7 +194,18 @@ TEST(ApplianceStorage, SettingsThatCannotBeReadAreNoDefaults) {
   Appliance appliance(around.loop, PartsOf(around.config, around.bus));
   StoreAccess access(appliance);
   EXPECT_THAT(testing::MessageOf<IoError>([&] { (void)WebSettings(access).GetSettings(); }),
-              HasSubstr("what is stored cannot be read: "));
+              HasSubstr("what is stored cannot be read: the stored settings cannot be read: "))
+      << "the page goes by this sentence";
+  // A complete set replaces them.
+  web::Settings entered;
+  entered.idle_logout_min = 9;
+  std::optional<web::Change> changed;
+  WebSettings settings(access);
+  settings.ChangeSettings({.user = "anna", .address = {}}, entered,
+                          [&](const web::Change& change) { changed = change; });
+  EXPECT_TRUE(RunUntil(around.loop, [&] { return changed.has_value(); }));
+  EXPECT_EQ(changed->result, web::ChangeResult::kDone);
+  EXPECT_EQ(settings.GetSettings().idle_logout_min, 9);
 }
 
 TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {

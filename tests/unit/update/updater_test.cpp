@@ -75,6 +75,8 @@ class FakeRauc {
     if (rauc->refuses_signature)
       return sd_bus_error_set(error, "org.gtk.GDBus.UnmappedGError.Quark._r_2dbundle",
                               "signature verification failed");
+    rauc->Report(0, "Checking bundle");
+    rauc->Report(100, "Checking bundle done.");
     return sd_bus_reply_method_return(message, "ss", "plumb-amd64", rauc->version.c_str());
   }
   static int Install(sd_bus_message* message, void* self, sd_bus_error*) {
@@ -92,6 +94,11 @@ class FakeRauc {
     sd_bus_emit_properties_changed(rauc->bus_, "/", "de.pengutronix.rauc.Installer", "Operation",
                                    "Progress", nullptr);
     return 1;
+  }
+  void Report(int percent, const char* step) {
+    percent_ = percent;
+    text_ = step;
+    sd_bus_emit_properties_changed(bus_, "/", "de.pengutronix.rauc.Installer", "Progress", nullptr);
   }
   void Finish() {
     percent_ = 100;
@@ -503,12 +510,12 @@ TEST_F(StandstillTest, ACopyHasLongerAndProgressBeginsTheTimeAnew) {
   });
 }
 
-TEST_F(StandstillTest, TheEndOfTheLastInstallationIsNoProgressOfThisOne) {
+TEST_F(StandstillTest, CheckingTheBundleIsNoProgressOfItsInstallation) {
   Play([&] {
     FakeRauc rauc(bus_.address());
     Start();
     WaitForRauc();
-    BeginAt(rauc, "Installing done.", 100);
+    BeginAt(rauc, "Checking bundle done.", 100);
     EXPECT_EQ(StatusNow().fraction, 0.0);
     rauc.Reach(20);
     EXPECT_TRUE(Becomes([&] { return StatusNow().fraction == 0.2; }));

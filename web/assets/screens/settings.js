@@ -41,7 +41,7 @@ function backupCard() {
     h('p', { class: 'hint' }, text.backupHint), last, now, running);
 }
 
-const kCannotRead = 500;
+const kCannotRead = /the stored settings cannot be read/;
 
 /// What is stored, or why it cannot be read: then nothing is filled in, since a default would look
 /// like a value that somebody set.
@@ -49,7 +49,7 @@ async function readSettings() {
   try {
     return { settings: await get('settings'), fault: null };
   } catch (error) {
-    if (error.status !== kCannotRead) throw error;
+    if (!kCannotRead.test(error.body?.error ?? '')) throw error;
     return { settings: {}, fault: error.message };
   }
 }
@@ -66,21 +66,30 @@ export async function showSettings(place) {
     return field(text[name], inputs[name]);
   });
   const flags = kFlags.map((name) => {
-    inputs[name] = checkbox(text[name], settings[name], { disabled: !editable });
-    return inputs[name].element;
+    if (fault) {  // A box is never empty, a choice can be.
+      const choice = select({ true: S.audit.yes, false: S.audit.no }, undefined,
+        { required: true, disabled: !editable });
+      inputs[name] = { isOn: () => choice.value === 'true' };
+      return field(text[name], choice);
+    }
+    const { box, element } = checkbox(text[name], settings[name], { disabled: !editable });
+    inputs[name] = { isOn: () => box.checked };
+    return element;
   });
   const posture = select(S.plan.postures, settings.posture,
     { required: true, disabled: !editable });
+  const alert = fault && h('p', { class: 'caution', role: 'alert' }, text.enterAll, ' ',
+    h('code', {}, fault));
   const save = async () => {
     const changed = { posture: posture.value };
     for (const name of Object.keys(kNumbers)) changed[name] = Number(inputs[name].value);
-    for (const name of kFlags) changed[name] = inputs[name].box.checked;
+    for (const name of kFlags) changed[name] = inputs[name].isOn();
     await put('settings', changed);
+    alert?.remove();
     done(S.saved);
   };
   clear(place, h('h1', {}, text.title), !editable && h('p', { class: 'lead' }, text.readOnly),
-    fault && h('p', { class: 'caution', role: 'alert' }, text.enterAll, ' ',
-      h('code', {}, fault)),
+    alert,
     h('section', { class: 'card' }, form({ class: 'form columns' }, save, numbers,
       field(text.posture, posture), flags,
       editable && h('div', { class: 'row' }, h('button', { class: 'primary' }, S.save)))),

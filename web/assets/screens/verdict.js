@@ -29,6 +29,7 @@ export function identity({ scan, patient, reference, received }) {
   const text = S.result;
   const age = h('strong', {});
   const item = (label, ...value) => h('div', {}, h('dt', {}, label), h('dd', {}, ...value));
+  const sinceScan = item(text.age, age);
   const element = h('dl', { class: 'identity' },
     item(text.patient, h('strong', { class: 'code' },
       patient ? h('a', { href: `#/patient/${patient.id}` }, patient.code) : S.none)),
@@ -36,10 +37,11 @@ export function identity({ scan, patient, reference, received }) {
     item(text.reference, reference
       ? `${text.version(reference.version)}, ${localTime(reference.created_at)}` : S.none),
     item(text.scanned, localTime(scan.started_at)),
-    item(text.age, age));
+    sinceScan);
   const tick = () => {
     const seconds = ageOf(scan, received);
-    age.textContent = Number.isFinite(seconds) ? ageText(seconds) : S.none;
+    sinceScan.hidden = !Number.isFinite(seconds);
+    if (!sinceScan.hidden) age.textContent = ageText(seconds);
   };
   return { element, tick };
 }
@@ -62,7 +64,7 @@ export function validityNote(scan, received, review) {
     if (!shown) clear(element);
     else {
       const [word, ...rest] = shown === 'review'
-        // A narrow screen says the time of the scan above only, where it is said in any case.
+        // On a narrow screen the time is left out here: it stands right above.
         ? [text.reviewTitle, h('span', { class: 'review-of' },
           text.review(localTime(scan.started_at)), ' '), text.reviewText] : words[shown];
       clear(element, h('strong', {}, word), ' ', rest);

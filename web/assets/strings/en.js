@@ -495,10 +495,10 @@ export const en = {
     filterHint: 'Searches the entries shown below; load older ones to search them too.',
     shown: (found, all) => `${found} of ${all} ${plural(all, 'entry', 'entries')}`,
     csv: 'Download as CSV',
-    views: 'Also show who looked at what', yes: 'yes', no: 'no',
+    views: 'Also show who looked at what', yes: 'yes', no: 'no', unassigned: 'Unassigned scan',
     reason: (text) => `reason: ${text}`, role: (role) => `role: ${role}`,
     changes: { password: 'new password', disabled: 'disabled', enabled: 'enabled' },
-    removals: { retention: 'older than scans are kept', quota: 'to free disk space' },
+    removals: { retention: 'past the retention period', quota: 'to free disk space' },
     about: {
       scan: (id) => `scan ${id}`, reference: (version) => `reference version ${version}`,
       check: (when) => `check of ${when}`, gone: (kind, id) => `${kind} ${id} (deleted)`,
@@ -588,7 +588,7 @@ export const en = {
     retention_days: 'Delete scans after … days (0: never)',
     idle_logout_min: 'Log out after … min of inactivity',
     readOnly: 'Only an engineer can change the settings.',
-    enterAll: 'No scan can start until an engineer enters every value here and saves.',
+    enterAll: 'No scan can start until an engineer enters every value here and saves them.',
     backup: 'Backup',
     backupHint: 'Copies the database and all scans into the folder that is set as backup_folder. '
       + 'Scans go on meanwhile.',

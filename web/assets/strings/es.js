@@ -549,6 +549,7 @@ export const es = {
     shown: (found, all) => `${found} de ${all} ${plural(all, 'entrada', 'entradas')}`,
     csv: 'Descargar como CSV',
     views: 'Mostrar también quién consultó qué', yes: 'sí', no: 'no',
+    unassigned: 'Escaneo sin asignar',
     reason: (text) => `motivo: ${text}`, role: (role) => `función: ${role}`,
     changes: { password: 'contraseña nueva', disabled: 'desactivada', enabled: 'activada' },
     removals: {

@@ -1,6 +1,7 @@
 // What the appliance refuses, reports of its own faults, and writes into its log, in Spanish: as
 // es_appliance.js, which takes these in.
 export const kFaultWords = {
+  'the stored settings': 'los ajustes guardados', 'a stored plan': 'un plan guardado',
   // Refusals of scan and session.
   'no scan is running': 'no hay ningún escaneo en curso',
   'no scan is running: press shortly to start one':
@@ -191,6 +192,10 @@ export const kFaultPatterns = [
   'La última copia está en el mismo disco que los escaneos y se pierde con él: monte el disco de '
     + 'copias en $1'],
   ['^what is stored cannot be read: (.+)$', 'no se puede leer lo guardado: $1'],
+  ['^(.+) cannot be read: (.+); it was changed from outside, or its disk failed\\. Put a backup of '
+    + 'the database in its place, or save it again$',
+  'no es posible leer $1: $2; se cambió desde fuera o falló el disco. Ponga una copia de la base '
+    + 'de datos en su lugar o guárdelo de nuevo'],
   ['^nobody can log in: (.+)$', 'nadie puede identificarse: $1'],
   ['^no scan can begin: (.+)$', 'no puede empezar ningún escaneo: $1'],
   ['^(\\d+) of (\\d+) stored scans cannot be seen \\(of scan (\\S+), (.+)\\): is the disk mounted '
