@@ -72,8 +72,11 @@ export function roomCard() {
   const text = S.room_calibration;
   const place = h('section', { class: 'card room-calibration' });
   let shown = '';
+  let requests = 0;
   const load = async () => {
+    const request = ++requests;
     const room = await get('room-calibration', true);
+    if (request !== requests) return;  // the answer to a later one is newer
     if (JSON.stringify(room) === shown) return;  // somebody may be typing
     shown = JSON.stringify(room);
     const { scans, versions } = room;
