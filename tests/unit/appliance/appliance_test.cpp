@@ -150,8 +150,8 @@ TEST_F(ApplianceTest, TheLogSaysWhichScanWasStartedEndedAndDiscarded) {
     const auto entries = appliance_->store()->audit.Find({0, 1, action});
     if (entries.empty()) return std::string("nothing");
     const auto& about = entries[0].about;
-    return (about ? about->patient_code + " " + std::to_string(about->number) : "nobody") + " " +
-           entries[0].detail;
+    return (about ? about->patient_code + " " + std::to_string(about->number) : "no subject:") +
+           " " + entries[0].detail;
   };
   Play([&] {
     MakeReady();
@@ -167,9 +167,9 @@ TEST_F(ApplianceTest, TheLogSaysWhichScanWasStartedEndedAndDiscarded) {
       EXPECT_TRUE(Becomes([&] { return logged("cancel") == kind; })) << kind;
       EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     };
-    scan("nobody unassigned");
+    scan("no subject: unassigned");
     On([&] { EXPECT_EQ(appliance_->OpenCheck(tess), ""); });
-    scan("nobody daily_check");
+    scan("no subject: daily_check");
     On([&] {
       Store& store = *appliance_->store();
       (void)store.checks.Add(

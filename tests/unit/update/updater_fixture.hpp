@@ -1,0 +1,146 @@
+// The updater on its loop, with a RAUC that does what a test says.
+#pragma once
+
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <future>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "daemon/update/updater.hpp"
+#include "tests/support/private_bus.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/update/fake_rauc.hpp"
+
+namespace plumb::testing {
+
+class UpdaterTest : public ::testing::Test {
+ protected:
+  UpdaterTest() {
+    std::filesystem::create_directories(folder_ / "updates");
+    WriteBundle("plumb-9.0.raucb");
+  }
+
+  /// As RAUC's plain and verity bundles are laid out: a squashfs, a signature, its size in eight
+  /// bytes.
+  void WriteBundle(const std::string& name, const std::string& magic = "hsqs",
+                   unsigned char signature_size = 0xFF, std::size_t bytes = 8192) {
+    std::string text = magic + std::string(bytes, 'x') + std::string(7, '\0');
+    text += static_cast<char>(signature_size);
+    std::ofstream(folder_ / "updates" / name, std::ios::binary) << text;
+  }
+
+  /// Runs the test beside the loop, which has the main thread; a loop that has ended does not begin
+  /// again.
+  void Play(const std::function<void()>& test) {
+    std::jthread player([&] {
+      test();
+      On([this] { updater_.reset(); });
+      loop_.Quit(0);
+    });
+    loop_.Run();
+  }
+
+  /// The same with a RAUC on the bus that the updater has found.
+  void PlayWithRauc(const std::function<void(FakeRauc&)>& test) {
+    Play([&] {
+      FakeRauc rauc(bus_.address());
+      Start();
+      WaitForRauc();
+      test(rauc);
+    });
+  }
+
+  /// On the loop's thread; waits for it.
+  void On(const std::function<void()>& work) {
+    std::promise<void> done;
+    loop_.Post("test", [&] {
+      work();
+      done.set_value();
+    });
+    done.get_future().wait();
+  }
+
+  void Start() {
+    On([this] {
+      updater_ = std::make_unique<Updater>(
+          loop_,
+          UpdaterOptions{
+              .folder = folder_ / "updates",
+              .max_bytes = 1 << 20,
+              .bus_address = bus_.address(),
+              .version = "0.1.0",
+              .boot = boot_,
+              .blocking_reason = [this] { return blocking_reason_; },
+              .changed = [this] { ++num_changes_; },
+              .run_in_background = {},
+              .ended = [this](const std::string& bundle,
+                              const std::string& failure) { ended_ = bundle + ": " + failure; },
+              .rolled_back = [this](const std::string& text) { roll_backs_ += text; },
+              .look_every = std::chrono::milliseconds(1),
+              .now =
+                  [this] {
+                    ++num_looks_;
+                    return EventLoop::Clock::time_point() + passed_.load();
+                  }});
+    });
+  }
+
+  [[nodiscard]] web::UpdateStatus StatusNow() {
+    web::UpdateStatus status;
+    On([&] { status = updater_->status(); });
+    return status;
+  }
+  [[nodiscard]] std::string Ended() {
+    std::string ended;
+    On([&] { ended = ended_; });
+    return ended;
+  }
+
+  /// False if it does not come to that within half a minute.
+  [[nodiscard]] static bool Becomes(const std::function<bool()>& holds) {
+    const auto until = EventLoop::Clock::now() + std::chrono::seconds(30);
+    while (!holds()) {
+      if (EventLoop::Clock::now() > until) return false;
+      ::usleep(2000);
+    }
+    return true;
+  }
+  void WaitForRauc() {
+    ASSERT_TRUE(Becomes([&] { return StatusNow().supported; }));
+  }
+
+  web::Change Install(const std::string& name) {
+    auto answer = std::make_shared<std::promise<web::Change>>();
+    On([&] {
+      updater_->Install(name, [answer](const web::Change& change) { answer->set_value(change); });
+    });
+    auto future = answer->get_future();
+    if (future.wait_for(std::chrono::seconds(30)) != std::future_status::ready) {
+      ADD_FAILURE() << "no answer";
+      return {};
+    }
+    return future.get();
+  }
+
+  EventLoop loop_;  // first: blocks signals before any thread starts
+  TempFolder folder_;
+  PrivateBus bus_{folder_.path()};
+  std::unique_ptr<Updater> updater_;
+  int num_changes_ = 0;
+  std::string blocking_reason_;
+  std::string ended_, roll_backs_;
+  std::string boot_ = "first";
+  std::atomic<std::chrono::seconds> passed_{std::chrono::seconds(0)};
+  std::atomic<int> num_looks_ = 0;
+};
+
+}  // namespace plumb::testing

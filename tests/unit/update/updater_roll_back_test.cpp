@@ -1,0 +1,87 @@
+// Whether the machine kept what was installed.
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/update/updater_fixture.hpp"
+
+namespace plumb {
+namespace {
+
+using testing::FakeRauc;
+using ::testing::HasSubstr;
+using testing::UpdaterTest;
+using web::ChangeResult;
+
+/// One installs 9.0 from system A; the test then simulates a restart of the machine.
+class RollBackTest : public UpdaterTest {
+ protected:
+  void InstallAndEnd() {
+    Start();
+    WaitForRauc();
+    EXPECT_FALSE(StatusNow().restart_needed);
+    EXPECT_EQ(Install("plumb-9.0.raucb").result, ChangeResult::kDone);
+    rauc_->Release();
+    EXPECT_TRUE(Becomes([&] { return !StatusNow().installing; }));
+    EXPECT_TRUE(StatusNow().restart_needed);
+    EXPECT_EQ(StatusNow().failure, "");
+    On([&] { updater_.reset(); });
+  }
+  void StartAs(const std::string& boot) {
+    boot_ = boot;
+    Start();
+    WaitForRauc();
+  }
+  std::unique_ptr<FakeRauc> rauc_ = std::make_unique<FakeRauc>(bus_.address());
+};
+
+TEST_F(RollBackTest, TheSameStartStillNeedsItsRestart) {
+  Play([&] {
+    InstallAndEnd();
+    StartAs("first");
+    EXPECT_TRUE(StatusNow().restart_needed);
+    EXPECT_EQ(StatusNow().rolled_back, "");
+    EXPECT_EQ(roll_backs_, "");
+  });
+}
+
+TEST_F(RollBackTest, AMachineThatStartsTheSystemBeforeSaysSoUntilSomebodyHasSeenIt) {
+  Play([&] {
+    InstallAndEnd();
+    StartAs("second");
+    EXPECT_FALSE(StatusNow().restart_needed);
+    EXPECT_THAT(StatusNow().rolled_back, HasSubstr("version 9.0 was installed, but"));
+    EXPECT_THAT(StatusNow().rolled_back, HasSubstr("0.1.0"));
+    On([&] { EXPECT_EQ(roll_backs_, updater_->status().rolled_back) << "once"; });
+    On([&] { updater_.reset(); });
+    StartAs("third");
+    EXPECT_NE(StatusNow().rolled_back, "") << "a second restart does not hide it";
+    On([&] { updater_->ForgetRollBack(); });
+    EXPECT_EQ(StatusNow().rolled_back, "");
+    On([&] { updater_.reset(); });
+    StartAs("fourth");
+    EXPECT_EQ(StatusNow().rolled_back, "");
+  });
+}
+
+TEST_F(RollBackTest, AMachineThatStartsTheNewSystemHasNothingToSay) {
+  Play([&] {
+    InstallAndEnd();
+    rauc_->slot = "B";
+    StartAs("second");
+    EXPECT_EQ(StatusNow().slot, "B");
+    EXPECT_FALSE(StatusNow().restart_needed);
+    EXPECT_EQ(StatusNow().rolled_back, "");
+    On([&] {
+      updater_->ForgetRollBack();
+      updater_.reset();
+    });
+    rauc_->slot = "A";  // the boot counter gave up on it later
+    StartAs("third");
+    EXPECT_NE(StatusNow().rolled_back, "");
+  });
+}
+
+}  // namespace
+}  // namespace plumb
