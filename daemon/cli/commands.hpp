@@ -30,7 +30,7 @@ struct CommandContext {
 };
 
 /// Runs the command. Its return value is the exit code; exceptions are converted to the other codes
-/// (see main.cpp).
+/// (see plumb_main.cpp).
 using Command = std::function<int(const CommandContext&)>;
 
 /// Adds the subcommand to `app` and returns how to run it once the line is parsed.
