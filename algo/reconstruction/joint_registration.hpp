@@ -12,11 +12,11 @@
 namespace plumb {
 
 struct JointRegistrationOptions {
-  double marker_length_m = 0.104;
-  bool calibrate = true;        ///< Estimate the sensor's calibration together with the poses.
-  bool use_depth_field = true;  ///< False: without the terms from kDepthField on.
-  bool use_dense = true;        ///< False: keypoints and markers only.
-  int num_rounds = 5;           ///< Rounds of association and solution.
+  double marker_length_m = 0.0;  ///< Required: the room's, see CornersInMarkerFrame().
+  bool calibrate = true;         ///< Estimate the sensor's calibration together with the poses.
+  bool use_depth_field = true;   ///< False: without the terms from kDepthField on.
+  bool use_dense = true;         ///< False: keypoints and markers only.
+  int num_rounds = 5;            ///< Rounds of association and solution.
   /// Largest point-to-plane residual of the first round; multiplied by 0.6 in each round.
   double max_gate_m = 0.06;
   double min_gate_m = 0.012;

@@ -24,7 +24,7 @@ struct PaperOptions {
   GlobalIcpOptions icp;
   HeightMapOptions height_map;
   int depth_window_px = 11;             ///< s, at 640 columns.
-  double marker_length_m = 0.104;       ///< l
+  double marker_length_m = 0.0;         ///< l; required: the room's, see CornersInMarkerFrame().
   std::optional<int> reference_marker;  ///< Id of the reference marker.
 };
 

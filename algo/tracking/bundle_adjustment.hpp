@@ -43,8 +43,8 @@ struct BundleOptions {
   double keypoint_depth_sigmas =
       1.5;  ///< Standard deviation of a keypoint's depth relative to the noise model.
   double min_corner_sigma_px = 0.05;
-  double marker_length_m = 0.104;
-  std::stop_token stop = {};  ///< Polled in each iteration.
+  double marker_length_m = 0.0;  ///< Required: the room's, see CornersInMarkerFrame().
+  std::stop_token stop = {};     ///< Polled in each iteration.
 };
 
 /// Posterior covariance with the calibration of all that a bundle adjustment moves: twists on the

@@ -20,7 +20,7 @@ struct LocalBundleOptions {
   double keypoint_depth_sigmas =
       1.5;  ///< Standard deviation of a keypoint's depth relative to the noise model.
   double min_corner_sigma_px = 0.3;  ///< In pixels at 640 columns.
-  double marker_length_m = 0.104;
+  double marker_length_m = 0.0;      ///< Required: the room's, see CornersInMarkerFrame().
 };
 
 struct LocalBundleSummary {

@@ -7,7 +7,7 @@
 namespace plumb {
 
 struct VelocityOptions {
-  double marker_length_m = 0.104;
+  double marker_length_m = 0.0;     ///< Required: the room's, see CornersInMarkerFrame().
   double keypoint_sigma_px = 0.6;   ///< In pixels at 640 columns.
   bool keep_witnesses_out = false;  ///< Leave out what IsWitness() selects.
   double min_corner_sigma_px = 0.05;

@@ -3,11 +3,15 @@
 
 #include <array>
 #include <map>
+#include <stdexcept>
 #include <vector>
 
 #include <Eigen/Core>
 
 namespace plumb {
+
+/// Side of the black square where neither configuration, recording nor calibration file states it.
+inline constexpr double kDefaultMarkerLength_m = 0.104;
 
 /// Corners in detector order: top-left first, clockwise as seen on the print. In the marker's own
 /// frame (x right, y up on the print, z out of it) they are (-,+), (+,+), (+,-), (-,-) times
@@ -25,7 +29,10 @@ struct MarkerObservation {
 };
 
 /// Corners of a marker of the given side length in its own frame, in detector order.
+/// @throws std::invalid_argument unless the length is positive: options whose length was never set
+///         must not place markers.
 [[nodiscard]] inline MarkerCorners CornersInMarkerFrame(double length_m) {
+  if (!(length_m > 0)) throw std::invalid_argument("the side length of the markers is not set");
   const double h = length_m / 2.0;
   return {Eigen::Vector3d(-h, h, 0), Eigen::Vector3d(h, h, 0), Eigen::Vector3d(h, -h, 0),
           Eigen::Vector3d(-h, -h, 0)};

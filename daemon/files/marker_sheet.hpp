@@ -8,6 +8,7 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "algo/types/marker.hpp"
 #include "algo/types/marker_dictionary.hpp"
 
 using cairo_surface_t = struct _cairo_surface;
@@ -16,9 +17,9 @@ namespace plumb {
 
 struct SheetOptions {
   std::string dictionary = "DICT_6X6_250";
-  std::vector<int> ids;      ///< In the order in which they are drawn.
-  double length_m = 0.104;   ///< Side of the black square.
-  std::string paper = "A4";  ///< A4 or A3, upright.
+  std::vector<int> ids;                      ///< In the order in which they are drawn.
+  double length_m = kDefaultMarkerLength_m;  ///< Side of the black square.
+  std::string paper = "A4";                  ///< A4 or A3, upright.
   /// The room calibration board (algo/comparison/room_board.hpp): its ids and paper size replace
   /// the two values above.
   bool is_board = false;

@@ -14,6 +14,7 @@
 
 #include <Eigen/Core>
 
+#include "algo/types/marker.hpp"
 #include "drivers/replay/tum_recording.hpp"
 #include "drivers/sensor.hpp"
 
@@ -27,7 +28,7 @@ struct SensorSettings {
   std::filesystem::path calibration_folder = "/var/lib/plumb/calibration";
   std::string marker_dictionary =
       "DICT_6X6_250";  ///< Used if the calibration file does not state it, like the next two.
-  double marker_length_m = 0.104;
+  double marker_length_m = kDefaultMarkerLength_m;
   std::optional<int> reference_marker = {};
   /// The three values above describe the room: a calibration file that states other markers is
   /// refused. Off for recordings and the virtual sensor, whose file is the only source for their

@@ -9,13 +9,14 @@
 #include <string>
 
 #include "algo/types/frame.hpp"
+#include "algo/types/marker.hpp"
 
 namespace plumb {
 
 /// Defaults for everything that a recording does not state.
 struct RecordingDefaults {
   std::string marker_dictionary = "DICT_6X6_250";
-  double marker_length_m = 0.104;
+  double marker_length_m = kDefaultMarkerLength_m;
   std::optional<int> reference_marker;
   /// Largest difference between the stamps of a colour image and its depth image; 0.55 periods of
   /// the slower stream, if that is more, so that streams of a low rate that are half a period apart

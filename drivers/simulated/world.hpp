@@ -19,7 +19,8 @@
 namespace plumb::simulated {
 
 inline constexpr const char* kDictionary = "DICT_6X6_250";
-inline constexpr double kMarkerLength = 0.104;  ///< Side of the black square, metres.
+inline constexpr double kMarkerLength =
+    kDefaultMarkerLength_m;  ///< Side of the black square, metres.
 inline constexpr double kBoardSide =
     0.132;  ///< Side of the white board on which it is printed, metres.
 

@@ -1,6 +1,7 @@
 #include "algo/reconstruction/joint_registration.hpp"
 
 #include <cmath>
+#include <stdexcept>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -23,12 +24,20 @@ constexpr synthetic::MapOptions kLandscape{.num_keyframes = 8,
                                            .pixel_noise = 0.1,
                                            .image_noise_m = 0.001};
 
+JointRegistrationOptions OfTheRoom() { return {.marker_length_m = synthetic::kMarkerLength}; }
+
+TEST(RegisterJointly, RefusesMarkersWhoseLengthWasNeverSet) {
+  const TrueMap truth = MakeTrueMap({.num_keyframes = 3, .num_landmarks = 40});
+  TrackingMap map = truth.map;
+  EXPECT_THROW((void)RegisterJointly(truth.stated, {}, map), std::invalid_argument);
+}
+
 TEST(RegisterJointly, FindsDisturbedPosesByDenseDepth) {
   const TrueMap truth = MakeTrueMap(kLandscape);
   TrackingMap map = truth.map;
   Disturb(map, 0.006, 0.006);
   const double before = Compare(map, truth.map).translation_m;
-  const auto result = RegisterJointly(truth.stated, {}, map);
+  const auto result = RegisterJointly(truth.stated, OfTheRoom(), map);
   const auto error = Compare(map, truth.map);
   fmt::print("{:.2e} -> {:.2e} m, {:.2e} rad, consistency {:.2e} -> {:.2e} m, {} pairs\n", before,
              error.translation_m, error.rotation_rad, result.consistency_before_m,
@@ -56,7 +65,8 @@ TEST(RegisterJointly, KeepsAKeyframeThatSawNextToNothingWhereTrackingPutIt) {
           truth.map.keyframes[kBlank - 1].T_world_color.inverse() * blank.T_world_color;
     }
     TrackingMap map = truth.map;
-    (void)RegisterJointly(truth.stated, {.use_dense = false}, map);
+    (void)RegisterJointly(truth.stated,
+                          {.marker_length_m = synthetic::kMarkerLength, .use_dense = false}, map);
     return (map.keyframes[kBlank].T_world_color.translation() - blank.T_world_color.translation())
         .norm();
   };
@@ -73,7 +83,7 @@ TEST(RegisterJointly, FindsWhatTheDepthCameraGetsWrong) {
   options.sensor.depth[5] = 0.004;
   const TrueMap truth = MakeTrueMap(options);
   TrackingMap map = truth.map;
-  const auto result = RegisterJointly(truth.stated, {}, map);
+  const auto result = RegisterJointly(truth.stated, OfTheRoom(), map);
   const auto& d = result.calibration.depth;
   // Scale and offset stand in for each other within one range of depths: what they do at the
   // working distance counts.
@@ -89,14 +99,14 @@ TEST(RegisterJointly, BeginsFromWhatIsKnownOfTheSensorAndSaysWhatTheSweepShowed)
   synthetic::MapOptions options = kLandscape;
   options.sensor.depth[kDepthScale] = 0.008;
   const TrueMap truth = MakeTrueMap(options);
-  JointRegistrationOptions known;
+  JointRegistrationOptions known = OfTheRoom();
   known.prior.mean[kDepthAt + kDepthScale] = 0.004;
   known.prior.information(kDepthAt + kDepthScale, kDepthAt + kDepthScale) = 1e16;
   TrackingMap map = truth.map;
   const auto held = RegisterJointly(truth.stated, known, map);
   EXPECT_NEAR(held.calibration.depth[kDepthScale], 0.004, 1e-5) << "the prior does not act";
   TrackingMap again = truth.map;
-  const auto free = RegisterJointly(truth.stated, {}, again);
+  const auto free = RegisterJointly(truth.stated, OfTheRoom(), again);
   ASSERT_TRUE(free.accepted);
   EXPECT_EQ(free.evidence.solution, ToVector(free.calibration));
   const auto& information = free.evidence.information;
@@ -109,7 +119,7 @@ TEST(RegisterJointly, AsksForVelocitiesBeforeEachRound) {
   const TrueMap truth = MakeTrueMap({.num_keyframes = 5, .num_landmarks = 60, .dense = true});
   TrackingMap map = truth.map;
   int asked = 0;
-  JointRegistrationOptions options;
+  JointRegistrationOptions options = OfTheRoom();
   options.num_rounds = 2;
   options.num_velocity_rounds = 3;
   options.settled_m = 0.0;
@@ -125,7 +135,7 @@ TEST(RegisterJointly, FindsVelocitiesInTheRowsUnlessToldNotTo) {
   synthetic::MapOptions with_readout{.num_keyframes = 6, .num_landmarks = 120};
   with_readout.sensor.readout_s[0] = 0.025;
   const TrueMap truth = MakeTrueMap(with_readout);
-  JointRegistrationOptions options;
+  JointRegistrationOptions options = OfTheRoom();
   options.use_dense = false;
   options.refresh_velocities = [&](TrackingMap& moved) {
     for (std::size_t k = 0; k < moved.keyframes.size(); ++k) {
@@ -154,7 +164,10 @@ TEST(RegisterJointly, SameBitsOnAnyNumberOfThreads) {
   for (std::size_t i = 0; i < 2; ++i) {
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, i + 1);
     Disturb(maps[i], 0.004, 0.004);
-    calibrations.push_back(RegisterJointly(truth.stated, {.num_rounds = 2}, maps[i]).calibration);
+    calibrations.push_back(
+        RegisterJointly(truth.stated,
+                        {.marker_length_m = synthetic::kMarkerLength, .num_rounds = 2}, maps[i])
+            .calibration);
   }
   EXPECT_EQ(calibrations[0].depth, calibrations[1].depth);
   EXPECT_EQ(calibrations[0].lens, calibrations[1].lens);
@@ -167,7 +180,8 @@ TEST(RegisterJointly, TheFirstKeyframeIsTheGauge) {
   const TrueMap truth = MakeTrueMap({.num_keyframes = 4, .num_landmarks = 60, .dense = true});
   TrackingMap map = truth.map;
   Disturb(map, 0.004, 0.004);
-  static_cast<void>(RegisterJointly(truth.stated, {.num_rounds = 1}, map));
+  static_cast<void>(RegisterJointly(
+      truth.stated, {.marker_length_m = synthetic::kMarkerLength, .num_rounds = 1}, map));
   EXPECT_EQ(map.keyframes[0].T_world_color.matrix(), truth.map.keyframes[0].T_world_color.matrix());
 }
 
@@ -176,13 +190,13 @@ TEST(RegisterJointly, StopsOnRequestAndLeavesTinyMapsAlone) {
   TrackingMap map = truth.map;
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_THROW(static_cast<void>(RegisterJointly(truth.stated, {}, map, stop.get_token())),
+  EXPECT_THROW(static_cast<void>(RegisterJointly(truth.stated, OfTheRoom(), map, stop.get_token())),
                Interrupted);
   TrackingMap one;
   one.keyframes.resize(1);
-  EXPECT_FALSE(RegisterJointly(truth.stated, {}, one).accepted);
+  EXPECT_FALSE(RegisterJointly(truth.stated, OfTheRoom(), one).accepted);
   TrackingMap none;
-  EXPECT_EQ(RegisterJointly(truth.stated, {}, none).num_pairs, 0);
+  EXPECT_EQ(RegisterJointly(truth.stated, OfTheRoom(), none).num_pairs, 0);
 }
 
 }  // namespace

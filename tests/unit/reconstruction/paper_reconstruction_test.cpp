@@ -115,6 +115,7 @@ TEST(PaperReconstructionTest, AllStagesRunInOrderAndImproveTheAgreementOfTheClou
   const std::vector<Keyframe> keyframes = Sweep(0.004);
   std::vector<std::string> stages;
   PaperOptions options;
+  options.marker_length_m = kLength;
   options.reference_marker = kReference;
   double last_fraction = 0.0;
   const PaperReconstruction result = ReconstructAsPublished(
@@ -135,9 +136,17 @@ TEST(PaperReconstructionTest, AllStagesRunInOrderAndImproveTheAgreementOfTheClou
     EXPECT_LT((marker.corners[0] - truth.at(id) * CornersInMarkerFrame(kLength)[0]).norm(), 0.03);
 }
 
+TEST(PaperReconstructionTest, RefusesMarkersWhoseLengthWasNeverSet) {
+  PaperOptions options;
+  options.icp.num_iterations = 1;
+  options.reference_marker = kReference;
+  EXPECT_THROW((void)ReconstructAsPublished(Sweep(0.0), options), std::invalid_argument);
+}
+
 TEST(PaperReconstructionTest, WithoutTheReferenceMarkerThereIsNoHeightMap) {
   const std::vector<Keyframe> keyframes = Sweep(0.0);
   PaperOptions options;
+  options.marker_length_m = kLength;
   options.icp.num_iterations = 1;
   EXPECT_FALSE(ReconstructAsPublished(keyframes, options).height_map.has_value());
   options.reference_marker = 1234;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
+#include <stdexcept>
 #include <string>
 
 #include <fmt/format.h>
@@ -234,6 +235,15 @@ TEST(BundleAdjust, KeyframesThatAreNotFreeStay) {
   }
 }
 
+TEST(BundleAdjust, RefusesMarkersWhoseLengthWasNeverSet) {
+  const auto truth = MakeTrueMap({.num_keyframes = 3, .num_landmarks = 40});
+  TrackingMap map = truth.map;
+  BundleOptions options = FreeAllButTheFirst(map);
+  options.marker_length_m = BundleOptions().marker_length_m;
+  CalibrationModel calibration;
+  EXPECT_THROW(BundleAdjust(truth.stated, options, {}, map, calibration), std::invalid_argument);
+}
+
 TEST(BundleAdjust, QuadraticTermPullsToItsMinimum) {
   // Two keyframes and nothing else: 1/2 x' H x + g' x has its minimum at -g / H of each coordinate.
   TrackingMap map;
@@ -246,6 +256,7 @@ TEST(BundleAdjust, QuadraticTermPullsToItsMinimum) {
     term.g[6 + i] = -1e4 * (i + 1) * 0.001 * (i - 2);
   }
   BundleOptions options;
+  options.marker_length_m = synthetic::kMarkerLength;
   options.free_keyframes = {1};
   CalibrationModel calibration;
   Intrinsics stated;

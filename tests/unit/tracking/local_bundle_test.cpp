@@ -2,6 +2,7 @@
 
 #include <cstring>
 #include <numeric>
+#include <stdexcept>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -24,6 +25,14 @@ LocalBundleOptions FreeFrom(int first, const TrackingMap& map) {
   options.max_iterations = 20;
   options.min_relative_decrease = 0.0;
   return options;
+}
+
+TEST(LocalBundle, RefusesMarkersWhoseLengthWasNeverSet) {
+  const auto truth = MakeTrueMap({.num_keyframes = 3, .num_landmarks = 40});
+  TrackingMap map = truth.map;
+  LocalBundleOptions options = FreeFrom(1, map);
+  options.marker_length_m = LocalBundleOptions().marker_length_m;
+  EXPECT_THROW(AdjustLocalMap(truth.stated, options, map), std::invalid_argument);
 }
 
 TEST(LocalBundle, FindsDisturbedPosesLandmarksAndMarkers) {
@@ -146,7 +155,8 @@ TEST(LocalBundle, LeavesAMapThatShowsNothingAsItIs) {
   map.keyframes.resize(2);
   map.keyframes[1].T_world_color.translation().x() = 0.1;
   const LocalBundleSummary summary =
-      AdjustLocalMap(MakeTrueMap({.num_landmarks = 1}).stated, {.free_keyframes = {1}}, map);
+      AdjustLocalMap(MakeTrueMap({.num_landmarks = 1}).stated,
+                     {.free_keyframes = {1}, .marker_length_m = synthetic::kMarkerLength}, map);
   EXPECT_EQ(summary.num_observations, 0);
   EXPECT_DOUBLE_EQ(map.keyframes[1].T_world_color.translation().x(), 0.1);
 }

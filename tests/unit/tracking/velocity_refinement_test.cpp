@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <random>
+#include <stdexcept>
 
 #include "tests/unit/tracking/synthetic_map.hpp"
 
@@ -50,6 +51,13 @@ VelocityOptions Options() {
   options.marker_length_m = synthetic::kMarkerLength;
   options.keypoint_sigma_px = 0.12;  // At 640 columns, twice the noise below at 320.
   return options;
+}
+
+TEST(RefineVelocities, RefusesMarkersWhoseLengthWasNeverSet) {
+  const TrueMap truth = MakeTrueMap(WithReadout());
+  TrackingMap map = truth.map;
+  EXPECT_THROW(RefineVelocities(truth.stated, WithReadout().sensor, {}, map),
+               std::invalid_argument);
 }
 
 TEST(RefineVelocities, FindsWhatTheRowsShow) {

@@ -59,6 +59,7 @@ TEST(Witnesses, DoNotMoveTheSolution) {
   }
   const auto solve = [&](TrackingMap of, bool keep_out) {
     BundleOptions options;
+    options.marker_length_m = kMarkerLength;
     options.keep_witnesses_out = keep_out;
     for (int k = 1; k < kSweep.num_keyframes; ++k) options.free_keyframes.push_back(k);
     CalibrationModel calibration;

@@ -1,0 +1,63 @@
+// Numbers that have one owner in the product's sources.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMarkerLength_m = 0.104;
+
+// Whether the line has the number, however it is written.
+bool Spells(const std::string& line, double number) {
+  static const std::regex kNumber(R"((^|[^\w.])((\d+\.\d*|\.\d+|\d+(?=[eE]))([eE][-+]?\d+)?))");
+  for (std::sregex_iterator match(line.begin(), line.end(), kNumber), end; match != end; ++match)
+    if (std::strtod((*match)[2].str().c_str(), nullptr) == number) return true;
+  return false;
+}
+
+TEST(SingleOwnerTest, TheDefaultLengthOfMarkersIsWrittenOnce) {
+  // A body's coordinates have nothing to do with it.
+  const std::set<std::string> others = {"drivers/simulated/body.cpp"};
+  const fs::path root = PLUMB_SOURCE_DIR;
+  std::vector<std::string> found;
+  std::size_t num_files = 0;
+  for (const char* top : {"algo", "drivers", "web", "daemon"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / top)) {
+      const std::string extension = entry.path().extension().string();
+      if (extension != ".cpp" && extension != ".hpp" && extension != ".js") continue;
+      const std::string file = fs::relative(entry.path(), root).string();
+      if (others.contains(file)) continue;
+      ++num_files;
+      std::ifstream source(entry.path());
+      int number = 0;
+      for (std::string line; std::getline(source, line);) {
+        ++number;
+        if (Spells(line, kMarkerLength_m)) found.push_back(file + ":" + std::to_string(number));
+      }
+    }
+  }
+  ASSERT_GT(num_files, 500U);  // far fewer means that nothing was read
+  EXPECT_THAT(found, ::testing::ElementsAre(::testing::StartsWith("algo/types/marker.hpp:")))
+      << "use kDefaultMarkerLength_m, or let the caller state the room's length";
+}
+
+TEST(SingleOwnerTest, ANumberIsFoundHoweverItIsWritten) {
+  for (const char* line : {"double a = 0.104;", "{.length_m = .104}", "f(104e-3, 2)",
+                           "x = 0.1040F;", "a*1.04e-01", "0.104"})
+    EXPECT_TRUE(Spells(line, kMarkerLength_m)) << line;
+  for (const char* line : {"0.1042", "10.104", "0.1041", "v0.104", "104", "1.0.104"})
+    EXPECT_FALSE(Spells(line, kMarkerLength_m)) << line;
+}
+
+}  // namespace
+}  // namespace plumb
