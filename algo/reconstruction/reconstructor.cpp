@@ -113,7 +113,7 @@ struct Reconstructor::Impl {
     const TrackedFrame tracked = tracker.Track(frame);
     tracking_times_s.push_back(Now() - start);
     report.tracked = tracked.tracked;
-    report.is_keyframe = tracked.keyframe >= 0;
+    report.is_keyframe = tracked.keyframe.has_value();
     report.num_keypoints = tracked.num_keypoints;
     report.num_markers = tracked.num_markers;
     if (tracked.tracked) {

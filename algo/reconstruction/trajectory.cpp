@@ -94,25 +94,26 @@ std::vector<Pose> ColorPoses(const std::vector<TrackedFrame>& frames, const Trac
       if (!frames[i].tracked) continue;
       const double fraction =
           t1 > t0 ? std::clamp((frames[i].color_time_s - t0) / (t1 - t0), 0.0, 1.0) : 0.0;
-      poses[i] = KeyframePose(map, frames[i].reference_keyframe) * frames[i].T_reference_color *
+      poses[i] = KeyframePose(map, frames[i].reference_keyframe.value()) *
+                 frames[i].T_reference_color *
                  Interpolate(Pose::Identity(), T_color_correction, fraction);
     }
   };
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const TrackedFrame& frame = frames[i];
-    if (frame.keyframe < 0) continue;
+    if (!frame.keyframe) continue;
     Pose T_correction = Pose::Identity();
     double t0 = frame.color_time_s;
-    const bool continues = begin > 0 && frames[begin - 1].keyframe == frame.previous_keyframe &&
-                           frame.previous_keyframe >= 0;
+    const bool continues = begin > 0 && frame.previous_keyframe &&
+                           frames[begin - 1].keyframe == frame.previous_keyframe;
     if (continues) {
       T_correction =
-          (KeyframePose(map, frame.previous_keyframe) * frame.T_previous_color).inverse() *
-          KeyframePose(map, frame.keyframe);
+          (KeyframePose(map, *frame.previous_keyframe) * frame.T_previous_color).inverse() *
+          KeyframePose(map, *frame.keyframe);
       t0 = frames[begin - 1].color_time_s;
     }
     spread(i, T_correction, t0, frame.color_time_s);
-    poses[i] = KeyframePose(map, frame.keyframe);
+    poses[i] = KeyframePose(map, *frame.keyframe);
     begin = i + 1;
   }
   spread(frames.size(), Pose::Identity(), 0, 0);
@@ -131,8 +132,9 @@ void RefreshVelocities(std::vector<TrackedFrame>& frames, TrackingMap& map) {
     begin = end;
   }
   for (const TrackedFrame& frame : frames)
-    if (frame.tracked && frame.keyframe >= 0)
-      map.keyframes[static_cast<std::size_t>(frame.keyframe)].velocity_per_s = frame.velocity_per_s;
+    if (frame.tracked && frame.keyframe)
+      map.keyframes[static_cast<std::size_t>(*frame.keyframe)].velocity_per_s =
+          frame.velocity_per_s;
 }
 
 std::vector<StampedPose> DepthTrajectory(const std::vector<TrackedFrame>& frames,
@@ -146,8 +148,8 @@ std::vector<StampedPose> DepthTrajectory(const std::vector<TrackedFrame>& frames
     const double dt =
         frames[i].depth_time_s - frames[i].color_time_s + calibration.depth[kDepthDelay];
     const Vector6d& velocity_per_s =
-        frames[i].keyframe >= 0
-            ? map.keyframes[static_cast<std::size_t>(frames[i].keyframe)].velocity_per_s
+        frames[i].keyframe
+            ? map.keyframes[static_cast<std::size_t>(*frames[i].keyframe)].velocity_per_s
             : frames[i].velocity_per_s;
     trajectory.push_back(
         {frames[i].depth_time_s, T_scene_world * PoseAfter(poses[i], velocity_per_s, dt)});

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <stop_token>
 #include <vector>
 
@@ -20,9 +21,10 @@ struct QuadraticTerm {
   static constexpr int kFocalAt = 12;
   static constexpr int kDepthCalibrationAt = kFocalAt + kFocal;
   static constexpr int kSize = kDepthCalibrationAt + CalibrationModel::kDepthSize;
-  int keyframe_a = -1;
-  int keyframe_b = -1;  ///< Second keyframe, or -1 where `marker` is the second.
-  int marker = -1;      ///< Id of the marker.
+  int keyframe_a = 0;
+  /// Exactly one of these two is set.
+  std::optional<int> keyframe_b;
+  std::optional<int> marker;  ///< Id of the marker.
   Eigen::Matrix<double, kSize, kSize> H = Eigen::Matrix<double, kSize, kSize>::Zero();
   Eigen::Matrix<double, kSize, 1> g = Eigen::Matrix<double, kSize, 1>::Zero();
 };

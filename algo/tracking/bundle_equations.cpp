@@ -165,8 +165,9 @@ void Equations::AddTerm(const State& state, const QuadraticTerm& term) {
   constexpr int kDepthSize = CalibrationModel::kDepthSize;
   constexpr int kDepth = QuadraticTerm::kDepthCalibrationAt;
   const Eigen::Index a = problem_.CameraAt(term.keyframe_a);
-  const Eigen::Index b = term.keyframe_b >= 0 ? problem_.CameraAt(term.keyframe_b)
-                                              : problem_.MarkerAt(problem_.MarkerSlot(term.marker));
+  const Eigen::Index b = term.keyframe_b
+                             ? problem_.CameraAt(*term.keyframe_b)
+                             : problem_.MarkerAt(problem_.MarkerSlot(term.marker.value()));
   const Eigen::Index f = problem_.calibration_at() + kLensAt;
   const Eigen::Index d = problem_.calibration_at() + kDepthAt;
   const auto add_pose = [&](Eigen::Index at, Eigen::Index in_term) {

@@ -64,7 +64,7 @@ void Problem::CollectMarkers() {
     for (const MarkerObservation& m : map_.keyframes[static_cast<std::size_t>(k)].data.markers)
       if (map_.markers.contains(m.id)) markers_.try_emplace(m.id, 0);
   for (const QuadraticTerm& term : terms_)
-    if (term.keyframe_b < 0) markers_.try_emplace(term.marker, 0);
+    if (term.marker) markers_.try_emplace(*term.marker, 0);
   int slot = 0;
   for (auto& [id, index] : markers_) {
     index = slot++;
@@ -225,9 +225,9 @@ Eigen::Vector2d Problem::CornerResidual(const State& state, const CornerView& vi
 Problem::TermVector Problem::TermState(const State& state, const QuadraticTerm& term) const {
   TermVector x;
   x.head<6>() = state.cameras[static_cast<std::size_t>(term.keyframe_a)].twist;
-  x.segment<6>(6) = term.keyframe_b >= 0
-                        ? state.cameras[static_cast<std::size_t>(term.keyframe_b)].twist
-                        : state.markers[static_cast<std::size_t>(markers_.at(term.marker))];
+  x.segment<6>(6) = term.keyframe_b
+                        ? state.cameras[static_cast<std::size_t>(*term.keyframe_b)].twist
+                        : state.markers[static_cast<std::size_t>(markers_.at(term.marker.value()))];
   for (int i = 0; i < QuadraticTerm::kFocal; ++i)
     x[QuadraticTerm::kFocalAt + i] = state.calibration.lens[static_cast<std::size_t>(i)] -
                                      calibration_.lens[static_cast<std::size_t>(i)];

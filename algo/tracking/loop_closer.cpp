@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include <Eigen/SparseCholesky>
@@ -66,8 +67,8 @@ std::vector<KeyframeLink> LinksOf(const TrackingMap& map) {
     for (std::size_t i = 0; i < keyframes.size(); ++i)
       for (std::size_t j = i + 1; j < keyframes.size(); ++j) ++shared[{keyframes[i], keyframes[j]}];
   for (std::size_t k = 0; k < map.keyframes.size(); ++k)
-    if (map.keyframes[k].previous >= 0)
-      shared[{map.keyframes[k].previous, static_cast<int>(k)}] += kCovisible;
+    if (const std::optional<int> previous = map.keyframes[k].previous)
+      shared[{*previous, static_cast<int>(k)}] += kCovisible;
   std::vector<KeyframeLink> links;
   for (const auto& [pair, count] : shared) {
     if (count < kCovisible || pair.first == pair.second) continue;

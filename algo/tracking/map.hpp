@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
@@ -39,7 +40,7 @@ struct MapKeyframe {
   Pose T_world_color = Pose::Identity();  ///< At the colour stamp.
   Vector6d velocity_per_s =
       Vector6d::Zero();  ///< Twist in the camera frame: T(t0 + dt) = T(t0) * PoseFromTwist(v dt).
-  int previous = -1;     ///< The keyframe against which it was tracked, or -1.
+  std::optional<int> previous;  ///< The keyframe against which it was tracked, if there was one.
   /// Its camera in the camera of `previous`, as tracked.
   Pose T_previous_color = Pose::Identity();
   std::vector<KeypointObservation> keypoints;

@@ -138,7 +138,7 @@ PoseProblem Tracker::Impl::MakeProblem(const FrameData& prepared, double dt_dept
   problem.intrinsics = info.intrinsics;
   problem.T_color_depth = PoseFromTwist(velocity * dt_depth_s);
   if (options.use_dense) {
-    const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(reference)];
+    const MapKeyframe& keyframe = ReferenceKeyframe();
     problem.dense_frame = &prepared.dense;
     problem.dense_target = &keyframe.dense;
     problem.T_world_target = DepthPose(keyframe);
@@ -279,20 +279,20 @@ void Tracker::Impl::Accept(const Frame& frame, FrameData& prepared, const PoseEs
   } else {
     result.reference_keyframe = reference;
     result.T_reference_color =
-        map.keyframes[static_cast<std::size_t>(reference)].T_world_color.inverse() *
-        estimate.T_world_camera;
+        ReferenceKeyframe().T_world_color.inverse() * estimate.T_world_camera;
   }
 }
 
 // The frame after a keyframe gives that keyframe a velocity by central differences.
 void Tracker::Impl::RefreshKeyframeVelocity(const Frame& frame, const Pose& T_world_now) {
-  if (frames.empty() || frames.back().keyframe < 0 || lost) return;
-  MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(frames.back().keyframe)];
+  if (frames.empty() || lost) return;
+  const std::optional<int> last = frames.back().keyframe;
+  if (!last) return;
+  MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(*last)];
   const double dt_after = frame.color_time_s - keyframe.data.color_time_s;
   if (dt_after <= 0) return;
   const Vector6d after = TwistFromPose(keyframe.T_world_color.inverse() * T_world_now) / dt_after;
-  keyframe.velocity_per_s =
-      frames.back().keyframe == 0 ? after : Vector6d(0.5 * (keyframe.velocity_per_s + after));
+  keyframe.velocity_per_s = *last == 0 ? after : Vector6d(0.5 * (keyframe.velocity_per_s + after));
   frames.back().velocity_per_s = keyframe.velocity_per_s;
 }
 
@@ -304,8 +304,8 @@ const TrackingMap& Tracker::map() const { return impl_->map; }
 TrackingMap Tracker::TakeMap() { return std::move(impl_->map); }
 const std::vector<TrackedFrame>& Tracker::frames() const { return impl_->frames; }
 Pose Tracker::T_world_color(const TrackedFrame& frame) const {
-  return impl_->map.keyframes.at(static_cast<std::size_t>(frame.reference_keyframe)).T_world_color *
-         frame.T_reference_color;
+  const auto keyframe = static_cast<std::size_t>(frame.reference_keyframe.value());
+  return impl_->map.keyframes.at(keyframe).T_world_color * frame.T_reference_color;
 }
 
 }  // namespace plumb

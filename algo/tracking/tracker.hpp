@@ -39,12 +39,12 @@ struct TrackedFrame {
   double color_time_s = 0.0;
   double depth_time_s = 0.0;
   bool tracked = false;
-  int keyframe = -1;            ///< Index in the map if it became a keyframe, otherwise -1.
-  int reference_keyframe = -1;  ///< The keyframe against which it was tracked.
+  std::optional<int> keyframe;            ///< Index in the map if it became a keyframe.
+  std::optional<int> reference_keyframe;  ///< The keyframe against which it was tracked, if it was.
   /// Colour camera at the colour stamp, in the reference keyframe's colour camera.
   Pose T_reference_color = Pose::Identity();
-  /// If it became a keyframe: the one against which it was tracked, or -1.
-  int previous_keyframe = -1;
+  /// If it became a keyframe: the one against which it was tracked. The first keyframe has none.
+  std::optional<int> previous_keyframe;
   Pose T_previous_color =
       Pose::Identity();  ///< If it became a keyframe: its camera in that one's, as tracked.
   Vector6d velocity_per_s = Vector6d::Zero();  ///< In the camera frame.
@@ -66,7 +66,7 @@ class Tracker {
   /// The map, for refinement after the last frame.
   [[nodiscard]] TrackingMap TakeMap();
   [[nodiscard]] const std::vector<TrackedFrame>& frames() const;
-  /// Live estimate; the world is the first keyframe's colour camera.
+  /// Live estimate of a tracked frame; the world is the first keyframe's colour camera.
   [[nodiscard]] Pose T_world_color(const TrackedFrame& frame) const;
 
  private:

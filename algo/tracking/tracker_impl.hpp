@@ -2,6 +2,7 @@
 // tracker_keyframes.cpp keeps the map of keyframes.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -35,7 +36,7 @@ struct Tracker::Impl {
 
   Pyramid last_pyramid;
   FollowedPoints followed_points;
-  int reference = -1;               // Keyframe against which frames are tracked.
+  std::optional<int> reference;     // Keyframe against which frames are tracked.
   std::size_t reference_count = 0;  // Active points when that keyframe was created.
   Pose T_world_last = Pose::Identity();
   double last_time_s = 0;
@@ -52,6 +53,10 @@ struct Tracker::Impl {
   FrameData Prepare(const Frame& frame) const;
   void FindMarkers(const Frame& frame, FrameData& prepared) const;
   void FindAllMarkers(FrameData& prepared) const;
+  // Only where there is one.
+  [[nodiscard]] const MapKeyframe& ReferenceKeyframe() const {
+    return map.keyframes[static_cast<std::size_t>(reference.value())];
+  }
   [[nodiscard]] Pose PredictedPose(const Frame& frame) const;
   TrackedFrame Track(const Frame& frame);
   static bool ShowsSomething(const FrameData& prepared);

@@ -47,7 +47,7 @@ cv::Mat MiddlesOfBlocks(const cv::Mat& rgb, int block) {
 }  // namespace
 
 bool Tracker::Impl::NeedsKeyframe(const Pose& T_world_color) const {
-  const MapKeyframe& keyframe = map.keyframes[static_cast<std::size_t>(reference)];
+  const MapKeyframe& keyframe = ReferenceKeyframe();
   const Pose T_keyframe_now = keyframe.T_world_color.inverse() * T_world_color;
   if (T_keyframe_now.translation().norm() >
       options.keyframe_distance * std::clamp(keyframe.median_depth_m, 0.4, 3.0))
@@ -104,10 +104,9 @@ void Tracker::Impl::MakeKeyframe(const Frame& frame, FrameData& prepared, const 
     followed_points.KeepPyramid(static_cast<std::size_t>(index), prepared.image.pyramid);
   }
   AddNewMarkers(frame.depth_m, keyframe);
-  if (reference >= 0) {
+  if (reference) {
     result.previous_keyframe = reference;
-    result.T_previous_color =
-        map.keyframes[static_cast<std::size_t>(reference)].T_world_color.inverse() * T_world_color;
+    result.T_previous_color = ReferenceKeyframe().T_world_color.inverse() * T_world_color;
   }
   keyframe.previous = reference;
   keyframe.T_previous_color = result.T_previous_color;
@@ -202,9 +201,9 @@ std::optional<Pose> Tracker::Impl::EstimatePoseFromKeyframe(int older, const Pos
                                                             const MapKeyframe& newest) {
   const std::vector<ActivePoint> followed = followed_points.points();
   followed_points.SetPoints({});
-  const int followed_reference = std::exchange(reference, older);
+  const std::optional<int> followed_reference = std::exchange(reference, older);
   PoseProblem problem = MakeProblem(prepared, newest.data.depth_time_s - newest.data.color_time_s);
-  reference = -1;  // No landmark is left.
+  reference.reset();  // No landmark is left.
   followed_points.Reassociate(prepared.image, newest.data.view.depth_m, T_world_guess,
                               KeyframesNear(T_world_guess, static_cast<std::size_t>(older) + 4),
                               problem.points);

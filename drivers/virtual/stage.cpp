@@ -21,7 +21,7 @@ Stage::View Stage::Now() const {
   return view_;
 }
 
-void Stage::Show(std::size_t scene, Motion motion, std::int64_t origin_us) {
+void Stage::Show(std::size_t scene, Motion motion, std::optional<std::int64_t> origin_us) {
   const std::lock_guard lock(mutex_);
   view_.index = scene % scenes_.size();
   view_.scene = scenes_[view_.index];

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,8 +30,8 @@ class Stage {
     Motion motion = Motion::kStill;
     std::uint64_t epoch = 0;  ///< Changes with every command: playing restarts.
     double speed = 1.0;       ///< 0: as fast as possible.
-    /// Stamp at the sweep's time 0; negative: the time at which it starts.
-    std::int64_t origin_us = -1;
+    /// Stamp at the sweep's time 0; nothing: the time at which it starts.
+    std::optional<std::int64_t> origin_us;
   };
 
   /// @throws std::runtime_error unless there are scenes, all of the same size and rate.
@@ -39,7 +40,7 @@ class Stage {
   [[nodiscard]] const FrameCacheShape& shape() const { return scenes_.front()->shape(); }
   [[nodiscard]] std::size_t size() const { return scenes_.size(); }
   [[nodiscard]] View Now() const;
-  void Show(std::size_t scene, Motion motion, std::int64_t origin_us = -1);
+  void Show(std::size_t scene, Motion motion, std::optional<std::int64_t> origin_us = {});
   void SetSpeed(double speed);
 
  private:

@@ -71,7 +71,7 @@ void SweepPlayer::Tick(const std::stop_token& stop) {
   if (Stage::View now = stage_->Now(); now.epoch != view_.epoch) {
     view_ = std::move(now);
     next_ = 0;
-    loaded_frame_ = -1;
+    loaded_frame_.reset();
     wait_ticks_ = view_.motion == Stage::Motion::kStill ? 0 : kTicksBeforeSweep;
     unit_->position = -1;
   } else {
@@ -88,8 +88,7 @@ void SweepPlayer::Tick(const std::stop_token& stop) {
   PlayedPair shown;
   if (in_sweep) {
     if (next_ == 0)
-      sweep_begin_us_ =
-          view_.origin_us >= 0 ? view_.origin_us : device_us_ - loaded_stamps_.color_us;
+      sweep_begin_us_ = view_.origin_us.value_or(device_us_ - loaded_stamps_.color_us);
     shown.stamps = {sweep_begin_us_ + loaded_stamps_.color_us,
                     sweep_begin_us_ + loaded_stamps_.depth_us};
     ++next_;
@@ -101,7 +100,7 @@ void SweepPlayer::Tick(const std::stop_token& stop) {
   if (unit_->glitch == Glitch::kLate && unit_->glitches_left > 0)
     SleepUntil(Clock::now() + std::chrono::microseconds(3 * view_.scene->shape().period_us), stop);
   Give(shown, stop);
-  unit_->position = static_cast<int>(loaded_frame_);
+  unit_->position = static_cast<int>(loaded_frame_.value());
 }
 
 void SweepPlayer::Load(std::uint32_t frame) {

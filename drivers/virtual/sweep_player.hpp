@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <thread>
@@ -57,7 +58,7 @@ class SweepPlayer {
   std::vector<std::uint8_t> rgb_;
   std::vector<std::uint16_t> depth_mm_;
   CachedStamps loaded_stamps_;
-  std::int64_t loaded_frame_ = -1;
+  std::optional<std::uint32_t> loaded_frame_;
   std::uint32_t next_ = 0;  ///< Position in the scene.
   /// Before a sweep, so that earlier frames in transit are not taken for its beginning.
   int wait_ticks_ = 0;

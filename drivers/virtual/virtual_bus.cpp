@@ -44,9 +44,10 @@ std::string VirtualBus::Obey(const std::string& line) try {
   if (verb == "scene") return show(std::stoul(argument));
   if (verb == "hold") return show(stage_->Now().index);
   if (verb == "rewind") {
-    std::int64_t origin_us = -1;
+    std::int64_t origin_us = 0;
     words >> origin_us;
-    return Rewind(argument, words ? origin_us : -1);
+    // A stamp before 0 is as good as none.
+    return Rewind(argument, words && origin_us >= 0 ? std::optional(origin_us) : std::nullopt);
   }
   if (verb == "state") return State();
   if (verb == "speed") return SetSpeed(std::stod(argument));
@@ -75,7 +76,7 @@ std::string VirtualBus::Obey(const std::string& line) try {
   return "refused: cannot understand the argument of " + line;
 }
 
-std::string VirtualBus::Rewind(const std::string& how, std::int64_t origin_us) {
+std::string VirtualBus::Rewind(const std::string& how, std::optional<std::int64_t> origin_us) {
   const bool once = how == "once";
   const std::vector<std::shared_ptr<Unit>> all = units();
   // A stall ends with the first frame of the sweep, neither before it nor after it.

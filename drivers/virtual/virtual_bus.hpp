@@ -8,6 +8,7 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,7 +45,7 @@ class VirtualBus {
   std::string Plug(const std::string& serial);
   std::string Unplug(const std::string& serial);
   std::string SetFailed(const std::string& serial, bool failed);
-  std::string Rewind(const std::string& how, std::int64_t origin_us);
+  std::string Rewind(const std::string& how, std::optional<std::int64_t> origin_us);
   std::string SetSpeed(double speed);
   std::string State() const;
   std::string OnUnit(const std::string& serial, const std::function<void(Unit&)>& change);

@@ -104,7 +104,7 @@ TEST(Trajectory, VelocitiesFollowATremblingHand) {
     frame.color_time_s = frame.depth_time_s = i / 30.0;
     frame.tracked = true;
     frame.reference_keyframe = 0;
-    frame.keyframe = i == 0 ? 0 : -1;
+    if (i == 0) frame.keyframe = 0;
     // The camera looks another way than the world's axes: velocities are in its own.
     frame.T_reference_color =
         At(kAmplitude_m * std::sin(kRate * frame.color_time_s), 0, 0.5 * 3.14159265358979);

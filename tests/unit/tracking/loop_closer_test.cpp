@@ -29,8 +29,8 @@ TrackingMap DriftedCircle(const Vector6d& drift_a_step) {
   TrackingMap map;
   for (int k = 0; k < kNumKeyframes; ++k) {
     MapKeyframe keyframe;
-    keyframe.previous = k - 1;
     if (k > 0) {
+      keyframe.previous = k - 1;
       keyframe.T_previous_color =
           TrueCamera(k - 1).inverse() * TrueCamera(k) * PoseFromTwist(drift_a_step);
       keyframe.T_world_color = map.keyframes.back().T_world_color * keyframe.T_previous_color;
