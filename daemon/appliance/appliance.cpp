@@ -3,7 +3,9 @@
 #include <sys/epoll.h>
 
 #include <algorithm>
+#include <exception>
 #include <iterator>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -21,6 +23,7 @@ using std::chrono::seconds;
 
 constexpr seconds kTick{1};
 const web::Actor kSelf{.user = "plumbd", .address = ""};
+const web::Actor kButton{.user = "button", .address = ""};
 
 }  // namespace
 
@@ -63,7 +66,7 @@ Appliance::~Appliance() {
 
 void Appliance::WatchButton() {
   if (parts_.button == nullptr) return;
-  parts_.button->SetListener([this](ButtonPress press) { (void)Press(press); });
+  parts_.button->SetListener([this](ButtonPress press) { (void)Press(press, kButton); });
   const auto dispatch = [this] {
     try {
       parts_.button->Dispatch(Button::Clock::now());
@@ -106,16 +109,23 @@ Appliance::Answer Appliance::WhyNotRestart() const {
 }
 
 /// Without a running scan and a shown result, a long press ends the treatment session.
-Appliance::Answer Appliance::Press(ButtonPress press) {
+Appliance::Answer Appliance::Press(ButtonPress press, const web::Actor& actor) {
   if (press == ButtonPress::kLong && state_.phase == ScanPhase::kReady && !session_id_.empty() &&
       !IsOwnSession())
-    return CloseSession({.user = "button", .address = {}});
-  return Handle(press == ButtonPress::kShort ? ScanEvent::kShortPress : ScanEvent::kLongPress);
+    return CloseSession(actor);
+  return Handle(press == ButtonPress::kShort ? ScanEvent::kShortPress : ScanEvent::kLongPress,
+                &actor);
 }
 
-Appliance::Answer Appliance::StartSweep() { return Handle(ScanEvent::kStart); }
-Appliance::Answer Appliance::EndSweep() { return Handle(ScanEvent::kEndSweep); }
-Appliance::Answer Appliance::Cancel() { return Handle(ScanEvent::kCancel); }
+Appliance::Answer Appliance::StartSweep(const web::Actor& actor) {
+  return Handle(ScanEvent::kStart, &actor);
+}
+Appliance::Answer Appliance::EndSweep(const web::Actor& actor) {
+  return Handle(ScanEvent::kEndSweep, &actor);
+}
+Appliance::Answer Appliance::Cancel(const web::Actor& actor) {
+  return Handle(ScanEvent::kCancel, &actor);
+}
 
 /// Checks beyond the state, which has accepted the event already.
 Appliance::Answer Appliance::WhyNotScan() const {
@@ -128,7 +138,7 @@ Appliance::Answer Appliance::WhyNotScan() const {
   return WhyNoSpace();
 }
 
-Appliance::Answer Appliance::Handle(ScanEvent event) {
+Appliance::Answer Appliance::Handle(ScanEvent event, const web::Actor* actor) {
   const ScanState before = state_;
   ScanTransition transition = Next(state_, event);
   const bool starts = std::find(transition.actions.begin(), transition.actions.end(),
@@ -147,9 +157,45 @@ Appliance::Answer Appliance::Handle(ScanEvent event) {
   }
   state_ = transition.state;
   if (state_.phase != ScanPhase::kResult) result_timer_.Disarm();
-  for (const ScanAction action : transition.actions) Act(action);
+  for (const ScanAction action : transition.actions) {
+    Act(action);
+    if (actor != nullptr) AuditAct(action, *actor);
+  }
+  if (actor != nullptr && transition.actions.empty())  // a fault or a result was acknowledged
+    Audit(*actor, "press", "", Name(state_.phase));
   if (state_ != before) PublishState();
   return answer;
+}
+
+void Appliance::AuditAct(ScanAction action, const web::Actor& actor) {
+  switch (action) {
+    case ScanAction::kStartScan:
+      return Audit(actor, "scan.start", scan_.session_id, ScanKind());
+    case ScanAction::kEndSweep:
+      return Audit(actor, "scan.end", scan_.session_id, ScanKind());
+    case ScanAction::kCancelScan:
+      return Audit(actor, "cancel", scan_.session_id, ScanKind());
+    case ScanAction::kArmResultTimer:
+    case ScanAction::kRefuse:
+      return;
+  }
+}
+
+void Appliance::Audit(const web::Actor& actor, const std::string& action,
+                      const std::string& subject, const std::string& detail) {
+  const auto report = [action](std::string_view why) {
+    Log(LogLevel::kError, fmt::format("the audit log does not take '{}': {}", action, why));
+  };
+  if (store_ == nullptr) return report(storage_fault_);
+  const bool posted = store_thread_.Post([=, this] {
+    try {
+      store_->audit.Log(actor, action, subject, detail);
+    } catch (const std::exception& error) {
+      return report(error.what());
+    }
+    loop_.Post("audit log written", [this] { NotifyDataChanged(); });
+  });
+  if (!posted) report("the store is busy");
 }
 
 void Appliance::Act(ScanAction action) {

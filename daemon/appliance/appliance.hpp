@@ -65,12 +65,14 @@ class Appliance {
 
   /// Empty if the appliance does it, otherwise one sentence why not.
   using Answer = std::string;
-  Answer Press(ButtonPress press);
+  /// The audit log names the actor of this and the next three functions, and the session of the
+  /// scan that the call started, ended or discarded.
+  Answer Press(ButtonPress press, const web::Actor& actor);
   /// Like a press, but for one purpose each.
-  Answer StartSweep();
-  Answer EndSweep();
+  Answer StartSweep(const web::Actor& actor);
+  Answer EndSweep(const web::Actor& actor);
   /// Discards the running scan.
-  Answer Cancel();
+  Answer Cancel(const web::Actor& actor);
   /// Makes a backup off the loop, while scans continue. Calls `done` on the loop with an error
   /// (empty if it was made) and the contents.
   /// @param key_file  Key for encryption; empty: the configured one, if any.
@@ -105,10 +107,6 @@ class Appliance {
   /// Shown by status and light until it is empty: the machine has gone back to the previous system.
   void SetRolledBack(const std::string& text);
   [[nodiscard]] const std::string& session_id() const { return session_id_; }
-  /// Session of the running or last scan; empty for a daily check and an unassigned scan.
-  [[nodiscard]] const std::string& scan_session_id() const { return scan_.session_id; }
-  /// Purpose of that scan by its stored name, or "unassigned": what the audit log says of it.
-  [[nodiscard]] const char* ScanKind() const;
   /// Closes this patient if it is open. An open daily check stays open.
   void ClosePatient(const std::string& patient_id);
   /// The next scan is the daily check of the room's markers; scans after it belong to the open
@@ -204,7 +202,14 @@ class Appliance {
 
   void OpenStore();
   void LogRecovery(const RecoveryReport& found) const;
-  Answer Handle(ScanEvent event);
+  /// @param actor  Who asks for it; null: the appliance itself.
+  Answer Handle(ScanEvent event, const web::Actor* actor = nullptr);
+  void Audit(const web::Actor& actor, const std::string& action, const std::string& subject,
+             const std::string& detail);
+  /// Adds what a person did with the scan to the audit log.
+  void AuditAct(ScanAction action, const web::Actor& actor);
+  /// Purpose of the running or last scan by its stored name, or "unassigned".
+  [[nodiscard]] const char* ScanKind() const;
   void ArmSessionTimer();
   void OnSessionTimer();
   void ForgetSession();

@@ -64,7 +64,7 @@ void ControlDesk::Answer(const ControlRequest& request, const ControlServer::Rep
           {{"event", "status"}, {"time", SystemSeconds()}, {"status", appliance_.StatusJson()}}));
     case Kind::kPress: {
       const std::string refusal =
-          appliance_.Press(request.is_long ? ButtonPress::kLong : ButtonPress::kShort);
+          appliance_.Press(request.is_long ? ButtonPress::kLong : ButtonPress::kShort, kSocket);
       return reply(refusal.empty() ? ControlDone() : ControlRefusal(refusal));
     }
     case Kind::kBackup:

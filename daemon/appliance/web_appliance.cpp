@@ -49,30 +49,19 @@ std::shared_ptr<const std::string> WebAppliance::SweptSurface() {
 }
 
 void WebAppliance::Press(const web::Actor& actor, web::Done done) {
-  const std::string refusal = appliance_.Press(ButtonPress::kShort);
-  if (refusal.empty()) audit_.Log(actor, "press", "", Name(appliance_.state().phase));
-  done(AnswerOf(refusal));
+  done(AnswerOf(appliance_.Press(ButtonPress::kShort, actor)));
 }
 
 void WebAppliance::StartSweep(const web::Actor& actor, web::Done done) {
-  const std::string refusal = appliance_.StartSweep();
-  if (refusal.empty())
-    audit_.Log(actor, "scan.start", appliance_.scan_session_id(), appliance_.ScanKind());
-  done(AnswerOf(refusal));
+  done(AnswerOf(appliance_.StartSweep(actor)));
 }
 
 void WebAppliance::EndSweep(const web::Actor& actor, web::Done done) {
-  const std::string refusal = appliance_.EndSweep();
-  if (refusal.empty())
-    audit_.Log(actor, "scan.end", appliance_.scan_session_id(), appliance_.ScanKind());
-  done(AnswerOf(refusal));
+  done(AnswerOf(appliance_.EndSweep(actor)));
 }
 
 void WebAppliance::Cancel(const web::Actor& actor, web::Done done) {
-  const std::string refusal = appliance_.Cancel();
-  if (refusal.empty())
-    audit_.Log(actor, "cancel", appliance_.scan_session_id(), appliance_.ScanKind());
-  done(AnswerOf(refusal));
+  done(AnswerOf(appliance_.Cancel(actor)));
 }
 
 void WebAppliance::SetListener(std::function<void(web::EventKind)> listener) {

@@ -3,14 +3,13 @@
 
 #include "daemon/appliance/store_access.hpp"
 #include "web/service/appliance_service.hpp"
-#include "web/service/audit_log.hpp"
 
 namespace plumb {
 
-/// Its arguments are borrowed.
+/// The appliance is borrowed.
 class WebAppliance : public web::ApplianceService {
  public:
-  WebAppliance(Appliance& appliance, web::AuditLog& audit) : appliance_(appliance), audit_(audit) {}
+  explicit WebAppliance(Appliance& appliance) : appliance_(appliance) {}
 
   [[nodiscard]] web::Status GetStatus() override { return appliance_.WebStatus(); }
   [[nodiscard]] web::Health GetHealth() override { return appliance_.Health(); }
@@ -27,7 +26,6 @@ class WebAppliance : public web::ApplianceService {
 
  private:
   Appliance& appliance_;
-  web::AuditLog& audit_;
   std::function<void(web::EventKind)> listener_;
   std::shared_ptr<const std::string> preview_;
   std::optional<std::int64_t> preview_index_;  ///< Index of the frame that it shows.

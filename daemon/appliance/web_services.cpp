@@ -26,7 +26,7 @@ WebServices::WebServices(Appliance& appliance, const UpdateConfig& update,
                          std::unique_ptr<SystemRestart> restart)
     : store_(appliance),
       audit_(store_),
-      button_(appliance, audit_),
+      button_(appliance),
       patients_(appliance, store_),
       references_(appliance, store_),
       scans_(appliance, store_),

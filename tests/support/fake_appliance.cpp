@@ -82,7 +82,7 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
     status.light = "working";
     status.scan->step = "surfaces";
     Notify(EventKind::kStatus);
-    return Did(actor, "press", status.scan->id, done);
+    return Did(actor, "scan.end", status.scan->id, done);
   }
   if (status.state != ApplianceState::kReady && status.state != ApplianceState::kResult) {
     return Finish(
@@ -115,7 +115,7 @@ void FakeAppliance::Press(const Actor& actor, Done done) {
   status.light = "scanning";
   phase_begun_.reset();
   Notify(EventKind::kStatus);
-  Did(actor, "press", scan.id, done);
+  Did(actor, "scan.start", scan.id, done);
 }
 
 void FakeAppliance::Cancel(const Actor& actor, Done done) {

@@ -11,7 +11,7 @@ writeFileSync(join(folder, 'package.json'), '{"type": "module"}');
 globalThis.document = { documentElement: {} };
 const load = async (name) => (await import(pathToFileURL(join(folder, `${name}.js`)).href));
 const { useLanguage } = await load('strings');
-const { detailWords, subjectWords } = await load('audit_words');
+const { detailWords, subjectWords, userWords } = await load('audit_words');
 rmSync(folder, { recursive: true });
 
 const failures = [];
@@ -89,10 +89,16 @@ for (const language of ['en', 'es']) {
     failures.push(`${language}: the plan's posture is raw`);
   }
 }
-for (const [language, retention, fraction, gone] of [
-  ['en', 'past the retention period', 'PX-1, Fraction 3', 'session 7 (deleted)'],
-  ['es', 'más antiguo que el plazo de conservación', 'PX-1, Fracción 3', 'sesión 7 (se borró)']]) {
+for (const [language, retention, fraction, gone, button] of [
+  ['en', 'past the retention period', 'PX-1, Fraction 3', 'session 7 (deleted)', 'the button'],
+  ['es', 'más antiguo que el plazo de conservación', 'PX-1, Fracción 3', 'sesión 7 (se borró)',
+    'el botón']]) {
   useLanguage(language);
+  equal(userWords({ user: 'button', address: '' }), button, language);
+  equal(userWords({ user: 'button', address: '10.0.0.2' }), 'button', 'of an account of that name');
+  for (const user of ['anna', 'plumbd', 'toString']) {
+    equal(userWords({ user, address: '' }), user, language);
+  }
   equal(detailWords({ action: 'scan.remove', user: 'plumbd', detail: 'retention' }), retention,
     language);
   const about = { kind: 'session', exists: true, patient_code: 'PX-1', number: 3, time: null };

@@ -44,7 +44,7 @@ compare(en, es, '');
 /// journal's Log() begins with a level.
 function actionsOf(text, file) {
   const actions = new Set();
-  for (const call of text.matchAll(/(\b(?:AppendAuditEntry|Write|Log)|\blog_?)\(/g)) {
+  for (const call of text.matchAll(/(\b(?:AppendAuditEntry|Audit|Write|Log)|\blog_?)\(/g)) {
     const parts = [''];
     let [depth, quoted] = [0, false];
     for (let i = call.index + call[0].length; i < text.length; ++i) {

@@ -82,6 +82,10 @@ export function detailWords({ action, user, address, detail }) {
   }
 }
 
+/// Who did it. The appliance's button and its control socket have no address, unlike an account of
+/// that name.
+export const userWords = ({ user, address }) => (address ? user : wordOf(S.audit.users, user));
+
 /// What an entry is about, as people know it: a code and a number instead of a row of the database.
 export function subjectWords({ subject, about }) {
   if (!about) return subject;

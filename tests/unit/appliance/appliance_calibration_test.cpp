@@ -78,12 +78,12 @@ TEST_F(ApplianceProfileTest, WhatThePageAsksIsWhatTheNextScanBeginsFrom) {
 TEST_F(ApplianceProfileTest, NothingChangesUnderAScan) {
   Play([&] {
     MakeReady();
-    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort), ""); });
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), ""); });
     const web::Change answer = Reset("A");
     EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
     EXPECT_THAT(answer.message, ::testing::HasSubstr("wait for its result"));
     EXPECT_TRUE(services_->services().profiles.GetSensorProfiles().versions.empty());
-    On([&] { EXPECT_EQ(appliance_->Cancel(), ""); });
+    On([&] { EXPECT_EQ(appliance_->Cancel(kTester), ""); });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     EXPECT_EQ(Reset("A").result, web::ChangeResult::kDone);
     EXPECT_EQ(services_->services().profiles.GetSensorProfiles().versions.size(), 1U);

@@ -106,6 +106,8 @@ class ApplianceTest : public ::testing::Test {
     return phase == ScanPhase::kScanning || phase == ScanPhase::kWorking;
   }
 
+  static inline const web::Actor kTester{.user = "tester", .address = ""};
+
   EventLoop loop_;  // first: blocks signals before any thread starts
   TempFolder folder_;
   FakeBus bus_;

@@ -26,10 +26,10 @@ TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedUnderAScan) {
   Play([&] {
     MakeReady();
     On([&] {
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
       ASSERT_EQ(appliance_->state().phase, ScanPhase::kScanning);
       EXPECT_EQ(Restarted(*services_).result, web::ChangeResult::kConflict);
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
       ASSERT_EQ(appliance_->state().phase, ScanPhase::kWorking);
       const web::Change answer = Restarted(*services_);
       EXPECT_EQ(answer.result, web::ChangeResult::kConflict);
@@ -40,7 +40,8 @@ TEST_F(ApplianceRestartTest, TheMachineIsNotRestartedUnderAScan) {
     On([&] {
       EXPECT_EQ(Restarted(*services_).result, web::ChangeResult::kDone);
       EXPECT_EQ(restart_->num_asked, 1);
-      EXPECT_THAT(appliance_->Press(ButtonPress::kShort), ::testing::HasSubstr("being restarted"));
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester),
+                  ::testing::HasSubstr("being restarted"));
       EXPECT_THAT(Restarted(*services_).message, ::testing::HasSubstr("being restarted"));
       EXPECT_EQ(restart_->num_asked, 1);
     });
@@ -64,12 +65,12 @@ TEST_F(ApplianceRestartTest, AFactoryResetIsNotedBeforeTheMachineRestarts) {
     const auto is_noted = [&] {
       return std::filesystem::exists(folder_ / "state" / kFactoryResetFile);
     };
-    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort), ""); });
+    On([&] { EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), ""); });
     EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).result,
               web::ChangeResult::kConflict)
         << "a scan runs";
     EXPECT_FALSE(is_noted());
-    On([&] { EXPECT_EQ(appliance_->Cancel(), ""); });
+    On([&] { EXPECT_EQ(appliance_->Cancel(kTester), ""); });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     restart_->failure = "the machine cannot be restarted from here: no";
     EXPECT_EQ(AskedToReset(*services_, loop_, web::FactoryReset::kWipe).message, restart_->failure);
@@ -79,7 +80,8 @@ TEST_F(ApplianceRestartTest, AFactoryResetIsNotedBeforeTheMachineRestarts) {
               web::ChangeResult::kDone);
     EXPECT_TRUE(is_noted());
     On([&] {
-      EXPECT_THAT(appliance_->Press(ButtonPress::kShort), ::testing::HasSubstr("being restarted"));
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester),
+                  ::testing::HasSubstr("being restarted"));
     });
   });
 }

@@ -1,6 +1,13 @@
 // Workers, sessions and references of the appliance.
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <functional>
 #include <future>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -41,10 +48,10 @@ TEST_F(ApplianceTest, AWorkerIsNotAliveWhileAResultIsComputedWithoutProgress) {
   Play([&] {
     MakeReady();
     On([&] {
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
       EXPECT_EQ(appliance_->state().phase, ScanPhase::kScanning);
       EXPECT_TRUE(appliance_->WorkersAreAlive()) << "it waits for frames";
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
       EXPECT_EQ(appliance_->state().phase, ScanPhase::kWorking);
       EXPECT_FALSE(appliance_->WorkersAreAlive());
     });
@@ -85,7 +92,7 @@ TEST_F(ApplianceTest, APatientWhoIsWipedWhileADailyCheckIsOpenIsNotOpenAfterIt) 
     });
     EXPECT_EQ(wiped.get_future().get().result, web::ChangeResult::kDone);
     On([&] {
-      for (int i = 0; i < 2; ++i) EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "");
+      for (int i = 0; i < 2; ++i) EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "");
     });
     EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
     On([&] {
@@ -117,7 +124,7 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
       EXPECT_THAT(answer.message, ::testing::HasSubstr("open Daily check"));
       // A session that was open since yesterday.
       appliance_->OpenSession("1", patient, web::ScanPurpose::kReference, "", tess);
-      (void)appliance_->Press(ButtonPress::kShort);
+      (void)appliance_->Press(ButtonPress::kShort, kTester);
     });
     EXPECT_TRUE(Becomes([&] {
       return appliance_->WebStatus().fault.find("open Daily check") != std::string::npos;
@@ -133,7 +140,7 @@ TEST_F(ApplianceTest, WithoutTodaysCheckNoReferenceIsScannedOrApproved) {
                   ::testing::HasSubstr("scan the reference again"))
           << "of a scan from before the check";
       (void)appliance_->CloseSession(tess);
-      (void)appliance_->Press(ButtonPress::kShort);  // acknowledges the fault
+      (void)appliance_->Press(ButtonPress::kShort, kTester);  // acknowledges the fault
       services_->services().patients.OpenPatient(tess, patient, web::ScanPurpose::kReference, "",
                                                  "", keep);
     });
@@ -181,6 +188,92 @@ TEST_F(ApplianceTest, TheLogSaysWhichScanWasStartedEndedAndDiscarded) {
       appliance_->OpenSession(session, patient, web::ScanPurpose::kReference, "", tess);
     });
     scan("P-1 0 reference");
+  });
+}
+
+/// A button that is pressed by the test, on the loop's thread.
+class FakeButton : public Button {
+ public:
+  FakeButton() : fd_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
+  ~FakeButton() override { ::close(fd_); }
+  FakeButton(const FakeButton&) = delete;
+  FakeButton& operator=(const FakeButton&) = delete;
+  [[nodiscard]] int fd() const override { return fd_; }
+  [[nodiscard]] std::optional<Clock::time_point> deadline() const override { return {}; }
+  void Dispatch(Clock::time_point /*now*/) override {}
+  void SetListener(std::function<void(ButtonPress)> pressed) override {
+    press = std::move(pressed);
+  }
+  std::function<void(ButtonPress)> press;
+
+ private:
+  const int fd_;
+};
+
+TEST_F(ApplianceTest, TheLogSaysWhatEachPressDidAndNothingTwice) {
+  parts_.demo_patient.clear();
+  parts_.config.appliance.warm_up_min = 0;
+  FakeButton button;
+  parts_.button = &button;
+  // "who action: code number, detail" of each entry about scans, the oldest first.
+  const auto logged = [&] {
+    std::vector<std::string> lines;
+    for (const web::AuditEntry& entry : appliance_->store()->audit.Find({0, 100, ""})) {
+      if (!entry.action.starts_with("scan.") && entry.action != "cancel" &&
+          entry.action != "press" && entry.action != "session.close")
+        continue;
+      const auto& about = entry.about;
+      lines.insert(lines.begin(),
+                   entry.user + " " + entry.action + ": " +
+                       (about ? about->patient_code + " " + std::to_string(about->number) : "") +
+                       ", " + entry.detail);
+    }
+    return lines;
+  };
+  Play([&] {
+    MakeReady();
+    web::ApplianceService& service = services_->services().appliance;
+    const auto page = [&] { service.Press(kTester, [](const web::Change&) {}); };
+    std::vector<std::string> expected;
+    const auto expect = [&](const std::vector<std::string>& lines) {
+      expected.insert(expected.end(), lines.begin(), lines.end());
+      EXPECT_TRUE(Becomes([&] { return logged().size() >= expected.size(); }));
+      On([&] { EXPECT_EQ(logged(), expected); });
+    };
+    // Starts, ends, and discards it before its result can arrive.
+    On([&] {
+      for (const ButtonPress kind : {ButtonPress::kShort, ButtonPress::kShort, ButtonPress::kLong})
+        button.press(kind);
+    });
+    expect({"button scan.start: , unassigned", "button scan.end: , unassigned",
+            "button cancel: , unassigned"});
+    EXPECT_TRUE(Becomes([&] { return !IsRunning(); }));
+    std::string patient;
+    On([&] {
+      Store& store = *appliance_->store();
+      patient = store.patients.Add(kTester, "P-1", "");
+      const std::string session =
+          store.treatments.Open(kTester, patient, web::ScanPurpose::kReference);
+      appliance_->OpenSession(session, patient, web::ScanPurpose::kReference, "", kTester);
+      page();  // without a check of the day the scan cannot begin
+    });
+    expect({"tester scan.start: P-1 0, reference"});
+    EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == ScanPhase::kFault; }));
+    On([&] {
+      page();
+      (void)appliance_->store()->checks.Add(
+          kTester, appliance_->WebStatus().sensor.serial,
+          TakenCheck{{.status = MarkerCheckStatus::kPassed, .items = {}, .reasons = {}}});
+      page();
+      page();
+      button.press(ButtonPress::kShort);  // refused: the result is being computed
+      button.press(ButtonPress::kLong);
+    });
+    expect({"tester press: , ready", "tester scan.start: P-1 0, reference",
+            "tester scan.end: P-1 0, reference", "button cancel: P-1 0, reference"});
+    EXPECT_TRUE(Becomes([&] { return appliance_->state().phase == ScanPhase::kReady; }));
+    On([&] { button.press(ButtonPress::kLong); });
+    expect({"button session.close: P-1 0, "});
   });
 }
 
@@ -268,9 +361,9 @@ TEST_F(ApplianceTest, ARollBackIsToldByStatusAndLightUntilItIsSeen) {
       EXPECT_EQ(appliance_->WebStatus().rolled_back, "the machine has gone back");
       EXPECT_THAT(appliance_->StatusJson().dump(),
                   ::testing::HasSubstr("the machine has gone back"));
-      EXPECT_EQ(appliance_->Press(ButtonPress::kShort), "") << "scans go on";
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "") << "scans go on";
       EXPECT_EQ(appliance_->WebStatus().light, "scanning");
-      EXPECT_EQ(appliance_->Cancel(), "");
+      EXPECT_EQ(appliance_->Cancel(kTester), "");
     });
     EXPECT_TRUE(Becomes([&] { return appliance_->WebStatus().light == "ready_rolled_back"; }));
     On([&] {

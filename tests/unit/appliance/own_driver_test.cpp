@@ -187,12 +187,12 @@ TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReference) {
   nlohmann::json status;
   std::jthread person([&] {
     EXPECT_TRUE(becomes([&] { return appliance.state().phase == ScanPhase::kReady; }));
-    on_loop([&] { EXPECT_EQ(appliance.StartSweep(), ""); });
+    on_loop([&] { EXPECT_EQ(appliance.StartSweep({.user = "tester", .address = {}}), ""); });
     EXPECT_TRUE(becomes([&] {
       status = appliance.StatusJson();
       return status["scan"].is_object() && status["scan"].value("frames", 0) >= kFrames;
     }));
-    on_loop([&] { EXPECT_EQ(appliance.EndSweep(), ""); });
+    on_loop([&] { EXPECT_EQ(appliance.EndSweep({.user = "tester", .address = {}}), ""); });
     EXPECT_TRUE(becomes([&] { return appliance.state().phase == ScanPhase::kResult; }));
     on_loop([&] { status = appliance.StatusJson(); });
     loop.Quit(0);

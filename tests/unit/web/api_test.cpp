@@ -108,7 +108,7 @@ TEST_F(ApiTest, ScanGoesFromPressToResultAndIsAudited) {
   std::vector<std::string> actions;
   for (const auto& entry : entries)
     actions.push_back(entry["user"].get<std::string>() + " " + entry["action"].get<std::string>());
-  EXPECT_THAT(actions, ::testing::IsSupersetOf({"technician login", "technician press",
+  EXPECT_THAT(actions, ::testing::IsSupersetOf({"technician login", "technician scan.start",
                                                 "technician cancel", "physicist login"}));
 }
 

@@ -1,6 +1,6 @@
 // The audit log: what was done, by whom, from where; filtered and taken away as CSV.
 import { get } from '../api.js';
-import { detailWords, subjectWords } from '../audit_words.js';
+import { detailWords, subjectWords, userWords } from '../audit_words.js';
 import { action, checkbox, clear, field, h, redraw, table } from '../dom.js';
 import { S } from '../strings.js';
 
@@ -40,7 +40,7 @@ export async function showAudit(place) {
     const { entries } = await get(
       `audit?before=${oldest}&limit=${kPage}&views=${views.box.checked ? 1 : 0}`);
     for (const entry of entries) {
-      rows.push([entry.time.replace('T', ' ').replace('Z', ''), entry.user,
+      rows.push([entry.time.replace('T', ' ').replace('Z', ''), userWords(entry),
         text.actions[entry.action] ?? entry.action, subjectWords(entry), detailWords(entry),
         entry.address]);
       oldest = entry.number;

@@ -495,6 +495,7 @@ export const en = {
     filterHint: 'Searches the entries shown below; load older ones to search them too.',
     shown: (found, all) => `${found} of ${all} ${plural(all, 'entry', 'entries')}`,
     csv: 'Download as CSV',
+    users: { button: 'the button', 'control socket': 'the control socket' },
     views: 'Also show who looked at what', yes: 'yes', no: 'no', unassigned: 'Unassigned scan',
     reason: (text) => `reason: ${text}`, role: (role) => `role: ${role}`,
     changes: { password: 'new password', disabled: 'disabled', enabled: 'enabled' },

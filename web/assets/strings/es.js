@@ -548,6 +548,7 @@ export const es = {
     filterHint: 'Busca en las entradas de abajo; cargue las anteriores para buscarlas también.',
     shown: (found, all) => `${found} de ${all} ${plural(all, 'entrada', 'entradas')}`,
     csv: 'Descargar como CSV',
+    users: { button: 'el botón', 'control socket': 'el socket de control' },
     views: 'Mostrar también quién consultó qué', yes: 'sí', no: 'no',
     unassigned: 'Escaneo sin asignar',
     reason: (text) => `motivo: ${text}`, role: (role) => `función: ${role}`,
