@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <mutex>
 #include <stdexcept>
 
 #include <fmt/format.h>
+#include <tbb/parallel_invoke.h>
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
@@ -87,13 +89,14 @@ class Comparer {
       CheckStop(options_.stop);
       const bool moved = Move();
       CheckStop(options_.stop);
-      Heights();
-      CheckStop(options_.stop);
+      // None of these needs what another one finds.
       if (moved) {
-        Deform();
-        CheckStop(options_.stop);
-        Judge();
+        tbb::parallel_invoke([&] { Heights(); }, [&] { Deform(); }, [&] { HeightsAfter(); });
+      } else {
+        Heights();
       }
+      CheckStop(options_.stop);
+      if (moved) Judge();
     }
     Decision decision = Decide(evidence_, options_.limits);
     result_.verdict = decision.verdict;
@@ -105,7 +108,9 @@ class Comparer {
  private:
   [[nodiscard]] double Now() const { return options_.now_s ? options_.now_s() : 0.0; }
   void Lap(const char* name, double since_s) {
-    if (options_.now_s) result_.timings_s[name] = Now() - since_s;
+    if (!options_.now_s) return;
+    const std::scoped_lock lock(timings_mutex_);
+    result_.timings_s[name] = Now() - since_s;
   }
   bool Refuse(std::string reason) {
     evidence_.failure = std::move(reason);
@@ -151,12 +156,17 @@ class Comparer {
 
   void Segment() {
     const double since_s = Now();
-    reference_cloud_ = SceneCloud(reference_, Eigen::Affine3d::Identity());
-    current_cloud_ = SceneCloud(current_, StretchedAlignment());
-    CheckStop(options_.stop);
-    reference_body_ = FindBody(reference_cloud_);
-    CheckStop(options_.stop);
-    current_body_ = FindBody(current_cloud_);
+    tbb::parallel_invoke(
+        [&] {
+          reference_cloud_ = SceneCloud(reference_, Eigen::Affine3d::Identity());
+          CheckStop(options_.stop);
+          reference_body_ = FindBody(reference_cloud_);
+        },
+        [&] {
+          current_cloud_ = SceneCloud(current_, StretchedAlignment());
+          CheckStop(options_.stop);
+          current_body_ = FindBody(current_cloud_);
+        });
     if (!reference_body_.support)
       result_.warnings.push_back(
           "no flat support was found in the reference scan: all of it counts as body");
@@ -255,15 +265,22 @@ class Comparer {
     current_cloud_ = TransformedCloud(by, current_cloud_);
   }
 
-  void Judge() {
+  // Coverage and remaining deviation, with the body moved back.
+  void HeightsAfter() {
     const double since_s = Now();
-    BodyMotion& motion = *result_.motion;
+    const Pose& T_motion = result_.motion->T;
     result_.region = CoverageOf(*reference_.height_map, result_.region_mask, current_cloud_,
-                                kCloudSpacing_m, motion.T);
+                                kCloudSpacing_m, T_motion);
     CheckStop(options_.stop);
-    const HeightMap corrected = CurrentHeight(motion.T.inverse());
+    const HeightMap corrected = CurrentHeight(T_motion.inverse());
     result_.deviation_after = HeightDifference(corrected, *reference_.height_map);
     Residuals(corrected);
+    Lap("deviation_after", since_s);
+  }
+
+  void Judge() {
+    const double since_s = Now();
+    const BodyMotion& motion = *result_.motion;
     result_.body_parts =
         DescribeBody({.reference = *reference_.height_map,
                       .deviation_after = *result_.deviation_after,
@@ -341,6 +358,7 @@ class Comparer {
   const CompareOptions& options_;
   double start_s_ = Now();
   Comparison result_;
+  std::mutex timings_mutex_;
   Evidence evidence_;
   PointCloud reference_cloud_;  // reference frame
   PointCloud current_cloud_;    // reference frame, after alignment
