@@ -17,17 +17,23 @@ namespace {
 using TermVector = Eigen::Matrix<double, QuadraticTerm::kSize, 1>;
 using DepthVector = Eigen::Matrix<double, CalibrationModel::kDepthSize, 1>;
 
+// First cell of a lattice, from the first usable cell.
+struct Offset {
+  int row = 0;
+  int column = 0;
+};
+
 // Projects cells of one view into another. Calls visit(cell in a, cell in b, q), where q is the
 // point in b's depth camera.
 template <typename Visit>
-void ForEachProjected(const Sensor& sensor, const View& a, const View& b, int phase, int stride,
+void ForEachProjected(const Sensor& sensor, const View& a, const View& b, Offset offset, int stride,
                       const Visit& visit) {
   const Pose T_b_a = b.T_world_depth.inverse() * a.T_world_depth;
   const Eigen::Matrix3f R = T_b_a.linear().cast<float>();
   const Eigen::Vector3f t = T_b_a.translation().cast<float>();
   const double window = a.keyframe->dense.window_px;
-  for (int r = 1 + phase % stride; r + 1 < a.height; r += stride) {
-    for (int c = 1 + (phase / stride) % stride; c + 1 < a.width; c += stride) {
+  for (int r = 1 + offset.row; r + 1 < a.height; r += stride) {
+    for (int c = 1 + offset.column; c + 1 < a.width; c += stride) {
       const auto i = static_cast<std::size_t>(r * a.width + c);
       if (a.keyframe->dense.normals[i].isZero()) continue;
       const Eigen::Vector3f q = R * a.points[i] + t;
@@ -144,9 +150,7 @@ class TermSum {
   static constexpr int kBlock = 64;
   void Flush() {
     if (count_ == 0) return;
-    block_.setZero();
-    block_.selfadjointView<Eigen::Lower>().rankUpdate(rows_.leftCols(count_));
-    term_.H.triangularView<Eigen::Lower>() += block_;
+    term_.H.selfadjointView<Eigen::Lower>().rankUpdate(rows_.leftCols(count_));
     term_.g.noalias() += rows_.leftCols(count_) * residuals_.head(count_);
     count_ = 0;
   }
@@ -154,7 +158,6 @@ class TermSum {
   int count_ = 0;
   Eigen::Matrix<double, QuadraticTerm::kSize, kBlock> rows_;
   Eigen::Matrix<double, kBlock, 1> residuals_;
-  Eigen::MatrixXd block_ = Eigen::MatrixXd::Zero(QuadraticTerm::kSize, QuadraticTerm::kSize);
 };
 
 constexpr double kLossScale = 2.0;  // Cauchy scale in standard deviations.
@@ -162,19 +165,34 @@ constexpr double kLossScale = 2.0;  // Cauchy scale in standard deviations.
 // Every fourth cell in each direction; each pair uses another of the sixteen lattices. Neighbouring
 // cells share most of their error, so the others would cost time without adding information.
 constexpr int kLattice = 4;
-// Number of cells that one cell stands for, relative to a lattice of two.
-constexpr double kCellsForOne = 4.0;
+// For terms that only lead to better ones.
+constexpr int kCoarseLattice = 2 * kLattice;
+constexpr int kNumLattices = kLattice * kLattice;
 constexpr int kHeldOut = 5;  // The lattice that is held out for Consistency().
 
-QuadraticTerm DenseTerm(const Sensor& sensor, const View& a, const View& b,
-                        const KeyframePair& pair, int phase, double gate_m, double weight) {
-  QuadraticTerm term;
+// Of one of the lattices of four, or of a coarser one within it that changes with `round`.
+Offset OffsetOf(int lattice, int stride, int round) {
+  const int finer = stride / kLattice;
+  return {lattice % kLattice + kLattice * (round % finer),
+          lattice / kLattice + kLattice * (round / finer % finer)};
+}
+
+// The pair's own lattice, which is not held out.
+Offset OffsetOfPair(std::size_t pair, int stride) {
+  auto lattice = static_cast<int>(pair % (kNumLattices - 1));
+  lattice += lattice >= kHeldOut ? 1 : 0;
+  return OffsetOf(lattice, stride, static_cast<int>(pair / (kNumLattices - 1)));
+}
+
+void FindDenseTerm(const Sensor& sensor, const View& a, const View& b, const KeyframePair& pair,
+                   Offset offset, int stride, double gate_m, double weight, QuadraticTerm& term) {
+  term = {};
   term.keyframe_a = pair.a;
   term.keyframe_b = pair.b;
   TermSum sum(term);
   const Eigen::Matrix3d R_b_a = (b.T_world_depth.inverse() * a.T_world_depth).linear();
   ForEachProjected(
-      sensor, a, b, phase, kLattice,
+      sensor, a, b, offset, stride,
       [&](std::size_t i, std::size_t j, const Eigen::Vector3f& q_b, const Eigen::Matrix3f& R) {
         const auto match = Correspond(a, b, i, j, q_b, R, gate_m);
         if (!match) return;
@@ -202,16 +220,14 @@ QuadraticTerm DenseTerm(const Sensor& sensor, const View& a, const View& b,
         sum.Add(J, residual, w);
       });
   sum.Finish();
-  return term;
 }
 
 // Depth measured on a marker's face lies in the marker's plane, which ties the scale of the depth
-// to the markers' side length.
-std::optional<QuadraticTerm> MarkerFaceTerm(const Sensor& sensor, const View& view, int keyframe,
-                                            const MarkerObservation& observation,
-                                            const MapMarker& marker, double half_side_m,
-                                            double gate_m) {
-  QuadraticTerm term;
+// to the markers' side length. Zero where too few cells lie on the face.
+void FindMarkerFaceTerm(const Sensor& sensor, const View& view, int keyframe,
+                        const MarkerObservation& observation, const MapMarker& marker,
+                        double half_side_m, double gate_m, QuadraticTerm& term) {
+  term = {};
   term.keyframe_a = keyframe;
   term.marker = observation.id;
   const Pose T_marker_depth = marker.T_world_marker.inverse() * view.T_world_depth;
@@ -257,9 +273,10 @@ std::optional<QuadraticTerm> MarkerFaceTerm(const Sensor& sensor, const View& vi
       ++count;
     }
   }
-  if (count < 8) return std::nullopt;
   sum.Finish();
-  return term;
+  if (count >= 8) return;
+  term.H.setZero();
+  term.g.setZero();
 }
 
 }  // namespace
@@ -366,7 +383,7 @@ std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistratio
           tried +=
               views[a].points[static_cast<std::size_t>(r * views[a].width + c)].z() > 0 ? 1 : 0;
       ForEachProjected(
-          sensor, views[a], views[b], 0, stride,
+          sensor, views[a], views[b], {}, stride,
           [&](std::size_t i, std::size_t j, const Eigen::Vector3f& q, const Eigen::Matrix3f& R) {
             hits += Correspond(views[a], views[b], i, j, q, R, options.max_gate_m) ? 1 : 0;
           });
@@ -391,38 +408,48 @@ std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistratio
   return pairs;
 }
 
-std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
-                                     const TrackingMap& map, const std::vector<View>& views,
-                                     const std::vector<KeyframePair>& pairs, double gate_m,
-                                     const std::stop_token& stop) {
+void MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
+               const TrackingMap& map, const std::vector<View>& views,
+               const std::vector<KeyframePair>& pairs, double gate_m, Density density,
+               const std::stop_token& stop, std::vector<QuadraticTerm>& terms) {
   std::vector<int> uses(views.size(), 0);
   for (const KeyframePair& pair : pairs) {
     ++uses[static_cast<std::size_t>(pair.a)];
     ++uses[static_cast<std::size_t>(pair.b)];
   }
-  std::vector<QuadraticTerm> terms(pairs.size());
-  tbb::parallel_for(std::size_t{0}, pairs.size(), [&](std::size_t p) {
+  struct Face {
+    std::size_t view;
+    const MarkerObservation* observation;
+    const MapMarker* marker;
+  };
+  std::vector<Face> faces;
+  for (std::size_t k = 0; k < views.size(); ++k)
+    for (const MarkerObservation& observation : map.keyframes[k].data.markers)
+      if (const auto marker = map.markers.find(observation.id); marker != map.markers.end())
+        faces.push_back({k, &observation, &marker->second});
+  const int stride = density == Density::kCoarse ? kCoarseLattice : kLattice;
+  // Number of cells that one cell stands for, relative to a lattice of two.
+  const double cells_for_one = stride * stride / 4.0;
+  // Terms are large: room for the links that may follow, too.
+  terms.reserve(pairs.size() + faces.size() + views.size());
+  terms.resize(pairs.size() + faces.size());
+  tbb::parallel_for(std::size_t{0}, terms.size(), [&](std::size_t i) {
     CheckStop(stop);
-    const auto a = static_cast<std::size_t>(pairs[p].a);
-    const auto b = static_cast<std::size_t>(pairs[p].b);
+    if (i >= pairs.size()) {
+      const Face& face = faces[i - pairs.size()];
+      FindMarkerFaceTerm(sensor, views[face.view], static_cast<int>(face.view), *face.observation,
+                         *face.marker, options.marker_length_m / 2, gate_m + 0.03, terms[i]);
+      return;
+    }
+    const auto a = static_cast<std::size_t>(pairs[i].a);
+    const auto b = static_cast<std::size_t>(pairs[i].b);
     // A keyframe's noise affects all its pairs, so together they have the weight of its cells used
     // once.
-    const double weight = options.dense_weight * kCellsForOne * 2.0 /
+    const double weight = options.dense_weight * cells_for_one * 2.0 /
                           std::sqrt(static_cast<double>(uses[a]) * uses[b]);
-    auto phase = static_cast<int>(p % (kLattice * kLattice - 1));
-    phase += phase >= kHeldOut ? 1 : 0;
-    terms[p] = DenseTerm(sensor, views[a], views[b], pairs[p], phase, gate_m, weight);
+    FindDenseTerm(sensor, views[a], views[b], pairs[i], OffsetOfPair(i, stride), stride, gate_m,
+                  weight, terms[i]);
   });
-  for (std::size_t k = 0; k < views.size(); ++k) {
-    for (const MarkerObservation& observation : map.keyframes[k].data.markers) {
-      const auto marker = map.markers.find(observation.id);
-      if (marker == map.markers.end()) continue;
-      auto term = MarkerFaceTerm(sensor, views[k], static_cast<int>(k), observation, marker->second,
-                                 options.marker_length_m / 2, gate_m + 0.03);
-      if (term) terms.push_back(std::move(*term));
-    }
-  }
-  return terms;
 }
 
 double Consistency(const Sensor& sensor, const std::vector<View>& views,
@@ -432,7 +459,7 @@ double Consistency(const Sensor& sensor, const std::vector<View>& views,
     const View& a = views[static_cast<std::size_t>(pairs[p].a)];
     const View& b = views[static_cast<std::size_t>(pairs[p].b)];
     ForEachProjected(
-        sensor, a, b, kHeldOut, kLattice,
+        sensor, a, b, OffsetOf(kHeldOut, kLattice, 0), kLattice,
         [&](std::size_t i, std::size_t j, const Eigen::Vector3f& q, const Eigen::Matrix3f& R) {
           if (const auto match = Correspond(a, b, i, j, q, R, gate_m))
             parts[p].push_back(static_cast<float>(std::abs(match->residual)));

@@ -60,13 +60,18 @@ Eigen::Matrix<double, 3, kCalibrationSize> CellJacobian(const Sensor& sensor, co
 std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistrationOptions& options,
                                     const std::vector<View>& views, const std::stop_token& stop);
 
+/// How many of the cells are used. Coarse: a quarter of those of fine, each with four times the
+/// weight; for terms that only lead to better ones.
+enum class Density { kCoarse, kFine };
+
 /// Point-to-plane residuals of each pair, and of the depth on each marker's face, linearised.
 /// @param gate_m  Larger residuals are not correspondences.
+/// @param terms  Replaced; its memory is used again.
 /// @throws Interrupted on a stop request
-std::vector<QuadraticTerm> MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
-                                     const TrackingMap& map, const std::vector<View>& views,
-                                     const std::vector<KeyframePair>& pairs, double gate_m,
-                                     const std::stop_token& stop);
+void MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
+               const TrackingMap& map, const std::vector<View>& views,
+               const std::vector<KeyframePair>& pairs, double gate_m, Density density,
+               const std::stop_token& stop, std::vector<QuadraticTerm>& terms);
 
 /// Median absolute point-to-plane distance of the cells that MakeTerms() never uses, metres; 0
 /// without any.

@@ -114,6 +114,8 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   std::vector<QuadraticTerm> links;
   AddTrackedLinks(map, links);
   BundleAdjust(stated, bundle, links, map, result.calibration);
+  // The start is near now: only what poses and calibration change together is left to be found.
+  bundle.initial_damping = 1e-7;
   const auto refresh_velocities = [&] {
     if (!options.refresh_velocities) return;
     options.refresh_velocities(map);
@@ -137,7 +139,6 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   double gate_m = options.max_gate_m;
   std::vector<dense::KeyframePair> pairs;
   std::vector<QuadraticTerm> terms;
-  bundle.max_iterations = 4;
   bundle.function_tolerance = BundleOptions().function_tolerance;
   // Overlapping surfaces determine the focal length. The rest of the lens, if free here, would
   // follow the errors of the depth model.
@@ -149,7 +150,11 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
     const std::vector<dense::View> views = dense::MakeViews(sensor, result.calibration, cells, map);
     CheckStop(stop);
     if (round == 0) pairs = dense::FindPairs(sensor, options, views, stop);
-    terms = dense::MakeTerms(sensor, options, map, views, pairs, gate_m, stop);
+    // The first round leads to the neighbourhood of the solution.
+    const bool is_first = round == 0;
+    dense::MakeTerms(sensor, options, map, views, pairs, gate_m,
+                     is_first ? dense::Density::kCoarse : dense::Density::kFine, stop, terms);
+    bundle.max_iterations = is_first ? 2 : 3;
     AddTrackedLinks(map, terms);
     BundleAdjust(stated, bundle, terms, map, result.calibration);
     CheckStop(stop);
@@ -159,7 +164,7 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
           std::max(farthest_m, (DepthPose(*view.keyframe, result.calibration).translation() -
                                 view.T_world_depth.translation())
                                    .norm());
-    if (farthest_m < options.settled_m) break;
+    if (!is_first && farthest_m < options.settled_m) break;
     gate_m = std::max(options.min_gate_m, 0.6 * gate_m);
   }
   result.num_pairs = static_cast<int>(pairs.size());

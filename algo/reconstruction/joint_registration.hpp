@@ -16,11 +16,11 @@ struct JointRegistrationOptions {
   bool calibrate = true;         ///< Estimate the sensor's calibration together with the poses.
   bool use_depth_field = true;   ///< False: without the terms from kDepthField on.
   bool use_dense = true;         ///< False: keypoints and markers only.
-  int num_rounds = 5;            ///< Rounds of association and solution.
+  int num_rounds = 5;            ///< Largest number of dense rounds; at least two are made.
   /// Largest point-to-plane residual of the first round; multiplied by 0.6 in each round.
   double max_gate_m = 0.06;
   double min_gate_m = 0.012;
-  double settled_m = 0.001;  ///< Iteration ends when no camera moves farther than this.
+  double settled_m = 0.002;  ///< The rounds end when no camera moves farther than this.
   int max_pairs = 8;         ///< Overlapping keyframes with which each keyframe is registered.
   double min_overlap = 0.2;  ///< Fraction of a keyframe's cells that project into the other.
   /// Weight of the dense terms relative to their noise model, because errors outside the model are

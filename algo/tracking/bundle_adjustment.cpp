@@ -106,7 +106,7 @@ BundleSummary Solver::Run() {
   summary.initial_cost = summary.final_cost = cost;
   if (!std::isfinite(cost) || problem_.size() == 0) return summary;
   summary.usable = true;
-  double damping = 1e-4;
+  double damping = options_.initial_damping;
   bool linearised = false;
   while (summary.num_iterations < options_.max_iterations && damping < kLargestDamping) {
     CheckStop(options_.stop);
@@ -240,8 +240,14 @@ BundlePosterior Solver::Posterior(Eigen::MatrixXd S) const {
 void Solver::Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const {
   tbb::parallel_for(std::size_t{0}, problem_.free().size(), [&](std::size_t slot) {
     const auto a = kCamera * static_cast<Eigen::Index>(slot);
-    for (const std::uint32_t i :
-         problem_.ViewsOfKeyframe(static_cast<std::size_t>(problem_.free()[slot]))) {
+    const std::vector<std::uint32_t>& views =
+        problem_.ViewsOfKeyframe(static_cast<std::size_t>(problem_.free()[slot]));
+    // Side by side, so that the product with the calibration is one.
+    const auto num_columns = static_cast<Eigen::Index>(options_.calibrate ? 3 * views.size() : 0);
+    Eigen::Matrix<double, kCalibrationSize, Eigen::Dynamic> all_W(kCalibrationSize, num_columns);
+    Eigen::Matrix<double, kCamera, Eigen::Dynamic> all_WV(kCamera, num_columns);
+    Eigen::Index column = 0;
+    for (const std::uint32_t i : views) {
       const PointSystem& point = points_[static_cast<std::size_t>(problem_.views()[i].landmark)];
       const CameraPoint WV = equations_.rows()[i].J_camera.transpose() *
                              (equations_.rows()[i].J_point * point.V_inverse);
@@ -250,19 +256,37 @@ void Solver::Eliminate(Eigen::MatrixXd& S, Eigen::VectorXd& right) const {
         if (b <= static_cast<int>(slot))
           S.block<kCamera, kCamera>(a, kCamera * static_cast<Eigen::Index>(b)).noalias() -=
               WV * W.transpose();
-      if (options_.calibrate)
-        S.block<kCalibrationSize, kCamera>(problem_.calibration_at(), a).noalias() -=
-            point.W_calibration * WV.transpose();
+      if (!options_.calibrate) continue;
+      all_W.middleCols<3>(column) = point.W_calibration;
+      all_WV.middleCols<3>(column) = WV;
+      column += 3;
     }
+    if (options_.calibrate)
+      S.block<kCalibrationSize, kCamera>(problem_.calibration_at(), a).noalias() -=
+          all_W * all_WV.transpose();
   });
   if (!options_.calibrate) return;
-  CalibrationMatrix H = CalibrationMatrix::Zero();
-  for (const PointSystem& point : points_) {
-    const CalibrationPoint WV = point.W_calibration * point.V_inverse;
-    H.noalias() += WV * point.W_calibration.transpose();
-    right.tail<kCalibrationSize>().noalias() -= WV * point.g;
+  // Lower half: V^-1 = L L', so W V^-1 W' is the square of the columns W L.
+  constexpr std::size_t kAtOnce = 64;
+  const std::size_t num_blocks = (points_.size() + kAtOnce - 1) / kAtOnce;
+  std::vector<CalibrationMatrix> H(num_blocks, CalibrationMatrix::Zero());
+  std::vector<CalibrationVector> g(num_blocks, CalibrationVector::Zero());
+  tbb::parallel_for(std::size_t{0}, num_blocks, [&](std::size_t block) {
+    const std::size_t first = block * kAtOnce;
+    const std::size_t count = std::min(kAtOnce, points_.size() - first);
+    Eigen::Matrix<double, kCalibrationSize, Eigen::Dynamic> columns(kCalibrationSize, 3 * count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const PointSystem& point = points_[first + i];
+      columns.middleCols<3>(static_cast<Eigen::Index>(3 * i)).noalias() =
+          point.W_calibration * point.V_inverse.llt().matrixL();
+      g[block].noalias() += point.W_calibration * (point.V_inverse * point.g);
+    }
+    H[block].selfadjointView<Eigen::Lower>().rankUpdate(columns);
+  });
+  for (std::size_t block = 0; block < num_blocks; ++block) {
+    S.bottomRightCorner<kCalibrationSize, kCalibrationSize>() -= H[block];
+    right.tail<kCalibrationSize>() -= g[block];
   }
-  S.bottomRightCorner<kCalibrationSize, kCalibrationSize>() -= H;
 }
 
 }  // namespace

@@ -41,7 +41,11 @@ struct BundleOptions {
   bool find_information = false;              ///< Fill BundleSummary::information and posterior.
   int max_iterations = 8;
   double function_tolerance = 1e-5;  ///< Iteration ends when the relative decrease is smaller.
-  double keypoint_sigma_px = 0.6;    ///< In pixels at 640 columns.
+  /// Of the diagonal, in the first step. Poses and calibration change together along directions
+  /// that the residuals determine a million times more weakly than any of them alone: a greater
+  /// damping needs many steps there, a smaller one may leave the range of a poor start.
+  double initial_damping = 1e-4;
+  double keypoint_sigma_px = 0.6;  ///< In pixels at 640 columns.
   double keypoint_depth_sigmas =
       1.5;  ///< Standard deviation of a keypoint's depth relative to the noise model.
   double min_corner_sigma_px = 0.05;

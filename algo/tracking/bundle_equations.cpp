@@ -9,12 +9,8 @@
 namespace plumb::bundle {
 namespace {
 
-using Matrix2x6d = Eigen::Matrix<double, 2, 6>;
-// Unknowns of the calibration that affect marker corners.
-constexpr int kSeenByCorners = kEdgeBiasAt + 1;
 using CameraVector = Eigen::Matrix<double, kCamera, 1>;
 using CameraMatrix = Eigen::Matrix<double, kCamera, kCamera>;
-using CameraRows2 = Eigen::Matrix<double, 2, kCamera>;
 using CalibrationCamera = Eigen::Matrix<double, kCalibrationSize, kCamera>;
 
 }  // namespace
@@ -23,6 +19,7 @@ Equations::Equations(const Problem& problem) : problem_(problem) {}
 
 void Equations::Linearise(const State& state) {
   rows_.resize(problem_.views().size());
+  corner_rows_.resize(problem_.corners().size());
   H_ = Eigen::MatrixXd::Zero(problem_.size(), problem_.size());
   g_ = Eigen::VectorXd::Zero(problem_.size());
   std::vector<CalibrationMatrix> H_calibration(problem_.num_keyframes(), CalibrationMatrix::Zero());
@@ -30,6 +27,8 @@ void Equations::Linearise(const State& state) {
   tbb::parallel_for(std::size_t{0}, problem_.num_keyframes(), [&](std::size_t k) {
     LineariseKeyframe(state, k, H_calibration[k], g_calibration[k]);
   });
+  tbb::parallel_for(std::size_t{0}, problem_.num_markers(),
+                    [&](std::size_t slot) { AddCornersOfMarker(slot); });
   if (problem_.options().calibrate) {
     for (std::size_t k = 0; k < problem_.num_keyframes(); ++k) {
       H_.bottomRightCorner<kCalibrationSize, kCalibrationSize>() += H_calibration[k];
@@ -40,37 +39,63 @@ void Equations::Linearise(const State& state) {
     g_.tail<kCalibrationSize>() +=
         prior * (ToVector(state.calibration) - problem_.options().prior.mean);
   }
-  for (const CornerView& view : problem_.corners()) AddCorner(state, view);
-  for (const QuadraticTerm& term : problem_.terms()) AddTerm(state, term);
+  const std::vector<QuadraticTerm>& terms = problem_.terms();
+  std::vector<Problem::TermVector> slopes(terms.size());
+  tbb::parallel_for(std::size_t{0}, terms.size(), [&](std::size_t i) {
+    slopes[i] = terms[i].H * problem_.TermState(state, terms[i]) + terms[i].g;
+  });
+  for (std::size_t i = 0; i < terms.size(); ++i) AddTerm(terms[i], slopes[i]);
 }
 
 void Equations::LineariseKeyframe(const State& state, std::size_t k,
                                   CalibrationMatrix& H_calibration,
                                   CalibrationVector& g_calibration) {
   const int slot = problem_.PoseSlot(static_cast<int>(k));
+  const bool calibrate = problem_.options().calibrate;
   CameraMatrix H = CameraMatrix::Zero();
   CameraVector g = CameraVector::Zero();
   CalibrationCamera H_coupled = CalibrationCamera::Zero();
-  for (const std::uint32_t i : problem_.ViewsOfKeyframe(k)) {
+  const std::vector<std::uint32_t>& views = problem_.ViewsOfKeyframe(k);
+  // The depth rows side by side, so that their products are single ones.
+  const auto num_rows = static_cast<Eigen::Index>(calibrate ? views.size() : 0);
+  Eigen::Matrix<double, CalibrationModel::kDepthSize, Eigen::Dynamic> J_depth(
+      CalibrationModel::kDepthSize, num_rows);
+  Eigen::Matrix<double, kCamera, Eigen::Dynamic> J_camera(kCamera, num_rows);
+  Eigen::Index row = 0;
+  for (const std::uint32_t i : views) {
     rows_[i] = RowsOf(state, problem_.views()[i]);
     const PointRows& rows = rows_[i];
     if (slot >= 0) {
       H.noalias() += rows.J_camera.transpose() * rows.J_camera;
       g.noalias() += rows.J_camera.transpose() * rows.r;
     }
-    if (!problem_.options().calibrate) continue;
-    if (slot >= 0) H_coupled += rows.CalibrationTimes<kCamera>(rows.J_camera);
+    if (!calibrate) continue;
+    J_depth.col(row) = rows.J_depth.transpose();
+    J_camera.col(row++) = rows.J_camera.row(2).transpose();
+    if (slot >= 0)
+      H_coupled.topRows<kLensAndReadout>().noalias() +=
+          rows.J_lens.transpose() * rows.J_camera.topRows<2>();
     H_calibration.topLeftCorner<kLensAndReadout, kLensAndReadout>().noalias() +=
         rows.J_lens.transpose() * rows.J_lens;
-    H_calibration.bottomRightCorner<CalibrationModel::kDepthSize, CalibrationModel::kDepthSize>()
-        .noalias() += rows.J_depth.transpose() * rows.J_depth;
     g_calibration += rows.CalibrationTimes<1>(rows.r);
   }
-  if (slot < 0) return;
-  H_.block<kCamera, kCamera>(kCamera * slot, kCamera * slot) += H;
-  g_.segment<kCamera>(kCamera * slot) += g;
-  if (problem_.options().calibrate)
-    H_.block<kCalibrationSize, kCamera>(problem_.calibration_at(), kCamera * slot) += H_coupled;
+  if (calibrate) {
+    H_calibration.bottomRightCorner<CalibrationModel::kDepthSize, CalibrationModel::kDepthSize>()
+        .selfadjointView<Eigen::Lower>()
+        .rankUpdate(J_depth);
+    if (slot >= 0)
+      H_coupled.bottomRows<CalibrationModel::kDepthSize>().noalias() +=
+          J_depth * J_camera.transpose();
+  }
+  if (slot >= 0) {
+    H_.block<kCamera, kCamera>(kCamera * slot, kCamera * slot) += H;
+    g_.segment<kCamera>(kCamera * slot) += g;
+    if (calibrate)
+      H_.block<kCalibrationSize, kCamera>(problem_.calibration_at(), kCamera * slot) += H_coupled;
+  }
+  for (const std::uint32_t i : problem_.CornersOfKeyframe(k))
+    corner_rows_[i] = RowsOf(state, problem_.corners()[i]);
+  AddCornersOfKeyframe(k, H_calibration, g_calibration);
 }
 
 PointRows Equations::RowsOf(const State& state, const PointView& view) const {
@@ -89,7 +114,13 @@ PointRows Equations::RowsOf(const State& state, const PointView& view) const {
   rows.J_camera.topRows<2>() = J * point.J_pose;
   rows.J_lens.leftCols<CalibrationModel::kLensSize>() = w * seen.J_lens;
   rows.J_lens.col(kReadoutAt) = view.place.row_share * (J * point.J_time);
-  if (!(view.depth.z_m > 0)) return rows;
+  if (!(view.depth.z_m > 0)) {
+    rows.r[2] = 0.0;
+    rows.J_point.row(2).setZero();
+    rows.J_camera.row(2).setZero();
+    rows.J_depth.setZero();
+    return rows;
+  }
   const double late_s = problem_.DepthDelay(state, view.keyframe, view.place.row_share);
   const SeenPoint late = See(camera, p_world, late_s);
   const PredictedDepth predicted = PredictDepth(state.calibration, late, view.place);
@@ -113,53 +144,69 @@ PointRows Equations::RowsOf(const State& state, const PointView& view) const {
   return rows;
 }
 
-void Equations::AddCorner(const State& state, const CornerView& view) {
+CornerRows Equations::RowsOf(const State& state, const CornerView& view) const {
   const Vector6d& twist = state.markers[static_cast<std::size_t>(view.marker)];
   CameraState marker_side;  // Used only for the right Jacobian of the twist.
   marker_side.twist = twist;
   marker_side.Prepare();
-  const Pose T_world_marker = problem_.MarkerPose(view.marker) * PoseFromTwist(twist);
+  const Pose T_marker0_marker = PoseFromTwist(twist);
+  const Pose& T_world_marker0 = problem_.MarkerPose(view.marker);
   const double share = RowShare(view.pixel.y(), problem_.stated().height);
-  const Eigen::Vector3d p_world =
-      problem_.MarkerPose(view.marker) * (PoseFromTwist(twist) * view.in_marker);
+  const Eigen::Vector3d p_world = T_world_marker0 * (T_marker0_marker * view.in_marker);
   const double row_s = state.calibration.readout_s[0] * share;
   const SeenPoint point =
       See(state.cameras[static_cast<std::size_t>(view.keyframe)], p_world, row_s);
   const SeenPixel seen = ProjectCorrected(problem_.stated(), state.calibration.lens, point.p);
-  Eigen::Vector2d r = problem_.CornerResidual(state, view, point.p);
-  const double robust = std::sqrt(CauchyWeight(r.squaredNorm(), kCornerLossScale));
+  CornerRows rows;
+  rows.r = problem_.CornerResidual(state, view, point.p);
+  const double robust = std::sqrt(CauchyWeight(rows.r.squaredNorm(), kCornerLossScale));
   const double w = robust * view.weight;
-  r *= robust;
+  rows.r *= robust;
   const Eigen::Matrix<double, 2, 3> J = w * seen.J_point;
   Matrix3x6d J_in_world;
-  J_in_world.leftCols<3>() = -T_world_marker.linear() * Skew(view.in_marker) * marker_side.J_right;
-  J_in_world.rightCols<3>() = problem_.MarkerPose(view.marker).linear();
-  const Matrix2x6d J_marker = J * point.J_world * J_in_world;
-  const CameraRows2 J_camera = J * point.J_pose;
-  const Eigen::Index m = problem_.MarkerAt(view.marker);
-  const Eigen::Index a = problem_.CameraAt(view.keyframe);
-  H_.block<6, 6>(m, m).noalias() += J_marker.transpose() * J_marker;
-  g_.segment<6>(m).noalias() += J_marker.transpose() * r;
-  if (a >= 0) {
-    H_.block<kCamera, kCamera>(a, a).noalias() += J_camera.transpose() * J_camera;
-    H_.block<6, kCamera>(m, a).noalias() += J_marker.transpose() * J_camera;
-    g_.segment<kCamera>(a).noalias() += J_camera.transpose() * r;
-  }
-  if (!problem_.options().calibrate) return;
-  Eigen::Matrix<double, 2, kSeenByCorners> J_calibration;
-  J_calibration << w * seen.J_lens, share * (J * point.J_time), w * view.inward;
-  H_.block<kSeenByCorners, kSeenByCorners>(problem_.calibration_at(), problem_.calibration_at())
-      .noalias() += J_calibration.transpose() * J_calibration;
-  H_.block<kSeenByCorners, 6>(problem_.calibration_at(), m).noalias() +=
-      J_calibration.transpose() * J_marker;
-  if (a >= 0)
-    H_.block<kSeenByCorners, kCamera>(problem_.calibration_at(), a).noalias() +=
-        J_calibration.transpose() * J_camera;
-  g_.segment<kSeenByCorners>(problem_.calibration_at()).noalias() += J_calibration.transpose() * r;
+  J_in_world.leftCols<3>() =
+      -(T_world_marker0 * T_marker0_marker).linear() * Skew(view.in_marker) * marker_side.J_right;
+  J_in_world.rightCols<3>() = T_world_marker0.linear();
+  rows.J_marker = J * point.J_world * J_in_world;
+  rows.J_camera = J * point.J_pose;
+  rows.J_calibration << w * seen.J_lens, share * (J * point.J_time), w * view.inward;
+  return rows;
 }
 
-void Equations::AddTerm(const State& state, const QuadraticTerm& term) {
-  const Problem::TermVector slope = term.H * problem_.TermState(state, term) + term.g;
+void Equations::AddCornersOfKeyframe(std::size_t k, CalibrationMatrix& H_calibration,
+                                     CalibrationVector& g_calibration) {
+  const Eigen::Index a = problem_.CameraAt(static_cast<int>(k));
+  for (const std::uint32_t i : problem_.CornersOfKeyframe(k)) {
+    const CornerRows& rows = corner_rows_[i];
+    if (a >= 0) {
+      const Eigen::Index m = problem_.MarkerAt(problem_.corners()[i].marker);
+      H_.block<kCamera, kCamera>(a, a).noalias() += rows.J_camera.transpose() * rows.J_camera;
+      H_.block<6, kCamera>(m, a).noalias() += rows.J_marker.transpose() * rows.J_camera;
+      g_.segment<kCamera>(a).noalias() += rows.J_camera.transpose() * rows.r;
+    }
+    if (!problem_.options().calibrate) continue;
+    H_calibration.topLeftCorner<kSeenByCorners, kSeenByCorners>().noalias() +=
+        rows.J_calibration.transpose() * rows.J_calibration;
+    g_calibration.head<kSeenByCorners>().noalias() += rows.J_calibration.transpose() * rows.r;
+    if (a >= 0)
+      H_.block<kSeenByCorners, kCamera>(problem_.calibration_at(), a).noalias() +=
+          rows.J_calibration.transpose() * rows.J_camera;
+  }
+}
+
+void Equations::AddCornersOfMarker(std::size_t slot) {
+  const Eigen::Index m = problem_.MarkerAt(static_cast<int>(slot));
+  for (const std::uint32_t i : problem_.CornersOfMarker(slot)) {
+    const CornerRows& rows = corner_rows_[i];
+    H_.block<6, 6>(m, m).noalias() += rows.J_marker.transpose() * rows.J_marker;
+    g_.segment<6>(m).noalias() += rows.J_marker.transpose() * rows.r;
+    if (problem_.options().calibrate)
+      H_.block<kSeenByCorners, 6>(problem_.calibration_at(), m).noalias() +=
+          rows.J_calibration.transpose() * rows.J_marker;
+  }
+}
+
+void Equations::AddTerm(const QuadraticTerm& term, const Problem::TermVector& slope) {
   constexpr int kFocal = QuadraticTerm::kFocal;
   constexpr int kFocalAt = QuadraticTerm::kFocalAt;
   constexpr int kDepthSize = CalibrationModel::kDepthSize;

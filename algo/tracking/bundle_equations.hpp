@@ -12,15 +12,14 @@ namespace plumb::bundle {
 inline constexpr int kLensAndReadout = kReadoutAt + 1;
 using CameraPoint = Eigen::Matrix<double, kCamera, 3>;
 
-/// Linearised observation of a keypoint, with weighted rows pixel x, pixel y and depth.
+/// Linearised observation of a keypoint, with weighted rows pixel x, pixel y and depth. Not
+/// initialised, because there are tens of thousands, of which parallel loops fill each.
 struct PointRows {
-  Eigen::Vector3d r = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d J_point = Eigen::Matrix3d::Zero();
-  Eigen::Matrix<double, 3, kCamera> J_camera = Eigen::Matrix<double, 3, kCamera>::Zero();
-  /// Derivatives to lens and readout.
-  Eigen::Matrix<double, 2, kLensAndReadout> J_lens =
-      Eigen::Matrix<double, 2, kLensAndReadout>::Zero();
-  DepthRow J_depth = DepthRow::Zero();
+  Eigen::Vector3d r;
+  Eigen::Matrix3d J_point;
+  Eigen::Matrix<double, 3, kCamera> J_camera;
+  Eigen::Matrix<double, 2, kLensAndReadout> J_lens;  ///< Derivatives to lens and readout.
+  DepthRow J_depth;
 
   /// J' M for this observation's derivatives J with respect to the whole calibration.
   template <int kColumns>
@@ -34,6 +33,17 @@ struct PointRows {
         J_depth.transpose() * M.row(2);
     return product;
   }
+};
+
+// Unknowns of the calibration that affect marker corners.
+inline constexpr int kSeenByCorners = kEdgeBiasAt + 1;
+
+/// Linearised observation of a marker's corner, weighted.
+struct CornerRows {
+  Eigen::Vector2d r;
+  Eigen::Matrix<double, 2, 6> J_marker;
+  Eigen::Matrix<double, 2, kCamera> J_camera;
+  Eigen::Matrix<double, 2, kSeenByCorners> J_calibration;
 };
 
 /// Parallel loops write to their own slots and every sum has a fixed order: the same bits on any
@@ -57,11 +67,17 @@ class Equations {
   void LineariseKeyframe(const State& state, std::size_t k, CalibrationMatrix& H_calibration,
                          CalibrationVector& g_calibration);
   [[nodiscard]] PointRows RowsOf(const State& state, const PointView& view) const;
-  void AddCorner(const State& state, const CornerView& view);
-  void AddTerm(const State& state, const QuadraticTerm& term);
+  [[nodiscard]] CornerRows RowsOf(const State& state, const CornerView& view) const;
+  // The corners that one keyframe sees: its own pose and its coupling to the markers.
+  void AddCornersOfKeyframe(std::size_t k, CalibrationMatrix& H_calibration,
+                            CalibrationVector& g_calibration);
+  void AddCornersOfMarker(std::size_t slot);
+  /// @param slope  H x + g of the term at the state.
+  void AddTerm(const QuadraticTerm& term, const Problem::TermVector& slope);
 
   const Problem& problem_;
   std::vector<PointRows> rows_;
+  std::vector<CornerRows> corner_rows_;
   Eigen::MatrixXd H_;
   Eigen::VectorXd g_;
 };

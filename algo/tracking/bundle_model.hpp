@@ -72,6 +72,7 @@ struct PredictedDepth {
 };
 /// Position of a depth reading in its image.
 struct DepthPlace {
+  DepthPlace() = default;
   DepthPlace(const Eigen::Vector2d& pixel, const Intrinsics& stated);
   Eigen::Vector2d centred;  ///< CentredCoordinates()
   FieldRow products;        ///< FieldProducts()

@@ -101,20 +101,29 @@ void Problem::CollectPoints() {
       landmarks_.push_back(o.landmark);
     }
   }
-  for (std::size_t k = 0; k < map_.keyframes.size(); ++k) {
+  std::vector<std::size_t> first_view = {0};  // Of each keyframe.
+  for (const MapKeyframe& keyframe : map_.keyframes)
+    first_view.push_back(
+        first_view.back() +
+        static_cast<std::size_t>(std::count_if(
+            keyframe.keypoints.begin(), keyframe.keypoints.end(),
+            [&](const auto& o) { return slot[static_cast<std::size_t>(o.landmark)] >= 0; })));
+  views_.resize(first_view.back());
+  tbb::parallel_for(std::size_t{0}, map_.keyframes.size(), [&](std::size_t k) {
+    std::size_t at = first_view[k];
     for (const KeypointObservation& o : map_.keyframes[k].keypoints) {
       const int s = slot[static_cast<std::size_t>(o.landmark)];
       if (s < 0) continue;
-      PointView view{static_cast<int>(k),
-                     s,
-                     o.pixel,
-                     DepthPlace(o.pixel, stated_),
-                     {o.z_m, o.inverse_depth_slope}};
+      PointView& view = views_[at++];
+      view = {static_cast<int>(k),
+              s,
+              o.pixel,
+              DepthPlace(o.pixel, stated_),
+              {o.z_m, o.inverse_depth_slope}};
       if (o.z_m > 0)
         view.weight_z = 1.0 / (options_.keypoint_depth_sigmas * DepthSigma(o.z_m, 0.8));
-      views_.push_back(view);
     }
-  }
+  });
 }
 
 State Problem::Start() const {
@@ -150,6 +159,14 @@ void Problem::DropViewsBehindCameras(const State& state) {
     views_of_keyframe_[static_cast<std::size_t>(views_[i].keyframe)].push_back(
         static_cast<std::uint32_t>(i));
   }
+  corners_of_keyframe_.assign(map_.keyframes.size(), {});
+  corners_of_marker_.assign(markers_.size(), {});
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    corners_of_keyframe_[static_cast<std::size_t>(corners_[i].keyframe)].push_back(
+        static_cast<std::uint32_t>(i));
+    corners_of_marker_[static_cast<std::size_t>(corners_[i].marker)].push_back(
+        static_cast<std::uint32_t>(i));
+  }
 }
 
 Eigen::Vector3d Problem::CornerInWorld(const State& state, const CornerView& view) const {
@@ -167,20 +184,17 @@ double Problem::Cost(const State& state) const {
   std::vector<double> parts(map_.keyframes.size(), 0.0);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t k) {
     for (const std::uint32_t i : views_of_keyframe_[k]) parts[k] += PointCost(state, views_[i]);
+    for (const std::uint32_t i : corners_of_keyframe_[k])
+      parts[k] += CornerCost(state, corners_[i]);
+  });
+  std::vector<double> of_terms(terms_.size());
+  tbb::parallel_for(std::size_t{0}, terms_.size(), [&](std::size_t i) {
+    const TermVector x = TermState(state, terms_[i]);
+    of_terms[i] = x.dot(0.5 * (terms_[i].H * x) + terms_[i].g);
   });
   double cost = 0;
   for (const double part : parts) cost += part;
-  for (const CornerView& view : corners_) {
-    const double share = RowShare(view.pixel.y(), stated_.height);
-    const SeenPoint point = See(state.cameras[static_cast<std::size_t>(view.keyframe)],
-                                CornerInWorld(state, view), state.calibration.readout_s[0] * share);
-    if (point.p.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
-    cost += 0.5 * CauchyLoss(CornerResidual(state, view, point.p).squaredNorm(), kCornerLossScale);
-  }
-  for (const QuadraticTerm& term : terms_) {
-    const TermVector x = TermState(state, term);
-    cost += x.dot(0.5 * (term.H * x) + term.g);
-  }
+  for (const double part : of_terms) cost += part;
   if (options_.calibrate) cost += options_.prior.Cost(ToVector(state.calibration));
   return cost;
 }
@@ -207,6 +221,14 @@ double Problem::PointCost(const State& state, const PointView& view) const {
     cost += 0.5 * CauchyLoss(rz * rz, kKeypointLossScale);
   }
   return cost;
+}
+
+double Problem::CornerCost(const State& state, const CornerView& view) const {
+  const double share = RowShare(view.pixel.y(), stated_.height);
+  const SeenPoint point = See(state.cameras[static_cast<std::size_t>(view.keyframe)],
+                              CornerInWorld(state, view), state.calibration.readout_s[0] * share);
+  if (point.p.z() < kNearestPoint_m) return std::numeric_limits<double>::infinity();
+  return 0.5 * CauchyLoss(CornerResidual(state, view, point.p).squaredNorm(), kCornerLossScale);
 }
 
 Eigen::Vector2d Problem::DepthOffset(const State& state, const Eigen::Vector2d& pixel_velocity,

@@ -107,11 +107,19 @@ class Problem {
   [[nodiscard]] const std::vector<std::uint32_t>& ViewsOfKeyframe(std::size_t keyframe) const {
     return views_of_keyframe_[keyframe];
   }
+  /// Indices into corners().
+  [[nodiscard]] const std::vector<std::uint32_t>& CornersOfKeyframe(std::size_t keyframe) const {
+    return corners_of_keyframe_[keyframe];
+  }
+  [[nodiscard]] const std::vector<std::uint32_t>& CornersOfMarker(std::size_t slot) const {
+    return corners_of_marker_[slot];
+  }
 
  private:
   void CollectMarkers();
   void CollectPoints();
   [[nodiscard]] double PointCost(const State& state, const PointView& view) const;
+  [[nodiscard]] double CornerCost(const State& state, const CornerView& view) const;
   [[nodiscard]] Eigen::Vector3d CornerInWorld(const State& state, const CornerView& view) const;
 
   const Intrinsics& stated_;
@@ -128,6 +136,8 @@ class Problem {
   std::vector<CornerView> corners_;
   std::vector<std::vector<std::uint32_t>> views_of_landmark_;
   std::vector<std::vector<std::uint32_t>> views_of_keyframe_;
+  std::vector<std::vector<std::uint32_t>> corners_of_keyframe_;
+  std::vector<std::vector<std::uint32_t>> corners_of_marker_;
   Eigen::Index markers_at_ = 0;
   Eigen::Index calibration_at_ = 0;
   Eigen::Index size_ = 0;

@@ -1,0 +1,91 @@
+#include "algo/reconstruction/dense_terms.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/tracking/synthetic_map.hpp"
+
+namespace plumb::dense {
+namespace {
+
+constexpr double kGate_m = 0.05;
+
+struct Scene {
+  explicit Scene(const synthetic::MapOptions& options) : truth(synthetic::MakeTrueMap(options)) {}
+
+  void Prepare() {
+    cells = MakeCells(truth.stated, truth.map);
+    sensor = MakeSensor(truth.stated, {});
+    views = MakeViews(sensor, {}, cells, truth.map);
+  }
+  [[nodiscard]] std::vector<QuadraticTerm> Terms(const std::vector<KeyframePair>& pairs,
+                                                 Density density) const {
+    std::vector<QuadraticTerm> terms;
+    MakeTerms(sensor, {.marker_length_m = synthetic::kMarkerLength}, truth.map, views, pairs,
+              kGate_m, density, {}, terms);
+    return terms;
+  }
+
+  synthetic::TrueMap truth;
+  Cells cells;
+  Sensor sensor;
+  std::vector<View> views;
+};
+
+// Information about the first twist of all terms.
+Eigen::Matrix<double, 6, 6> Information(const std::vector<QuadraticTerm>& terms) {
+  Eigen::Matrix<double, 6, 6> sum = Eigen::Matrix<double, 6, 6>::Zero();
+  for (const QuadraticTerm& term : terms) sum += term.H.topLeftCorner<6, 6>();
+  return sum;
+}
+
+TEST(DenseTerms, CoarseOnesWeighAsMuchAsFineOnes) {
+  Scene scene({.num_keyframes = 8, .num_landmarks = 40, .markers = false, .dense = true});
+  scene.Prepare();
+  const auto pairs = FindPairs(scene.sensor, {}, scene.views, {});
+  ASSERT_GT(pairs.size(), 16U);
+  const auto fine = Information(scene.Terms(pairs, Density::kFine));
+  const auto coarse = Information(scene.Terms(pairs, Density::kCoarse));
+  for (Eigen::Index i = 0; i < 6; ++i)
+    EXPECT_NEAR(coarse(i, i) / fine(i, i), 1.0, 0.1) << "unknown " << i;
+  EXPECT_NE(coarse, fine) << "the same cells were used";
+}
+
+TEST(DenseTerms, LeaveOutTheCellsThatAreHeldOut) {
+  // A view against itself: every cell is projected onto itself.
+  const std::vector<KeyframePair> itself(64, KeyframePair{1, 1, 1.0});
+  const auto weight_m2 = [&](bool of_held_out, Density density) {
+    Scene scene({.num_keyframes = 2, .num_landmarks = 40, .markers = false, .dense = true});
+    DenseView& view = scene.truth.map.keyframes[1].dense;
+    for (int r = 0; r < view.height; ++r)
+      for (int c = 0; c < view.width; ++c)
+        if ((r % 4 == 2 && c % 4 == 2) != of_held_out)
+          view.normals[static_cast<std::size_t>(r * view.width + c)].setZero();
+    scene.Prepare();
+    return Information(scene.Terms(itself, density)).trace();
+  };
+  for (const Density density : {Density::kFine, Density::kCoarse}) {
+    EXPECT_EQ(weight_m2(true, density), 0.0);
+    EXPECT_GT(weight_m2(false, density), 0.0) << "nothing is used: nothing is tested";
+  }
+}
+
+TEST(DenseTerms, AreTheSameInMemoryThatHeldOthers) {
+  Scene scene({.num_keyframes = 4, .num_landmarks = 40, .dense = true});
+  scene.Prepare();
+  const auto pairs = FindPairs(scene.sensor, {}, scene.views, {});
+  const auto fresh = scene.Terms(pairs, Density::kFine);
+  ASSERT_GT(fresh.size(), pairs.size()) << "no marker's face";
+  auto used = scene.Terms(pairs, Density::kCoarse);
+  used.resize(used.size() + 5, used.front());
+  MakeTerms(scene.sensor, {.marker_length_m = synthetic::kMarkerLength}, scene.truth.map,
+            scene.views, pairs, kGate_m, Density::kFine, {}, used);
+  ASSERT_EQ(used.size(), fresh.size());
+  for (std::size_t i = 0; i < fresh.size(); ++i) {
+    EXPECT_EQ(used[i].H, fresh[i].H);
+    EXPECT_EQ(used[i].g, fresh[i].g);
+    EXPECT_EQ(used[i].marker, fresh[i].marker);
+  }
+}
+
+}  // namespace
+}  // namespace plumb::dense
