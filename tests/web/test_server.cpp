@@ -2,8 +2,8 @@
 // in a browser. plumb_web_test_server FOLDER: makes scenes and results in FOLDER, prints its
 // address and "setup code: XXXX-XXXX", obeys lines on stdin: unplug, plug, fail (of the running
 // scan), nobackup (backups fail), overdue (no check has passed, references are blocked), checked,
-// slow (long sweeps), fast, swift (half a second from the start to the result), old (the last
-// result becomes 10 minutes old), quit; of what the next scan shows: markermoved (a check),
+// slow (long sweeps), fast, toil (long computing), swift (half a second from the start to the
+// result), old (the last result becomes 10 minutes old), quit; of what the next scan shows: markermoved (a check),
 // stranger (another body), shoulder (lifted), across (the body lies across the room's axes), "moved
 // AXIS AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by pitch, roll, yaw by
 // degrees); hole (in the region), shifted (one marker, by 12 mm), weak (roll is not well seen),
@@ -262,6 +262,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     service.sweep = std::chrono::milliseconds(300);
     service.work = std::chrono::milliseconds(200);
   }
+  if (name == "toil") service.work = std::chrono::milliseconds(60000);
   if (name == "nobackup") service.backup_fault = "no folder for backups is configured";
   if (name == "installed") {
     service.update.installing = false;
@@ -271,7 +272,9 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   }
   if (name == "rolledback") {
     service.update.restart_needed = false;
-    service.update.rolled_back = "The machine went back to the previous system, version 0.2.0.";
+    service.update.rolled_back =
+        "version 0.3.0 was installed, but the machine has gone back to the previous system, "
+        "0.2.0: the new one did not start or was not fit for work";
     service.status.rolled_back = service.update.rolled_back;
     service.Notify(web::EventKind::kUpdate);
     service.Notify(web::EventKind::kStatus);
@@ -417,6 +420,7 @@ int Serve(const fs::path& root, bool tls) {
   service.sweep = std::chrono::milliseconds(1500);
   service.profiles = KnownSensor();
   service.update.supported = true;
+  service.update.message = "";
   service.update.slot = "A";
   service.update.bundles = {"plumb-0.2.0.raucb"};
   web::HttpServerOptions options;

@@ -114,10 +114,12 @@ std::string NumberCells(const NumberRow& row, std::string_view name, const std::
                                         : Said(direction, words);
   const std::string shown =
       is_zero ? fmt::format("{:.{}f}", 0.0, digits) : fmt::format("{:+.{}f}", value, digits);
+  // A narrow window has no heads above the numbers: what a bare "±" means stands beside it.
   return fmt::format(
-      "<tr><th scope=\"row\">{}</th><td>{} {}</td><td>\xC2\xB1 {}</td><td>\xC2\xB1 {}</td>"
-      "<td>{}</td><td>{}</td></tr>",
-      name, Localized(shown, words), row.unit, Localized(fmt::format("{:.{}f}", u95, most), words),
+      "<tr><th scope=\"row\">{}</th><td>{} {}</td><td data-label=\"{}\">\xC2\xB1 {}</td>"
+      "<td data-label=\"{}\">\xC2\xB1 {}</td><td>{}</td><td>{}</td></tr>",
+      name, Localized(shown, words), row.unit, words.heads[2],
+      Localized(fmt::format("{:.{}f}", u95, most), words), words.heads[3],
       Localized(fmt::format("{:g}", tolerance), words),
       in       ? words.terms.within
       : unsure ? words.terms.not_surely

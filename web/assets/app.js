@@ -124,7 +124,8 @@ async function show() {
   } catch (error) {
     if (mine !== turn || !currentSession()) return;
     failed = true;
-    clear(place, h('p', { class: 'card' }, error.message));
+    clear(place, h('h1', { class: 'visually-hidden' }, S.nav[screen.parent ?? name]),
+      h('p', { class: 'card' }, error.message));
   }
 }
 
@@ -150,7 +151,8 @@ async function ask(question, text = S.offline) {
       } catch (error) {
         if (error.status > 0 && error.status < 500) throw error;
         top.hidden = true;
-        clear(main, h('p', { class: 'card' }, error.status ? error.message : text));
+        clear(main, h('h1', { class: 'visually-hidden' }, S.product),
+          h('p', { class: 'card' }, error.status ? error.message : text));
         await new Promise((ready) => { setTimeout(ready, kAskAgain_ms); });
       }
     }
@@ -304,5 +306,8 @@ if (location.pathname === '/room') {
     .catch(report);
 } else {
   listen();
+  // What is said before anybody answers is in the language of who is about to log in.
+  speak('login');
+  applyTheme('login');
   begin().catch(report);
 }

@@ -27,7 +27,8 @@ async function pair(main, logIn) {
   for (;;) {
     const asked = await fetch('/api/v1/displays/pair', { method: 'POST' }).catch(() => null);
     if (!asked?.ok) {
-      clear(main, h('p', { class: 'card' }, S.noAnswer));
+      clear(main, h('h1', { class: 'visually-hidden' }, S.room.title),
+        h('p', { class: 'card' }, S.noAnswer));
       await wait(2 * kAsk_ms);
       continue;
     }
@@ -73,9 +74,9 @@ function top(status, said) {
         : text.warming(Math.floor(sensor.powered_s / 60), minutesOf(sensor.warm_up_s)))));
 }
 
-/// Short words are 10 cm high on a screen of 40 inches; long ones take the width that there is.
-const word = (text, tone) =>
-  h('p', { class: `room-word ${tone}${text.length > 9 ? ' long' : ''}` }, text);
+/// Short words are 10 cm high on a screen of 40 inches; others take the width that there is.
+const sizeOf = (text) => (text.length > 9 ? ' long' : text.length > 7 ? ' wide' : '');
+const word = (text, tone) => h('p', { class: `room-word ${tone}${sizeOf(text)}` }, text);
 
 /// How much of the region was seen; where that cannot be known, whether new surface comes in.
 function coverageWords(scan) {
@@ -338,7 +339,8 @@ export async function showRoom(main, { speak, applyTheme }) {
       await pair(main, () => showLogin(main, false, () => location.reload()));
       break;
     } catch {
-      clear(main, h('p', { class: 'card' }, S.offline));
+      clear(main, h('h1', { class: 'visually-hidden' }, S.room.title),
+        h('p', { class: 'card' }, S.offline));
       await wait(kAsk_ms);
     }
   }

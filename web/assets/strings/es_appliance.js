@@ -198,7 +198,18 @@ export const kPatterns = [
   'el seguimiento se perdió durante $1 s en el escaneo ($2), o no llegó ninguna imagen; barra de '
     + 'nuevo, más despacio'],
   ['^(\\w+) was not measured$', '$1: no se midió'],
-  ['^(\\w+) is not well determined: ±([\\d.e-]+) (\\w+) at 95 %, the tolerance is '
+  // Why a result is in tolerance, unsure or a move: its numbers, one after the other.
+  ['^every value and its uncertainty lie within ([\\d.]+) mm and ([\\d.]+) deg$',
+    'todos los valores y su incertidumbre quedan dentro de $1 mm y $2°'],
+  ['^outside ([\\d.]+) mm and ([\\d.]+) deg: (.+)$', 'fuera de $1 mm y $2°: $3'],
+  ['^not surely within ([\\d.]+) mm and ([\\d.]+) deg: (.+)$',
+    'no con seguridad dentro de $1 mm y $2°: $3'],
+  ['^(\\w+ [+-][\\d.]+ [^,]+(?:, facing the gantry\\))?), (\\w+ [+-][\\d.]+ .+)$', '$1, $2'],
+  ['^(vertical|longitudinal|lateral|pitch|roll|yaw) ([+-][\\d.]+) (mm|deg) \\((.*)\\)$',
+    '$1 $2 $3 ($4)'],
+  ['^(vertical|longitudinal|lateral|pitch|roll|yaw) ([+-][\\d.]+) ±([\\d.]+) (mm|deg)$',
+    '$1 $2 ±$3 $4'],
+  ['^(\\w+) is not well determined: ±([\\d.e+-]+) (\\w+) at 95 %, the tolerance is '
     + '([\\d.]+) (\\w+)$',
     '$1: no está bien determinado, ±$2 $3 al 95 %; la tolerancia es $4 $5'],
   ['^scan needs at least (\\d+) markers shared with the reference, found (\\d+)(?: \\(ids? '

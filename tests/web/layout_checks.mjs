@@ -1,0 +1,137 @@
+// What can be wrong with a screen that is drawn, found by measuring it in the browser; and which
+// words a Spanish screen must not show.
+
+/// What differs between the catalogues: whole English texts, and the pieces of those that are filled
+/// in. Words that are also Spanish are left out.
+export function englishTexts(en, es) {
+  const leaves = (of) => Object.entries(of).flatMap(([key, value]) =>
+    (key === 'languageName' || key === 'translate' ? []
+      : typeof value === 'object' ? leaves(value) : [value]));
+  const spanish = leaves(es).map(String);
+  const all = new Set(spanish);
+  const texts = leaves(en).filter((one) => typeof one === 'string');
+  // Of a function the quoted parts, without what is filled in.
+  const pieces = leaves(en).filter((one) => typeof one === 'function').flatMap((one) =>
+    [...`${one}`.matchAll(/'([^']*)'|`([^`]*)`/g)].flatMap(([, a, b]) => (a ?? b).split(/\$\{[^}]*\}/)));
+  const isTelling = (text) => /[a-z]{2,} [a-z]{2,}/i.test(text) && !spanish.some((one) => one.includes(text));
+  return {
+    whole: texts.filter((text) => /[a-z]{2}/i.test(text) && !all.has(text)),
+    parts: [...texts, ...pieces].map((text) => text.trim()).filter(isTelling),
+  };
+}
+
+/// Runs in the page. Returns what is wrong, each with its kind in front.
+/// @param touched  By fingers: controls need 24 px.
+/// @param english  What englishTexts() found, on a Spanish screen; else null.
+export function faultsOfLayout({ touched, english }) {
+  const found = new Set();
+  const shorten = (text) => text.trim().replace(/\s+/g, ' ').slice(0, 60);
+  const nameOf = (element) => `${element.tagName.toLowerCase()}${[...element.classList].map((one) => `.${one}`).join('')} “${shorten(element.textContent || element.getAttribute('aria-label') || element.id)}”`;
+  const add = (kind, element, more = '') => found.add(`${kind}: ${nameOf(element)}${more}`);
+  const px = (value) => `${Math.round(value)} px`;
+  window.scrollTo(0, 0);
+  const { clientWidth, clientHeight, scrollWidth } = document.documentElement;
+  if (scrollWidth > clientWidth) found.add(`sideways: the document is ${scrollWidth - clientWidth} px too wide`);
+
+  // A modal dialog covers what is behind it; what floats for some seconds may do so, too.
+  const scope = document.querySelector('dialog:modal') ?? document.body;
+  // Where nobody can scroll all of it is in view.
+  const neverScrolls = getComputedStyle(document.body).overflowY === 'hidden';
+  const kUnseen = '.visually-hidden, .skip:not(:focus), .toast, noscript, script, style';
+  const isShown = (element) => element.checkVisibility({ visibilityProperty: true }) && !element.closest(kUnseen);
+  const kControls = 'a[href], button, input:not([type=hidden]), select, textarea, summary';
+  const controls = [...scope.querySelectorAll(kControls)].filter(isShown);
+  const texts = [];
+  for (const walker = document.createTreeWalker(scope, NodeFilter.SHOW_TEXT); walker.nextNode();) {
+    const { currentNode: node } = walker;
+    const owner = node.parentElement;
+    if (!node.data.trim() || !isShown(owner)) continue;
+    const range = document.createRange();
+    range.selectNodeContents(node);
+    const boxes = [...range.getClientRects()].filter(({ width, height }) => width > 0 && height > 0);
+    if (boxes.length || owner.tagName === 'OPTION') texts.push({ node, owner, boxes, text: shorten(node.data) });
+  }
+
+  // Nothing lies out of view, and nothing is cut off by what it stands in.
+  const kTolerance_px = 1.5;
+  const styles = new Map();
+  const styleOf = (element) => styles.get(element) ?? styles.set(element, getComputedStyle(element)).get(element);
+  const judge = (box, owner, text) => {
+    const tell = (kind, by) => found.add(`${kind}: ${nameOf(owner)}${text ? '' : ' (control)'}${by}`);
+    if (box.right > clientWidth + kTolerance_px || box.left < -kTolerance_px) tell('out of view', `, ${px(box.left)} to ${px(box.right)} of ${clientWidth}`);
+    if (neverScrolls && box.bottom > clientHeight + kTolerance_px) tell('out of view', `, down to ${px(box.bottom)} of ${clientHeight}`);
+    for (let around = text ? owner : owner.parentElement; around && around !== document.body; around = around.parentElement) {
+      const style = styleOf(around);
+      const frame = around.getBoundingClientRect();
+      const wide = Math.max(box.right - frame.right, frame.left - box.left);
+      const tall = Math.max(box.bottom - frame.bottom, frame.top - box.top);
+      // A line's box is higher than its letters.
+      const slack = text ? 0.25 * box.height : kTolerance_px;
+      if (style.overflowX !== 'visible' && wide > kTolerance_px) tell('cut off', ` at the side, by ${px(wide)} of ${nameOf(around)}`);
+      if (['hidden', 'clip'].includes(style.overflowY) && tall > slack) tell('cut off', ` above or below, by ${px(tall)} of ${nameOf(around)}`);
+      const painted = style.display !== 'inline' && (style.borderTopWidth !== '0px' || !/, 0\)$|transparent/.test(style.backgroundColor));
+      if (painted && (wide > kTolerance_px || tall > slack)) tell('sticks out', ` by ${px(Math.max(wide, tall))} of ${nameOf(around)}`);
+    }
+  };
+  for (const { owner, boxes } of texts) for (const box of boxes) judge(box, owner, true);
+  for (const control of controls) judge(control.getBoundingClientRect(), control, false);
+
+  // What is written in a field, or chosen in a list, fits into it.
+  const ruler = document.createElement('canvas').getContext('2d');
+  for (const control of controls.filter(({ tagName }) => ['INPUT', 'SELECT'].includes(tagName))) {
+    const style = styleOf(control);
+    const written = control.tagName === 'SELECT' ? control.selectedOptions[0]?.text ?? ''
+      : ['checkbox', 'radio', 'range', 'file', 'password'].includes(control.type) ? '' : control.value || control.placeholder;
+    ruler.font = style.font;
+    ruler.letterSpacing = style.letterSpacing;
+    const room = control.clientWidth - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight) - (control.tagName === 'SELECT' ? 16 : 0);
+    const needed = ruler.measureText(written).width;
+    if (needed > room + kTolerance_px) add('cut off', control, `: “${written}” needs ${px(needed)} of ${px(room)}`);
+  }
+
+  // No two things lie on each other. The marks on a picture belong on it.
+  const things = [
+    ...texts.flatMap(({ owner, boxes }) => boxes.map((box) => ({ owner, box, isText: true }))),
+    ...controls.map((owner) => ({ owner, box: owner.getBoundingClientRect(), isText: false })),
+  ];
+  things.forEach((a, i) => {
+    for (const b of things.slice(i + 1)) {
+      const wide = Math.min(a.box.right, b.box.right) - Math.max(a.box.left, b.box.left);
+      const tall = Math.min(a.box.bottom, b.box.bottom) - Math.max(a.box.top, b.box.top);
+      if (wide < 2 || tall < 2 || a.owner === b.owner || a.owner.contains(b.owner) || b.owner.contains(a.owner)) continue;
+      if (a.isText && b.isText && tall < 0.3 * Math.min(a.box.height, b.box.height)) continue;
+      found.add(`overlap: ${nameOf(a.owner)} and ${nameOf(b.owner)}, ${px(wide)} by ${px(tall)}`);
+    }
+  });
+
+  // What is read first on a phone is there without scrolling, below what forbids to act on it.
+  const value = document.querySelector('.result .number .value');
+  const end = value?.getBoundingClientRect().bottom ?? 0;
+  if (touched && end > 0.65 * clientHeight) add('far down', value, `: it ends at ${px(end)} of ${clientHeight}`);
+
+  // WCAG 2.2, 2.5.8: 24 px, but for links within a sentence. A box is touched by its label, too.
+  const isInSentence = (link) => link.tagName === 'A' && styleOf(link).display === 'inline'
+    && [...link.parentElement.childNodes].some((one) => one !== link && one.textContent.trim());
+  for (const control of touched ? controls : []) {
+    if (isInSentence(control)) continue;
+    const { width, height } = (control.closest('label') ?? control).getBoundingClientRect();
+    if (width < 24 || height < 24) add('small', control, `, ${px(width)} x ${px(height)}`);
+  }
+
+  // Every text is a text of the page's language: no key, no gap that was not filled, no English.
+  const kInvisible = ['aria-label', 'alt', 'placeholder', 'title'];
+  const said = [...texts.map(({ node, owner }) => [node.data, owner]),
+    ...[...scope.querySelectorAll(kInvisible.map((one) => `[${one}]`).join())].filter((one) => one.checkVisibility())
+      .flatMap((one) => kInvisible.filter((name) => one.hasAttribute(name)).map((name) => [one.getAttribute(name), one]))];
+  const whole = new Set(english?.whole);
+  for (const [raw, owner] of said) {
+    const text = raw.trim().replace(/\s+/g, ' ');
+    if (/\{\w*\}|\$\{|\bundefined\b|\bNaN\b|\bnull\b|\bInfinity\b|\[object |=>/.test(text)) add('raw', owner, `: ${shorten(text)}`);
+    const isQuoted = owner.closest('code, [lang=en], .bundle');
+    if (!isQuoted && (/^[a-z]+(_[a-z]+)+$/.test(text) || /^[a-z]+[A-Z][A-Za-z]+$/.test(text))) add('raw', owner, `: ${text}`);
+    if (!english || isQuoted) continue;
+    if (whole.has(text) || english.parts.some((part) => text.includes(part))
+      || /\b(the|of|and|is|are|was|were|with|this|not|by|for|from|to|it)\b/i.test(text)) add('English', owner, `: ${shorten(text)}`);
+  }
+  return [...found];
+}
