@@ -66,6 +66,12 @@ void JudgeTracking(const Evidence& evidence, const AcceptanceLimits& limits, Rea
   judge(evidence.current_lost_s, "current");
 }
 
+// As many as the other texts show, and none where they would say nothing.
+int Decimals(double u95, std::size_t i) {
+  if (!(u95 < 100.0)) return 0;
+  return IsShift(i) ? 1 : 2;
+}
+
 void JudgeUncertainty(const Evidence& evidence, const AcceptanceLimits& limits, Reasons& reasons) {
   for (std::size_t i = 0; i < evidence.numbers.size(); ++i) {
     const std::optional<MeasuredNumber>& number = evidence.numbers[i];
@@ -77,8 +83,9 @@ void JudgeUncertainty(const Evidence& evidence, const AcceptanceLimits& limits, 
       reasons.push_back(fmt::format("{} was not measured", kNumberNames[i]));
     } else if (!(number->u95 >= 0 && number->u95 <= ToleranceOf(limits, i))) {
       reasons.push_back(fmt::format(
-          "{} is not well determined: \u00b1{:.2g} {} at 95 %, the tolerance is {:g} {}",
-          kNumberNames[i], number->u95, UnitOf(i), ToleranceOf(limits, i), UnitOf(i)));
+          "{} is not well determined: \u00b1{:.{}f} {} at 95 %, the tolerance is {:g} {}",
+          kNumberNames[i], number->u95, Decimals(number->u95, i), UnitOf(i), ToleranceOf(limits, i),
+          UnitOf(i)));
     }
   }
 }

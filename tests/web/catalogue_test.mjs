@@ -102,8 +102,8 @@ for (const [text, expected] of [
     'el escaneo actual cubre el 81,5 % de la región y se necesita al menos el 90 %; bárrala toda'],
   ['pitch is not well determined: ±1.4 deg at 95 %, the tolerance is 1 deg',
     'cabeceo: no está bien determinado, ±1,4 ° al 95 %; la tolerancia es 1 °'],
-  ['lateral is not well determined: ±2.6e+02 mm at 95 %, the tolerance is 3 mm',
-    'lateral: no está bien determinado, ±2.6e+02 mm al 95 %; la tolerancia es 3 mm'],
+  ['lateral is not well determined: ±263 mm at 95 %, the tolerance is 3 mm',
+    'lateral: no está bien determinado, ±263 mm al 95 %; la tolerancia es 3 mm'],
   ['every value and its uncertainty lie within 3 mm and 1.5 deg',
     'todos los valores y su incertidumbre quedan dentro de 3 mm y 1,5°'],
   ['outside 3 mm and 1 deg: vertical -8.0 mm (down), lateral +12.4 mm (to the left, facing the '

@@ -158,6 +158,20 @@ TEST(AcceptanceTest, EveryValueAtItsTolerance) {
   }
 }
 
+TEST(AcceptanceTest, AnUncertaintyIsWrittenWithoutAnExponent) {
+  const auto reason = [](std::size_t i, double u95) {
+    Evidence wide = GoodEvidence();
+    wide.numbers[i]->u95 = u95;
+    return Decide(wide, {}).reasons.at(0);
+  };
+  EXPECT_EQ(reason(2, 263.2),
+            "lateral is not well determined: \u00b1263 mm at 95 %, the tolerance is 3 mm");
+  EXPECT_EQ(reason(2, 99.94),
+            "lateral is not well determined: \u00b199.9 mm at 95 %, the tolerance is 3 mm");
+  EXPECT_EQ(reason(3, 1.04),
+            "pitch is not well determined: \u00b11.04 deg at 95 %, the tolerance is 1 deg");
+}
+
 TEST(AcceptanceTest, ReasonsNameTheValuesThatDecide) {
   Evidence evidence = GoodEvidence();
   evidence.numbers[1] = MeasuredNumber{-2.9, 0.25, "away from gantry"};
