@@ -3,13 +3,13 @@
 // address and "setup code: XXXX-XXXX", obeys lines on stdin: unplug, plug, fail (of the running
 // scan), nobackup (backups fail), overdue (no check has passed, references are blocked), checked,
 // slow (long sweeps), fast, toil (long computing), swift (half a second from the start to the
-// result), old (the last result becomes 10 minutes old), quit; of what the next scan shows: markermoved (a check),
-// stranger (another body), shoulder (lifted), across (the body lies across the room's axes), "moved
-// AXIS AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by pitch, roll, yaw by
-// degrees); hole (in the region), shifted (one marker, by 12 mm), weak (roll is not well seen),
-// hurried (a third of the frames lost); "room known", "room unknown": what the status says; "moved
-// z 8 HFS bare": as compared where the room is not known; cold, warm (the sensor); full, emptied
-// (the disk).
+// result), old (the last result becomes 10 minutes old), quit; of what the next scan shows:
+// markermoved (a check), stranger (another body), shoulder (lifted), across (the body lies across
+// the room's axes), "moved AXIS AMOUNT POSTURE" (the body moved along x, y, z by mm or turned by
+// pitch, roll, yaw by degrees); hole (in the region), shifted (one marker, by 12 mm), weak (roll is
+// not well seen), hurried (a third of the frames lost); "room known", "room unknown": what the
+// status says; "moved z 8 HFS bare": as compared where the room is not known; cold, warm (the
+// sensor); full, emptied (the disk).
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
