@@ -258,7 +258,11 @@ await h.step('the history, the reports and the log tell the day in the words tha
   equal(await on('Reference approved'), 'PX-0100, reference version 1', 'the approval');
   equal(await on('Session opened'), 'PX-0100, Fraction 3', 'the newest session');
   equal(await on('Scan accepted'), `PX-0100, scan ${scans[0].id}`, 'the newest accept');
-  equal(await on('Scan started'), 'PX-0100, Fraction 1', 'the only fraction that was started on the page');
+  equal(await on('Scan started'), 'PX-0100, Fraction 3', 'the newest scan');
+  const started = await clara.locator('tbody tr', { has: clara.getByRole('cell', { name: 'Scan started', exact: true }) })
+    .allInnerTexts();
+  check(/the control socket/.test(started[0]), `the press on the control socket: ${started[0]}`);
+  check(started.some((row) => /\banna\b.*PX-0100, Fraction 1/s.test(row)), `the first on the page: ${started.join(' | ')}`);
   equal(await on('Patient added'), 'PX-0100', 'the patient');
   equal(await on('Screen paired'), 'couch side', 'the screen');
   check(/^check of /.test(await on('Baseline set')), `the check: ${await on('Baseline set')}`);
