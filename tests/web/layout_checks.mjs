@@ -35,7 +35,7 @@ export function faultsOfLayout({ touched, english }) {
 
   // A modal dialog covers what is behind it; what floats for some seconds may do so, too.
   const scope = document.querySelector('dialog:modal') ?? document.body;
-  // Where nobody can scroll all of it is in view.
+  // A page that cannot be scrolled must fit into the window as a whole.
   const neverScrolls = getComputedStyle(document.body).overflowY === 'hidden';
   const kUnseen = '.visually-hidden, .skip:not(:focus), .toast, noscript, script, style';
   const isShown = (element) => element.checkVisibility({ visibilityProperty: true }) && !element.closest(kUnseen);

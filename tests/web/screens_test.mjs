@@ -104,7 +104,8 @@ async function setTheme(page, theme, printed) {
 }
 
 let who = {};
-/// Where the page is the same for all languages, it is told which one; else it is loaded again.
+/// Opens a screen in a language. If its address does not contain the language, the page is told to
+/// change it; otherwise the address for that language is loaded.
 async function show(page, one, language) {
   if (page.url() === 'about:blank') await page.goto(h.url);
   await page.evaluate(([name, wanted]) => localStorage.setItem(`plumb-language-${name}`, wanted), [one.account ?? one.who, language]);
