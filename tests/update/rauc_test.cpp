@@ -8,10 +8,8 @@
 
 #include <cstdlib>
 #include <fstream>
-#include <future>
 #include <iterator>
 #include <memory>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,6 +18,7 @@
 #include "daemon/update/updater.hpp"
 #include "tests/support/private_bus.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/support/updater_on_loop.hpp"
 
 extern char** environ;
 
@@ -80,7 +79,7 @@ std::string WhyNotHere() {
   return {};
 }
 
-class RaucTest : public ::testing::Test {
+class RaucTest : public testing::UpdaterOnLoop {
  protected:
   static void SetUpTestSuite() {
     if (!WhyNotHere().empty()) return;
@@ -167,58 +166,20 @@ class RaucTest : public ::testing::Test {
                                 }});
     });
   }
-  /// The loop has the main thread.
   void Play(const std::function<void()>& test) {
-    std::jthread player([&] {
+    RunBesideLoop([&] {
       MakeUpdater();
       if (Becomes([&] { return StatusNow().supported; })) {
         test();
       } else {
         ADD_FAILURE() << "RAUC does not answer";
       }
-      On([this] { updater_.reset(); });
-      loop_.Quit(0);
     });
-    loop_.Run();
-  }
-  void On(const std::function<void()>& work) {
-    std::promise<void> done;
-    loop_.Post("test", [&] {
-      work();
-      done.set_value();
-    });
-    done.get_future().wait();
-  }
-  [[nodiscard]] web::UpdateStatus StatusNow() {
-    web::UpdateStatus status;
-    On([&] { status = updater_->status(); });
-    return status;
-  }
-  [[nodiscard]] static bool Becomes(const std::function<bool()>& holds) {
-    const auto until = EventLoop::Clock::now() + std::chrono::seconds(60);
-    while (!holds()) {
-      if (EventLoop::Clock::now() > until) return false;
-      ::usleep(5000);
-    }
-    return true;
-  }
-  web::Change Install(const std::string& name) {
-    auto answer = std::make_shared<std::promise<web::Change>>();
-    On([&] {
-      updater_->Install(name + ".raucb",
-                        [answer](const web::Change& change) { answer->set_value(change); });
-    });
-    auto future = answer->get_future();
-    if (future.wait_for(std::chrono::seconds(60)) != std::future_status::ready) {
-      ADD_FAILURE() << "no answer";
-      return {};
-    }
-    return future.get();
   }
   /// Also waits for its end. Gives why it failed, or nothing.
   std::string InstallToTheEnd(const std::string& name) {
     const int before = num_ended_;
-    const web::Change change = Install(name);
+    const web::Change change = Install(name + ".raucb");
     if (change.result != ChangeResult::kDone) return change.message;
     if (!Becomes([&] { return num_ended_ > before; })) return "it does not end";
     return failure_;
@@ -238,11 +199,9 @@ class RaucTest : public ::testing::Test {
   }
 
   static inline std::unique_ptr<TempFolder> made_;
-  EventLoop loop_;  // first: blocks signals before any thread starts
   TempFolder folder_;
   std::unique_ptr<testing::PrivateBus> bus_;
   std::unique_ptr<Child> rauc_;
-  std::unique_ptr<Updater> updater_;
   std::atomic<int> num_ended_{0};
   std::string failure_;
 };

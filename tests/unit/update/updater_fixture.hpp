@@ -1,28 +1,25 @@
 // The updater on its loop, with a RAUC that does what a test says.
 #pragma once
 
-#include <unistd.h>
-
 #include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <future>
 #include <memory>
 #include <string>
-#include <thread>
 
 #include <gtest/gtest.h>
 
 #include "daemon/update/updater.hpp"
 #include "tests/support/private_bus.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/support/updater_on_loop.hpp"
 #include "tests/unit/update/fake_rauc.hpp"
 
 namespace plumb::testing {
 
-class UpdaterTest : public ::testing::Test {
+class UpdaterTest : public UpdaterOnLoop {
  protected:
   UpdaterTest() {
     std::filesystem::create_directories(folder_ / "updates");
@@ -38,35 +35,14 @@ class UpdaterTest : public ::testing::Test {
     std::ofstream(folder_ / "updates" / name, std::ios::binary) << text;
   }
 
-  /// Runs the test beside the loop, which has the main thread; a loop that has ended does not begin
-  /// again.
-  void Play(const std::function<void()>& test) {
-    std::jthread player([&] {
-      test();
-      On([this] { updater_.reset(); });
-      loop_.Quit(0);
-    });
-    loop_.Run();
-  }
-
-  /// The same with a RAUC on the bus that the updater has found.
+  /// Runs the test beside the loop, with a RAUC on the bus that the updater has found.
   void PlayWithRauc(const std::function<void(FakeRauc&)>& test) {
-    Play([&] {
+    RunBesideLoop([&] {
       FakeRauc rauc(bus_.address());
       Start();
       WaitForRauc();
       test(rauc);
     });
-  }
-
-  /// On the loop's thread; waits for it.
-  void On(const std::function<void()>& work) {
-    std::promise<void> done;
-    loop_.Post("test", [&] {
-      work();
-      done.set_value();
-    });
-    done.get_future().wait();
   }
 
   void Start() {
@@ -94,47 +70,18 @@ class UpdaterTest : public ::testing::Test {
     });
   }
 
-  [[nodiscard]] web::UpdateStatus StatusNow() {
-    web::UpdateStatus status;
-    On([&] { status = updater_->status(); });
-    return status;
-  }
   [[nodiscard]] std::string Ended() {
     std::string ended;
     On([&] { ended = ended_; });
     return ended;
   }
 
-  /// False if it does not come to that within half a minute.
-  [[nodiscard]] static bool Becomes(const std::function<bool()>& holds) {
-    const auto until = EventLoop::Clock::now() + std::chrono::seconds(30);
-    while (!holds()) {
-      if (EventLoop::Clock::now() > until) return false;
-      ::usleep(2000);
-    }
-    return true;
-  }
   void WaitForRauc() {
     ASSERT_TRUE(Becomes([&] { return StatusNow().supported; }));
   }
 
-  web::Change Install(const std::string& name) {
-    auto answer = std::make_shared<std::promise<web::Change>>();
-    On([&] {
-      updater_->Install(name, [answer](const web::Change& change) { answer->set_value(change); });
-    });
-    auto future = answer->get_future();
-    if (future.wait_for(std::chrono::seconds(30)) != std::future_status::ready) {
-      ADD_FAILURE() << "no answer";
-      return {};
-    }
-    return future.get();
-  }
-
-  EventLoop loop_;  // first: blocks signals before any thread starts
   TempFolder folder_;
   PrivateBus bus_{folder_.path()};
-  std::unique_ptr<Updater> updater_;
   int num_changes_ = 0;
   std::string blocking_reason_;
   std::string ended_, roll_backs_;

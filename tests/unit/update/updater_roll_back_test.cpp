@@ -37,7 +37,7 @@ class RollBackTest : public UpdaterTest {
 };
 
 TEST_F(RollBackTest, TheSameStartStillNeedsItsRestart) {
-  Play([&] {
+  RunBesideLoop([&] {
     InstallAndEnd();
     StartAs("first");
     EXPECT_TRUE(StatusNow().restart_needed);
@@ -47,7 +47,7 @@ TEST_F(RollBackTest, TheSameStartStillNeedsItsRestart) {
 }
 
 TEST_F(RollBackTest, AMachineThatStartsTheSystemBeforeSaysSoUntilSomebodyHasSeenIt) {
-  Play([&] {
+  RunBesideLoop([&] {
     InstallAndEnd();
     StartAs("second");
     EXPECT_FALSE(StatusNow().restart_needed);
@@ -66,7 +66,7 @@ TEST_F(RollBackTest, AMachineThatStartsTheSystemBeforeSaysSoUntilSomebodyHasSeen
 }
 
 TEST_F(RollBackTest, AMachineThatStartsTheNewSystemHasNothingToSay) {
-  Play([&] {
+  RunBesideLoop([&] {
     InstallAndEnd();
     rauc_->slot = "B";
     StartAs("second");

@@ -23,7 +23,7 @@ using testing::UpdaterTest;
 using web::ChangeResult;
 
 TEST_F(UpdaterTest, WithoutABusItSaysThatThereIsNoInstaller) {
-  Play([&] {
+  RunBesideLoop([&] {
     bus_.Stop();
     Start();
     EXPECT_FALSE(StatusNow().supported);
@@ -33,7 +33,7 @@ TEST_F(UpdaterTest, WithoutABusItSaysThatThereIsNoInstaller) {
 }
 
 TEST_F(UpdaterTest, ABusWithoutRaucIsTheSame) {
-  Play([&] {
+  RunBesideLoop([&] {
     Start();
     ::usleep(200000);  // for an answer that does not come: the status must hold
     EXPECT_FALSE(StatusNow().supported);
@@ -60,7 +60,7 @@ TEST_F(UpdaterTest, AGoodBundleIsInstalledWithProgress) {
 }
 
 TEST_F(UpdaterTest, ABundleOfAStrangersKeyIsRefusedInRaucsWords) {
-  Play([&] {
+  RunBesideLoop([&] {
     FakeRauc rauc(bus_.address());
     rauc.refuses_signature = true;
     Start();
@@ -76,7 +76,7 @@ TEST_F(UpdaterTest, ABundleOfAStrangersKeyIsRefusedInRaucsWords) {
 }
 
 TEST_F(UpdaterTest, AnOlderVersionIsRefused) {
-  Play([&] {
+  RunBesideLoop([&] {
     FakeRauc rauc(bus_.address());
     rauc.version = "0.0.9";
     Start();
@@ -98,7 +98,7 @@ TEST_F(UpdaterTest, AScanThatBeganWhileTheBundleWasLookedAtGoesFirst) {
 }
 
 TEST_F(UpdaterTest, AFailureInTheMiddleIsSaid) {
-  Play([&] {
+  RunBesideLoop([&] {
     FakeRauc rauc(bus_.address());
     rauc.fails = true;
     Start();
@@ -122,7 +122,7 @@ TEST_F(UpdaterTest, ABusThatGoesAwayEndsTheInstallation) {
 }
 
 TEST_F(UpdaterTest, AnInstallerThatDiesInTheMiddleEndsTheInstallation) {
-  Play([&] {
+  RunBesideLoop([&] {
     auto rauc = std::make_unique<FakeRauc>(bus_.address());
     Start();
     WaitForRauc();
@@ -139,7 +139,7 @@ TEST_F(UpdaterTest, AnInstallerThatDiesInTheMiddleEndsTheInstallation) {
 }
 
 TEST_F(UpdaterTest, OnlyBundlesOfTheFolderAreKnown) {
-  Play([&] {
+  RunBesideLoop([&] {
     FakeRauc rauc(bus_.address());
     WriteBundle(".hidden.raucb");
     WriteBundle("notes.txt");

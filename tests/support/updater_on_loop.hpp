@@ -1,0 +1,77 @@
+// An updater on its loop, asked from the thread of a test.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <future>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "daemon/update/updater.hpp"
+
+namespace plumb::testing {
+
+/// Base of the tests of the updater, whatever RAUC it speaks to. The loop has the main thread.
+class UpdaterOnLoop : public ::testing::Test {
+ protected:
+  /// Runs the test beside the loop. A loop that has ended does not begin again.
+  void RunBesideLoop(const std::function<void()>& test) {
+    std::jthread player([&] {
+      test();
+      On([this] { updater_.reset(); });
+      loop_.Quit(0);
+    });
+    loop_.Run();
+  }
+
+  /// On the loop's thread; waits for it.
+  void On(const std::function<void()>& work) {
+    std::promise<void> done;
+    loop_.Post("test", [&] {
+      work();
+      done.set_value();
+    });
+    done.get_future().wait();
+  }
+
+  [[nodiscard]] web::UpdateStatus StatusNow() {
+    web::UpdateStatus status;
+    On([&] { status = updater_->status(); });
+    return status;
+  }
+
+  /// False if it does not come to that within a minute.
+  [[nodiscard]] static bool Becomes(const std::function<bool()>& holds) {
+    const auto until = EventLoop::Clock::now() + kPatience;
+    while (!holds()) {
+      if (EventLoop::Clock::now() > until) return false;
+      std::this_thread::sleep_for(
+          std::chrono::milliseconds(2));  // leaves the processor to the loop
+    }
+    return true;
+  }
+
+  /// @param file  Name of a bundle in the updater's folder.
+  web::Change Install(const std::string& file) {
+    auto answer = std::make_shared<std::promise<web::Change>>();
+    On([&] {
+      updater_->Install(file, [answer](const web::Change& change) { answer->set_value(change); });
+    });
+    auto future = answer->get_future();
+    if (future.wait_for(kPatience) != std::future_status::ready) {
+      ADD_FAILURE() << "no answer";
+      return {};
+    }
+    return future.get();
+  }
+
+  static constexpr std::chrono::seconds kPatience{60};
+
+  EventLoop loop_;  // first: blocks signals before any thread starts
+  std::unique_ptr<Updater> updater_;
+};
+
+}  // namespace plumb::testing
