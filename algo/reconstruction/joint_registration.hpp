@@ -16,7 +16,7 @@ struct JointRegistrationOptions {
   bool calibrate = true;         ///< Estimate the sensor's calibration together with the poses.
   bool use_depth_field = true;   ///< False: without the terms from kDepthField on.
   bool use_dense = true;         ///< False: keypoints and markers only.
-  int num_rounds = 5;            ///< Largest number of dense rounds; at least two are made.
+  int num_rounds = 5;            ///< Largest number of dense rounds, the coarse one included.
   /// Largest point-to-plane residual of the first round; multiplied by 0.6 in each round.
   double max_gate_m = 0.06;
   double min_gate_m = 0.012;
