@@ -9,6 +9,8 @@ const kSkip = 77;
 const kPassword = 'correct horse battery';
 const kFirstPassword = 'first horse of the day';  // that an engineer gives a new account
 const kPatience_ms = 30000;
+/// Pictures are for people; drawing them takes as long as a third of all else.
+const keepsPictures = process.env.PLUMB_PICTURES === '1';
 // Every size is in screens_test.mjs; painting a larger window would only take the others longer.
 const kSize = { width: 1280, height: 800 };
 
@@ -16,7 +18,7 @@ export class Harness {
   /// @param command  Of the server, with its arguments; it names its address and the setup code on stdout or stderr. FOLDER is replaced.
   static async start({ modules, command, folder, chromium }) {
     if (!chromium || !existsSync(chromium)) {
-      console.log('skipped: no chromium (Debian package chromium)');
+      console.log('skipped: no browser (Debian package chromium-headless-shell)');
       // Continuous integration has everything: there a test that is left out counts as failed.
       process.exit(/^(0?)$/.test(process.env.PLUMB_REQUIRE_ALL ?? '') ? kSkip : 1);
     }
@@ -180,10 +182,14 @@ export class Harness {
     }
   }
 
-  /// Keeps a picture of the screen and lets axe look at it: to be left out where screens_test.mjs has
-  /// the same.
+  /// With PLUMB_PICTURES=1, where somebody wants to look at them.
+  async picture(page, name, { fullPage = true } = {}) {
+    if (keepsPictures) await page.screenshot({ path: this.file(name), fullPage, timeout: 90000 });
+  }
+
+  /// A picture of the screen; and axe looks at it: to be left out where screens_test.mjs has the same.
   async look(page, name, { axe = true, fullPage = true } = {}) {
-    await page.screenshot({ path: this.file(`${name}.png`), fullPage, timeout: 90000 });
+    await this.picture(page, `${name}.png`, { fullPage });
     if (!axe) return;
     // Through the debugger, not as a script element: the page's policy stays in force.
     if (!await page.evaluate(() => 'axe' in window)) await page.evaluate(this.axe);

@@ -782,7 +782,7 @@ await h.step('without script the last result is shown, without WebGL the picture
   await plain.getByRole('button', { name: 'Log in' }).click();
   await plain.getByText('NO ANSWER').waitFor();
   check((await plain.getByRole('complementary').innerText()).includes('Not a medical device'), 'the notice is there');
-  await plain.screenshot({ path: h.file('plain-result.png'), fullPage: true });
+  await h.picture(plain, 'plain-result.png');
   const flat = await h.person('flat');
   await flat.addInitScript(() => { HTMLCanvasElement.prototype.getContext = new Proxy(HTMLCanvasElement.prototype.getContext, { apply: (target, self, args) => (args[0].startsWith('webgl') ? null : Reflect.apply(target, self, args)) }); });
   await h.logIn(flat, 'anna');

@@ -1,8 +1,9 @@
 // Every screen in every size, theme and language: screens_test.mjs NODE_MODULES SERVER OUT_FOLDER CHROMIUM
 // A screen is loaded once and switched in place, by what a person would use: the window, the theme
 // and the language. Layout, words and touch are measured in every size and language (colours change
-// neither); axe runs on a phone and at 1280 px, at each in both languages and both themes. Of each
-// screen one picture of each size is kept, in themes and languages that take turns.
+// neither); axe runs on a phone and at 1280 px, at each in both languages and both themes. With
+// PLUMB_PICTURES=1 one picture of each screen in each size is kept, in themes and languages that take
+// turns; without it, the pages are painted at a tenth of their size, which changes no measure.
 import { readFileSync } from 'node:fs';
 import { en } from '../../web/assets/strings/en.js';
 import { es } from '../../web/assets/strings/es.js';
@@ -24,6 +25,7 @@ const kSizes = [
   { width: 3840, height: 2160, open: true, picture: 'es light' },
 ];
 const kThemes = ['dark', 'light'];
+const keepsPictures = process.env.PLUMB_PICTURES === '1';
 const spent = {};
 async function timed(what, work) {
   const begun = Date.now();
@@ -38,7 +40,9 @@ check(english.whole.length > 300 && english.parts.length > 200, 'texts to look f
 
 /// Requests that a page waits for; the stream and the camera never end.
 const waiting = new WeakMap();
-function watch(page) {
+const debuggers = new WeakMap();
+async function watch(page) {
+  debuggers.set(page, await page.context().newCDPSession(page));
   const open = new Set();
   waiting.set(page, { open, last: Date.now() });
   const ends = (one) => { open.delete(one); waiting.get(page).last = Date.now(); };
@@ -57,6 +61,16 @@ async function settle(page) {
   await page.waitForFunction(([a, b]) => ![a, b].some((text) => document.querySelector('main')?.innerText.includes(text)), [en.loading, es.loading]);
   await drawn(page);
 }
+/// The window's size, painted small where nobody looks.
+async function resize(page, { width, height }) {
+  if (keepsPictures) await page.setViewportSize({ width, height });
+  else await debuggers.get(page).send('Emulation.setDeviceMetricsOverride', { width, height, deviceScaleFactor: 1, mobile: false, scale: 0.1 });
+}
+/// The size in which a person would use it, to click at what is there.
+const restore = async (page) => {
+  await debuggers.get(page).send('Emulation.clearDeviceMetricsOverride');
+  await page.setViewportSize(kSizes[2]);
+};
 const drawn = (page) => page.evaluate(() => new Promise((ready) => { requestAnimationFrame(() => requestAnimationFrame(ready)); }));
 
 async function axe(page, where, rules) {
@@ -77,15 +91,15 @@ async function measure(page, name, language, { touched = false, width }) {
 async function lookAt(page, one, language) {
   for (const size of kSizes) {
     if (one.heavy && !size.full) continue;  // an emulated graphics card draws it
-    const { width, height } = size;
-    await page.setViewportSize({ width, height });
+    const { width } = size;
+    await resize(page, size);
     await page.evaluate((open) => { for (const folded of document.querySelectorAll('main details')) folded.open = open; }, size.open ?? false);
     await timed(`size ${width}`, () => (size.open ? settle(page) : drawn(page)));
     await timed('layout', () => measure(page, one.name, language, size));
     for (const theme of kThemes) {
       const now = `${language} ${theme}`;
       const isFull = size.full === now;
-      const isKept = size.picture === now && (!one.state || size.full);
+      const isKept = keepsPictures && size.picture === now && (!one.state || size.full);
       if (!isFull && !isKept && size.contrast !== now) continue;
       await setTheme(page, theme, one.printed);
       const where = `${one.name}, ${width} px, ${language}, ${theme}`;
@@ -134,13 +148,13 @@ async function look(one) {
   const page = who[one.who];
   // The language that it is in comes first: one switch for each screen.
   const now = await page.evaluate(() => document.documentElement.lang);
-  await page.setViewportSize(kSizes[2]);
+  await restore(page);
   await one.before?.(page);
   for (const language of now === 'es' ? ['es', 'en'] : ['en', 'es']) {
     if (language !== now) await one.between?.(page);
     await timed('show', () => show(page, one, language));
     await lookAt(page, one, language);
-    await page.setViewportSize(kSizes[2]);
+    await restore(page);
     await one.also?.(page, language, language === 'es' ? es : en);
   }
   await one.leave?.(page);
@@ -157,13 +171,13 @@ async function lookAll(...screens) {
 
 // --- what there is to show
 
-const engineer = watch(await h.person('engineer', kSizes[2]));
-const anna = watch(await h.person('anna', kSizes[2]));
-const bob = watch(await h.person('bob', kSizes[2]));
-const clara = watch(await h.person('clara', kSizes[2]));
-const visitor = watch(await h.person('visitor', kSizes[2]));
-const room = watch(await h.person('room', kSizes[2]));
-const reader = watch(await h.person('reader', kSizes[2]));
+const engineer = await watch(await h.person('engineer', kSizes[2]));
+const anna = await watch(await h.person('anna', kSizes[2]));
+const bob = await watch(await h.person('bob', kSizes[2]));
+const clara = await watch(await h.person('clara', kSizes[2]));
+const visitor = await watch(await h.person('visitor', kSizes[2]));
+const room = await watch(await h.person('room', kSizes[2]));
+const reader = await watch(await h.person('reader', kSizes[2]));
 who = { engineer, anna, bob, clara, visitor, room, reader };
 
 const ok = async (page, path, method, body) => {
@@ -455,7 +469,7 @@ await h.step('the daily check and the room’s calibration, passed and failed; u
 
 await h.step('each check finds what it is for', async () => {
   const page = bob;
-  await page.setViewportSize(kSizes[0]);
+  await resize(page, kSizes[0]);
   await page.evaluate((name) => localStorage.setItem(`plumb-language-${name}`, 'es'), 'bob');
   await page.goto(`${h.url}#/status`);
   await page.reload();

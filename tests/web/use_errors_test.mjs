@@ -375,6 +375,7 @@ await h.step('during a sweep no update is installed', async () => {
   equal((await h.api(anna, 'status')).body.state, 'scanning', 'the sweep goes on');
   await anna.getByRole('button', { name: 'Discard scan' }).click();
   await anna.locator('.headline', { hasText: 'Ready' }).waitFor();
+  await anna.waitForTimeout(900);  // sooner, a tap was meant for what the button said before
   h.tell('swift');
 });
 
