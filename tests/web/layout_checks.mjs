@@ -22,8 +22,9 @@ export function englishTexts(en, es) {
 
 /// Runs in the page. Returns what is wrong, each with its kind in front.
 /// @param touched  By fingers: controls need 24 px.
+/// @param wall     On the wall of the room, where nobody scrolls.
 /// @param english  What englishTexts() found, on a Spanish screen; else null.
-export function faultsOfLayout({ touched, english }) {
+export function faultsOfLayout({ touched, wall, english }) {
   const found = new Set();
   const shorten = (text) => text.trim().replace(/\s+/g, ' ').slice(0, 60);
   const nameOf = (element) => `${element.tagName.toLowerCase()}${[...element.classList].map((one) => `.${one}`).join('')} “${shorten(element.textContent || element.getAttribute('aria-label') || element.id)}”`;
@@ -108,6 +109,9 @@ export function faultsOfLayout({ touched, english }) {
   const value = document.querySelector('.result .number .value');
   const end = value?.getBoundingClientRect().bottom ?? 0;
   if (touched && end > 0.65 * clientHeight) add('far down', value, `: it ends at ${px(end)} of ${clientHeight}`);
+  const last = wall && [...document.querySelectorAll('.screen:not(.is-old):has(.verdict.move) .number')].at(-1);
+  const below = last ? last.getBoundingClientRect().bottom : 0;
+  if (below > clientHeight) add('far down', last, `: it ends at ${px(below)} of ${clientHeight}`);
 
   // WCAG 2.2, 2.5.8: 24 px, but for links within a sentence. A box is touched by its label, too.
   const isInSentence = (link) => link.tagName === 'A' && styleOf(link).display === 'inline'
