@@ -184,15 +184,23 @@ TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReference) {
     }
     return does;
   };
+  const auto has_ended = [&] {
+    const ScanPhase phase = appliance.state().phase;
+    return phase == ScanPhase::kWorking || phase == ScanPhase::kResult;
+  };
   nlohmann::json status;
   std::jthread person([&] {
     EXPECT_TRUE(becomes([&] { return appliance.state().phase == ScanPhase::kReady; }));
     on_loop([&] { EXPECT_EQ(appliance.StartSweep({.user = "tester", .address = {}}), ""); });
+    // Where frames are processed slowly, as under a sanitizer, the sweep ends by itself before.
     EXPECT_TRUE(becomes([&] {
       status = appliance.StatusJson();
-      return status["scan"].is_object() && status["scan"].value("frames", 0) >= kFrames;
+      return has_ended() || status["scan"].value("frames", 0) >= kFrames;
     }));
-    on_loop([&] { EXPECT_EQ(appliance.EndSweep({.user = "tester", .address = {}}), ""); });
+    on_loop([&] {
+      if (has_ended()) return;
+      EXPECT_EQ(appliance.EndSweep({.user = "tester", .address = {}}), "");
+    });
     EXPECT_TRUE(becomes([&] { return appliance.state().phase == ScanPhase::kResult; }));
     on_loop([&] { status = appliance.StatusJson(); });
     loop.Quit(0);
