@@ -43,13 +43,13 @@ class UpdaterOnLoop : public ::testing::Test {
     return status;
   }
 
-  /// False if it does not come to that within a minute.
+  /// Waits until `holds` is true; false if it is not within a minute.
   [[nodiscard]] static bool Becomes(const std::function<bool()>& holds) {
     const auto until = EventLoop::Clock::now() + kPatience;
     while (!holds()) {
       if (EventLoop::Clock::now() > until) return false;
-      std::this_thread::sleep_for(
-          std::chrono::milliseconds(2));  // leaves the processor to the loop
+      // Asking without a pause would keep the loop busy with answers.
+      std::this_thread::sleep_for(kPollInterval);
     }
     return true;
   }
@@ -69,6 +69,7 @@ class UpdaterOnLoop : public ::testing::Test {
   }
 
   static constexpr std::chrono::seconds kPatience{60};
+  static constexpr std::chrono::milliseconds kPollInterval{2};
 
   EventLoop loop_;  // first: blocks signals before any thread starts
   std::unique_ptr<Updater> updater_;

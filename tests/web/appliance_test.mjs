@@ -16,12 +16,12 @@ const sim = (command) => promisify(execFile)(plumb, ['--control', socket, 'sim',
 const memory_kB = () => Number(/VmRSS:\s+(\d+)/.exec(readFileSync(`/proc/${h.server.pid}/status`, 'utf8'))[1]);
 
 const page = await h.person('engineer');
-/// As a person does: the sweep ends once nothing new comes into view.
+/// Ends the sweep once nothing new comes into view, as a person would.
 async function endSweep(who) {
   await who.getByRole('button', { name: 'End sweep' }).waitFor();
   for (const begun = Date.now(); ; await who.waitForTimeout(250)) {
     const { state, scan: seen } = (await h.api(who, 'status')).body;
-    if (state !== 'scanning') return;  // it lasted as long as a sweep may
+    if (state !== 'scanning') return;  // it reached its longest duration
     if (seen.without_new_surface_s > 1 && Date.now() - begun > 4000) break;
   }
   await who.getByRole('button', { name: 'End sweep' }).click();

@@ -9,7 +9,8 @@ const kSkip = 77;
 const kPassword = 'correct horse battery';
 const kFirstPassword = 'first horse of the day';  // that an engineer gives a new account
 const kPatience_ms = 30000;
-/// Pictures are for people; drawing them takes as long as a third of all else.
+/// Screenshots are only for people to look at; without them, WebScreens takes 360 instead of 479 s of
+/// processor time.
 const keepsPictures = process.env.PLUMB_PICTURES === '1';
 // Every size is in screens_test.mjs; painting a larger window would only take the others longer.
 const kSize = { width: 1280, height: 800 };
@@ -182,12 +183,13 @@ export class Harness {
     }
   }
 
-  /// With PLUMB_PICTURES=1, where somebody wants to look at them.
+  /// Takes a screenshot, but only with PLUMB_PICTURES=1.
   async picture(page, name, { fullPage = true } = {}) {
     if (keepsPictures) await page.screenshot({ path: this.file(name), fullPage, timeout: 90000 });
   }
 
-  /// A picture of the screen; and axe looks at it: to be left out where screens_test.mjs has the same.
+  /// Takes a screenshot and checks the screen with axe. Leave axe out where screens_test.mjs checks the
+  /// same screen.
   async look(page, name, { axe = true, fullPage = true } = {}) {
     await this.picture(page, `${name}.png`, { fullPage });
     if (!axe) return;

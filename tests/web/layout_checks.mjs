@@ -21,8 +21,8 @@ export function englishTexts(en, es) {
 }
 
 /// Runs in the page. Returns what is wrong, each with its kind in front.
-/// @param touched  By fingers: controls need 24 px.
-/// @param wall     On the wall of the room, where nobody scrolls.
+/// @param touched  Whether this is a touch screen, where controls need 24 px.
+/// @param wall     Whether this is the screen on the room's wall, which nobody scrolls.
 /// @param english  What englishTexts() found, on a Spanish screen; else null.
 export function faultsOfLayout({ touched, wall, english }) {
   const found = new Set();

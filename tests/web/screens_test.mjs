@@ -3,7 +3,7 @@
 // and the language. Layout, words and touch are measured in every size and language (colours change
 // neither); axe runs on a phone and at 1280 px, at each in both languages and both themes. With
 // PLUMB_PICTURES=1 one picture of each screen in each size is kept, in themes and languages that take
-// turns; without it, the pages are painted at a tenth of their size, which changes no measure.
+// turns; without it, the pages are painted at a tenth of their size, which changes no layout.
 import { readFileSync } from 'node:fs';
 import { en } from '../../web/assets/strings/en.js';
 import { es } from '../../web/assets/strings/es.js';
@@ -17,7 +17,7 @@ const { check, equal } = h;
 const kTags = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'];
 /// `full`: where axe runs with all of its rules, `contrast`: with the one of colours, which are the same
 /// in both languages, as all else is in both themes. `open`: whether all that unfolds is unfolded.
-/// `wall`: as the screen in the room.
+/// `wall`: the screen on the room's wall.
 const kSizes = [
   { width: 360, height: 740, full: 'es light', contrast: 'en dark', open: true, touched: true, picture: 'es light' },
   { width: 390, height: 844, touched: true, picture: 'en dark' },
@@ -62,12 +62,13 @@ async function settle(page) {
   await page.waitForFunction(([a, b]) => ![a, b].some((text) => document.querySelector('main')?.innerText.includes(text)), [en.loading, es.loading]);
   await drawn(page);
 }
-/// The window's size, painted small where nobody looks.
+/// Sets the size of the window. Unless pictures are kept, the page is painted at a tenth of it, which
+/// is faster and changes no layout.
 async function resize(page, { width, height }) {
   if (keepsPictures) await page.setViewportSize({ width, height });
   else await debuggers.get(page).send('Emulation.setDeviceMetricsOverride', { width, height, deviceScaleFactor: 1, mobile: false, scale: 0.1 });
 }
-/// The size in which a person would use it, to click at what is there.
+/// Back to a desktop window, painted at full size, so that its controls can be clicked.
 const restore = async (page) => {
   await debuggers.get(page).send('Emulation.clearDeviceMetricsOverride');
   await page.setViewportSize(kSizes[2]);
@@ -119,8 +120,8 @@ async function setTheme(page, theme, printed) {
 }
 
 let who = {};
-/// Opens a screen in a language. If its address does not contain the language, the page is told to
-/// change it; otherwise the address for that language is loaded.
+/// Opens a screen in the given language. A screen whose address names the language (`url`) is loaded
+/// from there; on every other screen the person's language setting is changed.
 async function show(page, one, language) {
   if (page.url() === 'about:blank') await page.goto(h.url);
   await page.evaluate(([name, wanted]) => localStorage.setItem(`plumb-language-${name}`, wanted), [one.account ?? one.who, language]);

@@ -375,7 +375,7 @@ await h.step('during a sweep no update is installed', async () => {
   equal((await h.api(anna, 'status')).body.state, 'scanning', 'the sweep goes on');
   await anna.getByRole('button', { name: 'Discard scan' }).click();
   await anna.locator('.headline', { hasText: 'Ready' }).waitFor();
-  await anna.waitForTimeout(900);  // sooner, a tap was meant for what the button said before
+  await anna.waitForTimeout(900);  // a tap right after the button changed is ignored
   h.tell('swift');
 });
 

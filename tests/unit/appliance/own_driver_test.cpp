@@ -192,7 +192,7 @@ TEST_F(OwnDriverTest, AScanWithItIsStoredAsThePatientsReference) {
   std::jthread person([&] {
     EXPECT_TRUE(becomes([&] { return appliance.state().phase == ScanPhase::kReady; }));
     on_loop([&] { EXPECT_EQ(appliance.StartSweep({.user = "tester", .address = {}}), ""); });
-    // Where frames are processed slowly, as under a sanitizer, the sweep ends by itself before.
+    // If frames are processed slowly, as under a sanitizer, the sweep may end by itself first.
     EXPECT_TRUE(becomes([&] {
       status = appliance.StatusJson();
       return has_ended() || status["scan"].value("frames", 0) >= kFrames;
