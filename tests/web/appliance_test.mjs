@@ -50,7 +50,7 @@ await h.step('the first sweep, closed and opened again midway, becomes the refer
   await page.getByRole('button', { name: 'End sweep' }).waitFor();
   await page.waitForFunction(() => document.querySelector('.facts')?.textContent.match(/tracked\s*[1-9]/));
   await page.locator('.preview img').waitFor();
-  await h.look(page, 'scan-sweep', { axe: false });
+  await h.look(page, 'scan-sweep');
   const id = await page.evaluate(() => fetch('/api/v1/status').then((response) => response.json()).then((status) => status.scan.id));
   await page.goto('about:blank');
   await page.goto(`${h.url}#/scan`);
@@ -70,7 +70,7 @@ await h.step('the moved body gives MOVE and six numbers', async () => {
   equal(await page.locator('.number .value').count(), 6, 'six numbers');
   check(await page.locator('.number.outside').count() > 0, 'something is outside tolerance');
   await page.locator('.reading strong').waitFor();
-  await h.look(page, 'result-move', { axe: false });
+  await h.look(page, 'result-move');
   await page.getByRole('button', { name: 'Open the 3-D view' }).click();
   await page.locator('canvas.mesh[data-ready=yes]').waitFor(kSlow);
   await page.locator('canvas.mesh').scrollIntoViewIfNeeded();

@@ -11,7 +11,7 @@ const kFirstPassword = 'first horse of the day';  // that an engineer gives a ne
 const kPatience_ms = 30000;
 /// Screenshots are only for people to look at; without them, WebScreens takes 360 instead of 479 s of
 /// processor time.
-const keepsPictures = process.env.PLUMB_PICTURES === '1';
+export const keepsPictures = process.env.PLUMB_PICTURES === '1';
 // Every size is in screens_test.mjs; painting a larger window would only take the others longer.
 const kSize = { width: 1280, height: 800 };
 

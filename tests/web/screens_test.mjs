@@ -7,7 +7,7 @@
 import { readFileSync } from 'node:fs';
 import { en } from '../../web/assets/strings/en.js';
 import { es } from '../../web/assets/strings/es.js';
-import { Harness } from './harness.mjs';
+import { Harness, keepsPictures } from './harness.mjs';
 import { englishTexts, faultsOfLayout } from './layout_checks.mjs';
 
 // The fifth shows only the screens whose names it matches.
@@ -26,7 +26,6 @@ const kSizes = [
   { width: 3840, height: 2160, wall: true, open: true, picture: 'es light' },
 ];
 const kThemes = ['dark', 'light'];
-const keepsPictures = process.env.PLUMB_PICTURES === '1';
 const spent = {};
 async function timed(what, work) {
   const begun = Date.now();
