@@ -10,6 +10,8 @@ namespace plumb {
 
 /// Colour of cells where nothing was measured, in every picture; no scale uses it.
 inline constexpr Color kHoleColor = {150, 152, 156};
+/// Not measured inside the region; the same colour as on the page (web/assets/maps.js).
+inline constexpr Color kRegionHoleColor = {176, 86, 196};
 
 /// Maps a difference in metres to a colour.
 ///

@@ -14,10 +14,33 @@ namespace {
 
 constexpr Color kInk = {33, 37, 41};
 constexpr Color kFaint = {92, 99, 106};
+constexpr Color kRegionHoleDark = {88, 43, 98};
 
 /// Weak shading keeps the legend readable: at most 14 % darker.
 constexpr double kReliefStrength = 0.30;
 constexpr double kPaleOutside = 0.45;  // fraction of white outside the region
+
+/// A cell of the region without a value beside another one: one alone is noise of the grid.
+bool IsHole(const HeightMap& difference, std::span<const std::uint8_t> region, int row,
+            int column) {
+  const auto is_missing = [&](int r, int c) {
+    if (r < 0 || c < 0 || r >= difference.grid.height || c >= difference.grid.width) return false;
+    const std::size_t cell =
+        static_cast<std::size_t>(r) * static_cast<std::size_t>(difference.grid.width) +
+        static_cast<std::size_t>(c);
+    return region[cell] != 0 && !std::isfinite(difference.z[cell]);
+  };
+  return is_missing(row, column) && (is_missing(row - 1, column) || is_missing(row + 1, column) ||
+                                     is_missing(row, column - 1) || is_missing(row, column + 1));
+}
+
+bool HasHole(const HeightMap& difference, std::span<const std::uint8_t> region) {
+  if (region.empty()) return false;
+  for (int row = 0; row < difference.grid.height; ++row)
+    for (int column = 0; column < difference.grid.width; ++column)
+      if (IsHole(difference, region, row, column)) return true;
+  return false;
+}
 
 cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& options,
                      const ColorScale& scale, const cv::Rect& cells) {
@@ -35,7 +58,14 @@ cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& optio
     for (int column = 0; column < cells.width; ++column) {
       const float e = difference.at(cells.y + row, cells.x + column);
       if (!std::isfinite(e)) {
-        out[column] = cv::Vec3b(kHoleColor[0], kHoleColor[1], kHoleColor[2]);
+        // Hatched, so that more than its colour tells a hole from what was not measured elsewhere.
+        const bool is_hole =
+            !options.region_mask.empty() &&
+            IsHole(difference, options.region_mask, cells.y + row, cells.x + column);
+        const Color& color = !is_hole                  ? kHoleColor
+                             : (row + column) % 12 < 6 ? kRegionHoleColor
+                                                       : kRegionHoleDark;
+        out[column] = cv::Vec3b(color[0], color[1], color[2]);
         continue;
       }
       const Color& color =
@@ -68,7 +98,7 @@ std::string LabelOf(const ColorScale::Tick& tick, bool is_tolerance, const Pictu
 }
 
 void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, bool has_region,
-                const PictureWords& words) {
+                bool has_hole, const PictureWords& words) {
   const double x = area.x, bar_width = 44;
   double y = area.y;
   const TextStyle head{.size_px = 18, .color = kInk, .bold = true};
@@ -78,7 +108,8 @@ void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, b
   y += scale.is_signed() ? 84 : 60;
   const TextStyle small{.size_px = 15, .color = kFaint};
   if (scale.is_signed()) figure.Text(x, y - 15, words.higher, small);
-  const double below = (scale.is_signed() ? 24 : 0) + 150 + (has_region ? 46 : 0);
+  const double below =
+      (scale.is_signed() ? 24 : 0) + 150 + (has_region ? 46 : 0) + (has_hole ? 46 : 0);
   const double height = std::max(180.0, area.y + area.height - y - below);
   for (int i = 0; i < static_cast<int>(height); ++i) {
     figure.FillRectangle(x, y + i, bar_width, 1.02,
@@ -99,6 +130,7 @@ void DrawLegend(Figure& figure, const cv::Rect& area, const ColorScale& scale, b
   y += height;
   if (scale.is_signed()) figure.Text(x, y + 22, words.lower, small), y += 24;
   y = DrawSwatch(figure, x, y + 18, area.width, kHoleColor, words.not_in_both);
+  if (has_hole) y = DrawSwatch(figure, x, y, area.width, kRegionHoleColor, words.hole);
   if (has_region) DrawSwatch(figure, x, y, area.width, {255, 255, 255}, words.outlined);
 }
 
@@ -116,6 +148,7 @@ cv::Mat DrawErrorImage(const HeightMap& difference, const ErrorImageOptions& opt
   const cv::Rect cells = CellsAroundRegion(
       difference.grid, CellsWithData(difference.grid, {difference.z}), options.region_mask);
   const std::vector<std::uint8_t> outline = PartOfMask(difference.grid, cells, options.region_mask);
+  const bool has_hole = HasHole(difference, options.region_mask);
   return DrawPage({.title = std::string(options.words.error_title),
                    .subtitle = options.subtitle,
                    .grid = Part(difference.grid, cells),
@@ -123,7 +156,7 @@ cv::Mat DrawErrorImage(const HeightMap& difference, const ErrorImageOptions& opt
                    .outline = outline,
                    .draw_legend =
                        [&](Figure& figure, const cv::Rect& area) {
-                         DrawLegend(figure, area, scale, !outline.empty(), options.words);
+                         DrawLegend(figure, area, scale, !outline.empty(), has_hole, options.words);
                        },
                    .marks = options.marks,
                    .words = options.words});

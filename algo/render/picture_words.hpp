@@ -24,6 +24,7 @@ struct PictureWords {
   std::string_view tolerance = "tolerance";
   std::string_view not_in_both = "not measured in both scans",
                    not_in_either = "not measured in either scan", not_measured = "not measured";
+  std::string_view hole = "hole in the region";
   std::string_view outlined = "outlined: the region; paler outside";
   std::string_view surface_on_top = "surface on top", reference = "reference", current = "current";
   std::string_view both_within = "both, within {} mm";

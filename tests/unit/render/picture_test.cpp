@@ -68,6 +68,23 @@ TEST(ErrorImageTest, HolesAreGreyAndNeverTheColourOfZero) {
   EXPECT_GT(with_hole - without, 0.1);  // a quarter of a map that takes half of the page
 }
 
+TEST(ErrorImageTest, AHoleInTheRegionIsToldFromWhatWasNotMeasuredElsewhere) {
+  HeightMap difference = Flat(0);
+  SetRows(difference, 30, 60, std::numeric_limits<float>::quiet_NaN());
+  std::vector<std::uint8_t> region(difference.grid.num_cells(), 1);
+  const cv::Mat inside = DrawErrorImage(difference, {.region_mask = region});
+  EXPECT_GT(Share(inside, kRegionHoleColor), 0.04) << "every second stripe";
+  std::fill(region.begin(), region.begin() + std::ptrdiff_t{70} * difference.grid.width,
+            std::uint8_t{0});
+  const cv::Mat outside = DrawErrorImage(difference, {.region_mask = region});
+  EXPECT_LT(Share(outside, kRegionHoleColor), 0.001) << "no legend for it either";
+  SetRows(difference, 30, 60, 0);
+  std::fill(region.begin(), region.end(), std::uint8_t{1});
+  difference.z[45 * 200 + 80] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_LT(Share(DrawErrorImage(difference, {.region_mask = region}), kRegionHoleColor), 0.001)
+      << "a single cell is no hole";
+}
+
 TEST(ErrorImageTest, CarriesTheNoticeInThePicture) {
   // The strip of the notice has its own colours at the foot of the page, for every map.
   const cv::Mat picture = DrawErrorImage(Flat(0));
