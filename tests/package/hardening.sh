@@ -21,7 +21,8 @@ while IFS= read -r -d '' file; do
   has "$dynamic" 'RPATH|RUNPATH' && missing+=("freedom from search paths of the build")
   has "$symbols" '__stack_chk_fail' || missing+=("the stack protector")
   # The reader and the plug-in are small and call nothing that has a checked form.
-  case "$name" in */bin/*) has "$symbols" '__[a-z]+_chk@' || missing+=(fortify) ;; esac
+  case "$name" in */bin/*) has "$symbols" '__[a-z]+_chk@' || missing+=(fortify)
+    has "$symbols" '__glibcxx_assert_fail' || missing+=("the checks of the standard library") ;; esac
   has "$notes" 'Build ID' || missing+=("a build id")
   # The code is made for CET. The note that says so of a whole program is lost to Debian 12's start files (crti.o), which lack it.
   if has "$header" 'X86-64'; then
