@@ -327,6 +327,9 @@ TEST_F(ScenesTest, EvaluateMeasuresAgainstTheTruth) {
   // 0.017 deg with and without the wider vector instructions.
   EXPECT_LT(error_mm, 0.93);
   EXPECT_LT(error_deg, 0.02);
+  const json& intervals = figures.at("total").at("intervals_95").at("all");
+  EXPECT_EQ(intervals.at("count"), 6 * figures.at("pairs").size());
+  EXPECT_GE(intervals.at("fraction").get<double>(), 0.8) << intervals.dump();
   const RunResult again = Plumb({"evaluate", SmallSuite(), "--out", folder_ / "out", "--reuse"});
   EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_THAT(again.err, Not(HasSubstr("tracking")));

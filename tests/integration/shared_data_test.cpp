@@ -21,7 +21,13 @@ class SharedDataTest : public CommandLineTest {
   struct Errors {
     std::vector<double> translation_mm;
     std::vector<double> rotation_deg;
-    std::vector<json> figures;  // Of each spacing.
+    int numbers = 0, inside = 0;  // Of the six of each pair: how many lie in their 95 % interval.
+    std::vector<json> figures;    // Of each spacing.
+    /// A bound that intervals of another width fail: of 36 numbers 34 are expected.
+    void ExpectThatIntervalsHold() const {
+      EXPECT_EQ(numbers, 6 * static_cast<int>(translation_mm.size()));
+      EXPECT_GE(inside, 0.85 * numbers);
+    }
   };
   // One spacing of keyframes gives one number, and a part of it is luck: three give the errors of
   // every pair three times.
@@ -41,6 +47,11 @@ class SharedDataTest : public CommandLineTest {
         if (!pair.contains("translation_mm") || pair.at("translation_mm").is_null()) continue;
         errors.translation_mm.push_back(pair.at("translation_mm").get<double>());
         errors.rotation_deg.push_back(pair.at("rotation_deg").get<double>());
+        for (const auto& [name, number] : pair.at("numbers").items()) {
+          if (number.is_null()) continue;
+          ++errors.numbers;
+          errors.inside += number.at("inside").get<bool>() ? 1 : 0;
+        }
       }
     }
     return errors;
@@ -62,6 +73,7 @@ TEST_F(SharedDataTest, AnotherSimulatorsSweepsWithTruth) {
   EXPECT_LE(Mean(errors.translation_mm), 1.2);      // Measured: 1.11.
   EXPECT_LE(Largest(errors.translation_mm), 1.58);  // Measured: 1.32.
   EXPECT_LE(Largest(errors.rotation_deg), 0.064);   // Measured: 0.053.
+  errors.ExpectThatIntervalsHold();
   for (const json& figures : errors.figures) {
     for (const auto& [name, scene] : figures.at("scenes").items()) {
       EXPECT_EQ(scene.at("frames").at("tracked"), scene.at("frames").at("total")) << name;
@@ -86,6 +98,8 @@ TEST_F(SharedDataTest, AUnitWithABentDepthImageAndAToneCurveOfItsOwn) {
   EXPECT_LE(Largest(alone.rotation_deg), 0.155);
   EXPECT_LE(Mean(with_profile.translation_mm), 1.1);
   EXPECT_LE(Largest(with_profile.rotation_deg), 0.155);
+  alone.ExpectThatIntervalsHold();
+  with_profile.ExpectThatIntervalsHold();
 }
 
 TEST_F(SharedDataTest, ARealSensorTracksWithTagsAndWithout) {
