@@ -107,6 +107,7 @@ int Main(int argc, char** argv) {
       AddBackup);
   add("restore", "Restore a state folder from a backup, after checking every file of it",
       AddRestore);
+  add("verify-log", "Check a downloaded audit log: whether it is as it was written", AddVerifyLog);
   add("export-patient", "Export one patient from a state folder or a backup", AddExportPatient);
   add("import-patient", "Import an exported patient into a state folder", AddImportPatient);
   add("factory-reset", "Reset plumbd's stored data to the state of delivery", AddFactoryReset);

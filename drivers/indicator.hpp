@@ -18,8 +18,9 @@ enum class IndicatorPattern {
   kResultMove,
   kNoAnswer,
   kFault,
-  kReadyRolledBack,  ///< Ready, but the system before the last update was restored.
-  kStopped,          ///< The service is not running, and no scan is possible.
+  kReadyRolledBack,      ///< Ready, but the system before the last update was restored.
+  kReadyDiskNearlyFull,  ///< Ready, but there is little room for more scans.
+  kStopped,              ///< The service is not running, and no scan is possible.
 };
 
 /// A light. Called on the event loop's thread only. No call blocks or throws: a broken light must

@@ -33,6 +33,7 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
       profiles_(std::make_shared<ProfileShelf>(parts_.config.appliance.state / "sensor-profiles")),
       profiles_off_(ProfilesOff(parts_.config)),
       warm_up_min_(parts_.config.appliance.warm_up_min) {
+  storage_timer_ = loop_.MakeTimer("storage retry", [this] { RetryStorage(); });
   OpenStore();
   RefreshRoom();
   result_timer_ =
@@ -56,6 +57,7 @@ Appliance::Appliance(EventLoop& loop, ApplianceParts parts)
       [this](const SensorEvent& event) {
         loop_.Post("sensor", [this, event] { OnSensor(event); });
       });
+  WatchSpace();
 }
 
 Appliance::~Appliance() {
@@ -97,12 +99,12 @@ bool Appliance::IsRunning() const {
 /// The demo's patient, which is open from the start and stays open.
 bool Appliance::IsOwnSession() const { return opened_by_.user == kSelf.user; }
 
+Appliance::Answer Appliance::WhyNotIdle() const {
+  return IsRunning() ? "a scan is running or being computed: wait for its result" : "";
+}
+
 Appliance::Answer Appliance::WhyNotRestart() const {
-  if (IsRunning())
-    return fmt::format(
-        "in state {}, trying to restart the machine, requires that no scan runs: wait for its "
-        "result",
-        Name(state_.phase));
+  if (std::string why = WhyNotIdle(); !why.empty()) return why;
   if (opening_ || (!session_id_.empty() && !IsOwnSession()))
     return "the session of a patient is open: close it first, then restart";
   return {};
@@ -134,6 +136,7 @@ Appliance::Answer Appliance::WhyNotScan() const {
       !blocking_reason.empty())
     return blocking_reason;
   if (store_ == nullptr || !storage_fault_.empty()) return "nothing can be stored";
+  if (std::string why = store_->WhyOtherScans(); !why.empty()) return why;
   if (opening_) return "a patient is being opened: press again in a moment";
   return WhyNoSpace();
 }
@@ -144,6 +147,8 @@ Appliance::Answer Appliance::Handle(ScanEvent event, const web::Actor* actor) {
   const bool starts = std::find(transition.actions.begin(), transition.actions.end(),
                                 ScanAction::kStartScan) != transition.actions.end();
   Answer answer(transition.refusal);
+  if (!answer.empty() && before.fault == FaultKind::kStorage && !space_fault_.empty())
+    answer = space_fault_;
   if (starts) {
     answer = WhyNotScan();
     if (!answer.empty())
@@ -222,11 +227,7 @@ void Appliance::Act(ScanAction action) {
 /// These run on the scan's thread: they use the store, which is thread-safe, and copies; everything
 /// else is posted. Of a check only its numbers are kept.
 Appliance::Answer Appliance::OpenCheck(const web::Actor& actor) {
-  if (IsRunning()) {
-    return fmt::format(
-        "in state {}, trying to begin a check, requires that no scan runs: wait for its result",
-        Name(state_.phase));
-  }
+  if (std::string why = WhyNotIdle(); !why.empty()) return why;
   check_ = actor;
   NotifyWeb(web::EventKind::kStatus);
   return {};
@@ -306,10 +307,7 @@ void Appliance::ForgetSession() {
 }
 
 Appliance::Answer Appliance::CloseSession(const web::Actor& actor) {
-  if (IsRunning())
-    return fmt::format(
-        "in state {}, trying to close the session, requires that no scan runs: wait for its result",
-        Name(state_.phase));
+  if (std::string why = WhyNotIdle(); !why.empty()) return why;
   if (session_id_.empty()) return "no session is open";
   ForgetSession();
   (void)store_thread_.Post([this, actor] {
@@ -368,6 +366,8 @@ void Appliance::Stop(std::function<void()> stopped) {
 void Appliance::OnTick() {
   tick_timer_.ArmAfter(kTick);
   const bool is_running = IsRunning();
+  WatchSpace();
+  if (is_unusable_due_) CountUnusable();
   clock_.Look(std::chrono::system_clock::now(), Clock::now());
   if (!is_running && --ticks_to_disk_check_ <= 0) CheckDisk();
   if (!is_running && --ticks_to_maintenance_ <= 0) RunMaintenance();

@@ -16,6 +16,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "daemon/appliance/current_store.hpp"
 #include "daemon/appliance/page_identity.hpp"
 #include "daemon/appliance/scan_session.hpp"
 #include "daemon/appliance/scan_state.hpp"
@@ -24,7 +25,6 @@
 #include "daemon/loop/clock_watch.hpp"
 #include "daemon/loop/event_loop.hpp"
 #include "daemon/loop/work_thread.hpp"
-#include "daemon/records/store.hpp"
 #include "drivers/button.hpp"
 #include "drivers/indicator.hpp"
 #include "web/service/appliance_service.hpp"
@@ -52,6 +52,13 @@ struct ApplianceParts {
   /// Longest check of the whole database at the start. A larger one is checked while the appliance
   /// already works.
   std::chrono::milliseconds check_limit = StoreOptions().check_limit;
+  /// Pauses before safe mode is tried to be left, each time it could not be; the last one is
+  /// repeated.
+  std::vector<std::chrono::milliseconds> storage_retries = {
+      std::chrono::seconds(10), std::chrono::seconds(60), std::chrono::seconds(300)};
+  /// Room on the disk of a folder. Empty: as the system says.
+  std::function<std::filesystem::space_info(const std::filesystem::path&, std::error_code&)> space =
+      {};
 };
 
 /// Not thread-safe: call it on the loop's thread, except for functions marked "from any thread".
@@ -101,6 +108,8 @@ class Appliance {
   /// Until the store has opened a session, no scan begins.
   void SetOpening(bool opening) { opening_ = opening; }
   [[nodiscard]] bool IsRunning() const;
+  /// For what has to wait until no scan runs; empty: none does.
+  [[nodiscard]] Answer WhyNotIdle() const;
   /// Why the machine may not be restarted now: a scan runs, or a patient's session is open (the
   /// demo's does not count). Empty if it may.
   [[nodiscard]] Answer WhyNotRestart() const;
@@ -155,7 +164,7 @@ class Appliance {
   /// False if a busy worker shows no progress: systemd's watchdog must then not be fed.
   [[nodiscard]] bool WorkersAreAlive() const;
 
-  /// In safe mode a read-only store, or null.
+  /// In safe mode a read-only store, or null. From any thread.
   [[nodiscard]] Store* store() { return store_.get(); }
   [[nodiscard]] const std::filesystem::path& state_folder() const {
     return parts_.config.appliance.state;
@@ -200,7 +209,25 @@ class Appliance {
   static constexpr int kFirstFileCheckTicks = 30;
   static constexpr int kBackupTicks = 60;  ///< Interval at which a due backup is checked for.
 
+  /// Why nothing can be stored.
+  enum class StorageFault {
+    kMayEnd,  ///< As a disk that is read-only or not mounted, or too many open files.
+    kDamage,  ///< Of the database: somebody has to restore a backup and start plumbd again.
+  };
+
   void OpenStore();
+  [[nodiscard]] std::unique_ptr<Store> OpenForWork(const std::filesystem::path& state,
+                                                   std::chrono::milliseconds lock_wait) const;
+  void UseStore(std::unique_ptr<Store> store);
+  void EnterSafeMode(const std::string& what, StorageFault kind);
+  void ArmStorageRetry();
+  void RetryStorage();
+  void ProbeStore();
+  void ReopenStore();
+  void EndRetry(const std::string& fault, StorageFault kind = StorageFault::kMayEnd);
+  void LeaveSafeMode();
+  void WatchSpace();
+  void CountUnusable();
   void LogRecovery(const RecoveryReport& found) const;
   /// @param actor  Who asks for it; null: the appliance itself.
   Answer Handle(ScanEvent event, const web::Actor* actor = nullptr);
@@ -247,12 +274,17 @@ class Appliance {
   void BackUpIfDue();
   /// Of the state folder's disk, or of the one that scans/ is: the one with less room.
   [[nodiscard]] std::optional<std::filesystem::space_info> SpaceForScans() const;
+  [[nodiscard]] std::filesystem::space_info SpaceOf(const std::filesystem::path& folder,
+                                                    std::error_code& error) const;
+  [[nodiscard]] int KeepWithinRoom(const std::stop_token& stop);
   [[nodiscard]] std::uint64_t NeededBytes() const;
   [[nodiscard]] Answer WhyNoSpace() const;
   [[nodiscard]] std::vector<std::string> StorageWarnings() const;
-  [[nodiscard]] std::uint64_t QuotaBytes() const;
-  void FailStorage(const std::string& what);
+  [[nodiscard]] double UsedShare() const;
+  [[nodiscard]] bool IsNearlyFull() const;
+  void FailStorage(const std::string& what, StorageFault kind);
   void ReadStored(web::Status& status);
+  void ReadStoredOrFail(web::Status& status);
   void Show();
   [[nodiscard]] IndicatorPattern Pattern() const;
   void PublishEvent(const char* event, const nlohmann::json& fields);
@@ -273,8 +305,15 @@ class Appliance {
   ApplianceParts parts_;
   mutable std::mutex room_mutex_;  ///< Changed on the loop, read from any thread.
   Room room_;
-  std::unique_ptr<Store> store_;
+  CurrentStore store_;
   std::string storage_fault_, backup_fault_;
+  StorageFault storage_fault_kind_ = StorageFault::kMayEnd;
+  std::string space_fault_;     ///< That no scan can be stored, of a store that works.
+  bool is_store_open_ = false;  ///< For changes; otherwise it is read-only, or there is none.
+  std::size_t num_storage_retries_ = 0;
+  std::chrono::steady_clock::time_point storage_works_since_;
+  UnusableRecords unusable_;
+  bool is_unusable_due_ = true;          ///< To be counted again.
   std::string record_fault_;             ///< That the audit log is not as it was written.
   bool is_database_checked_ = false;     ///< Once it is open, the check thread's.
   bool backup_is_beside_scans_ = false;  ///< The last one to the configured folder.
@@ -307,8 +346,8 @@ class Appliance {
   std::function<void(const std::string&)> tell_watchers_;
   std::function<void(web::EventKind)> tell_web_;
   std::function<void()> stopped_;
-  EventLoop::Source result_timer_, limit_timer_, session_timer_, tick_timer_, button_source_,
-      button_timer_;
+  EventLoop::Source result_timer_, limit_timer_, session_timer_, tick_timer_, storage_timer_,
+      button_source_, button_timer_;
   WorkThread store_thread_{256};
   WorkThread check_thread_{4};  ///< Reads stored files; changes do not wait for it.
   std::unique_ptr<SensorThread> sensors_;

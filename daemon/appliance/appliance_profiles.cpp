@@ -71,11 +71,7 @@ std::optional<std::string> Appliance::SensorProfileFile(int version) const {
 }
 
 Appliance::Answer Appliance::WhyNotChangeProfile(const std::string& serial) const {
-  if (IsRunning())
-    return fmt::format(
-        "in state {}, trying to change the sensor's profile, requires that no scan runs: wait for "
-        "its result",
-        Name(state_.phase));
+  if (std::string why = WhyNotIdle(); !why.empty()) return why;
   const SensorSnapshot sensor = sensors_->snapshot();
   if (!sensor.present || sensor.sensor.serial != serial)
     return fmt::format("the sensor {} is not connected: look at this page again", serial);

@@ -220,11 +220,6 @@ void Appliance::OnEnded(const ScanOutcome& outcome) {
           {{"SCAN", scan_.id}});
     const bool is_check = scan_.purpose == web::ScanPurpose::kDailyCheck;
     if (!is_check) last_result_ = scan_;
-    if (scan_.purpose == web::ScanPurpose::kReference &&
-        outcome.kind == Kind::kDone) {  // the next scan is compared with it, once it is approved
-      purpose_ = web::ScanPurpose::kFraction;
-      reference_reason_.clear();
-    }
     const std::string answer = outcome.check
                                    ? std::string("daily check ") + Name(outcome.check->check.status)
                                : outcome.verdict                ? Name(*outcome.verdict)

@@ -92,11 +92,23 @@ web::WallClock::time_point StartOfDay() {
 }
 
 const char* Name(IndicatorPattern pattern) {
-  static constexpr const char* kNames[] = {
-      "off",           "no_sensor",   "ready",     "scanning", "too_fast",
-      "too_near",      "too_far",     "working",   "done",     "result_in_tolerance",
-      "result_unsure", "result_move", "no_answer", "fault",    "ready_rolled_back",
-      "stopped"};
+  static constexpr const char* kNames[] = {"off",
+                                           "no_sensor",
+                                           "ready",
+                                           "scanning",
+                                           "too_fast",
+                                           "too_near",
+                                           "too_far",
+                                           "working",
+                                           "done",
+                                           "result_in_tolerance",
+                                           "result_unsure",
+                                           "result_move",
+                                           "no_answer",
+                                           "fault",
+                                           "ready_rolled_back",
+                                           "ready_disk_nearly_full",
+                                           "stopped"};
   static_assert(std::size(kNames) == static_cast<std::size_t>(IndicatorPattern::kStopped) + 1);
   return kNames[static_cast<int>(pattern)];
 }
@@ -106,7 +118,8 @@ IndicatorPattern Appliance::Pattern() const {
     case ScanPhase::kNoSensor:
       return IndicatorPattern::kNoSensor;
     case ScanPhase::kReady:
-      return rolled_back_.empty() ? IndicatorPattern::kReady : IndicatorPattern::kReadyRolledBack;
+      if (!rolled_back_.empty()) return IndicatorPattern::kReadyRolledBack;
+      return IsNearlyFull() ? IndicatorPattern::kReadyDiskNearlyFull : IndicatorPattern::kReady;
     case ScanPhase::kWorking:
       return IndicatorPattern::kWorking;
     case ScanPhase::kFault:
@@ -123,18 +136,18 @@ IndicatorPattern Appliance::Pattern() const {
       return scan_.outcome.verdict == Verdict::kMove ? IndicatorPattern::kResultMove
                                                      : IndicatorPattern::kResultInTolerance;
   }
-  switch (scan_.update.guidance.advice) {
-    case SweepAdvice::kNone:
-      break;
-    case SweepAdvice::kSlower:
-    case SweepAdvice::kLost:
+  switch (GuidanceOf(scan_.update.guidance.advice, scan_.dropped_share)) {
+    case web::Guidance::kSlower:
+    case web::Guidance::kTrackingLost:
+    case web::Guidance::kComputerTooSlow:  // fewer frames: a slower sweep still overlaps enough
       return IndicatorPattern::kTooFast;
-    case SweepAdvice::kFarther:
+    case web::Guidance::kFarther:
       return IndicatorPattern::kTooNear;
-    case SweepAdvice::kCloser:
+    case web::Guidance::kCloser:
       return IndicatorPattern::kTooFar;
+    default:
+      return IndicatorPattern::kScanning;
   }
-  return IndicatorPattern::kScanning;
 }
 
 void Appliance::Show() {
@@ -167,6 +180,7 @@ void Appliance::PublishState() {
 }
 
 void Appliance::NotifyWeb(web::EventKind kind) {
+  if (kind == web::EventKind::kData) is_unusable_due_ = true;
   if (tell_web_) tell_web_(kind);
 }
 
@@ -174,7 +188,7 @@ std::string Appliance::FaultReason() const {
   if (state_.phase != ScanPhase::kFault) return {};
   switch (state_.fault) {
     case FaultKind::kStorage:
-      return storage_fault_;
+      return storage_fault_.empty() ? space_fault_ : storage_fault_;
     case FaultKind::kScan:
       return scan_fault_;
     case FaultKind::kSensor:
@@ -317,7 +331,7 @@ web::Status Appliance::WebStatus() {
   if (!profile_fault_.empty()) status.warnings.push_back(profile_fault_);
   status.rolled_back = rolled_back_;
   ReportRoom(status);
-  ReadStored(status);
+  ReadStoredOrFail(status);
   return status;
 }
 
@@ -367,22 +381,32 @@ std::string Appliance::WhySensorIsCold(const std::optional<web::Scan>& scan) con
 }
 
 void Appliance::ReadStored(web::Status& status) {
+  status.check_overdue = IsCheckOverdue();
+  status.reference_block = WhyNoReference();
+  status.session = store_->treatments.Opened();
+  if (status.session && status.session->id != session_id_) status.session.reset();
+  status.waiting = store_->references.Waiting();
+  status.last_check = store_->checks.Last();
+  if (!open_patient_.empty())
+    status.scans_today = store_->scans.CountSince(open_patient_, StartOfDay());
+  if (last_result_) status.last_result = store_->scans.Find(last_result_->id);
+  if (status.last_result) status.last_result->age_s = AgeOf(status.last_result->id);
+}
+
+/// A request for the status must not end the appliance. A failure is posted, because this call may
+/// be part of reporting it.
+void Appliance::ReadStoredOrFail(web::Status& status) {
   if (store_ == nullptr) return;
+  const auto fail = [this](const std::exception& error, StorageFault kind) {
+    loop_.Post("store failed",
+               [this, what = std::string(error.what()), kind] { FailStorage(what, kind); });
+  };
   try {
-    status.check_overdue = IsCheckOverdue();
-    status.reference_block = WhyNoReference();
-    status.session = store_->treatments.Opened();
-    if (status.session && status.session->id != session_id_) status.session.reset();
-    status.waiting = store_->references.Waiting();
-    status.last_check = store_->checks.Last();
-    if (!open_patient_.empty())
-      status.scans_today = store_->scans.CountSince(open_patient_, StartOfDay());
-    if (last_result_) status.last_result = store_->scans.Find(last_result_->id);
-    if (status.last_result) status.last_result->age_s = AgeOf(status.last_result->id);
+    ReadStored(status);
+  } catch (const DatabaseCorrupt& error) {
+    fail(error, StorageFault::kDamage);
   } catch (const std::exception& error) {
-    // A request for the status must not end the appliance. The failure is posted, because this call
-    // may be part of reporting it.
-    loop_.Post("store failed", [this, what = std::string(error.what())] { FailStorage(what); });
+    fail(error, StorageFault::kMayEnd);
   }
 }
 

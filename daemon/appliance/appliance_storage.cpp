@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <ctime>
 #include <filesystem>
-#include <limits>
 #include <thread>
 #include <utility>
 
@@ -43,52 +42,176 @@ std::optional<std::filesystem::space_info> Appliance::SpaceForScans() const {
   const std::filesystem::path& state = parts_.config.appliance.state;
   for (const std::filesystem::path& folder : {state, state / "scans"}) {
     std::error_code error;
-    const std::filesystem::space_info space = std::filesystem::space(folder, error);
+    const std::filesystem::space_info space = SpaceOf(folder, error);
     if (!error && space.capacity > 0 && (!least || space.available < least->available))
       least = space;
   }
   return least;
 }
 
+std::filesystem::space_info Appliance::SpaceOf(const std::filesystem::path& folder,
+                                               std::error_code& error) const {
+  return parts_.space ? parts_.space(folder, error) : std::filesystem::space(folder, error);
+}
+
+/// On any thread. @throws IoError and its kinds
+std::unique_ptr<Store> Appliance::OpenForWork(const std::filesystem::path& state,
+                                              std::chrono::milliseconds lock_wait) const {
+  StoreOptions options;
+  options.check_limit = parts_.check_limit;
+  options.lock_wait = lock_wait;
+  options.sleep = [has_logged = false](std::chrono::milliseconds pause) mutable {
+    if (!std::exchange(has_logged, true))
+      Log(LogLevel::kWarning, "another program holds the database: waiting for it");
+    sd_notify(0, "EXTEND_TIMEOUT_USEC=20000000");  // the start is still in progress
+    std::this_thread::sleep_for(pause);
+  };
+  auto store = std::make_unique<Store>(state, options);
+  // Sessions end with the process: the patient on the couch has to be confirmed again.
+  store->treatments.CloseAll(kSelf);
+  return store;
+}
+
+void Appliance::UseStore(std::unique_ptr<Store> store) {
+  LogRecovery(store->recovery());
+  is_database_checked_ = store->recovery().checked_database;
+  if (!parts_.demo_patient.empty()) {
+    const auto patient = store->patients.FindByCode(parts_.demo_patient);
+    open_patient_ = patient ? patient->id : store->patients.Add(kSelf, parts_.demo_patient, "");
+    session_id_ = store->treatments.Open(kSelf, open_patient_, web::ScanPurpose::kFraction);
+    opened_by_ = kSelf;
+  }
+  store_.Replace(std::move(store));
+  is_store_open_ = true;
+  is_unusable_due_ = true;
+}
+
 void Appliance::OpenStore() {
-  if (!parts_.configuration_fault.empty()) {
-    storage_fault_ = parts_.configuration_fault;
-    Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", storage_fault_));
-    return;
-  }
+  if (!parts_.configuration_fault.empty())
+    return EnterSafeMode(parts_.configuration_fault, StorageFault::kMayEnd);
   try {
-    StoreOptions options;
-    options.check_limit = parts_.check_limit;
-    options.sleep = [has_logged = false](std::chrono::milliseconds pause) mutable {
-      if (!std::exchange(has_logged, true))
-        Log(LogLevel::kWarning, "another program holds the database: waiting for it");
-      sd_notify(0, "EXTEND_TIMEOUT_USEC=20000000");  // the start is still in progress
-      std::this_thread::sleep_for(pause);
-    };
-    store_ = std::make_unique<Store>(parts_.config.appliance.state, options);
-    LogRecovery(store_->recovery());
-    is_database_checked_ = store_->recovery().checked_database;
-    // Sessions end with the process: the patient on the couch has to be confirmed again.
-    store_->treatments.CloseAll(kSelf);
-    if (!parts_.demo_patient.empty()) {
-      const auto patient = store_->patients.FindByCode(parts_.demo_patient);
-      open_patient_ = patient ? patient->id : store_->patients.Add(kSelf, parts_.demo_patient, "");
-      session_id_ = store_->treatments.Open(kSelf, open_patient_, web::ScanPurpose::kFraction);
-      opened_by_ = kSelf;
-    }
+    return UseStore(OpenForWork(parts_.config.appliance.state, StoreOptions().lock_wait));
+  } catch (const DatabaseCorrupt& error) {
+    return EnterSafeMode(error.what(), StorageFault::kDamage);
+  } catch (const DiskRefused& error) {
+    EnterSafeMode(error.what(), StorageFault::kMayEnd);
   } catch (const std::exception& error) {  // the page must show any error
-    store_.reset();
-    storage_fault_ = error.what();
-    Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", storage_fault_));
-    if (dynamic_cast<const DiskRefused*>(&error) == nullptr) return;
+    return EnterSafeMode(error.what(), StorageFault::kMayEnd);
   }
-  if (store_) return;
   try {
-    store_ = Store::OpenReadable(parts_.config.appliance.state);
+    store_.Replace(Store::OpenReadable(parts_.config.appliance.state));
     Log(LogLevel::kNotice, "stored data can be read, but not changed");
   } catch (const std::exception& error) {
     Log(LogLevel::kError, fmt::format("read-only access failed too: {}", error.what()));
   }
+}
+
+void Appliance::EnterSafeMode(const std::string& what, StorageFault kind) {
+  storage_fault_ = what;
+  storage_fault_kind_ = kind;
+  space_fault_.clear();
+  Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", what));
+  constexpr std::chrono::minutes kLasting{10};
+  if (std::chrono::steady_clock::now() - storage_works_since_ > kLasting) num_storage_retries_ = 0;
+  ArmStorageRetry();
+}
+
+/// A damaged database is left to a person: a backup may be being put in its place. With a wrong
+/// configuration, the store to open is not known.
+void Appliance::ArmStorageRetry() {
+  if (storage_fault_kind_ == StorageFault::kDamage || !parts_.configuration_fault.empty() ||
+      parts_.storage_retries.empty())
+    return;
+  const std::size_t last = parts_.storage_retries.size() - 1;
+  storage_timer_.ArmAfter(parts_.storage_retries[std::min(num_storage_retries_++, last)]);
+}
+
+void Appliance::RetryStorage() {
+  if (storage_fault_.empty() || stopped_) return;
+  if (IsRunning()) return ArmStorageRetry();  // a scan that is being cancelled ends first
+  return is_store_open_ ? ProbeStore() : ReopenStore();
+}
+
+/// Of a store that was opened for changes: it has to be read and written without a fault.
+void Appliance::ProbeStore() {
+  try {
+    web::Status status;
+    ReadStored(status);
+  } catch (const DatabaseCorrupt& error) {
+    return EndRetry(error.what(), StorageFault::kDamage);
+  } catch (const std::exception& error) {
+    return EndRetry(error.what());
+  }
+  const bool posted = store_thread_.Post([this, fault = storage_fault_] {
+    std::string what;
+    try {
+      store_->CheckWritable();
+      store_->audit.Log(kSelf, "storage.recovered", "", fault);
+    } catch (const std::exception& error) {
+      what = error.what();
+    }
+    loop_.Post("storage retry", [this, what] { EndRetry(what); });
+  });
+  if (!posted) EndRetry(storage_fault_);
+}
+
+/// Of a store that could not be opened. Without a database there is nothing to come back to: a new
+/// one must not be created in a folder whose disk is missing or which is about to be restored.
+void Appliance::ReopenStore() {
+  const std::filesystem::path& state = parts_.config.appliance.state;
+  std::error_code ignored;
+  if (!std::filesystem::exists(state / "plumb.db", ignored)) return EndRetry(storage_fault_);
+  const bool posted = check_thread_.Post([this, state, fault = storage_fault_] {
+    const auto opened = std::make_shared<std::unique_ptr<Store>>();
+    std::string what;
+    auto kind = StorageFault::kMayEnd;
+    try {
+      *opened = OpenForWork(state, std::chrono::milliseconds(0));
+      (*opened)->audit.Log(kSelf, "storage.recovered", "", fault);
+    } catch (const std::exception& error) {
+      opened->reset();
+      what = error.what();
+      if (dynamic_cast<const DatabaseCorrupt*>(&error) != nullptr) kind = StorageFault::kDamage;
+    }
+    loop_.Post("storage retry", [this, opened, what, kind] {
+      if (!*opened) return EndRetry(what, kind);
+      try {
+        UseStore(std::move(*opened));
+      } catch (const std::exception& error) {
+        return EndRetry(error.what());
+      }
+      EndRetry({});
+    });
+  });
+  if (!posted) EndRetry(storage_fault_);
+}
+
+/// @param fault  The present one; empty: there is none any more.
+void Appliance::EndRetry(const std::string& fault, StorageFault kind) {
+  if (storage_fault_kind_ == StorageFault::kDamage) return;  // found meanwhile
+  if (fault.empty()) return LeaveSafeMode();
+  storage_fault_kind_ = kind;
+  if (fault != storage_fault_) {
+    storage_fault_ = fault;
+    Log(LogLevel::kError, fmt::format("still in safe mode: {}", fault));
+    PublishState();
+  }
+  ArmStorageRetry();
+}
+
+void Appliance::LeaveSafeMode() {
+  Log(LogLevel::kNotice, fmt::format("safe mode has ended, what is stored can be used again; the "
+                                     "fault was: {}",
+                                     storage_fault_));
+  storage_fault_.clear();
+  storage_works_since_ = std::chrono::steady_clock::now();
+  (void)Handle(ScanEvent::kStorageWorks);
+  WatchSpace();
+  RefreshRoom();
+  RunMaintenance();
+  CheckRecords();
+  NotifyWeb(web::EventKind::kStatus);
+  NotifyWeb(web::EventKind::kData);
 }
 
 void Appliance::LogRecovery(const RecoveryReport& found) const {
@@ -155,16 +278,72 @@ Appliance::Answer Appliance::WhyNoSpace() const {
   }
 }
 
-std::vector<std::string> Appliance::StorageWarnings() const {
-  constexpr double kNearlyFull = 0.8;
-  std::vector<std::string> warnings;
-  if (const auto space = SpaceForScans()) {
-    const double used =
-        1.0 - static_cast<double>(space->available) / static_cast<double>(space->capacity);
-    if (used >= kNearlyFull)
-      warnings.push_back(
-          fmt::format("The disk is {:.0f} % full: back up and remove scans.", 100 * used));
+/// State and light must not say "ready" while each press is refused. A result, or the failure of a
+/// scan, stays until it has been seen.
+void Appliance::WatchSpace() {
+  if (IsRunning() || state_.phase == ScanPhase::kResult || state_.fault == FaultKind::kScan ||
+      !storage_fault_.empty())
+    return;
+  const Answer why = WhyNoSpace();
+  const bool has_changed = why.empty() != space_fault_.empty();
+  space_fault_ = why;
+  if (has_changed) {
+    Log(why.empty() ? LogLevel::kNotice : LogLevel::kError,
+        why.empty() ? "there is room for scans again" : why);
+    (void)Handle(why.empty() ? ScanEvent::kStorageWorks : ScanEvent::kStorageFailed);
   }
+  if (Pattern() == shown_) return;  // the disk may have become nearly full
+  Show();
+  NotifyWeb(web::EventKind::kStatus);
+}
+
+/// Of the disk with less room, as df says it: without what is kept for root. 0 if it cannot be
+/// examined.
+double Appliance::UsedShare() const {
+  const auto space = SpaceForScans();
+  if (!space || space->capacity < space->free) return 0.0;
+  const auto used = static_cast<double>(space->capacity - space->free);
+  const double total = used + static_cast<double>(space->available);
+  return total > 0 ? used / total : 1.0;
+}
+
+bool Appliance::IsNearlyFull() const {
+  constexpr double kNearlyFull = 0.8;
+  return UsedShare() >= kNearlyFull;
+}
+
+/// Off the loop: it goes through all scans.
+void Appliance::CountUnusable() {
+  if (!is_store_open_ || !storage_fault_.empty()) return;
+  is_unusable_due_ = !store_thread_.Post([this] {
+    try {
+      const UnusableRecords found = store_->integrity.CountUnusable();
+      loop_.Post("unusable", [this, found] {
+        if (found == unusable_) return;
+        unusable_ = found;
+        NotifyWeb(web::EventKind::kStatus);
+      });
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError, fmt::format("cannot count unusable scans: {}", error.what()));
+    }
+  });
+}
+
+std::vector<std::string> Appliance::StorageWarnings() const {
+  std::vector<std::string> warnings;
+  if (IsNearlyFull())
+    warnings.push_back(
+        fmt::format("The disk is {:.0f} % full: back up and remove scans.", 100 * UsedShare()));
+  if (unusable_.references > 0)
+    warnings.push_back(fmt::format(
+        "The approved references of some patients ({}) cannot be used, because their files are "
+        "missing or changed: put the files back from a backup, or scan and approve new references.",
+        unusable_.references));
+  if (unusable_.scans > 0)
+    warnings.push_back(fmt::format(
+        "Files of some stored scans ({}) are missing or changed: put them back from a backup, or "
+        "remove these scans. The log names them.",
+        unusable_.scans));
   if (!record_fault_.empty()) warnings.push_back(record_fault_);
   if (!backup_fault_.empty()) warnings.push_back("The last backup failed: " + backup_fault_);
   if (backup_is_beside_scans_)
@@ -175,18 +354,6 @@ std::vector<std::string> Appliance::StorageWarnings() const {
   return warnings;
 }
 
-/// As configured, otherwise a fraction of the disk that holds the scans.
-std::uint64_t Appliance::QuotaBytes() const {
-  constexpr double kShare = 0.9;
-  if (parts_.config.appliance.quota_gb)
-    return static_cast<std::uint64_t>(*parts_.config.appliance.quota_gb * 1e9);
-  std::error_code error;
-  const std::filesystem::space_info space =
-      std::filesystem::space(parts_.config.appliance.state / "scans", error);
-  if (error || space.capacity == 0) return std::numeric_limits<std::uint64_t>::max();
-  return static_cast<std::uint64_t>(kShare * static_cast<double>(space.capacity));
-}
-
 /// Detects a disk that has become read-only before a patient is scanned in vain. Runs off the loop.
 void Appliance::CheckDisk() {
   ticks_to_disk_check_ = kDiskCheckTicks;
@@ -194,16 +361,20 @@ void Appliance::CheckDisk() {
   (void)store_thread_.Post([this] {
     try {
       store_->CheckWritable();
-    } catch (const DiskRefused& error) {
-      loop_.Post("disk check", [this, what = std::string(error.what())] { FailStorage(what); });
+    } catch (const std::exception& error) {
+      loop_.Post("disk check", [this, what = std::string(error.what())] {
+        FailStorage(what, StorageFault::kMayEnd);
+      });
     }
   });
 }
 
-void Appliance::FailStorage(const std::string& what) {
-  if (!storage_fault_.empty()) return;
-  storage_fault_ = what;
-  Log(LogLevel::kError, fmt::format("safe mode, nothing can be scanned: {}", what));
+/// Damage takes the place of a fault that may end by itself.
+void Appliance::FailStorage(const std::string& what, StorageFault kind) {
+  const bool is_worse =
+      kind == StorageFault::kDamage && storage_fault_kind_ != StorageFault::kDamage;
+  if (!storage_fault_.empty() && !is_worse) return;
+  EnterSafeMode(what, kind);
   (void)Handle(ScanEvent::kStorageFailed);
   PublishState();
 }
@@ -215,13 +386,16 @@ void Appliance::RunMaintenance() {
   // within this time a time server may still correct the clock
   constexpr std::chrono::hours kTrusted{1};
   const bool has_clock = clock_.held() >= kTrusted;
-  const std::uint64_t quota = QuotaBytes();
-  const bool posted = store_thread_.Post([this, quota, has_clock, stop = care_.get_token()] {
+  const std::optional<double> quota_gb = parts_.config.appliance.quota_gb;
+  const bool posted = store_thread_.Post([this, quota_gb, has_clock, stop = care_.get_token()] {
     try {
+      if (const std::string why = store_->WhyOtherScans(); !why.empty()) throw DiskRefused(why);
       const int old =
           has_clock ? store_->removal.RemoveOldScans(store_->settings.Get().retention_days, stop)
                     : 0;
-      const int over = store_->removal.KeepWithinQuota(quota, stop);
+      const int over = quota_gb ? store_->removal.KeepWithinQuota(
+                                      static_cast<std::uint64_t>(*quota_gb * 1e9), stop)
+                                : KeepWithinRoom(stop);
       if (old + over > 0)
         Log(LogLevel::kNotice,
             fmt::format("removed {} scans for their age, {} for the quota", old, over));
@@ -230,6 +404,13 @@ void Appliance::RunMaintenance() {
     }
   });
   if (!posted) Log(LogLevel::kWarning, "the store is too busy to remove old scans now");
+}
+
+/// Without a configured quota; on the store's thread.
+int Appliance::KeepWithinRoom(const std::stop_token& stop) {
+  std::error_code error;
+  const std::filesystem::space_info space = SpaceOf(store_->folders.scans(), error);
+  return error ? 0 : store_->removal.KeepWithinRoom(space.available, stop);
 }
 
 /// Verifies the audit log once a day, off the loop: its chain of digests protects nothing unless
@@ -251,8 +432,14 @@ void Appliance::CheckRecords() {
             "The audit log has been changed or shortened from outside: entry {} is not as it was "
             "written. Compare it with a backup",
             *broken);
+      // The journal is kept elsewhere: a log that somebody wrote anew does not end like this.
+      if (const AuditHead head = store_->audit.Head(); fault.empty())
+        Log(LogLevel::kInfo, fmt::format("the audit log is whole up to entry {}, chain {}",
+                                         head.number, head.chain));
     } catch (const DatabaseCorrupt& error) {
-      loop_.Post("record check", [this, what = std::string(error.what())] { FailStorage(what); });
+      loop_.Post("record check", [this, what = std::string(error.what())] {
+        FailStorage(what, StorageFault::kDamage);
+      });
     } catch (const std::exception& error) {
       fault = fmt::format("The audit log cannot be checked: {}", error.what());
     }
@@ -272,6 +459,7 @@ void Appliance::CheckStoredFiles() {
   (void)check_thread_.Post([this, stop = care_.get_token()] {
     std::optional<CheckedScan> checked;
     try {
+      if (const std::string why = store_->WhyOtherScans(); !why.empty()) throw DiskRefused(why);
       checked = store_->integrity.CheckNext(kFileCheckEvery, stop);
     } catch (const Interrupted&) {
       return;
@@ -281,6 +469,7 @@ void Appliance::CheckStoredFiles() {
     if (checked) {
       loop_.Post("file check", [this, checked] {
         ticks_to_file_check_ = kFileCheckTicks;
+        is_unusable_due_ = true;
         if (checked->fault.empty()) return;
         Log(LogLevel::kError,
             fmt::format("a stored scan has changed or is missing: {}", checked->fault),

@@ -164,12 +164,7 @@ class Plumbd {
       Log(LogLevel::kNotice, "SHA-256 of the page's certificate: " + page_.certificate);
     for (const std::string& warning : page_.warnings) Log(LogLevel::kWarning, warning);
     CheckCertificate();
-    if (const std::optional<std::string> code = http_.setup_code();
-        code && appliance_.storage_fault().empty()) {
-      // under systemd the standard output goes to the journal
-      fmt::print("setup code: {}\n", *code);
-      std::fflush(stdout);
-    }
+    ShowSetupCode();
     sd_notify(0, "READY=1");
     Log(LogLevel::kNotice,
         fmt::format("plumbd {} is ready; research use only, not a medical device", Version()));
@@ -234,7 +229,18 @@ class Plumbd {
     certificate_timer_.ArmAfter(std::chrono::hours(1));
   }
 
+  /// Once, and not in safe mode, where nobody can make the first account. Under systemd the
+  /// standard output goes to the journal.
+  void ShowSetupCode() {
+    const std::optional<std::string> code = http_.setup_code();
+    if (has_shown_code_ || !code || !appliance_.storage_fault().empty()) return;
+    has_shown_code_ = true;
+    fmt::print("setup code: {}\n", *code);
+    std::fflush(stdout);
+  }
+
   void Tick() {
+    ShowSetupCode();
     tick_.ArmAfter(std::min(watchdog_period_, std::chrono::microseconds(1'000'000)));
     if (const std::string line = appliance_.StatusLine(); line != status_line_) {
       status_line_ = line;
@@ -286,6 +292,7 @@ class Plumbd {
   std::vector<EventLoop::Source> signals_;
   EventLoop::Source tick_, certificate_timer_;
   bool has_watchdog_ = false;
+  bool has_shown_code_ = false;
   std::chrono::microseconds watchdog_period_{1'000'000};
   std::string status_line_;
 };

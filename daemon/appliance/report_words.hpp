@@ -17,15 +17,16 @@ struct ReportWords {
   std::string_view page, scan_title, course_title;
   std::string_view patient, unassigned, site, fraction, scan, scans, reference, version, plan,
       region, corners, whole_body, isocentre, middle, planned_by, approved_by, not_approved,
-      checksum, accepted, accepted_by, accepted_outside, no, printed;
+      checksum, session_by, accepted, accepted_by, accepted_outside, no, printed;
   std::string_view room_markers, couch_markers, tolerance, tolerance_fact;
   std::array<std::string_view, 4> postures;    ///< HFS, HFP, FFS, FFP.
   std::array<std::string_view, 6> short_axes;  ///< With units, as column heads.
   std::string_view verdict_reference, verdict_none, verdict_in, verdict_unsure, verdict_move;
   std::string_view why_in, why_unsure, why_move;
   std::string_view quality, markers, misfit, covered, hole, tracked, tracked_of, lost, keyframes,
-      sensor_on;
-  std::string_view frames_lost, warming, overdue_mark, overdue_words;
+      longest_lost, sensor, sensor_on, room_version, computed_with;
+  std::string_view frames_lost, warming, overdue_mark, overdue_words, room_unknown, room_not_used,
+      marker_ignored, weak_direction;
   std::string_view when, verdict, digits_note;
   SideWords sides;
   PictureWords pictures;

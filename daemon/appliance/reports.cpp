@@ -13,6 +13,7 @@
 #include "daemon/appliance/report_words.hpp"
 #include "daemon/config/version.hpp"
 #include "drivers/files/file_io.hpp"
+#include "drivers/files/image_file.hpp"
 #include "web/api/local_time.hpp"
 #include "web/service/limits.hpp"
 
@@ -151,19 +152,70 @@ ReportFacts QualityOf(const web::Scan& scan, const Json& scene, const Json& resu
     add(words.covered, Said(100 * region.value("coverage", 0.0), 1, words) + " %");
     add(words.hole, Said(1000 * region.value("largest_hole_m", 0.0), 0, words) + " mm");
   }
+  if (result.is_object() && result.contains("room_calibration") &&
+      result["room_calibration"].is_object())
+    add(words.room_version, std::to_string(result["room_calibration"].value("version", 0)));
   if (scene.is_object() && scene.contains("frames")) {
     const Json& frames = scene["frames"];
     add(words.tracked,
         Filled(words.tracked_of, frames.value("tracked", 0), frames.value("total", 0)));
     add(words.lost, std::to_string(frames.value("dropped", 0)));
     add(words.keyframes, std::to_string(scene.value("keyframes", 0)));
+    if (const double gap_s = scene.value("longest_lost_s", 0.0); gap_s > 0)
+      add(words.longest_lost, Said(gap_s, 1, words) + " s");
   }
+  if (!scan.sensor_serial.empty()) add(words.sensor, scan.sensor_serial);
   if (scan.sensor_on_s) add(words.sensor_on, Said(*scan.sensor_on_s / 60, 0, words) + " min");
+  // The program that computed the result, which may be older than the one that prints.
+  if (result.is_object() && result.contains("version"))
+    add(words.computed_with, "Plumb " + result.value("version", ""));
   return facts;
 }
 
-std::vector<std::string> CautionsOf(const web::Scan& scan, const Json& scene, double warm_up_min,
-                                    const ReportWords& words) {
+/// Index of a direction's name in result.json among the six; nothing if it is none of them.
+std::optional<std::size_t> AxisNamed(const std::string& name) {
+  constexpr std::array kNames = {"vertical", "longitudinal", "lateral", "pitch", "roll", "yaw"};
+  const auto* const found = std::ranges::find(kNames, name);
+  if (found == kNames.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - kNames.begin());
+}
+
+/// What the comparison could not rely on.
+void AddComparisonTo(std::vector<std::string>& cautions, const Json& result, Language language) {
+  const ReportWords& words = WordsOf(language);
+  const auto part = [&](const char* name) {
+    return result.is_object() ? result.value(name, Json()) : Json();
+  };
+  if (const Json body = part("body"); body.is_object() && !body.value("room_known", true))
+    cautions.emplace_back(words.room_unknown);
+  if (const Json room = part("room_calibration"); room.is_object() && !room.value("used", true))
+    cautions.push_back(
+        Filled(words.room_not_used, Translated(room.value("why_not_used", ""), language)));
+  if (const Json alignment = part("alignment"); alignment.is_object()) {
+    for (const auto& [id, residual_m] : alignment.value("markers_rejected", Json::object()).items())
+      cautions.push_back(
+          Filled(words.marker_ignored, id, Said(1000 * residual_m.get<double>(), 0, words)));
+  }
+  if (const Json motion = part("motion"); motion.is_object()) {
+    for (const Json& weak : motion.value("weak_directions", Json::array())) {
+      const std::string name = weak.value("name", "");
+      const std::optional<std::size_t> axis = AxisNamed(name);
+      cautions.push_back(
+          Filled(words.weak_direction, axis ? std::string(words.terms.axes[*axis]) : name));
+    }
+  }
+}
+
+void AddWarningsTo(std::vector<std::string>& cautions, const Json& file, Language language) {
+  if (!file.is_object()) return;
+  for (const Json& warning : file.value("warnings", Json::array()))
+    cautions.push_back(Translated(warning.get<std::string>(), language));
+}
+
+/// What is said beside the verdict: on the report, on the page without script and in print.
+std::vector<std::string> CautionsIn(const web::Scan& scan, const Json& scene, const Json& result,
+                                    double warm_up_min, Language language) {
+  const ReportWords& words = WordsOf(language);
   std::vector<std::string> cautions;
   if (scene.is_object() && scene.contains("frames")) {
     const double total = scene["frames"].value("total", 0.0);
@@ -174,6 +226,9 @@ std::vector<std::string> CautionsOf(const web::Scan& scan, const Json& scene, do
   if (scan.sensor_on_s && *scan.sensor_on_s < 60 * warm_up_min)
     cautions.emplace_back(words.warming);
   if (scan.check_overdue) cautions.emplace_back(words.terms.overdue);
+  AddComparisonTo(cautions, result, language);
+  AddWarningsTo(cautions, result, language);
+  AddWarningsTo(cautions, scene, language);
   return cautions;
 }
 
@@ -216,7 +271,7 @@ void AddReferenceTo(ReportFacts& facts, const web::Reference& reference, const R
   facts.emplace_back(words.tolerance_fact, ToleranceText(reference.plan.tolerance, words));
   facts.emplace_back(words.region, RegionText(reference.plan, words));
   facts.emplace_back(words.isocentre, IsocentreText(reference.plan, words));
-  facts.emplace_back(words.planned_by, reference.planned_by);
+  facts.emplace_back(words.planned_by, reference.planned_by.empty() ? "-" : reference.planned_by);
   facts.emplace_back(words.approved_by,
                      reference.approved_at ? fmt::format("{}, {}", reference.approved_by,
                                                          web::LocalTimeText(*reference.approved_at))
@@ -243,6 +298,7 @@ ReportFacts IdentityOf(const web::Scan& scan, const std::optional<web::Patient>&
   add(words.site, patient && !patient->site.empty() ? patient->site : "-");
   add(words.fraction, scan.fraction > 0 ? std::to_string(scan.fraction) : "-");
   add(words.scan, fmt::format("{}, {}", scan.id, web::LocalTimeText(scan.started_at)));
+  if (!scan.session_by.empty()) add(words.session_by, scan.session_by);
   if (reference) AddReferenceTo(facts, *reference, words);
   const std::string accepted = AcceptedText(scan, words);
   add(words.accepted, accepted.empty() ? std::string(words.no) : accepted);
@@ -289,7 +345,7 @@ ScanReport DescribeScan(const ReportSources& stored, const web::Scan& scan, Lang
                     .why = WhyOf(scan, language),
                     .identity = IdentityOf(scan, patient, reference, words),
                     .numbers = NumbersOf(scan, tolerance, language),
-                    .cautions = CautionsOf(scan, scene, stored.warm_up_min, words),
+                    .cautions = CautionsIn(scan, scene, result, stored.warm_up_min, language),
                     .quality = QualityOf(scan, scene, result, words),
                     .body = {},
                     .pictures = PicturesOf(stored, scan, reference, result, words),
@@ -338,6 +394,28 @@ CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& pat
   if (is_any_overdue)
     report.identity.emplace_back(words.overdue_mark, std::string(words.overdue_words));
   return report;
+}
+
+std::vector<std::string> CautionsOf(const ReportSources& stored, const web::Scan& scan,
+                                    Language language) {
+  try {
+    return CautionsIn(scan, JsonIn(scan.folder / "scene/scene.json"),
+                      JsonIn(scan.folder / "result/result.json"), stored.warm_up_min, language);
+  } catch (const Json::exception&) {  // a file that another version wrote differently
+    return CautionsIn(scan, {}, {}, stored.warm_up_min, language);
+  }
+}
+
+std::optional<std::string> ComparisonPng(const ReportSources& stored, const web::Scan& scan,
+                                         web::ComparisonPicture picture, Language language) {
+  if (!scan.result) return std::nullopt;
+  const std::vector<cv::Mat> pictures =
+      PicturesOf(stored, scan, stored.references.Find(scan.reference_id),
+                 JsonIn(scan.folder / "result/result.json"), WordsOf(language));
+  const auto wanted = static_cast<std::size_t>(picture);
+  if (wanted >= pictures.size()) return std::nullopt;
+  const std::vector<std::uint8_t> png = EncodePng(pictures[wanted]);
+  return std::string(png.begin(), png.end());
 }
 
 std::string ScanReportPdf(const ReportSources& stored, const web::Scan& scan, Language language) {

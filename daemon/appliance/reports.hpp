@@ -1,6 +1,7 @@
 // Assembles the reports from stored records. Called on a thread for reads.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "daemon/files/pdf_report.hpp"
@@ -26,6 +27,18 @@ struct ReportSources {
 /// All compared scans of a patient, oldest first.
 [[nodiscard]] CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& patient,
                                           web::Language language);
+
+/// What is to be known beside the verdict: lost frames, a cold sensor, an overdue check, a room
+/// that is not calibrated, ignored markers, uncertain directions, warnings.
+[[nodiscard]] std::vector<std::string> CautionsOf(const ReportSources& stored,
+                                                  const web::Scan& scan, web::Language language);
+
+/// A picture of the comparison as a PNG file; nothing if the scan was not compared, or a file that
+/// is needed is missing or damaged.
+[[nodiscard]] std::optional<std::string> ComparisonPng(const ReportSources& stored,
+                                                       const web::Scan& scan,
+                                                       web::ComparisonPicture picture,
+                                                       web::Language language);
 
 /// The reports as files. @throws IoError
 [[nodiscard]] std::string ScanReportPdf(const ReportSources& stored, const web::Scan& scan,

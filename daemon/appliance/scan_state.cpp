@@ -63,6 +63,8 @@ void Note(ScanState& state, ScanEvent event) {
       state.fault = SensorFault(state);
   }
   if (event == ScanEvent::kStorageFailed) state.fault = FaultKind::kStorage;
+  if (event == ScanEvent::kStorageWorks && state.fault == FaultKind::kStorage)
+    state.fault = SensorFault(state);
 }
 
 ScanTransition InNoSensor(const ScanState& state, ScanEvent event) {
@@ -232,8 +234,8 @@ const char* Name(ScanEvent event) {
   static constexpr const char* kNames[] = {
       "sensor_ready", "sensor_lost",    "sensor_failed",  "short_press",    "long_press",
       "start",        "end_sweep",      "cancel",         "sweep_complete", "scan_done",
-      "scan_failed",  "scan_cancelled", "result_expired", "storage_failed"};
-  static_assert(std::size(kNames) == static_cast<std::size_t>(ScanEvent::kStorageFailed) + 1);
+      "scan_failed",  "scan_cancelled", "result_expired", "storage_failed", "storage_works"};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(ScanEvent::kStorageWorks) + 1);
   return kNames[static_cast<int>(event)];
 }
 

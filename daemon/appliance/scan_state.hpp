@@ -15,7 +15,7 @@ enum class FaultKind {
   kNone,
   kSensor,   ///< The sensor is attached and does not work; ends when it works or is unplugged.
   kScan,     ///< The last scan failed; ends when somebody acknowledges it by a press.
-  kStorage,  ///< Nothing can be stored: safe mode until the next start.
+  kStorage,  ///< Nothing can be stored; ends when the storage works again.
 };
 
 struct ScanState {
@@ -45,6 +45,7 @@ enum class ScanEvent {
   kScanCancelled,  ///< The threads of the cancelled scan have ended.
   kResultExpired,  ///< Old enough to be dismissed.
   kStorageFailed,
+  kStorageWorks,  ///< Again, after it had failed.
 };
 
 enum class ScanAction { kStartScan, kEndSweep, kCancelScan, kArmResultTimer, kRefuse };

@@ -66,10 +66,7 @@ std::string Updates::WhyNotScan() const {
 
 std::string Updates::WhyNotInstall() const {
   if (restarting_) return "the machine is being restarted";
-  if (!appliance_.IsRunning()) return {};
-  return fmt::format(
-      "in state {}, trying to update, requires that no scan runs: wait for its result",
-      Name(appliance_.state().phase));
+  return appliance_.WhyNotIdle();
 }
 
 std::string Updates::WhyNotRestart() const {

@@ -32,6 +32,12 @@ void WebAccounts::ChangeUser(const web::Actor& actor, const web::UserChange& cha
                 [=](UserStore& users) { users.Change(actor, change); });
 }
 
+void WebAccounts::SetPreferences(const web::Actor& actor, const web::Preferences& preferences,
+                                 web::Done done) {
+  store_.Change(&Store::users, std::move(done),
+                [=](UserStore& users) { users.SetPreferences(actor.user, preferences); });
+}
+
 std::vector<web::Display> WebDisplays::Displays() {
   return store_.ReadOrNothing(&Store::displays,
                               [](DisplayStore& displays) { return displays.List(); });
@@ -60,6 +66,10 @@ void WebAuditLog::Log(const web::Actor& actor, const std::string& action,
 
 std::vector<web::AuditEntry> WebAuditLog::Audit(const web::AuditQuery& query) {
   return store_.Read(&Store::audit, [&](AuditStore& audit) { return audit.Find(query); });
+}
+
+std::string WebAuditLog::ExportAudit() {
+  return store_.Read(&Store::audit, [](AuditStore& audit) { return audit.Export(); });
 }
 
 }  // namespace plumb

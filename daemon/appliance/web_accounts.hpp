@@ -18,6 +18,8 @@ class WebAccounts : public web::AccountService {
   [[nodiscard]] std::optional<web::User> FindUser(const std::string& name) override;
   void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;
   void ChangeUser(const web::Actor& actor, const web::UserChange& change, web::Done done) override;
+  void SetPreferences(const web::Actor& actor, const web::Preferences& preferences,
+                      web::Done done) override;
 
  private:
   StoreAccess& store_;
@@ -44,6 +46,7 @@ class WebAuditLog : public web::AuditLog {
   void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
            const std::string& detail) override;
   [[nodiscard]] std::vector<web::AuditEntry> Audit(const web::AuditQuery& query) override;
+  [[nodiscard]] std::string ExportAudit() override;
 
  private:
   StoreAccess& store_;

@@ -61,6 +61,40 @@ std::optional<std::string> WebScans::CompactMap(const std::string& scan_id,
   }
 }
 
+std::vector<std::string> WebScans::Cautions(const std::string& scan_id, web::Language language) {
+  return store_.Read([&](Store& store) -> std::vector<std::string> {
+    const std::optional<web::Scan> scan = store.scans.Find(scan_id);
+    return scan ? CautionsOf(SourcesIn(store), *scan, language) : std::vector<std::string>();
+  });
+}
+
+std::optional<std::string> WebScans::FindDrawn(const std::string& scan_id,
+                                               web::ComparisonPicture picture,
+                                               web::Language language) {
+  const std::lock_guard lock(drawn_mutex_);
+  for (const Drawn& one : drawn_)
+    if (one.scan_id == scan_id && one.picture == picture && one.language == language)
+      return one.png;
+  return std::nullopt;
+}
+
+std::optional<std::string> WebScans::PictureOf(const std::string& scan_id,
+                                               web::ComparisonPicture picture,
+                                               web::Language language) {
+  return store_.Read([&](Store& store) -> std::optional<std::string> {
+    const std::optional<web::Scan> scan = store.scans.Find(scan_id);
+    if (!scan) return std::nullopt;
+    if (auto png = FindDrawn(scan_id, picture, language)) return png;
+    std::optional<std::string> png = ComparisonPng(SourcesIn(store), *scan, picture, language);
+    if (!png) return std::nullopt;
+    constexpr std::size_t kMaxDrawn = 4;  // both pictures in both languages
+    const std::lock_guard lock(drawn_mutex_);
+    drawn_.push_front({scan_id, picture, language, *png});
+    if (drawn_.size() > kMaxDrawn) drawn_.pop_back();
+    return png;
+  });
+}
+
 std::optional<std::string> WebScans::ScanReport(const std::string& scan_id,
                                                 web::Language language) {
   return store_.Read([&](Store& store) -> std::optional<std::string> {

@@ -1,6 +1,12 @@
 // The page's service for scans.
 #pragma once
 
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "daemon/appliance/reports.hpp"
 #include "daemon/appliance/store_access.hpp"
 #include "web/service/scan_service.hpp"
@@ -20,16 +26,33 @@ class WebScans : public web::ScanService {
                   web::Done done) override;
   [[nodiscard]] std::optional<std::string> CompactMap(const std::string& scan_id,
                                                       const std::string& name) override;
+  [[nodiscard]] std::vector<std::string> Cautions(const std::string& scan_id,
+                                                  web::Language language) override;
+  [[nodiscard]] std::optional<std::string> PictureOf(const std::string& scan_id,
+                                                     web::ComparisonPicture picture,
+                                                     web::Language language) override;
   [[nodiscard]] std::optional<std::string> ScanReport(const std::string& scan_id,
                                                       web::Language language) override;
   [[nodiscard]] std::optional<std::string> CourseReport(const std::string& patient_id,
                                                         web::Language language) override;
 
  private:
+  /// A picture that was drawn. What it is drawn from is never changed.
+  struct Drawn {
+    std::string scan_id;
+    web::ComparisonPicture picture;
+    web::Language language;
+    std::string png;
+  };
   [[nodiscard]] ReportSources SourcesIn(Store& store) const;
+  [[nodiscard]] std::optional<std::string> FindDrawn(const std::string& scan_id,
+                                                     web::ComparisonPicture picture,
+                                                     web::Language language);
 
   Appliance& appliance_;
   StoreAccess& store_;
+  std::mutex drawn_mutex_;
+  std::deque<Drawn> drawn_;  ///< The newest ones: the page without script asks every 10 seconds.
 };
 
 }  // namespace plumb

@@ -51,6 +51,7 @@ using Command = std::function<int(const CommandContext&)>;
 [[nodiscard]] Command AddUpdate(CLI::App& app);
 [[nodiscard]] Command AddBackup(CLI::App& app);
 [[nodiscard]] Command AddRestore(CLI::App& app);
+[[nodiscard]] Command AddVerifyLog(CLI::App& app);
 [[nodiscard]] Command AddExportPatient(CLI::App& app);
 [[nodiscard]] Command AddImportPatient(CLI::App& app);
 [[nodiscard]] Command AddFactoryReset(CLI::App& app);

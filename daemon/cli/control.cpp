@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <memory>
 #include <optional>
@@ -99,9 +100,22 @@ Json Ask(const std::filesystem::path& socket, const ControlRequest& request,
   return AskPlumbd(socket, request, context.stop, kTimeout_ms);
 }
 
-std::string NumberText(const Json& result, const char* name) {
-  const Json value = result.value(name, Json());
-  return value.is_number() ? fmt::format("{:+.2f}", value.get<double>()) : std::string("refused");
+/// One of the six numbers: "+1.2 ± 0.3 mm  up", with no digit below the uncertainty.
+std::string NumberText(const Json& correction, const std::string& name, const char* unit) {
+  const std::string key = name + "_" + unit;
+  const Json value = correction.value(key, Json());
+  if (!value.is_number()) return "not known";
+  const Json u95 = correction.value("uncertainty", Json::object()).value(key, Json());
+  const double half = u95.is_number() ? u95.get<double>() : 0.0;
+  const int most = std::string_view(unit) == "mm" ? 1 : 2;
+  const int digits =
+      half > 0 ? std::clamp(static_cast<int>(-std::floor(std::log10(half) + 1e-9)), 0, most) : most;
+  const std::string words =
+      std::abs(value.get<double>()) > half
+          ? correction.value("words", Json::object()).value(name, std::string())
+          : "less than its uncertainty";
+  return fmt::format("{:>+8.{}f} \u00b1 {:.{}f} {:<4} {}", value.get<double>(), digits, half, most,
+                     unit, words);
 }
 
 std::string StatusText(const Json& status) {
@@ -142,12 +156,11 @@ std::string StatusText(const Json& status) {
     const Json verdict = last.value("verdict", Json());
     text += fmt::format("result   scan {}: {}\n", last.value("scan", ""),
                         verdict.is_string() ? verdict.get<std::string>() : "reference taken");
-    if (last.value("correction", Json()).is_object()) {
+    if (const Json correction = last.value("correction", Json()); correction.is_object()) {
       for (const auto& [name, unit] : {std::pair("vertical", "mm"), std::pair("longitudinal", "mm"),
                                        std::pair("lateral", "mm"), std::pair("pitch", "deg"),
                                        std::pair("roll", "deg"), std::pair("yaw", "deg")}) {
-        text += fmt::format("         {:<13}{:>9} {}\n", name,
-                            NumberText(last, fmt::format("{}_{}", name, unit).c_str()), unit);
+        text += fmt::format("         {:<13}{}\n", name, NumberText(correction, name, unit));
       }
     }
     for (const Json& reason : last.value("reasons", Json::array()))

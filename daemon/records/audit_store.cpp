@@ -1,9 +1,13 @@
 #include "daemon/records/audit_store.hpp"
 
+#include <algorithm>
 #include <array>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
+#include "algo/base/bounded_json.hpp"
+#include "algo/base/errors.hpp"
 #include "daemon/records/audit_subjects.hpp"
 #include "daemon/records/scan_files.hpp"
 #include "daemon/records/stored_values.hpp"
@@ -28,6 +32,8 @@ std::string ChainText(const std::string& before, std::int64_t number, std::int64
   for (const std::string& field : fields) text += fmt::format("{}:{}\n", field.size(), field);
   return text;
 }
+
+constexpr std::array<const char*, 5> kFields = {"user", "address", "action", "subject", "detail"};
 
 constexpr const char* kAuditRows =
     "SELECT number, time, user, address, action, subject, detail, chain FROM audit ORDER BY number";
@@ -105,6 +111,62 @@ std::vector<web::AuditEntry> AuditStore::Find(const web::AuditQuery& wanted) {
   for (web::AuditEntry& entry : entries)
     entry.about = DescribeSubject(*lists, entry.action, entry.subject);
   return entries;
+}
+
+std::string AuditStore::Export() {
+  const StoreDatabase::Held lists = database_.ForLists();
+  Statement query = lists->Prepare(
+      "SELECT number, time, user, address, action, subject, detail, chain FROM audit WHERE number "
+      "> (SELECT ifnull(max(number), 0) FROM audit) - ? ORDER BY number");
+  query.Bind(std::int64_t{kMaxExported});
+  std::string lines;
+  while (query.Step()) {
+    nlohmann::ordered_json line = {{"number", query.Integer(0)}, {"time_us", query.Integer(1)}};
+    for (std::size_t i = 0; i < kFields.size(); ++i)
+      line[kFields[i]] = query.Text(static_cast<int>(i) + 2);
+    line["chain"] = query.Text(7);
+    lines += line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  }
+  return lines;
+}
+
+AuditHead CheckAuditExport(std::string_view lines) {
+  AuditHead head;
+  bool is_chained = false;
+  while (!lines.empty()) {
+    const std::size_t end = std::min(lines.find('\n'), lines.size());
+    const nlohmann::json line = ParseBoundedJson(lines.substr(0, end));
+    lines.remove_prefix(std::min(end + 1, lines.size()));
+    std::array<std::string, kFields.size()> fields;
+    std::int64_t number = 0, time_us = 0;
+    std::string chain;
+    try {
+      number = line.at("number").get<std::int64_t>();
+      time_us = line.at("time_us").get<std::int64_t>();
+      for (std::size_t i = 0; i < fields.size(); ++i)
+        fields[i] = line.at(kFields[i]).get<std::string>();
+      chain = line.at("chain").get<std::string>();
+    } catch (const nlohmann::json::exception&) {
+      throw DataError(fmt::format("what follows entry {} is not an entry of the log", head.number));
+    }
+    const bool is_first = head.number == 0;
+    const std::string expected = Sha256Of(ChainText(head.chain, number, time_us, fields));
+    is_chained = is_chained || !chain.empty();
+    const bool follows = is_first || number == head.number + 1;
+    const bool cannot_know = is_first && number != 1;
+    if (!follows || (is_chained && !cannot_know && chain != expected))
+      throw DataError(fmt::format("entry {} is not as it was written, or one before it is missing",
+                                  follows ? number : head.number + 1));
+    head = {.number = number, .chain = is_chained ? chain : expected};
+  }
+  return head;
+}
+
+AuditHead AuditStore::Head() {
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare("SELECT number, chain FROM audit ORDER BY number DESC LIMIT 1");
+  if (!query.Step()) return {};
+  return {.number = query.Integer(0), .chain = query.Text(1)};
 }
 
 std::optional<std::int64_t> AuditStore::FirstBroken() {

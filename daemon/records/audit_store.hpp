@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/records/store_database.hpp"
@@ -16,6 +17,18 @@ namespace plumb {
 void AppendAuditEntry(Database& database, const web::Actor& actor, const std::string& action,
                       const std::string& subject, const std::string& detail);
 
+/// The newest entry. Its digest covers the whole log: whoever has noted it can tell later whether
+/// anything before it was changed.
+struct AuditHead {
+  std::int64_t number = 0;  ///< 0: there is no entry.
+  std::string chain;
+};
+
+/// Checks what AuditStore::Export() wrote, each entry against the one before it. The first line of
+/// an export that does not begin with entry 1 cannot be checked.
+/// @throws DataError naming the first entry that is not as it was written
+[[nodiscard]] AuditHead CheckAuditExport(std::string_view lines);
+
 /// Thread-safe. @throws IoError and its kinds
 class AuditStore {
  public:
@@ -25,6 +38,11 @@ class AuditStore {
            const std::string& detail);
   /// Newest first.
   [[nodiscard]] std::vector<web::AuditEntry> Find(const web::AuditQuery& wanted);
+  /// One JSON object a line, oldest first, with all that the chain covers and its digests: the
+  /// newest kMaxExported entries.
+  [[nodiscard]] std::string Export();
+  static constexpr int kMaxExported = 200'000;
+  [[nodiscard]] AuditHead Head();
   /// The number of the first entry that does not match the previous one; nothing if the log is as
   /// it was written. Entries from before schema 5 are covered together.
   [[nodiscard]] std::optional<std::int64_t> FirstBroken();

@@ -6,12 +6,16 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <map>
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
+#include "daemon/records/audit_store.hpp"
 #include "daemon/records/database.hpp"
 #include "daemon/records/file_copy.hpp"
 #include "daemon/records/scan_files.hpp"
@@ -36,6 +40,8 @@ constexpr std::array<const char*, 4> kOtherFolders = {ScanFolders::kSetAside, "c
                                                       "imports", "sensor-profiles"};
 constexpr const char* kRestoring = ".restore";
 constexpr const char* kBackingUp = ".backup";
+/// In a restored state folder, until its audit log has the entry.
+constexpr const char* kRestored = "restored.json";
 
 /// True for the paths that a backup can contain: nothing outside it, nothing unknown.
 bool MayHold(const std::string& path) {
@@ -200,7 +206,7 @@ void GiveToOwnerOf(const fs::path& state, const fs::path& tree) {
 }
 
 void MoveIn(const fs::path& made, const fs::path& state) {
-  std::vector<std::string> names = {kScans};
+  std::vector<std::string> names = {kRestored, kScans};
   names.insert(names.end(), kOtherFolders.begin(), kOtherFolders.end());
   names.emplace_back(kDatabase);
   for (const std::string& name :
@@ -267,6 +273,11 @@ BackupReport RestoreBackup(const fs::path& backup, const fs::path& state,
     }
     for (const fs::directory_entry& scan : fs::directory_iterator(made / kScans))
       report.scans += scan.is_directory() ? 1 : 0;
+    WriteWholeFile(made / kRestored, nlohmann::ordered_json{{"backup", backup.string()},
+                                                            {"sha256", reader.digest()},
+                                                            {"scans", report.scans},
+                                                            {"time", store::Now()}}
+                                         .dump(2));
     GiveToOwnerOf(state, made);
     SyncDisk(made);
     MoveIn(made, state);
@@ -278,6 +289,28 @@ BackupReport RestoreBackup(const fs::path& backup, const fs::path& state,
     throw;
   }
   return report;
+}
+
+void NoteRestore(const fs::path& state, Database& database) {
+  const fs::path note = state / kRestored;
+  std::error_code error;
+  if (!fs::exists(note, error)) return;
+  std::string detail;
+  try {
+    constexpr std::size_t kLongest = 1U << 16U;
+    const nlohmann::json about = nlohmann::json::parse(ReadTextFile(note, kLongest));
+    detail = fmt::format("{}: {} scans, sha256 {}, restored at {:%F %T} UTC",
+                         about.at("backup").get<std::string>(), about.at("scans").get<int>(),
+                         about.at("sha256").get<std::string>(),
+                         fmt::gmtime(std::chrono::system_clock::to_time_t(
+                             store::FromStored(about.at("time").get<std::int64_t>()))));
+  } catch (const std::exception& unreadable) {  // that it was restored is known in any case
+    detail = fmt::format("the note about it cannot be read: {}", unreadable.what());
+  }
+  Transaction transaction(database);
+  AppendAuditEntry(database, store::kSelf, "backup.restore", "", detail);
+  transaction.Commit();
+  fs::remove(note, error);  // if that fails, the next start adds the entry once more
 }
 
 }  // namespace plumb

@@ -48,12 +48,16 @@ struct BackupReport {
 
 /// Restores a state folder from a backup. Every file is compared with SHA256SUMS, and the database
 /// is checked, before anything is written. A state folder left by an interrupted restore has no
-/// database, so plumbd starts in safe mode.
+/// database, so plumbd starts in safe mode. The first start has an entry in the audit log about it.
 /// @param state  Missing or empty. Its owner becomes the files' owner if the process may set it.
 /// @throws DataError if the backup is not complete, naming the first wrong file, or the secret is
 ///         not the one of the encryption; std::invalid_argument if the state folder is in use;
 ///         IoError; Interrupted
 BackupReport RestoreBackup(const std::filesystem::path& backup, const std::filesystem::path& state,
                            const std::stop_token& stop = {}, const BackupSecret* secret = nullptr);
+
+/// Adds the entry of a restore to the audit log, at the first start after it.
+/// @throws IoError and its kinds
+void NoteRestore(const std::filesystem::path& state, Database& database);
 
 }  // namespace plumb

@@ -84,4 +84,21 @@ std::optional<CheckedScan> FileIntegrity::CheckNext(std::chrono::hours at_least,
   return CheckedScan{.id = std::move(id), .fault = std::move(fault)};
 }
 
+UnusableRecords FileIntegrity::CountUnusable() {
+  const StoreDatabase::Held lists = database_.ForLists();
+  UnusableRecords found;
+  {
+    Statement query = lists->Prepare(
+        "SELECT count(*) FROM scans JOIN patients ON patients.id = patient_id WHERE unavailable <> "
+        "'' AND archived = 0");
+    if (query.Step()) found.scans = static_cast<int>(query.Integer(0));
+  }
+  Statement query = lists->Prepare(
+      "SELECT count(*) FROM refs JOIN scans ON scans.id = scan_id JOIN patients ON patients.id = "
+      "refs.patient_id WHERE unavailable <> '' AND archived = 0 AND version = (SELECT "
+      "max(version) FROM refs AS r WHERE r.patient_id = refs.patient_id AND r.approved_by <> '')");
+  if (query.Step()) found.references = static_cast<int>(query.Integer(0));
+  return found;
+}
+
 }  // namespace plumb

@@ -17,6 +17,13 @@ struct CheckedScan {
   std::string fault;  ///< Empty if its files are as they were stored.
 };
 
+/// What cannot be used because of its files, of patients who are not archived.
+struct UnusableRecords {
+  int scans = 0;
+  int references = 0;  ///< Patients whose newest approved reference is one of them.
+  bool operator==(const UnusableRecords&) const = default;
+};
+
 /// Thread-safe. @throws IoError and its kinds; Interrupted
 class FileIntegrity {
  public:
@@ -34,6 +41,8 @@ class FileIntegrity {
   /// if none is due.
   std::optional<CheckedScan> CheckNext(std::chrono::hours at_least,
                                        const std::stop_token& stop = {});
+  /// As found by the last check of each scan.
+  [[nodiscard]] UnusableRecords CountUnusable();
 
  private:
   StoreDatabase& database_;

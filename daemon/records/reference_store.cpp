@@ -20,13 +20,16 @@ namespace {
 
 constexpr const char* kReferenceColumns =
     "SELECT id, patient_id, version, scan_id, created_at, created_by, reason, approved_by, "
-    "approved_at, plan, revision, planned_by FROM refs ";
+    "approved_at, plan, revision, planned_by, (SELECT group_concat(path || ' ' || sha256, "
+    "char(10)) FROM (SELECT path, sha256 FROM scan_files WHERE scan_files.scan_id = refs.scan_id "
+    "AND path LIKE 'scene/%' ORDER BY path)) FROM refs ";
 
-/// SHA-256 of the data that an approval signs.
-std::string DigestOf(const std::string& patient_id, int version, const std::string& scan_id,
-                     const std::string& plan_json) {
+/// SHA-256 of the data that an approval signs: all that the summary shows, and the files of the
+/// surface that later scans are compared with.
+std::string DigestOf(const Statement& row) {
   const std::string text =
-      fmt::format("patient {}\nversion {}\nscan {}\n{}", patient_id, version, scan_id, plan_json);
+      fmt::format("patient {}\nversion {}\nscan {}\nreason {}\n{}\n{}", row.Text(1), row.Integer(2),
+                  ScanId(row.Integer(3)), row.Text(6), row.Text(9), row.Text(12));
   Sha256 hash;
   hash.Add(text.data(), text.size());
   return hash.Hex();
@@ -57,7 +60,7 @@ web::Reference ReadReferenceRow(const Statement& row) {
                            .approved_at = {},
                            .plan = {}};
   if (!row.IsNull(8)) reference.approved_at = FromStored(row.Integer(8));
-  reference.digest = DigestOf(row.Text(1), reference.version, reference.scan_id, row.Text(9));
+  reference.digest = DigestOf(row);
   return reference;
 }
 
@@ -85,12 +88,23 @@ void RequireRevision(std::int64_t stored, int read) {
                        "this plan has been changed by somebody else meanwhile: look at it again");
 }
 
+/// One person plans, another approves.
+void RequireSecondPerson(const web::Reference& reference, const web::Actor& approver) {
+  if (reference.planned_by.empty())
+    throw StoreRefusal(ChangeResult::kConflict,
+                       "nobody has planned this reference: save its plan first");
+  if (reference.created_by == approver.user || reference.planned_by == approver.user)
+    throw StoreRefusal(ChangeResult::kRefused,
+                       "who made or planned a reference does not approve it: ask a second person");
+}
+
 }  // namespace
 
 std::vector<web::WaitingReference> ReferenceStore::Waiting() {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare(
-      "SELECT refs.id, patient_id, code, version FROM refs JOIN patients ON patients.id = "
+      "SELECT refs.id, patient_id, code, version, planned_by FROM refs JOIN patients ON "
+      "patients.id = "
       "patient_id WHERE archived = 0 AND approved_by = '' AND version > (SELECT "
       "ifnull(max(version), 0) FROM refs "
       "AS r WHERE r.patient_id = refs.patient_id AND r.approved_by <> '') AND NOT EXISTS (SELECT 1 "
@@ -101,7 +115,8 @@ std::vector<web::WaitingReference> ReferenceStore::Waiting() {
     waiting.push_back({.reference_id = query.Text(0),
                        .patient_id = query.Text(1),
                        .patient_code = query.Text(2),
-                       .version = static_cast<int>(query.Integer(3))});
+                       .version = static_cast<int>(query.Integer(3)),
+                       .planned_by = query.Text(4)});
   }
   return waiting;
 }
@@ -159,12 +174,12 @@ std::string ReferenceStore::Add(const web::Actor& actor, const std::string& scan
       .Prepare(
           "INSERT INTO refs (patient_id, version, scan_id, created_at, created_by, planned_by, "
           "reason, plan) VALUES (?,"
-          " 1 + (SELECT ifnull(max(version), 0) FROM refs WHERE patient_id = ?), ?, ?, ?, ?, ?, ?)")
+          " 1 + (SELECT ifnull(max(version), 0) FROM refs WHERE patient_id = ?), ?, ?, ?, '', ?, "
+          "?)")
       .Bind(patient)
       .Bind(patient)
       .Bind(scan)
       .Bind(Now())
-      .Bind(actor.user)
       .Bind(actor.user)
       .Bind(reason)
       .Bind(PlanJson(plan))
@@ -180,12 +195,14 @@ std::string ReferenceStore::Plan(const web::Actor& actor, const std::string& id,
   const std::int64_t number = RequireId(id, "reference");
   StoreChange change(database_);
   bool is_approved = false;
+  std::string stored;
   {
-    Statement query = change.Prepare("SELECT approved_by, revision FROM refs WHERE id = ?");
+    Statement query = change.Prepare("SELECT approved_by, revision, plan FROM refs WHERE id = ?");
     if (!query.Bind(number).Step())
       throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
     is_approved = !query.Text(0).empty();
     RequireRevision(query.Integer(1), revision);
+    stored = query.Text(2);
   }
   std::string changed = id;
   if (is_approved) {
@@ -210,7 +227,8 @@ std::string ReferenceStore::Plan(const web::Actor& actor, const std::string& id,
         .Bind(number)
         .Run();
   }
-  change.Log(actor, "reference.plan", changed, PlanJson(plan));
+  // Both as they are stored: one that cannot be read is kept in the log as it was.
+  change.Log(actor, "reference.plan", changed, stored + "\n" + PlanJson(plan));
   change.Commit();
   return changed;
 }
@@ -229,24 +247,19 @@ void ReferenceStore::Approve(const web::Actor& actor, const std::string& id, int
   std::string signed_digest;
   StoreChange change(database_);
   {
-    Statement query = change.Prepare(
-        "SELECT approved_by, created_by, planned_by, revision, patient_id, version, scan_id, plan "
-        "FROM refs WHERE id = ?");
+    static const std::string kSql = std::string(kReferenceColumns) + "WHERE id = ?";
+    Statement query = change.Prepare(kSql.c_str());
     if (!query.Bind(number).Step())
       throw StoreRefusal(ChangeResult::kNotFound, "there is no such reference");
-    if (!query.Text(0).empty())
+    const web::Reference reference = ReadReferenceRow(query);
+    if (!reference.approved_by.empty())
       throw StoreRefusal(ChangeResult::kConflict, "this reference is approved already");
-    RequireRevision(query.Integer(3), revision);
-    signed_digest = DigestOf(query.Text(4), static_cast<int>(query.Integer(5)),
-                             ScanId(query.Integer(6)), query.Text(7));
+    RequireRevision(reference.revision, revision);
+    signed_digest = reference.digest;
     if (!digest.empty() && digest != signed_digest)
       throw StoreRefusal(ChangeResult::kConflict,
                          "what is stored is not what was shown: look at the reference again");
-    if (two_users && (query.Text(1) == actor.user || query.Text(2) == actor.user)) {
-      throw StoreRefusal(
-          ChangeResult::kRefused,
-          "who made or planned a reference does not approve it: ask a second person");
-    }
+    if (two_users) RequireSecondPerson(reference, actor);
   }
   change.Prepare("UPDATE refs SET approved_by = ?, approved_at = ? WHERE id = ?")
       .Bind(actor.user)

@@ -31,7 +31,8 @@ constexpr const char* kScanColumns =
     "SELECT scans.id, patient_id, reference_id, purpose, outcome, failure, started_at, "
     "finished_at, accepted_by, has_folder, results.json, accepted_reason, session_id, "
     "(SELECT fraction FROM sessions WHERE sessions.id = session_id), sensor_on_s, check_overdue, "
-    "unavailable, accepted_at FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
+    "unavailable, accepted_at, sensor_serial, (SELECT opened_by FROM sessions WHERE sessions.id = "
+    "session_id) FROM scans LEFT JOIN results ON results.scan_id = scans.id ";
 
 /// Flushes a folder, or with ::syncfs everything on its disk.
 void Sync(const fs::path& folder, int (*sync)(int) = ::fsync) {
@@ -80,6 +81,8 @@ web::Scan ScanStore::ReadScan(const Statement& row) const {
                  .fraction = static_cast<int>(row.Integer(13)),
                  .sensor_on_s = {},
                  .check_overdue = row.Integer(15) != 0,
+                 .sensor_serial = row.Text(18),
+                 .session_by = row.Text(19),
                  .folder = {}};
   if (!row.IsNull(14)) scan.sensor_on_s = row.Real(14);
   if (!row.IsNull(17)) scan.accepted_at = FromStored(row.Integer(17));
@@ -148,6 +151,13 @@ int ScanStore::CountSince(const std::string& patient_id, web::WallClock::time_po
   Statement query = rows->Prepare(
       "SELECT count(*) FROM scans WHERE patient_id = ? AND outcome = 'done' AND started_at >= ?");
   return query.Bind(*number).Bind(ToStored(since)).Step() ? static_cast<int>(query.Integer(0)) : 0;
+}
+
+std::optional<std::string> ScanStore::NewestWithFiles() {
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare(
+      "SELECT id FROM scans WHERE has_folder = 1 AND unavailable = '' ORDER BY id DESC LIMIT 1");
+  return query.Step() ? std::optional(ScanId(query.Integer(0))) : std::nullopt;
 }
 
 double ScanStore::SweptArea(const std::string& scan_id) {

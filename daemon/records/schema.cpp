@@ -191,8 +191,15 @@ UPDATE scans SET accepted_at = (SELECT MAX(time) FROM audit WHERE subject = prin
   AND action IN ('scan.accept', 'scan.accept_outside')) WHERE accepted_by <> '';
 )sql";
 
-constexpr std::array<const char*, kSchemaVersion> kSteps = {
-    kVersion1, kVersion2, kVersion3, kVersion4, kVersion5, kVersion6, kVersion7, kVersion8};
+// What each person chose of the page; empty: nothing yet.
+constexpr const char* kVersion9 = R"sql(
+ALTER TABLE users ADD COLUMN language TEXT NOT NULL DEFAULT '';
+ALTER TABLE users ADD COLUMN theme TEXT NOT NULL DEFAULT '';
+)sql";
+
+constexpr std::array<const char*, kSchemaVersion> kSteps = {kVersion1, kVersion2, kVersion3,
+                                                            kVersion4, kVersion5, kVersion6,
+                                                            kVersion7, kVersion8, kVersion9};
 
 /// Whether a newer database states that programs with this schema can use it.
 bool IsUsable(Database& database) {

@@ -5,7 +5,7 @@
 
 namespace plumb {
 
-inline constexpr int kSchemaVersion = 8;
+inline constexpr int kSchemaVersion = 9;
 
 /// The oldest schema whose programs can use a database of kSchemaVersion: after an update is rolled
 /// back, the previous version has to start with the data. A migration that only adds tables, and

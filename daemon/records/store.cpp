@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -11,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "daemon/records/backup.hpp"
 #include "daemon/records/schema.hpp"
 #include "drivers/files/file_io.hpp"
 
@@ -21,6 +23,12 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kDatabase = "plumb.db";
+
+FolderPlace PlaceOf(const fs::path& folder) {
+  struct stat status {};
+  if (::stat(folder.c_str(), &status) != 0) return {};
+  return {.disk = status.st_dev, .inode = status.st_ino};
+}
 
 void RequireWritable(const fs::path& folder) {
   const fs::path probe = folder / ".writable";
@@ -101,9 +109,11 @@ Store::Store(const fs::path& folder, const StoreOptions& options)
                 Database::Access::kReadOnly),
       integrity(database_, folders, options.look) {
   RecoverStore(*database_.ForChanges(), folders, options.look, recovery_);
+  NoteRestore(folders.state(), *database_.ForChanges());
   std::error_code error;
   fs::create_directories(folders.scans(), error);
   if (error) throw DiskRefused(DescribeWriteError(folders.scans(), error.value()));
+  scans_place_ = PlaceOf(folders.scans());
 }
 
 Store::Store(const fs::path& folder, ReadOnly)
@@ -118,6 +128,30 @@ std::unique_ptr<Store> Store::OpenReadable(const fs::path& folder) {
   return std::unique_ptr<Store>(new Store(folder, ReadOnly{}));
 }
 
-void Store::CheckWritable() const { RequireWritable(folders); }
+void Store::CheckWritable() {
+  if (const std::string why = WhyOtherScans(); !why.empty()) throw DiskRefused(why);
+  RequireWritable(folders);
+}
+
+/// The same disk may come back under another number: it is known by the newest scan on it.
+std::string Store::WhyOtherScans() {
+  const FolderPlace now = PlaceOf(folders.scans());
+  const std::lock_guard lock(place_mutex_);
+  if (now == scans_place_) return {};
+  try {
+    const std::optional<std::string> newest = scans.NewestWithFiles();
+    std::error_code error;
+    if (newest && fs::exists(folders.Scan(*newest), error)) {
+      scans_place_ = now;
+      return {};
+    }
+  } catch (const IoError& error) {
+    return error.what();
+  }
+  return fmt::format(
+      "the folder of the scans {} is not the one that was opened: if its disk is not mounted any "
+      "more, mount it again",
+      folders.scans().string());
+}
 
 }  // namespace plumb

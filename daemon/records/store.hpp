@@ -5,6 +5,10 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <mutex>
+#include <string>
+
+#include <sys/types.h>
 
 #include "daemon/records/audit_store.hpp"
 #include "daemon/records/check_store.hpp"
@@ -39,6 +43,13 @@ class FolderLock {
   int fd_ = -1;
 };
 
+/// Which folder of which disk a path means.
+struct FolderPlace {
+  dev_t disk = 0;
+  ino_t inode = 0;
+  bool operator==(const FolderPlace&) const = default;
+};
+
 struct StoreOptions {
   ExaminePath look = LookAt;
   /// Time during which a database held by another process is retried; a copying program releases
@@ -62,9 +73,12 @@ class Store {
   /// @throws IoError and its kinds.
   [[nodiscard]] static std::unique_ptr<Store> OpenReadable(const std::filesystem::path& folder);
 
-  /// Tries to write beside the database.
+  /// Tries to write beside the database and in the folder of the scans.
   /// @throws DiskRefused with the reason if that fails, unless the disk is only full.
-  void CheckWritable() const;
+  void CheckWritable();
+  /// Why the folder of the scans is another one than at the opening, as when its disk has been
+  /// unmounted: what is written there would lie beneath that disk. Empty if it is the same.
+  [[nodiscard]] std::string WhyOtherScans();
   [[nodiscard]] const RecoveryReport& recovery() const { return recovery_; }
   /// For work on the rows of any table, such as the import of a patient.
   [[nodiscard]] StoreDatabase& database() { return database_; }
@@ -79,6 +93,8 @@ class Store {
   RecoveryReport recovery_;
   StoreDatabase database_;
   RemovalGate gate_;
+  std::mutex place_mutex_;
+  FolderPlace scans_place_;  ///< Of the folder of the scans.
 
  public:
   // Declared after the members that they use.

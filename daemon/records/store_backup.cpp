@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include "daemon/records/audit_store.hpp"
+#include "daemon/records/backup_place.hpp"
 
 namespace plumb {
 
 BackupReport StoreBackup::Make(const web::Actor& actor, const std::filesystem::path& target,
                                const std::stop_token& stop, const BackupSecret* secret) {
+  RequireLastingPlace(target, folders_.state());
   const RemovalGate::Backup guard(gate_);
   BackupReport report;
   {

@@ -133,19 +133,19 @@ void StoreRemoval::RemoveScan(const web::Actor& actor, const std::string& id,
 
 /// Its files are removed after the lock is released: a scan that begins meanwhile must not wait for
 /// a slow disk.
-bool StoreRemoval::ForgetScan(const std::string& scan_id) {
+bool StoreRemoval::ForgetScan(const std::string& scan_id, const char* why) {
   const std::unique_lock removals = gate_.LockRemovals();
   {
     StoreChange change(database_);
     change
         .Prepare(
-            "DELETE FROM scans WHERE id = ? AND outcome <> 'running' AND id NOT IN (SELECT scan_id "
-            "FROM refs)")
+            "DELETE FROM scans WHERE id = ? AND outcome <> 'running' AND unavailable = '' AND id "
+            "NOT IN (SELECT scan_id FROM refs)")
         .Bind(ParseId(scan_id))
         .Run();
     if (change.num_changed() == 0) return false;
     NoteRemoved(change, scan_id);
-    change.Log(store::kSelf, "scan.remove", scan_id, "retention");
+    change.Log(store::kSelf, "scan.remove", scan_id, why);
     change.Commit();
   }
   RemoveFiles(scan_id);
@@ -163,15 +163,15 @@ int StoreRemoval::RemoveOldScans(int retention_days, const std::stop_token& stop
     Statement query = writer->Prepare(
         "SELECT id FROM (SELECT id, outcome, max(CASE WHEN started_at <= ? THEN started_at ELSE 0 "
         "END) OVER (ORDER BY id) AS since"
-        " FROM scans) WHERE outcome <> 'running' AND since < ? AND id NOT IN (SELECT scan_id FROM "
-        "refs) ORDER BY id");
+        ", unavailable FROM scans) WHERE outcome <> 'running' AND unavailable = '' AND since < ? "
+        "AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id");
     query.Bind(ToStored(now)).Bind(ToStored(now - std::chrono::hours(24) * retention_days));
     old = ScansOf(std::move(query));
   }
   int num_removed = 0;
   for (const std::string& scan : old) {
     if (stop.stop_requested()) break;
-    num_removed += ForgetScan(scan) ? 1 : 0;
+    num_removed += ForgetScan(scan, "retention") ? 1 : 0;
   }
   return num_removed;
 }
@@ -191,16 +191,32 @@ void StoreRemoval::ForgetRecording(const std::string& scan_id) {
   fs::remove_all(folders_.Scan(scan_id) / kRecordingFolder, ignored);
 }
 
+std::uint64_t DefaultQuota(std::uint64_t scan_bytes, std::uint64_t free_bytes) {
+  constexpr double kShare = 0.9;
+  return static_cast<std::uint64_t>(kShare * static_cast<double>(scan_bytes + free_bytes));
+}
+
 int StoreRemoval::KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop) {
-  std::uint64_t bytes = BytesOf(folders_.scans(), stop);
+  return RemoveOldest(BytesOf(folders_.scans(), stop), max_bytes, stop);
+}
+
+int StoreRemoval::KeepWithinRoom(std::uint64_t free_bytes, const std::stop_token& stop) {
+  const std::uint64_t bytes = BytesOf(folders_.scans(), stop);
+  return RemoveOldest(bytes, DefaultQuota(bytes, free_bytes), stop);
+}
+
+/// Scans whose files cannot be seen stay: removing them frees nothing, and their files may be back.
+int StoreRemoval::RemoveOldest(std::uint64_t bytes, std::uint64_t max_bytes,
+                               const std::stop_token& stop) {
   if (bytes <= max_bytes) return 0;
   int num_touched = 0;
   std::vector<std::string> all, removable;
   {
     const StoreDatabase::Held writer = database_.ForChanges();
-    all = ScansOf(writer->Prepare("SELECT id FROM scans WHERE has_folder = 1 ORDER BY id"));
+    all = ScansOf(writer->Prepare(
+        "SELECT id FROM scans WHERE has_folder = 1 AND unavailable = '' ORDER BY id"));
     removable =
-        ScansOf(writer->Prepare("SELECT id FROM scans WHERE has_folder = 1 "
+        ScansOf(writer->Prepare("SELECT id FROM scans WHERE has_folder = 1 AND unavailable = '' "
                                 "AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id"));
   }
   for (const std::string& scan : all) {  // raw recordings are large, and nothing depends on them
@@ -214,7 +230,7 @@ int StoreRemoval::KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token
   for (const std::string& scan : removable) {
     if (bytes <= max_bytes || stop.stop_requested()) break;
     const std::uint64_t its_bytes = BytesOf(folders_.Scan(scan), stop);
-    if (!ForgetScan(scan)) continue;  // it has become a reference
+    if (!ForgetScan(scan, "quota")) continue;  // it has become a reference
     bytes -= std::min(bytes, its_bytes);
     ++num_touched;
   }

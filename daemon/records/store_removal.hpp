@@ -36,6 +36,10 @@ class RemovalGate {
   std::atomic<bool> backing_up_ = false;
 };
 
+/// What scans may take where nobody has set a quota: 90 % of the room that other files leave on
+/// their disk.
+[[nodiscard]] std::uint64_t DefaultQuota(std::uint64_t scan_bytes, std::uint64_t free_bytes);
+
 /// Thread-safe. Files are removed after the database's lock is released: a scan that begins
 /// meanwhile must not wait for a slow disk. Throws StoreRefusal, and IoError and its kinds.
 class StoreRemoval {
@@ -51,16 +55,21 @@ class StoreRemoval {
   /// made; kInvalid without a reason.
   void RemoveScan(const web::Actor& actor, const std::string& id, const std::string& reason);
   /// Removes scans older than the given number of days (0: none) except those that references are
-  /// made from. Returns how many. Age is by the wall clock: call it only while that can be trusted.
+  /// made from, and those whose files cannot be seen now. Returns how many. Age is by the wall
+  /// clock: call it only while that can be trusted.
   int RemoveOldScans(int retention_days, const std::stop_token& stop = {});
   /// Removes the oldest recordings, then the oldest scans as above, until the scans take at most
   /// the given number of bytes. Returns how many scans lost something.
   int KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop = {});
+  /// The same, with DefaultQuota() of a disk on which so much is free.
+  int KeepWithinRoom(std::uint64_t free_bytes, const std::stop_token& stop = {});
 
  private:
+  int RemoveOldest(std::uint64_t bytes, std::uint64_t max_bytes, const std::stop_token& stop);
   void RemoveFiles(const std::string& scan_id);
   void ForgetRecording(const std::string& scan_id);
-  bool ForgetScan(const std::string& scan_id);  ///< False if it has become a reference.
+  /// @param why  For the log. False if it has become a reference.
+  bool ForgetScan(const std::string& scan_id, const char* why);
 
   StoreDatabase& database_;
   const ScanFolders& folders_;

@@ -14,6 +14,9 @@ using web::ChangeResult;
 
 namespace {
 
+constexpr const char* kUserColumns =
+    "SELECT name, role, password_hash, disabled, created_at, language, theme FROM users ";
+
 /// An account whose role cannot be read is disabled, not left out: if no account were found, the
 /// page would offer to create the first one.
 web::User ReadUser(const Statement& row) {
@@ -21,7 +24,8 @@ web::User ReadUser(const Statement& row) {
                  .role = web::Role::kTechnician,
                  .password_hash = row.Text(2),
                  .disabled = row.Integer(3) != 0,
-                 .created_at = FromStored(row.Integer(4))};
+                 .created_at = FromStored(row.Integer(4)),
+                 .preferences = {.language = row.Text(5), .theme = row.Text(6)}};
   try {
     user.role = store::ParseRole(row.Text(1));
   } catch (const DataError&) {
@@ -34,8 +38,8 @@ web::User ReadUser(const Statement& row) {
 
 std::vector<web::User> UserStore::List() {
   const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare(
-      "SELECT name, role, password_hash, disabled, created_at FROM users ORDER BY name LIMIT 1000");
+  static const std::string kSql = std::string(kUserColumns) + "ORDER BY name LIMIT 1000";
+  Statement query = rows->Prepare(kSql.c_str());
   std::vector<web::User> users;
   while (query.Step()) users.push_back(ReadUser(query));
   return users;
@@ -43,8 +47,8 @@ std::vector<web::User> UserStore::List() {
 
 std::optional<web::User> UserStore::Find(const std::string& name) {
   const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare(
-      "SELECT name, role, password_hash, disabled, created_at FROM users WHERE name = ?");
+  static const std::string kSql = std::string(kUserColumns) + "WHERE name = ?";
+  Statement query = rows->Prepare(kSql.c_str());
   return query.Bind(name).Step() ? std::optional(ReadUser(query)) : std::nullopt;
 }
 
@@ -73,8 +77,8 @@ void UserStore::Change(const web::Actor& actor, const web::UserChange& wanted) {
   StoreChange change(database_);
   web::User user;
   {
-    Statement query = change.Prepare(
-        "SELECT name, role, password_hash, disabled, created_at FROM users WHERE name = ?");
+    static const std::string kSql = std::string(kUserColumns) + "WHERE name = ?";
+    Statement query = change.Prepare(kSql.c_str());
     if (!query.Bind(wanted.name).Step())
       throw StoreRefusal(ChangeResult::kNotFound, "there is no such account");
     user = ReadUser(query);
@@ -84,7 +88,7 @@ void UserStore::Change(const web::Actor& actor, const web::UserChange& wanted) {
                        "the account has been changed by somebody else meanwhile: log in again");
   std::string changes;
   if (wanted.role && *wanted.role != user.role)
-    changes += fmt::format("role {} ", store::Name(*wanted.role));
+    changes += fmt::format("role {} > {} ", store::Name(user.role), store::Name(*wanted.role));
   if (wanted.password_hash && *wanted.password_hash != user.password_hash) changes += "password ";
   if (wanted.disabled && *wanted.disabled != user.disabled)
     changes += *wanted.disabled ? "disabled " : "enabled ";
@@ -103,6 +107,16 @@ void UserStore::Change(const web::Actor& actor, const web::UserChange& wanted) {
   }
   if (!changes.empty()) changes.pop_back();
   change.Log(actor, "user.change", wanted.name, changes);
+  change.Commit();
+}
+
+void UserStore::SetPreferences(const std::string& name, const web::Preferences& preferences) {
+  StoreChange change(database_);
+  change.Prepare("UPDATE users SET language = ?, theme = ? WHERE name = ?")
+      .Bind(preferences.language)
+      .Bind(preferences.theme)
+      .Bind(name)
+      .Run();
   change.Commit();
 }
 

@@ -21,6 +21,8 @@ class UserStore {
   void Add(const web::Actor& actor, const web::User& user);
   /// kConflict if no enabled engineer would be left.
   void Change(const web::Actor& actor, const web::UserChange& wanted);
+  /// Without an entry in the log.
+  void SetPreferences(const std::string& name, const web::Preferences& preferences);
 
  private:
   StoreDatabase& database_;

@@ -48,6 +48,10 @@ constexpr std::array kFaultSteps{IndicatorStep{kRed, milliseconds(80)},
 constexpr std::array kReadyRolledBackSteps{IndicatorStep{kGreen, milliseconds(1500)},
                                            IndicatorStep{kRed, milliseconds(300)}};
 
+constexpr std::array kReadyDiskNearlyFullSteps{
+    IndicatorStep{kGreen, milliseconds(1500)}, IndicatorStep{kRed | kGreen, milliseconds(150)},
+    IndicatorStep{kGreen, milliseconds(150)}, IndicatorStep{kRed | kGreen, milliseconds(150)}};
+
 // Slow, so that it is not mistaken for an error of a running service.
 constexpr std::array kStoppedSteps{IndicatorStep{kRed, milliseconds(1000)},
                                    IndicatorStep{0, milliseconds(1000)}};
@@ -88,6 +92,8 @@ IndicatorProgram ProgramOf(IndicatorPattern pattern) {
       return {kFaultSteps};
     case IndicatorPattern::kReadyRolledBack:
       return {kReadyRolledBackSteps};
+    case IndicatorPattern::kReadyDiskNearlyFull:
+      return {kReadyDiskNearlyFullSteps};
     case IndicatorPattern::kStopped:
       return {kStoppedSteps};
   }

@@ -89,7 +89,7 @@ class DaemonPlanTest : public ::testing::Test {
   std::string patient_, reference_;
 };
 
-TEST_F(DaemonPlanTest, TheToleranceThatWasApprovedDecidesTheVerdict) {
+TEST_F(DaemonPlanTest, ToleranceAndPostureThatWereApprovedAreUsed) {
   const json within = ScanBy(wide_);
   EXPECT_EQ(within["verdict"], "in_tolerance") << within["reasons"].dump();
   EXPECT_EQ(within["correction"]["isocentre"], (json{0.60, 0.25, 0.11}));
@@ -100,13 +100,21 @@ TEST_F(DaemonPlanTest, TheToleranceThatWasApprovedDecidesTheVerdict) {
   EXPECT_THAT(outside["reasons"].dump(), HasSubstr("20 mm"));
   json turned = wide_;
   turned["rotation_tolerance_deg"] = 2;
-  EXPECT_EQ(ScanBy(turned)["verdict"], "move") << "and by a narrower one of rotations";
+  turned["posture"] = "HFP";
+  const json prone = ScanBy(turned);
+  EXPECT_EQ(prone["verdict"], "move") << "and by a narrower one of rotations";
+  for (const json* result : {&within, &prone})
+    ASSERT_EQ((*result)["body"]["named_by"], "posture") << (*result)["body"].dump();
+  const json &supine_left = within["body"]["left_xy"], &prone_left = prone["body"]["left_xy"];
+  EXPECT_LT(supine_left[0].get<double>() * prone_left[0].get<double>() +
+                supine_left[1].get<double>() * prone_left[1].get<double>(),
+            -0.9)
+      << "who lies on the belly has the left side where it was the right one";
 }
 
-TEST_F(DaemonPlanTest, RegionPostureAndCouchMarkersThatWereApprovedAreUsed) {
+TEST_F(DaemonPlanTest, RegionAndCouchMarkersThatWereApprovedAreUsed) {
   json plan = wide_;
   plan["region_m"] = {{0.50, 0.15}, {0.80, 0.15}, {0.80, 0.55}, {0.50, 0.55}};
-  plan["posture"] = "FFP";
   plan["couch_markers"] = true;
   const json result = ScanBy(plan);
   ASSERT_TRUE(result["motion"].is_object()) << result["reasons"].dump();

@@ -10,6 +10,7 @@
 
 #include "tests/support/http_client.hpp"
 #include "tests/support/plumbd.hpp"
+#include "tests/support/process.hpp"
 
 namespace plumb {
 namespace {
@@ -23,6 +24,14 @@ using test::kPassword;
 using ::testing::HasSubstr;
 using ::testing::IsSupersetOf;
 using testing::Plumbd;
+
+/// What a person reads in a PDF file.
+std::string TextOfPdf(const std::string& bytes, const fs::path& file) {
+  std::ofstream(file, std::ios::binary) << bytes;
+  const RunResult read = plumb::Run({"/usr/bin/pdftotext", "-layout", file, "-"});
+  EXPECT_EQ(read.exit_code, 0) << read.err;
+  return read.out;
+}
 
 class DaemonWebTest : public ::testing::Test {
  protected:
@@ -113,8 +122,8 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
   const std::string first = scan(technician);
   EXPECT_EQ(technician.Get("/api/v1/status").json()["light"], "done")
       << "compared with nothing: no word of tolerance";
-  EXPECT_EQ(technician.Get("/api/v1/status").json()["next_purpose"], "fraction")
-      << "one reference, not all that follow";
+  EXPECT_EQ(technician.Get("/api/v1/status").json()["next_purpose"], "reference")
+      << "the session that is open is for a reference: a second scan is another draft of it";
   const json waiting = technician.Get("/api/v1/status").json()["waiting"];
   ASSERT_EQ(waiting.size(), 1U) << "the scan has made its draft";
   const std::string reference = waiting[0]["reference_id"];
@@ -126,17 +135,15 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
   plan.erase("tolerance");
   plan["revision"] = 1;
   ASSERT_EQ(physicist.Put("/api/v1/references/" + reference + "/plan", plan).status, 200);
-  EXPECT_EQ(physicist
-                .Post("/api/v1/references/" + reference + "/approve",
-                      {{"revision", 2}, {"password", kPassword}})
-                .status,
-            403)
-      << "not by the person who planned it";
-  ASSERT_EQ(second
-                .Post("/api/v1/references/" + reference + "/approve",
-                      {{"revision", 2}, {"password", kPassword}})
-                .status,
-            200);
+  const auto approve = [&](HttpClient& who) {
+    const json seen = who.Get("/api/v1/references/" + reference).json();
+    return who
+        .Post("/api/v1/references/" + reference + "/approve",
+              {{"revision", seen["revision"]}, {"digest", seen["digest"]}, {"password", kPassword}})
+        .status;
+  };
+  EXPECT_EQ(approve(physicist), 403) << "not by the person who planned it";
+  ASSERT_EQ(approve(second), 200);
 
   ASSERT_EQ(plumbd.Sim("next-scene")["ok"], true);
   ASSERT_EQ(
@@ -147,7 +154,18 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
   const std::string fraction = scan(technician);
   const json result = technician.Get("/api/v1/results/" + fraction).json();
   EXPECT_EQ(result["verdict"], "move");
-  EXPECT_EQ(technician.Get("/api/v1/scans/" + fraction + "/files/error_map.png").status, 200);
+  for (const char* picture : {"error_map.png", "overlay.png"}) {
+    const std::string path = "/api/v1/scans/" + fraction + "/files/" + picture;
+    const HttpAnswer stored = technician.Get(path);
+    const HttpAnswer english = technician.Get(path + "?language=en");
+    const HttpAnswer spanish = technician.Get(path + "?language=es");
+    for (const HttpAnswer* answer : {&stored, &english, &spanish}) {
+      EXPECT_EQ(answer->status, 200) << picture;
+      EXPECT_TRUE(answer->body.starts_with("\x89PNG")) << picture;
+    }
+    EXPECT_NE(english.body, stored.body) << "it names the patient's sides";
+    EXPECT_NE(spanish.body, english.body) << picture;
+  }
   EXPECT_EQ(technician.Post("/api/v1/scans/" + fraction + "/accept").status, 409)
       << "outside tolerance: not in one tap";
   EXPECT_EQ(technician
@@ -174,7 +192,13 @@ TEST_F(DaemonWebTest, FromTheSetupCodeToAnAcceptedFraction) {
   EXPECT_EQ(accepted["fraction"], 1);
   const HttpAnswer report = technician.Get("/api/v1/scans/" + fraction + "/report.pdf");
   EXPECT_EQ(report.status, 200);
-  EXPECT_TRUE(report.body.starts_with("%PDF"));
+  const std::string text = TextOfPdf(report.body, folder_.path() / "report.pdf");
+  for (const std::string& expected :
+       {std::string("PX-17"), std::string("MOVE"), std::string("Longitudinal"),
+        std::string("swelling"), std::string("second, 20"), std::string("Page 1"), fraction})
+    EXPECT_THAT(text, HasSubstr(expected));
+  const HttpAnswer course = technician.Get("/api/v1/patients/" + patient + "/report.pdf");
+  EXPECT_THAT(TextOfPdf(course.body, folder_.path() / "course.pdf"), HasSubstr("Course of PX-17"));
   EXPECT_EQ(technician.Get("/api/v1/scans/" + fraction + "/maps/deviation").status, 200);
   EXPECT_EQ(
       technician.Post("/api/v1/treatment/close", {{"session_id", accepted["session_id"]}}).status,

@@ -64,6 +64,15 @@ class ApiRules : public ::testing::Test {
         .value("id", "");
   }
 
+  /// Signs what is stored now.
+  static HttpAnswer Approve(HttpClient& who, const std::string& path,
+                            const std::string& password = kPassword) {
+    const json seen = who.Get(path).json();
+    return who.Post(
+        path + "/approve",
+        {{"revision", seen["revision"]}, {"digest", seen["digest"]}, {"password", password}});
+  }
+
   std::unique_ptr<RuledAppliance> appliance_ = MakeRuledAppliance();
 };
 
@@ -166,11 +175,9 @@ TEST_F(ApiRules, WithoutTodaysCheckNothingBecomesAReference) {
   appliance_->PassDailyCheck("technician");
   const HttpAnswer made = physicist.Post("/api/v1/references", wanted);
   EXPECT_EQ(made.status, 201) << made.body;
-  EXPECT_EQ(second
-                .Post("/api/v1/references/" + made.json().value("id", "") + "/approve",
-                      {{"revision", 1}, {"password", kPassword}})
-                .status,
-            200);
+  const std::string path = "/api/v1/references/" + made.json().value("id", "");
+  EXPECT_EQ(physicist.Put(path + "/plan", Plan()).status, 200);
+  EXPECT_EQ(Approve(second, path).status, 200);
 }
 
 TEST_F(ApiRules, AReferenceIsApprovedByASecondPersonAsItWasPlanned) {
@@ -179,32 +186,36 @@ TEST_F(ApiRules, AReferenceIsApprovedByASecondPersonAsItWasPlanned) {
              second = LoggedIn("second");
   const std::string patient = AddPatient(technician, "PX-17");
   const std::string id = Draft(physicist, patient), path = "/api/v1/references/" + id;
+  EXPECT_TRUE(second.Get(path).json()["planned_by"].is_null());
+  const HttpAnswer unplanned = Approve(second, path);
+  EXPECT_EQ(unplanned.status, 409);
+  EXPECT_THAT(unplanned.body, HasSubstr("nobody has planned"));
+  const json shown = second.Get(path).json();
   EXPECT_EQ(physicist.Put(path + "/plan", Plan()).status, 200);
   EXPECT_EQ(technician.Put(path + "/plan", Plan()).status, 403);
   EXPECT_EQ(physicist.Put(path + "/plan", Plan()).status, 409) << "another one was saved since";
-  EXPECT_EQ(second.Post(path + "/approve", {{"revision", 1}, {"password", kPassword}}).status, 409);
-  EXPECT_EQ(second.Get(path).json()["revision"], 2);
-  EXPECT_EQ(second.Post(path + "/approve", {{"revision", 2}}).status, 400) << "not signed";
-  EXPECT_EQ(second.Post(path + "/approve", {{"revision", 2}, {"password", "not this one"}}).status,
-            403);
-  EXPECT_EQ(technician.Post(path + "/approve", {{"revision", 2}, {"password", kPassword}}).status,
-            403);
-  EXPECT_EQ(physicist.Post(path + "/approve", {{"revision", 2}, {"password", kPassword}}).status,
-            403)
-      << "planned it";
-  EXPECT_EQ(second
-                .Post(path + "/approve",
-                      {{"revision", 2}, {"password", kPassword}, {"digest", "of another"}})
-                .status,
-            409);
+  const json planned = second.Get(path).json();
+  EXPECT_EQ(planned["revision"], 2);
+  const auto sign = [&](const json& revision, const json& digest) {
+    return second
+        .Post(path + "/approve",
+              {{"revision", revision}, {"digest", digest}, {"password", kPassword}})
+        .status;
+  };
+  EXPECT_EQ(sign(1, shown["digest"]), 409) << "what was shown is not what is stored";
+  EXPECT_EQ(sign(2, shown["digest"]), 409);
+  EXPECT_EQ(second.Post(path + "/approve", {{"revision", 2}, {"password", kPassword}}).status, 400)
+      << "it does not say what is signed";
+  EXPECT_EQ(second.Post(path + "/approve", {{"revision", 2}, {"digest", planned["digest"]}}).status,
+            400)
+      << "not signed";
+  EXPECT_EQ(Approve(second, path, "not this one").status, 403);
+  EXPECT_EQ(Approve(technician, path).status, 403);
+  EXPECT_EQ(Approve(physicist, path).status, 403) << "planned it";
   EXPECT_TRUE(
       technician.Get("/api/v1/patients/" + patient).json()["approved_reference_id"].is_null());
-  const std::string digest = second.Get(path).json()["digest"];
-  EXPECT_EQ(
-      second.Post(path + "/approve", {{"revision", 2}, {"password", kPassword}, {"digest", digest}})
-          .status,
-      200);
-  EXPECT_EQ(second.Post(path + "/approve", {{"revision", 2}, {"password", kPassword}}).status, 409);
+  EXPECT_EQ(Approve(second, path).status, 200);
+  EXPECT_EQ(Approve(second, path).status, 409) << "approved already";
   const json reference = technician.Get(path).json();
   EXPECT_EQ(reference["approved_by"], "second");
   EXPECT_EQ(reference["planned_by"], "physicist");
@@ -357,11 +368,8 @@ TEST_F(ApiRules, WhatWasDoneIsInTheLogWithWhoDidIt) {
   const std::string session = technician.Get("/api/v1/status").json()["session"].value("id", "");
   const std::string reference = Draft(physicist, patient);
   ASSERT_EQ(physicist.Put("/api/v1/references/" + reference + "/plan", Plan()).status, 200);
-  ASSERT_EQ(LoggedIn("second")
-                .Post("/api/v1/references/" + reference + "/approve",
-                      {{"revision", 2}, {"password", kPassword}})
-                .status,
-            200);
+  HttpClient second = LoggedIn("second");
+  ASSERT_EQ(Approve(second, "/api/v1/references/" + reference).status, 200);
   std::set<std::string> seen;
   const json log = physicist.Get("/api/v1/audit").json();
   for (const json& entry : log["entries"])

@@ -171,7 +171,7 @@ void FakeAppliance::Tick(std::chrono::steady_clock::time_point now) {
 void FakeAppliance::CloseCheck() {
   if (!is_check_) return;
   is_check_ = false;
-  status.next_purpose = ScanPurpose::kFraction;
+  status.next_purpose = status.session ? status.session->purpose : ScanPurpose::kFraction;
   status.patient_id = patient_before_check_;
 }
 
@@ -426,6 +426,12 @@ void FakeAppliance::AddUser(const Actor& actor, const User& user, Done done) {
     return Finish(done, Refusal(ChangeResult::kConflict, "this name is taken"));
   users.push_back(user);
   Did(actor, "user.add", user.name, done);
+}
+
+void FakeAppliance::SetPreferences(const Actor& actor, const Preferences& preferences, Done done) {
+  for (User& user : users)
+    if (user.name == actor.user) user.preferences = preferences;
+  Finish(done, {});
 }
 
 void FakeAppliance::ChangeUser(const Actor& actor, const UserChange& change, Done done) {

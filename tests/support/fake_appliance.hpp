@@ -58,6 +58,7 @@ class FakeAppliance : public web::BackgroundWork,
   std::vector<web::User> users;
   std::string accounts_fault;          ///< Why none of them can be looked up; empty: they can.
   std::vector<web::AuditEntry> audit;  ///< Oldest first.
+  std::string ExportAudit() override { return "{\"number\":1}\n"; }
   std::shared_ptr<const std::string> preview, surface;
   std::filesystem::path diagnostics_file;
   std::uint64_t uploaded_bytes = 0;
@@ -157,6 +158,20 @@ class FakeAppliance : public web::BackgroundWork,
     const auto scan = FindScan(scan_id);
     return scan && make_map ? make_map(scan->folder, name) : std::nullopt;
   }
+  std::vector<std::string> Cautions(const std::string& scan_id, web::Language) override {
+    const auto scan = FindScan(scan_id);
+    return scan && scan->check_overdue
+               ? std::vector<std::string>{"The daily check was overdue at this scan."}
+               : std::vector<std::string>();
+  }
+  std::optional<std::string> PictureOf(const std::string&, web::ComparisonPicture picture,
+                                       web::Language language) override {
+    if (!draws_pictures) return std::nullopt;
+    return std::string(picture == web::ComparisonPicture::kOverlay ? "overlay" : "error map") +
+           (language == web::Language::kSpanish ? " in Spanish" : " in English");
+  }
+  bool draws_pictures = false;
+  bool is_unreadable = false;  ///< Signed acts on references throw, as those of the real store.
   std::optional<std::string> ScanReport(const std::string& scan_id,
                                         web::Language language) override {
     report_language = language;
@@ -190,6 +205,8 @@ class FakeAppliance : public web::BackgroundWork,
   std::optional<web::User> FindUser(const std::string& name) override;
   void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;
   void ChangeUser(const web::Actor& actor, const web::UserChange& change, web::Done done) override;
+  void SetPreferences(const web::Actor& actor, const web::Preferences& preferences,
+                      web::Done done) override;
   void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
            const std::string& detail) override;
   std::vector<web::AuditEntry> Audit(const web::AuditQuery& query) override;

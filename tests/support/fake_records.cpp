@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "algo/base/errors.hpp"
+
 namespace plumb::test {
 
 using namespace web;  // NOLINT: a test's own names are none of these
@@ -38,7 +40,6 @@ Reference& FakeAppliance::MakeReference(const Scan& scan, const std::string& by,
   reference.created_by = by;
   reference.reason = reason;
   reference.plan.tolerance = settings.tolerance;
-  reference.planned_by = by;
   reference.digest = "digest of " + reference.id + " 1";
   references.push_back(reference);
   TellWaiting();
@@ -192,8 +193,11 @@ void FakeAppliance::TellWaiting() {
     patient.draft_reference_id =
         !found.empty() && found.front().approved_by.empty() ? found.front().id : "";
     if (!patient.draft_reference_id.empty())
-      status.waiting.push_back(
-          {patient.draft_reference_id, patient.id, patient.code, found.front().version});
+      status.waiting.push_back({.reference_id = patient.draft_reference_id,
+                                .patient_id = patient.id,
+                                .patient_code = patient.code,
+                                .version = found.front().version,
+                                .planned_by = found.front().planned_by});
   }
 }
 
@@ -238,6 +242,7 @@ void FakeAppliance::PlanReference(const Actor& actor, const std::string& id, int
     ++found->revision;
     found->digest = fmt::format("digest of {} {}", id, found->revision);
     found->planned_by = actor.user;
+    TellWaiting();
     return Did(actor, "reference.plan", id, done);
   }
   Reference next = *found;
@@ -256,6 +261,7 @@ void FakeAppliance::PlanReference(const Actor& actor, const std::string& id, int
 
 void FakeAppliance::ApproveReference(const Actor& actor, const std::string& id, int revision,
                                      const std::string& digest, Done done) {
+  if (is_unreadable) throw IoError("version 2 of the reference: its plan cannot be read");
   const auto found = std::find_if(references.begin(), references.end(),
                                   [&](const Reference& reference) { return reference.id == id; });
   if (found == references.end())
@@ -269,6 +275,9 @@ void FakeAppliance::ApproveReference(const Actor& actor, const std::string& id, 
                   Refusal(ChangeResult::kConflict, "this plan has been changed by somebody else"));
   if (!digest.empty() && digest != found->digest)
     return Finish(done, Refusal(ChangeResult::kConflict, "what is stored is not what was shown"));
+  if (found->planned_by.empty())
+    return Finish(done, Refusal(ChangeResult::kConflict,
+                                "nobody has planned this reference: save its plan first"));
   if (found->created_by == actor.user || found->planned_by == actor.user) {
     return Finish(done,
                   Refusal(ChangeResult::kRefused,

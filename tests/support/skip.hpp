@@ -16,8 +16,10 @@ namespace plumb::testing {
 
 }  // namespace plumb::testing
 
-/// In place of GTEST_SKIP(), in a function that returns nothing: fails where PLUMB_REQUIRE_ALL=1.
-/// Recordings that are not part of the repository are the exception; their tests use GTEST_SKIP().
+/// For a tool that toolchain/install brings, in a function that returns nothing: fails where
+/// PLUMB_REQUIRE_ALL=1. What no installation can bring uses GTEST_SKIP(): mounts and loop devices
+/// that the machine does not permit, and recordings that are not part of the repository.
+/// toolchain/test lists these at its end.
 #define PLUMB_SKIP(reason)                                                 \
   do {                                                                     \
     if (::plumb::testing::RequiresAllTests())                              \

@@ -23,6 +23,7 @@ status_of() { grep "^$1:" "/proc/$(show MainPID)/status" | tr -d ' \t'; }
 
 check "account of sysusers" "uid=*(plumb) gid=*(plumb)*" "$(id plumb)"
 check "folders of tmpfiles" "plumb plumb 700" "$(stat -c '%U %G %a' /var/lib/plumb)"
+check "place for backups" "plumb plumb 700" "$(stat -c '%U %G %a' /var/lib/plumb-backup)"
 check "unit is well-formed" "" "$(systemd-analyze verify --man=no plumbd.service 2>&1 | grep -i plumb)"
 
 begin=$(date +%s%N)
@@ -51,6 +52,11 @@ await "compared with the first" in_tolerance 60 plumb status --get last_result.v
 check "its files" "plumb plumb 700" "$(stat -c '%U %G %a' /var/lib/plumb/scans/000001)"
 check "journal with fields" "000001" "$(journalctl -u plumbd -o json PLUMB_SCAN=000001 | grep -o '"PLUMB_SCAN":"[0-9]*"' | head -1 | tr -dc 0-9)"
 check "setup code in the journal" "*setup code: ????-????*" "$(journalctl -u plumbd -o cat)"
+
+check "its own temporary folder takes no backup" "*visible to its service only*" "$(plumb backup /tmp/backup 2>&1)"
+mkdir -p /var/disk && mount --bind /var/disk /var/lib/plumb-backup && chown plumb: /var/lib/plumb-backup
+check "a disk that is mounted now takes a backup" "backed up to /var/lib/plumb-backup/first: 2 scans*" "$(plumb backup /var/lib/plumb-backup/first 2>&1)"
+check "the backup lies on that disk" "/var/disk/first/backup.json" "$(ls /var/disk/first/backup.json 2>&1)"
 
 systemctl reload plumbd.service
 await "reload" "*configuration was read again*" 10 journalctl -u plumbd -o cat

@@ -17,6 +17,7 @@
 #include "daemon/update/bundle_check.hpp"
 #include "daemon/update/updater.hpp"
 #include "tests/support/private_bus.hpp"
+#include "tests/support/skip.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/updater_on_loop.hpp"
 
@@ -72,9 +73,10 @@ std::string Bytes(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-std::string WhyNotHere() {
+bool HasRauc() { return ::access("/usr/bin/rauc", X_OK) == 0; }
+
+std::string WhyNotPermitted() {
   if (::geteuid() != 0) return "needs root: RAUC mounts bundles and takes them over";
-  if (::access("/usr/bin/rauc", X_OK) != 0) return "rauc is missing: run toolchain/install";
   if (::access("/dev/loop-control", W_OK) != 0) return "no loop devices here, RAUC needs one";
   return {};
 }
@@ -82,7 +84,7 @@ std::string WhyNotHere() {
 class RaucTest : public testing::UpdaterOnLoop {
  protected:
   static void SetUpTestSuite() {
-    if (!WhyNotHere().empty()) return;
+    if (!HasRauc() || !WhyNotPermitted().empty()) return;
     made_ = std::make_unique<TempFolder>();
     const std::string log = (*made_ / "made").string();
     Child make({"/bin/sh", "-c",
@@ -94,7 +96,8 @@ class RaucTest : public testing::UpdaterOnLoop {
   static void TearDownTestSuite() { made_.reset(); }
 
   void SetUp() override {
-    if (const std::string why = WhyNotHere(); !why.empty()) GTEST_SKIP() << why;
+    if (!HasRauc()) PLUMB_SKIP("rauc is missing: run toolchain/install");
+    if (const std::string why = WhyNotPermitted(); !why.empty()) GTEST_SKIP() << why;
     fs::create_directories(folder_ / "updates");
     for (const fs::path& path : {folder_.path(), folder_ / "updates"})
       ASSERT_EQ(::chown(path.c_str(), kNobody, kNobody), 0);

@@ -69,9 +69,8 @@ Response Busy() {
   return response;
 }
 
-Response TooMany(std::chrono::seconds wait) {
-  Response response =
-      ErrorResponse(429, fmt::format("too many wrong passwords; wait {} seconds", wait.count()));
+Response TooMany(const std::string& error, std::chrono::seconds wait) {
+  Response response = ErrorResponse(429, error);
   response.headers.emplace_back("Retry-After", std::to_string(wait.count()));
   return response;
 }
@@ -127,10 +126,15 @@ Accounts::Accounts(const Services& services, AccountOptions options)
       displays_(services.displays, options_.certificate.has_value(), options_.now),
       devices_(options_.device_key, options_.certificate.has_value()),
       worker_(options_.password_operations, options_.password_memory_bytes) {
-  // Accounts may exist even if they cannot be read: no setup code for a first account is issued.
+  LookForAccounts();
+  Expire();
+}
+
+/// Accounts may exist even if they cannot be read: no setup code for a first account is issued
+/// before they can.
+void Accounts::LookForAccounts() {
   accounts_fault_ = users_.WhyUnreadable();
   if (accounts_fault_.empty() && users_.Users().empty()) setup_code_ = MakeSetupCode();
-  Expire();
 }
 
 std::optional<std::string> Accounts::setup_code() const {
@@ -146,6 +150,7 @@ std::optional<int> Accounts::IdleLogout_min() const {
 }
 
 void Accounts::Expire() {
+  if (!accounts_fault_.empty()) LookForAccounts();
   idle_logout_min_ = IdleLogout_min().value_or(idle_logout_min_);
   sessions_.SetLimits(std::chrono::minutes(idle_logout_min_), options_.session_limit);
   sessions_.Expire(options_.now());
@@ -201,6 +206,8 @@ void Accounts::AddRoutes(Router& router) {
               bind(&Accounts::ShowLastLogin)});
   router.Add({"POST", "/api/v1/session/password", Permission::kLogin, BodyKind::kJson,
               bind(&Accounts::ChangeOwnPassword)});
+  router.Add({"PUT", "/api/v1/session/preferences", Permission::kLogin, BodyKind::kJson,
+              bind(&Accounts::SetPreferences)});
   router.Add({"POST", "/api/v1/references/{id}/approve", Permission::kApprove, BodyKind::kJson,
               bind(&Accounts::ApproveReference)});
   router.Add({"DELETE", "/api/v1/patients/{id}", Permission::kWipe, BodyKind::kJson,
@@ -245,7 +252,8 @@ void Accounts::HashThen(std::string password, const Respond& respond,
                      if (!hash)
                        return respond(ErrorResponse(
                            503, "not enough memory to hash a password; try again later"));
-                     then(*hash);
+                     RespondGuarded(
+                         "password", [&] { then(*hash); }, respond);
                    });
   if (!accepted) respond(Busy());
 }
@@ -272,7 +280,9 @@ void Accounts::SetUp(const Request& request, const Respond& respond) {
   const auto now = options_.now();
   // One counter for everybody: the code is short, so guesses must be slow wherever they come from.
   const std::string key = "setup";
-  if (const auto wait = limiter_.Wait(key, now); wait.count() > 0) return respond(TooMany(wait));
+  if (const auto wait = limiter_.Wait(key, now); wait.count() > 0)
+    return respond(
+        TooMany(fmt::format("too many wrong setup codes; wait {} seconds", wait.count()), wait));
   if (!SameText(code, setup_code_)) {
     limiter_.Failed(key, now);
     audit_.Log(request.actor(), "setup.failed", "", "wrong code");
@@ -315,7 +325,8 @@ std::optional<Response> Accounts::CountGuess(const std::vector<std::string>& cou
   const auto now = options_.now();
   std::chrono::seconds wait{0};
   for (const std::string& counter : counters) wait = std::max(wait, limiter_.Wait(counter, now));
-  if (wait.count() > 0) return TooMany(wait);
+  if (wait.count() > 0)
+    return TooMany(fmt::format("too many wrong passwords; wait {} seconds", wait.count()), wait);
   // Counted before hashing, so that many guesses sent at once are as slow as one after the other.
   for (const std::string& counter : counters) limiter_.Failed(counter, now);
   return std::nullopt;
@@ -335,7 +346,9 @@ void Accounts::LogIn(const Request& request, const std::string& name, std::strin
   const bool accepted = worker_.Verify(
       std::move(password), HashIn(stored), is_known,
       [this, actor = Actor{name, request.address}, stored, form, counters, respond](bool matches) {
-        FinishLogIn(actor, stored, matches, form, counters, respond);
+        RespondGuarded(
+            "login", [&] { FinishLogIn(actor, stored, matches, form, counters, respond); },
+            respond);
       });
   if (!accepted) respond(Busy());
 }
@@ -363,17 +376,39 @@ void Accounts::LogOut(const Request& request, const Respond& respond) {
   respond(std::move(response));
 }
 
+void Accounts::SetPreferences(const Request& request, const Respond& respond) {
+  Fields fields(request.body);
+  const Preferences wanted{.language = fields.Text("language", 1, 8),
+                           .theme = fields.Text("theme", 1, 8)};
+  fields.Finish();
+  if (wanted.language != "en" && wanted.language != "es")
+    throw DataError("language: expected en or es");
+  if (wanted.theme != "dark" && wanted.theme != "light" && wanted.theme != "auto")
+    throw DataError("theme: expected dark, light or auto");
+  users_.SetPreferences(request.actor(), wanted, WhileAlive([respond](const Change& change) {
+                          respond(ChangeResponse(change));
+                        }));
+}
+
 void Accounts::DescribeSession(const Request& request, const Respond& respond) {
+  const auto user = users_.FindUser(request.session->user);
+  const Preferences chosen = user ? user->preferences : Preferences{};
+  const auto or_null = [](const std::string& text) {
+    return text.empty() ? Json(nullptr) : Json(text);
+  };
   Json permissions = Json::array();
   for (const Permission permission : PermissionsOf(request.session->role))
     permissions.push_back(Name(permission));
   Response response;
-  response.body = Dump({{"user", request.session->user},
-                        {"role", Name(request.session->role)},
-                        {"permissions", permissions},
-                        {"csrf_token", request.session->csrf_token},
-                        {"password_change_required", request.session->must_change_password},
-                        {"idle_logout_min", IdleLogout_min().value_or(idle_logout_min_)}});
+  response.body =
+      Dump({{"user", request.session->user},
+            {"role", Name(request.session->role)},
+            {"permissions", permissions},
+            {"csrf_token", request.session->csrf_token},
+            {"password_change_required", request.session->must_change_password},
+            {"idle_logout_min", IdleLogout_min().value_or(idle_logout_min_)},
+            {"preferences",
+             {{"language", or_null(chosen.language)}, {"theme", or_null(chosen.theme)}}}});
   respond(std::move(response));
 }
 
@@ -413,7 +448,8 @@ void Accounts::VerifyOwn(const Request& request, std::string password, const cha
                        limiter_.Succeeded(counters.front());
                        if (session->ended)
                          return respond(ErrorResponse(401, "the session has ended: log in again"));
-                       then(user);
+                       RespondGuarded(
+                           "signature", [&] { then(user); }, respond);
                      });
   if (!accepted) respond(Busy());
 }

@@ -52,10 +52,12 @@ class Accounts : public SessionLookup {
   /// Descriptor of the password thread: readable when Dispatch() has something to do.
   [[nodiscard]] int fd() const { return worker_.fd(); }
   void Dispatch() { worker_.Dispatch(); }
-  /// Ends idle sessions; follows the idle time of the settings.
+  /// Ends idle sessions; follows the idle time of the settings; looks again for accounts that could
+  /// not be read.
   void Expire();
 
  private:
+  void LookForAccounts();
   void SetUp(const Request& request, const Respond& respond);
   void LogIn(const Request& request, const std::string& name, std::string password, bool form,
              const Respond& respond);
@@ -71,6 +73,7 @@ class Accounts : public SessionLookup {
   void VerifyOwn(const Request& request, std::string password, const char* wrong,
                  const Respond& respond, std::function<void(const User&)> then);
   void LogOut(const Request& request, const Respond& respond);
+  void SetPreferences(const Request& request, const Respond& respond);
   void DescribeSession(const Request& request, const Respond& respond);
   /// The login before this one, and failed attempts since.
   void ShowLastLogin(const Request& request, const Respond& respond);
@@ -131,7 +134,7 @@ class Accounts : public SessionLookup {
   Displays displays_;
   DeviceCookies devices_;
   LoginLimiter limiter_;
-  std::string accounts_fault_;  ///< Why no account could be seen at the start; empty: they could.
+  std::string accounts_fault_;  ///< Why no account can be seen; empty: they can.
   std::string setup_code_;      ///< Empty once there is an account.
   bool setting_up_ = false;
   int idle_logout_min_ = Settings{}.idle_logout_min;  ///< As last read.

@@ -11,6 +11,7 @@
 #include "algo/base/errors.hpp"
 #include "web/api/accounts.hpp"
 #include "web/api/json.hpp"
+#include "web/api/language.hpp"
 #include "web/api/look_back.hpp"
 #include "web/http/checks.hpp"
 #include "web/http/gate.hpp"
@@ -79,6 +80,13 @@ std::int64_t QueryNumber(const Request& request, const std::string& name, std::i
   return value;
 }
 
+/// @param name  Of the downloaded file; empty: the browser shows it.
+void NameDownload(Response& response, const std::string& name) {
+  if (name.empty()) return;
+  response.headers.emplace_back("Content-Disposition",
+                                fmt::format("attachment; filename=\"{}\"", name));
+}
+
 Response FileResponse(const fs::path& file, std::string_view type,
                       const std::string& download_name) {
   Response response;
@@ -88,21 +96,45 @@ Response FileResponse(const fs::path& file, std::string_view type,
     return ErrorResponse(404, "this scan has no such file");
   }
   response.type = std::string(type);
-  if (!download_name.empty())
-    response.headers.emplace_back("Content-Disposition",
-                                  fmt::format("attachment; filename=\"{}\"", download_name));
+  NameDownload(response, download_name);
+  return response;
+}
+
+std::optional<ComparisonPicture> PictureNamed(std::string_view name) {
+  if (name == "error_map.png") return ComparisonPicture::kErrorMap;
+  if (name == "overlay.png") return ComparisonPicture::kOverlay;
+  return std::nullopt;
+}
+
+/// Name of the downloaded file; empty if the client wants to show it.
+std::string DownloadName(const Request& request) {
+  return request.query.contains("download")
+             ? fmt::format("{}_{}", request.arguments[0], request.arguments[1])
+             : std::string();
+}
+
+/// A picture in the language that is asked for. Nothing, so that the stored one is sent, if no
+/// language is named, the file is no picture, or it cannot be drawn again.
+std::optional<Response> TranslatedPicture(ScanService& scans, const Request& request) {
+  const std::optional<ComparisonPicture> picture = PictureNamed(request.arguments[1]);
+  if (!picture || !request.query.contains("language")) return std::nullopt;
+  auto png = scans.PictureOf(request.arguments[0], *picture, LanguageIn(request));
+  if (!png) return std::nullopt;
+  Response response;
+  response.type = "image/png";
+  response.body = std::move(*png);
+  NameDownload(response, DownloadName(request));
   return response;
 }
 
 Response ScanFileResponse(ScanService& scans, const std::string& scan_id, std::string_view name,
-                          bool download) {
+                          const std::string& download_name) {
   const auto scan = scans.FindScan(scan_id);
   if (!scan) return ErrorResponse(404, "no such scan");
   for (const ScanFile& file : kScanFiles) {
     if (file.name != name) continue;
     if (scan->folder.empty()) return ErrorResponse(404, "the files of this scan are gone");
-    return FileResponse(scan->folder / file.path, file.type,
-                        download ? fmt::format("{}_{}", scan_id, name) : "");
+    return FileResponse(scan->folder / file.path, file.type, download_name);
   }
   return ErrorResponse(404, "this scan has no such file");
 }
@@ -316,8 +348,10 @@ void AddScanRoutes(Table& table, ScanService& scans) {
               });
   table.ReadAside("/api/v1/scans/{id}/files/{name}", Permission::kRoom,
                   [&scans](const Request& request) {
+                    if (auto picture = TranslatedPicture(scans, request))
+                      return std::move(*picture);
                     return ScanFileResponse(scans, request.arguments[0], request.arguments[1],
-                                            request.query.contains("download"));
+                                            DownloadName(request));
                   });
   table.ReadAside("/api/v1/scans/{id}/maps/{name}", Permission::kRoom,
                   [&scans](const Request& request) {
@@ -329,7 +363,7 @@ void AddScanRoutes(Table& table, ScanService& scans) {
                     return response;
                   });
   table.ReadAside("/api/v1/results/{id}", Permission::kRoom, [&scans](const Request& request) {
-    return ScanFileResponse(scans, request.arguments[0], "result.json", /*download=*/false);
+    return ScanFileResponse(scans, request.arguments[0], "result.json", /*download_name=*/"");
   });
 }
 
@@ -353,6 +387,13 @@ void AddSettingsRoutes(Table& table, SettingsService& settings, AuditLog& audit)
     const auto limit = static_cast<int>(QueryNumber(request, "limit", 100, kMaxListed));
     const bool views = QueryNumber(request, "views", 1, 1) == 1;
     return JsonResponse({{"entries", ListJson(audit.Audit({before, limit, "", views}))}});
+  });
+  table.ReadAside("/api/v1/audit.jsonl", Permission::kAudit, [&audit](const Request&) {
+    Response response;
+    response.type = "application/x-ndjson";
+    response.body = audit.ExportAudit();
+    NameDownload(response, "plumb_log.jsonl");
+    return response;
   });
   table.Read("/api/v1/settings", Permission::kView,
              [&settings](const Request&) { return JsonResponse(ToJson(settings.GetSettings())); });

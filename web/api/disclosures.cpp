@@ -37,6 +37,7 @@ constexpr std::array kDisclosures = {
     Disclosure{"/api/v1/scans/{id}/maps/{name}", "view.scan", ""},
     Disclosure{"/api/v1/results/{id}", "view.scan", ""},
     Disclosure{"/api/v1/audit", "view.log", ""},
+    Disclosure{"/api/v1/audit.jsonl", "", "download.log"},
     Disclosure{"/api/v1/preview", "view.camera", ""},
     Disclosure{"/api/v1/scan/surface", "view.camera", ""},
 };

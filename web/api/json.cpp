@@ -121,11 +121,13 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
           std::chrono::duration_cast<std::chrono::seconds>(now - *scan.finished_at).count();
   }
   if (scan.result) {
+    // Without an answer no number is for anybody to act on.
+    const bool is_answer = scan.result->verdict != "no_answer";
     json["result"] = {
         {"verdict", scan.result->verdict},
         {"reasons", scan.result->reasons},
-        {"correction", NumbersJson(scan.result->correction)},
-        {"u95", NumbersJson(scan.result->u95)},
+        {"correction", NumbersJson(is_answer ? scan.result->correction : std::nullopt)},
+        {"u95", NumbersJson(is_answer ? scan.result->u95 : std::nullopt)},
         {"words", WordsJson(scan.result->words)},
         {"body", {{"now", scan.result->body_now}, {"after", scan.result->body_after}}}};
   }
@@ -190,7 +192,8 @@ Json WaitingJson(const std::vector<WaitingReference>& waiting) {
     list.push_back(Json{{"reference_id", reference.reference_id},
                         {"patient_id", reference.patient_id},
                         {"patient_code", reference.patient_code},
-                        {"version", reference.version}});
+                        {"version", reference.version},
+                        {"planned_by", reference.planned_by}});
   }
   return list;
 }

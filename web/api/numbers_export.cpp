@@ -10,6 +10,7 @@
 
 #include "web/api/api.hpp"
 #include "web/api/json.hpp"
+#include "web/api/language.hpp"
 #include "web/api/zip_archive.hpp"
 #include "web/http/gate.hpp"
 
@@ -71,14 +72,6 @@ std::string NumbersJson(const Patient& patient, const std::vector<Scan>& scans) 
   return Dump({{"patient", ToJson(patient)}, {"scans", list}});
 }
 
-/// Language requested by "?language=es"; nothing for an unknown one.
-std::optional<Language> LanguageOf(const Request& request) {
-  const auto found = request.query.find("language");
-  if (found == request.query.end() || found->second == "en") return Language::kEnglish;
-  return found->second == "es" ? std::optional(Language::kSpanish) : std::nullopt;
-}
-Response NoSuchLanguage() { return ErrorResponse(400, "language: expected en or es"); }
-
 Response File(std::string body, std::string type, const std::string& name) {
   Response response;
   response.type = std::move(type);
@@ -91,18 +84,14 @@ Response File(std::string body, std::string type, const std::string& name) {
 void AddReports(Router& router, BackgroundWork& background, ScanService& scans) {
   AddAside(router, background, "/api/v1/scans/{id}/report.pdf", Permission::kView,
            [&scans](const Request& request) {
-             const std::optional<Language> language = LanguageOf(request);
-             if (!language) return NoSuchLanguage();
-             auto pdf = scans.ScanReport(request.arguments[0], *language);
+             auto pdf = scans.ScanReport(request.arguments[0], LanguageIn(request));
              if (!pdf) return ErrorResponse(404, "there is no such scan");
              return File(std::move(*pdf), "application/pdf",
                          fmt::format("plumb_scan_{}.pdf", request.arguments[0]));
            });
   AddAside(router, background, "/api/v1/patients/{id}/report.pdf", Permission::kView,
            [&scans](const Request& request) {
-             const std::optional<Language> language = LanguageOf(request);
-             if (!language) return NoSuchLanguage();
-             auto pdf = scans.CourseReport(request.arguments[0], *language);
+             auto pdf = scans.CourseReport(request.arguments[0], LanguageIn(request));
              if (!pdf) return ErrorResponse(404, "there is no such patient");
              return File(std::move(*pdf), "application/pdf",
                          fmt::format("plumb_course_{}.pdf", request.arguments[0]));
@@ -172,15 +161,13 @@ void AddCourse(Router& router, BackgroundWork& background, PatientService& patie
                ScanService& scans) {
   AddAside(router, background, "/api/v1/patients/{id}/course.zip", Permission::kView,
            [&patients, &scans](const Request& request) {
-             const std::optional<Language> language = LanguageOf(request);
-             if (!language) return NoSuchLanguage();
              const auto patient = patients.FindPatient(request.arguments[0]);
              if (!patient) return ErrorResponse(404, "there is no such patient");
              const std::vector<Scan> list = scans.Scans(patient->id, kMaxScans);
              std::vector<ArchivedFile> files = {
                  {.name = "numbers.csv", .bytes = Csv(*patient, list)},
                  {.name = "numbers.json", .bytes = NumbersJson(*patient, list)}};
-             if (auto pdf = scans.CourseReport(patient->id, *language))
+             if (auto pdf = scans.CourseReport(patient->id, LanguageIn(request)))
                files.push_back({.name = "course.pdf", .bytes = std::move(*pdf)});
              AddResults(list, files);
              return File(ZipOf(files), "application/zip",

@@ -170,9 +170,10 @@ std::string Pictures(const Scan& scan, const ResultWords& words) {
   std::error_code ignored;
   if (!std::filesystem::exists(scan.folder / "result/error_map.png", ignored)) return "";
   return fmt::format(
-      "<figure><img src=\"/api/v1/scans/{0}/files/error_map.png\" alt=\"{1}\"></figure>"
-      "<figure><img src=\"/api/v1/scans/{0}/files/overlay.png\" alt=\"{2}\"></figure>",
-      scan.id, words.map, words.overlay);
+      "<figure><img src=\"/api/v1/scans/{0}/files/error_map.png?language={3}\" "
+      "alt=\"{1}\"></figure>"
+      "<figure><img src=\"/api/v1/scans/{0}/files/overlay.png?language={3}\" alt=\"{2}\"></figure>",
+      scan.id, words.map, words.overlay, words.code);
 }
 
 std::string_view VerdictText(const std::string& verdict, bool review, const ResultWords& words) {
@@ -195,7 +196,8 @@ struct Records {
 struct Wanted {
   std::optional<std::string> scan;  ///< Number of the scan to read or print; not set: the newest.
   bool runs = false;                ///< A new scan is running or being computed.
-  const ResultWords& words;
+  Language language = Language::kEnglish;
+  const ResultWords& words = ResultWordsOf(language);
 };
 
 std::string AcceptedLine(const Scan& scan, const ResultWords& words) {
@@ -233,9 +235,7 @@ std::string Identity(const Records& records, const Scan& scan, const Scan* newer
       scan.fraction > 0 ? Filled(words.fraction, scan.fraction) + " " : "",
       Filled(words.scan_line, EscapeHtml(scan.id), LocalTimeText(scan.started_at), when),
       old ? fmt::format(" <strong>{}</strong>", words.old) : "");
-  text += AcceptedLine(scan, words);
-  if (scan.check_overdue) text += fmt::format("<p>{}</p>", words.terms.overdue);
-  return text;
+  return text + AcceptedLine(scan, words);
 }
 
 std::string ResultBody(const Records& records, const Scan& scan, const Scan* newer,
@@ -262,6 +262,8 @@ std::string ResultBody(const Records& records, const Scan& scan, const Scan* new
                       EscapeHtml(verdict), VerdictText(verdict, review, words));
   for (const std::string& reason : scan.result->reasons)
     body += fmt::format("<p>{}</p>", Said(reason, words));
+  for (const std::string& caution : records.scans.Cautions(scan.id, wanted.language))
+    body += fmt::format("<p class=\"caution\">{}</p>", EscapeHtml(caution));
   return body +
          NumbersTable(*scan.result, reference ? reference->plan.tolerance : Tolerance{}, review,
                       words) +
@@ -325,23 +327,23 @@ Response LoginPage(const Request& request, const ResultWords& words, const std::
 
 void AddResultPage(Router& router, const Services& services) {
   const Records records{services.patients, services.references, services.scans};
-  router.Add({"GET", "/result", Permission::kNone, BodyKind::kNone,
-              [records, &appliance = services.appliance, &accounts = services.accounts,
-               &background = services.background](const Request& request, const Respond& respond) {
-                const ResultWords& words = ResultWordsOf(LanguageOf(request));
-                if (!request.session)
-                  return respond(LoginPage(request, words, accounts.WhyUnreadable()));
-                const auto named = request.query.find("scan");
-                const ApplianceState state = appliance.GetStatus().state;
-                const Wanted wanted{
-                    .scan =
-                        named == request.query.end() ? std::nullopt : std::optional(named->second),
-                    .runs = state == ApplianceState::kScanning || state == ApplianceState::kWorking,
-                    .words = words};
-                RespondAside(
-                    background, "GET /result",
-                    [records, wanted] { return ResultPage(records, wanted); }, respond);
-              }});
+  router.Add(
+      {"GET", "/result", Permission::kNone, BodyKind::kNone,
+       [records, &appliance = services.appliance, &accounts = services.accounts,
+        &background = services.background](const Request& request, const Respond& respond) {
+         const Language language = LanguageOf(request);
+         if (!request.session)
+           return respond(LoginPage(request, ResultWordsOf(language), accounts.WhyUnreadable()));
+         const auto named = request.query.find("scan");
+         const ApplianceState state = appliance.GetStatus().state;
+         const Wanted wanted{
+             .scan = named == request.query.end() ? std::nullopt : std::optional(named->second),
+             .runs = state == ApplianceState::kScanning || state == ApplianceState::kWorking,
+             .language = language};
+         RespondAside(
+             background, "GET /result", [records, wanted] { return ResultPage(records, wanted); },
+             respond);
+       }});
 }
 
 }  // namespace plumb::web

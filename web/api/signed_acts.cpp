@@ -22,7 +22,7 @@ void Accounts::AcceptOutside(const Request& request, const Respond& respond) {
 void Accounts::ApproveReference(const Request& request, const Respond& respond) {
   Fields fields(request.body);
   const int revision = fields.Integer("revision", 1, kMaxRevision);
-  const std::string digest = fields.Has("digest") ? fields.Text("digest", 0, 64) : std::string();
+  const std::string digest = fields.Text("digest", 1, 64);  // of what the person was shown
   std::string password = fields.Text("password", 1, kMaxPassword);
   fields.Finish();
   Signed(request, std::move(password), respond,

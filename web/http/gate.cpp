@@ -113,10 +113,16 @@ void Gate::Handle(const Route& route, const Request& request, const Respond& res
   // The body may have taken long, and the account may have been disabled meanwhile.
   if (route.permission != Permission::kNone && request.session->ended)
     return respond(ErrorResponse(401, "the session has ended: log in again"));
+  RespondGuarded(
+      route.Name(), [&] { route.handler(request, respond); }, respond);
+}
+
+void RespondGuarded(const std::string& name, const std::function<void()>& rest,
+                    const Respond& respond) {
   try {
-    route.handler(request, respond);
+    rest();
   } catch (const std::exception& error) {
-    respond(AnswerOf(route.Name(), error));
+    respond(AnswerOf(name, error));
   }
 }
 

@@ -48,6 +48,12 @@ class Gate {
   bool tls_;
 };
 
+/// Runs what is left of a handler, later and on the loop: what it throws becomes the answer as in
+/// Gate::Handle(), so that one record that cannot be read does not end the loop.
+/// @param name  Of the route.
+void RespondGuarded(const std::string& name, const std::function<void()>& rest,
+                    const Respond& respond);
+
 /// A slow answer: made by `make` on the background thread for reads; its exceptions become an
 /// answer as in Gate::Handle().
 /// @param name  Of the route.

@@ -27,6 +27,9 @@ class AuditLog {
                    const std::string& detail) = 0;
   /// Newest first (background).
   [[nodiscard]] virtual std::vector<AuditEntry> Audit(const AuditQuery& query) = 0;
+  /// The log as it is stored, with the digests by which it can be checked: one JSON object a line,
+  /// oldest first (background).
+  [[nodiscard]] virtual std::string ExportAudit() = 0;
 };
 
 }  // namespace plumb::web

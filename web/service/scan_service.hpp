@@ -10,8 +10,11 @@
 
 namespace plumb::web {
 
-/// Language of a report; see `daemon/appliance/report_words.hpp`.
+/// Language of a report or a picture; see `daemon/appliance/report_words.hpp`.
 enum class Language { kEnglish, kSpanish };
+
+/// Pictures that are made of a comparison.
+enum class ComparisonPicture { kErrorMap, kOverlay };
 
 /// The rules of services.hpp hold.
 class ScanService {
@@ -36,6 +39,14 @@ class ScanService {
   /// @param name  "heightmap", "deviation", "deviation_after", "region" or "body".
   [[nodiscard]] virtual std::optional<std::string> CompactMap(const std::string& scan_id,
                                                               const std::string& name) = 0;
+  /// What is to be known beside the verdict of a scan, in whole sentences (background).
+  [[nodiscard]] virtual std::vector<std::string> Cautions(const std::string& scan_id,
+                                                          Language language) = 0;
+  /// A picture of a comparison with texts in a language and the patient's sides named, as a PNG
+  /// file; nothing if there is no such comparison, or it cannot be drawn (background).
+  [[nodiscard]] virtual std::optional<std::string> PictureOf(const std::string& scan_id,
+                                                             ComparisonPicture picture,
+                                                             Language language) = 0;
   /// One page about a scan, or the course of a patient, as a PDF file; nothing if there is no such
   /// scan or patient, or the report cannot be drawn (background).
   [[nodiscard]] virtual std::optional<std::string> ScanReport(const std::string& scan_id,

@@ -120,7 +120,9 @@ struct Scan {
   int fraction = 0;        ///< Fraction number of that session; 0 if there is none.
   /// Time that the sensor was on when the scan began, for warm-up.
   std::optional<double> sensor_on_s;
-  bool check_overdue = false;  ///< No daily check had passed when the scan began.
+  bool check_overdue = false;      ///< No daily check had passed when the scan began.
+  std::string sensor_serial = {};  ///< Of the unit that was swept.
+  std::string session_by = {};     ///< Who opened its session; empty if there is none.
   /// Time since its end by a monotonic clock; not set if only the wall clock is available.
   std::optional<double> age_s = {};
   std::filesystem::path
@@ -160,6 +162,7 @@ struct WaitingReference {
   std::string patient_id;
   std::string patient_code;
   int version = 1;
+  std::string planned_by;  ///< Empty: it is to be planned; otherwise it is to be approved.
 };
 
 /// A paired display in the room, which cannot change anything.
@@ -291,6 +294,12 @@ struct Status {
   std::string rolled_back;            ///< As in UpdateStatus.
 };
 
+/// What a person chose of the page; empty: the browser's language, the default theme.
+struct Preferences {
+  std::string language;  ///< "en" or "es".
+  std::string theme;     ///< "dark", "light" or "auto".
+};
+
 struct User {
   std::string name;
   Role role = Role::kTechnician;
@@ -298,6 +307,7 @@ struct User {
       password_hash;  ///< libsodium's argon2id string; leaves the service only for the login.
   bool disabled = false;
   WallClock::time_point created_at;
+  Preferences preferences = {};
 };
 
 /// Changes of an account; fields that are not set stay unchanged.

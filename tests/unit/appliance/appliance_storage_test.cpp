@@ -2,9 +2,12 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <mutex>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
@@ -14,6 +17,7 @@
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/appliance/appliance_fixture.hpp"
 
 namespace plumb {
 namespace {
@@ -31,6 +35,12 @@ struct Surroundings {
   Surroundings() { config.appliance.state = folder / "state"; }
 };
 
+void RunFor(EventLoop& loop, std::chrono::milliseconds time) {
+  EventLoop::Source end = loop.MakeTimer("end", [&] { loop.Quit(0); });
+  end.ArmAfter(time);
+  EXPECT_EQ(loop.Run(), 0);
+}
+
 TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
   Surroundings around;
   {
@@ -46,7 +56,8 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
        .before_scan = {},
        .button = nullptr,
        .indicator = nullptr,
-       .demo_patient = {}});
+       .demo_patient = {},
+       .storage_retries = {std::chrono::milliseconds(1)}});
   for (const fs::directory_entry& entry : fs::directory_iterator(around.config.appliance.state)) {
     if (!entry.is_regular_file()) continue;
     std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
@@ -54,10 +65,8 @@ TEST(ApplianceStorage, ADatabaseThatCannotBeReadAnyMoreIsSafeModeAndNotTheEnd) {
     file << std::string(fs::file_size(entry.path()), 'x');
   }
   EXPECT_EQ(appliance.WebStatus().state, web::ApplianceState::kNoSensor);
-  EventLoop::Source timer = around.loop.MakeTimer("end", [&] { around.loop.Quit(0); });
-  timer.ArmAfter(std::chrono::milliseconds(50));
-  EXPECT_EQ(around.loop.Run(), 0);
-  EXPECT_THAT(appliance.storage_fault(), HasSubstr("damaged"));
+  RunFor(around.loop, std::chrono::milliseconds(300));
+  EXPECT_THAT(appliance.storage_fault(), HasSubstr("damaged")) << "and it is not tried again";
   EXPECT_FALSE(appliance.WebStatus().fault.empty());
   EXPECT_FALSE(appliance.Health().ok);
 }
@@ -116,9 +125,7 @@ TEST(ApplianceStorage, AnAuditLogThatWasChangedFromOutsideIsReported) {
       EXPECT_TRUE(RunUntil(around.loop, is_told));
       continue;
     }
-    EventLoop::Source end = around.loop.MakeTimer("end", [&] { around.loop.Quit(0); });
-    end.ArmAfter(std::chrono::milliseconds(300));
-    (void)around.loop.Run();
+    RunFor(around.loop, std::chrono::milliseconds(300));
     EXPECT_FALSE(is_told());
   }
 }
@@ -158,9 +165,7 @@ TEST(ApplianceStorage, ADatabaseTooLargeForTheCheckAtTheStartIsCheckedWhileItWor
       EXPECT_FALSE(appliance.Health().ok);
       continue;
     }
-    EventLoop::Source end = around.loop.MakeTimer("end", [&] { around.loop.Quit(0); });
-    end.ArmAfter(std::chrono::milliseconds(1500));
-    (void)around.loop.Run();
+    RunFor(around.loop, std::chrono::milliseconds(1500));
     EXPECT_FALSE(is_found());
   }
 }
@@ -262,30 +267,285 @@ TEST(ApplianceStorage, ABackupIsMadeOffTheLoopAndRefusedInSafeMode) {
   }
 }
 
-/// A backup on the disk of the scans is lost with it. Memory is never the disk of the temporary
-/// files unless it is asked for.
+/// Another disk is made of memory, which a backup may be taken from and is not made into.
+fs::path InMemory(const Surroundings& around) {
+  return "/dev/shm" / around.folder.path().filename();
+}
+
+/// A backup on the disk of the scans is lost with it.
 TEST(ApplianceStorage, ABackupBesideTheScansIsWarnedOf) {
   for (const bool is_beside : {true, false}) {
     SCOPED_TRACE(is_beside);
     Surroundings around;
-    const fs::path memory = "/dev/shm" / around.folder.path().filename();
-    const fs::path folder = is_beside ? around.folder / "backup" : memory;
-    around.config.appliance.backup_folder = folder;
-    Appliance appliance(around.loop, PartsOf(around.config, around.bus));
-    std::optional<std::string> made;
-    appliance.BackUp({.user = "anna", .address = {}}, appliance.BackupTarget(),
-                     [&](const std::string& error, const BackupReport&) { made = error; });
-    EXPECT_TRUE(RunUntil(around.loop, [&] { return made.has_value(); }));
-    EXPECT_EQ(made, "");
-    const std::vector<std::string> warnings = appliance.WebStatus().storage.warnings;
-    EXPECT_EQ(std::count_if(warnings.begin(), warnings.end(),
-                            [](const std::string& warning) {
-                              return warning.find("lies on the disk of the scans") !=
-                                     std::string::npos;
-                            }),
-              is_beside ? 1 : 0);
+    const fs::path memory = InMemory(around);
+    if (!is_beside) around.config.appliance.state = memory / "state";
+    around.config.appliance.backup_folder = around.folder / "backup";
+    {
+      Appliance appliance(around.loop, PartsOf(around.config, around.bus));
+      std::optional<std::string> made;
+      appliance.BackUp({.user = "anna", .address = {}}, appliance.BackupTarget(),
+                       [&](const std::string& error, const BackupReport&) { made = error; });
+      EXPECT_TRUE(RunUntil(around.loop, [&] { return made.has_value(); }));
+      EXPECT_EQ(made, "");
+      const std::vector<std::string> warnings = appliance.WebStatus().storage.warnings;
+      EXPECT_EQ(std::count_if(warnings.begin(), warnings.end(),
+                              [](const std::string& warning) {
+                                return warning.find("lies on the disk of the scans") !=
+                                       std::string::npos;
+                              }),
+                is_beside ? 1 : 0);
+    }
     fs::remove_all(memory);
   }
+}
+
+TEST(ApplianceStorage, ABackupInMemoryIsRefused) {
+  Surroundings around;
+  const fs::path memory = InMemory(around);
+  Appliance appliance(around.loop, PartsOf(around.config, around.bus));
+  std::optional<std::string> refused;
+  appliance.BackUp({.user = "anna", .address = {}}, memory,
+                   [&](const std::string& error, const BackupReport&) { refused = error; });
+  EXPECT_TRUE(RunUntil(around.loop, [&] { return refused.has_value(); }));
+  EXPECT_THAT(refused.value_or(""), HasSubstr("is empty after a restart of the machine"));
+  EXPECT_FALSE(fs::exists(memory));
+}
+
+/// An appliance that tries to leave safe mode at once and again, on its loop beside the test.
+class StorageRetryTest : public testing::ApplianceTest {
+ protected:
+  StorageRetryTest() {
+    parts_.demo_patient.clear();
+    parts_.storage_retries = {std::chrono::milliseconds(20)};
+  }
+  [[nodiscard]] fs::path state() const { return folder_ / "state"; }
+  [[nodiscard]] std::string Fault() {
+    std::string fault;
+    On([&] { fault = appliance_->storage_fault(); });
+    return fault;
+  }
+  [[nodiscard]] std::vector<web::AuditEntry> Recoveries() const {
+    return appliance_->store()->audit.Find({0, 100, "storage.recovered"});
+  }
+  static void GiveItSomeTries() { std::this_thread::sleep_for(std::chrono::milliseconds(500)); }
+};
+
+/// A table that is away stands for reads that fail for a while.
+TEST_F(StorageRetryTest, SafeModeEndsWhenWhatIsStoredCanBeReadAgainAndNotBefore) {
+  Play([&] {
+    MakeReady();
+    Database direct(state() / "plumb.db", Database::Access::kReadWrite);
+    direct.Execute("ALTER TABLE checks RENAME TO away");
+    On([&] { (void)appliance_->WebStatus(); });
+    ASSERT_TRUE(Becomes([&] { return !appliance_->storage_fault().empty(); }));
+    const std::string fault = Fault();
+    GiveItSomeTries();
+    On([&] {
+      EXPECT_EQ(appliance_->storage_fault(), fault);
+      EXPECT_EQ(appliance_->WebStatus().state, web::ApplianceState::kFault);
+      EXPECT_FALSE(appliance_->Health().ok);
+      EXPECT_EQ(Recoveries().size(), 0U);
+    });
+    direct.Execute("ALTER TABLE away RENAME TO checks");
+    ASSERT_TRUE(Becomes([&] { return appliance_->storage_fault().empty(); }));
+    On([&] {
+      EXPECT_EQ(appliance_->WebStatus().state, web::ApplianceState::kReady);
+      EXPECT_EQ(appliance_->WebStatus().fault, "");
+      EXPECT_TRUE(appliance_->Health().ok) << appliance_->Health().reason;
+      ASSERT_EQ(Recoveries().size(), 1U);
+      EXPECT_EQ(Recoveries()[0].detail, fault);
+      EXPECT_EQ(appliance_->Press(ButtonPress::kShort, kTester), "") << "scans go on";
+      EXPECT_EQ(appliance_->Cancel(kTester), "");
+    });
+  });
+}
+
+std::string StoreSmallScan(Store& store, const std::string& patient) {
+  const std::string id = store.scans.Begin({.patient_id = patient,
+                                            .reference_id = {},
+                                            .purpose = {},
+                                            .sensor_serial = {},
+                                            .reason = {}});
+  fs::create_directory(store.folders.Staging(id) / "scene");
+  WriteWholeFile(store.folders.Staging(id) / "scene" / "scene.json", std::string_view("{}"));
+  store.scans.Finish(
+      id,
+      {.outcome = web::ScanOutcome::kDone, .failure = {}, .result_json = {}, .swept_area_m2 = 0});
+  return id;
+}
+
+/// As when the disk of the scans is mounted late.
+TEST_F(StorageRetryTest, AStoreThatCouldNotBeOpenedIsOpenedWhenItsScansAreThere) {
+  std::string patient;
+  {
+    Store store(state());
+    patient = store.patients.Add(kTester, "A", "");
+    for (int i = 0; i < 3; ++i) (void)StoreSmallScan(store, patient);
+  }
+  fs::rename(state() / "scans", folder_ / "away");
+  Play([&] {
+    EXPECT_THAT(Fault(), HasSubstr("cannot be seen"));
+    GiveItSomeTries();
+    EXPECT_THAT(Fault(), HasSubstr("cannot be seen"));
+    EXPECT_THROW((void)appliance_->store()->patients.Add(kTester, "B", ""), DiskRefused)
+        << "read-only";
+    EXPECT_EQ(appliance_->store()->patients.List().size(), 1U);
+    fs::rename(folder_ / "away", state() / "scans");
+    ASSERT_TRUE(Becomes([&] { return appliance_->storage_fault().empty(); }));
+    On([&] {
+      EXPECT_EQ(appliance_->store()->scans.List(patient, 10).size(), 3U);
+      EXPECT_NE(appliance_->store()->patients.Add(kTester, "B", ""), "");
+      EXPECT_EQ(Recoveries().size(), 1U);
+      EXPECT_TRUE(appliance_->Health().ok) << appliance_->Health().reason;
+      EXPECT_EQ(appliance_->WebStatus().state, web::ApplianceState::kNoSensor);
+    });
+  });
+}
+
+/// The disk may be missing, or a backup about to be restored.
+TEST_F(StorageRetryTest, SafeModeNeverEndsWithANewDatabase) {
+  std::ofstream(state()) << "a file where the folder should be";
+  Play([&] {
+    EXPECT_NE(Fault(), "");
+    fs::remove(state());
+    fs::create_directory(state());
+    GiveItSomeTries();
+    EXPECT_NE(Fault(), "");
+    EXPECT_TRUE(fs::is_empty(state()));
+  });
+}
+
+/// An appliance whose disk has the room that a test says.
+class ApplianceSpaceTest : public testing::ApplianceTest {
+ protected:
+  ApplianceSpaceTest() {
+    parts_.demo_patient.clear();
+    parts_.space = [this](const fs::path&, std::error_code&) {
+      const std::lock_guard lock(mutex_);
+      return space_;
+    };
+    SetAvailable(90'000'000'000);
+  }
+  /// Of a disk of 100 GB, of which 5 are kept for root.
+  void SetUsed(std::uintmax_t used_mb) {
+    Set({.capacity = 100'000'000'000,
+         .free = 100'000'000'000 - used_mb * 1'000'000,
+         .available = 95'000'000'000 - used_mb * 1'000'000});
+  }
+  void SetAvailable(std::uintmax_t bytes) {
+    Set({.capacity = 100'000'000'000, .free = bytes, .available = bytes});
+  }
+  [[nodiscard]] bool IsLit(const std::string& light) {
+    return Becomes([&] { return appliance_->WebStatus().light == light; });
+  }
+
+ private:
+  void Set(const fs::space_info& space) {
+    const std::lock_guard lock(mutex_);
+    space_ = space;
+  }
+
+  std::mutex mutex_;  ///< The loop and the store's thread ask for it.
+  fs::space_info space_ = {};
+};
+
+TEST_F(ApplianceSpaceTest, FourFifthsOfTheDiskAreToldByPageStatusAndLight) {
+  const auto warns = [&] {
+    const std::vector<std::string> warnings = appliance_->WebStatus().storage.warnings;
+    return std::find(warnings.begin(), warnings.end(),
+                     "The disk is 80 % full: back up and remove scans.") != warnings.end();
+  };
+  Play([&] {
+    SetUsed(75'999);
+    MakeReady();
+    EXPECT_TRUE(IsLit("ready"));
+    On([&] { EXPECT_FALSE(warns()); });
+    SetUsed(76'000);  // of the 95 that are not kept
+    EXPECT_TRUE(IsLit("ready_disk_nearly_full"));
+    On([&] {
+      EXPECT_TRUE(warns());
+      EXPECT_EQ(appliance_->StatusJson()["light"], "ready_disk_nearly_full");
+      EXPECT_THAT(appliance_->StatusJson()["warnings"].dump(), HasSubstr("80 % full"));
+      EXPECT_EQ(appliance_->state().phase, ScanPhase::kReady);
+      EXPECT_TRUE(appliance_->Health().ok);
+    });
+    SetUsed(75'999);
+    EXPECT_TRUE(IsLit("ready")) << "and that it is over";
+  });
+}
+
+/// Of the fake sensor, whose images are smaller than the smallest that are reckoned with.
+constexpr std::uintmax_t kScanBytes = 16'000'000 + 110 * 320 * 240;
+constexpr std::uintmax_t kRecordingBytes = std::uintmax_t{60 * 30 * 320 * 240} / 10 * 26;
+
+TEST_F(ApplianceSpaceTest, OneByteTooLittleIsAFaultAndNoReadiness) {
+  Play([&] {
+    MakeReady();
+    SetAvailable(kScanBytes);
+    EXPECT_TRUE(IsLit("ready_disk_nearly_full"));
+    SetAvailable(kScanBytes - 1);
+    EXPECT_TRUE(IsLit("fault"));
+    On([&] {
+      EXPECT_EQ(appliance_->WebStatus().state, web::ApplianceState::kFault);
+      EXPECT_EQ(appliance_->WebStatus().fault_kind, web::FaultKind::kStorage);
+      EXPECT_THAT(appliance_->WebStatus().fault, HasSubstr("the disk is full: 24 MB are free"));
+      EXPECT_THAT(appliance_->StatusLine(), HasSubstr("the disk is full"));
+      EXPECT_THAT(appliance_->Press(ButtonPress::kShort, kTester), HasSubstr("the disk is full"));
+      EXPECT_EQ(appliance_->storage_fault(), "") << "scans can be removed";
+      EXPECT_NE(appliance_->store()->patients.Add(kTester, "A", ""), "");
+    });
+    SetAvailable(kScanBytes);
+    EXPECT_TRUE(IsLit("ready_disk_nearly_full"));
+    On([&] { EXPECT_EQ(appliance_->WebStatus().fault, ""); });
+  });
+}
+
+TEST_F(ApplianceSpaceTest, ARecordingNeedsItsOwnRoomAndADailyCheckHasNone) {
+  parts_.config.appliance.keep_recordings = true;
+  parts_.config.appliance.scan_limit_s = 60;
+  Play([&] {
+    MakeReady();
+    const auto reason = [&] { return appliance_->Health().reason; };
+    SetAvailable(kScanBytes + kRecordingBytes);
+    On([&] { EXPECT_EQ(reason(), ""); });
+    SetAvailable(kScanBytes + kRecordingBytes - 1);
+    On([&] {
+      EXPECT_THAT(reason(), HasSubstr("the disk is full"));
+      EXPECT_EQ(appliance_->OpenCheck(kTester), "");
+      EXPECT_EQ(reason(), "");
+    });
+    SetAvailable(kScanBytes);
+    On([&] { EXPECT_EQ(reason(), ""); });
+    SetAvailable(kScanBytes - 1);
+    On([&] { EXPECT_THAT(reason(), HasSubstr("the disk is full")); });
+  });
+}
+
+TEST(ApplianceStorage, ScansThatWereLostAreAWarningUntilTheyAreBack) {
+  Surroundings around;
+  const fs::path scans = around.config.appliance.state / "scans";
+  std::string last;
+  {
+    Store store(around.config.appliance.state);
+    const std::string patient = store.patients.Add({.user = "anna", .address = {}}, "A", "");
+    for (int i = 0; i < 3; ++i) last = StoreSmallScan(store, patient);
+  }
+  fs::rename(scans / last, around.folder / "lost");
+  const auto warns = [](Appliance& appliance) {
+    const std::vector<std::string> warnings = appliance.WebStatus().storage.warnings;
+    return std::any_of(warnings.begin(), warnings.end(), [](const std::string& warning) {
+      return warning.starts_with("Files of some stored scans (1) are missing or changed");
+    });
+  };
+  {
+    Appliance appliance(around.loop, PartsOf(around.config, around.bus));
+    EXPECT_TRUE(RunUntil(around.loop, [&] { return warns(appliance); }));
+  }
+  fs::rename(around.folder / "lost", scans / last);
+  EventLoop another;
+  Appliance appliance(another, PartsOf(around.config, around.bus));
+  RunFor(another, std::chrono::milliseconds(1500));
+  EXPECT_FALSE(warns(appliance));
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ using enum ScanPhase;
 using E = ScanEvent;
 using A = ScanAction;
 
-constexpr int kNumEvents = static_cast<int>(E::kStorageFailed) + 1;
+constexpr int kNumEvents = static_cast<int>(E::kStorageWorks) + 1;
 
 bool IsRunning(const ScanState& s) { return s.phase == kScanning || s.phase == kWorking; }
 
@@ -112,9 +112,13 @@ TEST(ScanStateTest, AScanIsToldToStopOnce) {
   });
 }
 
-TEST(ScanStateTest, StorageFailureIsForever) {
-  ForEveryStateAndEvent([](const ScanState& before, E, const ScanTransition& t) {
+TEST(ScanStateTest, StorageFailureLastsUntilTheStorageWorks) {
+  ForEveryStateAndEvent([](const ScanState& before, E event, const ScanTransition& t) {
     if (before.fault != FaultKind::kStorage) return;
+    if (event == E::kStorageWorks) {
+      EXPECT_EQ(t.state.fault, before.sensor_fails ? FaultKind::kSensor : FaultKind::kNone);
+      return;
+    }
     EXPECT_EQ(t.state.fault, FaultKind::kStorage);
     EXPECT_TRUE(IsRunning(t.state) || t.state.phase == kFault);
   });
@@ -243,6 +247,10 @@ TEST(ScanStateTest, TheTable) {
       {kScanFault, E::kShortPress, kInReady, {}},
       {kScanFault, E::kStart, kScanFault, {A::kRefuse}},
       {kStorageFault, E::kShortPress, kStorageFault, {A::kRefuse}},
+      {kStorageFault, E::kStorageWorks, kInReady, {}},
+      {kInReady, E::kStorageWorks, kInReady, {}},
+      {kScanFault, E::kStorageWorks, kScanFault, {}},
+      {kInScanning, E::kStorageWorks, kInScanning, {}},
   };
   for (const Row& row : rows) {
     SCOPED_TRACE(Text(row.from, row.event));

@@ -17,15 +17,19 @@
 #include "drivers/files/image_file.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/files/small_output.hpp"
 
 namespace plumb {
 namespace {
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using testing::Answer;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using testing::kGrid;
 using testing::MessageOf;
+using testing::Slope;
 using testing::TempFolder;
 
 std::set<std::string> Names(const fs::path& folder) {
@@ -33,55 +37,6 @@ std::set<std::string> Names(const fs::path& folder) {
   for (const fs::directory_entry& entry : fs::directory_iterator(folder))
     names.insert(entry.path().filename().string());
   return names;
-}
-
-const GridShape kGrid{-0.1, -0.2, 0.0015, 120, 80};
-
-HeightMap Slope(double offset_m) {
-  HeightMap map(kGrid);
-  for (std::size_t i = 0; i < map.z.size(); ++i)
-    map.z[i] = static_cast<float>(offset_m + 1e-4 * static_cast<double>(i % 120));
-  map.z[5] = std::numeric_limits<float>::quiet_NaN();
-  return map;
-}
-
-Comparison Answer() {
-  Comparison comparison;
-  comparison.preset = Preset::kPaper;
-  comparison.verdict = Verdict::kMove;
-  comparison.reasons = {"vertical is 9.0 mm off"};
-  Alignment alignment;
-  alignment.T_reference_current.translation() = Eigen::Vector3d(0.25, 0.5, 0.75);
-  alignment.stretch(0, 1) = 0.125;
-  alignment.rms_m = 0.001;
-  alignment.markers_used = {3, 5, 8};
-  alignment.markers_rejected = {{7, 0.012}};
-  comparison.alignment = alignment;
-  BodyMotion motion;
-  motion.T.translation() = Eigen::Vector3d(1, 2, 3);
-  motion.covariance(0, 5) = 0.125;
-  motion.weak_directions = {{"roll", 2.5, "deg"}};
-  motion.residual_median_m = 0.0015;
-  motion.residual_p95_m = 0.004;
-  comparison.motion = motion;
-  Correction correction;
-  correction.isocentre_m = Eigen::Vector3d(0.1, 0.2, 0.3);
-  correction.value = {-9.0, 2.0, 3.0, 0.1, 0.2, 0.3};
-  correction.u95 = {0.5, 0.6, 0.7, 0.01, 0.02, 0.03};
-  correction.words[0] = "down 9.0 mm";
-  comparison.correction = correction;
-  comparison.region = RegionCoverage{0.97, 0.012, Eigen::Vector2d(0.4, 0.5)};
-  comparison.deviation = Slope(0.009);
-  comparison.distance = Slope(0.008);
-  comparison.current_height = Slope(0.109);
-  Deformation deformation;
-  deformation.points = {{0.1F, 0.2F, 0.3F}, {0.4F, 0.5F, 0.6F}};
-  deformation.shifts_m = {{0.01F, 0.02F, 0.03F}, {0.0F, 0.0F, 0.0F}};
-  deformation.observed = {1, 0};
-  deformation.shift_p95_m = 0.037;
-  comparison.deformation = deformation;
-  comparison.timings_s["alignment"] = 0.25;
-  return comparison;
 }
 
 TEST(ResultFolderTest, TheFieldIsAPlyThatOtherReadersTake) {

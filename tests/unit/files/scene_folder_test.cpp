@@ -19,6 +19,7 @@
 #include "tests/support/full_disk.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/files/small_output.hpp"
 
 namespace plumb {
 namespace {
@@ -28,44 +29,9 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::MessageOf;
+using testing::PoseAt;
+using testing::SmallScene;
 using testing::TempFolder;
-
-StampedPose PoseAt(double time_s) {
-  StampedPose pose{time_s, Pose::Identity()};
-  pose.T_world_camera.linear() = RotationFromVector(Eigen::Vector3d(2.9, 0.3 * time_s, -0.7));
-  pose.T_world_camera.translation() = Eigen::Vector3d(0.1 * time_s, -1.23456789, 0.777);
-  return pose;
-}
-
-Scene SmallScene() {
-  Scene scene;
-  scene.preset = Preset::kPaper;
-  scene.frame = SceneFrame::kReferenceMarker;
-  scene.marker_dictionary = "DICT_ARUCO_MIP_36h12";
-  scene.marker_length_m = 0.104;
-  scene.reference_marker = 11;
-  scene.markers[11] = {CornersInMarkerFrame(0.104), 9, 0.0004};
-  scene.markers[100] = {CornersInMarkerFrame(0.104), 2, 0.002};
-  scene.markers[100].corners[2] = Eigen::Vector3d(1.0 / 3.0, -0.1, 1e-9);
-  scene.keyframes = {PoseAt(1), PoseAt(3)};
-  scene.trajectory = {PoseAt(1), PoseAt(2), PoseAt(3)};
-  scene.frames_total = 5;
-  scene.frames_tracked = 3;
-  scene.frames_dropped = 1;
-  scene.longest_lost_s = 0.25;
-  scene.cloud.points = {{0, 0, 0.1F}, {0.5F, 0.25F, 0.125F}};
-  scene.cloud.normals = {{0, 0, 1}, {0, 1, 0}};
-  scene.cloud.colors = {Color{1, 2, 3}, Color{4, 5, 6}};
-  scene.height_map.emplace(GridShape{-0.1, -0.2, 0.0015, 7, 3});
-  scene.height_map->z[0] = 0.01F;
-  scene.height_map->z[9] = -0.02F;
-  scene.mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  scene.mesh.triangles = {{0, 1, 2}};
-  scene.calibration["depth_scale"] = 1.00123;
-  scene.timings_s["clouds"] = 0.5;
-  scene.warnings = {"depth is a little short"};
-  return scene;
-}
 
 /// A written scene that a test then damages.
 class SceneFolderTest : public ::testing::Test {

@@ -27,6 +27,7 @@ const std::vector<IndicatorPattern>& AllPatterns() {
                                                       IndicatorPattern::kDone,
                                                       IndicatorPattern::kFault,
                                                       IndicatorPattern::kReadyRolledBack,
+                                                      IndicatorPattern::kReadyDiskNearlyFull,
                                                       IndicatorPattern::kStopped};
   return patterns;
 }

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "daemon/records/backup_place.hpp"
 #include "daemon/records/file_cipher.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -26,8 +27,8 @@ using testing::FilesBelow;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::kAnna;
-using testing::kBert;
 using testing::MessageOf;
+using testing::PlanAndApprove;
 using testing::StoreScan;
 
 class BackupTest : public ::testing::Test {
@@ -36,7 +37,7 @@ class BackupTest : public ::testing::Test {
     Store store(state());
     patient_ = store.patients.Add(kAnna, "P", "thorax");
     reference_ = StoreScan(store, patient_);
-    store.references.Approve(kBert, store.references.Add(kAnna, reference_, "", {}), 1);
+    (void)PlanAndApprove(store, store.references.Add(kAnna, reference_, "", {}));
     for (int i = 0; i < 3; ++i) scan_ = StoreScan(store, patient_);
     fs::create_directories(state() / "calibration");
     WriteWholeFile(state() / "calibration" / "S1.yaml", std::string_view("fx: 1"));
@@ -50,10 +51,12 @@ class BackupTest : public ::testing::Test {
   [[nodiscard]] fs::path backup() const { return folder_ / "backup"; }
   [[nodiscard]] fs::path restored() const { return folder_ / "restored"; }
 
-  /// Without the database, whose pages a start changes.
+  /// Without the database, whose pages a start changes, and the note of a restore.
   static auto FilesOf(const fs::path& folder) {
     auto files = FilesBelow(folder);
-    std::erase_if(files, [](const auto& entry) { return entry.first.starts_with("plumb.db"); });
+    std::erase_if(files, [](const auto& entry) {
+      return entry.first.starts_with("plumb.db") || entry.first == "restored.json";
+    });
     return files;
   }
 
@@ -243,6 +246,60 @@ TEST_F(BackupTest, AnInterruptedRestoreIsNoStore) {
   (void)RestoreBackup(backup(), restored());
   fs::remove(restored() / "plumb.db");  // it comes last
   EXPECT_THROW(Store{restored()}, DatabaseCorrupt);
+}
+
+TEST_F(BackupTest, ARestoreIsInTheAuditLogOfTheFirstStart) {
+  (void)BackUpStopped(state(), backup());
+  const std::string sums = DigestOfFile(backup(), "SHA256SUMS").sha256;
+  (void)RestoreBackup(backup(), restored());
+  for (int start = 0; start < 2; ++start) {
+    Store store(restored());
+    const auto entries = store.audit.Find({0, 100, "backup.restore"});
+    ASSERT_EQ(entries.size(), 1U) << "once, in start " << start;
+    EXPECT_THAT(entries[0].detail, AllOf(HasSubstr(backup().string() + ": 4 scans"),
+                                         HasSubstr("sha256 " + sums), HasSubstr("restored at 20")));
+    EXPECT_EQ(store.audit.FirstBroken(), std::nullopt);
+  }
+  EXPECT_FALSE(fs::exists(restored() / "restored.json"));
+  EXPECT_THAT(Store(state()).audit.Find({0, 100, "backup.restore"}), IsEmpty());
+}
+
+TEST_F(BackupTest, ARestoreWhoseNoteIsDamagedIsInTheAuditLogToo) {
+  (void)BackUpStopped(state(), backup());
+  (void)RestoreBackup(backup(), restored());
+  WriteWholeFile(restored() / "restored.json", std::string_view("{"));
+  Store store(restored());
+  const auto entries = store.audit.Find({0, 100, "backup.restore"});
+  ASSERT_EQ(entries.size(), 1U);
+  EXPECT_THAT(entries[0].detail, HasSubstr("cannot be read"));
+}
+
+/// As systemd mounts them for a service with PrivateTmp=yes.
+TEST_F(BackupTest, AFolderOfTheServiceAloneIsNoPlaceForIt) {
+  constexpr const char* kMounts =
+      "22 1 254:1 / / rw - ext4 /dev/vda1 rw\n"
+      "30 22 0:30 / /tmp rw - tmpfs tmpfs rw\n"
+      "41 30 0:30 /systemd-private-12-plumbd.service-x/tmp /tmp rw - tmpfs tmpfs rw\n"
+      "42 22 254:1 /var/tmp/systemd-private-12-plumbd.service-y/tmp /var/tmp rw - ext4 /d rw\n"
+      "43 41 254:2 / /tmp/disk rw - ext4 /dev/vdb rw\n";
+  const auto why = [&](const char* target, const char* mounts) {
+    return WhyBackupIsLostAt(target, "/tmp", mounts);
+  };
+  for (const char* target : {"/tmp/backup", "/tmp", "/var/tmp/a/b"})
+    EXPECT_THAT(why(target, kMounts),
+                AllOf(HasSubstr(target), HasSubstr("visible to its service only"),
+                      HasSubstr("/var/lib/plumb-backup")));
+  for (const char* target : {"/tmpfolder/backup", "/var/lib/plumb-backup", "/tmp/disk/backup"})
+    EXPECT_EQ(why(target, kMounts), "") << target;
+  EXPECT_EQ(why("/tmp/backup", "22 1 254:1 / / rw - ext4 /dev/vda1 rw\n"), "");
+  EXPECT_EQ(why("/tmp/backup", ""), "");
+}
+
+TEST_F(BackupTest, AFolderInMemoryIsNoPlaceForItUnlessTheStateIsThereToo) {
+  EXPECT_THAT(WhyBackupIsLostAt("/dev/shm/no-such-folder/backup", "/", ""),
+              HasSubstr("lies in memory"));
+  EXPECT_EQ(WhyBackupIsLostAt("/dev/shm/backup", "/dev/shm", ""), "");
+  EXPECT_EQ(WhyBackupIsLostAt("/var/lib/plumb-backup", "/", ""), "");
 }
 
 TEST_F(BackupTest, AnotherFolderIsNotOverwritten) {

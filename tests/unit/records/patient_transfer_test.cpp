@@ -27,6 +27,7 @@ using testing::kAnna;
 using testing::kBert;
 using testing::MessageOf;
 using ::testing::Not;
+using testing::PlanAndApprove;
 using testing::StoreScan;
 
 class PatientTransferTest : public ::testing::Test {
@@ -40,7 +41,7 @@ class PatientTransferTest : public ::testing::Test {
     const std::string session = store.treatments.Open(kAnna, patient_, web::ScanPurpose::kFraction);
     reference_ = StoreScan(store, patient_);
     const std::string draft = store.references.Add(kAnna, reference_, "first", plan_);
-    store.references.Approve(kBert, draft, 1);
+    (void)PlanAndApprove(store, draft);
     NewScan begun = testing::Begun(patient_);
     begun.reference_id = draft;
     begun.session_id = session;

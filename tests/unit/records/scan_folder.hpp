@@ -46,6 +46,13 @@ inline std::string StoreScan(Store& store, const std::string& patient) {
   return id;
 }
 
+/// Anna plans a draft as it is, and Bert approves it.
+inline std::string PlanAndApprove(Store& store, const std::string& draft) {
+  (void)store.references.Plan(kAnna, draft, 1, store.references.Find(draft)->plan);
+  store.references.Approve(kBert, draft, 2);
+  return draft;
+}
+
 /// Path within the folder to content, of all regular files below it.
 inline std::map<std::string, std::string> FilesBelow(const std::filesystem::path& folder) {
   std::map<std::string, std::string> files;

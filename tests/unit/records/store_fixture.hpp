@@ -44,9 +44,8 @@ class StoreTest : public ::testing::Test {
     return id;
   }
   static std::string ApprovedReference(Store& store, const std::string& patient) {
-    const std::string id = store.references.Add(kAnna, Scan(store, patient), "first", {});
-    store.references.Approve(kBert, id, 1);
-    return id;
+    return testing::PlanAndApprove(store,
+                                   store.references.Add(kAnna, Scan(store, patient), "first", {}));
   }
   template <typename Call>
   static web::ChangeResult RefusalOf(const Call& call) {

@@ -14,6 +14,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::kAnna;
 using testing::kBert;
+using testing::PlanAndApprove;
 using testing::StoreScan;
 
 class StoreIntegrityTest : public ::testing::Test {
@@ -107,7 +108,7 @@ TEST_F(StoreIntegrityTest, AReferenceIsApprovedOnlyAsItWasStored) {
       HasSubstr("scene/heightmap.tiff"));
   EXPECT_FALSE(store_.references.Approved(patient_));
   Flip("scene/heightmap.tiff");
-  store_.references.Approve(kBert, reference, 1);
+  (void)PlanAndApprove(store_, reference);
   EXPECT_TRUE(store_.references.Approved(patient_));
 }
 
@@ -119,6 +120,9 @@ TEST_F(StoreIntegrityTest, TheDigestOfAStoredFileCannotBeChanged) {
 TEST_F(StoreIntegrityTest, TheAuditLogShowsWhatWasChangedInItOrTakenFromIt) {
   for (int i = 0; i < 5; ++i) store_.audit.Log(kAnna, "note", std::to_string(i), "text");
   ASSERT_EQ(store_.audit.FirstBroken(), std::nullopt);
+  const std::string exported = store_.audit.Export();
+  EXPECT_EQ(CheckAuditExport(exported).number, store_.audit.Head().number);
+  EXPECT_EQ(CheckAuditExport(exported).chain, store_.audit.Head().chain);
   Database direct(folder_ / "state" / "plumb.db", Database::Access::kReadWrite);
   direct.Execute("DROP TRIGGER audit_no_update; DROP TRIGGER audit_no_delete");
   const auto number = store_.audit.Find({0, 3}).at(2).number;
@@ -127,12 +131,68 @@ TEST_F(StoreIntegrityTest, TheAuditLogShowsWhatWasChangedInItOrTakenFromIt) {
   };
   restore("texT");
   EXPECT_EQ(store_.audit.FirstBroken(), number);
+  const auto named = HasSubstr(fmt::format("entry {} is not as it was written", number));
+  EXPECT_THAT(testing::MessageOf<DataError>([&] { (void)CheckAuditExport(store_.audit.Export()); }),
+              named);
+  EXPECT_THAT(testing::MessageOf<DataError>([&] {
+                std::string lines = exported;  // changed in the file that was downloaded
+                lines.replace(lines.find("\"detail\":\"text\""), 15, "\"detail\":\"tex.\"");
+                (void)CheckAuditExport(lines);
+              }),
+              HasSubstr("is not as it was written"));
+  EXPECT_EQ(CheckAuditExport(exported.substr(exported.find('\n') + 1)).chain,
+            CheckAuditExport(exported).chain)
+      << "without its first entry the rest can be checked";
   restore("text");
   EXPECT_EQ(store_.audit.FirstBroken(), std::nullopt);
   direct.Execute(fmt::format("DELETE FROM audit WHERE number > {}", number));
   EXPECT_EQ(store_.audit.FirstBroken(), number + 1) << "the newest entries are gone";
   direct.Execute(fmt::format("DELETE FROM audit WHERE number = {}", number - 1));
   EXPECT_EQ(store_.audit.FirstBroken(), number - 1);
+  EXPECT_THAT(testing::MessageOf<DataError>([&] { (void)CheckAuditExport(store_.audit.Export()); }),
+              HasSubstr(fmt::format("entry {} is not", number - 1)));
+}
+
+TEST_F(StoreIntegrityTest, UnusableFilesAreCountedUntilTheyAreBackOrTheirPatientIsArchived) {
+  EXPECT_EQ(store_.integrity.CountUnusable(), UnusableRecords());
+  Flip("scene/cloud.ply");
+  EXPECT_EQ(store_.integrity.CountUnusable(), UnusableRecords()) << "nobody has looked yet";
+  (void)store_.integrity.Check(scan_, false);
+  EXPECT_EQ(store_.integrity.CountUnusable(), (UnusableRecords{.scans = 1, .references = 0}));
+  Flip("scene/cloud.ply");
+  (void)store_.integrity.Check(scan_, false);
+  EXPECT_EQ(store_.integrity.CountUnusable(), UnusableRecords());
+  (void)PlanAndApprove(store_, store_.references.Add(kAnna, scan_, "", {}));
+  Flip("scene/cloud.ply");
+  (void)store_.integrity.Check(scan_, true);
+  EXPECT_EQ(store_.integrity.CountUnusable(), (UnusableRecords{.scans = 1, .references = 1}));
+  const std::string draft = store_.references.Add(kAnna, StoreScan(store_, patient_), "", {});
+  EXPECT_EQ(store_.integrity.CountUnusable().references, 1) << "a draft replaces nothing";
+  (void)PlanAndApprove(store_, draft);
+  EXPECT_EQ(store_.integrity.CountUnusable(), (UnusableRecords{.scans = 1, .references = 0}));
+  Database(store_.folders.state() / "plumb.db", Database::Access::kReadWrite)
+      .Execute("UPDATE patients SET archived = 1");
+  EXPECT_EQ(store_.integrity.CountUnusable(), UnusableRecords());
+}
+
+/// A folder that is moved away stands for a disk that is unmounted; DaemonDiskTest has a real one.
+TEST_F(StoreIntegrityTest, AnotherFolderInPlaceOfTheScansIsNoticedAndTheSameOneTakenBack) {
+  EXPECT_EQ(store_.WhyOtherScans(), "");
+  EXPECT_NO_THROW(store_.CheckWritable());
+  const fs::path scans = store_.folders.scans(), away = folder_ / "away";
+  fs::rename(scans, away);
+  EXPECT_THAT(store_.WhyOtherScans(), HasSubstr(scans.string()));
+  fs::create_directory(scans);  // what a disk was mounted on
+  EXPECT_THAT(testing::MessageOf<DiskRefused>([&] { store_.CheckWritable(); }),
+              HasSubstr("not the one that was opened"));
+  fs::remove(scans);
+  fs::rename(away, scans);
+  EXPECT_EQ(store_.WhyOtherScans(), "");
+  fs::copy(scans, away, fs::copy_options::recursive);  // the disk under another number
+  fs::remove_all(scans);
+  fs::rename(away, scans);
+  EXPECT_EQ(store_.WhyOtherScans(), "") << "known by its newest scan";
+  EXPECT_NO_THROW(store_.CheckWritable());
 }
 
 }  // namespace

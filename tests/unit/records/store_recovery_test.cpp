@@ -18,9 +18,9 @@ using testing::FillScan;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::kAnna;
-using testing::kBert;
 using testing::kScanFiles;
 using testing::MessageOf;
+using testing::PlanAndApprove;
 using ::testing::StartsWith;
 using testing::StoreScan;
 
@@ -57,7 +57,7 @@ class OneDamagedFile {
     Store store(state);
     const std::string patient = store.patients.Add(kAnna, "P", "");
     reference = StoreScan(store, patient);
-    store.references.Approve(kBert, store.references.Add(kAnna, reference, "", {}), 1);
+    (void)PlanAndApprove(store, store.references.Add(kAnna, reference, "", {}));
     for (int i = 0; i < 5; ++i) scans.push_back(StoreScan(store, patient));
     hit = of_reference ? reference : scans[2];
     FillScan(store.folders.Staging(store.scans.Begin(testing::Begun(patient))));
@@ -327,6 +327,7 @@ TEST_F(StoreRecoveryTest, AStoreOfVersion4KeepsScansThatItHadGivenUp) {
   {
     Database direct(state() / "plumb.db", Database::Access::kReadWrite);
     direct.Execute(
+        "ALTER TABLE users DROP COLUMN language; ALTER TABLE users DROP COLUMN theme; "
         "ALTER TABLE scans DROP COLUMN accepted_at; DROP TABLE room_calibrations; ALTER TABLE "
         "patients DROP COLUMN note; ALTER TABLE patients "
         "DROP COLUMN archived; DROP TABLE templates; DROP TABLE scan_files; DROP TABLE "

@@ -125,5 +125,57 @@ TEST_F(StoreTest, TheQuotaTakesRecordingsFirstThenOldScansAndNeverReferences) {
   EXPECT_TRUE(fs::exists(store->folders.Scan(reference_scan) / "scene"));
 }
 
+TEST_F(StoreTest, ScansWhoseFilesAreOutOfSightAreNeitherOldNorOverTheQuota) {
+  const auto store = Open();
+  const std::string patient = store->patients.Add(kAnna, "A", "");
+  const std::string out_of_sight = Scan(*store, patient), in_sight = Scan(*store, patient);
+  fs::create_directory(store->folders.Scan(out_of_sight) / "recording");
+  Database(database(), Database::Access::kReadWrite)
+      .Execute(
+          "UPDATE scans SET started_at = 0; UPDATE scans SET unavailable = 'it is missing' "
+          "WHERE id = " +
+          out_of_sight);
+  EXPECT_EQ(store->removal.RemoveOldScans(30), 1);
+  EXPECT_TRUE(store->scans.Find(out_of_sight));
+  EXPECT_EQ(store->scans.Find(in_sight), std::nullopt);
+  EXPECT_EQ(store->removal.KeepWithinQuota(0), 0);
+  EXPECT_TRUE(store->scans.Find(out_of_sight));
+  EXPECT_TRUE(fs::exists(store->folders.Scan(out_of_sight) / "recording"));
+  Database(database(), Database::Access::kReadWrite).Execute("UPDATE scans SET unavailable = ''");
+  EXPECT_EQ(store->removal.KeepWithinQuota(0), 2) << "its recording and itself";
+}
+
+TEST_F(StoreTest, TheLogSaysWhetherAgeOrTheQuotaRemovedAScan) {
+  const auto store = Open();
+  const std::string patient = store->patients.Add(kAnna, "A", "");
+  const auto reason = [&] { return store->audit.Find({0, 1, "scan.remove"}).at(0).detail; };
+  (void)Scan(*store, patient);
+  EXPECT_EQ(store->removal.KeepWithinQuota(0), 1);
+  EXPECT_EQ(reason(), "quota");
+  (void)Scan(*store, patient);
+  Database(database(), Database::Access::kReadWrite).Execute("UPDATE scans SET started_at = 0");
+  EXPECT_EQ(store->removal.RemoveOldScans(30), 1);
+  EXPECT_EQ(reason(), "retention");
+}
+
+TEST_F(StoreTest, WithoutAQuotaScansTakeNineTenthsOfTheRoomThatOtherFilesLeave) {
+  EXPECT_EQ(DefaultQuota(9'000, 1'000), 9'000U);
+  EXPECT_EQ(DefaultQuota(0, 1'000), 900U);
+  EXPECT_EQ(DefaultQuota(1'000, 0), 900U);
+  const auto store = Open();
+  const std::string patient = store->patients.Add(kAnna, "A", "");
+  std::string first;
+  for (int i = 0; i < 9; ++i) {
+    const std::string scan = Scan(*store, patient);
+    WriteWholeFile(store->folders.Scan(scan) / "scene" / "scene.json", std::string(1000, '{'));
+    if (i == 0) first = scan;
+  }
+  EXPECT_EQ(store->removal.KeepWithinRoom(1'000), 0) << "9000 of 10000 bytes";
+  EXPECT_EQ(store->removal.KeepWithinRoom(999), 1) << "one byte less is free";
+  EXPECT_EQ(store->scans.Find(first), std::nullopt);
+  EXPECT_EQ(store->removal.KeepWithinRoom(0), 1) << "another program has filled the disk";
+  EXPECT_EQ(store->scans.List(patient, 100).size(), 7U);
+}
+
 }  // namespace
 }  // namespace plumb

@@ -104,6 +104,7 @@ TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
   {
     Database direct(database(), Database::Access::kReadWrite);
     direct.Execute(
+        "ALTER TABLE users DROP COLUMN language; ALTER TABLE users DROP COLUMN theme; "
         "DROP TABLE room_calibrations; DROP TABLE check_baselines; DROP TABLE checks; ALTER TABLE "
         "refs DROP COLUMN revision; "
         "DROP INDEX scans_of_session; ALTER TABLE scans DROP COLUMN session_id; ALTER TABLE scans "
@@ -137,7 +138,9 @@ TEST_F(StoreTest, WhenAResultOfTheSchemaBeforeWasAcceptedIsTakenFromTheLog) {
   const web::AuditEntry logged = Open()->audit.Find({0, 1, "scan.accept"}).at(0);
   {
     Database direct(database(), Database::Access::kReadWrite);
-    direct.Execute("ALTER TABLE scans DROP COLUMN accepted_at; PRAGMA user_version = 7");
+    direct.Execute(
+        "ALTER TABLE users DROP COLUMN language; ALTER TABLE users DROP COLUMN theme; "
+        "ALTER TABLE scans DROP COLUMN accepted_at; PRAGMA user_version = 7");
   }
   const auto store = Open();
   EXPECT_EQ(store->scans.Find(accepted)->accepted_at, logged.time);
@@ -149,6 +152,7 @@ TEST_F(StoreTest, PatientsOfTheSchemaBeforeArchivesKeepWhatTheyHad) {
   {
     Database direct(database(), Database::Access::kReadWrite);
     direct.Execute(
+        "ALTER TABLE users DROP COLUMN language; ALTER TABLE users DROP COLUMN theme; "
         "ALTER TABLE scans DROP COLUMN accepted_at; DROP TABLE room_calibrations; ALTER TABLE "
         "patients DROP COLUMN note; ALTER TABLE patients "
         "DROP COLUMN archived; DROP TABLE templates; PRAGMA user_version = 5");

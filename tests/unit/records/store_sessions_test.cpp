@@ -165,12 +165,14 @@ TEST_F(StoreSessionsTest, WhatIsSignedIsWhatIsStored) {
   const std::string reference = store.references.Add(kAnna, Scan(store, patient, ""), "first", {});
   ASSERT_THAT(store.references.Waiting(), SizeIs(1));
   EXPECT_EQ(store.references.Waiting()[0].patient_code, "P-1");
+  EXPECT_EQ(store.references.Waiting()[0].planned_by, "");
   EXPECT_EQ(store.patients.Find(patient)->draft_reference_id, reference);
   const std::string digest = store.references.Find(reference)->digest;
   EXPECT_EQ(digest.size(), 64U);
   web::ReferencePlan wider;
   wider.tolerance.shift_mm = 5;
   (void)store.references.Plan(kAnna, reference, 1, wider);
+  EXPECT_EQ(store.references.Waiting()[0].planned_by, "anna");
   EXPECT_NE(store.references.Find(reference)->digest, digest);
   EXPECT_EQ(RefusalOf([&] { store.references.Approve(kBert, reference, 2, digest); }),
             ChangeResult::kConflict);

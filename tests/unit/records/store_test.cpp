@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "daemon/records/schema.hpp"
+#include "daemon/records/store_json.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/unit/records/store_fixture.hpp"
 
@@ -148,8 +149,9 @@ TEST_F(StoreTest, AnApprovedReferenceIsNeverChangedButPlannedAnew) {
   web::ReferencePlan plan;
   plan.region_m = {{0, 0}, {1, 0}, {1, 1}};
   plan.isocentre_m = {0.1, 0.2, 0.3};
-  const std::string second = store->references.Plan(kAnna, first, 1, plan);
+  const std::string second = store->references.Plan(kAnna, first, 2, plan);
   EXPECT_NE(second, first);
+  EXPECT_EQ(store->audit.Find({0, 1}).at(0).detail, PlanJson({}) + "\n" + PlanJson(plan));
   EXPECT_TRUE(store->references.Find(first)->plan.region_m.empty());
   EXPECT_EQ(store->references.Find(second)->version, 2);
   EXPECT_EQ(store->references.Find(second)->plan.region_m, plan.region_m);
@@ -172,7 +174,8 @@ TEST_F(StoreTest, NobodyApprovesTheirOwnReference) {
   const auto store = Open();
   const std::string patient = store->patients.Add(kAnna, "A", "");
   const std::string draft = store->references.Add(kAnna, Scan(*store, patient), "", {});
-  EXPECT_EQ(RefusalOf([&] { store->references.Approve(kAnna, draft, 1); }), ChangeResult::kRefused);
+  EXPECT_EQ(RefusalOf([&] { store->references.Approve(kBert, draft, 1); }), ChangeResult::kConflict)
+      << "nobody has planned it";
   (void)store->references.Plan(kBert, draft, 1, {});
   EXPECT_EQ(RefusalOf([&] { store->references.Plan(kAnna, draft, 1, {}); }),
             ChangeResult::kConflict)
@@ -275,6 +278,21 @@ TEST_F(StoreTest, TheLastEnabledEngineerStays) {
   EXPECT_EQ(store->users.Find("anna")->role, web::Role::kEngineer);
 }
 
+TEST_F(StoreTest, WhatAPersonChoseOfThePageStays) {
+  {
+    const auto store = Open();
+    for (const char* name : {"anna", "bert"})
+      store->users.Add(
+          kAnna,
+          {.name = name, .role = web::Role::kEngineer, .password_hash = "x", .created_at = {}});
+    store->users.SetPreferences("bert", {.language = "es", .theme = "light"});
+  }
+  const auto store = Open();
+  EXPECT_EQ(store->users.Find("bert")->preferences.language, "es");
+  EXPECT_EQ(store->users.Find("bert")->preferences.theme, "light");
+  EXPECT_EQ(store->users.Find("anna")->preferences.language, "");
+}
+
 TEST_F(StoreTest, APasswordChangedMeanwhileDoesNotUndoWhatWasDoneToTheAccount) {
   const auto store = Open();
   for (const char* name : {"anna", "bert"})
@@ -288,6 +306,7 @@ TEST_F(StoreTest, APasswordChangedMeanwhileDoesNotUndoWhatWasDoneToTheAccount) {
                               .disabled = {},
                               .password_hash = {},
                               .expected_hash = {}});
+  EXPECT_EQ(store->audit.Find({0, 1}).at(0).detail, "role engineer > technician");
   store->users.Change(kBert, password);
   EXPECT_EQ(store->users.Find("bert")->role, web::Role::kTechnician);
   EXPECT_EQ(RefusalOf([&] { store->users.Change(kBert, password); }), ChangeResult::kConflict)

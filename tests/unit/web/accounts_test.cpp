@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <gmock/gmock.h>
 
 #include "tests/unit/web/web_fixture.hpp"
@@ -57,6 +59,18 @@ TEST_F(AccountsTest, WhereNoAccountCanBeSeenTheReasonIsShownAndNobodyMakesTheFir
       client.Post("/api/v1/setup", {{"code", "AAAA-AAAA"}, {"name", "e"}, {"password", kPassword}})
           .status,
       409);
+  // The fault ends, as where another program held the database.
+  loop_->Do([&] {
+    service_.accounts_fault.clear();
+    service_.users.push_back({.name = "engineer",
+                              .role = web::Role::kEngineer,
+                              .password_hash = "of nobody",
+                              .created_at = {}});
+  });
+  const auto fault = [&] { return client.Get("/api/v1/session").json().value("fault", ""); };
+  for (int i = 0; i < 200 && !fault().empty(); ++i) ::usleep(100'000);
+  EXPECT_EQ(fault(), "");
+  EXPECT_EQ(client.Get("/api/v1/session").json().value("setup_required", true), false);
 }
 
 TEST_F(AccountsTest, SetupCodeCannotBeGuessedQuickly) {
@@ -228,11 +242,43 @@ TEST_F(AccountsTest, RolesReachOnlyWhatIsTheirs) {
   EXPECT_EQ(physicist.Get("/api/v1/audit").status, 200);
   EXPECT_EQ(technician.Post("/api/v1/references/x/approve", {{"revision", 1}}).status, 403);
   EXPECT_EQ(engineer.Post("/api/v1/references/x/approve", {{"revision", 1}}).status, 403);
-  EXPECT_EQ(
-      physicist.Post("/api/v1/references/x/approve", {{"revision", 1}, {"password", kPassword}})
-          .status,
-      404);
+  EXPECT_EQ(physicist
+                .Post("/api/v1/references/x/approve",
+                      {{"revision", 1}, {"digest", "of x"}, {"password", kPassword}})
+                .status,
+            404);
   EXPECT_EQ(service_.users.size(), 4U);
+}
+
+TEST_F(AccountsTest, LanguageAndThemeBelongToTheAccount) {
+  Start();
+  SetUpAccounts();
+  HttpClient here = LoggedIn("technician"), elsewhere = LoggedIn("technician");
+  HttpClient other = LoggedIn("physicist");
+  EXPECT_TRUE(here.Get("/api/v1/session").json()["preferences"]["language"].is_null());
+  const auto choose = [&](const char* language, const char* theme) {
+    return here.Put("/api/v1/session/preferences", {{"language", language}, {"theme", theme}})
+        .status;
+  };
+  EXPECT_EQ(choose("es", "light"), 200);
+  EXPECT_EQ(elsewhere.Get("/api/v1/session").json()["preferences"],
+            (nlohmann::json{{"language", "es"}, {"theme", "light"}}));
+  EXPECT_TRUE(other.Get("/api/v1/session").json()["preferences"]["language"].is_null());
+  EXPECT_EQ(choose("xx", "light"), 400);
+  EXPECT_EQ(choose("es", "pink"), 400);
+}
+
+TEST_F(AccountsTest, ARecordThatCannotBeReadIsTheAnswerToASignatureAndEndsNothing) {
+  Start();
+  SetUpAccounts();
+  HttpClient physicist = LoggedIn("physicist");
+  loop_->Do([&] { service_.is_unreadable = true; });
+  const HttpAnswer answer =
+      physicist.Post("/api/v1/references/x/approve",
+                     {{"revision", 1}, {"digest", "of x"}, {"password", kPassword}});
+  EXPECT_EQ(answer.status, 500);
+  EXPECT_THAT(answer.body, HasSubstr("its plan cannot be read"));
+  EXPECT_EQ(physicist.Get("/api/v1/status").status, 200);
 }
 
 TEST_F(AccountsTest, LoginWithoutScriptLeadsToTheResult) {

@@ -233,6 +233,24 @@ TEST_F(FilesTest, ResultsAreDownloadedUnderASafeName) {
   EXPECT_EQ(file.Header("cache-control"), "no-store");
 }
 
+TEST_F(FilesTest, APictureIsDrawnInTheLanguageThatIsAskedFor) {
+  HttpClient client = LoggedIn("technician");
+  const std::string files = "/api/v1/scans/s1/files/";
+  EXPECT_EQ(client.Get(files + "overlay.png?language=es").status, 404)
+      << "it cannot be drawn, and the stored one is a link";
+  loop_->Do([&] { service_.draws_pictures = true; });
+  const HttpAnswer overlay = client.Get(files + "overlay.png?download&language=es");
+  EXPECT_EQ(overlay.body, "overlay in Spanish");
+  EXPECT_EQ(overlay.Header("content-type"), "image/png");
+  EXPECT_EQ(overlay.Header("content-disposition"), "attachment; filename=\"s1_overlay.png\"");
+  const HttpAnswer map = client.Get(files + "error_map.png?language=en");
+  EXPECT_EQ(map.body, "error map in English");
+  EXPECT_EQ(map.Header("content-disposition"), "");
+  EXPECT_EQ(client.Get(files + "overlay.png?language=xx").status, 400);
+  EXPECT_EQ(client.Get(files + "overlay.png").status, 404) << "without a language the stored one";
+  EXPECT_EQ(client.Get(files + "result.json?language=es").body, R"({"format": 1})");
+}
+
 TEST_F(FilesTest, NoPathLeadsOutOfAScan) {
   HttpClient client = LoggedIn("technician");
   for (const char* path :

@@ -47,6 +47,13 @@ TEST_F(ResultPageTest, AFreshResultIsNotOld) {
   EXPECT_THAT(Page(), HasSubstr("class=\"fresh\""));
 }
 
+TEST_F(ResultPageTest, WhatIsToBeKnownStandsBesideTheVerdict) {
+  Add("s1", seconds(10));
+  EXPECT_THAT(Page(), Not(HasSubstr("overdue")));
+  loop_->Do([&] { service_.scans.back().check_overdue = true; });
+  EXPECT_THAT(Page(), HasSubstr("<p class=\"caution\">The daily check was overdue at this scan."));
+}
+
 TEST_F(ResultPageTest, AfterTwoMinutesItIsOld) {
   Add("s1", seconds(121));
   EXPECT_THAT(Page(), HasSubstr(kOld));

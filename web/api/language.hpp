@@ -1,0 +1,13 @@
+// The language that a client asks for.
+#pragma once
+
+#include "web/http/router.hpp"
+#include "web/service/scan_service.hpp"
+
+namespace plumb::web {
+
+/// Language named by "?language=es"; English if none is named.
+/// @throws DataError for a language that there is not
+[[nodiscard]] Language LanguageIn(const Request& request);
+
+}  // namespace plumb::web
