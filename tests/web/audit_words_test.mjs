@@ -50,6 +50,8 @@ const kDetails = [
   ['user.add', 'physicist', 'Physicist', 'Físico'],
   ['user.change', 'role engineer password disabled', 'role: Engineer, new password, disabled',
     'función: Ingeniero, contraseña nueva, desactivada'],
+  ['user.change', 'role technician > engineer password',
+    'role: Technician → Engineer, new password', 'función: Técnico → Ingeniero, contraseña nueva'],
   ['user.change', 'role technician', 'role: Technician', 'función: Técnico'],
   ['user.change', 'enabled', 'enabled', 'activada'],
   ['user.change', '', '', ''],

@@ -68,6 +68,7 @@ await h.step('first start, three accounts, and the screen in the room', async ()
   // The demo opens a patient of its own; this day has another one.
   const { session } = await state();
   if (session) equal((await h.api(anna, 'treatment/close', 'POST', { session_id: session.id })).status, 200, 'closed');
+  await h.acknowledge(engineer, anna, bob, clara);
 });
 
 await h.step('the room is calibrated: three scans of the board, signed', async () => {
@@ -115,13 +116,13 @@ await h.step('a new patient is scanned for a reference; it waits as a draft', as
   await anna.getByText('Saved as draft version 1.').waitFor(kSlow);
   await room.locator('.verdict', { hasText: 'REFERENCE SCANNED' }).waitFor(kSlow);
   await anna.goto(`${h.url}#/status`);
-  await anna.locator('.tile', { hasText: 'Waiting for approval' }).getByText('PX-0100').waitFor();
+  await anna.locator('.tile li', { hasText: 'Waiting for a plan: PX-0100' }).waitFor();
   await h.look(anna, 'waiting');
 });
 
 await h.step('one physicist plans, a second one approves', async () => {
   await bob.goto(`${h.url}#/status`);
-  await bob.locator('.tile', { hasText: 'Waiting for approval' }).getByRole('link', { name: 'PX-0100' }).click();
+  await bob.locator('.tile', { hasText: 'Draft references' }).getByRole('link', { name: 'PX-0100' }).click();
   const map = await h.drawRegion(bob, [[0.35, 0.35], [0.65, 0.35], [0.65, 0.65], [0.35, 0.65]]);
   await map.press('i');
   // Wider than usual: sweeps of this size leave 1 to 2 mm of uncertainty.

@@ -153,6 +153,21 @@ export class Harness {
     }, [path, method, body]);
   }
 
+  /// On these pages the people have seen that the session was changed from elsewhere.
+  async acknowledge(...pages) {
+    await Promise.all(pages.map((page) => page.evaluate(async () => {
+      const seen = () => JSON.parse(sessionStorage.getItem('plumb-session-seen') ?? '{}')?.id;
+      const response = await fetch('/api/v1/status', { headers: { 'X-Plumb-Background': '1' } });
+      if (!response.ok) return;  // nobody is logged in
+      const { session } = await response.json();
+      for (const begun = Date.now(); seen() !== session?.id;) {
+        if (Date.now() - begun > 20000) throw new Error(`the session that is known is ${seen()}, not ${session?.id}`);
+        document.querySelector('.session-alert button')?.click();
+        await new Promise((ready) => { setTimeout(ready, 20); });
+      }
+    })));
+  }
+
   /// The machine of that page's browser sleeps: no network, and while the time goes on its steady clock stands still.
   async sleep(page, seconds) {
     await page.context().setOffline(true);

@@ -51,7 +51,7 @@ await h.step('a wrong password is refused in words', async () => {
   await h.look(anna, 'login', { axe: false });
   await h.logIn(anna, 'anna');
   await anna.getByText('Recent scans').waitFor();
-  await anna.locator('.tile', { hasText: 'Waiting for approval' }).getByText('nothing').waitFor();
+  await anna.locator('.tile', { hasText: 'Draft references' }).getByText('none').waitFor();
   await h.look(anna, 'status', { axe: false });
 });
 
@@ -74,15 +74,18 @@ await h.step('a new patient is scanned for a reference', async () => {
   await anna.getByText('Saved as draft version 1.').waitFor();
   await anna.getByRole('link', { name: 'Open the draft' }).waitFor();
   await anna.goto(`${h.url}#/status`);
-  await anna.locator('.tile', { hasText: 'Waiting for approval' }).getByText('PX-0417').waitFor();
+  await anna.locator('.tile li', { hasText: 'Waiting for a plan: PX-0417 version 1' }).waitFor();
   await h.look(anna, 'status-waiting');
 });
 
 await h.step('a physicist plans, a second one approves', async () => {
   await h.logIn(bob, 'bob');
   await bob.goto(`${h.url}#/patients`);
+  await bob.getByRole('row', { name: 'PX-0417' }).getByText('waiting for a plan').waitFor();
   await bob.getByRole('link', { name: 'PX-0417' }).click();
   await bob.getByRole('link', { name: 'Plan, Version 1' }).click();
+  await bob.getByText('Nobody has planned this reference yet.').waitFor();
+  equal(await bob.getByRole('button', { name: 'Review and approve' }).count(), 0, 'nothing to approve before it is planned');
   const map = await h.drawRegion(bob, [[0.3, 0.3], [0.7, 0.3], [0.72, 0.7], [0.28, 0.7]]);
   await map.press('n');
   await map.press('ArrowUp');
@@ -142,10 +145,16 @@ await h.step('a physicist plans, a second one approves', async () => {
   await h.look(bob, 'plan', { axe: false });
   await bob.getByRole('button', { name: 'Save plan' }).click();
   await bob.getByRole('status').getByText('Plan saved.').waitFor({ state: 'attached' });
-  await bob.getByRole('button', { name: 'Review and approve' }).click();
-  await h.sign(bob);
-  await bob.getByRole('alert').getByText('a second person must approve').waitFor();
+  // Who planned it is not asked for a password that would be refused.
+  await bob.getByText('Waiting for a second physicist').waitFor();
+  equal(await bob.getByRole('button', { name: 'Review and approve' }).count(), 0, 'not by who planned it');
+  await anna.locator('.tile li', { hasText: 'Waiting for approval: PX-0417 version 1' }).waitFor();
   await h.logIn(clara, 'clara');
+  // Its check was overdue when it was scanned: the summary says so, as a result would.
+  await clara.route(/\/api\/v1\/scans\/[^/]+$/, async (route) => {
+    const response = await route.fetch();
+    await route.fulfill({ response, json: { ...await response.json(), check_overdue: true } });
+  });
   await clara.goto(`${h.url}${new URL(bob.url()).hash}`);
   await clara.getByText('4 corners').waitFor();
   // With an unsaved edit nothing can be approved, and what is signed is read-only.
@@ -167,6 +176,7 @@ await h.step('a physicist plans, a second one approves', async () => {
   const signed = clara.getByRole('region', { name: 'You are signing exactly this' });
   await signed.getByText('4 corners').waitFor();
   equal(await signed.locator('input:not([type=password])').count(), 0, 'the summary is read-only');
+  await signed.getByText('The daily check was overdue at this scan.').waitFor();
   await h.look(clara, 'plan-summary', { axe: false });
   await clara.getByLabel('Shifts (mm)').fill('5');
   await signed.waitFor({ state: 'detached' });
@@ -175,12 +185,61 @@ await h.step('a physicist plans, a second one approves', async () => {
   await h.sign(clara, 'not this one');
   await clara.getByRole('alert').getByText('password is wrong').waitFor();
   await h.sign(clara);
-  await clara.getByText('approved by clara').waitFor();
+  await clara.getByText(/approved by clara, .*\b(UTC|GMT)/).waitFor();
   await h.look(clara, 'plan-approved', { axe: false });
+  await clara.unrouteAll();
 });
 
-await h.step('unsaved work: asked before it is left, kept where the session ends', async () => {
+await h.step('corners by keys where the crosshair is, and one taken away by a finger', async () => {
+  const tablet = await h.person('tablet', { width: 1024, height: 768 }, { hasTouch: true });
+  await h.logIn(tablet, 'bob');
+  await tablet.goto(`${h.url}#/patients`);
+  await tablet.getByRole('link', { name: 'PX-0417' }).waitFor();
+  equal(await tablet.evaluate(() => document.activeElement.type), undefined, 'no keyboard covers the list');
+  await tablet.goto(`${h.url}${new URL(bob.url()).hash}`);
+  await tablet.getByText('4 corners').waitFor();
+  await tablet.getByRole('button', { name: 'Clear the region' }).click();
+  const map = tablet.getByRole('application');
+  const said = async (words) => {
+    await tablet.locator('#status', { hasText: words }).waitFor({ state: 'attached' });
+    return (await tablet.locator('#status').innerText()).match(/x (\S+), y (\S+) m/).slice(1).map(Number);
+  };
+  await map.press('Shift+ArrowLeft');
+  await map.press('ArrowUp');
+  const cross = await said('Crosshair');
+  await map.press('Enter');
+  equal((await said('Corner 1')).join(), cross.join(), 'the corner lies at the crosshair');
+  await map.press('Shift+ArrowRight');
+  await map.press('Enter');
+  equal((await said('Corner 2'))[0], Number((cross[0] + 0.05).toFixed(3)), 'the next one 50 mm to the right');
+  await map.press('Shift+ArrowUp');
+  await map.press('Enter');
+  await tablet.getByText('3 corners').waitFor();
+  // The same place again takes the corner that is there, which the arrows then move.
+  await map.press('Enter');
+  await map.press('ArrowLeft');
+  await tablet.getByText('3 corners').waitFor();
+  await map.press('Escape');
+  const remove = tablet.getByRole('button', { name: 'Delete corner' });
+  equal(await remove.getAttribute('aria-disabled'), 'true', 'no corner is selected');
+  const box = await tablet.locator('circle.corner').first().boundingBox();
+  await tablet.touchscreen.tap(box.x + box.width / 2 + 8, box.y + box.height / 2 + 8);  // a finger aims badly
+  await tablet.getByText('3 corners').waitFor();
+  await remove.tap();
+  await tablet.getByText('2 corners').waitFor();
+  await tablet.context().close();
+});
+
+await h.step('unsaved work: asked before it is left, kept for its person where the session ends, discarded where they say so', async () => {
   const shift = bob.getByLabel('Shifts (mm)');
+  const note = bob.getByText('Your unsaved changes from before were kept.');
+  const kept = () => bob.evaluate(() => Object.keys(sessionStorage).filter((key) => key.startsWith('plumb-plan-')).length);
+  const logInHere = async (name) => {
+    await bob.getByLabel('Name').fill(name);
+    await bob.getByLabel('Password').fill(h.password);
+    await bob.getByRole('button', { name: 'Log in' }).click();
+    await shift.waitFor();
+  };
   await bob.reload();
   await shift.fill('4.5');
   const asked = [];
@@ -192,16 +251,35 @@ await h.step('unsaved work: asked before it is left, kept where the session ends
   equal(await shift.inputValue(), '4.5', 'with what was typed');
   equal((await h.api(bob, 'logout', 'POST')).status, 200, 'the session ends elsewhere');
   await bob.getByRole('heading', { name: 'Log in' }).waitFor();
-  await bob.getByLabel('Name').fill('bob');
-  await bob.getByLabel('Password').fill(h.password);
-  await bob.getByRole('button', { name: 'Log in' }).click();
-  await bob.getByText('Your unsaved changes from before were kept.').waitFor();
+  await logInHere('clara');
+  equal(await shift.inputValue(), '3', 'another person sees what is stored');
+  equal(await note.count(), 0, 'nothing of it was hers');
+  await bob.getByRole('button', { name: 'Log out' }).click();
+  await bob.getByRole('heading', { name: 'Log in' }).waitFor();
+  await logInHere('bob');
+  await note.waitFor();
   equal(await shift.inputValue(), '4.5', 'kept');
   await h.look(bob, 'plan-kept');
-  await shift.fill('3');  // as it is stored: nothing is unsaved
+  await bob.getByRole('button', { name: 'Discard', exact: true }).click();
+  await note.waitFor({ state: 'detached' });
+  equal(await shift.inputValue(), '3', 'as it is stored');
+  equal(await kept(), 0, 'discarded');
+  equal(asked.length, 1, 'nothing more to ask');
+  // Who says that it is to be left without saving, or logs out, does not find it again.
+  bob.removeAllListeners('dialog');
+  bob.on('dialog', (dialog) => dialog.accept());
+  await shift.fill('4.5');
   await bob.getByRole('link', { name: 'Patients', exact: true }).click();
   await bob.waitForURL(/#\/patients/);
-  equal(asked.length, 1, 'nothing more to ask');
+  equal(await kept(), 0, 'left without saving');
+  await bob.goBack();
+  await shift.fill('4.5');
+  equal(await kept(), 1, 'kept as long as it is edited');
+  await bob.getByRole('button', { name: 'Log out' }).click();
+  await bob.getByRole('heading', { name: 'Log in' }).waitFor();
+  equal(await kept(), 0, 'logged out');
+  await logInHere('bob');
+  equal(await shift.inputValue(), '3', 'as it is stored');
   bob.removeAllListeners('dialog');
 });
 
@@ -209,13 +287,20 @@ await h.step('two minutes before the log-out the page warns; keys and pointer co
   const idle = await h.person('idle');
   await h.logIn(idle, 'anna');
   await idle.locator('.tile').first().waitFor();
-  const warning = idle.getByText(/^You will be logged out in \d+ s because of inactivity\.$/);
+  const warning = idle.locator('#idle').getByText(/^You will be logged out in \d+ s because of inactivity\.$/);
   await h.setClockOn(idle, 12 * 60);  // of 15 min
   await idle.waitForTimeout(1500);
   equal(await warning.count(), 0, 'three minutes before there is none');
   await h.setClockOn(idle, 65);
   await warning.waitFor();
   await h.look(idle, 'idle-warning', { axe: false, fullPage: false });
+  // What is announced does not change with each second.
+  const announced = () => idle.getByRole('alert').filter({ hasText: 'logged out' }).innerText();
+  const [first, shown] = [await announced(), await warning.innerText()];
+  await warning.filter({ hasNotText: shown }).waitFor();
+  equal(await announced(), first, 'announced once');
+  await h.setClockOn(idle, 60);
+  await idle.getByRole('alert').getByText(/out in [1-5]\d s/).waitFor();
   await idle.getByRole('button', { name: 'Stay logged in' }).click();
   await warning.waitFor({ state: 'detached' });
   for (const use of [() => idle.keyboard.press('Shift'), () => idle.mouse.click(5, 300)]) {
@@ -284,6 +369,17 @@ await h.step('the map reads millimetres by mouse and keyboard', async () => {
 });
 
 await h.step('the surface opens in 3-D', async () => {
+  const surface = '**/files/mesh.ply';
+  let go;
+  await anna.route(surface, async (route) => {
+    await new Promise((ready) => { go = ready; });
+    await route.abort();
+  });
+  await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
+  await anna.getByRole('progressbar', { name: 'Loading the surface' }).waitFor();
+  go();
+  await anna.locator('.mesh-place').getByText('The appliance does not answer.').waitFor();
+  await anna.unroute(surface);
   await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
   await anna.locator('canvas.mesh[data-ready=yes]').waitFor({ timeout: 60000 });
   const mesh = anna.locator('canvas.mesh');
@@ -355,6 +451,7 @@ await h.step('the surface opens in 3-D', async () => {
 
 await h.step('a second page follows the same scan', async () => {
   await clara.goto(`${h.url}#/scan`);
+  await h.acknowledge(clara);
   await anna.goto(`${h.url}#/scan`);
   h.tell('slow');
   await anna.getByRole('button', { name: 'Scan again' }).click();
@@ -368,7 +465,16 @@ await h.step('a second page follows the same scan', async () => {
   await anna.locator('.verdict.in_tolerance').waitFor();
   await h.look(anna, 'result-in-tolerance', { axe: false });
   await anna.getByRole('button', { name: 'Accept' }).click();
-  await anna.getByText('Accepted by anna').waitFor();
+  await anna.getByText(/Accepted by anna, .*\b(UTC|GMT)/).waitFor();
+  // What comes next is offered there.
+  await anna.getByRole('button', { name: 'Close session' }).click();
+  await anna.getByText('SESSION NOT OPEN').waitFor();
+  equal(await anna.getByRole('button', { name: 'Close session' }).count(), 0, 'it is closed');
+  await anna.locator('.identity').getByRole('link', { name: 'PX-0417' }).click();
+  await anna.getByRole('button', { name: 'Start treatment session' }).click();
+  await anna.locator('.who-line', { hasText: 'PX-0417' }).waitFor();
+  await anna.goto(`${h.url}#/result`);
+  await anna.locator('.verdict.in_tolerance').waitFor();
 });
 
 await h.step('a result grows old over a sleep, and takes its age from the appliance again', async () => {
@@ -474,6 +580,7 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
   await anna.locator('.verdict', { hasText: 'NO BASELINE' }).waitFor();
   equal(await anna.getByRole('button', { name: 'Set as baseline' }).count(), 0, 'a technician sets no baseline');
   await bob.goto(`${h.url}#/check`);
+  await h.acknowledge(bob);
   await bob.getByRole('button', { name: 'Set as baseline' }).click();
   await bob.getByText('12 markers, set by bob').waitFor();
   await takeCheck();
@@ -485,6 +592,8 @@ await h.step('the daily check: overdue, without a baseline, passed, failed', asy
   await takeCheck();
   await anna.locator('.verdict', { hasText: 'FAILED' }).waitFor();
   await anna.getByText('marker 7 moved 12 mm').first().waitFor();
+  check(await anna.locator('.trend circle.mark.within').count() > 0, 'a check that passed is a circle in the trend');
+  check(await anna.locator('.trend path.mark.outside').count() > 0, 'one that failed has another shape');
   await h.look(anna, 'check-failed', { axe: false });
   await anna.goto(`${h.url}#/status`);
   await anna.locator('.tile', { hasText: 'Daily check' }).getByText('failed').waitFor();
@@ -601,6 +710,7 @@ await h.step('the restart into an update: with the password, never during a sess
     await engineer.getByRole('button', { name: 'Restart now' }).click();
   };
   const alert = engineer.getByRole('alert');
+  await h.acknowledge(engineer);
   await h.look(engineer, 'update-restart', { axe: false });
   await restart('not the password');
   await alert.getByText('the password is wrong').waitFor();
@@ -609,6 +719,7 @@ await h.step('the restart into an update: with the password, never during a sess
   await restart(h.password);
   await alert.getByText('The session of a patient is open').or(alert.getByText('the session of a patient is open')).waitFor();
   equal((await h.api(anna, 'treatment/close', 'POST', { session_id: (await session()).id })).status, 200, 'closed');
+  await h.acknowledge(anna, bob, engineer);
   await restart(h.password);
   await engineer.getByRole('status').getByText('The appliance restarts').waitFor({ state: 'attached' });
   h.tell('rolledback');
@@ -685,7 +796,6 @@ await h.step('a scan is deleted with a reason and its number; one that a referen
   await anna.goto(`${h.url}#/result/${id}`);
   await anna.locator('.verdict').waitFor();
   equal(await anna.getByText('Delete this scan…').count(), 0, 'a technician deletes nothing');
-  await anna.goto(`${h.url}#/status`);  // there no change of the session is to be acknowledged
   await bob.goto(`${h.url}#/result/${id}`);
   await bob.getByText('Delete this scan…').click();
   await bob.getByText('The log keeps the number of the scan').waitFor();
@@ -740,6 +850,7 @@ await h.step('a keyboard alone logs in, starts a sweep and ends it', async () =>
   await keys.locator('.tile.good', { hasText: 'attached' }).waitFor();
   const { body: { patients } } = await h.api(anna, 'patients');
   equal((await h.api(anna, `patients/${patients.find((one) => one.code === 'PX-0417').id}/open`, 'POST', { purpose: 'fraction', reason: '', replaces: (await h.api(anna, 'status')).body.session?.id ?? '' })).status, 200, 'a patient to compare');
+  await h.acknowledge(keys, anna);
   await keys.locator('.brand').focus();
   for (let i = 0; i < 40 && (await focused()) !== 'Scan'; ++i) await keys.keyboard.press('Tab');
   await h.look(keys, 'focus', { axe: false });

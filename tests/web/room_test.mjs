@@ -40,8 +40,13 @@ async function approvedPatient(code) {
   await ok(anna, `patients/${id}/open`, 'POST', { purpose: 'reference', reason: '', replaces: open });
   await press();
   const { draft_reference_id: draft } = await ok(anna, `patients/${id}`, 'GET');
+  const { plan, ...read } = await ok(bob, `references/${draft}`, 'GET');
+  await ok(bob, `references/${draft}/plan`, 'PUT', { region_m: plan.region_m, isocentre_m: plan.isocentre_m, posture: plan.posture,
+    couch_markers: plan.couch_markers, shift_tolerance_mm: plan.tolerance.shift_mm, rotation_tolerance_deg: plan.tolerance.rotation_deg,
+    revision: read.revision });
   const { digest, revision } = await ok(clara, `references/${draft}`, 'GET');
   await ok(clara, `references/${draft}/approve`, 'POST', { revision, digest, password: h.password });
+  await h.acknowledge(anna, bob, clara);
   return id;
 }
 const openOnPage = async (page, code) => {
@@ -94,18 +99,24 @@ await h.step('the room follows the button by itself, in words of 10 cm', async (
   h.tell('slow');
   h.tell('moved z 8 HFS');
   h.tell('press');
-  for (const [advice, word] of [['slower', 'SLOWER'], ['closer', 'CLOSER'], ['farther', 'FARTHER'],
-    ['lost', 'LOST'], ['too_slow', 'COMPUTER TOO SLOW'], ['good', 'GOOD']]) {
-    h.tell(`guide ${advice}`);
-    const shown = room.locator('.room-word', { hasText: word });
-    await shown.waitFor(kSlow);
-    // On a screen of 40 inches (88 cm wide): the height of capital letters.
-    const size = await shown.evaluate((element) => parseFloat(getComputedStyle(element).fontSize));
-    const cm = size * 0.73 * 88.5 / 1920;
-    check(cm >= (word.length > 9 ? 5 : 10), `${word} is ${cm.toFixed(1)} cm high`);
-    const box = await shown.boundingBox();
-    check(box.x >= 0 && box.x + box.width <= 1920, `${word} fits`);
-    await h.look(room, `room-${advice}`, { axe: false, fullPage: false });
+  const kAdvice = ['slower', 'closer', 'farther', 'lost', 'too_slow', 'good'];
+  for (const [language, words] of [['es', ['MÁS DESPACIO', 'MÁS CERCA', 'MÁS LEJOS', 'PERDIDO', 'EQUIPO LENTO', 'BIEN']],
+    ['en', ['SLOWER', 'CLOSER', 'FARTHER', 'LOST', 'COMPUTER TOO SLOW', 'GOOD']]]) {
+    await room.goto(`${h.url}room?language=${language}`);
+    for (const [i, word] of words.entries()) {
+      h.tell(`guide ${kAdvice[i]}`);
+      const shown = room.locator('.room-word', { hasText: word });
+      await shown.waitFor(kSlow);
+      // On a screen of 40 inches (88 cm wide): the height of capital letters. The width leaves 10 cm to words
+      // of up to 7 letters, 7 cm to those of up to 9, and 5 cm to longer ones: MÁS DESPACIO, EQUIPO LENTO and
+      // COMPUTER TOO SLOW are among these.
+      const size = await shown.evaluate((element) => parseFloat(getComputedStyle(element).fontSize));
+      const cm = size * 0.73 * 88.5 / 1920;
+      check(cm >= (word.length > 9 ? 5 : word.length > 7 ? 7 : 10), `${word} is ${cm.toFixed(1)} cm high`);
+      const box = await shown.boundingBox();
+      check(box.x >= 0 && box.x + box.width <= 1920, `${word} fits`);
+      await h.look(room, `room-${kAdvice[i]}-${language}`, { axe: false, fullPage: false });
+    }
   }
   equal(await room.locator('.number').count(), 0, 'no result during the sweep');
   h.tell('guide');
@@ -238,7 +249,24 @@ await h.step('fraction numbers count sessions, not scans', async () => {
 });
 
 await h.step('a change from elsewhere is an alert to acknowledge', async () => {
-  const second = await approvedPatient('P-0050');  // its session has taken the place of P-0042's
+  // Where nothing is done with who is open, the screen stays usable beside it. A reload is no acknowledgement.
+  await anna.goto(`${h.url}#/status`);
+  const second = await addPatient('P-0050');
+  await ok(bob, `patients/${second}/open`, 'POST', { purpose: 'reference', reason: '', replaces: (await state()).session.id });
+  // The screen in the room says it for some seconds; nothing moves where that is not wanted.
+  const swapped = room.locator('.room-code.swapped', { hasText: 'Another patient: P-0050' });
+  await swapped.waitFor();
+  equal(await swapped.evaluate((element) => getComputedStyle(element).animationName), 'none', 'no animation');
+  await h.look(room, 'room-swapped', { axe: false, fullPage: false });
+  await h.setClockOn(room, 10);
+  await swapped.waitFor({ state: 'detached' });
+  await room.locator('.room-code', { hasText: 'P-0050' }).waitFor();
+  const above = anna.getByRole('alert').getByText('Now: P-0050');
+  await above.waitFor();
+  await h.look(anna, 'session-changed', { fullPage: false });
+  await anna.reload();
+  await above.waitFor();
+  await anna.goto(`${h.url}#/scan`);
   await anna.getByRole('dialog').getByText('Now: P-0050').waitFor();
   await anna.getByText('Check who is on the couch').waitFor();
   await h.look(anna, 'session-alert', { axe: false, fullPage: false });
@@ -246,6 +274,10 @@ await h.step('a change from elsewhere is an alert to acknowledge', async () => {
     'nothing else can be used before');
   await anna.getByRole('button', { name: 'I have seen it' }).click();
   equal(await anna.getByRole('dialog').count(), 0, 'acknowledged');
+  await anna.reload();
+  await anna.locator('.who-line', { hasText: 'P-0050' }).waitFor();
+  equal(await anna.locator('.session-alert').count(), 0, 'once');
+  await h.acknowledge(bob);
   // Opening another patient names the one whose session ends.
   await openOnPage(anna, 'P-0042');
   await anna.getByText('The session of P-0050 is open.').first().waitFor();
@@ -260,6 +292,18 @@ await h.step('a change from elsewhere is an alert to acknowledge', async () => {
 await h.step('codes are unique without regard to case, and a wristband opens', async () => {
   await h.addPatient(anna, 'p-0042');
   await anna.getByRole('alert').getByText(/there is a patient/i).waitFor();
+  await anna.goto(`${h.url}#/status`);
+  await anna.locator('.tile').first().waitFor();
+  await anna.goto(`${h.url}#/patients`);
+  await anna.getByRole('link', { name: 'P-0050' }).waitFor();
+  // The field has the focus: a scanner types at once.
+  await anna.keyboard.type('P-005');
+  await anna.keyboard.press('Enter');
+  await anna.locator('.caution', { hasText: 'No patient with this code: P-005.' }).waitFor();
+  await anna.getByRole('status').getByText('No patient with this code: P-005.').waitFor({ state: 'attached' });
+  check(/#\/patients$/.test(anna.url()), 'a part of a code opens nobody');
+  await anna.keyboard.type('P-77');  // in place of what was typed before
+  await anna.locator('.hint', { hasText: 'No patient with this code: P-77.' }).waitFor();
   await anna.getByLabel('Find a code').fill('p-0050');
   await anna.getByLabel('Find a code').press('Enter');
   await anna.getByRole('heading', { name: 'P-0050' }).waitFor();
@@ -268,6 +312,7 @@ await h.step('codes are unique without regard to case, and a wristband opens', a
 await h.step('without a session the button makes an unassigned scan that says so', async () => {
   const { session } = await state();
   await ok(anna, 'treatment/close', 'POST', { session_id: session.id });
+  await h.acknowledge(anna, bob, clara);
   await room.locator('.room-word', { hasText: 'NO SESSION' }).waitFor();
   equal(await room.locator('.room').getByText('NO SESSION').count(), 1, 'it is said once');
   await h.look(room, 'room-no-session', { axe: false, fullPage: false });
@@ -317,27 +362,48 @@ await h.step('eight tabs of one browser and three browsers: every one live, one 
 });
 
 await h.step('disconnected: states and buttons are off, and say how old they are', async () => {
+  await bob.goto(`${h.url}#/status`);
+  await clara.goto(`${h.url}#/patient/${patient}`);
+  const open = clara.getByRole('button', { name: 'Start treatment session' });
+  await open.waitFor();
+  equal(await open.getAttribute('aria-disabled'), null, 'a session can be opened');
   h.server.kill('SIGSTOP');
   try {
-    for (let i = 0; i < 8 && !(await anna.locator('.disconnected').count()); ++i) {
-      await h.setClockOn(anna, 30);
-      await anna.locator('.disconnected').waitFor({ timeout: 2500 }).catch(() => {});
-    }
-    await anna.getByText(/Last known: Ready, \d+ s ago/).first().waitFor();
+    await Promise.all([anna, bob, clara].map(async (page) => {
+      for (let i = 0; i < 8 && !(await page.locator('.disconnected').count()); ++i) {
+        await h.setClockOn(page, 30);
+        await page.locator('.disconnected').waitFor({ timeout: 2500 }).catch(() => {});
+      }
+    }));
+    equal(await open.getAttribute('aria-disabled'), 'true', 'nor is a session opened');
+    equal(await clara.getByRole('button', { name: 'Scan a new reference' }).getAttribute('aria-disabled'), 'true', 'nor one for a reference');
+    await bob.locator('.hero').getByText(/^Last known: Ready, \d+ s ago$/).waitFor();
+    equal(await bob.locator('.tile').first().evaluate((tile) => getComputedStyle(tile).borderTopStyle), 'dashed', 'no tile looks current');
+    await h.look(bob, 'status-disconnected');
+    await anna.locator('main').getByText(/^Last known: Ready, \d+ s ago$/).waitFor();
+    equal(await anna.locator('main [role=status]', { hasText: 'Last known' }).innerText(), 'Last known: Ready', 'what is announced does not tick');
     const start = anna.getByRole('button', { name: 'Start sweep' });
     equal(await start.getAttribute('aria-disabled'), 'true', 'the button is off');
     await h.look(anna, 'scan-disconnected', { axe: false });
   } finally {
     h.server.kill('SIGCONT');
   }
-  await anna.locator('.disconnected').waitFor({ state: 'detached', ...kSlow });
+  for (const page of [anna, bob, clara]) await page.locator('.disconnected').waitFor({ state: 'detached', ...kSlow });
+  equal(await open.getAttribute('aria-disabled'), null, 'a session can be opened again');
 });
 
 await h.step('Spanish and light: complete, and kept for the account and for the room', async () => {
   await bob.goto(`${h.url}#/users`);
   await bob.getByLabel('Language').selectOption('es');
   await bob.getByRole('heading', { name: 'Cuentas' }).waitFor();
+  const kept = bob.waitForResponse((answer) => answer.url().endsWith('/session/preferences'));
   await bob.getByLabel('Tema').selectOption('light');
+  await kept;
+  const elsewhere = await h.person('bob in another browser');
+  await h.logIn(elsewhere, 'bob');
+  await elsewhere.getByRole('link', { name: 'Estado', exact: true }).waitFor();
+  equal(await elsewhere.evaluate(() => document.documentElement.dataset.theme), 'light', 'his theme in another browser');
+  await elsewhere.context().close();
   await bob.goto(`${h.url}#/result`);
   await bob.locator('.verdict').waitFor();
   await h.look(bob, 'result-spanish-light', { axe: false });
@@ -349,6 +415,14 @@ await h.step('Spanish and light: complete, and kept for the account and for the 
   await room.goto(`${h.url}room?language=es`);
   await room.locator('.room-word', { hasText: 'SIN SESIÓN' }).waitFor();
   await h.look(room, 'room-spanish', { axe: false, fullPage: false });
+  // What the appliance says of its backups, too.
+  h.tell('nobackup');
+  await engineer.goto(`${h.url}#/users`);
+  await engineer.getByLabel('Language').selectOption('es');
+  await engineer.goto(`${h.url}#/settings`);
+  await engineer.locator('.last-backup').getByText('La última copia de seguridad falló: no hay carpeta de copias configurada').waitFor();
+  await engineer.goto(`${h.url}#/users`);
+  await engineer.getByLabel('Idioma').selectOption('en');
 });
 
 await h.step('the numbers of a patient as CSV, JSON and PDF', async () => {

@@ -263,7 +263,13 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
     service.work = std::chrono::milliseconds(200);
   }
   if (name == "toil") service.work = std::chrono::milliseconds(60000);
-  if (name == "nobackup") service.backup_fault = "no folder for backups is configured";
+  if (name == "nobackup") {
+    service.backup_fault = "no folder for backups is configured";
+    service.status.storage.warnings = {
+        "The last backup failed: no folder for backups is configured: set backup_folder in "
+        "[storage]"};
+    service.Notify(web::EventKind::kStatus);
+  }
   if (name == "installed") {
     service.update.installing = false;
     service.update.message = "plumb-0.3.0.raucb is installed: restart the appliance to use it";

@@ -383,11 +383,13 @@ await h.step('a result that grows old on the screen turns grey and says so', asy
   h.tell('moved z 8 HFS');
   await scan();
   const colour = () => anna.locator('.fresh').evaluate((element) => getComputedStyle(element).filter);
-  await h.sleep(anna, 100);
-  await anna.locator('.identity', { hasText: /1\d\d s/ }).waitFor();
   equal(await anna.locator('.is-old').count(), 0, 'fresh for 2 minutes');
   equal(await colour(), 'none', 'in colour');
+  await h.sleep(anna, 100);
+  await anna.locator('.identity', { hasText: /1\d\d s/ }).waitFor();
+  equal(await anna.locator('.old-note', { hasText: 'OLD' }).count(), 0, 'not yet');
   await h.setClockOn(anna, 30);
+  await anna.locator('.old-note', { hasText: 'OLD' }).waitFor();
   await anna.getByText('Do not act on it').waitFor();
   equal(await anna.locator('.is-old').count(), 1, 'marked as old');
   equal(await colour(), 'grayscale(1)', 'grey');
@@ -410,7 +412,9 @@ await h.step('a result that was missed without a connection is shown as soon as 
   equal(await anna.locator('.is-old').count(), 0, 'and it is fresh');
 });
 
-await h.step('a stream that says nothing any more is no connection', async () => {
+await h.step('a stream that says nothing any more is no connection, and a result that nobody can know to be valid commands nothing', async () => {
+  const commands = async () => [await anna.locator('.number .arrow').count(), await anna.getByText('Accept outside tolerance…').count()].join();
+  equal(await commands(), '1,1', 'an arrow, and the way to accept it');
   h.server.kill('SIGSTOP');
   try {
     await h.setClockOn(anna, 20);
@@ -419,9 +423,14 @@ await h.step('a stream that says nothing any more is no connection', async () =>
     await h.setClockOn(anna, 20);
     await anna.getByRole('alert').getByText('No connection to the appliance').waitFor();
     check(/^Last known: Result, \d+ s ago$/.test(await anna.locator('.chip').innerText()), 'and above');
+    await anna.locator('.old-note', { hasText: 'NO CONNECTION' }).waitFor();
+    equal(await anna.locator('.is-old').count(), 1, 'grey');
+    equal(await commands(), '0,0', 'neither an arrow nor a way to accept it');
   } finally {
     h.server.kill('SIGCONT');
   }
+  await anna.locator('.is-old').waitFor({ state: 'detached' });
+  equal(await commands(), '1,1', 'again');
   await anna.getByText('No connection to the appliance').first().waitFor({ state: 'detached' });
   await anna.locator('.chip', { hasText: 'Result' }).waitFor();
 });
@@ -438,7 +447,7 @@ await h.step('who logs out without a connection sees no patient any more, and is
   await h.logIn(anna, 'anna');
 });
 
-await h.step('scan again at a fraction takes a fraction, whatever the patient was opened for since', async () => {
+await h.step('scan again leads to the sweep only in the session of the same patient and purpose, else to where that is confirmed', async () => {
   await anna.goto(`${h.url}#/patients`);
   await anna.getByRole('link', { name: 'PX-0001' }).click();
   // In place of an approved one it takes a reason.
@@ -448,8 +457,33 @@ await h.step('scan again at a fraction takes a fraction, whatever the patient wa
   await anna.getByLabel('Reason for the new reference').fill('weight loss');
   await anna.getByRole('button', { name: 'Scan a new reference' }).click();
   await anna.locator('.who-line', { hasText: 'New reference' }).waitFor();
-  await anna.goto(`${h.url}#/result`);
-  await anna.getByRole('button', { name: 'Scan again' }).click();
+  const again = anna.getByRole('button', { name: 'Scan again' });
+  const { session: { patient_id: patient } } = (await h.api(anna, 'status')).body;
+  /// At the result of that scan, or at the newest.
+  const scanAgain = async (id = '') => {
+    await anna.goto(`${h.url}#/result/${id}`);
+    await anna.locator('.verdict').waitFor();
+    await again.click();
+    await anna.waitForURL(/#\/(scan|patient\/.*)$/);
+    return { at: new URL(anna.url()).hash, session: (await h.api(anna, 'status')).body.session };
+  };
+  let found = await scanAgain();  // of a fraction, while a reference is to be scanned
+  equal(found.at, `#/patient/${patient}`, 'to the patient');
+  equal(found.session.purpose, 'reference', 'nothing was opened');
+  await anna.getByText('Confirm: PX-0001 is on the couch').waitFor();
+  await anna.getByRole('button', { name: 'Start treatment session' }).click();
+  await anna.locator('.who-line', { hasText: /PX-0001\s*Fraction/ }).waitFor();
+  equal((await scanAgain()).at, '#/scan', 'in its own session to the sweep');
+  const { scans } = (await h.api(anna, `patients/${patient}/scans`)).body;
+  found = await scanAgain(scans.find(({ purpose }) => purpose === 'reference').id);
+  equal(found.at, `#/patient/${patient}`, 'of a reference to the patient, where its reason is asked');
+  equal(found.session.purpose, 'fraction', 'no reference was opened');
+  await anna.getByRole('button', { name: 'Close session' }).click();
+  await anna.getByText('The session is closed.').waitFor();
+  found = await scanAgain();
+  equal(found.at, `#/patient/${patient}`, 'without a session to the patient');
+  equal(found.session, null, 'still none');
+  await anna.getByRole('button', { name: 'Start treatment session' }).click();
   await anna.locator('.who-line', { hasText: /PX-0001\s*Fraction/ }).waitFor();
 });
 

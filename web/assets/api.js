@@ -95,10 +95,11 @@ const readFile = async (response) => ({ blob: await response.blob(), name: nameO
 const orNothing = (response) => response.json().catch(() => ({}));
 const api = (path) => `/api/v1/${path}`;
 export const get = (path, background = false) => ask('GET', api(path), undefined, { background });
-export const getBytes = (path, onPart) => ask('GET', api(path), undefined, {
-  timeout_ms: kLongAnswer_ms,
-  read: (response) => (onPart ? readParts(response, onPart) : response.arrayBuffer()),
-});
+export const getBytes = (path, onPart, timeout_ms = kLongAnswer_ms) =>
+  ask('GET', api(path), undefined, {
+    timeout_ms,
+    read: (response) => (onPart ? readParts(response, onPart) : response.arrayBuffer()),
+  });
 export const post = (path, body) => ask('POST', api(path), body, { read: orNothing });
 export const postForFile = (path) =>
   ask('POST', api(path), undefined, { timeout_ms: kLongAnswer_ms, read: readFile });
@@ -109,8 +110,12 @@ export const removeFor = (path, body) => ask('DELETE', api(path), body,
 export const postLong = (path) => ask('POST', api(path), undefined,
   { timeout_ms: kVeryLongAnswer_ms, read: orNothing });
 export const remove = (path) => ask('DELETE', api(path), undefined, { timeout_ms: kLongAnswer_ms });
-export const fileUrl = (scanId, name, download) =>
-  `/api/v1/scans/${scanId}/files/${name}${download ? '?download' : ''}`;
+/// A file of a scan; the texts of a picture are in the language of the page.
+export function fileUrl(scanId, name, download) {
+  const asked = [download && 'download',
+    name.endsWith('.png') && `language=${document.documentElement.lang}`].filter(Boolean);
+  return `/api/v1/scans/${scanId}/files/${name}${asked.length ? `?${asked.join('&')}` : ''}`;
+}
 
 /// The session, or null; `setupRequired` says that there is no account yet, `fault` why nobody can
 /// log in.

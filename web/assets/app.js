@@ -5,7 +5,8 @@ import {
 import { clear, forgetWarning, h, say, warn } from './dom.js';
 import { lastLogin, lastLoginWords } from './last_login.js';
 import { mayLeave } from './leave.js';
-import { applyTheme } from './preferences.js';
+import { drafts } from './plan_drafts.js';
+import { adoptPreferences, applyTheme } from './preferences.js';
 import { showAudit } from './screens/audit.js';
 import { showCheck } from './screens/check.js';
 import { showFault, showFirstPassword, showLogin } from './screens/login.js';
@@ -37,6 +38,7 @@ const kScreens = {
 const kAskAgain_ms = 3000;
 const kUseEvery_s = 30;
 const kWarn_s = 120;
+const kSayLeft_s = [10, 30, 60];  // the seconds are announced at these only, and once at the start
 const main = document.getElementById('main');
 const top = document.getElementById('top');
 let cleanUp = null;
@@ -97,7 +99,7 @@ function drawChip() {
   const { state } = live.status;
   chip.dataset.state = live.connected ? state : 'offline';
   const words = live.connected ? S.states[state]
-    : S.lastKnown(S.states[state], Math.floor(since_s(live.received)));
+    : `${S.lastKnown(S.states[state])}${S.lastKnownAge(Math.floor(since_s(live.received)))}`;
   if (chip.textContent !== words) chip.textContent = words;
   if (state === lastState) return;
   lastState = state;
@@ -112,6 +114,7 @@ async function show() {
   warn(live.connected ? '' : S.offline);
   const { name, argument } = route();
   drawTop();
+  watchSession();
   const screen = kScreens[name];
   const place = h('div', { class: `screen ${name}` }, h('p', { class: 'hint' }, S.loading));
   clear(main, place);
@@ -133,7 +136,8 @@ async function show() {
 /// it.
 function showFocused() {
   const shown = show();
-  main.focus({ preventScroll: true });
+  // Unless the screen has put it into a field of its own.
+  if (!main.contains(document.activeElement)) main.focus({ preventScroll: true });
   return shown;
 }
 
@@ -164,6 +168,7 @@ async function ask(question, text = S.offline) {
 
 async function leave() {
   if (!mayLeave()) return;
+  drafts.removeAll();
   live.close();
   forgetSession();
   await ask(logOut, S.leavingOffline).catch(() => {});
@@ -182,6 +187,7 @@ async function begin(message) {
   const found = await ask(loadSession);
   if (!found) return;
   const { session, setupRequired, fault, certificate } = found;
+  if (session) adoptPreferences(session);
   speak(session?.user ?? 'login');
   applyTheme(session?.user ?? 'login');
   drawTop();
@@ -231,7 +237,7 @@ async function followScan() {
 /// Pointer and keys count as use: who draws a plan is not logged out at Save. Two minutes before
 /// the end the page warns.
 let used = now();
-let askedToStay = false;
+let saidLeft_s = null;  // the step at which it was announced last; null: no warning is shown
 for (const kind of ['pointerdown', 'keydown', 'wheel', 'input']) {
   document.addEventListener(kind, () => {
     if (!currentSession() || since_s(used) < kUseEvery_s) return;
@@ -244,19 +250,26 @@ function watchIdle() {
   if (!session || !live.wanted) return;
   const idle_s = 60 * session.idle_logout_min;
   const left_s = Math.floor(idle_s - since_s(touchedAt()));
-  const place = document.getElementById('idle');
   if (left_s > Math.min(kWarn_s, idle_s / 2) || left_s <= 0) {
-    if (askedToStay) clear(place);
-    askedToStay = false;
+    if (saidLeft_s !== null) endIdle();
     return;
   }
-  if (!askedToStay) {
+  if (saidLeft_s === null) {
     const stay = h('button', { type: 'button' }, S.stay);
     stay.addEventListener('click', () => get('session').catch(() => {}));
-    clear(place, h('div', { class: 'alert' }, h('span', { id: 'idle-text' }), stay));
+    clear(document.getElementById('idle'),
+      h('section', { class: 'alert', 'aria-label': S.idle }, h('span', { id: 'idle-text' }), stay));
   }
-  askedToStay = true;
   document.getElementById('idle-text').textContent = S.logOffSoon(left_s);
+  const step = kSayLeft_s.find((one) => left_s <= one) ?? Infinity;
+  if (step === saidLeft_s) return;
+  saidLeft_s = step;
+  document.getElementById('idle-said').textContent = S.logOffSoon(left_s);
+}
+function endIdle() {
+  clear(document.getElementById('idle'));
+  clear(document.getElementById('idle-said'));
+  saidLeft_s = null;
 }
 setInterval(() => {
   watchIdle();
@@ -265,7 +278,11 @@ setInterval(() => {
 
 const report = (error) => clear(main, h('p', { class: 'card' }, error.message));
 let lastPurpose = null;
-const watchesSession = () => ['scan', 'result'].includes(route().name);
+/// Where people act on who is open: they scan, or use a result. Who opens another patient is asked
+/// there whether this one is to be closed.
+const kActOnSession = ['scan', 'result'];
+const watchSession = () =>
+  followSession(kActOnSession.includes(route().name), () => live.tell('acknowledged'));
 
 function listen() {
   live.listen((kind) => {
@@ -274,13 +291,13 @@ function listen() {
     if (kind === 'connection' && live.connected && failed) show();
     if (kind === 'status' || kind === 'connection') drawChip();
     if (kind === 'status' && live.status.sensor.present) forgetWarning(S.scan.lost);
-    if (kind === 'status') followSession(watchesSession(), () => live.tell('acknowledged'));
+    if (kind === 'status') watchSession();
     if (kind === 'result' && route().name === 'scan') followScan().catch(() => {});
   });
   setLoggedOffHandler(() => {
     live.close();
     forgetSession();
-    clear(document.getElementById('idle'));
+    endIdle();
     begin(S.loggedOff).catch(report);
   });
   window.addEventListener('plumb-language', () => {

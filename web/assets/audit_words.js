@@ -21,6 +21,12 @@ function planWords(plan) {
     plan.couch_markers ? text.couchMarkers : text.roomMarkers].join('; ');
 }
 
+/// The plan before and after, a line each; earlier versions wrote only the new one.
+function planChange(detail) {
+  const [before, after] = detail.split('\n').map((plan) => planWords(JSON.parse(plan)));
+  return after === undefined || before === after ? before : `${before} → ${after}`;
+}
+
 /// Each setting that was changed, before and after.
 const settingsWords = (changes) => Object.entries(changes).map(([name, values]) => {
   const said = (value) => (name === 'posture' ? wordOf(S.plan.postures, value) : plain(value));
@@ -42,12 +48,14 @@ function acceptWords(detail) {
     + (reason === undefined ? '' : `; ${S.audit.reason(reason)}`);
 }
 
-/// "role engineer password disabled": any of the three.
+/// "role technician > engineer password disabled": any of the three. Earlier versions wrote only
+/// the new role.
 function accountWords(detail) {
-  const found = /^(?:role (\w+) ?)?((?:(?:password|disabled|enabled) ?)*)$/.exec(detail);
+  const found = /^(?:role (\w+(?: > \w+)?) ?)?((?:(?:password|disabled|enabled) ?)*)$/.exec(detail);
   if (!detail || !found) return detail;
-  const [, role, others] = found;
-  return [role && S.audit.role(wordOf(S.roles, role)),
+  const [, roles, others] = found;
+  const role = roles?.split(' > ').map((one) => wordOf(S.roles, one)).join(' → ');
+  return [role && S.audit.role(role),
     ...others.split(' ').filter(Boolean).map((one) => S.audit.changes[one])]
     .filter(Boolean).join(', ');
 }
@@ -68,7 +76,7 @@ const kDetails = {
   'template.remove': (detail) => detail,  // the site, as a person named it
   'user.add': (detail) => wordOf(S.roles, detail),
   'user.change': accountWords,
-  'reference.plan': (detail) => planWords(JSON.parse(detail)),
+  'reference.plan': planChange,
   'settings.change': (detail) => settingsWords(JSON.parse(detail)),
 };
 

@@ -169,9 +169,14 @@ export function table(headings, rows, caption) {
 export const fixed = (value, digits) =>
   value.toFixed(digits).replace('-', '−').replace('.', S.decimal);
 
-export const localTime = (iso) => (iso ? new Date(iso).toLocaleString(S.locale, {
+const kMinute = {
   year: 'numeric', month: 'short', day: '2-digit', hour: '2-digit', minute: '2-digit',
-}) : '–');
+};
+export const localTime = (iso) => (iso ? new Date(iso).toLocaleString(S.locale, kMinute) : '–');
+/// When something was signed or accepted: with its time zone, as in the reports, which are written
+/// in the appliance's zone and not in the browser's.
+export const signedTime = (iso) => (iso
+  ? new Date(iso).toLocaleString(S.locale, { ...kMinute, timeZoneName: 'short' }) : '–');
 export const localDay = (iso) => (iso ? new Date(iso).toLocaleDateString(S.locale, {
   month: 'short', day: '2-digit',
 }) : '–');

@@ -121,9 +121,9 @@ function around({ width, values }, cell) {
 }
 
 /// What came so far of all that was begun, into `place`.
-function progressIn(place) {
-  const bar = h('progress', { max: 1, 'aria-label': S.loading });
-  clear(place, h('p', { class: 'hint' }, S.loading), bar);
+export function progressIn(place, words = S.loading) {
+  const bar = h('progress', { max: 1, 'aria-label': words });
+  clear(place, h('p', { class: 'hint' }, words), bar);
   const parts = new Map();
   return (name) => (received, total) => {
     parts.set(name, [received, total]);

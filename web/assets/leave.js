@@ -4,16 +4,20 @@ import { S } from './strings.js';
 let guard = null;  // of the screen that is shown
 
 /// @param isEdited  Whether there is unsaved work now; null: no guard.
-export function guardLeaving(isEdited) { guard = isEdited; }
+/// @param forget    Called once a person has decided to leave it.
+export function guardLeaving(isEdited, forget = () => {}) {
+  guard = isEdited && { isEdited, forget };
+}
 
 export function mayLeave() {
-  if (!guard?.()) {
-    guard = null;
-    return true;
+  if (guard?.isEdited()) {
+    if (!window.confirm(S.plan.leave)) return false;
+    guard.forget();
   }
-  if (!window.confirm(S.plan.leave)) return false;
   guard = null;
   return true;
 }
 
-window.addEventListener('beforeunload', (event) => { if (guard?.()) event.preventDefault(); });
+window.addEventListener('beforeunload', (event) => {
+  if (guard?.isEdited()) event.preventDefault();
+});

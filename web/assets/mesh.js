@@ -86,10 +86,11 @@ function boxOfInterest(geometry, grid, region, T) {
 }
 
 /// Draws into `canvas`. Throws where there is no WebGL.
+/// @param surface  Bytes of the PLY file.
 /// @param words  Of the compass's marks.
-/// Gives setGhost(url, share), setShare(share), look(name), cut(way, share), picture(), stop().
-export async function openMesh(canvas, {
-  url, grid, deviation, region, T, tolerance_m, compass, words,
+/// Gives setGhost(load, share), setShare(share), look(name), cut(way, share), picture(), stop().
+export function openMesh(canvas, {
+  surface, grid, deviation, region, T, tolerance_m, compass, words,
 }) {
   const renderer = new THREE.WebGLRenderer({
     canvas, antialias: true, logarithmicDepthBuffer: true, preserveDrawingBuffer: true,
@@ -104,7 +105,7 @@ export async function openMesh(canvas, {
   sun.position.set(-0.6, -0.4, 1);
   scene.add(sun);
   const loader = new PLYLoader();
-  const geometry = await loader.loadAsync(url);
+  const geometry = loader.parse(surface);
   colourByError(geometry, grid, deviation, region, T, tolerance_m);
   const material = new THREE.MeshStandardMaterial({
     vertexColors: true, roughness: 0.9, side: THREE.DoubleSide,
@@ -209,17 +210,18 @@ export async function openMesh(canvas, {
     look,
     setShare,
     cut,
-    async setGhost(ghostUrl, share) {
-      if (!ghost && ghostUrl) {
-        ghost = new THREE.Mesh(await loader.loadAsync(ghostUrl), new THREE.MeshStandardMaterial({
+    /// @param load  Gives the bytes of the reference's surface; null: it is hidden.
+    async setGhost(load, share) {
+      if (!ghost && load) {
+        ghost = new THREE.Mesh(loader.parse(await load()), new THREE.MeshStandardMaterial({
           color: 0x6ea8ff, alphaHash: true, side: THREE.DoubleSide,
           clippingPlanes: material.clippingPlanes,
         }));
         if (T) ghost.applyMatrix4(new THREE.Matrix4().set(...T.flat()).invert());
         scene.add(ghost);
       }
-      if (ghost) ghost.visible = Boolean(ghostUrl);
-      if (!ghostUrl) {
+      if (ghost) ghost.visible = Boolean(load);
+      if (!load) {
         material.opacity = 1;
         material.alphaHash = false;
         material.needsUpdate = true;

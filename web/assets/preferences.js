@@ -1,4 +1,6 @@
-// What a person chooses for this browser: language and theme.
+// What a person chooses: language and theme. They belong to the account; this browser keeps them as
+// well, for where the account cannot be asked.
+import { put } from './api.js';
 import { field, select } from './dom.js';
 import { chooseLanguage, kLanguages, languageOf, S } from './strings.js';
 
@@ -6,6 +8,16 @@ const key = (who) => `plumb-theme-${who}`;
 const themeOf = (who) => {
   try { return localStorage.getItem(key(who)) ?? 'dark'; } catch { return 'dark'; }
 };
+
+const keepTheme = (who, theme) => {
+  try { localStorage.setItem(key(who), theme); } catch { /* for this page only */ }
+};
+
+/// At a login: what the account chose, perhaps in another browser.
+export function adoptPreferences({ user, preferences: chosen }) {
+  if (kLanguages[chosen?.language]) chooseLanguage(user, chosen.language);
+  if (S.themes[chosen?.theme]) keepTheme(user, chosen.theme);
+}
 
 /// The room is dark: dark is the default; "auto" follows the system.
 export function applyTheme(who) { document.documentElement.dataset.theme = themeOf(who); }
@@ -15,14 +27,19 @@ export function preferences(who, changed) {
   const names = Object.fromEntries(Object.entries(kLanguages)
     .map(([name, texts]) => [name, texts.languageName]));
   const language = select(names, languageOf(who));
-  language.addEventListener('change', () => {
+  const theme = select(S.themes, themeOf(who));
+  // Without a connection the choice holds in this browser only.
+  const save = () => put('session/preferences', { language: language.value, theme: theme.value })
+    .catch(() => {});
+  language.addEventListener('change', async () => {
     chooseLanguage(who, language.value);
+    await save();
     changed();
   });
-  const theme = select(S.themes, themeOf(who));
   theme.addEventListener('change', () => {
-    try { localStorage.setItem(key(who), theme.value); } catch { /* for this page only */ }
+    keepTheme(who, theme.value);
     document.documentElement.dataset.theme = theme.value;
+    save();
   });
   return [field(S.language, language), field(S.theme, theme)];
 }

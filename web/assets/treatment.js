@@ -4,9 +4,29 @@ import { live, post } from './api.js';
 import { action, clear, done, h } from './dom.js';
 import { S } from './strings.js';
 
-let seen;          // the session that was last shown to the person here; nothing: none was yet
+const kSeen = 'plumb-session-seen';
+let seen;          // the session that the person here knows to be open; undefined: not yet known
 let own = 0;       // changes of our own that are on their way
 let alertBox = null;
+
+/// Kept in the tab: after a reload, what the person saw before it is still what they saw last.
+function remember(session) {
+  if (seen !== undefined && seen?.id === session?.id) return;
+  seen = session;
+  try { sessionStorage.setItem(kSeen, JSON.stringify(session)); } catch { /* for this page only */ }
+}
+function forget() {
+  seen = undefined;
+  try { sessionStorage.removeItem(kSeen); } catch { /* there is none */ }
+}
+function remembered() {
+  try {
+    const kept = sessionStorage.getItem(kSeen);
+    return kept === null ? undefined : JSON.parse(kept);
+  } catch {
+    return undefined;
+  }
+}
 
 const nameOf = (session) => (session
   ? [session.patient_code, session.fraction && S.session.fraction(session.fraction)]
@@ -14,14 +34,22 @@ const nameOf = (session) => (session
   : S.session.none);
 export const sessionName = nameOf;
 
-async function asOwn(change) {
+/// @param isOurs  Whether that session, or null, is what the change leads to.
+async function asOwn(change, isOurs) {
   ++own;
+  const before = live.received;
+  let isDone = false;
   try {
-    return await change();
+    await change();
+    isDone = true;
   } finally {
     await live.refreshed();
-    seen = live.status?.session ?? null;
     --own;
+    const isKnown = live.received !== before;
+    if (isDone && !isKnown) forget();
+    if (isDone && isKnown && isOurs(live.status.session)) remember(live.status.session);
+    // Else somebody else was first, or has changed it again meanwhile.
+    if (isKnown) live.tell('status');
   }
 }
 
@@ -29,75 +57,71 @@ async function asOwn(change) {
 export const openPatient = (patient, purpose, reason = '', replaces = '') => asOwn(async () => {
   await post(`patients/${patient.id}/open`, { purpose, reason, replaces });
   done(S.patients.opened(patient.code));
-});
+}, (now) => now?.patient_id === patient.id && now.purpose === purpose);
 
 export const closeSession = (session) => asOwn(async () => {
   await post('treatment/close', { session_id: session.id });
   done(S.session.closed);
-});
+}, (now) => !now);
 
 /// False while somebody else's change has not been acknowledged here: no scan starts from here.
 export const isAcknowledged = () => alertBox === null;
 
-function showAlert(before, after, acknowledged) {
+function showAlert(before, after, isModal, acknowledged) {
   const text = S.session;
   const button = h('button', { class: 'primary', type: 'button' }, text.acknowledge);
+  const words = [h('p', { class: 'lead' }, text.changed(nameOf(before), nameOf(after))),
+    after?.opened_by && h('p', {}, text.changedBy(after.opened_by)), h('p', {}, text.checkCouch)];
+  button.addEventListener('click', acknowledged);
+  if (!isModal) {
+    const bar = h('div', { class: 'session-alert' },
+      h('div', {}, h('strong', {}, text.changedTitle), words), button);
+    document.getElementById('session-changed').append(bar);
+    return bar;
+  }
   const box = h('dialog', { class: 'session-alert', 'aria-labelledby': 'session-alert-title' },
-    h('h2', { id: 'session-alert-title' }, text.changedTitle),
-    h('p', { class: 'lead' }, text.changed(nameOf(before), nameOf(after))),
-    after?.opened_by && h('p', {}, text.changedBy(after.opened_by)),
-    h('p', {}, text.checkCouch), button);
+    h('h2', { id: 'session-alert-title' }, text.changedTitle), words, button);
   box.addEventListener('cancel', (event) => event.preventDefault());
-  button.addEventListener('click', () => {
-    box.close();
-    box.remove();
-    acknowledged();
-  });
   document.body.append(box);
   box.showModal();
   return box;
 }
 
-/// To be called with every status.
-/// @param watching  Whether the screen shown depends on who is open.
-export function followSession(watching, changed) {
-  const now = live.status?.session ?? null;
-  if (seen === undefined || own > 0) {
-    seen ??= now;
-    return;
-  }
-  if ((seen?.id ?? null) === (now?.id ?? null)) {
-    if (alertBox) endAlert(changed);  // it is again as the person here knows it
-    seen = now;
-    return;
-  }
-  if (!watching && !alertBox) {
-    seen = now;
-    return;
-  }
-  if (alertBox?.dataset.session === (now?.id ?? '')) return;
-  alertBox?.close();
+function removeAlert() {
+  alertBox?.close?.();
   alertBox?.remove();
-  alertBox = showAlert(seen, now, () => {
-    alertBox = null;
-    seen = live.status?.session ?? null;
-    changed();
-  });
-  alertBox.dataset.session = now?.id ?? '';
-  changed();
+  alertBox = null;
 }
 
-function endAlert(changed) {
-  alertBox.close();
-  alertBox.remove();
-  alertBox = null;
+/// To be called with every status, and when the screen or the language is another one.
+/// @param isModal  Whether the screen shown acts on who is open: then nothing else can be used
+/// before it is acknowledged. Elsewhere the alert stands above the screen until then.
+export function followSession(isModal, changed) {
+  if (!live.status || own > 0) return;
+  const now = live.status.session;
+  if (seen === undefined) seen = remembered();
+  if (seen === undefined || seen?.id === now?.id) {
+    remember(now);
+    if (!alertBox) return;
+    removeAlert();  // it is again as the person here knows it
+    changed();
+    return;
+  }
+  const shown = JSON.stringify([now?.id, isModal, S.languageName]);
+  if (alertBox?.dataset.shown === shown) return;
+  removeAlert();
+  alertBox = showAlert(seen, now, isModal, () => {
+    removeAlert();
+    remember(now);
+    changed();
+  });
+  alertBox.dataset.shown = shown;
   changed();
 }
 
 export function forgetSession() {
-  seen = undefined;
-  alertBox?.remove();
-  alertBox = null;
+  forget();
+  removeAlert();
 }
 
 /// Who is open, which fraction, and how to close: on top of the screens that depend on it.

@@ -27,6 +27,16 @@ const valueOf = (scan, axis) => ({
   value: scan.result.correction[axis.key], u95: scan.result.u95?.[axis.key] ?? 0,
 });
 
+/// A mark of a trend, told apart by its shape as well as by its colour: within a circle, outside a
+/// triangle, not surely within a diamond.
+export function markOf(tone, cx, cy, r) {
+  if (tone === 'within') return svg('circle', { cx, cy, r, class: `mark ${tone}` });
+  const d = tone === 'outside' ? `M${cx} ${cy - 1.2 * r}l${1.2 * r} ${2.2 * r}h${-2.4 * r}z`
+    : `M${cx} ${cy - 1.3 * r}l${1.3 * r} ${1.3 * r} ${-1.3 * r} ${1.3 * r} ${-1.3 * r} `
+      + `${-1.3 * r}z`;
+  return svg('path', { d, class: `mark ${tone}` });
+}
+
 function chart(axis, fractions, limit) {
   const points = fractions
     .map((fraction, i) => ({
@@ -54,14 +64,8 @@ function chart(axis, fractions, limit) {
   const mark = (p, i, filled) => {
     const kind = judge(p.value, p.u95, limit);
     const tone = kind === 'in' ? 'within' : kind === 'out' ? 'outside' : 'unsure';
-    const [cx, cy, r] = [x(i) + (filled ? 3 : -3), y(p.value), filled ? 5 : 3.5];
-    // Told apart by their shape too: outside a triangle, not surely within a diamond.
-    const shape = tone === 'within' ? svg('circle', { cx, cy, r }) : svg('path', {
-      d: tone === 'outside' ? `M${cx} ${cy - 1.2 * r}l${1.2 * r} ${2.2 * r}h${-2.4 * r}z`
-        : `M${cx} ${cy - 1.3 * r}l${1.3 * r} ${1.3 * r} ${-1.3 * r} ${1.3 * r} `
-          + `${-1.3 * r} ${-1.3 * r}z`,
-    });
-    shape.setAttribute('class', `mark ${tone}${filled ? '' : ' open'}`);
+    const shape = markOf(tone, x(i) + (filled ? 3 : -3), y(p.value), filled ? 5 : 3.5);
+    if (!filled) shape.classList.add('open');
     return shape;
   };
   return h('figure', { class: 'trend' },

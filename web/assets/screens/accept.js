@@ -1,19 +1,19 @@
 // What people do with a result: scan again, accept it, make a reference of it, take it away.
 import { fileUrl, live, may, post } from '../api.js';
-import { action, clear, done, field, form, h, localTime, signingPassword } from '../dom.js';
+import { action, clear, done, field, form, h, signedTime, signingPassword } from '../dom.js';
 import { S } from '../strings.js';
-import { openPatient } from '../treatment.js';
+import { closeSession } from '../treatment.js';
 import { removeScan } from './remove_scan.js';
 import { whyNotValid } from './verdict.js';
 
+/// Opens no session: that is done on the patient's page, where it is confirmed who is on the couch.
 function rescanButton({ scan, patient }) {
   return action(S.result.rescan, async () => {
     const purpose = scan.purpose === 'reference' ? 'reference' : 'fraction';
-    const open = live.status?.session;
-    if (open?.patient_id !== patient.id || open.purpose !== purpose) {
-      await openPatient(patient, purpose);
-    }
-    location.hash = '#/scan';
+    const { session, next_purpose: next } = live.status ?? {};
+    const isOpen = session?.patient_id === patient.id && session.purpose === purpose
+      && next === purpose;
+    location.hash = isOpen ? '#/scan' : `#/patient/${patient.id}`;
   }, { class: 'primary' });
 }
 
@@ -36,34 +36,53 @@ function outsideForm(scan, reload) {
 /// Only a valid result can be accepted: one tap in tolerance, else a reason and the password.
 function acceptance({ scan, received }, reload) {
   const text = S.result;
-  if (scan.accepted_by) {
-    const { accepted_by: who, accepted_reason: why } = scan;
-    const signed = scan.accepted_at ? `${who}, ${localTime(scan.accepted_at)}` : who;
-    const words = why ? text.acceptedOutside(signed, why) : text.acceptedBy(signed);
-    return {
-      element: h('p', { class: `badge wide ${scan.accepted_reason ? 'move' : 'in_tolerance'}` },
-        `✓ ${words}`),
-      tick: () => {},
-    };
-  }
+  if (scan.accepted_by) return accepted(scan);
   const element = h('div', { class: 'acceptance' });
   const possible = may('accept') && scan.result && scan.result.verdict !== 'no_answer';
+  // Kept, so that a reason that is half typed outlives a moment without a connection.
+  let offer = null;
   let shown = null;
   const tick = () => {
     if (!possible) return;
     const valid = !whyNotValid(scan, received);
     if (shown === valid) return;
     shown = valid;
-    if (!valid) clear(element, h('p', { class: 'hint' }, text.cannotAccept));
-    else if (scan.result.verdict === 'in_tolerance') {
-      clear(element, action(text.accept, async () => {
-        await post(`scans/${scan.id}/accept`);
-        done(S.saved);
-        await reload();
-      }, { class: 'primary' }));
-    } else clear(element, outsideForm(scan, reload));
+    if (!valid) {
+      clear(element, h('p', { class: 'hint' }, text.cannotAccept));
+      return;
+    }
+    offer ??= scan.result.verdict === 'in_tolerance' ? action(text.accept, async () => {
+      await post(`scans/${scan.id}/accept`);
+      done(S.saved);
+      await reload();
+    }, { class: 'primary' }) : outsideForm(scan, reload);
+    clear(element, offer);
   };
   return { element, tick };
+}
+
+/// Who accepted it, and the end of its session, which usually comes next.
+function accepted(scan) {
+  const text = S.result;
+  const { accepted_by: who, accepted_reason: why } = scan;
+  const signed = scan.accepted_at ? `${who}, ${signedTime(scan.accepted_at)}` : who;
+  const words = why ? text.acceptedOutside(signed, why) : text.acceptedBy(signed);
+  const close = h('div', { class: 'acceptance' });
+  let shown;
+  const tick = () => {
+    const { session, state } = live.status ?? {};
+    const isRunning = state === 'scanning' || state === 'working';
+    const open = may('scan') && !isRunning && session && session.id === scan.session_id
+      ? session : null;
+    if (shown === open?.id) return;
+    shown = open?.id;
+    clear(close, open && action(S.session.close, () => closeSession(open), {}));
+  };
+  return {
+    element: h('div', { class: 'acceptance' },
+      h('p', { class: `badge wide ${why ? 'move' : 'in_tolerance'}` }, `✓ ${words}`), close),
+    tick,
+  };
 }
 
 function files(scan) {

@@ -63,6 +63,8 @@ export async function showAudit(place) {
   clear(place, h('h1', {}, text.title), h('section', { class: 'card' },
     field(text.filter, filter, text.filterHint),
     views.element, count, list,
-    h('div', { class: 'row' }, more, take)));
+    h('div', { class: 'row' }, more, take, h('a', {
+      class: 'button', href: '/api/v1/audit.jsonl', download: '',
+    }, text.whole)), h('p', { class: 'hint' }, text.wholeHint)));
   await load();
 }

@@ -3,6 +3,7 @@ import { currentSession, get, live, may, post } from '../api.js';
 import { action, done, fixed, h, localDay, localTime, redraw, svg, table } from '../dom.js';
 import { signed } from '../numbers.js';
 import { S, translated } from '../strings.js';
+import { markOf } from '../trend.js';
 import { sentence } from './common.js';
 import { roomCard } from './room_calibration.js';
 
@@ -96,9 +97,8 @@ function chart(name, checks) {
       x: kLeft, width: kWidth - kLeft - 4, y: y(limit), height: y(low) - y(limit), class: 'zone',
     }), tick(limit), tick(0), low < 0 && tick(low),
     svg('polyline', { points: values.map((v, i) => `${x(i)},${y(v)}`).join(' '), class: 'line' }),
-    points.map(({ item }, i) => svg('circle', {
-      cx: x(i), cy: y(item.value), r: 4, class: `mark ${item.passed ? 'within' : 'outside'}`,
-    })),
+    points.map(({ item }, i) =>
+      markOf(item.passed ? 'within' : 'outside', x(i), y(item.value), 4)),
     points.map(({ check }, i) => i % every === 0 && svg('text', {
       x: x(i), y: kHeight - 6, class: 'tick middle',
     }, localDay(check.time)))));

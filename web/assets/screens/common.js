@@ -1,5 +1,5 @@
 // What several screens show.
-import { get, live } from '../api.js';
+import { get, live, since_s } from '../api.js';
 import { clear, h } from '../dom.js';
 import { S, translated } from '../strings.js';
 
@@ -64,6 +64,23 @@ export function blockNote(tell) {
     if (element.isConnected) element.dataset.seen = 'yes';
   });
   return element;
+}
+
+/// The state that was known last, while there is no connection; draw() each second. Only the state
+/// is announced: its age changes too often.
+/// @param before  Gives words that stand before it.
+export function lastKnownNote(look, role = 'status', before = () => '') {
+  const state = h('span', { role });
+  const age = h('span', {});
+  const element = h('p', { class: 'visually-hidden' }, state, age);
+  const draw = () => {
+    const shown = !live.connected && live.status;
+    element.className = shown ? look : 'visually-hidden';
+    const words = shown ? `${before()}${S.lastKnown(S.states[live.status.state])}` : '';
+    if (state.textContent !== words) state.textContent = words;
+    age.textContent = shown ? S.lastKnownAge(Math.floor(since_s(live.received))) : '';
+  };
+  return { element, draw };
 }
 
 /// Codes by patient id, for lists.

@@ -1,6 +1,7 @@
 // The card of the 3-D view, which is loaded only when it is opened.
-import { fileUrl } from '../api.js';
+import { ApiError, getBytes } from '../api.js';
 import { action, checkbox, clear, h, select, warn } from '../dom.js';
+import { progressIn } from '../error_map.js';
 import { marksNote } from '../map_frame.js';
 import { S } from '../strings.js';
 
@@ -36,7 +37,11 @@ function cutControls(view) {
   return [h('label', { for: 'mesh-cut' }, text.cut), way, where];
 }
 
-function controls(view, canvas, ghostUrl, scan, compass) {
+const kSurface_ms = 600000;  // 30 MB on a slow line
+const surfaceOf = (scanId, onPart) =>
+  getBytes(`scans/${scanId}/files/mesh.ply`, onPart, kSurface_ms);
+
+function controls(view, canvas, reference, scan, compass) {
   const text = S.result;
   const buttons = viewsOf(compass).map((name) =>
     action(nameOf(name, compass), async () => view.look(name), {}));
@@ -44,7 +49,7 @@ function controls(view, canvas, ghostUrl, scan, compass) {
     h('a', { href: view.picture(), download: `plumb_${scan.id}_3d.png` }).click();
   }, {});
   const cut = cutControls(view);
-  if (!ghostUrl) return h('div', { class: 'row' }, buttons, picture, cut);
+  if (!reference) return h('div', { class: 'row' }, buttons, picture, cut);
   const ghost = checkbox(text.ghost, false, {});
   const share = h('input', {
     type: 'range', min: 0, max: 1, step: 0.05, value: 0.5, 'aria-label': text.ghostShare,
@@ -55,7 +60,8 @@ function controls(view, canvas, ghostUrl, scan, compass) {
     share.hidden = !ghost.box.checked;
     state.textContent = ghost.box.checked ? text.ghostLoading : '';
     try {
-      await view.setGhost(ghost.box.checked ? ghostUrl : null, Number(share.value));
+      await view.setGhost(ghost.box.checked ? () => surfaceOf(reference.scan_id) : null,
+        Number(share.value));
     } catch (error) {
       warn(error.message);
     }
@@ -71,30 +77,33 @@ export function meshView({ scan, reference, details }, map, tolerance_mm) {
   const place = h('div', { class: 'mesh-place' });
   let view = null;
   const open = action(text.meshOpen, async () => {
-    place.classList.remove('waiting');
-    clear(place, h('p', { class: 'hint' }, text.meshLoading));
     const canvas = h('canvas', {
       class: 'mesh', tabindex: '0', role: 'application', 'aria-label': text.meshLabel,
     });
     try {
       if (!document.createElement('canvas').getContext('webgl2')) throw new Error(text.meshFailed);
-      const { openMesh } = await import('../mesh.js');
+      const part = progressIn(place, text.meshLoading);
+      const [{ openMesh }, surface] = await Promise.all([import('../mesh.js'),
+        surfaceOf(scan.id, part('surface'))]);
+      if (!place.isConnected) return;  // the screen was left meanwhile
       const below = h('div', {});
+      place.classList.remove('waiting');
       clear(place, canvas, map?.legend?.(), below);
-      view = await openMesh(canvas, {
-        url: fileUrl(scan.id, 'mesh.ply'), grid: map?.grid, deviation: map?.deviation,
-        region: map?.region, T: details?.alignment?.T_reference_current,
-        tolerance_m: tolerance_mm / 1000, compass: map?.compass,
-        words: { ...text.marks, ...text.cube },
+      view = openMesh(canvas, {
+        surface, grid: map?.grid, deviation: map?.deviation, region: map?.region,
+        T: details?.alignment?.T_reference_current, tolerance_m: tolerance_mm / 1000,
+        compass: map?.compass, words: { ...text.marks, ...text.cube },
       });
       canvas.dataset.ready = 'yes';
-      const ghostUrl = reference && fileUrl(reference.scan_id, 'mesh.ply');
-      clear(below, marksNote(map?.compass), controls(view, canvas, ghostUrl, scan, map?.compass));
-    } catch {
-      clear(place, h('p', { class: 'hint' }, text.meshFailed));
+      clear(below, marksNote(map?.compass), controls(view, canvas, reference, scan, map?.compass));
+    } catch (error) {
+      // What did not arrive may arrive the next time; what the browser cannot show, it never can.
+      if (error instanceof ApiError) offer(error.message);
+      else clear(place, h('p', { class: 'hint' }, text.meshFailed));
     }
   }, {});
+  const offer = (words) => clear(place, open, h('p', { class: 'hint' }, words));
   place.classList.add('waiting');
-  clear(place, open, h('p', { class: 'hint' }, text.meshHint));
+  offer(text.meshHint);
   return { element: place, stop: () => view?.stop() };
 }

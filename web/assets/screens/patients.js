@@ -1,26 +1,32 @@
 // Patients, their references and scans, and the treatment session that people open here.
 import { get, live, may, post, put, removeFor } from '../api.js';
 import {
-  action, clear, done, enable, field, form, h, localTime, redraw, signingPassword, table, warn,
+  action, clear, done, enable, field, form, h, localTime, redraw, say, signedTime, signingPassword,
+  table, warn,
 } from '../dom.js';
 import { numbersLine } from '../numbers.js';
 import { S } from '../strings.js';
 import { closeSession, openPatient } from '../treatment.js';
 import { blockNote, isAdvice, outcomeBadge } from './common.js';
 
+const waitsFor = ({ planned_by: planner }) =>
+  (planner ? S.patients.waits : S.patients.waitsForPlan);
+
 function referenceState(patient) {
   const text = S.patients;
+  const draft = patient.draft_reference_id;
+  const told = live.status?.waiting.find(({ reference_id: id }) => id === draft);
   const approved = patient.approved_reference_id && `✓ ${text.approved}`;
-  const waits = patient.draft_reference_id && h('a', {
-    href: `#/plan/${patient.draft_reference_id}`, class: 'badge move',
-  }, text.waits);
+  const waits = draft && h('a', { href: `#/plan/${draft}`, class: 'badge move' },
+    told ? waitsFor(told) : text.draft);
   return approved || waits ? [approved, approved && waits && ' ', waits] : text.noReference;
 }
 
 export async function showPatients(place) {
   const text = S.patients;
   const list = h('div', {});
-  const search = h('input', { type: 'search', autocomplete: 'off' });
+  const search = h('input', { type: 'search', autocomplete: 'off', spellcheck: 'false' });
+  const missed = h('p', { class: 'caution' });
   const code = h('input', {
     required: true, maxlength: 32, pattern: '[A-Za-z0-9_\\-][A-Za-z0-9._\\-]*', autocomplete: 'off',
     spellcheck: 'false',
@@ -29,11 +35,9 @@ export async function showPatients(place) {
   const archived = h('input', { type: 'checkbox' });
   let patients = [];
 
-  const matching = () => {
-    const wanted = search.value.trim().toLowerCase();
-    return patients.filter((patient) => (archived.checked || !patient.archived)
-      && patient.code.toLowerCase().includes(wanted));
-  };
+  const wanted = () => search.value.trim().toLowerCase();
+  const matching = () => patients.filter((patient) => (archived.checked || !patient.archived)
+    && patient.code.toLowerCase().includes(wanted()));
   const row = (patient) => {
     const isOpen = patient.id === live.status?.session?.patient_id;
     return h('tr', { class: isOpen ? 'chosen' : '' },
@@ -47,24 +51,33 @@ export async function showPatients(place) {
     const rows = matching().map(row);
     redraw(list, rows.length
       ? table([text.code, text.site, text.scans, text.reference, text.added], rows, text.title)
-      : h('p', { class: 'hint' }, text.empty));
+      : h('p', { class: 'hint' }, wanted() ? text.noMatch(search.value.trim()) : text.empty));
   };
   const load = async () => {
-    ({ patients } = await get('patients', true));
+    // The state says which drafts wait for what.
+    [{ patients }] = await Promise.all([get('patients', true), live.refreshed()]);
     draw();
   };
-  search.addEventListener('input', draw);
+  search.addEventListener('input', () => {
+    missed.textContent = '';
+    draw();
+  });
   archived.addEventListener('change', draw);
-  // A scanner of wristbands types the code and Enter.
+  // A scanner of wristbands types the code and Enter. Only the whole code opens a patient: a part
+  // of one may be another patient's.
   search.addEventListener('keydown', (event) => {
-    if (event.key !== 'Enter') return;
-    const wanted = search.value.trim().toLowerCase();
-    const exact = patients.find((patient) => patient.code.toLowerCase() === wanted);
-    const found = exact ?? (matching().length === 1 ? matching()[0] : null);
-    if (found) location.hash = `#/patient/${found.id}`;
+    if (event.key !== 'Enter' || !wanted()) return;
+    const found = patients.find((patient) => patient.code.toLowerCase() === wanted());
+    if (found) {
+      location.hash = `#/patient/${found.id}`;
+      return;
+    }
+    missed.textContent = matching().length ? text.noMatch(search.value.trim()) : '';
+    say(text.noMatch(search.value.trim()));
+    search.select();  // or the next code would be added to this one
   });
   clear(place, h('h1', {}, text.title),
-    h('section', { class: 'card' }, field(text.search, search), list,
+    h('section', { class: 'card' }, field(text.search, search), missed, list,
       h('label', { class: 'check below' }, archived, ' ', text.showArchived)),
     may('patients') && h('section', { class: 'card' }, h('h2', {}, text.add),
       form({ class: 'form inline' }, async () => {
@@ -73,11 +86,14 @@ export async function showPatients(place) {
         location.hash = `#/patient/${id}`;
       }, field(text.code, code, text.codeHint), field(text.site, site, text.siteHint),
       h('button', { class: 'primary' }, text.add))));
+  // Not where a keyboard on the screen would cover the list.
+  if (!matchMedia('(pointer: coarse)').matches) search.focus({ preventScroll: true });
   await load();
   return live.listen((kind) => { if (kind === 'data') load().catch(() => {}); });
 }
 
 /// Where another patient's session is open, it is named and closed by the same tap.
+/// @return {element, draw}  draw() when the connection is lost or back.
 function openButtons(patient) {
   const text = S.patients;
   const reason = h('input', { maxlength: 200, autocomplete: 'off' });
@@ -107,14 +123,23 @@ function openButtons(patient) {
       action(S.cancel, async () => clear(question), {})));
   };
   const fraction = action(text.openFraction, open('fraction'), { class: 'start-session' });
-  enable(fraction, Boolean(patient.approved_reference_id));
   const reference = action(text.openReference, open('reference'), {});
-  return h('div', { class: 'form' },
+  let blocked = null;
+  // Without a connection nobody knows here whose session is open.
+  const draw = () => {
+    enable(fraction, live.connected && Boolean(patient.approved_reference_id));
+    enable(reference, live.connected && !blocked);
+  };
+  const block = blockNote((why) => {
+    blocked = why;
+    draw();
+  });
+  const element = h('div', { class: 'form' },
     h('p', { class: 'lead' }, text.confirmWho(patient.code)),
-    h('div', { class: 'row' }, fraction, reference),
-    blockNote((why) => enable(reference, !why)), question,
+    h('div', { class: 'row' }, fraction, reference), block, question,
     !patient.approved_reference_id && h('p', { class: 'hint' }, text.needsReference),
     field(text.reason, reason));
+  return { element, draw };
 }
 
 /// Site, note and archive: what people say of a course, and whether it is still in the list.
@@ -150,8 +175,8 @@ function referenceTable(references) {
     h('td', {}, `${localTime(reference.created_at)}, ${reference.created_by}`),
     h('td', {}, reference.reason || S.none),
     h('td', {}, reference.approved_by
-      ? `✓ ${text.approvedBy(reference.approved_by, localTime(reference.approved_at))}`
-      : h('span', { class: 'badge move' }, `${text.draft}, ${text.waits}`)),
+      ? `✓ ${text.approvedBy(reference.approved_by, signedTime(reference.approved_at))}`
+      : h('span', { class: 'badge move' }, `${text.draft}, ${waitsFor(reference)}`)),
     h('td', {}, h('a', {
       class: 'button', href: `#/plan/${reference.id}`,
       'aria-label': `${plan}, ${text.version} ${reference.version}`,
@@ -164,7 +189,7 @@ function scanTable(scans) {
   const text = S.patients;
   if (!scans.length) return h('p', { class: 'hint' }, S.status.noScans);
   const signed = (scan) => (scan.accepted_at
-    ? `${scan.accepted_by}, ${localTime(scan.accepted_at)}` : scan.accepted_by);
+    ? `${scan.accepted_by}, ${signedTime(scan.accepted_at)}` : scan.accepted_by);
   const accepted = (scan) => (!scan.accepted_by ? S.none : scan.accepted_reason
     ? `▲ ${signed(scan)}: ${scan.accepted_reason}` : `✓ ${signed(scan)}`);
   const rows = scans.map((scan) => h('tr', {},
@@ -213,6 +238,7 @@ export async function showPatient(place, id) {
   const heading = h('h1', {});
   let approved;
   let told;
+  let buttons = null;
   /// What begins a session is the first thing to press only where this patient's is not open.
   const weigh = () => opening.querySelector('.start-session')
     ?.classList.toggle('primary', live.status?.session?.patient_id !== id);
@@ -223,8 +249,8 @@ export async function showPatient(place, id) {
     const opens = `${patient.approved_reference_id} ${patient.archived}`;
     if (approved !== opens) {
       approved = opens;
-      clear(opening, patient.archived ? h('p', { class: 'hint' }, text.isArchived)
-        : openButtons(patient));
+      buttons = patient.archived ? null : openButtons(patient);
+      clear(opening, buttons?.element ?? h('p', { class: 'hint' }, text.isArchived));
       weigh();
     }
     const says = JSON.stringify([patient.site, patient.note, patient.archived]);
@@ -263,6 +289,7 @@ export async function showPatient(place, id) {
   await load();
   return live.listen((kind) => {
     if (kind === 'status') drawSession();
+    if (kind === 'connection') buttons?.draw();
     if (kind === 'data' || kind === 'result') load().catch((error) => warn(error.message));
   });
 }

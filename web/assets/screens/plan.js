@@ -1,15 +1,16 @@
 // The plan of a reference: region, isocentre, tolerances; and its approval, which signs exactly
 // what is stored.
-import { get, live, may, post, put } from '../api.js';
+import { currentSession, get, live, may, post, put } from '../api.js';
 import {
   action, checkbox, clear, done, enable, field, fixed, form, h, keepFocus, localTime, say, select,
-  signingPassword, warn,
+  signedTime, signingPassword, warn,
 } from '../dom.js';
 import { guardLeaving } from '../leave.js';
 import { compassOf, marksNote } from '../map_frame.js';
 import { loadMap } from '../maps.js';
+import { drafts } from '../plan_drafts.js';
 import { S } from '../strings.js';
-import { blockNote } from './common.js';
+import { blockNote, flagList } from './common.js';
 import { editor, measure } from './plan_editor.js';
 import { templateOf } from './plan_template.js';
 
@@ -94,22 +95,17 @@ const storedPlan = (reference) => ({
   posture: reference.plan.posture, couch_markers: reference.plan.couch_markers,
 });
 
-/// Unsaved work of this revision, kept over a lost session or a reload.
-const draftKey = (reference) => `plumb-plan-${reference.id}-${reference.revision}`;
-const drafts = {
-  read: (reference) => {
-    try { return JSON.parse(sessionStorage.getItem(draftKey(reference))); } catch { return null; }
-  },
-  write: (reference, plan) => {
-    try { sessionStorage.setItem(draftKey(reference), JSON.stringify(plan)); } catch { /* full */ }
-  },
-  remove: (reference) => {
-    try { sessionStorage.removeItem(draftKey(reference)); } catch { /* there is none */ }
-  },
-};
+/// Why the person who is logged in does not approve this draft; nothing where they may, or where it
+/// is approved already.
+function whyNotApprove(reference) {
+  if (reference.approved_by) return null;
+  if (!reference.planned_by) return S.plan.unplanned;
+  const isOwn = [reference.created_by, reference.planned_by].includes(currentSession()?.user);
+  return isOwn && may('approve') ? S.plan.secondPerson : null;
+}
 
 /// What an approval signs, read-only and complete, with the checksum that goes into the log.
-function summary(reference, patient, scene, picture, approve) {
+function summary(reference, patient, { scan, scene, picture }, approve) {
   const text = S.plan;
   const { plan } = reference;
   const row = (name, value) => [h('dt', {}, name), h('dd', {}, value)];
@@ -129,7 +125,7 @@ function summary(reference, patient, scene, picture, approve) {
       picture, h('dl', { class: 'facts' },
       row(S.patients.code, patient.code), row(S.patients.version, `${reference.version}`),
       row(S.patients.made, `${localTime(reference.created_at)}, ${reference.created_by}`),
-      row(text.planned, reference.planned_by ?? reference.created_by),
+      row(text.planned, reference.planned_by),
       row(S.patients.reasonShort, reference.reason || S.none),
       row(text.region, plan.region_m.length
         ? `${text.corners(plan.region_m.length)}, ${text.area(size.cm2, size.cm)}`
@@ -143,14 +139,17 @@ function summary(reference, patient, scene, picture, approve) {
         `${S.result.frames} ${frames.tracked} / ${frames.total}, `
           + `${S.result.views} ${scene.keyframes}`),
       row(text.signature, h('code', {}, reference.digest)))),
+    scan && flagList(scan, scene),
     h('p', { class: 'hint' }, text.approveHint), signature);
   return { element, password };
 }
 
-/// One stored plan and what is edited of it. `store(request)` sends a change.
-async function draft(place, reference, store) {
+/// One stored plan and what is edited of it. `store(request)` sends a change, `reload` shows what
+/// is stored.
+async function draft(place, reference, store, reload) {
   const text = S.plan;
   const patient = await get(`patients/${reference.patient_id}`);
+  const scan = await get(`scans/${reference.scan_id}`).catch(() => null);
   const editable = may('plan');
   const kept = editable ? drafts.read(reference) : null;
   const plan = kept ?? storedPlan(reference);
@@ -168,7 +167,8 @@ async function draft(place, reference, store) {
   // Nothing has been compared: nobody has yet confirmed that the body lies as the plan says.
   const compass = compassOf(live.status?.room, null);
   const isEdited = () => stored !== undefined && inputs.written() !== stored;
-  const sign = may('approve') && !reference.approved_by
+  const refusal = whyNotApprove(reference);
+  const sign = may('approve') && !reference.approved_by && !refusal
     && action(text.summaryReview, async () => showSummary(), {});
   let blocked = null;
   const block = sign && blockNote((why) => {
@@ -188,6 +188,7 @@ async function draft(place, reference, store) {
     if (edited) drafts.write(reference, inputs.body());
     else drafts.remove(reference);
     if (sign) enable(sign, !edited && !blocked);
+    if (deleteCorner) enable(deleteCorner, drawing.hasCorner());
     unsaved.textContent = edited && sign ? text.unsaved : '';
     if (edited) clear(signPlace);
   };
@@ -215,7 +216,9 @@ async function draft(place, reference, store) {
     const approve = (written) => store(() => post(`references/${reference.id}/approve`, {
       revision: reference.revision, digest: reference.digest, password: written,
     }), text.approved);
-    const { element, password } = summary(reference, patient, loaded?.scene, picture(), approve);
+    const { element, password } = summary(reference, patient, {
+      scan, scene: loaded?.scene, picture: picture(),
+    }, approve);
     clear(signPlace, element);
     element.scrollIntoView({ block: 'nearest' });
     password.focus();
@@ -236,17 +239,26 @@ async function draft(place, reference, store) {
       () => drafts.remove(reference));
   }, { class: 'primary' });
   const approval = reference.approved_by
-    ? S.patients.approvedBy(reference.approved_by, localTime(reference.approved_at))
+    ? S.patients.approvedBy(reference.approved_by, signedTime(reference.approved_at))
     : [h('span', { class: 'badge move' }, S.patients.draft),
       ` ${localTime(reference.created_at)}, ${reference.created_by}`];
-  const tools = editable && drawing && h('div', { class: 'row' },
-    action(text.undo, async () => drawing.undo(), {}),
+  const deleteCorner = editable && drawing
+    && action(text.deleteCorner, async () => drawing.deleteCorner(), {});
+  const tools = deleteCorner && h('div', { class: 'row' },
+    action(text.undo, async () => drawing.undo(), {}), deleteCorner,
     action(text.clear, async () => drawing.clear(), {}));
+  const discard = action(text.discardDraft, async () => {
+    drafts.remove(reference);
+    await reload();
+    done(text.draftDiscarded);
+    // The button that was pressed is gone.
+    document.getElementById('main').focus({ preventScroll: true });
+  }, {});
   keepFocus(place, () => clear(place,
     h('h1', {}, `${text.reference} ${reference.version} · `,
       h('a', { href: `#/patient/${patient.id}` }, patient.code)),
     h('p', { class: 'lead' }, approval),
-    kept && h('p', { class: 'old-note' }, text.draftKept),
+    kept && h('p', { class: 'old-note row' }, h('span', {}, text.draftKept), discard),
     h('div', { class: 'plan-grid' },
       h('section', { class: 'card' }, h('h2', {}, text.region),
         editable && h('p', { class: 'hint' }, text.regionHint), mapPlace, corners, tools),
@@ -266,6 +278,7 @@ async function draft(place, reference, store) {
         templatePlace, field(text.posture, inputs.posture), inputs.couch.element,
         editable && h('p', { class: 'hint' },
           reference.approved_by ? text.approvedHint : text.approveHint),
+        refusal && h('p', { class: 'caution refusal' }, refusal),
         unsaved, block, h('div', { class: 'row' }, editable && save, sign))),
     signPlace));
   if (editable && drawing) {
@@ -292,7 +305,7 @@ export async function showPlan(place, id) {
   let busy = false;  // with our own change, of which the stream notifies us too
   const load = async () => {
     reference = await get(`references/${id}`);
-    shown = await draft(place, reference, store);
+    shown = await draft(place, reference, store, load);
   };
   const differs = async () => {
     const stored = await get(`references/${id}`, true);
@@ -327,7 +340,7 @@ export async function showPlan(place, id) {
     say(text.reloaded, true);
   };
   await load();
-  guardLeaving(() => shown.isEdited());
+  guardLeaving(() => shown.isEdited(), () => drafts.remove(reference));
   const stop = live.listen((kind) => { if (kind === 'data') follow().catch(() => {}); });
   return () => {
     guardLeaving(null);

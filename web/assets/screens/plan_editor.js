@@ -7,6 +7,8 @@ import { S } from '../strings.js';
 const kStep_m = 0.005;
 const kSnap_m = 0.012;
 const kUndoSteps = 200;
+const kFinger_px = 14;  // a corner is drawn smaller than a finger can aim
+const kSame_m = 0.0005;
 const distance = ([ax, ay], [bx, by]) => Math.hypot(ax - bx, ay - by);
 
 /// Area in square centimetres and length of the outline in centimetres.
@@ -36,7 +38,10 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
   });
   const box = mapFrame({ grid, view: viewOf(grid, null), canvas, compass, cross: overlay });
   box.style.setProperty('max-width', `${75 * width / height}vh`);
-  const state = { chosen: -1, dragging: false, picking: false, onIsocentre: false };
+  // The crosshair is there once the keys have moved it.
+  const state = {
+    chosen: -1, grabbed: null, picking: false, onIsocentre: false, crosshair: null,
+  };
   const before = [];  // for undo
   const remember = () => {
     before.push(JSON.stringify([model.region, model.isocentre]));
@@ -48,6 +53,17 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
     const area = overlay.getBoundingClientRect();
     return [round(grid.x_min + (event.clientX - area.left) / area.width * width),
       round(grid.y_min + (1 - (event.clientY - area.top) / area.height) * height)];
+  };
+  /// The corner that a pointer touches; nothing where it touches none.
+  const cornerAt = (event) => {
+    const { corner } = event.target.dataset ?? {};
+    if (corner !== undefined) return Number(corner);
+    if (event.pointerType !== 'touch') return -1;
+    const reach = kFinger_px * width / overlay.getBoundingClientRect().width;
+    const point = fromEvent(event);
+    const away = model.region.map((other) => distance(point, other));
+    const nearest = away.indexOf(Math.min(...away));
+    return away[nearest] < reach ? nearest : -1;
   };
   /// A corner that is dragged lies straight beside its neighbours where it nearly does.
   const snapped = (point, i) => {
@@ -85,17 +101,61 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
           d: `M${x - 2 * size} ${y}h${4 * size}M${x} ${y - 2 * size}v${4 * size}`,
           class: state.onIsocentre ? 'isocentre chosen' : 'isocentre',
         });
+      })(),
+      state.crosshair && (() => {
+        const [x, y] = toMap(state.crosshair);
+        return svg('path', {
+          d: `M${x - 3 * size} ${y}h${6 * size}M${x} ${y - 3 * size}v${6 * size}`,
+          class: 'crosshair',
+        });
       })());
   };
   const skinAt = (point) => {
     const cell = cellAt(grid, ...point);
     return cell < 0 || Number.isNaN(map.values[cell]) ? 0 : round(map.values[cell]);
   };
+  const middleOfMap = [round(grid.x_min + width / 2), round(grid.y_min + height / 2)];
   const middle = () => {
     const n = model.region.length;
     const mean = (k) => round(model.region.reduce((sum, point) => sum + point[k], 0) / n);
-    return n > 2 ? [mean(0), mean(1)]
-      : [round(grid.x_min + width / 2), round(grid.y_min + height / 2)];
+    return n > 2 ? [mean(0), mean(1)] : middleOfMap;
+  };
+  /// Into the edge that is nearest, so that corners around the body make no crossing lines.
+  const addCorner = (point) => {
+    const i = nearestEdge(model.region, point);
+    model.region.splice(i, 0, point);
+    return i;
+  };
+  const deleteCorner = () => {
+    if (!model.region[state.chosen]) return;
+    remember();
+    model.region.splice(state.chosen, 1);
+    state.chosen = Math.min(state.chosen, model.region.length - 1);
+    update();
+  };
+  const moveCrosshair = ([dx, dy], by) => {
+    const [x, y] = state.crosshair ?? middleOfMap;
+    const within = (value, low, size) => round(Math.max(low, Math.min(low + size, value)));
+    state.crosshair = [within(x + by * dx, grid.x_min, width),
+      within(y + by * dy, grid.y_min, height)];
+    draw();
+    say(text.crosshairAt(...state.crosshair));
+  };
+  /// Adds a corner at the crosshair, which stays for the next one; takes the corner that is there.
+  const enterCorner = () => {
+    state.crosshair ??= middleOfMap;
+    const there = model.region.findIndex((other) => distance(other, state.crosshair) < kSame_m);
+    if (there < 0) {
+      remember();
+      const i = addCorner([...state.crosshair]);
+      state.chosen = -1;
+      update();
+      say(text.corner(i + 1, ...state.crosshair));
+    } else {
+      state.chosen = there;
+      update();
+      say(text.corner(there + 1, ...model.region[there]));
+    }
   };
   /// The isocentre by keys: put on the skin, then moved at the height that it has.
   const keyOnIsocentre = (key, direction, by) => {
@@ -128,29 +188,31 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
     overlay.addEventListener('pointerdown', (event) => {
       overlay.focus();
       const point = fromEvent(event);
+      const touched = cornerAt(event);
       remember();
       state.onIsocentre = false;
+      state.crosshair = null;
       if (state.picking) {
         model.isocentre = [...point, skinAt(point)];
         state.picking = false;
         overlay.classList.remove('picking');
-      } else if (event.target.dataset?.corner !== undefined) {
-        state.chosen = Number(event.target.dataset.corner);
-        state.dragging = true;
+      } else if (touched >= 0) {
+        state.chosen = touched;
+        // A finger beside the corner does not move it before the finger moves.
+        state.grabbed = model.region[touched].map((value, k) => value - point[k]);
         overlay.setPointerCapture(event.pointerId);
       } else {
-        // Into the edge that is nearest, so that clicks around the body make no crossing lines.
-        model.region.splice(nearestEdge(model.region, point), 0, point);
-        state.chosen = model.region.findIndex((other) => other === point);
+        state.chosen = addCorner(point);
       }
       update();
     });
     overlay.addEventListener('pointermove', (event) => {
-      if (!state.dragging) return;
-      model.region[state.chosen] = snapped(fromEvent(event), state.chosen);
+      if (!state.grabbed) return;
+      const point = fromEvent(event).map((value, k) => round(value + state.grabbed[k]));
+      model.region[state.chosen] = snapped(point, state.chosen);
       update();
     });
-    overlay.addEventListener('pointerup', () => { state.dragging = false; });
+    overlay.addEventListener('pointerup', () => { state.grabbed = null; });
     overlay.addEventListener('keydown', (event) => {
       const chosen = model.region[state.chosen];
       const direction = {
@@ -159,25 +221,31 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
       const by = kStep_m * (event.shiftKey ? 10 : 1);
       const isDelete = event.key === 'Delete' || event.key === 'Backspace';
       const key = event.key.toLowerCase();
-      if (!event.ctrlKey && !event.altKey && !event.metaKey && (key === 'i'
-        || (state.onIsocentre && model.isocentre && (direction || isDelete)))) {
+      const isUndo = key === (event.ctrlKey ? 'z' : 'u');
+      // All other shortcuts are the browser's.
+      if (event.altKey || event.metaKey || (event.ctrlKey && !isUndo)) return;
+      if (key === 'i' || (state.onIsocentre && model.isocentre && (direction || isDelete))) {
         event.preventDefault();
         keyOnIsocentre(key, direction, by);
         return;
       }
-      if (key === 'n' || key === 'enter') state.onIsocentre = false;
-      if (event.key === 'Enter' || (chosen && (direction || isDelete))) remember();
-      if (key === 'u' || (event.key === 'z' && event.ctrlKey)) {
+      if (key === 'n' || key === 'enter' || key === 'escape') state.onIsocentre = false;
+      if (event.key === 'Enter' || (direction && !chosen)) {
+        event.preventDefault();
+        if (direction) moveCrosshair(direction, by);
+        else enterCorner();
+        return;
+      }
+      if (isUndo) {
         undo();
-      } else if (event.key === 'Enter') {
-        model.region.push([round(grid.x_min + width / 2), round(grid.y_min + height / 2)]);
-        state.chosen = model.region.length - 1;
+      } else if (event.key === 'Escape') {
+        state.chosen = -1;  // the arrows move the crosshair again
       } else if (key === 'n' && model.region.length) {
         state.chosen = (state.chosen + 1) % model.region.length;
       } else if (isDelete && chosen) {
-        model.region.splice(state.chosen, 1);
-        state.chosen = Math.min(state.chosen, model.region.length - 1);
-      } else if (direction && chosen) {
+        deleteCorner();
+      } else if (direction) {
+        remember();
         model.region[state.chosen] = [round(chosen[0] + by * direction[0]),
           round(chosen[1] + by * direction[1])];
       } else {
@@ -191,7 +259,8 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
   }
   draw();
   return {
-    element: box, draw, undo,
+    element: box, draw, undo, deleteCorner,
+    hasCorner: () => Boolean(model.region[state.chosen]),
     /// In place of all corners; can be undone.
     set: (region) => {
       remember();

@@ -257,7 +257,7 @@ export async function showResult(place, id) {
     const missed = kind === 'status' && latest !== undefined
       && (live.status.last_result?.id ?? null) !== latest;
     if (!id && (kind === 'result' || missed)) follow();
-    else if (kind === 'status') tick();
+    else if (kind === 'status' || kind === 'connection') tick();
   });
   try {
     await load();

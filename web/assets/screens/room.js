@@ -9,7 +9,7 @@ import { loadMap, paintErrors } from '../maps.js';
 import { sixNumbers, toleranceOf } from '../numbers.js';
 import { chooseLanguage, kLanguages, languageOf, S, translated } from '../strings.js';
 import {
-  ageText, faultWords, flagList, isAdvice, isCold, minutesOf, sidesOf, sentence,
+  ageText, faultWords, flagList, isAdvice, isCold, lastKnownNote, minutesOf, sidesOf, sentence,
 } from './common.js';
 import { showFault, showLogin } from './login.js';
 import { preview, surfaceIn } from './scan.js';
@@ -18,6 +18,7 @@ import { ageOf, validityNote, verdictStrip } from './verdict.js';
 const kAsk_ms = 2000;
 const kWho = 'room';
 const kPartsShown = 3;
+const kSwap_s = 8;
 const optional = (path) => get(path, true).catch(() => null);
 const wait = (ms) => new Promise((ready) => { setTimeout(ready, ms); });
 
@@ -56,15 +57,19 @@ async function pair(main, logIn) {
 
 /// Who is open, and whether check and sensor let people scan.
 /// @param said  The large word below says already that no session is open.
-function top(status, said) {
+/// @param isSwapped  Another patient's session has just taken the place of one.
+function top(status, said, isSwapped) {
   const text = S.room;
   const { session, sensor } = status;
   const warm = !isCold(sensor.powered_s);
   const mark = (good, words) => h('li', { class: good ? 'good' : 'bad' }, words);
   const isCheck = (status.scan?.purpose ?? status.next_purpose) === 'daily_check';
   return h('header', { class: 'room-top' },
-    !said && h('p', { class: 'room-code' }, isCheck ? S.purposes.daily_check
-      : session?.patient_code ?? text.noSession),
+    !said && (isSwapped && !isCheck
+      ? h('p', { class: 'room-code swapped', role: 'alert' },
+        h('small', {}, text.anotherPatient), ' ', session.patient_code)
+      : h('p', { class: 'room-code' }, isCheck ? S.purposes.daily_check
+        : session?.patient_code ?? text.noSession)),
     !isCheck && session && h('p', { class: 'room-fraction' }, session.purpose === 'reference'
       ? S.purposes.reference : S.session.fraction(session.fraction),
     h('span', {}, ` · ${S.session.scans(session.num_scans)}`)),
@@ -238,7 +243,7 @@ function checkResult(check) {
 /// and the result stay.
 function display(main) {
   const head = h('div', {});
-  const offline = h('p', { class: 'room-offline', role: 'alert', hidden: true });
+  const offline = lastKnownNote('room-offline', 'alert', () => `${S.room.offline}. `);
   const body = h('div', { class: 'room-body' });
   const answer = result();
   const seen = h('div', { class: 'seen-so-far' });
@@ -247,8 +252,10 @@ function display(main) {
   let lastPurpose = null;
   let drawn = '';
   let shownMarks = '';
+  let patient = null;  // whose session was open last
+  let swapped = null;  // when this one took the place of another patient's
   clear(main, h('section', { class: 'room' }, h('h1', { class: 'visually-hidden' }, S.room.title),
-    offline, head, body, answer.element));
+    offline.element, head, body, answer.element));
   const withCamera = (wanted) => {
     if (wanted && !camera) camera = preview();
     if (!wanted && camera) {
@@ -260,12 +267,8 @@ function display(main) {
     const { status } = live;
     if (!status) return;
     lastPurpose = status.scan?.purpose ?? lastPurpose;
-    offline.hidden = live.connected;
     main.classList.toggle('off', !live.connected);
-    if (!live.connected) {
-      offline.textContent = `${S.room.offline}. `
-        + S.lastKnown(S.states[status.state], Math.floor(since_s(live.received)));
-    }
+    offline.draw();
     main.dataset.state = status.state;
     withCamera(status.state === 'scanning');
     showSurface(status.state === 'scanning');
@@ -275,11 +278,17 @@ function display(main) {
     const mine = last && (last.patient_id ?? null) === (status.session?.patient_id ?? null);
     const visible = status.state === 'result' && !isCheck && mine ? last : null;
     const said = !visible && !isCheck && saysNoSession(status);
-    const marks = JSON.stringify([S.languageName, status.session, status.check_overdue, said,
+    const { session } = status;
+    if (session && session.patient_id !== patient) {
+      if (patient) swapped = now();
+      patient = session.patient_id;
+    }
+    const isSwapped = Boolean(session && swapped && since_s(swapped) < kSwap_s);
+    const marks = JSON.stringify([S.languageName, session, isSwapped, status.check_overdue, said,
       status.next_purpose, status.sensor.present, Math.floor(status.sensor.powered_s / 60)]);
     if (marks !== shownMarks) {
       shownMarks = marks;
-      clear(head, top(status, said));
+      clear(head, top(status, said, isSwapped));
     }
     answer.show(visible);
     answer.element.hidden = !visible;
@@ -293,7 +302,7 @@ function display(main) {
     const fraction = status.state === 'scanning' ? scan?.coverage : scan?.step_fraction;
     const key = JSON.stringify([S.languageName, status.state, scan?.guidance,
       fraction === null, scan?.step, isCheck && status.last_check, faultWords(status),
-      status.session?.id, status.next_purpose]);
+      session?.id, status.next_purpose]);
     if (key === drawn && body.hasChildNodes()) {
       update(fraction);
       return;

@@ -4,7 +4,7 @@ import { action, clear, done, enable, h, redraw, say } from '../dom.js';
 import { liveSurface } from '../live_surface.js';
 import { S } from '../strings.js';
 import { isAcknowledged, sessionLine } from '../treatment.js';
-import { faultWords, sentence } from './common.js';
+import { faultWords, lastKnownNote, sentence } from './common.js';
 
 const kPreviewEvery_ms = 250;
 const kPreviewAnswer_ms = 5000;
@@ -109,7 +109,7 @@ export async function showScan(place) {
   const who = h('p', { class: 'lead who-line' });
   const headline = h('p', { class: 'headline' });
   const guidance = h('p', { class: 'guidance' });
-  const known = h('p', { class: 'old-note', role: 'status', hidden: true });
+  const known = lastKnownNote('old-note');
   const caution = h('p', { class: 'caution' });
   const bar = h('progress', { max: 1, 'aria-label': text.coverage });
   const barText = h('p', { class: 'bar-text' });
@@ -122,7 +122,7 @@ export async function showScan(place) {
 
   clear(place, h('h1', { class: 'visually-hidden' }, text.title),
     h('div', { class: 'scan-grid' },
-      h('section', { class: 'card sweep' }, who, known, headline, guidance, caution,
+      h('section', { class: 'card sweep' }, who, known.element, headline, guidance, caution,
         h('div', { class: 'bar' }, bar, barText), control.element),
       h('section', { class: 'card' }, h('h2', {}, S.status.preview), camera.element, seen, facts)));
 
@@ -162,10 +162,7 @@ export async function showScan(place) {
     const { status } = live;
     if (!status || !currentSession()) return;
     place.classList.toggle('off', !live.connected);
-    known.hidden = live.connected;
-    if (!live.connected) {
-      known.textContent = S.lastKnown(S.states[status.state], Math.floor(since_s(live.received)));
-    }
+    known.draw();
     headline.textContent = S.states[status.state];
     headline.dataset.state = status.state;
     control.draw(status);
@@ -179,7 +176,7 @@ export async function showScan(place) {
   draw();
   if (!live.status) get('status', true).then((status) => live.take(status), () => {});
   const stop = live.listen(draw);
-  const timer = setInterval(() => { if (!live.connected) draw(); }, 1000);
+  const timer = setInterval(known.draw, 1000);
   return () => {
     clearInterval(timer);
     stop();

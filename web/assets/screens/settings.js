@@ -1,6 +1,6 @@
 import { get, live, may, postLong, put } from '../api.js';
 import { action, checkbox, clear, done, field, form, h, localTime, select } from '../dom.js';
-import { S } from '../strings.js';
+import { S, translated } from '../strings.js';
 import { certificateCard } from './certificate.js';
 import { profileCard } from './sensor_profile.js';
 
@@ -23,8 +23,8 @@ function backupCard() {
     const { last: entry } = await get('backup', true);
     const warnings = live.status?.storage.warnings ?? [];
     clear(last, entry ? text.backupLast(localTime(entry.time), entry.user || S.product)
-      : text.backupNone, entry && [' ', h('code', {}, entry.detail)],
-    warnings.map((one) => h('span', { class: 'caution' }, ' ', one)));
+      : text.backupNone, entry && [' ', h('code', {}, translated(entry.detail))],
+    warnings.map((one) => h('span', { class: 'caution' }, ' ', translated(one))));
   };
   const now = action(text.backupNow, async () => {
     running.textContent = text.backupRunning;

@@ -4,7 +4,9 @@ import { clear, h, localTime, redraw, table } from '../dom.js';
 import { lastLogin, lastLoginWords } from '../last_login.js';
 import { S, translated } from '../strings.js';
 import { sessionName } from '../treatment.js';
-import { faultWords, isCold, minutesOf, outcomeBadge, patientCodes } from './common.js';
+import {
+  faultWords, isCold, lastKnownNote, minutesOf, outcomeBadge, patientCodes,
+} from './common.js';
 
 const gigabytes = (bytes) => Math.round(bytes / 2 ** 30);
 
@@ -24,9 +26,10 @@ function checkTile({ last_check: last, check_overdue: overdue }, tile) {
 function waitingTile({ waiting = [] }, tile) {
   const text = S.status;
   const rows = waiting.map((one) => h('li', {},
+    one.planned_by ? text.waitingApproval : text.waitingPlan, ' ',
     h('a', { href: `#/plan/${one.reference_id}` }, one.patient_code), ' ',
     text.waitingVersion(one.version)));
-  return tile(text.waitingApproval, waiting.length ? `${waiting.length}` : text.nothingWaits,
+  return tile(text.waiting, waiting.length ? `${waiting.length}` : text.nothingWaits,
     waiting.length ? 'waits' : '',
     rows.length > 0 && [h('ul', {}, rows), h('p', {}, text.waitingHint)]);
 }
@@ -63,6 +66,7 @@ export async function showStatus(place) {
   const text = S.status;
   const headline = h('p', { class: 'headline' });
   const hint = h('p', { class: 'lead' });
+  const known = lastKnownNote('old-note');
   const warnings = h('div', {});
   const grid = h('div', { class: 'tiles' });
   const list = h('div', {});
@@ -75,7 +79,7 @@ export async function showStatus(place) {
   let codes = await patientCodes();
   clear(place,
     h('h1', { class: 'visually-hidden' }, text.title),
-    h('section', { class: 'card hero' }, h('div', {}, headline, hint),
+    h('section', { class: 'card hero' }, h('div', {}, known.element, headline, hint),
       may('scan') && h('a', { class: 'button primary', href: '#/scan' }, text.goScan)),
     warnings, grid,
     h('section', { class: 'card' }, h('h2', {}, text.lastScans), list), login);
@@ -83,11 +87,13 @@ export async function showStatus(place) {
   const draw = () => {
     const { status } = live;
     if (!status) return;
+    place.classList.toggle('off', !live.connected);
+    known.draw();
     clear(warnings, [status.rolled_back, ...(status.warnings ?? [])].filter(Boolean)
       .map((one) => h('p', { class: 'caution' }, translated(one))));
     headline.textContent = S.states[status.state];
     headline.dataset.state = status.state;
-    hint.textContent = faultWords(status) ?? S.stateHints[status.state];
+    hint.textContent = live.connected ? faultWords(status) ?? S.stateHints[status.state] : '';
     redraw(grid, tiles(status));
   };
   const load = async () => {
@@ -104,8 +110,14 @@ export async function showStatus(place) {
   };
   draw();  // what is known already; the list may take a moment
   await load();
-  return live.listen((kind) => {
-    if (kind === 'status') draw();
+  const stop = live.listen((kind) => {
+    if (kind === 'status' || kind === 'connection') draw();
+    if (kind === 'data') live.refresh();  // a plan or an approval changes what waits
     if (kind === 'data' || kind === 'result') load().catch(() => {});
   });
+  const timer = setInterval(known.draw, 1000);
+  return () => {
+    clearInterval(timer);
+    stop();
+  };
 }

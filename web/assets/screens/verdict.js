@@ -13,7 +13,8 @@ export function ageOf(scan, received) {
 }
 
 /// Why this result must not be used: "running", "superseded", "closed" (its patient's session is
-/// not the one that is open), "old"; null: it is valid.
+/// not the one that is open), "old", "offline" (nobody knows here whether one of these holds by
+/// now); null: it is valid.
 export function whyNotValid(scan, received) {
   if (!scan.result) return null;
   const { status } = live;
@@ -21,8 +22,8 @@ export function whyNotValid(scan, received) {
   if (status?.last_result && status.last_result.id !== scan.id
       && status.last_result.patient_id === scan.patient_id) return 'superseded';
   if (ageOf(scan, received) > kOldAfter_s) return 'old';
-  return status && scan.patient_id && status.session?.patient_id !== scan.patient_id
-    ? 'closed' : null;
+  if (status && scan.patient_id && status.session?.patient_id !== scan.patient_id) return 'closed';
+  return live.connected ? null : 'offline';
 }
 
 export function identity({ scan, patient, reference, received }) {
@@ -55,6 +56,7 @@ export function validityNote(scan, received, review) {
     superseded: [text.superseded, text.supersededText],
     closed: [text.closed, text.closedText],
     old: [text.old, text.oldText],
+    offline: [text.offline, text.offlineText],
   };
   const tick = () => {
     const why = whyNotValid(scan, received);

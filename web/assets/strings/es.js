@@ -49,13 +49,15 @@ export const es = {
   none: '–',
   close: 'Cerrar',
   offline: 'Sin conexión con el equipo. Reintentando…',
-  lastKnown: (state, seconds) => `Último estado conocido: ${state}, hace ${seconds} s`,
+  lastKnown: (state) => `Último estado conocido: ${state}`,
+  lastKnownAge: (seconds) => `, hace ${seconds} s`,
   noAnswer: 'El equipo no responde.',
   answered: (status) => `El equipo respondió ${status}.`,
   leavingOffline: 'Sin conexión con el equipo. Saldrá de su cuenta en cuanto responda. '
     + 'Reintentando…',
   loggedOff: 'Ha salido de su cuenta. Vuelva a identificarse.',
   logOffSoon: (seconds) => `Saldrá de su cuenta en ${seconds} s por falta de uso.`,
+  idle: 'Salida automática',
   stay: 'Seguir conectado',
   notAllowed: 'Su función no permite abrir esta página.',
   save: 'Guardar',
@@ -154,9 +156,9 @@ export const es = {
     lastScans: 'Escaneos recientes', noScans: 'Aún no hay escaneos.', goScan: 'Ir a escanear',
     preview: 'Cámara', previewAlt: 'Imagen de la cámara',
     noPreview: 'La cámara no muestra nada en este momento.',
-    waiting: 'Pendiente de', nothingWaits: 'nada',
+    waiting: 'Borradores de referencia', nothingWaits: 'ninguno',
     waitingHint: 'Un físico planifica cada borrador y otro físico lo aprueba.',
-    waitingApproval: 'Pendiente de aprobación',
+    waitingPlan: 'Pendiente de plan:', waitingApproval: 'Pendiente de aprobación:',
     waitingVersion: (version) => `versión ${version}`,
   },
   patients: {
@@ -168,9 +170,10 @@ export const es = {
     isArchived: 'Este paciente está archivado y no se puede abrir para una sesión.',
     showArchived: 'Mostrar también los archivados', checkOverdue: 'control pendiente',
     reference: 'Referencia', approved: 'aprobada', noReference: 'ninguna',
-    waits: 'pendiente de aprobación', open: 'Sesión',
+    waits: 'pendiente de aprobación', waitsForPlan: 'pendiente de plan', open: 'Sesión',
     add: 'Añadir un paciente', codeHint: 'Un seudónimo: letras, cifras, . _ - (sin nombre)',
     siteHint: 'Por ejemplo, tórax', empty: 'Aún no hay pacientes.',
+    noMatch: (code) => `Ningún paciente con este código: ${code}.`,
     search: 'Buscar un código o leer la pulsera', isOpen: 'sesión abierta',
     openFraction: 'Iniciar sesión de tratamiento', openReference: 'Escanear una nueva referencia',
     reasonNeeded: 'Escriba por qué se toma una referencia nueva en lugar de la aprobada.',
@@ -227,6 +230,7 @@ export const es = {
       computer_too_slow: 'Se pierden imágenes. Barra más despacio.',
       no_markers: 'Muestre los marcadores a la cámara.',
     },
+    anotherPatient: 'Otro paciente:',
     ready: 'LISTO', noSession: 'SIN SESIÓN', sensorMissing: 'FALTA EL SENSOR', fault: 'FALLO',
     computing: 'CALCULANDO', press: 'Pulse el botón para empezar.',
     openOne: 'Abra un paciente en la página. Un escaneo ahora quedaría sin asignar.',
@@ -261,6 +265,8 @@ export const es = {
     supersededText: 'Hay un escaneo más nuevo. No actúe según este resultado.',
     closed: 'SESIÓN NO ABIERTA',
     closedText: 'La sesión de este paciente no está abierta. No actúe según este resultado.',
+    offline: 'SIN CONEXIÓN',
+    offlineText: 'No se sabe si este resultado sigue siendo válido. No actúe según él.',
     review: (when) => `Resultado del ${when}, para revisión.`,
     reviewText: 'No actúe según este resultado.', reviewTitle: 'REVISIÓN',
     unassigned: 'Escaneo sin asignar: no había ninguna sesión abierta.',
@@ -482,9 +488,11 @@ export const es = {
     title: 'Plan', reference: 'Referencia', region: 'Región de interés',
     regionHint: 'Pulse en el mapa para añadir vértices; arrastre un vértice para moverlo; Supr '
       + 'borra el elegido. Sin vértices, la región es el cuerpo hallado en el escaneo (perfilado).',
-    mapLabel: 'Mapa de alturas de la referencia con la región. Intro añade un vértice en el '
-      + 'centro, N elige el siguiente, las flechas lo mueven, Supr lo borra, U deshace. I elige el '
-      + 'isocentro, o pone uno en el centro de la región.',
+    mapLabel: 'Mapa de alturas de la referencia con la región. Las flechas mueven una cruz e '
+      + 'Intro añade allí un vértice. N elige el vértice siguiente: entonces las flechas lo '
+      + 'mueven, Supr lo borra y Esc vuelve a la cruz. U deshace. I elige el isocentro, o pone '
+      + 'uno en el centro de la región.',
+    crosshairAt: (x, y) => `Cruz: x ${x.toFixed(3)}; y ${y.toFixed(3)} m`.replaceAll('.', ','),
     isocentreAt: (x, y, z) => `Isocentro: x ${x.toFixed(3)}; y ${y.toFixed(3)}; z ${z.toFixed(3)}`
       .replaceAll('.', ',').concat(' m'),
     isocentreGone: 'Sin isocentro: el centro de la región.',
@@ -512,12 +520,18 @@ export const es = {
       + 'guardar. Recargue la página para verlo.',
     reloaded: 'Otra persona ha cambiado el plan; esto es lo guardado ahora.',
     save: 'Guardar el plan', approve: 'Aprobar', undo: 'Deshacer',
+    deleteCorner: 'Borrar el vértice',
+    unplanned: 'Nadie ha planificado aún esta referencia. Guarde su plan, aunque no haya nada que '
+      + 'cambiar; después podrá aprobarla un segundo físico.',
+    secondPerson: 'Pendiente de un segundo físico: usted escaneó o planificó esta referencia, así '
+      + 'que la aprueba otra persona.',
     approveHint: 'Aprueba un segundo físico. Después esta versión no se puede cambiar.',
     approvedHint: 'Esta versión está aprobada y no se puede cambiar. Guardar crea una versión '
       + 'nueva.',
     unsaved: 'Hay cambios sin guardar. Guárdelos antes de la aprobación.',
     leave: 'Hay cambios sin guardar. ¿Salir sin guardar?',
-    draftKept: 'Se conservaron sus cambios anteriores sin guardar.',
+    draftKept: 'Se conservaron sus cambios anteriores sin guardar.', discardDraft: 'Descartar',
+    draftDiscarded: 'Los cambios conservados se han descartado.',
     summary: 'Usted firma exactamente esto', summarySubmit: 'Firmar y aprobar',
     summaryReview: 'Revisar y aprobar', signature: 'Suma de control',
     scanQuality: 'Calidad del escaneo', made: 'Escaneado por', planned: 'Planificado por',
@@ -547,7 +561,10 @@ export const es = {
     detail: 'Detalle', more: 'Entradas anteriores', empty: 'Ninguna entrada.', filter: 'Filtrar',
     filterHint: 'Busca en las entradas de abajo; cargue las anteriores para buscarlas también.',
     shown: (found, all) => `${found} de ${all} ${plural(all, 'entrada', 'entradas')}`,
-    csv: 'Descargar como CSV',
+    csv: 'Descargar como CSV', whole: 'Descargar el registro entero',
+    wholeHint: 'El archivo CSV contiene lo que se muestra aquí. El registro entero contiene cada '
+      + 'entrada tal como se guardó, con su suma de control: plumb verify-log dice si se cambió '
+      + 'alguna.',
     users: { button: 'el botón', 'control socket': 'el socket de control' },
     views: 'Mostrar también quién consultó qué', yes: 'sí', no: 'no',
     unassigned: 'Escaneo sin asignar',
@@ -572,6 +589,7 @@ export const es = {
       'view.scans': 'Lista de escaneos consultada',
       'view.camera': 'Imagen de la cámara consultada',
       'view.log': 'Registro consultado',
+      'download.log': 'Registro descargado',
       'download.report': 'Informe descargado',
       'download.course_report': 'Resumen del tratamiento descargado',
       'download.numbers': 'Valores descargados',
@@ -617,6 +635,8 @@ export const es = {
       'display.remove': 'Pantalla quitada',
       'settings.change': 'Ajustes cambiados',
       'backup.make': 'Copia hecha',
+      'backup.restore': 'Copia restaurada',
+      'storage.recovered': 'Almacenamiento utilizable de nuevo',
       'certificate.replace': 'Certificado de la página sustituido',
       'certificate.new': 'Nuevo certificado autofirmado de la página',
       'diagnostics.write': 'Diagnóstico descargado',

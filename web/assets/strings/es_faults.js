@@ -47,6 +47,8 @@ export const kFaultWords = {
   'this plan has been changed by somebody else meanwhile: look at it again':
     'otra persona ha cambiado este plan entretanto: mírelo de nuevo',
   'there is no such reference': 'no existe esa referencia',
+  'nobody has planned this reference: save its plan first':
+    'nadie ha planificado esta referencia: guarde antes su plan',
   'this reference is approved already': 'esta referencia ya está aprobada',
   'what is stored is not what was shown: look at the reference again':
     'lo guardado no es lo que se mostró: mire la referencia de nuevo',
@@ -148,19 +150,20 @@ export const kFaultWords = {
     'no se conoce ningún escaneo con este número: ¿es de otra base de datos?',
   'it is complete, but its scan was never noted as done':
     'está completa, pero su escaneo nunca se anotó como terminado',
-  // States of the appliance, in refusals.
-  ready: 'listo', scanning: 'escaneando', working: 'calculando',
+  'name a folder on another disk, such as one that is mounted at /var/lib/plumb-backup':
+    'indique una carpeta de otro disco, como uno montado en /var/lib/plumb-backup',
+  'a scan is running or being computed: wait for its result':
+    'hay un escaneo en curso o calculándose: espere su resultado',
 };
 
 export const kFaultPatterns = [
-  ['^in state (\\w+), trying to (?:update|restart the machine|begin a check|close the session), '
-    + 'requires that no scan runs: wait for its result$',
-  'hay un escaneo en curso ($1): espere su resultado'],
   ['^there is a patient with the code (\\S+) already: choose another code \\(capital and small '
     + 'letters count as the same\\)$',
   'ya hay un paciente con el código $1: elija otro (mayúsculas y minúsculas cuentan igual)'],
   ['^too many wrong passwords; wait (\\d+) seconds$',
     'demasiadas contraseñas incorrectas; espere $1 segundos'],
+  ['^too many wrong setup codes; wait (\\d+) seconds$',
+    'demasiados códigos de instalación incorrectos; espere $1 segundos'],
   ['^the scan of this reference is not as it was stored: (.+); put a backup of its files in their '
     + 'place, or scan again$',
   'el escaneo de esta referencia no está como se guardó: $1; ponga una copia de sus archivos en '
@@ -170,6 +173,28 @@ export const kFaultPatterns = [
     + 'wanted$',
   'el disco está lleno: quedan $1 MB y un escaneo puede necesitar $2; borre escaneos que no hagan '
     + 'falta'],
+  ['^The approved references of some patients \\((\\d+)\\) cannot be used, because their files are '
+    + 'missing or changed: put the files back from a backup, or scan and approve new '
+    + 'references\\.?$',
+  'No se pueden usar las referencias aprobadas de algunos pacientes ($1), porque sus archivos '
+    + 'faltan o han cambiado: recupérelos de una copia de seguridad, o escanee y apruebe '
+    + 'referencias nuevas.'],
+  ['^Files of some stored scans \\((\\d+)\\) are missing or changed: put them back from a backup, '
+    + 'or remove these scans\\. The log names them\\.?$',
+  'Faltan o han cambiado archivos de algunos escaneos guardados ($1): recupérelos de una copia de '
+    + 'seguridad o borre esos escaneos. El registro los nombra.'],
+  ['^the folder of the scans (.+) is not the one that was opened: if its disk is not mounted any '
+    + 'more, mount it again$',
+  'la carpeta de los escaneos $1 no es la que se abrió: si su disco ya no está montado, vuelva a '
+    + 'montarlo'],
+  ['^no backup is made at (.+): this folder of plumbd is visible to its service only and is '
+    + 'deleted with it; (.+)$',
+  'no se hace ninguna copia en $1: solo el servicio de plumbd ve esta carpeta, que se borra con '
+    + 'él; $2'],
+  ['^no backup is made at (.+): this folder lies in memory and is empty after a restart of the '
+    + 'machine; (.+)$',
+  'no se hace ninguna copia en $1: esta carpeta está en la memoria y queda vacía al reiniciar el '
+    + 'equipo; $2'],
   ['^the disk is too full: (\\d+) MB are free$', 'el disco está demasiado lleno: quedan $1 MB'],
   ['^cannot write to (.+): (.+); check the disk, make it writable and start plumbd again$',
     'no se puede escribir en $1: $2; revise el disco, permita escribir en él y reinicie plumbd'],
