@@ -211,7 +211,7 @@ class Appliance {
 
   /// Why nothing can be stored.
   enum class StorageFault {
-    kMayEnd,  ///< As a disk that is read-only or not mounted, or too many open files.
+    kMayEnd,  ///< As a disk that is read-only or not mounted.
     kDamage,  ///< Of the database: somebody has to restore a backup and start plumbd again.
   };
 
@@ -278,6 +278,7 @@ class Appliance {
                                                     std::error_code& error) const;
   [[nodiscard]] int KeepWithinRoom(const std::stop_token& stop);
   [[nodiscard]] std::uint64_t NeededBytes() const;
+  [[nodiscard]] Answer WhyFull() const;
   [[nodiscard]] Answer WhyNoSpace() const;
   [[nodiscard]] std::vector<std::string> StorageWarnings() const;
   [[nodiscard]] double UsedShare() const;
@@ -314,6 +315,7 @@ class Appliance {
   std::chrono::steady_clock::time_point storage_works_since_;
   UnusableRecords unusable_;
   bool is_unusable_due_ = true;          ///< To be counted again.
+  bool is_quota_useful_ = true;          ///< On the store's thread.
   std::string record_fault_;             ///< That the audit log is not as it was written.
   bool is_database_checked_ = false;     ///< Once it is open, the check thread's.
   bool backup_is_beside_scans_ = false;  ///< The last one to the configured folder.

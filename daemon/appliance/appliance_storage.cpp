@@ -121,13 +121,13 @@ void Appliance::EnterSafeMode(const std::string& what, StorageFault kind) {
 void Appliance::ArmStorageRetry() {
   if (storage_fault_kind_ == StorageFault::kDamage || !parts_.configuration_fault.empty() ||
       parts_.storage_retries.empty())
-    return;
+    return storage_timer_.Disarm();
   const std::size_t last = parts_.storage_retries.size() - 1;
   storage_timer_.ArmAfter(parts_.storage_retries[std::min(num_storage_retries_++, last)]);
 }
 
 void Appliance::RetryStorage() {
-  if (storage_fault_.empty() || stopped_) return;
+  if (storage_fault_.empty() || storage_fault_kind_ == StorageFault::kDamage || stopped_) return;
   if (IsRunning()) return ArmStorageRetry();  // a scan that is being cancelled ends first
   return is_store_open_ ? ProbeStore() : ReopenStore();
 }
@@ -142,16 +142,20 @@ void Appliance::ProbeStore() {
   } catch (const std::exception& error) {
     return EndRetry(error.what());
   }
-  const bool posted = store_thread_.Post([this, fault = storage_fault_] {
-    std::string what;
-    try {
-      store_->CheckWritable();
-      store_->audit.Log(kSelf, "storage.recovered", "", fault);
-    } catch (const std::exception& error) {
-      what = error.what();
-    }
-    loop_.Post("storage retry", [this, what] { EndRetry(what); });
-  });
+  const bool posted =
+      store_thread_.Post([this, fault = storage_fault_, has_session = !session_id_.empty()] {
+        std::string what;
+        try {
+          store_->CheckWritable();
+          // What could not be written while the fault lasted: the ends of scans and of sessions.
+          FailInterruptedScans(*store_->database().ForChanges());
+          if (!has_session) store_->treatments.CloseAll(kSelf);
+          store_->audit.Log(kSelf, "storage.recovered", "", fault);
+        } catch (const std::exception& error) {
+          what = error.what();
+        }
+        loop_.Post("storage retry", [this, what] { EndRetry(what); });
+      });
   if (!posted) EndRetry(storage_fault_);
 }
 
@@ -175,6 +179,7 @@ void Appliance::ReopenStore() {
     }
     loop_.Post("storage retry", [this, opened, what, kind] {
       if (!*opened) return EndRetry(what, kind);
+      if (storage_fault_kind_ == StorageFault::kDamage) return;  // found meanwhile
       try {
         UseStore(std::move(*opened));
       } catch (const std::exception& error) {
@@ -263,16 +268,22 @@ std::uint64_t Appliance::NeededBytes() const {
   return static_cast<std::uint64_t>(bytes);
 }
 
-/// Why no scan can be stored now; empty if one can.
-Appliance::Answer Appliance::WhyNoSpace() const {
+/// Why the disk has no room for a scan; empty if it has. @throws IoError if the settings cannot be
+/// read
+Appliance::Answer Appliance::WhyFull() const {
   const auto space = SpaceForScans();
   if (!space) return {};  // a disk that cannot be examined is reported elsewhere
+  const std::uint64_t needed = NeededBytes();
+  if (space->available >= needed) return {};
+  return fmt::format(
+      "the disk is full: {} MB are free, a scan may need {}; remove scans that are not wanted",
+      space->available / 1'000'000, needed / 1'000'000);
+}
+
+/// Why no scan can be stored now; empty if one can.
+Appliance::Answer Appliance::WhyNoSpace() const {
   try {
-    const std::uint64_t needed = NeededBytes();
-    if (space->available >= needed) return {};
-    return fmt::format(
-        "the disk is full: {} MB are free, a scan may need {}; remove scans that are not wanted",
-        space->available / 1'000'000, needed / 1'000'000);
+    return WhyFull();
   } catch (const std::exception& failure) {
     return fmt::format("no scan can begin: {}", failure.what());
   }
@@ -284,7 +295,12 @@ void Appliance::WatchSpace() {
   if (IsRunning() || state_.phase == ScanPhase::kResult || state_.fault == FaultKind::kScan ||
       !storage_fault_.empty())
     return;
-  const Answer why = WhyNoSpace();
+  Answer why;
+  try {
+    why = WhyFull();
+  } catch (const std::exception&) {
+    return;  // told by the status, which reads the same settings
+  }
   const bool has_changed = why.empty() != space_fault_.empty();
   space_fault_ = why;
   if (has_changed) {
@@ -406,11 +422,25 @@ void Appliance::RunMaintenance() {
   if (!posted) Log(LogLevel::kWarning, "the store is too busy to remove old scans now");
 }
 
-/// Without a configured quota; on the store's thread.
+/// Without a configured quota; on the store's thread. Where it frees nothing it is not tried again:
+/// each time would cost another scan.
 int Appliance::KeepWithinRoom(const std::stop_token& stop) {
+  if (!is_quota_useful_) return 0;
   std::error_code error;
-  const std::filesystem::space_info space = SpaceOf(store_->folders.scans(), error);
-  return error ? 0 : store_->removal.KeepWithinRoom(space.available, stop);
+  const auto free_bytes = [&]() -> std::uint64_t {
+    const std::filesystem::space_info space = SpaceOf(store_->folders.scans(), error);
+    return error ? 0 : space.available;
+  };
+  (void)free_bytes();
+  if (error) return 0;
+  const StoreRemoval::Room room = store_->removal.KeepWithinRoom(free_bytes, stop);
+  is_quota_useful_ = room.has_helped;
+  if (!is_quota_useful_)
+    Log(LogLevel::kError,
+        "the disk is nearly full, and the removal of an old scan freed nothing: a backup on the "
+        "same disk may hold its files, or another program fills the disk. No more scans are "
+        "removed for the quota until the next start");
+  return room.num_removed;
 }
 
 /// Verifies the audit log once a day, off the loop: its chain of digests protects nothing unless

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
+#include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
 #include "daemon/appliance/report_pictures.hpp"
 #include "daemon/appliance/report_words.hpp"
@@ -409,9 +410,15 @@ std::vector<std::string> CautionsOf(const ReportSources& stored, const web::Scan
 std::optional<std::string> ComparisonPng(const ReportSources& stored, const web::Scan& scan,
                                          web::ComparisonPicture picture, Language language) {
   if (!scan.result) return std::nullopt;
-  const std::vector<cv::Mat> pictures =
-      PicturesOf(stored, scan, stored.references.Find(scan.reference_id),
-                 JsonIn(scan.folder / "result/result.json"), WordsOf(language));
+  std::vector<cv::Mat> pictures;
+  try {
+    pictures = PicturesOf(stored, scan, stored.references.Find(scan.reference_id),
+                          JsonIn(scan.folder / "result/result.json"), WordsOf(language));
+  } catch (const IoError&) {  // a record that cannot be read: the stored picture has to do
+    return std::nullopt;
+  } catch (const DataError&) {
+    return std::nullopt;
+  }
   const auto wanted = static_cast<std::size_t>(picture);
   if (wanted >= pictures.size()) return std::nullopt;
   const std::vector<std::uint8_t> png = EncodePng(pictures[wanted]);

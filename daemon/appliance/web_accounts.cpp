@@ -32,6 +32,11 @@ void WebAccounts::ChangeUser(const web::Actor& actor, const web::UserChange& cha
                 [=](UserStore& users) { users.Change(actor, change); });
 }
 
+web::Preferences WebAccounts::PreferencesOf(const std::string& name) {
+  return store_.ReadOrNothing(&Store::users,
+                              [&](UserStore& users) { return users.PreferencesOf(name); });
+}
+
 void WebAccounts::SetPreferences(const web::Actor& actor, const web::Preferences& preferences,
                                  web::Done done) {
   store_.Change(&Store::users, std::move(done),

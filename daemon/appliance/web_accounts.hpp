@@ -18,6 +18,7 @@ class WebAccounts : public web::AccountService {
   [[nodiscard]] std::optional<web::User> FindUser(const std::string& name) override;
   void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;
   void ChangeUser(const web::Actor& actor, const web::UserChange& change, web::Done done) override;
+  [[nodiscard]] web::Preferences PreferencesOf(const std::string& name) override;
   void SetPreferences(const web::Actor& actor, const web::Preferences& preferences,
                       web::Done done) override;
 

@@ -83,12 +83,13 @@ std::optional<std::string> WebScans::PictureOf(const std::string& scan_id,
                                                web::Language language) {
   return store_.Read([&](Store& store) -> std::optional<std::string> {
     const std::optional<web::Scan> scan = store.scans.Find(scan_id);
-    if (!scan) return std::nullopt;
+    if (!scan || scan->folder.empty()) return std::nullopt;
     if (auto png = FindDrawn(scan_id, picture, language)) return png;
     std::optional<std::string> png = ComparisonPng(SourcesIn(store), *scan, picture, language);
     if (!png) return std::nullopt;
     constexpr std::size_t kMaxDrawn = 4;  // both pictures in both languages
     const std::lock_guard lock(drawn_mutex_);
+    std::erase_if(drawn_, [&](const Drawn& one) { return !store.scans.Find(one.scan_id); });
     drawn_.push_front({scan_id, picture, language, *png});
     if (drawn_.size() > kMaxDrawn) drawn_.pop_back();
     return png;

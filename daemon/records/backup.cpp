@@ -15,6 +15,7 @@
 
 #include "algo/base/check_stop.hpp"
 #include "algo/base/errors.hpp"
+#include "algo/base/utf8.hpp"
 #include "daemon/records/audit_store.hpp"
 #include "daemon/records/database.hpp"
 #include "daemon/records/file_copy.hpp"
@@ -273,7 +274,7 @@ BackupReport RestoreBackup(const fs::path& backup, const fs::path& state,
     }
     for (const fs::directory_entry& scan : fs::directory_iterator(made / kScans))
       report.scans += scan.is_directory() ? 1 : 0;
-    WriteWholeFile(made / kRestored, nlohmann::ordered_json{{"backup", backup.string()},
+    WriteWholeFile(made / kRestored, nlohmann::ordered_json{{"backup", ValidUtf8(backup.string())},
                                                             {"sha256", reader.digest()},
                                                             {"scans", report.scans},
                                                             {"time", store::Now()}}

@@ -104,12 +104,10 @@ std::vector<web::WaitingReference> ReferenceStore::Waiting() {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare(
       "SELECT refs.id, patient_id, code, version, planned_by FROM refs JOIN patients ON "
-      "patients.id = "
-      "patient_id WHERE archived = 0 AND approved_by = '' AND version > (SELECT "
-      "ifnull(max(version), 0) FROM refs "
-      "AS r WHERE r.patient_id = refs.patient_id AND r.approved_by <> '') AND NOT EXISTS (SELECT 1 "
-      "FROM refs AS newer WHERE newer.patient_id = refs.patient_id AND newer.version > "
-      "refs.version) ORDER BY refs.id DESC LIMIT 20");
+      "patients.id = patient_id WHERE archived = 0 AND approved_by = '' AND version > (SELECT "
+      "ifnull(max(version), 0) FROM refs AS r WHERE r.patient_id = refs.patient_id AND "
+      "r.approved_by <> '') AND NOT EXISTS (SELECT 1 FROM refs AS newer WHERE newer.patient_id = "
+      "refs.patient_id AND newer.version > refs.version) ORDER BY refs.id DESC LIMIT 20");
   std::vector<web::WaitingReference> waiting;
   while (query.Step()) {
     waiting.push_back({.reference_id = query.Text(0),

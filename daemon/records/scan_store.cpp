@@ -155,8 +155,8 @@ int ScanStore::CountSince(const std::string& patient_id, web::WallClock::time_po
 
 std::optional<std::string> ScanStore::NewestWithFiles() {
   const StoreDatabase::Held rows = database_.ForRows();
-  Statement query = rows->Prepare(
-      "SELECT id FROM scans WHERE has_folder = 1 AND unavailable = '' ORDER BY id DESC LIMIT 1");
+  Statement query =
+      rows->Prepare("SELECT id FROM scans WHERE has_folder = 1 ORDER BY id DESC LIMIT 1");
   return query.Step() ? std::optional(ScanId(query.Integer(0))) : std::nullopt;
 }
 

@@ -57,7 +57,7 @@ class ScanStore {
   [[nodiscard]] std::optional<web::Scan> Find(const std::string& id);
   /// Completed scans of a patient.
   [[nodiscard]] int CountSince(const std::string& patient_id, web::WallClock::time_point since);
-  /// The newest scan whose files could be used when they were last looked at.
+  /// The newest scan that was stored with files.
   [[nodiscard]] std::optional<std::string> NewestWithFiles();
   /// Surface seen by a scan's sweep; 0 if unknown.
   [[nodiscard]] double SweptArea(const std::string& scan_id);

@@ -191,10 +191,16 @@ UPDATE scans SET accepted_at = (SELECT MAX(time) FROM audit WHERE subject = prin
   AND action IN ('scan.accept', 'scan.accept_outside')) WHERE accepted_by <> '';
 )sql";
 
-// What each person chose of the page; empty: nothing yet.
+// What each person chose of the page. Drafts that nobody has planned say so: earlier versions named
+// who had scanned them.
 constexpr const char* kVersion9 = R"sql(
-ALTER TABLE users ADD COLUMN language TEXT NOT NULL DEFAULT '';
-ALTER TABLE users ADD COLUMN theme TEXT NOT NULL DEFAULT '';
+CREATE TABLE preferences (
+  user TEXT PRIMARY KEY REFERENCES users(name) ON DELETE CASCADE,
+  language TEXT NOT NULL,
+  theme TEXT NOT NULL
+) STRICT;
+UPDATE refs SET planned_by = '' WHERE approved_by = '' AND revision = 1
+  AND reason NOT LIKE 'new plan of version %';
 )sql";
 
 constexpr std::array<const char*, kSchemaVersion> kSteps = {kVersion1, kVersion2, kVersion3,

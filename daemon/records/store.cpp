@@ -40,9 +40,8 @@ void RequireWritable(const fs::path& folder) {
   }
   if (reason == 0 || reason == ENOSPC || reason == EDQUOT || reason == EMFILE || reason == ENFILE)
     return;
-  throw DiskRefused(
-      fmt::format("cannot write to {}: {}; check the disk, make it writable and start plumbd again",
-                  folder.string(), std::strerror(reason)));
+  throw DiskRefused(fmt::format("cannot write to {}: {}; check the disk and make it writable",
+                                folder.string(), std::strerror(reason)));
 }
 
 /// scans/ may be a disk of its own.
@@ -150,7 +149,7 @@ std::string Store::WhyOtherScans() {
   }
   return fmt::format(
       "the folder of the scans {} is not the one that was opened: if its disk is not mounted any "
-      "more, mount it again",
+      "more, mount it again; if this is the right one, start plumbd again",
       folders.scans().string());
 }
 

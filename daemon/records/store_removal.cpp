@@ -139,8 +139,8 @@ bool StoreRemoval::ForgetScan(const std::string& scan_id, const char* why) {
     StoreChange change(database_);
     change
         .Prepare(
-            "DELETE FROM scans WHERE id = ? AND outcome <> 'running' AND unavailable = '' AND id "
-            "NOT IN (SELECT scan_id FROM refs)")
+            "DELETE FROM scans WHERE id = ? AND outcome <> 'running' AND id NOT IN (SELECT scan_id "
+            "FROM refs)")
         .Bind(ParseId(scan_id))
         .Run();
     if (change.num_changed() == 0) return false;
@@ -150,6 +150,21 @@ bool StoreRemoval::ForgetScan(const std::string& scan_id, const char* why) {
   }
   RemoveFiles(scan_id);
   return true;
+}
+
+/// Takes those out whose files were stored and cannot be seen now: removing them frees nothing, and
+/// their files may be back. One whose files have only changed is as old as any other.
+void StoreRemoval::LeaveOutOfSight(std::vector<std::string>& scan_ids) {
+  std::vector<std::string> unavailable;
+  {
+    const StoreDatabase::Held writer = database_.ForChanges();
+    unavailable = ScansOf(writer->Prepare("SELECT id FROM scans WHERE unavailable <> ''"));
+  }
+  std::erase_if(scan_ids, [&](const std::string& id) {
+    std::error_code ignored;
+    return std::ranges::find(unavailable, id) != unavailable.end() &&
+           !fs::exists(folders_.Scan(id), ignored);
+  });
 }
 
 int StoreRemoval::RemoveOldScans(int retention_days, const std::stop_token& stop) {
@@ -162,12 +177,12 @@ int StoreRemoval::RemoveOldScans(int retention_days, const std::stop_token& stop
     // in the future are wrong.
     Statement query = writer->Prepare(
         "SELECT id FROM (SELECT id, outcome, max(CASE WHEN started_at <= ? THEN started_at ELSE 0 "
-        "END) OVER (ORDER BY id) AS since"
-        ", unavailable FROM scans) WHERE outcome <> 'running' AND unavailable = '' AND since < ? "
-        "AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id");
+        "END) OVER (ORDER BY id) AS since FROM scans) WHERE outcome <> 'running' AND since < ? AND "
+        "id NOT IN (SELECT scan_id FROM refs) ORDER BY id");
     query.Bind(ToStored(now)).Bind(ToStored(now - std::chrono::hours(24) * retention_days));
     old = ScansOf(std::move(query));
   }
+  LeaveOutOfSight(old);
   int num_removed = 0;
   for (const std::string& scan : old) {
     if (stop.stop_requested()) break;
@@ -197,28 +212,40 @@ std::uint64_t DefaultQuota(std::uint64_t scan_bytes, std::uint64_t free_bytes) {
 }
 
 int StoreRemoval::KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop) {
-  return RemoveOldest(BytesOf(folders_.scans(), stop), max_bytes, stop);
+  return RemoveOldest(
+      BytesOf(folders_.scans(), stop), max_bytes, [] { return true; }, stop);
 }
 
-int StoreRemoval::KeepWithinRoom(std::uint64_t free_bytes, const std::stop_token& stop) {
+StoreRemoval::Room StoreRemoval::KeepWithinRoom(const std::function<std::uint64_t()>& free_bytes,
+                                                const std::stop_token& stop) {
   const std::uint64_t bytes = BytesOf(folders_.scans(), stop);
-  return RemoveOldest(bytes, DefaultQuota(bytes, free_bytes), stop);
+  std::uint64_t free = free_bytes();
+  Room room;
+  const auto has_helped = [&] {
+    const std::uint64_t before = std::exchange(free, free_bytes());
+    room.has_helped = free > before;
+    return room.has_helped;
+  };
+  room.num_removed = RemoveOldest(bytes, DefaultQuota(bytes, free), has_helped, stop);
+  return room;
 }
 
-/// Scans whose files cannot be seen stay: removing them frees nothing, and their files may be back.
+/// @param has_helped  Asked after each removal: false ends it.
 int StoreRemoval::RemoveOldest(std::uint64_t bytes, std::uint64_t max_bytes,
+                               const std::function<bool()>& has_helped,
                                const std::stop_token& stop) {
   if (bytes <= max_bytes) return 0;
   int num_touched = 0;
   std::vector<std::string> all, removable;
   {
     const StoreDatabase::Held writer = database_.ForChanges();
-    all = ScansOf(writer->Prepare(
-        "SELECT id FROM scans WHERE has_folder = 1 AND unavailable = '' ORDER BY id"));
+    all = ScansOf(writer->Prepare("SELECT id FROM scans WHERE has_folder = 1 ORDER BY id"));
     removable =
-        ScansOf(writer->Prepare("SELECT id FROM scans WHERE has_folder = 1 AND unavailable = '' "
+        ScansOf(writer->Prepare("SELECT id FROM scans WHERE has_folder = 1 "
                                 "AND id NOT IN (SELECT scan_id FROM refs) ORDER BY id"));
   }
+  LeaveOutOfSight(all);
+  LeaveOutOfSight(removable);
   for (const std::string& scan : all) {  // raw recordings are large, and nothing depends on them
     const fs::path recording = folders_.Scan(scan) / kRecordingFolder;
     std::error_code ignored;
@@ -226,6 +253,7 @@ int StoreRemoval::RemoveOldest(std::uint64_t bytes, std::uint64_t max_bytes,
     bytes -= std::min(bytes, BytesOf(recording, stop));
     ForgetRecording(scan);
     ++num_touched;
+    if (!has_helped()) return num_touched;
   }
   for (const std::string& scan : removable) {
     if (bytes <= max_bytes || stop.stop_requested()) break;
@@ -233,6 +261,7 @@ int StoreRemoval::RemoveOldest(std::uint64_t bytes, std::uint64_t max_bytes,
     if (!ForgetScan(scan, "quota")) continue;  // it has become a reference
     bytes -= std::min(bytes, its_bytes);
     ++num_touched;
+    if (!has_helped()) break;
   }
   return num_touched;
 }

@@ -3,9 +3,11 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "daemon/records/scan_folders.hpp"
 #include "daemon/records/scan_store.hpp"
@@ -61,11 +63,21 @@ class StoreRemoval {
   /// Removes the oldest recordings, then the oldest scans as above, until the scans take at most
   /// the given number of bytes. Returns how many scans lost something.
   int KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop = {});
-  /// The same, with DefaultQuota() of a disk on which so much is free.
-  int KeepWithinRoom(std::uint64_t free_bytes, const std::stop_token& stop = {});
+  struct Room {
+    int num_removed = 0;  ///< Scans that lost something.
+    /// False if the last removal freed nothing, as where a backup or a snapshot shares the blocks,
+    /// or another program takes all that becomes free: then no more was removed.
+    bool has_helped = true;
+  };
+  /// The same, with DefaultQuota() of the disk.
+  /// @param free_bytes  Measures what is free on it.
+  Room KeepWithinRoom(const std::function<std::uint64_t()>& free_bytes,
+                      const std::stop_token& stop = {});
 
  private:
-  int RemoveOldest(std::uint64_t bytes, std::uint64_t max_bytes, const std::stop_token& stop);
+  int RemoveOldest(std::uint64_t bytes, std::uint64_t max_bytes,
+                   const std::function<bool()>& has_helped, const std::stop_token& stop);
+  void LeaveOutOfSight(std::vector<std::string>& scan_ids);
   void RemoveFiles(const std::string& scan_id);
   void ForgetRecording(const std::string& scan_id);
   /// @param why  For the log. False if it has become a reference.

@@ -15,7 +15,7 @@ using web::ChangeResult;
 namespace {
 
 constexpr const char* kUserColumns =
-    "SELECT name, role, password_hash, disabled, created_at, language, theme FROM users ";
+    "SELECT name, role, password_hash, disabled, created_at FROM users ";
 
 /// An account whose role cannot be read is disabled, not left out: if no account were found, the
 /// page would offer to create the first one.
@@ -24,8 +24,7 @@ web::User ReadUser(const Statement& row) {
                  .role = web::Role::kTechnician,
                  .password_hash = row.Text(2),
                  .disabled = row.Integer(3) != 0,
-                 .created_at = FromStored(row.Integer(4)),
-                 .preferences = {.language = row.Text(5), .theme = row.Text(6)}};
+                 .created_at = FromStored(row.Integer(4))};
   try {
     user.role = store::ParseRole(row.Text(1));
   } catch (const DataError&) {
@@ -110,12 +109,19 @@ void UserStore::Change(const web::Actor& actor, const web::UserChange& wanted) {
   change.Commit();
 }
 
+web::Preferences UserStore::PreferencesOf(const std::string& name) {
+  const StoreDatabase::Held rows = database_.ForRows();
+  Statement query = rows->Prepare("SELECT language, theme FROM preferences WHERE user = ?");
+  if (!query.Bind(name).Step()) return {};
+  return {.language = query.Text(0), .theme = query.Text(1)};
+}
+
 void UserStore::SetPreferences(const std::string& name, const web::Preferences& preferences) {
   StoreChange change(database_);
-  change.Prepare("UPDATE users SET language = ?, theme = ? WHERE name = ?")
+  change.Prepare("INSERT OR REPLACE INTO preferences (user, language, theme) VALUES (?, ?, ?)")
+      .Bind(name)
       .Bind(preferences.language)
       .Bind(preferences.theme)
-      .Bind(name)
       .Run();
   change.Commit();
 }

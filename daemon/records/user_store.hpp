@@ -21,6 +21,8 @@ class UserStore {
   void Add(const web::Actor& actor, const web::User& user);
   /// kConflict if no enabled engineer would be left.
   void Change(const web::Actor& actor, const web::UserChange& wanted);
+  /// Empty where none were chosen.
+  [[nodiscard]] web::Preferences PreferencesOf(const std::string& name);
   /// Without an entry in the log.
   void SetPreferences(const std::string& name, const web::Preferences& preferences);
 

@@ -429,8 +429,7 @@ void FakeAppliance::AddUser(const Actor& actor, const User& user, Done done) {
 }
 
 void FakeAppliance::SetPreferences(const Actor& actor, const Preferences& preferences, Done done) {
-  for (User& user : users)
-    if (user.name == actor.user) user.preferences = preferences;
+  preferences_[actor.user] = preferences;
   Finish(done, {});
 }
 

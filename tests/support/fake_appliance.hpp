@@ -205,6 +205,7 @@ class FakeAppliance : public web::BackgroundWork,
   std::optional<web::User> FindUser(const std::string& name) override;
   void AddUser(const web::Actor& actor, const web::User& user, web::Done done) override;
   void ChangeUser(const web::Actor& actor, const web::UserChange& change, web::Done done) override;
+  web::Preferences PreferencesOf(const std::string& name) override { return preferences_[name]; }
   void SetPreferences(const web::Actor& actor, const web::Preferences& preferences,
                       web::Done done) override;
   void Log(const web::Actor& actor, const std::string& action, const std::string& subject,
@@ -250,6 +251,7 @@ class FakeAppliance : public web::BackgroundWork,
   bool is_check_ = false;  ///< The next or running scan is a check.
   std::string checker_, patient_before_check_;
   int next_id_ = 1;
+  std::map<std::string, web::Preferences> preferences_;
   std::map<std::string, int> num_fractions_;
   std::map<std::string, web::TreatmentSession> sessions_;  ///< By id: all that were opened.
 };

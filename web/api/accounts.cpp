@@ -134,7 +134,12 @@ Accounts::Accounts(const Services& services, AccountOptions options)
 /// before they can.
 void Accounts::LookForAccounts() {
   accounts_fault_ = users_.WhyUnreadable();
-  if (accounts_fault_.empty() && users_.Users().empty()) setup_code_ = MakeSetupCode();
+  if (!accounts_fault_.empty()) return;
+  try {
+    if (users_.Users().empty()) setup_code_ = MakeSetupCode();
+  } catch (const std::exception& error) {
+    accounts_fault_ = error.what();
+  }
 }
 
 std::optional<std::string> Accounts::setup_code() const {
@@ -391,8 +396,7 @@ void Accounts::SetPreferences(const Request& request, const Respond& respond) {
 }
 
 void Accounts::DescribeSession(const Request& request, const Respond& respond) {
-  const auto user = users_.FindUser(request.session->user);
-  const Preferences chosen = user ? user->preferences : Preferences{};
+  const Preferences chosen = users_.PreferencesOf(request.session->user);
   const auto or_null = [](const std::string& text) {
     return text.empty() ? Json(nullptr) : Json(text);
   };

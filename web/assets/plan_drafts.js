@@ -2,7 +2,7 @@
 // what a person decides: saving, leaving without saving, logging out.
 import { currentSession } from './api.js';
 
-const prefixOf = (user) => `plumb-plan-${user}-`;
+const prefixOf = (user) => `plumb-plan-${user}/`;
 /// Another person's work is never shown, and none that was done on another revision.
 const keyOf = (reference) =>
   `${prefixOf(currentSession()?.user)}${reference.id}-${reference.revision}`;

@@ -28,12 +28,12 @@ export function preferences(who, changed) {
     .map(([name, texts]) => [name, texts.languageName]));
   const language = select(names, languageOf(who));
   const theme = select(S.themes, themeOf(who));
-  // Without a connection the choice holds in this browser only.
+  // Without a connection the choice holds until the account is asked again.
   const save = () => put('session/preferences', { language: language.value, theme: theme.value })
     .catch(() => {});
-  language.addEventListener('change', async () => {
+  language.addEventListener('change', () => {
     chooseLanguage(who, language.value);
-    await save();
+    save();
     changed();
   });
   theme.addEventListener('change', () => {

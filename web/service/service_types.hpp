@@ -307,7 +307,6 @@ struct User {
       password_hash;  ///< libsodium's argon2id string; leaves the service only for the login.
   bool disabled = false;
   WallClock::time_point created_at;
-  Preferences preferences = {};
 };
 
 /// Changes of an account; fields that are not set stay unchanged.

@@ -327,7 +327,7 @@ TEST_F(StoreRecoveryTest, AStoreOfVersion4KeepsScansThatItHadGivenUp) {
   {
     Database direct(state() / "plumb.db", Database::Access::kReadWrite);
     direct.Execute(
-        "ALTER TABLE users DROP COLUMN language; ALTER TABLE users DROP COLUMN theme; "
+        "DROP TABLE preferences; "
         "ALTER TABLE scans DROP COLUMN accepted_at; DROP TABLE room_calibrations; ALTER TABLE "
         "patients DROP COLUMN note; ALTER TABLE patients "
         "DROP COLUMN archived; DROP TABLE templates; DROP TABLE scan_files; DROP TABLE "

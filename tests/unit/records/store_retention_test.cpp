@@ -129,18 +129,22 @@ TEST_F(StoreTest, ScansWhoseFilesAreOutOfSightAreNeitherOldNorOverTheQuota) {
   const auto store = Open();
   const std::string patient = store->patients.Add(kAnna, "A", "");
   const std::string out_of_sight = Scan(*store, patient), in_sight = Scan(*store, patient);
+  const std::string changed = Scan(*store, patient);
   fs::create_directory(store->folders.Scan(out_of_sight) / "recording");
+  const fs::path elsewhere = folder_ / "elsewhere";
+  fs::rename(store->folders.Scan(out_of_sight), elsewhere);
   Database(database(), Database::Access::kReadWrite)
       .Execute(
           "UPDATE scans SET started_at = 0; UPDATE scans SET unavailable = 'it is missing' "
-          "WHERE id = " +
-          out_of_sight);
-  EXPECT_EQ(store->removal.RemoveOldScans(30), 1);
+          "WHERE id IN (" +
+          out_of_sight + ", " + changed + ")");
+  EXPECT_EQ(store->removal.RemoveOldScans(30), 2) << "a changed one is as old as any other";
   EXPECT_TRUE(store->scans.Find(out_of_sight));
   EXPECT_EQ(store->scans.Find(in_sight), std::nullopt);
+  EXPECT_EQ(store->scans.Find(changed), std::nullopt);
   EXPECT_EQ(store->removal.KeepWithinQuota(0), 0);
   EXPECT_TRUE(store->scans.Find(out_of_sight));
-  EXPECT_TRUE(fs::exists(store->folders.Scan(out_of_sight) / "recording"));
+  fs::rename(elsewhere, store->folders.Scan(out_of_sight));
   Database(database(), Database::Access::kReadWrite).Execute("UPDATE scans SET unavailable = ''");
   EXPECT_EQ(store->removal.KeepWithinQuota(0), 2) << "its recording and itself";
 }
@@ -164,17 +168,30 @@ TEST_F(StoreTest, WithoutAQuotaScansTakeNineTenthsOfTheRoomThatOtherFilesLeave) 
   EXPECT_EQ(DefaultQuota(1'000, 0), 900U);
   const auto store = Open();
   const std::string patient = store->patients.Add(kAnna, "A", "");
-  std::string first;
-  for (int i = 0; i < 9; ++i) {
-    const std::string scan = Scan(*store, patient);
-    WriteWholeFile(store->folders.Scan(scan) / "scene" / "scene.json", std::string(1000, '{'));
-    if (i == 0) first = scan;
-  }
-  EXPECT_EQ(store->removal.KeepWithinRoom(1'000), 0) << "9000 of 10000 bytes";
-  EXPECT_EQ(store->removal.KeepWithinRoom(999), 1) << "one byte less is free";
+  const auto add = [&](int count) {
+    for (int i = 0; i < count; ++i)
+      WriteWholeFile(store->folders.Scan(Scan(*store, patient)) / "scene" / "scene.json",
+                     std::string(1000, '{'));
+  };
+  add(9);
+  const std::string first = store->scans.List(patient, 100).back().id;
+  std::uint64_t free = 1'000;
+  const auto grows = [&] { return free++; };
+  EXPECT_EQ(store->removal.KeepWithinRoom(grows).num_removed, 0) << "9000 of 10000 bytes";
+  EXPECT_TRUE(store->scans.Find(first));
+  free = 999;
+  EXPECT_EQ(store->removal.KeepWithinRoom(grows).num_removed, 1) << "one byte less is free";
   EXPECT_EQ(store->scans.Find(first), std::nullopt);
-  EXPECT_EQ(store->removal.KeepWithinRoom(0), 1) << "another program has filled the disk";
-  EXPECT_EQ(store->scans.List(patient, 100).size(), 7U);
+  add(22);
+  free = 0;
+  const StoreRemoval::Room enough = store->removal.KeepWithinRoom(grows);
+  EXPECT_EQ(enough.num_removed, 3) << "27000 of 30000 bytes stay where another program fills it";
+  EXPECT_TRUE(enough.has_helped);
+  add(3);
+  const StoreRemoval::Room useless = store->removal.KeepWithinRoom([] { return 0U; });
+  EXPECT_EQ(useless.num_removed, 1) << "what it frees is gone at once, or was shared";
+  EXPECT_FALSE(useless.has_helped);
+  EXPECT_EQ(store->scans.List(patient, 100).size(), 29U);
 }
 
 }  // namespace

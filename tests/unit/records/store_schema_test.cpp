@@ -104,7 +104,7 @@ TEST_F(StoreTest, AStoreOfTheFirstVersionGetsItsChecks) {
   {
     Database direct(database(), Database::Access::kReadWrite);
     direct.Execute(
-        "ALTER TABLE users DROP COLUMN language; ALTER TABLE users DROP COLUMN theme; "
+        "DROP TABLE preferences; "
         "DROP TABLE room_calibrations; DROP TABLE check_baselines; DROP TABLE checks; ALTER TABLE "
         "refs DROP COLUMN revision; "
         "DROP INDEX scans_of_session; ALTER TABLE scans DROP COLUMN session_id; ALTER TABLE scans "
@@ -139,7 +139,7 @@ TEST_F(StoreTest, WhenAResultOfTheSchemaBeforeWasAcceptedIsTakenFromTheLog) {
   {
     Database direct(database(), Database::Access::kReadWrite);
     direct.Execute(
-        "ALTER TABLE users DROP COLUMN language; ALTER TABLE users DROP COLUMN theme; "
+        "DROP TABLE preferences; "
         "ALTER TABLE scans DROP COLUMN accepted_at; PRAGMA user_version = 7");
   }
   const auto store = Open();
@@ -152,7 +152,7 @@ TEST_F(StoreTest, PatientsOfTheSchemaBeforeArchivesKeepWhatTheyHad) {
   {
     Database direct(database(), Database::Access::kReadWrite);
     direct.Execute(
-        "ALTER TABLE users DROP COLUMN language; ALTER TABLE users DROP COLUMN theme; "
+        "DROP TABLE preferences; "
         "ALTER TABLE scans DROP COLUMN accepted_at; DROP TABLE room_calibrations; ALTER TABLE "
         "patients DROP COLUMN note; ALTER TABLE patients "
         "DROP COLUMN archived; DROP TABLE templates; PRAGMA user_version = 5");

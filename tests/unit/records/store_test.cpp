@@ -288,9 +288,9 @@ TEST_F(StoreTest, WhatAPersonChoseOfThePageStays) {
     store->users.SetPreferences("bert", {.language = "es", .theme = "light"});
   }
   const auto store = Open();
-  EXPECT_EQ(store->users.Find("bert")->preferences.language, "es");
-  EXPECT_EQ(store->users.Find("bert")->preferences.theme, "light");
-  EXPECT_EQ(store->users.Find("anna")->preferences.language, "");
+  EXPECT_EQ(store->users.PreferencesOf("bert").language, "es");
+  EXPECT_EQ(store->users.PreferencesOf("bert").theme, "light");
+  EXPECT_EQ(store->users.PreferencesOf("anna").language, "");
 }
 
 TEST_F(StoreTest, APasswordChangedMeanwhileDoesNotUndoWhatWasDoneToTheAccount) {

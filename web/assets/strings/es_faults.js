@@ -184,9 +184,9 @@ export const kFaultPatterns = [
   'Faltan o han cambiado archivos de algunos escaneos guardados ($1): recupérelos de una copia de '
     + 'seguridad o borre esos escaneos. El registro los nombra.'],
   ['^the folder of the scans (.+) is not the one that was opened: if its disk is not mounted any '
-    + 'more, mount it again$',
+    + 'more, mount it again; if this is the right one, start plumbd again$',
   'la carpeta de los escaneos $1 no es la que se abrió: si su disco ya no está montado, vuelva a '
-    + 'montarlo'],
+    + 'montarlo; si es la correcta, arranque plumbd de nuevo'],
   ['^no backup is made at (.+): this folder of plumbd is visible to its service only and is '
     + 'deleted with it; (.+)$',
   'no se hace ninguna copia en $1: solo el servicio de plumbd ve esta carpeta, que se borra con '
@@ -196,8 +196,8 @@ export const kFaultPatterns = [
   'no se hace ninguna copia en $1: esta carpeta está en la memoria y queda vacía al reiniciar el '
     + 'equipo; $2'],
   ['^the disk is too full: (\\d+) MB are free$', 'el disco está demasiado lleno: quedan $1 MB'],
-  ['^cannot write to (.+): (.+); check the disk, make it writable and start plumbd again$',
-    'no se puede escribir en $1: $2; revise el disco, permita escribir en él y reinicie plumbd'],
+  ['^cannot write to (.+): (.+); check the disk and make it writable$',
+    'no se puede escribir en $1: $2; revise el disco y permita escribir en él'],
   ['^nothing can be backed up in safe mode: (.+)$',
     'en modo seguro no se puede hacer ninguna copia: $1'],
   ['^the configuration cannot be used: (.+)\\. Correct the file, then restart: '
