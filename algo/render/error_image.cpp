@@ -20,7 +20,8 @@ constexpr Color kRegionHoleDark = {88, 43, 98};
 constexpr double kReliefStrength = 0.30;
 constexpr double kPaleOutside = 0.45;  // fraction of white outside the region
 
-/// A cell of the region without a value beside another one: one alone is noise of the grid.
+/// True for an unmeasured cell of the region that has an unmeasured neighbour there: single cells
+/// are sampling noise of the grid.
 bool IsHole(const HeightMap& difference, std::span<const std::uint8_t> region, int row,
             int column) {
   const auto is_missing = [&](int r, int c) {
@@ -58,7 +59,8 @@ cv::Mat ColoredCells(const HeightMap& difference, const ErrorImageOptions& optio
     for (int column = 0; column < cells.width; ++column) {
       const float e = difference.at(cells.y + row, cells.x + column);
       if (!std::isfinite(e)) {
-        // Hatched, so that more than its colour tells a hole from what was not measured elsewhere.
+        // Holes in the region are hatched, so that they can be told apart from other unmeasured
+        // cells without relying on colour.
         const bool is_hole =
             !options.region_mask.empty() &&
             IsHole(difference, options.region_mask, cells.y + row, cells.x + column);

@@ -13,8 +13,12 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/loop/log.hpp"
+#include "daemon/records/stored_values.hpp"
 
 namespace plumb {
+
+using store::kSelf;
+
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -22,7 +26,6 @@ using Json = nlohmann::json;
 using std::chrono::seconds;
 
 constexpr seconds kTick{1};
-const web::Actor kSelf{.user = "plumbd", .address = ""};
 const web::Actor kButton{.user = "button", .address = ""};
 
 }  // namespace

@@ -52,11 +52,10 @@ struct ApplianceParts {
   /// Longest check of the whole database at the start. A larger one is checked while the appliance
   /// already works.
   std::chrono::milliseconds check_limit = StoreOptions().check_limit;
-  /// Pauses before safe mode is tried to be left, each time it could not be; the last one is
-  /// repeated.
+  /// Pauses between the attempts to leave safe mode; the last one is repeated.
   std::vector<std::chrono::milliseconds> storage_retries = {
       std::chrono::seconds(10), std::chrono::seconds(60), std::chrono::seconds(300)};
-  /// Room on the disk of a folder. Empty: as the system says.
+  /// Measures the room on the disk of a folder. Empty: asks the system.
   std::function<std::filesystem::space_info(const std::filesystem::path&, std::error_code&)> space =
       {};
 };
@@ -170,6 +169,8 @@ class Appliance {
     return parts_.config.appliance.state;
   }
   [[nodiscard]] const std::string& storage_fault() const { return storage_fault_; }
+  /// Attempts to leave safe mode that were armed since it began.
+  [[nodiscard]] std::size_t num_storage_retries() const { return num_storage_retries_; }
   [[nodiscard]] std::optional<Frame> LatestFrame() const { return sensors_->latest(); }
   /// Surface of the running sweep; null if there is none or nothing has been seen yet.
   [[nodiscard]] std::shared_ptr<const LiveSurfaceView> SurfaceSoFar() const {
@@ -211,13 +212,13 @@ class Appliance {
 
   /// Why nothing can be stored.
   enum class StorageFault {
-    kMayEnd,  ///< As a disk that is read-only or not mounted.
-    kDamage,  ///< Of the database: somebody has to restore a backup and start plumbd again.
+    kMayEnd,  ///< For example, a disk is read-only or not mounted.
+    kDamage,  ///< The database is damaged: somebody has to restore a backup and restart plumbd.
   };
 
   void OpenStore();
   [[nodiscard]] std::unique_ptr<Store> OpenForWork(const std::filesystem::path& state,
-                                                   std::chrono::milliseconds lock_wait) const;
+                                                   StoreOptions options) const;
   void UseStore(std::unique_ptr<Store> store);
   void EnterSafeMode(const std::string& what, StorageFault kind);
   void ArmStorageRetry();
@@ -309,13 +310,13 @@ class Appliance {
   CurrentStore store_;
   std::string storage_fault_, backup_fault_;
   StorageFault storage_fault_kind_ = StorageFault::kMayEnd;
-  std::string space_fault_;     ///< That no scan can be stored, of a store that works.
+  std::string space_fault_;     ///< Why no scan can be stored although the store works.
   bool is_store_open_ = false;  ///< For changes; otherwise it is read-only, or there is none.
   std::size_t num_storage_retries_ = 0;
   std::chrono::steady_clock::time_point storage_works_since_;
   UnusableRecords unusable_;
   bool is_unusable_due_ = true;          ///< To be counted again.
-  bool is_quota_useful_ = true;          ///< On the store's thread.
+  bool is_quota_useful_ = true;          ///< Removals have freed space; for the store's thread.
   std::string record_fault_;             ///< That the audit log is not as it was written.
   bool is_database_checked_ = false;     ///< Once it is open, the check thread's.
   bool backup_is_beside_scans_ = false;  ///< The last one to the configured folder.

@@ -229,8 +229,8 @@ class Plumbd {
     certificate_timer_.ArmAfter(std::chrono::hours(1));
   }
 
-  /// Once, and not in safe mode, where nobody can make the first account. Under systemd the
-  /// standard output goes to the journal.
+  /// Prints the setup code once, as soon as the first account can be created, which is impossible
+  /// in safe mode. Under systemd, standard output goes to the journal.
   void ShowSetupCode() {
     const std::optional<std::string> code = http_.setup_code();
     if (has_shown_code_ || !code || !appliance_.storage_fault().empty()) return;

@@ -8,11 +8,11 @@
 #include <nlohmann/json.hpp>
 
 #include "algo/base/bounded_json.hpp"
-#include "algo/base/errors.hpp"
 #include "algo/base/units.hpp"
 #include "daemon/appliance/report_pictures.hpp"
 #include "daemon/appliance/report_words.hpp"
 #include "daemon/config/version.hpp"
+#include "daemon/loop/log.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
 #include "web/api/local_time.hpp"
@@ -181,7 +181,7 @@ std::optional<std::size_t> AxisNamed(const std::string& name) {
   return static_cast<std::size_t>(found - kNames.begin());
 }
 
-/// What the comparison could not rely on.
+/// Adds what the comparison could not rely on.
 void AddComparisonTo(std::vector<std::string>& cautions, const Json& result, Language language) {
   const ReportWords& words = WordsOf(language);
   const auto part = [&](const char* name) {
@@ -213,7 +213,7 @@ void AddWarningsTo(std::vector<std::string>& cautions, const Json& file, Languag
     cautions.push_back(Translated(warning.get<std::string>(), language));
 }
 
-/// What is said beside the verdict: on the report, on the page without script and in print.
+/// Cautions beside the verdict, for the report, the page without script and the print view.
 std::vector<std::string> CautionsIn(const web::Scan& scan, const Json& scene, const Json& result,
                                     double warm_up_min, Language language) {
   const ReportWords& words = WordsOf(language);
@@ -407,22 +407,23 @@ std::vector<std::string> CautionsOf(const ReportSources& stored, const web::Scan
   }
 }
 
-std::optional<std::string> ComparisonPng(const ReportSources& stored, const web::Scan& scan,
-                                         web::ComparisonPicture picture, Language language) {
-  if (!scan.result) return std::nullopt;
-  std::vector<cv::Mat> pictures;
+std::vector<std::string> ComparisonPngs(const ReportSources& stored, const web::Scan& scan,
+                                        Language language) {
+  std::vector<std::string> files;
+  if (!scan.result) return files;
   try {
-    pictures = PicturesOf(stored, scan, stored.references.Find(scan.reference_id),
-                          JsonIn(scan.folder / "result/result.json"), WordsOf(language));
-  } catch (const IoError&) {  // a record that cannot be read: the stored picture has to do
-    return std::nullopt;
-  } catch (const DataError&) {
-    return std::nullopt;
+    for (const cv::Mat& picture :
+         PicturesOf(stored, scan, stored.references.Find(scan.reference_id),
+                    JsonIn(scan.folder / "result/result.json"), WordsOf(language))) {
+      const std::vector<std::uint8_t> png = EncodePng(picture);
+      files.emplace_back(png.begin(), png.end());
+    }
+  } catch (const std::exception& error) {
+    Log(LogLevel::kWarning,
+        fmt::format("the pictures of scan {} cannot be drawn: {}", scan.id, error.what()));
+    files.clear();
   }
-  const auto wanted = static_cast<std::size_t>(picture);
-  if (wanted >= pictures.size()) return std::nullopt;
-  const std::vector<std::uint8_t> png = EncodePng(pictures[wanted]);
-  return std::string(png.begin(), png.end());
+  return files;
 }
 
 std::string ScanReportPdf(const ReportSources& stored, const web::Scan& scan, Language language) {

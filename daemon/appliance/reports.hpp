@@ -1,8 +1,8 @@
 // Assembles the reports from stored records. Called on a thread for reads.
 #pragma once
 
-#include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/files/pdf_report.hpp"
 #include "daemon/records/patient_store.hpp"
@@ -28,17 +28,16 @@ struct ReportSources {
 [[nodiscard]] CourseReport DescribeCourse(const ReportSources& stored, const web::Patient& patient,
                                           web::Language language);
 
-/// What is to be known beside the verdict: lost frames, a cold sensor, an overdue check, a room
+/// Cautions to read beside the verdict: lost frames, a cold sensor, an overdue check, a room
 /// that is not calibrated, ignored markers, uncertain directions, warnings.
 [[nodiscard]] std::vector<std::string> CautionsOf(const ReportSources& stored,
                                                   const web::Scan& scan, web::Language language);
 
-/// A picture of the comparison as a PNG file; nothing if the scan was not compared, or a file that
-/// is needed is missing or damaged.
-[[nodiscard]] std::optional<std::string> ComparisonPng(const ReportSources& stored,
-                                                       const web::Scan& scan,
-                                                       web::ComparisonPicture picture,
-                                                       web::Language language);
+/// The pictures of the comparison as PNG files, in the order of web::ComparisonPicture; empty if
+/// the scan was not compared, or a record or file that they need is missing or damaged.
+[[nodiscard]] std::vector<std::string> ComparisonPngs(const ReportSources& stored,
+                                                      const web::Scan& scan,
+                                                      web::Language language);
 
 /// The reports as files. @throws IoError
 [[nodiscard]] std::string ScanReportPdf(const ReportSources& stored, const web::Scan& scan,

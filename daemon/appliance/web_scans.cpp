@@ -1,5 +1,7 @@
 #include "daemon/appliance/web_scans.hpp"
 
+#include <algorithm>
+
 #include <utility>
 
 #include <fmt/format.h>
@@ -68,31 +70,28 @@ std::vector<std::string> WebScans::Cautions(const std::string& scan_id, web::Lan
   });
 }
 
-std::optional<std::string> WebScans::FindDrawn(const std::string& scan_id,
-                                               web::ComparisonPicture picture,
-                                               web::Language language) {
-  const std::lock_guard lock(drawn_mutex_);
-  for (const Drawn& one : drawn_)
-    if (one.scan_id == scan_id && one.picture == picture && one.language == language)
-      return one.png;
-  return std::nullopt;
-}
-
 std::optional<std::string> WebScans::PictureOf(const std::string& scan_id,
                                                web::ComparisonPicture picture,
                                                web::Language language) {
   return store_.Read([&](Store& store) -> std::optional<std::string> {
     const std::optional<web::Scan> scan = store.scans.Find(scan_id);
     if (!scan || scan->folder.empty()) return std::nullopt;
-    if (auto png = FindDrawn(scan_id, picture, language)) return png;
-    std::optional<std::string> png = ComparisonPng(SourcesIn(store), *scan, picture, language);
-    if (!png) return std::nullopt;
-    constexpr std::size_t kMaxDrawn = 4;  // both pictures in both languages
+    // Held while drawing, so that a second request for the same scan waits instead of drawing too.
     const std::lock_guard lock(drawn_mutex_);
-    std::erase_if(drawn_, [&](const Drawn& one) { return !store.scans.Find(one.scan_id); });
-    drawn_.push_front({scan_id, picture, language, *png});
-    if (drawn_.size() > kMaxDrawn) drawn_.pop_back();
-    return png;
+    auto found = std::ranges::find_if(drawn_, [&](const Drawn& one) {
+      return one.scan_id == scan_id && one.language == language;
+    });
+    if (found == drawn_.end()) {
+      std::vector<std::string> pngs = ComparisonPngs(SourcesIn(store), *scan, language);
+      if (pngs.empty()) return std::nullopt;
+      constexpr std::size_t kMaxDrawn = 2;  // one scan in both languages
+      std::erase_if(drawn_, [&](const Drawn& one) { return !store.scans.Find(one.scan_id); });
+      drawn_.push_front({scan_id, language, std::move(pngs)});
+      if (drawn_.size() > kMaxDrawn) drawn_.pop_back();
+      found = drawn_.begin();
+    }
+    const auto wanted = static_cast<std::size_t>(picture);
+    return wanted < found->pngs.size() ? std::optional(found->pngs[wanted]) : std::nullopt;
   });
 }
 

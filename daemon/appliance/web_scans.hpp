@@ -37,22 +37,19 @@ class WebScans : public web::ScanService {
                                                         web::Language language) override;
 
  private:
-  /// A picture that was drawn. What it is drawn from is never changed.
+  /// The pictures of a scan in a language. The files that they are drawn from never change.
   struct Drawn {
     std::string scan_id;
-    web::ComparisonPicture picture;
     web::Language language;
-    std::string png;
+    std::vector<std::string> pngs;
   };
   [[nodiscard]] ReportSources SourcesIn(Store& store) const;
-  [[nodiscard]] std::optional<std::string> FindDrawn(const std::string& scan_id,
-                                                     web::ComparisonPicture picture,
-                                                     web::Language language);
 
   Appliance& appliance_;
   StoreAccess& store_;
   std::mutex drawn_mutex_;
-  std::deque<Drawn> drawn_;  ///< The newest ones: the page without script asks every 10 seconds.
+  /// The newest ones: a page asks for both pictures at once, and the one without script every 10 s.
+  std::deque<Drawn> drawn_;
 };
 
 }  // namespace plumb

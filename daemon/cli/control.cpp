@@ -17,6 +17,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "algo/base/digits.hpp"
 #include "algo/base/errors.hpp"
 #include "daemon/cli/ask_plumbd.hpp"
 #include "daemon/cli/commands.hpp"
@@ -108,8 +109,7 @@ std::string NumberText(const Json& correction, const std::string& name, const ch
   const Json u95 = correction.value("uncertainty", Json::object()).value(key, Json());
   const double half = u95.is_number() ? u95.get<double>() : 0.0;
   const int most = std::string_view(unit) == "mm" ? 1 : 2;
-  const int digits =
-      half > 0 ? std::clamp(static_cast<int>(-std::floor(std::log10(half) + 1e-9)), 0, most) : most;
+  const int digits = DecimalsFor(half, most);
   const std::string words =
       std::abs(value.get<double>()) > half
           ? correction.value("words", Json::object()).value(name, std::string())

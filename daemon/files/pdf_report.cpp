@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "algo/base/digits.hpp"
 #include "algo/base/errors.hpp"
 #include "algo/base/notice.hpp"
 #include "algo/base/utf8.hpp"
@@ -179,12 +180,6 @@ void Heading(Pages& pages, const std::string& text) {
   pages.Paragraph(kMargin, kInner, text, 11, kBlack, true);
 }
 
-/// Decimals of a value that its uncertainty justifies, as on the page.
-int DigitsOf(double u95, int most) {
-  if (!(u95 > 0)) return most;
-  return std::clamp(static_cast<int>(-std::floor(std::log10(u95) + 1e-9)), 0, most);
-}
-
 /// With a proper minus sign, no sign for zero, and the decimal sign of the language.
 std::string Number(double value, int digits, bool is_signed, char decimal) {
   std::string text = fmt::format("{:.{}f}", std::abs(value), digits);
@@ -246,7 +241,7 @@ void Pictures(Pages& pages, const std::vector<cv::Mat>& pictures) {
 }  // namespace
 
 std::string ValueWithUncertainty(double value, double u95, int most, char decimal) {
-  const int digits = DigitsOf(u95, most);
+  const int digits = DecimalsFor(u95, most);
   const std::string said = Number(value, digits, /*is_signed=*/true, decimal);
   if (!(u95 > 0)) return said;
   // One more decimal for an uncertainty that begins with 1, as on the page.

@@ -17,8 +17,8 @@ namespace plumb {
 void AppendAuditEntry(Database& database, const web::Actor& actor, const std::string& action,
                       const std::string& subject, const std::string& detail);
 
-/// The newest entry. Its digest covers the whole log: whoever has noted it can tell later whether
-/// anything before it was changed.
+/// The newest entry of the log. Its digest covers all earlier entries, so anyone who has kept a
+/// copy of it can check later that none of them has been changed.
 struct AuditHead {
   std::int64_t number = 0;  ///< 0: there is no entry.
   std::string chain;
@@ -38,8 +38,8 @@ class AuditStore {
            const std::string& detail);
   /// Newest first.
   [[nodiscard]] std::vector<web::AuditEntry> Find(const web::AuditQuery& wanted);
-  /// One JSON object a line, oldest first, with all that the chain covers and its digests: the
-  /// newest kMaxExported entries.
+  /// The newest kMaxExported entries, oldest first: one JSON object per line, with all fields that
+  /// the chain covers and its digests.
   [[nodiscard]] std::string Export();
   static constexpr int kMaxExported = 200'000;
   [[nodiscard]] AuditHead Head();

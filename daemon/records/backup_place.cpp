@@ -27,7 +27,7 @@ bool IsBelow(const fs::path& path, const fs::path& folder) {
          folder.end();
 }
 
-/// Of the file system that is mounted nearest above the path: the folder of it that is mounted.
+/// Root, within its file system, of the mount that contains the path.
 std::string MountedFolderOf(const fs::path& path, const std::string& mounts) {
   std::string root, nearest;
   std::istringstream lines(mounts);
@@ -43,7 +43,7 @@ std::string MountedFolderOf(const fs::path& path, const std::string& mounts) {
   return root;
 }
 
-/// The folder may not exist yet: what counts is the nearest one above that does.
+/// The folder may not exist yet; then its nearest existing parent counts.
 bool IsInMemory(fs::path path) {
   std::error_code error;
   while (!fs::exists(path, error) && path.has_relative_path()) path = path.parent_path();

@@ -6,10 +6,10 @@
 
 namespace plumb {
 
-/// Why a backup of a running plumbd at `target` would be lost; empty if nothing is known against
-/// it. Systemd gives a service a /tmp of its own, which nobody else sees and which ends with it,
-/// and what lies in memory is gone after a restart of the machine. Memory is accepted if the state
-/// folder lies there as well.
+/// Why a backup that plumbd makes at `target` would be lost; empty if no reason is known. With
+/// PrivateTmp=, systemd gives a service a /tmp that other processes cannot see and that is deleted
+/// when the service stops; a file system in memory is empty after a reboot. Memory is accepted if
+/// the state folder is in memory, too.
 /// @param mounts  The text of /proc/self/mountinfo.
 [[nodiscard]] std::string WhyBackupIsLostAt(const std::filesystem::path& target,
                                             const std::filesystem::path& state,

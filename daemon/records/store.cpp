@@ -132,7 +132,7 @@ void Store::CheckWritable() {
   RequireWritable(folders);
 }
 
-/// The same disk may come back under another number: it is known by the newest scan on it.
+/// A disk may come back under another device number; it is recognised by the newest scan on it.
 std::string Store::WhyOtherScans() {
   const FolderPlace now = PlaceOf(folders.scans());
   const std::lock_guard lock(place_mutex_);

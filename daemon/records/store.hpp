@@ -43,7 +43,7 @@ class FolderLock {
   int fd_ = -1;
 };
 
-/// Which folder of which disk a path means.
+/// Identifies a folder and its disk.
 struct FolderPlace {
   dev_t disk = 0;
   ino_t inode = 0;
@@ -76,8 +76,9 @@ class Store {
   /// Tries to write beside the database and in the folder of the scans.
   /// @throws DiskRefused with the reason if that fails, unless the disk is only full.
   void CheckWritable();
-  /// Why the folder of the scans is another one than at the opening, as when its disk has been
-  /// unmounted: what is written there would lie beneath that disk. Empty if it is the same.
+  /// Why the folder of the scans is no longer the one that was opened: its disk has probably been
+  /// unmounted, and what is written would be hidden once it is mounted again. Empty if it is the
+  /// same.
   [[nodiscard]] std::string WhyOtherScans();
   [[nodiscard]] const RecoveryReport& recovery() const { return recovery_; }
   /// For work on the rows of any table, such as the import of a patient.

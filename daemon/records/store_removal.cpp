@@ -152,8 +152,8 @@ bool StoreRemoval::ForgetScan(const std::string& scan_id, const char* why) {
   return true;
 }
 
-/// Takes those out whose files were stored and cannot be seen now: removing them frees nothing, and
-/// their files may be back. One whose files have only changed is as old as any other.
+/// Leaves out scans whose stored files cannot be seen now: removing them frees nothing, and the
+/// files may come back. A scan whose files have changed is treated like any other.
 void StoreRemoval::LeaveOutOfSight(std::vector<std::string>& scan_ids) {
   std::vector<std::string> unavailable;
   {
@@ -216,17 +216,19 @@ int StoreRemoval::KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token
       BytesOf(folders_.scans(), stop), max_bytes, [] { return true; }, stop);
 }
 
-StoreRemoval::Room StoreRemoval::KeepWithinRoom(const std::function<std::uint64_t()>& free_bytes,
-                                                const std::stop_token& stop) {
-  const std::uint64_t bytes = BytesOf(folders_.scans(), stop);
-  std::uint64_t free = free_bytes();
+StoreRemoval::Room StoreRemoval::KeepWithinRoom(
+    const std::function<std::optional<std::uint64_t>()>& free_bytes, const std::stop_token& stop) {
   Room room;
+  std::optional<std::uint64_t> free = free_bytes();
+  if (!free) return room;
+  const std::uint64_t bytes = BytesOf(folders_.scans(), stop);
+  const std::uint64_t quota = DefaultQuota(bytes, *free);
   const auto has_helped = [&] {
-    const std::uint64_t before = std::exchange(free, free_bytes());
-    room.has_helped = free > before;
+    const auto before = std::exchange(free, free_bytes());
+    room.has_helped = free > before;  // nothing is less than any number
     return room.has_helped;
   };
-  room.num_removed = RemoveOldest(bytes, DefaultQuota(bytes, free), has_helped, stop);
+  room.num_removed = RemoveOldest(bytes, quota, has_helped, stop);
   return room;
 }
 

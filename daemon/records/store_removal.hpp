@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -38,8 +39,7 @@ class RemovalGate {
   std::atomic<bool> backing_up_ = false;
 };
 
-/// What scans may take where nobody has set a quota: 90 % of the room that other files leave on
-/// their disk.
+/// Space that scans may take if no quota is set: 90 % of what other files leave on their disk.
 [[nodiscard]] std::uint64_t DefaultQuota(std::uint64_t scan_bytes, std::uint64_t free_bytes);
 
 /// Thread-safe. Files are removed after the database's lock is released: a scan that begins
@@ -65,13 +65,14 @@ class StoreRemoval {
   int KeepWithinQuota(std::uint64_t max_bytes, const std::stop_token& stop = {});
   struct Room {
     int num_removed = 0;  ///< Scans that lost something.
-    /// False if the last removal freed nothing, as where a backup or a snapshot shares the blocks,
-    /// or another program takes all that becomes free: then no more was removed.
+    /// False if the last removal freed nothing, for example because a backup or snapshot shares the
+    /// blocks, or another program used the space at once. Then no more was removed.
     bool has_helped = true;
   };
   /// The same, with DefaultQuota() of the disk.
-  /// @param free_bytes  Measures what is free on it.
-  Room KeepWithinRoom(const std::function<std::uint64_t()>& free_bytes,
+  /// @param free_bytes  Measures what is free on it; nothing where that cannot be measured: then
+  ///         nothing is removed.
+  Room KeepWithinRoom(const std::function<std::optional<std::uint64_t>()>& free_bytes,
                       const std::stop_token& stop = {});
 
  private:

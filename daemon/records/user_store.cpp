@@ -118,11 +118,15 @@ web::Preferences UserStore::PreferencesOf(const std::string& name) {
 
 void UserStore::SetPreferences(const std::string& name, const web::Preferences& preferences) {
   StoreChange change(database_);
-  change.Prepare("INSERT OR REPLACE INTO preferences (user, language, theme) VALUES (?, ?, ?)")
-      .Bind(name)
-      .Bind(preferences.language)
-      .Bind(preferences.theme)
-      .Run();
+  try {
+    change.Prepare("INSERT OR REPLACE INTO preferences (user, language, theme) VALUES (?, ?, ?)")
+        .Bind(name)
+        .Bind(preferences.language)
+        .Bind(preferences.theme)
+        .Run();
+  } catch (const ConstraintBroken&) {  // a display in the room is no account
+    throw StoreRefusal(ChangeResult::kNotFound, "there is no such account");
+  }
   change.Commit();
 }
 

@@ -21,9 +21,9 @@ class UserStore {
   void Add(const web::Actor& actor, const web::User& user);
   /// kConflict if no enabled engineer would be left.
   void Change(const web::Actor& actor, const web::UserChange& wanted);
-  /// Empty where none were chosen.
+  /// Empty if none were chosen.
   [[nodiscard]] web::Preferences PreferencesOf(const std::string& name);
-  /// Without an entry in the log.
+  /// Without an entry in the log. kNotFound for a name that no account has.
   void SetPreferences(const std::string& name, const web::Preferences& preferences);
 
  private:

@@ -7,16 +7,9 @@ build=$(realpath "$1") here=$(cd "$(dirname "$0")" && pwd)
 source=$(cd "$here/../.." && pwd)
 mkdir -p "$2"
 work=$(realpath "$2") root=$work/root
-skip() { echo "skipped: $1"; exit 77; }  # this machine does not permit it
-missing() { # WHAT: toolchain/install brings it, so it fails where PLUMB_REQUIRE_ALL is set
-  echo "skipped: $1"
-  [ "${PLUMB_REQUIRE_ALL:-0}" = 0 ] && exit 77
-  exit 1
-}
+. "$here/../support/left_out.sh"
 [ "$(id -u)" = 0 ] || skip "needs root"
-for program in systemd-nspawn mmdebstrap dh; do
-  command -v $program >/dev/null || missing "$program is missing: run toolchain/install"
-done
+require systemd-nspawn mmdebstrap dh
 
 # A Debian with systemd, curl and polkit, which plumbd recommends, and nothing that Plumb needs.
 sources=$(cat /etc/apt/sources.list /etc/apt/sources.list.d/debian.sources 2>/dev/null || true)

@@ -12,14 +12,8 @@ if [ -n "$sysroot" ]; then
   run=(qemu-aarch64-static -L "$sysroot" -E "LD_LIBRARY_PATH=/usr/lib/$multiarch/blas:/usr/lib/$multiarch/lapack")
 fi
 source=$(cd "$here/../.." && pwd)
-missing() { # WHAT: toolchain/install brings it, so it fails where PLUMB_REQUIRE_ALL is set
-  echo "skipped: $1"
-  [ "${PLUMB_REQUIRE_ALL:-0}" = 0 ] && exit 77
-  exit 1
-}
-for program in dh lintian; do
-  command -v $program >/dev/null || missing "$program is missing: run toolchain/install"
-done
+. "$here/../support/left_out.sh"
+require dh lintian
 rm -rf "$2"
 mkdir -p "$2"
 cd "$2"

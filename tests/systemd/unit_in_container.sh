@@ -7,16 +7,9 @@ build=$(realpath "$1") source=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$2"
 work=$(realpath "$2") root=$work/root
 
-skip() { echo "skipped: $1"; exit 77; }  # this machine does not permit it
-missing() { # WHAT: toolchain/install brings it, so it fails where PLUMB_REQUIRE_ALL is set
-  echo "skipped: $1"
-  [ "${PLUMB_REQUIRE_ALL:-0}" = 0 ] && exit 77
-  exit 1
-}
+. "$source/../support/left_out.sh"
 [ "$(id -u)" = 0 ] || skip "needs root"
-for program in systemd-nspawn mmdebstrap; do
-  command -v "$program" >/dev/null || missing "$program is missing: install the packages systemd-container and mmdebstrap"
-done
+require systemd-nspawn mmdebstrap
 
 # The packages that the programs were linked with, from wherever this machine gets its own.
 libraries=$(ldd "$build/daemon/plumbd" "$build/daemon/plumb" | awk '$3 ~ /^\// { print $3 }' | sort -u)

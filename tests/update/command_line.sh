@@ -3,13 +3,9 @@
 # restart, and a machine that starts the previous system.
 #   command_line.sh BUILD_FOLDER
 set -euo pipefail
-missing() { # PROGRAM: toolchain/install brings it, so continuous integration fails without it
-  echo "$1 is missing: run toolchain/install"
-  [ "${PLUMB_REQUIRE_ALL:-0}" = 0 ] && exit 77
-  exit 1
-}
-for program in rauc dbus-daemon openssl; do command -v "$program" >/dev/null || missing "$program"; done
-[ "$(id -u)" = 0 ] && [ -w /dev/loop-control ] || { echo "needs root and loop devices: RAUC mounts bundles"; exit 77; }
+. "$(dirname "$0")/../support/left_out.sh"
+require rauc dbus-daemon openssl
+[ "$(id -u)" = 0 ] && [ -w /dev/loop-control ] || skip "needs root and loop devices: RAUC mounts bundles"
 plumbd=$(realpath "$1/daemon/plumbd") plumb=$(realpath "$1/daemon/plumb") here=$(cd "$(dirname "$0")" && pwd)
 work=$(mktemp -d)
 cd "$work"

@@ -130,8 +130,7 @@ Accounts::Accounts(const Services& services, AccountOptions options)
   Expire();
 }
 
-/// Accounts may exist even if they cannot be read: no setup code for a first account is issued
-/// before they can.
+/// While accounts cannot be read, some may exist, so no setup code for a first account is issued.
 void Accounts::LookForAccounts() {
   accounts_fault_ = users_.WhyUnreadable();
   if (!accounts_fault_.empty()) return;

@@ -113,8 +113,8 @@ std::string DownloadName(const Request& request) {
              : std::string();
 }
 
-/// A picture in the language that is asked for. Nothing, so that the stored one is sent, if no
-/// language is named, the file is no picture, or it cannot be drawn again.
+/// The picture in the requested language. Nothing if none is requested, the file is not a picture,
+/// or it cannot be drawn: then the stored file is sent.
 std::optional<Response> TranslatedPicture(ScanService& scans, const Request& request) {
   const std::optional<ComparisonPicture> picture = PictureNamed(request.arguments[1]);
   if (!picture || !request.query.contains("language")) return std::nullopt;

@@ -121,7 +121,7 @@ Json ToJson(const Scan& scan, WallClock::time_point now) {
           std::chrono::duration_cast<std::chrono::seconds>(now - *scan.finished_at).count();
   }
   if (scan.result) {
-    // Without an answer no number is for anybody to act on.
+    // The numbers of a comparison without an answer must not be acted on.
     const bool is_answer = scan.result->verdict != "no_answer";
     json["result"] = {
         {"verdict", scan.result->verdict},

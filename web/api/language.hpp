@@ -1,4 +1,4 @@
-// The language that a client asks for.
+// The language that a client requests.
 #pragma once
 
 #include "web/http/router.hpp"
@@ -7,7 +7,7 @@
 namespace plumb::web {
 
 /// Language named by "?language=es"; English if none is named.
-/// @throws DataError for a language that there is not
+/// @throws DataError for an unknown language
 [[nodiscard]] Language LanguageIn(const Request& request);
 
 }  // namespace plumb::web

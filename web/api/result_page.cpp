@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "algo/base/digits.hpp"
 #include "web/api/api.hpp"
 #include "web/api/json.hpp"
 #include "web/api/local_time.hpp"
@@ -83,12 +84,6 @@ std::string LoginForm(const ResultWords& words, std::string_view trouble) {
       words.name, words.password, words.log_in);
 }
 
-/// Decimals that the uncertainty justifies: none below its first digit.
-int DigitsOf(double u95, int most) {
-  if (!(u95 > 0)) return most;
-  return std::clamp(static_cast<int>(-std::floor(std::log10(u95) + 1e-9)), 0, most);
-}
-
 /// With the decimal sign of the language.
 std::string Localized(std::string number, const ResultWords& words) {
   std::replace(number.begin(), number.end(), '.', words.terms.decimal);
@@ -104,7 +99,7 @@ std::string NumberCells(const NumberRow& row, std::string_view name, const std::
         words.terms.not_known);
   const double value = *row.value, u95 = row.u95.value_or(0.0), size = std::abs(value);
   const int most = std::string_view(row.unit) == "mm" ? 1 : 2;
-  const int digits = DigitsOf(u95, most);
+  const int digits = DecimalsFor(u95, most);
   const bool is_zero = size < 0.5 * std::pow(10.0, -digits);  // no sign, no direction
   const bool in = size + u95 <= tolerance, unsure = !in && size <= tolerance;
   const std::string way = !moves

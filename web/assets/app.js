@@ -136,7 +136,7 @@ async function show() {
 /// it.
 function showFocused() {
   const shown = show();
-  // Unless the screen has put it into a field of its own.
+  // Unless the screen has focused one of its own fields.
   if (!main.contains(document.activeElement)) main.focus({ preventScroll: true });
   return shown;
 }

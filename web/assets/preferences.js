@@ -1,5 +1,5 @@
-// What a person chooses: language and theme. They belong to the account; this browser keeps them as
-// well, for where the account cannot be asked.
+// What a person chooses: language and theme. They belong to the account; this browser keeps a
+// copy for when the account cannot be read.
 import { put } from './api.js';
 import { field, select } from './dom.js';
 import { chooseLanguage, kLanguages, languageOf, S } from './strings.js';

@@ -9,7 +9,7 @@ let seen;          // the session that the person here knows to be open; undefin
 let own = 0;       // changes of our own that are on their way
 let alertBox = null;
 
-/// Kept in the tab: after a reload, what the person saw before it is still what they saw last.
+/// Kept in the tab, so that a reload does not count as having seen a change.
 function remember(session) {
   if (seen !== undefined && seen?.id === session?.id) return;
   seen = session;
@@ -48,7 +48,7 @@ async function asOwn(change, isOurs) {
     const isKnown = live.received !== before;
     if (isDone && !isKnown) forget();
     if (isDone && isKnown && isOurs(live.status.session)) remember(live.status.session);
-    // Else somebody else was first, or has changed it again meanwhile.
+    // Otherwise somebody else changed the session first, or again.
     if (isKnown) live.tell('status');
   }
 }
@@ -103,7 +103,7 @@ export function followSession(isModal, changed) {
   if (seen === undefined || seen?.id === now?.id) {
     remember(now);
     if (!alertBox) return;
-    removeAlert();  // it is again as the person here knows it
+    removeAlert();  // it is the acknowledged session again
     changed();
     return;
   }

@@ -48,8 +48,8 @@ class Gate {
   bool tls_;
 };
 
-/// Runs what is left of a handler, later and on the loop: what it throws becomes the answer as in
-/// Gate::Handle(), so that one record that cannot be read does not end the loop.
+/// Runs the rest of a handler later, on the loop. Its exceptions become the answer as in
+/// Gate::Handle(), so that one unreadable record does not end the loop.
 /// @param name  Of the route.
 void RespondGuarded(const std::string& name, const std::function<void()>& rest,
                     const Respond& respond);

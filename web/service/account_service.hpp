@@ -24,7 +24,7 @@ class AccountService {
                        Done done) = 0;  ///< kConflict if the name is taken.
   /// kConflict if no enabled engineer would be left, or the account has changed.
   virtual void ChangeUser(const Actor& actor, const UserChange& change, Done done) = 0;
-  /// Empty where none were chosen, or they cannot be read.
+  /// Empty if none were chosen, or they cannot be read.
   [[nodiscard]] virtual Preferences PreferencesOf(const std::string& name) = 0;
   /// Keeps what the actor chose. It is not logged.
   virtual void SetPreferences(const Actor& actor, const Preferences& preferences, Done done) = 0;

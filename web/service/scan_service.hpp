@@ -39,11 +39,11 @@ class ScanService {
   /// @param name  "heightmap", "deviation", "deviation_after", "region" or "body".
   [[nodiscard]] virtual std::optional<std::string> CompactMap(const std::string& scan_id,
                                                               const std::string& name) = 0;
-  /// What is to be known beside the verdict of a scan, in whole sentences (background).
+  /// Cautions to read beside the verdict of a scan, as whole sentences (background).
   [[nodiscard]] virtual std::vector<std::string> Cautions(const std::string& scan_id,
                                                           Language language) = 0;
-  /// A picture of a comparison with texts in a language and the patient's sides named, as a PNG
-  /// file; nothing if there is no such comparison, or it cannot be drawn (background).
+  /// A picture of a comparison as a PNG file, with texts in a language and the patient's sides
+  /// named; nothing if there is no such comparison, or it cannot be drawn (background).
   [[nodiscard]] virtual std::optional<std::string> PictureOf(const std::string& scan_id,
                                                              ComparisonPicture picture,
                                                              Language language) = 0;

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <fstream>
 #include <mutex>
-#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -311,7 +310,7 @@ TEST(ApplianceStorage, ABackupInMemoryIsRefused) {
   EXPECT_FALSE(fs::exists(memory));
 }
 
-/// An appliance that tries to leave safe mode at once and again, on its loop beside the test.
+/// An appliance that tries every 20 ms to leave safe mode, on its loop beside the test.
 class StorageRetryTest : public testing::ApplianceTest {
  protected:
   StorageRetryTest() {
@@ -327,10 +326,15 @@ class StorageRetryTest : public testing::ApplianceTest {
   [[nodiscard]] std::vector<web::AuditEntry> Recoveries() const {
     return appliance_->store()->audit.Find({0, 100, "storage.recovered"});
   }
-  static void GiveItSomeTries() { std::this_thread::sleep_for(std::chrono::milliseconds(500)); }
+  /// Waits until several attempts to leave safe mode have failed.
+  void LetItTryInVain() {
+    std::size_t before = 0;
+    On([&] { before = appliance_->num_storage_retries(); });
+    ASSERT_TRUE(Becomes([&] { return appliance_->num_storage_retries() >= before + 5; }));
+  }
 };
 
-/// A table that is away stands for reads that fail for a while.
+/// A renamed table makes reads fail for a while.
 TEST_F(StorageRetryTest, SafeModeEndsWhenWhatIsStoredCanBeReadAgainAndNotBefore) {
   Play([&] {
     MakeReady();
@@ -339,7 +343,7 @@ TEST_F(StorageRetryTest, SafeModeEndsWhenWhatIsStoredCanBeReadAgainAndNotBefore)
     On([&] { (void)appliance_->WebStatus(); });
     ASSERT_TRUE(Becomes([&] { return !appliance_->storage_fault().empty(); }));
     const std::string fault = Fault();
-    GiveItSomeTries();
+    LetItTryInVain();
     On([&] {
       EXPECT_EQ(appliance_->storage_fault(), fault);
       EXPECT_EQ(appliance_->WebStatus().state, web::ApplianceState::kFault);
@@ -385,7 +389,7 @@ TEST_F(StorageRetryTest, AStoreThatCouldNotBeOpenedIsOpenedWhenItsScansAreThere)
   fs::rename(state() / "scans", folder_ / "away");
   Play([&] {
     EXPECT_THAT(Fault(), HasSubstr("cannot be seen"));
-    GiveItSomeTries();
+    LetItTryInVain();
     EXPECT_THAT(Fault(), HasSubstr("cannot be seen"));
     EXPECT_THROW((void)appliance_->store()->patients.Add(kTester, "B", ""), DiskRefused)
         << "read-only";
@@ -409,7 +413,7 @@ TEST_F(StorageRetryTest, SafeModeNeverEndsWithANewDatabase) {
     EXPECT_NE(Fault(), "");
     fs::remove(state());
     fs::create_directory(state());
-    GiveItSomeTries();
+    LetItTryInVain();
     EXPECT_NE(Fault(), "");
     EXPECT_TRUE(fs::is_empty(state()));
   });

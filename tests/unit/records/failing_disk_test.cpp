@@ -65,16 +65,6 @@ class FailingDiskTest : public ::testing::Test {
     WriteScene(testing::SmallScene(), folder / "scene");
     WriteResult(kComparison, kPictures, folder / "result");
   }
-  [[nodiscard]] std::string StoreCompared(Store& store) const {
-    const std::string id = store.scans.Begin(testing::Begun(patient_));
-    WriteCompared(store.folders.Staging(id));
-    store.scans.Finish(id, {.outcome = web::ScanOutcome::kDone,
-                            .failure = {},
-                            .result_json = R"({"verdict":"move"})",
-                            .swept_area_m2 = 1.0});
-    return id;
-  }
-
   void Prepare() const {
     for (const char* name : {"state", "backup", "restored"}) fs::remove_all(folder_ / name);
     fs::copy(prepared(), state(), fs::copy_options::recursive);
@@ -138,7 +128,7 @@ class FailingDiskTest : public ::testing::Test {
 
   testing::TempFolder folder_;
   std::string patient_, reference_;
-  std::map<std::string, std::string> compared_;  ///< The files of StoreCompared().
+  std::map<std::string, std::string> compared_;  ///< What WriteCompared() writes.
 };
 
 TEST_F(FailingDiskTest, WhileAScanIsStored) {
@@ -149,7 +139,7 @@ TEST_F(FailingDiskTest, WhileAScanIsStored) {
       Store store(state());
       (void)Arm(fault);
       try {
-        finished.push_back(StoreCompared(store));
+        finished.push_back(StoreScan(store, patient_, WriteCompared));
       } catch (const std::exception&) {  // told to the person, who scans again
       }
       failed = Disarm();

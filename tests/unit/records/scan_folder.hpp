@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <string_view>
@@ -36,9 +37,12 @@ inline NewScan Begun(const std::string& patient) {
           .reason = {}};
 }
 
-inline std::string StoreScan(Store& store, const std::string& patient) {
+/// @param fill  Writes the scan's files into a folder.
+inline std::string StoreScan(
+    Store& store, const std::string& patient,
+    const std::function<void(const std::filesystem::path&)>& fill = FillScan) {
   const std::string id = store.scans.Begin(Begun(patient));
-  FillScan(store.folders.Staging(id));
+  fill(store.folders.Staging(id));
   store.scans.Finish(id, {.outcome = web::ScanOutcome::kDone,
                           .failure = {},
                           .result_json = R"({"verdict":"in_tolerance"})",

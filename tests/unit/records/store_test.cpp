@@ -278,14 +278,22 @@ TEST_F(StoreTest, TheLastEnabledEngineerStays) {
   EXPECT_EQ(store->users.Find("anna")->role, web::Role::kEngineer);
 }
 
+void AddTwoEngineers(Store& store) {
+  for (const char* name : {"anna", "bert"})
+    store.users.Add(
+        kAnna,
+        {.name = name, .role = web::Role::kEngineer, .password_hash = "x", .created_at = {}});
+}
+
 TEST_F(StoreTest, WhatAPersonChoseOfThePageStays) {
   {
     const auto store = Open();
-    for (const char* name : {"anna", "bert"})
-      store->users.Add(
-          kAnna,
-          {.name = name, .role = web::Role::kEngineer, .password_hash = "x", .created_at = {}});
+    AddTwoEngineers(*store);
     store->users.SetPreferences("bert", {.language = "es", .theme = "light"});
+    EXPECT_EQ(RefusalOf([&] {
+                store->users.SetPreferences("couch side", {"es", "light"});
+              }),
+              ChangeResult::kNotFound);
   }
   const auto store = Open();
   EXPECT_EQ(store->users.PreferencesOf("bert").language, "es");
@@ -295,10 +303,7 @@ TEST_F(StoreTest, WhatAPersonChoseOfThePageStays) {
 
 TEST_F(StoreTest, APasswordChangedMeanwhileDoesNotUndoWhatWasDoneToTheAccount) {
   const auto store = Open();
-  for (const char* name : {"anna", "bert"})
-    store->users.Add(
-        kAnna,
-        {.name = name, .role = web::Role::kEngineer, .password_hash = "x", .created_at = {}});
+  AddTwoEngineers(*store);
   const web::UserChange password{
       .name = "bert", .role = {}, .disabled = {}, .password_hash = "y", .expected_hash = "x"};
   store->users.Change(kAnna, {.name = "bert",

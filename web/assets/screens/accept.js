@@ -39,7 +39,7 @@ function acceptance({ scan, received }, reload) {
   if (scan.accepted_by) return accepted(scan);
   const element = h('div', { class: 'acceptance' });
   const possible = may('accept') && scan.result && scan.result.verdict !== 'no_answer';
-  // Kept, so that a reason that is half typed outlives a moment without a connection.
+  // Kept, so that a half-typed reason survives a short loss of the connection.
   let offer = null;
   let shown = null;
   const tick = () => {
@@ -61,7 +61,7 @@ function acceptance({ scan, received }, reload) {
   return { element, tick };
 }
 
-/// Who accepted it, and the end of its session, which usually comes next.
+/// Who accepted it, and a button to close its session, which usually comes next.
 function accepted(scan) {
   const text = S.result;
   const { accepted_by: who, accepted_reason: why } = scan;

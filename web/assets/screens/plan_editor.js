@@ -120,7 +120,7 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
     const mean = (k) => round(model.region.reduce((sum, point) => sum + point[k], 0) / n);
     return n > 2 ? [mean(0), mean(1)] : middleOfMap;
   };
-  /// Into the edge that is nearest, so that corners around the body make no crossing lines.
+  /// Inserts it into the nearest edge, so that the outline does not cross itself.
   const addCorner = (point) => {
     const i = nearestEdge(model.region, point);
     model.region.splice(i, 0, point);

@@ -1,0 +1,264 @@
+// Upkeep of stored data, off the loop: retention and quota, checks of its files and log, backups.
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <ctime>
+#include <filesystem>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/appliance/appliance.hpp"
+#include "daemon/loop/log.hpp"
+#include "daemon/records/file_cipher.hpp"
+#include "daemon/records/stored_values.hpp"
+
+namespace plumb {
+
+using store::kSelf;
+
+namespace {
+
+/// Seconds between the checks of two stored scans, and until the next search for one that is due.
+constexpr int kFileCheckTicks = 5, kNoFileCheckTicks = 600;
+constexpr std::chrono::hours kFileCheckEvery{24};
+
+bool AreOnOneDisk(const std::filesystem::path& a, const std::filesystem::path& b) {
+  struct stat of_a {};
+  struct stat of_b {};
+  return ::stat(a.c_str(), &of_a) == 0 && ::stat(b.c_str(), &of_b) == 0 &&
+         of_a.st_dev == of_b.st_dev;
+}
+
+}  // namespace
+
+/// Retention and quota, off the loop.
+void Appliance::RunMaintenance() {
+  ticks_to_maintenance_ = kMaintenanceTicks;
+  if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
+  // within this time a time server may still correct the clock
+  constexpr std::chrono::hours kTrusted{1};
+  const bool has_clock = clock_.held() >= kTrusted;
+  const std::optional<double> quota_gb = parts_.config.appliance.quota_gb;
+  const bool posted = store_thread_.Post([this, quota_gb, has_clock, stop = care_.get_token()] {
+    try {
+      if (const std::string why = store_->WhyOtherScans(); !why.empty()) throw DiskRefused(why);
+      const int old =
+          has_clock ? store_->removal.RemoveOldScans(store_->settings.Get().retention_days, stop)
+                    : 0;
+      const int over = quota_gb ? store_->removal.KeepWithinQuota(
+                                      static_cast<std::uint64_t>(*quota_gb * 1e9), stop)
+                                : KeepWithinRoom(stop);
+      if (old + over > 0)
+        Log(LogLevel::kNotice,
+            fmt::format("removed {} scans for their age, {} for the quota", old, over));
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError, fmt::format("cannot remove old scans: {}", error.what()));
+    }
+  });
+  if (!posted) Log(LogLevel::kWarning, "the store is too busy to remove old scans now");
+}
+
+/// Without a configured quota; on the store's thread. Once a removal has freed nothing, no further
+/// one is tried: each would cost another scan.
+int Appliance::KeepWithinRoom(const std::stop_token& stop) {
+  if (!is_quota_useful_) return 0;
+  const auto free_bytes = [this]() -> std::optional<std::uint64_t> {
+    std::error_code error;
+    const std::filesystem::space_info space = SpaceOf(store_->folders.scans(), error);
+    return error ? std::nullopt : std::optional<std::uint64_t>(space.available);
+  };
+  const StoreRemoval::Room room = store_->removal.KeepWithinRoom(free_bytes, stop);
+  is_quota_useful_ = room.has_helped;
+  if (!is_quota_useful_)
+    Log(LogLevel::kError,
+        "the disk is nearly full, and removing an old scan freed nothing: a backup on the same "
+        "disk "
+        "may hold its files, or another program fills the disk. No more scans are removed for the "
+        "quota until the next start");
+  return room.num_removed;
+}
+
+/// Verifies the audit log once a day, off the loop: its chain of digests protects nothing unless
+/// it is checked.
+void Appliance::CheckRecords() {
+  constexpr int kDayTicks = 24 * 3600, kAgainTicks = 60;
+  ticks_to_record_check_ = kDayTicks;
+  if (store_ == nullptr || !storage_fault_.empty()) return;
+  const bool posted = check_thread_.Post([this] {
+    std::string fault;
+    try {
+      if (!std::exchange(is_database_checked_, true)) {
+        constexpr std::chrono::minutes kLongest{30};
+        Database(parts_.config.appliance.state / "plumb.db", Database::Access::kReadOnly)
+            .CheckIntegrity(kLongest);
+      }
+      if (const std::optional<std::int64_t> broken = store_->audit.FirstBroken())
+        fault = fmt::format(
+            "The audit log has been changed or shortened from outside: entry {} is not as it was "
+            "written. Compare it with a backup",
+            *broken);
+      // The journal is stored separately: if somebody rewrites the whole log, its last digest no
+      // longer matches the one that was noted here.
+      if (const AuditHead head = store_->audit.Head(); fault.empty())
+        Log(LogLevel::kInfo, fmt::format("the audit log is whole up to entry {}, chain {}",
+                                         head.number, head.chain));
+    } catch (const DatabaseCorrupt& error) {
+      loop_.Post("record check", [this, what = std::string(error.what())] {
+        FailStorage(what, StorageFault::kDamage);
+      });
+    } catch (const std::exception& error) {
+      fault = fmt::format("The audit log cannot be checked: {}", error.what());
+    }
+    loop_.Post("record check", [this, fault] {
+      if (!fault.empty() && fault != record_fault_) Log(LogLevel::kError, fault);
+      record_fault_ = fault;
+    });
+  });
+  if (!posted) ticks_to_record_check_ = kAgainTicks;
+}
+
+/// One scan at a time, off the loop, and never while a scan runs: damaged files are noticed before
+/// they are needed.
+void Appliance::CheckStoredFiles() {
+  ticks_to_file_check_ = kNoFileCheckTicks;  // until this check has ended
+  if (store_ == nullptr || !storage_fault_.empty() || stopped_) return;
+  (void)check_thread_.Post([this, stop = care_.get_token()] {
+    std::optional<CheckedScan> checked;
+    try {
+      if (const std::string why = store_->WhyOtherScans(); !why.empty()) throw DiskRefused(why);
+      checked = store_->integrity.CheckNext(kFileCheckEvery, stop);
+    } catch (const Interrupted&) {
+      return;
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError, fmt::format("cannot check the stored scans: {}", error.what()));
+    }
+    if (checked) {
+      loop_.Post("file check", [this, checked] {
+        ticks_to_file_check_ = kFileCheckTicks;
+        is_unusable_due_ = true;
+        if (checked->fault.empty()) return;
+        Log(LogLevel::kError,
+            fmt::format("a stored scan has changed or is missing: {}", checked->fault),
+            {{"SCAN", checked->id}});
+        NotifyWeb(web::EventKind::kData);
+      });
+    }
+  });
+}
+
+/// Counts off the loop, because it goes through all scans.
+void Appliance::CountUnusable() {
+  if (!is_store_open_ || !storage_fault_.empty()) return;
+  is_unusable_due_ = !store_thread_.Post([this] {
+    try {
+      const UnusableRecords found = store_->integrity.CountUnusable();
+      loop_.Post("unusable", [this, found] {
+        if (found == unusable_) return;
+        unusable_ = found;
+        NotifyWeb(web::EventKind::kStatus);
+      });
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError, fmt::format("cannot count unusable scans: {}", error.what()));
+    }
+  });
+}
+
+namespace {
+
+/// From now on the calling thread gets processor and disk time only when they are idle, so that a
+/// backup costs no frames of a scan. If the system refuses, the priority stays unchanged.
+void GiveWayToScans() {
+  constexpr int kLeastPriority = 19, kOfThread = 1, kBestEffort = 2, kLowestOfIts = 7;
+  (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLeastPriority);
+  (void)::syscall(SYS_ioprio_set, kOfThread, 0, kBestEffort << 13 | kLowestOfIts);
+}
+
+}  // namespace
+
+void Appliance::BackUp(
+    const web::Actor& actor, const std::filesystem::path& folder,
+    std::function<void(const std::string& error, const BackupReport& report)> done,
+    const std::filesystem::path& key_file) {
+  if (store_ == nullptr || !storage_fault_.empty())
+    return done("nothing can be backed up in safe mode: " + storage_fault_, {});
+  const std::filesystem::path key =
+      key_file.empty() ? parts_.config.appliance.backup_key_file : key_file;
+  const bool posted =
+      check_thread_.Post([this, actor, folder, done, key, stop = care_.get_token()] {
+        GiveWayToScans();
+        BackupReport report;
+        std::string error;
+        bool is_beside_scans = false;
+        try {
+          std::optional<BackupSecret> secret;
+          if (!key.empty()) secret.emplace(key);
+          report = store_->backup.Make(actor, folder, stop, secret ? &*secret : nullptr);
+          is_beside_scans = AreOnOneDisk(folder, store_->folders.scans());
+        } catch (const std::exception& failure) {
+          error = failure.what();
+        }
+        Log(error.empty() ? LogLevel::kNotice : LogLevel::kError,
+            error.empty() ? fmt::format("backup made: {}, {} scans, {} problems", folder.string(),
+                                        report.scans, report.problems.size())
+                          : fmt::format("no backup was made in {}: {}", folder.string(), error));
+        loop_.Post("backup", [this, done, error, report, is_beside_scans, folder] {
+          if (error.empty() && folder == BackupTarget()) backup_is_beside_scans_ = is_beside_scans;
+          done(error, report);
+        });
+      });
+  if (!posted) done("too many tasks are waiting: try again", {});
+}
+
+/// One folder for each day of the week: the eighth backup replaces the first.
+std::filesystem::path Appliance::BackupTarget() const {
+  if (parts_.config.appliance.backup_folder.empty()) return {};
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  return parts_.config.appliance.backup_folder /
+         fmt::format("plumb-{}", utc.tm_wday == 0 ? 7 : utc.tm_wday);
+}
+
+namespace {
+
+/// True if the folder has no backup younger than that.
+bool IsBackupDue(const std::filesystem::path& folder, std::chrono::duration<double> every) {
+  using FileClock = std::filesystem::file_time_type::clock;
+  for (int day = 1; day <= 7; ++day) {
+    std::error_code error;
+    const auto made = std::filesystem::last_write_time(
+        folder / fmt::format("plumb-{}", day) / "backup.json", error);
+    const std::chrono::duration<double> age = FileClock::now() - made;
+    if (!error && age.count() >= 0 && age < every)
+      return false;  // a time in the future does not count
+  }
+  return true;
+}
+
+}  // namespace
+
+/// The disk for backups may be slow or missing, so the loop does not access it.
+void Appliance::BackUpIfDue() {
+  ticks_to_backup_ = kBackupTicks;
+  const std::filesystem::path folder = parts_.config.appliance.backup_folder;
+  if (folder.empty() || store_ == nullptr || !storage_fault_.empty() || stopped_) return;
+  const std::chrono::duration<double> every =
+      std::chrono::duration<double, std::ratio<3600>>(parts_.config.appliance.backup_hours);
+  (void)check_thread_.Post([this, folder, every] {
+    if (!IsBackupDue(folder, every)) return;
+    loop_.Post("backup due", [this] {
+      constexpr int kAgainTicks = 3600;  // a failed backup is not repeated at once
+      ticks_to_backup_ = kAgainTicks;
+      BackUp(kSelf, BackupTarget(), [this](const std::string& error, const BackupReport&) {
+        backup_fault_ = error;
+        ticks_to_backup_ = error.empty() ? kBackupTicks : kAgainTicks;
+      });
+    });
+  });
+}
+
+}  // namespace plumb

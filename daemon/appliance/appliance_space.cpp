@@ -1,0 +1,105 @@
+// Room on the disks of the stored data.
+#include <algorithm>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "daemon/appliance/appliance.hpp"
+#include "daemon/loop/log.hpp"
+
+namespace plumb {
+
+std::optional<std::filesystem::space_info> Appliance::SpaceForScans() const {
+  std::optional<std::filesystem::space_info> least;
+  const std::filesystem::path& state = parts_.config.appliance.state;
+  for (const std::filesystem::path& folder : {state, state / "scans"}) {
+    std::error_code error;
+    const std::filesystem::space_info space = SpaceOf(folder, error);
+    if (!error && space.capacity > 0 && (!least || space.available < least->available))
+      least = space;
+  }
+  return least;
+}
+
+std::filesystem::space_info Appliance::SpaceOf(const std::filesystem::path& folder,
+                                               std::error_code& error) const {
+  return parts_.space ? parts_.space(folder, error) : std::filesystem::space(folder, error);
+}
+
+/// Upper limit for the space of the next scan.
+std::uint64_t Appliance::NeededBytes() const {
+  // Measured: a compared scan of 640x480 takes 40 MB; a recording takes 2.35 bytes per pixel and
+  // frame.
+  constexpr double kScene = 16e6, kSceneOfPixel = 110.0, kFrameOfPixel = 2.6, kFramesPerSecond = 30;
+  const Intrinsics camera = sensors_->snapshot().info.intrinsics;
+  const double pixels = std::max(320.0 * 240.0, static_cast<double>(camera.width) * camera.height);
+  const web::Settings settings = store_ ? store_->settings.Get() : web::Settings{};
+  double bytes = kScene + kSceneOfPixel * pixels;
+  if (!check_ && (parts_.config.appliance.keep_recordings || settings.keep_recordings)) {
+    const double sweep_s = parts_.config.appliance.scan_limit_s.value_or(settings.scan_limit_s);
+    bytes += kFrameOfPixel * pixels * kFramesPerSecond * sweep_s;
+  }
+  return static_cast<std::uint64_t>(bytes);
+}
+
+/// Why the disk has no room for a scan; empty if it has. @throws IoError if the settings cannot be
+/// read
+Appliance::Answer Appliance::WhyFull() const {
+  const auto space = SpaceForScans();
+  if (!space) return {};  // a disk that cannot be examined is reported elsewhere
+  const std::uint64_t needed = NeededBytes();
+  if (space->available >= needed) return {};
+  return fmt::format(
+      "the disk is full: {} MB are free, a scan may need {}; remove scans that are not wanted",
+      space->available / 1'000'000, needed / 1'000'000);
+}
+
+/// Why no scan can be stored now; empty if one can.
+Appliance::Answer Appliance::WhyNoSpace() const {
+  try {
+    return WhyFull();
+  } catch (const std::exception& failure) {
+    return fmt::format("no scan can begin: {}", failure.what());
+  }
+}
+
+/// State and light must not say "ready" while each press is refused. A result, or the failure of a
+/// scan, stays until it has been seen.
+void Appliance::WatchSpace() {
+  if (IsRunning() || state_.phase == ScanPhase::kResult || state_.fault == FaultKind::kScan ||
+      !storage_fault_.empty())
+    return;
+  Answer why;
+  try {
+    why = WhyFull();
+  } catch (const std::exception&) {
+    return;  // the status reads the same settings and reports the failure
+  }
+  const bool has_changed = why.empty() != space_fault_.empty();
+  space_fault_ = why;
+  if (has_changed) {
+    Log(why.empty() ? LogLevel::kNotice : LogLevel::kError,
+        why.empty() ? "there is room for scans again" : why);
+    (void)Handle(why.empty() ? ScanEvent::kStorageWorks : ScanEvent::kStorageFailed);
+  }
+  if (Pattern() == shown_) return;  // the disk may have become nearly full
+  Show();
+  NotifyWeb(web::EventKind::kStatus);
+}
+
+/// Used share of the disk with less room, counted as df does, without the blocks reserved for root.
+/// 0 if no disk can be examined.
+double Appliance::UsedShare() const {
+  const auto space = SpaceForScans();
+  if (!space || space->capacity < space->free) return 0.0;
+  const auto used = static_cast<double>(space->capacity - space->free);
+  const double total = used + static_cast<double>(space->available);
+  return total > 0 ? used / total : 1.0;
+}
+
+bool Appliance::IsNearlyFull() const {
+  constexpr double kNearlyFull = 0.8;
+  return UsedShare() >= kNearlyFull;
+}
+
+}  // namespace plumb
