@@ -150,6 +150,10 @@ void ControlServer::HandleLine(std::uint64_t id, const std::string& line) {
   try {
     ControlRequest request = ParseControlRequest(line);
     Client& client = *clients_.at(id);
+    if (client.unanswered >= options_.max_unanswered) {
+      throw DataError(fmt::format(
+          "{} requests of this connection have no answer yet: wait for them", client.unanswered));
+    }
     if (request.kind == ControlRequest::Kind::kUpdate) {
       request.file = std::move(client.attached);
       if (!request.file) throw DataError("update: the open file must come along (SCM_RIGHTS)");

@@ -19,6 +19,8 @@ struct ControlServerOptions {
   std::size_t max_clients = 32;
   std::size_t max_waiting =
       256 << 10;  ///< Bytes that a client has not read yet, above which it is dropped.
+  /// Requests of a client that wait for their answers; a further one is refused.
+  int max_unanswered = 16;
 };
 
 /// Used on the loop's thread. A client that never reads, floods or sends invalid data affects only

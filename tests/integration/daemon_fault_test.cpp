@@ -540,5 +540,30 @@ TEST_F(DaemonFaultTest, NonsenseAtTheControlSocketCostsOnlyItsOwnConnection) {
   plumbd.WaitFor("its answer", [](const json& status) { return status.contains("state"); });
 }
 
+TEST_F(DaemonFaultTest, AFloodAtTheControlSocketNeitherGrowsPlumbdNorKeepsOthersOut) {
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  const auto flood = [&](std::size_t bytes) {
+    const std::string requests = "{\"command\":\"status\"}\n{\"command\":\"nonsense\"}\n";
+    for (std::size_t sent = 0; sent < bytes;) {
+      const int fd = ConnectUnix(plumbd.socket());
+      for (ssize_t count = 1; count > 0 && sent < bytes; sent += requests.size())
+        count = ::send(fd, requests.data(), requests.size(), MSG_NOSIGNAL);
+      ::close(fd);
+    }
+  };
+  constexpr std::size_t kBytes = 8 << 20;
+  flood(kBytes);  // what it keeps for its work is there after the first one
+  const long before = plumbd.resident_kb();
+  std::vector<std::jthread> floods;
+  for (int i = 0; i < 3; ++i) floods.emplace_back([&] { flood(kBytes); });
+  for (int i = 0; i < 20; ++i)
+    plumbd.WaitFor("its answer", [](const json& status) { return status.contains("state"); });
+  floods.clear();
+  testing::ExpectBelow("memory in kB; the allocator's pools move by some megabytes",
+                       static_cast<double>(plumbd.resident_kb()),
+                       static_cast<double>(before + 30'000));
+}
+
 }  // namespace
 }  // namespace plumb

@@ -241,6 +241,51 @@ TEST_F(ControlServerTest, AWatcherThatNeverReadsIsDroppedAndOthersAreNot) {
   ::close(good);
 }
 
+TEST_F(ControlServerTest, RequestsThatWaitForTheirAnswersAreBounded) {
+  const int most = ControlServerOptions{}.max_unanswered;
+  RunWith([&] {
+    const int fd = ConnectUnix(folder_ / "s");
+    // The handler of this test answers only the last of those that come together.
+    const std::string request = "{\"command\":\"sim\",\"action\":\"plug\"}\n";
+    std::string burst;
+    for (int i = 0; i < most; ++i) burst += request;
+    Send(fd, burst);
+    EXPECT_EQ(ReadLine(fd), ControlDone());
+    Send(fd, request);  // takes the place of the one that was answered
+    EXPECT_EQ(ReadLine(fd), ControlDone());
+    Send(fd, request + request);
+    EXPECT_THAT(ReadLine(fd), HasSubstr(std::to_string(most) + " requests of this connection"));
+    EXPECT_EQ(ReadLine(fd), ControlDone()) << "of the one before";
+    ::close(fd);
+  });
+}
+
+TEST_F(ControlServerTest, AFloodThatNeverReadsItsAnswersCostsOthersNothing) {
+  RunWith([&] {
+    std::vector<std::jthread> floods;
+    for (int i = 0; i < 2; ++i) {
+      floods.emplace_back([&](const std::stop_token& stop) {
+        const std::string requests = "{\"command\":\"status\"}\n{}\n{\"command\":\"status\"}\n";
+        while (!stop.stop_requested()) {
+          const int fd = ConnectUnix(folder_ / "s");
+          while (::send(fd, requests.data(), requests.size(), MSG_NOSIGNAL) > 0 &&
+                 !stop.stop_requested()) {
+          }
+          ::close(fd);  // dropped for what it has not read
+        }
+      });
+    }
+    const int good = ConnectUnix(folder_ / "s");
+    int answered = 0;
+    for (; answered < 500; ++answered) {
+      Send(good, "{\"command\":\"status\"}\n");
+      if (ReadLine(good) != ControlDone()) break;
+    }
+    EXPECT_EQ(answered, 500);
+    ::close(good);
+  });
+}
+
 TEST_F(ControlServerTest, AnOpenFileComesAlongAndWhatNobodyAskedForIsClosed) {
   std::ofstream(folder_ / "bundle") << "what is in it";
   const int file = ::open((folder_ / "bundle").c_str(), O_RDONLY | O_CLOEXEC);
