@@ -256,16 +256,52 @@ await h.step('not as planned: no picture names a side of the patient, in a known
   h.tell('room known');
 });
 
-await h.step('unknown, without an answer: no picture names a side of the patient, nor does the plan', async () => {
+await h.step('unknown, without an answer: no picture of the result names a side of the patient', async () => {
   h.tell('stranger');
   await scan();
   const { found, views } = await marksOfResult('marks-no-answer');
   equal(found[kPictures[0]].join(), 'gantry,minusX,plusX', 'the map');
   check(!views.some((name) => kPatients.includes(name.toLowerCase())), `3-D views: ${views}`);
+});
+
+await h.step('the map of a plan names the sides that its posture has in a known room, and says so', async () => {
   const { body } = await h.api(bob, 'scans?limit=1');
   await bob.goto(`${h.url}#/plan/${body.scans[0].reference_id}`);
-  await bob.locator('.plan-grid .ways').waitFor();
-  equal((await marksIn(bob, '.plan-grid')).join(), 'gantry,minusX,plusX', 'the plan');
+  const way = (name) => bob.locator(`.plan-grid [data-mark=${name}]`);
+  await way('head').waitFor();
+  equal((await marksIn(bob, '.plan-grid')).join(), 'feet,gantry,head,left,right', 'the plan');
+  await bob.locator('.plan-grid').getByText('check that the patient lies so').waitFor();
+  const place = async (name) => {
+    const { x, y } = await way(name).boundingBox();
+    return `${Math.round(x)} ${Math.round(y)}`;
+  };
+  const before = [await place('left'), await place('right')];
+  const posture = bob.locator('.plan-grid').getByLabel('Posture');
+  if (await posture.isEnabled()) {
+    const was = await posture.inputValue();
+    await posture.selectOption(was === 'HFS' ? 'HFP' : 'HFS');
+    check(await place('left') !== before[0], 'who lies on the other side has left and right swapped');
+    await posture.selectOption(was);
+    equal([await place('left'), await place('right')].join(), before.join(), 'as it was');
+  }
+  await h.look(bob, 'marks-plan', { axe: false });
+  h.tell('room unknown');
+  await bob.reload();  // or the status might be an older one
+  await way('plusY').waitFor();
+  equal((await marksIn(bob, '.plan-grid')).join(), 'minusX,minusY,plusX,plusY', 'nobody knows the room');
+  h.tell('room known');
+});
+
+await h.step('during a sweep for a fraction the growing map names the sides of the planned posture', async () => {
+  h.tell('slow');
+  await anna.goto(`${h.url}#/scan`);
+  await anna.getByRole('button', { name: /Start sweep|Scan again/ }).click();
+  await anna.locator('.live-surface [data-mark=head]').waitFor();
+  equal((await marksIn(anna, '.live-surface')).join(), 'feet,gantry,head,left,right', 'the map that grows');
+  await anna.locator('.live-surface').getByText('check that the patient lies so').waitFor();
+  await h.look(anna, 'marks-live', { axe: false });
+  h.tell('fast');
+  await anna.waitForURL(/#\/result/, { timeout: 60000 });
 });
 
 await h.step('a wrong reference is NO ANSWER with its reason, and nothing to apply', async () => {

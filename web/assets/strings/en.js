@@ -333,6 +333,8 @@ export const en = {
       head: 'HEAD', feet: 'FEET', left: 'LEFT', right: 'RIGHT', gantry: 'GANTRY', plusX: '+X',
       minusX: '−X', plusY: '+Y', minusY: '−Y',
     },
+    marksOfPlan: 'Head, feet, left and right are those of the planned posture: check that the '
+      + 'patient lies so.',
     marksOfRoom: 'The marks are axes of the room (IEC 61217), not the patient’s sides.',
     marksOfAxes: 'The marks are axes of the reference marker, not the patient’s sides.',
     scaleBar: '10 cm',

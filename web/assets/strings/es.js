@@ -372,6 +372,8 @@ export const es = {
       head: 'CABEZA', feet: 'PIES', left: 'IZQ.', right: 'DER.', gantry: 'GANTRY', plusX: '+X',
       minusX: '−X', plusY: '+Y', minusY: '−Y',
     },
+    marksOfPlan: 'Cabeza, pies, izquierda y derecha son los de la postura planificada: compruebe '
+      + 'que el paciente está así.',
     marksOfRoom: 'Las marcas son ejes de la sala (IEC 61217), no los lados del paciente.',
     marksOfAxes: 'Las marcas son ejes del marcador de referencia, no los lados del paciente.',
     scaleBar: '10 cm',
