@@ -369,7 +369,7 @@ await h.step('the map reads millimetres by mouse and keyboard', async () => {
 });
 
 await h.step('the surface opens in 3-D', async () => {
-  const surface = '**/files/mesh.ply';
+  const surface = '**/maps/mesh';
   let go;
   await anna.route(surface, async (route) => {
     await new Promise((ready) => { go = ready; });

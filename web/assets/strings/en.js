@@ -344,6 +344,7 @@ export const en = {
     meshFailed: 'This browser cannot show 3-D (WebGL is missing). The pictures above show the '
       + 'same.',
     ghost: 'Show the reference', ghostLoading: 'Loading the reference…',
+    correctionShare: 'Share of the correction that is shown',
     ghostShare: 'Reference to current', views3d: {
       top: 'Top', anterior: 'Anterior', posterior: 'Posterior', left: 'Left', right: 'Right',
       head: 'Head', feet: 'Feet', reset: 'Reset',

@@ -384,6 +384,7 @@ export const es = {
     meshFailed: 'Este navegador no puede mostrar 3-D (falta WebGL). Las imágenes de arriba '
       + 'muestran lo mismo.',
     ghost: 'Mostrar la referencia', ghostLoading: 'Cargando la referencia…',
+    correctionShare: 'Parte de la corrección que se muestra',
     ghostShare: 'De la referencia a la actual', views3d: {
       top: 'Arriba', anterior: 'Anterior', posterior: 'Posterior', left: 'Izquierda',
       right: 'Derecha', head: 'Cabeza', feet: 'Pies', reset: 'Restablecer',
