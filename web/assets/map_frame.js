@@ -35,8 +35,8 @@ export function compassOf(room, body, posture) {
   };
 }
 
-/// The same where nothing has been compared yet: the sides that the posture of a plan has in a known
-/// room, for people to check; else the axes.
+/// The same where nothing has been compared yet: the sides that the posture of a plan has in a
+/// known room, for people to check; else the axes.
 export function compassOfPlan(room, posture) {
   if (!room?.known || !posture) return compassOf(room, null);
   const compass = compassOf(room, { named_by: 'posture' }, posture);

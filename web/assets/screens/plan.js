@@ -8,6 +8,7 @@ import {
 import { guardLeaving } from '../leave.js';
 import { compassOfPlan, marksNote } from '../map_frame.js';
 import { loadMap } from '../maps.js';
+import { kAxes } from '../numbers.js';
 import { drafts } from '../plan_drafts.js';
 import { S } from '../strings.js';
 import { blockNote, flagList } from './common.js';
@@ -124,15 +125,16 @@ function summary(reference, patient, { scan, scene, picture }, approve) {
     h('h2', {}, text.summary), h('div', { class: 'summary-grid' },
       picture, h('dl', { class: 'facts' },
       row(S.patients.code, patient.code), row(S.patients.version, `${reference.version}`),
-      row(S.patients.made, `${localTime(reference.created_at)}, ${reference.created_by}`),
+      row(S.patients.made, `${signedTime(reference.created_at)}, ${reference.created_by}`),
       row(text.planned, reference.planned_by),
       row(S.patients.reasonShort, reference.reason || S.none),
       row(text.region, plan.region_m.length
         ? `${text.corners(plan.region_m.length)}, ${text.area(size.cm2, size.cm)}`
         : text.wholeBody),
       row(text.isocentre, plan.isocentre_m ? `${metres(plan.isocentre_m)} m` : text.middle),
-      row(text.shiftSigned, `±${number(plan.tolerance.shift_mm)} mm`),
-      row(text.rotationSigned, `±${number(plan.tolerance.rotation_deg)}°`),
+      kAxes.map((axis) => row(text.toleranceSigned(S.result.axes[axis.name].toLowerCase()),
+        axis.shift ? `±${number(plan.tolerance.shift_mm)} mm`
+          : `±${number(plan.tolerance.rotation_deg)}°`)),
       row(text.posture, text.postures[plan.posture]),
       row(text.markerKind, plan.couch_markers ? text.couchMarkers : text.roomMarkers),
       frames && row(text.scanQuality,

@@ -452,7 +452,7 @@ export const en = {
     isocentreAt: (x, y, z) => `Isocentre: x ${x.toFixed(3)}, y ${y.toFixed(3)}, `
       + `z ${z.toFixed(3)} m`,
     isocentreGone: 'No isocentre: the middle of the region.',
-    shiftSigned: 'Tolerance of shifts', rotationSigned: 'Tolerance of rotations',
+    toleranceSigned: (axis) => `Tolerance: ${axis}`,
     isocentre: 'Isocentre',
     isocentreHint: 'Metres in the reference marker’s frame. Empty: the middle of the region.',
     markerAtLasers: 'Marker at the lasers', takeMarker: 'Take its centre',

@@ -499,7 +499,7 @@ export const es = {
     isocentreAt: (x, y, z) => `Isocentro: x ${x.toFixed(3)}; y ${y.toFixed(3)}; z ${z.toFixed(3)}`
       .replaceAll('.', ',').concat(' m'),
     isocentreGone: 'Sin isocentro: el centro de la región.',
-    shiftSigned: 'Tolerancia de desplazamiento', rotationSigned: 'Tolerancia de rotación',
+    toleranceSigned: (axis) => `Tolerancia: ${axis}`,
     isocentre: 'Isocentro',
     isocentreHint: 'Metros en el sistema del marcador de referencia. Vacío: el centro de la '
       + 'región.',
