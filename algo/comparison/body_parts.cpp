@@ -88,12 +88,8 @@ Outline OutlineOf(const GridShape& grid, const std::vector<std::uint8_t>& mask) 
 }
 
 Axes AxesByRoom(const BodyView& view, const Outline& outline) {
-  const Eigen::Matrix3d R_reference_iec = view.T_iec_reference->linear().transpose();
-  const auto in_plane = [&](const Eigen::Vector3d& iec) -> Eigen::Vector2d {
-    return (R_reference_iec * iec).head<2>().normalized();
-  };
-  const Axes room = {-in_plane(Eigen::Vector3d::UnitY()), in_plane(Eigen::Vector3d::UnitX()),
-                     false};
+  const RoomWays ways = WaysOfRoom(*view.T_iec_reference);
+  const Axes room = {-ways.gantry, ways.right, false};
   if (!view.posture) return room;
   const bool head_first = *view.posture == PatientPosture::kHeadFirstSupine ||
                           *view.posture == PatientPosture::kHeadFirstProne;
@@ -291,6 +287,15 @@ void CheckSizes(const BodyView& view) {
 
 }  // namespace
 
+RoomWays WaysOfRoom(const Pose& T_iec_reference) {
+  const Eigen::Matrix3d R_reference_iec = T_iec_reference.linear().transpose();
+  const auto in_plane = [&](const Eigen::Vector3d& iec) -> Eigen::Vector2d {
+    return (R_reference_iec * iec).head<2>().normalized();
+  };
+  return {.gantry = in_plane(Eigen::Vector3d::UnitY()),
+          .right = in_plane(Eigen::Vector3d::UnitX())};
+}
+
 BodyParts DescribeBody(const BodyView& view) {
   CheckSizes(view);
   const GridShape& grid = view.reference.grid;
@@ -298,10 +303,11 @@ BodyParts DescribeBody(const BodyView& view) {
   const bool is_room_known = view.T_iec_reference.has_value();
   const Axes axes = is_room_known ? AxesByRoom(view, outline) : AxesByBody(view, outline);
   const Profile profile(grid, view.body_mask, axes);
-  BodyParts result{.by_posture = axes.by_posture,
-                   .is_room_known = is_room_known,
-                   .patient = std::nullopt,
-                   .parts = {}};
+  BodyParts result{
+      .by_posture = axes.by_posture,
+      .room = is_room_known ? std::optional(WaysOfRoom(*view.T_iec_reference)) : std::nullopt,
+      .patient = std::nullopt,
+      .parts = {}};
   if (axes.by_posture) result.patient = PatientAxes{.head = -axes.along, .left = axes.side};
   if (profile.size() == 0) return result;
   const Words words = axes.by_posture ? Words::kPatient

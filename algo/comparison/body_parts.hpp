@@ -32,11 +32,20 @@ struct BodyPart {
   std::optional<Eigen::Vector3d> largest_shift_m;
 };
 
+/// Directions of the room on a map of the reference marker's plane, unit vectors: toward the
+/// gantry, and to the right of a person who faces it.
+struct RoomWays {
+  Eigen::Vector2d gantry = Eigen::Vector2d::UnitY();
+  Eigen::Vector2d right = Eigen::Vector2d::UnitX();
+};
+
+[[nodiscard]] RoomWays WaysOfRoom(const Pose& T_iec_reference);
+
 struct BodyParts {
   /// True if names follow the patient's posture. False if the posture is unknown or the body does
   /// not lie as it states; names then do not mention left or right.
   bool by_posture = false;
-  bool is_room_known = true;  ///< False if T_iec_reference is not set.
+  std::optional<RoomWays> room;  ///< Not set without T_iec_reference.
   /// Directions of head and left; exact where by_posture is set.
   std::optional<PatientAxes> patient;
   std::vector<BodyPart> parts;  ///< Ordered from head to feet (by the room: from the gantry away).

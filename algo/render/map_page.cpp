@@ -121,8 +121,11 @@ void DrawScaleBar(Figure& figure, const MapArea& area, const PictureWords& words
     figure.Line(end, y + 23, end, y + 40, kInk, 2.5);
 }
 
-/// Where the line from the middle of the map in that direction meets its edge.
-void DrawMark(Figure& figure, const MapArea& area, const MapMark& mark) {
+/// Draws a mark where the line from the middle of the map in that direction meets its edge, or on
+/// that line within the marks that are there already.
+/// @param taken  Places of the marks; this one is added.
+void DrawMark(Figure& figure, const MapArea& area, const MapMark& mark,
+              std::vector<cv::Rect2d>& taken) {
   const Eigen::Vector2d half(area.box.width / 2.0, area.box.height / 2.0);
   const Eigen::Vector2d way(mark.toward.x(), -mark.toward.y());
   double reach = std::numeric_limits<double>::infinity();
@@ -133,10 +136,17 @@ void DrawMark(Figure& figure, const MapArea& area, const MapMark& mark) {
       .size_px = 19, .color = kMarkInk, .bold = true, .align = HorizontalAlign::kCentre};
   const double width = figure.TextWidth(mark.name, style) + 18, height = 30;
   if (!std::isfinite(reach) || width > area.box.width || height > area.box.height) return;
-  const double x = std::clamp(area.box.x + half.x() + reach * way.x(), area.box.x + width / 2 + 3,
-                              area.box.x + area.box.width - width / 2 - 3);
-  const double y = std::clamp(area.box.y + half.y() + reach * way.y(), area.box.y + height / 2 + 3,
-                              area.box.y + area.box.height - height / 2 - 3);
+  double x = std::clamp(area.box.x + half.x() + reach * way.x(), area.box.x + width / 2 + 3,
+                        area.box.x + area.box.width - width / 2 - 3);
+  double y = std::clamp(area.box.y + half.y() + reach * way.y(), area.box.y + height / 2 + 3,
+                        area.box.y + area.box.height - height / 2 - 3);
+  const auto place = [&] { return cv::Rect2d(x - width / 2, y - height / 2, width, height); };
+  const auto is_taken = [&] {
+    return std::ranges::any_of(
+        taken, [&](const cv::Rect2d& other) { return (place() & other).area() > 0; });
+  };
+  for (double moved = 0; moved < reach && is_taken(); ++moved) x -= way.x(), y -= way.y();
+  taken.push_back(place());
   figure.FillRectangle(x - width / 2, y - height / 2, width, height, {255, 255, 255}, 0.88);
   figure.FrameRectangle(x - width / 2, y - height / 2, width, height, kMarkInk, 1.5);
   figure.Text(x, y + 7, mark.name, style);
@@ -288,7 +298,8 @@ cv::Mat DrawPage(const MapPage& page) {
   DrawAxes(figure, area, page.words);
   DrawScaleBar(figure, area, page.words);
   if (page.cross_m) DrawCross(figure, area, *page.cross_m, page.words);
-  for (const MapMark& mark : page.marks) DrawMark(figure, area, mark);
+  std::vector<cv::Rect2d> taken;
+  for (const MapMark& mark : page.marks) DrawMark(figure, area, mark, taken);
   DrawTitle(figure, page);
   if (page.draw_legend)
     page.draw_legend(

@@ -27,7 +27,7 @@ struct MapPage {
       outline;  ///< 1 for cells inside an outlined region, on the same grid; may be empty.
   /// Draws the legend in the column to the right of the map.
   std::function<void(Figure&, const cv::Rect&)> draw_legend;
-  std::vector<MapMark> marks = {};              ///< At the edges of the map.
+  std::vector<MapMark> marks = {};              ///< At the edges of the map, the first outermost.
   std::optional<Eigen::Vector2d> cross_m = {};  ///< The isocentre in the grid's frame.
   PictureWords words = {};
 };

@@ -16,6 +16,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "algo/base/pose.hpp"
+#include "algo/comparison/body_parts.hpp"
 #include "daemon/appliance/current_store.hpp"
 #include "daemon/appliance/page_identity.hpp"
 #include "daemon/appliance/scan_session.hpp"
@@ -123,6 +125,9 @@ class Appliance {
   [[nodiscard]] web::CheckStatus Checks();
   /// Reloads the calibration of the room, and whether a marker has moved since.
   void RefreshRoom();
+  /// Where the gantry is on maps, as the status states it; not set if the room is not known. From
+  /// any thread.
+  [[nodiscard]] std::optional<RoomWays> RoomOnMaps() const;
   /// From any thread.
   [[nodiscard]] web::RoomCalibrationStatus RoomCalibration();
   /// The board for the room's markers; from any thread.
@@ -253,6 +258,7 @@ class Appliance {
   [[nodiscard]] ScanJob MakeJob(const web::Settings& settings);
   [[nodiscard]] std::optional<RoomAxes> RoomOfJob() const;
   void ReportRoom(web::Status& status) const;
+  [[nodiscard]] std::optional<Pose> RoomPose() const;
   [[nodiscard]] std::shared_ptr<UnitProfile> MakeUnitProfile();
   /// Empty if the unit has none of its own: some sensors are known only by their port.
   [[nodiscard]] static std::string OwnSerial(const SensorDescription& sensor);

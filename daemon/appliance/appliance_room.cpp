@@ -63,22 +63,28 @@ std::optional<RoomAxes> Appliance::RoomOfJob() const {
 
 /// A signed calibration takes precedence even while it is due, and the axes are then unknown. The
 /// configuration counts only where no calibration was ever signed.
+std::optional<Pose> Appliance::RoomPose() const {
+  if (!room_.due.empty()) return std::nullopt;
+  return room_.calibration ? room_.calibration->fit.T_iec_reference
+                           : parts_.config.compare.T_iec_reference;
+}
+
+std::optional<RoomWays> Appliance::RoomOnMaps() const {
+  const std::lock_guard lock(room_mutex_);
+  const std::optional<Pose> T_iec_reference = RoomPose();
+  return T_iec_reference ? std::optional(WaysOfRoom(*T_iec_reference)) : std::nullopt;
+}
+
 void Appliance::ReportRoom(web::Status& status) const {
-  std::optional<Pose> T_iec_reference = parts_.config.compare.T_iec_reference;
-  if (room_.calibration || !room_.due.empty()) {
-    T_iec_reference.reset();
-    if (room_.due.empty())
-      T_iec_reference = room_.calibration->fit.T_iec_reference;
-    else
-      status.warnings.push_back(fmt::format(
-          "The room has to be calibrated again, until then directions are the patient's: {}",
-          room_.due));
-    if (room_.is_configured) {
-      status.warnings.push_back(
-          "The signed calibration of the room holds: T_iec_reference of the configuration is not "
-          "used");
-    }
-  }
+  if (!room_.due.empty())
+    status.warnings.push_back(fmt::format(
+        "The room has to be calibrated again, until then directions are the patient's: {}",
+        room_.due));
+  if ((room_.calibration || !room_.due.empty()) && room_.is_configured)
+    status.warnings.push_back(
+        "The signed calibration of the room holds: T_iec_reference of the configuration is not "
+        "used");
+  const std::optional<Pose> T_iec_reference = RoomPose();
   const Eigen::Matrix3d R_iec_reference = T_iec_reference.value_or(Pose::Identity()).linear();
   status.right_xy = {R_iec_reference(0, 0), R_iec_reference(0, 1)};
   status.gantry_xy = {R_iec_reference(1, 0), R_iec_reference(1, 1)};

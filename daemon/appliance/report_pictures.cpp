@@ -15,6 +15,7 @@
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/loop/log.hpp"
 #include "drivers/files/image_file.hpp"
+#include "web/service/limits.hpp"
 
 namespace plumb {
 namespace {
@@ -42,15 +43,28 @@ std::optional<Eigen::Vector2d> WayIn(const Json& body, const char* name) {
   return way.normalized();
 }
 
-std::vector<MapMark> SidesIn(const Json& result, const SideWords& words) {
+std::vector<MapMark> MarksIn(const Json& result, const SideWords& words) {
   const Json body = result.is_object() ? result.value("body", Json()) : Json();
-  if (!body.is_object() || body.value("named_by", "") != "posture") return {};
+  if (!body.is_object()) return {};
   const auto head = WayIn(body, "head_xy"), left = WayIn(body, "left_xy");
-  if (!head || !left) return {};
-  return {{std::string(words.head), *head},
-          {std::string(words.feet), -*head},
-          {std::string(words.left), *left},
-          {std::string(words.right), -*left}};
+  const auto gantry = WayIn(body, "gantry_xy"), right = WayIn(body, "right_xy");
+  const bool names_sides =
+      body.value("named_by", "") == "posture" && result.value("verdict", "") != "no_answer";
+  std::optional<PatientAxes> patient;
+  if (names_sides && head && left) patient = PatientAxes{*head, *left};
+  std::optional<RoomWays> room;
+  if (gantry && right) room = RoomWays{*gantry, *right};
+  return MapMarks(patient, room, words);
+}
+
+/// The sides of a patient who lies in that posture in the room; not set if there is no such
+/// posture.
+std::optional<PatientAxes> SidesIn(const RoomWays& room, std::string_view posture) {
+  if (!web::IsPosture(posture)) return std::nullopt;
+  const bool is_head_first = posture.starts_with('H'), is_supine = posture.ends_with('S');
+  return PatientAxes{
+      .head = is_head_first ? room.gantry : Eigen::Vector2d(-room.gantry),
+      .left = is_head_first == is_supine ? room.right : Eigen::Vector2d(-room.right)};
 }
 
 HeightMap HeightsOf(const fs::path& scan_folder) {
@@ -107,7 +121,7 @@ std::vector<cv::Mat> ComparisonPictures(const fs::path& scan_folder,
     for (std::size_t i = 0; i < current.z.size(); ++i) current.z[i] += reference.z[i];
     const std::vector<std::uint8_t> region =
         RegionLike(reference, scan_folder / "result/region.png");
-    const std::vector<MapMark> marks = SidesIn(result, sides);
+    const std::vector<MapMark> marks = MarksIn(result, sides);
     return {
         DrawErrorImage(deviation, {.tolerance_m = tolerance_m,
                                    .relief = &reference,
@@ -121,11 +135,13 @@ std::vector<cv::Mat> ComparisonPictures(const fs::path& scan_folder,
 }
 
 std::vector<cv::Mat> ReferencePictures(const fs::path& scan_folder, const web::ReferencePlan& plan,
-                                       const PictureWords& words) {
+                                       const std::optional<RoomWays>& room,
+                                       const PictureWords& words, const SideWords& sides) {
   return Drawn(scan_folder, [&]() -> std::vector<cv::Mat> {
     const HeightMap heights = HeightsOf(scan_folder);
     const std::vector<std::uint8_t> region = PlannedRegion(heights.grid, plan);
     HeightImageOptions options{.region_mask = region, .words = words};
+    if (room) options.marks = MapMarks(SidesIn(*room, plan.posture), room, sides);
     if (plan.isocentre_m)
       options.isocentre_m = Eigen::Vector2d((*plan.isocentre_m)[0], (*plan.isocentre_m)[1]);
     return {DrawHeightImage(heights, options)};

@@ -2,24 +2,21 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 #include <opencv2/core/mat.hpp>
 
 #include "algo/render/picture_words.hpp"
+#include "daemon/files/map_marks.hpp"
 #include "web/service/service_types.hpp"
 
 namespace plumb {
 
-/// Texts of the marks at the edges of a map.
-struct SideWords {
-  std::string_view head, feet, left, right;
-};
-
-/// Error map and overlay of a comparison, CV_8UC3 RGB. The marks name the patient's sides if the
-/// result found them; otherwise there are none. A picture whose files are missing or damaged is
-/// left out.
+/// Error map and overlay of a comparison, CV_8UC3 RGB. The marks name the patient's sides and the
+/// gantry, as far as the result knows them. A picture whose files are missing or damaged is left
+/// out.
 /// @param reference_folder  Folder of the reference's scan.
 /// @param result  Contents of result.json.
 [[nodiscard]] std::vector<cv::Mat> ComparisonPictures(const std::filesystem::path& scan_folder,
@@ -29,9 +26,12 @@ struct SideWords {
                                                       const SideWords& sides);
 
 /// The heights of a reference with the planned region outlined and the isocentre marked; nothing if
-/// the files are missing or damaged.
+/// the files are missing or damaged. In a known room the marks name the sides that the patient has
+/// in the planned posture.
 [[nodiscard]] std::vector<cv::Mat> ReferencePictures(const std::filesystem::path& scan_folder,
                                                      const web::ReferencePlan& plan,
-                                                     const PictureWords& words);
+                                                     const std::optional<RoomWays>& room,
+                                                     const PictureWords& words,
+                                                     const SideWords& sides);
 
 }  // namespace plumb

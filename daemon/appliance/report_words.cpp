@@ -77,7 +77,7 @@ constexpr ReportWords kEnglish = {
     .verdict = "Verdict",
     .digits_note =
         "Each number with its uncertainty of 95 %, in the digits that it lets them have.",
-    .sides = {"HEAD", "FEET", "LEFT", "RIGHT"},
+    .sides = {},
     .pictures = {}};
 
 constexpr ReportWords kSpanish = {
@@ -152,7 +152,7 @@ constexpr ReportWords kSpanish = {
     .when = "Cuándo",
     .verdict = "Veredicto",
     .digits_note = "Cada número con su incertidumbre del 95 %, con las cifras que ella permite.",
-    .sides = {"CABEZA", "PIES", "IZQUIERDA", "DERECHA"},
+    .sides = {"CABEZA", "PIES", "IZQUIERDA", "DERECHA", "GANTRY"},
     .pictures = {.notice = web::kSpanishTerms.notice,
                  .x_axis = "x (m), sistema del marcador de referencia",
                  .y_axis = "y (m)",

@@ -1,9 +1,11 @@
 // Assembles the reports from stored records. Called on a thread for reads.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "algo/comparison/body_parts.hpp"
 #include "daemon/files/pdf_report.hpp"
 #include "daemon/records/patient_store.hpp"
 #include "daemon/records/reference_store.hpp"
@@ -17,7 +19,8 @@ struct ReportSources {
   PatientStore& patients;
   ReferenceStore& references;
   ScanStore& scans;
-  double warm_up_min;  ///< Time that a sensor must have been on to be warm.
+  double warm_up_min;                 ///< Time that a sensor must have been on to be warm.
+  std::optional<RoomWays> room = {};  ///< As the room is known now: for pictures of plans.
 };
 
 /// One page: identity, plan and approval, verdict, the six numbers with uncertainty and tolerance,

@@ -14,7 +14,8 @@ namespace plumb {
 using web::ChangeResult;
 
 ReportSources WebScans::SourcesIn(Store& store) const {
-  return {store.patients, store.references, store.scans, appliance_.warm_up_min()};
+  return {store.patients, store.references, store.scans, appliance_.warm_up_min(),
+          appliance_.RoomOnMaps()};
 }
 
 std::vector<web::Scan> WebScans::Scans(const std::string& patient_id, int limit) {

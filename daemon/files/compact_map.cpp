@@ -1,7 +1,5 @@
 #include "daemon/files/compact_map.hpp"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -13,6 +11,9 @@
 
 #include "algo/base/errors.hpp"
 #include "algo/comparison/region.hpp"
+#include "daemon/files/compact_mesh.hpp"
+#include "daemon/files/deflated.hpp"
+#include "daemon/files/ply_file.hpp"
 #include "daemon/files/scene_folder.hpp"
 #include "drivers/files/image_file.hpp"
 
@@ -110,18 +111,13 @@ std::string Packed(const cv::Mat& map) {
       before = cell;
     }
   }
-  uLongf size = compressBound(differences.size());
-  std::vector<Bytef> stream(size);
-  if (compress2(stream.data(), &size, reinterpret_cast<const Bytef*>(differences.data()),
-                differences.size(), 6) != Z_OK)
-    throw IoError("not enough memory to pack a map");
-  bytes.append(reinterpret_cast<const char*>(stream.data()), size);
-  return bytes;
+  return bytes + Deflated(differences);
 }
 
 }  // namespace
 
 std::string CompactMap(const fs::path& scan_folder, std::string_view name) {
+  if (name == "mesh") return CompactMesh(ReadMeshPly(scan_folder / "scene/mesh.ply"));
   if (name == "region") return Packed(Region(scan_folder / "result"));
   if (name == "body") return Packed(BodyRegion(scan_folder / "scene"));
   if (name == "heightmap")

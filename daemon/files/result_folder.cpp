@@ -13,6 +13,7 @@
 #include "algo/render/error_image.hpp"
 #include "algo/render/overlay_image.hpp"
 #include "daemon/files/deformation_file.hpp"
+#include "daemon/files/map_marks.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
 
@@ -120,13 +121,17 @@ Json BodyPartsJson(const BodyParts& body) {
          part.largest_shift_m ? VectorJson(*part.largest_shift_m / kMillimetre) : Json(nullptr)},
         {"words_shift", shift.empty() ? Json(nullptr) : Json(shift)}});
   }
-  const char* named_by = body.is_room_known ? "room" : "axes";
+  const char* named_by = body.room ? "room" : "axes";
   Json json = {{"named_by", body.by_posture ? "posture" : named_by},
-               {"room_known", body.is_room_known},
+               {"room_known", body.room.has_value()},
                {"parts", parts}};
   if (body.patient) {
     json["head_xy"] = {body.patient->head.x(), body.patient->head.y()};
     json["left_xy"] = {body.patient->left.x(), body.patient->left.y()};
+  }
+  if (body.room) {
+    json["gantry_xy"] = {body.room->gantry.x(), body.room->gantry.y()};
+    json["right_xy"] = {body.room->right.x(), body.room->right.y()};
   }
   return json;
 }
@@ -211,20 +216,6 @@ void WriteRegion(const fs::path& file, const Comparison& comparison) {
 
 }  // namespace
 
-namespace {
-
-/// The patient's sides if the comparison found them; otherwise the pictures have no marks.
-std::vector<MapMark> SidesOf(const Comparison& comparison) {
-  if (!comparison.body_parts || !comparison.body_parts->by_posture ||
-      !comparison.body_parts->patient)
-    return {};
-  const Eigen::Vector2d head = comparison.body_parts->patient->head.normalized(),
-                        left = comparison.body_parts->patient->left.normalized();
-  return {{"HEAD", head}, {"FEET", -head}, {"LEFT", left}, {"RIGHT", -left}};
-}
-
-}  // namespace
-
 ResultPictures DrawResult(const Comparison& comparison, const HeightMap* reference_height,
                           const PictureOptions& options) {
   ResultPictures pictures;
@@ -235,7 +226,7 @@ ResultPictures DrawResult(const Comparison& comparison, const HeightMap* referen
     error.subtitle = options.subtitle;
     error.relief = reference_height;
     error.region_mask = comparison.region_mask;
-    error.marks = SidesOf(comparison);
+    error.marks = MapMarks(comparison);
     pictures.error_map = DrawErrorImage(*comparison.deviation, error);
   }
   if (reference_height != nullptr && comparison.current_height) {
@@ -243,7 +234,7 @@ ResultPictures DrawResult(const Comparison& comparison, const HeightMap* referen
     overlay.tolerance_m = options.tolerance_m;
     overlay.subtitle = options.subtitle;
     overlay.region_mask = comparison.region_mask;
-    overlay.marks = SidesOf(comparison);
+    overlay.marks = MapMarks(comparison);
     pictures.overlay = DrawOverlayImage(*reference_height, *comparison.current_height, overlay);
   }
   return pictures;

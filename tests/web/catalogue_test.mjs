@@ -125,6 +125,18 @@ for (const [text, expected] of [
   'no se puede leer lo guardado: no es posible leer los ajustes guardados: expected a JSON object, '
     + 'found none; se cambió desde fuera o falló el disco. Ponga una copia de la base de datos en su '
     + 'lugar o guárdelo de nuevo'],
+  ['the page\'s certificate CN=plumb ends on 2026-12-24 10:00 UTC: browsers refuse it from then '
+    + 'on; put a new one in its place before',
+  'el certificado de la página, CN=plumb, caduca el 2026-12-24 10:00 UTC: desde entonces los '
+    + 'navegadores lo rechazan; ponga antes uno nuevo en su lugar'],
+  ['what was handed in: holds no key that can be read without a password (Base64 error); expected '
+    + 'PEM files as `openssl req` writes them',
+  'lo entregado: no contiene ninguna clave que se pueda leer sin contraseña (Base64 error); se '
+    + 'esperaban archivos PEM como los escribe `openssl req`'],
+  ['/s/device.key has 3 bytes, expected 32: browsers are not known again after a restart; remove '
+    + 'the file',
+  '/s/device.key tiene 3 bytes y se esperaban 32: tras reiniciar no se reconoce ningún navegador; '
+    + 'borre el archivo'],
   ['scan needs at least 3 markers shared with the reference, found 1 (id 7); keep the markers in '
     + 'view', 'el escaneo necesita al menos 3 marcadores comunes con la referencia y tiene 1; '
     + 'mantenga los marcadores a la vista']]) {

@@ -176,6 +176,10 @@ await h.step('a physicist plans, a second one approves', async () => {
   const signed = clara.getByRole('region', { name: 'You are signing exactly this' });
   await signed.getByText('4 corners').waitFor();
   equal(await signed.locator('input:not([type=password])').count(), 0, 'the summary is read-only');
+  const facts = await signed.locator('dl').innerText();
+  for (const axis of ['vertical', 'longitudinal', 'lateral', 'pitch', 'roll', 'yaw']) {
+    check(new RegExp(`Tolerance: ${axis}\\s+±${['pitch', 'roll', 'yaw'].includes(axis) ? '1°' : '3 mm'}`).test(facts), `the tolerance of ${axis}: ${facts}`);
+  }
   await signed.getByText('The daily check was overdue at this scan.').waitFor();
   await h.look(clara, 'plan-summary', { axe: false });
   await clara.getByLabel('Shifts (mm)').fill('5');
@@ -369,7 +373,7 @@ await h.step('the map reads millimetres by mouse and keyboard', async () => {
 });
 
 await h.step('the surface opens in 3-D', async () => {
-  const surface = '**/files/mesh.ply';
+  const surface = '**/maps/mesh';
   let go;
   await anna.route(surface, async (route) => {
     await new Promise((ready) => { go = ready; });

@@ -55,7 +55,7 @@ await h.step('three scans, their spread, and a signature with the password', asy
   await card(bob).getByLabel('Your password').focus();
   await bob.keyboard.type(h.password);
   await bob.keyboard.press('Enter');
-  await card(bob).getByText(/Version 1, signed by bob, .*, gives every comparison the axes of the room/).waitFor();
+  await card(bob).getByText(/Version 1, signed by bob, .*\b(UTC|GMT)\b.*, gives every comparison the axes of the room/).waitFor();
   await card(anna).getByText(/signed by bob/).waitFor();
   await h.look(bob, 'room-calibration-signed');
 });

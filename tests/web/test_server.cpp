@@ -177,7 +177,7 @@ class Recorder {
                      comparison.motion->centroid_m, comparison.motion->centroid_m,
                      is_room_known ? std::optional(kT_iec_reference) : std::nullopt,
                      MarkerKind::kRoom, posture, comparison.body_parts->patient);
-    comparison.body_parts->is_room_known = is_room_known;
+    if (!is_room_known) comparison.body_parts->room.reset();
     comparison.verdict = Verdict::kMove;
     comparison.reasons = {"known motion"};
     const fs::path folder = NewFolder();

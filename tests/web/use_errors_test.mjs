@@ -232,6 +232,56 @@ await h.step('as planned: the pictures name the sides of the patient', async () 
   equal(await anna.locator('.marks-note').count(), 0, 'nothing to warn of');
 });
 
+await h.step('the slider of the 3-D view moves the surface as the correction will, beside the reference', async () => {
+  // Where the surface lies in the picture from the left, in pixels from the top; not the cube in the corner.
+  const middle = () => anna.locator('canvas.mesh').evaluate(async (canvas) => {
+    for (let i = 0; i < 3; ++i) await new Promise((ready) => { requestAnimationFrame(ready); });
+    const copy = document.createElement('canvas');
+    [copy.width, copy.height] = [canvas.width, canvas.height];
+    const context = copy.getContext('2d');
+    context.drawImage(canvas, 0, 0);
+    const { data } = context.getImageData(0, 0, copy.width, copy.height);
+    let [sum, count] = [0, 0];
+    for (let i = 0; i < data.length; i += 4) {
+      const [x, y] = [(i / 4) % copy.width, Math.floor(i / 4 / copy.width)];
+      if (data[i] + data[i + 1] + data[i + 2] < 90 || (x > 0.6 * copy.width && y > 0.6 * copy.height)) continue;
+      sum += y;
+      ++count;
+    }
+    return sum / count;
+  });
+  for (const [moved, way] of [['z 20', 1], ['z -20', -1]]) {
+    h.tell(`moved ${moved} HFS`);
+    await scan();
+    await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
+    await anna.locator('canvas.mesh[data-ready=yes]').waitFor({ timeout: 60000 });
+    await anna.locator('.mesh-place').getByRole('button', { name: 'Left', exact: true }).click();
+    const share = anna.getByLabel('Share of the correction that is shown');
+    const reference = anna.getByLabel('Show the reference');
+    equal(await reference.isChecked(), false, 'nothing but the current surface at first');
+    await share.fill('1');
+    await anna.locator('canvas.mesh[data-corrected="1"]').waitFor();
+    await anna.locator('canvas.mesh[data-ghost=yes]').waitFor({ timeout: 60000 });
+    equal(await reference.isChecked(), true, 'the reference is beside it');
+    await reference.uncheck();
+    await anna.locator('canvas.mesh[data-ghost=""]').waitFor();
+    const at = {};
+    for (const part of ['0', '0.25', '0.5']) {
+      await share.fill(part);
+      await anna.locator(`canvas.mesh[data-corrected="${part}"]`).waitFor();
+      at[part] = await middle();
+    }
+    const [quarter, half] = [at['0.25'] - at['0'], at['0.5'] - at['0']];
+    check(way * half > 0.7, `${moved}: half of the way back moves the picture by ${half.toFixed(1)} px`);
+    check(Math.abs(quarter / half - 0.5) < 0.2, `${moved}: a quarter of it by ${quarter.toFixed(1)} px`);
+  }
+  h.tell('stranger');
+  await scan();
+  await anna.getByRole('button', { name: 'Open the 3-D view' }).click();
+  await anna.locator('canvas.mesh[data-ready=yes]').waitFor({ timeout: 60000 });
+  equal(await anna.getByLabel('Share of the correction that is shown').count(), 0, 'no answer, no correction');
+});
+
 await h.step('not as planned: no picture names a side of the patient, in a known room and in an unknown one', async () => {
   const sides = (list) => list.filter((name) => kPatients.includes(name.toLowerCase()));
   h.tell('across');
@@ -256,16 +306,52 @@ await h.step('not as planned: no picture names a side of the patient, in a known
   h.tell('room known');
 });
 
-await h.step('unknown, without an answer: no picture names a side of the patient, nor does the plan', async () => {
+await h.step('unknown, without an answer: no picture of the result names a side of the patient', async () => {
   h.tell('stranger');
   await scan();
   const { found, views } = await marksOfResult('marks-no-answer');
   equal(found[kPictures[0]].join(), 'gantry,minusX,plusX', 'the map');
   check(!views.some((name) => kPatients.includes(name.toLowerCase())), `3-D views: ${views}`);
+});
+
+await h.step('the map of a plan names the sides that its posture has in a known room, and says so', async () => {
   const { body } = await h.api(bob, 'scans?limit=1');
   await bob.goto(`${h.url}#/plan/${body.scans[0].reference_id}`);
-  await bob.locator('.plan-grid .ways').waitFor();
-  equal((await marksIn(bob, '.plan-grid')).join(), 'gantry,minusX,plusX', 'the plan');
+  const way = (name) => bob.locator(`.plan-grid [data-mark=${name}]`);
+  await way('head').waitFor();
+  equal((await marksIn(bob, '.plan-grid')).join(), 'feet,gantry,head,left,right', 'the plan');
+  await bob.locator('.plan-grid').getByText('check that the patient lies so').waitFor();
+  const place = async (name) => {
+    const { x, y } = await way(name).boundingBox();
+    return `${Math.round(x)} ${Math.round(y)}`;
+  };
+  const before = [await place('left'), await place('right')];
+  const posture = bob.locator('.plan-grid').getByLabel('Posture');
+  if (await posture.isEnabled()) {
+    const was = await posture.inputValue();
+    await posture.selectOption(was === 'HFS' ? 'HFP' : 'HFS');
+    check(await place('left') !== before[0], 'who lies on the other side has left and right swapped');
+    await posture.selectOption(was);
+    equal([await place('left'), await place('right')].join(), before.join(), 'as it was');
+  }
+  await h.look(bob, 'marks-plan', { axe: false });
+  h.tell('room unknown');
+  await bob.reload();  // or the status might be an older one
+  await way('plusY').waitFor();
+  equal((await marksIn(bob, '.plan-grid')).join(), 'minusX,minusY,plusX,plusY', 'nobody knows the room');
+  h.tell('room known');
+});
+
+await h.step('during a sweep for a fraction the growing map names the sides of the planned posture', async () => {
+  h.tell('slow');
+  await anna.goto(`${h.url}#/scan`);
+  await anna.getByRole('button', { name: /Start sweep|Scan again/ }).click();
+  await anna.locator('.live-surface [data-mark=head]').waitFor();
+  equal((await marksIn(anna, '.live-surface')).join(), 'feet,gantry,head,left,right', 'the map that grows');
+  await anna.locator('.live-surface').getByText('check that the patient lies so').waitFor();
+  await h.look(anna, 'marks-live', { axe: false });
+  h.tell('fast');
+  await anna.waitForURL(/#\/result/, { timeout: 60000 });
 });
 
 await h.step('a wrong reference is NO ANSWER with its reason, and nothing to apply', async () => {

@@ -1,7 +1,7 @@
 // The surface that a sweep has seen so far, from above, and what of the region is still missing.
-import { live } from './api.js';
+import { get, live } from './api.js';
 import { clear, h } from './dom.js';
-import { compassOf, drawCropped, mapFrame, viewOf } from './map_frame.js';
+import { compassOfPlan, drawCropped, mapFrame, marksNote, viewOf } from './map_frame.js';
 import { paintHeights, paintMissing, readPacked } from './maps.js';
 import { S } from './strings.js';
 
@@ -30,6 +30,14 @@ async function fetchSurface() {
   };
 }
 
+/// Of the plan that this sweep will be compared with; null where there is none.
+async function plannedPosture() {
+  const { session, scan } = live.status ?? {};
+  if (session?.purpose !== 'fraction' || scan?.purpose !== 'fraction') return null;
+  const { approved_reference_id: id } = await get(`patients/${session.patient_id}`, true);
+  return id ? (await get(`references/${id}`, true)).plan?.posture ?? null : null;
+}
+
 /// Grows while a sweep goes on; until the reference marker has been seen it says that this is what
 /// it waits for.
 export function liveSurface() {
@@ -40,7 +48,10 @@ export function liveSurface() {
   const keys = h('p', { class: 'keys', hidden: true },
     h('span', { class: 'key seen' }, text.surfaceSeen),
     h('span', { class: 'key hole' }, text.surfaceMissing));
+  const marksPlace = h('div', {});
   let stopped = false;
+  let posture = null;
+  plannedPosture().then((found) => { posture = found; }, () => {});  // then the room's axes only
   const draw = ({ heights, missing, grid }) => {
     // All that is seen or wanted, so that the picture's scale does not change with every step.
     const shown = { ...heights, values: heights.values.map((z, i) =>
@@ -50,7 +61,9 @@ export function liveSurface() {
       paintHeights(whole, heights, grid.step, 1);
       paintMissing(whole, missing);
     });
-    clear(box, mapFrame({ grid, view, canvas, compass: compassOf(live.status?.room, null) }));
+    const compass = compassOfPlan(live.status?.room, posture);
+    clear(box, mapFrame({ grid, view, canvas, compass }));
+    clear(marksPlace, compass?.by === 'plan' && marksNote(compass));
     box.style.setProperty('--aspect', `${view.width / view.height}`);
     note.hidden = true;
     keys.hidden = false;
@@ -65,7 +78,7 @@ export function liveSurface() {
   };
   next();
   return {
-    element: h('figure', { class: 'live-surface' }, box, note, keys),
+    element: h('figure', { class: 'live-surface' }, box, marksPlace, note, keys),
     stop: () => { stopped = true; },
   };
 }

@@ -1,6 +1,6 @@
 // A map as a picture that can be read: cropped, with axes, a scale bar, the edge of the region, and
 // marks that say which way is which.
-import { fixed, h, svg } from './dom.js';
+import { clear, fixed, h, svg } from './dom.js';
 import { cropOf, outlineOf } from './maps.js';
 import { S } from './strings.js';
 
@@ -35,6 +35,14 @@ export function compassOf(room, body, posture) {
   };
 }
 
+/// The same where nothing has been compared yet: the sides that the posture of a plan has in a
+/// known room, for people to check; else the axes.
+export function compassOfPlan(room, posture) {
+  if (!room?.known || !posture) return compassOf(room, null);
+  const compass = compassOf(room, { named_by: 'posture' }, posture);
+  return compass && { ...compass, by: 'plan' };
+}
+
 /// Name of the mark toward which a direction of the map points; nothing where none is near it.
 export function markToward(compass, [x, y]) {
   const nearest = Object.entries(compass?.ways ?? {}).filter(([name]) => name !== 'gantry')
@@ -44,10 +52,14 @@ export function markToward(compass, [x, y]) {
   return gantry && gantry[0] * x + gantry[1] * y > 0.8 ? 'gantry' : null;
 }
 
-/// Says of what the marks are, where they are not the patient's.
-export const marksNote = (compass) => compass && compass.by !== 'posture'
-  && h('p', { class: 'hint marks-note' },
-    compass.by === 'room' ? S.result.marksOfRoom : S.result.marksOfAxes);
+/// Says of what the marks are, where no comparison has found the patient's sides.
+export const marksNote = (compass) => {
+  const text = S.result;
+  const note = {
+    plan: text.marksOfPlan, room: text.marksOfRoom, axes: text.marksOfAxes,
+  }[compass?.by];
+  return note && h('p', { class: 'hint marks-note' }, note);
+};
 
 /// The part of the grid that is shown, in metres.
 export function viewOf(grid, region) {
@@ -98,10 +110,13 @@ function axes(view, size) {
     svg('text', { x: 0.7 * size, y: 1.1 * size }, 'y cm'));
 }
 
+const sizeOf = (view) => Math.max(view.width, view.height) / 42;
+
 /// The gantry's mark stands outside the head's or feet's.
-function marks(view, compass, size) {
+function marks(view, compass) {
   if (!compass) return null;
   const text = S.result.marks;
+  const size = sizeOf(view);
   const place = (name, [dx, dy], along, down) => {
     const reach = Math.min(Math.abs(dx) > 0.3 ? view.width / 2 / Math.abs(dx) : Infinity,
       Math.abs(dy) > 0.3 ? view.height / 2 / Math.abs(dy) : Infinity);
@@ -124,9 +139,13 @@ function marks(view, compass, size) {
       place(name, way, ...(name === 'head' || name === 'feet' ? within : [0, 0]))));
 }
 
+/// In place of the marks that a frame has.
+export const setMarks = (box, view, compass) =>
+  clear(box.querySelector('.all-ways'), marks(view, compass));
+
 /// @param canvas  Shows the view; what stands over it is drawn beside it.
 export function mapFrame({ grid, view, canvas, region, compass, isocentre, cross }) {
-  const size = Math.max(view.width, view.height) / 42;
+  const size = sizeOf(view);
   const outline = region && outlineOf(region, grid);
   const shift = svg('g', {
     transform: `translate(${-view.crop.left * grid.width * grid.step} `
@@ -143,7 +162,7 @@ export function mapFrame({ grid, view, canvas, region, compass, isocentre, cross
   const drawing = svg('svg', {
     viewBox: `0 0 ${view.width} ${view.height}`, class: 'frame', 'aria-hidden': 'true',
     'font-size': size,
-  }, shift, axes(view, size), marks(view, compass, size),
+  }, shift, axes(view, size), svg('g', { class: 'all-ways' }, marks(view, compass)),
   svg('g', { class: 'scale-bar' },
     svg('path', {
       d: `M${view.width - size - bar} ${1.2 * size}v${0.6 * size}h${bar}v${-0.6 * size}`,

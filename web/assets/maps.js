@@ -3,6 +3,10 @@ import { getBytes } from './api.js';
 
 const kNone = -32768;
 
+/// Unpacks the zlib stream that begins there.
+export const inflated = (buffer, from) => new Response(new Blob([buffer.slice(from)]).stream()
+  .pipeThrough(new DecompressionStream('deflate'))).arrayBuffer();
+
 /// A packed map, as daemon/files/compact_map.hpp writes it: {width, height, values} on the whole
 /// grid, row 0 first, metres (for "region": 1 measured, 2 a hole), NaN where there is none.
 export async function readPacked(buffer, scale = 1e-4) {
@@ -11,9 +15,7 @@ export async function readPacked(buffer, scale = 1e-4) {
   const [width, height, x0, y0, w, h] = Array.from({ length: 6 },
     (_, i) => head.getUint16(4 + 2 * i, true));
   if (!(width * height <= 2 ** 25) || x0 + w > width || y0 + h > height) throw new Error('no map');
-  const stream = new Blob([buffer.slice(16)]).stream()
-    .pipeThrough(new DecompressionStream('deflate'));
-  const cells = new DataView(await new Response(stream).arrayBuffer());
+  const cells = new DataView(await inflated(buffer, 16));
   if (cells.byteLength !== 2 * w * h) throw new Error('a map that ends early');
   const values = new Float32Array(width * height).fill(NaN);
   for (let row = 0; row < h; ++row) {

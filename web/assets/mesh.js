@@ -1,13 +1,40 @@
 // The 3-D view; loaded only when it is opened.
 import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
-import { PLYLoader } from 'three/examples/jsm/loaders/PLYLoader.js';
 import { cellAt, errorIndex, errorTable, kOutside } from './maps.js';
 import { orientationCube } from './mesh_cube.js';
 
-/// Colours each vertex by the error map; T maps the mesh's frame to the map's.
+function geometryOf({ positions, corners }) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
+  geometry.setIndex(new THREE.BufferAttribute(corners, 1));
+  geometry.computeVertexNormals();
+  return geometry;
+}
+
+const matrixOf = (rows) => new THREE.Matrix4().set(...rows.flat());
+const rowsOf = ({ elements }) => [0, 1, 2, 3].map((row) =>
+  [0, 1, 2, 3].map((column) => elements[4 * column + row]));
+
+/// What the correction does to the current surface, in that surface's frame: the motion of the body
+/// in the map's frame, undone.
+function correctionOf(T, motion) {
+  const toMap = T ? matrixOf(T) : new THREE.Matrix4();
+  return toMap.clone().invert().multiply(matrixOf(motion).invert()).multiply(toMap);
+}
+
+/// A share of a rigid motion: turned and shifted by it, as seen from `centre`.
+function shareOf(motion, share, centre) {
+  const turn = new THREE.Quaternion()
+    .slerp(new THREE.Quaternion().setFromRotationMatrix(motion), share);
+  const shift = centre.clone().applyMatrix4(motion).sub(centre).multiplyScalar(share);
+  const from = centre.clone().negate().applyQuaternion(turn).add(centre).add(shift);
+  return new THREE.Matrix4().compose(from, turn, new THREE.Vector3(1, 1, 1));
+}
+
+/// Colours of the vertices by the error map; T maps the mesh's frame to the map's.
 /// @param region  NaN outside the region of interest: dimmed there, as the map is.
-function colourByError(geometry, grid, deviation, region, T, tolerance_m) {
+function coloursByError(geometry, grid, deviation, region, T, tolerance_m) {
   const position = geometry.getAttribute('position');
   const colours = new Uint8Array(3 * position.count);
   const scale = errorTable();
@@ -23,7 +50,7 @@ function colourByError(geometry, grid, deviation, region, T, tolerance_m) {
       colours[3 * i + k] = Number.isNaN(value) ? 80 : scale[at + k] * light;
     }
   }
-  geometry.setAttribute('color', new THREE.BufferAttribute(colours, 3, true));
+  return new THREE.BufferAttribute(colours, 3, true);
 }
 
 const kGround = 0x0d1216;
@@ -86,11 +113,13 @@ function boxOfInterest(geometry, grid, region, T) {
 }
 
 /// Draws into `canvas`. Throws where there is no WebGL.
-/// @param surface  Bytes of the PLY file.
+/// @param surface  {positions, corners}.
+/// @param motion  Of the body, in the map's frame; null: there is no correction to show.
 /// @param words  Of the compass's marks.
-/// Gives setGhost(load, share), setShare(share), look(name), cut(way, share), picture(), stop().
+/// Gives setGhost(load, share), setShare(share), correct(share, deviationAfter), look(name),
+/// cut(way, share), picture(), stop().
 export function openMesh(canvas, {
-  surface, grid, deviation, region, T, tolerance_m, compass, words,
+  surface, grid, deviation, region, T, motion, tolerance_m, compass, words,
 }) {
   const renderer = new THREE.WebGLRenderer({
     canvas, antialias: true, logarithmicDepthBuffer: true, preserveDrawingBuffer: true,
@@ -104,15 +133,17 @@ export function openMesh(canvas, {
   const sun = new THREE.DirectionalLight(0xffffff, 1.8);
   sun.position.set(-0.6, -0.4, 1);
   scene.add(sun);
-  const loader = new PLYLoader();
-  const geometry = loader.parse(surface);
-  colourByError(geometry, grid, deviation, region, T, tolerance_m);
+  const geometry = geometryOf(surface);
+  const measured = coloursByError(geometry, grid, deviation, region, T, tolerance_m);
+  geometry.setAttribute('color', measured);
   const material = new THREE.MeshStandardMaterial({
     vertexColors: true, roughness: 0.9, side: THREE.DoubleSide,
   });
   const box = boxOfInterest(geometry, grid, region, T);
   const { center, radius } = box.getBoundingSphere(new THREE.Sphere());
-  scene.add(new THREE.Mesh(geometry, material), marksAround(compass, words, box, radius));
+  const body = new THREE.Mesh(geometry, material);
+  body.matrixAutoUpdate = false;
+  scene.add(body, marksAround(compass, words, box, radius));
   const cube = orientationCube(compass, words);
   const controls = new OrbitControls(camera, canvas);
   controls.enableDamping = false;
@@ -206,14 +237,31 @@ export function openMesh(canvas, {
     }
     request();
   };
+  const correction = motion ? correctionOf(T, motion) : null;
+  let corrected = null;
   return {
     look,
     setShare,
     cut,
-    /// @param load  Gives the bytes of the reference's surface; null: it is hidden.
+    /// Moves the surface by a share of the correction, 0 to 1. Its colours are those of the nearer
+    /// end.
+    /// @param deviationAfter  The error map after the correction.
+    correct(share, deviationAfter) {
+      if (!correction) return;
+      body.matrix.copy(shareOf(correction, share, center));
+      body.matrixWorldNeedsUpdate = true;
+      if (share > 0.5) {
+        const toMap = T ? matrixOf(T) : new THREE.Matrix4();
+        corrected ??= coloursByError(geometry, grid, deviationAfter, region,
+          rowsOf(toMap.multiply(correction)), tolerance_m);
+      }
+      geometry.setAttribute('color', share > 0.5 ? corrected : measured);
+      request();
+    },
+    /// @param load  Gives the reference's surface; null: it is hidden.
     async setGhost(load, share) {
       if (!ghost && load) {
-        ghost = new THREE.Mesh(loader.parse(await load()), new THREE.MeshStandardMaterial({
+        ghost = new THREE.Mesh(geometryOf(await load()), new THREE.MeshStandardMaterial({
           color: 0x6ea8ff, alphaHash: true, side: THREE.DoubleSide,
           clippingPlanes: material.clippingPlanes,
         }));

@@ -36,7 +36,8 @@ class ScanService {
                           Done done) = 0;
   /// A map of a scan in a compact encoding (daemon/files/compact_map.hpp); nothing if there is none
   /// (background).
-  /// @param name  "heightmap", "deviation", "deviation_after", "region" or "body".
+  /// @param name  "heightmap", "deviation", "deviation_after", "region", "body", or "mesh" for the
+  ///         surface.
   [[nodiscard]] virtual std::optional<std::string> CompactMap(const std::string& scan_id,
                                                               const std::string& name) = 0;
   /// Cautions to read beside the verdict of a scan, as whole sentences (background).

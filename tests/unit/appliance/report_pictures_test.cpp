@@ -52,6 +52,10 @@ class ReportPicturesTest : public ::testing::Test {
     const nlohmann::json result = {
         {"body",
          {{"named_by", named_by}, {"head_xy", {0.0, head_y}}, {"left_xy", {-head_y, 0.0}}}}};
+    return Pictures(result, words);
+  }
+  [[nodiscard]] std::vector<cv::Mat> Pictures(const nlohmann::json& result,
+                                              const ReportWords& words) const {
     return ComparisonPictures(scan_, reference_, result, 3 * kMillimetre, words.pictures,
                               words.sides);
   }
@@ -86,6 +90,28 @@ TEST_F(ReportPicturesTest, NameThePatientsSidesInTheReportsLanguage) {
   EXPECT_TRUE(Same(english[0], Pictures(Language::kEnglish)[0])) << "the same every time";
 }
 
+TEST_F(ReportPicturesTest, ShowTheGantryWhereTheResultKnowsTheRoom) {
+  const ReportWords& words = WordsOf(Language::kEnglish);
+  nlohmann::json result = {
+      {"verdict", "move"},
+      {"body", {{"named_by", "posture"}, {"head_xy", {0.0, 1.0}}, {"left_xy", {-1.0, 0.0}}}}};
+  const cv::Mat without = Pictures(result, words)[0];
+  result["body"]["gantry_xy"] = {0.0, 1.0};
+  result["body"]["right_xy"] = {1.0, 0.0};
+  const cv::Mat with = Pictures(result, words)[0];
+  EXPECT_FALSE(Same(without, with));
+  Keep(with, "comparison_gantry");
+  result["verdict"] = "no_answer";
+  const cv::Mat no_answer = Pictures(result, words)[0];
+  EXPECT_FALSE(Same(with, no_answer)) << "without an answer no side is named";
+  result["verdict"] = "move";
+  result["body"]["named_by"] = "room";
+  EXPECT_TRUE(Same(Pictures(result, words)[0], no_answer)) << "the room's axes in both cases";
+  result["body"]["named_by"] = "axes";
+  result["body"].erase("gantry_xy");
+  EXPECT_FALSE(Same(Pictures(result, words)[0], no_answer)) << "no room, no gantry";
+}
+
 TEST_F(ReportPicturesTest, AreLeftOutWhereAFileIsMissingOrOfAnotherSize) {
   WritePng(scan_ / "result/region.png", cv::Mat(3, 4, CV_8UC1, cv::Scalar(255)));
   EXPECT_THAT(Pictures(Language::kEnglish), SizeIs(0));
@@ -99,19 +125,27 @@ TEST_F(ReportPicturesTest, AreLeftOutWhereAFileIsMissingOrOfAnotherSize) {
 
 TEST_F(ReportPicturesTest, OfAReferenceShowTheRegionAndTheIsocentre) {
   const PictureWords& words = WordsOf(Language::kSpanish).pictures;
+  const SideWords& sides = WordsOf(Language::kSpanish).sides;
   web::ReferencePlan plan;
-  const std::vector<cv::Mat> whole = ReferencePictures(reference_, plan, words);
+  const std::vector<cv::Mat> whole = ReferencePictures(reference_, plan, {}, words, sides);
   ASSERT_THAT(whole, SizeIs(1));
   plan.region_m = {{-0.2, -0.1}, {0.2, -0.1}, {0.2, 0.15}, {-0.2, 0.15}};
-  const std::vector<cv::Mat> region = ReferencePictures(reference_, plan, words);
+  const std::vector<cv::Mat> region = ReferencePictures(reference_, plan, {}, words, sides);
   ASSERT_THAT(region, SizeIs(1));
   EXPECT_FALSE(Same(whole[0], region[0]));
   plan.isocentre_m = {{0.05, 0.02, 0.1}};
-  const std::vector<cv::Mat> isocentre = ReferencePictures(reference_, plan, words);
+  const std::vector<cv::Mat> isocentre = ReferencePictures(reference_, plan, {}, words, sides);
   ASSERT_THAT(isocentre, SizeIs(1));
   EXPECT_FALSE(Same(region[0], isocentre[0]));
   Keep(isocentre[0], "reference_es");
-  EXPECT_THAT(ReferencePictures(scan_, plan, words), SizeIs(0)) << "no scene";
+  const std::vector<cv::Mat> marked = ReferencePictures(reference_, plan, RoomWays{}, words, sides);
+  ASSERT_THAT(marked, SizeIs(1));
+  EXPECT_FALSE(Same(isocentre[0], marked[0])) << "the gantry and the planned posture";
+  Keep(marked[0], "reference_marks_es");
+  plan.posture = "FFS";
+  EXPECT_FALSE(Same(ReferencePictures(reference_, plan, RoomWays{}, words, sides)[0], marked[0]))
+      << "head and feet change places";
+  EXPECT_THAT(ReferencePictures(scan_, plan, {}, words, sides), SizeIs(0)) << "no scene";
 }
 
 }  // namespace

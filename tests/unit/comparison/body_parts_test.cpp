@@ -251,7 +251,7 @@ TEST(BodyPartsTest, WithoutARoomTheBodyItselfSaysWhereItsHeadIs) {
       const BodyParts body = person.DescribeWithoutRoom(how.posture);
       EXPECT_THAT(Said(body), testing::ElementsAre("left shoulder 9 mm high"))
           << Name(how.posture) << turn_rad;
-      EXPECT_FALSE(body.is_room_known);
+      EXPECT_FALSE(body.room);
       ASSERT_TRUE(body.patient);
       const Eigen::Rotation2Dd to_reference(-turn_rad);
       EXPECT_LT((body.patient->head - to_reference * how.head).norm(), 0.02) << turn_rad;
@@ -263,9 +263,11 @@ TEST(BodyPartsTest, WithoutARoomTheBodyItselfSaysWhereItsHeadIs) {
 TEST(BodyPartsTest, WithARoomHeadAndLeftAreGivenTooAndItsAxesWhereThePostureIsNotBelieved) {
   const Lying person(kCases[1], 0.4, IsPerson, HighLeftShoulder);
   const BodyParts body = person.Describe(kCases[1].posture);
-  EXPECT_TRUE(body.is_room_known);
+  ASSERT_TRUE(body.room);
   ASSERT_TRUE(body.patient);
   const Eigen::Rotation2Dd to_reference(-0.4);
+  EXPECT_LT((body.room->gantry - to_reference * Eigen::Vector2d(0, 1)).norm(), 1e-9);
+  EXPECT_LT((body.room->right - to_reference * Eigen::Vector2d(1, 0)).norm(), 1e-9);
   EXPECT_LT((body.patient->head - to_reference * kCases[1].head).norm(), 0.02);
   EXPECT_LT((body.patient->left - to_reference * kCases[1].left).norm(), 0.02);
   EXPECT_FALSE(person.Describe(std::nullopt).patient);

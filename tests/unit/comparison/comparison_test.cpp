@@ -427,8 +427,8 @@ TEST(ComparisonTest, WhereTheRoomWasNeverSaidNoWordSpeaksOfIt) {
   };
   EXPECT_THAT(said(unset), testing::Not(HasSubstr("gantry")));
   EXPECT_THAT(said(set), HasSubstr("gantry"));
-  EXPECT_FALSE(unset.body_parts->is_room_known);
-  EXPECT_TRUE(set.body_parts->is_room_known);
+  EXPECT_FALSE(unset.body_parts->room);
+  EXPECT_TRUE(set.body_parts->room);
   EXPECT_EQ(unset.correction->value.longitudinal_mm, set.correction->value.longitudinal_mm);
 }
 

@@ -10,8 +10,11 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "algo/base/errors.hpp"
+#include "daemon/files/map_marks.hpp"
 #include "daemon/files/ply_file.hpp"
 #include "drivers/files/file_io.hpp"
 #include "drivers/files/image_file.hpp"
@@ -52,6 +55,33 @@ TEST(ResultFolderTest, TheFieldIsAPlyThatOtherReadersTake) {
   EXPECT_EQ(shift, (std::array{0.01F, 0.02F, 0.03F}));
   EXPECT_EQ(bytes[bytes.size() - row - 1], 1);
   EXPECT_EQ(bytes.back(), 0);
+}
+
+TEST(ResultFolderTest, TheMarksNameTheGantryWhereTheRoomIsKnownAndNoSideWithoutAnAnswer) {
+  const auto names = [](const Comparison& comparison) {
+    std::vector<std::string> found;
+    for (const MapMark& mark : MapMarks(comparison)) found.push_back(mark.name);
+    return found;
+  };
+  Comparison comparison = Answer();
+  comparison.body_parts.emplace();
+  EXPECT_THAT(names(comparison), ElementsAre());
+  comparison.body_parts->room = RoomWays{{1, 0}, {0, -1}};
+  EXPECT_THAT(names(comparison), ElementsAre("GANTRY", "+X", "\u2212X"));
+  comparison.body_parts->by_posture = true;
+  comparison.body_parts->patient = PatientAxes{{1, 0}, {0, -1}};
+  EXPECT_THAT(names(comparison), ElementsAre("GANTRY", "HEAD", "FEET", "LEFT", "RIGHT"));
+  EXPECT_EQ(MapMarks(comparison)[0].toward, Eigen::Vector2d(1, 0));
+  EXPECT_EQ(MapMarks(comparison)[4].toward, Eigen::Vector2d(0, 1)) << "right is opposite the left";
+  const auto body = nlohmann::json::parse(ResultJson(comparison)).at("body");
+  EXPECT_EQ(body.at("gantry_xy"), (nlohmann::json{1.0, 0.0}));
+  EXPECT_EQ(body.at("right_xy"), (nlohmann::json{0.0, -1.0}));
+  comparison.verdict = Verdict::kNoAnswer;
+  EXPECT_THAT(names(comparison), ElementsAre("GANTRY", "+X", "\u2212X"));
+  comparison.verdict = Verdict::kMove;
+  comparison.body_parts->room.reset();
+  EXPECT_THAT(names(comparison), ElementsAre("HEAD", "FEET", "LEFT", "RIGHT"));
+  EXPECT_FALSE(nlohmann::json::parse(ResultJson(comparison)).at("body").contains("gantry_xy"));
 }
 
 TEST(ResultFolderTest, HoldsTheKeysOfTheContract) {

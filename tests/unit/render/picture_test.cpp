@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
@@ -48,6 +49,21 @@ double MeanRow(const cv::Mat& picture, const Color& color, int last_column) {
     }
   }
   return count == 0 ? -1 : sum / count / picture.rows;
+}
+
+TEST(ErrorImageTest, MarksInOneDirectionDoNotCoverEachOther) {
+  constexpr Color kMarkInk = {20, 60, 90};
+  const auto ink = [&](const Eigen::Vector2d& toward, std::size_t num_marks) {
+    ErrorImageOptions options;
+    options.marks.assign(num_marks, {"GANTRY", toward});
+    return Share(DrawErrorImage(Flat(0), options), kMarkInk);
+  };
+  for (const Eigen::Vector2d& toward :
+       {Eigen::Vector2d(0, 1), Eigen::Vector2d(-1, 0), Eigen::Vector2d(0.6, -0.8)}) {
+    const double one = ink(toward, 1);
+    ASSERT_GT(one, 0);
+    EXPECT_GT(ink(toward, 2), 1.8 * one) << toward.transpose();
+  }
 }
 
 TEST(ErrorImageTest, DrawsYUp) {

@@ -1,6 +1,8 @@
 // The daily check of the room's markers: today's, its numbers over time, and the baseline.
 import { currentSession, get, live, may, post } from '../api.js';
-import { action, done, fixed, h, localDay, localTime, redraw, svg, table } from '../dom.js';
+import {
+  action, done, fixed, h, localDay, localTime, redraw, signedTime, svg, table,
+} from '../dom.js';
 import { signed } from '../numbers.js';
 import { S, translated } from '../strings.js';
 import { markOf } from '../trend.js';
@@ -137,7 +139,7 @@ export async function showCheck(place) {
   const load = async () => {
     const { checks, baseline, overdue } = await get('checks', true);
     const of = baseline
-      ? text.baselineOf(baseline.set_by, localTime(baseline.set_at), baseline.num_markers)
+      ? text.baselineOf(baseline.set_by, signedTime(baseline.set_at), baseline.num_markers)
       : text.noBaseline;
     redraw(place, h('h1', { class: 'visually-hidden' }, text.title), verdict(checks[0], overdue),
       h('section', { class: 'card split' },

@@ -3,7 +3,10 @@ import { ApiError, getBytes } from '../api.js';
 import { action, checkbox, clear, h, select, warn } from '../dom.js';
 import { progressIn } from '../error_map.js';
 import { marksNote } from '../map_frame.js';
+import { loadMap } from '../maps.js';
+import { readMesh } from '../packed_mesh.js';
 import { S } from '../strings.js';
+import { isAdvice } from './common.js';
 
 /// Standard views: from above, from each mark (the gantry stands behind the head or the feet), and
 /// askew.
@@ -37,11 +40,41 @@ function cutControls(view) {
   return [h('label', { for: 'mesh-cut' }, text.cut), way, where];
 }
 
-const kSurface_ms = 600000;  // 30 MB on a slow line
+const kSurface_ms = 600000;  // on a slow line
 const surfaceOf = (scanId, onPart) =>
-  getBytes(`scans/${scanId}/files/mesh.ply`, onPart, kSurface_ms);
+  getBytes(`scans/${scanId}/maps/mesh`, onPart, kSurface_ms).then(readMesh);
 
-function controls(view, canvas, reference, scan, compass) {
+/// The motion of the body that the correction undoes; null where no correction is advised.
+const motionOf = (scan, details) => (isAdvice(scan) && details?.correction?.vertical_mm !== null
+  ? details?.motion?.T ?? null : null);
+
+/// From the surface as measured to the surface after the correction, beside the reference.
+/// @param showReference  Shows it, once.
+function correctionControls(view, canvas, scan, showReference) {
+  const text = S.result;
+  const share = h('input', {
+    type: 'range', min: 0, max: 1, step: 0.05, value: 0, 'aria-label': text.correctionShare,
+  });
+  let after = null;
+  let shown = false;
+  share.addEventListener('input', async () => {
+    if (!shown) showReference();
+    shown = true;
+    try {
+      after ??= await loadMap(scan.id, 'deviation_after');
+    } catch (error) {
+      share.value = 0;
+      warn(`${text.mapMissing} ${error.message}`);
+      return;
+    }
+    view.correct(Number(share.value), after);
+    canvas.dataset.corrected = share.value;
+  });
+  const end = (words) => h('span', { 'aria-hidden': 'true' }, words);
+  return [end(text.before), share, end(text.after)];
+}
+
+function controls(view, canvas, { reference, scan, details }, compass) {
   const text = S.result;
   const buttons = viewsOf(compass).map((name) =>
     action(nameOf(name, compass), async () => view.look(name), {}));
@@ -69,7 +102,12 @@ function controls(view, canvas, reference, scan, compass) {
     canvas.dataset.ghost = ghost.box.checked ? 'yes' : '';
   });
   share.addEventListener('input', () => view.setShare(Number(share.value)));
-  return h('div', { class: 'row' }, buttons, picture, cut, ghost.element, share, state);
+  const correction = motionOf(scan, details) && correctionControls(view, canvas, scan, () => {
+    if (!ghost.box.checked) ghost.box.click();
+  });
+  return h('div', {}, h('div', { class: 'row' }, buttons, picture, cut),
+    h('div', { class: 'row' }, ghost.element, share, state),
+    correction && h('div', { class: 'row' }, correction));
 }
 
 export function meshView({ scan, reference, details }, map, tolerance_mm) {
@@ -91,11 +129,13 @@ export function meshView({ scan, reference, details }, map, tolerance_mm) {
       clear(place, canvas, map?.legend?.(), below);
       view = openMesh(canvas, {
         surface, grid: map?.grid, deviation: map?.deviation, region: map?.region,
-        T: details?.alignment?.T_reference_current, tolerance_m: tolerance_mm / 1000,
+        T: details?.alignment?.T_reference_current, motion: motionOf(scan, details),
+        tolerance_m: tolerance_mm / 1000,
         compass: map?.compass, words: { ...text.marks, ...text.cube },
       });
       canvas.dataset.ready = 'yes';
-      clear(below, marksNote(map?.compass), controls(view, canvas, reference, scan, map?.compass));
+      clear(below, marksNote(map?.compass),
+        controls(view, canvas, { reference, scan, details }, map?.compass));
     } catch (error) {
       // What did not arrive may arrive the next time; what the browser cannot show, it never can.
       if (error instanceof ApiError) offer(error.message);

@@ -6,8 +6,9 @@ import {
   signedTime, signingPassword, warn,
 } from '../dom.js';
 import { guardLeaving } from '../leave.js';
-import { compassOf, marksNote } from '../map_frame.js';
+import { compassOfPlan, marksNote } from '../map_frame.js';
 import { loadMap } from '../maps.js';
+import { kAxes } from '../numbers.js';
 import { drafts } from '../plan_drafts.js';
 import { S } from '../strings.js';
 import { blockNote, flagList } from './common.js';
@@ -124,15 +125,16 @@ function summary(reference, patient, { scan, scene, picture }, approve) {
     h('h2', {}, text.summary), h('div', { class: 'summary-grid' },
       picture, h('dl', { class: 'facts' },
       row(S.patients.code, patient.code), row(S.patients.version, `${reference.version}`),
-      row(S.patients.made, `${localTime(reference.created_at)}, ${reference.created_by}`),
+      row(S.patients.made, `${signedTime(reference.created_at)}, ${reference.created_by}`),
       row(text.planned, reference.planned_by),
       row(S.patients.reasonShort, reference.reason || S.none),
       row(text.region, plan.region_m.length
         ? `${text.corners(plan.region_m.length)}, ${text.area(size.cm2, size.cm)}`
         : text.wholeBody),
       row(text.isocentre, plan.isocentre_m ? `${metres(plan.isocentre_m)} m` : text.middle),
-      row(text.shiftSigned, `±${number(plan.tolerance.shift_mm)} mm`),
-      row(text.rotationSigned, `±${number(plan.tolerance.rotation_deg)}°`),
+      kAxes.map((axis) => row(text.toleranceSigned(S.result.axes[axis.name].toLowerCase()),
+        axis.shift ? `±${number(plan.tolerance.shift_mm)} mm`
+          : `±${number(plan.tolerance.rotation_deg)}°`)),
       row(text.posture, text.postures[plan.posture]),
       row(text.markerKind, plan.couch_markers ? text.couchMarkers : text.roomMarkers),
       frames && row(text.scanQuality,
@@ -164,8 +166,8 @@ async function draft(place, reference, store, reload) {
   let drawing = null;
   let hadIsocentre = Boolean(model.isocentre);
   let loaded = null;
-  // Nothing has been compared: nobody has yet confirmed that the body lies as the plan says.
-  const compass = compassOf(live.status?.room, null);
+  // Nothing has been compared: whoever plans and approves sees here whether the posture is right.
+  const compassFor = (posture) => compassOfPlan(live.status?.room, posture);
   const isEdited = () => stored !== undefined && inputs.written() !== stored;
   const refusal = whyNotApprove(reference);
   const sign = may('approve') && !reference.approved_by && !refusal
@@ -202,15 +204,24 @@ async function draft(place, reference, store, reload) {
   const unsaved = h('p', { class: 'caution', role: 'status' });
   try {
     loaded = await loadHeights(reference);
+    const compass = compassFor(plan.posture);
+    const marksPlace = h('div', {}, marksNote(compass));
     drawing = editor({ ...loaded, compass }, model, editable, changed);
-    clear(mapPlace, drawing.element, marksNote(compass));
+    inputs.posture.addEventListener('change', () => {
+      const wanted = compassFor(inputs.posture.value);
+      drawing.mark(wanted);
+      clear(marksPlace, marksNote(wanted));
+    });
+    clear(mapPlace, drawing.element, marksPlace);
   } catch (error) {
     clear(mapPlace, h('p', { class: 'hint' }, error.message));
   }
   const picture = () => {
     if (!loaded) return null;
     const shown = { region: reference.plan.region_m, isocentre: reference.plan.isocentre_m };
-    return editor({ ...loaded, compass }, shown, false, () => {}).element;
+    const compass = compassFor(reference.plan.posture);
+    return h('div', {}, editor({ ...loaded, compass }, shown, false, () => {}).element,
+      marksNote(compass));
   };
   const showSummary = () => {
     const approve = (written) => store(() => post(`references/${reference.id}/approve`, {

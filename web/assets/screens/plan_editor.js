@@ -1,6 +1,6 @@
 // The map of a plan on which region and isocentre are drawn, by pointer or by keys.
 import { clear, h, say, svg } from '../dom.js';
-import { mapFrame, viewOf } from '../map_frame.js';
+import { mapFrame, setMarks, viewOf } from '../map_frame.js';
 import { cellAt, outlineOf, paintHeights } from '../maps.js';
 import { S } from '../strings.js';
 
@@ -36,7 +36,8 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
     viewBox: `0 0 ${width} ${height}`, class: 'draw', tabindex: '0', role: 'application',
     'aria-label': text.mapLabel,
   });
-  const box = mapFrame({ grid, view: viewOf(grid, null), canvas, compass, cross: overlay });
+  const view = viewOf(grid, null);
+  const box = mapFrame({ grid, view, canvas, compass, cross: overlay });
   box.style.setProperty('max-width', `${75 * width / height}vh`);
   // The crosshair is there once the keys have moved it.
   const state = {
@@ -260,6 +261,7 @@ export function editor({ grid, map, body, compass }, model, editable, changed) {
   draw();
   return {
     element: box, draw, undo, deleteCorner,
+    mark: (wanted) => setMarks(box, view, wanted),
     hasCorner: () => Boolean(model.region[state.chosen]),
     /// In place of all corners; can be undone.
     set: (region) => {

@@ -2,7 +2,7 @@
 // signed.
 import { get, live, may, post } from '../api.js';
 import {
-  action, clear, done, field, fixed, form, h, localTime, signingPassword, table,
+  action, clear, done, field, fixed, form, h, localTime, signedTime, signingPassword, table,
 } from '../dom.js';
 import { S } from '../strings.js';
 import { sentence } from './common.js';
@@ -24,7 +24,7 @@ function state({ versions: [newest], due, configured }) {
   if (due) return h('p', { class: 'judged-out' }, `▲ ${text.due} ${sentence(due)}`);
   if (newest) {
     return h('p', { class: 'judged-in' }, `✓ ${text.holds(newest.version, newest.signed_by,
-      localTime(newest.signed_at))}`, configured && ` ${text.notTheConfigurations}`);
+      signedTime(newest.signed_at))}`, configured && ` ${text.notTheConfigurations}`);
   }
   return h('p', {}, configured ? text.configured : text.none);
 }
@@ -61,7 +61,7 @@ function signature(room, load) {
 }
 
 function versionRow(one) {
-  return h('tr', {}, h('th', { scope: 'row' }, one.version), h('td', {}, localTime(one.signed_at)),
+  return h('tr', {}, h('th', { scope: 'row' }, one.version), h('td', {}, signedTime(one.signed_at)),
     h('td', {}, one.signed_by), h('td', {}, `${fixed(one.shift_mm, 2)} mm`),
     h('td', {}, `${fixed(one.turn_deg, 2)}°`),
     h('td', {}, h('code', {}, one.digest.slice(0, 12))));

@@ -333,6 +333,8 @@ export const en = {
       head: 'HEAD', feet: 'FEET', left: 'LEFT', right: 'RIGHT', gantry: 'GANTRY', plusX: '+X',
       minusX: '−X', plusY: '+Y', minusY: '−Y',
     },
+    marksOfPlan: 'Head, feet, left and right are those of the planned posture: check that the '
+      + 'patient lies so.',
     marksOfRoom: 'The marks are axes of the room (IEC 61217), not the patient’s sides.',
     marksOfAxes: 'The marks are axes of the reference marker, not the patient’s sides.',
     scaleBar: '10 cm',
@@ -342,6 +344,7 @@ export const en = {
     meshFailed: 'This browser cannot show 3-D (WebGL is missing). The pictures above show the '
       + 'same.',
     ghost: 'Show the reference', ghostLoading: 'Loading the reference…',
+    correctionShare: 'Share of the correction that is shown',
     ghostShare: 'Reference to current', views3d: {
       top: 'Top', anterior: 'Anterior', posterior: 'Posterior', left: 'Left', right: 'Right',
       head: 'Head', feet: 'Feet', reset: 'Reset',
@@ -449,7 +452,7 @@ export const en = {
     isocentreAt: (x, y, z) => `Isocentre: x ${x.toFixed(3)}, y ${y.toFixed(3)}, `
       + `z ${z.toFixed(3)} m`,
     isocentreGone: 'No isocentre: the middle of the region.',
-    shiftSigned: 'Tolerance of shifts', rotationSigned: 'Tolerance of rotations',
+    toleranceSigned: (axis) => `Tolerance: ${axis}`,
     isocentre: 'Isocentre',
     isocentreHint: 'Metres in the reference marker’s frame. Empty: the middle of the region.',
     markerAtLasers: 'Marker at the lasers', takeMarker: 'Take its centre',

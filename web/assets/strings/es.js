@@ -372,6 +372,8 @@ export const es = {
       head: 'CABEZA', feet: 'PIES', left: 'IZQ.', right: 'DER.', gantry: 'GANTRY', plusX: '+X',
       minusX: '−X', plusY: '+Y', minusY: '−Y',
     },
+    marksOfPlan: 'Cabeza, pies, izquierda y derecha son los de la postura planificada: compruebe '
+      + 'que el paciente está así.',
     marksOfRoom: 'Las marcas son ejes de la sala (IEC 61217), no los lados del paciente.',
     marksOfAxes: 'Las marcas son ejes del marcador de referencia, no los lados del paciente.',
     scaleBar: '10 cm',
@@ -382,6 +384,7 @@ export const es = {
     meshFailed: 'Este navegador no puede mostrar 3-D (falta WebGL). Las imágenes de arriba '
       + 'muestran lo mismo.',
     ghost: 'Mostrar la referencia', ghostLoading: 'Cargando la referencia…',
+    correctionShare: 'Parte de la corrección que se muestra',
     ghostShare: 'De la referencia a la actual', views3d: {
       top: 'Arriba', anterior: 'Anterior', posterior: 'Posterior', left: 'Izquierda',
       right: 'Derecha', head: 'Cabeza', feet: 'Pies', reset: 'Restablecer',
@@ -496,7 +499,7 @@ export const es = {
     isocentreAt: (x, y, z) => `Isocentro: x ${x.toFixed(3)}; y ${y.toFixed(3)}; z ${z.toFixed(3)}`
       .replaceAll('.', ',').concat(' m'),
     isocentreGone: 'Sin isocentro: el centro de la región.',
-    shiftSigned: 'Tolerancia de desplazamiento', rotationSigned: 'Tolerancia de rotación',
+    toleranceSigned: (axis) => `Tolerancia: ${axis}`,
     isocentre: 'Isocentro',
     isocentreHint: 'Metros en el sistema del marcador de referencia. Vacío: el centro de la '
       + 'región.',

@@ -37,6 +37,22 @@ export const kFaultWords = {
     'este resultado no está en tolerancia: aceptarlo requiere un motivo y su contraseña',
   'a scan is removed for a reason: state it': 'un escaneo se borra por un motivo: indíquelo',
   'this scan is running: discard it instead': 'este escaneo está en curso: descártelo',
+  // The page's certificate, and how browsers are known again.
+  ['the page is served without TLS (web.plain_http): passwords and patient data can be read and '
+    + 'changed on the network']:
+    'la página se sirve sin TLS (web.plain_http): las contraseñas y los datos de los pacientes se '
+    + 'pueden leer y cambiar en la red',
+  ['the certificate cannot be replaced here: the page is served without TLS, or the configuration '
+    + 'names the certificate (web.tls_certificate)']:
+    'el certificado no se puede cambiar aquí: la página se sirve sin TLS o la configuración nombra '
+    + 'el certificado (web.tls_certificate)',
+  'what was handed in': 'lo entregado',
+  'holds no certificate that can be read': 'no contiene ningún certificado legible',
+  'holds no key that can be read without a password':
+    'no contiene ninguna clave que se pueda leer sin contraseña',
+  'holds a certificate of an unknown kind': 'contiene un certificado de un tipo desconocido',
+  'holds a key of an unknown kind': 'contiene una clave de un tipo desconocido',
+  'expected a file of the appliance\'s own': 'se esperaba un archivo propio del equipo',
   // References and plans.
   'this scan has no scene: only a finished scan can become a reference':
     'este escaneo no tiene escena: solo un escaneo terminado puede ser referencia',
@@ -253,6 +269,55 @@ export const kFaultPatterns = [
     + 'sweep slowly over a scene that stands still$',
   'dos de las $1 imágenes clave no vieron igual ninguna superficie (profundidad mediana $2 m): '
     + 'barra despacio una escena quieta'],
+  // The page's certificate, and how browsers are known again.
+  ['^the page\'s certificate (.+) is valid only from (.+): browsers refuse it; check the clock$',
+    'el certificado de la página, $1, no vale hasta el $2: los navegadores lo rechazan; compruebe '
+    + 'el reloj'],
+  ['^the page\'s certificate (.+) ended on (.+): browsers refuse it; put a new one in its place$',
+    'el certificado de la página, $1, caducó el $2: los navegadores lo rechazan; ponga uno nuevo '
+    + 'en su lugar'],
+  ['^the page\'s certificate (.+) ends on (.+): browsers refuse it from then on; put a new one in '
+    + 'its place before$',
+  'el certificado de la página, $1, caduca el $2: desde entonces los navegadores lo rechazan; '
+    + 'ponga antes uno nuevo en su lugar'],
+  ['^the key of the page\'s certificate (.+) is too weak \\((\\d+) bits\\): browsers refuse it; '
+    + 'make one of 256 bits on an elliptic curve, or of 2048 with RSA$',
+  'la clave del certificado de la página, $1, es demasiado débil ($2 bits): los navegadores la '
+    + 'rechazan; haga una de 256 bits en una curva elíptica, o de 2048 con RSA'],
+  ['^the page\'s certificate cannot be read: (.+); expected PEM$',
+    'no se puede leer el certificado de la página: $1; se esperaba PEM'],
+  ['^the certificate (.+) has a key of only (\\d+) bits: make one of 256 on an elliptic curve, or '
+    + 'of 2048 with RSA$',
+  'el certificado $1 tiene una clave de solo $2 bits: haga una de 256 en una curva elíptica, o de '
+    + '2048 con RSA'],
+  ['^the certificate (.+) ended on (.+): hand in a newer one$',
+    'el certificado $1 caducó el $2: entregue uno más nuevo'],
+  ['^the certificate (.+) is valid only from (.+): check the clock$',
+    'el certificado $1 no vale hasta el $2: compruebe el reloj'],
+  ['^the certificate (\\S+) cannot be served \\((.+)\\); expected PEM: the certificate of this '
+    + 'machine, then each that leads from it to an authority$',
+  'no se puede servir el certificado $1 ($2); se esperaba PEM: el certificado de este equipo y '
+    + 'después cada uno que lleva de él a una autoridad'],
+  ['^the certificate was not replaced: (.+)$', 'el certificado no se cambió: $1'],
+  ['^(.+): the key is not that of the certificate; give the two that were made together$',
+    '$1: la clave no es la del certificado; dé los dos que se hicieron juntos'],
+  ['^(.+): (holds .+) \\((.+)\\); expected PEM files as `openssl req` writes them$',
+    '$1: $2 ($3); se esperaban archivos PEM como los escribe `openssl req`'],
+  ['^the certificate of the page is for this run only: (.+); remove or correct the file$',
+    'el certificado de la página vale solo hasta reiniciar: $1; borre o corrija el archivo'],
+  ['^(\\S+) has (\\d+) bytes, expected (\\d+): browsers are not known again after a restart; '
+    + 'remove the file$',
+  '$1 tiene $2 bytes y se esperaban $3: tras reiniciar no se reconoce ningún navegador; borre el '
+    + 'archivo'],
+  ['^browsers are not known again after a restart: (.+)$',
+    'tras reiniciar no se reconoce ningún navegador: $1'],
+  ['^(\\S+) is not a regular file: (.+)$', '$1 no es un archivo normal: $2'],
+  ['^web\\.listen: (.+); the page is served at (\\S+) instead$',
+    'web.listen: $1; la página se sirve en $2'],
+  ['^(\\S+) is no address of this machine now: the page cannot be reached before it is '
+    + '\\(web.listen\\)$',
+  '$1 no es ahora una dirección de este equipo: hasta que lo sea no se llega a la página '
+    + '(web.listen)'],
   // Update.
   ['^(.+) is installed: restart the appliance to use it$',
     '$1 está instalado: reinicie el equipo para usarlo'],
