@@ -47,6 +47,27 @@ mkdir data
 run stick "$work/stick"
 check "a stick without a file is no matter" '^0 $' "$code $(cat out)"
 
+cat >bin/grub-editenv <<'SCRIPT'
+#!/bin/sh
+if [ "$2" = list ]; then cat "$1"; else echo "$3" >>"$1"; fi
+SCRIPT
+chmod +x bin/grub-editenv
+export PLUMB_UNIT_ENV=$work/unitenv PLUMB_MACHINE_ID=$work/machine-id
+echo 11111111111111111111111111111111 >machine-id
+run
+check "without the boot loader's file no machine ID is kept" '^0 $' "$code $(cat out)"
+: >unitenv
+run
+check "the first start's machine ID is kept" '^0 .*kept for the next ones MACHINE_ID=1{32}$' "$code $(cat out unitenv | tr '\n' ' ' | xargs)"
+run
+check "a start that was handed it over says so" 'is that of the first start' "$(cat out)"
+echo 22222222222222222222222222222222 >machine-id
+run
+check "and one with another ID" '^0 .*not that of the first start.* MACHINE_ID=1{32}$' "$code $(cat out) $(cat unitenv)"
+printf '#!/bin/sh\n[ "$2" = list ]\n' >bin/grub-editenv
+run
+check "a start goes on where it cannot be kept" '^0 .*cannot be kept' "$code $(cat out)"
+
 cat >bin/plumb <<'SCRIPT'
 #!/bin/sh
 case "$3" in state) echo ready ;; page.url) echo https://0.0.0.0:8080 ;; page.certificate) echo AB:CD ;; esac
