@@ -52,6 +52,18 @@ every_library_is_depended_upon() {
 }
 check "every library used is in Depends" every_library_is_depended_upon
 
+header_only_libraries_are_named() {
+  local package library bad=0
+  for package in plumb plumbd; do
+    for library in cli11 eigen3 nlohmann-json3 tomlplusplus; do
+      dpkg-deb -f "$once/${package}"_*.deb Static-Built-Using | grep -q "\b$library (= " ||
+        { echo "$package does not name $library in Static-Built-Using"; bad=1; }
+    done
+  done
+  return $bad
+}
+check "libraries that are headers only are named" header_only_libraries_are_named
+
 files_are_there() {
   local file bad=0
   for file in plumb/usr/share/man/man1/plumb.1.gz plumbd/usr/share/man/man8/plumbd.8.gz plumbd/usr/share/man/man5/plumb.toml.5.gz \

@@ -68,6 +68,21 @@ printf '#!/bin/sh\n[ "$2" = list ]\n' >bin/grub-editenv
 run
 check "a start goes on where it cannot be kept" '^0 .*cannot be kept' "$code $(cat out)"
 
+mkdir -p data/provision
+echo 480 >data/provision/burn-in
+printf '#!/bin/sh\necho "$@"\nexit 1\n' >bin/plumb
+chmod +x bin/plumb
+"$source/systemd/burn-in" >out
+report=$(tr '\n' ' ' <data/provision/burn-in.txt)
+check "a burn-in that was requested is run" \
+  "^doctor --burn-in 480 --burn-in-folder $work/data .*480 minutes: FAILED .exit code 1." "$report"
+check "its report is in the journal too" '480 minutes: FAILED' "$(cat out)"
+check "and it is not run again" '^burn-in.txt $' "$(ls data/provision | tr '\n' ' ')"
+echo 1 >data/provision/burn-in
+printf '#!/bin/sh\n' >bin/plumb
+"$source/systemd/burn-in" >out
+check "one that passes says so" '^burn-in of 1 minutes: passed' "$(cat data/provision/burn-in.txt)"
+
 cat >bin/plumb <<'SCRIPT'
 #!/bin/sh
 case "$3" in state) echo ready ;; page.url) echo https://0.0.0.0:8080 ;; page.certificate) echo AB:CD ;; esac
@@ -86,6 +101,8 @@ for line in 'Page         https://10.1.1.5:8080/' 'Page         https://\[fd00::
   'State        ready' 'enter the setup code: ABCD-EFGH'; do
   check "the screen shows: $line" "$line" "$screen"
 done
+sed -i s/:8080/:9443/ bin/plumb
+check "the screen shows another port" 'https://10.1.1.5:9443/' "$("$source/systemd/console-screen" once)"
 echo '{"setup_required":false}' >session
 check "with an account no setup code" '^none$' "$("$source/systemd/console-screen" once | grep -q 'setup code' || echo none)"
 exit $failed
