@@ -8,6 +8,7 @@
 #include "daemon/config/version.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/records/factory_reset.hpp"
+#include "daemon/update/bundle_check.hpp"
 #include "daemon/update/bundle_copy.hpp"
 
 namespace plumb {
@@ -35,7 +36,7 @@ Updates::Updates(Appliance& appliance, std::unique_ptr<SystemRestart> restart,
                    .folder = options_.config.folder,
                    .max_bytes = static_cast<std::uint64_t>(options_.config.max_bundle_mb) << 20,
                    .bus_address = options_.bus_address,
-                   .version = std::string(Version()),
+                   .version = VersionOfSystem(options_.release, std::string(Version())),
                    .boot = options_.boot,
                    .blocking_reason = [this] { return WhyNotInstall(); },
                    .changed = [this] { options_.changed(); },

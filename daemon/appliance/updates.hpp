@@ -17,9 +17,10 @@ namespace plumb {
 
 struct UpdatesOptions {
   UpdateConfig config;
-  std::filesystem::path state;                        ///< State folder for a factory reset.
-  std::filesystem::path sticks = "/run/plumb-stick";  ///< See UsbSticks.
-  std::string bus_address = {};                       ///< Empty: the system bus.
+  std::filesystem::path state;                           ///< State folder for a factory reset.
+  std::filesystem::path sticks = "/run/plumb-stick";     ///< See UsbSticks.
+  std::filesystem::path release = "/etc/plumb-release";  ///< See VersionOfSystem().
+  std::string bus_address = {};                          ///< Empty: the system bus.
   std::string boot = {};  ///< Unique for each start of the machine; empty if unknown.
   std::function<bool(std::function<void()>)> run_in_background;  ///< See UpdaterOptions.
   std::function<void()> changed;  ///< Called when GetUpdate() has changed.

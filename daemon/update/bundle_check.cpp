@@ -8,6 +8,8 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
+#include <fstream>
+#include <iomanip>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -20,6 +22,7 @@ namespace {
 constexpr std::string_view kSquashfs = "hsqs";
 constexpr std::uint64_t kMaxSignature = 64 << 10;
 constexpr std::uint64_t kLeastBundle = 4096;
+constexpr int kMaxVersion = 64;
 
 }  // namespace
 
@@ -79,6 +82,13 @@ bool IsOlder(const std::string& a, const std::string& b) {
     if (x != y) return x < y;
   }
   return false;
+}
+
+std::string VersionOfSystem(const std::filesystem::path& release, const std::string& program) {
+  std::ifstream file(release);
+  std::string version;
+  file >> std::setw(kMaxVersion) >> version;
+  return version.empty() || version.front() < '0' || version.front() > '9' ? program : version;
 }
 
 }  // namespace plumb

@@ -23,4 +23,9 @@ enum class BundleState { kUnknown, kWhole, kDamaged };
 /// are not numbers count as 0.
 [[nodiscard]] bool IsOlder(const std::string& a, const std::string& b);
 
+/// Version of the system that runs: the first word of its release file, as toolchain/image writes
+/// it; `program` where there is none. A later system may contain the same program.
+[[nodiscard]] std::string VersionOfSystem(const std::filesystem::path& release,
+                                          const std::string& program);
+
 }  // namespace plumb

@@ -1,10 +1,9 @@
 #!/usr/bin/env bash
 # Installs the packages with apt into a clean Debian that runs in systemd-nspawn, changes the configuration, upgrades, removes and purges them.
-#   install_in_container.sh BUILD_FOLDER WORK_FOLDER
+#   install_in_container.sh MADE WORK_FOLDER      MADE: by make_packages.sh
 # WORK_FOLDER keeps the Debian and what apt fetched for the next time. Exit code 77: it cannot run here, and the last line says why.
 set -euo pipefail
-build=$(realpath "$1") here=$(cd "$(dirname "$0")" && pwd)
-source=$(cd "$here/../.." && pwd)
+made=$(realpath "$1") here=$(cd "$(dirname "$0")" && pwd)
 mkdir -p "$2"
 work=$(realpath "$2") root=$work/root
 . "$here/../support/left_out.sh"
@@ -23,8 +22,16 @@ fi
 
 rm -rf "$work/out" "$work/debs"
 mkdir -p "$work/out" "$work/debs" "$work/cache/archives/partial"
-"$source/toolchain/package" --build "$build" --out "$work/debs/old" --version 0.0.1-1 >/dev/null
-"$source/toolchain/package" --build "$build" --out "$work/debs/new" >/dev/null
+mkdir "$work/debs/old" "$work/debs/new"
+cp "$made"/*.deb "$work/debs/new/"
+# The same under a lower number, for the upgrade.
+for package in plumb plumbd; do
+  dpkg-deb -R "$work/debs/new/${package}"_*.deb "$work/debs/unpacked"
+  sed -Ei 's/^Version: .*/Version: 0.0.1-1/; s/\bplumb \(= [^)]*\)/plumb (= 0.0.1-1)/' \
+    "$work/debs/unpacked/DEBIAN/control"
+  dpkg-deb -Zgzip -z1 -b "$work/debs/unpacked" "$work/debs/old/" >/dev/null
+  rm -r "$work/debs/unpacked"
+done
 # The container has no network: what the packages depend on is fetched here.
 apt-get -q -y -o Dir::State="$root/var/lib/apt" -o Dir::State::status="$root/var/lib/dpkg/status" \
   -o Dir::Etc::sourcelist="$root/etc/apt/sources.list" -o Dir::Etc::sourceparts="$root/etc/apt/sources.list.d" \

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes the packages of a build twice and looks into them.
-#   packages.sh BUILD_FOLDER WORK_FOLDER
+# Makes the packages of a build once more and looks into them.
+#   packages.sh BUILD_FOLDER MADE WORK_FOLDER      MADE: by make_packages.sh
 # Packages for another processor are checked too; their programs run in QEMU. Exit code 77: it
 # cannot run here, and the last line says why.
 set -euo pipefail
@@ -14,9 +14,10 @@ fi
 source=$(cd "$here/../.." && pwd)
 . "$here/../support/left_out.sh"
 require dh lintian
-rm -rf "$2"
-mkdir -p "$2"
-cd "$2"
+once=$(realpath "$2")
+rm -rf "$3"
+mkdir -p "$3"
+cd "$3"
 failed=0
 check() { # NAME COMMAND...
   local name=$1
@@ -24,21 +25,20 @@ check() { # NAME COMMAND...
   if "$@" >check.log 2>&1; then echo "ok      $name"; else failed=1; echo "FAILED  $name"; sed 's/^/        /' check.log; fi
 }
 
-"$source/toolchain/package" --build "$build" --out once >made
 # Another place, time zone, language and umask must not show.
 (umask 077 && TMPDIR=$(mktemp -d -p "$PWD") TZ=Asia/Tokyo LANG=de_DE "$source/toolchain/package" --build "$build" --out twice >/dev/null)
-check "two runs give the same bytes" diff -r once twice
-check "lintian finds no error" lintian --allow-root --fail-on error --suppress-tags debug-file-with-no-debug-symbols once/*.deb
+check "two runs give the same bytes" diff -r "$once" twice
+check "lintian finds no error" lintian --allow-root --fail-on error --suppress-tags debug-file-with-no-debug-symbols "$once"/*.deb
 
 mkdir tree
-for package in plumb plumbd plumb-virtual-sensor libplumb-dev; do dpkg-deb -x once/${package}_*.deb "tree/$package"; done
+for package in plumb plumbd plumb-virtual-sensor libplumb-dev; do dpkg-deb -x "$once/${package}"_*.deb "tree/$package"; done
 check "binaries are hardened" "$here/hardening.sh" tree
 cat check.log
 
 every_library_is_depended_upon() {
   local package file library owner bad=0
   for package in plumb plumbd plumb-virtual-sensor; do
-    depends=" $(dpkg-deb -f once/${package}_*.deb Depends) "
+    depends=" $(dpkg-deb -f "$once/${package}"_*.deb Depends) "
     while IFS= read -r file; do
       case "$file" in *libOpenNI2.so* | *libOniFile.so*) continue ;; esac
       for library in $(readelf -dW "$file" 2>/dev/null | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p'); do
@@ -51,6 +51,18 @@ every_library_is_depended_upon() {
   return $bad
 }
 check "every library used is in Depends" every_library_is_depended_upon
+
+header_only_libraries_are_named() {
+  local package library bad=0
+  for package in plumb plumbd; do
+    for library in cli11 eigen3 nlohmann-json3 tomlplusplus; do
+      dpkg-deb -f "$once/${package}"_*.deb Static-Built-Using | grep -q "\b$library (= " ||
+        { echo "$package does not name $library in Static-Built-Using"; bad=1; }
+    done
+  done
+  return $bad
+}
+check "libraries that are headers only are named" header_only_libraries_are_named
 
 files_are_there() {
   local file bad=0
@@ -65,7 +77,7 @@ files_are_there() {
 }
 check "manual, licence and units are in" files_are_there
 
-dpkg-deb -e once/plumbd_*.deb control
+dpkg-deb -e "$once"/plumbd_*.deb control
 check "the configuration is a conffile" grep -qx /etc/plumb/plumb.toml control/conffiles
 check "no maintainer script removes data" bash -c '! grep -nE "rm .*/var/lib|deluser|userdel" control/postrm control/prerm'
 check "the configuration as delivered is good" "${run[@]}" tree/plumbd/usr/bin/plumbd --config tree/plumbd/etc/plumb/plumb.toml --check-config

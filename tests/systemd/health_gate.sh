@@ -33,7 +33,12 @@ run roll-back
 check "a release that was good is not left" '^0 $' "$code $(grep reboot calls || true)"
 echo "0.2.1 two" >release
 run roll-back
-check "a new one is" '^0 systemctl --no-block reboot$' "$code $(grep reboot calls || true)"
+check "a new one is, and the boot loader takes the other at once" \
+  '^0 rauc status mark-bad systemctl --no-block reboot $' "$code $(grep -E 'reboot|mark-bad' calls | tr '\n' ' ')"
+echo 'exit 1' >rauc
+run roll-back
+check "also where RAUC cannot mark it" '^0 .*cannot mark this system as bad' "$code $(cat log)"
+check "the machine restarts then too" 'reboot' "$(tail -1 calls)"
 
 rm gate/good
 : >calls

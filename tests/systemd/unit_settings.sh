@@ -47,6 +47,42 @@ mkdir data
 run stick "$work/stick"
 check "a stick without a file is no matter" '^0 $' "$code $(cat out)"
 
+cat >bin/grub-editenv <<'SCRIPT'
+#!/bin/sh
+if [ "$2" = list ]; then cat "$1"; else echo "$3" >>"$1"; fi
+SCRIPT
+chmod +x bin/grub-editenv
+export PLUMB_UNIT_ENV=$work/unitenv PLUMB_MACHINE_ID=$work/machine-id
+echo 11111111111111111111111111111111 >machine-id
+run
+check "without the boot loader's file no machine ID is kept" '^0 $' "$code $(cat out)"
+: >unitenv
+run
+check "the first start's machine ID is kept" '^0 .*kept for the next ones MACHINE_ID=1{32}$' "$code $(cat out unitenv | tr '\n' ' ' | xargs)"
+run
+check "a start that was handed it over says so" 'is that of the first start' "$(cat out)"
+echo 22222222222222222222222222222222 >machine-id
+run
+check "and one with another ID" '^0 .*not that of the first start.* MACHINE_ID=1{32}$' "$code $(cat out) $(cat unitenv)"
+printf '#!/bin/sh\n[ "$2" = list ]\n' >bin/grub-editenv
+run
+check "a start goes on where it cannot be kept" '^0 .*cannot be kept' "$code $(cat out)"
+
+mkdir -p data/provision
+echo 480 >data/provision/burn-in
+printf '#!/bin/sh\necho "$@"\nexit 1\n' >bin/plumb
+chmod +x bin/plumb
+"$source/systemd/burn-in" >out
+report=$(tr '\n' ' ' <data/provision/burn-in.txt)
+check "a burn-in that was requested is run" \
+  "^doctor --burn-in 480 --burn-in-folder $work/data .*480 minutes: FAILED .exit code 1." "$report"
+check "its report is in the journal too" '480 minutes: FAILED' "$(cat out)"
+check "and it is not run again" '^burn-in.txt $' "$(ls data/provision | tr '\n' ' ')"
+echo 1 >data/provision/burn-in
+printf '#!/bin/sh\n' >bin/plumb
+"$source/systemd/burn-in" >out
+check "one that passes says so" '^burn-in of 1 minutes: passed' "$(cat data/provision/burn-in.txt)"
+
 cat >bin/plumb <<'SCRIPT'
 #!/bin/sh
 case "$3" in state) echo ready ;; page.url) echo https://0.0.0.0:8080 ;; page.certificate) echo AB:CD ;; esac
@@ -65,6 +101,8 @@ for line in 'Page         https://10.1.1.5:8080/' 'Page         https://\[fd00::
   'State        ready' 'enter the setup code: ABCD-EFGH'; do
   check "the screen shows: $line" "$line" "$screen"
 done
+sed -i s/:8080/:9443/ bin/plumb
+check "the screen shows another port" 'https://10.1.1.5:9443/' "$("$source/systemd/console-screen" once)"
 echo '{"setup_required":false}' >session
 check "with an account no setup code" '^none$' "$("$source/systemd/console-screen" once | grep -q 'setup code' || echo none)"
 exit $failed

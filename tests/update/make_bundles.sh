@@ -3,17 +3,12 @@
 # FOLDER alone.
 #   make_bundles.sh FOLDER
 set -euo pipefail
+source=$(cd "$(dirname "$0")/../.." && pwd)
 cd "$1"
 mkdir -p slots pki state
-authority() { # NAME: certificate authority and a certificate that may sign code
-  openssl req -x509 -newkey rsa:2048 -nodes -sha256 -days 7300 -subj "/CN=Plumb test $1" -keyout "pki/$1-ca.key" -out "pki/$1-ca.pem"
-  openssl req -newkey rsa:2048 -nodes -sha256 -subj "/CN=$1 signer" -keyout "pki/$1.key" -out "pki/$1.csr"
-  openssl x509 -req -in "pki/$1.csr" -CA "pki/$1-ca.pem" -CAkey "pki/$1-ca.key" -CAcreateserial -days 7300 -sha256 -out "pki/$1.pem" \
-    -extfile <(printf 'basicConstraints=CA:FALSE\nkeyUsage=digitalSignature\nextendedKeyUsage=codeSigning\nsubjectKeyIdentifier=hash\nauthorityKeyIdentifier=keyid\n')
-}
-authority own
-authority next
-authority stranger
+for name in own next stranger; do
+  PLUMB_KEY_BITS=2048 "$source/toolchain/signing-keys" pki $name
+done
 
 bundle() { # NAME VERSION COMPATIBLE SIGNER FORMAT [IMAGE]: noise where no image is given
   rm -rf content

@@ -14,7 +14,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/update/bundle_check.hpp"
 #include "daemon/update/updater.hpp"
 #include "tests/support/private_bus.hpp"
 #include "tests/support/skip.hpp"
@@ -306,17 +305,6 @@ TEST_F(RaucTest, AnotherAuthorityTakesOverByWayOfAnUpdate) {
     EXPECT_EQ(InstallToTheEnd("next"), "");
     EXPECT_TRUE(SlotHolds("b", "next"));
   });
-}
-
-TEST(BundleDamageTest, WhatIsNoBundleIsUnknown) {
-  const TempFolder folder;
-  EXPECT_EQ(LookForDamage(folder / "none"), BundleState::kUnknown);
-  for (const std::size_t size : {0U, 7U, 8U, 9U, 100U, 5000U}) {
-    for (const char fill : {'\0', '\1', '\xFF'}) {
-      std::ofstream(folder / "file", std::ios::binary) << std::string(size, fill);
-      EXPECT_EQ(LookForDamage(folder / "file"), BundleState::kUnknown) << size;
-    }
-  }
 }
 
 }  // namespace

@@ -37,5 +37,19 @@ TEST(VersionTest, AreComparedNumberByNumber) {
   EXPECT_FALSE(IsOlder("1.0", "0.99.99"));
 }
 
+TEST(VersionTest, AnImagesReleaseFileNamesTheSystem) {
+  const testing::TempFolder folder;
+  const auto with = [&](const std::string& text) {
+    std::ofstream(folder / "release") << text;
+    return VersionOfSystem(folder / "release", "0.2.0");
+  };
+  EXPECT_EQ(with("0.2.1 0123456789abcdef\n"), "0.2.1");
+  EXPECT_EQ(with("0.3.0"), "0.3.0");
+  EXPECT_EQ(with(""), "0.2.0");
+  EXPECT_EQ(with("unknown\n"), "0.2.0");
+  EXPECT_EQ(with(std::string(100'000, '1')), std::string(64, '1'));
+  EXPECT_EQ(VersionOfSystem(folder / "none", "0.2.0"), "0.2.0");
+}
+
 }  // namespace
 }  // namespace plumb
