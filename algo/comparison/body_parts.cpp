@@ -207,6 +207,8 @@ struct Midline {
   [[nodiscard]] double at(double along) const { return offset + slope * along; }
 };
 
+constexpr int kHeadRank = -1;  // Before the parts below the shoulders, which count from 0.
+
 // Names of the parts from head to feet. All but the head have two sides.
 class Naming {
  public:
@@ -220,7 +222,7 @@ class Naming {
     const int of_side = side > midline_.at(along) ? 0 : 1;
     if (!shoulders_)
       return 2 * std::clamp(static_cast<int>(3 * (along - begin_m_) / length_m_), 0, 2) + of_side;
-    if (along < shoulders_->line_m) return -1;
+    if (along < shoulders_->line_m) return kHeadRank;
     const double down = (along - shoulders_->line_m) / shoulders_->width_m;
     const auto band =
         std::find_if(kBands.begin(), kBands.end() - 1, [&](const Band& b) { return down < b.end; });
@@ -228,7 +230,7 @@ class Naming {
   }
 
   [[nodiscard]] std::string NameOf(int rank) const {
-    if (rank < 0) return "head and neck";
+    if (rank == kHeadRank) return "head and neck";
     const auto place = static_cast<std::size_t>(rank / 2);
     const bool is_plus = rank % 2 == 0;
     if (shoulders_) return fmt::format("{} {}", is_plus ? "left" : "right", kBands[place].name);

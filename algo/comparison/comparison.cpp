@@ -71,7 +71,6 @@ void CheckScenesMatch(const Scene& reference, const Scene& current) {
   }
 }
 
-// The scene's surface as a cloud with normals, in the reference frame.
 // One comparison in progress. Compare() runs its steps in order.
 class Comparer {
  public:

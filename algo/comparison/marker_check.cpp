@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -143,13 +144,13 @@ class Checker {
     std::vector<std::pair<const SceneMarker*, const SceneMarker*>> good;
     for (const int id : agreeing) good.emplace_back(&baseline_->markers.at(id), &seen_.at(id));
     double moved_m = 0.0;
-    int worst = -1;
+    std::optional<int> worst;  // The alignment used at least one of them.
     for (const auto& [id, marker] : seen_) {
       const auto known = baseline_->markers.find(id);
       if (known == baseline_->markers.end()) continue;
       const Pose T = FitWithout(id, agreeing).value_or(outcome.alignment->T_reference_current);
       const double off_m = (T * CentreOf(marker) - CentreOf(known->second)).norm();
-      if (worst < 0 || off_m > moved_m) moved_m = off_m, worst = id;
+      if (!worst || off_m > moved_m) moved_m = off_m, worst = id;
     }
     const double misfit_mm = outcome.alignment->rms_m / kMillimetre,
                  moved_mm = moved_m / kMillimetre;
@@ -158,8 +159,8 @@ class Checker {
                "the markers lie {:.1f} mm (RMS) off where they lay, at most {:g} mm are allowed",
                misfit_mm, limits_.max_misfit_m / kMillimetre));
     AtMost("moved", moved_mm, limits_.max_moved_m / kMillimetre, "mm",
-           fmt::format("marker {}", worst),
-           fmt::format("marker {} moved {:.0f} mm", worst, moved_mm));
+           fmt::format("marker {}", worst.value()),
+           fmt::format("marker {} moved {:.0f} mm", worst.value(), moved_mm));
     const double scale = 100 * (ScaleOf(good) - 1);
     AtMost("scale", scale, 100 * limits_.max_scale_share, "%", "",
            fmt::format("the markers lie {:.2f} % farther apart than they did: the sensor's "
@@ -169,21 +170,21 @@ class Checker {
 
   void Sides() {
     double worst = kNotKnown;
-    int id_of_worst = -1;
+    std::optional<int> id_of_worst;
     for (const auto& [id, marker] : seen_) {
       const double off = 100 * (SideOf(marker) / scene_.marker_length_m - 1);
-      if (id_of_worst < 0 || std::abs(off) > std::abs(worst)) worst = off, id_of_worst = id;
+      if (!id_of_worst || std::abs(off) > std::abs(worst)) worst = off, id_of_worst = id;
     }
     // Preset `best` assumes that every marker has its nominal size, so that its sides were not
     // measured and cannot be checked.
     if (std::abs(worst) < kAssumed_percent) return;
     AtMost("side", worst, 100 * limits_.max_side_share, "%",
-           id_of_worst < 0 ? "" : fmt::format("marker {}", id_of_worst),
-           id_of_worst < 0
-               ? std::string("no marker was seen, so none could be measured")
-               : fmt::format(
+           id_of_worst ? fmt::format("marker {}", *id_of_worst) : "",
+           id_of_worst
+               ? fmt::format(
                      "marker {} measures {:+.1f} % of its length: is its print of the right size?",
-                     id_of_worst, worst));
+                     *id_of_worst, worst)
+               : "no marker was seen, so none could be measured");
   }
 
   void Depth() {

@@ -147,13 +147,13 @@ std::optional<SupportPlane> ChooseSupport(const Surface& scene,
 void KeepLargestComponent(Body& body) {
   const int width = body.grid.width;
   const int height = body.grid.height;
-  std::vector<int> label(body.cells.size(), -1);
+  std::vector<std::uint32_t> label(body.cells.size(), 0);  // 0: in no component yet.
   std::vector<std::size_t> stack;
-  int best = -1;
+  std::uint32_t best = 0;
   std::size_t best_size = 0;
-  int next = 0;
+  std::uint32_t next = 1;
   for (std::size_t start = 0; start < body.cells.size(); ++start) {
-    if (body.cells[start] != Body::kBody || label[start] >= 0) continue;
+    if (body.cells[start] != Body::kBody || label[start] != 0) continue;
     std::size_t size = 0;
     stack.assign(1, start);
     label[start] = next;
@@ -167,7 +167,7 @@ void KeepLargestComponent(Body& body) {
         for (int c = std::max(column - 1, 0); c <= std::min(column + 1, width - 1); ++c) {
           const std::size_t other = static_cast<std::size_t>(r) * static_cast<std::size_t>(width) +
                                     static_cast<std::size_t>(c);
-          if (body.cells[other] != Body::kBody || label[other] >= 0) continue;
+          if (body.cells[other] != Body::kBody || label[other] != 0) continue;
           label[other] = next;
           stack.push_back(other);
         }

@@ -444,7 +444,7 @@ class MapFiller {
     result_.map.z[Index(row, column)] = seed.z() + rise;
     if (!result_.colors.empty())
       result_.colors[Index(row, column)] =
-          views_[static_cast<std::size_t>(fused.best_view)].ColorAt(fused.best_pixel);
+          views_[fused.best_view.value()].ColorAt(fused.best_pixel);
   }
 
   std::span<const ViewSurface> views_;

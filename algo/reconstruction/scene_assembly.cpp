@@ -121,7 +121,7 @@ void KeepHeightMap(HeightMap map, Scene& scene) {
       "no surface was measured around reference marker {}, up to some decimetres below and above "
       "it: the scene has no height "
       "map and cannot be a reference; lay the marker flat beside the body and sweep over both",
-      scene.reference_marker.value_or(-1)));
+      scene.reference_marker.value()));
 }
 
 }  // namespace plumb

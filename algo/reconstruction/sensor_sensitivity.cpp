@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <map>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -21,9 +22,9 @@ using Columns = Eigen::Matrix<double, 3, kCalibrationSize>;
 // Rows of the posterior's covariance with the calibration, for a twist; zero for what stayed.
 using TwistColumns = Eigen::Matrix<double, 6, kCalibrationSize>;
 
-TwistColumns RowsOf(const BundlePosterior& posterior, Eigen::Index first) {
-  if (first < 0) return TwistColumns::Zero();
-  return posterior.with_calibration.middleRows<6>(first);
+TwistColumns RowsOf(const BundlePosterior& posterior, std::optional<Eigen::Index> first) {
+  if (!first) return TwistColumns::Zero();
+  return posterior.with_calibration.middleRows<6>(*first);
 }
 
 // Covariance of a point with the calibration in the reference marker's frame, which moves itself.
@@ -136,8 +137,8 @@ SensorSensitivity SensitivityOf(const Intrinsics& stated, const CalibrationModel
   const MarkerFrame frame{reference.T_world_marker.inverse(),
                           RowsOf(posterior, posterior.MarkerAt(reference_marker))};
   for (const auto& [id, marker] : map.markers) {
-    const Eigen::Index first = posterior.MarkerAt(id);
-    if (first < 0) continue;
+    const std::optional<Eigen::Index> first = posterior.MarkerAt(id);
+    if (!first) continue;
     const Columns in_world =
         Moved(marker.T_world_marker.linear(), Eigen::Vector3d::Zero(), 1, RowsOf(posterior, first));
     result.markers[id] = derivative(

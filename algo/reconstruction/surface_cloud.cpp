@@ -246,8 +246,7 @@ Shards<Merged> MoveSeeds(std::span<const ViewSurface> views, const ViewFusion& f
       continue;
     const Eigen::Vector3f point = p + fused.offset_m * n;
     Color color = {0, 0, 0};
-    if (options.with_colors)
-      color = views[static_cast<std::size_t>(fused.best_view)].ColorAt(fused.best_pixel);
+    if (options.with_colors) color = views[fused.best_view.value()].ColorAt(fused.best_pixel);
     const Key key = KeyOf(point, 1.0F / voxel_size);
     moved[ShardOf(key)].push_back({key, point, fused.normal, fused.weight, color});
   }

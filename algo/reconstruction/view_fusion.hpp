@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,10 +27,11 @@ struct FusionOptions {
 struct FusedPoint {
   float offset_m =
       0.0F;  ///< Robust weighted mean of the surface's signed distance along the seed's normal.
-  float weight = 0.0F;           ///< Sum of the views' weights, 1/m^2.
-  int num_agreeing = 0;          ///< Views that measured the surface within the band.
-  int num_through = 0;           ///< Views that see through the seed.
-  int best_view = -1;            ///< Index of the agreeing view with the largest weight, or -1.
+  float weight = 0.0F;   ///< Sum of the views' weights, 1/m^2.
+  int num_agreeing = 0;  ///< Views that measured the surface within the band.
+  int num_through = 0;   ///< Views that see through the seed.
+  /// Index of the agreeing view with the largest weight, if a view agrees.
+  std::optional<std::uint16_t> best_view;
   std::uint32_t best_pixel = 0;  ///< Working pixel of the best view.
   Eigen::Vector3f normal =
       Eigen::Vector3f::Zero();  ///< Weighted mean of the agreeing views; world frame, unit length.

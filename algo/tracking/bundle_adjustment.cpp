@@ -143,8 +143,8 @@ void Solver::MakePoint(std::size_t s, double damping) {
     const PointRows& view = equations_.rows()[i];
     V.noalias() += view.J_point.transpose() * view.J_point;
     point.g.noalias() += view.J_point.transpose() * view.r;
-    const int slot = problem_.PoseSlot(problem_.views()[i].keyframe);
-    if (slot >= 0) point.W.emplace_back(slot, view.J_camera.transpose() * view.J_point);
+    if (const std::optional<int> slot = problem_.PoseSlot(problem_.views()[i].keyframe))
+      point.W.emplace_back(*slot, view.J_camera.transpose() * view.J_point);
     if (options_.calibrate) point.W_calibration += view.CalibrationTimes<3>(view.J_point);
   }
   V.diagonal() *= 1.0 + damping;
@@ -228,10 +228,8 @@ BundlePosterior Solver::Posterior(Eigen::MatrixXd S) const {
     unit.bottomRightCorner<kNumDepthTerms - kDepthField, kNumDepthTerms - kDepthField>().setZero();
   posterior.with_calibration = solver.solve(unit);
   if (!posterior.with_calibration.allFinite()) return {};
-  for (std::size_t k = 0; k < problem_.num_keyframes(); ++k) {
-    const int slot = problem_.PoseSlot(static_cast<int>(k));
-    posterior.camera_rows.push_back(slot < 0 ? -1 : kCamera * static_cast<Eigen::Index>(slot));
-  }
+  for (std::size_t k = 0; k < problem_.num_keyframes(); ++k)
+    posterior.camera_rows.push_back(problem_.CameraAt(static_cast<int>(k)));
   for (const auto& [id, slot] : problem_.marker_slots())
     posterior.marker_rows[id] = problem_.MarkerAt(slot);
   return posterior;

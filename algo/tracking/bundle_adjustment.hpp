@@ -58,17 +58,19 @@ struct BundleOptions {
 /// Landmarks are eliminated.
 struct BundlePosterior {
   Eigen::Matrix<double, Eigen::Dynamic, kCalibrationSize> with_calibration;
-  std::vector<Eigen::Index> camera_rows;    ///< First row of each keyframe; negative: it stayed.
+  /// First row of each keyframe. A keyframe that was fixed has none.
+  std::vector<std::optional<Eigen::Index>> camera_rows;
   std::map<int, Eigen::Index> marker_rows;  ///< By id.
 
   [[nodiscard]] bool empty() const { return with_calibration.rows() == 0; }
-  [[nodiscard]] Eigen::Index CameraAt(int keyframe) const {
+  [[nodiscard]] std::optional<Eigen::Index> CameraAt(int keyframe) const {
     return camera_rows[static_cast<std::size_t>(keyframe)];
   }
-  /// Negative for a marker that took no part.
-  [[nodiscard]] Eigen::Index MarkerAt(int id) const {
+  /// A marker that took no part has no row.
+  [[nodiscard]] std::optional<Eigen::Index> MarkerAt(int id) const {
     const auto found = marker_rows.find(id);
-    return found == marker_rows.end() ? -1 : found->second;
+    if (found == marker_rows.end()) return std::nullopt;
+    return found->second;
   }
   [[nodiscard]] CalibrationMatrix calibration() const {
     return with_calibration.bottomRows<kCalibrationSize>();

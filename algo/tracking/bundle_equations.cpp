@@ -50,7 +50,7 @@ void Equations::Linearise(const State& state) {
 void Equations::LineariseKeyframe(const State& state, std::size_t k,
                                   CalibrationMatrix& H_calibration,
                                   CalibrationVector& g_calibration) {
-  const int slot = problem_.PoseSlot(static_cast<int>(k));
+  const std::optional<Eigen::Index> at = problem_.CameraAt(static_cast<int>(k));
   const bool calibrate = problem_.options().calibrate;
   CameraMatrix H = CameraMatrix::Zero();
   CameraVector g = CameraVector::Zero();
@@ -65,14 +65,14 @@ void Equations::LineariseKeyframe(const State& state, std::size_t k,
   for (const std::uint32_t i : views) {
     rows_[i] = RowsOf(state, problem_.views()[i]);
     const PointRows& rows = rows_[i];
-    if (slot >= 0) {
+    if (at) {
       H.noalias() += rows.J_camera.transpose() * rows.J_camera;
       g.noalias() += rows.J_camera.transpose() * rows.r;
     }
     if (!calibrate) continue;
     J_depth.col(row) = rows.J_depth.transpose();
     J_camera.col(row++) = rows.J_camera.row(2).transpose();
-    if (slot >= 0)
+    if (at)
       H_coupled.topRows<kLensAndReadout>().noalias() +=
           rows.J_lens.transpose() * rows.J_camera.topRows<2>();
     H_calibration.topLeftCorner<kLensAndReadout, kLensAndReadout>().noalias() +=
@@ -83,15 +83,14 @@ void Equations::LineariseKeyframe(const State& state, std::size_t k,
     H_calibration.bottomRightCorner<CalibrationModel::kDepthSize, CalibrationModel::kDepthSize>()
         .selfadjointView<Eigen::Lower>()
         .rankUpdate(J_depth);
-    if (slot >= 0)
+    if (at)
       H_coupled.bottomRows<CalibrationModel::kDepthSize>().noalias() +=
           J_depth * J_camera.transpose();
   }
-  if (slot >= 0) {
-    H_.block<kCamera, kCamera>(kCamera * slot, kCamera * slot) += H;
-    g_.segment<kCamera>(kCamera * slot) += g;
-    if (calibrate)
-      H_.block<kCalibrationSize, kCamera>(problem_.calibration_at(), kCamera * slot) += H_coupled;
+  if (at) {
+    H_.block<kCamera, kCamera>(*at, *at) += H;
+    g_.segment<kCamera>(*at) += g;
+    if (calibrate) H_.block<kCalibrationSize, kCamera>(problem_.calibration_at(), *at) += H_coupled;
   }
   for (const std::uint32_t i : problem_.CornersOfKeyframe(k))
     corner_rows_[i] = RowsOf(state, problem_.corners()[i]);
@@ -175,21 +174,21 @@ CornerRows Equations::RowsOf(const State& state, const CornerView& view) const {
 
 void Equations::AddCornersOfKeyframe(std::size_t k, CalibrationMatrix& H_calibration,
                                      CalibrationVector& g_calibration) {
-  const Eigen::Index a = problem_.CameraAt(static_cast<int>(k));
+  const std::optional<Eigen::Index> a = problem_.CameraAt(static_cast<int>(k));
   for (const std::uint32_t i : problem_.CornersOfKeyframe(k)) {
     const CornerRows& rows = corner_rows_[i];
-    if (a >= 0) {
+    if (a) {
       const Eigen::Index m = problem_.MarkerAt(problem_.corners()[i].marker);
-      H_.block<kCamera, kCamera>(a, a).noalias() += rows.J_camera.transpose() * rows.J_camera;
-      H_.block<6, kCamera>(m, a).noalias() += rows.J_marker.transpose() * rows.J_camera;
-      g_.segment<kCamera>(a).noalias() += rows.J_camera.transpose() * rows.r;
+      H_.block<kCamera, kCamera>(*a, *a).noalias() += rows.J_camera.transpose() * rows.J_camera;
+      H_.block<6, kCamera>(m, *a).noalias() += rows.J_marker.transpose() * rows.J_camera;
+      g_.segment<kCamera>(*a).noalias() += rows.J_camera.transpose() * rows.r;
     }
     if (!problem_.options().calibrate) continue;
     H_calibration.topLeftCorner<kSeenByCorners, kSeenByCorners>().noalias() +=
         rows.J_calibration.transpose() * rows.J_calibration;
     g_calibration.head<kSeenByCorners>().noalias() += rows.J_calibration.transpose() * rows.r;
-    if (a >= 0)
-      H_.block<kSeenByCorners, kCamera>(problem_.calibration_at(), a).noalias() +=
+    if (a)
+      H_.block<kSeenByCorners, kCamera>(problem_.calibration_at(), *a).noalias() +=
           rows.J_calibration.transpose() * rows.J_camera;
   }
 }
@@ -211,10 +210,10 @@ void Equations::AddTerm(const QuadraticTerm& term, const Problem::TermVector& sl
   constexpr int kFocalAt = QuadraticTerm::kFocalAt;
   constexpr int kDepthSize = CalibrationModel::kDepthSize;
   constexpr int kDepth = QuadraticTerm::kDepthCalibrationAt;
-  const Eigen::Index a = problem_.CameraAt(term.keyframe_a);
-  const Eigen::Index b = term.keyframe_b
-                             ? problem_.CameraAt(*term.keyframe_b)
-                             : problem_.MarkerAt(problem_.MarkerSlot(term.marker.value()));
+  const std::optional<Eigen::Index> a = problem_.CameraAt(term.keyframe_a);
+  const std::optional<Eigen::Index> b =
+      term.keyframe_b ? problem_.CameraAt(*term.keyframe_b)
+                      : problem_.MarkerAt(problem_.MarkerSlot(term.marker.value()));
   const Eigen::Index f = problem_.calibration_at() + kLensAt;
   const Eigen::Index d = problem_.calibration_at() + kDepthAt;
   const auto add_pose = [&](Eigen::Index at, Eigen::Index in_term) {
@@ -224,13 +223,13 @@ void Equations::AddTerm(const QuadraticTerm& term, const Problem::TermVector& sl
     H_.block<kFocal, 6>(f, at) += term.H.block<kFocal, 6>(kFocalAt, in_term);
     H_.block<kDepthSize, 6>(d, at) += term.H.block<kDepthSize, 6>(kDepth, in_term);
   };
-  if (a >= 0) add_pose(a, 0);
-  if (b >= 0) add_pose(b, 6);
-  if (a >= 0 && b >= 0) {
-    if (b > a) {
-      H_.block<6, 6>(b, a) += term.H.block<6, 6>(6, 0);
+  if (a) add_pose(*a, 0);
+  if (b) add_pose(*b, 6);
+  if (a && b) {
+    if (*b > *a) {
+      H_.block<6, 6>(*b, *a) += term.H.block<6, 6>(6, 0);
     } else {
-      H_.block<6, 6>(a, b) += term.H.block<6, 6>(0, 6);
+      H_.block<6, 6>(*a, *b) += term.H.block<6, 6>(0, 6);
     }
   }
   if (!problem_.options().calibrate) return;

@@ -27,10 +27,10 @@ Problem::Problem(const Intrinsics& stated, const BundleOptions& options,
       terms_(terms),
       map_(map),
       calibration_(calibration),
-      pose_slot_(map.keyframes.size(), -1) {
+      pose_slot_(map.keyframes.size()) {
   for (const int k : options.free_keyframes) {
-    int& slot = pose_slot_[static_cast<std::size_t>(k)];
-    if (slot >= 0) continue;
+    std::optional<int>& slot = pose_slot_[static_cast<std::size_t>(k)];
+    if (slot) continue;
     slot = static_cast<int>(free_.size());
     free_.push_back(k);
   }
@@ -51,8 +51,10 @@ const Pose& Problem::MarkerPose(int slot) const {
   return T_world_marker0_[static_cast<std::size_t>(slot)];
 }
 
-Eigen::Index Problem::CameraAt(int keyframe) const {
-  return kCamera * static_cast<Eigen::Index>(PoseSlot(keyframe));
+std::optional<Eigen::Index> Problem::CameraAt(int keyframe) const {
+  const std::optional<int> slot = PoseSlot(keyframe);
+  if (!slot) return std::nullopt;
+  return kCamera * static_cast<Eigen::Index>(*slot);
 }
 
 double Problem::PixelWeight() const {
@@ -90,13 +92,13 @@ void Problem::CollectMarkers() {
 void Problem::CollectPoints() {
   // The landmarks that a free keyframe observes, and all observations of them. A landmark with only
   // one observation constrains nothing.
-  std::vector<int> slot(map_.landmarks.size(), -1);
+  std::vector<std::optional<int>> slot(map_.landmarks.size());
   for (const int k : free_) {
     for (const KeypointObservation& o : map_.keyframes[static_cast<std::size_t>(k)].keypoints) {
       const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
       if (options_.keep_witnesses_out && IsWitness(landmark, o.landmark)) continue;
-      int& s = slot[static_cast<std::size_t>(o.landmark)];
-      if (s >= 0 || !landmark.usable || landmark.num_observations < 2) continue;
+      std::optional<int>& s = slot[static_cast<std::size_t>(o.landmark)];
+      if (s || !landmark.usable || landmark.num_observations < 2) continue;
       s = static_cast<int>(landmarks_.size());
       landmarks_.push_back(o.landmark);
     }
@@ -105,18 +107,19 @@ void Problem::CollectPoints() {
   for (const MapKeyframe& keyframe : map_.keyframes)
     first_view.push_back(
         first_view.back() +
-        static_cast<std::size_t>(std::count_if(
-            keyframe.keypoints.begin(), keyframe.keypoints.end(),
-            [&](const auto& o) { return slot[static_cast<std::size_t>(o.landmark)] >= 0; })));
+        static_cast<std::size_t>(
+            std::count_if(keyframe.keypoints.begin(), keyframe.keypoints.end(), [&](const auto& o) {
+              return slot[static_cast<std::size_t>(o.landmark)].has_value();
+            })));
   views_.resize(first_view.back());
   tbb::parallel_for(std::size_t{0}, map_.keyframes.size(), [&](std::size_t k) {
     std::size_t at = first_view[k];
     for (const KeypointObservation& o : map_.keyframes[k].keypoints) {
-      const int s = slot[static_cast<std::size_t>(o.landmark)];
-      if (s < 0) continue;
+      const std::optional<int> s = slot[static_cast<std::size_t>(o.landmark)];
+      if (!s) continue;
       PointView& view = views_[at++];
       view = {static_cast<int>(k),
-              s,
+              *s,
               o.pixel,
               DepthPlace(o.pixel, stated_),
               {o.z_m, o.inverse_depth_slope}};

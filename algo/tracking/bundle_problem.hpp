@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -80,8 +81,8 @@ class Problem {
   /// The state at the beginning.
   [[nodiscard]] const Pose& MarkerPose(int slot) const;
   [[nodiscard]] int MarkerSlot(int id) const { return markers_.at(id); }
-  /// First unknown of a keyframe; negative if it is fixed.
-  [[nodiscard]] Eigen::Index CameraAt(int keyframe) const;
+  /// First unknown of a keyframe, unless it is fixed.
+  [[nodiscard]] std::optional<Eigen::Index> CameraAt(int keyframe) const;
   [[nodiscard]] Eigen::Index MarkerAt(int slot) const { return markers_at_ + 6 * slot; }
   [[nodiscard]] Eigen::Index calibration_at() const { return calibration_at_; }
   [[nodiscard]] Eigen::Index size() const { return size_; }
@@ -93,7 +94,8 @@ class Problem {
   [[nodiscard]] const std::vector<CornerView>& corners() const { return corners_; }
   /// Free keyframes, by pose slot.
   [[nodiscard]] const std::vector<int>& free() const { return free_; }
-  [[nodiscard]] int PoseSlot(int keyframe) const {
+  /// Place of a keyframe in free(), unless it is fixed.
+  [[nodiscard]] std::optional<int> PoseSlot(int keyframe) const {
     return pose_slot_[static_cast<std::size_t>(keyframe)];
   }
   [[nodiscard]] std::size_t num_keyframes() const { return pose_slot_.size(); }
@@ -128,8 +130,8 @@ class Problem {
   TrackingMap& map_;
   CalibrationModel& calibration_;
   std::vector<int> free_;
-  std::vector<int> pose_slot_;  // Per keyframe; -1 if it is fixed.
-  std::map<int, int> markers_;  // From id to slot.
+  std::vector<std::optional<int>> pose_slot_;  // Per keyframe.
+  std::map<int, int> markers_;                 // From id to slot.
   std::vector<Pose> T_world_marker0_;
   std::vector<int> landmarks_;  // Ids by slot.
   std::vector<PointView> views_;

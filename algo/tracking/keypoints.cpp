@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 
 #include <Eigen/Geometry>
 #include <opencv2/features2d.hpp>
@@ -42,21 +43,20 @@ void AddBestOfCells(const cv::Mat& gray, const cv::Rect& run, int cell,
   for (int first = run.x; first < run.br().x;) {
     const int end = std::min((first / cell + 1) * cell, run.br().x);
     float best = threshold;
-    cv::Point peak(-1, -1);
+    std::optional<cv::Point> peak;
     for (int y = run.y; y < run.br().y; ++y) {
       for (int x = first; x < end; ++x) {
         if (at(y, x) > best) {
           best = at(y, x);
-          peak = {x, y};
+          peak.emplace(x, y);
         }
       }
     }
     first = end;
-    if (peak.x < 0) continue;
-    corners.emplace_back(static_cast<float>(peak.x) +
-                             PeakOffset(at(peak.y, peak.x - 1), best, at(peak.y, peak.x + 1)),
-                         static_cast<float>(peak.y) +
-                             PeakOffset(at(peak.y - 1, peak.x), best, at(peak.y + 1, peak.x)));
+    if (!peak) continue;
+    const auto [x, y] = std::pair(peak->x, peak->y);
+    corners.emplace_back(static_cast<float>(x) + PeakOffset(at(y, x - 1), best, at(y, x + 1)),
+                         static_cast<float>(y) + PeakOffset(at(y - 1, x), best, at(y + 1, x)));
   }
 }
 

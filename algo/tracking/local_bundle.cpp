@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 
 #include <Eigen/Cholesky>
 
@@ -59,7 +60,7 @@ class LocalBundle {
       : intrinsics_(intrinsics),
         options_(options),
         map_(map),
-        slot_of_keyframe_(map.keyframes.size(), -1) {
+        slot_of_keyframe_(map.keyframes.size()) {
     for (const int k : options.free_keyframes)
       slot_of_keyframe_[static_cast<std::size_t>(k)] = num_poses_++;
     const double scale = intrinsics.width / 640.0;
@@ -104,13 +105,13 @@ class LocalBundle {
   };
 
   void CollectPoints() {
-    std::vector<int> slot(map_.landmarks.size(), -1);
+    std::vector<std::optional<int>> slot(map_.landmarks.size());
     for (const int k : options_.free_keyframes) {
       for (const KeypointObservation& o : map_.keyframes[static_cast<std::size_t>(k)].keypoints) {
         const Landmark& landmark = map_.landmarks[static_cast<std::size_t>(o.landmark)];
-        int& s = slot[static_cast<std::size_t>(o.landmark)];
+        std::optional<int>& s = slot[static_cast<std::size_t>(o.landmark)];
         // A landmark with only one observation constrains nothing.
-        if (s >= 0 || !landmark.usable || landmark.num_observations < 2) continue;
+        if (s || !landmark.usable || landmark.num_observations < 2) continue;
         s = static_cast<int>(landmarks_.size());
         landmarks_.push_back(o.landmark);
       }
@@ -119,8 +120,8 @@ class LocalBundle {
     const auto for_each = [&](const auto& visit) {
       for (std::size_t k = 0; k < map_.keyframes.size(); ++k)
         for (const KeypointObservation& o : map_.keyframes[k].keypoints)
-          if (const int s = slot[static_cast<std::size_t>(o.landmark)]; s >= 0)
-            visit(static_cast<int>(k), static_cast<std::size_t>(s), o);
+          if (const std::optional<int> s = slot[static_cast<std::size_t>(o.landmark)])
+            visit(static_cast<int>(k), static_cast<std::size_t>(*s), o);
     };
     for_each([&](int, std::size_t s, const KeypointObservation&) { ++first_view_[s + 1]; });
     for (std::size_t s = 0; s < landmarks_.size(); ++s) first_view_[s + 1] += first_view_[s];
@@ -250,12 +251,12 @@ class LocalBundle {
       const Eigen::Matrix3d J_point = J_camera * T_camera_world.linear();
       point.V.noalias() += J_point.transpose() * J_point;
       point.g.noalias() += J_point.transpose() * r;
-      const int slot = slot_of_keyframe_[static_cast<std::size_t>(view.keyframe)];
-      if (slot < 0) continue;
+      const std::optional<int> slot = slot_of_keyframe_[static_cast<std::size_t>(view.keyframe)];
+      if (!slot) continue;
       const Matrix3x6d J_pose = J_camera * PoseDerivative(p);
-      H.block<6, 6>(6 * slot, 6 * slot).noalias() += J_pose.transpose() * J_pose;
-      g.segment<6>(6 * slot).noalias() += J_pose.transpose() * r;
-      point.W.emplace_back(slot, J_pose.transpose() * J_point);
+      H.block<6, 6>(6 * *slot, 6 * *slot).noalias() += J_pose.transpose() * J_pose;
+      g.segment<6>(6 * *slot).noalias() += J_pose.transpose() * r;
+      point.W.emplace_back(*slot, J_pose.transpose() * J_point);
     }
   }
 
@@ -276,12 +277,12 @@ class LocalBundle {
     const int m = 6 * (num_poses_ + view.marker);
     H.block<6, 6>(m, m).noalias() += J_marker.transpose() * J_marker;
     g.segment<6>(m).noalias() += J_marker.transpose() * r;
-    const int slot = slot_of_keyframe_[static_cast<std::size_t>(view.keyframe)];
-    if (slot < 0) return;
+    const std::optional<int> slot = slot_of_keyframe_[static_cast<std::size_t>(view.keyframe)];
+    if (!slot) return;
     const Eigen::Matrix<double, 2, 6> J_pose = J * PoseDerivative(p);
-    H.block<6, 6>(6 * slot, 6 * slot).noalias() += J_pose.transpose() * J_pose;
-    H.block<6, 6>(m, 6 * slot).noalias() += J_marker.transpose() * J_pose;
-    g.segment<6>(6 * slot).noalias() += J_pose.transpose() * r;
+    H.block<6, 6>(6 * *slot, 6 * *slot).noalias() += J_pose.transpose() * J_pose;
+    H.block<6, 6>(m, 6 * *slot).noalias() += J_marker.transpose() * J_pose;
+    g.segment<6>(6 * *slot).noalias() += J_pose.transpose() * r;
   }
 
   // One damped Gauss-Newton step from `state` to `next`; only the lower half of H is used. False if
@@ -314,7 +315,7 @@ class LocalBundle {
     for (const int k : options_.free_keyframes) {
       const auto index = static_cast<std::size_t>(k);
       next.T_camera_world[index] =
-          PoseFromTwist(x.segment<6>(6 * slot_of_keyframe_[index])).inverse() *
+          PoseFromTwist(x.segment<6>(6 * slot_of_keyframe_[index].value())).inverse() *
           state.T_camera_world[index];
     }
     for (std::size_t s = 0; s < markers_.size(); ++s)
@@ -333,9 +334,9 @@ class LocalBundle {
   const LocalBundleOptions& options_;
   TrackingMap& map_;
   int num_poses_ = 0;
-  std::vector<int> slot_of_keyframe_;  // -1 if the keyframe is fixed.
-  double weight_px_ = 0;               // Focal length over the standard deviation of a keypoint.
-  std::vector<int> landmarks_;         // Ids in the map.
+  std::vector<std::optional<int>> slot_of_keyframe_;  // A fixed keyframe has none.
+  double weight_px_ = 0;        // Focal length over the standard deviation of a keypoint.
+  std::vector<int> landmarks_;  // Ids in the map.
   std::vector<int> markers_;
   std::vector<std::size_t> first_view_;  // First entry of each landmark in `views_`, plus the end.
   std::vector<PointView> views_;

@@ -59,12 +59,13 @@ struct DenseSum {
   int valid = 0;
 };
 
-// Cosine of incidence for the target's cells, computed on first use; < 0 before.
+// Cosine of incidence for the target's cells, computed on first use.
 using GrazingOfCells = std::vector<double>;
+constexpr double kNotComputed = -1.0;  // Not a cosine of incidence, which is never negative.
 
 double GrazingOf(const DenseView& target, std::size_t cell, GrazingOfCells& known) {
   double& grazing = known[cell];
-  if (grazing < 0)
+  if (grazing == kNotComputed)
     grazing = Grazing(std::abs(target.normals[cell].dot(target.point(cell).normalized())));
   return grazing;
 }
@@ -136,7 +137,7 @@ PoseEstimate OptimizePose(const PoseProblem& problem, const Pose& T_world_camera
   PoseEstimate estimate;
   estimate.T_world_camera = T_world_camera_start;
   const bool dense = problem.dense_frame != nullptr && problem.dense_target != nullptr;
-  GrazingOfCells grazing_of_cells(dense ? problem.dense_target->size() : 0, -1.0);
+  GrazingOfCells grazing_of_cells(dense ? problem.dense_target->size() : 0, kNotComputed);
   const std::vector<DensePoint> dense_points =
       dense ? DensePoints(problem) : std::vector<DensePoint>();
   double gate_m = 0.08;

@@ -35,7 +35,7 @@ void Progress::Update(std::string_view step, double fraction, std::string_view d
     return;
   }
   const double now_s = SteadySeconds();
-  if (!is_new && fraction < 1.0 && now_s - last_draw_s_ < kRedraw_s) return;
+  if (!is_new && fraction < 1.0 && last_draw_s_ && now_s - *last_draw_s_ < kRedraw_s) return;
   last_draw_s_ = now_s;
   Draw(std::clamp(fraction, 0.0, 1.0), detail);
 }

@@ -1,6 +1,7 @@
 // Shows the progress of a command on stderr.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -30,7 +31,7 @@ class Progress {
   const bool quiet_;
   const bool is_terminal_;
   bool is_drawn_ = false;
-  double last_draw_s_ = -1.0;
+  std::optional<double> last_draw_s_;
   std::string step_;
 };
 

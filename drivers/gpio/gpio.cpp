@@ -9,6 +9,7 @@
 #include <charconv>
 #include <cstring>
 #include <filesystem>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -141,7 +142,7 @@ struct GpioIndicator::Impl {
   std::array<gpiod_line*, 4> lines{};  ///< In the order of the bits of IndicatorOutput.
   int num_lights = 0;
   IndicatorPlayer player;
-  int written = -1;
+  std::optional<int> written;  // The outputs that the lines show.
 
   void Write() noexcept {
     const int outputs = player.outputs();

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 
 #include "algo/base/errors.hpp"
 
@@ -68,8 +69,7 @@ void CheckFileName(std::string_view file, const std::string& where) {
 struct Candidate {
   IndexPair pair;
   double sum_s = 0.0;
-  std::ptrdiff_t previous =
-      -1;  ///< Position of the previous candidate in the chain; -1 at its start.
+  std::optional<std::size_t> previous;  ///< Index of the previous candidate in the chain.
 };
 
 /// The best chain among those that end before a depth image: a Fenwick tree of maxima.
@@ -77,7 +77,7 @@ class BestChain {
  public:
   struct End {
     double sum_s = 0.0;
-    std::ptrdiff_t candidate = -1;
+    std::optional<std::size_t> candidate;
   };
 
   explicit BestChain(std::size_t size) : tree_(size + 1) {}
@@ -159,14 +159,12 @@ std::vector<IndexPair> AssociateByTime(std::span<const IndexEntry> color,
     }
     // Entered only now, so that no chain uses one colour image twice.
     for (std::size_t i = first_of_color; i < candidates.size(); ++i) {
-      best.Add(candidates[i].pair.depth, {candidates[i].sum_s, static_cast<std::ptrdiff_t>(i)});
+      best.Add(candidates[i].pair.depth, {candidates[i].sum_s, i});
     }
   }
   std::vector<IndexPair> pairs;
-  for (std::ptrdiff_t i = best.Before(depth.size()).candidate; i >= 0;
-       i = candidates[static_cast<std::size_t>(i)].previous) {
-    pairs.push_back(candidates[static_cast<std::size_t>(i)].pair);
-  }
+  for (auto i = best.Before(depth.size()).candidate; i; i = candidates[*i].previous)
+    pairs.push_back(candidates[*i].pair);
   std::reverse(pairs.begin(), pairs.end());
   return pairs;
 }

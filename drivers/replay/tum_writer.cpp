@@ -46,10 +46,13 @@ cv::Mat ToUnits(const cv::Mat& depth_m, double units_per_metre) {
   return units;
 }
 
-void CheckStamp(double time_s, double last_s, const char* what) {
-  if (std::isfinite(time_s) && time_s >= last_s + kStampStep_s && time_s >= 0) return;
-  throw std::invalid_argument(fmt::format(
-      "{} stamp {:.6f} s must be later than the one before ({:.6f} s)", what, time_s, last_s));
+void CheckStamp(double time_s, std::optional<double> last_s, const char* what) {
+  if (!(std::isfinite(time_s) && time_s >= 0))
+    throw std::invalid_argument(
+        fmt::format("{} stamp {} s must be a finite number from 0", what, time_s));
+  if (last_s && !(time_s >= *last_s + kStampStep_s))
+    throw std::invalid_argument(fmt::format(
+        "{} stamp {:.6f} s must be later than the one before ({:.6f} s)", what, time_s, *last_s));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,8 +41,8 @@ class TumWriter {
   TumWriter(std::filesystem::path folder, const StreamInfo& info,
             const TumWriterOptions& options = {});
 
-  /// @throws IoError; std::invalid_argument if a stamp is not later than the one before by a
-  /// microsecond, the resolution of the files.
+  /// @throws IoError; std::invalid_argument if a stamp is negative or not later than the one before
+  /// by a microsecond, the resolution of the files.
   void Add(const EncodedFrame& frame);
   void Add(const Frame& frame) { Add(EncodeFrame(frame, options_)); }
 
@@ -54,8 +55,8 @@ class TumWriter {
   TumWriterOptions options_;
   std::string color_index_;
   std::string depth_index_;
-  double last_color_s_ = -1.0;
-  double last_depth_s_ = -1.0;
+  std::optional<double> last_color_s_;  // Of the last pair.
+  std::optional<double> last_depth_s_;
 };
 
 }  // namespace plumb

@@ -61,9 +61,10 @@ struct Unit {
   std::atomic<bool> failed{false};
   std::atomic<Glitch> glitch{Glitch::kNone};
   std::atomic<int> glitches_left{0};
-  std::atomic<int> position{-1};        ///< Last delivered frame; -1: none since the last command.
-  std::mutex delivering;                ///< Held while a frame is delivered.
-  std::atomic<int> changes_pending{0};  ///< Changes that wait for `delivering` or hold it.
+  /// Last frame that was delivered since the last command.
+  std::atomic<std::optional<std::uint32_t>> position{std::nullopt};
+  std::mutex delivering;                        ///< Held while a frame is delivered.
+  std::atomic<int> changes_pending{0};          ///< Changes that wait for `delivering` or hold it.
   std::condition_variable_any changes_applied;  ///< None is pending any more.
 
   [[nodiscard]] bool silent() const { return gone || stalled || failed; }

@@ -73,7 +73,7 @@ void SweepPlayer::Tick(const std::stop_token& stop) {
     next_ = 0;
     loaded_frame_.reset();
     wait_ticks_ = view_.motion == Stage::Motion::kStill ? 0 : kTicksBeforeSweep;
-    unit_->position = -1;
+    unit_->position = std::nullopt;
   } else {
     view_.speed = now.speed;
   }
@@ -100,7 +100,7 @@ void SweepPlayer::Tick(const std::stop_token& stop) {
   if (unit_->glitch == Glitch::kLate && unit_->glitches_left > 0)
     SleepUntil(Clock::now() + std::chrono::microseconds(3 * view_.scene->shape().period_us), stop);
   Give(shown, stop);
-  unit_->position = static_cast<int>(loaded_frame_.value());
+  unit_->position = loaded_frame_.value();
 }
 
 void SweepPlayer::Load(std::uint32_t frame) {

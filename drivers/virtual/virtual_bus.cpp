@@ -101,8 +101,11 @@ std::string VirtualBus::State() const {
   std::ostringstream text;
   text << "ok scene=" << view.index << " scenes=" << stage_->size()
        << " frames=" << view.scene->shape().num_frames;
-  for (const auto& unit : units())
-    text << " unit=" << unit->serial << " position=" << unit->position;
+  for (const auto& unit : units()) {
+    const std::optional<std::uint32_t> position = unit->position;
+    text << " unit=" << unit->serial
+         << " position=" << (position ? std::to_string(*position) : "none");
+  }
   return text.str();
 }
 

@@ -137,6 +137,10 @@ for (const [text, expected] of [
     + 'the file',
   '/s/device.key tiene 3 bytes y se esperaban 32: tras reiniciar no se reconoce ningún navegador; '
     + 'borre el archivo'],
+  ['the scan failed: cannot compare the scenes: the reference was made with markers of 0.104 m, '
+    + 'the current one with 0.15 m; scan both with the same markers',
+  'el escaneo falló: no se pueden comparar los escaneos: la referencia se hizo con marcadores de '
+    + '0,104 m y el actual con marcadores de 0,15 m; escanee ambos con los mismos marcadores'],
   ['scan needs at least 3 markers shared with the reference, found 1 (id 7); keep the markers in '
     + 'view', 'el escaneo necesita al menos 3 marcadores comunes con la referencia y tiene 1; '
     + 'mantenga los marcadores a la vista']]) {
@@ -159,6 +163,20 @@ for (const [pattern] of kPatterns) {
   const fixed = pattern.replace(/\\(.)/g, '$1').split(/[$^()[\]?|]+/)
     .sort((a, b) => b.length - a.length)[0];
   if (fixed.length > 20 && !all.includes(fixed)) failures.push(`nothing says "${fixed}"`);
+}
+// And each sentence with which a comparison is refused has its Spanish.
+const spanish = [...Object.keys(kWords), ...kPatterns.map(([one]) => one.replace(/\\(.)/g, '$1'))];
+for (const file of ['algo/acceptance/acceptance.cpp', 'algo/comparison/comparison.cpp']) {
+  const text = readFileSync(join(source, file), 'utf8').replace(/"\s*\n\s*"/g, '');
+  for (const [, literal] of text.matchAll(/"((?:[^"\\\n]|\\.)*)"/g)) {
+    // Includes, and a caller's mistakes, which no user reads.
+    if (literal.length < 30 || /^(?:algo\/|acceptance:|comparison:)/.test(literal)) continue;
+    const fixed = JSON.parse(`"${literal}"`).split(/\{(?:[^{}]|\{\})*\}/)
+      .filter((part) => part.length > 3);
+    if (!spanish.some((one) => fixed.every((part) => one.includes(part)))) {
+      failures.push(`${file}: "${literal}" has no Spanish`);
+    }
+  }
 }
 if (en.patients && en.session.scans(1) === en.session.scans(2).replace('2', '1')) {
   failures.push('one scan is said as many');

@@ -93,6 +93,18 @@ TEST_F(VirtualProviderTest, EveryFrameOfASweepComesAsTheSimulatorMadeIt) {
   }
 }
 
+TEST_F(VirtualProviderTest, TheStateNamesTheLastFrameOnceThereIsOne) {
+  EXPECT_THAT(bus_->Obey("state"), HasSubstr(" unit=VIRTUAL-0001 position=none"));
+  VirtualProvider provider = Provider(std::chrono::seconds(20));
+  const auto sensor = provider.Open("");
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (bus_->units().front()->position.load() != 0U) {  // The first frame, which is held still.
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline);
+    (void)sensor->Next();
+  }
+  EXPECT_THAT(bus_->Obey("state"), HasSubstr(" unit=VIRTUAL-0001 position=0"));
+}
+
 TEST_F(VirtualProviderTest, AStallWaitsForTheFrameOnItsWayAndEndsWithTheSweep) {
   using namespace std::chrono_literals;
   std::mutex mutex;

@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <opencv2/core.hpp>
 
 #include "algo/base/errors.hpp"
@@ -353,6 +354,22 @@ TEST_F(TumRecordingTest, TheWriterRefusesStampsThatDoNotRise) {
   EXPECT_THROW(writer.Add(NumberedFrame(1)), std::invalid_argument);
   EXPECT_THROW(writer.Add(NumberedFrame(0)), std::invalid_argument);
   EXPECT_THROW(TumWriter(folder_ / "missing/parent", SmallCamera()), IoError);
+}
+
+TEST_F(TumRecordingTest, TheWriterRefusesStampsThatAreNoTimes) {
+  TumWriter writer(folder_ / "w", SmallCamera());
+  for (const double no_time_s :
+       {-0.5, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    Frame frame = NumberedFrame(0);
+    frame.color_time_s = no_time_s;
+    EXPECT_THROW(writer.Add(frame), std::invalid_argument) << no_time_s;
+    frame = NumberedFrame(0);
+    frame.depth_time_s = no_time_s;
+    EXPECT_THROW(writer.Add(frame), std::invalid_argument) << no_time_s;
+  }
+  Frame first = NumberedFrame(0);
+  first.color_time_s = first.depth_time_s = 0.0;
+  writer.Add(first);  // The first stamp has none before it.
 }
 
 TEST_F(TumRecordingTest, DepthBeyondSixteenBitsIsWrittenAsNothing) {

@@ -180,6 +180,14 @@ export const kPatterns = [
   ['^the session of (\\S+) is open \\(opened by (.+)\\): close it first$',
     'la sesión de $1 está abierta (la abrió $2): ciérrela primero'],
   // Why there is no answer.
+  ['^cannot compare the scenes: the reference was made with marker dictionary (\\S+), the current '
+    + 'one with (\\S+); scan both with the same markers$',
+  'no se pueden comparar los escaneos: la referencia se hizo con el diccionario de marcadores $1 y '
+    + 'el actual con $2; escanee ambos con los mismos marcadores'],
+  ['^cannot compare the scenes: the reference was made with markers of ([\\d.]+) m, the current '
+    + 'one with ([\\d.]+) m; scan both with the same markers$',
+  'no se pueden comparar los escaneos: la referencia se hizo con marcadores de $1 m y el actual '
+    + 'con marcadores de $2 m; escanee ambos con los mismos marcadores'],
   ['^the current scan covers ([\\d.]+) % of the region, at least ([\\d.]+) % are needed; sweep '
     + 'all of it$',
   'el escaneo actual cubre el $1 % de la región y se necesita al menos el $2 %; bárrala toda'],
