@@ -114,9 +114,10 @@ int Restore(const Options& options, const CommandContext& context) {
 Command AddBackup(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("folder", options->folder,
-                 "Folder of the backup; an older backup there is replaced")
+                 "Folder of the backup, or one file if its name ends in .tar; an older backup "
+                 "there is replaced")
       ->required()
-      ->type_name("FOLDER");
+      ->type_name("FOLDER|FILE.tar");
   app.add_option(
          "--state", options->state,
          "State folder that no plumbd is using; without it a running plumbd makes the backup")
@@ -129,7 +130,7 @@ Command AddBackup(CLI::App& app) {
 
 Command AddRestore(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("folder", options->folder, "The backup")->required()->type_name("FOLDER");
+  app.add_option("folder", options->folder, "The backup")->required()->type_name("FOLDER|FILE.tar");
   app.add_option("--state", options->state,
                  "State folder, missing or empty; default: the one of the configuration")
       ->type_name("DIR");

@@ -53,11 +53,15 @@ int Import(const Options& options, const CommandContext& context) {
 Command AddExportPatient(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("code", options->code, "The patient's code")->required()->type_name("CODE");
-  app.add_option("folder", options->folder, "Folder of the export; an older one is replaced")
+  app.add_option(
+         "folder", options->folder,
+         "Folder of the export, or one file if its name ends in .tar; an older export there is "
+         "replaced")
       ->required()
-      ->type_name("FOLDER");
-  app.add_option("--state", options->state,
-                 "State folder that no plumbd is using, or a backup that is not encrypted")
+      ->type_name("FOLDER|FILE.tar");
+  app.add_option(
+         "--state", options->state,
+         "State folder that no plumbd is using, or the folder of a backup that is not encrypted")
       ->required()
       ->type_name("DIR");
   app.add_option("--key-file", options->key_file, "Encrypt with the key in this file")
@@ -67,7 +71,7 @@ Command AddExportPatient(CLI::App& app) {
 
 Command AddImportPatient(CLI::App& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("folder", options->folder, "The export")->required()->type_name("FOLDER");
+  app.add_option("folder", options->folder, "The export")->required()->type_name("FOLDER|FILE.tar");
   app.add_option("--state", options->state, "State folder that no plumbd is using")
       ->required()
       ->type_name("DIR");

@@ -25,7 +25,7 @@ struct ControlRequest {
   /// kSim: a serial, the kind and number of glitches, or the speed; words of letters, digits, -, _
   /// and dots.
   std::string argument;
-  std::string folder = {};                        ///< kBackup: target folder.
+  std::string folder = {};                        ///< kBackup: target folder or archive.
   std::string key_file = {};                      ///< kBackup: file with the key for encryption.
   std::string name = {};                          ///< kUpdate: name of the bundle.
   std::shared_ptr<const AttachedFile> file = {};  ///< kUpdate: the bundle, open for reading.

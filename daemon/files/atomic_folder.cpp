@@ -68,6 +68,13 @@ void SyncTree(const fs::path& folder) {
 void CheckReplaceable(const fs::path& target, const OutputKind& kind) {
   const fs::file_status status = fs::symlink_status(target);
   if (!fs::exists(status)) return;
+  if (kind.may_replace) {
+    if (fs::is_regular_file(status) && kind.may_replace(target)) return;
+    throw IoError(
+        fmt::format("cannot write {} {}: what has this name is not an older {}; choose another "
+                    "name or move it away",
+                    kind.name, target.string(), kind.name));
+  }
   if (!fs::is_directory(status)) {
     throw IoError(
         fmt::format("cannot write {} {}: there is a file of that name; choose another or remove it",
@@ -195,6 +202,21 @@ void AtomicFolder::Commit() {
   } catch (const fs::filesystem_error& error) {
     throw IoError(DescribeWriteError(target_, error.code().value()));
   }
+}
+
+void AtomicFolder::CommitFile(const fs::path& file) {
+  Sync(file);
+  try {
+    CheckReplaceable(target_, kind_);  // again, because time has passed
+  } catch (const fs::filesystem_error& error) {
+    throw IoError(DescribeWriteError(target_, error.code().value()));
+  }
+  if (::rename(file.c_str(), target_.c_str()) != 0)
+    throw IoError(DescribeWriteError(target_, errno));
+  committed_ = true;
+  std::error_code ignored;
+  fs::remove_all(hidden_, ignored);
+  Sync(target_.parent_path());
 }
 
 void WriteFileAtomically(const fs::path& target,

@@ -8,12 +8,15 @@
 
 namespace plumb {
 
-/// The files of one kind of output folder: an existing folder of that kind may be replaced.
+/// The files of one kind of output folder: an existing folder of that kind may be replaced. Or,
+/// with `may_replace`, an output that is one file.
 struct OutputKind {
   std::string_view name;         ///< For messages: "scene".
   std::string_view marker_file;  ///< Always present, such as "scene.json".
   std::vector<std::string_view>
       known_entries;  ///< All allowed entries at its top level, including the marker file.
+  /// Set: the output is one file, and an existing file for which this is true may be replaced.
+  std::function<bool(const std::filesystem::path&)> may_replace = {};
 };
 
 /// A folder that is written beside its target under a hidden name and replaces the target with
@@ -37,6 +40,9 @@ class AtomicFolder {
   /// Call once.
   /// @throws IoError; the target is then unchanged.
   void Commit();
+  /// The same for an output that is one file, which lies in the folder: everything else in there is
+  /// removed.
+  void CommitFile(const std::filesystem::path& file);
 
  private:
   void RemoveStale() const;

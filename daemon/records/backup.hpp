@@ -3,7 +3,7 @@
 // A backup is a folder: plumb.db, scans/, set-aside/, calibration/ and imports/ as they were,
 // SHA256SUMS of every file (in the format of `sha256sum -c`) and backup.json about the whole. It
 // appears complete or not at all. With a secret every file except the last two is encrypted
-// (file_cipher.hpp).
+// (file_cipher.hpp). A target that ends in ".tar" is one file, an archive of the same.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +32,7 @@ struct BackupReport {
 /// Backs up an open store, whose files must not be removed meanwhile. The database is copied as of
 /// one moment, with the scans that it then contains. Files are copied (sharing blocks until one
 /// side is written to, if the file system can); each is read once. An older backup at `target` is
-/// replaced.
+/// replaced, and nothing else.
 /// @throws IoError if the backup cannot be written; Interrupted
 [[nodiscard]] BackupReport WriteBackup(const std::filesystem::path& state, Database& database,
                                        const std::filesystem::path& target,

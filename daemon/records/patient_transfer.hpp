@@ -3,7 +3,7 @@
 // An export is a folder: record.json (the rows of the patient, sessions, scans, results, references
 // and digests; for information also the patient's part of the audit log and the daily checks before
 // the scans), the files of the scans, SHA256SUMS and patient.json about the whole. Encrypted if a
-// secret is given.
+// secret is given; one file, an archive of the same, if its name ends in ".tar".
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,8 @@ struct PatientReport {
   bool was_there = false;  ///< Import: the same data exists already, and nothing was done.
 };
 
-/// @param state  A state folder that no plumbd uses, or a backup that is not encrypted.
+/// @param state  A state folder that no plumbd uses, or the folder of a backup that is not
+/// encrypted.
 /// @throws DataError if there is no such patient; IoError; Interrupted
 [[nodiscard]] PatientReport ExportPatient(const std::filesystem::path& state,
                                           const std::string& code,

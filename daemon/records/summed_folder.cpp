@@ -1,8 +1,10 @@
 #include "daemon/records/summed_folder.hpp"
 
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <ctime>
 
 #include <fmt/chrono.h>
@@ -25,20 +27,30 @@ constexpr const char* kSums = "SHA256SUMS";
 constexpr const char* kEncryption = "encryption";
 constexpr const char* kSignature = "signature";
 constexpr std::size_t kMaxAbout = std::size_t{16} << 20, kMaxSums = std::size_t{512} << 20;
-constexpr std::size_t kMaxProblems = 1000, kMaxPath = 4000;
+constexpr std::size_t kMaxProblems = 1000;
+/// In the hidden folder of an archive that is being written; the latter of one that is read, too.
+constexpr const char* kArchive = "archive";
+constexpr const char* kUnpacked = ".unpacked";
+
+/// True for an archive that Plumb has written: another file is never replaced by one.
+bool IsArchiveOf(const fs::path& file, const SummedKind& kind) {
+  try {
+    const TarReader tar(file);
+    const Json about = ParseBoundedJsonOrNothing<Json>(tar.Text(kind.about_file, kMaxAbout));
+    return tar.entries().contains(kSums) && about.is_object() && about.contains("format") &&
+           about.contains("sha256sums");
+  } catch (const std::runtime_error&) {
+    return false;
+  }
+}
+
+OutputKind OutputAt(const fs::path& target, const SummedKind& kind, OutputKind output) {
+  if (IsTarName(target))
+    output.may_replace = [kind](const fs::path& file) { return IsArchiveOf(file, kind); };
+  return output;
+}
 
 }  // namespace
-
-bool IsPlainPath(const std::string& path) {
-  const bool has_control = std::any_of(
-      path.begin(), path.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F || c == '\\'; });
-  if (has_control || path.empty() || path.size() > kMaxPath) return false;
-  const fs::path parts(path);
-  return parts.lexically_normal().string() == path &&
-         std::none_of(parts.begin(), parts.end(), [](const fs::path& part) {
-           return part.empty() || part == "." || part == ".." || part == "/";
-         });
-}
 
 std::vector<std::string> FilesBelow(const fs::path& top, const fs::path& folder) {
   std::vector<std::string> files;
@@ -57,21 +69,33 @@ std::vector<std::string> FilesBelow(const fs::path& top, const fs::path& folder)
 SummedWriter::SummedWriter(const fs::path& target, const SummedKind& kind, OutputKind output,
                            const BackupSecret* secret, std::stop_token stop)
     : kind_(kind),
-      output_(target, std::move(output)),
+      output_(target, OutputAt(target, kind, std::move(output))),
+      place_(output_.path()),
       cipher_(secret != nullptr ? std::make_unique<FileCipher>(*secret) : nullptr),
       stop_(std::move(stop)) {
   ::chmod(output_.path().c_str(), 0700);  // it contains patients' data
+  if (!IsTarName(target)) return;
+  tar_ = std::make_unique<TarWriter>(output_.path() / kArchive);
+  place_ /= kUnpacked;
+}
+
+void SummedWriter::Pack(const std::string& path) {
+  if (!tar_) return;
+  tar_->Add(place_, path, stop_);
+  if (::unlink((place_ / path).c_str()) != 0)
+    throw IoError(DescribeWriteError(place_ / path, errno));
 }
 
 std::string SummedWriter::Copied(const fs::path& from, const std::string& path) {
   FileDigest plain, written;
   if (cipher_) {
-    const FileCipher::Written both = cipher_->Seal(from, output_.path(), path, stop_);
+    const FileCipher::Written both = cipher_->Seal(from, place_, path, stop_);
     plain = both.plain;
     written = both.sealed;
   } else {
-    plain = written = CloneOrCopy(from, output_.path(), path, stop_);
+    plain = written = CloneOrCopy(from, place_, path, stop_);
   }
+  Pack(path);
   sums_ += fmt::format("{}  {}\n", written.sha256, path);
   ++files_;
   bytes_ += plain.bytes;
@@ -101,21 +125,28 @@ void SummedWriter::Report(std::string problem) {
 }
 
 void SummedWriter::Commit(Json about) {
-  WriteWholeFile(output_.path() / kSums, std::string_view(sums_));
+  std::error_code error;
+  fs::create_directories(place_, error);
+  if (error) throw IoError(DescribeWriteError(place_, error.value()));
+  WriteWholeFile(place_ / kSums, std::string_view(sums_));
   about["format"] = kind_.format;
   about["schema"] = kSchemaVersion;
   about["made_at"] = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
   about["files"] = files_;
   about["bytes"] = bytes_;
-  about["sha256sums"] = DigestOfFile(output_.path(), kSums).sha256;
+  about["sha256sums"] = DigestOfFile(place_, kSums).sha256;
   about["problems"] = problems_;
   if (cipher_) {
     about[kEncryption] = cipher_->Header();
     about[kSignature] = cipher_->Signature(sums_);
   }
-  WriteWholeFile(output_.path() / kind_.about_file,
+  WriteWholeFile(place_ / kind_.about_file,
                  about.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
-  output_.Commit();
+  if (!tar_) return output_.Commit();
+  Pack(kSums);
+  Pack(kind_.about_file);
+  tar_->Close();
+  output_.CommitFile(output_.path() / kArchive);
 }
 
 SummedReader::SummedReader(fs::path folder, SummedKind kind, const BackupSecret* secret)
@@ -123,8 +154,9 @@ SummedReader::SummedReader(fs::path folder, SummedKind kind, const BackupSecret*
   Json about;
   std::string text;
   try {
-    about = ParseBoundedJsonOrNothing<Json>(ReadTextFile(folder_ / kind_.about_file, kMaxAbout));
-    text = ReadTextFile(folder_ / kSums, kMaxSums);
+    OpenArchive();
+    about = ParseBoundedJsonOrNothing<Json>(Text(kind_.about_file, kMaxAbout));
+    text = Text(kSums, kMaxSums);
   } catch (const DataError& error) {
     Fail(error.what());
   }
@@ -133,7 +165,7 @@ SummedReader::SummedReader(fs::path folder, SummedKind kind, const BackupSecret*
   const Json schema = about.value("schema", Json());
   if (!schema.is_number_integer() || schema > kSchemaVersion)
     Fail("it was made by a newer Plumb: install that one first");
-  digest_ = DigestOfFile(folder_, kSums).sha256;
+  digest_ = Digest(kSums, {}).sha256;
   if (about.value("sha256sums", Json()) != digest_)
     Fail(fmt::format("{} is not the one that was written", kSums));
   const bool is_encrypted = about.contains(kEncryption);
@@ -161,6 +193,44 @@ SummedReader::SummedReader(fs::path folder, SummedKind kind, const BackupSecret*
                        line.substr(0, 120)));
     files_.push_back({.path = line.substr(kHex + 2), .sha256 = line.substr(0, kHex)});
   }
+  if (tar_ && tar_->entries().size() != files_.size() + 2)
+    Fail(
+        fmt::format("it has {} files, {} are expected", tar_->entries().size(), files_.size() + 2));
+}
+
+void SummedReader::OpenArchive() {
+  std::error_code error;
+  if (!fs::is_regular_file(folder_, error)) return;
+  tar_ = std::make_unique<TarReader>(folder_);
+  for (const auto& [path, entry] : tar_->entries()) {
+    if (path != kSums && path != kind_.about_file && !kind_.may_hold(path))
+      throw DataError(fmt::format("{:?} in it is none of a {}", path.substr(0, 120), kind_.name));
+  }
+}
+
+std::string SummedReader::Text(const char* name, std::size_t max_bytes) const {
+  return tar_ ? tar_->Text(name, max_bytes) : ReadTextFile(folder_ / name, max_bytes);
+}
+
+FileDigest SummedReader::Digest(const std::string& path, const std::stop_token& stop) const {
+  return tar_ ? tar_->Digest(path, stop) : DigestOfFile(folder_, path, stop);
+}
+
+FileDigest SummedReader::CopyPlain(const fs::path& to, const std::string& path,
+                                   const std::stop_token& stop) const {
+  return tar_ ? tar_->CopyTo(to, path, stop) : Copy(folder_, to, path, stop);
+}
+
+/// An encrypted file of an archive is unpacked beside its copy first.
+FileCipher::Written SummedReader::Open(const fs::path& to, const std::string& path,
+                                       const std::stop_token& stop) const {
+  if (!tar_) return cipher_->Open(folder_, to, path, stop);
+  const fs::path unpacked = to / kUnpacked;
+  (void)tar_->CopyTo(unpacked, path, stop);
+  FileCipher::Written both = cipher_->Open(unpacked, to, path, stop);
+  std::error_code ignored;
+  fs::remove_all(unpacked, ignored);
+  return both;
 }
 
 void SummedReader::Verify(const std::stop_token& stop) const {
@@ -169,7 +239,7 @@ void SummedReader::Verify(const std::stop_token& stop) const {
   for (const FileDigest& file : files_) {
     std::string why;
     try {
-      if (DigestOfFile(folder_, file.path, stop).sha256 != file.sha256)
+      if (Digest(file.path, stop).sha256 != file.sha256)
         why = file.path + " is not what was written";
     } catch (const IoError& error) {
       why = error.what();
@@ -186,11 +256,11 @@ FileDigest SummedReader::CopyTo(const fs::path& to, const FileDigest& file,
   FileDigest copy, read;
   try {
     if (cipher_) {
-      const FileCipher::Written both = cipher_->Open(folder_, to, file.path, stop);
+      const FileCipher::Written both = Open(to, file.path, stop);
       copy = both.plain;
       read = both.sealed;
     } else {
-      copy = read = Copy(folder_, to, file.path, stop);
+      copy = read = CopyPlain(to, file.path, stop);
     }
   } catch (const SourceUnreadable& error) {
     Fail(error.what());

@@ -1,6 +1,7 @@
 // Folders that leave the appliance: files, SHA256SUMS of each in the format of `sha256sum -c`, and
 // a JSON file about the whole. Encrypted if a key is given; the sums are then those of the
-// encrypted files, and signed with the key.
+// encrypted files, and signed with the key. A folder whose name ends in ".tar" is one file, an
+// archive of the same.
 #pragma once
 
 #include <functional>
@@ -13,6 +14,7 @@
 
 #include "daemon/files/atomic_folder.hpp"
 #include "daemon/records/file_cipher.hpp"
+#include "daemon/records/tar_file.hpp"
 
 namespace plumb {
 
@@ -24,14 +26,12 @@ struct SummedKind {
   std::function<bool(const std::string& path)> may_hold;
 };
 
-/// Plain path of a file in folders, without "..", ".", empty parts or control characters.
-[[nodiscard]] bool IsPlainPath(const std::string& path);
-
 /// Regular files in a folder, relative to `top`, by path. @throws IoError
 [[nodiscard]] std::vector<std::string> FilesBelow(const std::filesystem::path& top,
                                                   const std::filesystem::path& folder);
 
-/// A folder that is being written. It appears with Commit(), or not at all.
+/// A folder or an archive that is being written. It appears with Commit(), or not at all. Each file
+/// is added to an archive as soon as it is copied, so that only one lies beside it at a time.
 class SummedWriter {
  public:
   /// @param secret  Null: nothing is encrypted.
@@ -54,9 +54,12 @@ class SummedWriter {
 
  private:
   std::string Copied(const std::filesystem::path& from, const std::string& path);
+  void Pack(const std::string& path);
 
   SummedKind kind_;
   AtomicFolder output_;
+  std::unique_ptr<TarWriter> tar_;
+  std::filesystem::path place_;  ///< Of the files, or of those that are not in the archive yet.
   std::unique_ptr<FileCipher> cipher_;
   std::stop_token stop_;
   std::string sums_;
@@ -65,7 +68,7 @@ class SummedWriter {
   std::vector<std::string> problems_;
 };
 
-/// A folder that is being read; it is not trusted.
+/// A folder or an archive that is being read; it is not trusted.
 class SummedReader {
  public:
   /// Reads the facts about it.
@@ -84,8 +87,17 @@ class SummedReader {
   [[noreturn]] void Fail(const std::string& why) const;
 
  private:
+  void OpenArchive();
+  [[nodiscard]] std::string Text(const char* name, std::size_t max_bytes) const;
+  [[nodiscard]] FileDigest Digest(const std::string& path, const std::stop_token& stop) const;
+  FileDigest CopyPlain(const std::filesystem::path& to, const std::string& path,
+                       const std::stop_token& stop) const;
+  FileCipher::Written Open(const std::filesystem::path& to, const std::string& path,
+                           const std::stop_token& stop) const;
+
   std::filesystem::path folder_;
   SummedKind kind_;
+  std::unique_ptr<TarReader> tar_;  ///< Null: it is a folder.
   std::unique_ptr<FileCipher> cipher_;
   std::vector<FileDigest> files_;
   std::string digest_;

@@ -77,11 +77,18 @@ TEST(DaemonBackupTest, ABackupOf200ScansDisturbsNoSweepAndIsRestoredByteIdentica
 
   const auto last = plumb::Run({PLUMB_BINARY, "--control", plumbd.socket(), "backup", backup});
   EXPECT_EQ(last.exit_code, 0) << last.err;
+  const fs::path archive = folder / "backup.tar";
+  const auto packed = plumb::Run({PLUMB_BINARY, "--control", plumbd.socket(), "backup", archive});
+  EXPECT_EQ(packed.exit_code, 0) << packed.err;
   ASSERT_EQ(plumbd.Stop(), 0);
   const BackupReport report = RestoreBackup(backup, folder / "restored");
   EXPECT_EQ(report.scans, kScans + 1U);
   const auto restored = testing::FilesBelow(folder / "restored" / "scans");
   EXPECT_TRUE(restored == testing::FilesBelow(state / "scans"));
+  const auto unpacked =
+      plumb::Run({PLUMB_BINARY, "restore", archive, "--state", folder / "restored-from-archive"});
+  EXPECT_EQ(unpacked.exit_code, 0) << unpacked.err;
+  EXPECT_TRUE(testing::FilesBelow(folder / "restored-from-archive" / "scans") == restored);
   for (const auto& [name, content] : stored)
     EXPECT_TRUE(restored.contains(name) && restored.at(name) == content) << name;
 }

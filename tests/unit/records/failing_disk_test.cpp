@@ -66,7 +66,8 @@ class FailingDiskTest : public ::testing::Test {
     WriteResult(kComparison, kPictures, folder / "result");
   }
   void Prepare() const {
-    for (const char* name : {"state", "backup", "restored"}) fs::remove_all(folder_ / name);
+    for (const char* name : {"state", "backup", "backup.tar", "restored"})
+      fs::remove_all(folder_ / name);
     fs::copy(prepared(), state(), fs::copy_options::recursive);
   }
 
@@ -182,6 +183,35 @@ TEST_F(FailingDiskTest, WhileABackupIsMade) {
       }
       if (!is_made && fs::exists(backup())) {  // whole, with a problem that it tells
         EXPECT_NO_THROW((void)RestoreBackup(backup(), folder_ / "restored"));
+      }
+    }
+    ExpectNothingLost({"000001", "000002", "000003"});
+    return failed;
+  });
+}
+
+TEST_F(FailingDiskTest, WhileABackupIsMadeInOneFile) {
+  const fs::path archive = folder_ / "backup.tar";
+  ForEachFault("backing up into a file", [&](const CallFault& fault) {
+    long failed = 0;
+    {
+      Store store(state());
+      (void)Arm(fault);
+      bool is_made = false;
+      try {
+        is_made = store.backup.Make(kAnna, archive).problems.empty();
+      } catch (const IoError&) {
+      }
+      failed = Disarm();
+      EXPECT_TRUE(is_made || failed > 0);
+      if (is_made) {
+        EXPECT_EQ(RestoreBackup(archive, folder_ / "restored").scans, 3U);
+      } else if (fs::exists(archive)) {  // whole, with a problem that it tells
+        EXPECT_NO_THROW((void)RestoreBackup(archive, folder_ / "restored"));
+      }
+      if (fault.call == FailingCall::kWrite) {  // such as a full disk
+        for (const auto& entry : fs::directory_iterator(folder_.path()))
+          EXPECT_FALSE(entry.path().filename().string().starts_with(".backup.tar")) << entry.path();
       }
     }
     ExpectNothingLost({"000001", "000002", "000003"});

@@ -1,0 +1,267 @@
+#include "daemon/records/tar_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+#include <utility>
+#include <vector>
+
+#include <archive.h>
+#include <archive_entry.h>
+#include <fmt/format.h>
+
+#include "algo/base/check_stop.hpp"
+#include "algo/base/errors.hpp"
+#include "daemon/records/file_copy.hpp"
+#include "drivers/files/file_io.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kPiece = std::size_t{256} << 10, kMaxPath = 4000;
+/// What the names of one archive may take of the memory.
+constexpr std::size_t kMaxFiles = 5'000'000, kMaxNames = std::size_t{512} << 20;
+
+struct FreeReader {
+  void operator()(archive* reader) const { ::archive_read_free(reader); }
+};
+using Reader = std::unique_ptr<archive, FreeReader>;
+
+struct FreeEntry {
+  void operator()(archive_entry* entry) const { ::archive_entry_free(entry); }
+};
+
+std::string ReasonOf(archive* handle) {
+  const char* text = ::archive_error_string(handle);
+  return text != nullptr ? text : "for an unknown reason";
+}
+
+/// Tar only: a format or a compression more is one more way in.
+Reader OpenAt(int fd, std::int64_t position) {
+  Reader reader(::archive_read_new());
+  if (!reader || ::archive_read_support_format_tar(reader.get()) != ARCHIVE_OK)
+    throw IoError("libarchive cannot be used");
+  if (::lseek(fd, position, SEEK_SET) != position ||
+      ::archive_read_open_fd(reader.get(), fd, kPiece) != ARCHIVE_OK)
+    throw SourceUnreadable(fmt::format("cannot be opened: {}", ReasonOf(reader.get())));
+  return reader;
+}
+
+/// The name of a regular file. @throws DataError for everything else
+std::string NameOf(archive_entry* entry) {
+  const char* text = ::archive_entry_pathname(entry);
+  const std::string name = text != nullptr ? text : "";
+  const std::string shown = name.substr(0, 120);
+  if (!IsPlainPath(name))
+    throw DataError(fmt::format("it has a path that is not plain: {:?}", shown));
+  if (::archive_entry_filetype(entry) != AE_IFREG || ::archive_entry_hardlink(entry) != nullptr ||
+      ::archive_entry_symlink(entry) != nullptr || ::archive_entry_sparse_count(entry) != 0)
+    throw DataError(fmt::format("{} is not a plain file in it", shown));
+  return name;
+}
+
+}  // namespace
+
+bool IsTarName(const fs::path& path) { return path.extension() == ".tar"; }
+
+bool IsPlainPath(const std::string& path) {
+  const bool has_control = std::any_of(
+      path.begin(), path.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F || c == '\\'; });
+  if (has_control || path.empty() || path.size() > kMaxPath) return false;
+  const fs::path parts(path);
+  return parts.lexically_normal().string() == path &&
+         std::none_of(parts.begin(), parts.end(), [](const fs::path& part) {
+           return part.empty() || part == "." || part == ".." || part == "/";
+         });
+}
+
+TarWriter::TarWriter(fs::path file) : file_(std::move(file)) {
+  fd_ = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
+  if (fd_ < 0) throw IoError(DescribeWriteError(file_, errno));
+  archive_ = ::archive_write_new();
+  try {
+    // Names are written as they are, in the GNU format. Others convert them by the locale.
+    Check(::archive_write_set_format_gnutar(archive_));
+    Check(::archive_write_set_bytes_per_block(archive_, static_cast<int>(kPiece)));
+    Check(::archive_write_open_fd(archive_, fd_));
+  } catch (...) {
+    ::archive_write_free(archive_);
+    ::close(fd_);
+    throw;
+  }
+}
+
+TarWriter::~TarWriter() {
+  if (archive_ != nullptr) {
+    (void)::archive_write_fail(archive_);  // without it the end would be written
+    ::archive_write_free(archive_);
+  }
+  if (fd_ >= 0) ::close(fd_);
+}
+
+void TarWriter::Check(int result) const {
+  if (result == ARCHIVE_OK) return;
+  const int error = archive_ != nullptr ? ::archive_errno(archive_) : ENOMEM;
+  if (error > 0) throw IoError(DescribeWriteError(file_, error));
+  throw IoError(fmt::format("cannot write {}: {}", file_.string(), ReasonOf(archive_)));
+}
+
+void TarWriter::Add(const fs::path& from, const std::string& path, const std::stop_token& stop) {
+  const fs::path source = from / path;
+  const int fd = ::open(source.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  const auto fail = [&](int error) {
+    throw IoError(fmt::format("cannot read {}: {}", source.string(), std::strerror(error)));
+  };
+  if (fd < 0) fail(errno);
+  const std::unique_ptr<const int, void (*)(const int*)> closed(
+      &fd, [](const int* opened) { ::close(*opened); });
+  struct stat status {};
+  if (::fstat(fd, &status) != 0) fail(errno);
+  const std::unique_ptr<archive_entry, FreeEntry> entry(::archive_entry_new());
+  ::archive_entry_set_pathname(entry.get(), path.c_str());
+  ::archive_entry_set_filetype(entry.get(), AE_IFREG);
+  ::archive_entry_set_perm(entry.get(), 0640);
+  ::archive_entry_set_mtime(entry.get(), std::time(nullptr), 0);
+  ::archive_entry_set_size(entry.get(), status.st_size);
+  Check(::archive_write_header(archive_, entry.get()));
+  std::vector<std::uint8_t> piece(kPiece);
+  for (std::int64_t left = status.st_size; left > 0;) {
+    CheckStop(stop);
+    const ssize_t count = ::read(fd, piece.data(), piece.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) fail(count < 0 ? errno : EIO);
+    const la_ssize_t written =
+        ::archive_write_data(archive_, piece.data(), static_cast<std::size_t>(count));
+    if (written != count) Check(written < 0 ? static_cast<int>(written) : ARCHIVE_FATAL);
+    left -= count;
+  }
+  Check(::archive_write_finish_entry(archive_));
+}
+
+void TarWriter::Close() {
+  Check(::archive_write_close(archive_));
+  ::archive_write_free(std::exchange(archive_, nullptr));
+  if (const int fd = std::exchange(fd_, -1); ::close(fd) != 0)
+    throw IoError(DescribeWriteError(file_, errno));
+}
+
+TarReader::TarReader(fs::path file)
+    : file_(std::move(file)),
+      fd_(::open(file_.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY)) {
+  if (fd_ < 0)
+    throw DataError(fmt::format("cannot read {}: {}", file_.string(), std::strerror(errno)));
+  try {
+    ReadNames();
+  } catch (const SourceUnreadable& error) {
+    ::close(fd_);
+    throw DataError(fmt::format("it is no tar archive, or a damaged one ({})", error.what()));
+  } catch (...) {
+    ::close(fd_);
+    throw;
+  }
+}
+
+TarReader::~TarReader() { ::close(fd_); }
+
+void TarReader::ReadNames() {
+  struct stat status {};
+  if (::fstat(fd_, &status) != 0 || !S_ISREG(status.st_mode))
+    throw DataError("it is neither a folder nor a regular file");
+  const Reader reader = OpenAt(fd_, 0);
+  std::size_t names = 0;
+  for (archive_entry* entry = nullptr;;) {
+    const int result = ::archive_read_next_header(reader.get(), &entry);
+    if (result == ARCHIVE_EOF) break;
+    if (result != ARCHIVE_OK) throw SourceUnreadable(ReasonOf(reader.get()));
+    const std::string name = NameOf(entry);
+    const std::int64_t header = ::archive_read_header_position(reader.get());
+    const std::int64_t bytes = ::archive_entry_size(entry);
+    if (bytes < 0 || header < 0 || bytes > status.st_size - header)
+      throw DataError(fmt::format("it ends within {}", name));
+    names += name.size();
+    if (entries_.size() >= kMaxFiles || names > kMaxNames)
+      throw DataError("it has more files than a backup can have");
+    const Entry place{.header = header, .bytes = static_cast<std::uint64_t>(bytes)};
+    if (!entries_.emplace(name, place).second)
+      throw DataError(fmt::format("it has the file {} twice", name));
+  }
+}
+
+void TarReader::Read(const std::string& path, const Take& take) const {
+  const auto found = entries_.find(path);
+  if (found == entries_.end()) throw SourceUnreadable(fmt::format("{} is not in it", path));
+  const auto fail = [&](const std::string& why) {
+    throw SourceUnreadable(fmt::format("{} in it cannot be read: {}", path, why));
+  };
+  const Reader reader = OpenAt(fd_, found->second.header);
+  archive_entry* entry = nullptr;
+  if (::archive_read_next_header(reader.get(), &entry) != ARCHIVE_OK) fail(ReasonOf(reader.get()));
+  const char* name = ::archive_entry_pathname(entry);
+  if (name == nullptr || path != name) fail("the archive has changed");
+  std::vector<std::uint8_t> piece(kPiece);
+  for (std::uint64_t left = found->second.bytes;;) {
+    const la_ssize_t count = ::archive_read_data(reader.get(), piece.data(), piece.size());
+    if (count < 0) fail(ReasonOf(reader.get()));
+    const auto taken = static_cast<std::uint64_t>(count);
+    if (taken > left || (taken == 0 && left > 0)) fail("the archive has changed");
+    if (taken == 0) return;
+    left -= taken;
+    take({piece.data(), static_cast<std::size_t>(count)});
+  }
+}
+
+std::string TarReader::Text(const std::string& path, std::size_t max_bytes) const {
+  const auto found = entries_.find(path);
+  if (found != entries_.end() && found->second.bytes > max_bytes)
+    throw DataError(fmt::format("{} in it is longer than {} bytes", path, max_bytes));
+  std::string text;
+  try {
+    Read(path,
+         [&](std::span<const std::uint8_t> bytes) { text.append(bytes.begin(), bytes.end()); });
+  } catch (const SourceUnreadable& error) {
+    throw DataError(error.what());
+  }
+  return text;
+}
+
+FileDigest TarReader::Digest(const std::string& path, const std::stop_token& stop) const {
+  Sha256 hash;
+  FileDigest digest{.path = path, .bytes = 0, .sha256 = {}};
+  Read(path, [&](std::span<const std::uint8_t> bytes) {
+    CheckStop(stop);
+    hash.Add(bytes.data(), bytes.size());
+    digest.bytes += bytes.size();
+  });
+  digest.sha256 = hash.Hex();
+  return digest;
+}
+
+FileDigest TarReader::CopyTo(const fs::path& to, const std::string& path,
+                             const std::stop_token& stop) const {
+  const fs::path target = to / path;
+  std::error_code error;
+  fs::create_directories(target.parent_path(), error);
+  if (error) throw IoError(DescribeWriteError(target.parent_path(), error.value()));
+  Sha256 hash;
+  FileDigest digest{.path = path, .bytes = 0, .sha256 = {}};
+  FileWriter copy(target);
+  Read(path, [&](std::span<const std::uint8_t> bytes) {
+    CheckStop(stop);
+    hash.Add(bytes.data(), bytes.size());
+    copy.Write(bytes);
+    digest.bytes += bytes.size();
+  });
+  copy.Close();
+  ::chmod(target.c_str(), 0640);
+  digest.sha256 = hash.Hex();
+  return digest;
+}
+
+}  // namespace plumb
