@@ -4,9 +4,12 @@
 #include <cairo.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -18,10 +21,12 @@
 namespace plumb {
 namespace {
 
-constexpr double kWidth = 595.28, kHeight = 841.89;  // A4 in points
+/// A4 in points.
+struct Paper {
+  double width, height;
+};
+constexpr Paper kUpright{595.28, 841.89}, kAcross{841.89, 595.28};
 constexpr double kMargin = 42.0;
-constexpr double kBottom = kHeight - 58.0;
-constexpr double kInner = kWidth - 2 * kMargin;
 
 struct Ink {
   double r, g, b;
@@ -32,14 +37,19 @@ constexpr Ink kGood{0.04, 0.4, 0.24}, kMove{0.58, 0.3, 0.0};
 /// Points, y down.
 class Pages {
  public:
-  Pages(const ReportTexts& texts, std::string footer) : texts_(texts), footer_(std::move(footer)) {
-    surface_.reset(cairo_pdf_surface_create_for_stream(&Append, &bytes_, kWidth, kHeight));
+  Pages(const ReportTexts& texts, std::string footer, const Paper& paper)
+      : texts_(texts), footer_(std::move(footer)), paper_(paper) {
+    surface_.reset(
+        cairo_pdf_surface_create_for_stream(&Append, &bytes_, paper_.width, paper_.height));
     context_.reset(cairo_create(surface_.get()));
     Top();
   }
 
   double y = 0.0;
 
+  /// Width between the margins, and where the space for contents ends.
+  [[nodiscard]] double inner() const { return paper_.width - 2 * kMargin; }
+  [[nodiscard]] double bottom() const { return paper_.height - 58.0; }
   double Width(const std::string& text, double size, bool bold = false) {
     Font(size, bold);
     cairo_text_extents_t extents;
@@ -75,7 +85,7 @@ class Pages {
     cairo_set_source_rgb(context_.get(), ink.r, ink.g, ink.b);
     cairo_set_line_width(context_.get(), line_width);
     cairo_move_to(context_.get(), kMargin, at);
-    cairo_line_to(context_.get(), kWidth - kMargin, at);
+    cairo_line_to(context_.get(), paper_.width - kMargin, at);
     cairo_stroke(context_.get());
   }
   /// CV_8UC3 RGB, as large as fits.
@@ -138,19 +148,21 @@ class Pages {
   void Top() {
     ++page_;
     y = kMargin - 12;
-    Paragraph(kMargin, kInner, texts_.notice.empty() ? std::string(kResearchNotice) : texts_.notice,
-              7.5, kMove, true);
+    Paragraph(kMargin, inner(),
+              texts_.notice.empty() ? std::string(kResearchNotice) : texts_.notice, 7.5, kMove,
+              true);
     Rule(y += 5);
   }
   void Foot() {
-    Rule(kHeight - 44);
-    Text(kMargin, kHeight - 30, footer_, 7.5, kGrey);
+    Rule(paper_.height - 44);
+    Text(kMargin, paper_.height - 30, footer_, 7.5, kGrey);
     const std::string number = fmt::format(fmt::runtime(texts_.page), page_);
-    Text(kWidth - kMargin - Width(number, 8), kHeight - 30, number, 8, kGrey);
+    Text(paper_.width - kMargin - Width(number, 8), paper_.height - 30, number, 8, kGrey);
   }
 
   const ReportTexts& texts_;
   std::string bytes_, footer_;
+  Paper paper_;
   int page_ = 0;
   std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface_{
       nullptr, &cairo_surface_destroy};
@@ -159,7 +171,7 @@ class Pages {
 
 /// In two columns, name and text.
 void Facts(Pages& pages, const ReportFacts& facts) {
-  const double column = kInner / 2, name_width = 92;
+  const double column = pages.inner() / 2, name_width = 92;
   const double top = pages.y;
   double lowest = top;
   const std::size_t half = (facts.size() + 1) / 2;
@@ -177,7 +189,7 @@ void Facts(Pages& pages, const ReportFacts& facts) {
 
 void Heading(Pages& pages, const std::string& text) {
   pages.y += 6;
-  pages.Paragraph(kMargin, kInner, text, 11, kBlack, true);
+  pages.Paragraph(kMargin, pages.inner(), text, 11, kBlack, true);
 }
 
 /// With a proper minus sign, no sign for zero, and the decimal sign of the language.
@@ -221,7 +233,7 @@ void NumberLine(Pages& pages, const ReportNumber& number, const ReportTexts& tex
              8.5, in ? kGood : kMove, true);
   constexpr double kWordsAt = 372, kWordsSize = 8;
   pages.y = line - 1.3 * kWordsSize;  // the first line of the words is on this line
-  pages.Paragraph(kMargin + kWordsAt, kInner - kWordsAt, number.words, kWordsSize);
+  pages.Paragraph(kMargin + kWordsAt, pages.inner() - kWordsAt, number.words, kWordsSize);
   pages.y = std::max(pages.y, line);
 }
 
@@ -230,12 +242,57 @@ void Pictures(Pages& pages, const std::vector<cv::Mat>& pictures) {
   constexpr double kLeast = 60, kGap = 8;
   auto left = static_cast<double>(pictures.size());
   for (const cv::Mat& picture : pictures) {
-    const double height = (kBottom - pages.y - 6) / left - kGap;
+    const double height = (pages.bottom() - pages.y - 6) / left - kGap;
     left -= 1;
     if (height < kLeast) return;
-    pages.Picture(picture, kMargin, pages.y + 6, kInner, height);
+    pages.Picture(picture, kMargin, pages.y + 6, pages.inner(), height);
     pages.y += height + kGap;
   }
+}
+
+constexpr double kSmall = 6.8;
+constexpr std::size_t kCourseColumns = 9;  // fraction, when, verdict, six numbers
+
+bool IsBold(std::size_t column) { return column == 2; }
+
+struct CourseTable {
+  std::vector<std::array<std::string, kCourseColumns>> cells;  ///< As in the rows of the report.
+  std::array<double, kCourseColumns> left;                     ///< Of the columns, on the page.
+  double size = 8.0;                                           ///< Of the texts.
+};
+
+/// Columns as wide as their widest text, with equal gaps; smaller texts if they are too wide.
+CourseTable TableOf(Pages& pages, const CourseReport& report) {
+  constexpr double kLeastGap = 12.0, kMostGap = 30.0, kLeastSize = 4.0;
+  CourseTable table;
+  for (const CourseRow& row : report.rows) {
+    auto& cells = table.cells.emplace_back();
+    cells[0] = row.fraction, cells[1] = row.when, cells[2] = row.verdict;
+    for (std::size_t i = 0; i < row.values.size(); ++i) {
+      if (!row.values[i]) continue;
+      const auto [value, u95] = *row.values[i];
+      cells[3 + i] = ValueWithUncertainty(value, u95, i < 3 ? 1 : 2, report.texts.decimal);
+    }
+  }
+  std::array<double, kCourseColumns> widths{};
+  const auto measure = [&] {
+    double sum = 0;
+    for (std::size_t i = 0; i < kCourseColumns; ++i) {
+      widths[i] = pages.Width(report.texts.heads[i], table.size, /*bold=*/true);
+      for (const auto& cells : table.cells)
+        widths[i] = std::max(widths[i], pages.Width(cells[i], table.size, IsBold(i)));
+      sum += widths[i];
+    }
+    return sum;
+  };
+  constexpr double kGaps = kCourseColumns - 1;
+  double sum = measure();
+  for (; sum + kGaps * kLeastGap > pages.inner() && table.size > kLeastSize; sum = measure())
+    table.size -= 0.5;
+  const double gap = std::min(kMostGap, (pages.inner() - sum) / kGaps);
+  double x = kMargin;
+  for (std::size_t i = 0; i < kCourseColumns; x += widths[i++] + gap) table.left[i] = x;
+  return table;
 }
 
 }  // namespace
@@ -253,21 +310,22 @@ std::string ValueWithUncertainty(double value, double u95, int most, char decima
 }
 
 std::string PdfOf(const ScanReport& report) {
-  Pages pages(report.texts, report.footer);
+  Pages pages(report.texts, report.footer, kUpright);
   pages.y += 6;
-  pages.Paragraph(kMargin, kInner, report.title, 16, kBlack, true);
+  pages.Paragraph(kMargin, pages.inner(), report.title, 16, kBlack, true);
   pages.y += 2;
   Facts(pages, report.identity);
   pages.Rule(pages.y += 2);
-  pages.Paragraph(kMargin, kInner, report.verdict, 18, kBlack, true);
-  if (!report.why.empty()) pages.Paragraph(kMargin, kInner, report.why, 9.5);
+  pages.Paragraph(kMargin, pages.inner(), report.verdict, 18, kBlack, true);
+  if (!report.why.empty()) pages.Paragraph(kMargin, pages.inner(), report.why, 9.5);
   for (const std::string& caution : report.cautions)
-    pages.Paragraph(kMargin, kInner, "! " + caution, 9, kMove, true);
+    pages.Paragraph(kMargin, pages.inner(), "! " + caution, 9, kMove, true);
   if (!report.numbers.empty()) pages.y += 2;
   for (const ReportNumber& number : report.numbers) NumberLine(pages, number, report.texts);
   if (!report.body.empty()) {
     Heading(pages, report.texts.posture);
-    for (const std::string& words : report.body) pages.Paragraph(kMargin, kInner, words, 8.5);
+    for (const std::string& words : report.body)
+      pages.Paragraph(kMargin, pages.inner(), words, 8.5);
   }
   if (!report.quality.empty()) {
     Heading(pages, report.texts.quality);
@@ -278,45 +336,37 @@ std::string PdfOf(const ScanReport& report) {
 }
 
 std::string PdfOf(const CourseReport& report) {
-  constexpr std::array<double, 10> kColumns = {0, 38, 122, 214, 256, 298, 340, 398, 456, 0};
-  constexpr double kSize = 7.5, kSmall = 6.8;
   const ReportTexts& texts = report.texts;
-  Pages pages(texts, report.footer);
+  Pages pages(texts, report.footer, kAcross);
   pages.y += 6;
-  pages.Paragraph(kMargin, kInner, report.title, 16, kBlack, true);
+  pages.Paragraph(kMargin, pages.inner(), report.title, 16, kBlack, true);
   Facts(pages, report.identity);
+  const CourseTable table = TableOf(pages, report);
   const auto heads = [&] {
     pages.y += 14;
-    for (std::size_t i = 0; i + 1 < texts.heads.size(); ++i)
-      pages.Text(kMargin + kColumns[i], pages.y, texts.heads[i], kSmall, kGrey, true);
+    for (std::size_t i = 0; i < kCourseColumns; ++i)
+      pages.Text(table.left[i], pages.y, texts.heads[i], table.size, kGrey, true);
     pages.Rule(pages.y += 4);
   };
   heads();
-  for (const CourseRow& row : report.rows) {
-    if (pages.y > kBottom - 44) {
+  for (std::size_t row = 0; row < report.rows.size(); ++row) {
+    if (pages.y > pages.bottom() - 44) {
       pages.Next();
       heads();
     }
-    const double line = pages.y += 13;
-    pages.Text(kMargin + kColumns[0], line, row.fraction, kSize);
-    pages.Text(kMargin + kColumns[1], line, row.when, kSmall);
-    pages.Text(kMargin + kColumns[2], line, row.verdict, kSmall, kBlack, true);
-    for (std::size_t i = 0; i < row.values.size(); ++i) {
-      if (!row.values[i]) continue;
-      const auto [value, u95] = *row.values[i];
-      pages.Text(kMargin + kColumns[3 + i], line,
-                 ValueWithUncertainty(value, u95, i < 3 ? 1 : 2, texts.decimal), kSmall);
-    }
+    const double line = pages.y += 1.8 * table.size;
+    for (std::size_t i = 0; i < kCourseColumns; ++i)
+      pages.Text(table.left[i], line, table.cells[row][i], table.size, kBlack, IsBold(i));
     // Below, over the full width: who accepted, and why it was outside tolerance.
-    if (!row.accepted.empty()) {
+    if (const std::string& accepted = report.rows[row].accepted; !accepted.empty()) {
       pages.y += 1;
-      pages.Paragraph(kMargin + kColumns[1], kInner - kColumns[1],
-                      fmt::format("{}: {}", texts.heads[9], row.accepted), kSmall, kGrey);
+      pages.Paragraph(table.left[1], kMargin + pages.inner() - table.left[1],
+                      fmt::format("{}: {}", texts.heads[9], accepted), kSmall, kGrey);
     }
   }
   if (!report.note.empty()) {
     pages.y += 8;
-    pages.Paragraph(kMargin, kInner, report.note, kSmall, kGrey);
+    pages.Paragraph(kMargin, pages.inner(), report.note, kSmall, kGrey);
   }
   return pages.Finish();
 }

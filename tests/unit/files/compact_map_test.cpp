@@ -139,7 +139,10 @@ TEST(PdfReport, IsAWholeFileWhateverIsMissing) {
                            .values = {CourseValue{0.1, 0.9}, CourseValue{-3.2, 1.1}}});
   const std::string long_course = PdfOf(course);
   EXPECT_GT(long_course.size(), empty);
-  EXPECT_NE(long_course.find("/Count 5"), std::string::npos) << "pages, of two lines a scan";
+  EXPECT_NE(long_course.find("/Count 7"), std::string::npos) << "pages, of two lines a scan";
+  EXPECT_NE(long_course.find("/MediaBox [ 0 0 841"), std::string::npos)
+      << "across, for its columns";
+  EXPECT_NE(pdf.find("/MediaBox [ 0 0 595"), std::string::npos);
 }
 
 TEST(PdfReport, AValueHasNoDigitBelowItsUncertainty) {
