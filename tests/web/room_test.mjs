@@ -415,6 +415,17 @@ await h.step('Spanish and light: complete, and kept for the account and for the 
   await room.goto(`${h.url}room?language=es`);
   await room.locator('.room-word', { hasText: 'SIN SESIÓN' }).waitFor();
   await h.look(room, 'room-spanish', { axe: false, fullPage: false });
+  // The room is dark, but its screen may be light; the choice stays.
+  const theme = () => room.locator('html').getAttribute('data-theme');
+  equal(await theme(), 'dark', 'as the room is');
+  await room.goto(`${h.url}room?theme=light`);
+  await room.locator('.room-word', { hasText: 'SIN SESIÓN' }).waitFor();
+  equal(await theme(), 'light', 'as it was asked for');
+  await room.goto(`${h.url}room`);
+  await room.locator('.room-word', { hasText: 'SIN SESIÓN' }).waitFor();
+  equal(await theme(), 'light', 'and as it stays');
+  await room.goto(`${h.url}room?theme=dark`);
+  await room.locator('.room-word', { hasText: 'SIN SESIÓN' }).waitFor();
   // What the appliance says of its backups, too.
   h.tell('nobackup');
   await engineer.goto(`${h.url}#/users`);

@@ -206,6 +206,15 @@ std::string AcceptedLine(const Scan& scan, const ResultWords& words) {
                          : Filled(words.accepted_outside, who, EscapeHtml(scan.accepted_reason)));
 }
 
+/// Version and time of the reference, and who approved it, when.
+std::string ReferenceLine(const Reference& reference, const ResultWords& words) {
+  const std::string who =
+      EscapeHtml(reference.approved_by) +
+      (reference.approved_at ? ", " + LocalTimeText(*reference.approved_at) : std::string());
+  return fmt::format("<p>{}</p>", Filled(words.reference_line, reference.version,
+                                         LocalTimeText(reference.created_at), who));
+}
+
 /// Patient, number and age of the scan, and who accepted it.
 /// @param newer  A later scan without a result; null if there is none.
 std::string Identity(const Records& records, const Scan& scan, const Scan* newer, bool old,
@@ -246,10 +255,7 @@ std::string ResultBody(const Records& records, const Scan& scan, const Scan* new
                       "<p>{}</p></section>",
                       words.terms.no_answer, Said(scan.failure, words));
   const auto reference = records.references.FindReference(scan.reference_id);
-  if (reference)
-    body += fmt::format("<p>{}</p>", Filled(words.reference_line, reference->version,
-                                            LocalTimeText(reference->created_at),
-                                            EscapeHtml(reference->approved_by)));
+  if (reference) body += ReferenceLine(*reference, words);
   if (!scan.result) return body + fmt::format("<p>{}</p>", words.no_reference);
   const std::string& verdict = scan.result->verdict;
   const bool review = old || wanted.scan.has_value();

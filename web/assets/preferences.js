@@ -13,10 +13,13 @@ const keepTheme = (who, theme) => {
   try { localStorage.setItem(key(who), theme); } catch { /* for this page only */ }
 };
 
+/// For a screen that nobody logs in at.
+export function chooseTheme(who, theme) { if (S.themes[theme]) keepTheme(who, theme); }
+
 /// At a login: what the account chose, perhaps in another browser.
 export function adoptPreferences({ user, preferences: chosen }) {
   if (kLanguages[chosen?.language]) chooseLanguage(user, chosen.language);
-  if (S.themes[chosen?.theme]) keepTheme(user, chosen.theme);
+  chooseTheme(user, chosen?.theme);
 }
 
 /// The room is dark: dark is the default; "auto" follows the system.

@@ -140,7 +140,8 @@ TEST(PdfReport, IsAWholeFileWhateverIsMissing) {
   const std::string long_course = PdfOf(course);
   EXPECT_GT(long_course.size(), empty);
   EXPECT_NE(long_course.find("/Count 7"), std::string::npos) << "pages, of two lines a scan";
-  EXPECT_NE(long_course.find("/MediaBox [ 0 0 841"), std::string::npos) << "across, for its columns";
+  EXPECT_NE(long_course.find("/MediaBox [ 0 0 841"), std::string::npos)
+      << "across, for its columns";
   EXPECT_NE(pdf.find("/MediaBox [ 0 0 595"), std::string::npos);
 }
 

@@ -7,6 +7,7 @@ import { legend } from '../error_map.js';
 import { compassOf, drawCropped, mapFrame, marksNote, viewOf } from '../map_frame.js';
 import { loadMap, paintErrors } from '../maps.js';
 import { sixNumbers, toleranceOf } from '../numbers.js';
+import { chooseTheme } from '../preferences.js';
 import { chooseLanguage, kLanguages, languageOf, S, translated } from '../strings.js';
 import {
   ageText, faultWords, flagList, isAdvice, isCold, lastKnownNote, minutesOf, sidesOf, sentence,
@@ -330,9 +331,11 @@ function display(main) {
 export async function showRoom(main, { speak, applyTheme }) {
   document.documentElement.classList.add('room-page');
   speak(kWho);
-  applyTheme(kWho);
   document.title = `${S.room.title} · ${S.product}`;
-  const wanted = new URLSearchParams(location.search).get('language');
+  const asked = new URLSearchParams(location.search);
+  chooseTheme(kWho, asked.get('theme'));
+  applyTheme(kWho);
+  const wanted = asked.get('language');
   if (kLanguages[wanted] && wanted !== languageOf(kWho)) {
     chooseLanguage(kWho, wanted);
     speak(kWho);

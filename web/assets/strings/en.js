@@ -219,7 +219,8 @@ export const en = {
     checkDoneTitle: 'DAILY CHECK', nothing: 'No change',
   },
   displays: {
-    title: 'Displays', hint: 'A screen in the room opens /room and shows a code. Type it here.',
+    title: 'Displays', hint: 'A screen in the room opens /room and shows a code. Type it here. '
+      + '/room?language=es and /room?theme=light choose its language and theme.',
     code: 'Code on the screen', name: 'Name of the screen', pair: 'Pair the screen',
     paired: 'The screen is paired.', remove: 'Remove', none: 'No screen is paired.',
     when: 'Paired', by: 'By',

@@ -248,7 +248,8 @@ export const es = {
   },
   displays: {
     title: 'Pantallas',
-    hint: 'Una pantalla de la sala abre /room y muestra un código. Escríbalo aquí.',
+    hint: 'Una pantalla de la sala abre /room y muestra un código. Escríbalo aquí. '
+      + '/room?language=es y /room?theme=light eligen su idioma y su tema.',
     code: 'Código de la pantalla', name: 'Nombre de la pantalla', pair: 'Vincular la pantalla',
     paired: 'La pantalla está vinculada.', remove: 'Quitar', none: 'Ninguna pantalla vinculada.',
     when: 'Vinculada', by: 'Por',
