@@ -58,6 +58,7 @@ check "rules name services" 'plumb-backup-disk.service.*plumb-stick@.service' "$
 for unit in $named; do
   check "$unit is there" "^there$" "$([ -s "root/etc/systemd/system/$unit" ] && echo there)"
 done
+check "a wrong clock refuses no update" 'use-bundle-signing-time=true' "$(cat root/etc/rauc/system.conf)"
 units=(root/etc/systemd/system/plumb-*.service)
 check "units" '^[4-9]$' "${#units[@]}"
 complaints=$(systemd-analyze verify --man=no --recursive-errors=no "${units[@]}" 2>&1 |
