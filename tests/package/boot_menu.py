@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """The boot menu of the image in GRUB's own interpreter (grub-emu): which system is started in every
-state of the boot counter, and what is counted. Exit code 77: left out, and the last line says why."""
+state of the boot counter, and what is counted.
+
+Exit code 77: left out, and the last line says why."""
 
 import itertools
 import os
@@ -24,9 +26,9 @@ def run(menu):
     with tempfile.TemporaryDirectory() as folder:
         with open(os.path.join(folder, "grub.cfg"), "w") as file:
             file.write(menu)
-        return subprocess.run(["script", "-qec", f"env TERM=xterm grub-emu -d {folder}", "/dev/null"],
-                              stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True,
-                              timeout=50).stdout
+        command = ["script", "-qec", f"env TERM=xterm grub-emu -d {folder}", "/dev/null"]
+        return subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                              check=True, timeout=50).stdout
 
 
 def expected(whole, starts, order):
@@ -49,7 +51,8 @@ def check_counter(text):
     states = list(itertools.product((0, 1), range(4), (0, 1), range(4), ("A B", "B A")))
     menu = ""
     for a_ok, a_try, b_ok, b_try, order in states:
-        menu += defaults + f'set A_OK={a_ok}\nset A_TRY={a_try}\nset B_OK={b_ok}\nset B_TRY={b_try}\n'
+        menu += defaults + f"set A_OK={a_ok}\nset A_TRY={a_try}\n"
+        menu += f"set B_OK={b_ok}\nset B_TRY={b_try}\n"
         menu += f'set ORDER="{order}"\n{decision}echo "CHOSEN $default $fallback $A_TRY $B_TRY"\n'
     found = re.findall(r"CHOSEN (\d) (\d) (\d) (\d)", run(menu + "exit\n"))
     faults = 0 if len(found) == len(states) else 1
@@ -65,8 +68,8 @@ def check_counter(text):
 
 def check_machine_id(text):
     command = text[text.index("set CMD="):text.index("menuentry")]
-    shown = run("set MACHINE_ID=\n" + command + 'echo "LINE $CMD"\nset MACHINE_ID=12ab\n' + command +
-                'echo "LINE $CMD"\nexit\n')
+    command += 'echo "LINE $CMD"\n'
+    shown = run("set MACHINE_ID=\n" + command + "set MACHINE_ID=12ab\n" + command + "exit\n")
     lines = re.sub(r"[\r\n]", "", shown).split("LINE ")[1:]  # the terminal breaks long ones
     found = [re.findall(r"systemd\.machine_id=\w*", line) for line in lines]
     return found != [[], ["systemd.machine_id=12ab"]], f"machine ID for the kernel: {found}"
@@ -74,9 +77,10 @@ def check_machine_id(text):
 
 def check_fallback(text):
     """A system that cannot be loaded: these partitions do not exist."""
-    menu = text[text.index("menuentry"):].replace('menuentry "System A" {', 'menuentry "System A" { echo "IS RUN"; exit; ')
+    title = 'menuentry "System A" {'
+    menu = text[text.index(title):].replace(title, title + ' echo "IS RUN"; exit; ')
     shown = run("set timeout=0\nset default=1\nset fallback=0\n" + menu)
-    return "IS RUN" not in shown, "a system that cannot be loaded leaves its place to the other"
+    return "IS RUN" not in shown, "a system that cannot be loaded makes room for the other"
 
 
 def main():

@@ -31,6 +31,7 @@ PLUMB_GATE_SELF_TEST=yes run
 check "a healthy system with its self test" '^0 1 0.2.0 one$' "$code $(is_marked) $(cat gate/good)"
 run roll-back
 check "a release that was good is not left" '^0 $' "$code $(grep reboot calls || true)"
+check "nor by the boot loader at a later start" '^2$' "$(is_marked)"
 echo "0.2.1 two" >release
 run roll-back
 check "a new one is, and the boot loader takes the other at once" \

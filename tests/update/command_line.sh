@@ -17,6 +17,35 @@ check() { # NAME EXPECTED-REGEX FOUND
 }
 mkdir machine
 "$here/make_bundles.sh" machine >made 2>&1 || { cat made; exit 1; }
+# A signer whose certificate ends before the bundle is installed.
+mkdir -p short/content
+cat >short/ca.conf <<CONF
+[ca]
+default_ca=own
+[own]
+database=short/index
+serial=short/serial
+new_certs_dir=short
+default_md=sha256
+policy=any
+[any]
+commonName=supplied
+CONF
+: >short/index
+echo 01 >short/serial
+ends=$(($(date +%s) + 20))
+{
+  openssl req -newkey rsa:2048 -nodes -subj "/CN=short" -keyout short/key -out short/csr
+  openssl ca -batch -config short/ca.conf -in short/csr -out short/pem -cert machine/pki/own-ca.pem \
+    -keyfile machine/pki/own-ca.key -startdate "$(date -u -d '-1 hour' +%Y%m%d%H%M%SZ)" \
+    -enddate "$(date -u -d "@$ends" +%Y%m%d%H%M%SZ)" -extfile <(
+      printf '%s\n' basicConstraints=CA:FALSE keyUsage=digitalSignature extendedKeyUsage=codeSigning
+    )
+  cp machine/good.img short/content/rootfs.img
+  printf '%s\n' '[update]' compatible=plumb-test version=9.1.0 '' '[bundle]' format=plain '' \
+    '[image.rootfs]' filename=rootfs.img >short/content/manifest.raucm
+  rauc --cert=short/pem --key=short/key bundle short/content machine/expired.raucb
+} >made 2>&1 || { cat made; exit 1; }
 cat >bus.conf <<CONF
 <!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-BUS Bus Configuration 1.0//EN"
  "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd"><busconfig><type>session</type><listen>unix:path=$work/bus</listen>
@@ -71,6 +100,12 @@ check "and written to the other system" '^same$' "$(cmp -s -n 1500000 machine/go
 check "a machine without logind says that it cannot restart" '^5 .*cannot be restarted from here' "$(seen)"
 run machine/good.raucb
 check "a second time" '^0 .*is installed' "$(seen)"
+while [ "$(date +%s)" -le "$ends" ]; do sleep 1; done
+check "the signer's certificate has ended" '^no$' \
+  "$(openssl x509 -in short/pem -noout -checkend 0 >checkend && echo yes || echo no)"
+run machine/expired.raucb
+check "it was valid when the bundle was signed: the machine's clock does not count" \
+  '^0 .*is installed' "$(seen)"
 
 kill -TERM $daemon
 wait $daemon || true

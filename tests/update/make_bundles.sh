@@ -83,6 +83,7 @@ bootloader-custom-backend=$PWD/boot-backend
 [keyring]
 path=$PWD/keyring.pem
 check-purpose=codesign
+use-bundle-signing-time=true
 
 [slot.rootfs.0]
 device=$PWD/slots/a.img
