@@ -91,12 +91,8 @@ Axes AxesByRoom(const BodyView& view, const Outline& outline) {
   const RoomWays ways = WaysOfRoom(*view.T_iec_reference);
   const Axes room = {-ways.gantry, ways.right, false};
   if (!view.posture) return room;
-  const bool head_first = *view.posture == PatientPosture::kHeadFirstSupine ||
-                          *view.posture == PatientPosture::kHeadFirstProne;
-  const bool supine = *view.posture == PatientPosture::kHeadFirstSupine ||
-                      *view.posture == PatientPosture::kFeetFirstSupine;
-  Axes axes = {head_first ? room.along : Eigen::Vector2d(-room.along),
-               head_first == supine ? room.side : Eigen::Vector2d(-room.side), true};
+  const PatientAxes patient = SidesOf(ways, *view.posture);
+  Axes axes = {-patient.head, patient.left, true};
   if (outline.elongation < kElongated) return axes;
   const double cosine = outline.principal.dot(axes.along);
   if (std::abs(cosine) < std::sqrt(0.5))
@@ -296,6 +292,15 @@ RoomWays WaysOfRoom(const Pose& T_iec_reference) {
   };
   return {.gantry = in_plane(Eigen::Vector3d::UnitY()),
           .right = in_plane(Eigen::Vector3d::UnitX())};
+}
+
+PatientAxes SidesOf(const RoomWays& room, PatientPosture posture) {
+  const bool head_first =
+      posture == PatientPosture::kHeadFirstSupine || posture == PatientPosture::kHeadFirstProne;
+  const bool supine =
+      posture == PatientPosture::kHeadFirstSupine || posture == PatientPosture::kFeetFirstSupine;
+  return {.head = head_first ? room.gantry : Eigen::Vector2d(-room.gantry),
+          .left = head_first == supine ? room.right : Eigen::Vector2d(-room.right)};
 }
 
 BodyParts DescribeBody(const BodyView& view) {

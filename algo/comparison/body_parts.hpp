@@ -41,6 +41,9 @@ struct RoomWays {
 
 [[nodiscard]] RoomWays WaysOfRoom(const Pose& T_iec_reference);
 
+/// Directions of head and left of a patient who lies exactly along the room's axes.
+[[nodiscard]] PatientAxes SidesOf(const RoomWays& room, PatientPosture posture);
+
 struct BodyParts {
   /// True if names follow the patient's posture. False if the posture is unknown or the body does
   /// not lie as it states; names then do not mention left or right.

@@ -159,6 +159,15 @@ const char* Name(PatientPosture posture) {
   return "HFS";
 }
 
+std::optional<PatientPosture> PostureNamed(std::string_view name) {
+  for (const PatientPosture posture :
+       {PatientPosture::kHeadFirstSupine, PatientPosture::kHeadFirstProne,
+        PatientPosture::kFeetFirstSupine, PatientPosture::kFeetFirstProne}) {
+    if (name == Name(posture)) return posture;
+  }
+  return std::nullopt;
+}
+
 Eigen::Matrix3d CouchRotation(double pitch_rad, double roll_rad, double yaw_rad) {
   return (Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()) *
           Eigen::AngleAxisd(pitch_rad, Eigen::Vector3d::UnitX()) *

@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include <Eigen/Core>
 
@@ -18,6 +19,8 @@ enum class MarkerKind { kRoom, kCouch };
 /// Patient orientation: which end points to the gantry and which side is up.
 enum class PatientPosture { kHeadFirstSupine, kHeadFirstProne, kFeetFirstSupine, kFeetFirstProne };
 [[nodiscard]] const char* Name(PatientPosture posture);  ///< "HFS", "HFP", "FFS", "FFP"
+/// Not set: no posture has this name.
+[[nodiscard]] std::optional<PatientPosture> PostureNamed(std::string_view name);
 
 /// Directions of the patient's head and left side, unit vectors in the plane (x, y) of the
 /// reference marker.
@@ -68,7 +71,6 @@ struct Correction {
 /// @param posture     Selects the patient's left, right and head for the words. Not set: the words
 ///         refer to the room, or to the marker where the room is unknown.
 /// @param patient     Used for the words only where the room is unknown.
-/// at.
 [[nodiscard]] Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance,
                                       const Eigen::Vector3d& centroid,
                                       const Eigen::Vector3d& isocentre_reference,

@@ -306,7 +306,7 @@ class Appliance {
   struct Room {
     std::optional<SignedRoom> calibration;
     std::string due;  ///< Set without a calibration: one is stored but cannot be read.
-    bool is_configured = false;
+    std::optional<Pose> configured;  ///< T_iec_reference of the configuration.
   };
 
   EventLoop& loop_;

@@ -38,7 +38,7 @@ web::RoomCalibrationVersion ForPage(const SignedRoom& room) {
 
 void Appliance::RefreshRoom() {
   Room room;
-  room.is_configured = parts_.config.compare.T_iec_reference.has_value();
+  room.configured = parts_.config.compare.T_iec_reference;
   if (store_ != nullptr) {
     try {
       room.calibration = store_->room.Newest();
@@ -65,8 +65,7 @@ std::optional<RoomAxes> Appliance::RoomOfJob() const {
 /// configuration counts only where no calibration was ever signed.
 std::optional<Pose> Appliance::RoomPose() const {
   if (!room_.due.empty()) return std::nullopt;
-  return room_.calibration ? room_.calibration->fit.T_iec_reference
-                           : parts_.config.compare.T_iec_reference;
+  return room_.calibration ? room_.calibration->fit.T_iec_reference : room_.configured;
 }
 
 std::optional<RoomWays> Appliance::RoomOnMaps() const {
@@ -80,7 +79,7 @@ void Appliance::ReportRoom(web::Status& status) const {
     status.warnings.push_back(fmt::format(
         "The room has to be calibrated again, until then directions are the patient's: {}",
         room_.due));
-  if ((room_.calibration || !room_.due.empty()) && room_.is_configured)
+  if ((room_.calibration || !room_.due.empty()) && room_.configured)
     status.warnings.push_back(
         "The signed calibration of the room holds: T_iec_reference of the configuration is not "
         "used");
@@ -104,7 +103,7 @@ web::RoomCalibrationStatus Appliance::RoomCalibration() {
   {
     const std::lock_guard lock(room_mutex_);
     status.due = room_.due;
-    status.is_configured = room_.is_configured;
+    status.is_configured = room_.configured.has_value();
   }
   for (const SignedRoom& room : store_->room.List(kVersionsShown))
     status.versions.push_back(ForPage(room));

@@ -19,11 +19,7 @@ namespace {
 }
 
 PatientPosture PostureOf(std::string_view name) {
-  for (const PatientPosture posture :
-       {PatientPosture::kHeadFirstSupine, PatientPosture::kHeadFirstProne,
-        PatientPosture::kFeetFirstSupine, PatientPosture::kFeetFirstProne}) {
-    if (name == Name(posture)) return posture;
-  }
+  if (const auto posture = PostureNamed(name)) return *posture;
   Fail(fmt::format("posture: expected HFS, HFP, FFS or FFP, found '{}'", name.substr(0, 20)));
 }
 

@@ -15,7 +15,6 @@
 #include "daemon/files/scene_folder.hpp"
 #include "daemon/loop/log.hpp"
 #include "drivers/files/image_file.hpp"
-#include "web/service/limits.hpp"
 
 namespace plumb {
 namespace {
@@ -55,16 +54,6 @@ std::vector<MapMark> MarksIn(const Json& result, const SideWords& words) {
   std::optional<RoomWays> room;
   if (gantry && right) room = RoomWays{*gantry, *right};
   return MapMarks(patient, room, words);
-}
-
-/// The sides of a patient who lies in that posture in the room; not set if there is no such
-/// posture.
-std::optional<PatientAxes> SidesIn(const RoomWays& room, std::string_view posture) {
-  if (!web::IsPosture(posture)) return std::nullopt;
-  const bool is_head_first = posture.starts_with('H'), is_supine = posture.ends_with('S');
-  return PatientAxes{
-      .head = is_head_first ? room.gantry : Eigen::Vector2d(-room.gantry),
-      .left = is_head_first == is_supine ? room.right : Eigen::Vector2d(-room.right)};
 }
 
 HeightMap HeightsOf(const fs::path& scan_folder) {
@@ -141,7 +130,9 @@ std::vector<cv::Mat> ReferencePictures(const fs::path& scan_folder, const web::R
     const HeightMap heights = HeightsOf(scan_folder);
     const std::vector<std::uint8_t> region = PlannedRegion(heights.grid, plan);
     HeightImageOptions options{.region_mask = region, .words = words};
-    if (room) options.marks = MapMarks(SidesIn(*room, plan.posture), room, sides);
+    if (const std::optional<PatientPosture> posture = PostureNamed(plan.posture); room)
+      options.marks =
+          MapMarks(posture ? std::optional(SidesOf(*room, *posture)) : std::nullopt, room, sides);
     if (plan.isocentre_m)
       options.isocentre_m = Eigen::Vector2d((*plan.isocentre_m)[0], (*plan.isocentre_m)[1]);
     return {DrawHeightImage(heights, options)};

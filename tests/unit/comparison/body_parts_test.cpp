@@ -260,6 +260,20 @@ TEST(BodyPartsTest, WithoutARoomTheBodyItselfSaysWhereItsHeadIs) {
   }
 }
 
+TEST(BodyPartsTest, EachPostureHasItsSidesInARoomThatIsTurnedOnTheMap) {
+  for (const Case& how : kCases) {
+    EXPECT_EQ(PostureNamed(Name(how.posture)), how.posture);
+    const Eigen::Rotation2Dd to_map(0.7);
+    const PatientAxes sides =
+        SidesOf({.gantry = to_map * Eigen::Vector2d(0, 1), .right = to_map * Eigen::Vector2d(1, 0)},
+                how.posture);
+    EXPECT_LT((sides.head - to_map * how.head).norm(), 1e-9) << Name(how.posture);
+    EXPECT_LT((sides.left - to_map * how.left).norm(), 1e-9) << Name(how.posture);
+  }
+  EXPECT_FALSE(PostureNamed("HFDL"));
+  EXPECT_FALSE(PostureNamed(""));
+}
+
 TEST(BodyPartsTest, WithARoomHeadAndLeftAreGivenTooAndItsAxesWhereThePostureIsNotBelieved) {
   const Lying person(kCases[1], 0.4, IsPerson, HighLeftShoulder);
   const BodyParts body = person.Describe(kCases[1].posture);
