@@ -232,6 +232,15 @@ await h.step('as planned: the pictures name the sides of the patient', async () 
   equal(await anna.locator('.marks-note').count(), 0, 'nothing to warn of');
 });
 
+await h.step('compared before the room was known: its pictures have no gantry, whatever is known now', async () => {
+  h.tell('moved z 8 HFS bare');
+  const { id } = await scan();
+  equal((await h.api(anna, `results/${id}`)).body.body.room_known, false, 'as it was compared');
+  const { found } = await marksOfResult('marks-room-since');
+  equal(found[kPictures[0]].join(), 'feet,head,left,right', 'the map');
+  equal(found[kPictures[2]].join(), 'feet,head,left,right', 'the overlay');
+});
+
 await h.step('the slider of the 3-D view moves the surface as the correction will, beside the reference', async () => {
   // Where the region lies in the picture from the left, in pixels from the top: all around it is dimmed. Without the cube in the corner.
   const middle = () => anna.locator('canvas.mesh').evaluate(async (canvas) => {
@@ -316,18 +325,16 @@ await h.step('the map of a plan names the sides that its posture has in a known 
   await way('head').waitFor();
   equal((await marksIn(bob, '.plan-grid')).join(), 'feet,gantry,head,left,right', 'the plan');
   await bob.locator('.plan-grid').getByText('check that the patient lies so').waitFor();
-  const place = async (name) => {
-    const { x, y } = await way(name).boundingBox();
-    return `${Math.round(x)} ${Math.round(y)}`;
-  };
-  const before = [await place('left'), await place('right')];
+  // On this map the gantry is on the right, so that what is to the right of who faces it is at the bottom.
   const posture = bob.locator('.plan-grid').getByLabel('Posture');
-  if (await posture.isEnabled()) {
-    const was = await posture.inputValue();
-    await posture.selectOption(was === 'HFS' ? 'HFP' : 'HFS');
-    check(await place('left') !== before[0], 'who lies on the other side has left and right swapped');
-    await posture.selectOption(was);
-    equal([await place('left'), await place('right')].join(), before.join(), 'as it was');
+  equal(await posture.inputValue(), 'HFS', 'as approved');
+  for (const [name, head, left] of [['HFP', 'right', 'top'], ['FFS', 'left', 'top'], ['FFP', 'left', 'bottom'], ['HFS', 'right', 'bottom']]) {
+    await posture.selectOption(name);
+    const at = {};
+    for (const mark of ['head', 'feet', 'left', 'right', 'gantry']) at[mark] = await way(mark).boundingBox();
+    check(at.gantry.x > Math.max(at.left.x, at.right.x), `${name}: the gantry is on the right`);
+    equal(at.head.x > at.feet.x ? 'right' : 'left', head, `${name}: the head`);
+    equal(at.left.y > at.right.y ? 'bottom' : 'top', left, `${name}: the left side`);
   }
   await h.look(bob, 'marks-plan', { axe: false });
   h.tell('room unknown');

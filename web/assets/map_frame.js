@@ -15,11 +15,15 @@ const times = ([x, y], k) => [k * x, k * y];
 /// Which side is the patient's was decided where the words were made: only a result whose body
 /// "named_by" is "posture" shows head, feet, left and right, where the comparison found them. Else
 /// the marks are the axes of the room, as in the words; where that is not known, the map's own.
-/// @param body  Of the result: named_by, head_xy, left_xy; none: nothing is the patient's.
+/// @param room  Of the status: as it is known now.
+/// @param body  Of the result: named_by, head_xy, left_xy, and the room as the comparison knew it;
+///     none: nothing is the patient's.
 export function compassOf(room, body, posture) {
-  // Right of a person who faces the gantry.
-  const { gantry_xy: gantry, right_xy: right, known } = room ?? {};
-  if (!gantry || !right) return null;
+  if (!room?.gantry_xy || !room.right_xy) return null;
+  const known = room.known && body?.room_known !== false;
+  // In the frame of the result's reference, which may lie otherwise in the room than today's.
+  const gantry = body?.gantry_xy ?? room.gantry_xy;
+  const right = body?.right_xy ?? room.right_xy;  // of a person who faces the gantry
   // Results before 0.2.0 have only the posture, which has a meaning where the room is known.
   if (body?.named_by === 'posture' && (body.head_xy || (known && posture))) {
     const head = body.head_xy ?? times(gantry, posture.startsWith('H') ? 1 : -1);

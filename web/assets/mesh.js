@@ -205,6 +205,7 @@ export function openMesh(canvas, {
   look('reset');
 
   let ghost = null;
+  let isGhostWanted = false;
   // Both surfaces are drawn solid in turn by a screen-door pattern: nothing flickers where they lie
   // in each other, as it does with transparency.
   const setShare = (share) => {
@@ -260,16 +261,19 @@ export function openMesh(canvas, {
     },
     /// @param load  Gives the reference's surface; null: it is hidden.
     async setGhost(load, share) {
-      if (!ghost && load) {
-        ghost = new THREE.Mesh(geometryOf(await load()), new THREE.MeshStandardMaterial({
+      isGhostWanted = Boolean(load);
+      const reference = !ghost && load ? await load() : null;
+      // Meanwhile it may have been hidden again, or have come by another call.
+      if (reference && !ghost) {
+        ghost = new THREE.Mesh(geometryOf(reference), new THREE.MeshStandardMaterial({
           color: 0x6ea8ff, alphaHash: true, side: THREE.DoubleSide,
           clippingPlanes: material.clippingPlanes,
         }));
         if (T) ghost.applyMatrix4(new THREE.Matrix4().set(...T.flat()).invert());
         scene.add(ghost);
       }
-      if (ghost) ghost.visible = Boolean(load);
-      if (!load) {
+      if (ghost) ghost.visible = isGhostWanted;
+      if (!isGhostWanted) {
         material.opacity = 1;
         material.alphaHash = false;
         material.needsUpdate = true;

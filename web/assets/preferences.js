@@ -14,7 +14,9 @@ const keepTheme = (who, theme) => {
 };
 
 /// For a screen that nobody logs in at.
-export function chooseTheme(who, theme) { if (S.themes[theme]) keepTheme(who, theme); }
+export function chooseTheme(who, theme) {
+  if (Object.hasOwn(S.themes, theme)) keepTheme(who, theme);
+}
 
 /// At a login: what the account chose, perhaps in another browser.
 export function adoptPreferences({ user, preferences: chosen }) {

@@ -43,8 +43,8 @@ class ScanService {
   /// Cautions to read beside the verdict of a scan, as whole sentences (background).
   [[nodiscard]] virtual std::vector<std::string> Cautions(const std::string& scan_id,
                                                           Language language) = 0;
-  /// A picture of a comparison as a PNG file, with texts in a language and the patient's sides
-  /// named; nothing if there is no such comparison, or it cannot be drawn (background).
+  /// A picture of a comparison as a PNG file, with texts and marks in a language; nothing if there
+  /// is no such comparison, or it cannot be drawn (background).
   [[nodiscard]] virtual std::optional<std::string> PictureOf(const std::string& scan_id,
                                                              ComparisonPicture picture,
                                                              Language language) = 0;

@@ -39,9 +39,13 @@ export const outcomeBadge = (scan) => (scan.result ? verdictBadge(scan.result.ve
 export const isAdvice = (scan) =>
   Boolean(scan.result?.correction) && scan.result.verdict !== 'no_answer';
 
-/// Where the comparison found the patient's sides, for the marks on pictures: no answer, no side of
-/// the patient.
-export const sidesOf = (scan, details) => (isAdvice(scan) ? details?.body : undefined);
+/// Where the comparison found the patient's sides and the room's, for the marks on pictures: no
+/// answer, no side of the patient.
+export function sidesOf(scan, details) {
+  const body = details?.body;
+  if (!body || isAdvice(scan) || body.named_by === 'axes') return body;
+  return { ...body, named_by: 'room' };
+}
 
 /// Why no reference may be scanned or approved now, with the way to what is needed; follows the
 /// status while it is shown. `tell(why)` is first called at once.

@@ -55,19 +55,22 @@ function correctionControls(view, canvas, scan, showReference) {
   const share = h('input', {
     type: 'range', min: 0, max: 1, step: 0.05, value: 0, 'aria-label': text.correctionShare,
   });
-  let after = null;
+  let after = null;  // loaded once, however many steps the slider makes meanwhile
   let shown = false;
   share.addEventListener('input', async () => {
     if (!shown) showReference();
     shown = true;
+    after ??= loadMap(scan.id, 'deviation_after');
+    let map;
     try {
-      after ??= await loadMap(scan.id, 'deviation_after');
+      map = await after;
     } catch (error) {
+      after = null;
       share.value = 0;
       warn(`${text.mapMissing} ${error.message}`);
       return;
     }
-    view.correct(Number(share.value), after);
+    view.correct(Number(share.value), map);
     canvas.dataset.corrected = share.value;
   });
   const end = (words) => h('span', { 'aria-hidden': 'true' }, words);
@@ -96,6 +99,8 @@ function controls(view, canvas, { reference, scan, details }, compass) {
       await view.setGhost(ghost.box.checked ? () => surfaceOf(reference.scan_id) : null,
         Number(share.value));
     } catch (error) {
+      ghost.box.checked = false;
+      share.hidden = true;
       warn(error.message);
     }
     state.textContent = '';

@@ -336,7 +336,7 @@ export async function showRoom(main, { speak, applyTheme }) {
   chooseTheme(kWho, asked.get('theme'));
   applyTheme(kWho);
   const wanted = asked.get('language');
-  if (kLanguages[wanted] && wanted !== languageOf(kWho)) {
+  if (Object.hasOwn(kLanguages, wanted) && wanted !== languageOf(kWho)) {
     chooseLanguage(kWho, wanted);
     speak(kWho);
   }
