@@ -165,13 +165,11 @@ export const en = {
     confirmWho: (code) => `Confirm: ${code} is on the couch`,
     report: 'Course summary (PDF)', csv: 'Numbers (CSV)', json: 'Numbers (JSON)',
     course: 'Everything (zip)',
-    exports: 'Export',
   },
   scan: {
     title: 'Scan', start: 'Start sweep', stop: 'End sweep', acknowledge: 'Acknowledge',
     discard: 'Discard scan', again: 'Scan again', coverage: 'Covered', keyframes: 'Keyframes',
     tracked: 'Frames tracked', dropped: 'Frames lost', time: 'Time',
-    noPatient: 'No session open. This scan will be unassigned and not compared.',
     choose: 'Choose a patient', patient: 'Patient', show: 'Show result',
     guidance: {
       none: 'Good pace', slower: 'SLOWER', closer: 'CLOSER', farther: 'FARTHER',
@@ -228,7 +226,7 @@ export const en = {
   result: {
     title: 'Result', none: 'No result yet.', noneHint: 'Open a patient, then scan.',
     patient: 'Patient', reference: 'Reference', version: (v) => `version ${v}`,
-    scanned: 'Scanned', age: 'Age', fraction: 'Fraction', scanNumber: 'Scan',
+    scanned: 'Scanned', age: 'Age', fraction: 'Fraction',
     old: 'OLD', oldText: 'This result is older than 2 minutes. Do not act on it: scan again.',
     running: 'A NEW SCAN IS RUNNING',
     runningText: 'This result is no longer valid. Wait for the new one.',
@@ -495,7 +493,7 @@ export const en = {
     corners: (n) => (n === 0 ? 'No corners: the whole body'
       : `${n} ${plural(n, 'corner', 'corners')}`),
     area: (cm2, round) => `area ${cm2} cm², outline ${round} cm`,
-    saved: 'Plan saved.', approved: 'Reference approved.', newVersion: 'A new version was created.',
+    saved: 'Plan saved.', approved: 'Reference approved.',
     corner: (n, x, y) => `Corner ${n}: x ${x.toFixed(3)}, y ${y.toFixed(3)} m`,
     noMap: 'This scan has no height map.',
   },

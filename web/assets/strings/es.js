@@ -192,14 +192,12 @@ export const es = {
     confirmWho: (code) => `Confirme: ${code} está en la camilla`,
     report: 'Resumen del tratamiento (PDF)', csv: 'Valores (CSV)', json: 'Valores (JSON)',
     course: 'Todo (zip)',
-    exports: 'Exportar',
   },
   scan: {
     title: 'Escanear', start: 'Empezar el barrido', stop: 'Terminar el barrido',
     acknowledge: 'Confirmar', discard: 'Descartar el escaneo', again: 'Escanear de nuevo',
     coverage: 'Cubierto', keyframes: 'Imágenes clave', tracked: 'Imágenes seguidas',
     dropped: 'Imágenes perdidas', time: 'Tiempo',
-    noPatient: 'Ninguna sesión abierta. Este escaneo quedará sin asignar y no se comparará.',
     choose: 'Elegir un paciente', patient: 'Paciente', show: 'Mostrar el resultado',
     guidance: {
       none: 'Buen ritmo', slower: 'MÁS DESPACIO', closer: 'MÁS CERCA', farther: 'MÁS LEJOS',
@@ -257,7 +255,7 @@ export const es = {
   result: {
     title: 'Resultado', none: 'Aún no hay resultado.', noneHint: 'Abra un paciente y escanee.',
     patient: 'Paciente', reference: 'Referencia', version: (v) => `versión ${v}`,
-    scanned: 'Escaneado', age: 'Hace', fraction: 'Fracción', scanNumber: 'Escaneo',
+    scanned: 'Escaneado', age: 'Hace', fraction: 'Fracción',
     old: 'ANTIGUO', oldText: 'Este resultado tiene más de 2 minutos. No actúe según él: escanee de '
       + 'nuevo.',
     running: 'HAY UN NUEVO ESCANEO EN CURSO',
@@ -546,7 +544,6 @@ export const es = {
       : `${n} ${plural(n, 'vértice', 'vértices')}`),
     area: (cm2, round) => `área ${cm2} cm², contorno ${round} cm`,
     saved: 'Plan guardado.', approved: 'Referencia aprobada.',
-    newVersion: 'Se ha creado una versión nueva.',
     corner: (n, x, y) => `Vértice ${n}: x ${x.toFixed(3)}; y ${y.toFixed(3)} m`
       .replaceAll('.', ','),
     noMap: 'Este escaneo no tiene mapa de alturas.',
