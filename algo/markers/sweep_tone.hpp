@@ -26,7 +26,6 @@ struct SweepTone {
   /// sightings).
   double edge_shift_px = 0;
   double sigma_edge_shift_px = 0;
-  int num_sightings = 0;
 };
 
 /// Blur is symmetric in light. Under the correct curve an edge from black to white is symmetric

@@ -99,7 +99,6 @@ bool Solve(const Eigen::MatrixXd& S, const Eigen::VectorXd& right, Eigen::Vector
 
 BundleSummary Solver::Run() {
   BundleSummary summary;
-  summary.num_residuals = problem_.NumResiduals();
   State state = problem_.Start();
   problem_.DropViewsBehindCameras(state);
   double cost = problem_.Cost(state);
