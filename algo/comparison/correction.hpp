@@ -65,7 +65,6 @@ struct Correction {
 /// @param posture     Selects the patient's left, right and head for the words. Not set: the words
 ///         refer to the room, or to the marker where the room is unknown.
 /// @param patient     Used for the words only where the room is unknown.
-/// at.
 [[nodiscard]] Correction CorrectionOf(const Pose& T_motion, const Matrix6d& covariance,
                                       const Eigen::Vector3d& centroid,
                                       const Eigen::Vector3d& isocentre_reference,
