@@ -66,7 +66,8 @@ void JudgeTracking(const Evidence& evidence, const AcceptanceLimits& limits, Rea
   judge(evidence.current_lost_s, "current");
 }
 
-// As many as the other texts show, and none where they would say nothing.
+// Decimals of an uncertainty: those of the other texts, and none from 100 on, where they would mean
+// nothing.
 int Decimals(double u95, std::size_t i) {
   if (!(u95 < 100.0)) return 0;
   return IsShift(i) ? 1 : 2;

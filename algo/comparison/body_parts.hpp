@@ -82,7 +82,6 @@ struct BodyView {
 /// `now_m` is the rise of the part under the rigid motion plus the remaining deviation, so that a
 /// sideways shift does not count as a rise. Parts smaller than 20 cm2, or measured by less than a
 /// third, are left out.
-/// which less than a third was measured, are left out.
 /// @throws std::invalid_argument if grids or masks differ in size.
 [[nodiscard]] BodyParts DescribeBody(const BodyView& view);
 

@@ -77,6 +77,8 @@ class Comparer {
   Comparer(const Scene& reference, const Scene& current, const CompareOptions& options)
       : reference_(reference), current_(current), options_(options) {
     result_.preset = options.preset;
+    result_.reference_profile = reference.sensor_profile;
+    result_.current_profile = current.sensor_profile;
     evidence_.reference_lost_s = reference.longest_lost_s;
     evidence_.current_lost_s = current.longest_lost_s;
     evidence_.region_is_drawn = !options.region_polygon_m.empty();

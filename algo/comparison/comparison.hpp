@@ -73,6 +73,8 @@ struct BodyMotion {
 /// Content of a result. What could not be computed is absent, and `reasons` states why.
 struct Comparison {
   Preset preset = Preset::kBest;  ///< How the numbers were made.
+  /// Names of the sensor units' profiles from which the two scenes were made, if they were.
+  std::optional<std::string> reference_profile, current_profile;
   Verdict verdict = Verdict::kNoAnswer;
   std::vector<std::string> reasons;  ///< Complete sentences; the first one decides.
   std::optional<Alignment> alignment;

@@ -168,13 +168,6 @@ std::optional<PatientPosture> PostureNamed(std::string_view name) {
   return std::nullopt;
 }
 
-Eigen::Matrix3d CouchRotation(double pitch_rad, double roll_rad, double yaw_rad) {
-  return (Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()) *
-          Eigen::AngleAxisd(pitch_rad, Eigen::Vector3d::UnitX()) *
-          Eigen::AngleAxisd(roll_rad, Eigen::Vector3d::UnitY()))
-      .toRotationMatrix();
-}
-
 Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_reference,
                      const Pose& T_iec_reference) {
   const Pose T_correction = T_iec_reference * T_motion.inverse() * T_iec_reference.inverse();

@@ -56,9 +56,6 @@ struct Correction {
 [[nodiscard]] Vector6d CouchVector(const Pose& T_motion, const Eigen::Vector3d& isocentre_reference,
                                    const Pose& T_iec_reference);
 
-/// Rotation of the angles: Rz(yaw) Rx(pitch) Ry(roll), radians.
-[[nodiscard]] Eigen::Matrix3d CouchRotation(double pitch_rad, double roll_rad, double yaw_rad);
-
 /// The correction of a body motion with its uncertainty, propagated to first order.
 ///
 /// @param T_motion    p_current = T_motion * p_reference, in the reference marker's frame.

@@ -315,7 +315,7 @@ HeightMap SignedDistance(const HeightMap& current, const HeightMap& reference,
                          const std::vector<std::uint8_t>& mask) {
   CheckGrids(current, reference);
   if (!mask.empty() && mask.size() != reference.z.size())
-    throw std::invalid_argument("the mask must have one entry a cell");
+    throw std::invalid_argument("the mask must have one entry per cell");
   HeightMap distance(reference.grid);
   const NearestCells nearest(current, reference, mask);
   const GridSurface surface(current);

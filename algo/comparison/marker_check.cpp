@@ -99,7 +99,7 @@ class Checker {
     Fail(missing.empty()
              ? fmt::format("{} markers were seen, at least {} are needed; sweep over all of them",
                            found, wanted)
-             : fmt::format("markers {} were not seen well: look whether they are there, clean and "
+             : fmt::format("markers {} were not seen well: check that they are there, clean and "
                            "uncovered, and sweep over all",
                            fmt::join(missing, ", ")));
   }
@@ -156,7 +156,7 @@ class Checker {
                  moved_mm = moved_m / kMillimetre;
     AtMost("misfit", misfit_mm, limits_.max_misfit_m / kMillimetre, "mm", "",
            fmt::format(
-               "the markers lie {:.1f} mm (RMS) off where they lay, at most {:g} mm are allowed",
+               "the markers lie {:.1f} mm (RMS) from where they were, at most {:g} mm are allowed",
                misfit_mm, limits_.max_misfit_m / kMillimetre));
     AtMost("moved", moved_mm, limits_.max_moved_m / kMillimetre, "mm",
            fmt::format("marker {}", worst.value()),
@@ -182,7 +182,7 @@ class Checker {
            id_of_worst ? fmt::format("marker {}", *id_of_worst) : "",
            id_of_worst
                ? fmt::format(
-                     "marker {} measures {:+.1f} % of its length: is its print of the right size?",
+                     "marker {} is {:+.1f} % off its stated length: check the size of its print",
                      *id_of_worst, worst)
                : "no marker was seen, so none could be measured");
   }

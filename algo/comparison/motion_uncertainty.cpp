@@ -13,7 +13,7 @@ namespace {
 // maps does not show it.
 constexpr double kScaleSigma = 0.001;
 
-// For scenes that say nothing of their sensor. Depth is registered to colour by terms that each
+// For scenes without a SensorSensitivity. Depth is registered to colour by terms that each
 // sweep estimates again, so two sweeps may agree at the markers and place the body differently: by
 // 0.3 to 0.4 mm and 0.01 to 0.03 deg for each sweep (RMS, small suite of unit 71).
 constexpr double kSensorShift_m = 0.4 * kMillimetre;

@@ -40,7 +40,7 @@ struct UncertaintyInput {
   Pose T_motion = Pose::Identity();  ///< p_current = T_motion * p_reference
   /// Centroid of the region in the reference frame.
   Eigen::Vector3d centroid_m = Eigen::Vector3d::Zero();
-  /// SharedSensor::covariance; absent where a scene says nothing of its sensor.
+  /// SharedSensor::covariance; absent where a scene has no sensitivity.
   std::optional<Matrix6d> sensor;
 };
 

@@ -127,8 +127,7 @@ std::variant<BoardFit, std::string> FitRoomBoard(const RoomBoard& board, const M
   const std::size_t num = centres_board.size();
   if (num < limits.min_markers) {
     return fmt::format(
-        "{} of the board's {} markers were seen well, at least {} are needed: look whether they "
-        "are "
+        "{} of the board's {} markers were seen well, at least {} are needed: check that they are "
         "clean and uncovered, and sweep slowly over the board",
         num, board.centres_m.size(), limits.min_markers);
   }
@@ -162,8 +161,8 @@ std::variant<RoomFit, std::string> FitRoom(std::span<const RoomScan> scans) {
       const AlignmentOutcome outcome = AlignScenes(scans[0].room, scans[i].room);
       if (!outcome.alignment) {
         return std::string(
-            "fewer than 3 of the room's markers lie the same in all scans: sweep over the room's "
-            "markers too, and leave them alone");
+            "fewer than 3 of the room's markers lie in the same place in all scans: sweep over the "
+            "room's markers too, and do not move them");
       }
       T_first_scan = outcome.alignment->T_reference_current;
     }
@@ -200,8 +199,9 @@ std::variant<RoomFit, std::string> FitRoom(std::span<const RoomScan> scans) {
 std::string WhyNotSign(const RoomFit& fit, std::size_t num_scans,
                        const RoomCalibrationLimits& limits) {
   if (num_scans < limits.num_scans) {
-    return fmt::format("{} of {} scans of the board are there: scan again, without touching it",
-                       num_scans, limits.num_scans);
+    return fmt::format(
+        "{} of {} scans of the board have been made: scan again, without touching it", num_scans,
+        limits.num_scans);
   }
   if (fit.shift_m <= limits.max_shift_m && fit.turn_rad <= limits.max_turn_rad) return {};
   return fmt::format(

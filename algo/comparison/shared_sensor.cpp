@@ -14,15 +14,15 @@ using Effect = Eigen::Matrix<double, 6, Eigen::Dynamic>;  // A twist per unit of
 
 constexpr std::size_t kMinPatches = 4;
 constexpr std::size_t kMinMarkers = 3;
-// Sweeps scatter more than their residuals promise: as in Learn().
+// Factor by which the scatter of sweeps exceeds what their residuals indicate, as in Learn().
 constexpr double kSharedErrors = 3.0;
-// The shift of marker edges belongs to the light of each scan. What a sweep finds for the readout
-// time of the colour image hangs on how the hand trembled: ten sweeps of one simulated unit scatter
-// by 1.7 ms, fourteen times what their residuals promise.
+// The shift of marker edges depends on the light of each scan. A sweep's estimate of the colour
+// image's readout time depends on the tremor of the hand: over ten sweeps of one simulated unit it
+// scatters by 1.7 ms, fourteen times what the residuals indicate.
 constexpr double kEdgeDrift_px = 1.0;
 constexpr double kReadoutScatter_s = 0.002;
-// Between the reference and a fraction a sensor may have warmed up: its scale of depth then differs
-// by up to 0.6 %, four times what two sweeps in a row differ by.
+// Between the reference and a fraction a sensor may have warmed up: its depth scale then differs by
+// up to 0.6 %, four times the difference between two consecutive sweeps.
 constexpr double kWarmth = 4.0;
 
 struct Point {
@@ -76,7 +76,7 @@ std::vector<Point> SurfaceOf(const Scene& scene, const Pose& T, const Pose& T_bo
   return points;
 }
 
-// What both sweeps were free to change.
+// Terms of the calibration that both sweeps estimated.
 std::vector<Eigen::Index> FreeTerms(const SensorSensitivity& a, const SensorSensitivity& b) {
   std::vector<Eigen::Index> free;
   for (Eigen::Index i = 0; i < kCalibrationSize; ++i)
@@ -147,7 +147,7 @@ std::optional<SharedSensor> JoinSensors(const SharedSensorInput& input) {
   if (!(difference.dot(weighted) <= ChiSquareLimit(static_cast<int>(free.size())))) return result;
   result.one_unit = true;
   result.correction = G_r * (P_r * weighted) - G_c * (P_c * weighted);
-  // Of both estimates together, before and after.
+  // Effect of both estimates on the motion; joining them removes part of its covariance.
   const Effect gain = G_r * P_r - G_c * P_c;
   result.covariance -= gain * solver.solve(gain.transpose());
   return result;

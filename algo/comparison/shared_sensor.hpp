@@ -19,21 +19,21 @@ struct SharedSensorInput {
   std::function<bool(const Eigen::Vector3d&)> in_region;
 };
 
-/// What the calibrations' estimates do to a body motion. Left perturbations (rotation vector,
+/// Effect of the estimated calibrations on a body motion. Left perturbations (rotation vector,
 /// translation) about the moved centroid, reference frame.
 struct SharedSensor {
   bool one_unit = false;  ///< False: the scans may be by two units, and nothing was joined.
   Vector6d correction = Vector6d::Zero();  ///< Joining the two estimates moves the motion by it.
-  Matrix6d covariance = Matrix6d::Zero();  ///< Of the motion, from what is left uncertain.
+  Matrix6d covariance =
+      Matrix6d::Zero();  ///< Of the motion, from the calibration's remaining uncertainty.
 };
 
-/// The scenes differ by what their calibrations were estimated to be, and with them where the body
-/// lies against the markers. Where both were made by one unit its true calibration is one, apart
-/// from DriftBetweenSweeps(): a Kalman update of both estimates by their difference moves each
-/// scene by its own sensitivity. Scans by one unit have the same stated calibration, not a nominal
-/// one, and estimates that agree (chi-square test at 1 in 1,000).
-/// Absent where a scene has no sensitivity, or too little of the region or too few markers take
-/// part.
+/// Each scene depends on its sweep's estimate of the sensor's calibration, and so does the position
+/// of the body relative to the markers. If one unit made both scans, there is only one true
+/// calibration, apart from DriftBetweenSweeps(): a Kalman update of both estimates by their
+/// difference moves each scene by its own sensitivity. Scans by one unit have the same stated
+/// calibration, not a nominal one, and estimates that agree (chi-square test at 1 in 1,000). Absent
+/// where a scene has no sensitivity, or too little of the region or too few markers take part.
 [[nodiscard]] std::optional<SharedSensor> JoinSensors(const SharedSensorInput& input);
 
 }  // namespace plumb

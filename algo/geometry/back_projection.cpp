@@ -99,18 +99,4 @@ PointCloud BackProject(const DepthView& view, const RayTable& rays) {
   return cloud;
 }
 
-PointCloud Transformed(const Pose& T_a_b, const PointCloud& cloud_in_b) {
-  const Eigen::Matrix3f R = T_a_b.linear().cast<float>();
-  const Eigen::Vector3f t = T_a_b.translation().cast<float>();
-  PointCloud cloud_in_a;
-  cloud_in_a.points.resize(cloud_in_b.points.size());
-  std::transform(cloud_in_b.points.begin(), cloud_in_b.points.end(), cloud_in_a.points.begin(),
-                 [&](const Eigen::Vector3f& p) -> Eigen::Vector3f { return R * p + t; });
-  cloud_in_a.normals.resize(cloud_in_b.normals.size());
-  std::transform(cloud_in_b.normals.begin(), cloud_in_b.normals.end(), cloud_in_a.normals.begin(),
-                 [&](const Eigen::Vector3f& n) -> Eigen::Vector3f { return R * n; });
-  cloud_in_a.colors = cloud_in_b.colors;
-  return cloud_in_a;
-}
-
 }  // namespace plumb

@@ -56,7 +56,4 @@ class RayTables {
 ///         table's size.
 [[nodiscard]] PointCloud BackProject(const DepthView& view, const RayTable& rays);
 
-/// Transforms `cloud`: p_a = T_a_b * p_b, with normals rotated (paper: Theta).
-[[nodiscard]] PointCloud Transformed(const Pose& T_a_b, const PointCloud& cloud_in_b);
-
 }  // namespace plumb

@@ -40,7 +40,6 @@ struct SideFit {
          step_slope = 0;  ///< At the middle, and from end to end.
   Eigen::Matrix2d ends_covariance = Eigen::Matrix2d::Identity();
   double edge_shift_px = 0;
-  double residual_rms = 0;
   double residual_levels = 0;
   bool valid = false;
 };
@@ -167,7 +166,6 @@ bool Step(const Side& side, const std::vector<Sample>& samples, bool find_edge_s
   fit.step += change[5];
   fit.step_slope += change[6];
   fit.edge_shift_px += std::clamp(change[7], -0.3, 0.3);
-  fit.residual_rms = std::sqrt(weighted_square / std::max(weights, 1.0));
   fit.residual_levels = std::sqrt(levels_square / std::max(weights, 1.0));
   const double variance = weighted_square / std::max(1.0, weights - 7);
   fit.ends_covariance = variance * solver.solve(Matrix8::Identity()).topLeftCorner<2, 2>();
@@ -308,7 +306,6 @@ std::optional<CornerRefinement> RefineCorners(const cv::Mat& gray, const ImageCo
     result.contrast += fits[i].step / 4;
     result.edge_shift_px += fits[i].edge_shift_px / 4;
     result.residual_levels += fits[i].residual_levels / 4;
-    result.relative_residual += fits[i].residual_rms / std::max(fits[i].step, kMinContrast) / 4;
   }
   const double allowed_px = std::max(2.5, 0.6 * cell_px);
   for (std::size_t i = 0; i < 4; ++i)

@@ -56,8 +56,6 @@ struct CornerRefinement {
   double blur_px = 0.0;  ///< Mean blur across the four sides, as the sigma of a Gaussian.
   double contrast =
       0.0;  ///< Mean step from black to white, 0 to 1 of full scale (in linear light if requested).
-  double relative_residual =
-      0.0;  ///< RMS residual of the fit over the contrast; about 0.02 on clean images.
   double edge_shift_px = 0.0;  ///< As given or estimated.
   /// RMS residual of the fit in the image's own grey levels, for any curve that was inverted, so
   /// that fits with several curves can be compared.

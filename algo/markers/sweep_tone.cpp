@@ -113,7 +113,6 @@ std::optional<SweepTone> EstimateTone(const std::vector<MarkerSighting>& sightin
     if (one) losses.push_back(*one);
   if (losses.size() < kMinSightings) return std::nullopt;
   SweepTone tone;
-  tone.num_sightings = static_cast<int>(losses.size());
   tone.gamma = BestGamma(losses, 0, 1);
   double square = 0;
   for (std::size_t group = 0; group < kNumGroups; ++group)

@@ -22,11 +22,10 @@ struct SweepTone {
   double gamma = 0;        ///< Light is the value to the power gamma.
   double sigma_gamma = 0;  ///< Standard deviation, from the disagreement of groups of sightings.
   ToneTable table{};
-  /// What remains under this curve: white extends into black by this many pixels (median over
-  /// sightings).
+  /// Edge shift that remains under this curve: white extends into black by this many pixels (median
+  /// over sightings).
   double edge_shift_px = 0;
   double sigma_edge_shift_px = 0;
-  int num_sightings = 0;
 };
 
 /// Blur is symmetric in light. Under the correct curve an edge from black to white is symmetric

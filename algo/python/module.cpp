@@ -170,7 +170,7 @@ void AddRecording(py::module_& module) {
 }
 
 void AddScene(py::module_& module) {
-  py::class_<Scene>(module, "Scene", "What one sweep gives. Lengths in metres, scene frame.")
+  py::class_<Scene>(module, "Scene", "The result of one sweep. Lengths in metres, scene frame.")
       .def_static("load", &ReadScene, "folder"_a, "parts"_a = SceneParts{true, true, true})
       .def(
           "save",

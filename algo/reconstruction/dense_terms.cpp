@@ -17,7 +17,7 @@ namespace {
 using TermVector = Eigen::Matrix<double, QuadraticTerm::kSize, 1>;
 using DepthVector = Eigen::Matrix<double, CalibrationModel::kDepthSize, 1>;
 
-// First cell of a lattice, from the first usable cell.
+// Position of a lattice's first cell, relative to the first usable cell.
 struct Offset {
   int row = 0;
   int column = 0;
@@ -165,19 +165,20 @@ constexpr double kLossScale = 2.0;  // Cauchy scale in standard deviations.
 // Every fourth cell in each direction; each pair uses another of the sixteen lattices. Neighbouring
 // cells share most of their error, so the others would cost time without adding information.
 constexpr int kLattice = 4;
-// For terms that only lead to better ones.
+// For the early rounds, whose terms only provide a start for the fine ones.
 constexpr int kCoarseLattice = 2 * kLattice;
 constexpr int kNumLattices = kLattice * kLattice;
 constexpr int kHeldOut = 5;  // The lattice that is held out for Consistency().
 
-// Of one of the lattices of four, or of a coarser one within it that changes with `round`.
+// Offset of one of the kNumLattices lattices, or of a coarser one within it that changes with
+// `round`.
 Offset OffsetOf(int lattice, int stride, int round) {
   const int finer = stride / kLattice;
   return {lattice % kLattice + kLattice * (round % finer),
           lattice / kLattice + kLattice * (round / finer % finer)};
 }
 
-// The pair's own lattice, which is not held out.
+// Offset of the pair's own lattice, which is never the one that is held out.
 Offset OffsetOfPair(std::size_t pair, int stride) {
   auto lattice = static_cast<int>(pair % (kNumLattices - 1));
   lattice += lattice >= kHeldOut ? 1 : 0;
@@ -430,7 +431,7 @@ void MakeTerms(const Sensor& sensor, const JointRegistrationOptions& options,
   const int stride = density == Density::kCoarse ? kCoarseLattice : kLattice;
   // Number of cells that one cell stands for, relative to a lattice of two.
   const double cells_for_one = stride * stride / 4.0;
-  // Terms are large: room for the links that may follow, too.
+  // Terms are large, so the space for links that may be appended is reserved now.
   terms.reserve(pairs.size() + faces.size() + views.size());
   terms.resize(pairs.size() + faces.size());
   tbb::parallel_for(std::size_t{0}, terms.size(), [&](std::size_t i) {

@@ -61,7 +61,7 @@ std::vector<KeyframePair> FindPairs(const Sensor& sensor, const JointRegistratio
                                     const std::vector<View>& views, const std::stop_token& stop);
 
 /// How many of the cells are used. Coarse: a quarter of those of fine, each with four times the
-/// weight; for terms that only lead to better ones.
+/// weight; for the early rounds, whose terms only provide a start for the fine ones.
 enum class Density { kCoarse, kFine };
 
 /// Point-to-plane residuals of each pair, and of the depth on each marker's face, linearised.

@@ -58,7 +58,7 @@ double KeypointSigmaFactor(const TrackingMap& map) {
   return std::sqrt(std::max(1.0, mean / kEnough));
 }
 
-// What the joint solve changes in a map, without the images.
+// The part of a map that the joint solve changes; the images do not belong to it.
 class MapState {
  public:
   explicit MapState(const TrackingMap& map) : landmarks_(map.landmarks), markers_(map.markers) {
@@ -67,7 +67,7 @@ class MapState {
       velocity_per_s_.push_back(keyframe.velocity_per_s);
     }
   }
-  // The map takes this state, and this becomes the map's.
+  // Exchanges this state with that of the map.
   void Exchange(TrackingMap& map) {
     std::swap(map.landmarks, landmarks_);
     std::swap(map.markers, markers_);
@@ -114,7 +114,8 @@ JointRegistrationResult RegisterJointly(const Intrinsics& stated,
   std::vector<QuadraticTerm> links;
   AddTrackedLinks(map, links);
   BundleAdjust(stated, bundle, links, map, result.calibration);
-  // The start is near now: only what poses and calibration change together is left to be found.
+  // The start is close to the solution now: only directions in which poses and calibration change
+  // together remain.
   bundle.initial_damping = 1e-7;
   const auto refresh_velocities = [&] {
     if (!options.refresh_velocities) return;

@@ -50,7 +50,7 @@ HeightMap PaperHeightMap(std::span<const PointCloud> clouds_in_marker,
 HeightMap PaperHeightMap(std::span<const PointCloud> clouds, std::span<const Pose> T_marker_cloud,
                          const HeightMapOptions& options) {
   if (clouds.size() != T_marker_cloud.size())
-    throw std::invalid_argument("height map: there is not one pose a cloud");
+    throw std::invalid_argument("height map: the numbers of clouds and poses differ");
   const GridShape grid = options.Grid();
   if (!(options.top_surface_band > 0.0))
     throw std::invalid_argument("height map: the top surface band is not positive");

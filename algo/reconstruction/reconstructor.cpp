@@ -38,7 +38,7 @@ TrackerOptions TrackingOptions(const StreamInfo& info, const ReconstructorOption
   tracking.use_markers = options.use_markers;
   tracking.use_keypoints = options.use_keypoints;
   tracking.keep_color = options.keep_color;
-  // The surfaces take no other colours.
+  // Surfaces take their colours at working resolution only.
   if (options.preset == Preset::kBest)
     tracking.color_block = info.intrinsics.width / WorkingIntrinsics(info.intrinsics).width;
   tracking.keyframe_distance *= options.keyframe_spacing;
@@ -141,9 +141,6 @@ struct Reconstructor::Impl {
     report.median_depth_m = z[z.size() / 2];
     median_depths_m.push_back(report.median_depth_m);
   }
-
-  // ---- after the last frame
-  // --------------------------------------------------------------------------------------
 
   void CheckInput(const std::vector<TrackedFrame>& frames) const {
     if (frames.size() < 2)
@@ -293,10 +290,8 @@ struct Reconstructor::Impl {
       scene.warnings.push_back(
           "the dense registration did not make the views agree better and was left out");
     scene.timings_s["global_registration"] = solved - stage;
-    scene.timings_s["markers"] =
-        Now() -
-        // The joint solve has used these; they now place the keyframes in the scene's frame.
-        solved;
+    // The joint solve has used the markers; they now place the keyframes in the scene's frame.
+    scene.timings_s["markers"] = Now() - solved;
 
     report(0.5, "surface");
     stage = Now();

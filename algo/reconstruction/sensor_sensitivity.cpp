@@ -14,12 +14,13 @@ namespace {
 
 constexpr double kPatch_m = 0.2;
 constexpr int kCellStride = 4;      // Neighbouring cells move alike.
-constexpr float kMinCells = 50.0F;  // A patch of fewer is a rim.
+constexpr float kMinCells = 50.0F;  // Patches with fewer cells are rims.
 constexpr std::size_t kMaxPatches = 200;
 
 using Columns = Eigen::Matrix<double, 3, kCalibrationSize>;
 
-// Rows of the posterior's covariance with the calibration, for a twist; zero for what stayed.
+// Rows of the posterior's covariance with the calibration, for a twist; zero for a pose
+// that was fixed.
 using TwistColumns = Eigen::Matrix<double, 6, kCalibrationSize>;
 
 TwistColumns RowsOf(const BundlePosterior& posterior, std::optional<Eigen::Index> first) {
@@ -32,7 +33,7 @@ struct MarkerFrame {
   Pose T_marker_world;
   TwistColumns twist;
 
-  // Of `count` points whose sum in the marker's frame is given.
+  // Covariance of the sum of `count` points; `sum` is their sum in the marker's frame.
   [[nodiscard]] Columns Seen(const Eigen::Vector3d& sum, double count,
                              const Columns& in_world) const {
     return T_marker_world.linear() * in_world + Skew(sum) * twist.topRows<3>() -
@@ -40,7 +41,7 @@ struct MarkerFrame {
   }
 };
 
-// Of `count` points with this sum.
+// Covariance of the sum of `count` points in a frame that moves by the twist; `sum` is their sum.
 Columns Moved(const Eigen::Matrix3d& R, const Eigen::Vector3d& sum, double count,
               const TwistColumns& twist) {
   return R * (count * twist.bottomRows<3>() - Skew(sum) * twist.topRows<3>());

@@ -302,7 +302,7 @@ PointCloud MergeSurface(std::span<const ViewSurface> views, const SurfaceCloudOp
   for (const ViewSurface& view : views)
     if (!IsFinite(view.T_world_camera) || view.T_world_camera.translation().norm() > kMaxDistance)
       throw std::invalid_argument(
-          "merged surface: a view's pose is not finite or lies out of this world");
+          "merged surface: a view's pose is not finite or lies too far from the origin");
   const int min_views = std::min(options.min_views, static_cast<int>(views.size()));
   bool with_colors = options.with_colors;
   for (const ViewSurface& view : views) with_colors = with_colors && !view.color_rgb.empty();

@@ -121,7 +121,7 @@ TriangleMesh MeshOfHeightMap(const HeightMap& map, std::span<const Color> colors
       !(options.step_margin_m >= 0.0))
     throw std::invalid_argument("surface mesh: decimation, slope or step margin out of range");
   if (!colors.empty() && colors.size() != map.grid.num_cells())
-    throw std::invalid_argument("surface mesh: there is not one colour a cell");
+    throw std::invalid_argument("surface mesh: the numbers of cells and colours differ");
   return GridMesher(map, colors, options).Build();
 }
 

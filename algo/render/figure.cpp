@@ -96,15 +96,6 @@ void Figure::Line(double x0, double y0, double x1, double y1, const Color& color
   cairo_stroke(impl_->context);
 }
 
-void Figure::FillTriangle(const std::array<Eigen::Vector2d, 3>& corners, const Color& color) {
-  impl_->Set(color);
-  cairo_move_to(impl_->context, corners[0].x(), corners[0].y());
-  cairo_line_to(impl_->context, corners[1].x(), corners[1].y());
-  cairo_line_to(impl_->context, corners[2].x(), corners[2].y());
-  cairo_close_path(impl_->context);
-  cairo_fill(impl_->context);
-}
-
 void Figure::Picture(int x, int y, const cv::Mat& picture_rgb) {
   CV_Assert(picture_rgb.type() == CV_8UC3);
   cairo_surface_flush(impl_->surface);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -43,7 +42,6 @@ class Figure {
                       double line_width = 1.0);
   void Line(double x0, double y0, double x1, double y1, const Color& color, double line_width = 1.0,
             double opacity = 1.0);
-  void FillTriangle(const std::array<Eigen::Vector2d, 3>& corners, const Color& color);
 
   /// Draws an RGB picture with its top left corner at (x, y), pixel for pixel.
   void Picture(int x, int y, const cv::Mat& picture_rgb);

@@ -11,7 +11,7 @@ namespace plumb {
 using FieldAcross = std::array<double, 6>;  ///< T_0(x) to T_5(x)
 using FieldDown = std::array<double, 5>;    ///< T_0(y) to T_4(y)
 
-/// Of one of the CentredCoordinates().
+/// The polynomials of one of the CentredCoordinates().
 [[nodiscard]] FieldAcross PolynomialsAcross(double centred_x);
 [[nodiscard]] FieldDown PolynomialsDown(double centred_y);
 

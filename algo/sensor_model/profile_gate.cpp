@@ -17,7 +17,7 @@ constexpr double kMaxDays = 3650.0;  // limits the effect of a clock that was ne
 // its contribution would be a quotient of rounding errors.
 constexpr double kMinInformation = 0.01;
 
-// Without the shift of marker edges.
+// A covariance without the shift of marker edges.
 using Reduced = Eigen::Matrix<double, kCalibrationSize - 1, kCalibrationSize - 1>;
 
 Eigen::Index Place(Eigen::Index i) { return i < kEdgeBiasAt ? i : i + 1; }

@@ -19,7 +19,8 @@ using CalibrationPoint = Eigen::Matrix<double, kCalibrationSize, 3>;
 
 // Number of unknowns above which a sparse factorisation is faster.
 constexpr Eigen::Index kLargestDenseSystem = 1200;
-// Steps this short that do not improve the cost: the minimum is reached.
+// With this damping steps are so short that, if they do not reduce the cost, the minimum is
+// reached.
 constexpr double kLargestDamping = 1e8;
 
 // A landmark's own 3x3 system, inverted, and its coupling to the free keyframes and the
@@ -99,7 +100,6 @@ bool Solve(const Eigen::MatrixXd& S, const Eigen::VectorXd& right, Eigen::Vector
 
 BundleSummary Solver::Run() {
   BundleSummary summary;
-  summary.num_residuals = problem_.NumResiduals();
   State state = problem_.Start();
   problem_.DropViewsBehindCameras(state);
   double cost = problem_.Cost(state);

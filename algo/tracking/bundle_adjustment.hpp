@@ -41,9 +41,10 @@ struct BundleOptions {
   bool find_information = false;              ///< Fill BundleSummary::information and posterior.
   int max_iterations = 8;
   double function_tolerance = 1e-5;  ///< Iteration ends when the relative decrease is smaller.
-  /// Of the diagonal, in the first step. Poses and calibration change together along directions
-  /// that the residuals determine a million times more weakly than any of them alone: a greater
-  /// damping needs many steps there, a smaller one may leave the range of a poor start.
+  /// Damping of the first step, relative to the diagonal. Along some directions poses and
+  /// calibration change together, and the residuals determine these a million times more weakly
+  /// than either alone: greater damping needs many steps there, smaller damping may leave the
+  /// region in which a poor start converges.
   double initial_damping = 1e-4;
   double keypoint_sigma_px = 0.6;  ///< In pixels at 640 columns.
   double keypoint_depth_sigmas =
@@ -79,7 +80,6 @@ struct BundlePosterior {
 
 struct BundleSummary {
   bool usable = false;
-  int num_residuals = 0;
   int num_iterations = 0;
   double initial_cost = 0;
   double final_cost = 0;

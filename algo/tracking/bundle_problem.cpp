@@ -41,12 +41,6 @@ Problem::Problem(const Intrinsics& stated, const BundleOptions& options,
   size_ = calibration_at_ + (options.calibrate ? kCalibrationSize : 0);
 }
 
-int Problem::NumResiduals() const {
-  auto count = static_cast<int>(2 * (views_.size() + corners_.size()));
-  for (const PointView& view : views_) count += view.depth.z_m > 0 ? 1 : 0;
-  return count;
-}
-
 const Pose& Problem::MarkerPose(int slot) const {
   return T_world_marker0_[static_cast<std::size_t>(slot)];
 }

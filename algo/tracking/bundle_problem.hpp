@@ -65,7 +65,6 @@ class Problem {
   /// Writes the state into the map and the calibration.
   void Write(const State& state);
 
-  [[nodiscard]] int NumResiduals() const;
   [[nodiscard]] double PixelWeight() const;
   /// Time from the colour image's stamp to the depth reading at a row.
   [[nodiscard]] double DepthDelay(const State& state, int keyframe, double row_share) const;

@@ -76,7 +76,7 @@ struct DensePoint {
   Eigen::Vector3d p_color;
 };
 
-// In the order of the cells, which is that of the sums.
+// The points of a frame's cells, in the order of the cells, in which the sums are formed.
 std::vector<DensePoint> DensePoints(const PoseProblem& problem) {
   std::vector<DensePoint> points;
   const DenseView& frame = *problem.dense_frame;

@@ -16,7 +16,7 @@ namespace {
 
 using namespace bundle;  // NOLINT: the residuals' own vocabulary
 
-constexpr int kOneIn = 16;  // As many of each kind are kept out as of the dense cells.
+constexpr int kOneIn = 16;  // The same fraction of each kind as of the dense cells.
 constexpr int kIterations = 6;
 constexpr double kLossScale_px = 1.0;
 
@@ -38,8 +38,8 @@ class Images {
   }
 
   [[nodiscard]] const CameraState& camera(std::size_t keyframe) const { return cameras_[keyframe]; }
-  // Where a camera shows a point against where it was seen, with the derivative to the point;
-  // nothing behind the camera.
+  // Offset of a point's projection from its observation, with the derivative with respect to the
+  // point; nothing behind the camera.
   struct Residual {
     Eigen::Vector2d px;
     Eigen::Matrix<double, 2, 3> J_world;
@@ -58,8 +58,8 @@ class Images {
   std::vector<CameraState> cameras_;
 };
 
-// Distances of a landmark's observations from where the cameras show it, once it has been placed by
-// them; empty where it cannot be placed.
+// Distances between a landmark's observations and its projections, after it has been triangulated
+// from these observations; empty if it cannot be.
 std::vector<double> DistancesOf(const Images& images, const std::vector<View>& views,
                                 Eigen::Vector3d p_world, double px) {
   for (int i = 0; i < kIterations; ++i) {
@@ -124,9 +124,9 @@ std::vector<double> CornerDistances(const Images& images, const CalibrationModel
   return all;
 }
 
-// Beyond what the scatter of two medians of so many values explains (four standard deviations; the
-// median of a distance in two dimensions scatters by its own size over the root of the number), and
-// beyond a tenth, which is no bent path yet.
+// True if the error grew by more than the scatter of two medians of that many values explains (four
+// standard deviations; the median of a distance in two dimensions scatters by its own size over the
+// square root of the number) and by more than a tenth; less does not indicate a bent path.
 bool IsWorse(double before_px, double after_px, int count) {
   constexpr double kTolerated = 1.1;
   constexpr double kSigmas = 4.0;

@@ -8,8 +8,8 @@
 namespace plumb {
 
 /// Median distances, in pixels at 640 columns, of the observations that IsWitness() keeps out of
-/// the joint solve. A path that the depth images have bent shows here: the solve has no chance to
-/// make these observations agree with it.
+/// the joint solve. They reveal a path that errors of the depth images have bent, because the solve
+/// cannot adapt the path to these observations.
 struct WitnessErrors {
   double keypoints_px = 0.0;
   double corners_px = 0.0;
@@ -17,18 +17,19 @@ struct WitnessErrors {
   int num_corners = 0;
 };
 
-/// Landmarks that have to be seen as often as this to be a witness: three unknowns need more than
-/// two observations to be contradicted.
+/// Fewest observations of a landmark that is kept out: only more than two observations of three
+/// unknowns can contradict each other.
 inline constexpr int kMinWitnessViews = 4;
 
 /// Whether a landmark is kept out of the joint solve.
 [[nodiscard]] bool IsWitness(const Landmark& landmark, int id);
-/// Whether a keyframe's view of a marker is kept out of the joint solve. Markers of few views have
-/// none.
+/// Whether a keyframe's view of a marker is kept out of the joint solve. Of a marker with few views
+/// none is.
 [[nodiscard]] bool IsWitness(const MapMarker& marker, int id, int keyframe);
 
-/// Each landmark is placed where its own observations want it; the cameras, the markers and the
-/// calibration stay. The same on any number of threads.
+/// Errors of the observations that were kept out. Landmarks are triangulated from their own
+/// observations; cameras, markers and calibration stay as they are. The same on any number of
+/// threads.
 [[nodiscard]] WitnessErrors ErrorsOfWitnesses(const Intrinsics& stated,
                                               const CalibrationModel& calibration,
                                               double marker_length_m, const TrackingMap& map);

@@ -29,7 +29,8 @@ struct Frame {
 struct StreamInfo {
   Intrinsics intrinsics;  ///< Of the colour camera (and therefore of the registered depth).
   bool intrinsics_assumed = false;  ///< The recording has no calibration; nominal values are used.
-  std::string marker_dictionary = "DICT_6X6_250";   ///< OpenCV's name, or DICT_ARUCO_MIP_36h12.
+  /// OpenCV's name, or DICT_ARUCO_MIP_36h12.
+  std::string marker_dictionary = kDefaultMarkerDictionary;
   double marker_length_m = kDefaultMarkerLength_m;  ///< Side of the black square.
   std::optional<int> reference_marker;     ///< Id of the marker whose frame is the scene's frame.
   std::optional<std::int64_t> num_frames;  ///< Number of image pairs, if known beforehand.

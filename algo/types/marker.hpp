@@ -12,6 +12,8 @@ namespace plumb {
 
 /// Side of the black square where neither configuration, recording nor calibration file states it.
 inline constexpr double kDefaultMarkerLength_m = 0.104;
+/// Dictionary of the markers in the same case.
+inline constexpr const char* kDefaultMarkerDictionary = "DICT_6X6_250";
 
 /// Corners in detector order: top-left first, clockwise as seen on the print. In the marker's own
 /// frame (x right, y up on the print, z out of it) they are (-,+), (+,+), (+,-), (-,-) times

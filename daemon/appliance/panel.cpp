@@ -4,13 +4,9 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/loop/log.hpp"
-#ifdef PLUMB_WITH_GPIO
 #include "drivers/gpio/gpio.hpp"
-#endif
 
 namespace plumb {
-
-#ifdef PLUMB_WITH_GPIO
 namespace {
 
 /// Blinks by a timer of the loop.
@@ -70,16 +66,6 @@ Panel::Panel(EventLoop& loop, const PanelConfig& config) {
     Log(LogLevel::kError, fmt::format("no light: {}", error.what()));
   }
 }
-#else
-Panel::Panel(EventLoop&, const PanelConfig& config) {
-  if (!config.button_line.empty() || !config.red_line.empty() || !config.green_line.empty() ||
-      !config.blue_line.empty()) {
-    Log(LogLevel::kError,
-        "button and light are configured, but this plumbd was built without them: build it with "
-        "PLUMB_WITH_GPIO");
-  }
-}
-#endif
 
 Panel::~Panel() = default;
 

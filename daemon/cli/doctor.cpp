@@ -21,11 +21,9 @@
 #include "daemon/config/config.hpp"
 #include "daemon/config/sensor_settings.hpp"
 #include "daemon/control/unix_socket.hpp"
+#include "drivers/gpio/gpio.hpp"
 #include "drivers/live/sensor_calibration.hpp"
 #include "drivers/live/sensor_driver.hpp"
-#ifdef PLUMB_WITH_GPIO
-#include "drivers/gpio/gpio.hpp"
-#endif
 
 namespace plumb {
 namespace {
@@ -115,8 +113,7 @@ void CheckSensor(DoctorReport& report, const Config& config) try {
   report.Bad("configuration", problem.what(), "", kBadInput);
 }
 
-void CheckGpio(DoctorReport& report) {
-#ifdef PLUMB_WITH_GPIO
+void CheckGpio(DoctorReport& report) try {
   const std::vector<GpioChipDescription> chips = ListGpioChips();
   if (chips.empty())
     report.Note("GPIO", "no chip: no hardware button and light",
@@ -128,9 +125,8 @@ void CheckGpio(DoctorReport& report) {
     else
       report.Note("GPIO", fmt::format("{} cannot be opened", chip.name), chip.problem);
   }
-#else
-  report.Note("GPIO", "this build has no hardware button and light", "build with PLUMB_WITH_GPIO");
-#endif
+} catch (const DeviceError& error) {
+  report.Note("GPIO", error.what(), "use the page's button or `plumb press`");
 }
 
 void CheckFolder(DoctorReport& report, const char* what, const fs::path& folder) {

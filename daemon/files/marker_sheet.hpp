@@ -16,7 +16,7 @@ using cairo_surface_t = struct _cairo_surface;
 namespace plumb {
 
 struct SheetOptions {
-  std::string dictionary = "DICT_6X6_250";
+  std::string dictionary = kDefaultMarkerDictionary;
   std::vector<int> ids;                      ///< In the order in which they are drawn.
   double length_m = kDefaultMarkerLength_m;  ///< Side of the black square.
   std::string paper = "A4";                  ///< A4 or A3, upright.

@@ -180,6 +180,11 @@ std::string ResultJson(const Comparison& comparison, const std::optional<ResultR
   json["format"] = kFormat;
   json["version"] = PLUMB_VERSION;
   json["preset"] = Name(comparison.preset);
+  const auto named = [](const std::optional<std::string>& profile) {
+    return profile ? Json(*profile) : Json(nullptr);
+  };
+  json["sensor_profiles"] = {{"reference", named(comparison.reference_profile)},
+                             {"current", named(comparison.current_profile)}};
   json["verdict"] = Name(comparison.verdict);
   json["reasons"] = comparison.reasons;
   json["alignment"] = comparison.alignment ? AlignmentJson(*comparison.alignment) : Json(nullptr);

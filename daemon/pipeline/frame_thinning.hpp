@@ -57,7 +57,6 @@ class ThinnedFeed : public FrameFeed {
   [[nodiscard]] std::optional<double> last_frame_s() const override { return feed_.last_frame_s(); }
 
   [[nodiscard]] int stride() const { return stride_; }
-  [[nodiscard]] int num_left_out() const { return num_left_out_; }
   /// A sentence for the scene's warnings; empty if no frame was skipped.
   [[nodiscard]] std::string Warning() const;
 

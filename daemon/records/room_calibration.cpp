@@ -188,8 +188,8 @@ std::optional<std::string> WhyRoomIsDue(const SignedRoom& room, const std::strin
         item.name == "moved"
             ? fmt::format("{} moved {:.0f} mm since the room was calibrated", item.note, item.value)
             : fmt::format(
-                  "the markers lie {:.1f} mm (RMS) off where they lay when the room "
-                  "was calibrated",
+                  "the markers lie {:.1f} mm (RMS) from where they were when the room was "
+                  "calibrated",
                   item.value);
   }
   return answer;

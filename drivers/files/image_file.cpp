@@ -73,10 +73,6 @@ void WritePng(const std::filesystem::path& path, const cv::Mat& image) {
   WriteWholeFile(path, EncodePng(image));
 }
 
-void WriteJpeg(const std::filesystem::path& path, const cv::Mat& rgb, int quality) {
-  WriteWholeFile(path, EncodeJpeg(rgb, quality));
-}
-
 void WriteFloatTiff(const std::filesystem::path& path, const cv::Mat& values) {
   WriteWholeFile(path, EncodeFloatTiff(values));
 }

@@ -43,8 +43,7 @@ void WritePng(const std::filesystem::path& path, const cv::Mat& image);
 [[nodiscard]] std::vector<std::uint8_t> EncodePng(const cv::Mat& image);
 
 /// CV_8UC3 (RGB) as baseline JPEG; quality 1 to 100.
-/// @throws std::invalid_argument, IoError as WritePng().
-void WriteJpeg(const std::filesystem::path& path, const cv::Mat& rgb, int quality);
+/// @throws std::invalid_argument as WritePng().
 [[nodiscard]] std::vector<std::uint8_t> EncodeJpeg(const cv::Mat& rgb, int quality);
 
 /// CV_32FC1 as an uncompressed single-channel IEEE float TIFF; NaN is preserved.

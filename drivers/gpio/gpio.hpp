@@ -70,12 +70,13 @@ class GpioIndicator : public Indicator {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The lines and chips that exist, for diagnosis.
+/// A chip that exists, for diagnosis.
 struct GpioChipDescription {
   std::string name, label;
   std::vector<std::string> lines;  ///< Names of the lines that have one.
   std::string problem;             ///< Why the chip cannot be opened; empty if it can.
 };
+/// @throws DeviceError if this build has no button and light.
 [[nodiscard]] std::vector<GpioChipDescription> ListGpioChips();
 
 }  // namespace plumb

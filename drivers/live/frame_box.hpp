@@ -70,8 +70,9 @@ class FrameBox {
   std::deque<Clock::time_point> arrivals_;  ///< Arrivals of pairs within the last second.
   Clock::time_point last_arrival_ = Clock::now();
   Clock::time_point listened_ = Clock::now();  ///< Last time that Take() ran.
-  Clock::duration absent_{};                   ///< Total delay of Take() since it last had a pair,.
-  Clock::duration longest_gap_{};  ///< And its longest interval between two pairs since then.
+  Clock::duration absent_{};                   ///< Total delay of Take() since it last had a pair.
+  Clock::duration
+      longest_gap_{};  ///< Longest interval between two pairs since Take() last had one.
   std::int64_t next_index_ = 0;
   std::int64_t num_taken_ = 0;
   std::int64_t num_discarded_ = 0;

@@ -26,8 +26,8 @@ struct SensorSettings {
   /// is ignored, because live depth is in millimetres. A unit without a file gets nominal
   /// intrinsics from its field of view, and a warning.
   std::filesystem::path calibration_folder = "/var/lib/plumb/calibration";
-  std::string marker_dictionary =
-      "DICT_6X6_250";  ///< Used if the calibration file does not state it, like the next two.
+  /// Used if the calibration file does not state it, like the next two.
+  std::string marker_dictionary = kDefaultMarkerDictionary;
   double marker_length_m = kDefaultMarkerLength_m;
   std::optional<int> reference_marker = {};
   /// The three values above describe the room: a calibration file that states other markers is

@@ -63,7 +63,7 @@ void ExamineUsb(std::vector<SensorFinding>& findings) {
 
 void ExamineDrivers(std::vector<SensorFinding>& findings) {
   const auto folder = OpenNiDriverFolder();
-  if (!folder) return;  // loading OpenNI2 says why
+  if (!folder) return;  // the error of loading OpenNI2 states why
   for (const OpenNiDriverFile& driver : FindOpenNiDrivers(*folder)) {
     const std::string found = fmt::format("{}: {}", driver.file.string(), driver.serves);
     if (!driver.problem.empty())

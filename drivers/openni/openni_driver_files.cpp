@@ -30,7 +30,7 @@ constexpr std::array kKnown{
 
 constexpr std::string_view kEnding = ".so.0";
 
-/// "PS1080" of "libPS1080.so.0"; empty if it is no library's name.
+/// "PS1080" of "libPS1080.so.0"; empty if it is not the name of a library.
 std::string NameOf(const std::string& file) {
   const std::size_t end = file.find(".so");
   return file.starts_with("lib") && end != std::string::npos ? file.substr(3, end - 3) : "";

@@ -1,5 +1,5 @@
-// The drivers that OpenNI2 finds beside its library: Debian's, and those of other makers' sensors.
-// OpenNI2 passes over one that it cannot use without a word; here is said why.
+// The drivers that OpenNI2 finds beside its library: Debian's, and those for sensors of other
+// makes. OpenNI2 silently skips a driver that it cannot use; these functions state why.
 #pragma once
 
 #include <filesystem>
@@ -11,17 +11,17 @@ namespace plumb {
 
 struct OpenNiDriverFile {
   std::filesystem::path file;
-  std::string serves;       ///< Which sensors, in words.
+  std::string serves;       ///< The sensors that it supports, in words.
   bool is_debians = false;  ///< Part of Debian's package libopenni2-0.
-  std::string problem;      ///< Why OpenNI2 does not use it, and what to do; empty: it does.
+  std::string problem;      ///< Why OpenNI2 does not use it, with a remedy; empty if it does.
 };
 
 /// Where OpenNI2 looks for drivers: `OpenNI2/Drivers` beside the library that this program loads;
 /// nothing if it cannot be loaded.
 [[nodiscard]] std::optional<std::filesystem::path> OpenNiDriverFolder();
 
-/// In the order of their names; `libNAME.so` is left out where `libNAME.so.0` is there too. Each is
-/// loaded to see whether it can be: its own code runs.
+/// The drivers in a folder, by name; `libNAME.so` is left out if `libNAME.so.0` exists too. Each is
+/// loaded to check that this works, so its own code runs.
 [[nodiscard]] std::vector<OpenNiDriverFile> FindOpenNiDrivers(const std::filesystem::path& folder);
 
 }  // namespace plumb

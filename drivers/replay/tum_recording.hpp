@@ -15,7 +15,7 @@ namespace plumb {
 
 /// Defaults for everything that a recording does not state.
 struct RecordingDefaults {
-  std::string marker_dictionary = "DICT_6X6_250";
+  std::string marker_dictionary = kDefaultMarkerDictionary;
   double marker_length_m = kDefaultMarkerLength_m;
   std::optional<int> reference_marker;
   /// Largest difference between the stamps of a colour image and its depth image; 0.55 periods of

@@ -30,8 +30,8 @@ void WriteImages(const fs::path& root) {
   WritePng(png / "depth", depth);
   WritePng(png / "grey", cv::Mat(3, 2, CV_8UC1, cv::Scalar(9)));
   const fs::path jpeg = Folder(root / "jpeg");
-  WriteJpeg(jpeg / "fine", rgb, 95);
-  WriteJpeg(jpeg / "coarse", rgb, 5);
+  WriteWholeFile(jpeg / "fine", EncodeJpeg(rgb, 95));
+  WriteWholeFile(jpeg / "coarse", EncodeJpeg(rgb, 5));
   WriteFloatTiff(Folder(root / "tiff") / "map", cv::Mat(5, 4, CV_32FC1, cv::Scalar(0.5)));
 }
 

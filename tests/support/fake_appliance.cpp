@@ -230,7 +230,7 @@ void FakeAppliance::SeeBoard(const CheckRecord& check) {
   room.digest = std::string(63, 'a') + std::to_string(room.scans.size() % 10);
   room.why_not_sign = room.scans.size() < room.num_wanted
                           ? fmt::format(
-                                "{} of {} scans of the board are there: scan again, without "
+                                "{} of {} scans of the board have been made: scan again, without "
                                 "touching it",
                                 room.scans.size(), room.num_wanted)
                           : "";

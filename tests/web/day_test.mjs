@@ -73,7 +73,7 @@ await h.step('first start, three accounts, and the screen in the room', async ()
 
 await h.step('the room is calibrated: three scans of the board, signed', async () => {
   const card = bob.locator('.room-calibration');
-  for (const [number, said] of [[0, '1 of 3 scans of the board are there'], [1, '2 of 3 scans of the board are there'], [2, 'The newest 3 scans differ by']]) {
+  for (const [number, said] of [[0, '1 of 3 scans of the board have been made'], [1, '2 of 3 scans of the board have been made'], [2, 'The newest 3 scans differ by']]) {
     await scene(number);
     await bob.goto(`${h.url}#/check`);
     await card.getByRole('button', { name: 'Start a scan of the board' }).click();

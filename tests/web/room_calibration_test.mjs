@@ -39,10 +39,10 @@ await h.step('without a calibration directions are the patient’s, and a techni
 await h.step('three scans, their spread, and a signature with the password', async () => {
   h.tell('board');
   await scanBoard();
-  await card(bob).getByText('1 of 3 scans of the board are there').waitFor();
+  await card(bob).getByText('1 of 3 scans of the board have been made').waitFor();
   equal(await card(bob).getByRole('button', { name: 'Sign the calibration' }).count(), 0, 'too early to sign');
   await scanBoard();
-  await card(bob).getByText('2 of 3 scans of the board are there').waitFor();
+  await card(bob).getByText('2 of 3 scans of the board have been made').waitFor();
   await scanBoard();
   await card(bob).getByText('The newest 3 scans differ by 0.37 mm and 0.06°; at most 1.0 mm and 0.2° are allowed.').waitFor();
   equal(await card(bob).locator('tbody tr').count(), 3, 'one line a scan');

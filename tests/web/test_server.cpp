@@ -288,7 +288,7 @@ void Obey(FakeAppliance& service, Recorder& recorder, const std::string& command
   if (name == "markermoved") {
     web::CheckRecord check;
     check.reasons = {"marker 7 moved 12 mm",
-                     "the markers lie 3.4 mm (RMS) off where they lay, at most 3 mm are allowed"};
+                     "the markers lie 3.4 mm (RMS) from where they were, at most 3 mm are allowed"};
     check.items = {
         {"markers_seen", 12, 12, "", true, ""},      {"misfit", 3.4, 3, "mm", false, ""},
         {"moved", 12.2, 5, "mm", false, "marker 7"}, {"scale", 0.08, 0.5, "%", true, ""},

@@ -306,6 +306,15 @@ TEST(ComparisonTest, EachDoubtIsNoAnswerWithItsReason) {
   EXPECT_EQ(Compare(empty, PerfectReference()).verdict, Verdict::kNoAnswer);
 }
 
+TEST(ComparisonTest, TheSensorProfileOfEachSceneIsNamed) {
+  Scene reference = PerfectReference(), current = PerfectRepeat();
+  reference.sensor_profile = "unit A, 3 sweeps";
+  current.markers.clear();  // No answer is enough.
+  const Comparison comparison = Compare(reference, current);
+  EXPECT_EQ(comparison.reference_profile, "unit A, 3 sweeps");
+  EXPECT_EQ(comparison.current_profile, std::nullopt);
+}
+
 TEST(ComparisonTest, WithoutASupportOnlyADrawnRegionGetsAVerdict) {
   SyntheticOptions reference = ReferenceOptions();
   reference.hidden = [](const Eigen::Vector3d& p) {

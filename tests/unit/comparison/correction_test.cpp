@@ -6,9 +6,12 @@
 #include <gtest/gtest.h>
 
 #include "algo/base/units.hpp"
+#include "tests/unit/comparison/couch_rotation.hpp"
 
 namespace plumb {
 namespace {
+
+using testing::CouchRotation;
 
 const Eigen::Vector3d kIsocentre(0.5, 0.3, 0.12);
 

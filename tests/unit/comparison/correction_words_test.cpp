@@ -7,9 +7,12 @@
 
 #include "algo/base/units.hpp"
 #include "algo/comparison/correction.hpp"
+#include "tests/unit/comparison/couch_rotation.hpp"
 
 namespace plumb {
 namespace {
+
+using testing::CouchRotation;
 
 struct Row {
   PatientPosture posture;

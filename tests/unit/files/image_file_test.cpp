@@ -112,7 +112,7 @@ TEST(ImageFileTest, ColorIsRgbWhateverThePngHolds) {
 TEST(ImageFileTest, JpegKeepsColoursAndOrientation) {
   const TempFolder folder;
   const cv::Mat ramp = ColorRamp(128, 96);
-  WriteJpeg(folder / "a.jpg", ramp, 95);
+  WriteWholeFile(folder / "a.jpg", EncodeJpeg(ramp, 95));
   const cv::Mat read = ReadColorImage(folder / "a.jpg");
   ASSERT_EQ(read.size(), ramp.size());
   int worst = 0;

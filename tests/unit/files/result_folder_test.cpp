@@ -89,6 +89,8 @@ TEST(ResultFolderTest, HoldsTheKeysOfTheContract) {
   EXPECT_EQ(json.at("format"), 1);
   EXPECT_EQ(json.at("verdict"), "move");
   EXPECT_EQ(json.at("preset"), "paper");
+  EXPECT_TRUE(json.at("sensor_profiles").at("reference").is_null());
+  EXPECT_EQ(json.at("sensor_profiles").at("current"), "unit 61, 3 sweeps");
   EXPECT_FALSE(json.at("version").get<std::string>().empty());
   EXPECT_EQ(json.at("reasons").at(0), "vertical is 9.0 mm off");
   const auto& alignment = json.at("alignment");

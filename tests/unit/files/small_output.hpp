@@ -62,6 +62,7 @@ inline HeightMap Slope(double offset_m) {
 inline Comparison Answer() {
   Comparison comparison;
   comparison.preset = Preset::kPaper;
+  comparison.current_profile = "unit 61, 3 sweeps";
   comparison.verdict = Verdict::kMove;
   comparison.reasons = {"vertical is 9.0 mm off"};
   Alignment alignment;

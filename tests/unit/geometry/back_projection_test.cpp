@@ -79,17 +79,5 @@ TEST(BackProjectTest, NamesACallersMistake) {
   EXPECT_THROW((void)BackProject(view, rays), std::invalid_argument);
 }
 
-TEST(TransformedTest, TurnsNormalsAndMovesPoints) {
-  PointCloud cloud_in_b;
-  cloud_in_b.points = {{1, 0, 0}};
-  cloud_in_b.normals = {{0, 0, 1}};
-  Pose T_a_b = Pose::Identity();
-  T_a_b.linear() = Eigen::AngleAxisd(EIGEN_PI / 2, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  T_a_b.translation() = Eigen::Vector3d(0, 5, 0);
-  const PointCloud cloud_in_a = Transformed(T_a_b, cloud_in_b);
-  EXPECT_TRUE(cloud_in_a.points[0].isApprox(Eigen::Vector3f(0, 5, -1), 1e-6F));
-  EXPECT_TRUE(cloud_in_a.normals[0].isApprox(Eigen::Vector3f(1, 0, 0), 1e-6F));
-}
-
 }  // namespace
 }  // namespace plumb

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <regex>
 #include <set>
 #include <string>
@@ -25,9 +26,10 @@ bool Spells(const std::string& line, double number) {
   return false;
 }
 
-TEST(SingleOwnerTest, TheDefaultLengthOfMarkersIsWrittenOnce) {
-  // A body's coordinates have nothing to do with it.
-  const std::set<std::string> others = {"drivers/simulated/body.cpp"};
+// "FILE:LINE" of each line of the product's sources that `is_meant` accepts.
+// @param others  Files in which the same text means something else.
+std::vector<std::string> LinesThat(const std::function<bool(const std::string&)>& is_meant,
+                                   const std::set<std::string>& others) {
   const fs::path root = PLUMB_SOURCE_DIR;
   std::vector<std::string> found;
   std::size_t num_files = 0;
@@ -42,13 +44,31 @@ TEST(SingleOwnerTest, TheDefaultLengthOfMarkersIsWrittenOnce) {
       int number = 0;
       for (std::string line; std::getline(source, line);) {
         ++number;
-        if (Spells(line, kMarkerLength_m)) found.push_back(file + ":" + std::to_string(number));
+        if (is_meant(line)) found.push_back(file + ":" + std::to_string(number));
       }
     }
   }
-  ASSERT_GT(num_files, 500U);  // far fewer means that nothing was read
-  EXPECT_THAT(found, ::testing::ElementsAre(::testing::StartsWith("algo/types/marker.hpp:")))
+  EXPECT_GT(num_files, 500U) << "far fewer means that nothing was read";
+  return found;
+}
+
+TEST(SingleOwnerTest, TheDefaultLengthOfMarkersIsWrittenOnce) {
+  // A body's coordinates have nothing to do with it.
+  EXPECT_THAT(LinesThat([](const std::string& line) { return Spells(line, kMarkerLength_m); },
+                        {"drivers/simulated/body.cpp"}),
+              ::testing::ElementsAre(::testing::StartsWith("algo/types/marker.hpp:")))
       << "use kDefaultMarkerLength_m, or let the caller state the room's length";
+}
+
+TEST(SingleOwnerTest, TheDefaultDictionaryOfMarkersIsWrittenOnce) {
+  // The table of all dictionaries, and the markers that the simulator prints.
+  EXPECT_THAT(LinesThat(
+                  [](const std::string& line) {
+                    return line.find("\"DICT_6X6_250\"") != std::string::npos;
+                  },
+                  {"algo/types/marker_dictionary.cpp", "drivers/simulated/world.hpp"}),
+              ::testing::ElementsAre(::testing::StartsWith("algo/types/marker.hpp:")))
+      << "use kDefaultMarkerDictionary";
 }
 
 TEST(SingleOwnerTest, ANumberIsFoundHoweverItIsWritten) {

@@ -36,8 +36,8 @@ export const kWords = {
     'hay una sesión de un paciente abierta: ciérrela primero',
   'a scan is running: wait for its result': 'hay un escaneo en curso: espere su resultado',
   'the board has not been scanned yet': 'la lámina aún no se ha escaneado',
-  ['fewer than 3 of the room\'s markers lie the same in all scans: sweep over the room\'s markers '
-    + 'too, and leave them alone']:
+  ['fewer than 3 of the room\'s markers lie in the same place in all scans: sweep over the room\'s '
+    + 'markers too, and do not move them']:
     'menos de 3 marcadores de la sala están igual en todos los escaneos: barra también los '
     + 'marcadores de la sala y no los toque',
   ['none of the room\'s markers was seen well: sweep over them too, the room is described by '
@@ -253,15 +253,15 @@ export const kPatterns = [
     'El disco está lleno al $1 %: haga una copia de seguridad y borre escaneos.'],
   ['^The last backup failed: (.+)$', 'La última copia de seguridad falló: $1'],
   // The room's calibration.
-  ['^(\\d+) of (\\d+) scans of the board are there: scan again, without touching it$',
+  ['^(\\d+) of (\\d+) scans of the board have been made: scan again, without touching it$',
     'hay $1 de $2 escaneos de la lámina: escanee otra vez, sin tocarla'],
   ['^no scan of the board can be used: (.+)$', 'ningún escaneo de la lámina sirve: $1'],
   ['^the scans differ by ([\\d.]+) mm and ([\\d.]+) deg, at most ([\\d.]+) mm and ([\\d.]+) deg '
     + 'are allowed: let the sensor warm up, do not touch the board, and scan again$',
   'los escaneos difieren en $1 mm y $2°; se permiten $3 mm y $4° como máximo: deje calentar el '
     + 'sensor, no toque la lámina y escanee otra vez'],
-  ['^(\\d+) of the board\'s (\\d+) markers were seen well, at least (\\d+) are needed: look '
-    + 'whether they are clean and uncovered, and sweep slowly over the board$',
+  ['^(\\d+) of the board\'s (\\d+) markers were seen well, at least (\\d+) are needed: check '
+    + 'that they are clean and uncovered, and sweep slowly over the board$',
   'se vieron bien $1 de los $2 marcadores de la lámina y se necesitan al menos $3: mire si están '
     + 'limpios y descubiertos, y barra la lámina despacio'],
   ['^the board measures ([\\d.]+) % of its size, ([\\d.]+) % off are allowed: print it at 100 %, '
@@ -274,7 +274,7 @@ export const kPatterns = [
     + 'coloque la lámina plana sobre una placa rígida y bárrala despacio'],
   ['^marker (\\d+) moved ([\\d.]+) mm since the room was calibrated$',
     'el marcador $1 se movió $2 mm desde que se calibró la sala'],
-  ['^the markers lie ([\\d.]+) mm \\(RMS\\) off where they lay when the room was calibrated$',
+  ['^the markers lie ([\\d.]+) mm \\(RMS\\) from where they were when the room was calibrated$',
     'los marcadores están a $1 mm (RMS) de donde estaban cuando se calibró la sala'],
   ['^The room has to be calibrated again, until then directions are the patient\'s: (.+)$',
     'Hay que calibrar la sala de nuevo; hasta entonces las direcciones son las del paciente: $1'],
@@ -292,17 +292,18 @@ export const kPatterns = [
   // The daily check.
   ['^(\\d+) markers were seen, at least (\\d+) are needed; sweep over all of them$',
     'se vieron $1 marcadores y se necesitan al menos $2; bárralos todos'],
-  ['^markers ([\\d, ]+) were not seen well: look whether they are there, clean and uncovered, and '
+  ['^markers ([\\d, ]+) were not seen well: check that they are there, clean and uncovered, and '
     + 'sweep over all$',
   'los marcadores $1 no se vieron bien: mire si están, limpios y descubiertos, y bárralos todos'],
-  ['^the markers lie ([\\d.]+) mm \\(RMS\\) off where they lay, at most ([\\d.]+) mm are allowed$',
-    'los marcadores están a $1 mm (RMS) de donde estaban; se admiten $2 mm como máximo'],
+  ['^the markers lie ([\\d.]+) mm \\(RMS\\) from where they were, at most ([\\d.]+) mm are '
+    + 'allowed$',
+  'los marcadores están a $1 mm (RMS) de donde estaban; se admiten $2 mm como máximo'],
   ['^the markers lie (-?[\\d.]+) % farther apart than they did: the sensor\'s calibration may have '
     + 'changed$',
   'los marcadores están un $1 % más separados que antes: puede haber cambiado la calibración del '
     + 'sensor'],
-  ['^marker (\\d+) measures ([+-][\\d.]+) % of its length: is its print of the right size\\?$',
-    'el marcador $1 mide un $2 % de diferencia con su longitud: ¿está impreso a su tamaño?'],
+  ['^marker (\\d+) is ([+-][\\d.]+) % off its stated length: check the size of its print$',
+    'el marcador $1 se desvía un $2 % de su longitud: compruebe el tamaño de la impresión'],
   ['^the sensor\'s depth is off by ([+-][\\d.]+) %: let it warm up, check again, then have it '
     + 'calibrated$',
   'la profundidad del sensor se desvía un $1 %: déjelo calentar, repita el control y hágalo '
