@@ -30,6 +30,7 @@
 #include "daemon/appliance/panel.hpp"
 #include "daemon/appliance/plumbd_options.hpp"
 #include "daemon/appliance/provisioning.hpp"
+#include "daemon/appliance/unit_recovery.hpp"
 #include "daemon/appliance/web_services.hpp"
 #include "daemon/config/sensor_settings.hpp"
 #include "daemon/config/version.hpp"
@@ -343,6 +344,13 @@ int RunChecked(const PlumbdOptions& options, const SensorRegistry& registry) {
     const Config config = ReadConfiguration(options, registry);
     ApplyProvisioning(ReadProvisioning(*options.provision), options.unit, config.appliance.state);
     fmt::print("{} is taken over\n", options.provision->string());
+    return 0;
+  }
+  if (options.recover) {
+    const ApplianceConfig config = ReadConfiguration(options, registry).appliance;
+    ::umask(::umask(0077) | 0027);
+    fmt::print("{}\n", RecoverUnit(ReadUnitRecovery(*options.recover), config.state,
+                                   config.backup_key_file));
     return 0;
   }
   if (options.simulated.empty() == false && !options.state)

@@ -44,6 +44,10 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
                  "Apply serial number, name, network and certificate of this unit from a file, and "
                  "exit")
       ->type_name("FILE");
+  app.add_option("--recover", options.recover,
+                 "Confirm lost scans, or restore a backup, as a file says, for a state folder that "
+                 "no plumbd works with, and exit")
+      ->type_name("FILE");
   app.add_option("--unit", options.unit, "Folder in which --provision stores them")
       ->type_name("DIR")
       ->capture_default_str();

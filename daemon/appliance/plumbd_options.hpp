@@ -18,7 +18,7 @@ struct PlumbdOptions {
   bool use_default_config = true;  ///< If it exists and no file is named.
   bool check_config = false, show_stopped = false;
   std::string simulated;  ///< Name of the suite; empty: real sensors.
-  std::optional<std::filesystem::path> state, control, provision;
+  std::optional<std::filesystem::path> state, control, provision, recover;
   std::filesystem::path unit = "/data/unit";  ///< Where an image stores its provisioning data.
   std::optional<std::string> listen;
   int sim_frames = 300, sim_scenes = 0;

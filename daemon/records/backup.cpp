@@ -22,6 +22,7 @@
 #include "daemon/records/scan_files.hpp"
 #include "daemon/records/scan_folders.hpp"
 #include "daemon/records/schema.hpp"
+#include "daemon/records/store.hpp"
 #include "daemon/records/stored_values.hpp"
 #include "daemon/records/summed_folder.hpp"
 #include "drivers/files/file_io.hpp"
@@ -40,6 +41,7 @@ constexpr const char* kScans = "scans";
 constexpr std::array<const char*, 4> kOtherFolders = {ScanFolders::kSetAside, "calibration",
                                                       "imports", "sensor-profiles"};
 constexpr const char* kRestoring = ".restore";
+constexpr const char* kRestoringOver = ".recovery";
 constexpr const char* kBackingUp = ".backup";
 /// In a restored state folder, until its audit log has the entry.
 constexpr const char* kRestored = "restored.json";
@@ -222,6 +224,36 @@ void MoveIn(const fs::path& made, const fs::path& state) {
   fs::remove_all(made, ignored);
 }
 
+/// Moves everything that a restore replaces to a new folder. The database goes first: without it,
+/// and with scans, a start is safe mode.
+fs::path MoveOldAside(const fs::path& state) {
+  fs::path aside;
+  for (int n = 1; aside.empty() || fs::exists(fs::symlink_status(aside)); ++n)
+    aside = state / fmt::format("before-restore-{}", n);
+  fs::create_directory(aside);
+  GiveToOwnerOf(state, aside);
+  std::vector<std::string> names = {kDatabase,          "plumb.db-wal", "plumb.db-shm",
+                                    "plumb.db-journal", kRestored,      kScans};
+  names.insert(names.end(), kOtherFolders.begin(), kOtherFolders.end());
+  std::vector<std::string> moved;
+  for (const std::string& name : names) {
+    if (!fs::exists(fs::symlink_status(state / name))) continue;
+    if (::rename((state / name).c_str(), (aside / name).c_str()) == 0) {
+      moved.push_back(name);
+      continue;
+    }
+    const int error = errno;  // such as a disk that is mounted there
+    for (const std::string& back : moved)
+      (void)::rename((aside / back).c_str(), (state / back).c_str());
+    ::rmdir(aside.c_str());
+    throw IoError(DescribeWriteError(state / name, error));
+  }
+  SyncDisk(state);
+  if (!moved.empty()) return aside;
+  fs::remove(aside);
+  return {};
+}
+
 }  // namespace
 
 OutputKind BackupOutput() {
@@ -290,6 +322,31 @@ BackupReport RestoreBackup(const fs::path& backup, const fs::path& state,
     throw;
   }
   return report;
+}
+
+BackupReport RestoreOver(const fs::path& backup, const fs::path& state, const std::stop_token& stop,
+                         const BackupSecret* secret) {
+  FolderLock lock;
+  lock.Take(state);
+  const fs::path made = state / kRestoringOver;
+  try {
+    BackupReport report;
+    try {
+      fs::remove_all(made);  // left by an interrupted one
+      fs::create_directory(made);
+      GiveToOwnerOf(state, made);
+      report = RestoreBackup(backup, made, stop, secret);
+      report.replaced = MoveOldAside(state);
+    } catch (...) {  // what is stored is as it was
+      std::error_code ignored;
+      fs::remove_all(made, ignored);
+      throw;
+    }
+    MoveIn(made, state);
+    return report;
+  } catch (const fs::filesystem_error& error) {
+    throw IoError(DescribeWriteError(state, error.code().value()));
+  }
 }
 
 void NoteRestore(const fs::path& state, Database& database) {

@@ -27,6 +27,8 @@ struct BackupReport {
   /// Files in the store that are not as they were stored: "scan 000004: scene/cloud.ply is
   /// missing". The backup contains what exists.
   std::vector<std::string> problems;
+  /// Of RestoreOver(): folder with what was stored before; empty if there was nothing.
+  std::filesystem::path replaced = {};
 };
 
 /// Backs up an open store, whose files must not be removed meanwhile. The database is copied as of
@@ -55,6 +57,13 @@ struct BackupReport {
 ///         IoError; Interrupted
 BackupReport RestoreBackup(const std::filesystem::path& backup, const std::filesystem::path& state,
                            const std::stop_token& stop = {}, const BackupSecret* secret = nullptr);
+
+/// The same into a state folder that is not empty and that no plumbd works with. Once the backup is
+/// verified and unpacked, what it replaces is moved to a new folder before-restore-N in there:
+/// nothing of it is overwritten or removed. Keys and other files that no backup has stay.
+/// @throws as above; DatabaseBusy if a plumbd works with it
+BackupReport RestoreOver(const std::filesystem::path& backup, const std::filesystem::path& state,
+                         const std::stop_token& stop = {}, const BackupSecret* secret = nullptr);
 
 /// Adds the entry of a restore to the audit log, at the first start after it.
 /// @throws IoError and its kinds

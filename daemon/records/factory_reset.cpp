@@ -1,6 +1,5 @@
 #include "daemon/records/factory_reset.hpp"
 
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -14,6 +13,7 @@
 
 #include "algo/base/bounded_json.hpp"
 #include "algo/base/errors.hpp"
+#include "daemon/records/file_copy.hpp"
 #include "daemon/records/store.hpp"
 #include "drivers/files/file_io.hpp"
 
@@ -123,20 +123,10 @@ std::string KeepRecords(const fs::path& state, const web::Actor& actor) {
 }  // namespace
 
 void RequestFactoryReset(const fs::path& state, FactoryReset kind, const web::Actor& actor) {
-  const fs::path file = state / kFactoryResetFile;
-  const fs::path temporary = state / ".factory-reset.new";
   const Json json = {{"kind", kind == FactoryReset::kWipe ? kWipe : kKeep},
                      {"user", actor.user},
                      {"address", actor.address}};
-  WriteWholeFile(temporary, json.dump(-1, ' ', false, Json::error_handler_t::replace));
-  struct stat folder {};
-  if (::stat(state.c_str(), &folder) != 0 ||
-      (::geteuid() == 0 && ::chown(temporary.c_str(), folder.st_uid, folder.st_gid) != 0))
-    throw IoError(DescribeWriteError(temporary, errno));
-  SyncToDisk(temporary);
-  if (::rename(temporary.c_str(), file.c_str()) != 0)
-    throw IoError(DescribeWriteError(file, errno));
-  SyncToDisk(state);
+  PlaceFile(state, kFactoryResetFile, json.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
 void CancelFactoryReset(const fs::path& state) {

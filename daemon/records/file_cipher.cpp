@@ -133,9 +133,10 @@ std::string Hex(const unsigned char* bytes, std::size_t count) {
 
 }  // namespace
 
-BackupSecret::BackupSecret(const fs::path& file) {
+BackupSecret::BackupSecret(const fs::path& file, Readers readers) {
   struct stat status {};
-  if (::stat(file.c_str(), &status) == 0 && (status.st_mode & S_IROTH) != 0)
+  if (readers == Readers::kFew && ::stat(file.c_str(), &status) == 0 &&
+      (status.st_mode & S_IROTH) != 0)
     throw DataError(
         fmt::format("the key file {} can be read by everybody: chmod o= it first", file.string()));
   text_ = ReadTextFile(file, kMaxSecret + 1);

@@ -22,8 +22,10 @@ namespace plumb {
 /// bytes in hexadecimal. Erased on destruction.
 class BackupSecret {
  public:
-  /// @throws DataError if the file has no such line, or everybody may read it; IoError
-  explicit BackupSecret(const std::filesystem::path& file);
+  /// On a FAT-formatted stick everybody may read every file.
+  enum class Readers { kFew, kAny };
+  /// @throws DataError if the file has no such line, or more than the allowed may read it; IoError
+  explicit BackupSecret(const std::filesystem::path& file, Readers readers = Readers::kFew);
   ~BackupSecret();
   BackupSecret(const BackupSecret&) = delete;
   BackupSecret& operator=(const BackupSecret&) = delete;

@@ -106,6 +106,19 @@ FileDigest CloneOrCopy(const fs::path& from, const fs::path& to, const std::stri
   }
 }
 
+void PlaceFile(const fs::path& folder, const std::string& name, const std::string& text) {
+  const fs::path file = folder / name, temporary = folder / ("." + name + ".new");
+  WriteWholeFile(temporary, std::string_view(text));
+  struct stat owner {};
+  if (::stat(folder.c_str(), &owner) != 0 ||
+      (::geteuid() == 0 && ::chown(temporary.c_str(), owner.st_uid, owner.st_gid) != 0))
+    throw IoError(DescribeWriteError(temporary, errno));
+  SyncToDisk(temporary);
+  if (::rename(temporary.c_str(), file.c_str()) != 0)
+    throw IoError(DescribeWriteError(file, errno));
+  SyncToDisk(folder);
+}
+
 void SyncDisk(const fs::path& folder) {
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   const int result = fd < 0 ? -1 : ::syncfs(fd);

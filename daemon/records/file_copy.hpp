@@ -29,6 +29,12 @@ class SourceUnreadable : public IoError {
                                      const std::filesystem::path& to, const std::string& path,
                                      const std::stop_token& stop);
 
+/// Writes a small file of a folder durably and in one step. It gets the folder's owner, where the
+/// process may set it.
+/// @throws IoError
+void PlaceFile(const std::filesystem::path& folder, const std::string& name,
+               const std::string& text);
+
 /// Flushes everything on a folder's disk. @throws IoError
 void SyncDisk(const std::filesystem::path& folder);
 

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "daemon/records/audit_store.hpp"
+#include "daemon/records/file_copy.hpp"
 #include "daemon/records/scan_digests.hpp"
 #include "daemon/records/scan_store.hpp"
 #include "daemon/records/stored_values.hpp"
@@ -19,7 +20,8 @@ using store::ScanId;
 
 namespace {
 
-/// In the state folder; states that missing scans are lost for good.
+/// In the state folder; states that missing scans are lost for good: so many, or any if it is
+/// empty.
 constexpr const char* kLostFile = "scans-are-lost";
 
 /// A finished scan and the result of examining its files.
@@ -50,6 +52,7 @@ class Recovery {
   const ScanFolders& folders_;
   const ExaminePath& look_;
   RecoveryReport& report_;
+  std::string confirmed_;  ///< Which scans a person has confirmed as lost, for the audit log.
 };
 
 void Recovery::Run() {
@@ -62,6 +65,7 @@ void Recovery::Run() {
     AppendAuditEntry(database_, store::kSelf, "scan.interrupted", "",
                      fmt::format("{} scans had not ended", report_.interrupted_scans));
   }
+  if (!confirmed_.empty()) AppendAuditEntry(database_, store::kSelf, "scans.lost", "", confirmed_);
   NoteAvailability(scans);
   transaction.Commit();
   for (const fs::path& folder : folders_.All()) CollectOrphan(folder);
@@ -107,13 +111,26 @@ void Recovery::RefuseIfMostAreMissing(const std::vector<LookedAt>& scans) {
     if (first == nullptr) first = &scan;
   }
   if (missing < 2 || 2 * missing < seen_before) return;
-  if (look_(folders_.state() / kLostFile).error == 0) return;
+  const fs::path file = folders_.state() / kLostFile;
+  std::string other;
+  if (look_(file).error == 0) {
+    constexpr std::size_t kLongest = 64;
+    std::string said = ReadTextFile(file, kLongest);
+    while (!said.empty() && said.back() == '\n') said.pop_back();
+    if (said.empty() || said == std::to_string(missing)) {
+      confirmed_ =
+          fmt::format("{} of {} stored scans were confirmed as lost", missing, seen_before);
+      return;
+    }
+    other = fmt::format(" (not for {:?}, as it was confirmed)", said);
+  }
   throw ScansMissing(fmt::format(
       "{} of {} stored scans cannot be seen (of scan {}, {}): is the disk mounted at {}? Nothing "
       "was changed. Mount the disk or put a backup in its place, and start plumbd again; if these "
-      "files are gone for good, make an empty file {} first",
-      missing, seen_before, ScanId(first->id), first->now, (folders_.scans()).string(),
-      (folders_.state() / kLostFile).string()));
+      "files are gone for good, confirm that{}: with lost_scans = {} in plumb-recovery.toml (field "
+      "guide, Recover a unit), or with an empty file {}",
+      missing, seen_before, ScanId(first->id), first->now, (folders_.scans()).string(), other,
+      missing, file.string()));
 }
 
 void Recovery::NoteAvailability(const std::vector<LookedAt>& scans) {
@@ -200,6 +217,10 @@ void RefuseScansOfAnother(Database& database, const ScanFolders& scans) {
                   "its place, or move the folder {} away too to start over",
                   (scans.state() / "plumb.db").string(), folders.front().string(),
                   folders.size() - 1, (scans.scans()).string()));
+}
+
+void ConfirmLostScans(const fs::path& state, int num_lost) {
+  PlaceFile(state, kLostFile, std::to_string(num_lost));
 }
 
 void RecoverStore(Database& database, const ScanFolders& folders, const ExaminePath& look,

@@ -33,6 +33,11 @@ struct RecoveryReport {
 /// @throws DatabaseCorrupt if the database is new and there are scans.
 void RefuseScansOfAnother(Database& database, const ScanFolders& folders);
 
+/// Confirms to the next start that this number of missing scans is lost for good. They are marked
+/// unavailable then, and nothing is deleted. Another number is not confirmed by it.
+/// @throws IoError
+void ConfirmLostScans(const std::filesystem::path& state, int num_lost);
+
 /// Fails scans that were interrupted, records which files exist, removes the remains of a crash or
 /// a removal, and moves folders without a row to set-aside. The caller holds the connection for
 /// changes.

@@ -38,9 +38,21 @@ struct FreeEntry {
   void operator()(archive_entry* entry) const { ::archive_entry_free(entry); }
 };
 
+/// Closes its descriptor.
+struct Opened {
+  explicit Opened(const fs::path& path)
+      : fd(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {}
+  ~Opened() {
+    if (fd >= 0) ::close(fd);
+  }
+  Opened(const Opened&) = delete;
+  Opened& operator=(const Opened&) = delete;
+  const int fd;
+};
+
 std::string ReasonOf(archive* handle) {
-  const char* text = ::archive_error_string(handle);
-  return text != nullptr ? text : "for an unknown reason";
+  const char* text = handle != nullptr ? ::archive_error_string(handle) : nullptr;
+  return text != nullptr ? text : "the reason is not known";
 }
 
 /// Tar only: a format or a compression more is one more way in.
@@ -82,48 +94,61 @@ bool IsPlainPath(const std::string& path) {
          });
 }
 
+void TarWriter::Sink::Take(const std::uint8_t* bytes, std::size_t count) {
+  while (count > 0 && error == 0) {
+    const ssize_t written = ::write(fd, bytes, count);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) {
+      error = written < 0 ? errno : EIO;
+      return;
+    }
+    bytes += written;
+    count -= static_cast<std::size_t>(written);
+  }
+}
+
 TarWriter::TarWriter(fs::path file) : file_(std::move(file)) {
-  fd_ = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
-  if (fd_ < 0) throw IoError(DescribeWriteError(file_, errno));
+  sink_.fd = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
+  if (sink_.fd < 0) throw IoError(DescribeWriteError(file_, errno));
   archive_ = ::archive_write_new();
+  const auto take = [](archive*, void* sink, const void* bytes, std::size_t count) {
+    static_cast<Sink*>(sink)->Take(static_cast<const std::uint8_t*>(bytes), count);
+    return static_cast<la_ssize_t>(count);
+  };
   try {
+    Check(archive_ != nullptr ? ARCHIVE_OK : ARCHIVE_FATAL);
     // Names are written as they are, in the GNU format. Others convert them by the locale.
     Check(::archive_write_set_format_gnutar(archive_));
     Check(::archive_write_set_bytes_per_block(archive_, static_cast<int>(kPiece)));
-    Check(::archive_write_open_fd(archive_, fd_));
+    Check(::archive_write_set_bytes_in_last_block(archive_, 1));  // no padding
+    Check(::archive_write_open(archive_, &sink_, nullptr, take, nullptr));
   } catch (...) {
     ::archive_write_free(archive_);
-    ::close(fd_);
+    ::close(sink_.fd);
     throw;
   }
 }
 
 TarWriter::~TarWriter() {
-  if (archive_ != nullptr) {
-    (void)::archive_write_fail(archive_);  // without it the end would be written
-    ::archive_write_free(archive_);
-  }
-  if (fd_ >= 0) ::close(fd_);
+  if (sink_.error == 0) sink_.error = ECANCELED;  // nothing is written any more
+  ::archive_write_free(archive_);
+  if (sink_.fd >= 0) ::close(sink_.fd);
 }
 
 void TarWriter::Check(int result) const {
-  if (result == ARCHIVE_OK) return;
-  const int error = archive_ != nullptr ? ::archive_errno(archive_) : ENOMEM;
-  if (error > 0) throw IoError(DescribeWriteError(file_, error));
-  throw IoError(fmt::format("cannot write {}: {}", file_.string(), ReasonOf(archive_)));
+  if (sink_.error != 0) throw IoError(DescribeWriteError(file_, sink_.error));
+  if (result != ARCHIVE_OK)
+    throw IoError(fmt::format("cannot write {}: {}", file_.string(), ReasonOf(archive_)));
 }
 
 void TarWriter::Add(const fs::path& from, const std::string& path, const std::stop_token& stop) {
   const fs::path source = from / path;
-  const int fd = ::open(source.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  const Opened file(source);
   const auto fail = [&](int error) {
     throw IoError(fmt::format("cannot read {}: {}", source.string(), std::strerror(error)));
   };
-  if (fd < 0) fail(errno);
-  const std::unique_ptr<const int, void (*)(const int*)> closed(
-      &fd, [](const int* opened) { ::close(*opened); });
   struct stat status {};
-  if (::fstat(fd, &status) != 0) fail(errno);
+  if (file.fd < 0 || ::fstat(file.fd, &status) != 0) fail(errno);
   const std::unique_ptr<archive_entry, FreeEntry> entry(::archive_entry_new());
   ::archive_entry_set_pathname(entry.get(), path.c_str());
   ::archive_entry_set_filetype(entry.get(), AE_IFREG);
@@ -134,12 +159,12 @@ void TarWriter::Add(const fs::path& from, const std::string& path, const std::st
   std::vector<std::uint8_t> piece(kPiece);
   for (std::int64_t left = status.st_size; left > 0;) {
     CheckStop(stop);
-    const ssize_t count = ::read(fd, piece.data(), piece.size());
+    const ssize_t count = ::read(file.fd, piece.data(), piece.size());
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0) fail(count < 0 ? errno : EIO);
     const la_ssize_t written =
         ::archive_write_data(archive_, piece.data(), static_cast<std::size_t>(count));
-    if (written != count) Check(written < 0 ? static_cast<int>(written) : ARCHIVE_FATAL);
+    Check(written == count ? ARCHIVE_OK : ARCHIVE_FATAL);
     left -= count;
   }
   Check(::archive_write_finish_entry(archive_));
@@ -147,9 +172,7 @@ void TarWriter::Add(const fs::path& from, const std::string& path, const std::st
 
 void TarWriter::Close() {
   Check(::archive_write_close(archive_));
-  ::archive_write_free(std::exchange(archive_, nullptr));
-  if (const int fd = std::exchange(fd_, -1); ::close(fd) != 0)
-    throw IoError(DescribeWriteError(file_, errno));
+  if (::close(std::exchange(sink_.fd, -1)) != 0) throw IoError(DescribeWriteError(file_, errno));
 }
 
 TarReader::TarReader(fs::path file)

@@ -41,10 +41,17 @@ class TarWriter {
   void Close();
 
  private:
+  /// Where libarchive writes to. It is never told of an error, after which it would leak memory and
+  /// which Check() reports: the rest is dropped.
+  struct Sink {
+    int fd = -1;
+    int error = 0;
+    void Take(const std::uint8_t* bytes, std::size_t count);
+  };
   void Check(int result) const;
 
   std::filesystem::path file_;
-  int fd_ = -1;
+  Sink sink_;
   archive* archive_ = nullptr;
 };
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# A unit's provisioning file, from the data partition and from a stick, through plumbd --provision to what systemd reads; and the appliance's screen.
+# A unit's provisioning file, from the data partition and from a stick, through plumbd --provision to what systemd reads; its recovery; and the
+# appliance's screen.
 #   unit_settings.sh BUILD_FOLDER
 set -euo pipefail
 plumbd=$(realpath "$1/daemon/plumbd") source=$(cd "$(dirname "$0")/../.." && pwd)
@@ -83,6 +84,35 @@ printf '#!/bin/sh\n' >bin/plumb
 "$source/systemd/burn-in" >out
 check "one that passes says so" '^burn-in of 1 minutes: passed' "$(cat data/provision/burn-in.txt)"
 
+# Recovery: nothing happens to a unit whose plumbd works (here: another process holds the folder), and each file counts once.
+printf '[recovery]\nlost_scans = 3\n' >stick/plumb-recovery.toml
+: >asked
+exec 9<state
+flock -x 9
+run stick "$work/stick"
+check "a stick recovers nothing where plumbd works" '^0 .*nothing to recover.*not carried out' "$code $(tr '\n' ' ' <out)"
+check "and restarts nothing" '^$' "$(cat asked)"
+[ ! -e state/scans-are-lost ] || failed=1
+exec 9<&-
+run stick "$work/stick"
+check "in safe mode the number of lost scans is confirmed" '^0 3$' "$code $(cat state/scans-are-lost)"
+check "and plumbd starts again" 'restart plumbd.service' "$(tr '\n' ' ' <asked)"
+rm state/scans-are-lost
+: >asked
+run stick "$work/stick"
+check "but once" '^0 .*has been carried out' "$code $(cat out)"
+check "without another start" '^$' "$(ls state | grep lost)$(cat asked)"
+printf '[recovery]\nlost_scans = 1\n' >stick/plumb-recovery.toml
+run stick "$work/stick"
+check "a mistake of the recovery is reported with its line" 'plumb-recovery.toml:2: recovery.lost_scans: expected' "$(cat out)"
+rm stick/plumb-recovery.toml
+mkdir -p data/provision
+printf '[recovery]\nlost_scans = 4\n' >data/provision/plumb-recovery.toml
+: >asked
+run
+check "from the data partition, before plumbd starts" '^0 4 $' "$code $(cat state/scans-are-lost) $(cat asked)"
+rm -r state/scans-are-lost data/provision
+
 cat >bin/plumb <<'SCRIPT'
 #!/bin/sh
 case "$3" in state) echo ready ;; page.url) echo https://0.0.0.0:8080 ;; page.certificate) echo AB:CD ;; esac
@@ -96,6 +126,13 @@ echo PL-7 >data/unit/serial
 echo "0.2.0 abc" >release
 export PLUMB_RELEASE=$work/release
 echo '{"setup_required":true}' >session
+printf '[recovery]\nrestore = "no-backup"\n' >stick/plumb-recovery.toml
+: >asked
+run stick "$work/stick"
+check "a unit without an account is stopped for it, and started again" '^stop plumbd.socket plumbd.service .*restart plumbd.service $' "$(tr '\n' ' ' <asked)"
+check "a backup that is none changes nothing" '^0 .*no-backup cannot be used.*as it was$' "$code $(tr '\n' ' ' <out | sed 's/ $//')"
+check "nothing is left of it" '^$' "$(ls -A state | grep -e recovery -e before || true)"
+rm stick/plumb-recovery.toml
 screen=$("$source/systemd/console-screen" once)
 for line in 'Page         https://10.1.1.5:8080/' 'Page         https://\[fd00::5\]:8080/' 'Certificate  AB:CD' 'Serial       PL-7' 'Version      0.2.0' \
   'State        ready' 'enter the setup code: ABCD-EFGH'; do

@@ -55,6 +55,9 @@ const kDetails = [
   ['user.change', 'role technician', 'role: Technician', 'función: Técnico'],
   ['user.change', 'enabled', 'enabled', 'activada'],
   ['user.change', '', '', ''],
+  ['scans.lost', '3 of 5 stored scans were confirmed as lost',
+    '3 of 5 stored scans were confirmed as lost',
+    'se confirmó la pérdida de 3 de los 5 escaneos guardados'],
   ['recording.remove', 'quota', 'to free disk space', 'para liberar espacio en disco'],
   ['settings.change', '{"posture":["HFS","FFP"],"couch_markers":[false,true]}',
     'Posture of new references: Head first, supine → Feet first, prone; '

@@ -10,6 +10,7 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
+#include "daemon/appliance/unit_recovery.hpp"
 #include "daemon/appliance/web_settings.hpp"
 #include "daemon/records/file_cipher.hpp"
 #include "drivers/files/file_io.hpp"
@@ -403,6 +404,44 @@ TEST_F(StorageRetryTest, AStoreThatCouldNotBeOpenedIsOpenedWhenItsScansAreThere)
       EXPECT_TRUE(appliance_->Health().ok) << appliance_->Health().reason;
       EXPECT_EQ(appliance_->WebStatus().state, web::ApplianceState::kNoSensor);
     });
+  });
+}
+
+/// As the engineer confirms it, with a file on a stick.
+TEST_F(StorageRetryTest, ScansThatAreConfirmedAsLostEndSafeModeAndAreInTheLog) {
+  std::string patient;
+  {
+    Store store(state());
+    patient = store.patients.Add(kTester, "A", "");
+    for (int i = 0; i < 3; ++i) (void)StoreSmallScan(store, patient);
+  }
+  fs::rename(state() / "scans", folder_ / "away");
+  Play([&] {
+    EXPECT_THAT(Fault(), HasSubstr("lost_scans = 3"));
+    const auto confirm = [&](int number) {
+      return Becomes([&] {  // a try may hold the folder at this moment
+        try {
+          (void)RecoverUnit({.lost_scans = number, .backup = {}, .key_file = {}}, state(), {});
+          return true;
+        } catch (const DataError&) {
+          return false;
+        }
+      });
+    };
+    ASSERT_TRUE(confirm(2));
+    LetItTryInVain();
+    EXPECT_THAT(Fault(), HasSubstr("lost_scans = 3"));
+    ASSERT_TRUE(confirm(3));
+    ASSERT_TRUE(Becomes([&] { return appliance_->storage_fault().empty(); }));
+    On([&] {
+      const auto entries = appliance_->store()->audit.Find({0, 10, "scans.lost"});
+      ASSERT_EQ(entries.size(), 1U);
+      EXPECT_THAT(entries[0].detail, HasSubstr("3 of 3"));
+      EXPECT_EQ(appliance_->store()->scans.List(patient, 10).size(), 3U);
+    });
+    EXPECT_THROW((void)RecoverUnit({.lost_scans = 3, .backup = {}, .key_file = {}}, state(), {}),
+                 DataError)
+        << "a unit that works is left alone";
   });
 }
 

@@ -241,6 +241,64 @@ TEST_F(BackupTest, IsRestoredIntoAnEmptyFolderOnly) {
   EXPECT_FALSE(fs::exists(restored() / ".restore"));
 }
 
+TEST_F(BackupTest, WhatARestoreReplacesIsMovedAsideAndWhole) {
+  (void)BackUpStopped(state(), backup());
+  const auto saved = FilesOf(state());
+  WriteWholeFile(state() / "page-key.pem", std::string_view("key"));
+  {
+    Store store(state());
+    scan_ = StoreScan(store, patient_);
+  }
+  const auto before = FilesBelow(state());
+  const BackupReport report = RestoreOver(backup(), state());
+  EXPECT_EQ(report.scans, 4U);
+  EXPECT_EQ(report.replaced, state() / "before-restore-1");
+  auto aside = FilesBelow(report.replaced);
+  EXPECT_EQ(aside.size() + 1, before.size());
+  aside["page-key.pem"] = "key";
+  EXPECT_EQ(aside, before) << "all but the key, which stays";
+  EXPECT_TRUE(fs::exists(state() / "page-key.pem"));
+  EXPECT_FALSE(fs::exists(state() / ".recovery"));
+  {
+    Store store(state());
+    EXPECT_EQ(store.scans.List(patient_, 100).size(), 4U);
+    EXPECT_EQ(store.audit.Find({0, 10, "backup.restore"}).size(), 1U);
+    EXPECT_EQ(store.recovery().lost_scans + store.recovery().foreign_folders, 0);
+  }
+  EXPECT_EQ(RestoreOver(backup(), state()).replaced, state() / "before-restore-2");
+  EXPECT_EQ(FilesBelow(report.replaced).size() + 1, before.size()) << "the first is as it was";
+  auto now = FilesOf(state());
+  std::erase_if(now, [](const auto& entry) {
+    return entry.first.starts_with("before-restore") || entry.first == "page-key.pem";
+  });
+  EXPECT_EQ(now, saved);
+}
+
+TEST_F(BackupTest, ARestoreOverWhatIsStoredChangesNothingWithADamagedBackupOrARunningStore) {
+  (void)BackUpStopped(state(), backup());
+  {
+    const Store store(state());
+    EXPECT_THROW((void)RestoreOver(backup(), state()), DatabaseBusy);
+  }
+  const auto before = FilesBelow(state());
+  WriteWholeFile(backup() / "scans" / scan_ / "scene" / "cloud.ply", std::string_view("changed"));
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)RestoreOver(backup(), state()); }),
+              HasSubstr("nothing was restored"));
+  EXPECT_EQ(FilesBelow(state()), before);
+  EXPECT_FALSE(fs::exists(state() / "before-restore-1"));
+}
+
+TEST_F(BackupTest, ADamagedDatabaseAndAnEmptyFolderAreRestoredOver) {
+  (void)BackUpStopped(state(), backup());
+  WriteWholeFile(state() / "plumb.db", std::string_view("no database"));
+  EXPECT_EQ(RestoreOver(backup(), state()).scans, 4U);
+  EXPECT_EQ(Store(state()).scans.List(patient_, 100).size(), 4U);
+  fs::create_directory(restored());
+  EXPECT_EQ(RestoreOver(backup(), restored()).replaced, "") << "there was nothing";
+  EXPECT_FALSE(fs::exists(restored() / "before-restore-1"));
+  EXPECT_EQ(Store(restored()).scans.List(patient_, 100).size(), 4U);
+}
+
 TEST_F(BackupTest, AnInterruptedRestoreIsNoStore) {
   (void)BackUpStopped(state(), backup());
   (void)RestoreBackup(backup(), restored());

@@ -246,6 +246,49 @@ TEST_F(StoreRecoveryTest, APersonSaysThatTheFilesAreGoneForGood) {
   EXPECT_EQ(Open()->recovery().lost_scans, 0);
 }
 
+TEST_F(StoreRecoveryTest, TheNumberOfLostScansIsConfirmedAndNoOther) {
+  std::vector<std::string> scans;
+  {
+    const auto store = Open();
+    const std::string patient = store->patients.Add(kAnna, "P", "");
+    for (int i = 0; i < 5; ++i) scans.push_back(StoreScan(*store, patient));
+  }
+  fs::create_directories(folder_ / "away");
+  for (int i = 0; i < 3; ++i) fs::rename(state() / "scans" / scans[i], folder_ / "away" / scans[i]);
+  const auto before = testing::FilesBelow(state() / "scans");
+  for (const int number : {2, 4, 5}) {
+    ConfirmLostScans(state(), number);
+    EXPECT_THAT(MessageOf<ScansMissing>([&] { (void)Open(); }),
+                AllOf(HasSubstr("3 of 5"), HasSubstr("lost_scans = 3"),
+                      HasSubstr(fmt::format("not for \"{}\"", number))));
+  }
+  ConfirmLostScans(state(), 3);
+  {
+    const auto store = Open();
+    EXPECT_EQ(store->recovery().lost_scans, 3);
+    EXPECT_EQ(testing::FilesBelow(state() / "scans"), before) << "nothing is deleted";
+    const auto entries = store->audit.Find({0, 10, "scans.lost"});
+    ASSERT_EQ(entries.size(), 1U);
+    EXPECT_EQ(entries[0].detail, "3 of 5 stored scans were confirmed as lost");
+    EXPECT_EQ(store->audit.FirstBroken(), std::nullopt);
+  }
+  EXPECT_FALSE(fs::exists(state() / "scans-are-lost")) << "it counts once";
+  for (int i = 0; i < 3; ++i) fs::rename(folder_ / "away" / scans[i], state() / "scans" / scans[i]);
+  EXPECT_EQ(Open()->recovery().attached_scans, 3) << "and they may come back";
+}
+
+TEST_F(StoreRecoveryTest, AConfirmationOfNothingLostCountsForNoLaterStart) {
+  {
+    const auto store = Open();
+    const std::string patient = store->patients.Add(kAnna, "P", "");
+    for (int i = 0; i < 3; ++i) (void)StoreScan(*store, patient);
+  }
+  ConfirmLostScans(state(), 3);
+  EXPECT_TRUE(Open()->audit.Find({0, 10, "scans.lost"}).empty());
+  fs::rename(state() / "scans", folder_ / "disk");
+  EXPECT_THROW((void)Open(), ScansMissing);
+}
+
 TEST_F(StoreRecoveryTest, TheOnlyScanMayBeMissingAndComesBack) {
   std::string scan;
   {

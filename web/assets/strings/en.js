@@ -565,6 +565,7 @@ export const en = {
       'recording.remove': 'Recording deleted',
       'folder.remove': 'Folder of a failed or deleted scan removed',
       'folder.set_aside': 'Folder moved to set-aside',
+      'scans.lost': 'Missing scans confirmed as lost',
       press: 'Button pressed',
       cancel: 'Scan discarded',
       'reference.add': 'Reference created',

@@ -621,6 +621,7 @@ export const es = {
       'recording.remove': 'Grabación borrada',
       'folder.remove': 'Carpeta de un escaneo fallido o borrado eliminada',
       'folder.set_aside': 'Carpeta apartada a set-aside',
+      'scans.lost': 'Escaneos ausentes confirmados como perdidos',
       press: 'Botón pulsado',
       cancel: 'Escaneo descartado',
       'reference.add': 'Referencia creada',

@@ -242,7 +242,11 @@ export const kFaultPatterns = [
   ['^(\\d+) of (\\d+) stored scans cannot be seen \\(of scan (\\S+), (.+)\\): is the disk mounted '
     + 'at (.+)\\? Nothing was changed\\. .+$',
   'no se ven $1 de los $2 escaneos guardados (del escaneo $3, $4): ¿está montado el disco en $5? '
-    + 'No se ha cambiado nada. Monte el disco o ponga una copia en su lugar y reinicie plumbd'],
+    + 'No se ha cambiado nada. Monte el disco o ponga una copia en su lugar y reinicie plumbd; si '
+    + 'los archivos se han perdido para siempre, confírmelo con lost_scans = $1 en '
+    + 'plumb-recovery.toml (guía de campo)'],
+  ['^(\\d+) of (\\d+) stored scans were confirmed as lost$',
+    'se confirmó la pérdida de $1 de los $2 escaneos guardados'],
   // Sensor and scan.
   ['^the scan could not begin: (.+)$', 'el escaneo no pudo empezar: $1'],
   ['^the scan failed: (.+)$', 'el escaneo falló: $1'],

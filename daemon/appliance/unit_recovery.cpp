@@ -1,0 +1,87 @@
+#include "daemon/appliance/unit_recovery.hpp"
+
+#include <fmt/format.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/config/config_section.hpp"
+#include "daemon/records/backup.hpp"
+#include "daemon/records/file_cipher.hpp"
+#include "daemon/records/store.hpp"
+#include "drivers/files/file_io.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxBytes = 64 << 10;
+
+std::string Confirm(int num_lost, const fs::path& state) {
+  FolderLock lock;
+  lock.Take(state);
+  ConfirmLostScans(state, num_lost);
+  return fmt::format("{} missing scans are confirmed as lost: the next start uses that", num_lost);
+}
+
+std::string Restore(const UnitRecovery& given, const fs::path& state,
+                    const fs::path& configured_key) {
+  std::optional<BackupSecret> secret;
+  if (!configured_key.empty()) {  // a stick with a key of its own would be a way around it
+    if (!given.key_file.empty())
+      throw DataError(fmt::format("the unit has a key for backups, {}: leave recovery.key_file out",
+                                  configured_key.string()));
+    secret.emplace(configured_key);
+  } else if (!given.key_file.empty()) {
+    secret.emplace(given.key_file, BackupSecret::Readers::kAny);
+  }
+  const BackupReport report = RestoreOver(given.backup, state, {}, secret ? &*secret : nullptr);
+  return fmt::format(
+      "restored from {}: {} scans, {} files; what was stored before is in {}",
+      given.backup.string(), report.scans, report.files,
+      report.replaced.empty() ? "no folder, there was nothing" : report.replaced.string());
+}
+
+}  // namespace
+
+UnitRecovery ReadUnitRecovery(const fs::path& file) {
+  const std::string name = file.string();
+  const toml::table root = ParseToml(ReadTextFile(file, kMaxBytes), name);
+  for (const auto& [key, node] : root) {
+    if (key.str() != "recovery")
+      throw DataError(fmt::format("{}:{}: unknown table or key '{}'; known is [recovery]", name,
+                                  node.source().begin.line, key.str()));
+  }
+  const auto is_path = [](const std::string& value) { return !value.empty(); };
+  UnitRecovery given;
+  std::string backup, key_file;
+  Section section(root, "recovery", name);
+  section.Take("lost_scans", given.lost_scans,
+               "the number of missing scans that the page names in safe mode, at least 2",
+               [](int number) { return number >= 2; });
+  section.Take("restore", backup, "the folder of a backup, or its file", is_path);
+  section.Take("key_file", key_file, "the name of a file with the key of the backup", is_path);
+  section.RejectUnknownKeys();
+  if (given.lost_scans.has_value() == !backup.empty())
+    throw DataError(fmt::format("{}: recovery: expected either lost_scans or restore", name));
+  if (backup.empty() && !key_file.empty())
+    throw DataError(fmt::format("{}: recovery.key_file belongs to restore", name));
+  const fs::path folder = fs::absolute(file).parent_path();
+  // An absolute path stays as it is.
+  if (!backup.empty()) given.backup = folder / backup;
+  if (!key_file.empty()) given.key_file = folder / key_file;
+  return given;
+}
+
+std::string RecoverUnit(const UnitRecovery& given, const fs::path& state,
+                        const fs::path& configured_key) {
+  try {
+    return given.lost_scans ? Confirm(*given.lost_scans, state)
+                            : Restore(given, state, configured_key);
+  } catch (const DatabaseBusy&) {
+    throw DataError(
+        fmt::format("a plumbd works with {}: there is nothing to recover, and nothing was changed",
+                    state.string()));
+  }
+}
+
+}  // namespace plumb

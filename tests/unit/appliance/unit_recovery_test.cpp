@@ -1,0 +1,120 @@
+#include "daemon/appliance/unit_recovery.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "algo/base/errors.hpp"
+#include "daemon/records/backup.hpp"
+#include "daemon/records/file_cipher.hpp"
+#include "tests/support/message_of.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/records/scan_folder.hpp"
+
+namespace plumb {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using testing::kAnna;
+using testing::MessageOf;
+
+class UnitRecoveryTest : public ::testing::Test {
+ protected:
+  UnitRecoveryTest() {
+    fs::create_directories(stick());
+    Store store(state());
+    const std::string patient = store.patients.Add(kAnna, "P", "");
+    for (int i = 0; i < 2; ++i) (void)testing::StoreScan(store, patient);
+  }
+  [[nodiscard]] fs::path stick() const { return folder_ / "stick"; }
+  [[nodiscard]] fs::path state() const { return folder_ / "state"; }
+  [[nodiscard]] UnitRecovery Read(const std::string& text) const {
+    WriteWholeFile(stick() / "plumb-recovery.toml", std::string_view(text));
+    return ReadUnitRecovery(stick() / "plumb-recovery.toml");
+  }
+  [[nodiscard]] std::string WhyNot(const std::string& text) const {
+    return MessageOf<DataError>([&] { (void)Read(text); });
+  }
+  /// @param name  On the stick; everybody may read it there.
+  fs::path KeyFile(const std::string& name, const std::string& line) const {
+    WriteWholeFile(stick() / name, std::string_view(line));
+    fs::permissions(stick() / name, fs::perms(0644));
+    return stick() / name;
+  }
+
+  testing::TempFolder folder_;
+};
+
+TEST_F(UnitRecoveryTest, PathsAreOfTheFilesFolder) {
+  const UnitRecovery lost = Read("[recovery]\nlost_scans = 12\n");
+  EXPECT_EQ(lost.lost_scans, 12);
+  EXPECT_EQ(lost.backup, "");
+  const UnitRecovery given = Read("[recovery]\nrestore = \"plumb-3\"\nkey_file = \"k\"\n");
+  EXPECT_EQ(given.lost_scans, std::nullopt);
+  EXPECT_EQ(given.backup, stick() / "plumb-3");
+  EXPECT_EQ(given.key_file, stick() / "k");
+  EXPECT_EQ(Read("[recovery]\nrestore = \"/var/lib/plumb-backup/plumb-3\"\n").backup,
+            "/var/lib/plumb-backup/plumb-3");
+}
+
+TEST_F(UnitRecoveryTest, AMistakeIsReportedWithItsLine) {
+  EXPECT_THAT(WhyNot(""), HasSubstr("either lost_scans or restore"));
+  EXPECT_THAT(WhyNot("[recovery]\nlost_scans = 2\nrestore = \"x\"\n"), HasSubstr("either"));
+  EXPECT_THAT(WhyNot("[recovery]\nlost_scans = 1\n"), HasSubstr("toml:2: recovery.lost_scans"));
+  EXPECT_THAT(WhyNot("[recovery]\nlost_scans = true\n"), HasSubstr("toml:2"));
+  EXPECT_THAT(WhyNot("[recovery]\nlost_scans = 2\nkey_file = \"x\"\n"), HasSubstr("belongs to"));
+  EXPECT_THAT(WhyNot("[recovery]\nrestore = \"\"\n"), HasSubstr("toml:2"));
+  EXPECT_THAT(WhyNot("[recovery]\nwipe = true\n"), HasSubstr("wipe"));
+  EXPECT_THAT(WhyNot("[unit]\nserial = \"1\"\n"), HasSubstr("unknown table or key 'unit'"));
+}
+
+TEST_F(UnitRecoveryTest, ABackupIsRestoredAndTheReplacedIsKept) {
+  (void)BackUpStopped(state(), stick() / "backup.tar");
+  WriteWholeFile(state() / "plumb.db", std::string_view("no database"));
+  EXPECT_THAT(RecoverUnit(Read("[recovery]\nrestore = \"backup.tar\"\n"), state(), {}),
+              HasSubstr("2 scans, 15 files; what was stored before is in " +
+                        (state() / "before-restore-1").string()));
+  EXPECT_EQ(testing::FilesBelow(state() / "before-restore-1").at("plumb.db"), "no database");
+  Store store(state());
+  EXPECT_EQ(store.patients.List().size(), 1U);
+  EXPECT_EQ(store.audit.Find({0, 10, "backup.restore"}).size(), 1U);
+}
+
+TEST_F(UnitRecoveryTest, AUnitThatWorksIsLeftAlone) {
+  (void)BackUpStopped(state(), stick() / "backup");
+  const Store store(state());
+  for (const char* text : {"[recovery]\nrestore = \"backup\"\n", "[recovery]\nlost_scans = 2\n"}) {
+    EXPECT_THAT(MessageOf<DataError>([&] { (void)RecoverUnit(Read(text), state(), {}); }),
+                HasSubstr("nothing was changed"));
+  }
+  EXPECT_FALSE(fs::exists(state() / "before-restore-1"));
+  EXPECT_FALSE(fs::exists(state() / "scans-are-lost"));
+}
+
+// Whoever has the stick need not have the key.
+TEST_F(UnitRecoveryTest, WithAConfiguredKeyAForeignBackupIsRefused) {
+  const fs::path key = KeyFile("key", "correct horse battery staple\n");
+  const fs::path configured = folder_ / "backup.key";
+  fs::copy(key, configured);
+  fs::permissions(configured, fs::perms(0600));
+  (void)BackUpStopped(state(), stick() / "plain");
+  {
+    const BackupSecret secret(configured);
+    (void)BackUpStopped(state(), stick() / "sealed", {}, &secret);
+  }
+  EXPECT_THAT(MessageOf<DataError>([&] {
+                (void)RecoverUnit(Read("[recovery]\nrestore = \"plain\"\n"), state(), configured);
+              }),
+              HasSubstr("not encrypted"));
+  const std::string with_key = "[recovery]\nrestore = \"sealed\"\nkey_file = \"key\"\n";
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)RecoverUnit(Read(with_key), state(), configured); }),
+              HasSubstr("leave recovery.key_file out"));
+  EXPECT_FALSE(fs::exists(state() / "before-restore-1"));
+  EXPECT_THAT(RecoverUnit(Read("[recovery]\nrestore = \"sealed\"\n"), state(), configured),
+              HasSubstr("2 scans"));
+  EXPECT_THAT(RecoverUnit(Read(with_key), state(), {}), HasSubstr("before-restore-2"))
+      << "a unit without its configuration takes the key from the stick";
+}
+
+}  // namespace
+}  // namespace plumb
