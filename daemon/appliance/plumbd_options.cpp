@@ -41,8 +41,8 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
                "Only drive the light, with the pattern for a service that is not running, until "
                "SIGTERM");
   app.add_option("--provision", options.provision,
-                 "Apply serial number, name, network and certificate of this unit from a file, and "
-                 "exit")
+                 "Apply serial number, name, network, certificate and display of this unit from a "
+                 "file, and exit")
       ->type_name("FILE");
   app.add_option("--unit", options.unit, "Folder in which --provision stores them")
       ->type_name("DIR")
