@@ -1,6 +1,7 @@
 // Opening what is stored, and safe mode while it cannot be used.
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -10,12 +11,29 @@
 
 #include "algo/base/errors.hpp"
 #include "daemon/appliance/appliance.hpp"
+#include "daemon/appliance/provisioning.hpp"
 #include "daemon/loop/log.hpp"
 #include "daemon/records/stored_values.hpp"
 
 namespace plumb {
 
 using store::kSelf;
+
+namespace {
+
+/// A display that cannot be paired keeps nobody from scanning.
+void PairProvisionedDisplay(const std::filesystem::path& state, Store& store) {
+  try {
+    const std::optional<web::Display> display = ProvisionedDisplay(state);
+    if (display && store.displays.AddProvisioned(*display))
+      Log(LogLevel::kNotice, "the display of the provisioning file is paired");
+  } catch (const std::exception& error) {
+    Log(LogLevel::kError,
+        fmt::format("the display of the provisioning file is not paired: {}", error.what()));
+  }
+}
+
+}  // namespace
 
 /// On any thread. @throws IoError and its kinds
 std::unique_ptr<Store> Appliance::OpenForWork(const std::filesystem::path& state,
@@ -24,6 +42,7 @@ std::unique_ptr<Store> Appliance::OpenForWork(const std::filesystem::path& state
   auto store = std::make_unique<Store>(state, options);
   // Sessions end with the process: the patient on the couch has to be confirmed again.
   store->treatments.CloseAll(kSelf);
+  PairProvisionedDisplay(state, *store);
   return store;
 }
 

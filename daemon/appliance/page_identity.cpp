@@ -119,13 +119,16 @@ std::string ReadOrMakeSecret(const fs::path& file, const std::function<std::stri
   return ReadTextFile(file, kMaxBytes);
 }
 
-void KeepPageIdentity(const fs::path& state, const web::TlsIdentity& identity) {
-  const fs::path file = state / kKeyFile;
-  WriteSecret(file, fmt::format("{}\n{}", identity.certificate_pem, identity.key_pem));
+void KeepSecret(const fs::path& file, const std::string& contents) {
+  WriteSecret(file, contents);
   struct stat folder {};
-  if (::geteuid() == 0 && (::stat(state.c_str(), &folder) != 0 ||
+  if (::geteuid() == 0 && (::stat(file.parent_path().c_str(), &folder) != 0 ||
                            ::chown(file.c_str(), folder.st_uid, folder.st_gid) != 0))
     throw IoError(DescribeWriteError(file, errno));
+}
+
+void KeepPageIdentity(const fs::path& state, const web::TlsIdentity& identity) {
+  KeepSecret(state / kKeyFile, fmt::format("{}\n{}", identity.certificate_pem, identity.key_pem));
 }
 
 void CheckPageIdentity(const WebConfig& web) {

@@ -27,6 +27,10 @@ struct PageNotes {
 [[nodiscard]] std::string ReadOrMakeSecret(const std::filesystem::path& file,
                                            const std::function<std::string()>& make);
 
+/// Writes such a file in one step, with the owner of its folder.
+/// @throws IoError
+void KeepSecret(const std::filesystem::path& file, const std::string& contents);
+
 /// @throws DataError for keys of [web] that do not fit together, or a certificate or key that
 ///         cannot be used.
 void CheckPageIdentity(const WebConfig& web);

@@ -41,8 +41,8 @@ void AddPlumbdOptions(CLI::App& app, PlumbdOptions& options) {
                "Only drive the light, with the pattern for a service that is not running, until "
                "SIGTERM");
   app.add_option("--provision", options.provision,
-                 "Apply serial number, name, network and certificate of this unit from a file, and "
-                 "exit")
+                 "Apply serial number, name, network, certificate and display of this unit from a "
+                 "file, and exit")
       ->type_name("FILE");
   app.add_option("--recover", options.recover,
                  "Confirm lost scans, or restore a backup, as a file says, for a state folder that "

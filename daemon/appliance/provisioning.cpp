@@ -18,6 +18,7 @@
 #include "daemon/config/config_section.hpp"
 #include "daemon/files/atomic_folder.hpp"
 #include "drivers/files/file_io.hpp"
+#include "web/security/sessions.hpp"
 
 namespace plumb {
 namespace {
@@ -26,6 +27,8 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxBytes = 64 << 10;
 constexpr std::size_t kMaxServers = 8;
+constexpr std::size_t kKeyDigits = 64;  // 32 random bytes; no longer, because it becomes a cookie
+constexpr const char* kDisplayFile = "provisioned-display";  // the hash of its key, and its name
 
 bool IsWord(std::string_view text, std::string_view also, std::size_t longest) {
   return !text.empty() && text.size() <= longest &&
@@ -33,6 +36,21 @@ bool IsWord(std::string_view text, std::string_view also, std::size_t longest) {
            return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
                   also.find(static_cast<char>(c)) != std::string_view::npos;
          });
+}
+
+bool IsHex(std::string_view text, std::size_t digits) {
+  return text.size() == digits && std::all_of(text.begin(), text.end(), [](char c) {
+           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
+         });
+}
+
+/// The name of a file, with nothing outside the folder of the file that names it.
+bool IsPlainFile(const std::string& name) {
+  return IsWord(name, "._-", 128) && name.front() != '.';
+}
+
+bool IsDisplayName(const std::string& name) {
+  return IsWord(name, " ._-", 32) && name.front() != ' ' && name.back() != ' ';
 }
 
 /// 32 or 128 bits, or nothing.
@@ -92,11 +110,9 @@ void ReadNetwork(Section section, const std::string& name, Provisioning& given) 
 
 void ReadPage(Section section, const fs::path& file, Provisioning& given) {
   std::string certificate, key;
-  const auto is_plain = [](const std::string& name) {  // nothing outside the file's folder
-    return IsWord(name, "._-", 128) && name.front() != '.';
-  };
-  section.Take("certificate", certificate, "the name of a PEM file in the same folder", is_plain);
-  section.Take("key", key, "the name of a PEM file in the same folder", is_plain);
+  section.Take("certificate", certificate, "the name of a PEM file in the same folder",
+               IsPlainFile);
+  section.Take("key", key, "the name of a PEM file in the same folder", IsPlainFile);
   section.RejectUnknownKeys();
   if (certificate.empty() != key.empty())
     throw DataError(fmt::format("{}: page: certificate and key are given together", file.string()));
@@ -105,6 +121,43 @@ void ReadPage(Section section, const fs::path& file, Provisioning& given) {
   given.page = web::CheckedTlsIdentity(ReadTextFile(folder / certificate, kMaxBytes),
                                        ReadTextFile(folder / key, kMaxBytes),
                                        (folder / certificate).string());
+}
+
+/// The messages say how long a wrong key is, but show nothing of it.
+std::string CheckedDisplayKey(const fs::path& file) {
+  std::string key = ReadTextFile(file, kMaxBytes);
+  while (!key.empty() && (key.back() == '\n' || key.back() == '\r')) key.pop_back();
+  if (IsHex(key, kKeyDigits)) return key;
+  throw DataError(fmt::format(
+      "{}: expected {} digits 0-9 and a-f in one line (openssl rand -hex 32), found {}",
+      file.string(), kKeyDigits,
+      key.size() == kKeyDigits ? "another character" : fmt::format("{} characters", key.size())));
+}
+
+void ReadDisplay(Section section, const toml::table& root, const fs::path& file,
+                 Provisioning& given) {
+  std::string name, key_file;
+  section.Take("name", name, "1 to 32 letters, digits, ' ', '.', '_' and '-'", IsDisplayName);
+  section.Take("key_file", key_file, "the name of a file in the same folder", IsPlainFile);
+  section.RejectUnknownKeys();
+  if (name.empty() != key_file.empty())
+    throw DataError(
+        fmt::format("{}: display: name and key_file are given together", file.string()));
+  if (name.empty()) return;
+  try {
+    const std::string key = CheckedDisplayKey(file.parent_path() / key_file);
+    given.display = web::Display{
+        .id = {},
+        .name = name,
+        .token_hash = web::StoredHashOf(key),
+        .paired_at = {},
+        .paired_by = {},
+    };
+  } catch (const DataError& error) {
+    throw DataError(fmt::format("{}:{}: display.key_file: {}", file.string(),
+                                root["display"]["key_file"].node()->source().begin.line,
+                                error.what()));
+  }
 }
 
 void Put(const fs::path& file, const std::string& text) {
@@ -122,10 +175,11 @@ Provisioning ReadProvisioning(const fs::path& file) {
   const std::string name = file.string();
   const toml::table root = ParseToml(ReadTextFile(file, kMaxBytes), name);
   for (const auto& [key, node] : root) {
-    if (key.str() != "unit" && key.str() != "network" && key.str() != "page")
-      throw DataError(
-          fmt::format("{}:{}: unknown table or key '{}'; known are [unit], [network], [page]", name,
-                      node.source().begin.line, key.str()));
+    if (key.str() != "unit" && key.str() != "network" && key.str() != "page" &&
+        key.str() != "display")
+      throw DataError(fmt::format(
+          "{}:{}: unknown table or key '{}'; known are [unit], [network], [page], [display]", name,
+          node.source().begin.line, key.str()));
   }
   Provisioning given;
   Section unit(root, "unit", name);
@@ -136,6 +190,7 @@ Provisioning ReadProvisioning(const fs::path& file) {
   unit.RejectUnknownKeys();
   ReadNetwork(Section(root, "network", name), name, given);
   ReadPage(Section(root, "page", name), file, given);
+  ReadDisplay(Section(root, "display", name), root, file, given);
   return given;
 }
 
@@ -159,8 +214,28 @@ void ApplyProvisioning(const Provisioning& given, const fs::path& unit, const fs
       given.time_servers.empty()
           ? ""
           : fmt::format("[Time]\nNTP={}\n", fmt::join(given.time_servers, " ")));
-  if (!given.page) return;
-  KeepPageIdentity(state, *given.page);
+  if (given.page) KeepPageIdentity(state, *given.page);
+  if (given.display)
+    KeepSecret(state / kDisplayFile,
+               fmt::format("{} {}\n", given.display->token_hash, given.display->name));
+}
+
+std::optional<web::Display> ProvisionedDisplay(const fs::path& state) {
+  const fs::path file = state / kDisplayFile;
+  std::error_code ignored;
+  if (fs::symlink_status(file, ignored).type() == fs::file_type::not_found) return std::nullopt;
+  std::string text = ReadTextFile(file, kMaxBytes);
+  if (text.ends_with('\n')) text.pop_back();
+  const std::size_t space = std::min(text.find(' '), text.size());
+  web::Display display{.id = {},
+                       .name = text.substr(std::min(space + 1, text.size())),
+                       .token_hash = text.substr(0, space),
+                       .paired_at = {},
+                       .paired_by = {}};
+  if (!IsHex(display.token_hash, kKeyDigits) || !IsDisplayName(display.name))
+    throw DataError(fmt::format("{}: expected a hash of {} digits and a name, found {} characters",
+                                file.string(), kKeyDigits, text.size()));
+  return display;
 }
 
 }  // namespace plumb

@@ -1,5 +1,5 @@
 // Settings of one unit by the factory or a hospital's network administrator, before anybody can log
-// in: serial number, name, network and certificate, in one file.
+// in: serial number, name, network, certificate and the display in the room, in one file.
 #pragma once
 
 #include <filesystem>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "web/security/tls_identity.hpp"
+#include "web/service/service_types.hpp"
 
 namespace plumb {
 
@@ -18,9 +19,10 @@ struct Provisioning {
   std::string gateway;
   std::vector<std::string> dns, time_servers;
   std::optional<web::TlsIdentity> page;  ///< Certificate and key of the page.
+  std::optional<web::Display> display;   ///< Its name and the hash of its key.
 };
 
-/// Reads and checks the whole file; the PEM files that it names are in its folder.
+/// Reads and checks the whole file; the files that it names are in its folder.
 /// @throws DataError naming file, line, what was expected and found.
 [[nodiscard]] Provisioning ReadProvisioning(const std::filesystem::path& file);
 
@@ -28,10 +30,13 @@ struct Provisioning {
 [[nodiscard]] std::string NetworkFile(const Provisioning& given);
 
 /// Writes the given settings, each file in one step: `serial`, `host-name`, `network`,
-/// `time-servers` to `unit`, the page's key to `state` with that folder's owner. Settings that are
-/// not given are removed from `unit`.
+/// `time-servers` to `unit`, the page's key and the display to `state` with that folder's owner.
+/// Settings that are not given are removed from `unit`.
 /// @throws IoError
 void ApplyProvisioning(const Provisioning& given, const std::filesystem::path& unit,
                        const std::filesystem::path& state);
+
+/// The display that ApplyProvisioning() wrote, if any. @throws DataError
+[[nodiscard]] std::optional<web::Display> ProvisionedDisplay(const std::filesystem::path& state);
 
 }  // namespace plumb

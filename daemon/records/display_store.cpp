@@ -10,6 +10,20 @@ using store::Now;
 using store::ParseId;
 using web::ChangeResult;
 
+namespace {
+
+void Insert(StoreChange& change, const web::Actor& actor, const web::Display& display) {
+  change
+      .Prepare("INSERT INTO displays (name, token_hash, paired_at, paired_by) VALUES (?, ?, ?, ?)")
+      .Bind(display.name)
+      .Bind(display.token_hash)
+      .Bind(Now())
+      .Bind(actor.user)
+      .Run();
+}
+
+}  // namespace
+
 std::vector<web::Display> DisplayStore::List() {
   const StoreDatabase::Held rows = database_.ForRows();
   Statement query = rows->Prepare(
@@ -27,17 +41,30 @@ std::vector<web::Display> DisplayStore::List() {
 
 std::string DisplayStore::Add(const web::Actor& actor, const web::Display& display) {
   StoreChange change(database_);
-  change
-      .Prepare("INSERT INTO displays (name, token_hash, paired_at, paired_by) VALUES (?, ?, ?, ?)")
-      .Bind(display.name)
-      .Bind(display.token_hash)
-      .Bind(Now())
-      .Bind(actor.user)
-      .Run();
+  Insert(change, actor, display);
   const std::string id = std::to_string(change.last_id());
   change.Log(actor, "display.pair", display.name, "");
   change.Commit();
   return id;
+}
+
+bool DisplayStore::AddProvisioned(const web::Display& display) {
+  StoreChange change(database_);
+  // Not in the table of displays, so that the key stays known when its display is removed.
+  change.Prepare("INSERT OR IGNORE INTO settings (name, value) VALUES (?, ?)")
+      .Bind("display-key " + display.token_hash)
+      .Bind(display.name)
+      .Run();
+  if (change.num_changed() == 0) return false;
+  {
+    Statement query = change.Prepare("SELECT COUNT(*) FROM displays");
+    if (query.Step() && query.Integer(0) >= static_cast<std::int64_t>(web::kMaxDisplays))
+      throw StoreRefusal(ChangeResult::kConflict, "20 screens are paired already");
+  }
+  Insert(change, store::kSelf, display);
+  change.Log(store::kSelf, "display.provision", display.name, "");
+  change.Commit();
+  return true;
 }
 
 void DisplayStore::Remove(const web::Actor& actor, const std::string& id) {

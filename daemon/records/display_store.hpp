@@ -16,6 +16,9 @@ class DisplayStore {
 
   [[nodiscard]] std::vector<web::Display> List();
   std::string Add(const web::Actor& actor, const web::Display& display);  ///< Returns the id.
+  /// Adds the display of the provisioning file. Its key counts once: false, and nothing is changed,
+  /// if it was added before, even if the display has been removed since.
+  bool AddProvisioned(const web::Display& display);
   void Remove(const web::Actor& actor, const std::string& id);
 
  private:

@@ -29,7 +29,8 @@ constexpr const char* kKeep = "keep_records";
 constexpr const char* kWipe = "wipe";
 constexpr const char* kOfFileSystem = "lost+found";  // root's, on the root of a disk
 /// Items beside the database that are neither records nor belong to the sensor.
-constexpr std::array kOfPageAndUpdates = {"page-key.pem", "device.key", "updates"};
+constexpr std::array kOfPageAndUpdates = {"page-key.pem", "device.key", "provisioned-display",
+                                          "updates"};
 
 struct Request {
   FactoryReset kind = FactoryReset::kKeepRecords;

@@ -256,6 +256,54 @@ TEST_F(DaemonWebTest, OffLoopbackItIsServedByTlsWithACertificateOfItsOwnThatStay
   EXPECT_EQ(fs::status(folder_ / "state" / "device.key").permissions(), fs::perms(0600));
 }
 
+TEST_F(DaemonWebTest, AProvisionedDisplaySeesChangesNothingAndStaysRemoved) {
+  const std::string key = std::string(60, '0') + "beef";
+  std::ofstream(folder_ / "display.key") << key << '\n';
+  std::ofstream(folder_ / "plumb-provision.toml")
+      << "[display]\nname = \"Room 1\"\nkey_file = \"display.key\"\n";
+  fs::create_directory(folder_ / "state");
+  const RunResult taken =
+      plumb::Run({PLUMBD_BINARY, "--state", folder_ / "state", "--provision",
+                  folder_ / "plumb-provision.toml", "--unit", folder_ / "unit"});
+  ASSERT_EQ(taken.exit_code, 0) << taken.err;
+  const auto claim = [&](HttpClient& client) {
+    return client.Post("/api/v1/displays/claim", {{"secret", key}}).status;
+  };
+  for (const bool is_first : {true, false}) {
+    Plumbd plumbd(folder_.path());
+    ASSERT_TRUE(plumbd.WaitUntilUp());
+    HttpClient display(plumbd.port()), engineer(plumbd.port());
+    if (is_first) {
+      const json first = {
+          {"code", plumbd.setup_code()}, {"name", "engineer"}, {"password", kPassword}};
+      ASSERT_EQ(engineer.Post("/api/v1/setup", first).status, 200);
+    }
+    ASSERT_EQ(engineer.LogIn("engineer", kPassword), 200);
+    ASSERT_EQ(claim(display), 200);
+    display.FetchToken();
+    EXPECT_EQ(display.Get("/api/v1/session").json()["role"], "display");
+    EXPECT_EQ(display.Get("/api/v1/status").status, 200);
+    EXPECT_EQ(display.Post("/api/v1/press").status, 403);
+    EXPECT_EQ(display.Get("/api/v1/patients").status, 403);
+    const json paired = engineer.Get("/api/v1/displays").json()["displays"];
+    ASSERT_EQ(paired.size(), 1U) << "the next start pairs nothing twice";
+    EXPECT_EQ(paired[0]["name"], "Room 1");
+    if (!is_first) {
+      EXPECT_EQ(engineer.Ask("DELETE", "/api/v1/displays/" + paired[0]["id"].get<std::string>(), "")
+                    .status,
+                200);
+      EXPECT_EQ(display.Get("/api/v1/status").status, 401);
+      EXPECT_EQ(claim(display), 404);
+    }
+    EXPECT_EQ(plumbd.Stop(), 0);
+    EXPECT_THAT(plumbd.log(), ::testing::Not(HasSubstr(key)));
+  }
+  Plumbd plumbd(folder_.path());
+  ASSERT_TRUE(plumbd.WaitUntilUp());
+  HttpClient display(plumbd.port());
+  EXPECT_EQ(claim(display), 404) << "what was removed stays removed";
+}
+
 TEST_F(DaemonWebTest, TheEndOfItsCertificateIsToldFromThirtyDaysBefore) {
   std::ofstream(folder_ / "plumb.toml")
       << fmt::format("[web]\ntls_certificate = '{}'\ntls_key = '{}'\n",

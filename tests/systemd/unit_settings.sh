@@ -35,6 +35,16 @@ run
 check "a mistake is reported with its line" 'plumb-provision.toml:2: network.address: expected an address with its prefix' "$(cat out)"
 check "and the unit keeps what it had" 'Address=10.1.1.5/8' "$(cat run/systemd/network/10-plumb.network)"
 
+printf '[network]\naddress = "10.1.1.5/8"\n[display]\nname = "Room 1"\nkey_file = "display.key"\n' >data/provision/plumb-provision.toml
+printf '%063d' 0 >data/provision/display.key
+run
+check "a display's key that is too short is reported with its line" 'plumb-provision.toml:5: display.key_file: .* expected 64 digits .* found 63 characters' "$(cat out)"
+check "and nothing is taken over" '^$' "$(ls state)"
+printf '%064d\n' 0 >data/provision/display.key
+run
+check "a display: its name is kept for the owner alone, its key is not" '^0 .* 600 [0-9a-f]{64} Room 1$' "$code $(cat out) $(stat -c %a state/provisioned-display) $(cat state/provisioned-display)"
+check "and shown nowhere" '^none$' "$(grep -rq 0000000000 out state || echo none)"
+
 printf '[unit]\nhost_name = "stranger"\n' >stick/plumb-provision.toml
 run stick "$work/stick"
 check "a stick changes nothing on a unit that has been provisioned" '^0 .*left alone.* first$' "$code $(cat out) $(cat host-name)"

@@ -88,6 +88,25 @@ await h.step('the room display is paired by the code that it shows, and changes 
   }
 });
 
+await h.step('a link with the key pairs a display without a code, and does not keep the key', async () => {
+  // Another pairing's secret is as good a key as that of a provisioning file.
+  const { code, secret } = await ok(engineer, 'displays/pair', 'POST');
+  const wall = await h.person('wall', { width: 1280, height: 800 });
+  await wall.goto(`${h.url}room#key=${secret}`);
+  await wall.locator('.pair-code').waitFor();
+  equal(new URL(wall.url()).hash, '', 'a key that is not paired is not kept either');
+  await ok(engineer, 'displays', 'POST', { code, name: 'wall' });
+  await wall.goto(`${h.url}room?theme=light#key=${secret}`);
+  await wall.locator('.room-code').waitFor();
+  equal(new URL(wall.url()).search + new URL(wall.url()).hash, '?theme=light', 'the address has no key');
+  equal((await h.api(wall, 'press', 'POST')).status, 403, 'it changes nothing');
+  await engineer.goto(`${h.url}#/users`);
+  await engineer.reload();
+  await engineer.getByRole('button', { name: 'Remove wall' }).click();
+  await wall.locator('.pair-code').waitFor(kSlow);
+  await wall.context().close();
+});
+
 await h.step('one tap opens, confirms and leads to the sweep; the room says whose session', async () => {
   await openOnPage(anna, 'P-0042');
   await anna.getByRole('button', { name: /Start sweep|Scan again/ }).waitFor();

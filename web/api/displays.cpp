@@ -1,11 +1,9 @@
 #include "web/api/displays.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <sodium.h>
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "web/api/accounts.hpp"
@@ -16,7 +14,6 @@ namespace plumb::web {
 namespace {
 
 constexpr std::size_t kMaxWaiting = 8;
-constexpr std::size_t kMaxDisplays = 20;
 constexpr std::chrono::minutes kWaitsFor{10};
 constexpr int kMaxWrongCodes = 20;
 constexpr int kCookieAge_s =
@@ -31,13 +28,6 @@ std::string MakeCode() {
     code += kLetters[randombytes_uniform(static_cast<std::uint32_t>(kLetters.size()))];
   }
   return code;
-}
-
-std::string HashOf(const std::string& token) {
-  std::array<unsigned char, crypto_generichash_BYTES> hash{};
-  crypto_generichash(hash.data(), hash.size(), reinterpret_cast<const unsigned char*>(token.data()),
-                     token.size(), nullptr, 0);
-  return fmt::format("{:02x}", fmt::join(hash, ""));
 }
 
 }  // namespace
@@ -65,7 +55,7 @@ void Displays::Load() {
 std::shared_ptr<Session> Displays::SessionOf(const Request& request) {
   const auto token = CookieValue(request.Header("cookie"), cookie_name());
   if (!token || token->empty() || token->size() > 64) return nullptr;
-  const auto found = sessions_.find(HashOf(*token));
+  const auto found = sessions_.find(StoredHashOf(*token));
   return found == sessions_.end() ? nullptr : found->second;
 }
 
@@ -98,7 +88,7 @@ void Displays::Begin(const Request&, const Respond& respond) {
   if (pairings_.size() >= kMaxWaiting)
     return respond(ErrorResponse(503, "too many screens wait to be paired; try again later"));
   const std::string token = RandomToken(32);
-  pairings_.push_back({.code = MakeCode(), .token_hash = HashOf(token), .begun = now_()});
+  pairings_.push_back({.code = MakeCode(), .token_hash = StoredHashOf(token), .begun = now_()});
   Response response;
   response.body = Dump({{"code", pairings_.back().code}, {"secret", token}});
   respond(std::move(response));
@@ -109,7 +99,7 @@ void Displays::Claim(const Request& request, const Respond& respond) {
   const std::string token = fields.Text("secret", 1, 64);
   fields.Finish();
   Expire();
-  const std::string hash = HashOf(token);
+  const std::string hash = StoredHashOf(token);
   if (sessions_.contains(hash)) {
     Response response;
     response.headers.emplace_back(

@@ -40,6 +40,15 @@ std::string RandomToken(std::size_t bytes) {
   return text;
 }
 
+std::string StoredHashOf(const std::string& token) {
+  const std::string hash = HashOf(token);
+  std::string text(2 * hash.size() + 1, '\0');
+  sodium_bin2hex(text.data(), text.size(), reinterpret_cast<const unsigned char*>(hash.data()),
+                 hash.size());
+  text.pop_back();  // its terminating zero
+  return text;
+}
+
 bool Sessions::IsOver(const Session& session, TimePoint now) const {
   return session.ended || now - session.last_used >= idle_ || now - session.begun >= whole_;
 }

@@ -25,6 +25,9 @@ struct Session {
 /// Random text from that many bytes of the system's generator, in letters, digits, '-' and '_'.
 [[nodiscard]] std::string RandomToken(std::size_t bytes);
 
+/// The hash by which a display's token is stored, in hexadecimal digits.
+[[nodiscard]] std::string StoredHashOf(const std::string& token);
+
 /// That many bytes from the same generator.
 [[nodiscard]] std::string RandomBytes(std::size_t bytes);
 

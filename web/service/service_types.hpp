@@ -165,6 +165,8 @@ struct WaitingReference {
   std::string planned_by;  ///< Empty: it is to be planned; otherwise it is to be approved.
 };
 
+inline constexpr std::size_t kMaxDisplays = 20;
+
 /// A paired display in the room, which cannot change anything.
 struct Display {
   std::string id;

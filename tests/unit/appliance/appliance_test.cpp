@@ -2,6 +2,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <filesystem>
 #include <functional>
 #include <future>
 #include <optional>
@@ -14,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/records/check_json.hpp"
+#include "drivers/files/file_io.hpp"
 #include "tests/unit/appliance/appliance_fixture.hpp"
 #include "web/api/json.hpp"
 
@@ -369,6 +371,31 @@ TEST_F(ApplianceTest, ARollBackIsToldByStatusAndLightUntilItIsSeen) {
     On([&] {
       appliance_->SetRolledBack({});
       EXPECT_EQ(appliance_->WebStatus().light, "ready");
+    });
+  });
+}
+
+TEST_F(ApplianceTest, TheProvisionedDisplayIsPairedWhenItsStoreOpens) {
+  std::filesystem::create_directories(folder_ / "state");
+  WriteWholeFile(folder_ / "state" / "provisioned-display", std::string(64, 'a') + " Room 1\n");
+  Play([&] {
+    On([&] {
+      const std::vector<web::Display> paired = appliance_->store()->displays.List();
+      ASSERT_EQ(paired.size(), 1U);
+      EXPECT_EQ(paired[0].name, "Room 1");
+      EXPECT_EQ(paired[0].token_hash, std::string(64, 'a'));
+    });
+  });
+}
+
+TEST_F(ApplianceTest, AProvisionedDisplayThatCannotBeReadKeepsNobodyFromScanning) {
+  std::filesystem::create_directories(folder_ / "state");
+  WriteWholeFile(folder_ / "state" / "provisioned-display", std::string(63, 'a') + " Room 1\n");
+  Play([&] {
+    MakeReady();
+    On([&] {
+      EXPECT_EQ(appliance_->storage_fault(), "");
+      EXPECT_TRUE(appliance_->store()->displays.List().empty());
     });
   });
 }

@@ -2,6 +2,8 @@
 
 #include <sys/stat.h>
 
+#include <optional>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +11,7 @@
 #include "drivers/files/file_io.hpp"
 #include "tests/support/message_of.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "web/security/sessions.hpp"
 
 namespace plumb {
 namespace {
@@ -36,6 +39,13 @@ class ProvisioningTest : public ::testing::Test {
     ApplyProvisioning(given, folder_ / "unit", folder_ / "state");
   }
 
+  /// A file with a display of that name, whose key is in display.key.
+  std::string DisplayWithKey(const std::string& key, const std::string& name = "Room 1") {
+    WriteWholeFile(folder_ / "display.key", key);
+    return "[display]\nname = \"" + name + "\"\nkey_file = \"display.key\"\n";
+  }
+
+  const std::string kKey = std::string(60, '0') + "beef";
   testing::TempFolder folder_;
   const fs::path file_ = folder_ / "plumb-provision.toml";
 };
@@ -89,19 +99,83 @@ TEST_F(ProvisioningTest, BothSidesOfEachBound) {
 }
 
 TEST_F(ProvisioningTest, NothingHostileIsTakenOver) {
-  for (const char* bad :
-       {"[unit]\nserial = \"a b\"", "[unit]\nserial = 7", "[unit]\nserial = \"\"",
-        "[unit]\nhost_name = \"-a\"", "[unit]\nhost_name = \"a.b\"", "[unit]\ncolour = \"red\"",
-        "[network]\ngateway = \"10.0.0.1\"", "[network]\ndns = [\"10.0.0.1\"]",
-        "[network]\naddress = \"10.0.0.5/8\"\ndns = [\"10.0.0.1\\nX=1\"]",
-        "[network]\ntime_servers = [\"a b\"]", "[page]\ncertificate = \"page.pem\"",
-        "[page]\ncertificate = \"../page.pem\"\nkey = \"page.key\"",
-        "[page]\ncertificate = \"/etc/shadow\"\nkey = \"page.key\"",
-        "[page]\ncertificate = \"none.pem\"\nkey = \"none.key\"", "[rooms]", "unit = 1", "[unit",
-        "a = 1"})
+  for (const char* bad : {"[unit]\nserial = \"a b\"",
+                          "[unit]\nserial = 7",
+                          "[unit]\nserial = \"\"",
+                          "[unit]\nhost_name = \"-a\"",
+                          "[unit]\nhost_name = \"a.b\"",
+                          "[unit]\ncolour = \"red\"",
+                          "[network]\ngateway = \"10.0.0.1\"",
+                          "[network]\ndns = [\"10.0.0.1\"]",
+                          "[network]\naddress = \"10.0.0.5/8\"\ndns = [\"10.0.0.1\\nX=1\"]",
+                          "[network]\ntime_servers = [\"a b\"]",
+                          "[page]\ncertificate = \"page.pem\"",
+                          "[page]\ncertificate = \"../page.pem\"\nkey = \"page.key\"",
+                          "[page]\ncertificate = \"/etc/shadow\"\nkey = \"page.key\"",
+                          "[page]\ncertificate = \"none.pem\"\nkey = \"none.key\"",
+                          "[display]\nname = \"Room 1\"",
+                          "[display]\nkey_file = \"display.key\"",
+                          "[display]\nkey = \"secret\"",
+                          "display = 1",
+                          "[display]\nname = \"a\"\nkey_file = \"none.key\"",
+                          "[display]\nname = \"a\"\nkey_file = \"../display.key\"",
+                          "[display]\nname = \"a\"\nkey_file = \"/etc/shadow\"",
+                          "[display]\nname = \"a\"\nkey_file = \".\"",
+                          "[rooms]",
+                          "unit = 1",
+                          "[unit",
+                          "a = 1"})
     EXPECT_THAT(WhyNot(bad), HasSubstr(folder_.path().string())) << bad;
   EXPECT_THAT(MessageOf<DataError>([&] { (void)ReadProvisioning(folder_ / "none"); }),
               HasSubstr("none"));
+}
+
+TEST_F(ProvisioningTest, ADisplayIsKeptByNameAndHashForTheOwnerAloneAndItsKeyIsNot) {
+  const Provisioning given = Read(DisplayWithKey(kKey + "\n"));
+  ASSERT_TRUE(given.display);
+  EXPECT_EQ(given.display->name, "Room 1");
+  EXPECT_EQ(given.display->token_hash, web::StoredHashOf(kKey)) << "without the end of the line";
+  EXPECT_EQ(Read(DisplayWithKey(kKey + "\r\n")).display->token_hash, given.display->token_hash);
+  EXPECT_FALSE(ProvisionedDisplay(folder_ / "state"));
+  Apply(given);
+  const std::optional<web::Display> kept = ProvisionedDisplay(folder_ / "state");
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->name, "Room 1");
+  EXPECT_EQ(kept->token_hash, given.display->token_hash);
+  const fs::path file = folder_ / "state" / "provisioned-display";
+  EXPECT_EQ(ReadTextFile(file, 4096).find(kKey), std::string::npos);
+  struct stat status {};
+  ASSERT_EQ(::stat(file.c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777, 0600U);
+  Apply(Read(""));
+  EXPECT_TRUE(ProvisionedDisplay(folder_ / "state")) << "like the page's key";
+  WriteWholeFile(file, "damaged");
+  EXPECT_THAT(MessageOf<DataError>([&] { (void)ProvisionedDisplay(folder_ / "state"); }),
+              HasSubstr("provisioned-display: expected a hash"));
+}
+
+TEST_F(ProvisioningTest, ADisplaysKeyAndNameOnBothSidesOfEachBound) {
+  for (const std::size_t digits : {0U, 1U, 63U, 65U})
+    EXPECT_THAT(WhyNot(DisplayWithKey(std::string(digits, 'a'))),
+                HasSubstr("plumb-provision.toml:3: display.key_file: " +
+                          (folder_ / "display.key").string() +
+                          ": expected 64 digits 0-9 and a-f in one line (openssl rand -hex 32), "
+                          "found " +
+                          std::to_string(digits) + " characters"));
+  for (const char other : {'g', 'A', ' ', '\n', '\0', '/', ':', '`'}) {
+    std::string key = kKey;
+    key[5] = other;
+    const std::string why = WhyNot(DisplayWithKey(key));
+    EXPECT_THAT(why, HasSubstr("found another character")) << other;
+    EXPECT_EQ(why.find("beef"), std::string::npos) << "the key is in no message";
+  }
+  for (const std::string& good : {std::string(32, 'a'), std::string("R"), std::string("a b._-9")})
+    EXPECT_EQ(Read(DisplayWithKey(kKey, good)).display->name, good);
+  for (const std::string& bad : {std::string(33, 'a'), std::string(), std::string(" a"),
+                                 std::string("a "), std::string("a\\nb"), std::string("a<b")})
+    EXPECT_THAT(WhyNot(DisplayWithKey(kKey, bad)),
+                HasSubstr("plumb-provision.toml:2: display.name: expected 1 to 32 letters"))
+        << bad;
 }
 
 TEST_F(ProvisioningTest, AKeyOfAnotherCertificateIsRefused) {

@@ -198,5 +198,57 @@ TEST_F(StoreSessionsTest, PairedScreensStayOverARestart) {
   EXPECT_EQ(RefusalOf([&] { store.displays.Remove(kBert, "1"); }), ChangeResult::kNotFound);
 }
 
+TEST_F(StoreSessionsTest, AProvisionedScreenIsPairedOnceForEachKey) {
+  web::Display display{
+      .id = {}, .name = "Room 1", .token_hash = "ab", .paired_at = {}, .paired_by = {}};
+  {
+    Store store(folder_ / "state");
+    EXPECT_TRUE(store.displays.AddProvisioned(display));
+    EXPECT_FALSE(store.displays.AddProvisioned(display));
+  }
+  {
+    Store store(folder_ / "state");
+    display.name = "Room 2";
+    EXPECT_FALSE(store.displays.AddProvisioned(display)) << "the same key, whatever its name";
+    ASSERT_THAT(store.displays.List(), SizeIs(1));
+    EXPECT_EQ(store.displays.List()[0].name, "Room 1");
+    EXPECT_EQ(store.displays.List()[0].token_hash, "ab");
+    EXPECT_EQ(store.displays.List()[0].paired_by, "plumbd");
+    store.displays.Remove(kBert, store.displays.List()[0].id);
+  }
+  Store store(folder_ / "state");
+  EXPECT_FALSE(store.displays.AddProvisioned(display)) << "what was removed stays removed";
+  EXPECT_THAT(store.displays.List(), SizeIs(0));
+  display.token_hash = "cd";
+  EXPECT_TRUE(store.displays.AddProvisioned(display)) << "a new key";
+  EXPECT_THAT(store.displays.List(), SizeIs(1));
+  const auto log = store.audit.Find({0, 10, "display."});
+  ASSERT_THAT(log, SizeIs(3)) << "newest first";
+  EXPECT_EQ(log[0].action, "display.provision");
+  EXPECT_EQ(log[0].subject, "Room 2");
+  EXPECT_EQ(log[1].action, "display.remove");
+  EXPECT_EQ(log[2].action, "display.provision");
+  EXPECT_EQ(log[2].user, "plumbd");
+  EXPECT_EQ(log[2].detail, "") << "nothing of the key";
+}
+
+TEST_F(StoreSessionsTest, AProvisionedScreenThatHasNoPlaceIsPairedOnceThereIsOne) {
+  Store store(folder_ / "state");
+  const auto screen = [](std::size_t number) {
+    return web::Display{.id = {},
+                        .name = "screen",
+                        .token_hash = std::to_string(number),
+                        .paired_at = {},
+                        .paired_by = {}};
+  };
+  for (std::size_t i = 0; i < web::kMaxDisplays; ++i) (void)store.displays.Add(kAnna, screen(i));
+  const web::Display last = screen(web::kMaxDisplays);
+  EXPECT_EQ(RefusalOf([&] { (void)store.displays.AddProvisioned(last); }), ChangeResult::kConflict);
+  EXPECT_THAT(store.displays.List(), SizeIs(web::kMaxDisplays));
+  store.displays.Remove(kAnna, "1");
+  EXPECT_TRUE(store.displays.AddProvisioned(last));
+  EXPECT_THAT(store.displays.List(), SizeIs(web::kMaxDisplays));
+}
+
 }  // namespace
 }  // namespace plumb

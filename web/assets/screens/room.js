@@ -23,6 +23,26 @@ const kSwap_s = 8;
 const optional = (path) => get(path, true).catch(() => null);
 const wait = (ms) => new Promise((ready) => { setTimeout(ready, ms); });
 
+/// Null without a connection.
+const claim = (secret) => fetch('/api/v1/displays/claim', {
+  method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify({ secret }),
+}).catch(() => null);
+
+/// The key of a display that the provisioning file has paired, from /room#key=KEY. Browsers send
+/// no server what follows the #; and it is not left in the address, where people could read it.
+function takeKey() {
+  const key = new URLSearchParams(location.hash.slice(1)).get('key');
+  if (key) history.replaceState(null, '', location.pathname + location.search);
+  return key;
+}
+
+/// Whether the key has paired this screen. One that is not known (any more) has not.
+async function pairedBy(key) {
+  const answer = await claim(key);
+  if (!answer || answer.status >= 500) throw new Error('no answer');
+  return answer.ok && (await answer.json()).paired;
+}
+
 /// Shows a code until an engineer has typed it on the page; then this screen has its cookie.
 async function pair(main, logIn) {
   const text = S.room;
@@ -42,10 +62,7 @@ async function pair(main, logIn) {
     for (;;) {
       await wait(kAsk_ms);
       if (currentSession()) return;
-      const answer = await fetch('/api/v1/displays/claim', {
-        method: 'POST', headers: { 'Content-Type': 'application/json' },
-        body: JSON.stringify({ secret }),
-      }).catch(() => null);
+      const answer = await claim(secret);
       if (!answer) continue;  // no connection: the code stays valid
       if (!answer.ok) break;  // its time is over: another code
       if ((await answer.json()).paired) {
@@ -340,6 +357,8 @@ export async function showRoom(main, { speak, applyTheme }) {
     chooseLanguage(kWho, wanted);
     speak(kWho);
   }
+  const key = takeKey();
+  window.addEventListener('hashchange', () => location.reload());  // a key was typed in
   for (;;) {
     try {
       const { session, fault } = await loadSession();
@@ -347,6 +366,10 @@ export async function showRoom(main, { speak, applyTheme }) {
       if (fault) {
         await showFault(main, fault);
         continue;
+      }
+      if (key && await pairedBy(key)) {
+        await loadSession();
+        break;
       }
       await pair(main, () => showLogin(main, false, () => location.reload()));
       break;

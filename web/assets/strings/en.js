@@ -578,6 +578,7 @@ export const en = {
       'user.add': 'Account created',
       'user.change': 'Account changed',
       'display.pair': 'Screen paired',
+      'display.provision': 'Screen paired by the provisioning file',
       'display.remove': 'Screen removed',
       'settings.change': 'Settings changed',
       'backup.make': 'Backup made',

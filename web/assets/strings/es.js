@@ -634,6 +634,7 @@ export const es = {
       'user.add': 'Cuenta creada',
       'user.change': 'Cuenta cambiada',
       'display.pair': 'Pantalla vinculada',
+      'display.provision': 'Pantalla vinculada por el archivo de aprovisionamiento',
       'display.remove': 'Pantalla quitada',
       'settings.change': 'Ajustes cambiados',
       'backup.make': 'Copia hecha',
