@@ -323,7 +323,7 @@ std::vector<cv::Mat> PicturesOf(const ReportSources& stored, const web::Scan& sc
                                 const ReportWords& words) {
   if (!reference || scan.folder.empty()) return {};
   if (scan.purpose == web::ScanPurpose::kReference)
-    return ReferencePictures(scan.folder, reference->plan, stored.room, words.pictures,
+    return ReferencePictures(scan.folder, reference->plan, stored.room_in, words.pictures,
                              words.sides);
   const std::optional<web::Scan> of_reference = stored.scans.Find(reference->scan_id);
   if (!scan.result || !of_reference || of_reference->folder.empty()) return {};

@@ -15,7 +15,7 @@ using web::ChangeResult;
 
 ReportSources WebScans::SourcesIn(Store& store) const {
   return {store.patients, store.references, store.scans, appliance_.warm_up_min(),
-          appliance_.RoomOnMaps()};
+          [this](const MarkerMap& scene) { return appliance_.RoomIn(scene); }};
 }
 
 std::vector<web::Scan> WebScans::Scans(const std::string& patient_id, int limit) {

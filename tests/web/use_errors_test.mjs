@@ -337,6 +337,14 @@ await h.step('the map of a plan names the sides that its posture has in a known 
     equal(at.left.y > at.right.y ? 'bottom' : 'top', left, `${name}: the left side`);
   }
   await h.look(bob, 'marks-plan', { axe: false });
+  // Its marker lay turned by 90 degrees, and so the room does on its map.
+  h.tell('room turned');
+  await bob.reload();
+  await way('head').waitFor();
+  const turned = {};
+  for (const mark of ['head', 'feet', 'left', 'right', 'gantry']) turned[mark] = await way(mark).boundingBox();
+  check(turned.gantry.y < turned.head.y && turned.head.y < turned.feet.y, 'the gantry and the head are at the top of the map');
+  check(turned.left.x > turned.right.x, 'the left side is on the right of the map');
   h.tell('room unknown');
   await bob.reload();  // or the status might be an older one
   await way('plusY').waitFor();

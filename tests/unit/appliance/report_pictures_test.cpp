@@ -138,13 +138,24 @@ TEST_F(ReportPicturesTest, OfAReferenceShowTheRegionAndTheIsocentre) {
   ASSERT_THAT(isocentre, SizeIs(1));
   EXPECT_FALSE(Same(region[0], isocentre[0]));
   Keep(isocentre[0], "reference_es");
-  const std::vector<cv::Mat> marked = ReferencePictures(reference_, plan, RoomWays{}, words, sides);
+  MarkerMap asked;
+  RoomWays room;
+  const RoomFinder room_in = [&](const MarkerMap& scene) {
+    asked = scene;
+    return room;
+  };
+  const std::vector<cv::Mat> marked = ReferencePictures(reference_, plan, room_in, words, sides);
+  EXPECT_THAT(asked, SizeIs(8)) << "the room is where the markers of this scene say it is";
   ASSERT_THAT(marked, SizeIs(1));
   EXPECT_FALSE(Same(isocentre[0], marked[0])) << "the gantry and the planned posture";
   Keep(marked[0], "reference_marks_es");
   plan.posture = "FFS";
-  EXPECT_FALSE(Same(ReferencePictures(reference_, plan, RoomWays{}, words, sides)[0], marked[0]))
+  EXPECT_FALSE(Same(ReferencePictures(reference_, plan, room_in, words, sides)[0], marked[0]))
       << "head and feet change places";
+  plan.posture = "HFS";
+  room = {.gantry = Eigen::Vector2d::UnitX(), .right = -Eigen::Vector2d::UnitY()};
+  EXPECT_FALSE(Same(ReferencePictures(reference_, plan, room_in, words, sides)[0], marked[0]))
+      << "the marker was turned: so are the marks";
   EXPECT_THAT(ReferencePictures(scan_, plan, {}, words, sides), SizeIs(0)) << "no scene";
 }
 
