@@ -127,22 +127,27 @@ std::vector<cv::Mat> ComparisonPictures(const fs::path& scan_folder,
   });
 }
 
-std::vector<cv::Mat> ReferencePictures(const fs::path& scan_folder, const web::ReferencePlan& plan,
-                                       const RoomFinder& room_in, const PictureWords& words,
-                                       const SideWords& sides) {
-  return Drawn(scan_folder, [&]() -> std::vector<cv::Mat> {
+PlanPictures ReferencePictures(const fs::path& scan_folder, const web::ReferencePlan& plan,
+                               const RoomFinder& room_in, const PictureWords& words,
+                               const SideWords& sides) {
+  PlanPictures plans;
+  plans.pictures = Drawn(scan_folder, [&]() -> std::vector<cv::Mat> {
     const Scene scene = SceneWithHeights(scan_folder);
     const HeightMap& heights = *scene.height_map;
     const std::optional<RoomWays> room = room_in ? room_in(scene.markers) : std::nullopt;
+    const std::optional<PatientPosture> posture = PostureNamed(plan.posture);
     const std::vector<std::uint8_t> region = PlannedRegion(heights.grid, plan);
     HeightImageOptions options{.region_mask = region, .words = words};
-    if (const std::optional<PatientPosture> posture = PostureNamed(plan.posture); room)
-      options.marks =
-          MapMarks(posture ? std::optional(SidesOf(*room, *posture)) : std::nullopt, room, sides);
+    std::optional<PatientAxes> patient;
+    if (room && posture) patient = SidesOf(*room, *posture);
+    options.marks = MapMarks(patient, room, sides);
     if (plan.isocentre_m)
       options.isocentre_m = Eigen::Vector2d((*plan.isocentre_m)[0], (*plan.isocentre_m)[1]);
-    return {DrawHeightImage(heights, options)};
+    std::vector<cv::Mat> pictures = {DrawHeightImage(heights, options)};
+    plans.names_sides = patient.has_value();
+    return pictures;
   });
+  return plans;
 }
 
 }  // namespace plumb

@@ -31,14 +31,18 @@ namespace plumb {
 /// Where the room lies on the maps of a scene with these markers; nothing where it is not known.
 using RoomFinder = std::function<std::optional<RoomWays>(const MarkerMap& scene)>;
 
+struct PlanPictures {
+  std::vector<cv::Mat> pictures;
+  bool names_sides = false;  ///< Those of the planned posture: nothing has been compared.
+};
+
 /// The heights of a reference with the planned region outlined and the isocentre marked; nothing if
 /// the files are missing or damaged. In a known room the marks name the sides that the patient has
 /// in the planned posture.
 /// @param room_in  Empty: the room is not known.
-[[nodiscard]] std::vector<cv::Mat> ReferencePictures(const std::filesystem::path& scan_folder,
-                                                     const web::ReferencePlan& plan,
-                                                     const RoomFinder& room_in,
-                                                     const PictureWords& words,
-                                                     const SideWords& sides);
+[[nodiscard]] PlanPictures ReferencePictures(const std::filesystem::path& scan_folder,
+                                             const web::ReferencePlan& plan,
+                                             const RoomFinder& room_in, const PictureWords& words,
+                                             const SideWords& sides);
 
 }  // namespace plumb
