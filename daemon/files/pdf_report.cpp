@@ -259,7 +259,7 @@ bool IsBold(std::size_t column) { return column == 2; }
 
 struct CourseTable {
   std::vector<std::array<std::string, kCourseColumns>> cells;  ///< As in the rows of the report.
-  std::array<double, kCourseColumns> left;                     ///< Of the columns, on the page.
+  std::array<double, kCourseColumns> left{};                   ///< Of the columns, on the page.
   double size = 8.0;                                           ///< Of the texts.
 };
 
